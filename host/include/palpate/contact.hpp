@@ -1,0 +1,39 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include <glm/vec2.hpp>
+
+#include "palpate/touch.hpp"
+
+namespace palpate {
+
+/// What one element says about the surface below it (Eq. 3).
+enum class Reading : std::uint8_t {
+  no_contact = 0,
+  in_contact = 1,
+  unknown = 2,  ///< changes nothing, anywhere
+};
+
+/// Eq. 3: In Contact where the pressure exceeds both the threshold and ratio times the touch's
+/// largest pressure, No Contact where it is below both, else Unknown (which includes equality).
+/// Dead elements are Unknown and do not take part in the maximum.
+struct ContactClassifier {
+  double threshold = 2.0;  ///< in the recording's pressure unit
+  double ratio = 0.3;
+
+  /// The class of every element, [e].
+  std::vector<Reading> classify(const Touch& touch) const;
+};
+
+/// An element that is not Unknown, in the robot frame.
+struct ElementReading {
+  glm::dvec2 position_mm;
+  Reading reading;
+};
+
+/// The elements of the touch that say something, in the array's order.
+std::vector<ElementReading> known_readings(const Touch& touch, const ContactClassifier& classifier);
+
+}  // namespace palpate

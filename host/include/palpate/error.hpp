@@ -1,0 +1,25 @@
+#pragma once
+
+#include <stdexcept>
+#include <string>
+
+namespace palpate {
+
+/// What has to change for the call to succeed.
+enum class Fault {
+  input,   ///< a file, a value or an option given by the caller
+  system,  ///< the machine: no device, out of memory, disk full, device lost
+};
+
+/// The one exception type that Palpate throws, from construction and I/O. The message is a single
+/// line that names the file, the field, the value and the remedy as far as they are known.
+class Error : public std::runtime_error {
+ public:
+  Error(Fault fault, const std::string& message) : std::runtime_error(message), fault_(fault) {}
+  Fault fault() const noexcept { return fault_; }
+
+ private:
+  Fault fault_;
+};
+
+}  // namespace palpate

@@ -1,0 +1,42 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "palpate/lattice.hpp"
+#include "palpate/occupancy_grid.hpp"
+#include "palpate/touch.hpp"
+
+namespace palpate {
+
+// Every reader throws Error (Fault::input) in one line that names the file, the field and the
+// remedy; readers ignore what they do not know and refuse a higher version. Every writer leaves a
+// whole file or none: it writes beside the target and renames.
+
+/// Reads a "palpate.recording" HDF5 file.
+Recording read_recording(const std::filesystem::path& path);
+void write_recording(const std::filesystem::path& path, const Recording& recording);
+
+/// Reads a "palpate.map" HDF5 file.
+OccupancyGrid read_map(const std::filesystem::path& path);
+void write_map(const std::filesystem::path& path, const OccupancyGrid& map);
+
+/// Writes map.pgm and map.yaml in the map_server convention of ROS (trinary; occupied is black;
+/// the resolution and origin in metres; the first image row is the largest y), beside each other.
+/// `yaml_path` ends in .yaml; the image takes its stem.
+void write_map_server(const std::filesystem::path& yaml_path, const OccupancyGrid& map);
+
+/// The posterior of one recording, as in a "palpate.posterior" HDF5 file.
+struct Posterior {
+  std::vector<std::string> objects;
+  PoseLattice lattice;
+  std::vector<double> log_likelihood;  ///< [object, theta, y, x] in nats, without prior weights
+};
+Posterior read_posterior(const std::filesystem::path& path);
+void write_posterior(const std::filesystem::path& path, const Posterior& posterior);
+
+/// The `format` attribute of an HDF5 file, such as "palpate.map".
+std::string read_format(const std::filesystem::path& path);
+
+}  // namespace palpate

@@ -1,0 +1,50 @@
+#pragma once
+
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "palpate/contact.hpp"
+#include "palpate/device.hpp"
+#include "palpate/occupancy_grid.hpp"
+#include "palpate/sensor_model.hpp"
+
+namespace palpate {
+
+struct MapOptions {
+  double cell_mm = 0.5;
+  InverseSensorModel sensor;
+  ContactClassifier classifier;
+};
+
+/// Builds an object's occupancy grid from touches at known poses (Sec. II). The object frame is
+/// the robot frame of the touches. Updates add up, so their order does not matter.
+class MapBuilder {
+ public:
+  /// @throws Error on a cell size, spread, peak or prior out of range.
+  MapBuilder(Device& device, const MapOptions& options);
+  ~MapBuilder();
+  MapBuilder(MapBuilder&&) noexcept;
+  MapBuilder& operator=(MapBuilder&&) noexcept;
+
+  /// Adds the evidence of these touches.
+  void add(std::span<const Touch> touches);
+
+  /// The map of all touches so far. It covers the known elements and the support of the sensor
+  /// model around them, no more; each cell is within 1e-3 nats of the sum over all elements.
+  /// @throws Error if no element of any touch was In Contact or No Contact.
+  OccupancyGrid build(const std::string& label) const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+/// p(m) estimated as in the paper: the objects' area over the modelled area, pooled over all
+/// objects. Both areas are counted on maps built with an even prior, in which a cell is occupied
+/// when its evidence speaks for contact and modelled when it has evidence at all.
+double estimate_prior(Device& device, std::span<const std::vector<Touch>> touches_per_object,
+                      MapOptions options);
+
+}  // namespace palpate

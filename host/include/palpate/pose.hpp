@@ -1,0 +1,29 @@
+#pragma once
+
+#include <glm/vec2.hpp>
+
+namespace palpate {
+
+/// A rigid transformation of the plane. Written T_a_b it maps coordinates in frame b to frame a:
+/// p_a = R(theta_rad) p_b + translation_mm.
+struct Pose {
+  glm::dvec2 translation_mm{0.0, 0.0};
+  double theta_rad = 0.0;  ///< counter-clockwise, of any number of turns
+};
+
+/// T_a_c = T_a_b * T_b_c. Angles add; they are not wrapped.
+Pose operator*(const Pose& T_a_b, const Pose& T_b_c);
+
+/// p_a = T_a_b * p_b, in mm.
+glm::dvec2 operator*(const Pose& T_a_b, const glm::dvec2& p_b);
+
+/// T_b_a from T_a_b.
+Pose inverse(const Pose& T_a_b);
+
+/// R(theta) v.
+glm::dvec2 rotate(double theta_rad, const glm::dvec2& v);
+
+/// The same angle in [-period/2, period/2).
+double wrap_angle(double theta_rad, double period_rad);
+
+}  // namespace palpate

@@ -1,0 +1,26 @@
+#pragma once
+
+#include <glm/vec2.hpp>
+
+#include "palpate/occupancy_grid.hpp"
+#include "palpate/pose.hpp"
+
+namespace palpate {
+
+/// A body of uniform density over a map's occupied cells (log odds > 0), in the object frame.
+struct Body {
+  glm::dvec2 centroid_mm{0.0, 0.0};
+  double inertia_mm2 = 0.0;  ///< mean squared distance from the centroid
+};
+
+/// Throws Error if no cell is occupied.
+Body body_of(const OccupancyGrid& map);
+
+/// Root mean squared displacement in mm of the body between the estimated and the true pose
+/// (Chirikjian and Zhou 1998; Eq. 17-20): sqrt(|centroid difference|^2 + 2 J (1 - cos dtheta)),
+/// centroids compared in the robot frame. Symmetry n wraps dtheta into [-pi/n, pi/n); n = 0, full
+/// symmetry, ignores it. 1 mm of pure translation scores 1.
+double pose_error_mm(const Body& body, int symmetry, const Pose& T_object_robot_estimate,
+                     const Pose& T_object_robot_truth);
+
+}  // namespace palpate

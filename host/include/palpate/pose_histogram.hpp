@@ -1,0 +1,85 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "palpate/contact.hpp"
+#include "palpate/device.hpp"
+#include "palpate/lattice.hpp"
+#include "palpate/occupancy_grid.hpp"
+
+namespace palpate {
+
+/// An object that the unknown may turn out to be.
+struct Hypothesis {
+  OccupancyGrid map;
+  double weight = 1.0;  ///< prior weight, relative to the other objects'
+};
+
+struct HistogramOptions {
+  PoseLattice lattice;
+  ContactClassifier classifier;
+  double gamma = 0.1;
+  double prior = 0.2;  ///< p(m) of Eq. 7 and of the space beyond the maps
+};
+
+/// The bin of the largest posterior probability (Eq. 15-16).
+struct Mode {
+  int object = 0;        ///< index into the hypotheses
+  std::int64_t bin = 0;  ///< index into the lattice
+  Pose T_object_robot;
+  double log_likelihood = 0.0;  ///< of all touches, without prior weights, in nats
+};
+
+/// What the belief says about the unknown object, after any number of touches.
+struct Estimate {
+  std::vector<double> identity;  ///< probability of every hypothesis, Eq. 14, sums to 1
+  Mode mode;
+};
+
+/// Histogram filter over object identity and planar pose (Sec. III-C, Eq. 13-16): a dense lattice
+/// of poses for every object, kept in logs on the device, in two floats per bin so that accuracy
+/// does not decay with the number of touches. The same input gives the same bits on one device.
+class PoseHistogram {
+ public:
+  /// Uploads the maps and sets a uniform belief. Ties go to the first object and the lowest bin.
+  /// @throws Error on an empty list, a map with no cells or with infinite log odds, weights that
+  /// are not positive, a lattice or gamma out of range, or too little device memory.
+  PoseHistogram(Device& device, std::span<const Hypothesis> hypotheses,
+                const HistogramOptions& options);
+  ~PoseHistogram();
+  PoseHistogram(PoseHistogram&&) noexcept;
+  PoseHistogram& operator=(PoseHistogram&&) noexcept;
+
+  /// Back to the uniform belief, for the next unknown.
+  void reset();
+
+  /// Multiplies the belief by the likelihood of these touches (Eq. 7, 13). `progress` is called
+  /// with the fraction done, now and then.
+  void update(std::span<const Touch> touches, const std::function<void(double)>& progress = {});
+  void update(const Touch& touch) { update(std::span(&touch, 1)); }
+
+  /// Identity probabilities and mode.
+  Estimate estimate() const;
+
+  /// Probability of every (x, y) of one object, summed over theta, [ny, nx]; all objects' sum to 1.
+  std::vector<double> marginal_xy(int object) const;
+  /// Probability of every theta of one object, summed over (x, y), [ntheta].
+  std::vector<double> marginal_theta(int object) const;
+  /// Log-likelihood of every bin of one object in nats, [theta, y, x], without prior weights.
+  std::vector<double> log_likelihood(int object) const;
+
+  const PoseLattice& lattice() const;
+  /// Device memory held, in bytes, maps and tables included.
+  std::uint64_t device_bytes() const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace palpate

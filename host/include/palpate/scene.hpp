@@ -1,0 +1,51 @@
+#pragma once
+
+#include <array>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <glm/vec2.hpp>
+
+namespace palpate {
+
+/// What a scene file says. Everything that it may leave out is optional; a flag of the command line
+/// overrides its key.
+struct Scene {
+  /// One of the objects to tell apart. What is given here overrides the map's own.
+  struct Object {
+    std::filesystem::path map;
+    std::optional<std::string> label;
+    std::optional<int> symmetry;  ///< n-fold; 0 = full
+    double weight = 1.0;          ///< prior weight, relative to the other objects'
+  };
+
+  /// Ranges [lower, upper] of the lattice over T_object_robot, and its pivot; see PoseLattice.
+  struct Region {
+    std::optional<std::array<double, 2>> x_mm;
+    std::optional<std::array<double, 2>> y_mm;
+    std::optional<std::array<double, 2>> theta_deg;
+    std::optional<glm::dvec2> pivot_mm;  ///< in the robot frame
+  };
+
+  std::optional<std::vector<glm::dvec2>> array_mm;  ///< element centres in the sensor frame
+  std::optional<double> threshold;                  ///< in the recording's pressure unit
+  std::optional<double> ratio;
+  std::optional<double> gamma;
+  std::optional<double> prior;
+  std::vector<Object> objects;
+  Region region;
+  std::optional<std::array<int, 3>> bins;  ///< of x, y, theta
+  std::optional<std::string> filter;       ///< "auto", "histogram", "bounded" or "particles"
+  std::optional<std::string> device;       ///< a device's name or index
+};
+
+/// Reads a YAML scene file. Paths in it are relative to the file's folder; those returned are not.
+/// `array` is "digitacts", a text file with a line "x y" in mm per element ('#' starts a comment),
+/// or a list of [x, y] in mm.
+/// @throws Error naming the file, the line, the key, the value and the remedy, also for a key that
+/// is not known or given twice.
+Scene read_scene(const std::filesystem::path& path);
+
+}  // namespace palpate

@@ -1,0 +1,59 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include <glm/vec2.hpp>
+
+#include "palpate/pose.hpp"
+
+namespace palpate {
+
+/// The central 6 x 6 region of two PPS DigiTacts pads side by side, in the sensor frame, in mm:
+/// columns at x = +-1.1, +-3.0, +-4.9, rows at y = (k - 2.5) * 1.9; row by row, x fastest.
+std::vector<glm::dvec2> digitacts_array();
+
+/// Edge length of a DigiTacts element, in mm.
+inline constexpr double digitacts_element_mm = 1.8;
+
+/// One reading of the tactile array at a known pose. A view: the caller keeps the memory alive.
+struct Touch {
+  Pose T_robot_sensor;
+  std::span<const glm::dvec2> elements_mm;   ///< [e] element centres in the sensor frame
+  std::span<const double> pressure;          ///< [e] in the recording's unit
+  std::span<const std::uint8_t> valid = {};  ///< [e] 0 = dead element; empty: all are alive
+};
+
+/// Where an unknown object really was, when it is known.
+struct Truth {
+  std::string object;
+  Pose T_object_robot;
+};
+
+/// A sequence of readings of one array pressed against one object.
+struct Recording {
+  std::string path;                     ///< the file it was read from, for messages
+  std::string object;                   ///< label, "" when unknown
+  std::string pressure_unit = "kPa";    ///< "kPa" or "raw"
+  std::string rows = "touches";         ///< "touches", or "frames" for a raw stream
+  std::vector<Pose> T_robot_sensor;     ///< [n]
+  std::vector<double> pressure;         ///< [n, e]
+  std::vector<glm::dvec2> elements_mm;  ///< [e], or [n, e] where the array changes
+  std::vector<std::uint8_t> valid;      ///< empty, [e] or [n, e]; 0 = dead element
+  std::vector<double> time_s;           ///< empty or [n], since the Unix epoch
+  std::optional<Truth> truth;
+
+  /// Number of touches, n.
+  std::size_t size() const { return T_robot_sensor.size(); }
+  /// Number of elements of the array, e.
+  std::size_t elements() const { return size() == 0 ? 0 : pressure.size() / size(); }
+  /// Touch i, a view into this recording.
+  Touch touch(std::size_t i) const;
+  /// Touches [begin, end), views into this recording.
+  std::vector<Touch> touches(std::size_t begin, std::size_t end) const;
+};
+
+}  // namespace palpate

@@ -1,0 +1,59 @@
+#include "palpate/lattice.hpp"
+
+#include <cmath>
+
+#include <fmt/format.h>
+
+#include "palpate/error.hpp"
+
+namespace palpate {
+
+namespace {
+
+void validate_axis(const char* name, const Axis& axis) {
+  if (axis.count < 1) {
+    throw Error(Fault::input, fmt::format("bins {} = {}: give at least 1", name, axis.count));
+  }
+  if (!std::isfinite(axis.lower) || !std::isfinite(axis.upper)) {
+    throw Error(Fault::input,
+                fmt::format("range {} = {}:{}: give finite numbers", name, axis.lower, axis.upper));
+  }
+  if (axis.lower > axis.upper) {
+    throw Error(Fault::input, fmt::format("range {} = {}:{}: reversed, write the lower end first",
+                                          name, axis.lower, axis.upper));
+  }
+}
+
+}  // namespace
+
+PoseLattice& PoseLattice::collapse_fixed() {
+  for (Axis* axis : {&x_mm, &y_mm, &theta_rad}) {
+    if (axis->lower == axis->upper && axis->count > 1) {
+      axis->count = 1;
+    }
+  }
+  return *this;
+}
+
+void PoseLattice::validate() const {
+  validate_axis("x_mm", x_mm);
+  validate_axis("y_mm", y_mm);
+  validate_axis("theta_rad", theta_rad);
+  if (!std::isfinite(pivot_mm.x) || !std::isfinite(pivot_mm.y)) {
+    throw Error(Fault::input,
+                fmt::format("pivot_mm = {},{}: give finite numbers", pivot_mm.x, pivot_mm.y));
+  }
+}
+
+Pose PoseLattice::T_object_robot(std::int64_t index) const {
+  const std::int64_t in_plane = index % plane();
+  return T_object_robot(x_mm.centre(static_cast<int>(in_plane % x_mm.count)),
+                        y_mm.centre(static_cast<int>(in_plane / x_mm.count)),
+                        theta_rad.centre(static_cast<int>(index / plane())));
+}
+
+Pose PoseLattice::T_object_robot(double x, double y, double theta) const {
+  return {glm::dvec2(x, y) - rotate(theta, pivot_mm), theta};
+}
+
+}  // namespace palpate

@@ -1,0 +1,78 @@
+#include "palpate/sensor_model.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include <fmt/format.h>
+
+#include "palpate/error.hpp"
+#include "palpate/occupancy_grid.hpp"
+
+namespace palpate {
+
+namespace {
+
+void require_probability(const char* name, double value) {
+  if (!(value > 0.0 && value < 1.0)) {
+    throw Error(Fault::input,
+                fmt::format("{} = {}: must lie strictly between 0 and 1", name, value));
+  }
+}
+
+}  // namespace
+
+void InverseSensorModel::validate() const {
+  if (!(spread_mm > 0.0) || !std::isfinite(spread_mm)) {
+    throw Error(Fault::input, fmt::format("spread = {} mm: give a positive length", spread_mm));
+  }
+  if (!(peak > 0.0 && peak < 1.0)) {
+    throw Error(Fault::input,
+                fmt::format("peak = {}: must lie strictly between 0 and 1, or one reading would "
+                            "make a cell certain",
+                            peak));
+  }
+  require_probability("prior", prior);
+}
+
+double InverseSensorModel::increment(Reading reading, double distance_mm) const {
+  if (reading == Reading::unknown) {
+    return 0.0;
+  }
+  const double g = peak * std::exp(-distance_mm * distance_mm / (2.0 * spread_mm * spread_mm));
+  // Eq. 5 put into log odds; log1p keeps the small increments far from the element exact.
+  return reading == Reading::in_contact ? std::log1p(g * (1.0 - prior) / prior) - std::log1p(-g)
+                                        : std::log1p(-g) - std::log1p(g * prior / (1.0 - prior));
+}
+
+double InverseSensorModel::support_radius_mm(std::size_t readings, double tolerance) const {
+  // Where g <= 1/2 an increment is at most 2 g / min(m, 1 - m), since log1p(x) <= x and
+  // -log1p(-g) <= 2 g. `readings` of them stay below the tolerance once g does below this:
+  const double least = std::min(prior, 1.0 - prior) / 2.0;
+  const double g =
+      std::min(0.5, tolerance * least / static_cast<double>(std::max<std::size_t>(readings, 1)));
+  return spread_mm * std::sqrt(std::max(0.0, 2.0 * std::log(peak / g)));
+}
+
+void ContactLikelihood::validate() const {
+  if (!(gamma >= 0.0 && gamma < 1.0)) {
+    throw Error(Fault::input, fmt::format("gamma = {}: must lie in [0, 1)", gamma));
+  }
+  require_probability("prior", prior);
+}
+
+double ContactLikelihood::log_likelihood(Reading reading, double log_odds) const {
+  if (reading == Reading::unknown) {
+    return 0.0;
+  }
+  const double l = reading == Reading::in_contact ? log_odds : -log_odds;
+  // log of the logistic function, exact where the function itself would underflow.
+  const double log_p = std::min(l, 0.0) - std::log1p(std::exp(-std::abs(l)));
+  if (gamma == 0.0) {
+    return log_p;
+  }
+  const double a = std::log(gamma * prior);
+  const double b = std::log1p(-gamma) + log_p;
+  return std::max(a, b) + std::log1p(std::exp(-std::abs(a - b)));
+}
+
+}  // namespace palpate

@@ -1,0 +1,38 @@
+#include "palpate/touch.hpp"
+
+namespace palpate {
+
+std::vector<glm::dvec2> digitacts_array() {
+  constexpr double columns_mm[] = {-4.9, -3.0, -1.1, 1.1, 3.0, 4.9};
+  std::vector<glm::dvec2> elements;
+  elements.reserve(36);
+  for (int row = 0; row < 6; ++row) {
+    for (const double x : columns_mm) {
+      elements.emplace_back(x, (row - 2.5) * 1.9);
+    }
+  }
+  return elements;
+}
+
+Touch Recording::touch(std::size_t i) const {
+  const std::size_t e = elements();
+  // An array that changes, or elements that die on the way, have a row per touch.
+  const auto row = [&](const auto& values) {
+    return std::span(values).subspan(values.size() == e ? 0 : i * e, e);
+  };
+  return {.T_robot_sensor = T_robot_sensor[i],
+          .elements_mm = row(elements_mm),
+          .pressure = std::span(pressure).subspan(i * e, e),
+          .valid = valid.empty() ? std::span<const std::uint8_t>{} : row(valid)};
+}
+
+std::vector<Touch> Recording::touches(std::size_t begin, std::size_t end) const {
+  std::vector<Touch> views;
+  views.reserve(end - begin);
+  for (std::size_t i = begin; i < end; ++i) {
+    views.push_back(touch(i));
+  }
+  return views;
+}
+
+}  // namespace palpate
