@@ -1,0 +1,74 @@
+#include "buffer.hpp"
+
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "palpate/error.hpp"
+#include "result.hpp"
+
+namespace palpate::gpu {
+
+Buffer::Buffer(Context& context, VkDeviceSize bytes, Memory memory, std::string_view purpose)
+    : device_(context.device()), bytes_(bytes) {
+  const auto doing = fmt::format("device '{}': {:.1f} MiB for {}", context.name(),
+                                 static_cast<double>(bytes) / (1 << 20), purpose);
+  if (bytes > context.limits().allocation) {
+    throw Error(Fault::system,
+                fmt::format("{}: more than the {:.1f} MiB it allocates at once; use fewer bins, "
+                            "objects or cells",
+                            doing, static_cast<double>(context.limits().allocation) / (1 << 20)));
+  }
+  const VkBufferCreateInfo info{
+      .sType = VK_STRUCTURE_TYPE_BUFFER_CREATE_INFO,
+      .size = bytes,
+      .usage = static_cast<VkBufferUsageFlags>(
+          memory == Memory::device
+              ? VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_SRC_BIT |
+                    VK_BUFFER_USAGE_TRANSFER_DST_BIT
+          : memory == Memory::upload ? VK_BUFFER_USAGE_TRANSFER_SRC_BIT
+                                     : VK_BUFFER_USAGE_TRANSFER_DST_BIT)};
+  check(vkCreateBuffer(device_, &info, nullptr, &buffer_), doing);
+
+  // A constructor that throws runs no destructor: this object gives back what it has so far.
+  Buffer owner;
+  swap(owner);
+  VkMemoryRequirements needs;
+  vkGetBufferMemoryRequirements(owner.device_, owner.buffer_, &needs);
+  constexpr VkMemoryPropertyFlags mapped =
+      VK_MEMORY_PROPERTY_HOST_VISIBLE_BIT | VK_MEMORY_PROPERTY_HOST_COHERENT_BIT;
+  const std::uint32_t type =
+      memory == Memory::device
+          ? context.memory_type(needs.memoryTypeBits, 0, VK_MEMORY_PROPERTY_DEVICE_LOCAL_BIT)
+      : memory == Memory::upload
+          ? context.memory_type(needs.memoryTypeBits, mapped, 0)
+          : context.memory_type(needs.memoryTypeBits, mapped, VK_MEMORY_PROPERTY_HOST_CACHED_BIT);
+  const VkMemoryAllocateInfo allocation{.sType = VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_INFO,
+                                        .allocationSize = needs.size,
+                                        .memoryTypeIndex = type};
+  check(vkAllocateMemory(owner.device_, &allocation, nullptr, &owner.memory_), doing);
+  check(vkBindBufferMemory(owner.device_, owner.buffer_, owner.memory_, 0), doing);
+  if (memory != Memory::device) {
+    void* mapping = nullptr;
+    check(vkMapMemory(owner.device_, owner.memory_, 0, VK_WHOLE_SIZE, 0, &mapping), doing);
+    owner.data_ = static_cast<std::byte*>(mapping);
+  }
+  swap(owner);
+}
+
+Buffer::~Buffer() {
+  if (device_ != VK_NULL_HANDLE) {
+    vkDestroyBuffer(device_, buffer_, nullptr);
+    vkFreeMemory(device_, memory_, nullptr);
+  }
+}
+
+void Buffer::swap(Buffer& other) noexcept {
+  std::swap(device_, other.device_);
+  std::swap(buffer_, other.buffer_);
+  std::swap(memory_, other.memory_);
+  std::swap(bytes_, other.bytes_);
+  std::swap(data_, other.data_);
+}
+
+}  // namespace palpate::gpu

@@ -1,0 +1,45 @@
+#pragma once
+
+#include <string_view>
+
+#include "context.hpp"
+
+namespace palpate::gpu {
+
+/// Where a buffer lives. Data always travels through staging memory, also where a device could
+/// map its own: one path for every machine, which the tests on a CPU device exercise too.
+enum class Memory {
+  device,    ///< storage of kernels; the host cannot see it
+  upload,    ///< host memory, mapped, that the device copies from
+  download,  ///< host memory, mapped, that the device copies to
+};
+
+/// A Vulkan buffer with memory of its own. Move-only.
+class Buffer {
+ public:
+  Buffer() = default;
+  /// @param purpose what it holds, for the message when memory runs out
+  Buffer(Context& context, VkDeviceSize bytes, Memory memory, std::string_view purpose);
+  Buffer(Buffer&& other) noexcept { swap(other); }
+  Buffer& operator=(Buffer&& other) noexcept {
+    swap(other);
+    return *this;
+  }
+  ~Buffer();
+
+  VkBuffer handle() const { return buffer_; }
+  VkDeviceSize bytes() const { return bytes_; }
+  /// Start of the mapped memory; null for Memory::device.
+  std::byte* data() const { return data_; }
+
+ private:
+  void swap(Buffer& other) noexcept;
+
+  VkDevice device_ = VK_NULL_HANDLE;
+  VkBuffer buffer_ = VK_NULL_HANDLE;
+  VkDeviceMemory memory_ = VK_NULL_HANDLE;
+  VkDeviceSize bytes_ = 0;
+  std::byte* data_ = nullptr;
+};
+
+}  // namespace palpate::gpu

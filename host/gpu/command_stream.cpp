@@ -1,0 +1,282 @@
+#include "command_stream.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <limits>
+
+#include <fmt/format.h>
+
+#include "palpate/error.hpp"
+#include "result.hpp"
+#include "selection.hpp"
+
+namespace palpate::gpu {
+
+namespace {
+
+constexpr std::uint32_t sets_per_pool = 64;
+constexpr VkDeviceSize staging_block = 4 << 20;
+
+}  // namespace
+
+CommandStream::CommandStream(Context& context) : context_(context) {
+  const VkDevice device = context.device();
+  try {
+    const VkCommandPoolCreateInfo pool_info{.sType = VK_STRUCTURE_TYPE_COMMAND_POOL_CREATE_INFO,
+                                            .queueFamilyIndex = context.queue_family()};
+    check(vkCreateCommandPool(device, &pool_info, nullptr, &pool_), "creating a command pool");
+    const VkCommandBufferAllocateInfo buffer_info{
+        .sType = VK_STRUCTURE_TYPE_COMMAND_BUFFER_ALLOCATE_INFO,
+        .commandPool = pool_,
+        .level = VK_COMMAND_BUFFER_LEVEL_PRIMARY,
+        .commandBufferCount = 1};
+    check(vkAllocateCommandBuffers(device, &buffer_info, &commands_), "creating commands");
+    const VkFenceCreateInfo fence_info{.sType = VK_STRUCTURE_TYPE_FENCE_CREATE_INFO};
+    check(vkCreateFence(device, &fence_info, nullptr, &fence_), "creating a fence");
+    if (context.limits().timestamp_ns > 0.0F) {
+      const VkQueryPoolCreateInfo query_info{.sType = VK_STRUCTURE_TYPE_QUERY_POOL_CREATE_INFO,
+                                             .queryType = VK_QUERY_TYPE_TIMESTAMP,
+                                             .queryCount = 2};
+      check(vkCreateQueryPool(device, &query_info, nullptr, &timestamps_), "creating timestamps");
+    }
+  } catch (...) {
+    reset();
+    throw;
+  }
+}
+
+CommandStream::~CommandStream() { reset(); }
+
+void CommandStream::reset() {
+  const VkDevice device = context_.device();
+  for (const VkDescriptorPool pool : descriptor_pools_) {
+    vkDestroyDescriptorPool(device, pool, nullptr);
+  }
+  vkDestroyQueryPool(device, timestamps_, nullptr);
+  vkDestroyFence(device, fence_, nullptr);
+  vkDestroyCommandPool(device, pool_, nullptr);
+}
+
+template <typename Commands>
+void CommandStream::record(const Commands& commands) {
+  try {
+    begin();
+    commands();
+  } catch (...) {
+    rewind();
+    throw;
+  }
+}
+
+void CommandStream::begin() {
+  if (recording_) {
+    return;
+  }
+  const VkCommandBufferBeginInfo info{.sType = VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO,
+                                      .flags = VK_COMMAND_BUFFER_USAGE_ONE_TIME_SUBMIT_BIT};
+  check(vkBeginCommandBuffer(commands_, &info), "recording commands");
+  if (timestamps_ != VK_NULL_HANDLE) {
+    vkCmdResetQueryPool(commands_, timestamps_, 0, 2);
+    vkCmdWriteTimestamp(commands_, VK_PIPELINE_STAGE_TOP_OF_PIPE_BIT, timestamps_, 0);
+  }
+  recording_ = true;
+}
+
+void CommandStream::barrier() {
+  constexpr VkPipelineStageFlags stages =
+      VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT | VK_PIPELINE_STAGE_TRANSFER_BIT;
+  const VkMemoryBarrier memory{
+      .sType = VK_STRUCTURE_TYPE_MEMORY_BARRIER,
+      .srcAccessMask = VK_ACCESS_SHADER_WRITE_BIT | VK_ACCESS_TRANSFER_WRITE_BIT,
+      .dstAccessMask = VK_ACCESS_SHADER_READ_BIT | VK_ACCESS_SHADER_WRITE_BIT |
+                       VK_ACCESS_TRANSFER_READ_BIT | VK_ACCESS_TRANSFER_WRITE_BIT};
+  vkCmdPipelineBarrier(commands_, stages, stages, 0, 1, &memory, 0, nullptr, 0, nullptr);
+}
+
+CommandStream::Slice CommandStream::stage(Arena& arena, VkDeviceSize bytes) {
+  if (arena.blocks.empty() || arena.used + bytes > arena.blocks.back().bytes()) {
+    arena.blocks.emplace_back(context_, std::max(bytes, staging_block), arena.memory, "staging");
+    arena.used = 0;
+  }
+  const Slice slice{&arena.blocks.back(), arena.used};
+  arena.used += (bytes + 15) / 16 * 16;
+  return slice;
+}
+
+void CommandStream::upload_bytes(const Buffer& target, std::span<const std::byte> bytes,
+                                 VkDeviceSize offset) {
+  if (bytes.empty()) {
+    return;
+  }
+  record([&] {
+    const Slice slice = stage(upload_, bytes.size());
+    std::memcpy(slice.block->data() + slice.offset, bytes.data(), bytes.size());
+    const VkBufferCopy copy{slice.offset, offset, bytes.size()};
+    barrier();
+    vkCmdCopyBuffer(commands_, slice.block->handle(), target.handle(), 1, &copy);
+  });
+}
+
+void CommandStream::download_bytes(const Buffer& source, std::span<std::byte> bytes,
+                                   VkDeviceSize offset) {
+  if (bytes.empty()) {
+    return;
+  }
+  record([&] {
+    const Slice slice = stage(download_, bytes.size());
+    const VkBufferCopy copy{offset, slice.offset, bytes.size()};
+    barrier();
+    vkCmdCopyBuffer(commands_, source.handle(), slice.block->handle(), 1, &copy);
+    downloads_.push_back({bytes.data(), slice.block->data() + slice.offset, bytes.size()});
+  });
+}
+
+void CommandStream::fill(const Buffer& target, std::uint32_t word) {
+  record([&] {
+    barrier();
+    vkCmdFillBuffer(commands_, target.handle(), 0, VK_WHOLE_SIZE, word);
+  });
+}
+
+VkDescriptorSet CommandStream::descriptor_set(const Kernel& kernel,
+                                              std::span<const Binding> bindings) {
+  const VkDevice device = context_.device();
+  if (sets_used_ == descriptor_pools_.size() * sets_per_pool) {
+    const VkDescriptorPoolSize size{VK_DESCRIPTOR_TYPE_STORAGE_BUFFER,
+                                    sets_per_pool * max_storage_buffers};
+    const VkDescriptorPoolCreateInfo info{.sType = VK_STRUCTURE_TYPE_DESCRIPTOR_POOL_CREATE_INFO,
+                                          .maxSets = sets_per_pool,
+                                          .poolSizeCount = 1,
+                                          .pPoolSizes = &size};
+    VkDescriptorPool pool = VK_NULL_HANDLE;
+    check(vkCreateDescriptorPool(device, &info, nullptr, &pool), "creating a descriptor pool");
+    descriptor_pools_.push_back(pool);
+  }
+  const VkDescriptorSetLayout layout = kernel.set_layout();
+  const VkDescriptorSetAllocateInfo info{
+      .sType = VK_STRUCTURE_TYPE_DESCRIPTOR_SET_ALLOCATE_INFO,
+      .descriptorPool = descriptor_pools_[sets_used_ / sets_per_pool],
+      .descriptorSetCount = 1,
+      .pSetLayouts = &layout};
+  VkDescriptorSet set = VK_NULL_HANDLE;
+  check(vkAllocateDescriptorSets(device, &info, &set), "binding buffers");
+  ++sets_used_;
+
+  std::array<VkDescriptorBufferInfo, max_storage_buffers> ranges{};
+  std::array<VkWriteDescriptorSet, max_storage_buffers> writes{};
+  for (std::size_t i = 0; i < bindings.size(); ++i) {
+    const Binding& binding = bindings[i];
+    const VkDeviceSize bytes =
+        binding.bytes == VK_WHOLE_SIZE ? binding.buffer->bytes() - binding.offset : binding.bytes;
+    if (bytes > context_.limits().storage_range) {
+      throw Error(Fault::system,
+                  fmt::format("kernel {}: binding {} of {} B exceeds the device's {} B",
+                              kernel.name(), i, bytes, context_.limits().storage_range));
+    }
+    ranges[i] = {binding.buffer->handle(), binding.offset, bytes};
+    writes[i] = {.sType = VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET,
+                 .dstSet = set,
+                 .dstBinding = static_cast<std::uint32_t>(i),
+                 .descriptorCount = 1,
+                 .descriptorType = VK_DESCRIPTOR_TYPE_STORAGE_BUFFER,
+                 .pBufferInfo = &ranges[i]};
+  }
+  vkUpdateDescriptorSets(device, static_cast<std::uint32_t>(bindings.size()), writes.data(), 0,
+                         nullptr);
+  return set;
+}
+
+void CommandStream::dispatch_bytes(const Kernel& kernel, std::span<const Binding> bindings,
+                                   std::span<const std::byte> push,
+                                   std::array<std::uint32_t, 3> groups) {
+  record([&] {
+    const auto& most = context_.limits().group_count;
+    if (bindings.size() != kernel.buffers() || push.size() != kernel.push_bytes() ||
+        groups[0] > most[0] || groups[1] > most[1] || groups[2] > most[2]) {
+      throw Error(
+          Fault::system,
+          fmt::format("kernel {}: {} buffers, {} B of constants and {} x {} x {} workgroups "
+                      "do not fit it or the device",
+                      kernel.name(), bindings.size(), push.size(), groups[0], groups[1],
+                      groups[2]));
+    }
+    const VkDescriptorSet set = descriptor_set(kernel, bindings);
+    barrier();
+    vkCmdBindPipeline(commands_, VK_PIPELINE_BIND_POINT_COMPUTE, kernel.pipeline());
+    vkCmdBindDescriptorSets(commands_, VK_PIPELINE_BIND_POINT_COMPUTE, kernel.layout(), 0, 1, &set,
+                            0, nullptr);
+    vkCmdPushConstants(commands_, kernel.layout(), VK_SHADER_STAGE_COMPUTE_BIT, 0,
+                       static_cast<std::uint32_t>(push.size()), push.data());
+    vkCmdDispatch(commands_, groups[0], groups[1], groups[2]);
+  });
+}
+
+void CommandStream::run() {
+  if (!recording_) {
+    return;
+  }
+  try {
+    submit();
+  } catch (...) {
+    rewind();
+    throw;
+  }
+  rewind();
+  context_.validation().throw_if_any();
+}
+
+void CommandStream::submit() {
+  // What the device wrote into staging memory must be visible to the host after the fence.
+  const VkMemoryBarrier to_host{.sType = VK_STRUCTURE_TYPE_MEMORY_BARRIER,
+                                .srcAccessMask = VK_ACCESS_TRANSFER_WRITE_BIT,
+                                .dstAccessMask = VK_ACCESS_HOST_READ_BIT};
+  vkCmdPipelineBarrier(commands_, VK_PIPELINE_STAGE_TRANSFER_BIT, VK_PIPELINE_STAGE_HOST_BIT, 0, 1,
+                       &to_host, 0, nullptr, 0, nullptr);
+  if (timestamps_ != VK_NULL_HANDLE) {
+    vkCmdWriteTimestamp(commands_, VK_PIPELINE_STAGE_BOTTOM_OF_PIPE_BIT, timestamps_, 1);
+  }
+  check(vkEndCommandBuffer(commands_), "recording commands");
+  const VkSubmitInfo submit{.sType = VK_STRUCTURE_TYPE_SUBMIT_INFO,
+                            .commandBufferCount = 1,
+                            .pCommandBuffers = &commands_};
+  const VkDevice device = context_.device();
+  const auto doing = fmt::format("running on device '{}'", context_.name());
+  const auto start = std::chrono::steady_clock::now();
+  check(vkQueueSubmit(context_.queue(), 1, &submit, fence_), doing);
+  check(vkWaitForFences(device, 1, &fence_, VK_TRUE, std::numeric_limits<std::uint64_t>::max()),
+        doing);
+  device_seconds_ = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  if (timestamps_ != VK_NULL_HANDLE) {
+    std::array<std::uint64_t, 2> ticks{};
+    check(vkGetQueryPoolResults(device, timestamps_, 0, 2, sizeof ticks, ticks.data(),
+                                sizeof ticks[0], VK_QUERY_RESULT_64_BIT),
+          doing);
+    device_seconds_ =
+        static_cast<double>(ticks[1] - ticks[0]) * context_.limits().timestamp_ns * 1e-9;
+  }
+  for (const Download& download : downloads_) {
+    std::memcpy(download.target, download.source, download.bytes);
+  }
+}
+
+void CommandStream::rewind() {
+  const VkDevice device = context_.device();
+  recording_ = false;
+  downloads_.clear();
+  check(vkResetFences(device, 1, &fence_), "resetting a fence");
+  check(vkResetCommandPool(device, pool_, 0), "resetting commands");
+  for (const VkDescriptorPool pool : descriptor_pools_) {
+    check(vkResetDescriptorPool(device, pool, 0), "resetting a descriptor pool");
+  }
+  sets_used_ = 0;
+  for (Arena* arena : {&upload_, &download_}) {
+    // Small transfers keep their block; a rare large one does not hold on to its memory.
+    if (arena->blocks.size() > 1 ||
+        (!arena->blocks.empty() && arena->blocks.back().bytes() > staging_block)) {
+      arena->blocks.clear();
+    }
+    arena->used = 0;
+  }
+}
+
+}  // namespace palpate::gpu

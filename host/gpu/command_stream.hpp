@@ -1,0 +1,103 @@
+#pragma once
+
+#include <array>
+#include <cstring>
+#include <span>
+#include <vector>
+
+#include "buffer.hpp"
+#include "kernel.hpp"
+
+namespace palpate::gpu {
+
+/// A range of a buffer bound to a kernel.
+struct Binding {
+  const Buffer* buffer = nullptr;
+  VkDeviceSize offset = 0;
+  VkDeviceSize bytes = VK_WHOLE_SIZE;
+};
+
+/// Records copies and dispatches, then runs them in order. Every command sees the results of all
+/// commands before it: the one barrier function stands between any two. A call that throws drops
+/// everything recorded since the last run(), so that no later one meets what its caller has freed.
+class CommandStream {
+ public:
+  explicit CommandStream(Context& context);
+  ~CommandStream();
+  CommandStream(const CommandStream&) = delete;
+  CommandStream& operator=(const CommandStream&) = delete;
+
+  /// Copies the values to the buffer, starting at a byte offset. They are read at once.
+  template <typename T>
+  void upload(const Buffer& target, std::span<const T> values, VkDeviceSize offset = 0) {
+    upload_bytes(target, std::as_bytes(values), offset);
+  }
+  /// Copies from the buffer into `values`, which run() fills: they must live until then.
+  template <typename T>
+  void download(const Buffer& source, std::span<T> values, VkDeviceSize offset = 0) {
+    download_bytes(source, std::as_writable_bytes(values), offset);
+  }
+  /// Sets every 32-bit word of the buffer.
+  void fill(const Buffer& target, std::uint32_t word);
+
+  /// Runs a kernel on groups[0] x groups[1] x groups[2] workgroups.
+  template <typename Push>
+  void dispatch(const Kernel& kernel, std::span<const Binding> bindings, const Push& push,
+                std::array<std::uint32_t, 3> groups) {
+    static_assert(std::is_trivially_copyable_v<Push>);
+    dispatch_bytes(kernel, bindings, std::as_bytes(std::span(&push, 1)), groups);
+  }
+
+  /// Submits everything recorded, waits for it and delivers the downloads.
+  void run();
+
+  /// Time that the device spent on the last run(), in seconds.
+  double device_seconds() const { return device_seconds_; }
+
+ private:
+  struct Download {
+    std::byte* target;
+    const std::byte* source;
+    std::size_t bytes;
+  };
+  /// Staging memory of one direction, taken from front to back and reused after every run.
+  struct Arena {
+    Memory memory;
+    std::vector<Buffer> blocks;
+    VkDeviceSize used = 0;  ///< of the last block
+  };
+  struct Slice {
+    const Buffer* block;
+    VkDeviceSize offset;
+  };
+
+  Slice stage(Arena& arena, VkDeviceSize bytes);
+  void upload_bytes(const Buffer& target, std::span<const std::byte> bytes, VkDeviceSize offset);
+  void download_bytes(const Buffer& source, std::span<std::byte> bytes, VkDeviceSize offset);
+  void dispatch_bytes(const Kernel& kernel, std::span<const Binding> bindings,
+                      std::span<const std::byte> push, std::array<std::uint32_t, 3> groups);
+  /// Calls `commands` to add to the recording; see above for when that throws.
+  template <typename Commands>
+  void record(const Commands& commands);
+  void begin();
+  void barrier();
+  void submit();
+  void rewind();
+  void reset();
+  VkDescriptorSet descriptor_set(const Kernel& kernel, std::span<const Binding> bindings);
+
+  Context& context_;
+  VkCommandPool pool_ = VK_NULL_HANDLE;
+  VkCommandBuffer commands_ = VK_NULL_HANDLE;
+  VkFence fence_ = VK_NULL_HANDLE;
+  VkQueryPool timestamps_ = VK_NULL_HANDLE;
+  std::vector<VkDescriptorPool> descriptor_pools_;
+  std::size_t sets_used_ = 0;
+  Arena upload_{Memory::upload, {}, 0};
+  Arena download_{Memory::download, {}, 0};
+  std::vector<Download> downloads_;
+  bool recording_ = false;
+  double device_seconds_ = 0.0;
+};
+
+}  // namespace palpate::gpu

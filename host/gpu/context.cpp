@@ -1,0 +1,166 @@
+#include "context.hpp"
+
+#include <algorithm>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+
+#include <fmt/format.h>
+
+#include "palpate/error.hpp"
+#include "result.hpp"
+#include "selection.hpp"
+
+namespace palpate::gpu {
+
+namespace {
+
+VKAPI_ATTR VkBool32 VKAPI_CALL on_message(VkDebugUtilsMessageSeverityFlagBitsEXT /*severity*/,
+                                          VkDebugUtilsMessageTypeFlagsEXT /*types*/,
+                                          const VkDebugUtilsMessengerCallbackDataEXT* data,
+                                          void* log) {
+  static_cast<ValidationLog*>(log)->add(data->pMessage);
+  return VK_FALSE;
+}
+
+bool validation_wanted() {
+  const char* value = std::getenv("PALPATE_VALIDATION");
+  return value != nullptr && std::strcmp(value, "1") == 0;
+}
+
+template <typename Function>
+Function instance_function(VkInstance instance, const char* name) {
+  return reinterpret_cast<Function>(vkGetInstanceProcAddr(instance, name));
+}
+
+}  // namespace
+
+void ValidationLog::add(std::string message) {
+  const std::scoped_lock lock(mutex_);
+  messages_.push_back(std::move(message));
+}
+
+void ValidationLog::throw_if_any() {
+  const std::scoped_lock lock(mutex_);
+  if (!messages_.empty()) {
+    const std::string first = messages_.front();
+    messages_.clear();
+    throw Error(Fault::system, "Vulkan validation: " + first);
+  }
+}
+
+bool ValidationLog::empty() {
+  const std::scoped_lock lock(mutex_);
+  return messages_.empty();
+}
+
+Instance::Instance() {
+  const VkApplicationInfo application{.sType = VK_STRUCTURE_TYPE_APPLICATION_INFO,
+                                      .pApplicationName = "palpate",
+                                      .apiVersion = VK_API_VERSION_1_2};
+  const VkDebugUtilsMessengerCreateInfoEXT messenger_info{
+      .sType = VK_STRUCTURE_TYPE_DEBUG_UTILS_MESSENGER_CREATE_INFO_EXT,
+      .messageSeverity = VK_DEBUG_UTILS_MESSAGE_SEVERITY_WARNING_BIT_EXT |
+                         VK_DEBUG_UTILS_MESSAGE_SEVERITY_ERROR_BIT_EXT,
+      .messageType = VK_DEBUG_UTILS_MESSAGE_TYPE_VALIDATION_BIT_EXT |
+                     VK_DEBUG_UTILS_MESSAGE_TYPE_PERFORMANCE_BIT_EXT,
+      .pfnUserCallback = on_message,
+      .pUserData = &validation_};
+  const char* layer = "VK_LAYER_KHRONOS_validation";
+  const char* extension = VK_EXT_DEBUG_UTILS_EXTENSION_NAME;
+  VkInstanceCreateInfo info{.sType = VK_STRUCTURE_TYPE_INSTANCE_CREATE_INFO,
+                            .pApplicationInfo = &application};
+  if (validation_wanted()) {
+    info.pNext = &messenger_info;
+    info.enabledLayerCount = 1;
+    info.ppEnabledLayerNames = &layer;
+    info.enabledExtensionCount = 1;
+    info.ppEnabledExtensionNames = &extension;
+  }
+  check(vkCreateInstance(&info, nullptr, &instance_), "starting Vulkan");
+  if (validation_wanted()) {
+    const auto create = instance_function<PFN_vkCreateDebugUtilsMessengerEXT>(
+        instance_, "vkCreateDebugUtilsMessengerEXT");
+    check(create(instance_, &messenger_info, nullptr, &messenger_), "starting Vulkan validation");
+  }
+}
+
+Instance::~Instance() {
+  if (messenger_ != VK_NULL_HANDLE) {
+    instance_function<PFN_vkDestroyDebugUtilsMessengerEXT>(
+        instance_, "vkDestroyDebugUtilsMessengerEXT")(instance_, messenger_, nullptr);
+  }
+  vkDestroyInstance(instance_, nullptr);
+  // A destructor cannot throw, yet a message about a leaked or misused object must not get lost.
+  if (!validation_.empty()) {
+    try {
+      validation_.throw_if_any();
+    } catch (const Error& error) {
+      std::fputs(error.what(), stderr);
+      std::fputc('\n', stderr);
+    }
+    std::abort();
+  }
+}
+
+Context::Context(std::string_view name_or_index) {
+  const std::vector<Candidate> all = candidates(instance_.handle(), name_or_index);
+  const Candidate& candidate = chosen(all, name_or_index);
+  physical_ = candidate.physical;
+  queue_family_ = candidate.queue_family;
+  name_ = candidate.info.name;
+
+  VkPhysicalDeviceMaintenance3Properties maintenance{
+      .sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_MAINTENANCE_3_PROPERTIES};
+  VkPhysicalDeviceProperties2 properties{.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_PROPERTIES_2,
+                                         .pNext = &maintenance};
+  vkGetPhysicalDeviceProperties2(physical_, &properties);
+  const VkPhysicalDeviceLimits& limits = properties.properties.limits;
+  limits_.storage_range = limits.maxStorageBufferRange;
+  limits_.allocation = maintenance.maxMemoryAllocationSize;
+  std::copy_n(limits.maxComputeWorkGroupCount, 3, limits_.group_count);
+  limits_.push_bytes = limits.maxPushConstantsSize;
+
+  std::uint32_t families = 0;
+  vkGetPhysicalDeviceQueueFamilyProperties(physical_, &families, nullptr);
+  std::vector<VkQueueFamilyProperties> family(families);
+  vkGetPhysicalDeviceQueueFamilyProperties(physical_, &families, family.data());
+  if (family[queue_family_].timestampValidBits > 0) {
+    limits_.timestamp_ns = limits.timestampPeriod;
+  }
+  vkGetPhysicalDeviceMemoryProperties(physical_, &memory_);
+  limits_.memory = device_memory(memory_);
+
+  const float priority = 1.0F;
+  const VkDeviceQueueCreateInfo queue_info{.sType = VK_STRUCTURE_TYPE_DEVICE_QUEUE_CREATE_INFO,
+                                           .queueFamilyIndex = queue_family_,
+                                           .queueCount = 1,
+                                           .pQueuePriorities = &priority};
+  const VkDeviceCreateInfo info{.sType = VK_STRUCTURE_TYPE_DEVICE_CREATE_INFO,
+                                .queueCreateInfoCount = 1,
+                                .pQueueCreateInfos = &queue_info};
+  check(vkCreateDevice(physical_, &info, nullptr, &device_),
+        fmt::format("opening device '{}'", name_));
+  vkGetDeviceQueue(device_, queue_family_, 0, &queue_);
+}
+
+Context::~Context() {
+  vkDeviceWaitIdle(device_);
+  vkDestroyDevice(device_, nullptr);
+}
+
+std::uint32_t Context::memory_type(std::uint32_t type_bits, VkMemoryPropertyFlags flags,
+                                   VkMemoryPropertyFlags preferred) const {
+  for (const VkMemoryPropertyFlags wanted : {flags | preferred, flags}) {
+    for (std::uint32_t i = 0; i < memory_.memoryTypeCount; ++i) {
+      if ((type_bits & (1U << i)) != 0 &&
+          (memory_.memoryTypes[i].propertyFlags & wanted) == wanted) {
+        return i;
+      }
+    }
+  }
+  throw Error(Fault::system,
+              fmt::format("device '{}': has no memory with the properties {:#x}", name_, flags));
+}
+
+}  // namespace palpate::gpu

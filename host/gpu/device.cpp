@@ -1,0 +1,28 @@
+#include "palpate/device.hpp"
+
+#include "context.hpp"
+#include "selection.hpp"
+
+namespace palpate {
+
+std::vector<DeviceInfo> Device::list(std::string_view name_or_index) {
+  gpu::Instance instance;
+  std::vector<DeviceInfo> infos;
+  for (gpu::Candidate& candidate : gpu::candidates(instance.handle(), name_or_index)) {
+    infos.push_back(std::move(candidate.info));
+  }
+  return infos;
+}
+
+Device Device::open(std::string_view name_or_index) {
+  return Device(std::make_unique<gpu::Context>(name_or_index));
+}
+
+Device::Device(std::unique_ptr<gpu::Context> context) : context_(std::move(context)) {}
+Device::Device(Device&&) noexcept = default;
+Device& Device::operator=(Device&&) noexcept = default;
+Device::~Device() = default;
+
+const std::string& Device::name() const { return context_->name(); }
+
+}  // namespace palpate

@@ -1,0 +1,51 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+
+#include "context.hpp"
+
+namespace palpate::gpu {
+
+/// A compute shader ready to run. It binds storage buffers 0 .. buffers - 1 of set 0.
+struct KernelInfo {
+  const char* name = "";
+  std::span<const std::uint32_t> spirv;
+  std::uint32_t buffers = 0;
+  std::uint32_t push_bytes = 0;
+  std::span<const std::uint32_t> constants = {};  ///< specialization constants 0, 1, ... as bits
+};
+
+/// A compute pipeline with its layouts. Move-only.
+class Kernel {
+ public:
+  Kernel() = default;
+  /// @throws Error where the device's limits do not allow the kernel
+  Kernel(Context& context, const KernelInfo& info);
+  Kernel(Kernel&& other) noexcept { swap(other); }
+  Kernel& operator=(Kernel&& other) noexcept {
+    swap(other);
+    return *this;
+  }
+  ~Kernel();
+
+  VkPipeline pipeline() const { return pipeline_; }
+  VkPipelineLayout layout() const { return layout_; }
+  VkDescriptorSetLayout set_layout() const { return set_layout_; }
+  std::uint32_t buffers() const { return buffers_; }
+  std::uint32_t push_bytes() const { return push_bytes_; }
+  const char* name() const { return name_; }
+
+ private:
+  void swap(Kernel& other) noexcept;
+
+  VkDevice device_ = VK_NULL_HANDLE;
+  VkDescriptorSetLayout set_layout_ = VK_NULL_HANDLE;
+  VkPipelineLayout layout_ = VK_NULL_HANDLE;
+  VkPipeline pipeline_ = VK_NULL_HANDLE;
+  std::uint32_t buffers_ = 0;
+  std::uint32_t push_bytes_ = 0;
+  const char* name_ = "";
+};
+
+}  // namespace palpate::gpu

@@ -1,0 +1,201 @@
+#include "selection.hpp"
+
+#include <algorithm>
+#include <cctype>
+#include <charconv>
+#include <optional>
+
+#include <fmt/format.h>
+
+#include "palpate/error.hpp"
+#include "result.hpp"
+
+namespace palpate::gpu {
+
+namespace {
+
+struct TypeName {
+  const char* name;
+  int rank;
+};
+
+TypeName type_of(VkPhysicalDeviceType type) {
+  switch (type) {
+    case VK_PHYSICAL_DEVICE_TYPE_DISCRETE_GPU:
+      return {"discrete", 0};
+    case VK_PHYSICAL_DEVICE_TYPE_INTEGRATED_GPU:
+      return {"integrated", 1};
+    case VK_PHYSICAL_DEVICE_TYPE_VIRTUAL_GPU:
+      return {"virtual", 2};
+    case VK_PHYSICAL_DEVICE_TYPE_CPU:
+      return {"CPU", 3};
+    default:
+      return {"other", 4};
+  }
+}
+
+std::string version_text(std::uint32_t version) {
+  return fmt::format("{}.{}.{}", VK_API_VERSION_MAJOR(version), VK_API_VERSION_MINOR(version),
+                     VK_API_VERSION_PATCH(version));
+}
+
+/// A queue family for compute, one without graphics first: it does not wait for a desktop.
+std::optional<std::uint32_t> compute_family(VkPhysicalDevice physical) {
+  std::uint32_t count = 0;
+  vkGetPhysicalDeviceQueueFamilyProperties(physical, &count, nullptr);
+  std::vector<VkQueueFamilyProperties> families(count);
+  vkGetPhysicalDeviceQueueFamilyProperties(physical, &count, families.data());
+  std::optional<std::uint32_t> found;
+  for (std::uint32_t i = 0; i < count; ++i) {
+    if ((families[i].queueFlags & VK_QUEUE_COMPUTE_BIT) == 0) {
+      continue;
+    }
+    if ((families[i].queueFlags & VK_QUEUE_GRAPHICS_BIT) == 0) {
+      return i;
+    }
+    if (!found) {
+      found = i;
+    }
+  }
+  return found;
+}
+
+Candidate inspect(VkPhysicalDevice physical, int index) {
+  VkPhysicalDeviceDriverProperties driver{.sType =
+                                              VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_DRIVER_PROPERTIES};
+  VkPhysicalDeviceProperties2 properties2{.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_PROPERTIES_2};
+  VkPhysicalDeviceProperties& properties = properties2.properties;
+  vkGetPhysicalDeviceProperties(physical, &properties);
+  const bool has_version_1_1 = properties.apiVersion >= VK_API_VERSION_1_1;
+  if (properties.apiVersion >= VK_API_VERSION_1_2) {
+    properties2.pNext = &driver;
+    vkGetPhysicalDeviceProperties2(physical, &properties2);
+  }
+  VkPhysicalDeviceMemoryProperties memory;
+  vkGetPhysicalDeviceMemoryProperties(physical, &memory);
+
+  const TypeName type = type_of(properties.deviceType);
+  Candidate candidate{.physical = physical, .rank = type.rank, .info = {}};
+  DeviceInfo& info = candidate.info;
+  info.index = index;
+  info.name = properties.deviceName;
+  info.type = type.name;
+  info.driver = fmt::format("{} {}", driver.driverName, driver.driverInfo);
+  info.api = version_text(properties.apiVersion);
+  info.memory_gib = static_cast<double>(device_memory(memory)) / (1 << 30);
+
+  const auto family = compute_family(physical);
+  const std::uint32_t buffers = properties.limits.maxPerStageDescriptorStorageBuffers;
+  const std::uint32_t invocations = properties.limits.maxComputeWorkGroupInvocations;
+  if (!has_version_1_1) {
+    info.reason = fmt::format("supports Vulkan {}, 1.1 is needed", info.api);
+  } else if (!family) {
+    info.reason = "has no compute queue";
+  } else if (buffers < max_storage_buffers) {
+    info.reason = fmt::format("binds {} storage buffers at a time, {} are needed", buffers,
+                              max_storage_buffers);
+  } else if (invocations < max_group_invocations) {
+    info.reason = fmt::format("runs {} invocations per workgroup, {} are needed", invocations,
+                              max_group_invocations);
+  } else {
+    info.usable = true;
+    candidate.queue_family = *family;
+  }
+  return candidate;
+}
+
+std::string lower(std::string_view text) {
+  std::string result(text);
+  std::transform(result.begin(), result.end(), result.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return result;
+}
+
+bool matches(const DeviceInfo& info, std::string_view name_or_index) {
+  int index = 0;
+  const char* end = name_or_index.data() + name_or_index.size();
+  const auto [rest, error] = std::from_chars(name_or_index.data(), end, index);
+  if (error == std::errc{} && rest == end) {
+    return info.index == index;
+  }
+  return lower(info.name).find(lower(name_or_index)) != std::string::npos;
+}
+
+}  // namespace
+
+VkDeviceSize device_memory(const VkPhysicalDeviceMemoryProperties& memory) {
+  VkDeviceSize bytes = 0;
+  for (std::uint32_t i = 0; i < memory.memoryHeapCount; ++i) {
+    if ((memory.memoryHeaps[i].flags & VK_MEMORY_HEAP_DEVICE_LOCAL_BIT) != 0) {
+      bytes = std::max(bytes, memory.memoryHeaps[i].size);
+    }
+  }
+  return bytes;
+}
+
+void choose(std::span<Candidate> candidates, std::string_view name_or_index) {
+  Candidate* best = nullptr;
+  for (Candidate& candidate : candidates) {
+    if (!candidate.info.usable) {
+      continue;
+    }
+    if (!name_or_index.empty() && !matches(candidate.info, name_or_index)) {
+      candidate.info.reason = fmt::format("does not match '{}'", name_or_index);
+    } else if (best == nullptr || candidate.rank < best->rank) {
+      best = &candidate;
+    }
+  }
+  if (best == nullptr) {
+    return;
+  }
+  for (Candidate& candidate : candidates) {
+    if (&candidate != best && candidate.info.reason.empty()) {
+      candidate.info.reason =
+          candidate.rank == best->rank
+              ? fmt::format("as good as device {}, which comes first", best->info.index)
+              : fmt::format("ranks behind device {}: discrete, integrated, virtual, CPU",
+                            best->info.index);
+    }
+  }
+  best->info.chosen = true;
+  best->info.reason = name_or_index.empty()
+                          ? "the best usable device"
+                          : fmt::format("the best that matches '{}'", name_or_index);
+}
+
+std::vector<Candidate> candidates(VkInstance instance, std::string_view name_or_index) {
+  std::uint32_t count = 0;
+  check(vkEnumeratePhysicalDevices(instance, &count, nullptr), "listing the Vulkan devices");
+  std::vector<VkPhysicalDevice> devices(count);
+  check(vkEnumeratePhysicalDevices(instance, &count, devices.data()), "listing the Vulkan devices");
+  std::vector<Candidate> result;
+  for (std::uint32_t i = 0; i < count; ++i) {
+    result.push_back(inspect(devices[i], static_cast<int>(i)));
+  }
+  choose(result, name_or_index);
+  return result;
+}
+
+const Candidate& chosen(std::span<const Candidate> candidates, std::string_view name_or_index) {
+  const auto found = std::find_if(candidates.begin(), candidates.end(),
+                                  [](const Candidate& c) { return c.info.chosen; });
+  if (found != candidates.end()) {
+    return *found;
+  }
+  if (candidates.empty()) {
+    throw Error(Fault::system,
+                "no Vulkan device: install a driver (on Debian mesa-vulkan-drivers) and check "
+                "`palpate devices`");
+  }
+  std::string reasons;
+  for (const Candidate& candidate : candidates) {
+    reasons += fmt::format("{}{} '{}' {}", reasons.empty() ? "" : "; ", candidate.info.index,
+                           candidate.info.name, candidate.info.reason);
+  }
+  // A wish that no device fits is the caller's; a machine without a usable device is not.
+  throw Error(
+      name_or_index.empty() ? Fault::system : Fault::input,
+      fmt::format("device '{}': none fits: {}; see `palpate devices`", name_or_index, reasons));
+}
+
+}  // namespace palpate::gpu
