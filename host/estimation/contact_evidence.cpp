@@ -1,0 +1,53 @@
+#include "contact_evidence.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace palpate {
+
+ContactEvidence gather_evidence(std::span<const Touch> touches, const ContactClassifier& classifier,
+                                const glm::dvec2& pivot_mm, std::size_t segment_elements) {
+  ContactEvidence evidence;
+  for (const Touch& touch : touches) {
+    const std::vector<ElementReading> known = known_readings(touch, classifier);
+    for (const Reading reading : {Reading::no_contact, Reading::in_contact}) {
+      const std::size_t first = evidence.from_pivot_mm.size();
+      for (const ElementReading& element : known) {
+        if (element.reading == reading) {
+          evidence.from_pivot_mm.push_back(element.position_mm - pivot_mm);
+        }
+      }
+      const std::size_t end = evidence.from_pivot_mm.size();
+      for (std::size_t begin = first; begin < end; begin += segment_elements) {
+        evidence.segments.push_back(
+            {.begin = static_cast<shaders::uint>(begin),
+             .end = static_cast<shaders::uint>(std::min(begin + segment_elements, end)),
+             .reading = static_cast<shaders::uint>(reading)});
+      }
+    }
+  }
+  return evidence;
+}
+
+shaders::Split split(double coordinate_cells) {
+  constexpr double far = 1 << 29;
+  const double clamped = std::clamp(coordinate_cells, -far, far);
+  const double cell = std::floor(clamped);
+  return {static_cast<int>(cell), static_cast<float>(clamped - cell)};
+}
+
+std::vector<shaders::RotatedElement> rotate_evidence(std::span<const glm::dvec2> from_pivot_mm,
+                                                     const Axis& theta_rad, double cell_mm) {
+  std::vector<shaders::RotatedElement> rotated;
+  rotated.reserve(from_pivot_mm.size() * static_cast<std::size_t>(theta_rad.count));
+  for (int t = 0; t < theta_rad.count; ++t) {
+    const double c = std::cos(theta_rad.centre(t)) / cell_mm;
+    const double s = std::sin(theta_rad.centre(t)) / cell_mm;
+    for (const glm::dvec2& p : from_pivot_mm) {
+      rotated.push_back({split(c * p.x - s * p.y), split(s * p.x + c * p.y)});
+    }
+  }
+  return rotated;
+}
+
+}  // namespace palpate

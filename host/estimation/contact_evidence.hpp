@@ -1,0 +1,32 @@
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "interface.h"
+#include "palpate/contact.hpp"
+#include "palpate/lattice.hpp"
+
+namespace palpate {
+
+/// The known elements of some touches, in the robot frame and relative to the lattice's pivot,
+/// ordered so that equal reading classes of a touch stand together.
+struct ContactEvidence {
+  std::vector<glm::dvec2> from_pivot_mm;
+  std::vector<shaders::Segment> segments;
+};
+
+/// Classifies the touches' elements (Eq. 3) and leaves out those that are Unknown. No segment is
+/// longer than `segment_elements`: the kernel sums a segment in one float.
+ContactEvidence gather_evidence(std::span<const Touch> touches, const ContactClassifier& classifier,
+                                const glm::dvec2& pivot_mm, std::size_t segment_elements);
+
+/// Splits a coordinate into whole cells and the rest. Far outside any map the cell is clamped, so
+/// that sums of two stay within int32.
+shaders::Split split(double coordinate_cells);
+
+/// Every element rotated by every theta of the lattice, in cells, [theta, element].
+std::vector<shaders::RotatedElement> rotate_evidence(std::span<const glm::dvec2> from_pivot_mm,
+                                                     const Axis& theta_rad, double cell_mm);
+
+}  // namespace palpate

@@ -1,0 +1,193 @@
+#include "dense_likelihood.hpp"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+
+#include <fmt/format.h>
+
+#include "accumulate_likelihood.hpp"
+#include "interface.h"
+#include "palpate/error.hpp"
+
+namespace palpate {
+
+namespace {
+
+constexpr std::uint32_t workgroup = 64;
+// A segment's sum is one float: of 64 terms its rounding error stays below 1e-5 nats.
+constexpr std::size_t longest_segment = 64;
+constexpr VkDeviceSize table_bytes = 16 << 20;
+// About a second on a CPU device; watchdogs of desktop GPUs, which are far faster, allow two.
+constexpr double work_per_run = 2e8;
+
+/// The map with a border of prior around it.
+std::vector<float> with_border(const OccupancyGrid& map, double prior) {
+  constexpr int border = shaders::MAP_BORDER;
+  const int width = map.nx + 2 * border;
+  std::vector<float> cells(static_cast<std::size_t>(width) * (map.ny + 2 * border),
+                           static_cast<float>(log_odds_from_probability(prior)));
+  for (int j = 0; j < map.ny; ++j) {
+    const auto row = map.log_odds.begin() + static_cast<std::ptrdiff_t>(j) * map.nx;
+    std::copy(row, row + map.nx,
+              cells.begin() + static_cast<std::ptrdiff_t>(j + border) * width + border);
+  }
+  return cells;
+}
+
+/// The lattice's x centres, then its y centres, in cells of the bordered map.
+std::vector<shaders::Split> axes_in_cells(const PoseLattice& lattice, const OccupancyGrid& map) {
+  std::vector<shaders::Split> axes;
+  axes.reserve(static_cast<std::size_t>(lattice.x_mm.count) + lattice.y_mm.count);
+  for (int i = 0; i < lattice.x_mm.count; ++i) {
+    axes.push_back(
+        split((lattice.x_mm.centre(i) - map.origin_mm.x) / map.cell_mm + shaders::MAP_BORDER));
+  }
+  for (int j = 0; j < lattice.y_mm.count; ++j) {
+    axes.push_back(
+        split((lattice.y_mm.centre(j) - map.origin_mm.y) / map.cell_mm + shaders::MAP_BORDER));
+  }
+  return axes;
+}
+
+gpu::Kernel likelihood_kernel(gpu::Context& context, const ContactLikelihood& model) {
+  const auto floor = static_cast<float>(model.gamma * model.prior);
+  const auto trust = static_cast<float>(1.0 - model.gamma);
+  // log() of a float32 near the smallest normal number is inexact on some devices.
+  const bool in_logs = floor < 1e-30F;
+  const std::uint32_t constants[] = {workgroup, std::bit_cast<std::uint32_t>(floor),
+                                     std::bit_cast<std::uint32_t>(trust), in_logs ? 1U : 0U};
+  return {context,
+          {.name = "accumulate_likelihood",
+           .spirv = shaders::accumulate_likelihood,
+           .buffers = 5,
+           .push_bytes = sizeof(shaders::LikelihoodPush),
+           .constants = constants}};
+}
+
+}  // namespace
+
+DenseLikelihood::DenseLikelihood(gpu::Context& context, gpu::CommandStream& stream,
+                                 std::span<const Hypothesis> hypotheses, const PoseLattice& lattice,
+                                 const ContactLikelihood& model)
+    : context_(context),
+      stream_(stream),
+      lattice_(lattice),
+      kernel_(likelihood_kernel(context, model)) {
+  for (std::size_t object = 0; object < hypotheses.size(); ++object) {
+    const OccupancyGrid& map = hypotheses[object].map;
+    const std::vector<float> cells = with_border(map, model.prior);
+    const std::vector<shaders::Split> axes = axes_in_cells(lattice, map);
+    if (cells.size() * sizeof(float) > context.limits().storage_range) {
+      throw Error(Fault::input,
+                  fmt::format("map '{}': {} x {} cells exceed the {} MiB that device '{}' binds at "
+                              "once; build it with larger cells",
+                              map.label, map.nx, map.ny, context.limits().storage_range >> 20,
+                              context.name()));
+    }
+    Map& uploaded = maps_.emplace_back();
+    uploaded.width = map.nx + 2 * shaders::MAP_BORDER;
+    uploaded.height = map.ny + 2 * shaders::MAP_BORDER;
+    uploaded.log_odds = gpu::Buffer(context, cells.size() * sizeof(float), gpu::Memory::device,
+                                    fmt::format("map '{}'", map.label));
+    uploaded.axes = gpu::Buffer(context, axes.size() * sizeof(shaders::Split), gpu::Memory::device,
+                                "the lattice's axes");
+    stream.upload(uploaded.log_odds, std::span(cells));
+    stream.upload(uploaded.axes, std::span(axes));
+
+    const auto scale = std::find_if(scales_.begin(), scales_.end(),
+                                    [&](const Scale& s) { return s.cell_mm == map.cell_mm; });
+    if (scale == scales_.end()) {
+      scales_.push_back({map.cell_mm, {object}});
+    } else {
+      scale->objects.push_back(object);
+    }
+  }
+
+  bytes_per_element_ = lattice.theta_rad.count * sizeof(shaders::RotatedElement);
+  // The table and the work of one dispatch are bounded; below 16 elements reading and writing the
+  // belief would begin to count.
+  const std::size_t by_table = std::max<std::size_t>(1, table_bytes / bytes_per_element_);
+  const auto by_work = static_cast<std::size_t>(work_per_run / static_cast<double>(lattice.bins()));
+  batch_elements_ = std::min(by_table, std::max<std::size_t>(16, by_work));
+  segment_elements_ = std::min(longest_segment, batch_elements_);
+}
+
+void DenseLikelihood::reserve(std::size_t elements) {
+  if (elements * bytes_per_element_ > elements_.bytes()) {
+    segments_ =
+        gpu::Buffer(context_, elements * sizeof(shaders::Segment), gpu::Memory::device, "segments");
+    elements_ = gpu::Buffer(context_, elements * bytes_per_element_, gpu::Memory::device,
+                            "rotated elements");
+  }
+}
+
+void DenseLikelihood::accumulate(const ContactEvidence& evidence, const Belief& belief,
+                                 const std::function<void(double)>& progress) {
+  const auto& segments = evidence.segments;
+  const double bins = static_cast<double>(lattice_.bins()) * static_cast<double>(maps_.size());
+  const double all_work = bins * static_cast<double>(evidence.from_pivot_mm.size());
+  double done = 0.0;
+  double pending = 0.0;
+  reserve(std::min(evidence.from_pivot_mm.size(), batch_elements_));
+
+  for (std::size_t s = 0; s < segments.size();) {
+    // As many whole segments as the table holds.
+    const std::size_t first = segments[s].begin;
+    std::vector<shaders::Segment> batch;
+    for (; s < segments.size() && segments[s].end - first <= batch_elements_; ++s) {
+      batch.push_back(segments[s]);
+      batch.back().begin -= static_cast<shaders::uint>(first);
+      batch.back().end -= static_cast<shaders::uint>(first);
+    }
+    const std::size_t elements = batch.back().end;
+    stream_.upload(segments_, std::span<const shaders::Segment>(batch));
+
+    for (const Scale& scale : scales_) {
+      const std::vector<shaders::RotatedElement> rotated =
+          rotate_evidence(std::span(evidence.from_pivot_mm).subspan(first, elements),
+                          lattice_.theta_rad, scale.cell_mm);
+      stream_.upload(elements_, std::span<const shaders::RotatedElement>(rotated));
+      for (const std::size_t object : scale.objects) {
+        const Map& map = maps_[object];
+        for (const Slab& slab : belief.slabs(object)) {
+          const shaders::LikelihoodPush push{.plane_first = slab.plane_first,
+                                             .plane_count = slab.plane_count,
+                                             .theta_first = slab.theta_first,
+                                             .nx = static_cast<shaders::uint>(lattice_.x_mm.count),
+                                             .segments = static_cast<shaders::uint>(batch.size()),
+                                             .elements = static_cast<shaders::uint>(elements),
+                                             .map_width = map.width,
+                                             .map_height = map.height};
+          stream_.dispatch(kernel_,
+                           std::array{gpu::Binding{&map.log_odds}, gpu::Binding{&map.axes},
+                                      gpu::Binding{&elements_}, gpu::Binding{&segments_},
+                                      gpu::Binding{&slab.log_likelihood}},
+                           push,
+                           {(slab.plane_count + workgroup - 1) / workgroup, 1, slab.theta_count});
+          pending += static_cast<double>(slab.bins()) * static_cast<double>(elements);
+          if (pending > work_per_run) {
+            stream_.run();
+            done += pending;
+            pending = 0.0;
+            if (progress) {
+              progress(done / all_work);
+            }
+          }
+        }
+      }
+    }
+  }
+  stream_.run();
+}
+
+std::uint64_t DenseLikelihood::device_bytes() const {
+  std::uint64_t bytes = elements_.bytes() + segments_.bytes();
+  for (const Map& map : maps_) {
+    bytes += map.log_odds.bytes() + map.axes.bytes();
+  }
+  return bytes;
+}
+
+}  // namespace palpate

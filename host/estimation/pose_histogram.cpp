@@ -1,0 +1,181 @@
+#include "palpate/pose_histogram.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include <fmt/format.h>
+
+#include "belief.hpp"
+#include "command_stream.hpp"
+#include "dense_likelihood.hpp"
+#include "palpate/error.hpp"
+
+namespace palpate {
+
+namespace {
+
+void validate(std::span<const Hypothesis> hypotheses) {
+  if (hypotheses.empty()) {
+    throw Error(Fault::input, "no objects: give at least one map");
+  }
+  for (const auto& [map, weight] : hypotheses) {
+    if (map.nx < 1 || map.ny < 1 ||
+        map.log_odds.size() != static_cast<std::size_t>(map.nx) * map.ny) {
+      throw Error(Fault::input, fmt::format("map '{}': {} x {} cells but {} log odds", map.label,
+                                            map.nx, map.ny, map.log_odds.size()));
+    }
+    if (!(map.cell_mm > 0.0) || !std::isfinite(map.cell_mm)) {
+      throw Error(Fault::input, fmt::format("map '{}': cell_mm = {}: give a positive length",
+                                            map.label, map.cell_mm));
+    }
+    if (!std::all_of(map.log_odds.begin(), map.log_odds.end(),
+                     [](float l) { return std::isfinite(l); })) {
+      throw Error(Fault::input,
+                  fmt::format("map '{}': log odds must be finite; build it anew", map.label));
+    }
+    if (!(weight > 0.0) || !std::isfinite(weight)) {
+      throw Error(Fault::input,
+                  fmt::format("map '{}': weight = {}: give a positive number, or leave the object "
+                              "out",
+                              map.label, weight));
+    }
+  }
+}
+
+}  // namespace
+
+struct PoseHistogram::Impl {
+  Impl(Device& device, std::span<const Hypothesis> hypotheses, const HistogramOptions& wanted)
+      : options(wanted),
+        stream(device.context()),
+        belief(device.context(), stream, options.lattice, hypotheses.size()),
+        likelihood(device.context(), stream, hypotheses, options.lattice,
+                   {.gamma = options.gamma, .prior = options.prior}) {
+    double total = 0.0;
+    for (const Hypothesis& hypothesis : hypotheses) {
+      total += hypothesis.weight;
+    }
+    for (const Hypothesis& hypothesis : hypotheses) {
+      log_weight.push_back(std::log(hypothesis.weight) - std::log(total));
+    }
+    stream.run();
+  }
+
+  /// The reductions of the belief as it is now; kept until the next touch.
+  const std::vector<BeliefSummary>& summaries() {
+    if (!summarised) {
+      summarised = belief.summarise();
+    }
+    return *summarised;
+  }
+
+  /// log of each object's prior weight times the summed likelihood of its bins.
+  std::vector<double> log_evidence() {
+    std::vector<double> logs;
+    for (std::size_t i = 0; i < log_weight.size(); ++i) {
+      const BeliefSummary& summary = summaries()[i];
+      logs.push_back(log_weight[i] + summary.max.value() + std::log(summary.sum));
+    }
+    return logs;
+  }
+
+  /// Eq. 14, as a log-sum-exp over objects.
+  std::vector<double> identity() {
+    std::vector<double> probability = log_evidence();
+    const double most = *std::max_element(probability.begin(), probability.end());
+    double total = 0.0;
+    for (double& p : probability) {
+      p = std::exp(p - most);
+      total += p;
+    }
+    for (double& p : probability) {
+      p /= total;
+    }
+    return probability;
+  }
+
+  /// Scales sums relative to an object's largest bin to that object's probability.
+  std::vector<double> to_probability(int object, const std::vector<float>& sums) {
+    const double scale = identity()[object] / summaries()[object].sum;
+    std::vector<double> probability(sums.begin(), sums.end());
+    for (double& p : probability) {
+      p *= scale;
+    }
+    return probability;
+  }
+
+  HistogramOptions options;
+  gpu::CommandStream stream;
+  Belief belief;
+  DenseLikelihood likelihood;
+  std::vector<double> log_weight;
+  std::optional<std::vector<BeliefSummary>> summarised;
+};
+
+PoseHistogram::PoseHistogram(Device& device, std::span<const Hypothesis> hypotheses,
+                             const HistogramOptions& options) {
+  validate(hypotheses);
+  HistogramOptions checked = options;
+  checked.lattice.collapse_fixed().validate();
+  ContactLikelihood{.gamma = checked.gamma, .prior = checked.prior}.validate();
+  impl_ = std::make_unique<Impl>(device, hypotheses, checked);
+}
+
+PoseHistogram::~PoseHistogram() = default;
+PoseHistogram::PoseHistogram(PoseHistogram&&) noexcept = default;
+PoseHistogram& PoseHistogram::operator=(PoseHistogram&&) noexcept = default;
+
+void PoseHistogram::reset() {
+  impl_->belief.clear();
+  impl_->stream.run();
+  impl_->summarised.reset();
+}
+
+void PoseHistogram::update(std::span<const Touch> touches,
+                           const std::function<void(double)>& progress) {
+  const ContactEvidence evidence =
+      gather_evidence(touches, impl_->options.classifier, impl_->options.lattice.pivot_mm,
+                      impl_->likelihood.segment_elements());
+  impl_->summarised.reset();
+  impl_->likelihood.accumulate(evidence, impl_->belief, progress);
+}
+
+Estimate PoseHistogram::estimate() const {
+  Estimate estimate{.identity = impl_->identity(), .mode = {}};
+  const std::vector<BeliefSummary>& summaries = impl_->summaries();
+  double most = -std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < summaries.size(); ++i) {
+    const double log_likelihood = summaries[i].max.value();
+    if (impl_->log_weight[i] + log_likelihood > most) {
+      most = impl_->log_weight[i] + log_likelihood;
+      estimate.mode = {.object = static_cast<int>(i),
+                       .bin = summaries[i].arg_max,
+                       .T_object_robot = lattice().T_object_robot(summaries[i].arg_max),
+                       .log_likelihood = log_likelihood};
+    }
+  }
+  return estimate;
+}
+
+std::vector<double> PoseHistogram::marginal_xy(int object) const {
+  return impl_->to_probability(
+      object, impl_->belief.sum_over_theta(object, impl_->summaries()[object].max));
+}
+
+std::vector<double> PoseHistogram::marginal_theta(int object) const {
+  return impl_->to_probability(
+      object, impl_->belief.sum_over_plane(object, impl_->summaries()[object].max));
+}
+
+std::vector<double> PoseHistogram::log_likelihood(int object) const {
+  return impl_->belief.download(object);
+}
+
+const PoseLattice& PoseHistogram::lattice() const { return impl_->options.lattice; }
+
+std::uint64_t PoseHistogram::device_bytes() const {
+  return impl_->belief.device_bytes() + impl_->likelihood.device_bytes();
+}
+
+}  // namespace palpate
