@@ -1,0 +1,100 @@
+#include "footprint.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+
+#include "palpate/pose.hpp"
+
+namespace palpate {
+
+namespace {
+
+double cross(glm::dvec2 a, glm::dvec2 b) { return a.x * b.y - a.y * b.x; }
+
+/// Andrew's monotone chain; counter-clockwise.
+std::vector<glm::dvec2> convex_hull(std::vector<glm::dvec2> points) {
+  std::ranges::sort(
+      points, [](glm::dvec2 a, glm::dvec2 b) { return a.x < b.x || (a.x == b.x && a.y < b.y); });
+  std::vector<glm::dvec2> hull;
+  const auto extend = [&](glm::dvec2 p, std::size_t start) {
+    while (hull.size() >= start + 2 &&
+           cross(hull.back() - hull[hull.size() - 2], p - hull.back()) <= 0.0) {
+      hull.pop_back();
+    }
+    hull.push_back(p);
+  };
+  for (const glm::dvec2& p : points) {
+    extend(p, 0);
+  }
+  const std::size_t upper_start = hull.size() - 1;
+  for (auto p = points.rbegin() + 1; p < points.rend(); ++p) {
+    extend(*p, upper_start);
+  }
+  if (hull.size() > 1) {
+    hull.pop_back();  // the first point again
+  }
+  return hull;
+}
+
+/// The hull without the corners that are none but for rounding, along straight rows of elements.
+std::vector<glm::dvec2> without_straight_corners(std::span<const glm::dvec2> hull) {
+  std::vector<glm::dvec2> corners;
+  const std::size_t n = hull.size();
+  for (std::size_t k = 0; k < n; ++k) {
+    const glm::dvec2 in = hull[k] - hull[(k + n - 1) % n];
+    const glm::dvec2 out = hull[(k + 1) % n] - hull[k];
+    if (cross(in, out) > 1e-9 * glm::length(in) * glm::length(out)) {
+      corners.push_back(hull[k]);
+    }
+  }
+  return corners;
+}
+
+/// The direction of the hull's edge that the smallest enclosing rectangle lies along.
+double orientation_rad(std::span<const glm::dvec2> hull) {
+  double best_area = std::numeric_limits<double>::infinity();
+  double best_rad = 0.0;
+  for (std::size_t k = 0; k < hull.size(); ++k) {
+    const glm::dvec2 edge = hull[(k + 1) % hull.size()] - hull[k];
+    const double angle = std::atan2(edge.y, edge.x);
+    glm::dvec2 lower = rotate(-angle, hull[0]);
+    glm::dvec2 upper = lower;
+    for (const glm::dvec2& p : hull) {
+      lower = glm::min(lower, rotate(-angle, p));
+      upper = glm::max(upper, rotate(-angle, p));
+    }
+    const double area = (upper.x - lower.x) * (upper.y - lower.y);
+    if (area < best_area) {
+      best_area = area;
+      best_rad = angle;
+    }
+  }
+  return best_rad;
+}
+
+}  // namespace
+
+Footprint footprint(std::span<const glm::dvec2> centres_mm, double element_mm) {
+  Footprint result;
+  if (centres_mm.empty()) {
+    return result;
+  }
+  const double angle = orientation_rad(convex_hull({centres_mm.begin(), centres_mm.end()}));
+  const glm::dvec2 along = rotate(angle, {element_mm / 2, 0.0});
+  const glm::dvec2 across = rotate(angle, {0.0, element_mm / 2});
+  std::vector<glm::dvec2> corners;
+  for (const glm::dvec2& c : centres_mm) {
+    const std::array square{c - along - across, c + along - across, c + along + across,
+                            c - along + across};
+    result.elements.push_back(square);
+    corners.insert(corners.end(), square.begin(), square.end());
+  }
+  result.outline = without_straight_corners(convex_hull(std::move(corners)));
+  return result;
+}
+
+}  // namespace palpate

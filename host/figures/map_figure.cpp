@@ -1,0 +1,113 @@
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <string>
+
+#include <glm/common.hpp>
+
+#include "figures.hpp"
+#include "map_layer.hpp"
+#include "palpate/error.hpp"
+
+namespace palpate {
+
+namespace {
+
+constexpr double margin_px = 40.0;
+constexpr double gap_px = 24.0;
+constexpr double title_px = 60.0;    ///< above the maps
+constexpr double label_px = 34.0;    ///< above each map
+constexpr double legend_px = 150.0;  ///< below the maps
+constexpr double tiles_px = 1800.0;  ///< width to share among the columns
+constexpr double largest_tile_px = 600.0;
+constexpr double smallest_tile_px = 60.0;
+constexpr double bar_px = 440.0;
+constexpr double bar_inset_px = 30.0;  ///< room for the last tick's label
+constexpr double longest_scale_bar_px = 240.0;
+
+/// The maps' places: rows of tiles as large as the largest map, at one scale.
+struct Grid {
+  int columns = 1;
+  int rows = 1;
+  double px_per_mm = 1.0;
+  glm::dvec2 tile_px{0.0, 0.0};
+};
+
+Grid arrange(std::span<const OccupancyGrid> maps) {
+  const int n = static_cast<int>(maps.size());
+  const int at_most = std::max(6, static_cast<int>(std::ceil(std::sqrt(n))));
+  Grid grid;
+  grid.rows = (n + at_most - 1) / at_most;
+  grid.columns = (n + grid.rows - 1) / grid.rows;
+
+  glm::dvec2 extent_mm(0.0);
+  for (const OccupancyGrid& map : maps) {
+    extent_mm = glm::max(extent_mm, map.cell_mm * glm::dvec2(map.nx, map.ny));
+  }
+  const double side_px =
+      std::clamp(tiles_px / grid.columns - gap_px, smallest_tile_px, largest_tile_px);
+  grid.px_per_mm = side_px / std::max(extent_mm.x, extent_mm.y);
+  // A narrow map still has its label above.
+  grid.tile_px = glm::max(glm::ceil(grid.px_per_mm * extent_mm), glm::dvec2(smallest_tile_px, 1.0));
+  return grid;
+}
+
+void draw_tile(Canvas& canvas, const Box& tile, double px_per_mm, const OccupancyGrid& map,
+               const EvidenceScale& scale) {
+  const glm::dvec2 size = glm::round(px_per_mm * map.cell_mm * glm::dvec2(map.nx, map.ny));
+  const View view{.box = {tile.left + std::floor((tile.width - size.x) / 2), tile.top,
+                          std::max(size.x, 1.0), std::max(size.y, 1.0)},
+                  .lower = lower_edge_mm(map),
+                  .upper = upper_edge_mm(map)};
+  draw_cells(canvas, view, map, scale);
+  canvas.frame(view.box, {.colour = grey, .width_px = 1.0});
+  canvas.text(canvas.fit(map.label, tile.width, heading),
+              {tile.left + tile.width / 2, tile.top - 10.0}, heading, Align::centre);
+}
+
+/// A bar of the largest power of ten in mm that fits.
+void draw_scale_bar(Canvas& canvas, glm::dvec2 left_px, double px_per_mm) {
+  const double length_mm = std::pow(10.0, std::floor(std::log10(longest_scale_bar_px / px_per_mm)));
+  const double length_px = length_mm * px_per_mm;
+  const std::array bar{left_px, left_px + glm::dvec2(length_px, 0.0)};
+  canvas.line(bar, {.width_px = 5.0});
+  canvas.text(number(length_mm) + " mm", left_px + glm::dvec2(0.0, 28.0), body);
+}
+
+}  // namespace
+
+std::string draw_maps(std::span<const OccupancyGrid> maps) {
+  if (maps.empty()) {
+    throw Error(Fault::input, "no map to draw: give at least one");
+  }
+  for (const OccupancyGrid& map : maps) {
+    require_cells(map);
+  }
+  const EvidenceScale scale = evidence_scale(maps);
+  const Grid grid = arrange(maps);
+
+  const double tiles_width = grid.columns * (grid.tile_px.x + gap_px) - gap_px;
+  const double content = std::max(tiles_width, longest_scale_bar_px + bar_px + 3 * bar_inset_px);
+  const double row_px = label_px + grid.tile_px.y + gap_px;
+  const double legend_top = title_px + margin_px + grid.rows * row_px;
+  Canvas canvas(static_cast<int>(content + 2 * margin_px),
+                static_cast<int>(legend_top + legend_px));
+
+  canvas.text("Maps built from touch", {margin_px, margin_px + 20.0},
+              {.size_px = 28.0, .bold = true});
+  const double left = margin_px + std::floor((content - tiles_width) / 2);
+  for (std::size_t k = 0; k < maps.size(); ++k) {
+    const double column = static_cast<double>(k % grid.columns);
+    const double row = static_cast<double>(k / grid.columns);
+    const Box tile{left + column * (grid.tile_px.x + gap_px),
+                   title_px + margin_px + row * row_px + label_px, grid.tile_px.x, grid.tile_px.y};
+    draw_tile(canvas, tile, grid.px_per_mm, maps[k], scale);
+  }
+  draw_scale_bar(canvas, {margin_px, legend_top + 46.0}, grid.px_per_mm);
+  draw_evidence_bar(canvas,
+                    {margin_px + content - bar_px - bar_inset_px, legend_top + 36.0, bar_px, 20.0},
+                    scale);
+  return canvas.encode_png();
+}
+
+}  // namespace palpate

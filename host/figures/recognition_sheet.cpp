@@ -1,0 +1,303 @@
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdlib>
+#include <initializer_list>
+#include <numbers>
+#include <optional>
+#include <ranges>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <fmt/format.h>
+#include <glm/common.hpp>
+
+#include "figures.hpp"
+#include "footprint.hpp"
+#include "identity_panel.hpp"
+#include "map_layer.hpp"
+#include "palpate/error.hpp"
+#include "palpate/pose_error.hpp"
+
+namespace palpate {
+
+namespace {
+
+constexpr double margin_px = 40.0;
+constexpr double side_px = 480.0;  ///< of every panel's plot
+constexpr double axis_px = 84.0;   ///< to the left of every plot
+constexpr double gap_px = 40.0;    ///< between a plot and the next one's axis
+constexpr double top_px = 200.0;   ///< of the plots
+constexpr double bar_top_px = top_px + side_px + 104.0;
+constexpr double bar_height_px = 20.0;
+constexpr double height_px = bar_top_px + 96.0;
+constexpr double width_px =
+    margin_px + 3 * (axis_px + side_px) + 2 * gap_px + identity_labels_px + margin_px;
+
+/// The element squares fade as they shrink, or they would hide the map below a large array.
+constexpr double opaque_element_px = 80.0;
+constexpr double smallest_element_px = 4.0;
+/// Probabilities this many powers of ten below the largest are still told from zero.
+constexpr double decades = 6.0;
+
+constexpr Colour alarm{0.75, 0.1, 0.1};
+constexpr Pen estimate_pen{.colour = {0.0, 0.0, 0.0}, .width_px = 2.5, .halo_px = 1.5};
+constexpr Pen truth_pen{
+    .colour = {0.0, 0.55, 0.35}, .width_px = 2.5, .dashed = true, .halo_px = 1.5};
+
+Box plot(int panel) {
+  return {margin_px + axis_px + panel * (side_px + gap_px + axis_px), top_px, side_px, side_px};
+}
+
+Box bar(int panel) { return {plot(panel).left, bar_top_px, side_px, bar_height_px}; }
+
+void validate(const RecognitionSheet& sheet) {
+  require_cells(sheet.map);
+  sheet.lattice.validate();
+  const auto plane = static_cast<std::size_t>(sheet.lattice.plane());
+  if (sheet.belief_xy.size() != plane) {
+    throw Error(Fault::input, fmt::format("sheet '{}': belief_xy has {} values: give {}, one per "
+                                          "x and y of the lattice",
+                                          sheet.title, sheet.belief_xy.size(), plane));
+  }
+  for (const std::vector<double>& probabilities : sheet.identity) {
+    if (probabilities.size() != sheet.labels.size()) {
+      throw Error(Fault::input,
+                  fmt::format("sheet '{}': identity has {} probabilities after a touch: give {}, "
+                              "one per label",
+                              sheet.title, probabilities.size(), sheet.labels.size()));
+    }
+  }
+}
+
+void draw_title(Canvas& canvas, const Box& plot, std::string_view title) {
+  canvas.text(canvas.fit(title, plot.width, heading), {plot.left, top_px - 50.0}, heading);
+}
+
+/// What a panel's marks mean, in a row below its title.
+class Legend {
+ public:
+  Legend(Canvas& canvas, const Box& plot) : canvas_(canvas), x_(plot.left) {}
+
+  /// A mark of this width, drawn by the function around the given point, and its meaning.
+  template <typename Draw>
+  void add(double mark_px, const Draw& draw, std::string_view meaning) {
+    draw(glm::dvec2(x_ + mark_px / 2, baseline_px - 7.0));
+    x_ += mark_px + 8.0;
+    canvas_.text(meaning, {x_, baseline_px}, small);
+    x_ += canvas_.text_width(meaning, small) + 20.0;
+  }
+
+ private:
+  static constexpr double baseline_px = top_px - 16.0;
+  Canvas& canvas_;
+  double x_;
+};
+
+std::string headline(const RecognitionSheet& sheet) {
+  std::string text = "estimated " + sheet.map.label;
+  const std::string& truth = sheet.true_object;
+  if (!truth.empty()) {
+    text += ", true " + truth;
+  }
+  if (sheet.error_mm) {
+    text += fmt::format(", error {:.2f} mm", *sheet.error_mm);
+  }
+  return text;
+}
+
+/// Of the true poses, which are one but for the object's symmetry, the nearest in angle to the
+/// estimate: the one that the pose error compares it with.
+std::optional<Pose> nearest_truth(const RecognitionSheet& sheet) {
+  const int symmetry = sheet.map.symmetry;
+  if (!sheet.truth || symmetry == 1) {
+    return sheet.truth;
+  }
+  double turn_rad = sheet.T_object_robot.theta_rad - sheet.truth->theta_rad;
+  if (symmetry > 0) {
+    turn_rad -= wrap_angle(turn_rad, 2.0 * std::numbers::pi / symmetry);
+  }
+  const glm::dvec2 centroid = body_of(sheet.map).centroid_mm;
+  return Pose{centroid - rotate(turn_rad, centroid), turn_rad} * *sheet.truth;
+}
+
+std::string meaning_of_truth(const RecognitionSheet& sheet, const std::string& meaning) {
+  return sheet.map.symmetry == 1 ? meaning : meaning + ", by symmetry";
+}
+
+/// The touches as they lie on the object, where T_object_robot is this.
+std::vector<Footprint> footprints(const RecognitionSheet& sheet, const Pose& T_object_robot) {
+  std::vector<Footprint> result;
+  for (const std::vector<glm::dvec2>& elements : sheet.footprints_mm) {
+    std::vector<glm::dvec2> centres;
+    for (const glm::dvec2& p_robot : elements) {
+      centres.push_back(T_object_robot * p_robot);
+    }
+    result.push_back(footprint(centres, sheet.element_mm));
+  }
+  return result;
+}
+
+template <std::ranges::range Points>
+std::vector<glm::dvec2> pixels(const View& view, const Points& points) {
+  std::vector<glm::dvec2> result;
+  for (const glm::dvec2& p : points) {
+    result.push_back(view.pixel(p));
+  }
+  return result;
+}
+
+/// A square of the object frame around the map and all touches.
+View view_around(const Box& box, const OccupancyGrid& map,
+                 std::initializer_list<const std::vector<Footprint>*> touches) {
+  glm::dvec2 lower = lower_edge_mm(map);
+  glm::dvec2 upper = upper_edge_mm(map);
+  for (const std::vector<Footprint>* footprints : touches) {
+    for (const Footprint& f : *footprints) {
+      for (const glm::dvec2& corner : f.outline) {
+        lower = glm::min(lower, corner);
+        upper = glm::max(upper, corner);
+      }
+    }
+  }
+  const glm::dvec2 centre = 0.5 * (lower + upper);
+  const glm::dvec2 half(0.51 * std::max(upper.x - lower.x, upper.y - lower.y));
+  return {.box = box, .lower = centre - half, .upper = centre + half};
+}
+
+void draw_touches(Canvas& canvas, const RecognitionSheet& sheet) {
+  const std::vector<Footprint> estimated = footprints(sheet, sheet.T_object_robot);
+  const std::optional<Pose> truth = nearest_truth(sheet);
+  const std::vector<Footprint> actual =
+      truth ? footprints(sheet, *truth) : std::vector<Footprint>{};
+  const View view = view_around(plot(0), sheet.map, {&estimated, &actual});
+  const EvidenceScale scale = evidence_scale(std::span(&sheet.map, 1));
+  {
+    const Canvas::Clip clip(canvas, view.box);
+    draw_cells(canvas, view, sheet.map, scale);
+    const double element_px = sheet.element_mm * view.box.width / (view.upper.x - view.lower.x);
+    const double alpha = std::min(element_px / opaque_element_px, 0.25);
+    for (const Footprint& f : estimated) {
+      if (element_px >= smallest_element_px) {
+        for (const auto& square : f.elements) {
+          canvas.polygon(pixels(view, square),
+                         {.colour = {0.0, 0.0, 0.0, alpha}, .width_px = 0.75});
+        }
+      }
+    }
+    for (const Footprint& f : estimated) {
+      canvas.polygon(pixels(view, f.outline), estimate_pen);
+    }
+    for (const Footprint& f : actual) {
+      canvas.polygon(pixels(view, f.outline), truth_pen);
+    }
+  }
+  draw_axes(canvas, view, even_ticks(view.lower.x, view.upper.x, 7),
+            even_ticks(view.lower.y, view.upper.y, 7), "x in the object frame, mm", "y, mm");
+  draw_evidence_bar(canvas, bar(0), scale);
+
+  draw_title(canvas, view.box, "Touches on the map of " + sheet.map.label);
+  Legend legend(canvas, view.box);
+  const auto sample = [&](const Pen& pen) {
+    return [&canvas, &pen](glm::dvec2 at) {
+      const std::array ends{at - glm::dvec2(18.0, 0.0), at + glm::dvec2(18.0, 0.0)};
+      canvas.line(ends, pen);
+    };
+  };
+  legend.add(36.0, sample(estimate_pen), "estimated pose");
+  if (truth) {
+    legend.add(36.0, sample(truth_pen), meaning_of_truth(sheet, "true pose"));
+  }
+}
+
+void draw_ring(Canvas& canvas, glm::dvec2 at) { canvas.circle(at, 11.0, estimate_pen); }
+
+void draw_cross(Canvas& canvas, glm::dvec2 at) {
+  Pen pen = truth_pen;
+  pen.dashed = false;
+  for (const glm::dvec2& arm : {glm::dvec2(7.0, 7.0), glm::dvec2(7.0, -7.0)}) {
+    const std::array ends{at - arm, at + arm};
+    canvas.line(ends, pen);
+  }
+}
+
+/// The axis as drawn: one of zero extent is given a width.
+glm::dvec2 shown_range(const Axis& axis) {
+  const double half = axis.upper > axis.lower ? 0.0 : 0.5;
+  return {axis.lower - half, axis.upper + half};
+}
+
+std::string power_of_ten(int exponent) {
+  static constexpr std::array digits{"⁰", "¹", "²", "³", "⁴", "⁵", "⁶", "⁷", "⁸", "⁹"};
+  std::string text = exponent < 0 ? "10⁻" : "10";
+  for (const char digit : std::to_string(std::abs(exponent))) {
+    text += digits[static_cast<std::size_t>(digit - '0')];
+  }
+  return exponent == 0 ? "1" : text;
+}
+
+void draw_belief(Canvas& canvas, const RecognitionSheet& sheet) {
+  const PoseLattice& lattice = sheet.lattice;
+  const glm::dvec2 x = shown_range(lattice.x_mm);
+  const glm::dvec2 y = shown_range(lattice.y_mm);
+  const View view{.box = plot(1), .lower = {x[0], y[0]}, .upper = {x[1], y[1]}};
+
+  const double largest = *std::ranges::max_element(sheet.belief_xy);
+  const double top = largest > 0.0 ? std::ceil(std::log10(largest)) : 0.0;
+  const auto colour = [&](double log10_p) {
+    return sequential((log10_p - top + decades) / decades);
+  };
+  canvas.cells(view.box, lattice.x_mm.count, lattice.y_mm.count, [&](int i, int j) {
+    return colour(
+        std::log10(sheet.belief_xy[static_cast<std::size_t>(j) * lattice.x_mm.count + i]));
+  });
+  draw_axes(canvas, view, even_ticks(x[0], x[1], 7), even_ticks(y[0], y[1], 7),
+            "x of the pivot in the object frame, mm", "y, mm");
+  std::vector<Tick> ticks;
+  for (double exponent = top - decades; exponent <= top; exponent += 2.0) {
+    ticks.push_back({exponent, power_of_ten(static_cast<int>(exponent))});
+  }
+  ticks.front().label = "≤ " + ticks.front().label;
+  draw_colour_bar(canvas, bar(1), top - decades, top, colour, ticks,
+                  "probability per bin, all angles");
+
+  draw_title(canvas, view.box, "Where is it? Belief over position");
+  Legend legend(canvas, view.box);
+  const auto mark = [&](const Pose& T_object_robot, auto draw, std::string meaning) {
+    const glm::dvec2 pivot = T_object_robot * lattice.pivot_mm;
+    if (view.contains(pivot)) {
+      draw(canvas, view.pixel(pivot));
+    } else {
+      meaning += " (outside)";
+    }
+    legend.add(
+        26.0, [&](glm::dvec2 at) { draw(canvas, at); }, meaning);
+  };
+  mark(sheet.T_object_robot, draw_ring, "estimated");
+  if (const std::optional<Pose> truth = nearest_truth(sheet)) {
+    mark(*truth, draw_cross, meaning_of_truth(sheet, "true"));
+  }
+}
+
+}  // namespace
+
+std::string draw_recognition(const RecognitionSheet& sheet) {
+  validate(sheet);
+  Canvas canvas(static_cast<int>(width_px), static_cast<int>(height_px));
+  constexpr Font title{.size_px = 28.0, .bold = true};
+  constexpr Font result{.size_px = 24.0};
+  const double room = width_px - 2 * margin_px;
+  canvas.text(canvas.fit(sheet.title, room, title), {margin_px, 58.0}, title);
+  const bool wrong = !sheet.true_object.empty() && sheet.true_object != sheet.map.label;
+  canvas.text(canvas.fit(headline(sheet), room, result), {margin_px, 96.0}, result, Align::left,
+              wrong ? alarm : ink);
+  draw_touches(canvas, sheet);
+  draw_belief(canvas, sheet);
+  draw_title(canvas, plot(2), "What is it? Belief over identity");
+  draw_identity(canvas, plot(2), sheet.labels, sheet.identity);
+  return canvas.encode_png();
+}
+
+}  // namespace palpate

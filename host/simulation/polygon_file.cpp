@@ -1,0 +1,108 @@
+#include "polygon_file.hpp"
+
+#include <algorithm>
+#include <fstream>
+#include <locale>
+#include <optional>
+#include <sstream>
+#include <string>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "palpate/error.hpp"
+
+namespace palpate {
+
+namespace {
+
+[[noreturn]] void refuse(const std::filesystem::path& path, int line, const std::string& why) {
+  throw Error(Fault::input, fmt::format("{}:{}: {}", path.string(), line, why));
+}
+
+/// The vertex on a line without its comment; nothing if it is not one.
+std::optional<glm::dvec2> parse_vertex(const std::string& text) {
+  std::istringstream stream(text);
+  stream.imbue(std::locale::classic());
+  glm::dvec2 vertex;
+  stream >> vertex.x >> vertex.y;
+  // The stream refuses inf, nan and numbers too large for a double.
+  if (!stream || !(stream >> std::ws).eof()) {
+    return std::nullopt;
+  }
+  return vertex;
+}
+
+/// Whether any triangle from the first vertex to an edge has an area; if none has, all edges lie on
+/// rays from it and the polygon encloses nothing.
+bool encloses_area(const std::vector<glm::dvec2>& polygon) {
+  for (std::size_t i = 2; i < polygon.size(); ++i) {
+    const glm::dvec2 a = polygon[i - 1] - polygon[0];
+    const glm::dvec2 b = polygon[i] - polygon[0];
+    if (a.x * b.y != a.y * b.x) {
+      return true;
+    }
+  }
+  return false;
+}
+
+}  // namespace
+
+std::vector<std::vector<glm::dvec2>> read_polygons(const std::filesystem::path& path) {
+  std::ifstream file(path);
+  if (!file) {
+    throw Error(Fault::input, fmt::format("{}: cannot be opened for reading", path.string()));
+  }
+  std::vector<std::vector<glm::dvec2>> polygons;
+  std::vector<glm::dvec2> polygon;
+  int first_line = 0;
+  const auto finish_polygon = [&] {
+    if (polygon.empty()) {
+      return;
+    }
+    if (polygon.size() < 3) {
+      refuse(path, first_line,
+             fmt::format("polygon of {} vertices: give at least 3", polygon.size()));
+    }
+    if (!encloses_area(polygon)) {
+      refuse(path, first_line,
+             fmt::format("polygon of {} vertices on one line: give it an area", polygon.size()));
+    }
+    polygons.push_back(std::move(polygon));
+    polygon.clear();
+  };
+
+  std::string text;
+  for (int line = 1; std::getline(file, text); ++line) {
+    constexpr const char* blanks = " \t\r";
+    if (text.find_first_not_of(blanks) == std::string::npos) {
+      finish_polygon();
+      continue;
+    }
+    text.resize(std::min(text.find('#'), text.size()));
+    if (text.find_first_not_of(blanks) == std::string::npos) {
+      continue;
+    }
+    const std::optional<glm::dvec2> vertex = parse_vertex(text);
+    if (!vertex) {
+      refuse(path, line,
+             fmt::format("'{:.40}': write a vertex as two finite numbers, x y, in mm", text));
+    }
+    if (polygon.empty()) {
+      first_line = line;
+    }
+    polygon.push_back(*vertex);
+  }
+  if (file.bad()) {
+    throw Error(Fault::input, fmt::format("{}: cannot be read", path.string()));
+  }
+  finish_polygon();
+  if (polygons.empty()) {
+    throw Error(Fault::input, fmt::format("{}: no polygon in it: write one vertex, x y, in mm, a "
+                                          "line",
+                                          path.string()));
+  }
+  return polygons;
+}
+
+}  // namespace palpate

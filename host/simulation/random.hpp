@@ -1,0 +1,41 @@
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+#include <numbers>
+#include <random>
+
+namespace palpate {
+
+/// What random numbers are for. Uses that share a seed draw from different streams, or the first
+/// random touch of an unknown would repeat the numbers of its pose.
+enum class Stream : std::uint32_t { sensor, touch_poses, object_pose };
+
+/// Random numbers that are the same on every standard library: the engine and std::seed_seq are
+/// specified to the bit, the standard's distributions are not.
+class Random {
+ public:
+  Random(std::uint64_t seed, Stream stream) {
+    std::seed_seq sequence{static_cast<std::uint32_t>(seed), static_cast<std::uint32_t>(seed >> 32),
+                           static_cast<std::uint32_t>(stream)};
+    engine_.seed(sequence);
+  }
+
+  /// Uniform over [0, 1), in steps of 2^-53.
+  double uniform() { return static_cast<double>(engine_() >> 11) * 0x1p-53; }
+
+  /// Uniform over [lower, upper).
+  double uniform(double lower, double upper) { return lower + (upper - lower) * uniform(); }
+
+  /// Standard normal (Box and Muller 1958). The pair's second number is dropped, so that every call
+  /// takes the same two draws from the engine.
+  double normal() {
+    const double radius = std::sqrt(-2.0 * std::log(1.0 - uniform()));
+    return radius * std::cos(2.0 * std::numbers::pi * uniform());
+  }
+
+ private:
+  std::mt19937_64 engine_;
+};
+
+}  // namespace palpate

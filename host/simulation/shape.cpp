@@ -1,0 +1,52 @@
+#include <algorithm>
+#include <filesystem>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "glyphs.hpp"
+#include "palpate/error.hpp"
+#include "palpate/simulation.hpp"
+#include "polygon_file.hpp"
+#include "spans.hpp"
+
+namespace palpate {
+
+bool Shape::contains(const glm::dvec2& p_object_mm) const {
+  const std::vector<Span> on_line = spans(*this, p_object_mm.y);
+  return std::any_of(on_line.begin(), on_line.end(), [x = p_object_mm.x](const Span& span) {
+    return span.begin <= x && x <= span.end;
+  });
+}
+
+Shape make_shape(const std::string& name_or_file) {
+  if (name_or_file.size() == 1) {
+    char character = name_or_file[0];
+    if (character >= 'a' && character <= 'z') {
+      character = static_cast<char>(character - 'a' + 'A');
+    }
+    if (std::vector<Shape::Stroke> strokes = glyph_strokes(character); !strokes.empty()) {
+      return {.label = {character}, .strokes = std::move(strokes), .polygons = {}};
+    }
+  }
+  if (name_or_file == "ring") {
+    return {.label = "ring",
+            .strokes = {{.points_mm = arc({0.0, 0.0}, {7.5, 7.5}, 0.0, 360.0), .width_mm = 3.0}},
+            .polygons = {}};
+  }
+  if (name_or_file == "bar") {
+    return {.label = "bar",
+            .strokes = {},
+            .polygons = {{{-10.0, -4.0}, {10.0, -4.0}, {10.0, 4.0}, {-10.0, 4.0}}}};
+  }
+  const std::filesystem::path path(name_or_file);
+  std::error_code ignored;
+  if (!std::filesystem::exists(path, ignored) || std::filesystem::is_directory(path, ignored)) {
+    throw Error(Fault::input, fmt::format("shape '{}': not a file and no shape of that name; give "
+                                          "A to Z, 0 to 9, ring, bar or a polygon file",
+                                          name_or_file));
+  }
+  return {.label = path.stem().string(), .strokes = {}, .polygons = read_polygons(path)};
+}
+
+}  // namespace palpate

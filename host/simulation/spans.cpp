@@ -1,0 +1,95 @@
+#include "spans.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include <glm/geometric.hpp>
+
+namespace palpate {
+
+namespace {
+
+/// Adds the line's part within `radius` of the segment ab, which is one interval: the capsule is
+/// convex, so its ends are the outermost of those of the two discs and the two sides.
+void add_capsule(const glm::dvec2& a, const glm::dvec2& b, double radius, double y,
+                 std::vector<Span>& spans) {
+  if (y < std::min(a.y, b.y) - radius || y > std::max(a.y, b.y) + radius) {
+    return;
+  }
+  constexpr double infinity = std::numeric_limits<double>::infinity();
+  Span span{infinity, -infinity};
+  const auto include = [&span](double x) {
+    span.begin = std::min(span.begin, x);
+    span.end = std::max(span.end, x);
+  };
+  for (const glm::dvec2& p : {a, b}) {
+    const double rest = radius * radius - (y - p.y) * (y - p.y);
+    if (rest >= 0.0) {
+      include(p.x - std::sqrt(rest));
+      include(p.x + std::sqrt(rest));
+    }
+  }
+  // A horizontal segment's interval ends on its discs.
+  const glm::dvec2 along = b - a;
+  if (along.y != 0.0) {
+    const glm::dvec2 across = glm::dvec2(-along.y, along.x) * (radius / glm::length(along));
+    for (const glm::dvec2& start : {a + across, a - across}) {
+      const double t = (y - start.y) / along.y;
+      if (t >= 0.0 && t <= 1.0) {
+        include(start.x + t * along.x);
+      }
+    }
+  }
+  if (span.begin <= span.end) {
+    spans.push_back(span);
+  }
+}
+
+/// Adds the line's part inside the polygons, by the even-odd rule.
+void add_polygons(const std::vector<std::vector<glm::dvec2>>& polygons, double y,
+                  std::vector<Span>& spans) {
+  std::vector<double> crossings;
+  for (const std::vector<glm::dvec2>& polygon : polygons) {
+    for (std::size_t i = 0; i < polygon.size(); ++i) {
+      const glm::dvec2& a = polygon[i];
+      const glm::dvec2& b = polygon[(i + 1) % polygon.size()];
+      // Half open, so that a line through a vertex counts it once.
+      if ((a.y <= y) != (b.y <= y)) {
+        crossings.push_back(a.x + (y - a.y) / (b.y - a.y) * (b.x - a.x));
+      }
+    }
+  }
+  std::sort(crossings.begin(), crossings.end());
+  for (std::size_t i = 0; i + 1 < crossings.size(); i += 2) {
+    spans.push_back({crossings[i], crossings[i + 1]});
+  }
+}
+
+}  // namespace
+
+std::vector<Span> spans(const Shape& shape, double y_mm) {
+  std::vector<Span> found;
+  for (const Shape::Stroke& stroke : shape.strokes) {
+    const std::vector<glm::dvec2>& points = stroke.points_mm;
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      // A stroke's first point stands alone too: a stroke of one point is a disc.
+      add_capsule(points[i == 0 ? 0 : i - 1], points[i], stroke.width_mm / 2.0, y_mm, found);
+    }
+  }
+  add_polygons(shape.polygons, y_mm, found);
+
+  std::sort(found.begin(), found.end(),
+            [](const Span& a, const Span& b) { return a.begin < b.begin; });
+  std::vector<Span> disjoint;
+  for (const Span& span : found) {
+    if (disjoint.empty() || span.begin > disjoint.back().end) {
+      disjoint.push_back(span);
+    } else {
+      disjoint.back().end = std::max(disjoint.back().end, span.end);
+    }
+  }
+  return disjoint;
+}
+
+}  // namespace palpate

@@ -1,0 +1,54 @@
+#include "axes.hpp"
+
+#include <gtest/gtest.h>
+
+namespace palpate {
+namespace {
+
+std::vector<std::string> labels(const std::vector<Tick>& ticks) {
+  std::vector<std::string> result;
+  for (const Tick& tick : ticks) {
+    result.push_back(tick.label);
+  }
+  return result;
+}
+
+using Labels = std::vector<std::string>;
+
+TEST(EvenTicks, AreOneTwoOrFiveTimesAPowerOfTen) {
+  EXPECT_EQ(labels(even_ticks(-10.0, 10.0, 5)), (Labels{"−10", "−5", "0", "5", "10"}));
+  EXPECT_EQ(labels(even_ticks(0.0, 1.0, 5)), (Labels{"0", "0.2", "0.4", "0.6", "0.8", "1"}));
+  EXPECT_EQ(labels(even_ticks(-0.011, 0.012, 3)), (Labels{"−0.01", "0", "0.01"}));
+  EXPECT_EQ(labels(even_ticks(130.0, 1700.0, 4)), (Labels{"500", "1000", "1500"}));
+}
+
+TEST(EvenTicks, AreNeverMoreThanAskedFor) {
+  for (const double upper : {0.013, 0.7, 1.0, 3.3, 20.0, 99.0, 12345.0}) {
+    for (int count = 1; count <= 12; ++count) {
+      EXPECT_LE(even_ticks(-0.37 * upper, upper, count).size(), count + 1u);
+      EXPECT_GE(even_ticks(0.0, upper, count).size(), 1u);
+    }
+  }
+}
+
+TEST(EvenTicks, EndWhereStepsDrownInTheNumbersOwnRounding) {
+  EXPECT_LE(even_ticks(1e16, 1e16 + 4.0, 7).size(), 8u);
+}
+
+TEST(EvenTicks, KeepTheSmallestStep) {
+  EXPECT_EQ(labels(even_ticks(0.5, 1.5, 10, 1.0)), (Labels{"1"}));
+  EXPECT_EQ(labels(even_ticks(0.5, 3.5, 10, 1.0)), (Labels{"1", "2", "3"}));
+}
+
+TEST(View, MapsDataToPixelsWithYUp) {
+  const View view{.box = {100.0, 50.0, 200.0, 80.0}, .lower = {-1.0, 4.0}, .upper = {1.0, 8.0}};
+  EXPECT_EQ(view.pixel({-1.0, 4.0}), glm::dvec2(100.0, 130.0));
+  EXPECT_EQ(view.pixel({1.0, 8.0}), glm::dvec2(300.0, 50.0));
+  EXPECT_EQ(view.pixel({0.0, 7.0}), glm::dvec2(200.0, 70.0));
+  const Box box = view.pixels({0.0, 4.0}, {1.0, 5.0});
+  EXPECT_EQ(glm::dvec2(box.left, box.top), glm::dvec2(200.0, 110.0));
+  EXPECT_EQ(glm::dvec2(box.width, box.height), glm::dvec2(100.0, 20.0));
+}
+
+}  // namespace
+}  // namespace palpate

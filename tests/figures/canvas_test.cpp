@@ -1,0 +1,99 @@
+#include "canvas.hpp"
+
+#include <array>
+#include <string>
+
+#include <gtest/gtest.h>
+
+#include "palpate/error.hpp"
+#include "picture.hpp"
+
+namespace palpate {
+namespace {
+
+TEST(Canvas, IsWhiteAndOfTheSizeAskedFor) {
+  const Picture picture = decode(Canvas(31, 17).encode_png());
+  EXPECT_EQ(picture.width, 31);
+  EXPECT_EQ(picture.height, 17);
+  for (const std::uint32_t pixel : picture.pixels) {
+    EXPECT_EQ(pixel, 0xFFFFFFu);
+  }
+}
+
+TEST(Canvas, RefusesASizeBeyondCairo) {
+  try {
+    Canvas(100000, 10);
+    FAIL() << "no Error";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.fault(), Fault::system);
+  }
+}
+
+TEST(Canvas, FillsCellsFromTheLowestRowUp) {
+  constexpr int nx = 4;
+  constexpr int ny = 3;
+  const auto colour = [](int i, int j) { return Colour{i / 3.0, j / 2.0, 0.2}; };
+  Canvas canvas(60, 50);
+  canvas.cells({10.0, 5.0, 40.0, 30.0}, nx, ny, colour);
+  const Picture picture = decode(canvas.encode_png());
+  // Every pixel of the box has its cell's colour, to the very edge, and none outside has.
+  for (int y = 0; y < picture.height; ++y) {
+    for (int x = 0; x < picture.width; ++x) {
+      const bool inside = x >= 10 && x < 50 && y >= 5 && y < 35;
+      const Colour expected = inside ? colour((x - 10) / 10, ny - 1 - (y - 5) / 10) : white;
+      ASSERT_EQ(picture.at(x, y), rgb(expected)) << x << ", " << y;
+    }
+  }
+}
+
+TEST(Canvas, AveragesCellsSmallerThanAPixel) {
+  Canvas canvas(40, 40);
+  canvas.cells({0.0, 0.0, 40.0, 40.0}, 400, 400,
+               [](int i, int j) { return (i + j) % 2 == 0 ? white : Colour{}; });
+  const Picture picture = decode(canvas.encode_png());
+  for (int y = 1; y < 39; ++y) {
+    for (int x = 1; x < 39; ++x) {
+      // Half white, half black; the filter's weights differ a little from pixel to pixel.
+      ASSERT_NEAR(picture.at(x, y) & 0xFF, 128, 16) << x << ", " << y;
+    }
+  }
+}
+
+TEST(Canvas, ClipsWhileTheClipLives) {
+  const std::array across{glm::dvec2(0.0, 10.0), glm::dvec2(40.0, 10.0)};
+  Canvas canvas(40, 20);
+  {
+    const Canvas::Clip clip(canvas, {10.0, 0.0, 10.0, 20.0});
+    canvas.line(across, {.colour = {}, .width_px = 4.0});
+  }
+  const Picture clipped = decode(canvas.encode_png());
+  EXPECT_EQ(clipped.at(15, 10), 0u);
+  EXPECT_EQ(clipped.at(5, 10), 0xFFFFFFu);
+  EXPECT_EQ(clipped.at(25, 10), 0xFFFFFFu);
+  canvas.line(across, {.colour = {}, .width_px = 4.0});
+  EXPECT_EQ(decode(canvas.encode_png()).at(25, 10), 0u);
+}
+
+TEST(Canvas, ShortensTextToTheWidth) {
+  Canvas canvas(10, 10);
+  const Font font{20.0};
+  const std::string text = "größte Fläche";
+  const double whole = canvas.text_width(text, font);
+  EXPECT_EQ(canvas.fit(text, whole, font), text);
+  for (double width = whole; width > 30.0; width -= 3.0) {
+    const std::string shown = canvas.fit(text, width, font);
+    EXPECT_LE(canvas.text_width(shown, font), width);
+    EXPECT_EQ(shown.find('?'), std::string::npos) << shown << ": a character was cut in half";
+  }
+  EXPECT_EQ(canvas.fit(text, 0.0, font), "…");
+}
+
+TEST(Canvas, GoesOnAfterTextThatIsNotUtf8) {
+  Canvas canvas(40, 40);
+  canvas.text("\xC3\x28 \xFF", {0.0, 20.0}, {});
+  canvas.disc({20.0, 30.0}, 5.0, {});
+  EXPECT_EQ(decode(canvas.encode_png()).at(20, 30), 0u);
+}
+
+}  // namespace
+}  // namespace palpate

@@ -1,0 +1,33 @@
+#include "printable.hpp"
+
+#include <gtest/gtest.h>
+
+namespace palpate {
+namespace {
+
+TEST(Printable, KeepsWellFormedText) {
+  for (const char* text : {"", "A.unknown.h5", "Schlüssel", "€", "−10 ≤ θ", "鍵", "🔑"}) {
+    EXPECT_EQ(printable(text), text);
+  }
+}
+
+TEST(Printable, ReplacesControlCharacters) {
+  EXPECT_EQ(printable("a\nb\tc\x7F"), "a?b?c?");
+  EXPECT_EQ(printable("\xC2\x85"), "??");  // next line, U+0085
+  EXPECT_EQ(printable(std::string_view("a\0b", 3)), "a?b");
+}
+
+TEST(Printable, ReplacesEveryByteOfWhatIsNotUtf8) {
+  EXPECT_EQ(printable("\xFF"), "?");
+  EXPECT_EQ(printable("\x80z"), "?z");
+  EXPECT_EQ(printable("\xC3("), "?(");
+  EXPECT_EQ(printable("x\xE2\x82"), "x??");               // the end is missing
+  EXPECT_EQ(printable("\xC0\xAF"), "??");                 // '/' in two bytes
+  EXPECT_EQ(printable("\xE0\x80\xAF"), "???");            // '/' in three bytes
+  EXPECT_EQ(printable("\xED\xA0\x80"), "???");            // a surrogate
+  EXPECT_EQ(printable("\xF4\x90\x80\x80"), "????");       // beyond U+10FFFF
+  EXPECT_EQ(printable("\xF8\x88\x80\x80\x80"), "?????");  // five bytes
+}
+
+}  // namespace
+}  // namespace palpate

@@ -1,0 +1,187 @@
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include <gtest/gtest.h>
+
+#include "figures.hpp"
+#include "palpate/error.hpp"
+#include "palpate/pose_error.hpp"
+#include "palpate/touch.hpp"
+#include "picture.hpp"
+
+namespace palpate {
+namespace {
+
+/// A bar from (-5, 0) to (6, 1), touched twice at a pivot far from the robot's origin.
+RecognitionSheet example() {
+  RecognitionSheet sheet;
+  sheet.title = "bar.h5";
+  sheet.map = {.label = "bar", .origin_mm = {-10.0, -10.0}, .nx = 41, .ny = 41, .log_odds = {}};
+  for (int j = 0; j < sheet.map.ny; ++j) {
+    for (int i = 0; i < sheet.map.nx; ++i) {
+      const bool on = i >= 10 && i <= 32 && j >= 20 && j <= 22;
+      sheet.map.log_odds.push_back(on ? 8.0F : -4.0F);
+    }
+  }
+  sheet.lattice.pivot_mm = {200.0, -50.0};
+  sheet.T_object_robot = sheet.lattice.T_object_robot(2.0, 1.0, 0.3);
+  sheet.true_object = "bar";
+  sheet.truth = sheet.lattice.T_object_robot(2.4, 0.7, 0.35);
+  sheet.error_mm = 0.5;
+  for (const Pose& T_robot_sensor : {Pose{{198.0, -49.0}, 0.1}, Pose{{204.0, -52.0}, 1.0}}) {
+    std::vector<glm::dvec2> elements = digitacts_array();
+    for (glm::dvec2& p : elements) {
+      p = T_robot_sensor * p;
+    }
+    sheet.footprints_mm.push_back(elements);
+  }
+  sheet.belief_xy.assign(static_cast<std::size_t>(sheet.lattice.plane()), 1e-9);
+  sheet.belief_xy[15 * 25 + 4] = 0.8;
+  sheet.labels = {"bar", "ring"};
+  sheet.identity = {{0.6, 0.4}, {0.9, 0.1}};
+  return sheet;
+}
+
+/// Pixels of exactly this colour.
+int count(const Picture& picture, const Colour& colour) {
+  return static_cast<int>(std::ranges::count(picture.pixels, rgb(colour)));
+}
+
+TEST(RecognitionSheet, HasOneSizeWhateverItShows) {
+  const Picture whole = decode(draw_recognition(example()));
+  RecognitionSheet bare = example();
+  bare.footprints_mm.clear();
+  bare.truth.reset();
+  bare.error_mm.reset();
+  bare.true_object.clear();
+  bare.identity.clear();
+  bare.labels.clear();
+  const Picture empty = decode(draw_recognition(bare));
+  EXPECT_GE(whole.width, 2000);
+  EXPECT_EQ(whole.width, empty.width);
+  EXPECT_EQ(whole.height, empty.height);
+}
+
+TEST(RecognitionSheet, GivesTheSameBytesAgain) {
+  EXPECT_EQ(draw_recognition(example()), draw_recognition(example()));
+}
+
+TEST(RecognitionSheet, ShowsTheBeliefsLargestBinInTheBrightestColours) {
+  RecognitionSheet sheet = example();
+  sheet.T_object_robot = sheet.lattice.T_object_robot(-5.0, -5.0, 0.3);
+  sheet.truth.reset();
+  // log10 0.8 = -0.097 on the scale of six powers of ten below 1.
+  const Colour peak = sequential((std::log10(0.8) + 6.0) / 6.0);
+  const int with = count(decode(draw_recognition(sheet)), peak);
+  sheet.belief_xy[15 * 25 + 4] = 1e-9;
+  sheet.belief_xy[0] = 0.7;  // keeps the scale
+  const int without = count(decode(draw_recognition(sheet)), peak);
+  // A bin is 480 / 25 = 19.2 pixels wide.
+  EXPECT_NEAR(with - without, 19.2 * 19.2, 2 * 19.2);
+}
+
+TEST(RecognitionSheet, MarksThePivotAtTheEstimateWhateverTheAngle) {
+  // The same pivot, a different angle: the belief's panel stays as it is.
+  RecognitionSheet sheet = example();
+  sheet.truth.reset();
+  sheet.footprints_mm.clear();
+  const Picture a = decode(draw_recognition(sheet));
+  sheet.T_object_robot = sheet.lattice.T_object_robot(2.0, 1.0, 2.8);
+  EXPECT_LE(difference(a, decode(draw_recognition(sheet))).pixels, 4) << "antialiasing alone";
+  sheet.T_object_robot = sheet.lattice.T_object_robot(3.0, 1.0, 0.3);
+  EXPECT_GT(difference(a, decode(draw_recognition(sheet))).pixels, 100);
+}
+
+TEST(RecognitionSheet, DrawsTheTruthNearestToTheEstimateUnderTheSymmetry) {
+  RecognitionSheet sheet = example();
+  const glm::dvec2 c = body_of(sheet.map).centroid_mm;
+  const auto turned = [&](double angle_rad) {
+    return Pose{c - rotate(angle_rad, c), angle_rad} * *example().truth;
+  };
+  sheet.map.symmetry = 2;
+  const Picture plain = decode(draw_recognition(sheet));
+  sheet.truth = turned(std::numbers::pi);
+  EXPECT_LE(difference(plain, decode(draw_recognition(sheet))).pixels, 4) << "antialiasing alone";
+  sheet.truth = turned(std::numbers::pi / 2);
+  EXPECT_GT(difference(plain, decode(draw_recognition(sheet))).pixels, 100);
+
+  sheet.map.symmetry = 0;
+  const Picture full = decode(draw_recognition(sheet));
+  sheet.truth = turned(1.234);
+  EXPECT_LE(difference(full, decode(draw_recognition(sheet))).pixels, 4) << "antialiasing alone";
+}
+
+TEST(RecognitionSheet, AddsUpObjectsOfEqualLabel) {
+  RecognitionSheet sheet = example();
+  sheet.identity = {{0.5, 0.5}, {0.75, 0.25}};
+  const std::string two = draw_recognition(sheet);
+  sheet.labels = {"bar", "ring", "bar"};
+  sheet.identity = {{0.25, 0.5, 0.25}, {0.5, 0.25, 0.25}};
+  EXPECT_EQ(draw_recognition(sheet), two);
+}
+
+TEST(RecognitionSheet, DrawsALatticeOfOneBin) {
+  RecognitionSheet sheet = example();
+  sheet.lattice.x_mm = {3.0, 3.0, 1};
+  sheet.lattice.y_mm = {-10.0, 10.0, 1};
+  sheet.belief_xy = {1.0};
+  decode(draw_recognition(sheet));
+}
+
+TEST(RecognitionSheet, DrawsABeliefWithoutMass) {
+  RecognitionSheet sheet = example();
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  sheet.belief_xy.assign(sheet.belief_xy.size(), 0.0);
+  sheet.identity = {{0.5, 0.5}, {nan, nan}};
+  const Picture picture = decode(draw_recognition(sheet));
+  EXPECT_GE(count(picture, sequential(0.0)), 400 * 400) << "no belief is the dark end";
+  sheet.belief_xy.assign(sheet.belief_xy.size(), nan);
+  decode(draw_recognition(sheet));
+}
+
+TEST(RecognitionSheet, DrawsOneTouchAndOneCell) {
+  RecognitionSheet sheet = example();
+  sheet.map = {.label = "dot", .nx = 1, .ny = 1, .log_odds = {2.0F}};
+  sheet.footprints_mm.resize(1);
+  sheet.identity.resize(1);
+  decode(draw_recognition(sheet));
+}
+
+TEST(RecognitionSheet, DrawsManyLabelsAndTouches) {
+  RecognitionSheet sheet = example();
+  sheet.labels.clear();
+  for (int k = 0; k < 40; ++k) {
+    sheet.labels.push_back("object with a long label, number " + std::to_string(k));
+  }
+  sheet.identity.assign(300, std::vector<double>(40, 1.0 / 40));
+  sheet.identity.back()[7] = std::numeric_limits<double>::quiet_NaN();
+  const Picture picture = decode(draw_recognition(sheet));
+  EXPECT_GT(count(picture, grey), 0);
+  for (std::size_t k = 0; k + 1 < series_colours; ++k) {
+    EXPECT_GT(count(picture, series(k)), 0) << k;
+  }
+}
+
+TEST(RecognitionSheet, DrawsPosesOutsideOfTheLattice) {
+  RecognitionSheet sheet = example();
+  sheet.T_object_robot = sheet.lattice.T_object_robot(500.0, -3.0, 0.0);
+  sheet.truth = sheet.lattice.T_object_robot(0.0, -2000.0, 0.0);
+  decode(draw_recognition(sheet));
+}
+
+TEST(RecognitionSheet, RefusesArraysOfTheWrongSize) {
+  RecognitionSheet sheet = example();
+  sheet.belief_xy.pop_back();
+  EXPECT_THROW(draw_recognition(sheet), Error);
+  sheet = example();
+  sheet.identity[1].pop_back();
+  EXPECT_THROW(draw_recognition(sheet), Error);
+  sheet = example();
+  sheet.map.log_odds.clear();
+  EXPECT_THROW(draw_recognition(sheet), Error);
+}
+
+}  // namespace
+}  // namespace palpate
