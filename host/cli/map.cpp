@@ -1,0 +1,230 @@
+#include "commands.hpp"
+
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "atomic_file.hpp"
+#include "figures.hpp"
+#include "options.hpp"
+#include "palpate/error.hpp"
+#include "palpate/files.hpp"
+#include "palpate/map_builder.hpp"
+#include "progress.hpp"
+#include "recordings.hpp"
+
+namespace palpate::cli {
+
+namespace {
+
+struct Options {
+  std::vector<std::string> recordings;
+  std::string output;
+  double cell_mm = 0.5;
+  double psf_mm = 1.0;
+  std::optional<double> spread_mm;
+  double peak = 0.9;
+  std::string prior = "auto";
+  std::optional<double> threshold;
+  std::optional<double> ratio;
+  std::string frames;
+  int symmetry = 1;
+  std::string label;
+  std::string png;
+  std::string ros;
+  std::string device;
+};
+
+/// The touches of one label, of all recordings that bear it.
+struct ObjectTouches {
+  std::string label;
+  std::vector<Touch> touches;
+};
+
+std::vector<ObjectTouches> group_by_label(const std::vector<Recording>& recordings,
+                                          const Options& options, bool one_map) {
+  std::optional<Frames> frames;
+  if (!options.frames.empty()) {
+    frames = parse_frames("--frames", options.frames);
+  }
+  std::map<std::string, std::vector<Touch>> groups;
+  for (const Recording& recording : recordings) {
+    const std::string& label = options.label.empty() ? recording.object : options.label;
+    if (label.empty()) {
+      throw Error(Fault::input,
+                  fmt::format("{}: object is empty; name it with --label", recording.path));
+    }
+    if (label.find('/') != std::string::npos) {
+      throw Error(Fault::input, fmt::format("{}: object '{}' cannot name a file; give --label",
+                                            recording.path, label));
+    }
+    const auto [begin, end] = select(recording, frames);
+    const std::vector<Touch> touches = recording.touches(begin, end);
+    auto& group = groups[label];
+    group.insert(group.end(), touches.begin(), touches.end());
+    if (one_map && groups.size() > 1) {
+      throw Error(Fault::input,
+                  fmt::format("{}: object '{}' differs from '{}' of {}; give a folder, -o {}/, for "
+                              "a map of each, or one name for all with --label",
+                              recording.path, label, recordings.front().object,
+                              recordings.front().path, options.output));
+    }
+  }
+  std::vector<ObjectTouches> objects;
+  for (auto& [label, touches] : groups) {
+    objects.push_back({label, std::move(touches)});
+  }
+  return objects;
+}
+
+MapOptions map_options(const Options& options, const std::vector<Recording>& recordings) {
+  MapOptions result;
+  result.cell_mm = require_above("--cell-mm", options.cell_mm, 0.0);
+  require_above("--psf-mm", options.psf_mm, 0.0);
+  result.sensor.spread_mm =
+      require_above("--spread-mm", options.spread_mm.value_or(options.psf_mm / 2.0), 0.0);
+  result.sensor.peak = require_above("--peak", options.peak, 0.0);
+  if (options.peak >= 1.0) {
+    throw Error(Fault::input, fmt::format("--peak {}: must be below 1, or one reading would make a "
+                                          "cell certain",
+                                          options.peak));
+  }
+  result.classifier = make_classifier(recordings, options.threshold, options.ratio);
+  return result;
+}
+
+double parse_prior(const std::string& text) {
+  char* end = nullptr;
+  const double prior = std::strtod(text.c_str(), &end);
+  if (text.empty() || *end != '\0' || !(prior > 0.0 && prior < 1.0)) {
+    throw Error(Fault::input,
+                fmt::format("--prior {}: give auto, or a probability between 0 and 1", text));
+  }
+  return prior;
+}
+
+void build_maps(const Options& options) {
+  const std::filesystem::path output = options.output;
+  const bool folder = options.output.ends_with('/') || std::filesystem::is_directory(output);
+  if (options.symmetry < 0) {
+    throw Error(
+        Fault::input,
+        fmt::format("--symmetry {}: give n for n-fold, or 0 for full symmetry", options.symmetry));
+  }
+  const bool estimate = options.prior == "auto";
+  const double given_prior = estimate ? 0.0 : parse_prior(options.prior);
+  const std::vector<Recording> recordings = read_touch_recordings(options.recordings);
+  MapOptions model = map_options(options, recordings);
+  const std::vector<ObjectTouches> objects = group_by_label(recordings, options, !folder);
+
+  if (!folder) {
+    require_folder_of(output);
+  }
+  std::optional<AtomicFile> png;
+  if (!options.png.empty()) {
+    png.emplace(options.png);
+  }
+
+  Device device = Device::open(options.device);
+  model.sensor.prior = given_prior;
+  if (estimate) {
+    std::vector<std::vector<Touch>> touches;
+    for (const ObjectTouches& object : objects) {
+      touches.push_back(object.touches);
+    }
+    model.sensor.prior = estimate_prior(device, touches, model);
+  }
+
+  std::vector<OccupancyGrid> maps;
+  {
+    Progress progress("building maps");
+    for (const ObjectTouches& object : objects) {
+      progress.show(static_cast<double>(maps.size()) / static_cast<double>(objects.size()));
+      MapBuilder builder(device, model);
+      builder.add(object.touches);
+      maps.push_back(builder.build(object.label));
+      maps.back().symmetry = options.symmetry;
+    }
+  }
+
+  // Everything is computed; only now anything is written.
+  if (folder) {
+    make_folder(output);
+  }
+  for (std::size_t i = 0; i < maps.size(); ++i) {
+    const OccupancyGrid& map = maps[i];
+    const std::filesystem::path path = folder ? output / (map.label + ".map.h5") : output;
+    write_map(path, map);
+    fmt::print("{}: {} from {} touches, {} x {} cells of {} mm, prior {:.3f}\n", path.string(),
+               map.label, objects[i].touches.size(), map.nx, map.ny, map.cell_mm, map.prior);
+  }
+  if (!options.ros.empty()) {
+    make_folder(options.ros);
+    for (const OccupancyGrid& map : maps) {
+      const auto yaml = std::filesystem::path(options.ros) / (map.label + ".yaml");
+      write_map_server(yaml, map);
+      fmt::print("{}\n", yaml.string());
+    }
+  }
+  if (png) {
+    png->write(draw_maps(maps));
+    png->commit();
+    fmt::print("{}\n", options.png);
+  }
+}
+
+}  // namespace
+
+void add_map(CLI::App& app) {
+  auto* command = app.add_subcommand(
+      "map",
+      "Build an object's occupancy grid from touches at known poses (robot frame = object "
+      "frame)");
+  const auto options = std::make_shared<Options>();
+  command->add_option("RECORDING", options->recordings, "Recordings (HDF5)")->required();
+  command
+      ->add_option("-o,--output", options->output,
+                   "Map to write (HDF5), or FOLDER/ for one map per object label")
+      ->required();
+  command->add_option("--cell-mm", options->cell_mm, "Edge of a cell, mm")->capture_default_str();
+  command
+      ->add_option("--psf-mm", options->psf_mm, "The sensor's point spread, standard deviation, mm")
+      ->capture_default_str();
+  command->add_option("--spread-mm", options->spread_mm,
+                      "Spread of the inverse sensor model, mm [default: half of --psf-mm]");
+  command
+      ->add_option("--peak", options->peak,
+                   "Peak of the inverse sensor model, a probability below 1")
+      ->capture_default_str();
+  command
+      ->add_option("--prior", options->prior,
+                   "Probability that an unseen cell is occupied; auto: the objects' area over the "
+                   "modelled area")
+      ->capture_default_str();
+  command->add_option(
+      "--threshold", options->threshold,
+      "Contact threshold, in the recording's pressure unit [default: 2 kPa; must be "
+      "given for raw pressure]");
+  command->add_option("--ratio", options->ratio,
+                      "Contact threshold as a part of the touch's largest pressure [default: 0.3]");
+  command->add_option("--frames", options->frames,
+                      "Use the touches A:B, from A up to before B, of every recording");
+  command
+      ->add_option("--symmetry", options->symmetry,
+                   "The object's n-fold rotational symmetry; 0 = full")
+      ->capture_default_str();
+  command->add_option("--label", options->label,
+                      "Label of the map [default: the recording's object]");
+  command->add_option("--png", options->png, "Draw all maps side by side");
+  command->add_option("--ros", options->ros,
+                      "Folder for each map as PGM + YAML, in the convention of ROS's map_server");
+  command->add_option("--device", options->device, "Vulkan device, by index or a part of its name");
+  command->callback([options] { build_maps(*options); });
+}
+
+}  // namespace palpate::cli

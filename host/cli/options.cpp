@@ -1,0 +1,123 @@
+#include "options.hpp"
+
+#include <charconv>
+#include <cmath>
+#include <numbers>
+#include <system_error>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "palpate/error.hpp"
+
+namespace palpate::cli {
+
+namespace {
+
+[[noreturn]] void refuse(const std::string& flag, const std::string& text,
+                         const std::string& remedy) {
+  throw Error(Fault::input, fmt::format("{} {}: {}", flag, text, remedy));
+}
+
+/// The numbers between the separators, or nothing if the text has another form.
+template <typename Number>
+std::optional<std::vector<Number>> split_numbers(const std::string& text, char separator) {
+  std::vector<Number> numbers;
+  const char* at = text.data();
+  const char* const end = at + text.size();
+  while (true) {
+    Number number{};
+    const auto [rest, error] = std::from_chars(at, end, number);
+    if (error != std::errc{} || !std::isfinite(static_cast<double>(number))) {
+      return {};
+    }
+    numbers.push_back(number);
+    if (rest == end) {
+      return numbers;
+    }
+    if (*rest != separator) {
+      return {};
+    }
+    at = rest + 1;
+  }
+}
+
+template <typename Number>
+std::vector<Number> parse(const std::string& flag, const std::string& text, char separator,
+                          std::size_t count, const char* form) {
+  const auto numbers = split_numbers<Number>(text, separator);
+  if (!numbers || numbers->size() != count) {
+    refuse(flag, text, fmt::format("give it as {}", form));
+  }
+  return *numbers;
+}
+
+}  // namespace
+
+std::array<double, 2> parse_range(const std::string& flag, const std::string& text) {
+  const auto ends = parse<double>(flag, text, ':', 2, "LOWER:UPPER, such as -10:10");
+  if (ends[0] > ends[1]) {
+    refuse(flag, text, "reversed; write the lower end first");
+  }
+  return {ends[0], ends[1]};
+}
+
+glm::dvec2 parse_point(const std::string& flag, const std::string& text) {
+  const auto xy = parse<double>(flag, text, ',', 2, "X,Y in mm");
+  return {xy[0], xy[1]};
+}
+
+Pose parse_pose(const std::string& flag, const std::string& text) {
+  const auto values = parse<double>(flag, text, ',', 3, "X,Y,DEG, in mm and degrees");
+  return {{values[0], values[1]}, radians(values[2])};
+}
+
+std::array<int, 3> parse_bins(const std::string& flag, const std::string& text) {
+  const auto bins = parse<int>(flag, text, 'x', 3, "XxYxTHETA, such as 25x25x16");
+  for (const int count : bins) {
+    if (count < 1) {
+      refuse(flag, text, "every count must be at least 1");
+    }
+  }
+  return {bins[0], bins[1], bins[2]};
+}
+
+Frames parse_frames(const std::string& flag, const std::string& text) {
+  const auto ends =
+      parse<std::int64_t>(flag, text, ':', 2, "A:B, the touches from A up to before B");
+  if (ends[0] < 0 || ends[0] >= ends[1]) {
+    refuse(flag, text, "selects no touch; A must be at least 0 and below B");
+  }
+  return {static_cast<std::size_t>(ends[0]), static_cast<std::size_t>(ends[1])};
+}
+
+double require_above(const std::string& flag, double value, double least, bool inclusive) {
+  if (!std::isfinite(value) || value < least || (!inclusive && value == least)) {
+    refuse(flag, fmt::format("{}", value),
+           fmt::format("must be {} {}", inclusive ? "at least" : "above", least));
+  }
+  return value;
+}
+
+void require_folder_of(const std::filesystem::path& file) {
+  const std::filesystem::path folder = file.has_parent_path() ? file.parent_path() : ".";
+  std::error_code error;
+  if (!std::filesystem::is_directory(folder, error)) {
+    throw Error(Fault::input, fmt::format("{}: the folder '{}' does not exist; make it first",
+                                          file.string(), folder.string()));
+  }
+}
+
+void make_folder(const std::filesystem::path& folder) {
+  std::error_code error;
+  std::filesystem::create_directories(folder, error);
+  if (error || !std::filesystem::is_directory(folder)) {
+    throw Error(Fault::input, fmt::format("{}: cannot be made a folder ({}); choose another",
+                                          folder.string(), error.message()));
+  }
+}
+
+double degrees(double rad) { return rad * 180.0 / std::numbers::pi; }
+double radians(double deg) { return deg * std::numbers::pi / 180.0; }
+
+}  // namespace palpate::cli

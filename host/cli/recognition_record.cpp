@@ -1,0 +1,185 @@
+#include "recognition_record.hpp"
+
+#include <algorithm>
+#include <filesystem>
+#include <map>
+#include <numbers>
+
+#include <fmt/format.h>
+
+#include "palpate/pose_error.hpp"
+
+namespace palpate::cli {
+
+namespace {
+
+nlohmann::ordered_json to_json(const Step& step, const RecognitionTask& task) {
+  nlohmann::ordered_json identity;
+  for (std::size_t i = 0; i < task.labels.size(); ++i) {
+    identity[task.labels[i]] = step.identity[i];
+  }
+  const Mode& mode = step.mode;
+  const Pose T_robot_object = inverse(mode.T_object_robot);
+  nlohmann::ordered_json json{{"best", task.labels[step.best]},
+                              {"identity", identity},
+                              {"mode",
+                               {{"object", task.labels[task.label_of[mode.object]]},
+                                {"map", task.map_paths[mode.object]},
+                                {"x_mm", mode.T_object_robot.translation_mm.x},
+                                {"y_mm", mode.T_object_robot.translation_mm.y},
+                                {"theta_rad", mode.T_object_robot.theta_rad},
+                                {"log_likelihood", mode.log_likelihood}}},
+                              {"T_robot_object",
+                               {T_robot_object.translation_mm.x, T_robot_object.translation_mm.y,
+                                wrap_angle(T_robot_object.theta_rad, 2.0 * std::numbers::pi)}}};
+  if (step.right) {
+    json["right"] = *step.right;
+    json["error_mm"] = step.error_mm ? nlohmann::ordered_json(*step.error_mm) : nullptr;
+  }
+  return json;
+}
+
+std::string error_text(const Step& step) {
+  return step.error_mm ? fmt::format("{:.2f}", *step.error_mm) : "-";
+}
+
+/// What each label was taken for, most often first; only labels that were not always right.
+void print_confusions(const std::vector<RecognitionRecord>& records, const RecognitionTask& task) {
+  struct Row {
+    int all = 0;
+    int right = 0;
+    std::map<std::string, int> wrong;
+  };
+  std::map<std::string, Row> rows;
+  for (const RecognitionRecord& record : records) {
+    if (record.last().right) {
+      Row& row = rows[record.true_label];
+      ++row.all;
+      row.right += *record.last().right ? 1 : 0;
+      row.wrong[task.labels[record.last().best]] += *record.last().right ? 0 : 1;
+    }
+  }
+  if (std::all_of(rows.begin(), rows.end(),
+                  [](const auto& row) { return row.second.right == row.second.all; })) {
+    return;
+  }
+  fmt::print("\n{:<16} {:>9}  taken for\n", "object", "right");
+  for (const auto& [label, row] : rows) {
+    std::vector<std::pair<int, std::string>> wrong;
+    for (const auto& [other, count] : row.wrong) {
+      if (count > 0) {
+        wrong.emplace_back(-count, other);
+      }
+    }
+    std::sort(wrong.begin(), wrong.end());
+    std::string list;
+    for (const auto& [count, other] : wrong) {
+      list += fmt::format("{}{} {}", list.empty() ? "" : ", ", -count, other);
+    }
+    fmt::print("{:<16} {:>4} of {:<2}  {}\n", label, row.right, row.all, list);
+  }
+}
+
+}  // namespace
+
+const std::string& true_label(const Recording& recording) {
+  return recording.truth ? recording.truth->object : recording.object;
+}
+
+Step judge(const Estimate& estimate, const Unknown& unknown, const RecognitionTask& task) {
+  Step step;
+  step.mode = estimate.mode;
+  step.identity.assign(task.labels.size(), 0.0);
+  for (std::size_t i = 0; i < estimate.identity.size(); ++i) {
+    step.identity[task.label_of[i]] += estimate.identity[i];
+  }
+  step.best = static_cast<std::size_t>(
+      std::max_element(step.identity.begin(), step.identity.end()) - step.identity.begin());
+
+  const Recording& recording = *unknown.recording;
+  const std::string& truth = true_label(recording);
+  if (!truth.empty()) {
+    step.right = task.labels[step.best] == truth;
+  }
+  const OccupancyGrid& map = task.hypotheses[step.mode.object].map;
+  if (recording.truth && map.label == truth) {
+    step.error_mm = pose_error_mm(body_of(map), map.symmetry, step.mode.T_object_robot,
+                                  recording.truth->T_object_robot);
+  }
+  return step;
+}
+
+nlohmann::ordered_json to_json(const RecognitionRecord& record, const RecognitionTask& task,
+                               const std::string& device, bool with_trace) {
+  nlohmann::ordered_json json{{"recording", record.recording}};
+  if (record.frame) {
+    json["frame"] = *record.frame;
+  }
+  json["touches"] = record.touches;
+  json.update(to_json(record.last(), task));
+  json["seconds"] = record.seconds;
+  json["device"] = device;
+  if (with_trace) {
+    auto trace = nlohmann::ordered_json::array();
+    for (const Step& step : record.trace) {
+      trace.push_back(to_json(step, task));
+    }
+    json["trace"] = trace;
+  }
+  return json;
+}
+
+std::string name_of(const RecognitionRecord& record) {
+  const std::string file = std::filesystem::path(record.recording).filename().string();
+  return record.frame ? fmt::format("{} frame {}", file, *record.frame) : file;
+}
+
+void print_trace(const RecognitionRecord& record, const RecognitionTask& task) {
+  fmt::print("{}\n  touch  best       probability     x mm     y mm  theta deg  error mm\n",
+             name_of(record));
+  for (std::size_t i = 0; i < record.trace.size(); ++i) {
+    const Step& step = record.trace[i];
+    const Pose& T = step.mode.T_object_robot;
+    fmt::print("  {:>5}  {:<10} {:>11.6f} {:>8.2f} {:>8.2f} {:>10.1f}  {:>8}\n", i + 1,
+               task.labels[step.best], step.identity[step.best], T.translation_mm.x,
+               T.translation_mm.y, degrees(T.theta_rad), error_text(step));
+  }
+}
+
+void print_table(const std::vector<RecognitionRecord>& records, const RecognitionTask& task) {
+  std::size_t width = 9;
+  for (const RecognitionRecord& record : records) {
+    width = std::max(width, name_of(record).size());
+  }
+  fmt::print(
+      "{:<{}}  touches  best       probability     x mm     y mm  theta deg  truth      "
+      "error mm\n",
+      "recording", width);
+  int known = 0;
+  int right = 0;
+  int located = 0;
+  double error_sum = 0.0;
+  for (const RecognitionRecord& record : records) {
+    const Step& step = record.last();
+    const Pose& T = step.mode.T_object_robot;
+    fmt::print("{:<{}}  {:>7}  {:<10} {:>11.6f} {:>8.2f} {:>8.2f} {:>10.1f}  {:<10} {:>8}\n",
+               name_of(record), width, record.touches, task.labels[step.best],
+               step.identity[step.best], T.translation_mm.x, T.translation_mm.y,
+               degrees(T.theta_rad), record.true_label.empty() ? "-" : record.true_label,
+               error_text(step));
+    known += step.right ? 1 : 0;
+    right += step.right.value_or(false) ? 1 : 0;
+    located += step.error_mm ? 1 : 0;
+    error_sum += step.error_mm.value_or(0.0);
+  }
+  if (known > 0) {
+    fmt::print("{} of {} right ({:.1f} %)", right, known, 100.0 * right / known);
+    if (located > 0) {
+      fmt::print(", mean pose error {:.2f} mm", error_sum / located);
+    }
+    fmt::print("\n");
+    print_confusions(records, task);
+  }
+}
+
+}  // namespace palpate::cli

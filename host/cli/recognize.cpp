@@ -1,0 +1,236 @@
+#include "commands.hpp"
+
+#include <chrono>
+#include <cmath>
+#include <filesystem>
+#include <memory>
+#include <set>
+#include <string>
+
+#include <fmt/format.h>
+
+#include "atomic_file.hpp"
+#include "figures.hpp"
+#include "palpate/error.hpp"
+#include "palpate/files.hpp"
+#include "progress.hpp"
+#include "recognition_record.hpp"
+#include "recognition_task.hpp"
+
+namespace palpate::cli {
+
+namespace {
+
+/// Where results go. Made before the work, so that a wrong path is found first.
+struct Outputs {
+  explicit Outputs(const RecognizeOptions& options, const RecognitionTask& task) {
+    if (!options.posterior.empty()) {
+      if (task.unknowns.size() != 1) {
+        throw Error(Fault::input,
+                    fmt::format("--posterior {}: holds one unknown, not {}; select one "
+                                "recording or frame",
+                                options.posterior, task.unknowns.size()));
+      }
+      require_folder_of(options.posterior);
+    }
+    if (!options.json.empty() && options.json != "-") {
+      json = std::make_unique<AtomicFile>(options.json);
+    }
+    if (!options.png.empty()) {
+      std::set<std::string> names;
+      for (const Unknown& unknown : task.unknowns) {
+        if (!names.insert(png_name(unknown)).second) {
+          throw Error(Fault::input,
+                      fmt::format("{}: another recording has the same name, and so would its "
+                                  "picture; rename one",
+                                  unknown.recording->path));
+        }
+      }
+      make_folder(options.png);
+    }
+  }
+
+  static std::string png_name(const Unknown& unknown) {
+    const std::string stem = std::filesystem::path(unknown.recording->path).stem().string();
+    return unknown.frame ? fmt::format("{}.{}.png", stem, *unknown.frame) : stem + ".png";
+  }
+
+  std::unique_ptr<AtomicFile> json;
+};
+
+RecognitionRecord recognize_one(const Unknown& unknown, const RecognitionTask& task, bool trace,
+                                PoseHistogram& histogram,
+                                const std::function<void(double)>& progress) {
+  RecognitionRecord record{.recording = unknown.recording->path,
+                           .frame = unknown.frame,
+                           .touches = unknown.touches.size(),
+                           .true_label = true_label(*unknown.recording),
+                           .trace = {}};
+  const auto start = std::chrono::steady_clock::now();
+  histogram.reset();
+  if (trace) {
+    const auto touches = static_cast<double>(unknown.touches.size());
+    for (const Touch& touch : unknown.touches) {
+      const auto done = static_cast<double>(record.trace.size());
+      histogram.update(std::span(&touch, 1),
+                       [&](double fraction) { progress((done + fraction) / touches); });
+      record.trace.push_back(judge(histogram.estimate(), unknown, task));
+    }
+  } else {
+    histogram.update(unknown.touches, progress);
+    record.trace.push_back(judge(histogram.estimate(), unknown, task));
+  }
+  record.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  return record;
+}
+
+/// Edge at which an element is drawn: as a DigiTacts's, or where others lie closer, as their pitch
+/// allows.
+double element_edge_mm(const Touch& touch) {
+  const glm::dvec2& first = touch.elements_mm.front();
+  double nearest = 2.0;
+  for (const glm::dvec2& other : touch.elements_mm.subspan(1)) {
+    nearest = std::min(nearest, std::hypot(other.x - first.x, other.y - first.y));
+  }
+  return 0.9 * nearest;
+}
+
+std::string draw_sheet(const RecognitionRecord& record, const Unknown& unknown,
+                       const RecognitionTask& task, const PoseHistogram& histogram) {
+  const Step& last = record.last();
+  RecognitionSheet sheet;
+  sheet.title = name_of(record);
+  sheet.map = task.hypotheses[last.mode.object].map;
+  sheet.element_mm = element_edge_mm(unknown.touches.front());
+  sheet.T_object_robot = last.mode.T_object_robot;
+  sheet.true_object = record.true_label;
+  if (last.error_mm) {
+    sheet.truth = unknown.recording->truth->T_object_robot;
+    sheet.error_mm = last.error_mm;
+  }
+  sheet.lattice = histogram.lattice();
+  sheet.belief_xy = histogram.marginal_xy(last.mode.object);
+  sheet.labels = task.labels;
+  for (const Touch& touch : unknown.touches) {
+    auto& footprint = sheet.footprints_mm.emplace_back();
+    for (const glm::dvec2& element : touch.elements_mm) {
+      footprint.push_back(touch.T_robot_sensor * element);
+    }
+  }
+  for (const Step& step : record.trace) {
+    sheet.identity.push_back(step.identity);
+  }
+  return draw_recognition(sheet);
+}
+
+Posterior export_posterior(const RecognitionTask& task, const PoseHistogram& histogram) {
+  Posterior posterior{.objects = {}, .lattice = histogram.lattice(), .log_likelihood = {}};
+  for (std::size_t i = 0; i < task.hypotheses.size(); ++i) {
+    posterior.objects.push_back(task.hypotheses[i].map.label);
+    const std::vector<double> logs = histogram.log_likelihood(static_cast<int>(i));
+    posterior.log_likelihood.insert(posterior.log_likelihood.end(), logs.begin(), logs.end());
+  }
+  return posterior;
+}
+
+void recognize(const RecognizeOptions& options) {
+  const RecognitionTask task = prepare(options);
+  Device device = Device::open(task.device);
+  const Outputs outputs(options, task);
+  PoseHistogram histogram(device, task.hypotheses, task.histogram);
+
+  // The sheet shows the identity over the touches, so it needs the trace too.
+  const bool trace = options.trace || !options.png.empty();
+  const bool text = options.json != "-";
+  std::vector<RecognitionRecord> records;
+  auto json = nlohmann::ordered_json::array();
+  {
+    Progress progress("recognising");
+    for (const Unknown& unknown : task.unknowns) {
+      const auto show = [&](double fraction) {
+        progress.show((static_cast<double>(records.size()) + fraction) /
+                      static_cast<double>(task.unknowns.size()));
+      };
+      records.push_back(recognize_one(unknown, task, trace, histogram, show));
+      show(0.0);
+      json.push_back(to_json(records.back(), task, device.name(), options.trace));
+      if (!options.png.empty()) {
+        AtomicFile png(std::filesystem::path(options.png) / Outputs::png_name(unknown));
+        png.write(draw_sheet(records.back(), unknown, task, histogram));
+        png.commit();
+      }
+      if (!options.posterior.empty()) {
+        write_posterior(options.posterior, export_posterior(task, histogram));
+      }
+    }
+  }
+
+  if (text) {
+    if (options.trace) {
+      for (const RecognitionRecord& record : records) {
+        print_trace(record, task);
+      }
+      fmt::print("\n");
+    }
+    print_table(records, task);
+  } else {
+    fmt::print("{}\n", json.dump(2));
+  }
+  if (outputs.json) {
+    outputs.json->write(json.dump(2) + "\n");
+    outputs.json->commit();
+  }
+}
+
+}  // namespace
+
+void add_recognize(CLI::App& app) {
+  auto* command = app.add_subcommand("recognize",
+                                     "Recognise and locate the object of each recording among "
+                                     "known maps. Poses are T_object_robot, "
+                                     "p_object = R(theta) p_robot + (x, y)");
+  const auto options = std::make_shared<RecognizeOptions>();
+  command->add_option("RECORDING", options->recordings, "Recordings of unknown objects (HDF5)")
+      ->required();
+  command->add_option("--maps", options->maps, "Maps of the known objects, or folders of maps");
+  command->add_option("--scene", options->scene,
+                      "Scene file (YAML) with any of: array, threshold, ratio, gamma, prior, "
+                      "objects, region, bins, filter, device; a flag overrides its key");
+  command->add_option("--bins", options->bins,
+                      "Pose bins per object along x, y and theta [default: 25x25x16]");
+  command->add_option("--x-mm", options->x_mm,
+                      "Range of x, mm, as --x-mm=-10:10 [default: -10:10]");
+  command->add_option("--y-mm", options->y_mm,
+                      "Range of y, mm, as --y-mm=-10:10 [default: -10:10]");
+  command->add_option("--theta-deg", options->theta_deg,
+                      "Range of theta, degrees [default: 0:360]; a fixed angle, 30:30, is one bin");
+  command->add_option("--pivot-mm", options->pivot_mm,
+                      "Point X,Y in the robot frame, mm, that theta turns about and whose place in "
+                      "the object frame x and y are [default: 0,0]");
+  command->add_option("--prior", options->prior,
+                      "Probability that an unseen cell is occupied [default: the maps' own]");
+  command->add_option("--gamma", options->gamma,
+                      "Rate at which a contact reading is random [default: 0.1]");
+  command->add_option(
+      "--threshold", options->threshold,
+      "Contact threshold, in the recording's pressure unit [default: 2 kPa; must be "
+      "given for raw pressure]");
+  command->add_option("--ratio", options->ratio,
+                      "Contact threshold as a part of the touch's largest pressure [default: 0.3]");
+  command->add_option("--frames", options->frames,
+                      "Use the touches A:B, from A up to before B, of every recording");
+  command->add_option("--touches", options->touches, "Use the first N touches [default: all]");
+  command->add_flag("--each-frame", options->each_frame,
+                    "Take every touch for an unknown object of its own");
+  command->add_option("--filter", options->filter, "auto or histogram [default: auto]");
+  command->add_flag("--trace", options->trace, "Show the estimate after every touch");
+  command->add_option("--json", options->json, "Write the records as JSON; - is standard output");
+  command->add_option("--posterior", options->posterior,
+                      "Write the log-likelihood of every bin of one recording (HDF5)");
+  command->add_option("--png", options->png,
+                      "Folder for a sheet per unknown: footprints, belief, identities");
+  command->add_option("--device", options->device, "Vulkan device, by index or a part of its name");
+  command->callback([options] { recognize(*options); });
+}
+
+}  // namespace palpate::cli

@@ -1,0 +1,67 @@
+#include "recordings.hpp"
+
+#include <set>
+
+#include <fmt/format.h>
+
+#include "palpate/error.hpp"
+#include "palpate/files.hpp"
+
+namespace palpate::cli {
+
+std::vector<Recording> read_touch_recordings(const std::vector<std::string>& paths) {
+  std::vector<Recording> recordings;
+  std::set<std::filesystem::path> seen;
+  for (const std::string& path : paths) {
+    recordings.push_back(read_recording(path));
+    const Recording& recording = recordings.back();
+    if (!seen.insert(std::filesystem::canonical(path)).second) {
+      throw Error(Fault::input, fmt::format("{}: given twice; leave one out", path));
+    }
+    if (recording.rows == "frames") {
+      throw Error(Fault::input,
+                  fmt::format("{}: rows = frames, a raw stream; find its touches first: palpate "
+                              "touches {} -o TOUCHES.h5",
+                              path, path));
+    }
+    if (recording.pressure_unit != recordings.front().pressure_unit) {
+      throw Error(Fault::input,
+                  fmt::format("{}: pressure_unit is {} but {} has {}; one threshold does not fit "
+                              "both, use a call for each",
+                              path, recording.pressure_unit, paths.front(),
+                              recordings.front().pressure_unit));
+    }
+  }
+  return recordings;
+}
+
+Frames select(const Recording& recording, const std::optional<Frames>& frames) {
+  if (!frames) {
+    return {0, recording.size()};
+  }
+  if (frames->end > recording.size()) {
+    throw Error(Fault::input,
+                fmt::format("{}: has {} touches, --frames {}:{} reaches beyond; end at most at {}",
+                            recording.path, recording.size(), frames->begin, frames->end,
+                            recording.size()));
+  }
+  return *frames;
+}
+
+ContactClassifier make_classifier(std::span<const Recording> recordings,
+                                  std::optional<double> threshold, std::optional<double> ratio) {
+  ContactClassifier classifier;
+  if (threshold) {
+    classifier.threshold = require_above("--threshold", *threshold, 0.0, true);
+  } else if (recordings.front().pressure_unit == "raw") {
+    throw Error(Fault::input,
+                fmt::format("{}: pressure_unit = raw has no default threshold; give --threshold",
+                            recordings.front().path));
+  }
+  if (ratio) {
+    classifier.ratio = require_above("--ratio", *ratio, 0.0, true);
+  }
+  return classifier;
+}
+
+}  // namespace palpate::cli

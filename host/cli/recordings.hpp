@@ -1,0 +1,26 @@
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "options.hpp"
+#include "palpate/contact.hpp"
+#include "palpate/touch.hpp"
+
+namespace palpate::cli {
+
+/// Reads recordings of touches. Throws Error on a raw stream, on a file given twice, and on
+/// recordings of different pressure units.
+std::vector<Recording> read_touch_recordings(const std::vector<std::string>& paths);
+
+/// The selected touches of a recording, or all. Throws Error where it has fewer.
+Frames select(const Recording& recording, const std::optional<Frames>& frames);
+
+/// The classifier of Eq. 3 for these recordings: raw pressure has no default threshold.
+ContactClassifier make_classifier(std::span<const Recording> recordings,
+                                  std::optional<double> threshold, std::optional<double> ratio);
+
+}  // namespace palpate::cli

@@ -1,0 +1,129 @@
+#include "commands.hpp"
+
+#include <algorithm>
+#include <charconv>
+#include <memory>
+#include <optional>
+#include <random>
+#include <string>
+
+#include <fmt/format.h>
+
+#include "options.hpp"
+#include "palpate/error.hpp"
+#include "palpate/files.hpp"
+#include "palpate/simulation.hpp"
+
+namespace palpate::cli {
+
+namespace {
+
+struct Options {
+  std::string shape;
+  std::string output;
+  std::uint64_t seed = 1;
+  std::string poses = "grid";
+  SensorModel sensor;
+  std::string object_pose;
+  std::optional<int> touches;
+};
+
+/// T_object_sensor of "grid" or "random:N".
+std::vector<Pose> sensor_poses(const std::string& text, std::uint64_t seed) {
+  if (text == "grid") {
+    return training_grid();
+  }
+  const std::string prefix = "random:";
+  int n = 0;
+  const char* const end = text.data() + text.size();
+  if (text.starts_with(prefix)) {
+    const auto [rest, error] = std::from_chars(text.data() + prefix.size(), end, n);
+    if (error == std::errc{} && rest == end && n > 0) {
+      return random_poses(n, seed);
+    }
+  }
+  throw Error(Fault::input, fmt::format("--poses {}: give grid, or random:N with N above 0", text));
+}
+
+/// Draws n poses without replacement, in random order; the same for the same seed everywhere.
+std::vector<Pose> draw(std::vector<Pose> poses, std::size_t n, std::uint64_t seed) {
+  std::mt19937_64 random(seed);
+  for (std::size_t i = 0; i < n; ++i) {
+    // std::uniform_int_distribution differs between standard libraries; the bias of % is 1e-17.
+    std::swap(poses[i], poses[i + random() % (poses.size() - i)]);
+  }
+  poses.resize(n);
+  return poses;
+}
+
+void simulate(const Options& options) {
+  require_folder_of(options.output);
+  const Shape shape = make_shape(options.shape);
+  const bool unknown = !options.object_pose.empty();
+  Pose T_object_robot;
+  if (unknown) {
+    T_object_robot = options.object_pose == "random"
+                         ? random_object_pose(options.seed)
+                         : parse_pose("--object-pose", options.object_pose);
+  }
+
+  std::vector<Pose> poses = sensor_poses(options.poses, options.seed);
+  const std::size_t all = poses.size();
+  const auto wanted = static_cast<std::size_t>(options.touches.value_or(static_cast<int>(all)));
+  if (options.touches && (*options.touches < 1 || wanted > all)) {
+    throw Error(Fault::input, fmt::format("--touches {}: must lie between 1 and the {} poses of "
+                                          "--poses {}",
+                                          *options.touches, all, options.poses));
+  }
+  if (unknown || options.touches) {
+    poses = draw(std::move(poses), wanted, options.seed);
+  }
+  for (Pose& pose : poses) {
+    pose = inverse(T_object_robot) * pose;  // T_robot_sensor from T_object_sensor
+  }
+
+  Simulator simulator(shape, options.sensor, digitacts_array(), options.seed);
+  Recording recording = simulator.touch(poses, T_object_robot);
+  if (unknown) {
+    recording.object.clear();
+    recording.truth = {.object = shape.label, .T_object_robot = T_object_robot};
+  }
+  write_recording(options.output, recording);
+  fmt::print("{}: {} touches of {}", options.output, recording.size(), shape.label);
+  if (unknown) {
+    fmt::print(" at x {:.2f} mm, y {:.2f} mm, theta {:.1f} deg", T_object_robot.translation_mm.x,
+               T_object_robot.translation_mm.y, degrees(T_object_robot.theta_rad));
+  }
+  fmt::print("\n");
+}
+
+}  // namespace
+
+void add_simulate(CLI::App& app) {
+  auto* command = app.add_subcommand(
+      "simulate", "Simulate touches of a shape with a DigiTacts array, into a recording");
+  const auto options = std::make_shared<Options>();
+  command
+      ->add_option("SHAPE", options->shape,
+                   "A letter A to Z, a digit, ring, bar, or a polygon file (lines 'x y' in mm)")
+      ->required();
+  command->add_option("-o,--output", options->output, "Recording to write (HDF5)")->required();
+  command->add_option("--seed", options->seed, "Seed of noise, poses and order")
+      ->capture_default_str();
+  command
+      ->add_option("--poses", options->poses,
+                   "grid: 4 x 4 positions 6.8 mm apart, 12 angles each; or random:N")
+      ->capture_default_str();
+  command->add_option("--psf-mm", options->sensor.psf_mm, "Point spread, standard deviation, mm")
+      ->capture_default_str();
+  command->add_option("--noise-kpa", options->sensor.noise_kpa, "Noise, standard deviation, kPa")
+      ->capture_default_str();
+  command->add_option("--object-pose", options->object_pose,
+                      "Make an unknown at this pose T_object_robot: X,Y,DEG in mm and degrees, or "
+                      "random; the truth is stored in the file");
+  command->add_option("--touches", options->touches,
+                      "Draw N of the poses, without replacement [default: all]");
+  command->callback([options] { simulate(*options); });
+}
+
+}  // namespace palpate::cli
