@@ -1,0 +1,67 @@
+#include "file_format.hpp"
+
+#include <fmt/format.h>
+
+#include "palpate/files.hpp"
+
+namespace palpate {
+
+namespace {
+
+// What each kind of file is called and where it is wanted.
+struct Kind {
+  std::string_view format;
+  const char* name;
+  const char* use;
+};
+
+constexpr Kind kinds[] = {
+    {recording_format, "recording", "'palpate map' and 'palpate recognize' take it"},
+    {map_format, "map", "'palpate recognize' takes it after --maps"},
+    {posterior_format, "posterior", "'palpate info' shows it"},
+};
+
+std::string format_of(const Hdf5Contents& file) {
+  if (!file.has_attribute("format")) {
+    file.refuse(
+        "attribute 'format' is missing: this is no Palpate file; give a file whose format "
+        "is 'palpate.recording' or 'palpate.map'");
+  }
+  return file.text("format");
+}
+
+const Kind* find_kind(std::string_view format) {
+  for (const Kind& kind : kinds) {
+    if (kind.format == format) {
+      return &kind;
+    }
+  }
+  return nullptr;
+}
+
+}  // namespace
+
+void require_format(const Hdf5Contents& file, std::string_view format) {
+  const std::string found = format_of(file);
+  if (found != format) {
+    const char* wanted = find_kind(format)->name;
+    if (const Kind* kind = find_kind(found)) {
+      file.refuse(fmt::format("attribute 'format' = '{}': this is a {}, {}; give a {} here", found,
+                              kind->name, kind->use, wanted));
+    }
+    file.refuse(fmt::format("attribute 'format' = '{}' is unknown; give a {} ('{}')", found, wanted,
+                            format));
+  }
+  if (const int version = file.integer("version", 1); version > format_version) {
+    file.refuse(
+        fmt::format("attribute 'version' = {} is newer than this program, which reads {}; "
+                    "update Palpate",
+                    version, format_version));
+  }
+}
+
+std::string read_format(const std::filesystem::path& path) {
+  return format_of(Hdf5Contents(path, {"format"}, {}));
+}
+
+}  // namespace palpate

@@ -1,0 +1,143 @@
+#include "hdf5_writer.hpp"
+
+#include <algorithm>
+
+#include <fmt/format.h>
+
+#include "atomic_file.hpp"
+#include "palpate/error.hpp"
+
+namespace palpate {
+
+namespace {
+
+Hdf5Handle file_in_memory() {
+  const Hdf5Handle access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose);
+  constexpr std::size_t growth = 1 << 20;
+  H5Pset_fapl_core(access.get(), growth, false);
+  // The name is not used beyond HDF5's list of open files.
+  return {H5Fcreate("palpate", H5F_ACC_TRUNC, H5P_DEFAULT, access.get()), H5Fclose};
+}
+
+Hdf5Handle text_type() {
+  Hdf5Handle type(H5Tcopy(H5T_C_S1), H5Tclose);
+  H5Tset_size(type.get(), H5T_VARIABLE);
+  H5Tset_cset(type.get(), H5T_CSET_UTF8);
+  return type;
+}
+
+Hdf5Handle scalar() { return {H5Screate(H5S_SCALAR), H5Sclose}; }
+
+Hdf5Handle extents(const Hdf5Writer::Shape& shape) {
+  const std::vector<hsize_t> sizes(shape.begin(), shape.end());
+  return {H5Screate_simple(static_cast<int>(sizes.size()), sizes.data(), nullptr), H5Sclose};
+}
+
+// Whole inner dimensions up to a mebibyte of doubles, HDF5's chunk cache.
+std::vector<hsize_t> chunk_of(const Hdf5Writer::Shape& shape) {
+  std::size_t room = (1 << 20) / sizeof(double);
+  std::vector<hsize_t> chunk(shape.size());
+  for (std::size_t axis = shape.size(); axis-- > 0;) {
+    chunk[axis] = std::clamp<std::size_t>(room, 1, shape[axis]);
+    room /= chunk[axis];
+  }
+  return chunk;
+}
+
+}  // namespace
+
+Hdf5Writer::Hdf5Writer(std::filesystem::path path)
+    : path_(std::move(path)), lock_(hdf5_mutex), file_(H5I_INVALID_HID, H5Fclose) {
+  H5Eget_auto2(H5E_DEFAULT, &print_, &print_data_);
+  H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
+  file_ = file_in_memory();
+  require(file_.valid(), "the file");
+}
+
+Hdf5Writer::~Hdf5Writer() { H5Eset_auto2(H5E_DEFAULT, print_, print_data_); }
+
+void Hdf5Writer::attribute(const char* name, std::string_view text) {
+  const std::string terminated(text);
+  const char* pointer = terminated.c_str();
+  add_attribute(name, text_type().get(), scalar().get(), &pointer);
+}
+
+void Hdf5Writer::attribute(const char* name, std::span<const std::string> texts) {
+  std::vector<const char*> pointers;
+  for (const std::string& text : texts) {
+    pointers.push_back(text.c_str());
+  }
+  add_attribute(name, text_type().get(), extents({texts.size()}).get(), pointers.data());
+}
+
+void Hdf5Writer::attribute(const char* name, double number) {
+  add_attribute(name, H5T_NATIVE_DOUBLE, scalar().get(), &number);
+}
+
+void Hdf5Writer::attribute(const char* name, int number) {
+  add_attribute(name, H5T_NATIVE_INT, scalar().get(), &number);
+}
+
+void Hdf5Writer::attribute(const char* name, const std::vector<double>& numbers) {
+  add_attribute(name, H5T_NATIVE_DOUBLE, extents({numbers.size()}).get(), numbers.data());
+}
+
+void Hdf5Writer::dataset(const char* name, const Shape& shape, std::span<const double> values,
+                         Storage storage) {
+  add_dataset(name, shape, H5T_NATIVE_DOUBLE, values.data(), storage);
+}
+
+void Hdf5Writer::dataset(const char* name, const Shape& shape, std::span<const float> values) {
+  add_dataset(name, shape, H5T_NATIVE_FLOAT, values.data(), Storage::plain);
+}
+
+void Hdf5Writer::dataset(const char* name, const Shape& shape,
+                         std::span<const std::uint8_t> values) {
+  add_dataset(name, shape, H5T_NATIVE_UINT8, values.data(), Storage::plain);
+}
+
+void Hdf5Writer::save() {
+  AtomicFile target(path_);
+  require(H5Fflush(file_.get(), H5F_SCOPE_GLOBAL) >= 0, "the file");
+  const ssize_t size = H5Fget_file_image(file_.get(), nullptr, 0);
+  require(size > 0, "the file");
+  std::string image(static_cast<std::size_t>(size), '\0');
+  require(H5Fget_file_image(file_.get(), image.data(), image.size()) == size, "the file");
+  target.write(image);
+  target.commit();
+}
+
+void Hdf5Writer::add_attribute(const char* name, hid_t type, hid_t space, const void* values) {
+  const Hdf5Handle attribute(H5Acreate2(file_.get(), name, type, space, H5P_DEFAULT, H5P_DEFAULT),
+                             H5Aclose);
+  require(attribute.valid() && H5Awrite(attribute.get(), type, values) >= 0, name);
+}
+
+void Hdf5Writer::add_dataset(const char* name, const Shape& shape, hid_t type, const void* values,
+                             Storage storage) {
+  const Hdf5Handle creation(H5Pcreate(H5P_DATASET_CREATE), H5Pclose);
+  bool ready = H5Pset_obj_track_times(creation.get(), false) >= 0;
+  if (storage == Storage::compressed) {
+    const std::vector<hsize_t> chunk = chunk_of(shape);
+    constexpr unsigned level = 4;  // zlib's higher levels cost time and gain little on doubles
+    ready = ready &&
+            H5Pset_chunk(creation.get(), static_cast<int>(chunk.size()), chunk.data()) >= 0 &&
+            H5Pset_shuffle(creation.get()) >= 0 && H5Pset_deflate(creation.get(), level) >= 0;
+  }
+  const Hdf5Handle space = extents(shape);
+  const Hdf5Handle dataset(
+      H5Dcreate2(file_.get(), name, type, space.get(), H5P_DEFAULT, creation.get(), H5P_DEFAULT),
+      H5Dclose);
+  require(ready && dataset.valid() &&
+              H5Dwrite(dataset.get(), type, H5S_ALL, H5S_ALL, H5P_DEFAULT, values) >= 0,
+          name);
+}
+
+void Hdf5Writer::require(bool done, std::string_view what) const {
+  if (!done) {
+    throw Error(Fault::system, fmt::format("{}: HDF5 cannot write {}; free memory and try again",
+                                           path_.string(), what));
+  }
+}
+
+}  // namespace palpate

@@ -1,0 +1,20 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string_view>
+
+namespace palpate {
+
+/// Throws Error (Fault::input), "<path>: <message>".
+[[noreturn]] void refuse(const std::filesystem::path& path, std::string_view message);
+
+/// Size in bytes of a regular file that may be read.
+/// @throws Error where it is missing, a folder, not a regular file or not readable.
+std::uintmax_t require_readable(const std::filesystem::path& path);
+
+/// True for UTF-8 text without control characters: what may stand in a message, in JSON, on a
+/// picture.
+bool is_printable_utf8(std::string_view text);
+
+}  // namespace palpate

@@ -1,0 +1,93 @@
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "file_format.hpp"
+#include "hdf5_contents.hpp"
+#include "hdf5_writer.hpp"
+#include "input_file.hpp"
+#include "palpate/files.hpp"
+
+namespace palpate {
+
+namespace {
+
+// What holds for every map, read or about to be written.
+void validate(const std::filesystem::path& path, const OccupancyGrid& map) {
+  if (!(std::isfinite(map.cell_mm) && map.cell_mm > 0)) {
+    refuse(path, fmt::format("attribute 'cell_mm' = {}; make it positive", map.cell_mm));
+  }
+  if (!std::isfinite(map.origin_mm.x) || !std::isfinite(map.origin_mm.y)) {
+    refuse(path, fmt::format("attribute 'origin_mm' = [{}, {}]; store finite numbers",
+                             map.origin_mm.x, map.origin_mm.y));
+  }
+  if (!(map.prior > 0 && map.prior < 1)) {
+    refuse(path,
+           fmt::format("attribute 'prior' = {}; make it a probability between 0 and 1", map.prior));
+  }
+  if (map.symmetry < 0) {
+    refuse(path, fmt::format("attribute 'symmetry' = {}; make it 1, n for an n-fold symmetry or 0 "
+                             "for full symmetry",
+                             map.symmetry));
+  }
+  for (std::size_t k = 0; k < map.log_odds.size(); ++k) {
+    if (!std::isfinite(map.log_odds[k])) {
+      const auto nx = static_cast<std::size_t>(map.nx);
+      refuse(path, fmt::format("dataset 'log_odds'[{}, {}] = {} in float32; store finite numbers",
+                               k / nx, k % nx, map.log_odds[k]));
+    }
+  }
+}
+
+}  // namespace
+
+OccupancyGrid read_map(const std::filesystem::path& path) {
+  Hdf5Contents file(path,
+                    {"format", "version", "label", "cell_mm", "origin_mm", "prior", "symmetry"},
+                    {"log_odds"});
+  require_format(file, map_format);
+  OccupancyGrid map;
+  map.label = file.text("label");
+  map.cell_mm = file.number("cell_mm");
+  const std::vector<double> origin = file.numbers("origin_mm", 2);
+  map.origin_mm = {origin[0], origin[1]};
+  map.prior = file.number("prior");
+  map.symmetry = file.integer("symmetry", 0);
+  const Hdf5Value& log_odds = file.dataset("log_odds", 2);
+  const auto [least, most] = std::minmax(log_odds.shape[0], log_odds.shape[1]);
+  if (least < 1 || most > std::numeric_limits<int>::max()) {
+    file.refuse(fmt::format("dataset 'log_odds' has the shape {}; store at least one cell",
+                            log_odds.shape));
+  }
+  map.ny = static_cast<int>(log_odds.shape[0]);
+  map.nx = static_cast<int>(log_odds.shape[1]);
+  map.log_odds.assign(log_odds.numbers.begin(), log_odds.numbers.end());
+  validate(path, map);
+  return map;
+}
+
+void write_map(const std::filesystem::path& path, const OccupancyGrid& map) {
+  if (map.nx < 1 || map.ny < 1 ||
+      map.log_odds.size() != static_cast<std::size_t>(map.nx) * static_cast<std::size_t>(map.ny)) {
+    refuse(path, fmt::format("a map of {} x {} cells with {} log odds cannot be written; make them "
+                             "agree",
+                             map.nx, map.ny, map.log_odds.size()));
+  }
+  validate(path, map);
+  Hdf5Writer file(path);
+  file.attribute("format", map_format);
+  file.attribute("version", format_version);
+  file.attribute("label", map.label);
+  file.attribute("cell_mm", map.cell_mm);
+  file.attribute("origin_mm", {map.origin_mm.x, map.origin_mm.y});
+  file.attribute("prior", map.prior);
+  file.attribute("symmetry", map.symmetry);
+  file.dataset("log_odds", {static_cast<std::size_t>(map.ny), static_cast<std::size_t>(map.nx)},
+               map.log_odds);
+  file.save();
+}
+
+}  // namespace palpate

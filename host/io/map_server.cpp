@@ -1,0 +1,70 @@
+#include <yaml-cpp/yaml.h>
+
+#include <fmt/format.h>
+
+#include "atomic_file.hpp"
+#include "input_file.hpp"
+#include "palpate/files.hpp"
+
+namespace palpate {
+
+namespace {
+
+// map_server's defaults, and the grey levels that its map_saver writes for them.
+constexpr double occupied_threshold = 0.65;
+constexpr double free_threshold = 0.196;
+constexpr char occupied_grey = 0;
+constexpr char free_grey = static_cast<char>(254);
+constexpr char unknown_grey = static_cast<char>(205);
+
+std::string image_of(const OccupancyGrid& map) {
+  std::string image = fmt::format("P5\n{} {}\n255\n", map.nx, map.ny);
+  // An unseen cell holds exactly the prior, which may well lie below the free threshold.
+  const auto unseen = static_cast<float>(map.prior_log_odds());
+  for (int j = map.ny - 1; j >= 0; --j) {
+    for (int i = 0; i < map.nx; ++i) {
+      const float log_odds = map.at(i, j);
+      const double p = probability_from_log_odds(log_odds);
+      image += log_odds == unseen       ? unknown_grey
+               : p > occupied_threshold ? occupied_grey
+               : p < free_threshold     ? free_grey
+                                        : unknown_grey;
+    }
+  }
+  return image;
+}
+
+}  // namespace
+
+void write_map_server(const std::filesystem::path& yaml_path, const OccupancyGrid& map) {
+  if (yaml_path.extension() != ".yaml") {
+    refuse(yaml_path, "is not named as a map_server map; end its name in .yaml");
+  }
+  std::filesystem::path image_path = yaml_path;
+  image_path.replace_extension(".pgm");
+  constexpr double metres_per_mm = 1e-3;
+  // The origin is the corner, not the centre, of the lower left pixel.
+  const glm::dvec2 corner_mm = map.origin_mm - 0.5 * map.cell_mm;
+  YAML::Emitter yaml;
+  yaml.SetDoublePrecision(12);
+  yaml << YAML::BeginMap;
+  yaml << YAML::Key << "image" << YAML::Value << image_path.filename().string();
+  yaml << YAML::Key << "mode" << YAML::Value << "trinary";
+  yaml << YAML::Key << "resolution" << YAML::Value << map.cell_mm * metres_per_mm;
+  yaml << YAML::Key << "origin" << YAML::Value << YAML::Flow
+       << std::vector<double>{corner_mm.x * metres_per_mm, corner_mm.y * metres_per_mm, 0.0};
+  yaml << YAML::Key << "negate" << YAML::Value << 0;
+  yaml << YAML::Key << "occupied_thresh" << YAML::Value << occupied_threshold;
+  yaml << YAML::Key << "free_thresh" << YAML::Value << free_threshold;
+  yaml << YAML::EndMap << YAML::Newline;
+
+  AtomicFile image_file(image_path);
+  AtomicFile yaml_file(yaml_path);
+  image_file.write(image_of(map));
+  yaml_file.write(yaml.c_str());
+  // The image first: the YAML that names it must not appear without it.
+  image_file.commit();
+  yaml_file.commit();
+}
+
+}  // namespace palpate

@@ -1,0 +1,203 @@
+#include <algorithm>
+#include <cmath>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "file_format.hpp"
+#include "hdf5_contents.hpp"
+#include "hdf5_writer.hpp"
+#include "input_file.hpp"
+#include "palpate/files.hpp"
+
+namespace palpate {
+
+namespace {
+
+using Shape = std::vector<std::uint64_t>;
+
+// Datasets of a recording have to fit `pressure`.
+struct Extent {
+  std::uint64_t touches;
+  std::uint64_t elements;
+};
+
+// The dataset's numbers, once its shape is one of those that fit.
+std::vector<double> numbers_of(Hdf5Contents& file, const char* name, const Extent& extent,
+                               const std::vector<Shape>& fitting) {
+  Hdf5Value& value = file.dataset(name);
+  if (std::find(fitting.begin(), fitting.end(), value.shape) == fitting.end()) {
+    file.refuse(fmt::format("dataset '{}' has the shape {}; 'pressure' is [{}, {}], so make it {}",
+                            name, value.shape, extent.touches, extent.elements,
+                            fmt::join(fitting, " or ")));
+  }
+  return std::move(value.numbers);
+}
+
+std::optional<Truth> read_truth(const Hdf5Contents& file) {
+  if (!file.has_attribute("true_object") && !file.has_attribute("true_T_object_robot")) {
+    return {};
+  }
+  const std::vector<double> pose = file.numbers("true_T_object_robot", 3);
+  return Truth{file.text("true_object"), {{pose[0], pose[1]}, pose[2]}};
+}
+
+void require_one_of(const std::filesystem::path& path, const char* attribute,
+                    const std::string& value, const char* first, const char* second) {
+  if (value != first && value != second) {
+    refuse(path, fmt::format("attribute '{}' = '{}'; make it '{}' or '{}'", attribute, value, first,
+                             second));
+  }
+}
+
+// What holds for every recording, read or about to be written.
+void validate(const std::filesystem::path& path, const Recording& recording) {
+  const std::size_t n = recording.size();
+  const std::size_t e = recording.elements();
+  require_one_of(path, "pressure_unit", recording.pressure_unit, "kPa", "raw");
+  require_one_of(path, "rows", recording.rows, "touches", "frames");
+  for (std::size_t k = 0; k < recording.pressure.size(); ++k) {
+    const std::size_t valid = recording.valid.size() == e ? k % e : k;
+    const bool alive = recording.valid.empty() || recording.valid[valid] != 0;
+    if (alive && !std::isfinite(recording.pressure[k])) {
+      refuse(path, fmt::format("dataset 'pressure'[{}, {}] = {}; store finite numbers, and 0 in "
+                               "'valid' for a dead element",
+                               k / e, k % e, recording.pressure[k]));
+    }
+  }
+  for (std::size_t i = 0; i < n; ++i) {
+    const Pose& pose = recording.T_robot_sensor[i];
+    if (!std::isfinite(pose.translation_mm.x) || !std::isfinite(pose.translation_mm.y) ||
+        !std::isfinite(pose.theta_rad)) {
+      refuse(path, fmt::format("dataset 'sensor_pose'[{}] = [{}, {}, {}]; store finite numbers", i,
+                               pose.translation_mm.x, pose.translation_mm.y, pose.theta_rad));
+    }
+  }
+  for (std::size_t k = 0; k < recording.elements_mm.size(); ++k) {
+    const glm::dvec2& element = recording.elements_mm[k];
+    if (!std::isfinite(element.x) || !std::isfinite(element.y)) {
+      refuse(path, fmt::format("dataset 'elements', position {} = [{}, {}]; store finite numbers",
+                               k, element.x, element.y));
+    }
+  }
+  for (std::size_t i = 0; i < recording.time_s.size(); ++i) {
+    if (!std::isfinite(recording.time_s[i])) {
+      refuse(path, fmt::format("dataset 'time'[{}] = {}; store seconds since the Unix epoch", i,
+                               recording.time_s[i]));
+    }
+  }
+}
+
+}  // namespace
+
+Recording read_recording(const std::filesystem::path& path) {
+  Hdf5Contents file(path,
+                    {"format", "version", "object", "pressure_unit", "length_unit", "rows",
+                     "true_object", "true_T_object_robot"},
+                    {"pressure", "sensor_pose", "elements", "valid", "time"});
+  require_format(file, recording_format);
+  if (const std::string unit = file.text("length_unit"); unit != "mm") {
+    file.refuse(fmt::format("attribute 'length_unit' = '{}'; convert lengths to 'mm'", unit));
+  }
+  Recording recording;
+  recording.path = path.string();
+  recording.object = file.text("object");
+  recording.pressure_unit = file.text("pressure_unit");
+  if (file.has_attribute("rows")) {
+    recording.rows = file.text("rows");
+  }
+  recording.truth = read_truth(file);
+
+  Hdf5Value& pressure = file.dataset("pressure", 2);
+  const Extent extent{pressure.shape[0], pressure.shape[1]};
+  const auto [n, e] = extent;
+  if (n == 0 || e == 0) {
+    file.refuse(
+        fmt::format("dataset 'pressure' is empty, {}; record at least one touch by one "
+                    "element",
+                    pressure.shape));
+  }
+  recording.pressure = std::move(pressure.numbers);
+  const std::vector<double> poses = numbers_of(file, "sensor_pose", extent, {{n, 3}});
+  for (std::size_t i = 0; i < poses.size(); i += 3) {
+    recording.T_robot_sensor.push_back({{poses[i], poses[i + 1]}, poses[i + 2]});
+  }
+  const std::vector<double> elements = numbers_of(file, "elements", extent, {{e, 2}, {n, e, 2}});
+  for (std::size_t i = 0; i < elements.size(); i += 2) {
+    recording.elements_mm.emplace_back(elements[i], elements[i + 1]);
+  }
+  if (file.has_dataset("valid")) {
+    for (const double valid : numbers_of(file, "valid", extent, {{e}, {n, e}})) {
+      if (std::isnan(valid)) {
+        file.refuse("dataset 'valid' holds NaN; store 0 for a dead element and 1 for the others");
+      }
+      recording.valid.push_back(valid != 0);
+    }
+  }
+  if (file.has_dataset("time")) {
+    recording.time_s = numbers_of(file, "time", extent, {{n}});
+  }
+  validate(path, recording);
+  return recording;
+}
+
+void write_recording(const std::filesystem::path& path, const Recording& recording) {
+  const std::size_t n = recording.size();
+  const std::size_t e = recording.elements();
+  const auto fits = [&](std::size_t count) { return count == e || count == n * e; };
+  if (n * e == 0 || recording.pressure.size() != n * e || !fits(recording.elements_mm.size()) ||
+      !(recording.valid.empty() || fits(recording.valid.size())) ||
+      !(recording.time_s.empty() || recording.time_s.size() == n)) {
+    refuse(path, fmt::format("a recording of {} poses, {} pressures, {} elements, {} valid and {} "
+                             "times cannot be written; make them agree",
+                             n, recording.pressure.size(), recording.elements_mm.size(),
+                             recording.valid.size(), recording.time_s.size()));
+  }
+  validate(path, recording);
+
+  Hdf5Writer file(path);
+  file.attribute("format", recording_format);
+  file.attribute("version", format_version);
+  file.attribute("object", recording.object);
+  file.attribute("pressure_unit", recording.pressure_unit);
+  file.attribute("length_unit", "mm");
+  file.attribute("rows", recording.rows);
+  if (recording.truth) {
+    const Pose& pose = recording.truth->T_object_robot;
+    file.attribute("true_object", recording.truth->object);
+    file.attribute("true_T_object_robot",
+                   {pose.translation_mm.x, pose.translation_mm.y, pose.theta_rad});
+  }
+  const std::vector<float> narrow(recording.pressure.begin(), recording.pressure.end());
+  const bool exact =
+      std::equal(narrow.begin(), narrow.end(), recording.pressure.begin(),
+                 [](float a, double b) { return a == b || (std::isnan(a) && std::isnan(b)); });
+  if (exact) {
+    file.dataset("pressure", {n, e}, narrow);
+  } else {
+    file.dataset("pressure", {n, e}, recording.pressure);
+  }
+  std::vector<double> poses;
+  for (const Pose& pose : recording.T_robot_sensor) {
+    poses.insert(poses.end(), {pose.translation_mm.x, pose.translation_mm.y, pose.theta_rad});
+  }
+  file.dataset("sensor_pose", {n, 3}, poses);
+  std::vector<double> elements;
+  for (const glm::dvec2& element : recording.elements_mm) {
+    elements.insert(elements.end(), {element.x, element.y});
+  }
+  const bool constant_array = recording.elements_mm.size() == e;
+  file.dataset("elements", constant_array ? Hdf5Writer::Shape{e, 2} : Hdf5Writer::Shape{n, e, 2},
+               elements);
+  if (!recording.valid.empty()) {
+    const bool constant_valid = recording.valid.size() == e;
+    file.dataset("valid", constant_valid ? Hdf5Writer::Shape{e} : Hdf5Writer::Shape{n, e},
+                 recording.valid);
+  }
+  if (!recording.time_s.empty()) {
+    file.dataset("time", {n}, recording.time_s);
+  }
+  file.save();
+}
+
+}  // namespace palpate

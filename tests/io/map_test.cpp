@@ -1,0 +1,127 @@
+#include <gtest/gtest.h>
+#include <yaml-cpp/yaml.h>
+
+#include <cmath>
+#include <limits>
+
+#include "file_parts.hpp"
+#include "palpate/files.hpp"
+#include "scratch_folder.hpp"
+
+namespace palpate {
+namespace {
+
+OccupancyGrid small_map() {
+  OccupancyGrid map;
+  map.label = "A";
+  map.cell_mm = 0.5;
+  map.origin_mm = {-3.5, 12.0};
+  map.prior = 0.1;
+  map.symmetry = 2;
+  map.nx = 3;
+  map.ny = 2;
+  const auto unseen = static_cast<float>(map.prior_log_odds());
+  map.log_odds = {-1000.0f, unseen, 8.0f, 0.25f, -1.0f, unseen + 0.01f};
+  return map;
+}
+
+class MapFile : public testing::Test {
+ protected:
+  std::string message(const FileParts& parts) {
+    parts.save(path_);
+    const std::string text = input_error([&] { read_map(path_); });
+    expect_named(text, {path_.c_str()});
+    return text;
+  }
+
+  ScratchFolder folder_;
+  std::filesystem::path path_ = folder_ / "A.map.h5";
+};
+
+TEST_F(MapFile, ComesBackAsItWasWritten) {
+  const OccupancyGrid written = small_map();
+  write_map(path_, written);
+  EXPECT_EQ(read_format(path_), "palpate.map");
+  const OccupancyGrid read = read_map(path_);
+  EXPECT_EQ(read.label, written.label);
+  EXPECT_EQ(read.cell_mm, written.cell_mm);
+  EXPECT_EQ(read.origin_mm, written.origin_mm);
+  EXPECT_EQ(read.prior, written.prior);
+  EXPECT_EQ(read.symmetry, written.symmetry);
+  EXPECT_EQ(read.nx, written.nx);
+  EXPECT_EQ(read.ny, written.ny);
+  EXPECT_EQ(read.log_odds, written.log_odds);
+}
+
+TEST_F(MapFile, NamesAttributesItCannotTake) {
+  const auto spoilt = [&](const char* name, auto value) {
+    return message(map_parts().attribute(name, value));
+  };
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  const double infinity = std::numeric_limits<double>::infinity();
+  for (const double cell_mm : {0.0, -0.5, nan, infinity}) {
+    expect_named(spoilt("cell_mm", cell_mm), {"'cell_mm'"});
+  }
+  for (const double prior : {0.0, 1.0, -0.1, nan}) {
+    expect_named(spoilt("prior", prior), {"'prior'"});
+  }
+  for (const double symmetry : {-1.0, 0.5, 1e12, nan}) {
+    expect_named(spoilt("symmetry", symmetry), {"'symmetry'"});
+  }
+  expect_named(spoilt("origin_mm", std::vector<double>{0, nan}), {"'origin_mm'", "nan"});
+  expect_named(spoilt("origin_mm", std::vector<double>{0, 0, 0}), {"'origin_mm'", "3", "2"});
+  expect_named(spoilt("version", 2), {"'version'", "newer"});
+  expect_named(spoilt("format", "palpate.recording"), {"a recording", "palpate recognize", "map"});
+  for (const char* name :
+       {"format", "version", "label", "cell_mm", "origin_mm", "prior", "symmetry"}) {
+    expect_named(message(map_parts().without(name)), {"attribute", name, "missing"});
+  }
+}
+
+TEST_F(MapFile, NamesLogOddsItCannotTake) {
+  expect_named(message(map_parts().dataset("log_odds", {2, 3}, {0, 0, 0, 0, 0, NAN})),
+               {"'log_odds'[1, 2]", "nan"});
+  // Finite in float64, infinite in the grid's float32.
+  expect_named(message(map_parts().dataset("log_odds", {2, 3}, 1e300)), {"'log_odds'", "inf"});
+  expect_named(message(map_parts().dataset("log_odds", {0, 3})), {"'log_odds'", "[0, 3]"});
+  expect_named(message(map_parts().dataset("log_odds", {6})), {"'log_odds'", "dimensions"});
+  expect_named(message(map_parts().without("log_odds")), {"'log_odds'", "missing"});
+}
+
+TEST_F(MapFile, IsNotWrittenWhereItCouldNotBeRead) {
+  OccupancyGrid map = small_map();
+  map.prior = 1.0;
+  expect_named(input_error([&] { write_map(path_, map); }), {path_.c_str(), "'prior'"});
+  map = small_map();
+  map.nx = 4;
+  expect_named(input_error([&] { write_map(path_, map); }), {path_.c_str(), "4 x 2"});
+  EXPECT_TRUE(std::filesystem::is_empty(folder_.path()));
+}
+
+TEST_F(MapFile, ShowsMapServerWhatIsOccupiedFreeAndUnknown) {
+  const std::filesystem::path yaml_path = folder_ / "A.yaml";
+  write_map_server(yaml_path, small_map());
+  // The upper row comes first: p = 0.56 unknown, 0.27 unknown, 0.10 free though barely seen; then
+  // p = 0 free, unseen, nearly 1 occupied.
+  const std::string pixels{'\xcd', '\xcd', '\xfe', '\xfe', '\xcd', '\x00'};
+  EXPECT_EQ(bytes_of(folder_ / "A.pgm"), "P5\n3 2\n255\n" + pixels);
+  const YAML::Node yaml = YAML::LoadFile(yaml_path.string());
+  EXPECT_EQ(yaml["image"].as<std::string>(), "A.pgm");
+  EXPECT_EQ(yaml["mode"].as<std::string>(), "trinary");
+  EXPECT_EQ(yaml["negate"].as<int>(), 0);
+  // Written with 12 digits.
+  EXPECT_NEAR(yaml["resolution"].as<double>(), 0.0005, 1e-15);
+  EXPECT_NEAR(yaml["origin"][0].as<double>(), -0.00375, 1e-14);
+  EXPECT_NEAR(yaml["origin"][1].as<double>(), 0.01175, 1e-14);
+  EXPECT_EQ(yaml["origin"][2].as<double>(), 0.0);
+  EXPECT_EQ(yaml["occupied_thresh"].as<double>(), 0.65);
+  EXPECT_EQ(yaml["free_thresh"].as<double>(), 0.196);
+}
+
+TEST_F(MapFile, WantsAYamlNameForMapServer) {
+  expect_named(input_error([&] { write_map_server(folder_ / "A.pgm", small_map()); }),
+               {"A.pgm", ".yaml"});
+}
+
+}  // namespace
+}  // namespace palpate

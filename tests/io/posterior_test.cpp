@@ -1,0 +1,71 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+
+#include "file_parts.hpp"
+#include "palpate/files.hpp"
+#include "scratch_folder.hpp"
+
+namespace palpate {
+namespace {
+
+class PosteriorFile : public testing::Test {
+ protected:
+  std::string message(const FileParts& parts) {
+    parts.save(path_);
+    const std::string text = input_error([&] { read_posterior(path_); });
+    expect_named(text, {path_.c_str()});
+    return text;
+  }
+
+  ScratchFolder folder_;
+  std::filesystem::path path_ = folder_ / "posterior.h5";
+};
+
+TEST_F(PosteriorFile, ComesBackAsItWasWritten) {
+  Posterior written;
+  written.objects = {"A", "B", "lång name"};
+  written.lattice.x_mm = {-10, 10, 70};
+  written.lattice.y_mm = {-5, 5, 50};
+  written.lattice.theta_rad = {0, 6, 40};
+  written.lattice.pivot_mm = {100, -3};
+  // More than one chunk.
+  for (std::size_t k = 0; k < 3u * 70 * 50 * 40; ++k) {
+    written.log_likelihood.push_back(-std::sqrt(static_cast<double>(k)));
+  }
+  written.log_likelihood[5] = -std::numeric_limits<double>::infinity();
+  write_posterior(path_, written);
+  const Posterior read = read_posterior(path_);
+  EXPECT_EQ(read.objects, written.objects);
+  EXPECT_EQ(read.log_likelihood, written.log_likelihood);
+  EXPECT_EQ(read.lattice.x_mm.lower, -10);
+  EXPECT_EQ(read.lattice.x_mm.count, 70);
+  EXPECT_EQ(read.lattice.y_mm.upper, 5);
+  EXPECT_EQ(read.lattice.y_mm.count, 50);
+  EXPECT_EQ(read.lattice.theta_rad.upper, 6);
+  EXPECT_EQ(read.lattice.theta_rad.count, 40);
+  EXPECT_EQ(read.lattice.pivot_mm, glm::dvec2(100, -3));
+  EXPECT_LT(std::filesystem::file_size(path_), written.log_likelihood.size() * sizeof(double));
+}
+
+TEST_F(PosteriorFile, NamesWhatItCannotTake) {
+  const auto spoilt = [&](const char* name, auto value) {
+    return message(posterior_parts().attribute(name, value));
+  };
+  expect_named(spoilt("bins_x", 3), {"'log_likelihood'", "[2, 4, 3, 2]", "[2, 4, 3, 3]"});
+  expect_named(spoilt("objects", std::vector<std::string>{"A"}), {"'log_likelihood'"});
+  expect_named(spoilt("bins_theta", 0), {"'bins_theta'", "0"});
+  expect_named(spoilt("x_mm", std::vector<double>{1, -1}), {"x_mm", "reversed"});
+  expect_named(spoilt("y_mm", std::vector<double>{1, NAN}), {"'y_mm'", "nan"});
+  expect_named(spoilt("format", "palpate.map"), {"a map", "posterior"});
+  expect_named(message(posterior_parts().dataset("log_likelihood", {2, 4, 3, 2}, NAN)),
+               {"'log_likelihood'", "nan"});
+  for (const char* name : {"objects", "bins_x", "bins_y", "bins_theta", "x_mm", "y_mm", "theta_rad",
+                           "pivot_mm", "log_likelihood"}) {
+    expect_named(message(posterior_parts().without(name)), {name, "missing"});
+  }
+}
+
+}  // namespace
+}  // namespace palpate

@@ -1,0 +1,301 @@
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <cmath>
+#include <limits>
+
+#include "file_parts.hpp"
+#include "palpate/files.hpp"
+#include "scratch_folder.hpp"
+
+namespace palpate {
+namespace {
+
+constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+constexpr double infinity = std::numeric_limits<double>::infinity();
+
+Recording small_recording() {
+  Recording recording;
+  recording.object = "Ä";
+  recording.T_robot_sensor = {{{1.0, 2.0}, 3.0}, {{-4.0, 0.1}, -70.0}};
+  recording.pressure = {0.0, -1.5, 2.25, 1e6, 0.5, 3.0};
+  recording.elements_mm = {{-1.0, 0.1}, {0.0, 0.2}, {1.0, 0.3}};
+  return recording;
+}
+
+void expect_same(const Recording& read, const Recording& written) {
+  EXPECT_EQ(read.object, written.object);
+  EXPECT_EQ(read.pressure_unit, written.pressure_unit);
+  EXPECT_EQ(read.rows, written.rows);
+  EXPECT_EQ(read.pressure, written.pressure);
+  EXPECT_EQ(read.elements_mm, written.elements_mm);
+  EXPECT_EQ(read.valid, written.valid);
+  EXPECT_EQ(read.time_s, written.time_s);
+  ASSERT_EQ(read.size(), written.size());
+  for (std::size_t i = 0; i < read.size(); ++i) {
+    EXPECT_EQ(read.T_robot_sensor[i].translation_mm, written.T_robot_sensor[i].translation_mm);
+    EXPECT_EQ(read.T_robot_sensor[i].theta_rad, written.T_robot_sensor[i].theta_rad);
+  }
+}
+
+class RecordingFile : public testing::Test {
+ protected:
+  // What reading the file says when the parts are saved to it.
+  std::string message(const FileParts& parts) {
+    parts.save(path_);
+    const std::string text = input_error([&] { read_recording(path_); });
+    expect_named(text, {path_.c_str()});
+    return text;
+  }
+
+  Recording read(const FileParts& parts) {
+    parts.save(path_);
+    return read_recording(path_);
+  }
+
+  ScratchFolder folder_;
+  std::filesystem::path path_ = folder_ / "recording.h5";
+};
+
+TEST_F(RecordingFile, ComesBackAsItWasWritten) {
+  const Recording written = small_recording();
+  write_recording(path_, written);
+  const Recording read = read_recording(path_);
+  expect_same(read, written);
+  EXPECT_EQ(read.path, path_.string());
+  EXPECT_FALSE(read.truth);
+}
+
+TEST_F(RecordingFile, KeepsEverythingOptional) {
+  Recording written = small_recording();
+  written.pressure_unit = "raw";
+  written.rows = "frames";
+  written.elements_mm = {{0, 0}, {1, 0}, {2, 0}, {0, 1}, {1, 1}, {2, 1}};
+  written.valid = {1, 0, 1, 1, 1, 0};
+  written.time_s = {1.7e9, 1.7e9 + 0.01};
+  written.truth = Truth{"B", {{1.5, -2.5}, 4.0}};
+  write_recording(path_, written);
+  const Recording read = read_recording(path_);
+  expect_same(read, written);
+  ASSERT_TRUE(read.truth);
+  EXPECT_EQ(read.truth->object, "B");
+  EXPECT_EQ(read.truth->T_object_robot.translation_mm, glm::dvec2(1.5, -2.5));
+  EXPECT_EQ(read.truth->T_object_robot.theta_rad, 4.0);
+}
+
+TEST_F(RecordingFile, KeepsPressureThatFloatCannotHold) {
+  Recording written = small_recording();
+  written.pressure[2] = 0.1;
+  write_recording(path_, written);
+  EXPECT_EQ(read_recording(path_).pressure, written.pressure);
+}
+
+TEST_F(RecordingFile, HalvesPressureThatFloatHolds) {
+  Recording written = small_recording();
+  write_recording(path_, written);
+  edit(path_, [](hid_t file) {
+    const Hdf5Handle dataset(H5Dopen2(file, "pressure", H5P_DEFAULT), H5Dclose);
+    const Hdf5Handle type(H5Dget_type(dataset.get()), H5Tclose);
+    EXPECT_EQ(H5Tget_size(type.get()), sizeof(float));
+  });
+}
+
+TEST_F(RecordingFile, IsTheSameBytesForTheSameContent) {
+  write_recording(path_, small_recording());
+  const std::string first = bytes_of(path_);
+  write_recording(path_, small_recording());
+  EXPECT_EQ(bytes_of(path_), first);
+}
+
+TEST_F(RecordingFile, LetsDeadElementsReadAnything) {
+  Recording written = small_recording();
+  written.pressure[1] = nan;
+  written.pressure[4] = infinity;
+  written.valid = {1, 0, 1};
+  write_recording(path_, written);
+  const Recording read = read_recording(path_);
+  EXPECT_TRUE(std::isnan(read.pressure[1]));
+  EXPECT_EQ(read.pressure[4], infinity);
+  EXPECT_EQ(read.valid, written.valid);
+}
+
+TEST_F(RecordingFile, IgnoresWhatItDoesNotKnow) {
+  EXPECT_EQ(read(recording_parts().attribute("weather", "fair").dataset("torque", {7})).size(), 2u);
+}
+
+TEST_F(RecordingFile, ReadsOtherTypesOfNumbersAndStrings) {
+  recording_parts().without("object").without("pressure").without("version").save(path_);
+  edit(path_, [](hid_t file) {
+    const Hdf5Handle scalar(H5Screate(H5S_SCALAR), H5Sclose);
+    const Hdf5Handle text(H5Tcopy(H5T_C_S1), H5Tclose);
+    H5Tset_size(text.get(), 5);
+    H5Tset_strpad(text.get(), H5T_STR_SPACEPAD);
+    const Hdf5Handle object(
+        H5Acreate2(file, "object", text.get(), scalar.get(), H5P_DEFAULT, H5P_DEFAULT), H5Aclose);
+    H5Awrite(object.get(), text.get(), "key  ");
+    // A list of one, in the other byte order.
+    const hsize_t one = 1;
+    const Hdf5Handle list(H5Screate_simple(1, &one, nullptr), H5Sclose);
+    const Hdf5Handle version(
+        H5Acreate2(file, "version", H5T_STD_U64BE, list.get(), H5P_DEFAULT, H5P_DEFAULT), H5Aclose);
+    const int number = 1;
+    H5Awrite(version.get(), H5T_NATIVE_INT, &number);
+    const hsize_t extents[] = {2, 3};
+    const Hdf5Handle space(H5Screate_simple(2, extents, nullptr), H5Sclose);
+    const Hdf5Handle pressure(H5Dcreate2(file, "pressure", H5T_STD_I16BE, space.get(), H5P_DEFAULT,
+                                         H5P_DEFAULT, H5P_DEFAULT),
+                              H5Dclose);
+    const std::int16_t values[] = {0, -1, 255, 3, 4, 32767};
+    H5Dwrite(pressure.get(), H5T_NATIVE_INT16, H5S_ALL, H5S_ALL, H5P_DEFAULT, values);
+    // h5py's bool.
+    const Hdf5Handle truth(H5Tenum_create(H5T_STD_I8LE), H5Tclose);
+    const std::int8_t levels[] = {0, 1};
+    H5Tenum_insert(truth.get(), "FALSE", &levels[0]);
+    H5Tenum_insert(truth.get(), "TRUE", &levels[1]);
+    const Hdf5Handle row(H5Screate_simple(1, &extents[1], nullptr), H5Sclose);
+    const Hdf5Handle valid(
+        H5Dcreate2(file, "valid", truth.get(), row.get(), H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT),
+        H5Dclose);
+    const std::int8_t alive[] = {1, 0, 1};
+    H5Dwrite(valid.get(), truth.get(), H5S_ALL, H5S_ALL, H5P_DEFAULT, alive);
+  });
+  const Recording read = read_recording(path_);
+  EXPECT_EQ(read.object, "key");
+  EXPECT_EQ(read.pressure, (std::vector<double>{0, -1, 255, 3, 4, 32767}));
+  EXPECT_EQ(read.valid, (std::vector<std::uint8_t>{1, 0, 1}));
+}
+
+TEST_F(RecordingFile, NamesDatasetsThatDisagree) {
+  const auto spoilt = [&](const char* name, const Hdf5Writer::Shape& shape) {
+    return message(recording_parts().dataset(name, shape));
+  };
+  expect_named(spoilt("elements", {4, 2}), {"'elements'", "[4, 2]", "'pressure'", "[2, 3]"});
+  expect_named(spoilt("elements", {3, 3}), {"'elements'", "[3, 3]", "[3, 2] or [2, 3, 2]"});
+  expect_named(spoilt("elements", {3, 3, 2}), {"'elements'", "[3, 3, 2]"});
+  expect_named(spoilt("elements", {6}), {"'elements'", "[6]"});
+  expect_named(spoilt("sensor_pose", {1, 3}), {"'sensor_pose'", "[1, 3]", "[2, 3]"});
+  expect_named(spoilt("sensor_pose", {2, 4}), {"'sensor_pose'", "[2, 4]"});
+  expect_named(spoilt("valid", {2}), {"'valid'", "[2]", "[3] or [2, 3]"});
+  expect_named(spoilt("valid", {3, 2}), {"'valid'", "[3, 2]"});
+  expect_named(spoilt("time", {3}), {"'time'", "[3]", "[2]"});
+  expect_named(spoilt("pressure", {6}), {"'pressure'", "1 dimensions", "2"});
+  expect_named(spoilt("pressure", {0, 3}), {"'pressure'", "[0, 3]", "at least one"});
+  expect_named(spoilt("pressure", {2, 0}), {"'pressure'", "[2, 0]", "at least one"});
+}
+
+TEST_F(RecordingFile, NamesWhatIsMissing) {
+  for (const char* name : {"format", "version", "object", "pressure_unit", "length_unit"}) {
+    expect_named(message(recording_parts().without(name)), {"attribute", name, "missing"});
+  }
+  for (const char* name : {"pressure", "sensor_pose", "elements"}) {
+    expect_named(message(recording_parts().without(name)), {"dataset", name, "missing"});
+  }
+  expect_named(message(recording_parts().attribute("true_object", "A")),
+               {"'true_T_object_robot'", "missing"});
+}
+
+TEST_F(RecordingFile, NamesValuesThatAreNoNumbers) {
+  const std::vector<double> row_of_nan{1, 2, 3, 4, nan, 6};
+  expect_named(message(recording_parts().dataset("pressure", {2, 3}, row_of_nan)),
+               {"'pressure'[1, 1]", "nan", "'valid'"});
+  expect_named(message(recording_parts().dataset("pressure", {2, 3}, infinity)),
+               {"'pressure'[0, 0]", "inf"});
+  expect_named(message(recording_parts().dataset("sensor_pose", {2, 3}, row_of_nan)),
+               {"'sensor_pose'[1]", "nan"});
+  expect_named(message(recording_parts().dataset("elements", {3, 2}, infinity)),
+               {"'elements'", "inf"});
+  expect_named(message(recording_parts().dataset("time", {2}, nan)), {"'time'[0]", "nan"});
+  expect_named(message(recording_parts().dataset("valid", {3}, nan)), {"'valid'", "NaN"});
+}
+
+TEST_F(RecordingFile, NamesAttributesItCannotTake) {
+  const auto spoilt = [&](const char* name, auto value) {
+    return message(recording_parts().attribute(name, value));
+  };
+  expect_named(spoilt("pressure_unit", "psi"), {"'pressure_unit'", "'psi'", "'kPa' or 'raw'"});
+  expect_named(spoilt("length_unit", "m"), {"'length_unit'", "'m'", "'mm'"});
+  expect_named(spoilt("rows", "columns"), {"'rows'", "'columns'", "'touches' or 'frames'"});
+  expect_named(spoilt("version", 2), {"'version'", "2", "newer", "update Palpate"});
+  expect_named(spoilt("version", 0), {"'version'", "0", "from 1"});
+  expect_named(spoilt("version", 1.5), {"'version'", "1.5"});
+  expect_named(spoilt("version", "1"), {"'version'", "numbers"});
+  expect_named(spoilt("object", 7), {"'object'", "string"});
+  expect_named(spoilt("object", "a\nb"), {"'object'", "printable"});
+  expect_named(spoilt("object", "\xff"), {"'object'", "UTF-8"});
+  expect_named(spoilt("format", "palpate.map"), {"'palpate.map'", "a map", "--maps", "recording"});
+  expect_named(spoilt("format", "palpate.posterior"), {"a posterior", "palpate info"});
+  expect_named(spoilt("format", "palpate.video"), {"'palpate.video'", "unknown"});
+}
+
+TEST_F(RecordingFile, NamesDatasetsOfOtherTypes) {
+  recording_parts().without("pressure").save(path_);
+  edit(path_, [](hid_t file) {
+    Hdf5Handle(H5Gcreate2(file, "pressure", H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT), H5Gclose);
+  });
+  expect_named(input_error([&] { read_recording(path_); }), {"'pressure'", "cannot be read"});
+  recording_parts().without("time").save(path_);
+  edit(path_, [](hid_t file) {
+    const hsize_t two = 2;
+    const Hdf5Handle space(H5Screate_simple(1, &two, nullptr), H5Sclose);
+    const Hdf5Handle type(H5Tcreate(H5T_OPAQUE, 4), H5Tclose);
+    Hdf5Handle(
+        H5Dcreate2(file, "time", type.get(), space.get(), H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT),
+        H5Dclose);
+  });
+  expect_named(input_error([&] { read_recording(path_); }), {"'time'", "type"});
+}
+
+// h5py can declare a dataset of any size without storing any of it.
+TEST_F(RecordingFile, RefusesShapesThatItsFileCannotHold) {
+  for (const bool chunked : {false, true}) {
+    recording_parts().without("pressure").save(path_);
+    edit(path_, [&](hid_t file) {
+      const hsize_t extents[] = {1u << 30, 1u << 30};
+      const Hdf5Handle space(H5Screate_simple(2, extents, nullptr), H5Sclose);
+      const Hdf5Handle creation(H5Pcreate(H5P_DATASET_CREATE), H5Pclose);
+      if (chunked) {
+        const hsize_t chunk[] = {64, 64};
+        H5Pset_chunk(creation.get(), 2, chunk);
+        H5Pset_deflate(creation.get(), 4);
+      }
+      Hdf5Handle(H5Dcreate2(file, "pressure", H5T_NATIVE_FLOAT, space.get(), H5P_DEFAULT,
+                            creation.get(), H5P_DEFAULT),
+                 H5Dclose);
+    });
+    expect_named(input_error([&] { read_recording(path_); }),
+                 {"'pressure'", "[1073741824, 1073741824]", "more than is stored"});
+  }
+}
+
+TEST_F(RecordingFile, NamesWhatIsNoReadableHdf5File) {
+  const auto message_of = [&] { return input_error([&] { read_recording(path_); }); };
+  expect_named(message_of(), {path_.c_str(), "no such file"});
+  put_bytes(path_, "");
+  expect_named(message_of(), {path_.c_str(), "empty"});
+  put_bytes(path_, std::string(3000, 'x'));
+  expect_named(message_of(), {path_.c_str(), "not an HDF5 file"});
+  recording_parts().save(path_);
+  put_bytes(path_, bytes_of(path_).substr(0, 2000));
+  expect_named(message_of(), {path_.c_str(), "truncated"});
+  expect_named(input_error([&] { read_recording(folder_.path()); }),
+               {folder_.path().c_str(), "folder"});
+  expect_named(input_error([&] { read_recording("/dev/null"); }), {"/dev/null", "regular"});
+  if (::geteuid() == 0) {
+    return;  // root may read everything
+  }
+  std::filesystem::permissions(path_, std::filesystem::perms::none);
+  expect_named(message_of(), {path_.c_str(), "permissions"});
+}
+
+TEST_F(RecordingFile, IsNotWrittenWhereItCouldNotBeRead) {
+  Recording spoilt = small_recording();
+  spoilt.pressure.pop_back();
+  expect_named(input_error([&] { write_recording(path_, spoilt); }), {path_.c_str(), "agree"});
+  spoilt = small_recording();
+  spoilt.pressure[0] = nan;
+  expect_named(input_error([&] { write_recording(path_, spoilt); }), {path_.c_str(), "'pressure'"});
+  EXPECT_TRUE(std::filesystem::is_empty(folder_.path()));
+}
+
+}  // namespace
+}  // namespace palpate

@@ -1,0 +1,151 @@
+#include "palpate/scene.hpp"
+
+#include <gtest/gtest.h>
+
+#include "palpate/touch.hpp"
+#include "scratch_folder.hpp"
+
+namespace palpate {
+namespace {
+
+class SceneFile : public testing::Test {
+ protected:
+  Scene read(const std::string& yaml) {
+    put_bytes(path_, yaml);
+    return read_scene(path_);
+  }
+
+  std::string message(const std::string& yaml) {
+    const std::string text = input_error([&] { read(yaml); });
+    expect_named(text, {path_.c_str()});
+    return text;
+  }
+
+  ScratchFolder folder_;
+  std::filesystem::path path_ = folder_ / "scene.yaml";
+};
+
+TEST_F(SceneFile, SaysAllThatItCan) {
+  const Scene scene = read(R"(
+array: digitacts
+threshold: 2.5
+ratio: 0.25
+gamma: 0.05
+prior: 0.15
+objects:
+  - {map: A.map.h5, label: A, symmetry: 0, weight: 2}
+  - {map: /maps/E.map.h5}
+region: {x_mm: [-10, 20], y_mm: [-1, 1], theta_deg: [0, 90], pivot_mm: [400, -5]}
+bins: [25, 24, 16]
+filter: particles
+device: llvmpipe
+)");
+  EXPECT_EQ(scene.array_mm, digitacts_array());
+  EXPECT_EQ(scene.threshold, 2.5);
+  EXPECT_EQ(scene.ratio, 0.25);
+  EXPECT_EQ(scene.gamma, 0.05);
+  EXPECT_EQ(scene.prior, 0.15);
+  ASSERT_EQ(scene.objects.size(), 2u);
+  EXPECT_EQ(scene.objects[0].map, folder_ / "A.map.h5");
+  EXPECT_EQ(scene.objects[0].label, "A");
+  EXPECT_EQ(scene.objects[0].symmetry, 0);
+  EXPECT_EQ(scene.objects[0].weight, 2.0);
+  EXPECT_EQ(scene.objects[1].map, "/maps/E.map.h5");
+  EXPECT_FALSE(scene.objects[1].label);
+  EXPECT_FALSE(scene.objects[1].symmetry);
+  EXPECT_EQ(scene.objects[1].weight, 1.0);
+  EXPECT_EQ(scene.region.x_mm, (std::array{-10.0, 20.0}));
+  EXPECT_EQ(scene.region.y_mm, (std::array{-1.0, 1.0}));
+  EXPECT_EQ(scene.region.theta_deg, (std::array{0.0, 90.0}));
+  EXPECT_EQ(scene.region.pivot_mm, glm::dvec2(400, -5));
+  EXPECT_EQ(scene.bins, (std::array{25, 24, 16}));
+  EXPECT_EQ(scene.filter, "particles");
+  EXPECT_EQ(scene.device, "llvmpipe");
+}
+
+TEST_F(SceneFile, MayLeaveEverythingOut) {
+  for (const char* yaml : {"", "# nothing but a comment\n", "{}"}) {
+    const Scene scene = read(yaml);
+    EXPECT_FALSE(scene.array_mm || scene.threshold || scene.ratio || scene.gamma || scene.prior ||
+                 scene.region.x_mm || scene.bins || scene.filter || scene.device);
+    EXPECT_TRUE(scene.objects.empty());
+  }
+}
+
+TEST_F(SceneFile, TakesTheArrayAsAList) {
+  EXPECT_EQ(read("array: [[0, 1], [2.5, -3]]").array_mm,
+            (std::vector<glm::dvec2>{{0, 1}, {2.5, -3}}));
+}
+
+TEST_F(SceneFile, TakesTheArrayFromAFileBesideIt) {
+  put_bytes(folder_ / "pads.txt", "# two pads\n\n-1 0.5 # left\r\n\t1.5e0\t-2\n");
+  EXPECT_EQ(read("array: pads.txt").array_mm, (std::vector<glm::dvec2>{{-1, 0.5}, {1.5, -2}}));
+  const std::string pads = (folder_ / "pads.txt").string();
+  for (const char* text : {"1 2\n3\n", "1 2\n3 4 5\n", "1 2\nnan 1\n", "1 2\n3,4\n"}) {
+    put_bytes(pads, text);
+    expect_named(input_error([&] { read("array: pads.txt"); }), {pads.c_str(), "line 2"});
+  }
+  put_bytes(pads, "# none\n");
+  expect_named(input_error([&] { read("array: pads.txt"); }), {pads.c_str(), "no element"});
+  expect_named(input_error([&] { read("array: digitact"); }), {"digitact", "no such file"});
+}
+
+TEST_F(SceneFile, NamesKeysThatItDoesNotKnow) {
+  expect_named(message("ratio: 0.3\ntreshold: 2"), {"line 2", "treshold", "unknown", "threshold"});
+  expect_named(message("region:\n  x: [0, 1]"), {"line 2", "'x'", "unknown", "x_mm"});
+  expect_named(message("objects:\n  - {map: A.h5, name: A}"), {"line 2", "name", "label"});
+  expect_named(message("[a]: 1"), {"line 1", "unknown"});
+  expect_named(message("ratio: 0.3\nratio: 0.2"), {"line 2", "ratio", "twice"});
+}
+
+TEST_F(SceneFile, NamesValuesThatItCannotTake) {
+  struct Case {
+    const char* yaml;
+    const char* key;
+  };
+  for (const Case& spoilt : std::initializer_list<Case>{
+           {"threshold: high", "threshold"},
+           {"threshold: -1", "threshold"},
+           {"threshold: .nan", "threshold"},
+           {"threshold: .inf", "threshold"},
+           {"threshold: 2 kPa", "threshold"},
+           {"threshold: [2]", "threshold"},
+           {"threshold:", "threshold"},
+           {"ratio: 1", "ratio"},
+           {"gamma: 1", "gamma"},
+           {"gamma: -0.1", "gamma"},
+           {"prior: 0", "prior"},
+           {"prior: 1", "prior"},
+           {"array: []", "array"},
+           {"array: {}", "array"},
+           {"array: [1, 2]", "array[0]"},
+           {"array: [[1, 2], [1, x]]", "array[1][1]"},
+           {"objects: A.h5", "objects"},
+           {"objects: [A.h5]", "objects[0]"},
+           {"objects: [{label: A}]", "map"},
+           {"objects: [{map: A.h5, symmetry: -1}]", "symmetry"},
+           {"objects: [{map: A.h5, symmetry: 1.5}]", "symmetry"},
+           {"objects: [{map: A.h5, weight: 0}]", "weight"},
+           {"objects: [{map: A.h5, label: ''}]", "label"},
+           {"region: 10", "region"},
+           {"region: {x_mm: [10, -10]}", "x_mm"},
+           {"region: {y_mm: [0]}", "y_mm"},
+           {"region: {pivot_mm: [0, .nan]}", "pivot_mm[1]"},
+           {"bins: [25, 25]", "bins"},
+           {"bins: [25, 25, 0]", "bins[2]"},
+           {"bins: [25, 2.5, 16]", "bins[1]"},
+           {"filter: kalman", "filter"},
+           {"device: [0]", "device"},
+           {"- ratio: 0.3", "the scene"},
+       }) {
+    expect_named(message(spoilt.yaml), {"line 1", spoilt.key});
+  }
+}
+
+TEST_F(SceneFile, NamesTheLineThatIsNoYaml) {
+  expect_named(message("ratio: 0.3\nobjects: [1, 2\nbins: 3"), {"line", "YAML"});
+  expect_named(input_error([&] { read_scene(folder_ / "no.yaml"); }), {"no.yaml", "no such file"});
+}
+
+}  // namespace
+}  // namespace palpate
