@@ -43,15 +43,30 @@ void validate(std::span<const Hypothesis> hypotheses) {
   }
 }
 
+double common_prior(std::span<const Hypothesis> hypotheses) {
+  const OccupancyGrid& first = hypotheses.front().map;
+  for (const Hypothesis& hypothesis : hypotheses) {
+    // Readers may have rounded one of them.
+    if (std::abs(hypothesis.map.prior - first.prior) > 1e-6) {
+      throw Error(
+          Fault::input,
+          fmt::format("map '{}': prior {} differs from {} of map '{}'; build the maps "
+                      "together, or say which prior to use",
+                      hypothesis.map.label, hypothesis.map.prior, first.prior, first.label));
+    }
+  }
+  return first.prior;
+}
+
 }  // namespace
 
 struct PoseHistogram::Impl {
-  Impl(Device& device, std::span<const Hypothesis> hypotheses, const HistogramOptions& wanted)
+  Impl(Device& device, std::span<const Hypothesis> hypotheses, const HistogramOptions& wanted,
+       const ContactLikelihood& model)
       : options(wanted),
         stream(device.context()),
         belief(device.context(), stream, options.lattice, hypotheses.size()),
-        likelihood(device.context(), stream, hypotheses, options.lattice,
-                   {.gamma = options.gamma, .prior = options.prior}) {
+        likelihood(device.context(), stream, hypotheses, options.lattice, model) {
     double total = 0.0;
     for (const Hypothesis& hypothesis : hypotheses) {
       total += hypothesis.weight;
@@ -118,8 +133,10 @@ PoseHistogram::PoseHistogram(Device& device, std::span<const Hypothesis> hypothe
   validate(hypotheses);
   HistogramOptions checked = options;
   checked.lattice.collapse_fixed().validate();
-  ContactLikelihood{.gamma = checked.gamma, .prior = checked.prior}.validate();
-  impl_ = std::make_unique<Impl>(device, hypotheses, checked);
+  const ContactLikelihood model{.gamma = checked.gamma,
+                                .prior = checked.prior ? *checked.prior : common_prior(hypotheses)};
+  model.validate();
+  impl_ = std::make_unique<Impl>(device, hypotheses, checked, model);
 }
 
 PoseHistogram::~PoseHistogram() = default;

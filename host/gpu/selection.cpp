@@ -193,9 +193,11 @@ const Candidate& chosen(std::span<const Candidate> candidates, std::string_view 
                            candidate.info.name, candidate.info.reason);
   }
   // A wish that no device fits is the caller's; a machine without a usable device is not.
-  throw Error(
-      name_or_index.empty() ? Fault::system : Fault::input,
-      fmt::format("device '{}': none fits: {}; see `palpate devices`", name_or_index, reasons));
+  if (name_or_index.empty()) {
+    throw Error(Fault::system, fmt::format("no usable Vulkan device: {}", reasons));
+  }
+  throw Error(Fault::input, fmt::format("device '{}': none fits: {}; see `palpate devices`",
+                                        name_or_index, reasons));
 }
 
 }  // namespace palpate::gpu

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -24,7 +25,9 @@ struct HistogramOptions {
   PoseLattice lattice;
   ContactClassifier classifier;
   double gamma = 0.1;
-  double prior = 0.2;  ///< p(m) of Eq. 7 and of the space beyond the maps
+  /// p(m) of Eq. 7 and of the space beyond the maps; by default the maps' own, which must then be
+  /// the same for all: unequal priors would favour the emptier or the fuller map in unseen space.
+  std::optional<double> prior = {};
 };
 
 /// The bin of the largest posterior probability (Eq. 15-16).
@@ -47,8 +50,9 @@ struct Estimate {
 class PoseHistogram {
  public:
   /// Uploads the maps and sets a uniform belief. Ties go to the first object and the lowest bin.
-  /// @throws Error on an empty list, a map with no cells or with infinite log odds, weights that
-  /// are not positive, a lattice or gamma out of range, or too little device memory.
+  /// @throws Error on an empty list, a map with no cells or with infinite log odds, maps of
+  /// different priors where none is given, weights that are not positive, a lattice, gamma or prior
+  /// out of range, or too little device memory.
   PoseHistogram(Device& device, std::span<const Hypothesis> hypotheses,
                 const HistogramOptions& options);
   ~PoseHistogram();
