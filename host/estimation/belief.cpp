@@ -157,12 +157,10 @@ std::vector<BeliefSummary> Belief::summarise() const {
     for (const Slab& slab : slabs) {
       for (std::size_t i = 0; i < partials_of(slab); ++i, ++partial) {
         const TwoFloat max{partial->max_high, partial->max_low};
-        const std::int64_t bin = lattice_index(lattice_, slab, partial->arg_max);
-        // Slabs that part a plane are not in the order of the lattice.
-        if (!any || exceeds(max, summary.max) ||
-            (!exceeds(summary.max, max) && bin < summary.arg_max)) {
+        // Slabs stand in the lattice's order, so the first of equals has the lowest bin.
+        if (!any || exceeds(max, summary.max)) {
           summary.max = max;
-          summary.arg_max = bin;
+          summary.arg_max = lattice_index(lattice_, slab, partial->arg_max);
           any = true;
         }
       }

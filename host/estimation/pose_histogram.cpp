@@ -29,6 +29,10 @@ void validate(std::span<const Hypothesis> hypotheses) {
       throw Error(Fault::input, fmt::format("map '{}': cell_mm = {}: give a positive length",
                                             map.label, map.cell_mm));
     }
+    if (!std::isfinite(map.origin_mm.x) || !std::isfinite(map.origin_mm.y)) {
+      throw Error(Fault::input, fmt::format("map '{}': origin_mm = {},{}: give finite numbers",
+                                            map.label, map.origin_mm.x, map.origin_mm.y));
+    }
     if (!std::all_of(map.log_odds.begin(), map.log_odds.end(),
                      [](float l) { return std::isfinite(l); })) {
       throw Error(Fault::input,

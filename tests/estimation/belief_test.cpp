@@ -1,0 +1,159 @@
+#include <limits>
+#include <numbers>
+
+#include <gtest/gtest.h>
+
+#include "context.hpp"
+#include "palpate/error.hpp"
+#include "palpate/pose_histogram.hpp"
+#include "synthetic.hpp"
+
+namespace palpate {
+namespace {
+
+/// 1,560 bins in a plane, 7 planes.
+HistogramOptions options() {
+  HistogramOptions result;
+  result.lattice = {
+      .x_mm = {-5.0, 5.0, 40}, .y_mm = {-5.0, 5.0, 39}, .theta_rad = {0, 2 * std::numbers::pi, 7}};
+  return result;
+}
+
+std::vector<Hypothesis> two_objects() {
+  return {{random_map(20, 20, 0.5, 4.0, 111), 1.0}, {random_map(18, 21, 0.5, 4.0, 112), 2.0}};
+}
+
+/// Everything that a belief tells.
+struct Told {
+  std::vector<std::vector<double>> log_likelihood;
+  std::vector<std::vector<double>> marginal;
+  Estimate before;
+  Estimate after;
+};
+
+Told tell(Device& device, const Recording& recording, const HistogramOptions& wanted) {
+  const std::vector<Hypothesis> objects = two_objects();
+  PoseHistogram histogram(device, objects, wanted);
+  Told told;
+  told.before = histogram.estimate();
+  for (const Touch& touch : all_touches(recording)) {
+    histogram.update(touch);
+  }
+  told.after = histogram.estimate();
+  for (const int object : {0, 1}) {
+    told.log_likelihood.push_back(histogram.log_likelihood(object));
+    told.marginal.push_back(histogram.marginal_xy(object));
+    told.marginal.push_back(histogram.marginal_theta(object));
+  }
+  return told;
+}
+
+/// A device that is made to look lesser cuts the belief into slabs, which must not show.
+class Slabs : public testing::Test {
+ protected:
+  void expect_unseen(const HistogramOptions& wanted = options()) {
+    const Recording recording = random_recording(2, 12, 113);
+    const Told whole = tell(device, recording, wanted);
+    device.context().lower_limits(limits);
+    const Told cut = tell(device, recording, wanted);
+    EXPECT_EQ(cut.log_likelihood, whole.log_likelihood);
+    EXPECT_EQ(cut.before.mode.bin, 0);
+    EXPECT_EQ(cut.after.mode.object, whole.after.mode.object);
+    EXPECT_EQ(cut.after.mode.bin, whole.after.mode.bin);
+    EXPECT_EQ(cut.after.mode.log_likelihood, whole.after.mode.log_likelihood);
+    // Float32 sums of at most 4,096 terms in another order.
+    EXPECT_LT(largest_difference(cut.after.identity, whole.after.identity), 1e-6);
+    for (std::size_t i = 0; i < whole.marginal.size(); ++i) {
+      EXPECT_LT(largest_difference(cut.marginal[i], whole.marginal[i]), 1e-6);
+    }
+  }
+
+  Device device = Device::open();
+  gpu::Limits limits = device.context().limits();
+};
+
+constexpr std::size_t plane_bytes = std::size_t{40} * 39 * 2 * sizeof(float);
+
+TEST_F(Slabs, OfSeveralPlanesByTheBinding) {
+  limits.storage_range = 3 * plane_bytes + 8;
+  expect_unseen();
+}
+
+TEST_F(Slabs, OfOnePlane) {
+  limits.storage_range = plane_bytes;
+  expect_unseen();
+}
+
+TEST_F(Slabs, OfPartsOfAPlane) {
+  limits.storage_range = plane_bytes / 2 + 8;
+  expect_unseen();
+}
+
+TEST_F(Slabs, ByTheWorkgroupsAlongX) {
+  // 10 workgroups of 64 bins cover less than half a plane.
+  limits.group_count[0] = 10;
+  expect_unseen();
+}
+
+TEST_F(Slabs, ByTheWorkgroupsAlongZ) {
+  limits.group_count[2] = 2;
+  expect_unseen();
+}
+
+TEST_F(Slabs, ByTheWorkgroupsOfAReduction) {
+  // 65 workgroups cover each of these planes, but 67 would be needed to reduce all 65 of them.
+  HistogramOptions wanted = options();
+  wanted.lattice.x_mm.count = 64;
+  wanted.lattice.y_mm.count = 65;
+  wanted.lattice.theta_rad.count = 65;
+  limits.group_count[0] = 65;
+  expect_unseen(wanted);
+}
+
+TEST(Belief, MoreBinsThanMemoryIsRefusedBeforeAnyIsTaken) {
+  Device device = Device::open();
+  const std::vector<Hypothesis> objects = two_objects();
+  HistogramOptions too_many = options();
+  const auto expect_refused = [&] {
+    try {
+      const PoseHistogram histogram(device, objects, too_many);
+      ADD_FAILURE() << "accepted";
+    } catch (const Error& error) {
+      EXPECT_EQ(error.fault(), Fault::system);
+      EXPECT_NE(std::string(error.what()).find("use fewer bins"), std::string::npos)
+          << error.what();
+    }
+  };
+  gpu::Limits limits = device.context().limits();
+  const std::uint64_t needed = 2 * 7 * plane_bytes;
+  limits.memory = needed - 1;
+  device.context().lower_limits(limits);
+  expect_refused();
+  limits.memory = 2 * needed;
+  device.context().lower_limits(limits);
+  EXPECT_NO_THROW(PoseHistogram(device, objects, too_many)) << "the device is still usable";
+  // Far beyond 64 bits of bins.
+  too_many.lattice.x_mm.count = std::numeric_limits<int>::max();
+  too_many.lattice.y_mm.count = std::numeric_limits<int>::max();
+  too_many.lattice.theta_rad.count = std::numeric_limits<int>::max();
+  expect_refused();
+}
+
+TEST(Belief, AMapAboveTheBindingIsRefusedByItsLabel) {
+  Device device = Device::open();
+  gpu::Limits limits = device.context().limits();
+  limits.storage_range = 1000;
+  device.context().lower_limits(limits);
+  const Hypothesis hypothesis{random_map(40, 40, 0.5, 1.0, 114), 1.0};
+  HistogramOptions small;
+  small.lattice = {.x_mm = {-1, 1, 2}, .y_mm = {-1, 1, 2}, .theta_rad = {0, 1, 2}};
+  try {
+    const PoseHistogram histogram(device, std::span(&hypothesis, 1), small);
+    FAIL() << "accepted";
+  } catch (const Error& error) {
+    EXPECT_NE(std::string(error.what()).find("'made up'"), std::string::npos) << error.what();
+  }
+}
+
+}  // namespace
+}  // namespace palpate

@@ -1,0 +1,65 @@
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include <gtest/gtest.h>
+
+#include "palpate/pose_histogram.hpp"
+#include "synthetic.hpp"
+
+namespace palpate {
+namespace {
+
+TEST(LargeLattice, FiveMillionBinsAreAsGoodAsTenThousand) {
+  std::vector<Hypothesis> objects;
+  for (const std::uint64_t seed : {131U, 132U, 133U, 134U, 135U}) {
+    objects.push_back({random_map(61, 61, 0.5, 12.0, seed), 1.0});
+  }
+  HistogramOptions options;
+  options.lattice = {.x_mm = {-10.0, 10.0, 100},
+                     .y_mm = {-10.0, 10.0, 100},
+                     .theta_rad = {0.0, 2.0 * std::numbers::pi, 100}};
+  const Recording recording = random_recording(9, 36, 136);
+  const std::vector<Touch> touches = all_touches(recording);
+  Device device = Device::open();
+  PoseHistogram histogram(device, objects, options);
+  double done = 0.0;
+  histogram.update(touches, [&](double fraction) {
+    EXPECT_GT(fraction, done);
+    EXPECT_LE(fraction, 1.0);
+    done = fraction;
+  });
+  EXPECT_GT(done, 0.5) << "no progress was reported";
+  const auto all_bins = static_cast<std::uint64_t>(5 * options.lattice.bins());
+  EXPECT_LT(histogram.device_bytes(), 16 * all_bins);
+
+  Uniform random(137);
+  const Estimate estimate = histogram.estimate();
+  double best = -1e300;
+  for (int object = 0; object < 5; ++object) {
+    const OccupancyGrid& map = objects[static_cast<std::size_t>(object)].map;
+    const std::vector<double> product = histogram.log_likelihood(object);
+    best = std::max(best, *std::max_element(product.begin(), product.end()));
+    for (int sample = 0; sample < 2000; ++sample) {
+      const auto bin = static_cast<std::int64_t>(random(0.0, 1e6));
+      const Pose pose = reference::bin_pose(options.lattice, bin);
+      double expected = 0.0;
+      for (const Touch& touch : touches) {
+        expected += reference::log_likelihood(touch, pose, map, {}, {});
+      }
+      // 1e-4 nats per touch is what the method allows.
+      ASSERT_NEAR(product[static_cast<std::size_t>(bin)], expected, 9e-4)
+          << "object " << object << ", bin " << bin;
+    }
+    double sum = 0.0;
+    for (const double p : histogram.marginal_theta(object)) {
+      sum += p;
+    }
+    // Each theta is a sum of 10,000 float32 terms, 64 lanes of 157 each.
+    EXPECT_NEAR(sum, estimate.identity[static_cast<std::size_t>(object)], 1e-5);
+  }
+  EXPECT_EQ(estimate.mode.log_likelihood, best);
+}
+
+}  // namespace
+}  // namespace palpate

@@ -1,0 +1,219 @@
+#include "palpate/map_builder.hpp"
+
+#include <cmath>
+#include <numbers>
+
+#include <gtest/gtest.h>
+
+#include "palpate/error.hpp"
+#include "synthetic.hpp"
+
+namespace palpate {
+namespace {
+
+// What the method allows a map with a finite support to differ from the uncut sum, in nats.
+constexpr double map_tolerance = 1e-3;
+// Two orders of adding the same increments: both are summed in two floats, and rounded to one
+// float32 below 64 nats, whose last digit is 4e-6.
+constexpr double rounding = 1e-5;
+
+OccupancyGrid build(std::span<const Touch> touches, const MapOptions& options = {}) {
+  Device device = Device::open();
+  MapBuilder builder(device, options);
+  builder.add(touches);
+  return builder.build("made up");
+}
+
+TEST(MapBuilder, AgreesWithTheUncutSumForEveryNumberOfElements) {
+  for (const std::size_t elements : {1U, 7U, 36U, 37U, 63U, 65U, 256U, 1400U}) {
+    const Recording recording = random_recording(2, elements, elements);
+    const MapOptions options{.cell_mm = 1.0};
+    EXPECT_LT(map_error(build(all_touches(recording), options), all_touches(recording), options),
+              map_tolerance)
+        << elements << " elements";
+  }
+}
+
+TEST(MapBuilder, AgreesForEveryCellSizeAndSpread) {
+  const Recording recording = random_recording(3, 36, 8);
+  for (const double cell_mm : {0.1, 0.37, 0.5, 1.0, 5.0}) {
+    for (const double spread_mm : {0.25, 0.5, 2.0}) {
+      const MapOptions options{.cell_mm = cell_mm, .sensor = {.spread_mm = spread_mm}};
+      EXPECT_LT(map_error(build(all_touches(recording), options), all_touches(recording), options),
+                map_tolerance)
+          << "cells of " << cell_mm << " mm, spread " << spread_mm << " mm";
+    }
+  }
+}
+
+TEST(MapBuilder, AgreesForEveryPeakAndPrior) {
+  const Recording recording = random_recording(3, 36, 9);
+  for (const double peak : {0.05, 0.5, 0.9, 0.99}) {
+    for (const double prior : {0.01, 0.2, 0.5, 0.95}) {
+      const MapOptions options{.cell_mm = 0.5, .sensor = {.peak = peak, .prior = prior}};
+      EXPECT_LT(map_error(build(all_touches(recording), options), all_touches(recording), options),
+                map_tolerance)
+          << "peak " << peak << ", prior " << prior;
+    }
+  }
+}
+
+/// Grids of every size along one axis: cells wider than the support, elements from end to end.
+class MapSize : public testing::TestWithParam<int> {};
+
+TEST_P(MapSize, AgreesAlongEitherAxis) {
+  const int cells = GetParam();
+  const MapOptions options{.cell_mm = 5.0, .sensor = {.spread_mm = 0.5}};
+  for (const bool along_x : {true, false}) {
+    Recording recording = random_recording(1, 40, 10);
+    recording.T_robot_sensor[0] = {};
+    Uniform random(11);
+    for (std::size_t k = 0; k < recording.elements_mm.size(); ++k) {
+      const double at_mm =
+          5.0 * std::floor(k == 0 ? 0.0 : (k == 1 ? cells - 1.0 : random(0.0, cells)));
+      recording.elements_mm[k] = along_x ? glm::dvec2(at_mm, 0.1) : glm::dvec2(0.1, at_mm);
+    }
+    recording.pressure[0] = 20.0;
+    recording.pressure[1] = 0.0;
+    const OccupancyGrid map = build(all_touches(recording), options);
+    EXPECT_EQ(along_x ? map.nx : map.ny, cells);
+    EXPECT_EQ(along_x ? map.ny : map.nx, 1);
+    EXPECT_LT(map_error(map, all_touches(recording), options), map_tolerance);
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Cells, MapSize, testing::Values(1, 7, 63, 65, 1000));
+
+TEST(MapBuilder, AgreesFarFromTheOrigin) {
+  const Recording recording = moved(random_recording(3, 36, 12), {{1.3e5, -2.7e5}, 2.0});
+  const MapOptions options{.cell_mm = 0.5};
+  EXPECT_LT(map_error(build(all_touches(recording), options), all_touches(recording), options),
+            map_tolerance);
+}
+
+TEST(MapBuilder, AgreesForAnArrayThatChangesAndHasDeadElements) {
+  Recording recording = random_recording(4, 20, 13);
+  Uniform random(14);
+  recording.elements_mm.clear();
+  for (std::size_t i = 0; i < recording.pressure.size(); ++i) {
+    recording.elements_mm.emplace_back(random(-6.0, 6.0), random(-6.0, 6.0));
+    recording.valid.push_back(random(0.0, 1.0) < 0.8 ? 1 : 0);
+    if (recording.valid.back() == 0) {
+      recording.pressure[i] = std::numeric_limits<double>::quiet_NaN();
+    }
+  }
+  const MapOptions options;
+  EXPECT_LT(map_error(build(all_touches(recording), options), all_touches(recording), options),
+            map_tolerance);
+}
+
+TEST(MapBuilder, CoversTheKnownElementsAndTheirSupportAndNoMore) {
+  Recording recording = random_recording(1, 3, 15);
+  recording.T_robot_sensor[0] = {};
+  recording.elements_mm = {{0.0, 0.0}, {10.0, 4.0}, {500.0, 500.0}};
+  recording.pressure = {20.0, 0.0, 3.0};  // In Contact, No Contact, Unknown
+  const MapOptions options;
+  const OccupancyGrid map = build(all_touches(recording), options);
+  const glm::dvec2 last = map.centre_mm(map.nx - 1, map.ny - 1);
+  // 8 spreads are beyond any increment that counts.
+  EXPECT_GT(map.origin_mm.x, -8.0 * 0.5);
+  EXPECT_GT(map.origin_mm.y, -8.0 * 0.5);
+  EXPECT_LT(last.x, 10.0 + 8.0 * 0.5);
+  EXPECT_LT(last.y, 4.0 + 8.0 * 0.5);
+  EXPECT_EQ(map.label, "made up");
+  EXPECT_EQ(map.prior, options.sensor.prior);
+  EXPECT_EQ(map.symmetry, 1);
+}
+
+TEST(MapBuilder, OriginIsAWholeMultipleOfTheCell) {
+  const Recording recording = random_recording(2, 36, 16);
+  for (const double cell_mm : {0.1, 0.37, 0.5, 3.0}) {
+    const OccupancyGrid map = build(all_touches(recording), {.cell_mm = cell_mm});
+    for (const double origin_mm : {map.origin_mm.x, map.origin_mm.y}) {
+      EXPECT_EQ(origin_mm, cell_mm * std::round(origin_mm / cell_mm)) << cell_mm;
+    }
+  }
+}
+
+void expect_same_map(const OccupancyGrid& a, const OccupancyGrid& b, double tolerance) {
+  ASSERT_EQ(a.origin_mm, b.origin_mm);
+  ASSERT_EQ(a.nx, b.nx);
+  ASSERT_EQ(a.ny, b.ny);
+  for (std::size_t i = 0; i < a.log_odds.size(); ++i) {
+    ASSERT_NEAR(a.log_odds[i], b.log_odds[i], tolerance) << "cell " << i;
+  }
+}
+
+TEST(MapBuilder, OrderAndGroupingOfTouchesDoNotMatter) {
+  const Recording recording = random_recording(24, 36, 17);
+  const std::vector<Touch> touches = all_touches(recording);
+  const std::vector<Touch> reversed(touches.rbegin(), touches.rend());
+  const OccupancyGrid map = build(touches);
+  expect_same_map(map, build(reversed), rounding);
+  Device device = Device::open();
+  MapBuilder builder(device, {});
+  for (const Touch& touch : touches) {
+    builder.add(std::span(&touch, 1));
+  }
+  expect_same_map(map, builder.build("made up"), 0.0);
+  expect_same_map(map, builder.build("made up"), 0.0);
+}
+
+TEST(MapBuilder, MovesWithTheRobotFrame) {
+  const Recording recording = random_recording(6, 36, 18);
+  const OccupancyGrid map = build(all_touches(recording));
+  // A quarter turn and a whole number of cells map cells to cells.
+  const OccupancyGrid turned =
+      build(all_touches(moved(recording, {{250.0, -33.5}, std::numbers::pi / 2.0})));
+  ASSERT_EQ(turned.nx, map.ny);
+  ASSERT_EQ(turned.ny, map.nx);
+  for (int j = 0; j < map.ny; ++j) {
+    for (int i = 0; i < map.nx; ++i) {
+      const glm::dvec2 p = map.centre_mm(i, j);
+      const glm::dvec2 q = turned.centre_mm(map.ny - 1 - j, i);
+      ASSERT_NEAR(q.x, 250.0 - p.y, 1e-9) << "float64 rounding";
+      ASSERT_NEAR(q.y, -33.5 + p.x, 1e-9) << "float64 rounding";
+      // Positions within a tile are float32: 1e-6 mm, where an increment changes by up to 10 nats
+      // per mm.
+      ASSERT_NEAR(turned.at(map.ny - 1 - j, i), map.at(i, j), 1e-4);
+    }
+  }
+}
+
+TEST(MapBuilder, UnknownElementsAndTouchesChangeNoBit) {
+  const Recording known = random_recording(3, 36, 19);
+  Recording more = known;
+  more.elements_mm.insert(more.elements_mm.end(), {{0.3, 0.2}, {90.0, 90.0}});
+  more.pressure.clear();
+  for (std::size_t i = 0; i < known.size(); ++i) {
+    const std::span<const double> row = known.touch(i).pressure;
+    more.pressure.insert(more.pressure.end(), row.begin(), row.end());
+    more.pressure.insert(more.pressure.end(), {2.0, 3.0});
+  }
+  more.T_robot_sensor.push_back({{4.0, 4.0}, 0.5});
+  more.pressure.insert(more.pressure.end(), more.elements_mm.size(), 0.0);  // all equal: Unknown
+  expect_same_map(build(all_touches(known)), build(all_touches(more)), 0.0);
+}
+
+TEST(MapBuilder, TheSameInputGivesTheSameBits) {
+  const Recording recording = random_recording(20, 65, 20);
+  expect_same_map(build(all_touches(recording)), build(all_touches(recording)), 0.0);
+}
+
+TEST(MapBuilder, TouchesWithoutAKnownElementMakeNoMap) {
+  Recording recording = random_recording(2, 36, 21);
+  recording.pressure.assign(recording.pressure.size(), 0.0);
+  for (const std::vector<Touch>& touches : {std::vector<Touch>{}, all_touches(recording)}) {
+    try {
+      build(touches);
+      FAIL() << "built a map of nothing";
+    } catch (const Error& error) {
+      EXPECT_EQ(error.fault(), Fault::input);
+      EXPECT_NE(std::string(error.what()).find("'made up'"), std::string::npos) << error.what();
+      EXPECT_NE(std::string(error.what()).find("threshold"), std::string::npos) << error.what();
+    }
+  }
+}
+
+}  // namespace
+}  // namespace palpate

@@ -1,0 +1,138 @@
+#include <functional>
+#include <limits>
+#include <string>
+
+#include <gtest/gtest.h>
+
+#include "palpate/error.hpp"
+#include "palpate/map_builder.hpp"
+#include "palpate/pose_histogram.hpp"
+#include "synthetic.hpp"
+
+namespace palpate {
+namespace {
+
+constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+constexpr double infinity = std::numeric_limits<double>::infinity();
+
+void expect_refused(const std::function<void()>& call, const std::string& says) {
+  try {
+    call();
+    ADD_FAILURE() << "accepted, though " << says << " is wrong";
+  } catch (const Error& error) {
+    const std::string message = error.what();
+    EXPECT_EQ(error.fault(), Fault::input) << message;
+    EXPECT_NE(message.find(says), std::string::npos) << message;
+    EXPECT_EQ(message.find('\n'), std::string::npos) << message;
+  }
+}
+
+TEST(MapOptions, OutOfRangeAreRefused) {
+  Device device = Device::open();
+  const auto refuse = [&](const MapOptions& options, const std::string& says) {
+    expect_refused([&] { const MapBuilder builder(device, options); }, says);
+  };
+  for (const double length : {0.0, -0.5, nan, infinity}) {
+    refuse({.cell_mm = length}, "cell");
+    refuse({.sensor = {.spread_mm = length}}, "spread");
+  }
+  for (const double p : {0.0, 1.0, -0.5, 2.0, nan}) {
+    refuse({.sensor = {.peak = p}}, "peak");
+    refuse({.sensor = {.prior = p}}, "prior");
+  }
+}
+
+TEST(MapOptions, AMapTooLargeIsRefusedBeforeItIsBuilt) {
+  Device device = Device::open();
+  Recording recording = random_recording(2, 36, 121);
+  recording.T_robot_sensor[1].translation_mm = {1e6, 1e6};
+  const auto build = [&](double cell_mm) {
+    MapBuilder builder(device, {.cell_mm = cell_mm});
+    builder.add(all_touches(recording));
+    return builder.build("made up");
+  };
+  expect_refused([&] { build(0.001); }, "use larger cells");
+  expect_refused([&] { build(10.0); }, "use larger cells");
+  EXPECT_NO_THROW(build(1000.0));
+}
+
+class HistogramInput : public testing::Test {
+ protected:
+  void refuse(const std::string& says) {
+    expect_refused([&] { const PoseHistogram histogram(device, objects, options); }, says);
+  }
+
+  Device device = Device::open();
+  std::vector<Hypothesis> objects{{random_map(5, 4, 0.5, 1.0, 122), 1.0}};
+  HistogramOptions options;
+};
+
+TEST_F(HistogramInput, WithoutObjectsIsRefused) {
+  objects.clear();
+  refuse("no objects");
+}
+
+TEST_F(HistogramInput, WithAMapThatIsNoGridIsRefused) {
+  const OccupancyGrid sound = objects[0].map;
+  objects[0].map.nx = 0;
+  refuse("'made up'");
+  objects[0].map = sound;
+  objects[0].map.log_odds.pop_back();
+  refuse("19 log odds");
+  for (const double cell_mm : {0.0, -1.0, nan, infinity}) {
+    objects[0].map = sound;
+    objects[0].map.cell_mm = cell_mm;
+    refuse("cell_mm");
+  }
+  for (const double origin_mm : {nan, infinity}) {
+    objects[0].map = sound;
+    objects[0].map.origin_mm.y = origin_mm;
+    refuse("origin_mm");
+  }
+  for (const double log_odds : {nan, infinity, -infinity}) {
+    objects[0].map = sound;
+    objects[0].map.log_odds[7] = static_cast<float>(log_odds);
+    refuse("finite");
+  }
+}
+
+TEST_F(HistogramInput, WithAWeightThatIsNotPositiveIsRefused) {
+  for (const double weight : {0.0, -1.0, nan, infinity}) {
+    objects[0].weight = weight;
+    refuse("weight");
+  }
+}
+
+TEST_F(HistogramInput, WithAGammaOrPriorOutOfRangeIsRefused) {
+  for (const double gamma : {-0.1, 1.0, nan}) {
+    options.gamma = gamma;
+    refuse("gamma");
+  }
+  options.gamma = 0.1;
+  for (const double prior : {0.0, 1.0, nan}) {
+    options.prior = prior;
+    refuse("prior");
+  }
+}
+
+TEST_F(HistogramInput, WithMapsOfDifferentPriorsIsRefusedUnlessOneIsGiven) {
+  objects.push_back({random_map(5, 4, 0.5, 1.0, 123), 1.0});
+  objects[1].map.prior = 0.3;
+  refuse("0.3");
+  options.prior = 0.25;
+  EXPECT_NO_THROW(PoseHistogram(device, objects, options));
+}
+
+TEST_F(HistogramInput, WithALatticeOutOfRangeIsRefused) {
+  options.lattice.x_mm.count = 0;
+  refuse("x_mm");
+  options.lattice = {.y_mm = {5.0, -5.0, 3}};
+  refuse("y_mm");
+  options.lattice = {.theta_rad = {0.0, nan, 3}};
+  refuse("theta_rad");
+  options.lattice = {.pivot_mm = {infinity, 0.0}};
+  refuse("pivot_mm");
+}
+
+}  // namespace
+}  // namespace palpate

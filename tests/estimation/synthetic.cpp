@@ -1,0 +1,119 @@
+#include "synthetic.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+namespace palpate {
+
+double Uniform::operator()(double lower, double upper) {
+  // SplitMix64 (Steele, Lea and Flood 2014).
+  state_ += 0x9E3779B97F4A7C15;
+  std::uint64_t z = state_;
+  z = (z ^ (z >> 30)) * 0xBF58476D1CE4E5B9;
+  z = (z ^ (z >> 27)) * 0x94D049BB133111EB;
+  z ^= z >> 31;
+  return lower + (upper - lower) * (static_cast<double>(z >> 11) * 0x1p-53);
+}
+
+Recording random_recording(std::size_t touches, std::size_t elements, std::uint64_t seed) {
+  Uniform random(seed);
+  Recording recording;
+  for (std::size_t k = 0; k < elements; ++k) {
+    recording.elements_mm.emplace_back(random(-6.0, 6.0), random(-6.0, 6.0));
+  }
+  for (std::size_t i = 0; i < touches; ++i) {
+    recording.T_robot_sensor.push_back(
+        {{random(-8.0, 8.0), random(-8.0, 8.0)}, random(-std::numbers::pi, std::numbers::pi)});
+    for (std::size_t k = 0; k < elements; ++k) {
+      // The ratio test asks for at least 0.3 * 20 = 6 kPa, the threshold for 2.
+      const double kind = k == 0 ? 0.0 : random(0.0, 3.0);
+      recording.pressure.push_back(kind < 1.0   ? random(6.1, 20.0)
+                                   : kind < 2.0 ? random(0.0, 1.8)
+                                                : 2.0);
+    }
+  }
+  return recording;
+}
+
+OccupancyGrid random_map(int nx, int ny, double cell_mm, double steepness, std::uint64_t seed) {
+  Uniform random(seed);
+  OccupancyGrid map{.label = "made up",
+                    .cell_mm = cell_mm,
+                    .origin_mm = -cell_mm * glm::dvec2(nx / 2, ny / 2),
+                    .nx = nx,
+                    .ny = ny};
+  for (int cell = 0; cell < nx * ny; ++cell) {
+    map.log_odds.push_back(static_cast<float>(random(-steepness, steepness)));
+  }
+  return map;
+}
+
+std::vector<Touch> all_touches(const Recording& recording) {
+  return recording.touches(0, recording.size());
+}
+
+Recording moved(Recording recording, const Pose& T_moved_robot) {
+  for (Pose& pose : recording.T_robot_sensor) {
+    pose = T_moved_robot * pose;
+  }
+  return recording;
+}
+
+double largest_difference(std::span<const double> a, std::span<const double> b) {
+  if (a.size() != b.size()) {
+    return std::numeric_limits<double>::infinity();
+  }
+  double most = 0.0;
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    const double difference = std::abs(a[i] - b[i]);
+    // A difference that is not a number must not pass for a small one.
+    most = difference <= most ? most : difference;
+  }
+  return most;
+}
+
+reference::Posterior reference_posterior(std::span<const Hypothesis> hypotheses,
+                                         const HistogramOptions& options,
+                                         std::span<const Touch> touches) {
+  reference::Posterior posterior{.lattice = options.lattice, .log_likelihood = {}, .weight = {}};
+  const ContactLikelihood model{.gamma = options.gamma,
+                                .prior = options.prior.value_or(hypotheses.front().map.prior)};
+  for (const Hypothesis& hypothesis : hypotheses) {
+    posterior.log_likelihood.push_back(reference::log_likelihoods(
+        touches, options.lattice, hypothesis.map, options.classifier, model));
+    posterior.weight.push_back(hypothesis.weight);
+  }
+  return posterior;
+}
+
+double likelihood_error(const PoseHistogram& histogram, const reference::Posterior& expected) {
+  double most = 0.0;
+  for (std::size_t object = 0; object < expected.weight.size(); ++object) {
+    most = std::max(most, largest_difference(histogram.log_likelihood(static_cast<int>(object)),
+                                             expected.log_likelihood[object]));
+  }
+  return most;
+}
+
+double map_error(const OccupancyGrid& map, std::span<const Touch> touches,
+                 const MapOptions& options) {
+  constexpr int around = 5;
+  OccupancyGrid wider;
+  wider.cell_mm = map.cell_mm;
+  wider.origin_mm = map.origin_mm - map.cell_mm * glm::dvec2(around);
+  wider.nx = map.nx + 2 * around;
+  wider.ny = map.ny + 2 * around;
+  std::vector<double> product;
+  for (int j = -around; j < map.ny + around; ++j) {
+    for (int i = -around; i < map.nx + around; ++i) {
+      const bool inside = i >= 0 && i < map.nx && j >= 0 && j < map.ny;
+      product.push_back(inside ? map.at(i, j) : map.prior_log_odds());
+    }
+  }
+  return largest_difference(
+      product, reference::log_odds_map(touches, wider, options.classifier, options.sensor));
+}
+
+}  // namespace palpate

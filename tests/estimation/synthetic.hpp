@@ -1,0 +1,55 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "palpate/map_builder.hpp"
+#include "palpate/pose_histogram.hpp"
+#include "palpate/touch.hpp"
+#include "reference.hpp"
+
+namespace palpate {
+
+/// Numbers spread evenly over [lower, upper), the same on every standard library.
+class Uniform {
+ public:
+  explicit Uniform(std::uint64_t seed) : state_(seed) {}
+  double operator()(double lower, double upper);
+
+ private:
+  std::uint64_t state_;
+};
+
+/// Touches of no object in particular: elements over [-6, 6]^2 mm, poses over [-8, 8]^2 mm and all
+/// angles, and as many In Contact as No Contact and Unknown elements; the first is In Contact.
+Recording random_recording(std::size_t touches, std::size_t elements, std::uint64_t seed);
+
+/// A grid about the origin whose cells have independent log odds in [-steepness, steepness]: any
+/// error of position shows.
+OccupancyGrid random_map(int nx, int ny, double cell_mm, double steepness, std::uint64_t seed);
+
+/// Every touch of a recording.
+std::vector<Touch> all_touches(const Recording& recording);
+
+/// The same touches in a robot frame moved by T_moved_robot.
+Recording moved(Recording recording, const Pose& T_moved_robot);
+
+/// Largest absolute difference, element by element; infinite where the sizes differ.
+double largest_difference(std::span<const double> a, std::span<const double> b);
+
+/// Log-likelihoods of all objects after the touches, [object][bin], from the reference.
+reference::Posterior reference_posterior(std::span<const Hypothesis> hypotheses,
+                                         const HistogramOptions& options,
+                                         std::span<const Touch> touches);
+
+/// Largest difference in nats between the product's and the reference's bins of any object.
+double likelihood_error(const PoseHistogram& histogram, const reference::Posterior& expected);
+
+/// Largest difference in nats between a map and the reference, also over the cells around it, which
+/// hold the prior.
+double map_error(const OccupancyGrid& map, std::span<const Touch> touches,
+                 const MapOptions& options);
+
+}  // namespace palpate

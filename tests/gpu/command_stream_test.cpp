@@ -1,0 +1,200 @@
+#include "command_stream.hpp"
+
+#include <chrono>
+#include <functional>
+#include <string>
+
+#include <gtest/gtest.h>
+
+#include "palpate/error.hpp"
+#include "scale_and_add_kernel.hpp"
+
+namespace palpate::gpu {
+namespace {
+
+using Words = std::vector<std::uint32_t>;
+
+Buffer words_buffer(Context& context, std::size_t n) {
+  return {context, n * sizeof(std::uint32_t), Memory::device, "a test"};
+}
+
+TEST(CommandStream, EveryCommandSeesTheOnesBefore) {
+  Context context("");
+  CommandStream stream(context);
+  const ScaleAndAdd triple(context, 3);
+  const Words first = pattern<std::uint32_t>(1000);
+  const Words second = pattern<std::uint32_t>(500);
+  const Buffer a = words_buffer(context, 1000);
+  const Buffer b = words_buffer(context, 1000);
+  Words early(1000);
+  Words late(1000);
+  stream.upload(a, std::span(first));
+  triple.dispatch(stream, a, b, 1);
+  stream.download(b, std::span(early));
+  stream.upload(a, std::span(second), 500 * sizeof(std::uint32_t));
+  triple.dispatch(stream, a, b, 2);
+  triple.dispatch(stream, b, a, 5);
+  stream.download(a, std::span(late));
+  stream.run();
+  for (std::size_t i = 0; i < 1000; ++i) {
+    ASSERT_EQ(early[i], 3 * first[i] + 1) << i;
+    const std::uint32_t source = i < 500 ? first[i] : second[i - 500];
+    ASSERT_EQ(late[i], 3 * (3 * source + 2) + 5) << i;
+  }
+}
+
+TEST(CommandStream, ALongChainOfDispatchesTakesSeveralDescriptorPools) {
+  Context context("");
+  CommandStream stream(context);
+  const ScaleAndAdd copy(context, 1);
+  const Buffer a = words_buffer(context, 65);
+  const Buffer b = words_buffer(context, 65);
+  for (const int repetition : {0, 1}) {
+    stream.fill(a, 7);
+    for (int i = 0; i < 100; ++i) {
+      copy.dispatch(stream, a, b, 1);
+      copy.dispatch(stream, b, a, 1);
+    }
+    Words words(65);
+    stream.download(a, std::span(words));
+    stream.run();
+    EXPECT_EQ(words, Words(65, 207)) << "repetition " << repetition;
+  }
+}
+
+TEST(CommandStream, RunningNothingIsAllowed) {
+  Context context("");
+  CommandStream stream(context);
+  stream.run();
+  stream.run();
+}
+
+TEST(CommandStream, DeviceTimeIsPartOfTheWallTime) {
+  Context context("");
+  CommandStream stream(context);
+  const ScaleAndAdd triple(context, 3);
+  const Buffer a = words_buffer(context, 1 << 20);
+  const Buffer b = words_buffer(context, 1 << 20);
+  stream.fill(a, 1);
+  const auto start = std::chrono::steady_clock::now();
+  for (int i = 0; i < 20; ++i) {
+    triple.dispatch(stream, a, b, 1);
+  }
+  stream.run();
+  const std::chrono::duration<double> wall = std::chrono::steady_clock::now() - start;
+  // 20 million words written take any device more than a microsecond.
+  EXPECT_GT(stream.device_seconds(), 1e-6);
+  // The device's clock may run a little faster than the host's.
+  EXPECT_LT(stream.device_seconds(), 1.01 * wall.count());
+}
+
+TEST(CommandStream, AnyValidationMessageFailsTheRun) {
+  Context context("");
+  CommandStream stream(context);
+  const Buffer a = words_buffer(context, 3);
+  stream.fill(a, 1);
+  vkResetFences(context.device(), 0, nullptr);  // needs at least one: wrong, but harmless
+  try {
+    stream.run();
+    FAIL() << "Vulkan's validation layer is off: set PALPATE_VALIDATION=1";
+  } catch (const Error& error) {
+    EXPECT_NE(std::string(error.what()).find("vkResetFences"), std::string::npos) << error.what();
+  }
+}
+
+/// Commands that a stream must refuse, and what its message has to say.
+class Refusal : public testing::Test {
+ protected:
+  void expect_refused(const std::function<void()>& command, const std::string& says) {
+    // What was recorded before goes with it, even a command on a buffer that is gone by then.
+    Words never(8, 42);
+    {
+      const Buffer gone = words_buffer(context, 8);
+      stream.fill(gone, 1);
+      stream.download(gone, std::span(never));
+      try {
+        command();
+        ADD_FAILURE() << "accepted";
+      } catch (const Error& error) {
+        EXPECT_EQ(error.fault(), Fault::system);
+        EXPECT_NE(std::string(error.what()).find(says), std::string::npos) << error.what();
+      }
+    }
+    stream.run();
+    EXPECT_EQ(never, Words(8, 42));
+
+    Words words(8);
+    stream.fill(a, 10);
+    triple.dispatch(stream, a, b, 1);
+    stream.download(b, std::span(words));
+    stream.run();
+    EXPECT_EQ(words, Words(8, 31)) << "the stream is unusable afterwards";
+  }
+
+  Context context{""};
+  CommandStream stream{context};
+  ScaleAndAdd triple{context, 3};
+  Buffer a = words_buffer(context, 8);
+  Buffer b = words_buffer(context, 8);
+};
+
+TEST_F(Refusal, OfABindingAboveTheDevicesLimit) {
+  Limits small = context.limits();
+  small.storage_range = 1024;
+  context.lower_limits(small);
+  const Buffer large = words_buffer(context, 257);
+  expect_refused([&] { triple.dispatch(stream, large, b, 1); }, "binding 0 of 1028 B");
+  // A part of it fits.
+  Words words(8);
+  stream.fill(large, 2);
+  stream.dispatch(triple.kernel(), std::array{Binding{&large, 0, 1024}, Binding{&b}},
+                  ScaleAndAdd::Push{8, 0}, {1, 1, 1});
+  stream.download(b, std::span(words));
+  stream.run();
+  EXPECT_EQ(words, Words(8, 6));
+}
+
+TEST_F(Refusal, OfTooManyWorkgroups) {
+  const auto& most = context.limits().group_count;
+  for (const std::size_t dimension : {0U, 1U, 2U}) {
+    if (most[dimension] == ~0U) {
+      continue;  // no number of workgroups exceeds it
+    }
+    std::array<std::uint32_t, 3> groups{1, 1, 1};
+    groups[dimension] = most[dimension] + 1;
+    expect_refused(
+        [&] {
+          stream.dispatch(triple.kernel(), std::array{Binding{&a}, Binding{&b}},
+                          ScaleAndAdd::Push{8, 0}, groups);
+        },
+        "workgroups");
+  }
+}
+
+TEST_F(Refusal, OfBuffersAndConstantsThatTheKernelDoesNotTake) {
+  expect_refused(
+      [&] {
+        stream.dispatch(triple.kernel(), std::array{Binding{&a}}, ScaleAndAdd::Push{8, 0},
+                        {1, 1, 1});
+      },
+      "scale_and_add: 1 buffers");
+  expect_refused(
+      [&] {
+        stream.dispatch(triple.kernel(), std::array{Binding{&a}, Binding{&b}}, std::uint32_t{8},
+                        {1, 1, 1});
+      },
+      "4 B of constants");
+}
+
+TEST_F(Refusal, OfATransferThatNoStagingMemoryHolds) {
+  Limits small = context.limits();
+  small.allocation = 1000;
+  const Words words(251);
+  const Buffer large = words_buffer(context, 251);
+  context.lower_limits(small);
+  CommandStream fresh(context);
+  EXPECT_THROW(fresh.upload(large, std::span(words)), Error);
+}
+
+}  // namespace
+}  // namespace palpate::gpu

@@ -1,0 +1,103 @@
+#include "palpate/device.hpp"
+
+#include <algorithm>
+#include <cctype>
+#include <cstdlib>
+#include <utility>
+
+#include <gtest/gtest.h>
+
+#include "context.hpp"
+#include "palpate/error.hpp"
+
+namespace palpate {
+namespace {
+
+TEST(Device, ListTellsWhichOneOpens) {
+  const std::vector<DeviceInfo> infos = Device::list();
+  ASSERT_FALSE(infos.empty()) << "no Vulkan device: install mesa-vulkan-drivers";
+  const auto chosen = [](const DeviceInfo& info) { return info.chosen; };
+  ASSERT_EQ(std::count_if(infos.begin(), infos.end(), chosen), 1);
+  EXPECT_EQ(std::find_if(infos.begin(), infos.end(), chosen)->name, Device::open().name());
+  for (std::size_t i = 0; i < infos.size(); ++i) {
+    EXPECT_EQ(infos[i].index, static_cast<int>(i));
+    EXPECT_FALSE(infos[i].reason.empty());
+    EXPECT_EQ(infos[i].api.substr(0, 2), "1.");
+    EXPECT_GT(infos[i].memory_gib, 0.0);
+    EXPECT_TRUE(infos[i].usable || !infos[i].chosen);
+  }
+}
+
+TEST(Device, OpensByIndexAndByName) {
+  for (const DeviceInfo& info : Device::list()) {
+    if (!info.usable) {
+      continue;
+    }
+    EXPECT_EQ(Device::open(std::to_string(info.index)).name(), info.name);
+    std::string name = info.name;
+    std::transform(name.begin(), name.end(), name.begin(),
+                   [](unsigned char c) { return static_cast<char>(std::toupper(c)); });
+    EXPECT_EQ(Device::open(name).name(), info.name);
+  }
+}
+
+TEST(Device, OneThatDoesNotExistIsRefusedNamingThoseThatDo) {
+  for (const char* wish : {"no such device", "99"}) {
+    const std::vector<DeviceInfo> infos = Device::list(wish);
+    try {
+      Device::open(wish);
+      FAIL() << wish << " was opened";
+    } catch (const Error& error) {
+      EXPECT_EQ(error.fault(), Fault::input);
+      const std::string message = error.what();
+      EXPECT_NE(message.find(wish), std::string::npos) << message;
+      for (const DeviceInfo& info : infos) {
+        EXPECT_FALSE(info.chosen);
+        EXPECT_NE(message.find(info.name), std::string::npos) << message;
+      }
+    }
+  }
+}
+
+TEST(Device, AMachineWithoutADriverSaysSo) {
+  setenv("VK_DRIVER_FILES", "/nonexistent.json", 1);
+  setenv("VK_ICD_FILENAMES", "/nonexistent.json", 1);  // its name in older loaders
+  try {
+    Device::open();
+    ADD_FAILURE() << "opened a device without a driver";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.fault(), Fault::system);
+    EXPECT_NE(std::string(error.what()).find("install"), std::string::npos) << error.what();
+  }
+  unsetenv("VK_DRIVER_FILES");
+  unsetenv("VK_ICD_FILENAMES");
+}
+
+TEST(Device, Moves) {
+  Device first = Device::open();
+  const std::string name = first.name();
+  gpu::Context* const context = &first.context();
+  Device second(std::move(first));
+  EXPECT_EQ(second.name(), name);
+  EXPECT_EQ(&second.context(), context);
+}
+
+TEST(Context, HasTheLimitsThatVulkanGuarantees) {
+  Device device = Device::open();
+  const gpu::Limits& limits = device.context().limits();
+  EXPECT_GE(limits.storage_range, 1U << 27);
+  EXPECT_GE(limits.allocation, 1U << 30);
+  EXPECT_GE(limits.push_bytes, 128U);
+  EXPECT_GT(limits.memory, 0U);
+  for (const std::uint32_t groups : limits.group_count) {
+    EXPECT_GE(groups, 65535U);
+  }
+}
+
+TEST(Context, AMemoryTypeThatDoesNotExistIsAnError) {
+  Device device = Device::open();
+  EXPECT_THROW(device.context().memory_type(0, 0, 0), Error);
+}
+
+}  // namespace
+}  // namespace palpate

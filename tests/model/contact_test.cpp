@@ -1,0 +1,102 @@
+#include "palpate/contact.hpp"
+
+#include <limits>
+#include <random>
+
+#include <gtest/gtest.h>
+
+#include "reference.hpp"
+
+namespace palpate {
+namespace {
+
+constexpr Reading in = Reading::in_contact;
+constexpr Reading no = Reading::no_contact;
+constexpr Reading unknown = Reading::unknown;
+
+std::vector<Reading> classify(const std::vector<double>& pressure,
+                              const std::vector<std::uint8_t>& valid = {},
+                              const ContactClassifier& classifier = {}) {
+  const std::vector<glm::dvec2> elements(pressure.size());
+  return classifier.classify(
+      {.T_robot_sensor = {}, .elements_mm = elements, .pressure = pressure, .valid = valid});
+}
+
+using Readings = std::vector<Reading>;
+
+TEST(ContactClassifier, NeedsBothTestsToAgree) {
+  // Threshold 2, ratio 0.3, largest 20: the second bound is 6.
+  EXPECT_EQ(classify({20.0, 7.0, 5.0, 1.0}), (Readings{in, in, unknown, no}));
+  // Largest 4: the second bound is 1.2.
+  EXPECT_EQ(classify({4.0, 2.5, 1.5, 1.0}), (Readings{in, in, unknown, no}));
+}
+
+TEST(ContactClassifier, EqualityIsUnknown) {
+  const ContactClassifier half{.threshold = 2.0, .ratio = 0.5};
+  EXPECT_EQ(classify({8.0, 2.0}, {}, half), (Readings{in, unknown})) << "threshold";
+  EXPECT_EQ(classify({8.0, 4.0}, {}, half), (Readings{in, unknown})) << "ratio, above the other";
+  EXPECT_EQ(classify({3.0, 1.5}, {}, half), (Readings{in, unknown})) << "ratio, below the other";
+}
+
+TEST(ContactClassifier, AllZeroIsUnknown) {
+  // Nothing is below 0.3 times a largest pressure of 0.
+  EXPECT_EQ(classify({0.0, 0.0, 0.0}), (Readings{unknown, unknown, unknown}));
+}
+
+TEST(ContactClassifier, EqualPressuresBelowTheThresholdAreUnknown) {
+  EXPECT_EQ(classify({1.0, 1.0}), (Readings{unknown, unknown}));
+}
+
+TEST(ContactClassifier, DeadElementsAreUnknownAndDoNotSetTheMaximum) {
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_EQ(classify({1e9, 5.0, 1.0}, {0, 1, 1}), (Readings{unknown, in, no}));
+  EXPECT_EQ(classify({nan, 5.0, 1.0}, {0, 1, 1}), (Readings{unknown, in, no}));
+  EXPECT_EQ(classify({5.0, 1.0}, {0, 0}), (Readings{unknown, unknown}));
+}
+
+TEST(ContactClassifier, ANonNumberIsUnknownAndChangesNoOther) {
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_EQ(classify({nan, 5.0, 1.0}), (Readings{unknown, in, no}));
+  EXPECT_EQ(classify({5.0, nan, 1.0}), (Readings{in, unknown, no}));
+}
+
+TEST(ContactClassifier, EmptyArrayHasNoReadings) { EXPECT_TRUE(classify({}).empty()); }
+
+TEST(ContactClassifier, AgreesWithTheReference) {
+  std::mt19937_64 random(11);
+  // Halves, so that many pressures equal a bound.
+  std::uniform_int_distribution<int> halves(0, 12);
+  std::bernoulli_distribution alive(0.9);
+  const ContactClassifier classifier{.threshold = 2.0, .ratio = 0.5};
+  for (int trial = 0; trial < 200; ++trial) {
+    std::vector<double> pressure(9);
+    std::vector<std::uint8_t> valid(9);
+    for (std::size_t i = 0; i < pressure.size(); ++i) {
+      pressure[i] = halves(random) / 2.0;
+      valid[i] = alive(random) ? 1 : 0;
+    }
+    const std::vector<glm::dvec2> elements(9);
+    const Touch touch{
+        .T_robot_sensor = {}, .elements_mm = elements, .pressure = pressure, .valid = valid};
+    EXPECT_EQ(classifier.classify(touch), reference::classify(touch, classifier));
+  }
+}
+
+TEST(KnownReadings, AreInTheRobotFrameWithoutTheUnknown) {
+  const std::vector<glm::dvec2> elements{{1.0, 0.0}, {2.0, 0.0}, {3.0, 0.0}};
+  const std::vector<double> pressure{10.0, 2.5, 0.0};
+  const Touch touch{.T_robot_sensor = {{100.0, 200.0}, 1.5707963267948966},
+                    .elements_mm = elements,
+                    .pressure = pressure};
+  const std::vector<ElementReading> known = known_readings(touch, {});
+  ASSERT_EQ(known.size(), 2U);
+  // A quarter turn puts the sensor's x axis along the robot's y; 1e-12 mm is float64 rounding.
+  EXPECT_EQ(known[0].reading, in);
+  EXPECT_NEAR(known[0].position_mm.x, 100.0, 1e-12);
+  EXPECT_NEAR(known[0].position_mm.y, 201.0, 1e-12);
+  EXPECT_EQ(known[1].reading, no);
+  EXPECT_NEAR(known[1].position_mm.y, 203.0, 1e-12);
+}
+
+}  // namespace
+}  // namespace palpate

@@ -1,0 +1,104 @@
+#include "palpate/lattice.hpp"
+
+#include <limits>
+#include <numbers>
+#include <string>
+
+#include <gtest/gtest.h>
+
+#include "palpate/error.hpp"
+#include "reference.hpp"
+
+namespace palpate {
+namespace {
+
+// Float64 rounding of coordinates below 1e4 mm.
+constexpr double rounding = 1e-11;
+
+TEST(Axis, CentresStandInTheMiddleOfEqualBins) {
+  const Axis axis{-10.0, 10.0, 5};
+  EXPECT_EQ(axis.step(), 4.0);
+  EXPECT_EQ(axis.centre(0), -8.0);
+  EXPECT_EQ(axis.centre(2), 0.0);
+  EXPECT_EQ(axis.centre(4), 8.0);
+}
+
+TEST(PoseLattice, OrderIsThetaThenYThenXWithXFastest) {
+  const PoseLattice lattice{.x_mm = {0.0, 3.0, 3}, .y_mm = {0.0, 2.0, 2}, .theta_rad = {0, 4, 4}};
+  EXPECT_EQ(lattice.plane(), 6);
+  EXPECT_EQ(lattice.bins(), 24);
+  std::int64_t bin = 0;
+  for (int t = 0; t < 4; ++t) {
+    for (int j = 0; j < 2; ++j) {
+      for (int i = 0; i < 3; ++i, ++bin) {
+        const Pose pose = lattice.T_object_robot(bin);
+        EXPECT_EQ(pose.translation_mm, glm::dvec2(i + 0.5, j + 0.5));
+        EXPECT_EQ(pose.theta_rad, t + 0.5);
+      }
+    }
+  }
+}
+
+TEST(PoseLattice, PivotHasTheLatticesCoordinatesInTheObjectFrame) {
+  const PoseLattice lattice{.x_mm = {-5.0, 5.0, 4},
+                            .y_mm = {-3.0, 9.0, 3},
+                            .theta_rad = {0.0, 6.0, 5},
+                            .pivot_mm = {700.0, -400.0}};
+  for (std::int64_t bin = 0; bin < lattice.bins(); ++bin) {
+    const Pose pose = lattice.T_object_robot(bin);
+    const glm::dvec2 at = pose * lattice.pivot_mm;
+    EXPECT_NEAR(at.x, lattice.x_mm.centre(static_cast<int>(bin % 4)), rounding);
+    EXPECT_NEAR(at.y, lattice.y_mm.centre(static_cast<int>(bin / 4 % 3)), rounding);
+    // p_o = R(theta) (p_r - pivot) + (x, y) at another point.
+    const glm::dvec2 p_robot{690.0, -377.0};
+    const glm::dvec2 p_object = at + rotate(pose.theta_rad, p_robot - lattice.pivot_mm);
+    EXPECT_NEAR((pose * p_robot).x, p_object.x, rounding);
+    EXPECT_NEAR((pose * p_robot).y, p_object.y, rounding);
+    const Pose expected = reference::bin_pose(lattice, bin);
+    EXPECT_NEAR(pose.translation_mm.x, expected.translation_mm.x, rounding);
+    EXPECT_NEAR(pose.translation_mm.y, expected.translation_mm.y, rounding);
+    EXPECT_NEAR(pose.theta_rad, expected.theta_rad, rounding);
+  }
+}
+
+TEST(PoseLattice, BinsOfAllDimensionsMayExceed32Bits) {
+  const PoseLattice lattice{
+      .x_mm = {0.0, 1.0, 100000}, .y_mm = {0.0, 1.0, 100000}, .theta_rad = {0.0, 1.0, 10}};
+  EXPECT_EQ(lattice.bins(), 100000000000);
+  EXPECT_NEAR(lattice.T_object_robot(lattice.bins() - 1).theta_rad, 0.95, rounding);
+}
+
+TEST(PoseLattice, ADimensionOfZeroExtentCostsOneBin) {
+  PoseLattice lattice{.x_mm = {3.0, 3.0, 25}, .y_mm = {-1.0, 1.0, 25}, .theta_rad = {0.5, 0.5, 16}};
+  lattice.collapse_fixed();
+  EXPECT_EQ(lattice.x_mm.count, 1);
+  EXPECT_EQ(lattice.y_mm.count, 25);
+  EXPECT_EQ(lattice.theta_rad.count, 1);
+  EXPECT_EQ(lattice.T_object_robot(0).translation_mm.x, 3.0);
+  EXPECT_EQ(lattice.T_object_robot(0).theta_rad, 0.5);
+}
+
+void expect_refused(const PoseLattice& lattice, const std::string& field) {
+  try {
+    lattice.validate();
+    ADD_FAILURE() << field << " was accepted";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.fault(), Fault::input);
+    EXPECT_NE(std::string(error.what()).find(field), std::string::npos) << error.what();
+  }
+}
+
+TEST(PoseLattice, RefusesWhatIsNoLattice) {
+  constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+  constexpr double infinity = std::numeric_limits<double>::infinity();
+  PoseLattice().validate();
+  expect_refused({.x_mm = {-1.0, 1.0, 0}}, "x_mm");
+  expect_refused({.y_mm = {-1.0, 1.0, -3}}, "y_mm");
+  expect_refused({.theta_rad = {1.0, 0.0, 4}}, "theta_rad");
+  expect_refused({.x_mm = {nan, 1.0, 4}}, "x_mm");
+  expect_refused({.y_mm = {0.0, infinity, 4}}, "y_mm");
+  expect_refused({.pivot_mm = {0.0, nan}}, "pivot_mm");
+}
+
+}  // namespace
+}  // namespace palpate

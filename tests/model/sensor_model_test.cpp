@@ -1,0 +1,168 @@
+#include "palpate/sensor_model.hpp"
+
+#include <cmath>
+#include <limits>
+#include <string>
+
+#include <gtest/gtest.h>
+
+#include "palpate/error.hpp"
+#include "palpate/occupancy_grid.hpp"
+#include "reference.hpp"
+
+namespace palpate {
+namespace {
+
+constexpr Reading in = Reading::in_contact;
+constexpr Reading no = Reading::no_contact;
+constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+
+TEST(LogOdds, AndProbabilityAreInverse) {
+  EXPECT_EQ(log_odds_from_probability(0.5), 0.0);
+  EXPECT_DOUBLE_EQ(log_odds_from_probability(0.2), -std::log(4.0));
+  EXPECT_EQ(probability_from_log_odds(0.0), 0.5);
+  EXPECT_EQ(probability_from_log_odds(1000.0), 1.0);
+  EXPECT_EQ(probability_from_log_odds(-1000.0), 0.0);
+  for (double p = 0.001; p < 1.0; p += 0.037) {
+    EXPECT_NEAR(probability_from_log_odds(log_odds_from_probability(p)), p, 1e-15) << "rounding";
+  }
+}
+
+TEST(InverseSensorModel, IsEquations4To6) {
+  for (const double prior : {0.05, 0.2, 0.5, 0.8}) {
+    for (const double peak : {0.1, 0.9, 0.999}) {
+      for (const double spread_mm : {0.25, 0.5, 2.0}) {
+        const InverseSensorModel model{.spread_mm = spread_mm, .peak = peak, .prior = prior};
+        // Beyond 4 spreads the reference itself loses digits of log(p / (1 - p)).
+        for (double d = 0.0; d < 4.0 * spread_mm; d += 0.1 * spread_mm) {
+          for (const Reading reading : {in, no}) {
+            EXPECT_NEAR(model.increment(reading, d), reference::increment(reading, d, model), 1e-12)
+                << "float64 rounding of logs near 10";
+          }
+        }
+      }
+    }
+  }
+}
+
+TEST(InverseSensorModel, AtTheElementsCentre) {
+  // p = 0.2 + 0.8 * 0.9 = 0.92, and 0.2 - 0.2 * 0.9 = 0.02.
+  const InverseSensorModel model{.spread_mm = 0.5, .peak = 0.9, .prior = 0.2};
+  EXPECT_NEAR(model.increment(in, 0.0), std::log(0.92 / 0.08) - std::log(0.2 / 0.8), 1e-14);
+  EXPECT_NEAR(model.increment(no, 0.0), std::log(0.02 / 0.98) - std::log(0.2 / 0.8), 1e-14);
+}
+
+TEST(InverseSensorModel, ContactAndNoContactMirrorEachOtherAboutAnEvenPrior) {
+  const InverseSensorModel even{.spread_mm = 0.5, .peak = 0.9, .prior = 0.5};
+  const InverseSensorModel low{.spread_mm = 0.5, .peak = 0.9, .prior = 0.1};
+  const InverseSensorModel high{.spread_mm = 0.5, .peak = 0.9, .prior = 0.9};
+  for (double d = 0.0; d < 3.0; d += 0.2) {
+    EXPECT_DOUBLE_EQ(even.increment(in, d), -even.increment(no, d));
+    EXPECT_NEAR(low.increment(in, d), -high.increment(no, d), 1e-14) << "rounding of 1 - prior";
+  }
+}
+
+TEST(InverseSensorModel, UnknownChangesNothing) {
+  const InverseSensorModel model;
+  EXPECT_EQ(model.increment(Reading::unknown, 0.0), 0.0);
+  EXPECT_EQ(model.increment(Reading::unknown, 1.0), 0.0);
+}
+
+TEST(InverseSensorModel, TendsToThePriorFarAway) {
+  const InverseSensorModel model;
+  double last = model.increment(in, 0.0);
+  for (double d = 0.1; d < 5.0; d += 0.1) {
+    const double here = model.increment(in, d);
+    EXPECT_LT(here, last);
+    EXPECT_GT(here, 0.0);
+    EXPECT_LT(model.increment(no, d), 0.0);
+    last = here;
+  }
+  EXPECT_EQ(model.increment(in, 1e6), 0.0);
+}
+
+TEST(InverseSensorModel, SupportRadiusKeepsTheCutSumBelowTheTolerance) {
+  for (const double prior : {0.02, 0.2, 0.5, 0.98}) {
+    for (const double peak : {1e-9, 0.3, 0.9, 0.9999}) {
+      for (const std::size_t readings : {1U, 36U, 7000U, 1000000U}) {
+        const InverseSensorModel model{.spread_mm = 0.7, .peak = peak, .prior = prior};
+        const double radius = model.support_radius_mm(readings, 5e-4);
+        const auto all = static_cast<double>(readings);
+        EXPECT_LE(all * std::abs(model.increment(in, radius)), 5e-4 * (1.0 + 1e-9));
+        EXPECT_LE(all * std::abs(model.increment(no, radius)), 5e-4 * (1.0 + 1e-9));
+        EXPECT_LE(radius, 10.0 * model.spread_mm) << "cuts off nothing worth the time";
+      }
+    }
+  }
+}
+
+TEST(InverseSensorModel, RefusesWhatIsOutOfRange) {
+  const auto expect_refused = [](const InverseSensorModel& model, const std::string& field) {
+    try {
+      model.validate();
+      ADD_FAILURE() << field << " was accepted";
+    } catch (const Error& error) {
+      EXPECT_EQ(error.fault(), Fault::input);
+      EXPECT_EQ(std::string(error.what()).find(field), 0U) << error.what();
+    }
+  };
+  InverseSensorModel().validate();
+  for (const double spread : {0.0, -1.0, nan, std::numeric_limits<double>::infinity()}) {
+    expect_refused({.spread_mm = spread}, "spread");
+  }
+  for (const double p : {0.0, 1.0, -0.1, 1.5, nan}) {
+    expect_refused({.peak = p}, "peak");
+    expect_refused({.prior = p}, "prior");
+  }
+}
+
+TEST(ContactLikelihood, IsEquation7) {
+  for (const double gamma : {0.0, 1e-6, 0.1, 0.5, 0.99}) {
+    for (const double prior : {0.02, 0.2, 0.7}) {
+      const ContactLikelihood model{.gamma = gamma, .prior = prior};
+      for (double l = -30.0; l <= 30.0; l += 0.7) {
+        const double p = 1.0 / (1.0 + std::exp(-l));
+        const double q = 1.0 / (1.0 + std::exp(l));
+        EXPECT_NEAR(model.log_likelihood(in, l), std::log(gamma * prior + (1.0 - gamma) * p), 1e-12)
+            << "float64 rounding of logs below 30";
+        EXPECT_NEAR(model.log_likelihood(no, l), std::log(gamma * prior + (1.0 - gamma) * q), 1e-12)
+            << "float64 rounding of logs below 30";
+        EXPECT_NEAR(model.log_likelihood(in, l), reference::log_likelihood(in, l, model), 1e-12)
+            << "float64 rounding of logs below 30";
+      }
+      EXPECT_EQ(model.log_likelihood(Reading::unknown, 3.0), 0.0);
+    }
+  }
+}
+
+TEST(ContactLikelihood, WithoutGammaHasNoFloor) {
+  const ContactLikelihood model{.gamma = 0.0, .prior = 0.2};
+  EXPECT_EQ(model.log_likelihood(in, -1000.0), -1000.0);
+  EXPECT_EQ(model.log_likelihood(in, 1000.0), 0.0);
+  EXPECT_EQ(model.log_likelihood(no, 1000.0), -1000.0);
+  EXPECT_EQ(model.log_likelihood(no, -1000.0), 0.0);
+  EXPECT_EQ(model.log_likelihood(in, 0.0), -std::log(2.0));
+}
+
+TEST(ContactLikelihood, WithGammaHasAFloor) {
+  const ContactLikelihood model{.gamma = 0.1, .prior = 0.2};
+  EXPECT_NEAR(model.log_likelihood(in, -1000.0), std::log(0.02), 1e-15);
+  EXPECT_NEAR(model.log_likelihood(no, 1000.0), std::log(0.02), 1e-15);
+  EXPECT_NEAR(model.log_likelihood(in, 1000.0), std::log(0.92), 1e-15);
+  // Half of 0.9 beside 0.02.
+  EXPECT_NEAR(model.log_likelihood(in, 0.0), std::log(0.47), 1e-15);
+}
+
+TEST(ContactLikelihood, RefusesWhatIsOutOfRange) {
+  ContactLikelihood().validate();
+  ContactLikelihood{.gamma = 0.0}.validate();
+  for (const double gamma : {-0.1, 1.0, 2.0, nan}) {
+    EXPECT_THROW((ContactLikelihood{.gamma = gamma}.validate()), Error) << gamma;
+  }
+  for (const double prior : {0.0, 1.0, -1.0, nan}) {
+    EXPECT_THROW((ContactLikelihood{.prior = prior}.validate()), Error) << prior;
+  }
+}
+
+}  // namespace
+}  // namespace palpate

@@ -1,0 +1,82 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include <glm/vec2.hpp>
+
+#include "palpate/contact.hpp"
+#include "palpate/lattice.hpp"
+#include "palpate/occupancy_grid.hpp"
+#include "palpate/pose.hpp"
+#include "palpate/sensor_model.hpp"
+#include "palpate/touch.hpp"
+
+/// Every equation once more, written plainly in float64 from Pezzementi, Reyda and Hager (ICRA
+/// 2011), to measure the product against. It shares the product's data types and none of its
+/// functions. Units and frames are those of the types; nothing is checked.
+namespace palpate::reference {
+
+/// p_a = R(theta) p_b + t, in mm.
+glm::dvec2 transform(const Pose& T_a_b, const glm::dvec2& p_b);
+
+/// Eq. 3: the class of every element, [e].
+std::vector<Reading> classify(const Touch& touch, const ContactClassifier& classifier);
+
+/// Eq. 4-6: log-odds increment in nats of a cell at this distance from an element's centre.
+double increment(Reading reading, double distance_mm, const InverseSensorModel& sensor);
+
+/// Eq. 4-6: log odds of every cell of a grid, [ny, nx], of which only the geometry is read: the
+/// prior and the increments of all elements, with no Gaussian cut off. The object frame is the
+/// touches' robot frame.
+std::vector<double> log_odds_map(std::span<const Touch> touches, const OccupancyGrid& grid,
+                                 const ContactClassifier& classifier,
+                                 const InverseSensorModel& sensor);
+
+/// Bilinear interpolation of the map's log odds; every cell beyond the map holds the prior's.
+double interpolate(const OccupancyGrid& map, double prior, const glm::dvec2& p_object_mm);
+
+/// Eq. 7 for one element, in nats.
+double log_likelihood(Reading reading, double log_odds, const ContactLikelihood& model);
+
+/// Eq. 7 for all elements of a touch on an object at a pose, in nats.
+double log_likelihood(const Touch& touch, const Pose& T_object_robot, const OccupancyGrid& map,
+                      const ContactClassifier& classifier, const ContactLikelihood& model);
+
+/// The pose of a bin: p_o = R(theta) (p_r - pivot) + (x, y) at the bin's centroid.
+Pose bin_pose(const PoseLattice& lattice, std::int64_t bin);
+
+/// Eq. 13 in logs: the touches' log-likelihood at every bin, [theta, y, x], in nats.
+std::vector<double> log_likelihoods(std::span<const Touch> touches, const PoseLattice& lattice,
+                                    const OccupancyGrid& map, const ContactClassifier& classifier,
+                                    const ContactLikelihood& model);
+
+/// The belief over objects and bins: log-likelihoods [object][bin] and prior weights [object].
+struct Posterior {
+  PoseLattice lattice;
+  std::vector<std::vector<double>> log_likelihood;
+  std::vector<double> weight;
+};
+
+/// Eq. 14: probability of every object; sums to 1.
+std::vector<double> identity(const Posterior& posterior);
+
+/// Eq. 15-16: object and bin of the largest probability, the first among equals.
+struct Mode {
+  int object = 0;
+  std::int64_t bin = 0;
+};
+Mode mode(const Posterior& posterior);
+
+/// Probability of every (x, y) of one object, [ny, nx].
+std::vector<double> marginal_xy(const Posterior& posterior, int object);
+/// Probability of every theta of one object, [ntheta].
+std::vector<double> marginal_theta(const Posterior& posterior, int object);
+
+/// Eq. 17-20 of Chirikjian and Zhou 1998: root mean squared displacement in mm of the map's
+/// occupied cells between two poses, with the turn wrapped by the map's symmetry.
+double pose_error_mm(const OccupancyGrid& map, const Pose& T_object_robot_estimate,
+                     const Pose& T_object_robot_truth);
+
+}  // namespace palpate::reference
