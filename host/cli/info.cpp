@@ -15,14 +15,27 @@ namespace palpate::cli {
 
 namespace {
 
+/// What the elements that are alive read; a dead one's pressure may be anything.
+std::vector<double> live_pressures(const Recording& r) {
+  std::vector<double> pressures;
+  for (std::size_t k = 0; k < r.pressure.size(); ++k) {
+    if (r.valid.empty() || r.valid[k % r.valid.size()] != 0) {
+      pressures.push_back(r.pressure[k]);
+    }
+  }
+  return pressures;
+}
+
 void print_recording(const std::string& path) {
   const Recording r = read_recording(path);
-  const auto [least, most] = std::minmax_element(r.pressure.begin(), r.pressure.end());
   fmt::print("{}: recording of {}\n", path, r.object.empty() ? "an unknown object" : r.object);
   fmt::print("  {}           {}\n", r.rows, r.size());
   fmt::print("  elements          {}{}\n", r.elements(),
              r.elements_mm.size() == r.elements() ? "" : ", positions change per touch");
-  fmt::print("  pressure          {:.3g} to {:.3g} {}\n", *least, *most, r.pressure_unit);
+  if (const std::vector<double> pressures = live_pressures(r); !pressures.empty()) {
+    const auto [least, most] = std::minmax_element(pressures.begin(), pressures.end());
+    fmt::print("  pressure          {:.3g} to {:.3g} {}\n", *least, *most, r.pressure_unit);
+  }
   if (!r.valid.empty()) {
     fmt::print("  dead readings     {} of {}\n", std::count(r.valid.begin(), r.valid.end(), 0),
                r.valid.size());

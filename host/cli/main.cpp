@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cstdio>
 #include <exception>
 #include <new>
@@ -14,17 +15,27 @@ namespace {
 constexpr int wrong_input = 2;
 constexpr int failed = 1;
 
-int complain(int status, const std::string& message) {
-  fmt::print(stderr, "palpate: {}\n", message);
+/// Prints one line, whatever a path or a library's message holds.
+int complain(int status, std::string message) {
+  std::replace_if(
+      message.begin(), message.end(), [](unsigned char c) { return c < ' '; }, ' ');
+  // Not fmt::print, which throws where standard error cannot be written.
+  std::fprintf(stderr, "palpate: %s\n", message.c_str());
   return status;
 }
 
-/// CLI11's messages may span lines; ours are one.
-std::string first_line(const std::string& text) { return text.substr(0, text.find('\n')); }
+/// CLI11 takes an empty value for a missing one, and so a script's unset variable for a default.
+void refuse_empty_values(CLI::App& app) {
+  for (CLI::App* command : app.get_subcommands({})) {
+    for (CLI::Option* option : command->get_options()) {
+      option->check([](const std::string& value) {
+        return value.empty() ? "empty; give a value or leave it out" : "";
+      });
+    }
+  }
+}
 
-}  // namespace
-
-int main(int argc, char** argv) {
+int run(int argc, char** argv) {
   CLI::App app("Palpate recognises and locates objects by touch, on Vulkan compute.", "palpate");
   app.set_version_flag("--version", PALPATE_VERSION);
   app.require_subcommand(1);
@@ -34,21 +45,35 @@ int main(int argc, char** argv) {
   palpate::cli::add_map(app);
   palpate::cli::add_recognize(app);
   palpate::cli::add_info(app);
-
+  refuse_empty_values(app);
   try {
     app.parse(argc, argv);
-    if (std::fflush(stdout) != 0) {
-      return complain(failed, "standard output: cannot be written; is the disk full?");
-    }
-    return 0;
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() == 0) {
       return app.exit(error);  // --help, --version
     }
     const auto commands = app.get_subcommands();
+    const auto unexpected = app.remaining();
+    if (commands.empty() && !unexpected.empty()) {
+      // CLI11 would only say that a command is missing.
+      return complain(wrong_input,
+                      fmt::format("'{}' is not a command; see palpate --help", unexpected.front()));
+    }
     return complain(wrong_input,
-                    fmt::format("{}; see palpate {}--help", first_line(error.what()),
+                    fmt::format("{}; see palpate {}--help", error.what(),
                                 commands.empty() ? "" : commands.front()->get_name() + " "));
+  }
+  if (std::fflush(stdout) != 0) {
+    return complain(failed, "standard output: cannot be written; is the disk full?");
+  }
+  return 0;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  try {
+    return run(argc, argv);
   } catch (const palpate::Error& error) {
     return complain(error.fault() == palpate::Fault::input ? wrong_input : failed, error.what());
   } catch (const std::bad_alloc&) {

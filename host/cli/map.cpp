@@ -9,8 +9,8 @@
 
 #include <fmt/format.h>
 
-#include "atomic_file.hpp"
 #include "figures.hpp"
+#include "input_file.hpp"
 #include "options.hpp"
 #include "palpate/error.hpp"
 #include "palpate/files.hpp"
@@ -76,6 +76,7 @@ std::vector<ObjectTouches> group_by_label(const std::vector<Recording>& recordin
     }
   }
   std::vector<ObjectTouches> objects;
+  objects.reserve(groups.size());
   for (auto& [label, touches] : groups) {
     objects.push_back({label, std::move(touches)});
   }
@@ -110,11 +111,11 @@ double parse_prior(const std::string& text) {
 
 void build_maps(const Options& options) {
   const std::filesystem::path output = options.output;
-  const bool folder = options.output.ends_with('/') || std::filesystem::is_directory(output);
-  if (options.symmetry < 0) {
-    throw Error(
-        Fault::input,
-        fmt::format("--symmetry {}: give n for n-fold, or 0 for full symmetry", options.symmetry));
+  std::error_code ignored;
+  const bool folder =
+      options.output.ends_with('/') || std::filesystem::is_directory(output, ignored);
+  if (!is_printable_utf8(options.label)) {
+    throw Error(Fault::input, "--label: give printable text, in UTF-8");
   }
   const bool estimate = options.prior == "auto";
   const double given_prior = estimate ? 0.0 : parse_prior(options.prior);
@@ -123,17 +124,17 @@ void build_maps(const Options& options) {
   const std::vector<ObjectTouches> objects = group_by_label(recordings, options, !folder);
 
   if (!folder) {
-    require_folder_of(output);
+    require_writable(output);
   }
-  std::optional<AtomicFile> png;
   if (!options.png.empty()) {
-    png.emplace(options.png);
+    require_writable(options.png);
   }
 
   Device device = Device::open(options.device);
   model.sensor.prior = given_prior;
   if (estimate) {
     std::vector<std::vector<Touch>> touches;
+    touches.reserve(objects.size());
     for (const ObjectTouches& object : objects) {
       touches.push_back(object.touches);
     }
@@ -171,9 +172,8 @@ void build_maps(const Options& options) {
       fmt::print("{}\n", yaml.string());
     }
   }
-  if (png) {
-    png->write(draw_maps(maps));
-    png->commit();
+  if (!options.png.empty()) {
+    write_file(options.png, draw_maps(maps));
     fmt::print("{}\n", options.png);
   }
 }
@@ -217,6 +217,7 @@ void add_map(CLI::App& app) {
   command
       ->add_option("--symmetry", options->symmetry,
                    "The object's n-fold rotational symmetry; 0 = full")
+      ->check(require_whole_number)
       ->capture_default_str();
   command->add_option("--label", options->label,
                       "Label of the map [default: the recording's object]");

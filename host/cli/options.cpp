@@ -8,6 +8,7 @@
 
 #include <fmt/format.h>
 
+#include "atomic_file.hpp"
 #include "palpate/error.hpp"
 
 namespace palpate::cli {
@@ -99,13 +100,22 @@ double require_above(const std::string& flag, double value, double least, bool i
   return value;
 }
 
-void require_folder_of(const std::filesystem::path& file) {
-  const std::filesystem::path folder = file.has_parent_path() ? file.parent_path() : ".";
-  std::error_code error;
-  if (!std::filesystem::is_directory(folder, error)) {
-    throw Error(Fault::input, fmt::format("{}: the folder '{}' does not exist; make it first",
-                                          file.string(), folder.string()));
-  }
+std::string require_whole_number(const std::string& text) {
+  std::uint64_t number = 0;
+  const char* const end = text.data() + text.size();
+  const auto [rest, error] = std::from_chars(text.data(), end, number);
+  const bool octal = text.size() > 1 && text.front() == '0';
+  return error == std::errc{} && rest == end && !octal
+             ? ""
+             : fmt::format("{}: give a whole number, such as 10", text);
+}
+
+void require_writable(const std::filesystem::path& file) { const AtomicFile probe(file); }
+
+void write_file(const std::filesystem::path& file, std::string_view bytes) {
+  AtomicFile target(file);
+  target.write(bytes);
+  target.commit();
 }
 
 void make_folder(const std::filesystem::path& folder) {

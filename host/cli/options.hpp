@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <string_view>
 
 #include "palpate/pose.hpp"
 
@@ -32,8 +33,14 @@ Frames parse_frames(const std::string& flag, const std::string& text);
 /// Throws Error unless the value is finite and above `least` (or equal to it, if `inclusive`).
 double require_above(const std::string& flag, double value, double least, bool inclusive = false);
 
+/// What is wrong with a whole number, or nothing. CLI11 alone reads 010 as octal and, where it
+/// wants no sign, wraps -1 around and takes the largest number for one that is larger.
+std::string require_whole_number(const std::string& text);
+
 /// Throws Error unless a file can be made there: before hours of work, not after.
-void require_folder_of(const std::filesystem::path& file);
+void require_writable(const std::filesystem::path& file);
+/// Writes a file that appears whole or not at all. Throws Error.
+void write_file(const std::filesystem::path& file, std::string_view bytes);
 /// Makes the folder where it is missing. Throws Error where that fails.
 void make_folder(const std::filesystem::path& folder);
 

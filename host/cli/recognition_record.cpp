@@ -102,7 +102,9 @@ Step judge(const Estimate& estimate, const Unknown& unknown, const RecognitionTa
     step.right = task.labels[step.best] == truth;
   }
   const OccupancyGrid& map = task.hypotheses[step.mode.object].map;
-  if (recording.truth && map.label == truth) {
+  const bool has_body =
+      std::any_of(map.log_odds.begin(), map.log_odds.end(), [](float l) { return l > 0.0F; });
+  if (recording.truth && map.label == truth && has_body) {
     step.error_mm = pose_error_mm(body_of(map), map.symmetry, step.mode.T_object_robot,
                                   recording.truth->T_object_robot);
   }

@@ -17,11 +17,17 @@ namespace {
 
 /// The map files that an argument of --maps stands for: itself, or the maps of a folder.
 std::vector<std::filesystem::path> map_files(const std::filesystem::path& argument) {
-  if (!std::filesystem::is_directory(argument)) {
+  std::error_code error;
+  if (!std::filesystem::is_directory(argument, error)) {
     return {argument};
   }
   std::vector<std::filesystem::path> files;
-  for (const auto& entry : std::filesystem::directory_iterator(argument)) {
+  const std::filesystem::directory_iterator entries(argument, error);
+  if (error) {
+    throw Error(Fault::input, fmt::format("{}: cannot be read: {}; check its permissions",
+                                          argument.string(), error.message()));
+  }
+  for (const auto& entry : entries) {
     if (entry.path().extension() == ".h5" && read_format(entry.path()) == "palpate.map") {
       files.push_back(entry.path());
     }

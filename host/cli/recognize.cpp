@@ -9,7 +9,6 @@
 
 #include <fmt/format.h>
 
-#include "atomic_file.hpp"
 #include "figures.hpp"
 #include "palpate/error.hpp"
 #include "palpate/files.hpp"
@@ -21,42 +20,36 @@ namespace palpate::cli {
 
 namespace {
 
-/// Where results go. Made before the work, so that a wrong path is found first.
-struct Outputs {
-  explicit Outputs(const RecognizeOptions& options, const RecognitionTask& task) {
-    if (!options.posterior.empty()) {
-      if (task.unknowns.size() != 1) {
+std::string png_name(const Unknown& unknown) {
+  const std::string stem = std::filesystem::path(unknown.recording->path).stem().string();
+  return unknown.frame ? fmt::format("{}.{}.png", stem, *unknown.frame) : stem + ".png";
+}
+
+/// Throws Error where a result could not be kept: before the work, not after.
+void check_outputs(const RecognizeOptions& options, const RecognitionTask& task) {
+  if (!options.posterior.empty()) {
+    if (task.unknowns.size() != 1) {
+      throw Error(Fault::input, fmt::format("--posterior {}: holds one unknown, not {}; select one "
+                                            "recording or frame",
+                                            options.posterior, task.unknowns.size()));
+    }
+    require_writable(options.posterior);
+  }
+  if (!options.json.empty() && options.json != "-") {
+    require_writable(options.json);
+  }
+  if (!options.png.empty()) {
+    std::set<std::string> names;
+    for (const Unknown& unknown : task.unknowns) {
+      if (!names.insert(png_name(unknown)).second) {
         throw Error(Fault::input,
-                    fmt::format("--posterior {}: holds one unknown, not {}; select one "
-                                "recording or frame",
-                                options.posterior, task.unknowns.size()));
+                    fmt::format("{}: another recording has the same name, and so would its "
+                                "picture; rename one",
+                                unknown.recording->path));
       }
-      require_folder_of(options.posterior);
-    }
-    if (!options.json.empty() && options.json != "-") {
-      json = std::make_unique<AtomicFile>(options.json);
-    }
-    if (!options.png.empty()) {
-      std::set<std::string> names;
-      for (const Unknown& unknown : task.unknowns) {
-        if (!names.insert(png_name(unknown)).second) {
-          throw Error(Fault::input,
-                      fmt::format("{}: another recording has the same name, and so would its "
-                                  "picture; rename one",
-                                  unknown.recording->path));
-        }
-      }
-      make_folder(options.png);
     }
   }
-
-  static std::string png_name(const Unknown& unknown) {
-    const std::string stem = std::filesystem::path(unknown.recording->path).stem().string();
-    return unknown.frame ? fmt::format("{}.{}.png", stem, *unknown.frame) : stem + ".png";
-  }
-
-  std::unique_ptr<AtomicFile> json;
-};
+}
 
 RecognitionRecord recognize_one(const Unknown& unknown, const RecognitionTask& task, bool trace,
                                 PoseHistogram& histogram,
@@ -135,13 +128,15 @@ Posterior export_posterior(const RecognitionTask& task, const PoseHistogram& his
 
 void recognize(const RecognizeOptions& options) {
   const RecognitionTask task = prepare(options);
+  check_outputs(options, task);
   Device device = Device::open(task.device);
-  const Outputs outputs(options, task);
   PoseHistogram histogram(device, task.hypotheses, task.histogram);
+  if (!options.png.empty()) {
+    make_folder(options.png);
+  }
 
   // The sheet shows the identity over the touches, so it needs the trace too.
   const bool trace = options.trace || !options.png.empty();
-  const bool text = options.json != "-";
   std::vector<RecognitionRecord> records;
   auto json = nlohmann::ordered_json::array();
   {
@@ -155,9 +150,8 @@ void recognize(const RecognizeOptions& options) {
       show(0.0);
       json.push_back(to_json(records.back(), task, device.name(), options.trace));
       if (!options.png.empty()) {
-        AtomicFile png(std::filesystem::path(options.png) / Outputs::png_name(unknown));
-        png.write(draw_sheet(records.back(), unknown, task, histogram));
-        png.commit();
+        write_file(std::filesystem::path(options.png) / png_name(unknown),
+                   draw_sheet(records.back(), unknown, task, histogram));
       }
       if (!options.posterior.empty()) {
         write_posterior(options.posterior, export_posterior(task, histogram));
@@ -165,7 +159,12 @@ void recognize(const RecognizeOptions& options) {
     }
   }
 
-  if (text) {
+  // The path of a recording need not be UTF-8, as JSON must.
+  const std::string json_text =
+      json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
+  if (options.json == "-") {
+    fmt::print("{}", json_text);
+  } else {
     if (options.trace) {
       for (const RecognitionRecord& record : records) {
         print_trace(record, task);
@@ -173,12 +172,9 @@ void recognize(const RecognizeOptions& options) {
       fmt::print("\n");
     }
     print_table(records, task);
-  } else {
-    fmt::print("{}\n", json.dump(2));
-  }
-  if (outputs.json) {
-    outputs.json->write(json.dump(2) + "\n");
-    outputs.json->commit();
+    if (!options.json.empty()) {
+      write_file(options.json, json_text);
+    }
   }
 }
 
@@ -219,7 +215,8 @@ void add_recognize(CLI::App& app) {
                       "Contact threshold as a part of the touch's largest pressure [default: 0.3]");
   command->add_option("--frames", options->frames,
                       "Use the touches A:B, from A up to before B, of every recording");
-  command->add_option("--touches", options->touches, "Use the first N touches [default: all]");
+  command->add_option("--touches", options->touches, "Use the first N touches [default: all]")
+      ->check(require_whole_number);
   command->add_flag("--each-frame", options->each_frame,
                     "Take every touch for an unknown object of its own");
   command->add_option("--filter", options->filter, "auto or histogram [default: auto]");

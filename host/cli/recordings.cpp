@@ -59,7 +59,10 @@ ContactClassifier make_classifier(std::span<const Recording> recordings,
                             recordings.front().path));
   }
   if (ratio) {
-    classifier.ratio = require_above("--ratio", *ratio, 0.0, true);
+    if (!(*ratio >= 0.0 && *ratio < 1.0)) {
+      throw Error(Fault::input, fmt::format("--ratio {}: must be at least 0 and below 1", *ratio));
+    }
+    classifier.ratio = *ratio;
   }
   return classifier;
 }

@@ -57,7 +57,7 @@ std::vector<Pose> draw(std::vector<Pose> poses, std::size_t n, std::uint64_t see
 }
 
 void simulate(const Options& options) {
-  require_folder_of(options.output);
+  require_writable(options.output);
   const Shape shape = make_shape(options.shape);
   const bool unknown = !options.object_pose.empty();
   Pose T_object_robot;
@@ -109,6 +109,7 @@ void add_simulate(CLI::App& app) {
       ->required();
   command->add_option("-o,--output", options->output, "Recording to write (HDF5)")->required();
   command->add_option("--seed", options->seed, "Seed of noise, poses and order")
+      ->check(require_whole_number)
       ->capture_default_str();
   command
       ->add_option("--poses", options->poses,
@@ -121,8 +122,10 @@ void add_simulate(CLI::App& app) {
   command->add_option("--object-pose", options->object_pose,
                       "Make an unknown at this pose T_object_robot: X,Y,DEG in mm and degrees, or "
                       "random; the truth is stored in the file");
-  command->add_option("--touches", options->touches,
-                      "Draw N of the poses, without replacement [default: all]");
+  command
+      ->add_option("--touches", options->touches,
+                   "Draw N of the poses, without replacement [default: all]")
+      ->check(require_whole_number);
   command->callback([options] { simulate(*options); });
 }
 

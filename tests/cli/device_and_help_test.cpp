@@ -1,0 +1,87 @@
+#include <set>
+
+#include "program.hpp"
+
+namespace palpate {
+namespace {
+
+using nlohmann::json;
+
+using DevicesCommand = ProgramTest;
+
+TEST_F(DevicesCommand, JsonNamesOneChosenDevice) {
+  const json devices = json::parse(done({"devices", "--json"}));
+  ASSERT_FALSE(devices.empty());
+  int chosen = 0;
+  for (const json& device : devices) {
+    EXPECT_TRUE(device.at("index").is_number_integer());
+    for (const char* key : {"name", "type", "driver", "vulkan", "reason"}) {
+      EXPECT_FALSE(device.at(key).get<std::string>().empty()) << key;
+    }
+    EXPECT_TRUE(device.at("usable").is_boolean());
+    EXPECT_GT(device.at("memory_gib").get<double>(), 0.0);
+    chosen += device.at("chosen").get<bool>() ? 1 : 0;
+  }
+  EXPECT_EQ(chosen, 1);
+}
+
+TEST_F(DevicesCommand, TextMarksTheChosenDevice) {
+  const json devices = json::parse(done({"devices", "--json"}));
+  const std::string text = done({"devices"});
+  for (const json& device : devices) {
+    EXPECT_NE(text.find(device["name"].get<std::string>()), std::string::npos) << text;
+    EXPECT_NE(text.find(device["reason"].get<std::string>()), std::string::npos) << text;
+  }
+  EXPECT_TRUE(text.starts_with("*") || text.find("\n*") != std::string::npos) << text;
+}
+
+struct Help {
+  const char* command;
+  std::vector<const char*> mentions;  ///< flags with their defaults and units
+
+  friend void PrintTo(const Help& help, std::ostream* out) { *out << help.command; }
+};
+
+class CommandHelp : public ProgramTest, public testing::WithParamInterface<Help> {};
+
+TEST_P(CommandHelp, MentionsEveryFlagWithDefaultAndUnit) {
+  const std::string help = done({GetParam().command, "--help"});
+  for (const char* part : GetParam().mentions) {
+    EXPECT_NE(help.find(part), std::string::npos) << "'" << part << "' not in\n" << help;
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    All, CommandHelp,
+    testing::Values(
+        Help{"devices", {"--json"}},
+        Help{"simulate",
+             {"SHAPE", "-o,", "--seed", "=1", "--poses", "grid", "random:N", "--psf-mm", "mm",
+              "--noise-kpa", "=0.7", "kPa", "--object-pose", "X,Y,DEG", "random", "--touches"}},
+        Help{"map", {"RECORDING", "-o,",         "FOLDER/", "--cell-mm", "=0.5",    "mm",
+                     "--psf-mm",  "--spread-mm", "half",    "--peak",    "=0.9",    "--prior",
+                     "=auto",     "--threshold", "2 kPa",   "--ratio",   "0.3",     "--frames",
+                     "A:B",       "--symmetry",  "--label", "--png",     "--device"}},
+        Help{"recognize",
+             {"RECORDING",   "--maps",       "--scene",  "--bins",        "25x25x16", "--x-mm",
+              "-10:10",      "--y-mm",       "mm",       "--theta-deg",   "0:360",    "degrees",
+              "--pivot-mm",  "X,Y",          "0,0",      "--prior",       "--gamma",  "0.1",
+              "--threshold", "2 kPa",        "--ratio",  "0.3",           "--frames", "A:B",
+              "--touches",   "--each-frame", "--filter", "histogram",     "--trace",  "--json",
+              "--posterior", "--png",        "--device", "T_object_robot"}},
+        Help{"info", {"FILE"}}),
+    [](const auto& test) { return std::string(test.param.command); });
+
+using ProgramHelp = ProgramTest;
+
+TEST_F(ProgramHelp, ListsTheCommands) {
+  const std::string help = done({"--help"});
+  for (const char* command : {"devices", "simulate", "map", "recognize", "info"}) {
+    EXPECT_NE(help.find(std::string("\n  ") + command), std::string::npos) << help;
+  }
+}
+
+TEST_F(ProgramHelp, VersionIsTheProjects) { EXPECT_EQ(done({"--version"}), PALPATE_VERSION "\n"); }
+
+}  // namespace
+}  // namespace palpate

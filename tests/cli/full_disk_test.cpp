@@ -1,0 +1,78 @@
+#include <algorithm>
+
+#include "program.hpp"
+#include "sample_files.hpp"
+
+namespace palpate {
+namespace {
+
+class FullDisk : public ProgramTest {
+ protected:
+  FullDisk() {
+    write_map(folder_ / "A.map.h5", sample_map("A"));
+    write_recording(folder_ / "u.h5", sample_unknown("A", {}, 6));
+    write_recording(folder_ / "A.h5", sample_training("A", 48));
+  }
+
+  static void expect_failure(const Outcome& outcome, const char* named) {
+    EXPECT_EQ(outcome.status, 1) << outcome.err;
+    EXPECT_EQ(std::count(outcome.err.begin(), outcome.err.end(), '\n'), 1) << outcome.err;
+    EXPECT_NE(outcome.err.find(named), std::string::npos) << outcome.err;
+  }
+};
+
+struct Output {
+  const char* name;
+  std::vector<std::string> arguments;
+  const char* file;
+
+  friend void PrintTo(const Output& output, std::ostream* out) { *out << output.file; }
+};
+
+class FullDiskOutput : public FullDisk, public testing::WithParamInterface<Output> {};
+
+TEST_P(FullDiskOutput, LeavesNoPartAndAnOlderFileIntact) {
+  const std::filesystem::path target = folder_ / GetParam().file;
+  std::filesystem::create_directories(target.parent_path());
+  for (const char* older : {"", "an older file"}) {
+    std::filesystem::remove(target);
+    if (*older != '\0') {
+      put_bytes(target, older);
+    }
+    const auto before = content_of(folder_.path());
+    // Below the size of every output here, above that of a message.
+    const Outcome outcome = palpate(GetParam().arguments, {.largest_file_bytes = 2048});
+    expect_failure(outcome, GetParam().file);
+    EXPECT_TRUE(content_of(folder_.path()) == before) << "the folder has changed";
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    All, FullDiskOutput,
+    testing::Values(Output{"recording", {"simulate", "A", "-o", "new.h5"}, "new.h5"},
+                    Output{"map", {"map", "A.h5", "-o", "new.map.h5"}, "new.map.h5"},
+                    Output{"map_in_folder", {"map", "A.h5", "-o", "maps/"}, "maps/A.map.h5"},
+                    Output{
+                        "json",
+                        {"recognize", "u.h5", "--maps", "A.map.h5", "--trace", "--json", "r.json"},
+                        "r.json"},
+                    Output{"posterior",
+                           {"recognize", "u.h5", "--maps", "A.map.h5", "--posterior", "p.h5"},
+                           "p.h5"},
+                    Output{"sheet",
+                           {"recognize", "u.h5", "--maps", "A.map.h5", "--png", "sheets"},
+                           "sheets/u.png"}),
+    [](const auto& test) { return std::string(test.param.name); });
+
+TEST_F(FullDisk, StandardOutputThatCannotBeWrittenIsAFailure) {
+  expect_failure(palpate({"recognize", "u.h5", "--maps", "A.map.h5", "--json", "-"},
+                         {.standard_output = "/dev/full"}),
+                 "standard output");
+}
+
+TEST_F(FullDisk, StandardErrorThatCannotBeWrittenKeepsTheStatus) {
+  EXPECT_EQ(palpate({"info", "missing.h5"}, {.standard_error = "/dev/full"}).status, 2);
+}
+
+}  // namespace
+}  // namespace palpate

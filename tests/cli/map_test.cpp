@@ -1,0 +1,149 @@
+#include <algorithm>
+#include <cmath>
+
+#include "hdf5_contents.hpp"
+#include "program.hpp"
+#include "sample_files.hpp"
+
+namespace palpate {
+namespace {
+
+class MapCommand : public ProgramTest {
+ protected:
+  MapCommand() {
+    write_recording(folder_ / "A.h5", sample_training("A", 48));
+    write_recording(folder_ / "I.h5", sample_training("I", 48));
+  }
+
+  /// The map of A.h5 built with these flags.
+  OccupancyGrid map_of_a(std::vector<std::string> flags) const {
+    flags.insert(flags.begin(), {"map", "A.h5", "-o", "A.map.h5"});
+    done(flags);
+    return read_map(folder_ / "A.map.h5");
+  }
+};
+
+TEST_F(MapCommand, FolderGetsAMapPerLabel) {
+  done({"map", "A.h5", "I.h5", "-o", "new/maps/"});
+  const auto content = content_of(folder_ / "new/maps");
+  ASSERT_EQ(content.size(), 2u);
+  const OccupancyGrid a = read_map(folder_ / "new/maps/A.map.h5");
+  const OccupancyGrid i = read_map(folder_ / "new/maps/I.map.h5");
+  EXPECT_EQ(a.label, "A");
+  EXPECT_EQ(i.label, "I");
+  EXPECT_EQ(a.symmetry, 1);
+  EXPECT_EQ(a.cell_mm, 0.5);
+  EXPECT_EQ(a.prior, i.prior) << "pooled over all objects of the call";
+  for (const double origin : {a.origin_mm.x, a.origin_mm.y, i.origin_mm.x, i.origin_mm.y}) {
+    EXPECT_EQ(origin / 0.5, std::round(origin / 0.5)) << "a whole multiple of the cell";
+  }
+}
+
+TEST_F(MapCommand, FolderThatExistsNeedsNoSlash) {
+  std::filesystem::create_directory(folder_ / "maps");
+  done({"map", "A.h5", "-o", "maps"});
+  EXPECT_EQ(read_map(folder_ / "maps/A.map.h5").label, "A");
+}
+
+TEST_F(MapCommand, FileSaysWhatItIs) {
+  map_of_a({});
+  Hdf5Contents file(folder_ / "A.map.h5", {"format", "version"}, {"log_odds"});
+  EXPECT_EQ(file.text("format"), "palpate.map");
+  EXPECT_EQ(file.integer("version", 0), 1);
+  EXPECT_EQ(file.dataset("log_odds").shape.size(), 2u);
+}
+
+TEST_F(MapCommand, DefaultsAreTheDocumentedOnes) {
+  map_of_a({});
+  const std::string bare = bytes_of(folder_ / "A.map.h5");
+  map_of_a({"--cell-mm", "0.5",     "--psf-mm",   "1.0",         "--spread-mm", "0.5",     "--peak",
+            "0.9",       "--prior", "auto",       "--threshold", "2",           "--ratio", "0.3",
+            "--frames",  "0:48",    "--symmetry", "1",           "--label",     "A"});
+  EXPECT_TRUE(bytes_of(folder_ / "A.map.h5") == bare) << "the same input gives the same file";
+}
+
+TEST_F(MapCommand, FlagsAreStoredInTheMap) {
+  const OccupancyGrid map =
+      map_of_a({"--cell-mm", "1", "--prior", "0.3", "--symmetry", "0", "--label", "other name"});
+  EXPECT_EQ(map.cell_mm, 1.0);
+  EXPECT_EQ(map.prior, 0.3);
+  EXPECT_EQ(map.symmetry, 0);
+  EXPECT_EQ(map.label, "other name");
+}
+
+TEST_F(MapCommand, FlagsOfTheModelMatter) {
+  const OccupancyGrid usual = map_of_a({"--prior", "0.2"});
+  for (const auto& [flag, value] : {std::pair{"--peak", "0.5"},
+                                    {"--spread-mm", "0.7"},
+                                    {"--psf-mm", "2"},
+                                    {"--threshold", "5"},
+                                    {"--ratio", "0.6"},
+                                    {"--frames", "0:10"}}) {
+    EXPECT_NE(map_of_a({"--prior", "0.2", flag, value}).log_odds, usual.log_odds) << flag;
+  }
+}
+
+TEST_F(MapCommand, SpreadIsHalfThePointSpread) {
+  const OccupancyGrid by_psf = map_of_a({"--psf-mm", "1.6"});
+  EXPECT_EQ(map_of_a({"--spread-mm", "0.8"}).log_odds, by_psf.log_odds);
+  EXPECT_EQ(map_of_a({"--spread-mm", "0.8", "--psf-mm", "5"}).log_odds, by_psf.log_odds);
+}
+
+TEST_F(MapCommand, FramesAreHalfOpen) {
+  const OccupancyGrid selected = map_of_a({"--frames", "5:20"});
+  write_recording(folder_ / "A.h5", part_of(sample_training("A", 48), 5, 20));
+  EXPECT_EQ(map_of_a({}).log_odds, selected.log_odds);
+}
+
+TEST_F(MapCommand, RecordingsOfOneLabelMakeOneMap) {
+  const OccupancyGrid whole = map_of_a({});
+  write_recording(folder_ / "first.h5", part_of(sample_training("A", 48), 0, 30));
+  write_recording(folder_ / "second.h5", part_of(sample_training("A", 48), 30, 48));
+  done({"map", "first.h5", "second.h5", "-o", "both.map.h5"});
+  EXPECT_EQ(read_map(folder_ / "both.map.h5").log_odds, whole.log_odds);
+}
+
+TEST_F(MapCommand, RawPressureIsClassifiedByItsOwnThreshold) {
+  const OccupancyGrid usual = map_of_a({});
+  Recording raw = sample_training("A", 48);
+  raw.pressure_unit = "raw";
+  for (double& pressure : raw.pressure) {
+    pressure *= 8.0;  // exact in binary
+  }
+  write_recording(folder_ / "A.h5", raw);
+  EXPECT_EQ(map_of_a({"--threshold", "16"}).log_odds, usual.log_odds);
+}
+
+TEST_F(MapCommand, DeadElementsChangeNothing) {
+  Recording recording = sample_training("A", 48);
+  recording.valid.assign(recording.elements(), 1);
+  recording.valid[7] = 0;
+  for (std::size_t i = 0; i < recording.size(); ++i) {
+    recording.pressure[i * recording.elements() + 7] = std::nan("");
+  }
+  write_recording(folder_ / "A.h5", recording);
+  const OccupancyGrid with_nan = map_of_a({});
+  for (std::size_t i = 0; i < recording.size(); ++i) {
+    recording.pressure[i * recording.elements() + 7] = 1e6;
+  }
+  write_recording(folder_ / "A.h5", recording);
+  EXPECT_EQ(map_of_a({}).log_odds, with_nan.log_odds);
+}
+
+TEST_F(MapCommand, DrawsAndExports) {
+  done({"map", "A.h5", "I.h5", "-o", "maps/", "--png", "maps.png", "--ros", "ros"});
+  EXPECT_TRUE(bytes_of(folder_ / "maps.png").starts_with("\x89PNG"));
+  const auto exported = content_of(folder_ / "ros");
+  EXPECT_EQ(exported.size(), 4u);
+  for (const char* name : {"A.pgm", "A.yaml", "I.pgm", "I.yaml"}) {
+    EXPECT_TRUE(exported.contains(name)) << name;
+  }
+}
+
+TEST_F(MapCommand, ReplacesAnOlderFile) {
+  put_bytes(folder_ / "A.map.h5", "an older file");
+  EXPECT_EQ(map_of_a({}).label, "A");
+}
+
+}  // namespace
+}  // namespace palpate

@@ -1,0 +1,125 @@
+#include "program.hpp"
+
+#include <fcntl.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <csignal>
+#include <cstdlib>
+
+namespace palpate {
+
+namespace {
+
+void redirect(int descriptor, const std::filesystem::path& file) {
+  const int opened = ::open(file.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600);
+  if (opened < 0 || ::dup2(opened, descriptor) < 0) {
+    ::_exit(126);
+  }
+  ::close(opened);
+}
+
+void limit_files(rlim_t bytes) {
+  // Ignored, so that a write beyond the limit fails like one to a full disk.
+  std::signal(SIGXFSZ, SIG_IGN);
+  const rlimit limit{.rlim_cur = bytes, .rlim_max = bytes};
+  ::setrlimit(RLIMIT_FSIZE, &limit);
+}
+
+}  // namespace
+
+[[noreturn]] void become_program(const std::vector<std::string>& arguments) {
+  std::string name = PALPATE_PROGRAM;
+  std::vector<std::string> texts = arguments;
+  std::vector<char*> argv{name.data()};
+  for (std::string& text : texts) {
+    argv.push_back(text.data());
+  }
+  argv.push_back(nullptr);
+  // Far longer than any run here takes, sanitizers included: a program that hangs is ended.
+  ::alarm(120);
+  ::execv(name.c_str(), argv.data());
+  ::_exit(127);
+}
+
+Outcome run_program(const std::filesystem::path& folder, const std::vector<std::string>& arguments,
+                    const Surroundings& surroundings) {
+  const ScratchFolder captured;
+  const std::filesystem::path out = captured / "out";
+  const std::filesystem::path err = captured / "err";
+  const bool draws = std::find(arguments.begin(), arguments.end(), "--png") != arguments.end();
+  const pid_t pid = ::fork();
+  if (pid == 0) {
+    if (::chdir(folder.c_str()) != 0) {
+      ::_exit(126);
+    }
+    redirect(STDOUT_FILENO,
+             surroundings.standard_output.empty() ? out : surroundings.standard_output);
+    redirect(STDERR_FILENO,
+             surroundings.standard_error.empty() ? err : surroundings.standard_error);
+    if (draws) {
+      // Fontconfig never frees its cache.
+      ::setenv("LSAN_OPTIONS", "detect_leaks=0", 1);
+    }
+    if (surroundings.largest_file_bytes) {
+      limit_files(*surroundings.largest_file_bytes);
+    }
+    become_program(arguments);
+  }
+  int status = 0;
+  ::waitpid(pid, &status, 0);
+  return {.status = WIFEXITED(status) ? WEXITSTATUS(status) : -WTERMSIG(status),
+          .out = bytes_of(out),
+          .err = bytes_of(err)};
+}
+
+std::map<std::string, std::string> content_of(const std::filesystem::path& folder) {
+  std::map<std::string, std::string> content;
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(folder)) {
+    content[entry.path().lexically_relative(folder).string()] =
+        entry.is_regular_file() ? bytes_of(entry.path()) : "";
+  }
+  return content;
+}
+
+std::string ProgramTest::done(const std::vector<std::string>& arguments) const {
+  const Outcome outcome = palpate(arguments);
+  EXPECT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_EQ(outcome.err, "");
+  return outcome.out;
+}
+
+nlohmann::json ProgramTest::records(std::vector<std::string> arguments) const {
+  arguments.insert(arguments.begin(), "recognize");
+  arguments.insert(arguments.end(), {"--json", "-"});
+  return nlohmann::json::parse(done(arguments));
+}
+
+nlohmann::json ProgramTest::record(const std::vector<std::string>& arguments) const {
+  const nlohmann::json all = records(arguments);
+  EXPECT_EQ(all.size(), 1u);
+  return all.at(0);
+}
+
+void ProgramTest::expect_refused(const std::vector<std::string>& arguments,
+                                 const std::vector<std::string>& named) const {
+  const auto before = content_of(folder_.path());
+  const Outcome outcome = palpate(arguments);
+  std::string command = "palpate";
+  for (const std::string& argument : arguments) {
+    command += " " + argument;
+  }
+  SCOPED_TRACE(command);
+  EXPECT_EQ(outcome.status, 2) << outcome.err;
+  EXPECT_EQ(std::count(outcome.err.begin(), outcome.err.end(), '\n'), 1) << outcome.err;
+  EXPECT_TRUE(outcome.err.ends_with('\n'));
+  for (const std::string& part : named) {
+    EXPECT_NE(outcome.err.find(part), std::string::npos)
+        << "'" << part << "' not in " << outcome.err;
+  }
+  EXPECT_EQ(outcome.out, "");
+  EXPECT_TRUE(content_of(folder_.path()) == before) << "the folder has changed";
+}
+
+}  // namespace palpate

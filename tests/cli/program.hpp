@@ -1,0 +1,62 @@
+#pragma once
+
+#include <sys/resource.h>
+
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+#include "io/scratch_folder.hpp"
+
+namespace palpate {
+
+/// How a run of the program ended, and what it said.
+struct Outcome {
+  int status = -1;  ///< exit status, or minus the signal that ended it
+  std::string out;
+  std::string err;
+};
+
+/// What a run may find different from an ordinary shell.
+struct Surroundings {
+  std::optional<rlim_t> largest_file_bytes;  ///< writes beyond it fail, as on a full disk
+  std::filesystem::path standard_output;     ///< a file in the place of Outcome::out
+  std::filesystem::path standard_error;      ///< a file in the place of Outcome::err
+};
+
+/// Runs the palpate program in `folder`, on which its relative paths depend.
+Outcome run_program(const std::filesystem::path& folder, const std::vector<std::string>& arguments,
+                    const Surroundings& surroundings = {});
+
+/// In a forked child: becomes the palpate program.
+[[noreturn]] void become_program(const std::vector<std::string>& arguments);
+
+/// Every file and folder below `folder`, with the files' content.
+std::map<std::string, std::string> content_of(const std::filesystem::path& folder);
+
+/// Runs the program in a folder of the test's own.
+class ProgramTest : public testing::Test {
+ protected:
+  Outcome palpate(const std::vector<std::string>& arguments,
+                  const Surroundings& surroundings = {}) const {
+    return run_program(folder_.path(), arguments, surroundings);
+  }
+  /// Standard output of a run that has to go well and say nothing else.
+  std::string done(const std::vector<std::string>& arguments) const;
+  /// The records of `recognize` with these arguments, as `--json -` prints them.
+  nlohmann::json records(std::vector<std::string> arguments) const;
+  /// The one record of `recognize` with these arguments.
+  nlohmann::json record(const std::vector<std::string>& arguments) const;
+  /// Expects status 2, one line on standard error that holds every one of `named`, nothing on
+  /// standard output, and the folder as it was before.
+  void expect_refused(const std::vector<std::string>& arguments,
+                      const std::vector<std::string>& named) const;
+
+  ScratchFolder folder_;
+};
+
+}  // namespace palpate

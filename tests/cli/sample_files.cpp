@@ -1,0 +1,59 @@
+#include "sample_files.hpp"
+
+#include "palpate/simulation.hpp"
+
+namespace palpate {
+
+namespace {
+
+Recording touch(const std::string& letter, const Pose& T_object_robot, int touches) {
+  constexpr std::uint64_t seed = 20110509;
+  std::vector<Pose> T_robot_sensor = random_poses(touches, seed);
+  for (Pose& pose : T_robot_sensor) {
+    pose = inverse(T_object_robot) * pose;
+  }
+  return Simulator(make_shape(letter), {}, digitacts_array(), seed)
+      .touch(T_robot_sensor, T_object_robot);
+}
+
+}  // namespace
+
+OccupancyGrid sample_map(const std::string& letter) {
+  const Shape shape = make_shape(letter);
+  OccupancyGrid map;
+  map.label = letter;
+  map.origin_mm = {-16.0, -16.0};
+  map.nx = 65;
+  map.ny = 65;
+  for (int j = 0; j < map.ny; ++j) {
+    for (int i = 0; i < map.nx; ++i) {
+      map.log_odds.push_back(shape.contains(map.centre_mm(i, j)) ? 4.0F : -4.0F);
+    }
+  }
+  return map;
+}
+
+Recording sample_unknown(const std::string& letter, const Pose& T_object_robot, int touches) {
+  Recording recording = touch(letter, T_object_robot, touches);
+  recording.object.clear();
+  recording.truth = {.object = letter, .T_object_robot = T_object_robot};
+  return recording;
+}
+
+Recording sample_training(const std::string& letter, int touches) {
+  return touch(letter, {}, touches);
+}
+
+Recording part_of(const Recording& recording, std::size_t begin, std::size_t end) {
+  const auto rows = [&](auto& values, std::size_t width) {
+    values.erase(values.begin() + static_cast<std::ptrdiff_t>(end * width), values.end());
+    values.erase(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(begin * width));
+  };
+  Recording part = recording;
+  rows(part.pressure, recording.elements());
+  rows(part.T_robot_sensor, 1);
+  part.time_s.clear();
+  return part;
+}
+
+}  // namespace palpate

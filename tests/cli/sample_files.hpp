@@ -1,0 +1,22 @@
+#pragma once
+
+#include <string>
+
+#include "palpate/files.hpp"
+
+namespace palpate {
+
+/// A letter's map as it would be after very many touches, made without a device: log odds of 4
+/// nats on the letter and -4 beside it, 33 x 33 mm.
+OccupancyGrid sample_map(const std::string& letter);
+
+/// Simulated touches of a letter at this pose T_object_robot, which is stored as the truth.
+Recording sample_unknown(const std::string& letter, const Pose& T_object_robot, int touches);
+
+/// Simulated touches of a letter at known poses, to build a map of.
+Recording sample_training(const std::string& letter, int touches);
+
+/// The touches [begin, end) of a recording as one of their own.
+Recording part_of(const Recording& recording, std::size_t begin, std::size_t end);
+
+}  // namespace palpate

@@ -1,0 +1,47 @@
+# Run by CTest. Installs the build tree into a scratch prefix, and uses Palpate only from there.
+cmake_minimum_required(VERSION 3.25)
+
+function(run)
+  execute_process(COMMAND ${ARGV} OUTPUT_VARIABLE output ERROR_VARIABLE output
+                  RESULT_VARIABLE status)
+  list(JOIN ARGV " " command)
+  message(STATUS "${command}\n${output}")
+  if(NOT status EQUAL 0)
+    message(FATAL_ERROR "failed with ${status}: ${command}")
+  endif()
+  set(output "${output}" PARENT_SCOPE)
+endfunction()
+
+set(prefix ${SCRATCH_DIR}/prefix)
+file(REMOVE_RECURSE ${SCRATCH_DIR})
+run(${CMAKE_COMMAND} --install ${BUILD_DIR} --prefix ${prefix})
+
+# The program has to find its library beside itself, wherever the prefix is.
+file(RENAME ${prefix} ${prefix}.moved)
+set(prefix ${prefix}.moved)
+run(${prefix}/bin/palpate --version)
+if(NOT output STREQUAL "${VERSION}\n")
+  message(FATAL_ERROR "palpate --version printed '${output}', not ${VERSION}")
+endif()
+
+# A user needs neither Vulkan's nor HDF5's headers.
+file(GLOB_RECURSE headers ${prefix}/include/*.hpp)
+if(NOT headers)
+  message(FATAL_ERROR "no header was installed")
+endif()
+foreach(header IN LISTS headers)
+  file(STRINGS ${header} includes REGEX "#[ \t]*include.*(vulkan|hdf5|H5|libusb)")
+  if(includes)
+    message(FATAL_ERROR "${header} is public, but says ${includes}")
+  endif()
+endforeach()
+
+# Sanitizers have to be in the program for them to work in the library.
+if(SANITIZE)
+  string(APPEND FLAGS " -fsanitize=${SANITIZE}")
+endif()
+run(${CMAKE_COMMAND} -S ${PROJECT_DIR} -B ${SCRATCH_DIR}/build -G ${GENERATOR}
+    -DCMAKE_PREFIX_PATH=${prefix} -DCMAKE_CXX_COMPILER=${COMPILER}
+    -DCMAKE_BUILD_TYPE=${BUILD_TYPE} "-DCMAKE_CXX_FLAGS=${FLAGS}")
+run(${CMAKE_COMMAND} --build ${SCRATCH_DIR}/build)
+run(${SCRATCH_DIR}/build/consumer)
