@@ -1,47 +1,100 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_control_flow_attributes : require
 
-// Builds a map by parallel cell updates (Eq. 4-6): one tile per workgroup, one cell per invocation,
-// which adds the increments of all readings near its tile. Positions are relative to the tile, so
-// that their float32 error does not grow with the map.
+// Adds readings to a map by parallel cell updates (Eq. 4-6): one tile of cells per workgroup, a
+// block of BLOCK_CELLS x BLOCK_CELLS of them per invocation, in registers. The Gaussian is separable:
+// its exponentials are shared along rows and columns. Positions are relative to the tile, so that
+// their float32 error does not grow with the map.
 
 #include "interface.h"
 
-layout(local_size_x = TILE_CELLS, local_size_y = TILE_CELLS) in;
+layout(local_size_x = TILE_CELLS / BLOCK_CELLS, local_size_y = TILE_CELLS / BLOCK_CELLS) in;
 
 layout(constant_id = 0) const float PEAK = 0.9;
-layout(constant_id = 1) const float PRIOR = 0.2;
-layout(constant_id = 2) const float INVERSE_TWICE_VARIANCE = 2.0;  // 1 / (2 spread^2), per mm^2
+layout(constant_id = 1) const float INVERSE_TWICE_VARIANCE = 2.0;  // 1 / (2 spread^2), per mm^2
 
 #include "two_float.glsl"
 
 layout(std430, binding = 0) readonly buffer Tiles { Tile tiles[]; };
-layout(std430, binding = 1) readonly buffer Readings { TileReading readings[]; };
-layout(std430, binding = 2) buffer Map { float log_odds[]; };
+layout(binding = 1) uniform samplerBuffer readings;  // TileReading
+layout(std430, binding = 2) buffer Map { vec2 log_odds[]; };  // relative to the prior, two floats
 layout(push_constant) uniform Push { EvidencePush push; };
 
-// log(1 + x) to a relative 2e-7: plain log(1 + x) would lose the increments far from an element.
-float log_one_plus(const float x) {
-  if (abs(x) < 0.01) {
-    return x * (1.0 - x * (1.0 / 2.0 - x * (1.0 / 3.0 - x * (1.0 / 4.0))));
+// Increments that are summed in one float before they join the two-float sum.
+const uint CHUNK = 64;
+
+#define FOR_EACH_CELL                               \
+  [[unroll]] for (int j = 0; j < BLOCK_CELLS; ++j) \
+  [[unroll]] for (int i = 0; i < BLOCK_CELLS; ++i)
+
+float weight[BLOCK_CELLS][BLOCK_CELLS];  // the Gaussian G' of one reading at every cell
+
+void weigh(const vec2 corner, const vec4 reading) {
+  const vec2 offset = corner - reading.xy;
+  float along_x[BLOCK_CELLS];
+  [[unroll]] for (int i = 0; i < BLOCK_CELLS; ++i) {
+    const float d = offset.x + float(i) * push.cell_mm;
+    along_x[i] = PEAK * exp(-d * d * INVERSE_TWICE_VARIANCE);
   }
-  return log(1.0 + x);
+  [[unroll]] for (int j = 0; j < BLOCK_CELLS; ++j) {
+    const float d = offset.y + float(j) * push.cell_mm;
+    const float along_y = exp(-d * d * INVERSE_TWICE_VARIANCE);
+    [[unroll]] for (int i = 0; i < BLOCK_CELLS; ++i) { weight[j][i] = along_x[i] * along_y; }
+  }
+}
+
+// tanh of half the increment.
+float half_tanh(const float g, const vec4 reading) {
+  return g * reading.z / (2.0 + g * reading.w);
+}
+
+// 2 atanh(t) for |t| <= SERIES_REACH, to a relative 2e-7: a logarithm would lose the small
+// increments far from an element, of which a long recording has many.
+float twice_atanh_series(const float t) {
+  const float q = t * t;
+  return t * (2.0 + q * (2.0 / 3.0 + q * (2.0 / 5.0 + q * (2.0 / 7.0 + q * (2.0 / 9.0)))));
 }
 
 void main() {
   const Tile tile = tiles[push.tile_first + gl_WorkGroupID.x];
-  const vec2 cell = vec2(gl_LocalInvocationID.xy) * push.cell_mm;
-  vec2 sum = vec2(0.0);
-  for (uint k = tile.first; k < tile.first + tile.count; ++k) {
-    const vec2 d = cell - vec2(readings[k].x_mm, readings[k].y_mm);
-    const float g = PEAK * exp(-dot(d, d) * INVERSE_TWICE_VARIANCE);
-    const float increment = readings[k].reading == IN_CONTACT
-                                ? log_one_plus(g * ((1.0 - PRIOR) / PRIOR)) - log_one_plus(-g)
-                                : log_one_plus(-g) - log_one_plus(g * (PRIOR / (1.0 - PRIOR)));
-    sum = two_float_add(sum, increment);
+  const uvec2 block = gl_LocalInvocationID.xy * BLOCK_CELLS;
+  const vec2 corner = vec2(block) * push.cell_mm;
+  vec2 sum[BLOCK_CELLS][BLOCK_CELLS];
+  float part[BLOCK_CELLS][BLOCK_CELLS];
+  FOR_EACH_CELL { sum[j][i] = vec2(0.0); }
+
+  const uint near_end = tile.first + tile.near;
+  for (uint first = tile.first; first < near_end; first += CHUNK) {
+    FOR_EACH_CELL { part[j][i] = 0.0; }
+    for (uint k = first; k < min(first + CHUNK, near_end); ++k) {
+      const vec4 reading = texelFetch(readings, int(k));
+      weigh(corner, reading);
+      FOR_EACH_CELL {
+        const float t = half_tanh(weight[j][i], reading);
+        part[j][i] +=
+            abs(t) < SERIES_REACH ? twice_atanh_series(t) : log((1.0 + t) / (1.0 - t));
+      }
+    }
+    FOR_EACH_CELL { sum[j][i] = two_float_add(sum[j][i], part[j][i]); }
   }
-  const uvec2 at = uvec2(tile.column, tile.row) + gl_LocalInvocationID.xy;
-  if (at.x < push.width && at.y < push.height) {
-    log_odds[at.y * push.width + at.x] += sum.x;
+
+  const uint end = tile.first + tile.count;
+  for (uint first = near_end; first < end; first += CHUNK) {
+    FOR_EACH_CELL { part[j][i] = 0.0; }
+    for (uint k = first; k < min(first + CHUNK, end); ++k) {
+      const vec4 reading = texelFetch(readings, int(k));
+      weigh(corner, reading);
+      FOR_EACH_CELL { part[j][i] += twice_atanh_series(half_tanh(weight[j][i], reading)); }
+    }
+    FOR_EACH_CELL { sum[j][i] = two_float_add(sum[j][i], part[j][i]); }
+  }
+
+  const uvec2 at = uvec2(tile.column, tile.row) + block;
+  FOR_EACH_CELL {
+    if (at.x + i < push.width && at.y + j < push.height) {
+      const uint cell = (at.y + j) * push.width + at.x + i;
+      log_odds[cell] = two_float_sum(log_odds[cell], sum[j][i]);
+    }
   }
 }

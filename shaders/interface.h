@@ -12,29 +12,50 @@ using uint = std::uint32_t;
 // Reading classes, as in palpate::Reading. Unknown elements never reach a kernel.
 const uint NO_CONTACT = 0;
 const uint IN_CONTACT = 1;
+// What an element says instead of No Contact: its likelihood over that of No Contact.
+const uint CONTACT_INSTEAD = 2;
+const uint UNKNOWN_INSTEAD = 3;
 
-// Rows and columns of prior that surround an uploaded map, on each side: two, so that a clamped
-// cell index finds both of its nodes at the prior.
-const int MAP_BORDER = 2;
+// Rows and columns of prior that surround an uploaded map, on each side: so many that a clamped
+// index finds all three nodes of a tile at the prior.
+const int MAP_BORDER = 3;
 
-// Edge of the square tile of map cells that one workgroup of accumulate_evidence fills.
+// Elements whose likelihoods are multiplied before one logarithm, and before one division.
+const uint FACTORS_PER_LOG = 8;
+const uint FACTORS_PER_DIVISION = 4;
+
+// Edge of the square tile of map cells that one workgroup of accumulate_evidence fills, and of the
+// block of them that one invocation holds in registers.
 const int TILE_CELLS = 16;
+const int BLOCK_CELLS = 4;
 
 // Bins that one workgroup of reduce_belief covers.
-const uint REDUCE_BINS = 4096;
+const uint REDUCE_BINS = 16384;
 
-// One known element's reading near a tile, relative to the centre of the tile's first cell.
+// (x, y) indices and thetas that one workgroup of sum_marginals covers.
+const uint MARGINAL_WORKGROUP = 64;
+const uint MARGINAL_PLANE = 512;
+const uint MARGINAL_THETAS = 32;
+
+// Increments above 2 atanh(SERIES_REACH) take a logarithm, smaller ones a series.
+const float SERIES_REACH = 0.2;
+
+// One known element's reading near a tile, relative to the centre of the tile's first cell. The
+// log-odds increment at Gaussian weight g is 2 atanh(g gain / (2 + g skew)).
 struct TileReading {
   float x_mm;
   float y_mm;
-  uint reading;
+  float gain;
+  float skew;
 };
 
-// A tile of the map and its readings, [first, first + count) of the list.
+// A tile of the map and its readings, [first, first + count) of the list, of which the first `near`
+// come close to a cell of the tile.
 struct Tile {
   uint column;
   uint row;
   uint first;
+  uint near;
   uint count;
 };
 
@@ -51,28 +72,29 @@ struct Split {
   float fraction;  // [0, 1]
 };
 
-// One element rotated by one theta, in units of the map's cell.
+// One element rotated by one theta, in units of the map's cell. Kernels read it as an ivec4.
 struct RotatedElement {
   Split x;
   Split y;
 };
 
-// Consecutive elements [begin, end) of the same reading class.
+// Consecutive elements [begin, end) of the same reading class. Kernels read it as an ivec4.
 struct Segment {
   uint begin;
   uint end;
   uint reading;
+  uint unused;
 };
 
 struct LikelihoodPush {
-  uint plane_first;  // the slab's first (x, y) index
-  uint plane_count;  // its number of (x, y) indices
-  uint theta_first;  // its first theta
   uint nx;           // bins along x
+  uint row_first;    // the slab's first row, its index along y
+  uint rows;         // the slab's number of rows
+  uint theta_first;  // the slab's first theta
   uint segments;
-  uint elements;   // per theta in the table
-  int map_width;   // with border
-  int map_height;  // with border
+  uint elements;  // per theta in the table
+  int map_width;  // with border
+  int map_height;
 };
 
 // Result of one workgroup of reduce_belief.
@@ -88,20 +110,23 @@ struct ReducePush {
   uint partial_first;
 };
 
+struct AddPush {
+  uint bins;
+  uint row;  // bins that one row of workgroups covers
+};
+
 struct MarginalPush {
-  uint plane_first;
-  uint plane_count;
-  uint theta_first;
-  uint theta_count;
+  uint plane;      // (x, y) indices of the slab
+  uint thetas;     // of the slab
   float max_high;  // the sums are of exp(log-likelihood - max)
   float max_low;
 };
 
 #ifdef __cplusplus
-static_assert(sizeof(TileReading) == 12 && sizeof(Tile) == 16 && sizeof(EvidencePush) == 16);
-static_assert(sizeof(RotatedElement) == 16 && sizeof(Segment) == 12);
+static_assert(sizeof(TileReading) == 16 && sizeof(Tile) == 20 && sizeof(EvidencePush) == 16);
+static_assert(sizeof(RotatedElement) == 16 && sizeof(Segment) == 16);
 static_assert(sizeof(LikelihoodPush) == 32 && sizeof(Partial) == 16);
-static_assert(sizeof(ReducePush) == 8 && sizeof(MarginalPush) == 24);
+static_assert(sizeof(ReducePush) == 8 && sizeof(AddPush) == 8 && sizeof(MarginalPush) == 16);
 }  // namespace palpate::shaders
 #endif
 

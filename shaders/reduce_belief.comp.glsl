@@ -1,25 +1,32 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_control_flow_attributes : require
 
 // The largest log-likelihood of every REDUCE_BINS bins, its first index, and the sum of
-// exp(log-likelihood - max) over them (Eq. 14, 15). The host combines the partial results in
-// float64 and in order, so equal input gives equal bits.
+// exp(log-likelihood - max) over them (Eq. 14, 15), in one pass: the sum is kept relative to the
+// largest value so far. The host combines the partial results in float64 and in order, so equal
+// input gives equal bits.
 
 #include "interface.h"
 
 layout(local_size_x_id = 0) in;
 
-layout(std430, binding = 0) readonly buffer Belief { vec2 belief[]; };
+layout(binding = 0) uniform samplerBuffer belief;  // two floats, normalised: |low| <= ulp(high) / 2
 layout(std430, binding = 1) writeonly buffer Partials { Partial partials[]; };
 layout(push_constant) uniform Push { ReducePush push; };
+
+// Values that a lane takes at a time, for one new maximum and one rescaling of the sum.
+const uint BATCH = 8;
 
 shared vec2 best_value[gl_WorkGroupSize.x];
 shared uint best_index[gl_WorkGroupSize.x];
 shared float sums[gl_WorkGroupSize.x];
 
-bool better(const vec2 a, const uint a_index, const vec2 b, const uint b_index) {
-  precise float difference = (a.x - b.x) + (a.y - b.y);
-  return difference > 0.0 || (difference == 0.0 && a_index < b_index);
+bool exceeds(const vec2 a, const vec2 b) { return a.x > b.x || (a.x == b.x && a.y > b.y); }
+
+float relative(const vec2 value, const vec2 reference) {
+  precise float difference = (value.x - reference.x) + (value.y - reference.y);
+  return exp(difference);
 }
 
 void main() {
@@ -28,45 +35,46 @@ void main() {
   const uint begin = gl_WorkGroupID.x * REDUCE_BINS;
   const uint end = min(begin + REDUCE_BINS, push.bins);
 
-  // A lane past the end repeats the first bin, which changes no maximum.
-  uint index = begin + lane < end ? begin + lane : begin;
-  vec2 value = belief[index];
-  for (uint i = begin + lane + lanes; i < end; i += lanes) {
-    if (better(belief[i], i, value, index)) {
-      value = belief[i];
-      index = i;
+  // A lane past the end repeats the last bin without counting it, which changes no result.
+  uint index = min(begin + lane, end - 1);
+  vec2 best = texelFetch(belief, int(index)).xy;
+  float sum = 0.0;
+  for (uint i = begin + lane; i < end; i += lanes * BATCH) {
+    vec2 value[BATCH];
+    const vec2 before = best;
+    [[unroll]] for (uint b = 0; b < BATCH; ++b) {
+      const uint at = min(i + b * lanes, end - 1);
+      value[b] = texelFetch(belief, int(at)).xy;
+      const bool more = exceeds(value[b], best);
+      best = more ? value[b] : best;
+      index = more ? at : index;
     }
-  }
-  best_value[lane] = value;
-  best_index[lane] = index;
-  barrier();
-  for (uint half_lanes = lanes / 2; half_lanes > 0; half_lanes /= 2) {
-    if (lane < half_lanes) {
-      const uint other = lane + half_lanes;
-      if (better(best_value[other], best_index[other], best_value[lane], best_index[lane])) {
-        best_value[lane] = best_value[other];
-        best_index[lane] = best_index[other];
-      }
+    sum *= relative(before, best);
+    [[unroll]] for (uint b = 0; b < BATCH; ++b) {
+      sum += i + b * lanes < end ? relative(value[b], best) : 0.0;
     }
-    barrier();
   }
 
-  const vec2 most = best_value[0];
-  float sum = 0.0;
-  for (uint i = begin + lane; i < end; i += lanes) {
-    precise float difference = (belief[i].x - most.x) + (belief[i].y - most.y);
-    sum += exp(difference);
-  }
+  best_value[lane] = best;
+  best_index[lane] = index;
   sums[lane] = sum;
   barrier();
-  for (uint half_lanes = lanes / 2; half_lanes > 0; half_lanes /= 2) {
-    if (lane < half_lanes) {
-      sums[lane] += sums[lane + half_lanes];
+  for (uint reach = lanes / 2; reach > 0; reach /= 2) {
+    if (lane < reach) {
+      const vec2 mine = best_value[lane];
+      const vec2 other = best_value[lane + reach];
+      const uint other_index = best_index[lane + reach];
+      const bool more = exceeds(other, mine) || (other == mine && other_index < best_index[lane]);
+      const vec2 most = more ? other : mine;
+      sums[lane] =
+          sums[lane] * relative(mine, most) + sums[lane + reach] * relative(other, most);
+      best_value[lane] = most;
+      best_index[lane] = more ? other_index : best_index[lane];
     }
     barrier();
   }
   if (lane == 0) {
     partials[push.partial_first + gl_WorkGroupID.x] =
-        Partial(most.x, most.y, best_index[0], sums[0]);
+        Partial(best_value[0].x, best_value[0].y, best_index[0], sums[0]);
   }
 }

@@ -10,3 +10,8 @@ vec2 two_float_add(vec2 sum, float value) {
   precise float remainder = low - (renormalised - high);
   return vec2(renormalised, remainder);
 }
+
+vec2 two_float_sum(vec2 a, vec2 b) {
+  const vec2 sum = two_float_add(a, b.x);
+  return two_float_add(sum, b.y);
+}

@@ -123,6 +123,14 @@ void build_maps(const Options& options) {
   MapOptions model = map_options(options, recordings);
   const std::vector<ObjectTouches> objects = group_by_label(recordings, options, !folder);
 
+  for (const Recording& recording : recordings) {
+    std::error_code not_there;
+    if (std::filesystem::equivalent(recording.path, output, not_there)) {
+      throw Error(Fault::input, fmt::format("{}: -o would overwrite this recording; choose another "
+                                            "name for the map",
+                                            recording.path));
+    }
+  }
   if (!folder) {
     require_writable(output);
   }
@@ -144,9 +152,10 @@ void build_maps(const Options& options) {
   std::vector<OccupancyGrid> maps;
   {
     Progress progress("building maps");
+    MapBuilder builder(device, model);
     for (const ObjectTouches& object : objects) {
       progress.show(static_cast<double>(maps.size()) / static_cast<double>(objects.size()));
-      MapBuilder builder(device, model);
+      builder.clear();
       builder.add(object.touches);
       maps.push_back(builder.build(object.label));
       maps.back().symmetry = options.symmetry;

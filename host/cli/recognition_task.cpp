@@ -184,6 +184,20 @@ std::vector<Unknown> list_unknowns(const RecognizeOptions& options,
   return unknowns;
 }
 
+/// Presses one by one of one large array that never moves share most of the work.
+bool array_is_still(const std::vector<Unknown>& unknowns, bool each_frame) {
+  constexpr std::size_t large = 256;
+  const Touch& first = unknowns.front().touches.front();
+  return each_frame && unknowns.size() > 1 && first.elements_mm.size() >= large &&
+         std::all_of(unknowns.begin(), unknowns.end(), [&](const Unknown& unknown) {
+           const Touch& touch = unknown.touches.front();
+           return touch.T_robot_sensor.translation_mm == first.T_robot_sensor.translation_mm &&
+                  touch.T_robot_sensor.theta_rad == first.T_robot_sensor.theta_rad &&
+                  std::equal(touch.elements_mm.begin(), touch.elements_mm.end(),
+                             first.elements_mm.begin(), first.elements_mm.end());
+         });
+}
+
 void check_filter(const std::string& filter) {
   if (filter == "bounded" || filter == "particles") {
     throw Error(Fault::input,
@@ -212,6 +226,7 @@ RecognitionTask prepare(const RecognizeOptions& options) {
       make_classifier(task.recordings, options.threshold ? options.threshold : scene.threshold,
                       options.ratio ? options.ratio : scene.ratio);
   task.unknowns = list_unknowns(options, task.recordings);
+  task.histogram.still_array = array_is_still(task.unknowns, options.each_frame);
   load_maps(objects_of(options, scene), task);
   task.histogram.prior = common_prior(task, options.prior ? options.prior : scene.prior);
   task.device = options.device.empty() ? scene.device.value_or("") : options.device;

@@ -8,6 +8,7 @@
 #include <string>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include "figures.hpp"
 #include "palpate/error.hpp"
@@ -102,7 +103,7 @@ std::string draw_sheet(const RecognitionRecord& record, const Unknown& unknown,
     sheet.error_mm = last.error_mm;
   }
   sheet.lattice = histogram.lattice();
-  sheet.belief_xy = histogram.marginal_xy(last.mode.object);
+  sheet.belief_xy = histogram.marginals(last.mode.object).xy;
   sheet.labels = task.labels;
   for (const Touch& touch : unknown.touches) {
     auto& footprint = sheet.footprints_mm.emplace_back();
@@ -124,6 +125,15 @@ Posterior export_posterior(const RecognitionTask& task, const PoseHistogram& his
     posterior.log_likelihood.insert(posterior.log_likelihood.end(), logs.begin(), logs.end());
   }
   return posterior;
+}
+
+/// Where and how the likelihood is evaluated.
+void print_engine(const RecognitionTask& task, const Device& device,
+                  const PoseHistogram& histogram) {
+  const PoseLattice& lattice = histogram.lattice();
+  fmt::print("{}: {} maps, {} x {} x {} bins each, in {}\n\n", device.name(),
+             task.hypotheses.size(), lattice.x_mm.count, lattice.y_mm.count,
+             lattice.theta_rad.count, fmt::join(histogram.paths(), "; "));
 }
 
 void recognize(const RecognizeOptions& options) {
@@ -165,6 +175,7 @@ void recognize(const RecognizeOptions& options) {
   if (options.json == "-") {
     fmt::print("{}", json_text);
   } else {
+    print_engine(task, device, histogram);
     if (options.trace) {
       for (const RecognitionRecord& record : records) {
         print_trace(record, task);

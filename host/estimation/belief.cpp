@@ -1,16 +1,15 @@
 #include "belief.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 
 #include <fmt/format.h>
 
+#include "add_belief.hpp"
 #include "interface.h"
 #include "palpate/error.hpp"
 #include "reduce_belief.hpp"
-#include "sum_over_plane.hpp"
-#include "sum_over_theta.hpp"
+#include "sum_marginals.hpp"
 
 namespace palpate {
 
@@ -18,34 +17,46 @@ namespace {
 
 constexpr std::uint32_t workgroup = 64;  // the minimum a device must allow is 128
 constexpr std::uint32_t workgroup_constant[] = {workgroup};
+constexpr gpu::Access read_and_write[] = {gpu::Access::table, gpu::Access::storage};
+constexpr gpu::Access marginal_bindings[] = {gpu::Access::table, gpu::Access::storage,
+                                             gpu::Access::storage};
 
 /// Cuts an object's bins into slabs of whole theta planes, or, where a plane alone is too large
-/// for a binding or a dispatch, into parts of planes.
+/// for a binding or a dispatch, into groups of its rows.
 std::vector<Slab> cut_into_slabs(gpu::Context& context, const PoseLattice& lattice) {
   const gpu::Limits& limits = context.limits();
-  const std::int64_t binding_bins = std::min(
-      static_cast<std::int64_t>(std::min<VkDeviceSize>(limits.storage_range, limits.allocation) /
-                                sizeof(TwoFloat)),
-      std::int64_t{limits.group_count[0]} * shaders::REDUCE_BINS);
-  const std::int64_t plane_part =
-      std::min({lattice.plane(), binding_bins, std::int64_t{limits.group_count[0]} * workgroup});
-  const std::int64_t planes =
-      plane_part < lattice.plane()
+  const auto binding_bins = static_cast<std::int64_t>(
+      std::min({limits.storage_range / sizeof(TwoFloat), limits.allocation / sizeof(TwoFloat),
+                VkDeviceSize{limits.table_texels},
+                VkDeviceSize{limits.group_count[0]} * shaders::REDUCE_BINS}));
+  // However few bins an invocation takes, a plane's rows must fit one dispatch.
+  const std::int64_t plane_bins =
+      std::min(binding_bins, std::int64_t{limits.group_count[0]} * workgroup);
+  const std::int64_t rows =
+      std::min<std::int64_t>(plane_bins / lattice.x_mm.count, lattice.y_mm.count);
+  if (rows == 0) {
+    throw Error(Fault::input, fmt::format("bins x = {}: device '{}' takes at most {}; use fewer",
+                                          lattice.x_mm.count, context.name(), plane_bins));
+  }
+  const std::int64_t thetas =
+      rows < lattice.y_mm.count
           ? 1
-          : std::min({binding_bins / lattice.plane(), std::int64_t{limits.group_count[2]},
-                      std::int64_t{limits.group_count[0]}, std::int64_t{lattice.theta_rad.count}});
+          : std::min({binding_bins / lattice.plane(),
+                      std::int64_t{std::min(limits.group_count[1], limits.group_count[2])},
+                      std::int64_t{lattice.theta_rad.count}});
   std::vector<Slab> slabs;
-  for (std::int64_t theta = 0; theta < lattice.theta_rad.count; theta += planes) {
-    for (std::int64_t first = 0; first < lattice.plane(); first += plane_part) {
+  for (std::int64_t theta = 0; theta < lattice.theta_rad.count; theta += thetas) {
+    for (std::int64_t row = 0; row < lattice.y_mm.count; row += rows) {
       Slab slab;
       slab.theta_first = static_cast<std::uint32_t>(theta);
       slab.theta_count =
-          static_cast<std::uint32_t>(std::min(planes, lattice.theta_rad.count - theta));
-      slab.plane_first = static_cast<std::uint32_t>(first);
-      slab.plane_count = static_cast<std::uint32_t>(std::min(plane_part, lattice.plane() - first));
+          static_cast<std::uint32_t>(std::min(thetas, lattice.theta_rad.count - theta));
+      slab.row_first = static_cast<std::uint32_t>(row);
+      slab.row_count = static_cast<std::uint32_t>(std::min(rows, lattice.y_mm.count - row));
+      slab.nx = static_cast<std::uint32_t>(lattice.x_mm.count);
       slab.log_likelihood =
           gpu::Buffer(context, slab.bins() * sizeof(TwoFloat), gpu::Memory::device,
-                      fmt::format("{} pose bins", slab.bins()));
+                      fmt::format("{} pose bins", slab.bins()), VK_FORMAT_R32G32_SFLOAT);
       slabs.push_back(std::move(slab));
     }
   }
@@ -71,10 +82,14 @@ std::size_t partials_of(const Slab& slab) {
   return static_cast<std::size_t>((slab.bins() + shaders::REDUCE_BINS - 1) / shaders::REDUCE_BINS);
 }
 
+std::uint32_t groups_of(std::uint32_t count, std::uint32_t per_group) {
+  return (count + per_group - 1) / per_group;
+}
+
 /// Index in the lattice of a slab's bin.
 std::int64_t lattice_index(const PoseLattice& lattice, const Slab& slab, std::int64_t in_slab) {
-  return (slab.theta_first + in_slab / slab.plane_count) * lattice.plane() + slab.plane_first +
-         in_slab % slab.plane_count;
+  return (slab.theta_first + in_slab / slab.plane()) * lattice.plane() +
+         std::int64_t{slab.row_first} * slab.nx + in_slab % slab.plane();
 }
 
 bool exceeds(const TwoFloat& a, const TwoFloat& b) { return a.value() > b.value(); }
@@ -88,19 +103,18 @@ Belief::Belief(gpu::Context& context, gpu::CommandStream& stream, const PoseLatt
       lattice_(lattice),
       reduce_(context, {.name = "reduce_belief",
                         .spirv = shaders::reduce_belief,
-                        .buffers = 2,
+                        .bindings = read_and_write,
                         .push_bytes = sizeof(shaders::ReducePush),
                         .constants = workgroup_constant}),
-      sum_over_theta_(context, {.name = "sum_over_theta",
-                                .spirv = shaders::sum_over_theta,
-                                .buffers = 2,
-                                .push_bytes = sizeof(shaders::MarginalPush),
-                                .constants = workgroup_constant}),
-      sum_over_plane_(context, {.name = "sum_over_plane",
-                                .spirv = shaders::sum_over_plane,
-                                .buffers = 2,
-                                .push_bytes = sizeof(shaders::MarginalPush),
-                                .constants = workgroup_constant}) {
+      sum_marginals_(context, {.name = "sum_marginals",
+                               .spirv = shaders::sum_marginals,
+                               .bindings = marginal_bindings,
+                               .push_bytes = sizeof(shaders::MarginalPush)}),
+      add_(context, {.name = "add_belief",
+                     .spirv = shaders::add_belief,
+                     .bindings = read_and_write,
+                     .push_bytes = sizeof(shaders::AddPush),
+                     .constants = workgroup_constant}) {
   require_memory(context, lattice, objects);
   for (std::size_t object = 0; object < objects; ++object) {
     slabs_.push_back(cut_into_slabs(context, lattice));
@@ -117,6 +131,19 @@ void Belief::clear() {
   for (const auto& slabs : slabs_) {
     for (const Slab& slab : slabs) {
       stream_.fill(slab.log_likelihood, 0);
+    }
+  }
+}
+
+void Belief::add(const Belief& other) {
+  for (std::size_t object = 0; object < slabs_.size(); ++object) {
+    for (std::size_t i = 0; i < slabs_[object].size(); ++i) {
+      const Slab& slab = slabs_[object][i];
+      // A plane of a slab fits one row of workgroups.
+      const shaders::AddPush push{.bins = static_cast<shaders::uint>(slab.bins()),
+                                  .row = slab.plane()};
+      stream_.dispatch(add_, {&other.slabs_[object][i].log_likelihood, &slab.log_likelihood}, push,
+                       {groups_of(slab.plane(), workgroup), slab.theta_count, 1});
     }
   }
 }
@@ -138,9 +165,7 @@ std::vector<BeliefSummary> Belief::summarise() const {
       const auto groups = static_cast<std::uint32_t>(partials_of(slab));
       const shaders::ReducePush push{.bins = static_cast<std::uint32_t>(slab.bins()),
                                      .partial_first = first};
-      stream_.dispatch(reduce_,
-                       std::array{gpu::Binding{&slab.log_likelihood}, gpu::Binding{&partials_}},
-                       push, {groups, 1, 1});
+      stream_.dispatch(reduce_, {&slab.log_likelihood, &partials_}, push, {groups, 1, 1});
       first += groups;
     }
   }
@@ -174,37 +199,37 @@ std::vector<BeliefSummary> Belief::summarise() const {
   return summaries;
 }
 
-std::vector<float> Belief::sum_over_theta(std::size_t object, TwoFloat max) const {
-  std::vector<float> sums(static_cast<std::size_t>(lattice_.plane()));
-  const gpu::Buffer marginal(context_, sums.size() * sizeof(float), gpu::Memory::device,
-                             "a marginal");
-  stream_.fill(marginal, 0);
+BeliefMarginals Belief::marginals(std::size_t object, TwoFloat max) const {
+  BeliefMarginals sums;
+  sums.xy.resize(static_cast<std::size_t>(lattice_.plane()));
+  sums.theta.resize(static_cast<std::size_t>(lattice_.theta_rad.count));
   for (const Slab& slab : slabs_[object]) {
-    const shaders::MarginalPush push{slab.plane_first, slab.plane_count, slab.theta_first,
-                                     slab.theta_count, max.high,         max.low};
-    stream_.dispatch(sum_over_theta_,
-                     std::array{gpu::Binding{&slab.log_likelihood}, gpu::Binding{&marginal}}, push,
-                     {(slab.plane_count + workgroup - 1) / workgroup, 1, 1});
-  }
-  stream_.download(marginal, std::span(sums));
-  stream_.run();
-  return sums;
-}
+    const std::uint32_t chunks = groups_of(slab.theta_count, shaders::MARGINAL_THETAS);
+    const std::uint32_t blocks = groups_of(slab.plane(), shaders::MARGINAL_PLANE);
+    std::vector<float> over_theta(std::size_t{chunks} * slab.plane());
+    std::vector<float> over_plane(std::size_t{blocks} * slab.theta_count);
+    const gpu::Buffer theta_parts(context_, std::span(over_theta).size_bytes(), gpu::Memory::device,
+                                  "a marginal");
+    const gpu::Buffer plane_parts(context_, std::span(over_plane).size_bytes(), gpu::Memory::device,
+                                  "a marginal");
+    const shaders::MarginalPush push{.plane = slab.plane(),
+                                     .thetas = slab.theta_count,
+                                     .max_high = max.high,
+                                     .max_low = max.low};
+    stream_.dispatch(sum_marginals_, {&slab.log_likelihood, &theta_parts, &plane_parts}, push,
+                     {blocks, chunks, 1});
+    stream_.download(theta_parts, std::span(over_theta));
+    stream_.download(plane_parts, std::span(over_plane));
+    stream_.run();
 
-std::vector<float> Belief::sum_over_plane(std::size_t object, TwoFloat max) const {
-  std::vector<float> sums(static_cast<std::size_t>(lattice_.theta_rad.count));
-  const gpu::Buffer marginal(context_, sums.size() * sizeof(float), gpu::Memory::device,
-                             "a marginal");
-  stream_.fill(marginal, 0);
-  for (const Slab& slab : slabs_[object]) {
-    const shaders::MarginalPush push{slab.plane_first, slab.plane_count, slab.theta_first,
-                                     slab.theta_count, max.high,         max.low};
-    stream_.dispatch(sum_over_plane_,
-                     std::array{gpu::Binding{&slab.log_likelihood}, gpu::Binding{&marginal}}, push,
-                     {slab.theta_count, 1, 1});
+    const std::size_t first = std::size_t{slab.row_first} * slab.nx;
+    for (std::size_t i = 0; i < over_theta.size(); ++i) {
+      sums.xy[first + i % slab.plane()] += over_theta[i];
+    }
+    for (std::size_t i = 0; i < over_plane.size(); ++i) {
+      sums.theta[slab.theta_first + i % slab.theta_count] += over_plane[i];
+    }
   }
-  stream_.download(marginal, std::span(sums));
-  stream_.run();
   return sums;
 }
 

@@ -6,26 +6,22 @@
 
 #include "command_stream.hpp"
 #include "palpate/lattice.hpp"
+#include "two_float.hpp"
 
 namespace palpate {
 
-/// A part of an object's bins that fits one storage binding and one dispatch: `theta_count` planes
-/// from `theta_first`, and of each the (x, y) indices [plane_first, plane_first + plane_count).
+/// A part of an object's bins that fits one binding and one dispatch: of `theta_count` planes from
+/// `theta_first` the rows (indices along y) [row_first, row_first + row_count).
 struct Slab {
   std::uint32_t theta_first = 0;
   std::uint32_t theta_count = 0;
-  std::uint32_t plane_first = 0;
-  std::uint32_t plane_count = 0;
-  gpu::Buffer log_likelihood;  ///< [theta, plane], two floats each
+  std::uint32_t row_first = 0;
+  std::uint32_t row_count = 0;
+  std::uint32_t nx = 0;
+  gpu::Buffer log_likelihood;  ///< [theta, y, x], two floats each
 
-  std::int64_t bins() const { return std::int64_t{theta_count} * plane_count; }
-};
-
-/// A log-likelihood as two floats, as the kernels keep it.
-struct TwoFloat {
-  float high = 0.0F;
-  float low = 0.0F;
-  double value() const { return static_cast<double>(high) + low; }
+  std::uint32_t plane() const { return row_count * nx; }
+  std::int64_t bins() const { return std::int64_t{theta_count} * plane(); }
 };
 
 /// What a reduction over one object's bins finds.
@@ -33,6 +29,12 @@ struct BeliefSummary {
   TwoFloat max;
   std::int64_t arg_max = 0;  ///< the lowest bin that has it
   double sum = 0.0;          ///< of exp(log-likelihood - max) over the bins, at least 1
+};
+
+/// Sums of exp(log-likelihood - max) over parts of one object's bins.
+struct BeliefMarginals {
+  std::vector<double> xy;     ///< over theta, [ny, nx]
+  std::vector<double> theta;  ///< over (x, y), [ntheta]
 };
 
 /// The summed log-likelihood of every pose bin of every object, on the device, and the reductions
@@ -44,15 +46,14 @@ class Belief {
 
   /// Records the return to a uniform belief.
   void clear();
+  /// Records the addition of another belief over the same lattice and objects.
+  void add(const Belief& other);
   std::span<const Slab> slabs(std::size_t object) const { return slabs_[object]; }
   std::uint64_t device_bytes() const;
 
   // These run the stream.
   std::vector<BeliefSummary> summarise() const;
-  /// Sums of exp(log-likelihood - max) over theta, [ny, nx].
-  std::vector<float> sum_over_theta(std::size_t object, TwoFloat max) const;
-  /// Sums of exp(log-likelihood - max) over (x, y), [ntheta].
-  std::vector<float> sum_over_plane(std::size_t object, TwoFloat max) const;
+  BeliefMarginals marginals(std::size_t object, TwoFloat max) const;
   /// All bins of one object, [theta, y, x].
   std::vector<double> download(std::size_t object) const;
 
@@ -62,8 +63,8 @@ class Belief {
   PoseLattice lattice_;
   std::vector<std::vector<Slab>> slabs_;
   gpu::Kernel reduce_;
-  gpu::Kernel sum_over_theta_;
-  gpu::Kernel sum_over_plane_;
+  gpu::Kernel sum_marginals_;
+  gpu::Kernel add_;
   gpu::Buffer partials_;  ///< of all slabs in order
   std::size_t partial_count_ = 0;
 };

@@ -5,27 +5,60 @@
 
 namespace palpate {
 
+namespace {
+
+/// Adds the touch's elements of one reading as segments of one class.
+void append(ContactEvidence& evidence, const Touch& touch, std::span<const Reading> readings,
+            Reading reading, shaders::uint segment_class, const glm::dvec2& pivot_mm,
+            std::size_t segment_elements) {
+  const std::size_t first = evidence.from_pivot_mm.size();
+  for (std::size_t i = 0; i < readings.size(); ++i) {
+    if (readings[i] == reading) {
+      evidence.from_pivot_mm.push_back(touch.T_robot_sensor * touch.elements_mm[i] - pivot_mm);
+    }
+  }
+  const std::size_t end = evidence.from_pivot_mm.size();
+  for (std::size_t begin = first; begin < end; begin += segment_elements) {
+    evidence.segments.push_back(
+        {.begin = static_cast<shaders::uint>(begin),
+         .end = static_cast<shaders::uint>(std::min(begin + segment_elements, end)),
+         .reading = segment_class,
+         .unused = 0});
+  }
+}
+
+}  // namespace
+
 ContactEvidence gather_evidence(std::span<const Touch> touches, const ContactClassifier& classifier,
                                 const glm::dvec2& pivot_mm, std::size_t segment_elements) {
   ContactEvidence evidence;
   for (const Touch& touch : touches) {
-    const std::vector<ElementReading> known = known_readings(touch, classifier);
-    for (const Reading reading : {Reading::no_contact, Reading::in_contact}) {
-      const std::size_t first = evidence.from_pivot_mm.size();
-      for (const ElementReading& element : known) {
-        if (element.reading == reading) {
-          evidence.from_pivot_mm.push_back(element.position_mm - pivot_mm);
-        }
-      }
-      const std::size_t end = evidence.from_pivot_mm.size();
-      for (std::size_t begin = first; begin < end; begin += segment_elements) {
-        evidence.segments.push_back(
-            {.begin = static_cast<shaders::uint>(begin),
-             .end = static_cast<shaders::uint>(std::min(begin + segment_elements, end)),
-             .reading = static_cast<shaders::uint>(reading)});
-      }
-    }
+    const std::vector<Reading> readings = classifier.classify(touch);
+    append(evidence, touch, readings, Reading::no_contact, shaders::NO_CONTACT, pivot_mm,
+           segment_elements);
+    append(evidence, touch, readings, Reading::in_contact, shaders::IN_CONTACT, pivot_mm,
+           segment_elements);
   }
+  return evidence;
+}
+
+ContactEvidence gather_no_contact(const Touch& touch, const glm::dvec2& pivot_mm,
+                                  std::size_t segment_elements) {
+  const std::vector<Reading> readings(touch.elements_mm.size(), Reading::no_contact);
+  ContactEvidence evidence;
+  append(evidence, touch, readings, Reading::no_contact, shaders::NO_CONTACT, pivot_mm,
+         segment_elements);
+  return evidence;
+}
+
+ContactEvidence gather_differences(const Touch& touch, const ContactClassifier& classifier,
+                                   const glm::dvec2& pivot_mm, std::size_t segment_elements) {
+  const std::vector<Reading> readings = classifier.classify(touch);
+  ContactEvidence evidence;
+  append(evidence, touch, readings, Reading::in_contact, shaders::CONTACT_INSTEAD, pivot_mm,
+         segment_elements);
+  append(evidence, touch, readings, Reading::unknown, shaders::UNKNOWN_INSTEAD, pivot_mm,
+         segment_elements);
   return evidence;
 }
 

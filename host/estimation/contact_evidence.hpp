@@ -21,6 +21,15 @@ struct ContactEvidence {
 ContactEvidence gather_evidence(std::span<const Touch> touches, const ContactClassifier& classifier,
                                 const glm::dvec2& pivot_mm, std::size_t segment_elements);
 
+/// The same for an array that reads No Contact everywhere.
+ContactEvidence gather_no_contact(const Touch& touch, const glm::dvec2& pivot_mm,
+                                  std::size_t segment_elements);
+
+/// What a touch adds to that: the elements that are not in No Contact, by the ratio of their
+/// likelihood to that of No Contact.
+ContactEvidence gather_differences(const Touch& touch, const ContactClassifier& classifier,
+                                   const glm::dvec2& pivot_mm, std::size_t segment_elements);
+
 /// Splits a coordinate into whole cells and the rest. Far outside any map the cell is clamped, so
 /// that sums of two stay within int32.
 shaders::Split split(double coordinate_cells);

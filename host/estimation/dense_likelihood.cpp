@@ -1,13 +1,10 @@
 #include "dense_likelihood.hpp"
 
 #include <algorithm>
-#include <array>
-#include <bit>
 #include <cmath>
 
 #include <fmt/format.h>
 
-#include "accumulate_likelihood.hpp"
 #include "interface.h"
 #include "palpate/error.hpp"
 
@@ -15,12 +12,16 @@ namespace palpate {
 
 namespace {
 
-constexpr std::uint32_t workgroup = 64;
 // A segment's sum is one float: of 64 terms its rounding error stays below 1e-5 nats.
 constexpr std::size_t longest_segment = 64;
 constexpr VkDeviceSize table_bytes = 16 << 20;
-// About a second on a CPU device; watchdogs of desktop GPUs, which are far faster, allow two.
-constexpr double work_per_run = 2e8;
+// Bins times elements: about half a second on a CPU device, so that progress shows; watchdogs of
+// desktop GPUs, which are a hundred times faster, allow two.
+constexpr double work_per_run = 5e8;
+
+std::uint32_t blocks(std::uint32_t count, std::uint32_t per_block) {
+  return (count + per_block - 1) / per_block;
+}
 
 /// The map with a border of prior around it.
 std::vector<float> with_border(const OccupancyGrid& map, double prior) {
@@ -51,46 +52,28 @@ std::vector<shaders::Split> axes_in_cells(const PoseLattice& lattice, const Occu
   return axes;
 }
 
-gpu::Kernel likelihood_kernel(gpu::Context& context, const ContactLikelihood& model) {
-  const auto floor = static_cast<float>(model.gamma * model.prior);
-  const auto trust = static_cast<float>(1.0 - model.gamma);
-  // log() of a float32 near the smallest normal number is inexact on some devices.
-  const bool in_logs = floor < 1e-30F;
-  const std::uint32_t constants[] = {workgroup, std::bit_cast<std::uint32_t>(floor),
-                                     std::bit_cast<std::uint32_t>(trust), in_logs ? 1U : 0U};
-  return {context,
-          {.name = "accumulate_likelihood",
-           .spirv = shaders::accumulate_likelihood,
-           .buffers = 5,
-           .push_bytes = sizeof(shaders::LikelihoodPush),
-           .constants = constants}};
-}
-
 }  // namespace
 
 DenseLikelihood::DenseLikelihood(gpu::Context& context, gpu::CommandStream& stream,
-                                 std::span<const Hypothesis> hypotheses, const PoseLattice& lattice,
-                                 const ContactLikelihood& model)
-    : context_(context),
-      stream_(stream),
-      lattice_(lattice),
-      kernel_(likelihood_kernel(context, model)) {
+                                 const Belief& belief, std::span<const Hypothesis> hypotheses,
+                                 const PoseLattice& lattice, const ContactLikelihood& model)
+    : context_(context), stream_(stream), lattice_(lattice) {
   for (std::size_t object = 0; object < hypotheses.size(); ++object) {
     const OccupancyGrid& map = hypotheses[object].map;
     const std::vector<float> cells = with_border(map, model.prior);
     const std::vector<shaders::Split> axes = axes_in_cells(lattice, map);
-    if (cells.size() * sizeof(float) > context.limits().storage_range) {
-      throw Error(Fault::input,
-                  fmt::format("map '{}': {} x {} cells exceed the {} MiB that device '{}' binds at "
-                              "once; build it with larger cells",
-                              map.label, map.nx, map.ny, context.limits().storage_range >> 20,
-                              context.name()));
+    if (cells.size() > context.limits().table_texels) {
+      throw Error(
+          Fault::input,
+          fmt::format("map '{}': {} x {} cells exceed the {} that device '{}' reads as a "
+                      "table; build it with larger cells",
+                      map.label, map.nx, map.ny, context.limits().table_texels, context.name()));
     }
     Map& uploaded = maps_.emplace_back();
     uploaded.width = map.nx + 2 * shaders::MAP_BORDER;
     uploaded.height = map.ny + 2 * shaders::MAP_BORDER;
     uploaded.log_odds = gpu::Buffer(context, cells.size() * sizeof(float), gpu::Memory::device,
-                                    fmt::format("map '{}'", map.label));
+                                    fmt::format("map '{}'", map.label), VK_FORMAT_R32_SFLOAT);
     uploaded.axes = gpu::Buffer(context, axes.size() * sizeof(shaders::Split), gpu::Memory::device,
                                 "the lattice's axes");
     stream.upload(uploaded.log_odds, std::span(cells));
@@ -99,7 +82,7 @@ DenseLikelihood::DenseLikelihood(gpu::Context& context, gpu::CommandStream& stre
     const auto scale = std::find_if(scales_.begin(), scales_.end(),
                                     [&](const Scale& s) { return s.cell_mm == map.cell_mm; });
     if (scale == scales_.end()) {
-      scales_.push_back({map.cell_mm, {object}});
+      scales_.push_back({map.cell_mm, choose_path(context, lattice, map.cell_mm, model), {object}});
     } else {
       scale->objects.push_back(object);
     }
@@ -108,18 +91,44 @@ DenseLikelihood::DenseLikelihood(gpu::Context& context, gpu::CommandStream& stre
   bytes_per_element_ = lattice.theta_rad.count * sizeof(shaders::RotatedElement);
   // The table and the work of one dispatch are bounded; below 16 elements reading and writing the
   // belief would begin to count.
-  const std::size_t by_table = std::max<std::size_t>(1, table_bytes / bytes_per_element_);
+  const std::size_t by_table = std::max<std::size_t>(
+      1, std::min<std::size_t>(table_bytes / bytes_per_element_,
+                               context.limits().table_texels / lattice.theta_rad.count));
   const auto by_work = static_cast<std::size_t>(work_per_run / static_cast<double>(lattice.bins()));
   batch_elements_ = std::min(by_table, std::max<std::size_t>(16, by_work));
   segment_elements_ = std::min(longest_segment, batch_elements_);
+
+  reserve(1);
+  for (const Scale& scale : scales_) {
+    const std::size_t object = scale.objects.front();
+    dispatch(scale.path, object, belief.slabs(object).front(), 0, 0);
+  }
+}
+
+void DenseLikelihood::dispatch(const LikelihoodPath& path, std::size_t object, const Slab& slab,
+                               std::size_t segments, std::size_t elements) {
+  const Map& map = maps_[object];
+  const shaders::LikelihoodPush push{.nx = slab.nx,
+                                     .row_first = slab.row_first,
+                                     .rows = slab.row_count,
+                                     .theta_first = slab.theta_first,
+                                     .segments = static_cast<shaders::uint>(segments),
+                                     .elements = static_cast<shaders::uint>(elements),
+                                     .map_width = map.width,
+                                     .map_height = map.height};
+  const std::uint32_t invocations =
+      blocks(slab.nx, path.bins_x) * blocks(slab.row_count, path.bins_y);
+  stream_.dispatch(path.kernel,
+                   {&map.log_odds, &map.axes, &elements_, &segments_, &slab.log_likelihood}, push,
+                   {blocks(invocations, likelihood_workgroup), 1, slab.theta_count});
 }
 
 void DenseLikelihood::reserve(std::size_t elements) {
   if (elements * bytes_per_element_ > elements_.bytes()) {
-    segments_ =
-        gpu::Buffer(context_, elements * sizeof(shaders::Segment), gpu::Memory::device, "segments");
+    segments_ = gpu::Buffer(context_, elements * sizeof(shaders::Segment), gpu::Memory::device,
+                            "segments", VK_FORMAT_R32G32B32A32_SINT);
     elements_ = gpu::Buffer(context_, elements * bytes_per_element_, gpu::Memory::device,
-                            "rotated elements");
+                            "rotated elements", VK_FORMAT_R32G32B32A32_SINT);
   }
 }
 
@@ -150,22 +159,8 @@ void DenseLikelihood::accumulate(const ContactEvidence& evidence, const Belief& 
                           lattice_.theta_rad, scale.cell_mm);
       stream_.upload(elements_, std::span<const shaders::RotatedElement>(rotated));
       for (const std::size_t object : scale.objects) {
-        const Map& map = maps_[object];
         for (const Slab& slab : belief.slabs(object)) {
-          const shaders::LikelihoodPush push{.plane_first = slab.plane_first,
-                                             .plane_count = slab.plane_count,
-                                             .theta_first = slab.theta_first,
-                                             .nx = static_cast<shaders::uint>(lattice_.x_mm.count),
-                                             .segments = static_cast<shaders::uint>(batch.size()),
-                                             .elements = static_cast<shaders::uint>(elements),
-                                             .map_width = map.width,
-                                             .map_height = map.height};
-          stream_.dispatch(kernel_,
-                           std::array{gpu::Binding{&map.log_odds}, gpu::Binding{&map.axes},
-                                      gpu::Binding{&elements_}, gpu::Binding{&segments_},
-                                      gpu::Binding{&slab.log_likelihood}},
-                           push,
-                           {(slab.plane_count + workgroup - 1) / workgroup, 1, slab.theta_count});
+          dispatch(scale.path, object, slab, batch.size(), elements);
           pending += static_cast<double>(slab.bins()) * static_cast<double>(elements);
           if (pending > work_per_run) {
             stream_.run();
@@ -180,6 +175,14 @@ void DenseLikelihood::accumulate(const ContactEvidence& evidence, const Belief& 
     }
   }
   stream_.run();
+}
+
+std::vector<std::string> DenseLikelihood::paths() const {
+  std::vector<std::string> descriptions;
+  for (const Scale& scale : scales_) {
+    descriptions.push_back(scale.path.description);
+  }
+  return descriptions;
 }
 
 std::uint64_t DenseLikelihood::device_bytes() const {

@@ -7,19 +7,20 @@
 #include "belief.hpp"
 #include "command_stream.hpp"
 #include "contact_evidence.hpp"
+#include "likelihood_path.hpp"
 #include "palpate/lattice.hpp"
 #include "palpate/pose_histogram.hpp"
 #include "palpate/sensor_model.hpp"
 
 namespace palpate {
 
-/// The log-likelihood of touches at every bin of the lattice, for several maps (Eq. 7): one bin per
-/// kernel invocation.
+/// The log-likelihood of touches at every bin of the lattice, for several maps (Eq. 7).
 class DenseLikelihood {
  public:
-  /// Records the upload of the maps, in the order of the belief's objects. Beyond each of them lies
-  /// the model's prior.
-  DenseLikelihood(gpu::Context& context, gpu::CommandStream& stream,
+  /// Records the upload of the maps, in the order of the belief's objects, and a first, empty run
+  /// of every kernel: drivers compile them then, and no touch has to wait for that. Beyond each map
+  /// lies the model's prior.
+  DenseLikelihood(gpu::Context& context, gpu::CommandStream& stream, const Belief& belief,
                   std::span<const Hypothesis> hypotheses, const PoseLattice& lattice,
                   const ContactLikelihood& model);
 
@@ -31,6 +32,9 @@ class DenseLikelihood {
   void accumulate(const ContactEvidence& evidence, const Belief& belief,
                   const std::function<void(double)>& progress);
 
+  /// The path of every cell size among the maps, and why it was chosen.
+  std::vector<std::string> paths() const;
+
   std::uint64_t device_bytes() const;
 
  private:
@@ -40,19 +44,22 @@ class DenseLikelihood {
     gpu::Buffer log_odds;
     gpu::Buffer axes;  ///< the lattice's x and y in cells of this map
   };
-  /// Maps of one cell size share the rotated elements.
+  /// Maps of one cell size share the rotated elements and the path.
   struct Scale {
     double cell_mm = 0.0;
+    LikelihoodPath path;
     std::vector<std::size_t> objects;
   };
 
+  /// Records one run of the path's kernel over a slab.
+  void dispatch(const LikelihoodPath& path, std::size_t object, const Slab& slab,
+                std::size_t segments, std::size_t elements);
   /// Makes room for this many elements in the tables.
   void reserve(std::size_t elements);
 
   gpu::Context& context_;
   gpu::CommandStream& stream_;
   PoseLattice lattice_;
-  gpu::Kernel kernel_;
   std::vector<Map> maps_;
   std::vector<Scale> scales_;
   VkDeviceSize bytes_per_element_ = 0;  ///< rotated by every theta

@@ -62,15 +62,32 @@ double common_prior(std::span<const Hypothesis> hypotheses) {
   return first.prior;
 }
 
+/// An array at rest and the log-likelihood of its reading No Contact everywhere.
+struct StillArray {
+  explicit StillArray(Belief belief) : no_contact(std::move(belief)) {}
+
+  bool holds(const Touch& touch) const {
+    return touch.T_robot_sensor.translation_mm == T_robot_sensor.translation_mm &&
+           touch.T_robot_sensor.theta_rad == T_robot_sensor.theta_rad &&
+           std::equal(touch.elements_mm.begin(), touch.elements_mm.end(), elements_mm.begin(),
+                      elements_mm.end());
+  }
+
+  Pose T_robot_sensor;
+  std::vector<glm::dvec2> elements_mm;
+  Belief no_contact;
+};
+
 }  // namespace
 
 struct PoseHistogram::Impl {
   Impl(Device& device, std::span<const Hypothesis> hypotheses, const HistogramOptions& wanted,
        const ContactLikelihood& model)
       : options(wanted),
-        stream(device.context()),
-        belief(device.context(), stream, options.lattice, hypotheses.size()),
-        likelihood(device.context(), stream, hypotheses, options.lattice, model) {
+        context(device.context()),
+        stream(context),
+        belief(context, stream, options.lattice, hypotheses.size()),
+        likelihood(context, stream, belief, hypotheses, options.lattice, model) {
     double total = 0.0;
     for (const Hypothesis& hypothesis : hypotheses) {
       total += hypothesis.weight;
@@ -78,7 +95,7 @@ struct PoseHistogram::Impl {
     for (const Hypothesis& hypothesis : hypotheses) {
       log_weight.push_back(std::log(hypothesis.weight) - std::log(total));
     }
-    stream.run();
+    summaries();  // runs what was recorded, and the reductions a first time
   }
 
   /// The reductions of the belief as it is now; kept until the next touch.
@@ -114,20 +131,40 @@ struct PoseHistogram::Impl {
     return probability;
   }
 
-  /// Scales sums relative to an object's largest bin to that object's probability.
-  std::vector<double> to_probability(int object, const std::vector<float>& sums) {
-    const double scale = identity()[object] / summaries()[object].sum;
-    std::vector<double> probability(sums.begin(), sums.end());
-    for (double& p : probability) {
-      p *= scale;
+  /// Adds a touch as what it says beyond No Contact everywhere.
+  void update_still(const Touch& touch) {
+    const glm::dvec2& pivot_mm = options.lattice.pivot_mm;
+    if (!still || !still->holds(touch)) {
+      if (!still) {
+        still.emplace(Belief(context, stream, options.lattice, log_weight.size()));
+      }
+      still->T_robot_sensor = touch.T_robot_sensor;
+      still->elements_mm.assign(touch.elements_mm.begin(), touch.elements_mm.end());
+      still->no_contact.clear();
+      likelihood.accumulate(gather_no_contact(touch, pivot_mm, likelihood.segment_elements()),
+                            still->no_contact, {});
     }
-    return probability;
+    belief.add(still->no_contact);
+    likelihood.accumulate(
+        gather_differences(touch, options.classifier, pivot_mm, likelihood.segment_elements()),
+        belief, {});
+  }
+
+  /// Scales sums relative to an object's largest bin to that object's probability.
+  std::vector<double> to_probability(int object, std::vector<double> sums) {
+    const double scale = identity()[object] / summaries()[object].sum;
+    for (double& sum : sums) {
+      sum *= scale;
+    }
+    return sums;
   }
 
   HistogramOptions options;
+  gpu::Context& context;
   gpu::CommandStream stream;
   Belief belief;
   DenseLikelihood likelihood;
+  std::optional<StillArray> still;
   std::vector<double> log_weight;
   std::optional<std::vector<BeliefSummary>> summarised;
 };
@@ -149,17 +186,22 @@ PoseHistogram& PoseHistogram::operator=(PoseHistogram&&) noexcept = default;
 
 void PoseHistogram::reset() {
   impl_->belief.clear();
-  impl_->stream.run();
   impl_->summarised.reset();
 }
 
 void PoseHistogram::update(std::span<const Touch> touches,
                            const std::function<void(double)>& progress) {
-  const ContactEvidence evidence =
-      gather_evidence(touches, impl_->options.classifier, impl_->options.lattice.pivot_mm,
-                      impl_->likelihood.segment_elements());
   impl_->summarised.reset();
-  impl_->likelihood.accumulate(evidence, impl_->belief, progress);
+  if (impl_->options.still_array) {
+    for (const Touch& touch : touches) {
+      impl_->update_still(touch);
+    }
+    return;
+  }
+  impl_->likelihood.accumulate(
+      gather_evidence(touches, impl_->options.classifier, impl_->options.lattice.pivot_mm,
+                      impl_->likelihood.segment_elements()),
+      impl_->belief, progress);
 }
 
 Estimate PoseHistogram::estimate() const {
@@ -179,14 +221,10 @@ Estimate PoseHistogram::estimate() const {
   return estimate;
 }
 
-std::vector<double> PoseHistogram::marginal_xy(int object) const {
-  return impl_->to_probability(
-      object, impl_->belief.sum_over_theta(object, impl_->summaries()[object].max));
-}
-
-std::vector<double> PoseHistogram::marginal_theta(int object) const {
-  return impl_->to_probability(
-      object, impl_->belief.sum_over_plane(object, impl_->summaries()[object].max));
+Marginals PoseHistogram::marginals(int object) const {
+  BeliefMarginals sums = impl_->belief.marginals(object, impl_->summaries()[object].max);
+  return {.xy = impl_->to_probability(object, std::move(sums.xy)),
+          .theta = impl_->to_probability(object, std::move(sums.theta))};
 }
 
 std::vector<double> PoseHistogram::log_likelihood(int object) const {
@@ -195,8 +233,11 @@ std::vector<double> PoseHistogram::log_likelihood(int object) const {
 
 const PoseLattice& PoseHistogram::lattice() const { return impl_->options.lattice; }
 
+std::vector<std::string> PoseHistogram::paths() const { return impl_->likelihood.paths(); }
+
 std::uint64_t PoseHistogram::device_bytes() const {
-  return impl_->belief.device_bytes() + impl_->likelihood.device_bytes();
+  const std::uint64_t still = impl_->still ? impl_->still->no_contact.device_bytes() : 0;
+  return impl_->belief.device_bytes() + still + impl_->likelihood.device_bytes();
 }
 
 }  // namespace palpate

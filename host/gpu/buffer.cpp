@@ -9,7 +9,8 @@
 
 namespace palpate::gpu {
 
-Buffer::Buffer(Context& context, VkDeviceSize bytes, Memory memory, std::string_view purpose)
+Buffer::Buffer(Context& context, VkDeviceSize bytes, Memory memory, std::string_view purpose,
+               VkFormat texel)
     : device_(context.device()), bytes_(bytes) {
   const auto doing = fmt::format("device '{}': {:.1f} MiB for {}", context.name(),
                                  static_cast<double>(bytes) / (1 << 20), purpose);
@@ -24,8 +25,8 @@ Buffer::Buffer(Context& context, VkDeviceSize bytes, Memory memory, std::string_
       .size = bytes,
       .usage = static_cast<VkBufferUsageFlags>(
           memory == Memory::device
-              ? VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_SRC_BIT |
-                    VK_BUFFER_USAGE_TRANSFER_DST_BIT
+              ? VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_UNIFORM_TEXEL_BUFFER_BIT |
+                    VK_BUFFER_USAGE_TRANSFER_SRC_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT
           : memory == Memory::upload ? VK_BUFFER_USAGE_TRANSFER_SRC_BIT
                                      : VK_BUFFER_USAGE_TRANSFER_DST_BIT)};
   check(vkCreateBuffer(device_, &info, nullptr, &buffer_), doing);
@@ -48,6 +49,13 @@ Buffer::Buffer(Context& context, VkDeviceSize bytes, Memory memory, std::string_
                                         .memoryTypeIndex = type};
   check(vkAllocateMemory(owner.device_, &allocation, nullptr, &owner.memory_), doing);
   check(vkBindBufferMemory(owner.device_, owner.buffer_, owner.memory_, 0), doing);
+  if (texel != VK_FORMAT_UNDEFINED) {
+    const VkBufferViewCreateInfo view{.sType = VK_STRUCTURE_TYPE_BUFFER_VIEW_CREATE_INFO,
+                                      .buffer = owner.buffer_,
+                                      .format = texel,
+                                      .range = VK_WHOLE_SIZE};
+    check(vkCreateBufferView(owner.device_, &view, nullptr, &owner.table_), doing);
+  }
   if (memory != Memory::device) {
     void* mapping = nullptr;
     check(vkMapMemory(owner.device_, owner.memory_, 0, VK_WHOLE_SIZE, 0, &mapping), doing);
@@ -58,6 +66,7 @@ Buffer::Buffer(Context& context, VkDeviceSize bytes, Memory memory, std::string_
 
 Buffer::~Buffer() {
   if (device_ != VK_NULL_HANDLE) {
+    vkDestroyBufferView(device_, table_, nullptr);
     vkDestroyBuffer(device_, buffer_, nullptr);
     vkFreeMemory(device_, memory_, nullptr);
   }
@@ -67,6 +76,7 @@ void Buffer::swap(Buffer& other) noexcept {
   std::swap(device_, other.device_);
   std::swap(buffer_, other.buffer_);
   std::swap(memory_, other.memory_);
+  std::swap(table_, other.table_);
   std::swap(bytes_, other.bytes_);
   std::swap(data_, other.data_);
 }

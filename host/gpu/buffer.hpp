@@ -19,7 +19,10 @@ class Buffer {
  public:
   Buffer() = default;
   /// @param purpose what it holds, for the message when memory runs out
-  Buffer(Context& context, VkDeviceSize bytes, Memory memory, std::string_view purpose);
+  /// @param texel the format as which kernels read it where they bind it as a table; device memory
+  /// only
+  Buffer(Context& context, VkDeviceSize bytes, Memory memory, std::string_view purpose,
+         VkFormat texel = VK_FORMAT_UNDEFINED);
   Buffer(Buffer&& other) noexcept { swap(other); }
   Buffer& operator=(Buffer&& other) noexcept {
     swap(other);
@@ -28,6 +31,8 @@ class Buffer {
   ~Buffer();
 
   VkBuffer handle() const { return buffer_; }
+  /// Null without a texel format.
+  VkBufferView table() const { return table_; }
   VkDeviceSize bytes() const { return bytes_; }
   /// Start of the mapped memory; null for Memory::device.
   std::byte* data() const { return data_; }
@@ -38,6 +43,7 @@ class Buffer {
   VkDevice device_ = VK_NULL_HANDLE;
   VkBuffer buffer_ = VK_NULL_HANDLE;
   VkDeviceMemory memory_ = VK_NULL_HANDLE;
+  VkBufferView table_ = VK_NULL_HANDLE;
   VkDeviceSize bytes_ = 0;
   std::byte* data_ = nullptr;
 };

@@ -139,15 +139,16 @@ void CommandStream::fill(const Buffer& target, std::uint32_t word) {
 }
 
 VkDescriptorSet CommandStream::descriptor_set(const Kernel& kernel,
-                                              std::span<const Binding> bindings) {
+                                              std::span<const Buffer* const> buffers) {
   const VkDevice device = context_.device();
   if (sets_used_ == descriptor_pools_.size() * sets_per_pool) {
-    const VkDescriptorPoolSize size{VK_DESCRIPTOR_TYPE_STORAGE_BUFFER,
-                                    sets_per_pool * max_storage_buffers};
+    const VkDescriptorPoolSize sizes[] = {
+        {descriptor_type(Access::table), sets_per_pool * max_bindings},
+        {descriptor_type(Access::storage), sets_per_pool * max_bindings}};
     const VkDescriptorPoolCreateInfo info{.sType = VK_STRUCTURE_TYPE_DESCRIPTOR_POOL_CREATE_INFO,
                                           .maxSets = sets_per_pool,
-                                          .poolSizeCount = 1,
-                                          .pPoolSizes = &size};
+                                          .poolSizeCount = 2,
+                                          .pPoolSizes = sizes};
     VkDescriptorPool pool = VK_NULL_HANDLE;
     check(vkCreateDescriptorPool(device, &info, nullptr, &pool), "creating a descriptor pool");
     descriptor_pools_.push_back(pool);
@@ -162,45 +163,46 @@ VkDescriptorSet CommandStream::descriptor_set(const Kernel& kernel,
   check(vkAllocateDescriptorSets(device, &info, &set), "binding buffers");
   ++sets_used_;
 
-  std::array<VkDescriptorBufferInfo, max_storage_buffers> ranges{};
-  std::array<VkWriteDescriptorSet, max_storage_buffers> writes{};
-  for (std::size_t i = 0; i < bindings.size(); ++i) {
-    const Binding& binding = bindings[i];
-    const VkDeviceSize bytes =
-        binding.bytes == VK_WHOLE_SIZE ? binding.buffer->bytes() - binding.offset : binding.bytes;
-    if (bytes > context_.limits().storage_range) {
-      throw Error(Fault::system,
-                  fmt::format("kernel {}: binding {} of {} B exceeds the device's {} B",
-                              kernel.name(), i, bytes, context_.limits().storage_range));
-    }
-    ranges[i] = {binding.buffer->handle(), binding.offset, bytes};
+  std::array<VkDescriptorBufferInfo, max_bindings> ranges{};
+  std::array<VkBufferView, max_bindings> tables{};
+  std::array<VkWriteDescriptorSet, max_bindings> writes{};
+  for (std::size_t i = 0; i < buffers.size(); ++i) {
+    ranges[i] = {buffers[i]->handle(), 0, VK_WHOLE_SIZE};
+    tables[i] = buffers[i]->table();
     writes[i] = {.sType = VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET,
                  .dstSet = set,
                  .dstBinding = static_cast<std::uint32_t>(i),
                  .descriptorCount = 1,
-                 .descriptorType = VK_DESCRIPTOR_TYPE_STORAGE_BUFFER,
-                 .pBufferInfo = &ranges[i]};
+                 .descriptorType = descriptor_type(kernel.bindings()[i]),
+                 .pBufferInfo = &ranges[i],
+                 .pTexelBufferView = &tables[i]};
+    if (kernel.bindings()[i] == Access::storage &&
+        buffers[i]->bytes() > context_.limits().storage_range) {
+      throw Error(
+          Fault::system,
+          fmt::format("kernel {}: binding {} of {} B exceeds the device's {} B", kernel.name(), i,
+                      buffers[i]->bytes(), context_.limits().storage_range));
+    }
   }
-  vkUpdateDescriptorSets(device, static_cast<std::uint32_t>(bindings.size()), writes.data(), 0,
+  vkUpdateDescriptorSets(device, static_cast<std::uint32_t>(buffers.size()), writes.data(), 0,
                          nullptr);
   return set;
 }
 
-void CommandStream::dispatch_bytes(const Kernel& kernel, std::span<const Binding> bindings,
+void CommandStream::dispatch_bytes(const Kernel& kernel, std::span<const Buffer* const> buffers,
                                    std::span<const std::byte> push,
                                    std::array<std::uint32_t, 3> groups) {
   record([&] {
     const auto& most = context_.limits().group_count;
-    if (bindings.size() != kernel.buffers() || push.size() != kernel.push_bytes() ||
+    if (buffers.size() != kernel.bindings().size() || push.size() != kernel.push_bytes() ||
         groups[0] > most[0] || groups[1] > most[1] || groups[2] > most[2]) {
       throw Error(
           Fault::system,
           fmt::format("kernel {}: {} buffers, {} B of constants and {} x {} x {} workgroups "
                       "do not fit it or the device",
-                      kernel.name(), bindings.size(), push.size(), groups[0], groups[1],
-                      groups[2]));
+                      kernel.name(), buffers.size(), push.size(), groups[0], groups[1], groups[2]));
     }
-    const VkDescriptorSet set = descriptor_set(kernel, bindings);
+    const VkDescriptorSet set = descriptor_set(kernel, buffers);
     barrier();
     vkCmdBindPipeline(commands_, VK_PIPELINE_BIND_POINT_COMPUTE, kernel.pipeline());
     vkCmdBindDescriptorSets(commands_, VK_PIPELINE_BIND_POINT_COMPUTE, kernel.layout(), 0, 1, &set,

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstring>
+#include <initializer_list>
 #include <span>
 #include <vector>
 
@@ -9,13 +10,6 @@
 #include "kernel.hpp"
 
 namespace palpate::gpu {
-
-/// A range of a buffer bound to a kernel.
-struct Binding {
-  const Buffer* buffer = nullptr;
-  VkDeviceSize offset = 0;
-  VkDeviceSize bytes = VK_WHOLE_SIZE;
-};
 
 /// Records copies and dispatches, then runs them in order. Every command sees the results of all
 /// commands before it: the one barrier function stands between any two. A call that throws drops
@@ -40,12 +34,14 @@ class CommandStream {
   /// Sets every 32-bit word of the buffer.
   void fill(const Buffer& target, std::uint32_t word);
 
-  /// Runs a kernel on groups[0] x groups[1] x groups[2] workgroups.
+  /// Runs a kernel, with a buffer for each of its bindings, on groups[0] x groups[1] x groups[2]
+  /// workgroups.
   template <typename Push>
-  void dispatch(const Kernel& kernel, std::span<const Binding> bindings, const Push& push,
-                std::array<std::uint32_t, 3> groups) {
+  void dispatch(const Kernel& kernel, std::initializer_list<const Buffer*> buffers,
+                const Push& push, std::array<std::uint32_t, 3> groups) {
     static_assert(std::is_trivially_copyable_v<Push>);
-    dispatch_bytes(kernel, bindings, std::as_bytes(std::span(&push, 1)), groups);
+    dispatch_bytes(kernel, std::span(buffers.begin(), buffers.size()),
+                   std::as_bytes(std::span(&push, 1)), groups);
   }
 
   /// Submits everything recorded, waits for it and delivers the downloads.
@@ -74,7 +70,7 @@ class CommandStream {
   Slice stage(Arena& arena, VkDeviceSize bytes);
   void upload_bytes(const Buffer& target, std::span<const std::byte> bytes, VkDeviceSize offset);
   void download_bytes(const Buffer& source, std::span<std::byte> bytes, VkDeviceSize offset);
-  void dispatch_bytes(const Kernel& kernel, std::span<const Binding> bindings,
+  void dispatch_bytes(const Kernel& kernel, std::span<const Buffer* const> buffers,
                       std::span<const std::byte> push, std::array<std::uint32_t, 3> groups);
   /// Calls `commands` to add to the recording; see above for when that throws.
   template <typename Commands>
@@ -84,7 +80,7 @@ class CommandStream {
   void submit();
   void rewind();
   void reset();
-  VkDescriptorSet descriptor_set(const Kernel& kernel, std::span<const Binding> bindings);
+  VkDescriptorSet descriptor_set(const Kernel& kernel, std::span<const Buffer* const> buffers);
 
   Context& context_;
   VkCommandPool pool_ = VK_NULL_HANDLE;

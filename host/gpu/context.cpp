@@ -110,14 +110,18 @@ Context::Context(std::string_view name_or_index) {
   queue_family_ = candidate.queue_family;
   name_ = candidate.info.name;
 
+  VkPhysicalDeviceSubgroupProperties subgroup{
+      .sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_SUBGROUP_PROPERTIES};
   VkPhysicalDeviceMaintenance3Properties maintenance{
-      .sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_MAINTENANCE_3_PROPERTIES};
+      .sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_MAINTENANCE_3_PROPERTIES, .pNext = &subgroup};
   VkPhysicalDeviceProperties2 properties{.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_PROPERTIES_2,
                                          .pNext = &maintenance};
   vkGetPhysicalDeviceProperties2(physical_, &properties);
   const VkPhysicalDeviceLimits& limits = properties.properties.limits;
   limits_.storage_range = limits.maxStorageBufferRange;
   limits_.allocation = maintenance.maxMemoryAllocationSize;
+  limits_.table_texels = limits.maxTexelBufferElements;
+  limits_.subgroup = subgroup.subgroupSize;
   std::copy_n(limits.maxComputeWorkGroupCount, 3, limits_.group_count);
   limits_.push_bytes = limits.maxPushConstantsSize;
 

@@ -47,6 +47,8 @@ class Instance {
 struct Limits {
   VkDeviceSize storage_range = 0;  ///< bytes of one storage-buffer binding
   VkDeviceSize allocation = 0;     ///< bytes of one allocation
+  std::uint32_t table_texels = 0;  ///< elements of one texel buffer
+  std::uint32_t subgroup = 0;      ///< invocations that run in step: about 8 on a CPU, 32 on a GPU
   VkDeviceSize memory = 0;         ///< bytes of the largest heap of device memory
   std::uint32_t group_count[3] = {};
   std::uint32_t push_bytes = 0;

@@ -10,30 +10,35 @@
 
 namespace palpate::gpu {
 
+VkDescriptorType descriptor_type(Access access) {
+  return access == Access::table ? VK_DESCRIPTOR_TYPE_UNIFORM_TEXEL_BUFFER
+                                 : VK_DESCRIPTOR_TYPE_STORAGE_BUFFER;
+}
+
 Kernel::Kernel(Context& context, const KernelInfo& info) {
   const auto doing = fmt::format("device '{}': kernel {}", context.name(), info.name);
-  if (info.push_bytes > context.limits().push_bytes || info.buffers > max_storage_buffers) {
+  if (info.push_bytes > context.limits().push_bytes || info.bindings.size() > max_bindings) {
     throw Error(Fault::system, fmt::format("{}: needs {} B of push constants and {} buffers, more "
                                            "than the device has",
-                                           doing, info.push_bytes, info.buffers));
+                                           doing, info.push_bytes, info.bindings.size()));
   }
   // A constructor that throws runs no destructor: `owner` gives back what it has so far.
   Kernel owner;
   owner.device_ = context.device();
-  owner.buffers_ = info.buffers;
+  owner.bindings_.assign(info.bindings.begin(), info.bindings.end());
   owner.push_bytes_ = info.push_bytes;
   owner.name_ = info.name;
 
   std::vector<VkDescriptorSetLayoutBinding> bindings;
-  for (std::uint32_t i = 0; i < info.buffers; ++i) {
-    bindings.push_back({.binding = i,
-                        .descriptorType = VK_DESCRIPTOR_TYPE_STORAGE_BUFFER,
+  for (const Access access : info.bindings) {
+    bindings.push_back({.binding = static_cast<std::uint32_t>(bindings.size()),
+                        .descriptorType = descriptor_type(access),
                         .descriptorCount = 1,
                         .stageFlags = VK_SHADER_STAGE_COMPUTE_BIT});
   }
   const VkDescriptorSetLayoutCreateInfo set_info{
       .sType = VK_STRUCTURE_TYPE_DESCRIPTOR_SET_LAYOUT_CREATE_INFO,
-      .bindingCount = info.buffers,
+      .bindingCount = static_cast<std::uint32_t>(bindings.size()),
       .pBindings = bindings.data()};
   check(vkCreateDescriptorSetLayout(owner.device_, &set_info, nullptr, &owner.set_layout_), doing);
 
@@ -90,7 +95,7 @@ void Kernel::swap(Kernel& other) noexcept {
   std::swap(set_layout_, other.set_layout_);
   std::swap(layout_, other.layout_);
   std::swap(pipeline_, other.pipeline_);
-  std::swap(buffers_, other.buffers_);
+  std::swap(bindings_, other.bindings_);
   std::swap(push_bytes_, other.push_bytes_);
   std::swap(name_, other.name_);
 }

@@ -2,16 +2,25 @@
 
 #include <cstdint>
 #include <span>
+#include <vector>
 
 #include "context.hpp"
 
 namespace palpate::gpu {
 
-/// A compute shader ready to run. It binds storage buffers 0 .. buffers - 1 of set 0.
+/// How a kernel reaches a buffer.
+enum class Access {
+  table,    ///< reads it as a texel buffer: the fast way on every device for what is not written
+  storage,  ///< reads and writes it as a storage buffer
+};
+
+VkDescriptorType descriptor_type(Access access);
+
+/// A compute shader ready to run. Binding i of set 0 is bindings[i].
 struct KernelInfo {
   const char* name = "";
   std::span<const std::uint32_t> spirv;
-  std::uint32_t buffers = 0;
+  std::span<const Access> bindings;
   std::uint32_t push_bytes = 0;
   std::span<const std::uint32_t> constants = {};  ///< specialization constants 0, 1, ... as bits
 };
@@ -32,7 +41,7 @@ class Kernel {
   VkPipeline pipeline() const { return pipeline_; }
   VkPipelineLayout layout() const { return layout_; }
   VkDescriptorSetLayout set_layout() const { return set_layout_; }
-  std::uint32_t buffers() const { return buffers_; }
+  std::span<const Access> bindings() const { return bindings_; }
   std::uint32_t push_bytes() const { return push_bytes_; }
   const char* name() const { return name_; }
 
@@ -43,7 +52,7 @@ class Kernel {
   VkDescriptorSetLayout set_layout_ = VK_NULL_HANDLE;
   VkPipelineLayout layout_ = VK_NULL_HANDLE;
   VkPipeline pipeline_ = VK_NULL_HANDLE;
-  std::uint32_t buffers_ = 0;
+  std::vector<Access> bindings_;
   std::uint32_t push_bytes_ = 0;
   const char* name_ = "";
 };

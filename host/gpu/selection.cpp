@@ -86,17 +86,13 @@ Candidate inspect(VkPhysicalDevice physical, int index) {
 
   const auto family = compute_family(physical);
   const std::uint32_t buffers = properties.limits.maxPerStageDescriptorStorageBuffers;
-  const std::uint32_t invocations = properties.limits.maxComputeWorkGroupInvocations;
   if (!has_version_1_1) {
     info.reason = fmt::format("supports Vulkan {}, 1.1 is needed", info.api);
   } else if (!family) {
     info.reason = "has no compute queue";
-  } else if (buffers < max_storage_buffers) {
-    info.reason = fmt::format("binds {} storage buffers at a time, {} are needed", buffers,
-                              max_storage_buffers);
-  } else if (invocations < max_group_invocations) {
-    info.reason = fmt::format("runs {} invocations per workgroup, {} are needed", invocations,
-                              max_group_invocations);
+  } else if (buffers < max_bindings) {
+    info.reason =
+        fmt::format("binds {} storage buffers at a time, {} are needed", buffers, max_bindings);
   } else {
     info.usable = true;
     candidate.queue_family = *family;

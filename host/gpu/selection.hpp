@@ -11,11 +11,8 @@
 
 namespace palpate::gpu {
 
-/// Most storage buffers that one kernel binds.
-inline constexpr std::uint32_t max_storage_buffers = 6;
-
-/// Most invocations in a workgroup of a kernel.
-inline constexpr std::uint32_t max_group_invocations = 256;
+/// Most buffers that one kernel binds, of either kind.
+inline constexpr std::uint32_t max_bindings = 6;
 
 /// A physical device with what speaks for or against it.
 struct Candidate {

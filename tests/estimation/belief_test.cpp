@@ -42,8 +42,9 @@ Told tell(Device& device, const Recording& recording, const HistogramOptions& wa
   told.after = histogram.estimate();
   for (const int object : {0, 1}) {
     told.log_likelihood.push_back(histogram.log_likelihood(object));
-    told.marginal.push_back(histogram.marginal_xy(object));
-    told.marginal.push_back(histogram.marginal_theta(object));
+    Marginals marginals = histogram.marginals(object);
+    told.marginal.push_back(std::move(marginals.xy));
+    told.marginal.push_back(std::move(marginals.theta));
   }
   return told;
 }
@@ -56,15 +57,18 @@ class Slabs : public testing::Test {
     const Told whole = tell(device, recording, wanted);
     device.context().lower_limits(limits);
     const Told cut = tell(device, recording, wanted);
-    EXPECT_EQ(cut.log_likelihood, whole.log_likelihood);
+    for (std::size_t i = 0; i < whole.log_likelihood.size(); ++i) {
+      // Register tiles begin elsewhere in a part of a plane, which rounds a bin's place in its tile
+      // differently.
+      EXPECT_LT(largest_difference(cut.log_likelihood[i], whole.log_likelihood[i]), 2e-5);
+    }
     EXPECT_EQ(cut.before.mode.bin, 0);
     EXPECT_EQ(cut.after.mode.object, whole.after.mode.object);
     EXPECT_EQ(cut.after.mode.bin, whole.after.mode.bin);
-    EXPECT_EQ(cut.after.mode.log_likelihood, whole.after.mode.log_likelihood);
-    // Float32 sums of at most 4,096 terms in another order.
-    EXPECT_LT(largest_difference(cut.after.identity, whole.after.identity), 1e-6);
+    EXPECT_NEAR(cut.after.mode.log_likelihood, whole.after.mode.log_likelihood, 2e-5);
+    EXPECT_LT(largest_difference(cut.after.identity, whole.after.identity), 1e-5);
     for (std::size_t i = 0; i < whole.marginal.size(); ++i) {
-      EXPECT_LT(largest_difference(cut.marginal[i], whole.marginal[i]), 1e-6);
+      EXPECT_LT(largest_difference(cut.marginal[i], whole.marginal[i]), 1e-5);
     }
   }
 
@@ -139,10 +143,10 @@ TEST(Belief, MoreBinsThanMemoryIsRefusedBeforeAnyIsTaken) {
   expect_refused();
 }
 
-TEST(Belief, AMapAboveTheBindingIsRefusedByItsLabel) {
+TEST(Belief, AMapLargerThanATableIsRefusedByItsLabel) {
   Device device = Device::open();
   gpu::Limits limits = device.context().limits();
-  limits.storage_range = 1000;
+  limits.table_texels = 1000;
   device.context().lower_limits(limits);
   const Hypothesis hypothesis{random_map(40, 40, 0.5, 1.0, 114), 1.0};
   HistogramOptions small;

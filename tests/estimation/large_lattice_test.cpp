@@ -52,10 +52,10 @@ TEST(LargeLattice, FiveMillionBinsAreAsGoodAsTenThousand) {
           << "object " << object << ", bin " << bin;
     }
     double sum = 0.0;
-    for (const double p : histogram.marginal_theta(object)) {
+    for (const double p : histogram.marginals(object).theta) {
       sum += p;
     }
-    // Each theta is a sum of 10,000 float32 terms, 64 lanes of 157 each.
+    // Each theta is a sum of float32 parts of 512 terms.
     EXPECT_NEAR(sum, estimate.identity[static_cast<std::size_t>(object)], 1e-5);
   }
   EXPECT_EQ(estimate.mode.log_likelihood, best);

@@ -90,8 +90,7 @@ TEST(PoseHistogram, AgreesWithTheReferenceInIdentityModeAndMarginals) {
 
     double total = 0.0;
     for (int object = 0; object < 3; ++object) {
-      const std::vector<double> xy = histogram.marginal_xy(object);
-      const std::vector<double> theta = histogram.marginal_theta(object);
+      const auto [xy, theta] = histogram.marginals(object);
       EXPECT_LT(largest_difference(xy, reference::marginal_xy(expected, object)), tolerance);
       EXPECT_LT(largest_difference(theta, reference::marginal_theta(expected, object)), tolerance);
       double sum_xy = 0.0;
@@ -169,7 +168,7 @@ TEST(PoseHistogram, ATwofoldSymmetricMapCannotTellHalfATurn) {
   Device device = Device::open();
   PoseHistogram histogram(device, std::span(&hypothesis, 1), options);
   histogram.update(all_touches(recording));
-  const std::vector<double> theta = histogram.marginal_theta(0);
+  const std::vector<double> theta = histogram.marginals(0).theta;
   for (std::size_t t = 0; t < 3; ++t) {
     EXPECT_NEAR(theta[t], theta[t + 3], 1e-4) << "the tolerance of one touch";
   }
@@ -247,10 +246,9 @@ TEST(PoseHistogram, TheSameInputGivesTheSameBits) {
     histogram.update(all_touches(recording));
     std::vector<double> all = all_bins(histogram, 3);
     for (const int object : {0, 1, 2}) {
-      for (const auto& marginal :
-           {histogram.marginal_xy(object), histogram.marginal_theta(object)}) {
-        all.insert(all.end(), marginal.begin(), marginal.end());
-      }
+      const Marginals marginals = histogram.marginals(object);
+      all.insert(all.end(), marginals.xy.begin(), marginals.xy.end());
+      all.insert(all.end(), marginals.theta.begin(), marginals.theta.end());
     }
     const Estimate estimate = histogram.estimate();
     all.insert(all.end(), estimate.identity.begin(), estimate.identity.end());

@@ -49,11 +49,12 @@ TEST(Kernel, EachHasItsOwnConstants) {
 
 TEST(Kernel, NeedingMoreThanTheDeviceHasIsRefusedByName) {
   Context context("");
-  const auto expect_refused = [&](std::uint32_t buffers, std::uint32_t push_bytes) {
+  const auto expect_refused = [&](std::size_t buffers, std::uint32_t push_bytes) {
+    const std::vector<Access> bindings(buffers, Access::storage);
     try {
       const Kernel kernel(context, {.name = "greedy",
                                     .spirv = shaders::scale_and_add,
-                                    .buffers = buffers,
+                                    .bindings = bindings,
                                     .push_bytes = push_bytes});
       ADD_FAILURE() << "accepted";
     } catch (const Error& error) {

@@ -26,7 +26,7 @@ class ScaleAndAdd {
   void dispatch(CommandStream& stream, const Buffer& source, const Buffer& target,
                 std::uint32_t addend) const {
     const auto count = static_cast<std::uint32_t>(target.bytes() / sizeof(std::uint32_t));
-    stream.dispatch(kernel_, std::array{Binding{&source}, Binding{&target}}, Push{count, addend},
+    stream.dispatch(kernel_, {&source, &target}, Push{count, addend},
                     {(count + workgroup - 1) / workgroup, 1, 1});
   }
   const Kernel& kernel() const { return kernel_; }
@@ -35,9 +35,11 @@ class ScaleAndAdd {
   ScaleAndAdd(Context& context, const std::array<std::uint32_t, 2>& constants)
       : kernel_(context, {.name = "scale_and_add",
                           .spirv = shaders::scale_and_add,
-                          .buffers = 2,
+                          .bindings = bindings,
                           .push_bytes = sizeof(Push),
                           .constants = constants}) {}
+
+  static constexpr Access bindings[] = {Access::storage, Access::storage};
 
   Kernel kernel_;
 };

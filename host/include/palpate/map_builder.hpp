@@ -28,13 +28,17 @@ class MapBuilder {
   MapBuilder(MapBuilder&&) noexcept;
   MapBuilder& operator=(MapBuilder&&) noexcept;
 
-  /// Adds the evidence of these touches.
+  /// Adds the evidence of these touches. Memory does not grow with their number, only with the
+  /// area that they cover.
   void add(std::span<const Touch> touches);
 
   /// The map of all touches so far. It covers the known elements and the support of the sensor
   /// model around them, no more; each cell is within 1e-3 nats of the sum over all elements.
   /// @throws Error if no element of any touch was In Contact or No Contact.
-  OccupancyGrid build(const std::string& label) const;
+  OccupancyGrid build(const std::string& label);
+
+  /// Forgets all touches, for the next object.
+  void clear();
 
  private:
   struct Impl;

@@ -28,6 +28,10 @@ struct HistogramOptions {
   /// p(m) of Eq. 7 and of the space beyond the maps; by default the maps' own, which must then be
   /// the same for all: unequal priors would favour the emptier or the fuller map in unseen space.
   std::optional<double> prior = {};
+  /// The array stays where it is from touch to touch, as a large one under a table of objects does:
+  /// a touch of No Contact everywhere is then evaluated once, and of every touch only the elements
+  /// that say something else. The result is the same but for rounding; it takes twice the memory.
+  bool still_array = false;
 };
 
 /// The bin of the largest posterior probability (Eq. 15-16).
@@ -42,6 +46,12 @@ struct Mode {
 struct Estimate {
   std::vector<double> identity;  ///< probability of every hypothesis, Eq. 14, sums to 1
   Mode mode;
+};
+
+/// Probabilities of parts of one object's poses.
+struct Marginals {
+  std::vector<double> xy;     ///< of every (x, y), summed over theta, [ny, nx]
+  std::vector<double> theta;  ///< of every theta, summed over (x, y), [ntheta]
 };
 
 /// Histogram filter over object identity and planar pose (Sec. III-C, Eq. 13-16): a dense lattice
@@ -70,14 +80,14 @@ class PoseHistogram {
   /// Identity probabilities and mode.
   Estimate estimate() const;
 
-  /// Probability of every (x, y) of one object, summed over theta, [ny, nx]; all objects' sum to 1.
-  std::vector<double> marginal_xy(int object) const;
-  /// Probability of every theta of one object, summed over (x, y), [ntheta].
-  std::vector<double> marginal_theta(int object) const;
+  /// Marginal probabilities of one object's poses; all objects' sum to 1.
+  Marginals marginals(int object) const;
   /// Log-likelihood of every bin of one object in nats, [theta, y, x], without prior weights.
   std::vector<double> log_likelihood(int object) const;
 
   const PoseLattice& lattice() const;
+  /// How the likelihood is evaluated for each cell size among the maps, and why so.
+  std::vector<std::string> paths() const;
   /// Device memory held, in bytes, maps and tables included.
   std::uint64_t device_bytes() const;
 

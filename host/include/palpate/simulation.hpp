@@ -37,12 +37,12 @@ Shape make_shape(const std::string& name_or_file);
 /// area, scaled by a press force that varies from touch to touch and by a gain per element, with
 /// additive noise and no negative readings.
 struct SensorModel {
-  double psf_mm = 1.0;            ///< standard deviation of the point spread
+  double psf_mm = 1.0;                       ///< standard deviation of the point spread
   double element_mm = digitacts_element_mm;  ///< edge of a square element
-  double pressure_kpa = 20.0;     ///< reading of an element wholly on the shape, on average
-  double force_spread = 0.15;     ///< relative standard deviation of the press force
-  double gain_spread = 0.05;      ///< relative standard deviation of the elements' gains
-  double noise_kpa = 0.7;         ///< standard deviation of the additive noise
+  double pressure_kpa = 20.0;  ///< reading of an element wholly on the shape, on average
+  double force_spread = 0.15;  ///< relative standard deviation of the press force
+  double gain_spread = 0.05;   ///< relative standard deviation of the elements' gains
+  double noise_kpa = 0.7;      ///< standard deviation of the additive noise
 };
 
 /// Simulated touches of one shape with one array. The same seed gives the same recording.

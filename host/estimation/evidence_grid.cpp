@@ -1,0 +1,266 @@
+#include "evidence_grid.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+
+#include <fmt/format.h>
+
+#include "accumulate_evidence.hpp"
+#include "interface.h"
+#include "palpate/error.hpp"
+#include "two_float.hpp"
+
+namespace palpate {
+
+namespace {
+
+// Readings per pass times the tiles that each of them reaches.
+constexpr std::size_t entries_per_pass = 1 << 20;
+constexpr gpu::Access bindings[] = {gpu::Access::storage, gpu::Access::table, gpu::Access::storage};
+
+/// Tiles that some reading supports, each with its readings.
+struct TileLists {
+  std::vector<shaders::Tile> tiles;
+  std::vector<shaders::TileReading> readings;
+};
+
+shaders::TileReading tile_reading(const glm::dvec2& local_mm, Reading reading, double prior) {
+  // Eq. 5 in log odds: log((1 + g a) / (1 - g)) for contact, a = (1 - m) / m, and
+  // log((1 - g) / (1 + g b)) for none, b = m / (1 - m). As 2 atanh of their difference over their
+  // sum, t = g gain / (2 + g skew), neither loses digits where g is small.
+  const bool contact = reading == Reading::in_contact;
+  const double gain = contact ? 1.0 / prior : -1.0 / (1.0 - prior);
+  const double skew = contact ? (1.0 - prior) / prior - 1.0 : prior / (1.0 - prior) - 1.0;
+  return {static_cast<float>(local_mm.x), static_cast<float>(local_mm.y), static_cast<float>(gain),
+          static_cast<float>(skew)};
+}
+
+/// Distance at which the increment falls to what the kernel's series represents.
+double near_radius_mm(const InverseSensorModel& sensor) {
+  const double reach = shaders::SERIES_REACH;
+  const double p = sensor.prior;
+  // |t| = reach solved for g, of the class that reaches further.
+  const double contact = 2.0 * reach / (1.0 / p - reach * ((1.0 - p) / p - 1.0));
+  const double none = 2.0 * reach / (1.0 / (1.0 - p) + reach * (p / (1.0 - p) - 1.0));
+  const double g = std::min(contact, none);
+  return g < sensor.peak ? sensor.spread_mm * std::sqrt(2.0 * std::log(sensor.peak / g)) : 0.0;
+}
+
+/// Sorts readings into the lists of the tiles that they reach, those near a tile's cells first.
+TileLists assign_to_tiles(std::span<const ElementReading> readings, const CellRange& range,
+                          double cell_mm, double radius_mm, const InverseSensorModel& sensor) {
+  const double near_mm = near_radius_mm(sensor);
+  const std::int64_t columns = (range.nx + shaders::TILE_CELLS - 1) / shaders::TILE_CELLS;
+  const std::int64_t rows = (range.ny + shaders::TILE_CELLS - 1) / shaders::TILE_CELLS;
+  const double tile_mm = (shaders::TILE_CELLS - 1) * cell_mm;
+  const auto tile_of = [&](double mm, std::int64_t origin, std::int64_t cells) {
+    const double cell =
+        std::clamp(mm / cell_mm - static_cast<double>(origin), 0.0, static_cast<double>(cells - 1));
+    return static_cast<std::int64_t>(cell) / shaders::TILE_CELLS;
+  };
+  // Calls visit(list, reading relative to the tile) for every list that a reading belongs to: tile
+  // i has list 2 i for its near and list 2 i + 1 for its far readings.
+  const auto for_each_entry = [&](const auto& visit) {
+    for (const ElementReading& r : readings) {
+      const glm::dvec2& p = r.position_mm;
+      const std::int64_t last_row = tile_of(p.y + radius_mm, range.y, range.ny);
+      const std::int64_t last_column = tile_of(p.x + radius_mm, range.x, range.nx);
+      for (auto row = tile_of(p.y - radius_mm, range.y, range.ny); row <= last_row; ++row) {
+        for (auto column = tile_of(p.x - radius_mm, range.x, range.nx); column <= last_column;
+             ++column) {
+          const glm::dvec2 corner =
+              cell_mm * glm::dvec2(static_cast<double>(range.x + column * shaders::TILE_CELLS),
+                                   static_cast<double>(range.y + row * shaders::TILE_CELLS));
+          const glm::dvec2 local = p - corner;
+          const double outside_x = std::max({0.0, -local.x, local.x - tile_mm});
+          const double outside_y = std::max({0.0, -local.y, local.y - tile_mm});
+          const double distance = std::hypot(outside_x, outside_y);
+          if (distance <= radius_mm) {
+            const auto tile = static_cast<std::size_t>(row * columns + column);
+            visit(2 * tile + (distance <= near_mm ? 0 : 1), local, r.reading);
+          }
+        }
+      }
+    }
+  };
+
+  // Counting sort: the sizes of all lists, then their places, then their contents.
+  std::vector<std::uint32_t> next(2 * static_cast<std::size_t>(columns * rows) + 1, 0);
+  for_each_entry([&](std::size_t list, const glm::dvec2&, Reading) { ++next[list + 1]; });
+  TileLists lists;
+  for (std::size_t list = 0; list + 1 < next.size(); list += 2) {
+    const std::uint32_t near = next[list + 1];
+    const std::uint32_t count = near + next[list + 2];
+    if (count > 0) {
+      const auto tile = static_cast<std::int64_t>(list / 2);
+      lists.tiles.push_back(
+          {.column = static_cast<shaders::uint>(tile % columns * shaders::TILE_CELLS),
+           .row = static_cast<shaders::uint>(tile / columns * shaders::TILE_CELLS),
+           .first = next[list],
+           .near = near,
+           .count = count});
+    }
+    next[list + 1] += next[list];
+    next[list + 2] += next[list + 1];
+  }
+  lists.readings.resize(next.back());
+  for_each_entry([&](std::size_t list, const glm::dvec2& local, Reading reading) {
+    lists.readings[next[list]++] = tile_reading(local, reading, sensor.prior);
+  });
+  return lists;
+}
+
+gpu::Kernel evidence_kernel(gpu::Context& context, const InverseSensorModel& sensor) {
+  const std::uint32_t constants[] = {std::bit_cast<std::uint32_t>(static_cast<float>(sensor.peak)),
+                                     std::bit_cast<std::uint32_t>(static_cast<float>(
+                                         1.0 / (2.0 * sensor.spread_mm * sensor.spread_mm)))};
+  return {context,
+          {.name = "accumulate_evidence",
+           .spirv = shaders::accumulate_evidence,
+           .bindings = bindings,
+           .push_bytes = sizeof(shaders::EvidencePush),
+           .constants = constants}};
+}
+
+}  // namespace
+
+bool CellRange::contains(const CellRange& other) const {
+  return other.x >= x && other.y >= y && other.x + other.nx <= x + nx &&
+         other.y + other.ny <= y + ny;
+}
+
+CellRange united(const CellRange& a, const CellRange& b) {
+  if (a.nx == 0) {
+    return b;
+  }
+  const std::int64_t x = std::min(a.x, b.x);
+  const std::int64_t y = std::min(a.y, b.y);
+  return {x, y, std::max(a.x + a.nx, b.x + b.nx) - x, std::max(a.y + a.ny, b.y + b.ny) - y};
+}
+
+CellRange cover(const glm::dvec2& lowest_mm, const glm::dvec2& highest_mm, double margin_mm,
+                double cell_mm) {
+  const auto first = [&](double mm) { return std::ceil((mm - margin_mm) / cell_mm); };
+  const auto last = [&](double mm) { return std::floor((mm + margin_mm) / cell_mm); };
+  // A cell larger than the support may hold a reading without its centre being near.
+  const double nx = std::max(1.0, last(highest_mm.x) - first(lowest_mm.x) + 1.0);
+  const double ny = std::max(1.0, last(highest_mm.y) - first(lowest_mm.y) + 1.0);
+  if (!(nx * ny < 1 << 30)) {
+    throw Error(Fault::input,
+                fmt::format("the map would have {:.3g} x {:.3g} cells of {} mm; use larger cells, "
+                            "or touches that lie closer together",
+                            nx, ny, cell_mm));
+  }
+  return {static_cast<std::int64_t>(first(lowest_mm.x)),
+          static_cast<std::int64_t>(first(lowest_mm.y)), static_cast<std::int64_t>(nx),
+          static_cast<std::int64_t>(ny)};
+}
+
+EvidenceGrid::EvidenceGrid(gpu::Context& context, double cell_mm, const InverseSensorModel& sensor)
+    : context_(context),
+      stream_(context),
+      cell_mm_(cell_mm),
+      sensor_(sensor),
+      kernel_(evidence_kernel(context, sensor)) {}
+
+void EvidenceGrid::grow(const CellRange& needed) {
+  if (range_.contains(needed)) {
+    return;
+  }
+  CellRange larger = united(range_, needed);
+  if (range_.nx > 0) {
+    // Room for what a moving sensor touches next, so that growing stays rare.
+    larger = {larger.x - larger.nx / 4, larger.y - larger.ny / 4, larger.nx + larger.nx / 2,
+              larger.ny + larger.ny / 2};
+  }
+  const auto bytes = static_cast<VkDeviceSize>(larger.nx * larger.ny) * sizeof(TwoFloat);
+  if (bytes > context_.limits().storage_range) {
+    throw Error(
+        Fault::input,
+        fmt::format("the map would have {} x {} cells of {} mm, more than device '{}' binds "
+                    "at once; use larger cells, or touches that lie closer together",
+                    larger.nx, larger.ny, cell_mm_, context_.name()));
+  }
+  gpu::Buffer cells(context_, bytes, gpu::Memory::device, "map cells");
+  std::vector<TwoFloat> old(static_cast<std::size_t>(range_.nx * range_.ny));
+  if (!old.empty()) {
+    stream_.download(cells_, std::span(old));
+    stream_.run();
+  }
+  stream_.fill(cells, 0);
+  for (std::int64_t row = 0; row < range_.ny; ++row) {
+    const std::int64_t at = (row + range_.y - larger.y) * larger.nx + range_.x - larger.x;
+    stream_.upload(cells,
+                   std::span<const TwoFloat>(old).subspan(static_cast<std::size_t>(row * range_.nx),
+                                                          static_cast<std::size_t>(range_.nx)),
+                   static_cast<VkDeviceSize>(at) * sizeof(TwoFloat));
+  }
+  stream_.run();
+  cells_ = std::move(cells);
+  range_ = larger;
+}
+
+void EvidenceGrid::add(std::span<const ElementReading> readings, double radius_mm) {
+  const double tiles_across = 2.0 + 2.0 * radius_mm / (cell_mm_ * shaders::TILE_CELLS);
+  const auto pass = static_cast<std::size_t>(
+      std::max(1.0, static_cast<double>(entries_per_pass) / (tiles_across * tiles_across)));
+  for (; !readings.empty(); readings = readings.subspan(std::min(pass, readings.size()))) {
+    const auto part = readings.first(std::min(pass, readings.size()));
+    glm::dvec2 lowest = part.front().position_mm;
+    glm::dvec2 highest = lowest;
+    for (const ElementReading& r : part) {
+      lowest = {std::min(lowest.x, r.position_mm.x), std::min(lowest.y, r.position_mm.y)};
+      highest = {std::max(highest.x, r.position_mm.x), std::max(highest.y, r.position_mm.y)};
+    }
+    grow(cover(lowest, highest, radius_mm, cell_mm_));
+
+    const TileLists lists = assign_to_tiles(part, range_, cell_mm_, radius_mm, sensor_);
+    if (lists.tiles.empty()) {
+      continue;  // every reading falls between the centres of cells larger than its support
+    }
+    const gpu::Buffer tiles(context_, std::span(lists.tiles).size_bytes(), gpu::Memory::device,
+                            "map tiles");
+    const gpu::Buffer list(context_, std::span(lists.readings).size_bytes(), gpu::Memory::device,
+                           "readings per map tile", VK_FORMAT_R32G32B32A32_SFLOAT);
+    stream_.upload(tiles, std::span(lists.tiles));
+    stream_.upload(list, std::span(lists.readings));
+    const std::size_t most = context_.limits().group_count[0];
+    for (std::size_t tile = 0; tile < lists.tiles.size(); tile += most) {
+      const shaders::EvidencePush push{.tile_first = static_cast<shaders::uint>(tile),
+                                       .width = static_cast<shaders::uint>(range_.nx),
+                                       .height = static_cast<shaders::uint>(range_.ny),
+                                       .cell_mm = static_cast<float>(cell_mm_)};
+      const auto groups = static_cast<std::uint32_t>(std::min(most, lists.tiles.size() - tile));
+      stream_.dispatch(kernel_, {&tiles, &list, &cells_}, push, {groups, 1, 1});
+    }
+    stream_.run();
+  }
+}
+
+std::vector<double> EvidenceGrid::sums(const CellRange& range) {
+  std::vector<TwoFloat> cells(static_cast<std::size_t>(range_.nx * range_.ny));
+  if (!cells.empty()) {
+    stream_.download(cells_, std::span(cells));
+    stream_.run();
+  }
+  std::vector<double> sums(static_cast<std::size_t>(range.nx * range.ny), 0.0);
+  for (std::int64_t row = 0; row < range.ny; ++row) {
+    for (std::int64_t column = 0; column < range.nx; ++column) {
+      const std::int64_t x = column + range.x - range_.x;
+      const std::int64_t y = row + range.y - range_.y;
+      if (x >= 0 && x < range_.nx && y >= 0 && y < range_.ny) {
+        sums[static_cast<std::size_t>(row * range.nx + column)] =
+            cells[static_cast<std::size_t>(y * range_.nx + x)].value();
+      }
+    }
+  }
+  return sums;
+}
+
+void EvidenceGrid::clear() {
+  cells_ = {};
+  range_ = {};
+}
+
+}  // namespace palpate

@@ -1,0 +1,123 @@
+#version 450
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_control_flow_attributes : require
+
+// Adds the log-likelihood of touches (Eq. 7, 13) to a slab of one object's belief, for lattices that
+// are finer than the map: one invocation takes TILE_X x TILE_Y neighbouring bins of one theta, which
+// span at most one cell, so that 3 x 3 map nodes serve all of them for each element.
+
+#include "interface.h"
+
+layout(local_size_x_id = 0) in;
+layout(constant_id = 4) const uint TILE_X = 5;
+layout(constant_id = 5) const uint TILE_Y = 5;
+layout(constant_id = 6) const float STEP_X = 0.2;  // between bins, in cells
+layout(constant_id = 7) const float STEP_Y = 0.2;
+
+#include "contact_likelihood.glsl"
+#include "likelihood_buffers.glsl"
+#include "two_float.glsl"
+
+float log_odds_of[TILE_Y][TILE_X];  // under one element, at every bin of the tile
+
+// Bilinear in log odds, for all bins of the tile.
+void interpolate(const Split bin_x, const Split bin_y, const ivec4 element) {
+  const float x = bin_x.fraction + intBitsToFloat(element.y);
+  const float y = bin_y.fraction + intBitsToFloat(element.w);
+  const float whole_x = floor(x);
+  const float whole_y = floor(y);
+  const float fx = x - whole_x;
+  const float fy = y - whole_y;
+  const int column = clamp(bin_x.cell + element.x + int(whole_x), 0, push.map_width - 3);
+  const int row = clamp(bin_y.cell + element.z + int(whole_y), 0, push.map_height - 3);
+
+  float nodes[3][TILE_X];  // of three rows, between columns
+  [[unroll]] for (int r = 0; r < 3; ++r) {
+    const int node = (row + r) * push.map_width + column;
+    const float first = log_odds(node);
+    const float second = log_odds(node + 1);
+    const float third = log_odds(node + 2);
+    [[unroll]] for (uint i = 0; i < TILE_X; ++i) {
+      const float f = fx + float(i) * STEP_X;
+      nodes[r][i] =
+          first + (second - first) * min(f, 1.0) + (third - second) * max(f - 1.0, 0.0);
+    }
+  }
+  [[unroll]] for (uint i = 0; i < TILE_X; ++i) {
+    const float lower = nodes[1][i] - nodes[0][i];
+    const float upper = nodes[2][i] - nodes[1][i];
+    [[unroll]] for (uint j = 0; j < TILE_Y; ++j) {
+      const float f = fy + float(j) * STEP_Y;
+      log_odds_of[j][i] = nodes[0][i] + lower * min(f, 1.0) + upper * max(f - 1.0, 0.0);
+    }
+  }
+}
+
+#define FOR_EACH_BIN                            \
+  [[unroll]] for (uint j = 0; j < TILE_Y; ++j) \
+  [[unroll]] for (uint i = 0; i < TILE_X; ++i)
+
+void main() {
+  const uint tiles_x = (push.nx + TILE_X - 1) / TILE_X;
+  const uint tiles_y = (push.rows + TILE_Y - 1) / TILE_Y;
+  const uint tile = gl_GlobalInvocationID.x;
+  const uint theta = gl_WorkGroupID.z;
+  if (tile >= tiles_x * tiles_y) {
+    return;
+  }
+  const uint x = tile % tiles_x * TILE_X;
+  const uint y = tile / tiles_x * TILE_Y;
+  const Split bin_x = axis[x];
+  const Split bin_y = axis[push.nx + push.row_first + y];
+  const int table = int((push.theta_first + theta) * push.elements);
+
+  vec2 sum[TILE_Y][TILE_X];
+  float part[TILE_Y][TILE_X];
+  float product[TILE_Y][TILE_X];
+  float numerator[TILE_Y][TILE_X];
+  float denominator[TILE_Y][TILE_X];
+  FOR_EACH_BIN { sum[j][i] = vec2(0.0); }
+
+  for (uint s = 0; s < push.segments; ++s) {
+    const ivec4 segment = texelFetch(segments, int(s));
+    const uint reading = uint(segment.z);
+    const ReadingRatio reading_says = reading_ratio(reading);
+    FOR_EACH_BIN { part[j][i] = 0.0; }
+    if (IN_LOGS) {
+      for (int k = segment.x; k < segment.y; ++k) {
+        interpolate(bin_x, bin_y, texelFetch(elements, table + k));
+        FOR_EACH_BIN { part[j][i] += log_likelihood(reading, log_odds_of[j][i]); }
+      }
+    } else {
+      for (int group = segment.x; group < segment.y; group += int(FACTORS_PER_LOG)) {
+        const int group_end = min(group + int(FACTORS_PER_LOG), segment.y);
+        FOR_EACH_BIN { product[j][i] = 1.0; }
+        for (int quotient = group; quotient < group_end; quotient += int(FACTORS_PER_DIVISION)) {
+          const int end = min(quotient + int(FACTORS_PER_DIVISION), group_end);
+          FOR_EACH_BIN {
+            numerator[j][i] = 1.0;
+            denominator[j][i] = 1.0;
+          }
+          for (int k = quotient; k < end; ++k) {
+            interpolate(bin_x, bin_y, texelFetch(elements, table + k));
+            FOR_EACH_BIN {
+              const vec2 ratio = likelihood_ratio(reading_says, log_odds_of[j][i]);
+              numerator[j][i] *= ratio.x;
+              denominator[j][i] *= ratio.y;
+            }
+          }
+          FOR_EACH_BIN { product[j][i] *= numerator[j][i] / denominator[j][i]; }
+        }
+        FOR_EACH_BIN { part[j][i] += log(product[j][i]); }
+      }
+    }
+    FOR_EACH_BIN { sum[j][i] = two_float_add(sum[j][i], part[j][i]); }
+  }
+
+  FOR_EACH_BIN {
+    if (x + i < push.nx && y + j < push.rows) {
+      const uint bin = (theta * push.rows + y + j) * push.nx + x + i;
+      belief[bin] = two_float_sum(belief[bin], sum[j][i]);
+    }
+  }
+}

@@ -1,0 +1,22 @@
+#version 450
+#extension GL_GOOGLE_include_directive : require
+
+// Adds one slab of log-likelihoods to another.
+
+#include "interface.h"
+
+layout(local_size_x_id = 0) in;
+
+#include "two_float.glsl"
+
+layout(binding = 0) uniform samplerBuffer added;
+layout(std430, binding = 1) buffer Belief { vec2 belief[]; };
+layout(push_constant) uniform Push { AddPush push; };
+
+void main() {
+  // Rows of workgroups, for one row of them may not cover a slab.
+  const uint bin = gl_WorkGroupID.y * push.row + gl_GlobalInvocationID.x;
+  if (gl_GlobalInvocationID.x < push.row && bin < push.bins) {
+    belief[bin] = two_float_sum(belief[bin], texelFetch(added, int(bin)).xy);
+  }
+}
