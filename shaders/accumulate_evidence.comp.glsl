@@ -35,12 +35,17 @@ void weigh(const vec2 corner, const vec4 reading) {
   float along_x[BLOCK_CELLS];
   [[unroll]] for (int i = 0; i < BLOCK_CELLS; ++i) {
     const float d = offset.x + float(i) * push.cell_mm;
-    along_x[i] = PEAK * exp(-d * d * INVERSE_TWICE_VARIANCE);
+    along_x[i] = PEAK * exp(max(-d * d * INVERSE_TWICE_VARIANCE, -40.0));
   }
   [[unroll]] for (int j = 0; j < BLOCK_CELLS; ++j) {
     const float d = offset.y + float(j) * push.cell_mm;
-    const float along_y = exp(-d * d * INVERSE_TWICE_VARIANCE);
-    [[unroll]] for (int i = 0; i < BLOCK_CELLS; ++i) { weight[j][i] = along_x[i] * along_y; }
+    const float along_y = exp(max(-d * d * INVERSE_TWICE_VARIANCE, -40.0));
+    [[unroll]] for (int i = 0; i < BLOCK_CELLS; ++i) {
+      // What is too small to count is 0 at once: powers of it would be denormal, which CPUs take a
+      // hundred times longer for.
+      const float g = along_x[i] * along_y;
+      weight[j][i] = g > 1e-16 ? g : 0.0;
+    }
   }
 }
 
@@ -71,9 +76,12 @@ void main() {
       const vec4 reading = texelFetch(readings, int(k));
       weigh(corner, reading);
       FOR_EACH_CELL {
-        const float t = half_tanh(weight[j][i], reading);
+        const float g = weight[j][i];
+        const float t = half_tanh(g, reading);
+        // (1 + t) / (1 - t) or its inverse, without the cancellation of 1 - t.
+        const float odds = (2.0 + g * (reading.w + abs(reading.z))) / (2.0 - 2.0 * g);
         part[j][i] +=
-            abs(t) < SERIES_REACH ? twice_atanh_series(t) : log((1.0 + t) / (1.0 - t));
+            abs(t) < SERIES_REACH ? twice_atanh_series(t) : sign(reading.z) * log(odds);
       }
     }
     FOR_EACH_CELL { sum[j][i] = two_float_add(sum[j][i], part[j][i]); }

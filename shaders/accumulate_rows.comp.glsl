@@ -59,18 +59,18 @@ void main() {
   }
 
   vec2 sum[TILE_X];
-  float part[TILE_X];
   float product[TILE_X];
   FOR_EACH_BIN { sum[i] = vec2(0.0); }
   for (uint s = 0; s < push.segments; ++s) {
     const ivec4 segment = texelFetch(segments, int(s));
     const uint reading = uint(segment.z);
     const ReadingRatio reading_says = reading_ratio(reading);
-    FOR_EACH_BIN { part[i] = 0.0; }
     if (IN_LOGS) {
       for (int k = segment.x; k < segment.y; ++k) {
         interpolate(bin_y, texelFetch(elements, table + k));
-        FOR_EACH_BIN { part[i] += log_likelihood(reading, log_odds_of[i]); }
+        FOR_EACH_BIN {
+          sum[i] = two_float_add(sum[i], log_likelihood(reading, log_odds_of[i]));
+        }
       }
     } else {
       for (int group = segment.x; group < segment.y; group += int(FACTORS_PER_LOG)) {
@@ -83,10 +83,9 @@ void main() {
             product[i] *= ratio.x / ratio.y;
           }
         }
-        FOR_EACH_BIN { part[i] += log(product[i]); }
+        FOR_EACH_BIN { sum[i] = two_float_add(sum[i], log(product[i])); }
       }
     }
-    FOR_EACH_BIN { sum[i] = two_float_add(sum[i], part[i]); }
   }
 
   FOR_EACH_BIN {

@@ -72,7 +72,6 @@ void main() {
   const int table = int((push.theta_first + theta) * push.elements);
 
   vec2 sum[TILE_Y][TILE_X];
-  float part[TILE_Y][TILE_X];
   float product[TILE_Y][TILE_X];
   float numerator[TILE_Y][TILE_X];
   float denominator[TILE_Y][TILE_X];
@@ -82,11 +81,12 @@ void main() {
     const ivec4 segment = texelFetch(segments, int(s));
     const uint reading = uint(segment.z);
     const ReadingRatio reading_says = reading_ratio(reading);
-    FOR_EACH_BIN { part[j][i] = 0.0; }
     if (IN_LOGS) {
       for (int k = segment.x; k < segment.y; ++k) {
         interpolate(bin_x, bin_y, texelFetch(elements, table + k));
-        FOR_EACH_BIN { part[j][i] += log_likelihood(reading, log_odds_of[j][i]); }
+        FOR_EACH_BIN {
+          sum[j][i] = two_float_add(sum[j][i], log_likelihood(reading, log_odds_of[j][i]));
+        }
       }
     } else {
       for (int group = segment.x; group < segment.y; group += int(FACTORS_PER_LOG)) {
@@ -108,10 +108,9 @@ void main() {
           }
           FOR_EACH_BIN { product[j][i] *= numerator[j][i] / denominator[j][i]; }
         }
-        FOR_EACH_BIN { part[j][i] += log(product[j][i]); }
+        FOR_EACH_BIN { sum[j][i] = two_float_add(sum[j][i], log(product[j][i])); }
       }
     }
-    FOR_EACH_BIN { sum[j][i] = two_float_add(sum[j][i], part[j][i]); }
   }
 
   FOR_EACH_BIN {

@@ -1,6 +1,8 @@
 #include "commands.hpp"
 
+#include <algorithm>
 #include <filesystem>
+#include <functional>
 #include <map>
 #include <memory>
 #include <optional>
@@ -40,12 +42,7 @@ struct Options {
   std::string device;
 };
 
-/// The touches of one label, of all recordings that bear it.
-struct ObjectTouches {
-  std::string label;
-  std::vector<Touch> touches;
-};
-
+/// The touches of every label, of all recordings that bear it.
 std::vector<ObjectTouches> group_by_label(const std::vector<Recording>& recordings,
                                           const Options& options, bool one_map) {
   std::optional<Frames> frames;
@@ -109,6 +106,40 @@ double parse_prior(const std::string& text) {
   return prior;
 }
 
+/// Finds what would fail at the end before the work begins.
+void prepare_outputs(const Options& options, bool folder,
+                     const std::vector<std::filesystem::path>& map_paths) {
+  std::vector<std::pair<std::string, std::filesystem::path>> outputs;
+  for (const std::filesystem::path& path : map_paths) {
+    outputs.emplace_back("-o", path);
+  }
+  if (!options.png.empty()) {
+    outputs.emplace_back("--png", options.png);
+  }
+  require_distinct(outputs, {options.recordings.begin(), options.recordings.end()});
+  if (!options.png.empty()) {
+    require_writable(options.png);
+  }
+  if (folder) {
+    make_folder(options.output);
+  }
+  for (const std::filesystem::path& path : map_paths) {
+    require_writable(path);
+  }
+  if (!options.ros.empty()) {
+    make_folder(options.ros);
+  }
+}
+
+void add_in_batches(MapBuilder& builder, std::span<const Touch> touches,
+                    const std::function<void(double)>& progress) {
+  constexpr std::size_t batch = 1000;
+  for (std::size_t begin = 0; begin < touches.size(); begin += batch) {
+    builder.add(touches.subspan(begin, std::min(batch, touches.size() - begin)));
+    progress(static_cast<double>(begin) / static_cast<double>(touches.size()));
+  }
+}
+
 void build_maps(const Options& options) {
   const std::filesystem::path output = options.output;
   std::error_code ignored;
@@ -123,58 +154,38 @@ void build_maps(const Options& options) {
   MapOptions model = map_options(options, recordings);
   const std::vector<ObjectTouches> objects = group_by_label(recordings, options, !folder);
 
-  for (const Recording& recording : recordings) {
-    std::error_code not_there;
-    if (std::filesystem::equivalent(recording.path, output, not_there)) {
-      throw Error(Fault::input, fmt::format("{}: -o would overwrite this recording; choose another "
-                                            "name for the map",
-                                            recording.path));
-    }
+  std::vector<std::filesystem::path> map_paths;
+  for (const ObjectTouches& object : objects) {
+    map_paths.push_back(folder ? output / (object.label + ".map.h5") : output);
   }
-  if (!folder) {
-    require_writable(output);
-  }
-  if (!options.png.empty()) {
-    require_writable(options.png);
-  }
+  prepare_outputs(options, folder, map_paths);
 
   Device device = Device::open(options.device);
-  model.sensor.prior = given_prior;
-  if (estimate) {
-    std::vector<std::vector<Touch>> touches;
-    touches.reserve(objects.size());
-    for (const ObjectTouches& object : objects) {
-      touches.push_back(object.touches);
-    }
-    model.sensor.prior = estimate_prior(device, touches, model);
-  }
-
+  model.sensor.prior = estimate ? estimate_prior(device, objects, model) : given_prior;
   std::vector<OccupancyGrid> maps;
   {
     Progress progress("building maps");
     MapBuilder builder(device, model);
     for (const ObjectTouches& object : objects) {
-      progress.show(static_cast<double>(maps.size()) / static_cast<double>(objects.size()));
       builder.clear();
-      builder.add(object.touches);
+      add_in_batches(builder, object.touches, [&](double fraction) {
+        progress.show((static_cast<double>(maps.size()) + fraction) /
+                      static_cast<double>(objects.size()));
+      });
       maps.push_back(builder.build(object.label));
       maps.back().symmetry = options.symmetry;
     }
   }
 
   // Everything is computed; only now anything is written.
-  if (folder) {
-    make_folder(output);
-  }
   for (std::size_t i = 0; i < maps.size(); ++i) {
     const OccupancyGrid& map = maps[i];
-    const std::filesystem::path path = folder ? output / (map.label + ".map.h5") : output;
-    write_map(path, map);
-    fmt::print("{}: {} from {} touches, {} x {} cells of {} mm, prior {:.3f}\n", path.string(),
-               map.label, objects[i].touches.size(), map.nx, map.ny, map.cell_mm, map.prior);
+    write_map(map_paths[i], map);
+    fmt::print("{}: {} from {} touches, {} x {} cells of {} mm, prior {:.3g}\n",
+               map_paths[i].string(), map.label, objects[i].touches.size(), map.nx, map.ny,
+               map.cell_mm, map.prior);
   }
   if (!options.ros.empty()) {
-    make_folder(options.ros);
     for (const OccupancyGrid& map : maps) {
       const auto yaml = std::filesystem::path(options.ros) / (map.label + ".yaml");
       write_map_server(yaml, map);

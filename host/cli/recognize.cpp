@@ -34,10 +34,22 @@ void check_outputs(const RecognizeOptions& options, const RecognitionTask& task)
                                             "recording or frame",
                                             options.posterior, task.unknowns.size()));
     }
-    require_writable(options.posterior);
+  }
+  std::vector<std::pair<std::string, std::filesystem::path>> outputs;
+  if (!options.posterior.empty()) {
+    outputs.emplace_back("--posterior", options.posterior);
   }
   if (!options.json.empty() && options.json != "-") {
-    require_writable(options.json);
+    outputs.emplace_back("--json", options.json);
+  }
+  std::vector<std::filesystem::path> inputs(options.recordings.begin(), options.recordings.end());
+  inputs.insert(inputs.end(), task.map_paths.begin(), task.map_paths.end());
+  if (!options.scene.empty()) {
+    inputs.emplace_back(options.scene);
+  }
+  require_distinct(outputs, inputs);
+  for (const auto& output : outputs) {
+    require_writable(output.second);
   }
   if (!options.png.empty()) {
     std::set<std::string> names;

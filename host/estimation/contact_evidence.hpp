@@ -17,7 +17,7 @@ struct ContactEvidence {
 };
 
 /// Classifies the touches' elements (Eq. 3) and leaves out those that are Unknown. No segment is
-/// longer than `segment_elements`: the kernel sums a segment in one float.
+/// longer than `segment_elements`, what one dispatch takes.
 ContactEvidence gather_evidence(std::span<const Touch> touches, const ContactClassifier& classifier,
                                 const glm::dvec2& pivot_mm, std::size_t segment_elements);
 

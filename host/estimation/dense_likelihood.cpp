@@ -12,8 +12,6 @@ namespace palpate {
 
 namespace {
 
-// A segment's sum is one float: of 64 terms its rounding error stays below 1e-5 nats.
-constexpr std::size_t longest_segment = 64;
 constexpr VkDeviceSize table_bytes = 16 << 20;
 // Bins times elements: about half a second on a CPU device, so that progress shows; watchdogs of
 // desktop GPUs, which are a hundred times faster, allow two.
@@ -89,14 +87,20 @@ DenseLikelihood::DenseLikelihood(gpu::Context& context, gpu::CommandStream& stre
   }
 
   bytes_per_element_ = lattice.theta_rad.count * sizeof(shaders::RotatedElement);
-  // The table and the work of one dispatch are bounded; below 16 elements reading and writing the
-  // belief would begin to count.
-  const std::size_t by_table = std::max<std::size_t>(
-      1, std::min<std::size_t>(table_bytes / bytes_per_element_,
-                               context.limits().table_texels / lattice.theta_rad.count));
+  // What bounds a dispatch: the table, the kernel's loops (which take up to two iterations for an
+  // element), and the work. Below 16 elements reading and writing the belief would begin to count.
+  const std::size_t most_texels = context.limits().table_texels;
+  const auto thetas = static_cast<std::size_t>(lattice.theta_rad.count);
+  if (thetas > most_texels) {
+    throw Error(Fault::input,
+                fmt::format("bins theta = {}: device '{}' takes at most {}; use fewer", thetas,
+                            context.name(), most_texels));
+  }
+  const std::size_t by_table =
+      std::clamp<std::size_t>(table_bytes / bytes_per_element_, 1, most_texels / thetas);
   const auto by_work = static_cast<std::size_t>(work_per_run / static_cast<double>(lattice.bins()));
-  batch_elements_ = std::min(by_table, std::max<std::size_t>(16, by_work));
-  segment_elements_ = std::min(longest_segment, batch_elements_);
+  batch_elements_ = std::min(
+      {by_table, std::size_t{gpu::most_iterations / 2}, std::max<std::size_t>(16, by_work)});
 
   reserve(1);
   for (const Scale& scale : scales_) {

@@ -25,7 +25,7 @@ class DenseLikelihood {
                   const ContactLikelihood& model);
 
   /// Most elements that one segment of the evidence may hold.
-  std::size_t segment_elements() const { return segment_elements_; }
+  std::size_t segment_elements() const { return batch_elements_; }
 
   /// Adds the evidence to the belief. Runs the stream from time to time, so that no submission
   /// keeps a device busy for long, and reports the fraction done.
@@ -64,7 +64,6 @@ class DenseLikelihood {
   std::vector<Scale> scales_;
   VkDeviceSize bytes_per_element_ = 0;  ///< rotated by every theta
   std::size_t batch_elements_ = 0;      ///< most elements in the tables
-  std::size_t segment_elements_ = 0;
   gpu::Buffer elements_;
   gpu::Buffer segments_;
 };

@@ -169,12 +169,18 @@ void EvidenceGrid::grow(const CellRange& needed) {
     return;
   }
   CellRange larger = united(range_, needed);
+  const auto bytes_of = [](const CellRange& range) {
+    return static_cast<VkDeviceSize>(range.nx * range.ny) * sizeof(TwoFloat);
+  };
   if (range_.nx > 0) {
     // Room for what a moving sensor touches next, so that growing stays rare.
-    larger = {larger.x - larger.nx / 4, larger.y - larger.ny / 4, larger.nx + larger.nx / 2,
-              larger.ny + larger.ny / 2};
+    const CellRange roomy{larger.x - larger.nx / 4, larger.y - larger.ny / 4,
+                          larger.nx + larger.nx / 2, larger.ny + larger.ny / 2};
+    if (bytes_of(roomy) <= context_.limits().storage_range) {
+      larger = roomy;
+    }
   }
-  const auto bytes = static_cast<VkDeviceSize>(larger.nx * larger.ny) * sizeof(TwoFloat);
+  const VkDeviceSize bytes = bytes_of(larger);
   if (bytes > context_.limits().storage_range) {
     throw Error(
         Fault::input,
@@ -203,8 +209,12 @@ void EvidenceGrid::grow(const CellRange& needed) {
 
 void EvidenceGrid::add(std::span<const ElementReading> readings, double radius_mm) {
   const double tiles_across = 2.0 + 2.0 * radius_mm / (cell_mm_ * shaders::TILE_CELLS);
-  const auto pass = static_cast<std::size_t>(
-      std::max(1.0, static_cast<double>(entries_per_pass) / (tiles_across * tiles_across)));
+  const double most_entries = std::min(static_cast<double>(entries_per_pass),
+                                       static_cast<double>(context_.limits().table_texels));
+  // All readings of a pass may lie on one tile.
+  const auto pass =
+      static_cast<std::size_t>(std::clamp(most_entries / (tiles_across * tiles_across), 1.0,
+                                          static_cast<double>(gpu::most_iterations)));
   for (; !readings.empty(); readings = readings.subspan(std::min(pass, readings.size()))) {
     const auto part = readings.first(std::min(pass, readings.size()));
     glm::dvec2 lowest = part.front().position_mm;

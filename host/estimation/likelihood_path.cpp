@@ -10,8 +10,6 @@ namespace {
 // Eight factors of at least this multiply to 1e-24, and the kernel's clamp of the odds at 2^-30
 // changes them by less than one part in 1e6.
 constexpr double least_product_floor = 1e-3;
-// Below this many invocations in step a device is a CPU, which a few workgroups fill.
-constexpr std::uint32_t gpu_subgroup = 16;
 constexpr std::int64_t invocations_that_fill_a_gpu = 1 << 16;
 
 constexpr gpu::Access bindings[] = {gpu::Access::table, gpu::Access::storage, gpu::Access::table,
@@ -29,11 +27,11 @@ std::vector<std::uint32_t> model_constants(const ContactLikelihood& model) {
 std::span<const gpu::Access> likelihood_bindings() { return bindings; }
 
 std::uint32_t most_bins_per_invocation(const gpu::Context& context, std::int64_t bins) {
-  if (context.limits().subgroup < gpu_subgroup) {
-    return 25;
-  }
+  constexpr std::int64_t largest = 25;
   return static_cast<std::uint32_t>(
-      std::clamp<std::int64_t>(bins / invocations_that_fill_a_gpu, 1, 25));
+      context.limits().cpu
+          ? largest
+          : std::clamp<std::int64_t>(bins / invocations_that_fill_a_gpu, 1, largest));
 }
 
 LikelihoodPath choose_path(gpu::Context& context, const PoseLattice& lattice, double cell_mm,

@@ -33,7 +33,8 @@ std::uint32_t most_bins_per_invocation(const gpu::Context& context, std::int64_t
 /// Neighbouring bins in register tiles; none where the lattice is too coarse for the map's cells.
 std::optional<LikelihoodPath> tile_path(gpu::Context& context, const PoseLattice& lattice,
                                         double cell_mm, const ContactLikelihood& model);
-/// Bins of a row, each with map nodes of its own; for any lattice.
+/// Bins of a row, each with map nodes of its own; for any lattice, in particular for those that
+/// tile_path refuses.
 LikelihoodPath row_path(gpu::Context& context, const PoseLattice& lattice, double cell_mm,
                         const ContactLikelihood& model);
 

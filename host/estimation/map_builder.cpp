@@ -106,18 +106,17 @@ void MapBuilder::clear() {
   impl_->grid.clear();
 }
 
-double estimate_prior(Device& device, std::span<const std::vector<Touch>> touches_per_object,
-                      MapOptions options) {
+double estimate_prior(Device& device, std::span<const ObjectTouches> objects, MapOptions options) {
   options.sensor.prior = 0.5;
   // Below the map's own tolerance there is no evidence to speak of.
   constexpr double no_evidence = 2.0 * cut_tolerance;
   std::size_t occupied = 0;
   std::size_t modelled = 0;
   MapBuilder builder(device, options);
-  for (const std::vector<Touch>& touches : touches_per_object) {
+  for (const ObjectTouches& object : objects) {
     builder.clear();
-    builder.add(touches);
-    for (const float evidence : builder.build("").log_odds) {
+    builder.add(object.touches);
+    for (const float evidence : builder.build(object.label).log_odds) {
       occupied += evidence > no_evidence ? 1 : 0;
       modelled += std::abs(evidence) > no_evidence ? 1 : 0;
     }

@@ -15,6 +15,9 @@ namespace palpate {
 
 namespace {
 
+// Sums of this many nats over any number of touches stay within float32.
+constexpr float most_log_odds = 1e30F;
+
 void validate(std::span<const Hypothesis> hypotheses) {
   if (hypotheses.empty()) {
     throw Error(Fault::input, "no objects: give at least one map");
@@ -34,9 +37,10 @@ void validate(std::span<const Hypothesis> hypotheses) {
                                             map.label, map.origin_mm.x, map.origin_mm.y));
     }
     if (!std::all_of(map.log_odds.begin(), map.log_odds.end(),
-                     [](float l) { return std::isfinite(l); })) {
+                     [](float l) { return std::abs(l) <= most_log_odds; })) {
       throw Error(Fault::input,
-                  fmt::format("map '{}': log odds must be finite; build it anew", map.label));
+                  fmt::format("map '{}': log odds must lie within +-{:g}; build it anew", map.label,
+                              most_log_odds));
     }
     if (!(weight > 0.0) || !std::isfinite(weight)) {
       throw Error(Fault::input,
@@ -131,18 +135,39 @@ struct PoseHistogram::Impl {
     return probability;
   }
 
-  /// Adds a touch as what it says beyond No Contact everywhere.
+  void require_object(int object) const {
+    if (object < 0 || static_cast<std::size_t>(object) >= log_weight.size()) {
+      throw Error(Fault::input, fmt::format("object {}: there are {}, counted from 0", object,
+                                            log_weight.size()));
+    }
+  }
+
+  /// Adds a touch element by element.
+  void update_plain(std::span<const Touch> touches, const std::function<void(double)>& progress) {
+    likelihood.accumulate(gather_evidence(touches, options.classifier, options.lattice.pivot_mm,
+                                          likelihood.segment_elements()),
+                          belief, progress);
+  }
+
+  /// Adds a touch as what it says beyond No Contact everywhere, where that is less.
   void update_still(const Touch& touch) {
+    const std::vector<Reading> readings = options.classifier.classify(touch);
+    const auto no_contact = std::count(readings.begin(), readings.end(), Reading::no_contact);
+    if (2 * static_cast<std::size_t>(no_contact) < readings.size()) {
+      update_plain(std::span(&touch, 1), {});
+      return;
+    }
     const glm::dvec2& pivot_mm = options.lattice.pivot_mm;
     if (!still || !still->holds(touch)) {
       if (!still) {
         still.emplace(Belief(context, stream, options.lattice, log_weight.size()));
       }
-      still->T_robot_sensor = touch.T_robot_sensor;
-      still->elements_mm.assign(touch.elements_mm.begin(), touch.elements_mm.end());
+      still->elements_mm.clear();
       still->no_contact.clear();
       likelihood.accumulate(gather_no_contact(touch, pivot_mm, likelihood.segment_elements()),
                             still->no_contact, {});
+      still->T_robot_sensor = touch.T_robot_sensor;
+      still->elements_mm.assign(touch.elements_mm.begin(), touch.elements_mm.end());
     }
     belief.add(still->no_contact);
     likelihood.accumulate(
@@ -193,15 +218,15 @@ void PoseHistogram::update(std::span<const Touch> touches,
                            const std::function<void(double)>& progress) {
   impl_->summarised.reset();
   if (impl_->options.still_array) {
-    for (const Touch& touch : touches) {
-      impl_->update_still(touch);
+    for (std::size_t i = 0; i < touches.size(); ++i) {
+      impl_->update_still(touches[i]);
+      if (progress) {
+        progress(static_cast<double>(i + 1) / static_cast<double>(touches.size()));
+      }
     }
     return;
   }
-  impl_->likelihood.accumulate(
-      gather_evidence(touches, impl_->options.classifier, impl_->options.lattice.pivot_mm,
-                      impl_->likelihood.segment_elements()),
-      impl_->belief, progress);
+  impl_->update_plain(touches, progress);
 }
 
 Estimate PoseHistogram::estimate() const {
@@ -222,12 +247,14 @@ Estimate PoseHistogram::estimate() const {
 }
 
 Marginals PoseHistogram::marginals(int object) const {
+  impl_->require_object(object);
   BeliefMarginals sums = impl_->belief.marginals(object, impl_->summaries()[object].max);
   return {.xy = impl_->to_probability(object, std::move(sums.xy)),
           .theta = impl_->to_probability(object, std::move(sums.theta))};
 }
 
 std::vector<double> PoseHistogram::log_likelihood(int object) const {
+  impl_->require_object(object);
   return impl_->belief.download(object);
 }
 

@@ -34,18 +34,19 @@ LikelihoodPath row_path(gpu::Context& context, const PoseLattice& lattice, doubl
               std::min(longest_run, most_bins_per_invocation(context, lattice.bins())));
   std::vector<std::uint32_t> constants = model_constants(model);
   constants.push_back(run);
-  return {.kernel = {context,
-                     {.name = "accumulate_rows",
-                      .spirv = shaders::accumulate_rows,
-                      .bindings = likelihood_bindings(),
-                      .push_bytes = sizeof(shaders::LikelihoodPush),
-                      .constants = constants}},
-          .bins_x = run,
-          .bins_y = 1,
-          .description =
-              fmt::format("runs of {} bins: at a lattice step of {:.3g} x {:.3g} map "
-                          "cells, or with so few bins, register tiles do not pay",
-                          run, lattice.x_mm.step() / cell_mm, lattice.y_mm.step() / cell_mm)};
+  return {
+      .kernel = {context,
+                 {.name = "accumulate_rows",
+                  .spirv = shaders::accumulate_rows,
+                  .bindings = likelihood_bindings(),
+                  .push_bytes = sizeof(shaders::LikelihoodPush),
+                  .constants = constants}},
+      .bins_x = run,
+      .bins_y = 1,
+      .description = fmt::format("runs of {} bins: at a lattice step of {:.3g} x {:.3g} map "
+                                 "cells a tile of four bins does not fit into a cell{}",
+                                 run, lattice.x_mm.step() / cell_mm, lattice.y_mm.step() / cell_mm,
+                                 context.limits().cpu ? "" : ", or would leave the GPU idle")};
 }
 
 }  // namespace palpate

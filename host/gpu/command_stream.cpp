@@ -251,10 +251,11 @@ void CommandStream::submit() {
   if (timestamps_ != VK_NULL_HANDLE) {
     std::array<std::uint64_t, 2> ticks{};
     check(vkGetQueryPoolResults(device, timestamps_, 0, 2, sizeof ticks, ticks.data(),
-                                sizeof ticks[0], VK_QUERY_RESULT_64_BIT),
+                                sizeof ticks[0], VK_QUERY_RESULT_64_BIT | VK_QUERY_RESULT_WAIT_BIT),
           doing);
     device_seconds_ =
-        static_cast<double>(ticks[1] - ticks[0]) * context_.limits().timestamp_ns * 1e-9;
+        static_cast<double>((ticks[1] - ticks[0]) & context_.limits().timestamp_mask) *
+        context_.limits().timestamp_ns * 1e-9;
   }
   for (const Download& download : downloads_) {
     std::memcpy(download.target, download.source, download.bytes);

@@ -81,7 +81,11 @@ Instance::Instance() {
   if (validation_wanted()) {
     const auto create = instance_function<PFN_vkCreateDebugUtilsMessengerEXT>(
         instance_, "vkCreateDebugUtilsMessengerEXT");
-    check(create(instance_, &messenger_info, nullptr, &messenger_), "starting Vulkan validation");
+    const VkResult result = create(instance_, &messenger_info, nullptr, &messenger_);
+    if (result != VK_SUCCESS) {
+      vkDestroyInstance(instance_, nullptr);
+      check(result, "starting Vulkan validation");
+    }
   }
 }
 
@@ -110,10 +114,8 @@ Context::Context(std::string_view name_or_index) {
   queue_family_ = candidate.queue_family;
   name_ = candidate.info.name;
 
-  VkPhysicalDeviceSubgroupProperties subgroup{
-      .sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_SUBGROUP_PROPERTIES};
   VkPhysicalDeviceMaintenance3Properties maintenance{
-      .sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_MAINTENANCE_3_PROPERTIES, .pNext = &subgroup};
+      .sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_MAINTENANCE_3_PROPERTIES};
   VkPhysicalDeviceProperties2 properties{.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_PROPERTIES_2,
                                          .pNext = &maintenance};
   vkGetPhysicalDeviceProperties2(physical_, &properties);
@@ -121,7 +123,7 @@ Context::Context(std::string_view name_or_index) {
   limits_.storage_range = limits.maxStorageBufferRange;
   limits_.allocation = maintenance.maxMemoryAllocationSize;
   limits_.table_texels = limits.maxTexelBufferElements;
-  limits_.subgroup = subgroup.subgroupSize;
+  limits_.cpu = properties.properties.deviceType == VK_PHYSICAL_DEVICE_TYPE_CPU;
   std::copy_n(limits.maxComputeWorkGroupCount, 3, limits_.group_count);
   limits_.push_bytes = limits.maxPushConstantsSize;
 
@@ -131,6 +133,7 @@ Context::Context(std::string_view name_or_index) {
   vkGetPhysicalDeviceQueueFamilyProperties(physical_, &families, family.data());
   if (family[queue_family_].timestampValidBits > 0) {
     limits_.timestamp_ns = limits.timestampPeriod;
+    limits_.timestamp_mask = ~std::uint64_t{0} >> (64 - family[queue_family_].timestampValidBits);
   }
   vkGetPhysicalDeviceMemoryProperties(physical_, &memory_);
   limits_.memory = device_memory(memory_);

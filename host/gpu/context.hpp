@@ -43,16 +43,21 @@ class Instance {
   ValidationLog validation_;
 };
 
+/// Iterations that all loops of a kernel together may take in one invocation. lavapipe ends loops
+/// after 65,535 iterations without a word; half of that leaves room for outer loops.
+inline constexpr std::uint32_t most_iterations = 1 << 15;
+
 /// Device limits that sizes are planned by.
 struct Limits {
   VkDeviceSize storage_range = 0;  ///< bytes of one storage-buffer binding
   VkDeviceSize allocation = 0;     ///< bytes of one allocation
   std::uint32_t table_texels = 0;  ///< elements of one texel buffer
-  std::uint32_t subgroup = 0;      ///< invocations that run in step: about 8 on a CPU, 32 on a GPU
+  bool cpu = false;                ///< a few cores that a few workgroups fill
   VkDeviceSize memory = 0;         ///< bytes of the largest heap of device memory
   std::uint32_t group_count[3] = {};
   std::uint32_t push_bytes = 0;
-  float timestamp_ns = 0.0F;  ///< 0 where the queue has no timestamps
+  std::uint64_t timestamp_mask = 0;  ///< the bits of a timestamp that count
+  float timestamp_ns = 0.0F;         ///< 0 where the queue has no timestamps
 };
 
 /// A logical device with one compute queue.

@@ -85,14 +85,10 @@ Candidate inspect(VkPhysicalDevice physical, int index) {
   info.memory_gib = static_cast<double>(device_memory(memory)) / (1 << 30);
 
   const auto family = compute_family(physical);
-  const std::uint32_t buffers = properties.limits.maxPerStageDescriptorStorageBuffers;
   if (!has_version_1_1) {
     info.reason = fmt::format("supports Vulkan {}, 1.1 is needed", info.api);
   } else if (!family) {
     info.reason = "has no compute queue";
-  } else if (buffers < max_bindings) {
-    info.reason =
-        fmt::format("binds {} storage buffers at a time, {} are needed", buffers, max_bindings);
   } else {
     info.usable = true;
     candidate.queue_family = *family;

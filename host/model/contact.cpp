@@ -1,11 +1,44 @@
 #include "palpate/contact.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
+
+#include <fmt/format.h>
+
+#include "palpate/error.hpp"
 
 namespace palpate {
 
+namespace {
+
+void validate(const Touch& touch) {
+  const std::size_t e = touch.pressure.size();
+  if (touch.elements_mm.size() != e || (!touch.valid.empty() && touch.valid.size() != e)) {
+    throw Error(Fault::input,
+                fmt::format("touch: {} pressures, {} elements and {} validities; make them agree",
+                            e, touch.elements_mm.size(), touch.valid.size()));
+  }
+  const auto finite = [](const glm::dvec2& p) { return std::isfinite(p.x) && std::isfinite(p.y); };
+  if (!finite(touch.T_robot_sensor.translation_mm) ||
+      !std::isfinite(touch.T_robot_sensor.theta_rad)) {
+    throw Error(Fault::input, "touch: T_robot_sensor is not finite");
+  }
+  for (std::size_t i = 0; i < e; ++i) {
+    const bool alive = touch.valid.empty() || touch.valid[i] != 0;
+    if (!finite(touch.elements_mm[i]) || (alive && !std::isfinite(touch.pressure[i]))) {
+      throw Error(Fault::input,
+                  fmt::format("touch: element {}: its place or pressure is not finite; mark a dead "
+                              "element as not valid",
+                              i));
+    }
+  }
+}
+
+}  // namespace
+
 std::vector<Reading> ContactClassifier::classify(const Touch& touch) const {
+  validate(touch);
   const std::size_t e = touch.pressure.size();
   const auto alive = [&](std::size_t i) { return touch.valid.empty() || touch.valid[i] != 0; };
 

@@ -14,7 +14,8 @@ void validate_axis(const char* name, const Axis& axis) {
   if (axis.count < 1) {
     throw Error(Fault::input, fmt::format("bins {} = {}: give at least 1", name, axis.count));
   }
-  if (!std::isfinite(axis.lower) || !std::isfinite(axis.upper)) {
+  if (!std::isfinite(axis.lower) || !std::isfinite(axis.upper) ||
+      !std::isfinite(axis.upper - axis.lower)) {
     throw Error(Fault::input,
                 fmt::format("range {} = {}:{}: give finite numbers", name, axis.lower, axis.upper));
   }

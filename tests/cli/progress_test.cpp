@@ -56,7 +56,7 @@ TEST_F(ProgressLine, IsShownOnATerminalOnlyAndErased) {
   double elapsed_s = 0.0;
   int bins = 0;
   std::string text;
-  while (elapsed_s < 3.0) {
+  while (elapsed_s < 6.0) {
     // Time grows with the square of the bins along x and y.
     bins = bins == 0 ? 60 : static_cast<int>(bins * std::max(1.1, std::sqrt(3.6 / elapsed_s)));
     const auto start = std::chrono::steady_clock::now();

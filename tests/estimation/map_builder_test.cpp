@@ -200,6 +200,39 @@ TEST(MapBuilder, TheSameInputGivesTheSameBits) {
   expect_same_map(build(all_touches(recording)), build(all_touches(recording)), 0.0);
 }
 
+TEST(MapBuilder, AMillionTouchesOfOneSpotKeepTheirDigits) {
+  // Rounding errors of equal increments all have one sign: a plain float32 sum would drift.
+  const std::vector<glm::dvec2> element{{0.13, 0.07}};
+  for (const Reading reading : {Reading::in_contact, Reading::no_contact}) {
+    const bool contact = reading == Reading::in_contact;
+    const std::vector<double> pressure{contact ? 10.0 : 0.1};
+    // An element that is alone reads the largest pressure: only a ratio above one makes it No
+    // Contact.
+    const MapOptions options{
+        .cell_mm = 0.25, .sensor = {}, .classifier = {.ratio = contact ? 0.3 : 2.0}};
+    const Touch touch{.T_robot_sensor = {}, .elements_mm = element, .pressure = pressure};
+    const std::vector<Touch> batch(10'000, touch);
+    Device device = Device::open();
+    MapBuilder builder(device, options);
+    for (int i = 0; i < 100; ++i) {
+      builder.add(batch);
+    }
+    const OccupancyGrid map = builder.build("spot");
+    double worst = 0.0;
+    for (int j = 0; j < map.ny; ++j) {
+      for (int i = 0; i < map.nx; ++i) {
+        const glm::dvec2 d = map.centre_mm(i, j) - element.front();
+        const double expected =
+            map.prior_log_odds() +
+            1e6 * reference::increment(reading, std::hypot(d.x, d.y), options.sensor);
+        worst =
+            std::max(worst, std::abs(map.at(i, j) - expected) / (1e-3 + 1e-4 * std::abs(expected)));
+      }
+    }
+    EXPECT_LT(worst, 1.0) << "of 1e-3 nats, for what is cut off, and a relative 1e-4";
+  }
+}
+
 TEST(MapBuilder, TouchesWithoutAKnownElementMakeNoMap) {
   Recording recording = random_recording(2, 36, 21);
   recording.pressure.assign(recording.pressure.size(), 0.0);

@@ -32,9 +32,9 @@ double fraction(const Recording& recording) {
 
 double estimate(std::vector<Recording> recordings) {
   Device device = Device::open();
-  std::vector<std::vector<Touch>> touches;
+  std::vector<ObjectTouches> touches;
   for (const Recording& recording : recordings) {
-    touches.push_back(all_touches(recording));
+    touches.push_back({"disc", all_touches(recording)});
   }
   // No cell of 0.2 mm lies halfway between two elements, where contact and no contact cancel out.
   return estimate_prior(device, touches, {.cell_mm = 0.2});
@@ -59,7 +59,7 @@ TEST(EstimatePrior, IsPooledOverAllObjects) {
 TEST(EstimatePrior, DoesNotDependOnThePriorItIsGiven) {
   Device device = Device::open();
   const Recording recording = touch_of_disc(6.0);
-  const std::vector<std::vector<Touch>> touches{all_touches(recording)};
+  const std::vector<ObjectTouches> touches{{"disc", all_touches(recording)}};
   EXPECT_EQ(estimate_prior(device, touches, {.sensor = {.prior = 0.01}}),
             estimate_prior(device, touches, {.sensor = {.prior = 0.9}}));
 }

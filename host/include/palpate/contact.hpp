@@ -23,7 +23,7 @@ struct ContactClassifier {
   double threshold = 2.0;  ///< in the recording's pressure unit
   double ratio = 0.3;
 
-  /// The class of every element, [e].
+  /// The class of every element, [e]. Throws Error on a touch that is not sound.
   std::vector<Reading> classify(const Touch& touch) const;
 };
 

@@ -12,9 +12,10 @@
 
 namespace palpate {
 
+/// What a map is made with.
 struct MapOptions {
-  double cell_mm = 0.5;
-  InverseSensorModel sensor;
+  double cell_mm = 0.5;       ///< edge of a cell
+  InverseSensorModel sensor;  ///< also holds the prior
   ContactClassifier classifier;
 };
 
@@ -33,7 +34,8 @@ class MapBuilder {
   void add(std::span<const Touch> touches);
 
   /// The map of all touches so far. It covers the known elements and the support of the sensor
-  /// model around them, no more; each cell is within 1e-3 nats of the sum over all elements.
+  /// model around them, no more; each cell is within 1e-3 nats, or a relative 1e-4, of the sum over
+  /// all elements.
   /// @throws Error if no element of any touch was In Contact or No Contact.
   OccupancyGrid build(const std::string& label);
 
@@ -45,10 +47,16 @@ class MapBuilder {
   std::unique_ptr<Impl> impl_;
 };
 
+/// The touches of one object.
+struct ObjectTouches {
+  std::string label;
+  std::vector<Touch> touches;
+};
+
 /// p(m) estimated as in the paper: the objects' area over the modelled area, pooled over all
 /// objects. Both areas are counted on maps built with an even prior, in which a cell is occupied
 /// when its evidence speaks for contact and modelled when it has evidence at all.
-double estimate_prior(Device& device, std::span<const std::vector<Touch>> touches_per_object,
-                      MapOptions options);
+/// @throws Error as MapBuilder does, naming the object.
+double estimate_prior(Device& device, std::span<const ObjectTouches> objects, MapOptions options);
 
 }  // namespace palpate

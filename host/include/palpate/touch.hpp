@@ -20,6 +20,8 @@ std::vector<glm::dvec2> digitacts_array();
 inline constexpr double digitacts_element_mm = 1.8;
 
 /// One reading of the tactile array at a known pose. A view: the caller keeps the memory alive.
+/// What takes a touch throws Error where the sizes disagree, or where the pose, the place of an
+/// element or the pressure of one that is alive is not finite.
 struct Touch {
   Pose T_robot_sensor;
   std::span<const glm::dvec2> elements_mm;   ///< [e] element centres in the sensor frame
@@ -50,9 +52,9 @@ struct Recording {
   std::size_t size() const { return T_robot_sensor.size(); }
   /// Number of elements of the array, e.
   std::size_t elements() const { return size() == 0 ? 0 : pressure.size() / size(); }
-  /// Touch i, a view into this recording.
+  /// Touch i < size(), a view into this recording: valid as long as it is unchanged.
   Touch touch(std::size_t i) const;
-  /// Touches [begin, end), views into this recording.
+  /// Touches [begin, end), end <= size(), views into this recording.
   std::vector<Touch> touches(std::size_t begin, std::size_t end) const;
 };
 
