@@ -1,0 +1,36 @@
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "bordered_map.hpp"
+#include "contact_evidence.hpp"
+#include "palpate/sensor_model.hpp"
+
+namespace palpate::bench {
+
+/// The likelihood on the host's cores, for comparison: a thread per core, rows of bins vectorised
+/// by the compiler. Coordinates are split into cell and fraction as on the device.
+class CpuLoop {
+ public:
+  CpuLoop(std::span<const Hypothesis> hypotheses, const PoseLattice& lattice,
+          const ContactLikelihood& model);
+
+  /// Adds the touches' log-likelihood to all bins.
+  void update(std::span<const Touch> touches);
+  /// Of every bin of one object in nats, [theta, y, x].
+  const std::vector<double>& log_likelihood(std::size_t object) const { return belief_[object]; }
+
+ private:
+  /// `rotated` are the elements of the row's theta.
+  void add_row(std::size_t object, std::int64_t row, std::span<const shaders::Segment> segments,
+               const shaders::RotatedElement* rotated);
+
+  PoseLattice lattice_;
+  float random_floor_;  ///< gamma m
+  float trust_;         ///< 1 - gamma
+  std::vector<BorderedMap> maps_;
+  std::vector<std::vector<double>> belief_;
+};
+
+}  // namespace palpate::bench

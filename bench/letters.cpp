@@ -1,0 +1,74 @@
+#include "letters.hpp"
+
+#include <numbers>
+#include <string>
+
+namespace palpate::bench {
+
+namespace {
+
+constexpr const char* names[] = {"A", "E", "I", "O", "U"};
+
+Simulator simulator_of(const char* name, std::uint64_t seed) {
+  return {make_shape(name), SensorModel{}, digitacts_array(), seed};
+}
+
+}  // namespace
+
+std::vector<Recording> training_recordings() {
+  std::vector<Recording> recordings;
+  std::uint64_t seed = 1;
+  for (const char* name : names) {
+    recordings.push_back(simulator_of(name, seed++).touch(training_grid(), Pose{}));
+  }
+  return recordings;
+}
+
+std::vector<Hypothesis> letter_maps(Device& device, const std::vector<Recording>& training,
+                                    const MapOptions& options) {
+  std::vector<std::vector<Touch>> touches;
+  for (const Recording& recording : training) {
+    touches.push_back(all_touches(recording));
+  }
+  MapOptions with_prior = options;
+  with_prior.sensor.prior = estimate_prior(device, touches, options);
+  MapBuilder builder(device, with_prior);
+  std::vector<Hypothesis> hypotheses;
+  for (std::size_t letter = 0; letter < training.size(); ++letter) {
+    builder.clear();
+    builder.add(touches[letter]);
+    hypotheses.push_back({.map = builder.build(training[letter].object)});
+  }
+  return hypotheses;
+}
+
+std::vector<Recording> unknown_recordings(int count, int touches, std::uint64_t seed) {
+  std::vector<Simulator> simulators;
+  for (const char* name : names) {
+    simulators.push_back(simulator_of(name, ++seed));
+  }
+  std::vector<Recording> recordings;
+  for (int i = 0; i < count; ++i) {
+    const std::size_t letter = static_cast<std::size_t>(i) % simulators.size();
+    const Pose T_object_robot = random_object_pose(++seed);
+    std::vector<Pose> poses = random_poses(touches, ++seed);
+    for (Pose& pose : poses) {
+      pose = inverse(T_object_robot) * pose;  // T_robot_sensor from T_object_sensor
+    }
+    recordings.push_back(simulators[letter].touch(poses, T_object_robot));
+    recordings.back().truth = {.object = names[letter], .T_object_robot = T_object_robot};
+  }
+  return recordings;
+}
+
+std::vector<Touch> all_touches(const Recording& recording) {
+  return recording.touches(0, recording.size());
+}
+
+PoseLattice lattice_of(int nx, int ny, int ntheta) {
+  return {.x_mm = {-10.0, 10.0, nx},
+          .y_mm = {-10.0, 10.0, ny},
+          .theta_rad = {0.0, 2.0 * std::numbers::pi, ntheta}};
+}
+
+}  // namespace palpate::bench

@@ -1,0 +1,31 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "palpate/device.hpp"
+#include "palpate/map_builder.hpp"
+#include "palpate/pose_histogram.hpp"
+#include "palpate/simulation.hpp"
+
+namespace palpate::bench {
+
+inline constexpr int touches_per_unknown = 9;  // after which the paper knows every letter
+
+/// The letters A, E, I, O and U, touched 192 times each at known poses, with fixed seeds.
+std::vector<Recording> training_recordings();
+
+/// Maps of the letters, which share the prior that their training touches give.
+std::vector<Hypothesis> letter_maps(Device& device, const std::vector<Recording>& training,
+                                    const MapOptions& options);
+
+/// Recordings of letters in random poses within the lattice, A to U in turn, with the truth.
+std::vector<Recording> unknown_recordings(int count, int touches, std::uint64_t seed);
+
+/// Every touch of a recording.
+std::vector<Touch> all_touches(const Recording& recording);
+
+/// Bins over x and y in [-10, 10] mm and the full circle (Sec. IV).
+PoseLattice lattice_of(int nx, int ny, int ntheta);
+
+}  // namespace palpate::bench

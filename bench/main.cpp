@@ -1,0 +1,35 @@
+#include <cstdio>
+#include <exception>
+#include <span>
+
+#include <fmt/format.h>
+#include <CLI/CLI.hpp>
+
+#include "kernels.hpp"
+#include "palpate/error.hpp"
+
+int main(int argc, char** argv) {
+  CLI::App app("Measures Palpate's speed and accuracy on simulated letters.", "palpate-bench");
+  app.require_subcommand(1);
+  palpate::bench::KernelOptions options;
+  auto* kernels = app.add_subcommand(
+      "kernels",
+      "Likelihood (ns per pose bin, element and touch), reductions (ms), maps (s), many unknowns "
+      "(per second) and latency (ms), with errors in nats against float64; takes some minutes");
+  kernels->add_option("--json", options.json, "Also write the results to this file");
+  kernels->add_flag("--quick", options.quick, "Small sizes, in less than a minute");
+  kernels->add_option("--device", options.device, "Vulkan device, by a part of its name or index");
+  kernels->callback([&] { palpate::bench::measure_kernels(options, std::span(argv, argc)); });
+  try {
+    app.parse(argc, argv);
+    return 0;
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : 2;
+  } catch (const palpate::Error& error) {
+    fmt::print(stderr, "palpate-bench: {}\n", error.what());
+    return error.fault() == palpate::Fault::input ? 2 : 1;
+  } catch (const std::exception& error) {
+    fmt::print(stderr, "palpate-bench: {}\n", error.what());
+    return 1;
+  }
+}

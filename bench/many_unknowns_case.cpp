@@ -1,0 +1,172 @@
+#include <spawn.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <fcntl.h>
+#include <filesystem>
+#include <optional>
+
+#include <fmt/format.h>
+
+#include "cases.hpp"
+#include "letters.hpp"
+#include "measurement.hpp"
+#include "palpate/error.hpp"
+#include "palpate/files.hpp"
+
+namespace palpate::bench {
+
+namespace {
+
+constexpr double goal_lost_percent = 10.0;
+constexpr double goal_rate_over_processes = 4.0;
+
+/// A folder that goes when it is no longer needed.
+class ScratchFolder {
+ public:
+  ScratchFolder() {
+    std::string name = std::filesystem::temp_directory_path() / "palpate-bench-XXXXXX";
+    if (::mkdtemp(name.data()) == nullptr) {
+      throw Error(Fault::system, fmt::format("{}: cannot be made; is TMPDIR writable?", name));
+    }
+    path_ = name;
+  }
+  ~ScratchFolder() {
+    std::error_code ignored;
+    std::filesystem::remove_all(path_, ignored);
+  }
+  ScratchFolder(const ScratchFolder&) = delete;
+  ScratchFolder& operator=(const ScratchFolder&) = delete;
+
+  const std::filesystem::path& path() const { return path_; }
+
+ private:
+  std::filesystem::path path_;
+};
+
+/// Runs a program to its end, in silence.
+void run_process(std::vector<std::string> arguments) {
+  std::vector<char*> argv;
+  for (std::string& argument : arguments) {
+    argv.push_back(argument.data());
+  }
+  argv.push_back(nullptr);
+  posix_spawn_file_actions_t actions;
+  posix_spawn_file_actions_init(&actions);
+  posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, "/dev/null", O_WRONLY, 0);
+  pid_t process = 0;
+  const int refused = posix_spawn(&process, argv.front(), &actions, nullptr, argv.data(), environ);
+  posix_spawn_file_actions_destroy(&actions);
+  int status = 0;
+  if (refused != 0 || waitpid(process, &status, 0) != process || status != 0) {
+    throw Error(Fault::system, fmt::format("{}: failed; run it by hand", arguments.front()));
+  }
+}
+
+/// Median seconds that `palpate recognize` takes per unknown, start and end included; none where
+/// the program does not lie beside this one.
+std::optional<double> seconds_per_process(const Inputs& inputs, int processes) {
+  const std::filesystem::path program =
+      std::filesystem::read_symlink("/proc/self/exe").replace_filename("palpate");
+  if (!std::filesystem::exists(program)) {
+    return std::nullopt;
+  }
+  const ScratchFolder folder;
+  const std::filesystem::path maps = folder.path() / "maps";
+  std::filesystem::create_directory(maps);
+  for (const Hypothesis& letter : inputs.letters) {
+    write_map(maps / (letter.map.label + ".map.h5"), letter.map);
+  }
+  std::vector<double> seconds;
+  for (int i = 0; i < processes; ++i) {
+    const std::filesystem::path recording = folder.path() / fmt::format("{}.h5", i);
+    write_recording(recording, inputs.unknowns[static_cast<std::size_t>(i)]);
+    std::vector<std::string> arguments{program,  "recognize", recording,       "--maps",       maps,
+                                       "--bins", "25x25x16",  "--x-mm=-10:10", "--y-mm=-10:10"};
+    if (!inputs.device_name.empty()) {
+      arguments.insert(arguments.end(), {"--device", inputs.device_name});
+    }
+    seconds.push_back(seconds_of([&] { run_process(arguments); }));
+  }
+  return median(seconds);
+}
+
+bool equal(const Estimate& a, const Estimate& b) {
+  return a.identity == b.identity && a.mode.object == b.mode.object && a.mode.bin == b.mode.bin &&
+         a.mode.log_likelihood == b.mode.log_likelihood;
+}
+
+}  // namespace
+
+Case many_unknowns_case(const Inputs& inputs) {
+  const PoseLattice lattice = lattice_of(25, 25, 16);
+  const int large_thetas = inputs.quick ? 160 : 1600;
+  const auto bins =
+      static_cast<double>(lattice.bins()) * static_cast<double>(inputs.letters.size());
+  const auto per_bin = static_cast<double>(inputs.unknowns.front().pressure.size());
+  PoseHistogram histogram = letter_histogram(inputs, lattice);
+  const auto recognise = [](PoseHistogram& with, const Recording& unknown) {
+    with.reset();
+    with.update(all_touches(unknown));
+    return with.estimate();
+  };
+  recognise(histogram, inputs.unknowns.front());
+
+  std::vector<Estimate> estimates;
+  const double seconds = seconds_of([&] {
+    for (const Recording& unknown : inputs.unknowns) {
+      estimates.push_back(recognise(histogram, unknown));
+    }
+  });
+  const auto unknowns = static_cast<double>(inputs.unknowns.size());
+  const double ns = 1e9 * seconds / (unknowns * bins * per_bin);
+
+  PoseHistogram large = letter_histogram(inputs, lattice_of(25, 25, large_thetas));
+  const double large_seconds =
+      median_seconds([&] { recognise(large, inputs.unknowns.front()); }, 3);
+  const double large_ns =
+      1e9 * large_seconds / (bins * large_thetas / lattice.theta_rad.count * per_bin);
+
+  int different = 0;
+  int right = 0;
+  for (std::size_t i = 0; i < inputs.unknowns.size(); ++i) {
+    const std::string& best = inputs.letters[estimates[i].mode.object].map.label;
+    right += best == inputs.unknowns[i].truth->object ? 1 : 0;
+  }
+  const std::size_t last = inputs.unknowns.size() - 1;
+  for (const std::size_t i : {std::size_t{0}, last / 2, last}) {
+    PoseHistogram alone = letter_histogram(inputs, lattice);
+    bool same = equal(recognise(alone, inputs.unknowns[i]), estimates[i]);
+    recognise(histogram, inputs.unknowns[i]);
+    for (int object = 0; object < static_cast<int>(inputs.letters.size()); ++object) {
+      same = same && alone.log_likelihood(object) == histogram.log_likelihood(object);
+    }
+    different += same ? 0 : 1;
+  }
+
+  Case result{.name = "many unknowns",
+              .facts = {{"unknowns", inputs.unknowns.size()},
+                        {"touches of each", inputs.unknowns.front().size()},
+                        {"objects", inputs.letters.size()},
+                        {"bins", "25x25x16"},
+                        {"large case's bins", fmt::format("25x25x{}", large_thetas)},
+                        {"path", histogram.paths()}},
+              .measurements = {{"rate", unknowns / seconds, "unknowns per s"},
+                               {"per bin, element and touch", ns, "ns"},
+                               {"one large case, per bin, element and touch", large_ns, "ns"},
+                               {"lost against the large case", 100.0 * (ns / large_ns - 1.0), "%",
+                                at_most(goal_lost_percent)},
+                               {"of 3, other bits than one by one", static_cast<double>(different),
+                                "unknowns", at_most(0)},
+                               {"letter of the mode is right", 100.0 * right / unknowns, "%"}}};
+  if (const auto alone = seconds_per_process(inputs, 10)) {
+    result.measurements.push_back({"a process per unknown", 1.0 / *alone, "unknowns per s"});
+    result.measurements.push_back({"rate over a process per unknown", *alone * unknowns / seconds,
+                                   "times", at_least(goal_rate_over_processes)});
+  } else {
+    result.facts["a process per unknown"] = "not measured: no palpate beside this program";
+  }
+  return result;
+}
+
+}  // namespace palpate::bench

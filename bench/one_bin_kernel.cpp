@@ -1,0 +1,98 @@
+#include "one_bin_kernel.hpp"
+
+#include <bit>
+
+#include "contact_evidence.hpp"
+#include "one_bin.hpp"
+#include "two_float.hpp"
+
+namespace palpate::bench {
+
+namespace {
+
+constexpr std::uint32_t workgroup = 64;
+constexpr gpu::Access bindings[] = {gpu::Access::storage, gpu::Access::storage,
+                                    gpu::Access::storage, gpu::Access::storage,
+                                    gpu::Access::storage};
+
+gpu::Kernel make_kernel(gpu::Context& context, const ContactLikelihood& model) {
+  const std::uint32_t constants[] = {
+      workgroup, std::bit_cast<std::uint32_t>(static_cast<float>(model.gamma * model.prior)),
+      std::bit_cast<std::uint32_t>(static_cast<float>(1.0 - model.gamma))};
+  return {context,
+          {.name = "one_bin",
+           .spirv = shaders::one_bin,
+           .bindings = bindings,
+           .push_bytes = sizeof(shaders::LikelihoodPush),
+           .constants = constants}};
+}
+
+template <typename T>
+gpu::Buffer uploaded(gpu::Context& context, gpu::CommandStream& stream,
+                     const std::vector<T>& values, const char* purpose) {
+  gpu::Buffer buffer(context, std::span(values).size_bytes(), gpu::Memory::device, purpose);
+  stream.upload(buffer, std::span(values));
+  return buffer;
+}
+
+}  // namespace
+
+OneBinKernel::OneBinKernel(Device& device, std::span<const Hypothesis> hypotheses,
+                           const PoseLattice& lattice, const ContactLikelihood& model)
+    : context_(device.context()),
+      stream_(context_),
+      kernel_(make_kernel(context_, model)),
+      lattice_(lattice),
+      cell_mm_(hypotheses.front().map.cell_mm) {
+  for (const BorderedMap& map : bordered_maps(hypotheses, lattice, model.prior)) {
+    objects_.push_back({.width = map.width,
+                        .height = map.height,
+                        .map = uploaded(context_, stream_, map.log_odds, "a map"),
+                        .axes = uploaded(context_, stream_, map.axes, "the lattice's axes"),
+                        .belief = gpu::Buffer(
+                            context_, static_cast<VkDeviceSize>(lattice.bins()) * sizeof(TwoFloat),
+                            gpu::Memory::device, "pose bins")});
+    stream_.fill(objects_.back().belief, 0);
+  }
+  stream_.run();
+}
+
+void OneBinKernel::update(std::span<const Touch> touches) {
+  const ContactEvidence evidence =
+      gather_evidence(touches, ContactClassifier{}, lattice_.pivot_mm, segment_elements);
+  const gpu::Buffer elements =
+      uploaded(context_, stream_,
+               rotate_evidence(evidence.from_pivot_mm, lattice_.theta_rad, cell_mm_), "elements");
+  const gpu::Buffer segments = uploaded(context_, stream_, evidence.segments, "segments");
+  for (const Object& object : objects_) {
+    const shaders::LikelihoodPush push{
+        .nx = static_cast<shaders::uint>(lattice_.x_mm.count),
+        .row_first = 0,
+        .rows = static_cast<shaders::uint>(lattice_.y_mm.count),
+        .theta_first = 0,
+        .segments = static_cast<shaders::uint>(evidence.segments.size()),
+        .elements = static_cast<shaders::uint>(evidence.from_pivot_mm.size()),
+        .map_width = object.width,
+        .map_height = object.height};
+    const auto plane = static_cast<std::uint32_t>(lattice_.plane());
+    stream_.dispatch(kernel_, {&object.map, &object.axes, &elements, &segments, &object.belief},
+                     push,
+                     {(plane + workgroup - 1) / workgroup, 1,
+                      static_cast<std::uint32_t>(lattice_.theta_rad.count)});
+  }
+  stream_.run();
+}
+
+std::vector<double> OneBinKernel::log_likelihood(std::size_t object) {
+  std::vector<TwoFloat> bins(static_cast<std::size_t>(lattice_.bins()));
+  stream_.download(objects_[object].belief, std::span(bins));
+  stream_.run();
+  std::vector<double> values;
+  values.reserve(bins.size());
+  for (const TwoFloat& bin : bins) {
+    values.push_back(bin.value());
+  }
+  return values;
+}
+
+}  // namespace palpate::bench
