@@ -26,18 +26,18 @@ std::vector<Recording> training_recordings() {
 
 std::vector<Hypothesis> letter_maps(Device& device, const std::vector<Recording>& training,
                                     const MapOptions& options) {
-  std::vector<std::vector<Touch>> touches;
+  std::vector<ObjectTouches> letters;
   for (const Recording& recording : training) {
-    touches.push_back(all_touches(recording));
+    letters.push_back({recording.object, all_touches(recording)});
   }
   MapOptions with_prior = options;
-  with_prior.sensor.prior = estimate_prior(device, touches, options);
+  with_prior.sensor.prior = estimate_prior(device, letters, options);
   MapBuilder builder(device, with_prior);
   std::vector<Hypothesis> hypotheses;
-  for (std::size_t letter = 0; letter < training.size(); ++letter) {
+  for (const ObjectTouches& letter : letters) {
     builder.clear();
-    builder.add(touches[letter]);
-    hypotheses.push_back({.map = builder.build(training[letter].object)});
+    builder.add(letter.touches);
+    hypotheses.push_back({.map = builder.build(letter.label)});
   }
   return hypotheses;
 }

@@ -9,7 +9,7 @@ layout(local_size_x_id = 0) in;
 
 #include "two_float.glsl"
 
-layout(binding = 0) uniform samplerBuffer added;
+layout(binding = 0) uniform samplerBuffer added;  // two bins a texel
 layout(std430, binding = 1) buffer Belief { vec2 belief[]; };
 layout(push_constant) uniform Push { AddPush push; };
 
@@ -17,6 +17,7 @@ void main() {
   // Rows of workgroups, for one row of them may not cover a slab.
   const uint bin = gl_WorkGroupID.y * push.row + gl_GlobalInvocationID.x;
   if (gl_GlobalInvocationID.x < push.row && bin < push.bins) {
-    belief[bin] = two_float_sum(belief[bin], texelFetch(added, int(bin)).xy);
+    const vec4 pair = texelFetch(added, int(bin / 2));
+    belief[bin] = two_float_sum(belief[bin], bin % 2 == 0 ? pair.xy : pair.zw);
   }
 }

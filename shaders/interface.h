@@ -35,7 +35,7 @@ const uint REDUCE_BINS = 16384;
 // (x, y) indices and thetas that one workgroup of sum_marginals covers.
 const uint MARGINAL_WORKGROUP = 64;
 const uint MARGINAL_PLANE = 512;
-const uint MARGINAL_THETAS = 32;
+const uint MARGINAL_THETAS = 64;
 
 // Increments above 2 atanh(SERIES_REACH) take a logarithm, smaller ones a series.
 const float SERIES_REACH = 0.2;

@@ -11,12 +11,14 @@
 
 layout(local_size_x_id = 0) in;
 
-layout(binding = 0) uniform samplerBuffer belief;  // two floats, normalised: |low| <= ulp(high) / 2
+// Two bins a texel, which halves the fetches. Their two floats are normalised:
+// |low| <= ulp(high) / 2.
+layout(binding = 0) uniform samplerBuffer belief;
 layout(std430, binding = 1) writeonly buffer Partials { Partial partials[]; };
 layout(push_constant) uniform Push { ReducePush push; };
 
-// Values that a lane takes at a time, for one new maximum and one rescaling of the sum.
-const uint BATCH = 8;
+// Texels that a lane takes at a time, for one new maximum and one rescaling of the sum.
+const uint BATCH = 4;
 
 shared vec2 best_value[gl_WorkGroupSize.x];
 shared uint best_index[gl_WorkGroupSize.x];
@@ -36,22 +38,29 @@ void main() {
   const uint end = min(begin + REDUCE_BINS, push.bins);
 
   // A lane past the end repeats the last bin without counting it, which changes no result.
-  uint index = min(begin + lane, end - 1);
-  vec2 best = texelFetch(belief, int(index)).xy;
+  const uint last = (end - 1) / 2;
+  uint index = min(begin + 2 * lane, end - 1);
+  const vec4 first = texelFetch(belief, int(index / 2));
+  vec2 best = index % 2 == 0 ? first.xy : first.zw;
   float sum = 0.0;
-  for (uint i = begin + lane; i < end; i += lanes * BATCH) {
-    vec2 value[BATCH];
+  for (uint i = begin / 2 + lane; 2 * i < end; i += lanes * BATCH) {
+    vec2 value[2 * BATCH];
     const vec2 before = best;
     [[unroll]] for (uint b = 0; b < BATCH; ++b) {
-      const uint at = min(i + b * lanes, end - 1);
-      value[b] = texelFetch(belief, int(at)).xy;
-      const bool more = exceeds(value[b], best);
-      best = more ? value[b] : best;
-      index = more ? at : index;
+      const vec4 pair = texelFetch(belief, int(min(i + b * lanes, last)));
+      value[2 * b] = pair.xy;
+      value[2 * b + 1] = pair.zw;
+      [[unroll]] for (uint k = 0; k < 2; ++k) {
+        const uint at = 2 * (i + b * lanes) + k;
+        const bool more = at < end && exceeds(value[2 * b + k], best);
+        best = more ? value[2 * b + k] : best;
+        index = more ? at : index;
+      }
     }
     sum *= relative(before, best);
-    [[unroll]] for (uint b = 0; b < BATCH; ++b) {
-      sum += i + b * lanes < end ? relative(value[b], best) : 0.0;
+    [[unroll]] for (uint b = 0; b < 2 * BATCH; ++b) {
+      const uint at = 2 * (i + b / 2 * lanes) + b % 2;
+      sum += at < end ? relative(value[b], best) : 0.0;
     }
   }
 

@@ -10,7 +10,7 @@
 
 layout(local_size_x = MARGINAL_WORKGROUP) in;
 
-layout(binding = 0) uniform samplerBuffer belief;
+layout(binding = 0) uniform samplerBuffer belief;  // two bins a texel
 layout(std430, binding = 1) writeonly buffer OverTheta { float over_theta[]; };  // [chunk, plane]
 layout(std430, binding = 2) writeonly buffer OverPlane { float over_plane[]; };  // [block, theta]
 layout(push_constant) uniform Push { MarginalPush push; };
@@ -34,7 +34,8 @@ void main() {
     [[unroll]] for (uint i = 0; i < PER_LANE; ++i) {
       const uint at = first + i * MARGINAL_WORKGROUP;
       const uint bin = (theta + t) * push.plane + min(at, push.plane - 1);
-      const vec2 value = texelFetch(belief, int(bin)).xy;
+      const vec4 pair = texelFetch(belief, int(bin / 2));
+      const vec2 value = bin % 2 == 0 ? pair.xy : pair.zw;
       precise float difference = (value.x - push.max_high) + (value.y - push.max_low);
       const float probability = at < push.plane ? exp(difference) : 0.0;
       sum[i] += probability;

@@ -117,17 +117,11 @@ void prepare_outputs(const Options& options, bool folder,
     outputs.emplace_back("--png", options.png);
   }
   require_distinct(outputs, {options.recordings.begin(), options.recordings.end()});
+  if (!folder) {
+    require_writable(options.output);
+  }
   if (!options.png.empty()) {
     require_writable(options.png);
-  }
-  if (folder) {
-    make_folder(options.output);
-  }
-  for (const std::filesystem::path& path : map_paths) {
-    require_writable(path);
-  }
-  if (!options.ros.empty()) {
-    make_folder(options.ros);
   }
 }
 
@@ -177,7 +171,13 @@ void build_maps(const Options& options) {
     }
   }
 
-  // Everything is computed; only now anything is written.
+  // Everything is computed; only now anything is written, the folders first.
+  if (!options.ros.empty()) {
+    make_folder(options.ros);
+  }
+  if (folder) {
+    make_folder(output);
+  }
   for (std::size_t i = 0; i < maps.size(); ++i) {
     const OccupancyGrid& map = maps[i];
     write_map(map_paths[i], map);

@@ -28,7 +28,8 @@ std::vector<Slab> cut_into_slabs(gpu::Context& context, const PoseLattice& latti
   const auto binding_bins = static_cast<std::int64_t>(
       std::min({limits.storage_range / sizeof(TwoFloat), limits.allocation / sizeof(TwoFloat),
                 VkDeviceSize{limits.table_texels},
-                VkDeviceSize{limits.group_count[0]} * shaders::REDUCE_BINS}));
+                VkDeviceSize{limits.group_count[0]} * shaders::REDUCE_BINS}) /
+      2 * 2);
   // However few bins an invocation takes, a plane's rows must fit one dispatch.
   const std::int64_t plane_bins =
       std::min(binding_bins, std::int64_t{limits.group_count[0]} * workgroup);
@@ -54,9 +55,10 @@ std::vector<Slab> cut_into_slabs(gpu::Context& context, const PoseLattice& latti
       slab.row_first = static_cast<std::uint32_t>(row);
       slab.row_count = static_cast<std::uint32_t>(std::min(rows, lattice.y_mm.count - row));
       slab.nx = static_cast<std::uint32_t>(lattice.x_mm.count);
+      // Reductions read two bins a texel, so an odd number takes room for one more.
       slab.log_likelihood =
-          gpu::Buffer(context, slab.bins() * sizeof(TwoFloat), gpu::Memory::device,
-                      fmt::format("{} pose bins", slab.bins()), VK_FORMAT_R32G32_SFLOAT);
+          gpu::Buffer(context, (slab.bins() + 1) / 2 * 2 * sizeof(TwoFloat), gpu::Memory::device,
+                      fmt::format("{} pose bins", slab.bins()), VK_FORMAT_R32G32B32A32_SFLOAT);
       slabs.push_back(std::move(slab));
     }
   }
@@ -90,6 +92,15 @@ std::uint32_t groups_of(std::uint32_t count, std::uint32_t per_group) {
 std::int64_t lattice_index(const PoseLattice& lattice, const Slab& slab, std::int64_t in_slab) {
   return (slab.theta_first + in_slab / slab.plane()) * lattice.plane() +
          std::int64_t{slab.row_first} * slab.nx + in_slab % slab.plane();
+}
+
+/// Adds every row of `parts` to `sums`.
+void add_rows(std::span<const float> parts, std::span<double> sums) {
+  for (; !parts.empty(); parts = parts.subspan(sums.size())) {
+    for (std::size_t i = 0; i < sums.size(); ++i) {
+      sums[i] += parts[i];
+    }
+  }
 }
 
 bool exceeds(const TwoFloat& a, const TwoFloat& b) { return a.value() > b.value(); }
@@ -222,13 +233,9 @@ BeliefMarginals Belief::marginals(std::size_t object, TwoFloat max) const {
     stream_.download(plane_parts, std::span(over_plane));
     stream_.run();
 
-    const std::size_t first = std::size_t{slab.row_first} * slab.nx;
-    for (std::size_t i = 0; i < over_theta.size(); ++i) {
-      sums.xy[first + i % slab.plane()] += over_theta[i];
-    }
-    for (std::size_t i = 0; i < over_plane.size(); ++i) {
-      sums.theta[slab.theta_first + i % slab.theta_count] += over_plane[i];
-    }
+    add_rows(over_theta,
+             std::span(sums.xy).subspan(std::size_t{slab.row_first} * slab.nx, slab.plane()));
+    add_rows(over_plane, std::span(sums.theta).subspan(slab.theta_first, slab.theta_count));
   }
   return sums;
 }

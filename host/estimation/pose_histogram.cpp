@@ -39,8 +39,8 @@ void validate(std::span<const Hypothesis> hypotheses) {
     if (!std::all_of(map.log_odds.begin(), map.log_odds.end(),
                      [](float l) { return std::abs(l) <= most_log_odds; })) {
       throw Error(Fault::input,
-                  fmt::format("map '{}': log odds must lie within +-{:g}; build it anew", map.label,
-                              most_log_odds));
+                  fmt::format("map '{}': log odds must be finite and within +-{:g}; build it anew",
+                              map.label, most_log_odds));
     }
     if (!(weight > 0.0) || !std::isfinite(weight)) {
       throw Error(Fault::input,

@@ -26,7 +26,7 @@ void validate(const Touch& touch) {
   }
   for (std::size_t i = 0; i < e; ++i) {
     const bool alive = touch.valid.empty() || touch.valid[i] != 0;
-    if (!finite(touch.elements_mm[i]) || (alive && !std::isfinite(touch.pressure[i]))) {
+    if (!finite(touch.elements_mm[i]) || (alive && std::isinf(touch.pressure[i]))) {
       throw Error(Fault::input,
                   fmt::format("touch: element {}: its place or pressure is not finite; mark a dead "
                               "element as not valid",

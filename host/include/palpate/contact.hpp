@@ -18,7 +18,8 @@ enum class Reading : std::uint8_t {
 
 /// Eq. 3: In Contact where the pressure exceeds both the threshold and ratio times the touch's
 /// largest pressure, No Contact where it is below both, else Unknown (which includes equality).
-/// Dead elements are Unknown and do not take part in the maximum.
+/// Dead elements, and those whose pressure is no number, are Unknown and do not take part in the
+/// maximum.
 struct ContactClassifier {
   double threshold = 2.0;  ///< in the recording's pressure unit
   double ratio = 0.3;

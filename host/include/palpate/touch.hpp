@@ -20,8 +20,8 @@ std::vector<glm::dvec2> digitacts_array();
 inline constexpr double digitacts_element_mm = 1.8;
 
 /// One reading of the tactile array at a known pose. A view: the caller keeps the memory alive.
-/// What takes a touch throws Error where the sizes disagree, or where the pose, the place of an
-/// element or the pressure of one that is alive is not finite.
+/// What takes a touch throws Error where the sizes disagree, or where the pose or the place of an
+/// element is not finite or the pressure of one that is alive is infinite.
 struct Touch {
   Pose T_robot_sensor;
   std::span<const glm::dvec2> elements_mm;   ///< [e] element centres in the sensor frame
