@@ -28,7 +28,7 @@ bool exceeds(const vec2 a, const vec2 b) { return a.x > b.x || (a.x == b.x && a.
 
 float relative(const vec2 value, const vec2 reference) {
   precise float difference = (value.x - reference.x) + (value.y - reference.y);
-  return exp(difference);
+  return exp(max(difference, NEGLIGIBLE));
 }
 
 void main() {
@@ -39,19 +39,22 @@ void main() {
 
   // A lane past the end repeats the last bin without counting it, which changes no result.
   const uint last = (end - 1) / 2;
-  uint index = min(begin + 2 * lane, end - 1);
-  const vec4 first = texelFetch(belief, int(index / 2));
-  vec2 best = index % 2 == 0 ? first.xy : first.zw;
+  const uint per_lane = REDUCE_BINS / 2 / lanes;
+  const uint first =
+      begin / 2 + lane / SIDE_BY_SIDE * SIDE_BY_SIDE * per_lane + lane % SIDE_BY_SIDE;
+  uint index = min(2 * first, end - 1);
+  const vec4 first_pair = texelFetch(belief, int(index / 2));
+  vec2 best = index % 2 == 0 ? first_pair.xy : first_pair.zw;
   float sum = 0.0;
-  for (uint i = begin / 2 + lane; 2 * i < end; i += lanes * BATCH) {
+  for (uint i = first; i < first + SIDE_BY_SIDE * per_lane; i += SIDE_BY_SIDE * BATCH) {
     vec2 value[2 * BATCH];
     const vec2 before = best;
     [[unroll]] for (uint b = 0; b < BATCH; ++b) {
-      const vec4 pair = texelFetch(belief, int(min(i + b * lanes, last)));
+      const vec4 pair = texelFetch(belief, int(min(i + b * SIDE_BY_SIDE, last)));
       value[2 * b] = pair.xy;
       value[2 * b + 1] = pair.zw;
       [[unroll]] for (uint k = 0; k < 2; ++k) {
-        const uint at = 2 * (i + b * lanes) + k;
+        const uint at = 2 * (i + b * SIDE_BY_SIDE) + k;
         const bool more = at < end && exceeds(value[2 * b + k], best);
         best = more ? value[2 * b + k] : best;
         index = more ? at : index;
@@ -59,7 +62,7 @@ void main() {
     }
     sum *= relative(before, best);
     [[unroll]] for (uint b = 0; b < 2 * BATCH; ++b) {
-      const uint at = 2 * (i + b / 2 * lanes) + b % 2;
+      const uint at = 2 * (i + b / 2 * SIDE_BY_SIDE) + b % 2;
       sum += at < end ? relative(value[b], best) : 0.0;
     }
   }

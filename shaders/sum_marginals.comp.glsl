@@ -15,38 +15,61 @@ layout(std430, binding = 1) writeonly buffer OverTheta { float over_theta[]; }; 
 layout(std430, binding = 2) writeonly buffer OverPlane { float over_plane[]; };  // [block, theta]
 layout(push_constant) uniform Push { MarginalPush push; };
 
-const uint PER_LANE = MARGINAL_PLANE / MARGINAL_WORKGROUP;
+// Where planes have an even number of bins, every pair of bins of a plane is one texel.
+layout(constant_id = 0) const bool EVEN_PLANES = false;
+
+const uint PAIRS_PER_LANE = MARGINAL_PLANE / MARGINAL_WORKGROUP / 2;
 
 shared float parts[MARGINAL_THETAS][MARGINAL_WORKGROUP];
+
+// Two bins from this one on.
+vec4 fetch_pair(const uint bin, const uint last) {
+  const vec4 texel = texelFetch(belief, int(bin / 2));
+  if (EVEN_PLANES) {
+    return texel;
+  }
+  const vec4 next = texelFetch(belief, int(min(bin + 1, last) / 2));
+  return bin % 2 == 0 ? texel : vec4(texel.zw, next.xy);
+}
+
+float relative(const vec2 value) {
+  precise float difference = (value.x - push.max_high) + (value.y - push.max_low);
+  return exp(max(difference, NEGLIGIBLE));
+}
 
 void main() {
   const uint lane = gl_LocalInvocationID.x;
   const uint block = gl_WorkGroupID.x;
   const uint chunk = gl_WorkGroupID.y;
-  const uint first = block * MARGINAL_PLANE + lane;
+  const uint first = block * MARGINAL_PLANE +
+                     2 * (lane / SIDE_BY_SIDE * SIDE_BY_SIDE * PAIRS_PER_LANE + lane % SIDE_BY_SIDE);
   const uint theta = chunk * MARGINAL_THETAS;
   const uint thetas = min(MARGINAL_THETAS, push.thetas - theta);
+  const uint last = push.thetas * push.plane - 1;
 
-  float sum[PER_LANE];
-  [[unroll]] for (uint i = 0; i < PER_LANE; ++i) { sum[i] = 0.0; }
+  vec2 sum[PAIRS_PER_LANE];
+  [[unroll]] for (uint i = 0; i < PAIRS_PER_LANE; ++i) { sum[i] = vec2(0.0); }
   for (uint t = 0; t < thetas; ++t) {
     float part = 0.0;
-    [[unroll]] for (uint i = 0; i < PER_LANE; ++i) {
-      const uint at = first + i * MARGINAL_WORKGROUP;
-      const uint bin = (theta + t) * push.plane + min(at, push.plane - 1);
-      const vec4 pair = texelFetch(belief, int(bin / 2));
-      const vec2 value = bin % 2 == 0 ? pair.xy : pair.zw;
-      precise float difference = (value.x - push.max_high) + (value.y - push.max_low);
-      const float probability = at < push.plane ? exp(difference) : 0.0;
+    [[unroll]] for (uint i = 0; i < PAIRS_PER_LANE; ++i) {
+      const uint at = first + 2 * i * SIDE_BY_SIDE;
+      const uint bin = (theta + t) * push.plane + at;
+      const vec4 pair = fetch_pair(min(bin, last), last);
+      const vec2 probability =
+          vec2(at < push.plane ? relative(pair.xy) : 0.0,
+               at + 1 < push.plane ? relative(pair.zw) : 0.0);
       sum[i] += probability;
-      part += probability;
+      part += probability.x + probability.y;
     }
     parts[t][lane] = part;
   }
-  [[unroll]] for (uint i = 0; i < PER_LANE; ++i) {
-    const uint at = first + i * MARGINAL_WORKGROUP;
+  [[unroll]] for (uint i = 0; i < PAIRS_PER_LANE; ++i) {
+    const uint at = first + 2 * i * SIDE_BY_SIDE;
     if (at < push.plane) {
-      over_theta[chunk * push.plane + at] = sum[i];
+      over_theta[chunk * push.plane + at] = sum[i].x;
+    }
+    if (at + 1 < push.plane) {
+      over_theta[chunk * push.plane + at + 1] = sum[i].y;
     }
   }
   barrier();

@@ -94,6 +94,16 @@ std::int64_t lattice_index(const PoseLattice& lattice, const Slab& slab, std::in
          std::int64_t{slab.row_first} * slab.nx + in_slab % slab.plane();
 }
 
+gpu::Kernel marginal_kernel(gpu::Context& context, const PoseLattice& lattice) {
+  const std::uint32_t even_planes[] = {lattice.x_mm.count % 2 == 0 ? 1U : 0U};
+  return {context,
+          {.name = "sum_marginals",
+           .spirv = shaders::sum_marginals,
+           .bindings = marginal_bindings,
+           .push_bytes = sizeof(shaders::MarginalPush),
+           .constants = even_planes}};
+}
+
 /// Adds every row of `parts` to `sums`.
 void add_rows(std::span<const float> parts, std::span<double> sums) {
   for (; !parts.empty(); parts = parts.subspan(sums.size())) {
@@ -117,10 +127,7 @@ Belief::Belief(gpu::Context& context, gpu::CommandStream& stream, const PoseLatt
                         .bindings = read_and_write,
                         .push_bytes = sizeof(shaders::ReducePush),
                         .constants = workgroup_constant}),
-      sum_marginals_(context, {.name = "sum_marginals",
-                               .spirv = shaders::sum_marginals,
-                               .bindings = marginal_bindings,
-                               .push_bytes = sizeof(shaders::MarginalPush)}),
+      sum_marginals_(marginal_kernel(context, lattice)),
       add_(context, {.name = "add_belief",
                      .spirv = shaders::add_belief,
                      .bindings = read_and_write,
