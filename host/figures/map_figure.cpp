@@ -98,7 +98,8 @@ std::string draw_maps(std::span<const OccupancyGrid> maps) {
   const double left = margin_px + std::floor((content - tiles_width) / 2);
   for (std::size_t k = 0; k < maps.size(); ++k) {
     const double column = static_cast<double>(k % grid.columns);
-    const double row = static_cast<double>(k / grid.columns);
+    const std::size_t row_index = k / grid.columns;
+    const auto row = static_cast<double>(row_index);
     const Box tile{left + column * (grid.tile_px.x + gap_px),
                    title_px + margin_px + row * row_px + label_px, grid.tile_px.x, grid.tile_px.y};
     draw_tile(canvas, tile, grid.px_per_mm, maps[k], scale);

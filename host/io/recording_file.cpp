@@ -54,6 +54,12 @@ void require_one_of(const std::filesystem::path& path, const char* attribute,
 void validate(const std::filesystem::path& path, const Recording& recording) {
   const std::size_t n = recording.size();
   const std::size_t e = recording.elements();
+  if (e == 0 || recording.pressure.size() != n * e) {
+    refuse(path,
+           fmt::format("dataset 'pressure': {} values for {} touches; store one per touch and "
+                       "element",
+                       recording.pressure.size(), n));
+  }
   require_one_of(path, "pressure_unit", recording.pressure_unit, "kPa", "raw");
   require_one_of(path, "rows", recording.rows, "touches", "frames");
   for (std::size_t k = 0; k < recording.pressure.size(); ++k) {

@@ -175,7 +175,7 @@ std::array<int, 3> read_bins(const Entry& entry) {
 }
 
 std::string read_filter(const Entry& entry) {
-  const std::string filter = entry.text();
+  std::string filter = entry.text();
   if (filter != "auto" && filter != "histogram" && filter != "bounded" && filter != "particles") {
     entry.refuse("give auto, histogram, bounded or particles");
   }

@@ -31,6 +31,8 @@ class MapBuilder {
 
   /// Adds the evidence of these touches. Memory does not grow with their number, only with the
   /// area that they cover.
+  /// @throws Error on a touch that is not sound, or where the area has more cells than the device
+  /// holds
   void add(std::span<const Touch> touches);
 
   /// The map of all touches so far. It covers the known elements and the support of the sensor

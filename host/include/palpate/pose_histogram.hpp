@@ -74,15 +74,19 @@ class PoseHistogram {
 
   /// Multiplies the belief by the likelihood of these touches (Eq. 7, 13). `progress` is called
   /// with the fraction done, now and then.
+  /// @throws Error on a touch that is not sound, or if the device fails
   void update(std::span<const Touch> touches, const std::function<void(double)>& progress = {});
   void update(const Touch& touch) { update(std::span(&touch, 1)); }
 
-  /// Identity probabilities and mode.
+  /// Identity probabilities (Eq. 14) and mode (Eq. 15-16).
+  /// @throws Error if the device fails
   Estimate estimate() const;
 
   /// Marginal probabilities of one object's poses; all objects' sum to 1.
+  /// @throws Error if there is no such object, or the device fails
   Marginals marginals(int object) const;
   /// Log-likelihood of every bin of one object in nats, [theta, y, x], without prior weights.
+  /// @throws Error if there is no such object, or the device fails
   std::vector<double> log_likelihood(int object) const;
 
   const PoseLattice& lattice() const;

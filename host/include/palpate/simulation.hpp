@@ -55,7 +55,9 @@ class Simulator {
   Simulator(Simulator&&) noexcept;
   Simulator& operator=(Simulator&&) noexcept;
 
-  /// Touches at these sensor poses, with the object at T_object_robot.
+  /// Touches at these sensor poses, [n], with the object at T_object_robot: pressures in kPa, [n,
+  /// e], and times 0.5 s apart from 0. Every call goes on with the random numbers of the one
+  /// before.
   Recording touch(const std::vector<Pose>& T_robot_sensor, const Pose& T_object_robot);
 
  private:
