@@ -261,4 +261,41 @@ std::vector<double> Belief::download(std::size_t object) const {
   return values;
 }
 
+std::vector<double> Belief::download(std::size_t object, const BinWindow& window) const {
+  const int thetas = lattice_.theta_rad.count;
+  const auto nx = static_cast<std::size_t>(lattice_.x_mm.count);
+  const int row_end = window.row_first + window.row_count;
+  // Whole rows: they are contiguous.
+  std::vector<TwoFloat> raw(static_cast<std::size_t>(window.theta_count) * window.row_count * nx);
+  for (int t = 0; t < window.theta_count; ++t) {
+    const int theta = ((window.theta_first + t) % thetas + thetas) % thetas;
+    for (const Slab& slab : slabs_[object]) {
+      const int slab_theta = theta - static_cast<int>(slab.theta_first);
+      const int slab_row = static_cast<int>(slab.row_first);
+      const int slab_end = slab_row + static_cast<int>(slab.row_count);
+      const int begin = std::max(window.row_first, slab_row);
+      const int end = std::min(row_end, slab_end);
+      if (slab_theta < 0 || slab_theta >= static_cast<int>(slab.theta_count) || begin >= end) {
+        continue;
+      }
+      const std::size_t row_in_slab =
+          static_cast<std::size_t>(slab_theta) * slab.row_count + (begin - slab_row);
+      const std::size_t row_in_raw =
+          static_cast<std::size_t>(t) * window.row_count + (begin - window.row_first);
+      stream_.download(slab.log_likelihood,
+                       std::span(raw).subspan(row_in_raw * nx, (end - begin) * nx),
+                       row_in_slab * nx * sizeof(TwoFloat));
+    }
+  }
+  stream_.run();
+  std::vector<double> values;
+  values.reserve(window.bins());
+  for (std::size_t row = 0; row < raw.size(); row += nx) {
+    for (int i = 0; i < window.column_count; ++i) {
+      values.push_back(raw[row + window.column_first + i].value());
+    }
+  }
+  return values;
+}
+
 }  // namespace palpate

@@ -24,6 +24,21 @@ struct Slab {
   std::int64_t bins() const { return std::int64_t{theta_count} * plane(); }
 };
 
+/// A block of an object's bins. Its planes go on with the first after the last; its rows and
+/// columns (indices along y and x) lie within the lattice.
+struct BinWindow {
+  int theta_first = 0;  ///< may be negative
+  int theta_count = 0;
+  int row_first = 0;
+  int row_count = 0;
+  int column_first = 0;
+  int column_count = 0;
+
+  std::size_t bins() const {
+    return static_cast<std::size_t>(theta_count) * row_count * column_count;
+  }
+};
+
 /// What a reduction over one object's bins finds.
 struct BeliefSummary {
   TwoFloat max;
@@ -56,6 +71,8 @@ class Belief {
   BeliefMarginals marginals(std::size_t object, TwoFloat max) const;
   /// All bins of one object, [theta, y, x].
   std::vector<double> download(std::size_t object) const;
+  /// The bins of a window, [theta, y, x].
+  std::vector<double> download(std::size_t object, const BinWindow& window) const;
 
  private:
   gpu::Context& context_;

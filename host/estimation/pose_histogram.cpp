@@ -9,62 +9,16 @@
 #include "belief.hpp"
 #include "command_stream.hpp"
 #include "dense_likelihood.hpp"
+#include "hypotheses.hpp"
 #include "palpate/error.hpp"
+#include "refinement.hpp"
 
 namespace palpate {
 
 namespace {
 
-// Sums of this many nats over any number of touches stay within float32.
-constexpr float most_log_odds = 1e30F;
-
-void validate(std::span<const Hypothesis> hypotheses) {
-  if (hypotheses.empty()) {
-    throw Error(Fault::input, "no objects: give at least one map");
-  }
-  for (const auto& [map, weight] : hypotheses) {
-    if (map.nx < 1 || map.ny < 1 ||
-        map.log_odds.size() != static_cast<std::size_t>(map.nx) * map.ny) {
-      throw Error(Fault::input, fmt::format("map '{}': {} x {} cells but {} log odds", map.label,
-                                            map.nx, map.ny, map.log_odds.size()));
-    }
-    if (!(map.cell_mm > 0.0) || !std::isfinite(map.cell_mm)) {
-      throw Error(Fault::input, fmt::format("map '{}': cell_mm = {}: give a positive length",
-                                            map.label, map.cell_mm));
-    }
-    if (!std::isfinite(map.origin_mm.x) || !std::isfinite(map.origin_mm.y)) {
-      throw Error(Fault::input, fmt::format("map '{}': origin_mm = {},{}: give finite numbers",
-                                            map.label, map.origin_mm.x, map.origin_mm.y));
-    }
-    if (!std::all_of(map.log_odds.begin(), map.log_odds.end(),
-                     [](float l) { return std::abs(l) <= most_log_odds; })) {
-      throw Error(Fault::input,
-                  fmt::format("map '{}': log odds must be finite and within +-{:g}; build it anew",
-                              map.label, most_log_odds));
-    }
-    if (!(weight > 0.0) || !std::isfinite(weight)) {
-      throw Error(Fault::input,
-                  fmt::format("map '{}': weight = {}: give a positive number, or leave the object "
-                              "out",
-                              map.label, weight));
-    }
-  }
-}
-
-double common_prior(std::span<const Hypothesis> hypotheses) {
-  const OccupancyGrid& first = hypotheses.front().map;
-  for (const Hypothesis& hypothesis : hypotheses) {
-    // Readers may have rounded one of them.
-    if (std::abs(hypothesis.map.prior - first.prior) > 1e-6) {
-      throw Error(
-          Fault::input,
-          fmt::format("map '{}': prior {} differs from {} of map '{}'; build the maps "
-                      "together, or say which prior to use",
-                      hypothesis.map.label, hypothesis.map.prior, first.prior, first.label));
-    }
-  }
-  return first.prior;
-}
+// exp(-700) is among the smallest numbers that float64 holds at full precision.
+constexpr double impossible = 700.0;
 
 /// An array at rest and the log-likelihood of its reading No Contact everywhere.
 struct StillArray {
@@ -88,16 +42,18 @@ struct PoseHistogram::Impl {
   Impl(Device& device, std::span<const Hypothesis> hypotheses, const HistogramOptions& wanted,
        const ContactLikelihood& model)
       : options(wanted),
+        prior_model(model),
         context(device.context()),
         stream(context),
         belief(context, stream, options.lattice, hypotheses.size()),
-        likelihood(context, stream, belief, hypotheses, options.lattice, model) {
-    double total = 0.0;
+        likelihood(context, stream, belief, hypotheses, options.lattice, model),
+        log_weight(log_weights(hypotheses)) {
     for (const Hypothesis& hypothesis : hypotheses) {
-      total += hypothesis.weight;
+      bodies.push_back(displaced_body(hypothesis.map));
     }
-    for (const Hypothesis& hypothesis : hypotheses) {
-      log_weight.push_back(std::log(hypothesis.weight) - std::log(total));
+    if (options.none_weight) {
+      none_log_weight = std::log(*options.none_weight) - log_total_weight(hypotheses) +
+                        std::log(static_cast<double>(options.lattice.bins()));
     }
     summaries();  // runs what was recorded, and the reductions a first time
   }
@@ -120,9 +76,12 @@ struct PoseHistogram::Impl {
     return logs;
   }
 
-  /// Eq. 14, as a log-sum-exp over objects.
+  /// Eq. 14, as a log-sum-exp over objects and, where it is asked for, "none of these": the last.
   std::vector<double> identity() {
     std::vector<double> probability = log_evidence();
+    if (none_log_weight) {
+      probability.push_back(*none_log_weight + prior_log_likelihood);
+    }
     const double most = *std::max_element(probability.begin(), probability.end());
     double total = 0.0;
     for (double& p : probability) {
@@ -133,6 +92,17 @@ struct PoseHistogram::Impl {
       p /= total;
     }
     return probability;
+  }
+
+  /// Adds what a map of nothing but the prior, at whatever pose, makes of a touch (Eq. 7).
+  void add_to_prior(const Touch& touch) {
+    const double log_odds = log_odds_from_probability(prior_model.prior);
+    const std::vector<Reading> readings = options.classifier.classify(touch);
+    for (const Reading reading : {Reading::no_contact, Reading::in_contact}) {
+      prior_log_likelihood +=
+          static_cast<double>(std::count(readings.begin(), readings.end(), reading)) *
+          prior_model.log_likelihood(reading, log_odds);
+    }
   }
 
   void require_object(int object) const {
@@ -147,6 +117,9 @@ struct PoseHistogram::Impl {
     likelihood.accumulate(gather_evidence(touches, options.classifier, options.lattice.pivot_mm,
                                           likelihood.segment_elements()),
                           belief, progress);
+    for (const Touch& touch : touches) {
+      add_to_prior(touch);
+    }
   }
 
   /// Adds a touch as what it says beyond No Contact everywhere, where that is less.
@@ -173,6 +146,7 @@ struct PoseHistogram::Impl {
     likelihood.accumulate(
         gather_differences(touch, options.classifier, pivot_mm, likelihood.segment_elements()),
         belief, {});
+    add_to_prior(touch);
   }
 
   /// Scales sums relative to an object's largest bin to that object's probability.
@@ -185,23 +159,31 @@ struct PoseHistogram::Impl {
   }
 
   HistogramOptions options;
+  ContactLikelihood prior_model;
   gpu::Context& context;
   gpu::CommandStream stream;
   Belief belief;
   DenseLikelihood likelihood;
   std::optional<StillArray> still;
   std::vector<double> log_weight;
+  std::optional<double> none_log_weight;  ///< times the number of bins
+  double prior_log_likelihood = 0.0;      ///< of all touches, by the prior alone
+  std::vector<Body> bodies;
   std::optional<std::vector<BeliefSummary>> summarised;
 };
 
 PoseHistogram::PoseHistogram(Device& device, std::span<const Hypothesis> hypotheses,
                              const HistogramOptions& options) {
-  validate(hypotheses);
+  validate_hypotheses(hypotheses);
   HistogramOptions checked = options;
   checked.lattice.collapse_fixed().validate();
   const ContactLikelihood model{.gamma = checked.gamma,
                                 .prior = checked.prior ? *checked.prior : common_prior(hypotheses)};
   model.validate();
+  if (checked.none_weight && !(*checked.none_weight > 0.0 && std::isfinite(*checked.none_weight))) {
+    throw Error(Fault::input, fmt::format("none_weight = {}: give a positive number, or none",
+                                          *checked.none_weight));
+  }
   impl_ = std::make_unique<Impl>(device, hypotheses, checked, model);
 }
 
@@ -211,6 +193,7 @@ PoseHistogram& PoseHistogram::operator=(PoseHistogram&&) noexcept = default;
 
 void PoseHistogram::reset() {
   impl_->belief.clear();
+  impl_->prior_log_likelihood = 0.0;
   impl_->summarised.reset();
 }
 
@@ -231,10 +214,16 @@ void PoseHistogram::update(std::span<const Touch> touches,
 
 Estimate PoseHistogram::estimate() const {
   Estimate estimate{.identity = impl_->identity(), .mode = {}};
+  if (impl_->none_log_weight) {
+    estimate.none = estimate.identity.back();
+    estimate.identity.pop_back();
+  }
   const std::vector<BeliefSummary>& summaries = impl_->summaries();
   double most = -std::numeric_limits<double>::infinity();
+  double best = most;
   for (std::size_t i = 0; i < summaries.size(); ++i) {
     const double log_likelihood = summaries[i].max.value();
+    best = std::max(best, log_likelihood);
     if (impl_->log_weight[i] + log_likelihood > most) {
       most = impl_->log_weight[i] + log_likelihood;
       estimate.mode = {.object = static_cast<int>(i),
@@ -243,7 +232,18 @@ Estimate PoseHistogram::estimate() const {
                        .log_likelihood = log_likelihood};
     }
   }
+  estimate.contradicted = impl_->prior_log_likelihood - best > impossible;
   return estimate;
+}
+
+RefinedPose PoseHistogram::refine(const Mode& mode) const {
+  impl_->require_object(mode.object);
+  if (mode.bin < 0 || mode.bin >= lattice().bins()) {
+    throw Error(Fault::input,
+                fmt::format("bin {}: there are {}, counted from 0", mode.bin, lattice().bins()));
+  }
+  return palpate::refine(impl_->belief, lattice(), static_cast<std::size_t>(mode.object),
+                         impl_->bodies[mode.object], mode.bin);
 }
 
 Marginals PoseHistogram::marginals(int object) const {

@@ -24,5 +24,6 @@ Device& Device::operator=(Device&&) noexcept = default;
 Device::~Device() = default;
 
 const std::string& Device::name() const { return context_->name(); }
+std::uint64_t Device::memory_bytes() const { return context_->limits().memory; }
 
 }  // namespace palpate

@@ -1,6 +1,7 @@
 #include "palpate/lattice.hpp"
 
 #include <cmath>
+#include <numbers>
 
 #include <fmt/format.h>
 
@@ -44,6 +45,12 @@ void PoseLattice::validate() const {
     throw Error(Fault::input,
                 fmt::format("pivot_mm = {},{}: give finite numbers", pivot_mm.x, pivot_mm.y));
   }
+}
+
+bool PoseLattice::full_circle() const {
+  constexpr double circle_rad = 2.0 * std::numbers::pi;
+  constexpr double rounding = 1e-9;  // of ends that were given in degrees
+  return std::abs(theta_rad.upper - theta_rad.lower - circle_rad) < rounding;
 }
 
 Pose PoseLattice::T_object_robot(std::int64_t index) const {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <memory>
 #include <string>
 #include <string_view>
@@ -42,6 +43,8 @@ class Device {
   ~Device();
 
   const std::string& name() const;
+  /// Memory that it computes in, in bytes; a CPU device shares the machine's.
+  std::uint64_t memory_bytes() const;
   gpu::Context& context() { return *context_; }
 
  private:

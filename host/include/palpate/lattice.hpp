@@ -32,6 +32,8 @@ struct PoseLattice {
   /// Throws Error on counts below one, reversed or non-finite ranges.
   void validate() const;
 
+  /// theta covers the whole circle once, so that its last bin neighbours its first.
+  bool full_circle() const;
   std::int64_t plane() const { return std::int64_t{x_mm.count} * y_mm.count; }
   std::int64_t bins() const { return plane() * theta_rad.count; }
   /// The pose of a bin; index order is theta, y, x, x fastest.

@@ -10,16 +10,10 @@
 
 #include "palpate/contact.hpp"
 #include "palpate/device.hpp"
+#include "palpate/estimate.hpp"
 #include "palpate/lattice.hpp"
-#include "palpate/occupancy_grid.hpp"
 
 namespace palpate {
-
-/// An object that the unknown may turn out to be.
-struct Hypothesis {
-  OccupancyGrid map;
-  double weight = 1.0;  ///< prior weight, relative to the other objects'
-};
 
 struct HistogramOptions {
   PoseLattice lattice;
@@ -32,20 +26,10 @@ struct HistogramOptions {
   /// a touch of No Contact everywhere is then evaluated once, and of every touch only the elements
   /// that say something else. The result is the same but for rounding; it takes twice the memory.
   bool still_array = false;
-};
-
-/// The bin of the largest posterior probability (Eq. 15-16).
-struct Mode {
-  int object = 0;        ///< index into the hypotheses
-  std::int64_t bin = 0;  ///< index into the lattice
-  Pose T_object_robot;
-  double log_likelihood = 0.0;  ///< of all touches, without prior weights, in nats
-};
-
-/// What the belief says about the unknown object, after any number of touches.
-struct Estimate {
-  std::vector<double> identity;  ///< probability of every hypothesis, Eq. 14, sums to 1
-  Mode mode;
+  /// Prior weight of "none of these", relative to the hypotheses': an object that was never
+  /// learned, whose map holds only the prior. It costs no bins: its likelihood is the same at every
+  /// pose. A positive number, or none.
+  std::optional<double> none_weight = {};
 };
 
 /// Probabilities of parts of one object's poses.
@@ -61,8 +45,8 @@ class PoseHistogram {
  public:
   /// Uploads the maps and sets a uniform belief. Ties go to the first object and the lowest bin.
   /// @throws Error on an empty list, a map with no cells or with infinite log odds, maps of
-  /// different priors where none is given, weights that are not positive, a lattice, gamma or prior
-  /// out of range, or too little device memory.
+  /// different priors where none is given, weights that are not positive and finite, a lattice,
+  /// gamma or prior out of range, or too little device memory.
   PoseHistogram(Device& device, std::span<const Hypothesis> hypotheses,
                 const HistogramOptions& options);
   ~PoseHistogram();
@@ -82,7 +66,20 @@ class PoseHistogram {
   /// @throws Error if the device fails
   Estimate estimate() const;
 
-  /// Marginal probabilities of one object's poses; all objects' sum to 1.
+  /// The pose between the bins around a mode, of which only `object` and `bin` count: the mean of
+  /// the belief's eighth root over a window, which is moved to that mean until it rests. The root
+  /// evens out the ripples that cells and noise leave in the belief, so that the mean errs less
+  /// than the mode and than the mean of the belief itself. The covariance is the second moment of
+  /// the belief itself about that pose, over the same window, plus that of a bin.
+  ///
+  /// The window holds the poses at which the object lies within 2.5 mm (root mean square over its
+  /// occupied cells) of where the bin has it, at least the neighbouring bins; it goes on at 0 where
+  /// theta covers the whole circle and ends at the region's edges. Other modes, and what is unknown
+  /// by more than the window, do not show in the result. An axis of zero extent stays where it is.
+  /// @throws Error if there is no such object or bin, or the device fails
+  RefinedPose refine(const Mode& mode) const;
+
+  /// Marginal probabilities of one object's poses; all objects' and `none` sum to 1.
   /// @throws Error if there is no such object, or the device fails
   Marginals marginals(int object) const;
   /// Log-likelihood of every bin of one object in nats, [theta, y, x], without prior weights.

@@ -19,11 +19,11 @@ int main() {
   const Recording unknown = sensor.touch(T_robot_sensor, T_object_robot);
   PoseHistogram belief(device, hypotheses, HistogramOptions{});  // what is it, and where?
   belief.update(unknown.touches(0, unknown.size()));
-  const auto [identity, mode] = belief.estimate();
-  const OccupancyGrid& map = hypotheses[mode.object].map;
-  const Pose& T = mode.T_object_robot;
-  std::cout << map.label << " with probability " << identity[mode.object] << " at "
-            << T.translation_mm.x << ", " << T.translation_mm.y << " mm, " << T.theta_rad
+  const Estimate estimate = belief.estimate();
+  const OccupancyGrid& map = hypotheses[estimate.mode.object].map;
+  const Pose& T = estimate.mode.T_object_robot;
+  std::cout << map.label << " with probability " << estimate.identity[estimate.mode.object]
+            << " at " << T.translation_mm.x << ", " << T.translation_mm.y << " mm, " << T.theta_rad
             << " rad\n";
   return map.label == "E" && pose_error_mm(body_of(map), 1, T, T_object_robot) < 2.0 ? 0 : 1;
 }

@@ -1,0 +1,88 @@
+#include "palpate/balanced_lattice.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include <fmt/format.h>
+#include <glm/geometric.hpp>
+
+#include "hypotheses.hpp"
+#include "palpate/error.hpp"
+#include "refinement.hpp"
+
+namespace palpate {
+
+namespace {
+
+double smallest_cell_mm(std::span<const Hypothesis> hypotheses) {
+  return std::min_element(
+             hypotheses.begin(), hypotheses.end(),
+             [](const Hypothesis& a, const Hypothesis& b) { return a.map.cell_mm < b.map.cell_mm; })
+      ->map.cell_mm;
+}
+
+/// Root mean square distance of an object's cells from the pivot, wherever in the region that is.
+double lever_mm(const OccupancyGrid& map, const PoseLattice& region) {
+  const Body body = displaced_body(map);
+  const double width_mm = region.x_mm.upper - region.x_mm.lower;
+  const double height_mm = region.y_mm.upper - region.y_mm.lower;
+  const glm::dvec2 middle_mm(region.x_mm.lower + width_mm / 2.0,
+                             region.y_mm.lower + height_mm / 2.0);
+  const glm::dvec2 offset_mm = body.centroid_mm - middle_mm;
+  return std::sqrt(body.inertia_mm2 + glm::dot(offset_mm, offset_mm) +
+                   (width_mm * width_mm + height_mm * height_mm) / 12.0);
+}
+
+double count_of(double extent, double step) { return std::max(1.0, std::ceil(extent / step)); }
+
+}  // namespace
+
+BalancedLattice balanced_lattice(const PoseLattice& region, std::span<const Hypothesis> hypotheses,
+                                 std::int64_t most_bins) {
+  validate_hypotheses(hypotheses);
+  PoseLattice lattice = region;
+  for (Axis* axis : {&lattice.x_mm, &lattice.y_mm, &lattice.theta_rad}) {
+    axis->count = 1;
+  }
+  lattice.validate();
+  double longest_mm = 0.0;
+  for (const Hypothesis& hypothesis : hypotheses) {
+    longest_mm = std::max(longest_mm, lever_mm(hypothesis.map, region));
+  }
+  const double extents_mm[] = {lattice.x_mm.upper - lattice.x_mm.lower,
+                               lattice.y_mm.upper - lattice.y_mm.lower,
+                               (lattice.theta_rad.upper - lattice.theta_rad.lower) * longest_mm};
+  const auto bins = [&](double step_mm) {
+    double product = static_cast<double>(hypotheses.size());
+    for (const double extent_mm : extents_mm) {
+      product *= count_of(extent_mm, step_mm);
+    }
+    return product;
+  };
+  const double wanted_mm = balanced_step_cells * smallest_cell_mm(hypotheses);
+  // Counts are ints.
+  const auto most =
+      static_cast<double>(std::min<std::int64_t>(most_bins, std::numeric_limits<int>::max()));
+  double step_mm = wanted_mm;
+  // Axes that are down to one bin give no more, so the cube root may fall short.
+  for (double fewer = bins(step_mm); fewer > most; fewer = bins(step_mm)) {
+    if (fewer == static_cast<double>(hypotheses.size())) {
+      throw Error(Fault::input, fmt::format("{} objects: a bin for each is more than {}; use fewer",
+                                            hypotheses.size(), most_bins));
+    }
+    step_mm *= std::clamp(std::cbrt(fewer / most), 1.01, 1e3);
+  }
+  lattice.x_mm.count = static_cast<int>(count_of(extents_mm[0], step_mm));
+  lattice.y_mm.count = static_cast<int>(count_of(extents_mm[1], step_mm));
+  lattice.theta_rad.count = static_cast<int>(count_of(extents_mm[2], step_mm));
+  return {.lattice = lattice, .step_mm = step_mm, .bounded = step_mm > wanted_mm};
+}
+
+std::int64_t most_bins_on(const Device& device, bool still_array) {
+  constexpr std::uint64_t bytes_per_bin = 8;
+  const std::uint64_t held = device.memory_bytes() / 2 / (still_array ? 2 : 1) / bytes_per_bin;
+  return static_cast<std::int64_t>(std::min(held, static_cast<std::uint64_t>(most_balanced_bins)));
+}
+
+}  // namespace palpate

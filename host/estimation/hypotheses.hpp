@@ -1,0 +1,22 @@
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "palpate/estimate.hpp"
+
+namespace palpate {
+
+/// @throws Error on an empty list, a map that is not sound or a weight that is not positive.
+void validate_hypotheses(std::span<const Hypothesis> hypotheses);
+
+/// The maps' prior. @throws Error where they differ.
+double common_prior(std::span<const Hypothesis> hypotheses);
+
+/// log of the sum of the prior weights.
+double log_total_weight(std::span<const Hypothesis> hypotheses);
+
+/// log of every prior weight over their sum.
+std::vector<double> log_weights(std::span<const Hypothesis> hypotheses);
+
+}  // namespace palpate

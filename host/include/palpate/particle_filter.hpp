@@ -1,0 +1,88 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "palpate/contact.hpp"
+#include "palpate/device.hpp"
+#include "palpate/estimate.hpp"
+#include "palpate/lattice.hpp"
+
+namespace palpate {
+
+/// How the next generation of particles is drawn from the weighted one.
+enum class Resampling {
+  multinomial,  ///< n independent draws, as in the paper
+  systematic,   ///< one draw and n - 1 equal steps: the same expectation, the least variance
+};
+
+struct ParticleOptions {
+  int particles = 10'000;  ///< n, over all objects together; at most 1,000,000
+  /// Where particles start: uniform over the lattice's ranges, about its pivot. Its counts do not
+  /// matter.
+  PoseLattice region;
+  ContactClassifier classifier;
+  double gamma = 0.1;
+  std::optional<double> prior = {};        ///< p(m) of Eq. 7, see HistogramOptions
+  std::optional<double> none_weight = {};  ///< see HistogramOptions
+  double motion_mm = 1.0;   ///< standard deviation of the noise added to x and y before each touch
+  double motion_rad = 0.1;  ///< the same for theta
+  Resampling resampling = Resampling::multinomial;
+  /// Augmented MCL (Thrun, Burgard and Fox 2005, Table 8.3), the paper's second variant: each new
+  /// particle is a random one with probability max(0, 1 - w_fast / w_slow), of averages of the
+  /// likelihood per touch that decay at these rates.
+  bool augmented = false;
+  double alpha_slow = 0.05;
+  double alpha_fast = 0.5;
+  std::uint64_t seed = 0;  ///< the same seed gives the same run on one device
+};
+
+/// Monte Carlo localization over object identity and planar pose (Sec. III-B, Eq. 8-12) on the
+/// device. Per touch: resample by weight, add motion noise, weigh by Eq. 7. Random numbers are a
+/// function of the seed, the touch and the particle, so that the order of execution is without
+/// influence.
+class ParticleFilter {
+ public:
+  /// @throws Error as PoseHistogram does, and on a number of particles, a noise or a rate out of
+  /// range.
+  ParticleFilter(Device& device, std::span<const Hypothesis> hypotheses,
+                 const ParticleOptions& options);
+  ~ParticleFilter();
+  ParticleFilter(ParticleFilter&&) noexcept;
+  ParticleFilter& operator=(ParticleFilter&&) noexcept;
+
+  /// Uniform particles once more, for the next unknown.
+  void reset();
+
+  /// @throws Error on a touch that is not sound, or if the device fails
+  void update(std::span<const Touch> touches);
+  void update(const Touch& touch) { update(std::span(&touch, 1)); }
+
+  /// Identity by Eq. 9; the pose is the maximum of the Parzen estimate with a cone kernel (Eq.
+  /// 10-12), rho = 1 mm and 1 rad, on a grid of 0.5 mm and 0.04 pi rad. `mode.bin` is -1, and
+  /// `mode.log_likelihood` the log of the Parzen density's value there.
+  /// @throws Error if the device fails
+  Estimate estimate() const;
+
+  /// 1 / sum of squared weights (Kong 1992), in [1, n].
+  double effective_sample_size() const;
+
+  struct Particle {
+    int object = 0;  ///< index into the hypotheses; their number for "none of these"
+    Pose T_object_robot;
+    double weight = 0.0;  ///< all together sum to 1
+  };
+  /// All particles, for inspection. @throws Error if the device fails
+  std::vector<Particle> particles() const;
+
+  std::uint64_t device_bytes() const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace palpate

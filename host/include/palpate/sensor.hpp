@@ -1,0 +1,74 @@
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <glm/vec2.hpp>
+
+#include "palpate/pose.hpp"
+
+namespace palpate {
+
+/// One reading of a whole array, as a sensor delivers it.
+struct Frame {
+  double host_time_s = 0.0;                  ///< when it arrived, since the Unix epoch
+  std::optional<double> device_time_s = {};  ///< by the sensor's own clock, where it has one
+  std::vector<double> values;                ///< [e] in the sensor's pressure unit
+  std::uint64_t lost_before = 0;             ///< frames lost since the one before
+  std::optional<Pose> T_robot_sensor = {};   ///< where the source knows it: replays and simulations
+};
+
+/// What a sensor is.
+struct SensorDescription {
+  std::string name;                      ///< such as "TakkTile", for people
+  std::string serial;                    ///< "" where it has none
+  std::string pressure_unit = "kPa";     ///< "kPa" or "raw"
+  std::vector<glm::dvec2> elements_mm;   ///< [e] element centres in the sensor frame
+  std::vector<std::uint8_t> valid = {};  ///< empty or [e]; 0 = dead element
+  double rate_hz = 0.0;                  ///< frames per second, 0 where that is not known
+};
+
+/// What happened on the way from the sensor since start().
+struct SensorCounters {
+  std::uint64_t frames = 0;           ///< delivered by next() or waiting for it
+  std::uint64_t lost = 0;             ///< dropped because next() was not called in time, or missing
+  std::uint64_t timeouts = 0;         ///< transfers that the host gave up
+  std::uint64_t stalls = 0;           ///< halted endpoints, cleared
+  std::uint64_t overflows = 0;        ///< packets larger than the endpoint allows
+  std::uint64_t checksum_errors = 0;  ///< packets dropped for that
+  std::uint64_t garbage_bytes = 0;    ///< bytes that belong to no packet
+  std::uint64_t reconnects = 0;       ///< times the board was gone and came back
+};
+
+/// A stream of frames from a board, a file or a simulation. Used from one thread; it is not
+/// specified from which threads a sensor reads its hardware.
+class Sensor {
+ public:
+  virtual ~Sensor() = default;
+
+  virtual const SensorDescription& description() const = 0;
+
+  /// Frames arrive from here on. @throws Error where the hardware refuses.
+  virtual void start() = 0;
+
+  /// The next frame, or none within `timeout`: not yet, gone for the moment, or ended(). Frames
+  /// that nobody takes are dropped from the oldest on and counted with the next one.
+  /// @throws Error (Fault::system) where no frame will ever come again although it has not ended
+  virtual std::optional<Frame> next(std::chrono::milliseconds timeout) = 0;
+
+  /// No more frames will come: the end of a replayed file.
+  virtual bool ended() const { return false; }
+
+  /// The board is unplugged and waited for.
+  virtual bool gone() const { return false; }
+
+  /// Frames stop; start() begins anew.
+  virtual void stop() = 0;
+
+  virtual SensorCounters counters() const = 0;
+};
+
+}  // namespace palpate
