@@ -131,11 +131,130 @@ struct MarginalPush {
   float max_low;
 };
 
+// Angles to which cosine and sine are tabled; what is left of an angle is small.
+const uint HEADINGS = 256;
+
+// Particles that one workgroup of sum_weights covers, a run of them per lane.
+const uint WEIGHT_LANES = 64;
+const uint WEIGHT_BLOCK = 1024;
+
+// Where draw_particles takes a particle from.
+const uint DRAW_INITIAL = 0;      // the initial distribution
+const uint DRAW_SAME = 1;         // the particle of the same index
+const uint DRAW_MULTINOMIAL = 2;  // an independent draw by weight
+const uint DRAW_SYSTEMATIC = 3;   // equal steps through the summed weights
+
+// What a random number is for: a word of its counter, so that no two uses share a number.
+const uint RANDOM_ANCESTOR = 0;
+const uint RANDOM_MOTION = 1;
+const uint RANDOM_POSE = 2;
+const uint RANDOM_OFFSET = 3;
+
+// Grid points of the Parzen estimate that one workgroup of sum_cones evaluates: x, y and theta. A
+// lane takes all x of one (y, theta).
+const int PARZEN_EDGE = 4;
+const int PARZEN_THETAS = 10;
+
+// A hypothesis of the particle filter, relative to the region's centre. Kernels read it as an
+// ivec4.
+struct Particle {
+  uint object;
+  float x_mm;
+  float y_mm;
+  float theta_rad;  // [-pi, pi)
+};
+
+// One object's part in the initial distribution, as bounds that grow with the object: its particles
+// at the start, and 2^-32 of the chance that a random particle is of it.
+struct ObjectShare {
+  uint particle_end;
+  uint chance_end;
+};
+
+// What draw_particles has to know of a block of weights. Keys are the particle drawn for
+// (systematic) or a random word (multinomial). Kernels read it as an ivec4.
+struct DrawBlock {
+  uint key_end;  // keys from the block before up to this one fall into the block
+  float last;    // systematic: where the last of them falls, as cumulated weight
+  float step;    // systematic: between keys
+  float sum;     // of the block's weights
+};
+
+struct DrawPush {
+  uint key_low;  // of the generator: the seed
+  uint key_high;
+  uint touch;  // word of the counters
+  uint particles;
+  uint draw;      // one of DRAW_
+  uint injected;  // 2^-32 of the chance that a random particle takes the place
+  uint objects;
+  uint blocks;      // up to the last that weighs anything
+  float half_x_mm;  // of the region
+  float half_y_mm;
+  float half_theta_rad;
+  float motion_mm;  // standard deviations
+  float motion_rad;
+};
+
+// One object's map among all maps, which stand in one table.
+struct ParticleMap {
+  int first;  // cell
+  int width;  // with border
+  int height;
+  uint scale;               // which of the tables of elements has its cell size
+  float cells_per_mm_high;  // two floats
+  float cells_per_mm_low;
+  Split centre_x;  // the region's centre in cells of the bordered map
+  Split centre_y;
+};
+
+// One known element in cells, or one heading's cosine and sine: the coarse part has so few bits
+// that products of the two are exact. Kernels read it as a vec4.
+struct CoarseAndFine {
+  float coarse_x;
+  float coarse_y;
+  float fine_x;
+  float fine_y;
+};
+
+struct WeighPush {
+  uint particles;
+  uint segments;
+  uint elements;  // per cell size
+  uint fresh;     // 1 where the log-weights so far do not count
+};
+
+// Result of one workgroup of sum_weights; sums are relative to the block's largest weight.
+struct WeightBlock {
+  float max_high;  // of the log-weights
+  float max_low;
+  float sum;
+  float sum_squares;
+};
+
+// Grid points from this one on, and the ranges of particles that reach them.
+struct ConeUnit {
+  int x;  // indices of the grid, which goes through the region's centre
+  int y;
+  int theta;
+  uint range_first;
+  uint range_end;
+};
+
+struct ConePush {
+  float step_mm;
+  float step_rad;
+};
+
 #ifdef __cplusplus
 static_assert(sizeof(TileReading) == 16 && sizeof(Tile) == 20 && sizeof(EvidencePush) == 16);
 static_assert(sizeof(RotatedElement) == 16 && sizeof(Segment) == 16);
 static_assert(sizeof(LikelihoodPush) == 32 && sizeof(Partial) == 16);
 static_assert(sizeof(ReducePush) == 8 && sizeof(AddPush) == 8 && sizeof(MarginalPush) == 16);
+static_assert(sizeof(Particle) == 16 && sizeof(ObjectShare) == 8 && sizeof(DrawBlock) == 16);
+static_assert(sizeof(DrawPush) == 52 && sizeof(ParticleMap) == 40 && sizeof(CoarseAndFine) == 16);
+static_assert(sizeof(WeighPush) == 16 && sizeof(WeightBlock) == 16);
+static_assert(sizeof(ConeUnit) == 20 && sizeof(ConePush) == 8);
 }  // namespace palpate::shaders
 #endif
 

@@ -36,6 +36,9 @@ nlohmann::ordered_json to_json(const Step& step, const RecognitionTask& task) {
     json["right"] = *step.right;
     json["error_mm"] = step.error_mm ? nlohmann::ordered_json(*step.error_mm) : nullptr;
   }
+  if (step.effective_sample_size) {
+    json["effective_sample_size"] = *step.effective_sample_size;
+  }
   return json;
 }
 
@@ -137,14 +140,17 @@ std::string name_of(const RecognitionRecord& record) {
 }
 
 void print_trace(const RecognitionRecord& record, const RecognitionTask& task) {
-  fmt::print("{}\n  touch  best       probability     x mm     y mm  theta deg  error mm\n",
-             name_of(record));
+  fmt::print("{}\n  touch  best       probability     x mm     y mm  theta deg  error mm{}\n",
+             name_of(record), record.last().effective_sample_size ? "  effective particles" : "");
   for (std::size_t i = 0; i < record.trace.size(); ++i) {
     const Step& step = record.trace[i];
     const Pose& T = step.mode.T_object_robot;
-    fmt::print("  {:>5}  {:<10} {:>11.6f} {:>8.2f} {:>8.2f} {:>10.1f}  {:>8}\n", i + 1,
+    const std::string effective = step.effective_sample_size
+                                      ? fmt::format("  {:>19.1f}", *step.effective_sample_size)
+                                      : std::string();
+    fmt::print("  {:>5}  {:<10} {:>11.6f} {:>8.2f} {:>8.2f} {:>10.1f}  {:>8}{}\n", i + 1,
                task.labels[step.best], step.identity[step.best], T.translation_mm.x,
-               T.translation_mm.y, degrees(T.theta_rad), error_text(step));
+               T.translation_mm.y, degrees(T.theta_rad), error_text(step), effective);
   }
 }
 

@@ -17,6 +17,7 @@ struct Step {
   Mode mode;
   std::optional<bool> right;       ///< is `best` the true label, where that is known?
   std::optional<double> error_mm;  ///< of the mode, where the truth is known and its object right
+  std::optional<double> effective_sample_size;  ///< of the particles, where there are any
 };
 
 /// The result for one unknown.

@@ -198,14 +198,61 @@ bool array_is_still(const std::vector<Unknown>& unknowns, bool each_frame) {
          });
 }
 
-void check_filter(const std::string& filter) {
-  if (filter == "bounded" || filter == "particles") {
+/// Whether the particle filter is asked for. Throws Error on a filter that there is not, and on
+/// flags that the other one would leave without effect.
+bool wants_particles(const RecognizeOptions& options, const Scene& scene) {
+  const std::string filter =
+      !options.filter.empty() ? options.filter : scene.filter.value_or("auto");
+  if (filter == "bounded") {
     throw Error(Fault::input,
                 fmt::format("--filter {}: not in this version yet; use histogram", filter));
   }
-  if (filter != "auto" && filter != "histogram") {
-    throw Error(Fault::input, fmt::format("--filter {}: not known; use histogram", filter));
+  if (filter != "auto" && filter != "histogram" && filter != "particles") {
+    throw Error(Fault::input,
+                fmt::format("--filter {}: not known; use histogram or particles", filter));
   }
+  const bool particles = filter == "particles";
+  if (particles && !options.posterior.empty()) {
+    throw Error(Fault::input, fmt::format("--posterior {}: particles have no bins; use --filter "
+                                          "histogram",
+                                          options.posterior));
+  }
+  for (const auto& [flag, given] : {std::pair{"--particles", options.particles.has_value()},
+                                    std::pair{"--resampling", !options.resampling.empty()},
+                                    std::pair{"--augmented", options.augmented},
+                                    std::pair{"--seed", options.seed.has_value()}}) {
+    if (given && !particles) {
+      throw Error(
+          Fault::input,
+          fmt::format("{}: has no effect on --filter {}; add --filter particles", flag, filter));
+    }
+  }
+  return particles;
+}
+
+/// What the histogram's options and the flags say to the particle filter.
+ParticleOptions particle_options(const RecognizeOptions& options,
+                                 const HistogramOptions& histogram) {
+  ParticleOptions particles{.region = histogram.lattice,
+                            .classifier = histogram.classifier,
+                            .gamma = histogram.gamma,
+                            .prior = histogram.prior,
+                            .none_weight = histogram.none_weight,
+                            .augmented = options.augmented};
+  particles.particles = options.particles.value_or(particles.particles);
+  if (particles.particles < 1 || particles.particles > 1'000'000) {
+    throw Error(Fault::input,
+                fmt::format("--particles {}: give 1 to 1,000,000", particles.particles));
+  }
+  if (options.resampling == "systematic") {
+    particles.resampling = Resampling::systematic;
+  } else if (!options.resampling.empty() && options.resampling != "multinomial") {
+    throw Error(Fault::input, fmt::format("--resampling {}: not known; use multinomial or "
+                                          "systematic",
+                                          options.resampling));
+  }
+  particles.seed = options.seed.value_or(particles.seed);
+  return particles;
 }
 
 }  // namespace
@@ -213,7 +260,7 @@ void check_filter(const std::string& filter) {
 RecognitionTask prepare(const RecognizeOptions& options) {
   const Scene scene = options.scene.empty() ? Scene{} : read_scene(options.scene);
   RecognitionTask task;
-  check_filter(!options.filter.empty() ? options.filter : scene.filter.value_or("auto"));
+  const bool with_particles = wants_particles(options, scene);
   task.histogram.lattice = make_lattice(options, scene);
   task.histogram.gamma = options.gamma ? *options.gamma : scene.gamma.value_or(0.1);
   if (!(task.histogram.gamma >= 0.0 && task.histogram.gamma < 1.0)) {
@@ -229,6 +276,9 @@ RecognitionTask prepare(const RecognizeOptions& options) {
   task.histogram.still_array = array_is_still(task.unknowns, options.each_frame);
   load_maps(objects_of(options, scene), task);
   task.histogram.prior = common_prior(task, options.prior ? options.prior : scene.prior);
+  if (with_particles) {
+    task.particles = particle_options(options, task.histogram);
+  }
   task.device = options.device.empty() ? scene.device.value_or("") : options.device;
   return task;
 }

@@ -1,10 +1,12 @@
 #pragma once
 
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "options.hpp"
+#include "palpate/particle_filter.hpp"
 #include "palpate/pose_histogram.hpp"
 #include "palpate/scene.hpp"
 #include "palpate/touch.hpp"
@@ -29,6 +31,10 @@ struct RecognizeOptions {
   std::optional<int> touches;
   bool each_frame = false;
   std::string filter;
+  std::optional<int> particles;
+  std::string resampling;
+  bool augmented = false;
+  std::optional<std::uint64_t> seed;
   bool trace = false;
   std::string json;
   std::string posterior;
@@ -50,6 +56,7 @@ struct RecognitionTask {
   std::vector<std::string> labels;     ///< every label once, in the order of the maps
   std::vector<std::size_t> label_of;   ///< [hypothesis] index into labels
   HistogramOptions histogram;
+  std::optional<ParticleOptions> particles;  ///< where the particle filter was asked for
   std::string device;
   std::vector<Recording> recordings;
   std::vector<Unknown> unknowns;

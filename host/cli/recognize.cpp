@@ -8,12 +8,12 @@
 #include <string>
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include "figures.hpp"
 #include "palpate/error.hpp"
 #include "palpate/files.hpp"
 #include "progress.hpp"
+#include "recogniser.hpp"
 #include "recognition_record.hpp"
 #include "recognition_task.hpp"
 
@@ -65,7 +65,7 @@ void check_outputs(const RecognizeOptions& options, const RecognitionTask& task)
 }
 
 RecognitionRecord recognize_one(const Unknown& unknown, const RecognitionTask& task, bool trace,
-                                PoseHistogram& histogram,
+                                Recogniser& recogniser,
                                 const std::function<void(double)>& progress) {
   RecognitionRecord record{.recording = unknown.recording->path,
                            .frame = unknown.frame,
@@ -73,18 +73,23 @@ RecognitionRecord recognize_one(const Unknown& unknown, const RecognitionTask& t
                            .true_label = true_label(*unknown.recording),
                            .trace = {}};
   const auto start = std::chrono::steady_clock::now();
-  histogram.reset();
+  const auto judged = [&] {
+    Step step = judge(recogniser.estimate(), unknown, task);
+    step.effective_sample_size = recogniser.effective_sample_size();
+    return step;
+  };
+  recogniser.reset();
   if (trace) {
     const auto touches = static_cast<double>(unknown.touches.size());
     for (const Touch& touch : unknown.touches) {
       const auto done = static_cast<double>(record.trace.size());
-      histogram.update(std::span(&touch, 1),
-                       [&](double fraction) { progress((done + fraction) / touches); });
-      record.trace.push_back(judge(histogram.estimate(), unknown, task));
+      recogniser.update(std::span(&touch, 1),
+                        [&](double fraction) { progress((done + fraction) / touches); });
+      record.trace.push_back(judged());
     }
   } else {
-    histogram.update(unknown.touches, progress);
-    record.trace.push_back(judge(histogram.estimate(), unknown, task));
+    recogniser.update(unknown.touches, progress);
+    record.trace.push_back(judged());
   }
   record.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   return record;
@@ -102,7 +107,7 @@ double element_edge_mm(const Touch& touch) {
 }
 
 std::string draw_sheet(const RecognitionRecord& record, const Unknown& unknown,
-                       const RecognitionTask& task, const PoseHistogram& histogram) {
+                       const RecognitionTask& task, const Recogniser& recogniser) {
   const Step& last = record.last();
   RecognitionSheet sheet;
   sheet.title = name_of(record);
@@ -114,8 +119,8 @@ std::string draw_sheet(const RecognitionRecord& record, const Unknown& unknown,
     sheet.truth = unknown.recording->truth->T_object_robot;
     sheet.error_mm = last.error_mm;
   }
-  sheet.lattice = histogram.lattice();
-  sheet.belief_xy = histogram.marginals(last.mode.object).xy;
+  sheet.lattice = task.histogram.lattice;
+  sheet.belief_xy = recogniser.belief_xy(last.mode.object);
   sheet.labels = task.labels;
   for (const Touch& touch : unknown.touches) {
     auto& footprint = sheet.footprints_mm.emplace_back();
@@ -139,20 +144,11 @@ Posterior export_posterior(const RecognitionTask& task, const PoseHistogram& his
   return posterior;
 }
 
-/// Where and how the likelihood is evaluated.
-void print_engine(const RecognitionTask& task, const Device& device,
-                  const PoseHistogram& histogram) {
-  const PoseLattice& lattice = histogram.lattice();
-  fmt::print("{}: {} maps, {} x {} x {} bins each, in {}\n\n", device.name(),
-             task.hypotheses.size(), lattice.x_mm.count, lattice.y_mm.count,
-             lattice.theta_rad.count, fmt::join(histogram.paths(), "; "));
-}
-
 void recognize(const RecognizeOptions& options) {
   const RecognitionTask task = prepare(options);
   check_outputs(options, task);
   Device device = Device::open(task.device);
-  PoseHistogram histogram(device, task.hypotheses, task.histogram);
+  const std::unique_ptr<Recogniser> recogniser = make_recogniser(device, task);
   if (!options.png.empty()) {
     make_folder(options.png);
   }
@@ -168,15 +164,15 @@ void recognize(const RecognizeOptions& options) {
         progress.show((static_cast<double>(records.size()) + fraction) /
                       static_cast<double>(task.unknowns.size()));
       };
-      records.push_back(recognize_one(unknown, task, trace, histogram, show));
+      records.push_back(recognize_one(unknown, task, trace, *recogniser, show));
       show(0.0);
       json.push_back(to_json(records.back(), task, device.name(), options.trace));
       if (!options.png.empty()) {
         write_file(std::filesystem::path(options.png) / png_name(unknown),
-                   draw_sheet(records.back(), unknown, task, histogram));
+                   draw_sheet(records.back(), unknown, task, *recogniser));
       }
       if (!options.posterior.empty()) {
-        write_posterior(options.posterior, export_posterior(task, histogram));
+        write_posterior(options.posterior, export_posterior(task, *recogniser->histogram()));
       }
     }
   }
@@ -187,7 +183,8 @@ void recognize(const RecognizeOptions& options) {
   if (options.json == "-") {
     fmt::print("{}", json_text);
   } else {
-    print_engine(task, device, histogram);
+    fmt::print("{}: {} maps, {}\n\n", device.name(), task.hypotheses.size(),
+               recogniser->description());
     if (options.trace) {
       for (const RecognitionRecord& record : records) {
         print_trace(record, task);
@@ -242,7 +239,18 @@ void add_recognize(CLI::App& app) {
       ->check(require_whole_number);
   command->add_flag("--each-frame", options->each_frame,
                     "Take every touch for an unknown object of its own");
-  command->add_option("--filter", options->filter, "auto or histogram [default: auto]");
+  command->add_option("--filter", options->filter,
+                      "auto, histogram or particles; auto is histogram [default: auto]");
+  command
+      ->add_option("--particles", options->particles,
+                   "Particles over all objects together, up to 1,000,000 [default: 10000]")
+      ->check(require_whole_number);
+  command->add_option("--resampling", options->resampling,
+                      "multinomial or systematic [default: multinomial]");
+  command->add_flag("--augmented", options->augmented,
+                    "Augmented MCL: add random particles where the touches fit worse than before");
+  command->add_option("--seed", options->seed, "Seed of the particles' random numbers [default: 0]")
+      ->check(require_whole_number);
   command->add_flag("--trace", options->trace, "Show the estimate after every touch");
   command->add_option("--json", options->json, "Write the records as JSON; - is standard output");
   command->add_option("--posterior", options->posterior,

@@ -5,6 +5,7 @@
 
 #include <fmt/format.h>
 
+#include "bordered_map.hpp"
 #include "interface.h"
 #include "palpate/error.hpp"
 
@@ -19,20 +20,6 @@ constexpr double work_per_run = 5e8;
 
 std::uint32_t blocks(std::uint32_t count, std::uint32_t per_block) {
   return (count + per_block - 1) / per_block;
-}
-
-/// The map with a border of prior around it.
-std::vector<float> with_border(const OccupancyGrid& map, double prior) {
-  constexpr int border = shaders::MAP_BORDER;
-  const int width = map.nx + 2 * border;
-  std::vector<float> cells(static_cast<std::size_t>(width) * (map.ny + 2 * border),
-                           static_cast<float>(log_odds_from_probability(prior)));
-  for (int j = 0; j < map.ny; ++j) {
-    const auto row = map.log_odds.begin() + static_cast<std::ptrdiff_t>(j) * map.nx;
-    std::copy(row, row + map.nx,
-              cells.begin() + static_cast<std::ptrdiff_t>(j + border) * width + border);
-  }
-  return cells;
 }
 
 /// The lattice's x centres, then its y centres, in cells of the bordered map.

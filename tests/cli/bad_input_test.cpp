@@ -339,9 +339,26 @@ TEST_F(BadInput, UnknownFlag) {
 
 TEST_F(BadInput, FilterThatIsNotThere) {
   expect_refused(with(recognize, {"--filter", "kalman"}), {"--filter kalman", "use histogram"});
-  for (const char* filter : {"bounded", "particles"}) {
-    expect_refused(with(recognize, {"--filter", filter}), {"--filter", filter, "use histogram"});
+  expect_refused(with(recognize, {"--filter", "bounded"}), {"--filter bounded", "use histogram"});
+}
+
+TEST_F(BadInput, FlagsOfTheOtherFilter) {
+  for (const Arguments& flags :
+       {Arguments{"--particles", "100"}, Arguments{"--seed", "1"},
+        Arguments{"--resampling", "systematic"}, Arguments{"--augmented"}}) {
+    expect_refused(with(recognize, flags), {flags.front(), "add --filter particles"});
   }
+  expect_refused(with(recognize, {"--filter", "particles", "--posterior", "p.h5"}),
+                 {"--posterior p.h5", "use --filter histogram"});
+}
+
+TEST_F(BadInput, ParticlesOutOfRange) {
+  const Arguments particles = with(recognize, {"--filter", "particles"});
+  for (const char* count : {"0", "-1", "1000001", "ten"}) {
+    expect_refused(with(particles, {"--particles", count}), {"--particles", count});
+  }
+  expect_refused(with(particles, {"--resampling", "best"}), {"--resampling best", "systematic"});
+  expect_refused(with(particles, {"--seed", "-1"}), {"--seed", "-1"});
 }
 
 }  // namespace

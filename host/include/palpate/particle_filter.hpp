@@ -28,22 +28,27 @@ struct ParticleOptions {
   double gamma = 0.1;
   std::optional<double> prior = {};        ///< p(m) of Eq. 7, see HistogramOptions
   std::optional<double> none_weight = {};  ///< see HistogramOptions
-  double motion_mm = 1.0;   ///< standard deviation of the noise added to x and y before each touch
+  double motion_mm = 1.0;   ///< standard deviation of the noise added to x and y at each touch
   double motion_rad = 0.1;  ///< the same for theta
   Resampling resampling = Resampling::multinomial;
   /// Augmented MCL (Thrun, Burgard and Fox 2005, Table 8.3), the paper's second variant: each new
-  /// particle is a random one with probability max(0, 1 - w_fast / w_slow), of averages of the
-  /// likelihood per touch that decay at these rates.
+  /// particle is a random one with probability max(0, 1 - w_fast / w_slow). Both are running
+  /// averages of the particles' mean likelihood of a touch, taken to the power of one over its
+  /// known elements: the likelihood itself falls by orders with every element.
   bool augmented = false;
-  double alpha_slow = 0.05;
-  double alpha_fast = 0.5;
-  std::uint64_t seed = 0;  ///< the same seed gives the same run on one device
+  double alpha_slow = 0.05;  ///< rate of w_slow, above 0 and below alpha_fast
+  double alpha_fast = 0.5;   ///< rate of w_fast, at most 1
+  std::uint64_t seed = 0;    ///< the same seed gives the same run on one device
 };
 
 /// Monte Carlo localization over object identity and planar pose (Sec. III-B, Eq. 8-12) on the
-/// device. Per touch: resample by weight, add motion noise, weigh by Eq. 7. Random numbers are a
-/// function of the seed, the touch and the particle, so that the order of execution is without
-/// influence.
+/// device. Per touch: resample by weight, add motion noise, weigh by Eq. 7. The first touch finds
+/// all weights equal and resamples nothing; a touch without a known element adds motion noise and
+/// leaves the weights as they are. Weights are kept in logs relative to the largest, so that they
+/// never all vanish. Particles are free to leave the region.
+///
+/// Random numbers are a function of the seed, the touch and the particle, so that the order of
+/// execution is without influence.
 class ParticleFilter {
  public:
   /// @throws Error as PoseHistogram does, and on a number of particles, a noise or a rate out of
@@ -54,7 +59,8 @@ class ParticleFilter {
   ParticleFilter(ParticleFilter&&) noexcept;
   ParticleFilter& operator=(ParticleFilter&&) noexcept;
 
-  /// Uniform particles once more, for the next unknown.
+  /// The initial particles once more, for the next unknown: the same touches give the same run.
+  /// @throws Error if the device fails
   void reset();
 
   /// @throws Error on a touch that is not sound, or if the device fails
@@ -62,8 +68,9 @@ class ParticleFilter {
   void update(const Touch& touch) { update(std::span(&touch, 1)); }
 
   /// Identity by Eq. 9; the pose is the maximum of the Parzen estimate with a cone kernel (Eq.
-  /// 10-12), rho = 1 mm and 1 rad, on a grid of 0.5 mm and 0.04 pi rad. `mode.bin` is -1, and
-  /// `mode.log_likelihood` the log of the Parzen density's value there.
+  /// 10-12), rho = 1 mm and 1 rad, on a grid of 0.5 mm and 0.04 pi rad through the region's centre.
+  /// `mode.bin` is -1, and `mode.log_likelihood` the log of the Parzen sum's value there, at most
+  /// 0; where all particles are of "none of these", it is -infinity and the mode says nothing.
   /// @throws Error if the device fails
   Estimate estimate() const;
 

@@ -1,0 +1,98 @@
+#include "recogniser.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "palpate/particle_filter.hpp"
+
+namespace palpate::cli {
+
+namespace {
+
+class HistogramRecogniser : public Recogniser {
+ public:
+  HistogramRecogniser(Device& device, const RecognitionTask& task)
+      : histogram_(device, task.hypotheses, task.histogram) {}
+
+  void reset() override { histogram_.reset(); }
+  void update(std::span<const Touch> touches,
+              const std::function<void(double)>& progress) override {
+    histogram_.update(touches, progress);
+  }
+  Estimate estimate() const override { return histogram_.estimate(); }
+  std::optional<double> effective_sample_size() const override { return {}; }
+  std::vector<double> belief_xy(int object) const override {
+    return histogram_.marginals(object).xy;
+  }
+  std::string description() const override {
+    const PoseLattice& lattice = histogram_.lattice();
+    return fmt::format("{} x {} x {} bins each, in {}", lattice.x_mm.count, lattice.y_mm.count,
+                       lattice.theta_rad.count, fmt::join(histogram_.paths(), "; "));
+  }
+  const PoseHistogram* histogram() const override { return &histogram_; }
+
+ private:
+  PoseHistogram histogram_;
+};
+
+/// The bin that a value falls into, the nearest one where it lies beyond all.
+int bin_of(const Axis& axis, double value) {
+  const double bin = axis.count > 1 ? std::floor((value - axis.lower) / axis.step()) : 0.0;
+  return static_cast<int>(std::clamp(bin, 0.0, axis.count - 1.0));
+}
+
+class ParticleRecogniser : public Recogniser {
+ public:
+  ParticleRecogniser(Device& device, const RecognitionTask& task)
+      : options_(*task.particles), filter_(device, task.hypotheses, options_) {}
+
+  void reset() override { filter_.reset(); }
+  void update(std::span<const Touch> touches,
+              const std::function<void(double)>& progress) override {
+    for (std::size_t i = 0; i < touches.size(); ++i) {
+      filter_.update(touches[i]);
+      progress(static_cast<double>(i + 1) / static_cast<double>(touches.size()));
+    }
+  }
+  Estimate estimate() const override { return filter_.estimate(); }
+  std::optional<double> effective_sample_size() const override {
+    return filter_.effective_sample_size();
+  }
+  std::vector<double> belief_xy(int object) const override {
+    const PoseLattice& lattice = options_.region;
+    std::vector<double> belief(static_cast<std::size_t>(lattice.plane()));
+    for (const ParticleFilter::Particle& particle : filter_.particles()) {
+      if (particle.object == object) {
+        const glm::dvec2 at = particle.T_object_robot * lattice.pivot_mm;
+        const auto row = static_cast<std::size_t>(bin_of(lattice.y_mm, at.y));
+        belief[row * lattice.x_mm.count + bin_of(lattice.x_mm, at.x)] += particle.weight;
+      }
+    }
+    return belief;
+  }
+  std::string description() const override {
+    return fmt::format(
+        "{} particles, {} resampling{}, seed {}", options_.particles,
+        options_.resampling == Resampling::multinomial ? "multinomial" : "systematic",
+        options_.augmented ? ", random particles added" : "", options_.seed);
+  }
+  const PoseHistogram* histogram() const override { return nullptr; }
+
+ private:
+  ParticleOptions options_;
+  ParticleFilter filter_;
+};
+
+}  // namespace
+
+std::unique_ptr<Recogniser> make_recogniser(Device& device, const RecognitionTask& task) {
+  if (task.particles) {
+    return std::make_unique<ParticleRecogniser>(device, task);
+  }
+  return std::make_unique<HistogramRecogniser>(device, task);
+}
+
+}  // namespace palpate::cli

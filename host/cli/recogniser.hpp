@@ -1,0 +1,39 @@
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "palpate/estimate.hpp"
+#include "palpate/pose_histogram.hpp"
+#include "recognition_task.hpp"
+
+namespace palpate::cli {
+
+/// What `recognize` needs of a filter, whichever was asked for.
+class Recogniser {
+ public:
+  virtual ~Recogniser() = default;
+
+  /// Forgets all touches, for the next unknown.
+  virtual void reset() = 0;
+  /// `progress` is called with the fraction done, now and then.
+  virtual void update(std::span<const Touch> touches,
+                      const std::function<void(double)>& progress) = 0;
+  virtual Estimate estimate() const = 0;
+  /// Of the particles, where there are any.
+  virtual std::optional<double> effective_sample_size() const = 0;
+  /// Probability of every (x, y) of one object over the task's lattice, [ny, nx].
+  virtual std::vector<double> belief_xy(int object) const = 0;
+  /// What is evaluated, where and how, in a few words.
+  virtual std::string description() const = 0;
+  /// The dense belief, where there is one.
+  virtual const PoseHistogram* histogram() const = 0;
+};
+
+std::unique_ptr<Recogniser> make_recogniser(Device& device, const RecognitionTask& task);
+
+}  // namespace palpate::cli

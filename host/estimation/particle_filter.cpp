@@ -1,0 +1,356 @@
+#include "palpate/particle_filter.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include <fmt/format.h>
+
+#include "command_stream.hpp"
+#include "draw_particles.hpp"
+#include "hypotheses.hpp"
+#include "likelihood_averages.hpp"
+#include "palpate/error.hpp"
+#include "particle_likelihood.hpp"
+#include "parzen_mode.hpp"
+#include "philox.hpp"
+#include "sum_weights.hpp"
+#include "two_float.hpp"
+#include "weight_blocks.hpp"
+
+namespace palpate {
+
+namespace {
+
+constexpr int most_particles = 1'000'000;
+// Beyond, float32 would no longer place a particle to a hundredth of a millimetre.
+constexpr double widest_mm = 100'000.0;
+constexpr std::uint32_t workgroup = 64;
+constexpr std::uint32_t workgroup_constant[] = {workgroup};
+constexpr gpu::Access draw_bindings[] = {gpu::Access::table, gpu::Access::table, gpu::Access::table,
+                                         gpu::Access::storage, gpu::Access::storage};
+constexpr gpu::Access sum_bindings[] = {gpu::Access::table, gpu::Access::storage,
+                                        gpu::Access::storage};
+
+std::uint32_t groups_of(std::size_t count, std::size_t per_group) {
+  return static_cast<std::uint32_t>((count + per_group - 1) / per_group);
+}
+
+/// A probability in units of 2^-32.
+shaders::uint in_words(double probability) {
+  return static_cast<shaders::uint>(
+      std::clamp(std::floor(probability * 0x1p32), 0.0, 0x1p32 - 1.0));
+}
+
+void require(bool sound, const char* name, double value, const char* remedy) {
+  if (!sound) {
+    throw Error(Fault::input, fmt::format("{} = {}: {}", name, value, remedy));
+  }
+}
+
+void validate(const ParticleOptions& options) {
+  require(options.particles >= 1 && options.particles <= most_particles, "particles",
+          options.particles, "give 1 to 1,000,000");
+  for (const auto& [name, axis] : {std::pair{"region x_mm", options.region.x_mm},
+                                   std::pair{"region y_mm", options.region.y_mm}}) {
+    require(axis.upper - axis.lower <= widest_mm, name, axis.upper - axis.lower,
+            "extends over more than 100 m; give a smaller one");
+  }
+  const auto is_deviation = [](double v) { return v >= 0.0 && v <= 1000.0; };
+  require(is_deviation(options.motion_mm), "motion_mm", options.motion_mm, "give 0 to 1000");
+  require(is_deviation(options.motion_rad), "motion_rad", options.motion_rad, "give 0 to 1000");
+  require(options.alpha_slow > 0.0 && options.alpha_slow < options.alpha_fast, "alpha_slow",
+          options.alpha_slow, "give a rate above 0 and below alpha_fast");
+  require(options.alpha_fast <= 1.0, "alpha_fast", options.alpha_fast, "give at most 1");
+  if (options.none_weight) {
+    require(*options.none_weight > 0.0 && std::isfinite(*options.none_weight), "none_weight",
+            *options.none_weight, "give a positive number");
+  }
+}
+
+/// The parts of the objects, and of "none of these" after them, in the initial distribution.
+std::vector<shaders::ObjectShare> object_shares(std::span<const Hypothesis> hypotheses,
+                                                const ParticleOptions& options) {
+  std::vector<double> weights;
+  for (const Hypothesis& hypothesis : hypotheses) {
+    weights.push_back(hypothesis.weight);
+  }
+  if (options.none_weight) {
+    weights.push_back(*options.none_weight);
+  }
+  double total = 0.0;
+  for (const double weight : weights) {
+    total += weight;
+  }
+  std::vector<shaders::ObjectShare> shares;
+  double before = 0.0;
+  for (const double weight : weights) {
+    before += weight;
+    shares.push_back({.particle_end = static_cast<shaders::uint>(
+                          std::lround(before / total * options.particles)),
+                      .chance_end = in_words(before / total)});
+  }
+  return shares;
+}
+
+double half(const Axis& axis) { return (axis.upper - axis.lower) / 2.0; }
+double centre(const Axis& axis) { return axis.lower + half(axis); }
+
+}  // namespace
+
+struct ParticleFilter::Impl {
+  Impl(Device& device, std::span<const Hypothesis> hypotheses, const ParticleOptions& wanted,
+       const ContactLikelihood& model)
+      : options(wanted),
+        objects(hypotheses.size()),
+        context(device.context()),
+        stream(context),
+        likelihood(context, stream, hypotheses, options.region, model),
+        parzen(context, stream),
+        draw_kernel(context, {.name = "draw_particles",
+                              .spirv = shaders::draw_particles,
+                              .bindings = draw_bindings,
+                              .push_bytes = sizeof(shaders::DrawPush),
+                              .constants = workgroup_constant}),
+        sum_kernel(context, {.name = "sum_weights",
+                             .spirv = shaders::sum_weights,
+                             .bindings = sum_bindings,
+                             .push_bytes = sizeof(shaders::uint)}),
+        averages(options.alpha_slow, options.alpha_fast) {
+    const std::size_t n = size();
+    if (n > context.limits().table_texels) {
+      throw Error(Fault::input, fmt::format("particles = {}: device '{}' takes at most {}", n,
+                                            context.name(), context.limits().table_texels));
+    }
+    for (gpu::Buffer* buffer : {&particles, &drawn}) {
+      *buffer = gpu::Buffer(context, n * sizeof(shaders::Particle), gpu::Memory::device,
+                            "particles", VK_FORMAT_R32G32B32A32_SINT);
+    }
+    log_weights = gpu::Buffer(context, n * sizeof(TwoFloat), gpu::Memory::device,
+                              "particle weights", VK_FORMAT_R32G32_SFLOAT);
+    cumulative = gpu::Buffer(context, n * sizeof(float), gpu::Memory::device, "particle weights",
+                             VK_FORMAT_R32_SFLOAT);
+    sums.resize(groups_of(n, shaders::WEIGHT_BLOCK));
+    block_sums =
+        gpu::Buffer(context, std::span(sums).size_bytes(), gpu::Memory::device, "sums of weights");
+    draw_blocks = gpu::Buffer(context, sums.size() * sizeof(shaders::DrawBlock),
+                              gpu::Memory::device, "sums of weights", VK_FORMAT_R32G32B32A32_SINT);
+    const std::vector<shaders::ObjectShare> all_shares = object_shares(hypotheses, options);
+    share_count = static_cast<shaders::uint>(all_shares.size());
+    shares = gpu::Buffer(context, std::span(all_shares).size_bytes(), gpu::Memory::device,
+                         "prior weights");
+    stream.upload(shares, std::span<const shaders::ObjectShare>(all_shares));
+    start();
+  }
+
+  std::size_t size() const { return static_cast<std::size_t>(options.particles); }
+
+  /// Uniform particles of equal weight.
+  void start() {
+    touch = 0;
+    weighed = false;
+    averages = LikelihoodAverages(options.alpha_slow, options.alpha_fast);
+    draw(shaders::DRAW_INITIAL, 0.0);
+    // No evidence, equal weights; the driver compiles the kernel now, and no touch waits for that.
+    likelihood.weigh({}, particles, size(), log_weights);
+    sum_weights();
+  }
+
+  /// Records the drawing of all particles; see shaders::DrawPush.
+  void draw(shaders::uint how, double injected) {
+    std::vector<shaders::DrawBlock> bounds;
+    if (how == shaders::DRAW_MULTINOMIAL) {
+      bounds = multinomial_blocks(sums, summary);
+    } else if (how == shaders::DRAW_SYSTEMATIC) {
+      const auto words = philox({0, touch, shaders::RANDOM_OFFSET, 0}, key());
+      bounds = systematic_blocks(sums, summary, options.particles, words[0] * 0x1p-32);
+    }
+    stream.upload(draw_blocks, std::span<const shaders::DrawBlock>(bounds));
+    const shaders::DrawPush push{
+        .key_low = key()[0],
+        .key_high = key()[1],
+        .touch = touch,
+        .particles = static_cast<shaders::uint>(size()),
+        .draw = how,
+        .injected = in_words(injected),
+        .objects = share_count,
+        .blocks = static_cast<shaders::uint>(bounds.size()),
+        .half_x_mm = static_cast<float>(half(options.region.x_mm)),
+        .half_y_mm = static_cast<float>(half(options.region.y_mm)),
+        .half_theta_rad = static_cast<float>(half(options.region.theta_rad)),
+        .motion_mm = static_cast<float>(options.motion_mm),
+        .motion_rad = static_cast<float>(options.motion_rad)};
+    stream.dispatch(draw_kernel, {&particles, &cumulative, &draw_blocks, &shares, &drawn}, push,
+                    {groups_of(size(), workgroup), 1, 1});
+    std::swap(particles, drawn);
+  }
+
+  /// Sums the weights for the next drawing and for what is said of them.
+  void sum_weights() {
+    stream.dispatch(sum_kernel, {&log_weights, &cumulative, &block_sums},
+                    static_cast<shaders::uint>(size()),
+                    {static_cast<std::uint32_t>(sums.size()), 1, 1});
+    stream.download(block_sums, std::span(sums));
+    stream.run();
+    summary = summarise(sums);
+  }
+
+  void update(const ContactEvidence& evidence) {
+    ++touch;
+    // A touch that says nothing moves the particles and leaves their weights: drawing anew would
+    // only lose some. So would it before the first touch, when all weigh the same.
+    const bool informative = !evidence.segments.empty();
+    if (!informative || !weighed) {
+      draw(shaders::DRAW_SAME, 0.0);
+    } else {
+      draw(options.resampling == Resampling::multinomial ? shaders::DRAW_MULTINOMIAL
+                                                         : shaders::DRAW_SYSTEMATIC,
+           options.augmented ? averages.injected() : 0.0);
+    }
+    if (!informative) {
+      stream.run();
+      return;
+    }
+    likelihood.weigh(evidence, particles, size(), log_weights);
+    sum_weights();
+    weighed = true;
+    averages.add(summary.log_largest + std::log(summary.sum / static_cast<double>(size())),
+                 evidence.from_pivot_mm.size());
+  }
+
+  /// Particles as the device keeps them, about the region's centre.
+  std::vector<shaders::Particle> download(std::vector<double>& weights) {
+    std::vector<shaders::Particle> states(size());
+    std::vector<TwoFloat> logs(size());
+    stream.download(particles, std::span(states));
+    stream.download(log_weights, std::span(logs));
+    stream.run();
+    weights.clear();
+    double total = 0.0;
+    for (const TwoFloat& log_weight : logs) {
+      weights.push_back(std::exp(log_weight.value() - summary.log_largest));
+      total += weights.back();
+    }
+    for (double& weight : weights) {
+      weight /= total;
+    }
+    return states;
+  }
+
+  Pose T_object_robot(double x_mm, double y_mm, double theta_rad) const {
+    const PoseLattice& region = options.region;
+    return region.T_object_robot(centre(region.x_mm) + x_mm, centre(region.y_mm) + y_mm,
+                                 centre(region.theta_rad) + theta_rad);
+  }
+
+  std::array<std::uint32_t, 2> key() const {
+    return {static_cast<std::uint32_t>(options.seed),
+            static_cast<std::uint32_t>(options.seed >> 32)};
+  }
+
+  ParticleOptions options;
+  std::size_t objects;
+  gpu::Context& context;
+  gpu::CommandStream stream;
+  ParticleLikelihood likelihood;
+  ParzenMode parzen;
+  gpu::Kernel draw_kernel;
+  gpu::Kernel sum_kernel;
+  gpu::Buffer particles;
+  gpu::Buffer drawn;  ///< those of the touch before, and the place for the next
+  gpu::Buffer log_weights;
+  gpu::Buffer cumulative;
+  gpu::Buffer block_sums;
+  gpu::Buffer draw_blocks;
+  gpu::Buffer shares;
+  shaders::uint share_count = 0;
+  std::vector<shaders::WeightBlock> sums;
+  WeightSummary summary;
+  LikelihoodAverages averages;
+  shaders::uint touch = 0;  ///< counts the touches since the start
+  bool weighed = false;     ///< by any touch since the start
+};
+
+ParticleFilter::ParticleFilter(Device& device, std::span<const Hypothesis> hypotheses,
+                               const ParticleOptions& options) {
+  validate_hypotheses(hypotheses);
+  ParticleOptions checked = options;
+  checked.region.collapse_fixed().validate();
+  validate(checked);
+  const ContactLikelihood model{.gamma = checked.gamma,
+                                .prior = checked.prior ? *checked.prior : common_prior(hypotheses)};
+  model.validate();
+  impl_ = std::make_unique<Impl>(device, hypotheses, checked, model);
+}
+
+ParticleFilter::~ParticleFilter() = default;
+ParticleFilter::ParticleFilter(ParticleFilter&&) noexcept = default;
+ParticleFilter& ParticleFilter::operator=(ParticleFilter&&) noexcept = default;
+
+void ParticleFilter::reset() { impl_->start(); }
+
+void ParticleFilter::update(std::span<const Touch> touches) {
+  const ParticleOptions& options = impl_->options;
+  std::vector<ContactEvidence> evidence;
+  for (const Touch& touch : touches) {
+    evidence.push_back(gather_evidence(std::span(&touch, 1), options.classifier,
+                                       options.region.pivot_mm,
+                                       ParticleLikelihood::segment_elements()));
+  }
+  for (const ContactEvidence& of_touch : evidence) {
+    impl_->update(of_touch);
+  }
+}
+
+Estimate ParticleFilter::estimate() const {
+  std::vector<double> weights;
+  const std::vector<shaders::Particle> particles = impl_->download(weights);
+  Estimate estimate{.identity = std::vector<double>(impl_->objects), .mode = {}};
+  for (std::size_t i = 0; i < particles.size(); ++i) {
+    const std::size_t object = particles[i].object;
+    (object < impl_->objects ? estimate.identity[object] : estimate.none) += weights[i];
+  }
+  const auto maximum =
+      impl_->parzen.find(particles, weights, static_cast<std::uint32_t>(impl_->objects));
+  estimate.mode.bin = -1;
+  estimate.mode.log_likelihood = -std::numeric_limits<double>::infinity();
+  estimate.mode.T_object_robot = impl_->T_object_robot(0.0, 0.0, 0.0);
+  if (maximum) {
+    estimate.mode.object = static_cast<int>(maximum->object);
+    estimate.mode.T_object_robot =
+        impl_->T_object_robot(maximum->x_mm, maximum->y_mm, maximum->theta_rad);
+    estimate.mode.log_likelihood = std::log(maximum->density);
+  }
+  return estimate;
+}
+
+double ParticleFilter::effective_sample_size() const {
+  // Rounding of the device's sums could leave the range.
+  return std::clamp(impl_->summary.effective_sample_size(), 1.0,
+                    static_cast<double>(impl_->size()));
+}
+
+std::vector<ParticleFilter::Particle> ParticleFilter::particles() const {
+  std::vector<double> weights;
+  std::vector<Particle> particles;
+  const std::vector<shaders::Particle> states = impl_->download(weights);
+  for (std::size_t i = 0; i < states.size(); ++i) {
+    particles.push_back({.object = static_cast<int>(states[i].object),
+                         .T_object_robot = impl_->T_object_robot(states[i].x_mm, states[i].y_mm,
+                                                                 states[i].theta_rad),
+                         .weight = weights[i]});
+  }
+  return particles;
+}
+
+std::uint64_t ParticleFilter::device_bytes() const {
+  std::uint64_t bytes = impl_->likelihood.device_bytes();
+  for (const gpu::Buffer* buffer :
+       {&impl_->particles, &impl_->drawn, &impl_->log_weights, &impl_->cumulative,
+        &impl_->block_sums, &impl_->draw_blocks, &impl_->shares}) {
+    bytes += buffer->bytes();
+  }
+  return bytes;
+}
+
+}  // namespace palpate

@@ -1,0 +1,188 @@
+#include "particle_likelihood.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include <fmt/format.h>
+
+#include "bordered_map.hpp"
+#include "interface.h"
+#include "likelihood_path.hpp"
+#include "palpate/error.hpp"
+#include "weigh_particles.hpp"
+
+namespace palpate {
+
+namespace {
+
+constexpr gpu::Access bindings[] = {gpu::Access::table, gpu::Access::storage, gpu::Access::table,
+                                    gpu::Access::table, gpu::Access::table,   gpu::Access::storage};
+// As in DenseLikelihood: about half a second on a CPU device.
+constexpr double work_per_run = 5e8;
+// The table's least guaranteed size, less the headings, holds this many elements at 15 cell sizes.
+constexpr std::size_t most_elements = 4096;
+static_assert(most_elements <= gpu::most_iterations / 2);
+
+/// Coordinates in cells, or a cosine and sine, split at multiples of `quantum`. With 2^-2 cells and
+/// 2^-11, sums of products of the coarse parts are exact up to 1,000 cells.
+shaders::CoarseAndFine split_coarse(const glm::dvec2& v, double quantum) {
+  const glm::dvec2 coarse{std::round(v.x / quantum) * quantum, std::round(v.y / quantum) * quantum};
+  return {static_cast<float>(coarse.x), static_cast<float>(coarse.y),
+          static_cast<float>(v.x - coarse.x), static_cast<float>(v.y - coarse.y)};
+}
+
+std::vector<shaders::CoarseAndFine> headings() {
+  std::vector<shaders::CoarseAndFine> table;
+  for (shaders::uint i = 0; i < shaders::HEADINGS; ++i) {
+    table.push_back(
+        split_coarse(rotate(2.0 * std::numbers::pi * i / shaders::HEADINGS, {1.0, 0.0}), 0x1p-11));
+  }
+  return table;
+}
+
+/// In cells, and so near that a rotation stays a whole number of float32 and of int32.
+shaders::CoarseAndFine element_in_cells(const glm::dvec2& from_pivot_mm, double cell_mm) {
+  constexpr double far = 1 << 20;
+  const glm::dvec2 cells = from_pivot_mm / cell_mm;
+  return split_coarse({std::clamp(cells.x, -far, far), std::clamp(cells.y, -far, far)}, 0.25);
+}
+
+std::size_t index_of(std::vector<double>& values, double value) {
+  const auto found = std::find(values.begin(), values.end(), value);
+  const auto index = static_cast<std::size_t>(found - values.begin());
+  if (found == values.end()) {
+    values.push_back(value);
+  }
+  return index;
+}
+
+double centre(const Axis& axis) { return axis.lower + (axis.upper - axis.lower) / 2.0; }
+
+}  // namespace
+
+ParticleLikelihood::ParticleLikelihood(gpu::Context& context, gpu::CommandStream& stream,
+                                       std::span<const Hypothesis> hypotheses,
+                                       const PoseLattice& region, const ContactLikelihood& model)
+    : context_(context),
+      stream_(stream),
+      theta_centre_rad_(centre(region.theta_rad)),
+      kernel_(context, {.name = "weigh_particles",
+                        .spirv = shaders::weigh_particles,
+                        .bindings = bindings,
+                        .push_bytes = sizeof(shaders::WeighPush),
+                        .constants = model_constants(model)}) {
+  std::vector<float> cells;
+  std::vector<shaders::ParticleMap> objects;
+  const auto append = [&](const OccupancyGrid& map) {
+    const double cells_per_mm = 1.0 / map.cell_mm;
+    const auto high = static_cast<float>(cells_per_mm);
+    objects.push_back(
+        {.first = static_cast<int>(cells.size()),
+         .width = map.nx + 2 * shaders::MAP_BORDER,
+         .height = map.ny + 2 * shaders::MAP_BORDER,
+         .scale = static_cast<shaders::uint>(index_of(cell_sizes_mm_, map.cell_mm)),
+         .cells_per_mm_high = high,
+         .cells_per_mm_low = static_cast<float>(cells_per_mm - static_cast<double>(high)),
+         .centre_x =
+             split((centre(region.x_mm) - map.origin_mm.x) / map.cell_mm + shaders::MAP_BORDER),
+         .centre_y =
+             split((centre(region.y_mm) - map.origin_mm.y) / map.cell_mm + shaders::MAP_BORDER)});
+    const std::vector<float> bordered = with_border(map, model.prior);
+    cells.insert(cells.end(), bordered.begin(), bordered.end());
+    if (cells.size() > context.limits().table_texels) {
+      throw Error(
+          Fault::input,
+          fmt::format("maps up to '{}': {} cells together exceed the {} that device '{}' "
+                      "reads as a table; build them with larger cells",
+                      map.label, cells.size(), context.limits().table_texels, context.name()));
+    }
+  };
+  for (const Hypothesis& hypothesis : hypotheses) {
+    append(hypothesis.map);
+  }
+  OccupancyGrid none;
+  none.cell_mm = hypotheses.front().map.cell_mm;
+  append(none);
+
+  maps_ = gpu::Buffer(context, std::span(cells).size_bytes(), gpu::Memory::device, "maps",
+                      VK_FORMAT_R32_SFLOAT);
+  objects_ = gpu::Buffer(context, std::span(objects).size_bytes(), gpu::Memory::device, "maps");
+  stream.upload(maps_, std::span<const float>(cells));
+  stream.upload(objects_, std::span<const shaders::ParticleMap>(objects));
+  reserve(64);
+}
+
+std::size_t ParticleLikelihood::segment_elements() { return most_elements; }
+
+void ParticleLikelihood::reserve(std::size_t elements) {
+  const std::size_t texels = shaders::HEADINGS + elements * cell_sizes_mm_.size();
+  if (texels > context_.limits().table_texels) {
+    throw Error(Fault::input,
+                fmt::format("maps of {} cell sizes: more than device '{}' reads at once; build "
+                            "them with the same cells",
+                            cell_sizes_mm_.size(), context_.name()));
+  }
+  if (texels * sizeof(shaders::CoarseAndFine) > turns_.bytes()) {
+    segments_ = gpu::Buffer(context_, elements * sizeof(shaders::Segment), gpu::Memory::device,
+                            "segments", VK_FORMAT_R32G32B32A32_SINT);
+    turns_ = gpu::Buffer(context_, texels * sizeof(shaders::CoarseAndFine), gpu::Memory::device,
+                         "elements", VK_FORMAT_R32G32B32A32_SFLOAT);
+    stream_.upload(turns_, std::span<const shaders::CoarseAndFine>(headings()));
+  }
+}
+
+void ParticleLikelihood::weigh(const ContactEvidence& evidence, const gpu::Buffer& particles,
+                               std::size_t count, const gpu::Buffer& log_weights) {
+  std::vector<glm::dvec2> turned_mm;
+  for (const glm::dvec2& p : evidence.from_pivot_mm) {
+    turned_mm.push_back(rotate(theta_centre_rad_, p));
+  }
+  const std::size_t room = std::min(evidence.from_pivot_mm.size(), most_elements);
+  if (room * sizeof(shaders::Segment) > segments_.bytes()) {
+    stream_.run();  // what was recorded may use the tables that go
+    reserve(room);
+  }
+  const std::vector<shaders::Segment>& segments = evidence.segments;
+  double pending = 0.0;
+  std::size_t s = 0;
+  do {
+    const bool fresh = s == 0;
+    const std::size_t first = segments.empty() ? 0 : segments[s].begin;
+    std::vector<shaders::Segment> batch;
+    for (; s < segments.size() && segments[s].end - first <= room; ++s) {
+      batch.push_back(segments[s]);
+      batch.back().begin -= static_cast<shaders::uint>(first);
+      batch.back().end -= static_cast<shaders::uint>(first);
+    }
+    const std::size_t elements = batch.empty() ? 0 : batch.back().end;
+    std::vector<shaders::CoarseAndFine> table;
+    for (const double cell_mm : cell_sizes_mm_) {
+      for (std::size_t k = 0; k < elements; ++k) {
+        table.push_back(element_in_cells(turned_mm[first + k], cell_mm));
+      }
+    }
+    const double work = static_cast<double>(count) * static_cast<double>(elements);
+    if (pending + work > work_per_run) {
+      stream_.run();
+      pending = 0.0;
+    }
+    pending += work;
+    stream_.upload(segments_, std::span<const shaders::Segment>(batch));
+    stream_.upload(turns_, std::span<const shaders::CoarseAndFine>(table),
+                   shaders::HEADINGS * sizeof(shaders::CoarseAndFine));
+    const auto invocations = static_cast<std::uint32_t>(count);
+    const shaders::WeighPush push{.particles = invocations,
+                                  .segments = static_cast<shaders::uint>(batch.size()),
+                                  .elements = static_cast<shaders::uint>(elements),
+                                  .fresh = fresh ? 1U : 0U};
+    stream_.dispatch(kernel_, {&maps_, &objects_, &turns_, &segments_, &particles, &log_weights},
+                     push, {(invocations + likelihood_workgroup - 1) / likelihood_workgroup, 1, 1});
+  } while (s < segments.size());
+}
+
+std::uint64_t ParticleLikelihood::device_bytes() const {
+  return maps_.bytes() + objects_.bytes() + turns_.bytes() + segments_.bytes();
+}
+
+}  // namespace palpate

@@ -1,0 +1,51 @@
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "command_stream.hpp"
+#include "contact_evidence.hpp"
+#include "palpate/estimate.hpp"
+#include "palpate/lattice.hpp"
+#include "palpate/sensor_model.hpp"
+
+namespace palpate {
+
+/// The log-likelihood of a touch (Eq. 7) at particles that each have an object and a pose of their
+/// own. All maps stand in one table, so that one dispatch weighs all particles.
+class ParticleLikelihood {
+ public:
+  /// Records the upload of the maps. A further object, after all others, is of the prior
+  /// everywhere.
+  /// @throws Error where the maps together are more than the device reads as a table
+  ParticleLikelihood(gpu::Context& context, gpu::CommandStream& stream,
+                     std::span<const Hypothesis> hypotheses, const PoseLattice& region,
+                     const ContactLikelihood& model);
+
+  /// Most elements that one segment of the evidence may hold.
+  static std::size_t segment_elements();
+
+  /// Records the weighing of `count` particles, shaders::Particle about the region's centre, by one
+  /// touch, all alike where it has no known element. Where it has very many, runs the stream in
+  /// between.
+  void weigh(const ContactEvidence& evidence, const gpu::Buffer& particles, std::size_t count,
+             const gpu::Buffer& log_weights);
+
+  std::uint64_t device_bytes() const;
+
+ private:
+  /// Makes room for this many elements per cell size.
+  void reserve(std::size_t elements);
+
+  gpu::Context& context_;
+  gpu::CommandStream& stream_;
+  double theta_centre_rad_ = 0.0;
+  std::vector<double> cell_sizes_mm_;  ///< of the maps, each once
+  gpu::Kernel kernel_;
+  gpu::Buffer maps_;
+  gpu::Buffer objects_;
+  gpu::Buffer turns_;  ///< headings, then the elements in cells, [cell size, element]
+  gpu::Buffer segments_;
+};
+
+}  // namespace palpate

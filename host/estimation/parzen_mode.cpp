@@ -1,0 +1,309 @@
+#include "parzen_mode.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <vector>
+
+#include <glm/vec4.hpp>
+
+#include "palpate/pose.hpp"
+#include "sum_cones.hpp"
+
+namespace palpate {
+
+namespace {
+
+constexpr double two_pi = 2.0 * std::numbers::pi;
+constexpr double step_mm = 0.5;
+constexpr double step_rad = 0.04 * std::numbers::pi;
+constexpr int sectors = 50 / shaders::PARZEN_THETAS;  // tiles around the circle
+constexpr int edge = shaders::PARZEN_EDGE;
+constexpr int points = edge * edge * shaders::PARZEN_THETAS;
+// A grid point's cone reaches this many cells down, and one less up, in x and y.
+constexpr int reach_cells = 2;
+// Particles that one unit takes at most, so that no loop is long.
+constexpr std::uint32_t unit_particles = 8192;
+static_assert(unit_particles < gpu::most_iterations / 2);
+constexpr std::size_t units_per_run = 1 << 14;
+constexpr std::size_t first_tiles = 16;
+
+constexpr gpu::Access bindings[] = {gpu::Access::table, gpu::Access::storage, gpu::Access::storage,
+                                    gpu::Access::storage};
+
+/// Object, sector of theta, y, x: whole numbers in one that sorts in this order. y and x may be
+/// negative; where they do not fit, they are clamped, at 65 m from the region's centre.
+struct Key {
+  static constexpr int bits = 18;
+  static constexpr int bias = 1 << (bits - 1);
+
+  static std::uint64_t pack(std::uint64_t object, int sector, int y, int x) {
+    const auto biased = [](int v) {
+      return static_cast<std::uint64_t>(std::clamp(v, -bias, bias - 1) + bias);
+    };
+    return (((object * 8 + static_cast<std::uint64_t>(sector)) << bits | biased(y)) << bits) |
+           biased(x);
+  }
+  explicit Key(std::uint64_t key)
+      : object(static_cast<std::uint32_t>(key >> (2 * bits + 3))),
+        sector(static_cast<int>(key >> (2 * bits) & 7)),
+        y(static_cast<int>(key >> bits & (2 * bias - 1)) - bias),
+        x(static_cast<int>(key & (2 * bias - 1)) - bias) {}
+
+  std::uint32_t object;
+  int sector;
+  int y;
+  int x;
+};
+
+int cell_of(float mm) {
+  constexpr double far = Key::bias;
+  return static_cast<int>(std::floor(std::clamp(mm / step_mm, -far, far)));
+}
+
+int tile_of(int cell) { return static_cast<int>(std::floor(static_cast<double>(cell) / edge)); }
+
+int sector_of(float theta_rad) {
+  const int sector = static_cast<int>(std::floor(theta_rad / (two_pi / sectors)));
+  return (sector % sectors + sectors) % sectors;
+}
+
+using Range = std::array<std::uint32_t, 2>;
+
+/// The particles that count, in the order of their cells.
+struct SortedParticles {
+  std::vector<std::uint64_t> key;   ///< by cell
+  std::vector<glm::vec4> particle;  ///< x_mm, y_mm, theta_rad, weight over the largest
+  std::vector<double> mass_before;  ///< sum of the weights of all before, and of all
+  double largest = 0.0;             ///< weight
+
+  double mass(const Range& range) const { return mass_before[range[1]] - mass_before[range[0]]; }
+};
+
+SortedParticles sort(std::span<const shaders::Particle> particles, std::span<const double> weights,
+                     std::uint32_t objects) {
+  SortedParticles sorted;
+  for (std::size_t i = 0; i < particles.size(); ++i) {
+    if (particles[i].object < objects) {
+      sorted.largest = std::max(sorted.largest, weights[i]);
+    }
+  }
+  // All that are left out together change the maximum, at least half the largest weight, by 1e-9.
+  const double least = sorted.largest * 1e-10 / static_cast<double>(particles.size());
+  std::vector<std::pair<std::uint64_t, std::uint32_t>> order;
+  for (std::size_t i = 0; i < particles.size(); ++i) {
+    const auto& [object, x_mm, y_mm, theta_rad] = particles[i];
+    if (object < objects && weights[i] > least) {
+      order.emplace_back(Key::pack(object, sector_of(theta_rad), cell_of(y_mm), cell_of(x_mm)),
+                         static_cast<std::uint32_t>(i));
+    }
+  }
+  std::sort(order.begin(), order.end());
+  double mass = 0.0;
+  for (const auto& [key, i] : order) {
+    const double weight = weights[i] / sorted.largest;
+    sorted.key.push_back(key);
+    sorted.particle.emplace_back(particles[i].x_mm, particles[i].y_mm, particles[i].theta_rad,
+                                 static_cast<float>(weight));
+    sorted.mass_before.push_back(mass);
+    mass += weight;
+  }
+  sorted.mass_before.push_back(mass);
+  return sorted;
+}
+
+/// A tile of grid points, edge x edge in x and y and a sector of theta.
+struct Tile {
+  std::uint64_t key = 0;      ///< in tiles
+  std::vector<Range> ranges;  ///< of the particles that may reach it
+  double mass = 0.0;          ///< of those, which bounds the density
+};
+
+/// All tiles that a particle reaches and some of their neighbours.
+std::vector<std::uint64_t> reached_tiles(const SortedParticles& sorted) {
+  std::vector<std::uint64_t> occupied;
+  for (const std::uint64_t cell : sorted.key) {
+    const Key key(cell);
+    const std::uint64_t tile = Key::pack(key.object, key.sector, tile_of(key.y), tile_of(key.x));
+    if (occupied.empty() || occupied.back() != tile) {
+      occupied.push_back(tile);
+    }
+  }
+  const auto make_unique = [](std::vector<std::uint64_t>& keys) {
+    std::sort(keys.begin(), keys.end());
+    keys.erase(std::unique(keys.begin(), keys.end()), keys.end());
+  };
+  make_unique(occupied);
+  std::vector<std::uint64_t> reached;
+  for (const std::uint64_t tile : occupied) {
+    const Key key(tile);
+    for (const int turn : {sectors - 1, 0, 1}) {
+      for (const int dy : {-1, 0, 1}) {
+        for (const int dx : {-1, 0, 1}) {
+          reached.push_back(
+              Key::pack(key.object, (key.sector + turn) % sectors, key.y + dy, key.x + dx));
+        }
+      }
+    }
+  }
+  make_unique(reached);
+  return reached;
+}
+
+Tile gather(const SortedParticles& sorted, std::uint64_t tile_key) {
+  const auto first_of = [&sorted](std::uint64_t key) {
+    return static_cast<std::uint32_t>(std::lower_bound(sorted.key.begin(), sorted.key.end(), key) -
+                                      sorted.key.begin());
+  };
+  Tile tile{.key = tile_key, .ranges = {}};
+  const Key key(tile_key);
+  for (const int turn : {sectors - 1, 0, 1}) {
+    const int sector = (key.sector + turn) % sectors;
+    for (int y = key.y * edge - reach_cells; y < key.y * edge + edge - 1 + reach_cells; ++y) {
+      const int x = key.x * edge;
+      const Range range{first_of(Key::pack(key.object, sector, y, x - reach_cells)),
+                        first_of(Key::pack(key.object, sector, y, x + edge - 1 + reach_cells))};
+      if (range[0] < range[1]) {
+        tile.ranges.push_back(range);
+        tile.mass += sorted.mass(range);
+      }
+    }
+  }
+  return tile;
+}
+
+/// Cuts the tile's ranges into units.
+void append_units(const Tile& tile, std::vector<shaders::ConeUnit>& units,
+                  std::vector<Range>& ranges) {
+  const Key key(tile.key);
+  std::uint32_t room = 0;
+  for (const Range& range : tile.ranges) {
+    for (std::uint32_t begin = range[0]; begin < range[1];) {
+      if (room == 0) {
+        const auto first = static_cast<shaders::uint>(ranges.size());
+        units.push_back({.x = key.x * edge,
+                         .y = key.y * edge,
+                         .theta = key.sector * shaders::PARZEN_THETAS,
+                         .range_first = first,
+                         .range_end = first});
+        room = unit_particles;
+      }
+      const std::uint32_t end = std::min(range[1], begin + room);
+      ranges.push_back({begin, end});
+      ++units.back().range_end;
+      room -= end - begin;
+      begin = end;
+    }
+  }
+}
+
+/// Eq. 11 in float64 at one point of a tile's grid.
+double density_at(const SortedParticles& sorted, const Tile& tile, const ParzenMaximum& at) {
+  double sum = 0.0;
+  for (const Range& range : tile.ranges) {
+    for (std::uint32_t i = range[0]; i < range[1]; ++i) {
+      const glm::vec4& particle = sorted.particle[i];
+      const double dx = particle.x - at.x_mm;
+      const double dy = particle.y - at.y_mm;
+      const double dtheta = wrap_angle(particle.z - at.theta_rad, two_pi);
+      sum += particle.w * std::max(0.0, 1.0 - std::sqrt(dx * dx + dy * dy + dtheta * dtheta));
+    }
+  }
+  return sum * sorted.largest;
+}
+
+}  // namespace
+
+ParzenMode::ParzenMode(gpu::Context& context, gpu::CommandStream& stream)
+    : context_(context),
+      stream_(stream),
+      sum_cones_(context, {.name = "sum_cones",
+                           .spirv = shaders::sum_cones,
+                           .bindings = bindings,
+                           .push_bytes = sizeof(shaders::ConePush)}) {
+  // The driver compiles the kernel at its first run, and no estimate has to wait for that.
+  const shaders::Particle particle{};
+  const double weight = 1.0;
+  find({&particle, 1}, {&weight, 1}, 1);
+}
+
+std::optional<ParzenMaximum> ParzenMode::find(std::span<const shaders::Particle> particles,
+                                              std::span<const double> weights,
+                                              std::uint32_t objects) const {
+  const SortedParticles sorted = sort(particles, weights, objects);
+  if (sorted.key.empty()) {
+    return std::nullopt;
+  }
+  std::vector<Tile> tiles;
+  for (const std::uint64_t key : reached_tiles(sorted)) {
+    Tile tile = gather(sorted, key);
+    if (!tile.ranges.empty()) {
+      tiles.push_back(std::move(tile));
+    }
+  }
+  std::stable_sort(tiles.begin(), tiles.end(),
+                   [](const Tile& a, const Tile& b) { return a.mass > b.mass; });
+
+  const gpu::Buffer table(context_, std::span(sorted.particle).size_bytes(), gpu::Memory::device,
+                          "particles", VK_FORMAT_R32G32B32A32_SFLOAT);
+  stream_.upload(table, std::span<const glm::vec4>(sorted.particle));
+  double best = 0.0;
+  std::size_t best_tile = 0;
+  int best_point = 0;
+  for (std::size_t t = 0; t < tiles.size() && tiles[t].mass > best;) {
+    std::vector<shaders::ConeUnit> units;
+    std::vector<Range> ranges;
+    std::vector<std::size_t> unit_end;  // of every tile of this run
+    const std::size_t first = t;
+    const std::size_t most_tiles = first == 0 ? first_tiles : tiles.size();
+    for (; t < tiles.size() && t - first < most_tiles && tiles[t].mass > best &&
+           units.size() < units_per_run;
+         ++t) {
+      append_units(tiles[t], units, ranges);
+      unit_end.push_back(units.size());
+    }
+    const gpu::Buffer range_table(context_, std::span(ranges).size_bytes(), gpu::Memory::device,
+                                  "ranges of particles");
+    const gpu::Buffer unit_table(context_, std::span(units).size_bytes(), gpu::Memory::device,
+                                 "tiles of the Parzen estimate");
+    std::vector<float> densities(units.size() * points);
+    const gpu::Buffer sums(context_, std::span(densities).size_bytes(), gpu::Memory::device,
+                           "the Parzen estimate");
+    stream_.upload(range_table, std::span<const Range>(ranges));
+    stream_.upload(unit_table, std::span<const shaders::ConeUnit>(units));
+    stream_.dispatch(sum_cones_, {&table, &range_table, &unit_table, &sums},
+                     shaders::ConePush{static_cast<float>(step_mm), static_cast<float>(step_rad)},
+                     {static_cast<std::uint32_t>(units.size()), 1, 1});
+    stream_.download(sums, std::span(densities));
+    stream_.run();
+
+    std::size_t unit = 0;
+    for (std::size_t i = 0; i < unit_end.size(); ++i) {
+      std::array<double, points> density{};
+      for (; unit < unit_end[i]; ++unit) {
+        for (int point = 0; point < points; ++point) {
+          density[point] += densities[unit * points + point];
+        }
+      }
+      const auto most = std::max_element(density.begin(), density.end());
+      if (*most > best) {
+        best = *most;
+        best_tile = first + i;
+        best_point = static_cast<int>(most - density.begin());
+      }
+    }
+  }
+
+  const Tile& tile = tiles[best_tile];
+  const Key key(tile.key);
+  const int turn = key.sector * shaders::PARZEN_THETAS + best_point / (edge * edge);
+  ParzenMaximum maximum{.object = key.object,
+                        .x_mm = step_mm * (key.x * edge + best_point % edge),
+                        .y_mm = step_mm * (key.y * edge + best_point / edge % edge),
+                        .theta_rad = wrap_angle(step_rad * turn, two_pi)};
+  maximum.density = density_at(sorted, tile, maximum);
+  return maximum;
+}
+
+}  // namespace palpate

@@ -1,0 +1,44 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+
+#include "command_stream.hpp"
+#include "interface.h"
+
+namespace palpate {
+
+/// Where the Parzen estimate is largest: a point of its grid, about the region's centre.
+struct ParzenMaximum {
+  std::uint32_t object = 0;
+  double x_mm = 0.0;
+  double y_mm = 0.0;
+  double theta_rad = 0.0;
+  double density = 0.0;  ///< sum of weight times cone, Eq. 11
+};
+
+/// The maximum of the Parzen estimate over particles (Eq. 10-12): a cone of rho = 1 mm and 1 rad,
+/// d^2 = (dx^2 + dy^2) / mm^2 + dtheta^2 / rad^2, on a grid of 0.5 mm and 0.04 pi rad.
+///
+/// Particles are sorted by grid cell on the host and the device sums their cones at tiles of grid
+/// points. A tile is left out where the particles in its reach weigh less than what has been found
+/// elsewhere, for no cone is higher than 1: the heaviest tiles come first.
+class ParzenMode {
+ public:
+  /// Runs the stream.
+  ParzenMode(gpu::Context& context, gpu::CommandStream& stream);
+
+  /// None where no particle of the first `objects` objects has any weight. Of points whose
+  /// densities differ by less than about 1e-5 of their value, any may be the answer; its density is
+  /// exact.
+  std::optional<ParzenMaximum> find(std::span<const shaders::Particle> particles,
+                                    std::span<const double> weights, std::uint32_t objects) const;
+
+ private:
+  gpu::Context& context_;
+  gpu::CommandStream& stream_;
+  gpu::Kernel sum_cones_;
+};
+
+}  // namespace palpate

@@ -1,0 +1,115 @@
+#version 450
+#extension GL_GOOGLE_include_directive : require
+
+// Draws the particles of the next touch from those of the last one (Sec. III-B): a particle by its
+// weight, with motion noise, or, in Augmented MCL, now and then a random one. One particle per
+// invocation.
+
+#include "interface.h"
+
+layout(local_size_x_id = 0) in;
+
+#include "philox.glsl"
+
+layout(binding = 0) uniform isamplerBuffer particles;  // Particle
+layout(binding = 1) uniform samplerBuffer cumulative;  // weight within the block, inclusive
+layout(binding = 2) uniform isamplerBuffer blocks;     // DrawBlock
+layout(std430, binding = 3) readonly buffer Shares { ObjectShare shares[]; };
+layout(std430, binding = 4) writeonly buffer Drawn { Particle drawn[]; };
+layout(push_constant) uniform Push { DrawPush push; };
+
+const float PI = 3.14159265358979;
+const float PER_WORD = 1.0 / 4294967296.0;
+
+uvec4 random(const uint particle, const uint purpose) {
+  return philox(uvec4(particle, push.touch, purpose, 0), uvec2(push.key_low, push.key_high));
+}
+
+// Uniform over (-1, 1].
+float uniform_of(const uint word) { return (float(word) + 0.5) * 2.0 * PER_WORD - 1.0; }
+
+// Two independent standard normal numbers (Box and Muller 1958).
+vec2 normals(const uvec2 words) {
+  // Logarithms may round to above 0 at 1.
+  const float radius = sqrt(max(-2.0 * log((float(words.x) + 0.5) * PER_WORD), 0.0));
+  const float angle = PI * uniform_of(words.y);
+  return radius * vec2(cos(angle), sin(angle));
+}
+
+float wrap(const float theta_rad) {
+  return theta_rad - 2.0 * PI * floor(theta_rad * (0.5 / PI) + 0.5);
+}
+
+Particle initial(const uint particle) {
+  const uvec4 words = random(particle, RANDOM_POSE);
+  uint low = 0;
+  uint high = push.objects - 1;
+  while (low < high) {
+    const uint middle = (low + high) / 2;
+    const bool below = push.draw == DRAW_INITIAL ? particle < shares[middle].particle_end
+                                                 : words.w < shares[middle].chance_end;
+    low = below ? low : middle + 1;
+    high = below ? middle : high;
+  }
+  return Particle(low, push.half_x_mm * uniform_of(words.x), push.half_y_mm * uniform_of(words.y),
+                  wrap(push.half_theta_rad * uniform_of(words.z)));
+}
+
+// The particle that a key falls on. `chance` says where in its block a random key falls.
+uint find(const uint key, const uint chance) {
+  uint low = 0;
+  uint high = push.blocks - 1;
+  while (low < high) {
+    const uint middle = (low + high) / 2;
+    const bool below = key < uint(texelFetch(blocks, int(middle)).x);
+    low = below ? low : middle + 1;
+    high = below ? middle : high;
+  }
+  const ivec4 block = texelFetch(blocks, int(low));
+  const float sum = intBitsToFloat(block.w);
+  const float place = push.draw == DRAW_MULTINOMIAL
+                          ? (float(chance) + 0.5) * PER_WORD * sum
+                          : intBitsToFloat(block.y) -
+                                float(uint(block.x) - 1 - key) * intBitsToFloat(block.z);
+  // Rounded up to the whole sum, it would fall behind the last particle that weighs anything.
+  const float target = clamp(place, 0.0, uintBitsToFloat(floatBitsToUint(sum) - 1));
+
+  low *= WEIGHT_BLOCK;
+  high = min(low + WEIGHT_BLOCK, push.particles) - 1;
+  while (low < high) {
+    const uint middle = (low + high) / 2;
+    const bool below = target < texelFetch(cumulative, int(middle)).x;
+    low = below ? low : middle + 1;
+    high = below ? middle : high;
+  }
+  return low;
+}
+
+Particle moved(const uint ancestor, const uint particle) {
+  const ivec4 from = texelFetch(particles, int(ancestor));
+  const uvec4 words = random(particle, RANDOM_MOTION);
+  const vec2 shift = normals(words.xy) * push.motion_mm;
+  const float turn = normals(words.zw).x * push.motion_rad;
+  return Particle(uint(from.x), intBitsToFloat(from.y) + shift.x, intBitsToFloat(from.z) + shift.y,
+                  wrap(intBitsToFloat(from.w) + turn));
+}
+
+void main() {
+  const uint particle = gl_GlobalInvocationID.x;
+  if (particle >= push.particles) {
+    return;
+  }
+  if (push.draw == DRAW_INITIAL) {
+    drawn[particle] = initial(particle);
+  } else if (push.draw == DRAW_SAME) {
+    drawn[particle] = moved(particle, particle);
+  } else {
+    const uvec4 words = random(particle, RANDOM_ANCESTOR);
+    if (words.z < push.injected) {
+      drawn[particle] = initial(particle);
+    } else {
+      const uint key = push.draw == DRAW_MULTINOMIAL ? words.x : particle;
+      drawn[particle] = moved(find(key, words.y), particle);
+    }
+  }
+}

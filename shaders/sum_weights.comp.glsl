@@ -1,0 +1,82 @@
+#version 450
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_control_flow_attributes : require
+
+// The cumulated weights of every WEIGHT_BLOCK particles, relative to the largest of the block, with
+// their sum and that of their squares. The host combines blocks in float64 and in order, so equal
+// input gives equal bits. Cumulated weights never fall, which the search among them relies on:
+// every lane starts from the very sum that the lane before it ends with.
+
+#include "interface.h"
+
+layout(local_size_x = WEIGHT_LANES) in;
+
+layout(binding = 0) uniform samplerBuffer log_weights;  // two floats
+layout(std430, binding = 1) writeonly buffer Cumulative { float cumulative[]; };
+layout(std430, binding = 2) writeonly buffer Blocks { WeightBlock blocks[]; };
+layout(push_constant) uniform Push { uint particles; } push;
+
+const uint RUN = WEIGHT_BLOCK / WEIGHT_LANES;
+// Squares of smaller weights would be denormal, which CPUs take a hundred times longer for.
+const float LEAST_SQUARED = 1e-18;
+
+shared vec2 largest[WEIGHT_LANES];
+shared float sums[WEIGHT_LANES];
+shared float squares[WEIGHT_LANES];
+
+bool exceeds(const vec2 a, const vec2 b) { return a.x > b.x || (a.x == b.x && a.y > b.y); }
+
+float relative(const vec2 value, const vec2 reference) {
+  precise float difference = (value.x - reference.x) + (value.y - reference.y);
+  return exp(max(difference, NEGLIGIBLE));
+}
+
+void main() {
+  const uint lane = gl_LocalInvocationID.x;
+  const uint first = gl_WorkGroupID.x * WEIGHT_BLOCK + lane * RUN;
+  vec2 value[RUN];
+  vec2 most = vec2(0.0);
+  [[unroll]] for (uint i = 0; i < RUN; ++i) {
+    // A lane past the end repeats the last particle without counting it.
+    value[i] = texelFetch(log_weights, int(min(first + i, push.particles - 1))).xy;
+    most = i == 0 || exceeds(value[i], most) ? value[i] : most;
+  }
+  largest[lane] = most;
+  barrier();
+  for (uint reach = WEIGHT_LANES / 2; reach > 0; reach /= 2) {
+    if (lane < reach && exceeds(largest[lane + reach], largest[lane])) {
+      largest[lane] = largest[lane + reach];
+    }
+    barrier();
+  }
+  most = largest[0];
+
+  float running[RUN];
+  float sum = 0.0;
+  float square = 0.0;
+  [[unroll]] for (uint i = 0; i < RUN; ++i) {
+    const float weight = first + i < push.particles ? relative(value[i], most) : 0.0;
+    sum += weight;
+    square += weight > LEAST_SQUARED ? weight * weight : 0.0;
+    running[i] = sum;
+  }
+  sums[lane] = sum;
+  squares[lane] = square;
+  barrier();
+  float before = 0.0;
+  for (uint i = 0; i < lane; ++i) {
+    before += sums[i];
+  }
+  [[unroll]] for (uint i = 0; i < RUN; ++i) {
+    if (first + i < push.particles) {
+      cumulative[first + i] = before + running[i];
+    }
+  }
+  if (lane == WEIGHT_LANES - 1) {
+    float all_squares = 0.0;
+    for (uint i = 0; i < WEIGHT_LANES; ++i) {
+      all_squares += squares[i];
+    }
+    blocks[gl_WorkGroupID.x] = WeightBlock(most.x, most.y, before + sum, all_squares);
+  }
+}

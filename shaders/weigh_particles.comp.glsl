@@ -1,0 +1,116 @@
+#version 450
+#extension GL_GOOGLE_include_directive : require
+
+// Weighs particles by the log-likelihood of a touch (Eq. 7), one particle per invocation, each at a
+// pose and on a map of its own.
+//
+// In plain float32 the place of an element, some hundred cells from the map's corner, would be off
+// by 1e-5 cells and the weight by more than 1e-4 nats. Hence the coarse parts, whose products are
+// exact and whose whole cells can be taken off before anything is rounded.
+
+#include "interface.h"
+
+layout(local_size_x_id = 0) in;
+
+#include "contact_likelihood.glsl"
+#include "two_float.glsl"
+
+layout(binding = 0) uniform samplerBuffer maps;           // log odds, each with a border of prior
+layout(std430, binding = 1) readonly buffer Objects { ParticleMap objects[]; };
+layout(binding = 2) uniform samplerBuffer turns;          // CoarseAndFine: headings, then elements
+layout(binding = 3) uniform isamplerBuffer segments;      // Segment
+layout(binding = 4) uniform isamplerBuffer particles;     // Particle
+layout(std430, binding = 5) buffer LogWeights { vec2 log_weights[]; };  // two floats
+layout(push_constant) uniform Push { WeighPush push; };
+
+// 2 pi / HEADINGS as a number of few bits, of which multiples are exact, and the rest.
+const float HEADING_COARSE = 51471.0 / 2097152.0;
+const float HEADING_FINE = 4.07236297e-07;
+const float FARTHEST_CELLS = 16777216.0;
+
+// Cosine and sine of an angle in [-pi, pi], coarse and fine.
+vec4 direction(const float theta_rad) {
+  const float heading = floor(theta_rad * (1.0 / (HEADING_COARSE + HEADING_FINE)) + 0.5);
+  precise float exact_rest = theta_rad - heading * HEADING_COARSE;
+  const float rest = exact_rest - heading * HEADING_FINE;
+  const vec4 turn = texelFetch(turns, int(heading) & int(HEADINGS - 1));
+  const vec2 whole = turn.xy + turn.zw;
+  // |rest| < 0.013: the next terms are below 1e-12.
+  const float square = rest * rest;
+  const float sine = rest * (1.0 - square / 6.0);
+  const float versine = square * (0.5 - square / 24.0);
+  return vec4(turn.xy, turn.zw + vec2(-whole.y, whole.x) * sine - whole * versine);
+}
+
+// A coordinate relative to the region's centre, in cells of the map.
+Split in_cells(const float from_centre_mm, const ParticleMap object, const Split centre) {
+  const vec2 cells = two_float_product(from_centre_mm, object.cells_per_mm_high);
+  const float whole = floor(cells.x);
+  const float rest = (cells.x - whole) + (cells.y + from_centre_mm * object.cells_per_mm_low);
+  return Split(centre.cell + int(clamp(whole, -FARTHEST_CELLS, FARTHEST_CELLS)),
+               rest + centre.fraction);
+}
+
+// Bilinear in log odds, where an element meets the map. Outside of it both nodes are of the border
+// and hold the prior.
+float log_odds(const ParticleMap object, const Split x, const Split y, const vec4 turn,
+               const vec4 element) {
+  const vec2 coarse = vec2(turn.x * element.x - turn.y * element.y,
+                           turn.y * element.x + turn.x * element.y);
+  const vec2 whole_element = element.xy + element.zw;
+  const vec2 fine = vec2(turn.x * element.z - turn.y * element.w,
+                         turn.y * element.z + turn.x * element.w) +
+                    vec2(turn.z * whole_element.x - turn.w * whole_element.y,
+                         turn.w * whole_element.x + turn.z * whole_element.y);
+  const vec2 whole = floor(coarse);
+  const vec2 rest = (coarse - whole) + (fine + vec2(x.fraction, y.fraction));
+  const vec2 carried = floor(rest);
+  const vec2 f = rest - carried;
+  const ivec2 cell = ivec2(whole) + ivec2(carried) + ivec2(x.cell, y.cell);
+  const int column = clamp(cell.x, 0, object.width - 2);
+  const int row = clamp(cell.y, 0, object.height - 2);
+  const int node = object.first + row * object.width + column;
+  const float lower = texelFetch(maps, node).x;
+  const float upper = texelFetch(maps, node + object.width).x;
+  const float low = lower + (texelFetch(maps, node + 1).x - lower) * f.x;
+  const float high = upper + (texelFetch(maps, node + object.width + 1).x - upper) * f.x;
+  return low + (high - low) * f.y;
+}
+
+void main() {
+  const uint particle = gl_GlobalInvocationID.x;
+  if (particle >= push.particles) {
+    return;
+  }
+  const ivec4 state = texelFetch(particles, int(particle));
+  const ParticleMap object = objects[state.x];
+  const Split x = in_cells(intBitsToFloat(state.y), object, object.centre_x);
+  const Split y = in_cells(intBitsToFloat(state.z), object, object.centre_y);
+  const vec4 turn = direction(intBitsToFloat(state.w));
+  const int table = int(HEADINGS + object.scale * push.elements);
+
+  vec2 sum = push.fresh != 0 ? vec2(0.0) : log_weights[particle];
+  for (uint s = 0; s < push.segments; ++s) {
+    const ivec4 segment = texelFetch(segments, int(s));
+    const uint reading = uint(segment.z);
+    if (IN_LOGS) {
+      for (int k = segment.x; k < segment.y; ++k) {
+        const float l = log_odds(object, x, y, turn, texelFetch(turns, table + k));
+        sum = two_float_add(sum, log_likelihood(reading, l));
+      }
+    } else {
+      const ReadingRatio says = reading_ratio(reading);
+      for (int group = segment.x; group < segment.y; group += int(FACTORS_PER_LOG)) {
+        const int end = min(group + int(FACTORS_PER_LOG), segment.y);
+        float product = 1.0;
+        for (int k = group; k < end; ++k) {
+          const float l = log_odds(object, x, y, turn, texelFetch(turns, table + k));
+          const vec2 ratio = likelihood_ratio(says, l);
+          product *= ratio.x / ratio.y;
+        }
+        sum = two_float_add(sum, log(product));
+      }
+    }
+  }
+  log_weights[particle] = sum;
+}

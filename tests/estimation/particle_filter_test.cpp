@@ -1,0 +1,452 @@
+#include "palpate/particle_filter.hpp"
+
+#include <array>
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <numbers>
+#include <string>
+
+#include <gtest/gtest.h>
+#include <glm/vec3.hpp>
+
+#include "palpate/error.hpp"
+#include "synthetic.hpp"
+
+namespace palpate {
+namespace {
+
+constexpr double two_pi = 2.0 * std::numbers::pi;
+// What the method allows a log-likelihood to differ from float64, in nats per touch.
+constexpr double per_touch = 1e-4;
+
+std::vector<Hypothesis> three_objects() {
+  return {{random_map(31, 27, 0.5, 4.0, 81), 1.0},
+          {random_map(25, 25, 0.3, 4.0, 82), 2.0},
+          {random_map(14, 15, 1.0, 4.0, 83), 1.0}};
+}
+
+Recording says_nothing() {
+  Recording recording = random_recording(1, 36, 431);
+  recording.valid.assign(36, 0);
+  return recording;
+}
+
+std::vector<double> weights_of(const ParticleFilter& filter) {
+  std::vector<double> weights;
+  for (const ParticleFilter::Particle& particle : filter.particles()) {
+    weights.push_back(particle.weight);
+  }
+  return weights;
+}
+
+bool same_pose(const Pose& a, const Pose& b) {
+  return a.translation_mm == b.translation_mm && a.theta_rad == b.theta_rad;
+}
+
+bool same_bits(const ParticleFilter& a, const ParticleFilter& b) {
+  const auto particles_a = a.particles();
+  const auto particles_b = b.particles();
+  for (std::size_t i = 0; i < particles_a.size(); ++i) {
+    if (particles_a[i].object != particles_b[i].object ||
+        particles_a[i].weight != particles_b[i].weight ||
+        !same_pose(particles_a[i].T_object_robot, particles_b[i].T_object_robot)) {
+      return false;
+    }
+  }
+  return particles_a.size() == particles_b.size();
+}
+
+/// Largest difference in nats between the particles' weights and the reference's likelihoods of one
+/// touch at their poses, both relative to the mean, over every `stride`-th particle.
+double weight_error(const ParticleFilter& filter, const Touch& touch,
+                    const std::vector<Hypothesis>& objects, const ParticleOptions& options,
+                    std::size_t stride = 1) {
+  const ContactLikelihood model{.gamma = options.gamma,
+                                .prior = options.prior.value_or(objects.front().map.prior)};
+  std::vector<double> differences;
+  double mean = 0.0;
+  const std::vector<ParticleFilter::Particle> particles = filter.particles();
+  for (std::size_t i = 0; i < particles.size(); i += stride) {
+    const ParticleFilter::Particle& particle = particles[i];
+    const double expected = reference::log_likelihood(
+        touch, particle.T_object_robot, objects[particle.object].map, options.classifier, model);
+    differences.push_back(std::log(particle.weight) - expected);
+    mean += differences.back();
+  }
+  mean /= static_cast<double>(differences.size());
+  return largest_difference(differences, std::vector<double>(differences.size(), mean));
+}
+
+TEST(ParticleFilter, StartsUniformByPriorWeightAndReturnsToIt) {
+  const std::vector<Hypothesis> objects = three_objects();
+  ParticleOptions options{.particles = 4000,
+                          .region = {.x_mm = {-3.0, 5.0, 1},
+                                     .y_mm = {10.0, 12.0, 1},
+                                     .theta_rad = {1.0, 1.0 + std::numbers::pi, 1}}};
+  Device device = Device::open();
+  ParticleFilter filter(device, objects, options);
+  const ParticleFilter untouched(device, objects, options);
+  const Recording recording = random_recording(2, 36, 432);
+  for (const bool after_reset : {false, true}) {
+    EXPECT_TRUE(same_bits(filter, untouched)) << after_reset;
+    EXPECT_EQ(filter.effective_sample_size(), 4000.0);
+    const std::vector<double> identity = filter.estimate().identity;
+    EXPECT_NEAR(identity[0], 0.25, 1e-12) << "float64 sums";
+    EXPECT_NEAR(identity[1], 0.5, 1e-12);
+    glm::dvec3 sum{0.0};
+    for (const auto& [object, pose, weight] : filter.particles()) {
+      const glm::dvec3 place{pose.translation_mm, pose.theta_rad};
+      for (int axis = 0; axis < 3; ++axis) {
+        const Axis& range = axis == 0   ? options.region.x_mm
+                            : axis == 1 ? options.region.y_mm
+                                        : options.region.theta_rad;
+        EXPECT_GE(place[axis], range.lower - 1e-6) << "float32 about the centre";
+        EXPECT_LE(place[axis], range.upper + 1e-6);
+        sum[axis] += (place[axis] - range.lower) / (range.upper - range.lower) / 4000.0;
+      }
+      EXPECT_NEAR(weight, 1.0 / 4000.0, 1e-15);
+    }
+    for (int axis = 0; axis < 3; ++axis) {
+      // Five deviations of the mean of 4,000 uniform numbers.
+      EXPECT_NEAR(sum[axis], 0.5, 5.0 * std::sqrt(1.0 / 12.0 / 4000.0));
+    }
+    filter.update(all_touches(recording));
+    EXPECT_FALSE(same_bits(filter, untouched));
+    filter.reset();
+  }
+}
+
+TEST(ParticleFilter, WeighsAsTheReferenceDoesAtTheParticlesOwnPoses) {
+  const std::vector<Hypothesis> objects = three_objects();
+  Device device = Device::open();
+  // Around blocks of 64 and 1,024.
+  for (const int n : {1, 7, 63, 65, 1000, 1025, 5000}) {
+    const ParticleOptions options{.particles = n, .region = {}, .classifier = {}};
+    ParticleFilter filter(device, objects, options);
+    const Recording recording = random_recording(3, 36, 433);
+    for (std::size_t i = 0; i < recording.size(); ++i) {
+      filter.update(recording.touch(i));
+      EXPECT_LT(weight_error(filter, recording.touch(i), objects, options), per_touch)
+          << n << " particles, touch " << i;
+    }
+  }
+}
+
+TEST(ParticleFilter, WeighsAsTheReferenceDoesOnLargeMapsAndAlienCells) {
+  // 0.07 mm is no binary fraction, and 900 cells make float32 coordinates coarse.
+  const std::vector<Hypothesis> objects = {{random_map(900, 700, 0.07, 4.0, 84), 1.0}};
+  const ParticleOptions options{.particles = 3000, .region = {}, .classifier = {}};
+  Device device = Device::open();
+  ParticleFilter filter(device, objects, options);
+  const Recording recording = random_recording(1, 36, 434);
+  filter.update(recording.touch(0));
+  EXPECT_LT(weight_error(filter, recording.touch(0), objects, options), per_touch);
+}
+
+TEST(ParticleFilter, WeighsAsTheReferenceDoesWithoutAFloorAndWithManyElements) {
+  std::vector<Hypothesis> objects = three_objects();
+  const Recording recording = random_recording(1, 10'000, 435);
+  Device device = Device::open();
+  for (const double gamma : {0.0, 0.1}) {
+    const ParticleOptions options{.particles = 65, .region = {}, .classifier = {}, .gamma = gamma};
+    ParticleFilter filter(device, objects, options);
+    filter.update(recording.touch(0));
+    // Weights below exp(-745) are 0 in float64: compare what is left, at least the largest.
+    const auto particles = filter.particles();
+    const ContactLikelihood model{.gamma = gamma, .prior = 0.2};
+    std::vector<double> expected;
+    double most = -std::numeric_limits<double>::infinity();
+    for (const auto& particle : particles) {
+      expected.push_back(reference::log_likelihood(recording.touch(0), particle.T_object_robot,
+                                                   objects[particle.object].map, {}, model));
+      most = std::max(most, expected.back());
+    }
+    double total = 0.0;
+    for (double& l : expected) {
+      l = std::exp(l - most);
+      total += l;
+    }
+    for (double& l : expected) {
+      l /= total;
+    }
+    // 277 touches' worth of elements, and a probability changes by at most the error in nats.
+    EXPECT_LT(largest_difference(weights_of(filter), expected), 277 * per_touch) << gamma;
+  }
+}
+
+TEST(ParticleFilter, KeepsItsPrecisionFarFromTheRobotsOrigin) {
+  const std::vector<Hypothesis> objects = three_objects();
+  ParticleOptions options{.particles = 1000, .region = {}, .classifier = {}};
+  const Recording recording = random_recording(2, 36, 436);
+  Device device = Device::open();
+  ParticleFilter near(device, objects, options);
+  near.update(all_touches(recording));
+
+  const glm::dvec2 far_mm{1.2e6, -3.4e5};
+  const Recording shifted = moved(recording, {far_mm, 0.0});
+  options.region.pivot_mm = far_mm;
+  ParticleFilter far(device, objects, options);
+  far.update(all_touches(shifted));
+  // 1 km away a float64 is good to 1e-10 mm, which may round float32 elements otherwise: a touch
+  // differs by what the device may, and by the same draws.
+  EXPECT_LT(largest_difference(weights_of(near), weights_of(far)), 2.0 * per_touch);
+  EXPECT_LT(weight_error(far, shifted.touch(1), objects, options), per_touch);
+  const Estimate here = near.estimate();
+  const Estimate there = far.estimate();
+  EXPECT_LT(largest_difference(here.identity, there.identity), 2.0 * per_touch);
+  const glm::dvec2 p_mm{3.0, 4.0};
+  EXPECT_NEAR((here.mode.T_object_robot * p_mm).x, (there.mode.T_object_robot * (p_mm + far_mm)).x,
+              1e-6)
+      << "the same grid point, in float64";
+}
+
+TEST(ParticleFilter, MovesByNormalNoiseOfTheGivenDeviations) {
+  constexpr int n = 200'000;
+  ParticleOptions options{
+      .particles = n,
+      .region = {.x_mm = {2.0, 2.0, 1}, .y_mm = {0.0, 0.0, 1}, .theta_rad = {3.0, 3.0, 1}},
+      .classifier = {}};
+  options.motion_mm = 1.5;
+  options.motion_rad = 0.2;
+  Device device = Device::open();
+  ParticleFilter filter(device, three_objects(), options);
+  const Recording nothing = says_nothing();
+  filter.update(nothing.touch(0));
+  // Moments 1 to 4 of three standard normal numbers, and their products.
+  std::array<std::array<double, 4>, 3> moment{};
+  glm::dvec3 product{0.0};
+  int beyond = 0;
+  for (const auto& [object, pose, weight] : filter.particles()) {
+    const glm::dvec3 z{(pose.translation_mm.x - 2.0) / 1.5, pose.translation_mm.y / 1.5,
+                       wrap_angle(pose.theta_rad - 3.0, two_pi) / 0.2};
+    for (int axis = 0; axis < 3; ++axis) {
+      for (int power = 1; power <= 4; ++power) {
+        moment[axis][power - 1] += std::pow(z[axis], power) / n;
+      }
+      beyond += std::abs(z[axis]) > 3.0 ? 1 : 0;
+    }
+    product += glm::dvec3{z.x * z.y, z.y * z.z, z.z * z.x} / static_cast<double>(n);
+  }
+  // Five deviations of each moment's mean: the variance of z^k is E z^2k - (E z^k)^2.
+  const double unit = 5.0 / std::sqrt(n);
+  for (int axis = 0; axis < 3; ++axis) {
+    EXPECT_NEAR(moment[axis][0], 0.0, unit);
+    EXPECT_NEAR(moment[axis][1], 1.0, unit * std::sqrt(2.0));
+    EXPECT_NEAR(moment[axis][2], 0.0, unit * std::sqrt(15.0));
+    EXPECT_NEAR(moment[axis][3], 3.0, unit * std::sqrt(96.0));
+    EXPECT_NEAR(product[axis], 0.0, unit);
+  }
+  // 0.0027 of them lie beyond three deviations.
+  const double expected = 0.0026998 * 3 * n;
+  EXPECT_NEAR(beyond, expected, 5.0 * std::sqrt(expected));
+
+  // Two steps have twice the variance, so the second is independent of the first.
+  filter.update(nothing.touch(0));
+  double square = 0.0;
+  for (const auto& particle : filter.particles()) {
+    square += std::pow(particle.T_object_robot.translation_mm.y / 1.5, 2) / n;
+  }
+  EXPECT_NEAR(square, 2.0, 2.0 * unit * std::sqrt(2.0));
+}
+
+TEST(ParticleFilter, ATouchThatSaysNothingMovesButWeighsNothing) {
+  Device device = Device::open();
+  ParticleFilter filter(device, three_objects(),
+                        {.particles = 1000, .region = {}, .classifier = {}});
+  const Recording recording = random_recording(1, 36, 437);
+  const Recording nothing = says_nothing();
+  for (const bool touched : {false, true}) {
+    if (touched) {
+      filter.update(recording.touch(0));
+    }
+    const auto before = filter.particles();
+    const double effective = filter.effective_sample_size();
+    filter.update(nothing.touch(0));
+    const auto after = filter.particles();
+    for (std::size_t i = 0; i < before.size(); ++i) {
+      EXPECT_EQ(after[i].weight, before[i].weight);
+      EXPECT_EQ(after[i].object, before[i].object);
+      EXPECT_FALSE(same_pose(after[i].T_object_robot, before[i].T_object_robot));
+    }
+    EXPECT_EQ(filter.effective_sample_size(), effective);
+  }
+}
+
+TEST(ParticleFilter, TheSeedDecidesEveryBit) {
+  const Recording recording = random_recording(4, 36, 438);
+  Device device = Device::open();
+  for (const Resampling resampling : {Resampling::multinomial, Resampling::systematic}) {
+    ParticleOptions options{.particles = 3000, .region = {}, .classifier = {}};
+    options.resampling = resampling;
+    options.augmented = true;
+    options.seed = 0x1234'5678'9ABC;
+    ParticleFilter first(device, three_objects(), options);
+    ParticleFilter second(device, three_objects(), options);
+    options.seed += std::uint64_t{1} << 32;
+    ParticleFilter other(device, three_objects(), options);
+    EXPECT_FALSE(same_bits(first, other)) << "the upper half of the seed counts";
+    first.update(all_touches(recording));
+    for (std::size_t i = 0; i < recording.size(); ++i) {
+      second.update(recording.touch(i));
+      (void)second.estimate();
+    }
+    EXPECT_TRUE(same_bits(first, second)) << "neither batches nor looking at it change a run";
+    first.reset();
+    first.update(all_touches(recording));
+    EXPECT_TRUE(same_bits(first, second));
+  }
+}
+
+TEST(ParticleFilter, TheEffectiveSampleSizeIsThatOfTheWeights) {
+  Device device = Device::open();
+  const Recording recording = random_recording(3, 36, 439);
+  for (const int n : {1, 65, 5000}) {
+    ParticleFilter filter(device, three_objects(),
+                          {.particles = n, .region = {}, .classifier = {}});
+    for (std::size_t i = 0; i < recording.size(); ++i) {
+      filter.update(recording.touch(i));
+      double squares = 0.0;
+      for (const double weight : weights_of(filter)) {
+        squares += weight * weight;
+      }
+      // Float32 sums within blocks.
+      EXPECT_NEAR(filter.effective_sample_size(), 1.0 / squares, 1e-5 / squares);
+    }
+    EXPECT_GE(filter.effective_sample_size(), 1.0);
+    EXPECT_LE(filter.effective_sample_size(), n);
+  }
+}
+
+TEST(ParticleFilter, WeightsSumToOneHoweverUnlikelyTheTouch) {
+  // Without a floor, these log odds cost a touch some 1e4 nats.
+  std::vector<Hypothesis> objects = {{random_map(200, 200, 0.5, 1.0, 85), 1.0}};
+  for (float& l : objects[0].map.log_odds) {
+    l = -1000.0F;
+  }
+  Device device = Device::open();
+  ParticleOptions options{.particles = 2000, .region = {}, .classifier = {}, .gamma = 0.0};
+  options.augmented = true;
+  ParticleFilter filter(device, objects, options);
+  const Recording recording = random_recording(3, 36, 440);
+  for (std::size_t i = 0; i < recording.size(); ++i) {
+    filter.update(recording.touch(i));
+    double total = 0.0;
+    for (const double weight : weights_of(filter)) {
+      total += weight;
+    }
+    EXPECT_NEAR(total, 1.0, 1e-12) << "float64 sums";
+    EXPECT_NEAR(filter.effective_sample_size(), 2000.0, 0.1) << "all are as unlikely";
+    EXPECT_TRUE(std::isfinite(filter.estimate().mode.log_likelihood));
+  }
+}
+
+TEST(ParticleFilter, NoneOfTheseCompetesByThePriorAlone) {
+  std::vector<Hypothesis> objects = three_objects();
+  ParticleOptions options{.particles = 40'000, .region = {}, .classifier = {}};
+  options.motion_mm = 0.0;
+  options.motion_rad = 0.0;
+  options.none_weight = 4.0;
+  Device device = Device::open();
+  ParticleFilter filter(device, objects, options);
+  EXPECT_NEAR(filter.estimate().none, 0.5, 1e-12) << "its weight against 1 + 2 + 1";
+  const Recording recording = random_recording(1, 5, 441);
+  const Touch touch = recording.touch(0);
+  filter.update(touch);
+
+  // Every other particle's weight against that of none must be the reference's ratio.
+  const ContactLikelihood model{.gamma = 0.1, .prior = 0.2};
+  double none_likelihood = 0.0;
+  for (const ElementReading& element : known_readings(touch, {})) {
+    none_likelihood += model.log_likelihood(element.reading, log_odds_from_probability(0.2));
+  }
+  double none_weight = 0.0;
+  std::vector<double> identity(3);
+  double none = 0.0;
+  const auto particles = filter.particles();
+  for (const auto& particle : particles) {
+    if (particle.object == 3) {
+      none_weight = particle.weight;
+      none += particle.weight;
+    }
+  }
+  for (const auto& particle : particles) {
+    if (particle.object == 3) {
+      EXPECT_EQ(particle.weight, none_weight);
+      continue;
+    }
+    identity[particle.object] += particle.weight;
+    const double expected = reference::log_likelihood(touch, particle.T_object_robot,
+                                                      objects[particle.object].map, {}, model);
+    EXPECT_NEAR(std::log(particle.weight / none_weight), expected - none_likelihood, per_touch);
+  }
+  const Estimate estimate = filter.estimate();
+  EXPECT_NEAR(estimate.none, none, 1e-12) << "float64 sums";
+  EXPECT_LT(largest_difference(estimate.identity, identity), 1e-12);
+  EXPECT_LT(estimate.mode.object, 3);
+}
+
+TEST(ParticleFilter, AModeThatNoParticleSupportsHasNoDensity) {
+  ParticleOptions options{.particles = 1, .region = {}, .classifier = {}};
+  options.none_weight = 1e9;
+  Device device = Device::open();
+  const Estimate estimate = ParticleFilter(device, three_objects(), options).estimate();
+  EXPECT_EQ(estimate.none, 1.0);
+  EXPECT_EQ(estimate.mode.object, 0);
+  EXPECT_EQ(estimate.mode.log_likelihood, -std::numeric_limits<double>::infinity());
+}
+
+TEST(ParticleFilter, RunsWithAMillionParticles) {
+  const std::vector<Hypothesis> objects = three_objects();
+  const ParticleOptions options{.particles = 1'000'000, .region = {}, .classifier = {}};
+  Device device = Device::open();
+  ParticleFilter filter(device, objects, options);
+  const Recording recording = random_recording(2, 12, 442);
+  filter.update(all_touches(recording));
+  EXPECT_GT(filter.effective_sample_size(), 1000.0);
+  const Estimate estimate = filter.estimate();
+  double total = 0.0;
+  for (const double p : estimate.identity) {
+    total += p;
+  }
+  EXPECT_NEAR(total, 1.0, 1e-9) << "float64 sums of a million";
+  EXPECT_TRUE(std::isfinite(estimate.mode.log_likelihood));
+  EXPECT_LT(weight_error(filter, recording.touch(1), objects, options, 101), per_touch);
+}
+
+TEST(ParticleFilter, OptionsOutOfRangeAreRefused) {
+  constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+  Device device = Device::open();
+  const auto refuse = [&](const std::function<void(ParticleOptions&)>& change,
+                          const std::string& says) {
+    ParticleOptions options;
+    change(options);
+    try {
+      const ParticleFilter filter(device, three_objects(), options);
+      ADD_FAILURE() << "accepted, though " << says << " is wrong";
+    } catch (const Error& error) {
+      const std::string message = error.what();
+      EXPECT_EQ(error.fault(), Fault::input) << message;
+      EXPECT_NE(message.find(says), std::string::npos) << message;
+    }
+  };
+  for (const int n : {0, -1, 1'000'001}) {
+    refuse([&](ParticleOptions& o) { o.particles = n; }, "particles = ");
+  }
+  for (const double deviation : {-1.0, nan, 1e9}) {
+    refuse([&](ParticleOptions& o) { o.motion_mm = deviation; }, "motion_mm = ");
+    refuse([&](ParticleOptions& o) { o.motion_rad = deviation; }, "motion_rad = ");
+  }
+  for (const double rate : {-0.1, 0.0, 0.5, nan}) {
+    refuse([&](ParticleOptions& o) { o.alpha_slow = rate; }, "alpha_slow = ");
+  }
+  refuse([](ParticleOptions& o) { o.alpha_fast = 1.1; }, "alpha_fast = ");
+  refuse([](ParticleOptions& o) { o.none_weight = 0.0; }, "none_weight = ");
+  refuse([](ParticleOptions& o) { o.gamma = 1.0; }, "gamma = ");
+  refuse([](ParticleOptions& o) { o.prior = 0.0; }, "prior = ");
+  refuse([](ParticleOptions& o) { o.region.y_mm = {0.0, 2e5, 1}; }, "region y_mm = ");
+  refuse([](ParticleOptions& o) { o.region.x_mm = {1.0, -1.0, 1}; }, "x_mm = ");
+}
+
+}  // namespace
+}  // namespace palpate

@@ -1,0 +1,158 @@
+#include "parzen_mode.hpp"
+
+#include <cmath>
+#include <numbers>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "palpate/pose.hpp"
+#include "synthetic.hpp"
+
+namespace palpate {
+namespace {
+
+constexpr double two_pi = 2.0 * std::numbers::pi;
+
+struct Cloud {
+  std::vector<shaders::Particle> particles;
+  std::vector<double> weights;
+};
+
+/// Particles spread over [-extent, extent] mm and rad (at most pi), of random weights that sum
+/// to 1.
+Cloud random_cloud(std::size_t n, std::uint32_t objects, double extent, std::uint64_t seed) {
+  Uniform random(seed);
+  Cloud cloud;
+  double total = 0.0;
+  const double most_rad = std::min(extent, std::numbers::pi);
+  for (std::size_t i = 0; i < n; ++i) {
+    cloud.particles.push_back({.object = static_cast<std::uint32_t>(random(0.0, objects)),
+                               .x_mm = static_cast<float>(random(-extent, extent)),
+                               .y_mm = static_cast<float>(random(-extent, extent)),
+                               .theta_rad = static_cast<float>(random(-most_rad, most_rad))});
+    cloud.weights.push_back(std::exp(random(-3.0, 0.0)));
+    total += cloud.weights.back();
+  }
+  for (double& weight : cloud.weights) {
+    weight /= total;
+  }
+  return cloud;
+}
+
+/// Eq. 10 and 11 as they stand.
+double density(const Cloud& cloud, std::uint32_t object, double x_mm, double y_mm,
+               double theta_rad) {
+  double sum = 0.0;
+  for (std::size_t i = 0; i < cloud.particles.size(); ++i) {
+    const auto& [of, x, y, theta] = cloud.particles[i];
+    const double dtheta = std::remainder(theta - theta_rad, two_pi);
+    const double d = std::hypot(x - x_mm, y - y_mm, dtheta);
+    sum += of == object ? cloud.weights[i] * std::max(0.0, 1.0 - d) : 0.0;
+  }
+  return sum;
+}
+
+/// The largest density over the whole grid, Eq. 12.
+double largest_density(const Cloud& cloud, std::uint32_t objects, double extent) {
+  const int cells = static_cast<int>(std::ceil(extent / 0.5)) + 2;
+  double most = 0.0;
+  for (std::uint32_t object = 0; object < objects; ++object) {
+    for (int k = 0; k < 50; ++k) {
+      for (int j = -cells; j <= cells; ++j) {
+        for (int i = -cells; i <= cells; ++i) {
+          most =
+              std::max(most, density(cloud, object, 0.5 * i, 0.5 * j, 0.04 * std::numbers::pi * k));
+        }
+      }
+    }
+  }
+  return most;
+}
+
+std::optional<ParzenMaximum> find(const Cloud& cloud, std::uint32_t objects) {
+  Device device = Device::open();
+  gpu::CommandStream stream(device.context());
+  return ParzenMode(device.context(), stream).find(cloud.particles, cloud.weights, objects);
+}
+
+void expect_on_grid(double value, double step) {
+  EXPECT_NEAR(value / step, std::round(value / step), 1e-9) << "float64 rounding";
+}
+
+TEST(ParzenMode, IsThePlainMaximumOverTheGrid) {
+  // Dense, so that one tile takes several units' worth of lists, and sparse.
+  for (const auto& [n, extent] :
+       {std::pair{std::size_t{1}, 2.0}, std::pair{std::size_t{7}, 1.0},
+        std::pair{std::size_t{65}, 4.0}, std::pair{std::size_t{300}, 2.0}}) {
+    for (const std::uint64_t seed : {421U, 422U, 423U}) {
+      const Cloud cloud = random_cloud(n, 2, extent, seed);
+      const auto maximum = find(cloud, 2);
+      ASSERT_TRUE(maximum);
+      const double expected = largest_density(cloud, 2, extent);
+      // Points are compared by float32 sums of so many terms; the answer's density is in float64,
+      // of weights that were rounded to float32.
+      EXPECT_NEAR(maximum->density, expected, 1e-5 * expected) << n << ", seed " << seed;
+      EXPECT_NEAR(density(cloud, maximum->object, maximum->x_mm, maximum->y_mm, maximum->theta_rad),
+                  maximum->density, 1e-6 * expected);
+      expect_on_grid(maximum->x_mm, 0.5);
+      expect_on_grid(maximum->y_mm, 0.5);
+      expect_on_grid(maximum->theta_rad, 0.04 * std::numbers::pi);
+    }
+  }
+}
+
+TEST(ParzenMode, ReachesAcrossTheCutOfTheCircleAndBetweenTiles) {
+  // Pairs that only a point between them sees both of, on either side of where tiles and turns
+  // meet.
+  const auto pi = static_cast<float>(std::numbers::pi);
+  for (const auto& [x, y, theta] :
+       {std::array{0.0F, 0.0F, pi}, std::array{2.0F, -2.0F, 0.0F}, std::array{-4.0F, 6.0F, 1.2566F},
+        std::array{-0.5F, -0.5F, -1.2566F}}) {
+    Cloud cloud;
+    for (const float side : {-0.4F, 0.4F}) {
+      float turned = theta + side;
+      turned = turned >= pi ? turned - 2.0F * pi : turned;
+      cloud.particles.push_back(
+          {.object = 0, .x_mm = x + side, .y_mm = y + side, .theta_rad = turned});
+      cloud.weights.push_back(0.5);
+    }
+    const auto maximum = find(cloud, 1);
+    ASSERT_TRUE(maximum);
+    const double expected = largest_density(cloud, 1, 8.0);
+    EXPECT_NEAR(maximum->density, expected, 1e-5 * expected) << x << ", " << y << ", " << theta;
+  }
+}
+
+TEST(ParzenMode, OfManyParticlesInOnePlaceIsTheirWeight) {
+  // More than one unit takes, and more than one loop may.
+  constexpr std::size_t n = 100'000;
+  const Cloud cloud{std::vector<shaders::Particle>(
+                        n, {.object = 3, .x_mm = 1.5F, .y_mm = -2.0F, .theta_rad = 0.0F}),
+                    std::vector<double>(n, 1.0 / n)};
+  const auto maximum = find(cloud, 4);
+  ASSERT_TRUE(maximum);
+  EXPECT_EQ(maximum->object, 3U);
+  EXPECT_EQ(maximum->x_mm, 1.5);
+  EXPECT_EQ(maximum->y_mm, -2.0);
+  EXPECT_EQ(maximum->theta_rad, 0.0);
+  EXPECT_NEAR(maximum->density, 1.0, 1e-9) << "float64 rounding";
+}
+
+TEST(ParzenMode, IsNeverOfAnObjectThatIsNotAsked) {
+  Cloud cloud = random_cloud(50, 2, 2.0, 424);
+  double weight = 0.0;
+  for (std::size_t i = 0; i < 50; ++i) {
+    cloud.weights[i] *= cloud.particles[i].object == 1 ? 1e6 : 1.0;
+    weight += cloud.weights[i];
+  }
+  ASSERT_EQ(find(cloud, 2)->object, 1U);
+  const auto first = find(cloud, 1);
+  ASSERT_TRUE(first);
+  EXPECT_EQ(first->object, 0U);
+  EXPECT_NEAR(first->density, largest_density(cloud, 1, 2.0), 1e-5 * first->density);
+  EXPECT_FALSE(find(cloud, 0));
+}
+
+}  // namespace
+}  // namespace palpate
