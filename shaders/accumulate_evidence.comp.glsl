@@ -9,10 +9,11 @@
 
 #include "interface.h"
 
-layout(local_size_x = TILE_CELLS / BLOCK_CELLS, local_size_y = TILE_CELLS / BLOCK_CELLS) in;
+layout(local_size_x_id = 0, local_size_y_id = 1) in;  // TILE_CELLS / BLOCK_CELLS each
 
-layout(constant_id = 0) const float PEAK = 0.9;
-layout(constant_id = 1) const float INVERSE_TWICE_VARIANCE = 2.0;  // 1 / (2 spread^2), per mm^2
+layout(constant_id = 2) const int BLOCK_CELLS = 4;
+layout(constant_id = 3) const float PEAK = 0.9;
+layout(constant_id = 4) const float INVERSE_TWICE_VARIANCE = 2.0;  // 1 / (2 spread^2), per mm^2
 
 #include "two_float.glsl"
 

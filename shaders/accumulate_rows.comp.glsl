@@ -9,7 +9,7 @@
 #include "interface.h"
 
 layout(local_size_x_id = 0) in;
-layout(constant_id = 4) const uint TILE_X = 5;
+layout(constant_id = 5) const uint TILE_X = 5;
 
 #include "contact_likelihood.glsl"
 #include "likelihood_buffers.glsl"
@@ -60,7 +60,9 @@ void main() {
 
   vec2 sum[TILE_X];
   float product[TILE_X];
-  FOR_EACH_BIN { sum[i] = vec2(0.0); }
+  // The belief's own sum goes on, so that it does not matter which touches share a dispatch.
+  const uint bin = (theta * push.rows + y) * push.nx + x;
+  FOR_EACH_BIN { sum[i] = x + i < push.nx ? belief[bin + i] : vec2(0.0); }
   for (uint s = 0; s < push.segments; ++s) {
     const ivec4 segment = texelFetch(segments, int(s));
     const uint reading = uint(segment.z);
@@ -90,8 +92,7 @@ void main() {
 
   FOR_EACH_BIN {
     if (x + i < push.nx) {
-      const uint bin = (theta * push.rows + y) * push.nx + x + i;
-      belief[bin] = two_float_sum(belief[bin], sum[i]);
+      belief[bin + i] = sum[i];
     }
   }
 }

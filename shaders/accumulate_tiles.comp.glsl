@@ -9,10 +9,10 @@
 #include "interface.h"
 
 layout(local_size_x_id = 0) in;
-layout(constant_id = 4) const uint TILE_X = 5;
-layout(constant_id = 5) const uint TILE_Y = 5;
-layout(constant_id = 6) const float STEP_X = 0.2;  // between bins, in cells
-layout(constant_id = 7) const float STEP_Y = 0.2;
+layout(constant_id = 5) const uint TILE_X = 5;
+layout(constant_id = 6) const uint TILE_Y = 5;
+layout(constant_id = 7) const float STEP_X = 0.2;  // between bins, in cells
+layout(constant_id = 8) const float STEP_Y = 0.2;
 
 #include "contact_likelihood.glsl"
 #include "likelihood_buffers.glsl"
@@ -75,7 +75,11 @@ void main() {
   float product[TILE_Y][TILE_X];
   float numerator[TILE_Y][TILE_X];
   float denominator[TILE_Y][TILE_X];
-  FOR_EACH_BIN { sum[j][i] = vec2(0.0); }
+  // The belief's own sum goes on, so that it does not matter which touches share a dispatch.
+  const uint bin = (theta * push.rows + y) * push.nx + x;
+  FOR_EACH_BIN {
+    sum[j][i] = x + i < push.nx && y + j < push.rows ? belief[bin + j * push.nx + i] : vec2(0.0);
+  }
 
   for (uint s = 0; s < push.segments; ++s) {
     const ivec4 segment = texelFetch(segments, int(s));
@@ -115,8 +119,7 @@ void main() {
 
   FOR_EACH_BIN {
     if (x + i < push.nx && y + j < push.rows) {
-      const uint bin = (theta * push.rows + y + j) * push.nx + x + i;
-      belief[bin] = two_float_sum(belief[bin], sum[j][i]);
+      belief[bin + j * push.nx + i] = sum[j][i];
     }
   }
 }

@@ -24,27 +24,18 @@ const int MAP_BORDER = 3;
 const uint FACTORS_PER_LOG = 8;
 const uint FACTORS_PER_DIVISION = 4;
 
-// Edge of the square tile of map cells that one workgroup of accumulate_evidence fills, and of the
-// block of them that one invocation holds in registers.
+// Edge of the square tile of map cells that one workgroup of accumulate_evidence fills: small, for
+// few readings that reach none of its cells, and large, for few lists that a reading stands in.
 const int TILE_CELLS = 16;
-const int BLOCK_CELLS = 4;
 
 // Nats below the largest at which a bin no longer counts: sums of 1e9 such bins are below float32,
 // and an exponential that is not denormal, which costs CPUs a hundred times as much, takes its
 // place.
 const float NEGLIGIBLE = -80.0;
 
-// Lanes that read side by side, each group of them from a part of memory of its own: on a CPU they
-// are one vector, which runs ahead of the others, and on a GPU they fill a cache line.
-const uint SIDE_BY_SIDE = 8;
-
-// Bins that one workgroup of reduce_belief covers.
-const uint REDUCE_BINS = 16384;
-
-// (x, y) indices and thetas that one workgroup of sum_marginals covers.
-const uint MARGINAL_WORKGROUP = 64;
-const uint MARGINAL_PLANE = 2048;
-const uint MARGINAL_THETAS = 64;
+// Texels that a lane of reduce_belief takes at a time, for one new maximum and one rescaling of the
+// sum.
+const uint REDUCE_BATCH = 4;
 
 // Increments above 2 atanh(SERIES_REACH) take a logarithm, smaller ones a series.
 const float SERIES_REACH = 0.2;

@@ -2,23 +2,22 @@
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_control_flow_attributes : require
 
-// The largest log-likelihood of every REDUCE_BINS bins, its first index, and the sum of
+// The largest log-likelihood of the bins of every workgroup, its first index, and the sum of
 // exp(log-likelihood - max) over them (Eq. 14, 15), in one pass: the sum is kept relative to the
 // largest value so far. The host combines the partial results in float64 and in order, so equal
 // input gives equal bits.
 
 #include "interface.h"
 
-layout(local_size_x_id = 0) in;
+layout(local_size_x_id = 0) in;  // a power of two
+layout(constant_id = 1) const uint SIDE_BY_SIDE = 8;      // lanes that read one stretch of memory
+layout(constant_id = 2) const uint TEXELS_PER_LANE = 128;  // a multiple of REDUCE_BATCH
 
 // Two bins a texel, which halves the fetches. Their two floats are normalised:
 // |low| <= ulp(high) / 2.
 layout(binding = 0) uniform samplerBuffer belief;
 layout(std430, binding = 1) writeonly buffer Partials { Partial partials[]; };
 layout(push_constant) uniform Push { ReducePush push; };
-
-// Texels that a lane takes at a time, for one new maximum and one rescaling of the sum.
-const uint BATCH = 4;
 
 shared vec2 best_value[gl_WorkGroupSize.x];
 shared uint best_index[gl_WorkGroupSize.x];
@@ -34,22 +33,23 @@ float relative(const vec2 value, const vec2 reference) {
 void main() {
   const uint lane = gl_LocalInvocationID.x;
   const uint lanes = gl_WorkGroupSize.x;
-  const uint begin = gl_WorkGroupID.x * REDUCE_BINS;
-  const uint end = min(begin + REDUCE_BINS, push.bins);
+  const uint bins = 2 * lanes * TEXELS_PER_LANE;
+  const uint begin = gl_WorkGroupID.x * bins;
+  const uint end = min(begin + bins, push.bins);
 
   // A lane past the end repeats the last bin without counting it, which changes no result.
   const uint last = (end - 1) / 2;
-  const uint per_lane = REDUCE_BINS / 2 / lanes;
   const uint first =
-      begin / 2 + lane / SIDE_BY_SIDE * SIDE_BY_SIDE * per_lane + lane % SIDE_BY_SIDE;
+      begin / 2 + lane / SIDE_BY_SIDE * SIDE_BY_SIDE * TEXELS_PER_LANE + lane % SIDE_BY_SIDE;
   uint index = min(2 * first, end - 1);
   const vec4 first_pair = texelFetch(belief, int(index / 2));
   vec2 best = index % 2 == 0 ? first_pair.xy : first_pair.zw;
   float sum = 0.0;
-  for (uint i = first; i < first + SIDE_BY_SIDE * per_lane; i += SIDE_BY_SIDE * BATCH) {
-    vec2 value[2 * BATCH];
+  const uint past = first + SIDE_BY_SIDE * TEXELS_PER_LANE;
+  for (uint i = first; i < past; i += SIDE_BY_SIDE * REDUCE_BATCH) {
+    vec2 value[2 * REDUCE_BATCH];
     const vec2 before = best;
-    [[unroll]] for (uint b = 0; b < BATCH; ++b) {
+    [[unroll]] for (uint b = 0; b < REDUCE_BATCH; ++b) {
       const vec4 pair = texelFetch(belief, int(min(i + b * SIDE_BY_SIDE, last)));
       value[2 * b] = pair.xy;
       value[2 * b + 1] = pair.zw;
@@ -61,7 +61,7 @@ void main() {
       }
     }
     sum *= relative(before, best);
-    [[unroll]] for (uint b = 0; b < 2 * BATCH; ++b) {
+    [[unroll]] for (uint b = 0; b < 2 * REDUCE_BATCH; ++b) {
       const uint at = 2 * (i + b / 2 * SIDE_BY_SIDE) + b % 2;
       sum += at < end ? relative(value[b], best) : 0.0;
     }

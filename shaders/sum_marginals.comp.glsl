@@ -3,24 +3,26 @@
 #extension GL_EXT_control_flow_attributes : require
 
 // Sums a slab's probabilities, relative to exp(max), over theta and over (x, y) in one pass. A
-// workgroup takes MARGINAL_PLANE (x, y) indices and MARGINAL_THETAS thetas and writes its parts of
-// both sums, which the host adds in order.
+// workgroup takes a block of (x, y) indices and a chunk of thetas and writes its parts of both sums,
+// which the host adds in order.
 
 #include "interface.h"
 
-layout(local_size_x = MARGINAL_WORKGROUP) in;
+layout(local_size_x_id = 0) in;
+layout(constant_id = 1) const uint SIDE_BY_SIDE = 8;  // lanes that read one stretch of memory
+layout(constant_id = 2) const uint PAIRS_PER_LANE = 16;
+layout(constant_id = 3) const uint THETAS = 64;  // at most the workgroup's lanes
+// Where planes have an even number of bins, every pair of bins of a plane is one texel.
+layout(constant_id = 4) const bool EVEN_PLANES = false;
 
 layout(binding = 0) uniform samplerBuffer belief;  // two bins a texel
 layout(std430, binding = 1) writeonly buffer OverTheta { float over_theta[]; };  // [chunk, plane]
 layout(std430, binding = 2) writeonly buffer OverPlane { float over_plane[]; };  // [block, theta]
 layout(push_constant) uniform Push { MarginalPush push; };
 
-// Where planes have an even number of bins, every pair of bins of a plane is one texel.
-layout(constant_id = 0) const bool EVEN_PLANES = false;
-
-const uint PAIRS_PER_LANE = MARGINAL_PLANE / MARGINAL_WORKGROUP / 2;
-
-shared float parts[MARGINAL_THETAS][MARGINAL_WORKGROUP];
+// [theta, lane]. One word more a row: lanes that sum a row each would all meet in one bank.
+const uint ROW = gl_WorkGroupSize.x + 1;
+shared float parts[THETAS * ROW];
 
 // Two bins from this one on.
 vec4 fetch_pair(const uint bin, const uint last) {
@@ -41,10 +43,10 @@ void main() {
   const uint lane = gl_LocalInvocationID.x;
   const uint block = gl_WorkGroupID.x;
   const uint chunk = gl_WorkGroupID.y;
-  const uint first = block * MARGINAL_PLANE +
+  const uint first = block * 2 * gl_WorkGroupSize.x * PAIRS_PER_LANE +
                      2 * (lane / SIDE_BY_SIDE * SIDE_BY_SIDE * PAIRS_PER_LANE + lane % SIDE_BY_SIDE);
-  const uint theta = chunk * MARGINAL_THETAS;
-  const uint thetas = min(MARGINAL_THETAS, push.thetas - theta);
+  const uint theta = chunk * THETAS;
+  const uint thetas = min(THETAS, push.thetas - theta);
   const uint last = push.thetas * push.plane - 1;
 
   vec2 sum[PAIRS_PER_LANE];
@@ -61,7 +63,7 @@ void main() {
       sum[i] += probability;
       part += probability.x + probability.y;
     }
-    parts[t][lane] = part;
+    parts[t * ROW + lane] = part;
   }
   [[unroll]] for (uint i = 0; i < PAIRS_PER_LANE; ++i) {
     const uint at = first + 2 * i * SIDE_BY_SIDE;
@@ -75,8 +77,8 @@ void main() {
   barrier();
   if (lane < thetas) {
     float total = 0.0;
-    for (uint i = 0; i < MARGINAL_WORKGROUP; ++i) {
-      total += parts[lane][i];
+    for (uint i = 0; i < gl_WorkGroupSize.x; ++i) {
+      total += parts[lane * ROW + i];
     }
     over_plane[block * push.thetas + theta + lane] = total;
   }

@@ -190,11 +190,7 @@ bool array_is_still(const std::vector<Unknown>& unknowns, bool each_frame) {
   const Touch& first = unknowns.front().touches.front();
   return each_frame && unknowns.size() > 1 && first.elements_mm.size() >= large &&
          std::all_of(unknowns.begin(), unknowns.end(), [&](const Unknown& unknown) {
-           const Touch& touch = unknown.touches.front();
-           return touch.T_robot_sensor.translation_mm == first.T_robot_sensor.translation_mm &&
-                  touch.T_robot_sensor.theta_rad == first.T_robot_sensor.theta_rad &&
-                  std::equal(touch.elements_mm.begin(), touch.elements_mm.end(),
-                             first.elements_mm.begin(), first.elements_mm.end());
+           return same_placement(unknown.touches.front(), first);
          });
 }
 
@@ -274,6 +270,13 @@ RecognitionTask prepare(const RecognizeOptions& options) {
                       options.ratio ? options.ratio : scene.ratio);
   task.unknowns = list_unknowns(options, task.recordings);
   task.histogram.still_array = array_is_still(task.unknowns, options.each_frame);
+  if (options.memory_mib) {
+    if (*options.memory_mib < 1) {
+      throw Error(Fault::input,
+                  fmt::format("--memory-mib {}: give at least 1", *options.memory_mib));
+    }
+    task.histogram.memory_limit_bytes = static_cast<std::uint64_t>(*options.memory_mib) << 20;
+  }
   load_maps(objects_of(options, scene), task);
   task.histogram.prior = common_prior(task, options.prior ? options.prior : scene.prior);
   if (with_particles) {

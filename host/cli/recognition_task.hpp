@@ -30,6 +30,7 @@ struct RecognizeOptions {
   std::string frames;
   std::optional<int> touches;
   bool each_frame = false;
+  std::optional<int> memory_mib;
   std::string filter;
   std::optional<int> particles;
   std::string resampling;

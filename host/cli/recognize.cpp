@@ -257,6 +257,10 @@ void add_recognize(CLI::App& app) {
                       "Write the log-likelihood of every bin of one recording (HDF5)");
   command->add_option("--png", options->png,
                       "Folder for a sheet per unknown: footprints, belief, identities");
+  command
+      ->add_option("--memory-mib", options->memory_mib,
+                   "Most memory of the device to take, MiB [default: all of it]; less costs time")
+      ->check(require_whole_number);
   command->add_option("--device", options->device, "Vulkan device, by index or a part of its name");
   command->callback([options] { recognize(*options); });
 }

@@ -7,7 +7,6 @@
 
 #include "add_belief.hpp"
 #include "interface.h"
-#include "palpate/error.hpp"
 #include "reduce_belief.hpp"
 #include "sum_marginals.hpp"
 
@@ -15,77 +14,12 @@ namespace palpate {
 
 namespace {
 
-constexpr std::uint32_t workgroup = 64;  // the minimum a device must allow is 128
-constexpr std::uint32_t workgroup_constant[] = {workgroup};
 constexpr gpu::Access read_and_write[] = {gpu::Access::table, gpu::Access::storage};
 constexpr gpu::Access marginal_bindings[] = {gpu::Access::table, gpu::Access::storage,
                                              gpu::Access::storage};
 
-/// Cuts an object's bins into slabs of whole theta planes, or, where a plane alone is too large
-/// for a binding or a dispatch, into groups of its rows.
-std::vector<Slab> cut_into_slabs(gpu::Context& context, const PoseLattice& lattice) {
-  const gpu::Limits& limits = context.limits();
-  const auto binding_bins = static_cast<std::int64_t>(
-      std::min({limits.storage_range / sizeof(TwoFloat), limits.allocation / sizeof(TwoFloat),
-                VkDeviceSize{limits.table_texels},
-                VkDeviceSize{limits.group_count[0]} * shaders::REDUCE_BINS}) /
-      2 * 2);
-  // However few bins an invocation takes, a plane's rows must fit one dispatch.
-  const std::int64_t plane_bins =
-      std::min(binding_bins, std::int64_t{limits.group_count[0]} * workgroup);
-  const std::int64_t rows =
-      std::min<std::int64_t>(plane_bins / lattice.x_mm.count, lattice.y_mm.count);
-  if (rows == 0) {
-    throw Error(Fault::input, fmt::format("bins x = {}: device '{}' takes at most {}; use fewer",
-                                          lattice.x_mm.count, context.name(), plane_bins));
-  }
-  const std::int64_t thetas =
-      rows < lattice.y_mm.count
-          ? 1
-          : std::min({binding_bins / lattice.plane(),
-                      std::int64_t{std::min(limits.group_count[1], limits.group_count[2])},
-                      std::int64_t{lattice.theta_rad.count}});
-  std::vector<Slab> slabs;
-  for (std::int64_t theta = 0; theta < lattice.theta_rad.count; theta += thetas) {
-    for (std::int64_t row = 0; row < lattice.y_mm.count; row += rows) {
-      Slab slab;
-      slab.theta_first = static_cast<std::uint32_t>(theta);
-      slab.theta_count =
-          static_cast<std::uint32_t>(std::min(thetas, lattice.theta_rad.count - theta));
-      slab.row_first = static_cast<std::uint32_t>(row);
-      slab.row_count = static_cast<std::uint32_t>(std::min(rows, lattice.y_mm.count - row));
-      slab.nx = static_cast<std::uint32_t>(lattice.x_mm.count);
-      // Reductions read two bins a texel, so an odd number takes room for one more.
-      slab.log_likelihood =
-          gpu::Buffer(context, (slab.bins() + 1) / 2 * 2 * sizeof(TwoFloat), gpu::Memory::device,
-                      fmt::format("{} pose bins", slab.bins()), VK_FORMAT_R32G32B32A32_SFLOAT);
-      slabs.push_back(std::move(slab));
-    }
-  }
-  return slabs;
-}
-
-/// Some drivers hand out more memory than there is and fail only when it is written.
-void require_memory(const gpu::Context& context, const PoseLattice& lattice, std::size_t objects) {
-  constexpr double gib = 1 << 30;
-  const double needed = static_cast<double>(sizeof(TwoFloat)) * static_cast<double>(objects) *
-                        lattice.x_mm.count * lattice.y_mm.count * lattice.theta_rad.count;
-  const auto held = static_cast<double>(context.limits().memory);
-  if (needed > held) {
-    throw Error(Fault::system,
-                fmt::format("{} objects x {} x {} x {} pose bins need {:.1f} GiB, device '{}' has "
-                            "{:.1f}; use fewer bins or objects",
-                            objects, lattice.x_mm.count, lattice.y_mm.count,
-                            lattice.theta_rad.count, needed / gib, context.name(), held / gib));
-  }
-}
-
-std::size_t partials_of(const Slab& slab) {
-  return static_cast<std::size_t>((slab.bins() + shaders::REDUCE_BINS - 1) / shaders::REDUCE_BINS);
-}
-
-std::uint32_t groups_of(std::uint32_t count, std::uint32_t per_group) {
-  return (count + per_group - 1) / per_group;
+std::uint32_t groups_of(std::int64_t count, std::uint32_t per_group) {
+  return static_cast<std::uint32_t>((count + per_group - 1) / per_group);
 }
 
 /// Index in the lattice of a slab's bin.
@@ -94,14 +28,35 @@ std::int64_t lattice_index(const PoseLattice& lattice, const Slab& slab, std::in
          std::int64_t{slab.row_first} * slab.nx + in_slab % slab.plane();
 }
 
-gpu::Kernel marginal_kernel(gpu::Context& context, const PoseLattice& lattice) {
-  const std::uint32_t even_planes[] = {lattice.x_mm.count % 2 == 0 ? 1U : 0U};
+gpu::Kernel reduction_kernel(gpu::Context& context, const ReductionSizes& sizes) {
+  const std::uint32_t constants[] = {sizes.lanes, sizes.side_by_side, sizes.texels_per_lane};
+  return {context,
+          {.name = "reduce_belief",
+           .spirv = shaders::reduce_belief,
+           .bindings = read_and_write,
+           .push_bytes = sizeof(shaders::ReducePush),
+           .constants = constants}};
+}
+
+gpu::Kernel marginal_kernel(gpu::Context& context, const MarginalSizes& sizes, bool even_planes) {
+  const std::uint32_t constants[] = {sizes.lanes, sizes.side_by_side, sizes.pairs_per_lane,
+                                     sizes.thetas, even_planes ? 1U : 0U};
   return {context,
           {.name = "sum_marginals",
            .spirv = shaders::sum_marginals,
            .bindings = marginal_bindings,
            .push_bytes = sizeof(shaders::MarginalPush),
-           .constants = even_planes}};
+           .constants = constants}};
+}
+
+gpu::Kernel addition_kernel(gpu::Context& context) {
+  const std::uint32_t constants[] = {independent_lanes(context.limits())};
+  return {context,
+          {.name = "add_belief",
+           .spirv = shaders::add_belief,
+           .bindings = read_and_write,
+           .push_bytes = sizeof(shaders::AddPush),
+           .constants = constants}};
 }
 
 /// Adds every row of `parts` to `sums`.
@@ -122,27 +77,52 @@ Belief::Belief(gpu::Context& context, gpu::CommandStream& stream, const PoseLatt
     : context_(context),
       stream_(stream),
       lattice_(lattice),
-      reduce_(context, {.name = "reduce_belief",
-                        .spirv = shaders::reduce_belief,
-                        .bindings = read_and_write,
-                        .push_bytes = sizeof(shaders::ReducePush),
-                        .constants = workgroup_constant}),
-      sum_marginals_(marginal_kernel(context, lattice)),
-      add_(context, {.name = "add_belief",
-                     .spirv = shaders::add_belief,
-                     .bindings = read_and_write,
-                     .push_bytes = sizeof(shaders::AddPush),
-                     .constants = workgroup_constant}) {
-  require_memory(context, lattice, objects);
+      reduction_(reduction_sizes(context.limits(), lattice.bins())),
+      marginal_(marginal_sizes(context.limits(), lattice.plane(), lattice.theta_rad.count)),
+      reduce_(reduction_kernel(context, reduction_)),
+      sum_marginals_(marginal_kernel(context, marginal_, lattice.x_mm.count % 2 == 0)),
+      add_(addition_kernel(context)) {
+  const std::vector<SlabExtent> extents = cut_into_slabs(context, lattice, reduction_.bins());
   for (std::size_t object = 0; object < objects; ++object) {
-    slabs_.push_back(cut_into_slabs(context, lattice));
-    for (const Slab& slab : slabs_.back()) {
-      partial_count_ += partials_of(slab);
+    std::vector<Slab>& slabs = slabs_.emplace_back();
+    for (const SlabExtent& extent : extents) {
+      slabs.push_back({extent, gpu::Buffer(context, extent.bytes(), gpu::Memory::device,
+                                           fmt::format("{} pose bins", extent.bins()),
+                                           VK_FORMAT_R32G32B32A32_SFLOAT)});
+      partial_count_ += groups_of(extent.bins(), reduction_.bins());
     }
   }
   partials_ = gpu::Buffer(context, partial_count_ * sizeof(shaders::Partial), gpu::Memory::device,
                           "partial sums");
   clear();
+}
+
+std::uint64_t Belief::bytes_needed(const gpu::Context& context, const PoseLattice& lattice,
+                                   std::size_t objects) {
+  const std::uint32_t per_group = reduction_sizes(context.limits(), lattice.bins()).bins();
+  std::uint64_t bytes = 0;
+  std::uint64_t partials = 0;
+  for (const SlabExtent& slab : cut_into_slabs(context, lattice, per_group)) {
+    bytes += gpu::allocated(slab.bytes());
+    partials += groups_of(slab.bins(), per_group);
+  }
+  return objects * bytes + gpu::allocated(objects * partials * sizeof(shaders::Partial));
+}
+
+std::uint64_t Belief::marginal_bytes(const gpu::Context& context, const PoseLattice& lattice) {
+  const gpu::Limits& limits = context.limits();
+  const MarginalSizes sizes = marginal_sizes(limits, lattice.plane(), lattice.theta_rad.count);
+  std::uint64_t most = 0;
+  for (const SlabExtent& slab :
+       cut_into_slabs(context, lattice, reduction_sizes(limits, lattice.bins()).bins())) {
+    const std::uint64_t over_theta =
+        std::uint64_t{groups_of(slab.theta_count, sizes.thetas)} * slab.plane();
+    const std::uint64_t over_plane =
+        std::uint64_t{groups_of(slab.plane(), sizes.plane())} * slab.theta_count;
+    most = std::max(most, gpu::allocated(over_theta * sizeof(float)) +
+                              gpu::allocated(over_plane * sizeof(float)));
+  }
+  return most;
 }
 
 void Belief::clear() {
@@ -160,8 +140,9 @@ void Belief::add(const Belief& other) {
       // A plane of a slab fits one row of workgroups.
       const shaders::AddPush push{.bins = static_cast<shaders::uint>(slab.bins()),
                                   .row = slab.plane()};
-      stream_.dispatch(add_, {&other.slabs_[object][i].log_likelihood, &slab.log_likelihood}, push,
-                       {groups_of(slab.plane(), workgroup), slab.theta_count, 1});
+      stream_.dispatch(
+          add_, {&other.slabs_[object][i].log_likelihood, &slab.log_likelihood}, push,
+          {groups_of(slab.plane(), independent_lanes(context_.limits())), slab.theta_count, 1});
     }
   }
 }
@@ -180,7 +161,7 @@ std::vector<BeliefSummary> Belief::summarise() const {
   std::uint32_t first = 0;
   for (const auto& slabs : slabs_) {
     for (const Slab& slab : slabs) {
-      const auto groups = static_cast<std::uint32_t>(partials_of(slab));
+      const std::uint32_t groups = groups_of(slab.bins(), reduction_.bins());
       const shaders::ReducePush push{.bins = static_cast<std::uint32_t>(slab.bins()),
                                      .partial_first = first};
       stream_.dispatch(reduce_, {&slab.log_likelihood, &partials_}, push, {groups, 1, 1});
@@ -198,7 +179,8 @@ std::vector<BeliefSummary> Belief::summarise() const {
     BeliefSummary summary;
     bool any = false;
     for (const Slab& slab : slabs) {
-      for (std::size_t i = 0; i < partials_of(slab); ++i, ++partial) {
+      const std::uint32_t groups = groups_of(slab.bins(), reduction_.bins());
+      for (std::uint32_t i = 0; i < groups; ++i, ++partial) {
         const TwoFloat max{partial->max_high, partial->max_low};
         // Slabs stand in the lattice's order, so the first of equals has the lowest bin.
         if (!any || exceeds(max, summary.max)) {
@@ -222,8 +204,8 @@ BeliefMarginals Belief::marginals(std::size_t object, TwoFloat max) const {
   sums.xy.resize(static_cast<std::size_t>(lattice_.plane()));
   sums.theta.resize(static_cast<std::size_t>(lattice_.theta_rad.count));
   for (const Slab& slab : slabs_[object]) {
-    const std::uint32_t chunks = groups_of(slab.theta_count, shaders::MARGINAL_THETAS);
-    const std::uint32_t blocks = groups_of(slab.plane(), shaders::MARGINAL_PLANE);
+    const std::uint32_t chunks = groups_of(slab.theta_count, marginal_.thetas);
+    const std::uint32_t blocks = groups_of(slab.plane(), marginal_.plane());
     std::vector<float> over_theta(std::size_t{chunks} * slab.plane());
     std::vector<float> over_plane(std::size_t{blocks} * slab.theta_count);
     const gpu::Buffer theta_parts(context_, std::span(over_theta).size_bytes(), gpu::Memory::device,

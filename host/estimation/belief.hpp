@@ -5,24 +5,12 @@
 #include <vector>
 
 #include "command_stream.hpp"
+#include "kernel_sizes.hpp"
 #include "palpate/lattice.hpp"
+#include "slab.hpp"
 #include "two_float.hpp"
 
 namespace palpate {
-
-/// A part of an object's bins that fits one binding and one dispatch: of `theta_count` planes from
-/// `theta_first` the rows (indices along y) [row_first, row_first + row_count).
-struct Slab {
-  std::uint32_t theta_first = 0;
-  std::uint32_t theta_count = 0;
-  std::uint32_t row_first = 0;
-  std::uint32_t row_count = 0;
-  std::uint32_t nx = 0;
-  gpu::Buffer log_likelihood;  ///< [theta, y, x], two floats each
-
-  std::uint32_t plane() const { return row_count * nx; }
-  std::int64_t bins() const { return std::int64_t{theta_count} * plane(); }
-};
 
 /// A block of an object's bins. Its planes go on with the first after the last; its rows and
 /// columns (indices along y and x) lie within the lattice.
@@ -59,6 +47,11 @@ class Belief {
   Belief(gpu::Context& context, gpu::CommandStream& stream, const PoseLattice& lattice,
          std::size_t objects);
 
+  /// Device memory that a belief takes, in bytes, and what marginals() takes while it runs.
+  static std::uint64_t bytes_needed(const gpu::Context& context, const PoseLattice& lattice,
+                                    std::size_t objects);
+  static std::uint64_t marginal_bytes(const gpu::Context& context, const PoseLattice& lattice);
+
   /// Records the return to a uniform belief.
   void clear();
   /// Records the addition of another belief over the same lattice and objects.
@@ -79,6 +72,8 @@ class Belief {
   gpu::CommandStream& stream_;
   PoseLattice lattice_;
   std::vector<std::vector<Slab>> slabs_;
+  ReductionSizes reduction_;
+  MarginalSizes marginal_;
   gpu::Kernel reduce_;
   gpu::Kernel sum_marginals_;
   gpu::Kernel add_;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <functional>
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -17,12 +18,24 @@ namespace palpate {
 /// The log-likelihood of touches at every bin of the lattice, for several maps (Eq. 7).
 class DenseLikelihood {
  public:
+  /// Elements that a dispatch takes at best: a multiple of the factors of a product, unless the
+  /// device's tables hold fewer.
+  /// @throws Error where they do not hold one element at every theta
+  static std::size_t batch_for(const gpu::Context& context, const PoseLattice& lattice);
+  /// Device memory that maps, and tables for this many elements, take, in bytes.
+  /// @throws Error where a map is larger than what kernels read
+  static std::uint64_t bytes_needed(const gpu::Context& context,
+                                    std::span<const Hypothesis> hypotheses,
+                                    const PoseLattice& lattice, std::size_t elements);
+
   /// Records the upload of the maps, in the order of the belief's objects, and a first, empty run
   /// of every kernel: drivers compile them then, and no touch has to wait for that. Beyond each map
   /// lies the model's prior.
+  /// @param most_elements of the tables; like batch_for(), which it may lower
   DenseLikelihood(gpu::Context& context, gpu::CommandStream& stream, const Belief& belief,
                   std::span<const Hypothesis> hypotheses, const PoseLattice& lattice,
-                  const ContactLikelihood& model);
+                  const ContactLikelihood& model,
+                  std::size_t most_elements = std::numeric_limits<std::size_t>::max());
 
   /// Most elements that one segment of the evidence may hold.
   std::size_t segment_elements() const { return batch_elements_; }
@@ -44,16 +57,16 @@ class DenseLikelihood {
     gpu::Buffer log_odds;
     gpu::Buffer axes;  ///< the lattice's x and y in cells of this map
   };
-  /// Maps of one cell size share the rotated elements and the path.
+  /// Maps of one kind share the rotated elements and the path.
   struct Scale {
-    double cell_mm = 0.0;
+    MapKind maps;
     LikelihoodPath path;
     std::vector<std::size_t> objects;
   };
 
-  /// Records one run of the path's kernel over a slab.
-  void dispatch(const LikelihoodPath& path, std::size_t object, const Slab& slab,
-                std::size_t segments, std::size_t elements);
+  /// Records one run of the scale's kernel over a slab.
+  void dispatch(const Scale& scale, std::size_t object, const Slab& slab, std::size_t segments,
+                std::size_t elements);
   /// Makes room for this many elements in the tables.
   void reserve(std::size_t elements);
 
@@ -64,6 +77,7 @@ class DenseLikelihood {
   std::vector<Scale> scales_;
   VkDeviceSize bytes_per_element_ = 0;  ///< rotated by every theta
   std::size_t batch_elements_ = 0;      ///< most elements in the tables
+  gpu::Buffer no_table_;                ///< bound where a map is none
   gpu::Buffer elements_;
   gpu::Buffer segments_;
 };

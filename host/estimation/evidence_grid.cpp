@@ -8,6 +8,7 @@
 
 #include "accumulate_evidence.hpp"
 #include "interface.h"
+#include "kernel_sizes.hpp"
 #include "palpate/error.hpp"
 #include "two_float.hpp"
 
@@ -112,7 +113,10 @@ TileLists assign_to_tiles(std::span<const ElementReading> readings, const CellRa
 }
 
 gpu::Kernel evidence_kernel(gpu::Context& context, const InverseSensorModel& sensor) {
-  const std::uint32_t constants[] = {std::bit_cast<std::uint32_t>(static_cast<float>(sensor.peak)),
+  const std::uint32_t block = block_cells(context.limits());
+  const std::uint32_t blocks_across = shaders::TILE_CELLS / block;
+  const std::uint32_t constants[] = {blocks_across, blocks_across, block,
+                                     std::bit_cast<std::uint32_t>(static_cast<float>(sensor.peak)),
                                      std::bit_cast<std::uint32_t>(static_cast<float>(
                                          1.0 / (2.0 * sensor.spread_mm * sensor.spread_mm)))};
   return {context,

@@ -19,27 +19,34 @@ struct LikelihoodPath {
   std::string description;  ///< what it does and why it was chosen
 };
 
-inline constexpr std::uint32_t likelihood_workgroup = 64;
+/// What a path is made for: maps of one cell size that kernels read in one way.
+struct MapKind {
+  double cell_mm = 0.0;
+  /// Tables are the fast way, which not every device has for large maps.
+  gpu::Access access = gpu::Access::table;
 
-/// What every path's kernel is specialised by: the workgroup, then the model of Eq. 7.
-std::vector<std::uint32_t> model_constants(const ContactLikelihood& model);
+  bool operator==(const MapKind&) const = default;
+};
+
+/// What every kernel that evaluates Eq. 7 is specialised by: the workgroup, then the model.
+std::vector<std::uint32_t> model_constants(const gpu::Limits& limits,
+                                           const ContactLikelihood& model);
+/// The same and the maps' place: what every path's kernel is specialised by.
+std::vector<std::uint32_t> path_constants(const gpu::Limits& limits, const MapKind& maps,
+                                          const ContactLikelihood& model);
 /// The buffers of shaders/likelihood_buffers.glsl.
 std::span<const gpu::Access> likelihood_bindings();
 
-/// Most bins that an invocation may take so that a lattice of this many bins still fills the
-/// device: a CPU device is full at once, a GPU wants tens of thousands of invocations.
-std::uint32_t most_bins_per_invocation(const gpu::Context& context, std::int64_t bins);
-
 /// Neighbouring bins in register tiles; none where the lattice is too coarse for the map's cells.
 std::optional<LikelihoodPath> tile_path(gpu::Context& context, const PoseLattice& lattice,
-                                        double cell_mm, const ContactLikelihood& model);
+                                        const MapKind& maps, const ContactLikelihood& model);
 /// Bins of a row, each with map nodes of its own; for any lattice, in particular for those that
 /// tile_path refuses.
-LikelihoodPath row_path(gpu::Context& context, const PoseLattice& lattice, double cell_mm,
+LikelihoodPath row_path(gpu::Context& context, const PoseLattice& lattice, const MapKind& maps,
                         const ContactLikelihood& model);
 
 /// The fastest of them that is sound.
-LikelihoodPath choose_path(gpu::Context& context, const PoseLattice& lattice, double cell_mm,
+LikelihoodPath choose_path(gpu::Context& context, const PoseLattice& lattice, const MapKind& maps,
                            const ContactLikelihood& model);
 
 }  // namespace palpate

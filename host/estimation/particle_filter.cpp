@@ -9,6 +9,7 @@
 #include "command_stream.hpp"
 #include "draw_particles.hpp"
 #include "hypotheses.hpp"
+#include "kernel_sizes.hpp"
 #include "likelihood_averages.hpp"
 #include "palpate/error.hpp"
 #include "particle_likelihood.hpp"
@@ -25,8 +26,6 @@ namespace {
 constexpr int most_particles = 1'000'000;
 // Beyond, float32 would no longer place a particle to a hundredth of a millimetre.
 constexpr double widest_mm = 100'000.0;
-constexpr std::uint32_t workgroup = 64;
-constexpr std::uint32_t workgroup_constant[] = {workgroup};
 constexpr gpu::Access draw_bindings[] = {gpu::Access::table, gpu::Access::table, gpu::Access::table,
                                          gpu::Access::storage, gpu::Access::storage};
 constexpr gpu::Access sum_bindings[] = {gpu::Access::table, gpu::Access::storage,
@@ -107,11 +106,12 @@ struct ParticleFilter::Impl {
         stream(context),
         likelihood(context, stream, hypotheses, options.region, model),
         parzen(context, stream),
+        lanes(independent_lanes(context.limits())),
         draw_kernel(context, {.name = "draw_particles",
                               .spirv = shaders::draw_particles,
                               .bindings = draw_bindings,
                               .push_bytes = sizeof(shaders::DrawPush),
-                              .constants = workgroup_constant}),
+                              .constants = {&lanes, 1}}),
         sum_kernel(context, {.name = "sum_weights",
                              .spirv = shaders::sum_weights,
                              .bindings = sum_bindings,
@@ -181,7 +181,7 @@ struct ParticleFilter::Impl {
         .motion_mm = static_cast<float>(options.motion_mm),
         .motion_rad = static_cast<float>(options.motion_rad)};
     stream.dispatch(draw_kernel, {&particles, &cumulative, &draw_blocks, &shares, &drawn}, push,
-                    {groups_of(size(), workgroup), 1, 1});
+                    {groups_of(size(), lanes), 1, 1});
     std::swap(particles, drawn);
   }
 
@@ -254,6 +254,7 @@ struct ParticleFilter::Impl {
   gpu::CommandStream stream;
   ParticleLikelihood likelihood;
   ParzenMode parzen;
+  std::uint32_t lanes;  ///< of a workgroup of draw_kernel
   gpu::Kernel draw_kernel;
   gpu::Kernel sum_kernel;
   gpu::Buffer particles;

@@ -8,6 +8,7 @@
 
 #include "bordered_map.hpp"
 #include "interface.h"
+#include "kernel_sizes.hpp"
 #include "likelihood_path.hpp"
 #include "palpate/error.hpp"
 #include "weigh_particles.hpp"
@@ -18,8 +19,6 @@ namespace {
 
 constexpr gpu::Access bindings[] = {gpu::Access::table, gpu::Access::storage, gpu::Access::table,
                                     gpu::Access::table, gpu::Access::table,   gpu::Access::storage};
-// As in DenseLikelihood: about half a second on a CPU device.
-constexpr double work_per_run = 5e8;
 // The table's least guaranteed size, less the headings, holds this many elements at 15 cell sizes.
 constexpr std::size_t most_elements = 4096;
 static_assert(most_elements <= gpu::most_iterations / 2);
@@ -71,7 +70,7 @@ ParticleLikelihood::ParticleLikelihood(gpu::Context& context, gpu::CommandStream
                         .spirv = shaders::weigh_particles,
                         .bindings = bindings,
                         .push_bytes = sizeof(shaders::WeighPush),
-                        .constants = model_constants(model)}) {
+                        .constants = model_constants(context.limits(), model)}) {
   std::vector<float> cells;
   std::vector<shaders::ParticleMap> objects;
   const auto append = [&](const OccupancyGrid& map) {
@@ -163,7 +162,7 @@ void ParticleLikelihood::weigh(const ContactEvidence& evidence, const gpu::Buffe
       }
     }
     const double work = static_cast<double>(count) * static_cast<double>(elements);
-    if (pending + work > work_per_run) {
+    if (pending + work > work_per_run(context_.limits())) {
       stream_.run();
       pending = 0.0;
     }
@@ -172,12 +171,13 @@ void ParticleLikelihood::weigh(const ContactEvidence& evidence, const gpu::Buffe
     stream_.upload(turns_, std::span<const shaders::CoarseAndFine>(table),
                    shaders::HEADINGS * sizeof(shaders::CoarseAndFine));
     const auto invocations = static_cast<std::uint32_t>(count);
+    const std::uint32_t lanes = independent_lanes(context_.limits());
     const shaders::WeighPush push{.particles = invocations,
                                   .segments = static_cast<shaders::uint>(batch.size()),
                                   .elements = static_cast<shaders::uint>(elements),
                                   .fresh = fresh ? 1U : 0U};
     stream_.dispatch(kernel_, {&maps_, &objects_, &turns_, &segments_, &particles, &log_weights},
-                     push, {(invocations + likelihood_workgroup - 1) / likelihood_workgroup, 1, 1});
+                     push, {(invocations + lanes - 1) / lanes, 1, 1});
   } while (s < segments.size());
 }
 

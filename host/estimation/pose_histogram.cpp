@@ -10,6 +10,7 @@
 #include "command_stream.hpp"
 #include "dense_likelihood.hpp"
 #include "hypotheses.hpp"
+#include "memory_plan.hpp"
 #include "palpate/error.hpp"
 #include "refinement.hpp"
 
@@ -25,10 +26,7 @@ struct StillArray {
   explicit StillArray(Belief belief) : no_contact(std::move(belief)) {}
 
   bool holds(const Touch& touch) const {
-    return touch.T_robot_sensor.translation_mm == T_robot_sensor.translation_mm &&
-           touch.T_robot_sensor.theta_rad == T_robot_sensor.theta_rad &&
-           std::equal(touch.elements_mm.begin(), touch.elements_mm.end(), elements_mm.begin(),
-                      elements_mm.end());
+    return same_placement(touch, {T_robot_sensor, elements_mm, {}});
   }
 
   Pose T_robot_sensor;
@@ -44,9 +42,10 @@ struct PoseHistogram::Impl {
       : options(wanted),
         prior_model(model),
         context(device.context()),
+        batch_elements(plan_memory(context, hypotheses, options)),
         stream(context),
         belief(context, stream, options.lattice, hypotheses.size()),
-        likelihood(context, stream, belief, hypotheses, options.lattice, model),
+        likelihood(context, stream, belief, hypotheses, options.lattice, model, batch_elements),
         log_weight(log_weights(hypotheses)) {
     for (const Hypothesis& hypothesis : hypotheses) {
       bodies.push_back(displaced_body(hypothesis.map));
@@ -161,6 +160,7 @@ struct PoseHistogram::Impl {
   HistogramOptions options;
   ContactLikelihood prior_model;
   gpu::Context& context;
+  std::size_t batch_elements;  ///< most that the likelihood's tables may hold
   gpu::CommandStream stream;
   Belief belief;
   DenseLikelihood likelihood;

@@ -4,6 +4,7 @@
 
 #include "accumulate_rows.hpp"
 #include "interface.h"
+#include "kernel_sizes.hpp"
 #include "likelihood_path.hpp"
 
 namespace palpate {
@@ -27,26 +28,26 @@ std::uint32_t run_for(std::uint32_t nx, std::uint32_t longest) {
 
 }  // namespace
 
-LikelihoodPath row_path(gpu::Context& context, const PoseLattice& lattice, double cell_mm,
+LikelihoodPath row_path(gpu::Context& context, const PoseLattice& lattice, const MapKind& maps,
                         const ContactLikelihood& model) {
   const std::uint32_t run =
       run_for(static_cast<std::uint32_t>(lattice.x_mm.count),
-              std::min(longest_run, most_bins_per_invocation(context, lattice.bins())));
-  std::vector<std::uint32_t> constants = model_constants(model);
+              std::min(longest_run, most_bins_per_invocation(context.limits(), lattice.bins())));
+  std::vector<std::uint32_t> constants = path_constants(context.limits(), maps, model);
   constants.push_back(run);
-  return {
-      .kernel = {context,
-                 {.name = "accumulate_rows",
-                  .spirv = shaders::accumulate_rows,
-                  .bindings = likelihood_bindings(),
-                  .push_bytes = sizeof(shaders::LikelihoodPush),
-                  .constants = constants}},
-      .bins_x = run,
-      .bins_y = 1,
-      .description = fmt::format("runs of {} bins: at a lattice step of {:.3g} x {:.3g} map "
-                                 "cells a tile of four bins does not fit into a cell{}",
-                                 run, lattice.x_mm.step() / cell_mm, lattice.y_mm.step() / cell_mm,
-                                 context.limits().cpu ? "" : ", or would leave the GPU idle")};
+  return {.kernel = {context,
+                     {.name = "accumulate_rows",
+                      .spirv = shaders::accumulate_rows,
+                      .bindings = likelihood_bindings(),
+                      .push_bytes = sizeof(shaders::LikelihoodPush),
+                      .constants = constants}},
+          .bins_x = run,
+          .bins_y = 1,
+          .description = fmt::format("runs of {} bins: at a lattice step of {:.3g} x {:.3g} map "
+                                     "cells a tile of four bins does not fit into a cell{}",
+                                     run, lattice.x_mm.step() / maps.cell_mm,
+                                     lattice.y_mm.step() / maps.cell_mm,
+                                     context.limits().cpu ? "" : ", or would leave the GPU idle")};
 }
 
 }  // namespace palpate

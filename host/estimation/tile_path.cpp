@@ -6,6 +6,7 @@
 
 #include "accumulate_tiles.hpp"
 #include "interface.h"
+#include "kernel_sizes.hpp"
 #include "likelihood_path.hpp"
 
 namespace palpate {
@@ -24,12 +25,12 @@ std::uint32_t bins_in_a_cell(double step_cells, int count) {
 }  // namespace
 
 std::optional<LikelihoodPath> tile_path(gpu::Context& context, const PoseLattice& lattice,
-                                        double cell_mm, const ContactLikelihood& model) {
-  const double step_x = lattice.x_mm.step() / cell_mm;
-  const double step_y = lattice.y_mm.step() / cell_mm;
+                                        const MapKind& maps, const ContactLikelihood& model) {
+  const double step_x = lattice.x_mm.step() / maps.cell_mm;
+  const double step_y = lattice.y_mm.step() / maps.cell_mm;
   std::uint32_t x = bins_in_a_cell(step_x, lattice.x_mm.count);
   std::uint32_t y = bins_in_a_cell(step_y, lattice.y_mm.count);
-  const std::uint32_t most = most_bins_per_invocation(context, lattice.bins());
+  const std::uint32_t most = most_bins_per_invocation(context.limits(), lattice.bins());
   while (x * y > most) {
     (x > y ? x : y) -= 1;
   }
@@ -37,7 +38,7 @@ std::optional<LikelihoodPath> tile_path(gpu::Context& context, const PoseLattice
   if (x * y < 4) {
     return {};
   }
-  std::vector<std::uint32_t> constants = model_constants(model);
+  std::vector<std::uint32_t> constants = path_constants(context.limits(), maps, model);
   constants.insert(constants.end(), {x, y, std::bit_cast<std::uint32_t>(static_cast<float>(step_x)),
                                      std::bit_cast<std::uint32_t>(static_cast<float>(step_y))});
   return LikelihoodPath{

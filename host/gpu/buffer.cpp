@@ -11,7 +11,8 @@ namespace palpate::gpu {
 
 Buffer::Buffer(Context& context, VkDeviceSize bytes, Memory memory, std::string_view purpose,
                VkFormat texel)
-    : device_(context.device()), bytes_(bytes) {
+    : context_(&context), bytes_(bytes) {
+  const VkDevice device = context.device();
   const auto doing = fmt::format("device '{}': {:.1f} MiB for {}", context.name(),
                                  static_cast<double>(bytes) / (1 << 20), purpose);
   if (bytes > context.limits().allocation) {
@@ -29,13 +30,13 @@ Buffer::Buffer(Context& context, VkDeviceSize bytes, Memory memory, std::string_
                     VK_BUFFER_USAGE_TRANSFER_SRC_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT
           : memory == Memory::upload ? VK_BUFFER_USAGE_TRANSFER_SRC_BIT
                                      : VK_BUFFER_USAGE_TRANSFER_DST_BIT)};
-  check(vkCreateBuffer(device_, &info, nullptr, &buffer_), doing);
+  check(vkCreateBuffer(device, &info, nullptr, &buffer_), doing);
 
   // A constructor that throws runs no destructor: this object gives back what it has so far.
   Buffer owner;
   swap(owner);
   VkMemoryRequirements needs;
-  vkGetBufferMemoryRequirements(owner.device_, owner.buffer_, &needs);
+  vkGetBufferMemoryRequirements(device, owner.buffer_, &needs);
   constexpr VkMemoryPropertyFlags mapped =
       VK_MEMORY_PROPERTY_HOST_VISIBLE_BIT | VK_MEMORY_PROPERTY_HOST_COHERENT_BIT;
   const std::uint32_t type =
@@ -47,37 +48,42 @@ Buffer::Buffer(Context& context, VkDeviceSize bytes, Memory memory, std::string_
   const VkMemoryAllocateInfo allocation{.sType = VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_INFO,
                                         .allocationSize = needs.size,
                                         .memoryTypeIndex = type};
-  check(vkAllocateMemory(owner.device_, &allocation, nullptr, &owner.memory_), doing);
-  check(vkBindBufferMemory(owner.device_, owner.buffer_, owner.memory_, 0), doing);
+  check(vkAllocateMemory(device, &allocation, nullptr, &owner.memory_), doing);
+  owner.allocated_ = needs.size;
+  context.take_memory(needs.size);
+  check(vkBindBufferMemory(device, owner.buffer_, owner.memory_, 0), doing);
   if (texel != VK_FORMAT_UNDEFINED) {
     const VkBufferViewCreateInfo view{.sType = VK_STRUCTURE_TYPE_BUFFER_VIEW_CREATE_INFO,
                                       .buffer = owner.buffer_,
                                       .format = texel,
                                       .range = VK_WHOLE_SIZE};
-    check(vkCreateBufferView(owner.device_, &view, nullptr, &owner.table_), doing);
+    check(vkCreateBufferView(device, &view, nullptr, &owner.table_), doing);
   }
   if (memory != Memory::device) {
     void* mapping = nullptr;
-    check(vkMapMemory(owner.device_, owner.memory_, 0, VK_WHOLE_SIZE, 0, &mapping), doing);
+    check(vkMapMemory(device, owner.memory_, 0, VK_WHOLE_SIZE, 0, &mapping), doing);
     owner.data_ = static_cast<std::byte*>(mapping);
   }
   swap(owner);
 }
 
 Buffer::~Buffer() {
-  if (device_ != VK_NULL_HANDLE) {
-    vkDestroyBufferView(device_, table_, nullptr);
-    vkDestroyBuffer(device_, buffer_, nullptr);
-    vkFreeMemory(device_, memory_, nullptr);
+  if (context_ != nullptr) {
+    const VkDevice device = context_->device();
+    vkDestroyBufferView(device, table_, nullptr);
+    vkDestroyBuffer(device, buffer_, nullptr);
+    vkFreeMemory(device, memory_, nullptr);
+    context_->give_memory(allocated_);
   }
 }
 
 void Buffer::swap(Buffer& other) noexcept {
-  std::swap(device_, other.device_);
+  std::swap(context_, other.context_);
   std::swap(buffer_, other.buffer_);
   std::swap(memory_, other.memory_);
   std::swap(table_, other.table_);
   std::swap(bytes_, other.bytes_);
+  std::swap(allocated_, other.allocated_);
   std::swap(data_, other.data_);
 }
 

@@ -14,6 +14,9 @@ enum class Memory {
   download,  ///< host memory, mapped, that the device copies to
 };
 
+/// What a buffer of this many bytes takes of the device's memory, rounded up as drivers do.
+constexpr VkDeviceSize allocated(VkDeviceSize bytes) { return (bytes + 255) / 256 * 256; }
+
 /// A Vulkan buffer with memory of its own. Move-only.
 class Buffer {
  public:
@@ -40,11 +43,12 @@ class Buffer {
  private:
   void swap(Buffer& other) noexcept;
 
-  VkDevice device_ = VK_NULL_HANDLE;
+  Context* context_ = nullptr;
   VkBuffer buffer_ = VK_NULL_HANDLE;
   VkDeviceMemory memory_ = VK_NULL_HANDLE;
   VkBufferView table_ = VK_NULL_HANDLE;
   VkDeviceSize bytes_ = 0;
+  VkDeviceSize allocated_ = 0;
   std::byte* data_ = nullptr;
 };
 

@@ -15,7 +15,10 @@ namespace palpate::gpu {
 namespace {
 
 constexpr std::uint32_t sets_per_pool = 64;
-constexpr VkDeviceSize staging_block = 4 << 20;
+constexpr VkDeviceSize staging_block = CommandStream::staging_bytes / 2;
+
+/// Copies start at multiples of 16 bytes.
+VkDeviceSize staged(VkDeviceSize bytes) { return (bytes + 15) / 16 * 16; }
 
 }  // namespace
 
@@ -63,7 +66,7 @@ void CommandStream::record(const Commands& commands) {
     begin();
     commands();
   } catch (...) {
-    rewind();
+    drop();
     throw;
   }
 }
@@ -93,42 +96,49 @@ void CommandStream::barrier() {
   vkCmdPipelineBarrier(commands_, stages, stages, 0, 1, &memory, 0, nullptr, 0, nullptr);
 }
 
-CommandStream::Slice CommandStream::stage(Arena& arena, VkDeviceSize bytes) {
-  if (arena.blocks.empty() || arena.used + bytes > arena.blocks.back().bytes()) {
-    arena.blocks.emplace_back(context_, std::max(bytes, staging_block), arena.memory, "staging");
-    arena.used = 0;
+std::size_t CommandStream::stage(Arena& arena, std::size_t bytes) {
+  if (arena.block.bytes() == 0) {
+    arena.block = Buffer(context_, staging_block, arena.memory, "staging");
   }
-  const Slice slice{&arena.blocks.back(), arena.used};
-  arena.used += (bytes + 15) / 16 * 16;
-  return slice;
+  // A small copy is not worth two pieces.
+  const VkDeviceSize room = staging_block - arena.used;
+  if (room < std::min<VkDeviceSize>(bytes, staging_block / 4)) {
+    run_recorded();
+    begin();
+  }
+  return std::min<std::size_t>(bytes, staging_block - arena.used);
 }
 
 void CommandStream::upload_bytes(const Buffer& target, std::span<const std::byte> bytes,
                                  VkDeviceSize offset) {
-  if (bytes.empty()) {
-    return;
+  while (!bytes.empty()) {
+    record([&] {
+      const std::size_t count = stage(upload_, bytes.size());
+      std::memcpy(upload_.block.data() + upload_.used, bytes.data(), count);
+      const VkBufferCopy copy{upload_.used, offset, count};
+      barrier();
+      vkCmdCopyBuffer(commands_, upload_.block.handle(), target.handle(), 1, &copy);
+      upload_.used += staged(count);
+      bytes = bytes.subspan(count);
+      offset += count;
+    });
   }
-  record([&] {
-    const Slice slice = stage(upload_, bytes.size());
-    std::memcpy(slice.block->data() + slice.offset, bytes.data(), bytes.size());
-    const VkBufferCopy copy{slice.offset, offset, bytes.size()};
-    barrier();
-    vkCmdCopyBuffer(commands_, slice.block->handle(), target.handle(), 1, &copy);
-  });
 }
 
 void CommandStream::download_bytes(const Buffer& source, std::span<std::byte> bytes,
                                    VkDeviceSize offset) {
-  if (bytes.empty()) {
-    return;
+  while (!bytes.empty()) {
+    record([&] {
+      const std::size_t count = stage(download_, bytes.size());
+      const VkBufferCopy copy{offset, download_.used, count};
+      barrier();
+      vkCmdCopyBuffer(commands_, source.handle(), download_.block.handle(), 1, &copy);
+      downloads_.push_back({bytes.data(), download_.block.data() + download_.used, count});
+      download_.used += staged(count);
+      bytes = bytes.subspan(count);
+      offset += count;
+    });
   }
-  record([&] {
-    const Slice slice = stage(download_, bytes.size());
-    const VkBufferCopy copy{offset, slice.offset, bytes.size()};
-    barrier();
-    vkCmdCopyBuffer(commands_, source.handle(), slice.block->handle(), 1, &copy);
-    downloads_.push_back({bytes.data(), slice.block->data() + slice.offset, bytes.size()});
-  });
 }
 
 void CommandStream::fill(const Buffer& target, std::uint32_t word) {
@@ -217,10 +227,16 @@ void CommandStream::run() {
   if (!recording_) {
     return;
   }
+  run_recorded();
+  device_seconds_ = seconds_before_run_;
+  seconds_before_run_ = 0.0;
+}
+
+void CommandStream::run_recorded() {
   try {
     submit();
   } catch (...) {
-    rewind();
+    drop();
     throw;
   }
   rewind();
@@ -247,19 +263,24 @@ void CommandStream::submit() {
   check(vkQueueSubmit(context_.queue(), 1, &submit, fence_), doing);
   check(vkWaitForFences(device, 1, &fence_, VK_TRUE, std::numeric_limits<std::uint64_t>::max()),
         doing);
-  device_seconds_ = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   if (timestamps_ != VK_NULL_HANDLE) {
     std::array<std::uint64_t, 2> ticks{};
     check(vkGetQueryPoolResults(device, timestamps_, 0, 2, sizeof ticks, ticks.data(),
                                 sizeof ticks[0], VK_QUERY_RESULT_64_BIT | VK_QUERY_RESULT_WAIT_BIT),
           doing);
-    device_seconds_ =
-        static_cast<double>((ticks[1] - ticks[0]) & context_.limits().timestamp_mask) *
-        context_.limits().timestamp_ns * 1e-9;
+    seconds = static_cast<double>((ticks[1] - ticks[0]) & context_.limits().timestamp_mask) *
+              context_.limits().timestamp_ns * 1e-9;
   }
+  seconds_before_run_ += seconds;
   for (const Download& download : downloads_) {
     std::memcpy(download.target, download.source, download.bytes);
   }
+}
+
+void CommandStream::drop() {
+  seconds_before_run_ = 0.0;
+  rewind();
 }
 
 void CommandStream::rewind() {
@@ -272,14 +293,8 @@ void CommandStream::rewind() {
     check(vkResetDescriptorPool(device, pool, 0), "resetting a descriptor pool");
   }
   sets_used_ = 0;
-  for (Arena* arena : {&upload_, &download_}) {
-    // Small transfers keep their block; a rare large one does not hold on to its memory.
-    if (arena->blocks.size() > 1 ||
-        (!arena->blocks.empty() && arena->blocks.back().bytes() > staging_block)) {
-      arena->blocks.clear();
-    }
-    arena->used = 0;
-  }
+  upload_.used = 0;
+  download_.used = 0;
 }
 
 }  // namespace palpate::gpu

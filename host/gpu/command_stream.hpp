@@ -12,10 +12,15 @@
 namespace palpate::gpu {
 
 /// Records copies and dispatches, then runs them in order. Every command sees the results of all
-/// commands before it: the one barrier function stands between any two. A call that throws drops
-/// everything recorded since the last run(), so that no later one meets what its caller has freed.
+/// commands before it: the one barrier function stands between any two. Staging memory does not
+/// grow with what is copied: where it is full, a copy first runs what was recorded. A call that
+/// throws drops everything recorded and not yet run, so that no later one meets what its caller has
+/// freed.
 class CommandStream {
  public:
+  /// Most staging memory, both directions together, in bytes.
+  static constexpr VkDeviceSize staging_bytes = 8 << 20;
+
   explicit CommandStream(Context& context);
   ~CommandStream();
   CommandStream(const CommandStream&) = delete;
@@ -47,7 +52,7 @@ class CommandStream {
   /// Submits everything recorded, waits for it and delivers the downloads.
   void run();
 
-  /// Time that the device spent on the last run(), in seconds.
+  /// Time that the device spent on everything up to the last run(), in seconds.
   double device_seconds() const { return device_seconds_; }
 
  private:
@@ -59,15 +64,12 @@ class CommandStream {
   /// Staging memory of one direction, taken from front to back and reused after every run.
   struct Arena {
     Memory memory;
-    std::vector<Buffer> blocks;
-    VkDeviceSize used = 0;  ///< of the last block
-  };
-  struct Slice {
-    const Buffer* block;
-    VkDeviceSize offset;
+    Buffer block;
+    VkDeviceSize used = 0;
   };
 
-  Slice stage(Arena& arena, VkDeviceSize bytes);
+  /// Makes room for a copy of up to `bytes`, at least one, at arena.used, and says how many fit.
+  std::size_t stage(Arena& arena, std::size_t bytes);
   void upload_bytes(const Buffer& target, std::span<const std::byte> bytes, VkDeviceSize offset);
   void download_bytes(const Buffer& source, std::span<std::byte> bytes, VkDeviceSize offset);
   void dispatch_bytes(const Kernel& kernel, std::span<const Buffer* const> buffers,
@@ -77,8 +79,10 @@ class CommandStream {
   void record(const Commands& commands);
   void begin();
   void barrier();
+  void run_recorded();
   void submit();
   void rewind();
+  void drop();
   void reset();
   VkDescriptorSet descriptor_set(const Kernel& kernel, std::span<const Buffer* const> buffers);
 
@@ -94,6 +98,7 @@ class CommandStream {
   std::vector<Download> downloads_;
   bool recording_ = false;
   double device_seconds_ = 0.0;
+  double seconds_before_run_ = 0.0;  ///< of what ran because staging memory was full
 };
 
 }  // namespace palpate::gpu

@@ -108,18 +108,25 @@ Instance::~Instance() {
 }
 
 Context::Context(std::string_view name_or_index) {
-  const std::vector<Candidate> all = candidates(instance_.handle(), name_or_index);
-  const Candidate& candidate = chosen(all, name_or_index);
+  const std::string wish = wished(name_or_index);
+  const std::vector<Candidate> all = candidates(instance_.handle(), wish);
+  const Candidate& candidate = chosen(all, wish);
   physical_ = candidate.physical;
   queue_family_ = candidate.queue_family;
   name_ = candidate.info.name;
 
+  VkPhysicalDeviceSubgroupProperties subgroup{
+      .sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_SUBGROUP_PROPERTIES};
   VkPhysicalDeviceMaintenance3Properties maintenance{
-      .sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_MAINTENANCE_3_PROPERTIES};
+      .sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_MAINTENANCE_3_PROPERTIES, .pNext = &subgroup};
   VkPhysicalDeviceProperties2 properties{.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_PROPERTIES_2,
                                          .pNext = &maintenance};
   vkGetPhysicalDeviceProperties2(physical_, &properties);
   const VkPhysicalDeviceLimits& limits = properties.properties.limits;
+  limits_.group_invocations = limits.maxComputeWorkGroupInvocations;
+  std::copy_n(limits.maxComputeWorkGroupSize, 3, limits_.group_size);
+  limits_.shared_bytes = limits.maxComputeSharedMemorySize;
+  limits_.subgroup = subgroup.subgroupSize;
   limits_.storage_range = limits.maxStorageBufferRange;
   limits_.allocation = maintenance.maxMemoryAllocationSize;
   limits_.table_texels = limits.maxTexelBufferElements;
@@ -154,6 +161,11 @@ Context::Context(std::string_view name_or_index) {
 Context::~Context() {
   vkDeviceWaitIdle(device_);
   vkDestroyDevice(device_, nullptr);
+}
+
+void Context::take_memory(VkDeviceSize bytes) {
+  memory_use_.now += bytes;
+  memory_use_.peak = std::max(memory_use_.peak, memory_use_.now);
 }
 
 std::uint32_t Context::memory_type(std::uint32_t type_bits, VkMemoryPropertyFlags flags,

@@ -49,15 +49,25 @@ inline constexpr std::uint32_t most_iterations = 1 << 15;
 
 /// Device limits that sizes are planned by.
 struct Limits {
-  VkDeviceSize storage_range = 0;  ///< bytes of one storage-buffer binding
-  VkDeviceSize allocation = 0;     ///< bytes of one allocation
-  std::uint32_t table_texels = 0;  ///< elements of one texel buffer
-  bool cpu = false;                ///< a few cores that a few workgroups fill
-  VkDeviceSize memory = 0;         ///< bytes of the largest heap of device memory
+  std::uint32_t group_invocations = 0;  ///< of one workgroup
+  std::uint32_t group_size[3] = {};     ///< invocations of one workgroup along each dimension
+  std::uint32_t shared_bytes = 0;       ///< memory that the invocations of a workgroup share
+  std::uint32_t subgroup = 0;           ///< invocations that run in step
+  VkDeviceSize storage_range = 0;       ///< bytes of one storage-buffer binding
+  VkDeviceSize allocation = 0;          ///< bytes of one allocation
+  std::uint32_t table_texels = 0;       ///< elements of one texel buffer
+  bool cpu = false;                     ///< a few cores that a few workgroups fill
+  VkDeviceSize memory = 0;              ///< bytes of the largest heap of device memory
   std::uint32_t group_count[3] = {};
   std::uint32_t push_bytes = 0;
   std::uint64_t timestamp_mask = 0;  ///< the bits of a timestamp that count
   float timestamp_ns = 0.0F;         ///< 0 where the queue has no timestamps
+};
+
+/// Memory that buffers hold, staging included, in bytes.
+struct MemoryUse {
+  VkDeviceSize now = 0;
+  VkDeviceSize peak = 0;
 };
 
 /// A logical device with one compute queue.
@@ -78,6 +88,11 @@ class Context {
   /// smaller devices or much larger problems would.
   void lower_limits(const Limits& limits) { limits_ = limits; }
 
+  const MemoryUse& memory_use() const { return memory_use_; }
+  /// Called by buffers as they take memory and give it back.
+  void take_memory(VkDeviceSize bytes);
+  void give_memory(VkDeviceSize bytes) { memory_use_.now -= bytes; }
+
   /// The first memory type allowed by `type_bits` that has all of `flags`.
   /// Throws Error where there is none.
   std::uint32_t memory_type(std::uint32_t type_bits, VkMemoryPropertyFlags flags,
@@ -92,6 +107,7 @@ class Context {
   std::string name_;
   Limits limits_;
   VkPhysicalDeviceMemoryProperties memory_{};
+  MemoryUse memory_use_;
 };
 
 }  // namespace palpate::gpu

@@ -8,7 +8,7 @@ namespace palpate {
 std::vector<DeviceInfo> Device::list(std::string_view name_or_index) {
   gpu::Instance instance;
   std::vector<DeviceInfo> infos;
-  for (gpu::Candidate& candidate : gpu::candidates(instance.handle(), name_or_index)) {
+  for (gpu::Candidate& candidate : gpu::candidates(instance.handle(), gpu::wished(name_or_index))) {
     infos.push_back(std::move(candidate.info));
   }
   return infos;

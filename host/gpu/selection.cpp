@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cctype>
 #include <charconv>
+#include <cstdlib>
 #include <optional>
 
 #include <fmt/format.h>
@@ -114,6 +115,11 @@ bool matches(const DeviceInfo& info, std::string_view name_or_index) {
 }
 
 }  // namespace
+
+std::string wished(std::string_view name_or_index) {
+  const char* value = std::getenv("PALPATE_DEVICE");
+  return name_or_index.empty() && value != nullptr ? value : std::string(name_or_index);
+}
 
 VkDeviceSize device_memory(const VkPhysicalDeviceMemoryProperties& memory) {
   VkDeviceSize bytes = 0;

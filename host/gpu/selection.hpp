@@ -22,6 +22,9 @@ struct Candidate {
   DeviceInfo info;
 };
 
+/// The wish, or where there is none, that of PALPATE_DEVICE in the environment.
+std::string wished(std::string_view name_or_index);
+
 /// Every physical device of the instance. One of the usable ones is marked as chosen, if any fits
 /// the wish: an index, a part of a name (case ignored), or nothing for the best.
 std::vector<Candidate> candidates(VkInstance instance, std::string_view name_or_index);

@@ -1,5 +1,7 @@
 #include "palpate/touch.hpp"
 
+#include <algorithm>
+
 namespace palpate {
 
 std::vector<glm::dvec2> digitacts_array() {
@@ -12,6 +14,12 @@ std::vector<glm::dvec2> digitacts_array() {
     }
   }
   return elements;
+}
+
+bool same_placement(const Touch& a, const Touch& b) {
+  return a.T_robot_sensor.translation_mm == b.T_robot_sensor.translation_mm &&
+         a.T_robot_sensor.theta_rad == b.T_robot_sensor.theta_rad &&
+         std::ranges::equal(a.elements_mm, b.elements_mm);
 }
 
 Touch Recording::touch(std::size_t i) const {

@@ -48,6 +48,14 @@ TEST_F(RecognizeFlags, EveryFlagOfTheModelMatters) {
   }
 }
 
+TEST_F(RecognizeFlags, MemoryIsBoundedWithoutAnotherResult) {
+  EXPECT_EQ(mode({"--memory-mib", "10"}), mode({}));
+  // 8 MiB are for copies alone.
+  expect_refused({"recognize", "u.h5", "--maps", "maps", "--memory-mib", "8"},
+                 {"memory limit of 8.0 MiB", "raise it"});
+  expect_refused({"recognize", "u.h5", "--maps", "maps", "--memory-mib", "0"}, {"--memory-mib 0"});
+}
+
 TEST_F(RecognizeFlags, FramesAreHalfOpen) {
   const json selected = mode({"--frames", "2:5"});
   write_recording(folder_ / "u.h5", part_of(sample_unknown("A", {{2.0, -3.0}, 1.0}, 6), 2, 5));

@@ -143,21 +143,5 @@ TEST(Belief, MoreBinsThanMemoryIsRefusedBeforeAnyIsTaken) {
   expect_refused();
 }
 
-TEST(Belief, AMapLargerThanATableIsRefusedByItsLabel) {
-  Device device = Device::open();
-  gpu::Limits limits = device.context().limits();
-  limits.table_texels = 1000;
-  device.context().lower_limits(limits);
-  const Hypothesis hypothesis{random_map(40, 40, 0.5, 1.0, 114), 1.0};
-  HistogramOptions small;
-  small.lattice = {.x_mm = {-1, 1, 2}, .y_mm = {-1, 1, 2}, .theta_rad = {0, 1, 2}};
-  try {
-    const PoseHistogram histogram(device, std::span(&hypothesis, 1), small);
-    FAIL() << "accepted";
-  } catch (const Error& error) {
-    EXPECT_NE(std::string(error.what()).find("'made up'"), std::string::npos) << error.what();
-  }
-}
-
 }  // namespace
 }  // namespace palpate

@@ -1,5 +1,6 @@
 #include <cmath>
 #include <numbers>
+#include <ostream>
 #include <string>
 #include <vector>
 
@@ -47,6 +48,10 @@ struct Case {
   double step_x;
   double step_y;
   const char* path;  ///< what must be chosen, so that the cases reach every kernel and tile
+
+  friend std::ostream& operator<<(std::ostream& out, const Case& c) {
+    return out << c.step_x << " x " << c.step_y << " cells, " << c.path;
+  }
 };
 
 class Steps : public testing::TestWithParam<Case> {};

@@ -88,6 +88,33 @@ TEST(CommandStream, DeviceTimeIsPartOfTheWallTime) {
   EXPECT_LT(stream.device_seconds(), 1.01 * wall.count());
 }
 
+TEST(CommandStream, StagingMemoryDoesNotGrowWithWhatIsCopied) {
+  Context context("");
+  CommandStream stream(context);
+  const auto words = pattern<std::uint32_t>(2'000'001);
+  {
+    const Buffer a = words_buffer(context, words.size());
+    const Buffer b = words_buffer(context, words.size());
+    const VkDeviceSize buffers = context.memory_use().now;
+    const ScaleAndAdd triple(context, 3);
+    // All of it recorded before the one run: 8 MB up and twice 8 MB down.
+    Words tripled(words.size());
+    Words plain(words.size());
+    stream.upload(a, std::span<const std::uint32_t>(words));
+    triple.dispatch(stream, a, b, 1);
+    stream.download(b, std::span(tripled));
+    stream.download(a, std::span(plain));
+    stream.run();
+    EXPECT_EQ(plain, words);
+    for (std::size_t i = 0; i < words.size(); ++i) {
+      ASSERT_EQ(tripled[i], 3 * words[i] + 1) << i;
+    }
+    EXPECT_LE(context.memory_use().peak, buffers + CommandStream::staging_bytes);
+    EXPECT_GT(stream.device_seconds(), 0.0);
+  }
+  EXPECT_LE(context.memory_use().now, CommandStream::staging_bytes);
+}
+
 TEST(CommandStream, AnyValidationMessageFailsTheRun) {
   Context context("");
   CommandStream stream(context);

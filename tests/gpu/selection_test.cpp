@@ -159,5 +159,17 @@ TEST(DeviceMemory, IsTheLargestHeapOfTheDevice) {
   EXPECT_EQ(device_memory(memory), 16U);
 }
 
+TEST(Wished, IsTheEnvironmentsWhereNothingIsNamed) {
+  const char* before = std::getenv("PALPATE_DEVICE");
+  const std::string kept = before == nullptr ? "" : before;
+  unsetenv("PALPATE_DEVICE");
+  EXPECT_EQ(wished(""), "");
+  EXPECT_EQ(wished("0"), "0");
+  setenv("PALPATE_DEVICE", "llvmpipe", 1);
+  EXPECT_EQ(wished(""), "llvmpipe");
+  EXPECT_EQ(wished("0"), "0");
+  before == nullptr ? unsetenv("PALPATE_DEVICE") : setenv("PALPATE_DEVICE", kept.c_str(), 1);
+}
+
 }  // namespace
 }  // namespace palpate::gpu

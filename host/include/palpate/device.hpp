@@ -32,9 +32,10 @@ class Device {
   /// Every device, in Vulkan's order, with the reason for or against each one.
   static std::vector<DeviceInfo> list(std::string_view name_or_index = {});
 
-  /// Opens a device: by index, by a part of its name (case ignored), or, given nothing, the best:
-  /// discrete before integrated before virtual before CPU. With PALPATE_VALIDATION=1 in the
-  /// environment, Vulkan's validation layer is on and any message it has becomes an Error.
+  /// Opens a device: by index, by a part of its name (case ignored), or, given nothing, the one
+  /// that PALPATE_DEVICE in the environment names in the same way, or else the best: discrete
+  /// before integrated before virtual before CPU. With PALPATE_VALIDATION=1 in the environment,
+  /// Vulkan's validation layer is on and any message it has becomes an Error.
   /// @throws Error where none fits, naming every device and why it was refused.
   static Device open(std::string_view name_or_index = {});
 

@@ -30,6 +30,9 @@ struct HistogramOptions {
   /// learned, whose map holds only the prior. It costs no bins: its likelihood is the same at every
   /// pose. A positive number, or none.
   std::optional<double> none_weight = {};
+  /// Most memory of the device that the histogram may take, in bytes, staging memory included; by
+  /// default all of it. Tables shrink to fit, which costs time and changes no bit of the result.
+  std::optional<std::uint64_t> memory_limit_bytes = {};
 };
 
 /// Probabilities of parts of one object's poses.
@@ -46,7 +49,8 @@ class PoseHistogram {
   /// Uploads the maps and sets a uniform belief. Ties go to the first object and the lowest bin.
   /// @throws Error on an empty list, a map with no cells or with infinite log odds, maps of
   /// different priors where none is given, weights that are not positive and finite, a lattice,
-  /// gamma or prior out of range, or too little device memory.
+  /// gamma or prior out of range, or more memory than the limit or the device allows, which is said
+  /// before any is taken.
   PoseHistogram(Device& device, std::span<const Hypothesis> hypotheses,
                 const HistogramOptions& options);
   ~PoseHistogram();

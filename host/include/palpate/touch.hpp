@@ -29,6 +29,9 @@ struct Touch {
   std::span<const std::uint8_t> valid = {};  ///< [e] 0 = dead element; empty: all are alive
 };
 
+/// True where both touches have the same elements in the same places of the robot frame, exactly.
+bool same_placement(const Touch& a, const Touch& b);
+
 /// Where an unknown object really was, when it is known.
 struct Truth {
   std::string object;

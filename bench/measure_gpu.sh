@@ -1,0 +1,66 @@
+#!/usr/bin/env bash
+# Everything that a machine with a GPU is asked for, in one call: builds, runs the tests on the
+# device and measures the kernels; logs and JSON are left in FOLDER. The packages must be there
+# (see dev). Ends with status 1 if any step failed, but never skips the steps after it.
+set -euo pipefail
+
+usage() {
+  echo "usage: bench/measure_gpu.sh FOLDER [--device NAME|INDEX] [--quick]" >&2
+  exit 2
+}
+
+folder='' device='' quick=0
+while [ $# -gt 0 ]; do
+  case $1 in
+    --device)
+      [ $# -ge 2 ] || usage
+      device=$2
+      shift
+      ;;
+    --quick) quick=1 ;;
+    -*) usage ;;
+    *)
+      [ -z "$folder" ] || usage
+      folder=$1
+      ;;
+  esac
+  shift
+done
+[ -n "$folder" ] || usage
+mkdir -p "$folder"
+folder=$(cd "$folder" && pwd)
+cd "$(dirname "${BASH_SOURCE[0]}")/.."
+
+status=0
+# step NAME COMMAND...: what the command says goes to FOLDER/NAME.log.
+step() {
+  local name=$1 start=$SECONDS
+  shift
+  if "$@" >"$folder/$name.log" 2>&1; then
+    echo "$name: done in $((SECONDS - start)) s"
+  else
+    echo "$name: failed, see $folder/$name.log" >&2
+    status=1
+    return 1
+  fi
+}
+
+# Programs that take no --device, such as the tests, follow the environment.
+without_slow=() bench_options=()
+if [ -n "$device" ]; then
+  export PALPATE_DEVICE=$device
+  bench_options+=(--device "$device")
+fi
+if [ $quick -eq 1 ]; then
+  without_slow=(-LE slow)
+  bench_options+=(--quick)
+fi
+
+step configure cmake --preset release -DPALPATE_TESTS=ON || exit 1
+step build cmake --build --preset release || exit 1
+step devices build/palpate devices || exit 1
+step bench build/palpate-bench kernels "${bench_options[@]}" --json "$folder/kernels.json" || true
+# The bench's own test would only run it once more.
+step tests ctest --preset release -j "$(nproc)" -E '^bench_test' "${without_slow[@]}" \
+  --output-junit "$folder/tests.xml" || true
+exit $status

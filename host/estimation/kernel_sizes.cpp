@@ -1,0 +1,101 @@
+#include "kernel_sizes.hpp"
+
+#include <algorithm>
+#include <bit>
+
+#include "interface.h"
+
+namespace palpate {
+
+namespace {
+
+/// Workgroups of a reduction that keep every core busy, before they grow in the place of their
+/// number: measured on a CPU device of two cores, where 16 of them took a fifth longer; several per
+/// unit of a GPU that has a hundred.
+std::int64_t groups_that_fill(const gpu::Limits& limits) { return limits.cpu ? 4 : 1024; }
+
+/// The largest power of two up to `wanted` lanes that the device runs in one workgroup.
+std::uint32_t lanes_up_to(const gpu::Limits& limits, std::uint32_t wanted) {
+  return std::bit_floor(std::min({wanted, limits.group_invocations, limits.group_size[0]}));
+}
+
+/// A subgroup reads one stretch of memory: a CPU runs one ahead of the others, and for a GPU that
+/// is a whole number of cache lines.
+std::uint32_t side_by_side(const gpu::Limits& limits, std::uint32_t lanes) {
+  return std::min(std::bit_floor(std::max(limits.subgroup, 1U)), lanes);
+}
+
+}  // namespace
+
+ReductionSizes reduction_sizes(const gpu::Limits& limits, std::int64_t bins) {
+  // A CPU runs the lanes of a workgroup one vector after the other, so that more of them gain
+  // nothing; on a GPU they hide each other's wait for memory.
+  const std::uint32_t wanted = limits.cpu ? 64 : 256;
+  // Each lane shares its maximum, the bin and the sum in the end.
+  constexpr std::uint32_t shared_per_lane = 16;
+  const std::uint32_t lanes =
+      lanes_up_to(limits, std::min(wanted, limits.shared_bytes / shared_per_lane));
+  // Long stretches amortise the tree of the end. On a GPU 32 texels do, 512 bytes of a lane.
+  const std::int64_t most = limits.cpu ? 128 : 32;
+  constexpr std::int64_t batch = shaders::REDUCE_BATCH;
+  const std::int64_t texels = bins / 2 / (lanes * groups_that_fill(limits));
+  return {.lanes = lanes,
+          .side_by_side = side_by_side(limits, lanes),
+          .texels_per_lane =
+              static_cast<std::uint32_t>(std::clamp(texels / batch * batch, batch, most))};
+}
+
+MarginalSizes marginal_sizes(const gpu::Limits& limits, std::int64_t plane, std::int64_t thetas) {
+  // Thetas times lanes of parts lie in shared memory, of which every device has 16 KiB. A GPU
+  // keeps several workgroups at once if each takes no more than that.
+  const std::uint32_t lanes = lanes_up_to(limits, limits.cpu ? 64 : 128);
+  const std::uint32_t row_bytes = (lanes + 1) * sizeof(float);
+  const std::uint32_t most_thetas =
+      std::bit_floor(std::min({limits.shared_bytes / row_bytes, lanes, limits.cpu ? 64U : 32U}));
+  const std::int64_t pairs_of_a_plane = (plane + 2 * lanes - 1) / (2 * lanes);
+  const std::int64_t chunks = (thetas + most_thetas - 1) / most_thetas;
+  const std::int64_t pairs = pairs_of_a_plane * chunks / groups_that_fill(limits);
+  return {.lanes = lanes,
+          .side_by_side = side_by_side(limits, lanes),
+          .pairs_per_lane = static_cast<std::uint32_t>(
+              std::clamp<std::int64_t>(pairs, 1, std::min<std::int64_t>(16, pairs_of_a_plane))),
+          .thetas = most_thetas};
+}
+
+std::uint32_t independent_lanes(const gpu::Limits& limits) {
+  // Small workgroups spread a small lattice over all units, and 64 lanes are whole subgroups of
+  // nearly every device.
+  return lanes_up_to(limits, std::max(64U, limits.subgroup));
+}
+
+std::uint32_t block_cells(const gpu::Limits& limits) {
+  // The larger the block, the more cells share an exponential; but a tile must be at least one
+  // whole subgroup.
+  std::uint32_t block = 4;
+  const auto invocations = [](std::uint32_t cells) {
+    const std::uint32_t edge = shaders::TILE_CELLS / cells;
+    return edge * edge;
+  };
+  while (block > 1 && invocations(block) < limits.subgroup &&
+         invocations(block / 2) <= limits.group_invocations) {
+    block /= 2;
+  }
+  return block;
+}
+
+std::uint32_t most_bins_per_invocation(const gpu::Limits& limits, std::int64_t bins) {
+  // A CPU device is full at once. 25 bins are what an invocation holds in registers.
+  constexpr std::int64_t largest = 25;
+  constexpr std::int64_t invocations_that_fill_a_gpu = 1 << 16;
+  return static_cast<std::uint32_t>(
+      limits.cpu ? largest
+                 : std::clamp<std::int64_t>(bins / invocations_that_fill_a_gpu, 1, largest));
+}
+
+double work_per_run(const gpu::Limits& limits) {
+  // About half a second on a CPU device and on a small GPU, so that progress shows; watchdogs of
+  // desktop GPUs allow two.
+  return limits.cpu ? 5e8 : 1e10;
+}
+
+}  // namespace palpate

@@ -1,0 +1,88 @@
+#include "memory_plan.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include <fmt/format.h>
+
+#include "belief.hpp"
+#include "command_stream.hpp"
+#include "dense_likelihood.hpp"
+#include "interface.h"
+#include "palpate/error.hpp"
+
+namespace palpate {
+
+namespace {
+
+/// Memory that a histogram may take, and who says so.
+struct Room {
+  std::uint64_t bytes = 0;
+  bool set_by_options = false;
+};
+
+Room room_of(const gpu::Context& context, const HistogramOptions& options) {
+  if (options.memory_limit_bytes && *options.memory_limit_bytes < context.limits().memory) {
+    return {*options.memory_limit_bytes, true};
+  }
+  return {context.limits().memory, false};
+}
+
+[[noreturn]] void refuse(const gpu::Context& context, const PoseLattice& lattice,
+                         std::size_t objects, const Room& room, double needed) {
+  constexpr double mib = 1 << 20;
+  const std::string what = fmt::format("{} objects x {} x {} x {} pose bins need {:.0f} MiB",
+                                       objects, lattice.x_mm.count, lattice.y_mm.count,
+                                       lattice.theta_rad.count, std::ceil(needed / mib));
+  if (room.set_by_options) {
+    throw Error(
+        Fault::input,
+        fmt::format("memory limit of {:.1f} MiB: {}; raise it, or use fewer bins or objects",
+                    static_cast<double>(room.bytes) / mib, what));
+  }
+  throw Error(Fault::system,
+              fmt::format("{}, device '{}' has {:.0f}; use fewer bins or objects", what,
+                          context.name(), static_cast<double>(room.bytes) / mib));
+}
+
+}  // namespace
+
+std::size_t plan_memory(const gpu::Context& context, std::span<const Hypothesis> hypotheses,
+                        const HistogramOptions& options) {
+  const PoseLattice& lattice = options.lattice;
+  const std::size_t objects = hypotheses.size();
+  const Room room = room_of(context, options);
+  // The belief, and for an array at rest that of No Contact everywhere.
+  const std::size_t beliefs = options.still_array ? 2 : 1;
+
+  // A first look in floating point: bins may be too many to count.
+  const double bins_alone = 8.0 * static_cast<double>(beliefs * objects) * lattice.x_mm.count *
+                            lattice.y_mm.count * lattice.theta_rad.count;
+  if (bins_alone > static_cast<double>(room.bytes)) {
+    refuse(context, lattice, objects, room, bins_alone);
+  }
+  const std::size_t most = DenseLikelihood::batch_for(context, lattice);
+  const std::uint64_t held = beliefs * Belief::bytes_needed(context, lattice, objects) +
+                             Belief::marginal_bytes(context, lattice) +
+                             (room.set_by_options ? gpu::CommandStream::staging_bytes : 0);
+  const auto needed = [&](std::size_t elements) {
+    return held + DenseLikelihood::bytes_needed(context, hypotheses, lattice, elements);
+  };
+  // Whole products, so that the limit does not change a bit of the result.
+  constexpr std::size_t step = shaders::FACTORS_PER_LOG;
+  if (needed(std::min(most, step)) > room.bytes) {
+    refuse(context, lattice, objects, room, static_cast<double>(needed(std::min(most, step))));
+  }
+  if (needed(most) <= room.bytes) {
+    return most;
+  }
+  std::size_t fits = step;
+  std::size_t too_many = most;
+  while (too_many - fits > step) {
+    const std::size_t middle = (fits + too_many) / 2 / step * step;
+    (needed(middle) <= room.bytes ? fits : too_many) = middle;
+  }
+  return fits;
+}
+
+}  // namespace palpate

@@ -1,0 +1,51 @@
+#include "slab.hpp"
+
+#include <algorithm>
+
+#include <fmt/format.h>
+
+#include "kernel_sizes.hpp"
+#include "palpate/error.hpp"
+#include "two_float.hpp"
+
+namespace palpate {
+
+std::vector<SlabExtent> cut_into_slabs(const gpu::Context& context, const PoseLattice& lattice,
+                                       std::uint32_t reduction_bins) {
+  const gpu::Limits& limits = context.limits();
+  const auto binding_bins = static_cast<std::int64_t>(
+      std::min({limits.storage_range / sizeof(TwoFloat), limits.allocation / sizeof(TwoFloat),
+                VkDeviceSize{limits.table_texels} * 2,
+                VkDeviceSize{limits.group_count[0]} * reduction_bins}) /
+      2 * 2);
+  // However few bins an invocation takes, a plane's rows must fit one dispatch.
+  const std::int64_t plane_bins =
+      std::min(binding_bins, std::int64_t{limits.group_count[0]} * independent_lanes(limits));
+  const std::int64_t rows =
+      std::min<std::int64_t>(plane_bins / lattice.x_mm.count, lattice.y_mm.count);
+  if (rows == 0) {
+    throw Error(Fault::input, fmt::format("bins x = {}: device '{}' takes at most {}; use fewer",
+                                          lattice.x_mm.count, context.name(), plane_bins));
+  }
+  const std::int64_t thetas =
+      rows < lattice.y_mm.count
+          ? 1
+          : std::min({binding_bins / lattice.plane(),
+                      std::int64_t{std::min(limits.group_count[1], limits.group_count[2])},
+                      std::int64_t{lattice.theta_rad.count}});
+  std::vector<SlabExtent> slabs;
+  for (std::int64_t theta = 0; theta < lattice.theta_rad.count; theta += thetas) {
+    for (std::int64_t row = 0; row < lattice.y_mm.count; row += rows) {
+      slabs.push_back(
+          {.theta_first = static_cast<std::uint32_t>(theta),
+           .theta_count =
+               static_cast<std::uint32_t>(std::min(thetas, lattice.theta_rad.count - theta)),
+           .row_first = static_cast<std::uint32_t>(row),
+           .row_count = static_cast<std::uint32_t>(std::min(rows, lattice.y_mm.count - row)),
+           .nx = static_cast<std::uint32_t>(lattice.x_mm.count)});
+    }
+  }
+  return slabs;
+}
+
+}  // namespace palpate

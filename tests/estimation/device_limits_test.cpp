@@ -1,0 +1,177 @@
+// The kernels with the sizes that they take on other devices than the one at hand.
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include <gtest/gtest.h>
+
+#include "made_up_devices.hpp"
+#include "palpate/error.hpp"
+#include "palpate/pose_histogram.hpp"
+#include "synthetic.hpp"
+
+namespace palpate {
+namespace {
+
+constexpr double two_pi = 2.0 * std::numbers::pi;
+// What the method allows a log-likelihood to differ from float64, in nats per touch.
+constexpr double per_touch = 1e-4;
+
+std::vector<Hypothesis> two_objects() {
+  return {{random_map(31, 27, 0.5, 12.0, 141), 1.0}, {random_map(23, 29, 0.5, 12.0, 142), 2.0}};
+}
+
+/// A lattice of nx x 17 x 33 bins: more than one chunk of thetas.
+PoseLattice lattice_of(double step_mm, int nx) {
+  return {.x_mm = {-2.0, -2.0 + step_mm * nx, nx},
+          .y_mm = {-3.0, -3.0 + step_mm * 17, 17},
+          .theta_rad = {0.0, two_pi, 33}};
+}
+
+class DeviceLimits : public testing::TestWithParam<MadeUpDevice> {
+ protected:
+  DeviceLimits() { device.context().lower_limits(GetParam().limits(device.context().limits())); }
+
+  Device device = Device::open();
+};
+
+TEST_P(DeviceLimits, LeaveBeliefsAsTheReferenceHasThem) {
+  const Recording recording = random_recording(2, 36, 143);
+  const std::vector<Touch> touches = all_touches(recording);
+  const std::vector<Hypothesis> objects = two_objects();
+  // Register tiles and runs of bins, pairs of bins within a row and across rows.
+  for (const auto& [step_mm, nx] : {std::pair(0.1, 19), std::pair(0.8, 20)}) {
+    HistogramOptions options;
+    options.lattice = lattice_of(step_mm, nx);
+    PoseHistogram histogram(device, objects, options);
+    EXPECT_EQ(histogram.estimate().mode.bin, 0) << "the first of equals";
+    histogram.update(touches);
+    const reference::Posterior expected = reference_posterior(objects, options, touches);
+    EXPECT_LT(likelihood_error(histogram, expected), 2 * per_touch);
+    // Two touches of that error change a probability by as much.
+    constexpr double probability = 4 * per_touch;
+    const Estimate estimate = histogram.estimate();
+    EXPECT_LT(largest_difference(estimate.identity, reference::identity(expected)), probability);
+    EXPECT_EQ(estimate.mode.object, reference::mode(expected).object);
+    EXPECT_EQ(estimate.mode.bin, reference::mode(expected).bin);
+    for (const int object : {0, 1}) {
+      const Marginals marginals = histogram.marginals(object);
+      EXPECT_LT(largest_difference(marginals.xy, reference::marginal_xy(expected, object)),
+                probability);
+      EXPECT_LT(largest_difference(marginals.theta, reference::marginal_theta(expected, object)),
+                probability);
+    }
+  }
+}
+
+TEST_P(DeviceLimits, LeaveAStillArrayAsTheReferenceHasIt) {
+  Recording recording = random_recording(2, 60, 144);
+  recording.T_robot_sensor[1] = recording.T_robot_sensor[0];
+  std::fill(recording.pressure.begin() + 70, recording.pressure.end(), 0.0);
+  const std::vector<Touch> touches = all_touches(recording);
+  const std::vector<Hypothesis> objects = two_objects();
+  HistogramOptions options;
+  options.lattice = lattice_of(0.1, 19);
+  options.still_array = true;
+  PoseHistogram histogram(device, objects, options);
+  histogram.update(touches);
+  // Some of the 60 elements count twice.
+  EXPECT_LT(likelihood_error(histogram, reference_posterior(objects, options, touches)),
+            2 * 2 * per_touch * 60 / 36);
+}
+
+TEST_P(DeviceLimits, LeaveSumsOverMillionsOfBinsAsFloat64HasThem) {
+  const Hypothesis object{random_map(31, 27, 0.5, 2.0, 145), 1.0};
+  HistogramOptions options;
+  // So many that a GPU's lanes take more than one batch.
+  options.lattice = {.x_mm = {-5.0, 5.0, 203}, .y_mm = {-5.0, 5.0, 199}, .theta_rad = {0, 1, 107}};
+  const Recording recording = random_recording(1, 3, 146);
+  PoseHistogram histogram(device, std::span(&object, 1), options);
+  histogram.update(all_touches(recording));
+  const std::vector<double> logs = histogram.log_likelihood(0);
+  const auto most = std::max_element(logs.begin(), logs.end());
+  const Estimate estimate = histogram.estimate();
+  EXPECT_EQ(estimate.mode.bin, most - logs.begin());
+  EXPECT_EQ(estimate.mode.log_likelihood, *most);
+  std::vector<double> xy(static_cast<std::size_t>(options.lattice.plane()), 0.0);
+  std::vector<double> theta(107, 0.0);
+  double total = 0.0;
+  for (std::size_t i = 0; i < logs.size(); ++i) {
+    const double p = std::exp(logs[i] - *most);
+    xy[i % xy.size()] += p;
+    theta[i / xy.size()] += p;
+    total += p;
+  }
+  for (double& p : xy) {
+    p /= total;
+  }
+  for (double& p : theta) {
+    p /= total;
+  }
+  // Sums of float32 parts, each of at most 512 terms: a relative 512 * 6e-8.
+  const Marginals marginals = histogram.marginals(0);
+  EXPECT_LT(largest_difference(marginals.xy, xy), 3e-5 * *std::max_element(xy.begin(), xy.end()));
+  EXPECT_LT(largest_difference(marginals.theta, theta),
+            3e-5 * *std::max_element(theta.begin(), theta.end()));
+}
+
+TEST_P(DeviceLimits, LeaveMapsAsTheReferenceHasThem) {
+  const Recording recording = random_recording(2, 36, 147);
+  const std::vector<Touch> touches = all_touches(recording);
+  for (const double cell_mm : {0.2, 1.0}) {
+    const MapOptions options{.cell_mm = cell_mm};
+    MapBuilder builder(device, options);
+    builder.add(touches);
+    EXPECT_LT(map_error(builder.build("made up"), touches, options), 1e-3)
+        << "what the method allows";
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Devices, DeviceLimits, testing::ValuesIn(made_up_devices));
+
+/// 46 x 46 cells with the border.
+constexpr int large_map_cells = 40;
+
+TEST(LargeMap, IsReadFromStorageWhereNoTableHoldsIt) {
+  const Recording recording = random_recording(2, 36, 148);
+  const std::vector<Touch> touches = all_touches(recording);
+  // Beside one that a table holds, of the same cells.
+  const std::vector<Hypothesis> objects{
+      {random_map(large_map_cells, large_map_cells, 0.5, 12.0, 149), 1.0},
+      {random_map(9, 11, 0.5, 12.0, 150), 1.0}};
+  Device device = Device::open();
+  gpu::Limits limits = device.context().limits();
+  limits.table_texels = 46 * 46 - 1;
+  device.context().lower_limits(limits);
+  for (const double step_mm : {0.1, 0.8}) {
+    HistogramOptions options;
+    options.lattice = lattice_of(step_mm, 19);
+    PoseHistogram histogram(device, objects, options);
+    EXPECT_EQ(histogram.paths().size(), 2U);
+    histogram.update(touches);
+    EXPECT_LT(likelihood_error(histogram, reference_posterior(objects, options, touches)),
+              2 * per_touch);
+  }
+}
+
+TEST(LargeMap, ThatNoBufferHoldsIsRefusedByItsLabel) {
+  Device device = Device::open();
+  gpu::Limits limits = device.context().limits();
+  limits.table_texels = 1000;
+  limits.storage_range = (46 * 46 - 1) * sizeof(float);
+  device.context().lower_limits(limits);
+  const Hypothesis object{random_map(large_map_cells, large_map_cells, 0.5, 1.0, 114), 1.0};
+  HistogramOptions small;
+  small.lattice = {.x_mm = {-1, 1, 2}, .y_mm = {-1, 1, 2}, .theta_rad = {0, 1, 2}};
+  try {
+    const PoseHistogram histogram(device, std::span(&object, 1), small);
+    FAIL() << "accepted";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.fault(), Fault::input);
+    EXPECT_NE(std::string(error.what()).find("'made up'"), std::string::npos) << error.what();
+  }
+}
+
+}  // namespace
+}  // namespace palpate

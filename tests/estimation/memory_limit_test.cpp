@@ -1,0 +1,170 @@
+#include <numbers>
+#include <optional>
+
+#include <gtest/gtest.h>
+
+#include "context.hpp"
+#include "palpate/error.hpp"
+#include "palpate/pose_histogram.hpp"
+#include "synthetic.hpp"
+
+namespace palpate {
+namespace {
+
+constexpr std::uint64_t mib = 1 << 20;
+
+std::vector<Hypothesis> two_objects() {
+  return {{random_map(61, 57, 0.5, 12.0, 151), 1.0}, {random_map(33, 29, 1.0, 12.0, 152), 1.0}};
+}
+
+HistogramOptions options_of(int x, int y, int theta, bool still) {
+  HistogramOptions options;
+  options.lattice = {.x_mm = {-5.0, 5.0, x},
+                     .y_mm = {-5.0, 5.0, y},
+                     .theta_rad = {0.0, 2.0 * std::numbers::pi, theta}};
+  options.still_array = still;
+  return options;
+}
+
+/// All that a histogram tells, and the most memory that it took on the way.
+struct Outcome {
+  std::vector<std::vector<double>> told;
+  std::uint64_t peak_bytes = 0;
+  std::uint64_t device_bytes = 0;
+};
+
+Outcome run(const HistogramOptions& options, std::span<const Touch> touches) {
+  Device device = Device::open();
+  const std::vector<Hypothesis> objects = two_objects();
+  PoseHistogram histogram(device, objects, options);
+  histogram.update(touches);
+  Outcome outcome;
+  outcome.told.push_back(histogram.estimate().identity);
+  for (const int object : {0, 1}) {
+    const Marginals marginals = histogram.marginals(object);
+    outcome.told.insert(outcome.told.end(),
+                        {marginals.xy, marginals.theta, histogram.log_likelihood(object)});
+  }
+  outcome.peak_bytes = device.context().memory_use().peak;
+  outcome.device_bytes = histogram.device_bytes();
+  return outcome;
+}
+
+/// The message of the refusal; none where the histogram is built.
+std::optional<std::string> refusal(const HistogramOptions& options) {
+  Device device = Device::open();
+  try {
+    const PoseHistogram histogram(device, two_objects(), options);
+  } catch (const Error& error) {
+    EXPECT_EQ(error.fault(), Fault::input);
+    EXPECT_EQ(device.context().memory_use().peak, 0U) << "refused after memory was taken";
+    return error.what();
+  }
+  return {};
+}
+
+/// The smallest limit that is accepted, to 16 KiB.
+std::uint64_t least_limit(HistogramOptions options) {
+  std::uint64_t refused = 0;
+  std::uint64_t accepted = 256 * mib;
+  while (accepted - refused > 16 << 10) {
+    const std::uint64_t middle = (refused + accepted) / 2;
+    options.memory_limit_bytes = middle;
+    (refusal(options) ? refused : accepted) = middle;
+  }
+  return accepted;
+}
+
+struct Size {
+  int x;
+  int y;
+  int theta;
+  std::size_t elements;
+  bool still;
+
+  friend std::ostream& operator<<(std::ostream& out, const Size& size) {
+    return out << size.x << " x " << size.y << " x " << size.theta << " bins, " << size.elements
+               << " elements" << (size.still ? " at rest" : "");
+  }
+};
+
+class MemoryLimit : public testing::TestWithParam<Size> {};
+
+TEST_P(MemoryLimit, IsKeptAndChangesNoBit) {
+  const auto [x, y, theta, elements, still] = GetParam();
+  Recording recording = random_recording(3, elements, 153);
+  if (still) {
+    recording.T_robot_sensor.assign(3, {{0.7, -0.4}, 0.3});
+    for (std::size_t i = 0; i < recording.pressure.size(); ++i) {
+      recording.pressure[i] = i % 4 == 0 ? recording.pressure[i] : 0.0;
+    }
+  }
+  const std::vector<Touch> touches = all_touches(recording);
+  HistogramOptions options = options_of(x, y, theta, still);
+  const Outcome unlimited = run(options, touches);
+  const std::uint64_t least = least_limit(options);
+  EXPECT_GE(least, unlimited.told.back().size() * 2 * 8) << "two objects' bins";
+  for (const std::uint64_t limit : {least, least + least / 20, 2 * least}) {
+    options.memory_limit_bytes = limit;
+    const Outcome limited = run(options, touches);
+    EXPECT_LE(limited.peak_bytes, limit);
+    EXPECT_LE(limited.device_bytes, limit);
+    EXPECT_EQ(limited.told, unlimited.told) << limit << " bytes";
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Sizes, MemoryLimit,
+                         testing::Values(Size{1, 1, 1, 36, false}, Size{25, 25, 16, 36, false},
+                                         Size{9, 7, 1001, 300, false}, Size{60, 50, 40, 36, false},
+                                         Size{25, 25, 100, 400, true}));
+
+TEST(MemoryLimit, ThatIsTooLowIsRefusedWithWhatIsNeeded) {
+  HistogramOptions options = options_of(100, 100, 100, false);
+  options.memory_limit_bytes = 20 * mib;
+  const std::string message = refusal(options).value_or("accepted");
+  // Sixteen million bytes of bins, tables and maps, and 8 MiB of staging memory.
+  EXPECT_EQ(
+      message,
+      "memory limit of 20.0 MiB: 2 objects x 100 x 100 x 100 pose bins need 24 MiB; raise it, "
+      "or use fewer bins or objects");
+  options.memory_limit_bytes = 24 * mib;
+  EXPECT_EQ(refusal(options), std::nullopt) << "what the message names is enough";
+}
+
+TEST(MemoryLimit, AboveTheDevicesMemoryIsTheDevices) {
+  Device device = Device::open();
+  gpu::Limits limits = device.context().limits();
+  limits.memory = 10 * mib;
+  device.context().lower_limits(limits);
+  HistogramOptions options = options_of(100, 100, 100, false);
+  options.memory_limit_bytes = 100 * mib;
+  try {
+    const PoseHistogram histogram(device, two_objects(), options);
+    FAIL() << "accepted";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.fault(), Fault::system);
+    EXPECT_NE(std::string(error.what()).find("has 10;"), std::string::npos) << error.what();
+  }
+}
+
+TEST(Histogram, GivesTheSameBitsHoweverTouchesAreGrouped) {
+  const Recording recording = random_recording(7, 37, 154);
+  const std::vector<Touch> touches = all_touches(recording);
+  const std::vector<Hypothesis> objects = two_objects();
+  Device device = Device::open();
+  for (const int bins : {11, 91}) {  // runs of bins, register tiles
+    const HistogramOptions options = options_of(bins, bins, 5, false);
+    PoseHistogram together(device, objects, options);
+    together.update(touches);
+    PoseHistogram apart(device, objects, options);
+    for (const Touch& touch : touches) {
+      apart.update(touch);
+    }
+    for (const int object : {0, 1}) {
+      EXPECT_EQ(apart.log_likelihood(object), together.log_likelihood(object));
+    }
+  }
+}
+
+}  // namespace
+}  // namespace palpate
