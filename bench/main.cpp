@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
+#include "experiment.hpp"
 #include "kernels.hpp"
 #include "palpate/error.hpp"
 
@@ -20,6 +21,24 @@ int main(int argc, char** argv) {
   kernels->add_flag("--quick", options.quick, "Small sizes, in less than a minute");
   kernels->add_option("--device", options.device, "Vulkan device, by a part of its name or index");
   kernels->callback([&] { palpate::bench::measure_kernels(options, std::span(argv, argc)); });
+  palpate::bench::ExperimentOptions experiment_options;
+  auto* experiment = app.add_subcommand(
+      "experiment",
+      "The paper's Sec. IV on simulated letters: identity and pose error against the number of "
+      "touches, for histogram and particle filters; calibration; objects never learned");
+  experiment->add_option("--trials", experiment_options.trials,
+                         "Trials per letter, 10 by default, or 4 with --quick");
+  experiment->add_option("--touches", experiment_options.touches,
+                         "Touches per trial, 50 by default, or 12 with --quick; at most 192");
+  experiment->add_option("--json", experiment_options.json, "Also write the results to this file");
+  experiment->add_option("--csv", experiment_options.csv, "Also write tables to this folder");
+  experiment->add_option("--plots", experiment_options.plots,
+                         "Also draw the paper's figures in this folder, by gnuplot");
+  experiment->add_flag("--quick", experiment_options.quick, "Few trials and touches, in seconds");
+  experiment->add_option("--device", experiment_options.device,
+                         "Vulkan device, by a part of its name or index");
+  experiment->callback(
+      [&] { palpate::bench::run_experiment(experiment_options, std::span(argv, argc)); });
   try {
     app.parse(argc, argv);
     return 0;

@@ -1,7 +1,4 @@
-#include <sys/wait.h>
-
 #include <cmath>
-#include <cstdlib>
 #include <fstream>
 #include <map>
 #include <string>
@@ -9,16 +6,11 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
+#include "bench_program.hpp"
 #include "io/scratch_folder.hpp"
 
 namespace palpate {
 namespace {
-
-/// Exit status of palpate-bench with these arguments, which hold nothing that a shell would expand.
-int run(const std::string& arguments) {
-  const int status = std::system(("'" PALPATE_BENCH "' " + arguments + " >/dev/null").c_str());
-  return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
-}
 
 /// The value of a measurement, which must be there.
 double value_of(const nlohmann::json& measured, const std::string& name) {
@@ -34,7 +26,7 @@ double value_of(const nlohmann::json& measured, const std::string& name) {
 TEST(PalpateBench, QuickRunFillsTheDocumentAndKeepsTheErrorBounds) {
   const ScratchFolder folder;
   const std::string file = folder / "bench.json";
-  ASSERT_EQ(run("kernels --quick --json " + file), 0);
+  ASSERT_EQ(run_bench("kernels --quick --json " + file), 0);
   const auto document = nlohmann::json::parse(std::ifstream(file));
   for (const char* fact : {"device", "compiler", "date", "command line"}) {
     EXPECT_FALSE(document.at(fact).get<std::string>().empty()) << fact;
@@ -88,12 +80,13 @@ TEST(PalpateBench, QuickRunFillsTheDocumentAndKeepsTheErrorBounds) {
 
 TEST(PalpateBench, RefusesAFileThatCannotBeWrittenBeforeItMeasures) {
   const ScratchFolder folder;
-  EXPECT_EQ(run("kernels --json " + (folder / "missing/bench.json").string() + " 2>/dev/null"), 2);
+  EXPECT_EQ(
+      run_bench("kernels --json " + (folder / "missing/bench.json").string() + " 2>/dev/null"), 2);
 }
 
 TEST(PalpateBench, RefusesWhatItDoesNotKnow) {
-  EXPECT_EQ(run("kernels --slowly 2>/dev/null"), 2);
-  EXPECT_EQ(run("2>/dev/null"), 2);
+  EXPECT_EQ(run_bench("kernels --slowly 2>/dev/null"), 2);
+  EXPECT_EQ(run_bench("2>/dev/null"), 2);
 }
 
 }  // namespace

@@ -1,0 +1,168 @@
+#include <algorithm>
+#include <string>
+
+#include <fmt/format.h>
+
+#include "atomic_file.hpp"
+#include "experiment_result.hpp"
+
+namespace palpate::bench {
+
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+Json json_of(const std::optional<ErrorSummary>& error) {
+  if (!error) {
+    return nullptr;
+  }
+  return {{"mean", error->mean_mm}, {"median", error->median_mm}, {"p95", error->p95_mm}};
+}
+
+Json json_of(const FilterRun& run) {
+  Json curve = Json::array();
+  for (const CurvePoint& point : curve_of(run)) {
+    curve.push_back({{"touches", point.touches},
+                     {"accuracy", point.accuracy},
+                     {"mean_confidence", point.mean_confidence},
+                     {"located", point.located},
+                     {"error_mm", json_of(point.error)},
+                     {"refined_error_mm", json_of(point.refined_error)}});
+  }
+  const Calibration calibration = calibration_of(run);
+  Json bins = Json::array();
+  for (const Calibration::Bin& bin : calibration.bins) {
+    bins.push_back({{"lower", bin.lower},
+                    {"count", bin.count},
+                    {"mean_confidence", bin.mean_confidence},
+                    {"fraction_right", bin.fraction_right}});
+  }
+  return {
+      {"filter", run.filter},
+      {"name", run.name},
+      {"count", run.count},
+      {"seconds", run.seconds},
+      {"curve", std::move(curve)},
+      {"calibration", {{"expected_error", calibration.expected_error}, {"bins", std::move(bins)}}}};
+}
+
+Json json_of(const NoneRun& run, const std::vector<double>& log10_weights) {
+  Json curve = Json::array();
+  for (const double log10_weight : log10_weights) {
+    curve.push_back({{"log10_weight", log10_weight},
+                     {"lost", run.lost(log10_weight)},
+                     {"noticed", run.noticed(log10_weight)}});
+  }
+  return {{"touches", run.touches},
+          {"learned_log10_weight", run.learned_log10_weight},
+          {"unlearned_log10_weight", run.unlearned_log10_weight},
+          {"curve", std::move(curve)}};
+}
+
+std::string cells(const std::optional<ErrorSummary>& error) {
+  return error
+             ? fmt::format("{:.6g},{:.6g},{:.6g}", error->mean_mm, error->median_mm, error->p95_mm)
+             : ",,";
+}
+
+std::string cell(const std::optional<double>& value) {
+  return value ? fmt::format("{:.6g}", *value) : "";
+}
+
+std::string curves(const ExperimentResult& result) {
+  std::string table =
+      "filter,count,touches,accuracy,mean_confidence,located,error_mean_mm,error_median_mm,"
+      "error_p95_mm,refined_mean_mm,refined_median_mm,refined_p95_mm\n";
+  for (const FilterRun& run : result.runs) {
+    for (const CurvePoint& point : curve_of(run)) {
+      table += fmt::format("{},{},{},{:.6g},{:.6g},{},{},{}\n", run.filter, run.count,
+                           point.touches, point.accuracy, point.mean_confidence, point.located,
+                           cells(point.error), cells(point.refined_error));
+    }
+  }
+  return table;
+}
+
+std::string calibration(const ExperimentResult& result) {
+  std::string table = "filter,count,confidence_from,estimates,mean_confidence,fraction_right\n";
+  for (const FilterRun& run : result.runs) {
+    for (const Calibration::Bin& bin : calibration_of(run).bins) {
+      table += fmt::format("{},{},{:.1f},{},{:.6g},{:.6g}\n", run.filter, run.count, bin.lower,
+                           bin.count, bin.mean_confidence, bin.fraction_right);
+    }
+  }
+  return table;
+}
+
+std::string none(const ExperimentResult& result) {
+  std::string table = "touches,log10_weight,lost,noticed\n";
+  for (const NoneRun& run : result.none) {
+    for (const double log10_weight : sampled_log10_weights(result.none)) {
+      table += fmt::format("{},{:g},{:.6g},{:.6g}\n", run.touches, log10_weight,
+                           run.lost(log10_weight), run.noticed(log10_weight));
+    }
+  }
+  return table;
+}
+
+std::string trials(const ExperimentResult& result) {
+  std::string table =
+      "filter,count,trial,object,touches,right,confidence,error_mm,refined_error_mm\n";
+  for (const FilterRun& run : result.runs) {
+    for (std::size_t trial = 0; trial < run.scores.size(); ++trial) {
+      int touches = 0;
+      for (const Score& score : run.scores[trial]) {
+        table += fmt::format("{},{},{},{},{},{:d},{:.6g},{},{}\n", run.filter, run.count, trial,
+                             result.true_objects[trial], ++touches, score.right, score.confidence,
+                             cell(score.error_mm), cell(score.refined_error_mm));
+      }
+    }
+  }
+  return table;
+}
+
+}  // namespace
+
+std::vector<double> sampled_log10_weights(const std::vector<NoneRun>& runs) {
+  constexpr double step = 2.0;
+  double least = 0.0;
+  double most = 0.0;
+  for (const NoneRun& run : runs) {
+    for (const auto* weights : {&run.learned_log10_weight, &run.unlearned_log10_weight}) {
+      for (const double weight : *weights) {
+        least = std::min(least, weight);
+        most = std::max(most, weight);
+      }
+    }
+  }
+  std::vector<double> samples;
+  for (double i = std::floor(least / step) - 1.0; i <= std::ceil(most / step) + 1.0; ++i) {
+    samples.push_back(i * step);
+  }
+  return samples;
+}
+
+nlohmann::ordered_json document_of(const ExperimentResult& result) {
+  Json document{{"filters", Json::array()}, {"none", Json::array()}};
+  for (const FilterRun& run : result.runs) {
+    document["filters"].push_back(json_of(run));
+  }
+  for (const NoneRun& run : result.none) {
+    document["none"].push_back(json_of(run, sampled_log10_weights(result.none)));
+  }
+  return document;
+}
+
+void write_tables(const ExperimentResult& result, const std::filesystem::path& folder) {
+  const auto write = [&](const char* name, const std::string& table) {
+    AtomicFile file(folder / name);
+    file.write(table);
+    file.commit();
+  };
+  write("curves.csv", curves(result));
+  write("calibration.csv", calibration(result));
+  write("none.csv", none(result));
+  write("trials.csv", trials(result));
+}
+
+}  // namespace palpate::bench

@@ -1,0 +1,75 @@
+#include "filter_run.hpp"
+
+#include <gtest/gtest.h>
+
+#include "none_run.hpp"
+
+namespace palpate::bench {
+namespace {
+
+/// Four trials of two touches.
+FilterRun small_run() {
+  FilterRun run;
+  run.scores = {
+      {{.right = true, .confidence = 0.5, .error_mm = 4.0}, {true, 1.0, 1.0, 0.5}},
+      {{.right = true, .confidence = 0.5, .error_mm = 2.0}, {true, 1.0, 2.0, 1.5}},
+      {{.right = false, .confidence = 0.3, .error_mm = {}}, {true, 1.0, 6.0, 1.0}},
+      {{.right = false, .confidence = 0.3, .error_mm = {}}, {false, 0.6, {}, {}}},
+  };
+  return run;
+}
+
+TEST(Curve, CountsTrialsAfterEveryTouch) {
+  const std::vector<CurvePoint> curve = curve_of(small_run());
+  ASSERT_EQ(curve.size(), 2U);
+  EXPECT_EQ(curve[0].touches, 1);
+  EXPECT_DOUBLE_EQ(curve[0].accuracy, 0.5);
+  EXPECT_DOUBLE_EQ(curve[0].mean_confidence, 0.4);
+  EXPECT_EQ(curve[1].touches, 2);
+  EXPECT_DOUBLE_EQ(curve[1].accuracy, 0.75);
+  EXPECT_DOUBLE_EQ(curve[1].mean_confidence, 0.9);
+}
+
+TEST(Curve, TakesErrorsOverTheLocatedTrialsOnly) {
+  const std::vector<CurvePoint> curve = curve_of(small_run());
+  EXPECT_EQ(curve[0].located, 2);
+  EXPECT_FALSE(curve[0].refined_error);
+  ASSERT_TRUE(curve[1].error);
+  EXPECT_EQ(curve[1].located, 3);
+  EXPECT_DOUBLE_EQ(curve[1].error->mean_mm, 3.0);
+  EXPECT_DOUBLE_EQ(curve[1].error->median_mm, 2.0);
+  EXPECT_DOUBLE_EQ(curve[1].error->p95_mm, 6.0);
+  ASSERT_TRUE(curve[1].refined_error);
+  EXPECT_DOUBLE_EQ(curve[1].refined_error->mean_mm, 1.0);
+}
+
+TEST(Curve, HasNoErrorWhereNothingIsLocated) {
+  FilterRun run;
+  run.scores = {{{.right = false, .confidence = 0.3, .error_mm = {}}}};
+  EXPECT_FALSE(curve_of(run).front().error);
+}
+
+TEST(Calibration, ComparesConfidenceWithTheFractionRight) {
+  const Calibration calibration = calibration_of(small_run());
+  ASSERT_EQ(calibration.bins.size(), 4U) << "from 0.3, 0.5, 0.6 and 0.9, which holds 1";
+  EXPECT_EQ(calibration.bins[0].count, 2);
+  EXPECT_DOUBLE_EQ(calibration.bins[0].fraction_right, 0.0);
+  EXPECT_DOUBLE_EQ(calibration.bins[1].fraction_right, 1.0);
+  EXPECT_DOUBLE_EQ(calibration.bins[3].lower, 0.9);
+  EXPECT_EQ(calibration.bins[3].count, 3);
+  EXPECT_NEAR(calibration.expected_error, (2 * 0.3 + 2 * 0.5 + 1 * 0.6 + 3 * 0.0) / 8.0, 1e-12);
+}
+
+TEST(None, IsCalledAboveEachTrialsOwnWeight) {
+  const NoneRun run{.touches = 9,
+                    .learned_log10_weight = {2.0, 4.0},
+                    .unlearned_log10_weight = {-3.0, 0.0, 1.0, 3.0}};
+  EXPECT_EQ(run.lost(2.0), 0.0);
+  EXPECT_EQ(run.lost(3.0), 0.5);
+  EXPECT_EQ(run.noticed(2.0), 0.75);
+  EXPECT_EQ(run.noticed(300.0), 1.0);
+  EXPECT_EQ(run.separation(), (0.75 + 1.0) / 2.0) << "3 of 4 turn below 2, all below 4";
+}
+
+}  // namespace
+}  // namespace palpate::bench

@@ -1,0 +1,130 @@
+#include "trials.hpp"
+
+#include <cmath>
+#include <numbers>
+#include <set>
+
+#include <gtest/gtest.h>
+
+#include "palpate/error.hpp"
+#include "palpate/simulation.hpp"
+
+namespace palpate::bench {
+namespace {
+
+const std::vector<std::string> shapes = {"A", "O"};
+
+/// Index of the training pose at which a touch meets the object, or -1.
+int training_pose_of(const Pose& T_object_sensor) {
+  const std::vector<Pose> grid = training_grid();
+  for (std::size_t i = 0; i < grid.size(); ++i) {
+    const glm::dvec2 away_mm = grid[i].translation_mm - T_object_sensor.translation_mm;
+    const double turn_rad =
+        wrap_angle(grid[i].theta_rad - T_object_sensor.theta_rad, 2.0 * std::numbers::pi);
+    // Poses of some 20 mm, rotated and back in double.
+    if (std::hypot(away_mm.x, away_mm.y) < 1e-9 && std::abs(turn_rad) < 1e-9) {
+      return static_cast<int>(i);
+    }
+  }
+  return -1;
+}
+
+TEST(Trials, MeetTheObjectAtTheTrainingPosesEachOnce) {
+  for (const Recording& trial : make_trials(shapes, 2, 192, 7)) {
+    std::set<int> met;
+    for (const Pose& T_robot_sensor : trial.T_robot_sensor) {
+      met.insert(training_pose_of(trial.truth->T_object_robot * T_robot_sensor));
+    }
+    EXPECT_EQ(met.size(), 192U);
+    EXPECT_FALSE(met.contains(-1));
+  }
+}
+
+TEST(Trials, AreOfEveryShapeInItsOwnPoseAndOrder) {
+  const std::vector<Recording> trials = make_trials(shapes, 3, 5, 7);
+  ASSERT_EQ(trials.size(), 6U);
+  std::set<double> angles_rad;
+  std::set<int> first_touches;
+  for (std::size_t i = 0; i < trials.size(); ++i) {
+    const Truth& truth = *trials[i].truth;
+    EXPECT_EQ(truth.object, shapes[i / 3]);
+    EXPECT_LE(std::abs(truth.T_object_robot.translation_mm.x), 10.0);
+    EXPECT_LE(std::abs(truth.T_object_robot.translation_mm.y), 10.0);
+    EXPECT_EQ(trials[i].size(), 5U);
+    EXPECT_EQ(trials[i].elements(), 36U);
+    angles_rad.insert(truth.T_object_robot.theta_rad);
+    first_touches.insert(training_pose_of(truth.T_object_robot * trials[i].T_robot_sensor[0]));
+  }
+  EXPECT_EQ(angles_rad.size(), 6U);
+  EXPECT_GT(first_touches.size(), 1U);
+}
+
+TEST(Trials, BeginAlikeHoweverManyThereAre) {
+  const std::vector<Recording> few = make_trials(shapes, 1, 3, 7);
+  const std::vector<Recording> many = make_trials(shapes, 4, 9, 7);
+  for (const auto& [short_one, long_one] :
+       {std::pair(few[0], many[0]), std::pair(few[1], many[4])}) {
+    EXPECT_EQ(short_one.truth->T_object_robot.theta_rad, long_one.truth->T_object_robot.theta_rad);
+    for (std::size_t i = 0; i < short_one.pressure.size(); ++i) {
+      EXPECT_EQ(short_one.pressure[i], long_one.pressure[i]);
+    }
+  }
+}
+
+TEST(Trials, OfOneShapeShareItsTestSet) {
+  const std::vector<Recording> trials = make_trials(shapes, 2, 192, 7);
+  const std::multiset<double> first(trials[0].pressure.begin(), trials[0].pressure.end());
+  EXPECT_EQ(first, std::multiset<double>(trials[1].pressure.begin(), trials[1].pressure.end()));
+  EXPECT_NE(first, std::multiset<double>(trials[2].pressure.begin(), trials[2].pressure.end()));
+}
+
+TEST(Trials, RefuseMoreTouchesThanThereAreToDraw) {
+  EXPECT_THROW(make_trials(shapes, 1, 193, 7), Error);
+  EXPECT_THROW(make_trials(shapes, 1, 0, 7), Error);
+}
+
+/// A map of one occupied cell below three in a row.
+OccupancyGrid small_map(const std::string& label, int symmetry) {
+  return {.label = label,
+          .cell_mm = 1.0,
+          .symmetry = symmetry,
+          .nx = 3,
+          .ny = 2,
+          .log_odds = {1.0F, 1.0F, 1.0F, -1.0F, 1.0F, -1.0F}};
+}
+
+LearnedLetters two_objects() {
+  LearnedLetters learned;
+  learned.objects = {{.map = small_map("A", 1)}, {.map = small_map("O", 0)}};
+  for (const Hypothesis& object : learned.objects) {
+    learned.bodies.push_back(body_of(object.map));
+  }
+  return learned;
+}
+
+TEST(Score, CountsTheErrorWhereTheModesObjectIsRight) {
+  const LearnedLetters learned = two_objects();
+  Estimate estimate{.identity = {0.4, 0.6},
+                    .mode = {.object = 0, .T_object_robot = {{3.0, 4.0}, 0.0}}};
+  const Score located = score(learned, estimate, {.object = "A", .T_object_robot = {}});
+  EXPECT_FALSE(located.right);
+  EXPECT_EQ(located.confidence, 0.6);
+  ASSERT_TRUE(located.error_mm);
+  EXPECT_NEAR(*located.error_mm, 5.0, 1e-12) << "a translation by (3, 4) mm";
+
+  const Score recognised = score(learned, estimate, {.object = "O", .T_object_robot = {}});
+  EXPECT_TRUE(recognised.right);
+  EXPECT_FALSE(recognised.error_mm);
+}
+
+TEST(Score, KnowsThatAnOLooksTheSameFromAllSides) {
+  const LearnedLetters learned = two_objects();
+  // A turn about the centroid, which the robot then sees where it was.
+  const glm::dvec2 centroid_mm = learned.bodies[1].centroid_mm;
+  const Pose turned{centroid_mm - rotate(1.0, centroid_mm), 1.0};
+  EXPECT_NEAR(error_mm(learned, 1, turned, {.object = "O", .T_object_robot = {}}), 0.0, 1e-12);
+  EXPECT_GT(error_mm(learned, 0, turned, {.object = "A", .T_object_robot = {}}), 0.5);
+}
+
+}  // namespace
+}  // namespace palpate::bench
