@@ -201,11 +201,17 @@ void send_hdf5_values(int descriptor, const std::filesystem::path& path, std::ui
   }
   const Hdf5Handle access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose);
   H5Pset_file_locking(access.get(), true, true);  // some network file systems have no locks
-  const Hdf5Handle file(H5Fopen(path.c_str(), H5F_ACC_RDONLY, access.get()), H5Fclose);
+  Hdf5Handle file(H5Fopen(path.c_str(), H5F_ACC_RDONLY, access.get()), H5Fclose);
   if (!file.valid()) {
-    sender.send(Hdf5Record::refused, "", problem(open_problem(innermost_reason())));
-    sender.send(Hdf5Record::end);
-    return;
+    const std::string reason = innermost_reason();
+    // A stream that is being recorded, or whose recorder was killed.
+    file = {H5Fopen(path.c_str(), H5F_ACC_RDONLY | H5F_ACC_SWMR_READ, access.get()), H5Fclose};
+    if (!file.valid()) {
+      sender.send(Hdf5Record::refused, "", problem(open_problem(reason)));
+      sender.send(Hdf5Record::end);
+      return;
+    }
+    sender.send(Hdf5Record::unclosed, "", {});
   }
   for (const std::string& name : attributes) {
     if (const htri_t there = H5Aexists(file.get(), name.c_str()); there != 0) {
@@ -218,6 +224,8 @@ void send_hdf5_values(int descriptor, const std::filesystem::path& path, std::ui
   for (const std::string& name : datasets) {
     if (const htri_t there = H5Lexists(file.get(), name.c_str(), H5P_DEFAULT); there != 0) {
       const Hdf5Handle dataset(H5Dopen2(file.get(), name.c_str(), H5P_DEFAULT), H5Dclose);
+      // A file that is being written grows.
+      file_bytes = std::max<std::uint64_t>(file_bytes, std::filesystem::file_size(path));
       sender.send(Hdf5Record::dataset, name,
                   dataset.valid() ? read_value(dataset.get(), dataset_access,
                                                largest_dataset(dataset.get(), file_bytes))

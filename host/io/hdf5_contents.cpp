@@ -117,6 +117,10 @@ Hdf5Contents::Hdf5Contents(const std::filesystem::path& path,
     if (kind == Hdf5Record::refused) {
       refuse(value.problem);
     }
+    if (kind == Hdf5Record::unclosed) {
+      closed_ = false;
+      continue;
+    }
     (kind == Hdf5Record::attribute ? attributes_ : datasets_)[name] = std::move(value);
   }
 }

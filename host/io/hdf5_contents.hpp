@@ -33,6 +33,8 @@ class Hdf5Contents {
   Hdf5Contents(const std::filesystem::path& path, const std::vector<std::string>& attributes,
                const std::vector<std::string>& datasets);
 
+  /// False for a file that is being written or whose writer was killed: see FrameRecorder.
+  bool closed() const { return closed_; }
   bool has_attribute(const std::string& name) const { return attributes_.contains(name); }
   bool has_dataset(const std::string& name) const { return datasets_.contains(name); }
 
@@ -53,6 +55,7 @@ class Hdf5Contents {
   const Hdf5Value& attribute(const std::string& name) const;
 
   std::filesystem::path path_;
+  bool closed_ = true;
   std::map<std::string, Hdf5Value> attributes_;
   std::map<std::string, Hdf5Value> datasets_;
 };

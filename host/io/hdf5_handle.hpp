@@ -11,6 +11,23 @@ namespace palpate {
 /// must not inherit the library in the middle of another thread's call.
 inline std::mutex hdf5_mutex;
 
+/// Use of HDF5 by this thread, whose errors it does not print while this lives.
+class Hdf5Session {
+ public:
+  Hdf5Session() : lock_(hdf5_mutex) {
+    H5Eget_auto2(H5E_DEFAULT, &print_, &data_);
+    H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
+  }
+  ~Hdf5Session() { H5Eset_auto2(H5E_DEFAULT, print_, data_); }
+  Hdf5Session(const Hdf5Session&) = delete;
+  Hdf5Session& operator=(const Hdf5Session&) = delete;
+
+ private:
+  std::lock_guard<std::mutex> lock_;
+  H5E_auto2_t print_ = nullptr;  ///< how the program wants HDF5's errors printed
+  void* data_ = nullptr;
+};
+
 /// Owns an HDF5 identifier, which may be invalid.
 class Hdf5Handle {
  public:

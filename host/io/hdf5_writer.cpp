@@ -1,13 +1,22 @@
 #include "hdf5_writer.hpp"
 
 #include <algorithm>
+#include <limits>
 
 #include <fmt/format.h>
 
-#include "atomic_file.hpp"
+#include "hdf5_failure.hpp"
 #include "palpate/error.hpp"
 
 namespace palpate {
+
+void set_appendable(hid_t access) {
+  H5Pset_libver_bounds(access, H5F_LIBVER_V110, H5F_LIBVER_V110);
+  // A process can be killed between two pages of one write; a checksum of metadata would not
+  // survive that.
+  constexpr hsize_t page = 4096;
+  H5Pset_alignment(access, 1, page);
+}
 
 namespace {
 
@@ -17,6 +26,12 @@ Hdf5Handle file_in_memory() {
   H5Pset_fapl_core(access.get(), growth, false);
   // The name is not used beyond HDF5's list of open files.
   return {H5Fcreate("palpate", H5F_ACC_TRUNC, H5P_DEFAULT, access.get()), H5Fclose};
+}
+
+Hdf5Handle appendable_file(const std::filesystem::path& path) {
+  const Hdf5Handle access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose);
+  set_appendable(access.get());
+  return {H5Fcreate(path.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, access.get()), H5Fclose};
 }
 
 Hdf5Handle text_type() {
@@ -33,6 +48,18 @@ Hdf5Handle extents(const Hdf5Writer::Shape& shape) {
   return {H5Screate_simple(static_cast<int>(sizes.size()), sizes.data(), nullptr), H5Sclose};
 }
 
+// Whole rows of about 64 KiB: what is written again with every flush of a growing dataset.
+std::vector<hsize_t> growing_chunk(const Hdf5Writer::Shape& shape, std::size_t value_bytes) {
+  constexpr std::size_t bytes = 1 << 16;
+  std::vector<hsize_t> chunk(shape.begin(), shape.end());
+  std::size_t row_bytes = value_bytes;
+  for (std::size_t axis = 1; axis < shape.size(); ++axis) {
+    row_bytes *= shape[axis];
+  }
+  chunk[0] = std::max<std::size_t>(1, bytes / row_bytes);
+  return chunk;
+}
+
 // Whole inner dimensions up to a mebibyte of doubles, HDF5's chunk cache.
 std::vector<hsize_t> chunk_of(const Hdf5Writer::Shape& shape) {
   std::size_t room = (1 << 20) / sizeof(double);
@@ -46,15 +73,15 @@ std::vector<hsize_t> chunk_of(const Hdf5Writer::Shape& shape) {
 
 }  // namespace
 
-Hdf5Writer::Hdf5Writer(std::filesystem::path path)
-    : path_(std::move(path)), lock_(hdf5_mutex), file_(H5I_INVALID_HID, H5Fclose) {
-  H5Eget_auto2(H5E_DEFAULT, &print_, &print_data_);
-  H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
-  file_ = file_in_memory();
+Hdf5Writer::Hdf5Writer(std::filesystem::path path, Layout layout)
+    : path_(std::move(path)), file_(H5I_INVALID_HID, H5Fclose) {
+  if (layout == Layout::appendable) {
+    // HDF5 1.10 spoils the checksum of such a file in its image.
+    on_disk_.emplace(path_);
+  }
+  file_ = on_disk_ ? appendable_file(on_disk_->path()) : file_in_memory();
   require(file_.valid(), "the file");
 }
-
-Hdf5Writer::~Hdf5Writer() { H5Eset_auto2(H5E_DEFAULT, print_, print_data_); }
 
 void Hdf5Writer::attribute(const char* name, std::string_view text) {
   const std::string terminated(text);
@@ -87,8 +114,9 @@ void Hdf5Writer::dataset(const char* name, const Shape& shape, std::span<const d
   add_dataset(name, shape, H5T_NATIVE_DOUBLE, values.data(), storage);
 }
 
-void Hdf5Writer::dataset(const char* name, const Shape& shape, std::span<const float> values) {
-  add_dataset(name, shape, H5T_NATIVE_FLOAT, values.data(), Storage::plain);
+void Hdf5Writer::dataset(const char* name, const Shape& shape, std::span<const float> values,
+                         Storage storage) {
+  add_dataset(name, shape, H5T_NATIVE_FLOAT, values.data(), storage);
 }
 
 void Hdf5Writer::dataset(const char* name, const Shape& shape,
@@ -96,7 +124,18 @@ void Hdf5Writer::dataset(const char* name, const Shape& shape,
   add_dataset(name, shape, H5T_NATIVE_UINT8, values.data(), Storage::plain);
 }
 
+void Hdf5Writer::dataset(const char* name, const Shape& shape,
+                         std::span<const std::uint64_t> values, Storage storage) {
+  add_dataset(name, shape, H5T_NATIVE_UINT64, values.data(), storage);
+}
+
 void Hdf5Writer::save() {
+  if (on_disk_) {
+    require(H5Fflush(file_.get(), H5F_SCOPE_GLOBAL) >= 0, "the file");
+    file_ = Hdf5Handle(H5I_INVALID_HID, H5Fclose);
+    on_disk_->commit();
+    return;
+  }
   AtomicFile target(path_);
   require(H5Fflush(file_.get(), H5F_SCOPE_GLOBAL) >= 0, "the file");
   const ssize_t size = H5Fget_file_image(file_.get(), nullptr, 0);
@@ -124,7 +163,21 @@ void Hdf5Writer::add_dataset(const char* name, const Shape& shape, hid_t type, c
             H5Pset_chunk(creation.get(), static_cast<int>(chunk.size()), chunk.data()) >= 0 &&
             H5Pset_shuffle(creation.get()) >= 0 && H5Pset_deflate(creation.get(), level) >= 0;
   }
-  const Hdf5Handle space = extents(shape);
+  Hdf5Handle space = extents(shape);
+  if (storage == Storage::growing) {
+    const std::vector<hsize_t> chunk = growing_chunk(shape, H5Tget_size(type));
+    std::vector<hsize_t> sizes(shape.begin(), shape.end());
+    std::vector<hsize_t> most = sizes;
+    most[0] = H5S_UNLIMITED;
+    // What a writer that was killed did not write reads as no number.
+    constexpr double unwritten = std::numeric_limits<double>::quiet_NaN();
+    ready = ready &&
+            H5Sset_extent_simple(space.get(), static_cast<int>(sizes.size()), sizes.data(),
+                                 most.data()) >= 0 &&
+            H5Pset_chunk(creation.get(), static_cast<int>(chunk.size()), chunk.data()) >= 0 &&
+            (H5Tget_class(type) != H5T_FLOAT ||
+             H5Pset_fill_value(creation.get(), H5T_NATIVE_DOUBLE, &unwritten) >= 0);
+  }
   const Hdf5Handle dataset(
       H5Dcreate2(file_.get(), name, type, space.get(), H5P_DEFAULT, creation.get(), H5P_DEFAULT),
       H5Dclose);
@@ -134,10 +187,20 @@ void Hdf5Writer::add_dataset(const char* name, const Shape& shape, hid_t type, c
 }
 
 void Hdf5Writer::require(bool done, std::string_view what) const {
-  if (!done) {
-    throw Error(Fault::system, fmt::format("{}: HDF5 cannot write {}; free memory and try again",
-                                           path_.string(), what));
+  if (done) {
+    return;
   }
+  if (on_disk_) {
+    const std::string reason = hdf5_failure();
+    if (file_.valid()) {
+      give_up_hdf5_file(file_.get());
+    }
+    throw Error(Fault::system, fmt::format("{}: cannot write: {}; free or repair the disk and try "
+                                           "again",
+                                           path_.string(), reason));
+  }
+  throw Error(Fault::system, fmt::format("{}: HDF5 cannot write {}; free memory and try again",
+                                         path_.string(), what));
 }
 
 }  // namespace palpate

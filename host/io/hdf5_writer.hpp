@@ -2,27 +2,35 @@
 
 #include <cstdint>
 #include <filesystem>
-#include <mutex>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "atomic_file.hpp"
 #include "hdf5_handle.hpp"
 
 namespace palpate {
 
-/// An HDF5 file that is put together in memory and saved in one piece: a disk that refuses is met
-/// by AtomicFile, not in the middle of HDF5's caches. The same content gives the same bytes.
+/// Makes a file access property list that of `appendable` files: see Hdf5Writer::Layout.
+void set_appendable(hid_t access);
+
+/// An HDF5 file that appears whole or not at all. It is put together in memory and saved in one
+/// piece, so that a disk that refuses is met by AtomicFile, not in the middle of HDF5's caches; an
+/// appendable one is made beside its target. The same content gives the same bytes.
 /// Every function throws Error (Fault::system) where HDF5 or the disk refuses.
 class Hdf5Writer {
  public:
   using Shape = std::vector<std::size_t>;
-  enum class Storage { plain, compressed };
+  /// How a dataset lies in the file; `growing` ones can be extended along the first axis.
+  enum class Storage { plain, compressed, growing };
+  /// What HDF5 may do with the file after save(). `appendable` ones can be opened by one writer and
+  /// many readers at a time (SWMR), which takes HDF5 1.10.
+  enum class Layout { closed, appendable };
 
   /// @param path where save() puts it; the target is not touched before.
-  explicit Hdf5Writer(std::filesystem::path path);
-  ~Hdf5Writer();
+  explicit Hdf5Writer(std::filesystem::path path, Layout layout = Layout::closed);
   Hdf5Writer(const Hdf5Writer&) = delete;
   Hdf5Writer& operator=(const Hdf5Writer&) = delete;
 
@@ -34,9 +42,13 @@ class Hdf5Writer {
 
   void dataset(const char* name, const Shape& shape, std::span<const double> values,
                Storage storage = Storage::plain);
-  void dataset(const char* name, const Shape& shape, std::span<const float> values);
+  void dataset(const char* name, const Shape& shape, std::span<const float> values,
+               Storage storage = Storage::plain);
   void dataset(const char* name, const Shape& shape, std::span<const std::uint8_t> values);
+  void dataset(const char* name, const Shape& shape, std::span<const std::uint64_t> values,
+               Storage storage = Storage::plain);
 
+  /// The last that is done with it.
   void save();
 
  private:
@@ -46,9 +58,8 @@ class Hdf5Writer {
   void require(bool done, std::string_view what) const;
 
   std::filesystem::path path_;
-  std::lock_guard<std::mutex> lock_;
-  H5E_auto2_t print_ = nullptr;  ///< how the program wants HDF5's errors printed
-  void* print_data_ = nullptr;
+  Hdf5Session session_;
+  std::optional<AtomicFile> on_disk_;  ///< of an appendable file, which is not made in memory
   Hdf5Handle file_;
 };
 

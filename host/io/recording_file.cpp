@@ -34,12 +34,84 @@ std::vector<double> numbers_of(Hdf5Contents& file, const char* name, const Exten
   return std::move(value.numbers);
 }
 
+// A stream that was cut off may have ended between two datasets: its rows are those that all of
+// them have. `time` is written last, and what was not written is NaN.
+void keep_whole_rows(Hdf5Contents& file) {
+  const std::vector<std::string> names = {"pressure", "sensor_pose", "time", "device_time",
+                                          "lost_before"};
+  std::uint64_t rows = UINT64_MAX;
+  for (const std::string& name : names) {
+    if (file.has_dataset(name)) {
+      const Hdf5Value& value = file.dataset(name);
+      rows = std::min(rows, value.shape.empty() ? 0 : value.shape[0]);
+    }
+  }
+  if (file.has_dataset("time")) {
+    const std::vector<double>& time = file.dataset("time").numbers;
+    const auto unwritten =
+        std::find_if(time.begin(), time.end(), [](double t) { return std::isnan(t); });
+    rows = std::min(rows, static_cast<std::uint64_t>(unwritten - time.begin()));
+  }
+  for (const std::string& name : names) {
+    if (file.has_dataset(name)) {
+      Hdf5Value& value = file.dataset(name);
+      if (!value.shape.empty() && value.shape[0] > 0) {
+        value.numbers.resize(value.numbers.size() / value.shape[0] * rows);
+        value.shape[0] = rows;
+      }
+    }
+  }
+}
+
 std::optional<Truth> read_truth(const Hdf5Contents& file) {
   if (!file.has_attribute("true_object") && !file.has_attribute("true_T_object_robot")) {
     return {};
   }
   const std::vector<double> pose = file.numbers("true_T_object_robot", 3);
   return Truth{file.text("true_object"), {{pose[0], pose[1]}, pose[2]}};
+}
+
+// What a stream of frames has besides.
+void read_stream(Hdf5Contents& file, const Extent& extent, Recording& recording) {
+  const auto [n, e] = extent;
+  if (file.has_attribute("sensor")) {
+    recording.sensor = file.text("sensor");
+  }
+  if (file.has_attribute("serial")) {
+    recording.serial = file.text("serial");
+  }
+  if (file.has_dataset("baseline")) {
+    recording.baseline = numbers_of(file, "baseline", extent, {{e}});
+  }
+  if (file.has_dataset("device_time")) {
+    recording.device_time_s = numbers_of(file, "device_time", extent, {{n}});
+  }
+  if (file.has_dataset("lost_before")) {
+    for (const double lost : numbers_of(file, "lost_before", extent, {{n}})) {
+      if (!(lost >= 0.0 && lost <= 1e15)) {
+        file.refuse(fmt::format("dataset 'lost_before' holds {}; store counts of frames", lost));
+      }
+      recording.lost_before.push_back(static_cast<std::uint64_t>(lost));
+    }
+  }
+}
+
+void write_stream(Hdf5Writer& file, const Recording& recording) {
+  if (!recording.sensor.empty()) {
+    file.attribute("sensor", recording.sensor);
+  }
+  if (!recording.serial.empty()) {
+    file.attribute("serial", recording.serial);
+  }
+  if (!recording.baseline.empty()) {
+    file.dataset("baseline", {recording.baseline.size()}, recording.baseline);
+  }
+  if (!recording.device_time_s.empty()) {
+    file.dataset("device_time", {recording.size()}, recording.device_time_s);
+  }
+  if (!recording.lost_before.empty()) {
+    file.dataset("lost_before", {recording.size()}, recording.lost_before);
+  }
 }
 
 void require_one_of(const std::filesystem::path& path, const char* attribute,
@@ -73,6 +145,10 @@ void validate(const std::filesystem::path& path, const Recording& recording) {
   }
   for (std::size_t i = 0; i < n; ++i) {
     const Pose& pose = recording.T_robot_sensor[i];
+    if (recording.rows == "frames" && std::isnan(pose.translation_mm.x) &&
+        std::isnan(pose.translation_mm.y) && std::isnan(pose.theta_rad)) {
+      continue;  // not known at that time
+    }
     if (!std::isfinite(pose.translation_mm.x) || !std::isfinite(pose.translation_mm.y) ||
         !std::isfinite(pose.theta_rad)) {
       refuse(path, fmt::format("dataset 'sensor_pose'[{}] = [{}, {}, {}]; store finite numbers", i,
@@ -84,6 +160,13 @@ void validate(const std::filesystem::path& path, const Recording& recording) {
     if (!std::isfinite(element.x) || !std::isfinite(element.y)) {
       refuse(path, fmt::format("dataset 'elements', position {} = [{}, {}]; store finite numbers",
                                k, element.x, element.y));
+    }
+  }
+  for (std::size_t i = 0; i < recording.baseline.size(); ++i) {
+    if ((recording.valid.size() != e || recording.valid[i] != 0) &&
+        !std::isfinite(recording.baseline[i])) {
+      refuse(path, fmt::format("dataset 'baseline'[{}] = {}; store finite numbers", i,
+                               recording.baseline[i]));
     }
   }
   for (std::size_t i = 0; i < recording.time_s.size(); ++i) {
@@ -99,13 +182,18 @@ void validate(const std::filesystem::path& path, const Recording& recording) {
 Recording read_recording(const std::filesystem::path& path) {
   Hdf5Contents file(path,
                     {"format", "version", "object", "pressure_unit", "length_unit", "rows",
-                     "true_object", "true_T_object_robot"},
-                    {"pressure", "sensor_pose", "elements", "valid", "time"});
+                     "true_object", "true_T_object_robot", "sensor", "serial"},
+                    {"pressure", "sensor_pose", "elements", "valid", "time", "baseline",
+                     "device_time", "lost_before"});
   require_format(file, recording_format);
   if (const std::string unit = file.text("length_unit"); unit != "mm") {
     file.refuse(fmt::format("attribute 'length_unit' = '{}'; convert lengths to 'mm'", unit));
   }
+  if (!file.closed()) {
+    keep_whole_rows(file);
+  }
   Recording recording;
+  recording.closed = file.closed();
   recording.path = path.string();
   recording.object = file.text("object");
   recording.pressure_unit = file.text("pressure_unit");
@@ -143,6 +231,7 @@ Recording read_recording(const std::filesystem::path& path) {
   if (file.has_dataset("time")) {
     recording.time_s = numbers_of(file, "time", extent, {{n}});
   }
+  read_stream(file, extent, recording);
   validate(path, recording);
   return recording;
 }
@@ -153,11 +242,17 @@ void write_recording(const std::filesystem::path& path, const Recording& recordi
   const auto fits = [&](std::size_t count) { return count == e || count == n * e; };
   if (n * e == 0 || recording.pressure.size() != n * e || !fits(recording.elements_mm.size()) ||
       !(recording.valid.empty() || fits(recording.valid.size())) ||
-      !(recording.time_s.empty() || recording.time_s.size() == n)) {
-    refuse(path, fmt::format("a recording of {} poses, {} pressures, {} elements, {} valid and {} "
-                             "times cannot be written; make them agree",
+      !(recording.time_s.empty() || recording.time_s.size() == n) ||
+      !(recording.baseline.empty() || recording.baseline.size() == e) ||
+      !(recording.device_time_s.empty() || recording.device_time_s.size() == n) ||
+      !(recording.lost_before.empty() || recording.lost_before.size() == n)) {
+    refuse(path, fmt::format("a recording of {} poses, {} pressures, {} elements, {} valid, {} "
+                             "times, {} baseline values, {} device times and {} lost counts "
+                             "cannot be written; make them agree",
                              n, recording.pressure.size(), recording.elements_mm.size(),
-                             recording.valid.size(), recording.time_s.size()));
+                             recording.valid.size(), recording.time_s.size(),
+                             recording.baseline.size(), recording.device_time_s.size(),
+                             recording.lost_before.size()));
   }
   validate(path, recording);
 
@@ -203,6 +298,7 @@ void write_recording(const std::filesystem::path& path, const Recording& recordi
   if (!recording.time_s.empty()) {
     file.dataset("time", {n}, recording.time_s);
   }
+  write_stream(file, recording);
   file.save();
 }
 

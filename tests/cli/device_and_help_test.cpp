@@ -54,7 +54,7 @@ TEST_P(CommandHelp, MentionsEveryFlagWithDefaultAndUnit) {
 INSTANTIATE_TEST_SUITE_P(
     All, CommandHelp,
     testing::Values(
-        Help{"devices", {"--json"}},
+        Help{"devices", {"--json"}}, Help{"sensors", {"--json", "USB", "(*)"}},
         Help{"simulate",
              {"SHAPE", "-o,", "--seed", "=1", "--poses", "grid", "random:N", "--psf-mm", "mm",
               "--noise-kpa", "=0.7", "kPa", "--object-pose", "X,Y,DEG", "random", "--touches"}},
@@ -78,7 +78,7 @@ using ProgramHelp = ProgramTest;
 
 TEST_F(ProgramHelp, ListsTheCommands) {
   const std::string help = done({"--help"});
-  for (const char* command : {"devices", "simulate", "map", "recognize", "info"}) {
+  for (const char* command : {"devices", "sensors", "simulate", "map", "recognize", "info"}) {
     EXPECT_NE(help.find(std::string("\n  ") + command), std::string::npos) << help;
   }
 }

@@ -45,3 +45,18 @@ run(${CMAKE_COMMAND} -S ${PROJECT_DIR} -B ${SCRATCH_DIR}/build -G ${GENERATOR}
     -DCMAKE_BUILD_TYPE=${BUILD_TYPE} "-DCMAKE_CXX_FLAGS=${FLAGS}")
 run(${CMAKE_COMMAND} --build ${SCRATCH_DIR}/build)
 run(${SCRATCH_DIR}/build/consumer)
+run(${SCRATCH_DIR}/build/board_reader)
+
+# The core knows nothing of USB, and the driver nothing of the core.
+foreach(program IN ITEMS consumer board_reader)
+  file(GET_RUNTIME_DEPENDENCIES EXECUTABLES ${SCRATCH_DIR}/build/${program}
+       RESOLVED_DEPENDENCIES_VAR ${program}_libraries UNRESOLVED_DEPENDENCIES_VAR unresolved)
+endforeach()
+if(consumer_libraries MATCHES "libusb" OR board_reader_libraries MATCHES "libvulkan")
+  message(FATAL_ERROR "more is linked than needed:\n${consumer_libraries}\n${board_reader_libraries}")
+endif()
+foreach(file IN ITEMS 70-palpate.rules profiles/tsf85.yaml)
+  if(NOT EXISTS ${prefix}/share/palpate/${file})
+    message(FATAL_ERROR "share/palpate/${file} was not installed")
+  endif()
+endforeach()

@@ -9,6 +9,7 @@
 #include <glm/vec2.hpp>
 
 #include "palpate/pose.hpp"
+#include "palpate/touch.hpp"
 
 namespace palpate {
 
@@ -29,6 +30,9 @@ struct SensorDescription {
   std::vector<glm::dvec2> elements_mm;   ///< [e] element centres in the sensor frame
   std::vector<std::uint8_t> valid = {};  ///< empty or [e]; 0 = dead element
   double rate_hz = 0.0;                  ///< frames per second, 0 where that is not known
+  std::vector<double> baseline = {};     ///< empty or [e]: what it reads untouched, where known
+  std::string object = {};               ///< what it is touching, "" when unknown
+  std::optional<Truth> truth = {};       ///< of an unknown, in simulations and replays of them
 };
 
 /// What happened on the way from the sensor since start().

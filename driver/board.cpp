@@ -1,0 +1,45 @@
+#include "board.hpp"
+
+#include <algorithm>
+
+#include <fmt/format.h>
+
+#include "palpate/error.hpp"
+#include "serial_board.hpp"
+#include "takktile_board.hpp"
+
+namespace palpate {
+
+std::uint64_t Board::parse(const TransferRing::Completion& completion,
+                           std::vector<ParsedFrame>& frames) {
+  const std::uint64_t before = deframer().counters().checksum_errors;
+  deframer().push(completion.bytes, frames);
+  return deframer().counters().checksum_errors - before;
+}
+
+std::unique_ptr<Board> make_board(const std::string& name) {
+  if (name == TakktileBoard::kind) {
+    return std::make_unique<TakktileBoard>();
+  }
+  const std::vector<std::string> shipped = shipped_profiles();
+  const bool is_path = name.find('/') != std::string::npos || name.ends_with(".yaml");
+  if (!is_path && std::ranges::find(shipped, name) == shipped.end()) {
+    throw Error(
+        Fault::input,
+        fmt::format("sensor '{}': no such board; give {}, {}, or the path of a profile that "
+                    "ends in .yaml",
+                    name, TakktileBoard::kind, fmt::join(shipped, ", ")));
+  }
+  return std::make_unique<SerialBoard>(name, read_serial_profile(name));
+}
+
+std::vector<std::unique_ptr<Board>> known_boards() {
+  std::vector<std::unique_ptr<Board>> boards;
+  boards.push_back(std::make_unique<TakktileBoard>());
+  for (const std::string& name : shipped_profiles()) {
+    boards.push_back(make_board(name));
+  }
+  return boards;
+}
+
+}  // namespace palpate

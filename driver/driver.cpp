@@ -1,0 +1,73 @@
+#include "palpate/driver.hpp"
+
+#include <algorithm>
+
+#include "board.hpp"
+#include "board_choice.hpp"
+#include "palpate/error.hpp"
+#include "usb_device.hpp"
+#include "usb_fault.hpp"
+#include "usb_handle.hpp"
+#include "usb_sensor.hpp"
+
+namespace palpate {
+
+namespace {
+
+/// Asks the board as far as that disturbs nobody.
+void inspect(Board& board, const UsbDevice& device, BoardInfo& info) {
+  info.name = full_name(board, device);
+  try {
+    const StreamSource source = board.source(device);
+    const bool taken = std::ranges::any_of(source.interfaces, [&](int interface) {
+      return interface_driver(device, interface) == "usbfs";
+    });
+    if (taken) {
+      info.reason = in_use(device);
+      return;
+    }
+    UsbHandle handle(device);
+    const SensorDescription description = board.configure(handle);
+    info.elements = description.elements_mm.size();
+    info.rate_hz = description.rate_hz;
+    info.pressure_unit = description.pressure_unit;
+    info.usable = true;
+  } catch (const Error& error) {
+    info.reason = error.what();
+  }
+}
+
+}  // namespace
+
+std::vector<BoardInfo> list_boards() {
+  const UsbContext context;
+  const std::vector<std::unique_ptr<Board>> boards = known_boards();
+  std::vector<BoardInfo> infos;
+  for (const UsbDevice& device : usb_devices(context)) {
+    BoardInfo info{.name = {},
+                   .bus = device.bus,
+                   .address = device.address,
+                   .vendor = device.vendor,
+                   .product = device.product,
+                   .manufacturer = device.manufacturer,
+                   .product_name = device.product_name,
+                   .serial = device.serial,
+                   .pressure_unit = {},
+                   .reason = "no board that is known by its USB ids"};
+    const auto board = std::ranges::find_if(
+        boards, [&](const std::unique_ptr<Board>& b) { return b->fits(device); });
+    if (board != boards.end()) {
+      info.reason.clear();
+      inspect(**board, device, info);
+    }
+    infos.push_back(std::move(info));
+  }
+  return infos;
+}
+
+std::unique_ptr<Sensor> open_board(const std::string& name) {
+  const BoardName parsed = parse_board_name(name);
+  return std::make_unique<UsbSensor>(make_board(parsed.kind), parsed.which);
+}
+
+}  // namespace palpate

@@ -1,0 +1,311 @@
+#include "profile_packet.hpp"
+
+#include <algorithm>
+#include <optional>
+#include <utility>
+
+#include <fmt/format.h>
+
+namespace palpate {
+
+namespace {
+
+using Format = PacketFormat;
+using Entry = ProfileEntry;
+
+constexpr std::uint32_t most_packet_bytes = 65536;
+
+Format::Check read_check(const Entry& field) {
+  using Kind = Checksum::Kind;
+  Checksum::Parameters kind;
+  Checksum::Parameters options;
+  Format::Check check{.checksum = Checksum(kind)};
+  read_keys(
+      field,
+      {{"checksum",
+        [&](const Entry& e) {
+          kind = e.one_of<Checksum::Parameters>({{"sum8", {.kind = Kind::sum, .bytes = 1}},
+                                                 {"sum16", {.kind = Kind::sum, .bytes = 2}},
+                                                 {"xor8", {.kind = Kind::exor, .bytes = 1}},
+                                                 {"crc8", {.kind = Kind::crc, .bytes = 1}},
+                                                 {"crc16", {.kind = Kind::crc, .bytes = 2}},
+                                                 {"crc32", {.kind = Kind::crc, .bytes = 4}},
+                                                 {"weiss16", {.kind = Kind::weiss, .bytes = 2}}});
+        }},
+       {"polynomial", [&](const Entry& e) { options.polynomial = e.integer(1); }},
+       {"init", [&](const Entry& e) { options.init = e.integer(); }},
+       {"xor_out", [&](const Entry& e) { options.xor_out = e.integer(); }},
+       {"reflect",
+        [&](const Entry& e) {
+          options.reflect = e.one_of<bool>({{"false", false}, {"true", true}});
+        }},
+       {"order",
+        [&](const Entry& e) {
+          check.big_endian = e.one_of<bool>({{"le", false}, {"be", true}});
+        }},
+       {"from", [&](const Entry& e) { check.from_byte = e.integer(0, most_packet_bytes); }},
+       {"covers", [&](const Entry& e) {
+          check.after = e.one_of<bool>({{"before", false}, {"after", true}});
+        }}});
+  const bool is_crc = kind.kind == Kind::crc;
+  if (is_crc != (options.polynomial != 0)) {
+    field.refuse(is_crc ? "a crc needs 'polynomial', such as 0x1021; add it"
+                        : "'polynomial' belongs to a crc; remove it");
+  }
+  if (!is_crc && options.reflect) {
+    field.refuse("'reflect' belongs to a crc; remove it");
+  }
+  if (kind.kind == Kind::weiss && (options.init != 0 || options.xor_out != 0)) {
+    field.refuse("weiss16 has its own 'init' and 'xor_out'; remove them");
+  }
+  const std::uint64_t end = std::uint64_t{1} << (8 * kind.bytes);
+  if (std::max({options.polynomial, options.init, options.xor_out}) >= end) {
+    field.refuse(
+        fmt::format("polynomial, init and xor_out have at most {} bits here", 8 * kind.bytes));
+  }
+  options.kind = kind.kind;
+  options.bytes = kind.bytes;
+  check.checksum = Checksum(options);
+  return check;
+}
+
+Format::Length read_length(const Entry& field) {
+  Format::Length length;
+  read_keys(field,
+            {{"length",
+              [&](const Entry& e) {
+                length.type = e.number_type();
+                if (length.type.kind != NumberType::Kind::unsigned_integer) {
+                  e.refuse("give u8, u16le, u16be, u32le or u32be");
+                }
+              }},
+             {"extra", [&](const Entry& e) { length.extra = e.integer(0, most_packet_bytes); }},
+             {"most", [&](const Entry& e) { length.most = e.integer(1, most_packet_bytes); }}});
+  return length;
+}
+
+Format::Time read_time(const Entry& field) {
+  Format::Time time;
+  read_keys(field, {{"time",
+                     [&](const Entry& e) {
+                       time.type = e.number_type();
+                       if (time.type.kind == NumberType::Kind::real) {
+                         e.refuse("give an integer type, such as u32le");
+                       }
+                     }},
+                    {"tick_s", [&](const Entry& e) { time.tick_s = e.number(1e-9, 1.0); }}});
+  return time;
+}
+
+Format::Values read_values(const Entry& field) {
+  Format::Values values{.stride_bytes = 0};
+  read_keys(field, {{"values", [&](const Entry& e) { values.type = e.number_type(); }},
+                    {"stride", [&](const Entry& e) { values.stride_bytes = e.integer(1, 256); }},
+                    {"at", [&](const Entry& e) { values.at_byte = e.integer(0, 255); }}});
+  if (values.stride_bytes == 0) {
+    values.stride_bytes = values.at_byte + values.type.bytes;
+  }
+  if (values.at_byte + values.type.bytes > values.stride_bytes) {
+    field.refuse(fmt::format("a value at byte {} does not fit a stride of {}; enlarge 'stride'",
+                             values.at_byte, values.stride_bytes));
+  }
+  return values;
+}
+
+Format::Part read_part(const Entry& entry, std::size_t elements) {
+  Format::Part part;
+  bool tagged = false;
+  read_keys(
+      entry,
+      {{"tag",
+        [&](const Entry& e) {
+          part.tag = static_cast<std::uint8_t>(e.integer(0, 255));
+          tagged = true;
+        }},
+       {"mask", [&](const Entry& e) { part.mask = static_cast<std::uint8_t>(e.integer(0, 255)); }},
+       {"values",
+        [&](const Entry& e) { part.values = e.integer(1, static_cast<std::uint32_t>(elements)); }},
+       {"skip", [&](const Entry& e) { part.skip = e.integer(0, 4096); }}});
+  if (!tagged) {
+    entry.refuse("key 'tag' is missing; add the byte that the part begins with");
+  }
+  if (part.values > 0 && part.skip > 0) {
+    entry.refuse("a part has 'values' or bytes to 'skip'; remove one");
+  }
+  return part;
+}
+
+Format::Parts read_parts(const Entry& field, std::size_t elements) {
+  Format::Parts parts;
+  read_keys(field, {{"parts", [&](const Entry& e) { parts.type = e.number_type(); }},
+                    {"tags", [&](const Entry& e) {
+                       for (const Entry& part : e.list("give a list of {tag: ..., values: N}")) {
+                         parts.parts.push_back(read_part(part, elements));
+                       }
+                     }}});
+  std::size_t values = 0;
+  for (const Format::Part& part : parts.parts) {
+    values += part.values;
+  }
+  if (values != elements) {
+    field.refuse(
+        fmt::format("the parts carry {} values, but there are {} elements; correct the "
+                    "'values' of the tags or 'elements'",
+                    values, elements));
+  }
+  return parts;
+}
+
+Format::Field read_field(const Entry& field, std::size_t elements) {
+  constexpr const char* kinds = "bytes, only, skip, length, time, values, parts, checksum";
+  if (!field.node.IsMap()) {
+    field.refuse(fmt::format("give a field such as {{skip: 1}}; the fields are {}", kinds));
+  }
+  // The key that says what the field is; the others are options of it. Where a key is wrong, the
+  // reader of the kind says so.
+  const auto has = [&](const char* kind) {
+    return std::any_of(field.node.begin(), field.node.end(), [&](const auto& item) {
+      return item.first.IsScalar() && item.first.Scalar() == kind;
+    });
+  };
+  if (has("bytes")) {
+    Format::Fixed fixed;
+    read_keys(field, {{"bytes", [&](const Entry& e) { fixed.bytes = e.bytes(); }}});
+    return fixed;
+  }
+  if (has("only")) {
+    Format::Only only;
+    read_keys(field, {{"only", [&](const Entry& e) { only.bytes = e.bytes(); }}});
+    return only;
+  }
+  if (has("skip")) {
+    Format::Skip skip;
+    read_keys(field, {{"skip", [&](const Entry& e) { skip.bytes = e.integer(1, 4096); }}});
+    return skip;
+  }
+  if (has("length")) {
+    return read_length(field);
+  }
+  if (has("time")) {
+    return read_time(field);
+  }
+  if (has("values")) {
+    return read_values(field);
+  }
+  if (has("parts")) {
+    return read_parts(field, elements);
+  }
+  if (has("checksum")) {
+    return read_check(field);
+  }
+  field.refuse(fmt::format("unknown field; the fields are {}", kinds));
+}
+
+template <class Field>
+std::size_t count_of(const Format& format) {
+  return static_cast<std::size_t>(std::count_if(
+      format.fields.begin(), format.fields.end(),
+      [](const Format::Field& field) { return std::holds_alternative<Field>(field); }));
+}
+
+void check_counts(const Entry& packet, const Format& format) {
+  if (count_of<Format::Values>(format) + count_of<Format::Parts>(format) != 1) {
+    packet.refuse("give exactly one field 'values' or 'parts'");
+  }
+  if (count_of<Format::Length>(format) > 1 || count_of<Format::Time>(format) > 1 ||
+      count_of<Format::Check>(format) > 1) {
+    packet.refuse("give 'length', 'time' and 'checksum' at most once each; remove one");
+  }
+  if (!std::holds_alternative<Format::Fixed>(format.fields.front()) &&
+      !std::holds_alternative<Format::Fixed>(format.fields.back())) {
+    packet.refuse("nothing marks a packet; put 'bytes' at its beginning or its end");
+  }
+}
+
+// Without a Length a packet carries one part, so all of them have to be of one size.
+void check_parts(const Entry& field, const Format::Parts& parts, bool counted) {
+  for (const Format::Part& part : parts.parts) {
+    if (!counted && bytes_of(parts, part) != bytes_of(parts, parts.parts.front())) {
+      field.refuse("parts differ in size, and no 'length' tells how many there are; add one");
+    }
+  }
+}
+
+// What lies behind a Length is found only in packets of the right size, its tail apart.
+void check_places(const std::vector<Entry>& entries, const Format& format) {
+  const PacketShape shape = shape_of(format);
+  const std::size_t tail = format.fields.size() - shape.tail_fields;
+  std::size_t offset = 0;
+  for (std::size_t i = 0; i < format.fields.size(); ++i) {
+    const Format::Field& field = format.fields[i];
+    const bool in_middle = shape.counted && i >= shape.head_fields && i < tail;
+    if (in_middle && std::holds_alternative<Format::Fixed>(field)) {
+      entries[i].refuse("between the length and the end write 'only' instead of 'bytes'");
+    }
+    if (in_middle && std::holds_alternative<Format::Check>(field)) {
+      entries[i].refuse("put 'checksum' before 'length' or at the end");
+    }
+    if (shape.counted && i < shape.head_fields &&
+        (std::holds_alternative<Format::Values>(field) ||
+         std::holds_alternative<Format::Parts>(field))) {
+      entries[i].refuse("put 'values' or 'parts' behind 'length'");
+    }
+    if (const auto* check = std::get_if<Format::Check>(&field)) {
+      // The least that stands before it, in the shortest packet.
+      const std::size_t before = shape.counted && i >= tail ? shape.head_bytes : offset;
+      if (!check->after && check->from_byte >= before) {
+        entries[i].refuse(fmt::format("'from' is {}, but only {} bytes stand before the checksum",
+                                      check->from_byte, before));
+      }
+      if (check->after && (i >= tail || check->from_byte != 0)) {
+        entries[i].refuse("'covers: after' is for a checksum before the values, without 'from'");
+      }
+    }
+    if (const auto* parts = std::get_if<Format::Parts>(&field)) {
+      check_parts(entries[i], *parts, shape.counted);
+    }
+    offset += bytes_of(field, format.elements, shape.counted);
+    if (offset > most_packet_bytes) {
+      entries[i].refuse(fmt::format(
+          "a packet has more than {} bytes; give fewer elements or fields", most_packet_bytes));
+    }
+  }
+}
+
+// By default the largest packet is the one with the values.
+void set_most(const std::vector<Entry>& entries, Format& format) {
+  const PacketShape shape = shape_of(format);
+  for (std::size_t i = 0; i < format.fields.size(); ++i) {
+    if (auto* length = std::get_if<Format::Length>(&format.fields[i])) {
+      if (length->most == 0 && shape.parts) {
+        entries[i].refuse("add 'most', the largest count of bytes that the packets have");
+      }
+      length->most = length->most == 0 ? shape.middle_bytes : length->most;
+      if (length->most < shape.middle_bytes) {
+        entries[i].refuse(fmt::format("'most' is {}, but the values take {} bytes; enlarge it",
+                                      length->most, shape.middle_bytes));
+      }
+    }
+  }
+}
+
+}  // namespace
+
+PacketFormat read_packet_format(const ProfileEntry& packet, std::size_t elements) {
+  constexpr std::size_t most_fields = 64;
+  PacketFormat format;
+  format.elements = elements;
+  const std::vector<Entry> entries = packet.list("give a list of fields");
+  if (entries.empty() || entries.size() > most_fields) {
+    packet.refuse(fmt::format("give 1 to {} fields", most_fields));
+  }
+  for (const Entry& entry : entries) {
+    format.fields.push_back(read_field(entry, elements));
+  }
+  check_counts(packet, format);
+  check_places(entries, format);
+  set_most(entries, format);
+  return format;
+}
+
+}  // namespace palpate

@@ -1,0 +1,112 @@
+#include "serial_board.hpp"
+
+#include <algorithm>
+#include <array>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "palpate/error.hpp"
+#include "usb_interfaces.hpp"
+
+namespace palpate {
+
+namespace {
+
+// CDC PSTN 1.2, 6.3: class requests to the control interface.
+constexpr std::uint8_t class_request_out = 0x21;
+constexpr std::uint8_t set_line_coding = 0x20;
+constexpr std::uint8_t set_control_line_state = 0x22;
+constexpr std::uint16_t terminal_ready_and_request_to_send = 3;
+
+BulkInterface data_interface(const UsbDevice& device) {
+  constexpr std::uint8_t class_cdc_data = LIBUSB_CLASS_DATA;
+  return find_interface(device, class_cdc_data);
+}
+
+std::array<std::uint8_t, 7> line_coding(const SerialLine& line) {
+  return {static_cast<std::uint8_t>(line.baud),
+          static_cast<std::uint8_t>(line.baud >> 8),
+          static_cast<std::uint8_t>(line.baud >> 16),
+          static_cast<std::uint8_t>(line.baud >> 24),
+          static_cast<std::uint8_t>(line.stop_bits == 2 ? 2 : 0),
+          static_cast<std::uint8_t>(line.parity),
+          line.data_bits};
+}
+
+}  // namespace
+
+SerialBoard::SerialBoard(std::string name, SerialProfile profile)
+    : name_(std::move(name)), profile_(std::move(profile)) {}
+
+bool SerialBoard::fits(const UsbDevice& device) const {
+  return std::ranges::find(profile_.usb, UsbId{device.vendor, device.product}) !=
+         profile_.usb.end();
+}
+
+StreamSource SerialBoard::source(const UsbDevice& device) const {
+  const BulkInterface data = data_interface(device);
+  // A transfer that is not ended by a short packet waits until it is full, and the ring has to last
+  // while the program is elsewhere: a transfer holds two milliseconds of the line.
+  constexpr std::size_t bits_per_byte = 10;
+  const std::size_t bytes = profile_.line.baud / bits_per_byte / 500;
+  const std::size_t packets = std::clamp<std::size_t>(bytes / data.packet_bytes, 1, 64);
+  StreamSource source{.endpoint = data.in_endpoint, .transfer_bytes = packets * data.packet_bytes};
+  if (const auto control = find_control_interface(device, data.number)) {
+    source.interfaces.push_back(*control);
+  }
+  source.interfaces.push_back(data.number);
+  return source;
+}
+
+SensorDescription SerialBoard::configure(UsbHandle&) {
+  deframer_ = make_deframer(profile_);
+  return {.name = profile_.name,
+          .serial = {},
+          .pressure_unit = profile_.pressure_unit,
+          .elements_mm = profile_.elements_mm,
+          .rate_hz = profile_.rate_hz};
+}
+
+void SerialBoard::start(UsbHandle& handle) {
+  const UsbDevice& device = handle.device();
+  if (const auto control = find_control_interface(device, data_interface(device).number)) {
+    handle.control_out({.type = class_request_out,
+                        .request = set_line_coding,
+                        .index = static_cast<std::uint16_t>(*control)},
+                       line_coding(profile_.line));
+    set_line_state(handle, terminal_ready_and_request_to_send);
+  }
+  send(handle, profile_.start);
+}
+
+void SerialBoard::stop(UsbHandle& handle) {
+  send(handle, profile_.stop);
+  set_line_state(handle, 0);
+}
+
+void SerialBoard::set_line_state(UsbHandle& handle, std::uint16_t state) {
+  const UsbDevice& device = handle.device();
+  if (const auto control = find_control_interface(device, data_interface(device).number)) {
+    handle.control_out({.type = class_request_out,
+                        .request = set_control_line_state,
+                        .value = state,
+                        .index = static_cast<std::uint16_t>(*control)});
+  }
+}
+
+void SerialBoard::send(UsbHandle& handle, const std::vector<std::uint8_t>& bytes) {
+  if (bytes.empty()) {
+    return;
+  }
+  const BulkInterface data = data_interface(handle.device());
+  if (!data.out_endpoint) {
+    throw Error(Fault::system,
+                fmt::format("{}: {} has bytes to send, but the device takes none; is "
+                            "it the right board?",
+                            handle.device().place(), profile_.path.string()));
+  }
+  handle.bulk_out(*data.out_endpoint, bytes);
+}
+
+}  // namespace palpate

@@ -1,0 +1,35 @@
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "board.hpp"
+#include "serial_profile.hpp"
+
+namespace palpate {
+
+/// A board behind a CDC serial port, as its profile describes it.
+class SerialBoard final : public Board {
+ public:
+  SerialBoard(std::string name, SerialProfile profile);
+
+  const std::string& name() const override { return name_; }
+  bool has_ids() const override { return !profile_.usb.empty(); }
+  bool fits(const UsbDevice& device) const override;
+  StreamSource source(const UsbDevice& device) const override;
+  SensorDescription configure(UsbHandle& handle) override;
+  void start(UsbHandle& handle) override;
+  void stop(UsbHandle& handle) override;
+  Deframer& deframer() override { return *deframer_; }
+
+ private:
+  void set_line_state(UsbHandle& handle, std::uint16_t state);
+  void send(UsbHandle& handle, const std::vector<std::uint8_t>& bytes);
+
+  std::string name_;
+  SerialProfile profile_;
+  std::unique_ptr<Deframer> deframer_;
+};
+
+}  // namespace palpate

@@ -1,0 +1,212 @@
+#include "serial_profile.hpp"
+
+#include <algorithm>
+#include <fstream>
+#include <iterator>
+#include <optional>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "data_folder.hpp"
+#include "packet_deframer.hpp"
+#include "palpate/error.hpp"
+#include "profile_entry.hpp"
+#include "profile_packet.hpp"
+
+namespace palpate {
+
+namespace {
+
+using Entry = ProfileEntry;
+
+constexpr const char* suffix = ".yaml";
+constexpr std::size_t most_elements = 16384;
+
+std::filesystem::path profile_folder() { return data_folder() / "profiles"; }
+
+[[noreturn]] void refuse(const std::filesystem::path& path, const std::string& message) {
+  throw Error(Fault::input, fmt::format("{}: {}", path.string(), message));
+}
+
+std::string text_of(const std::filesystem::path& path) {
+  constexpr std::uintmax_t most_bytes = 1 << 20;
+  std::error_code failure;
+  if (!std::filesystem::is_regular_file(path, failure)) {
+    refuse(path, "no such profile; check the path");
+  }
+  if (std::filesystem::file_size(path, failure) > most_bytes) {
+    refuse(path, "larger than 1 MiB; name a profile");
+  }
+  std::ifstream file(path, std::ios::binary);
+  if (!file) {
+    refuse(path, "cannot be read; check its permissions");
+  }
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+UsbId read_usb_id(const Entry& entry) {
+  const std::string text = entry.text();
+  const auto is_hex = [&](std::size_t i) {
+    return std::string_view("0123456789abcdefABCDEF").find(text[i]) != std::string_view::npos;
+  };
+  bool fits = text.size() == 9 && text[4] == ':';
+  for (std::size_t i = 0; fits && i < text.size(); ++i) {
+    fits = i == 4 || is_hex(i);
+  }
+  if (!fits) {
+    entry.refuse("give vendor and product as lsusb shows them, such as 16d0:14cc");
+  }
+  return {static_cast<std::uint16_t>(std::stoul(text.substr(0, 4), nullptr, 16)),
+          static_cast<std::uint16_t>(std::stoul(text.substr(5), nullptr, 16))};
+}
+
+SerialLine read_line(const Entry& entry) {
+  using Parity = SerialLine::Parity;
+  SerialLine line;
+  read_keys(entry,
+            {{"baud", [&](const Entry& e) { line.baud = e.integer(50, 100'000'000); }},
+             {"data_bits",
+              [&](const Entry& e) { line.data_bits = static_cast<std::uint8_t>(e.integer(5, 8)); }},
+             {"parity",
+              [&](const Entry& e) {
+                line.parity = e.one_of<Parity>(
+                    {{"none", Parity::none}, {"odd", Parity::odd}, {"even", Parity::even}});
+              }},
+             {"stop_bits", [&](const Entry& e) {
+                line.stop_bits = static_cast<std::uint8_t>(e.integer(1, 2));
+              }}});
+  return line;
+}
+
+void append_grid(const Entry& entry, std::vector<glm::dvec2>& elements_mm) {
+  std::optional<glm::dvec2> pitch_mm;
+  glm::dvec2 center_mm(0.0);
+  std::size_t nx = 0;
+  std::size_t ny = 0;
+  bool x_fastest = true;
+  read_keys(entry, {{"grid",
+                     [&](const Entry& e) {
+                       const std::vector<Entry> counts = e.list("give the counts [x, y]");
+                       if (counts.size() != 2) {
+                         e.refuse("give the counts [x, y]");
+                       }
+                       nx = counts[0].integer(1, 1024);
+                       ny = counts[1].integer(1, 1024);
+                     }},
+                    {"pitch_mm", [&](const Entry& e) { pitch_mm = e.point(); }},
+                    {"center_mm", [&](const Entry& e) { center_mm = e.point(); }},
+                    {"fastest", [&](const Entry& e) {
+                       x_fastest = e.one_of<bool>({{"x", true}, {"y", false}});
+                     }}});
+  if (nx == 0 || !pitch_mm) {
+    entry.refuse("a grid has 'grid: [NX, NY]' and 'pitch_mm: [X, Y]'; add what is missing");
+  }
+  if (elements_mm.size() + nx * ny > most_elements) {
+    entry.refuse(fmt::format("more than {} elements; make the grid smaller", most_elements));
+  }
+  for (std::size_t i = 0; i < nx * ny; ++i) {
+    const glm::dvec2 index = x_fastest ? glm::dvec2(i % nx, i / nx) : glm::dvec2(i / ny, i % ny);
+    const glm::dvec2 middle = glm::dvec2(nx - 1, ny - 1) / 2.0;
+    elements_mm.push_back(center_mm + (index - middle) * *pitch_mm);
+  }
+}
+
+std::vector<glm::dvec2> read_elements_mm(const Entry& entry) {
+  std::vector<glm::dvec2> elements_mm;
+  for (const Entry& item : entry.list("give a list of [x, y] in mm and {grid: ...}")) {
+    if (item.node.IsMap()) {
+      append_grid(item, elements_mm);
+    } else {
+      elements_mm.push_back(item.point());
+    }
+  }
+  if (elements_mm.empty() || elements_mm.size() > most_elements) {
+    entry.refuse(fmt::format("give 1 to {} elements", most_elements));
+  }
+  return elements_mm;
+}
+
+SerialProfile read_root(const Entry& root) {
+  SerialProfile profile;
+  profile.path = root.file;
+  std::optional<Entry> packet;
+  double gain = 1.0;
+  double offset = 0.0;
+  read_keys(root,
+            {{"name", [&](const Entry& e) { profile.name = e.text(); }},
+             {"usb",
+              [&](const Entry& e) {
+                for (const Entry& id : e.list("give a list such as [16d0:14cc]")) {
+                  profile.usb.push_back(read_usb_id(id));
+                }
+              }},
+             {"line", [&](const Entry& e) { profile.line = read_line(e); }},
+             {"start", [&](const Entry& e) { profile.start = e.bytes(0); }},
+             {"stop", [&](const Entry& e) { profile.stop = e.bytes(0); }},
+             {"unit",
+              [&](const Entry& e) {
+                profile.pressure_unit = e.one_of<std::string>({{"raw", "raw"}, {"kPa", "kPa"}});
+              }},
+             {"gain", [&](const Entry& e) { gain = e.number(); }},
+             {"offset", [&](const Entry& e) { offset = e.number(); }},
+             {"rate_hz", [&](const Entry& e) { profile.rate_hz = e.number(0.0, 1e6); }},
+             {"elements", [&](const Entry& e) { profile.elements_mm = read_elements_mm(e); }},
+             {"packet", [&](const Entry& e) { packet.emplace(e); }}});
+  for (const auto& [key, missing] :
+       {std::pair{"name", profile.name.empty()}, std::pair{"elements", profile.elements_mm.empty()},
+        std::pair{"packet", !packet}}) {
+    if (missing) {
+      root.refuse(fmt::format("key '{}' is missing; add it", key));
+    }
+  }
+  // Only now: the keys come in any order, and the packet depends on the elements.
+  profile.packet = read_packet_format(*packet, profile.elements_mm.size());
+  profile.packet.gain = gain;
+  profile.packet.offset = offset;
+  return profile;
+}
+
+}  // namespace
+
+std::vector<std::string> shipped_profiles() {
+  std::vector<std::string> names;
+  std::error_code failure;
+  for (const auto& file : std::filesystem::directory_iterator(profile_folder(), failure)) {
+    if (file.path().extension() == suffix) {
+      names.push_back(file.path().stem().string());
+    }
+  }
+  std::sort(names.begin(), names.end());
+  return names;
+}
+
+SerialProfile read_serial_profile(const std::string& name_or_path) {
+  const bool is_path =
+      name_or_path.find('/') != std::string::npos || name_or_path.ends_with(suffix);
+  if (!is_path) {
+    const std::vector<std::string> names = shipped_profiles();
+    if (std::find(names.begin(), names.end(), name_or_path) == names.end()) {
+      refuse(name_or_path, fmt::format("no such board; give one of {}, or the path of a profile "
+                                       "that ends in {}",
+                                       fmt::join(names, ", "), suffix));
+    }
+  }
+  const std::filesystem::path path =
+      is_path ? std::filesystem::path(name_or_path) : profile_folder() / (name_or_path + suffix);
+  return parse_serial_profile(text_of(path), path);
+}
+
+SerialProfile parse_serial_profile(const std::string& yaml, const std::filesystem::path& path) {
+  try {
+    return read_root({path, "the profile", YAML::Load(yaml)});
+  } catch (const YAML::Exception& error) {
+    refuse(path, fmt::format("line {}: {}; correct the YAML", line_of(error.mark), error.msg));
+  }
+}
+
+std::unique_ptr<Deframer> make_deframer(const SerialProfile& profile) {
+  return std::make_unique<PacketDeframer>(profile.packet);
+}
+
+}  // namespace palpate

@@ -1,0 +1,60 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <glm/vec2.hpp>
+
+#include "deframer.hpp"
+#include "packet_format.hpp"
+
+namespace palpate {
+
+/// Vendor and product of a USB device.
+struct UsbId {
+  std::uint16_t vendor = 0;
+  std::uint16_t product = 0;
+  friend bool operator==(const UsbId&, const UsbId&) = default;
+};
+
+/// Line settings of a CDC serial port, for SET_LINE_CODING.
+struct SerialLine {
+  enum class Parity : std::uint8_t { none = 0, odd = 1, even = 2 };  // as CDC PSTN 1.2 codes them
+  std::uint32_t baud = 115200;
+  std::uint8_t data_bits = 8;  ///< 5 to 8
+  Parity parity = Parity::none;
+  std::uint8_t stop_bits = 1;  ///< 1 or 2
+};
+
+/// A board behind a CDC serial port, as a profile describes it.
+struct SerialProfile {
+  std::filesystem::path path;  ///< the file it was read from
+  std::string name;            ///< for people, such as "Robotiq TSF-85"
+  std::vector<UsbId> usb;      ///< empty: the board's id is not known, the user has to say it
+  SerialLine line;
+  std::vector<std::uint8_t> start;      ///< bytes to send before frames come, may be empty
+  std::vector<std::uint8_t> stop;       ///< bytes to send when no more are wanted, may be empty
+  std::string pressure_unit = "raw";    ///< "kPa" or "raw"
+  double rate_hz = 0.0;                 ///< 0 where it is not known
+  std::vector<glm::dvec2> elements_mm;  ///< [e] in the sensor frame, in the order of the values
+  PacketFormat packet;
+};
+
+/// Names of the profiles that Palpate ships, in alphabetical order.
+std::vector<std::string> shipped_profiles();
+
+/// Reads a profile: a shipped one by its name ("tsf85"), any other by its path, which holds a '/'
+/// or ends in ".yaml".
+/// @throws Error naming file, line, key, value and remedy.
+SerialProfile read_serial_profile(const std::string& name_or_path);
+
+/// Reads a profile from its text. @param path names it in messages
+SerialProfile parse_serial_profile(const std::string& yaml, const std::filesystem::path& path);
+
+/// A deframer for the profile's stream. One push takes any piece of it.
+std::unique_ptr<Deframer> make_deframer(const SerialProfile& profile);
+
+}  // namespace palpate

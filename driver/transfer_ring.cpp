@@ -1,0 +1,133 @@
+#include "transfer_ring.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <new>
+#include <utility>
+
+namespace palpate {
+
+namespace {
+
+// A board may be slow or silent; a transfer without an end would hide that.
+constexpr unsigned transfer_patience_ms = 1000;
+
+double now_s() {
+  return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
+}
+
+}  // namespace
+
+TransferRing::TransferRing(const UsbContext& context, UsbHandle& handle, std::uint8_t endpoint,
+                           std::size_t transfer_bytes, Counters& counters)
+    : context_(context.get()),
+      handle_(handle),
+      endpoint_(endpoint),
+      transfer_bytes_(transfer_bytes),
+      slots_(transfers),
+      counters_(counters) {
+  for (Slot& slot : slots_) {
+    slot.ring = this;
+    slot.buffer.resize(transfer_bytes_);
+    slot.transfer = libusb_alloc_transfer(0);
+    if (slot.transfer == nullptr) {
+      std::ranges::for_each(slots_, libusb_free_transfer, &Slot::transfer);
+      throw std::bad_alloc();
+    }
+  }
+  for (Slot& slot : slots_) {
+    submit(slot);
+  }
+}
+
+TransferRing::~TransferRing() {
+  drain();
+  std::ranges::for_each(slots_, libusb_free_transfer, &Slot::transfer);
+}
+
+std::vector<TransferRing::Completion> TransferRing::completed() {
+  return std::exchange(completed_, {});
+}
+
+void TransferRing::recycle(std::vector<Completion>&& completions) {
+  for (Completion& completion : completions) {
+    if (spare_.size() < transfers) {
+      spare_.push_back(std::move(completion.bytes));
+    }
+  }
+}
+
+void TransferRing::recover() {
+  drain();
+  handle_.clear_halt(endpoint_);
+  halted_ = false;
+  for (Slot& slot : slots_) {
+    submit(slot);
+  }
+}
+
+void TransferRing::submit(Slot& slot) {
+  libusb_fill_bulk_transfer(slot.transfer, handle_.get(), endpoint_, slot.buffer.data(),
+                            static_cast<int>(slot.buffer.size()), &TransferRing::on_return, &slot,
+                            transfer_patience_ms);
+  slot.under_way = libusb_submit_transfer(slot.transfer) == LIBUSB_SUCCESS;
+  // Not only LIBUSB_ERROR_NO_DEVICE: nothing else would bring this transfer back into the ring.
+  lost_ = lost_ || !slot.under_way;
+}
+
+void TransferRing::on_return(libusb_transfer* transfer) noexcept {
+  Slot& slot = *static_cast<Slot*>(transfer->user_data);
+  slot.under_way = false;
+  slot.ring->take(slot);
+}
+
+void TransferRing::take(Slot& slot) {
+  const int status = slot.transfer->status;
+  const bool damaged = status == LIBUSB_TRANSFER_ERROR || status == LIBUSB_TRANSFER_OVERFLOW;
+  // A halted endpoint stalls all transfers under way; that is one event.
+  const bool stalled = status == LIBUSB_TRANSFER_STALL && !halted_;
+  counters_.timeouts += status == LIBUSB_TRANSFER_TIMED_OUT ? 1 : 0;
+  counters_.overflows += status == LIBUSB_TRANSFER_OVERFLOW ? 1 : 0;
+  counters_.stalls += stalled ? 1 : 0;
+  halted_ = halted_ || stalled;
+  if (damaged || stalled) {
+    ++errors_in_a_row_;
+  } else if (status == LIBUSB_TRANSFER_COMPLETED) {
+    errors_in_a_row_ = 0;
+  }
+  lost_ = lost_ || status == LIBUSB_TRANSFER_NO_DEVICE || errors_in_a_row_ >= transfers;
+
+  // What was on its way when a transfer was given up still counts.
+  const auto length = static_cast<std::size_t>(damaged ? 0 : slot.transfer->actual_length);
+  const bool ended = status == LIBUSB_TRANSFER_COMPLETED && length < transfer_bytes_;
+  if (length > 0 || ended || damaged) {
+    std::vector<std::uint8_t> fresh;
+    if (!spare_.empty()) {
+      fresh = std::move(spare_.back());
+      spare_.pop_back();
+    }
+    fresh.resize(transfer_bytes_);
+    slot.buffer.swap(fresh);
+    fresh.resize(length);
+    completed_.push_back({std::move(fresh), now_s(), ended, damaged});
+  }
+  if (!draining_ && !halted_ && !lost_ && status != LIBUSB_TRANSFER_CANCELLED) {
+    submit(slot);
+  }
+}
+
+void TransferRing::drain() {
+  draining_ = true;
+  for (Slot& slot : slots_) {
+    if (slot.under_way) {
+      libusb_cancel_transfer(slot.transfer);
+    }
+  }
+  while (std::ranges::any_of(slots_, &Slot::under_way)) {
+    timeval patience{.tv_sec = 0, .tv_usec = 100'000};
+    libusb_handle_events_timeout_completed(context_, &patience, nullptr);
+  }
+  draining_ = false;
+}
+
+}  // namespace palpate

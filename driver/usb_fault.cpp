@@ -1,0 +1,86 @@
+#include "usb_fault.hpp"
+
+#include <unistd.h>
+
+#include <filesystem>
+#include <fstream>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "data_folder.hpp"
+
+namespace palpate {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+bool holds(const fs::path& process, const std::string& node) {
+  std::error_code code;  // processes end while they are looked at, and many are not ours to see
+  for (const fs::directory_entry& file : fs::directory_iterator(process / "fd", code)) {
+    // The end only: /dev of another program may lie elsewhere, as in a container.
+    if (fs::read_symlink(file.path(), code).string().ends_with(node)) {
+      return true;
+    }
+  }
+  return false;
+}
+
+/// The programs that have the file open, as "name (process 123)".
+std::vector<std::string> holders(const std::string& node) {
+  std::vector<std::string> programs;
+  std::error_code code;
+  for (const fs::directory_entry& process : fs::directory_iterator("/proc", code)) {
+    const std::string id = process.path().filename();
+    if (id.find_first_not_of("0123456789") == std::string::npos && id != std::to_string(getpid()) &&
+        holds(process.path(), node)) {
+      std::string name;
+      std::ifstream comm(process.path() / "comm");
+      std::getline(comm, name);
+      programs.push_back(fmt::format("{} (process {})", name, id));
+    }
+  }
+  return programs;
+}
+
+std::string missing_permission(const UsbDevice& device) {
+  const std::string rules = (data_folder() / "70-palpate.rules").string();
+  return fmt::format(
+      "no permission to open {}; install the udev rule with 'sudo cp {} /etc/udev/rules.d/ && sudo "
+      "udevadm control --reload && sudo udevadm trigger', then log in at this machine or join the "
+      "group plugdev",
+      device.node(), rules);
+}
+
+std::string help(const UsbDevice& device, int code) {
+  switch (code) {
+    case LIBUSB_ERROR_ACCESS:
+      return missing_permission(device);
+    case LIBUSB_ERROR_BUSY:
+      return in_use(device);
+    case LIBUSB_ERROR_NO_DEVICE:
+      return "it is unplugged; plug it in again";
+    case LIBUSB_ERROR_PIPE:
+      return "it refuses the request; is its firmware the right one?";
+    case LIBUSB_ERROR_TIMEOUT:
+      return "it does not answer; unplug it and plug it in again";
+    default:
+      return fmt::format("{}; unplug it and plug it in again", libusb_strerror(code));
+  }
+}
+
+}  // namespace
+
+std::string in_use(const UsbDevice& device) {
+  const std::vector<std::string> programs = holders(device.node());
+  return programs.empty()
+             ? "another program has it, or this one twice; end that use of it"
+             : fmt::format("in use by {}; end that program", fmt::join(programs, ", "));
+}
+
+Error usb_fault(const UsbDevice& device, const std::string& what, int code) {
+  return {Fault::system, fmt::format("{}: {}: {}", device.place(), what, help(device, code))};
+}
+
+}  // namespace palpate

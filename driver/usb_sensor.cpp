@@ -1,0 +1,217 @@
+#include "usb_sensor.hpp"
+
+#include <algorithm>
+#include <exception>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "board_choice.hpp"
+#include "palpate/error.hpp"
+
+namespace palpate {
+
+namespace {
+
+using std::chrono::duration_cast;
+using std::chrono::microseconds;
+using std::chrono::milliseconds;
+using std::chrono::steady_clock;
+
+// How long to wait before a board that is gone is looked for again: udev needs a moment to give
+// permission, and one that never comes back must not keep the machine busy.
+constexpr milliseconds first_back_off{50};
+constexpr milliseconds longest_back_off{1000};
+// stop() interrupts the wait for events; this only bounds what a missed interrupt would cost.
+constexpr milliseconds event_patience{100};
+
+void handle_events(const UsbContext& context, microseconds patience) {
+  timeval time{.tv_sec = patience.count() / 1'000'000, .tv_usec = patience.count() % 1'000'000};
+  libusb_handle_events_timeout_completed(context.get(), &time, nullptr);
+}
+
+int on_arrival(libusb_context*, libusb_device*, libusb_hotplug_event, void* arrived) noexcept {
+  static_cast<std::atomic<bool>*>(arrived)->store(true);
+  return 0;  // stay registered
+}
+
+}  // namespace
+
+UsbSensor::UsbSensor(std::unique_ptr<Board> board, const std::string& which)
+    : board_(std::move(board)) {
+  const UsbDevice device = choose_device(usb_devices(context_), *board_, which);
+  which_ = device.serial.empty() ? device.port : device.serial;
+  link_ = std::make_unique<BoardLink>(context_, *board_, device, transfer_counters_);
+  description_ = link_->description();
+  watch_arrivals();
+}
+
+UsbSensor::~UsbSensor() { stop(); }
+
+void UsbSensor::watch_arrivals() {
+  // Where this does not work, a board that comes back is found by looking again and again.
+  if (libusb_has_capability(LIBUSB_CAP_HAS_HOTPLUG) != 0) {
+    libusb_hotplug_register_callback(context_.get(), LIBUSB_HOTPLUG_EVENT_DEVICE_ARRIVED,
+                                     LIBUSB_HOTPLUG_NO_FLAGS, LIBUSB_HOTPLUG_MATCH_ANY,
+                                     LIBUSB_HOTPLUG_MATCH_ANY, LIBUSB_HOTPLUG_MATCH_ANY, on_arrival,
+                                     &arrived_, nullptr);
+  }
+}
+
+void UsbSensor::start() {
+  stop();
+  queue_.clear();
+  transfer_counters_ = {};
+  tally_ = {};
+  lost_before_next_ = 0;
+  publish();
+  if (link_) {
+    link_->begin();
+  } else {
+    reconnect(choose_device(usb_devices(context_), *board_, which_));
+  }
+  gone_ = false;
+  stopping_ = false;
+  back_off_ = first_back_off;
+  thread_ = std::thread([this] { run(); });
+}
+
+std::optional<Frame> UsbSensor::next(milliseconds timeout) { return queue_.pop(timeout); }
+
+void UsbSensor::stop() {
+  if (thread_.joinable()) {
+    stopping_ = true;
+    libusb_interrupt_event_handler(context_.get());
+    thread_.join();
+  }
+}
+
+SensorCounters UsbSensor::counters() const {
+  const FrameQueue::Counters queue = queue_.counters();
+  const std::lock_guard lock(mutex_);
+  SensorCounters counters = published_;
+  counters.frames = queue.pushed - queue.dropped;
+  counters.lost += queue.dropped;
+  return counters;
+}
+
+void UsbSensor::run() {
+  try {
+    while (!stopping_) {
+      if (link_) {
+        stream();
+      } else {
+        wait_for_return();
+      }
+      publish();
+    }
+    if (link_) {
+      std::vector<TransferRing::Completion> last = link_->end();
+      deliver(last);
+      publish();
+    }
+  } catch (...) {
+    link_.reset();
+    queue_.fail(std::current_exception());
+  }
+}
+
+void UsbSensor::stream() {
+  handle_events(context_, event_patience);
+  TransferRing& ring = link_->ring();
+  std::vector<TransferRing::Completion> completions = ring.completed();
+  deliver(completions);
+  ring.recycle(std::move(completions));
+  if (ring.lost()) {
+    lose();
+  } else if (ring.halted()) {
+    try {
+      ring.recover();
+    } catch (const Error&) {
+      lose();
+    }
+  }
+}
+
+void UsbSensor::lose() {
+  link_.reset();
+  board_->deframer().reset();
+  gone_ = true;
+}
+
+void UsbSensor::wait_for_return() {
+  const auto end = steady_clock::now() + back_off_;
+  for (auto now = steady_clock::now(); !stopping_ && !arrived_ && now < end;
+       now = steady_clock::now()) {
+    handle_events(context_,
+                  std::min<microseconds>(duration_cast<microseconds>(end - now), event_patience));
+  }
+  back_off_ = arrived_.exchange(false) ? first_back_off : std::min(2 * back_off_, longest_back_off);
+  if (stopping_) {
+    return;
+  }
+  std::optional<UsbDevice> device;
+  try {
+    device = choose_device(usb_devices(context_), *board_, which_);
+    reconnect(*device);
+  } catch (const Error&) {
+    return;  // not plugged in yet, or udev has not given permission yet, or gone again
+  }
+  if (link_->description().elements_mm != description_.elements_mm) {
+    throw Error(
+        Fault::system,
+        fmt::format("{}: came back with {} elements instead of {}, or in other places; open "
+                    "it again",
+                    device->place(), link_->description().elements_mm.size(),
+                    description_.elements_mm.size()));
+  }
+  ++tally_.reconnects;
+  gone_ = false;
+}
+
+void UsbSensor::reconnect(const UsbDevice& device) {
+  auto link = std::make_unique<BoardLink>(context_, *board_, device, transfer_counters_);
+  link->begin();
+  link_ = std::move(link);
+}
+
+void UsbSensor::deliver(std::vector<TransferRing::Completion>& completions) {
+  for (const TransferRing::Completion& completion : completions) {
+    deliver(completion);
+  }
+}
+
+void UsbSensor::deliver(const TransferRing::Completion& completion) {
+  Deframer& deframer = board_->deframer();
+  if (completion.damaged) {
+    // At least the frame that it belonged to.
+    deframer.reset();
+    ++lost_before_next_;
+    ++tally_.lost;
+    return;
+  }
+  const DeframerCounters before = deframer.counters();
+  parsed_.clear();
+  const std::uint64_t spoiled = board_->parse(completion, parsed_);
+  tally_.checksum_errors += deframer.counters().checksum_errors - before.checksum_errors;
+  tally_.garbage_bytes += deframer.counters().garbage_bytes - before.garbage_bytes;
+  tally_.lost += spoiled;
+  lost_before_next_ += spoiled;
+  for (ParsedFrame& frame : parsed_) {
+    queue_.push({.host_time_s = completion.host_time_s,
+                 .device_time_s = frame.device_time_s,
+                 .values = std::move(frame.values),
+                 .lost_before = std::exchange(lost_before_next_, 0)});
+    back_off_ = first_back_off;
+  }
+}
+
+void UsbSensor::publish() {
+  const std::lock_guard lock(mutex_);
+  published_ = tally_;
+  published_.timeouts = transfer_counters_.timeouts;
+  published_.stalls = transfer_counters_.stalls;
+  published_.overflows = transfer_counters_.overflows;
+}
+
+}  // namespace palpate

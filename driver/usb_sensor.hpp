@@ -1,0 +1,75 @@
+#pragma once
+
+#include <atomic>
+#include <chrono>
+#include <cstdint>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "board.hpp"
+#include "board_link.hpp"
+#include "frame_queue.hpp"
+#include "palpate/sensor.hpp"
+#include "transfer_ring.hpp"
+#include "usb_device.hpp"
+
+namespace palpate {
+
+/// The stream of a board, over unplugging and plugging in again.
+///
+/// Between start() and stop() a thread of its own has the device: it pumps the events of libusb,
+/// parses what the transfers brought, ends stalls, and waits for a board that is gone. The thread
+/// that calls next() meets it only at the queue of frames.
+class UsbSensor final : public Sensor {
+ public:
+  /// @param which serial number or port of the board; "" where there is only one. @throws Error
+  UsbSensor(std::unique_ptr<Board> board, const std::string& which);
+  ~UsbSensor() override;
+  UsbSensor(const UsbSensor&) = delete;
+  UsbSensor& operator=(const UsbSensor&) = delete;
+
+  const SensorDescription& description() const override { return description_; }
+  void start() override;
+  std::optional<Frame> next(std::chrono::milliseconds timeout) override;
+  bool gone() const override { return gone_; }
+  void stop() override;
+  SensorCounters counters() const override;
+
+ private:
+  void watch_arrivals();
+  void run();
+  void stream();
+  void lose();
+  void wait_for_return();
+  void reconnect(const UsbDevice& device);
+  void deliver(std::vector<TransferRing::Completion>& completions);
+  void deliver(const TransferRing::Completion& completion);
+  void publish();
+
+  UsbContext context_;
+  std::unique_ptr<Board> board_;
+  std::string which_;  // serial number or port, by which it is known when it comes back
+  std::atomic<bool> arrived_ = false;  // some device was plugged in
+
+  // The thread's alone between start() and stop().
+  TransferRing::Counters transfer_counters_;
+  SensorCounters tally_;
+  std::unique_ptr<BoardLink> link_;  // none while the board is gone
+  std::vector<ParsedFrame> parsed_;
+  std::uint64_t lost_before_next_ = 0;
+  std::chrono::milliseconds back_off_ = {};
+
+  SensorDescription description_;
+  std::thread thread_;
+  std::atomic<bool> stopping_ = false;
+  std::atomic<bool> gone_ = false;
+  FrameQueue queue_;
+  mutable std::mutex mutex_;
+  SensorCounters published_;  // a copy of the tally, under the mutex
+};
+
+}  // namespace palpate

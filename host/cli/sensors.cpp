@@ -1,0 +1,88 @@
+#include <algorithm>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "commands.hpp"
+#include "palpate/driver.hpp"
+
+namespace palpate::cli {
+
+namespace {
+
+/// Bytes that are no UTF-8, as a bad string of a device may be, would stop the JSON.
+std::string dumped(const nlohmann::ordered_json& value) {
+  return value.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
+}
+
+void print_json(const std::vector<BoardInfo>& boards) {
+  auto list = nlohmann::ordered_json::array();
+  for (const BoardInfo& b : boards) {
+    list.push_back({{"name", b.name},
+                    {"bus", b.bus},
+                    {"address", b.address},
+                    {"vendor", fmt::format("{:04x}", b.vendor)},
+                    {"product", fmt::format("{:04x}", b.product)},
+                    {"manufacturer", b.manufacturer},
+                    {"product_name", b.product_name},
+                    {"serial", b.serial},
+                    {"elements", b.elements},
+                    {"rate_hz", b.rate_hz},
+                    {"pressure_unit", b.pressure_unit},
+                    {"usable", b.usable},
+                    {"reason", b.reason}});
+  }
+  fmt::print("{}\n", dumped(list));
+}
+
+/// What a terminal shows of a string that the device chose.
+std::string printable(std::string text) {
+  std::ranges::replace_if(
+      text, [](unsigned char c) { return c < ' ' || c == 0x7f; }, '?');
+  return text;
+}
+
+void print_text(const std::vector<BoardInfo>& boards) {
+  if (boards.empty()) {
+    fmt::print("no USB devices\n");
+  }
+  for (const BoardInfo& b : boards) {
+    const std::string named = b.manufacturer.empty() && b.product_name.empty()
+                                  ? "nameless device"
+                                  : printable(b.manufacturer + " " + b.product_name);
+    fmt::print("{} {:04x}:{:04x}  {}\n", b.usable ? '*' : ' ', b.vendor, b.product,
+               b.name.empty() ? named : printable(b.name));
+    fmt::print("     bus {}, address {}, serial {}\n", b.bus, b.address,
+               b.serial.empty() ? "none" : printable(b.serial));
+    if (b.usable) {
+      fmt::print("     {} elements, {}, {}\n", b.elements, b.pressure_unit,
+                 b.rate_hz > 0 ? fmt::format("{} frames/s", b.rate_hz) : "rate not known");
+    } else {
+      fmt::print("     {}: {}\n", b.name.empty() ? "not known" : "not usable", b.reason);
+    }
+  }
+}
+
+void print_sensors(bool json) {
+  const std::vector<BoardInfo> boards = list_boards();
+  if (json) {
+    print_json(boards);
+  } else {
+    print_text(boards);
+  }
+}
+
+}  // namespace
+
+void add_sensors(CLI::App& app) {
+  auto* command = app.add_subcommand(
+      "sensors", "List the USB devices, the boards that can be used (*), and why others cannot");
+  const auto json = std::make_shared<bool>(false);
+  command->add_flag("--json", *json, "Print JSON");
+  command->callback([json] { print_sensors(*json); });
+}
+
+}  // namespace palpate::cli

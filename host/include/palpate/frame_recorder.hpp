@@ -1,0 +1,49 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+
+#include "palpate/sensor.hpp"
+
+namespace palpate {
+
+/// Writes a stream of frames to a "palpate.recording" HDF5 file with `rows` = "frames", such that a
+/// kill, a crash or a full disk at any moment costs at most the last second of it.
+///
+/// The file appears with the first frames in it and is appended to about four times a second, so
+/// that readers find whole rows at any time (HDF5's SWMR, single writer and multiple readers).
+/// read_recording() opens it while it is written and when it was never closed; h5py does with
+/// `h5py.File(path, "r", swmr=True)`. `h5clear -s --increment=0 FILE` turns a file that was never
+/// closed into a usual one; without `--increment=0` it cuts the frames off.
+///
+/// Pressures are stored as float32, finer than any sensor resolves. A power cut may cost what the
+/// system has not yet brought to the disk.
+class FrameRecorder {
+ public:
+  /// @param path the recording to be made; an older file stays until the first frames are saved
+  /// @param sensor names the sensor and gives its elements, unit, baseline and truth
+  /// @throws Error where the sensor's lists disagree
+  FrameRecorder(std::filesystem::path path, SensorDescription sensor);
+  /// Closes the file as far as that succeeds.
+  ~FrameRecorder();
+  FrameRecorder(const FrameRecorder&) = delete;
+  FrameRecorder& operator=(const FrameRecorder&) = delete;
+
+  /// Appends a frame. One with a reading that is no number counts as lost: see `lost()`.
+  /// @throws Error (Fault::input) on a frame of another size, (Fault::system) where the disk is full
+  void add(const Frame& frame);
+  /// Saves what was added: when no frame comes for a while. @throws Error (Fault::system)
+  void flush();
+  /// Saves what was added and closes the file. @throws Error (Fault::system)
+  void close();
+
+  std::uint64_t frames() const;  ///< added so far
+  std::uint64_t lost() const;    ///< lost so far, as the frames say
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace palpate

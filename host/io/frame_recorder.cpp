@@ -1,0 +1,297 @@
+#include "palpate/frame_recorder.hpp"
+
+#include <fmt/format.h>
+
+#include <chrono>
+#include <cmath>
+#include <limits>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "file_format.hpp"
+#include "hdf5_failure.hpp"
+#include "hdf5_writer.hpp"
+#include "input_file.hpp"
+#include "palpate/error.hpp"
+
+namespace palpate {
+
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+// A quarter of what may be lost: a pause of the machine fits in as well.
+constexpr double flush_interval_s = 0.25;
+// Frames replayed at full speed must not pile up between two flushes.
+constexpr std::size_t most_pending_values = 1 << 20;
+
+constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
+
+// Rows that wait to be saved.
+struct Rows {
+  std::vector<float> pressure;        // [n, e]
+  std::vector<double> sensor_pose;    // [n, 3]
+  std::vector<double> device_time_s;  // [n]
+  std::vector<std::uint64_t> lost_before;
+  std::vector<double> time_s;
+
+  std::size_t size() const { return time_s.size(); }
+  void clear() { *this = {}; }
+};
+
+}  // namespace
+
+struct FrameRecorder::Impl {
+  Impl(std::filesystem::path file_path, SensorDescription description)
+      : path(std::move(file_path)), sensor(std::move(description)) {}
+
+  void require_consistent() const;
+  bool readable(const Frame& frame) const;
+  bool due() const;
+  void save();
+  void create();
+  void append();
+  void append(hid_t dataset, hid_t type, std::size_t width, const void* values);
+  [[noreturn]] void fail();
+  void close();
+
+  std::filesystem::path path;
+  SensorDescription sensor;
+  bool has_device_time = false;
+  bool failed = false;
+  Rows pending;
+  Clock::time_point oldest_pending;
+  std::uint64_t saved = 0;
+  std::uint64_t frames = 0;
+  std::uint64_t lost = 0;
+  std::uint64_t lost_since = 0;  // with the next frame
+
+  // Open from the first save on.
+  Hdf5Handle file{H5I_INVALID_HID, H5Fclose};
+  Hdf5Handle pressure{H5I_INVALID_HID, H5Dclose};
+  Hdf5Handle sensor_pose{H5I_INVALID_HID, H5Dclose};
+  Hdf5Handle device_time{H5I_INVALID_HID, H5Dclose};
+  Hdf5Handle lost_before{H5I_INVALID_HID, H5Dclose};
+  Hdf5Handle time{H5I_INVALID_HID, H5Dclose};
+};
+
+void FrameRecorder::Impl::require_consistent() const {
+  const std::size_t e = sensor.elements_mm.size();
+  const auto fits = [&](const auto& list) { return list.empty() || list.size() == e; };
+  if (e == 0 || !fits(sensor.valid) || !fits(sensor.baseline)) {
+    refuse(path, fmt::format("sensor '{}' has {} elements, {} valid and {} baseline values; make "
+                             "them agree",
+                             sensor.name, e, sensor.valid.size(), sensor.baseline.size()));
+  }
+}
+
+bool FrameRecorder::Impl::readable(const Frame& frame) const {
+  for (std::size_t i = 0; i < frame.values.size(); ++i) {
+    const bool alive = sensor.valid.empty() || sensor.valid[i] != 0;
+    if (alive && !std::isfinite(static_cast<float>(frame.values[i]))) {
+      return false;
+    }
+  }
+  return std::isfinite(frame.host_time_s);
+}
+
+bool FrameRecorder::Impl::due() const {
+  return pending.pressure.size() >= most_pending_values ||
+         // By the stream's own time too: a late reader catches up faster than the clock runs.
+         std::abs(pending.time_s.back() - pending.time_s.front()) >= flush_interval_s ||
+         std::chrono::duration<double>(Clock::now() - oldest_pending).count() >= flush_interval_s;
+}
+
+void FrameRecorder::Impl::save() {
+  if (pending.size() == 0) {
+    return;
+  }
+  const std::size_t rows = pending.size();
+  if (saved == 0) {
+    create();
+  } else {
+    append();
+    saved += rows;
+  }
+  pending.clear();
+}
+
+// The first rows make a whole file, which appears under its name with them and is then opened for
+// more: whenever the recorder is killed, there is no file or a readable one.
+void FrameRecorder::Impl::create() {
+  const std::size_t n = pending.size();
+  const std::size_t e = sensor.elements_mm.size();
+  has_device_time = std::isfinite(pending.device_time_s.front());
+  {
+    Hdf5Writer out(path, Hdf5Writer::Layout::appendable);
+    out.attribute("format", recording_format);
+    out.attribute("version", format_version);
+    out.attribute("object", sensor.object);
+    out.attribute("pressure_unit", sensor.pressure_unit);
+    out.attribute("length_unit", "mm");
+    out.attribute("rows", "frames");
+    out.attribute("sensor", sensor.name);
+    out.attribute("serial", sensor.serial);
+    if (sensor.truth) {
+      const Pose& T = sensor.truth->T_object_robot;
+      out.attribute("true_object", sensor.truth->object);
+      out.attribute("true_T_object_robot",
+                    std::vector<double>{T.translation_mm.x, T.translation_mm.y, T.theta_rad});
+    }
+    std::vector<double> elements;
+    for (const glm::dvec2& element : sensor.elements_mm) {
+      elements.insert(elements.end(), {element.x, element.y});
+    }
+    out.dataset("elements", {e, 2}, elements);
+    if (!sensor.valid.empty()) {
+      out.dataset("valid", {e}, sensor.valid);
+    }
+    if (!sensor.baseline.empty()) {
+      out.dataset("baseline", {e}, sensor.baseline);
+    }
+    constexpr auto growing = Hdf5Writer::Storage::growing;
+    out.dataset("pressure", {n, e}, pending.pressure, growing);
+    out.dataset("sensor_pose", {n, 3}, pending.sensor_pose, growing);
+    if (has_device_time) {
+      out.dataset("device_time", {n}, pending.device_time_s, growing);
+    }
+    out.dataset("lost_before", {n}, pending.lost_before, growing);
+    out.dataset("time", {n}, pending.time_s, growing);
+    out.save();
+  }
+  saved = n;
+  const Hdf5Session session;
+  const Hdf5Handle access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose);
+  set_appendable(access.get());
+  H5Pset_file_locking(access.get(), true, true);  // some network file systems have no locks
+  file = {H5Fopen(path.c_str(), H5F_ACC_RDWR | H5F_ACC_SWMR_WRITE, access.get()), H5Fclose};
+  const auto open = [&](const char* name) {
+    return Hdf5Handle(H5Dopen2(file.get(), name, H5P_DEFAULT), H5Dclose);
+  };
+  pressure = open("pressure");
+  sensor_pose = open("sensor_pose");
+  lost_before = open("lost_before");
+  time = open("time");
+  if (has_device_time) {
+    device_time = open("device_time");
+  }
+  if (!file.valid() || !time.valid() || !pressure.valid() || !sensor_pose.valid() ||
+      !lost_before.valid() || device_time.valid() != has_device_time) {
+    fail();
+  }
+}
+
+void FrameRecorder::Impl::append() {
+  if (!file.valid()) {
+    throw Error(Fault::system, fmt::format("{}: is closed; record to another file", path.string()));
+  }
+  const Hdf5Session session;
+  append(pressure.get(), H5T_NATIVE_FLOAT, sensor.elements_mm.size(), pending.pressure.data());
+  append(sensor_pose.get(), H5T_NATIVE_DOUBLE, 3, pending.sensor_pose.data());
+  append(lost_before.get(), H5T_NATIVE_UINT64, 1, pending.lost_before.data());
+  if (has_device_time) {
+    append(device_time.get(), H5T_NATIVE_DOUBLE, 1, pending.device_time_s.data());
+  }
+  // Last: a row whose time is there is there as a whole.
+  append(time.get(), H5T_NATIVE_DOUBLE, 1, pending.time_s.data());
+}
+
+void FrameRecorder::Impl::append(hid_t dataset, hid_t type, std::size_t width,
+                                 const void* values) {
+  const int rank = width == 1 ? 1 : 2;
+  const hsize_t begin[] = {saved, 0};
+  const hsize_t count[] = {pending.size(), width};
+  const hsize_t extent[] = {saved + pending.size(), width};
+  bool done = H5Dset_extent(dataset, extent) >= 0;
+  const Hdf5Handle there(H5Dget_space(dataset), H5Sclose);
+  const Hdf5Handle here(H5Screate_simple(rank, count, nullptr), H5Sclose);
+  done = done &&
+         H5Sselect_hyperslab(there.get(), H5S_SELECT_SET, begin, nullptr, count, nullptr) >= 0 &&
+         H5Dwrite(dataset, type, here.get(), there.get(), H5P_DEFAULT, values) >= 0 &&
+         H5Dflush(dataset) >= 0;
+  if (!done) {
+    fail();
+  }
+}
+
+void FrameRecorder::Impl::fail() {
+  const std::string reason = hdf5_failure();
+  failed = true;
+  if (file.valid()) {
+    give_up_hdf5_file(file.get());
+  }
+  close();
+  throw Error(Fault::system,
+              fmt::format("{}: cannot be written: {}; it holds {} frames and can be read; free or "
+                          "repair the disk and record to another file",
+                          path.string(), reason, saved));
+}
+
+void FrameRecorder::Impl::close() {
+  for (Hdf5Handle* handle : {&pressure, &sensor_pose, &device_time, &lost_before, &time, &file}) {
+    const Hdf5Handle closing = std::exchange(*handle, Hdf5Handle(H5I_INVALID_HID, H5Fclose));
+  }
+}
+
+FrameRecorder::FrameRecorder(std::filesystem::path path, SensorDescription sensor)
+    : impl_(std::make_unique<Impl>(std::move(path), std::move(sensor))) {
+  impl_->require_consistent();
+}
+
+FrameRecorder::~FrameRecorder() {
+  if (impl_->failed) {
+    return;
+  }
+  try {
+    close();
+  } catch (const Error&) {
+    // Who wants to know calls close().
+  }
+}
+
+void FrameRecorder::add(const Frame& frame) {
+  Impl& r = *impl_;
+  if (frame.values.size() != r.sensor.elements_mm.size()) {
+    refuse(r.path, fmt::format("a frame has {} values but the sensor {} elements; record one array",
+                               frame.values.size(), r.sensor.elements_mm.size()));
+  }
+  r.lost += frame.lost_before;
+  r.lost_since += frame.lost_before;
+  if (!r.readable(frame)) {
+    ++r.lost;
+    ++r.lost_since;
+    return;
+  }
+  Rows& rows = r.pending;
+  if (rows.size() == 0) {
+    r.oldest_pending = Clock::now();
+  }
+  rows.pressure.insert(rows.pressure.end(), frame.values.begin(), frame.values.end());
+  const Pose pose = frame.T_robot_sensor.value_or(Pose{{unknown, unknown}, unknown});
+  rows.sensor_pose.insert(rows.sensor_pose.end(),
+                          {pose.translation_mm.x, pose.translation_mm.y, pose.theta_rad});
+  rows.device_time_s.push_back(frame.device_time_s.value_or(unknown));
+  rows.lost_before.push_back(std::exchange(r.lost_since, 0));
+  rows.time_s.push_back(frame.host_time_s);
+  ++r.frames;
+  if (r.due()) {
+    r.save();
+  }
+}
+
+void FrameRecorder::flush() { impl_->save(); }
+
+void FrameRecorder::close() {
+  impl_->save();
+  const Hdf5Session session;
+  if (impl_->file.valid() && H5Fflush(impl_->file.get(), H5F_SCOPE_GLOBAL) < 0) {
+    impl_->fail();
+  }
+  impl_->close();
+}
+
+std::uint64_t FrameRecorder::frames() const { return impl_->frames; }
+std::uint64_t FrameRecorder::lost() const { return impl_->lost; }
+
+}  // namespace palpate

@@ -1,0 +1,40 @@
+#include "hdf5_failure.hpp"
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <string_view>
+
+namespace palpate {
+
+std::string hdf5_failure() {
+  std::string reason = "HDF5 failed";
+  H5Ewalk2(
+      H5E_DEFAULT, H5E_WALK_UPWARD,
+      [](unsigned, const H5E_error2_t* error, void* text) -> herr_t {
+        const std::string_view said = error->desc == nullptr ? "" : error->desc;
+        const std::string_view key = "error message = '";
+        if (const std::size_t at = said.find(key); at != std::string_view::npos) {
+          const std::string_view rest = said.substr(at + key.size());
+          *static_cast<std::string*>(text) = rest.substr(0, rest.find('\''));
+          return 1;
+        }
+        return 0;
+      },
+      &reason);
+  return reason;
+}
+
+void give_up_hdf5_file(hid_t file) {
+  void* descriptor = nullptr;
+  if (H5Fget_vfd_handle(file, H5P_DEFAULT, &descriptor) < 0) {
+    return;
+  }
+  // What is still to be written goes nowhere.
+  if (const int nowhere = ::open("/dev/null", O_RDWR | O_CLOEXEC); nowhere >= 0) {
+    ::dup3(nowhere, *static_cast<int*>(descriptor), O_CLOEXEC);
+    ::close(nowhere);
+  }
+}
+
+}  // namespace palpate

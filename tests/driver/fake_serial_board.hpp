@@ -1,0 +1,39 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "fake_usb_device.hpp"
+
+namespace palpate {
+
+/// A board behind a CDC ACM port: a control interface that rules over a data interface.
+class FakeSerialBoard {
+ public:
+  struct Ids {
+    std::uint16_t vendor = 0x16d0;  // Robotiq's TSF-85
+    std::uint16_t product = 0x14cc;
+  };
+  /// How the descriptors tell which control interface belongs to the data interface 1.
+  enum class Union { present, missing };
+
+  FakeSerialBoard(FakeUsb& usb, const std::string& serial, Ids ids,
+                  Union descriptor = Union::present, int address = 2);
+
+  /// As the host set them; none before.
+  std::optional<Bytes> line_coding() const;
+  std::optional<int> line_state() const;
+
+  FakeUsbDevice& usb() { return device_; }
+
+ private:
+  std::optional<Bytes> answer(const FakeUsbDevice::Setup& setup, const Bytes& data);
+
+  mutable std::mutex mutex_;
+  std::optional<Bytes> line_coding_;
+  std::optional<int> line_state_;
+  FakeUsbDevice device_;  // the last: it calls the others
+};
+
+}  // namespace palpate

@@ -1,0 +1,108 @@
+#include "fake_takktile.hpp"
+
+#include <bit>
+
+namespace palpate {
+
+namespace {
+
+constexpr int columns = 5;
+
+/// One vendor interface: bulk 0x81 towards the host, 0x02 from it.
+Bytes configuration() {
+  return {9, 2, 32,   0, 1,  1,    0, 0x80, 50,  // one interface
+          9, 4, 0,    0, 2,  0xff, 0, 0,    0,   //
+          7, 5, 0x81, 2, 64, 0,    0,            //
+          7, 5, 0x02, 2, 64, 0,    0};
+}
+
+}  // namespace
+
+double expected_kpa(int raw_pressure, int raw_temperature, int recalibrations) {
+  const double p = raw_pressure;
+  const double t = raw_temperature;
+  const double compensated =
+      2009.75 + 32.0 * recalibrations + (-2.375854 + 0.000790 * t) * p - 0.920471 * t;
+  return 50.0 + compensated * 65.0 / 1023.0;
+}
+
+FakeTakktile::FakeTakktile(FakeUsb& usb, const std::string& serial,
+                           std::vector<std::uint8_t> alive_rows, Layout layout, int address)
+    : alive_rows_(std::move(alive_rows)),
+      layout_(layout),
+      device_(usb, address, /*port=*/address,
+              {.vendor = 0x59e3,
+               .product = 0x74c7,
+               .manufacturer = "TakkTile LLC",
+               .product_name = "TakkTile USB",
+               .serial = serial},
+              configuration(),
+              [this](const FakeUsbDevice::Setup& setup, const Bytes&) { return answer(setup); }) {
+  alive_rows_.resize(8);
+}
+
+void FakeTakktile::replace_cells(std::vector<std::uint8_t> alive_rows) {
+  alive_rows_ = std::move(alive_rows);
+  alive_rows_.resize(8);
+}
+
+int FakeTakktile::cells() const {
+  int cells = 0;
+  for (const std::uint8_t row : alive_rows_) {
+    cells += std::popcount(row);
+  }
+  return cells;
+}
+
+void FakeTakktile::send_frame(int raw_pressure, int raw_temperature) {
+  Bytes frame;
+  for (int cell = 0; cell < cells(); ++cell) {
+    for (const int raw : {raw_pressure, raw_temperature}) {
+      frame.push_back(static_cast<std::uint8_t>(raw >> 2));
+      frame.push_back(static_cast<std::uint8_t>(raw << 6));
+    }
+  }
+  device_.send_message(frame);
+}
+
+std::optional<Bytes> FakeTakktile::answer(const FakeUsbDevice::Setup& setup) {
+  if (setup.type != 0xc0) {
+    return std::nullopt;
+  }
+  switch (setup.request) {
+    case 0x5c: {
+      if (layout_ == Layout::bits) {
+        return alive_rows_;
+      }
+      Bytes map;
+      for (const std::uint8_t row : alive_rows_) {
+        for (int column = 0; column < columns; ++column) {
+          map.push_back((row >> column & 1) != 0 ? 0xff : 0x00);
+        }
+      }
+      return map;
+    }
+    case 0x6c:
+      // The MPL115A2's data sheet: a0 = 2009.75, b1 = -2.375854, b2 = -0.920471, c12 = 0.000790.
+      return Bytes{static_cast<std::uint8_t>(0x3e + recalibrations_),
+                   0xce,
+                   0xb3,
+                   0xf9,
+                   0xc5,
+                   0x17,
+                   0x33,
+                   0xc8};
+    case 0xc7: {
+      // TCC0.CTRLA = TC_CLKSEL_DIV256_gc & wIndex: the timer runs where bits of 0x06 are left.
+      constexpr int clock_by_256 = 0x06;
+      streaming_ = (setup.index & clock_by_256) == clock_by_256;
+      return Bytes{static_cast<std::uint8_t>(setup.index != 0 ? 1 : 0)};
+    }
+    case 0xba:
+      return Bytes{1};
+    default:
+      return std::nullopt;
+  }
+}
+
+}  // namespace palpate

@@ -1,0 +1,158 @@
+#pragma once
+
+#include <linux/usbdevice_fs.h>
+#include <umockdev.h>
+
+#include <condition_variable>
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <set>
+#include <string>
+#include <vector>
+
+namespace palpate {
+
+using Bytes = std::vector<std::uint8_t>;
+
+/// The USB of a test: /sys, /dev and udev as umockdev shows them to libusb in this process and in
+/// those it starts.
+class FakeUsb {
+ public:
+  FakeUsb();
+  ~FakeUsb();
+  FakeUsb(const FakeUsb&) = delete;
+  FakeUsb& operator=(const FakeUsb&) = delete;
+
+  UMockdevTestbed* testbed() const { return testbed_; }
+  std::string root() const;
+
+ private:
+  UMockdevTestbed* testbed_;
+};
+
+/// A device behind Linux's usbfs: what the kernel and the hardware would answer to libusb's ioctls.
+/// Its firmware is the function that answers control requests, and whoever sends packets.
+class FakeUsbDevice {
+ public:
+  struct Identity {
+    std::uint16_t vendor = 0;
+    std::uint16_t product = 0;
+    std::string manufacturer;
+    std::string product_name;
+    std::string serial;  ///< "" = none
+  };
+  struct Setup {
+    std::uint8_t type = 0;
+    std::uint8_t request = 0;
+    std::uint16_t value = 0;
+    std::uint16_t index = 0;
+  };
+  /// The bytes for the host, empty for a request from it (whose bytes come along); none = stall.
+  /// Called from the thread that plays the kernel.
+  using Firmware = std::function<std::optional<Bytes>(const Setup& setup, const Bytes& data)>;
+  /// What a packet's turn on the bus ends with, as the kernel reports it in the status of a URB.
+  enum class Fault { none, stall, overflow, protocol };
+
+  /// @param configuration the configuration descriptor with all that follows it
+  FakeUsbDevice(FakeUsb& usb, int address, int port, Identity identity, Bytes configuration,
+                Firmware firmware);
+  ~FakeUsbDevice();
+  FakeUsbDevice(const FakeUsbDevice&) = delete;
+  FakeUsbDevice& operator=(const FakeUsbDevice&) = delete;
+
+  /// Appears on the bus, with the address it had the last time plus `by`: libusb takes a device at
+  /// another address for another one, as it is on real hardware.
+  void plug(int by = 0);
+  /// Disappears: the URBs under way fail, and so does all that follows.
+  void unplug();
+
+  /// Queues a packet of the bulk endpoint towards the host.
+  void send_packet(Bytes bytes);
+  /// Queues bytes as packets of 64 bytes, the last one short; empty where they are a multiple.
+  void send_message(const Bytes& bytes);
+  /// The next turn on the bus ends so. A stall stays until the halt is cleared.
+  void send_fault(Fault fault, int times = 1);
+  /// Every control request is refused by a stall, or never answered.
+  void refuse_requests(bool refuse);
+  void ignore_requests(bool ignore);
+  /// Only root may open it, and nobody where the test is not run by root.
+  void forbid();
+  /// Another program has the interfaces.
+  void occupy(bool occupied);
+  /// A driver of the kernel has the interface, except while it is claimed.
+  void bind_kernel_driver(int interface);
+
+  // What the host has done.
+  std::vector<Setup> requests() const;
+  int halts_cleared() const;
+  int urbs_under_way() const;
+  bool claimed(int interface) const;
+  bool has_kernel_driver(int interface) const;
+  Bytes received() const;  ///< through the bulk endpoint from the host
+  /// Packets that nobody has fetched yet.
+  std::size_t waiting_packets() const;
+
+  std::string node() const;
+  std::string port() const;
+  const Identity& identity() const { return identity_; }
+
+ private:
+  struct Unref {
+    void operator()(UMockdevIoctlData* data) const { umockdev_ioctl_data_unref(data); }
+  };
+  using Memory = std::unique_ptr<UMockdevIoctlData, Unref>;  // of the client, as it is seen here
+  struct Urb {
+    Memory data;
+    Memory buffer;
+    std::size_t filled = 0;
+    int status = 0;
+
+    usbdevfs_urb& fields() const { return *reinterpret_cast<usbdevfs_urb*>(data->data); }
+  };
+  struct Turn {
+    Bytes packet;
+    Fault fault = Fault::none;
+  };
+
+  static gboolean on_ioctl(UMockdevIoctlBase*, UMockdevIoctlClient* client, gpointer self);
+  void handle(UMockdevIoctlClient* client);
+  int take_interface(int interface);
+  int submit(UMockdevIoctlData* argument);
+  int discard(UMockdevIoctlData* argument);
+  int reap(UMockdevIoctlData* argument, std::unique_lock<std::mutex>& lock);
+  void run_control(Urb& urb);
+  void run_bulk();
+  std::string syspath() const;
+  void show_driver(int interface, const std::string& driver);
+
+  FakeUsb& usb_;
+  int address_;
+  int port_;
+  Identity identity_;
+  Bytes configuration_;
+  Firmware firmware_;
+  UMockdevIoctlBase* handler_;
+
+  mutable std::mutex mutex_;
+  std::condition_variable changed_;
+  bool plugged_ = false;
+  bool halted_ = false;
+  bool refusing_ = false;
+  bool ignoring_ = false;
+  bool occupied_ = false;
+  std::set<int> kernel_bound_;
+  std::set<int> claimed_;
+  std::deque<Urb> under_way_;
+  std::deque<Urb> finished_;
+  std::deque<Turn> turns_;
+  std::vector<Setup> requests_;
+  int halts_cleared_ = 0;
+  Bytes received_;
+};
+
+}  // namespace palpate

@@ -1,0 +1,132 @@
+#include "sent_frame.hpp"
+
+#include <bit>
+#include <stdexcept>
+
+namespace palpate {
+
+namespace {
+
+void append(Bytes& bytes, const Bytes& more) {
+  bytes.insert(bytes.end(), more.begin(), more.end());
+}
+
+SentFrame tsf85_frame(std::mt19937& random) {
+  SentFrame frame;
+  for (int finger = 0; finger < 2; ++finger) {
+    const auto index = static_cast<int>(random() % 4);
+    Bytes data{static_cast<std::uint8_t>(0x10 | finger << 2 | index)};
+    for (int i = 0; i < 28; ++i) {
+      const auto value = static_cast<std::uint16_t>(random());
+      append(data, {static_cast<std::uint8_t>(value >> 8), static_cast<std::uint8_t>(value)});
+      frame.values.push_back(value);
+    }
+    append(frame.bytes, {0x9a, static_cast<std::uint8_t>(random()), 0x58,
+                         static_cast<std::uint8_t>(data.size())});
+    append(frame.bytes, data);
+    // Acceleration, of now and then, in a packet of its own.
+    if (random() % 2 == 0) {
+      append(frame.bytes, {0x9a, 0x00, 0x58, 7, static_cast<std::uint8_t>(0x30 | finger << 2)});
+      append(frame.bytes, random_bytes(6, random));
+    }
+  }
+  return frame;
+}
+
+SentFrame wts_frame(std::mt19937& random) {
+  SentFrame frame;
+  Bytes payload = random_bytes(4, random);  // time
+  payload.push_back(0);                     // not compressed
+  for (int i = 0; i < 6 * 14; ++i) {
+    const auto value = static_cast<std::uint16_t>(random() % 4096);
+    append(payload, {static_cast<std::uint8_t>(value), static_cast<std::uint8_t>(value >> 8)});
+    frame.values.push_back(value);
+  }
+  frame.bytes = wts_packet(0x00, payload);
+  return frame;
+}
+
+SentFrame flexitac_frame(std::mt19937& random) {
+  SentFrame frame{.bytes = {0xaa, 0x55}, .values = {}};
+  append(frame.bytes, random_bytes(16 * 32, random));
+  frame.values.assign(frame.bytes.begin() + 2, frame.bytes.end());
+  return frame;
+}
+
+SentFrame anyskin_frame(std::mt19937& random) {
+  SentFrame frame;
+  for (int chip = 0; chip < 5; ++chip) {
+    for (int field = 0; field < 4; ++field) {
+      const float value = static_cast<float>(random() % 20001) / 10.0f - 1000.0f;
+      const auto pattern = std::bit_cast<std::uint32_t>(value);
+      for (int byte = 0; byte < 4; ++byte) {
+        frame.bytes.push_back(static_cast<std::uint8_t>(pattern >> (8 * byte)));
+      }
+      if (field == 3) {
+        frame.values.push_back(double{value});
+      }
+    }
+  }
+  append(frame.bytes, {0x0d, 0x0a});
+  return frame;
+}
+
+}  // namespace
+
+SentFrame random_frame(const std::string& board, std::mt19937& random) {
+  if (board == "tsf85") {
+    return tsf85_frame(random);
+  }
+  if (board == "wts") {
+    return wts_frame(random);
+  }
+  if (board == "flexitac") {
+    return flexitac_frame(random);
+  }
+  if (board == "anyskin") {
+    return anyskin_frame(random);
+  }
+  throw std::invalid_argument("no board " + board);
+}
+
+std::uint16_t weiss_checksum(const Bytes& bytes) {
+  unsigned crc = 0xffff;
+  for (const std::uint8_t byte : bytes) {
+    unsigned entry = ((crc ^ byte) & 0xff) << 8;
+    for (int bit = 0; bit < 8; ++bit) {
+      entry = (entry & 0x8000) != 0 ? entry << 1 ^ 0x1021 : entry << 1;
+    }
+    crc = (entry & 0xffff) ^ crc >> 8;
+  }
+  return static_cast<std::uint16_t>(crc);
+}
+
+Bytes wts_packet(std::uint8_t id, const Bytes& payload) {
+  Bytes packet;
+  for (const std::size_t byte : {std::size_t{0xaa}, std::size_t{0xaa}, std::size_t{0xaa},
+                                 std::size_t{id}, payload.size(), payload.size() >> 8}) {
+    packet.push_back(static_cast<std::uint8_t>(byte));
+  }
+  append(packet, payload);
+  const std::uint16_t crc = weiss_checksum(packet);
+  append(packet, {static_cast<std::uint8_t>(crc), static_cast<std::uint8_t>(crc >> 8)});
+  return packet;
+}
+
+Bytes random_bytes(std::size_t count, std::mt19937& random) {
+  Bytes bytes(count);
+  for (std::uint8_t& byte : bytes) {
+    byte = static_cast<std::uint8_t>(random());
+  }
+  return bytes;
+}
+
+Bytes stream_of(const std::vector<SentFrame>& frames) {
+  Bytes bytes;
+  for (const SentFrame& frame : frames) {
+    append(bytes, frame.bytes);
+  }
+  return bytes;
+}
+
+}  // namespace palpate

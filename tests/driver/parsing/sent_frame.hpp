@@ -1,0 +1,35 @@
+#pragma once
+
+#include <cstdint>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "deframer.hpp"
+
+namespace palpate {
+
+using Bytes = std::vector<std::uint8_t>;
+
+/// What a board sends for one frame, and what it means.
+struct SentFrame {
+  Bytes bytes;
+  std::vector<double> values;
+};
+
+/// A frame of a shipped profile's board with random readings, written byte by byte after the
+/// board's protocol, apart from the profile. "wts", "tsf85", "flexitac" or "anyskin".
+SentFrame random_frame(const std::string& board, std::mt19937& random);
+
+/// Weiss Robotics' checksum, bit by bit.
+std::uint16_t weiss_checksum(const Bytes& bytes);
+
+/// A WTS packet.
+Bytes wts_packet(std::uint8_t id, const Bytes& payload);
+
+Bytes random_bytes(std::size_t count, std::mt19937& random);
+
+/// The bytes of frames, one after the other.
+Bytes stream_of(const std::vector<SentFrame>& frames);
+
+}  // namespace palpate

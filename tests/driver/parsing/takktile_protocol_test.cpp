@@ -1,0 +1,204 @@
+#include "takktile_protocol.hpp"
+
+#include <gtest/gtest.h>
+
+#include <set>
+
+#include "palpate/error.hpp"
+
+namespace palpate::takktile {
+namespace {
+
+using Bytes = std::vector<std::uint8_t>;
+
+template <class Action>
+std::string system_error(const Action& action) {
+  try {
+    action();
+  } catch (const Error& error) {
+    EXPECT_EQ(error.fault(), Fault::system) << error.what();
+    return error.what();
+  }
+  ADD_FAILURE() << "nothing was thrown";
+  return "";
+}
+
+TEST(TakkTileAliveMap, HasABitPerColumn) {
+  // Row 1: columns 0, 2, 4; row 7: column 3.
+  const std::vector<Cell> cells = parse_alive_map(Bytes{0, 0b10101, 0, 0, 0, 0, 0, 0b01000});
+  EXPECT_EQ(cells, (std::vector<Cell>{{1, 0}, {1, 2}, {1, 4}, {7, 3}}));
+}
+
+TEST(TakkTileAliveMap, HasAByteForEachCellInTheFork) {
+  Bytes reply(40, 0x00);
+  reply[5] = reply[7] = reply[9] = reply[38] = 0xff;
+  reply[10] = 0x01;  // neither
+  EXPECT_EQ(parse_alive_map(reply), (std::vector<Cell>{{1, 0}, {1, 2}, {1, 4}, {7, 3}}));
+}
+
+TEST(TakkTileAliveMap, RefusesWhatIsNone) {
+  for (const std::size_t length : {0, 1, 7, 9, 39, 41, 64}) {
+    const std::string message = system_error([&] { parse_alive_map(Bytes(length, 0x01)); });
+    EXPECT_NE(message.find(std::to_string(length) + " bytes"), std::string::npos) << message;
+  }
+  EXPECT_NE(system_error([] { parse_alive_map(Bytes(8, 0)); }).find("no cell"), std::string::npos);
+  EXPECT_NE(system_error([] { parse_alive_map(Bytes(40, 0)); }).find("no cell"), std::string::npos);
+  EXPECT_NE(system_error([] { parse_alive_map(Bytes(8, 0x20)); }).find("0x20"), std::string::npos);
+}
+
+TEST(TakkTileElements, LieOnAGridAboutTheOrigin) {
+  const std::vector<Cell> all = parse_alive_map(Bytes(40, 0xff));
+  const std::vector<glm::dvec2> elements_mm = element_positions(all);
+  ASSERT_EQ(elements_mm.size(), 40u);
+  glm::dvec2 sum(0.0);
+  for (const glm::dvec2& element_mm : elements_mm) {
+    sum += element_mm;
+  }
+  EXPECT_EQ(sum, glm::dvec2(0.0)) << "multiples of half the pitch are exact";
+  EXPECT_EQ(elements_mm[1] - elements_mm[0], glm::dvec2(default_pitch_mm, 0));
+  EXPECT_EQ(elements_mm[5] - elements_mm[0], glm::dvec2(0, default_pitch_mm));
+  // A cell keeps its place when others are dead.
+  EXPECT_EQ(element_positions(std::vector<Cell>{{7, 4}}, 2.0).front(), glm::dvec2(4, 7));
+}
+
+// The example of the MPL115A2 data sheet (Freescale, "Pressure compensation"): a0 = 0x3ece,
+// b1 = 0xb3f9, b2 = 0xc517, c12 = 0x33c8, Padc = 410 (0x6680), Tadc = 507 (0x7ec0). By hand:
+//   a0  =  16078 / 8       = 2009.75
+//   b1  = -19463 / 8192    =   -2.3758544921875
+//   b2  = -15081 / 16384   =   -0.92047119140625
+//   c12 = (0x33c8 >> 2) / 2^22 = 3314 / 4194304 = 0.000790119171142578
+//   c12 Tadc = 0.400590419769287;  b1 + that = -1.97526407241821;  times Padc = -809.858269691467
+//   + a0 = 1199.89173030853;  + b2 Tadc (-466.678894042969) = 733.212836265564
+//   50 + 733.212836265564 * 65 / 1023 = 96.5873258624259 kPa; the data sheet rounds to 96.59.
+constexpr std::uint8_t sheet_bytes[] = {0x3e, 0xce, 0xb3, 0xf9, 0xc5, 0x17, 0x33, 0xc8};
+
+TEST(TakkTileCalibration, GivesTheDataSheetsExample) {
+  const Calibration calibration = parse_calibration(sheet_bytes);
+  EXPECT_EQ(calibration.a0, 2009.75);
+  EXPECT_EQ(calibration.b1, -2.3758544921875);
+  EXPECT_EQ(calibration.b2, -0.92047119140625);
+  EXPECT_EQ(calibration.c12, 3314.0 / 4194304.0);
+  // The hand calculation has 15 digits.
+  EXPECT_NEAR(pressure_kpa(calibration, 410, 507), 96.5873258624259, 1e-11);
+}
+
+TEST(TakkTileCalibration, ReadsSignsAndIgnoresPaddedBits) {
+  // c12 = 0x2000 in 14 bits = -8192; the two lowest bits are padding.
+  const Calibration calibration =
+      parse_calibration(Bytes{0xff, 0xff, 0x7f, 0xff, 0x80, 0x00, 0x80, 0x03});
+  EXPECT_EQ(calibration.a0, -0.125);
+  EXPECT_EQ(calibration.b1, 32767.0 / 8192.0);
+  EXPECT_EQ(calibration.b2, -2.0);
+  EXPECT_EQ(calibration.c12, -8192.0 / 4194304.0);
+}
+
+TEST(TakkTileCalibration, RefusesACellThatDoesNotAnswer) {
+  system_error([] { parse_calibration(Bytes{}); });
+  system_error([] { parse_calibration(Bytes(7, 1)); });
+  system_error([] { parse_calibration(Bytes(12, 1)); });
+  system_error([] { parse_calibration(Bytes(8, 0x00)); });
+  system_error([] { parse_calibration(Bytes(8, 0xff)); });
+}
+
+// kPa = 50 + P * 65 / 1023, so that what was sent can be told from a value.
+constexpr Calibration plain{.a0 = 0.0, .b1 = 1.0, .b2 = 0.0, .c12 = 0.0};
+
+/// A frame whose cell i reads first + i, in packets.
+std::vector<Bytes> packets_of(std::size_t cells, std::uint16_t first) {
+  Bytes frame;
+  for (std::size_t i = 0; i < cells; ++i) {
+    const auto pressure = static_cast<std::uint16_t>((first + i) % 1024);
+    frame.insert(frame.end(), {static_cast<std::uint8_t>(pressure >> 2),
+                               static_cast<std::uint8_t>(pressure << 6), 0x80, 0x00});
+  }
+  std::vector<Bytes> packets;
+  for (std::size_t at = 0; at <= frame.size(); at += packet_bytes) {
+    const std::size_t end = std::min(frame.size(), at + packet_bytes);
+    packets.emplace_back(frame.begin() + static_cast<std::ptrdiff_t>(at),
+                         frame.begin() + static_cast<std::ptrdiff_t>(end));
+  }
+  return packets;  // the last has fewer bytes than a packet, perhaps none
+}
+
+class TakkTileFrames : public testing::TestWithParam<std::size_t> {
+ protected:
+  void push(const std::vector<Bytes>& packets) {
+    for (const Bytes& packet : packets) {
+      deframer_.push(packet, frames_);
+    }
+  }
+  void expect_frame(std::size_t index, std::uint16_t first) {
+    ASSERT_GT(frames_.size(), index);
+    ASSERT_EQ(frames_[index].values.size(), cells_);
+    for (std::size_t i = 0; i < cells_; ++i) {
+      const double raw = static_cast<double>((first + i) % 1024);
+      EXPECT_NEAR(frames_[index].values[i], 50 + raw * 65 / 1023, 1e-12) << "rounding";
+    }
+    EXPECT_FALSE(frames_[index].device_time_s);
+  }
+
+  const std::size_t cells_ = GetParam();
+  Deframer deframer_{std::vector<Calibration>(cells_, plain)};
+  std::vector<ParsedFrame> frames_;
+};
+
+TEST_P(TakkTileFrames, EndWithAShortOrAnEmptyPacket) {
+  push(packets_of(cells_, 100));
+  push(packets_of(cells_, 1000));
+  ASSERT_EQ(frames_.size(), 2u);
+  expect_frame(0, 100);
+  expect_frame(1, 1000);
+  EXPECT_EQ(deframer_.counters().garbage_bytes, 0u);
+}
+
+TEST_P(TakkTileFrames, ThatLoseAPacketAreDropped) {
+  const std::vector<Bytes> whole = packets_of(cells_, 7);
+  for (std::size_t lost = 0; lost < whole.size(); ++lost) {
+    std::vector<Bytes> damaged = whole;
+    damaged.erase(damaged.begin() + static_cast<std::ptrdiff_t>(lost));
+    frames_.clear();
+    push(damaged);
+    EXPECT_TRUE(frames_.empty());
+    push(packets_of(cells_, 200));  // lost with it where the end was
+    frames_.clear();
+    push(packets_of(cells_, 300));
+    ASSERT_EQ(frames_.size(), 1u) << "not in step two frames after";
+    expect_frame(0, 300);
+  }
+}
+
+TEST_P(TakkTileFrames, SurviveForeignPackets) {
+  std::uint64_t foreign = 0;
+  for (const std::size_t bytes : {1u, 3u, 63u, 64u}) {
+    push({Bytes(bytes, 0x55)});
+    foreign += bytes;
+    push(packets_of(cells_, 50));
+    frames_.clear();
+    push(packets_of(cells_, 60));
+    ASSERT_EQ(frames_.size(), 1u);
+    expect_frame(0, 60);
+  }
+  EXPECT_GE(deframer_.counters().garbage_bytes, cells_ == 1 ? foreign - 64 : foreign);
+  EXPECT_EQ(deframer_.counters().checksum_errors, 0u);
+}
+
+TEST_P(TakkTileFrames, BeginAnewAfterReset) {
+  deframer_.push(packets_of(cells_, 9).front().size() == packet_bytes ? Bytes(64, 1) : Bytes{},
+                 frames_);
+  deframer_.reset();
+  push(packets_of(cells_, 11));
+  ASSERT_EQ(frames_.size(), 1u);
+  expect_frame(0, 11);
+}
+
+TEST_P(TakkTileFrames, DoNotComeOfEmptyPackets) {
+  push({Bytes{}, Bytes{}, Bytes{}});
+  EXPECT_TRUE(frames_.empty());
+  EXPECT_EQ(deframer_.counters().garbage_bytes, 0u);
+}
+
+// One cell; below, at and above a packet's 16; two packets; a whole board.
+INSTANTIATE_TEST_SUITE_P(Cells, TakkTileFrames, testing::Values(1, 15, 16, 17, 32, 40));
+
+}  // namespace
+}  // namespace palpate::takktile

@@ -1,0 +1,72 @@
+#include <cstdlib>
+
+#include <gmock/gmock.h>
+
+#include "cli/program.hpp"
+#include "fake_serial_board.hpp"
+#include "fake_takktile.hpp"
+
+namespace palpate {
+namespace {
+
+using nlohmann::json;
+using testing::HasSubstr;
+using testing::Not;
+
+/// The program sees the USB of the test.
+class SensorsCommand : public ProgramTest {
+ protected:
+  // As in sanitizer_options.cpp, for the program.
+  SensorsCommand() { setenv("ASAN_OPTIONS", "verify_asan_link_order=0:detect_leaks=0", 1); }
+
+  FakeUsb usb_;
+};
+
+TEST_F(SensorsCommand, SaysThatNothingIsPluggedIn) {
+  EXPECT_EQ(done({"sensors"}), "no USB devices\n");
+  EXPECT_EQ(json::parse(done({"sensors", "--json"})), json::array());
+}
+
+TEST_F(SensorsCommand, TellsBoardsFromOtherDevices) {
+  FakeTakktile takktile(usb_, "0012", {0b11111, 0b111});
+  FakeSerialBoard tsf85(usb_, "", {}, FakeSerialBoard::Union::present, 3);
+  FakeSerialBoard other(usb_, "B2", {.vendor = 0x2341, .product = 0x8036},
+                        FakeSerialBoard::Union::present, 4);
+  const json boards = json::parse(done({"sensors", "--json"}));
+  ASSERT_EQ(boards.size(), 3U);
+  EXPECT_EQ(boards[0], json::parse(R"({
+    "name": "takktile:0012", "bus": 1, "address": 2, "vendor": "59e3", "product": "74c7",
+    "manufacturer": "TakkTile LLC", "product_name": "TakkTile USB", "serial": "0012",
+    "elements": 8, "rate_hz": 0.0, "pressure_unit": "kPa", "usable": true, "reason": ""})"));
+  EXPECT_EQ(boards[1]["name"], "tsf85:1-3") << "no serial number: named by its port";
+  EXPECT_EQ(boards[1]["elements"], 56);
+  EXPECT_EQ(boards[2]["usable"], false);
+  EXPECT_EQ(boards[2]["name"], "");
+
+  const std::string text = done({"sensors"});
+  EXPECT_THAT(text, HasSubstr("* 59e3:74c7  takktile:0012\n"
+                              "     bus 1, address 2, serial 0012\n"
+                              "     8 elements, kPa, rate not known\n"));
+  EXPECT_THAT(text, HasSubstr("* 16d0:14cc  tsf85:1-3\n"
+                              "     bus 1, address 3, serial none\n"
+                              "     56 elements, raw, 100 frames/s\n"));
+  EXPECT_THAT(text, HasSubstr("  2341:8036  Maker Serial board\n"
+                              "     bus 1, address 4, serial B2\n"
+                              "     not known: "));
+}
+
+TEST_F(SensorsCommand, SaysWhyABoardCannotBeUsed) {
+  FakeTakktile board(usb_, "0012", {0b11111});
+  board.usb().refuse_requests(true);
+  EXPECT_THAT(done({"sensors"}), HasSubstr("     not usable: USB device 59e3:74c7 at 1-2: request "
+                                           "0x5C: it refuses the request"));
+}
+
+TEST_F(SensorsCommand, DoesNotPassOnWhatADeviceWouldSayToATerminal) {
+  FakeTakktile board(usb_, "\x1b[2J", {0b11111});
+  EXPECT_THAT(done({"sensors"}), Not(HasSubstr("\x1b")));
+  EXPECT_EQ(json::parse(done({"sensors", "--json"})).size(), 1U);
+}
+
+}  // namespace
+}  // namespace palpate

@@ -1,0 +1,51 @@
+#pragma once
+
+#include <chrono>
+#include <functional>
+#include <thread>
+#include <vector>
+
+#include "palpate/sensor.hpp"
+
+namespace palpate {
+
+/// Longer than anything here takes on a machine that is busy with other things: only a failure
+/// waits so long.
+constexpr std::chrono::seconds patience{20};
+
+/// Waits until it holds. False: it did not within the time.
+inline bool becomes_true(const std::function<bool()>& condition) {
+  const auto end = std::chrono::steady_clock::now() + patience;
+  while (!condition()) {
+    if (std::chrono::steady_clock::now() > end) {
+      return false;
+    }
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+  return true;
+}
+
+/// The next `count` frames, or fewer where they do not come.
+inline std::vector<Frame> take(Sensor& sensor, std::size_t count) {
+  std::vector<Frame> frames;
+  while (frames.size() < count) {
+    std::optional<Frame> frame = sensor.next(patience);
+    if (!frame) {
+      break;
+    }
+    frames.push_back(std::move(*frame));
+  }
+  return frames;
+}
+
+/// Calls `send` with 0, 1, ... at that rate, as a board sends its frames.
+inline void at_rate(double rate_hz, int count, const std::function<void(int)>& send) {
+  auto next = std::chrono::steady_clock::now();
+  for (int i = 0; i < count; ++i) {
+    send(i);
+    next += std::chrono::nanoseconds(static_cast<long>(1e9 / rate_hz));
+    std::this_thread::sleep_until(next);
+  }
+}
+
+}  // namespace palpate

@@ -1,0 +1,155 @@
+#include <gtest/gtest.h>
+
+#include "fake_takktile.hpp"
+#include "palpate/driver.hpp"
+#include "streamed.hpp"
+#include "transfer_ring.hpp"
+
+namespace palpate {
+namespace {
+
+using Fault = FakeUsbDevice::Fault;
+
+constexpr int ring = static_cast<int>(TransferRing::transfers);
+
+/// A board of two rows that streams.
+class TransferFault : public testing::Test {
+ protected:
+  TransferFault() { sensor_->start(); }
+
+  /// Sends a frame and expects it.
+  Frame frame_after(int raw) {
+    board_.send_frame(raw);
+    const std::vector<Frame> frames = take(*sensor_, 1);
+    EXPECT_EQ(frames.size(), 1U);
+    EXPECT_NEAR(frames.at(0).values.at(9), expected_kpa(raw), kpa_tolerance);
+    return frames.at(0);
+  }
+
+  FakeUsb usb_;
+  FakeTakktile board_{usb_, "1", {0b11111, 0b11111}};
+  std::unique_ptr<Sensor> sensor_ = open_board("takktile");
+};
+
+TEST_F(TransferFault, AStallIsClearedAndTheStreamGoesOn) {
+  frame_after(100);
+  for (int i = 1; i <= 3; ++i) {
+    board_.usb().send_fault(Fault::stall);
+    frame_after(100 + i);
+    EXPECT_EQ(board_.usb().halts_cleared(), i);
+  }
+  sensor_->stop();
+  EXPECT_EQ(sensor_->counters().stalls, 3U);
+  EXPECT_EQ(sensor_->counters().frames, 4U);
+  EXPECT_EQ(sensor_->counters().reconnects, 0U);
+}
+
+TEST_F(TransferFault, AnOverflowIsCountedAndCostsOneFrame) {
+  frame_after(100);
+  board_.usb().send_fault(Fault::overflow);
+  EXPECT_EQ(frame_after(101).lost_before, 1U);
+  EXPECT_EQ(frame_after(102).lost_before, 0U);
+  sensor_->stop();
+  EXPECT_EQ(sensor_->counters().overflows, 1U);
+  EXPECT_EQ(sensor_->counters().lost, 1U);
+}
+
+TEST_F(TransferFault, FewerErrorsInARowThanTransfersAreSurvived) {
+  for (int i = 0; i < 3; ++i) {
+    board_.usb().send_fault(Fault::protocol, ring - 1);
+    EXPECT_EQ(frame_after(100 + i).lost_before, static_cast<std::uint64_t>(ring - 1));
+  }
+  EXPECT_EQ(sensor_->counters().reconnects, 0U);
+  EXPECT_FALSE(sensor_->gone());
+}
+
+TEST_F(TransferFault, AsManyErrorsInARowAsTransfersOpenTheBoardAnew) {
+  frame_after(100);
+  const std::size_t requests = board_.usb().requests().size();
+  board_.usb().send_fault(Fault::protocol, ring);
+  ASSERT_TRUE(becomes_true([&] { return sensor_->counters().reconnects == 1; }));
+  EXPECT_GT(board_.usb().requests().size(), requests + 10) << "calibration is read again";
+  EXPECT_EQ(frame_after(101).lost_before, static_cast<std::uint64_t>(ring));
+}
+
+TEST_F(TransferFault, AnEndpointThatStallsForEverDoesNotHangTheProgram) {
+  board_.usb().send_fault(Fault::stall, 10 * ring);
+  ASSERT_TRUE(becomes_true([&] { return sensor_->counters().reconnects >= 2; }));
+  sensor_->stop();
+  EXPECT_GE(sensor_->counters().stalls, 2U * ring);
+  EXPECT_EQ(board_.usb().urbs_under_way(), 0);
+}
+
+TEST_F(TransferFault, ASilentBoardTimesOutAndIsWaitedFor) {
+  frame_after(100);
+  ASSERT_TRUE(becomes_true([&] { return sensor_->counters().timeouts >= 1; }));
+  EXPECT_FALSE(sensor_->gone());
+  EXPECT_EQ(frame_after(101).lost_before, 0U);
+  EXPECT_EQ(sensor_->counters().reconnects, 0U);
+}
+
+TEST_F(TransferFault, APauseWithinAFrameCostsNothing) {
+  FakeTakktile board(usb_, "2", {0b11111, 0b11111, 0b11111, 0b11111}, FakeTakktile::Layout::bits,
+                     3);
+  const auto sensor = open_board("takktile:2");
+  sensor->start();
+  board.usb().send_packet(Bytes(64, 0x40));
+  ASSERT_TRUE(becomes_true([&] { return sensor->counters().timeouts >= 1; }));
+  board.usb().send_packet(Bytes(16, 0x40));
+  const std::vector<Frame> frames = take(*sensor, 1);
+  ASSERT_EQ(frames.size(), 1U);
+  EXPECT_NEAR(frames[0].values.at(19), expected_kpa(0x101, 0x101), kpa_tolerance);
+  EXPECT_EQ(sensor->counters().garbage_bytes, 0U);
+}
+
+TEST_F(TransferFault, FramesOfAnotherLengthAreCountedAndPassedOver) {
+  frame_after(100);
+  board_.usb().send_message(Bytes(36));   // a cell is missing
+  board_.usb().send_message(Bytes(104));  // two frames without the end of the first
+  board_.usb().send_message(Bytes(320));
+  EXPECT_EQ(frame_after(101).lost_before, 3U);
+  sensor_->stop();
+  EXPECT_EQ(sensor_->counters().lost, 3U);
+  EXPECT_EQ(sensor_->counters().garbage_bytes, 36U + 104U + 320U);
+}
+
+TEST_F(TransferFault, AnEmptyPacketBetweenFramesIsNoFrame) {
+  board_.usb().send_packet({});
+  EXPECT_EQ(frame_after(100).lost_before, 0U);
+}
+
+TEST_F(TransferFault, TheOldestFramesGoWhereNobodyTakesThem) {
+  constexpr int sent = 1100;
+  constexpr int kept = 1024;
+  for (int i = 0; i < sent; ++i) {
+    board_.send_frame(i % 1000);
+  }
+  ASSERT_TRUE(becomes_true([&] {
+    const SensorCounters counters = sensor_->counters();
+    return counters.frames + counters.lost == sent;
+  }));
+  EXPECT_EQ(sensor_->counters().lost, static_cast<std::uint64_t>(sent - kept));
+  const std::vector<Frame> frames = take(*sensor_, kept);
+  ASSERT_EQ(frames.size(), static_cast<std::size_t>(kept));
+  EXPECT_EQ(frames[0].lost_before, static_cast<std::uint64_t>(sent - kept));
+  EXPECT_NEAR(frames[0].values[0], expected_kpa(sent - kept), kpa_tolerance);
+  EXPECT_EQ(frames[1].lost_before, 0U);
+  EXPECT_NEAR(frames.back().values[0], expected_kpa((sent - 1) % 1000), kpa_tolerance);
+}
+
+TEST_F(TransferFault, StopsAndStartsAnew) {
+  frame_after(100);
+  for (int i = 0; i < 3; ++i) {
+    sensor_->stop();
+    EXPECT_FALSE(board_.streaming());
+    EXPECT_EQ(board_.usb().urbs_under_way(), 0);
+    EXPECT_EQ(sensor_->next(std::chrono::milliseconds(0)), std::nullopt);
+    sensor_->start();
+    EXPECT_TRUE(board_.streaming());
+    EXPECT_EQ(sensor_->counters().frames, 0U);
+    frame_after(200 + i);
+  }
+}
+
+}  // namespace
+}  // namespace palpate
