@@ -75,7 +75,7 @@ Pose parse_pose(const std::string& flag, const std::string& text) {
 }
 
 std::array<int, 3> parse_bins(const std::string& flag, const std::string& text) {
-  const auto bins = parse<int>(flag, text, 'x', 3, "XxYxTHETA, such as 25x25x16");
+  const auto bins = parse<int>(flag, text, 'x', 3, "XxYxTHETA, such as 25x25x16, or auto");
   for (const int count : bins) {
     if (count < 1) {
       refuse(flag, text, "every count must be at least 1");

@@ -23,6 +23,9 @@ class HistogramRecogniser : public Recogniser {
     histogram_.update(touches, progress);
   }
   Estimate estimate() const override { return histogram_.estimate(); }
+  std::optional<RefinedPose> refine(const Mode& mode) const override {
+    return histogram_.refine(mode);
+  }
   std::optional<double> effective_sample_size() const override { return {}; }
   std::vector<double> belief_xy(int object) const override {
     return histogram_.marginals(object).xy;
@@ -58,6 +61,7 @@ class ParticleRecogniser : public Recogniser {
     }
   }
   Estimate estimate() const override { return filter_.estimate(); }
+  std::optional<RefinedPose> refine(const Mode&) const override { return {}; }
   std::optional<double> effective_sample_size() const override {
     return filter_.effective_sample_size();
   }

@@ -24,6 +24,8 @@ class Recogniser {
   virtual void update(std::span<const Touch> touches,
                       const std::function<void(double)>& progress) = 0;
   virtual Estimate estimate() const = 0;
+  /// The mode's pose between the bins, where there are bins.
+  virtual std::optional<RefinedPose> refine(const Mode& mode) const = 0;
   /// Of the particles, where there are any.
   virtual std::optional<double> effective_sample_size() const = 0;
   /// Probability of every (x, y) of one object over the task's lattice, [ny, nx].

@@ -13,6 +13,22 @@ namespace palpate::cli {
 
 namespace {
 
+nlohmann::ordered_json to_json(const RefinedPose& refined) {
+  auto rows = nlohmann::ordered_json::array();
+  for (std::size_t row = 0; row < 3; ++row) {
+    const double* values = &refined.covariance[3 * row];
+    rows.push_back({values[0], values[1], values[2]});
+  }
+  return {{"x_mm", refined.T_object_robot.translation_mm.x},
+          {"y_mm", refined.T_object_robot.translation_mm.y},
+          {"theta_rad", refined.T_object_robot.theta_rad},
+          {"covariance", rows}};
+}
+
+nlohmann::ordered_json to_json(std::optional<double> error_mm) {
+  return error_mm ? nlohmann::ordered_json(*error_mm) : nullptr;
+}
+
 nlohmann::ordered_json to_json(const Step& step, const RecognitionTask& task) {
   nlohmann::ordered_json identity;
   for (std::size_t i = 0; i < task.labels.size(); ++i) {
@@ -28,13 +44,21 @@ nlohmann::ordered_json to_json(const Step& step, const RecognitionTask& task) {
                                 {"x_mm", mode.T_object_robot.translation_mm.x},
                                 {"y_mm", mode.T_object_robot.translation_mm.y},
                                 {"theta_rad", mode.T_object_robot.theta_rad},
-                                {"log_likelihood", mode.log_likelihood}}},
-                              {"T_robot_object",
-                               {T_robot_object.translation_mm.x, T_robot_object.translation_mm.y,
-                                wrap_angle(T_robot_object.theta_rad, 2.0 * std::numbers::pi)}}};
+                                {"log_likelihood", mode.log_likelihood}}}};
+  if (step.refined) {
+    json["refined"] = to_json(*step.refined);
+  }
+  json["T_robot_object"] = {T_robot_object.translation_mm.x, T_robot_object.translation_mm.y,
+                            wrap_angle(T_robot_object.theta_rad, 2.0 * std::numbers::pi)};
   if (step.right) {
     json["right"] = *step.right;
-    json["error_mm"] = step.error_mm ? nlohmann::ordered_json(*step.error_mm) : nullptr;
+    json["error_mm"] = to_json(step.error_mm);
+    if (step.refined) {
+      json["refined_error_mm"] = to_json(step.refined_error_mm);
+    }
+  }
+  if (step.contradicted) {
+    json["contradicted"] = true;
   }
   if (step.effective_sample_size) {
     json["effective_sample_size"] = *step.effective_sample_size;
@@ -42,8 +66,8 @@ nlohmann::ordered_json to_json(const Step& step, const RecognitionTask& task) {
   return json;
 }
 
-std::string error_text(const Step& step) {
-  return step.error_mm ? fmt::format("{:.2f}", *step.error_mm) : "-";
+std::string error_text(std::optional<double> error_mm) {
+  return error_mm ? fmt::format("{:.2f}", *error_mm) : "-";
 }
 
 /// What each label was taken for, most often first; only labels that were not always right.
@@ -89,12 +113,18 @@ const std::string& true_label(const Recording& recording) {
   return recording.truth ? recording.truth->object : recording.object;
 }
 
-Step judge(const Estimate& estimate, const Unknown& unknown, const RecognitionTask& task) {
+Step judge(const Estimate& estimate, const std::optional<RefinedPose>& refined,
+           const Unknown& unknown, const RecognitionTask& task) {
   Step step;
   step.mode = estimate.mode;
+  step.refined = refined;
+  step.contradicted = estimate.contradicted;
   step.identity.assign(task.labels.size(), 0.0);
   for (std::size_t i = 0; i < estimate.identity.size(); ++i) {
     step.identity[task.label_of[i]] += estimate.identity[i];
+  }
+  if (task.histogram.none_weight) {
+    step.identity.back() = estimate.none;
   }
   step.best = static_cast<std::size_t>(
       std::max_element(step.identity.begin(), step.identity.end()) - step.identity.begin());
@@ -102,14 +132,21 @@ Step judge(const Estimate& estimate, const Unknown& unknown, const RecognitionTa
   const Recording& recording = *unknown.recording;
   const std::string& truth = true_label(recording);
   if (!truth.empty()) {
-    step.right = task.labels[step.best] == truth;
+    const bool learned =
+        std::find(task.labels.begin(), task.labels.end(), truth) != task.labels.end();
+    step.right = task.labels[step.best] == (learned ? truth : none_label);
   }
   const OccupancyGrid& map = task.hypotheses[step.mode.object].map;
   const bool has_body =
       std::any_of(map.log_odds.begin(), map.log_odds.end(), [](float l) { return l > 0.0F; });
   if (recording.truth && map.label == truth && has_body) {
-    step.error_mm = pose_error_mm(body_of(map), map.symmetry, step.mode.T_object_robot,
-                                  recording.truth->T_object_robot);
+    const auto error_mm = [&, body = body_of(map)](const Pose& T_object_robot) {
+      return pose_error_mm(body, map.symmetry, T_object_robot, recording.truth->T_object_robot);
+    };
+    step.error_mm = error_mm(step.mode.T_object_robot);
+    if (step.refined) {
+      step.refined_error_mm = error_mm(step.refined->T_object_robot);
+    }
   }
   return step;
 }
@@ -140,17 +177,18 @@ std::string name_of(const RecognitionRecord& record) {
 }
 
 void print_trace(const RecognitionRecord& record, const RecognitionTask& task) {
-  fmt::print("{}\n  touch  best       probability     x mm     y mm  theta deg  error mm{}\n",
-             name_of(record), record.last().effective_sample_size ? "  effective particles" : "");
+  const bool particles = record.last().effective_sample_size.has_value();
+  fmt::print("{}\n  touch  best       probability     x mm     y mm  theta deg  error mm  {}\n",
+             name_of(record), particles ? "effective particles" : " refined");
   for (std::size_t i = 0; i < record.trace.size(); ++i) {
     const Step& step = record.trace[i];
     const Pose& T = step.mode.T_object_robot;
-    const std::string effective = step.effective_sample_size
-                                      ? fmt::format("  {:>19.1f}", *step.effective_sample_size)
-                                      : std::string();
-    fmt::print("  {:>5}  {:<10} {:>11.6f} {:>8.2f} {:>8.2f} {:>10.1f}  {:>8}{}\n", i + 1,
+    const std::string last = particles ? fmt::format("{:>19.1f}", *step.effective_sample_size)
+                                       : fmt::format("{:>8}", error_text(step.refined_error_mm));
+    fmt::print("  {:>5}  {:<10} {:>11.6f} {:>8.2f} {:>8.2f} {:>10.1f}  {:>8} {}{}\n", i + 1,
                task.labels[step.best], step.identity[step.best], T.translation_mm.x,
-               T.translation_mm.y, degrees(T.theta_rad), error_text(step), effective);
+               T.translation_mm.y, degrees(T.theta_rad), error_text(step.error_mm), last,
+               step.contradicted ? "  contradicted" : "");
   }
 }
 
@@ -161,29 +199,42 @@ void print_table(const std::vector<RecognitionRecord>& records, const Recognitio
   }
   fmt::print(
       "{:<{}}  touches  best       probability     x mm     y mm  theta deg  truth      "
-      "error mm\n",
+      "error mm  refined\n",
       "recording", width);
   int known = 0;
   int right = 0;
   int located = 0;
   double error_sum = 0.0;
+  double refined_sum = 0.0;
   for (const RecognitionRecord& record : records) {
     const Step& step = record.last();
     const Pose& T = step.mode.T_object_robot;
-    fmt::print("{:<{}}  {:>7}  {:<10} {:>11.6f} {:>8.2f} {:>8.2f} {:>10.1f}  {:<10} {:>8}\n",
+    fmt::print("{:<{}}  {:>7}  {:<10} {:>11.6f} {:>8.2f} {:>8.2f} {:>10.1f}  {:<10} {:>8} {:>8}\n",
                name_of(record), width, record.touches, task.labels[step.best],
                step.identity[step.best], T.translation_mm.x, T.translation_mm.y,
                degrees(T.theta_rad), record.true_label.empty() ? "-" : record.true_label,
-               error_text(step));
+               error_text(step.error_mm), error_text(step.refined_error_mm));
     known += step.right ? 1 : 0;
     right += step.right.value_or(false) ? 1 : 0;
     located += step.error_mm ? 1 : 0;
     error_sum += step.error_mm.value_or(0.0);
+    refined_sum += step.refined_error_mm.value_or(0.0);
+  }
+  for (const RecognitionRecord& record : records) {
+    if (record.last().contradicted) {
+      fmt::print(
+          "{}: contradicted: no map explains these touches at any bin; the object may be "
+          "unknown, its pose outside the region, or gamma too small\n",
+          name_of(record));
+    }
   }
   if (known > 0) {
     fmt::print("{} of {} right ({:.1f} %)", right, known, 100.0 * right / known);
     if (located > 0) {
       fmt::print(", mean pose error {:.2f} mm", error_sum / located);
+      if (records.front().last().refined) {
+        fmt::print(", refined {:.2f} mm", refined_sum / located);
+      }
     }
     fmt::print("\n");
     print_confusions(records, task);

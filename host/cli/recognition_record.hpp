@@ -15,8 +15,12 @@ struct Step {
   std::vector<double> identity;  ///< [label] probability
   std::size_t best = 0;          ///< the label of the largest probability
   Mode mode;
-  std::optional<bool> right;       ///< is `best` the true label, where that is known?
+  std::optional<RefinedPose> refined;  ///< where the filter has bins
+  bool contradicted = false;
+  /// Is `best` the true label, where that is known? "(none)" is right where no map has that label.
+  std::optional<bool> right;
   std::optional<double> error_mm;  ///< of the mode, where the truth is known and its object right
+  std::optional<double> refined_error_mm;
   std::optional<double> effective_sample_size;  ///< of the particles, where there are any
 };
 
@@ -33,7 +37,8 @@ struct RecognitionRecord {
 };
 
 /// Sums an estimate over the maps of each label and compares it with the truth.
-Step judge(const Estimate& estimate, const Unknown& unknown, const RecognitionTask& task);
+Step judge(const Estimate& estimate, const std::optional<RefinedPose>& refined,
+           const Unknown& unknown, const RecognitionTask& task);
 
 /// The label that the recording is known to show: its truth, or else its object.
 const std::string& true_label(const Recording& recording);

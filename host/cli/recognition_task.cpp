@@ -119,8 +119,9 @@ PoseLattice make_lattice(const RecognizeOptions& options, const Scene& scene) {
   range("--x-mm", options.x_mm, scene.region.x_mm, lattice.x_mm, 1.0);
   range("--y-mm", options.y_mm, scene.region.y_mm, lattice.y_mm, 1.0);
   range("--theta-deg", options.theta_deg, scene.region.theta_deg, lattice.theta_rad, radians(1.0));
-  const auto bins =
-      options.bins.empty() ? scene.bins : std::optional(parse_bins("--bins", options.bins));
+  const auto bins = options.bins.empty()     ? scene.bins
+                    : options.bins == "auto" ? std::nullopt
+                                             : std::optional(parse_bins("--bins", options.bins));
   if (bins) {
     lattice.x_mm.count = (*bins)[0];
     lattice.y_mm.count = (*bins)[1];
@@ -132,6 +133,22 @@ PoseLattice make_lattice(const RecognizeOptions& options, const Scene& scene) {
     lattice.pivot_mm = *scene.region.pivot_mm;
   }
   return lattice.collapse_fixed();
+}
+
+/// The weight of "none of these", which becomes the last label.
+void add_none(std::optional<double> weight, RecognitionTask& task) {
+  if (!weight) {
+    return;
+  }
+  task.histogram.none_weight = require_above("--none", *weight, 0.0);
+  const auto taken = std::find(task.labels.begin(), task.labels.end(), none_label);
+  if (taken != task.labels.end()) {
+    throw Error(Fault::input,
+                fmt::format("--none: a map is labelled {}, as the hypothesis of an unknown object "
+                            "is; label it otherwise in a scene file",
+                            none_label));
+  }
+  task.labels.emplace_back(none_label);
 }
 
 /// Puts the scene's array in the place of the recordings' own.
@@ -258,6 +275,7 @@ RecognitionTask prepare(const RecognizeOptions& options) {
   RecognitionTask task;
   const bool with_particles = wants_particles(options, scene);
   task.histogram.lattice = make_lattice(options, scene);
+  task.auto_bins = options.bins.empty() ? scene.auto_bins : options.bins == "auto";
   task.histogram.gamma = options.gamma ? *options.gamma : scene.gamma.value_or(0.1);
   if (!(task.histogram.gamma >= 0.0 && task.histogram.gamma < 1.0)) {
     throw Error(Fault::input,
@@ -278,6 +296,7 @@ RecognitionTask prepare(const RecognizeOptions& options) {
     task.histogram.memory_limit_bytes = static_cast<std::uint64_t>(*options.memory_mib) << 20;
   }
   load_maps(objects_of(options, scene), task);
+  add_none(options.none ? options.none : scene.none, task);
   task.histogram.prior = common_prior(task, options.prior ? options.prior : scene.prior);
   if (with_particles) {
     task.particles = particle_options(options, task.histogram);

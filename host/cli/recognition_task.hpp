@@ -25,6 +25,7 @@ struct RecognizeOptions {
   std::string pivot_mm;
   std::optional<double> prior;
   std::optional<double> gamma;
+  std::optional<double> none;
   std::optional<double> threshold;
   std::optional<double> ratio;
   std::string frames;
@@ -50,14 +51,18 @@ struct Unknown {
   std::vector<Touch> touches;
 };
 
+/// The label of "none of these", an object that was never learned.
+inline constexpr const char* none_label = "(none)";
+
 /// What the flags and the scene file together ask for; a flag overrides the scene's key.
 struct RecognitionTask {
   std::vector<Hypothesis> hypotheses;
   std::vector<std::string> map_paths;  ///< [hypothesis]
-  std::vector<std::string> labels;     ///< every label once, in the order of the maps
+  std::vector<std::string> labels;     ///< each once, in the order of the maps; last, if any, none
   std::vector<std::size_t> label_of;   ///< [hypothesis] index into labels
   HistogramOptions histogram;
   std::optional<ParticleOptions> particles;  ///< where the particle filter was asked for
+  bool auto_bins = false;                    ///< the lattice's counts are still to be chosen
   std::string device;
   std::vector<Recording> recordings;
   std::vector<Unknown> unknowns;

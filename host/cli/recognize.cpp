@@ -10,6 +10,7 @@
 #include <fmt/format.h>
 
 #include "figures.hpp"
+#include "palpate/balanced_lattice.hpp"
 #include "palpate/error.hpp"
 #include "palpate/files.hpp"
 #include "progress.hpp"
@@ -72,12 +73,12 @@ RecognitionRecord recognize_one(const Unknown& unknown, const RecognitionTask& t
                            .touches = unknown.touches.size(),
                            .true_label = true_label(*unknown.recording),
                            .trace = {}};
-  const auto start = std::chrono::steady_clock::now();
-  const auto judged = [&] {
-    Step step = judge(recogniser.estimate(), unknown, task);
-    step.effective_sample_size = recogniser.effective_sample_size();
-    return step;
+  const auto look = [&] {
+    const Estimate estimate = recogniser.estimate();
+    record.trace.push_back(judge(estimate, recogniser.refine(estimate.mode), unknown, task));
+    record.trace.back().effective_sample_size = recogniser.effective_sample_size();
   };
+  const auto start = std::chrono::steady_clock::now();
   recogniser.reset();
   if (trace) {
     const auto touches = static_cast<double>(unknown.touches.size());
@@ -85,11 +86,11 @@ RecognitionRecord recognize_one(const Unknown& unknown, const RecognitionTask& t
       const auto done = static_cast<double>(record.trace.size());
       recogniser.update(std::span(&touch, 1),
                         [&](double fraction) { progress((done + fraction) / touches); });
-      record.trace.push_back(judged());
+      look();
     }
   } else {
     recogniser.update(unknown.touches, progress);
-    record.trace.push_back(judged());
+    look();
   }
   record.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   return record;
@@ -114,6 +115,7 @@ std::string draw_sheet(const RecognitionRecord& record, const Unknown& unknown,
   sheet.map = task.hypotheses[last.mode.object].map;
   sheet.element_mm = element_edge_mm(unknown.touches.front());
   sheet.T_object_robot = last.mode.T_object_robot;
+  sheet.none = task.labels[last.best] == none_label;
   sheet.true_object = record.true_label;
   if (last.error_mm) {
     sheet.truth = unknown.recording->truth->T_object_robot;
@@ -144,10 +146,30 @@ Posterior export_posterior(const RecognitionTask& task, const PoseHistogram& his
   return posterior;
 }
 
+/// Counts for --bins auto: what the maps are worth and the device holds.
+PoseLattice choose_bins(const RecognitionTask& task, const Device& device) {
+  const HistogramOptions& histogram = task.histogram;
+  const std::int64_t most = most_bins_on(device, histogram.still_array);
+  const BalancedLattice chosen = balanced_lattice(histogram.lattice, task.hypotheses, most);
+  if (chosen.bounded) {
+    fmt::print(stderr,
+               "palpate: --bins auto: steps of {:.2f} mm, coarser than the maps are worth, to keep "
+               "to {} bins in all; narrow the region, or give --bins\n",
+               chosen.step_mm, most);
+  }
+  return chosen.lattice;
+}
+
 void recognize(const RecognizeOptions& options) {
-  const RecognitionTask task = prepare(options);
+  RecognitionTask task = prepare(options);
   check_outputs(options, task);
   Device device = Device::open(task.device);
+  if (task.auto_bins) {
+    task.histogram.lattice = choose_bins(task, device);
+    if (task.particles) {  // of which pictures count how many lie in each bin
+      task.particles->region = task.histogram.lattice;
+    }
+  }
   const std::unique_ptr<Recogniser> recogniser = make_recogniser(device, task);
   if (!options.png.empty()) {
     make_folder(options.png);
@@ -211,9 +233,10 @@ void add_recognize(CLI::App& app) {
   command->add_option("--maps", options->maps, "Maps of the known objects, or folders of maps");
   command->add_option("--scene", options->scene,
                       "Scene file (YAML) with any of: array, threshold, ratio, gamma, prior, "
-                      "objects, region, bins, filter, device; a flag overrides its key");
+                      "none, objects, region, bins, filter, device; a flag overrides its key");
   command->add_option("--bins", options->bins,
-                      "Pose bins per object along x, y and theta [default: 25x25x16]");
+                      "Pose bins per object along x, y and theta [default: 25x25x16]; auto: as "
+                      "many as the maps' cells are worth and the device holds");
   command->add_option("--x-mm", options->x_mm,
                       "Range of x, mm, as --x-mm=-10:10 [default: -10:10]");
   command->add_option("--y-mm", options->y_mm,
@@ -227,6 +250,10 @@ void add_recognize(CLI::App& app) {
                       "Probability that an unseen cell is occupied [default: the maps' own]");
   command->add_option("--gamma", options->gamma,
                       "Rate at which a contact reading is random [default: 0.1]");
+  command->add_option("--none", options->none,
+                      "Prior weight of \"(none)\", an object that was never learned, where each "
+                      "map's is 1 or its scene's: with 5 maps, 5 makes it as likely as not; its "
+                      "likelihood is that of a map of nothing but the prior [default: left out]");
   command->add_option(
       "--threshold", options->threshold,
       "Contact threshold, in the recording's pressure unit [default: 2 kPa; must be "

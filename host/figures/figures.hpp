@@ -24,7 +24,8 @@ struct RecognitionSheet {
   std::vector<std::vector<glm::dvec2>> footprints_mm;  ///< [touch][element] in the robot frame
   double element_mm = 1.8;                             ///< edge at which an element is drawn
   Pose T_object_robot;                                 ///< estimated
-  std::string true_object;                             ///< label, "" where it is unknown
+  bool none = false;          ///< "none of these" is more probable than the map's object
+  std::string true_object;    ///< label, "" where it is unknown
   std::optional<Pose> truth;  ///< T_object_robot, where it is known and the identity is right
   std::optional<double> error_mm;
   PoseLattice lattice;

@@ -97,7 +97,7 @@ class Legend {
 };
 
 std::string headline(const RecognitionSheet& sheet) {
-  std::string text = "estimated " + sheet.map.label;
+  std::string text = (sheet.none ? "estimated (none), most like " : "estimated ") + sheet.map.label;
   const std::string& truth = sheet.true_object;
   if (!truth.empty()) {
     text += ", true " + truth;
@@ -290,7 +290,9 @@ std::string draw_recognition(const RecognitionSheet& sheet) {
   constexpr Font result{.size_px = 24.0};
   const double room = width_px - 2 * margin_px;
   canvas.text(canvas.fit(sheet.title, room, title), {margin_px, 58.0}, title);
-  const bool wrong = !sheet.true_object.empty() && sheet.true_object != sheet.map.label;
+  const bool wrong = !sheet.true_object.empty() &&
+                     (sheet.none ? std::ranges::count(sheet.labels, sheet.true_object) > 0
+                                 : sheet.true_object != sheet.map.label);
   canvas.text(canvas.fit(headline(sheet), room, result), {margin_px, 96.0}, result, Align::left,
               wrong ? alarm : ink);
   draw_touches(canvas, sheet);

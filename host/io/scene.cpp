@@ -165,13 +165,17 @@ Scene::Region read_region(const Entry& entry) {
   return region;
 }
 
-std::array<int, 3> read_bins(const Entry& entry) {
-  constexpr const char* remedy = "give the counts of bins [x, y, theta]";
+void read_bins(const Entry& entry, Scene& scene) {
+  if (entry.node.IsScalar() && entry.node.Scalar() == "auto") {
+    scene.auto_bins = true;
+    return;
+  }
+  constexpr const char* remedy = "give the counts of bins [x, y, theta], or auto";
   const std::vector<Entry> counts = entry.list(remedy);
   if (counts.size() != 3) {
     entry.refuse(remedy);
   }
-  return {counts[0].integer(1), counts[1].integer(1), counts[2].integer(1)};
+  scene.bins = {counts[0].integer(1), counts[1].integer(1), counts[2].integer(1)};
 }
 
 std::string read_filter(const Entry& entry) {
@@ -193,6 +197,7 @@ Scene read_scene(const std::filesystem::path& path) {
       return scene;  // comments alone: everything is left out
     }
     const auto at_least_0 = [](double value) { return value >= 0; };
+    const auto positive = [](double value) { return value > 0; };
     const auto rate = [](double value) { return value >= 0 && value < 1; };
     const auto inner = [](double value) { return value > 0 && value < 1; };
     read_keys(
@@ -208,7 +213,9 @@ Scene read_scene(const std::filesystem::path& path) {
           [&](const Entry& e) { scene.prior = e.number(inner, "give a number in (0, 1)"); }},
          {"objects", [&](const Entry& e) { scene.objects = read_objects(e); }},
          {"region", [&](const Entry& e) { scene.region = read_region(e); }},
-         {"bins", [&](const Entry& e) { scene.bins = read_bins(e); }},
+         {"none",
+          [&](const Entry& e) { scene.none = e.number(positive, "give a number above 0"); }},
+         {"bins", [&](const Entry& e) { read_bins(e, scene); }},
          {"filter", [&](const Entry& e) { scene.filter = read_filter(e); }},
          {"device", [&](const Entry& e) { scene.device = e.text(); }}});
   } catch (const YAML::Exception& error) {

@@ -56,6 +56,27 @@ TEST_F(RecognizeFlags, MemoryIsBoundedWithoutAnotherResult) {
   expect_refused({"recognize", "u.h5", "--maps", "maps", "--memory-mib", "0"}, {"--memory-mib 0"});
 }
 
+TEST_F(RecognizeFlags, AutoBinsAreChosenByTheMapsAndSaid) {
+  const std::vector<std::string> region{"--x-mm=1:3", "--y-mm=-4:-2.5", "--theta-deg=40:70"};
+  std::vector<std::string> chosen{"recognize", "u.h5", "--maps", "maps", "--bins", "auto"};
+  chosen.insert(chosen.end(), region.begin(), region.end());
+  const std::string out = done(chosen);
+  // 2 and 1.5 mm in steps of 0.3.
+  const std::size_t counts = out.find("7 x 5 x ");
+  ASSERT_NE(counts, std::string::npos) << out;
+  const int angles = std::stoi(out.substr(counts + 8));
+  // 30 degrees of a lever of some 9 mm, the letters' and the pivot's distance from their middle.
+  EXPECT_NEAR(angles, 0.52 * 9.0 / 0.3, 3);
+  std::vector<std::string> automatic = region;
+  automatic.emplace_back("--bins=auto");
+  std::vector<std::string> by_hand = region;
+  by_hand.push_back(fmt::format("--bins=7x5x{}", angles));
+  EXPECT_EQ(mode(automatic), mode(by_hand));
+  put_bytes(folder_ / "auto.yaml",
+            "bins: auto\nregion: {x_mm: [1, 3], y_mm: [-4, -2.5], theta_deg: [40, 70]}\n");
+  EXPECT_EQ(mode({"--scene=auto.yaml"}), mode(by_hand));
+}
+
 TEST_F(RecognizeFlags, FramesAreHalfOpen) {
   const json selected = mode({"--frames", "2:5"});
   write_recording(folder_ / "u.h5", part_of(sample_unknown("A", {{2.0, -3.0}, 1.0}, 6), 2, 5));

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "palpate/pose_error.hpp"
 #include "program.hpp"
 #include "sample_files.hpp"
 
@@ -40,7 +41,8 @@ TEST_F(RecognizeRecord, HasTheDocumentedKeysAndTypes) {
   const json r = record({"u.h5", "--maps", "A.map.h5", "I.map.h5"});
   EXPECT_EQ(keys_of(r),
             (std::vector<std::string>{"T_robot_object", "best", "device", "error_mm", "identity",
-                                      "mode", "recording", "right", "seconds", "touches"}));
+                                      "mode", "recording", "refined", "refined_error_mm", "right",
+                                      "seconds", "touches"}));
   EXPECT_EQ(r["recording"], "u.h5");
   EXPECT_EQ(r["touches"], 6);
   EXPECT_TRUE(r["touches"].is_number_integer());
@@ -58,6 +60,16 @@ TEST_F(RecognizeRecord, HasTheDocumentedKeysAndTypes) {
   EXPECT_TRUE(r["right"].is_boolean());
   EXPECT_TRUE(r["right"]);
   EXPECT_TRUE(r["error_mm"].is_number());
+  EXPECT_TRUE(r["refined_error_mm"].is_number());
+  const json& refined = r["refined"];
+  EXPECT_EQ(keys_of(refined),
+            (std::vector<std::string>{"covariance", "theta_rad", "x_mm", "y_mm"}));
+  ASSERT_EQ(refined["covariance"].size(), 3u);
+  for (std::size_t row = 0; row < 3; ++row) {
+    ASSERT_EQ(refined["covariance"][row].size(), 3u);
+    EXPECT_GT(refined["covariance"][row][row].get<double>(), 0.0);
+    EXPECT_EQ(refined["covariance"][row][0], refined["covariance"][0][row]);
+  }
   EXPECT_GT(r["seconds"].get<double>(), 0.0);
   EXPECT_NE(done({"devices"}).find(r["device"].get<std::string>()), std::string::npos);
 }
@@ -69,6 +81,22 @@ TEST_F(RecognizeRecord, ModeIsNearTheTruth) {
   EXPECT_LT(r["error_mm"].get<double>(), 1.5);
   const Pose T_object_robot = pose_of(r["mode"]);
   EXPECT_NEAR(T_object_robot.theta_rad, true_pose.theta_rad, 2 * std::numbers::pi / 48);
+}
+
+TEST_F(RecognizeRecord, RefinedPoseLiesBetweenTheBins) {
+  const json r = record({"u.h5", "--maps", "A.map.h5", "I.map.h5", "--bins", "64x64x244"});
+  const Pose mode = pose_of(r["mode"]);
+  const Pose refined = pose_of(r["refined"]);
+  EXPECT_NE(refined.translation_mm.x, mode.translation_mm.x);
+  EXPECT_LT(std::abs(refined.translation_mm.x - mode.translation_mm.x), 1.0) << "some bins";
+  // The error is that of the pose: its body moves by as much.
+  const OccupancyGrid map = sample_map("A");
+  EXPECT_NEAR(r["refined_error_mm"].get<double>(),
+              pose_error_mm(body_of(map), map.symmetry, refined, true_pose), 1e-9);
+  EXPECT_LT(r["refined_error_mm"].get<double>(), 0.6) << "two bins";
+  const std::string out = done({"recognize", "u.h5", "--maps", "A.map.h5"});
+  EXPECT_NE(out.find("error mm  refined"), std::string::npos) << out;
+  EXPECT_NE(out.find(" mm, refined "), std::string::npos) << out;
 }
 
 TEST_F(RecognizeRecord, RobotPoseIsTheInverse) {
@@ -87,12 +115,14 @@ TEST_F(RecognizeRecord, WithoutATruthNothingIsRight) {
   const json r = record({"u.h5", "--maps", "A.map.h5"});
   EXPECT_FALSE(r.contains("right"));
   EXPECT_FALSE(r.contains("error_mm"));
+  EXPECT_FALSE(r.contains("refined_error_mm"));
 }
 
 TEST_F(RecognizeRecord, AWrongObjectHasNoPoseError) {
   const json r = record({"u.h5", "--maps", "I.map.h5"});
   EXPECT_EQ(r["right"], false);
   EXPECT_TRUE(r["error_mm"].is_null());
+  EXPECT_TRUE(r["refined_error_mm"].is_null());
 }
 
 TEST_F(RecognizeRecord, ALabelWithoutAPoseIsRightWithoutAPoseError) {
@@ -114,8 +144,9 @@ TEST_F(RecognizeRecord, TraceTellsTheSameAfterEveryTouch) {
   ASSERT_EQ(whole["trace"].size(), 6u);
   for (std::size_t i = 0; i < 6; ++i) {
     const json& step = whole["trace"][i];
-    EXPECT_EQ(keys_of(step), (std::vector<std::string>{"T_robot_object", "best", "error_mm",
-                                                       "identity", "mode", "right"}));
+    EXPECT_EQ(keys_of(step),
+              (std::vector<std::string>{"T_robot_object", "best", "error_mm", "identity", "mode",
+                                        "refined", "refined_error_mm", "right"}));
     const json r =
         record({"u.h5", "--maps", "A.map.h5", "I.map.h5", "--touches", std::to_string(i + 1)});
     for (const char* key : {"best", "T_robot_object", "right", "error_mm"}) {

@@ -67,6 +67,7 @@ INSTANTIATE_TEST_SUITE_P(
                     Setting{"theta_deg", "region: {theta_deg: [10, 80]}", "--theta-deg=10:80"},
                     Setting{"pivot_mm", "region: {pivot_mm: [3, -2]}", "--pivot-mm=3,-2"},
                     Setting{"bins", "bins: [8, 9, 10]", "--bins=8x9x10"},
+                    Setting{"none", "none: 0.5", "--none=0.5"},
                     Setting{"filter", "filter: histogram", "--filter=histogram"}),
     [](const auto& test) { return std::string(test.param.name); });
 
@@ -88,6 +89,8 @@ INSTANTIATE_TEST_SUITE_P(
                     Setting{"theta_deg", "region: {theta_deg: [200, 210]}", "--theta-deg=0:180"},
                     Setting{"pivot_mm", "region: {pivot_mm: [90, 90]}", "--pivot-mm=1,1"},
                     Setting{"bins", "bins: [1, 1, 1]", "--bins=12x12x12"},
+                    Setting{"auto_bins", "bins: auto", "--bins=12x12x12"},
+                    Setting{"none", "none: 1e300", "--none=0.5"},
                     Setting{"filter", "filter: particles", "--filter=histogram"},
                     Setting{"device", "device: no such device", "--device=0"}),
     [](const auto& test) { return std::string(test.param.name); });

@@ -28,7 +28,7 @@ struct BalancedLattice {
 /// `balanced_step_cells` of the smallest cell of any map, theta in steps that turn each object by
 /// as much, root mean square over its occupied cells and over where in the region the pivot may be
 /// in it. The letters of Sec. IV, of 0.5 mm cells over 20 mm and the full circle, get some
-/// 67 x 67 x 250. An axis of zero extent costs one bin. Where that makes more than `most_bins` of
+/// 67 x 67 x 280. An axis of zero extent costs one bin. Where that makes more than `most_bins` of
 /// all objects together, all axes are made coarser alike.
 /// @throws Error on an empty list, a map that is not sound or a region that is out of range
 BalancedLattice balanced_lattice(const PoseLattice& region, std::span<const Hypothesis> hypotheses,

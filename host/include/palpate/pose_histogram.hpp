@@ -80,6 +80,8 @@ class PoseHistogram {
   /// occupied cells) of where the bin has it, at least the neighbouring bins; it goes on at 0 where
   /// theta covers the whole circle and ends at the region's edges. Other modes, and what is unknown
   /// by more than the window, do not show in the result. An axis of zero extent stays where it is.
+  /// On bins much wider than the belief, where the best bin need not be the nearest to the truth,
+  /// the covariance is too small.
   /// @throws Error if there is no such object or bin, or the device fails
   RefinedPose refine(const Mode& mode) const;
 

@@ -36,7 +36,9 @@ struct Scene {
   std::optional<double> prior;
   std::vector<Object> objects;
   Region region;
+  std::optional<double> none;              ///< prior weight of "none of these"
   std::optional<std::array<int, 3>> bins;  ///< of x, y, theta
+  bool auto_bins = false;                  ///< as many as the maps are worth: balanced_lattice()
   std::optional<std::string> filter;       ///< "auto", "histogram", "bounded" or "particles"
   std::optional<std::string> device;       ///< a device's name or index
 };

@@ -1,0 +1,188 @@
+// "None of these", and touches that contradict everything.
+
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+#include <gtest/gtest.h>
+
+#include "palpate/error.hpp"
+#include "palpate/pose_histogram.hpp"
+#include "synthetic.hpp"
+
+namespace palpate {
+namespace {
+
+constexpr double two_pi = 6.283185307179586;
+constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+constexpr double infinity = std::numeric_limits<double>::infinity();
+
+HistogramOptions with_none(double weight) {
+  HistogramOptions options;
+  options.lattice = {.x_mm = {-5.0, 5.0, 9}, .y_mm = {-5.0, 5.0, 8}, .theta_rad = {0, two_pi, 6}};
+  options.none_weight = weight;
+  return options;
+}
+
+std::vector<Hypothesis> two_objects() {
+  return {{random_map(31, 27, 0.5, 1.0, 151), 1.5}, {random_map(25, 25, 0.5, 1.0, 152), 0.5}};
+}
+
+double sum(const std::vector<double>& values) {
+  return std::accumulate(values.begin(), values.end(), 0.0);
+}
+
+/// Weight of "none of these" as of a map of one cell that holds the prior, bin by bin.
+double plain_none(const std::vector<Hypothesis>& objects, const HistogramOptions& options,
+                  std::span<const Touch> touches) {
+  OccupancyGrid nothing{.nx = 1, .ny = 1, .log_odds = {}};
+  const double prior = options.prior.value_or(objects.front().map.prior);
+  nothing.log_odds = {static_cast<float>(std::log(prior / (1.0 - prior)))};
+  std::vector<Hypothesis> with = objects;
+  with.push_back({nothing, *options.none_weight});
+  with.back().map.prior = prior;
+  return reference::identity(reference_posterior(with, options, touches)).back();
+}
+
+TEST(NoneOfThese, CompetesAsAMapOfThePriorWould) {
+  const std::vector<Hypothesis> objects = two_objects();
+  const Recording recording = random_recording(3, 5, 153);
+  Device device = Device::open();
+  for (const double weight : {0.01, 1.0, 20.0}) {
+    for (const double gamma : {0.0, 0.3}) {
+      HistogramOptions options = with_none(weight);
+      options.gamma = gamma;
+      PoseHistogram histogram(device, objects, options);
+      for (std::size_t touches = 0; touches <= recording.size(); ++touches) {
+        if (touches > 0) {
+          histogram.update(recording.touch(touches - 1));
+        }
+        const Estimate estimate = histogram.estimate();
+        // A probability changes by at most what its log is off, 1e-4 nats per touch.
+        EXPECT_NEAR(estimate.none, plain_none(objects, options, recording.touches(0, touches)),
+                    1e-4 * static_cast<double>(touches) + 1e-6);
+        EXPECT_EQ(estimate.identity.size(), 2U);
+        EXPECT_NEAR(sum(estimate.identity) + estimate.none, 1.0, 1e-15) << "rounding";
+        for (int object = 0; object < 2; ++object) {
+          // Sums of some hundred float32 terms of one order.
+          EXPECT_NEAR(sum(histogram.marginals(object).xy), estimate.identity[object], 1e-6);
+        }
+      }
+    }
+  }
+}
+
+TEST(NoneOfThese, BeforeAnyTouchHasItsWeightAndAfterAResetAgain) {
+  const std::vector<Hypothesis> objects = two_objects();
+  const Recording recording = random_recording(2, 36, 154);
+  Device device = Device::open();
+  PoseHistogram histogram(device, objects, with_none(2.0));
+  for (int round = 0; round < 2; ++round) {
+    EXPECT_NEAR(histogram.estimate().none, 0.5, 1e-15) << "2 of 1.5 + 0.5 + 2";
+    histogram.update(all_touches(recording));
+    EXPECT_GT(std::abs(histogram.estimate().none - 0.5), 1e-3);
+    histogram.reset();
+  }
+}
+
+TEST(NoneOfThese, ChangesNeitherTheModeNorTheOddsBetweenObjects) {
+  const std::vector<Hypothesis> objects = two_objects();
+  const Recording recording = random_recording(2, 5, 155);
+  HistogramOptions options = with_none(1.0);
+  Device device = Device::open();
+  PoseHistogram with(device, objects, options);
+  options.none_weight.reset();
+  PoseHistogram without(device, objects, options);
+  with.update(all_touches(recording));
+  without.update(all_touches(recording));
+  const Estimate a = with.estimate();
+  const Estimate b = without.estimate();
+  EXPECT_EQ(a.mode.bin, b.mode.bin);
+  EXPECT_EQ(a.mode.object, b.mode.object);
+  EXPECT_EQ(b.none, 0.0);
+  EXPECT_NEAR(a.identity[0] / a.identity[1], b.identity[0] / b.identity[1], 1e-12) << "rounding";
+}
+
+TEST(NoneOfThese, OfAStillArrayIsTheSame) {
+  const std::vector<Hypothesis> objects = two_objects();
+  Recording recording = random_recording(4, 60, 156);
+  for (Pose& pose : recording.T_robot_sensor) {
+    pose = {{0.4, -0.3}, 0.2};
+  }
+  for (std::size_t i = 0; i < recording.pressure.size(); ++i) {
+    // The last touch has few No Contact elements and takes the plain way.
+    if (i % 60 != 0 && i % 5 != 0 && i < 180) {
+      recording.pressure[i] = 0.0;
+    }
+  }
+  HistogramOptions options = with_none(1e-6);
+  Device device = Device::open();
+  PoseHistogram plain(device, objects, options);
+  options.still_array = true;
+  PoseHistogram still(device, objects, options);
+  for (std::size_t i = 0; i < recording.size(); ++i) {
+    plain.update(recording.touch(i));
+    still.update(recording.touch(i));
+    // Rounding of the two ways, some 1e-4 nats per 36 elements and touch.
+    EXPECT_NEAR(still.estimate().none, plain.estimate().none, 1e-3) << "touch " << i;
+    EXPECT_EQ(still.estimate().contradicted, plain.estimate().contradicted);
+  }
+}
+
+TEST(NoneOfThese, WithAWeightThatIsNotPositiveIsRefused) {
+  Device device = Device::open();
+  for (const double weight : {0.0, -1.0, nan, infinity}) {
+    EXPECT_THROW(PoseHistogram(device, two_objects(), with_none(weight)), Error) << weight;
+  }
+}
+
+/// Maps that are sure of all that they say: full everywhere, and empty everywhere.
+std::vector<Hypothesis> sure_objects() {
+  std::vector<Hypothesis> objects(2, {random_map(61, 61, 0.5, 1.0, 157), 1.0});
+  for (std::size_t k = 0; k < objects[0].map.log_odds.size(); ++k) {
+    objects[0].map.log_odds[k] = 1000.0F;
+    objects[1].map.log_odds[k] = -1000.0F;
+  }
+  return objects;
+}
+
+TEST(Contradiction, IsSaidWhereNothingExplainsTheTouches) {
+  // Half of the elements in contact, half not: neither full nor empty.
+  Recording recording;
+  recording.elements_mm = {{-1, 0}, {1, 0}};
+  recording.T_robot_sensor = {{}};
+  recording.pressure = {9.0, 0.0};
+  HistogramOptions options = with_none(1.0);
+  options.gamma = 0.0;
+  Device device = Device::open();
+  PoseHistogram histogram(device, sure_objects(), options);
+  EXPECT_FALSE(histogram.estimate().contradicted) << "before any touch";
+  histogram.update(all_touches(recording));
+  const Estimate estimate = histogram.estimate();
+  EXPECT_TRUE(estimate.contradicted);
+  EXPECT_NEAR(estimate.mode.log_likelihood, -1000.0, 1.0);
+  EXPECT_EQ(estimate.none, 1.0);
+  EXPECT_TRUE(std::isfinite(sum(estimate.identity)));
+  histogram.reset();
+  EXPECT_FALSE(histogram.estimate().contradicted);
+
+  recording.pressure = {9.0, 9.0};
+  histogram.update(all_touches(recording));
+  EXPECT_FALSE(histogram.estimate().contradicted) << "the full one explains it";
+}
+
+TEST(Contradiction, IsNotSaidWhereReadingsMayBeRandom) {
+  Recording recording;
+  recording.elements_mm = {{-1, 0}, {1, 0}};
+  recording.T_robot_sensor = {{}};
+  recording.pressure = {9.0, 0.0};
+  HistogramOptions options = with_none(1.0);
+  options.gamma = 0.1;
+  Device device = Device::open();
+  PoseHistogram histogram(device, sure_objects(), options);
+  histogram.update(all_touches(recording));
+  EXPECT_FALSE(histogram.estimate().contradicted);
+}
+
+}  // namespace
+}  // namespace palpate
