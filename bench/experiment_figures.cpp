@@ -154,7 +154,9 @@ void draw_errors(const ExperimentResult& result, const std::filesystem::path& fo
         return run.filter == "histogram" && run.count == most_of(result, "histogram");
       });
   Chart chart(
-      fmt::format("set xlabel 'touches'\nset xrange [0:*]\nset yrange [0:*]\n"
+      fmt::format("set xlabel 'touches'\nset xrange [0:*]\nset logscale y\n"
+                  "set yrange [0.3:30]\n"
+                  "set ytics (0.5, 1, 2, 5, 10, 20)\n"
                   "set ylabel 'pose error where the letter is right (mm)'\n"
                   "set title {}\n",
                   gnuplot_quoted(finest->name)));

@@ -16,7 +16,8 @@ std::int64_t groups_that_fill(const gpu::Limits& limits) { return limits.cpu ? 4
 
 /// The largest power of two up to `wanted` lanes that the device runs in one workgroup.
 std::uint32_t lanes_up_to(const gpu::Limits& limits, std::uint32_t wanted) {
-  return std::bit_floor(std::min({wanted, limits.group_invocations, limits.group_size[0]}));
+  return std::bit_floor(
+      std::max(1U, std::min({wanted, limits.group_invocations, limits.group_size[0]})));
 }
 
 /// A subgroup reads one stretch of memory: a CPU runs one ahead of the others, and for a GPU that
@@ -50,8 +51,8 @@ MarginalSizes marginal_sizes(const gpu::Limits& limits, std::int64_t plane, std:
   // keeps several workgroups at once if each takes no more than that.
   const std::uint32_t lanes = lanes_up_to(limits, limits.cpu ? 64 : 128);
   const std::uint32_t row_bytes = (lanes + 1) * sizeof(float);
-  const std::uint32_t most_thetas =
-      std::bit_floor(std::min({limits.shared_bytes / row_bytes, lanes, limits.cpu ? 64U : 32U}));
+  const std::uint32_t most_thetas = std::bit_floor(
+      std::max(1U, std::min({limits.shared_bytes / row_bytes, lanes, limits.cpu ? 64U : 32U})));
   const std::int64_t pairs_of_a_plane = (plane + 2 * lanes - 1) / (2 * lanes);
   const std::int64_t chunks = (thetas + most_thetas - 1) / most_thetas;
   const std::int64_t pairs = pairs_of_a_plane * chunks / groups_that_fill(limits);
