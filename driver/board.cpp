@@ -21,14 +21,14 @@ std::unique_ptr<Board> make_board(const std::string& name) {
   if (name == TakktileBoard::kind) {
     return std::make_unique<TakktileBoard>();
   }
-  const std::vector<std::string> shipped = shipped_profiles();
+  std::vector<std::string> known = shipped_profiles();
   const bool is_path = name.find('/') != std::string::npos || name.ends_with(".yaml");
-  if (!is_path && std::ranges::find(shipped, name) == shipped.end()) {
-    throw Error(
-        Fault::input,
-        fmt::format("sensor '{}': no such board; give {}, {}, or the path of a profile that "
-                    "ends in .yaml",
-                    name, TakktileBoard::kind, fmt::join(shipped, ", ")));
+  if (!is_path && std::ranges::find(known, name) == known.end()) {
+    known.insert(known.begin(), TakktileBoard::kind);
+    throw Error(Fault::input,
+                fmt::format("sensor '{}': no such board; give one of {}, or the path of a profile "
+                            "that ends in .yaml",
+                            name, fmt::join(known, ", ")));
   }
   return std::make_unique<SerialBoard>(name, read_serial_profile(name));
 }

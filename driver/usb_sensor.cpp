@@ -25,6 +25,12 @@ constexpr milliseconds longest_back_off{1000};
 // stop() interrupts the wait for events; this only bounds what a missed interrupt would cost.
 constexpr milliseconds event_patience{100};
 
+/// A board came back that frames of before cannot be compared with: no use waiting for another.
+class OtherElements : public Error {
+ public:
+  using Error::Error;
+};
+
 void handle_events(const UsbContext& context, microseconds patience) {
   timeval time{.tv_sec = patience.count() / 1'000'000, .tv_usec = patience.count() % 1'000'000};
   libusb_handle_events_timeout_completed(context.get(), &time, nullptr);
@@ -68,7 +74,7 @@ void UsbSensor::start() {
   if (link_) {
     link_->begin();
   } else {
-    reconnect(choose_device(usb_devices(context_), *board_, which_));
+    reconnect();
   }
   gone_ = false;
   stopping_ = false;
@@ -150,27 +156,28 @@ void UsbSensor::wait_for_return() {
   if (stopping_) {
     return;
   }
-  std::optional<UsbDevice> device;
   try {
-    device = choose_device(usb_devices(context_), *board_, which_);
-    reconnect(*device);
+    reconnect();
+  } catch (const OtherElements&) {
+    throw;
   } catch (const Error&) {
     return;  // not plugged in yet, or udev has not given permission yet, or gone again
-  }
-  if (link_->description().elements_mm != description_.elements_mm) {
-    throw Error(
-        Fault::system,
-        fmt::format("{}: came back with {} elements instead of {}, or in other places; open "
-                    "it again",
-                    device->place(), link_->description().elements_mm.size(),
-                    description_.elements_mm.size()));
   }
   ++tally_.reconnects;
   gone_ = false;
 }
 
-void UsbSensor::reconnect(const UsbDevice& device) {
+void UsbSensor::reconnect() {
+  const UsbDevice device = choose_device(usb_devices(context_), *board_, which_);
   auto link = std::make_unique<BoardLink>(context_, *board_, device, transfer_counters_);
+  const std::size_t elements = link->description().elements_mm.size();
+  if (link->description().elements_mm != description_.elements_mm) {
+    throw OtherElements(
+        Fault::system,
+        fmt::format(
+            "{}: came back with {} elements instead of {}, or in other places; open it again",
+            device.place(), elements, description_.elements_mm.size()));
+  }
   link->begin();
   link_ = std::move(link);
 }

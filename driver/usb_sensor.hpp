@@ -45,7 +45,7 @@ class UsbSensor final : public Sensor {
   void stream();
   void lose();
   void wait_for_return();
-  void reconnect(const UsbDevice& device);
+  void reconnect();
   void deliver(std::vector<TransferRing::Completion>& completions);
   void deliver(const TransferRing::Completion& completion);
   void publish();

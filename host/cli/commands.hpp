@@ -7,6 +7,8 @@ namespace palpate::cli {
 // Each adds one command with its options; the command runs when it was parsed.
 void add_devices(CLI::App& app);
 void add_sensors(CLI::App& app);
+void add_record(CLI::App& app);
+void add_touches(CLI::App& app);
 void add_simulate(CLI::App& app);
 void add_map(CLI::App& app);
 void add_recognize(CLI::App& app);

@@ -1,7 +1,9 @@
 #include "commands.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <memory>
+#include <numeric>
 #include <string>
 
 #include <fmt/format.h>
@@ -26,6 +28,33 @@ std::vector<double> live_pressures(const Recording& r) {
   return pressures;
 }
 
+/// What a stream of frames has besides.
+void print_stream(const Recording& r) {
+  if (!r.time_s.empty() && r.time_s.back() > r.time_s.front()) {
+    fmt::print("  rate              {:.1f} Hz\n",
+               static_cast<double>(r.size() - 1) / (r.time_s.back() - r.time_s.front()));
+  }
+  if (!r.lost_before.empty()) {
+    fmt::print("  lost              {} frames\n",
+               std::accumulate(r.lost_before.begin(), r.lost_before.end(), std::uint64_t{0}));
+  }
+  const auto posed = std::count_if(r.T_robot_sensor.begin(), r.T_robot_sensor.end(),
+                                   [](const Pose& pose) { return !std::isnan(pose.theta_rad); });
+  fmt::print("  with a pose       {} frames\n", posed);
+  if (r.baseline.empty()) {
+    fmt::print("  baseline          none\n");
+  } else {
+    const auto [least, most] = std::minmax_element(r.baseline.begin(), r.baseline.end());
+    fmt::print("  baseline          {:.3g} to {:.3g} {}\n", *least, *most, r.pressure_unit);
+  }
+  if (!r.sensor.empty()) {
+    fmt::print("  sensor            {}{}\n", r.sensor,
+               r.serial.empty() ? "" : ", serial " + r.serial);
+  }
+  fmt::print("  closed            {}\n",
+             r.closed ? "yes" : "no: it is being recorded, or was cut off");
+}
+
 void print_recording(const std::string& path) {
   const Recording r = read_recording(path);
   fmt::print("{}: recording of {}\n", path, r.object.empty() ? "an unknown object" : r.object);
@@ -42,6 +71,9 @@ void print_recording(const std::string& path) {
   }
   if (!r.time_s.empty()) {
     fmt::print("  duration          {:.3f} s\n", r.time_s.back() - r.time_s.front());
+  }
+  if (r.rows == "frames") {
+    print_stream(r);
   }
   if (r.truth) {
     const Pose& T = r.truth->T_object_robot;

@@ -42,6 +42,8 @@ int run(int argc, char** argv) {
   app.failure_message([](const CLI::App*, const CLI::Error&) { return std::string(); });
   palpate::cli::add_devices(app);
   palpate::cli::add_sensors(app);
+  palpate::cli::add_record(app);
+  palpate::cli::add_touches(app);
   palpate::cli::add_simulate(app);
   palpate::cli::add_map(app);
   palpate::cli::add_recognize(app);

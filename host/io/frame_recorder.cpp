@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <limits>
@@ -39,6 +40,15 @@ struct Rows {
   std::size_t size() const { return time_s.size(); }
   void clear() { *this = {}; }
 };
+
+// What a board says of itself may be anything; no reader takes that.
+std::string printable(std::string text) {
+  if (!is_printable_utf8(text)) {
+    std::replace_if(
+        text.begin(), text.end(), [](char c) { return c < ' ' || c > '~'; }, '?');
+  }
+  return text;
+}
 
 }  // namespace
 
@@ -131,8 +141,8 @@ void FrameRecorder::Impl::create() {
     out.attribute("pressure_unit", sensor.pressure_unit);
     out.attribute("length_unit", "mm");
     out.attribute("rows", "frames");
-    out.attribute("sensor", sensor.name);
-    out.attribute("serial", sensor.serial);
+    out.attribute("sensor", printable(sensor.name));
+    out.attribute("serial", printable(sensor.serial));
     if (sensor.truth) {
       const Pose& T = sensor.truth->T_object_robot;
       out.attribute("true_object", sensor.truth->object);

@@ -1,0 +1,98 @@
+#include <algorithm>
+#include <memory>
+#include <string>
+
+#include <fmt/format.h>
+
+#include "commands.hpp"
+#include "detector_flags.hpp"
+#include "options.hpp"
+#include "palpate/error.hpp"
+#include "palpate/files.hpp"
+#include "palpate/virtual_sensor.hpp"
+
+namespace palpate::cli {
+
+namespace {
+
+struct Options {
+  std::string frames;
+  std::string output;
+  DetectorFlags detector;
+};
+
+/// Appends the touch; false where it has no pose.
+bool append(const DetectedTouch& touch, Recording& recording) {
+  if (!touch.T_robot_sensor) {
+    return false;
+  }
+  recording.T_robot_sensor.push_back(*touch.T_robot_sensor);
+  recording.pressure.insert(recording.pressure.end(), touch.pressure.begin(), touch.pressure.end());
+  recording.time_s.push_back(0.5 * (touch.begin_s + touch.end_s));
+  return true;
+}
+
+void find_touches(const Options& options) {
+  require_distinct({{"--output", options.output}}, {options.frames});
+  require_writable(options.output);
+  const std::unique_ptr<Sensor> stream =
+      open_virtual_sensor("replay:" + options.frames + ",speed=max");
+  const SensorDescription& sensor = stream->description();
+  TouchDetector detector(detector_options(options.detector, sensor.pressure_unit, options.frames),
+                         sensor.baseline, sensor.valid);
+  Recording recording;
+  recording.object = sensor.object;
+  recording.pressure_unit = sensor.pressure_unit;
+  recording.elements_mm = sensor.elements_mm;
+  recording.valid = sensor.valid;
+  recording.truth = sensor.truth;
+  recording.sensor = sensor.name;
+  recording.serial = sensor.serial;
+
+  std::size_t without_pose = 0;
+  const auto take = [&](const std::optional<DetectedTouch>& touch) {
+    without_pose += touch && !append(*touch, recording) ? 1 : 0;
+  };
+  stream->start();
+  while (!stream->ended()) {
+    if (const std::optional<Frame> frame = stream->next({})) {
+      take(detector.add(*frame));
+    }
+  }
+  take(detector.finish());
+
+  if (recording.size() == 0) {
+    throw Error(Fault::input,
+                without_pose > 0
+                    ? fmt::format("{}: none of its {} touches has a pose; record it with --poses",
+                                  options.frames, without_pose)
+                    : fmt::format("{}: no touch in its {} frames; lower --onset or --min-steady-s",
+                                  options.frames, stream->counters().frames));
+  }
+  write_recording(options.output, recording);
+  fmt::print("{}: {} touches in {} frames of {}", options.output, recording.size(),
+             stream->counters().frames, options.frames);
+  if (without_pose > 0) {
+    fmt::print(", {} without a pose left out", without_pose);
+  }
+  fmt::print("\n");
+}
+
+}  // namespace
+
+void add_touches(CLI::App& app) {
+  auto* command = app.add_subcommand(
+      "touches", "Find the touches in a recording of frames, for 'palpate map' and 'recognize'");
+  const auto options = std::make_shared<Options>();
+  command->add_option("FRAMES", options->frames, "Recording of frames, of 'palpate record'")
+      ->required();
+  command
+      ->add_option("-o,--output", options->output,
+                   "Recording of touches to write (HDF5): the mean of each touch's steady phase, "
+                   "above the baseline")
+      ->required();
+  add_detector_flags(*command, options->detector);
+  command->callback([options] { find_touches(*options); });
+}
+
+}  // namespace palpate::cli

@@ -1,0 +1,65 @@
+#include "palpate/baseline.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include <fmt/format.h>
+
+#include "palpate/error.hpp"
+
+namespace palpate {
+
+namespace {
+
+// Of one element over some frames; reorders the values.
+double median(std::span<double> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+}  // namespace
+
+std::vector<double> baseline_of(std::span<const Frame> frames, const SensorDescription& sensor,
+                                std::optional<double> onset) {
+  if (frames.empty()) {
+    throw Error(Fault::input, "no frame came for the baseline; is the sensor connected?");
+  }
+  // Halves of fewer frames differ by their noise alone.
+  constexpr std::size_t least_frames = 20;
+  const bool judged = onset && frames.size() >= least_frames;
+  const std::size_t half = frames.size() / 2;
+  std::vector<double> baseline(sensor.elements_mm.size(), 0.0);
+  std::vector<double> values(frames.size());
+  for (std::size_t k = 0; k < baseline.size(); ++k) {
+    if (!sensor.valid.empty() && sensor.valid[k] == 0) {
+      continue;
+    }
+    std::size_t count = 0;
+    for (const Frame& frame : frames) {
+      if (std::isfinite(frame.values.at(k))) {
+        values[count++] = frame.values[k];
+      }
+    }
+    if (count == 0) {
+      throw Error(Fault::input,
+                  fmt::format("element {} reads no number while the baseline is taken; mark it "
+                              "dead or repair it",
+                              k));
+    }
+    if (judged && count == frames.size()) {
+      const std::span<double> all(values);
+      const double change = median(all.subspan(half)) - median(all.first(half));
+      if (std::abs(change) > *onset) {
+        throw Error(Fault::input,
+                    fmt::format("the array is touched while its baseline is taken: element {} "
+                                "changes by {:.3g} {}; let go of it and try again",
+                                k, change, sensor.pressure_unit));
+      }
+    }
+    baseline[k] = median(std::span(values).first(count));
+  }
+  return baseline;
+}
+
+}  // namespace palpate

@@ -1,0 +1,70 @@
+#include "replayed_sensor.hpp"
+
+#include <cmath>
+
+#include <fmt/format.h>
+
+#include "palpate/error.hpp"
+#include "palpate/files.hpp"
+
+namespace palpate {
+
+ReplayedSensor::ReplayedSensor(const std::string& path, std::optional<double> speed)
+    : recording_(read_recording(path)), pace_(speed) {
+  const auto refuse = [&](const char* message) {
+    throw Error(Fault::input, fmt::format("{}: {}", path, message));
+  };
+  const Recording& r = recording_;
+  if (r.rows != "frames") {
+    refuse(
+        "rows = touches, single readings; give a stream of frames, or use the touches as they "
+        "are: palpate recognize");
+  }
+  if (r.time_s.empty()) {
+    refuse("dataset 'time' is missing; a replay needs the times of the frames");
+  }
+  const std::size_t e = r.elements();
+  if (r.elements_mm.size() != e || !(r.valid.empty() || r.valid.size() == e)) {
+    refuse("its array changes from frame to frame; a sensor has one array, so record each apart");
+  }
+  description_.name = r.sensor;
+  description_.serial = r.serial;
+  description_.pressure_unit = r.pressure_unit;
+  description_.elements_mm = r.elements_mm;
+  description_.valid = r.valid;
+  description_.baseline = r.baseline;
+  description_.object = r.object;
+  description_.truth = r.truth;
+  if (const double seconds = r.time_s.back() - r.time_s.front(); seconds > 0.0) {
+    description_.rate_hz = static_cast<double>(r.size() - 1) / seconds;
+  }
+}
+
+void ReplayedSensor::start() {
+  at_ = 0;
+  counters_ = {};
+  pace_.start(recording_.time_s.front());
+}
+
+std::optional<Frame> ReplayedSensor::next(std::chrono::milliseconds timeout) {
+  if (ended() || !pace_.wait(recording_.time_s[at_], timeout)) {
+    return {};
+  }
+  const Recording& r = recording_;
+  const std::size_t i = at_++;
+  const Touch touch = r.touch(i);
+  Frame frame{.host_time_s = r.time_s[i],
+              .values = {touch.pressure.begin(), touch.pressure.end()},
+              .lost_before = r.lost_before.empty() ? 0 : r.lost_before[i]};
+  if (!r.device_time_s.empty() && !std::isnan(r.device_time_s[i])) {
+    frame.device_time_s = r.device_time_s[i];
+  }
+  if (!std::isnan(touch.T_robot_sensor.theta_rad)) {
+    frame.T_robot_sensor = touch.T_robot_sensor;
+  }
+  ++counters_.frames;
+  counters_.lost += frame.lost_before;
+  return frame;
+}
+
+}  // namespace palpate

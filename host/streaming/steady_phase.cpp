@@ -1,0 +1,134 @@
+#include "steady_phase.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include <glm/geometric.hpp>
+
+namespace palpate {
+
+namespace {
+
+constexpr double turn_rad = 2.0 * std::numbers::pi;
+// More would not make the mean better than the sensor is.
+constexpr std::size_t most_kept = 512;
+// So that one that is wrong does not decide.
+constexpr std::size_t least_frames = 3;
+
+// Mean of the middle half; values at its borders count by their part. Reorders the values.
+double interquartile_mean(std::vector<double>& values) {
+  std::sort(values.begin(), values.end());
+  const double n = static_cast<double>(values.size());
+  double sum = 0.0;
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    const double rank = static_cast<double>(i);
+    const double part = std::min(rank + 1.0, 0.75 * n) - std::max(rank, 0.25 * n);
+    sum += std::max(part, 0.0) * values[i];
+  }
+  return sum / (0.5 * n);
+}
+
+}  // namespace
+
+bool SteadyPhase::fits(double load, const std::optional<Pose>& T_robot_sensor) const {
+  if (empty()) {
+    return true;
+  }
+  const double mean = load_sum_ / static_cast<double>(frames_);
+  // Noise of a light touch is a large part of its load, and no sign of a change.
+  if (std::abs(load - mean) > std::max(options_.steady * mean, options_.release)) {
+    return false;
+  }
+  if (!T_robot_sensor || !first_pose_) {
+    return true;
+  }
+  return glm::distance(T_robot_sensor->translation_mm, first_pose_->translation_mm) <
+             options_.steady_mm &&
+         std::abs(wrap_angle(T_robot_sensor->theta_rad - first_pose_->theta_rad, turn_rad)) <
+             options_.steady_rad;
+}
+
+void SteadyPhase::add(double time_s, double load, const std::vector<double>& pressure,
+                      const std::optional<Pose>& T_robot_sensor) {
+  load_sum_ += load;
+  if (!first_pose_) {
+    first_pose_ = T_robot_sensor;
+  }
+  if (frames_++ % stride_ != 0) {
+    return;
+  }
+  kept_.push_back({time_s, T_robot_sensor});
+  pressure_.insert(pressure_.end(), pressure.begin(), pressure.end());
+  if (kept_.size() == most_kept) {
+    thin();
+  }
+}
+
+// Keeps every second frame, and of those to come too.
+void SteadyPhase::thin() {
+  const std::size_t e = pressure_.size() / kept_.size();
+  for (std::size_t i = 0; 2 * i < kept_.size(); ++i) {
+    kept_[i] = kept_[2 * i];
+    std::copy_n(pressure_.begin() + static_cast<std::ptrdiff_t>(2 * i * e), e,
+                pressure_.begin() + static_cast<std::ptrdiff_t>(i * e));
+  }
+  kept_.resize(most_kept / 2);
+  pressure_.resize(kept_.size() * e);
+  stride_ *= 2;
+}
+
+// The release shows late in what was smoothed: the last frames may belong to it.
+std::size_t SteadyPhase::steady_frames() const {
+  constexpr std::size_t median_delay = 2;
+  if (kept_.size() < median_delay) {
+    return 0;
+  }
+  std::size_t n = kept_.size() - median_delay;
+  while (n > 0 && kept_[n - 1].time_s > kept_.back().time_s - options_.smooth_s) {
+    --n;
+  }
+  return n;
+}
+
+std::optional<DetectedTouch> SteadyPhase::touch() const {
+  const std::size_t n = steady_frames();
+  if (n < least_frames || kept_[n - 1].time_s - kept_[0].time_s < options_.min_steady_s) {
+    return {};
+  }
+  DetectedTouch touch{
+      .begin_s = kept_[0].time_s, .end_s = kept_[n - 1].time_s, .frames = n, .pressure = {}};
+  const std::size_t e = pressure_.size() / kept_.size();
+  std::vector<double> values(n);
+  for (std::size_t k = 0; k < e; ++k) {
+    for (std::size_t i = 0; i < n; ++i) {
+      values[i] = pressure_[i * e + k];
+    }
+    touch.pressure.push_back(interquartile_mean(values));
+  }
+  Pose sum;
+  double poses = 0.0;
+  for (std::size_t i = 0; i < n; ++i) {
+    if (const auto& pose = kept_[i].T_robot_sensor) {
+      sum.translation_mm += pose->translation_mm;
+      sum.theta_rad += wrap_angle(pose->theta_rad - first_pose_->theta_rad, turn_rad);
+      poses += 1.0;
+    }
+  }
+  if (poses > 0.0) {
+    touch.T_robot_sensor =
+        Pose{sum.translation_mm / poses, first_pose_->theta_rad + sum.theta_rad / poses};
+  }
+  return touch;
+}
+
+void SteadyPhase::clear() {
+  frames_ = 0;
+  load_sum_ = 0.0;
+  first_pose_.reset();
+  stride_ = 1;
+  kept_.clear();
+  pressure_.clear();
+}
+
+}  // namespace palpate

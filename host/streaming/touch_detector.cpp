@@ -1,0 +1,190 @@
+#include "palpate/touch_detector.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "frame_smoother.hpp"
+#include "palpate/error.hpp"
+#include "steady_phase.hpp"
+
+namespace palpate {
+
+namespace {
+
+// After a release, the skin creeps back for a while; that is not drift.
+constexpr double rest_s = 0.5;
+
+void require(const char* field, double value, bool in_range, const char* range) {
+  if (!std::isfinite(value) || !in_range) {
+    throw Error(Fault::input,
+                fmt::format("touch detector {} = {}: make it {}", field, value, range));
+  }
+}
+
+void validate(const TouchDetectorOptions& o) {
+  require("onset", o.onset, o.onset > 0.0, "a pressure above 0");
+  require("release", o.release, o.release > 0.0 && o.release <= o.onset,
+          "a pressure above 0 and at most the onset");
+  require("steady", o.steady, o.steady > 0.0 && o.steady < 1.0, "a part between 0 and 1");
+  require("min_steady_s", o.min_steady_s, o.min_steady_s >= 0.0, "seconds, from 0");
+  require("steady_mm", o.steady_mm, o.steady_mm > 0.0, "millimetres above 0");
+  require("steady_rad", o.steady_rad, o.steady_rad > 0.0, "radians above 0");
+  require("smooth_s", o.smooth_s, o.smooth_s >= 0.0, "seconds, from 0");
+  require("drift_s", o.drift_s, o.drift_s >= 0.0, "seconds, from 0");
+  require("largest_gap_s", o.largest_gap_s, o.largest_gap_s > 0.0, "seconds above 0");
+}
+
+}  // namespace
+
+struct TouchDetector::Impl {
+  Impl(const TouchDetectorOptions& detector_options, std::vector<double> untouched,
+       std::vector<std::uint8_t> alive)
+      : options(detector_options),
+        baseline(std::move(untouched)),
+        valid(std::move(alive)),
+        smoother(options.smooth_s),
+        phase(options) {}
+
+  std::optional<DetectedTouch> add(const Frame& frame);
+  bool take(const Frame& frame);
+  void follow_drift(const std::vector<double>& smooth, double elapsed_s);
+  void end_phase();
+  std::optional<DetectedTouch> end_touch(double time_s);
+
+  TouchDetectorOptions options;
+  std::vector<double> baseline;
+  std::vector<std::uint8_t> valid;
+  FrameSmoother smoother;
+  SteadyPhase phase;                  // the one under way
+  std::optional<DetectedTouch> best;  // of the phases of this touch that are over
+  std::vector<double> pressure;       // [e] of the frame under way, above the baseline
+  std::optional<double> last_s;       // time of the frame before
+  double released_s = 0.0;
+  bool touching = false;
+};
+
+// Subtracts the baseline. False for a frame with a reading that is no number.
+bool TouchDetector::Impl::take(const Frame& frame) {
+  const std::size_t e = frame.values.size();
+  if (baseline.empty()) {
+    baseline.assign(e, 0.0);
+  }
+  if (e != baseline.size() || (!valid.empty() && valid.size() != e)) {
+    throw Error(Fault::input, fmt::format("a frame has {} values where {} are expected; feed the "
+                                          "touch detector the frames of one array",
+                                          e, baseline.size()));
+  }
+  pressure.resize(e);
+  bool readable = std::isfinite(frame.host_time_s);
+  for (std::size_t i = 0; i < e; ++i) {
+    const bool alive = valid.empty() || valid[i] != 0;
+    pressure[i] = alive ? frame.values[i] - baseline[i] : 0.0;
+    readable = readable && std::isfinite(pressure[i]);
+  }
+  return readable;
+}
+
+std::optional<DetectedTouch> TouchDetector::Impl::add(const Frame& frame) {
+  if (!take(frame)) {
+    return {};
+  }
+  const double time_s = frame.host_time_s;
+  std::optional<DetectedTouch> ended;
+  const double elapsed_s = last_s ? time_s - *last_s : 0.0;
+  if (elapsed_s > options.largest_gap_s || elapsed_s < 0.0) {
+    ended = end_touch(time_s);
+    smoother.reset();
+  }
+  last_s = time_s;
+
+  const std::vector<double>& smooth = smoother.add(time_s, pressure);
+  double largest = 0.0;
+  double load = 0.0;
+  for (const double p : smooth) {
+    largest = std::max(largest, p);
+    load += std::max(0.0, p - options.release);
+  }
+  if (!touching && largest <= options.onset) {
+    if (largest < options.release && time_s - released_s > rest_s) {
+      follow_drift(smooth, elapsed_s);
+    }
+    return ended;
+  }
+  if (touching && largest < options.release) {
+    return end_touch(time_s);  // never after a gap, which touches nothing
+  }
+  touching = true;
+  if (!phase.fits(load, frame.T_robot_sensor)) {
+    end_phase();
+  }
+  phase.add(time_s, load, pressure, frame.T_robot_sensor);
+  return ended;
+}
+
+void TouchDetector::Impl::follow_drift(const std::vector<double>& smooth, double elapsed_s) {
+  if (options.drift_s <= 0.0) {
+    return;
+  }
+  const double part = std::clamp(elapsed_s / options.drift_s, 0.0, 1.0);
+  for (std::size_t i = 0; i < baseline.size(); ++i) {
+    baseline[i] += part * smooth[i];
+  }
+}
+
+void TouchDetector::Impl::end_phase() {
+  const auto duration = [](const DetectedTouch& touch) { return touch.end_s - touch.begin_s; };
+  if (std::optional<DetectedTouch> touch = phase.touch()) {
+    if (!best || duration(*touch) > duration(*best)) {
+      best = std::move(touch);
+    }
+  }
+  phase.clear();
+}
+
+std::optional<DetectedTouch> TouchDetector::Impl::end_touch(double time_s) {
+  end_phase();
+  touching = false;
+  released_s = time_s;
+  return std::exchange(best, std::nullopt);
+}
+
+TouchDetector::TouchDetector(const TouchDetectorOptions& options, std::vector<double> baseline,
+                             std::vector<std::uint8_t> valid)
+    : impl_(std::make_unique<Impl>(options, std::move(baseline), std::move(valid))) {
+  validate(options);
+  if (!impl_->baseline.empty() && !impl_->valid.empty() &&
+      impl_->baseline.size() != impl_->valid.size()) {
+    throw Error(Fault::input,
+                fmt::format("touch detector: {} baseline and {} valid values; make them agree",
+                            impl_->baseline.size(), impl_->valid.size()));
+  }
+  for (std::size_t i = 0; i < impl_->baseline.size(); ++i) {
+    const bool alive = impl_->valid.empty() || impl_->valid[i] != 0;
+    if (!alive) {
+      impl_->baseline[i] = 0.0;
+    }
+    require("baseline", impl_->baseline[i], true, "finite");
+  }
+}
+
+TouchDetector::~TouchDetector() = default;
+TouchDetector::TouchDetector(TouchDetector&&) noexcept = default;
+TouchDetector& TouchDetector::operator=(TouchDetector&&) noexcept = default;
+
+std::optional<DetectedTouch> TouchDetector::add(const Frame& frame) { return impl_->add(frame); }
+
+std::optional<DetectedTouch> TouchDetector::finish() {
+  const double now_s = impl_->last_s.value_or(0.0);
+  std::optional<DetectedTouch> touch = impl_->end_touch(now_s);
+  impl_->smoother.reset();
+  impl_->last_s.reset();
+  return touch;
+}
+
+bool TouchDetector::touching() const { return impl_->touching; }
+const std::vector<double>& TouchDetector::baseline() const { return impl_->baseline; }
+
+}  // namespace palpate

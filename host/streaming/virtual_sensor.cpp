@@ -1,0 +1,150 @@
+#include "palpate/virtual_sensor.hpp"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <map>
+#include <numbers>
+#include <vector>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "palpate/error.hpp"
+#include "replayed_sensor.hpp"
+#include "simulated_sensor.hpp"
+
+namespace palpate {
+
+namespace {
+
+constexpr std::string_view replay = "replay:";
+constexpr std::string_view simulate = "simulate:";
+
+// "WHAT,key=value,key=value" taken apart, and what each key says.
+class SourceName {
+ public:
+  // Only known keys end what the name is about: a path may hold commas and equals signs.
+  SourceName(const std::string& name, std::string_view scheme,
+             const std::vector<std::string_view>& keys)
+      : name_(name) {
+    std::string_view rest = std::string_view(name_).substr(scheme.size());
+    for (;;) {
+      const std::size_t comma = rest.rfind(',');
+      if (comma == std::string_view::npos) {
+        break;
+      }
+      const std::string_view option = rest.substr(comma + 1);
+      const std::string_view key = option.substr(0, option.find('='));
+      if (std::find(keys.begin(), keys.end(), key) == keys.end()) {
+        if (scheme == simulate) {
+          refuse(key, fmt::format("is no option; there are {}", fmt::join(keys, ", ")));
+        }
+        break;
+      }
+      if (key.size() == option.size()) {
+        refuse(key, "has no value; write key=value");
+      }
+      if (!options_.emplace(key, option.substr(key.size() + 1)).second) {
+        refuse(key, "is given twice; leave one out");
+      }
+      rest = rest.substr(0, comma);
+    }
+    if (rest.empty()) {
+      refuse(scheme, "names nothing; write replay:FILE or simulate:SHAPE");
+    }
+    what_ = rest;
+  }
+
+  const std::string& what() const { return what_; }
+
+  template <typename Number>
+  std::optional<Number> number(std::string_view key, Number least, Number most) const {
+    const auto found = options_.find(key);
+    if (found == options_.end()) {
+      return {};
+    }
+    return parse<Number>(key, found->second, least, most);
+  }
+
+  std::optional<double> speed() const {
+    const auto found = options_.find("speed");
+    if (found == options_.end()) {
+      return 1.0;
+    }
+    if (found->second == "max") {
+      return {};
+    }
+    return parse(found->first, found->second, 1e-3, 1e6);
+  }
+
+  std::optional<Pose> object_pose(std::uint64_t seed) const {
+    const auto found = options_.find("object");
+    if (found == options_.end()) {
+      return {};
+    }
+    const std::string_view text = found->second;
+    if (text == "random") {
+      return random_object_pose(seed);
+    }
+    const std::size_t first = text.find(':');
+    const std::size_t second = text.find(':', first == text.npos ? first : first + 1);
+    if (second == text.npos) {
+      refuse("object", "must be random, or X:Y:DEG in mm and degrees");
+    }
+    constexpr double far_mm = 1e6;
+    constexpr double far_deg = 1e6;
+    const double x = parse("object", text.substr(0, first), -far_mm, far_mm);
+    const double y = parse("object", text.substr(first + 1, second - first - 1), -far_mm, far_mm);
+    const double deg = parse("object", text.substr(second + 1), -far_deg, far_deg);
+    return Pose{{x, y}, deg * std::numbers::pi / 180.0};
+  }
+
+ private:
+  [[noreturn]] void refuse(std::string_view key, std::string_view message) const {
+    throw Error(Fault::input, fmt::format("sensor {}: {} {}", name_, key, message));
+  }
+
+  template <typename Number>
+  Number parse(std::string_view key, std::string_view text, Number least, Number most) const {
+    Number value{};
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+    // Refuses NaN too.
+    if (error != std::errc{} || end != text.data() + text.size() ||
+        !(value >= least && value <= most)) {
+      refuse(key, fmt::format("= {}: give a number from {} to {}", text, least, most));
+    }
+    return value;
+  }
+
+  std::string name_;
+  std::string what_;
+  std::map<std::string_view, std::string_view> options_;
+};
+
+}  // namespace
+
+bool is_virtual_sensor(std::string_view name) {
+  return name.starts_with(replay) || name.starts_with(simulate);
+}
+
+std::unique_ptr<Sensor> open_virtual_sensor(const std::string& name) {
+  if (name.starts_with(replay)) {
+    const SourceName source(name, replay, {"speed"});
+    return std::make_unique<ReplayedSensor>(source.what(), source.speed());
+  }
+  if (!name.starts_with(simulate)) {
+    throw Error(Fault::input, fmt::format("sensor {}: write replay:FILE or simulate:SHAPE", name));
+  }
+  const SourceName source(name, simulate, {"rate", "seed", "touches", "noise", "object", "speed"});
+  SimulatedSensorOptions options;
+  options.rate_hz = source.number("rate", 1.0, 1e5).value_or(options.rate_hz);
+  options.seed = source.number<std::uint64_t>("seed", 0, UINT64_MAX).value_or(options.seed);
+  options.touches = source.number<std::uint64_t>("touches", 1, 1'000'000'000);
+  options.noise_kpa = source.number("noise", 0.0, 1e3).value_or(options.noise_kpa);
+  options.T_object_robot = source.object_pose(options.seed);
+  options.speed = source.speed();
+  return std::make_unique<SimulatedSensor>(source.what(), options);
+}
+
+}  // namespace palpate
