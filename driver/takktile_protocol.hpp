@@ -23,7 +23,7 @@ inline constexpr std::size_t packet_bytes = 64;
 inline constexpr std::uint8_t request_version = 0x00;      ///< wIndex 0: hardware, 1: firmware
 inline constexpr std::uint8_t request_alive_map = 0x5c;    ///< ask for alive_map_request_bytes
 inline constexpr std::uint8_t request_calibration = 0x6c;  ///< wValue column, wIndex row
-inline constexpr std::uint8_t request_stream = 0xc7;       ///< wValue ticks, wIndex 1 start, 0 stop
+inline constexpr std::uint8_t request_stream = 0xc7;       ///< wValue ticks, wIndex 0: stop
 inline constexpr std::uint8_t request_ping = 0xba;
 
 inline constexpr std::size_t calibration_bytes = 8;
