@@ -24,8 +24,10 @@ UsbHandle::UsbHandle(UsbDevice device) : device_(std::move(device)) {
 }
 
 UsbHandle::~UsbHandle() {
-  for (const int interface : claimed_) {
-    libusb_release_interface(handle_.get(), interface);
+  // The last one first: the kernel's serial driver takes a board back with its control interface,
+  // which is claimed first, and only if the data interface is free by then.
+  for (auto interface = claimed_.rbegin(); interface != claimed_.rend(); ++interface) {
+    libusb_release_interface(handle_.get(), *interface);
   }
 }
 

@@ -85,7 +85,7 @@ cat /tmp/frames.txt
 check "10 s at 200 frames/s without loss" stream_frames --check /tmp/frames.txt 1900 0
 
 # Unplugged while it streams, and plugged in again.
-as_user 1000,46 stream_frames takktile:QEMU-1 8 > /tmp/frames.txt 2>&1 &
+as_user 1000,46 stream_frames takktile:QEMU-1 15 > /tmp/frames.txt 2>&1 &
 streaming=$!
 sleep 2
 unplug TakkTile

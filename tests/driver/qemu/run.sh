@@ -1,7 +1,9 @@
 #!/usr/bin/env bash
 # The driver on a real kernel: boots Debian's own under QEMU with a USB gadget (see guest_init.sh).
 #
-#   run.sh SCRATCH RULES PROGRAM...
+#   run.sh SCRATCH DRIVER PROGRAM...
+#
+# DRIVER is the folder with the udev rule and the boards' profiles.
 #
 # Exits with 77 (skipped) and the reason where QEMU, busybox, udev or a kernel with its modules is
 # missing. PALPATE_TEST_KERNEL names the folder of a kernel package unpacked with dpkg -x; without
@@ -15,7 +17,7 @@ skip() {
 
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
 scratch=$1
-rules=$2
+driver=$2
 shift 2
 
 for tool in qemu-system-x86_64 busybox cpio udevadm setpriv modinfo; do
@@ -66,7 +68,9 @@ for program in "$(command -v udevadm)" "$(command -v setpriv)" "$@"; do
 done
 cp -L /lib64/ld-linux-x86-64.so.2 "$guest/lib64/"
 ln -sf udevadm "$guest/bin/systemd-udevd"
-cp /lib/udev/rules.d/50-udev-default.rules "$rules" "$guest/lib/udev/rules.d/"
+cp /lib/udev/rules.d/50-udev-default.rules "$driver/70-palpate.rules" "$guest/lib/udev/rules.d/"
+mkdir -p "$guest/share/palpate"
+cp -r "$driver/70-palpate.rules" "$driver/profiles" "$guest/share/palpate/"
 cp "$here/guest_init.sh" "$guest/init"
 chmod +x "$guest/init"
 printf 'root:x:0:0::/:/bin/sh\nuser:x:1000:1000::/:/bin/sh\n' > "$guest/etc/passwd"
