@@ -1,7 +1,8 @@
 // Eq. 7 for one element, as ContactLikelihood in host/model/sensor_model.cpp. Any other function of
 // the reading class and the interpolated log odds takes its place here.
 
-layout(constant_id = 1) const float RANDOM_FLOOR = 0.02;  // gamma m
+// gamma m; where IN_LOGS its logarithm, for float32 does not hold every floor, or NO_FLOOR.
+layout(constant_id = 1) const float RANDOM_FLOOR = 0.02;
 layout(constant_id = 2) const float TRUST = 0.9;          // 1 - gamma
 // Products of likelihoods need a floor that eight factors keep within float32; below it, the
 // likelihood is evaluated and summed in logs.
@@ -35,11 +36,10 @@ vec2 likelihood_ratio(const ReadingRatio ratio, const float log_odds) {
 // Log-likelihood of contact; that of none is the same at the negative log odds.
 float contact_log_likelihood(const float log_odds) {
   const float trusted = min(log_odds, 0.0) - log(1.0 + exp(-abs(log_odds))) + log(TRUST);
-  if (RANDOM_FLOOR == 0.0) {
+  if (RANDOM_FLOOR == NO_FLOOR) {
     return trusted;
   }
-  const float floored = log(RANDOM_FLOOR);
-  return max(trusted, floored) + log(1.0 + exp(-abs(trusted - floored)));
+  return max(trusted, RANDOM_FLOOR) + log(1.0 + exp(-abs(trusted - RANDOM_FLOOR)));
 }
 
 float log_likelihood(const uint reading, const float log_odds) {

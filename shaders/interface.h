@@ -20,6 +20,9 @@ const uint UNKNOWN_INSTEAD = 3;
 // index finds all three nodes of a tile at the prior.
 const int MAP_BORDER = 3;
 
+// Stands for log(gamma m) where gamma is 0: the likelihood has no floor.
+const float NO_FLOOR = -1e38;
+
 // Elements whose likelihoods are multiplied before one logarithm, and before one division.
 const uint FACTORS_PER_LOG = 8;
 const uint FACTORS_PER_DIVISION = 4;

@@ -65,11 +65,16 @@ double common_prior(std::span<const Hypothesis> hypotheses) {
 }
 
 double log_total_weight(std::span<const Hypothesis> hypotheses) {
+  // Relative to the largest, for the sum of the weights themselves may be infinite.
+  double largest = 0.0;
+  for (const Hypothesis& hypothesis : hypotheses) {
+    largest = std::max(largest, hypothesis.weight);
+  }
   double total = 0.0;
   for (const Hypothesis& hypothesis : hypotheses) {
-    total += hypothesis.weight;
+    total += hypothesis.weight / largest;
   }
-  return std::log(total);
+  return std::log(largest) + std::log(total);
 }
 
 std::vector<double> log_weights(std::span<const Hypothesis> hypotheses) {

@@ -1,7 +1,9 @@
 #include "likelihood_path.hpp"
 
 #include <bit>
+#include <cmath>
 
+#include "interface.h"
 #include "kernel_sizes.hpp"
 
 namespace palpate {
@@ -20,9 +22,13 @@ constexpr gpu::Access bindings[] = {gpu::Access::table, gpu::Access::storage, gp
 std::vector<std::uint32_t> model_constants(const gpu::Limits& limits,
                                            const ContactLikelihood& model) {
   const double floor = model.gamma * model.prior;
-  return {independent_lanes(limits), std::bit_cast<std::uint32_t>(static_cast<float>(floor)),
-          std::bit_cast<std::uint32_t>(static_cast<float>(1.0 - model.gamma)),
-          floor < least_product_floor ? 1U : 0U};
+  const bool in_logs = floor < least_product_floor;
+  // A product of two small numbers may be 0 where both logarithms are sound.
+  const double log_floor =
+      model.gamma > 0.0 ? std::log(model.gamma) + std::log(model.prior) : shaders::NO_FLOOR;
+  return {independent_lanes(limits),
+          std::bit_cast<std::uint32_t>(static_cast<float>(in_logs ? log_floor : floor)),
+          std::bit_cast<std::uint32_t>(static_cast<float>(1.0 - model.gamma)), in_logs ? 1U : 0U};
 }
 
 std::vector<std::uint32_t> path_constants(const gpu::Limits& limits, const MapKind& maps,

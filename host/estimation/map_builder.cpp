@@ -122,7 +122,9 @@ double estimate_prior(Device& device, std::span<const ObjectTouches> objects, Ma
     }
   }
   // Where nothing, or everything, was in contact, half a cell keeps the logs finite.
-  return (static_cast<double>(occupied) + 0.5) / (static_cast<double>(modelled) + 1.0);
+  const double fraction =
+      (static_cast<double>(occupied) + 0.5) / (static_cast<double>(modelled) + 1.0);
+  return std::clamp(fraction, least_prior, 1.0 - least_prior);
 }
 
 }  // namespace palpate

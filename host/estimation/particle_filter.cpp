@@ -77,8 +77,11 @@ std::vector<shaders::ObjectShare> object_shares(std::span<const Hypothesis> hypo
   if (options.none_weight) {
     weights.push_back(*options.none_weight);
   }
+  // Relative to the largest, for the sum of the weights themselves may be infinite.
+  const double largest = *std::max_element(weights.begin(), weights.end());
   double total = 0.0;
-  for (const double weight : weights) {
+  for (double& weight : weights) {
+    weight /= largest;
     total += weight;
   }
   std::vector<shaders::ObjectShare> shares;

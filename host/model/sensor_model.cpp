@@ -25,13 +25,18 @@ void InverseSensorModel::validate() const {
   if (!(spread_mm > 0.0) || !std::isfinite(spread_mm)) {
     throw Error(Fault::input, fmt::format("spread = {} mm: give a positive length", spread_mm));
   }
-  if (!(peak > 0.0 && peak < 1.0)) {
+  // Beyond these, increments in float32 no longer keep to what MapBuilder promises.
+  constexpr double largest_peak = 0.9999;
+  if (!(peak > 0.0 && peak <= largest_peak)) {
     throw Error(Fault::input,
-                fmt::format("peak = {}: must lie strictly between 0 and 1, or one reading would "
+                fmt::format("peak = {}: must lie above 0 and be at most {}, or one reading would "
                             "make a cell certain",
-                            peak));
+                            peak, largest_peak));
   }
-  require_probability("prior", prior);
+  if (!(prior >= least_prior && prior <= 1.0 - least_prior)) {
+    throw Error(Fault::input, fmt::format("prior = {}: must lie between {:g} and 1 - {:g}", prior,
+                                          least_prior, least_prior));
+  }
 }
 
 double InverseSensorModel::increment(Reading reading, double distance_mm) const {
@@ -70,7 +75,7 @@ double ContactLikelihood::log_likelihood(Reading reading, double log_odds) const
   if (gamma == 0.0) {
     return log_p;
   }
-  const double a = std::log(gamma * prior);
+  const double a = std::log(gamma) + std::log(prior);
   const double b = std::log1p(-gamma) + log_p;
   return std::max(a, b) + std::log1p(std::exp(-std::abs(a - b)));
 }

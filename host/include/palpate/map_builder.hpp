@@ -37,7 +37,7 @@ class MapBuilder {
 
   /// The map of all touches so far. It covers the known elements and the support of the sensor
   /// model around them, no more; each cell is within 1e-3 nats, or a relative 1e-4, of the sum over
-  /// all elements.
+  /// all elements, as long as a cell is at most 200 times as wide as the sensor model's spread.
   /// @throws Error if no element of any touch was In Contact or No Contact.
   OccupancyGrid build(const std::string& label);
 

@@ -6,6 +6,10 @@
 
 namespace palpate {
 
+/// The smallest prior of a map, and its distance from 1: beyond it, what a reading says 10 spreads
+/// away would still outweigh the prior.
+inline constexpr double least_prior = 1e-6;
+
 /// The inverse sensor model of Eq. 4-6: how much one element's reading changes the log odds of the
 /// cells around it. The printed equations contradict each other; the consistent reading is
 ///   G'(d) = peak * exp(-d^2 / (2 spread^2)),
@@ -13,10 +17,11 @@ namespace palpate {
 ///   increment = log(p / (1 - p)) - log(m / (1 - m)).
 struct InverseSensorModel {
   double spread_mm = 0.5;  ///< half the standard deviation of the sensor's point spread
-  double peak = 0.9;       ///< below 1, or a single reading would make a cell certain
+  double peak = 0.9;       ///< at most 0.9999: at 1 a single reading would make a cell certain
   double prior = 0.2;      ///< m
 
-  /// Throws Error unless spread > 0, 0 < peak < 1 and 0 < prior < 1.
+  /// Throws Error unless spread > 0, 0 < peak <= 0.9999 and
+  /// least_prior <= prior <= 1 - least_prior.
   void validate() const;
   /// Log-odds increment of a cell at this distance from the element's centre, in nats.
   double increment(Reading reading, double distance_mm) const;

@@ -1,0 +1,141 @@
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "hard_case.hpp"
+
+namespace palpate {
+namespace {
+
+/// Map nodes of which nothing is doubted: every cell at +1,000 or -1,000.
+OccupancyGrid certain_map(std::uint64_t seed) {
+  OccupancyGrid map = random_map(41, 41, 0.5, 1.0, seed);
+  for (float& l : map.log_odds) {
+    l = l > 0.0F ? 1000.0F : -1000.0F;
+  }
+  return map;
+}
+
+OccupancyGrid filled_map(float log_odds) {
+  OccupancyGrid map = random_map(41, 41, 0.5, 1.0, 411);
+  map.log_odds.assign(map.log_odds.size(), log_odds);
+  return map;
+}
+
+HistogramOptions without_gamma() {
+  HistogramOptions options;
+  options.gamma = 0.0;
+  options.lattice = {.x_mm = {-3.0, 3.0, 5}, .y_mm = {-3.0, 3.0, 6}, .theta_rad = {0.0, 6.0, 4}};
+  return options;
+}
+
+// Interpolation between -1,000 and 1,000 keeps the seven digits of float32: 1e-4 nats for each of
+// the elements, and of the sum what its 36 roundings leave.
+constexpr Allowed seven_digits{.nats = 2e-3, .relative = 3e-7};
+
+/// A touch of the map's middle with as many elements of this pressure beside one of 10 kPa.
+Recording press(double pressure, double first = 10.0) {
+  Recording recording;
+  recording.T_robot_sensor.push_back({{0.5, -0.25}, 0.3});
+  for (int i = 0; i < 36; ++i) {
+    recording.elements_mm.emplace_back(0.2 * (i % 6), 0.2 * (i / 6));  // NOLINT: whole rows
+    recording.pressure.push_back(i == 0 ? first : pressure);
+  }
+  return recording;
+}
+
+TEST(Contradiction, CertainMapsWithoutGamma) {
+  HardCase hard("gamma = 0 on maps at log odds of +-1,000",
+                "a likelihood of exp(-1000) is 0 in float64, and 0 / 0 is no number",
+                "logs throughout and no floor; seven digits of the 1,000 nats of an element");
+  const std::vector<Hypothesis> objects{{certain_map(412), 1.0}, {certain_map(413), 1.0}};
+  const Recording recording = random_recording(4, 36, 414);
+  Device device = Device::open();
+  for (const double bins_mm : {0.4, 6.0}) {
+    HistogramOptions options = without_gamma();
+    options.lattice.x_mm.upper = options.lattice.x_mm.lower + bins_mm;
+    options.lattice.y_mm.upper = options.lattice.y_mm.lower + bins_mm;
+    hard.expect_posterior(device, objects, options, all_touches(recording), seven_digits);
+    options.still_array = true;
+    hard.expect_posterior(device, objects, options, all_touches(recording), seven_digits);
+  }
+}
+
+TEST(Contradiction, OfEveryHypothesis) {
+  HardCase hard("gamma = 0 and evidence that contradicts every hypothesis",
+                "normalising what is left hides that nothing fits",
+                "log-likelihoods keep the 1,000 nats of every element; `contradicted` says so");
+  const std::vector<Hypothesis> objects{{filled_map(-1000.0F), 1.0}, {filled_map(-999.0F), 1.0}};
+  const Recording recording = press(10.0);
+  Device device = Device::open();
+  const Estimate estimate =
+      hard.expect_posterior(device, objects, without_gamma(), all_touches(recording), seven_digits);
+  EXPECT_NEAR(estimate.mode.log_likelihood, -36.0 * 999.0, 36.0 * 1e-4);
+  EXPECT_EQ(estimate.mode.object, 1);
+  EXPECT_TRUE(estimate.contradicted);
+  // "None of these" then takes all of the mass, and nothing else does.
+  HistogramOptions options = without_gamma();
+  options.none_weight = 1e-30;
+  PoseHistogram histogram(device, objects, options);
+  EXPECT_NEAR(histogram.estimate().none, 1e-30 / (2.0 + 1e-30), 1e-36);
+  histogram.update(all_touches(recording));
+  EXPECT_EQ(histogram.estimate().none, 1.0);
+  EXPECT_EQ(histogram.estimate().identity, (std::vector{0.0, 0.0}));
+  EXPECT_TRUE(histogram.estimate().contradicted);
+  histogram.reset();
+  EXPECT_FALSE(histogram.estimate().contradicted);
+}
+
+TEST(Contradiction, IsNoneWhereOneHypothesisFits) {
+  HardCase hard("gamma = 0 and evidence that contradicts all objects but one",
+                "the one that fits must keep all of the mass, and exactly",
+                "log1p of exp(-1000) is 0: a certain element costs nothing");
+  const std::vector<Hypothesis> objects{{filled_map(-1000.0F), 1.0}, {filled_map(1000.0F), 1e-30}};
+  const Recording recording = press(10.0);
+  Device device = Device::open();
+  const Estimate estimate =
+      hard.expect_posterior(device, objects, without_gamma(), all_touches(recording), seven_digits);
+  EXPECT_EQ(estimate.mode.log_likelihood, 0.0);
+  EXPECT_EQ(estimate.mode.object, 1);
+  EXPECT_EQ(estimate.identity[0], 0.0);
+  EXPECT_EQ(estimate.identity[1], 1.0);
+  EXPECT_FALSE(estimate.contradicted);
+}
+
+TEST(Contradiction, LogOddsAtTheLargestThatAMapMayHold) {
+  HardCase hard("log odds of +-1e30, gamma 0 and 0.1",
+                "products and differences overflow float32 to infinity",
+                "log odds are bounded at 1e30, sums stay below 1e38; seven digits");
+  const std::vector<Hypothesis> objects{{filled_map(-1e30F), 1.0}, {filled_map(1e30F), 1.0}};
+  Device device = Device::open();
+  for (const double gamma : {0.0, 0.1}) {
+    HistogramOptions options = without_gamma();
+    options.gamma = gamma;
+    for (const double pressure : {0.0, 10.0}) {
+      const Recording recording = press(pressure);
+      // All bins of an object are alike, and the objects as far apart as can be.
+      hard.expect_posterior(device, objects, options, all_touches(recording),
+                            {.nats = 2e-3, .relative = 3e-7, .near_top_nats = 2e-3});
+    }
+  }
+}
+
+TEST(Contradiction, AFloorThatNoFloatHolds) {
+  HardCase hard("gamma of 1e-30, 1e-42 and 1e-300",
+                "the floor gamma m of the likelihood is subnormal or 0 in float32, its logarithm "
+                "wrong",
+                "the floor reaches the kernels as a logarithm; seven digits of its nats");
+  const std::vector<Hypothesis> objects{{filled_map(-1000.0F), 1.0}, {certain_map(415), 1.0}};
+  const Recording recording = press(10.0);
+  Device device = Device::open();
+  for (const double gamma : {1e-30, 1e-42, 1e-300}) {
+    HistogramOptions options = without_gamma();
+    options.gamma = gamma;
+    const Estimate estimate =
+        hard.expect_posterior(device, objects, options, all_touches(recording), seven_digits);
+    EXPECT_GE(estimate.mode.log_likelihood, 36.0 * std::log(0.2 * gamma) - 0.1);
+  }
+}
+
+}  // namespace
+}  // namespace palpate

@@ -1,0 +1,205 @@
+#include "hard_case.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <iostream>
+#include <numeric>
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+namespace palpate {
+
+namespace {
+
+// What the reductions add to a probability: sums of float32 terms, at most 16,384 to a part.
+constexpr double reduction = 2e-6;
+
+// Bins this far below the top hold one part in 1e9 of the mass.
+constexpr double near_top_nats = 20.0;
+
+std::string digits(double number) { return number == 0.0 ? "0" : fmt::format("{:.1e}", number); }
+
+/// Log probability of every bin of every object, [object][bin].
+std::vector<std::vector<double>> log_posterior(
+    std::span<const Hypothesis> objects, const std::vector<std::vector<double>>& log_likelihood) {
+  double most = -std::numeric_limits<double>::infinity();
+  std::vector<std::vector<double>> logs = log_likelihood;
+  for (std::size_t object = 0; object < logs.size(); ++object) {
+    for (double& l : logs[object]) {
+      l += std::log(objects[object].weight);
+      most = std::max(most, l);
+    }
+  }
+  double sum = 0.0;
+  for (const auto& bins : logs) {
+    for (const double l : bins) {
+      sum += std::exp(l - most);
+    }
+  }
+  for (auto& bins : logs) {
+    for (double& l : bins) {
+      l -= most + std::log(sum);
+    }
+  }
+  return logs;
+}
+
+}  // namespace
+
+double Allowed::at(double log_likelihood) const {
+  return nats + relative * std::abs(log_likelihood);
+}
+
+bool all_finite(std::span<const double> numbers) {
+  return std::all_of(numbers.begin(), numbers.end(), [](double n) { return std::isfinite(n); });
+}
+
+double total(std::span<const double> numbers) {
+  return std::accumulate(numbers.begin(), numbers.end(), 0.0);
+}
+
+HardCase::HardCase(std::string name, std::string risk, std::string bound)
+    : name_(std::move(name)), risk_(std::move(risk)), bound_(std::move(bound)) {}
+
+HardCase::~HardCase() {
+  std::string seen;
+  for (const auto& [quantity, largest] : largest_) {
+    seen += fmt::format("{}{} {} of {}", seen.empty() ? "" : "; ", quantity, digits(largest.error),
+                        digits(largest.allowed));
+    testing::Test::RecordProperty(quantity, fmt::format("{:.3e}", largest.error));
+  }
+  std::cout << fmt::format("| {} | {} | {} | {} |", name_, risk_, bound_, seen) << std::endl;
+}
+
+void HardCase::check(const std::string& quantity, double error, double allowed) const {
+  EXPECT_LE(error, allowed) << name_ << ": " << quantity;
+}
+
+void HardCase::expect(const std::string& quantity, double error, double allowed) {
+  check(quantity, error, allowed);
+  Largest& largest = largest_[quantity];
+  if (error > largest.error || largest.allowed == 0.0) {
+    largest = {error, allowed};
+  }
+}
+
+Estimate HardCase::expect_posterior(Device& device, std::span<const Hypothesis> objects,
+                                    const HistogramOptions& options, std::span<const Touch> touches,
+                                    Allowed allowed) {
+  return expect_posterior_of_repeated(device, objects, options, touches, 1, allowed);
+}
+
+Estimate HardCase::expect_posterior_of_repeated(Device& device, std::span<const Hypothesis> objects,
+                                                const HistogramOptions& options,
+                                                std::span<const Touch> touches, int times,
+                                                Allowed allowed) {
+  reference::Posterior expected = reference_posterior(objects, options, touches);
+  for (auto& bins : expected.log_likelihood) {
+    for (double& l : bins) {
+      l *= times;
+    }
+  }
+  PoseHistogram histogram(device, objects, options);
+  for (int i = 0; i < times; ++i) {
+    histogram.update(touches);
+  }
+  const Estimate estimate = histogram.estimate();
+
+  std::vector<std::vector<double>> bins;
+  double worst = 0.0;
+  for (std::size_t object = 0; object < objects.size(); ++object) {
+    bins.push_back(histogram.log_likelihood(static_cast<int>(object)));
+    EXPECT_TRUE(all_finite(bins.back())) << name_ << ": bins of object " << object;
+    // Of all bins, the one that has the least left of what it is allowed, or exceeds it the most.
+    std::optional<Largest> largest;
+    for (std::size_t bin = 0; bin < bins.back().size(); ++bin) {
+      const double l = expected.log_likelihood[object][bin];
+      const Largest here{std::abs(bins.back()[bin] - l), allowed.at(l)};
+      if (!largest || here.error - here.allowed > largest->error - largest->allowed) {
+        largest = here;
+      }
+      worst = std::max(worst, here.error);
+    }
+    expect("log-likelihood, nats", largest->error, largest->allowed);
+  }
+
+  const auto product_logs = log_posterior(objects, bins);
+  const auto expected_logs = log_posterior(objects, expected.log_likelihood);
+  double top = -std::numeric_limits<double>::infinity();
+  for (const auto& logs : expected_logs) {
+    top = std::max(top, *std::max_element(logs.begin(), logs.end()));
+  }
+  Largest near_top;
+  for (std::size_t object = 0; object < objects.size(); ++object) {
+    for (std::size_t bin = 0; bin < bins[object].size(); ++bin) {
+      if (expected_logs[object][bin] > top - near_top_nats) {
+        const double error = std::abs(product_logs[object][bin] - expected_logs[object][bin]);
+        near_top.error = std::max(near_top.error, error);
+        near_top.allowed =
+            std::max(near_top.allowed, 2.0 * allowed.at(expected.log_likelihood[object][bin]));
+      }
+    }
+  }
+  expect("log posterior near the top, nats", near_top.error,
+         allowed.near_top_nats.value_or(near_top.allowed));
+
+  // Each of two errors of e nats changes a probability by at most e.
+  const double probability = 2.0 * worst + reduction;
+  EXPECT_TRUE(all_finite(estimate.identity)) << name_;
+  EXPECT_NEAR(total(estimate.identity), 1.0, 1e-12) << name_;
+  expect("identity", largest_difference(estimate.identity, reference::identity(expected)),
+         probability);
+
+  const auto object = static_cast<std::size_t>(estimate.mode.object);
+  const auto bin = static_cast<std::size_t>(estimate.mode.bin);
+  EXPECT_EQ(estimate.mode.log_likelihood, bins[object][bin]) << name_;
+  check("mode below the best bin, nats", top - expected_logs[object][bin], 2.0 * worst);
+  const Pose pose = reference::bin_pose(histogram.lattice(), estimate.mode.bin);
+  const glm::dvec2 shift = estimate.mode.T_object_robot.translation_mm - pose.translation_mm;
+  EXPECT_LE(std::hypot(shift.x, shift.y), 1e-8) << name_;
+  EXPECT_EQ(estimate.mode.T_object_robot.theta_rad, pose.theta_rad) << name_;
+
+  const RefinedPose refined = histogram.refine(estimate.mode);
+  const auto& [translation_mm, theta_rad] = refined.T_object_robot;
+  EXPECT_TRUE(all_finite(std::vector{translation_mm.x, translation_mm.y, theta_rad})) << name_;
+  EXPECT_TRUE(all_finite(refined.covariance)) << name_;
+  for (const int i : {0, 4, 8}) {
+    EXPECT_GE(refined.covariance[static_cast<std::size_t>(i)], 0.0) << name_;
+  }
+
+  for (int o = 0; o < static_cast<int>(objects.size()); ++o) {
+    const auto [xy, theta] = histogram.marginals(o);
+    EXPECT_TRUE(all_finite(xy)) << name_;
+    EXPECT_TRUE(all_finite(theta)) << name_;
+    check("marginals", largest_difference(xy, reference::marginal_xy(expected, o)), probability);
+    check("marginals", largest_difference(theta, reference::marginal_theta(expected, o)),
+          probability);
+    const double p = estimate.identity[static_cast<std::size_t>(o)];
+    check("sum of marginals", std::abs(total(xy) - p), reduction);
+    check("sum of marginals", std::abs(total(theta) - p), reduction);
+  }
+  return estimate;
+}
+
+void HardCase::expect_cell(double log_odds, double expected) {
+  expect("map, of what is allowed",
+         std::abs(log_odds - expected) / std::max(1e-3, 1e-4 * std::abs(expected)), 1.0);
+}
+
+OccupancyGrid HardCase::expect_map(Device& device, std::span<const Touch> touches,
+                                   const MapOptions& options) {
+  MapBuilder builder(device, options);
+  builder.add(touches);
+  OccupancyGrid map = builder.build(name_);
+  const std::vector<double> cells(map.log_odds.begin(), map.log_odds.end());
+  EXPECT_TRUE(all_finite(cells)) << name_;
+  const std::vector<double> expected =
+      reference::log_odds_map(touches, map, options.classifier, options.sensor);
+  for (std::size_t cell = 0; cell < cells.size(); ++cell) {
+    expect_cell(cells[cell], expected[cell]);
+  }
+  return map;
+}
+
+}  // namespace palpate

@@ -1,0 +1,84 @@
+#include <gtest/gtest.h>
+
+#include "hard_case.hpp"
+
+namespace palpate {
+namespace {
+
+/// 1e-4 nats per touch of 36 elements, and of the posterior near its top 0.05 nats at any length.
+constexpr Allowed long_run(int touches) { return {.nats = touches * 1e-4, .near_top_nats = 0.05}; }
+
+constexpr int most_touches = sanitized ? 1'000 : 10'000;
+constexpr int still_touches = sanitized ? 1'000 : 4'000;
+
+/// Two objects that differ so little that thousands of touches hardly tell them apart.
+std::vector<Hypothesis> near_twins() {
+  const OccupancyGrid one = random_map(61, 61, 0.5, 40.0, 401);
+  OccupancyGrid other = one;
+  Uniform random(402);
+  for (float& l : other.log_odds) {
+    l += static_cast<float>(random(-1e-3, 1e-3));
+  }
+  return {{one, 1.0}, {other, 1.0}};
+}
+
+/// A few bins so close together that all of them stay within sight of the top.
+HistogramOptions near_the_top(int rows) {
+  HistogramOptions options;
+  options.lattice = {
+      .x_mm = {-0.002, 0.002, 3}, .y_mm = {1.0, 1.002, rows}, .theta_rad = {0.5, 0.5005, 3}};
+  return options;
+}
+
+TEST(LongRun, TenThousandTouchesInARow) {
+  HardCase hard("10,000 touches in a row, log-likelihoods of -1e6",
+                "a float32 sum keeps 0.06 nats at 1e6 and loses the difference between bins",
+                "two floats per bin, so that each logarithm's rounding counts once; 0.05 nats near "
+                "the top");
+  const std::vector<Hypothesis> objects = near_twins();
+  const Recording recording = random_recording(most_touches, 80, 403);
+  Device device = Device::open();
+  // Two rows take register tiles, one row takes runs of bins.
+  for (const int rows : {2, 1}) {
+    const Estimate estimate = hard.expect_posterior(device, objects, near_the_top(rows),
+                                                    all_touches(recording), long_run(most_touches));
+    EXPECT_LT(estimate.mode.log_likelihood, -90.0 * most_touches) << "the case is not hard enough";
+    EXPECT_GT(estimate.identity[0], 1e-6) << "no longer near the top";
+    EXPECT_GT(estimate.identity[1], 1e-6) << "no longer near the top";
+  }
+}
+
+TEST(LongRun, TheSameTouchTenThousandTimes) {
+  HardCase hard(
+      "the same touch 10,000 times", "equal rounding errors do not cancel but add up",
+      "each logarithm of eight factors is kept to some 1e-7 nats; 0.05 nats near the top");
+  const std::vector<Hypothesis> objects = near_twins();
+  const Recording recording = random_recording(1, 36, 404);
+  std::vector<Touch> touches(100, recording.touch(0));
+  Device device = Device::open();
+  for (const int rows : {2, 1}) {
+    hard.expect_posterior_of_repeated(device, objects, near_the_top(rows), touches,
+                                      most_touches / 100, long_run(most_touches));
+  }
+}
+
+TEST(LongRun, TouchesOneByOneOfAStillArray) {
+  HardCase hard("4,000 touches of a still array, one by one",
+                "every touch adds a shared base and takes back what it says otherwise",
+                "base and differences are two floats; 0.05 nats near the top");
+  const std::vector<Hypothesis> objects = near_twins();
+  HistogramOptions options = near_the_top(2);
+  options.still_array = true;
+  Recording recording = random_recording(2, 36, 405);
+  recording.T_robot_sensor[1] = recording.T_robot_sensor[0];
+  // Mostly No Contact, or the base is not taken.
+  for (std::size_t i = 0; i < recording.pressure.size(); ++i) {
+    recording.pressure[i] = i % 8 == 0 ? 10.0 : i % 8 == 1 ? 2.0 : 1.0 * static_cast<double>(i % 2);
+  }
+  Device device = Device::open();
+  hard.expect_posterior_of_repeated(device, objects, options, all_touches(recording),
+                                    still_touches / 2, long_run(still_touches));
+}
+
+}  // namespace
+}  // namespace palpate

@@ -1,0 +1,160 @@
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include <gtest/gtest.h>
+
+#include "hard_case.hpp"
+#include "io/scratch_folder.hpp"
+
+namespace palpate {
+namespace {
+
+constexpr double subnormal = std::numeric_limits<double>::denorm_min();
+
+std::vector<Hypothesis> three_objects() {
+  return {{random_map(31, 27, 0.5, 6.0, 421), 1.0},
+          {random_map(25, 25, 0.5, 6.0, 422), 2.0},
+          {random_map(14, 15, 1.0, 6.0, 423), 1.0}};
+}
+
+HistogramOptions small_options() {
+  HistogramOptions options;
+  options.lattice = {.x_mm = {-5.0, 5.0, 5},
+                     .y_mm = {-5.0, 5.0, 7},
+                     .theta_rad = {0.0, 2.0 * std::numbers::pi, 6}};
+  return options;
+}
+
+/// Touches that say nothing leave every bin where it was, to the bit, and make no map.
+void expect_nothing_said(HardCase& hard, const Recording& recording) {
+  const std::vector<Hypothesis> objects = three_objects();
+  Device device = Device::open();
+  for (const bool still : {false, true}) {
+    HistogramOptions options = small_options();
+    options.still_array = still;
+    const Estimate estimate =
+        hard.expect_posterior(device, objects, options, all_touches(recording), {.nats = 0.0});
+    EXPECT_EQ(estimate.mode.log_likelihood, 0.0);
+    EXPECT_EQ(estimate.mode.object, 1) << "the heaviest";
+    EXPECT_EQ(estimate.mode.bin, 0) << "ties go to the lowest bin";
+    EXPECT_NEAR(estimate.identity[1], 0.5, 1e-15);
+  }
+  MapBuilder builder(device, {});
+  builder.add(all_touches(recording));
+  expect_named(input_error([&] { builder.build("silent"); }), {"silent", "In Contact"});
+}
+
+TEST(SilentTouch, AllUnknown) {
+  HardCase hard("all-Unknown touches: dead elements, no numbers, between the thresholds",
+                "an empty batch, a sum over nothing, a maximum over nothing",
+                "exact: nothing is added to any bin; a map of nothing is refused");
+  Recording recording = random_recording(5, 36, 424);
+  recording.valid.assign(recording.pressure.size(), 1);
+  for (std::size_t i = 0; i < recording.pressure.size(); ++i) {
+    switch (i / 36) {
+      case 0:
+        recording.valid[i] = 0;
+        break;
+      case 1:
+        recording.pressure[i] = std::numeric_limits<double>::quiet_NaN();
+        break;
+      default:
+        // Above 0.3 of the largest and below the threshold.
+        recording.pressure[i] = 1.0 + 0.01 * static_cast<double>(i % 36);
+    }
+  }
+  expect_nothing_said(hard, recording);
+}
+
+TEST(SilentTouch, EveryElementAtTheThreshold) {
+  HardCase hard("every element exactly at the threshold, or at the ratio of the largest",
+                "a comparison that counts equality as contact, or as none", "exact: Unknown");
+  Recording recording = random_recording(2, 36, 425);
+  recording.pressure.assign(recording.pressure.size(), 2.0);
+  // The second touch's largest is at the threshold, and the others are at the ratio of it.
+  for (std::size_t i = 37; i < 72; ++i) {
+    recording.pressure[i] = 0.3 * 2.0;
+  }
+  expect_nothing_said(hard, recording);
+
+  // At the ratio of the largest and above the threshold.
+  recording.pressure[36] = 20.0;
+  for (std::size_t i = 37; i < 72; ++i) {
+    recording.pressure[i] = 0.3 * 20.0;
+  }
+  const Touch touch = recording.touch(1);
+  EXPECT_EQ(ContactClassifier{}.classify(touch), reference::classify(touch, {}));
+  EXPECT_EQ(known_readings(touch, {}).size(), 1U) << "only the 20 kPa say anything";
+}
+
+TEST(SilentTouch, EntirelyOffTheMap) {
+  HardCase hard("touches entirely off the map, by 40 to 1e300 mm",
+                "indices overflow, and bins that are alike differ by rounding",
+                "cells are clamped to +-2^29 into the border of prior: equal bits in every bin");
+  const std::vector<Hypothesis> objects{{random_map(31, 27, 0.5, 6.0, 426), 1.0},
+                                        {random_map(25, 25, 0.5, 6.0, 427), 1.0}};
+  Device device = Device::open();
+  for (const double away_mm : {40.0, 1e6, 1e12, 1e300}) {
+    const Recording recording = moved(random_recording(3, 36, 428), {{away_mm, -away_mm}, 0.0});
+    double expected = 0.0;
+    for (const Touch& touch : all_touches(recording)) {
+      for (const ElementReading& r : known_readings(touch, {})) {
+        expected += ContactLikelihood{}.log_likelihood(r.reading, std::log(0.2 / 0.8));
+      }
+    }
+    for (const double gamma : {0.1, 0.0}) {
+      HistogramOptions options = small_options();
+      options.gamma = gamma;
+      const Estimate estimate =
+          hard.expect_posterior(device, objects, options, all_touches(recording));
+      EXPECT_EQ(estimate.mode.bin, 0) << "all bins are alike";
+      EXPECT_EQ(estimate.mode.object, 0);
+      EXPECT_EQ(estimate.identity, (std::vector{0.5, 0.5}));
+      if (gamma > 0.0) {
+        EXPECT_NEAR(estimate.mode.log_likelihood, expected, 1e-4);
+      }
+    }
+  }
+}
+
+TEST(SilentTouch, SubnormalPressures) {
+  HardCase hard("subnormal pressures and thresholds", "pressures flushed to zero change class",
+                "exact: classes are decided in float64, and subnormals are kept");
+  // Small whole numbers, once as they are and once as multiples of the smallest number.
+  Recording recording = random_recording(4, 36, 429);
+  Uniform random(430);
+  for (double& p : recording.pressure) {
+    p = std::floor(random(0.0, 12.0));
+  }
+  Recording tiny = recording;
+  for (double& p : tiny.pressure) {
+    p *= subnormal;
+  }
+  HistogramOptions options = small_options();
+  const std::vector<Hypothesis> objects = three_objects();
+  Device device = Device::open();
+  // At these ratios the product with the largest pressure is a whole number, or never one.
+  for (const double ratio : {0.5, 0.25}) {
+    options.classifier = {.threshold = 3.0 * subnormal, .ratio = ratio};
+    const Estimate estimate = hard.expect_posterior(device, objects, options, all_touches(tiny));
+    EXPECT_NE(estimate.mode.log_likelihood, 0.0) << "nothing was said";
+    for (std::size_t i = 0; i < tiny.size(); ++i) {
+      EXPECT_EQ(options.classifier.classify(tiny.touch(i)),
+                reference::classify(tiny.touch(i), options.classifier));
+    }
+  }
+  // Against readings as large as usual: all of them are No Contact.
+  options.classifier = {};
+  tiny.pressure[0] = 20.0;
+  EXPECT_EQ(known_readings(tiny.touch(0), {}).size(), 36U);
+  hard.expect_posterior(device, objects, options, all_touches(tiny));
+
+  MapOptions map_options;
+  map_options.classifier = {.threshold = 3.0 * subnormal, .ratio = 0.5};
+  tiny.pressure[0] = 5.0 * subnormal;
+  hard.expect_map(device, all_touches(tiny), map_options);
+}
+
+}  // namespace
+}  // namespace palpate

@@ -1,0 +1,121 @@
+#include <cmath>
+#include <numbers>
+
+#include <gtest/gtest.h>
+
+#include "hard_case.hpp"
+
+namespace palpate {
+namespace {
+
+constexpr double two_pi = 2.0 * std::numbers::pi;
+
+HistogramOptions symmetric_options() {
+  HistogramOptions options;
+  options.lattice = {.x_mm = {-4.0, 4.0, 5}, .y_mm = {-4.0, 4.0, 6}, .theta_rad = {0, two_pi, 8}};
+  return options;
+}
+
+/// The bin of the pose turned by half a turn about the object's middle.
+std::int64_t half_a_turn_on(const PoseLattice& lattice, std::int64_t bin) {
+  const std::int64_t in_plane = bin % lattice.plane();
+  const std::int64_t theta = bin / lattice.plane();
+  const std::int64_t turned = (theta + lattice.theta_rad.count / 2) % lattice.theta_rad.count;
+  return turned * lattice.plane() + lattice.plane() - 1 - in_plane;
+}
+
+TEST(Tie, IdenticalObjects) {
+  HardCase hard("identical objects",
+                "rounding of one of them, or the order of a reduction, decides",
+                "equal bits; the mode is the first object's, the identity the prior weights'");
+  const OccupancyGrid map = random_map(31, 27, 0.5, 6.0, 431);
+  const std::vector<Hypothesis> equal{{map, 1.0}, {map, 1.0}, {map, 1.0}};
+  const std::vector<Hypothesis> unequal{{map, 1.0}, {map, 2.0}, {map, 2.0}};
+  const Recording recording = random_recording(6, 36, 432);
+  Device device = Device::open();
+  for (int run = 0; run < 3; ++run) {
+    const Estimate estimate =
+        hard.expect_posterior(device, equal, symmetric_options(), all_touches(recording), {2e-4});
+    EXPECT_EQ(estimate.mode.object, 0);
+    EXPECT_EQ(estimate.identity[0], estimate.identity[1]);
+    EXPECT_EQ(estimate.identity[0], estimate.identity[2]);
+  }
+  const Estimate estimate =
+      hard.expect_posterior(device, unequal, symmetric_options(), all_touches(recording), {2e-4});
+  EXPECT_EQ(estimate.mode.object, 1);
+  EXPECT_NEAR(estimate.identity[0], 0.2, 1e-12);
+  EXPECT_EQ(estimate.identity[1], estimate.identity[2]);
+}
+
+TEST(Tie, TwoFoldSymmetry) {
+  HardCase hard("two-fold symmetry",
+                "two modes whose bins differ by rounding only: the choice must not wander",
+                "the same bits in every run; each half holds half of the mass");
+  OccupancyGrid map = random_map(31, 27, 0.5, 6.0, 433);
+  map.symmetry = 2;
+  for (std::size_t cell = 0; cell < map.log_odds.size(); ++cell) {
+    map.log_odds[map.log_odds.size() - 1 - cell] = map.log_odds[cell];
+  }
+  map.origin_mm = -map.cell_mm * glm::dvec2(15.0, 13.0);
+  const std::vector<Hypothesis> objects{{map, 1.0}};
+  const Recording recording = random_recording(3, 36, 434);
+  const HistogramOptions options = symmetric_options();
+  Device device = Device::open();
+  std::vector<double> first;
+  for (int run = 0; run < 3; ++run) {
+    const Estimate estimate =
+        hard.expect_posterior(device, objects, options, all_touches(recording));
+    PoseHistogram histogram(device, objects, options);
+    histogram.update(all_touches(recording));
+    EXPECT_EQ(histogram.estimate().mode.bin, estimate.mode.bin) << "the same each time";
+    const std::vector<double> bins = histogram.log_likelihood(0);
+    if (run == 0) {
+      first = bins;
+    }
+    EXPECT_EQ(bins, first) << "equal bits";
+    const auto twin = static_cast<std::size_t>(half_a_turn_on(options.lattice, estimate.mode.bin));
+    EXPECT_NEAR(bins[twin], estimate.mode.log_likelihood, 1e-4);
+    const std::vector<double> theta = histogram.marginals(0).theta;
+    for (std::size_t t = 0; t < 4; ++t) {
+      EXPECT_NEAR(theta[t], theta[t + 4], 1e-4) << "half a turn apart";
+    }
+  }
+}
+
+TEST(Tie, FullSymmetry) {
+  HardCase hard("full symmetry, touched at its middle", "every theta is as good as the others",
+                "equal bits for all thetas; the mode is the lowest bin's");
+  OccupancyGrid map = random_map(41, 41, 0.5, 1.0, 435);
+  map.symmetry = 0;
+  for (int j = 0; j < map.ny; ++j) {
+    for (int i = 0; i < map.nx; ++i) {
+      const glm::dvec2 p = map.centre_mm(i, j);
+      map.log_odds[static_cast<std::size_t>(j * map.nx + i)] =
+          static_cast<float>(4.0 * std::cos(std::hypot(p.x, p.y)));
+    }
+  }
+  const std::vector<Hypothesis> objects{{map, 1.0}};
+  Recording recording;
+  recording.T_robot_sensor = {{{12.0, -7.0}, 0.4}, {{12.0, -7.0}, 2.0}};
+  recording.elements_mm = {{0.0, 0.0}};
+  recording.pressure = {10.0, 5.0};
+  HistogramOptions options = symmetric_options();
+  options.lattice.pivot_mm = {12.0, -7.0};
+  Device device = Device::open();
+  for (int run = 0; run < 3; ++run) {
+    const Estimate estimate =
+        hard.expect_posterior(device, objects, options, all_touches(recording));
+    EXPECT_LT(estimate.mode.bin, options.lattice.plane()) << "not of the first theta";
+    PoseHistogram histogram(device, objects, options);
+    histogram.update(all_touches(recording));
+    const std::vector<double> bins = histogram.log_likelihood(0);
+    for (std::size_t bin = 0; bin < bins.size(); ++bin) {
+      ASSERT_EQ(bins[bin], bins[bin % static_cast<std::size_t>(options.lattice.plane())]);
+    }
+    const std::vector<double> theta = histogram.marginals(0).theta;
+    EXPECT_EQ(theta, std::vector<double>(8, theta[0]));
+  }
+}
+
+}  // namespace
+}  // namespace palpate
