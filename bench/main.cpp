@@ -8,6 +8,7 @@
 #include "experiment.hpp"
 #include "kernels.hpp"
 #include "palpate/error.hpp"
+#include "sweep.hpp"
 
 int main(int argc, char** argv) {
   CLI::App app("Measures Palpate's speed and accuracy on simulated letters.", "palpate-bench");
@@ -39,6 +40,21 @@ int main(int argc, char** argv) {
                          "Vulkan device, by a part of its name or index");
   experiment->callback(
       [&] { palpate::bench::run_experiment(experiment_options, std::span(argv, argc)); });
+  palpate::bench::SweepOptions sweep_options;
+  auto* sweep = app.add_subcommand(
+      "sweep",
+      "Speed against error on simulated letters: every filter from 100 to 10,000,000 bins per "
+      "object and maps of several cell sizes; takes many minutes on a CPU");
+  sweep->add_option("--json", sweep_options.json, "Also write the results to this file");
+  sweep->add_option("--html", sweep_options.html, "Also write them as a page with charts");
+  sweep->add_option("--plots", sweep_options.plots, "Also write the page's charts to this folder");
+  sweep->add_option("--max-bins", sweep_options.max_bins, "Most bins per object");
+  sweep->add_option("--trials", sweep_options.trials,
+                    "Most trials per letter, 10 by default; fewer where bins are many");
+  sweep->add_flag("--quick", sweep_options.quick, "Few counts and trials, in less than a minute");
+  sweep->add_option("--device", sweep_options.device,
+                    "Vulkan device, by a part of its name or index");
+  sweep->callback([&] { palpate::bench::run_sweep(sweep_options, std::span(argv, argc)); });
   try {
     app.parse(argc, argv);
     return 0;
