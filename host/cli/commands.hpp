@@ -9,6 +9,7 @@ void add_devices(CLI::App& app);
 void add_sensors(CLI::App& app);
 void add_record(CLI::App& app);
 void add_touches(CLI::App& app);
+void add_live(CLI::App& app);
 void add_simulate(CLI::App& app);
 void add_map(CLI::App& app);
 void add_recognize(CLI::App& app);

@@ -44,6 +44,7 @@ int run(int argc, char** argv) {
   palpate::cli::add_sensors(app);
   palpate::cli::add_record(app);
   palpate::cli::add_touches(app);
+  palpate::cli::add_live(app);
   palpate::cli::add_simulate(app);
   palpate::cli::add_map(app);
   palpate::cli::add_recognize(app);

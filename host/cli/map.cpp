@@ -92,7 +92,8 @@ MapOptions map_options(const Options& options, const std::vector<Recording>& rec
                                           "cell certain",
                                           options.peak));
   }
-  result.classifier = make_classifier(recordings, options.threshold, options.ratio);
+  result.classifier = make_classifier(recordings.front().pressure_unit, recordings.front().path,
+                                      options.threshold, options.ratio);
   return result;
 }
 

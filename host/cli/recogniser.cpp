@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include "palpate/balanced_lattice.hpp"
 #include "palpate/particle_filter.hpp"
 
 namespace palpate::cli {
@@ -90,7 +91,32 @@ class ParticleRecogniser : public Recogniser {
   ParticleFilter filter_;
 };
 
+/// Counts for --bins auto: what the maps are worth and the device holds.
+PoseLattice choose_bins(const RecognitionTask& task, const Device& device) {
+  const HistogramOptions& histogram = task.histogram;
+  const std::int64_t most = most_bins_on(device, histogram.still_array);
+  const BalancedLattice chosen = balanced_lattice(histogram.lattice, task.hypotheses, most);
+  if (chosen.bounded) {
+    fmt::print(stderr,
+               "palpate: --bins auto: steps of {:.2f} mm, coarser than the maps are worth, to keep "
+               "to {} bins in all; narrow the region, or give --bins\n",
+               chosen.step_mm, most);
+  }
+  return chosen.lattice;
+}
+
 }  // namespace
+
+void settle_bins(const Device& device, RecognitionTask& task) {
+  if (!task.auto_bins) {
+    return;
+  }
+  task.histogram.lattice = choose_bins(task, device);
+  if (task.particles) {  // of which pictures count how many lie in each bin
+    task.particles->region = task.histogram.lattice;
+  }
+  task.auto_bins = false;
+}
 
 std::unique_ptr<Recogniser> make_recogniser(Device& device, const RecognitionTask& task) {
   if (task.particles) {

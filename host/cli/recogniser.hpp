@@ -13,7 +13,7 @@
 
 namespace palpate::cli {
 
-/// What `recognize` needs of a filter, whichever was asked for.
+/// What the commands need of a filter, whichever was asked for.
 class Recogniser {
  public:
   virtual ~Recogniser() = default;
@@ -35,6 +35,10 @@ class Recogniser {
   /// The dense belief, where there is one.
   virtual const PoseHistogram* histogram() const = 0;
 };
+
+/// Chooses the lattice's counts where they are left to the maps and the device, and says on
+/// standard error where the device allows fewer than the maps are worth.
+void settle_bins(const Device& device, RecognitionTask& task);
 
 std::unique_ptr<Recogniser> make_recogniser(Device& device, const RecognitionTask& task);
 

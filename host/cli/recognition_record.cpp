@@ -29,43 +29,6 @@ nlohmann::ordered_json to_json(std::optional<double> error_mm) {
   return error_mm ? nlohmann::ordered_json(*error_mm) : nullptr;
 }
 
-nlohmann::ordered_json to_json(const Step& step, const RecognitionTask& task) {
-  nlohmann::ordered_json identity;
-  for (std::size_t i = 0; i < task.labels.size(); ++i) {
-    identity[task.labels[i]] = step.identity[i];
-  }
-  const Mode& mode = step.mode;
-  const Pose T_robot_object = inverse(mode.T_object_robot);
-  nlohmann::ordered_json json{{"best", task.labels[step.best]},
-                              {"identity", identity},
-                              {"mode",
-                               {{"object", task.labels[task.label_of[mode.object]]},
-                                {"map", task.map_paths[mode.object]},
-                                {"x_mm", mode.T_object_robot.translation_mm.x},
-                                {"y_mm", mode.T_object_robot.translation_mm.y},
-                                {"theta_rad", mode.T_object_robot.theta_rad},
-                                {"log_likelihood", mode.log_likelihood}}}};
-  if (step.refined) {
-    json["refined"] = to_json(*step.refined);
-  }
-  json["T_robot_object"] = {T_robot_object.translation_mm.x, T_robot_object.translation_mm.y,
-                            wrap_angle(T_robot_object.theta_rad, 2.0 * std::numbers::pi)};
-  if (step.right) {
-    json["right"] = *step.right;
-    json["error_mm"] = to_json(step.error_mm);
-    if (step.refined) {
-      json["refined_error_mm"] = to_json(step.refined_error_mm);
-    }
-  }
-  if (step.contradicted) {
-    json["contradicted"] = true;
-  }
-  if (step.effective_sample_size) {
-    json["effective_sample_size"] = *step.effective_sample_size;
-  }
-  return json;
-}
-
 std::string error_text(std::optional<double> error_mm) {
   return error_mm ? fmt::format("{:.2f}", *error_mm) : "-";
 }
@@ -113,11 +76,13 @@ const std::string& true_label(const Recording& recording) {
   return recording.truth ? recording.truth->object : recording.object;
 }
 
-Step judge(const Estimate& estimate, const std::optional<RefinedPose>& refined,
-           const Unknown& unknown, const RecognitionTask& task) {
+Step judge(const Recogniser& recogniser, const std::string& true_label,
+           const std::optional<Truth>& truth, const RecognitionTask& task) {
+  const Estimate estimate = recogniser.estimate();
   Step step;
   step.mode = estimate.mode;
-  step.refined = refined;
+  step.refined = recogniser.refine(estimate.mode);
+  step.effective_sample_size = recogniser.effective_sample_size();
   step.contradicted = estimate.contradicted;
   step.identity.assign(task.labels.size(), 0.0);
   for (std::size_t i = 0; i < estimate.identity.size(); ++i) {
@@ -129,19 +94,17 @@ Step judge(const Estimate& estimate, const std::optional<RefinedPose>& refined,
   step.best = static_cast<std::size_t>(
       std::max_element(step.identity.begin(), step.identity.end()) - step.identity.begin());
 
-  const Recording& recording = *unknown.recording;
-  const std::string& truth = true_label(recording);
-  if (!truth.empty()) {
+  if (!true_label.empty()) {
     const bool learned =
-        std::find(task.labels.begin(), task.labels.end(), truth) != task.labels.end();
-    step.right = task.labels[step.best] == (learned ? truth : none_label);
+        std::find(task.labels.begin(), task.labels.end(), true_label) != task.labels.end();
+    step.right = task.labels[step.best] == (learned ? true_label : none_label);
   }
   const OccupancyGrid& map = task.hypotheses[step.mode.object].map;
   const bool has_body =
       std::any_of(map.log_odds.begin(), map.log_odds.end(), [](float l) { return l > 0.0F; });
-  if (recording.truth && map.label == truth && has_body) {
+  if (truth && map.label == true_label && has_body) {
     const auto error_mm = [&, body = body_of(map)](const Pose& T_object_robot) {
-      return pose_error_mm(body, map.symmetry, T_object_robot, recording.truth->T_object_robot);
+      return pose_error_mm(body, map.symmetry, T_object_robot, truth->T_object_robot);
     };
     step.error_mm = error_mm(step.mode.T_object_robot);
     if (step.refined) {
@@ -149,6 +112,43 @@ Step judge(const Estimate& estimate, const std::optional<RefinedPose>& refined,
     }
   }
   return step;
+}
+
+nlohmann::ordered_json to_json(const Step& step, const RecognitionTask& task) {
+  nlohmann::ordered_json identity;
+  for (std::size_t i = 0; i < task.labels.size(); ++i) {
+    identity[task.labels[i]] = step.identity[i];
+  }
+  const Mode& mode = step.mode;
+  const Pose T_robot_object = inverse(mode.T_object_robot);
+  nlohmann::ordered_json json{{"best", task.labels[step.best]},
+                              {"identity", identity},
+                              {"mode",
+                               {{"object", task.labels[task.label_of[mode.object]]},
+                                {"map", task.map_paths[mode.object]},
+                                {"x_mm", mode.T_object_robot.translation_mm.x},
+                                {"y_mm", mode.T_object_robot.translation_mm.y},
+                                {"theta_rad", mode.T_object_robot.theta_rad},
+                                {"log_likelihood", mode.log_likelihood}}}};
+  if (step.refined) {
+    json["refined"] = to_json(*step.refined);
+  }
+  json["T_robot_object"] = {T_robot_object.translation_mm.x, T_robot_object.translation_mm.y,
+                            wrap_angle(T_robot_object.theta_rad, 2.0 * std::numbers::pi)};
+  if (step.right) {
+    json["right"] = *step.right;
+    json["error_mm"] = to_json(step.error_mm);
+    if (step.refined) {
+      json["refined_error_mm"] = to_json(step.refined_error_mm);
+    }
+  }
+  if (step.contradicted) {
+    json["contradicted"] = true;
+  }
+  if (step.effective_sample_size) {
+    json["effective_sample_size"] = *step.effective_sample_size;
+  }
+  return json;
 }
 
 nlohmann::ordered_json to_json(const RecognitionRecord& record, const RecognitionTask& task,

@@ -6,6 +6,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "recogniser.hpp"
 #include "recognition_task.hpp"
 
 namespace palpate::cli {
@@ -36,13 +37,16 @@ struct RecognitionRecord {
   const Step& last() const { return trace.back(); }
 };
 
-/// Sums an estimate over the maps of each label and compares it with the truth.
-Step judge(const Estimate& estimate, const std::optional<RefinedPose>& refined,
-           const Unknown& unknown, const RecognitionTask& task);
+/// What is believed now, summed over the maps of each label and compared with the truth, as far as
+/// it is known: a label, "" where not, and a pose.
+Step judge(const Recogniser& recogniser, const std::string& true_label,
+           const std::optional<Truth>& truth, const RecognitionTask& task);
 
 /// The label that the recording is known to show: its truth, or else its object.
 const std::string& true_label(const Recording& recording);
 
+/// One step in the form that other programs rely on.
+nlohmann::ordered_json to_json(const Step& step, const RecognitionTask& task);
 /// The record in the form that other programs rely on.
 nlohmann::ordered_json to_json(const RecognitionRecord& record, const RecognitionTask& task,
                                const std::string& device, bool with_trace);

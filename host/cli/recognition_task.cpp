@@ -41,19 +41,19 @@ std::vector<std::filesystem::path> map_files(const std::filesystem::path& argume
   return files;
 }
 
-std::vector<Scene::Object> objects_of(const RecognizeOptions& options, const Scene& scene) {
-  if (options.maps.empty()) {
+std::vector<Scene::Object> objects_of(const RecognitionFlags& flags, const Scene& scene) {
+  if (flags.maps.empty()) {
     if (scene.objects.empty()) {
       throw Error(Fault::input,
-                  options.scene.empty()
+                  flags.scene.empty()
                       ? "--maps: missing; give the objects' maps, or a --scene with objects"
                       : fmt::format("{}: objects: missing; list the maps there or give --maps",
-                                    options.scene));
+                                    flags.scene));
     }
     return scene.objects;
   }
   std::vector<Scene::Object> objects;
-  for (const std::string& argument : options.maps) {
+  for (const std::string& argument : flags.maps) {
     for (const std::filesystem::path& file : map_files(argument)) {
       objects.push_back({.map = file, .label = {}, .symmetry = {}});
     }
@@ -106,7 +106,7 @@ double common_prior(const RecognitionTask& task, std::optional<double> given) {
   return first;
 }
 
-PoseLattice make_lattice(const RecognizeOptions& options, const Scene& scene) {
+PoseLattice make_lattice(const RecognitionFlags& flags, const Scene& scene) {
   PoseLattice lattice;
   const auto range = [](const char* flag, const std::string& text,
                         const std::optional<std::array<double, 2>>& key, Axis& axis, double unit) {
@@ -116,19 +116,19 @@ PoseLattice make_lattice(const RecognizeOptions& options, const Scene& scene) {
       axis.upper = (*ends)[1] * unit;
     }
   };
-  range("--x-mm", options.x_mm, scene.region.x_mm, lattice.x_mm, 1.0);
-  range("--y-mm", options.y_mm, scene.region.y_mm, lattice.y_mm, 1.0);
-  range("--theta-deg", options.theta_deg, scene.region.theta_deg, lattice.theta_rad, radians(1.0));
-  const auto bins = options.bins.empty()     ? scene.bins
-                    : options.bins == "auto" ? std::nullopt
-                                             : std::optional(parse_bins("--bins", options.bins));
+  range("--x-mm", flags.x_mm, scene.region.x_mm, lattice.x_mm, 1.0);
+  range("--y-mm", flags.y_mm, scene.region.y_mm, lattice.y_mm, 1.0);
+  range("--theta-deg", flags.theta_deg, scene.region.theta_deg, lattice.theta_rad, radians(1.0));
+  const auto bins = flags.bins.empty()     ? scene.bins
+                    : flags.bins == "auto" ? std::nullopt
+                                           : std::optional(parse_bins("--bins", flags.bins));
   if (bins) {
     lattice.x_mm.count = (*bins)[0];
     lattice.y_mm.count = (*bins)[1];
     lattice.theta_rad.count = (*bins)[2];
   }
-  if (!options.pivot_mm.empty()) {
-    lattice.pivot_mm = parse_point("--pivot-mm", options.pivot_mm);
+  if (!flags.pivot_mm.empty()) {
+    lattice.pivot_mm = parse_point("--pivot-mm", flags.pivot_mm);
   } else if (scene.region.pivot_mm) {
     lattice.pivot_mm = *scene.region.pivot_mm;
   }
@@ -151,71 +151,10 @@ void add_none(std::optional<double> weight, RecognitionTask& task) {
   task.labels.emplace_back(none_label);
 }
 
-/// Puts the scene's array in the place of the recordings' own.
-void replace_array(const Scene& scene, const std::string& scene_file,
-                   std::vector<Recording>& recordings) {
-  if (!scene.array_mm) {
-    return;
-  }
-  for (Recording& recording : recordings) {
-    if (recording.elements() != scene.array_mm->size()) {
-      throw Error(
-          Fault::input,
-          fmt::format("{}: pressure: {} elements, but array of {} has {}; use the "
-                      "recording's own array by leaving the key out",
-                      recording.path, recording.elements(), scene_file, scene.array_mm->size()));
-    }
-    recording.elements_mm = *scene.array_mm;
-  }
-}
-
-std::vector<Unknown> list_unknowns(const RecognizeOptions& options,
-                                   const std::vector<Recording>& recordings) {
-  std::optional<Frames> frames;
-  if (!options.frames.empty()) {
-    frames = parse_frames("--frames", options.frames);
-  }
-  if (options.touches && *options.touches < 1) {
-    throw Error(Fault::input, fmt::format("--touches {}: give at least 1", *options.touches));
-  }
-  if (options.touches && options.each_frame) {
-    throw Error(Fault::input,
-                "--touches: with --each-frame every unknown has one touch; leave one of them out");
-  }
-  std::vector<Unknown> unknowns;
-  for (const Recording& recording : recordings) {
-    auto [begin, end] = select(recording, frames);
-    if (options.touches && static_cast<std::size_t>(*options.touches) > end - begin) {
-      throw Error(Fault::input, fmt::format("{}: has {} touches; --touches {} is too many",
-                                            recording.path, end - begin, *options.touches));
-    }
-    if (options.each_frame) {
-      for (std::size_t i = begin; i < end; ++i) {
-        unknowns.push_back({&recording, i, {recording.touch(i)}});
-      }
-    } else {
-      end = options.touches ? begin + static_cast<std::size_t>(*options.touches) : end;
-      unknowns.push_back({&recording, {}, recording.touches(begin, end)});
-    }
-  }
-  return unknowns;
-}
-
-/// Presses one by one of one large array that never moves share most of the work.
-bool array_is_still(const std::vector<Unknown>& unknowns, bool each_frame) {
-  constexpr std::size_t large = 256;
-  const Touch& first = unknowns.front().touches.front();
-  return each_frame && unknowns.size() > 1 && first.elements_mm.size() >= large &&
-         std::all_of(unknowns.begin(), unknowns.end(), [&](const Unknown& unknown) {
-           return same_placement(unknown.touches.front(), first);
-         });
-}
-
 /// Whether the particle filter is asked for. Throws Error on a filter that there is not, and on
 /// flags that the other one would leave without effect.
-bool wants_particles(const RecognizeOptions& options, const Scene& scene) {
-  const std::string filter =
-      !options.filter.empty() ? options.filter : scene.filter.value_or("auto");
+bool wants_particles(const RecognitionFlags& flags, const Scene& scene) {
+  const std::string filter = !flags.filter.empty() ? flags.filter : scene.filter.value_or("auto");
   if (filter == "bounded") {
     throw Error(Fault::input,
                 fmt::format("--filter {}: not in this version yet; use histogram", filter));
@@ -225,15 +164,10 @@ bool wants_particles(const RecognizeOptions& options, const Scene& scene) {
                 fmt::format("--filter {}: not known; use histogram or particles", filter));
   }
   const bool particles = filter == "particles";
-  if (particles && !options.posterior.empty()) {
-    throw Error(Fault::input, fmt::format("--posterior {}: particles have no bins; use --filter "
-                                          "histogram",
-                                          options.posterior));
-  }
-  for (const auto& [flag, given] : {std::pair{"--particles", options.particles.has_value()},
-                                    std::pair{"--resampling", !options.resampling.empty()},
-                                    std::pair{"--augmented", options.augmented},
-                                    std::pair{"--seed", options.seed.has_value()}}) {
+  for (const auto& [flag, given] :
+       {std::pair{"--particles", flags.particles.has_value()},
+        std::pair{"--resampling", !flags.resampling.empty()},
+        std::pair{"--augmented", flags.augmented}, std::pair{"--seed", flags.seed.has_value()}}) {
     if (given && !particles) {
       throw Error(
           Fault::input,
@@ -244,64 +178,76 @@ bool wants_particles(const RecognizeOptions& options, const Scene& scene) {
 }
 
 /// What the histogram's options and the flags say to the particle filter.
-ParticleOptions particle_options(const RecognizeOptions& options,
-                                 const HistogramOptions& histogram) {
+ParticleOptions particle_options(const RecognitionFlags& flags, const HistogramOptions& histogram) {
   ParticleOptions particles{.region = histogram.lattice,
                             .classifier = histogram.classifier,
                             .gamma = histogram.gamma,
                             .prior = histogram.prior,
                             .none_weight = histogram.none_weight,
-                            .augmented = options.augmented};
-  particles.particles = options.particles.value_or(particles.particles);
+                            .augmented = flags.augmented};
+  particles.particles = flags.particles.value_or(particles.particles);
   if (particles.particles < 1 || particles.particles > 1'000'000) {
     throw Error(Fault::input,
                 fmt::format("--particles {}: give 1 to 1,000,000", particles.particles));
   }
-  if (options.resampling == "systematic") {
+  if (flags.resampling == "systematic") {
     particles.resampling = Resampling::systematic;
-  } else if (!options.resampling.empty() && options.resampling != "multinomial") {
+  } else if (!flags.resampling.empty() && flags.resampling != "multinomial") {
     throw Error(Fault::input, fmt::format("--resampling {}: not known; use multinomial or "
                                           "systematic",
-                                          options.resampling));
+                                          flags.resampling));
   }
-  particles.seed = options.seed.value_or(particles.seed);
+  particles.seed = flags.seed.value_or(particles.seed);
   return particles;
 }
 
 }  // namespace
 
-RecognitionTask prepare(const RecognizeOptions& options) {
-  const Scene scene = options.scene.empty() ? Scene{} : read_scene(options.scene);
+Scene scene_of(const RecognitionFlags& flags) {
+  return flags.scene.empty() ? Scene{} : read_scene(flags.scene);
+}
+
+void replace_array(const Scene& scene, const std::string& scene_file, const std::string& source,
+                   std::size_t elements, std::vector<glm::dvec2>& elements_mm) {
+  if (!scene.array_mm) {
+    return;
+  }
+  if (elements != scene.array_mm->size()) {
+    throw Error(Fault::input,
+                fmt::format("{}: pressure: {} elements, but array of {} has {}; use its own array "
+                            "by leaving the key out",
+                            source, elements, scene_file, scene.array_mm->size()));
+  }
+  elements_mm = *scene.array_mm;
+}
+
+RecognitionTask prepare(const RecognitionFlags& flags, const Scene& scene,
+                        const std::string& pressure_unit, const std::string& source) {
   RecognitionTask task;
-  const bool with_particles = wants_particles(options, scene);
-  task.histogram.lattice = make_lattice(options, scene);
-  task.auto_bins = options.bins.empty() ? scene.auto_bins : options.bins == "auto";
-  task.histogram.gamma = options.gamma ? *options.gamma : scene.gamma.value_or(0.1);
+  const bool with_particles = wants_particles(flags, scene);
+  task.histogram.lattice = make_lattice(flags, scene);
+  task.auto_bins = flags.bins.empty() ? scene.auto_bins : flags.bins == "auto";
+  task.histogram.gamma = flags.gamma ? *flags.gamma : scene.gamma.value_or(0.1);
   if (!(task.histogram.gamma >= 0.0 && task.histogram.gamma < 1.0)) {
     throw Error(Fault::input,
                 fmt::format("--gamma {}: must be at least 0 and below 1", task.histogram.gamma));
   }
-  task.recordings = read_touch_recordings(options.recordings);
-  replace_array(scene, options.scene, task.recordings);
   task.histogram.classifier =
-      make_classifier(task.recordings, options.threshold ? options.threshold : scene.threshold,
-                      options.ratio ? options.ratio : scene.ratio);
-  task.unknowns = list_unknowns(options, task.recordings);
-  task.histogram.still_array = array_is_still(task.unknowns, options.each_frame);
-  if (options.memory_mib) {
-    if (*options.memory_mib < 1) {
-      throw Error(Fault::input,
-                  fmt::format("--memory-mib {}: give at least 1", *options.memory_mib));
+      make_classifier(pressure_unit, source, flags.threshold ? flags.threshold : scene.threshold,
+                      flags.ratio ? flags.ratio : scene.ratio);
+  if (flags.memory_mib) {
+    if (*flags.memory_mib < 1) {
+      throw Error(Fault::input, fmt::format("--memory-mib {}: give at least 1", *flags.memory_mib));
     }
-    task.histogram.memory_limit_bytes = static_cast<std::uint64_t>(*options.memory_mib) << 20;
+    task.histogram.memory_limit_bytes = static_cast<std::uint64_t>(*flags.memory_mib) << 20;
   }
-  load_maps(objects_of(options, scene), task);
-  add_none(options.none ? options.none : scene.none, task);
-  task.histogram.prior = common_prior(task, options.prior ? options.prior : scene.prior);
+  load_maps(objects_of(flags, scene), task);
+  add_none(flags.none ? flags.none : scene.none, task);
+  task.histogram.prior = common_prior(task, flags.prior ? flags.prior : scene.prior);
   if (with_particles) {
-    task.particles = particle_options(options, task.histogram);
+    task.particles = particle_options(flags, task.histogram);
   }
-  task.device = options.device.empty() ? scene.device.value_or("") : options.device;
+  task.device = flags.device.empty() ? scene.device.value_or("") : flags.device;
   return task;
 }
 

@@ -5,17 +5,17 @@
 #include <string>
 #include <vector>
 
+#include <CLI/CLI.hpp>
+
 #include "options.hpp"
 #include "palpate/particle_filter.hpp"
 #include "palpate/pose_histogram.hpp"
 #include "palpate/scene.hpp"
-#include "palpate/touch.hpp"
 
 namespace palpate::cli {
 
-/// The flags of `recognize`, as given.
-struct RecognizeOptions {
-  std::vector<std::string> recordings;
+/// The flags that say what is known and how it is recognised, as given.
+struct RecognitionFlags {
   std::vector<std::string> maps;
   std::string scene;
   std::string bins;
@@ -28,28 +28,16 @@ struct RecognizeOptions {
   std::optional<double> none;
   std::optional<double> threshold;
   std::optional<double> ratio;
-  std::string frames;
-  std::optional<int> touches;
-  bool each_frame = false;
   std::optional<int> memory_mib;
   std::string filter;
   std::optional<int> particles;
   std::string resampling;
   bool augmented = false;
   std::optional<std::uint64_t> seed;
-  bool trace = false;
-  std::string json;
-  std::string posterior;
-  std::string png;
   std::string device;
 };
 
-/// One unknown object: some touches of one recording, in order.
-struct Unknown {
-  const Recording* recording = nullptr;
-  std::optional<std::size_t> frame;  ///< index in the file, with --each-frame
-  std::vector<Touch> touches;
-};
+void add_recognition_flags(CLI::App& command, RecognitionFlags& flags);
 
 /// The label of "none of these", an object that was never learned.
 inline constexpr const char* none_label = "(none)";
@@ -64,11 +52,19 @@ struct RecognitionTask {
   std::optional<ParticleOptions> particles;  ///< where the particle filter was asked for
   bool auto_bins = false;                    ///< the lattice's counts are still to be chosen
   std::string device;
-  std::vector<Recording> recordings;
-  std::vector<Unknown> unknowns;
 };
 
-/// Reads and checks everything that the flags name. Throws Error.
-RecognitionTask prepare(const RecognizeOptions& options);
+/// The scene file that the flags name, or an empty scene. Throws Error.
+Scene scene_of(const RecognitionFlags& flags);
+
+/// Puts the scene's array, where it has one, in the place of the source's own. Throws Error where
+/// it has not as many elements.
+void replace_array(const Scene& scene, const std::string& scene_file, const std::string& source,
+                   std::size_t elements, std::vector<glm::dvec2>& elements_mm);
+
+/// Reads and checks everything that the flags name, for pressures of this unit. `source` is where
+/// they come from, for messages. Throws Error.
+RecognitionTask prepare(const RecognitionFlags& flags, const Scene& scene,
+                        const std::string& pressure_unit, const std::string& source);
 
 }  // namespace palpate::cli

@@ -10,17 +10,26 @@
 #include <fmt/format.h>
 
 #include "figures.hpp"
-#include "palpate/balanced_lattice.hpp"
 #include "palpate/error.hpp"
 #include "palpate/files.hpp"
 #include "progress.hpp"
 #include "recogniser.hpp"
 #include "recognition_record.hpp"
 #include "recognition_task.hpp"
+#include "unknowns.hpp"
 
 namespace palpate::cli {
 
 namespace {
+
+struct Options {
+  UnknownsFlags unknowns;
+  RecognitionFlags recognition;
+  bool trace = false;
+  std::string json;
+  std::string posterior;
+  std::string png;
+};
 
 std::string png_name(const Unknown& unknown) {
   const std::string stem = std::filesystem::path(unknown.recording->path).stem().string();
@@ -28,12 +37,18 @@ std::string png_name(const Unknown& unknown) {
 }
 
 /// Throws Error where a result could not be kept: before the work, not after.
-void check_outputs(const RecognizeOptions& options, const RecognitionTask& task) {
+void check_outputs(const Options& options, const RecognitionTask& task,
+                   const std::vector<Unknown>& unknowns) {
   if (!options.posterior.empty()) {
-    if (task.unknowns.size() != 1) {
+    if (task.particles) {
+      throw Error(Fault::input, fmt::format("--posterior {}: particles have no bins; use --filter "
+                                            "histogram",
+                                            options.posterior));
+    }
+    if (unknowns.size() != 1) {
       throw Error(Fault::input, fmt::format("--posterior {}: holds one unknown, not {}; select one "
                                             "recording or frame",
-                                            options.posterior, task.unknowns.size()));
+                                            options.posterior, unknowns.size()));
     }
   }
   std::vector<std::pair<std::string, std::filesystem::path>> outputs;
@@ -43,10 +58,11 @@ void check_outputs(const RecognizeOptions& options, const RecognitionTask& task)
   if (!options.json.empty() && options.json != "-") {
     outputs.emplace_back("--json", options.json);
   }
-  std::vector<std::filesystem::path> inputs(options.recordings.begin(), options.recordings.end());
+  std::vector<std::filesystem::path> inputs(options.unknowns.recordings.begin(),
+                                            options.unknowns.recordings.end());
   inputs.insert(inputs.end(), task.map_paths.begin(), task.map_paths.end());
-  if (!options.scene.empty()) {
-    inputs.emplace_back(options.scene);
+  if (!options.recognition.scene.empty()) {
+    inputs.emplace_back(options.recognition.scene);
   }
   require_distinct(outputs, inputs);
   for (const auto& output : outputs) {
@@ -54,7 +70,7 @@ void check_outputs(const RecognizeOptions& options, const RecognitionTask& task)
   }
   if (!options.png.empty()) {
     std::set<std::string> names;
-    for (const Unknown& unknown : task.unknowns) {
+    for (const Unknown& unknown : unknowns) {
       if (!names.insert(png_name(unknown)).second) {
         throw Error(Fault::input,
                     fmt::format("{}: another recording has the same name, and so would its "
@@ -74,9 +90,7 @@ RecognitionRecord recognize_one(const Unknown& unknown, const RecognitionTask& t
                            .true_label = true_label(*unknown.recording),
                            .trace = {}};
   const auto look = [&] {
-    const Estimate estimate = recogniser.estimate();
-    record.trace.push_back(judge(estimate, recogniser.refine(estimate.mode), unknown, task));
-    record.trace.back().effective_sample_size = recogniser.effective_sample_size();
+    record.trace.push_back(judge(recogniser, record.true_label, unknown.recording->truth, task));
   };
   const auto start = std::chrono::steady_clock::now();
   recogniser.reset();
@@ -146,30 +160,15 @@ Posterior export_posterior(const RecognitionTask& task, const PoseHistogram& his
   return posterior;
 }
 
-/// Counts for --bins auto: what the maps are worth and the device holds.
-PoseLattice choose_bins(const RecognitionTask& task, const Device& device) {
-  const HistogramOptions& histogram = task.histogram;
-  const std::int64_t most = most_bins_on(device, histogram.still_array);
-  const BalancedLattice chosen = balanced_lattice(histogram.lattice, task.hypotheses, most);
-  if (chosen.bounded) {
-    fmt::print(stderr,
-               "palpate: --bins auto: steps of {:.2f} mm, coarser than the maps are worth, to keep "
-               "to {} bins in all; narrow the region, or give --bins\n",
-               chosen.step_mm, most);
-  }
-  return chosen.lattice;
-}
-
-void recognize(const RecognizeOptions& options) {
-  RecognitionTask task = prepare(options);
-  check_outputs(options, task);
+void recognize(const Options& options) {
+  const Scene scene = scene_of(options.recognition);
+  const Unknowns unknowns = read_unknowns(options.unknowns, scene, options.recognition.scene);
+  const Recording& first = unknowns.recordings.front();
+  RecognitionTask task = prepare(options.recognition, scene, first.pressure_unit, first.path);
+  task.histogram.still_array = unknowns.still_array;
+  check_outputs(options, task, unknowns.list);
   Device device = Device::open(task.device);
-  if (task.auto_bins) {
-    task.histogram.lattice = choose_bins(task, device);
-    if (task.particles) {  // of which pictures count how many lie in each bin
-      task.particles->region = task.histogram.lattice;
-    }
-  }
+  settle_bins(device, task);
   const std::unique_ptr<Recogniser> recogniser = make_recogniser(device, task);
   if (!options.png.empty()) {
     make_folder(options.png);
@@ -181,10 +180,10 @@ void recognize(const RecognizeOptions& options) {
   auto json = nlohmann::ordered_json::array();
   {
     Progress progress("recognising");
-    for (const Unknown& unknown : task.unknowns) {
+    for (const Unknown& unknown : unknowns.list) {
       const auto show = [&](double fraction) {
         progress.show((static_cast<double>(records.size()) + fraction) /
-                      static_cast<double>(task.unknowns.size()));
+                      static_cast<double>(unknowns.list.size()));
       };
       records.push_back(recognize_one(unknown, task, trace, *recogniser, show));
       show(0.0);
@@ -227,68 +226,25 @@ void add_recognize(CLI::App& app) {
                                      "Recognise and locate the object of each recording among "
                                      "known maps. Poses are T_object_robot, "
                                      "p_object = R(theta) p_robot + (x, y)");
-  const auto options = std::make_shared<RecognizeOptions>();
-  command->add_option("RECORDING", options->recordings, "Recordings of unknown objects (HDF5)")
-      ->required();
-  command->add_option("--maps", options->maps, "Maps of the known objects, or folders of maps");
-  command->add_option("--scene", options->scene,
-                      "Scene file (YAML) with any of: array, threshold, ratio, gamma, prior, "
-                      "none, objects, region, bins, filter, device; a flag overrides its key");
-  command->add_option("--bins", options->bins,
-                      "Pose bins per object along x, y and theta [default: 25x25x16]; auto: as "
-                      "many as the maps' cells are worth and the device holds");
-  command->add_option("--x-mm", options->x_mm,
-                      "Range of x, mm, as --x-mm=-10:10 [default: -10:10]");
-  command->add_option("--y-mm", options->y_mm,
-                      "Range of y, mm, as --y-mm=-10:10 [default: -10:10]");
-  command->add_option("--theta-deg", options->theta_deg,
-                      "Range of theta, degrees [default: 0:360]; a fixed angle, 30:30, is one bin");
-  command->add_option("--pivot-mm", options->pivot_mm,
-                      "Point X,Y in the robot frame, mm, that theta turns about and whose place in "
-                      "the object frame x and y are [default: 0,0]");
-  command->add_option("--prior", options->prior,
-                      "Probability that an unseen cell is occupied [default: the maps' own]");
-  command->add_option("--gamma", options->gamma,
-                      "Rate at which a contact reading is random [default: 0.1]");
-  command->add_option("--none", options->none,
-                      "Prior weight of \"(none)\", an object that was never learned, where each "
-                      "map's is 1 or its scene's: with 5 maps, 5 makes it as likely as not; its "
-                      "likelihood is that of a map of nothing but the prior [default: left out]");
-  command->add_option(
-      "--threshold", options->threshold,
-      "Contact threshold, in the recording's pressure unit [default: 2 kPa; must be "
-      "given for raw pressure]");
-  command->add_option("--ratio", options->ratio,
-                      "Contact threshold as a part of the touch's largest pressure [default: 0.3]");
-  command->add_option("--frames", options->frames,
-                      "Use the touches A:B, from A up to before B, of every recording");
-  command->add_option("--touches", options->touches, "Use the first N touches [default: all]")
-      ->check(require_whole_number);
-  command->add_flag("--each-frame", options->each_frame,
-                    "Take every touch for an unknown object of its own");
-  command->add_option("--filter", options->filter,
-                      "auto, histogram or particles; auto is histogram [default: auto]");
+  const auto options = std::make_shared<Options>();
   command
-      ->add_option("--particles", options->particles,
-                   "Particles over all objects together, up to 1,000,000 [default: 10000]")
+      ->add_option("RECORDING", options->unknowns.recordings,
+                   "Recordings of unknown objects (HDF5)")
+      ->required();
+  add_recognition_flags(*command, options->recognition);
+  command->add_option("--frames", options->unknowns.frames,
+                      "Use the touches A:B, from A up to before B, of every recording");
+  command
+      ->add_option("--touches", options->unknowns.touches, "Use the first N touches [default: all]")
       ->check(require_whole_number);
-  command->add_option("--resampling", options->resampling,
-                      "multinomial or systematic [default: multinomial]");
-  command->add_flag("--augmented", options->augmented,
-                    "Augmented MCL: add random particles where the touches fit worse than before");
-  command->add_option("--seed", options->seed, "Seed of the particles' random numbers [default: 0]")
-      ->check(require_whole_number);
+  command->add_flag("--each-frame", options->unknowns.each_frame,
+                    "Take every touch for an unknown object of its own");
   command->add_flag("--trace", options->trace, "Show the estimate after every touch");
   command->add_option("--json", options->json, "Write the records as JSON; - is standard output");
   command->add_option("--posterior", options->posterior,
                       "Write the log-likelihood of every bin of one recording (HDF5)");
   command->add_option("--png", options->png,
                       "Folder for a sheet per unknown: footprints, belief, identities");
-  command
-      ->add_option("--memory-mib", options->memory_mib,
-                   "Most memory of the device to take, MiB [default: all of it]; less costs time")
-      ->check(require_whole_number);
-  command->add_option("--device", options->device, "Vulkan device, by index or a part of its name");
   command->callback([options] { recognize(*options); });
 }
 

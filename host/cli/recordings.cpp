@@ -48,15 +48,15 @@ Frames select(const Recording& recording, const std::optional<Frames>& frames) {
   return *frames;
 }
 
-ContactClassifier make_classifier(std::span<const Recording> recordings,
+ContactClassifier make_classifier(const std::string& pressure_unit, const std::string& source,
                                   std::optional<double> threshold, std::optional<double> ratio) {
   ContactClassifier classifier;
   if (threshold) {
     classifier.threshold = require_above("--threshold", *threshold, 0.0, true);
-  } else if (recordings.front().pressure_unit == "raw") {
-    throw Error(Fault::input,
-                fmt::format("{}: pressure_unit = raw has no default threshold; give --threshold",
-                            recordings.front().path));
+  } else if (pressure_unit == "raw") {
+    throw Error(
+        Fault::input,
+        fmt::format("{}: pressure_unit = raw has no default threshold; give --threshold", source));
   }
   if (ratio) {
     if (!(*ratio >= 0.0 && *ratio < 1.0)) {

@@ -2,7 +2,6 @@
 
 #include <filesystem>
 #include <optional>
-#include <span>
 #include <string>
 #include <vector>
 
@@ -19,8 +18,9 @@ std::vector<Recording> read_touch_recordings(const std::vector<std::string>& pat
 /// The selected touches of a recording, or all. Throws Error where it has fewer.
 Frames select(const Recording& recording, const std::optional<Frames>& frames);
 
-/// The classifier of Eq. 3 for these recordings: raw pressure has no default threshold.
-ContactClassifier make_classifier(std::span<const Recording> recordings,
+/// The classifier of Eq. 3 for pressures of this unit: raw ones have no default threshold. `source`
+/// is named where it is missing.
+ContactClassifier make_classifier(const std::string& pressure_unit, const std::string& source,
                                   std::optional<double> threshold, std::optional<double> ratio);
 
 }  // namespace palpate::cli

@@ -1,6 +1,8 @@
 #include "program.hpp"
 
 #include <fcntl.h>
+#include <pty.h>
+#include <sys/ioctl.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -72,6 +74,80 @@ Outcome run_program(const std::filesystem::path& folder, const std::vector<std::
   return {.status = WIFEXITED(status) ? WEXITSTATUS(status) : -WTERMSIG(status),
           .out = bytes_of(out),
           .err = bytes_of(err)};
+}
+
+ProgramOnTerminal::ProgramOnTerminal(const std::filesystem::path& folder,
+                                     const std::vector<std::string>& arguments,
+                                     const std::map<std::string, std::string>& environment,
+                                     int columns, int rows) {
+  winsize window{};
+  window.ws_col = static_cast<unsigned short>(columns);
+  window.ws_row = static_cast<unsigned short>(rows);
+  pid_ = ::forkpty(&terminal_, nullptr, nullptr, &window);
+  if (pid_ == 0) {
+    if (::chdir(folder.c_str()) != 0) {
+      ::_exit(126);
+    }
+    for (const auto& [name, value] : environment) {
+      ::setenv(name.c_str(), value.c_str(), 1);
+    }
+    become_program(arguments);
+  }
+}
+
+ProgramOnTerminal::~ProgramOnTerminal() {
+  if (pid_ > 0) {
+    ::kill(pid_, SIGKILL);
+    ::waitpid(pid_, nullptr, 0);
+  }
+  if (terminal_ >= 0) {
+    ::close(terminal_);
+  }
+}
+
+bool ProgramOnTerminal::read_more() {
+  char piece[4096];
+  // The terminal ends with an error, not with an end of file, when the program is gone.
+  const ssize_t got = ::read(terminal_, piece, sizeof piece);
+  if (got > 0) {
+    text_.append(piece, static_cast<std::size_t>(got));
+  }
+  return got > 0;
+}
+
+bool ProgramOnTerminal::shows(const std::string& text) {
+  for (;;) {
+    const std::size_t found = text_.find(text, seen_);
+    if (found != text_.npos) {
+      seen_ = found + text.size();
+      return true;
+    }
+    if (!read_more()) {
+      return false;
+    }
+  }
+}
+
+void ProgramOnTerminal::type(const std::string& keys) const {
+  EXPECT_EQ(::write(terminal_, keys.data(), keys.size()), static_cast<ssize_t>(keys.size()));
+}
+
+void ProgramOnTerminal::resize(int columns, int rows) const {
+  winsize window{};
+  window.ws_col = static_cast<unsigned short>(columns);
+  window.ws_row = static_cast<unsigned short>(rows);
+  EXPECT_EQ(::ioctl(terminal_, TIOCSWINSZ, &window), 0);
+}
+
+Outcome ProgramOnTerminal::finish() {
+  while (read_more()) {
+  }
+  int status = 0;
+  ::waitpid(pid_, &status, 0);
+  pid_ = -1;
+  return {.status = WIFEXITED(status) ? WEXITSTATUS(status) : -WTERMSIG(status),
+          .out = text_,
+          .err = {}};
 }
 
 std::map<std::string, std::string> content_of(const std::filesystem::path& folder) {

@@ -32,6 +32,33 @@ struct Surroundings {
 Outcome run_program(const std::filesystem::path& folder, const std::vector<std::string>& arguments,
                     const Surroundings& surroundings = {});
 
+/// The palpate program on a terminal of its own.
+class ProgramOnTerminal {
+ public:
+  /// `environment` is set on top of the test's own.
+  ProgramOnTerminal(const std::filesystem::path& folder, const std::vector<std::string>& arguments,
+                    const std::map<std::string, std::string>& environment = {}, int columns = 80,
+                    int rows = 24);
+  ~ProgramOnTerminal();
+  ProgramOnTerminal(const ProgramOnTerminal&) = delete;
+  ProgramOnTerminal& operator=(const ProgramOnTerminal&) = delete;
+
+  /// Waits until the program has shown this since the last call; false if it ends before.
+  bool shows(const std::string& text);
+  void type(const std::string& keys) const;
+  void resize(int columns, int rows) const;
+  /// Waits for the end of the program: its status, and all that it has shown.
+  Outcome finish();
+
+ private:
+  bool read_more();
+
+  int terminal_ = -1;
+  pid_t pid_ = -1;
+  std::string text_;
+  std::size_t seen_ = 0;  ///< of text_, by shows()
+};
+
 /// In a forked child: becomes the palpate program.
 [[noreturn]] void become_program(const std::vector<std::string>& arguments);
 

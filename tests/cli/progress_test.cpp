@@ -1,7 +1,3 @@
-#include <pty.h>
-#include <sys/wait.h>
-#include <unistd.h>
-
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -29,25 +25,9 @@ class ProgressLine : public ProgramTest {
 
   /// What the program shows on a terminal.
   std::string shown(const std::vector<std::string>& arguments) const {
-    int terminal = -1;
-    const pid_t pid = ::forkpty(&terminal, nullptr, nullptr, nullptr);
-    if (pid == 0) {
-      if (::chdir(folder_.path().c_str()) != 0) {
-        ::_exit(126);
-      }
-      become_program(arguments);
-    }
-    std::string text;
-    char piece[4096];
-    // The terminal ends with an error, not with an end of file, when the program is gone.
-    for (ssize_t got = 0; (got = ::read(terminal, piece, sizeof piece)) > 0;) {
-      text.append(piece, static_cast<std::size_t>(got));
-    }
-    ::close(terminal);
-    int status = 0;
-    ::waitpid(pid, &status, 0);
-    EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 0) << text;
-    return text;
+    const Outcome outcome = ProgramOnTerminal(folder_.path(), arguments).finish();
+    EXPECT_EQ(outcome.status, 0) << outcome.out;
+    return outcome.out;
   }
 };
 

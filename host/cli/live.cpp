@@ -1,0 +1,201 @@
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <csignal>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include <fmt/format.h>
+
+#include "commands.hpp"
+#include "detector_flags.hpp"
+#include "interruption.hpp"
+#include "live_recognition.hpp"
+#include "live_record.hpp"
+#include "live_screen.hpp"
+#include "options.hpp"
+#include "palpate/error.hpp"
+#include "palpate/pose_track.hpp"
+#include "palpate/virtual_sensor.hpp"
+#include "recogniser.hpp"
+#include "sensor_option.hpp"
+
+namespace palpate::cli {
+
+namespace {
+
+using namespace std::chrono_literals;
+
+struct Options {
+  std::string sensor;
+  std::string poses;
+  RecognitionFlags recognition;
+  DetectorFlags detector;
+  double tare_s = 0.5;
+  std::optional<double> reset_after_s;
+  std::string json;
+};
+
+/// The sensor with its poses. `posed` is left as it is where they are the sensor's own.
+std::unique_ptr<Sensor> open_posed_sensor(const Options& options, const PosedSensor*& posed) {
+  if (options.poses.empty() && !is_virtual_sensor(options.sensor)) {
+    throw Error(Fault::input,
+                fmt::format("--poses: missing; sensor {} does not know where it is: give a file, a "
+                            "FIFO or - with the robot's poses",
+                            options.sensor));
+  }
+  std::unique_ptr<Sensor> sensor = open_sensor(options.sensor);
+  if (options.poses.empty()) {
+    return sensor;
+  }
+  auto with_poses = std::make_unique<PosedSensor>(std::move(sensor), options.poses);
+  posed = with_poses.get();
+  return with_poses;
+}
+
+/// Throws Error where --json would overwrite what is read. A path in the sensor's name may be
+/// followed by options, and may hold commas itself.
+void check_output(const Options& options, const RecognitionTask& task) {
+  if (options.json.empty() || options.json == "-") {
+    return;
+  }
+  std::vector<std::filesystem::path> inputs(task.map_paths.begin(), task.map_paths.end());
+  std::string replayed = options.sensor.substr(options.sensor.find(':') + 1);
+  while (!replayed.empty()) {
+    inputs.emplace_back(replayed);
+    const std::size_t comma = replayed.rfind(',');
+    replayed.resize(comma == replayed.npos ? 0 : comma);
+  }
+  for (const std::string& file : {options.poses, options.recognition.scene}) {
+    if (!file.empty() && file != "-") {
+      inputs.emplace_back(file);
+    }
+  }
+  require_distinct({{"--json", options.json}}, inputs);
+}
+
+/// A first touch compiles kernels and pages memory in; a real one should not have to wait for that.
+void warm_up(Recogniser& recogniser, const RecognitionTask& task, const SensorDescription& sensor,
+             const std::vector<glm::dvec2>& elements_mm) {
+  // In Contact and No Contact by turns: what is Unknown would be passed over.
+  std::vector<double> pressure(elements_mm.size(), 0.0);
+  for (std::size_t i = 0; i < pressure.size(); i += 2) {
+    pressure[i] = 2.0 * task.histogram.classifier.threshold + 1.0;
+  }
+  const Touch touch{.T_robot_sensor = {},
+                    .elements_mm = elements_mm,
+                    .pressure = pressure,
+                    .valid = sensor.valid};
+  recogniser.update(std::span(&touch, 1), [](double) {});
+  recogniser.refine(recogniser.estimate().mode);
+  recogniser.reset();
+}
+
+void live(const Options& options) {
+  if (options.reset_after_s) {
+    require_above("--reset-after", *options.reset_after_s, 0.0);
+  }
+  require_above("--tare", options.tare_s, 0.0, true);
+  const Scene scene = scene_of(options.recognition);
+  const PosedSensor* posed = nullptr;
+  const std::unique_ptr<Sensor> sensor = open_posed_sensor(options, posed);
+  const SensorDescription& description = sensor->description();
+  std::vector<glm::dvec2> elements_mm = description.elements_mm;
+  const std::string source = "sensor " + options.sensor;
+  replace_array(scene, options.recognition.scene, source, elements_mm.size(), elements_mm);
+  const TouchDetectorOptions detector =
+      detector_options(options.detector, description.pressure_unit, source);
+  RecognitionTask task = prepare(options.recognition, scene, description.pressure_unit, source);
+  check_output(options, task);
+  Device device = Device::open(task.device);
+  settle_bins(device, task);
+  const std::unique_ptr<Recogniser> recogniser = make_recogniser(device, task);
+  warm_up(*recogniser, task, description, elements_mm);
+  std::optional<LineFile> json;
+  if (!options.json.empty()) {
+    json.emplace(options.json);
+  }
+
+  // A reader of our output that ends is an error like a full disk, and no end without a word.
+  std::signal(SIGPIPE, SIG_IGN);
+  const Interruption interruption;
+  const bool to_program = options.json == "-";
+  std::FILE* const people = to_program ? stderr : stdout;
+  const bool on_terminal =
+      isatty(fileno(people)) != 0 && !(to_program && isatty(STDOUT_FILENO) != 0);
+  if (!to_program && !on_terminal) {
+    fmt::print("{}: {} maps, {}\n{}\n", device.name(), task.hypotheses.size(),
+               recogniser->description(), table_heading());
+    std::fflush(stdout);
+  }
+  LiveRecognition recognition(
+      *sensor, elements_mm, *recogniser, task,
+      {.detector = detector, .tare_s = options.tare_s, .reset_after_s = options.reset_after_s},
+      [&](const LiveTouch& touch) {
+        if (json) {
+          json->add(json_line(touch, task));
+        }
+        if (!to_program && !on_terminal) {
+          fmt::print("{}\n", table_line(touch, task));
+          std::fflush(stdout);
+        }
+      });
+  {
+    std::optional<LiveScreen> screen;
+    if (on_terminal) {
+      screen.emplace(people, description, elements_mm, task);
+    }
+    while (!recognition.wait_for_end(50ms) && !interruption.requested()) {
+      if (screen && screen->update(recognition.state())) {
+        recognition.reset();
+      }
+    }
+    recognition.finish();
+  }
+
+  const LiveState state = recognition.state();
+  if (state.all_touches == 0 && state.without_pose > 0 && !interruption.requested()) {
+    throw Error(Fault::input, fmt::format("{}: none of its {} touches has a pose; give --poses",
+                                          source, state.without_pose));
+  }
+  fmt::print(people, "{}", summary(state, recognition.latencies_ms(), task));
+  if (posed != nullptr && posed->poses().refused > 0) {
+    fmt::print(stderr, "palpate: {} lines were no poses; the first: {}\n", posed->poses().refused,
+               posed->poses().first_refused);
+  }
+}
+
+}  // namespace
+
+void add_live(CLI::App& app) {
+  auto* command = app.add_subcommand("live",
+                                     "Recognise and locate what a sensor touches, touch by touch, "
+                                     "until Ctrl-C. On a terminal: the "
+                                     "pressure, the identity, the object's map with the array on "
+                                     "it; key r begins the next unknown. "
+                                     "Poses are T_object_robot");
+  const auto options = std::make_shared<Options>();
+  command->add_option("--sensor", options->sensor, sensor_help)->required();
+  command->add_option("--poses", options->poses,
+                      "File, FIFO or - (standard input) with the sensor's poses, a line each: "
+                      "{\"time\": s since 1970, \"x_mm\": mm, \"y_mm\": mm, \"theta_rad\": rad} "
+                      "[default: the frames' own, in replays and simulations]");
+  add_recognition_flags(*command, options->recognition);
+  add_detector_flags(*command, options->detector);
+  command
+      ->add_option("--tare", options->tare_s,
+                   "The array's baseline is read from the first seconds, when nothing touches it, "
+                   "unless the sensor knows it; 0: none")
+      ->capture_default_str();
+  command->add_option("--reset-after", options->reset_after_s,
+                      "The first touch after so many seconds without contact is of another unknown "
+                      "[default: never]");
+  command->add_option("--json", options->json,
+                      "Write a line of JSON for each touch, at once; - is standard output");
+  command->callback([options] { live(*options); });
+}
+
+}  // namespace palpate::cli

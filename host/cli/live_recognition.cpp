@@ -1,0 +1,257 @@
+#include "live_recognition.hpp"
+
+#include <algorithm>
+#include <csignal>
+#include <utility>
+
+#include "palpate/baseline.hpp"
+
+namespace palpate::cli {
+
+namespace {
+
+using namespace std::chrono_literals;
+
+/// Signals are for the thread that can end the others: a thread that is started meanwhile leaves
+/// them all to it.
+class SignalsElsewhere {
+ public:
+  SignalsElsewhere() {
+    sigset_t all;
+    ::sigfillset(&all);
+    ::pthread_sigmask(SIG_SETMASK, &all, &before_);
+  }
+  ~SignalsElsewhere() { ::pthread_sigmask(SIG_SETMASK, &before_, nullptr); }
+  SignalsElsewhere(const SignalsElsewhere&) = delete;
+  SignalsElsewhere& operator=(const SignalsElsewhere&) = delete;
+
+ private:
+  sigset_t before_;
+};
+
+}  // namespace
+
+LiveRecognition::LiveRecognition(Sensor& sensor, std::vector<glm::dvec2> elements_mm,
+                                 Recogniser& recogniser, const RecognitionTask& task,
+                                 const LiveOptions& options,
+                                 std::function<void(const LiveTouch&)> on_touch)
+    : sensor_(sensor),
+      description_(sensor.description()),
+      elements_mm_(std::move(elements_mm)),
+      recogniser_(recogniser),
+      task_(task),
+      options_(options),
+      on_touch_(std::move(on_touch)) {
+  const SignalsElsewhere block;
+  reader_ = std::thread([this] { guard(&LiveRecognition::read); });
+  believer_ = std::thread([this] { guard(&LiveRecognition::believe); });
+}
+
+LiveRecognition::~LiveRecognition() {
+  {
+    const std::lock_guard lock(mutex_);
+    jobs_.clear();
+  }
+  try {
+    finish();
+  } catch (...) {
+    // Whoever wanted to know has called finish() before.
+  }
+}
+
+void LiveRecognition::guard(void (LiveRecognition::*work)()) {
+  try {
+    (this->*work)();
+  } catch (...) {
+    const std::lock_guard lock(mutex_);
+    failure_ = failure_ ? failure_ : std::current_exception();
+    stop_ = true;
+    all_read_ = true;
+    jobs_.clear();
+  }
+  changed_.notify_all();
+}
+
+LiveState LiveRecognition::state() const {
+  const std::lock_guard lock(mutex_);
+  return state_;
+}
+
+std::vector<double> LiveRecognition::latencies_ms() const {
+  const std::lock_guard lock(mutex_);
+  return latencies_ms_;
+}
+
+bool LiveRecognition::wait_for_end(std::chrono::milliseconds timeout) {
+  std::unique_lock lock(mutex_);
+  return changed_.wait_for(lock, timeout, [&] { return ended_ || failure_; });
+}
+
+void LiveRecognition::reset() { push({}); }
+
+void LiveRecognition::push(Job job) {
+  {
+    const std::lock_guard lock(mutex_);
+    jobs_.push_back(std::move(job));
+  }
+  changed_.notify_all();
+}
+
+void LiveRecognition::finish() {
+  {
+    const std::lock_guard lock(mutex_);
+    stop_ = true;
+  }
+  changed_.notify_all();
+  for (std::thread* thread : {&reader_, &believer_}) {
+    if (thread->joinable()) {
+      thread->join();
+    }
+  }
+  if (failure_) {
+    std::rethrow_exception(std::exchange(failure_, nullptr));
+  }
+}
+
+void LiveRecognition::read() {
+  sensor_.start();
+  if (std::optional<TouchDetector> detector = tare()) {
+    const auto reading = [&] {
+      const std::lock_guard lock(mutex_);
+      state_.gone = sensor_.gone();
+      return !stop_;
+    };
+    while (reading() && !sensor_.ended()) {
+      if (const std::optional<Frame> frame = sensor_.next(20ms)) {
+        take(*detector, *frame);
+      }
+    }
+    taken_ = Clock::now();
+    hand_on(detector->finish());
+  }
+  sensor_.stop();
+  const std::lock_guard lock(mutex_);
+  state_.touching = false;
+  all_read_ = true;
+}
+
+/// Reads what the array feels untouched, unless the sensor knows; none where that was interrupted.
+std::optional<TouchDetector> LiveRecognition::tare() {
+  std::vector<double> baseline = description_.baseline;
+  std::vector<Frame> frames;
+  if (baseline.empty() && options_.tare_s > 0.0) {
+    const auto enough = [&] {
+      const std::lock_guard lock(mutex_);
+      state_.taring = !stop_;
+      state_.gone = sensor_.gone();
+      return stop_ || sensor_.ended() ||
+             (!frames.empty() &&
+              frames.back().host_time_s - frames.front().host_time_s >= options_.tare_s);
+    };
+    while (!enough()) {
+      if (std::optional<Frame> frame = sensor_.next(20ms)) {
+        frames.push_back(std::move(*frame));
+      }
+    }
+    {
+      const std::lock_guard lock(mutex_);
+      state_.taring = false;
+      state_.counters = sensor_.counters();
+      if (stop_) {
+        return {};
+      }
+    }
+    baseline = baseline_of(frames, description_, options_.detector.onset);
+  }
+  return TouchDetector(options_.detector, std::move(baseline), description_.valid);
+}
+
+void LiveRecognition::take(TouchDetector& detector, const Frame& frame) {
+  taken_ = Clock::now();
+  const std::optional<DetectedTouch> touch = detector.add(frame);
+  const bool touching = detector.touching();
+  const std::vector<double>& baseline = detector.baseline();
+  {
+    const std::lock_guard lock(mutex_);
+    state_.pressure.resize(frame.values.size());
+    for (std::size_t i = 0; i < frame.values.size(); ++i) {
+      state_.pressure[i] = frame.values[i] - (baseline.empty() ? 0.0 : baseline[i]);
+    }
+    state_.T_robot_sensor = frame.T_robot_sensor;
+    state_.touching = touching;
+    state_.counters = sensor_.counters();
+  }
+  hand_on(touch);
+  if (touching) {
+    if (!was_touching_ && options_.reset_after_s && last_contact_s_ &&
+        frame.host_time_s - *last_contact_s_ > *options_.reset_after_s) {
+      reset();
+    }
+    last_contact_s_ = frame.host_time_s;
+  }
+  was_touching_ = touching;
+}
+
+void LiveRecognition::hand_on(const std::optional<DetectedTouch>& touch) {
+  if (!touch) {
+    return;
+  }
+  if (!touch->T_robot_sensor) {
+    const std::lock_guard lock(mutex_);
+    ++state_.without_pose;
+    return;
+  }
+  push({.touch = touch, .taken = taken_, .frames_lost = sensor_.counters().lost});
+}
+
+void LiveRecognition::believe() {
+  std::unique_lock lock(mutex_);
+  for (;;) {
+    changed_.wait(lock, [&] { return !jobs_.empty() || all_read_; });
+    if (jobs_.empty()) {
+      break;
+    }
+    const Job job = std::move(jobs_.front());
+    jobs_.pop_front();
+    lock.unlock();
+    use(job);
+    lock.lock();
+  }
+  ended_ = true;
+}
+
+void LiveRecognition::use(const Job& job) {
+  if (!job.touch) {
+    recogniser_.reset();
+    const std::lock_guard lock(mutex_);
+    if (state_.touches > 0) {  // one that was never touched is the same still
+      ++state_.unknown;
+      state_.touches = 0;
+      state_.last.reset();
+    }
+    return;
+  }
+  const SensorDescription& sensor = description_;
+  const Touch touch{.T_robot_sensor = *job.touch->T_robot_sensor,
+                    .elements_mm = elements_mm_,
+                    .pressure = job.touch->pressure,
+                    .valid = sensor.valid};
+  recogniser_.update(std::span(&touch, 1), [](double) {});
+  const std::string& label = sensor.truth ? sensor.truth->object : sensor.object;
+  LiveTouch result{.touch = *job.touch,
+                   .step = judge(recogniser_, label, sensor.truth, task_),
+                   .frames_lost = job.frames_lost};
+  result.latency_ms = std::chrono::duration<double, std::milli>(Clock::now() - job.taken).count();
+  {
+    const std::lock_guard lock(mutex_);
+    result.unknown = state_.unknown;
+    result.index = state_.touches++;
+    ++state_.all_touches;
+    state_.worst_latency_ms = std::max(state_.worst_latency_ms, result.latency_ms);
+    latencies_ms_.push_back(result.latency_ms);
+    state_.last = result;
+  }
+  on_touch_(result);
+}
+
+}  // namespace palpate::cli

@@ -1,0 +1,126 @@
+#pragma once
+
+#include <chrono>
+#include <condition_variable>
+#include <cstdint>
+#include <deque>
+#include <exception>
+#include <functional>
+#include <mutex>
+#include <optional>
+#include <thread>
+#include <vector>
+
+#include "palpate/sensor.hpp"
+#include "palpate/touch_detector.hpp"
+#include "recogniser.hpp"
+#include "recognition_record.hpp"
+
+namespace palpate::cli {
+
+/// What was believed after a touch of a stream.
+struct LiveTouch {
+  DetectedTouch touch;
+  std::size_t unknown = 0;  ///< which one, from 0
+  std::size_t index = 0;    ///< of the touch on that unknown, from 0
+  Step step;
+  double latency_ms = 0.0;        ///< from taking the frame that ended the touch to its estimate
+  std::uint64_t frames_lost = 0;  ///< up to that frame
+};
+
+/// What is known of a stream at one moment.
+struct LiveState {
+  std::vector<double> pressure;  ///< [e] above the baseline; empty before the first frame
+  std::optional<Pose> T_robot_sensor;
+  SensorCounters counters;
+  bool taring = false;
+  bool touching = false;
+  bool gone = false;
+  std::size_t unknown = 0;
+  std::size_t touches = 0;       ///< on this unknown
+  std::size_t all_touches = 0;   ///< with a pose, on every unknown
+  std::size_t without_pose = 0;  ///< touches that were passed over
+  std::optional<LiveTouch> last;
+  double worst_latency_ms = 0.0;
+};
+
+struct LiveOptions {
+  TouchDetectorOptions detector;
+  double tare_s = 0.5;                  ///< where the sensor knows no baseline
+  std::optional<double> reset_after_s;  ///< after so long without contact another unknown comes
+};
+
+/// Finds the touches in a sensor's stream and updates the belief with each, from construction on.
+/// Frames are read and touches found on one thread, so that no frame is lost meanwhile the belief
+/// is updated on another.
+class LiveRecognition {
+ public:
+  /// `on_touch` is called after each touch, on a thread of its own. What is passed by reference
+  /// must outlive this and be left alone, the task excepted.
+  /// @param elements_mm [e] in the sensor frame
+  LiveRecognition(Sensor& sensor, std::vector<glm::dvec2> elements_mm, Recogniser& recogniser,
+                  const RecognitionTask& task, const LiveOptions& options,
+                  std::function<void(const LiveTouch&)> on_touch);
+  /// Ends at once.
+  ~LiveRecognition();
+  LiveRecognition(const LiveRecognition&) = delete;
+  LiveRecognition& operator=(const LiveRecognition&) = delete;
+
+  LiveState state() const;
+  /// Of every touch so far.
+  std::vector<double> latencies_ms() const;
+  /// Waits at most so long; true when the stream has ended and all its touches are used, or failed.
+  bool wait_for_end(std::chrono::milliseconds timeout);
+  /// The touches to come are of another unknown.
+  void reset();
+  /// Reads no more and uses what was read, the touch under way included. @throws Error where
+  /// something failed meanwhile
+  void finish();
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  /// A touch for the belief, or the end of an unknown.
+  struct Job {
+    std::optional<DetectedTouch> touch;
+    Clock::time_point taken;
+    std::uint64_t frames_lost = 0;
+  };
+
+  void read();
+  std::optional<TouchDetector> tare();
+  void take(TouchDetector& detector, const Frame& frame);
+  void hand_on(const std::optional<DetectedTouch>& touch);
+  void believe();
+  void use(const Job& job);
+  void push(Job job);
+  /// Runs a thread's work and keeps what it throws.
+  void guard(void (LiveRecognition::*work)());
+
+  Sensor& sensor_;  ///< of the reading thread alone
+  const SensorDescription description_;
+  std::vector<glm::dvec2> elements_mm_;
+  Recogniser& recogniser_;
+  const RecognitionTask& task_;
+  LiveOptions options_;
+  std::function<void(const LiveTouch&)> on_touch_;
+
+  mutable std::mutex mutex_;
+  std::condition_variable changed_;
+  std::deque<Job> jobs_;
+  LiveState state_;
+  std::vector<double> latencies_ms_;
+  bool stop_ = false;      ///< read no more
+  bool all_read_ = false;  ///< no job will be added by the stream
+  bool ended_ = false;     ///< nothing is left to do
+  std::exception_ptr failure_;
+
+  // Of the reading thread alone.
+  Clock::time_point taken_;
+  std::optional<double> last_contact_s_;
+  bool was_touching_ = false;
+
+  std::thread reader_;
+  std::thread believer_;
+};
+
+}  // namespace palpate::cli

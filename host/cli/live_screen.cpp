@@ -1,0 +1,123 @@
+#include "live_screen.hpp"
+
+#include <unistd.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include <fmt/format.h>
+
+#include "evidence_scale.hpp"
+
+namespace palpate::cli {
+
+using namespace std::chrono_literals;
+
+LiveScreen::LiveScreen(std::FILE* output, const SensorDescription& sensor,
+                       const std::vector<glm::dvec2>& elements_mm, const RecognitionTask& task)
+    : output_(output), task_(task) {
+  view_.sensor = sensor.serial.empty() ? sensor.name : sensor.name + " " + sensor.serial;
+  view_.elements_mm = elements_mm;
+  view_.valid = sensor.valid;
+  view_.pressure_unit = sensor.pressure_unit;
+  view_.labels = task.labels;
+  // A press is mostly several times as strong as what counts as contact.
+  view_.full_scale = std::max(5.0 * task.histogram.classifier.threshold, 1e-6);
+  std::vector<OccupancyGrid> maps;
+  for (const Hypothesis& hypothesis : task.hypotheses) {
+    maps.push_back(hypothesis.map);
+  }
+  view_.evidence_nats = evidence_scale(maps).range_nats;
+  if (terminal_moves_cursor()) {
+    terminal_.emplace(fileno(output), STDIN_FILENO);
+    view_.keys = terminal_->has_keys() ? "r: next unknown   Ctrl-C: end" : "Ctrl-C: end";
+  }
+}
+
+bool LiveScreen::update(const LiveState& state) {
+  describe(state);
+  measure_rate(state);
+  const Terminal::Size size = Terminal::size_of(fileno(output_));
+  if (terminal_) {
+    terminal_->show(draw(view_, size.columns, size.rows, colours_));
+    return terminal_->keys().find('r') != std::string::npos;
+  }
+  if (state.all_touches != printed_) {
+    printed_ = state.all_touches;
+    for (const std::string& line : draw(view_, size.columns - 1, size.rows - 1, colours_)) {
+      fmt::print(output_, "{}\n", line);
+    }
+    std::fflush(output_);
+  }
+  return false;
+}
+
+void LiveScreen::describe(const LiveState& state) {
+  view_.frames = state.counters.frames;
+  view_.lost = state.counters.lost;
+  view_.warning = state.gone || state.taring;
+  view_.state = state.gone     ? "the board is gone; waiting until it is plugged in again"
+                : state.taring ? "reading the untouched array: keep it free"
+                               : fmt::format("unknown {}, {} touches{}", state.unknown + 1,
+                                             state.touches, state.touching ? ", touching" : "");
+  if (state.without_pose > 0) {
+    view_.warning = true;
+    view_.state += fmt::format("; {} touches without a pose passed over", state.without_pose);
+  }
+  view_.pressure = state.pressure;
+  for (std::size_t i = 0; i < state.pressure.size(); ++i) {
+    if (view_.valid.empty() || view_.valid[i] != 0) {
+      // Not by fmax(): what is no number must not become the scale.
+      view_.full_scale = std::max(view_.full_scale, state.pressure[i]);
+    }
+  }
+  view_.identity.clear();
+  view_.map = nullptr;
+  view_.latency_ms.reset();
+  view_.T_robot_sensor.reset();
+  if (!state.last) {
+    return;
+  }
+  const Step& step = state.last->step;
+  if (step.contradicted) {
+    view_.state += "; no map fits these touches";
+    view_.warning = true;
+  }
+  view_.identity = step.identity;
+  view_.map = &task_.hypotheses[step.mode.object].map;
+  view_.T_object_robot = step.refined ? step.refined->T_object_robot : step.mode.T_object_robot;
+  if (const auto error_mm = step.refined ? step.refined_error_mm : step.error_mm) {
+    view_.state += fmt::format("; error {:.2f} mm", *error_mm);
+  }
+  view_.latency_ms = state.last->latency_ms;
+  view_.worst_latency_ms = state.worst_latency_ms;
+  place_array(state);
+}
+
+void LiveScreen::place_array(const LiveState& state) {
+  const bool now = state.touching && state.T_robot_sensor;
+  view_.T_robot_sensor = now ? state.T_robot_sensor : state.last->touch.T_robot_sensor;
+  const std::vector<double>& pressure = now ? state.pressure : state.last->touch.pressure;
+  const bool sound = pressure.size() == view_.elements_mm.size() &&
+                     std::none_of(pressure.begin(), pressure.end(),
+                                  [](double value) { return std::isinf(value); });
+  view_.readings.clear();
+  if (sound) {
+    view_.readings = task_.histogram.classifier.classify({.T_robot_sensor = *view_.T_robot_sensor,
+                                                          .elements_mm = view_.elements_mm,
+                                                          .pressure = pressure,
+                                                          .valid = view_.valid});
+  }
+}
+
+void LiveScreen::measure_rate(const LiveState& state) {
+  const auto now = Clock::now();
+  const double elapsed_s = std::chrono::duration<double>(now - rated_).count();
+  if (elapsed_s >= 1.0) {
+    view_.rate_hz = static_cast<double>(state.counters.frames - rated_frames_) / elapsed_s;
+    rated_frames_ = state.counters.frames;
+    rated_ = now;
+  }
+}
+
+}  // namespace palpate::cli

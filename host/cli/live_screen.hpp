@@ -1,0 +1,42 @@
+#pragma once
+
+#include <chrono>
+#include <cstdio>
+#include <optional>
+#include <vector>
+
+#include "live_recognition.hpp"
+#include "live_view.hpp"
+#include "terminal.hpp"
+
+namespace palpate::cli {
+
+/// Shows on a terminal what is known of a stream: as a screen, or where the cursor cannot be moved,
+/// as a picture after each touch.
+class LiveScreen {
+ public:
+  /// @param output the terminal; keys are read from standard input
+  LiveScreen(std::FILE* output, const SensorDescription& sensor,
+             const std::vector<glm::dvec2>& elements_mm, const RecognitionTask& task);
+
+  /// Shows this; true where the next unknown is asked for.
+  bool update(const LiveState& state);
+
+ private:
+  using Clock = std::chrono::steady_clock;
+
+  void describe(const LiveState& state);
+  void place_array(const LiveState& state);
+  void measure_rate(const LiveState& state);
+
+  std::FILE* output_;
+  const RecognitionTask& task_;
+  LiveView view_;
+  TerminalColours colours_ = terminal_colours();
+  std::optional<Terminal> terminal_;
+  std::size_t printed_ = 0;  ///< touches shown where the cursor cannot be moved
+  Clock::time_point rated_ = Clock::now();
+  std::uint64_t rated_frames_ = 0;
+};
+
+}  // namespace palpate::cli

@@ -1,0 +1,249 @@
+#include "live_view.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+#include <fmt/format.h>
+
+#include "evidence_scale.hpp"
+#include "options.hpp"
+
+namespace palpate::cli {
+
+namespace {
+
+/// Part of the canvas, in cells.
+struct Panel {
+  int column = 0;
+  int row = 0;
+  int columns = 0;
+  int rows = 0;
+};
+
+/// Where the elements of an array are, to be drawn as squares as wide as the closest two are apart.
+class ArrayPicture {
+ public:
+  explicit ArrayPicture(const std::vector<glm::dvec2>& elements_mm) : elements_mm_(elements_mm) {
+    double nearest = std::numeric_limits<double>::infinity();
+    for (std::size_t i = 0; i < elements_mm.size(); ++i) {
+      for (std::size_t j = 0; j < i; ++j) {
+        const glm::dvec2 d = elements_mm[i] - elements_mm[j];
+        const double distance = std::hypot(d.x, d.y);
+        nearest = distance > 0.0 ? std::min(nearest, distance) : nearest;
+      }
+    }
+    half_mm_ = std::isfinite(nearest) ? 0.5 * nearest : 1.0;
+    if (!elements_mm.empty()) {
+      lower_mm_ = upper_mm_ = elements_mm.front();
+    }
+    for (const glm::dvec2& p : elements_mm) {
+      lower_mm_ = {std::min(lower_mm_.x, p.x), std::min(lower_mm_.y, p.y)};
+      upper_mm_ = {std::max(upper_mm_.x, p.x), std::max(upper_mm_.y, p.y)};
+    }
+    lower_mm_ -= half_mm_;
+    upper_mm_ += half_mm_;
+  }
+
+  const glm::dvec2& lower_mm() const { return lower_mm_; }
+  const glm::dvec2& upper_mm() const { return upper_mm_; }
+
+  /// The element that covers this point of the sensor frame.
+  std::optional<std::size_t> element_at(const glm::dvec2& p_mm) const {
+    if (p_mm.x < lower_mm_.x || p_mm.y < lower_mm_.y || p_mm.x > upper_mm_.x ||
+        p_mm.y > upper_mm_.y) {
+      return {};
+    }
+    for (std::size_t i = 0; i < elements_mm_.size(); ++i) {
+      if (std::abs(p_mm.x - elements_mm_[i].x) <= half_mm_ &&
+          std::abs(p_mm.y - elements_mm_[i].y) <= half_mm_) {
+        return i;
+      }
+    }
+    return {};
+  }
+
+ private:
+  const std::vector<glm::dvec2>& elements_mm_;
+  double half_mm_ = 1.0;
+  glm::dvec2 lower_mm_{};
+  glm::dvec2 upper_mm_{};
+};
+
+/// Draws the area from `lower` to `upper`, as large as it fits into the panel, with y upwards.
+/// `pixel_at` is called with points in mm and returns a Pixel, or none.
+template <typename PixelAt>
+void draw_picture(TerminalCanvas& canvas, const Panel& panel, const glm::dvec2& lower_mm,
+                  const glm::dvec2& upper_mm, const PixelAt& pixel_at) {
+  const glm::dvec2 extent_mm = upper_mm - lower_mm;
+  const double mm =
+      std::max(extent_mm.x / panel.columns, extent_mm.y / (2.0 * panel.rows));  // of a pixel
+  const int width = std::min(panel.columns, static_cast<int>(std::lround(extent_mm.x / mm)));
+  const int height = std::min(2 * panel.rows, static_cast<int>(std::lround(extent_mm.y / mm)));
+  for (int v = 0; v < height; ++v) {
+    for (int u = 0; u < width; ++u) {
+      const glm::dvec2 p_mm{lower_mm.x + (u + 0.5) * extent_mm.x / width,
+                            upper_mm.y - (v + 0.5) * extent_mm.y / height};
+      if (const std::optional<Pixel> pixel = pixel_at(p_mm)) {
+        canvas.pixel(panel.column + u, 2 * panel.row + v, *pixel);
+      }
+    }
+  }
+}
+
+bool alive(const LiveView& view, std::size_t i) { return view.valid.empty() || view.valid[i] != 0; }
+
+void draw_pressure(TerminalCanvas& canvas, const Panel& panel, const LiveView& view) {
+  canvas.text(panel.column, panel.row,
+              fmt::format("pressure, 0 to {:.3g} {}", view.full_scale, view.pressure_unit), true);
+  if (view.pressure.size() != view.elements_mm.size() || view.pressure.empty()) {
+    return;
+  }
+  const ArrayPicture array(view.elements_mm);
+  draw_picture(canvas, {panel.column, panel.row + 1, panel.columns, panel.rows - 1},
+               array.lower_mm(), array.upper_mm(),
+               [&](const glm::dvec2& p_mm) -> std::optional<Pixel> {
+                 const auto element = array.element_at(p_mm);
+                 if (!element) {
+                   return {};
+                 }
+                 if (!alive(view, *element)) {
+                   return Pixel{.colour = grey, .mark = 'x'};
+                 }
+                 const double part = view.pressure[*element] / view.full_scale;
+                 return Pixel{.colour = sequential(part), .shade = part};
+               });
+}
+
+Colour mix(const Colour& a, const Colour& b, double part) {
+  return {a.red + part * (b.red - a.red), a.green + part * (b.green - a.green),
+          a.blue + part * (b.blue - a.blue)};
+}
+
+/// The map's evidence in nats around a point, over a square about as wide as a pixel may be.
+double evidence_at(const OccupancyGrid& map, const glm::dvec2& p_mm) {
+  const glm::dvec2 cell = (p_mm - map.origin_mm) / map.cell_mm;
+  const int i = std::clamp(static_cast<int>(std::lround(cell.x)), 0, map.nx - 1);
+  const int j = std::clamp(static_cast<int>(std::lround(cell.y)), 0, map.ny - 1);
+  return map.at(i, j) - map.prior_log_odds();
+}
+
+std::string pose_text(const LiveView& view) {
+  const Pose& T = view.T_object_robot;
+  return fmt::format("{}  x {:.2f} mm  y {:.2f} mm  theta {:.1f} deg", view.map->label,
+                     T.translation_mm.x, T.translation_mm.y, degrees(T.theta_rad));
+}
+
+void draw_map(TerminalCanvas& canvas, const Panel& panel, const LiveView& view) {
+  if (view.map == nullptr) {
+    canvas.text(panel.column, panel.row, "no touch yet", true);
+    return;
+  }
+  canvas.text(panel.column, panel.row, pose_text(view), true);
+  const OccupancyGrid& map = *view.map;
+  const bool with_array = view.T_robot_sensor && view.readings.size() == view.elements_mm.size() &&
+                          !view.elements_mm.empty();
+  const std::vector<glm::dvec2> nowhere;
+  const ArrayPicture array(with_array ? view.elements_mm : nowhere);
+  const Pose T_sensor_object =
+      with_array ? inverse(view.T_object_robot * *view.T_robot_sensor) : Pose{};
+  draw_picture(canvas, {panel.column, panel.row + 1, panel.columns, panel.rows - 1},
+               lower_edge_mm(map), upper_edge_mm(map),
+               [&](const glm::dvec2& p_mm) -> std::optional<Pixel> {
+                 const double part = evidence_at(map, p_mm) / view.evidence_nats;
+                 Pixel pixel{.colour = diverging(part), .shade = 0.25 * std::clamp(part, 0.0, 1.0)};
+                 const auto element = array.element_at(T_sensor_object * p_mm);
+                 if (element && view.readings[*element] == Reading::in_contact) {
+                   pixel = {.colour = ink, .mark = '@'};
+                 } else if (element) {
+                   pixel.colour = mix(pixel.colour, ink, 0.35);
+                   pixel.mark = 'o';
+                 }
+                 return pixel;
+               });
+}
+
+/// The labels that there is room for: the most probable ones, in their own order.
+std::vector<std::size_t> shown_labels(const LiveView& view, std::size_t room) {
+  std::vector<std::size_t> shown(view.labels.size());
+  std::iota(shown.begin(), shown.end(), std::size_t{0});
+  if (shown.size() > room) {
+    if (!view.identity.empty()) {
+      std::stable_sort(shown.begin(), shown.end(), [&](std::size_t a, std::size_t b) {
+        return view.identity[a] > view.identity[b];
+      });
+    }
+    shown.resize(room);
+    std::sort(shown.begin(), shown.end());
+  }
+  return shown;
+}
+
+void draw_identity(TerminalCanvas& canvas, const Panel& panel, const LiveView& view) {
+  constexpr int longest_label = 12;
+  constexpr int number = 8;  // " 100.0 %"
+  const auto shown = shown_labels(view, static_cast<std::size_t>(std::max(panel.rows, 0)));
+  int width = 1;
+  for (const std::size_t label : shown) {
+    width = std::max(width, std::min(longest_label, static_cast<int>(view.labels[label].size())));
+  }
+  int row = panel.row;
+  for (const std::size_t label : shown) {
+    canvas.text(panel.column, row, view.labels[label]);
+    // Covers the end of a label that is too long.
+    canvas.text(panel.column + width, row,
+                std::string(static_cast<std::size_t>(panel.columns), ' '));
+    if (!view.identity.empty()) {
+      const double probability = view.identity[label];
+      const int bar = panel.columns - width - 1 - number;
+      canvas.bar(panel.column + width + 1, row, bar, probability,
+                 series(label % (series_colours - 1)));
+      canvas.text(panel.column + width + 1 + std::max(bar, 0), row,
+                  fmt::format("{:6.1f} %", 100.0 * probability));
+    }
+    ++row;
+  }
+}
+
+void draw_status(TerminalCanvas& canvas, const LiveView& view) {
+  std::string status = fmt::format("{}  {:.0f} Hz  {} frames, {} lost", view.sensor, view.rate_hz,
+                                   view.frames, view.lost);
+  if (view.latency_ms && view.worst_latency_ms) {
+    status +=
+        fmt::format("  latency {:.1f} ms, worst {:.1f}", *view.latency_ms, *view.worst_latency_ms);
+  }
+  canvas.text(0, 0, status);
+  canvas.text(0, 1, view.state, view.warning);
+}
+
+}  // namespace
+
+std::vector<std::string> draw(const LiveView& view, int columns, int rows,
+                              TerminalColours colours) {
+  constexpr int least_columns = 44;
+  constexpr int least_rows = 14;
+  constexpr int gap = 2;
+  TerminalCanvas canvas(columns, rows);
+  draw_status(canvas, view);
+  if (columns < least_columns || rows < least_rows) {
+    if (view.map != nullptr) {
+      canvas.text(0, 2, pose_text(view), true);
+    }
+    draw_identity(canvas, {0, 3, columns, rows - 3}, view);
+    return canvas.lines(colours);
+  }
+  const int top = 3;
+  const int body = rows - top - 2;
+  const int left = std::clamp(columns * 2 / 5, 20, 60);
+  const int bars = std::min(static_cast<int>(view.labels.size()), std::max(3, body / 2));
+  const int picture = body - bars - 2;
+  draw_pressure(canvas, {0, top, left, picture}, view);
+  canvas.text(0, top + picture + 1, "identity", true);
+  draw_identity(canvas, {0, top + picture + 2, left, bars}, view);
+  draw_map(canvas, {left + gap, top, columns - left - gap, body}, view);
+  canvas.text(0, rows - 1, view.keys);
+  return canvas.lines(colours);
+}
+
+}  // namespace palpate::cli

@@ -1,0 +1,215 @@
+// `palpate live` on recorded and simulated streams, without a terminal.
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <fstream>
+#include <sstream>
+
+#include <fmt/format.h>
+
+#include "palpate/frame_recorder.hpp"
+#include "palpate/virtual_sensor.hpp"
+#include "program.hpp"
+#include "sample_files.hpp"
+
+namespace palpate {
+namespace {
+
+using Arguments = std::vector<std::string>;
+
+// At full speed, so that a test of seconds of touching takes none.
+constexpr const char* unknown_e = "simulate:E,rate=100,seed=3,object=random,touches=4,speed=max";
+
+class Live : public ProgramTest {
+ protected:
+  Live() {
+    write_map(folder_ / "A.map.h5", sample_map("A"));
+    write_map(folder_ / "E.map.h5", sample_map("E"));
+  }
+
+  static Arguments live(const std::string& sensor, const Arguments& more = {}) {
+    Arguments arguments{"live",     "--sensor", sensor,   "--maps",
+                        "A.map.h5", "E.map.h5", "--bins", "20x20x24"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return arguments;
+  }
+
+  /// Every line of JSON.
+  static std::vector<nlohmann::json> parsed(const std::string& lines) {
+    std::vector<nlohmann::json> records;
+    std::istringstream stream(lines);
+    for (std::string line; std::getline(stream, line);) {
+      records.push_back(nlohmann::json::parse(line));
+    }
+    return records;
+  }
+
+  std::vector<nlohmann::json> records_of(const std::string& sensor, Arguments more = {}) const {
+    more.insert(more.end(), {"--json", "live.jsonl"});
+    done(live(sensor, more));
+    return parsed(bytes_of(folder_ / "live.jsonl"));
+  }
+};
+
+// All of a record but the time that it took.
+nlohmann::json timeless(nlohmann::json record) {
+  EXPECT_GT(record.at("latency_ms").get<double>(), 0.0);
+  record.erase("latency_ms");
+  return record;
+}
+
+TEST_F(Live, RecognisesASimulatedLetter) {
+  const Outcome outcome = palpate(live(unknown_e, {"--json", "-"}));
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  const auto records = parsed(outcome.out);
+  ASSERT_EQ(records.size(), 4u);
+  double last_s = 0.0;
+  for (std::size_t i = 0; i < records.size(); ++i) {
+    EXPECT_EQ(records[i].at("unknown"), 0u);
+    EXPECT_EQ(records[i].at("touch"), i);
+    EXPECT_EQ(records[i].at("frames_lost"), 0u);
+    EXPECT_GT(records[i].at("time"), last_s);
+    last_s = records[i].at("time");
+  }
+  EXPECT_EQ(records.back().at("best"), "E");
+  EXPECT_EQ(records.back().at("right"), true);
+  // A bin is 1 mm wide and 15 degrees, by which the letter's ends move about 3 mm.
+  EXPECT_LT(records.back().at("refined_error_mm"), 2.0);
+  EXPECT_NE(outcome.err.find("4 touches"), std::string::npos) << outcome.err;
+}
+
+// What is found on the way is what `touches` and `recognize` find afterwards.
+TEST_F(Live, AgreesWithTouchesFoundAfterwards) {
+  done({"record", "--sensor", unknown_e, "-o", "frames.h5"});
+  const auto live = records_of("replay:frames.h5,speed=max");
+  done({"touches", "frames.h5", "-o", "touches.h5"});
+  const nlohmann::json trace =
+      record({"touches.h5", "--maps", "A.map.h5", "E.map.h5", "--bins", "20x20x24", "--trace"})
+          .at("trace");
+  ASSERT_EQ(live.size(), 4u);
+  ASSERT_EQ(trace.size(), live.size());
+  for (std::size_t i = 0; i < live.size(); ++i) {
+    for (const auto& [key, value] : trace[i].items()) {
+      // The same touches on the same device give the same bits, one by one or together; files hold
+      // pressures in float64.
+      EXPECT_EQ(live[i].at(key), value) << key << " after touch " << i;
+    }
+  }
+}
+
+TEST_F(Live, JoinsFramesWithPosesFromAFifo) {
+  done({"record", "--sensor", unknown_e, "-o", "frames.h5"});
+  const auto expected = records_of("replay:frames.h5,speed=max");
+
+  // The same stream from a board that does not know where it is, and a robot that does.
+  const auto stream =
+      open_virtual_sensor("replay:" + (folder_ / "frames.h5").string() + ",speed=max");
+  FrameRecorder bare(folder_ / "bare.h5", stream->description());
+  std::string poses = "not a pose\n";
+  for (std::size_t i = 0; !stream->ended(); ++i) {
+    Frame frame = stream->next({}).value();
+    const Pose pose = frame.T_robot_sensor.value();
+    if (i % 5 == 0 || stream->ended()) {
+      poses += fmt::format("{{\"time\": {:.17g}, \"x_mm\": {}, \"y_mm\": {}, \"theta_rad\": {}}}\n",
+                           frame.host_time_s, pose.translation_mm.x, pose.translation_mm.y,
+                           pose.theta_rad);
+    }
+    frame.T_robot_sensor.reset();
+    bare.add(frame);
+  }
+  bare.close();
+  ASSERT_EQ(::mkfifo((folder_ / "poses").c_str(), 0600), 0);
+  // For reading and writing it opens at once, and all fits into it.
+  const int fifo = ::open((folder_ / "poses").c_str(), O_RDWR);
+  ASSERT_EQ(::write(fifo, poses.data(), poses.size()), static_cast<ssize_t>(poses.size()));
+
+  const Outcome outcome =
+      palpate(live("replay:bare.h5,speed=max", {"--poses", "poses", "--json", "live.jsonl"}));
+  ::close(fifo);
+  EXPECT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_NE(outcome.err.find("1 lines were no poses"), std::string::npos) << outcome.err;
+  const auto records = parsed(bytes_of(folder_ / "live.jsonl"));
+  ASSERT_EQ(records.size(), expected.size());
+  for (std::size_t i = 0; i < records.size(); ++i) {
+    // The robot stands still in the steady phase, so that poses between its own are the same but
+    // for rounding.
+    for (const char* key : {"x_mm", "y_mm", "theta_rad"}) {
+      EXPECT_NEAR(records[i].at("pose").at(key), expected[i].at("pose").at(key), 1e-9) << key;
+    }
+    EXPECT_EQ(records[i].at("best"), expected[i].at("best"));
+    for (const char* label : {"A", "E"}) {
+      // A rounded pose moves the likelihood's float32 sums by about 1e-5 nats.
+      EXPECT_NEAR(records[i].at("identity").at(label), expected[i].at("identity").at(label), 1e-3);
+    }
+  }
+
+  expect_refused(live("replay:bare.h5,speed=max", {"--json", "-"}),
+                 {"bare.h5", "4 touches", "--poses"});
+}
+
+TEST_F(Live, BeginsAnotherUnknownAfterAPause) {
+  // From release to onset the simulated robot takes 0.3 s and more.
+  const auto records = records_of(unknown_e, {"--reset-after", "0.2"});
+  ASSERT_EQ(records.size(), 4u);
+  for (std::size_t i = 0; i < records.size(); ++i) {
+    EXPECT_EQ(records[i].at("unknown"), i);
+    EXPECT_EQ(records[i].at("touch"), 0u);
+  }
+  const auto patient = records_of(unknown_e, {"--reset-after", "2"});
+  ASSERT_EQ(patient.size(), 4u);
+  EXPECT_EQ(patient.back().at("unknown"), 0u);
+  EXPECT_EQ(patient.back().at("touch"), 3u);
+  EXPECT_EQ(timeless(patient.front()).at("identity"), timeless(records.front()).at("identity"));
+  EXPECT_NE(patient.back().at("identity"), records.back().at("identity"));
+}
+
+TEST_F(Live, PrintsALineForEachTouch) {
+  const std::string out = done(live(unknown_e));
+  EXPECT_EQ(out.find('\033'), std::string::npos) << "escape codes without a terminal";
+  EXPECT_NE(out.find("unknown  touch  best"), std::string::npos) << out;
+  EXPECT_NE(out.find("\n      1      4  E "), std::string::npos) << out;
+  EXPECT_NE(out.find("4 touches"), std::string::npos) << out;
+  EXPECT_NE(out.find(" 0 lost"), std::string::npos) << out;
+  EXPECT_NE(out.find("from frame to estimate: median "), std::string::npos) << out;
+}
+
+TEST_F(Live, TakesTheFlagsOfRecognize) {
+  const auto records =
+      records_of(unknown_e, {"--filter", "particles", "--particles", "500", "--none", "1"});
+  ASSERT_EQ(records.size(), 4u);
+  EXPECT_TRUE(records.back().at("identity").contains("(none)"));
+  EXPECT_TRUE(records.back().contains("effective_sample_size"));
+  EXPECT_FALSE(records.back().contains("refined"));
+}
+
+TEST_F(Live, RefusesWhatCannotBeMeant) {
+  expect_refused(live("nothing"), {"--poses", "nothing"});
+  expect_refused(live("nothing", {"--poses", "-"}), {"nothing"});
+  expect_refused(live("simulate:A,colour=red"), {"colour"});
+  expect_refused({"live", "--sensor", unknown_e}, {"--maps", "missing"});
+  expect_refused({"live", "--maps", "A.map.h5"}, {"--sensor"});
+  expect_refused(live(unknown_e, {"--reset-after", "0"}), {"--reset-after"});
+  expect_refused(live(unknown_e, {"--tare", "-1"}), {"--tare"});
+  expect_refused(live(unknown_e, {"--gamma", "1"}), {"--gamma"});
+  expect_refused(live(unknown_e, {"--json", "E.map.h5"}), {"--json", "E.map.h5", "overwrite"});
+  expect_refused(live(unknown_e, {"--json", "no/such.jsonl"}), {"--json", "no/such.jsonl"});
+
+  done({"record", "--sensor", unknown_e, "-o", "frames,1.h5"});
+  expect_refused(live("replay:frames,1.h5,speed=max", {"--json", "frames,1.h5"}),
+                 {"--json", "overwrite"});
+  std::ofstream(folder_ / "poses.jsonl") << "{\"time\": 1, \"x_mm\": 0, \"y_mm\": 0}\n";
+  expect_refused(live(unknown_e, {"--poses", "poses.jsonl"}), {"poses.jsonl", "theta_rad"});
+  write_recording(folder_ / "touches.h5", sample_unknown("A", {}, 2));
+  expect_refused(live("replay:touches.h5"), {"touches.h5", "rows"});
+}
+
+TEST_F(Live, SaysWhereALineCannotBeWritten) {
+  const Outcome outcome = palpate(live(unknown_e, {"--json", "/dev/full"}));
+  EXPECT_EQ(outcome.status, 1);
+  EXPECT_NE(outcome.err.find("/dev/full"), std::string::npos) << outcome.err;
+}
+
+}  // namespace
+}  // namespace palpate
