@@ -4,8 +4,8 @@
 
 namespace palpate::cli {
 
-/// While it lives, Ctrl-C, a hang-up and SIGTERM do not end the program but are noted here. One at a
-/// time.
+/// While it lives, Ctrl-C, a hang-up and SIGTERM do not end the program but are noted here. One at
+/// a time.
 class Interruption {
  public:
   Interruption();

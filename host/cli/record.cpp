@@ -42,8 +42,9 @@ class FrameSource {
     std::optional<Frame> frame = sensor_.next(100ms);
     if (!frame) {
       // A board that says nothing must not hold up a script.
-      done_ = interruption_.requested() || sensor_.ended() ||
-              (seconds_ && std::chrono::duration<double>(Clock::now() - heard_).count() > *seconds_);
+      done_ =
+          interruption_.requested() || sensor_.ended() ||
+          (seconds_ && std::chrono::duration<double>(Clock::now() - heard_).count() > *seconds_);
       return {};
     }
     heard_ = Clock::now();
@@ -69,8 +70,8 @@ class FrameSource {
 /// The stream's first frames, over the time of the tare.
 std::vector<Frame> first_frames(FrameSource& source, double tare_s) {
   std::vector<Frame> frames;
-  while (!source.done() && (frames.empty() || frames.back().host_time_s -
-                                                      frames.front().host_time_s < tare_s)) {
+  while (!source.done() &&
+         (frames.empty() || frames.back().host_time_s - frames.front().host_time_s < tare_s)) {
     if (std::optional<Frame> frame = source.next()) {
       frames.push_back(std::move(*frame));
     }

@@ -207,8 +207,7 @@ void FrameRecorder::Impl::append() {
   append(time.get(), H5T_NATIVE_DOUBLE, 1, pending.time_s.data());
 }
 
-void FrameRecorder::Impl::append(hid_t dataset, hid_t type, std::size_t width,
-                                 const void* values) {
+void FrameRecorder::Impl::append(hid_t dataset, hid_t type, std::size_t width, const void* values) {
   const int rank = width == 1 ? 1 : 2;
   const hsize_t begin[] = {saved, 0};
   const hsize_t count[] = {pending.size(), width};

@@ -8,7 +8,13 @@
 namespace palpate {
 
 /// Kinds of records in the stream of send_hdf5_values().
-enum class Hdf5Record : char { attribute = 'a', dataset = 'd', refused = 'r', unclosed = 'u', end = 'e' };
+enum class Hdf5Record : char {
+  attribute = 'a',
+  dataset = 'd',
+  refused = 'r',
+  unclosed = 'u',
+  end = 'e'
+};
 
 /// Deflate, the strongest of HDF5's own filters, turns at most 258 bytes into 2 bits.
 inline constexpr std::uint64_t largest_compression = 1032;

@@ -5,7 +5,7 @@
 
 #include <fmt/format.h>
 
-#include "hdf5_failure.hpp"
+#include "atomic_file.hpp"
 #include "palpate/error.hpp"
 
 namespace palpate {
@@ -20,18 +20,14 @@ void set_appendable(hid_t access) {
 
 namespace {
 
-Hdf5Handle file_in_memory() {
+Hdf5Handle file_in_memory(Hdf5Image& image, Hdf5Writer::Layout layout) {
   const Hdf5Handle access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose);
-  constexpr std::size_t growth = 1 << 20;
-  H5Pset_fapl_core(access.get(), growth, false);
+  set_in_memory(access.get(), image);
+  if (layout == Hdf5Writer::Layout::appendable) {
+    set_appendable(access.get());
+  }
   // The name is not used beyond HDF5's list of open files.
   return {H5Fcreate("palpate", H5F_ACC_TRUNC, H5P_DEFAULT, access.get()), H5Fclose};
-}
-
-Hdf5Handle appendable_file(const std::filesystem::path& path) {
-  const Hdf5Handle access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose);
-  set_appendable(access.get());
-  return {H5Fcreate(path.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, access.get()), H5Fclose};
 }
 
 Hdf5Handle text_type() {
@@ -74,12 +70,7 @@ std::vector<hsize_t> chunk_of(const Hdf5Writer::Shape& shape) {
 }  // namespace
 
 Hdf5Writer::Hdf5Writer(std::filesystem::path path, Layout layout)
-    : path_(std::move(path)), file_(H5I_INVALID_HID, H5Fclose) {
-  if (layout == Layout::appendable) {
-    // HDF5 1.10 spoils the checksum of such a file in its image.
-    on_disk_.emplace(path_);
-  }
-  file_ = on_disk_ ? appendable_file(on_disk_->path()) : file_in_memory();
+    : path_(std::move(path)), file_(file_in_memory(image_, layout)) {
   require(file_.valid(), "the file");
 }
 
@@ -130,19 +121,12 @@ void Hdf5Writer::dataset(const char* name, const Shape& shape,
 }
 
 void Hdf5Writer::save() {
-  if (on_disk_) {
-    require(H5Fflush(file_.get(), H5F_SCOPE_GLOBAL) >= 0, "the file");
-    file_ = Hdf5Handle(H5I_INVALID_HID, H5Fclose);
-    on_disk_->commit();
-    return;
-  }
   AtomicFile target(path_);
   require(H5Fflush(file_.get(), H5F_SCOPE_GLOBAL) >= 0, "the file");
   const ssize_t size = H5Fget_file_image(file_.get(), nullptr, 0);
-  require(size > 0, "the file");
-  std::string image(static_cast<std::size_t>(size), '\0');
-  require(H5Fget_file_image(file_.get(), image.data(), image.size()) == size, "the file");
-  target.write(image);
+  file_ = Hdf5Handle(H5I_INVALID_HID, H5Fclose);
+  require(size > 0 && image_.bytes.size() >= static_cast<std::size_t>(size), "the file");
+  target.write(std::string_view(image_.bytes).substr(0, static_cast<std::size_t>(size)));
   target.commit();
 }
 
@@ -187,20 +171,10 @@ void Hdf5Writer::add_dataset(const char* name, const Shape& shape, hid_t type, c
 }
 
 void Hdf5Writer::require(bool done, std::string_view what) const {
-  if (done) {
-    return;
+  if (!done) {
+    throw Error(Fault::system, fmt::format("{}: HDF5 cannot write {}; free memory and try again",
+                                           path_.string(), what));
   }
-  if (on_disk_) {
-    const std::string reason = hdf5_failure();
-    if (file_.valid()) {
-      give_up_hdf5_file(file_.get());
-    }
-    throw Error(Fault::system, fmt::format("{}: cannot write: {}; free or repair the disk and try "
-                                           "again",
-                                           path_.string(), reason));
-  }
-  throw Error(Fault::system, fmt::format("{}: HDF5 cannot write {}; free memory and try again",
-                                         path_.string(), what));
 }
 
 }  // namespace palpate

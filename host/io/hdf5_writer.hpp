@@ -2,23 +2,21 @@
 
 #include <cstdint>
 #include <filesystem>
-#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
 #include <vector>
 
-#include "atomic_file.hpp"
 #include "hdf5_handle.hpp"
+#include "hdf5_image.hpp"
 
 namespace palpate {
 
 /// Makes a file access property list that of `appendable` files: see Hdf5Writer::Layout.
 void set_appendable(hid_t access);
 
-/// An HDF5 file that appears whole or not at all. It is put together in memory and saved in one
-/// piece, so that a disk that refuses is met by AtomicFile, not in the middle of HDF5's caches; an
-/// appendable one is made beside its target. The same content gives the same bytes.
+/// An HDF5 file that is put together in memory and saved in one piece: a disk that refuses is met
+/// by AtomicFile, not in the middle of HDF5's caches. The same content gives the same bytes.
 /// Every function throws Error (Fault::system) where HDF5 or the disk refuses.
 class Hdf5Writer {
  public:
@@ -59,8 +57,8 @@ class Hdf5Writer {
 
   std::filesystem::path path_;
   Hdf5Session session_;
-  std::optional<AtomicFile> on_disk_;  ///< of an appendable file, which is not made in memory
-  Hdf5Handle file_;
+  Hdf5Image image_;
+  Hdf5Handle file_;  ///< until save()
 };
 
 }  // namespace palpate

@@ -18,6 +18,19 @@ double median(std::span<double> values) {
   return *middle;
 }
 
+// How far the medians of the quarters lie apart; reorders the values within them.
+double change_over(std::span<double> values) {
+  const std::size_t quarter = values.size() / 4;
+  double least = median(values.first(quarter));
+  double most = least;
+  for (std::size_t i = 1; i < 4; ++i) {
+    const double middle = median(values.subspan(i * quarter, quarter));
+    least = std::min(least, middle);
+    most = std::max(most, middle);
+  }
+  return most - least;
+}
+
 }  // namespace
 
 std::vector<double> baseline_of(std::span<const Frame> frames, const SensorDescription& sensor,
@@ -25,10 +38,9 @@ std::vector<double> baseline_of(std::span<const Frame> frames, const SensorDescr
   if (frames.empty()) {
     throw Error(Fault::input, "no frame came for the baseline; is the sensor connected?");
   }
-  // Halves of fewer frames differ by their noise alone.
-  constexpr std::size_t least_frames = 20;
+  // Quarters of fewer frames differ by their noise alone.
+  constexpr std::size_t least_frames = 40;
   const bool judged = onset && frames.size() >= least_frames;
-  const std::size_t half = frames.size() / 2;
   std::vector<double> baseline(sensor.elements_mm.size(), 0.0);
   std::vector<double> values(frames.size());
   for (std::size_t k = 0; k < baseline.size(); ++k) {
@@ -48,9 +60,8 @@ std::vector<double> baseline_of(std::span<const Frame> frames, const SensorDescr
                               k));
     }
     if (judged && count == frames.size()) {
-      const std::span<double> all(values);
-      const double change = median(all.subspan(half)) - median(all.first(half));
-      if (std::abs(change) > *onset) {
+      const double change = change_over(values);
+      if (change > *onset) {
         throw Error(Fault::input,
                     fmt::format("the array is touched while its baseline is taken: element {} "
                                 "changes by {:.3g} {}; let go of it and try again",

@@ -39,13 +39,13 @@ PoseReader::PoseReader(const std::string& name, PoseTrack& track)
       name == "-" ? STDIN_FILENO : ::open(name.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC);
   struct stat status {};
   if (descriptor_ < 0 || ::fstat(descriptor_, &status) != 0) {
-    throw Error(Fault::input, fmt::format("--poses {}: cannot be read: {}; give a file, a FIFO or "
+    throw Error(Fault::input, fmt::format("poses {}: cannot be read: {}; give a file, a FIFO or "
                                           "- for standard input",
                                           name, std::strerror(errno)));
   }
   if (S_ISDIR(status.st_mode)) {
     ::close(descriptor_);
-    throw Error(Fault::input, fmt::format("--poses {}: is a folder; name a file in it", name));
+    throw Error(Fault::input, fmt::format("poses {}: is a folder; name a file in it", name));
   }
   is_file_ = S_ISREG(status.st_mode);
   is_fifo_ = S_ISFIFO(status.st_mode) && descriptor_ != STDIN_FILENO;

@@ -71,6 +71,12 @@ INSTANTIATE_TEST_SUITE_P(
               "--each-frame", "--filter",    "histogram",   "--particles", "10000",
               "--resampling", "systematic",  "--augmented", "--seed",      "--trace",
               "--json",       "--posterior", "--png",       "--device",    "T_object_robot"}},
+        Help{"record",
+             {"--sensor", "replay:FILE", "simulate:SHAPE", "-o,", "--seconds", "--poses", "FIFO",
+              "--tare", "=0.5", "--object"}},
+        Help{"touches",
+             {"FRAMES", "-o,", "--onset", "2 kPa", "--release", "half", "--steady", "=0.15",
+              "--min-steady-s", "=0.1", "--smooth-s", "=0.05", "--drift-s", "=60"}},
         Help{"info", {"FILE"}}),
     [](const auto& test) { return std::string(test.param.command); });
 
@@ -78,7 +84,8 @@ using ProgramHelp = ProgramTest;
 
 TEST_F(ProgramHelp, ListsTheCommands) {
   const std::string help = done({"--help"});
-  for (const char* command : {"devices", "sensors", "simulate", "map", "recognize", "info"}) {
+  for (const char* command : {"devices", "sensors", "record", "touches", "simulate", "map",
+                              "recognize", "live", "info"}) {
     EXPECT_NE(help.find(std::string("\n  ") + command), std::string::npos) << help;
   }
 }

@@ -104,7 +104,7 @@ Estimate HardCase::expect_posterior_of_repeated(Device& device, std::span<const 
   for (int i = 0; i < times; ++i) {
     histogram.update(touches);
   }
-  const Estimate estimate = histogram.estimate();
+  Estimate estimate = histogram.estimate();
 
   std::vector<std::vector<double>> bins;
   double worst = 0.0;

@@ -31,7 +31,8 @@ class FrameRecorder {
   FrameRecorder& operator=(const FrameRecorder&) = delete;
 
   /// Appends a frame. One with a reading that is no number counts as lost: see `lost()`.
-  /// @throws Error (Fault::input) on a frame of another size, (Fault::system) where the disk is full
+  /// @throws Error (Fault::input) on a frame of another size, (Fault::system) where the disk is
+  /// full
   void add(const Frame& frame);
   /// Saves what was added: when no frame comes for a while. @throws Error (Fault::system)
   void flush();

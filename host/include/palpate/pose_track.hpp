@@ -40,24 +40,23 @@ class PoseTrack {
 /// in the order of time (seconds since the Unix epoch, as the frames' host times), from a file, a
 /// FIFO or standard input. Other keys and empty lines are passed over.
 ///
-/// A file is read when the sensor is opened, and a line of it that is no pose is an error. A FIFO or
-/// standard input is read as it comes, without waiting: such a line is passed over and counted. A
-/// frame is held back until the pose after it has come, at most for 0.2 s.
+/// A file is read when the sensor is opened, and a line of it that is no pose is an error. A FIFO
+/// or standard input is read as it comes, without waiting: such a line is passed over and counted.
+/// A frame is held back until the pose after it has come, at most for 0.2 s.
 class PosedSensor : public Sensor {
  public:
   /// What came from the robot.
   struct Poses {
     std::uint64_t read = 0;
-    std::uint64_t refused = 0;   ///< lines that are no pose, or one that is not later than another
-    std::string first_refused;   ///< what was wrong with the first of them, naming the line
-    std::uint64_t frames = 0;    ///< frames with a pose
-    std::uint64_t without = 0;   ///< frames without one
+    std::uint64_t refused = 0;  ///< lines that are no pose, or one that is not later than another
+    std::string first_refused;  ///< what was wrong with the first of them, naming the line
+    std::uint64_t frames = 0;   ///< frames with a pose
+    std::uint64_t without = 0;  ///< frames without one
   };
 
   /// @param poses path of a file or FIFO, or "-": standard input
   /// @throws Error (Fault::input) where it cannot be read, or a line of a file is no pose
-  PosedSensor(std::unique_ptr<Sensor> sensor, const std::string& poses,
-              double largest_gap_s = 0.1);
+  PosedSensor(std::unique_ptr<Sensor> sensor, const std::string& poses, double largest_gap_s = 0.1);
   ~PosedSensor() override;
 
   const SensorDescription& description() const override;

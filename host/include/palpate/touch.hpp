@@ -52,12 +52,12 @@ struct Recording {
   std::optional<Truth> truth;
 
   // What a stream of frames has besides. Its poses may be NaN: not known at that time.
-  std::string sensor;                      ///< name of the sensor, "" when unknown
-  std::string serial;                      ///< its serial number, "" where it has none
-  std::vector<double> baseline;            ///< empty or [e]: what it reads untouched
-  std::vector<double> device_time_s;       ///< empty or [n], by the sensor's own clock; NaN: unknown
+  std::string sensor;                 ///< name of the sensor, "" when unknown
+  std::string serial;                 ///< its serial number, "" where it has none
+  std::vector<double> baseline;       ///< empty or [e]: what it reads untouched
+  std::vector<double> device_time_s;  ///< empty or [n], by the sensor's own clock; NaN: unknown
   std::vector<std::uint64_t> lost_before;  ///< empty or [n]: frames lost since the one before
-  bool closed = true;  ///< false: it was cut off, or is still being recorded
+  bool closed = true;                      ///< false: it was cut off, or is still being recorded
 
   /// Number of touches, n.
   std::size_t size() const { return T_robot_sensor.size(); }

@@ -43,10 +43,10 @@ struct DetectedTouch {
 /// than a step of the sensor's converter and averages noise almost as well as the mean (84 %
 /// against 64 % of its efficiency); and a quarter of the frames may be wrong to either side.
 ///
-/// While nothing is touched the baseline follows slow drift. Lost frames do no harm beyond what they
-/// do to the time a touch is seen; a silence longer than `largest_gap_s`, or a clock that goes back,
-/// ends a touch and begins anew. The memory in use is bounded: of a long steady phase, frames evenly
-/// spread over it are kept.
+/// While nothing is touched the baseline follows slow drift. Lost frames do no harm beyond what
+/// they do to the time a touch is seen; a silence longer than `largest_gap_s`, or a clock that goes
+/// back, ends a touch and begins anew. The memory in use is bounded: of a long steady phase, frames
+/// evenly spread over it are kept.
 class TouchDetector {
  public:
   /// @param baseline [e] what the array reads when nothing is touched, subtracted from every frame;

@@ -18,8 +18,8 @@ bool is_virtual_sensor(std::string_view name);
 ///
 /// "simulate:SHAPE" is a robot that presses a DigiTacts array onto a shape, as make_shape() names
 /// it, again and again at random poses where it touches it: it hovers for 1 s, then takes 1 s for
-/// each press, 0.3 s on the way there, 0.1 s to press, 0.5 s of steady contact and 0.1 s to lift. An
-/// element reads about 3 kPa when nothing touches it, every reading has noise of its own, and
+/// each press, 0.3 s on the way there, 0.1 s to press, 0.5 s of steady contact and 0.1 s to lift.
+/// An element reads about 3 kPa when nothing touches it, every reading has noise of its own, and
 /// T_robot_sensor is known. Without `object` the shape lies at the robot's origin and the stream
 /// bears its label; with it the stream is one of an unknown with its truth.
 ///
@@ -32,8 +32,8 @@ bool is_virtual_sensor(std::string_view name);
 ///   noise=KPA     standard deviation of each reading's noise [0.7]
 ///   object=random|X:Y:DEG   T_object_robot of an unknown, in mm and degrees
 ///
-/// @throws Error (Fault::input) on an unknown option or value, a file that is no recording of frames
-/// with times, an array that changes
+/// @throws Error (Fault::input) on an unknown option or value, a file that is no recording of
+/// frames with times, an array that changes
 std::unique_ptr<Sensor> open_virtual_sensor(const std::string& name);
 
 }  // namespace palpate

@@ -1,0 +1,182 @@
+#include <fmt/format.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <cmath>
+#include <csignal>
+#include <random>
+#include <thread>
+
+#include "palpate/files.hpp"
+#include "program.hpp"
+
+namespace palpate {
+namespace {
+
+using namespace std::chrono_literals;
+
+class RecordCommand : public ProgramTest {
+ protected:
+  Recording recorded(const std::string& file, std::vector<std::string> arguments) const {
+    arguments.insert(arguments.begin(), {"record", "-o", file});
+    EXPECT_NE(done(arguments).find(file + ": "), std::string::npos);
+    return read_recording(folder_ / file);
+  }
+
+  // The program while it records, its output in "said".
+  pid_t start(const std::string& file, const std::string& sensor) const {
+    const pid_t pid = ::fork();
+    if (pid == 0) {
+      if (::chdir(folder_.path().c_str()) != 0 || std::freopen("said", "w", stdout) == nullptr ||
+          std::freopen("complained", "w", stderr) == nullptr) {
+        ::_exit(126);
+      }
+      become_program({"record", "--sensor", sensor, "-o", file});
+    }
+    return pid;
+  }
+
+  static int end(pid_t pid, int signal) {
+    ::kill(pid, signal);
+    int status = 0;
+    ::waitpid(pid, &status, 0);
+    return status;
+  }
+
+  // Waits for the recording, unless the program ends first.
+  bool appears(const std::string& file, pid_t pid) const {
+    while (!std::filesystem::exists(folder_ / file)) {
+      if (::waitpid(pid, nullptr, WNOHANG) != 0) {
+        return false;
+      }
+      std::this_thread::sleep_for(5ms);
+    }
+    return true;
+  }
+};
+
+TEST_F(RecordCommand, KeepsAllThatTheSensorSays) {
+  const Recording r =
+      recorded("s.h5", {"--sensor", "simulate:E,touches=2,object=3:-4:30,speed=max"});
+  EXPECT_EQ(r.rows, "frames");
+  EXPECT_EQ(r.size(), 361u);  // 1 s, 2 presses, 0.6 s, both ends
+  EXPECT_EQ(r.elements(), 36u);
+  EXPECT_TRUE(r.closed);
+  EXPECT_EQ(r.lost_before, std::vector<std::uint64_t>(361, 0));
+  ASSERT_TRUE(r.truth);
+  EXPECT_EQ(r.truth->object, "E");
+  ASSERT_EQ(r.baseline.size(), 36u);
+  for (const double baseline : r.baseline) {
+    EXPECT_NEAR(baseline, 3.0, 2.0);  // four deviations of 0.5 kPa
+  }
+  for (const Pose& pose : r.T_robot_sensor) {
+    EXPECT_TRUE(std::isfinite(pose.theta_rad));
+  }
+}
+
+TEST_F(RecordCommand, SummaryAndInfoSayWhatThereIs) {
+  expect_named(done({"record", "--sensor", "simulate:A,speed=max", "-o", "s.h5", "--seconds", "4",
+                     "--object", "letter"}),
+               {"s.h5: 400 frames in 3.990 s, 100.0 Hz, 0 lost, 400 with a pose"});
+  expect_named(done({"info", "s.h5"}),
+               {"recording of letter", "frames           400", "rate              100.0 Hz",
+                "lost              0", "baseline          ", "closed            yes",
+                "simulated DigiTacts"});
+}
+
+TEST_F(RecordCommand, ReplayIsTheRecordingAgain) {
+  const Recording first = recorded("a.h5", {"--sensor", "simulate:A,touches=1,speed=max"});
+  const Recording again = recorded("b.h5", {"--sensor", "replay:a.h5,speed=max"});
+  EXPECT_EQ(again.pressure, first.pressure);
+  EXPECT_EQ(again.time_s, first.time_s);
+  EXPECT_EQ(again.baseline, first.baseline);
+  EXPECT_EQ(again.object, "A");
+}
+
+TEST_F(RecordCommand, PosesComeFromAFile) {
+  std::string poses;
+  const Recording first = recorded("a.h5", {"--sensor", "simulate:A,touches=1,speed=max"});
+  for (int i = 0; i <= 20; ++i) {
+    poses += fmt::format(R"({{"time": {:.3f}, "x_mm": {}, "y_mm": 2, "theta_rad": 1}})"
+                         "\n",
+                         first.time_s[0] - 0.025 + 0.05 * i, i);
+  }
+  put_bytes(folder_ / "poses", poses);
+  const Recording posed =
+      recorded("b.h5", {"--sensor", "replay:a.h5,speed=max", "--poses", "poses"});
+  EXPECT_NEAR(posed.T_robot_sensor[0].translation_mm.x, 0.5, 0.03);  // times rounded to 1 ms
+  EXPECT_NEAR(posed.T_robot_sensor[50].translation_mm.x, 10.5, 0.03);
+  EXPECT_TRUE(std::isnan(posed.T_robot_sensor[200].theta_rad)) << "the poses have ended";
+  put_bytes(folder_ / "poses", poses + "nonsense\n");
+  expect_refused({"record", "--sensor", "replay:a.h5,speed=max", "--poses", "poses", "-o", "c.h5"},
+                 {"poses, line 22", "JSON"});
+}
+
+TEST_F(RecordCommand, CtrlCEndsItCleanly) {
+  const pid_t pid = start("s.h5", "simulate:A,rate=500");
+  ASSERT_TRUE(appears("s.h5", pid));
+  expect_named(done({"info", "s.h5"}), {"closed            no"});
+  const int status = end(pid, SIGINT);
+  EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 0) << bytes_of(folder_ / "complained");
+  expect_named(bytes_of(folder_ / "said"), {"s.h5: ", " frames in ", " 0 lost"});
+  EXPECT_TRUE(read_recording(folder_ / "s.h5").closed);
+}
+
+TEST_F(RecordCommand, KilledItLeavesAReadableFile) {
+  std::mt19937_64 random(3);
+  for (int run = 0; run < 6; ++run) {
+    const std::string file = fmt::format("{}.h5", run);
+    const pid_t pid = start(file, "simulate:A,rate=1000,speed=5");
+    ASSERT_TRUE(appears(file, pid));
+    std::this_thread::sleep_for(std::chrono::milliseconds(random() % 300));
+    end(pid, SIGKILL);
+    const Recording r = read_recording(folder_ / file);
+    EXPECT_GE(r.size(), 500u) << "the tare's frames at least";
+    for (std::size_t i = 1; i < r.size(); ++i) {
+      ASSERT_NEAR(r.time_s[i] - r.time_s[i - 1], 0.001, 1e-6);  // none is missing
+    }
+    EXPECT_EQ(palpate({"touches", file, "-o", "t.h5", "--onset", "1000"}).status, 2);
+  }
+}
+
+TEST_F(RecordCommand, FullDiskIsOneLineAndLeavesAReadableFile) {
+  // Less than the first rows take, and more.
+  for (const rlim_t bytes : {2048, 400000, 900000}) {
+    const Outcome outcome =
+        palpate({"record", "--sensor", "simulate:A,touches=100,speed=max", "-o", "s.h5"},
+                {.largest_file_bytes = bytes});
+    EXPECT_EQ(outcome.status, 1) << outcome.err;
+    EXPECT_EQ(std::count(outcome.err.begin(), outcome.err.end(), '\n'), 1) << outcome.err;
+    expect_named(outcome.err, {"s.h5", "File too large"});
+    if (bytes > 2048) {
+      EXPECT_GT(read_recording(folder_ / "s.h5").size(), 100u);
+    } else {
+      EXPECT_TRUE(content_of(folder_.path()).empty());
+    }
+  }
+}
+
+TEST_F(RecordCommand, TouchedWhileTheBaselineIsTakenIsRefused) {
+  // The simulated robot begins its first press after 1.3 s.
+  expect_refused(
+      {"record", "--sensor", "simulate:A,touches=1,speed=max", "-o", "s.h5", "--tare", "1.6"},
+      {"touched", "element"});
+  const Recording r =
+      recorded("s.h5", {"--sensor", "simulate:A,touches=1,speed=max", "--tare", "0"});
+  EXPECT_TRUE(r.baseline.empty());
+}
+
+TEST_F(RecordCommand, RefusesWhatCannotBeRecorded) {
+  expect_refused({"record", "--sensor", "replay:missing.h5", "-o", "s.h5"}, {"missing.h5"});
+  expect_refused({"record", "--sensor", "simulate:A,rate=x", "-o", "s.h5"}, {"rate", "x"});
+  expect_refused({"record", "--sensor", "simulate:A", "-o", "no/s.h5"}, {"no/s.h5", "mkdir"});
+  expect_refused({"record", "--sensor", "simulate:A", "-o", "s.h5", "--seconds=-1"}, {"--seconds"});
+  expect_refused({"record", "--sensor", "simulate:A", "-o", "s.h5", "--tare=nan"}, {"--tare"});
+  expect_refused({"record", "--sensor", "simulate:A", "-o", "s.h5", "--poses", "missing"},
+                 {"poses missing", "FIFO"});
+  expect_refused({"record", "-o", "s.h5"}, {"--sensor"});
+}
+
+}  // namespace
+}  // namespace palpate

@@ -1,0 +1,99 @@
+#include <cmath>
+
+#include "palpate/files.hpp"
+#include "palpate/simulation.hpp"
+#include "program.hpp"
+
+namespace palpate {
+namespace {
+
+using nlohmann::json;
+
+class TouchesCommand : public ProgramTest {
+ protected:
+  // The touches of a simulated stream, by way of a file of frames.
+  Recording touches_of(const std::string& name, const std::string& sensor) const {
+    done({"record", "--sensor", sensor + ",speed=max", "-o", name + ".frames.h5"});
+    done({"touches", name + ".frames.h5", "-o", name + ".h5"});
+    return read_recording(folder_ / (name + ".h5"));
+  }
+};
+
+TEST_F(TouchesCommand, FindsTheTouchesThatWereMade) {
+  const Recording r = touches_of("u", "simulate:O,touches=12,seed=8,object=random");
+  EXPECT_EQ(r.rows, "touches");
+  ASSERT_EQ(r.size(), 12u);
+  EXPECT_EQ(r.elements(), 36u);
+  EXPECT_EQ(r.elements_mm, digitacts_array());
+  EXPECT_EQ(r.object, "");
+  ASSERT_TRUE(r.truth);
+  EXPECT_EQ(r.truth->object, "O");
+  for (std::size_t i = 0; i < r.size(); ++i) {
+    // The steady half second is in the middle of 0.4 to 0.9 s of every second, after one of them.
+    EXPECT_NEAR(r.time_s[i] - r.time_s[0], static_cast<double>(i), 0.05);
+  }
+}
+
+TEST_F(TouchesCommand, LettersAreRecognisedByWhatTheyFound) {
+  for (const std::string letter : {"A", "E", "I"}) {
+    EXPECT_EQ(touches_of(letter, "simulate:" + letter + ",touches=150").object, letter);
+  }
+  done({"map", "A.h5", "E.h5", "I.h5", "-o", "maps/"});
+  std::vector<std::string> arguments;
+  for (const std::string letter : {"A", "E", "I"}) {
+    touches_of("u" + letter, "simulate:" + letter + ",touches=10,seed=77,object=random");
+    arguments.push_back("u" + letter + ".h5");
+  }
+  arguments.insert(arguments.end(), {"--maps", "maps"});
+  for (const json& record : records(arguments)) {
+    EXPECT_TRUE(record.at("right").get<bool>()) << record.dump(1);
+    // Half a bin of 0.8 mm and of 22.5 degrees, at an arm of 8 mm.
+    EXPECT_LT(record.at("error_mm").get<double>(), 2.0);
+  }
+}
+
+TEST_F(TouchesCommand, DeadElementsUnitAndSensorAreCopied) {
+  touches_of("a", "simulate:A,touches=2");
+  Recording frames = read_recording(folder_ / "a.frames.h5");
+  frames.pressure_unit = "raw";
+  frames.serial = "17";
+  frames.valid.assign(36, 1);
+  frames.valid[5] = 0;
+  write_recording(folder_ / "raw.h5", frames);
+  expect_refused({"touches", "raw.h5", "-o", "t.h5"}, {"raw.h5", "--onset"});
+  done({"touches", "raw.h5", "-o", "t.h5", "--onset", "2"});
+  const Recording r = read_recording(folder_ / "t.h5");
+  EXPECT_EQ(r.size(), 2u);
+  EXPECT_EQ(r.pressure_unit, "raw");
+  EXPECT_EQ(r.serial, "17");
+  EXPECT_EQ(r.valid, frames.valid);
+}
+
+TEST_F(TouchesCommand, TouchesWithoutAPoseAreLeftOut) {
+  touches_of("a", "simulate:A,touches=3");
+  Recording frames = read_recording(folder_ / "a.frames.h5");
+  const Pose unknown{{std::nan(""), std::nan("")}, std::nan("")};
+  for (std::size_t i = 0; i < 200; ++i) {  // the first press begins at 1.3 s and ends at 2 s
+    frames.T_robot_sensor[i] = unknown;
+  }
+  write_recording(folder_ / "b.h5", frames);
+  expect_named(done({"touches", "b.h5", "-o", "t.h5"}), {"2 touches", "1 without a pose left out"});
+  EXPECT_EQ(read_recording(folder_ / "t.h5").size(), 2u);
+  frames.T_robot_sensor.assign(frames.size(), unknown);
+  write_recording(folder_ / "b.h5", frames);
+  expect_refused({"touches", "b.h5", "-o", "u.h5"}, {"b.h5", "3 touches", "--poses"});
+}
+
+TEST_F(TouchesCommand, RefusesWhatHoldsNoTouches) {
+  touches_of("a", "simulate:A,touches=1");
+  expect_refused({"touches", "a.h5", "-o", "t.h5"}, {"a.h5", "touches"});
+  expect_refused({"touches", "a.frames.h5", "-o", "t.h5", "--onset", "1000"}, {"--onset"});
+  expect_refused({"touches", "a.frames.h5", "-o", "t.h5", "--onset=-1"}, {"onset = -1"});
+  expect_refused({"touches", "a.frames.h5", "-o", "t.h5", "--release", "5"}, {"release = 5"});
+  expect_refused({"touches", "a.frames.h5", "-o", "t.h5", "--steady", "2"}, {"steady = 2"});
+  expect_refused({"touches", "a.frames.h5", "-o", "a.frames.h5"}, {"--output", "input"});
+  expect_refused({"touches", "missing.h5", "-o", "t.h5"}, {"missing.h5"});
+}
+
+}  // namespace
+}  // namespace palpate

@@ -1,0 +1,257 @@
+#include "palpate/touch_detector.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "io/scratch_folder.hpp"
+#include "press.hpp"
+
+namespace palpate {
+namespace {
+
+constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+const std::vector<double> pattern = {12.0, 6.0, 0.0, 3.0};
+
+// The pattern pressed every second from 0.5 s on, for half a second each.
+std::vector<double> presses(double time_s) {
+  std::vector<double> values = pattern;
+  for (double& value : values) {
+    value *= press(std::fmod(time_s, 1.0), 0.3, 0.4);
+  }
+  return values;
+}
+
+// Five standard errors of the interquartile mean, 0.3 / sqrt(0.84 n), of 30 frames or more.
+constexpr double mean_tolerance = 0.3;
+
+void expect_pattern(const std::vector<DetectedTouch>& touches, std::size_t count) {
+  ASSERT_EQ(touches.size(), count);
+  for (std::size_t i = 0; i < count; ++i) {
+    SCOPED_TRACE(i);
+    // The press is fully there from 0.4 to 0.8 s; smoothing and ramps of 15 % take part of it.
+    EXPECT_NEAR(touches[i].begin_s - stream_begin_s, static_cast<double>(i) + 0.42, 0.06);
+    EXPECT_NEAR(touches[i].end_s - stream_begin_s, static_cast<double>(i) + 0.78, 0.06);
+    for (std::size_t k = 0; k < pattern.size(); ++k) {
+      EXPECT_NEAR(touches[i].pressure[k], pattern[k], mean_tolerance) << k;
+    }
+  }
+}
+
+TEST(TouchDetector, FindsEveryPressOnce) {
+  expect_pattern(touches_in(Stream{}.frames(8.0, presses)), 8);
+  expect_pattern(touches_in(Stream{.rate_hz = 1000.0}.frames(3.0, presses)), 3);
+}
+
+TEST(TouchDetector, FindsNothingInNoise) {
+  // 100 elements at the simulator's noise: hundreds of readings above the onset.
+  const auto untouched = [](double) { return std::vector<double>(100, 0.0); };
+  EXPECT_TRUE(touches_in(Stream{.noise = 0.7}.frames(20.0, untouched)).empty());
+}
+
+TEST(TouchDetector, ScalesWithTheUnit) {
+  std::vector<Frame> frames = Stream{}.frames(3.0, presses);
+  const std::vector<DetectedTouch> kpa = touches_in(frames);
+  constexpr double counts_per_kpa = 64.0;  // a power of two: the same digits
+  for (Frame& frame : frames) {
+    for (double& value : frame.values) {
+      value *= counts_per_kpa;
+    }
+  }
+  TouchDetectorOptions options;
+  options.onset *= counts_per_kpa;
+  options.release *= counts_per_kpa;
+  const std::vector<DetectedTouch> raw = touches_in(frames, options);
+  ASSERT_EQ(raw.size(), kpa.size());
+  for (std::size_t i = 0; i < raw.size(); ++i) {
+    EXPECT_EQ(raw[i].begin_s, kpa[i].begin_s);
+    EXPECT_EQ(raw[i].frames, kpa[i].frames);
+    for (std::size_t k = 0; k < pattern.size(); ++k) {
+      EXPECT_EQ(raw[i].pressure[k], counts_per_kpa * kpa[i].pressure[k]);
+    }
+  }
+}
+
+TEST(TouchDetector, SingleBadFramesChangeNothing) {
+  std::vector<Frame> frames = Stream{}.frames(8.0, presses);
+  for (std::size_t i = 10; i < frames.size(); i += 13) {
+    frames[i].values.assign(4, i % 2 == 0 ? 500.0 : -500.0);
+  }
+  expect_pattern(touches_in(frames), 8);
+}
+
+TEST(TouchDetector, LostFramesDoNoHarm) {
+  std::vector<Frame> frames = Stream{}.frames(8.0, presses);
+  std::mt19937_64 random(3);
+  std::erase_if(frames, [&](const Frame&) { return random() % 10 < 3; });
+  expect_pattern(touches_in(frames), 8);
+}
+
+TEST(TouchDetector, PassesOverFramesThatAreNoNumbers) {
+  std::vector<Frame> frames = Stream{}.frames(3.0, presses);
+  for (std::size_t i = 0; i < frames.size(); i += 7) {
+    frames[i].values[i % 4] = nan;
+  }
+  expect_pattern(touches_in(frames), 3);
+}
+
+TEST(TouchDetector, TapIsNoTouch) {
+  const auto tap = [](double t) { return std::vector<double>{20.0 * press(t, 0.5, 0.02)}; };
+  EXPECT_TRUE(touches_in(Stream{}.frames(2.0, tap)).empty());
+}
+
+TEST(TouchDetector, LightTouchOfOneElementIsOne) {
+  const auto light = [](double t) { return std::vector<double>{3.0 * press(t, 0.5, 0.5), 0.0}; };
+  const auto touches = touches_in(Stream{.noise = 0.5}.frames(2.0, light));
+  ASSERT_EQ(touches.size(), 1u);
+  EXPECT_NEAR(touches[0].pressure[0], 3.0, 0.5);  // five standard errors of 30 frames
+}
+
+TEST(TouchDetector, BaselineIsSubtractedAndFollowsDrift) {
+  // Untouched it reads 50 and, over five minutes, 6 more: three times the onset.
+  const auto drifting = [](double t) {
+    return std::vector<double>{50.0 + 0.02 * t + 10.0 * press(t, 300.0, 0.5)};
+  };
+  const std::vector<Frame> frames = Stream{.rate_hz = 20.0}.frames(302.0, drifting);
+  const auto count = [&](double drift_s) {
+    TouchDetectorOptions options;
+    options.drift_s = drift_s;
+    TouchDetector detector(options, {50.0}, {});
+    std::vector<DetectedTouch> touches;
+    for (const Frame& frame : frames) {
+      if (auto touch = detector.add(frame)) {
+        touches.push_back(*touch);
+      }
+    }
+    return touches;
+  };
+  const auto followed = count(10.0);
+  ASSERT_EQ(followed.size(), 1u);
+  // The baseline lags by 10 s of drift, 0.2, and has the noise of 20 s.
+  EXPECT_NEAR(followed[0].pressure[0], 10.2, 0.7);
+  EXPECT_NE(count(0.0).size(), 1u);
+}
+
+TEST(TouchDetector, BaselineStaysDuringATouch) {
+  const auto held = [](double t) { return std::vector<double>{8.0 * press(t, 1.0, 100.0)}; };
+  TouchDetector detector({.drift_s = 5.0}, {}, {});
+  std::vector<double> at_onset;
+  for (const Frame& frame : Stream{.noise = 0.0}.frames(90.0, held)) {
+    EXPECT_FALSE(detector.add(frame));
+    if (detector.touching() && at_onset.empty()) {
+      at_onset = detector.baseline();
+    }
+  }
+  EXPECT_TRUE(detector.touching());
+  EXPECT_EQ(detector.baseline(), at_onset);
+}
+
+TEST(TouchDetector, EndlessTouchKeepsABoundedPartOfAllOfIt) {
+  const auto held = [](double t) { return std::vector<double>{8.0 * press(t, 1.0, 1e6)}; };
+  TouchDetector detector({}, {}, {});
+  for (const Frame& frame : Stream{}.frames(600.0, held)) {
+    EXPECT_FALSE(detector.add(frame));
+  }
+  const auto touch = detector.finish();
+  ASSERT_TRUE(touch);
+  EXPECT_FALSE(detector.touching());
+  EXPECT_LE(touch->frames, 512u);
+  EXPECT_GE(touch->frames, 200u);
+  EXPECT_NEAR(touch->begin_s - stream_begin_s, 1.1, 0.1);
+  // The last frames may be left out, at most two of those kept: one of 128 is.
+  EXPECT_NEAR(touch->end_s - stream_begin_s, 600.0, 4.0);
+  EXPECT_NEAR(touch->pressure[0], 8.0, 0.12);  // five standard errors of 200 frames
+}
+
+TEST(TouchDetector, SilenceAndAClockThatGoesBackEndATouch) {
+  const auto held = [](double t) { return std::vector<double>{8.0 * press(t, 0.5, 1e6)}; };
+  for (const double jump_s : {3.0, -3.0}) {
+    std::vector<Frame> frames = Stream{}.frames(4.0, held);
+    for (std::size_t i = 200; i < frames.size(); ++i) {
+      frames[i].host_time_s += jump_s;
+    }
+    const auto touches = touches_in(frames);
+    ASSERT_EQ(touches.size(), 2u) << jump_s;
+    EXPECT_LT(touches[0].end_s, frames[200].host_time_s + (jump_s < 0.0 ? 10.0 : 0.0));
+    EXPECT_GE(touches[1].begin_s, frames[200].host_time_s);
+  }
+}
+
+TEST(TouchDetector, DeadElementsTakeNoPart) {
+  std::vector<Frame> frames = Stream{}.frames(2.0, presses);
+  TouchDetector detector({}, {0.0, 0.0, 5e3, 0.0}, {1, 1, 0, 1});
+  std::vector<DetectedTouch> touches;
+  for (Frame& frame : frames) {
+    frame.values[2] = frame.host_time_s > stream_begin_s + 1.0 ? nan : 9999.0;
+    if (auto touch = detector.add(frame)) {
+      touches.push_back(*touch);
+    }
+  }
+  ASSERT_EQ(touches.size(), 2u);
+  EXPECT_EQ(touches[0].pressure[2], 0.0);
+}
+
+TEST(TouchDetector, PoseIsTheMeanAcrossTheTurn) {
+  std::vector<Frame> frames = Stream{}.frames(1.0, presses);
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    const double sign = i % 2 == 0 ? 1.0 : -1.0;
+    if (i % 4 < 2) {  // half of the frames have none
+      frames[i].T_robot_sensor = Pose{{5.0 + 0.1 * sign, -2.0}, sign * (std::numbers::pi - 0.01)};
+    }
+  }
+  const auto touches = touches_in(frames);
+  ASSERT_EQ(touches.size(), 1u);
+  ASSERT_TRUE(touches[0].T_robot_sensor);
+  const Pose& pose = *touches[0].T_robot_sensor;
+  // At worst one frame more of one sign than of the other.
+  EXPECT_NEAR(pose.translation_mm.x, 5.0, 0.011);
+  EXPECT_NEAR(pose.translation_mm.y, -2.0, 1e-9);
+  EXPECT_NEAR(std::abs(wrap_angle(pose.theta_rad, 2 * std::numbers::pi)), std::numbers::pi, 0.002);
+}
+
+TEST(TouchDetector, TouchWithoutPosesHasNone) {
+  const auto touches = touches_in(Stream{}.frames(1.0, presses));
+  ASSERT_EQ(touches.size(), 1u);
+  EXPECT_FALSE(touches[0].T_robot_sensor);
+}
+
+TEST(TouchDetector, OfASlideTheLongestRestCounts) {
+  const auto held = [](double t) { return std::vector<double>{8.0 * press(t, 0.5, 3.0)}; };
+  std::vector<Frame> frames = Stream{}.frames(5.0, held);
+  for (Frame& frame : frames) {
+    const double t = frame.host_time_s - stream_begin_s;
+    // At rest at 0 for 0.5 s, then a slide of 20 mm in 0.5 s, then at rest for 2 s.
+    frame.T_robot_sensor = Pose{{20.0 * std::clamp((t - 1.1) / 0.5, 0.0, 1.0), 0.0}, 0.0};
+  }
+  const auto touches = touches_in(frames);
+  ASSERT_EQ(touches.size(), 1u);
+  EXPECT_NEAR(touches[0].T_robot_sensor->translation_mm.x, 20.0, 0.1);  // a fifth of steady_mm
+  EXPECT_NEAR(touches[0].end_s - touches[0].begin_s, 2.0, 0.15);
+}
+
+TEST(TouchDetector, RefusesWhatCannotBe) {
+  const auto refused = [](TouchDetectorOptions options) {
+    return input_error([&] { TouchDetector(options, {}, {}); });
+  };
+  for (const double wrong : {nan, -1.0, std::numeric_limits<double>::infinity()}) {
+    expect_named(refused({.onset = wrong}), {"onset"});
+    expect_named(refused({.release = wrong}), {"release"});
+    expect_named(refused({.steady = wrong}), {"steady"});
+    expect_named(refused({.min_steady_s = wrong}), {"min_steady_s"});
+    expect_named(refused({.steady_mm = wrong}), {"steady_mm"});
+    expect_named(refused({.steady_rad = wrong}), {"steady_rad"});
+    expect_named(refused({.smooth_s = wrong}), {"smooth_s"});
+    expect_named(refused({.drift_s = wrong}), {"drift_s"});
+    expect_named(refused({.largest_gap_s = wrong}), {"largest_gap_s"});
+  }
+  expect_named(refused({.onset = 1.0, .release = 2.0}), {"release = 2"});
+  expect_named(input_error([] { TouchDetector({}, {1.0, 2.0}, {1}); }), {"2 baseline", "1 valid"});
+  expect_named(input_error([] { TouchDetector({}, {nan}, {}); }), {"baseline"});
+  TouchDetector detector({}, {0.0, 0.0}, {});
+  expect_named(input_error([&] { detector.add({.values = {1.0}}); }), {"1 values", "2"});
+}
+
+}  // namespace
+}  // namespace palpate

@@ -1,0 +1,241 @@
+#include "palpate/virtual_sensor.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "io/scratch_folder.hpp"
+#include "palpate/baseline.hpp"
+#include "palpate/files.hpp"
+#include "palpate/simulation.hpp"
+#include "palpate/touch_detector.hpp"
+
+namespace palpate {
+namespace {
+
+using namespace std::chrono_literals;
+
+constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+
+std::vector<Frame> frames_of(Sensor& sensor) {
+  std::vector<Frame> frames;
+  sensor.start();
+  while (!sensor.ended()) {
+    if (auto frame = sensor.next(100ms)) {
+      frames.push_back(std::move(*frame));
+    }
+  }
+  sensor.stop();
+  return frames;
+}
+
+std::vector<Frame> frames_of(const std::string& name) {
+  return frames_of(*open_virtual_sensor(name));
+}
+
+std::vector<DetectedTouch> touches_of(const std::string& name) {
+  const auto sensor = open_virtual_sensor(name);
+  const std::vector<Frame> frames = frames_of(*sensor);
+  const std::span first = std::span(frames).first(frames.size() / 30);
+  TouchDetector detector({}, baseline_of(first, sensor->description(), 2.0), {});
+  std::vector<DetectedTouch> touches;
+  for (const Frame& frame : frames) {
+    if (auto touch = detector.add(frame)) {
+      touches.push_back(std::move(*touch));
+    }
+  }
+  EXPECT_FALSE(detector.finish()) << "the stream ends untouched";
+  return touches;
+}
+
+TEST(SimulatedSensor, ThePressesAreFoundAsTheyWereMade) {
+  const std::string name = "simulate:E,seed=4,touches=20,object=3:-4:30,speed=max";
+  const auto touches = touches_of(name);
+  const auto exact = touches_of(name + ",noise=0");
+  ASSERT_EQ(touches.size(), 20u);
+  ASSERT_EQ(exact.size(), 20u);
+  const Pose T_object_robot{{3.0, -4.0}, std::numbers::pi / 6.0};
+  std::vector<Pose> drawn = random_poses(256, 4);
+  for (std::size_t i = 0; i < touches.size(); ++i) {
+    SCOPED_TRACE(i);
+    ASSERT_TRUE(touches[i].T_robot_sensor);
+    const Pose T_object_sensor = T_object_robot * *touches[i].T_robot_sensor;
+    // The robot stands still while it presses: only rounding.
+    const auto is_it = [&](const Pose& pose) {
+      return std::abs(pose.translation_mm.x - T_object_sensor.translation_mm.x) < 1e-9 &&
+             std::abs(pose.translation_mm.y - T_object_sensor.translation_mm.y) < 1e-9 &&
+             std::abs(wrap_angle(pose.theta_rad - T_object_sensor.theta_rad,
+                                 2.0 * std::numbers::pi)) < 1e-9;
+    };
+    const auto found = std::find_if(drawn.begin(), drawn.end(), is_it);
+    ASSERT_NE(found, drawn.end());
+    drawn.erase(drawn.begin(), found + 1);  // each once, in order
+    for (std::size_t k = 0; k < touches[i].pressure.size(); ++k) {
+      // Five standard errors of the steady mean, 0.7 / sqrt(0.84 * 40), and of the baseline,
+      // 1.25 * 0.7 / sqrt(70).
+      EXPECT_NEAR(touches[i].pressure[k], exact[i].pressure[k], 0.8) << k;
+    }
+  }
+}
+
+TEST(SimulatedSensor, SteadyFramesWithoutNoiseAreTheSimulatorsTouch) {
+  const auto exact = touches_of("simulate:I,touches=5,noise=0,speed=max");
+  SensorModel model;
+  model.noise_kpa = 0.0;
+  Simulator simulator(make_shape("I"), model, digitacts_array(), 1);
+  std::size_t found = 0;
+  for (const Pose& pose : random_poses(256, 1)) {
+    const std::vector<double> pressure = simulator.touch({pose}, {}).pressure;
+    if (found < exact.size() && *std::max_element(pressure.begin(), pressure.end()) >= 5.0) {
+      for (std::size_t k = 0; k < pressure.size(); ++k) {
+        // The baseline follows the begin of each press, below 1 kPa for less than 0.1 s of its 60.
+        EXPECT_NEAR(exact[found].pressure[k], pressure[k], 5 * 0.1 / 60.0);
+      }
+      ++found;
+    }
+  }
+  EXPECT_EQ(found, 5u);
+}
+
+TEST(SimulatedSensor, SameSeedGivesTheSameStream) {
+  const auto values = [](const std::string& name) {
+    std::vector<double> all;
+    for (const Frame& frame : frames_of(name)) {
+      all.insert(all.end(), frame.values.begin(), frame.values.end());
+    }
+    return all;
+  };
+  const std::string name = "simulate:A,touches=2,speed=max";
+  EXPECT_EQ(values(name), values(name));
+  EXPECT_EQ(values(name), values(name + ",seed=1"));
+  EXPECT_NE(values(name), values(name + ",seed=2"));
+  const auto sensor = open_virtual_sensor(name);
+  EXPECT_EQ(frames_of(*sensor)[77].values, frames_of(*sensor)[77].values) << "start() begins anew";
+}
+
+TEST(SimulatedSensor, FramesComeAtTheRate) {
+  const auto sensor = open_virtual_sensor("simulate:A,touches=1,rate=250,speed=max");
+  EXPECT_EQ(sensor->description().rate_hz, 250.0);
+  EXPECT_EQ(sensor->description().object, "A");
+  EXPECT_FALSE(sensor->description().truth);
+  const std::vector<Frame> frames = frames_of(*sensor);
+  // 1 s of hovering, 1 s of pressing, 0.6 s until the end; the first and the last frame count.
+  ASSERT_EQ(frames.size(), 651u);
+  for (std::size_t i = 1; i < frames.size(); ++i) {
+    // A double holds times since 1970 to 2.4e-7 s.
+    EXPECT_NEAR(frames[i].host_time_s - frames[i - 1].host_time_s, 0.004, 1e-6);
+  }
+}
+
+TEST(SimulatedSensor, RealTimeIsNotOvertaken) {
+  const auto sensor = open_virtual_sensor("simulate:A,touches=1,speed=20");
+  const auto begin = std::chrono::steady_clock::now();
+  EXPECT_EQ(frames_of(*sensor).size(), 261u);
+  EXPECT_GE(std::chrono::steady_clock::now() - begin, 2.6s / 20);
+  sensor->start();
+  ASSERT_TRUE(sensor->next(1s));
+  const auto slow = open_virtual_sensor("simulate:A,rate=1,speed=0.001");
+  slow->start();
+  ASSERT_TRUE(slow->next(1s));
+  EXPECT_FALSE(slow->next(1ms)) << "the second frame is due in 1,000 s";
+  EXPECT_FALSE(slow->ended());
+}
+
+class ReplayedFile : public testing::Test {
+ protected:
+  ReplayedFile() {
+    recording_.rows = "frames";
+    recording_.sensor = "Board";
+    recording_.serial = "9";
+    recording_.elements_mm = {{0.0, 0.0}, {1.0, 0.0}};
+    recording_.valid = {1, 0};
+    recording_.baseline = {2.0, 0.0};
+    for (int i = 0; i < 50; ++i) {
+      recording_.pressure.insert(recording_.pressure.end(), {0.5 * i, nan});
+      recording_.time_s.push_back(1.7e9 + 0.01 * i);
+      recording_.device_time_s.push_back(i % 2 == 0 ? 0.01 * i : nan);
+      recording_.lost_before.push_back(i == 7 ? 3 : 0);
+      recording_.T_robot_sensor.push_back(i < 25 ? Pose{{nan, nan}, nan} : Pose{{1.0 * i, 0}, 2.0});
+    }
+    recording_.truth = {.object = "U", .T_object_robot = {}};
+  }
+
+  std::string saved() {
+    write_recording(path_, recording_);
+    return "replay:" + path_.string();
+  }
+
+  ScratchFolder folder_;
+  std::filesystem::path path_ = folder_ / "with, comma=.h5";
+  Recording recording_;
+};
+
+TEST_F(ReplayedFile, ComesAsItWasRecorded) {
+  const auto sensor = open_virtual_sensor(saved() + ",speed=max");
+  const SensorDescription& description = sensor->description();
+  EXPECT_EQ(description.name, "Board");
+  EXPECT_EQ(description.serial, "9");
+  EXPECT_EQ(description.elements_mm, recording_.elements_mm);
+  EXPECT_EQ(description.valid, recording_.valid);
+  EXPECT_EQ(description.baseline, recording_.baseline);
+  EXPECT_NEAR(description.rate_hz, 100.0, 1e-3);  // times are good to 2.4e-7 s in 0.49 s
+  ASSERT_TRUE(description.truth);
+  EXPECT_EQ(description.truth->object, "U");
+  const std::vector<Frame> frames = frames_of(*sensor);
+  ASSERT_EQ(frames.size(), 50u);
+  for (std::size_t i = 0; i < 50; ++i) {
+    EXPECT_EQ(frames[i].host_time_s, recording_.time_s[i]);
+    EXPECT_EQ(frames[i].values[0], recording_.pressure[2 * i]);
+    EXPECT_EQ(frames[i].device_time_s.has_value(), i % 2 == 0);
+    EXPECT_EQ(frames[i].T_robot_sensor.has_value(), i >= 25);
+    EXPECT_EQ(frames[i].lost_before, i == 7 ? 3u : 0u);
+  }
+  EXPECT_EQ(sensor->counters().frames, 50u);
+  EXPECT_EQ(sensor->counters().lost, 3u);
+}
+
+TEST_F(ReplayedFile, TakesItsTime) {
+  const auto sensor = open_virtual_sensor(saved() + ",speed=5");
+  const auto begin = std::chrono::steady_clock::now();
+  EXPECT_EQ(frames_of(*sensor).size(), 50u);
+  EXPECT_GE(std::chrono::steady_clock::now() - begin, 0.489s / 5);
+}
+
+TEST_F(ReplayedFile, RefusesWhatIsNoStream) {
+  recording_.time_s.clear();
+  expect_named(input_error([&] { open_virtual_sensor(saved()); }), {"comma=.h5", "'time'"});
+  recording_.rows = "touches";
+  recording_.T_robot_sensor.assign(50, {});
+  expect_named(input_error([&] { open_virtual_sensor(saved()); }), {"comma=.h5", "touches"});
+  expect_named(input_error([] { open_virtual_sensor("replay:missing.h5"); }), {"missing.h5"});
+}
+
+TEST(VirtualSensor, RefusesNamesThatSayNothing) {
+  const auto refused = [](const std::string& name, std::initializer_list<const char*> parts) {
+    EXPECT_TRUE(is_virtual_sensor(name));
+    expect_named(input_error([&] { open_virtual_sensor(name); }), parts);
+  };
+  refused("simulate:", {"simulate:SHAPE"});
+  refused("replay:,speed=max", {"replay:FILE"});
+  refused("simulate:A,rat=3", {"rat", "rate, seed"});
+  refused("simulate:A,rate", {"rate", "value"});
+  refused("simulate:A,rate=", {"rate", "number"});
+  refused("simulate:A,rate=0", {"rate", "1"});
+  refused("simulate:A,rate=nan", {"rate"});
+  refused("simulate:A,rate=10x", {"rate"});
+  refused("simulate:A,rate=10,rate=20", {"rate", "twice"});
+  refused("simulate:A,seed=-1", {"seed"});
+  refused("simulate:A,touches=0", {"touches"});
+  refused("simulate:A,noise=-1", {"noise"});
+  refused("simulate:A,object=1:2", {"object", "X:Y:DEG"});
+  refused("simulate:A,object=1:2:x", {"object"});
+  refused("simulate:A,speed=0", {"speed"});
+  refused("simulate:AB", {"AB"});
+  EXPECT_FALSE(is_virtual_sensor("takktile"));
+}
+
+}  // namespace
+}  // namespace palpate
