@@ -50,7 +50,6 @@ Outcome run_program(const std::filesystem::path& folder, const std::vector<std::
   const ScratchFolder captured;
   const std::filesystem::path out = captured / "out";
   const std::filesystem::path err = captured / "err";
-  const bool draws = std::find(arguments.begin(), arguments.end(), "--png") != arguments.end();
   const pid_t pid = ::fork();
   if (pid == 0) {
     if (::chdir(folder.c_str()) != 0) {
@@ -60,10 +59,6 @@ Outcome run_program(const std::filesystem::path& folder, const std::vector<std::
              surroundings.standard_output.empty() ? out : surroundings.standard_output);
     redirect(STDERR_FILENO,
              surroundings.standard_error.empty() ? err : surroundings.standard_error);
-    if (draws) {
-      // Fontconfig never frees its cache.
-      ::setenv("LSAN_OPTIONS", "detect_leaks=0", 1);
-    }
     if (surroundings.largest_file_bytes) {
       limit_files(*surroundings.largest_file_bytes);
     }
