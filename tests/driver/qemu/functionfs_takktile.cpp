@@ -115,7 +115,11 @@ class Stream {
 
  private:
   void send() {
-    const int in = open_endpoint(folder_ + "/ep1");
+    const int in = open((folder_ + "/ep1").c_str(), O_RDWR);
+    if (in < 0) {
+      std::perror("ep1");  // unplugged between the request and now
+      return;
+    }
     std::vector<std::uint8_t> frame(std::size_t{rows} * columns * 4);
     sent_ = 0;
     auto next = std::chrono::steady_clock::now();
