@@ -13,6 +13,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <cerrno>
 #include <chrono>
 #include <cstdint>
 #include <cstdio>
@@ -186,7 +187,14 @@ int main(int argc, char** argv) {
 
   Stream stream(folder, std::atoi(argv[2]));
   usb_functionfs_event event;
-  while (read(control, &event, sizeof(event)) == sizeof(event)) {
+  while (true) {
+    if (read(control, &event, sizeof(event)) != sizeof(event)) {
+      if (errno == EIDRM || errno == EINTR) {
+        continue;  // the host gave a request up for the next
+      }
+      std::perror("ep0");
+      return 1;
+    }
     if (event.type == FUNCTIONFS_DISABLE || event.type == FUNCTIONFS_UNBIND) {
       stream.stop();
       stream.join();
@@ -218,5 +226,4 @@ int main(int argc, char** argv) {
       }
     }
   }
-  return 0;
 }
