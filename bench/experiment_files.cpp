@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include "atomic_file.hpp"
+#include "error_json.hpp"
 #include "experiment_result.hpp"
 
 namespace palpate::bench {
@@ -11,13 +12,6 @@ namespace palpate::bench {
 namespace {
 
 using Json = nlohmann::ordered_json;
-
-Json json_of(const std::optional<ErrorSummary>& error) {
-  if (!error) {
-    return nullptr;
-  }
-  return {{"mean", error->mean_mm}, {"median", error->median_mm}, {"p95", error->p95_mm}};
-}
 
 Json json_of(const FilterRun& run) {
   Json curve = Json::array();

@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 
+#include "error_json.hpp"
 #include "sweep_findings.hpp"
 
 namespace palpate::bench {
@@ -14,13 +15,6 @@ namespace palpate::bench {
 namespace {
 
 using Json = nlohmann::ordered_json;
-
-Json json_of(const std::optional<ErrorSummary>& error) {
-  if (!error) {
-    return nullptr;
-  }
-  return {{"mean", error->mean_mm}, {"median", error->median_mm}, {"p95", error->p95_mm}};
-}
 
 Json json_of(const Deviation& deviation) {
   return {{"largest", deviation.largest}, {"rms", deviation.rms}, {"samples", deviation.samples}};
