@@ -6,17 +6,17 @@
 namespace palpate {
 
 double NumberType::read(std::span<const std::uint8_t> wire) const {
-  std::uint64_t pattern = 0;
+  // A negative integer's sign fills the bytes above those on the wire.
+  const bool negative = kind == Kind::signed_integer && wire[big_endian ? 0 : bytes - 1] >= 0x80;
+  std::uint64_t pattern = negative ? ~std::uint64_t{0} : 0;
   for (std::size_t i = 0; i < bytes; ++i) {
     pattern = pattern << 8 | wire[big_endian ? i : bytes - 1 - i];
   }
   switch (kind) {
     case Kind::unsigned_integer:
       return static_cast<double>(pattern);
-    case Kind::signed_integer: {
-      const int unused_bits = 64 - 8 * bytes;
-      return static_cast<double>(static_cast<std::int64_t>(pattern << unused_bits) >> unused_bits);
-    }
+    case Kind::signed_integer:
+      return static_cast<double>(static_cast<std::int64_t>(pattern));
     case Kind::real:
       return bytes == 8 ? std::bit_cast<double>(pattern)
                         : double{std::bit_cast<float>(static_cast<std::uint32_t>(pattern))};

@@ -75,10 +75,8 @@ void PoseReader::read() {
     const ssize_t got = ::read(descriptor_, bytes, sizeof bytes);
     if (got > 0) {
       take({bytes, static_cast<std::size_t>(got)});
-    } else if (got < 0) {
-      return;  // nothing there yet
-    } else if (is_fifo_) {
-      return;  // another writer may come
+    } else if (got < 0 || is_fifo_) {
+      return;  // nothing there yet, or another writer may come
     } else {
       ended_ = true;
       end_line();
