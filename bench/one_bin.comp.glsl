@@ -5,7 +5,7 @@
 // invocation, one theta per workgroup, everything in storage buffers, one exp and one log per
 // element.
 
-#include "../shaders/interface.h"
+#include "one_bin_push.h"
 
 layout(local_size_x_id = 0) in;
 layout(constant_id = 1) const float RANDOM_FLOOR = 0.02;  // gamma m
@@ -18,7 +18,7 @@ layout(std430, binding = 1) readonly buffer Axes { Split axis[]; };  // nx of x,
 layout(std430, binding = 2) readonly buffer Elements { RotatedElement rotated[]; };
 layout(std430, binding = 3) readonly buffer Segments { Segment segment[]; };
 layout(std430, binding = 4) buffer Belief { vec2 belief[]; };  // [theta, y, x]
-layout(push_constant) uniform Push { LikelihoodPush push; };
+layout(push_constant) uniform Push { OneBinPush push; };
 
 // Bilinear in log odds. Outside the map both nodes are of the border and hold the prior.
 float interpolate(const Split bin_x, const Split bin_y, const RotatedElement element) {
@@ -46,13 +46,13 @@ float log_likelihood(const uint reading, const float log_odds) {
 void main() {
   const uint in_plane = gl_GlobalInvocationID.x;
   const uint theta = gl_WorkGroupID.z;
-  if (in_plane >= push.nx * push.rows) {
+  if (in_plane >= push.nx * push.ny) {
     return;
   }
   const Split bin_x = axis[in_plane % push.nx];
   const Split bin_y = axis[push.nx + in_plane / push.nx];
   const uint table = theta * push.elements;
-  const uint bin = theta * push.nx * push.rows + in_plane;
+  const uint bin = theta * push.nx * push.ny + in_plane;
 
   vec2 sum = belief[bin];
   for (uint s = 0; s < push.segments; ++s) {

@@ -4,6 +4,7 @@
 
 #include "contact_evidence.hpp"
 #include "one_bin.hpp"
+#include "one_bin_push.h"
 #include "two_float.hpp"
 
 namespace palpate::bench {
@@ -23,7 +24,7 @@ gpu::Kernel make_kernel(gpu::Context& context, const ContactLikelihood& model) {
           {.name = "one_bin",
            .spirv = shaders::one_bin,
            .bindings = bindings,
-           .push_bytes = sizeof(shaders::LikelihoodPush),
+           .push_bytes = sizeof(shaders::OneBinPush),
            .constants = constants}};
 }
 
@@ -65,11 +66,9 @@ void OneBinKernel::update(std::span<const Touch> touches) {
                rotate_evidence(evidence.from_pivot_mm, lattice_.theta_rad, cell_mm_), "elements");
   const gpu::Buffer segments = uploaded(context_, stream_, evidence.segments, "segments");
   for (const Object& object : objects_) {
-    const shaders::LikelihoodPush push{
+    const shaders::OneBinPush push{
         .nx = static_cast<shaders::uint>(lattice_.x_mm.count),
-        .row_first = 0,
-        .rows = static_cast<shaders::uint>(lattice_.y_mm.count),
-        .theta_first = 0,
+        .ny = static_cast<shaders::uint>(lattice_.y_mm.count),
         .segments = static_cast<shaders::uint>(evidence.segments.size()),
         .elements = static_cast<shaders::uint>(evidence.from_pivot_mm.size()),
         .map_width = object.width,

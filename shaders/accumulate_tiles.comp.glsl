@@ -2,9 +2,9 @@
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_control_flow_attributes : require
 
-// Adds the log-likelihood of touches (Eq. 7, 13) to a slab of one object's belief, for lattices that
-// are finer than the map: one invocation takes TILE_X x TILE_Y neighbouring bins of one theta, which
-// span at most one cell, so that 3 x 3 map nodes serve all of them for each element.
+// Adds the log-likelihood of touches (Eq. 7, 13) to a slab of the belief, for lattices that are finer
+// than the map: one invocation takes TILE_X x TILE_Y neighbouring bins of one theta, which span at
+// most one cell, so that 3 x 3 map nodes serve all of them for each element.
 
 #include "interface.h"
 
@@ -21,26 +21,34 @@ layout(constant_id = 8) const float STEP_Y = 0.2;
 float log_odds_of[TILE_Y][TILE_X];  // under one element, at every bin of the tile
 
 // Bilinear in log odds, for all bins of the tile.
-void interpolate(const Split bin_x, const Split bin_y, const ivec4 element) {
+void interpolate(const ObjectPlace object, const Split bin_x, const Split bin_y,
+                 const ivec4 element) {
   const float x = bin_x.fraction + intBitsToFloat(element.y);
   const float y = bin_y.fraction + intBitsToFloat(element.w);
   const float whole_x = floor(x);
   const float whole_y = floor(y);
   const float fx = x - whole_x;
   const float fy = y - whole_y;
-  const int column = clamp(bin_x.cell + element.x + int(whole_x), 0, push.map_width - 3);
-  const int row = clamp(bin_y.cell + element.z + int(whole_y), 0, push.map_height - 3);
+  const int column = clamp(bin_x.cell + element.x + int(whole_x), 0, object.map_width - 3);
+  const int row = clamp(bin_y.cell + element.z + int(whole_y), 0, object.map_height - 3);
+
+  // Four fetches hold all nine nodes.
+  const int node = object.first_node + row * object.map_width + column;
+  const int above = node + 2 * object.map_width;
+  const vec4 left = corners(node, object.map_width);
+  const vec4 right = corners(node + 2, object.map_width);
+  const vec4 above_left = corners(above, object.map_width);
+  const vec4 above_right = corners(above + 2, object.map_width);
+  const vec3 node_rows[3] = {vec3(left.xy, right.x), vec3(left.zw, right.z),
+                             vec3(above_left.xy, above_right.x)};
 
   float nodes[3][TILE_X];  // of three rows, between columns
   [[unroll]] for (int r = 0; r < 3; ++r) {
-    const int node = (row + r) * push.map_width + column;
-    const float first = log_odds(node);
-    const float second = log_odds(node + 1);
-    const float third = log_odds(node + 2);
+    const vec3 three = node_rows[r];
     [[unroll]] for (uint i = 0; i < TILE_X; ++i) {
       const float f = fx + float(i) * STEP_X;
       nodes[r][i] =
-          first + (second - first) * min(f, 1.0) + (third - second) * max(f - 1.0, 0.0);
+          three.x + (three.y - three.x) * min(f, 1.0) + (three.z - three.y) * max(f - 1.0, 0.0);
     }
   }
   [[unroll]] for (uint i = 0; i < TILE_X; ++i) {
@@ -67,8 +75,9 @@ void main() {
   }
   const uint x = tile % tiles_x * TILE_X;
   const uint y = tile / tiles_x * TILE_Y;
-  const Split bin_x = axis[x];
-  const Split bin_y = axis[push.nx + push.row_first + y];
+  const ObjectPlace object = places[push.object_first + gl_WorkGroupID.y];
+  const Split bin_x = axis[object.first_axis + x];
+  const Split bin_y = axis[object.first_axis + push.nx + push.row_first + y];
   const int table = int((push.theta_first + theta) * push.elements);
 
   vec2 sum[TILE_Y][TILE_X];
@@ -76,7 +85,7 @@ void main() {
   float numerator[TILE_Y][TILE_X];
   float denominator[TILE_Y][TILE_X];
   // The belief's own sum goes on, so that it does not matter which touches share a dispatch.
-  const uint bin = (theta * push.rows + y) * push.nx + x;
+  const uint bin = object.first_bin + (theta * push.rows + y) * push.nx + x;
   FOR_EACH_BIN {
     sum[j][i] = x + i < push.nx && y + j < push.rows ? belief[bin + j * push.nx + i] : vec2(0.0);
   }
@@ -87,7 +96,7 @@ void main() {
     const ReadingRatio reading_says = reading_ratio(reading);
     if (IN_LOGS) {
       for (int k = segment.x; k < segment.y; ++k) {
-        interpolate(bin_x, bin_y, texelFetch(elements, table + k));
+        interpolate(object, bin_x, bin_y, texelFetch(elements, table + k));
         FOR_EACH_BIN {
           sum[j][i] = two_float_add(sum[j][i], log_likelihood(reading, log_odds_of[j][i]));
         }
@@ -103,7 +112,7 @@ void main() {
             denominator[j][i] = 1.0;
           }
           for (int k = quotient; k < end; ++k) {
-            interpolate(bin_x, bin_y, texelFetch(elements, table + k));
+            interpolate(object, bin_x, bin_y, texelFetch(elements, table + k));
             FOR_EACH_BIN {
               const vec2 ratio = likelihood_ratio(reading_says, log_odds_of[j][i]);
               numerator[j][i] *= ratio.x;

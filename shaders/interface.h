@@ -81,6 +81,24 @@ struct RotatedElement {
   Split y;
 };
 
+// Log odds at a node of a map, at the nodes to its right and above it, and at the one above that to
+// its right. Kernels read it as a vec4: one fetch in the place of four.
+struct Corners {
+  float here;
+  float right;
+  float above;
+  float above_right;
+};
+
+// Where an object stands in the tables of a dispatch.
+struct ObjectPlace {
+  int first_node;  // of its map
+  int map_width;   // with border
+  int map_height;
+  uint first_axis;  // the lattice's x, then y, in cells of its map
+  uint first_bin;   // in the slab
+};
+
 // Consecutive elements [begin, end) of the same reading class. Kernels read it as an ivec4.
 struct Segment {
   uint begin;
@@ -95,9 +113,8 @@ struct LikelihoodPush {
   uint rows;         // the slab's number of rows
   uint theta_first;  // the slab's first theta
   uint segments;
-  uint elements;  // per theta in the table
-  int map_width;  // with border
-  int map_height;
+  uint elements;      // per theta in the table
+  uint object_first;  // of the dispatch, in the table of places
 };
 
 // Result of one workgroup of reduce_belief.
@@ -109,7 +126,8 @@ struct Partial {
 };
 
 struct ReducePush {
-  uint bins;
+  uint bins;    // of one object in the slab
+  uint stride;  // from one object's bins to the next one's, an even number
   uint partial_first;
 };
 
@@ -121,6 +139,7 @@ struct AddPush {
 struct MarginalPush {
   uint plane;      // (x, y) indices of the slab
   uint thetas;     // of the slab
+  uint first_bin;  // of the object in the slab, an even number
   float max_high;  // the sums are of exp(log-likelihood - max)
   float max_low;
 };
@@ -243,8 +262,8 @@ struct ConePush {
 #ifdef __cplusplus
 static_assert(sizeof(TileReading) == 16 && sizeof(Tile) == 20 && sizeof(EvidencePush) == 16);
 static_assert(sizeof(RotatedElement) == 16 && sizeof(Segment) == 16);
-static_assert(sizeof(LikelihoodPush) == 32 && sizeof(Partial) == 16);
-static_assert(sizeof(ReducePush) == 8 && sizeof(AddPush) == 8 && sizeof(MarginalPush) == 16);
+static_assert(sizeof(LikelihoodPush) == 28 && sizeof(Partial) == 16);
+static_assert(sizeof(ReducePush) == 12 && sizeof(AddPush) == 8 && sizeof(MarginalPush) == 20);
 static_assert(sizeof(Particle) == 16 && sizeof(ObjectShare) == 8 && sizeof(DrawBlock) == 16);
 static_assert(sizeof(DrawPush) == 52 && sizeof(ParticleMap) == 40 && sizeof(CoarseAndFine) == 16);
 static_assert(sizeof(WeighPush) == 16 && sizeof(WeightBlock) == 16);

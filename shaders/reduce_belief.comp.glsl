@@ -4,8 +4,8 @@
 
 // The largest log-likelihood of the bins of every workgroup, its first index, and the sum of
 // exp(log-likelihood - max) over them (Eq. 14, 15), in one pass: the sum is kept relative to the
-// largest value so far. The host combines the partial results in float64 and in order, so equal
-// input gives equal bits.
+// largest value so far. Objects follow one another along y, and no workgroup spans two. The host
+// combines the partial results in float64 and in order, so equal input gives equal bits.
 
 #include "interface.h"
 
@@ -13,7 +13,7 @@ layout(local_size_x_id = 0) in;  // a power of two
 layout(constant_id = 1) const uint SIDE_BY_SIDE = 8;      // lanes that read one stretch of memory
 layout(constant_id = 2) const uint TEXELS_PER_LANE = 128;  // a multiple of REDUCE_BATCH
 
-// Two bins a texel, which halves the fetches. Their two floats are normalised:
+// [object, bin]. Two bins a texel, which halves the fetches. Their two floats are normalised:
 // |low| <= ulp(high) / 2.
 layout(binding = 0) uniform samplerBuffer belief;
 layout(std430, binding = 1) writeonly buffer Partials { Partial partials[]; };
@@ -34,6 +34,7 @@ void main() {
   const uint lane = gl_LocalInvocationID.x;
   const uint lanes = gl_WorkGroupSize.x;
   const uint bins = 2 * lanes * TEXELS_PER_LANE;
+  const int object_texel = int(gl_WorkGroupID.y * push.stride / 2);
   const uint begin = gl_WorkGroupID.x * bins;
   const uint end = min(begin + bins, push.bins);
 
@@ -42,7 +43,7 @@ void main() {
   const uint first =
       begin / 2 + lane / SIDE_BY_SIDE * SIDE_BY_SIDE * TEXELS_PER_LANE + lane % SIDE_BY_SIDE;
   uint index = min(2 * first, end - 1);
-  const vec4 first_pair = texelFetch(belief, int(index / 2));
+  const vec4 first_pair = texelFetch(belief, object_texel + int(index / 2));
   vec2 best = index % 2 == 0 ? first_pair.xy : first_pair.zw;
   float sum = 0.0;
   const uint past = first + SIDE_BY_SIDE * TEXELS_PER_LANE;
@@ -50,7 +51,7 @@ void main() {
     vec2 value[2 * REDUCE_BATCH];
     const vec2 before = best;
     [[unroll]] for (uint b = 0; b < REDUCE_BATCH; ++b) {
-      const vec4 pair = texelFetch(belief, int(min(i + b * SIDE_BY_SIDE, last)));
+      const vec4 pair = texelFetch(belief, object_texel + int(min(i + b * SIDE_BY_SIDE, last)));
       value[2 * b] = pair.xy;
       value[2 * b + 1] = pair.zw;
       [[unroll]] for (uint k = 0; k < 2; ++k) {
@@ -86,7 +87,7 @@ void main() {
     barrier();
   }
   if (lane == 0) {
-    partials[push.partial_first + gl_WorkGroupID.x] =
+    partials[push.partial_first + gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x] =
         Partial(best_value[0].x, best_value[0].y, best_index[0], sums[0]);
   }
 }

@@ -2,7 +2,7 @@
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_control_flow_attributes : require
 
-// Sums a slab's probabilities, relative to exp(max), over theta and over (x, y) in one pass. A
+// Sums the probabilities of an object's bins in a slab, relative to exp(max), over theta and over (x, y) in one pass. A
 // workgroup takes a block of (x, y) indices and a chunk of thetas and writes its parts of both sums,
 // which the host adds in order.
 
@@ -26,11 +26,12 @@ shared float parts[THETAS * ROW];
 
 // Two bins from this one on.
 vec4 fetch_pair(const uint bin, const uint last) {
-  const vec4 texel = texelFetch(belief, int(bin / 2));
+  const int object_texel = int(push.first_bin / 2);
+  const vec4 texel = texelFetch(belief, object_texel + int(bin / 2));
   if (EVEN_PLANES) {
     return texel;
   }
-  const vec4 next = texelFetch(belief, int(min(bin + 1, last) / 2));
+  const vec4 next = texelFetch(belief, object_texel + int(min(bin + 1, last) / 2));
   return bin % 2 == 0 ? texel : vec4(texel.zw, next.xy);
 }
 

@@ -15,7 +15,7 @@ layout(local_size_x_id = 0) in;
 #include "contact_likelihood.glsl"
 #include "two_float.glsl"
 
-layout(binding = 0) uniform samplerBuffer maps;           // log odds, each with a border of prior
+layout(binding = 0) uniform samplerBuffer maps;           // Corners of nodes, with a border of prior
 layout(std430, binding = 1) readonly buffer Objects { ParticleMap objects[]; };
 layout(binding = 2) uniform samplerBuffer turns;          // CoarseAndFine: headings, then elements
 layout(binding = 3) uniform isamplerBuffer segments;      // Segment
@@ -70,10 +70,9 @@ float log_odds(const ParticleMap object, const Split x, const Split y, const vec
   const int column = clamp(cell.x, 0, object.width - 2);
   const int row = clamp(cell.y, 0, object.height - 2);
   const int node = object.first + row * object.width + column;
-  const float lower = texelFetch(maps, node).x;
-  const float upper = texelFetch(maps, node + object.width).x;
-  const float low = lower + (texelFetch(maps, node + 1).x - lower) * f.x;
-  const float high = upper + (texelFetch(maps, node + object.width + 1).x - upper) * f.x;
+  const vec4 corner = texelFetch(maps, node);
+  const float low = corner.x + (corner.y - corner.x) * f.x;
+  const float high = corner.z + (corner.w - corner.z) * f.x;
   return low + (high - low) * f.y;
 }
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include <fmt/format.h>
 
@@ -14,6 +15,7 @@ namespace palpate {
 
 namespace {
 
+constexpr float least = -std::numeric_limits<float>::infinity();
 constexpr gpu::Access read_and_write[] = {gpu::Access::table, gpu::Access::storage};
 constexpr gpu::Access marginal_bindings[] = {gpu::Access::table, gpu::Access::storage,
                                              gpu::Access::storage};
@@ -59,6 +61,16 @@ gpu::Kernel addition_kernel(gpu::Context& context) {
            .constants = constants}};
 }
 
+ReductionSizes sizes_for(const gpu::Context& context, const PoseLattice& lattice,
+                         std::size_t objects) {
+  return reduction_sizes(context.limits(), lattice.bins() * static_cast<std::int64_t>(objects));
+}
+
+/// Partial results of reducing a slab.
+std::size_t partials_of(const SlabExtent& slab, const ReductionSizes& sizes) {
+  return std::size_t{slab.object_count} * groups_of(slab.bins(), sizes.bins());
+}
+
 /// Adds every row of `parts` to `sums`.
 void add_rows(std::span<const float> parts, std::span<double> sums) {
   for (; !parts.empty(); parts = parts.subspan(sums.size())) {
@@ -77,44 +89,47 @@ Belief::Belief(gpu::Context& context, gpu::CommandStream& stream, const PoseLatt
     : context_(context),
       stream_(stream),
       lattice_(lattice),
-      reduction_(reduction_sizes(context.limits(), lattice.bins())),
+      objects_(objects),
+      reduction_(sizes_for(context, lattice, objects)),
       marginal_(marginal_sizes(context.limits(), lattice.plane(), lattice.theta_rad.count)),
       reduce_(reduction_kernel(context, reduction_)),
       sum_marginals_(marginal_kernel(context, marginal_, lattice.x_mm.count % 2 == 0)),
       add_(addition_kernel(context)) {
-  const std::vector<SlabExtent> extents = cut_into_slabs(context, lattice, reduction_.bins());
-  for (std::size_t object = 0; object < objects; ++object) {
-    std::vector<Slab>& slabs = slabs_.emplace_back();
-    for (const SlabExtent& extent : extents) {
-      slabs.push_back({extent, gpu::Buffer(context, extent.bytes(), gpu::Memory::device,
-                                           fmt::format("{} pose bins", extent.bins()),
-                                           VK_FORMAT_R32G32B32A32_SFLOAT)});
-      partial_count_ += groups_of(extent.bins(), reduction_.bins());
-    }
+  for (const SlabExtent& extent : cut(context, lattice, objects)) {
+    slabs_.push_back(
+        {extent, gpu::Buffer(context, extent.bytes(), gpu::Memory::device,
+                             fmt::format("{} x {} pose bins", extent.object_count, extent.bins()),
+                             VK_FORMAT_R32G32B32A32_SFLOAT)});
+    partial_count_ += partials_of(extent, reduction_);
   }
   partials_ = gpu::Buffer(context, partial_count_ * sizeof(shaders::Partial), gpu::Memory::device,
                           "partial sums");
   clear();
 }
 
-std::uint64_t Belief::bytes_needed(const gpu::Context& context, const PoseLattice& lattice,
-                                   std::size_t objects) {
-  const std::uint32_t per_group = reduction_sizes(context.limits(), lattice.bins()).bins();
-  std::uint64_t bytes = 0;
-  std::uint64_t partials = 0;
-  for (const SlabExtent& slab : cut_into_slabs(context, lattice, per_group)) {
-    bytes += gpu::allocated(slab.bytes());
-    partials += groups_of(slab.bins(), per_group);
-  }
-  return objects * bytes + gpu::allocated(objects * partials * sizeof(shaders::Partial));
+std::vector<SlabExtent> Belief::cut(const gpu::Context& context, const PoseLattice& lattice,
+                                    std::size_t objects) {
+  return cut_into_slabs(context, lattice, objects, sizes_for(context, lattice, objects).bins());
 }
 
-std::uint64_t Belief::marginal_bytes(const gpu::Context& context, const PoseLattice& lattice) {
-  const gpu::Limits& limits = context.limits();
-  const MarginalSizes sizes = marginal_sizes(limits, lattice.plane(), lattice.theta_rad.count);
+std::uint64_t Belief::bytes_needed(const gpu::Context& context, const PoseLattice& lattice,
+                                   std::size_t objects) {
+  const ReductionSizes sizes = sizes_for(context, lattice, objects);
+  std::uint64_t bytes = 0;
+  std::size_t partials = 0;
+  for (const SlabExtent& slab : cut(context, lattice, objects)) {
+    bytes += gpu::allocated(slab.bytes());
+    partials += partials_of(slab, sizes);
+  }
+  return bytes + gpu::allocated(partials * sizeof(shaders::Partial));
+}
+
+std::uint64_t Belief::marginal_bytes(const gpu::Context& context, const PoseLattice& lattice,
+                                     std::size_t objects) {
+  const MarginalSizes sizes =
+      marginal_sizes(context.limits(), lattice.plane(), lattice.theta_rad.count);
   std::uint64_t most = 0;
-  for (const SlabExtent& slab :
-       cut_into_slabs(context, lattice, reduction_sizes(limits, lattice.bins()).bins())) {
+  for (const SlabExtent& slab : cut(context, lattice, objects)) {
     const std::uint64_t over_theta =
         std::uint64_t{groups_of(slab.theta_count, sizes.thetas)} * slab.plane();
     const std::uint64_t over_plane =
@@ -126,76 +141,70 @@ std::uint64_t Belief::marginal_bytes(const gpu::Context& context, const PoseLatt
 }
 
 void Belief::clear() {
-  for (const auto& slabs : slabs_) {
-    for (const Slab& slab : slabs) {
-      stream_.fill(slab.log_likelihood, 0);
-    }
+  for (const Slab& slab : slabs_) {
+    stream_.fill(slab.log_likelihood, 0);
   }
 }
 
 void Belief::add(const Belief& other) {
-  for (std::size_t object = 0; object < slabs_.size(); ++object) {
-    for (std::size_t i = 0; i < slabs_[object].size(); ++i) {
-      const Slab& slab = slabs_[object][i];
-      // A plane of a slab fits one row of workgroups.
-      const shaders::AddPush push{.bins = static_cast<shaders::uint>(slab.bins()),
-                                  .row = slab.plane()};
-      stream_.dispatch(
-          add_, {&other.slabs_[object][i].log_likelihood, &slab.log_likelihood}, push,
-          {groups_of(slab.plane(), independent_lanes(context_.limits())), slab.theta_count, 1});
-    }
+  const std::uint32_t lanes = independent_lanes(context_.limits());
+  for (std::size_t i = 0; i < slabs_.size(); ++i) {
+    const std::int64_t bins = slabs_[i].object_count * slabs_[i].stride();
+    const std::int64_t row = std::min(bins, std::int64_t{context_.limits().group_count[0]} * lanes);
+    const shaders::AddPush push{.bins = static_cast<shaders::uint>(bins),
+                                .row = static_cast<shaders::uint>(row)};
+    stream_.dispatch(add_, {&other.slabs_[i].log_likelihood, &slabs_[i].log_likelihood}, push,
+                     {groups_of(row, lanes), groups_of(bins, push.row), 1});
   }
 }
 
 std::uint64_t Belief::device_bytes() const {
   std::uint64_t bytes = partials_.bytes();
-  for (const auto& slabs : slabs_) {
-    for (const Slab& slab : slabs) {
-      bytes += slab.log_likelihood.bytes();
-    }
+  for (const Slab& slab : slabs_) {
+    bytes += slab.log_likelihood.bytes();
   }
   return bytes;
 }
 
 std::vector<BeliefSummary> Belief::summarise() const {
   std::uint32_t first = 0;
-  for (const auto& slabs : slabs_) {
-    for (const Slab& slab : slabs) {
-      const std::uint32_t groups = groups_of(slab.bins(), reduction_.bins());
-      const shaders::ReducePush push{.bins = static_cast<std::uint32_t>(slab.bins()),
-                                     .partial_first = first};
-      stream_.dispatch(reduce_, {&slab.log_likelihood, &partials_}, push, {groups, 1, 1});
-      first += groups;
-    }
+  for (const Slab& slab : slabs_) {
+    const shaders::ReducePush push{.bins = static_cast<shaders::uint>(slab.bins()),
+                                   .stride = static_cast<shaders::uint>(slab.stride()),
+                                   .partial_first = first};
+    const std::uint32_t groups = groups_of(slab.bins(), reduction_.bins());
+    stream_.dispatch(reduce_, {&slab.log_likelihood, &partials_}, push,
+                     {groups, slab.object_count, 1});
+    first += static_cast<std::uint32_t>(partials_of(slab, reduction_));
   }
   std::vector<shaders::Partial> partials(partial_count_);
   stream_.download(partials_, std::span(partials));
   stream_.run();
 
-  std::vector<BeliefSummary> summaries;
-  const shaders::Partial* partial = partials.data();
-  for (const auto& slabs : slabs_) {
-    const shaders::Partial* const begin = partial;
-    BeliefSummary summary;
-    bool any = false;
-    for (const Slab& slab : slabs) {
-      const std::uint32_t groups = groups_of(slab.bins(), reduction_.bins());
-      for (std::uint32_t i = 0; i < groups; ++i, ++partial) {
-        const TwoFloat max{partial->max_high, partial->max_low};
-        // Slabs stand in the lattice's order, so the first of equals has the lowest bin.
-        if (!any || exceeds(max, summary.max)) {
-          summary.max = max;
-          summary.arg_max = lattice_index(lattice_, slab, partial->arg_max);
-          any = true;
+  std::vector<BeliefSummary> summaries(objects_, {.max = {least, 0.0F}});
+  const auto for_each_partial = [&](const auto& take) {
+    const shaders::Partial* partial = partials.data();
+    for (const Slab& slab : slabs_) {
+      for (std::uint32_t i = 0; i < slab.object_count; ++i) {
+        for (std::uint32_t g = groups_of(slab.bins(), reduction_.bins()); g > 0; --g, ++partial) {
+          take(summaries[slab.object_first + i], slab, *partial,
+               TwoFloat{partial->max_high, partial->max_low});
         }
       }
     }
-    for (const shaders::Partial* p = begin; p != partial; ++p) {
-      summary.sum +=
-          p->sum * std::exp(TwoFloat{p->max_high, p->max_low}.value() - summary.max.value());
+  };
+  // An object's slabs stand in the lattice's order, so the first of equals has the lowest bin.
+  for_each_partial([&](BeliefSummary& summary, const Slab& slab, const shaders::Partial& partial,
+                       const TwoFloat& max) {
+    if (exceeds(max, summary.max)) {
+      summary.max = max;
+      summary.arg_max = lattice_index(lattice_, slab, partial.arg_max);
     }
-    summaries.push_back(summary);
-  }
+  });
+  for_each_partial([&](BeliefSummary& summary, const Slab&, const shaders::Partial& partial,
+                       const TwoFloat& max) {
+    summary.sum += partial.sum * std::exp(max.value() - summary.max.value());
+  });
   return summaries;
 }
 
@@ -203,7 +212,10 @@ BeliefMarginals Belief::marginals(std::size_t object, TwoFloat max) const {
   BeliefMarginals sums;
   sums.xy.resize(static_cast<std::size_t>(lattice_.plane()));
   sums.theta.resize(static_cast<std::size_t>(lattice_.theta_rad.count));
-  for (const Slab& slab : slabs_[object]) {
+  for (const Slab& slab : slabs_) {
+    if (!slab.holds(object)) {
+      continue;
+    }
     const std::uint32_t chunks = groups_of(slab.theta_count, marginal_.thetas);
     const std::uint32_t blocks = groups_of(slab.plane(), marginal_.plane());
     std::vector<float> over_theta(std::size_t{chunks} * slab.plane());
@@ -212,10 +224,12 @@ BeliefMarginals Belief::marginals(std::size_t object, TwoFloat max) const {
                                   "a marginal");
     const gpu::Buffer plane_parts(context_, std::span(over_plane).size_bytes(), gpu::Memory::device,
                                   "a marginal");
-    const shaders::MarginalPush push{.plane = slab.plane(),
-                                     .thetas = slab.theta_count,
-                                     .max_high = max.high,
-                                     .max_low = max.low};
+    const shaders::MarginalPush push{
+        .plane = slab.plane(),
+        .thetas = slab.theta_count,
+        .first_bin = static_cast<shaders::uint>(slab.first_bin(object)),
+        .max_high = max.high,
+        .max_low = max.low};
     stream_.dispatch(sum_marginals_, {&slab.log_likelihood, &theta_parts, &plane_parts}, push,
                      {blocks, chunks, 1});
     stream_.download(theta_parts, std::span(over_theta));
@@ -232,9 +246,13 @@ BeliefMarginals Belief::marginals(std::size_t object, TwoFloat max) const {
 std::vector<double> Belief::download(std::size_t object) const {
   std::vector<double> values(static_cast<std::size_t>(lattice_.bins()));
   std::vector<TwoFloat> raw;
-  for (const Slab& slab : slabs_[object]) {
+  for (const Slab& slab : slabs_) {
+    if (!slab.holds(object)) {
+      continue;
+    }
     raw.resize(static_cast<std::size_t>(slab.bins()));
-    stream_.download(slab.log_likelihood, std::span(raw));
+    stream_.download(slab.log_likelihood, std::span(raw),
+                     slab.first_bin(object) * sizeof(TwoFloat));
     stream_.run();
     for (std::int64_t i = 0; i < slab.bins(); ++i) {
       values[lattice_index(lattice_, slab, i)] = raw[i].value();
@@ -251,13 +269,14 @@ std::vector<double> Belief::download(std::size_t object, const BinWindow& window
   std::vector<TwoFloat> raw(static_cast<std::size_t>(window.theta_count) * window.row_count * nx);
   for (int t = 0; t < window.theta_count; ++t) {
     const int theta = ((window.theta_first + t) % thetas + thetas) % thetas;
-    for (const Slab& slab : slabs_[object]) {
+    for (const Slab& slab : slabs_) {
       const int slab_theta = theta - static_cast<int>(slab.theta_first);
       const int slab_row = static_cast<int>(slab.row_first);
       const int slab_end = slab_row + static_cast<int>(slab.row_count);
       const int begin = std::max(window.row_first, slab_row);
       const int end = std::min(row_end, slab_end);
-      if (slab_theta < 0 || slab_theta >= static_cast<int>(slab.theta_count) || begin >= end) {
+      if (!slab.holds(object) || slab_theta < 0 ||
+          slab_theta >= static_cast<int>(slab.theta_count) || begin >= end) {
         continue;
       }
       const std::size_t row_in_slab =
@@ -266,7 +285,7 @@ std::vector<double> Belief::download(std::size_t object, const BinWindow& window
           static_cast<std::size_t>(t) * window.row_count + (begin - window.row_first);
       stream_.download(slab.log_likelihood,
                        std::span(raw).subspan(row_in_raw * nx, (end - begin) * nx),
-                       row_in_slab * nx * sizeof(TwoFloat));
+                       (slab.first_bin(object) + row_in_slab * nx) * sizeof(TwoFloat));
     }
   }
   stream_.run();

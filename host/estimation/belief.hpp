@@ -47,16 +47,20 @@ class Belief {
   Belief(gpu::Context& context, gpu::CommandStream& stream, const PoseLattice& lattice,
          std::size_t objects);
 
+  /// How a belief is cut.
+  static std::vector<SlabExtent> cut(const gpu::Context& context, const PoseLattice& lattice,
+                                     std::size_t objects);
   /// Device memory that a belief takes, in bytes, and what marginals() takes while it runs.
   static std::uint64_t bytes_needed(const gpu::Context& context, const PoseLattice& lattice,
                                     std::size_t objects);
-  static std::uint64_t marginal_bytes(const gpu::Context& context, const PoseLattice& lattice);
+  static std::uint64_t marginal_bytes(const gpu::Context& context, const PoseLattice& lattice,
+                                      std::size_t objects);
 
   /// Records the return to a uniform belief.
   void clear();
   /// Records the addition of another belief over the same lattice and objects.
   void add(const Belief& other);
-  std::span<const Slab> slabs(std::size_t object) const { return slabs_[object]; }
+  std::span<const Slab> slabs() const { return slabs_; }
   std::uint64_t device_bytes() const;
 
   // These run the stream.
@@ -71,7 +75,8 @@ class Belief {
   gpu::Context& context_;
   gpu::CommandStream& stream_;
   PoseLattice lattice_;
-  std::vector<std::vector<Slab>> slabs_;
+  std::size_t objects_;
+  std::vector<Slab> slabs_;
   ReductionSizes reduction_;
   MarginalSizes marginal_;
   gpu::Kernel reduce_;

@@ -8,7 +8,7 @@
 #include "belief.hpp"
 #include "command_stream.hpp"
 #include "contact_evidence.hpp"
-#include "likelihood_path.hpp"
+#include "map_table.hpp"
 #include "palpate/lattice.hpp"
 #include "palpate/pose_histogram.hpp"
 #include "palpate/sensor_model.hpp"
@@ -21,7 +21,8 @@ class DenseLikelihood {
   /// Elements that a dispatch takes at best: a multiple of the factors of a product, unless the
   /// device's tables hold fewer.
   /// @throws Error where they do not hold one element at every theta
-  static std::size_t batch_for(const gpu::Context& context, const PoseLattice& lattice);
+  static std::size_t batch_for(const gpu::Context& context, const PoseLattice& lattice,
+                               std::size_t objects);
   /// Device memory that maps, and tables for this many elements, take, in bytes.
   /// @throws Error where a map is larger than what kernels read
   static std::uint64_t bytes_needed(const gpu::Context& context,
@@ -51,21 +52,22 @@ class DenseLikelihood {
   std::uint64_t device_bytes() const;
 
  private:
-  struct Map {
-    int width = 0;   ///< with border
-    int height = 0;  ///< with border
-    gpu::Buffer log_odds;
-    gpu::Buffer axes;  ///< the lattice's x and y in cells of this map
-  };
-  /// Maps of one kind share the rotated elements and the path.
-  struct Scale {
-    MapKind maps;
+  /// Objects that a dispatch takes together.
+  struct Group {
     LikelihoodPath path;
+    MapKind kind;
     std::vector<std::size_t> objects;
+    MapTable maps;
+  };
+  /// Those of a group that a slab holds: a range of group.objects.
+  struct Range {
+    std::uint32_t first = 0;
+    std::uint32_t count = 0;
   };
 
-  /// Records one run of the scale's kernel over a slab.
-  void dispatch(const Scale& scale, std::size_t object, const Slab& slab, std::size_t segments,
+  static Range within(const Group& group, const Slab& slab);
+  /// Records one run of the group's kernel over its objects in a slab.
+  void dispatch(const Group& group, const Range& range, const Slab& slab, std::size_t segments,
                 std::size_t elements);
   /// Makes room for this many elements in the tables.
   void reserve(std::size_t elements);
@@ -73,8 +75,8 @@ class DenseLikelihood {
   gpu::Context& context_;
   gpu::CommandStream& stream_;
   PoseLattice lattice_;
-  std::vector<Map> maps_;
-  std::vector<Scale> scales_;
+  std::size_t objects_;
+  std::vector<Group> groups_;
   VkDeviceSize bytes_per_element_ = 0;  ///< rotated by every theta
   std::size_t batch_elements_ = 0;      ///< most elements in the tables
   gpu::Buffer no_table_;                ///< bound where a map is none

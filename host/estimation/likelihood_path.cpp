@@ -14,8 +14,9 @@ namespace {
 // changes them by less than one part in 1e6.
 constexpr double least_product_floor = 1e-3;
 
-constexpr gpu::Access bindings[] = {gpu::Access::table, gpu::Access::storage, gpu::Access::table,
-                                    gpu::Access::table, gpu::Access::storage, gpu::Access::storage};
+constexpr gpu::Access bindings[] = {gpu::Access::table,  gpu::Access::storage, gpu::Access::table,
+                                    gpu::Access::table,  gpu::Access::storage, gpu::Access::storage,
+                                    gpu::Access::storage};
 
 }  // namespace
 
@@ -40,12 +41,12 @@ std::vector<std::uint32_t> path_constants(const gpu::Limits& limits, const MapKi
 
 std::span<const gpu::Access> likelihood_bindings() { return bindings; }
 
-LikelihoodPath choose_path(gpu::Context& context, const PoseLattice& lattice, const MapKind& maps,
-                           const ContactLikelihood& model) {
-  if (auto path = tile_path(context, lattice, maps, model)) {
+LikelihoodPath choose_path(gpu::Context& context, const PoseLattice& lattice, std::size_t objects,
+                           const MapKind& maps, const ContactLikelihood& model) {
+  if (auto path = tile_path(context, lattice, objects, maps, model)) {
     return std::move(*path);
   }
-  return row_path(context, lattice, maps, model);
+  return row_path(context, lattice, objects, maps, model);
 }
 
 }  // namespace palpate

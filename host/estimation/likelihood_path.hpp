@@ -39,14 +39,16 @@ std::span<const gpu::Access> likelihood_bindings();
 
 /// Neighbouring bins in register tiles; none where the lattice is too coarse for the map's cells.
 std::optional<LikelihoodPath> tile_path(gpu::Context& context, const PoseLattice& lattice,
-                                        const MapKind& maps, const ContactLikelihood& model);
+                                        std::size_t objects, const MapKind& maps,
+                                        const ContactLikelihood& model);
 /// Bins of a row, each with map nodes of its own; for any lattice, in particular for those that
 /// tile_path refuses.
-LikelihoodPath row_path(gpu::Context& context, const PoseLattice& lattice, const MapKind& maps,
-                        const ContactLikelihood& model);
+LikelihoodPath row_path(gpu::Context& context, const PoseLattice& lattice, std::size_t objects,
+                        const MapKind& maps, const ContactLikelihood& model);
 
 /// The fastest of them that is sound.
-LikelihoodPath choose_path(gpu::Context& context, const PoseLattice& lattice, const MapKind& maps,
-                           const ContactLikelihood& model);
+/// @param objects whose bins a dispatch takes together
+LikelihoodPath choose_path(gpu::Context& context, const PoseLattice& lattice, std::size_t objects,
+                           const MapKind& maps, const ContactLikelihood& model);
 
 }  // namespace palpate

@@ -61,9 +61,9 @@ std::size_t plan_memory(const gpu::Context& context, std::span<const Hypothesis>
   if (bins_alone > static_cast<double>(room.bytes)) {
     refuse(context, lattice, objects, room, bins_alone);
   }
-  const std::size_t most = DenseLikelihood::batch_for(context, lattice);
+  const std::size_t most = DenseLikelihood::batch_for(context, lattice, objects);
   const std::uint64_t held = beliefs * Belief::bytes_needed(context, lattice, objects) +
-                             Belief::marginal_bytes(context, lattice) +
+                             Belief::marginal_bytes(context, lattice, objects) +
                              (room.set_by_options ? gpu::CommandStream::staging_bytes : 0);
   const auto needed = [&](std::size_t elements) {
     return held + DenseLikelihood::bytes_needed(context, hypotheses, lattice, elements);

@@ -71,7 +71,7 @@ ParticleLikelihood::ParticleLikelihood(gpu::Context& context, gpu::CommandStream
                         .bindings = bindings,
                         .push_bytes = sizeof(shaders::WeighPush),
                         .constants = model_constants(context.limits(), model)}) {
-  std::vector<float> cells;
+  std::vector<shaders::Corners> cells;
   std::vector<shaders::ParticleMap> objects;
   const auto append = [&](const OccupancyGrid& map) {
     const double cells_per_mm = 1.0 / map.cell_mm;
@@ -87,7 +87,7 @@ ParticleLikelihood::ParticleLikelihood(gpu::Context& context, gpu::CommandStream
              split((centre(region.x_mm) - map.origin_mm.x) / map.cell_mm + shaders::MAP_BORDER),
          .centre_y =
              split((centre(region.y_mm) - map.origin_mm.y) / map.cell_mm + shaders::MAP_BORDER)});
-    const std::vector<float> bordered = with_border(map, model.prior);
+    const std::vector<shaders::Corners> bordered = corners_with_border(map, model.prior);
     cells.insert(cells.end(), bordered.begin(), bordered.end());
     if (cells.size() > context.limits().table_texels) {
       throw Error(
@@ -105,9 +105,9 @@ ParticleLikelihood::ParticleLikelihood(gpu::Context& context, gpu::CommandStream
   append(none);
 
   maps_ = gpu::Buffer(context, std::span(cells).size_bytes(), gpu::Memory::device, "maps",
-                      VK_FORMAT_R32_SFLOAT);
+                      VK_FORMAT_R32G32B32A32_SFLOAT);
   objects_ = gpu::Buffer(context, std::span(objects).size_bytes(), gpu::Memory::device, "maps");
-  stream.upload(maps_, std::span<const float>(cells));
+  stream.upload(maps_, std::span<const shaders::Corners>(cells));
   stream.upload(objects_, std::span<const shaders::ParticleMap>(objects));
   reserve(64);
 }

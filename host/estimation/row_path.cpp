@@ -28,11 +28,12 @@ std::uint32_t run_for(std::uint32_t nx, std::uint32_t longest) {
 
 }  // namespace
 
-LikelihoodPath row_path(gpu::Context& context, const PoseLattice& lattice, const MapKind& maps,
-                        const ContactLikelihood& model) {
+LikelihoodPath row_path(gpu::Context& context, const PoseLattice& lattice, std::size_t objects,
+                        const MapKind& maps, const ContactLikelihood& model) {
+  const std::int64_t bins = lattice.bins() * static_cast<std::int64_t>(objects);
   const std::uint32_t run =
       run_for(static_cast<std::uint32_t>(lattice.x_mm.count),
-              std::min(longest_run, most_bins_per_invocation(context.limits(), lattice.bins())));
+              std::min(longest_run, most_bins_per_invocation(context.limits(), bins)));
   std::vector<std::uint32_t> constants = path_constants(context.limits(), maps, model);
   constants.push_back(run);
   return {.kernel = {context,

@@ -11,7 +11,7 @@
 namespace palpate {
 
 std::vector<SlabExtent> cut_into_slabs(const gpu::Context& context, const PoseLattice& lattice,
-                                       std::uint32_t reduction_bins) {
+                                       std::size_t objects, std::uint32_t reduction_bins) {
   const gpu::Limits& limits = context.limits();
   const auto binding_bins = static_cast<std::int64_t>(
       std::min({limits.storage_range / sizeof(TwoFloat), limits.allocation / sizeof(TwoFloat),
@@ -33,16 +33,31 @@ std::vector<SlabExtent> cut_into_slabs(const gpu::Context& context, const PoseLa
           : std::min({binding_bins / lattice.plane(),
                       std::int64_t{std::min(limits.group_count[1], limits.group_count[2])},
                       std::int64_t{lattice.theta_rad.count}});
+  SlabExtent extent{.nx = static_cast<std::uint32_t>(lattice.x_mm.count)};
   std::vector<SlabExtent> slabs;
-  for (std::int64_t theta = 0; theta < lattice.theta_rad.count; theta += thetas) {
-    for (std::int64_t row = 0; row < lattice.y_mm.count; row += rows) {
-      slabs.push_back(
-          {.theta_first = static_cast<std::uint32_t>(theta),
-           .theta_count =
-               static_cast<std::uint32_t>(std::min(thetas, lattice.theta_rad.count - theta)),
-           .row_first = static_cast<std::uint32_t>(row),
-           .row_count = static_cast<std::uint32_t>(std::min(rows, lattice.y_mm.count - row)),
-           .nx = static_cast<std::uint32_t>(lattice.x_mm.count)});
+  if (rows == lattice.y_mm.count && thetas == lattice.theta_rad.count) {
+    extent.theta_count = static_cast<std::uint32_t>(thetas);
+    extent.row_count = static_cast<std::uint32_t>(rows);
+    const auto together = static_cast<std::size_t>(std::clamp<std::int64_t>(
+        binding_bins / extent.stride(), 1, std::int64_t{limits.group_count[1]}));
+    for (std::size_t object = 0; object < objects; object += together) {
+      extent.object_first = static_cast<std::uint32_t>(object);
+      extent.object_count = static_cast<std::uint32_t>(std::min(together, objects - object));
+      slabs.push_back(extent);
+    }
+    return slabs;
+  }
+  for (std::size_t object = 0; object < objects; ++object) {
+    extent.object_first = static_cast<std::uint32_t>(object);
+    for (std::int64_t theta = 0; theta < lattice.theta_rad.count; theta += thetas) {
+      extent.theta_first = static_cast<std::uint32_t>(theta);
+      extent.theta_count =
+          static_cast<std::uint32_t>(std::min(thetas, lattice.theta_rad.count - theta));
+      for (std::int64_t row = 0; row < lattice.y_mm.count; row += rows) {
+        extent.row_first = static_cast<std::uint32_t>(row);
+        extent.row_count = static_cast<std::uint32_t>(std::min(rows, lattice.y_mm.count - row));
+        slabs.push_back(extent);
+      }
     }
   }
   return slabs;

@@ -8,9 +8,12 @@
 
 namespace palpate {
 
-/// A part of an object's bins that fits one binding and one dispatch: of `theta_count` planes from
-/// `theta_first` the rows (indices along y) [row_first, row_first + row_count).
+/// A part of the belief that fits one binding and one dispatch: the bins of several whole objects,
+/// or a part of one's, which is of `theta_count` planes from `theta_first` the rows (indices along
+/// y) [row_first, row_first + row_count).
 struct SlabExtent {
+  std::uint32_t object_first = 0;
+  std::uint32_t object_count = 1;
   std::uint32_t theta_first = 0;
   std::uint32_t theta_count = 0;
   std::uint32_t row_first = 0;
@@ -18,22 +21,29 @@ struct SlabExtent {
   std::uint32_t nx = 0;
 
   std::uint32_t plane() const { return row_count * nx; }
+  /// Of one object.
   std::int64_t bins() const { return std::int64_t{theta_count} * plane(); }
-  /// Of the bins, two floats each. Reductions read two bins a texel, so an odd number takes room
-  /// for one more.
-  VkDeviceSize bytes() const { return static_cast<VkDeviceSize>(bins() + 1) / 2 * 16; }
+  /// From one object's first bin to the next one's: reductions read two bins a texel.
+  std::int64_t stride() const { return (bins() + 1) / 2 * 2; }
+  bool holds(std::size_t object) const { return object - object_first < object_count; }
+  std::int64_t first_bin(std::size_t object) const {
+    return static_cast<std::int64_t>(object - object_first) * stride();
+  }
+  /// Of all objects, two floats a bin.
+  VkDeviceSize bytes() const { return static_cast<VkDeviceSize>(object_count * stride()) * 8; }
 };
 
 /// That part with its memory.
 struct Slab : SlabExtent {
-  gpu::Buffer log_likelihood;  ///< [theta, y, x], two floats each
+  gpu::Buffer log_likelihood;  ///< [object, theta, y, x], two floats each
 };
 
-/// Cuts an object's bins into slabs of whole theta planes, or, where a plane alone is too large for
-/// a binding or a dispatch, into groups of its rows; in the lattice's order.
+/// Cuts the objects' bins into slabs: of as many whole objects as fit a binding and a dispatch, or,
+/// where one is too large, of its theta planes, or, where a plane alone is too large, of groups of
+/// its rows; in the order of the objects and of the lattice.
 /// @param reduction_bins that one workgroup of a reduction covers
 /// @throws Error where a single row is too large
 std::vector<SlabExtent> cut_into_slabs(const gpu::Context& context, const PoseLattice& lattice,
-                                       std::uint32_t reduction_bins);
+                                       std::size_t objects, std::uint32_t reduction_bins);
 
 }  // namespace palpate

@@ -25,16 +25,18 @@ std::uint32_t bins_in_a_cell(double step_cells, int count) {
 }  // namespace
 
 std::optional<LikelihoodPath> tile_path(gpu::Context& context, const PoseLattice& lattice,
-                                        const MapKind& maps, const ContactLikelihood& model) {
+                                        std::size_t objects, const MapKind& maps,
+                                        const ContactLikelihood& model) {
   const double step_x = lattice.x_mm.step() / maps.cell_mm;
   const double step_y = lattice.y_mm.step() / maps.cell_mm;
   std::uint32_t x = bins_in_a_cell(step_x, lattice.x_mm.count);
   std::uint32_t y = bins_in_a_cell(step_y, lattice.y_mm.count);
-  const std::uint32_t most = most_bins_per_invocation(context.limits(), lattice.bins());
+  const std::uint32_t most = most_bins_per_invocation(
+      context.limits(), lattice.bins() * static_cast<std::int64_t>(objects));
   while (x * y > most) {
     (x > y ? x : y) -= 1;
   }
-  // A tile reads nine nodes: below four bins a row, which reads four per bin, costs less.
+  // A tile fetches four times: below four bins a row, which fetches once per bin, costs less.
   if (x * y < 4) {
     return {};
   }

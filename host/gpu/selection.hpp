@@ -12,7 +12,7 @@
 namespace palpate::gpu {
 
 /// Most buffers that one kernel binds. Every device takes 4 storage buffers and 16 tables.
-inline constexpr std::uint32_t max_bindings = 6;
+inline constexpr std::uint32_t max_bindings = 7;
 
 /// A physical device with what speaks for or against it.
 struct Candidate {

@@ -96,6 +96,14 @@ TEST_F(Slabs, OfSeveralPlanesByTheBinding) {
   expect_unseen();
 }
 
+TEST_F(Slabs, OfOneObjectOrSeveral) {
+  // An odd number of bins: the second object's begin after a gap.
+  HistogramOptions wanted = options();
+  wanted.lattice.x_mm.count = 41;
+  limits.storage_range = std::size_t{41} * 39 * 7 * 2 * sizeof(float) * 3 / 2;
+  expect_unseen(wanted);
+}
+
 TEST_F(Slabs, OfOnePlane) {
   limits.storage_range = plane_bytes;
   expect_unseen();

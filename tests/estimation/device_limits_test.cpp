@@ -155,6 +155,27 @@ TEST(LargeMap, IsReadFromStorageWhereNoTableHoldsIt) {
   }
 }
 
+TEST(LargeMap, ManyMapsGoIntoSeveralTables) {
+  const std::vector<Touch> touches = all_touches(random_recording(2, 36, 151));
+  std::vector<Hypothesis> objects;
+  for (std::uint64_t i = 0; i < 5; ++i) {
+    objects.push_back({random_map(11, 12, i == 2 ? 0.3 : 0.5, 12.0, 152 + i), 1.0});
+  }
+  Device device = Device::open();
+  gpu::Limits limits = device.context().limits();
+  limits.table_texels = 2 * 17 * 18;  // two maps with their borders
+  device.context().lower_limits(limits);
+  for (const double step_mm : {0.1, 0.8}) {
+    HistogramOptions options;
+    options.lattice = lattice_of(step_mm, 19);
+    PoseHistogram histogram(device, objects, options);
+    EXPECT_EQ(histogram.paths().size(), 2U) << "two sizes of cells";
+    histogram.update(touches);
+    EXPECT_LT(likelihood_error(histogram, reference_posterior(objects, options, touches)),
+              2 * per_touch);
+  }
+}
+
 TEST(LargeMap, ThatNoBufferHoldsIsRefusedByItsLabel) {
   Device device = Device::open();
   gpu::Limits limits = device.context().limits();

@@ -1,0 +1,134 @@
+#include "map_table.hpp"
+
+#include <algorithm>
+
+#include <fmt/format.h>
+
+#include "bordered_map.hpp"
+#include "contact_evidence.hpp"
+#include "interface.h"
+#include "palpate/error.hpp"
+
+namespace palpate {
+
+namespace {
+
+int bordered(int cells) { return cells + 2 * shaders::MAP_BORDER; }
+
+/// Cells of the map with its border. In storage a kernel that takes a map's last node reads on,
+/// without a use, to the one above and to its right.
+std::uint64_t cells_of(const OccupancyGrid& map, gpu::Access access) {
+  const auto width = static_cast<std::uint64_t>(bordered(map.nx));
+  return width * bordered(map.ny) + (access == gpu::Access::storage ? width + 1 : 0);
+}
+
+/// Most cells that kernels read at once.
+std::uint64_t most_cells(const gpu::Limits& limits, gpu::Access access) {
+  if (access == gpu::Access::table) {
+    return std::min<std::uint64_t>(limits.table_texels,
+                                   limits.allocation / sizeof(shaders::Corners));
+  }
+  return std::min(limits.storage_range, limits.allocation) / sizeof(float);
+}
+
+/// How kernels read the map. Throws Error where the device has no way.
+gpu::Access access_of(const gpu::Context& context, const OccupancyGrid& map) {
+  std::uint64_t most = 0;
+  for (const gpu::Access access : {gpu::Access::table, gpu::Access::storage}) {
+    most = std::max(most, most_cells(context.limits(), access));
+    if (cells_of(map, access) <= most) {
+      return access;
+    }
+  }
+  throw Error(
+      Fault::input,
+      fmt::format("map '{}': {} x {} cells exceed the {} that kernels of device '{}' read in one "
+                  "buffer; build it with larger cells",
+                  map.label, map.nx, map.ny, most, context.name()));
+}
+
+std::size_t axis_bins(const PoseLattice& lattice) {
+  return static_cast<std::size_t>(lattice.x_mm.count) + lattice.y_mm.count;
+}
+
+void append_axis(std::vector<shaders::Split>& axes, const Axis& axis_mm, double origin_mm,
+                 double cell_mm) {
+  for (int i = 0; i < axis_mm.count; ++i) {
+    axes.push_back(split((axis_mm.centre(i) - origin_mm) / cell_mm + shaders::MAP_BORDER));
+  }
+}
+
+std::uint64_t cell_bytes(gpu::Access access) {
+  return access == gpu::Access::table ? sizeof(shaders::Corners) : sizeof(float);
+}
+
+}  // namespace
+
+std::vector<MapGroup> group_maps(const gpu::Context& context,
+                                 std::span<const Hypothesis> hypotheses) {
+  std::vector<MapGroup> groups;
+  for (std::size_t object = 0; object < hypotheses.size(); ++object) {
+    const OccupancyGrid& map = hypotheses[object].map;
+    const MapKind kind{map.cell_mm, access_of(context, map)};
+    const std::uint64_t cells = cells_of(map, kind.access);
+    const std::uint64_t most = most_cells(context.limits(), kind.access);
+    const auto group = std::find_if(groups.begin(), groups.end(), [&](const MapGroup& g) {
+      return g.kind == kind && g.cells + cells <= most;
+    });
+    if (group == groups.end()) {
+      groups.push_back({kind, cells, {object}});
+    } else {
+      group->cells += cells;
+      group->objects.push_back(object);
+    }
+  }
+  return groups;
+}
+
+std::uint64_t MapTable::bytes_needed(const MapGroup& group, const PoseLattice& lattice) {
+  return gpu::allocated(group.cells * cell_bytes(group.kind.access)) +
+         gpu::allocated(group.objects.size() * axis_bins(lattice) * sizeof(shaders::Split)) +
+         gpu::allocated(group.objects.size() * sizeof(shaders::ObjectPlace));
+}
+
+MapTable::MapTable(gpu::Context& context, gpu::CommandStream& stream, const MapGroup& group,
+                   std::span<const Hypothesis> hypotheses, const PoseLattice& lattice,
+                   const Belief& belief, double prior) {
+  const gpu::Access access = group.kind.access;
+  log_odds_ = gpu::Buffer(
+      context, group.cells * cell_bytes(access), gpu::Memory::device,
+      fmt::format("map '{}'", hypotheses[group.objects.front()].map.label),
+      access == gpu::Access::table ? VK_FORMAT_R32G32B32A32_SFLOAT : VK_FORMAT_UNDEFINED);
+  std::vector<shaders::Split> axes;
+  std::vector<shaders::ObjectPlace> places;
+  std::uint64_t first_node = 0;
+  for (const std::size_t object : group.objects) {
+    const OccupancyGrid& map = hypotheses[object].map;
+    const auto slab = std::find_if(belief.slabs().begin(), belief.slabs().end(),
+                                   [&](const Slab& s) { return s.holds(object); });
+    places.push_back({.first_node = static_cast<int>(first_node),
+                      .map_width = bordered(map.nx),
+                      .map_height = bordered(map.ny),
+                      .first_axis = static_cast<shaders::uint>(axes.size()),
+                      .first_bin = static_cast<shaders::uint>(slab->first_bin(object))});
+    append_axis(axes, lattice.x_mm, map.origin_mm.x, map.cell_mm);
+    append_axis(axes, lattice.y_mm, map.origin_mm.y, map.cell_mm);
+    const VkDeviceSize offset = first_node * cell_bytes(access);
+    if (access == gpu::Access::table) {
+      const std::vector<shaders::Corners> cells = corners_with_border(map, prior);
+      stream.upload(log_odds_, std::span(cells), offset);
+    } else {
+      const std::vector<float> cells = with_border(map, prior);
+      stream.upload(log_odds_, std::span(cells), offset);
+    }
+    first_node += cells_of(map, access);
+  }
+  axes_ =
+      gpu::Buffer(context, std::span(axes).size_bytes(), gpu::Memory::device, "the lattice's axes");
+  places_ = gpu::Buffer(context, std::span(places).size_bytes(), gpu::Memory::device,
+                        "the objects' places");
+  stream.upload(axes_, std::span<const shaders::Split>(axes));
+  stream.upload(places_, std::span<const shaders::ObjectPlace>(places));
+}
+
+}  // namespace palpate

@@ -1,0 +1,52 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "belief.hpp"
+#include "command_stream.hpp"
+#include "likelihood_path.hpp"
+#include "palpate/estimate.hpp"
+#include "palpate/lattice.hpp"
+
+namespace palpate {
+
+/// Objects whose maps are of one kind and together no larger than what a kernel reads at once.
+struct MapGroup {
+  MapKind kind;
+  std::uint64_t cells = 0;           ///< that the maps take in a buffer
+  std::vector<std::size_t> objects;  ///< ascending
+};
+
+/// Puts every hypothesis's map into a group.
+/// @throws Error where a map is larger than what kernels read
+std::vector<MapGroup> group_maps(const gpu::Context& context,
+                                 std::span<const Hypothesis> hypotheses);
+
+/// The maps of a group on the device, one after the other, and what a kernel needs to find each.
+class MapTable {
+ public:
+  /// Device memory that it takes, in bytes.
+  static std::uint64_t bytes_needed(const MapGroup& group, const PoseLattice& lattice);
+
+  /// Records the upload. Beyond each map lies the prior.
+  MapTable(gpu::Context& context, gpu::CommandStream& stream, const MapGroup& group,
+           std::span<const Hypothesis> hypotheses, const PoseLattice& lattice, const Belief& belief,
+           double prior);
+
+  const gpu::Buffer& log_odds() const { return log_odds_; }
+  /// The lattice's x centres, then its y centres, in cells of each map, [object].
+  const gpu::Buffer& axes() const { return axes_; }
+  /// shaders::ObjectPlace, [object].
+  const gpu::Buffer& places() const { return places_; }
+
+  std::uint64_t device_bytes() const { return log_odds_.bytes() + axes_.bytes() + places_.bytes(); }
+
+ private:
+  gpu::Buffer log_odds_;
+  gpu::Buffer axes_;
+  gpu::Buffer places_;
+};
+
+}  // namespace palpate
