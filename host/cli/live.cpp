@@ -77,7 +77,7 @@ void check_output(const Options& options, const RecognitionTask& task) {
   require_distinct({{"--json", options.json}}, inputs);
 }
 
-/// A first touch compiles kernels and pages memory in; a real one should not have to wait for that.
+/// A first touch pages memory in, and may compile; a real one should not have to wait for that.
 void warm_up(Recogniser& recogniser, const RecognitionTask& task, const SensorDescription& sensor,
              const std::vector<glm::dvec2>& elements_mm) {
   // In Contact and No Contact by turns: what is Unknown would be passed over.
@@ -89,6 +89,7 @@ void warm_up(Recogniser& recogniser, const RecognitionTask& task, const SensorDe
                     .elements_mm = elements_mm,
                     .pressure = pressure,
                     .valid = sensor.valid};
+  recogniser.prepare(touch);
   recogniser.update(std::span(&touch, 1), [](double) {});
   recogniser.refine(recogniser.estimate().mode);
   recogniser.reset();

@@ -182,6 +182,7 @@ void LiveRecognition::take(TouchDetector& detector, const Frame& frame) {
     state_.counters = sensor_.counters();
   }
   hand_on(touch);
+  hand_ahead(detector.candidate());
   if (touching) {
     if (!was_touching_ && options_.reset_after_s && last_contact_s_ &&
         frame.host_time_s - *last_contact_s_ > *options_.reset_after_s) {
@@ -202,6 +203,15 @@ void LiveRecognition::hand_on(const std::optional<DetectedTouch>& touch) {
     return;
   }
   push({.touch = touch, .taken = taken_, .frames_lost = sensor_.counters().lost});
+}
+
+void LiveRecognition::hand_ahead(const std::optional<DetectedTouch>& candidate) {
+  if (!candidate) {
+    candidate_begin_s_.reset();
+  } else if (candidate_begin_s_ != candidate->begin_s && candidate->T_robot_sensor) {
+    candidate_begin_s_ = candidate->begin_s;
+    push({.touch = candidate, .under_way = true, .taken = taken_});
+  }
 }
 
 void LiveRecognition::believe() {
@@ -236,6 +246,10 @@ void LiveRecognition::use(const Job& job) {
                     .elements_mm = elements_mm_,
                     .pressure = job.touch->pressure,
                     .valid = sensor.valid};
+  if (job.under_way) {
+    recogniser_.prepare(touch);
+    return;
+  }
   recogniser_.update(std::span(&touch, 1), [](double) {});
   const std::string& label = sensor.truth ? sensor.truth->object : sensor.object;
   LiveTouch result{.touch = *job.touch,

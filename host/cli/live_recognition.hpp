@@ -52,7 +52,8 @@ struct LiveOptions {
 
 /// Finds the touches in a sensor's stream and updates the belief with each, from construction on.
 /// Frames are read and touches found on one thread, so that no frame is lost meanwhile the belief
-/// is updated on another.
+/// is updated on another. While a press is released, its steady phase is evaluated already, so that
+/// the estimate does not have to wait for that.
 class LiveRecognition {
  public:
   /// `on_touch` is called after each touch, on a thread of its own. What is passed by reference
@@ -79,9 +80,10 @@ class LiveRecognition {
 
  private:
   using Clock = std::chrono::steady_clock;
-  /// A touch for the belief, or the end of an unknown.
+  /// A touch for the belief, now or in all likelihood, or the end of an unknown.
   struct Job {
     std::optional<DetectedTouch> touch;
+    bool under_way = false;
     Clock::time_point taken;
     std::uint64_t frames_lost = 0;
   };
@@ -90,6 +92,7 @@ class LiveRecognition {
   std::optional<TouchDetector> tare();
   void take(TouchDetector& detector, const Frame& frame);
   void hand_on(const std::optional<DetectedTouch>& touch);
+  void hand_ahead(const std::optional<DetectedTouch>& candidate);
   void believe();
   void use(const Job& job);
   void push(Job job);
@@ -118,6 +121,7 @@ class LiveRecognition {
   Clock::time_point taken_;
   std::optional<double> last_contact_s_;
   bool was_touching_ = false;
+  std::optional<double> candidate_begin_s_;
 
   std::thread reader_;
   std::thread believer_;

@@ -23,6 +23,7 @@ class HistogramRecogniser : public Recogniser {
               const std::function<void(double)>& progress) override {
     histogram_.update(touches, progress);
   }
+  void prepare(const Touch& touch) override { histogram_.prepare(touch); }
   Estimate estimate() const override { return histogram_.estimate(); }
   std::optional<RefinedPose> refine(const Mode& mode) const override {
     return histogram_.refine(mode);
@@ -61,6 +62,7 @@ class ParticleRecogniser : public Recogniser {
       progress(static_cast<double>(i + 1) / static_cast<double>(touches.size()));
     }
   }
+  void prepare(const Touch&) override {}  // what weighs particles also moves and draws them
   Estimate estimate() const override { return filter_.estimate(); }
   std::optional<RefinedPose> refine(const Mode&) const override { return {}; }
   std::optional<double> effective_sample_size() const override {

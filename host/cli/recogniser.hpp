@@ -23,6 +23,8 @@ class Recogniser {
   /// `progress` is called with the fraction done, now and then.
   virtual void update(std::span<const Touch> touches,
                       const std::function<void(double)>& progress) = 0;
+  /// Evaluates a touch that is likely to come, where that can be done ahead.
+  virtual void prepare(const Touch& touch) = 0;
   virtual Estimate estimate() const = 0;
   /// The mode's pose between the bins, where there are bins.
   virtual std::optional<RefinedPose> refine(const Mode& mode) const = 0;

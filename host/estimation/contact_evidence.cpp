@@ -29,6 +29,15 @@ void append(ContactEvidence& evidence, const Touch& touch, std::span<const Readi
 
 }  // namespace
 
+bool ContactEvidence::operator==(const ContactEvidence& other) const {
+  const auto same = [](const shaders::Segment& a, const shaders::Segment& b) {
+    return a.begin == b.begin && a.end == b.end && a.reading == b.reading;
+  };
+  return from_pivot_mm == other.from_pivot_mm &&
+         std::equal(segments.begin(), segments.end(), other.segments.begin(), other.segments.end(),
+                    same);
+}
+
 ContactEvidence gather_evidence(std::span<const Touch> touches, const ContactClassifier& classifier,
                                 const glm::dvec2& pivot_mm, std::size_t segment_elements) {
   ContactEvidence evidence;

@@ -14,6 +14,8 @@ namespace palpate {
 struct ContactEvidence {
   std::vector<glm::dvec2> from_pivot_mm;
   std::vector<shaders::Segment> segments;
+
+  bool operator==(const ContactEvidence& other) const;
 };
 
 /// Classifies the touches' elements (Eq. 3) and leaves out those that are Unknown. No segment is

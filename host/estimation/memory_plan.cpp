@@ -47,8 +47,8 @@ Room room_of(const gpu::Context& context, const HistogramOptions& options) {
 
 }  // namespace
 
-std::size_t plan_memory(const gpu::Context& context, std::span<const Hypothesis> hypotheses,
-                        const HistogramOptions& options) {
+MemoryPlan plan_memory(const gpu::Context& context, std::span<const Hypothesis> hypotheses,
+                       const HistogramOptions& options) {
   const PoseLattice& lattice = options.lattice;
   const std::size_t objects = hypotheses.size();
   const Room room = room_of(context, options);
@@ -73,8 +73,14 @@ std::size_t plan_memory(const gpu::Context& context, std::span<const Hypothesis>
   if (needed(std::min(most, step)) > room.bytes) {
     refuse(context, lattice, objects, room, static_cast<double>(needed(std::min(most, step))));
   }
+  const auto plan = [&](std::size_t elements) {
+    // An array at rest prepares for the next touch in a way of its own.
+    const std::uint64_t with_one_more =
+        needed(elements) + Belief::bytes_needed(context, lattice, objects);
+    return MemoryPlan{elements, !options.still_array && with_one_more <= room.bytes};
+  };
   if (needed(most) <= room.bytes) {
-    return most;
+    return plan(most);
   }
   std::size_t fits = step;
   std::size_t too_many = most;
@@ -82,7 +88,7 @@ std::size_t plan_memory(const gpu::Context& context, std::span<const Hypothesis>
     const std::size_t middle = (fits + too_many) / 2 / step * step;
     (needed(middle) <= room.bytes ? fits : too_many) = middle;
   }
-  return fits;
+  return plan(fits);
 }
 
 }  // namespace palpate

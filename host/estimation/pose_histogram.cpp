@@ -34,6 +34,14 @@ struct StillArray {
   Belief no_contact;
 };
 
+/// A touch that may come next and its log-likelihood.
+struct PreparedTouch {
+  explicit PreparedTouch(Belief belief) : log_likelihood(std::move(belief)) {}
+
+  std::optional<ContactEvidence> evidence;  ///< none while it is not sound
+  Belief log_likelihood;
+};
+
 }  // namespace
 
 struct PoseHistogram::Impl {
@@ -42,10 +50,11 @@ struct PoseHistogram::Impl {
       : options(wanted),
         prior_model(model),
         context(device.context()),
-        batch_elements(plan_memory(context, hypotheses, options)),
+        plan(plan_memory(context, hypotheses, options)),
         stream(context),
         belief(context, stream, options.lattice, hypotheses.size()),
-        likelihood(context, stream, belief, hypotheses, options.lattice, model, batch_elements),
+        likelihood(context, stream, belief, hypotheses, options.lattice, model,
+                   plan.batch_elements),
         log_weight(log_weights(hypotheses)) {
     for (const Hypothesis& hypothesis : hypotheses) {
       bodies.push_back(displaced_body(hypothesis.map));
@@ -111,11 +120,30 @@ struct PoseHistogram::Impl {
     }
   }
 
-  /// Adds a touch element by element.
+  ContactEvidence evidence_of(std::span<const Touch> touches) const {
+    return gather_evidence(touches, options.classifier, options.lattice.pivot_mm,
+                           likelihood.segment_elements());
+  }
+
+  void prepare(const Touch& touch) {
+    ContactEvidence evidence = evidence_of(std::span(&touch, 1));
+    if (!prepared) {
+      prepared.emplace(Belief(context, stream, options.lattice, log_weight.size()));
+    }
+    prepared->evidence.reset();
+    prepared->log_likelihood.clear();
+    likelihood.accumulate(evidence, prepared->log_likelihood, {});
+    prepared->evidence = std::move(evidence);
+  }
+
+  /// Adds touches element by element, unless they were prepared.
   void update_plain(std::span<const Touch> touches, const std::function<void(double)>& progress) {
-    likelihood.accumulate(gather_evidence(touches, options.classifier, options.lattice.pivot_mm,
-                                          likelihood.segment_elements()),
-                          belief, progress);
+    const ContactEvidence evidence = evidence_of(touches);
+    if (prepared && prepared->evidence == evidence) {
+      belief.add(prepared->log_likelihood);
+    } else {
+      likelihood.accumulate(evidence, belief, progress);
+    }
     for (const Touch& touch : touches) {
       add_to_prior(touch);
     }
@@ -160,11 +188,12 @@ struct PoseHistogram::Impl {
   HistogramOptions options;
   ContactLikelihood prior_model;
   gpu::Context& context;
-  std::size_t batch_elements;  ///< most that the likelihood's tables may hold
+  MemoryPlan plan;
   gpu::CommandStream stream;
   Belief belief;
   DenseLikelihood likelihood;
   std::optional<StillArray> still;
+  std::optional<PreparedTouch> prepared;
   std::vector<double> log_weight;
   std::optional<double> none_log_weight;  ///< times the number of bins
   double prior_log_likelihood = 0.0;      ///< of all touches, by the prior alone
@@ -210,6 +239,12 @@ void PoseHistogram::update(std::span<const Touch> touches,
     return;
   }
   impl_->update_plain(touches, progress);
+}
+
+void PoseHistogram::prepare(const Touch& touch) {
+  if (impl_->plan.room_to_prepare) {
+    impl_->prepare(touch);
+  }
 }
 
 Estimate PoseHistogram::estimate() const {
@@ -264,7 +299,9 @@ std::vector<std::string> PoseHistogram::paths() const { return impl_->likelihood
 
 std::uint64_t PoseHistogram::device_bytes() const {
   const std::uint64_t still = impl_->still ? impl_->still->no_contact.device_bytes() : 0;
-  return impl_->belief.device_bytes() + still + impl_->likelihood.device_bytes();
+  const std::uint64_t prepared =
+      impl_->prepared ? impl_->prepared->log_likelihood.device_bytes() : 0;
+  return impl_->belief.device_bytes() + still + prepared + impl_->likelihood.device_bytes();
 }
 
 }  // namespace palpate

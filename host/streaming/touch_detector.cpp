@@ -184,6 +184,7 @@ std::optional<DetectedTouch> TouchDetector::finish() {
   return touch;
 }
 
+const std::optional<DetectedTouch>& TouchDetector::candidate() const { return impl_->best; }
 bool TouchDetector::touching() const { return impl_->touching; }
 const std::vector<double>& TouchDetector::baseline() const { return impl_->baseline; }
 

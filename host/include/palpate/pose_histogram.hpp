@@ -66,6 +66,14 @@ class PoseHistogram {
   void update(std::span<const Touch> touches, const std::function<void(double)>& progress = {});
   void update(const Touch& touch) { update(std::span(&touch, 1)); }
 
+  /// Evaluates a touch that is likely to come next, so that update() with that touch alone, of the
+  /// same readings at the same place, only has to add it: for a touch that is known before it ends.
+  /// The result is the same but for rounding, and the belief does not change before. Takes memory
+  /// for a second belief from the first call on; where the device or the limit has none, nothing is
+  /// done. Nor is it for a still array.
+  /// @throws Error on a touch that is not sound, or if the device fails
+  void prepare(const Touch& touch);
+
   /// Identity probabilities (Eq. 14) and mode (Eq. 15-16).
   /// @throws Error if the device fails
   Estimate estimate() const;

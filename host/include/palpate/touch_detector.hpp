@@ -65,6 +65,9 @@ class TouchDetector {
   /// The touch under way when the stream ends, if it was steady long enough; begins anew.
   std::optional<DetectedTouch> finish();
 
+  /// The touch that the next release will end, unless a longer steady phase comes before; empty
+  /// where no steady phase is over yet. It changes with add() and finish() alone.
+  const std::optional<DetectedTouch>& candidate() const;
   /// Between onset and release.
   bool touching() const;
   /// [e] what the array reads untouched by now; empty before the first frame where none was given.

@@ -1,0 +1,99 @@
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "context.hpp"
+#include "palpate/pose_histogram.hpp"
+#include "synthetic.hpp"
+
+namespace palpate {
+namespace {
+
+const std::vector<Hypothesis>& objects() {
+  static const std::vector<Hypothesis> two{{random_map(31, 27, 0.5, 12.0, 162), 1.0},
+                                           {random_map(23, 29, 0.5, 12.0, 163), 1.0}};
+  return two;
+}
+
+HistogramOptions options_of(double step_mm) {
+  HistogramOptions options;
+  options.lattice = {.x_mm = {-3.0, -3.0 + 11 * step_mm, 11},
+                     .y_mm = {-2.0, -2.0 + 9 * step_mm, 9},
+                     .theta_rad = {0.0, 3.0, 5}};
+  return options;
+}
+
+std::vector<std::vector<double>> told_by(const PoseHistogram& histogram) {
+  return {histogram.log_likelihood(0), histogram.log_likelihood(1)};
+}
+
+/// Two of three touches are used; the third is another one.
+class PreparedTouch : public testing::Test {
+ protected:
+  Device device = Device::open();
+  const Recording recording = random_recording(3, 60, 161);
+  const std::vector<Touch> touches = all_touches(recording);
+};
+
+TEST_F(PreparedTouch, ChangesNothingBeforeItComes) {
+  PoseHistogram histogram(device, objects(), options_of(0.1));
+  histogram.update(touches[0]);
+  const auto before = told_by(histogram);
+  histogram.prepare(touches[1]);
+  EXPECT_EQ(told_by(histogram), before);
+}
+
+TEST_F(PreparedTouch, GivesTheReferencesLikelihoodOnEveryPath) {
+  for (const double step_mm : {0.1, 0.8}) {
+    const HistogramOptions options = options_of(step_mm);
+    PoseHistogram histogram(device, objects(), options);
+    for (const Touch& touch : touches) {
+      histogram.prepare(touch);
+      histogram.update(touch);
+    }
+    // 1e-4 nats per 36 elements and touch.
+    EXPECT_LT(likelihood_error(histogram, reference_posterior(objects(), options, touches)),
+              1e-4 * 3 * 60.0 / 36.0);
+  }
+}
+
+TEST_F(PreparedTouch, ThatDoesNotComeCostsNoBit) {
+  PoseHistogram plain(device, objects(), options_of(0.8));
+  PoseHistogram prepared(device, objects(), options_of(0.8));
+  // Another touch, several at once, and the same readings elsewhere.
+  Touch elsewhere = touches[2];
+  elsewhere.T_robot_sensor.translation_mm.x += 0.25;
+  for (PoseHistogram* histogram : {&plain, &prepared}) {
+    const auto prepare = [&](const Touch& touch) {
+      if (histogram == &prepared) {
+        histogram->prepare(touch);
+      }
+    };
+    prepare(touches[2]);
+    histogram->update(touches[0]);
+    prepare(touches[0]);
+    histogram->update(std::span(touches).first(2));
+    prepare(elsewhere);
+    histogram->update(touches[2]);
+  }
+  EXPECT_EQ(told_by(prepared), told_by(plain));
+}
+
+TEST_F(PreparedTouch, StaysWithinTheMemoryLimit) {
+  HistogramOptions options = options_of(0.1);
+  options.lattice.theta_rad.count = 20'000;  // 32 MB for each belief
+  const std::uint64_t one_belief = 2 * 8 * static_cast<std::uint64_t>(options.lattice.bins());
+  for (const std::uint64_t limit : {2 * one_belief, 4 * one_belief}) {
+    options.memory_limit_bytes = limit;
+    Device fresh = Device::open();
+    PoseHistogram histogram(fresh, objects(), options);
+    histogram.prepare(touches[0]);
+    histogram.update(touches[0]);
+    const bool room = limit > 3 * one_belief;
+    EXPECT_EQ(histogram.device_bytes() > 2 * one_belief, room);
+    EXPECT_LE(fresh.context().memory_use().peak, limit);
+  }
+}
+
+}  // namespace
+}  // namespace palpate
