@@ -51,8 +51,9 @@ SimulatedSensor::SimulatedSensor(const std::string& shape, const SimulatedSensor
       shape_(make_shape(shape)),
       T_object_robot_(options.T_object_robot.value_or(Pose{})),
       pace_(options.speed) {
-  description_.name = "simulated DigiTacts";
-  description_.elements_mm = digitacts_array();
+  const bool own_array = !options.elements_mm.empty();
+  description_.name = own_array ? "simulated array" : "simulated DigiTacts";
+  description_.elements_mm = own_array ? options.elements_mm : digitacts_array();
   description_.rate_hz = options.rate_hz;
   if (options.T_object_robot) {
     description_.truth = {.object = shape_.label, .T_object_robot = T_object_robot_};

@@ -15,6 +15,7 @@ namespace palpate {
 /// What a simulated robot does: see open_virtual_sensor().
 struct SimulatedSensorOptions {
   double rate_hz = 100.0;
+  std::vector<glm::dvec2> elements_mm;  ///< in the sensor frame; empty: digitacts_array()
   std::uint64_t seed = 1;
   std::optional<std::uint64_t> touches;
   double noise_kpa = 0.7;

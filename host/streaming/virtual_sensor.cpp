@@ -100,6 +100,30 @@ class SourceName {
     return Pose{{x, y}, deg * std::numbers::pi / 180.0};
   }
 
+  std::vector<glm::dvec2> array() const {
+    const auto found = options_.find("array");
+    if (found == options_.end()) {
+      return {};
+    }
+    const std::string_view text = found->second;
+    const std::size_t first = text.find(':');
+    const std::size_t second = text.find(':', first == text.npos ? first : first + 1);
+    if (second == text.npos) {
+      refuse("array", "must be COLUMNS:ROWS:PITCH, the pitch in mm");
+    }
+    const int columns = parse("array", text.substr(0, first), 1, 64);
+    const int rows = parse("array", text.substr(first + 1, second - first - 1), 1, 64);
+    const double pitch_mm = parse("array", text.substr(second + 1), 0.01, 100.0);
+    std::vector<glm::dvec2> elements_mm;
+    for (int row = 0; row < rows; ++row) {
+      for (int column = 0; column < columns; ++column) {
+        elements_mm.emplace_back((column - (columns - 1) / 2.0) * pitch_mm,
+                                 (row - (rows - 1) / 2.0) * pitch_mm);
+      }
+    }
+    return elements_mm;
+  }
+
  private:
   [[noreturn]] void refuse(std::string_view key, std::string_view message) const {
     throw Error(Fault::input, fmt::format("sensor {}: {} {}", name_, key, message));
@@ -136,13 +160,15 @@ std::unique_ptr<Sensor> open_virtual_sensor(const std::string& name) {
   if (!name.starts_with(simulate)) {
     throw Error(Fault::input, fmt::format("sensor {}: write replay:FILE or simulate:SHAPE", name));
   }
-  const SourceName source(name, simulate, {"rate", "seed", "touches", "noise", "object", "speed"});
+  const SourceName source(name, simulate,
+                          {"rate", "array", "seed", "touches", "noise", "object", "speed"});
   SimulatedSensorOptions options;
   options.rate_hz = source.number("rate", 1.0, 1e5).value_or(options.rate_hz);
   options.seed = source.number<std::uint64_t>("seed", 0, UINT64_MAX).value_or(options.seed);
   options.touches = source.number<std::uint64_t>("touches", 1, 1'000'000'000);
   options.noise_kpa = source.number("noise", 0.0, 1e3).value_or(options.noise_kpa);
   options.T_object_robot = source.object_pose(options.seed);
+  options.elements_mm = source.array();
   options.speed = source.speed();
   return std::make_unique<SimulatedSensor>(source.what(), options);
 }

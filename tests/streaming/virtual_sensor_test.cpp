@@ -81,6 +81,17 @@ TEST(SimulatedSensor, ThePressesAreFoundAsTheyWereMade) {
   }
 }
 
+TEST(SimulatedSensor, HasTheArrayThatIsAskedFor) {
+  const auto sensor = open_virtual_sensor("simulate:E,array=3:2:1.5,touches=2,speed=max");
+  const std::vector<glm::dvec2> expected = {{-1.5, -0.75}, {0.0, -0.75}, {1.5, -0.75},
+                                            {-1.5, 0.75},  {0.0, 0.75},  {1.5, 0.75}};
+  EXPECT_EQ(sensor->description().elements_mm, expected);
+  sensor->start();
+  const std::optional<Frame> frame = sensor->next(0ms);
+  ASSERT_TRUE(frame);
+  EXPECT_EQ(frame->values.size(), 6u);
+}
+
 TEST(SimulatedSensor, SteadyFramesWithoutNoiseAreTheSimulatorsTouch) {
   const auto exact = touches_of("simulate:I,touches=5,noise=0,speed=max");
   SensorModel model;
@@ -220,7 +231,10 @@ TEST(VirtualSensor, RefusesNamesThatSayNothing) {
   };
   refused("simulate:", {"simulate:SHAPE"});
   refused("replay:,speed=max", {"replay:FILE"});
-  refused("simulate:A,rat=3", {"rat", "rate, seed"});
+  refused("simulate:A,rat=3", {"rat", "rate, array, seed"});
+  refused("simulate:A,array=16:16", {"array", "COLUMNS:ROWS:PITCH"});
+  refused("simulate:A,array=0:16:2", {"array", "1"});
+  refused("simulate:A,array=16:16:0", {"array", "0.01"});
   refused("simulate:A,rate", {"rate", "value"});
   refused("simulate:A,rate=", {"rate", "number"});
   refused("simulate:A,rate=0", {"rate", "1"});

@@ -27,6 +27,7 @@ bool is_virtual_sensor(std::string_view name);
 ///   speed=F|max   F times as fast, or as fast as frames are taken
 /// and of simulate:
 ///   rate=HZ       frames per second [100]
+///   array=COLUMNS:ROWS:PITCH  a grid of elements, the pitch in mm [a DigiTacts array, 6 x 6]
 ///   seed=N        of presses and noise [1]
 ///   touches=N     ends after so many presses [never]
 ///   noise=KPA     standard deviation of each reading's noise [0.7]
