@@ -110,7 +110,8 @@ class OtherProgram {
 };
 
 TEST_F(Refusal, ABoardInUseNamesWhoHasIt) {
-  FakeTakktile board(usb_, "1", {0b11111});
+  // An address of its own: tests that run beside this one have their boards open.
+  FakeTakktile board(usb_, "1", {0b11111}, FakeTakktile::Layout::bits, 99);
   board.usb().occupy(true);
   {
     const OtherProgram other(board.usb().node());
