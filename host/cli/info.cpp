@@ -92,6 +92,9 @@ void print_map(const std::string& path) {
              m.nx * m.cell_mm, m.ny * m.cell_mm);
   fmt::print("  origin            {:.3f}, {:.3f} mm, centre of cell (0, 0)\n", m.origin_mm.x,
              m.origin_mm.y);
+  if (m.spread_mm) {
+    fmt::print("  spread            {} mm, of the sensor model that built it\n", *m.spread_mm);
+  }
   fmt::print("  prior             {:.4f}, log odds {:.3f}\n", m.prior, m.prior_log_odds());
   fmt::print("  log odds          {:.3f} to {:.3f} nats\n", *least, *most);
   fmt::print("  occupied          {} cells, {:.1f} mm2\n", occupied,

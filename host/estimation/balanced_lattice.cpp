@@ -15,11 +15,18 @@ namespace palpate {
 
 namespace {
 
-double smallest_cell_mm(std::span<const Hypothesis> hypotheses) {
-  return std::min_element(
-             hypotheses.begin(), hypotheses.end(),
-             [](const Hypothesis& a, const Hypothesis& b) { return a.map.cell_mm < b.map.cell_mm; })
-      ->map.cell_mm;
+/// The least distance over which a map can change much: cells are interpolated, and every cell is
+/// a sum of Gaussians of the sensor model's spread.
+double resolution_mm(const OccupancyGrid& map) {
+  return std::max(map.cell_mm, map.spread_mm.value_or(0.0));
+}
+
+double finest_resolution_mm(std::span<const Hypothesis> hypotheses) {
+  double finest_mm = std::numeric_limits<double>::infinity();
+  for (const Hypothesis& hypothesis : hypotheses) {
+    finest_mm = std::min(finest_mm, resolution_mm(hypothesis.map));
+  }
+  return finest_mm;
 }
 
 /// Root mean square distance of an object's cells from the pivot, wherever in the region that is.
@@ -60,7 +67,7 @@ BalancedLattice balanced_lattice(const PoseLattice& region, std::span<const Hypo
     }
     return product;
   };
-  const double wanted_mm = balanced_step_cells * smallest_cell_mm(hypotheses);
+  const double wanted_mm = balanced_step * finest_resolution_mm(hypotheses);
   // Counts are ints.
   const auto most =
       static_cast<double>(std::min<std::int64_t>(most_bins, std::numeric_limits<int>::max()));

@@ -30,6 +30,11 @@ void validate_hypotheses(std::span<const Hypothesis> hypotheses) {
       throw Error(Fault::input, fmt::format("map '{}': cell_mm = {}: give a positive length",
                                             map.label, map.cell_mm));
     }
+    if (map.spread_mm && (!(*map.spread_mm > 0.0) || !std::isfinite(*map.spread_mm))) {
+      throw Error(Fault::input,
+                  fmt::format("map '{}': spread_mm = {}: give a positive length, or none",
+                              map.label, *map.spread_mm));
+    }
     if (!std::isfinite(map.origin_mm.x) || !std::isfinite(map.origin_mm.y)) {
       throw Error(Fault::input, fmt::format("map '{}': origin_mm = {},{}: give finite numbers",
                                             map.label, map.origin_mm.x, map.origin_mm.y));

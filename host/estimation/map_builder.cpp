@@ -88,6 +88,7 @@ OccupancyGrid MapBuilder::build(const std::string& label) {
   map.label = label;
   map.prior = options.sensor.prior;
   map.cell_mm = options.cell_mm;
+  map.spread_mm = options.sensor.spread_mm;
   // Origins are whole multiples of the cell, so that maps can be compared cell by cell.
   map.origin_mm =
       options.cell_mm * glm::dvec2(static_cast<double>(range.x), static_cast<double>(range.y));

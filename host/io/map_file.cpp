@@ -33,6 +33,10 @@ void validate(const std::filesystem::path& path, const OccupancyGrid& map) {
                              "for full symmetry",
                              map.symmetry));
   }
+  if (map.spread_mm && !(std::isfinite(*map.spread_mm) && *map.spread_mm > 0)) {
+    refuse(path, fmt::format("attribute 'spread_mm' = {}; make it positive, or leave it out",
+                             *map.spread_mm));
+  }
   for (std::size_t k = 0; k < map.log_odds.size(); ++k) {
     if (!std::isfinite(map.log_odds[k])) {
       const auto nx = static_cast<std::size_t>(map.nx);
@@ -45,9 +49,10 @@ void validate(const std::filesystem::path& path, const OccupancyGrid& map) {
 }  // namespace
 
 OccupancyGrid read_map(const std::filesystem::path& path) {
-  Hdf5Contents file(path,
-                    {"format", "version", "label", "cell_mm", "origin_mm", "prior", "symmetry"},
-                    {"log_odds"});
+  Hdf5Contents file(
+      path,
+      {"format", "version", "label", "cell_mm", "origin_mm", "prior", "symmetry", "spread_mm"},
+      {"log_odds"});
   require_format(file, map_format);
   OccupancyGrid map;
   map.label = file.text("label");
@@ -56,6 +61,9 @@ OccupancyGrid read_map(const std::filesystem::path& path) {
   map.origin_mm = {origin[0], origin[1]};
   map.prior = file.number("prior");
   map.symmetry = file.integer("symmetry", 0);
+  if (file.has_attribute("spread_mm")) {  // other programs' maps may have none
+    map.spread_mm = file.number("spread_mm");
+  }
   const Hdf5Value& log_odds = file.dataset("log_odds", 2);
   const auto [least, most] = std::minmax(log_odds.shape[0], log_odds.shape[1]);
   if (least < 1 || most > std::numeric_limits<int>::max()) {
@@ -85,6 +93,9 @@ void write_map(const std::filesystem::path& path, const OccupancyGrid& map) {
   file.attribute("origin_mm", {map.origin_mm.x, map.origin_mm.y});
   file.attribute("prior", map.prior);
   file.attribute("symmetry", map.symmetry);
+  if (map.spread_mm) {
+    file.attribute("spread_mm", *map.spread_mm);
+  }
   file.dataset("log_odds", {static_cast<std::size_t>(map.ny), static_cast<std::size_t>(map.nx)},
                map.log_odds);
   file.save();

@@ -46,9 +46,11 @@ TEST_F(InfoCommand, DeadElementsDoNotCountAmongThePressures) {
 TEST_F(InfoCommand, Map) {
   OccupancyGrid map = sample_map("I");
   map.symmetry = 2;
+  map.spread_mm = 0.7;
   write_map(folder_ / "I.map.h5", map);
-  expect_info("I.map.h5", {"map of I", "65 x 65 of 0.5 mm", "-16.000, -16.000 mm", "0.2000",
-                           "-4.000 to 4.000 nats", "symmetry          2"});
+  expect_info("I.map.h5",
+              {"map of I", "65 x 65 of 0.5 mm", "-16.000, -16.000 mm", "0.2000",
+               "spread            0.7 mm", "-4.000 to 4.000 nats", "symmetry          2"});
 }
 
 TEST_F(InfoCommand, Posterior) {

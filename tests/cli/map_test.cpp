@@ -85,6 +85,7 @@ TEST_F(MapCommand, FlagsOfTheModelMatter) {
 
 TEST_F(MapCommand, SpreadIsHalfThePointSpread) {
   const OccupancyGrid by_psf = map_of_a({"--psf-mm", "1.6"});
+  EXPECT_EQ(by_psf.spread_mm, 0.8) << "the map says so";
   EXPECT_EQ(map_of_a({"--spread-mm", "0.8"}).log_odds, by_psf.log_odds);
   EXPECT_EQ(map_of_a({"--spread-mm", "0.8", "--psf-mm", "5"}).log_odds, by_psf.log_odds);
 }

@@ -77,6 +77,22 @@ TEST_F(RecognizeFlags, AutoBinsAreChosenByTheMapsAndSaid) {
   EXPECT_EQ(mode({"--scene=auto.yaml"}), mode(by_hand));
 }
 
+TEST_F(RecognizeFlags, AutoBinsAreNotFinerThanTheSensorShows) {
+  write_recording(folder_ / "train.h5", sample_training("A", 48));
+  done({"map", "train.h5", "--cell-mm", "0.25", "-o", "fine.map.h5"});
+  const std::vector<std::string> recognize{"recognize",   "u.h5",           "--maps",
+                                           "fine.map.h5", "--bins",         "auto",
+                                           "--x-mm=1:3",  "--y-mm=-4:-2.5", "--theta-deg=40:70"};
+  const std::string out = done(recognize);
+  EXPECT_NE(out.find("7 x 5 x "), std::string::npos) << "steps of 0.3 mm\n" << out;
+  // Of a map that does not know its spread, the cells decide.
+  OccupancyGrid map = read_map(folder_ / "fine.map.h5");
+  map.spread_mm.reset();
+  write_map(folder_ / "fine.map.h5", map);
+  const std::string finer = done(recognize);
+  EXPECT_NE(finer.find("14 x 10 x "), std::string::npos) << finer;
+}
+
 TEST_F(RecognizeFlags, FramesAreHalfOpen) {
   const json selected = mode({"--frames", "2:5"});
   write_recording(folder_ / "u.h5", part_of(sample_unknown("A", {{2.0, -3.0}, 1.0}, 6), 2, 5));

@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <numbers>
+#include <optional>
 
 #include <gtest/gtest.h>
 
@@ -80,6 +81,24 @@ TEST(BalancedLattice, TakesTheFinestMapAndTheLongestLever) {
   objects[1] = letter("O");
   objects[1].map.origin_mm.x += 30.0;
   EXPECT_GT(balanced_lattice({}, objects).lattice.theta_rad.count, 2 * one.lattice.theta_rad.count);
+}
+
+TEST(BalancedLattice, StopsAtWhatTheSensorShows) {
+  const auto counts = [](double cell_mm, std::optional<double> spread_mm) {
+    Hypothesis object = letter("O");
+    object.map.origin_mm *= cell_mm / object.map.cell_mm;
+    object.map.cell_mm = cell_mm;
+    object.map.spread_mm = spread_mm;
+    return balanced_lattice({}, std::span(&object, 1)).lattice.x_mm.count;
+  };
+  EXPECT_EQ(counts(0.25, {}), 134) << "not known";
+  EXPECT_EQ(counts(0.25, 0.5), 67) << "20 mm in steps of 0.6 x 0.5 mm";
+  EXPECT_EQ(counts(0.25, 0.1), 134) << "cells wider than the spread";
+  EXPECT_EQ(counts(0.5, 0.5), 67);
+  EXPECT_EQ(counts(1.0, 0.5), 34);
+  std::vector<Hypothesis> objects{letter("O"), letter("O")};
+  objects[0].map.spread_mm = 2.0;
+  EXPECT_EQ(balanced_lattice({}, objects).lattice.x_mm.count, 67) << "the finest counts";
 }
 
 TEST(BalancedLattice, FollowsTheRegionAndCollapsesWhatIsFixed) {

@@ -84,6 +84,11 @@ TEST_F(HistogramInput, WithAMapThatIsNoGridIsRefused) {
     objects[0].map.cell_mm = cell_mm;
     refuse("cell_mm");
   }
+  for (const double spread_mm : {0.0, -1.0, nan, infinity}) {
+    objects[0].map = sound;
+    objects[0].map.spread_mm = spread_mm;
+    refuse("spread_mm");
+  }
   for (const double origin_mm : {nan, infinity}) {
     objects[0].map = sound;
     objects[0].map.origin_mm.y = origin_mm;

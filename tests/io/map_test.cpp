@@ -18,6 +18,7 @@ OccupancyGrid small_map() {
   map.origin_mm = {-3.5, 12.0};
   map.prior = 0.1;
   map.symmetry = 2;
+  map.spread_mm = 0.7;
   map.nx = 3;
   map.ny = 2;
   const auto unseen = static_cast<float>(map.prior_log_odds());
@@ -48,9 +49,18 @@ TEST_F(MapFile, ComesBackAsItWasWritten) {
   EXPECT_EQ(read.origin_mm, written.origin_mm);
   EXPECT_EQ(read.prior, written.prior);
   EXPECT_EQ(read.symmetry, written.symmetry);
+  EXPECT_EQ(read.spread_mm, written.spread_mm);
   EXPECT_EQ(read.nx, written.nx);
   EXPECT_EQ(read.ny, written.ny);
   EXPECT_EQ(read.log_odds, written.log_odds);
+}
+
+TEST_F(MapFile, MayNotKnowTheSpread) {
+  map_parts().save(path_);
+  OccupancyGrid map = read_map(path_);
+  EXPECT_FALSE(map.spread_mm);
+  write_map(path_, map);
+  EXPECT_FALSE(read_map(path_).spread_mm);
 }
 
 TEST_F(MapFile, NamesAttributesItCannotTake) {
@@ -61,6 +71,9 @@ TEST_F(MapFile, NamesAttributesItCannotTake) {
   const double infinity = std::numeric_limits<double>::infinity();
   for (const double cell_mm : {0.0, -0.5, nan, infinity}) {
     expect_named(spoilt("cell_mm", cell_mm), {"'cell_mm'"});
+  }
+  for (const double spread_mm : {0.0, -0.5, nan, infinity}) {
+    expect_named(spoilt("spread_mm", spread_mm), {"'spread_mm'"});
   }
   for (const double prior : {0.0, 1.0, -0.1, nan}) {
     expect_named(spoilt("prior", prior), {"'prior'"});

@@ -9,9 +9,10 @@
 
 namespace palpate {
 
-/// Step of balanced bins, as a part of a map's cell. The interpolated map changes little over less,
-/// and the refined pose lies between the bins anyhow. Every halving costs eight times the bins.
-inline constexpr double balanced_step_cells = 0.6;
+/// Step of balanced bins, as a part of what a map resolves: of the larger of its cell and, where
+/// the map knows it, the spread of its sensor model. The map changes little over less, and the
+/// refined pose lies between the bins anyhow. Every halving costs eight times the bins.
+inline constexpr double balanced_step = 0.6;
 
 /// Bins of all objects together that balanced_lattice() does not exceed by itself: 0.8 GB, and on
 /// two CPU cores some 2.5 s for a touch of 36 elements.
@@ -25,11 +26,12 @@ struct BalancedLattice {
 };
 
 /// Counts for the region of a lattice, whose own are not read: x and y in steps of at most
-/// `balanced_step_cells` of the smallest cell of any map, theta in steps that turn each object by
-/// as much, root mean square over its occupied cells and over where in the region the pivot may be
-/// in it. The letters of Sec. IV, of 0.5 mm cells over 20 mm and the full circle, get some
-/// 67 x 67 x 280. An axis of zero extent costs one bin. Where that makes more than `most_bins` of
-/// all objects together, all axes are made coarser alike.
+/// `balanced_step` of what the finest map resolves, theta in steps that turn each object by as
+/// much, root mean square over its occupied cells and over where in the region the pivot may be in
+/// it. The letters of Sec. IV, over 20 mm and the full circle, get some 67 x 67 x 280 with cells of
+/// 0.5 mm, and no more with smaller ones under the spread of 0.5 mm that a point spread of 1 mm
+/// has. An axis of zero extent costs one bin. Where that makes more than `most_bins` of all objects
+/// together, all axes are made coarser alike.
 /// @throws Error on an empty list, a map that is not sound or a region that is out of range
 BalancedLattice balanced_lattice(const PoseLattice& region, std::span<const Hypothesis> hypotheses,
                                  std::int64_t most_bins = most_balanced_bins);

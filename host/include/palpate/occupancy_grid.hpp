@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -21,6 +22,9 @@ struct OccupancyGrid {
   glm::dvec2 origin_mm{0.0, 0.0};  ///< centre of cell (0, 0)
   double prior = 0.2;              ///< p(m), probability that an unseen cell is occupied
   int symmetry = 1;                ///< n-fold rotational symmetry of the object; 0 = full
+  /// Spread of the inverse sensor model that built it: a finer cell shows no more. None where that
+  /// is not known.
+  std::optional<double> spread_mm = {};
   int nx = 0;
   int ny = 0;
   std::vector<float> log_odds;  ///< [ny, nx], row-major
