@@ -223,7 +223,7 @@ void print_table(const std::vector<RecognitionRecord>& records, const Recognitio
   for (const RecognitionRecord& record : records) {
     if (record.last().contradicted) {
       fmt::print(
-          "{}: contradicted: no map explains these touches at any bin; the object may be "
+          "{}: contradicted: no map explains these touches at any pose tried; the object may be "
           "unknown, its pose outside the region, or gamma too small\n",
           name_of(record));
     }

@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 
 #include "command_stream.hpp"
+#include "contradiction.hpp"
 #include "draw_particles.hpp"
 #include "hypotheses.hpp"
 #include "kernel_sizes.hpp"
@@ -104,6 +105,7 @@ struct ParticleFilter::Impl {
   Impl(Device& device, std::span<const Hypothesis> hypotheses, const ParticleOptions& wanted,
        const ContactLikelihood& model)
       : options(wanted),
+        prior_model(model),
         objects(hypotheses.size()),
         context(device.context()),
         stream(context),
@@ -152,6 +154,7 @@ struct ParticleFilter::Impl {
   void start() {
     touch = 0;
     weighed = false;
+    prior_over_best = 0.0;
     averages = LikelihoodAverages(options.alpha_slow, options.alpha_fast);
     draw(shaders::DRAW_INITIAL, 0.0);
     // No evidence, equal weights; the driver compiles the kernel now, and no touch waits for that.
@@ -198,7 +201,26 @@ struct ParticleFilter::Impl {
     summary = summarise(sums);
   }
 
-  void update(const ContactEvidence& evidence) {
+  /// Log-likelihood of the last touch by the particle of an object that explains it best.
+  /// -infinity where all are of "none of these".
+  double best_log_likelihood() {
+    if (!options.none_weight) {
+      return summary.log_largest;
+    }
+    // The largest may be of "none of these", which is as likely as the prior by definition.
+    std::vector<TwoFloat> logs;
+    const std::vector<shaders::Particle> states = download(logs);
+    double best = -std::numeric_limits<double>::infinity();
+    for (std::size_t i = 0; i < states.size(); ++i) {
+      if (states[i].object < objects) {
+        best = std::max(best, logs[i].value());
+      }
+    }
+    return best;
+  }
+
+  /// @param by_prior log-likelihood of the touch by the prior alone
+  void update(const ContactEvidence& evidence, double by_prior) {
     ++touch;
     // A touch that says nothing moves the particles and leaves their weights: drawing anew would
     // only lose some. So would it before the first touch, when all weigh the same.
@@ -217,17 +239,27 @@ struct ParticleFilter::Impl {
     likelihood.weigh(evidence, particles, size(), log_weights);
     sum_weights();
     weighed = true;
+    if (const double best = best_log_likelihood(); std::isfinite(best)) {
+      prior_over_best += by_prior - best;
+    }
     averages.add(summary.log_largest + std::log(summary.sum / static_cast<double>(size())),
                  evidence.from_pivot_mm.size());
   }
 
-  /// Particles as the device keeps them, about the region's centre.
-  std::vector<shaders::Particle> download(std::vector<double>& weights) {
+  /// Particles as the device keeps them, about the region's centre, and their log-likelihoods.
+  std::vector<shaders::Particle> download(std::vector<TwoFloat>& logs) {
     std::vector<shaders::Particle> states(size());
-    std::vector<TwoFloat> logs(size());
+    logs.resize(size());
     stream.download(particles, std::span(states));
     stream.download(log_weights, std::span(logs));
     stream.run();
+    return states;
+  }
+
+  /// The same with weights that sum to 1.
+  std::vector<shaders::Particle> download(std::vector<double>& weights) {
+    std::vector<TwoFloat> logs;
+    std::vector<shaders::Particle> states = download(logs);
     weights.clear();
     double total = 0.0;
     for (const TwoFloat& log_weight : logs) {
@@ -252,6 +284,7 @@ struct ParticleFilter::Impl {
   }
 
   ParticleOptions options;
+  ContactLikelihood prior_model;
   std::size_t objects;
   gpu::Context& context;
   gpu::CommandStream stream;
@@ -273,6 +306,8 @@ struct ParticleFilter::Impl {
   LikelihoodAverages averages;
   shaders::uint touch = 0;  ///< counts the touches since the start
   bool weighed = false;     ///< by any touch since the start
+  /// Of all touches since the start, the prior's log-likelihood over the best particle's.
+  double prior_over_best = 0.0;
 };
 
 ParticleFilter::ParticleFilter(Device& device, std::span<const Hypothesis> hypotheses,
@@ -295,14 +330,17 @@ void ParticleFilter::reset() { impl_->start(); }
 
 void ParticleFilter::update(std::span<const Touch> touches) {
   const ParticleOptions& options = impl_->options;
+  // All of them before the first is taken in, for one that is not sound refuses all.
   std::vector<ContactEvidence> evidence;
+  std::vector<double> by_prior;
   for (const Touch& touch : touches) {
     evidence.push_back(gather_evidence(std::span(&touch, 1), options.classifier,
                                        options.region.pivot_mm,
                                        ParticleLikelihood::segment_elements()));
+    by_prior.push_back(prior_log_likelihood(touch, options.classifier, impl_->prior_model));
   }
-  for (const ContactEvidence& of_touch : evidence) {
-    impl_->update(of_touch);
+  for (std::size_t i = 0; i < evidence.size(); ++i) {
+    impl_->update(evidence[i], by_prior[i]);
   }
 }
 
@@ -325,6 +363,7 @@ Estimate ParticleFilter::estimate() const {
         impl_->T_object_robot(maximum->x_mm, maximum->y_mm, maximum->theta_rad);
     estimate.mode.log_likelihood = std::log(maximum->density);
   }
+  estimate.contradicted = impl_->prior_over_best > contradiction_nats;
   return estimate;
 }
 

@@ -8,6 +8,7 @@
 
 #include "belief.hpp"
 #include "command_stream.hpp"
+#include "contradiction.hpp"
 #include "dense_likelihood.hpp"
 #include "hypotheses.hpp"
 #include "memory_plan.hpp"
@@ -17,9 +18,6 @@
 namespace palpate {
 
 namespace {
-
-// exp(-700) is among the smallest numbers that float64 holds at full precision.
-constexpr double impossible = 700.0;
 
 /// An array at rest and the log-likelihood of its reading No Contact everywhere.
 struct StillArray {
@@ -102,15 +100,8 @@ struct PoseHistogram::Impl {
     return probability;
   }
 
-  /// Adds what a map of nothing but the prior, at whatever pose, makes of a touch (Eq. 7).
   void add_to_prior(const Touch& touch) {
-    const double log_odds = log_odds_from_probability(prior_model.prior);
-    const std::vector<Reading> readings = options.classifier.classify(touch);
-    for (const Reading reading : {Reading::no_contact, Reading::in_contact}) {
-      prior_log_likelihood +=
-          static_cast<double>(std::count(readings.begin(), readings.end(), reading)) *
-          prior_model.log_likelihood(reading, log_odds);
-    }
+    prior_log_likelihood += palpate::prior_log_likelihood(touch, options.classifier, prior_model);
   }
 
   void require_object(int object) const {
@@ -267,7 +258,7 @@ Estimate PoseHistogram::estimate() const {
                        .log_likelihood = log_likelihood};
     }
   }
-  estimate.contradicted = impl_->prior_log_likelihood - best > impossible;
+  estimate.contradicted = impl_->prior_log_likelihood - best > contradiction_nats;
   return estimate;
 }
 

@@ -100,6 +100,11 @@ TEST_F(RecognizeDoubt, ContradictedTouchesAreSaidToBeSo) {
   EXPECT_NE(out.find("  contradicted\n"), std::string::npos) << out;
   EXPECT_NE(out.find("o.h5: contradicted: "), std::string::npos) << out;
   EXPECT_FALSE(with("a.h5", {}).contains("contradicted"));
+
+  std::vector<std::string> particles = call;
+  particles.insert(particles.end(), {"--filter", "particles"});
+  EXPECT_EQ(record(particles)["contradicted"], true);
+  EXPECT_FALSE(with("a.h5", {"--filter", "particles"}).contains("contradicted"));
 }
 
 TEST_F(RecognizeDoubt, HelpSaysWhatTheWeightMeans) {

@@ -1,12 +1,15 @@
 // "None of these", and touches that contradict everything.
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <numeric>
+#include <optional>
 
 #include <gtest/gtest.h>
 
 #include "palpate/error.hpp"
+#include "palpate/particle_filter.hpp"
 #include "palpate/pose_histogram.hpp"
 #include "synthetic.hpp"
 
@@ -182,6 +185,59 @@ TEST(Contradiction, IsNotSaidWhereReadingsMayBeRandom) {
   PoseHistogram histogram(device, sure_objects(), options);
   histogram.update(all_touches(recording));
   EXPECT_FALSE(histogram.estimate().contradicted);
+}
+
+/// What the prior makes of a touch over what the best particle of any object does, in nats, by the
+/// reference; 0 where all particles are of "none of these".
+double prior_over_best(const ParticleFilter& filter, const Touch& touch,
+                       const std::vector<Hypothesis>& objects, const ParticleOptions& options) {
+  const ContactLikelihood model{.gamma = options.gamma, .prior = objects.front().map.prior};
+  double best = -std::numeric_limits<double>::infinity();
+  for (const ParticleFilter::Particle& particle : filter.particles()) {
+    if (static_cast<std::size_t>(particle.object) < objects.size()) {
+      best = std::max(
+          best, reference::log_likelihood(touch, particle.T_object_robot,
+                                          objects[particle.object].map, options.classifier, model));
+    }
+  }
+  const OccupancyGrid unseen{
+      .nx = 1, .ny = 1, .log_odds = {static_cast<float>(objects.front().map.prior_log_odds())}};
+  return std::isfinite(best)
+             ? reference::log_likelihood(touch, {}, unseen, options.classifier, model) - best
+             : 0.0;
+}
+
+TEST(Contradiction, IsSaidByParticlesWhereTheReferenceSaysSo) {
+  Device device = Device::open();
+  const Recording recording = random_recording(8, 36, 158);
+  const auto said = [&](double steepness, double gamma, std::optional<double> none_weight) {
+    // So wide that no particle leaves its elements on what was never seen.
+    const std::vector<Hypothesis> objects{{random_map(121, 121, 0.5, steepness, 159), 1.0},
+                                          {random_map(121, 121, 0.5, steepness, 160), 1.0}};
+    ParticleOptions options{.particles = 500, .region = {}};
+    options.gamma = gamma;
+    options.none_weight = none_weight;
+    ParticleFilter filter(device, objects, options);
+    EXPECT_FALSE(filter.estimate().contradicted) << "before any touch";
+    double nats = 0.0;
+    int contradicted = 0;
+    for (const Touch& touch : all_touches(recording)) {
+      filter.update(touch);
+      nats += prior_over_best(filter, touch, objects, options);
+      EXPECT_GT(std::abs(nats - 700.0), 1.0) << "no matter of rounding";
+      EXPECT_EQ(filter.estimate().contradicted, nats > 700.0) << nats << " nats";
+      contradicted += nats > 700.0 ? 1 : 0;
+    }
+    filter.reset();
+    EXPECT_FALSE(filter.estimate().contradicted);
+    return contradicted;
+  };
+  const int with_time = said(150.0, 0.0, {});
+  EXPECT_GT(with_time, 0);
+  EXPECT_LT(with_time, 8) << "not by the first touch alone";
+  EXPECT_EQ(said(1000.0, 0.0, {}), 8);
+  EXPECT_EQ(said(1000.0, 0.0, 1.0), 8) << "though the particles of none explain them";
+  EXPECT_EQ(said(1000.0, 0.1, {}), 0) << "readings may be random";
 }
 
 }  // namespace

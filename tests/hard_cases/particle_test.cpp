@@ -164,6 +164,7 @@ TEST(Particles, OfCertainMapsWithoutGamma) {
     ParticleFilter filter(device, objects, options);
     for (const Touch& touch : all_touches(recording)) {
       expect_weights(hard, filter, touch, objects, options, 5e-3);
+      EXPECT_TRUE(filter.estimate().contradicted);
     }
   }
 }

@@ -28,9 +28,10 @@ struct Estimate {
   std::vector<double> identity;  ///< probability of every hypothesis, Eq. 14; with `none` sums to 1
   double none = 0.0;             ///< probability of "none of these", where that was asked for
   Mode mode;
-  /// Even the best bin explains the touches worse than a map of nothing but the prior does, by a
-  /// factor below exp(-700), which is 0 in float64: the object, its pose or the sensor model cannot
-  /// be what the hypotheses say. `identity` and `mode` still name the least impossible.
+  /// Even the best bin, or the best particle of each touch, explains the touches worse than a map
+  /// of nothing but the prior does, by a factor below exp(-700), which is 0 in float64: the object,
+  /// its pose or the sensor model cannot be what the hypotheses say. `identity` and `mode` still
+  /// name the least impossible.
   bool contradicted = false;
 };
 
