@@ -13,7 +13,7 @@ namespace palpate {
 /// the whole grid where none is.
 Body displaced_body(const OccupancyGrid& map);
 
-/// Mean and covariance of one object's belief around a bin, as PoseHistogram::refine() has them.
+/// Peak and covariance of one object's belief around a bin, as PoseHistogram::refine() has them.
 /// @throws Error if the device fails
 RefinedPose refine(const Belief& belief, const PoseLattice& lattice, std::size_t object,
                    const Body& body, std::int64_t bin);
