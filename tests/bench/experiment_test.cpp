@@ -67,6 +67,9 @@ void expect_order(const std::map<std::string, nlohmann::json>& filters) {
   EXPECT_GT(error_mm("histogram 100"), error_mm("histogram 1000"));
   EXPECT_GT(error_mm("histogram 1000"), error_mm("histogram 10000"));
   EXPECT_LT(error_mm("histogram 10000"), 1.3);
+  const std::string balanced = "histogram 9295";  // 13x13x55
+  EXPECT_GE(accuracy(balanced), accuracy("histogram 10000"));
+  EXPECT_LT(error_mm(balanced), error_mm("histogram 10000"));
   for (const char* count : {"1000", "10000"}) {
     for (const char* particles : {"particles ", "augmented "}) {
       EXPECT_GE(accuracy(std::string("histogram ") + count),
