@@ -49,7 +49,7 @@ struct Chart {
 
 /// The chart as an SVG element, for a page that has chart_style().
 std::string svg_of(const Chart& chart);
-/// The chart as a file by itself.
+/// The chart as a file by itself, on a light ground.
 std::string svg_file(const Chart& chart);
 
 /// CSS of charts, for light and for dark surroundings. The colours are those of Okabe and Ito

@@ -155,6 +155,7 @@ TEST(Sweep, QuickRunKeepsTheOrderAndTheErrorBounds) {
   for (const char* chart : {"front", "precision", "bins"}) {
     const std::string svg = bytes_of(folder / "plots" / ("sweep_" + std::string(chart) + ".svg"));
     EXPECT_TRUE(svg.starts_with("<svg xmlns=")) << chart;
+    EXPECT_EQ(svg.find("var("), std::string::npos) << "not every viewer knows variables";
     expect_well_formed(svg);
   }
 }
