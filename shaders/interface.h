@@ -121,7 +121,7 @@ struct LikelihoodPush {
 struct Partial {
   float max_high;
   float max_low;
-  uint arg_max;  // index within the slab
+  uint arg_max;  // index within the object's bins of the slab
   float sum;     // of exp(log-likelihood - max)
 };
 
@@ -262,6 +262,7 @@ struct ConePush {
 #ifdef __cplusplus
 static_assert(sizeof(TileReading) == 16 && sizeof(Tile) == 20 && sizeof(EvidencePush) == 16);
 static_assert(sizeof(RotatedElement) == 16 && sizeof(Segment) == 16);
+static_assert(sizeof(Corners) == 16 && sizeof(ObjectPlace) == 20);
 static_assert(sizeof(LikelihoodPush) == 28 && sizeof(Partial) == 16);
 static_assert(sizeof(ReducePush) == 12 && sizeof(AddPush) == 8 && sizeof(MarginalPush) == 20);
 static_assert(sizeof(Particle) == 16 && sizeof(ObjectShare) == 8 && sizeof(DrawBlock) == 16);

@@ -2,9 +2,9 @@
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_control_flow_attributes : require
 
-// Sums the probabilities of an object's bins in a slab, relative to exp(max), over theta and over (x, y) in one pass. A
-// workgroup takes a block of (x, y) indices and a chunk of thetas and writes its parts of both sums,
-// which the host adds in order.
+// Sums the probabilities of an object's bins in a slab, relative to exp(max), over theta and over
+// (x, y) in one pass. A workgroup takes a block of (x, y) indices and a chunk of thetas and writes
+// its parts of both sums, which the host adds in order.
 
 #include "interface.h"
 

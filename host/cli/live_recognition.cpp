@@ -92,6 +92,10 @@ void LiveRecognition::reset() { push({}); }
 void LiveRecognition::push(Job job) {
   {
     const std::lock_guard lock(mutex_);
+    if (job.touch) {
+      // What has not begun to be evaluated ahead would now only hold up what comes.
+      std::erase_if(jobs_, [](const Job& waiting) { return waiting.under_way; });
+    }
     jobs_.push_back(std::move(job));
   }
   changed_.notify_all();

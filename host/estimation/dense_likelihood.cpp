@@ -55,8 +55,8 @@ std::uint64_t DenseLikelihood::bytes_needed(const gpu::Context& context,
                                             const PoseLattice& lattice, std::size_t elements) {
   std::uint64_t bytes = gpu::allocated(elements * bytes_per_element(lattice)) +
                         gpu::allocated(elements * sizeof(shaders::Segment)) +
-                        gpu::allocated(sizeof(float));
-  for (const MapGroup& group : group_maps(context, hypotheses)) {
+                        gpu::allocated(sizeof(shaders::Corners));
+  for (const MapGroup& group : group_maps(context, hypotheses, lattice)) {
     bytes += MapTable::bytes_needed(group, lattice);
   }
   return bytes;
@@ -74,7 +74,7 @@ DenseLikelihood::DenseLikelihood(gpu::Context& context, gpu::CommandStream& stre
       batch_elements_(std::min(batch_for(context, lattice, hypotheses.size()), most_elements)),
       no_table_(context, sizeof(shaders::Corners), gpu::Memory::device, "no table",
                 VK_FORMAT_R32G32B32A32_SFLOAT) {
-  for (const MapGroup& group : group_maps(context, hypotheses)) {
+  for (const MapGroup& group : group_maps(context, hypotheses, lattice)) {
     groups_.push_back(
         {.path = choose_path(context, lattice, group.objects.size(), group.kind, model),
          .kind = group.kind,

@@ -65,15 +65,19 @@ std::uint64_t cell_bytes(gpu::Access access) {
 }  // namespace
 
 std::vector<MapGroup> group_maps(const gpu::Context& context,
-                                 std::span<const Hypothesis> hypotheses) {
+                                 std::span<const Hypothesis> hypotheses,
+                                 const PoseLattice& lattice) {
+  const gpu::Limits& limits = context.limits();
+  const std::size_t most_objects = std::min(limits.storage_range, limits.allocation) /
+                                   (axis_bins(lattice) * sizeof(shaders::Split));
   std::vector<MapGroup> groups;
   for (std::size_t object = 0; object < hypotheses.size(); ++object) {
     const OccupancyGrid& map = hypotheses[object].map;
     const MapKind kind{map.cell_mm, access_of(context, map)};
     const std::uint64_t cells = cells_of(map, kind.access);
-    const std::uint64_t most = most_cells(context.limits(), kind.access);
+    const std::uint64_t most = most_cells(limits, kind.access);
     const auto group = std::find_if(groups.begin(), groups.end(), [&](const MapGroup& g) {
-      return g.kind == kind && g.cells + cells <= most;
+      return g.kind == kind && g.cells + cells <= most && g.objects.size() < most_objects;
     });
     if (group == groups.end()) {
       groups.push_back({kind, cells, {object}});

@@ -12,7 +12,8 @@
 
 namespace palpate {
 
-/// Objects whose maps are of one kind and together no larger than what a kernel reads at once.
+/// Objects whose maps are of one kind and, like their axes, together no larger than what a kernel
+/// reads at once.
 struct MapGroup {
   MapKind kind;
   std::uint64_t cells = 0;           ///< that the maps take in a buffer
@@ -22,7 +23,8 @@ struct MapGroup {
 /// Puts every hypothesis's map into a group.
 /// @throws Error where a map is larger than what kernels read
 std::vector<MapGroup> group_maps(const gpu::Context& context,
-                                 std::span<const Hypothesis> hypotheses);
+                                 std::span<const Hypothesis> hypotheses,
+                                 const PoseLattice& lattice);
 
 /// The maps of a group on the device, one after the other, and what a kernel needs to find each.
 class MapTable {

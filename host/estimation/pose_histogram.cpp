@@ -119,7 +119,13 @@ struct PoseHistogram::Impl {
   void prepare(const Touch& touch) {
     ContactEvidence evidence = evidence_of(std::span(&touch, 1));
     if (!prepared) {
-      prepared.emplace(Belief(context, stream, options.lattice, log_weight.size()));
+      try {
+        prepared.emplace(Belief(context, stream, options.lattice, log_weight.size()));
+      } catch (const Error&) {
+        // Others on the device have taken what the plan counted on; it works without, too.
+        plan.room_to_prepare = false;
+        return;
+      }
     }
     prepared->evidence.reset();
     prepared->log_likelihood.clear();
@@ -132,6 +138,10 @@ struct PoseHistogram::Impl {
     const ContactEvidence evidence = evidence_of(touches);
     if (prepared && prepared->evidence == evidence) {
       belief.add(prepared->log_likelihood);
+      stream.run();
+      if (progress) {
+        progress(1.0);
+      }
     } else {
       likelihood.accumulate(evidence, belief, progress);
     }

@@ -42,7 +42,8 @@ bool solve(std::vector<double> matrix, std::vector<double>& right) {
 }  // namespace
 
 std::optional<glm::dvec3> quadratic_peak(std::span<const WeightedValue> values,
-                                         const std::array<bool, 3>& varies) {
+                                         const std::array<bool, 3>& varies,
+                                         double least_curvature) {
   std::vector<int> axes;
   for (int axis = 0; axis < 3; ++axis) {
     if (varies[axis]) {
@@ -88,8 +89,7 @@ std::optional<glm::dvec3> quadratic_peak(std::span<const WeightedValue> values,
       curvature[a * d + b] -= fit[k];
       curvature[b * d + a] -= fit[k];
     }
-    // Flatter than this is rounding.
-    if (!(curvature[a * d + a] > 1e-6)) {
+    if (!(curvature[a * d + a] > least_curvature)) {
       return {};
     }
   }

@@ -17,8 +17,9 @@ struct WeightedValue {
 
 /// Where the quadratic that fits these values best, in weighted least squares, has its maximum.
 /// Coordinates that do not vary stay at 0. None where the values do not tell: fewer than two for
-/// every unknown, too few different places, or a quadratic that has no maximum.
+/// every unknown, too few different places, or a quadratic without a maximum that stands out.
+/// @param least_curvature of the quadratic along each coordinate, in values per coordinate squared
 std::optional<glm::dvec3> quadratic_peak(std::span<const WeightedValue> values,
-                                         const std::array<bool, 3>& varies);
+                                         const std::array<bool, 3>& varies, double least_curvature);
 
 }  // namespace palpate

@@ -83,10 +83,11 @@ class PoseHistogram {
   /// fitted near the mean of the belief's eighth root over a window, which is moved to that mean
   /// until it rests; bins count by the belief's 24th root times a Gaussian of 0.8 mm about it.
   /// Roots and fit even out the ripples that readings leave in the belief: the peak errs less than
-  /// the mode and than the mean of the belief itself. The pose is that mean where the window holds
-  /// fewer than two bins for every unknown of the quadratic, as on bins wider than some 1.5 mm, or
-  /// where it has no peak within 1 mm and the region. The covariance is the second moment of the
-  /// belief itself about that pose, over the same window, plus that of a bin.
+  /// the mode and than the mean of the belief itself. The pose is that mean where fewer than two
+  /// bins within the window's radius stand for every unknown of the quadratic, as on bins wider
+  /// than some 1.5 mm along three axes, or where it has no peak within 1 mm and the region. The
+  /// covariance is the second moment of the belief itself about that pose, over the same window,
+  /// plus that of a bin.
   ///
   /// The window holds the poses at which the object lies within 2.5 mm (root mean square over its
   /// occupied cells) of where the bin has it, at least the neighbouring bins; it goes on at 0 where
