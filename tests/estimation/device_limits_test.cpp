@@ -156,7 +156,8 @@ TEST(LargeMap, IsReadFromStorageWhereNoTableHoldsIt) {
 }
 
 TEST(LargeMap, ManyMapsGoIntoSeveralTables) {
-  const std::vector<Touch> touches = all_touches(random_recording(2, 36, 151));
+  const Recording recording = random_recording(2, 36, 151);
+  const std::vector<Touch> touches = all_touches(recording);
   std::vector<Hypothesis> objects;
   for (std::uint64_t i = 0; i < 5; ++i) {
     objects.push_back({random_map(11, 12, i == 2 ? 0.3 : 0.5, 12.0, 152 + i), 1.0});
