@@ -52,10 +52,6 @@ std::string svg_of(const Chart& chart);
 /// The chart as a file by itself, on a light ground.
 std::string svg_file(const Chart& chart);
 
-/// CSS of charts, for light and for dark surroundings. The colours are those of Okabe and Ito
-/// (2008), which the colour-blind tell apart, some made darker or lighter for contrast.
-std::string chart_style();
-
 /// Text as it may stand in XML, between tags or in quotes.
 std::string xml_escaped(const std::string& text);
 

@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include "chart_style.hpp"
 #include "svg_chart.hpp"
 #include "sweep_findings.hpp"
 #include "sweep_result.hpp"
