@@ -1,0 +1,310 @@
+#include "plain_refinement.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+
+#include "reference.hpp"
+
+namespace palpate {
+
+namespace {
+
+constexpr double two_pi = 2.0 * std::numbers::pi;
+
+/// The body of PoseHistogram::refine(): the occupied cells.
+struct Cells {
+  glm::dvec2 centroid_mm{0.0};
+  double inertia_mm2 = 0.0;
+};
+
+Cells occupied_cells(const OccupancyGrid& map) {
+  Cells cells;
+  double count = 0.0;
+  double squares = 0.0;
+  for (int j = 0; j < map.ny; ++j) {
+    for (int i = 0; i < map.nx; ++i) {
+      if (map.at(i, j) > 0.0F) {
+        const glm::dvec2 p = map.origin_mm + map.cell_mm * glm::dvec2(i, j);
+        cells.centroid_mm += p;
+        squares += p.x * p.x + p.y * p.y;
+        count += 1.0;
+      }
+    }
+  }
+  cells.centroid_mm /= count;
+  const glm::dvec2& c = cells.centroid_mm;
+  cells.inertia_mm2 = squares / count - c.x * c.x - c.y * c.y;
+  return cells;
+}
+
+bool is_circle(const Axis& theta_rad) {
+  return std::abs(theta_rad.upper - theta_rad.lower - two_pi) < 1e-9;
+}
+
+/// Steps from bin a to bin b of theta, the short way round a circle.
+int turn_steps(const Axis& theta_rad, int a, int b) {
+  const int n = theta_rad.count;
+  int steps = b - a;
+  if (is_circle(theta_rad)) {
+    steps = ((steps + (n - 1) / 2) % n + n) % n - (n - 1) / 2;
+  }
+  return steps;
+}
+
+/// A bin of the window: how far from the mean it moves the object, in mm, and its log-likelihood.
+struct Moved {
+  double mm[3];
+  double log;
+};
+
+/// The peak of a quadratic over the axes that vary, by elimination with pivots; the mean where
+/// there is none. Both relative to the mean.
+std::array<double, 3> plain_peak(const std::vector<Moved>& window, const bool (&varies)[3]) {
+  std::vector<int> axes;
+  for (int a = 0; a < 3; ++a) {
+    if (varies[a]) {
+      axes.push_back(a);
+    }
+  }
+  const int d = static_cast<int>(axes.size());
+  const int n = (d + 1) * (d + 2) / 2;
+  if (d == 0 || static_cast<int>(window.size()) < 2 * n) {
+    return {};
+  }
+  double top = -1e300;
+  for (const Moved& bin : window) {
+    top = std::max(top, bin.log);
+  }
+  // Rows of the normal equations, the right side last.
+  std::vector<std::vector<double>> rows(n, std::vector<double>(n + 1));
+  for (const Moved& bin : window) {
+    std::vector<double> terms{1.0};
+    double square = 0.0;
+    for (const double mm : bin.mm) {
+      square += mm * mm;
+    }
+    for (const int a : axes) {
+      terms.push_back(bin.mm[a]);
+    }
+    for (int a = 0; a < d; ++a) {
+      for (int b = a; b < d; ++b) {
+        terms.push_back(bin.mm[axes[a]] * bin.mm[axes[b]]);
+      }
+    }
+    terms.push_back(bin.log - top);
+    const double weight = std::exp((bin.log - top) / 24.0 - square / (2.0 * 0.8 * 0.8));
+    for (int i = 0; i < n; ++i) {
+      for (int k = 0; k <= n; ++k) {
+        rows[i][k] += weight * terms[i] * terms[k];
+      }
+    }
+  }
+  const auto eliminate = [](std::vector<std::vector<double>>& m) {
+    const std::size_t size = m.size();
+    for (std::size_t i = 0; i < size; ++i) {
+      std::size_t pivot = i;
+      for (std::size_t k = i; k < size; ++k) {
+        pivot = std::abs(m[k][i]) > std::abs(m[pivot][i]) ? k : pivot;
+      }
+      std::swap(m[i], m[pivot]);
+      if (std::abs(m[i][i]) < 1e-12) {
+        return false;
+      }
+      for (std::size_t k = 0; k < size; ++k) {
+        const double factor = k == i ? 0.0 : m[k][i] / m[i][i];
+        for (std::size_t c = i; c <= size; ++c) {
+          m[k][c] -= factor * m[i][c];
+        }
+      }
+    }
+    return true;
+  };
+  if (!eliminate(rows)) {
+    return {};
+  }
+  const auto fit = [&](int i) { return rows[i][n] / rows[i][i]; };
+  double h[3][3] = {};  // minus the second derivatives
+  for (int a = 0, k = 1 + d; a < d; ++a) {
+    for (int b = a; b < d; ++b, ++k) {
+      h[a][b] -= fit(k);
+      h[b][a] -= fit(k);
+    }
+  }
+  // A maximum: every leading minor is positive.
+  const double two = h[0][0] * h[1][1] - h[0][1] * h[1][0];
+  const double three = h[0][0] * (h[1][1] * h[2][2] - h[1][2] * h[2][1]) -
+                       h[0][1] * (h[1][0] * h[2][2] - h[1][2] * h[2][0]) +
+                       h[0][2] * (h[1][0] * h[2][1] - h[1][1] * h[2][0]);
+  if (h[0][0] <= 0.0 || (d > 1 && two <= 0.0) || (d > 2 && three <= 0.0)) {
+    return {};
+  }
+  std::vector<std::vector<double>> newton;
+  for (int a = 0; a < d; ++a) {
+    newton.emplace_back(h[a], h[a] + d);
+    newton.back().push_back(fit(1 + a));
+  }
+  std::array<double, 3> peak{};
+  eliminate(newton);
+  for (int a = 0; a < d; ++a) {
+    peak[axes[a]] = newton[a][d] / newton[a][a];
+  }
+  return std::hypot(peak[0], peak[1], peak[2]) > 1.0 ? std::array<double, 3>{} : peak;
+}
+
+}  // namespace
+
+RefinedPose plain_refinement(const std::vector<double>& logs, const PoseLattice& lattice,
+                             const OccupancyGrid& map, std::int64_t bin) {
+  const int nx = lattice.x_mm.count;
+  const int ny = lattice.y_mm.count;
+  const int nt = lattice.theta_rad.count;
+  const double step[] = {lattice.x_mm.step(), lattice.y_mm.step(), lattice.theta_rad.step()};
+  const Cells body = occupied_cells(map);
+  int centre[] = {static_cast<int>(bin % nx), static_cast<int>(bin / nx % ny),
+                  static_cast<int>(bin / nx / ny)};
+  struct Inside {
+    double d[3];
+    double log;
+    bool within;
+    std::int64_t bin;
+  };
+  std::vector<Inside> window;
+  double offset[3] = {};
+  double place[3] = {};  // of the centre
+  for (int pass = 0; pass < 3; ++pass) {
+    const std::int64_t middle = (std::int64_t{centre[2]} * ny + centre[1]) * nx + centre[0];
+    const Pose T = reference::bin_pose(lattice, middle);
+    const double c = std::cos(T.theta_rad);
+    const double s = std::sin(T.theta_rad);
+    const glm::dvec2 from = body.centroid_mm - T.translation_mm;
+    const glm::dvec2 centroid_robot(c * from.x + s * from.y, -s * from.x + c * from.y);
+    window.clear();
+    double top = -1e300;
+    for (std::int64_t k = 0; k < lattice.bins(); ++k) {
+      const int steps[] = {static_cast<int>(k % nx) - centre[0],
+                           static_cast<int>(k / nx % ny) - centre[1],
+                           turn_steps(lattice.theta_rad, centre[2], static_cast<int>(k / nx / ny))};
+      const glm::dvec2 moved =
+          reference::transform(reference::bin_pose(lattice, k), centroid_robot) - body.centroid_mm;
+      const double turn = steps[2] * step[2];
+      const double displaced2 =
+          moved.x * moved.x + moved.y * moved.y + body.inertia_mm2 * turn * turn;
+      const bool neighbour =
+          std::abs(steps[0]) <= 1 && std::abs(steps[1]) <= 1 && std::abs(steps[2]) <= 1;
+      const bool within = displaced2 <= 2.5 * 2.5;
+      if (within || neighbour) {
+        window.push_back({{steps[0] * step[0], steps[1] * step[1], turn}, logs[k], within, k});
+        top = std::max(top, logs[k]);
+      }
+    }
+    double tempered = 0.0;
+    double sum[3] = {};
+    for (const Inside& in : window) {
+      tempered += std::exp((in.log - top) / 8.0);
+      for (int a = 0; a < 3; ++a) {
+        sum[a] += std::exp((in.log - top) / 8.0) * in.d[a];
+      }
+    }
+    for (int a = 0; a < 3; ++a) {
+      offset[a] = sum[a] / tempered;
+      const Axis& axis = a == 0 ? lattice.x_mm : a == 1 ? lattice.y_mm : lattice.theta_rad;
+      place[a] = axis.centre(centre[a]);
+      if (step[a] > 0.0) {
+        centre[a] += static_cast<int>(std::lround(offset[a] / step[a]));
+      }
+    }
+    centre[2] = (centre[2] + nt) % nt;
+  }
+  // Carried to the plain pose by differences of the map from parameters to poses.
+  const auto plain = [&](double x, double y, double theta) {
+    const double px = lattice.pivot_mm.x;
+    const double py = lattice.pivot_mm.y;
+    return std::array{x - (std::cos(theta) * px - std::sin(theta) * py),
+                      y - (std::sin(theta) * px + std::cos(theta) * py), theta};
+  };
+  // How far a bin moves the object from where the mean has it.
+  const auto mean_pose = plain(place[0] + offset[0], place[1] + offset[1], place[2] + offset[2]);
+  const double c = std::cos(mean_pose[2]);
+  const double s = std::sin(mean_pose[2]);
+  const glm::dvec2 from = body.centroid_mm - glm::dvec2(mean_pose[0], mean_pose[1]);
+  const glm::dvec2 centroid_robot(c * from.x + s * from.y, -s * from.x + c * from.y);
+  const double spin_mm = std::sqrt(body.inertia_mm2);
+  std::vector<Moved> moved_bins;
+  for (const Inside& in : window) {
+    if (in.within) {
+      const glm::dvec2 by =
+          reference::transform(reference::bin_pose(lattice, in.bin), centroid_robot) -
+          body.centroid_mm;
+      moved_bins.push_back({{by.x, by.y, spin_mm * (in.d[2] - offset[2])}, in.log});
+    }
+  }
+  const auto peak = plain_peak(moved_bins, {nx > 1, ny > 1, nt > 1});
+  // The place at which the object has moved by that much.
+  const double turn = peak[2] / spin_mm;
+  const glm::dvec2 lever =
+      body.centroid_mm - glm::dvec2(place[0] + offset[0], place[1] + offset[1]);
+  const glm::dvec2 turned(std::cos(turn) * lever.x - std::sin(turn) * lever.y,
+                          std::sin(turn) * lever.x + std::cos(turn) * lever.y);
+  const double shift[] = {nx > 1 ? peak[0] - (turned.x - lever.x) : 0.0,
+                          ny > 1 ? peak[1] - (turned.y - lever.y) : 0.0, turn};
+  bool inside = true;
+  for (int a = 0; a < 3; ++a) {
+    const Axis& axis = a == 0 ? lattice.x_mm : a == 1 ? lattice.y_mm : lattice.theta_rad;
+    const double at = place[a] + offset[a] + shift[a];
+    inside = inside && ((a == 2 && is_circle(axis)) || (at >= axis.lower && at <= axis.upper));
+  }
+  double top = -1e300;
+  double own = 0.0;
+  double mean[3];
+  double moment[3][3];
+  for (const Inside& in : window) {
+    top = std::max(top, in.log);
+  }
+  for (int a = 0; a < 3; ++a) {
+    offset[a] += inside ? shift[a] : 0.0;
+    mean[a] = place[a] + offset[a];
+    for (int b = 0; b < 3; ++b) {
+      moment[a][b] = 0.0;
+    }
+  }
+  for (const Inside& in : window) {
+    own += std::exp(in.log - top);
+    for (int a = 0; a < 3; ++a) {
+      for (int b = 0; b < 3; ++b) {
+        moment[a][b] += std::exp(in.log - top) * (in.d[a] - offset[a]) * (in.d[b] - offset[b]);
+      }
+    }
+  }
+  for (int a = 0; a < 3; ++a) {
+    for (int b = 0; b < 3; ++b) {
+      moment[a][b] = moment[a][b] / own + (a == b ? step[a] * step[a] / 12.0 : 0.0);
+    }
+  }
+  double jacobian[3][3];
+  for (int b = 0; b < 3; ++b) {
+    constexpr double h = 1e-6;
+    const auto at = [&](double d) {
+      return plain(mean[0] + (b == 0 ? d : 0), mean[1] + (b == 1 ? d : 0),
+                   mean[2] + (b == 2 ? d : 0));
+    };
+    for (int a = 0; a < 3; ++a) {
+      jacobian[a][b] = (at(h)[a] - at(-h)[a]) / (2.0 * h);
+    }
+  }
+  RefinedPose refined;
+  const auto pose = plain(mean[0], mean[1], mean[2]);
+  refined.T_object_robot = {{pose[0], pose[1]}, pose[2]};
+  for (int a = 0; a < 3; ++a) {
+    for (int b = 0; b < 3; ++b) {
+      for (int k = 0; k < 9; ++k) {
+        refined.covariance[3 * a + b] +=
+            jacobian[a][k / 3] * moment[k / 3][k % 3] * jacobian[b][k % 3];
+      }
+    }
+  }
+  return refined;
+}
+
+}  // namespace palpate
