@@ -1,6 +1,7 @@
 #include "detector_flags.hpp"
 
 #include <fmt/format.h>
+#include <CLI/CLI.hpp>
 
 #include "palpate/error.hpp"
 

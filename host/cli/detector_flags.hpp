@@ -3,7 +3,9 @@
 #include <optional>
 #include <string>
 
-#include <CLI/CLI.hpp>
+namespace CLI {
+class App;
+}
 
 #include "palpate/touch_detector.hpp"
 

@@ -1,5 +1,7 @@
 #include "recognition_task.hpp"
 
+#include <CLI/CLI.hpp>
+
 namespace palpate::cli {
 
 void add_recognition_flags(CLI::App& command, RecognitionFlags& flags) {

@@ -8,6 +8,7 @@
 #include <string>
 
 #include <fmt/format.h>
+#include <CLI/CLI.hpp>
 
 #include "figures.hpp"
 #include "palpate/error.hpp"

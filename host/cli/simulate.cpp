@@ -8,6 +8,7 @@
 #include <string>
 
 #include <fmt/format.h>
+#include <CLI/CLI.hpp>
 
 #include "options.hpp"
 #include "palpate/error.hpp"
