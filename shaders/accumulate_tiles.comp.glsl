@@ -2,9 +2,9 @@
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_control_flow_attributes : require
 
-// Adds the log-likelihood of touches (Eq. 7, 13) to a slab of the belief, for lattices that are finer
-// than the map: one invocation takes TILE_X x TILE_Y neighbouring bins of one theta, which span at
-// most one cell, so that 3 x 3 map nodes serve all of them for each element.
+// Adds the log-likelihood of touches (Eq. 7, 13) to a slab of the belief, for lattices whose step is
+// at most a cell of the map: one invocation takes TILE_X x TILE_Y neighbouring bins of one theta,
+// which span at most CELLS cells, so that for each element the same few nodes serve all of them.
 
 #include "interface.h"
 
@@ -13,12 +13,26 @@ layout(constant_id = 5) const uint TILE_X = 5;
 layout(constant_id = 6) const uint TILE_Y = 5;
 layout(constant_id = 7) const float STEP_X = 0.2;  // between bins, in cells
 layout(constant_id = 8) const float STEP_Y = 0.2;
+layout(constant_id = 9) const uint CELLS = 1;  // 1 or 2
+
+const uint NODES = CELLS + 2;
 
 #include "contact_likelihood.glsl"
 #include "likelihood_buffers.glsl"
 #include "two_float.glsl"
 
 float log_odds_of[TILE_Y][TILE_X];  // under one element, at every bin of the tile
+
+// How far along it lies in each of the cells that the tile may reach, from 0 to 1.
+vec3 shares(const float place) {
+  return CELLS == 1 ? vec3(min(place, 1.0), max(place - 1.0, 0.0), 0.0)
+                    : clamp(place - vec3(0.0, 1.0, 2.0), 0.0, 1.0);
+}
+
+float along(const vec4 nodes, const vec3 share) {
+  const float first = nodes.x + (nodes.y - nodes.x) * share.x + (nodes.z - nodes.y) * share.y;
+  return CELLS == 1 ? first : first + (nodes.w - nodes.z) * share.z;
+}
 
 // Bilinear in log odds, for all bins of the tile.
 void interpolate(const ObjectPlace object, const Split bin_x, const Split bin_y,
@@ -29,34 +43,28 @@ void interpolate(const ObjectPlace object, const Split bin_x, const Split bin_y,
   const float whole_y = floor(y);
   const float fx = x - whole_x;
   const float fy = y - whole_y;
-  const int column = clamp(bin_x.cell + element.x + int(whole_x), 0, object.map_width - 3);
-  const int row = clamp(bin_y.cell + element.z + int(whole_y), 0, object.map_height - 3);
+  const int column = clamp(bin_x.cell + element.x + int(whole_x), 0, object.map_width - 4);
+  const int row = clamp(bin_y.cell + element.z + int(whole_y), 0, object.map_height - 4);
 
-  // Four fetches hold all nine nodes.
+  // Four fetches hold sixteen nodes.
   const int node = object.first_node + row * object.map_width + column;
   const int above = node + 2 * object.map_width;
   const vec4 left = corners(node, object.map_width);
   const vec4 right = corners(node + 2, object.map_width);
   const vec4 above_left = corners(above, object.map_width);
   const vec4 above_right = corners(above + 2, object.map_width);
-  const vec3 node_rows[3] = {vec3(left.xy, right.x), vec3(left.zw, right.z),
-                             vec3(above_left.xy, above_right.x)};
+  const vec4 node_rows[4] = {vec4(left.xy, right.xy), vec4(left.zw, right.zw),
+                             vec4(above_left.xy, above_right.xy),
+                             vec4(above_left.zw, above_right.zw)};
 
-  float nodes[3][TILE_X];  // of three rows, between columns
-  [[unroll]] for (int r = 0; r < 3; ++r) {
-    const vec3 three = node_rows[r];
-    [[unroll]] for (uint i = 0; i < TILE_X; ++i) {
-      const float f = fx + float(i) * STEP_X;
-      nodes[r][i] =
-          three.x + (three.y - three.x) * min(f, 1.0) + (three.z - three.y) * max(f - 1.0, 0.0);
-    }
-  }
   [[unroll]] for (uint i = 0; i < TILE_X; ++i) {
-    const float lower = nodes[1][i] - nodes[0][i];
-    const float upper = nodes[2][i] - nodes[1][i];
+    const vec3 share = shares(fx + float(i) * STEP_X);
+    vec4 column_nodes = vec4(0.0);  // between the map's columns
+    [[unroll]] for (uint r = 0; r < NODES; ++r) {
+      column_nodes[r] = along(node_rows[r], share);
+    }
     [[unroll]] for (uint j = 0; j < TILE_Y; ++j) {
-      const float f = fy + float(j) * STEP_Y;
-      log_odds_of[j][i] = nodes[0][i] + lower * min(f, 1.0) + upper * max(f - 1.0, 0.0);
+      log_odds_of[j][i] = along(column_nodes, shares(fy + float(j) * STEP_Y));
     }
   }
 }

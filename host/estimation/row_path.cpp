@@ -45,10 +45,10 @@ LikelihoodPath row_path(gpu::Context& context, const PoseLattice& lattice, std::
           .bins_x = run,
           .bins_y = 1,
           .description = fmt::format("runs of {} bins: at a lattice step of {:.3g} x {:.3g} map "
-                                     "cells a tile of four bins does not fit into a cell{}",
+                                     "cells too few bins span two cells for a tile{}",
                                      run, lattice.x_mm.step() / maps.cell_mm,
                                      lattice.y_mm.step() / maps.cell_mm,
-                                     context.limits().cpu ? "" : ", or would leave the GPU idle")};
+                                     context.limits().cpu ? "" : ", or tiles leave the GPU idle")};
 }
 
 }  // namespace palpate

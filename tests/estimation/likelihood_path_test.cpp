@@ -66,11 +66,17 @@ TEST_P(Steps, TakeTheRightPathAndAgree) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Cells, Steps,
-                         testing::Values(Case{0.2, 0.2, "5 x 5"}, Case{0.25, 0.25, "5 x 5"},
-                                         Case{0.01, 0.07, "5 x 5"}, Case{1.0 / 3.0, 0.3, "4 x 4"},
-                                         Case{0.4, 0.4, "3 x 3"}, Case{0.5, 0.5, "3 x 3"},
-                                         Case{0.51, 0.99, "2 x 2"}, Case{1.0, 1.0, "2 x 2"},
-                                         Case{0.2, 3.0, "5 x 1"}, Case{1.7, 0.2, "1 x 5"},
+                         testing::Values(Case{0.2, 0.2, "5 x 5 bins over one cell"},
+                                         Case{0.25, 0.25, "5 x 5 bins over one cell"},
+                                         Case{0.01, 0.07, "5 x 5 bins over one cell"},
+                                         Case{1.0 / 3.0, 0.3, "4 x 4 bins over one cell"},
+                                         Case{0.2, 1.0, "5 x 2 bins over one cell"},
+                                         Case{0.4, 0.4, "5 x 5 bins over two cells"},
+                                         Case{0.5, 0.5, "5 x 5 bins over two cells"},
+                                         Case{0.6, 2.0 / 3.0, "4 x 4 bins over two cells"},
+                                         Case{0.51, 0.99, "4 x 3 bins over two cells"},
+                                         Case{2.0, 0.25, "2 x 5 bins over two cells"},
+                                         Case{1.0, 1.0, "runs of"}, Case{0.2, 3.0, "runs of"},
                                          Case{1.0, 1.3, "runs of"}, Case{1.6, 1.6, "runs of"},
                                          Case{9.7, 0.9, "runs of"}));
 
@@ -78,7 +84,7 @@ class FineBins : public testing::TestWithParam<int> {};
 
 TEST_P(FineBins, AgreeAlongEitherAxis) {
   // Down to one bin per axis, and with counts that no tile divides.
-  for (const double step : {0.2, 0.4, 1.6}) {
+  for (const double step : {0.2, 0.3, 0.6, 1.6}) {
     EXPECT_LT(run(lattice_of(step, step, GetParam(), 3), 12.0, 36).error_per_touch, per_touch);
     EXPECT_LT(run(lattice_of(step, step, 3, GetParam()), 12.0, 36).error_per_touch, per_touch);
   }
@@ -91,7 +97,7 @@ class ElementCounts : public testing::TestWithParam<std::size_t> {};
 TEST_P(ElementCounts, AgreeOnEveryPath) {
   // The tolerance is for arrays of 36; the errors of more elements add up.
   const double arrays = std::max(1.0, static_cast<double>(GetParam()) / 36.0);
-  for (const double step : {0.2, 0.4, 1.6}) {
+  for (const double step : {0.2, 0.3, 0.6, 1.6}) {
     EXPECT_LT(run(lattice_of(step, step, 11, 9), 12.0, GetParam()).error_per_touch,
               per_touch * arrays);
   }
@@ -100,7 +106,7 @@ TEST_P(ElementCounts, AgreeOnEveryPath) {
 INSTANTIATE_TEST_SUITE_P(Elements, ElementCounts, testing::Values(0, 1, 36, 37, 256, 1400));
 
 TEST(LikelihoodPaths, AgreeOnSteepAndFlatMaps) {
-  for (const double step : {0.2, 0.4, 1.6}) {
+  for (const double step : {0.2, 0.3, 0.6, 1.6}) {
     const PoseLattice lattice = lattice_of(step, step, 21, 19);
     EXPECT_LT(run(lattice, 130.0, 36).error_per_touch, per_touch) << step;
     EXPECT_LT(run(lattice, 0.0, 36).error_per_touch, per_touch) << step;
@@ -108,7 +114,7 @@ TEST(LikelihoodPaths, AgreeOnSteepAndFlatMaps) {
 }
 
 TEST(LikelihoodPaths, AgreeWithoutAFloorUnderTheLikelihood) {
-  for (const double step : {0.2, 0.4, 1.6}) {
+  for (const double step : {0.2, 0.3, 0.6, 1.6}) {
     const PoseLattice lattice = lattice_of(step, step, 21, 19);
     // No floor, one too small for products, and the least that products take.
     for (const double gamma : {0.0, 1e-6, 5e-3}) {
