@@ -19,8 +19,8 @@ namespace {
 // Chosen by the mean pose error over 50 unknown letters of 15 touches on 64 x 64 x 244 bins, of
 // which the modes err by 0.33 mm: the belief itself gives 0.26, its roots 4, 8, 12 and 16 give
 // 0.20, 0.17, 0.17 and 0.17. Radii of 2 and 3 mm give the same within 0.01 mm, 4 mm gives 0.19.
-// On 50 others, whose modes err by 0.39 mm, they leave 0.22 mm. The covariance is safe there: the
-// error's square over it is 1.2 in the mean, where 3 would be exact.
+// On 50 others, whose modes err by 0.39 mm, they leave 0.22 mm. The covariance is safe for touches
+// at exact poses: the peak's error squared over it is about 1 in the mean, where 3 would be exact.
 constexpr double temper = 8.0;
 constexpr double radius_mm = 2.5;
 // One pass leaves 0.19 mm, two 0.18; a fourth moves nothing.

@@ -36,13 +36,13 @@ TEST(LongRun, TenThousandTouchesInARow) {
                 "two floats per bin, so that each logarithm's rounding counts once; 0.05 nats near "
                 "the top");
   const std::vector<Hypothesis> objects = near_twins();
-  const Recording recording = random_recording(most_touches, 80, 403);
+  const Recording recording = random_recording(most_touches, 100, 403);
   Device device = Device::open();
-  // Two rows take register tiles, one row takes runs of bins.
-  for (const int rows : {2, 1}) {
+  // Four rows take register tiles, one row takes runs of bins.
+  for (const int rows : {4, 1}) {
     const Estimate estimate = hard.expect_posterior(device, objects, near_the_top(rows),
                                                     all_touches(recording), long_run(most_touches));
-    EXPECT_LT(estimate.mode.log_likelihood, -90.0 * most_touches) << "the case is not hard enough";
+    EXPECT_LT(estimate.mode.log_likelihood, -100.0 * most_touches) << "the case is not hard enough";
     EXPECT_GT(estimate.identity[0], 1e-6) << "no longer near the top";
     EXPECT_GT(estimate.identity[1], 1e-6) << "no longer near the top";
   }
@@ -56,7 +56,7 @@ TEST(LongRun, TheSameTouchTenThousandTimes) {
   const Recording recording = random_recording(1, 36, 404);
   std::vector<Touch> touches(100, recording.touch(0));
   Device device = Device::open();
-  for (const int rows : {2, 1}) {
+  for (const int rows : {4, 1}) {
     hard.expect_posterior_of_repeated(device, objects, near_the_top(rows), touches,
                                       most_touches / 100, long_run(most_touches));
   }

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -22,6 +23,32 @@ std::int64_t half_a_turn_on(const PoseLattice& lattice, std::int64_t bin) {
   const std::int64_t theta = bin / lattice.plane();
   const std::int64_t turned = (theta + lattice.theta_rad.count / 2) % lattice.theta_rad.count;
   return turned * lattice.plane() + lattice.plane() - 1 - in_plane;
+}
+
+/// The bin of the pose turned by a quarter of a turn about the object's middle, where x and y have
+/// the same bins.
+std::int64_t a_quarter_turn_on(const PoseLattice& lattice, std::int64_t bin) {
+  const std::int64_t n = lattice.x_mm.count;
+  const std::int64_t x = bin % n;
+  const std::int64_t y = bin % lattice.plane() / n;
+  const std::int64_t theta = bin / lattice.plane();
+  const std::int64_t turned = (theta + lattice.theta_rad.count / 4) % lattice.theta_rad.count;
+  return turned * lattice.plane() + x * n + (n - 1 - y);  // (x, y) becomes (-y, x)
+}
+
+/// Rings around the origin: the same at every quarter turn to the last bit, at others nearly.
+OccupancyGrid rings() {
+  OccupancyGrid map = random_map(41, 41, 0.5, 1.0, 435);
+  map.symmetry = 0;
+  map.origin_mm = -map.cell_mm * glm::dvec2(20.0);
+  for (int j = 0; j < map.ny; ++j) {
+    for (int i = 0; i < map.nx; ++i) {
+      const glm::dvec2 p = map.centre_mm(i, j);
+      map.log_odds[static_cast<std::size_t>(j * map.nx + i)] =
+          static_cast<float>(4.0 * std::cos(std::hypot(p.x, p.y)));
+    }
+  }
+  return map;
 }
 
 TEST(Tie, IdenticalObjects) {
@@ -83,18 +110,46 @@ TEST(Tie, TwoFoldSymmetry) {
 }
 
 TEST(Tie, FullSymmetry) {
-  HardCase hard("full symmetry, touched at its middle", "every theta is as good as the others",
-                "equal bits for all thetas; the mode is the lowest bin's");
-  OccupancyGrid map = random_map(41, 41, 0.5, 1.0, 435);
-  map.symmetry = 0;
-  for (int j = 0; j < map.ny; ++j) {
-    for (int i = 0; i < map.nx; ++i) {
-      const glm::dvec2 p = map.centre_mm(i, j);
-      map.log_odds[static_cast<std::size_t>(j * map.nx + i)] =
-          static_cast<float>(4.0 * std::cos(std::hypot(p.x, p.y)));
+  HardCase hard("full symmetry, touched all over",
+                "every pose has a twin at each turn; rounding alone would choose among them",
+                "the same bits in every run; a turn of the pose moves no log-likelihood");
+  const std::vector<Hypothesis> objects{{rings(), 1.0}};
+  const Recording recording = random_recording(4, 36, 436);
+  HistogramOptions options = symmetric_options();
+  options.lattice.y_mm = options.lattice.x_mm;  // so that quarter turns take bins to bins
+  Device device = Device::open();
+  std::vector<double> first;
+  for (int run = 0; run < 3; ++run) {
+    const Estimate estimate =
+        hard.expect_posterior(device, objects, options, all_touches(recording));
+    PoseHistogram histogram(device, objects, options);
+    histogram.update(all_touches(recording));
+    EXPECT_EQ(histogram.estimate().mode.bin, estimate.mode.bin) << "the same each time";
+    const std::vector<double> bins = histogram.log_likelihood(0);
+    if (run == 0) {
+      first = bins;
+    }
+    EXPECT_EQ(bins, first) << "equal bits";
+    EXPECT_GT(
+        *std::max_element(bins.begin(), bins.end()) - *std::min_element(bins.begin(), bins.end()),
+        1.0)
+        << "the touches say nothing";
+    for (std::size_t bin = 0; bin < bins.size(); ++bin) {
+      const auto twin = static_cast<std::size_t>(
+          a_quarter_turn_on(options.lattice, static_cast<std::int64_t>(bin)));
+      hard.expect("twins, nats", std::abs(bins[twin] - bins[bin]), 1e-4);
+    }
+    const std::vector<double> theta = histogram.marginals(0).theta;
+    for (std::size_t t = 0; t < theta.size(); ++t) {
+      EXPECT_NEAR(theta[t], theta[(t + 2) % theta.size()], 1e-4) << "a quarter turn apart";
     }
   }
-  const std::vector<Hypothesis> objects{{map, 1.0}};
+}
+
+TEST(Tie, FullSymmetryTouchedAtTheMiddle) {
+  HardCase hard("full symmetry, touched at its middle", "every theta is as good as the others",
+                "equal bits for all thetas; the mode is the lowest bin's");
+  const std::vector<Hypothesis> objects{{rings(), 1.0}};
   Recording recording;
   recording.T_robot_sensor = {{{12.0, -7.0}, 0.4}, {{12.0, -7.0}, 2.0}};
   recording.elements_mm = {{0.0, 0.0}};

@@ -94,7 +94,8 @@ class PoseHistogram {
   /// theta covers the whole circle and ends at the region's edges. Other modes, and what is unknown
   /// by more than the window, do not show in the result. An axis of zero extent stays where it is.
   /// On bins much wider than the belief, where the best bin need not be the nearest to the truth,
-  /// the covariance is too small.
+  /// the covariance is too small. So it is where touches lie elsewhere than reported: the belief
+  /// takes their poses to be exact. After one or two touches a pose is rarely better than its mode.
   /// @throws Error if there is no such object or bin, or the device fails
   RefinedPose refine(const Mode& mode) const;
 
