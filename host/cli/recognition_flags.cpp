@@ -11,7 +11,8 @@ void add_recognition_flags(CLI::App& command, RecognitionFlags& flags) {
                      "none, objects, region, bins, filter, device; a flag overrides its key");
   command.add_option("--bins", flags.bins,
                      "Pose bins per object along x, y and theta [default: 25x25x16]; auto: as "
-                     "many as the maps' cells are worth and the device holds");
+                     "many as the maps' cells and the sensor's spread are worth and the device "
+                     "holds");
   command.add_option("--x-mm", flags.x_mm, "Range of x, mm, as --x-mm=-10:10 [default: -10:10]");
   command.add_option("--y-mm", flags.y_mm, "Range of y, mm, as --y-mm=-10:10 [default: -10:10]");
   command.add_option("--theta-deg", flags.theta_deg,
