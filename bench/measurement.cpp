@@ -55,6 +55,18 @@ double quantile(std::span<const double> values, double fraction) {
   return sorted[static_cast<std::size_t>(std::max(rank, 1.0)) - 1];
 }
 
+Interval wilson_interval(int successes, int trials) {
+  constexpr double z = 1.959964;  // the standard normal's 97.5th percentile
+  const double n = trials;
+  const double p = successes / n;
+  const double centre = (p + z * z / (2.0 * n)) / (1.0 + z * z / n);
+  const double half_width =
+      z / (1.0 + z * z / n) * std::sqrt(p * (1.0 - p) / n + z * z / (4.0 * n * n));
+  // Rounding must not leave the ends at 0 and 1 outside.
+  return {successes == 0 ? 0.0 : centre - half_width,
+          successes == trials ? 1.0 : centre + half_width};
+}
+
 std::uint64_t resident_bytes() { return status_bytes("VmRSS:"); }
 
 std::uint64_t peak_resident_bytes() { return status_bytes("VmHWM:"); }
