@@ -11,14 +11,12 @@
 #include <fmt/format.h>
 
 #include "atomic_file.hpp"
+#include "comparison.hpp"
 #include "experiment_result.hpp"
 #include "gnuplot.hpp"
 #include "letters.hpp"
-#include "measurement.hpp"
 #include "palpate/balanced_lattice.hpp"
 #include "palpate/error.hpp"
-#include "published.hpp"
-#include "report.hpp"
 
 namespace palpate::bench {
 
@@ -27,6 +25,7 @@ namespace {
 constexpr std::uint64_t learned_seed = 1'000;  ///< of the letters' trials
 constexpr std::uint64_t unlearned_seed = 100'000'000;
 constexpr std::uint64_t particle_seed = 1;
+constexpr int most_noisy_touches = 20;  ///< of an array that is not where it is reported
 
 /// Before the minutes of work, so that a folder that cannot be is known at once.
 void make_folder(const std::string& folder) {
@@ -42,107 +41,6 @@ int least_one(const char* field, int value) {
     throw Error(Fault::input, fmt::format("{} = {}: give 1 or more", field, value));
   }
   return value;
-}
-
-double percent(double fraction) { return 100.0 * fraction; }
-
-/// The least accuracy from some touch on.
-double least_accuracy_from(std::span<const CurvePoint> curve, int touches) {
-  double least = 1.0;
-  for (const CurvePoint& point : curve.subspan(touches - 1)) {
-    least = std::min(least, point.accuracy);
-  }
-  return least;
-}
-
-/// Touches from which the accuracy is 100 % to the end; one more than there are where it never is.
-int touches_to_certainty(std::span<const CurvePoint> curve) {
-  int touches = static_cast<int>(curve.size()) + 1;
-  while (touches > 1 && curve[touches - 2].accuracy == 1.0) {
-    --touches;
-  }
-  return touches;
-}
-
-Case case_of(const FilterRun& run) {
-  const std::vector<CurvePoint> curve = curve_of(run);
-  const CurvePoint& last = curve.back();
-  Case result{.name = run.name,
-              .facts = {{"trials", run.scores.size()},
-                        {"touches", last.touches},
-                        {"seconds", std::round(10.0 * run.seconds) / 10.0}},
-              .measurements = {{"accuracy at the end", percent(last.accuracy), "%"}}};
-  const auto add = [&](Measurement measurement) {
-    result.measurements.push_back(std::move(measurement));
-  };
-  if (const int touches = touches_to_certainty(curve); touches <= last.touches) {
-    add({"right in every trial from", static_cast<double>(touches), "touches on"});
-  }
-  // Balanced bins are as many as their whole numbers along each axis allow.
-  const bool ten_thousand = run.filter == "histogram" && run.count > 1'000;
-  const int known_after = run.filter != "histogram" ? 0
-                          : ten_thousand            ? published::bins_10000_know_after
-                          : run.count == 1'000      ? published::bins_1000_know_after
-                                                    : 0;
-  if (known_after > 0 && known_after <= last.touches) {
-    add({fmt::format("least accuracy from touch {} on", known_after),
-         percent(least_accuracy_from(curve, known_after)), "%", at_least(100.0)});
-  }
-  if (last.error) {
-    add({"mean error at the end", last.error->mean_mm, "mm",
-         ten_thousand ? std::optional(at_most(published::error_mm)) : std::nullopt});
-    add({"median error at the end", last.error->median_mm, "mm"});
-    add({"95th percentile of the error at the end", last.error->p95_mm, "mm"});
-  }
-  if (last.refined_error) {
-    add({"mean error at the end, refined", last.refined_error->mean_mm, "mm"});
-    add({"95th percentile at the end, refined", last.refined_error->p95_mm, "mm"});
-  }
-  add({"expected calibration error", percent(calibration_of(run).expected_error), "%"});
-  return result;
-}
-
-/// At the end of the trials, filter by filter of one size.
-Case comparison_of(const std::vector<FilterRun>& runs) {
-  Case result{.name = "histogram against particles",
-              .facts = {{"equal count",
-                         "bins per object, of which there are five; particles in "
-                         "all"}}};
-  for (const FilterRun& particles : runs) {
-    const auto histogram = std::find_if(runs.begin(), runs.end(), [&](const FilterRun& run) {
-      return run.filter == "histogram" && run.count == particles.count;
-    });
-    if (particles.filter == "histogram" || histogram == runs.end()) {
-      continue;
-    }
-    const CurvePoint ahead = curve_of(*histogram).back();
-    const CurvePoint behind = curve_of(particles).back();
-    result.measurements.push_back({fmt::format("accuracy ahead of {}", particles.name),
-                                   percent(ahead.accuracy - behind.accuracy), "% points",
-                                   at_least(0.0)});
-    if (ahead.error && behind.error) {
-      result.measurements.push_back({fmt::format("mean error less than {}'s", particles.name),
-                                     behind.error->mean_mm - ahead.error->mean_mm, "mm",
-                                     at_least(0.0)});
-    }
-  }
-  return result;
-}
-
-/// "None" at even odds, and at the largest weight that loses no learned object.
-Case case_of(const NoneRun& run) {
-  const double safe =
-      *std::min_element(run.learned_log10_weight.begin(), run.learned_log10_weight.end());
-  return {
-      .name = fmt::format("none of these, {} touches", run.touches),
-      .facts = {{"learned", run.learned_log10_weight.size()},
-                {"never learned", run.unlearned_log10_weight.size()}},
-      .measurements = {
-          {"called none at weight 1: never learned", percent(run.noticed(0.0)), "%"},
-          {"called none at weight 1: learned", percent(run.lost(0.0)), "%"},
-          {"largest weight that loses no learned one", safe, "log10"},
-          {"never learned, called none at that weight", percent(run.noticed(safe)), "%"},
-          {"unlearned turn to none before learned ones", percent(run.separation()), "% of pairs"}}};
 }
 
 ExperimentResult measure(Device& device, const ExperimentOptions& options, Report& report) {
@@ -178,7 +76,28 @@ ExperimentResult measure(Device& device, const ExperimentOptions& options, Repor
                                         .seed = particle_seed}));
     }
   }
-  report.add(comparison_of(result.runs));
+  for (const FilterRun& particles : result.runs) {
+    for (const FilterRun& histogram : result.runs) {
+      if (particles.filter != "histogram" && histogram.filter == "histogram" &&
+          as_many(histogram.count, particles.count)) {
+        report.add(comparison_of(histogram, particles));
+      }
+    }
+  }
+  for (const SensorPoseNoise& noise : {SensorPoseNoise{1.0, 0.05}, SensorPoseNoise{2.0, 0.1}}) {
+    const std::vector<Recording> noisy = make_trials(
+        vowels, trials_each, std::min(touches, most_noisy_touches), learned_seed, noise);
+    PoseNoiseRuns& runs = result.pose_noise.emplace_back();
+    runs.noise = noise;
+    for (const PoseLattice& lattice : {table_1[1], table_1[2]}) {
+      runs.runs.push_back(run_histogram(device, learned, noisy, lattice));
+    }
+    runs.runs.push_back(run_particles(
+        device, learned, noisy,
+        ParticleOptions{
+            .particles = counts.back(), .region = table_1.back(), .seed = particle_seed}));
+    report.add(case_of(runs));
+  }
 
   std::vector<int> none_touches;  // few, the paper's nine, many
   for (const int n : {3, 9, 25}) {
