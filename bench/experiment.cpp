@@ -76,13 +76,8 @@ ExperimentResult measure(Device& device, const ExperimentOptions& options, Repor
                                         .seed = particle_seed}));
     }
   }
-  for (const FilterRun& particles : result.runs) {
-    for (const FilterRun& histogram : result.runs) {
-      if (particles.filter != "histogram" && histogram.filter == "histogram" &&
-          as_many(histogram.count, particles.count)) {
-        report.add(comparison_of(histogram, particles));
-      }
-    }
+  for (const auto& [histogram, particles] : equal_counts(result.runs)) {
+    report.add(comparison_of(histogram, particles));
   }
   for (const SensorPoseNoise& noise : {SensorPoseNoise{1.0, 0.05}, SensorPoseNoise{2.0, 0.1}}) {
     const std::vector<Recording> noisy = make_trials(

@@ -109,6 +109,15 @@ std::string standing(const std::vector<PairedPoint>& curve, const Lead& lead) {
   return text;
 }
 
+void add_error_lead(Case& result, const std::string& name, const PairedPoint& point) {
+  if (point.error_lead_mm) {
+    result.measurements.push_back({.name = name,
+                                   .value = *point.error_lead_mm,
+                                   .unit = "mm",
+                                   .interval = point.error_lead_interval});
+  }
+}
+
 }  // namespace
 
 Case comparison_of(const FilterRun& histogram, const FilterRun& particles) {
@@ -139,10 +148,7 @@ Case comparison_of(const FilterRun& histogram, const FilterRun& particles) {
     result.measurements.push_back(
         {"error less where both locate, over touches", error_lead_mm / compared, "mm"});
   }
-  if (curve.back().error_lead_mm) {
-    result.measurements.push_back(
-        {"error less where both locate, at the end", *curve.back().error_lead_mm, "mm"});
-  }
+  add_error_lead(result, "error less where both locate, at the end", curve.back());
   return result;
 }
 
@@ -158,6 +164,12 @@ Case case_of(const PoseNoiseRuns& noisy) {
       result.measurements.push_back(
           {run.name + ": mean error at the end", last.error->mean_mm, "mm"});
     }
+  }
+  for (const auto& [histogram, particles] : equal_counts(noisy.runs)) {
+    add_error_lead(result,
+                   fmt::format("{}: error less than of {}, where both locate, at the end",
+                               histogram.name, particles.name),
+                   compare(histogram, particles).back());
   }
   return result;
 }

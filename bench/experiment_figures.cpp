@@ -233,8 +233,7 @@ void draw_refined(const ExperimentResult& result, const std::filesystem::path& f
 void draw_pose_noise(const ExperimentResult& result, const std::filesystem::path& folder) {
   const std::vector<FilterRun>& noisy = result.pose_noise.front().runs;
   Chart chart =
-      chart_over_touches(fmt::format("set xrange [0:{}]\nset logscale y\n"
-                                     "set yrange [0.3:20]\n"
+      chart_over_touches(fmt::format("set xrange [0:{}]\nset logscale y\nset yrange [0.3:20]\n"
                                      "set ytics (0.5, 1, 2, 5, 10, 20)\n"
                                      "set ylabel 'mean pose error where the letter is "
                                      "right (mm)'\n",

@@ -31,7 +31,7 @@ std::string row(const std::string& name, const Measurement& m) {
     reached = m.reached() ? "yes" : "no";
   }
   const std::string unit =
-      m.interval ? fmt::format("{} ({:.4g}-{:.4g})", m.unit, m.interval->low, m.interval->high)
+      m.interval ? fmt::format("{} ({:.4g} to {:.4g})", m.unit, m.interval->low, m.interval->high)
                  : m.unit;
   return fmt::format("| {:<28} | {:<46} | {:>10.4g} {:<17} | {:<8} | {:<7} |", name, m.name,
                      m.value, unit, goal, reached);

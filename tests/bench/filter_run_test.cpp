@@ -76,6 +76,13 @@ TEST(Wilson, BracketsTheFractionAndIsNeverEmpty) {
   EXPECT_EQ(curve_of(small_run())[1].accuracy_interval.low, wilson_interval(3, 4).low);
 }
 
+TEST(MeanInterval, IsTwoStandardErrorsEachWay) {
+  const Interval interval = mean_interval(std::vector{1.0, 2.0, 3.0, 6.0});
+  // Mean 3, deviation sqrt(14 / 3), over sqrt(4), times 1.959964.
+  EXPECT_NEAR(interval.low, 3.0 - 2.117, 1e-3);
+  EXPECT_NEAR(interval.high, 3.0 + 2.117, 1e-3);
+}
+
 TEST(Comparison, PairsTrialByTrial) {
   FilterRun other = small_run();
   other.scores[0][0].error_mm = 7.0;  // 3 mm behind where both locate
@@ -87,6 +94,7 @@ TEST(Comparison, PairsTrialByTrial) {
   EXPECT_EQ(curve[0].located_by_both, 1);
   ASSERT_TRUE(curve[0].error_lead_mm);
   EXPECT_DOUBLE_EQ(*curve[0].error_lead_mm, 3.0);
+  EXPECT_FALSE(curve[0].error_lead_interval) << "one difference says nothing of its spread";
   EXPECT_EQ(curve[1].right_lead, 1);
   EXPECT_EQ(curve[1].located_by_both, 3);
   EXPECT_DOUBLE_EQ(*curve[1].error_lead_mm, 0.0);
