@@ -13,13 +13,12 @@ namespace {
 
 double percent(double fraction) { return 100.0 * fraction; }
 
-/// The least accuracy from some touch on.
-double least_accuracy_from(std::span<const CurvePoint> curve, int touches) {
-  double least = 1.0;
-  for (const CurvePoint& point : curve.subspan(touches - 1)) {
-    least = std::min(least, point.accuracy);
-  }
-  return least;
+/// Where the accuracy is least from some touch on.
+const CurvePoint& least_accurate_from(std::span<const CurvePoint> curve, int touches) {
+  const std::span<const CurvePoint> rest = curve.subspan(touches - 1);
+  return *std::min_element(rest.begin(), rest.end(), [](const CurvePoint& a, const CurvePoint& b) {
+    return a.accuracy < b.accuracy;
+  });
 }
 
 /// Adds the number of touches from which something holds to the end, where there is one.
@@ -65,8 +64,10 @@ Case case_of(const FilterRun& run) {
                           : run.count == 1'000      ? published::bins_1000_know_after
                                                     : 0;
   if (known_after > 0 && known_after <= last.touches) {
-    add({fmt::format("least accuracy from touch {} on", known_after),
-         percent(least_accuracy_from(curve, known_after)), "%", at_least(100.0)});
+    Measurement least = accuracy_of(fmt::format("least accuracy from touch {} on", known_after),
+                                    least_accurate_from(curve, known_after));
+    least.goal = at_least(100.0);
+    add(std::move(least));
   }
   if (last.error) {
     add({"mean error at the end", last.error->mean_mm, "mm",
