@@ -25,7 +25,6 @@ namespace {
 constexpr std::uint64_t learned_seed = 1'000;  ///< of the letters' trials
 constexpr std::uint64_t unlearned_seed = 100'000'000;
 constexpr std::uint64_t particle_seed = 1;
-constexpr int most_noisy_touches = 20;  ///< of an array that is not where it is reported
 
 /// Before the minutes of work, so that a folder that cannot be is known at once.
 void make_folder(const std::string& folder) {
@@ -43,6 +42,51 @@ int least_one(const char* field, int value) {
   return value;
 }
 
+constexpr int most_particles = 10'000;
+
+/// Table I's bins per object: 100, 1,000 and 10,000.
+std::array<PoseLattice, 3> table_1() {
+  return {lattice_of(5, 5, 4), lattice_of(10, 10, 10), lattice_of(25, 25, 16)};
+}
+
+/// The trials' letters again, with the array displaced.
+std::vector<PoseNoiseRuns> measure_pose_noise(Device& device, const LearnedLetters& learned,
+                                              int trials_each, int touches) {
+  constexpr int most_touches = 20;
+  std::vector<PoseNoiseRuns> levels;
+  for (const SensorPoseNoise& noise : {SensorPoseNoise{1.0, 0.05}, SensorPoseNoise{2.0, 0.1}}) {
+    const std::vector<Recording> trials =
+        make_trials(vowels, trials_each, std::min(touches, most_touches), learned_seed, noise);
+    PoseNoiseRuns& level = levels.emplace_back();
+    level.noise = noise;
+    const std::array lattices = table_1();
+    for (const PoseLattice& lattice : {lattices[1], lattices[2]}) {
+      level.runs.push_back(run_histogram(device, learned, trials, lattice));
+    }
+    level.runs.push_back(run_particles(
+        device, learned, trials,
+        ParticleOptions{
+            .particles = most_particles, .region = lattices.back(), .seed = particle_seed}));
+  }
+  return levels;
+}
+
+std::vector<NoneRun> measure_none(Device& device, const LearnedLetters& learned,
+                                  std::span<const Recording> trials, int trials_each, int touches) {
+  std::vector<int> none_touches;  // few, the paper's nine, many
+  for (const int n : {3, 9, 25}) {
+    if (n <= touches) {
+      none_touches.push_back(n);
+    }
+  }
+  if (none_touches.empty()) {
+    none_touches.push_back(touches);
+  }
+  return run_none(device, learned, trials,
+                  make_trials(unlearned_shapes, trials_each, none_touches.back(), unlearned_seed),
+                  table_1().back(), none_touches);
+}
+
 ExperimentResult measure(Device& device, const ExperimentOptions& options, Report& report) {
   const int trials_each = least_one("--trials", options.trials.value_or(options.quick ? 4 : 10));
   const int touches = options.touches.value_or(options.quick ? 12 : 50);
@@ -56,22 +100,22 @@ ExperimentResult measure(Device& device, const ExperimentOptions& options, Repor
     report.add(case_of(run));
     result.runs.push_back(std::move(run));
   };
-  const std::array table_1 = {lattice_of(5, 5, 4), lattice_of(10, 10, 10), lattice_of(25, 25, 16)};
-  for (const PoseLattice& lattice : table_1) {
+  const std::array lattices = table_1();
+  for (const PoseLattice& lattice : lattices) {
     add(run_histogram(device, learned, trials, lattice));
   }
   // As many as Table I's most, shaped by what a turn moves.
   const std::int64_t most_bins =
-      table_1.back().bins() * static_cast<std::int64_t>(learned.objects.size());
+      lattices.back().bins() * static_cast<std::int64_t>(learned.objects.size());
   add(run_histogram(device, learned, trials,
-                    balanced_lattice(table_1.back(), learned.objects, most_bins).lattice));
+                    balanced_lattice(lattices.back(), learned.objects, most_bins).lattice));
   const std::vector<int> counts =
-      options.quick ? std::vector{1'000, 10'000} : std::vector{100, 1'000, 10'000};
+      options.quick ? std::vector{1'000, most_particles} : std::vector{100, 1'000, most_particles};
   for (const bool augmented : {false, true}) {
     for (const int particles : counts) {
       add(run_particles(device, learned, trials,
                         ParticleOptions{.particles = particles,
-                                        .region = table_1.back(),
+                                        .region = lattices.back(),
                                         .augmented = augmented,
                                         .seed = particle_seed}));
     }
@@ -79,34 +123,11 @@ ExperimentResult measure(Device& device, const ExperimentOptions& options, Repor
   for (const auto& [histogram, particles] : equal_counts(result.runs)) {
     report.add(comparison_of(histogram, particles));
   }
-  for (const SensorPoseNoise& noise : {SensorPoseNoise{1.0, 0.05}, SensorPoseNoise{2.0, 0.1}}) {
-    const std::vector<Recording> noisy = make_trials(
-        vowels, trials_each, std::min(touches, most_noisy_touches), learned_seed, noise);
-    PoseNoiseRuns& runs = result.pose_noise.emplace_back();
-    runs.noise = noise;
-    for (const PoseLattice& lattice : {table_1[1], table_1[2]}) {
-      runs.runs.push_back(run_histogram(device, learned, noisy, lattice));
-    }
-    runs.runs.push_back(run_particles(
-        device, learned, noisy,
-        ParticleOptions{
-            .particles = counts.back(), .region = table_1.back(), .seed = particle_seed}));
+  result.pose_noise = measure_pose_noise(device, learned, trials_each, touches);
+  for (const PoseNoiseRuns& runs : result.pose_noise) {
     report.add(case_of(runs));
   }
-
-  std::vector<int> none_touches;  // few, the paper's nine, many
-  for (const int n : {3, 9, 25}) {
-    if (n <= touches) {
-      none_touches.push_back(n);
-    }
-  }
-  if (none_touches.empty()) {
-    none_touches.push_back(touches);
-  }
-  result.none =
-      run_none(device, learned, trials,
-               make_trials(unlearned_shapes, trials_each, none_touches.back(), unlearned_seed),
-               table_1.back(), none_touches);
+  result.none = measure_none(device, learned, trials, trials_each, touches);
   for (const NoneRun& run : result.none) {
     report.add(case_of(run));
   }
