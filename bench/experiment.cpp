@@ -11,14 +11,12 @@
 #include <fmt/format.h>
 
 #include "atomic_file.hpp"
+#include "comparison.hpp"
 #include "experiment_result.hpp"
 #include "gnuplot.hpp"
 #include "letters.hpp"
-#include "measurement.hpp"
 #include "palpate/balanced_lattice.hpp"
 #include "palpate/error.hpp"
-#include "published.hpp"
-#include "report.hpp"
 
 namespace palpate::bench {
 
@@ -44,105 +42,49 @@ int least_one(const char* field, int value) {
   return value;
 }
 
-double percent(double fraction) { return 100.0 * fraction; }
+constexpr int most_particles = 10'000;
 
-/// The least accuracy from some touch on.
-double least_accuracy_from(std::span<const CurvePoint> curve, int touches) {
-  double least = 1.0;
-  for (const CurvePoint& point : curve.subspan(touches - 1)) {
-    least = std::min(least, point.accuracy);
-  }
-  return least;
+/// Table I's bins per object: 100, 1,000 and 10,000.
+std::array<PoseLattice, 3> table_1() {
+  return {lattice_of(5, 5, 4), lattice_of(10, 10, 10), lattice_of(25, 25, 16)};
 }
 
-/// Touches from which the accuracy is 100 % to the end; one more than there are where it never is.
-int touches_to_certainty(std::span<const CurvePoint> curve) {
-  int touches = static_cast<int>(curve.size()) + 1;
-  while (touches > 1 && curve[touches - 2].accuracy == 1.0) {
-    --touches;
-  }
-  return touches;
-}
-
-Case case_of(const FilterRun& run) {
-  const std::vector<CurvePoint> curve = curve_of(run);
-  const CurvePoint& last = curve.back();
-  Case result{.name = run.name,
-              .facts = {{"trials", run.scores.size()},
-                        {"touches", last.touches},
-                        {"seconds", std::round(10.0 * run.seconds) / 10.0}},
-              .measurements = {{"accuracy at the end", percent(last.accuracy), "%"}}};
-  const auto add = [&](Measurement measurement) {
-    result.measurements.push_back(std::move(measurement));
-  };
-  if (const int touches = touches_to_certainty(curve); touches <= last.touches) {
-    add({"right in every trial from", static_cast<double>(touches), "touches on"});
-  }
-  // Balanced bins are as many as their whole numbers along each axis allow.
-  const bool ten_thousand = run.filter == "histogram" && run.count > 1'000;
-  const int known_after = run.filter != "histogram" ? 0
-                          : ten_thousand            ? published::bins_10000_know_after
-                          : run.count == 1'000      ? published::bins_1000_know_after
-                                                    : 0;
-  if (known_after > 0 && known_after <= last.touches) {
-    add({fmt::format("least accuracy from touch {} on", known_after),
-         percent(least_accuracy_from(curve, known_after)), "%", at_least(100.0)});
-  }
-  if (last.error) {
-    add({"mean error at the end", last.error->mean_mm, "mm",
-         ten_thousand ? std::optional(at_most(published::error_mm)) : std::nullopt});
-    add({"median error at the end", last.error->median_mm, "mm"});
-    add({"95th percentile of the error at the end", last.error->p95_mm, "mm"});
-  }
-  if (last.refined_error) {
-    add({"mean error at the end, refined", last.refined_error->mean_mm, "mm"});
-    add({"95th percentile at the end, refined", last.refined_error->p95_mm, "mm"});
-  }
-  add({"expected calibration error", percent(calibration_of(run).expected_error), "%"});
-  return result;
-}
-
-/// At the end of the trials, filter by filter of one size.
-Case comparison_of(const std::vector<FilterRun>& runs) {
-  Case result{.name = "histogram against particles",
-              .facts = {{"equal count",
-                         "bins per object, of which there are five; particles in "
-                         "all"}}};
-  for (const FilterRun& particles : runs) {
-    const auto histogram = std::find_if(runs.begin(), runs.end(), [&](const FilterRun& run) {
-      return run.filter == "histogram" && run.count == particles.count;
-    });
-    if (particles.filter == "histogram" || histogram == runs.end()) {
-      continue;
+/// The trials' letters again, with the array displaced.
+std::vector<PoseNoiseRuns> measure_pose_noise(Device& device, const LearnedLetters& learned,
+                                              int trials_each, int touches) {
+  constexpr int most_touches = 20;
+  std::vector<PoseNoiseRuns> levels;
+  for (const SensorPoseNoise& noise : {SensorPoseNoise{1.0, 0.05}, SensorPoseNoise{2.0, 0.1}}) {
+    const std::vector<Recording> trials =
+        make_trials(vowels, trials_each, std::min(touches, most_touches), learned_seed, noise);
+    PoseNoiseRuns& level = levels.emplace_back();
+    level.noise = noise;
+    const std::array lattices = table_1();
+    for (const PoseLattice& lattice : {lattices[1], lattices[2]}) {
+      level.runs.push_back(run_histogram(device, learned, trials, lattice));
     }
-    const CurvePoint ahead = curve_of(*histogram).back();
-    const CurvePoint behind = curve_of(particles).back();
-    result.measurements.push_back({fmt::format("accuracy ahead of {}", particles.name),
-                                   percent(ahead.accuracy - behind.accuracy), "% points",
-                                   at_least(0.0)});
-    if (ahead.error && behind.error) {
-      result.measurements.push_back({fmt::format("mean error less than {}'s", particles.name),
-                                     behind.error->mean_mm - ahead.error->mean_mm, "mm",
-                                     at_least(0.0)});
+    level.runs.push_back(run_particles(
+        device, learned, trials,
+        ParticleOptions{
+            .particles = most_particles, .region = lattices.back(), .seed = particle_seed}));
+  }
+  return levels;
+}
+
+std::vector<NoneRun> measure_none(Device& device, const LearnedLetters& learned,
+                                  std::span<const Recording> trials, int trials_each, int touches) {
+  std::vector<int> none_touches;  // few, the paper's nine, many
+  for (const int n : {3, 9, 25}) {
+    if (n <= touches) {
+      none_touches.push_back(n);
     }
   }
-  return result;
-}
-
-/// "None" at even odds, and at the largest weight that loses no learned object.
-Case case_of(const NoneRun& run) {
-  const double safe =
-      *std::min_element(run.learned_log10_weight.begin(), run.learned_log10_weight.end());
-  return {
-      .name = fmt::format("none of these, {} touches", run.touches),
-      .facts = {{"learned", run.learned_log10_weight.size()},
-                {"never learned", run.unlearned_log10_weight.size()}},
-      .measurements = {
-          {"called none at weight 1: never learned", percent(run.noticed(0.0)), "%"},
-          {"called none at weight 1: learned", percent(run.lost(0.0)), "%"},
-          {"largest weight that loses no learned one", safe, "log10"},
-          {"never learned, called none at that weight", percent(run.noticed(safe)), "%"},
-          {"unlearned turn to none before learned ones", percent(run.separation()), "% of pairs"}}};
+  if (none_touches.empty()) {
+    none_touches.push_back(touches);
+  }
+  return run_none(device, learned, trials,
+                  make_trials(unlearned_shapes, trials_each, none_touches.back(), unlearned_seed),
+                  table_1().back(), none_touches);
 }
 
 ExperimentResult measure(Device& device, const ExperimentOptions& options, Report& report) {
@@ -158,41 +100,34 @@ ExperimentResult measure(Device& device, const ExperimentOptions& options, Repor
     report.add(case_of(run));
     result.runs.push_back(std::move(run));
   };
-  const std::array table_1 = {lattice_of(5, 5, 4), lattice_of(10, 10, 10), lattice_of(25, 25, 16)};
-  for (const PoseLattice& lattice : table_1) {
+  const std::array lattices = table_1();
+  for (const PoseLattice& lattice : lattices) {
     add(run_histogram(device, learned, trials, lattice));
   }
   // As many as Table I's most, shaped by what a turn moves.
   const std::int64_t most_bins =
-      table_1.back().bins() * static_cast<std::int64_t>(learned.objects.size());
+      lattices.back().bins() * static_cast<std::int64_t>(learned.objects.size());
   add(run_histogram(device, learned, trials,
-                    balanced_lattice(table_1.back(), learned.objects, most_bins).lattice));
+                    balanced_lattice(lattices.back(), learned.objects, most_bins).lattice));
   const std::vector<int> counts =
-      options.quick ? std::vector{1'000, 10'000} : std::vector{100, 1'000, 10'000};
+      options.quick ? std::vector{1'000, most_particles} : std::vector{100, 1'000, most_particles};
   for (const bool augmented : {false, true}) {
     for (const int particles : counts) {
       add(run_particles(device, learned, trials,
                         ParticleOptions{.particles = particles,
-                                        .region = table_1.back(),
+                                        .region = lattices.back(),
                                         .augmented = augmented,
                                         .seed = particle_seed}));
     }
   }
-  report.add(comparison_of(result.runs));
-
-  std::vector<int> none_touches;  // few, the paper's nine, many
-  for (const int n : {3, 9, 25}) {
-    if (n <= touches) {
-      none_touches.push_back(n);
-    }
+  for (const auto& [histogram, particles] : equal_counts(result.runs)) {
+    report.add(comparison_of(histogram, particles));
   }
-  if (none_touches.empty()) {
-    none_touches.push_back(touches);
+  result.pose_noise = measure_pose_noise(device, learned, trials_each, touches);
+  for (const PoseNoiseRuns& runs : result.pose_noise) {
+    report.add(case_of(runs));
   }
-  result.none =
-      run_none(device, learned, trials,
-               make_trials(unlearned_shapes, trials_each, none_touches.back(), unlearned_seed),
-               table_1.back(), none_touches);
+  result.none = measure_none(device, learned, trials, trials_each, touches);
   for (const NoneRun& run : result.none) {
     report.add(case_of(run));
   }

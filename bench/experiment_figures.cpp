@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 
 #include "atomic_file.hpp"
+#include "comparison.hpp"
 #include "experiment_result.hpp"
 #include "gnuplot.hpp"
 #include "published.hpp"
@@ -58,6 +59,16 @@ class Chart {
     data_ += "END\n";
     plot(fmt::format("{} using 1:2", name), title, form);
   }
+  /// Adds the area between two values at every x.
+  void fill(const std::vector<std::array<double, 3>>& bands, const std::string& form) {
+    const std::string name = fmt::format("$data{}", count_++);
+    data_ += name + " << END\n";
+    for (const auto& [x, low, high] : bands) {
+      data_ += fmt::format("{:.6g} {:.6g} {:.6g}\n", x, low, high);
+    }
+    data_ += "END\n";
+    plot(fmt::format("{} using 1:2:3", name), "", "filledcurves " + form);
+  }
   /// Adds a function of x.
   void plot(const std::string& what, const std::string& title, const std::string& form) {
     plots_ += fmt::format("{}{} with {} title {}", plots_.empty() ? "plot " : ", ", what, form,
@@ -96,6 +107,21 @@ void add_curve(Chart& chart, const FilterRun& run, const Value& value, const std
   chart.add(points, title, "linespoints pi 5 lt " + form);
 }
 
+/// The 95 % intervals of every run of a filter's accuracy, to be drawn below the lines.
+void add_intervals(Chart& chart, const ExperimentResult& result, const std::string& filter) {
+  int linetype = 0;
+  for (const FilterRun& run : result.runs) {
+    if (run.filter == filter) {
+      std::vector<std::array<double, 3>> band;
+      for (const CurvePoint& point : curve_of(run)) {
+        band.push_back({static_cast<double>(point.touches), 100.0 * point.accuracy_interval.low,
+                        100.0 * point.accuracy_interval.high});
+      }
+      chart.fill(band, fmt::format("lt {} fs transparent solid 0.12 noborder", ++linetype));
+    }
+  }
+}
+
 /// One line for every run of a filter.
 void add_runs(Chart& chart, const ExperimentResult& result, const std::string& filter,
               const Value& value, const std::string& form = "") {
@@ -107,27 +133,40 @@ void add_runs(Chart& chart, const ExperimentResult& result, const std::string& f
   }
 }
 
-/// A chart over the number of touches.
+Chart chart_over_touches(const std::string& settings) {
+  return Chart("set xlabel 'touches'\nset xrange [0:*]\n" + settings);
+}
+
+/// Every run of a filter over the number of touches.
 Chart chart_of(const ExperimentResult& result, const std::string& filter, const Value& value,
                const std::string& settings, const std::string& form = "") {
-  Chart chart("set xlabel 'touches'\nset xrange [0:*]\n" + settings);
+  Chart chart = chart_over_touches(settings);
   add_runs(chart, result, filter, value, form);
   return chart;
 }
 
 constexpr const char* accuracy_axis =
     "set ylabel 'trials with the right letter (%)'\nset yrange [0:105]\n";
+/// The 95 % interval as a light band behind every curve.
+Chart accuracy_chart_of(const ExperimentResult& result, const std::string& filter) {
+  Chart chart = chart_over_touches(
+      "set ylabel 'trials with the right letter, and 95 % interval (%)'\nset yrange [0:105]\n");
+  add_intervals(chart, result, filter);
+  add_runs(chart, result, filter, accuracy_percent);
+  return chart;
+}
+
 constexpr const char* error_axis =
     "set ylabel 'mean pose error where the letter is right (mm)'\nset yrange [0:*]\n";
 
 void draw_paper_figures(const ExperimentResult& result, const std::filesystem::path& folder) {
-  Chart fig6a = chart_of(result, "particles", accuracy_percent, accuracy_axis);
+  Chart fig6a = accuracy_chart_of(result, "particles");
   fig6a.plot(fmt::format("{}", 100.0 * published::particle_accuracy),
              "paper: 10,000 particles level out", "lines lt 11");
   fig6a.draw(folder, "fig6a");
   chart_of(result, "particles", mean_error_mm, error_axis).draw(folder, "fig6b");
 
-  Chart fig7a = chart_of(result, "histogram", accuracy_percent, accuracy_axis);
+  Chart fig7a = accuracy_chart_of(result, "histogram");
   fig7a.add({{published::bins_1000_know_after, 100.0}}, "paper: 1,000 bins reach 100 %",
             "points lt 12");
   fig7a.add({{published::bins_10000_know_after, 100.0}}, "paper: 10,000 bins reach 100 %",
@@ -153,13 +192,12 @@ void draw_errors(const ExperimentResult& result, const std::filesystem::path& fo
       std::find_if(result.runs.begin(), result.runs.end(), [&](const FilterRun& run) {
         return run.filter == "histogram" && run.count == most_of(result, "histogram");
       });
-  Chart chart(
-      fmt::format("set xlabel 'touches'\nset xrange [0:*]\nset logscale y\n"
-                  "set yrange [0.3:30]\n"
-                  "set ytics (0.5, 1, 2, 5, 10, 20)\n"
-                  "set ylabel 'pose error where the letter is right (mm)'\n"
-                  "set title {}\n",
-                  gnuplot_quoted(finest->name)));
+  Chart chart =
+      chart_over_touches(fmt::format("set logscale y\nset yrange [0.3:30]\n"
+                                     "set ytics (0.5, 1, 2, 5, 10, 20)\n"
+                                     "set ylabel 'pose error where the letter is right (mm)'\n"
+                                     "set title {}\n",
+                                     gnuplot_quoted(finest->name)));
   const auto with = [](double ErrorSummary::*field, std::optional<ErrorSummary> CurvePoint::*of) {
     return [=](const CurvePoint& point) { return point.*of ? *(point.*of).*field : NAN; };
   };
@@ -171,6 +209,58 @@ void draw_errors(const ExperimentResult& result, const std::filesystem::path& fo
   add_curve(chart, *finest, with(&E::p95_mm, &P::refined_error), "refined, 95th percentile", "4");
   add_curve(chart, *finest, with(&E::mean_mm, &P::refined_error), "refined, mean", "5");
   chart.draw(folder, "errors");
+}
+
+/// The mode's error beside the refined pose's, of the histograms with the most bins.
+void draw_refined(const ExperimentResult& result, const std::filesystem::path& folder) {
+  Chart chart = chart_over_touches(
+      "set logscale y\nset yrange [0.2:20]\nset ytics (0.2, 0.5, 1, 2, 5, 10, 20)\n"
+      "set ylabel 'mean pose error where the letter is right (mm)'\n");
+  const auto refined_mm = [](const CurvePoint& point) {
+    return point.refined_error ? point.refined_error->mean_mm : NAN;
+  };
+  int linetype = 0;
+  for (const FilterRun& run : result.runs) {
+    if (run.filter == "histogram" && as_many(run.count, most_of(result, "histogram"))) {
+      add_curve(chart, run, mean_error_mm, run.name + ", mode", fmt::format("{}", ++linetype));
+      add_curve(chart, run, refined_mm, run.name + ", refined", fmt::format("{}", ++linetype));
+    }
+  }
+  chart.draw(folder, "refined");
+}
+
+/// Pose errors with the array where it is reported and off by each noise, for the largest counts.
+void draw_pose_noise(const ExperimentResult& result, const std::filesystem::path& folder) {
+  const std::vector<FilterRun>& noisy = result.pose_noise.front().runs;
+  Chart chart =
+      chart_over_touches(fmt::format("set xrange [0:{}]\nset logscale y\nset yrange [0.3:20]\n"
+                                     "set ytics (0.5, 1, 2, 5, 10, 20)\n"
+                                     "set ylabel 'mean pose error where the letter is "
+                                     "right (mm)'\n",
+                                     noisy.front().scores.front().size()));
+  int form = 0;  // dashes tell filters apart, colours the noise
+  for (const FilterRun& filter : noisy) {
+    if (filter.count != most_of(result, filter.filter)) {
+      continue;
+    }
+    ++form;
+    const auto add = [&](const std::vector<FilterRun>& runs, const std::string& name,
+                         int linetype) {
+      const auto run = std::find_if(runs.begin(), runs.end(), [&](const FilterRun& candidate) {
+        return candidate.name == filter.name;
+      });
+      add_curve(chart, *run, mean_error_mm, fmt::format("{}, {}", filter.name, name),
+                fmt::format("{} dt {} pt {}", linetype, form, form == 1 ? 7 : 4));
+    };
+    int linetype = 1;
+    add(result.runs, "exact", linetype);
+    for (const PoseNoiseRuns& runs : result.pose_noise) {
+      add(runs.runs,
+          fmt::format("{} mm, {} rad", runs.noise.translation_mm, runs.noise.rotation_rad),
+          ++linetype);
+    }
+  }
+  chart.draw(folder, "pose_noise");
 }
 
 void draw_calibration(const ExperimentResult& result, const std::filesystem::path& folder) {
@@ -231,6 +321,8 @@ void draw_figures(const ExperimentResult& result, const std::filesystem::path& f
   add_runs(augmented, result, "augmented", accuracy_percent, "dt 2 lw 3");
   augmented.draw(folder, "augmented");
   draw_errors(result, folder);
+  draw_refined(result, folder);
+  draw_pose_noise(result, folder);
   draw_calibration(result, folder);
   draw_none(result, folder);
 }

@@ -13,16 +13,22 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-Json json_of(const FilterRun& run) {
+Json curve_json(const FilterRun& run) {
   Json curve = Json::array();
   for (const CurvePoint& point : curve_of(run)) {
     curve.push_back({{"touches", point.touches},
                      {"accuracy", point.accuracy},
+                     {"accuracy_low", point.accuracy_interval.low},
+                     {"accuracy_high", point.accuracy_interval.high},
                      {"mean_confidence", point.mean_confidence},
                      {"located", point.located},
                      {"error_mm", json_of(point.error)},
                      {"refined_error_mm", json_of(point.refined_error)}});
   }
+  return curve;
+}
+
+Json json_of(const FilterRun& run) {
   const Calibration calibration = calibration_of(run);
   Json bins = Json::array();
   for (const Calibration::Bin& bin : calibration.bins) {
@@ -36,8 +42,21 @@ Json json_of(const FilterRun& run) {
       {"name", run.name},
       {"count", run.count},
       {"seconds", run.seconds},
-      {"curve", std::move(curve)},
+      {"curve", curve_json(run)},
       {"calibration", {{"expected_error", calibration.expected_error}, {"bins", std::move(bins)}}}};
+}
+
+Json json_of(const PoseNoiseRuns& noisy) {
+  Json filters = Json::array();
+  for (const FilterRun& run : noisy.runs) {
+    filters.push_back({{"filter", run.filter},
+                       {"name", run.name},
+                       {"count", run.count},
+                       {"curve", curve_json(run)}});
+  }
+  return {{"translation_mm", noisy.noise.translation_mm},
+          {"rotation_rad", noisy.noise.rotation_rad},
+          {"filters", std::move(filters)}};
 }
 
 Json json_of(const NoneRun& run, const std::vector<double>& log10_weights) {
@@ -63,15 +82,36 @@ std::string cell(const std::optional<double>& value) {
   return value ? fmt::format("{:.6g}", *value) : "";
 }
 
+constexpr const char* curve_head =
+    "filter,count,touches,accuracy,accuracy_low,accuracy_high,mean_confidence,located,"
+    "error_mean_mm,error_median_mm,error_p95_mm,refined_mean_mm,refined_median_mm,refined_p95_mm";
+
+/// A line for every touch, each after `first`.
+std::string curve_lines(const FilterRun& run, const std::string& first = "") {
+  std::string lines;
+  for (const CurvePoint& point : curve_of(run)) {
+    lines += fmt::format("{}{},{},{},{:.6g},{:.6g},{:.6g},{:.6g},{},{},{}\n", first, run.filter,
+                         run.count, point.touches, point.accuracy, point.accuracy_interval.low,
+                         point.accuracy_interval.high, point.mean_confidence, point.located,
+                         cells(point.error), cells(point.refined_error));
+  }
+  return lines;
+}
+
 std::string curves(const ExperimentResult& result) {
-  std::string table =
-      "filter,count,touches,accuracy,mean_confidence,located,error_mean_mm,error_median_mm,"
-      "error_p95_mm,refined_mean_mm,refined_median_mm,refined_p95_mm\n";
+  std::string table = fmt::format("{}\n", curve_head);
   for (const FilterRun& run : result.runs) {
-    for (const CurvePoint& point : curve_of(run)) {
-      table += fmt::format("{},{},{},{:.6g},{:.6g},{},{},{}\n", run.filter, run.count,
-                           point.touches, point.accuracy, point.mean_confidence, point.located,
-                           cells(point.error), cells(point.refined_error));
+    table += curve_lines(run);
+  }
+  return table;
+}
+
+std::string pose_noise(const ExperimentResult& result) {
+  std::string table = fmt::format("noise_mm,noise_rad,{}\n", curve_head);
+  for (const PoseNoiseRuns& noisy : result.pose_noise) {
+    for (const FilterRun& run : noisy.runs) {
+      table += curve_lines(
+          run, fmt::format("{},{},", noisy.noise.translation_mm, noisy.noise.rotation_rad));
     }
   }
   return table;
@@ -137,9 +177,12 @@ std::vector<double> sampled_log10_weights(const std::vector<NoneRun>& runs) {
 }
 
 nlohmann::ordered_json document_of(const ExperimentResult& result) {
-  Json document{{"filters", Json::array()}, {"none", Json::array()}};
+  Json document{{"filters", Json::array()}, {"pose_noise", Json::array()}, {"none", Json::array()}};
   for (const FilterRun& run : result.runs) {
     document["filters"].push_back(json_of(run));
+  }
+  for (const PoseNoiseRuns& noisy : result.pose_noise) {
+    document["pose_noise"].push_back(json_of(noisy));
   }
   for (const NoneRun& run : result.none) {
     document["none"].push_back(json_of(run, sampled_log10_weights(result.none)));
@@ -155,6 +198,7 @@ void write_tables(const ExperimentResult& result, const std::filesystem::path& f
   };
   write("curves.csv", curves(result));
   write("calibration.csv", calibration(result));
+  write("pose_noise.csv", pose_noise(result));
   write("none.csv", none(result));
   write("trials.csv", trials(result));
 }

@@ -8,23 +8,39 @@
 
 #include "filter_run.hpp"
 #include "none_run.hpp"
+#include "report.hpp"
 
 namespace palpate::bench {
+
+/// Filters over trials in which the array is not quite where the robot reports it.
+struct PoseNoiseRuns {
+  SensorPoseNoise noise;
+  std::vector<FilterRun> runs;
+};
 
 struct ExperimentResult {
   std::vector<std::string> true_objects;  ///< [trial]
   std::vector<FilterRun> runs;
+  std::vector<PoseNoiseRuns> pose_noise;
   std::vector<NoneRun> none;
 };
+
+/// What a run reached beside what the paper reports of its filter.
+Case case_of(const FilterRun& run);
+/// A histogram against particles over the same trials, over all touches and at the end.
+Case comparison_of(const FilterRun& histogram, const FilterRun& particles);
+Case case_of(const PoseNoiseRuns& noisy);
+/// "None" at even odds, and at the largest weight that loses no learned object.
+Case case_of(const NoneRun& run);
 
 /// Weights of "none of these" at which its curves are sampled, as log10.
 std::vector<double> sampled_log10_weights(const std::vector<NoneRun>& runs);
 
-/// Every curve, calibration and "none" table, as `filters` and `none`.
+/// Every curve, calibration and "none" table, as `filters`, `pose_noise` and `none`.
 nlohmann::ordered_json document_of(const ExperimentResult& result);
 
-/// Writes curves.csv, calibration.csv, none.csv and trials.csv, the last with a line for every
-/// touch of every trial.
+/// Writes curves.csv, calibration.csv, pose_noise.csv, none.csv and trials.csv, the last with a
+/// line for every touch of every trial.
 /// @throws Error where the disk refuses
 void write_tables(const ExperimentResult& result, const std::filesystem::path& folder);
 

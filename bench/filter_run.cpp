@@ -8,7 +8,6 @@
 #include <fmt/format.h>
 
 #include "letters.hpp"
-#include "measurement.hpp"
 #include "palpate/pose_histogram.hpp"
 
 namespace palpate::bench {
@@ -29,9 +28,10 @@ CurvePoint point_of(const FilterRun& run, std::size_t touch) {
   CurvePoint point{.touches = static_cast<int>(touch) + 1, .error = {}, .refined_error = {}};
   std::vector<double> errors_mm;
   std::vector<double> refined_errors_mm;
+  int right = 0;
   for (const std::vector<Score>& trial : run.scores) {
     const Score& score = trial[touch];
-    point.accuracy += score.right ? 1.0 : 0.0;
+    right += score.right ? 1 : 0;
     point.mean_confidence += score.confidence;
     if (score.error_mm) {
       errors_mm.push_back(*score.error_mm);
@@ -40,8 +40,9 @@ CurvePoint point_of(const FilterRun& run, std::size_t touch) {
       refined_errors_mm.push_back(*score.refined_error_mm);
     }
   }
-  const auto trials = static_cast<double>(run.scores.size());
-  point.accuracy /= trials;
+  const auto trials = static_cast<int>(run.scores.size());
+  point.accuracy = static_cast<double>(right) / trials;
+  point.accuracy_interval = wilson_interval(right, trials);
   point.mean_confidence /= trials;
   point.located = static_cast<int>(errors_mm.size());
   point.error = summary_of(errors_mm);

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "measurement.hpp"
 #include "palpate/lattice.hpp"
 #include "palpate/particle_filter.hpp"
 #include "trials.hpp"
@@ -40,6 +41,7 @@ struct ErrorSummary {
 struct CurvePoint {
   int touches = 0;
   double accuracy = 0.0;  ///< fraction of the trials whose most probable object is the true one
+  Interval accuracy_interval;  ///< 95 %, see wilson_interval()
   double mean_confidence = 0.0;
   int located = 0;  ///< trials whose mode's object is the true one; the errors are over these
   std::optional<ErrorSummary> error;          ///< none where nothing is located

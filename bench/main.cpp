@@ -26,7 +26,8 @@ int main(int argc, char** argv) {
   auto* experiment = app.add_subcommand(
       "experiment",
       "The paper's Sec. IV on simulated letters: identity and pose error against the number of "
-      "touches, for histogram and particle filters; calibration; objects never learned");
+      "touches, for histogram and particle filters; calibration; misplaced touches; objects "
+      "never learned");
   experiment->add_option("--trials", experiment_options.trials,
                          "Trials per letter, 10 by default, or 4 with --quick");
   experiment->add_option("--touches", experiment_options.touches,

@@ -4,12 +4,15 @@
 #include <chrono>
 #include <cmath>
 #include <fstream>
+#include <numeric>
 #include <string>
 #include <string_view>
 
 namespace palpate::bench {
 
 namespace {
+
+constexpr double z = 1.959964;  ///< the standard normal's 97.5th percentile
 
 /// A field of /proc/self/status, which are in KiB; 0 where there is none.
 std::uint64_t status_bytes(std::string_view field) {
@@ -53,6 +56,28 @@ double quantile(std::span<const double> values, double fraction) {
   std::sort(sorted.begin(), sorted.end());
   const double rank = std::ceil(fraction * static_cast<double>(sorted.size()));
   return sorted[static_cast<std::size_t>(std::max(rank, 1.0)) - 1];
+}
+
+Interval wilson_interval(int successes, int trials) {
+  const double n = trials;
+  const double p = successes / n;
+  const double centre = (p + z * z / (2.0 * n)) / (1.0 + z * z / n);
+  const double half_width =
+      z / (1.0 + z * z / n) * std::sqrt(p * (1.0 - p) / n + z * z / (4.0 * n * n));
+  // Rounding must not leave the ends at 0 and 1 outside.
+  return {successes == 0 ? 0.0 : centre - half_width,
+          successes == trials ? 1.0 : centre + half_width};
+}
+
+Interval mean_interval(std::span<const double> values) {
+  const auto n = static_cast<double>(values.size());
+  const double mean = std::accumulate(values.begin(), values.end(), 0.0) / n;
+  double squares = 0.0;
+  for (const double value : values) {
+    squares += (value - mean) * (value - mean);
+  }
+  const double half_width = z * std::sqrt(squares / (n - 1.0) / n);
+  return {mean - half_width, mean + half_width};
 }
 
 std::uint64_t resident_bytes() { return status_bytes("VmRSS:"); }

@@ -22,6 +22,18 @@ double median(std::span<const double> values);
 /// The smallest value that at least this fraction of the values does not exceed.
 double quantile(std::span<const double> values, double fraction);
 
+struct Interval {
+  double low = 0.0;
+  double high = 0.0;
+};
+/// The 95 % score interval of a probability of which `successes` of `trials` are known (Wilson
+/// 1927). Unlike the normal approximation's it is not empty where all or none succeed.
+/// trials > 0.
+Interval wilson_interval(int successes, int trials);
+/// The 95 % interval of the mean of what at least two values are drawn from, by the normal
+/// approximation.
+Interval mean_interval(std::span<const double> values);
+
 /// Resident memory of the process. The peak is since the last restart_peak_memory(), or since the
 /// process began where the kernel does not allow that.
 std::uint64_t resident_bytes();

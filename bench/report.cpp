@@ -30,8 +30,11 @@ std::string row(const std::string& name, const Measurement& m) {
     goal = fmt::format("{} {:.4g}", m.goal->kind == Goal::Kind::at_most ? "≤" : "≥", m.goal->value);
     reached = m.reached() ? "yes" : "no";
   }
+  const std::string unit =
+      m.interval ? fmt::format("{} ({:.4g} to {:.4g})", m.unit, m.interval->low, m.interval->high)
+                 : m.unit;
   return fmt::format("| {:<28} | {:<46} | {:>10.4g} {:<17} | {:<8} | {:<7} |", name, m.name,
-                     m.value, m.unit, goal, reached);
+                     m.value, unit, goal, reached);
 }
 
 }  // namespace
@@ -65,6 +68,10 @@ void Report::add(const Case& measured) {
     if (m.goal) {
       entry[m.goal->kind == Goal::Kind::at_most ? "at_most" : "at_least"] = m.goal->value;
       entry["reached"] = m.reached();
+    }
+    if (m.interval) {
+      entry["low"] = m.interval->low;
+      entry["high"] = m.interval->high;
     }
     record["measurements"].push_back(std::move(entry));
   }

@@ -6,6 +6,8 @@
 
 #include <nlohmann/json.hpp>
 
+#include "measurement.hpp"
+
 namespace palpate::bench {
 
 /// What a measured value is held against.
@@ -21,6 +23,7 @@ struct Measurement {
   double value = 0.0;
   std::string unit;
   std::optional<Goal> goal = {};
+  std::optional<Interval> interval = {};  ///< of the value, 95 %
 
   bool reached() const;
 };

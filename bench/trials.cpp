@@ -32,15 +32,21 @@ std::vector<std::size_t> random_order(std::size_t n, std::uint64_t seed) {
 }
 
 /// Touches of an object whose frame was the robot's, as a robot meets them at T_object_robot.
-Recording trial_of(const Recording& test_set, int touches, std::uint64_t seed) {
+Recording trial_of(const Recording& test_set, int touches, std::uint64_t seed,
+                   const SensorPoseNoise& noise) {
   const std::vector<std::size_t> order = random_order(test_set.size(), seed);
   const Pose T_object_robot = random_object_pose(seed);
+  Random random(seed, Stream::pose_noise);
   Recording trial;
   trial.elements_mm = test_set.elements_mm;
   trial.truth = {.object = test_set.object, .T_object_robot = T_object_robot};
   for (int i = 0; i < touches; ++i) {
     const Touch touch = test_set.touch(order[i]);
-    trial.T_robot_sensor.push_back(inverse(T_object_robot) * touch.T_robot_sensor);
+    const double dx_mm = noise.translation_mm * random.normal();
+    const double dy_mm = noise.translation_mm * random.normal();
+    const Pose T_sensor_reported{{dx_mm, dy_mm}, noise.rotation_rad * random.normal()};
+    trial.T_robot_sensor.push_back(inverse(T_object_robot) * touch.T_robot_sensor *
+                                   T_sensor_reported);
     trial.pressure.insert(trial.pressure.end(), touch.pressure.begin(), touch.pressure.end());
   }
   return trial;
@@ -59,7 +65,7 @@ LearnedLetters learn_letters(Device& device, const MapOptions& options) {
 }
 
 std::vector<Recording> make_trials(std::span<const std::string> shapes, int trials_each,
-                                   int touches, std::uint64_t seed) {
+                                   int touches, std::uint64_t seed, const SensorPoseNoise& noise) {
   const std::vector<Pose> poses = training_grid();
   if (touches < 1 || static_cast<std::size_t>(touches) > poses.size()) {
     throw Error(Fault::input, fmt::format("touches per trial = {}: give 1 to {}, which is what "
@@ -71,7 +77,7 @@ std::vector<Recording> make_trials(std::span<const std::string> shapes, int tria
     Simulator simulator(make_shape(shape), SensorModel{}, digitacts_array(), seed);
     const Recording test_set = simulator.touch(poses, Pose{});
     for (int i = 0; i < trials_each; ++i) {
-      trials.push_back(trial_of(test_set, touches, seed + i));
+      trials.push_back(trial_of(test_set, touches, seed + i, noise));
     }
     seed += seeds_per_shape;
   }

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "comparison.hpp"
 #include "none_run.hpp"
 
 namespace palpate::bench {
@@ -58,6 +59,59 @@ TEST(Calibration, ComparesConfidenceWithTheFractionRight) {
   EXPECT_DOUBLE_EQ(calibration.bins[3].lower, 0.9);
   EXPECT_EQ(calibration.bins[3].count, 3);
   EXPECT_NEAR(calibration.expected_error, (2 * 0.3 + 2 * 0.5 + 1 * 0.6 + 3 * 0.0) / 8.0, 1e-12);
+}
+
+TEST(Wilson, BracketsTheFractionAndIsNeverEmpty) {
+  // Newcombe 1998, table I: 81 of 263, 15 of 148, 0 of 20 and 1 of 29.
+  const auto expect = [](int successes, int trials, double low, double high) {
+    const Interval interval = wilson_interval(successes, trials);
+    EXPECT_NEAR(interval.low, low, 5e-5) << "to the four digits of the table";
+    EXPECT_NEAR(interval.high, high, 5e-5);
+  };
+  expect(81, 263, 0.2553, 0.3662);
+  expect(15, 148, 0.0624, 0.1605);
+  expect(0, 20, 0.0, 0.1611);
+  expect(1, 29, 0.0061, 0.1718);
+  EXPECT_EQ(wilson_interval(20, 20).high, 1.0);
+  EXPECT_EQ(curve_of(small_run())[1].accuracy_interval.low, wilson_interval(3, 4).low);
+}
+
+TEST(MeanInterval, IsTwoStandardErrorsEachWay) {
+  const Interval interval = mean_interval(std::vector{1.0, 2.0, 3.0, 6.0});
+  // Mean 3, deviation sqrt(14 / 3), over sqrt(4), times 1.959964.
+  EXPECT_NEAR(interval.low, 3.0 - 2.117, 1e-3);
+  EXPECT_NEAR(interval.high, 3.0 + 2.117, 1e-3);
+}
+
+TEST(Comparison, PairsTrialByTrial) {
+  FilterRun other = small_run();
+  other.scores[0][0].error_mm = 7.0;  // 3 mm behind where both locate
+  other.scores[1][0].error_mm = {};   // lost: 2 mm of the other do not count
+  other.scores[2][1].right = false;
+  const std::vector<PairedPoint> curve = compare(small_run(), other);
+  ASSERT_EQ(curve.size(), 2U);
+  EXPECT_EQ(curve[0].right_lead, 0);
+  EXPECT_EQ(curve[0].located_by_both, 1);
+  ASSERT_TRUE(curve[0].error_lead_mm);
+  EXPECT_DOUBLE_EQ(*curve[0].error_lead_mm, 3.0);
+  EXPECT_FALSE(curve[0].error_lead_interval) << "one difference says nothing of its spread";
+  EXPECT_EQ(curve[1].right_lead, 1);
+  EXPECT_EQ(curve[1].located_by_both, 3);
+  EXPECT_DOUBLE_EQ(*curve[1].error_lead_mm, 0.0);
+  other.scores[0][0].error_mm = {};
+  EXPECT_FALSE(compare(small_run(), other)[0].error_lead_mm);
+}
+
+TEST(Comparison, NamesRangesOfTouches) {
+  EXPECT_EQ(ranges_of({}), "");
+  EXPECT_EQ(ranges_of({3}), "3");
+  EXPECT_EQ(ranges_of({1, 2, 3, 8, 10, 11}), "1-3, 8, 10-11");
+}
+
+TEST(Comparison, TakesBalancedBinsForAsMany) {
+  EXPECT_TRUE(as_many(9'295, 10'000));
+  EXPECT_TRUE(as_many(10'000, 9'295));
+  EXPECT_FALSE(as_many(1'000, 10'000));
 }
 
 TEST(None, IsCalledAboveEachTrialsOwnWeight) {

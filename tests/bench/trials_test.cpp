@@ -78,6 +78,30 @@ TEST(Trials, OfOneShapeShareItsTestSet) {
   EXPECT_NE(first, std::multiset<double>(trials[2].pressure.begin(), trials[2].pressure.end()));
 }
 
+TEST(Trials, WithNoiseAreTheSameReadingsReportedElsewhere) {
+  const SensorPoseNoise noise{.translation_mm = 2.0, .rotation_rad = 0.1};
+  const std::vector<Recording> exact = make_trials(shapes, 4, 100, 7);
+  const std::vector<Recording> noisy = make_trials(shapes, 4, 100, 7, noise);
+  glm::dvec2 squares_mm2{0.0, 0.0};
+  double squares_rad2 = 0.0;
+  std::set<double> turns_rad;
+  for (std::size_t i = 0; i < exact.size(); ++i) {
+    EXPECT_EQ(exact[i].pressure, noisy[i].pressure);
+    EXPECT_EQ(exact[i].truth->T_object_robot.theta_rad, noisy[i].truth->T_object_robot.theta_rad);
+    for (std::size_t touch = 0; touch < exact[i].size(); ++touch) {
+      const Pose off = inverse(exact[i].T_robot_sensor[touch]) * noisy[i].T_robot_sensor[touch];
+      squares_mm2 += off.translation_mm * off.translation_mm;
+      squares_rad2 += off.theta_rad * off.theta_rad;
+      turns_rad.insert(off.theta_rad);
+    }
+  }
+  // Of 800 draws, a standard deviation is known to 2.5 % (one sigma).
+  EXPECT_EQ(turns_rad.size(), 800U);
+  EXPECT_NEAR(std::sqrt(squares_mm2.x / 800.0), noise.translation_mm, 0.2);
+  EXPECT_NEAR(std::sqrt(squares_mm2.y / 800.0), noise.translation_mm, 0.2);
+  EXPECT_NEAR(std::sqrt(squares_rad2 / 800.0), noise.rotation_rad, 0.01);
+}
+
 TEST(Trials, RefuseMoreTouchesThanThereAreToDraw) {
   EXPECT_THROW(make_trials(shapes, 1, 193, 7), Error);
   EXPECT_THROW(make_trials(shapes, 1, 0, 7), Error);
