@@ -11,6 +11,7 @@
 #include <glm/matrix.hpp>
 
 #include "quadratic_peak.hpp"
+#include "tempering.hpp"
 
 namespace palpate {
 
@@ -21,15 +22,18 @@ namespace {
 // 0.20, 0.17, 0.17 and 0.17. Radii of 2 and 3 mm give the same within 0.01 mm, 4 mm gives 0.19.
 // On 50 others, whose modes err by 0.39 mm, they leave 0.22 mm. The covariance is safe for touches
 // at exact poses: the peak's error squared over it is about 1 in the mean, where 3 would be exact.
-constexpr double temper = 8.0;
+// A fixed root leaves one of the coarse bins alone after many touches: on 13 x 13 x 55 bins and 60
+// others, poses of 15, 25 and 50 touches then err by 0.39, 0.35 and 0.37 mm; by 0.37, 0.30 and 0.25
+// with tempering_root().
+constexpr double least_root = 8.0;
 constexpr double radius_mm = 2.5;
 // One pass leaves 0.19 mm, two 0.18; a fourth moves nothing.
 constexpr int passes = 3;
 // Over 400 other unknowns, touched where the maps were and anywhere, the peak errs by 0.149 and
 // 0.168 mm, the mean by 0.159 and 0.182; on 14 x 14 x 53 bins, by 0.26 and 0.40. Reaches of 1 and
-// 1.3 mm and the root 48 give the same within 0.02 mm. Peaks further away than a bin or two are of
-// quadratics that do not fit.
-constexpr double peak_temper = 24.0;
+// 1.3 mm and twice the root give the same within 0.02 mm. Peaks further away than a bin or two are
+// of quadratics that do not fit.
+constexpr double peak_root_factor = 3.0;  ///< to the mean's root, 24 in the place of 8
 constexpr double peak_reach_mm = 0.8;
 constexpr double farthest_peak_mm = 1.0;
 // Nats per mm^2. The logs' rounding, 1e-3 nats after a thousand touches, bends them by as much.
@@ -42,9 +46,10 @@ struct BinIndex {
 };
 
 /// A bin of the window: its place relative to the centre bin, in (x_mm, y_mm, theta_rad) of the
-/// lattice, and its log-likelihood.
+/// lattice, how far it moves the body, its turn in mm too, and its log-likelihood.
 struct Sample {
   glm::dvec3 offset;
+  glm::dvec3 moved_mm;
   double log_likelihood = 0.0;
   bool within_radius = false;  ///< or else a neighbour only
 };
@@ -84,14 +89,15 @@ class Refinement {
                     .theta = static_cast<int>(bin / lattice_.plane())};
     for (int pass = 1;; ++pass) {
       const std::vector<Sample> samples = sample(centre);
-      glm::dvec3 mean = tempered_mean(samples);
+      const double root = root_of(samples);
+      glm::dvec3 mean = tempered_mean(samples, root);
       const BinIndex nearest = moved(centre, mean);
       if (pass < passes &&
           (nearest.x != centre.x || nearest.y != centre.y || nearest.theta != centre.theta)) {
         centre = nearest;
         continue;
       }
-      mean = peak_near(samples, centre, mean).value_or(mean);
+      mean = peak_near(samples, centre, mean, root).value_or(mean);
       glm::dvec3 place = place_of(centre) + mean;
       if (lattice_.full_circle()) {
         const Axis& theta = lattice_.theta_rad;
@@ -141,13 +147,12 @@ class Refinement {
         for (int i = x.first; i < x.first + x.count; ++i, ++k) {
           const glm::dvec2 shift_mm((i - centre.x) * lattice_.x_mm.step(),
                                     (j - centre.y) * lattice_.y_mm.step());
-          const glm::dvec2 moved_mm = shift_mm + swing_mm;
+          const glm::dvec3 moved_mm(shift_mm + swing_mm, std::sqrt(inertia_mm2) * dtheta);
           const bool neighbour = std::abs(i - centre.x) <= 1 && std::abs(j - centre.y) <= 1 &&
                                  std::abs(t - centre.theta) <= 1;
-          const bool within =
-              glm::dot(moved_mm, moved_mm) + inertia_mm2 * dtheta * dtheta <= radius_mm * radius_mm;
+          const bool within = glm::dot(moved_mm, moved_mm) <= radius_mm * radius_mm;
           if (neighbour || within) {
-            samples.push_back({{shift_mm, dtheta}, logs[k], within});
+            samples.push_back({{shift_mm, dtheta}, moved_mm, logs[k], within});
           }
         }
       }
@@ -162,12 +167,22 @@ class Refinement {
         ->log_likelihood;
   }
 
-  static glm::dvec3 tempered_mean(const std::vector<Sample>& samples) {
+  static double root_of(const std::vector<Sample>& samples) {
+    std::vector<DisplacedBin> bins;
+    for (const Sample& sample : samples) {
+      if (sample.within_radius) {
+        bins.push_back({sample.moved_mm, sample.log_likelihood});
+      }
+    }
+    return tempering_root(bins, least_root);
+  }
+
+  static glm::dvec3 tempered_mean(const std::vector<Sample>& samples, double root) {
     const double top = largest(samples);
     glm::dvec3 sum{0.0};
     double total = 0.0;
     for (const Sample& sample : samples) {
-      const double weight = std::exp((sample.log_likelihood - top) / temper);
+      const double weight = std::exp((sample.log_likelihood - top) / root);
       sum += weight * sample.offset;
       total += weight;
     }
@@ -177,7 +192,7 @@ class Refinement {
   /// The peak of the logs near the mean, relative to the centre bin as the mean is: of a quadratic
   /// in how far the body moves. None where there is none, or beyond the region.
   std::optional<glm::dvec3> peak_near(const std::vector<Sample>& samples, const BinIndex& centre,
-                                      const glm::dvec3& mean) const {
+                                      const glm::dvec3& mean, double root) const {
     const double top = largest(samples);
     const double spin_mm = std::sqrt(std::max(body_.inertia_mm2, 1e-12));
     const glm::dvec3 place = place_of(centre) + mean;
@@ -193,7 +208,7 @@ class Refinement {
       farthest_rad = std::max(farthest_rad, std::abs(d.z));
       const glm::dvec3 moved_mm(glm::dvec2(d) + swing_mm(d.z), spin_mm * d.z);
       const double log_weight =
-          (sample.log_likelihood - top) / peak_temper -
+          (sample.log_likelihood - top) / (peak_root_factor * root) -
           glm::dot(moved_mm, moved_mm) / (2.0 * peak_reach_mm * peak_reach_mm);
       values.push_back({moved_mm, sample.log_likelihood - top, std::exp(log_weight)});
     }

@@ -59,9 +59,53 @@ struct Moved {
   double log;
 };
 
+/// How far bins weighted by a root of the belief spread about their mean; by none, for a root of 0.
+double plain_spread_mm(const std::vector<Moved>& window, double root) {
+  double top = -1e300;
+  for (const Moved& bin : window) {
+    top = std::max(top, bin.log);
+  }
+  const auto weight = [&](const Moved& bin) {
+    return root > 0.0 ? std::exp((bin.log - top) / root) : 1.0;
+  };
+  double total = 0.0;
+  double mean[3] = {};
+  for (const Moved& bin : window) {
+    total += weight(bin);
+    for (int a = 0; a < 3; ++a) {
+      mean[a] += weight(bin) * bin.mm[a];
+    }
+  }
+  double variance = 0.0;
+  for (const Moved& bin : window) {
+    for (int a = 0; a < 3; ++a) {
+      const double from_mean = bin.mm[a] - mean[a] / total;
+      variance += weight(bin) / total * from_mean * from_mean;
+    }
+  }
+  return std::sqrt(variance);
+}
+
+/// The eighth root, or the one under which bins spread by a third of their own spread, between
+/// doublings by the spread.
+double plain_root(const std::vector<Moved>& window) {
+  const double wanted = plain_spread_mm(window, 0.0) / 3.0;
+  double root = 8.0;
+  if (plain_spread_mm(window, root) >= wanted) {
+    return root;
+  }
+  while (plain_spread_mm(window, 2.0 * root) < wanted) {
+    root *= 2.0;
+  }
+  const double narrow = plain_spread_mm(window, root);
+  const double wide = plain_spread_mm(window, 2.0 * root);
+  return root * std::pow(2.0, (wanted - narrow) / (wide - narrow));
+}
+
 /// The peak of a quadratic over the axes that vary, by elimination with pivots; the mean where
 /// there is none. Both relative to the mean.
-std::array<double, 3> plain_peak(const std::vector<Moved>& window, const bool (&varies)[3]) {
+std::array<double, 3> plain_peak(const std::vector<Moved>& window, double root,
+                                 const bool (&varies)[3]) {
   std::vector<int> axes;
   for (int a = 0; a < 3; ++a) {
     if (varies[a]) {
@@ -94,7 +138,7 @@ std::array<double, 3> plain_peak(const std::vector<Moved>& window, const bool (&
       }
     }
     terms.push_back(bin.log - top);
-    const double weight = std::exp((bin.log - top) / 24.0 - square / (2.0 * 0.8 * 0.8));
+    const double weight = std::exp((bin.log - top) / root - square / (2.0 * 0.8 * 0.8));
     for (int i = 0; i < n; ++i) {
       for (int k = 0; k <= n; ++k) {
         rows[i][k] += weight * terms[i] * terms[k];
@@ -171,6 +215,7 @@ RefinedPose plain_refinement(const std::vector<double>& logs, const PoseLattice&
     std::int64_t bin;
   };
   std::vector<Inside> window;
+  double root = 0.0;
   double offset[3] = {};
   double place[3] = {};  // of the centre
   for (int pass = 0; pass < 3; ++pass) {
@@ -181,6 +226,7 @@ RefinedPose plain_refinement(const std::vector<double>& logs, const PoseLattice&
     const glm::dvec2 from = body.centroid_mm - T.translation_mm;
     const glm::dvec2 centroid_robot(c * from.x + s * from.y, -s * from.x + c * from.y);
     window.clear();
+    std::vector<Moved> displaced;
     double top = -1e300;
     for (std::int64_t k = 0; k < lattice.bins(); ++k) {
       const int steps[] = {static_cast<int>(k % nx) - centre[0],
@@ -198,13 +244,17 @@ RefinedPose plain_refinement(const std::vector<double>& logs, const PoseLattice&
         window.push_back({{steps[0] * step[0], steps[1] * step[1], turn}, logs[k], within, k});
         top = std::max(top, logs[k]);
       }
+      if (within) {
+        displaced.push_back({{moved.x, moved.y, std::sqrt(body.inertia_mm2) * turn}, logs[k]});
+      }
     }
+    root = plain_root(displaced);
     double tempered = 0.0;
     double sum[3] = {};
     for (const Inside& in : window) {
-      tempered += std::exp((in.log - top) / 8.0);
+      tempered += std::exp((in.log - top) / root);
       for (int a = 0; a < 3; ++a) {
-        sum[a] += std::exp((in.log - top) / 8.0) * in.d[a];
+        sum[a] += std::exp((in.log - top) / root) * in.d[a];
       }
     }
     for (int a = 0; a < 3; ++a) {
@@ -240,7 +290,7 @@ RefinedPose plain_refinement(const std::vector<double>& logs, const PoseLattice&
       moved_bins.push_back({{by.x, by.y, spin_mm * (in.d[2] - offset[2])}, in.log});
     }
   }
-  const auto peak = plain_peak(moved_bins, {nx > 1, ny > 1, nt > 1});
+  const auto peak = plain_peak(moved_bins, 3.0 * root, {nx > 1, ny > 1, nt > 1});
   // The place at which the object has moved by that much.
   const double turn = peak[2] / spin_mm;
   const glm::dvec2 lever =
