@@ -34,21 +34,75 @@ std::vector<Recording> trials_of(int each) {
   return make_trials(vowels, each, touches_per_trial, trial_seed);
 }
 
-std::string mean_mm(const SweepPoint& point, PoseKind kind) {
-  const std::optional<ErrorsOverTrials> errors = errors_over(point.errors, kind);
-  return errors ? fmt::format("{:.3f}", errors->mean_mm) : std::string("-");
+// What is printed is Markdown.
+
+void print_heads(const std::vector<std::string>& heads) {
+  fmt::print("\n| {} |\n|:--|", fmt::join(heads, " | "));
+  for (std::size_t i = 1; i < heads.size(); ++i) {
+    fmt::print("--:|");
+  }
+  fmt::print("\n");
+}
+
+void print_row(const std::vector<std::string>& cells) {
+  fmt::print("| {} |\n", fmt::join(cells, " | "));
+  std::fflush(stdout);
+}
+
+std::string text_of(const std::optional<double>& value) {
+  return value ? fmt::format("{:.3f}", *value) : std::string("–");
 }
 
 void print(const SweepPoint& point) {
-  fmt::print(
-      "{:<10} {:>5} {:>9} {:>6} {:>4} {:>10} {:>10} {:>8.1f} {:>6.1f} {:>8} {:>8} {:>8.3f} "
-      "{:>9.1e}\n",
-      point.filter, point.cell_mm, count_text(static_cast<double>(point.count)),
-      point.errors.size(), point.full_trials, seconds_text(point.seconds_touch),
-      seconds_text(point.seconds_unknown), static_cast<double>(point.device_bytes) / (1 << 20),
-      100.0 * point.accuracy, mean_mm(point, PoseKind::mode), mean_mm(point, PoseKind::refined),
-      point.calibration_error, point.deviation.largest);
-  std::fflush(stdout);
+  const auto mode = errors_over(point.errors, PoseKind::mode);
+  const auto refined = errors_over(point.errors, PoseKind::refined);
+  print_row({point.filter == "histogram"
+                 ? fmt::format("histogram {}x{}x{}", point.bins[0], point.bins[1], point.bins[2])
+                 : point.filter,
+             fmt::format("{}", point.cell_mm), count_text(static_cast<double>(point.count)),
+             fmt::format("{}", point.full_trials), seconds_text(point.seconds_touch),
+             seconds_text(point.seconds_unknown),
+             point.seconds_refine ? seconds_text(*point.seconds_refine) : "–",
+             fmt::format("{:.1f}", static_cast<double>(point.device_bytes) / (1 << 20)),
+             fmt::format("{:.0f}", 100.0 * point.accuracy),
+             fmt::format("{:.3f}", point.calibration_error),
+             fmt::format("{} of {}", mode ? mode->trials : 0, point.errors.size()), mean_text(mode),
+             text_of(mode ? mode->p95_mm : std::nullopt), mean_text(refined),
+             text_of(refined ? refined->p95_mm : std::nullopt), text_of(point.nearest_bin_mm),
+             fmt::format("{:.1e}", point.deviation.largest),
+             fmt::format("{:.1e}", point.deviation.rms)});
+}
+
+void print(const SweepResult& result) {
+  print_heads({"way", "bins", "ns per pose, element and touch", "largest", "RMS"});
+  for (const Precision& precision : result.precisions) {
+    print_row({precision.path, count_text(static_cast<double>(precision.count)),
+               fmt::format("{:.2f}", precision.nanoseconds),
+               fmt::format("{:.1e}", precision.deviation.largest),
+               fmt::format("{:.1e}", precision.deviation.rms)});
+  }
+  print_heads({"otherwise", "elements", "bins", "mode, mm", "refined, mm", "against",
+               "mode: difference", "refined: difference", "beyond"});
+  for (const Limit& limit : result.limits) {
+    print_row({limit.name, fmt::format("{}", limit.elements),
+               count_text(static_cast<double>(limit.count)),
+               mean_text(errors_over(limit.errors, PoseKind::mode)),
+               mean_text(errors_over(limit.errors, PoseKind::refined)), against_text(result, limit),
+               gain_text(result, limit, PoseKind::mode),
+               gain_text(result, limit, PoseKind::refined), fmt::format("{}", limit.beyond)});
+  }
+  fmt::print("\n");
+  for (const CellFinding& finding : result.findings) {
+    fmt::print("- {}\n", finding.sentence);
+  }
+  fmt::print("\n{}\n", window_sentence(result));
+  if (!result.verdicts.empty()) {
+    print_heads({"goal", "mm", "", "reached"});
+  }
+  for (const Measurement& verdict : result.verdicts) {
+    print_row({verdict.name, fmt::format("{:.3f}", verdict.value),
+               fmt::format("≤ {}", verdict.goal->value), verdict.reached() ? "yes" : "no"});
+  }
 }
 
 /// Each of the particle filters at each of the counts.
@@ -114,14 +168,15 @@ SweepResult measure(Device& device, const SweepOptions& options) {
   const SweepPlan plan = plan_of(options);
   SweepResult result{.trials = plan.trials_each * static_cast<int>(vowels.size()),
                      .touches = touches_per_trial};
-  fmt::print("{:<10} {:>5} {:>9} {:>6} {:>4} {:>10} {:>10} {:>8} {:>6} {:>8} {:>8} {:>8} {:>9}\n",
-             "filter", "cells", "count", "trials", "full", "a touch", "unknown", "MiB", "right",
-             "mode mm", "refined", "calibr.", "deviation");
+  print_heads({"filter", "cells, mm", "count", "in full", "per touch", "per unknown",
+               "refined pose", "MiB", "right, %", "calibration error", "located", "mode: mean, mm",
+               "95 %", "refined: mean, mm", "95 %", "nearest bin, mm", "deviation, nats: largest",
+               "RMS"});
   for (const CellPlan& cells : plan.cells) {
     sweep_cells(device, plan, cells, result);
   }
   result.limits = measure_limits(device, {.lattices = plan.limits,
-                                          .trials_each = plan.trials_each,
+                                          .trials_each = plan.limit_trials_each,
                                           .touches = touches_per_trial,
                                           .seed = trial_seed,
                                           .quick = options.quick});
@@ -171,32 +226,7 @@ void run_sweep(const SweepOptions& options, std::span<char* const> command_line)
   const double seconds = seconds_of([&] { result = measure(device, options); });
   facts["seconds in all"] = std::round(10.0 * seconds) / 10.0;
 
-  fmt::print("\n");
-  for (const Precision& precision : result.precisions) {
-    fmt::print(
-        "{:>9} poses: {:8.3f} ns per pose, element and touch, largest deviation {:.1e} nats, by "
-        "{}\n",
-        count_text(static_cast<double>(precision.count)), precision.nanoseconds,
-        precision.deviation.largest, precision.path);
-  }
-  for (const CellFinding& finding : result.findings) {
-    fmt::print("{}\n", finding.sentence);
-  }
-  fmt::print("{}\n", window_sentence(result));
-  for (const Limit& limit : result.limits) {
-    fmt::print(
-        "{}, {} elements, {} bins: {} mm by the mode, {} refined; {} and {} to {}; {} beyond "
-        "the windows\n",
-        limit.name, limit.elements, count_text(static_cast<double>(limit.count)),
-        mean_text(errors_over(limit.errors, PoseKind::mode)),
-        mean_text(errors_over(limit.errors, PoseKind::refined)),
-        gain_text(result, limit, PoseKind::mode), gain_text(result, limit, PoseKind::refined),
-        against_text(result, limit), limit.beyond);
-  }
-  for (const Measurement& verdict : result.verdicts) {
-    fmt::print("{}: {:.3f} {}, at most {}: {}\n", verdict.name, verdict.value, verdict.unit,
-               verdict.goal->value, verdict.reached() ? "reached" : "not reached");
-  }
+  print(result);
   if (json) {
     nlohmann::ordered_json document = facts;
     document.update(document_of(result));

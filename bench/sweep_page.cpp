@@ -236,7 +236,7 @@ std::string page_of(const SweepResult& result, const nlohmann::ordered_json& fac
   text += fmt::format(
       "<h2>What bounds the error</h2>\n<p class=\"note\">One thing otherwise at a time, {} trials "
       "in windows; differences are paired by trial, above 0 where it errs more.</p>\n",
-      result.trials);
+      result.limits.front().errors.size());
   text += limit_table(result);
   text += "<h2>All runs</h2>\n<p class=\"note\">Click on a head to sort.</p>\n" + run_table(result);
   text += fmt::format(

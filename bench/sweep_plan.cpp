@@ -41,7 +41,7 @@ std::vector<CellPlan> quick_cells() {
 std::vector<CellPlan> full_cells() {
   const auto alone = [](double cell_mm) {
     return CellPlan{.cell_mm = cell_mm,
-                    .lattices = scaled({1e2, 1e3, 1e4, 1e5, 1e6, 3e6, 1e7}),
+                    .lattices = scaled({1e2, 1e3, 1e4, 1e5, 1e6, 1e7}),
                     .particles = {},
                     .compared = {}};
   };
@@ -83,6 +83,7 @@ SweepPlan plan_of(const SweepOptions& options) {
                  .most_twice = options.quick ? 50'000 : 1'200'000,
                  .cells = options.quick ? quick_cells() : full_cells(),
                  .limits = {goal_bins}};
+  plan.limit_trials_each = options.quick ? std::min(plan.trials_each, 2) : plan.trials_each;
   if (!options.quick) {
     plan.limits.insert(plan.limits.end(), {scaled(3e5), scaled(3e6)});
   }

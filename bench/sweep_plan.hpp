@@ -34,7 +34,8 @@ struct SweepPlan {
   std::int64_t most_full = 0;
   std::int64_t most_twice = 0;
   std::vector<CellPlan> cells;
-  std::vector<BinCounts> limits;  ///< lattices of the limits
+  std::vector<BinCounts> limits;  ///< their lattices
+  int limit_trials_each = 0;
 
   /// Trials of every letter with the full posterior, at most trials_each.
   int full_each(double cell_mm, const BinCounts& bins) const;

@@ -48,7 +48,7 @@ std::string seconds_text(double seconds) {
 }
 
 std::string mean_text(const std::optional<ErrorsOverTrials>& errors) {
-  return errors ? fmt::format("{:.3f} ± {:.3f}", errors->mean_mm, errors->standard_error_mm) : "-";
+  return errors ? fmt::format("{:.3f} ± {:.3f}", errors->mean_mm, errors->standard_error_mm) : "–";
 }
 
 std::string knee_sentence(const CellFinding& finding, const std::vector<SweepPoint>& runs) {
@@ -114,7 +114,7 @@ std::string window_sentence(const SweepResult& result) {
 
 std::string gain_text(const SweepResult& result, const Limit& limit, PoseKind kind) {
   if (!limit.against) {
-    return "-";
+    return "–";
   }
   const PairedErrors paired =
       paired_errors(result.limits[*limit.against].errors, limit.errors, kind);
@@ -124,7 +124,7 @@ std::string gain_text(const SweepResult& result, const Limit& limit, PoseKind ki
 
 std::string against_text(const SweepResult& result, const Limit& limit) {
   if (!limit.against) {
-    return "-";
+    return "–";
   }
   const Limit& other = result.limits[*limit.against];
   return other.name == limit.name ? bins_text(other.count) + " bins" : other.name;
