@@ -233,7 +233,7 @@ std::vector<NamedChart> charts_of(const SweepResult& result) {
                 "marks: maps of 0.5 mm cells; half filled: 0.25 mm; hollow: 1 mm. A refined pose "
                 "is drawn at the time of all estimates and one refinement after the last. Errors "
                 "are over the trials whose mode has the right object; the front is of runs that "
-                "recognise and locate all {} trials.",
+                "recognise and locate all {} trials, and runs of fewer stay out of it.",
                 result.trials)),
       named("precision", precision_chart(result),
             fmt::format(

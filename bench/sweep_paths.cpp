@@ -62,9 +62,9 @@ std::vector<Precision> compare_paths(Device& device, const LearnedLetters& learn
   PoseHistogram at_rest(device, learned.objects, {.lattice = lattice, .still_array = true});
   OneBinKernel one_bin(device, learned.objects, lattice, product);
   CpuLoop cpu_loop(learned.objects, lattice, product);
-  const auto way = [](std::string path, const ContactLikelihood& model,
+  const auto way = [](const std::string& path, const ContactLikelihood& model,
                       const std::vector<Touch>& touches, auto& engine) {
-    return Way{.path = std::move(path),
+    return Way{.path = path,
                .model = model,
                .touches = touches,
                .update = [&engine](std::span<const Touch> some) { engine.update(some); },
