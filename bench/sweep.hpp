@@ -8,13 +8,15 @@
 namespace palpate::bench {
 
 struct SweepOptions {
-  std::string device;                    ///< a device's name or index; empty for the best
-  std::string json;                      ///< file to write; empty for none
-  std::string html;                      ///< page to write; empty for none
-  std::string plots;                     ///< folder to write the page's charts to; empty for none
-  std::optional<std::int64_t> max_bins;  ///< per object; by default 10,000,000, or 100,000 if quick
-  std::optional<int> trials;             ///< most per letter; by default 10, or 4 if quick
-  bool quick = false;                    ///< few counts and trials, in less than a minute
+  std::string device;  ///< a device's name or index; empty for the best
+  std::string json;    ///< file to write; empty for none
+  std::string html;    ///< page to write; empty for none
+  std::string plots;   ///< folder to write the page's charts to; empty for none
+  /// Per object of the runs; by default 10,000,000, or 100,000 if quick. What bounds the error is
+  /// measured in windows of lattices of its own.
+  std::optional<std::int64_t> max_bins;
+  std::optional<int> trials;  ///< most per letter; by default 10, or 4 if quick
+  bool quick = false;         ///< few counts and trials, in less than a minute
 };
 
 /// Speed against error on simulated letters: every filter at counts from 100 to 10,000,000 bins per

@@ -23,7 +23,7 @@ struct Limit {
 };
 
 struct LimitPlan {
-  std::vector<BinCounts> lattices;  ///< the first of every variant, all of other arrays
+  std::vector<BinCounts> lattices;  ///< the first for every variant, all for arrays
   int trials_each = 0;
   int touches = 0;
   std::uint64_t seed = 0;  ///< of the trials
@@ -31,7 +31,8 @@ struct LimitPlan {
 };
 
 /// Where the errors that no bin mends come from: the variants one by one, each against the first,
-/// which is as everywhere else; arrays of other elements on all lattices, each against its first.
+/// which is as everywhere else; the arrays, that one's included, on all lattices, each against its
+/// first.
 std::vector<Limit> measure_limits(Device& device, const LimitPlan& plan);
 
 }  // namespace palpate::bench

@@ -9,7 +9,14 @@ namespace palpate {
 
 /// What random numbers are for. Uses that share a seed draw from different streams, or the first
 /// random touch of an unknown would repeat the numbers of its pose.
-enum class Stream : std::uint32_t { sensor, touch_poses, object_pose, touch_order, frames, displacement };
+enum class Stream : std::uint32_t {
+  sensor,
+  touch_poses,
+  object_pose,
+  touch_order,
+  frames,
+  displacement
+};
 
 /// Random numbers that are the same on every standard library: the engine and std::seed_seq are
 /// specified to the bit, the standard's distributions are not.
