@@ -27,7 +27,11 @@ std::vector<std::size_t> pareto_front(std::span<const CostAndError> entries) {
 std::optional<std::size_t> knee_of(std::span<const std::vector<TrialErrors>> runs, PoseKind kind) {
   for (std::size_t i = 0; i + 1 < runs.size(); ++i) {
     const auto finer = runs.subspan(i + 1);
+    const bool all_located = std::all_of(runs[i].begin(), runs[i].end(), [&](const auto& trial) {
+      return trial.of(kind).has_value();
+    });
     const bool suffices =
+        all_located &&
         std::all_of(finer.begin(), finer.end(), [&](const std::vector<TrialErrors>& run) {
           const PairedErrors paired = paired_errors(runs[i], run, kind);
           return paired.trials > 0 && !paired.gain();

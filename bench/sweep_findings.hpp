@@ -18,9 +18,9 @@ struct CostAndError {
 /// by rising cost. Of equal entries the first one.
 std::vector<std::size_t> pareto_front(std::span<const CostAndError> entries);
 
-/// Where more bins stop helping: the first run, by rising count, over which no finer one has a
-/// gain(). None where that would be the last one, for want of a finer one to compare with, or
-/// where a run has no errors.
+/// Where more bins stop helping: the first run, by rising count, that locates every trial and over
+/// which no finer one has a gain(). None where that would be the last one, for want of a finer one
+/// to compare with, or where a run has no errors.
 std::optional<std::size_t> knee_of(std::span<const std::vector<TrialErrors>> runs, PoseKind kind);
 
 }  // namespace palpate::bench

@@ -229,7 +229,8 @@ std::string page_of(const SweepResult& result, const nlohmann::ordered_json& fac
     text += fmt::format("<li>{}</li>\n", xml_escaped(finding.sentence));
   }
   text += fmt::format(
-      "</ul>\n<p class=\"note\">Bins suffice where no finer lattice lowers the mean error by more "
+      "</ul>\n<p class=\"note\">Bins suffice where all trials are located and no finer lattice "
+      "lowers the mean error by more "
       "than {:.0f} % and by more than two standard errors of the paired differences. ± is a "
       "standard error.</p>\n",
       100.0 * least_gain);

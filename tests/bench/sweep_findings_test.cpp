@@ -69,6 +69,9 @@ TEST(Knee, IsTheFirstRunThatNoFinerOneGainsOver) {
       << "the last run has no finer one";
   EXPECT_EQ(knee_of(runs, PoseKind::refined), std::nullopt) << "no refined poses";
   EXPECT_EQ(knee_of({}, PoseKind::mode), std::nullopt);
+  const std::vector<std::vector<TrialErrors>> missing = {run_of({1.0, -1.0}), run_of({1.0, 1.0}),
+                                                         run_of({1.0, 1.0})};
+  EXPECT_EQ(knee_of(missing, PoseKind::mode), 1U) << "bins that miss a trial do not suffice";
 }
 
 std::size_t count_of(const std::string& text, const std::string& part) {
