@@ -4,25 +4,27 @@
 
 #include <fmt/format.h>
 
+#include "cases.hpp"
 #include "letters.hpp"
 #include "reference.hpp"
 
 namespace palpate::bench {
 
 ErrorStatistics likelihood_errors(
-    const Inputs& inputs, const PoseLattice& lattice, std::span<const Touch> touches,
-    int bins_per_object, const std::function<std::vector<double>(int object)>& log_likelihood) {
+    std::span<const Hypothesis> objects, const ContactLikelihood& model, const PoseLattice& lattice,
+    std::span<const Touch> touches, int bins_per_object,
+    const std::function<std::vector<double>(int object)>& log_likelihood) {
   std::mt19937_64 random(7);
   ErrorStatistics errors;
-  for (int object = 0; object < static_cast<int>(inputs.letters.size()); ++object) {
+  for (int object = 0; object < static_cast<int>(objects.size()); ++object) {
     const std::vector<double> measured = log_likelihood(object);
     for (int sample = 0; sample < bins_per_object; ++sample) {
       const std::size_t bin = random() % measured.size();
       const Pose T_object_robot = reference::bin_pose(lattice, static_cast<std::int64_t>(bin));
       double expected = 0.0;
       for (const Touch& touch : touches) {
-        expected += reference::log_likelihood(touch, T_object_robot, inputs.letters[object].map,
-                                              ContactClassifier{}, inputs.model);
+        expected += reference::log_likelihood(touch, T_object_robot, objects[object].map,
+                                              ContactClassifier{}, model);
       }
       errors.add(measured[bin] - expected);
     }
@@ -49,9 +51,9 @@ Case accuracy_case(const Inputs& inputs, const PoseLattice& lattice) {
     for (; done < touches; ++done) {
       histogram.update(recording.touch(done));
     }
-    const ErrorStatistics errors =
-        likelihood_errors(inputs, lattice, recording.touches(0, touches), bins_per_object,
-                          [&](int object) { return histogram.log_likelihood(object); });
+    const ErrorStatistics errors = likelihood_errors(
+        inputs.letters, inputs.model, lattice, recording.touches(0, touches), bins_per_object,
+        [&](int object) { return histogram.log_likelihood(object); });
     result.measurements.push_back({fmt::format("largest error at touch {}", touches),
                                    errors.largest(), "nats", at_most(goal)});
     result.measurements.push_back(

@@ -4,15 +4,19 @@
 #include <span>
 #include <vector>
 
-#include "cases.hpp"
 #include "measurement.hpp"
+#include "palpate/estimate.hpp"
+#include "palpate/lattice.hpp"
+#include "palpate/sensor_model.hpp"
+#include "palpate/touch.hpp"
 
 namespace palpate::bench {
 
-/// Difference in nats between the log-likelihoods of some bins of every letter, drawn with a fixed
+/// Difference in nats between the log-likelihoods of some bins of every object, drawn with a fixed
 /// seed, and the float64 reference of the touches. `log_likelihood` gives all bins of an object.
 ErrorStatistics likelihood_errors(
-    const Inputs& inputs, const PoseLattice& lattice, std::span<const Touch> touches,
-    int bins_per_object, const std::function<std::vector<double>(int object)>& log_likelihood);
+    std::span<const Hypothesis> objects, const ContactLikelihood& model, const PoseLattice& lattice,
+    std::span<const Touch> touches, int bins_per_object,
+    const std::function<std::vector<double>(int object)>& log_likelihood);
 
 }  // namespace palpate::bench

@@ -55,8 +55,8 @@ std::vector<PoseNoiseRuns> measure_pose_noise(Device& device, const LearnedLette
   constexpr int most_touches = 20;
   std::vector<PoseNoiseRuns> levels;
   for (const SensorPoseNoise& noise : {SensorPoseNoise{1.0, 0.05}, SensorPoseNoise{2.0, 0.1}}) {
-    const std::vector<Recording> trials =
-        make_trials(vowels, trials_each, std::min(touches, most_touches), learned_seed, noise);
+    const std::vector<Recording> trials = make_trials(
+        vowels, trials_each, std::min(touches, most_touches), learned_seed, {.pose_noise = noise});
     PoseNoiseRuns& level = levels.emplace_back();
     level.noise = noise;
     const std::array lattices = table_1();

@@ -9,17 +9,18 @@ namespace {
 
 constexpr const char* names[] = {"A", "E", "I", "O", "U"};
 
-Simulator simulator_of(const char* name, std::uint64_t seed) {
-  return {make_shape(name), SensorModel{}, digitacts_array(), seed};
+Simulator simulator_of(const char* name, const TouchingSensor& sensor, std::uint64_t seed) {
+  return {make_shape(name), sensor.model, sensor.elements_mm, seed};
 }
 
 }  // namespace
 
-std::vector<Recording> training_recordings() {
+std::vector<Recording> training_recordings(const TouchingSensor& sensor,
+                                           const std::vector<Pose>& poses) {
   std::vector<Recording> recordings;
   std::uint64_t seed = 1;
   for (const char* name : names) {
-    recordings.push_back(simulator_of(name, seed++).touch(training_grid(), Pose{}));
+    recordings.push_back(simulator_of(name, sensor, seed++).touch(poses, Pose{}));
   }
   return recordings;
 }
@@ -45,7 +46,7 @@ std::vector<Hypothesis> letter_maps(Device& device, const std::vector<Recording>
 std::vector<Recording> unknown_recordings(int count, int touches, std::uint64_t seed) {
   std::vector<Simulator> simulators;
   for (const char* name : names) {
-    simulators.push_back(simulator_of(name, ++seed));
+    simulators.push_back(simulator_of(name, {}, ++seed));
   }
   std::vector<Recording> recordings;
   for (int i = 0; i < count; ++i) {

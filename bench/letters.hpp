@@ -12,8 +12,15 @@ namespace palpate::bench {
 
 inline constexpr int touches_per_unknown = 9;  // after which the paper knows every letter
 
-/// The letters A, E, I, O and U, touched 192 times each at known poses, with fixed seeds.
-std::vector<Recording> training_recordings();
+/// What letters are touched with.
+struct TouchingSensor {
+  SensorModel model = {};
+  std::vector<glm::dvec2> elements_mm = digitacts_array();
+};
+
+/// The letters A, E, I, O and U, touched at known poses T_object_sensor, with fixed seeds.
+std::vector<Recording> training_recordings(const TouchingSensor& sensor = {},
+                                           const std::vector<Pose>& poses = training_grid());
 
 /// Maps of the letters, which share the prior that their training touches give.
 std::vector<Hypothesis> letter_maps(Device& device, const std::vector<Recording>& training,

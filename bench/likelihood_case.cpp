@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 
 #include "accuracy.hpp"
+#include "cases.hpp"
 #include "cpu_loop.hpp"
 #include "letters.hpp"
 #include "measurement.hpp"
@@ -40,7 +41,8 @@ Case likelihood_case(const Inputs& inputs, PoseHistogram& histogram, double goal
             static_cast<double>(objects * elements * touches.size()));
   };
   const auto errors_of = [&](const PoseLattice& l, const auto& log_likelihood) {
-    return likelihood_errors(inputs, l, touches, inputs.quick ? 100 : 500, log_likelihood);
+    return likelihood_errors(inputs.letters, inputs.model, l, touches, inputs.quick ? 100 : 500,
+                             log_likelihood);
   };
 
   // The first touches warm up, and show the error and the memory.

@@ -6,8 +6,8 @@
 #include <fmt/format.h>
 
 #include "svg_chart.hpp"
-#include "sweep_findings.hpp"
 #include "sweep_result.hpp"
+#include "sweep_words.hpp"
 
 namespace palpate::bench {
 
@@ -29,12 +29,15 @@ std::string title_of(const PosedError& posed) {
       point.filter == "histogram"
           ? fmt::format("{} x {} x {} bins", point.bins[0], point.bins[1], point.bins[2])
           : fmt::format("{} particles", point.count);
+  const std::string p95 =
+      posed.errors.p95_mm ? fmt::format(", 95th percentile {:.3f}", *posed.errors.p95_mm) : "";
   return fmt::format(
-      "{}{}, {}, cells of {} mm: mean {:.3f}, median {:.3f}, 95th percentile {:.3f} "
-      "mm over {} of {} trials; {} per unknown",
-      point.filter, posed.refined ? ", refined pose" : ", mode", bins, point.cell_mm,
-      posed.error->mean_mm, posed.error->median_mm, posed.error->p95_mm, point.last.located,
-      point.scores.size(), seconds_text(point.seconds_unknown));
+      "{}, {}, {}, cells of {} mm: mean {} mm, median {:.3f}{}, over {} trials{}; "
+      "{:.0f} % of {} recognised; {} per unknown",
+      point.filter, posed.kind == PoseKind::refined ? "refined pose" : "mode", bins, point.cell_mm,
+      mean_text(posed.errors), posed.errors.median_mm, p95, posed.errors.trials,
+      point.window ? " in windows" : "", 100.0 * point.accuracy, point.full_trials,
+      seconds_text(posed.seconds));
 }
 
 Fill fill_of(double cell_mm) {
@@ -45,14 +48,16 @@ Fill fill_of(double cell_mm) {
 std::vector<ChartSeries> filter_series(const SweepResult& result) {
   struct Kind {
     const char* filter;
-    bool refined;
+    PoseKind pose;
     const char* name;
     Shape shape;
   };
-  constexpr Kind kinds[] = {{"histogram", false, "histogram, mode", Shape::circle},
-                            {"histogram", true, "histogram, refined", Shape::square},
-                            {"particles", false, "particles", Shape::triangle},
-                            {"augmented", false, "Augmented MCL", Shape::diamond}};
+  constexpr Kind kinds[] = {
+      {"histogram", PoseKind::mode, "histogram, mode", Shape::circle},
+      {"histogram", PoseKind::refined, "histogram, refined", Shape::square},
+      {"particles", PoseKind::mode, "particles", Shape::triangle},
+      {"augmented", PoseKind::mode, "Augmented MCL", Shape::diamond},
+      {"systematic", PoseKind::mode, "systematic resampling", Shape::triangle}};
   const std::vector<PosedError> all = posed_errors(result);
   std::vector<ChartSeries> series;
   for (int colour = 0; colour < static_cast<int>(std::size(kinds)); ++colour) {
@@ -62,14 +67,14 @@ std::vector<ChartSeries> filter_series(const SweepResult& result) {
                       .colour = colour,
                       .shape = kind.shape,
                       .fill = fill_of(cell_mm)};
-      // The refined pose stands right below its mode: one label for both.
-      const bool labelled =
-          cell_mm == 0.5 && (kind.refined || std::string_view(kind.filter) != "histogram");
+      // The refined pose stands right below its mode, and particles by their like: one label.
+      const bool labelled = cell_mm == 0.5 && (kind.pose == PoseKind::refined ||
+                                               std::string_view(kind.filter) == "particles");
       for (const PosedError& posed : all) {
-        if (posed.point->filter == kind.filter && posed.refined == kind.refined &&
+        if (posed.point->filter == kind.filter && posed.kind == kind.pose &&
             posed.point->cell_mm == cell_mm) {
-          one.points.push_back({.x = posed.point->seconds_unknown,
-                                .y = posed.error->mean_mm,
+          one.points.push_back({.x = posed.seconds,
+                                .y = posed.errors.mean_mm,
                                 .label = labelled ? size_of(*posed.point) : "",
                                 .title = title_of(posed)});
         }
@@ -89,14 +94,10 @@ Chart pose_chart(const SweepResult& result) {
               .y_label = "mean pose error (mm)",
               .x_tick = seconds_text,
               .y_tick = mm_text};
-  const std::vector<PosedError> posed = posed_errors(result);
-  std::vector<CostAndError> entries;
-  for (const PosedError& one : posed) {
-    entries.push_back({one.point->seconds_unknown, one.error->mean_mm});
-  }
   ChartSeries front{.name = "front", .colour = grey, .line = true, .marks = false};
-  for (const std::size_t i : pareto_front(entries)) {
-    front.points.push_back({.x = entries[i].cost, .y = entries[i].error, .label = {}, .title = {}});
+  for (const PosedError& posed : pose_front(result)) {
+    front.points.push_back(
+        {.x = posed.seconds, .y = posed.errors.mean_mm, .label = {}, .title = {}});
   }
   chart.series.push_back(std::move(front));
   for (ChartSeries& series : filter_series(result)) {
@@ -112,40 +113,33 @@ struct Family {
 };
 constexpr Family families[] = {{"register tiles", "register tiles", Shape::square},
                                {"runs", "rows", Shape::circle},
+                               {"in logs", "in logs", Shape::circle},
+                               {"array at rest", "array at rest", Shape::square},
                                {"one-bin", "one-bin kernel", Shape::triangle},
-                               {"CPU loop", "CPU loop", Shape::diamond},
-                               {"particles", "particles", Shape::triangle}};
+                               {"CPU loop", "CPU loop", Shape::diamond}};
 
 Chart precision_chart(const SweepResult& result) {
   Chart chart{.title = "Time against numerical error",
               .x_label = "time per pose, element and touch (ns)",
-              .y_label = "largest deviation from float64 (nats per touch)",
+              .y_label = "largest deviation from float64 (nats)",
               .x_tick = ns_text,
               .y_tick = nats_text};
-  std::vector<CostAndError> entries;
-  for (const Precision& precision : result.precisions) {
-    entries.push_back({precision.nanoseconds, precision.deviation.largest});
-  }
   ChartSeries front{.name = "front", .colour = grey, .line = true, .marks = false};
-  for (const std::size_t i : pareto_front(entries)) {
-    front.points.push_back({.x = entries[i].cost, .y = entries[i].error, .label = {}, .title = {}});
+  for (const Precision& precision : precision_front(result)) {
+    front.points.push_back(
+        {.x = precision.nanoseconds, .y = precision.deviation.largest, .label = {}, .title = {}});
   }
   chart.series.push_back(std::move(front));
   for (int colour = 0; colour < static_cast<int>(std::size(families)); ++colour) {
     const Family& family = families[colour];
-    ChartSeries series{
-        .name = family.name,
-        .colour = colour,
-        .shape = family.shape,
-        .fill = std::string_view(family.begin) == "particles" ? Fill::none : Fill::solid};
+    ChartSeries series{.name = family.name, .colour = colour, .shape = family.shape};
     for (const Precision& precision : result.precisions) {
       if (precision.path.starts_with(family.begin)) {
         series.points.push_back(
             {.x = precision.nanoseconds,
              .y = precision.deviation.largest,
              .label = count_text(static_cast<double>(precision.count)),
-             .title = fmt::format("{}, {} poses: {:.3g} ns; largest {:.2e}, RMS {:.2e} nats per "
-                                  "touch",
+             .title = fmt::format("{}, {} poses: {:.3g} ns; largest {:.2e}, RMS {:.2e} nats",
                                   precision.path, precision.count, precision.nanoseconds,
                                   precision.deviation.largest, precision.deviation.rms)});
       }
@@ -177,22 +171,21 @@ Chart knee_chart(const SweepResult& result) {
                         .fill = Fill::none,
                         .line = true};
     const std::vector<SweepPoint> runs = histograms_of(result, finding.cell_mm);
-    for (const SweepPoint& run : runs) {
-      const auto x = static_cast<double>(run.count);
-      if (run.last.error) {
-        mode.points.push_back({.x = x,
-                               .y = run.last.error->mean_mm,
+    for (const PosedError& posed : posed_errors(result)) {
+      if (posed.point->balanced && posed.point->cell_mm == finding.cell_mm) {
+        (posed.kind == PoseKind::mode ? mode : refined)
+            .points.push_back({.x = static_cast<double>(posed.point->count),
+                               .y = posed.errors.mean_mm,
                                .label = {},
-                               .title = title_of({&run, false, &*run.last.error})});
+                               .title = title_of(posed)});
       }
-      if (run.last.refined_error) {
-        refined.points.push_back({.x = x,
-                                  .y = run.last.refined_error->mean_mm,
+    }
+    if (finding.cell_mm == 0.5) {
+      for (const SweepPoint& run : runs) {
+        nearest.points.push_back({.x = static_cast<double>(run.count),
+                                  .y = *run.nearest_bin_mm,
                                   .label = {},
-                                  .title = title_of({&run, true, &*run.last.refined_error})});
-      }
-      if (finding.cell_mm == 0.5) {
-        nearest.points.push_back({.x = x, .y = *run.nearest_bin_mm, .label = {}, .title = {}});
+                                  .title = {}});
       }
     }
     const auto balanced = static_cast<double>(finding.balanced_count);
@@ -206,14 +199,18 @@ Chart knee_chart(const SweepResult& result) {
     chart.series.push_back(std::move(refined));
     ++colour;
   }
-  const auto least = std::min_element(
-      result.findings.begin(), result.findings.end(),
-      [](const CellFinding& a, const CellFinding& b) { return a.floor_mm < b.floor_mm; });
-  if (least->floor_mm > 0.0) {
+  const CellFinding* least = nullptr;
+  for (const CellFinding& finding : result.findings) {
+    if (finding.floor && (least == nullptr || finding.floor->mean_mm < least->floor->mean_mm)) {
+      least = &finding;
+    }
+  }
+  if (least != nullptr) {
     chart.rules.push_back({.vertical = false,
-                           .at = least->floor_mm,
+                           .at = least->floor->mean_mm,
                            .colour = grey,
-                           .label = fmt::format("noise floor {:.3f} mm", least->floor_mm)});
+                           .label = fmt::format("noise floor {} mm, {} trials",
+                                                mean_text(least->floor), least->floor->trials)});
   }
   chart.series.push_back(std::move(nearest));
   return chart;
@@ -231,23 +228,27 @@ std::vector<NamedChart> charts_of(const SweepResult& result) {
   };
   return {
       named("front", pose_chart(result),
-            "Labels are bins per object, of which there are five, or particles in all. Solid "
-            "marks: maps of 0.5 mm cells; half filled: 0.25 mm; hollow: 1 mm. Errors are over the "
-            "trials whose mode has the right object, so points that identify badly look better "
-            "than they are: see the accuracy in the table. The refined pose takes one more "
-            "reduction, once per unknown, which is not timed."),
+            fmt::format(
+                "Labels are bins per object, of which there are five, or particles in all. Solid "
+                "marks: maps of 0.5 mm cells; half filled: 0.25 mm; hollow: 1 mm. A refined pose "
+                "is drawn at the time of all estimates and one refinement after the last. Errors "
+                "are over the trials whose mode has the right object; the front is of runs that "
+                "recognise and locate all {} trials, and runs of fewer stay out of it.",
+                result.trials)),
       named("precision", precision_chart(result),
-            "The likelihood alone, for the histogram and the two baselines, side by side; for "
-            "particles with the motion, the resampling and the estimate. Deviations of the "
-            "log-likelihood are the largest of a sample of bins; the particles' are those of the "
-            "weights after one touch."),
+            fmt::format(
+                "The likelihood alone, side by side on the same lattices; labels are bins per "
+                "object. Deviations of the log-likelihood are the largest of {} bins an object "
+                "after one touch. In logs: gamma = 0. The array at rest counts its No Contact "
+                "elements, too, although it skips them.",
+                sampled_bins)),
       named("bins", knee_chart(result),
-            "The histogram on lattices of balanced steps. \"Nearest bin\" is the error of the bins "
-            "that hold the true poses: what the lattice "
-            "alone costs. A mode does better where a neighbour fits better. The noise floor is "
-            "what is left on the finest lattice. "
-            "Vertical lines: what --bins auto takes for these cells. Runs of many bins have fewer "
-            "trials, the sentences below compare equal ones."),
+            fmt::format(
+                "The histogram on lattices of balanced steps, all over the same {} trials. "
+                "\"Nearest bin\" is the least error that any bin of the lattice has: what the "
+                "lattice alone costs. The noise floor is what is left on the finest lattice. "
+                "Vertical lines: what --bins auto takes for these cells.",
+                result.trials)),
   };
 }
 

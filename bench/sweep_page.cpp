@@ -5,8 +5,8 @@
 
 #include "chart_style.hpp"
 #include "svg_chart.hpp"
-#include "sweep_findings.hpp"
 #include "sweep_result.hpp"
+#include "sweep_words.hpp"
 
 namespace palpate::bench {
 
@@ -67,73 +67,129 @@ std::string cell(const std::string& text) {
 }
 std::string cell(const std::optional<double>& value, const char* format) {
   return value ? cell(fmt::format(fmt::runtime(format), *value), *value)
-               : "<td data-value=\"inf\">-</td>";
+               : "<td data-value=\"inf\">–</td>";
+}
+std::string cell(std::int64_t count) {
+  return cell(fmt::format("{}", count), static_cast<double>(count));
 }
 
-std::string errors(const std::optional<ErrorSummary>& error) {
-  const auto value = [&](double ErrorSummary::*part) {
-    return error ? std::optional((*error).*part) : std::nullopt;
-  };
-  return cell(value(&ErrorSummary::mean_mm), "{:.3f}") +
-         cell(value(&ErrorSummary::median_mm), "{:.3f}") +
-         cell(value(&ErrorSummary::p95_mm), "{:.3f}");
+std::string mean(const std::optional<ErrorsOverTrials>& errors) {
+  return errors ? cell(mean_text(errors), errors->mean_mm) : cell(std::nullopt, "");
+}
+
+/// Mean with standard error, median and 95th percentile.
+std::string errors(const SweepPoint& point, PoseKind kind) {
+  const std::optional<ErrorsOverTrials> over = errors_over(point.errors, kind);
+  return mean(over) + cell(over ? std::optional(over->median_mm) : std::nullopt, "{:.3f}") +
+         cell(over ? over->p95_mm : std::nullopt, "{:.3f}");
 }
 
 std::string row(const SweepPoint& point) {
   const auto mib = static_cast<double>(point.device_bytes) / (1 << 20);
-  const auto largest = point.deviation ? std::optional(point.deviation->largest) : std::nullopt;
-  const auto rms = point.deviation ? std::optional(point.deviation->rms) : std::nullopt;
+  const std::optional<ErrorsOverTrials> located = errors_over(point.errors, PoseKind::mode);
   const std::string bins = point.filter == "histogram" ? fmt::format("{}x{}x{}", point.bins[0],
                                                                      point.bins[1], point.bins[2])
-                                                       : std::string("-");
+                                                       : std::string("–");
   std::string text = "<tr>";
   text += cell(point.filter);
   text += cell(fmt::format("{}", point.cell_mm), point.cell_mm);
-  text += cell(fmt::format("{}", point.count), static_cast<double>(point.count));
+  text += cell(point.count);
   text += cell(bins);
-  text += cell(fmt::format("{}", point.scores.size()), static_cast<double>(point.scores.size()));
+  text += cell(static_cast<std::int64_t>(point.full_trials));
   text += cell(seconds_text(point.seconds_touch), point.seconds_touch);
   text += cell(seconds_text(point.seconds_unknown), point.seconds_unknown);
+  text += point.seconds_refine ? cell(seconds_text(*point.seconds_refine), *point.seconds_refine)
+                               : cell(std::nullopt, "");
   text += cell(fmt::format("{:.3g}", mib), mib);
-  text += cell(fmt::format("{:.1f}", 100.0 * point.last.accuracy), point.last.accuracy);
-  text += errors(point.last.error);
-  text += errors(point.last.refined_error);
-  text += cell(point.nearest_bin_mm, "{:.3f}");
+  text += cell(fmt::format("{:.1f}", 100.0 * point.accuracy), point.accuracy);
   text += cell(fmt::format("{:.3f}", point.calibration_error), point.calibration_error);
-  text += cell(largest, "{:.1e}") + cell(rms, "{:.1e}");
+  text += cell(fmt::format("{} of {}{}", located ? located->trials : 0, point.errors.size(),
+                           point.window ? ", windows" : ""),
+               located ? located->trials : 0);
+  text += errors(point, PoseKind::mode);
+  text += errors(point, PoseKind::refined);
+  text += cell(point.nearest_bin_mm, "{:.3f}");
+  text += cell(point.deviation.largest, "{:.1e}") + cell(point.deviation.rms, "{:.1e}");
   text += cell(point.path);
   return text + "</tr>\n";
 }
 
-std::string table_of(const SweepResult& result) {
+std::string row(const Precision& precision) {
+  return "<tr>" + cell(precision.path) + cell(precision.count) +
+         cell(precision.nanoseconds, "{:.3g}") + cell(precision.deviation.largest, "{:.1e}") +
+         cell(precision.deviation.rms, "{:.1e}") + "</tr>\n";
+}
+
+std::string row(const SweepResult& result, const Limit& limit) {
+  return "<tr>" + cell(limit.name) + cell(static_cast<std::int64_t>(limit.elements)) +
+         cell(limit.count) + mean(errors_over(limit.errors, PoseKind::mode)) +
+         mean(errors_over(limit.errors, PoseKind::refined)) + cell(against_text(result, limit)) +
+         cell(gain_text(result, limit, PoseKind::mode)) +
+         cell(gain_text(result, limit, PoseKind::refined)) +
+         cell(static_cast<std::int64_t>(limit.beyond)) + "</tr>\n";
+}
+
+std::string table(const std::vector<std::string>& heads, const std::string& rows) {
   std::string text = "<div class=\"wide\"><table>\n<thead><tr>";
-  for (const char* head : {"filter",
-                           "cells, mm",
-                           "bins per object, or particles",
-                           "bins",
-                           "trials",
-                           "per touch",
-                           "per unknown",
-                           "device MiB",
-                           "right, %",
-                           "mode mean, mm",
-                           "median",
-                           "95 %",
-                           "refined mean, mm",
-                           "median",
-                           "95 %",
-                           "nearest bin, mm",
-                           "calibration error",
-                           "largest deviation, nats per touch",
-                           "RMS",
-                           "path"}) {
+  for (const std::string& head : heads) {
     text += fmt::format("<th scope=\"col\">{}</th>", head);
   }
-  text += "</tr></thead>\n<tbody>\n";
+  return text + "</tr></thead>\n<tbody>\n" + rows + "</tbody></table></div>\n";
+}
+
+std::string run_table(const SweepResult& result) {
+  std::string rows;
   for (const SweepPoint& point : result.points) {
-    text += row(point);
+    rows += row(point);
   }
-  return text + "</tbody></table></div>\n";
+  return table({"filter",
+                "cells, mm",
+                "bins per object, or particles",
+                "bins",
+                "trials in full",
+                "per touch",
+                "per unknown",
+                "refined pose",
+                "device memory, MiB",
+                "right, % of trials in full",
+                "calibration error, all touches of the trials in full pooled",
+                "trials located",
+                "mode: mean ± standard error, mm",
+                "median",
+                "95 %",
+                "refined: mean ± standard error, mm",
+                "median",
+                "95 %",
+                "nearest bin, mm",
+                fmt::format("largest deviation of {} bins an object, or as many particles, after "
+                            "one touch, nats",
+                            sampled_bins),
+                "RMS",
+                "path"},
+               rows);
+}
+
+std::string precision_table(const SweepResult& result) {
+  std::string rows;
+  for (const Precision& precision : result.precisions) {
+    rows += row(precision);
+  }
+  return table(
+      {"path", "bins per object", "ns per pose, element and touch",
+       fmt::format("largest deviation of {} bins an object after one touch, nats", sampled_bins),
+       "RMS"},
+      rows);
+}
+
+std::string limit_table(const SweepResult& result) {
+  std::string rows;
+  for (const Limit& limit : result.limits) {
+    rows += row(result, limit);
+  }
+  return table({"what is otherwise", "elements", "bins per object",
+                "mode: mean ± standard error, mm", "refined: mean ± standard error, mm", "against",
+                "mode: difference, mm", "refined: difference, mm", "beyond the windows"},
+               rows);
 }
 
 std::string verdicts_of(const SweepResult& result) {
@@ -173,10 +229,24 @@ std::string page_of(const SweepResult& result, const nlohmann::ordered_json& fac
     text += fmt::format("<li>{}</li>\n", xml_escaped(finding.sentence));
   }
   text += fmt::format(
-      "</ul>\n<p class=\"note\">Bins suffice where no finer lattice lowers the mean error by more "
-      "than {:.0f} %, over the trials that both had.</p>\n",
-      100.0 * (1.0 - 1.0 / (1.0 + knee_loss)));
-  text += "<h2>All runs</h2>\n<p class=\"note\">Click on a head to sort.</p>\n" + table_of(result);
+      "</ul>\n<p class=\"note\">Bins suffice where all trials are located and no finer lattice "
+      "lowers the mean error by more "
+      "than {:.0f} % and by more than two standard errors of the paired differences. ± is a "
+      "standard error.</p>\n",
+      100.0 * least_gain);
+  text += fmt::format(
+      "<h2>What bounds the error</h2>\n<p class=\"note\">One thing otherwise at a time, {} trials "
+      "in windows; differences are paired by trial, above 0 where it errs more.</p>\n",
+      result.limits.front().errors.size());
+  text += limit_table(result);
+  text += "<h2>All runs</h2>\n<p class=\"note\">Click on a head to sort.</p>\n" + run_table(result);
+  text += fmt::format(
+      "<p class=\"note\">A run with fewer trials in full than located has its errors from windows: "
+      "the bins of the same lattice within {} mm of the truth, by the pose error, of the true "
+      "object's map alone. A bin's likelihood does not depend on the others, so that mode and "
+      "refined pose are those of the full posterior wherever that has its mode there. {}</p>\n",
+      window_reach_mm, xml_escaped(window_sentence(result)));
+  text += "<h2>All ways to evaluate the likelihood</h2>\n" + precision_table(result);
   return text + fmt::format("<script>{}</script>\n</body>\n</html>\n", sort_script);
 }
 

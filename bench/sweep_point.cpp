@@ -8,43 +8,13 @@
 #include <fmt/format.h>
 
 #include "accuracy.hpp"
-#include "cases.hpp"
-#include "cpu_loop.hpp"
-#include "letters.hpp"
-#include "measurement.hpp"
-#include "one_bin_kernel.hpp"
+#include "filter_run.hpp"
 #include "palpate/pose_histogram.hpp"
 #include "reference.hpp"
 
 namespace palpate::bench {
 
 namespace {
-
-constexpr int sampled_bins = 200;  ///< of every object, or particles
-constexpr int repeats = 3;
-
-Inputs inputs_of(Device& device, const LearnedLetters& learned) {
-  Inputs inputs{.device = device,
-                .device_name = {},
-                .training = {},
-                .letters = learned.objects,
-                .model = {},
-                .unknowns = {}};
-  inputs.model.prior = learned.objects.front().map.prior;
-  return inputs;
-}
-
-Deviation per_touch(const ErrorStatistics& errors, std::size_t touches, int samples) {
-  const auto n = static_cast<double>(touches);
-  return {.largest = errors.largest() / n, .rms = errors.rms() / n, .samples = samples};
-}
-
-Deviation deviation_of(const Inputs& inputs, const PoseLattice& lattice,
-                       std::span<const Touch> touches,
-                       const std::function<std::vector<double>(int object)>& log_likelihood) {
-  return per_touch(likelihood_errors(inputs, lattice, touches, sampled_bins, log_likelihood),
-                   touches.size(), sampled_bins * static_cast<int>(inputs.letters.size()));
-}
 
 /// What the trials of a filter leave behind.
 struct Trials {
@@ -68,41 +38,51 @@ struct Trials {
   }
 
   void fill(SweepPoint& point) const {
+    point.full_trials = static_cast<int>(run.scores.size());
     point.seconds_touch = median(seconds_touch);
     point.seconds_unknown = median(seconds_unknown);
     for (const std::vector<Score>& scores : run.scores) {
-      point.scores.push_back(scores.back());
+      const Score& last = scores.back();
+      point.errors.push_back({.mode_mm = last.error_mm, .refined_mm = last.refined_error_mm});
+      point.accuracy += last.right ? 1.0 : 0.0;
+      point.least_confidence = std::min(point.least_confidence, last.confidence);
     }
-    point.last = curve_of(run).back();
+    point.accuracy /= static_cast<double>(run.scores.size());
     point.calibration_error = calibration_of(run).expected_error;
   }
 };
 
-double nearest_centre(const Axis& axis, double value) {
-  const double i = std::floor((value - axis.lower) / axis.step());
-  return axis.centre(static_cast<int>(std::clamp(i, 0.0, axis.count - 1.0)));
-}
+/// Poses by the full posterior.
+struct FullPoses {
+  Pose mode;
+  Pose refined;
+};
 
-/// Mean error of the bins that hold the true poses. For lattices about the robot's origin and over
-/// the full circle, as all of Sec. IV are.
-double nearest_bin_mm(const LearnedLetters& learned, std::span<const Recording> trials,
-                      const PoseLattice& lattice) {
-  double sum_mm = 0.0;
-  for (const Recording& trial : trials) {
-    const Truth& truth = *trial.truth;
-    const auto object = std::find_if(
-        learned.objects.begin(), learned.objects.end(),
-        [&](const Hypothesis& hypothesis) { return hypothesis.map.label == truth.object; });
-    const Axis& theta = lattice.theta_rad;
-    const double turn = theta.upper - theta.lower;
-    const double theta_rad = truth.T_object_robot.theta_rad;
-    const Pose nearest = lattice.T_object_robot(
-        nearest_centre(lattice.x_mm, truth.T_object_robot.translation_mm.x),
-        nearest_centre(lattice.y_mm, truth.T_object_robot.translation_mm.y),
-        nearest_centre(theta, theta_rad - turn * std::floor((theta_rad - theta.lower) / turn)));
-    sum_mm += error_mm(learned, static_cast<int>(object - learned.objects.begin()), nearest, truth);
+/// Puts errors from windows in the place of those of the full posterior, which they are held
+/// against. `full` are of the first trials of every object, as many of each; none where the mode
+/// has the wrong object.
+void look_into_windows(SweepPoint& point, Device& device, const LearnedLetters& learned,
+                       std::span<const Recording> trials, const PoseLattice& lattice,
+                       std::span<const std::optional<FullPoses>> full) {
+  const std::size_t each = trials.size() / learned.objects.size();
+  const std::size_t full_each = full.size() / learned.objects.size();
+  WindowCheck check;
+  point.errors.clear();
+  for (std::size_t i = 0; i < trials.size(); ++i) {
+    const WindowEstimate estimate = estimate_in_window(device, learned, trials[i], lattice);
+    point.errors.push_back(estimate.errors);
+    if (i % each >= full_each) {
+      continue;
+    }
+    if (const std::optional<FullPoses>& same = full[i / each * full_each + i % each]) {
+      const Body body = truth_of(learned, trials[i]).body;
+      ++check.trials;
+      check.mode_mm = std::max(check.mode_mm, pose_error_mm(body, 1, estimate.mode, same->mode));
+      check.refined_mm =
+          std::max(check.refined_mm, pose_error_mm(body, 1, estimate.refined, same->refined));
+    }
   }
-  return sum_mm / static_cast<double>(trials.size());
+  point.window = check;
 }
 
 /// Weights after one touch against the likelihood of each particle. Weights are relative, so both
@@ -112,7 +92,7 @@ Deviation weight_deviation(Device& device, const LearnedLetters& learned, const 
   ParticleFilter filter(device, learned.objects, options);
   filter.update(touch);
   const std::vector<ParticleFilter::Particle> particles = filter.particles();
-  const ContactLikelihood model = inputs_of(device, learned).model;
+  const ContactLikelihood model{.prior = learned.objects.front().map.prior};
   const auto reference_of = [&](const ParticleFilter::Particle& particle) {
     return reference::log_likelihood(touch, particle.T_object_robot,
                                      learned.objects[particle.object].map, options.classifier,
@@ -122,55 +102,83 @@ Deviation weight_deviation(Device& device, const LearnedLetters& learned, const 
       *std::max_element(particles.begin(), particles.end(),
                         [](const auto& a, const auto& b) { return a.weight < b.weight; });
   const double heaviest_reference = reference_of(heaviest);
-  const int samples = sampled_bins * static_cast<int>(learned.objects.size());
   std::mt19937_64 random(7);
   ErrorStatistics errors;
-  for (int i = 0; i < samples; ++i) {
+  for (std::size_t i = 0; i < sampled_bins * learned.objects.size(); ++i) {
     const ParticleFilter::Particle& particle = particles[random() % particles.size()];
     errors.add(std::log(particle.weight / heaviest.weight) -
                (reference_of(particle) - heaviest_reference));
   }
-  return per_touch(errors, 1, samples);
-}
-
-std::string joined(const std::vector<std::string>& texts) {
-  return fmt::format("{}", fmt::join(texts, "; "));
+  return deviation_of(errors, learned);
 }
 
 }  // namespace
 
+Deviation deviation_of(const ErrorStatistics& errors, const LearnedLetters& learned) {
+  return {.largest = errors.largest(),
+          .rms = errors.rms(),
+          .samples = sampled_bins * static_cast<int>(learned.objects.size())};
+}
+
 SweepPoint measure_histogram(Device& device, const LearnedLetters& learned,
-                             std::span<const Recording> trials, const PoseLattice& lattice) {
+                             std::span<const Recording> trials, int full_each,
+                             const PoseLattice& lattice) {
   SweepPoint point{.filter = "histogram",
                    .cell_mm = learned.objects.front().map.cell_mm,
                    .count = lattice.bins(),
                    .bins = {lattice.x_mm.count, lattice.y_mm.count, lattice.theta_rad.count}};
   PoseHistogram histogram(device, learned.objects, HistogramOptions{.lattice = lattice});
-  point.path = joined(histogram.paths());
+  point.path = fmt::format("{}", fmt::join(histogram.paths(), "; "));
+  const std::size_t each = trials.size() / learned.objects.size();
   Trials results;
-  for (const Recording& trial : trials) {
+  std::vector<std::optional<FullPoses>> full;
+  std::vector<double> seconds_refine;
+  for (std::size_t i = 0; i < trials.size(); ++i) {
+    if (i % each >= static_cast<std::size_t>(full_each)) {
+      continue;
+    }
     histogram.reset();
-    const Estimate estimate = results.add(learned, trial, [&](const Touch& touch) {
+    const Estimate estimate = results.add(learned, trials[i], [&](const Touch& touch) {
       histogram.update(touch);
       return histogram.estimate();
     });
+    RefinedPose refined;
+    seconds_refine.push_back(seconds_of([&] { refined = histogram.refine(estimate.mode); }));
+    full.emplace_back();
     if (Score& scored = results.run.scores.back().back(); scored.error_mm) {
       scored.refined_error_mm =
-          error_mm(learned, estimate.mode.object, histogram.refine(estimate.mode).T_object_robot,
-                   *trial.truth);
+          error_mm(learned, estimate.mode.object, refined.T_object_robot, *trials[i].truth);
+      full.back() = FullPoses{estimate.mode.T_object_robot, refined.T_object_robot};
     }
   }
   results.fill(point);
+  point.seconds_refine = median(seconds_refine);
   point.device_bytes = histogram.device_bytes();
-  point.nearest_bin_mm = nearest_bin_mm(learned, trials, lattice);
-  point.deviation = deviation_of(inputs_of(device, learned), lattice, all_touches(trials.back()),
-                                 [&](int object) { return histogram.log_likelihood(object); });
+  if (full.size() < trials.size()) {
+    look_into_windows(point, device, learned, trials, lattice, full);
+  }
+  double nearest_mm = 0.0;
+  for (const Recording& trial : trials) {
+    nearest_mm += nearest_bin_mm(lattice, truth_of(learned, trial));
+  }
+  point.nearest_bin_mm = nearest_mm / static_cast<double>(trials.size());
+  const Touch touch = trials.front().touch(0);
+  histogram.reset();
+  histogram.update(touch);
+  const ContactLikelihood model{.prior = learned.objects.front().map.prior};
+  point.deviation = deviation_of(
+      likelihood_errors(learned.objects, model, lattice, std::span(&touch, 1), sampled_bins,
+                        [&](int object) { return histogram.log_likelihood(object); }),
+      learned);
   return point;
 }
 
 SweepPoint measure_particles(Device& device, const LearnedLetters& learned,
                              std::span<const Recording> trials, ParticleOptions options) {
-  SweepPoint point{.filter = options.augmented ? "augmented" : "particles",
+  const bool systematic = options.resampling == Resampling::systematic;
+  SweepPoint point{.filter = options.augmented ? "augmented"
+                             : systematic      ? "systematic"
+                                               : "particles",
                    .cell_mm = learned.objects.front().map.cell_mm,
                    .count = options.particles,
                    .path = "particles"};
@@ -183,50 +191,11 @@ SweepPoint measure_particles(Device& device, const LearnedLetters& learned,
       particles.update(touch);
       return particles.estimate();
     });
-    point.device_bytes = particles.device_bytes();
+    point.device_bytes = std::max(point.device_bytes, particles.device_bytes());
   }
   results.fill(point);
   point.deviation = weight_deviation(device, learned, trials.front().touch(0), options);
   return point;
-}
-
-std::vector<Precision> compare_paths(Device& device, const LearnedLetters& learned,
-                                     const Recording& unknown, int touches,
-                                     const PoseLattice& lattice) {
-  const Inputs inputs = inputs_of(device, learned);
-  const std::vector<Touch> first = unknown.touches(0, static_cast<std::size_t>(touches));
-  PoseHistogram histogram(device, learned.objects, HistogramOptions{.lattice = lattice});
-  OneBinKernel one_bin(device, inputs.letters, lattice, inputs.model);
-  CpuLoop cpu_loop(inputs.letters, lattice, inputs.model);
-  const std::function<void()> contenders[] = {
-      [&] { histogram.update(first); },
-      [&] { one_bin.update(first); },
-      [&] { cpu_loop.update(first); },
-  };
-  for (const auto& contender : contenders) {
-    contender();
-  }
-  const Deviation deviations[] = {
-      deviation_of(inputs, lattice, first,
-                   [&](int object) { return histogram.log_likelihood(object); }),
-      deviation_of(inputs, lattice, first,
-                   [&](int object) { return one_bin.log_likelihood(object); }),
-      deviation_of(inputs, lattice, first,
-                   [&](int object) { return cpu_loop.log_likelihood(object); }),
-  };
-  const std::string names[] = {joined(histogram.paths()), "one-bin kernel", "CPU loop"};
-  const std::vector<std::vector<double>> seconds = interleave(contenders, repeats);
-  const double evaluations = static_cast<double>(lattice.bins()) *
-                             static_cast<double>(inputs.letters.size() * unknown.elements()) *
-                             touches;
-  std::vector<Precision> compared;
-  for (std::size_t i = 0; i < seconds.size(); ++i) {
-    compared.push_back({.path = names[i],
-                        .count = lattice.bins(),
-                        .nanoseconds = 1e9 * median(seconds[i]) / evaluations,
-                        .deviation = deviations[i]});
-  }
-  return compared;
 }
 
 }  // namespace palpate::bench

@@ -1,14 +1,10 @@
 #include "sweep_result.hpp"
 
 #include <algorithm>
-#include <array>
-#include <cmath>
 #include <iterator>
 
-#include <fmt/format.h>
-
-#include "error_json.hpp"
 #include "sweep_findings.hpp"
+#include "sweep_words.hpp"
 
 namespace palpate::bench {
 
@@ -25,129 +21,100 @@ Json json_of(const std::optional<Value>& value) {
   return value ? Json(*value) : Json(nullptr);
 }
 
+Json json_of(const std::optional<ErrorsOverTrials>& errors) {
+  return errors ? Json{{"trials", errors->trials},
+                       {"mean", errors->mean_mm},
+                       {"standard_error", errors->standard_error_mm},
+                       {"median", errors->median_mm},
+                       {"p95", json_of(errors->p95_mm)}}
+                : Json(nullptr);
+}
+
+Json json_of(const std::optional<WindowCheck>& check) {
+  return check ? Json{{"compared_trials", check->trials},
+                      {"mode_difference_mm", check->mode_mm},
+                      {"refined_difference_mm", check->refined_mm}}
+               : Json(nullptr);
+}
+
+Json json_of(std::span<const TrialErrors> trials, PoseKind kind) {
+  Json list = Json::array();
+  for (const TrialErrors& trial : trials) {
+    list.push_back(json_of(trial.of(kind)));
+  }
+  return list;
+}
+
 Json json_of(const SweepPoint& point) {
-  return {
-      {"filter", point.filter},
-      {"cell_mm", point.cell_mm},
-      {"count", point.count},
-      {"bins", point.filter == "histogram" ? Json(point.bins) : Json(nullptr)},
-      {"balanced", point.balanced},
-      {"path", point.path},
-      {"trials", point.scores.size()},
-      {"seconds_per_touch", point.seconds_touch},
-      {"seconds_per_unknown", point.seconds_unknown},
-      {"device_bytes", point.device_bytes},
-      {"accuracy", point.last.accuracy},
-      {"located", point.last.located},
-      {"error_mm", json_of(point.last.error)},
-      {"refined_error_mm", json_of(point.last.refined_error)},
-      {"nearest_bin_mm", json_of(point.nearest_bin_mm)},
-      {"expected_calibration_error", point.calibration_error},
-      {"deviation_nats_per_touch", point.deviation ? json_of(*point.deviation) : Json(nullptr)}};
+  return {{"filter", point.filter},
+          {"cell_mm", point.cell_mm},
+          {"count", point.count},
+          {"bins", point.filter == "histogram" ? Json(point.bins) : Json(nullptr)},
+          {"balanced", point.balanced},
+          {"path", point.path},
+          {"full_trials", point.full_trials},
+          {"seconds_per_touch", point.seconds_touch},
+          {"seconds_per_unknown", point.seconds_unknown},
+          {"seconds_refine", json_of(point.seconds_refine)},
+          {"device_bytes", point.device_bytes},
+          {"accuracy", point.accuracy},
+          {"least_confidence", point.least_confidence},
+          {"expected_calibration_error", point.calibration_error},
+          {"trials", point.errors.size()},
+          {"windows", json_of(point.window)},
+          {"error_mm", json_of(errors_over(point.errors, PoseKind::mode))},
+          {"refined_error_mm", json_of(errors_over(point.errors, PoseKind::refined))},
+          {"errors_mm", json_of(point.errors, PoseKind::mode)},
+          {"refined_errors_mm", json_of(point.errors, PoseKind::refined)},
+          {"nearest_bin_mm", json_of(point.nearest_bin_mm)},
+          {"deviation_nats", json_of(point.deviation)}};
 }
 
-std::string knee_text(const std::optional<std::int64_t>& knee) {
-  return knee ? fmt::format("suffice from {} bins on", count_text(static_cast<double>(*knee)))
-              : "still gain at the finest lattice";
+Json json_of(const CellFinding& finding) {
+  return {{"cell_mm", finding.cell_mm},
+          {"balanced_bins", finding.balanced_bins},
+          {"balanced_count", finding.balanced_count},
+          {"mode_knee", json_of(finding.mode_knee)},
+          {"refined_knee", json_of(finding.refined_knee)},
+          {"floor_mm", json_of(finding.floor)},
+          {"sentence", finding.sentence}};
 }
 
-double percent_less(double from, double to) { return from > 0.0 ? 100.0 * (1.0 - to / from) : 0.0; }
-
-/// "mode 31 %, refined 4 %" of error less from one run to another.
-std::string gain_text(const SweepPoint& from, const SweepPoint& to, std::size_t objects) {
-  const PairedErrors mode = paired_errors(from, to, objects, false);
-  const PairedErrors refined = paired_errors(from, to, objects, true);
-  return fmt::format(
-      "{:.3f} to {:.3f} mm by the mode ({:+.0f} %), {:.3f} to {:.3f} mm refined "
-      "({:+.0f} %), {} trials",
-      mode.first_mm, mode.second_mm, -percent_less(mode.first_mm, mode.second_mm), refined.first_mm,
-      refined.second_mm, -percent_less(refined.first_mm, refined.second_mm), mode.trials);
+Json json_of(const PosedError& posed) {
+  return {{"filter", posed.point->filter},
+          {"pose", posed.kind == PoseKind::mode ? "mode" : "refined"},
+          {"cell_mm", posed.point->cell_mm},
+          {"count", posed.point->count},
+          {"trials", posed.errors.trials},
+          {"accuracy", posed.point->accuracy},
+          {"cost", posed.seconds},
+          {"error", posed.errors.mean_mm},
+          {"standard_error", posed.errors.standard_error_mm}};
 }
 
-std::string sentence_of(const CellFinding& finding, const std::vector<SweepPoint>& runs,
-                        std::size_t objects) {
-  std::string text = fmt::format("Cells of {} mm: modes {}, refined poses {}.", finding.cell_mm,
-                                 knee_text(finding.mode_knee), knee_text(finding.refined_knee));
-  // The run nearest to what auto takes, as a factor, and those next to a decade away.
-  const auto distance = [&](const SweepPoint& run, double factor) {
-    return std::abs(std::log(static_cast<double>(run.count) /
-                             (factor * static_cast<double>(finding.balanced_count))));
-  };
-  const auto nearest = [&](double factor) {
-    return std::min_element(runs.begin(), runs.end(), [&](const auto& a, const auto& b) {
-      return distance(a, factor) < distance(b, factor);
-    });
-  };
-  const auto balanced = nearest(1.0);
-  const auto number = [](const auto& run) { return count_text(static_cast<double>(run->count)); };
-  text += fmt::format(" --bins auto takes {} x {} x {} = {}", finding.balanced_bins[0],
-                      finding.balanced_bins[1], finding.balanced_bins[2],
-                      count_text(static_cast<double>(finding.balanced_count)));
-  constexpr double close = 0.7;  // a factor of two
-  if (distance(*balanced, 1.0) > close) {
-    return text + ", which is beyond this sweep.";
+Json difference_of(const SweepResult& result, const Limit& limit, PoseKind kind) {
+  if (!limit.against) {
+    return nullptr;
   }
-  text += ".";
-  if (const auto before = nearest(0.1); before != balanced) {
-    text += fmt::format(" From {} to {} bins: {}.", number(before), number(balanced),
-                        gain_text(*before, *balanced, objects));
-  }
-  if (const auto after = nearest(10.0); after != balanced) {
-    text += fmt::format(" From {} to {}: {}.", number(balanced), number(after),
-                        gain_text(*balanced, *after, objects));
-  }
-  return text;
+  const PairedErrors paired =
+      paired_errors(result.limits[*limit.against].errors, limit.errors, kind);
+  return {{"mean", paired.second_mm - paired.first_mm},
+          {"standard_error", paired.standard_error_mm}};
 }
 
-/// `count`s and what they cost, of the entries that nothing beats.
-Json front_of(const std::vector<CostAndError>& entries, const std::vector<Json>& names) {
-  Json front = Json::array();
-  for (const std::size_t i : pareto_front(entries)) {
-    Json entry = names[i];
-    entry["cost"] = entries[i].cost;
-    entry["error"] = entries[i].error;
-    front.push_back(std::move(entry));
-  }
-  return front;
-}
-
-Json pose_front(const SweepResult& result) {
-  std::vector<CostAndError> entries;
-  std::vector<Json> names;
-  for (const PosedError& posed : posed_errors(result)) {
-    entries.push_back({posed.point->seconds_unknown, posed.error->mean_mm});
-    names.push_back({{"filter", posed.point->filter},
-                     {"pose", posed.refined ? "refined" : "mode"},
-                     {"cell_mm", posed.point->cell_mm},
-                     {"count", posed.point->count}});
-  }
-  return front_of(entries, names);
-}
-
-Json precision_front(const SweepResult& result) {
-  std::vector<CostAndError> entries;
-  std::vector<Json> names;
-  for (const Precision& precision : result.precisions) {
-    entries.push_back({precision.nanoseconds, precision.deviation.largest});
-    names.push_back({{"path", precision.path}, {"count", precision.count}});
-  }
-  return front_of(entries, names);
+Json json_of(const SweepResult& result, const Limit& limit) {
+  return {{"name", limit.name},
+          {"count", limit.count},
+          {"elements", limit.elements},
+          {"error_mm", json_of(errors_over(limit.errors, PoseKind::mode))},
+          {"refined_error_mm", json_of(errors_over(limit.errors, PoseKind::refined))},
+          {"beyond_window", limit.beyond},
+          {"against", limit.against ? Json(against_text(result, limit)) : Json(nullptr)},
+          {"difference_mm", difference_of(result, limit, PoseKind::mode)},
+          {"refined_difference_mm", difference_of(result, limit, PoseKind::refined)}};
 }
 
 }  // namespace
-
-std::vector<PosedError> posed_errors(const SweepResult& result) {
-  std::vector<PosedError> posed;
-  for (const SweepPoint& point : result.points) {
-    if (point.last.error) {
-      posed.push_back({&point, false, &*point.last.error});
-    }
-    if (point.last.refined_error) {
-      posed.push_back({&point, true, &*point.last.refined_error});
-    }
-  }
-  return posed;
-}
 
 std::vector<SweepPoint> histograms_of(const SweepResult& result, double cell_mm) {
   std::vector<SweepPoint> runs;
@@ -158,55 +125,104 @@ std::vector<SweepPoint> histograms_of(const SweepResult& result, double cell_mm)
   return runs;
 }
 
-CellFinding find_knee(const SweepResult& result, double cell_mm,
-                      const std::array<int, 3>& balanced_bins) {
+std::vector<PosedError> posed_errors(const SweepResult& result) {
+  std::vector<PosedError> posed;
+  for (const SweepPoint& point : result.points) {
+    for (const PoseKind kind : {PoseKind::mode, PoseKind::refined}) {
+      if (const auto errors = errors_over(point.errors, kind)) {
+        const double refine = kind == PoseKind::refined ? *point.seconds_refine : 0.0;
+        posed.push_back({&point, kind, *errors, point.seconds_unknown + refine});
+      }
+    }
+  }
+  return posed;
+}
+
+std::vector<PosedError> pose_front(const SweepResult& result) {
+  std::vector<PosedError> posed = posed_errors(result);
+  std::erase_if(posed, [&](const PosedError& one) {
+    return one.point->accuracy < 1.0 || one.errors.trials < result.trials;
+  });
+  std::vector<CostAndError> entries;
+  for (const PosedError& one : posed) {
+    entries.push_back({one.seconds, one.errors.mean_mm});
+  }
+  std::vector<PosedError> front;
+  for (const std::size_t i : pareto_front(entries)) {
+    front.push_back(posed[i]);
+  }
+  return front;
+}
+
+std::vector<Precision> precision_front(const SweepResult& result) {
+  std::vector<CostAndError> entries;
+  for (const Precision& precision : result.precisions) {
+    entries.push_back({precision.nanoseconds, precision.deviation.largest});
+  }
+  std::vector<Precision> front;
+  for (const std::size_t i : pareto_front(entries)) {
+    front.push_back(result.precisions[i]);
+  }
+  return front;
+}
+
+CellFinding find_knee(const SweepResult& result, double cell_mm, const BinCounts& balanced_bins) {
   const std::vector<SweepPoint> runs = histograms_of(result, cell_mm);
-  CellFinding finding{
-      .cell_mm = cell_mm,
-      .balanced_bins = balanced_bins,
-      .balanced_count = std::int64_t{balanced_bins[0]} * balanced_bins[1] * balanced_bins[2],
-      .mode_knee = {},
-      .refined_knee = {},
-      .sentence = {}};
-  if (const auto knee = knee_of(runs, result.objects, false)) {
-    finding.mode_knee = runs[*knee].count;
+  std::vector<std::vector<TrialErrors>> errors;
+  for (const SweepPoint& run : runs) {
+    errors.push_back(run.errors);
   }
-  if (const auto knee = knee_of(runs, result.objects, true)) {
-    finding.refined_knee = runs[*knee].count;
-  }
-  if (runs.back().last.refined_error) {
-    finding.floor_mm = runs.back().last.refined_error->mean_mm;
-  }
-  finding.floor_trials = runs.back().last.located;
-  finding.sentence = sentence_of(finding, runs, result.objects);
+  const auto knee = [&](PoseKind kind) {
+    const std::optional<std::size_t> i = knee_of(errors, kind);
+    return i ? std::optional(runs[*i].count) : std::nullopt;
+  };
+  CellFinding finding{.cell_mm = cell_mm,
+                      .balanced_bins = balanced_bins,
+                      .balanced_count = product(balanced_bins),
+                      .mode_knee = knee(PoseKind::mode),
+                      .refined_knee = knee(PoseKind::refined),
+                      .floor = errors_over(errors.back(), PoseKind::refined),
+                      .sentence = {}};
+  finding.sentence = knee_sentence(finding, runs);
   return finding;
 }
 
 Json document_of(const SweepResult& result) {
-  Json document{{"touches", result.touches},   {"points", Json::array()},
+  Json document{{"touches", result.touches},   {"trials", result.trials},
+                {"points", Json::array()},     {"windows", window_sentence(result)},
                 {"precisions", Json::array()}, {"fronts", Json::object()},
-                {"knees", Json::array()},      {"verdicts", Json::array()}};
+                {"knees", Json::array()},      {"limits", Json::array()},
+                {"verdicts", Json::array()}};
   for (const SweepPoint& point : result.points) {
     document["points"].push_back(json_of(point));
   }
+  const auto json_of_precision = [](const Precision& precision) {
+    return Json{{"path", precision.path},
+                {"count", precision.count},
+                {"nanoseconds", precision.nanoseconds},
+                {"deviation_nats", json_of(precision.deviation)}};
+  };
   for (const Precision& precision : result.precisions) {
-    document["precisions"].push_back({{"path", precision.path},
-                                      {"count", precision.count},
-                                      {"nanoseconds", precision.nanoseconds},
-                                      {"deviation_nats_per_touch", json_of(precision.deviation)}});
+    document["precisions"].push_back(json_of_precision(precision));
   }
-  document["fronts"] = {{"seconds per unknown, mean error in mm", pose_front(result)},
-                        {"ns per pose, element and touch, largest deviation in nats per touch",
-                         precision_front(result)}};
+  Json& pose = document["fronts"]["seconds per unknown, mean error in mm"] = Json::array();
+  for (const PosedError& posed : pose_front(result)) {
+    pose.push_back(json_of(posed));
+  }
+  Json& precision =
+      document["fronts"]["ns per pose, element and touch, largest deviation in nats"] =
+          Json::array();
+  for (const Precision& one : precision_front(result)) {
+    precision.push_back({{"path", one.path},
+                         {"count", one.count},
+                         {"cost", one.nanoseconds},
+                         {"error", one.deviation.largest}});
+  }
   for (const CellFinding& finding : result.findings) {
-    document["knees"].push_back({{"cell_mm", finding.cell_mm},
-                                 {"balanced_bins", finding.balanced_bins},
-                                 {"balanced_count", finding.balanced_count},
-                                 {"mode_knee", json_of(finding.mode_knee)},
-                                 {"refined_knee", json_of(finding.refined_knee)},
-                                 {"floor_mm", finding.floor_mm},
-                                 {"floor_trials", finding.floor_trials},
-                                 {"sentence", finding.sentence}});
+    document["knees"].push_back(json_of(finding));
+  }
+  for (const Limit& limit : result.limits) {
+    document["limits"].push_back(json_of(result, limit));
   }
   for (const Measurement& verdict : result.verdicts) {
     document["verdicts"].push_back({{"name", verdict.name},
@@ -216,18 +232,6 @@ Json document_of(const SweepResult& result) {
                                     {"reached", verdict.reached()}});
   }
   return document;
-}
-
-std::string count_text(double count) {
-  return count >= 0.9995e6   ? fmt::format("{:.3g} M", count / 1e6)
-         : count >= 0.9995e3 ? fmt::format("{:.3g} k", count / 1e3)
-                             : fmt::format("{:.3g}", count);
-}
-
-std::string seconds_text(double seconds) {
-  return seconds >= 0.9995      ? fmt::format("{:.3g} s", seconds)
-         : seconds >= 0.9995e-3 ? fmt::format("{:.3g} ms", 1e3 * seconds)
-                                : fmt::format("{:.3g} us", 1e6 * seconds);
 }
 
 }  // namespace palpate::bench

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -9,6 +8,9 @@
 #include <nlohmann/json.hpp>
 
 #include "report.hpp"
+#include "sweep_limits.hpp"
+#include "sweep_paths.hpp"
+#include "sweep_plan.hpp"
 #include "sweep_point.hpp"
 
 namespace palpate::bench {
@@ -16,41 +18,48 @@ namespace palpate::bench {
 /// Where more bins stop helping on maps of one cell size, as the data say.
 struct CellFinding {
   double cell_mm = 0.0;
-  std::array<int, 3> balanced_bins{};  ///< what --bins auto takes
+  BinCounts balanced_bins{};  ///< what --bins auto takes
   std::int64_t balanced_count = 0;
   std::optional<std::int64_t> mode_knee;     ///< bins per object, see knee_of()
   std::optional<std::int64_t> refined_knee;  ///< the same for the refined pose
-  double floor_mm = 0.0;  ///< mean error of the refined pose on the finest lattice
-  int floor_trials = 0;
-  std::string sentence;  ///< the finding in words
+  std::optional<ErrorsOverTrials> floor;     ///< of the refined pose on the finest lattice
+  std::string sentence;                      ///< the finding in words
 };
 
 struct SweepResult {
-  std::size_t objects = 0;
+  int trials = 0;  ///< over which errors are compared
   int touches = 0;
   std::vector<SweepPoint> points;
   std::vector<Precision> precisions;
   std::vector<CellFinding> findings;  ///< by falling cell size
+  std::vector<Limit> limits;
   std::vector<Measurement> verdicts;
 };
 
 /// The runs of the histogram on balanced lattices and maps of one cell size, by rising count.
 std::vector<SweepPoint> histograms_of(const SweepResult& result, double cell_mm);
 
-/// The mean error of a run's modes or of its refined poses.
+/// The errors of a run's modes or of its refined poses, and what they cost.
 struct PosedError {
   const SweepPoint* point = nullptr;
-  bool refined = false;
-  const ErrorSummary* error = nullptr;
+  PoseKind kind = PoseKind::mode;
+  ErrorsOverTrials errors;
+  double seconds = 0.0;  ///< per unknown with an estimate after each touch and, where refined, one
+                         ///< refined pose
 };
 /// All there are, in the order of the runs; they point into the result.
 std::vector<PosedError> posed_errors(const SweepResult& result);
+/// Those that none beats in time and mean error, of runs that recognise and locate all trials:
+/// errors over some of the trials would flatter.
+std::vector<PosedError> pose_front(const SweepResult& result);
+
+/// Those that none beats in time and largest deviation.
+std::vector<Precision> precision_front(const SweepResult& result);
 
 /// What the lattice that --bins auto takes for maps of one cell size has to do with its runs.
-CellFinding find_knee(const SweepResult& result, double cell_mm,
-                      const std::array<int, 3>& balanced_bins);
+CellFinding find_knee(const SweepResult& result, double cell_mm, const BinCounts& balanced_bins);
 
-/// Points, precisions, findings, verdicts and fronts.
+/// Points, precisions, findings, limits, verdicts and fronts.
 nlohmann::ordered_json document_of(const SweepResult& result);
 
 /// A result as one self-contained page, with the facts at its head.
@@ -65,10 +74,5 @@ struct NamedChart {
   std::string caption;  ///< for people who read the chart
 };
 std::vector<NamedChart> charts_of(const SweepResult& result);
-
-/// A count such as 100, 17.5 k or 1 M.
-std::string count_text(double count);
-/// Seconds with a unit and a prefix.
-std::string seconds_text(double seconds);
 
 }  // namespace palpate::bench

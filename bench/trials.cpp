@@ -6,7 +6,6 @@
 
 #include <fmt/format.h>
 
-#include "letters.hpp"
 #include "palpate/error.hpp"
 #include "palpate/simulation.hpp"
 #include "random.hpp"
@@ -33,7 +32,7 @@ std::vector<std::size_t> random_order(std::size_t n, std::uint64_t seed) {
 
 /// Touches of an object whose frame was the robot's, as a robot meets them at T_object_robot.
 Recording trial_of(const Recording& test_set, int touches, std::uint64_t seed,
-                   const SensorPoseNoise& noise) {
+                   const TrialTouches& how) {
   const std::vector<std::size_t> order = random_order(test_set.size(), seed);
   const Pose T_object_robot = random_object_pose(seed);
   Random random(seed, Stream::pose_noise);
@@ -42,9 +41,9 @@ Recording trial_of(const Recording& test_set, int touches, std::uint64_t seed,
   trial.truth = {.object = test_set.object, .T_object_robot = T_object_robot};
   for (int i = 0; i < touches; ++i) {
     const Touch touch = test_set.touch(order[i]);
-    const double dx_mm = noise.translation_mm * random.normal();
-    const double dy_mm = noise.translation_mm * random.normal();
-    const Pose T_sensor_reported{{dx_mm, dy_mm}, noise.rotation_rad * random.normal()};
+    const double dx_mm = how.pose_noise.translation_mm * random.normal();
+    const double dy_mm = how.pose_noise.translation_mm * random.normal();
+    const Pose T_sensor_reported{{dx_mm, dy_mm}, how.pose_noise.rotation_rad * random.normal()};
     trial.T_robot_sensor.push_back(inverse(T_object_robot) * touch.T_robot_sensor *
                                    T_sensor_reported);
     trial.pressure.insert(trial.pressure.end(), touch.pressure.begin(), touch.pressure.end());
@@ -54,9 +53,9 @@ Recording trial_of(const Recording& test_set, int touches, std::uint64_t seed,
 
 }  // namespace
 
-LearnedLetters learn_letters(Device& device, const MapOptions& options) {
-  LearnedLetters learned{.objects = letter_maps(device, training_recordings(), options),
-                         .bodies = {}};
+LearnedLetters learn_letters(Device& device, const MapOptions& options,
+                             const std::vector<Recording>& training) {
+  LearnedLetters learned{.objects = letter_maps(device, training, options), .bodies = {}};
   for (Hypothesis& object : learned.objects) {
     object.map.symmetry = symmetry_of(object.map.label);
     learned.bodies.push_back(body_of(object.map));
@@ -65,8 +64,10 @@ LearnedLetters learn_letters(Device& device, const MapOptions& options) {
 }
 
 std::vector<Recording> make_trials(std::span<const std::string> shapes, int trials_each,
-                                   int touches, std::uint64_t seed, const SensorPoseNoise& noise) {
-  const std::vector<Pose> poses = training_grid();
+                                   int touches, std::uint64_t seed, const TrialTouches& how) {
+  const std::vector<Pose> grid = training_grid();
+  const std::vector<Pose> poses =
+      how.at_random_poses ? random_poses(static_cast<int>(grid.size()), seed) : grid;
   if (touches < 1 || static_cast<std::size_t>(touches) > poses.size()) {
     throw Error(Fault::input, fmt::format("touches per trial = {}: give 1 to {}, which is what "
                                           "there is to draw from without replacement",
@@ -74,14 +75,21 @@ std::vector<Recording> make_trials(std::span<const std::string> shapes, int tria
   }
   std::vector<Recording> trials;
   for (const std::string& shape : shapes) {
-    Simulator simulator(make_shape(shape), SensorModel{}, digitacts_array(), seed);
+    Simulator simulator(make_shape(shape), how.sensor.model, how.sensor.elements_mm, seed);
     const Recording test_set = simulator.touch(poses, Pose{});
     for (int i = 0; i < trials_each; ++i) {
-      trials.push_back(trial_of(test_set, touches, seed + i, noise));
+      trials.push_back(trial_of(test_set, touches, seed + i, how));
     }
     seed += seeds_per_shape;
   }
   return trials;
+}
+
+std::size_t object_of(const LearnedLetters& learned, const std::string& label) {
+  const auto object =
+      std::find_if(learned.objects.begin(), learned.objects.end(),
+                   [&](const Hypothesis& hypothesis) { return hypothesis.map.label == label; });
+  return static_cast<std::size_t>(object - learned.objects.begin());
 }
 
 Score score(const LearnedLetters& learned, const Estimate& estimate, const Truth& truth) {

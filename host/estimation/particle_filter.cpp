@@ -387,7 +387,7 @@ std::vector<ParticleFilter::Particle> ParticleFilter::particles() const {
 }
 
 std::uint64_t ParticleFilter::device_bytes() const {
-  std::uint64_t bytes = impl_->likelihood.device_bytes();
+  std::uint64_t bytes = impl_->likelihood.device_bytes() + impl_->parzen.peak_bytes();
   for (const gpu::Buffer* buffer :
        {&impl_->particles, &impl_->drawn, &impl_->log_weights, &impl_->cumulative,
         &impl_->block_sums, &impl_->draw_blocks, &impl_->shares}) {

@@ -230,7 +230,7 @@ ParzenMode::ParzenMode(gpu::Context& context, gpu::CommandStream& stream)
 
 std::optional<ParzenMaximum> ParzenMode::find(std::span<const shaders::Particle> particles,
                                               std::span<const double> weights,
-                                              std::uint32_t objects) const {
+                                              std::uint32_t objects) {
   const SortedParticles sorted = sort(particles, weights, objects);
   if (sorted.key.empty()) {
     return std::nullopt;
@@ -270,6 +270,8 @@ std::optional<ParzenMaximum> ParzenMode::find(std::span<const shaders::Particle>
     std::vector<float> densities(units.size() * points);
     const gpu::Buffer sums(context_, std::span(densities).size_bytes(), gpu::Memory::device,
                            "the Parzen estimate");
+    peak_bytes_ = std::max<std::uint64_t>(
+        peak_bytes_, table.bytes() + range_table.bytes() + unit_table.bytes() + sums.bytes());
     stream_.upload(range_table, std::span<const Range>(ranges));
     stream_.upload(unit_table, std::span<const shaders::ConeUnit>(units));
     stream_.dispatch(sum_cones_, {&table, &range_table, &unit_table, &sums},

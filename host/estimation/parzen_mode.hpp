@@ -33,12 +33,16 @@ class ParzenMode {
   /// densities differ by less than about 1e-5 of their value, any may be the answer; its density is
   /// exact.
   std::optional<ParzenMaximum> find(std::span<const shaders::Particle> particles,
-                                    std::span<const double> weights, std::uint32_t objects) const;
+                                    std::span<const double> weights, std::uint32_t objects);
+
+  /// The most device memory that a find() has held at once; it gives all of it back.
+  std::uint64_t peak_bytes() const { return peak_bytes_; }
 
  private:
   gpu::Context& context_;
   gpu::CommandStream& stream_;
   gpu::Kernel sum_cones_;
+  std::uint64_t peak_bytes_ = 0;
 };
 
 }  // namespace palpate

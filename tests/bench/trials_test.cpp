@@ -81,7 +81,7 @@ TEST(Trials, OfOneShapeShareItsTestSet) {
 TEST(Trials, WithNoiseAreTheSameReadingsReportedElsewhere) {
   const SensorPoseNoise noise{.translation_mm = 2.0, .rotation_rad = 0.1};
   const std::vector<Recording> exact = make_trials(shapes, 4, 100, 7);
-  const std::vector<Recording> noisy = make_trials(shapes, 4, 100, 7, noise);
+  const std::vector<Recording> noisy = make_trials(shapes, 4, 100, 7, {.pose_noise = noise});
   glm::dvec2 squares_mm2{0.0, 0.0};
   double squares_rad2 = 0.0;
   std::set<double> turns_rad;
@@ -100,6 +100,18 @@ TEST(Trials, WithNoiseAreTheSameReadingsReportedElsewhere) {
   EXPECT_NEAR(std::sqrt(squares_mm2.x / 800.0), noise.translation_mm, 0.2);
   EXPECT_NEAR(std::sqrt(squares_mm2.y / 800.0), noise.translation_mm, 0.2);
   EXPECT_NEAR(std::sqrt(squares_rad2 / 800.0), noise.rotation_rad, 0.01);
+}
+
+TEST(Trials, OfAnotherKindAreOfTheSameUnknowns) {
+  const Recording plain = make_trials(shapes, 1, 30, 7).front();
+  TrialTouches how;
+  how.sensor.elements_mm = {{0.0, 0.0}, {3.8, 0.0}};
+  const Recording other = make_trials(shapes, 1, 30, 7, how).front();
+  EXPECT_EQ(other.elements(), 2U);
+  EXPECT_EQ(other.truth->T_object_robot.translation_mm, plain.truth->T_object_robot.translation_mm);
+
+  const Recording anywhere = make_trials(shapes, 1, 30, 7, {.at_random_poses = true}).front();
+  EXPECT_EQ(training_pose_of(anywhere.truth->T_object_robot * anywhere.T_robot_sensor[0]), -1);
 }
 
 TEST(Trials, RefuseMoreTouchesThanThereAreToDraw) {

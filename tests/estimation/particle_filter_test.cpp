@@ -414,6 +414,16 @@ TEST(ParticleFilter, RunsWithAMillionParticles) {
   EXPECT_LT(weight_error(filter, recording.touch(1), objects, options, 101), per_touch);
 }
 
+TEST(ParticleFilter, MemoryCountsWhatAnEstimateTakes) {
+  Device device = Device::open();
+  constexpr int particles = 10'000;
+  ParticleFilter filter(device, three_objects(), {.particles = particles, .seed = 5});
+  const std::uint64_t before = filter.device_bytes();
+  filter.estimate();
+  // All weigh the same, so that the estimate takes every particle, four floats each.
+  EXPECT_GE(filter.device_bytes(), before + particles * 4 * sizeof(float));
+}
+
 TEST(ParticleFilter, OptionsOutOfRangeAreRefused) {
   constexpr double nan = std::numeric_limits<double>::quiet_NaN();
   Device device = Device::open();

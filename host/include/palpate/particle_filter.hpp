@@ -90,6 +90,7 @@ class ParticleFilter {
   /// All particles, for inspection. @throws Error if the device fails
   std::vector<Particle> particles() const;
 
+  /// Device memory held, in bytes, and the most that an estimate has needed besides.
   std::uint64_t device_bytes() const;
 
  private:

@@ -1,0 +1,50 @@
+#pragma once
+
+#include <vector>
+
+#include "palpate/device.hpp"
+#include "palpate/lattice.hpp"
+#include "palpate/pose_error.hpp"
+#include "palpate/touch.hpp"
+#include "trial_errors.hpp"
+#include "trials.hpp"
+
+namespace palpate::bench {
+
+/// An object and where it is.
+struct PlacedBody {
+  Body body;
+  int symmetry = 1;  ///< as OccupancyGrid has it
+  Pose T_object_robot;
+};
+
+/// The true object of a trial.
+PlacedBody truth_of(const LearnedLetters& learned, const Recording& trial);
+
+/// Parts of a lattice, of the same bins, that together hold every bin within `reach_mm` of the body
+/// by pose_error_mm(): one for each of its n places of equal error, or, for a body of full
+/// symmetry, sectors of the circle. The lattice's theta is to cover the circle; a part's may go on
+/// beyond its ends. Parts are boxes and may hold other bins besides.
+std::vector<PoseLattice> windows_about(const PoseLattice& lattice, const PlacedBody& placed,
+                                       double reach_mm);
+
+/// Least error that a bin of the lattice has: what the lattice alone costs.
+double nearest_bin_mm(const PoseLattice& lattice, const PlacedBody& placed);
+
+/// How far from the truth a mode is looked for.
+inline constexpr double window_reach_mm = 3.0;
+
+/// What the posterior of the whole lattice says of the true object near the truth.
+struct WindowEstimate {
+  Pose mode;
+  Pose refined;
+  TrialErrors errors;
+};
+
+/// Mode and refined pose of a trial's true object from its posterior within `window_reach_mm` of
+/// the truth. They are those of the full posterior, but for rounding, wherever that has its mode
+/// there: the likelihood of a bin does not depend on the others.
+WindowEstimate estimate_in_window(Device& device, const LearnedLetters& learned,
+                                  const Recording& trial, const PoseLattice& lattice);
+
+}  // namespace palpate::bench
