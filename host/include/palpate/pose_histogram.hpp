@@ -81,11 +81,11 @@ class PoseHistogram {
   /// The pose between the bins around a mode, of which only `object` and `bin` count: where a
   /// quadratic in how far the object moves, fitted to the logs of the belief, has its peak. It is
   /// fitted near the mean of a root of the belief over a window, which is moved to that mean until
-  /// it rests: the eighth, or a higher one where bins so weighted spread by less than a third of the
-  /// window. In the fit they count by thrice that root times a Gaussian of 0.8 mm about the mean.
-  /// Roots and fit even out the ripples that readings leave in the belief: the peak errs less than
-  /// the mode and than the mean of the belief itself. The pose is that mean where fewer than two
-  /// bins within the window's radius stand for every unknown of the quadratic, as on bins wider
+  /// it rests: the eighth, or a higher one where bins so weighted spread by less than a third of
+  /// the window. In the fit they count by thrice that root times a Gaussian of 0.8 mm about the
+  /// mean. Roots and fit even out the ripples that readings leave in the belief: the peak errs less
+  /// than the mode and than the mean of the belief itself. The pose is that mean where fewer than
+  /// two bins within the window's radius stand for every unknown of the quadratic, as on bins wider
   /// than some 1.5 mm along three axes, or where it has no peak within 1 mm and the region. The
   /// covariance is the second moment of the belief itself about that pose, over the same window,
   /// plus that of a bin.
