@@ -27,7 +27,7 @@ std::vector<PairedPoint> compare(const FilterRun& first, const FilterRun& second
       point.error_lead_mm =
           std::accumulate(leads_mm.begin(), leads_mm.end(), 0.0) / point.located_by_both;
     }
-    if (leads_mm.size() > 1) {
+    if (leads_mm.size() > 2) {
       point.error_lead_interval = mean_interval(leads_mm);
     }
     curve.push_back(point);

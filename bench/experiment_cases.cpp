@@ -57,8 +57,7 @@ Case case_of(const FilterRun& run) {
   };
   add_from(result, "right in every trial from", curve,
            [](const CurvePoint& point) { return point.accuracy == 1.0; });
-  // Balanced bins are as many as their whole numbers along each axis allow.
-  const bool ten_thousand = run.filter == "histogram" && run.count > 1'000;
+  const bool ten_thousand = run.filter == "histogram" && run.count == 10'000;
   const int known_after = run.filter != "histogram" ? 0
                           : ten_thousand            ? published::bins_10000_know_after
                           : run.count == 1'000      ? published::bins_1000_know_after

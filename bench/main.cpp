@@ -51,7 +51,8 @@ int main(int argc, char** argv) {
   sweep->add_option("--plots", sweep_options.plots, "Also write the page's charts to this folder");
   sweep->add_option("--max-bins", sweep_options.max_bins, "Most bins per object");
   sweep->add_option("--trials", sweep_options.trials,
-                    "Most trials per letter, 10 by default, or 4 with --quick");
+                    "Trials per letter, 10 by default, or 4 with --quick; few of them in full "
+                    "where bins are many");
   sweep->add_flag("--quick", sweep_options.quick, "Few counts and trials, in less than a minute");
   sweep->add_option("--device", sweep_options.device,
                     "Vulkan device, by a part of its name or index");

@@ -30,8 +30,11 @@ struct Interval {
 /// 1927). Unlike the normal approximation's it is not empty where all or none succeed.
 /// trials > 0.
 Interval wilson_interval(int successes, int trials);
-/// The 95 % interval of the mean of what at least two values are drawn from, by the normal
-/// approximation.
+/// Of at least one value.
+double mean(std::span<const double> values);
+/// Of the mean of at least two values.
+double standard_error(std::span<const double> values);
+/// The 95 % interval of the mean of what at least three values are drawn from, by Student's t.
 Interval mean_interval(std::span<const double> values);
 
 /// Resident memory of the process. The peak is since the last restart_peak_memory(), or since the

@@ -82,14 +82,14 @@ void print(const SweepResult& result) {
                fmt::format("{:.1e}", precision.deviation.rms)});
   }
   print_heads({"otherwise", "elements", "bins", "mode, mm", "refined, mm", "against",
-               "mode: difference", "refined: difference", "beyond"});
+               "mode: difference", "refined: difference"});
   for (const Limit& limit : result.limits) {
     print_row({limit.name, fmt::format("{}", limit.elements),
                count_text(static_cast<double>(limit.count)),
                mean_text(errors_over(limit.errors, PoseKind::mode)),
                mean_text(errors_over(limit.errors, PoseKind::refined)), against_text(result, limit),
-               gain_text(result, limit, PoseKind::mode),
-               gain_text(result, limit, PoseKind::refined), fmt::format("{}", limit.beyond)});
+               difference_text(result, limit, PoseKind::mode),
+               difference_text(result, limit, PoseKind::refined)});
   }
   fmt::print("\n");
   for (const CellFinding& finding : result.findings) {

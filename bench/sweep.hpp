@@ -15,7 +15,7 @@ struct SweepOptions {
   /// Per object of the runs; by default 10,000,000, or 100,000 if quick. What bounds the error is
   /// measured in windows of lattices of its own.
   std::optional<std::int64_t> max_bins;
-  std::optional<int> trials;  ///< most per letter; by default 10, or 4 if quick
+  std::optional<int> trials;  ///< per letter; by default 10, or 4 if quick
   bool quick = false;         ///< few counts and trials, in less than a minute
 };
 

@@ -209,8 +209,8 @@ Chart knee_chart(const SweepResult& result) {
     chart.rules.push_back({.vertical = false,
                            .at = least->floor->mean_mm,
                            .colour = grey,
-                           .label = fmt::format("noise floor {} mm, {} trials",
-                                                mean_text(least->floor), least->floor->trials)});
+                           .label = fmt::format("floor {} mm, {} trials", mean_text(least->floor),
+                                                least->floor->trials)});
   }
   chart.series.push_back(std::move(nearest));
   return chart;
@@ -233,7 +233,8 @@ std::vector<NamedChart> charts_of(const SweepResult& result) {
                 "marks: maps of 0.5 mm cells; half filled: 0.25 mm; hollow: 1 mm. A refined pose "
                 "is drawn at the time of all estimates and one refinement after the last. Errors "
                 "are over the trials whose mode has the right object; the front is of runs that "
-                "recognise and locate all {} trials, and runs of fewer stay out of it.",
+                "recognise and locate all {} trials, where errors are from windows all those in "
+                "full; runs of fewer stay out of it.",
                 result.trials)),
       named("precision", precision_chart(result),
             fmt::format(
@@ -246,7 +247,7 @@ std::vector<NamedChart> charts_of(const SweepResult& result) {
             fmt::format(
                 "The histogram on lattices of balanced steps, all over the same {} trials. "
                 "\"Nearest bin\" is the least error that any bin of the lattice has: what the "
-                "lattice alone costs. The noise floor is what is left on the finest lattice. "
+                "lattice alone costs. The floor is what is left on the finest lattice. "
                 "Vertical lines: what --bins auto takes for these cells.",
                 result.trials)),
   };

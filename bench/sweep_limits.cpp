@@ -86,7 +86,6 @@ Limit measure(Device& device, const LearnedLetters& learned, std::span<const Rec
       .name = {}, .count = lattice.bins(), .elements = trials.front().elements(), .errors = {}};
   for (const Recording& trial : trials) {
     limit.errors.push_back(estimate_in_window(device, learned, trial, lattice).errors);
-    limit.beyond += *limit.errors.back().mode_mm > window_reach_mm ? 1 : 0;
   }
   return limit;
 }

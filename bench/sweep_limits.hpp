@@ -11,14 +11,13 @@
 namespace palpate::bench {
 
 /// Pose errors of all trials on one lattice where one thing about the sensor, its touches or the
-/// maps is otherwise, from windows.
+/// maps is otherwise, from windows: of how well the object and its neighbourhood are found they say
+/// nothing.
 struct Limit {
   std::string name;
   std::int64_t count = 0;    ///< bins per object
   std::size_t elements = 0;  ///< of the array
   std::vector<TrialErrors> errors;
-  /// Trials whose mode is no nearer than windows reach: the full posterior may well have another.
-  int beyond = 0;
   std::optional<std::size_t> against = {};  ///< the limit it is compared with
 };
 

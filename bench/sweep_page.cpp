@@ -124,9 +124,8 @@ std::string row(const SweepResult& result, const Limit& limit) {
   return "<tr>" + cell(limit.name) + cell(static_cast<std::int64_t>(limit.elements)) +
          cell(limit.count) + mean(errors_over(limit.errors, PoseKind::mode)) +
          mean(errors_over(limit.errors, PoseKind::refined)) + cell(against_text(result, limit)) +
-         cell(gain_text(result, limit, PoseKind::mode)) +
-         cell(gain_text(result, limit, PoseKind::refined)) +
-         cell(static_cast<std::int64_t>(limit.beyond)) + "</tr>\n";
+         cell(difference_text(result, limit, PoseKind::mode)) +
+         cell(difference_text(result, limit, PoseKind::refined)) + "</tr>\n";
 }
 
 std::string table(const std::vector<std::string>& heads, const std::string& rows) {
@@ -188,7 +187,7 @@ std::string limit_table(const SweepResult& result) {
   }
   return table({"what is otherwise", "elements", "bins per object",
                 "mode: mean ± standard error, mm", "refined: mean ± standard error, mm", "against",
-                "mode: difference, mm", "refined: difference, mm", "beyond the windows"},
+                "mode: difference, mm", "refined: difference, mm"},
                rows);
 }
 
@@ -230,13 +229,15 @@ std::string page_of(const SweepResult& result, const nlohmann::ordered_json& fac
   }
   text += fmt::format(
       "</ul>\n<p class=\"note\">Bins suffice where all trials are located and no finer lattice "
-      "lowers the mean error by more "
-      "than {:.0f} % and by more than two standard errors of the paired differences. ± is a "
+      "lowers the "
+      "mean error by more than {:.0f} % and by more than two standard errors of the paired "
+      "differences. ± is a "
       "standard error.</p>\n",
       100.0 * least_gain);
   text += fmt::format(
       "<h2>What bounds the error</h2>\n<p class=\"note\">One thing otherwise at a time, {} trials "
-      "in windows; differences are paired by trial, above 0 where it errs more.</p>\n",
+      "in windows, which say nothing of how well the object and its neighbourhood are found; "
+      "differences are paired by trial, above 0 where it errs more.</p>\n",
       result.limits.front().errors.size());
   text += limit_table(result);
   text += "<h2>All runs</h2>\n<p class=\"note\">Click on a head to sort.</p>\n" + run_table(result);
@@ -244,7 +245,8 @@ std::string page_of(const SweepResult& result, const nlohmann::ordered_json& fac
       "<p class=\"note\">A run with fewer trials in full than located has its errors from windows: "
       "the bins of the same lattice within {} mm of the truth, by the pose error, of the true "
       "object's map alone. A bin's likelihood does not depend on the others, so that mode and "
-      "refined pose are those of the full posterior wherever that has its mode there. {}</p>\n",
+      "refined pose are those of the full posterior wherever that has its mode there, as it has in "
+      "the trials in full. {}</p>\n",
       window_reach_mm, xml_escaped(window_sentence(result)));
   text += "<h2>All ways to evaluate the likelihood</h2>\n" + precision_table(result);
   return text + fmt::format("<script>{}</script>\n</body>\n</html>\n", sort_script);

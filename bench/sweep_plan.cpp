@@ -78,7 +78,7 @@ int SweepPlan::particle_trials_each(int particles) const {
 
 SweepPlan plan_of(const SweepOptions& options) {
   const int trials = options.quick ? 4 : 10;
-  SweepPlan plan{.trials_each = std::min(trials, options.trials.value_or(trials)),
+  SweepPlan plan{.trials_each = options.trials.value_or(trials),
                  .most_full = options.quick ? 50'000 : 320'000,
                  .most_twice = options.quick ? 50'000 : 1'200'000,
                  .cells = options.quick ? quick_cells() : full_cells(),

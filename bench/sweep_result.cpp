@@ -86,6 +86,7 @@ Json json_of(const PosedError& posed) {
           {"cell_mm", posed.point->cell_mm},
           {"count", posed.point->count},
           {"trials", posed.errors.trials},
+          {"full_trials", posed.point->full_trials},
           {"accuracy", posed.point->accuracy},
           {"cost", posed.seconds},
           {"error", posed.errors.mean_mm},
@@ -97,8 +98,8 @@ Json difference_of(const SweepResult& result, const Limit& limit, PoseKind kind)
     return nullptr;
   }
   const PairedErrors paired =
-      paired_errors(result.limits[*limit.against].errors, limit.errors, kind);
-  return {{"mean", paired.second_mm - paired.first_mm},
+      paired_errors(limit.errors, result.limits[*limit.against].errors, kind);
+  return {{"mean", paired.first_mm - paired.second_mm},
           {"standard_error", paired.standard_error_mm}};
 }
 
@@ -108,7 +109,6 @@ Json json_of(const SweepResult& result, const Limit& limit) {
           {"elements", limit.elements},
           {"error_mm", json_of(errors_over(limit.errors, PoseKind::mode))},
           {"refined_error_mm", json_of(errors_over(limit.errors, PoseKind::refined))},
-          {"beyond_window", limit.beyond},
           {"against", limit.against ? Json(against_text(result, limit)) : Json(nullptr)},
           {"difference_mm", difference_of(result, limit, PoseKind::mode)},
           {"refined_difference_mm", difference_of(result, limit, PoseKind::refined)}};

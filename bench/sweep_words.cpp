@@ -16,13 +16,13 @@ std::string knee_text(const std::optional<std::int64_t>& knee) {
               : "still gain at the finest lattice";
 }
 
-/// "0.316 to 0.238 mm by the mode (-25 %, 0.078 +- 0.012 less)".
+/// "0.316 to 0.238 mm by the mode (-25 %, -0.078 +- 0.012 mm)".
 std::string step_text(const SweepPoint& from, const SweepPoint& to, PoseKind kind) {
   const PairedErrors paired = paired_errors(from.errors, to.errors, kind);
-  const double less_mm = paired.first_mm - paired.second_mm;
-  return fmt::format("{:.3f} to {:.3f} mm {} ({:+.0f} %, {:.3f} ± {:.3f} less)", paired.first_mm,
+  const double more_mm = paired.second_mm - paired.first_mm;
+  return fmt::format("{:.3f} to {:.3f} mm {} ({:+.0f} %, {:+.3f} ± {:.3f} mm)", paired.first_mm,
                      paired.second_mm, kind == PoseKind::mode ? "by the mode" : "refined",
-                     paired.first_mm > 0.0 ? -100.0 * less_mm / paired.first_mm : 0.0, less_mm,
+                     paired.first_mm > 0.0 ? 100.0 * more_mm / paired.first_mm : 0.0, more_mm,
                      paired.standard_error_mm);
 }
 
@@ -105,20 +105,19 @@ std::string window_sentence(const SweepResult& result) {
     return {};
   }
   return fmt::format(
-      "Windows: of {} trials with the full posterior on the same lattices, {:.0f} are recognised, "
-      "each with a probability of {:.6f} or more; their modes are those of the windows within "
-      "{:.1e} "
-      "mm, their refined poses within {:.1e} mm ({} trials).",
+      "Windows: of {} trials with the full posterior on the same lattices, {:.0f} are recognised; "
+      "what is most probable has a probability of {:.6f} or more. Their modes are those of the "
+      "windows within {:.1e} mm, their refined poses within {:.1e} mm ({} trials).",
       full_trials, recognised, least_confidence, all.mode_mm, all.refined_mm, all.trials);
 }
 
-std::string gain_text(const SweepResult& result, const Limit& limit, PoseKind kind) {
+std::string difference_text(const SweepResult& result, const Limit& limit, PoseKind kind) {
   if (!limit.against) {
     return "–";
   }
   const PairedErrors paired =
-      paired_errors(result.limits[*limit.against].errors, limit.errors, kind);
-  return fmt::format("{:+.3f} ± {:.3f}", paired.second_mm - paired.first_mm,
+      paired_errors(limit.errors, result.limits[*limit.against].errors, kind);
+  return fmt::format("{:+.3f} ± {:.3f}", paired.first_mm - paired.second_mm,
                      paired.standard_error_mm);
 }
 

@@ -21,9 +21,9 @@ std::string knee_sentence(const CellFinding& finding, const std::vector<SweepPoi
 /// How well windows agree with the full posterior; empty where there are none.
 std::string window_sentence(const SweepResult& result);
 
-/// By how much a limit errs less than what it is compared with, with the standard error; a dash
+/// By how much more a limit errs than what it is compared with, with the standard error; a dash
 /// where it is compared with nothing.
-std::string gain_text(const SweepResult& result, const Limit& limit, PoseKind kind);
+std::string difference_text(const SweepResult& result, const Limit& limit, PoseKind kind);
 /// What it is compared with; a dash for nothing.
 std::string against_text(const SweepResult& result, const Limit& limit);
 

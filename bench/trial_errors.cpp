@@ -1,8 +1,6 @@
 #include "trial_errors.hpp"
 
 #include <algorithm>
-#include <cmath>
-#include <numeric>
 #include <vector>
 
 #include "measurement.hpp"
@@ -11,21 +9,8 @@ namespace palpate::bench {
 
 namespace {
 
-double mean(std::span<const double> values) {
-  return std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
-}
-
-double standard_error(std::span<const double> values) {
-  if (values.size() < 2) {
-    return 0.0;
-  }
-  const double centre = mean(values);
-  double squares = 0.0;
-  for (const double value : values) {
-    squares += (value - centre) * (value - centre);
-  }
-  const auto n = static_cast<double>(values.size());
-  return std::sqrt(squares / (n - 1.0) / n);
+double standard_error_or_0(std::span<const double> values) {
+  return values.size() > 1 ? standard_error(values) : 0.0;
 }
 
 }  // namespace
@@ -43,7 +28,7 @@ std::optional<ErrorsOverTrials> errors_over(std::span<const TrialErrors> trials,
   }
   ErrorsOverTrials errors{.trials = static_cast<int>(errors_mm.size()),
                           .mean_mm = mean(errors_mm),
-                          .standard_error_mm = standard_error(errors_mm),
+                          .standard_error_mm = standard_error_or_0(errors_mm),
                           .median_mm = median(errors_mm)};
   if (errors_mm.size() >= least_for_p95) {
     errors.p95_mm = quantile(errors_mm, 0.95);
@@ -53,7 +38,7 @@ std::optional<ErrorsOverTrials> errors_over(std::span<const TrialErrors> trials,
 
 bool PairedErrors::gain() const {
   const double less_mm = first_mm - second_mm;
-  return less_mm > least_gain * first_mm && less_mm > 2.0 * standard_error_mm;
+  return trials > 1 && less_mm > least_gain * first_mm && less_mm > 2.0 * standard_error_mm;
 }
 
 PairedErrors paired_errors(std::span<const TrialErrors> first, std::span<const TrialErrors> second,
@@ -76,7 +61,7 @@ PairedErrors paired_errors(std::span<const TrialErrors> first, std::span<const T
   return {.trials = static_cast<int>(less_mm.size()),
           .first_mm = mean(first_mm),
           .second_mm = mean(second_mm),
-          .standard_error_mm = standard_error(less_mm)};
+          .standard_error_mm = standard_error_or_0(less_mm)};
 }
 
 }  // namespace palpate::bench

@@ -39,7 +39,7 @@ struct PairedErrors {
   double second_mm = 0.0;
   double standard_error_mm = 0.0;  ///< of the mean difference; 0 for a single trial
 
-  /// The second errs less by more than `least_gain` and by two standard errors.
+  /// The second errs less by more than `least_gain` and by two standard errors; never of one trial.
   bool gain() const;
 };
 /// Trial i of one run is trial i of the other.

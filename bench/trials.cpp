@@ -89,6 +89,9 @@ std::size_t object_of(const LearnedLetters& learned, const std::string& label) {
   const auto object =
       std::find_if(learned.objects.begin(), learned.objects.end(),
                    [&](const Hypothesis& hypothesis) { return hypothesis.map.label == label; });
+  if (object == learned.objects.end()) {
+    throw Error(Fault::input, fmt::format("'{}' is no learned letter", label));
+  }
   return static_cast<std::size_t>(object - learned.objects.begin());
 }
 

@@ -51,6 +51,7 @@ std::vector<Recording> make_trials(std::span<const std::string> shapes, int tria
                                    int touches, std::uint64_t seed, const TrialTouches& how = {});
 
 /// The learned object of this label, as an index.
+/// @throws Error where it was not learned
 std::size_t object_of(const LearnedLetters& learned, const std::string& label);
 
 /// What an estimate is worth.

@@ -2,9 +2,10 @@
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_control_flow_attributes : require
 
-// Adds the log-likelihood of touches (Eq. 7, 13) to a slab of the belief, for lattices whose step is
-// at most a cell of the map: one invocation takes TILE_X x TILE_Y neighbouring bins of one theta,
-// which span at most CELLS cells, so that for each element the same few nodes serve all of them.
+// Adds the log-likelihood of touches (Eq. 7, 13) to a slab of the belief, for lattices of which
+// several neighbouring bins lie within a cell of the map or two: one invocation takes TILE_X x TILE_Y
+// of one theta, which span at most CELLS cells along each axis, so that for each element the same few
+// nodes serve all of them.
 
 #include "interface.h"
 

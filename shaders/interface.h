@@ -17,7 +17,7 @@ const uint CONTACT_INSTEAD = 2;
 const uint UNKNOWN_INSTEAD = 3;
 
 // Rows and columns of prior that surround an uploaded map, on each side: so many that a clamped
-// index finds all four nodes of a tile's side at the prior.
+// index finds all four nodes of a tile along an axis at the prior.
 const int MAP_BORDER = 4;
 
 // Stands for log(gamma m) where gamma is 0: the likelihood has no floor.

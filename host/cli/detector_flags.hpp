@@ -3,11 +3,11 @@
 #include <optional>
 #include <string>
 
+#include "palpate/touch_detector.hpp"
+
 namespace CLI {
 class App;
 }
-
-#include "palpate/touch_detector.hpp"
 
 namespace palpate::cli {
 

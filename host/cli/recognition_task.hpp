@@ -5,14 +5,14 @@
 #include <string>
 #include <vector>
 
-namespace CLI {
-class App;
-}
-
 #include "options.hpp"
 #include "palpate/particle_filter.hpp"
 #include "palpate/pose_histogram.hpp"
 #include "palpate/scene.hpp"
+
+namespace CLI {
+class App;
+}
 
 namespace palpate::cli {
 

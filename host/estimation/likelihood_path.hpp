@@ -37,7 +37,8 @@ std::vector<std::uint32_t> path_constants(const gpu::Limits& limits, const MapKi
 /// The buffers of shaders/likelihood_buffers.glsl.
 std::span<const gpu::Access> likelihood_bindings();
 
-/// Neighbouring bins in register tiles; none where the lattice is too coarse for the map's cells.
+/// Neighbouring bins in register tiles; none where too few lie side by side
+/// within two of the map's cells.
 std::optional<LikelihoodPath> tile_path(gpu::Context& context, const PoseLattice& lattice,
                                         std::size_t objects, const MapKind& maps,
                                         const ContactLikelihood& model);

@@ -15,11 +15,9 @@ namespace {
 
 int bordered(int cells) { return cells + 2 * shaders::MAP_BORDER; }
 
-/// Cells of the map with its border. In storage a kernel that takes a map's last node reads on,
-/// without a use, to the one above and to its right.
-std::uint64_t cells_of(const OccupancyGrid& map, gpu::Access access) {
-  const auto width = static_cast<std::uint64_t>(bordered(map.nx));
-  return width * bordered(map.ny) + (access == gpu::Access::storage ? width + 1 : 0);
+/// Cells of the map with its border.
+std::uint64_t cells_of(const OccupancyGrid& map) {
+  return static_cast<std::uint64_t>(bordered(map.nx)) * bordered(map.ny);
 }
 
 /// Most cells that kernels read at once.
@@ -36,7 +34,7 @@ gpu::Access access_of(const gpu::Context& context, const OccupancyGrid& map) {
   std::uint64_t most = 0;
   for (const gpu::Access access : {gpu::Access::table, gpu::Access::storage}) {
     most = std::max(most, most_cells(context.limits(), access));
-    if (cells_of(map, access) <= most) {
+    if (cells_of(map) <= most) {
       return access;
     }
   }
@@ -74,7 +72,7 @@ std::vector<MapGroup> group_maps(const gpu::Context& context,
   for (std::size_t object = 0; object < hypotheses.size(); ++object) {
     const OccupancyGrid& map = hypotheses[object].map;
     const MapKind kind{map.cell_mm, access_of(context, map)};
-    const std::uint64_t cells = cells_of(map, kind.access);
+    const std::uint64_t cells = cells_of(map);
     const std::uint64_t most = most_cells(limits, kind.access);
     const auto group = std::find_if(groups.begin(), groups.end(), [&](const MapGroup& g) {
       return g.kind == kind && g.cells + cells <= most && g.objects.size() < most_objects;
@@ -125,7 +123,7 @@ MapTable::MapTable(gpu::Context& context, gpu::CommandStream& stream, const MapG
       const std::vector<float> cells = with_border(map, prior);
       stream.upload(log_odds_, std::span(cells), offset);
     }
-    first_node += cells_of(map, access);
+    first_node += cells_of(map);
   }
   axes_ =
       gpu::Buffer(context, std::span(axes).size_bytes(), gpu::Memory::device, "the lattice's axes");

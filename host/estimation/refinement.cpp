@@ -33,7 +33,7 @@ constexpr int passes = 3;
 // 0.168 mm, the mean by 0.159 and 0.182; on 14 x 14 x 53 bins, by 0.26 and 0.40. Reaches of 1 and
 // 1.3 mm and twice the root give the same within 0.02 mm. Peaks further away than a bin or two are
 // of quadratics that do not fit.
-constexpr double peak_root_factor = 3.0;  ///< to the mean's root, 24 in the place of 8
+constexpr double peak_root_factor = 3.0;  ///< of the mean's root: 24 for a root of 8
 constexpr double peak_reach_mm = 0.8;
 constexpr double farthest_peak_mm = 1.0;
 // Nats per mm^2. The logs' rounding, 1e-3 nats after a thousand touches, bends them by as much.

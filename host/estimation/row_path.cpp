@@ -45,7 +45,7 @@ LikelihoodPath row_path(gpu::Context& context, const PoseLattice& lattice, std::
           .bins_x = run,
           .bins_y = 1,
           .description = fmt::format("runs of {} bins: at a lattice step of {:.3g} x {:.3g} map "
-                                     "cells too few bins span two cells for a tile{}",
+                                     "cells fewer bins than a tile needs lie side by side{}",
                                      run, lattice.x_mm.step() / maps.cell_mm,
                                      lattice.y_mm.step() / maps.cell_mm,
                                      context.limits().cpu ? "" : ", or tiles leave the GPU idle")};

@@ -9,8 +9,11 @@ namespace palpate {
 
 namespace {
 
+// The larger, the less refined poses err on coarse bins after many touches, and the more on fine
+// ones after few. Of 0.26, 0.31, 0.36, 0.41 and 0.46: 0.30, 0.25, 0.23, 0.22 and 0.21 mm on 13 x 13
+// x 55 bins after 50 touches; 0.211, 0.212, 0.215, 0.226 and 0.232 mm on 30 x 30 x 113 after 15.
 constexpr double wanted_share = 1.0 / 3.0;
-// Logs differ by 1e19 nats at the most; beyond that one bin may as well have it all.
+// To a root of 1e20. Where bins differ by more nats one has it all, whatever the root.
 constexpr int most_doublings = 64;
 
 /// Root mean square distance from the mean, bins weighted by exp(log-likelihood * inverse_root).
@@ -31,9 +34,6 @@ double spread_mm(std::span<const DisplacedBin> bins, double top, double inverse_
 }  // namespace
 
 double tempering_root(std::span<const DisplacedBin> bins, double least) {
-  if (bins.empty()) {
-    return least;
-  }
   const double top =
       std::max_element(bins.begin(), bins.end(), [](const DisplacedBin& a, const DisplacedBin& b) {
         return a.log_likelihood < b.log_likelihood;

@@ -12,9 +12,10 @@ struct DisplacedBin {
   double log_likelihood = 0.0;
 };
 
-/// The root of the belief, at least `least`, under which its bins spread by a third of what they
-/// would if all weighed the same, in the root mean square about their mean. Many touches leave
-/// nearly all of a belief in one bin of a coarse lattice, and a fixed root of it no better.
+/// The root of the belief in at least one bin, no less than `least`, under which its bins spread by
+/// a third of what they would if all weighed the same, in the root mean square about their mean.
+/// Many touches leave nearly all of a belief in one bin of a coarse lattice, and a fixed root of it
+/// no better.
 double tempering_root(std::span<const DisplacedBin> bins, double least);
 
 }  // namespace palpate

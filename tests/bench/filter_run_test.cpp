@@ -76,11 +76,17 @@ TEST(Wilson, BracketsTheFractionAndIsNeverEmpty) {
   EXPECT_EQ(curve_of(small_run())[1].accuracy_interval.low, wilson_interval(3, 4).low);
 }
 
-TEST(MeanInterval, IsTwoStandardErrorsEachWay) {
-  const Interval interval = mean_interval(std::vector{1.0, 2.0, 3.0, 6.0});
-  // Mean 3, deviation sqrt(14 / 3), over sqrt(4), times 1.959964.
-  EXPECT_NEAR(interval.low, 3.0 - 2.117, 1e-3);
-  EXPECT_NEAR(interval.high, 3.0 + 2.117, 1e-3);
+TEST(MeanInterval, IsStudents) {
+  const Interval few = mean_interval(std::vector{1.0, 2.0, 3.0, 6.0});
+  // Mean 3, deviation sqrt(14 / 3), over sqrt(4), times 3.1824 for three degrees of freedom.
+  EXPECT_NEAR(few.low, 3.0 - 3.437, 0.04);
+  EXPECT_NEAR(few.high, 3.0 + 3.437, 0.04);
+  std::vector<double> many;
+  for (int i = 0; i < 21; ++i) {
+    many.push_back(i);
+  }
+  // Deviation sqrt(770 / 20), over sqrt(21), times 2.0860 for twenty.
+  EXPECT_NEAR(mean_interval(many).high, 10.0 + 2.8244, 1e-3);
 }
 
 TEST(Comparison, PairsTrialByTrial) {

@@ -6,6 +6,7 @@
 
 #include <gtest/gtest.h>
 
+#include "interface.h"
 #include "made_up_devices.hpp"
 #include "palpate/error.hpp"
 #include "palpate/pose_histogram.hpp"
@@ -130,8 +131,13 @@ TEST_P(DeviceLimits, LeaveMapsAsTheReferenceHasThem) {
 
 INSTANTIATE_TEST_SUITE_P(Devices, DeviceLimits, testing::ValuesIn(made_up_devices));
 
-/// 46 x 46 cells with the border.
 constexpr int large_map_cells = 40;
+
+/// Cells of a map as kernels read it.
+constexpr std::uint32_t bordered(int nx, int ny) {
+  return static_cast<std::uint32_t>((nx + 2 * shaders::MAP_BORDER) *
+                                    (ny + 2 * shaders::MAP_BORDER));
+}
 
 TEST(LargeMap, IsReadFromStorageWhereNoTableHoldsIt) {
   const Recording recording = random_recording(2, 36, 148);
@@ -142,9 +148,9 @@ TEST(LargeMap, IsReadFromStorageWhereNoTableHoldsIt) {
       {random_map(9, 11, 0.5, 12.0, 150), 1.0}};
   Device device = Device::open();
   gpu::Limits limits = device.context().limits();
-  limits.table_texels = 46 * 46 - 1;
+  limits.table_texels = bordered(large_map_cells, large_map_cells) - 1;
   device.context().lower_limits(limits);
-  for (const double step_mm : {0.1, 0.8}) {
+  for (const double step_mm : {0.1, 0.25, 0.8}) {
     HistogramOptions options;
     options.lattice = lattice_of(step_mm, 19);
     PoseHistogram histogram(device, objects, options);
@@ -164,9 +170,9 @@ TEST(LargeMap, ManyMapsGoIntoSeveralTables) {
   }
   Device device = Device::open();
   gpu::Limits limits = device.context().limits();
-  limits.table_texels = 2 * 17 * 18;  // two maps with their borders
+  limits.table_texels = 2 * bordered(11, 12);
   device.context().lower_limits(limits);
-  for (const double step_mm : {0.1, 0.8}) {
+  for (const double step_mm : {0.1, 0.25, 0.8}) {
     HistogramOptions options;
     options.lattice = lattice_of(step_mm, 19);
     PoseHistogram histogram(device, objects, options);
@@ -181,7 +187,7 @@ TEST(LargeMap, ThatNoBufferHoldsIsRefusedByItsLabel) {
   Device device = Device::open();
   gpu::Limits limits = device.context().limits();
   limits.table_texels = 1000;
-  limits.storage_range = (46 * 46 - 1) * sizeof(float);
+  limits.storage_range = (bordered(large_map_cells, large_map_cells) - 1) * sizeof(float);
   device.context().lower_limits(limits);
   const Hypothesis object{random_map(large_map_cells, large_map_cells, 0.5, 1.0, 114), 1.0};
   HistogramOptions small;

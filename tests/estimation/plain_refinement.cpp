@@ -94,7 +94,10 @@ double plain_root(const std::vector<Moved>& window) {
   if (plain_spread_mm(window, root) >= wanted) {
     return root;
   }
-  while (plain_spread_mm(window, 2.0 * root) < wanted) {
+  for (int i = 0; plain_spread_mm(window, 2.0 * root) < wanted; ++i) {
+    if (i == 64) {
+      return root;  // one bin has it all
+    }
     root *= 2.0;
   }
   const double narrow = plain_spread_mm(window, root);

@@ -44,7 +44,7 @@ TEST_F(PreparedTouch, ChangesNothingBeforeItComes) {
 }
 
 TEST_F(PreparedTouch, GivesTheReferencesLikelihoodOnEveryPath) {
-  for (const double step_mm : {0.1, 0.8}) {
+  for (const double step_mm : {0.1, 0.25, 0.8}) {
     const HistogramOptions options = options_of(step_mm);
     PoseHistogram histogram(device, objects(), options);
     for (const Touch& touch : touches) {

@@ -42,7 +42,7 @@ TEST(StillArray, GivesTheReferencesLikelihoodOnEveryPath) {
   constexpr std::size_t elements = 300;
   const Recording recording = presses(3, elements);
   const std::vector<Touch> touches = all_touches(recording);
-  for (const double step_mm : {0.1, 0.8}) {
+  for (const double step_mm : {0.1, 0.25, 0.8}) {
     for (const double gamma : {0.1, 1e-6}) {
       const HistogramOptions options = options_of(true, step_mm, gamma);
       Device device = Device::open();

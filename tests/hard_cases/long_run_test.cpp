@@ -67,7 +67,7 @@ TEST(LongRun, TouchesOneByOneOfAStillArray) {
                 "every touch adds a shared base and takes back what it says otherwise",
                 "base and differences are two floats; 0.05 nats near the top");
   const std::vector<Hypothesis> objects = near_twins();
-  HistogramOptions options = near_the_top(2);
+  HistogramOptions options = near_the_top(4);  // register tiles
   options.still_array = true;
   Recording recording = random_recording(2, 36, 405);
   recording.T_robot_sensor[1] = recording.T_robot_sensor[0];

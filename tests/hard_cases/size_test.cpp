@@ -38,7 +38,7 @@ TEST(Size, OneObjectOneBinOneElement) {
 
 TEST(Size, AMapOfOneCell) {
   HardCase hard("a map of one cell", "interpolation reaches beyond the map on both sides",
-                "a border of prior, three cells wide");
+                "a border of prior, wider than any tile reaches");
   const std::vector<Hypothesis> objects{{random_map(1, 1, 0.5, 6.0, 453), 1.0},
                                         {random_map(1, 1, 8.0, 6.0, 454), 1.0},
                                         {random_map(1, 9, 1.0, 6.0, 455), 1.0}};

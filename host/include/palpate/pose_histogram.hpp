@@ -96,7 +96,8 @@ class PoseHistogram {
   /// by more than the window, do not show in the result. An axis of zero extent stays where it is.
   /// On bins much wider than the belief, where the best bin need not be the nearest to the truth,
   /// the covariance is too small. So it is where touches lie elsewhere than reported: the belief
-  /// takes their poses to be exact. After one or two touches a pose is rarely better than its mode.
+  /// takes their poses to be exact. After one or two touches a pose is better than its mode
+  /// on average, but worse in about a third of the cases.
   /// @throws Error if there is no such object or bin, or the device fails
   RefinedPose refine(const Mode& mode) const;
 
