@@ -39,6 +39,8 @@ class FakeUsb {
 /// Its firmware is the function that answers control requests, and whoever sends packets.
 class FakeUsbDevice {
  public:
+  static constexpr std::size_t packet_bytes = 64;  ///< of every endpoint
+
   struct Identity {
     std::uint16_t vendor = 0;
     std::uint16_t product = 0;

@@ -11,6 +11,7 @@
 #include <glm/vec3.hpp>
 
 #include "palpate/error.hpp"
+#include "particle_reference.hpp"
 #include "synthetic.hpp"
 
 namespace palpate {
@@ -20,24 +21,10 @@ constexpr double two_pi = 2.0 * std::numbers::pi;
 // What the method allows a log-likelihood to differ from float64, in nats per touch.
 constexpr double per_touch = 1e-4;
 
-std::vector<Hypothesis> three_objects() {
-  return {{random_map(31, 27, 0.5, 4.0, 81), 1.0},
-          {random_map(25, 25, 0.3, 4.0, 82), 2.0},
-          {random_map(14, 15, 1.0, 4.0, 83), 1.0}};
-}
-
 Recording says_nothing() {
   Recording recording = random_recording(1, 36, 431);
   recording.valid.assign(36, 0);
   return recording;
-}
-
-std::vector<double> weights_of(const ParticleFilter& filter) {
-  std::vector<double> weights;
-  for (const ParticleFilter::Particle& particle : filter.particles()) {
-    weights.push_back(particle.weight);
-  }
-  return weights;
 }
 
 bool same_pose(const Pose& a, const Pose& b) {
@@ -55,27 +42,6 @@ bool same_bits(const ParticleFilter& a, const ParticleFilter& b) {
     }
   }
   return particles_a.size() == particles_b.size();
-}
-
-/// Largest difference in nats between the particles' weights and the reference's likelihoods of one
-/// touch at their poses, both relative to the mean, over every `stride`-th particle.
-double weight_error(const ParticleFilter& filter, const Touch& touch,
-                    const std::vector<Hypothesis>& objects, const ParticleOptions& options,
-                    std::size_t stride = 1) {
-  const ContactLikelihood model{.gamma = options.gamma,
-                                .prior = options.prior.value_or(objects.front().map.prior)};
-  std::vector<double> differences;
-  double mean = 0.0;
-  const std::vector<ParticleFilter::Particle> particles = filter.particles();
-  for (std::size_t i = 0; i < particles.size(); i += stride) {
-    const ParticleFilter::Particle& particle = particles[i];
-    const double expected = reference::log_likelihood(
-        touch, particle.T_object_robot, objects[particle.object].map, options.classifier, model);
-    differences.push_back(std::log(particle.weight) - expected);
-    mean += differences.back();
-  }
-  mean /= static_cast<double>(differences.size());
-  return largest_difference(differences, std::vector<double>(differences.size(), mean));
 }
 
 TEST(ParticleFilter, StartsUniformByPriorWeightAndReturnsToIt) {
@@ -115,90 +81,6 @@ TEST(ParticleFilter, StartsUniformByPriorWeightAndReturnsToIt) {
     EXPECT_FALSE(same_bits(filter, untouched));
     filter.reset();
   }
-}
-
-TEST(ParticleFilter, WeighsAsTheReferenceDoesAtTheParticlesOwnPoses) {
-  const std::vector<Hypothesis> objects = three_objects();
-  Device device = Device::open();
-  // Around blocks of 64 and 1,024.
-  for (const int n : {1, 7, 63, 65, 1000, 1025, 5000}) {
-    const ParticleOptions options{.particles = n, .region = {}, .classifier = {}};
-    ParticleFilter filter(device, objects, options);
-    const Recording recording = random_recording(3, 36, 433);
-    for (std::size_t i = 0; i < recording.size(); ++i) {
-      filter.update(recording.touch(i));
-      EXPECT_LT(weight_error(filter, recording.touch(i), objects, options), per_touch)
-          << n << " particles, touch " << i;
-    }
-  }
-}
-
-TEST(ParticleFilter, WeighsAsTheReferenceDoesOnLargeMapsAndAlienCells) {
-  // 0.07 mm is no binary fraction, and 900 cells make float32 coordinates coarse.
-  const std::vector<Hypothesis> objects = {{random_map(900, 700, 0.07, 4.0, 84), 1.0}};
-  const ParticleOptions options{.particles = 3000, .region = {}, .classifier = {}};
-  Device device = Device::open();
-  ParticleFilter filter(device, objects, options);
-  const Recording recording = random_recording(1, 36, 434);
-  filter.update(recording.touch(0));
-  EXPECT_LT(weight_error(filter, recording.touch(0), objects, options), per_touch);
-}
-
-TEST(ParticleFilter, WeighsAsTheReferenceDoesWithoutAFloorAndWithManyElements) {
-  std::vector<Hypothesis> objects = three_objects();
-  const Recording recording = random_recording(1, 10'000, 435);
-  Device device = Device::open();
-  for (const double gamma : {0.0, 0.1}) {
-    const ParticleOptions options{.particles = 65, .region = {}, .classifier = {}, .gamma = gamma};
-    ParticleFilter filter(device, objects, options);
-    filter.update(recording.touch(0));
-    // Weights below exp(-745) are 0 in float64: compare what is left, at least the largest.
-    const auto particles = filter.particles();
-    const ContactLikelihood model{.gamma = gamma, .prior = 0.2};
-    std::vector<double> expected;
-    double most = -std::numeric_limits<double>::infinity();
-    for (const auto& particle : particles) {
-      expected.push_back(reference::log_likelihood(recording.touch(0), particle.T_object_robot,
-                                                   objects[particle.object].map, {}, model));
-      most = std::max(most, expected.back());
-    }
-    double total = 0.0;
-    for (double& l : expected) {
-      l = std::exp(l - most);
-      total += l;
-    }
-    for (double& l : expected) {
-      l /= total;
-    }
-    // 277 touches' worth of elements, and a probability changes by at most the error in nats.
-    EXPECT_LT(largest_difference(weights_of(filter), expected), 277 * per_touch) << gamma;
-  }
-}
-
-TEST(ParticleFilter, KeepsItsPrecisionFarFromTheRobotsOrigin) {
-  const std::vector<Hypothesis> objects = three_objects();
-  ParticleOptions options{.particles = 1000, .region = {}, .classifier = {}};
-  const Recording recording = random_recording(2, 36, 436);
-  Device device = Device::open();
-  ParticleFilter near(device, objects, options);
-  near.update(all_touches(recording));
-
-  const glm::dvec2 far_mm{1.2e6, -3.4e5};
-  const Recording shifted = moved(recording, {far_mm, 0.0});
-  options.region.pivot_mm = far_mm;
-  ParticleFilter far(device, objects, options);
-  far.update(all_touches(shifted));
-  // 1 km away a float64 is good to 1e-10 mm, which may round float32 elements otherwise: a touch
-  // differs by what the device may, and by the same draws.
-  EXPECT_LT(largest_difference(weights_of(near), weights_of(far)), 2.0 * per_touch);
-  EXPECT_LT(weight_error(far, shifted.touch(1), objects, options), per_touch);
-  const Estimate here = near.estimate();
-  const Estimate there = far.estimate();
-  EXPECT_LT(largest_difference(here.identity, there.identity), 2.0 * per_touch);
-  const glm::dvec2 p_mm{3.0, 4.0};
-  EXPECT_NEAR((here.mode.T_object_robot * p_mm).x, (there.mode.T_object_robot * (p_mm + far_mm)).x,
-              1e-6)
-      << "the same grid point, in float64";
 }
 
 TEST(ParticleFilter, MovesByNormalNoiseOfTheGivenDeviations) {
@@ -295,49 +177,6 @@ TEST(ParticleFilter, TheSeedDecidesEveryBit) {
     first.reset();
     first.update(all_touches(recording));
     EXPECT_TRUE(same_bits(first, second));
-  }
-}
-
-TEST(ParticleFilter, TheEffectiveSampleSizeIsThatOfTheWeights) {
-  Device device = Device::open();
-  const Recording recording = random_recording(3, 36, 439);
-  for (const int n : {1, 65, 5000}) {
-    ParticleFilter filter(device, three_objects(),
-                          {.particles = n, .region = {}, .classifier = {}});
-    for (std::size_t i = 0; i < recording.size(); ++i) {
-      filter.update(recording.touch(i));
-      double squares = 0.0;
-      for (const double weight : weights_of(filter)) {
-        squares += weight * weight;
-      }
-      // Float32 sums within blocks.
-      EXPECT_NEAR(filter.effective_sample_size(), 1.0 / squares, 1e-5 / squares);
-    }
-    EXPECT_GE(filter.effective_sample_size(), 1.0);
-    EXPECT_LE(filter.effective_sample_size(), n);
-  }
-}
-
-TEST(ParticleFilter, WeightsSumToOneHoweverUnlikelyTheTouch) {
-  // Without a floor, these log odds cost a touch some 1e4 nats.
-  std::vector<Hypothesis> objects = {{random_map(200, 200, 0.5, 1.0, 85), 1.0}};
-  for (float& l : objects[0].map.log_odds) {
-    l = -1000.0F;
-  }
-  Device device = Device::open();
-  ParticleOptions options{.particles = 2000, .region = {}, .classifier = {}, .gamma = 0.0};
-  options.augmented = true;
-  ParticleFilter filter(device, objects, options);
-  const Recording recording = random_recording(3, 36, 440);
-  for (std::size_t i = 0; i < recording.size(); ++i) {
-    filter.update(recording.touch(i));
-    double total = 0.0;
-    for (const double weight : weights_of(filter)) {
-      total += weight;
-    }
-    EXPECT_NEAR(total, 1.0, 1e-12) << "float64 sums";
-    EXPECT_NEAR(filter.effective_sample_size(), 2000.0, 0.1) << "all are as unlikely";
-    EXPECT_TRUE(std::isfinite(filter.estimate().mode.log_likelihood));
   }
 }
 
