@@ -90,16 +90,20 @@ FakeUsbDevice::FakeUsbDevice(FakeUsb& usb, int address, int port, Identity ident
       port_(port),
       identity_(std::move(identity)),
       configuration_(std::move(configuration)),
-      firmware_(std::move(firmware)),
-      handler_(umockdev_ioctl_base_new()) {
-  g_signal_connect(handler_, "handle-ioctl", G_CALLBACK(&FakeUsbDevice::on_ioctl), this);
-  plug();
+      firmware_(std::move(firmware)) {
+  plug(0);
 }
 
-FakeUsbDevice::~FakeUsbDevice() {
-  unplug();
-  g_signal_handlers_disconnect_by_data(handler_, this);
-  g_object_unref(handler_);
+FakeUsbDevice::~FakeUsbDevice() { unplug(); }
+
+FakeUsbDevice::Attachment::Attachment(FakeUsbDevice& owner)
+    : device(owner), handler(umockdev_ioctl_base_new()) {
+  g_signal_connect(handler, "handle-ioctl", G_CALLBACK(&FakeUsbDevice::on_ioctl), this);
+}
+
+FakeUsbDevice::Attachment::~Attachment() {
+  g_signal_handlers_disconnect_by_data(handler, this);
+  g_object_unref(handler);
 }
 
 std::string FakeUsbDevice::port() const { return fmt::format("1-{}", port_); }
@@ -110,8 +114,7 @@ void FakeUsbDevice::plug(int by) {
   address_ += by;
   {
     const std::lock_guard lock(mutex_);
-    plugged_ = true;
-    halted_ = false;
+    attachments_.push_back(std::make_unique<Attachment>(*this));
     turns_.clear();
   }
   Bytes descriptors = device_descriptor(identity_.vendor, identity_.product, /*device_class=*/0,
@@ -128,7 +131,7 @@ void FakeUsbDevice::plug(int by) {
   attribute("serial", identity_.serial);
   // Before the device appears, so that whoever sees it can open it.
   GError* error = nullptr;
-  if (!umockdev_testbed_attach_ioctl(usb_.testbed(), node().c_str(), handler_, &error)) {
+  if (!umockdev_testbed_attach_ioctl(usb_.testbed(), node().c_str(), last().handler, &error)) {
     throw std::runtime_error(error->message);
   }
   add(usb_.testbed(), text);
@@ -141,16 +144,16 @@ void FakeUsbDevice::plug(int by) {
 void FakeUsbDevice::unplug() {
   {
     const std::lock_guard lock(mutex_);
-    if (!plugged_) {
+    if (!last().plugged) {
       return;
     }
-    plugged_ = false;
-    for (Urb& urb : under_way_) {
+    last().plugged = false;
+    for (Urb& urb : last().under_way) {
       urb.status = -ESHUTDOWN;
-      finished_.push_back(std::move(urb));
+      last().finished.push_back(std::move(urb));
     }
-    under_way_.clear();
-    claimed_.clear();
+    last().under_way.clear();
+    last().claimed.clear();
   }
   const std::string path = "/sys" + syspath();
   for (int interface = 0; interface < configuration_.at(4); ++interface) {
@@ -244,17 +247,17 @@ int FakeUsbDevice::halts_cleared() const {
 
 int FakeUsbDevice::urbs_under_way() const {
   const std::lock_guard lock(mutex_);
-  return static_cast<int>(under_way_.size());
+  return static_cast<int>(last().under_way.size());
 }
 
 bool FakeUsbDevice::claimed(int interface) const {
   const std::lock_guard lock(mutex_);
-  return claimed_.contains(interface);
+  return last().claimed.contains(interface);
 }
 
 bool FakeUsbDevice::has_kernel_driver(int interface) const {
   const std::lock_guard lock(mutex_);
-  return kernel_bound_.contains(interface) && !claimed_.contains(interface);
+  return kernel_bound_.contains(interface) && !last().claimed.contains(interface);
 }
 
 Bytes FakeUsbDevice::received() const {

@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <deque>
 #include <functional>
+#include <map>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -67,10 +68,11 @@ class FakeUsbDevice {
   FakeUsbDevice(const FakeUsbDevice&) = delete;
   FakeUsbDevice& operator=(const FakeUsbDevice&) = delete;
 
-  /// Appears on the bus, with the address it had the last time plus `by`: libusb takes a device at
-  /// another address for another one, as it is on real hardware.
-  void plug(int by = 0);
-  /// Disappears: the URBs under way fail, and so does all that follows.
+  /// Appears on the bus again, `by` addresses further: a bus gives each device that is plugged in a
+  /// new one, and the old one only after all 127 have had their turn (0).
+  void plug(int by = 1);
+  /// Disappears: the URBs under way fail, and whoever has it open has nothing any more, also once
+  /// it is plugged in again.
   void unplug();
 
   /// Queues a packet of the bulk endpoint towards the host.
@@ -121,14 +123,32 @@ class FakeUsbDevice {
     Fault fault = Fault::none;
   };
 
-  static gboolean on_ioctl(UMockdevIoctlBase*, UMockdevIoctlClient* client, gpointer self);
-  void handle(UMockdevIoctlClient* client);
-  int take_interface(int interface);
-  int submit(UMockdevIoctlData* argument);
-  int discard(UMockdevIoctlData* argument);
-  int reap(UMockdevIoctlData* argument, std::unique_lock<std::mutex>& lock);
+  /// The device from one plugging in to the unplugging, which is what an open file belongs to: the
+  /// kernel knows a device that comes back as another one.
+  struct Attachment {
+    explicit Attachment(FakeUsbDevice& device);
+    ~Attachment();
+    Attachment(const Attachment&) = delete;
+    Attachment& operator=(const Attachment&) = delete;
+
+    FakeUsbDevice& device;
+    UMockdevIoctlBase* handler;
+    bool plugged = true;
+    bool halted = false;
+    std::map<int, UMockdevIoctlClient*> claimed = {};  // by which open file
+    std::deque<Urb> under_way = {};
+    std::deque<Urb> finished = {};
+  };
+
+  static gboolean on_ioctl(UMockdevIoctlBase*, UMockdevIoctlClient* client, gpointer attachment);
+  void handle(UMockdevIoctlClient* client, Attachment& attachment);
+  int take_interface(int interface, UMockdevIoctlClient* client, Attachment& attachment) const;
+  int submit(UMockdevIoctlData* argument, Attachment& attachment);
+  static int discard(UMockdevIoctlData* argument, Attachment& attachment);
+  int reap(UMockdevIoctlData* argument, Attachment& attachment, std::unique_lock<std::mutex>& lock);
   void run_control(Urb& urb);
-  void run_bulk();
+  void run_bulk(Attachment& attachment);
+  Attachment& last() const { return *attachments_.back(); }
   std::string syspath() const;
   void show_driver(int interface, const std::string& driver);
 
@@ -138,19 +158,14 @@ class FakeUsbDevice {
   Identity identity_;
   Bytes configuration_;
   Firmware firmware_;
-  UMockdevIoctlBase* handler_;
 
   mutable std::mutex mutex_;
   std::condition_variable changed_;
-  bool plugged_ = false;
-  bool halted_ = false;
+  std::vector<std::unique_ptr<Attachment>> attachments_;  // those of before may still be open
   bool refusing_ = false;
   bool ignoring_ = false;
   bool occupied_ = false;
   std::set<int> kernel_bound_;
-  std::set<int> claimed_;
-  std::deque<Urb> under_way_;
-  std::deque<Urb> finished_;
   std::deque<Turn> turns_;
   std::vector<Setup> requests_;
   int halts_cleared_ = 0;

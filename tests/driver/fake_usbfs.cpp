@@ -14,12 +14,14 @@
 
 namespace palpate {
 
-gboolean FakeUsbDevice::on_ioctl(UMockdevIoctlBase*, UMockdevIoctlClient* client, gpointer self) {
-  static_cast<FakeUsbDevice*>(self)->handle(client);
+gboolean FakeUsbDevice::on_ioctl(UMockdevIoctlBase*, UMockdevIoctlClient* client,
+                                 gpointer attachment) {
+  auto& opened = *static_cast<Attachment*>(attachment);
+  opened.device.handle(client, opened);
   return TRUE;
 }
 
-void FakeUsbDevice::handle(UMockdevIoctlClient* client) {
+void FakeUsbDevice::handle(UMockdevIoctlClient* client, Attachment& attachment) {
   UMockdevIoctlData* argument = umockdev_ioctl_client_get_arg(client);
   const auto memory = [&](std::size_t bytes) {
     return Memory(umockdev_ioctl_data_resolve(argument, 0, bytes, nullptr));
@@ -32,7 +34,7 @@ void FakeUsbDevice::handle(UMockdevIoctlClient* client) {
   std::unique_lock lock(mutex_);
   const unsigned long request = umockdev_ioctl_client_get_request(client);
   int code = 0;  // an errno
-  if (!plugged_ && request != USBDEVFS_REAPURBNDELAY && request != USBDEVFS_DISCARDURB) {
+  if (!attachment.plugged && request != USBDEVFS_REAPURBNDELAY) {
     code = ENODEV;
   } else {
     switch (request) {
@@ -47,26 +49,26 @@ void FakeUsbDevice::handle(UMockdevIoctlClient* client) {
         code = ENODATA;
         break;
       case USBDEVFS_DISCONNECT_CLAIM:  // the interface's number comes first
-        code = take_interface(number(sizeof(usbdevfs_disconnect_claim)));
+        code = take_interface(number(sizeof(usbdevfs_disconnect_claim)), client, attachment);
         break;
       case USBDEVFS_CLAIMINTERFACE:
-        code = take_interface(number(sizeof(unsigned)));
+        code = take_interface(number(sizeof(unsigned)), client, attachment);
         break;
       case USBDEVFS_RELEASEINTERFACE:
-        claimed_.erase(number(sizeof(unsigned)));
+        attachment.claimed.erase(number(sizeof(unsigned)));
         break;
       case USBDEVFS_CLEAR_HALT:
-        halted_ = false;
+        attachment.halted = false;
         ++halts_cleared_;
         break;
       case USBDEVFS_SUBMITURB:
-        code = submit(argument);
+        code = submit(argument, attachment);
         break;
       case USBDEVFS_DISCARDURB:
-        code = discard(argument);
+        code = discard(argument, attachment);
         break;
       case USBDEVFS_REAPURBNDELAY:
-        code = reap(argument, lock);
+        code = reap(argument, attachment, lock);
         break;
       case USBDEVFS_IOCTL:  // to give an interface back to the kernel's driver
         break;
@@ -77,15 +79,16 @@ void FakeUsbDevice::handle(UMockdevIoctlClient* client) {
   umockdev_ioctl_client_complete(client, code == 0 ? 0 : -1, code);
 }
 
-int FakeUsbDevice::take_interface(int interface) {
+int FakeUsbDevice::take_interface(int interface, UMockdevIoctlClient* client,
+                                  Attachment& attachment) const {
   if (occupied_) {
     return EBUSY;
   }
-  claimed_.insert(interface);
-  return 0;
+  const auto claim = attachment.claimed.try_emplace(interface, client).first;
+  return claim->second == client ? 0 : EBUSY;
 }
 
-int FakeUsbDevice::submit(UMockdevIoctlData* argument) {
+int FakeUsbDevice::submit(UMockdevIoctlData* argument, Attachment& attachment) {
   Urb urb;
   urb.data.reset(umockdev_ioctl_data_resolve(argument, 0, sizeof(usbdevfs_urb), nullptr));
   const auto length = static_cast<std::size_t>(urb.fields().buffer_length);
@@ -95,13 +98,13 @@ int FakeUsbDevice::submit(UMockdevIoctlData* argument) {
   }
   if (urb.fields().type == USBDEVFS_URB_TYPE_CONTROL) {
     run_control(urb);
-    (ignoring_ ? under_way_ : finished_).push_back(std::move(urb));
+    (ignoring_ ? attachment.under_way : attachment.finished).push_back(std::move(urb));
   } else if ((urb.fields().endpoint & 0x80) == 0) {
     received_.insert(received_.end(), urb.buffer->data, urb.buffer->data + length);
     urb.filled = length;
-    finished_.push_back(std::move(urb));
+    attachment.finished.push_back(std::move(urb));
   } else {
-    under_way_.push_back(std::move(urb));
+    attachment.under_way.push_back(std::move(urb));
   }
   return 0;
 }
@@ -129,14 +132,14 @@ void FakeUsbDevice::run_control(Urb& urb) {
   }
 }
 
-int FakeUsbDevice::discard(UMockdevIoctlData* argument) {
+int FakeUsbDevice::discard(UMockdevIoctlData* argument, Attachment& attachment) {
   gulong address = 0;
   std::memcpy(&address, argument->data, sizeof(address));
-  for (auto urb = under_way_.begin(); urb != under_way_.end(); ++urb) {
+  for (auto urb = attachment.under_way.begin(); urb != attachment.under_way.end(); ++urb) {
     if (urb->data->client_addr == address) {
       urb->status = -ENOENT;
-      finished_.push_back(std::move(*urb));
-      under_way_.erase(urb);
+      attachment.finished.push_back(std::move(*urb));
+      attachment.under_way.erase(urb);
       return 0;
     }
   }
@@ -144,13 +147,14 @@ int FakeUsbDevice::discard(UMockdevIoctlData* argument) {
 }
 
 /// Lets packets take their turn until one ends a transfer.
-void FakeUsbDevice::run_bulk() {
-  while (finished_.empty() && (halted_ || !turns_.empty()) && !under_way_.empty() && plugged_) {
-    Urb& urb = under_way_.front();
-    if (halted_) {
+void FakeUsbDevice::run_bulk(Attachment& attachment) {
+  while (attachment.finished.empty() && (attachment.halted || !turns_.empty()) &&
+         !attachment.under_way.empty() && attachment.plugged) {
+    Urb& urb = attachment.under_way.front();
+    if (attachment.halted) {
       urb.status = -EPIPE;
-      finished_.push_back(std::move(urb));
-      under_way_.pop_front();
+      attachment.finished.push_back(std::move(urb));
+      attachment.under_way.pop_front();
       continue;
     }
     const Turn turn = std::move(turns_.front());
@@ -158,7 +162,7 @@ void FakeUsbDevice::run_bulk() {
     const auto room = static_cast<std::size_t>(urb.fields().buffer_length) - urb.filled;
     switch (turn.fault) {
       case Fault::stall:
-        halted_ = true;
+        attachment.halted = true;
         urb.status = -EPIPE;
         break;
       case Fault::overflow:
@@ -180,24 +184,25 @@ void FakeUsbDevice::run_bulk() {
           continue;
         }
     }
-    finished_.push_back(std::move(urb));
-    under_way_.pop_front();
+    attachment.finished.push_back(std::move(urb));
+    attachment.under_way.pop_front();
   }
 }
 
-int FakeUsbDevice::reap(UMockdevIoctlData* argument, std::unique_lock<std::mutex>& lock) {
-  run_bulk();
-  if (finished_.empty() && plugged_) {
+int FakeUsbDevice::reap(UMockdevIoctlData* argument, Attachment& attachment,
+                        std::unique_lock<std::mutex>& lock) {
+  run_bulk(attachment);
+  if (attachment.finished.empty() && attachment.plugged) {
     // libusb sees a file that is always ready and asks without end: a short wait here leaves the
     // processor to others.
     changed_.wait_for(lock, std::chrono::microseconds(500));
-    run_bulk();
+    run_bulk(attachment);
   }
-  if (finished_.empty()) {
-    return plugged_ ? EAGAIN : ENODEV;
+  if (attachment.finished.empty()) {
+    return attachment.plugged ? EAGAIN : ENODEV;
   }
-  const Urb urb = std::move(finished_.front());
-  finished_.pop_front();
+  const Urb urb = std::move(attachment.finished.front());
+  attachment.finished.pop_front();
   urb.fields().status = urb.status;
   urb.fields().actual_length = static_cast<int>(urb.filled);
   const Memory pointer(umockdev_ioctl_data_resolve(argument, 0, sizeof(void*), nullptr));

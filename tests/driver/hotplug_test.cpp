@@ -31,7 +31,7 @@ TEST_F(Hotplug, BoardsAppearAndDisappearInTheList) {
     EXPECT_EQ(list_boards().size(), 1U);
     board.usb().unplug();
     EXPECT_TRUE(list_boards().empty());
-    board.usb().plug(1);
+    board.usb().plug();
     EXPECT_EQ(list_boards().at(0).address, 3);
   }
   EXPECT_TRUE(list_boards().empty());
@@ -50,7 +50,7 @@ TEST_F(Hotplug, AStreamOutlivesUnpluggingAndReadsTheCalibrationAgain) {
     }
     EXPECT_EQ(sensor->next(std::chrono::milliseconds(10)), std::nullopt) << "it only times out";
     board.recalibrate();
-    board.usb().plug(1);
+    board.usb().plug();
     ASSERT_TRUE(becomes_true([&] { return !sensor->gone(); }));
     EXPECT_EQ(sensor->counters().reconnects, static_cast<std::uint64_t>(round));
   }
@@ -69,7 +69,7 @@ TEST_F(Hotplug, AnotherBoardDoesNotTakeThePlace) {
   std::this_thread::sleep_for(std::chrono::milliseconds(300));
   EXPECT_TRUE(sensor->gone());
   EXPECT_TRUE(other.usb().requests().empty());
-  board.usb().plug(1);
+  board.usb().plug();
   ASSERT_TRUE(becomes_true([&] { return !sensor->gone(); }));
   expect_frame(*sensor, board, 101);
 }
@@ -82,7 +82,7 @@ TEST_F(Hotplug, ABoardWithoutSerialIsKnownByItsPort) {
   expect_frame(*sensor, board, 100);
   board.usb().unplug();
   ASSERT_TRUE(becomes_true([&] { return sensor->gone(); }));
-  board.usb().plug(1);
+  board.usb().plug();
   ASSERT_TRUE(becomes_true([&] { return !sensor->gone(); }));
   expect_frame(*sensor, board, 101);
 }
@@ -95,7 +95,7 @@ TEST_F(Hotplug, OtherCellsThanBeforeAreRefused) {
   board.usb().unplug();
   ASSERT_TRUE(becomes_true([&] { return sensor->gone(); }));
   board.replace_cells({0b1111});
-  board.usb().plug(1);
+  board.usb().plug();
   try {
     while (true) {
       sensor->next(patience);
@@ -115,7 +115,7 @@ TEST_F(Hotplug, StopsAndGoesWhileTheBoardIsAway) {
   ASSERT_TRUE(becomes_true([&] { return sensor->gone(); }));
   sensor->stop();
   EXPECT_THROW(sensor->start(), Error);
-  board.usb().plug(1);
+  board.usb().plug();
   sensor->start();
   EXPECT_FALSE(sensor->gone());
   expect_frame(*sensor, board, 101);

@@ -174,7 +174,7 @@ TEST_F(SerialBoards, AreStartedAgainWhenTheyComeBack) {
   ASSERT_TRUE(becomes_true([&] { return board.usb().waiting_packets() == 0; }));
   board.usb().unplug();
   ASSERT_TRUE(becomes_true([&] { return sensor->gone(); }));
-  board.usb().plug(1);
+  board.usb().plug();
   ASSERT_TRUE(becomes_true([&] { return !sensor->gone(); }));
   Bytes twice = tsf85_start;
   twice.insert(twice.end(), tsf85_start.begin(), tsf85_start.end());
