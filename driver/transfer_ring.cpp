@@ -5,6 +5,8 @@
 #include <new>
 #include <utility>
 
+#include "usb_fault.hpp"
+
 namespace palpate {
 
 namespace {
@@ -29,21 +31,20 @@ TransferRing::TransferRing(const UsbContext& context, UsbHandle& handle, std::ui
   for (Slot& slot : slots_) {
     slot.ring = this;
     slot.buffer.resize(transfer_bytes_);
-    slot.transfer = libusb_alloc_transfer(0);
-    if (slot.transfer == nullptr) {
-      std::ranges::for_each(slots_, libusb_free_transfer, &Slot::transfer);
+    slot.transfer.reset(libusb_alloc_transfer(0));
+    if (!slot.transfer) {
       throw std::bad_alloc();
     }
   }
-  for (Slot& slot : slots_) {
-    submit(slot);
+  try {
+    begin();
+  } catch (...) {
+    drain();
+    throw;
   }
 }
 
-TransferRing::~TransferRing() {
-  drain();
-  std::ranges::for_each(slots_, libusb_free_transfer, &Slot::transfer);
-}
+TransferRing::~TransferRing() { drain(); }
 
 std::vector<TransferRing::Completion> TransferRing::completed() {
   return std::exchange(completed_, {});
@@ -61,18 +62,26 @@ void TransferRing::recover() {
   drain();
   handle_.clear_halt(endpoint_);
   halted_ = false;
+  begin();
+}
+
+void TransferRing::begin() {
   for (Slot& slot : slots_) {
-    submit(slot);
+    if (const int code = submit(slot); code != LIBUSB_SUCCESS) {
+      throw usb_fault(handle_.device(), "no transfer can be begun", code);
+    }
   }
 }
 
-void TransferRing::submit(Slot& slot) {
-  libusb_fill_bulk_transfer(slot.transfer, handle_.get(), endpoint_, slot.buffer.data(),
+int TransferRing::submit(Slot& slot) {
+  libusb_fill_bulk_transfer(slot.transfer.get(), handle_.get(), endpoint_, slot.buffer.data(),
                             static_cast<int>(slot.buffer.size()), &TransferRing::on_return, &slot,
                             transfer_patience_ms);
-  slot.under_way = libusb_submit_transfer(slot.transfer) == LIBUSB_SUCCESS;
+  const int code = libusb_submit_transfer(slot.transfer.get());
+  slot.under_way = code == LIBUSB_SUCCESS;
   // Not only LIBUSB_ERROR_NO_DEVICE: nothing else would bring this transfer back into the ring.
   lost_ = lost_ || !slot.under_way;
+  return code;
 }
 
 void TransferRing::on_return(libusb_transfer* transfer) noexcept {
@@ -120,7 +129,7 @@ void TransferRing::drain() {
   draining_ = true;
   for (Slot& slot : slots_) {
     if (slot.under_way) {
-      libusb_cancel_transfer(slot.transfer);
+      libusb_cancel_transfer(slot.transfer.get());
     }
   }
   while (std::ranges::any_of(slots_, &Slot::under_way)) {

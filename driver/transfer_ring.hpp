@@ -36,6 +36,7 @@ class TransferRing {
 
   /// @param transfer_bytes of one transfer, a multiple of the endpoint's packet
   /// @param counters has to outlive the ring
+  /// @throws Error where the device takes no transfers
   TransferRing(const UsbContext& context, UsbHandle& handle, std::uint8_t endpoint,
                std::size_t transfer_bytes, Counters& counters);
   ~TransferRing();
@@ -57,16 +58,20 @@ class TransferRing {
   void drain();
 
  private:
+  struct Free {
+    void operator()(libusb_transfer* transfer) const { libusb_free_transfer(transfer); }
+  };
   struct Slot {
     TransferRing* ring = nullptr;
-    libusb_transfer* transfer = nullptr;
+    std::unique_ptr<libusb_transfer, Free> transfer;
     std::vector<std::uint8_t> buffer;
     bool under_way = false;
   };
 
   static void on_return(libusb_transfer* transfer) noexcept;
   void take(Slot& slot);
-  void submit(Slot& slot);
+  void begin();
+  int submit(Slot& slot);
 
   libusb_context* context_;
   UsbHandle& handle_;

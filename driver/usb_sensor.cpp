@@ -71,15 +71,25 @@ void UsbSensor::start() {
   tally_ = {};
   lost_before_next_ = 0;
   publish();
-  if (link_) {
-    link_->begin();
-  } else {
-    reconnect();
-  }
+  begin();
   gone_ = false;
   stopping_ = false;
   back_off_ = first_back_off;
   thread_ = std::thread([this] { run(); });
+}
+
+void UsbSensor::begin() {
+  if (link_) {
+    try {
+      link_->begin();
+      return;
+    } catch (const Error&) {
+      // Also where the board is plugged in: to the kernel a board that was unplugged since it was
+      // opened is another device, which has to be opened anew.
+      link_.reset();
+    }
+  }
+  reconnect();
 }
 
 std::optional<Frame> UsbSensor::next(milliseconds timeout) { return queue_.pop(timeout); }

@@ -41,6 +41,7 @@ class UsbSensor final : public Sensor {
 
  private:
   void watch_arrivals();
+  void begin();
   void run();
   void stream();
   void lose();

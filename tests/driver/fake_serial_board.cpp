@@ -23,6 +23,10 @@ Bytes configuration(FakeSerialBoard::Union descriptor) {
       {7, 5, 0x83, 2, 64, 0, 0}};
   if (descriptor == FakeSerialBoard::Union::missing) {
     descriptors.erase(descriptors.begin() + 6);
+  } else if (descriptor == FakeSerialBoard::Union::alone) {
+    descriptors.erase(descriptors.begin() + 1, descriptors.begin() + 8);
+    descriptors[0][4] = 1;
+    descriptors[1][2] = 0;
   }
   Bytes bytes;
   for (const Bytes& d : descriptors) {
@@ -46,8 +50,10 @@ FakeSerialBoard::FakeSerialBoard(FakeUsb& usb, const std::string& serial, Ids id
               [this](const FakeUsbDevice::Setup& setup, const Bytes& data) {
                 return answer(setup, data);
               }) {
-  device_.bind_kernel_driver(control_interface);
-  device_.bind_kernel_driver(data_interface);
+  if (descriptor != Union::alone) {
+    device_.bind_kernel_driver(control_interface);
+    device_.bind_kernel_driver(data_interface);
+  }
 }
 
 std::optional<Bytes> FakeSerialBoard::line_coding() const {

@@ -15,8 +15,9 @@ class FakeSerialBoard {
     std::uint16_t vendor = 0x16d0;  // Robotiq's TSF-85
     std::uint16_t product = 0x14cc;
   };
-  /// How the descriptors tell which control interface belongs to the data interface 1.
-  enum class Union { present, missing };
+  /// How the descriptors tell which control interface belongs to the data interface; there is none
+  /// where the data interface is `alone`.
+  enum class Union { present, missing, alone };
 
   FakeSerialBoard(FakeUsb& usb, const std::string& serial, Ids ids,
                   Union descriptor = Union::present, int address = 2);
