@@ -47,6 +47,10 @@ TransferRing::TransferRing(const UsbContext& context, UsbHandle& handle, std::ui
 TransferRing::~TransferRing() { drain(); }
 
 std::vector<TransferRing::Completion> TransferRing::completed() {
+  if (missing_ > 0) {
+    completed_.push_back({.bytes = {}, .missing = missing_});
+    missing_ = 0;
+  }
   return std::exchange(completed_, {});
 }
 
@@ -109,7 +113,17 @@ void TransferRing::take(Slot& slot) {
   // What was on its way when a transfer was given up still counts.
   const auto length = static_cast<std::size_t>(damaged ? 0 : slot.transfer->actual_length);
   const bool ended = status == LIBUSB_TRANSFER_COMPLETED && length < transfer_bytes_;
-  if (length > 0 || ended || damaged) {
+  missing_ += damaged ? 1 : 0;
+  if (length > 0 || ended) {
+    keep(slot, length, ended);
+  }
+  if (!draining_ && !halted_ && !lost_ && status != LIBUSB_TRANSFER_CANCELLED) {
+    submit(slot);
+  }
+}
+
+void TransferRing::keep(Slot& slot, std::size_t length, bool ended) noexcept {
+  try {
     std::vector<std::uint8_t> fresh;
     if (!spare_.empty()) {
       fresh = std::move(spare_.back());
@@ -118,10 +132,10 @@ void TransferRing::take(Slot& slot) {
     fresh.resize(transfer_bytes_);
     slot.buffer.swap(fresh);
     fresh.resize(length);
-    completed_.push_back({std::move(fresh), now_s(), ended, damaged});
-  }
-  if (!draining_ && !halted_ && !lost_ && status != LIBUSB_TRANSFER_CANCELLED) {
-    submit(slot);
+    completed_.push_back({std::move(fresh), now_s(), ended, missing_});
+    missing_ = 0;
+  } catch (const std::bad_alloc&) {
+    ++missing_;  // libusb called, which is C: nothing may be thrown
   }
 }
 

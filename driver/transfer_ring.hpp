@@ -21,8 +21,10 @@ class TransferRing {
   struct Completion {
     std::vector<std::uint8_t> bytes;
     double host_time_s = 0.0;  ///< since the Unix epoch
-    bool ended = false;    ///< by a packet that was not full; an empty one leaves no other trace
-    bool damaged = false;  ///< bytes are missing here: an error or an overflow on the bus
+    bool ended = false;  ///< by a packet that was not full; an empty one leaves no other trace
+    /// Transfers since the one before whose bytes are missing: an error or an overflow on the bus,
+    /// or no memory to keep them.
+    std::uint64_t missing = 0;
   };
 
   /// What went wrong, over all rings of a board.
@@ -43,7 +45,8 @@ class TransferRing {
   TransferRing(const TransferRing&) = delete;
   TransferRing& operator=(const TransferRing&) = delete;
 
-  /// What came since the last call, in order. Give it back by recycle().
+  /// What came since the last call, in order; the last may stand for missing transfers alone. Give
+  /// it back by recycle().
   std::vector<Completion> completed();
   void recycle(std::vector<Completion>&& completions);
 
@@ -70,6 +73,7 @@ class TransferRing {
 
   static void on_return(libusb_transfer* transfer) noexcept;
   void take(Slot& slot);
+  void keep(Slot& slot, std::size_t length, bool ended) noexcept;
   void begin();
   int submit(Slot& slot);
 
@@ -79,6 +83,7 @@ class TransferRing {
   std::size_t transfer_bytes_;
   std::vector<Slot> slots_;
   std::vector<Completion> completed_;
+  std::uint64_t missing_ = 0;  // since the last of them
   std::vector<std::vector<std::uint8_t>> spare_;
   Counters& counters_;
   std::size_t errors_in_a_row_ = 0;

@@ -200,12 +200,11 @@ void UsbSensor::deliver(std::vector<TransferRing::Completion>& completions) {
 
 void UsbSensor::deliver(const TransferRing::Completion& completion) {
   Deframer& deframer = board_->deframer();
-  if (completion.damaged) {
-    // At least the frame that it belonged to.
+  if (completion.missing > 0) {
+    // At least the frames that they belonged to.
     deframer.reset();
-    ++lost_before_next_;
-    ++tally_.lost;
-    return;
+    lost_before_next_ += completion.missing;
+    tally_.lost += completion.missing;
   }
   const DeframerCounters before = deframer.counters();
   parsed_.clear();

@@ -64,6 +64,7 @@ class FakeUsbDevice {
   /// @param configuration the configuration descriptor with all that follows it
   FakeUsbDevice(FakeUsb& usb, int address, int port, Identity identity, Bytes configuration,
                 Firmware firmware);
+  /// Sensors that have transfers under way have to be stopped before: nobody would end them.
   ~FakeUsbDevice();
   FakeUsbDevice(const FakeUsbDevice&) = delete;
   FakeUsbDevice& operator=(const FakeUsbDevice&) = delete;

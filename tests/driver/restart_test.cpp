@@ -110,6 +110,7 @@ TEST_F(Restart, FindsABoardAtAnotherPortByItsSerialNumberOnly) {
       EXPECT_THAT(refusal(*sensor), HasSubstr("'takktile:1-2': not plugged in"));
       EXPECT_TRUE(elsewhere.usb().requests().empty());
     }
+    sensor->stop();
   }
 }
 
@@ -146,6 +147,7 @@ TEST_F(Restart, FindsABoardThatIsMovedToAnotherPortWhileItStarts) {
   board.usb().unplug();
   started.get();
   expect_frame(*sensor, elsewhere, 100);
+  sensor->stop();
 }
 
 TEST_F(Restart, TriesABoardThatDoesNotAnswerOnceMore) {

@@ -1,0 +1,92 @@
+#include "transfer_ring.hpp"
+
+#include <gtest/gtest.h>
+
+#include <optional>
+
+#include "fake_takktile.hpp"
+#include "palpate/error.hpp"
+#include "streamed.hpp"
+#include "usb_device.hpp"
+#include "usb_handle.hpp"
+#include "without_memory.hpp"
+
+namespace palpate {
+namespace {
+
+using Completion = TransferRing::Completion;
+
+/// A ring whose events this thread pumps.
+class Ring : public testing::Test {
+ protected:
+  Ring() {
+    handle_.claim(0);
+    ring_.emplace(context_, handle_, std::uint8_t{0x81}, transfer_bytes, counters_);
+  }
+
+  /// Until the callbacks of all that was sent have returned.
+  bool pump() {
+    const auto end = std::chrono::steady_clock::now() + patience;
+    while (board_.usb().waiting_packets() > 0 && std::chrono::steady_clock::now() < end) {
+      timeval time{.tv_sec = 0, .tv_usec = 1000};
+      libusb_handle_events_timeout_completed(context_.get(), &time, nullptr);
+    }
+    return board_.usb().waiting_packets() == 0;
+  }
+
+  static constexpr std::size_t transfer_bytes = 512;
+  FakeUsb usb_;
+  FakeTakktile board_{usb_, "1", {0b11111}};
+  UsbContext context_;
+  UsbHandle handle_{usb_devices(context_).at(0)};
+  TransferRing::Counters counters_;
+  std::optional<TransferRing> ring_;
+};
+
+TEST_F(Ring, CountsWhatItHasNoMemoryToKeep) {
+  board_.usb().send_packet(Bytes(1, 1));
+  ASSERT_TRUE(pump());
+  // More than the ring keeps spare buffers for.
+  constexpr std::uint64_t lost = 2 * TransferRing::transfers;
+  for (std::uint64_t i = 0; i < lost; ++i) {
+    board_.usb().send_packet(Bytes(2, 2));
+  }
+  {
+    const WithoutMemory none;
+    pump();
+  }
+  board_.usb().send_packet(Bytes(3, 3));
+  ASSERT_TRUE(pump());
+  const std::vector<Completion> completions = ring_->completed();
+  ASSERT_EQ(completions.size(), 2U);
+  EXPECT_EQ(completions[0].bytes, Bytes(1, 1));
+  EXPECT_EQ(completions[0].missing, 0U);
+  EXPECT_EQ(completions[1].bytes, Bytes(3, 3));
+  EXPECT_EQ(completions[1].missing, lost);
+  EXPECT_FALSE(ring_->lost());
+}
+
+TEST_F(Ring, EndsWithoutMemory) {
+  board_.usb().send_packet(Bytes(64, 1));  // on its way: the transfer waits for more
+  ASSERT_TRUE(pump());
+  {
+    const WithoutMemory none;
+    ring_->drain();
+  }
+  const std::vector<Completion> completions = ring_->completed();
+  ASSERT_EQ(completions.size(), 1U);
+  EXPECT_TRUE(completions[0].bytes.empty());
+  EXPECT_EQ(completions[0].missing, 1U);
+  EXPECT_FALSE(completions[0].ended);
+  EXPECT_TRUE(ring_->completed().empty());
+}
+
+TEST_F(Ring, OfADeviceThatIsGoneDoesNotBegin) {
+  ring_.reset();
+  board_.usb().unplug();
+  EXPECT_THROW(ring_.emplace(context_, handle_, std::uint8_t{0x81}, transfer_bytes, counters_),
+               Error);
+}
+
+}  // namespace
+}  // namespace palpate
