@@ -1,5 +1,8 @@
 #include "checksum.hpp"
 
+#include <algorithm>
+#include <bit>
+
 namespace palpate {
 
 namespace {
@@ -27,9 +30,19 @@ std::uint32_t most_significant_first(std::uint32_t byte, std::uint32_t polynomia
   return crc;
 }
 
+/// The image of a register under a linear map, given those of its bits.
+std::uint32_t mapped(const std::array<std::uint32_t, 32>& images, std::uint32_t value) {
+  std::uint32_t image = 0;
+  for (; value != 0; value &= value - 1) {
+    image ^= images[static_cast<std::size_t>(std::countr_zero(value))];
+  }
+  return image;
+}
+
 }  // namespace
 
-Checksum::Checksum(const Parameters& parameters) : parameters_(parameters) {
+Checksum::Checksum(const Parameters& parameters)
+    : parameters_(parameters), mask_(mask_of(parameters.bytes)) {
   const std::size_t width = 8 * parameters_.bytes;
   for (std::uint32_t byte = 0; byte < table_.size(); ++byte) {
     if (parameters_.kind == Kind::weiss) {
@@ -42,39 +55,78 @@ Checksum::Checksum(const Parameters& parameters) : parameters_(parameters) {
       table_[byte] = most_significant_first(byte, parameters_.polynomial, parameters_.bytes);
     }
   }
+  // The register is linear over GF(2) in what it held and in the bytes that came, also Weiss'.
+  if (parameters_.kind == Kind::crc || parameters_.kind == Kind::weiss) {
+    Map one_byte{};
+    for (std::size_t bit = 0; bit < width; ++bit) {
+      one_byte[bit] = run_on(std::uint32_t{1} << bit, 0);
+    }
+    zeros_.push_back(one_byte);
+    while ((std::size_t{1} << zeros_.size()) <= longest_stretch) {
+      Map twice{};
+      std::ranges::transform(zeros_.back(), twice.begin(),
+                             [&](std::uint32_t image) { return mapped(zeros_.back(), image); });
+      zeros_.push_back(twice);
+    }
+  }
+}
+
+std::uint32_t Checksum::begin() const {
+  // Only a CRC has a beginning other than its parameter says: a reflected one turns it round too.
+  switch (parameters_.kind) {
+    case Kind::weiss:
+      return 0xffff;
+    case Kind::crc:
+      return parameters_.reflect ? reflected(parameters_.init, 8 * parameters_.bytes)
+                                 : parameters_.init;
+    case Kind::sum:
+    case Kind::exor:
+      break;
+  }
+  return parameters_.init;
+}
+
+std::uint32_t Checksum::run_on(std::uint32_t running, std::uint8_t byte) const {
+  switch (parameters_.kind) {
+    case Kind::sum:
+      return running + byte;
+    case Kind::exor:
+      return running ^ byte;
+    case Kind::weiss:
+    case Kind::crc:
+      break;
+  }
+  const bool least_first = parameters_.kind == Kind::weiss || parameters_.reflect;
+  const std::size_t width = 8 * parameters_.bytes;
+  return least_first ? running >> 8 ^ table_[(running ^ byte) & 0xff]
+                     : (running << 8 & mask_) ^ table_[(running >> (width - 8) ^ byte) & 0xff];
 }
 
 std::uint32_t Checksum::operator()(std::span<const std::uint8_t> bytes) const {
-  const std::size_t width = 8 * parameters_.bytes;
-  const std::uint32_t mask = mask_of(parameters_.bytes);
-  // Only a CRC has a beginning other than its parameter says: a reflected one turns it round too.
-  const bool least_first = parameters_.kind == Kind::weiss || parameters_.reflect;
-  std::uint32_t sum = parameters_.init & mask;
-  switch (parameters_.kind) {
-    case Kind::sum:
-      for (const std::uint8_t byte : bytes) {
-        sum += byte;
-      }
-      break;
-    case Kind::exor:
-      for (const std::uint8_t byte : bytes) {
-        sum ^= byte;
-      }
-      break;
-    case Kind::weiss:
-      sum = 0xffff;
-      [[fallthrough]];
-    case Kind::crc:
-      if (parameters_.kind == Kind::crc && parameters_.reflect) {
-        sum = reflected(sum, width);
-      }
-      for (const std::uint8_t byte : bytes) {
-        sum = least_first ? sum >> 8 ^ table_[(sum ^ byte) & 0xff]
-                          : (sum << 8 & mask) ^ table_[(sum >> (width - 8) ^ byte) & 0xff];
-      }
-      break;
+  std::uint32_t running = begin();
+  for (const std::uint8_t byte : bytes) {
+    running = run_on(running, byte);
   }
-  return (sum ^ parameters_.xor_out) & mask;
+  return (running ^ parameters_.xor_out) & mask_;
+}
+
+std::uint32_t Checksum::of_stretch(std::uint32_t before, std::uint32_t end,
+                                   std::size_t bytes) const {
+  // Sums and registers of streams that differ before the stretch only differ by what the stretch
+  // makes of that difference; here, of the one between `before` and the beginning.
+  const std::uint32_t running = parameters_.kind == Kind::sum
+                                    ? end - before + begin()
+                                    : end ^ over_zeros(before ^ begin(), bytes);
+  return (running ^ parameters_.xor_out) & mask_;
+}
+
+std::uint32_t Checksum::over_zeros(std::uint32_t running, std::size_t bytes) const {
+  for (std::size_t power = 0; power < zeros_.size(); ++power) {
+    if ((bytes >> power & 1u) != 0) {
+      running = mapped(zeros_[power], running);
+    }
+  }
+  return running;
 }
 
 }  // namespace palpate

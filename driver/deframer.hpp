@@ -9,7 +9,7 @@ namespace palpate {
 
 /// One frame as the bytes of a board give it.
 struct ParsedFrame {
-  std::vector<double> values;                ///< [e] in the board's pressure unit
+  std::vector<double> values;  ///< [e] in the board's pressure unit; NaN where it sent no number
   std::optional<double> device_time_s = {};  ///< by the board's clock, where it sends one
 };
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 namespace palpate {
@@ -15,15 +16,6 @@ bool begins_like(Bytes bytes, const std::vector<std::uint8_t>& pattern) {
   const std::size_t known = std::min(bytes.size(), pattern.size());
   return std::equal(pattern.begin(), pattern.begin() + static_cast<std::ptrdiff_t>(known),
                     bytes.begin());
-}
-
-/// Index of the first element whose value the part carries.
-std::size_t first_element(const PacketFormat::Parts& field, const PacketFormat::Part& part) {
-  std::size_t element = 0;
-  for (const PacketFormat::Part* before = field.parts.data(); before != &part; ++before) {
-    element += before->values;
-  }
-  return element;
 }
 
 template <class Field>
@@ -41,12 +33,29 @@ PacketDeframer::PacketDeframer(PacketFormat format)
     terminator_ = last->bytes;
   }
   for (const PacketFormat::Field& field : format_.fields) {
-    checked_ = checked_ || as<PacketFormat::Check>(field) != nullptr;
+    if (const auto* check = as<PacketFormat::Check>(field)) {
+      checksum_ = &check->checksum;
+    } else if (const auto* parts = as<PacketFormat::Parts>(field)) {
+      parts_.resize(256);
+      // The first part whose tag fits counts.
+      for (std::size_t tag = 0; tag < parts_.size(); ++tag) {
+        std::size_t element = 0;
+        for (const PacketFormat::Part& part : parts->parts) {
+          if ((tag & part.mask) == (part.tag & part.mask)) {
+            parts_[tag] = {bytes_of(*parts, part), part.values, element};
+            break;
+          }
+          element += part.values;
+        }
+      }
+    }
   }
+  reset();
 }
 
 void PacketDeframer::reset() {
   buffer_.clear();
+  running_.assign(1, 0);
   at_ = 0;
   in_step_ = true;
   values_.clear();
@@ -54,12 +63,27 @@ void PacketDeframer::reset() {
 
 void PacketDeframer::push(Bytes bytes, std::vector<ParsedFrame>& frames) {
   buffer_.insert(buffer_.end(), bytes.begin(), bytes.end());
+  if (checksum_ != nullptr) {
+    for (const std::uint8_t byte : bytes) {
+      running_.push_back(checksum_->run_on(running_.back(), byte));
+    }
+  }
   while (at_ < buffer_.size() && take_step(frames)) {
   }
+  forget_consumed();
+}
+
+void PacketDeframer::forget_consumed() {
   // A terminator that has been consumed still tells where the next packet begins.
-  const std::size_t history = std::min(at_, terminator_.size());
-  buffer_.erase(buffer_.begin(), buffer_.begin() + static_cast<std::ptrdiff_t>(at_ - history));
-  at_ = history;
+  const auto consumed = static_cast<std::ptrdiff_t>(at_ - std::min(at_, terminator_.size()));
+  // Only where no more is kept than goes, or each push would move a packet that is not whole yet.
+  if (2 * consumed >= static_cast<std::ptrdiff_t>(buffer_.size())) {
+    buffer_.erase(buffer_.begin(), buffer_.begin() + consumed);
+    if (checksum_ != nullptr) {
+      running_.erase(running_.begin(), running_.begin() + consumed);
+    }
+    at_ -= static_cast<std::size_t>(consumed);
+  }
 }
 
 bool PacketDeframer::take_step(std::vector<ParsedFrame>& frames) {
@@ -81,7 +105,7 @@ bool PacketDeframer::take_step(std::vector<ParsedFrame>& frames) {
     case Verdict::whole:
       break;
   }
-  if (!in_step_ && !checked_) {
+  if (!in_step_ && checksum_ == nullptr) {
     const Bytes next = stream.subspan(candidate.bytes);
     if (!begins_like(next, preamble_)) {
       drop_byte();
@@ -93,7 +117,7 @@ bool PacketDeframer::take_step(std::vector<ParsedFrame>& frames) {
   }
   if (interpret(stream.first(candidate.bytes), frames) == Meaning::malformed) {
     values_.clear();
-    if (!checked_) {
+    if (checksum_ == nullptr) {
       drop_byte();
       return true;
     }
@@ -171,10 +195,10 @@ bool PacketDeframer::checksum_is_right(Bytes packet) const {
       const std::size_t bytes = check->checksum.bytes();
       const NumberType type{NumberType::Kind::unsigned_integer, static_cast<std::uint8_t>(bytes),
                             check->big_endian};
-      const Bytes covered = check->after
-                                ? packet.subspan(offset + bytes)
-                                : packet.subspan(check->from_byte, offset - check->from_byte);
-      return type.read(packet.subspan(offset)) == check->checksum(covered);
+      const std::size_t begin = check->after ? offset + bytes : check->from_byte;
+      const std::size_t end = check->after ? packet.size() : offset;
+      return type.read(packet.subspan(offset)) ==
+             check->checksum.of_stretch(running_[at_ + begin], running_[at_ + end], end - begin);
     }
     offset += bytes_of(format_.fields[i], format_.elements, shape_.counted);
   }
@@ -220,73 +244,66 @@ PacketDeframer::Meaning PacketDeframer::interpret(Bytes packet, std::vector<Pars
       time_s_ = time->type.read(places[i]) * time->tick_s;
     }
   }
-  const std::size_t before = frames.size();
   for (std::size_t i = 0; i < places.size(); ++i) {
-    const auto* values = as<PacketFormat::Values>(format_.fields[i]);
-    const auto* parts = as<PacketFormat::Parts>(format_.fields[i]);
-    if ((values != nullptr && !read_values(*values, places[i], frames)) ||
-        (parts != nullptr && !read_parts(*parts, places[i], frames))) {
-      frames.resize(before);
-      return Meaning::malformed;
+    if (const auto* values = as<PacketFormat::Values>(format_.fields[i])) {
+      read_values(*values, places[i], frames);
+    } else if (const auto* parts = as<PacketFormat::Parts>(format_.fields[i])) {
+      if (!are_parts(places[i])) {
+        return Meaning::malformed;
+      }
+      read_parts(*parts, places[i], frames);
     }
   }
   return Meaning::values;
 }
 
-bool PacketDeframer::read_values(const PacketFormat::Values& field, Bytes bytes,
+void PacketDeframer::read_values(const PacketFormat::Values& field, Bytes bytes,
                                  std::vector<ParsedFrame>& frames) {
   values_.clear();
   for (std::size_t element = 0; element < format_.elements; ++element) {
     const Bytes stride = bytes.subspan(element * field.stride_bytes);
-    if (!append_value(field.type.read(stride.subspan(field.at_byte)))) {
-      return false;
-    }
+    append_value(field.type.read(stride.subspan(field.at_byte)));
   }
   complete_frame(frames);
+}
+
+bool PacketDeframer::are_parts(Bytes bytes) const {
+  while (!bytes.empty()) {
+    const std::size_t part_bytes = parts_[bytes[0]].bytes;
+    if (part_bytes == 0 || part_bytes > bytes.size()) {
+      return false;
+    }
+    bytes = bytes.subspan(part_bytes);
+  }
   return true;
 }
 
-bool PacketDeframer::read_parts(const PacketFormat::Parts& field, Bytes bytes,
+void PacketDeframer::read_parts(const PacketFormat::Parts& field, Bytes bytes,
                                 std::vector<ParsedFrame>& frames) {
-  const auto end = field.parts.end();
   while (!bytes.empty()) {
-    const auto part = std::find_if(field.parts.begin(), end, [&](const PacketFormat::Part& p) {
-      return (bytes[0] & p.mask) == (p.tag & p.mask);
-    });
-    if (part == end || bytes.size() < bytes_of(field, *part)) {
-      return false;
-    }
-    if (part->values > 0) {
-      const std::size_t place = first_element(field, *part);
-      if (place == 0) {
+    const KnownPart& part = parts_[bytes[0]];
+    if (part.values > 0) {
+      if (part.first_element == 0) {
         values_.clear();
       }
-      if (values_.size() != place) {
+      if (values_.size() != part.first_element) {
         values_.clear();  // the part before this one was lost, and the frame with it
-      } else if (!read_part(field, *part, bytes)) {
-        return false;
-      } else if (values_.size() == format_.elements) {
-        complete_frame(frames);
+      } else {
+        for (std::size_t i = 0; i < part.values; ++i) {
+          append_value(field.type.read(bytes.subspan(1 + i * field.type.bytes)));
+        }
+        if (values_.size() == format_.elements) {
+          complete_frame(frames);
+        }
       }
     }
-    bytes = bytes.subspan(bytes_of(field, *part));
+    bytes = bytes.subspan(part.bytes);
   }
-  return true;
 }
 
-bool PacketDeframer::read_part(const PacketFormat::Parts& field, const PacketFormat::Part& part,
-                               Bytes bytes) {
-  for (std::size_t i = 0; i < part.values; ++i) {
-    if (!append_value(field.type.read(bytes.subspan(1 + i * field.type.bytes)))) {
-      return false;
-    }
-  }
-  return true;
-}
-
-bool PacketDeframer::append_value(double number) {
-  values_.push_back(format_.gain * number + format_.offset);
-  return std::isfinite(values_.back());
+void PacketDeframer::append_value(double number) {
+  const double value = format_.gain * number + format_.offset;
+  values_.push_back(std::isfinite(value) ? value : std::numeric_limits<double>::quiet_NaN());
 }
 
 void PacketDeframer::complete_frame(std::vector<ParsedFrame>& frames) {

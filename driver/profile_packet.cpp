@@ -14,6 +14,9 @@ using Format = PacketFormat;
 using Entry = ProfileEntry;
 
 constexpr std::uint32_t most_packet_bytes = 65536;
+// Out of step, each byte may begin a packet whose parts are gone through before one is wrong; where
+// there is a checksum, it tells before.
+constexpr std::uint32_t most_unchecked_parts_bytes = 4096;
 
 Format::Check read_check(const Entry& field) {
   using Kind = Checksum::Kind;
@@ -281,6 +284,13 @@ void set_most(const std::vector<Entry>& entries, Format& format) {
         entries[i].refuse("add 'most', the largest count of bytes that the packets have");
       }
       length->most = length->most == 0 ? shape.middle_bytes : length->most;
+      if (shape.parts && count_of<Format::Check>(format) == 0 &&
+          length->most > most_unchecked_parts_bytes) {
+        entries[i].refuse(
+            fmt::format("'most' is {}, but parts without a checksum have at most {} "
+                        "bytes; lower it, or add 'checksum'",
+                        length->most, most_unchecked_parts_bytes));
+      }
       if (length->most < shape.middle_bytes) {
         entries[i].refuse(fmt::format("'most' is {}, but the values take {} bytes; enlarge it",
                                       length->most, shape.middle_bytes));

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <random>
 #include <string_view>
 #include <vector>
 
@@ -62,6 +64,46 @@ TEST(Checksum, AddsAndExors) {
   EXPECT_EQ(of({.kind = Kind::sum, .bytes = 1, .xor_out = 0xff}, bytes), 0xeeu);
   EXPECT_EQ(of({.kind = Kind::exor, .bytes = 1}, bytes), 0xedu);
   EXPECT_EQ(of({.kind = Kind::exor, .bytes = 1, .init = 0x0f}, bytes), 0xe2u);
+}
+
+TEST(Checksum, OfAStretchNeedsOnlyTheRunningValuesAtItsEnds) {
+  std::mt19937 random(20261122);
+  std::vector<std::uint8_t> stream(2000);
+  for (std::uint8_t& byte : stream) {
+    byte = static_cast<std::uint8_t>(random());
+  }
+  for (const Checksum::Parameters& parameters : std::vector<Checksum::Parameters>{
+           {.kind = Kind::sum, .bytes = 1, .init = 0x31, .xor_out = 0xff},
+           {.kind = Kind::sum, .bytes = 2},
+           {.kind = Kind::exor, .bytes = 1, .init = 0x0f},
+           {.kind = Kind::weiss, .bytes = 2},
+           {.bytes = 1, .polynomial = 0x07, .init = 0x5a},
+           {.bytes = 2, .polynomial = 0x1021, .init = 0xb2aa, .reflect = true},
+           {.bytes = 2, .polynomial = 0x8005, .init = 0xffff, .xor_out = 0x1234},
+           {.bytes = 4, .polynomial = 0x04c11db7, .init = 0xffffffff, .xor_out = 0xffffffff},
+           {.bytes = 4, .polynomial = 0x04c11db7, .init = 0xffffffff, .reflect = true}}) {
+    const Checksum checksum(parameters);
+    std::vector<std::uint32_t> running{static_cast<std::uint32_t>(random() & 0xff)};
+    for (const std::uint8_t byte : stream) {
+      running.push_back(checksum.run_on(running.back(), byte));
+    }
+    for (int i = 0; i < 200; ++i) {
+      const auto [from, to] = std::minmax({random() % 2001, random() % 2001});
+      ASSERT_EQ(checksum.of_stretch(running[from], running[to], to - from),
+                checksum(std::span(stream).subspan(from, to - from)))
+          << from << " to " << to;
+    }
+  }
+}
+
+TEST(Checksum, OfTheLongestStretch) {
+  const Checksum crc({.bytes = 4, .polynomial = 0x04c11db7, .init = 0xffffffff});
+  const std::vector<std::uint8_t> stream(Checksum::longest_stretch, 0x5a);
+  std::uint32_t running = 0;
+  for (const std::uint8_t byte : stream) {
+    running = crc.run_on(running, byte);
+  }
+  EXPECT_EQ(crc.of_stretch(0, running, stream.size()), crc(stream));
 }
 
 TEST(Checksum, OfNothingIsItsBeginning) {

@@ -180,6 +180,12 @@ TEST_F(ProfileFile, SaysWhatIsWrongWithAPacket) {
   expect_refused(with_packet("  - bytes: aa\n  - length: u8\n"
                              "  - {parts: u8, tags: [{tag: 1, values: 2}]}\n"),
                  {"line 5", "packet[1]", "add 'most'"});
+  const std::string parts = "  - {parts: u8, tags: [{tag: 1, values: 2}]}\n";
+  const std::string checksum = "  - checksum: sum8\n";
+  expect_refused(with_packet("  - bytes: aa\n  - {length: u16le, most: 4097}\n" + parts),
+                 {"line 5", "'most' is 4097", "at most 4096", "add 'checksum'"});
+  read(with_packet("  - bytes: aa\n  - {length: u16le, most: 4096}\n" + parts));
+  read(with_packet("  - bytes: aa\n  - {length: u16le, most: 65536}\n" + parts + checksum));
 }
 
 }  // namespace

@@ -1,0 +1,76 @@
+// Streams that begin like a packet at every byte, by profiles that allow the largest packets. They
+// take milliseconds; where a packet were gone through anew for each byte, minutes.
+#include <gtest/gtest.h>
+
+#include <string>
+
+#include "checksum.hpp"
+#include "receiver.hpp"
+#include "serial_profile.hpp"
+
+namespace palpate {
+namespace {
+
+constexpr const char* largest = R"(
+name: largest
+elements: [{grid: [128, 128], pitch_mm: [1, 1]}]
+packet:
+  - bytes: "00"
+  - {values: u8, stride: 3}
+)";
+
+class LargestPacket : public testing::TestWithParam<const char*> {};
+
+TEST_P(LargestPacket, IsFoundBehindManyThatBeginLikeIt) {
+  const std::string check = GetParam();
+  const SerialProfile profile =
+      parse_serial_profile(largest + ("  - {" + check + "}\n"), "largest.yaml");
+  const auto& checksum = std::get<PacketFormat::Check>(profile.packet.fields.back()).checksum;
+  Bytes packet(1 + 3 * 16384, 0);
+  for (std::size_t i = 1; i < packet.size(); ++i) {
+    packet[i] = static_cast<std::uint8_t>(i / 3);
+  }
+  const std::uint32_t sum = checksum(packet);
+  for (std::size_t i = 0; i < checksum.bytes(); ++i) {
+    packet.push_back(static_cast<std::uint8_t>(sum >> (8 * i)));
+  }
+  Receiver receiver(profile);
+  Bytes noise(1'000'000, 0);
+  noise[0] = 1;  // out of step from here on
+  receiver.push(noise);
+  // As a board with short packets delivers it.
+  for (std::size_t at = 0; at < packet.size(); at += 7) {
+    const auto begin = packet.begin() + static_cast<std::ptrdiff_t>(at);
+    receiver.push(Bytes(
+        begin, begin + static_cast<std::ptrdiff_t>(std::min<std::size_t>(7, packet.size() - at))));
+  }
+  ASSERT_EQ(receiver.frames().size(), 1u);
+  EXPECT_EQ(receiver.frames()[0].values.back(), packet[1 + 3 * 16383]);
+  EXPECT_EQ(receiver.garbage(), noise.size());
+}
+
+// Each of them is wrong for a packet of zeros.
+INSTANTIATE_TEST_SUITE_P(
+    Checksums, LargestPacket,
+    testing::Values("checksum: sum16, init: 0x1234", "checksum: weiss16",
+                    "checksum: xor8, init: 0x11",
+                    "checksum: crc32, polynomial: 0x04c11db7, init: 0xffffffff"));
+
+TEST(LargestParts, AreGoneThroughInBoundedWork) {
+  // Each byte begins a packet of 2570 bytes, whose last part is cut short.
+  Receiver receiver(parse_serial_profile(R"(
+name: parts
+elements: [[0, 0], [1, 0], [2, 0]]
+packet:
+  - bytes: "0a"
+  - {length: u16be, most: 4096}
+  - {parts: u8, tags: [{tag: 0x0a, values: 3}]}
+)",
+                                         "parts.yaml"));
+  receiver.push(Bytes(50'000, 0x0a));
+  EXPECT_TRUE(receiver.frames().empty());
+  EXPECT_GT(receiver.garbage(), 45'000u);
+}
+
+}  // namespace
+}  // namespace palpate
