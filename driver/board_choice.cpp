@@ -9,6 +9,14 @@
 
 namespace palpate {
 
+namespace {
+
+bool could_be(const UsbDevice& device, const Board& board) {
+  return !board.has_ids() || board.fits(device);
+}
+
+}  // namespace
+
 BoardName parse_board_name(const std::string& name) {
   // A path may hold colons; the part behind a profile's suffix, or behind the name, says which.
   const std::string suffix = ".yaml";
@@ -27,8 +35,17 @@ BoardName parse_board_name(const std::string& name) {
   return parsed;
 }
 
-std::string full_name(const Board& board, const UsbDevice& device) {
-  return fmt::format("{}:{}", board.name(), device.serial.empty() ? device.port : device.serial);
+std::string distinction(const Board& board, const UsbDevice& device,
+                        const std::vector<UsbDevice>& devices) {
+  const auto bearers = std::ranges::count_if(devices, [&](const UsbDevice& other) {
+    return could_be(other, board) && other.serial == device.serial;
+  });
+  return device.serial.empty() || bearers > 1 ? device.port : device.serial;
+}
+
+std::string full_name(const Board& board, const UsbDevice& device,
+                      const std::vector<UsbDevice>& devices) {
+  return fmt::format("{}:{}", board.name(), distinction(board, device, devices));
 }
 
 UsbDevice choose_device(const std::vector<UsbDevice>& devices, const Board& board,
@@ -42,7 +59,7 @@ UsbDevice choose_device(const std::vector<UsbDevice>& devices, const Board& boar
   }
   std::vector<UsbDevice> fitting;
   std::ranges::copy_if(devices, std::back_inserter(fitting), [&](const UsbDevice& device) {
-    return (!board.has_ids() || board.fits(device)) &&
+    return could_be(device, board) &&
            (which.empty() || which == device.serial || which == device.port);
   });
   if (fitting.empty()) {
@@ -52,7 +69,7 @@ UsbDevice choose_device(const std::vector<UsbDevice>& devices, const Board& boar
   if (fitting.size() > 1) {
     std::vector<std::string> names;
     for (const UsbDevice& device : fitting) {
-      names.push_back(full_name(board, device));
+      names.push_back(full_name(board, device, devices));
     }
     throw Error(Fault::input, fmt::format("sensor '{}': {} of them are plugged in; say which: {}",
                                           board.name(), names.size(), fmt::join(names, ", ")));

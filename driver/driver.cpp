@@ -16,7 +16,6 @@ namespace {
 
 /// Asks the board as far as that disturbs nobody.
 void inspect(Board& board, const UsbDevice& device, BoardInfo& info) {
-  info.name = full_name(board, device);
   try {
     const StreamSource source = board.source(device);
     const bool taken = std::ranges::any_of(source.interfaces, [&](int interface) {
@@ -43,7 +42,8 @@ std::vector<BoardInfo> list_boards() {
   const UsbContext context;
   const std::vector<std::unique_ptr<Board>> boards = known_boards();
   std::vector<BoardInfo> infos;
-  for (const UsbDevice& device : usb_devices(context)) {
+  const std::vector<UsbDevice> devices = usb_devices(context);
+  for (const UsbDevice& device : devices) {
     BoardInfo info{.name = {},
                    .bus = device.bus,
                    .address = device.address,
@@ -58,6 +58,7 @@ std::vector<BoardInfo> list_boards() {
         boards, [&](const std::unique_ptr<Board>& b) { return b->fits(device); });
     if (board != boards.end()) {
       info.reason.clear();
+      info.name = full_name(**board, device, devices);
       inspect(**board, device, info);
     }
     infos.push_back(std::move(info));

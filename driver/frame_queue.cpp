@@ -1,5 +1,6 @@
 #include "frame_queue.hpp"
 
+#include <algorithm>
 #include <utility>
 
 namespace palpate {
@@ -20,8 +21,11 @@ void FrameQueue::push(Frame frame) {
 }
 
 std::optional<Frame> FrameQueue::pop(std::chrono::milliseconds timeout) {
+  // The end of a wait is a time of the clock, which has to be able to hold it.
+  constexpr std::chrono::milliseconds longest = std::chrono::hours(24 * 365);
   std::unique_lock lock(mutex_);
-  changed_.wait_for(lock, timeout, [this] { return !frames_.empty() || failure_; });
+  changed_.wait_for(lock, std::clamp(timeout, std::chrono::milliseconds(0), longest),
+                    [this] { return !frames_.empty() || failure_; });
   if (!frames_.empty()) {
     Frame frame = std::move(frames_.front());
     frames_.pop_front();

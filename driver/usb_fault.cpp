@@ -2,6 +2,7 @@
 
 #include <unistd.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <vector>
@@ -16,27 +17,35 @@ namespace {
 
 namespace fs = std::filesystem;
 
-bool holds(const fs::path& process, const std::string& node) {
-  std::error_code code;  // processes end while they are looked at, and many are not ours to see
-  for (const fs::directory_entry& file : fs::directory_iterator(process / "fd", code)) {
-    // The end only: /dev of another program may lie elsewhere, as in a container.
-    if (fs::read_symlink(file.path(), code).string().ends_with(node)) {
-      return true;
-    }
+/// What the folder holds, as far as it can be read: processes end while they are looked at, and
+/// many are not ours to see.
+std::vector<fs::path> entries_of(const fs::path& folder) {
+  std::vector<fs::path> entries;
+  std::error_code code;
+  for (fs::directory_iterator entry(folder, code), end; !code && entry != end;
+       entry.increment(code)) {
+    entries.push_back(entry->path());
   }
-  return false;
+  return entries;
+}
+
+bool holds(const fs::path& process, const std::string& node) {
+  return std::ranges::any_of(entries_of(process / "fd"), [&](const fs::path& file) {
+    std::error_code code;
+    // The end only: /dev of another program may lie elsewhere, as in a container.
+    return fs::read_symlink(file, code).string().ends_with(node);
+  });
 }
 
 /// The programs that have the file open, as "name (process 123)".
 std::vector<std::string> holders(const std::string& node) {
   std::vector<std::string> programs;
-  std::error_code code;
-  for (const fs::directory_entry& process : fs::directory_iterator("/proc", code)) {
-    const std::string id = process.path().filename();
+  for (const fs::path& process : entries_of("/proc")) {
+    const std::string id = process.filename();
     if (id.find_first_not_of("0123456789") == std::string::npos && id != std::to_string(getpid()) &&
-        holds(process.path(), node)) {
+        holds(process, node)) {
       std::string name;
-      std::ifstream comm(process.path() / "comm");
+      std::ifstream comm(process / "comm");
       std::getline(comm, name);
       programs.push_back(fmt::format("{} (process {})", name, id));
     }

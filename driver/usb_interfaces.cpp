@@ -38,6 +38,7 @@ std::vector<const libusb_interface_descriptor*> interfaces_of(const Configuratio
 }
 
 BulkInterface describe(const libusb_interface_descriptor& interface) {
+  constexpr int packet_bits = 0x07ff;  // USB 2.0, table 9-13: the others mean something else
   BulkInterface found{.number = interface.bInterfaceNumber};
   for (const libusb_endpoint_descriptor& e :
        std::span(interface.endpoint, interface.bNumEndpoints)) {
@@ -48,7 +49,7 @@ BulkInterface describe(const libusb_interface_descriptor& interface) {
       found.out_endpoint = e.bEndpointAddress;
     } else if (found.packet_bytes == 0) {
       found.in_endpoint = e.bEndpointAddress;
-      found.packet_bytes = e.wMaxPacketSize;
+      found.packet_bytes = e.wMaxPacketSize & packet_bits;
     }
   }
   return found;

@@ -45,8 +45,9 @@ int on_arrival(libusb_context*, libusb_device*, libusb_hotplug_event, void* arri
 
 UsbSensor::UsbSensor(std::unique_ptr<Board> board, const std::string& which)
     : board_(std::move(board)) {
-  const UsbDevice device = choose_device(usb_devices(context_), *board_, which);
-  which_ = device.serial.empty() ? device.port : device.serial;
+  const std::vector<UsbDevice> devices = usb_devices(context_);
+  const UsbDevice device = choose_device(devices, *board_, which);
+  which_ = distinction(*board_, device, devices);
   link_ = std::make_unique<BoardLink>(context_, *board_, device, transfer_counters_);
   description_ = link_->description();
   watch_arrivals();

@@ -20,7 +20,7 @@ Bytes configuration(FakeSerialBoard::Union descriptor) {
       {7, 5, 0x82, 3, 8, 0, 16},
       {9, 4, data_interface, 0, 2, 0x0a, 0, 0, 0},
       {7, 5, 0x03, 2, 64, 0, 0},
-      {7, 5, 0x83, 2, 64, 0, 0}};
+      {7, 5, 0x83, 2, 64, 0x18, 0}};  // 64 bytes, and bits that mean nothing in a bulk endpoint
   if (descriptor == FakeSerialBoard::Union::missing) {
     descriptors.erase(descriptors.begin() + 6);
   } else if (descriptor == FakeSerialBoard::Union::alone) {

@@ -87,6 +87,28 @@ TEST_F(Hotplug, ABoardWithoutSerialIsKnownByItsPort) {
   expect_frame(*sensor, board, 101);
 }
 
+TEST_F(Hotplug, BoardsThatShareASerialNumberAreKnownByTheirPorts) {
+  FakeTakktile board(usb_, "0001", {0b11111});
+  FakeTakktile copy(usb_, "0001", {0b11111}, FakeTakktile::Layout::bits, 3);
+  EXPECT_EQ(list_boards().at(0).name, "takktile:1-2");
+  EXPECT_EQ(list_boards().at(1).name, "takktile:1-3");
+  try {
+    open_board("takktile:0001");
+    ADD_FAILURE() << "it could be either";
+  } catch (const Error& error) {
+    EXPECT_THAT(error.what(), HasSubstr("say which: takktile:1-2, takktile:1-3"));
+  }
+  const auto sensor = open_board("takktile:1-3");
+  sensor->start();
+  expect_frame(*sensor, copy, 100);
+  copy.usb().unplug();
+  ASSERT_TRUE(becomes_true([&] { return sensor->gone(); }));
+  copy.usb().plug();
+  ASSERT_TRUE(becomes_true([&] { return !sensor->gone(); }));
+  expect_frame(*sensor, copy, 101);
+  EXPECT_FALSE(board.usb().claimed(0));
+}
+
 TEST_F(Hotplug, OtherCellsThanBeforeAreRefused) {
   FakeTakktile board(usb_, "1", {0b11111});
   const auto sensor = open_board("takktile");

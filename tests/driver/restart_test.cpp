@@ -141,9 +141,10 @@ TEST_F(Restart, FindsABoardThatIsMovedToAnotherPortWhileItStarts) {
   const auto sensor = open_board("takktile");
   const std::size_t asked = board.usb().requests().size();
   board.usb().ignore_requests(true);
+  // Plugged in before it is unplugged: so start() meets it whenever it looks.
+  FakeTakktile elsewhere(usb_, "1", {0b11111}, FakeTakktile::Layout::bits, 5);
   auto started = std::async(std::launch::async, [&] { sensor->start(); });
   ASSERT_TRUE(becomes_true([&] { return board.usb().requests().size() > asked; }));
-  FakeTakktile elsewhere(usb_, "1", {0b11111}, FakeTakktile::Layout::bits, 5);
   board.usb().unplug();
   started.get();
   expect_frame(*sensor, elsewhere, 100);

@@ -13,6 +13,8 @@
 #include "palpate/error.hpp"
 #include "parsing/sent_frame.hpp"
 #include "streamed.hpp"
+#include "usb_device.hpp"
+#include "usb_interfaces.hpp"
 
 namespace palpate {
 namespace {
@@ -89,6 +91,16 @@ TEST_F(SerialBoards, FindTheControlInterfaceWithoutAUnionDescriptor) {
   const auto sensor = open_board("tsf85");
   sensor->start();
   EXPECT_EQ(board.line_state(), 3);
+}
+
+TEST_F(SerialBoards, HavePacketsOfTheBitsThatCount) {
+  FakeSerialBoard board(usb_, "A1", {});
+  const UsbContext context;
+  const BulkInterface data = find_interface(usb_devices(context).at(0), LIBUSB_CLASS_DATA);
+  EXPECT_EQ(data.number, data_interface);
+  EXPECT_EQ(data.in_endpoint, 0x83);
+  EXPECT_EQ(data.out_endpoint, 0x03);
+  EXPECT_EQ(data.packet_bytes, 64U);
 }
 
 TEST_F(SerialBoards, StreamWhereverPacketsCutTheFrames) {

@@ -43,6 +43,23 @@ class Ring : public testing::Test {
   std::optional<TransferRing> ring_;
 };
 
+TEST_F(Ring, TellsWhichTransferAPacketEnded) {
+  for (const std::size_t bytes : {transfer_bytes, transfer_bytes - 64, std::size_t{3}}) {
+    board_.usb().send_message(Bytes(bytes, 1));
+  }
+  ASSERT_TRUE(pump());
+  const std::vector<Completion> completions = ring_->completed();
+  ASSERT_EQ(completions.size(), 4U);
+  EXPECT_EQ(completions[0].bytes.size(), transfer_bytes);
+  EXPECT_FALSE(completions[0].ended) << "full, but with full packets only";
+  EXPECT_TRUE(completions[1].bytes.empty());
+  EXPECT_TRUE(completions[1].ended);
+  EXPECT_EQ(completions[2].bytes.size(), transfer_bytes - 64);
+  EXPECT_TRUE(completions[2].ended);
+  EXPECT_EQ(completions[3].bytes.size(), 3U);
+  EXPECT_TRUE(completions[3].ended);
+}
+
 TEST_F(Ring, CountsWhatItHasNoMemoryToKeep) {
   board_.usb().send_packet(Bytes(1, 1));
   ASSERT_TRUE(pump());

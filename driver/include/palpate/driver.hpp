@@ -41,8 +41,9 @@ std::vector<BoardInfo> list_boards();
 /// its port such as 1-2.3.
 ///
 /// A board that is unplugged while it streams is waited for: the sensor is gone() until a board
-/// with the same serial number (or, where it has none, on the same port) is back; its calibration
-/// is read again and the stream goes on.
+/// with the same serial number (or, where it has none or another board bore it too, on the same
+/// port) is back; its calibration is read again and the stream goes on. start() looks for it in the
+/// same way where it was unplugged while the sensor was stopped, but does not wait for it.
 /// @throws Error (Fault::input) where the name is wrong or no such board is plugged in,
 ///         (Fault::system) where it cannot be opened: no permission, in use, or it does not answer
 std::unique_ptr<Sensor> open_board(const std::string& name);
