@@ -12,16 +12,12 @@ double NumberType::read(std::span<const std::uint8_t> wire) const {
   for (std::size_t i = 0; i < bytes; ++i) {
     pattern = pattern << 8 | wire[big_endian ? i : bytes - 1 - i];
   }
-  switch (kind) {
-    case Kind::unsigned_integer:
-      return static_cast<double>(pattern);
-    case Kind::signed_integer:
-      return static_cast<double>(static_cast<std::int64_t>(pattern));
-    case Kind::real:
-      return bytes == 8 ? std::bit_cast<double>(pattern)
-                        : double{std::bit_cast<float>(static_cast<std::uint32_t>(pattern))};
+  if (kind == Kind::real) {
+    return bytes == 8 ? std::bit_cast<double>(pattern)
+                      : double{std::bit_cast<float>(static_cast<std::uint32_t>(pattern))};
   }
-  return 0.0;
+  return negative ? static_cast<double>(static_cast<std::int64_t>(pattern))
+                  : static_cast<double>(pattern);
 }
 
 std::size_t bytes_of(const PacketFormat::Field& field, std::size_t elements, bool counted) {

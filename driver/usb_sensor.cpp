@@ -152,7 +152,6 @@ void UsbSensor::stream() {
 
 void UsbSensor::lose() {
   link_.reset();
-  board_->deframer().reset();
   gone_ = true;
 }
 

@@ -195,6 +195,20 @@ TEST_F(SerialBoards, AreStartedAgainWhenTheyComeBack) {
   expect_values(*sensor, {sent[1]});
 }
 
+TEST_F(SerialBoards, ForgetHalfAFrameWhenTheyAreStartedAgain) {
+  FakeSerialBoard board(usb_, "A1", {});
+  const auto sensor = open_board("tsf85:A1");
+  const std::vector<SentFrame> sent = frames_of("tsf85", 2);
+  sensor->start();
+  board.usb().send_packet(Bytes(sent[0].bytes.begin(), sent[0].bytes.begin() + 30));
+  ASSERT_TRUE(becomes_true([&] { return board.usb().waiting_packets() == 0; }));
+  sensor->start();
+  board.usb().send_message(sent[1].bytes);
+  expect_values(*sensor, {sent[1]});
+  sensor->stop();
+  EXPECT_EQ(sensor->counters().garbage_bytes, 0U);
+}
+
 TEST_F(SerialBoards, HaveProfilesOfTheUsersOwn) {
   ScratchFolder folder;
   const std::string path = folder.path() / "mine.yaml";

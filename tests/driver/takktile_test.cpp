@@ -30,6 +30,25 @@ TEST_F(Takktile, IsListedWithElementsAndSerial) {
   EXPECT_FALSE(board.usb().claimed(0)) << "looking disturbs nobody";
 }
 
+TEST_F(Takktile, IsAskedWhatThePublishedFirmwareAnswers) {
+  FakeTakktile board(usb_, "1", {0b00001, 0, 0b10000});
+  {
+    const auto sensor = open_board("takktile");
+    sensor->start();
+    sensor->stop();
+  }
+  std::vector<std::vector<int>> requests;
+  for (const FakeUsbDevice::Setup& setup : board.usb().requests()) {
+    EXPECT_EQ(setup.type, 0xc0) << "a vendor's request to the device, towards the host";
+    requests.push_back({setup.request, setup.value, setup.index});
+  }
+  EXPECT_EQ(requests, (std::vector<std::vector<int>>{{0x5c, 0, 0},       // which cells are alive
+                                                     {0x6c, 0, 0},       // calibration: column, row
+                                                     {0x6c, 4, 2},       //
+                                                     {0xc7, 120, 0xff},  // period, start
+                                                     {0xc7, 0, 0}}));
+}
+
 TEST_F(Takktile, BothFirmwaresGiveTheSameElements) {
   std::vector<std::vector<glm::dvec2>> elements;
   for (const auto layout : {FakeTakktile::Layout::bits, FakeTakktile::Layout::bytes}) {

@@ -54,6 +54,15 @@ TEST_F(TransferFault, AnOverflowIsCountedAndCostsOneFrame) {
   EXPECT_EQ(sensor_->counters().lost, 1U);
 }
 
+TEST_F(TransferFault, ALossOfBeforeIsNotToldAfterANewStart) {
+  board_.usb().send_fault(Fault::overflow);
+  ASSERT_TRUE(becomes_true([&] { return sensor_->counters().lost == 1; }));
+  sensor_->start();
+  EXPECT_EQ(frame_after(100).lost_before, 0U);
+  EXPECT_EQ(sensor_->counters().lost, 0U);
+  EXPECT_EQ(sensor_->counters().overflows, 0U);
+}
+
 TEST_F(TransferFault, FewerErrorsInARowThanTransfersAreSurvived) {
   for (int i = 0; i < 3; ++i) {
     board_.usb().send_fault(Fault::protocol, ring - 1);
