@@ -60,6 +60,10 @@ void TransferRing::recycle(std::vector<Completion>&& completions) {
       spare_.push_back(std::move(completion.bytes));
     }
   }
+  completions.clear();
+  if (completed_.empty()) {
+    completed_.swap(completions);  // for its memory
+  }
 }
 
 void TransferRing::recover() {

@@ -46,7 +46,7 @@ class TransferRing {
   TransferRing& operator=(const TransferRing&) = delete;
 
   /// What came since the last call, in order; the last may stand for missing transfers alone. Give
-  /// it back by recycle().
+  /// it back by recycle(): a callback allocates memory only where more comes than was given back.
   std::vector<Completion> completed();
   void recycle(std::vector<Completion>&& completions);
 

@@ -209,6 +209,19 @@ TEST_F(SerialBoards, ForgetHalfAFrameWhenTheyAreStartedAgain) {
   EXPECT_EQ(sensor->counters().garbage_bytes, 0U);
 }
 
+TEST_F(SerialBoards, DoNotJoinWhatStandsOnBothSidesOfALoss) {
+  FakeSerialBoard board(usb_, "A1", {});
+  const auto sensor = open_board("tsf85:A1");
+  const std::vector<SentFrame> sent = frames_of("tsf85", 2);
+  sensor->start();
+  board.usb().send_packet(Bytes(sent[0].bytes.begin(), sent[0].bytes.begin() + 30));
+  board.usb().send_fault(FakeUsbDevice::Fault::protocol);
+  board.usb().send_message(sent[1].bytes);
+  expect_values(*sensor, {sent[1]});
+  sensor->stop();
+  EXPECT_EQ(sensor->counters().lost, 1U);
+}
+
 TEST_F(SerialBoards, HaveProfilesOfTheUsersOwn) {
   ScratchFolder folder;
   const std::string path = folder.path() / "mine.yaml";

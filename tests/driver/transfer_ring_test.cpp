@@ -83,6 +83,33 @@ TEST_F(Ring, CountsWhatItHasNoMemoryToKeep) {
   EXPECT_FALSE(ring_->lost());
 }
 
+TEST_F(Ring, NeedsNoMemoryForAsMuchAsWasRecycled) {
+  constexpr int packets = 5;
+  const auto send = [&] {
+    for (int i = 0; i < packets; ++i) {
+      board_.usb().send_packet(Bytes(1, static_cast<std::uint8_t>(i)));
+    }
+  };
+  send();
+  ASSERT_TRUE(pump());
+  std::vector<Completion> completions = ring_->completed();
+  for (int round = 0; round < 3; ++round) {
+    ASSERT_EQ(completions.size(), static_cast<std::size_t>(packets));
+    for (int i = 0; i < packets; ++i) {
+      EXPECT_EQ(completions[static_cast<std::size_t>(i)].bytes,
+                Bytes(1, static_cast<std::uint8_t>(i)));
+      EXPECT_EQ(completions[static_cast<std::size_t>(i)].missing, 0U);
+    }
+    ring_->recycle(std::move(completions));
+    send();
+    {
+      const WithoutMemory none;
+      pump();
+    }
+    completions = ring_->completed();
+  }
+}
+
 TEST_F(Ring, EndsWithoutMemory) {
   board_.usb().send_packet(Bytes(64, 1));  // on its way: the transfer waits for more
   ASSERT_TRUE(pump());
