@@ -32,6 +32,19 @@ TEST(Wts, DropsAPacketWithAWrongChecksumAndCountsIt) {
   }
 }
 
+// Out of step, what begins like a packet is mostly none.
+TEST(Wts, CountsAWrongChecksumOnlyInStep) {
+  Receiver receiver(read_serial_profile("wts"));
+  Bytes damaged = wts_packet(0x21, {0x00, 0x00});
+  damaged.back() ^= 1;
+  receiver.push(Bytes{0x01});
+  receiver.push(damaged);
+  EXPECT_EQ(receiver.checksum_errors(), 0u);
+  receiver.push(wts_packet(0x21, {0x00, 0x00}));
+  receiver.push(damaged);
+  EXPECT_EQ(receiver.checksum_errors(), 1u);
+}
+
 TEST(Wts, PassesOverAnswersToCommands) {
   std::mt19937 random(4);
   const SentFrame frame = random_frame("wts", random);
@@ -113,6 +126,18 @@ TEST(FlexiTac, IsNotMisledByMarkersInThePayload) {
     EXPECT_EQ(receiver.frames()[i].values[40 * i], 0xaa);
   }
   EXPECT_EQ(receiver.garbage(), 100u);
+}
+
+TEST(FlexiTac, BelievesAMarkerOnceAnotherFollows) {
+  Receiver receiver(read_serial_profile("flexitac"));
+  receiver.push(Bytes{0x00});
+  receiver.push(flexitac({{7, 9}}));
+  EXPECT_TRUE(receiver.frames().empty());
+  receiver.push(Bytes{0xaa});
+  EXPECT_TRUE(receiver.frames().empty());
+  receiver.push(Bytes{0x55});
+  ASSERT_EQ(receiver.frames().size(), 1u);
+  EXPECT_EQ(receiver.frames()[0].values[7], 9.0);
 }
 
 TEST(FlexiTac, LeavesAFalseMarkerWhenItChanges) {

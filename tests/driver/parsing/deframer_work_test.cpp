@@ -5,6 +5,7 @@
 #include <string>
 
 #include "checksum.hpp"
+#include "driver/without_memory.hpp"
 #include "receiver.hpp"
 #include "serial_profile.hpp"
 
@@ -70,6 +71,22 @@ packet:
   receiver.push(Bytes(50'000, 0x0a));
   EXPECT_TRUE(receiver.frames().empty());
   EXPECT_GT(receiver.garbage(), 45'000u);
+}
+
+TEST(EndlessGarbage, NeedsNoMoreMemoryThanItsFirstBytes) {
+  const std::unique_ptr<Deframer> deframer = make_deframer(read_serial_profile("wts"));
+  std::vector<ParsedFrame> frames;
+  const Bytes piece(64, 0x00);
+  constexpr int pieces = 1000;
+  deframer->push(piece, frames);
+  deframer->push(piece, frames);
+  {
+    const WithoutMemory none;
+    for (int i = 2; i < pieces; ++i) {
+      deframer->push(piece, frames);
+    }
+  }
+  EXPECT_EQ(deframer->counters().garbage_bytes, pieces * piece.size());
 }
 
 }  // namespace
