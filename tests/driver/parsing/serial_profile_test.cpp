@@ -160,7 +160,7 @@ TEST_F(ProfileFile, SaysWhatIsWrongWithAPacket) {
   expect_refused(with_packet("  - bytes: aa\n  - values: u8\n  - checksum: crc16\n"),
                  {"line 6", "packet[2]", "polynomial"});
   expect_refused(with_packet("  - bytes: aa\n  - values: u8\n"
-                             "  - {checksum: crc8, polynomial: 0x1021}\n"),
+                             "  - {checksum: crc8, polynomial: 0x100}\n"),
                  {"line 6", "packet[2]", "8 bits"});
   expect_refused(with_packet("  - bytes: aa\n  - values: u8\n  - {checksum: sum8, from: 3}\n"),
                  {"line 6", "packet[2]", "only 3 bytes"});
