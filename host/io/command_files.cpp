@@ -1,0 +1,89 @@
+#include "command_files.hpp"
+
+#include <fmt/format.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <map>
+#include <optional>
+#include <system_error>
+#include <utility>
+
+#include "palpate/error.hpp"
+#include "standard_streams.hpp"
+
+namespace palpate {
+
+namespace {
+
+/// What tells two files apart: device and inode, or the path where there is no file yet.
+struct Identity {
+  dev_t device = 0;
+  ino_t inode = 0;
+  std::filesystem::path path;
+
+  auto operator<=>(const Identity&) const = default;
+};
+
+/// None for what cannot be overwritten, such as a terminal.
+std::optional<Identity> identity_of(const std::filesystem::path& file, int stream) {
+  struct stat status {};
+  const bool found =
+      file == "-" ? ::fstat(stream, &status) == 0 : ::stat(file.c_str(), &status) == 0;
+  if (!found) {
+    std::error_code ignored;
+    // Absolute first: what exists of a relative path may be nothing, and then it stays as it is.
+    return Identity{.path = std::filesystem::weakly_canonical(
+                        std::filesystem::absolute(file, ignored), ignored)};
+  }
+  if (!S_ISREG(status.st_mode) && !S_ISFIFO(status.st_mode)) {
+    return {};
+  }
+  return Identity{.device = status.st_dev, .inode = status.st_ino, .path = {}};
+}
+
+void require_open(const std::string& flag, const std::filesystem::path& file, int stream,
+                  const char* name) {
+  if (file == "-" && was_closed(stream)) {
+    throw Error(Fault::input, fmt::format("{} -: standard {} is closed; name a file", flag, name));
+  }
+}
+
+}  // namespace
+
+void CommandFiles::reads(const std::string& flag, const std::filesystem::path& file) {
+  require_open(flag, file, STDIN_FILENO, "input");
+  read_.push_back({flag, file});
+}
+
+void CommandFiles::writes(const std::string& flag, const std::filesystem::path& file) {
+  require_open(flag, file, STDOUT_FILENO, "output");
+  written_.push_back({flag, file});
+}
+
+void CommandFiles::require_distinct() const {
+  // Every file so far, with what becomes of it.
+  std::map<Identity, std::pair<const Named*, const char*>> taken;
+  for (const Named& input : read_) {
+    if (const auto identity = identity_of(input.file, STDIN_FILENO)) {
+      taken.emplace(*identity, std::pair{&input, "reads"});
+    }
+  }
+  for (const Named& output : written_) {
+    const auto identity = identity_of(output.file, STDOUT_FILENO);
+    if (!identity) {
+      continue;
+    }
+    const auto [other, is_new] = taken.emplace(*identity, std::pair{&output, "writes"});
+    if (!is_new) {
+      const auto& [named, verb] = other->second;
+      throw Error(
+          Fault::input,
+          fmt::format("{} {}: would overwrite {}, which {} {}; choose another "
+                      "name",
+                      output.flag, output.file.string(), named->file.string(), named->flag, verb));
+    }
+  }
+}
+
+}  // namespace palpate
