@@ -8,9 +8,11 @@
 #include "experiment.hpp"
 #include "kernels.hpp"
 #include "palpate/error.hpp"
+#include "standard_streams.hpp"
 #include "sweep.hpp"
 
 int main(int argc, char** argv) {
+  palpate::open_closed_streams();
   CLI::App app("Measures Palpate's speed and accuracy on simulated letters.", "palpate-bench");
   app.require_subcommand(1);
   palpate::bench::KernelOptions options;

@@ -9,6 +9,7 @@
 
 #include "commands.hpp"
 #include "palpate/error.hpp"
+#include "standard_streams.hpp"
 
 namespace {
 
@@ -77,6 +78,7 @@ int run(int argc, char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  palpate::open_closed_streams();
   try {
     return run(argc, argv);
   } catch (const palpate::Error& error) {
