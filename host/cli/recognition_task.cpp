@@ -251,4 +251,17 @@ RecognitionTask prepare(const RecognitionFlags& flags, const Scene& scene,
   return task;
 }
 
+void add_recognition_files(const RecognitionFlags& flags, const Scene& scene,
+                           const RecognitionTask& task, CommandFiles& files) {
+  if (!flags.scene.empty()) {
+    files.reads("--scene", flags.scene);
+  }
+  if (scene.array_file) {
+    files.reads("--scene", *scene.array_file);
+  }
+  for (const std::string& map : task.map_paths) {
+    files.reads(flags.maps.empty() ? "--scene" : "--maps", map);
+  }
+}
+
 }  // namespace palpate::cli
