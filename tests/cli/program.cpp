@@ -15,7 +15,8 @@ namespace palpate {
 namespace {
 
 void redirect(int descriptor, const std::filesystem::path& file) {
-  const int opened = ::open(file.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600);
+  const int flags = descriptor == STDIN_FILENO ? O_RDONLY : O_WRONLY | O_CREAT | O_TRUNC;
+  const int opened = ::open(file.c_str(), flags, 0600);
   if (opened < 0 || ::dup2(opened, descriptor) < 0) {
     ::_exit(126);
   }
@@ -59,6 +60,12 @@ Outcome run_program(const std::filesystem::path& folder, const std::vector<std::
              surroundings.standard_output.empty() ? out : surroundings.standard_output);
     redirect(STDERR_FILENO,
              surroundings.standard_error.empty() ? err : surroundings.standard_error);
+    if (!surroundings.standard_input.empty()) {
+      redirect(STDIN_FILENO, surroundings.standard_input);
+    }
+    for (const int stream : surroundings.closed) {
+      ::close(stream);
+    }
     if (surroundings.largest_file_bytes) {
       limit_files(*surroundings.largest_file_bytes);
     }

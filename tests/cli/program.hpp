@@ -26,6 +26,8 @@ struct Surroundings {
   std::optional<rlim_t> largest_file_bytes;  ///< writes beyond it fail, as on a full disk
   std::filesystem::path standard_output;     ///< a file in the place of Outcome::out
   std::filesystem::path standard_error;      ///< a file in the place of Outcome::err
+  std::filesystem::path standard_input;      ///< a file in the place of the test's own
+  std::vector<int> closed;                   ///< standard streams that are closed, as a daemon's
 };
 
 /// Runs the palpate program in `folder`, on which its relative paths depend.
