@@ -7,8 +7,10 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <csignal>
 #include <cstdlib>
+#include <system_error>
 
 namespace palpate {
 
@@ -21,6 +23,14 @@ void redirect(int descriptor, const std::filesystem::path& file) {
     ::_exit(126);
   }
   ::close(opened);
+}
+
+/// What fork() and its like return, unless they refuse: this test fails then, with their reason.
+pid_t require_process(pid_t pid, const char* call) {
+  if (pid < 0) {
+    throw std::system_error(errno, std::generic_category(), call);
+  }
+  return pid;
 }
 
 void limit_files(rlim_t bytes) {
@@ -51,7 +61,7 @@ Outcome run_program(const std::filesystem::path& folder, const std::vector<std::
   const ScratchFolder captured;
   const std::filesystem::path out = captured / "out";
   const std::filesystem::path err = captured / "err";
-  const pid_t pid = ::fork();
+  const pid_t pid = require_process(::fork(), "fork");
   if (pid == 0) {
     if (::chdir(folder.c_str()) != 0) {
       ::_exit(126);
@@ -85,7 +95,7 @@ ProgramOnTerminal::ProgramOnTerminal(const std::filesystem::path& folder,
   winsize window{};
   window.ws_col = static_cast<unsigned short>(columns);
   window.ws_row = static_cast<unsigned short>(rows);
-  pid_ = ::forkpty(&terminal_, nullptr, nullptr, &window);
+  pid_ = require_process(::forkpty(&terminal_, nullptr, nullptr, &window), "forkpty");
   if (pid_ == 0) {
     if (::chdir(folder.c_str()) != 0) {
       ::_exit(126);

@@ -37,7 +37,8 @@ Outcome run_program(const std::filesystem::path& folder, const std::vector<std::
 /// The palpate program on a terminal of its own.
 class ProgramOnTerminal {
  public:
-  /// `environment` is set on top of the test's own.
+  /// `environment` is set on top of the test's own. Throws, and so fails the test, where the
+  /// machine has no pseudo-terminal to give.
   ProgramOnTerminal(const std::filesystem::path& folder, const std::vector<std::string>& arguments,
                     const std::map<std::string, std::string>& environment = {}, int columns = 80,
                     int rows = 24);
