@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cstdio>
 #include <exception>
+#include <iostream>
 #include <new>
 #include <string>
 
@@ -24,6 +25,15 @@ int complain(int status, std::string message) {
   // Not fmt::print, which throws where standard error cannot be written.
   std::fprintf(stderr, "palpate: %s\n", message.c_str());
   return status;
+}
+
+int complain_of_output() {
+  return complain(failed, "standard output: cannot be written; is the disk full?");
+}
+
+/// The status of a run that went well, unless something that it printed was lost.
+int finish() {
+  return std::fflush(stdout) != 0 || std::ferror(stdout) != 0 ? complain_of_output() : 0;
 }
 
 /// CLI11 takes an empty value for a missing one, and so a script's unset variable for a default.
@@ -56,7 +66,9 @@ int run(int argc, char** argv) {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() == 0) {
-      return app.exit(error);  // --help, --version
+      app.exit(error);  // prints --help or --version
+      std::cout.flush();
+      return finish();
     }
     const auto commands = app.get_subcommands();
     const auto unexpected = app.remaining();
@@ -69,10 +81,7 @@ int run(int argc, char** argv) {
                     fmt::format("{}; see palpate {}--help", error.what(),
                                 commands.empty() ? "" : commands.front()->get_name() + " "));
   }
-  if (std::fflush(stdout) != 0) {
-    return complain(failed, "standard output: cannot be written; is the disk full?");
-  }
-  return 0;
+  return finish();
 }
 
 }  // namespace
@@ -86,6 +95,7 @@ int main(int argc, char** argv) {
   } catch (const std::bad_alloc&) {
     return complain(failed, "out of memory; use fewer bins, objects or cells");
   } catch (const std::exception& error) {
-    return complain(failed, error.what());
+    // What fmt::print throws names no file.
+    return std::ferror(stdout) != 0 ? complain_of_output() : complain(failed, error.what());
   }
 }

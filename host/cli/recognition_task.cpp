@@ -174,6 +174,11 @@ bool wants_particles(const RecognitionFlags& flags, const Scene& scene) {
           fmt::format("{}: has no effect on --filter {}; add --filter particles", flag, filter));
     }
   }
+  if (flags.memory_mib && particles) {
+    throw Error(Fault::input,
+                "--memory-mib: has no effect on --filter particles; use --filter histogram, or "
+                "fewer --particles");
+  }
   return particles;
 }
 

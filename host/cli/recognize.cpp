@@ -4,12 +4,14 @@
 #include <cmath>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <set>
 #include <string>
 
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
+#include "atomic_file.hpp"
 #include "command_files.hpp"
 #include "figures.hpp"
 #include "palpate/error.hpp"
@@ -85,6 +87,11 @@ void check_outputs(const Options& options, const Scene& scene, const Recognition
   for (const std::string& file : {options.posterior, options.json}) {
     if (!file.empty() && file != "-") {
       require_writable(file);
+    }
+  }
+  if (std::filesystem::is_directory(options.png)) {
+    for (const Unknown& unknown : unknowns) {
+      require_writable(png_path(options, unknown));
     }
   }
 }
@@ -168,6 +175,22 @@ Posterior export_posterior(const RecognitionTask& task, const PoseHistogram& his
   return posterior;
 }
 
+/// Writes posterior and JSON, both or none.
+void write_results(const Options& options, const RecognitionTask& task,
+                   const Recogniser& recogniser, const std::string& json) {
+  std::optional<AtomicFile> json_file;
+  if (!options.json.empty() && options.json != "-") {
+    json_file.emplace(options.json);
+    json_file->write(json);
+  }
+  if (!options.posterior.empty()) {
+    write_posterior(options.posterior, export_posterior(task, *recogniser.histogram()));
+  }
+  if (json_file) {
+    json_file->commit();
+  }
+}
+
 void recognize(const Options& options) {
   const Scene scene = scene_of(options.recognition);
   const Unknowns unknowns = read_unknowns(options.unknowns, scene, options.recognition.scene);
@@ -200,15 +223,14 @@ void recognize(const Options& options) {
         write_file(png_path(options, unknown),
                    draw_sheet(records.back(), unknown, task, *recogniser));
       }
-      if (!options.posterior.empty()) {
-        write_posterior(options.posterior, export_posterior(task, *recogniser->histogram()));
-      }
     }
   }
 
   // The path of a recording need not be UTF-8, as JSON must.
   const std::string json_text =
       json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
+  // The files before anything is printed: nobody may be listening any more.
+  write_results(options, task, *recogniser, json_text);
   if (options.json == "-") {
     fmt::print("{}", json_text);
   } else {
@@ -221,9 +243,6 @@ void recognize(const Options& options) {
       fmt::print("\n");
     }
     print_table(records, task);
-    if (!options.json.empty()) {
-      write_file(options.json, json_text);
-    }
   }
 }
 

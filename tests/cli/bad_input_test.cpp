@@ -286,6 +286,9 @@ TEST_F(BadInput, OutputsThatAreFolders) {
   expect_refused({"simulate", "A", "-o", "folder"}, named);
   expect_refused(with(map, {"--png", "folder"}), named);
   expect_refused(with(recognize, {"--json", "folder"}), named);
+  std::filesystem::create_directories(folder_ / "sheets/u.1.png");
+  expect_refused(with(recognize, {"--each-frame", "--json", "r.json", "--png", "sheets"}),
+                 {"sheets/u.1.png", "is a folder"});
 }
 
 TEST_F(BadInput, FolderThatIsAFile) {
@@ -348,6 +351,8 @@ TEST_F(BadInput, FlagsOfTheOtherFilter) {
         Arguments{"--resampling", "systematic"}, Arguments{"--augmented"}}) {
     expect_refused(with(recognize, flags), {flags.front(), "add --filter particles"});
   }
+  expect_refused(with(recognize, {"--filter", "particles", "--memory-mib", "100"}),
+                 {"--memory-mib", "use --filter histogram"});
   expect_refused(with(recognize, {"--filter", "particles", "--posterior", "p.h5"}),
                  {"--posterior p.h5", "use --filter histogram"});
 }

@@ -70,6 +70,42 @@ TEST_F(FullDisk, StandardOutputThatCannotBeWrittenIsAFailure) {
                  "standard output");
 }
 
+TEST_F(FullDisk, LongOutputThatCannotBeWrittenIsAFailureOfStandardOutputToo) {
+  // More than standard output keeps back until the end.
+  expect_failure(palpate({"recognize", "u.h5", "--maps", "A.map.h5", "--each-frame", "--trace",
+                          "--bins", "5x5x4", "--json", "-"},
+                         {.standard_output = "/dev/full"}),
+                 "standard output");
+  expect_failure(palpate({"live", "--sensor", "simulate:A,rate=100,touches=2,speed=max", "--maps",
+                          "A.map.h5", "--bins", "5x5x4"},
+                         {.standard_output = "/dev/full"}),
+                 "standard output");
+}
+
+TEST_F(FullDisk, HelpThatCannotBeWrittenIsAFailure) {
+  for (const char* flag : {"--help", "--version"}) {
+    expect_failure(palpate({flag}, {.standard_output = "/dev/full"}), "standard output");
+  }
+}
+
+TEST_F(FullDisk, ResultsAreWrittenWhereNobodyListens) {
+  const Outcome outcome = palpate({"recognize", "u.h5", "--maps", "A.map.h5", "--each-frame",
+                                   "--trace", "--bins", "5x5x4", "--json", "r.json"},
+                                  {.standard_output = "/dev/full"});
+  EXPECT_EQ(outcome.status, 1) << outcome.err;
+  EXPECT_EQ(nlohmann::json::parse(bytes_of(folder_ / "r.json")).size(), 6u);
+}
+
+TEST_F(FullDisk, PosteriorThatCannotBeWrittenKeepsTheJsonBack) {
+  const auto before = content_of(folder_.path());
+  // The JSON of one estimate is below it, the posterior above.
+  const Outcome outcome = palpate(
+      {"recognize", "u.h5", "--maps", "A.map.h5", "--json", "r.json", "--posterior", "p.h5"},
+      {.largest_file_bytes = 4096});
+  expect_failure(outcome, "p.h5");
+  EXPECT_TRUE(content_of(folder_.path()) == before) << "the folder has changed";
+}
+
 TEST_F(FullDisk, StandardErrorThatCannotBeWrittenKeepsTheStatus) {
   EXPECT_EQ(palpate({"info", "missing.h5"}, {.standard_error = "/dev/full"}).status, 2);
 }
