@@ -89,21 +89,27 @@ TEST_F(FullDisk, HelpThatCannotBeWrittenIsAFailure) {
 }
 
 TEST_F(FullDisk, ResultsAreWrittenWhereNobodyListens) {
-  const Outcome outcome = palpate({"recognize", "u.h5", "--maps", "A.map.h5", "--each-frame",
+  const Outcome outcome = palpate({"recognize", "A.h5", "--maps", "A.map.h5", "--each-frame",
                                    "--trace", "--bins", "5x5x4", "--json", "r.json"},
                                   {.standard_output = "/dev/full"});
-  EXPECT_EQ(outcome.status, 1) << outcome.err;
-  EXPECT_EQ(nlohmann::json::parse(bytes_of(folder_ / "r.json")).size(), 6u);
+  expect_failure(outcome, "standard output");
+  EXPECT_EQ(nlohmann::json::parse(bytes_of(folder_ / "r.json")).size(), 48u);
 }
 
-TEST_F(FullDisk, PosteriorThatCannotBeWrittenKeepsTheJsonBack) {
+TEST_F(FullDisk, JsonAndPosteriorAreBothWrittenOrNone) {
   const auto before = content_of(folder_.path());
-  // The JSON of one estimate is below it, the posterior above.
-  const Outcome outcome = palpate(
-      {"recognize", "u.h5", "--maps", "A.map.h5", "--json", "r.json", "--posterior", "p.h5"},
-      {.largest_file_bytes = 4096});
-  expect_failure(outcome, "p.h5");
-  EXPECT_TRUE(content_of(folder_.path()) == before) << "the folder has changed";
+  const auto expect_none = [&](const std::string& bins, bool trace, const char* refused) {
+    std::vector<std::string> arguments{"recognize", "A.h5",   "--maps", "A.map.h5",    "--bins",
+                                       bins,        "--json", "r.json", "--posterior", "p.h5"};
+    if (trace) {
+      arguments.emplace_back("--trace");
+    }
+    // Below the size of one of them, above that of the other.
+    expect_failure(palpate(arguments, {.largest_file_bytes = 12000}), refused);
+    EXPECT_TRUE(content_of(folder_.path()) == before) << "the folder has changed";
+  };
+  expect_none("5x5x4", true, "r.json");
+  expect_none("25x25x16", false, "p.h5");
 }
 
 TEST_F(FullDisk, StandardErrorThatCannotBeWrittenKeepsTheStatus) {
