@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 
+#include "file_identity.hpp"
 #include "palpate/error.hpp"
 #include "palpate/files.hpp"
 #include "recordings.hpp"
@@ -62,10 +63,10 @@ std::vector<Scene::Object> objects_of(const RecognitionFlags& flags, const Scene
 }
 
 void load_maps(const std::vector<Scene::Object>& objects, RecognitionTask& task) {
-  std::set<std::filesystem::path> seen;
+  std::set<std::optional<FileIdentity>> seen;
   for (const Scene::Object& object : objects) {
     OccupancyGrid map = read_map(object.map);
-    if (!seen.insert(std::filesystem::canonical(object.map)).second) {
+    if (!seen.insert(identity_of(object.map)).second) {
       throw Error(
           Fault::input,
           fmt::format("{}: the same map is given twice; leave one out, or give the object a "

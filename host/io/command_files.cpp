@@ -1,7 +1,6 @@
 #include "command_files.hpp"
 
 #include <fmt/format.h>
-#include <sys/stat.h>
 #include <unistd.h>
 
 #include <map>
@@ -9,6 +8,7 @@
 #include <system_error>
 #include <utility>
 
+#include "file_identity.hpp"
 #include "palpate/error.hpp"
 #include "standard_streams.hpp"
 
@@ -16,30 +16,24 @@ namespace palpate {
 
 namespace {
 
-/// What tells two files apart: device and inode, or the path where there is no file yet.
-struct Identity {
-  dev_t device = 0;
-  ino_t inode = 0;
-  std::filesystem::path path;
-
-  auto operator<=>(const Identity&) const = default;
-};
+/// What tells two files apart: their identities, or their paths where there is no file yet.
+using Place = std::pair<FileIdentity, std::filesystem::path>;
 
 /// None for what cannot be overwritten, such as a terminal.
-std::optional<Identity> identity_of(const std::filesystem::path& file, int stream) {
+std::optional<Place> place_of(const std::filesystem::path& file, int stream) {
   struct stat status {};
   const bool found =
       file == "-" ? ::fstat(stream, &status) == 0 : ::stat(file.c_str(), &status) == 0;
   if (!found) {
     std::error_code ignored;
     // Absolute first: what exists of a relative path may be nothing, and then it stays as it is.
-    return Identity{.path = std::filesystem::weakly_canonical(
-                        std::filesystem::absolute(file, ignored), ignored)};
+    return Place{
+        {}, std::filesystem::weakly_canonical(std::filesystem::absolute(file, ignored), ignored)};
   }
   if (!S_ISREG(status.st_mode) && !S_ISFIFO(status.st_mode)) {
     return {};
   }
-  return Identity{.device = status.st_dev, .inode = status.st_ino, .path = {}};
+  return Place{identity_of(status), {}};
 }
 
 void require_open(const std::string& flag, const std::filesystem::path& file, int stream,
@@ -63,18 +57,18 @@ void CommandFiles::writes(const std::string& flag, const std::filesystem::path& 
 
 void CommandFiles::require_distinct() const {
   // Every file so far, with what becomes of it.
-  std::map<Identity, std::pair<const Named*, const char*>> taken;
+  std::map<Place, std::pair<const Named*, const char*>> taken;
   for (const Named& input : read_) {
-    if (const auto identity = identity_of(input.file, STDIN_FILENO)) {
-      taken.emplace(*identity, std::pair{&input, "reads"});
+    if (const auto place = place_of(input.file, STDIN_FILENO)) {
+      taken.emplace(*place, std::pair{&input, "reads"});
     }
   }
   for (const Named& output : written_) {
-    const auto identity = identity_of(output.file, STDOUT_FILENO);
-    if (!identity) {
+    const auto place = place_of(output.file, STDOUT_FILENO);
+    if (!place) {
       continue;
     }
-    const auto [other, is_new] = taken.emplace(*identity, std::pair{&output, "writes"});
+    const auto [other, is_new] = taken.emplace(*place, std::pair{&output, "writes"});
     if (!is_new) {
       const auto& [named, verb] = other->second;
       throw Error(

@@ -207,12 +207,16 @@ TEST_F(BadInput, FolderMayNameNoMapEither) {
 TEST_F(BadInput, TheSameMapTwice) {
   expect_refused({"recognize", "u.h5", "--maps", "A.map.h5", "./A.map.h5"},
                  {"A.map.h5", "twice", "leave one out"});
+  std::filesystem::create_hard_link(folder_ / "A.map.h5", folder_ / "hard.h5");
+  expect_refused({"recognize", "u.h5", "--maps", "A.map.h5", "hard.h5"}, {"hard.h5", "twice"});
 }
 
 TEST_F(BadInput, TheSameRecordingTwice) {
   expect_refused({"recognize", "u.h5", "./u.h5", "--maps", "A.map.h5"},
                  {"u.h5", "twice", "leave one out"});
   expect_refused({"map", "A.h5", "./A.h5", "-o", "out.map.h5"}, {"A.h5", "twice"});
+  std::filesystem::create_hard_link(folder_ / "A.h5", folder_ / "hard.h5");
+  expect_refused({"map", "A.h5", "hard.h5", "-o", "out.map.h5"}, {"hard.h5", "twice"});
 }
 
 TEST_F(BadInput, RawStream) {
