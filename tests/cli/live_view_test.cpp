@@ -118,6 +118,16 @@ TEST(LiveView, DrawsALargeArrayAtOnce) {
   EXPECT_NE(joined(lines).find("@@@@", 34), std::string::npos);
 }
 
+TEST(LiveView, DrawsAnUnseenMapWhite) {
+  OccupancyGrid map = sample_map("E");
+  map.prior = 0.1;
+  map.log_odds.assign(map.log_odds.size(), static_cast<float>(map.prior_log_odds()));
+  LiveView view = sample_view(map);
+  view.T_robot_sensor.reset();
+  const std::string text = joined(draw(view, 80, 24, TerminalColours::direct));
+  EXPECT_NE(text.find("\033[38;2;255;255;255m\033[48;2;255;255;255m"), std::string::npos);
+}
+
 TEST(LiveView, BarsAreAsLongAsProbabilities) {
   const OccupancyGrid map = sample_map("E");
   const auto lines = draw(sample_view(map), 80, 24, TerminalColours::none);
