@@ -11,6 +11,7 @@
 #include <fmt/format.h>
 
 #include "atomic_file.hpp"
+#include "command_files.hpp"
 #include "comparison.hpp"
 #include "experiment_result.hpp"
 #include "gnuplot.hpp"
@@ -33,6 +34,24 @@ void make_folder(const std::string& folder) {
     throw Error(Fault::input, fmt::format("folder {}: {}; give one that can be written to", folder,
                                           error.message()));
   }
+}
+
+void require_distinct_outputs(const ExperimentOptions& options) {
+  CommandFiles files;
+  const auto add = [&](const char* flag, const std::string& folder,
+                       const std::vector<std::string>& names) {
+    for (const std::string& name : names) {
+      if (!folder.empty()) {
+        files.writes(flag, std::filesystem::path(folder) / name);
+      }
+    }
+  };
+  add("--csv", options.csv, table_files());
+  add("--plots", options.plots, figure_files());
+  if (!options.json.empty()) {
+    files.writes("--json", options.json);
+  }
+  files.require_distinct();
 }
 
 int least_one(const char* field, int value) {
@@ -137,6 +156,7 @@ ExperimentResult measure(Device& device, const ExperimentOptions& options, Repor
 }  // namespace
 
 void run_experiment(const ExperimentOptions& options, std::span<char* const> command_line) {
+  require_distinct_outputs(options);
   std::unique_ptr<AtomicFile> file;
   if (!options.json.empty()) {
     file = std::make_unique<AtomicFile>(options.json);

@@ -315,6 +315,17 @@ void draw_none(const ExperimentResult& result, const std::filesystem::path& fold
 
 }  // namespace
 
+std::vector<std::string> figure_files() {
+  std::vector<std::string> files;
+  for (const char* name : {"fig6a", "fig6b", "fig7a", "fig7b", "errors", "refined", "pose_noise",
+                           "calibration", "none", "augmented"}) {
+    for (const Terminal& terminal : terminals) {
+      files.push_back(fmt::format("{}.{}", name, terminal.extension));
+    }
+  }
+  return files;
+}
+
 void draw_figures(const ExperimentResult& result, const std::filesystem::path& folder) {
   draw_paper_figures(result, folder);
   Chart augmented = chart_of(result, "particles", accuracy_percent, accuracy_axis, "dt 1");

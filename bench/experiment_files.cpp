@@ -190,6 +190,10 @@ nlohmann::ordered_json document_of(const ExperimentResult& result) {
   return document;
 }
 
+std::vector<std::string> table_files() {
+  return {"curves.csv", "calibration.csv", "pose_noise.csv", "none.csv", "trials.csv"};
+}
+
 void write_tables(const ExperimentResult& result, const std::filesystem::path& folder) {
   const auto write = [&](const char* name, const std::string& table) {
     AtomicFile file(folder / name);

@@ -39,6 +39,10 @@ std::vector<double> sampled_log10_weights(const std::vector<NoneRun>& runs);
 /// Every curve, calibration and "none" table, as `filters`, `pose_noise` and `none`.
 nlohmann::ordered_json document_of(const ExperimentResult& result);
 
+/// The files that write_tables() and draw_figures() make of a result in their folders.
+std::vector<std::string> table_files();
+std::vector<std::string> figure_files();
+
 /// Writes curves.csv, calibration.csv, pose_noise.csv, none.csv and trials.csv, the last with a
 /// line for every touch of every trial.
 /// @throws Error where the disk refuses

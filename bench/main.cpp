@@ -1,16 +1,18 @@
 #include <cstdio>
 #include <exception>
+#include <iostream>
 #include <span>
 
-#include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
 #include "experiment.hpp"
 #include "kernels.hpp"
 #include "palpate/error.hpp"
+#include "standard_streams.hpp"
 #include "sweep.hpp"
 
 int main(int argc, char** argv) {
+  palpate::open_closed_streams();
   CLI::App app("Measures Palpate's speed and accuracy on simulated letters.", "palpate-bench");
   app.require_subcommand(1);
   palpate::bench::KernelOptions options;
@@ -58,15 +60,24 @@ int main(int argc, char** argv) {
                     "Vulkan device, by a part of its name or index");
   sweep->callback([&] { palpate::bench::run_sweep(sweep_options, std::span(argv, argc)); });
   try {
-    app.parse(argc, argv);
+    try {
+      app.parse(argc, argv);
+    } catch (const CLI::ParseError& error) {
+      if (app.exit(error) != 0) {
+        return 2;
+      }
+      std::cout.flush();  // --help
+    }
+    if (std::fflush(stdout) != 0 || std::ferror(stdout) != 0) {
+      throw palpate::Error(palpate::Fault::system,
+                           "standard output: cannot be written; is the disk full?");
+    }
     return 0;
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : 2;
   } catch (const palpate::Error& error) {
-    fmt::print(stderr, "palpate-bench: {}\n", error.what());
+    std::fprintf(stderr, "palpate-bench: %s\n", error.what());
     return error.fault() == palpate::Fault::input ? 2 : 1;
   } catch (const std::exception& error) {
-    fmt::print(stderr, "palpate-bench: {}\n", error.what());
+    std::fprintf(stderr, "palpate-bench: %s\n", error.what());
     return 1;
   }
 }

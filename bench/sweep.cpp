@@ -12,6 +12,7 @@
 #include <fmt/format.h>
 
 #include "atomic_file.hpp"
+#include "command_files.hpp"
 #include "letters.hpp"
 #include "measurement.hpp"
 #include "palpate/balanced_lattice.hpp"
@@ -191,6 +192,26 @@ void require_at_least(const char* flag, const std::optional<std::int64_t>& value
   }
 }
 
+std::filesystem::path chart_path(const SweepOptions& options, const std::string& chart) {
+  return std::filesystem::path(options.plots) / ("sweep_" + chart + ".svg");
+}
+
+void require_distinct_outputs(const SweepOptions& options) {
+  CommandFiles files;
+  if (!options.json.empty()) {
+    files.writes("--json", options.json);
+  }
+  if (!options.html.empty()) {
+    files.writes("--html", options.html);
+  }
+  if (!options.plots.empty()) {
+    for (const char* chart : chart_names) {
+      files.writes("--plots", chart_path(options, chart));
+    }
+  }
+  files.require_distinct();
+}
+
 std::unique_ptr<AtomicFile> output(const std::string& path) {
   return path.empty() ? nullptr : std::make_unique<AtomicFile>(path);
 }
@@ -206,6 +227,7 @@ void run_sweep(const SweepOptions& options, std::span<char* const> command_line)
   // Before the minutes of work, so that what cannot be is known at once.
   require_at_least("--max-bins", options.max_bins, 1'000);
   require_at_least("--trials", options.trials, 1);
+  require_distinct_outputs(options);
   const std::unique_ptr<AtomicFile> json = output(options.json);
   const std::unique_ptr<AtomicFile> html = output(options.html);
   if (std::error_code error; !options.plots.empty() &&
@@ -237,7 +259,7 @@ void run_sweep(const SweepOptions& options, std::span<char* const> command_line)
   }
   if (!options.plots.empty()) {
     for (const NamedChart& chart : charts_of(result)) {
-      AtomicFile file(std::filesystem::path(options.plots) / ("sweep_" + chart.name + ".svg"));
+      AtomicFile file(chart_path(options, chart.name));
       commit(file, chart.file);
     }
   }

@@ -227,7 +227,7 @@ std::vector<NamedChart> charts_of(const SweepResult& result) {
                       .caption = std::move(caption)};
   };
   return {
-      named("front", pose_chart(result),
+      named(chart_names[0], pose_chart(result),
             fmt::format(
                 "Labels are bins per object, of which there are five, or particles in all. Solid "
                 "marks: maps of 0.5 mm cells; half filled: 0.25 mm; hollow: 1 mm. A refined pose "
@@ -236,14 +236,14 @@ std::vector<NamedChart> charts_of(const SweepResult& result) {
                 "recognise and locate all {} trials, where errors are from windows all those in "
                 "full; runs of fewer stay out of it.",
                 result.trials)),
-      named("precision", precision_chart(result),
+      named(chart_names[1], precision_chart(result),
             fmt::format(
                 "The likelihood alone, side by side on the same lattices; labels are bins per "
                 "object. Deviations of the log-likelihood are the largest of {} bins an object "
                 "after one touch. In logs: gamma = 0. The array at rest counts its No Contact "
                 "elements, too, although it skips them.",
                 sampled_bins)),
-      named("bins", knee_chart(result),
+      named(chart_names[2], knee_chart(result),
             fmt::format(
                 "The histogram on lattices of balanced steps, all over the same {} trials. "
                 "\"Nearest bin\" is the least error that any bin of the lattice has: what the "

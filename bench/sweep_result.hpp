@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -73,6 +74,7 @@ struct NamedChart {
   std::string file;     ///< by itself
   std::string caption;  ///< for people who read the chart
 };
+inline constexpr std::array chart_names{"front", "precision", "bins"};
 std::vector<NamedChart> charts_of(const SweepResult& result);
 
 }  // namespace palpate::bench

@@ -22,8 +22,7 @@ std::unique_ptr<Board> make_board(const std::string& name) {
     return std::make_unique<TakktileBoard>();
   }
   std::vector<std::string> known = shipped_profiles();
-  const bool is_path = name.find('/') != std::string::npos || name.ends_with(".yaml");
-  if (!is_path && std::ranges::find(known, name) == known.end()) {
+  if (!is_profile_path(name) && std::ranges::find(known, name) == known.end()) {
     known.insert(known.begin(), TakktileBoard::kind);
     throw Error(Fault::input,
                 fmt::format("sensor '{}': no such board; give one of {}, or the path of a profile "

@@ -5,6 +5,8 @@
 #include "board.hpp"
 #include "board_choice.hpp"
 #include "palpate/error.hpp"
+#include "serial_profile.hpp"
+#include "takktile_board.hpp"
 #include "usb_device.hpp"
 #include "usb_fault.hpp"
 #include "usb_handle.hpp"
@@ -64,6 +66,11 @@ std::vector<BoardInfo> list_boards() {
     infos.push_back(std::move(info));
   }
   return infos;
+}
+
+std::optional<std::filesystem::path> board_file(const std::string& name) {
+  const std::string kind = parse_board_name(name).kind;
+  return kind == TakktileBoard::kind ? std::nullopt : std::optional(profile_path(kind));
 }
 
 std::unique_ptr<Sensor> open_board(const std::string& name) {

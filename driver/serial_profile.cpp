@@ -181,10 +181,17 @@ std::vector<std::string> shipped_profiles() {
   return names;
 }
 
+bool is_profile_path(const std::string& name) {
+  return name.find('/') != std::string::npos || name.ends_with(suffix);
+}
+
+std::filesystem::path profile_path(const std::string& name_or_path) {
+  return is_profile_path(name_or_path) ? std::filesystem::path(name_or_path)
+                                       : profile_folder() / (name_or_path + suffix);
+}
+
 SerialProfile read_serial_profile(const std::string& name_or_path) {
-  const bool is_path =
-      name_or_path.find('/') != std::string::npos || name_or_path.ends_with(suffix);
-  if (!is_path) {
+  if (!is_profile_path(name_or_path)) {
     const std::vector<std::string> names = shipped_profiles();
     if (std::find(names.begin(), names.end(), name_or_path) == names.end()) {
       refuse(name_or_path, fmt::format("no such board; give one of {}, or the path of a profile "
@@ -192,8 +199,7 @@ SerialProfile read_serial_profile(const std::string& name_or_path) {
                                        fmt::join(names, ", "), suffix));
     }
   }
-  const std::filesystem::path path =
-      is_path ? std::filesystem::path(name_or_path) : profile_folder() / (name_or_path + suffix);
+  const std::filesystem::path path = profile_path(name_or_path);
   return parse_serial_profile(text_of(path), path);
 }
 

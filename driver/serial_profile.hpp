@@ -46,8 +46,14 @@ struct SerialProfile {
 /// Names of the profiles that Palpate ships, in alphabetical order.
 std::vector<std::string> shipped_profiles();
 
-/// Reads a profile: a shipped one by its name ("tsf85"), any other by its path, which holds a '/'
-/// or ends in ".yaml".
+/// True for the path of a profile, which holds a '/' or ends in ".yaml"; a shipped one's name is
+/// none.
+bool is_profile_path(const std::string& name);
+
+/// The file of a profile of this name or path, which need not exist.
+std::filesystem::path profile_path(const std::string& name_or_path);
+
+/// Reads a profile: a shipped one by its name ("tsf85"), any other by its path.
 /// @throws Error naming file, line, key, value and remedy.
 SerialProfile read_serial_profile(const std::string& name_or_path);
 

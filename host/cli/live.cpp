@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <chrono>
 #include <csignal>
-#include <filesystem>
 #include <memory>
 #include <optional>
 #include <string>
@@ -11,6 +10,7 @@
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
+#include "command_files.hpp"
 #include "commands.hpp"
 #include "detector_flags.hpp"
 #include "interruption.hpp"
@@ -57,27 +57,6 @@ std::unique_ptr<Sensor> open_posed_sensor(const Options& options, const PosedSen
   return with_poses;
 }
 
-/// Throws Error where --json would overwrite what is read. A path in the sensor's name may be
-/// followed by options, and may hold commas itself.
-void check_output(const Options& options, const RecognitionTask& task) {
-  if (options.json.empty() || options.json == "-") {
-    return;
-  }
-  std::vector<std::filesystem::path> inputs(task.map_paths.begin(), task.map_paths.end());
-  std::string replayed = options.sensor.substr(options.sensor.find(':') + 1);
-  while (!replayed.empty()) {
-    inputs.emplace_back(replayed);
-    const std::size_t comma = replayed.rfind(',');
-    replayed.resize(comma == replayed.npos ? 0 : comma);
-  }
-  for (const std::string& file : {options.poses, options.recognition.scene}) {
-    if (!file.empty() && file != "-") {
-      inputs.emplace_back(file);
-    }
-  }
-  require_distinct({{"--json", options.json}}, inputs);
-}
-
 /// A first touch pages memory in, and may compile; a real one should not have to wait for that.
 void warm_up(Recogniser& recogniser, const RecognitionTask& task, const SensorDescription& sensor,
              const std::vector<glm::dvec2>& elements_mm) {
@@ -111,7 +90,13 @@ void live(const Options& options) {
   const TouchDetectorOptions detector =
       detector_options(options.detector, description.pressure_unit, source);
   RecognitionTask task = prepare(options.recognition, scene, description.pressure_unit, source);
-  check_output(options, task);
+  CommandFiles files;
+  add_sensor_files(options.sensor, options.poses, files);
+  add_recognition_files(options.recognition, scene, task, files);
+  if (!options.json.empty()) {
+    files.writes("--json", options.json);
+  }
+  files.require_distinct();
   Device device = Device::open(task.device);
   settle_bins(device, task);
   const std::unique_ptr<Recogniser> recogniser = make_recogniser(device, task);

@@ -2,11 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <numeric>
 
 #include <fmt/format.h>
 
+#include "array_picture.hpp"
 #include "evidence_scale.hpp"
 #include "options.hpp"
 
@@ -20,55 +20,6 @@ struct Panel {
   int row = 0;
   int columns = 0;
   int rows = 0;
-};
-
-/// Where the elements of an array are, to be drawn as squares as wide as the closest two are apart.
-class ArrayPicture {
- public:
-  explicit ArrayPicture(const std::vector<glm::dvec2>& elements_mm) : elements_mm_(elements_mm) {
-    double nearest = std::numeric_limits<double>::infinity();
-    for (std::size_t i = 0; i < elements_mm.size(); ++i) {
-      for (std::size_t j = 0; j < i; ++j) {
-        const glm::dvec2 d = elements_mm[i] - elements_mm[j];
-        const double distance = std::hypot(d.x, d.y);
-        nearest = distance > 0.0 ? std::min(nearest, distance) : nearest;
-      }
-    }
-    half_mm_ = std::isfinite(nearest) ? 0.5 * nearest : 1.0;
-    if (!elements_mm.empty()) {
-      lower_mm_ = upper_mm_ = elements_mm.front();
-    }
-    for (const glm::dvec2& p : elements_mm) {
-      lower_mm_ = {std::min(lower_mm_.x, p.x), std::min(lower_mm_.y, p.y)};
-      upper_mm_ = {std::max(upper_mm_.x, p.x), std::max(upper_mm_.y, p.y)};
-    }
-    lower_mm_ -= half_mm_;
-    upper_mm_ += half_mm_;
-  }
-
-  const glm::dvec2& lower_mm() const { return lower_mm_; }
-  const glm::dvec2& upper_mm() const { return upper_mm_; }
-
-  /// The element that covers this point of the sensor frame.
-  std::optional<std::size_t> element_at(const glm::dvec2& p_mm) const {
-    if (p_mm.x < lower_mm_.x || p_mm.y < lower_mm_.y || p_mm.x > upper_mm_.x ||
-        p_mm.y > upper_mm_.y) {
-      return {};
-    }
-    for (std::size_t i = 0; i < elements_mm_.size(); ++i) {
-      if (std::abs(p_mm.x - elements_mm_[i].x) <= half_mm_ &&
-          std::abs(p_mm.y - elements_mm_[i].y) <= half_mm_) {
-        return i;
-      }
-    }
-    return {};
-  }
-
- private:
-  const std::vector<glm::dvec2>& elements_mm_;
-  double half_mm_ = 1.0;
-  glm::dvec2 lower_mm_{};
-  glm::dvec2 upper_mm_{};
 };
 
 /// Draws the area from `lower` to `upper`, as large as it fits into the panel, with y upwards.

@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cstdio>
 #include <exception>
+#include <iostream>
 #include <new>
 #include <string>
 
@@ -9,6 +10,7 @@
 
 #include "commands.hpp"
 #include "palpate/error.hpp"
+#include "standard_streams.hpp"
 
 namespace {
 
@@ -23,6 +25,15 @@ int complain(int status, std::string message) {
   // Not fmt::print, which throws where standard error cannot be written.
   std::fprintf(stderr, "palpate: %s\n", message.c_str());
   return status;
+}
+
+int complain_of_output() {
+  return complain(failed, "standard output: cannot be written; is the disk full?");
+}
+
+/// The status of a run that went well, unless something that it printed was lost.
+int finish() {
+  return std::fflush(stdout) != 0 || std::ferror(stdout) != 0 ? complain_of_output() : 0;
 }
 
 /// CLI11 takes an empty value for a missing one, and so a script's unset variable for a default.
@@ -55,7 +66,9 @@ int run(int argc, char** argv) {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() == 0) {
-      return app.exit(error);  // --help, --version
+      app.exit(error);  // prints --help or --version
+      std::cout.flush();
+      return finish();
     }
     const auto commands = app.get_subcommands();
     const auto unexpected = app.remaining();
@@ -68,15 +81,13 @@ int run(int argc, char** argv) {
                     fmt::format("{}; see palpate {}--help", error.what(),
                                 commands.empty() ? "" : commands.front()->get_name() + " "));
   }
-  if (std::fflush(stdout) != 0) {
-    return complain(failed, "standard output: cannot be written; is the disk full?");
-  }
-  return 0;
+  return finish();
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
+  palpate::open_closed_streams();
   try {
     return run(argc, argv);
   } catch (const palpate::Error& error) {
@@ -84,6 +95,7 @@ int main(int argc, char** argv) {
   } catch (const std::bad_alloc&) {
     return complain(failed, "out of memory; use fewer bins, objects or cells");
   } catch (const std::exception& error) {
-    return complain(failed, error.what());
+    // What fmt::print throws names no file.
+    return std::ferror(stdout) != 0 ? complain_of_output() : complain(failed, error.what());
   }
 }

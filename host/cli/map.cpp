@@ -12,6 +12,7 @@
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
+#include "command_files.hpp"
 #include "figures.hpp"
 #include "input_file.hpp"
 #include "options.hpp"
@@ -108,17 +109,31 @@ double parse_prior(const std::string& text) {
   return prior;
 }
 
+std::filesystem::path ros_path(const Options& options, const std::string& label) {
+  return std::filesystem::path(options.ros) / (label + ".yaml");
+}
+
 /// Finds what would fail at the end before the work begins.
 void prepare_outputs(const Options& options, bool folder,
-                     const std::vector<std::filesystem::path>& map_paths) {
-  std::vector<std::pair<std::string, std::filesystem::path>> outputs;
+                     const std::vector<std::filesystem::path>& map_paths,
+                     const std::vector<ObjectTouches>& objects) {
+  CommandFiles files;
+  for (const std::string& recording : options.recordings) {
+    files.reads("RECORDING", recording);
+  }
   for (const std::filesystem::path& path : map_paths) {
-    outputs.emplace_back("-o", path);
+    files.writes("-o", path);
   }
   if (!options.png.empty()) {
-    outputs.emplace_back("--png", options.png);
+    files.writes("--png", options.png);
   }
-  require_distinct(outputs, {options.recordings.begin(), options.recordings.end()});
+  if (!options.ros.empty()) {
+    for (const ObjectTouches& object : objects) {
+      files.writes("--ros", ros_path(options, object.label));
+      files.writes("--ros", ros_path(options, object.label).replace_extension(".pgm"));
+    }
+  }
+  files.require_distinct();
   if (!folder) {
     require_writable(options.output);
   }
@@ -154,7 +169,7 @@ void build_maps(const Options& options) {
   for (const ObjectTouches& object : objects) {
     map_paths.push_back(folder ? output / (object.label + ".map.h5") : output);
   }
-  prepare_outputs(options, folder, map_paths);
+  prepare_outputs(options, folder, map_paths, objects);
 
   Device device = Device::open(options.device);
   model.sensor.prior = estimate ? estimate_prior(device, objects, model) : given_prior;
@@ -189,7 +204,7 @@ void build_maps(const Options& options) {
   }
   if (!options.ros.empty()) {
     for (const OccupancyGrid& map : maps) {
-      const auto yaml = std::filesystem::path(options.ros) / (map.label + ".yaml");
+      const std::filesystem::path yaml = ros_path(options, map.label);
       write_map_server(yaml, map);
       fmt::print("{}\n", yaml.string());
     }

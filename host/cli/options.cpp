@@ -2,7 +2,6 @@
 
 #include <charconv>
 #include <cmath>
-#include <map>
 #include <numbers>
 #include <system_error>
 #include <vector>
@@ -112,25 +111,6 @@ std::string require_whole_number(const std::string& text) {
 }
 
 void require_writable(const std::filesystem::path& file) { const AtomicFile probe(file); }
-
-void require_distinct(const std::vector<std::pair<std::string, std::filesystem::path>>& outputs,
-                      const std::vector<std::filesystem::path>& inputs) {
-  std::map<std::filesystem::path, std::string> taken;
-  const auto place = [](const std::filesystem::path& path) {
-    std::error_code error;
-    return std::filesystem::weakly_canonical(path, error);
-  };
-  for (const std::filesystem::path& input : inputs) {
-    taken.emplace(place(input), "an input");
-  }
-  for (const auto& [flag, file] : outputs) {
-    const auto [other, is_new] = taken.emplace(place(file), "what " + flag + " writes");
-    if (!is_new) {
-      refuse(flag, file.string(),
-             fmt::format("would overwrite {}; choose another name", other->second));
-    }
-  }
-}
 
 void write_file(const std::filesystem::path& file, std::string_view bytes) {
   AtomicFile target(file);

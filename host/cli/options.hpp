@@ -6,8 +6,6 @@
 #include <optional>
 #include <string>
 #include <string_view>
-#include <utility>
-#include <vector>
 
 #include "palpate/pose.hpp"
 
@@ -41,9 +39,6 @@ std::string require_whole_number(const std::string& text);
 
 /// Throws Error unless a file can be made there: before hours of work, not after.
 void require_writable(const std::filesystem::path& file);
-/// Throws Error where an output, as flag and file, is one of the inputs or another output.
-void require_distinct(const std::vector<std::pair<std::string, std::filesystem::path>>& outputs,
-                      const std::vector<std::filesystem::path>& inputs);
 /// Writes a file that appears whole or not at all. Throws Error.
 void write_file(const std::filesystem::path& file, std::string_view bytes);
 /// Makes the folder where it is missing. Throws Error where that fails.

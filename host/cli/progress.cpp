@@ -2,7 +2,7 @@
 
 #include <unistd.h>
 
-#include <cstdio>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -10,24 +10,33 @@ namespace palpate::cli {
 
 using namespace std::chrono_literals;
 
+Progress::Progress(std::string what, std::FILE* output, std::function<Clock::time_point()> now)
+    : what_(std::move(what)),
+      output_(output),
+      now_(std::move(now)),
+      start_(now_()),
+      shown_(start_) {}
+
 void Progress::show(double fraction) {
-  const auto now = std::chrono::steady_clock::now();
-  if (now - start_ < 2s || now - shown_ < 100ms || isatty(STDERR_FILENO) == 0) {
+  const auto now = now_();
+  if (now - start_ < 2s || now - shown_ < 100ms || isatty(fileno(output_)) == 0) {
     return;
   }
   shown_ = now;
   visible_ = true;
   const double elapsed = std::chrono::duration<double>(now - start_).count();
-  const double left = fraction > 0.0 ? elapsed * (1.0 - fraction) / fraction : 0.0;
+  const std::string left =
+      fraction > 0.0 ? fmt::format(", {:.0f} s left", elapsed * (1.0 - fraction) / fraction) : "";
   // Carriage return, text, erase to the end of the line.
-  fmt::print(stderr, "\r{} {:3.0f} %, {:.0f} s left\033[K", what_, 100.0 * fraction, left);
-  std::fflush(stderr);
+  const std::string line = fmt::format("\r{} {:3.0f} %{}\033[K", what_, 100.0 * fraction, left);
+  std::fputs(line.c_str(), output_);  // not fmt::print, which throws where a terminal has gone
+  std::fflush(output_);
 }
 
 Progress::~Progress() {
   if (visible_) {
-    std::fputs("\r\033[K", stderr);
-    std::fflush(stderr);
+    std::fputs("\r\033[K", output_);
+    std::fflush(output_);
   }
 }
 

@@ -1,6 +1,8 @@
 #pragma once
 
 #include <chrono>
+#include <cstdio>
+#include <functional>
 #include <string>
 
 namespace palpate::cli {
@@ -8,7 +10,12 @@ namespace palpate::cli {
 /// A progress line on standard error, for work over two seconds and only when it is a terminal.
 class Progress {
  public:
-  explicit Progress(std::string what) : what_(std::move(what)) {}
+  using Clock = std::chrono::steady_clock;
+
+  /// @param output shows the line, if it is a terminal
+  /// @param now tells the time
+  explicit Progress(std::string what, std::FILE* output = stderr,
+                    std::function<Clock::time_point()> now = Clock::now);
   ~Progress();
   Progress(const Progress&) = delete;
   Progress& operator=(const Progress&) = delete;
@@ -18,8 +25,10 @@ class Progress {
 
  private:
   std::string what_;
-  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
-  std::chrono::steady_clock::time_point shown_ = start_;
+  std::FILE* output_;
+  std::function<Clock::time_point()> now_;
+  Clock::time_point start_;
+  Clock::time_point shown_;
   bool visible_ = false;
 };
 

@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 
+#include "file_identity.hpp"
 #include "palpate/error.hpp"
 #include "palpate/files.hpp"
 #include "recordings.hpp"
@@ -62,10 +63,10 @@ std::vector<Scene::Object> objects_of(const RecognitionFlags& flags, const Scene
 }
 
 void load_maps(const std::vector<Scene::Object>& objects, RecognitionTask& task) {
-  std::set<std::filesystem::path> seen;
+  std::set<std::optional<FileIdentity>> seen;
   for (const Scene::Object& object : objects) {
     OccupancyGrid map = read_map(object.map);
-    if (!seen.insert(std::filesystem::canonical(object.map)).second) {
+    if (!seen.insert(identity_of(object.map)).second) {
       throw Error(
           Fault::input,
           fmt::format("{}: the same map is given twice; leave one out, or give the object a "
@@ -174,6 +175,11 @@ bool wants_particles(const RecognitionFlags& flags, const Scene& scene) {
           fmt::format("{}: has no effect on --filter {}; add --filter particles", flag, filter));
     }
   }
+  if (flags.memory_mib && particles) {
+    throw Error(Fault::input,
+                "--memory-mib: has no effect on --filter particles; use --filter histogram, or "
+                "fewer --particles");
+  }
   return particles;
 }
 
@@ -249,6 +255,19 @@ RecognitionTask prepare(const RecognitionFlags& flags, const Scene& scene,
   }
   task.device = flags.device.empty() ? scene.device.value_or("") : flags.device;
   return task;
+}
+
+void add_recognition_files(const RecognitionFlags& flags, const Scene& scene,
+                           const RecognitionTask& task, CommandFiles& files) {
+  if (!flags.scene.empty()) {
+    files.reads("--scene", flags.scene);
+  }
+  if (scene.array_file) {
+    files.reads("--scene", *scene.array_file);
+  }
+  for (const std::string& map : task.map_paths) {
+    files.reads(flags.maps.empty() ? "--scene" : "--maps", map);
+  }
 }
 
 }  // namespace palpate::cli

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "command_files.hpp"
 #include "options.hpp"
 #include "palpate/particle_filter.hpp"
 #include "palpate/pose_histogram.hpp"
@@ -68,5 +69,9 @@ void replace_array(const Scene& scene, const std::string& scene_file, const std:
 /// they come from, for messages. Throws Error.
 RecognitionTask prepare(const RecognitionFlags& flags, const Scene& scene,
                         const std::string& pressure_unit, const std::string& source);
+
+/// Adds the scene file and its array's, and the maps.
+void add_recognition_files(const RecognitionFlags& flags, const Scene& scene,
+                           const RecognitionTask& task, CommandFiles& files);
 
 }  // namespace palpate::cli

@@ -4,12 +4,15 @@
 #include <cmath>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <set>
 #include <string>
 
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
+#include "atomic_file.hpp"
+#include "command_files.hpp"
 #include "figures.hpp"
 #include "palpate/error.hpp"
 #include "palpate/files.hpp"
@@ -32,13 +35,14 @@ struct Options {
   std::string png;
 };
 
-std::string png_name(const Unknown& unknown) {
+std::filesystem::path png_path(const Options& options, const Unknown& unknown) {
   const std::string stem = std::filesystem::path(unknown.recording->path).stem().string();
-  return unknown.frame ? fmt::format("{}.{}.png", stem, *unknown.frame) : stem + ".png";
+  return std::filesystem::path(options.png) /
+         (unknown.frame ? fmt::format("{}.{}.png", stem, *unknown.frame) : stem + ".png");
 }
 
 /// Throws Error where a result could not be kept: before the work, not after.
-void check_outputs(const Options& options, const RecognitionTask& task,
+void check_outputs(const Options& options, const Scene& scene, const RecognitionTask& task,
                    const std::vector<Unknown>& unknowns) {
   if (!options.posterior.empty()) {
     if (task.particles) {
@@ -52,32 +56,42 @@ void check_outputs(const Options& options, const RecognitionTask& task,
                                             options.posterior, unknowns.size()));
     }
   }
-  std::vector<std::pair<std::string, std::filesystem::path>> outputs;
-  if (!options.posterior.empty()) {
-    outputs.emplace_back("--posterior", options.posterior);
-  }
-  if (!options.json.empty() && options.json != "-") {
-    outputs.emplace_back("--json", options.json);
-  }
-  std::vector<std::filesystem::path> inputs(options.unknowns.recordings.begin(),
-                                            options.unknowns.recordings.end());
-  inputs.insert(inputs.end(), task.map_paths.begin(), task.map_paths.end());
-  if (!options.recognition.scene.empty()) {
-    inputs.emplace_back(options.recognition.scene);
-  }
-  require_distinct(outputs, inputs);
-  for (const auto& output : outputs) {
-    require_writable(output.second);
-  }
   if (!options.png.empty()) {
-    std::set<std::string> names;
+    std::set<std::filesystem::path> pictures;
     for (const Unknown& unknown : unknowns) {
-      if (!names.insert(png_name(unknown)).second) {
+      if (!pictures.insert(png_path(options, unknown)).second) {
         throw Error(Fault::input,
                     fmt::format("{}: another recording has the same name, and so would its "
                                 "picture; rename one",
                                 unknown.recording->path));
       }
+    }
+  }
+  CommandFiles files;
+  for (const std::string& recording : options.unknowns.recordings) {
+    files.reads("RECORDING", recording);
+  }
+  add_recognition_files(options.recognition, scene, task, files);
+  if (!options.posterior.empty()) {
+    files.writes("--posterior", options.posterior);
+  }
+  if (!options.json.empty()) {
+    files.writes("--json", options.json);
+  }
+  if (!options.png.empty()) {
+    for (const Unknown& unknown : unknowns) {
+      files.writes("--png", png_path(options, unknown));
+    }
+  }
+  files.require_distinct();
+  for (const std::string& file : {options.posterior, options.json}) {
+    if (!file.empty() && file != "-") {
+      require_writable(file);
+    }
+  }
+  if (std::filesystem::is_directory(options.png)) {
+    for (const Unknown& unknown : unknowns) {
+      require_writable(png_path(options, unknown));
     }
   }
 }
@@ -161,13 +175,29 @@ Posterior export_posterior(const RecognitionTask& task, const PoseHistogram& his
   return posterior;
 }
 
+/// Writes posterior and JSON, both or none.
+void write_results(const Options& options, const RecognitionTask& task,
+                   const Recogniser& recogniser, const std::string& json) {
+  std::optional<AtomicFile> json_file;
+  if (!options.json.empty() && options.json != "-") {
+    json_file.emplace(options.json);
+    json_file->write(json);
+  }
+  if (!options.posterior.empty()) {
+    write_posterior(options.posterior, export_posterior(task, *recogniser.histogram()));
+  }
+  if (json_file) {
+    json_file->commit();
+  }
+}
+
 void recognize(const Options& options) {
   const Scene scene = scene_of(options.recognition);
   const Unknowns unknowns = read_unknowns(options.unknowns, scene, options.recognition.scene);
   const Recording& first = unknowns.recordings.front();
   RecognitionTask task = prepare(options.recognition, scene, first.pressure_unit, first.path);
   task.histogram.still_array = unknowns.still_array;
-  check_outputs(options, task, unknowns.list);
+  check_outputs(options, scene, task, unknowns.list);
   Device device = Device::open(task.device);
   settle_bins(device, task);
   const std::unique_ptr<Recogniser> recogniser = make_recogniser(device, task);
@@ -190,11 +220,8 @@ void recognize(const Options& options) {
       show(0.0);
       json.push_back(to_json(records.back(), task, device.name(), options.trace));
       if (!options.png.empty()) {
-        write_file(std::filesystem::path(options.png) / png_name(unknown),
+        write_file(png_path(options, unknown),
                    draw_sheet(records.back(), unknown, task, *recogniser));
-      }
-      if (!options.posterior.empty()) {
-        write_posterior(options.posterior, export_posterior(task, *recogniser->histogram()));
       }
     }
   }
@@ -202,6 +229,8 @@ void recognize(const Options& options) {
   // The path of a recording need not be UTF-8, as JSON must.
   const std::string json_text =
       json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
+  // The files before anything is printed: nobody may be listening any more.
+  write_results(options, task, *recogniser, json_text);
   if (options.json == "-") {
     fmt::print("{}", json_text);
   } else {
@@ -214,9 +243,6 @@ void recognize(const Options& options) {
       fmt::print("\n");
     }
     print_table(records, task);
-    if (!options.json.empty()) {
-      write_file(options.json, json_text);
-    }
   }
 }
 

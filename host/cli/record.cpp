@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
+#include "command_files.hpp"
 #include "commands.hpp"
 #include "interruption.hpp"
 #include "options.hpp"
@@ -104,6 +105,10 @@ void print(const Options& options, const FrameRecorder& recorder, const Summary&
 }
 
 void record(const Options& options) {
+  CommandFiles files;
+  add_sensor_files(options.sensor, options.poses, files);
+  files.writes("-o", options.output);
+  files.require_distinct();
   require_writable(options.output);
   if (options.seconds) {
     require_above("--seconds", *options.seconds, 0.0);

@@ -4,6 +4,7 @@
 
 #include <fmt/format.h>
 
+#include "file_identity.hpp"
 #include "palpate/error.hpp"
 #include "palpate/files.hpp"
 
@@ -11,11 +12,11 @@ namespace palpate::cli {
 
 std::vector<Recording> read_touch_recordings(const std::vector<std::string>& paths) {
   std::vector<Recording> recordings;
-  std::set<std::filesystem::path> seen;
+  std::set<std::optional<FileIdentity>> seen;
   for (const std::string& path : paths) {
     recordings.push_back(read_recording(path));
     const Recording& recording = recordings.back();
-    if (!seen.insert(std::filesystem::canonical(path)).second) {
+    if (!seen.insert(identity_of(path)).second) {
       throw Error(Fault::input, fmt::format("{}: given twice; leave one out", path));
     }
     if (recording.rows == "frames") {

@@ -3,6 +3,7 @@
 #include <memory>
 #include <string>
 
+#include "command_files.hpp"
 #include "palpate/sensor.hpp"
 
 namespace palpate::cli {
@@ -15,5 +16,8 @@ inline constexpr const char* sensor_help =
 
 /// Opens a board or a virtual sensor. Throws Error naming it and what there is.
 std::unique_ptr<Sensor> open_sensor(const std::string& name);
+
+/// Adds what a sensor of this name reads, and the poses of --poses, "" where there are none.
+void add_sensor_files(const std::string& name, const std::string& poses, CommandFiles& files);
 
 }  // namespace palpate::cli

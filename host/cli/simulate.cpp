@@ -10,6 +10,7 @@
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
+#include "command_files.hpp"
 #include "options.hpp"
 #include "palpate/error.hpp"
 #include "palpate/files.hpp"
@@ -57,8 +58,19 @@ std::vector<Pose> draw(std::vector<Pose> poses, std::size_t n, std::uint64_t see
   return poses;
 }
 
-void simulate(const Options& options) {
+/// Throws Error where the recording could not be written, or would overwrite the shape.
+void check_output(const Options& options) {
+  CommandFiles files;
+  if (!built_in_shape(options.shape)) {
+    files.reads("SHAPE", options.shape);
+  }
+  files.writes("-o", options.output);
+  files.require_distinct();
   require_writable(options.output);
+}
+
+void simulate(const Options& options) {
+  check_output(options);
   const Shape shape = make_shape(options.shape);
   const bool unknown = !options.object_pose.empty();
   Pose T_object_robot;

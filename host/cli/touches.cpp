@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
+#include "command_files.hpp"
 #include "commands.hpp"
 #include "detector_flags.hpp"
 #include "options.hpp"
@@ -34,7 +35,10 @@ bool append(const DetectedTouch& touch, Recording& recording) {
 }
 
 void find_touches(const Options& options) {
-  require_distinct({{"--output", options.output}}, {options.frames});
+  CommandFiles files;
+  files.reads("FRAMES", options.frames);
+  files.writes("-o", options.output);
+  files.require_distinct();
   require_writable(options.output);
   const std::unique_ptr<Sensor> stream =
       open_virtual_sensor("replay:" + options.frames + ",speed=max");

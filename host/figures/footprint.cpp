@@ -54,23 +54,35 @@ std::vector<glm::dvec2> without_straight_corners(std::span<const glm::dvec2> hul
   return corners;
 }
 
-/// The direction of the hull's edge that the smallest enclosing rectangle lies along.
+/// The direction of the hull's edge that the smallest enclosing rectangle lies along. By rotating
+/// calipers (Toussaint 1983): while the edge goes round, so do the corners that are farthest along
+/// it, across it and back along it.
 double orientation_rad(std::span<const glm::dvec2> hull) {
+  const std::size_t n = hull.size();
+  const auto corner = [&](std::size_t k) { return hull[k % n]; };
   double best_area = std::numeric_limits<double>::infinity();
   double best_rad = 0.0;
-  for (std::size_t k = 0; k < hull.size(); ++k) {
-    const glm::dvec2 edge = hull[(k + 1) % hull.size()] - hull[k];
-    const double angle = std::atan2(edge.y, edge.x);
-    glm::dvec2 lower = rotate(-angle, hull[0]);
-    glm::dvec2 upper = lower;
-    for (const glm::dvec2& p : hull) {
-      lower = glm::min(lower, rotate(-angle, p));
-      upper = glm::max(upper, rotate(-angle, p));
-    }
-    const double area = (upper.x - lower.x) * (upper.y - lower.y);
+  std::size_t right = 0;
+  std::size_t top = 0;
+  std::size_t left = 0;
+  for (std::size_t k = 0; k < n; ++k) {
+    const glm::dvec2 edge = corner(k + 1) - corner(k);
+    const glm::dvec2 along = edge / glm::length(edge);
+    // The farthest corner in a direction, from the one that was farthest for the edge before.
+    const auto advance = [&](std::size_t from, glm::dvec2 direction) {
+      while (from < k + n && glm::dot(direction, corner(from + 1) - corner(from)) > 0.0) {
+        ++from;
+      }
+      return from;
+    };
+    right = advance(std::max(right, k + 1), along);
+    top = advance(std::max(top, right), {-along.y, along.x});
+    left = advance(std::max(left, top), -along);
+    const double area =
+        glm::dot(along, corner(right) - corner(left)) * cross(along, corner(top) - corner(k));
     if (area < best_area) {
       best_area = area;
-      best_rad = angle;
+      best_rad = std::atan2(edge.y, edge.x);
     }
   }
   return best_rad;

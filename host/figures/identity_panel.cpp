@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <unordered_map>
 
 #include <fmt/format.h>
 
@@ -31,14 +32,15 @@ struct Curve {
 std::vector<Curve> curves_of(const std::vector<std::string>& labels,
                              const std::vector<std::vector<double>>& identity) {
   std::vector<Curve> curves;
+  std::unordered_map<std::string, std::size_t> of_label;
   for (std::size_t object = 0; object < labels.size(); ++object) {
-    auto curve = std::ranges::find(curves, labels[object], &Curve::label);
-    if (curve == curves.end()) {
+    const auto [known, is_new] = of_label.emplace(labels[object], curves.size());
+    if (is_new) {
       curves.push_back({labels[object], std::vector<double>(identity.size(), 0.0)});
-      curve = curves.end() - 1;
     }
+    Curve& curve = curves[known->second];
     for (std::size_t touch = 0; touch < identity.size(); ++touch) {
-      curve->probability[touch] += identity[touch][object];
+      curve.probability[touch] += identity[touch][object];
     }
   }
   return curves;

@@ -118,10 +118,16 @@ void read_keys(const Entry& map, const Readers& readers) {
   }
 }
 
-std::vector<glm::dvec2> read_array(const Entry& array) {
+void read_array(const Entry& array, Scene& scene) {
   if (array.node.IsScalar()) {
     const std::string name = array.text();
-    return name == "digitacts" ? digitacts_array() : read_elements(array.file.parent_path() / name);
+    if (name == "digitacts") {
+      scene.array_mm = digitacts_array();
+    } else {
+      scene.array_file = array.file.parent_path() / name;
+      scene.array_mm = read_elements(*scene.array_file);
+    }
+    return;
   }
   std::vector<glm::dvec2> elements;
   for (const Entry& element : array.list("give 'digitacts', a file or a list of [x, y] in mm")) {
@@ -130,7 +136,7 @@ std::vector<glm::dvec2> read_array(const Entry& array) {
   if (elements.empty()) {
     array.refuse("give at least one [x, y] in mm");
   }
-  return elements;
+  scene.array_mm = std::move(elements);
 }
 
 Scene::Object read_object(const Entry& entry) {
@@ -202,7 +208,7 @@ Scene read_scene(const std::filesystem::path& path) {
     const auto inner = [](double value) { return value > 0 && value < 1; };
     read_keys(
         root,
-        {{"array", [&](const Entry& e) { scene.array_mm = read_array(e); }},
+        {{"array", [&](const Entry& e) { read_array(e, scene); }},
          {"threshold",
           [&](const Entry& e) { scene.threshold = e.number(at_least_0, "give a number from 0"); }},
          {"ratio",

@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <filesystem>
+#include <optional>
 #include <utility>
 
 #include <fmt/format.h>
@@ -19,25 +20,33 @@ bool Shape::contains(const glm::dvec2& p_object_mm) const {
   });
 }
 
-Shape make_shape(const std::string& name_or_file) {
-  if (name_or_file.size() == 1) {
-    char character = name_or_file[0];
+std::optional<Shape> built_in_shape(const std::string& name) {
+  if (name.size() == 1) {
+    char character = name[0];
     if (character >= 'a' && character <= 'z') {
       character = static_cast<char>(character - 'a' + 'A');
     }
     if (std::vector<Shape::Stroke> strokes = glyph_strokes(character); !strokes.empty()) {
-      return {.label = {character}, .strokes = std::move(strokes), .polygons = {}};
+      return Shape{.label = {character}, .strokes = std::move(strokes), .polygons = {}};
     }
   }
-  if (name_or_file == "ring") {
-    return {.label = "ring",
-            .strokes = {{.points_mm = arc({0.0, 0.0}, {7.5, 7.5}, 0.0, 360.0), .width_mm = 3.0}},
-            .polygons = {}};
+  if (name == "ring") {
+    return Shape{
+        .label = "ring",
+        .strokes = {{.points_mm = arc({0.0, 0.0}, {7.5, 7.5}, 0.0, 360.0), .width_mm = 3.0}},
+        .polygons = {}};
   }
-  if (name_or_file == "bar") {
-    return {.label = "bar",
-            .strokes = {},
-            .polygons = {{{-10.0, -4.0}, {10.0, -4.0}, {10.0, 4.0}, {-10.0, 4.0}}}};
+  if (name == "bar") {
+    return Shape{.label = "bar",
+                 .strokes = {},
+                 .polygons = {{{-10.0, -4.0}, {10.0, -4.0}, {10.0, 4.0}, {-10.0, 4.0}}}};
+  }
+  return {};
+}
+
+Shape make_shape(const std::string& name_or_file) {
+  if (std::optional<Shape> shape = built_in_shape(name_or_file)) {
+    return *std::move(shape);
   }
   const std::filesystem::path path(name_or_file);
   std::error_code ignored;

@@ -1,16 +1,19 @@
 #include "palpate/virtual_sensor.hpp"
 
 #include <algorithm>
+#include <array>
 #include <charconv>
 #include <cmath>
 #include <map>
 #include <numbers>
+#include <span>
 #include <vector>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
 #include "palpate/error.hpp"
+#include "palpate/simulation.hpp"
 #include "replayed_sensor.hpp"
 #include "simulated_sensor.hpp"
 
@@ -21,12 +24,16 @@ namespace {
 constexpr std::string_view replay = "replay:";
 constexpr std::string_view simulate = "simulate:";
 
+constexpr std::array<std::string_view, 1> replay_keys{"speed"};
+constexpr std::array<std::string_view, 7> simulate_keys{"rate",  "array",  "seed", "touches",
+                                                        "noise", "object", "speed"};
+
 // "WHAT,key=value,key=value" taken apart, and what each key says.
 class SourceName {
  public:
   // Only known keys end what the name is about: a path may hold commas and equals signs.
   SourceName(const std::string& name, std::string_view scheme,
-             const std::vector<std::string_view>& keys)
+             std::span<const std::string_view> keys)
       : name_(name) {
     std::string_view rest = std::string_view(name_).substr(scheme.size());
     for (;;) {
@@ -152,16 +159,23 @@ bool is_virtual_sensor(std::string_view name) {
   return name.starts_with(replay) || name.starts_with(simulate);
 }
 
+std::optional<std::filesystem::path> virtual_sensor_file(const std::string& name) {
+  if (name.starts_with(replay)) {
+    return SourceName(name, replay, replay_keys).what();
+  }
+  const std::string shape = SourceName(name, simulate, simulate_keys).what();
+  return built_in_shape(shape) ? std::nullopt : std::optional<std::filesystem::path>(shape);
+}
+
 std::unique_ptr<Sensor> open_virtual_sensor(const std::string& name) {
   if (name.starts_with(replay)) {
-    const SourceName source(name, replay, {"speed"});
+    const SourceName source(name, replay, replay_keys);
     return std::make_unique<ReplayedSensor>(source.what(), source.speed());
   }
   if (!name.starts_with(simulate)) {
     throw Error(Fault::input, fmt::format("sensor {}: write replay:FILE or simulate:SHAPE", name));
   }
-  const SourceName source(name, simulate,
-                          {"rate", "array", "seed", "touches", "noise", "object", "speed"});
+  const SourceName source(name, simulate, simulate_keys);
   SimulatedSensorOptions options;
   options.rate_hz = source.number("rate", 1.0, 1e5).value_or(options.rate_hz);
   options.seed = source.number<std::uint64_t>("seed", 0, UINT64_MAX).value_or(options.seed);

@@ -240,6 +240,9 @@ TEST(Experiment, QuickRunKeepsThePapersOrder) {
   expect_pose_noise_to_cost(document.at("pose_noise"), filters);
   expect_none_to_notice(document.at("none"));
   expect_pictures(folder / "plots");
+  expect_no_file_written_twice("experiment --csv " + (folder / "csv").string(), folder / "csv");
+  expect_no_file_written_twice("experiment --plots " + (folder / "plots").string(),
+                               folder / "plots");
 }
 
 TEST(Experiment, MissesGnuplotBeforeItMeasures) {

@@ -84,6 +84,12 @@ TEST(PalpateBench, RefusesAFileThatCannotBeWrittenBeforeItMeasures) {
       run_bench("kernels --json " + (folder / "missing/bench.json").string() + " 2>/dev/null"), 2);
 }
 
+TEST(PalpateBench, OutputThatIsLostIsAFailure) {
+  const int status = std::system("'" PALPATE_BENCH "' --help >/dev/full 2>/dev/null");
+  ASSERT_TRUE(WIFEXITED(status));
+  EXPECT_EQ(WEXITSTATUS(status), 1);
+}
+
 TEST(PalpateBench, RefusesWhatItDoesNotKnow) {
   EXPECT_EQ(run_bench("kernels --slowly 2>/dev/null"), 2);
   EXPECT_EQ(run_bench("2>/dev/null"), 2);

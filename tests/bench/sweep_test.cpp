@@ -247,6 +247,7 @@ TEST(Sweep, QuickRunKeepsTheOrderAndTheErrorBounds) {
     EXPECT_EQ(svg.find("var("), std::string::npos) << "not every viewer knows variables";
     expect_well_formed(svg);
   }
+  expect_no_file_written_twice("sweep --plots " + (folder / "plots").string(), folder / "plots");
 }
 
 TEST(Sweep, RefusesWhatCannotBe) {
@@ -256,6 +257,10 @@ TEST(Sweep, RefusesWhatCannotBe) {
   EXPECT_EQ(run_bench("sweep --html " + (folder / "missing/s.html").string() + " 2>/dev/null"), 2);
   std::ofstream(folder / "file") << "no folder";
   EXPECT_EQ(run_bench("sweep --plots " + (folder / "file").string() + " 2>/dev/null"), 2);
+  std::filesystem::create_directory(folder / "results");
+  std::ofstream(folder / "results/s.html") << "older";
+  expect_no_file_written_twice("sweep --html " + (folder / "results/../results/s.html").string(),
+                               folder / "results");
 }
 
 }  // namespace

@@ -207,12 +207,16 @@ TEST_F(BadInput, FolderMayNameNoMapEither) {
 TEST_F(BadInput, TheSameMapTwice) {
   expect_refused({"recognize", "u.h5", "--maps", "A.map.h5", "./A.map.h5"},
                  {"A.map.h5", "twice", "leave one out"});
+  std::filesystem::create_hard_link(folder_ / "A.map.h5", folder_ / "hard.h5");
+  expect_refused({"recognize", "u.h5", "--maps", "A.map.h5", "hard.h5"}, {"hard.h5", "twice"});
 }
 
 TEST_F(BadInput, TheSameRecordingTwice) {
   expect_refused({"recognize", "u.h5", "./u.h5", "--maps", "A.map.h5"},
                  {"u.h5", "twice", "leave one out"});
   expect_refused({"map", "A.h5", "./A.h5", "-o", "out.map.h5"}, {"A.h5", "twice"});
+  std::filesystem::create_hard_link(folder_ / "A.h5", folder_ / "hard.h5");
+  expect_refused({"map", "A.h5", "hard.h5", "-o", "out.map.h5"}, {"hard.h5", "twice"});
 }
 
 TEST_F(BadInput, RawStream) {
@@ -286,6 +290,9 @@ TEST_F(BadInput, OutputsThatAreFolders) {
   expect_refused({"simulate", "A", "-o", "folder"}, named);
   expect_refused(with(map, {"--png", "folder"}), named);
   expect_refused(with(recognize, {"--json", "folder"}), named);
+  std::filesystem::create_directories(folder_ / "sheets/u.1.png");
+  expect_refused(with(recognize, {"--each-frame", "--json", "r.json", "--png", "sheets"}),
+                 {"sheets/u.1.png", "is a folder"});
 }
 
 TEST_F(BadInput, FolderThatIsAFile) {
@@ -348,6 +355,8 @@ TEST_F(BadInput, FlagsOfTheOtherFilter) {
         Arguments{"--resampling", "systematic"}, Arguments{"--augmented"}}) {
     expect_refused(with(recognize, flags), {flags.front(), "add --filter particles"});
   }
+  expect_refused(with(recognize, {"--filter", "particles", "--memory-mib", "100"}),
+                 {"--memory-mib", "use --filter histogram"});
   expect_refused(with(recognize, {"--filter", "particles", "--posterior", "p.h5"}),
                  {"--posterior p.h5", "use --filter histogram"});
 }

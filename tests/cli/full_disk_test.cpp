@@ -70,6 +70,48 @@ TEST_F(FullDisk, StandardOutputThatCannotBeWrittenIsAFailure) {
                  "standard output");
 }
 
+TEST_F(FullDisk, LongOutputThatCannotBeWrittenIsAFailureOfStandardOutputToo) {
+  // More than standard output keeps back until the end.
+  expect_failure(palpate({"recognize", "u.h5", "--maps", "A.map.h5", "--each-frame", "--trace",
+                          "--bins", "5x5x4", "--json", "-"},
+                         {.standard_output = "/dev/full"}),
+                 "standard output");
+  expect_failure(palpate({"live", "--sensor", "simulate:A,rate=100,touches=2,speed=max", "--maps",
+                          "A.map.h5", "--bins", "5x5x4"},
+                         {.standard_output = "/dev/full"}),
+                 "standard output");
+}
+
+TEST_F(FullDisk, HelpThatCannotBeWrittenIsAFailure) {
+  for (const char* flag : {"--help", "--version"}) {
+    expect_failure(palpate({flag}, {.standard_output = "/dev/full"}), "standard output");
+  }
+}
+
+TEST_F(FullDisk, ResultsAreWrittenWhereNobodyListens) {
+  const Outcome outcome = palpate({"recognize", "A.h5", "--maps", "A.map.h5", "--each-frame",
+                                   "--trace", "--bins", "5x5x4", "--json", "r.json"},
+                                  {.standard_output = "/dev/full"});
+  expect_failure(outcome, "standard output");
+  EXPECT_EQ(nlohmann::json::parse(bytes_of(folder_ / "r.json")).size(), 48u);
+}
+
+TEST_F(FullDisk, JsonAndPosteriorAreBothWrittenOrNone) {
+  const auto before = content_of(folder_.path());
+  const auto expect_none = [&](const std::string& bins, bool trace, const char* refused) {
+    std::vector<std::string> arguments{"recognize", "A.h5",   "--maps", "A.map.h5",    "--bins",
+                                       bins,        "--json", "r.json", "--posterior", "p.h5"};
+    if (trace) {
+      arguments.emplace_back("--trace");
+    }
+    // Below the size of one of them, above that of the other.
+    expect_failure(palpate(arguments, {.largest_file_bytes = 12000}), refused);
+    EXPECT_TRUE(content_of(folder_.path()) == before) << "the folder has changed";
+  };
+  expect_none("5x5x4", true, "r.json");
+  expect_none("25x25x16", false, "p.h5");
+}
+
 TEST_F(FullDisk, StandardErrorThatCannotBeWrittenKeepsTheStatus) {
   EXPECT_EQ(palpate({"info", "missing.h5"}, {.standard_error = "/dev/full"}).status, 2);
 }

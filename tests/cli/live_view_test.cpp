@@ -102,6 +102,32 @@ TEST(LiveView, DrawsTheArrayAsItLies) {
   EXPECT_LT(touched->find('@', 34), touched->find('o', 34));
 }
 
+// With every element against every other, and against every pixel, this would take minutes.
+TEST(LiveView, DrawsALargeArrayAtOnce) {
+  const OccupancyGrid map = sample_map("E");
+  LiveView view = sample_view(map);
+  view.elements_mm.clear();
+  for (int i = 0; i < 90'000; ++i) {
+    view.elements_mm.emplace_back(0.04 * (i % 300) - 6.0, 0.04 * (i / 300) - 6.0);
+  }
+  view.pressure.assign(view.elements_mm.size(), 20.0);
+  view.valid.clear();
+  view.readings.assign(view.elements_mm.size(), Reading::in_contact);
+  const auto lines = draw(view, 80, 24, TerminalColours::none);
+  EXPECT_NE(lines[4].substr(0, 32).find("@@@@"), std::string::npos) << joined(lines);
+  EXPECT_NE(joined(lines).find("@@@@", 34), std::string::npos);
+}
+
+TEST(LiveView, DrawsAnUnseenMapWhite) {
+  OccupancyGrid map = sample_map("E");
+  map.prior = 0.1;
+  map.log_odds.assign(map.log_odds.size(), static_cast<float>(map.prior_log_odds()));
+  LiveView view = sample_view(map);
+  view.T_robot_sensor.reset();
+  const std::string text = joined(draw(view, 80, 24, TerminalColours::direct));
+  EXPECT_NE(text.find("\033[38;2;255;255;255m\033[48;2;255;255;255m"), std::string::npos);
+}
+
 TEST(LiveView, BarsAreAsLongAsProbabilities) {
   const OccupancyGrid map = sample_map("E");
   const auto lines = draw(sample_view(map), 80, 24, TerminalColours::none);

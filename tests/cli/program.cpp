@@ -7,19 +7,30 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <csignal>
 #include <cstdlib>
+#include <system_error>
 
 namespace palpate {
 
 namespace {
 
 void redirect(int descriptor, const std::filesystem::path& file) {
-  const int opened = ::open(file.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600);
+  const int flags = descriptor == STDIN_FILENO ? O_RDONLY : O_WRONLY | O_CREAT | O_TRUNC;
+  const int opened = ::open(file.c_str(), flags, 0600);
   if (opened < 0 || ::dup2(opened, descriptor) < 0) {
     ::_exit(126);
   }
   ::close(opened);
+}
+
+/// What fork() and its like return, unless they refuse: this test fails then, with their reason.
+pid_t require_process(pid_t pid, const char* call) {
+  if (pid < 0) {
+    throw std::system_error(errno, std::generic_category(), call);
+  }
+  return pid;
 }
 
 void limit_files(rlim_t bytes) {
@@ -50,7 +61,7 @@ Outcome run_program(const std::filesystem::path& folder, const std::vector<std::
   const ScratchFolder captured;
   const std::filesystem::path out = captured / "out";
   const std::filesystem::path err = captured / "err";
-  const pid_t pid = ::fork();
+  const pid_t pid = require_process(::fork(), "fork");
   if (pid == 0) {
     if (::chdir(folder.c_str()) != 0) {
       ::_exit(126);
@@ -59,6 +70,12 @@ Outcome run_program(const std::filesystem::path& folder, const std::vector<std::
              surroundings.standard_output.empty() ? out : surroundings.standard_output);
     redirect(STDERR_FILENO,
              surroundings.standard_error.empty() ? err : surroundings.standard_error);
+    if (!surroundings.standard_input.empty()) {
+      redirect(STDIN_FILENO, surroundings.standard_input);
+    }
+    for (const int stream : surroundings.closed) {
+      ::close(stream);
+    }
     if (surroundings.largest_file_bytes) {
       limit_files(*surroundings.largest_file_bytes);
     }
@@ -78,7 +95,7 @@ ProgramOnTerminal::ProgramOnTerminal(const std::filesystem::path& folder,
   winsize window{};
   window.ws_col = static_cast<unsigned short>(columns);
   window.ws_row = static_cast<unsigned short>(rows);
-  pid_ = ::forkpty(&terminal_, nullptr, nullptr, &window);
+  pid_ = require_process(::forkpty(&terminal_, nullptr, nullptr, &window), "forkpty");
   if (pid_ == 0) {
     if (::chdir(folder.c_str()) != 0) {
       ::_exit(126);

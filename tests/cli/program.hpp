@@ -26,6 +26,8 @@ struct Surroundings {
   std::optional<rlim_t> largest_file_bytes;  ///< writes beyond it fail, as on a full disk
   std::filesystem::path standard_output;     ///< a file in the place of Outcome::out
   std::filesystem::path standard_error;      ///< a file in the place of Outcome::err
+  std::filesystem::path standard_input;      ///< a file in the place of the test's own
+  std::vector<int> closed;                   ///< standard streams that are closed, as a daemon's
 };
 
 /// Runs the palpate program in `folder`, on which its relative paths depend.
@@ -35,7 +37,8 @@ Outcome run_program(const std::filesystem::path& folder, const std::vector<std::
 /// The palpate program on a terminal of its own.
 class ProgramOnTerminal {
  public:
-  /// `environment` is set on top of the test's own.
+  /// `environment` is set on top of the test's own. Throws, and so fails the test, where the
+  /// machine has no pseudo-terminal to give.
   ProgramOnTerminal(const std::filesystem::path& folder, const std::vector<std::string>& arguments,
                     const std::map<std::string, std::string>& environment = {}, int columns = 80,
                     int rows = 24);

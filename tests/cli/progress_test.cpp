@@ -1,8 +1,14 @@
-#include <algorithm>
-#include <chrono>
-#include <cmath>
+// The line that shows how far long work is, by a clock that the tests turn.
 
-#include <fmt/format.h>
+#include "progress.hpp"
+
+#include <fcntl.h>
+#include <pty.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <memory>
+#include <system_error>
 
 #include "program.hpp"
 #include "sample_files.hpp"
@@ -10,53 +16,122 @@
 namespace palpate {
 namespace {
 
-class ProgressLine : public ProgramTest {
- protected:
-  ProgressLine() {
-    write_map(folder_ / "A.map.h5", sample_map("A"));
-    write_recording(folder_ / "u.h5", sample_unknown("A", {}, 24));
+using namespace std::chrono_literals;
+
+/// Two ends of a terminal or of a pipe: what is printed into one is read from the other.
+class Ends {
+ public:
+  static Ends of_terminal() {
+    int ends[2];
+    require(::openpty(&ends[0], &ends[1], nullptr, nullptr, nullptr), "openpty");
+    return Ends(ends);
+  }
+  static Ends of_pipe() {
+    int ends[2];
+    require(::pipe(ends), "pipe");
+    return Ends(ends);
+  }
+  ~Ends() { ::close(reader_); }
+  Ends(const Ends&) = delete;
+  Ends& operator=(const Ends&) = delete;
+
+  std::FILE* output() const { return output_.get(); }
+
+  /// What was printed since the last call.
+  std::string printed() const {
+    char text[4096];
+    const ssize_t got = ::read(reader_, text, sizeof text);
+    return {text, got > 0 ? static_cast<std::size_t>(got) : 0};
   }
 
-  static std::vector<std::string> work(int bins) {
-    return {"recognize",    "u.h5",   "--maps",
-            "A.map.h5",     "--bins", fmt::format("{0}x{0}x16", bins),
-            "--each-frame", "--json", "r.json"};
+ private:
+  explicit Ends(const int (&ends)[2])
+      : reader_(ends[0]), output_(::fdopen(ends[1], "w"), &std::fclose) {
+    require(::fcntl(reader_, F_SETFL, O_NONBLOCK), "fcntl");
+  }
+  static void require(int result, const char* call) {
+    if (result != 0) {
+      throw std::system_error(errno, std::generic_category(), call);
+    }
   }
 
-  /// What the program shows on a terminal.
-  std::string shown(const std::vector<std::string>& arguments) const {
-    const Outcome outcome = ProgramOnTerminal(folder_.path(), arguments).finish();
-    EXPECT_EQ(outcome.status, 0) << outcome.out;
-    return outcome.out;
-  }
+  int reader_;
+  std::unique_ptr<std::FILE, int (*)(std::FILE*)> output_;
 };
 
-TEST_F(ProgressLine, IsShownOnATerminalOnlyAndErased) {
-  // Grows until this machine is busy for well over the two seconds that pass in silence.
-  double elapsed_s = 0.0;
-  int bins = 0;
-  std::string text;
-  while (elapsed_s < 6.0) {
-    // Time grows with the square of the bins along x and y.
-    bins = bins == 0 ? 60 : static_cast<int>(bins * std::max(1.1, std::sqrt(3.6 / elapsed_s)));
-    const auto start = std::chrono::steady_clock::now();
-    text = shown(work(bins));
-    ASSERT_FALSE(HasFailure());
-    elapsed_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+class ProgressLine : public testing::Test {
+ protected:
+  std::unique_ptr<cli::Progress> begin(const Ends& ends) {
+    return std::make_unique<cli::Progress>("working", ends.output(), [this] { return now_; });
   }
-  const std::string erase = "\r\033[K";
-  const std::size_t last = text.rfind("\rrecognising ");
-  ASSERT_NE(last, std::string::npos) << text;
-  const std::size_t erased = text.find(erase, last);
-  ASSERT_NE(erased, std::string::npos) << text;
-  EXPECT_EQ(text.find("recognising", erased), std::string::npos);
-  EXPECT_LT(erased, text.find("recording  touches")) << "erased before the table is printed";
-  // The same work, where standard error is a file.
-  done(work(bins));
+
+  cli::Progress::Clock::time_point now_{};
+};
+
+TEST_F(ProgressLine, IsShownAfterTwoSecondsAndErased) {
+  const Ends terminal = Ends::of_terminal();
+  auto progress = begin(terminal);
+  progress->show(0.0);
+  now_ += 1999ms;
+  progress->show(0.25);
+  EXPECT_EQ(terminal.printed(), "");
+  now_ += 1ms;
+  progress->show(0.25);
+  EXPECT_EQ(terminal.printed(), "\rworking  25 %, 6 s left\033[K");
+  now_ += 6s;
+  progress->show(1.0);
+  EXPECT_EQ(terminal.printed(), "\rworking 100 %, 0 s left\033[K");
+  progress.reset();
+  EXPECT_EQ(terminal.printed(), "\r\033[K");
+}
+
+TEST_F(ProgressLine, ChangesTenTimesASecond) {
+  const Ends terminal = Ends::of_terminal();
+  const auto progress = begin(terminal);
+  now_ += 3s;
+  progress->show(0.1);
+  EXPECT_NE(terminal.printed(), "");
+  now_ += 99ms;
+  progress->show(0.2);
+  EXPECT_EQ(terminal.printed(), "");
+  now_ += 1ms;
+  progress->show(0.3);
+  EXPECT_NE(terminal.printed().find(" 30 %, "), std::string::npos);
+}
+
+TEST_F(ProgressLine, KnowsNoEndBeforeItHasBegun) {
+  const Ends terminal = Ends::of_terminal();
+  const auto progress = begin(terminal);
+  now_ += 3s;
+  progress->show(0.0);
+  EXPECT_EQ(terminal.printed(), "\rworking   0 %\033[K");
 }
 
 TEST_F(ProgressLine, IsNotShownForShortWork) {
-  EXPECT_EQ(shown(work(5)).find("recognising"), std::string::npos);
+  const Ends terminal = Ends::of_terminal();
+  auto progress = begin(terminal);
+  now_ += 1s;
+  progress->show(0.9);
+  now_ += 1h;  // none of it is spent on work that is shown
+  progress.reset();
+  EXPECT_EQ(terminal.printed(), "");
+}
+
+TEST_F(ProgressLine, IsNotShownInAFile) {
+  const Ends pipe = Ends::of_pipe();
+  auto progress = begin(pipe);
+  now_ += 1h;
+  progress->show(0.5);
+  progress.reset();
+  EXPECT_EQ(pipe.printed(), "");
+}
+
+class ProgressOfTheProgram : public ProgramTest {};
+
+TEST_F(ProgressOfTheProgram, LeavesStandardErrorEmpty) {
+  write_map(folder_ / "A.map.h5", sample_map("A"));
+  write_recording(folder_ / "u.h5", sample_unknown("A", {}, 3));
+  done({"recognize", "u.h5", "--maps", "A.map.h5", "--bins", "5x5x4", "--each-frame"});
 }
 
 }  // namespace

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include "picture.hpp"
+
 namespace palpate {
 namespace {
 
@@ -48,6 +50,29 @@ TEST(View, MapsDataToPixelsWithYUp) {
   const Box box = view.pixels({0.0, 4.0}, {1.0, 5.0});
   EXPECT_EQ(glm::dvec2(box.left, box.top), glm::dvec2(200.0, 110.0));
   EXPECT_EQ(glm::dvec2(box.width, box.height), glm::dvec2(100.0, 20.0));
+}
+
+TEST(EvenTicks, AnEndThatIsOffByRoundingHasItsTick) {
+  // 6 * 0.1 is a little more than 0.6, which is a multiple of the step.
+  const auto ticks = even_ticks(6 * 0.1, 1.4, 4);
+  ASSERT_EQ(ticks.size(), 5u);
+  EXPECT_EQ(ticks.front().label, "0.6");
+  EXPECT_EQ(ticks.back().label, "1.4");
+}
+
+TEST(DrawAxes, KeepTheLabelClearOfWideTicks) {
+  const View view{.box = {300.0, 20.0, 100.0, 100.0}, .lower = {0.0, 0.0}, .upper = {1.0, 1.0}};
+  const std::string wide = "1.23456e+123 and more";
+  const auto drawn = [&](const char* label) {
+    Canvas canvas(420, 200);
+    draw_axes(canvas, view, {}, {{0.5, wide}}, "", label);
+    return decode(canvas.encode_png());
+  };
+  Canvas canvas(1, 1);
+  const double ticks_left = view.box.left - 10.0 - canvas.text_width(wide, small);
+  const Difference label = difference(drawn(""), drawn("label"));
+  EXPECT_GT(label.pixels, 0);
+  EXPECT_LT(label.right, ticks_left);
 }
 
 }  // namespace

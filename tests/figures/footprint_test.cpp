@@ -1,8 +1,12 @@
 #include "footprint.hpp"
 
 #include <cmath>
+#include <limits>
+#include <numbers>
+#include <random>
 
 #include <gtest/gtest.h>
+#include <glm/common.hpp>
 
 #include "palpate/pose.hpp"
 #include "palpate/touch.hpp"
@@ -54,6 +58,65 @@ TEST(Footprint, TurnsItsSquaresWithTheArray) {
     // The array's own direction, or a right angle to it.
     EXPECT_NEAR(std::sin(2.0 * (std::atan2(edge.y, edge.x) - T.theta_rad)), 0.0, 1e-9);
   }
+}
+
+/// Area of the rectangle along this direction around the points.
+double rectangle_around(const std::vector<glm::dvec2>& points, double angle_rad) {
+  glm::dvec2 lower = rotate(-angle_rad, points.front());
+  glm::dvec2 upper = lower;
+  for (const glm::dvec2& p : points) {
+    lower = glm::min(lower, rotate(-angle_rad, p));
+    upper = glm::max(upper, rotate(-angle_rad, p));
+  }
+  return (upper.x - lower.x) * (upper.y - lower.y);
+}
+
+TEST(Footprint, LiesAlongTheSmallestRectangle) {
+  std::mt19937_64 random(20110509);
+  std::uniform_real_distribution<double> mm(-10.0, 10.0);
+  for (int run = 0; run < 200; ++run) {
+    std::vector<glm::dvec2> points(3 + run % 10);
+    for (glm::dvec2& p : points) {
+      // Every other time on a grid, where many points lie in one line.
+      p = {mm(random), mm(random)};
+      p = run % 2 == 0 ? p : glm::round(p / 5.0);
+    }
+    // One side of the smallest rectangle holds two of the points.
+    double smallest = std::numeric_limits<double>::infinity();
+    for (const glm::dvec2& a : points) {
+      for (const glm::dvec2& b : points) {
+        if (a != b) {
+          smallest = std::min(smallest, rectangle_around(points, std::atan2(b.y - a.y, b.x - a.x)));
+        }
+      }
+    }
+    const auto square = footprint(points, 1.0).elements.front();
+    const glm::dvec2 edge = square[1] - square[0];
+    // Rounding of coordinates of 10 mm, turned.
+    EXPECT_NEAR(rectangle_around(points, std::atan2(edge.y, edge.x)), smallest, 1e-11) << run;
+  }
+}
+
+// With every corner against every edge these would take minutes.
+TEST(Footprint, OfALargeArrayIsMadeAtOnce) {
+  constexpr std::size_t elements = 40'000;
+  std::vector<glm::dvec2> ring;
+  for (std::size_t k = 0; k < elements; ++k) {
+    ring.push_back(rotate(2.0 * std::numbers::pi * static_cast<double>(k) / elements, {50.0, 0.0}));
+  }
+  const Footprint round = footprint(ring, 0.01);
+  EXPECT_EQ(round.elements.size(), elements);
+  // The ring, and up to half a diagonal of an element around it.
+  EXPECT_GT(area(round.outline), std::numbers::pi * 50.0 * 50.0);
+  EXPECT_LT(area(round.outline), std::numbers::pi * 50.01 * 50.01);
+
+  std::vector<glm::dvec2> grid;
+  for (std::size_t k = 0; k < elements; ++k) {
+    grid.emplace_back(0.5 * static_cast<double>(k % 200), 0.25 * static_cast<double>(k / 200));
+  }
+  const Footprint rectangle = footprint(at({{3.0, 4.0}, 0.4}, grid), 0.25);
+  EXPECT_EQ(rectangle.outline.size(), 4u);
+  EXPECT_NEAR(area(rectangle.outline), 99.75 * 50.0, 1e-8);
 }
 
 TEST(Footprint, OfOneElementIsASquare) {

@@ -113,6 +113,27 @@ TEST(RecognitionSheet, DrawsTheTruthNearestToTheEstimateUnderTheSymmetry) {
   EXPECT_LE(difference(full, decode(draw_recognition(sheet))).pixels, 4) << "antialiasing alone";
 }
 
+TEST(RecognitionSheet, LeavesATruthThatIsTheNearestWhereItIs) {
+  RecognitionSheet sheet = example();
+  const Picture one = decode(draw_recognition(sheet));
+  sheet.map.symmetry = 2;
+  const Difference change = difference(one, decode(draw_recognition(sheet)));
+  EXPECT_GT(change.pixels, 0) << "the legends";
+  EXPECT_LT(change.bottom, 200) << "the plots begin there";
+}
+
+TEST(RecognitionSheet, MarksAWrongIdentity) {
+  const Colour alarm{0.75, 0.1, 0.1};
+  RecognitionSheet sheet = example();
+  EXPECT_EQ(count(decode(draw_recognition(sheet)), alarm), 0);
+  sheet.true_object = "ring";
+  EXPECT_GT(count(decode(draw_recognition(sheet)), alarm), 0);
+  sheet.none = true;
+  EXPECT_GT(count(decode(draw_recognition(sheet)), alarm), 0) << "the ring was learned";
+  sheet.true_object = "cup";
+  EXPECT_EQ(count(decode(draw_recognition(sheet)), alarm), 0);
+}
+
 TEST(RecognitionSheet, AddsUpObjectsOfEqualLabel) {
   RecognitionSheet sheet = example();
   sheet.identity = {{0.5, 0.5}, {0.75, 0.25}};

@@ -129,9 +129,10 @@ TEST_F(PosedSensorSource, FifoIsReadAsItComes) {
   // Nobody writes: the first frame is held back, then let go without a pose.
   EXPECT_FALSE(sensor.next(0ms));
   std::optional<Frame> first;
-  while (!first) {
+  for (int i = 0; i < 10 && !first; ++i) {
     first = sensor.next(1s);
   }
+  ASSERT_TRUE(first);
   EXPECT_FALSE(first->T_robot_sensor);
   {
     std::ofstream writer(path_);

@@ -2,7 +2,9 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -32,6 +34,10 @@ struct BoardInfo {
 /// for their elements; nothing is claimed, so that a stream of another program goes on.
 /// @throws Error (Fault::system) where the USB itself cannot be used
 std::vector<BoardInfo> list_boards();
+
+/// The profile that open_board() reads for a board of this name, if it reads any.
+/// @throws Error (Fault::input) on a name of another form
+std::optional<std::filesystem::path> board_file(const std::string& name);
 
 /// Opens a board and reads its geometry and calibration; start() of the sensor begins the stream.
 ///

@@ -30,6 +30,7 @@ struct Scene {
   };
 
   std::optional<std::vector<glm::dvec2>> array_mm;  ///< element centres in the sensor frame
+  std::optional<std::filesystem::path> array_file;  ///< that they were read from, if from a file
   std::optional<double> threshold;                  ///< in the recording's pressure unit
   std::optional<double> ratio;
   std::optional<double> gamma;

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -26,6 +27,9 @@ struct Shape {
 
   bool contains(const glm::dvec2& p_object_mm) const;
 };
+
+/// The shape of this name that make_shape() knows without a file, if there is one.
+std::optional<Shape> built_in_shape(const std::string& name);
 
 /// A capital letter "A".."Z" or digit "0".."9" about 25 mm high, "ring", "bar", or the path of a
 /// polygon file: lines "x y" in mm, an empty line between polygons, '#' starts a comment.

@@ -1,6 +1,8 @@
 #pragma once
 
+#include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 
@@ -10,6 +12,10 @@ namespace palpate {
 
 /// True for the names that open_virtual_sensor() takes: "replay:..." and "simulate:...".
 bool is_virtual_sensor(std::string_view name);
+
+/// The file that a virtual sensor of this name reads: a recording or a polygon file, if any.
+/// @throws Error (Fault::input) on an unknown option
+std::optional<std::filesystem::path> virtual_sensor_file(const std::string& name);
 
 /// A sensor without a board. Its frames wait for whoever is late; none is ever lost.
 ///

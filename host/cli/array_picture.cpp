@@ -1,0 +1,97 @@
+#include "array_picture.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <set>
+#include <tuple>
+#include <utility>
+
+#include <glm/common.hpp>
+
+namespace palpate::cli {
+
+namespace {
+
+/// The smallest distance between two elements that do not coincide; infinite where there are none.
+/// Sweeps along x over those elements alone that lie less than the distance so far behind.
+double least_distance_mm(std::vector<glm::dvec2> elements_mm) {
+  const auto before = [](const glm::dvec2& a, const glm::dvec2& b) {
+    return std::tie(a.x, a.y) < std::tie(b.x, b.y);
+  };
+  std::ranges::sort(elements_mm, before);
+  elements_mm.erase(std::unique(elements_mm.begin(), elements_mm.end()), elements_mm.end());
+  double least = std::numeric_limits<double>::infinity();
+  std::set<std::pair<double, double>> near;  // y and x
+  auto last = elements_mm.begin();
+  for (const glm::dvec2& p : elements_mm) {
+    for (; p.x - last->x > least; ++last) {
+      near.erase({last->y, last->x});
+    }
+    for (auto q = near.lower_bound({p.y - least, -std::numeric_limits<double>::infinity()});
+         q != near.end() && q->first - p.y <= least; ++q) {
+      least = std::min(least, std::hypot(p.x - q->second, p.y - q->first));
+    }
+    near.emplace(p.y, p.x);
+  }
+  return least;
+}
+
+}  // namespace
+
+ArrayPicture::ArrayPicture(const std::vector<glm::dvec2>& elements_mm) {
+  if (elements_mm.empty()) {
+    return;
+  }
+  const double least_mm = least_distance_mm(elements_mm);
+  half_mm_ = std::isfinite(least_mm) ? 0.5 * least_mm : 1.0;
+  lower_mm_ = upper_mm_ = elements_mm.front();
+  for (const glm::dvec2& p : elements_mm) {
+    lower_mm_ = glm::min(lower_mm_, p);
+    upper_mm_ = glm::max(upper_mm_, p);
+  }
+  lower_mm_ -= half_mm_;
+  upper_mm_ += half_mm_;
+  placed_.reserve(elements_mm.size());
+  for (std::size_t i = 0; i < elements_mm.size(); ++i) {
+    const glm::dvec2& p = elements_mm[i];
+    placed_.push_back({.row = row_of(p.y), .column = column_of(p.x), .element = i, .centre_mm = p});
+  }
+  std::ranges::sort(placed_, {},
+                    [](const Placed& p) { return std::tuple(p.row, p.column, p.element); });
+  // Of elements that coincide only the first is ever seen.
+  const auto end =
+      std::unique(placed_.begin(), placed_.end(),
+                  [](const Placed& a, const Placed& b) { return a.centre_mm == b.centre_mm; });
+  placed_.erase(end, placed_.end());
+}
+
+double ArrayPicture::row_of(double y_mm) const {
+  return std::floor((y_mm - lower_mm_.y) / (2.0 * half_mm_));
+}
+
+double ArrayPicture::column_of(double x_mm) const {
+  return std::floor((x_mm - lower_mm_.x) / (2.0 * half_mm_));
+}
+
+std::optional<std::size_t> ArrayPicture::element_at(const glm::dvec2& p_mm) const {
+  std::optional<std::size_t> found;
+  // An element that covers the point has its centre in the point's cell or in one beside it.
+  for (double row = row_of(p_mm.y) - 1.0, last = row + 2.0; row <= last; ++row) {
+    const double column = column_of(p_mm.x);
+    const auto in_row = [](const Placed& p, const std::pair<double, double>& cell) {
+      return std::pair(p.row, p.column) < cell;
+    };
+    for (auto p =
+             std::lower_bound(placed_.begin(), placed_.end(), std::pair(row, column - 1.0), in_row);
+         p != placed_.end() && p->row == row && p->column <= column + 1.0; ++p) {
+      if (std::abs(p_mm.x - p->centre_mm.x) <= half_mm_ &&
+          std::abs(p_mm.y - p->centre_mm.y) <= half_mm_) {
+        found = std::min(found.value_or(p->element), p->element);
+      }
+    }
+  }
+  return found;
+}
+
+}  // namespace palpate::cli

@@ -1,0 +1,83 @@
+#include "command_files.hpp"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <map>
+#include <optional>
+#include <system_error>
+#include <utility>
+
+#include "file_identity.hpp"
+#include "palpate/error.hpp"
+#include "standard_streams.hpp"
+
+namespace palpate {
+
+namespace {
+
+/// What tells two files apart: their identities, or their paths where there is no file yet.
+using Place = std::pair<FileIdentity, std::filesystem::path>;
+
+/// None for what cannot be overwritten, such as a terminal.
+std::optional<Place> place_of(const std::filesystem::path& file, int stream) {
+  struct stat status {};
+  const bool found =
+      file == "-" ? ::fstat(stream, &status) == 0 : ::stat(file.c_str(), &status) == 0;
+  if (!found) {
+    std::error_code ignored;
+    // Absolute first: what exists of a relative path may be nothing, and then it stays as it is.
+    return Place{
+        {}, std::filesystem::weakly_canonical(std::filesystem::absolute(file, ignored), ignored)};
+  }
+  if (!S_ISREG(status.st_mode) && !S_ISFIFO(status.st_mode)) {
+    return {};
+  }
+  return Place{identity_of(status), {}};
+}
+
+void require_open(const std::string& flag, const std::filesystem::path& file, int stream,
+                  const char* name) {
+  if (file == "-" && was_closed(stream)) {
+    throw Error(Fault::input, fmt::format("{} -: standard {} is closed; name a file", flag, name));
+  }
+}
+
+}  // namespace
+
+void CommandFiles::reads(const std::string& flag, const std::filesystem::path& file) {
+  require_open(flag, file, STDIN_FILENO, "input");
+  read_.push_back({flag, file});
+}
+
+void CommandFiles::writes(const std::string& flag, const std::filesystem::path& file) {
+  require_open(flag, file, STDOUT_FILENO, "output");
+  written_.push_back({flag, file});
+}
+
+void CommandFiles::require_distinct() const {
+  // Every file so far, with what becomes of it.
+  std::map<Place, std::pair<const Named*, const char*>> taken;
+  for (const Named& input : read_) {
+    if (const auto place = place_of(input.file, STDIN_FILENO)) {
+      taken.emplace(*place, std::pair{&input, "reads"});
+    }
+  }
+  for (const Named& output : written_) {
+    const auto place = place_of(output.file, STDOUT_FILENO);
+    if (!place) {
+      continue;
+    }
+    const auto [other, is_new] = taken.emplace(*place, std::pair{&output, "writes"});
+    if (!is_new) {
+      const auto& [named, verb] = other->second;
+      throw Error(
+          Fault::input,
+          fmt::format("{} {}: would overwrite {}, which {} {}; choose another "
+                      "name",
+                      output.flag, output.file.string(), named->file.string(), named->flag, verb));
+    }
+  }
+}
+
+}  // namespace palpate

@@ -1,0 +1,31 @@
+#pragma once
+
+#include <sys/stat.h>
+
+#include <filesystem>
+#include <optional>
+#include <tuple>
+
+namespace palpate {
+
+/// Device and inode, which all names of a file share, links and hard links included.
+struct FileIdentity {
+  dev_t device = 0;
+  ino_t inode = 0;
+
+  friend bool operator<(const FileIdentity& a, const FileIdentity& b) {
+    return std::tie(a.device, a.inode) < std::tie(b.device, b.inode);
+  }
+};
+
+inline FileIdentity identity_of(const struct stat& status) {
+  return {.device = status.st_dev, .inode = status.st_ino};
+}
+
+/// None where there is no such file.
+inline std::optional<FileIdentity> identity_of(const std::filesystem::path& file) {
+  struct stat status {};
+  return ::stat(file.c_str(), &status) == 0 ? std::optional(identity_of(status)) : std::nullopt;
+}
+
+}  // namespace palpate

@@ -1,0 +1,76 @@
+// Standard input, output and error closed, as a daemon's are.
+
+#include <unistd.h>
+
+#include "program.hpp"
+#include "sample_files.hpp"
+
+namespace palpate {
+namespace {
+
+class ClosedStreams : public ProgramTest {
+ protected:
+  ClosedStreams() {
+    write_map(folder_ / "A.map.h5", sample_map("A"));
+    write_recording(folder_ / "u.h5", sample_unknown("A", {}, 2));
+  }
+};
+
+const std::vector<int> every{STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO};
+constexpr const char* presses = "simulate:A,rate=100,seed=3,touches=2,speed=max";
+
+TEST_F(ClosedStreams, NothingPrintedLandsInAFile) {
+  const std::vector<std::string> live{"live",   "--sensor", presses,  "--maps", "A.map.h5",
+                                      "--bins", "5x5x4",    "--json", "f"};
+  for (const std::vector<int>& closed : {std::vector{STDOUT_FILENO}, every}) {
+    const Outcome outcome = palpate(live, {.closed = closed});
+    EXPECT_EQ(outcome.status, 0) << outcome.err;
+    EXPECT_EQ(outcome.err, "");
+    const std::string lines = bytes_of(folder_ / "f");
+    EXPECT_EQ(std::count(lines.begin(), lines.end(), '\n'), 2) << lines;
+    for (std::size_t begin = 0; begin < lines.size(); begin = lines.find('\n', begin) + 1) {
+      const std::string line = lines.substr(begin, lines.find('\n', begin) - begin);
+      EXPECT_TRUE(nlohmann::json::accept(line)) << line;
+    }
+  }
+}
+
+TEST_F(ClosedStreams, FilesAreReadAndWrittenAllTheSame) {
+  const Outcome plain = palpate({"recognize", "u.h5", "--maps", "A.map.h5", "--bins", "5x5x4",
+                                 "--posterior", "p.h5", "--png", "sheets"});
+  ASSERT_EQ(plain.status, 0) << plain.err;
+  const auto expected = content_of(folder_.path());
+  for (const std::vector<int>& closed :
+       {std::vector{STDIN_FILENO}, {STDOUT_FILENO}, {STDERR_FILENO}, every}) {
+    std::filesystem::remove(folder_ / "p.h5");
+    std::filesystem::remove_all(folder_ / "sheets");
+    const Outcome outcome = palpate({"recognize", "u.h5", "--maps", "A.map.h5", "--bins", "5x5x4",
+                                     "--posterior", "p.h5", "--png", "sheets"},
+                                    {.closed = closed});
+    EXPECT_EQ(outcome.status, 0) << outcome.err;
+    EXPECT_TRUE(content_of(folder_.path()) == expected);
+  }
+}
+
+// Whoever asks for standard output by name wants to have it.
+TEST_F(ClosedStreams, AreRefusedWhereTheyAreNamed) {
+  for (const std::vector<std::string>& arguments :
+       {std::vector<std::string>{"recognize", "u.h5", "--maps", "A.map.h5", "--json", "-"},
+        {"live", "--sensor", presses, "--maps", "A.map.h5", "--json", "-"}}) {
+    const Outcome outcome = palpate(arguments, {.closed = {STDOUT_FILENO}});
+    EXPECT_EQ(outcome.status, 2);
+    EXPECT_EQ(outcome.err, "palpate: --json -: standard output is closed; name a file\n");
+  }
+  const Outcome outcome = palpate({"record", "--sensor", presses, "--poses", "-", "-o", "f.h5"},
+                                  {.closed = {STDIN_FILENO}});
+  EXPECT_EQ(outcome.status, 2);
+  EXPECT_EQ(outcome.err, "palpate: --poses -: standard input is closed; name a file\n");
+}
+
+TEST_F(ClosedStreams, KeepTheStatus) {
+  EXPECT_EQ(palpate({"info", "missing.h5"}, {.closed = every}).status, 2);
+  EXPECT_EQ(palpate({"--version"}, {.closed = every}).status, 0);
+}
+
+}  // namespace
+}  // namespace palpate
