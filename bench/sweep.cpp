@@ -12,6 +12,7 @@
 #include <fmt/format.h>
 
 #include "atomic_file.hpp"
+#include "chart_file.hpp"
 #include "letters.hpp"
 #include "measurement.hpp"
 #include "palpate/balanced_lattice.hpp"
@@ -237,8 +238,7 @@ void run_sweep(const SweepOptions& options, std::span<char* const> command_line)
   }
   if (!options.plots.empty()) {
     for (const NamedChart& chart : charts_of(result)) {
-      AtomicFile file(std::filesystem::path(options.plots) / ("sweep_" + chart.name + ".svg"));
-      commit(file, chart.file);
+      write_chart(chart.chart, options.plots, "sweep_" + chart.name);
     }
   }
 }

@@ -1,0 +1,14 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+#include "chart.hpp"
+
+namespace palpate::bench {
+
+/// Writes the chart into the folder as NAME.png and NAME.svg.
+/// @throws Error where the disk refuses
+void write_chart(const Chart& chart, const std::filesystem::path& folder, const std::string& name);
+
+}  // namespace palpate::bench
