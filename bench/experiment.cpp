@@ -14,7 +14,6 @@
 #include "command_files.hpp"
 #include "comparison.hpp"
 #include "experiment_result.hpp"
-#include "gnuplot.hpp"
 #include "letters.hpp"
 #include "palpate/balanced_lattice.hpp"
 #include "palpate/error.hpp"
@@ -163,9 +162,6 @@ void run_experiment(const ExperimentOptions& options, std::span<char* const> com
   }
   make_folder(options.csv);
   make_folder(options.plots);
-  if (!options.plots.empty()) {
-    require_gnuplot();
-  }
   Device device = Device::open(options.device);
   const auto now = std::chrono::floor<std::chrono::seconds>(std::chrono::system_clock::now());
   Report report({{"device", device.name()},

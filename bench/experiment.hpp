@@ -20,8 +20,8 @@ struct ExperimentOptions {
 /// touches, for both filters. Beyond the paper: calibration, refined poses, an array that is
 /// not quite where it is reported, and objects that were never learned. Prints the paper's claims
 /// beside what was measured, and writes what is asked for.
-/// @throws Error where trials or touches are out of range, the device, a file or a folder cannot be
-/// opened, or gnuplot is missing
+/// @throws Error where trials or touches are out of range, or the device, a file or a folder cannot
+/// be opened
 void run_experiment(const ExperimentOptions& options, std::span<char* const> command_line);
 
 }  // namespace palpate::bench

@@ -50,7 +50,7 @@ void write_tables(const ExperimentResult& result, const std::filesystem::path& f
 
 /// Draws the paper's Fig. 6a, 6b, 7a and 7b with its headline numbers marked, and what goes beyond
 /// it, each as PNG and SVG.
-/// @throws Error where gnuplot or the disk refuses
+/// @throws Error where the disk refuses
 void draw_figures(const ExperimentResult& result, const std::filesystem::path& folder);
 
 }  // namespace palpate::bench

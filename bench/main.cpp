@@ -37,7 +37,7 @@ int main(int argc, char** argv) {
   experiment->add_option("--json", experiment_options.json, "Also write the results to this file");
   experiment->add_option("--csv", experiment_options.csv, "Also write tables to this folder");
   experiment->add_option("--plots", experiment_options.plots,
-                         "Also draw the paper's figures in this folder, by gnuplot");
+                         "Also draw the paper's figures in this folder, as PNG and SVG");
   experiment->add_flag("--quick", experiment_options.quick, "Few trials and touches, in seconds");
   experiment->add_option("--device", experiment_options.device,
                          "Vulkan device, by a part of its name or index");
@@ -50,7 +50,8 @@ int main(int argc, char** argv) {
       "object and maps of several cell sizes; takes many minutes on a CPU");
   sweep->add_option("--json", sweep_options.json, "Also write the results to this file");
   sweep->add_option("--html", sweep_options.html, "Also write them as a page with charts");
-  sweep->add_option("--plots", sweep_options.plots, "Also write the page's charts to this folder");
+  sweep->add_option("--plots", sweep_options.plots,
+                    "Also write the page's charts to this folder, as PNG and SVG");
   sweep->add_option("--max-bins", sweep_options.max_bins, "Most bins per object");
   sweep->add_option("--trials", sweep_options.trials,
                     "Trials per letter, 10 by default, or 4 with --quick; few of them in full "

@@ -12,6 +12,7 @@
 #include <fmt/format.h>
 
 #include "atomic_file.hpp"
+#include "chart_file.hpp"
 #include "command_files.hpp"
 #include "letters.hpp"
 #include "measurement.hpp"
@@ -192,9 +193,8 @@ void require_at_least(const char* flag, const std::optional<std::int64_t>& value
   }
 }
 
-std::filesystem::path chart_path(const SweepOptions& options, const std::string& chart) {
-  return std::filesystem::path(options.plots) / ("sweep_" + chart + ".svg");
-}
+/// Of a chart's files, without their endings.
+std::string file_name(const std::string& chart) { return "sweep_" + chart; }
 
 void require_distinct_outputs(const SweepOptions& options) {
   CommandFiles files;
@@ -206,7 +206,9 @@ void require_distinct_outputs(const SweepOptions& options) {
   }
   if (!options.plots.empty()) {
     for (const char* chart : chart_names) {
-      files.writes("--plots", chart_path(options, chart));
+      for (const std::string& file : chart_files(file_name(chart))) {
+        files.writes("--plots", std::filesystem::path(options.plots) / file);
+      }
     }
   }
   files.require_distinct();
@@ -259,8 +261,7 @@ void run_sweep(const SweepOptions& options, std::span<char* const> command_line)
   }
   if (!options.plots.empty()) {
     for (const NamedChart& chart : charts_of(result)) {
-      AtomicFile file(chart_path(options, chart.name));
-      commit(file, chart.file);
+      write_chart(chart.chart, options.plots, file_name(chart.name));
     }
   }
 }

@@ -1,11 +1,12 @@
 #include <algorithm>
+#include <functional>
 #include <iterator>
 #include <string>
 #include <string_view>
 
 #include <fmt/format.h>
 
-#include "svg_chart.hpp"
+#include "chart.hpp"
 #include "sweep_result.hpp"
 #include "sweep_words.hpp"
 
@@ -13,11 +14,11 @@ namespace palpate::bench {
 
 namespace {
 
-constexpr int grey = 5;
-
-std::string mm_text(double mm) { return fmt::format("{:g}", mm); }
-std::string ns_text(double ns) { return fmt::format("{:g}", ns); }
 std::string nats_text(double nats) { return fmt::format("{:.0e}", nats); }
+
+ChartAxis log_axis(std::string label, std::function<std::string(double)> text = {}) {
+  return {.label = std::move(label), .scale = Scale::logarithmic, .text = std::move(text)};
+}
 
 std::string size_of(const SweepPoint& point) {
   return count_text(static_cast<double>(point.count));
@@ -40,8 +41,8 @@ std::string title_of(const PosedError& posed) {
       seconds_text(posed.seconds));
 }
 
-Fill fill_of(double cell_mm) {
-  return cell_mm < 0.4 ? Fill::half : cell_mm < 0.75 ? Fill::solid : Fill::none;
+MarkFill fill_of(double cell_mm) {
+  return cell_mm < 0.4 ? MarkFill::pale : cell_mm < 0.75 ? MarkFill::solid : MarkFill::hollow;
 }
 
 /// A series for every filter and kind of pose, the cell sizes told by their fill.
@@ -50,22 +51,22 @@ std::vector<ChartSeries> filter_series(const SweepResult& result) {
     const char* filter;
     PoseKind pose;
     const char* name;
-    Shape shape;
+    Mark mark;
   };
   constexpr Kind kinds[] = {
-      {"histogram", PoseKind::mode, "histogram, mode", Shape::circle},
-      {"histogram", PoseKind::refined, "histogram, refined", Shape::square},
-      {"particles", PoseKind::mode, "particles", Shape::triangle},
-      {"augmented", PoseKind::mode, "Augmented MCL", Shape::diamond},
-      {"systematic", PoseKind::mode, "systematic resampling", Shape::triangle}};
+      {"histogram", PoseKind::mode, "histogram, mode", Mark::circle},
+      {"histogram", PoseKind::refined, "histogram, refined", Mark::square},
+      {"particles", PoseKind::mode, "particles", Mark::triangle},
+      {"augmented", PoseKind::mode, "Augmented MCL", Mark::diamond},
+      {"systematic", PoseKind::mode, "systematic resampling", Mark::triangle}};
   const std::vector<PosedError> all = posed_errors(result);
   std::vector<ChartSeries> series;
-  for (int colour = 0; colour < static_cast<int>(std::size(kinds)); ++colour) {
+  for (std::size_t colour = 0; colour < std::size(kinds); ++colour) {
     const Kind& kind = kinds[colour];
     for (const double cell_mm : {0.25, 0.5, 1.0}) {
       ChartSeries one{.name = cell_mm == 0.5 ? kind.name : "",
-                      .colour = colour,
-                      .shape = kind.shape,
+                      .colour = palpate::series(colour),
+                      .mark = kind.mark,
                       .fill = fill_of(cell_mm)};
       // The refined pose stands right below its mode, and particles by their like: one label.
       const bool labelled = cell_mm == 0.5 && (kind.pose == PoseKind::refined ||
@@ -88,16 +89,14 @@ std::vector<ChartSeries> filter_series(const SweepResult& result) {
 }
 
 Chart pose_chart(const SweepResult& result) {
-  Chart chart{.title = "Time against pose error",
-              .x_label = fmt::format("time per unknown of {} touches, an estimate after each",
-                                     result.touches),
-              .y_label = "mean pose error (mm)",
-              .x_tick = seconds_text,
-              .y_tick = mm_text};
-  ChartSeries front{.name = "front", .colour = grey, .line = true, .marks = false};
+  Chart chart{.x = log_axis(fmt::format("time per unknown of {} touches, an estimate after each",
+                                        result.touches),
+                            seconds_text),
+              .y = log_axis("mean pose error (mm)")};
+  ChartSeries front{
+      .name = "front", .colour = comparison_grey, .mark = Mark::none, .line = Line::solid};
   for (const PosedError& posed : pose_front(result)) {
-    front.points.push_back(
-        {.x = posed.seconds, .y = posed.errors.mean_mm, .label = {}, .title = {}});
+    front.points.push_back({.x = posed.seconds, .y = posed.errors.mean_mm});
   }
   chart.series.push_back(std::move(front));
   for (ChartSeries& series : filter_series(result)) {
@@ -109,30 +108,27 @@ Chart pose_chart(const SweepResult& result) {
 struct Family {
   const char* begin;  ///< of the path's description
   const char* name;
-  Shape shape;
+  Mark mark;
 };
-constexpr Family families[] = {{"register tiles", "register tiles", Shape::square},
-                               {"runs", "rows", Shape::circle},
-                               {"in logs", "in logs", Shape::circle},
-                               {"array at rest", "array at rest", Shape::square},
-                               {"one-bin", "one-bin kernel", Shape::triangle},
-                               {"CPU loop", "CPU loop", Shape::diamond}};
+constexpr Family families[] = {{"register tiles", "register tiles", Mark::square},
+                               {"runs", "rows", Mark::circle},
+                               {"in logs", "in logs", Mark::circle},
+                               {"array at rest", "array at rest", Mark::square},
+                               {"one-bin", "one-bin kernel", Mark::triangle},
+                               {"CPU loop", "CPU loop", Mark::diamond}};
 
 Chart precision_chart(const SweepResult& result) {
-  Chart chart{.title = "Time against numerical error",
-              .x_label = "time per pose, element and touch (ns)",
-              .y_label = "largest deviation from float64 (nats)",
-              .x_tick = ns_text,
-              .y_tick = nats_text};
-  ChartSeries front{.name = "front", .colour = grey, .line = true, .marks = false};
+  Chart chart{.x = log_axis("time per pose, element and touch (ns)"),
+              .y = log_axis("largest deviation from float64 (nats)", nats_text)};
+  ChartSeries front{
+      .name = "front", .colour = comparison_grey, .mark = Mark::none, .line = Line::solid};
   for (const Precision& precision : precision_front(result)) {
-    front.points.push_back(
-        {.x = precision.nanoseconds, .y = precision.deviation.largest, .label = {}, .title = {}});
+    front.points.push_back({.x = precision.nanoseconds, .y = precision.deviation.largest});
   }
   chart.series.push_back(std::move(front));
-  for (int colour = 0; colour < static_cast<int>(std::size(families)); ++colour) {
+  for (std::size_t colour = 0; colour < std::size(families); ++colour) {
     const Family& family = families[colour];
-    ChartSeries series{.name = family.name, .colour = colour, .shape = family.shape};
+    ChartSeries series{.name = family.name, .colour = palpate::series(colour), .mark = family.mark};
     for (const Precision& precision : result.precisions) {
       if (precision.path.starts_with(family.begin)) {
         series.points.push_back(
@@ -152,47 +148,39 @@ Chart precision_chart(const SweepResult& result) {
 }
 
 Chart knee_chart(const SweepResult& result) {
-  Chart chart{.title = "Error against bins",
-              .x_label = "bins per object",
-              .y_label = "mean pose error (mm)",
-              .x_tick = count_text,
-              .y_tick = mm_text};
+  Chart chart{.x = log_axis("bins per object", count_text), .y = log_axis("mean pose error (mm)")};
   ChartSeries nearest{
-      .name = "nearest bin", .colour = grey, .line = true, .dashed = true, .marks = false};
-  int colour = 0;
+      .name = "nearest bin", .colour = comparison_grey, .mark = Mark::none, .line = Line::dashed};
+  std::size_t colour = 0;
   for (const CellFinding& finding : result.findings) {
     ChartSeries mode{.name = fmt::format("{} mm cells, mode", finding.cell_mm),
-                     .colour = colour,
-                     .shape = Shape::circle,
-                     .line = true};
+                     .colour = palpate::series(colour),
+                     .mark = Mark::circle,
+                     .line = Line::solid};
     ChartSeries refined{.name = fmt::format("{} mm, refined", finding.cell_mm),
-                        .colour = colour,
-                        .shape = Shape::square,
-                        .fill = Fill::none,
-                        .line = true};
+                        .colour = palpate::series(colour),
+                        .mark = Mark::square,
+                        .fill = MarkFill::hollow,
+                        .line = Line::solid};
     const std::vector<SweepPoint> runs = histograms_of(result, finding.cell_mm);
     for (const PosedError& posed : posed_errors(result)) {
       if (posed.point->balanced && posed.point->cell_mm == finding.cell_mm) {
         (posed.kind == PoseKind::mode ? mode : refined)
             .points.push_back({.x = static_cast<double>(posed.point->count),
                                .y = posed.errors.mean_mm,
-                               .label = {},
                                .title = title_of(posed)});
       }
     }
     if (finding.cell_mm == 0.5) {
       for (const SweepPoint& run : runs) {
-        nearest.points.push_back({.x = static_cast<double>(run.count),
-                                  .y = *run.nearest_bin_mm,
-                                  .label = {},
-                                  .title = {}});
+        nearest.points.push_back({.x = static_cast<double>(run.count), .y = *run.nearest_bin_mm});
       }
     }
     const auto balanced = static_cast<double>(finding.balanced_count);
     if (balanced <= 2.0 * static_cast<double>(runs.back().count)) {
       chart.rules.push_back({.vertical = true,
                              .at = balanced,
-                             .colour = colour,
+                             .colour = palpate::series(colour),
                              .label = fmt::format("auto, {} mm", finding.cell_mm)});
     }
     chart.series.push_back(std::move(mode));
@@ -208,7 +196,7 @@ Chart knee_chart(const SweepResult& result) {
   if (least != nullptr) {
     chart.rules.push_back({.vertical = false,
                            .at = least->floor->mean_mm,
-                           .colour = grey,
+                           .colour = comparison_grey,
                            .label = fmt::format("floor {} mm, {} trials", mean_text(least->floor),
                                                 least->floor->trials)});
   }
@@ -219,37 +207,28 @@ Chart knee_chart(const SweepResult& result) {
 }  // namespace
 
 std::vector<NamedChart> charts_of(const SweepResult& result) {
-  const auto named = [](const char* name, const Chart& chart, std::string caption) {
-    return NamedChart{.name = name,
-                      .title = chart.title,
-                      .svg = svg_of(chart),
-                      .file = svg_file(chart),
-                      .caption = std::move(caption)};
-  };
   return {
-      named(chart_names[0], pose_chart(result),
-            fmt::format(
-                "Labels are bins per object, of which there are five, or particles in all. Solid "
-                "marks: maps of 0.5 mm cells; half filled: 0.25 mm; hollow: 1 mm. A refined pose "
-                "is drawn at the time of all estimates and one refinement after the last. Errors "
-                "are over the trials whose mode has the right object; the front is of runs that "
-                "recognise and locate all {} trials, where errors are from windows all those in "
-                "full; runs of fewer stay out of it.",
-                result.trials)),
-      named(chart_names[1], precision_chart(result),
-            fmt::format(
-                "The likelihood alone, side by side on the same lattices; labels are bins per "
-                "object. Deviations of the log-likelihood are the largest of {} bins an object "
-                "after one touch. In logs: gamma = 0. The array at rest counts its No Contact "
-                "elements, too, although it skips them.",
-                sampled_bins)),
-      named(chart_names[2], knee_chart(result),
-            fmt::format(
-                "The histogram on lattices of balanced steps, all over the same {} trials. "
-                "\"Nearest bin\" is the least error that any bin of the lattice has: what the "
-                "lattice alone costs. The floor is what is left on the finest lattice. "
-                "Vertical lines: what --bins auto takes for these cells.",
-                result.trials)),
+      {chart_names[0], "Time against pose error", pose_chart(result),
+       fmt::format(
+           "Labels are bins per object, of which there are five, or particles in all. Solid "
+           "marks: maps of 0.5 mm cells; half filled: 0.25 mm; hollow: 1 mm. A refined pose "
+           "is drawn at the time of all estimates and one refinement after the last. Errors "
+           "are over the trials whose mode has the right object; the front is of runs that "
+           "recognise and locate all {} trials, where errors are from windows all those in "
+           "full; runs of fewer stay out of it.",
+           result.trials)},
+      {chart_names[1], "Time against numerical error", precision_chart(result),
+       fmt::format("The likelihood alone, side by side on the same lattices; labels are bins per "
+                   "object. Deviations of the log-likelihood are the largest of {} bins an object "
+                   "after one touch. In logs: gamma = 0. The array at rest counts its No Contact "
+                   "elements, too, although it skips them.",
+                   sampled_bins)},
+      {chart_names[2], "Error against bins", knee_chart(result),
+       fmt::format("The histogram on lattices of balanced steps, all over the same {} trials. "
+                   "\"Nearest bin\" is the least error that any bin of the lattice has: what the "
+                   "lattice alone costs. The floor is what is left on the finest lattice. "
+                   "Vertical lines: what --bins auto takes for these cells.",
+                   result.trials)},
   };
 }
 

@@ -1,10 +1,11 @@
+#include <cctype>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include <fmt/format.h>
 
-#include "chart_style.hpp"
-#include "svg_chart.hpp"
+#include "chart.hpp"
 #include "sweep_result.hpp"
 #include "sweep_words.hpp"
 
@@ -35,6 +36,10 @@ document.querySelectorAll("th").forEach(function (head) {
 )";
 
 constexpr const char* page_style = R"(
+:root { --ground: #ffffff; --ink: #1c1c1c; --faint: #6b6b6b; --grid: #dcdcdc;
+  --good: #00805f; --bad: #c04e00; }
+@media (prefers-color-scheme: dark) { :root { --ground: #15181c; --ink: #ececec; --faint: #a8a8a8;
+  --grid: #353a41; --good: #2fc79a; --bad: #f0873c; } }
 body { margin: 2rem auto; max-width: 70rem; padding: 0 1rem; background: var(--ground);
   color: var(--ink); font: 15px/1.5 system-ui, 'DejaVu Sans', sans-serif; }
 h1 { font-size: 1.6rem; margin: 0 0 0.4rem; }
@@ -44,7 +49,10 @@ dt { color: var(--faint); }
 dd { margin: 0; overflow-wrap: anywhere; }
 figure { margin: 0; }
 figcaption, .note { color: var(--faint); font-size: 0.9em; }
-svg { width: 100%; height: auto; display: block; }
+.chart { position: relative; background: #ffffff; border-radius: 6px; }
+.chart img { width: 100%; display: block; }
+.chart svg { position: absolute; inset: 0; width: 100%; height: 100%; }
+.chart circle { fill: transparent; }
 .wide { overflow-x: auto; }
 table { border-collapse: collapse; font-size: 12px; font-variant-numeric: tabular-nums; }
 th, td { padding: 0.2rem 0.4rem; text-align: right; white-space: nowrap; }
@@ -54,8 +62,61 @@ th[aria-sort=ascending]::after { content: ' \2191'; }
 th[aria-sort=descending]::after { content: ' \2193'; }
 tbody tr { border-bottom: 1px solid var(--grid); }
 .text { text-align: left; }
-.yes { color: var(--c2); font-weight: 600; } .no { color: var(--c1); font-weight: 600; }
+.yes { color: var(--good); font-weight: 600; } .no { color: var(--bad); font-weight: 600; }
 )";
+
+/// Text as it may stand in XML, between tags or in quotes.
+std::string xml_escaped(const std::string& text) {
+  std::string escaped;
+  for (const char c : text) {
+    switch (c) {
+      case '&':
+        escaped += "&amp;";
+        break;
+      case '<':
+        escaped += "&lt;";
+        break;
+      case '>':
+        escaped += "&gt;";
+        break;
+      case '"':
+        escaped += "&quot;";
+        break;
+      default:
+        escaped += c;
+    }
+  }
+  return escaped;
+}
+
+/// Bytes as they may stand in a URL.
+std::string url_escaped(const std::string& bytes) {
+  std::string escaped;
+  for (const char c : bytes) {
+    const bool plain = std::isalnum(static_cast<unsigned char>(c)) != 0 ||
+                       std::string_view(" -.,;:=/()").find(c) != std::string_view::npos;
+    escaped += plain ? std::string(1, c) : fmt::format("%{:02X}", static_cast<unsigned char>(c));
+  }
+  return escaped;
+}
+
+/// The chart as a picture in the page. Invisible discs over its marks show their titles under the
+/// pointer.
+std::string figure_of(const NamedChart& chart) {
+  const ChartPicture picture = draw_chart(chart.chart, PictureFormat::svg);
+  std::string spots;
+  for (const ChartSpot& spot : picture.spots) {
+    spots +=
+        fmt::format("<circle cx=\"{:.0f}\" cy=\"{:.0f}\" r=\"11\"><title>{}</title></circle>\n",
+                    spot.at_px.x, spot.at_px.y, xml_escaped(spot.title));
+  }
+  return fmt::format(
+      "<h2>{0}</h2>\n<figure>\n<div class=\"chart\"><img alt=\"{0}\" "
+      "src=\"data:image/svg+xml,{1}\"/>\n<svg viewBox=\"0 0 {2} {3}\">\n{4}</svg></div>\n"
+      "<figcaption>{5}</figcaption>\n</figure>\n",
+      xml_escaped(chart.title), url_escaped(picture.bytes), picture.width_px, picture.height_px,
+      spots, xml_escaped(chart.caption));
+}
 
 /// A table's cell, sorted by `value`.
 std::string cell(const std::string& text, double value) {
@@ -208,9 +269,9 @@ std::string page_of(const SweepResult& result, const nlohmann::ordered_json& fac
   std::string text = fmt::format(
       "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\"/>\n"
       "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\"/>\n"
-      "<title>Palpate: speed against error</title>\n<style>{}{}</style>\n</head>\n<body>\n"
+      "<title>Palpate: speed against error</title>\n<style>{}</style>\n</head>\n<body>\n"
       "<h1>Palpate: speed against error</h1>\n<dl>\n",
-      chart_style(), page_style);
+      page_style);
   for (const auto& [name, value] : facts.items()) {
     text += fmt::format("<dt>{}</dt><dd>{}</dd>\n", xml_escaped(name),
                         xml_escaped(value.is_string() ? value.get<std::string>() : value.dump()));
@@ -220,8 +281,7 @@ std::string page_of(const SweepResult& result, const nlohmann::ordered_json& fac
     text += "<h2>Verdicts</h2>\n" + verdicts_of(result);
   }
   for (const NamedChart& chart : charts_of(result)) {
-    text += fmt::format("<h2>{}</h2>\n<figure>\n{}<figcaption>{}</figcaption>\n</figure>\n",
-                        xml_escaped(chart.title), chart.svg, xml_escaped(chart.caption));
+    text += figure_of(chart);
   }
   text += "<h2>Where more bins stop helping</h2>\n<ul>\n";
   for (const CellFinding& finding : result.findings) {

@@ -8,6 +8,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "chart.hpp"
 #include "report.hpp"
 #include "sweep_limits.hpp"
 #include "sweep_paths.hpp"
@@ -70,8 +71,7 @@ std::string page_of(const SweepResult& result, const nlohmann::ordered_json& fac
 struct NamedChart {
   std::string name;
   std::string title;
-  std::string svg;      ///< for a page that has chart_style()
-  std::string file;     ///< by itself
+  Chart chart;
   std::string caption;  ///< for people who read the chart
 };
 inline constexpr std::array chart_names{"front", "precision", "bins"};

@@ -6,6 +6,7 @@
 #include <numbers>
 #include <vector>
 
+#include <cairo-svg.h>
 #include <fmt/format.h>
 
 #include "palpate/error.hpp"
@@ -37,10 +38,26 @@ void trace(cairo_t* context, std::span<const glm::dvec2> points) {
   }
 }
 
+cairo_status_t append(void* bytes, const unsigned char* data, unsigned int size) {
+  static_cast<std::string*>(bytes)->append(reinterpret_cast<const char*>(data), size);
+  return CAIRO_STATUS_SUCCESS;
+}
+
+cairo_surface_t* svg_surface(std::string* bytes, int width_px, int height_px) {
+  cairo_surface_t* surface =
+      cairo_svg_surface_create_for_stream(append, bytes, width_px, height_px);
+  cairo_svg_surface_set_document_unit(surface, CAIRO_SVG_UNIT_PX);
+  return surface;
+}
+
 }  // namespace
 
-Canvas::Canvas(int width_px, int height_px)
-    : surface_(cairo_image_surface_create(CAIRO_FORMAT_RGB24, width_px, height_px)),
+Canvas::Canvas(int width_px, int height_px, PictureFormat format)
+    : format_(format),
+      svg_(std::make_unique<std::string>()),
+      surface_(format == PictureFormat::svg
+                   ? svg_surface(svg_.get(), width_px, height_px)
+                   : cairo_image_surface_create(CAIRO_FORMAT_RGB24, width_px, height_px)),
       context_(cairo_create(surface_.get())) {
   cairo_t* context = context_.get();
   const std::string what = fmt::format("picture of {} x {} pixels", width_px, height_px);
@@ -116,6 +133,9 @@ void Canvas::stroke(const Pen& pen) {
   if (pen.dashed) {
     const double dash[] = {4.0 * pen.width_px, 3.0 * pen.width_px};
     cairo_set_dash(context, dash, 2, 0.0);
+  } else if (pen.dotted) {
+    const double dots[] = {1.0 * pen.width_px, 2.0 * pen.width_px};
+    cairo_set_dash(context, dots, 2, 0.0);
   } else {
     cairo_set_dash(context, nullptr, 0, 0.0);
   }
@@ -138,6 +158,12 @@ void Canvas::polygon(std::span<const glm::dvec2> corners, const Pen& pen) {
   trace(context_.get(), corners);
   cairo_close_path(context_.get());
   stroke(pen);
+}
+
+void Canvas::fill(std::span<const glm::dvec2> corners, const Colour& colour) {
+  trace(context_.get(), corners);
+  set_source(context_.get(), colour);
+  cairo_fill(context_.get());
 }
 
 void Canvas::circle(glm::dvec2 centre, double radius_px, const Pen& pen) {
@@ -199,12 +225,13 @@ Canvas::Clip::Clip(Canvas& canvas, const Box& box) : context_(canvas.context_.ge
 
 Canvas::Clip::~Clip() { cairo_restore(context_); }
 
-std::string Canvas::encode_png() const {
+std::string Canvas::encode() {
   require(cairo_status(context_.get()), "picture");
-  const auto append = [](void* bytes, const unsigned char* data, unsigned int size) {
-    static_cast<std::string*>(bytes)->append(reinterpret_cast<const char*>(data), size);
-    return CAIRO_STATUS_SUCCESS;
-  };
+  if (format_ == PictureFormat::svg) {
+    cairo_surface_finish(surface_.get());
+    require(cairo_surface_status(surface_.get()), "picture");
+    return *svg_;
+  }
   std::string bytes;
   require(cairo_surface_write_to_png_stream(surface_.get(), append, &bytes), "picture");
   return bytes;

@@ -10,6 +10,7 @@
 #include <glm/vec2.hpp>
 
 #include "palette.hpp"
+#include "picture_format.hpp"
 
 namespace palpate {
 
@@ -36,6 +37,7 @@ struct Pen {
   Colour colour = ink;
   double width_px = 2.0;
   bool dashed = false;
+  bool dotted = false;
   double halo_px = 0.0;  ///< on each side
 };
 
@@ -43,7 +45,7 @@ struct Pen {
 class Canvas {
  public:
   /// @throws Error (Fault::system) if there is no memory for that many pixels.
-  Canvas(int width_px, int height_px);
+  Canvas(int width_px, int height_px, PictureFormat format = PictureFormat::png);
 
   /// `at` is the left end, centre or right end of the baseline. Bytes that are not UTF-8 and
   /// control characters show as '?'.
@@ -57,6 +59,7 @@ class Canvas {
 
   void line(std::span<const glm::dvec2> points, const Pen& pen);
   void polygon(std::span<const glm::dvec2> corners, const Pen& pen);
+  void fill(std::span<const glm::dvec2> corners, const Colour& colour);
   void circle(glm::dvec2 centre, double radius_px, const Pen& pen);
   void disc(glm::dvec2 centre, double radius_px, const Colour& colour);
   void frame(const Box& box, const Pen& pen);
@@ -75,9 +78,9 @@ class Canvas {
     cairo_t* context_;
   };
 
-  /// The bytes of a PNG file.
+  /// The bytes of a file of the canvas' format. After an SVG file, nothing more can be drawn.
   /// @throws Error (Fault::system) if anything drawn so far failed.
-  std::string encode_png() const;
+  std::string encode();
 
  private:
   struct Destroy {
@@ -89,6 +92,8 @@ class Canvas {
   void show(const std::string& text, Align align, const Colour& colour);
   void stroke(const Pen& pen);
 
+  PictureFormat format_;
+  std::unique_ptr<std::string> svg_;  ///< outlives the surface, which writes to it
   std::unique_ptr<cairo_surface_t, Destroy> surface_;
   std::unique_ptr<cairo_t, Destroy> context_;
 };

@@ -108,7 +108,7 @@ std::string draw_maps(std::span<const OccupancyGrid> maps) {
   draw_evidence_bar(canvas,
                     {margin_px + content - bar_px - bar_inset_px, legend_top + 36.0, bar_px, 20.0},
                     scale);
-  return canvas.encode_png();
+  return canvas.encode();
 }
 
 }  // namespace palpate

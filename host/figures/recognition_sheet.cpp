@@ -299,7 +299,7 @@ std::string draw_recognition(const RecognitionSheet& sheet) {
   draw_belief(canvas, sheet);
   draw_title(canvas, plot(2), "What is it? Belief over identity");
   draw_identity(canvas, plot(2), sheet.labels, sheet.identity);
-  return canvas.encode_png();
+  return canvas.encode();
 }
 
 }  // namespace palpate

@@ -4,8 +4,6 @@
 
 #include <gtest/gtest.h>
 
-#include "svg_chart.hpp"
-
 namespace palpate::bench {
 namespace {
 
@@ -72,37 +70,6 @@ TEST(Knee, IsTheFirstRunThatNoFinerOneGainsOver) {
   const std::vector<std::vector<TrialErrors>> missing = {run_of({1.0, -1.0}), run_of({1.0, 1.0}),
                                                          run_of({1.0, 1.0})};
   EXPECT_EQ(knee_of(missing, PoseKind::mode), 1U) << "bins that miss a trial do not suffice";
-}
-
-std::size_t count_of(const std::string& text, const std::string& part) {
-  std::size_t count = 0;
-  for (std::size_t at = text.find(part); at != std::string::npos; at = text.find(part, at + 1)) {
-    ++count;
-  }
-  return count;
-}
-
-TEST(Chart, DrawsEveryPointThatALogarithmicAxisHolds) {
-  Chart chart{.title = "a < b & c",
-              .x_label = "x",
-              .y_label = "y",
-              .x_tick = [](double x) { return std::to_string(x); },
-              .y_tick = [](double y) { return std::to_string(y); },
-              .series = {{.name = "one",
-                          .points = {{1.0, 1.0, "first", "title \"1\""},
-                                     {1e3, 1e-3, "second", "title 2"},
-                                     {0.0, 1.0, "none", "on no such axis"},
-                                     {1.0, -1.0, "none", "on no such axis"}}}}};
-  const std::string svg = svg_of(chart);
-  // The legend has a mark, too.
-  EXPECT_EQ(count_of(svg, "<circle"), 3U);
-  EXPECT_EQ(svg.find("no such axis"), std::string::npos);
-  EXPECT_NE(svg.find("a &lt; b &amp; c"), std::string::npos);
-  EXPECT_NE(svg.find("title &quot;1&quot;"), std::string::npos);
-  EXPECT_EQ(svg.find("nan"), std::string::npos);
-  chart.series.clear();
-  EXPECT_EQ(svg_of(chart).find("nan"), std::string::npos) << "an empty chart has axes";
-  EXPECT_NE(svg_file(chart).find("xmlns"), std::string::npos);
 }
 
 }  // namespace

@@ -12,7 +12,7 @@ namespace palpate {
 namespace {
 
 TEST(Canvas, IsWhiteAndOfTheSizeAskedFor) {
-  const Picture picture = decode(Canvas(31, 17).encode_png());
+  const Picture picture = decode(Canvas(31, 17).encode());
   EXPECT_EQ(picture.width, 31);
   EXPECT_EQ(picture.height, 17);
   for (const std::uint32_t pixel : picture.pixels) {
@@ -35,7 +35,7 @@ TEST(Canvas, FillsCellsFromTheLowestRowUp) {
   const auto colour = [](int i, int j) { return Colour{i / 3.0, j / 2.0, 0.2}; };
   Canvas canvas(60, 50);
   canvas.cells({10.0, 5.0, 40.0, 30.0}, nx, ny, colour);
-  const Picture picture = decode(canvas.encode_png());
+  const Picture picture = decode(canvas.encode());
   // Every pixel of the box has its cell's colour, to the very edge, and none outside has.
   for (int y = 0; y < picture.height; ++y) {
     for (int x = 0; x < picture.width; ++x) {
@@ -50,7 +50,7 @@ TEST(Canvas, AveragesCellsSmallerThanAPixel) {
   Canvas canvas(40, 40);
   canvas.cells({0.0, 0.0, 40.0, 40.0}, 400, 400,
                [](int i, int j) { return (i + j) % 2 == 0 ? white : Colour{}; });
-  const Picture picture = decode(canvas.encode_png());
+  const Picture picture = decode(canvas.encode());
   for (int y = 1; y < 39; ++y) {
     for (int x = 1; x < 39; ++x) {
       // Half white, half black; the filter's weights differ a little from pixel to pixel.
@@ -66,12 +66,12 @@ TEST(Canvas, ClipsWhileTheClipLives) {
     const Canvas::Clip clip(canvas, {10.0, 0.0, 10.0, 20.0});
     canvas.line(across, {.colour = {}, .width_px = 4.0});
   }
-  const Picture clipped = decode(canvas.encode_png());
+  const Picture clipped = decode(canvas.encode());
   EXPECT_EQ(clipped.at(15, 10), 0u);
   EXPECT_EQ(clipped.at(5, 10), 0xFFFFFFu);
   EXPECT_EQ(clipped.at(25, 10), 0xFFFFFFu);
   canvas.line(across, {.colour = {}, .width_px = 4.0});
-  EXPECT_EQ(decode(canvas.encode_png()).at(25, 10), 0u);
+  EXPECT_EQ(decode(canvas.encode()).at(25, 10), 0u);
 }
 
 TEST(Canvas, ShortensTextToTheWidth) {
@@ -92,7 +92,7 @@ TEST(Canvas, GoesOnAfterTextThatIsNotUtf8) {
   Canvas canvas(40, 40);
   canvas.text("\xC3\x28 \xFF", {0.0, 20.0}, {});
   canvas.disc({20.0, 30.0}, 5.0, {});
-  EXPECT_EQ(decode(canvas.encode_png()).at(20, 30), 0u);
+  EXPECT_EQ(decode(canvas.encode()).at(20, 30), 0u);
 }
 
 }  // namespace

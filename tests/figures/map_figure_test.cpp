@@ -29,7 +29,7 @@ TEST(MapLayer, ColoursEveryCellByItsDistanceFromThePrior) {
   const EvidenceScale scale{4.0};
   Canvas canvas(60, 40);
   draw_cells(canvas, {{0.0, 0.0, 60.0, 40.0}, lower_edge_mm(map), upper_edge_mm(map)}, map, scale);
-  const Picture picture = decode(canvas.encode_png());
+  const Picture picture = decode(canvas.encode());
   EXPECT_EQ(picture.at(10, 30), 0xFFFFFFu);
   EXPECT_EQ(picture.at(30, 30), rgb(diverging(1.0)));
   EXPECT_EQ(picture.at(50, 30), rgb(diverging(-1.0)));

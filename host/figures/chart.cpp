@@ -1,0 +1,354 @@
+#include "chart.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "axes.hpp"
+#include "canvas.hpp"
+#include "chart_axis.hpp"
+
+namespace palpate {
+
+namespace {
+
+constexpr double width_px = 1440.0;
+constexpr double plot_height_px = 640.0;
+constexpr double right_px = 36.0;
+constexpr double below_px = 72.0;
+constexpr double row_px = 32.0;  // of the legend
+constexpr double sample_px = 64.0;
+constexpr double radius_px = 7.5;
+
+Colour paler(const Colour& colour, double share) {
+  const auto mix = [&](double part) { return share * part + (1.0 - share); };
+  return {mix(colour.red), mix(colour.green), mix(colour.blue)};
+}
+
+/// The corners of a mark's outline; none for a circle.
+std::vector<glm::dvec2> corners_of(Mark mark, glm::dvec2 at) {
+  const double r = radius_px;
+  switch (mark) {
+    case Mark::square:
+      return {at + glm::dvec2(-r, -r), at + glm::dvec2(r, -r), at + glm::dvec2(r, r),
+              at + glm::dvec2(-r, r)};
+    case Mark::triangle:
+      return {at + glm::dvec2(0.0, -1.2 * r), at + glm::dvec2(1.2 * r, 0.9 * r),
+              at + glm::dvec2(-1.2 * r, 0.9 * r)};
+    case Mark::diamond:
+      return {at + glm::dvec2(0.0, -1.3 * r), at + glm::dvec2(1.3 * r, 0.0),
+              at + glm::dvec2(0.0, 1.3 * r), at + glm::dvec2(-1.3 * r, 0.0)};
+    default:
+      return {};
+  }
+}
+
+void draw_mark(Canvas& canvas, const ChartSeries& series, glm::dvec2 at) {
+  const Colour inside = series.fill == MarkFill::solid  ? series.colour
+                        : series.fill == MarkFill::pale ? paler(series.colour, 0.4)
+                                                        : white;
+  // A white edge tells solid marks apart that lie on each other.
+  const Pen edge{.colour = series.fill == MarkFill::solid ? white : series.colour,
+                 .width_px = series.fill == MarkFill::solid ? 1.5 : 2.2};
+  if (series.mark == Mark::circle) {
+    canvas.disc(at, radius_px, inside);
+    canvas.circle(at, radius_px, edge);
+  } else if (series.mark == Mark::cross) {
+    const double arm = 1.6 * radius_px;
+    canvas.line(std::array{at - glm::dvec2(arm, 0.0), at + glm::dvec2(arm, 0.0)},
+                {.colour = series.colour, .width_px = 3.0});
+    canvas.line(std::array{at - glm::dvec2(0.0, arm), at + glm::dvec2(0.0, arm)},
+                {.colour = series.colour, .width_px = 3.0});
+  } else if (series.mark != Mark::none) {
+    const std::vector<glm::dvec2> corners = corners_of(series.mark, at);
+    canvas.fill(corners, inside);
+    canvas.polygon(corners, edge);
+  }
+}
+
+Pen pen_of(const ChartSeries& series) {
+  return {.colour = series.colour,
+          .width_px = 3.0,
+          .dashed = series.line == Line::dashed,
+          .dotted = series.line == Line::dotted};
+}
+
+bool meet(const Box& a, const Box& b) {
+  return a.left < b.right() && b.left < a.right() && a.top < b.bottom() && b.top < a.bottom();
+}
+
+bool free_of(const Box& box, const std::vector<Box>& taken) {
+  return std::none_of(taken.begin(), taken.end(),
+                      [&](const Box& other) { return meet(box, other); });
+}
+
+/// The legend, in rows of as many entries as fit, each as wide as the widest.
+struct Legend {
+  std::vector<const ChartSeries*> entries;
+  double column_px = 0.0;
+  std::size_t rows = 0;
+  std::size_t columns = 1;
+
+  Legend(Canvas& canvas, const Chart& chart, double room_px) {
+    for (const ChartSeries& series : chart.series) {
+      if (!series.name.empty()) {
+        entries.push_back(&series);
+        column_px = std::max(column_px, sample_px + 48.0 + canvas.text_width(series.name, body));
+      }
+    }
+    if (!entries.empty()) {
+      const auto most = std::max<std::size_t>(1, static_cast<std::size_t>(room_px / column_px));
+      rows = (entries.size() + most - 1) / most;
+      columns = (entries.size() + rows - 1) / rows;
+    }
+  }
+
+  double height_px() const { return row_px * static_cast<double>(rows); }
+
+  void draw(Canvas& canvas, glm::dvec2 corner) const {
+    for (std::size_t i = 0; i < entries.size(); ++i) {
+      const ChartSeries& series = *entries[i];
+      const glm::dvec2 left =
+          corner + glm::dvec2(column_px * static_cast<double>(i % columns),
+                              row_px * (static_cast<double>(i / columns) + 0.5));
+      const glm::dvec2 right = left + glm::dvec2(sample_px, 0.0);
+      if (series.line != Line::none) {
+        canvas.line(std::array{left, right}, pen_of(series));
+      }
+      draw_mark(canvas, series, 0.5 * (left + right));
+      canvas.text(series.name, right + glm::dvec2(12.0, 7.0), body);
+    }
+  }
+};
+
+/// What lies within the frame of the axes.
+class Plot {
+ public:
+  Plot(Canvas& canvas, const AxisSpan& x, const AxisSpan& y, const Box& box)
+      : canvas_(canvas),
+        x_(x),
+        y_(y),
+        view_{.box = box, .lower = {x.lower, y.lower}, .upper = {x.upper, y.upper}} {}
+
+  const View& view() const { return view_; }
+
+  void grid() {
+    const auto lines = [&](const AxisSpan& axis, bool vertical) {
+      for (const double place : axis.fine) {
+        rule(place, vertical, {.colour = {0.93, 0.93, 0.93}, .width_px = 1.0});
+      }
+      for (const Tick& tick : axis.ticks) {
+        rule(tick.value, vertical, {.colour = {0.84, 0.84, 0.84}, .width_px = 1.5});
+      }
+    };
+    lines(x_, true);
+    lines(y_, false);
+  }
+
+  void rules(const std::vector<ChartRule>& rules) {
+    for (const ChartRule& each : rules) {
+      const AxisSpan& axis = each.vertical ? x_ : y_;
+      const double place = axis.place(each.at);
+      rule(place, each.vertical, {.colour = each.colour, .width_px = 2.2, .dotted = true});
+      const double text_px = canvas_.text_width(each.label, small);
+      const Box& box = view_.box;
+      Box label{.left = box.left + 8.0, .top = 0.0, .width = text_px, .height = 22.0};
+      if (each.vertical) {
+        const double x = view_.pixel({place, y_.lower}).x;
+        label.left = x + 6.0 + text_px > box.right() ? x - 6.0 - text_px : x + 6.0;
+        label.top = box.top + 6.0;
+      } else {
+        label.top = view_.pixel({x_.lower, place}).y - 26.0;
+      }
+      while (!free_of(label, taken_)) {
+        label.top += 24.0;
+      }
+      taken_.push_back(label);
+      canvas_.text(each.label, {label.left, label.top + 17.0}, small, Align::left, each.colour);
+    }
+  }
+
+  void intervals(const ChartSeries& series) {
+    std::vector<glm::dvec2> lower;
+    std::vector<glm::dvec2> upper;
+    for (const ChartPoint& point : series.points) {
+      if (!drawn(point) || !y_.has(point.high) || !(point.low <= point.high)) {
+        continue;
+      }
+      // An interval that reaches below what a logarithmic axis has ends at the axis.
+      lower.push_back(
+          view_.pixel({x_.place(point.x), y_.has(point.low) ? y_.place(point.low) : y_.lower}));
+      upper.push_back(view_.pixel({x_.place(point.x), y_.place(point.high)}));
+    }
+    if (series.interval == IntervalShape::band) {
+      upper.insert(upper.end(), lower.rbegin(), lower.rend());
+      canvas_.fill(upper, {series.colour.red, series.colour.green, series.colour.blue, 0.12});
+      return;
+    }
+    for (std::size_t i = 0; i < lower.size(); ++i) {
+      canvas_.line(std::array{lower[i], upper[i]}, {.colour = series.colour, .width_px = 2.0});
+      for (const glm::dvec2& end : {lower[i], upper[i]}) {
+        canvas_.line(std::array{end - glm::dvec2(5.0, 0.0), end + glm::dvec2(5.0, 0.0)},
+                     {.colour = series.colour, .width_px = 2.0});
+      }
+    }
+  }
+
+  void line(const ChartSeries& series) {
+    std::vector<glm::dvec2> run;
+    const auto draw = [&] {
+      if (series.line != Line::none && run.size() > 1) {
+        canvas_.line(run, pen_of(series));
+      }
+      run.clear();
+    };
+    for (const ChartPoint& point : series.points) {
+      if (drawn(point)) {
+        run.push_back(pixel(point));
+      } else {
+        draw();
+      }
+    }
+    draw();
+  }
+
+  void marks(const ChartSeries& series) {
+    for (std::size_t i = 0; i < series.points.size(); i += series.mark_every) {
+      const ChartPoint& point = series.points[i];
+      if (!drawn(point)) {
+        continue;
+      }
+      const glm::dvec2 at = pixel(point);
+      draw_mark(canvas_, series, at);
+      if (!point.title.empty()) {
+        spots_.push_back({at, point.title});
+      }
+      if (series.mark != Mark::none) {
+        taken_.push_back({at.x - radius_px, at.y - radius_px, 2.0 * radius_px, 2.0 * radius_px});
+      }
+    }
+  }
+
+  void labels(const ChartSeries& series) {
+    for (const ChartPoint& point : series.points) {
+      if (drawn(point) && !point.label.empty()) {
+        label(point.label, pixel(point), series.colour);
+      }
+    }
+  }
+
+  std::vector<ChartSpot> spots() { return std::move(spots_); }
+
+ private:
+  bool drawn(const ChartPoint& point) const { return x_.has(point.x) && y_.has(point.y); }
+  glm::dvec2 pixel(const ChartPoint& point) const {
+    return view_.pixel({x_.place(point.x), y_.place(point.y)});
+  }
+
+  void rule(double place, bool vertical, const Pen& pen) {
+    const Box& box = view_.box;
+    const glm::dvec2 at = view_.pixel({place, place});
+    canvas_.line(vertical ? std::array{glm::dvec2(at.x, box.top), glm::dvec2(at.x, box.bottom())}
+                          : std::array{glm::dvec2(box.left, at.y), glm::dvec2(box.right(), at.y)},
+                 pen);
+  }
+
+  /// Writes the text where it fits beside the point without covering a mark or another label, or
+  /// nowhere.
+  void label(const std::string& text, glm::dvec2 at, const Colour& colour) {
+    const double w = canvas_.text_width(text, small);
+    constexpr double h = 20.0;
+    constexpr double gap = radius_px + 4.0;
+    const std::array<glm::dvec2, 6> corners{{{at.x + gap, at.y - h / 2},
+                                             {at.x - w / 2, at.y - gap - h},
+                                             {at.x - w / 2, at.y + gap},
+                                             {at.x - gap - w, at.y - h / 2},
+                                             {at.x + gap, at.y - gap - h / 2},
+                                             {at.x - gap - w, at.y + gap - h / 2}}};
+    for (const glm::dvec2& corner : corners) {
+      const Box box{corner.x, corner.y, w, h};
+      const Box& all = view_.box;
+      if (box.left >= all.left && box.right() <= all.right() && box.top >= all.top &&
+          box.bottom() <= all.bottom() && free_of(box, taken_)) {
+        taken_.push_back(box);
+        canvas_.text(text, {box.left, box.bottom() - 4.0}, small, Align::left, colour);
+        return;
+      }
+    }
+  }
+
+  Canvas& canvas_;
+  const AxisSpan& x_;
+  const AxisSpan& y_;
+  View view_;
+  std::vector<Box> taken_;  ///< by marks and text
+  std::vector<ChartSpot> spots_;
+};
+
+AxisSpan span_of_axis(const Chart& chart, bool along_x) {
+  std::vector<double> values;
+  for (const ChartSeries& series : chart.series) {
+    for (const ChartPoint& point : series.points) {
+      if (along_x) {
+        values.push_back(point.x);
+      } else {
+        values.insert(values.end(), {point.y, point.low, point.high});
+      }
+    }
+  }
+  for (const ChartRule& rule : chart.rules) {
+    if (rule.vertical == along_x) {
+      values.push_back(rule.at);
+    }
+  }
+  return span_of(along_x ? chart.x : chart.y, values);
+}
+
+}  // namespace
+
+ChartPicture draw_chart(const Chart& chart, PictureFormat format) {
+  const AxisSpan x = span_of_axis(chart, true);
+  const AxisSpan y = span_of_axis(chart, false);
+  Canvas ruler(1, 1);  // measures text before the picture's size is known
+  double widest_px = 0.0;
+  for (const Tick& tick : y.ticks) {
+    widest_px = std::max(widest_px, ruler.text_width(tick.label, small));
+  }
+  const double left_px = std::max(92.0, widest_px + 50.0);
+  const double plot_px = width_px - left_px - right_px;
+  const Legend legend(ruler, chart, plot_px);
+  const double title_px = chart.title.empty() ? 0.0 : 44.0;
+  const double top_px = 16.0 + title_px + legend.height_px() + 12.0;
+
+  const int height = static_cast<int>(top_px + plot_height_px + below_px);
+  Canvas canvas(static_cast<int>(width_px), height, format);
+  if (!chart.title.empty()) {
+    canvas.text(chart.title, {left_px, 16.0 + heading.size_px}, heading);
+  }
+  legend.draw(canvas, {left_px, 16.0 + title_px});
+  Plot plot(canvas, x, y, {left_px, top_px, plot_px, plot_height_px});
+  plot.grid();
+  {
+    const Canvas::Clip inside(canvas, plot.view().box);
+    for (const ChartSeries& series : chart.series) {
+      plot.intervals(series);
+    }
+    for (const ChartSeries& series : chart.series) {
+      plot.line(series);
+    }
+  }
+  draw_axes(canvas, plot.view(), x.ticks, y.ticks, chart.x.label, chart.y.label);
+  for (const ChartSeries& series : chart.series) {
+    plot.marks(series);
+  }
+  plot.rules(chart.rules);
+  for (const ChartSeries& series : chart.series) {
+    plot.labels(series);
+  }
+  return {.bytes = canvas.encode(),
+          .width_px = static_cast<int>(width_px),
+          .height_px = height,
+          .spots = plot.spots()};
+}
+
+}  // namespace palpate

@@ -1,0 +1,7 @@
+#pragma once
+
+namespace palpate {
+
+enum class PictureFormat { png, svg };
+
+}  // namespace palpate
