@@ -20,6 +20,8 @@ namespace {
 
 constexpr std::string_view replay = "replay:";
 constexpr std::string_view simulate = "simulate:";
+const std::vector<std::string_view> simulate_keys = {"rate",  "array",  "seed", "touches",
+                                                     "noise", "object", "speed"};
 
 // "WHAT,key=value,key=value" taken apart, and what each key says.
 class SourceName {
@@ -57,6 +59,7 @@ class SourceName {
   }
 
   const std::string& what() const { return what_; }
+  bool has(std::string_view key) const { return options_.contains(key); }
 
   template <typename Number>
   std::optional<Number> number(std::string_view key, Number least, Number most) const {
@@ -152,6 +155,15 @@ bool is_virtual_sensor(std::string_view name) {
   return name.starts_with(replay) || name.starts_with(simulate);
 }
 
+bool is_endless_flood(const std::string& name) {
+  if (!name.starts_with(simulate)) {
+    return false;
+  }
+  const SourceName source(name, simulate, simulate_keys);
+  constexpr double fast = 100.0;
+  return !source.has("touches") && source.speed().value_or(fast + 1.0) > fast;
+}
+
 std::unique_ptr<Sensor> open_virtual_sensor(const std::string& name) {
   if (name.starts_with(replay)) {
     const SourceName source(name, replay, {"speed"});
@@ -160,8 +172,7 @@ std::unique_ptr<Sensor> open_virtual_sensor(const std::string& name) {
   if (!name.starts_with(simulate)) {
     throw Error(Fault::input, fmt::format("sensor {}: write replay:FILE or simulate:SHAPE", name));
   }
-  const SourceName source(name, simulate,
-                          {"rate", "array", "seed", "touches", "noise", "object", "speed"});
+  const SourceName source(name, simulate, simulate_keys);
   SimulatedSensorOptions options;
   options.rate_hz = source.number("rate", 1.0, 1e5).value_or(options.rate_hz);
   options.seed = source.number<std::uint64_t>("seed", 0, UINT64_MAX).value_or(options.seed);

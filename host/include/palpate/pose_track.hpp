@@ -73,6 +73,8 @@ class PoseTrack {
 /// FIFO once 65,536 wait; while the board is gone, all but those of the last second are forgotten.
 class PosedSensor : public Sensor {
  public:
+  static constexpr double usual_gap_s = 0.1;
+
   /// What came from the robot, and since start() its frames.
   struct Poses {
     std::uint64_t read = 0;
@@ -88,8 +90,8 @@ class PosedSensor : public Sensor {
   /// @param poses path of a file or FIFO, or "-": standard input
   /// @param complain called from within next(); may be empty
   /// @throws Error (Fault::input) where it cannot be read, or a line of a file is no pose
-  PosedSensor(std::unique_ptr<Sensor> sensor, const std::string& poses, double largest_gap_s = 0.1,
-              Complaint complain = {});
+  PosedSensor(std::unique_ptr<Sensor> sensor, const std::string& poses,
+              double largest_gap_s = usual_gap_s, Complaint complain = {});
   ~PosedSensor() override;
 
   const SensorDescription& description() const override;
