@@ -64,7 +64,7 @@ struct TouchDetector::Impl {
   std::optional<DetectedTouch> best;  // of the phases of this touch that are over
   std::vector<double> pressure;       // [e] of the frame under way, above the baseline; NaN: none
   std::optional<double> last_s;       // time of the frame before
-  double released_s = 0.0;
+  std::optional<double> released_s;   // end of the touch before
   bool touching = false;
 };
 
@@ -110,7 +110,7 @@ std::optional<DetectedTouch> TouchDetector::Impl::add(const Frame& frame) {
     load += std::max(0.0, p - options.release);
   }
   if (!touching && largest <= options.onset) {
-    if (largest < options.release && time_s - released_s > rest_s) {
+    if (largest < options.release && (!released_s || time_s - *released_s > rest_s)) {
       follow_drift(smooth, elapsed_s);
     }
     return ended;
@@ -184,10 +184,10 @@ TouchDetector& TouchDetector::operator=(TouchDetector&&) noexcept = default;
 std::optional<DetectedTouch> TouchDetector::add(const Frame& frame) { return impl_->add(frame); }
 
 std::optional<DetectedTouch> TouchDetector::finish() {
-  const double now_s = impl_->last_s.value_or(0.0);
-  std::optional<DetectedTouch> touch = impl_->end_touch(now_s);
+  std::optional<DetectedTouch> touch = impl_->end_touch(0.0);
   impl_->smoother.reset();
   impl_->last_s.reset();
+  impl_->released_s.reset();  // the next stream may be of any time
   return touch;
 }
 

@@ -217,6 +217,25 @@ TEST(UnknownReading, BaselineFollowsWhatIsReadBelowItByTheOnsetAtMost) {
   EXPECT_NEAR(detector.baseline()[0], -4.0, 0.01);
 }
 
+// After finish() another stream may begin, at any time.
+TEST(UnknownReading, BaselineFollowsInAStreamOfEarlierTimes) {
+  TouchDetector detector({.drift_s = 6.0}, {}, {});
+  const auto drifted = [](double) { return std::vector<double>{0.5}; };
+  std::vector<Frame> frames = Stream{.noise = 0.0}.frames(6.0, drifted);
+  for (Frame& frame : frames) {
+    detector.add(frame);
+  }
+  const double once = detector.baseline()[0];
+  detector.finish();
+  for (Frame& frame : frames) {
+    frame.host_time_s -= 1e6;
+    detector.add(frame);
+  }
+  // 1 - 1/e, and as much of the rest; each frame a step of 0.01 / 6.
+  EXPECT_NEAR(once, 0.5 * (1.0 - std::exp(-1.0)), 1e-3);
+  EXPECT_NEAR(detector.baseline()[0], 0.5 * (1.0 - std::exp(-2.0)), 1e-3);
+}
+
 TEST(UnknownReading, BaselinesBeyondFloat32AreRefused) {
   expect_named(input_error([] { TouchDetector({}, {1e300}, {}); }), {"baseline", "float32"});
   EXPECT_NO_THROW(TouchDetector({}, {nan, 1.0}, {0, 1})) << "a dead element may have none";
