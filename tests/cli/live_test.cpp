@@ -147,6 +147,7 @@ TEST_F(Live, UnknownAndHugeReadingsCostNoTouch) {
   write_recording(folder_ / "spoilt.h5", frames);
   expect_agreement("spoilt.h5", 4);
   const auto records = parsed(bytes_of(folder_ / "live.jsonl"));
+  ASSERT_EQ(records.size(), 4u);
   EXPECT_EQ(records.back().at("best"), "E");
   // 561 frames, and 99 of one element of which two or three are counted already.
   expect_named(done(live("replay:spoilt.h5,speed=max")), {"4 touches", "65", "readings unknown"});
