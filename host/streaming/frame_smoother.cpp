@@ -21,8 +21,8 @@ double median(double a, double b, double c) {
 const std::vector<double>& FrameSmoother::add(double time_s, const std::vector<double>& pressure) {
   append(time_s, pressure);
   while (window_.size() > 1 &&
-         (window_.size() > most_frames || window_.front().first <= time_s - smooth_s_)) {
-    spare_.push_back(std::move(window_.front().second));
+         (window_.size() > most_frames || window_.front().time_s <= time_s - smooth_s_)) {
+    spare_.push_back(std::move(window_.front().values));
     window_.pop_front();
   }
   take_means(time_s);
@@ -38,8 +38,10 @@ void FrameSmoother::append(double time_s, const std::vector<double>& pressure) {
     spare_.pop_back();
   }
   middle.assign(e, std::numeric_limits<double>::quiet_NaN());
+  bool whole = true;
   for (std::size_t i = 0; i < e; ++i) {
     if (std::isnan(pressure[i])) {
+      whole = false;
       continue;
     }
     Recent& recent = recent_[i];
@@ -50,7 +52,7 @@ void FrameSmoother::append(double time_s, const std::vector<double>& pressure) {
     recent.last_s = time_s;
     middle[i] = median(recent.readings[0], recent.readings[1], recent.readings[2]);
   }
-  window_.emplace_back(time_s, std::move(middle));
+  window_.push_back({.time_s = time_s, .values = std::move(middle), .whole = whole});
 }
 
 // Summed anew for every frame: in a running sum, a reading of 1e20 would leave its rounding, which
@@ -60,16 +62,25 @@ void FrameSmoother::take_means(double time_s) {
   sum_.assign(e, 0.0);
   known_.assign(e, 0.0);
   mean_.resize(e, 0.0);
-  for (const auto& [then_s, medians] : window_) {
-    for (std::size_t i = 0; i < e; ++i) {
-      const bool known = !std::isnan(medians[i]);
-      sum_[i] += known ? medians[i] : 0.0;
-      known_[i] += known ? 1.0 : 0.0;
+  double whole = 0.0;
+  for (const Medians& medians : window_) {
+    if (medians.whole) {
+      // Nearly all are, and this loop takes a third of the time of the other.
+      for (std::size_t i = 0; i < e; ++i) {
+        sum_[i] += medians.values[i];
+      }
+      whole += 1.0;
+    } else {
+      for (std::size_t i = 0; i < e; ++i) {
+        const bool known = !std::isnan(medians.values[i]);
+        sum_[i] += known ? medians.values[i] : 0.0;
+        known_[i] += known ? 1.0 : 0.0;
+      }
     }
   }
   for (std::size_t i = 0; i < e; ++i) {
-    if (known_[i] > 0.0) {
-      mean_[i] = sum_[i] / known_[i];
+    if (const double known = whole + known_[i]; known > 0.0) {
+      mean_[i] = sum_[i] / known;
     } else if (recent_[i].count == 0 || time_s - recent_[i].last_s > largest_gap_s_) {
       mean_[i] = 0.0;
     }
@@ -78,7 +89,7 @@ void FrameSmoother::take_means(double time_s) {
 
 void FrameSmoother::reset() {
   while (!window_.empty()) {
-    spare_.push_back(std::move(window_.front().second));
+    spare_.push_back(std::move(window_.front().values));
     window_.pop_front();
   }
   recent_.clear();

@@ -4,7 +4,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <deque>
-#include <utility>
 #include <vector>
 
 namespace palpate {
@@ -39,17 +38,24 @@ class FrameSmoother {
     double last_s = 0.0;  ///< when the last of them came
   };
 
+  /// Of one frame.
+  struct Medians {
+    double time_s;
+    std::vector<double> values;  ///< [e] NaN: Unknown
+    bool whole;                  ///< none is Unknown
+  };
+
   void append(double time_s, const std::vector<double>& pressure);
   void take_means(double time_s);
 
   double smooth_s_;
   double largest_gap_s_;
-  std::vector<Recent> recent_;                                 ///< [e]
-  std::deque<std::pair<double, std::vector<double>>> window_;  ///< time and medians; NaN: none
-  std::vector<std::vector<double>> spare_;                     ///< memory for the next medians
-  std::vector<double> sum_;                                    ///< [e] of the window
-  std::vector<double> known_;                                  ///< [e] how many it is the sum of
-  std::vector<double> mean_;                                   ///< [e]
+  std::vector<Recent> recent_;  ///< [e]
+  std::deque<Medians> window_;
+  std::vector<std::vector<double>> spare_;  ///< memory for the next medians
+  std::vector<double> sum_;                 ///< [e] of the window
+  std::vector<double> known_;               ///< [e] how many of its frames that are not whole count
+  std::vector<double> mean_;                ///< [e]
 };
 
 }  // namespace palpate
