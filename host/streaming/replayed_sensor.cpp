@@ -33,8 +33,10 @@ ReplayedSensor::ReplayedSensor(const std::string& path, std::optional<double> sp
   description_.serial = r.serial;
   description_.pressure_unit = r.pressure_unit;
   description_.elements_mm = r.elements_mm;
-  if (r.valid.size() == e) {
-    description_.valid = r.valid;
+  // Dead is what is valid in no frame.
+  description_.valid.assign(r.valid.empty() ? 0 : e, 0);
+  for (std::size_t k = 0; k < r.valid.size(); ++k) {
+    description_.valid[k % e] |= r.valid[k];
   }
   description_.baseline = r.baseline;
   description_.object = r.object;
