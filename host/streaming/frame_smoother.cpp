@@ -93,7 +93,6 @@ void FrameSmoother::reset() {
     window_.pop_front();
   }
   recent_.clear();
-  mean_.clear();
 }
 
 }  // namespace palpate

@@ -54,7 +54,7 @@ struct TouchDetector::Impl {
   bool take(const Frame& frame);
   void follow_drift(const std::vector<double>& smooth, double elapsed_s);
   void end_phase();
-  std::optional<DetectedTouch> end_touch(double time_s);
+  std::optional<DetectedTouch> end_touch();
 
   TouchDetectorOptions options;
   std::vector<double> baseline;
@@ -97,7 +97,8 @@ std::optional<DetectedTouch> TouchDetector::Impl::add(const Frame& frame) {
   std::optional<DetectedTouch> ended;
   const double elapsed_s = last_s ? time_s - *last_s : 0.0;
   if (elapsed_s > options.largest_gap_s || elapsed_s < 0.0) {
-    ended = end_touch(time_s);
+    ended = end_touch();
+    released_s = time_s;
     smoother.reset();
   }
   last_s = time_s;
@@ -116,7 +117,8 @@ std::optional<DetectedTouch> TouchDetector::Impl::add(const Frame& frame) {
     return ended;
   }
   if (touching && largest < options.release) {
-    return end_touch(time_s);  // never after a gap, which touches nothing
+    released_s = time_s;
+    return end_touch();  // never after a gap, which touches nothing
   }
   touching = true;
   const std::optional<Pose> pose = frame.T_robot_sensor && is_robot_pose(*frame.T_robot_sensor)
@@ -150,10 +152,9 @@ void TouchDetector::Impl::end_phase() {
   phase.clear();
 }
 
-std::optional<DetectedTouch> TouchDetector::Impl::end_touch(double time_s) {
+std::optional<DetectedTouch> TouchDetector::Impl::end_touch() {
   end_phase();
   touching = false;
-  released_s = time_s;
   return std::exchange(best, std::nullopt);
 }
 
@@ -184,7 +185,7 @@ TouchDetector& TouchDetector::operator=(TouchDetector&&) noexcept = default;
 std::optional<DetectedTouch> TouchDetector::add(const Frame& frame) { return impl_->add(frame); }
 
 std::optional<DetectedTouch> TouchDetector::finish() {
-  std::optional<DetectedTouch> touch = impl_->end_touch(0.0);
+  std::optional<DetectedTouch> touch = impl_->end_touch();
   impl_->smoother.reset();
   impl_->last_s.reset();
   impl_->released_s.reset();  // the next stream may be of any time

@@ -28,11 +28,13 @@ class QueuedSensor : public Sensor {
     std::deque<Frame> frames;
     bool gone = false;
     bool ended = false;
+    int starts = 0;
+    int stops = 0;
   };
 
   explicit QueuedSensor(Board& board) : board_(board) { description_.elements_mm = {{0.0, 0.0}}; }
   const SensorDescription& description() const override { return description_; }
-  void start() override {}
+  void start() override { ++board_.starts; }
   std::optional<Frame> next(std::chrono::milliseconds) override {
     if (board_.frames.empty()) {
       return {};
@@ -43,7 +45,7 @@ class QueuedSensor : public Sensor {
   }
   bool ended() const override { return board_.ended && board_.frames.empty(); }
   bool gone() const override { return board_.gone; }
-  void stop() override {}
+  void stop() override { ++board_.stops; }
   SensorCounters counters() const override { return {}; }
 
  private:
@@ -182,6 +184,8 @@ TEST_F(PoseSource, FileServesEveryStart) {
     EXPECT_EQ(sensor.poses().without, 0u);
     EXPECT_EQ(sensor.poses().read, 101u);
     sensor.stop();
+    EXPECT_EQ(board_.starts, run + 1);
+    EXPECT_EQ(board_.stops, run + 1);
   }
 }
 

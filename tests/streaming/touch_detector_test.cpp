@@ -165,6 +165,23 @@ TEST(TouchDetector, EndlessTouchKeepsABoundedPartOfAllOfIt) {
   EXPECT_NEAR(touch->pressure[0], 8.0, 0.12);  // five standard errors of 200 frames
 }
 
+// Of what changes slowly, the frames that are kept tell the middle.
+TEST(TouchDetector, EndlessTouchIsTheMeanOverAllOfIt) {
+  const auto rising = [](double t) {
+    return std::vector<double>{press(t, 1.0, 1e6) * (8.0 + 0.001 * t), press(t, 1.0, 1e6) * 3.0};
+  };
+  TouchDetector detector({}, {}, {});
+  for (const Frame& frame : Stream{.noise = 0.0}.frames(600.0, rising)) {
+    EXPECT_FALSE(detector.add(frame));
+  }
+  const auto touch = detector.finish();
+  ASSERT_TRUE(touch);
+  // The phase may begin 0.1 s late and ends up to 4 s early, of which the middle moves by a half.
+  EXPECT_NEAR(touch->pressure[0], 8.3, 0.003);
+  // The baseline follows the beginning of the press, below 1 for 0.04 s of its 60.
+  EXPECT_NEAR(touch->pressure[1], 3.0, 0.001);
+}
+
 TEST(TouchDetector, SilenceAndAClockThatGoesBackEndATouch) {
   const auto held = [](double t) { return std::vector<double>{8.0 * press(t, 0.5, 1e6)}; };
   for (const double jump_s : {3.0, -3.0}) {
