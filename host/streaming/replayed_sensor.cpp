@@ -35,8 +35,11 @@ ReplayedSensor::ReplayedSensor(const std::string& path, std::optional<double> sp
   description_.elements_mm = r.elements_mm;
   // Dead is what is valid in no frame.
   description_.valid.assign(r.valid.empty() ? 0 : e, 0);
-  for (std::size_t k = 0; k < r.valid.size(); ++k) {
-    description_.valid[k % e] |= r.valid[k];
+  for (std::size_t i = 0; i < r.size(); ++i) {
+    const Touch frame = r.touch(i);
+    for (std::size_t k = 0; k < frame.valid.size(); ++k) {
+      description_.valid[k] |= frame.valid[k];
+    }
   }
   description_.baseline = r.baseline;
   description_.object = r.object;

@@ -8,6 +8,8 @@
 
 #include <algorithm>
 #include <deque>
+#include <filesystem>
+#include <iterator>
 #include <vector>
 
 #include "io/scratch_folder.hpp"
@@ -187,6 +189,23 @@ TEST_F(PoseSource, FileServesEveryStart) {
     EXPECT_EQ(board_.starts, run + 1);
     EXPECT_EQ(board_.stops, run + 1);
   }
+}
+
+TEST_F(PoseSource, IsClosedWithTheSensor) {
+  const auto open_descriptors = [] {
+    const std::filesystem::directory_iterator list("/proc/self/fd");
+    return std::distance(begin(list), end(list));
+  };
+  put_bytes(path_, line(time_of(0), 1.0));
+  const auto before = open_descriptors();
+  {
+    const PosedSensor sensor = open();
+    EXPECT_EQ(open_descriptors(), before + 1);
+  }
+  EXPECT_EQ(open_descriptors(), before);
+  put_bytes(path_, "nonsense\n");
+  input_error([&] { open(); });
+  EXPECT_EQ(open_descriptors(), before);
 }
 
 // Neither lines that never end nor lines that never stop keep next() from returning.
