@@ -18,12 +18,17 @@ namespace palpate::cli {
 
 namespace {
 
-/// What the elements that are alive read; a dead one's pressure may be anything.
-std::vector<double> live_pressures(const Recording& r) {
+/// What the elements that are alive read; a dead one's pressure may be anything, and a frame's may
+/// be NaN, Unknown.
+std::vector<double> live_pressures(const Recording& r, std::size_t& unknown) {
   std::vector<double> pressures;
   for (std::size_t k = 0; k < r.pressure.size(); ++k) {
     if (r.valid.empty() || r.valid[k % r.valid.size()] != 0) {
-      pressures.push_back(r.pressure[k]);
+      if (std::isnan(r.pressure[k])) {
+        ++unknown;
+      } else {
+        pressures.push_back(r.pressure[k]);
+      }
     }
   }
   return pressures;
@@ -62,9 +67,13 @@ void print_recording(const std::string& path) {
   fmt::print("  {}           {}\n", r.rows, r.size());
   fmt::print("  elements          {}{}\n", r.elements(),
              r.elements_mm.size() == r.elements() ? "" : ", positions change per touch");
-  if (const std::vector<double> pressures = live_pressures(r); !pressures.empty()) {
+  std::size_t unknown = 0;
+  if (const std::vector<double> pressures = live_pressures(r, unknown); !pressures.empty()) {
     const auto [least, most] = std::minmax_element(pressures.begin(), pressures.end());
     fmt::print("  pressure          {:.3g} to {:.3g} {}\n", *least, *most, r.pressure_unit);
+  }
+  if (unknown > 0) {
+    fmt::print("  unknown readings  {} of {}\n", unknown, r.pressure.size());
   }
   if (!r.valid.empty()) {
     fmt::print("  dead readings     {} of {}\n", std::count(r.valid.begin(), r.valid.end(), 0),

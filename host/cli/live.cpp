@@ -4,6 +4,7 @@
 #include <chrono>
 #include <csignal>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <string>
 
@@ -40,8 +41,36 @@ struct Options {
   std::string json;
 };
 
+/// What is wrong with the poses, said at once: on standard error, or on the screen where that would
+/// be drawn over.
+class PoseComplaints {
+ public:
+  void add(const std::string& problem) {
+    const std::lock_guard lock(mutex_);
+    last_ = problem;
+    if (!on_screen_) {
+      fmt::print(stderr, "palpate: {}\n", problem);
+    }
+  }
+  /// There is a screen from here on.
+  void show(bool on_screen) {
+    const std::lock_guard lock(mutex_);
+    on_screen_ = on_screen;
+  }
+  std::string last() const {
+    const std::lock_guard lock(mutex_);
+    return last_;
+  }
+
+ private:
+  mutable std::mutex mutex_;
+  std::string last_;
+  bool on_screen_ = false;
+};
+
 /// The sensor with its poses. `posed` is left as it is where they are the sensor's own.
-std::unique_ptr<Sensor> open_posed_sensor(const Options& options, const PosedSensor*& posed) {
+std::unique_ptr<Sensor> open_posed_sensor(const Options& options, PoseComplaints& complaints,
+                                          const PosedSensor*& posed) {
   if (options.poses.empty() && !is_virtual_sensor(options.sensor)) {
     throw Error(Fault::input,
                 fmt::format("--poses: missing; sensor {} does not know where it is: give a file, a "
@@ -52,7 +81,9 @@ std::unique_ptr<Sensor> open_posed_sensor(const Options& options, const PosedSen
   if (options.poses.empty()) {
     return sensor;
   }
-  auto with_poses = std::make_unique<PosedSensor>(std::move(sensor), options.poses);
+  auto with_poses = std::make_unique<PosedSensor>(
+      std::move(sensor), options.poses, PosedSensor::usual_gap_s,
+      [&complaints](const std::string& problem) { complaints.add(problem); });
   posed = with_poses.get();
   return with_poses;
 }
@@ -82,7 +113,8 @@ void live(const Options& options) {
   require_above("--tare", options.tare_s, 0.0, true);
   const Scene scene = scene_of(options.recognition);
   const PosedSensor* posed = nullptr;
-  const std::unique_ptr<Sensor> sensor = open_posed_sensor(options, posed);
+  PoseComplaints complaints;
+  const std::unique_ptr<Sensor> sensor = open_posed_sensor(options, complaints, posed);
   const SensorDescription& description = sensor->description();
   std::vector<glm::dvec2> elements_mm = description.elements_mm;
   const std::string source = "sensor " + options.sensor;
@@ -118,6 +150,7 @@ void live(const Options& options) {
                recogniser->description(), table_heading());
     std::fflush(stdout);
   }
+  complaints.show(on_terminal && isatty(STDERR_FILENO) != 0);
   LiveRecognition recognition(
       *sensor, elements_mm, *recogniser, task,
       {.detector = detector, .tare_s = options.tare_s, .reset_after_s = options.reset_after_s},
@@ -136,7 +169,7 @@ void live(const Options& options) {
       screen.emplace(people, description, elements_mm, task);
     }
     while (!recognition.wait_for_end(50ms) && !interruption.requested()) {
-      if (screen && screen->update(recognition.state())) {
+      if (screen && screen->update(recognition.state(), complaints.last())) {
         recognition.reset();
       }
     }
@@ -149,9 +182,8 @@ void live(const Options& options) {
                                           source, state.without_pose));
   }
   fmt::print(people, "{}", summary(state, recognition.latencies_ms(), task));
-  if (posed != nullptr && posed->poses().refused > 0) {
-    fmt::print(stderr, "palpate: {} lines were no poses; the first: {}\n", posed->poses().refused,
-               posed->poses().first_refused);
+  if (posed != nullptr) {
+    report_refused(posed->poses());
   }
 }
 
@@ -166,10 +198,9 @@ void add_live(CLI::App& app) {
                                      "Poses are T_object_robot");
   const auto options = std::make_shared<Options>();
   command->add_option("--sensor", options->sensor, sensor_help)->required();
-  command->add_option("--poses", options->poses,
-                      "File, FIFO or - (standard input) with the sensor's poses, a line each: "
-                      "{\"time\": s since 1970, \"x_mm\": mm, \"y_mm\": mm, \"theta_rad\": rad} "
-                      "[default: the frames' own, in replays and simulations]");
+  command->add_option(
+      "--poses", options->poses,
+      std::string(poses_help) + " [default: the frames' own, in replays and simulations]");
   add_recognition_flags(*command, options->recognition);
   add_detector_flags(*command, options->detector);
   command

@@ -2,15 +2,20 @@
 
 #include <algorithm>
 #include <csignal>
+#include <limits>
 #include <utility>
 
 #include "palpate/baseline.hpp"
+#include "palpate/pose_track.hpp"
 
 namespace palpate::cli {
 
 namespace {
 
 using namespace std::chrono_literals;
+
+// A simulation at full speed would fill the memory, and finish() would have to use all of them.
+constexpr std::size_t most_jobs = 64;
 
 /// Signals are for the thread that can end the others: a thread that is started meanwhile leaves
 /// them all to it.
@@ -120,12 +125,7 @@ void LiveRecognition::finish() {
 void LiveRecognition::read() {
   sensor_.start();
   if (std::optional<TouchDetector> detector = tare()) {
-    const auto reading = [&] {
-      const std::lock_guard lock(mutex_);
-      state_.gone = sensor_.gone();
-      return !stop_;
-    };
-    while (reading() && !sensor_.ended()) {
+    while (wait_for_room() && !sensor_.ended()) {
       if (const std::optional<Frame> frame = sensor_.next(20ms)) {
         take(*detector, *frame);
       }
@@ -139,21 +139,30 @@ void LiveRecognition::read() {
   all_read_ = true;
 }
 
+/// Waits until another touch may be found; false where no more shall be read.
+bool LiveRecognition::wait_for_room() {
+  const bool gone = sensor_.gone();
+  std::unique_lock lock(mutex_);
+  state_.gone = gone;
+  changed_.wait(lock, [&] { return stop_ || jobs_.size() < most_jobs; });
+  return !stop_;
+}
+
 /// Reads what the array feels untouched, unless the sensor knows; none where that was interrupted.
 std::optional<TouchDetector> LiveRecognition::tare() {
   std::vector<double> baseline = description_.baseline;
   std::vector<Frame> frames;
+  StreamTime time;
   if (baseline.empty() && options_.tare_s > 0.0) {
     const auto enough = [&] {
       const std::lock_guard lock(mutex_);
       state_.taring = !stop_;
       state_.gone = sensor_.gone();
-      return stop_ || sensor_.ended() ||
-             (!frames.empty() &&
-              frames.back().host_time_s - frames.front().host_time_s >= options_.tare_s);
+      return stop_ || sensor_.ended() || (!frames.empty() && time.elapsed_s() >= options_.tare_s);
     };
     while (!enough()) {
       if (std::optional<Frame> frame = sensor_.next(20ms)) {
+        time.advance(frame->host_time_s);
         frames.push_back(std::move(*frame));
       }
     }
@@ -161,6 +170,9 @@ std::optional<TouchDetector> LiveRecognition::tare() {
       const std::lock_guard lock(mutex_);
       state_.taring = false;
       state_.counters = sensor_.counters();
+      for (const Frame& frame : frames) {
+        state_.unknown_readings += unknown_readings(frame, description_.valid);
+      }
       if (stop_) {
         return {};
       }
@@ -179,20 +191,26 @@ void LiveRecognition::take(TouchDetector& detector, const Frame& frame) {
     const std::lock_guard lock(mutex_);
     state_.pressure.resize(frame.values.size());
     for (std::size_t i = 0; i < frame.values.size(); ++i) {
-      state_.pressure[i] = frame.values[i] - (baseline.empty() ? 0.0 : baseline[i]);
+      const double value = frame.values[i];
+      state_.pressure[i] = is_known(value) ? value - (baseline.empty() ? 0.0 : baseline[i])
+                                           : std::numeric_limits<double>::quiet_NaN();
     }
-    state_.T_robot_sensor = frame.T_robot_sensor;
+    state_.unknown_readings += unknown_readings(frame, description_.valid);
+    state_.T_robot_sensor = frame.T_robot_sensor && is_robot_pose(*frame.T_robot_sensor)
+                                ? frame.T_robot_sensor
+                                : std::nullopt;
     state_.touching = touching;
     state_.counters = sensor_.counters();
   }
   hand_on(touch);
   hand_ahead(detector.candidate());
+  const double now_s = time_.advance(frame.host_time_s);
   if (touching) {
     if (!was_touching_ && options_.reset_after_s && last_contact_s_ &&
-        frame.host_time_s - *last_contact_s_ > *options_.reset_after_s) {
+        now_s - *last_contact_s_ > *options_.reset_after_s) {
       reset();
     }
-    last_contact_s_ = frame.host_time_s;
+    last_contact_s_ = now_s;
   }
   was_touching_ = touching;
 }
@@ -228,6 +246,7 @@ void LiveRecognition::believe() {
     const Job job = std::move(jobs_.front());
     jobs_.pop_front();
     lock.unlock();
+    changed_.notify_all();
     use(job);
     lock.lock();
   }
@@ -249,7 +268,7 @@ void LiveRecognition::use(const Job& job) {
   const Touch touch{.T_robot_sensor = *job.touch->T_robot_sensor,
                     .elements_mm = elements_mm_,
                     .pressure = job.touch->pressure,
-                    .valid = sensor.valid};
+                    .valid = job.touch->valid};
   if (job.under_way) {
     recogniser_.prepare(touch);
     return;

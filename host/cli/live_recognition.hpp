@@ -15,6 +15,7 @@
 #include "palpate/touch_detector.hpp"
 #include "recogniser.hpp"
 #include "recognition_record.hpp"
+#include "stream_time.hpp"
 
 namespace palpate::cli {
 
@@ -30,7 +31,8 @@ struct LiveTouch {
 
 /// What is known of a stream at one moment.
 struct LiveState {
-  std::vector<double> pressure;  ///< [e] above the baseline; empty before the first frame
+  std::vector<double> pressure;  ///< [e] above the baseline, NaN: Unknown; empty before the first
+                                 ///< frame
   std::optional<Pose> T_robot_sensor;
   SensorCounters counters;
   bool taring = false;
@@ -40,6 +42,7 @@ struct LiveState {
   std::size_t touches = 0;       ///< on this unknown
   std::size_t all_touches = 0;   ///< with a pose, on every unknown
   std::size_t without_pose = 0;  ///< touches that were passed over
+  std::uint64_t unknown_readings = 0;
   std::optional<LiveTouch> last;
   double worst_latency_ms = 0.0;
 };
@@ -52,8 +55,8 @@ struct LiveOptions {
 
 /// Finds the touches in a sensor's stream and updates the belief with each, from construction on.
 /// Frames are read and touches found on one thread, so that no frame is lost meanwhile the belief
-/// is updated on another. While a press is released, its steady phase is evaluated already, so that
-/// the estimate does not have to wait for that.
+/// is updated on another; while 64 touches wait for that, none is read. While a press is released,
+/// its steady phase is evaluated already, so that the estimate does not have to wait for that.
 class LiveRecognition {
  public:
   /// `on_touch` is called after each touch, on a thread of its own. What is passed by reference
@@ -93,6 +96,7 @@ class LiveRecognition {
   void take(TouchDetector& detector, const Frame& frame);
   void hand_on(const std::optional<DetectedTouch>& touch);
   void hand_ahead(const std::optional<DetectedTouch>& candidate);
+  bool wait_for_room();
   void believe();
   void use(const Job& job);
   void push(Job job);
@@ -119,7 +123,8 @@ class LiveRecognition {
 
   // Of the reading thread alone.
   Clock::time_point taken_;
-  std::optional<double> last_contact_s_;
+  StreamTime time_;
+  std::optional<double> last_contact_s_;  ///< of time_
   bool was_touching_ = false;
   std::optional<double> candidate_begin_s_;
 

@@ -65,6 +65,9 @@ std::string summary(const LiveState& state, std::vector<double> latencies_ms,
   if (state.without_pose > 0) {
     text += fmt::format(", {} touches without a pose passed over", state.without_pose);
   }
+  if (state.unknown_readings > 0) {
+    text += fmt::format(", {} readings unknown", state.unknown_readings);
+  }
   text += "\n";
   if (!latencies_ms.empty()) {
     const auto middle = latencies_ms.begin() + static_cast<std::ptrdiff_t>(latencies_ms.size() / 2);

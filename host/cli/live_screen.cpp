@@ -21,8 +21,6 @@ LiveScreen::LiveScreen(std::FILE* output, const SensorDescription& sensor,
   view_.valid = sensor.valid;
   view_.pressure_unit = sensor.pressure_unit;
   view_.labels = task.labels;
-  // A press is mostly several times as strong as what counts as contact.
-  view_.full_scale = std::max(5.0 * task.histogram.classifier.threshold, 1e-6);
   std::vector<OccupancyGrid> maps;
   for (const Hypothesis& hypothesis : task.hypotheses) {
     maps.push_back(hypothesis.map);
@@ -34,8 +32,12 @@ LiveScreen::LiveScreen(std::FILE* output, const SensorDescription& sensor,
   }
 }
 
-bool LiveScreen::update(const LiveState& state) {
+bool LiveScreen::update(const LiveState& state, const std::string& warning) {
   describe(state);
+  if (!warning.empty()) {
+    view_.warning = true;
+    view_.state += "; " + warning;
+  }
   measure_rate(state);
   const Terminal::Size size = Terminal::size_of(fileno(output_));
   if (terminal_) {
@@ -65,10 +67,12 @@ void LiveScreen::describe(const LiveState& state) {
     view_.state += fmt::format("; {} touches without a pose passed over", state.without_pose);
   }
   view_.pressure = state.pressure;
-  for (std::size_t i = 0; i < state.pressure.size(); ++i) {
-    if (view_.valid.empty() || view_.valid[i] != 0) {
-      // Not by fmax(): what is no number must not become the scale.
-      view_.full_scale = std::max(view_.full_scale, state.pressure[i]);
+  // A press is mostly several times as strong as what counts as contact. A touch's robust mean may
+  // widen the scale; of single frames, one of 1e38 would leave nothing to be seen.
+  view_.full_scale = std::max(5.0 * task_.histogram.classifier.threshold, 1e-6);
+  if (state.last) {
+    for (const double pressure : state.last->touch.pressure) {
+      view_.full_scale = std::max(view_.full_scale, pressure);
     }
   }
   view_.identity.clear();
@@ -98,15 +102,13 @@ void LiveScreen::place_array(const LiveState& state) {
   const bool now = state.touching && state.T_robot_sensor;
   view_.T_robot_sensor = now ? state.T_robot_sensor : state.last->touch.T_robot_sensor;
   const std::vector<double>& pressure = now ? state.pressure : state.last->touch.pressure;
-  const bool sound = pressure.size() == view_.elements_mm.size() &&
-                     std::none_of(pressure.begin(), pressure.end(),
-                                  [](double value) { return std::isinf(value); });
+  const std::vector<std::uint8_t>& valid = now ? view_.valid : state.last->touch.valid;
   view_.readings.clear();
-  if (sound) {
+  if (pressure.size() == view_.elements_mm.size()) {
     view_.readings = task_.histogram.classifier.classify({.T_robot_sensor = *view_.T_robot_sensor,
                                                           .elements_mm = view_.elements_mm,
                                                           .pressure = pressure,
-                                                          .valid = view_.valid});
+                                                          .valid = valid});
   }
 }
 

@@ -20,7 +20,8 @@ class LiveScreen {
              const std::vector<glm::dvec2>& elements_mm, const RecognitionTask& task);
 
   /// Shows this; true where the next unknown is asked for.
-  bool update(const LiveState& state);
+  /// @param warning shown beside the state; "" where there is none
+  bool update(const LiveState& state, const std::string& warning);
 
  private:
   using Clock = std::chrono::steady_clock;

@@ -1,4 +1,7 @@
+#include <unistd.h>
+
 #include <chrono>
+#include <filesystem>
 #include <memory>
 #include <optional>
 #include <string>
@@ -16,7 +19,9 @@
 #include "palpate/frame_recorder.hpp"
 #include "palpate/pose_track.hpp"
 #include "palpate/touch_detector.hpp"
+#include "palpate/virtual_sensor.hpp"
 #include "sensor_option.hpp"
+#include "stream_time.hpp"
 
 namespace palpate::cli {
 
@@ -50,8 +55,8 @@ class FrameSource {
       return {};
     }
     heard_ = Clock::now();
-    first_s_ = first_s_.value_or(frame->host_time_s);
-    if (interruption_.requested() || (seconds_ && frame->host_time_s - *first_s_ >= *seconds_)) {
+    const double elapsed_s = time_.advance(frame->host_time_s);
+    if (interruption_.requested() || (seconds_ && elapsed_s >= *seconds_)) {
       done_ = true;
       return {};
     }
@@ -65,44 +70,128 @@ class FrameSource {
   Sensor& sensor_;
   std::optional<double> seconds_;
   Clock::time_point heard_ = Clock::now();
-  std::optional<double> first_s_;
+  StreamTime time_;
   bool done_ = false;
 };
 
-/// The stream's first frames, over the time of the tare.
-std::vector<Frame> first_frames(FrameSource& source, double tare_s) {
-  std::vector<Frame> frames;
-  while (!source.done() &&
-         (frames.empty() || frames.back().host_time_s - frames.front().host_time_s < tare_s)) {
-    if (std::optional<Frame> frame = source.next()) {
-      frames.push_back(std::move(*frame));
+/// What stood under a recording's name before it: kept beside it until the recording is known to be
+/// wanted. A process that is killed leaves both.
+class OlderFile {
+ public:
+  explicit OlderFile(std::filesystem::path file)
+      : file_(std::move(file)), kept_(file_.string() + fmt::format(".before-{}", ::getpid())) {
+    existed_ = ::access(file_.c_str(), F_OK) == 0;
+    // Some file systems have no links.
+    is_kept_ = existed_ && ::link(file_.c_str(), kept_.c_str()) == 0;
+  }
+  ~OlderFile() { let_go(); }
+  OlderFile(const OlderFile&) = delete;
+  OlderFile& operator=(const OlderFile&) = delete;
+
+  /// Takes the recording away.
+  void restore() {
+    std::error_code ignored;
+    if (is_kept_) {
+      std::filesystem::rename(kept_, file_, ignored);
+      is_kept_ = false;
+    } else if (!existed_) {
+      std::filesystem::remove(file_, ignored);
     }
   }
-  return frames;
-}
-
-/// What became of the stream.
-struct Summary {
-  double begin_s = 0.0;
-  double end_s = 0.0;
-  std::uint64_t posed = 0;
-
-  void count(const Frame& frame) {
-    begin_s = begin_s == 0.0 ? frame.host_time_s : begin_s;
-    end_s = frame.host_time_s;
-    posed += frame.T_robot_sensor ? 1 : 0;
+  /// The recording has taken its place.
+  void let_go() {
+    std::error_code ignored;
+    if (is_kept_) {
+      std::filesystem::remove(kept_, ignored);
+      is_kept_ = false;
+    }
   }
+
+ private:
+  std::filesystem::path file_;
+  std::filesystem::path kept_;
+  bool existed_ = false;
+  bool is_kept_ = false;
 };
 
-void print(const Options& options, const FrameRecorder& recorder, const Summary& summary) {
-  const double seconds = summary.end_s - summary.begin_s;
-  const std::uint64_t frames = recorder.frames();
-  fmt::print("{}: {} frames in {:.3f} s", options.output, frames, seconds);
-  if (seconds > 0.0) {
-    fmt::print(", {:.1f} Hz", static_cast<double>(frames - 1) / seconds);
+/// A recording under way. The frames of the tare are saved like all others, and the baseline is
+/// stored when it is known.
+class RecordingUnderWay {
+ public:
+  /// @param tare_s over which the baseline is taken; 0: it is known, or there is none
+  RecordingUnderWay(const std::string& output, const SensorDescription& sensor, double tare_s)
+      : sensor_(sensor), tare_s_(tare_s), older_(output), recorder_(std::in_place, output, sensor) {
+    if (taring()) {
+      recorder_->expect_baseline();
+    } else {
+      older_.let_go();
+    }
   }
-  fmt::print(", {} lost, {} with a pose\n", recorder.lost(), summary.posed);
-}
+
+  void add(const Frame& frame) {
+    recorder_->add(frame);
+    time_.advance(frame.host_time_s);
+    posed_ += frame.T_robot_sensor ? 1 : 0;
+    if (taring()) {
+      first_.push_back(frame);
+      if (time_.elapsed_s() >= tare_s_) {
+        end_tare();
+      }
+    }
+  }
+  void flush() { recorder_->flush(); }
+  bool empty() const { return recorder_->frames() + recorder_->lost() == 0; }
+
+  /// Throws Error where the array was touched during the tare: there is no recording then.
+  void close() {
+    if (taring() && !first_.empty()) {
+      end_tare();
+    }
+    recorder_->close();
+  }
+
+  void print_summary(const std::string& output) const {
+    const double seconds = time_.elapsed_s();
+    const std::uint64_t frames = recorder_->frames();
+    fmt::print("{}: {} frames in {:.3f} s", output, frames, seconds);
+    if (seconds > 0.0) {
+      fmt::print(", {:.1f} Hz", static_cast<double>(frames - 1) / seconds);
+    }
+    fmt::print(", {} lost, {} with a pose", recorder_->lost(), posed_);
+    if (recorder_->unknown_readings() > 0) {
+      fmt::print(", {} readings unknown", recorder_->unknown_readings());
+    }
+    fmt::print("\n");
+  }
+
+ private:
+  bool taring() const { return tare_s_ > 0.0; }
+
+  void end_tare() {
+    const bool raw = sensor_.pressure_unit == "raw";
+    std::vector<double> baseline;
+    try {
+      baseline = baseline_of(first_, sensor_,
+                             raw ? std::nullopt : std::optional(TouchDetectorOptions{}.onset));
+    } catch (...) {
+      recorder_.reset();
+      older_.restore();
+      throw;
+    }
+    recorder_->set_baseline(std::move(baseline));
+    older_.let_go();
+    tare_s_ = 0.0;
+    first_ = {};
+  }
+
+  SensorDescription sensor_;
+  double tare_s_;
+  std::vector<Frame> first_;  ///< of the tare
+  StreamTime time_;
+  std::uint64_t posed_ = 0;
+  OlderFile older_;
+  std::optional<FrameRecorder> recorder_;
+};
 
 void record(const Options& options) {
   CommandFiles files;
@@ -112,12 +201,19 @@ void record(const Options& options) {
   require_writable(options.output);
   if (options.seconds) {
     require_above("--seconds", *options.seconds, 0.0);
+  } else if (is_endless_flood(options.sensor)) {
+    throw Error(Fault::input,
+                fmt::format("sensor {}: frames without an end at this speed would fill the disk; "
+                            "give --seconds, touches=N or a lower speed",
+                            options.sensor));
   }
   require_above("--tare", options.tare_s, 0.0, true);
   std::unique_ptr<Sensor> sensor = open_sensor(options.sensor);
   PosedSensor* posed = nullptr;
   if (!options.poses.empty()) {
-    auto with_poses = std::make_unique<PosedSensor>(std::move(sensor), options.poses);
+    auto with_poses = std::make_unique<PosedSensor>(
+        std::move(sensor), options.poses, PosedSensor::usual_gap_s,
+        [](const std::string& problem) { fmt::print(stderr, "palpate: {}\n", problem); });
     posed = with_poses.get();
     sensor = std::move(with_poses);
   }
@@ -125,42 +221,27 @@ void record(const Options& options) {
   if (!options.object.empty()) {
     description.object = options.object;
   }
-  const bool tare = options.tare_s > 0.0 && description.baseline.empty();
 
   FrameSource source(*sensor, options.seconds);
+  RecordingUnderWay recording(options.output, description,
+                              description.baseline.empty() ? options.tare_s : 0.0);
   sensor->start();
-  const std::vector<Frame> first = first_frames(source, tare ? options.tare_s : 0.0);
-  if (first.empty()) {
-    throw Error(Fault::system,
-                fmt::format("sensor {}: no frame came; see palpate sensors", options.sensor));
-  }
-  if (tare) {
-    const bool raw = description.pressure_unit == "raw";
-    description.baseline = baseline_of(
-        first, description, raw ? std::nullopt : std::optional(TouchDetectorOptions{}.onset));
-  }
-  FrameRecorder recorder(options.output, description);
-  Summary summary;
-  const auto add = [&](const Frame& frame) {
-    recorder.add(frame);
-    summary.count(frame);
-  };
-  for (const Frame& frame : first) {
-    add(frame);
-  }
   while (!source.done()) {
     if (const std::optional<Frame> frame = source.next()) {
-      add(*frame);
+      recording.add(*frame);
     } else {
-      recorder.flush();
+      recording.flush();
     }
   }
   sensor->stop();
-  recorder.close();
-  print(options, recorder, summary);
-  if (posed != nullptr && posed->poses().refused > 0) {
-    fmt::print(stderr, "palpate: {} lines were no poses; the first: {}\n", posed->poses().refused,
-               posed->poses().first_refused);
+  if (recording.empty()) {
+    throw Error(Fault::system,
+                fmt::format("sensor {}: no frame came; see palpate sensors", options.sensor));
+  }
+  recording.close();
+  recording.print_summary(options.output);
+  if (posed != nullptr) {
+    report_refused(posed->poses());
   }
 }
 
@@ -178,13 +259,11 @@ void add_record(CLI::App& app) {
                    "Recording of frames to write (HDF5); an older file is replaced")
       ->required();
   command->add_option("--seconds", options->seconds, "End after this time, in seconds");
-  command->add_option("--poses", options->poses,
-                      "File, FIFO or - (standard input) with the sensor's poses, a line each: "
-                      "{\"time\": s since 1970, \"x_mm\": mm, \"y_mm\": mm, \"theta_rad\": rad}");
+  command->add_option("--poses", options->poses, poses_help);
   command
       ->add_option("--tare", options->tare_s,
                    "The array's baseline is read from the first seconds, when nothing touches it; "
-                   "0: none")
+                   "they are recorded, too. 0: none")
       ->capture_default_str();
   command->add_option("--object", options->object, "Label of the object that is touched");
   command->callback([options] { record(*options); });

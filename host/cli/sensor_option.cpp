@@ -1,5 +1,7 @@
 #include "sensor_option.hpp"
 
+#include <fmt/format.h>
+
 #include "palpate/driver.hpp"
 #include "palpate/virtual_sensor.hpp"
 
@@ -15,6 +17,13 @@ void add_sensor_files(const std::string& name, const std::string& poses, Command
   }
   if (!poses.empty()) {
     files.reads("--poses", poses);
+  }
+}
+
+void report_refused(const PosedSensor::Poses& poses) {
+  if (poses.refused > 0) {
+    fmt::print(stderr, "palpate: {} lines were no poses or out of order; the first: {}\n",
+               poses.refused, poses.first_refused);
   }
 }
 

@@ -23,15 +23,30 @@ struct Options {
   DetectorFlags detector;
 };
 
-/// Appends the touch; false where it has no pose.
+/// Appends the touch; false where it has no pose. Every touch has a `valid` of its own.
 bool append(const DetectedTouch& touch, Recording& recording) {
   if (!touch.T_robot_sensor) {
     return false;
   }
+  recording.valid.insert(recording.valid.end(), touch.valid.begin(), touch.valid.end());
   recording.T_robot_sensor.push_back(*touch.T_robot_sensor);
   recording.pressure.insert(recording.pressure.end(), touch.pressure.begin(), touch.pressure.end());
   recording.time_s.push_back(0.5 * (touch.begin_s + touch.end_s));
   return true;
+}
+
+/// Leaves one list of dead elements, or none, where the same are dead in every touch.
+void shorten_valid(Recording& recording, const std::vector<std::uint8_t>& dead) {
+  const std::size_t e = recording.elements();
+  const auto is_usual = [&](std::size_t k) {
+    return (recording.valid[k] != 0) == (dead.empty() || dead[k % e] != 0);
+  };
+  for (std::size_t k = 0; k < recording.valid.size(); ++k) {
+    if (!is_usual(k)) {
+      return;
+    }
+  }
+  recording.valid = dead;
 }
 
 void find_touches(const Options& options) {
@@ -49,11 +64,11 @@ void find_touches(const Options& options) {
   recording.object = sensor.object;
   recording.pressure_unit = sensor.pressure_unit;
   recording.elements_mm = sensor.elements_mm;
-  recording.valid = sensor.valid;
   recording.truth = sensor.truth;
   recording.sensor = sensor.name;
   recording.serial = sensor.serial;
 
+  std::uint64_t unknown = 0;
   std::size_t without_pose = 0;
   const auto take = [&](const std::optional<DetectedTouch>& touch) {
     without_pose += touch && !append(*touch, recording) ? 1 : 0;
@@ -61,6 +76,7 @@ void find_touches(const Options& options) {
   stream->start();
   while (!stream->ended()) {
     if (const std::optional<Frame> frame = stream->next({})) {
+      unknown += unknown_readings(*frame, sensor.valid);
       take(detector.add(*frame));
     }
   }
@@ -74,11 +90,15 @@ void find_touches(const Options& options) {
                     : fmt::format("{}: no touch in its {} frames; lower --onset or --min-steady-s",
                                   options.frames, stream->counters().frames));
   }
+  shorten_valid(recording, sensor.valid);
   write_recording(options.output, recording);
   fmt::print("{}: {} touches in {} frames of {}", options.output, recording.size(),
              stream->counters().frames, options.frames);
   if (without_pose > 0) {
     fmt::print(", {} without a pose left out", without_pose);
+  }
+  if (unknown > 0) {
+    fmt::print(", {} readings unknown", unknown);
   }
   fmt::print("\n");
 }

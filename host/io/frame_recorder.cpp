@@ -57,6 +57,7 @@ struct FrameRecorder::Impl {
       : path(std::move(file_path)), sensor(std::move(description)) {}
 
   void require_consistent() const;
+  bool alive(std::size_t element) const { return sensor.valid.empty() || sensor.valid[element]; }
   bool readable(const Frame& frame) const;
   bool due() const;
   void save();
@@ -68,6 +69,7 @@ struct FrameRecorder::Impl {
 
   std::filesystem::path path;
   SensorDescription sensor;
+  bool baseline_follows = false;
   bool has_device_time = false;
   bool failed = false;
   Rows pending;
@@ -76,6 +78,7 @@ struct FrameRecorder::Impl {
   std::uint64_t frames = 0;
   std::uint64_t lost = 0;
   std::uint64_t lost_since = 0;  // with the next frame
+  std::uint64_t unknown_readings = 0;
 
   // Open from the first save on.
   Hdf5Handle file{H5I_INVALID_HID, H5Fclose};
@@ -97,13 +100,11 @@ void FrameRecorder::Impl::require_consistent() const {
 }
 
 bool FrameRecorder::Impl::readable(const Frame& frame) const {
+  bool any_known = false;
   for (std::size_t i = 0; i < frame.values.size(); ++i) {
-    const bool alive = sensor.valid.empty() || sensor.valid[i] != 0;
-    if (alive && !std::isfinite(static_cast<float>(frame.values[i]))) {
-      return false;
-    }
+    any_known = any_known || (alive(i) && is_known(frame.values[i]));
   }
-  return std::isfinite(frame.host_time_s);
+  return any_known && std::isfinite(frame.host_time_s);
 }
 
 bool FrameRecorder::Impl::due() const {
@@ -159,6 +160,8 @@ void FrameRecorder::Impl::create() {
     }
     if (!sensor.baseline.empty()) {
       out.dataset("baseline", {e}, sensor.baseline);
+    } else if (baseline_follows) {
+      out.dataset("baseline", {e}, std::vector<double>(e, unknown));
     }
     constexpr auto growing = Hdf5Writer::Storage::growing;
     out.dataset("pressure", {n, e}, pending.pressure, growing);
@@ -259,6 +262,29 @@ FrameRecorder::~FrameRecorder() {
   }
 }
 
+void FrameRecorder::expect_baseline() { impl_->baseline_follows = true; }
+
+void FrameRecorder::set_baseline(std::vector<double> baseline) {
+  Impl& r = *impl_;
+  std::swap(r.sensor.baseline, baseline);
+  try {
+    r.require_consistent();
+  } catch (...) {
+    std::swap(r.sensor.baseline, baseline);
+    throw;
+  }
+  if (r.saved == 0) {
+    return;  // it comes with the first rows
+  }
+  const Hdf5Session session;
+  const Hdf5Handle dataset(H5Dopen2(r.file.get(), "baseline", H5P_DEFAULT), H5Dclose);
+  if (H5Dwrite(dataset.get(), H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT,
+               r.sensor.baseline.data()) < 0 ||
+      H5Dflush(dataset.get()) < 0) {
+    r.fail();
+  }
+}
+
 void FrameRecorder::add(const Frame& frame) {
   Impl& r = *impl_;
   if (frame.values.size() != r.sensor.elements_mm.size()) {
@@ -276,7 +302,11 @@ void FrameRecorder::add(const Frame& frame) {
   if (rows.size() == 0) {
     r.oldest_pending = Clock::now();
   }
-  rows.pressure.insert(rows.pressure.end(), frame.values.begin(), frame.values.end());
+  for (std::size_t i = 0; i < frame.values.size(); ++i) {
+    const bool none = r.alive(i) && !is_known(frame.values[i]);
+    rows.pressure.push_back(static_cast<float>(none ? unknown : frame.values[i]));
+    r.unknown_readings += none ? 1 : 0;
+  }
   const Pose pose = frame.T_robot_sensor.value_or(Pose{{unknown, unknown}, unknown});
   rows.sensor_pose.insert(rows.sensor_pose.end(),
                           {pose.translation_mm.x, pose.translation_mm.y, pose.theta_rad});
@@ -302,5 +332,6 @@ void FrameRecorder::close() {
 
 std::uint64_t FrameRecorder::frames() const { return impl_->frames; }
 std::uint64_t FrameRecorder::lost() const { return impl_->lost; }
+std::uint64_t FrameRecorder::unknown_readings() const { return impl_->unknown_readings; }
 
 }  // namespace palpate

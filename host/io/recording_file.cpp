@@ -82,6 +82,10 @@ void read_stream(Hdf5Contents& file, const Extent& extent, Recording& recording)
   }
   if (file.has_dataset("baseline")) {
     recording.baseline = numbers_of(file, "baseline", extent, {{e}});
+    if (std::all_of(recording.baseline.begin(), recording.baseline.end(),
+                    [](double value) { return std::isnan(value); })) {
+      recording.baseline.clear();  // the recording was cut off before it was taken
+    }
   }
   if (file.has_dataset("device_time")) {
     recording.device_time_s = numbers_of(file, "device_time", extent, {{n}});
@@ -137,7 +141,8 @@ void validate(const std::filesystem::path& path, const Recording& recording) {
   for (std::size_t k = 0; k < recording.pressure.size(); ++k) {
     const std::size_t valid = recording.valid.size() == e ? k % e : k;
     const bool alive = recording.valid.empty() || recording.valid[valid] != 0;
-    if (alive && !std::isfinite(recording.pressure[k])) {
+    const bool unknown = recording.rows == "frames" && std::isnan(recording.pressure[k]);
+    if (alive && !unknown && !std::isfinite(recording.pressure[k])) {
       refuse(path, fmt::format("dataset 'pressure'[{}, {}] = {}; store finite numbers, and 0 in "
                                "'valid' for a dead element",
                                k / e, k % e, recording.pressure[k]));

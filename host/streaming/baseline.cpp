@@ -1,7 +1,6 @@
 #include "palpate/baseline.hpp"
 
 #include <algorithm>
-#include <cmath>
 
 #include <fmt/format.h>
 
@@ -40,8 +39,14 @@ std::vector<double> baseline_of(std::span<const Frame> frames, const SensorDescr
   }
   // Quarters of fewer frames differ by their noise alone.
   constexpr std::size_t least_frames = 40;
-  const bool judged = onset && frames.size() >= least_frames;
   std::vector<double> baseline(sensor.elements_mm.size(), 0.0);
+  for (const Frame& frame : frames) {
+    if (frame.values.size() != baseline.size()) {
+      throw Error(Fault::input, fmt::format("a frame of the baseline has {} values but the sensor "
+                                            "{} elements; take the frames of one array",
+                                            frame.values.size(), baseline.size()));
+    }
+  }
   std::vector<double> values(frames.size());
   for (std::size_t k = 0; k < baseline.size(); ++k) {
     if (!sensor.valid.empty() && sensor.valid[k] == 0) {
@@ -49,7 +54,7 @@ std::vector<double> baseline_of(std::span<const Frame> frames, const SensorDescr
     }
     std::size_t count = 0;
     for (const Frame& frame : frames) {
-      if (std::isfinite(frame.values.at(k))) {
+      if (is_known(frame.values[k])) {
         values[count++] = frame.values[k];
       }
     }
@@ -59,8 +64,8 @@ std::vector<double> baseline_of(std::span<const Frame> frames, const SensorDescr
                               "dead or repair it",
                               k));
     }
-    if (judged && count == frames.size()) {
-      const double change = change_over(values);
+    if (onset && count >= least_frames) {
+      const double change = change_over(std::span(values).first(count));
       if (change > *onset) {
         throw Error(Fault::input,
                     fmt::format("the array is touched while its baseline is taken: element {} "

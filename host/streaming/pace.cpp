@@ -1,5 +1,6 @@
 #include "pace.hpp"
 
+#include <algorithm>
 #include <thread>
 
 namespace palpate {
@@ -7,15 +8,17 @@ namespace palpate {
 using Clock = std::chrono::steady_clock;
 
 void Pace::start(double stream_s) {
-  first_s_ = stream_s;
+  last_s_ = stream_s;
+  elapsed_s_ = 0.0;
   start_ = Clock::now();
 }
 
-bool Pace::wait(double stream_s, std::chrono::milliseconds timeout) const {
+bool Pace::wait(double stream_s, std::chrono::milliseconds timeout) {
   if (!speed_) {
     return true;
   }
-  const std::chrono::duration<double> from_start((stream_s - first_s_) / *speed_);
+  const double elapsed_s = elapsed_s_ + std::max(0.0, stream_s - last_s_);
+  const std::chrono::duration<double> from_start(elapsed_s / *speed_);
   const std::chrono::duration<double> left = from_start - (Clock::now() - start_);
   if (left > timeout) {
     std::this_thread::sleep_for(timeout);
@@ -24,6 +27,8 @@ bool Pace::wait(double stream_s, std::chrono::milliseconds timeout) const {
   if (left.count() > 0.0) {
     std::this_thread::sleep_for(left);
   }
+  last_s_ = stream_s;
+  elapsed_s_ = elapsed_s;
   return true;
 }
 

@@ -20,6 +20,9 @@ namespace {
 
 // Far longer than any pose; what never ends a line must not fill the memory.
 constexpr std::size_t longest_line = 4096;
+// What read() takes at most.
+constexpr std::size_t block_bytes = 1 << 14;
+constexpr int blocks_at_once = 4;
 
 std::optional<double> number(const nlohmann::json& line, const char* key) {
   const auto found = line.find(key);
@@ -32,8 +35,8 @@ std::optional<double> number(const nlohmann::json& line, const char* key) {
 
 }  // namespace
 
-PoseReader::PoseReader(const std::string& name, PoseTrack& track)
-    : name_(name == "-" ? "standard input" : name), track_(track) {
+PoseReader::PoseReader(const std::string& name, PoseTrack& track, PosedSensor::Complaint complain)
+    : name_(name == "-" ? "standard input" : name), track_(track), complain_(std::move(complain)) {
   // Without waiting for whoever writes to a FIFO.
   descriptor_ =
       name == "-" ? STDIN_FILENO : ::open(name.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC);
@@ -51,7 +54,8 @@ PoseReader::PoseReader(const std::string& name, PoseTrack& track)
   is_fifo_ = S_ISFIFO(status.st_mode) && descriptor_ != STDIN_FILENO;
   if (is_file_) {
     try {
-      read();
+      while (read_some()) {
+      }
     } catch (...) {
       ::close(descriptor_);  // no destructor runs
       throw;
@@ -66,22 +70,36 @@ PoseReader::~PoseReader() {
 }
 
 void PoseReader::read() {
-  char bytes[1 << 14];
-  while (!ended_) {
-    pollfd ready{.fd = descriptor_, .events = POLLIN, .revents = 0};
-    if (::poll(&ready, 1, 0) <= 0) {
-      return;
-    }
-    const ssize_t got = ::read(descriptor_, bytes, sizeof bytes);
-    if (got > 0) {
-      take({bytes, static_cast<std::size_t>(got)});
-    } else if (got < 0 || is_fifo_) {
-      return;  // nothing there yet, or another writer may come
-    } else {
-      ended_ = true;
+  for (int block = 0; block < blocks_at_once && read_some(); ++block) {
+  }
+}
+
+// One block; false where there is none, or none yet.
+bool PoseReader::read_some() {
+  char bytes[block_bytes];
+  pollfd ready{.fd = descriptor_, .events = POLLIN, .revents = 0};
+  if (ended_ || (!is_file_ && ::poll(&ready, 1, 0) <= 0)) {
+    return false;
+  }
+  const ssize_t got = ::read(descriptor_, bytes, sizeof bytes);
+  if (got > 0) {
+    take({bytes, static_cast<std::size_t>(got)});
+    return true;
+  }
+  if (got < 0 && is_file_) {
+    throw Error(Fault::input, fmt::format("poses {}: cannot be read: {}; copy or record it again",
+                                          name_, std::strerror(errno)));
+  }
+  if (got == 0 && !is_fifo_) {  // of a FIFO another writer may come
+    ended_ = true;
+    if (!line_.empty() || overlong_) {
       end_line();
     }
+    const std::uint64_t dropped = track_.dropped();
+    track_.end();
+    judge_order(dropped, track_.set_back());
   }
+  return false;
 }
 
 void PoseReader::take(std::string_view bytes) {
@@ -105,7 +123,8 @@ void PoseReader::end_line() {
   ++lines_;
   const std::string text = std::exchange(line_, {});
   if (std::exchange(overlong_, false)) {
-    refuse_line("is longer than any pose");
+    ++malformed_;
+    refuse_line(Flaw::too_long, lines_, "is longer than any pose");
     return;
   }
   if (text.find_first_not_of(" \t\r") == std::string::npos) {
@@ -113,7 +132,8 @@ void PoseReader::end_line() {
   }
   const nlohmann::json line = nlohmann::json::parse(text, nullptr, false);
   if (!line.is_object()) {
-    refuse_line("is no JSON object");
+    ++malformed_;
+    refuse_line(Flaw::no_json, lines_, "is no JSON object");
     return;
   }
   const auto time = number(line, "time");
@@ -121,30 +141,70 @@ void PoseReader::end_line() {
   const auto y = number(line, "y_mm");
   const auto theta = number(line, "theta_rad");
   if (!time || !x || !y || !theta) {
-    refuse_line(fmt::format("has no number '{}'", !time ? "time"
+    ++malformed_;
+    refuse_line(Flaw::no_number, lines_,
+                fmt::format("has no number '{}'", !time ? "time"
                                                   : !x  ? "x_mm"
                                                   : !y  ? "y_mm"
                                                         : "theta_rad"));
     return;
   }
-  if (!track_.add(*time, {{*x, *y}, *theta})) {
-    refuse_line("is not later than the pose before");
+  const Pose T_robot_sensor{{*x, *y}, *theta};
+  if (!is_robot_pose(T_robot_sensor)) {
+    ++malformed_;
+    refuse_line(Flaw::far_away, lines_,
+                fmt::format("x_mm = {}, y_mm = {}, theta_rad = {}: no robot is further away than "
+                            "1e9 mm, or has turned by more than 1e9 rad",
+                            *x, *y, *theta));
     return;
   }
-  ++poses_;
+  add(*time, T_robot_sensor);
 }
 
-void PoseReader::refuse_line(std::string_view problem) {
-  ++refused_;
+void PoseReader::add(double time_s, const Pose& T_robot_sensor) {
+  const std::uint64_t dropped = track_.dropped();
+  const std::uint64_t set_back = track_.set_back();
+  const double before_s = track_.last_s().value_or(time_s);
+  ++poses_;
+  track_.add(time_s, T_robot_sensor);
+  judge_order(dropped, set_back);
+  if (track_.set_aside() == 1) {
+    aside_ = {.line = lines_, .time_s = time_s, .before_s = before_s};
+  }
+}
+
+// Says what has become of the poses that were set aside.
+void PoseReader::judge_order(std::uint64_t dropped_before, std::uint64_t set_back_before) {
+  const bool early = aside_.time_s <= aside_.before_s;
+  if (track_.dropped() != dropped_before) {
+    refuse_line(Flaw::out_of_order, aside_.line,
+                fmt::format("time = {} s is {} the poses around it, at {} s", aside_.time_s,
+                            early ? "not later than" : "far later than", aside_.before_s));
+  }
+  if (track_.set_back() != set_back_before) {
+    const std::string problem = fmt::format(
+        "time = {} s is not later than the pose before, at {} s, and the poses after "
+        "it go on from there: the robot's clock was set",
+        aside_.time_s, aside_.before_s);
+    refuse_line(Flaw::clock_set_back, aside_.line, problem);
+  }
+}
+
+void PoseReader::refuse_line(Flaw flaw, std::uint64_t line, std::string_view problem) {
   const std::string text = fmt::format(
       "{}, line {}: {}; write {{\"time\": s, \"x_mm\": mm, \"y_mm\": mm, \"theta_rad\": rad}}",
-      name_, lines_, problem);
+      name_, line, problem);
   if (is_file_) {
     throw Error(Fault::input, text);
   }
   if (first_refused_.empty()) {
     first_refused_ = text;
   }
+  const auto kind = static_cast<std::size_t>(flaw);
+  if (complain_ && !told_[kind]) {
+    complain_("poses " + text);
+  }
+  told_[kind] = true;
 }
 
 }  // namespace palpate

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <bitset>
 #include <cstdint>
 #include <string>
 #include <string_view>
@@ -12,27 +13,39 @@ namespace palpate {
 class PoseReader {
  public:
   /// @param name path of a file or FIFO, or "-": standard input
-  /// @throws Error where it cannot be read, or a line of a file is no pose
-  PoseReader(const std::string& name, PoseTrack& track);
+  /// @param complain is told of the first line of each kind that is refused; may be empty
+  /// @throws Error where it cannot be read, or a line of a file is refused
+  PoseReader(const std::string& name, PoseTrack& track, PosedSensor::Complaint complain);
   ~PoseReader();
   PoseReader(const PoseReader&) = delete;
   PoseReader& operator=(const PoseReader&) = delete;
 
-  /// Takes what has come, without waiting.
+  /// Takes what has come, without waiting: at most 64 KiB, so that a flood ends nobody's patience.
   void read();
   /// No more will come.
   bool ended() const { return ended_; }
-  std::uint64_t poses() const { return poses_; }
-  std::uint64_t refused() const { return refused_; }
+  /// The poses are those of a file and all in the track.
+  bool is_file() const { return is_file_; }
+  /// Poses that joined the track.
+  std::uint64_t poses() const { return poses_ - track_.dropped() - track_.set_aside(); }
+  /// Lines that did not.
+  std::uint64_t refused() const { return malformed_ + track_.dropped(); }
   const std::string& first_refused() const { return first_refused_; }
 
  private:
+  /// What may be wrong with a line.
+  enum class Flaw { too_long, no_json, no_number, far_away, out_of_order, clock_set_back, kinds };
+
+  bool read_some();
   void take(std::string_view bytes);
   void end_line();
-  void refuse_line(std::string_view problem);
+  void add(double time_s, const Pose& T_robot_sensor);
+  void judge_order(std::uint64_t dropped_before, std::uint64_t set_back_before);
+  void refuse_line(Flaw flaw, std::uint64_t line, std::string_view problem);
 
   std::string name_;
   PoseTrack& track_;
+  PosedSensor::Complaint complain_;
   int descriptor_ = -1;
   bool is_file_ = false;
   bool is_fifo_ = false;
@@ -40,9 +53,17 @@ class PoseReader {
   std::string line_;       ///< the one that has begun
   bool overlong_ = false;  ///< it has more bytes than any pose
   std::uint64_t lines_ = 0;
-  std::uint64_t poses_ = 0;
-  std::uint64_t refused_ = 0;
+  std::uint64_t poses_ = 0;      ///< lines that were handed to the track
+  std::uint64_t malformed_ = 0;  ///< lines that were not
   std::string first_refused_;
+  std::bitset<static_cast<std::size_t>(Flaw::kinds)> told_;
+
+  /// The first of the poses that the track has set aside.
+  struct {
+    std::uint64_t line = 0;
+    double time_s = 0.0;
+    double before_s = 0.0;  ///< time of the track's last pose
+  } aside_;
 };
 
 }  // namespace palpate

@@ -1,16 +1,73 @@
 #include "palpate/pose_track.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <numbers>
 
 namespace palpate {
 
+namespace {
+
+// Of a clock that was set: fewer may be stamped wrongly.
+constexpr std::size_t enough_to_join = 3;
+// A pose that comes later than this may be stamped wrongly.
+constexpr double gaps_of_a_leap = 10.0;
+
+}  // namespace
+
+bool is_robot_pose(const Pose& T_robot_sensor) {
+  constexpr double largest = 1e9;
+  const auto& [x_mm, y_mm] =
+      std::pair(T_robot_sensor.translation_mm.x, T_robot_sensor.translation_mm.y);
+  return std::abs(x_mm) <= largest && std::abs(y_mm) <= largest &&
+         std::abs(T_robot_sensor.theta_rad) <= largest;
+}
+
 bool PoseTrack::add(double time_s, const Pose& T_robot_sensor) {
-  if (!poses_.empty() && time_s <= poses_.back().first) {
+  if (!std::isfinite(time_s) || !is_robot_pose(T_robot_sensor)) {
+    ++dropped_;
     return false;
   }
-  poses_.emplace_back(time_s, T_robot_sensor);
+  const std::optional<double> last = last_s();
+  const double leap_s = gaps_of_a_leap * largest_gap_s_;
+  if (!last || (time_s > *last && time_s - *last <= leap_s)) {
+    drop_aside();
+    poses_.emplace_back(time_s, T_robot_sensor);
+    return true;
+  }
+  const bool in_order = !aside_.empty() && time_s > aside_.back().first;
+  const bool same_side = !aside_.empty() && (time_s > *last) == (aside_.front().first > *last);
+  if (!in_order || !same_side) {
+    drop_aside();
+  }
+  aside_.emplace_back(time_s, T_robot_sensor);
+  if (aside_.size() < enough_to_join) {
+    return false;
+  }
+  join();
   return true;
+}
+
+void PoseTrack::end() {
+  if (!aside_.empty() && aside_.front().first > poses_.back().first) {
+    join();
+  }
+  drop_aside();
+}
+
+void PoseTrack::join() {
+  const double begin_s = aside_.front().first;
+  set_back_ += begin_s <= poses_.back().first ? 1 : 0;
+  while (!poses_.empty() && poses_.back().first >= begin_s) {
+    poses_.pop_back();
+  }
+  poses_.insert(poses_.end(), aside_.begin(), aside_.end());
+  aside_.clear();
+}
+
+void PoseTrack::drop_aside() {
+  dropped_ += aside_.size();
+  aside_.clear();
 }
 
 std::optional<Pose> PoseTrack::at(double time_s) const {

@@ -20,6 +20,10 @@ constexpr auto patience = 200ms;
 constexpr auto look = 5ms;
 // Frames that a replay at full speed may have waiting.
 constexpr std::size_t most_held = 4096;
+// Poses that a robot may be ahead of the frames.
+constexpr std::size_t most_poses = 1 << 16;
+// Frames of a board that comes back are not older than its poses of this time.
+constexpr double kept_while_gone_s = 1.0;
 
 }  // namespace
 
@@ -29,22 +33,61 @@ struct PosedSensor::Impl {
     Clock::time_point since;
   };
 
-  Impl(std::unique_ptr<Sensor> inner, const std::string& name, double largest_gap_s)
-      : sensor(std::move(inner)), track(largest_gap_s), reader(name, track) {}
+  Impl(std::unique_ptr<Sensor> inner, const std::string& name, double largest_gap_s,
+       Complaint complain)
+      : sensor(std::move(inner)), track(largest_gap_s), reader(name, track, std::move(complain)) {}
 
-  bool decided(const Held& waiting) const {
+  // No pose that is still to come tells more of this frame's.
+  bool decided(const Frame& frame) const {
     const auto last_s = track.last_s();
-    return reader.ended() || (last_s && *last_s >= waiting.frame.host_time_s) ||
-           Clock::now() - waiting.since >= patience;
+    return reader.ended() || (last_s && *last_s >= frame.host_time_s);
   }
 
-  Frame release() {
+  // The first frame, once its pose is known or will not be.
+  std::optional<Frame> release() {
+    if (held.empty()) {
+      return {};
+    }
+    const Held& first = held.front();
+    if (!decided(first.frame)) {
+      forget_before(first.frame.host_time_s);
+      reader.read();
+    }
+    if (!decided(first.frame) && Clock::now() - first.since < patience) {
+      return {};
+    }
     Frame frame = std::move(held.front().frame);
     held.pop_front();
     frame.T_robot_sensor = track.at(frame.host_time_s);
     ++(frame.T_robot_sensor ? counts.frames : counts.without);
-    track.forget_before(frame.host_time_s);
+    forget_before(frame.host_time_s);
     return frame;
+  }
+
+  // Waits for a frame; false where none came. Robots are listened to meanwhile.
+  bool take(std::chrono::milliseconds wait) {
+    if (sensor->ended() || held.size() >= most_held) {
+      std::this_thread::sleep_for(wait);
+      return false;
+    }
+    if (std::optional<Frame> frame = sensor->next(wait)) {
+      held.push_back({std::move(*frame), Clock::now()});
+      return true;
+    }
+    if (track.size() < most_poses) {
+      reader.read();
+    }
+    if (sensor->gone() && track.last_s()) {
+      forget_before(*track.last_s() - kept_while_gone_s);
+    }
+    return false;
+  }
+
+  // A file is there as a whole when the sensor starts again.
+  void forget_before(double time_s) {
+    if (!reader.is_file()) {
+      track.forget_before(time_s);
+    }
   }
 
   std::unique_ptr<Sensor> sensor;
@@ -55,8 +98,8 @@ struct PosedSensor::Impl {
 };
 
 PosedSensor::PosedSensor(std::unique_ptr<Sensor> sensor, const std::string& poses,
-                         double largest_gap_s)
-    : impl_(std::make_unique<Impl>(std::move(sensor), poses, largest_gap_s)) {}
+                         double largest_gap_s, Complaint complain)
+    : impl_(std::make_unique<Impl>(std::move(sensor), poses, largest_gap_s, std::move(complain))) {}
 
 PosedSensor::~PosedSensor() = default;
 
@@ -64,27 +107,24 @@ const SensorDescription& PosedSensor::description() const { return impl_->sensor
 
 void PosedSensor::start() {
   impl_->held.clear();
+  impl_->counts = {};
   impl_->sensor->start();
 }
 
 std::optional<Frame> PosedSensor::next(std::chrono::milliseconds timeout) {
   const auto deadline = Clock::now() + timeout;
   for (;;) {
-    impl_->reader.read();
-    auto& held = impl_->held;
-    if (!held.empty() && impl_->decided(held.front())) {
-      return impl_->release();
+    if (std::optional<Frame> frame = impl_->release()) {
+      return frame;
     }
-    const auto left =
-        std::chrono::duration_cast<std::chrono::milliseconds>(deadline - Clock::now());
-    if (left <= 0ms || ended()) {
+    const auto left = std::max(
+        0ms, std::chrono::duration_cast<std::chrono::milliseconds>(deadline - Clock::now()));
+    if (ended()) {
       return {};
     }
-    const auto wait = held.empty() ? left : std::min<std::chrono::milliseconds>(left, look);
-    if (impl_->sensor->ended() || held.size() >= most_held) {
-      std::this_thread::sleep_for(wait);
-    } else if (std::optional<Frame> frame = impl_->sensor->next(wait)) {
-      held.push_back({std::move(*frame), Clock::now()});
+    const bool taken = impl_->take(std::min<std::chrono::milliseconds>(left, look));
+    if (left == 0ms) {
+      return taken ? impl_->release() : std::nullopt;
     }
   }
 }

@@ -1,6 +1,8 @@
 #include "replayed_sensor.hpp"
 
 #include <cmath>
+#include <limits>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -24,14 +26,21 @@ ReplayedSensor::ReplayedSensor(const std::string& path, std::optional<double> sp
     refuse("dataset 'time' is missing; a replay needs the times of the frames");
   }
   const std::size_t e = r.elements();
-  if (r.elements_mm.size() != e || !(r.valid.empty() || r.valid.size() == e)) {
+  if (r.elements_mm.size() != e) {
     refuse("its array changes from frame to frame; a sensor has one array, so record each apart");
   }
   description_.name = r.sensor;
   description_.serial = r.serial;
   description_.pressure_unit = r.pressure_unit;
   description_.elements_mm = r.elements_mm;
-  description_.valid = r.valid;
+  // Dead is what is valid in no frame.
+  description_.valid.assign(r.valid.empty() ? 0 : e, 0);
+  for (std::size_t i = 0; i < r.size(); ++i) {
+    const Touch frame = r.touch(i);
+    for (std::size_t k = 0; k < frame.valid.size(); ++k) {
+      description_.valid[k] |= frame.valid[k];
+    }
+  }
   description_.baseline = r.baseline;
   description_.object = r.object;
   description_.truth = r.truth;
@@ -53,8 +62,16 @@ std::optional<Frame> ReplayedSensor::next(std::chrono::milliseconds timeout) {
   const Recording& r = recording_;
   const std::size_t i = at_++;
   const Touch touch = r.touch(i);
+  std::vector<double> values(touch.pressure.begin(), touch.pressure.end());
+  if (r.valid.size() != r.elements()) {
+    for (std::size_t k = 0; k < touch.valid.size(); ++k) {
+      if (touch.valid[k] == 0) {
+        values[k] = std::numeric_limits<double>::quiet_NaN();  // Unknown in this frame
+      }
+    }
+  }
   Frame frame{.host_time_s = r.time_s[i],
-              .values = {touch.pressure.begin(), touch.pressure.end()},
+              .values = std::move(values),
               .lost_before = r.lost_before.empty() ? 0 : r.lost_before[i]};
   if (!r.device_time_s.empty() && !std::isnan(r.device_time_s[i])) {
     frame.device_time_s = r.device_time_s[i];

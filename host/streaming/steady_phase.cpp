@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <span>
 
 #include <glm/geometric.hpp>
 
@@ -17,7 +18,7 @@ constexpr std::size_t most_kept = 512;
 constexpr std::size_t least_frames = 3;
 
 // Mean of the middle half; values at its borders count by their part. Reorders the values.
-double interquartile_mean(std::vector<double>& values) {
+double interquartile_mean(std::span<double> values) {
   std::sort(values.begin(), values.end());
   const double n = static_cast<double>(values.size());
   double sum = 0.0;
@@ -96,15 +97,24 @@ std::optional<DetectedTouch> SteadyPhase::touch() const {
   if (n < least_frames || kept_[n - 1].time_s - kept_[0].time_s < options_.min_steady_s) {
     return {};
   }
-  DetectedTouch touch{
-      .begin_s = kept_[0].time_s, .end_s = kept_[n - 1].time_s, .frames = n, .pressure = {}};
   const std::size_t e = pressure_.size() / kept_.size();
+  DetectedTouch touch{.begin_s = kept_[0].time_s,
+                      .end_s = kept_[n - 1].time_s,
+                      .frames = n,
+                      .pressure = std::vector<double>(e, 0.0),
+                      .valid = std::vector<std::uint8_t>(e, 0)};
   std::vector<double> values(n);
   for (std::size_t k = 0; k < e; ++k) {
+    std::size_t known = 0;
     for (std::size_t i = 0; i < n; ++i) {
-      values[i] = pressure_[i * e + k];
+      if (const double value = pressure_[i * e + k]; !std::isnan(value)) {
+        values[known++] = value;
+      }
     }
-    touch.pressure.push_back(interquartile_mean(values));
+    if (known >= least_frames) {
+      touch.pressure[k] = interquartile_mean(std::span(values).first(known));
+      touch.valid[k] = 1;
+    }
   }
   Pose sum;
   double poses = 0.0;

@@ -16,10 +16,11 @@ class SteadyPhase {
   bool empty() const { return frames_ == 0; }
   /// Whether a frame of this load and pose is like those before it.
   bool fits(double load, const std::optional<Pose>& T_robot_sensor) const;
-  /// @param pressure [e] above the baseline
+  /// @param pressure [e] above the baseline; NaN: Unknown
   void add(double time_s, double load, const std::vector<double>& pressure,
            const std::optional<Pose>& T_robot_sensor);
-  /// The reading, unless the phase is too short.
+  /// The reading, unless the phase is too short. An element that was known in fewer than three of
+  /// its frames is not valid in it.
   std::optional<DetectedTouch> touch() const;
   /// Forgets its frames.
   void clear();

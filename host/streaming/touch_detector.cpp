@@ -2,12 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include <fmt/format.h>
 
 #include "frame_smoother.hpp"
 #include "palpate/error.hpp"
+#include "palpate/pose_track.hpp"
 #include "steady_phase.hpp"
 
 namespace palpate {
@@ -45,14 +47,14 @@ struct TouchDetector::Impl {
       : options(detector_options),
         baseline(std::move(untouched)),
         valid(std::move(alive)),
-        smoother(options.smooth_s),
+        smoother(options.smooth_s, options.largest_gap_s),
         phase(options) {}
 
   std::optional<DetectedTouch> add(const Frame& frame);
   bool take(const Frame& frame);
   void follow_drift(const std::vector<double>& smooth, double elapsed_s);
   void end_phase();
-  std::optional<DetectedTouch> end_touch(double time_s);
+  std::optional<DetectedTouch> end_touch();
 
   TouchDetectorOptions options;
   std::vector<double> baseline;
@@ -60,13 +62,13 @@ struct TouchDetector::Impl {
   FrameSmoother smoother;
   SteadyPhase phase;                  // the one under way
   std::optional<DetectedTouch> best;  // of the phases of this touch that are over
-  std::vector<double> pressure;       // [e] of the frame under way, above the baseline
+  std::vector<double> pressure;       // [e] of the frame under way, above the baseline; NaN: none
   std::optional<double> last_s;       // time of the frame before
-  double released_s = 0.0;
+  std::optional<double> released_s;   // end of the touch before
   bool touching = false;
 };
 
-// Subtracts the baseline. False for a frame with a reading that is no number.
+// Subtracts the baseline. False for a frame that says nothing.
 bool TouchDetector::Impl::take(const Frame& frame) {
   const std::size_t e = frame.values.size();
   if (baseline.empty()) {
@@ -78,13 +80,13 @@ bool TouchDetector::Impl::take(const Frame& frame) {
                                           e, baseline.size()));
   }
   pressure.resize(e);
-  bool readable = std::isfinite(frame.host_time_s);
+  bool any_known = false;
   for (std::size_t i = 0; i < e; ++i) {
-    const bool alive = valid.empty() || valid[i] != 0;
-    pressure[i] = alive ? frame.values[i] - baseline[i] : 0.0;
-    readable = readable && std::isfinite(pressure[i]);
+    const bool known = (valid.empty() || valid[i] != 0) && is_known(frame.values[i]);
+    pressure[i] = known ? frame.values[i] - baseline[i] : std::numeric_limits<double>::quiet_NaN();
+    any_known = any_known || known;
   }
-  return readable;
+  return any_known && std::isfinite(frame.host_time_s);
 }
 
 std::optional<DetectedTouch> TouchDetector::Impl::add(const Frame& frame) {
@@ -95,7 +97,8 @@ std::optional<DetectedTouch> TouchDetector::Impl::add(const Frame& frame) {
   std::optional<DetectedTouch> ended;
   const double elapsed_s = last_s ? time_s - *last_s : 0.0;
   if (elapsed_s > options.largest_gap_s || elapsed_s < 0.0) {
-    ended = end_touch(time_s);
+    ended = end_touch();
+    released_s = time_s;
     smoother.reset();
   }
   last_s = time_s;
@@ -108,19 +111,23 @@ std::optional<DetectedTouch> TouchDetector::Impl::add(const Frame& frame) {
     load += std::max(0.0, p - options.release);
   }
   if (!touching && largest <= options.onset) {
-    if (largest < options.release && time_s - released_s > rest_s) {
+    if (largest < options.release && (!released_s || time_s - *released_s > rest_s)) {
       follow_drift(smooth, elapsed_s);
     }
     return ended;
   }
   if (touching && largest < options.release) {
-    return end_touch(time_s);  // never after a gap, which touches nothing
+    released_s = time_s;
+    return end_touch();  // never after a gap, which touches nothing
   }
   touching = true;
-  if (!phase.fits(load, frame.T_robot_sensor)) {
+  const std::optional<Pose> pose = frame.T_robot_sensor && is_robot_pose(*frame.T_robot_sensor)
+                                       ? frame.T_robot_sensor
+                                       : std::nullopt;
+  if (!phase.fits(load, pose)) {
     end_phase();
   }
-  phase.add(time_s, load, pressure, frame.T_robot_sensor);
+  phase.add(time_s, load, pressure, pose);
   return ended;
 }
 
@@ -130,7 +137,8 @@ void TouchDetector::Impl::follow_drift(const std::vector<double>& smooth, double
   }
   const double part = std::clamp(elapsed_s / options.drift_s, 0.0, 1.0);
   for (std::size_t i = 0; i < baseline.size(); ++i) {
-    baseline[i] += part * smooth[i];
+    // Two frames of -1e38 are no drift, and would be the baseline from here on.
+    baseline[i] += part * std::max(smooth[i], -options.onset);
   }
 }
 
@@ -144,10 +152,9 @@ void TouchDetector::Impl::end_phase() {
   phase.clear();
 }
 
-std::optional<DetectedTouch> TouchDetector::Impl::end_touch(double time_s) {
+std::optional<DetectedTouch> TouchDetector::Impl::end_touch() {
   end_phase();
   touching = false;
-  released_s = time_s;
   return std::exchange(best, std::nullopt);
 }
 
@@ -166,7 +173,8 @@ TouchDetector::TouchDetector(const TouchDetectorOptions& options, std::vector<do
     if (!alive) {
       impl_->baseline[i] = 0.0;
     }
-    require("baseline", impl_->baseline[i], true, "finite");
+    require("baseline", impl_->baseline[i], is_known(impl_->baseline[i]),
+            "a pressure that float32 holds");
   }
 }
 
@@ -177,10 +185,10 @@ TouchDetector& TouchDetector::operator=(TouchDetector&&) noexcept = default;
 std::optional<DetectedTouch> TouchDetector::add(const Frame& frame) { return impl_->add(frame); }
 
 std::optional<DetectedTouch> TouchDetector::finish() {
-  const double now_s = impl_->last_s.value_or(0.0);
-  std::optional<DetectedTouch> touch = impl_->end_touch(now_s);
+  std::optional<DetectedTouch> touch = impl_->end_touch();
   impl_->smoother.reset();
   impl_->last_s.reset();
+  impl_->released_s.reset();  // the next stream may be of any time
   return touch;
 }
 

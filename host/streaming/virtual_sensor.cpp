@@ -23,7 +23,6 @@ namespace {
 
 constexpr std::string_view replay = "replay:";
 constexpr std::string_view simulate = "simulate:";
-
 constexpr std::array<std::string_view, 1> replay_keys{"speed"};
 constexpr std::array<std::string_view, 7> simulate_keys{"rate",  "array",  "seed", "touches",
                                                         "noise", "object", "speed"};
@@ -64,6 +63,7 @@ class SourceName {
   }
 
   const std::string& what() const { return what_; }
+  bool has(std::string_view key) const { return options_.contains(key); }
 
   template <typename Number>
   std::optional<Number> number(std::string_view key, Number least, Number most) const {
@@ -165,6 +165,15 @@ std::optional<std::filesystem::path> virtual_sensor_file(const std::string& name
   }
   const std::string shape = SourceName(name, simulate, simulate_keys).what();
   return built_in_shape(shape) ? std::nullopt : std::optional<std::filesystem::path>(shape);
+}
+
+bool is_endless_flood(const std::string& name) {
+  if (!name.starts_with(simulate)) {
+    return false;
+  }
+  const SourceName source(name, simulate, simulate_keys);
+  constexpr double fast = 100.0;
+  return !source.has("touches") && source.speed().value_or(fast + 1.0) > fast;
 }
 
 std::unique_ptr<Sensor> open_virtual_sensor(const std::string& name) {

@@ -2,10 +2,16 @@
 
 #include <fcntl.h>
 #include <sys/stat.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <csignal>
 #include <fstream>
 #include <sstream>
+#include <thread>
 
 #include <fmt/format.h>
 
@@ -46,6 +52,48 @@ class Live : public ProgramTest {
     return records;
   }
 
+  /// What is believed after each touch of a recording of frames is what `touches` and `recognize`
+  /// find in it afterwards.
+  void expect_agreement(const std::string& frames, std::size_t touches) const {
+    const Outcome outcome =
+        palpate(live("replay:" + frames + ",speed=max", {"--json", "live.jsonl"}));
+    ASSERT_EQ(outcome.status, 0) << outcome.err;
+    const auto live = parsed(bytes_of(folder_ / "live.jsonl"));
+    done({"touches", frames, "-o", "touches.h5"});
+    const nlohmann::json trace =
+        record({"touches.h5", "--maps", "A.map.h5", "E.map.h5", "--bins", "20x20x24", "--trace"})
+            .at("trace");
+    ASSERT_EQ(live.size(), touches);
+    ASSERT_EQ(trace.size(), live.size());
+    for (std::size_t i = 0; i < live.size(); ++i) {
+      for (const auto& [key, value] : trace[i].items()) {
+        // The same touches on the same device give the same bits, one by one or together; files
+        // hold pressures in float64.
+        EXPECT_EQ(live[i].at(key), value) << key << " after touch " << i;
+      }
+    }
+  }
+
+  /// The program while it recognises, once its table has begun.
+  pid_t start(const Arguments& arguments) const {
+    const pid_t pid = ::fork();
+    if (pid == 0) {
+      if (::chdir(folder_.path().c_str()) != 0 || std::freopen("said", "w", stdout) == nullptr ||
+          std::freopen("complained", "w", stderr) == nullptr) {
+        ::_exit(126);
+      }
+      become_program(arguments);
+    }
+    while (bytes_of(folder_ / "said").find("latency ms") == std::string::npos) {
+      if (::waitpid(pid, nullptr, WNOHANG) != 0) {
+        ADD_FAILURE() << "it has ended: " << bytes_of(folder_ / "complained");
+        return -1;
+      }
+      std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    }
+    return pid;
+  }
+
   std::vector<nlohmann::json> records_of(const std::string& sensor, Arguments more = {}) const {
     more.insert(more.end(), {"--json", "live.jsonl"});
     done(live(sensor, more));
@@ -80,22 +128,57 @@ TEST_F(Live, RecognisesASimulatedLetter) {
   EXPECT_NE(outcome.err.find("4 touches"), std::string::npos) << outcome.err;
 }
 
-// What is found on the way is what `touches` and `recognize` find afterwards.
 TEST_F(Live, AgreesWithTouchesFoundAfterwards) {
   done({"record", "--sensor", unknown_e, "-o", "frames.h5"});
-  const auto live = records_of("replay:frames.h5,speed=max");
-  done({"touches", "frames.h5", "-o", "touches.h5"});
-  const nlohmann::json trace =
-      record({"touches.h5", "--maps", "A.map.h5", "E.map.h5", "--bins", "20x20x24", "--trace"})
-          .at("trace");
-  ASSERT_EQ(live.size(), 4u);
-  ASSERT_EQ(trace.size(), live.size());
-  for (std::size_t i = 0; i < live.size(); ++i) {
-    for (const auto& [key, value] : trace[i].items()) {
-      // The same touches on the same device give the same bits, one by one or together; files hold
-      // pressures in float64.
-      EXPECT_EQ(live[i].at(key), value) << key << " after touch " << i;
+  expect_agreement("frames.h5", 4);
+}
+
+TEST_F(Live, UnknownAndHugeReadingsCostNoTouch) {
+  done({"record", "--sensor", unknown_e, "-o", "frames.h5"});
+  Recording frames = read_recording(folder_ / "frames.h5");
+  frames.pressure[36 * 110 + 3] = frames.pressure[36 * 111 + 3] = 1e38;
+  frames.pressure[36 * 215 + 9] = frames.pressure[36 * 216 + 9] = -1e38;
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    frames.pressure[36 * i + i % 36] = std::nan("");
+    if (i > 210 && i < 310) {  // the second press
+      frames.pressure[36 * i + 20] = std::nan("");
     }
+  }
+  write_recording(folder_ / "spoilt.h5", frames);
+  expect_agreement("spoilt.h5", 4);
+  const auto records = parsed(bytes_of(folder_ / "live.jsonl"));
+  ASSERT_EQ(records.size(), 4u);
+  EXPECT_EQ(records.back().at("best"), "E");
+  // 561 frames, and 99 of one element of which two or three are counted already.
+  expect_named(done(live("replay:spoilt.h5,speed=max")), {"4 touches", "65", "readings unknown"});
+}
+
+// A clock that is set back by an hour: in the tare, and between the second and the third touch.
+TEST_F(Live, AClockThatIsSetBackProlongsNothing) {
+  done({"record", "--sensor", unknown_e, "-o", "frames.h5"});
+  Recording frames = read_recording(folder_ / "frames.h5");
+  frames.baseline.clear();
+  for (std::size_t i = 20; i < frames.size(); ++i) {
+    frames.time_s[i] -= i < 320 ? 3600.0 : 7200.0;
+  }
+  write_recording(folder_ / "set.h5", frames);
+  const auto records = records_of("replay:set.h5,speed=max", {"--reset-after", "0.2"});
+  ASSERT_EQ(records.size(), 4u);
+  for (std::size_t i = 0; i < 4; ++i) {
+    EXPECT_EQ(records[i].at("unknown"), i);
+  }
+}
+
+// A source of poses that never ends a line keeps nobody from ending the program.
+TEST_F(Live, EndsWhileTheSourceOfPosesNeverDoes) {
+  for (const int signal : {SIGINT, SIGTERM}) {
+    const pid_t pid = start(live("simulate:A", {"--poses", "/dev/zero"}));
+    ASSERT_GT(pid, 0);
+    ::kill(pid, signal);
+    int status = 0;
+    ::waitpid(pid, &status, 0);
+    EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 0) << bytes_of(folder_ / "complained");
+    std::filesystem::remove(folder_ / "said");
   }
 }
 
@@ -112,6 +195,10 @@ TEST_F(Live, JoinsFramesWithPosesFromAFifo) {
     Frame frame = stream->next({}).value();
     const Pose pose = frame.T_robot_sensor.value();
     if (i % 5 == 0 || stream->ended()) {
+      if (i == 50 || i == 300) {  // in milliseconds
+        poses += fmt::format("{{\"time\": {:.17g}, \"x_mm\": 0, \"y_mm\": 0, \"theta_rad\": 0}}\n",
+                             1000.0 * frame.host_time_s);
+      }
       poses += fmt::format("{{\"time\": {:.17g}, \"x_mm\": {}, \"y_mm\": {}, \"theta_rad\": {}}}\n",
                            frame.host_time_s, pose.translation_mm.x, pose.translation_mm.y,
                            pose.theta_rad);
@@ -129,7 +216,11 @@ TEST_F(Live, JoinsFramesWithPosesFromAFifo) {
       palpate(live("replay:bare.h5,speed=max", {"--poses", "poses", "--json", "live.jsonl"}));
   ::close(fifo);
   EXPECT_EQ(outcome.status, 0) << outcome.err;
-  EXPECT_NE(outcome.err.find("1 lines were no poses"), std::string::npos) << outcome.err;
+  EXPECT_NE(outcome.err.find("3 lines were no poses"), std::string::npos) << outcome.err;
+  // When it happens, each kind once, before the lines of the end.
+  EXPECT_EQ(std::count(outcome.err.begin(), outcome.err.end(), '\n'), 3) << outcome.err;
+  expect_named(outcome.err, {"palpate: poses poses, line 1: is no JSON object",
+                             "palpate: poses poses, line 12: time = 1"});
   const auto records = parsed(bytes_of(folder_ / "live.jsonl"));
   ASSERT_EQ(records.size(), expected.size());
   for (std::size_t i = 0; i < records.size(); ++i) {

@@ -12,6 +12,7 @@
 #include <csignal>
 #include <cstdlib>
 #include <functional>
+#include <limits>
 #include <random>
 #include <thread>
 
@@ -182,6 +183,61 @@ TEST_F(FrameRecorderFile, FrameWithAReadingThatIsNoNumberCountsAsLost) {
   ASSERT_EQ(read.size(), 2u);
   EXPECT_EQ(recorder.lost(), 2u);
   EXPECT_EQ(read.lost_before, (std::vector<std::uint64_t>{0, 2}));
+}
+
+TEST_F(FrameRecorderFile, UnknownReadingsComeBackAsNaNs) {
+  SensorDescription sensor = sensor_of(3);
+  sensor.valid = {1, 1, 0};
+  FrameRecorder recorder(path_, sensor);
+  const double inf = std::numeric_limits<double>::infinity();
+  for (const double none : {std::nan(""), inf, -inf, 1e300, -3.5e38}) {
+    Frame frame = frame_of(recorder.frames(), 3);
+    frame.values[1] = none;
+    frame.values[2] = none;  // a dead element's does not count
+    recorder.add(frame);
+  }
+  recorder.add(frame_of(5, 3));
+  EXPECT_EQ(recorder.frames(), 6u);
+  EXPECT_EQ(recorder.lost(), 0u);
+  EXPECT_EQ(recorder.unknown_readings(), 5u);
+  recorder.close();
+  const Recording read = read_recording(path_);
+  ASSERT_EQ(read.size(), 6u);
+  for (std::size_t i = 0; i < 6; ++i) {
+    EXPECT_EQ(read.pressure[3 * i], reading(i, 0));
+    EXPECT_EQ(std::isnan(read.pressure[3 * i + 1]), i < 5) << i;
+  }
+  // What was read can be written and read again; touches must be whole.
+  write_recording(folder_ / "again.h5", read);
+  EXPECT_TRUE(std::isnan(read_recording(folder_ / "again.h5").pressure[1]));
+  Recording touches = read;
+  touches.rows = "touches";
+  touches.T_robot_sensor.assign(6, {});
+  expect_named(input_error([&] { write_recording(folder_ / "touches.h5", touches); }),
+               {"'pressure'[0, 1]", "nan"});
+}
+
+TEST_F(FrameRecorderFile, BaselineMayFollowTheFrames) {
+  for (const std::size_t flushed : {0u, 5u}) {
+    FrameRecorder recorder(path_, sensor_of(2));
+    recorder.expect_baseline();
+    for (std::size_t i = 0; i < 5; ++i) {
+      recorder.add(frame_of(i, 2));
+    }
+    if (flushed > 0) {
+      recorder.flush();
+      EXPECT_EQ(read_recording(path_).size(), 5u);
+      EXPECT_TRUE(read_recording(path_).baseline.empty()) << "not taken yet";
+    }
+    expect_named(input_error([&] { recorder.set_baseline({1.0}); }), {"1 baseline", "2 elements"});
+    recorder.set_baseline({1.5, -2.0});
+    recorder.add(frame_of(5, 2));
+    recorder.close();
+    const Recording read = read_recording(path_);
+    EXPECT_EQ(read.baseline, (std::vector<double>{1.5, -2.0})) << flushed;
+    ASSERT_EQ(read.size(), 6u);
+    expect_prefix(read, 2);
+  }
 }
 
 TEST_F(FrameRecorderFile, RefusesWhatDoesNotFit) {

@@ -165,6 +165,44 @@ TEST(TouchDetector, EndlessTouchKeepsABoundedPartOfAllOfIt) {
   EXPECT_NEAR(touch->pressure[0], 8.0, 0.12);  // five standard errors of 200 frames
 }
 
+// After a release the skin creeps back for half a second, which is no drift.
+TEST(TouchDetector, BaselineRestsAfterARelease) {
+  const auto creeping = [](double t) {
+    return std::vector<double>{t < 0.1 ? 0.0 : 0.5 + 8.0 * press(t, 0.1, 0.5)};
+  };
+  TouchDetector detector({.drift_s = 6.0}, {}, {});
+  std::optional<double> released_s;
+  std::optional<double> followed_s;
+  double rested = 0.0;
+  for (const Frame& frame : Stream{.noise = 0.0}.frames(3.0, creeping)) {
+    if (detector.add(frame)) {
+      released_s = frame.host_time_s;
+      rested = detector.baseline()[0];
+    } else if (released_s && !followed_s && detector.baseline()[0] != rested) {
+      followed_s = frame.host_time_s;
+    }
+  }
+  ASSERT_TRUE(released_s && followed_s);
+  EXPECT_NEAR(*followed_s - *released_s, 0.51, 0.011);  // the frame after it, and a rounding
+}
+
+// Of what changes slowly, the frames that are kept tell the middle.
+TEST(TouchDetector, EndlessTouchIsTheMeanOverAllOfIt) {
+  const auto rising = [](double t) {
+    return std::vector<double>{press(t, 1.0, 1e6) * (8.0 + 0.001 * t), press(t, 1.0, 1e6) * 3.0};
+  };
+  TouchDetector detector({}, {}, {});
+  for (const Frame& frame : Stream{.noise = 0.0}.frames(600.0, rising)) {
+    EXPECT_FALSE(detector.add(frame));
+  }
+  const auto touch = detector.finish();
+  ASSERT_TRUE(touch);
+  // The phase may begin 0.1 s late and ends up to 4 s early, of which the middle moves by a half.
+  EXPECT_NEAR(touch->pressure[0], 8.3, 0.003);
+  // The baseline follows the beginning of the press, below 1 for 0.04 s of its 60.
+  EXPECT_NEAR(touch->pressure[1], 3.0, 0.001);
+}
+
 TEST(TouchDetector, SilenceAndAClockThatGoesBackEndATouch) {
   const auto held = [](double t) { return std::vector<double>{8.0 * press(t, 0.5, 1e6)}; };
   for (const double jump_s : {3.0, -3.0}) {

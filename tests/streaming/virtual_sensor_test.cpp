@@ -215,6 +215,33 @@ TEST_F(ReplayedFile, TakesItsTime) {
   EXPECT_GE(std::chrono::steady_clock::now() - begin, 0.489s / 5);
 }
 
+// The recording host's clock was set back in the middle.
+TEST_F(ReplayedFile, TakesItsTimeAcrossAClockThatWasSetBack) {
+  for (std::size_t i = 25; i < 50; ++i) {
+    recording_.time_s[i] -= 3600.0;
+  }
+  const auto sensor = open_virtual_sensor(saved() + ",speed=5");
+  const auto begin = std::chrono::steady_clock::now();
+  EXPECT_EQ(frames_of(*sensor).size(), 50u);
+  EXPECT_GE(std::chrono::steady_clock::now() - begin, 0.479s / 5);
+}
+
+TEST_F(ReplayedFile, ReadingsThatAreNotValidInAFrameAreUnknownInIt) {
+  recording_.valid.assign(100, 1);
+  recording_.valid[2 * 7] = 0;
+  for (std::size_t i = 0; i < 50; ++i) {
+    recording_.valid[2 * i + 1] = 0;
+  }
+  const auto sensor = open_virtual_sensor(saved() + ",speed=max");
+  EXPECT_EQ(sensor->description().valid, (std::vector<std::uint8_t>{1, 0})) << "dead";
+  const std::vector<Frame> frames = frames_of(*sensor);
+  ASSERT_EQ(frames.size(), 50u);
+  for (std::size_t i = 0; i < 50; ++i) {
+    EXPECT_EQ(is_known(frames[i].values[0]), i != 7);
+    EXPECT_FALSE(is_known(frames[i].values[1]));
+  }
+}
+
 TEST_F(ReplayedFile, RefusesWhatIsNoStream) {
   recording_.time_s.clear();
   expect_named(input_error([&] { open_virtual_sensor(saved()); }), {"comma=.h5", "'time'"});
@@ -222,6 +249,16 @@ TEST_F(ReplayedFile, RefusesWhatIsNoStream) {
   recording_.T_robot_sensor.assign(50, {});
   expect_named(input_error([&] { open_virtual_sensor(saved()); }), {"comma=.h5", "touches"});
   expect_named(input_error([] { open_virtual_sensor("replay:missing.h5"); }), {"missing.h5"});
+}
+
+TEST(VirtualSensor, KnowsWhatFloodsWithoutAnEnd) {
+  EXPECT_TRUE(is_endless_flood("simulate:A,speed=max"));
+  EXPECT_TRUE(is_endless_flood("simulate:A,rate=1000,speed=101"));
+  EXPECT_FALSE(is_endless_flood("simulate:A,speed=100"));
+  EXPECT_FALSE(is_endless_flood("simulate:A"));
+  EXPECT_FALSE(is_endless_flood("simulate:A,touches=3,speed=max"));
+  EXPECT_FALSE(is_endless_flood("replay:a.h5,speed=max"));
+  EXPECT_FALSE(is_endless_flood("takktile"));
 }
 
 TEST(VirtualSensor, RefusesNamesThatSayNothing) {

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <vector>
 
 #include "palpate/sensor.hpp"
 
@@ -17,8 +18,8 @@ namespace palpate {
 /// `h5py.File(path, "r", swmr=True)`. `h5clear -s --increment=0 FILE` turns a file that was never
 /// closed into a usual one; without `--increment=0` it cuts the frames off.
 ///
-/// Pressures are stored as float32, finer than any sensor resolves. A power cut may cost what the
-/// system has not yet brought to the disk.
+/// Pressures are stored as float32, finer than any sensor resolves, and NaN where a reading is
+/// Unknown: see is_known(). A power cut may cost what the system has not yet brought to the disk.
 class FrameRecorder {
  public:
   /// @param path the recording to be made; an older file stays until the first frames are saved
@@ -30,7 +31,15 @@ class FrameRecorder {
   FrameRecorder(const FrameRecorder&) = delete;
   FrameRecorder& operator=(const FrameRecorder&) = delete;
 
-  /// Appends a frame. One with a reading that is no number counts as lost: see `lost()`.
+  /// Keeps a place in the file for a baseline that is known only later; a file that is cut off
+  /// before has none. To be called before the first frame is added.
+  void expect_baseline();
+  /// Stores the baseline, [e], after expect_baseline(). @throws Error on another size or where the
+  /// disk is full
+  void set_baseline(std::vector<double> baseline);
+
+  /// Appends a frame. One without a known reading, or with a time that is not finite, counts as
+  /// lost: see `lost()`.
   /// @throws Error (Fault::input) on a frame of another size, (Fault::system) where the disk is
   /// full
   void add(const Frame& frame);
@@ -39,8 +48,9 @@ class FrameRecorder {
   /// Saves what was added and closes the file. @throws Error (Fault::system)
   void close();
 
-  std::uint64_t frames() const;  ///< added so far
-  std::uint64_t lost() const;    ///< lost so far, as the frames say
+  std::uint64_t frames() const;            ///< added so far
+  std::uint64_t lost() const;              ///< lost so far, as the frames say
+  std::uint64_t unknown_readings() const;  ///< so far, see is_known(); dead elements do not count
 
  private:
   struct Impl;

@@ -1,8 +1,12 @@
 #pragma once
 
 #include <chrono>
+#include <cmath>
+#include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -13,14 +17,31 @@
 
 namespace palpate {
 
+/// Whether an element's reading is a number that float32 holds, as recordings do. Every other
+/// reading, NaN, an infinity or a larger number, is Unknown: it says nothing about the element in
+/// its frame.
+inline bool is_known(double reading) {
+  return std::abs(reading) <= double{std::numeric_limits<float>::max()};
+}
+
 /// One reading of a whole array, as a sensor delivers it.
 struct Frame {
   double host_time_s = 0.0;                  ///< when it arrived, since the Unix epoch
   std::optional<double> device_time_s = {};  ///< by the sensor's own clock, where it has one
-  std::vector<double> values;                ///< [e] in the sensor's pressure unit
+  std::vector<double> values;                ///< [e] in the sensor's pressure unit; see is_known()
   std::uint64_t lost_before = 0;             ///< frames lost since the one before
   std::optional<Pose> T_robot_sensor = {};   ///< where the source knows it: replays and simulations
 };
+
+/// How many of a frame's readings are Unknown. Dead elements do not count.
+/// @param valid empty or [e]; 0 = dead element
+inline std::size_t unknown_readings(const Frame& frame, std::span<const std::uint8_t> valid) {
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < frame.values.size(); ++i) {
+    count += (valid.empty() || valid[i] != 0) && !is_known(frame.values[i]) ? 1 : 0;
+  }
+  return count;
+}
 
 /// What a sensor is.
 struct SensorDescription {

@@ -51,7 +51,8 @@ struct Recording {
   std::vector<double> time_s;           ///< empty or [n], since the Unix epoch
   std::optional<Truth> truth;
 
-  // What a stream of frames has besides. Its poses may be NaN: not known at that time.
+  // What a stream of frames has besides. Its poses may be NaN, not known at that time, and so may
+  // its pressures: Unknown.
   std::string sensor;                 ///< name of the sensor, "" when unknown
   std::string serial;                 ///< its serial number, "" where it has none
   std::vector<double> baseline;       ///< empty or [e]: what it reads untouched

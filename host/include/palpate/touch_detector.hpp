@@ -32,6 +32,7 @@ struct DetectedTouch {
   double end_s = 0.0;
   std::size_t frames = 0;                   ///< that the means are of
   std::vector<double> pressure;             ///< [e] interquartile mean, above the baseline
+  std::vector<std::uint8_t> valid = {};     ///< [e] 0 = dead, or Unknown in its frames; it reads 0
   std::optional<Pose> T_robot_sensor = {};  ///< mean of those that are known
 };
 
@@ -43,7 +44,13 @@ struct DetectedTouch {
 /// than a step of the sensor's converter and averages noise almost as well as the mean (84 %
 /// against 64 % of its efficiency); and a quarter of the frames may be wrong to either side.
 ///
-/// While nothing is touched the baseline follows slow drift. Lost frames do no harm beyond what
+/// A reading that is_known() does not know changes nothing: the touch is found by the others, and
+/// the means are of the readings that are known. An element that is Unknown for longer than
+/// `largest_gap_s` counts as untouched until it can be read again. Whatever finite numbers an
+/// element reads, they leave no trace in the touches after them.
+///
+/// While nothing is touched the baseline follows slow drift, of what is read below it by at most
+/// `onset` in `drift_s`. Lost frames do no harm beyond what
 /// they do to the time a touch is seen; a silence longer than `largest_gap_s`, or a clock that goes
 /// back, ends a touch and begins anew. The memory in use is bounded: of a long steady phase, frames
 /// evenly spread over it are kept.
@@ -52,15 +59,17 @@ class TouchDetector {
   /// @param baseline [e] what the array reads when nothing is touched, subtracted from every frame;
   /// empty: it reads nothing
   /// @param valid empty or [e]; 0 = dead element, which takes no part and reads 0 in every touch
-  /// @throws Error on options out of range or sizes that disagree
+  /// @throws Error on options out of range, a baseline that is_known() refuses or sizes that
+  /// disagree
   TouchDetector(const TouchDetectorOptions& options, std::vector<double> baseline,
                 std::vector<std::uint8_t> valid);
   ~TouchDetector();
   TouchDetector(TouchDetector&&) noexcept;
   TouchDetector& operator=(TouchDetector&&) noexcept;
 
-  /// Takes one frame; returns the touch that ends with it. A frame with a reading that is no number
-  /// is passed over. @throws Error on a frame of another size than the one before
+  /// Takes one frame; returns the touch that ends with it. A frame without a known reading, or with
+  /// a time that is not finite, is passed over; a pose that is_robot_pose() refuses is not known.
+  /// @throws Error on a frame of another size than the one before
   std::optional<DetectedTouch> add(const Frame& frame);
   /// The touch under way when the stream ends, if it was steady long enough; begins anew.
   std::optional<DetectedTouch> finish();

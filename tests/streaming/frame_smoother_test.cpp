@@ -1,0 +1,144 @@
+#include "frame_smoother.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cfloat>
+#include <cmath>
+#include <limits>
+#include <random>
+
+namespace palpate {
+namespace {
+
+constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+constexpr double smooth_s = 0.05;
+constexpr double gap_s = 0.5;
+constexpr double period_s = 0.01;
+
+std::vector<std::vector<double>> noise(std::size_t frames, std::size_t elements) {
+  std::mt19937_64 random(11);
+  std::normal_distribution<double> normal(20.0, 3.0);
+  std::vector<std::vector<double>> values(frames, std::vector<double>(elements));
+  for (std::vector<double>& frame : values) {
+    for (double& value : frame) {
+      value = normal(random);
+    }
+  }
+  return values;
+}
+
+// What the smoother says after each frame.
+std::vector<std::vector<double>> means_of(const std::vector<std::vector<double>>& frames) {
+  FrameSmoother smoother(smooth_s, gap_s);
+  std::vector<std::vector<double>> means;
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    means.push_back(smoother.add(period_s * static_cast<double>(i), frames[i]));
+  }
+  return means;
+}
+
+double median(double a, double b, double c) {
+  return std::max(std::min(a, b), std::min(std::max(a, b), c));
+}
+
+TEST(FrameSmoother, IsTheMeanOfTheMediansInItsWindow) {
+  const auto frames = noise(40, 3);
+  const auto means = means_of(frames);
+  for (std::size_t i = 8; i < frames.size(); ++i) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      double sum = 0.0;
+      // Five frames of 10 ms are less than 50 ms old.
+      for (std::size_t j = i - 4; j <= i; ++j) {
+        sum += median(frames[j][k], frames[j - 1][k], frames[j - 2][k]);
+      }
+      // Times in steps of 0.01 s may round the oldest frame in.
+      const double older = median(frames[i - 5][k], frames[i - 6][k], frames[i - 7][k]);
+      const bool with_older =
+          period_s * static_cast<double>(i - 5) > period_s * static_cast<double>(i) - smooth_s;
+      const double expected = with_older ? (sum + older) / 6.0 : sum / 5.0;
+      EXPECT_NEAR(means[i][k], expected, 1e-13) << i;  // a few roundings of numbers about 20
+    }
+  }
+}
+
+TEST(FrameSmoother, WhateverHasLeftTheWindowLeavesNoTrace) {
+  const auto clean = noise(200, 4);
+  const auto expected = means_of(clean);
+  for (const double wrong : {1e20, 1e38, -1e38, double{FLT_MAX}, 1e16}) {
+    auto frames = clean;
+    frames[50][1] = frames[51][1] = wrong;  // the median passes two in a row
+    const auto means = means_of(frames);
+    EXPECT_GT(std::abs(means[52][1]), 1e14) << wrong;
+    for (std::size_t i = 0; i < frames.size(); ++i) {
+      EXPECT_TRUE(std::isfinite(means[i][1]));
+      for (std::size_t k = 0; k < 4; ++k) {
+        // In a window of 5 or 6 frames, and one frame more in the medians.
+        if (k != 1 || i < 50 || i > 58) {
+          ASSERT_EQ(means[i][k], expected[i][k]) << wrong << ", frame " << i;
+        }
+      }
+    }
+  }
+}
+
+TEST(FrameSmoother, UnknownReadingsTakeNoPart) {
+  auto frames = noise(60, 2);
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    frames[i][0] = i % 2 == 0 ? 7.0 : nan;
+  }
+  const auto alone = means_of(noise(60, 2));
+  const auto means = means_of(frames);
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    EXPECT_EQ(means[i][0], 7.0) << i;
+    EXPECT_EQ(means[i][1], alone[i][1]) << "of another element's";
+  }
+}
+
+// A spike beside an Unknown reading is a single bad reading still.
+TEST(FrameSmoother, MedianIsOfKnownReadings) {
+  for (const std::size_t spike : {20u, 22u}) {
+    std::vector<std::vector<double>> frames(40, {5.0});
+    frames[spike] = {1e9};
+    frames[21] = {nan};
+    for (const auto& mean : means_of(frames)) {
+      EXPECT_EQ(mean[0], 5.0);
+    }
+  }
+}
+
+TEST(FrameSmoother, AnElementThatIsUnknownKeepsItsMeanForAGap) {
+  std::vector<std::vector<double>> frames(100, {3.0});
+  for (std::size_t i = 20; i < 90; ++i) {
+    frames[i] = {nan};
+  }
+  const auto means = means_of(frames);
+  EXPECT_EQ(means[68][0], 3.0) << "0.49 s after its last reading";
+  EXPECT_EQ(means[71][0], 0.0) << "0.52 s after it";
+  EXPECT_EQ(means[90][0], 3.0);
+  EXPECT_EQ(means_of({{nan}})[0][0], 0.0);
+}
+
+TEST(FrameSmoother, ResetForgetsEverything) {
+  FrameSmoother smoother(smooth_s, gap_s);
+  smoother.add(1.0, {1e30, 5.0});
+  smoother.add(1.01, {1e30, 5.0});
+  smoother.reset();
+  EXPECT_EQ(smoother.add(0.5, {2.0, nan}), (std::vector<double>{2.0, 0.0}));
+}
+
+// Where times do not advance, 256 frames are kept, of those the last.
+TEST(FrameSmoother, TimesThatStandStillKeepABoundedWindow) {
+  FrameSmoother smoother(smooth_s, gap_s);
+  for (int i = 0; i < 1000; ++i) {
+    smoother.add(1.0, {100.0});
+  }
+  // The median of the first is still 100.
+  for (int i = 0; i < 255; ++i) {
+    smoother.add(1.0, {1.0});
+  }
+  EXPECT_EQ(smoother.add(1.0, {1.0})[0], (100.0 + 255.0) / 256.0);
+  EXPECT_EQ(smoother.add(1.0, {1.0})[0], 1.0);
+}
+
+}  // namespace
+}  // namespace palpate
