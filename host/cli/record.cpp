@@ -8,6 +8,7 @@
 #include <CLI/CLI.hpp>
 
 #include "commands.hpp"
+#include "input_file.hpp"
 #include "interruption.hpp"
 #include "options.hpp"
 #include "palpate/baseline.hpp"
@@ -109,6 +110,9 @@ void record(const Options& options) {
     require_above("--seconds", *options.seconds, 0.0);
   }
   require_above("--tare", options.tare_s, 0.0, true);
+  if (!is_printable_utf8(options.object)) {
+    throw Error(Fault::input, "--object: give printable text, in UTF-8");
+  }
   std::unique_ptr<Sensor> sensor = open_sensor(options.sensor);
   PosedSensor* posed = nullptr;
   if (!options.poses.empty()) {
