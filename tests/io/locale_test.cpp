@@ -2,10 +2,8 @@
 
 #include <gtest/gtest.h>
 
-#include <clocale>
-#include <locale>
-
 #include "element_file.hpp"
+#include "host_locale.hpp"
 #include "palpate/files.hpp"
 #include "palpate/scene.hpp"
 #include "palpate/simulation.hpp"
@@ -13,26 +11,6 @@
 
 namespace palpate {
 namespace {
-
-// "1.500,25", as in much of Europe.
-class DecimalComma : public std::numpunct<char> {
-  char do_decimal_point() const override { return ','; }
-  char do_thousands_sep() const override { return '.'; }
-  std::string do_grouping() const override { return "\3"; }
-};
-
-// Sets C++'s global locale for a while.
-class HostLocale {
- public:
-  HostLocale()
-      : before_(std::locale::global(std::locale(std::locale::classic(), new DecimalComma))) {}
-  ~HostLocale() { std::locale::global(before_); }
-  HostLocale(const HostLocale&) = delete;
-  HostLocale& operator=(const HostLocale&) = delete;
-
- private:
-  std::locale before_;
-};
 
 class HostWithDecimalCommas : public testing::Test {
  protected:
