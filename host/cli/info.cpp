@@ -27,7 +27,8 @@ std::string closed_of(const std::string& path, const Recording& r) {
     case Recorder::there:
       return "no: it is being recorded";
     case Recorder::gone:
-      return "no: it was cut off; other programs open it after: palpate info --close " + path;
+      return "no: it was cut off; h5py opens it only with swmr=True, until palpate info --close " +
+             path;
     case Recorder::unknown:
       break;
   }

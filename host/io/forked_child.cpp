@@ -141,6 +141,7 @@ bool ForkedChild::read(void* data, std::size_t bytes) {
   char* rest = static_cast<char*>(data);
   while (bytes > 0) {
     if (!wait_for_answer(socket_.get(), silence_)) {
+      fell_silent_ = true;
       return false;
     }
     const ssize_t got = ::read(socket_.get(), rest, bytes);

@@ -39,6 +39,8 @@ class ForkedChild {
 
   /// Reads exactly so many bytes; false where the child has ended or been silent for too long.
   bool read(void* data, std::size_t bytes);
+  /// Whether read() gave up a child that was silent for too long.
+  bool fell_silent() const { return fell_silent_; }
   /// Sends a request; false where the child has ended.
   bool write(const void* data, std::size_t bytes);
 
@@ -46,6 +48,7 @@ class ForkedChild {
   pid_t pid_ = -1;
   Descriptor socket_;
   std::chrono::milliseconds silence_;
+  bool fell_silent_ = false;
 };
 
 // For `work`, in the child.

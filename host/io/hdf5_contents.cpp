@@ -10,6 +10,7 @@
 #include "hdf5_handle.hpp"
 #include "hdf5_rows.hpp"
 #include "input_file.hpp"
+#include "palpate/error.hpp"
 #include "recording_state.hpp"
 
 namespace palpate {
@@ -83,8 +84,7 @@ class Receiver {
 
 Hdf5Contents::Hdf5Contents(const std::filesystem::path& path,
                            const std::vector<std::string>& attributes,
-                           const std::vector<std::string>& datasets,
-                           std::optional<std::chrono::milliseconds> silence)
+                           const std::vector<std::string>& datasets)
     : path_(path) {
   const std::uint64_t file_bytes = require_readable(path);
   if (file_bytes == 0) {
@@ -92,12 +92,12 @@ Hdf5Contents::Hdf5Contents(const std::filesystem::path& path,
   }
   // Before the file is opened: what is closed by then is read as a whole.
   closed_ = !is_marked_open(path);
-  child_.emplace([&](int socket) { serve_hdf5(socket, path, file_bytes, attributes, datasets); },
-                 ForkedLimits{.cpu_seconds = cpu_seconds,
-                              .memory_bytes = memory_bytes,
-                              .silence = silence.value_or(
-                                  1min + std::chrono::seconds(file_bytes / bytes_per_second))},
-                 hdf5_mutex);
+  child_.emplace(
+      [&](int socket) { serve_hdf5(socket, path, file_bytes, attributes, datasets); },
+      ForkedLimits{.cpu_seconds = cpu_seconds,
+                   .memory_bytes = memory_bytes,
+                   .silence = 1min + std::chrono::seconds(file_bytes / bytes_per_second)},
+      hdf5_mutex);
   receive(datasets);
 }
 
@@ -131,6 +131,12 @@ void Hdf5Contents::receive(const std::vector<std::string>& datasets) {
 }
 
 void Hdf5Contents::refuse_damaged() const {
+  if (child_->fell_silent()) {
+    throw Error(Fault::system,
+                fmt::format("{}: cannot be read: its disk does not answer; copy it to "
+                            "another disk",
+                            path_.string()));
+  }
   refuse("is damaged: the HDF5 library failed on it; copy or record it again");
 }
 

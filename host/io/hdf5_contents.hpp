@@ -1,6 +1,5 @@
 #pragma once
 
-#include <chrono>
 #include <cstdint>
 #include <filesystem>
 #include <functional>
@@ -40,11 +39,9 @@ class Hdf5Contents {
   /// and some of them.
   using Take = std::function<void(std::uint64_t first, std::span<const double> numbers)>;
 
-  /// @param silence how long the file may say nothing; by default a minute and a second per MiB.
   /// @throws Error where the file is missing, unreadable, no HDF5 file, truncated or damaged.
   Hdf5Contents(const std::filesystem::path& path, const std::vector<std::string>& attributes,
-               const std::vector<std::string>& datasets,
-               std::optional<std::chrono::milliseconds> silence = {});
+               const std::vector<std::string>& datasets);
 
   /// False for a file that is being written or whose writer was killed: see FrameRecorder.
   bool closed() const { return closed_; }

@@ -75,7 +75,12 @@ TEST_F(Forked, ChildThatWaitsForEverIsGivenUp) {
       ::pause();
     }
   };
-  EXPECT_EQ(answer(wait, 1, {.cpu_seconds = 5, .memory_bytes = 1 << 24, .silence = 20ms}), "");
+  {
+    ForkedChild child(wait, {.cpu_seconds = 5, .memory_bytes = 1 << 24, .silence = 20ms}, mutex_);
+    char byte = 0;
+    EXPECT_FALSE(child.read(&byte, 1));
+    EXPECT_TRUE(child.fell_silent());
+  }
   EXPECT_EQ(::waitpid(-1, nullptr, WNOHANG), -1) << "a child is left behind";
 }
 

@@ -11,6 +11,8 @@
 namespace palpate {
 namespace {
 
+constexpr H5Z_filter_t filter_id = 40000;  // of nobody
+
 class OutsideFile : public testing::Test {
  protected:
   OutsideFile() {
@@ -26,6 +28,9 @@ class OutsideFile : public testing::Test {
   void expect_refused(const std::function<void(hid_t)>& change, const char* word) {
     recording_parts().without("pressure").save(path_);
     edit(path_, change);
+    if (H5Zfilter_avail(filter_id) > 0) {
+      H5Zunregister(filter_id);  // it was there to write the file
+    }
     expect_named(input_error([&] { read_recording(path_); }), {path_.c_str(), "'pressure'", word});
   }
 
@@ -116,6 +121,33 @@ TEST_F(OutsideFile, VirtualDatasetsAreNotResolved) {
           "virtual");
     }
   }
+}
+
+// A file must not choose which code is loaded.
+TEST_F(OutsideFile, FiltersAreNotLoaded) {
+  // A FIFO among the plugins: whoever opens it waits.
+  ASSERT_EQ(::mkfifo((folder_ / "libfilter.so").c_str(), 0600), 0);
+  H5PLprepend(folder_.path().c_str());
+  expect_refused(
+      [&](hid_t file) {
+        const auto pass = [](unsigned, size_t, const unsigned*, size_t bytes, size_t*,
+                             void**) -> size_t { return bytes; };
+        const H5Z_class2_t filter{H5Z_CLASS_T_VERS, filter_id, 1,       1,
+                                  "test",           nullptr,   nullptr, pass};
+        ASSERT_GE(H5Zregister(&filter), 0);
+        const Hdf5Handle creation(H5Pcreate(H5P_DATASET_CREATE), H5Pclose);
+        const hsize_t chunk[] = {2, 3};
+        H5Pset_chunk(creation.get(), 2, chunk);
+        H5Pset_filter(creation.get(), filter.id, H5Z_FLAG_MANDATORY, 0, nullptr);
+        create(file, creation.get());
+        const Hdf5Handle dataset(H5Dopen2(file, "pressure", H5P_DEFAULT), H5Dclose);
+        const std::vector<float> values(6, 1.0F);
+        EXPECT_GE(
+            H5Dwrite(dataset.get(), H5T_NATIVE_FLOAT, H5S_ALL, H5S_ALL, H5P_DEFAULT, values.data()),
+            0);
+      },
+      "cannot be read");
+  H5PLremove(0);
 }
 
 // Within the file a link is as good as the dataset.
