@@ -2,11 +2,12 @@
 
 #include <algorithm>
 #include <charconv>
-#include <cmath>
+#include <optional>
 #include <set>
 
 #include <fmt/format.h>
 
+#include "number_text.hpp"
 #include "palpate/error.hpp"
 
 namespace palpate {
@@ -46,12 +47,12 @@ std::string ProfileEntry::text() const {
 }
 
 double ProfileEntry::number(double least, double most) const {
-  double value = 0;
-  if (!node.IsScalar() || !YAML::convert<double>::decode(node, value) ||
-      !(value >= least && value <= most)) {
+  // Not yaml-cpp's conversion, which reads 1.500 as 1500 where the locale has decimal commas.
+  const std::optional<double> value = node.IsScalar() ? number_of(node.Scalar()) : std::nullopt;
+  if (!value || *value < least || *value > most) {
     refuse(fmt::format("give a number from {:g} to {:g}", least, most));
   }
-  return value;
+  return *value;
 }
 
 std::uint32_t ProfileEntry::integer(std::uint32_t least, std::uint32_t most) const {

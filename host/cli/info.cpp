@@ -1,52 +1,51 @@
 #include "commands.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <memory>
-#include <numeric>
 #include <string>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <CLI/CLI.hpp>
 
+#include "file_summary.hpp"
 #include "options.hpp"
 #include "palpate/error.hpp"
 #include "palpate/files.hpp"
+#include "recording_state.hpp"
 
 namespace palpate::cli {
 
 namespace {
 
-/// What the elements that are alive read; a dead one's pressure may be anything, and a frame's may
-/// be NaN, Unknown.
-std::vector<double> live_pressures(const Recording& r, std::size_t& unknown) {
-  std::vector<double> pressures;
-  for (std::size_t k = 0; k < r.pressure.size(); ++k) {
-    if (r.valid.empty() || r.valid[k % r.valid.size()] != 0) {
-      if (std::isnan(r.pressure[k])) {
-        ++unknown;
-      } else {
-        pressures.push_back(r.pressure[k]);
-      }
-    }
+/// Whether other programs can open the file, and what to do where they cannot.
+std::string closed_of(const std::string& path, const Recording& r) {
+  if (r.closed) {
+    return "yes";
   }
-  return pressures;
+  switch (recorder_of(path)) {
+    case Recorder::there:
+      return "no: it is being recorded";
+    case Recorder::gone:
+      return "no: it was cut off; h5py opens it only with swmr=True, until palpate info --close " +
+             path;
+    case Recorder::unknown:
+      break;
+  }
+  return "no: it is being recorded, or was cut off";
 }
 
 /// What a stream of frames has besides.
-void print_stream(const Recording& r) {
-  if (!r.time_s.empty() && r.time_s.back() > r.time_s.front()) {
+void print_stream(const std::string& path, const RecordingSummary& s) {
+  const Recording& r = s.head;
+  if (s.first_s && *s.last_s > *s.first_s) {
     fmt::print("  rate              {:.1f} Hz\n",
-               static_cast<double>(r.size() - 1) / (r.time_s.back() - r.time_s.front()));
+               static_cast<double>(s.rows - 1) / (*s.last_s - *s.first_s));
   }
-  if (!r.lost_before.empty()) {
-    fmt::print("  lost              {} frames\n",
-               std::accumulate(r.lost_before.begin(), r.lost_before.end(), std::uint64_t{0}));
+  if (s.lost) {
+    fmt::print("  lost              {} frames\n", *s.lost);
   }
-  const auto posed = std::count_if(r.T_robot_sensor.begin(), r.T_robot_sensor.end(),
-                                   [](const Pose& pose) { return !std::isnan(pose.theta_rad); });
-  fmt::print("  with a pose       {} frames\n", posed);
+  fmt::print("  with a pose       {} frames\n", s.with_pose);
   if (r.baseline.empty()) {
     fmt::print("  baseline          none\n");
   } else {
@@ -57,33 +56,32 @@ void print_stream(const Recording& r) {
     fmt::print("  sensor            {}{}\n", r.sensor,
                r.serial.empty() ? "" : ", serial " + r.serial);
   }
-  fmt::print("  closed            {}\n",
-             r.closed ? "yes" : "no: it is being recorded, or was cut off");
+  fmt::print("  closed            {}\n", closed_of(path, r));
 }
 
 void print_recording(const std::string& path) {
-  const Recording r = read_recording(path);
+  const RecordingSummary s = summarize_recording(path);
+  const Recording& r = s.head;
   fmt::print("{}: recording of {}\n", path, r.object.empty() ? "an unknown object" : r.object);
-  fmt::print("  {}           {}\n", r.rows, r.size());
-  fmt::print("  elements          {}{}\n", r.elements(),
-             r.elements_mm.size() == r.elements() ? "" : ", positions change per touch");
-  std::size_t unknown = 0;
-  if (const std::vector<double> pressures = live_pressures(r, unknown); !pressures.empty()) {
-    const auto [least, most] = std::minmax_element(pressures.begin(), pressures.end());
-    fmt::print("  pressure          {:.3g} to {:.3g} {}\n", *least, *most, r.pressure_unit);
+  fmt::print("  {}           {}\n", r.rows, s.rows);
+  fmt::print("  elements          {}{}\n", s.elements,
+             s.array_changes ? ", positions change per touch" : "");
+  if (s.pressure) {
+    fmt::print("  pressure          {:.3g} to {:.3g} {}\n", s.pressure->least, s.pressure->most,
+               r.pressure_unit);
   }
-  if (unknown > 0) {
-    fmt::print("  unknown readings  {} of {}\n", unknown, r.pressure.size());
+  if (s.unknown_readings > 0) {
+    fmt::print("  unknown readings  {} of {}\n", s.unknown_readings, s.rows * s.elements);
   }
   if (!r.valid.empty()) {
     fmt::print("  dead readings     {} of {}\n", std::count(r.valid.begin(), r.valid.end(), 0),
                r.valid.size());
   }
-  if (!r.time_s.empty()) {
-    fmt::print("  duration          {:.3f} s\n", r.time_s.back() - r.time_s.front());
+  if (s.first_s) {
+    fmt::print("  duration          {:.3f} s\n", *s.last_s - *s.first_s);
   }
   if (r.rows == "frames") {
-    print_stream(r);
+    print_stream(path, s);
   }
   if (r.truth) {
     const Pose& T = r.truth->T_object_robot;
@@ -93,10 +91,8 @@ void print_recording(const std::string& path) {
 }
 
 void print_map(const std::string& path) {
-  const OccupancyGrid m = read_map(path);
-  const auto [least, most] = std::minmax_element(m.log_odds.begin(), m.log_odds.end());
-  const auto occupied =
-      std::count_if(m.log_odds.begin(), m.log_odds.end(), [](float l) { return l > 0.0F; });
+  const MapSummary s = summarize_map(path);
+  const OccupancyGrid& m = s.head;
   fmt::print("{}: map of {}\n", path, m.label);
   fmt::print("  cells             {} x {} of {} mm, {:.1f} x {:.1f} mm\n", m.nx, m.ny, m.cell_mm,
              m.nx * m.cell_mm, m.ny * m.cell_mm);
@@ -106,14 +102,15 @@ void print_map(const std::string& path) {
     fmt::print("  spread            {} mm, of the sensor model that built it\n", *m.spread_mm);
   }
   fmt::print("  prior             {:.4f}, log odds {:.3f}\n", m.prior, m.prior_log_odds());
-  fmt::print("  log odds          {:.3f} to {:.3f} nats\n", *least, *most);
-  fmt::print("  occupied          {} cells, {:.1f} mm2\n", occupied,
-             static_cast<double>(occupied) * m.cell_mm * m.cell_mm);
+  fmt::print("  log odds          {:.3f} to {:.3f} nats\n", s.log_odds.least, s.log_odds.most);
+  fmt::print("  occupied          {} cells, {:.1f} mm2\n", s.occupied,
+             static_cast<double>(s.occupied) * m.cell_mm * m.cell_mm);
   fmt::print("  symmetry          {}\n", m.symmetry == 0 ? "full" : fmt::format("{}", m.symmetry));
 }
 
 void print_posterior(const std::string& path) {
-  const Posterior p = read_posterior(path);
+  const PosteriorSummary s = summarize_posterior(path);
+  const Posterior& p = s.head;
   const PoseLattice& lattice = p.lattice;
   fmt::print("{}: posterior over {}\n", path, fmt::join(p.objects, ", "));
   fmt::print("  bins              {} x {} x {} (x, y, theta) per object\n", lattice.x_mm.count,
@@ -123,18 +120,25 @@ void print_posterior(const std::string& path) {
   fmt::print("  theta             {:.1f} to {:.1f} deg\n", degrees(lattice.theta_rad.lower),
              degrees(lattice.theta_rad.upper));
   fmt::print("  pivot             {}, {} mm\n", lattice.pivot_mm.x, lattice.pivot_mm.y);
-  const auto bins = static_cast<std::size_t>(lattice.bins());
   for (std::size_t i = 0; i < p.objects.size(); ++i) {
-    const auto begin = p.log_likelihood.begin() + static_cast<std::ptrdiff_t>(i * bins);
-    const auto most = std::max_element(begin, begin + static_cast<std::ptrdiff_t>(bins));
-    const Pose T = lattice.T_object_robot(most - begin);
+    const auto& [log_likelihood, bin] = s.peaks[i];
+    const Pose T = lattice.T_object_robot(bin);
     fmt::print("  {:16}  largest {:.3f} nats at x {:.2f} mm, y {:.2f} mm, theta {:.1f} deg\n",
-               p.objects[i], *most, T.translation_mm.x, T.translation_mm.y, degrees(T.theta_rad));
+               p.objects[i], log_likelihood, T.translation_mm.x, T.translation_mm.y,
+               degrees(T.theta_rad));
   }
 }
 
-void print_info(const std::string& path) {
+void print_info(const std::string& path, bool close) {
   const std::string format = read_format(path);
+  if (close) {
+    if (format != "palpate.recording") {
+      throw Error(
+          Fault::input,
+          fmt::format("{}: format '{}' is never cut off; give --close a recording", path, format));
+    }
+    close_recording(path);
+  }
   if (format == "palpate.recording") {
     print_recording(path);
   } else if (format == "palpate.map") {
@@ -153,9 +157,17 @@ void print_info(const std::string& path) {
 
 void add_info(CLI::App& app) {
   auto* command = app.add_subcommand("info", "Say what a recording, a map or a posterior holds");
-  const auto path = std::make_shared<std::string>();
-  command->add_option("FILE", *path, "HDF5 file")->required();
-  command->callback([path] { print_info(*path); });
+  struct Options {
+    std::string path;
+    bool close = false;
+  };
+  const auto options = std::make_shared<Options>();
+  command->add_option("FILE", options->path, "HDF5 file")->required();
+  command->add_flag("--close", options->close,
+                    "First close a recording that was cut off, in its place, so that programs "
+                    "other than Palpate open it (h5py needs swmr=True before). Its whole rows are "
+                    "kept. One that is being recorded is refused");
+  command->callback([options] { print_info(options->path, options->close); });
 }
 
 }  // namespace palpate::cli

@@ -15,6 +15,7 @@
 #include "command_files.hpp"
 #include "figures.hpp"
 #include "input_file.hpp"
+#include "number_text.hpp"
 #include "options.hpp"
 #include "palpate/error.hpp"
 #include "palpate/files.hpp"
@@ -100,13 +101,12 @@ MapOptions map_options(const Options& options, const std::vector<Recording>& rec
 }
 
 double parse_prior(const std::string& text) {
-  char* end = nullptr;
-  const double prior = std::strtod(text.c_str(), &end);
-  if (text.empty() || *end != '\0' || !(prior > 0.0 && prior < 1.0)) {
+  const std::optional<double> prior = number_of(text);
+  if (!prior || !(*prior > 0.0 && *prior < 1.0)) {
     throw Error(Fault::input,
                 fmt::format("--prior {}: give auto, or a probability between 0 and 1", text));
   }
-  return prior;
+  return *prior;
 }
 
 std::filesystem::path ros_path(const Options& options, const std::string& label) {

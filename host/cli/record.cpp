@@ -12,6 +12,7 @@
 
 #include "command_files.hpp"
 #include "commands.hpp"
+#include "input_file.hpp"
 #include "interruption.hpp"
 #include "options.hpp"
 #include "palpate/baseline.hpp"
@@ -208,6 +209,9 @@ void record(const Options& options) {
                             options.sensor));
   }
   require_above("--tare", options.tare_s, 0.0, true);
+  if (!is_printable_utf8(options.object)) {
+    throw Error(Fault::input, "--object: give printable text, in UTF-8");
+  }
   std::unique_ptr<Sensor> sensor = open_sensor(options.sensor);
   PosedSensor* posed = nullptr;
   if (!options.poses.empty()) {

@@ -12,6 +12,7 @@
 #include "palpate/error.hpp"
 #include "palpate/files.hpp"
 #include "palpate/virtual_sensor.hpp"
+#include "recording_state.hpp"
 
 namespace palpate::cli {
 
@@ -47,6 +48,21 @@ void shorten_valid(Recording& recording, const std::vector<std::uint8_t>& dead) 
     }
   }
   recording.valid = dead;
+}
+
+/// Closes a stream that was cut off, whose touches are found, so that other programs open it too.
+void close_input(const std::string& frames) {
+  if (!is_marked_open(frames) || recorder_of(frames) != Recorder::gone) {
+    return;
+  }
+  try {
+    if (close_recording(frames)) {
+      fmt::print("{}: was cut off, and is closed now\n", frames);
+    }
+  } catch (const Error& error) {
+    // The touches are found; a disk for reading only is no reason to fail.
+    fmt::print("{}; only Palpate and readers of SWMR open it\n", error.what());
+  }
 }
 
 void find_touches(const Options& options) {
@@ -101,13 +117,18 @@ void find_touches(const Options& options) {
     fmt::print(", {} readings unknown", unknown);
   }
   fmt::print("\n");
+  close_input(options.frames);
 }
 
 }  // namespace
 
 void add_touches(CLI::App& app) {
   auto* command = app.add_subcommand(
-      "touches", "Find the touches in a recording of frames, for 'palpate map' and 'recognize'");
+      "touches",
+      "Find the touches in a recording of frames, for 'palpate map' and 'recognize'. A recording "
+      "of "
+      "frames that was cut off is closed afterwards, as by 'palpate info --close', so that other "
+      "programs open it");
   const auto options = std::make_shared<Options>();
   command->add_option("FRAMES", options->frames, "Recording of frames, of 'palpate record'")
       ->required();

@@ -1,6 +1,5 @@
 #include "atomic_file.hpp"
 
-#include <fcntl.h>
 #include <fmt/format.h>
 #include <unistd.h>
 
@@ -9,6 +8,7 @@
 #include <cstring>
 #include <system_error>
 
+#include "descriptor.hpp"
 #include "input_file.hpp"
 #include "palpate/error.hpp"
 
@@ -20,23 +20,6 @@ namespace {
   throw Error(Fault::system, fmt::format("{}: cannot {}: {}; free or repair the disk and try again",
                                          target.string(), action, std::strerror(errno)));
 }
-
-class Descriptor {
- public:
-  Descriptor(const std::filesystem::path& path, int flags, mode_t mode = 0)
-      : descriptor_(::open(path.c_str(), flags | O_CLOEXEC, mode)) {}
-  ~Descriptor() {
-    if (descriptor_ >= 0) {
-      ::close(descriptor_);
-    }
-  }
-  Descriptor(const Descriptor&) = delete;
-  Descriptor& operator=(const Descriptor&) = delete;
-  int get() const { return descriptor_; }
-
- private:
-  int descriptor_;
-};
 
 std::filesystem::path folder_of(const std::filesystem::path& target) {
   return target.has_parent_path() ? target.parent_path() : ".";
@@ -66,7 +49,7 @@ AtomicFile::AtomicFile(const std::filesystem::path& target) : target_(target) {
   static std::atomic<unsigned> serial = 0;
   for (;;) {
     std::filesystem::path name = folder / fmt::format(".palpate-{}-{}.part", ::getpid(), serial++);
-    if (Descriptor(name, O_WRONLY | O_CREAT | O_EXCL, 0666).get() >= 0) {
+    if (Descriptor(name, O_WRONLY | O_CREAT | O_EXCL, 0666).valid()) {
       temporary_ = std::move(name);
       return;
     }
@@ -85,7 +68,7 @@ AtomicFile::~AtomicFile() {
 
 void AtomicFile::write(std::string_view bytes) {
   const Descriptor file(temporary_, O_WRONLY | O_TRUNC);
-  if (file.get() < 0) {
+  if (!file.valid()) {
     fail(target_, "open its temporary file");
   }
   while (!bytes.empty()) {
@@ -101,7 +84,7 @@ void AtomicFile::write(std::string_view bytes) {
 void AtomicFile::commit() {
   {
     const Descriptor file(temporary_, O_RDONLY);
-    if (file.get() < 0 || ::fsync(file.get()) != 0) {
+    if (!file.valid() || ::fsync(file.get()) != 0) {
       fail(target_, "write");
     }
   }
@@ -111,7 +94,7 @@ void AtomicFile::commit() {
   temporary_.clear();
   // Makes the new name last through a power cut; file systems that cannot do it may refuse.
   const Descriptor folder(folder_of(target_), O_RDONLY | O_DIRECTORY);
-  if (folder.get() >= 0) {
+  if (folder.valid()) {
     ::fsync(folder.get());
   }
 }

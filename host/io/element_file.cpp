@@ -4,10 +4,10 @@
 
 #include <algorithm>
 #include <fstream>
-#include <sstream>
 #include <string>
 
 #include "input_file.hpp"
+#include "number_text.hpp"
 
 namespace palpate {
 
@@ -18,16 +18,14 @@ std::vector<glm::dvec2> read_elements(const std::filesystem::path& path) {
   std::string line;
   for (int number = 1; std::getline(file, line); ++number) {
     line.resize(std::min(line.find('#'), line.size()));
-    std::istringstream fields(line);
-    fields >> std::ws;
-    if (fields.eof()) {
+    if (line.find_first_not_of(" \t\r\v\f") == std::string::npos) {
       continue;
     }
-    glm::dvec2 element;
-    if (!(fields >> element.x >> element.y) || !(fields >> std::ws).eof()) {
+    const auto xy = two_numbers_of(line);
+    if (!xy) {
       refuse(path, fmt::format("line {} is not a position; write 'x y' in mm", number));
     }
-    elements.push_back(element);
+    elements.emplace_back((*xy)[0], (*xy)[1]);
   }
   if (elements.empty()) {
     refuse(path, "holds no element; write a line 'x y' in mm for each");

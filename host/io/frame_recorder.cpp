@@ -10,11 +10,15 @@
 #include <utility>
 #include <vector>
 
+#include "descriptor.hpp"
 #include "file_format.hpp"
 #include "hdf5_failure.hpp"
 #include "hdf5_writer.hpp"
 #include "input_file.hpp"
 #include "palpate/error.hpp"
+#include "printable.hpp"
+#include "recording_rules.hpp"
+#include "recording_state.hpp"
 
 namespace palpate {
 
@@ -41,13 +45,25 @@ struct Rows {
   void clear() { *this = {}; }
 };
 
-// What a board says of itself may be anything; no reader takes that.
-std::string printable(std::string text) {
-  if (!is_printable_utf8(text)) {
-    std::replace_if(
-        text.begin(), text.end(), [](char c) { return c < ' ' || c > '~'; }, '?');
-  }
-  return text;
+// What a recording says besides its rows.
+Recording head_of(const SensorDescription& sensor) {
+  Recording head;
+  head.rows = "frames";
+  head.object = sensor.object;
+  head.pressure_unit = sensor.pressure_unit;
+  head.elements_mm = sensor.elements_mm;
+  head.valid = sensor.valid;
+  head.baseline = sensor.baseline;
+  head.truth = sensor.truth;
+  // What a board says of itself may be anything; no reader takes that.
+  head.sensor = printable(sensor.name);
+  head.serial = printable(sensor.serial);
+  return head;
+}
+
+// What is added to a count of frames that a board may have made up.
+void count_lost(std::uint64_t& count, std::uint64_t more) {
+  count = more < largest_count - count ? count + more : largest_count;
 }
 
 }  // namespace
@@ -56,8 +72,8 @@ struct FrameRecorder::Impl {
   Impl(std::filesystem::path file_path, SensorDescription description)
       : path(std::move(file_path)), sensor(std::move(description)) {}
 
-  void require_consistent() const;
   bool alive(std::size_t element) const { return sensor.valid.empty() || sensor.valid[element]; }
+  void require_recordable() const;
   bool readable(const Frame& frame) const;
   bool due() const;
   void save();
@@ -89,14 +105,17 @@ struct FrameRecorder::Impl {
   Hdf5Handle time{H5I_INVALID_HID, H5Dclose};
 };
 
-void FrameRecorder::Impl::require_consistent() const {
+void FrameRecorder::Impl::require_recordable() const {
   const std::size_t e = sensor.elements_mm.size();
   const auto fits = [&](const auto& list) { return list.empty() || list.size() == e; };
   if (e == 0 || !fits(sensor.valid) || !fits(sensor.baseline)) {
-    refuse(path, fmt::format("sensor '{}' has {} elements, {} valid and {} baseline values; make "
-                             "them agree",
-                             sensor.name, e, sensor.valid.size(), sensor.baseline.size()));
+    refuse(path,
+           fmt::format("sensor '{}' has {} elements, {} valid and {} baseline values; make "
+                       "them agree",
+                       printable(sensor.name), e, sensor.valid.size(), sensor.baseline.size()));
   }
+  require_head(path, head_of(sensor), e);
+  require_elements(path, 0, sensor.elements_mm);
 }
 
 bool FrameRecorder::Impl::readable(const Frame& frame) const {
@@ -142,8 +161,9 @@ void FrameRecorder::Impl::create() {
     out.attribute("pressure_unit", sensor.pressure_unit);
     out.attribute("length_unit", "mm");
     out.attribute("rows", "frames");
-    out.attribute("sensor", printable(sensor.name));
-    out.attribute("serial", printable(sensor.serial));
+    const Recording head = head_of(sensor);
+    out.attribute("sensor", head.sensor);
+    out.attribute("serial", head.serial);
     if (sensor.truth) {
       const Pose& T = sensor.truth->T_object_robot;
       out.attribute("true_object", sensor.truth->object);
@@ -178,7 +198,14 @@ void FrameRecorder::Impl::create() {
   const Hdf5Handle access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose);
   set_appendable(access.get());
   H5Pset_file_locking(access.get(), true, true);  // some network file systems have no locks
-  file = {H5Fopen(path.c_str(), H5F_ACC_RDWR | H5F_ACC_SWMR_WRITE, access.get()), H5Fclose};
+  {
+    const StandardDescriptorsTaken taken;
+    file = {H5Fopen(path.c_str(), H5F_ACC_RDWR | H5F_ACC_SWMR_WRITE, access.get()), H5Fclose};
+  }
+  // HDF5 holds its own lock only while it opens a file that may be read meanwhile.
+  if (void* descriptor = nullptr; H5Fget_vfd_handle(file.get(), H5P_DEFAULT, &descriptor) >= 0) {
+    mark_as_being_recorded(*static_cast<int*>(descriptor));
+  }
   const auto open = [&](const char* name) {
     return Hdf5Handle(H5Dopen2(file.get(), name, H5P_DEFAULT), H5Dclose);
   };
@@ -248,7 +275,7 @@ void FrameRecorder::Impl::close() {
 
 FrameRecorder::FrameRecorder(std::filesystem::path path, SensorDescription sensor)
     : impl_(std::make_unique<Impl>(std::move(path), std::move(sensor))) {
-  impl_->require_consistent();
+  impl_->require_recordable();
 }
 
 FrameRecorder::~FrameRecorder() {
@@ -268,7 +295,7 @@ void FrameRecorder::set_baseline(std::vector<double> baseline) {
   Impl& r = *impl_;
   std::swap(r.sensor.baseline, baseline);
   try {
-    r.require_consistent();
+    r.require_recordable();
   } catch (...) {
     std::swap(r.sensor.baseline, baseline);
     throw;
@@ -291,11 +318,11 @@ void FrameRecorder::add(const Frame& frame) {
     refuse(r.path, fmt::format("a frame has {} values but the sensor {} elements; record one array",
                                frame.values.size(), r.sensor.elements_mm.size()));
   }
-  r.lost += frame.lost_before;
-  r.lost_since += frame.lost_before;
+  count_lost(r.lost, frame.lost_before);
+  count_lost(r.lost_since, frame.lost_before);
   if (!r.readable(frame)) {
-    ++r.lost;
-    ++r.lost_since;
+    count_lost(r.lost, 1);
+    count_lost(r.lost_since, 1);
     return;
   }
   Rows& rows = r.pending;
@@ -307,10 +334,13 @@ void FrameRecorder::add(const Frame& frame) {
     rows.pressure.push_back(static_cast<float>(none ? unknown : frame.values[i]));
     r.unknown_readings += none ? 1 : 0;
   }
-  const Pose pose = frame.T_robot_sensor.value_or(Pose{{unknown, unknown}, unknown});
+  // A pose that is no pose costs itself, not the frame, and never the recording.
+  const bool posed = frame.T_robot_sensor && is_finite(*frame.T_robot_sensor);
+  const Pose pose = posed ? *frame.T_robot_sensor : Pose{{unknown, unknown}, unknown};
   rows.sensor_pose.insert(rows.sensor_pose.end(),
                           {pose.translation_mm.x, pose.translation_mm.y, pose.theta_rad});
-  rows.device_time_s.push_back(frame.device_time_s.value_or(unknown));
+  const double device_time_s = frame.device_time_s.value_or(unknown);
+  rows.device_time_s.push_back(std::isfinite(device_time_s) ? device_time_s : unknown);
   rows.lost_before.push_back(std::exchange(r.lost_since, 0));
   rows.time_s.push_back(frame.host_time_s);
   ++r.frames;

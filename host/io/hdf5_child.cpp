@@ -5,35 +5,20 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include "forked_call.hpp"
+#include "forked_child.hpp"
 #include "hdf5_contents.hpp"
 #include "hdf5_handle.hpp"
+#include "hdf5_rows.hpp"
 
 namespace palpate {
 
 namespace {
 
-constexpr const char* damaged = "cannot be read: the file is damaged; copy or record it again";
-
-// What attributes and datasets do alike.
-struct Access {
-  hid_t (*type)(hid_t);
-  hid_t (*space)(hid_t);
-  herr_t (*read)(hid_t id, hid_t memory_type, void* values);
-};
-
-constexpr Access attribute_access{H5Aget_type, H5Aget_space, H5Aread};
-constexpr Access dataset_access{
-    H5Dget_type, H5Dget_space, [](hid_t id, hid_t memory_type, void* values) {
-      return H5Dread(id, memory_type, H5S_ALL, H5S_ALL, H5P_DEFAULT, values);
-    }};
-
-void read_strings(hid_t id, const Access& access, hid_t type, hid_t space, std::size_t count,
-                  Hdf5Value& value) {
+void read_strings(hid_t attribute, hid_t type, hid_t space, std::size_t count, Hdf5Value& value) {
   if (H5Tis_variable_str(type) > 0) {
     std::vector<char*> texts(count, nullptr);
-    if (access.read(id, type, texts.data()) < 0) {
-      value.problem = damaged;
+    if (H5Aread(attribute, type, texts.data()) < 0) {
+      value.problem = hdf5_damaged;
       return;
     }
     for (const char* text : texts) {
@@ -44,8 +29,8 @@ void read_strings(hid_t id, const Access& access, hid_t type, hid_t space, std::
   }
   const std::size_t width = H5Tget_size(type);
   std::string texts(count * width, '\0');
-  if (access.read(id, type, texts.data()) < 0) {
-    value.problem = damaged;
+  if (H5Aread(attribute, type, texts.data()) < 0) {
+    value.problem = hdf5_damaged;
     return;
   }
   for (std::size_t i = 0; i < count; ++i) {
@@ -58,25 +43,14 @@ void read_strings(hid_t id, const Access& access, hid_t type, hid_t space, std::
   }
 }
 
-// Bytes of the values as stored; more than can be said is the largest number.
-std::uint64_t stored_bytes(const std::vector<std::uint64_t>& shape, std::size_t width) {
-  std::uint64_t bytes = width;
-  for (const std::uint64_t extent : shape) {
-    if (__builtin_mul_overflow(bytes, extent, &bytes)) {
-      return UINT64_MAX;
-    }
-  }
-  return bytes;
-}
-
-Hdf5Value read_value(hid_t id, const Access& access, std::uint64_t largest_bytes) {
+Hdf5Value read_attribute(hid_t attribute, std::uint64_t file_bytes) {
   Hdf5Value value;
-  const Hdf5Handle type(access.type(id), H5Tclose);
-  const Hdf5Handle space(access.space(id), H5Sclose);
+  const Hdf5Handle type(attribute >= 0 ? H5Aget_type(attribute) : -1, H5Tclose);
+  const Hdf5Handle space(attribute >= 0 ? H5Aget_space(attribute) : -1, H5Sclose);
   const int rank = space.valid() ? H5Sget_simple_extent_ndims(space.get()) : -1;
   const std::size_t width = type.valid() ? H5Tget_size(type.get()) : 0;
   if (rank < 0 || width == 0) {
-    value.problem = damaged;
+    value.problem = hdf5_damaged;
     return value;
   }
   std::vector<hsize_t> extents(static_cast<std::size_t>(rank));
@@ -90,12 +64,9 @@ Hdf5Value read_value(hid_t id, const Access& access, std::uint64_t largest_bytes
     value.problem = "has a type that Palpate does not read; store numbers or strings";
     return value;
   }
-  const std::uint64_t bytes = stored_bytes(value.shape, width);
-  if (bytes > largest_bytes) {
-    value.problem = fmt::format(
-        "has the shape {}, more than is stored of it: it is damaged or was never written; copy or "
-        "record it again",
-        value.shape);
+  const std::uint64_t bytes = hdf5_stored_bytes(value.shape, width);
+  if (bytes > file_bytes) {
+    value.problem = hdf5_damaged;
     return value;
   }
   const std::size_t count = bytes / width;
@@ -103,32 +74,21 @@ Hdf5Value read_value(hid_t id, const Access& access, std::uint64_t largest_bytes
     return value;
   }
   if (kind == H5T_STRING) {
-    read_strings(id, access, type.get(), space.get(), count, value);
+    read_strings(attribute, type.get(), space.get(), count, value);
     return value;
   }
   value.numbers.resize(count);
-  if (access.read(id, H5T_NATIVE_DOUBLE, value.numbers.data()) < 0) {
-    value.problem = damaged;
+  if (H5Aread(attribute, H5T_NATIVE_DOUBLE, value.numbers.data()) < 0) {
+    value.problem = hdf5_damaged;
   }
   return value;
 }
 
-// Bound of a dataset's size, from what is stored of it. A damaged shape would otherwise have
-// terabytes allocated before the first read fails.
-std::uint64_t largest_dataset(hid_t dataset, std::uint64_t file_bytes) {
-  const std::uint64_t stored = std::min<std::uint64_t>(H5Dget_storage_size(dataset), file_bytes);
-  const Hdf5Handle creation(H5Dget_create_plist(dataset), H5Pclose);
-  return creation.valid() && H5Pget_layout(creation.get()) == H5D_CHUNKED &&
-                 H5Pget_nfilters(creation.get()) > 0
-             ? stored * largest_compression
-             : stored;
-}
-
 class Sender {
  public:
-  explicit Sender(int descriptor) : descriptor_(descriptor) {}
+  explicit Sender(int socket) : socket_(socket) {}
 
-  void send(Hdf5Record kind) { forked_write(descriptor_, &kind, sizeof kind); }
+  void send(Hdf5Record kind) { forked_write(socket_, &kind, sizeof kind); }
 
   void send(Hdf5Record kind, const std::string& name, const Hdf5Value& value) {
     send(kind);
@@ -142,23 +102,24 @@ class Sender {
     }
   }
 
+  void refuse(std::string problem) {
+    Hdf5Value value;
+    value.problem = std::move(problem);
+    send(Hdf5Record::refused, "", value);
+    send(Hdf5Record::end);
+  }
+
  private:
-  void send_size(std::uint64_t size) { forked_write(descriptor_, &size, sizeof size); }
+  void send_size(std::uint64_t size) { forked_write(socket_, &size, sizeof size); }
 
   template <class List>
   void send_list(const List& list) {
     send_size(list.size());
-    forked_write(descriptor_, list.data(), list.size() * sizeof(typename List::value_type));
+    forked_write(socket_, list.data(), list.size() * sizeof(typename List::value_type));
   }
 
-  int descriptor_;
+  int socket_;
 };
-
-Hdf5Value problem(std::string text) {
-  Hdf5Value value;
-  value.problem = std::move(text);
-  return value;
-}
 
 // HDF5's own account of the last failure, where it began.
 std::string innermost_reason() {
@@ -182,57 +143,66 @@ std::string open_problem(const std::string& reason) {
   if (reason.find("lock file") != std::string::npos) {
     return "is being written by another program; wait until it is done";
   }
-  return damaged;
+  return hdf5_damaged;
 }
 
-}  // namespace
-
-void send_hdf5_values(int descriptor, const std::filesystem::path& path, std::uint64_t file_bytes,
-                      const std::vector<std::string>& attributes,
-                      const std::vector<std::string>& datasets) {
-  Sender sender(descriptor);
-  H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
-  H5PLset_loading_state(0);  // a file's filters must not load code
-  if (H5Fis_hdf5(path.c_str()) <= 0) {
-    sender.send(Hdf5Record::refused, "",
-                problem("is not an HDF5 file; give a file that Palpate or h5py wrote"));
-    sender.send(Hdf5Record::end);
-    return;
-  }
+// Invalid, with HDF5's account in `reason`, where the file cannot be opened.
+Hdf5Handle open_file(const std::filesystem::path& path, std::string& reason) {
   const Hdf5Handle access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose);
   H5Pset_file_locking(access.get(), true, true);  // some network file systems have no locks
   Hdf5Handle file(H5Fopen(path.c_str(), H5F_ACC_RDONLY, access.get()), H5Fclose);
   if (!file.valid()) {
-    const std::string reason = innermost_reason();
+    reason = innermost_reason();
     // A stream that is being recorded, or whose recorder was killed.
     file = {H5Fopen(path.c_str(), H5F_ACC_RDONLY | H5F_ACC_SWMR_READ, access.get()), H5Fclose};
-    if (!file.valid()) {
-      sender.send(Hdf5Record::refused, "", problem(open_problem(reason)));
-      sender.send(Hdf5Record::end);
-      return;
-    }
-    sender.send(Hdf5Record::unclosed, "", {});
+  }
+  return file;
+}
+
+}  // namespace
+
+void serve_hdf5(int socket, const std::filesystem::path& path, std::uint64_t file_bytes,
+                const std::vector<std::string>& attributes,
+                const std::vector<std::string>& datasets) {
+  Sender sender(socket);
+  H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
+  H5PLset_loading_state(0);          // a file's filters must not load code
+  H5Lunregister(H5L_TYPE_EXTERNAL);  // nor its links lead to other files, which may be FIFOs
+  if (H5Fis_hdf5(path.c_str()) <= 0) {
+    sender.refuse("is not an HDF5 file; give a file that Palpate or h5py wrote");
+    return;
+  }
+  std::string reason;
+  const Hdf5Handle file = open_file(path, reason);
+  if (!file.valid()) {
+    sender.refuse(open_problem(reason));
+    return;
   }
   for (const std::string& name : attributes) {
     if (const htri_t there = H5Aexists(file.get(), name.c_str()); there != 0) {
       const Hdf5Handle attribute(H5Aopen(file.get(), name.c_str(), H5P_DEFAULT), H5Aclose);
-      sender.send(Hdf5Record::attribute, name,
-                  attribute.valid() ? read_value(attribute.get(), attribute_access, file_bytes)
-                                    : problem(damaged));
+      sender.send(Hdf5Record::attribute, name, read_attribute(attribute.get(), file_bytes));
     }
   }
-  for (const std::string& name : datasets) {
+  std::map<std::uint64_t, Hdf5Rows> opened;
+  for (std::size_t i = 0; i < datasets.size(); ++i) {
+    const std::string& name = datasets[i];
     if (const htri_t there = H5Lexists(file.get(), name.c_str(), H5P_DEFAULT); there != 0) {
-      const Hdf5Handle dataset(H5Dopen2(file.get(), name.c_str(), H5P_DEFAULT), H5Dclose);
       // A file that is being written grows.
       file_bytes = std::max<std::uint64_t>(file_bytes, std::filesystem::file_size(path));
-      sender.send(Hdf5Record::dataset, name,
-                  dataset.valid() ? read_value(dataset.get(), dataset_access,
-                                               largest_dataset(dataset.get(), file_bytes))
-                                  : problem(damaged));
+      const Hdf5Rows& rows = opened.try_emplace(i, file.get(), name, file_bytes).first->second;
+      Hdf5Value value;
+      value.problem = rows.problem();
+      value.shape = rows.shape();
+      sender.send(Hdf5Record::dataset, name, value);
     }
   }
   sender.send(Hdf5Record::end);
+  for (;;) {
+    Hdf5Request request{};
+    forked_read(socket, &request, sizeof request);  // ends the child after the last
+    opened.at(request.dataset).send(socket, request.first, request.count);
+  }
 }
 
 }  // namespace palpate

@@ -1,33 +1,42 @@
 #include "hdf5_contents.hpp"
 
+#include <algorithm>
 #include <cmath>
-#include <cstring>
 #include <limits>
-#include <mutex>
 
 #include <fmt/format.h>
 
-#include "forked_call.hpp"
 #include "hdf5_child.hpp"
 #include "hdf5_handle.hpp"
+#include "hdf5_rows.hpp"
 #include "input_file.hpp"
+#include "palpate/error.hpp"
+#include "recording_state.hpp"
 
 namespace palpate {
 
 namespace {
 
-// Takes the stream of send_hdf5_values() apart. Nothing in it is trusted: a damaged file may have
+using namespace std::chrono_literals;
+
+// Milliseconds are usual; a child that needs this long to open a file loops.
+constexpr std::uint64_t cpu_seconds = 2;
+// Metadata and a piece of the numbers.
+constexpr std::uint64_t memory_bytes = 256 << 20;
+// The slowest disk that is worth waiting for.
+constexpr std::uint64_t bytes_per_second = 1 << 20;
+
+// Takes the first answer of serve_hdf5() apart. Nothing in it is trusted: a damaged file may have
 // corrupted the child's memory. Once a length does not fit, every further value is empty.
 class Receiver {
  public:
-  explicit Receiver(std::string_view stream) : rest_(stream) {}
+  explicit Receiver(ForkedChild& child) : child_(child) {}
 
   bool intact() const { return intact_; }
-  bool empty() const { return rest_.empty(); }
 
   Hdf5Record kind() {
     Hdf5Record value{};
-    copy(&value, 1, sizeof value);
+    copy(&value, sizeof value);
     return value;
   }
 
@@ -35,12 +44,13 @@ class Receiver {
   void list(List& values) {
     constexpr std::size_t width = sizeof(typename List::value_type);
     const std::uint64_t count = size();
-    if (count > rest_.size() / width) {
+    // No child had the memory for more.
+    if (count > memory_bytes / width) {
       intact_ = false;
       return;
     }
     values.resize(count);
-    copy(values.data(), count, width);
+    copy(values.data(), count * width);
   }
 
   void value(Hdf5Value& value) {
@@ -55,31 +65,20 @@ class Receiver {
  private:
   std::uint64_t size() {
     std::uint64_t value = 0;
-    copy(&value, 1, sizeof value);
+    copy(&value, sizeof value);
     return value;
   }
 
-  void copy(void* values, std::size_t count, std::size_t width) {
-    if (!intact_ || count > rest_.size() / width) {
-      intact_ = false;
-      return;
-    }
-    if (count > 0) {
-      std::memcpy(values, rest_.data(), count * width);
-      rest_.remove_prefix(count * width);
+  void copy(void* values, std::size_t bytes) {
+    intact_ = intact_ && child_.read(values, bytes);
+    if (!intact_) {
+      std::fill_n(static_cast<char*>(values), bytes, '\0');
     }
   }
 
-  std::string_view rest_;
+  ForkedChild& child_;
   bool intact_ = true;
 };
-
-// Milliseconds are usual; a child that needs this long loops.
-constexpr std::uint64_t cpu_seconds = 2;
-constexpr std::uint64_t cpu_bytes_per_second = 1 << 20;
-// Metadata, and bytes that were compressed as far as can be and widen to double.
-constexpr std::uint64_t memory_bytes = 256 << 20;
-constexpr std::uint64_t memory_bytes_per_byte = largest_compression * sizeof(double);
 
 }  // namespace
 
@@ -91,20 +90,22 @@ Hdf5Contents::Hdf5Contents(const std::filesystem::path& path,
   if (file_bytes == 0) {
     refuse("is empty; copy or record it again");
   }
-  std::string stream;
-  {
-    const std::lock_guard lock(hdf5_mutex);
-    stream = forked_call(
-        [&](int descriptor) {
-          send_hdf5_values(descriptor, path, file_bytes, attributes, datasets);
-        },
-        {.cpu_seconds = cpu_seconds + file_bytes / cpu_bytes_per_second,
-         .memory_bytes = memory_bytes + memory_bytes_per_byte * file_bytes});
-  }
-  Receiver receiver(stream);
+  // Before the file is opened: what is closed by then is read as a whole.
+  closed_ = !is_marked_open(path);
+  child_.emplace(
+      [&](int socket) { serve_hdf5(socket, path, file_bytes, attributes, datasets); },
+      ForkedLimits{.cpu_seconds = cpu_seconds,
+                   .memory_bytes = memory_bytes,
+                   .silence = 1min + std::chrono::seconds(file_bytes / bytes_per_second)},
+      hdf5_mutex);
+  receive(datasets);
+}
+
+void Hdf5Contents::receive(const std::vector<std::string>& datasets) {
+  Receiver receiver(*child_);
   for (;;) {
     const Hdf5Record kind = receiver.kind();
-    if (kind == Hdf5Record::end && receiver.intact() && receiver.empty()) {
+    if (kind == Hdf5Record::end && receiver.intact()) {
       return;
     }
     std::string name;
@@ -112,17 +113,31 @@ Hdf5Contents::Hdf5Contents(const std::filesystem::path& path,
     receiver.list(name);
     receiver.value(value);
     if (!receiver.intact()) {
-      refuse("is damaged: the HDF5 library failed on it; copy or record it again");
+      refuse_damaged();
     }
     if (kind == Hdf5Record::refused) {
       refuse(value.problem);
     }
-    if (kind == Hdf5Record::unclosed) {
-      closed_ = false;
+    if (kind == Hdf5Record::attribute) {
+      attributes_[name] = std::move(value);
       continue;
     }
-    (kind == Hdf5Record::attribute ? attributes_ : datasets_)[name] = std::move(value);
+    const auto found = std::find(datasets.begin(), datasets.end(), name);
+    if (found == datasets.end()) {
+      refuse_damaged();
+    }
+    datasets_[name] = {static_cast<std::uint64_t>(found - datasets.begin()), std::move(value)};
   }
+}
+
+void Hdf5Contents::refuse_damaged() const {
+  if (child_->fell_silent()) {
+    throw Error(Fault::system,
+                fmt::format("{}: cannot be read: its disk does not answer; copy it to "
+                            "another disk",
+                            path_.string()));
+  }
+  refuse("is damaged: the HDF5 library failed on it; copy or record it again");
 }
 
 std::string Hdf5Contents::text(const std::string& name) const {
@@ -174,23 +189,49 @@ int Hdf5Contents::integer(const std::string& name, int least) const {
   return static_cast<int>(value);
 }
 
-Hdf5Value& Hdf5Contents::dataset(const std::string& name, std::optional<std::size_t> rank) {
-  const auto found = datasets_.find(name);
-  if (found == datasets_.end()) {
-    refuse(fmt::format("dataset '{}' is missing; add it", name));
-  }
-  Hdf5Value& value = found->second;
-  if (!value.problem.empty()) {
-    refuse(fmt::format("dataset '{}' {}", name, value.problem));
-  }
-  if (!value.strings.empty()) {
-    refuse(fmt::format("dataset '{}' holds strings; store numbers", name));
-  }
+const std::vector<std::uint64_t>& Hdf5Contents::shape(const std::string& name,
+                                                      std::optional<std::size_t> rank) const {
+  const Hdf5Value& value = dataset(name).value;
   if (rank && value.shape.size() != *rank) {
     refuse(
         fmt::format("dataset '{}' has {} dimensions; give it {}", name, value.shape.size(), *rank));
   }
-  return value;
+  return value.shape;
+}
+
+std::uint64_t Hdf5Contents::count(const std::string& name) const {
+  return hdf5_stored_bytes(shape(name), 1);
+}
+
+void Hdf5Contents::read(const std::string& name, const Take& take, std::uint64_t rows) {
+  const Dataset& found = dataset(name);
+  const std::vector<std::uint64_t>& shape = found.value.shape;
+  std::uint64_t total = 1;
+  for (std::size_t axis = 0; axis < shape.size(); ++axis) {
+    total *= axis == 0 ? std::min(rows, shape[0]) : shape[axis];
+  }
+  if (total == 0) {
+    return;
+  }
+  const Hdf5Request request{found.index, 0, shape.empty() ? 1 : std::min(rows, shape[0])};
+  std::vector<double> piece;
+  bool intact = child_->write(&request, sizeof request);
+  for (std::uint64_t first = 0; intact && first < total; first += piece.size()) {
+    std::uint64_t count = 0;
+    intact = child_->read(&count, sizeof count);
+    if (intact && count == 0) {
+      refuse(fmt::format("dataset '{}' {}", name, hdf5_damaged));
+    }
+    intact = intact && count <= std::min(hdf5_piece, total - first);
+    piece.resize(intact ? count : 0);
+    intact = intact && child_->read(piece.data(), piece.size() * sizeof(double));
+    if (intact) {
+      take(first, piece);
+    }
+  }
+  if (!intact) {
+    refuse_damaged();
+  }
 }
 
 void Hdf5Contents::refuse(std::string_view message) const { palpate::refuse(path_, message); }
@@ -202,6 +243,17 @@ const Hdf5Value& Hdf5Contents::attribute(const std::string& name) const {
   }
   if (!found->second.problem.empty()) {
     refuse(fmt::format("attribute '{}' {}", name, found->second.problem));
+  }
+  return found->second;
+}
+
+const Hdf5Contents::Dataset& Hdf5Contents::dataset(const std::string& name) const {
+  const auto found = datasets_.find(name);
+  if (found == datasets_.end()) {
+    refuse(fmt::format("dataset '{}' is missing; add it", name));
+  }
+  if (const std::string& problem = found->second.value.problem; !problem.empty()) {
+    refuse(fmt::format("dataset '{}' {}", name, problem));
   }
   return found->second;
 }

@@ -1,9 +1,10 @@
 #include "hdf5_failure.hpp"
 
-#include <fcntl.h>
 #include <unistd.h>
 
 #include <string_view>
+
+#include "descriptor.hpp"
 
 namespace palpate {
 
@@ -31,9 +32,8 @@ void give_up_hdf5_file(hid_t file) {
     return;
   }
   // What is still to be written goes nowhere.
-  if (const int nowhere = ::open("/dev/null", O_RDWR | O_CLOEXEC); nowhere >= 0) {
-    ::dup3(nowhere, *static_cast<int*>(descriptor), O_CLOEXEC);
-    ::close(nowhere);
+  if (const Descriptor nowhere("/dev/null", O_RDWR); nowhere.valid()) {
+    ::dup3(nowhere.get(), *static_cast<int*>(descriptor), O_CLOEXEC);
   }
 }
 

@@ -1,14 +1,13 @@
 #include "input_file.hpp"
 
-#include <fcntl.h>
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <bit>
 #include <cerrno>
 #include <cstring>
 #include <system_error>
 
+#include "descriptor.hpp"
 #include "palpate/error.hpp"
 
 namespace palpate {
@@ -29,11 +28,9 @@ std::uintmax_t require_readable(const std::filesystem::path& path) {
   if (!failure && status.type() != std::filesystem::file_type::regular) {
     refuse(path, "is not a regular file; save the data to one first");
   }
-  const int descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
-  if (descriptor < 0) {
+  if (!Descriptor(path, O_RDONLY | O_NONBLOCK).valid()) {
     refuse(path, fmt::format("cannot be read: {}; check its permissions", std::strerror(errno)));
   }
-  ::close(descriptor);
   return std::filesystem::file_size(path);
 }
 

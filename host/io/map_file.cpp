@@ -1,3 +1,5 @@
+#include "map_file.hpp"
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -5,18 +7,21 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include "available_memory.hpp"
 #include "file_format.hpp"
 #include "hdf5_contents.hpp"
 #include "hdf5_writer.hpp"
 #include "input_file.hpp"
 #include "palpate/files.hpp"
+#include "recording_rules.hpp"
 
 namespace palpate {
 
 namespace {
 
-// What holds for every map, read or about to be written.
+// What holds for every map without its cells, read or about to be written.
 void validate(const std::filesystem::path& path, const OccupancyGrid& map) {
+  require_text(path, "attribute 'label'", map.label);
   if (!(std::isfinite(map.cell_mm) && map.cell_mm > 0)) {
     refuse(path, fmt::format("attribute 'cell_mm' = {}; make it positive", map.cell_mm));
   }
@@ -37,18 +42,25 @@ void validate(const std::filesystem::path& path, const OccupancyGrid& map) {
     refuse(path, fmt::format("attribute 'spread_mm' = {}; make it positive, or leave it out",
                              *map.spread_mm));
   }
-  for (std::size_t k = 0; k < map.log_odds.size(); ++k) {
-    if (!std::isfinite(map.log_odds[k])) {
-      const auto nx = static_cast<std::size_t>(map.nx);
+}
+
+void require_log_odds(const std::filesystem::path& path, int nx, std::size_t first,
+                      std::span<const float> log_odds) {
+  for (std::size_t i = 0; i < log_odds.size(); ++i) {
+    if (!std::isfinite(log_odds[i])) {
+      const std::size_t k = first + i;
+      const auto width = static_cast<std::size_t>(nx);
       refuse(path, fmt::format("dataset 'log_odds'[{}, {}] = {} in float32; store finite numbers",
-                               k / nx, k % nx, map.log_odds[k]));
+                               k / width, k % width, log_odds[i]));
     }
   }
 }
 
 }  // namespace
 
-OccupancyGrid read_map(const std::filesystem::path& path) {
+void scan_map(const std::filesystem::path& path,
+              const std::function<void(const OccupancyGrid&)>& head,
+              const std::function<void(std::span<const float>)>& cells) {
   Hdf5Contents file(
       path,
       {"format", "version", "label", "cell_mm", "origin_mm", "prior", "symmetry", "spread_mm"},
@@ -64,16 +76,37 @@ OccupancyGrid read_map(const std::filesystem::path& path) {
   if (file.has_attribute("spread_mm")) {  // other programs' maps may have none
     map.spread_mm = file.number("spread_mm");
   }
-  const Hdf5Value& log_odds = file.dataset("log_odds", 2);
-  const auto [least, most] = std::minmax(log_odds.shape[0], log_odds.shape[1]);
+  const std::vector<std::uint64_t>& shape = file.shape("log_odds", 2);
+  const auto [least, most] = std::minmax(shape[0], shape[1]);
   if (least < 1 || most > std::numeric_limits<int>::max()) {
-    file.refuse(fmt::format("dataset 'log_odds' has the shape {}; store at least one cell",
-                            log_odds.shape));
+    file.refuse(fmt::format("dataset 'log_odds' has the shape {}; store at least one cell", shape));
   }
-  map.ny = static_cast<int>(log_odds.shape[0]);
-  map.nx = static_cast<int>(log_odds.shape[1]);
-  map.log_odds.assign(log_odds.numbers.begin(), log_odds.numbers.end());
+  map.ny = static_cast<int>(shape[0]);
+  map.nx = static_cast<int>(shape[1]);
   validate(path, map);
+  head(map);
+  std::vector<float> narrow;
+  file.read("log_odds", [&](std::uint64_t first, std::span<const double> log_odds) {
+    narrow.assign(log_odds.begin(), log_odds.end());
+    require_log_odds(path, map.nx, first, narrow);
+    cells(narrow);
+  });
+}
+
+OccupancyGrid read_map(const std::filesystem::path& path) {
+  OccupancyGrid map;
+  scan_map(
+      path,
+      [&](const OccupancyGrid& head) {
+        map = head;
+        const auto count = static_cast<std::size_t>(map.nx) * static_cast<std::size_t>(map.ny);
+        require_memory(path, fmt::format("a map of {} x {} cells", map.nx, map.ny),
+                       count * sizeof(float));
+        map.log_odds.reserve(count);
+      },
+      [&](std::span<const float> cells) {
+        map.log_odds.insert(map.log_odds.end(), cells.begin(), cells.end());
+      });
   return map;
 }
 
@@ -85,6 +118,7 @@ void write_map(const std::filesystem::path& path, const OccupancyGrid& map) {
                              map.nx, map.ny, map.log_odds.size()));
   }
   validate(path, map);
+  require_log_odds(path, map.nx, 0, map.log_odds);
   Hdf5Writer file(path);
   file.attribute("format", map_format);
   file.attribute("version", format_version);

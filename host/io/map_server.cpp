@@ -45,17 +45,19 @@ void write_map_server(const std::filesystem::path& yaml_path, const OccupancyGri
   constexpr double metres_per_mm = 1e-3;
   // The origin is the corner, not the centre, of the lower left pixel.
   const glm::dvec2 corner_mm = map.origin_mm - 0.5 * map.cell_mm;
+  // Numbers are written as text: an Emitter writes them with the locale's decimal commas.
+  const auto number = [](double value) { return fmt::format("{:.12g}", value); };
   YAML::Emitter yaml;
-  yaml.SetDoublePrecision(12);
   yaml << YAML::BeginMap;
   yaml << YAML::Key << "image" << YAML::Value << image_path.filename().string();
   yaml << YAML::Key << "mode" << YAML::Value << "trinary";
-  yaml << YAML::Key << "resolution" << YAML::Value << map.cell_mm * metres_per_mm;
+  yaml << YAML::Key << "resolution" << YAML::Value << number(map.cell_mm * metres_per_mm);
   yaml << YAML::Key << "origin" << YAML::Value << YAML::Flow
-       << std::vector<double>{corner_mm.x * metres_per_mm, corner_mm.y * metres_per_mm, 0.0};
-  yaml << YAML::Key << "negate" << YAML::Value << 0;
-  yaml << YAML::Key << "occupied_thresh" << YAML::Value << occupied_threshold;
-  yaml << YAML::Key << "free_thresh" << YAML::Value << free_threshold;
+       << std::vector<std::string>{number(corner_mm.x * metres_per_mm),
+                                   number(corner_mm.y * metres_per_mm), number(0.0)};
+  yaml << YAML::Key << "negate" << YAML::Value << number(0.0);
+  yaml << YAML::Key << "occupied_thresh" << YAML::Value << number(occupied_threshold);
+  yaml << YAML::Key << "free_thresh" << YAML::Value << number(free_threshold);
   yaml << YAML::EndMap << YAML::Newline;
 
   AtomicFile image_file(image_path);

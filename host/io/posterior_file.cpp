@@ -1,15 +1,19 @@
+#include "posterior_file.hpp"
+
 #include <cmath>
 #include <limits>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include "available_memory.hpp"
 #include "file_format.hpp"
 #include "hdf5_contents.hpp"
+#include "hdf5_rows.hpp"
 #include "hdf5_writer.hpp"
 #include "input_file.hpp"
 #include "palpate/error.hpp"
-#include "palpate/files.hpp"
+#include "recording_rules.hpp"
 
 namespace palpate {
 
@@ -20,14 +24,27 @@ Axis read_axis(const Hdf5Contents& file, const char* range, const char* bins) {
   return {ends[0], ends[1], file.integer(bins, 1)};
 }
 
-// What holds for every posterior, read or about to be written.
+// What holds for every posterior without its log-likelihoods, read or about to be written.
 void validate(const std::filesystem::path& path, const Posterior& posterior) {
+  // HDF5 keeps an attribute of at most 64 KiB, 16 bytes for each text.
+  constexpr std::size_t most_objects = 4000;
+  if (posterior.objects.empty() || posterior.objects.size() > most_objects) {
+    refuse(path, fmt::format("attribute 'objects' has {} labels; store 1 to {}",
+                             posterior.objects.size(), most_objects));
+  }
+  for (const std::string& label : posterior.objects) {
+    require_text(path, "attribute 'objects'", label);
+  }
   try {
     posterior.lattice.validate();
   } catch (const Error& error) {
     refuse(path, error.what());
   }
-  for (const double value : posterior.log_likelihood) {
+}
+
+void require_log_likelihoods(const std::filesystem::path& path,
+                             std::span<const double> log_likelihood) {
+  for (const double value : log_likelihood) {
     // A bin may be impossible, but not better than certain.
     if (std::isnan(value) || value == std::numeric_limits<double>::infinity()) {
       refuse(path, fmt::format("dataset 'log_likelihood' holds {}; store numbers or -inf", value));
@@ -35,9 +52,18 @@ void validate(const std::filesystem::path& path, const Posterior& posterior) {
   }
 }
 
+std::vector<std::uint64_t> shape_of(const Posterior& posterior) {
+  const PoseLattice& lattice = posterior.lattice;
+  return {posterior.objects.size(), static_cast<std::uint64_t>(lattice.theta_rad.count),
+          static_cast<std::uint64_t>(lattice.y_mm.count),
+          static_cast<std::uint64_t>(lattice.x_mm.count)};
+}
+
 }  // namespace
 
-Posterior read_posterior(const std::filesystem::path& path) {
+void scan_posterior(const std::filesystem::path& path,
+                    const std::function<void(const Posterior&)>& head,
+                    const std::function<void(std::span<const double>)>& log_likelihood) {
   Hdf5Contents file(path,
                     {"format", "version", "objects", "bins_x", "bins_y", "bins_theta", "x_mm",
                      "y_mm", "theta_rad", "pivot_mm"},
@@ -51,30 +77,47 @@ Posterior read_posterior(const std::filesystem::path& path) {
   lattice.theta_rad = read_axis(file, "theta_rad", "bins_theta");
   const std::vector<double> pivot = file.numbers("pivot_mm", 2);
   lattice.pivot_mm = {pivot[0], pivot[1]};
-  Hdf5Value& log_likelihood = file.dataset("log_likelihood", 4);
-  const std::vector<std::uint64_t> expected{posterior.objects.size(),
-                                            static_cast<std::uint64_t>(lattice.theta_rad.count),
-                                            static_cast<std::uint64_t>(lattice.y_mm.count),
-                                            static_cast<std::uint64_t>(lattice.x_mm.count)};
-  if (log_likelihood.shape != expected) {
-    file.refuse(fmt::format("dataset 'log_likelihood' has the shape {}; its attributes make it {}",
-                            log_likelihood.shape, expected));
-  }
-  posterior.log_likelihood = std::move(log_likelihood.numbers);
   validate(path, posterior);
+  const std::vector<std::uint64_t> expected = shape_of(posterior);
+  if (const auto& shape = file.shape("log_likelihood", 4); shape != expected) {
+    file.refuse(fmt::format("dataset 'log_likelihood' has the shape {}; its attributes make it {}",
+                            shape, expected));
+  }
+  head(posterior);
+  file.read("log_likelihood", [&](std::uint64_t, std::span<const double> values) {
+    require_log_likelihoods(path, values);
+    log_likelihood(values);
+  });
+}
+
+Posterior read_posterior(const std::filesystem::path& path) {
+  Posterior posterior;
+  scan_posterior(
+      path,
+      [&](const Posterior& head) {
+        posterior = head;
+        const std::vector<std::uint64_t> shape = shape_of(posterior);
+        require_memory(path, fmt::format("a posterior of {} bins", fmt::join(shape, " x ")),
+                       hdf5_stored_bytes(shape, sizeof(double)));
+        posterior.log_likelihood.reserve(hdf5_stored_bytes(shape, 1));
+      },
+      [&](std::span<const double> values) {
+        posterior.log_likelihood.insert(posterior.log_likelihood.end(), values.begin(),
+                                        values.end());
+      });
   return posterior;
 }
 
 void write_posterior(const std::filesystem::path& path, const Posterior& posterior) {
   const PoseLattice& lattice = posterior.lattice;
   validate(path, posterior);
-  const std::size_t objects = posterior.objects.size();
-  if (objects == 0 ||
-      posterior.log_likelihood.size() != objects * static_cast<std::size_t>(lattice.bins())) {
-    refuse(path, fmt::format("a posterior of {} objects, {} bins and {} log-likelihoods cannot be "
-                             "written; make them agree",
-                             objects, lattice.bins(), posterior.log_likelihood.size()));
+  if (posterior.log_likelihood.size() != hdf5_stored_bytes(shape_of(posterior), 1)) {
+    refuse(path,
+           fmt::format("a posterior of {} bins and {} log-likelihoods cannot be written; make "
+                       "them agree",
+                       fmt::join(shape_of(posterior), " x "), posterior.log_likelihood.size()));
   }
+  require_log_likelihoods(path, posterior.log_likelihood);
   Hdf5Writer file(path);
   file.attribute("format", posterior_format);
   file.attribute("version", format_version);
@@ -88,7 +131,7 @@ void write_posterior(const std::filesystem::path& path, const Posterior& posteri
   file.attribute("pivot_mm", {lattice.pivot_mm.x, lattice.pivot_mm.y});
   file.dataset(
       "log_likelihood",
-      {objects, static_cast<std::size_t>(lattice.theta_rad.count),
+      {posterior.objects.size(), static_cast<std::size_t>(lattice.theta_rad.count),
        static_cast<std::size_t>(lattice.y_mm.count), static_cast<std::size_t>(lattice.x_mm.count)},
       posterior.log_likelihood, Hdf5Writer::Storage::compressed);
   file.save();

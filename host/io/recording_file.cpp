@@ -2,102 +2,45 @@
 #include <cmath>
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
+#include "available_memory.hpp"
 #include "file_format.hpp"
-#include "hdf5_contents.hpp"
+#include "hdf5_rows.hpp"
 #include "hdf5_writer.hpp"
 #include "input_file.hpp"
 #include "palpate/files.hpp"
+#include "recording_rules.hpp"
+#include "recording_scan.hpp"
 
 namespace palpate {
 
 namespace {
 
-using Shape = std::vector<std::uint64_t>;
-
-// Datasets of a recording have to fit `pressure`.
-struct Extent {
-  std::uint64_t touches;
-  std::uint64_t elements;
-};
-
-// The dataset's numbers, once its shape is one of those that fit.
-std::vector<double> numbers_of(Hdf5Contents& file, const char* name, const Extent& extent,
-                               const std::vector<Shape>& fitting) {
-  Hdf5Value& value = file.dataset(name);
-  if (std::find(fitting.begin(), fitting.end(), value.shape) == fitting.end()) {
-    file.refuse(fmt::format("dataset '{}' has the shape {}; 'pressure' is [{}, {}], so make it {}",
-                            name, value.shape, extent.touches, extent.elements,
-                            fmt::join(fitting, " or ")));
-  }
-  return std::move(value.numbers);
+template <typename Value>
+void append(std::vector<Value>& list, std::span<const Value> more) {
+  list.insert(list.end(), more.begin(), more.end());
 }
 
-// A stream that was cut off may have ended between two datasets: its rows are those that all of
-// them have. `time` is written last, and what was not written is NaN.
-void keep_whole_rows(Hdf5Contents& file) {
-  const std::vector<std::string> names = {"pressure", "sensor_pose", "time", "device_time",
-                                          "lost_before"};
-  std::uint64_t rows = UINT64_MAX;
-  for (const std::string& name : names) {
-    if (file.has_dataset(name)) {
-      const Hdf5Value& value = file.dataset(name);
-      rows = std::min(rows, value.shape.empty() ? 0 : value.shape[0]);
+void reserve(const std::filesystem::path& path, const RecordingHead& head, Recording& recording) {
+  const std::uint64_t n = head.rows;
+  const std::uint64_t e = head.elements;
+  const std::uint64_t places = head.array_changes ? hdf5_stored_bytes(std::vector{n, e}, 1) : e;
+  std::uint64_t bytes = 0;
+  for (const auto& [count, width] :
+       {std::pair{hdf5_stored_bytes(std::vector{n, e}, 1), sizeof(double)},
+        {places, sizeof(glm::dvec2)},
+        {n, sizeof(Pose) + 3 * sizeof(double)}}) {
+    std::uint64_t some = 0;
+    if (__builtin_mul_overflow(count, width, &some) ||
+        __builtin_add_overflow(bytes, some, &bytes)) {
+      bytes = UINT64_MAX;
+      break;
     }
   }
-  if (file.has_dataset("time")) {
-    const std::vector<double>& time = file.dataset("time").numbers;
-    const auto unwritten =
-        std::find_if(time.begin(), time.end(), [](double t) { return std::isnan(t); });
-    rows = std::min(rows, static_cast<std::uint64_t>(unwritten - time.begin()));
-  }
-  for (const std::string& name : names) {
-    if (file.has_dataset(name)) {
-      Hdf5Value& value = file.dataset(name);
-      if (!value.shape.empty() && value.shape[0] > 0) {
-        value.numbers.resize(value.numbers.size() / value.shape[0] * rows);
-        value.shape[0] = rows;
-      }
-    }
-  }
-}
-
-std::optional<Truth> read_truth(const Hdf5Contents& file) {
-  if (!file.has_attribute("true_object") && !file.has_attribute("true_T_object_robot")) {
-    return {};
-  }
-  const std::vector<double> pose = file.numbers("true_T_object_robot", 3);
-  return Truth{file.text("true_object"), {{pose[0], pose[1]}, pose[2]}};
-}
-
-// What a stream of frames has besides.
-void read_stream(Hdf5Contents& file, const Extent& extent, Recording& recording) {
-  const auto [n, e] = extent;
-  if (file.has_attribute("sensor")) {
-    recording.sensor = file.text("sensor");
-  }
-  if (file.has_attribute("serial")) {
-    recording.serial = file.text("serial");
-  }
-  if (file.has_dataset("baseline")) {
-    recording.baseline = numbers_of(file, "baseline", extent, {{e}});
-    if (std::all_of(recording.baseline.begin(), recording.baseline.end(),
-                    [](double value) { return std::isnan(value); })) {
-      recording.baseline.clear();  // the recording was cut off before it was taken
-    }
-  }
-  if (file.has_dataset("device_time")) {
-    recording.device_time_s = numbers_of(file, "device_time", extent, {{n}});
-  }
-  if (file.has_dataset("lost_before")) {
-    for (const double lost : numbers_of(file, "lost_before", extent, {{n}})) {
-      if (!(lost >= 0.0 && lost <= 1e15)) {
-        file.refuse(fmt::format("dataset 'lost_before' holds {}; store counts of frames", lost));
-      }
-      recording.lost_before.push_back(static_cast<std::uint64_t>(lost));
-    }
-  }
+  require_memory(path, fmt::format("a recording of {} rows by {} elements", n, e), bytes);
+  recording.pressure.reserve(n * e);
+  recording.T_robot_sensor.reserve(n);
+  recording.elements_mm.reserve(places);
 }
 
 void write_stream(Hdf5Writer& file, const Recording& recording) {
@@ -118,130 +61,8 @@ void write_stream(Hdf5Writer& file, const Recording& recording) {
   }
 }
 
-void require_one_of(const std::filesystem::path& path, const char* attribute,
-                    const std::string& value, const char* first, const char* second) {
-  if (value != first && value != second) {
-    refuse(path, fmt::format("attribute '{}' = '{}'; make it '{}' or '{}'", attribute, value, first,
-                             second));
-  }
-}
-
-// What holds for every recording, read or about to be written.
-void validate(const std::filesystem::path& path, const Recording& recording) {
-  const std::size_t n = recording.size();
-  const std::size_t e = recording.elements();
-  if (e == 0 || recording.pressure.size() != n * e) {
-    refuse(path,
-           fmt::format("dataset 'pressure': {} values for {} touches; store one per touch and "
-                       "element",
-                       recording.pressure.size(), n));
-  }
-  require_one_of(path, "pressure_unit", recording.pressure_unit, "kPa", "raw");
-  require_one_of(path, "rows", recording.rows, "touches", "frames");
-  for (std::size_t k = 0; k < recording.pressure.size(); ++k) {
-    const std::size_t valid = recording.valid.size() == e ? k % e : k;
-    const bool alive = recording.valid.empty() || recording.valid[valid] != 0;
-    const bool unknown = recording.rows == "frames" && std::isnan(recording.pressure[k]);
-    if (alive && !unknown && !std::isfinite(recording.pressure[k])) {
-      refuse(path, fmt::format("dataset 'pressure'[{}, {}] = {}; store finite numbers, and 0 in "
-                               "'valid' for a dead element",
-                               k / e, k % e, recording.pressure[k]));
-    }
-  }
-  for (std::size_t i = 0; i < n; ++i) {
-    const Pose& pose = recording.T_robot_sensor[i];
-    if (recording.rows == "frames" && std::isnan(pose.translation_mm.x) &&
-        std::isnan(pose.translation_mm.y) && std::isnan(pose.theta_rad)) {
-      continue;  // not known at that time
-    }
-    if (!std::isfinite(pose.translation_mm.x) || !std::isfinite(pose.translation_mm.y) ||
-        !std::isfinite(pose.theta_rad)) {
-      refuse(path, fmt::format("dataset 'sensor_pose'[{}] = [{}, {}, {}]; store finite numbers", i,
-                               pose.translation_mm.x, pose.translation_mm.y, pose.theta_rad));
-    }
-  }
-  for (std::size_t k = 0; k < recording.elements_mm.size(); ++k) {
-    const glm::dvec2& element = recording.elements_mm[k];
-    if (!std::isfinite(element.x) || !std::isfinite(element.y)) {
-      refuse(path, fmt::format("dataset 'elements', position {} = [{}, {}]; store finite numbers",
-                               k, element.x, element.y));
-    }
-  }
-  for (std::size_t i = 0; i < recording.baseline.size(); ++i) {
-    if ((recording.valid.size() != e || recording.valid[i] != 0) &&
-        !std::isfinite(recording.baseline[i])) {
-      refuse(path, fmt::format("dataset 'baseline'[{}] = {}; store finite numbers", i,
-                               recording.baseline[i]));
-    }
-  }
-  for (std::size_t i = 0; i < recording.time_s.size(); ++i) {
-    if (!std::isfinite(recording.time_s[i])) {
-      refuse(path, fmt::format("dataset 'time'[{}] = {}; store seconds since the Unix epoch", i,
-                               recording.time_s[i]));
-    }
-  }
-}
-
-}  // namespace
-
-Recording read_recording(const std::filesystem::path& path) {
-  Hdf5Contents file(path,
-                    {"format", "version", "object", "pressure_unit", "length_unit", "rows",
-                     "true_object", "true_T_object_robot", "sensor", "serial"},
-                    {"pressure", "sensor_pose", "elements", "valid", "time", "baseline",
-                     "device_time", "lost_before"});
-  require_format(file, recording_format);
-  if (const std::string unit = file.text("length_unit"); unit != "mm") {
-    file.refuse(fmt::format("attribute 'length_unit' = '{}'; convert lengths to 'mm'", unit));
-  }
-  if (!file.closed()) {
-    keep_whole_rows(file);
-  }
-  Recording recording;
-  recording.closed = file.closed();
-  recording.path = path.string();
-  recording.object = file.text("object");
-  recording.pressure_unit = file.text("pressure_unit");
-  if (file.has_attribute("rows")) {
-    recording.rows = file.text("rows");
-  }
-  recording.truth = read_truth(file);
-
-  Hdf5Value& pressure = file.dataset("pressure", 2);
-  const Extent extent{pressure.shape[0], pressure.shape[1]};
-  const auto [n, e] = extent;
-  if (n == 0 || e == 0) {
-    file.refuse(
-        fmt::format("dataset 'pressure' is empty, {}; record at least one touch by one "
-                    "element",
-                    pressure.shape));
-  }
-  recording.pressure = std::move(pressure.numbers);
-  const std::vector<double> poses = numbers_of(file, "sensor_pose", extent, {{n, 3}});
-  for (std::size_t i = 0; i < poses.size(); i += 3) {
-    recording.T_robot_sensor.push_back({{poses[i], poses[i + 1]}, poses[i + 2]});
-  }
-  const std::vector<double> elements = numbers_of(file, "elements", extent, {{e, 2}, {n, e, 2}});
-  for (std::size_t i = 0; i < elements.size(); i += 2) {
-    recording.elements_mm.emplace_back(elements[i], elements[i + 1]);
-  }
-  if (file.has_dataset("valid")) {
-    for (const double valid : numbers_of(file, "valid", extent, {{e}, {n, e}})) {
-      if (std::isnan(valid)) {
-        file.refuse("dataset 'valid' holds NaN; store 0 for a dead element and 1 for the others");
-      }
-      recording.valid.push_back(valid != 0);
-    }
-  }
-  if (file.has_dataset("time")) {
-    recording.time_s = numbers_of(file, "time", extent, {{n}});
-  }
-  read_stream(file, extent, recording);
-  validate(path, recording);
-  return recording;
-}
-
-void write_recording(const std::filesystem::path& path, const Recording& recording) {
+// Sizes of a recording that is about to be written.
+void require_agreement(const std::filesystem::path& path, const Recording& recording) {
   const std::size_t n = recording.size();
   const std::size_t e = recording.elements();
   const auto fits = [&](std::size_t count) { return count == e || count == n * e; };
@@ -259,7 +80,38 @@ void write_recording(const std::filesystem::path& path, const Recording& recordi
                        recording.valid.size(), recording.time_s.size(), recording.baseline.size(),
                        recording.device_time_s.size(), recording.lost_before.size()));
   }
-  validate(path, recording);
+}
+
+}  // namespace
+
+Recording read_recording(const std::filesystem::path& path) {
+  Recording recording;
+  scan_recording(path,
+                 {.head =
+                      [&](const RecordingHead& head) {
+                        recording = head.recording;
+                        reserve(path, head, recording);
+                      },
+                  .pressure = [&](auto values) { append(recording.pressure, values); },
+                  .T_robot_sensor = [&](auto poses) { append(recording.T_robot_sensor, poses); },
+                  .elements_mm = [&](auto places) { append(recording.elements_mm, places); },
+                  .time_s = [&](auto times) { append(recording.time_s, times); },
+                  .device_time_s = [&](auto times) { append(recording.device_time_s, times); },
+                  .lost_before = [&](auto counts) { append(recording.lost_before, counts); }});
+  return recording;
+}
+
+void write_recording(const std::filesystem::path& path, const Recording& recording) {
+  require_agreement(path, recording);
+  const std::size_t n = recording.size();
+  const std::size_t e = recording.elements();
+  require_head(path, recording, e);
+  require_pressures(path, recording, e, 0, recording.pressure);
+  require_poses(path, recording, 0, recording.T_robot_sensor);
+  require_elements(path, 0, recording.elements_mm);
+  require_times(path, 0, recording.time_s);
+  require_device_times(path, 0, recording.device_time_s);
+  require_lost_counts(path, 0, recording.lost_before);
 
   Hdf5Writer file(path);
   file.attribute("format", recording_format);

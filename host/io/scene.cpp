@@ -3,8 +3,9 @@
 #include <yaml-cpp/yaml.h>
 
 #include <algorithm>
-#include <cmath>
 #include <functional>
+#include <limits>
+#include <optional>
 #include <set>
 #include <string_view>
 #include <utility>
@@ -13,6 +14,7 @@
 
 #include "element_file.hpp"
 #include "input_file.hpp"
+#include "number_text.hpp"
 #include "palpate/touch.hpp"
 
 namespace palpate {
@@ -35,20 +37,21 @@ struct Entry {
   double number(
       bool (*fits)(double) = [](double) { return true; },
       const char* remedy = "give a number") const {
-    double value = 0;
-    if (!node.IsScalar() || !YAML::convert<double>::decode(node, value) || !std::isfinite(value) ||
-        !fits(value)) {
+    // Not yaml-cpp's conversion, which reads 1.500 as 1500 where the locale has decimal commas.
+    const std::optional<double> value = node.IsScalar() ? number_of(node.Scalar()) : std::nullopt;
+    if (!value || !fits(*value)) {
       refuse(remedy);
     }
-    return value;
+    return *value;
   }
 
   int integer(int least) const {
-    int value = 0;
-    if (!node.IsScalar() || !YAML::convert<int>::decode(node, value) || value < least) {
+    // Not yaml-cpp's conversion either, which reads 010 as 8.
+    const auto value = node.IsScalar() ? whole_number_of(node.Scalar()) : std::nullopt;
+    if (!value || *value < least || *value > std::numeric_limits<int>::max()) {
       refuse(fmt::format("give a whole number from {}", least));
     }
-    return value;
+    return static_cast<int>(*value);
   }
 
   std::string text() const {

@@ -2,14 +2,12 @@
 
 #include <algorithm>
 #include <fstream>
-#include <locale>
-#include <optional>
-#include <sstream>
 #include <string>
 #include <utility>
 
 #include <fmt/format.h>
 
+#include "number_text.hpp"
 #include "palpate/error.hpp"
 
 namespace palpate {
@@ -18,19 +16,6 @@ namespace {
 
 [[noreturn]] void refuse(const std::filesystem::path& path, int line, const std::string& why) {
   throw Error(Fault::input, fmt::format("{}:{}: {}", path.string(), line, why));
-}
-
-/// The vertex on a line without its comment; nothing if it is not one.
-std::optional<glm::dvec2> parse_vertex(const std::string& text) {
-  std::istringstream stream(text);
-  stream.imbue(std::locale::classic());
-  glm::dvec2 vertex;
-  stream >> vertex.x >> vertex.y;
-  // The stream refuses inf, nan and numbers too large for a double.
-  if (!stream || !(stream >> std::ws).eof()) {
-    return std::nullopt;
-  }
-  return vertex;
 }
 
 /// Whether any triangle from the first vertex to an edge has an area; if none has, all edges lie on
@@ -83,7 +68,7 @@ std::vector<std::vector<glm::dvec2>> read_polygons(const std::filesystem::path& 
     if (text.find_first_not_of(blanks) == std::string::npos) {
       continue;
     }
-    const std::optional<glm::dvec2> vertex = parse_vertex(text);
+    const auto vertex = two_numbers_of(text);
     if (!vertex) {
       refuse(path, line,
              fmt::format("'{:.40}': write a vertex as two finite numbers, x y, in mm", text));
@@ -91,7 +76,7 @@ std::vector<std::vector<glm::dvec2>> read_polygons(const std::filesystem::path& 
     if (polygon.empty()) {
       first_line = line;
     }
-    polygon.push_back(*vertex);
+    polygon.emplace_back((*vertex)[0], (*vertex)[1]);
   }
   if (file.bad()) {
     throw Error(Fault::input, fmt::format("{}: cannot be read", path.string()));

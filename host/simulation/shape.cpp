@@ -9,6 +9,7 @@
 #include "palpate/error.hpp"
 #include "palpate/simulation.hpp"
 #include "polygon_file.hpp"
+#include "printable.hpp"
 #include "spans.hpp"
 
 namespace palpate {
@@ -55,7 +56,7 @@ Shape make_shape(const std::string& name_or_file) {
                                           "A to Z, 0 to 9, ring, bar or a polygon file",
                                           name_or_file));
   }
-  return {.label = path.stem().string(), .strokes = {}, .polygons = read_polygons(path)};
+  return {.label = printable(path.stem().string()), .strokes = {}, .polygons = read_polygons(path)};
 }
 
 }  // namespace palpate

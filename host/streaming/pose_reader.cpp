@@ -18,6 +18,19 @@ namespace palpate {
 
 namespace {
 
+// The descriptor of a file, never one of standard input, output and error: a daemon may have closed
+// those, and the number 0 stands for poses from standard input here.
+int open_poses(const std::string& path) {
+  // Without waiting for whoever writes to a FIFO.
+  const int descriptor = ::open(path.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC);
+  if (descriptor < 0 || descriptor > STDERR_FILENO) {
+    return descriptor;
+  }
+  const int moved = ::fcntl(descriptor, F_DUPFD_CLOEXEC, STDERR_FILENO + 1);
+  ::close(descriptor);
+  return moved;
+}
+
 // Far longer than any pose; what never ends a line must not fill the memory.
 constexpr std::size_t longest_line = 4096;
 // What read() takes at most.
@@ -37,9 +50,7 @@ std::optional<double> number(const nlohmann::json& line, const char* key) {
 
 PoseReader::PoseReader(const std::string& name, PoseTrack& track, PosedSensor::Complaint complain)
     : name_(name == "-" ? "standard input" : name), track_(track), complain_(std::move(complain)) {
-  // Without waiting for whoever writes to a FIFO.
-  descriptor_ =
-      name == "-" ? STDIN_FILENO : ::open(name.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC);
+  descriptor_ = name == "-" ? STDIN_FILENO : open_poses(name);
   struct stat status {};
   if (descriptor_ < 0 || ::fstat(descriptor_, &status) != 0) {
     throw Error(Fault::input, fmt::format("poses {}: cannot be read: {}; give a file, a FIFO or "

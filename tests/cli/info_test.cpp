@@ -43,6 +43,15 @@ TEST_F(InfoCommand, DeadElementsDoNotCountAmongThePressures) {
   expect_info("d.h5", {"1.5 to 1.5 kPa", "dead readings     2 of 36"});
 }
 
+TEST_F(InfoCommand, ClosesRecordingsOnly) {
+  write_recording(folder_ / "u.h5", sample_training("A", 1));
+  const std::string before = bytes_of(folder_ / "u.h5");
+  expect_named(done({"info", "--close", "u.h5"}), {"touches           1"});
+  EXPECT_TRUE(bytes_of(folder_ / "u.h5") == before) << "it is closed already";
+  write_map(folder_ / "I.map.h5", sample_map("I"));
+  expect_refused({"info", "--close", "I.map.h5"}, {"I.map.h5", "palpate.map", "recording"});
+}
+
 TEST_F(InfoCommand, Map) {
   OccupancyGrid map = sample_map("I");
   map.symmetry = 2;

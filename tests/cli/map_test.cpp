@@ -47,10 +47,10 @@ TEST_F(MapCommand, FolderThatExistsNeedsNoSlash) {
 
 TEST_F(MapCommand, FileSaysWhatItIs) {
   map_of_a({});
-  Hdf5Contents file(folder_ / "A.map.h5", {"format", "version"}, {"log_odds"});
+  const Hdf5Contents file(folder_ / "A.map.h5", {"format", "version"}, {"log_odds"});
   EXPECT_EQ(file.text("format"), "palpate.map");
   EXPECT_EQ(file.integer("version", 0), 1);
-  EXPECT_EQ(file.dataset("log_odds").shape.size(), 2u);
+  EXPECT_EQ(file.shape("log_odds").size(), 2u);
 }
 
 TEST_F(MapCommand, DefaultsAreTheDocumentedOnes) {

@@ -124,10 +124,37 @@ TEST_F(RecordCommand, PosesComeFromAFile) {
                  {"poses, line 22", "JSON"});
 }
 
+TEST_F(RecordCommand, LabelThatNoFileMayHoldIsRefusedAtOnce) {
+  // A sensor that would be refused as well: it has not been opened yet.
+  for (const char* label : {"caf\xe9", "a\nb"}) {
+    expect_refused({"record", "--sensor", "replay:none.h5", "--object", label, "-o", "s.h5"},
+                   {"--object", "UTF-8"});
+  }
+}
+
+TEST_F(RecordCommand, PosesBeyondAllNumbersCostThemselvesOnly) {
+  const Recording first = recorded("a.h5", {"--sensor", "simulate:A,touches=1,speed=max"});
+  std::string poses;
+  for (int i = 0; i <= 20; ++i) {
+    const std::string x = i == 3 ? "1.7e308" : i == 4 ? "-1.7e308" : "1";
+    poses += fmt::format(R"({{"time": {:.3f}, "x_mm": {}, "y_mm": 2, "theta_rad": 1}})"
+                         "\n",
+                         first.time_s[0] - 0.025 + 0.05 * i, x);
+  }
+  put_bytes(folder_ / "poses", poses);
+  const Recording posed =
+      recorded("b.h5", {"--sensor", "replay:a.h5,speed=max", "--poses", "poses"});
+  EXPECT_EQ(posed.size(), first.size());
+  EXPECT_EQ(posed.T_robot_sensor[0].translation_mm.x, 1.0);
+  EXPECT_TRUE(std::isnan(posed.T_robot_sensor[15].theta_rad));  // between the two
+  EXPECT_EQ(posed.T_robot_sensor[50].translation_mm.x, 1.0);
+}
+
 TEST_F(RecordCommand, CtrlCEndsItCleanly) {
   const pid_t pid = start("s.h5", "simulate:A,rate=500");
   ASSERT_TRUE(appears("s.h5", pid));
-  expect_named(done({"info", "s.h5"}), {"closed            no"});
+  expect_named(done({"info", "s.h5"}), {"closed            no: it is being recorded"});
+  expect_named(palpate({"info", "--close", "s.h5"}).err, {"s.h5", "wait until it is done"});
   const int status = end(pid, SIGINT);
   EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 0) << bytes_of(folder_ / "complained");
   expect_named(bytes_of(folder_ / "said"), {"s.h5: ", " frames in ", " 0 lost"});
@@ -148,6 +175,10 @@ TEST_F(RecordCommand, KilledItLeavesAReadableFile) {
       ASSERT_NEAR(r.time_s[i] - r.time_s[i - 1], 0.001, 1e-6);  // none is missing
     }
     EXPECT_EQ(palpate({"touches", file, "-o", "t.h5", "--onset", "1000"}).status, 2);
+    expect_named(done({"info", file}), {"closed            no: it was cut off", "info --close"});
+    expect_named(done({"info", "--close", file}), {"closed            yes"});
+    EXPECT_EQ(read_recording(folder_ / file).size(), r.size());
+    EXPECT_TRUE(read_recording(folder_ / file).closed);
   }
 }
 

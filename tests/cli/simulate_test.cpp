@@ -42,6 +42,16 @@ TEST_F(SimulateCommand, GridTouchesAKnownObject) {
   }
 }
 
+// A file may have any name; a label is printable.
+TEST_F(SimulateCommand, PolygonFileWithAnOddNameGivesAPrintableLabel) {
+  for (const auto& [name, label] : {std::pair{"caf\xe9.txt", "caf?"}, {"a\nb.txt", "a?b"}}) {
+    put_bytes(folder_ / name, "-10 -10\n10 -10\n0 10\n");
+    EXPECT_EQ(simulate("p.h5", {name, "--touches", "2"}).object, label);
+    EXPECT_EQ(simulate("u.h5", {name, "--touches", "2", "--object-pose", "1,2,3"}).truth->object,
+              label);
+  }
+}
+
 TEST_F(SimulateCommand, FileSaysWhatItIs) {
   simulate("A.h5", {"A"});
   const Hdf5Contents file(folder_ / "A.h5", {"format", "version", "length_unit"}, {});

@@ -1,6 +1,10 @@
+#include <sys/wait.h>
+#include <unistd.h>
+
 #include <cmath>
 
 #include "palpate/files.hpp"
+#include "palpate/frame_recorder.hpp"
 #include "palpate/simulation.hpp"
 #include "program.hpp"
 
@@ -50,6 +54,34 @@ TEST_F(TouchesCommand, LettersAreRecognisedByWhatTheyFound) {
     // Half a bin of 0.8 mm and of 22.5 degrees, at an arm of 8 mm.
     EXPECT_LT(record.at("error_mm").get<double>(), 2.0);
   }
+}
+
+TEST_F(TouchesCommand, StreamThatWasCutOffIsClosedForOthers) {
+  done({"record", "--sensor", "simulate:A,touches=3,speed=max", "-o", "whole.h5"});
+  const Recording whole = read_recording(folder_ / "whole.h5");
+  const pid_t pid = ::fork();
+  if (pid == 0) {
+    FrameRecorder recorder(folder_ / "cut.h5",
+                           {.elements_mm = whole.elements_mm, .baseline = whole.baseline});
+    for (std::size_t i = 0; i < whole.size(); ++i) {
+      const Touch row = whole.touch(i);
+      recorder.add({.host_time_s = whole.time_s[i],
+                    .values = {row.pressure.begin(), row.pressure.end()},
+                    .T_robot_sensor = row.T_robot_sensor});
+    }
+    recorder.flush();
+    ::_exit(0);  // as a kill: nothing is closed
+  }
+  int status = -1;
+  ::waitpid(pid, &status, 0);
+  ASSERT_EQ(status, 0);
+  ASSERT_FALSE(read_recording(folder_ / "cut.h5").closed);
+  expect_named(done({"touches", "cut.h5", "-o", "t.h5"}), {"3 touches", "cut.h5: was cut off"});
+  EXPECT_TRUE(read_recording(folder_ / "cut.h5").closed);
+  EXPECT_EQ(read_recording(folder_ / "cut.h5").size(), whole.size());
+  const std::string before = bytes_of(folder_ / "cut.h5");
+  EXPECT_EQ(done({"touches", "cut.h5", "-o", "t.h5"}).find("cut off"), std::string::npos);
+  EXPECT_TRUE(bytes_of(folder_ / "cut.h5") == before);
 }
 
 TEST_F(TouchesCommand, DeadElementsUnitAndSensorAreCopied) {

@@ -3,12 +3,10 @@
 #include <gtest/gtest.h>
 #include <sys/resource.h>
 
-#include <cstdlib>
 #include <functional>
 #include <random>
 
 #include "file_parts.hpp"
-#include "forked_call.hpp"
 #include "palpate/files.hpp"
 #include "palpate/scene.hpp"
 #include "scratch_folder.hpp"
@@ -88,39 +86,6 @@ TEST(DamagedFile, SceneIsReadOrRefused) {
       "array: [[0, 1], [2, 3]]\nthreshold: 2.0\nobjects:\n  - {map: A.h5, label: A, weight: 1.0}\n"
       "region: {x_mm: [-10, 10], theta_deg: [0, 360]}\nbins: [25, 25, 16]\nfilter: histogram\n",
       [](const auto& path) { read_scene(path); });
-}
-
-TEST(ForkedCall, BringsBackWhatWasWritten) {
-  const std::string sent(1'000'000, 'x');
-  const std::string got =
-      forked_call([&](int descriptor) { forked_write(descriptor, sent.data(), sent.size()); },
-                  {.cpu_seconds = 5, .memory_bytes = 1 << 24});
-  EXPECT_EQ(got, sent);
-}
-
-TEST(ForkedCall, OutlivesItsChild) {
-  const ForkedLimits limits{.cpu_seconds = 1, .memory_bytes = 1 << 24};
-  EXPECT_EQ(forked_call([](int) { std::abort(); }, limits), "");
-  EXPECT_EQ(forked_call([](int) { throw std::runtime_error("lost"); }, limits), "");
-  EXPECT_EQ(forked_call(
-                [](int) {
-                  for (volatile bool endless = true; endless;) {
-                  }
-                },
-                limits),
-            "");
-}
-
-TEST(ForkedCall, EndsAChildThatWritesWithoutEnd) {
-  const std::string block(1 << 16, 'x');
-  const std::string got = forked_call(
-      [&](int descriptor) {
-        for (;;) {
-          forked_write(descriptor, block.data(), block.size());
-        }
-      },
-      {.cpu_seconds = 5, .memory_bytes = 1 << 20});
-  EXPECT_LT(got.size(), std::size_t{1} << 22);
 }
 
 }  // namespace

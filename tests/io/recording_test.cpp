@@ -245,12 +245,55 @@ TEST_F(RecordingFile, NamesDatasetsOfOtherTypes) {
   expect_named(input_error([&] { read_recording(path_); }), {"'time'", "type"});
 }
 
+// h5py's Empty: a type and a shape of nothing.
+TEST_F(RecordingFile, NamesWhatIsEmpty) {
+  recording_parts().without("version").save(path_);
+  edit(path_, [](hid_t file) {
+    const Hdf5Handle nothing(H5Screate(H5S_NULL), H5Sclose);
+    Hdf5Handle(H5Acreate2(file, "version", H5T_NATIVE_INT, nothing.get(), H5P_DEFAULT, H5P_DEFAULT),
+               H5Aclose);
+  });
+  expect_named(input_error([&] { read_recording(path_); }), {"'version'", "0 numbers"});
+  recording_parts()
+      .dataset("pressure", {1, 3}, 1.0)
+      .dataset("sensor_pose", {1, 3}, 0.5)
+      .without("object")
+      .save(path_);
+  edit(path_, [](hid_t file) {
+    const Hdf5Handle nothing(H5Screate(H5S_NULL), H5Sclose);
+    const Hdf5Handle text(H5Tcopy(H5T_C_S1), H5Tclose);
+    Hdf5Handle(H5Acreate2(file, "object", text.get(), nothing.get(), H5P_DEFAULT, H5P_DEFAULT),
+               H5Aclose);
+  });
+  EXPECT_EQ(read_recording(path_).object, "");
+  edit(path_, [](hid_t file) {
+    const Hdf5Handle nothing(H5Screate(H5S_NULL), H5Sclose);
+    Hdf5Handle(H5Dcreate2(file, "time", H5T_NATIVE_DOUBLE, nothing.get(), H5P_DEFAULT, H5P_DEFAULT,
+                          H5P_DEFAULT),
+               H5Dclose);
+  });
+  expect_named(input_error([&] { read_recording(path_); }), {"'time'", "[0]", "[1]"});
+}
+
+// Other programs decode texts by what the file says of them.
+TEST_F(RecordingFile, SaysThatItsTextsAreUtf8) {
+  write_recording(path_, small_recording());
+  edit(path_, [](hid_t file) {
+    const Hdf5Handle object(H5Aopen(file, "object", H5P_DEFAULT), H5Aclose);
+    const Hdf5Handle type(H5Aget_type(object.get()), H5Tclose);
+    EXPECT_EQ(H5Tget_cset(type.get()), H5T_CSET_UTF8);
+  });
+}
+
 // h5py can declare a dataset of any size without storing any of it.
 TEST_F(RecordingFile, RefusesShapesThatItsFileCannotHold) {
-  for (const bool chunked : {false, true}) {
+  // The smaller one is not stored either, though a file of its size could hold it.
+  constexpr hsize_t large = 1u << 30;
+  for (const auto& [rows, columns, chunked] :
+       {std::tuple{large, large, false}, {large, large, true}, {hsize_t{2}, hsize_t{3}, false}}) {
     recording_parts().without("pressure").save(path_);
     edit(path_, [&](hid_t file) {
-      const hsize_t extents[] = {1u << 30, 1u << 30};
+      const hsize_t extents[] = {rows, columns};
       const Hdf5Handle space(H5Screate_simple(2, extents, nullptr), H5Sclose);
       const Hdf5Handle creation(H5Pcreate(H5P_DATASET_CREATE), H5Pclose);
       if (chunked) {
@@ -263,7 +306,8 @@ TEST_F(RecordingFile, RefusesShapesThatItsFileCannotHold) {
                  H5Dclose);
     });
     expect_named(input_error([&] { read_recording(path_); }),
-                 {"'pressure'", "[1073741824, 1073741824]", "more than is stored"});
+                 {"'pressure'", rows == large ? "[1073741824, 1073741824]" : "[2, 3]",
+                  "more than is stored"});
   }
 }
 

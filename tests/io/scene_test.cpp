@@ -90,6 +90,16 @@ TEST_F(SceneFile, TakesTheArrayFromAFileBesideIt) {
   expect_named(input_error([&] { read("array: digitact"); }), {"digitact", "no such file"});
 }
 
+// A leading 0 is no octal number: --bins reads it like this, too.
+TEST_F(SceneFile, ReadsWholeNumbersAsDecimal) {
+  EXPECT_EQ(read("bins: [010, 08, +8]").bins, (std::array{10, 8, 8}));
+  EXPECT_EQ(read("objects: [{map: A.h5, symmetry: 010}]").objects[0].symmetry, 10);
+  for (const char* yaml : {"bins: [0x10, 1, 1]", "bins: [1e1, 1, 1]", "bins: [1.0, 1, 1]",
+                           "bins: [2147483648, 1, 1]", "bins: [' 1', 1, 1]"}) {
+    expect_named(message(yaml), {"bins[0]", "whole number"});
+  }
+}
+
 TEST_F(SceneFile, NamesKeysThatItDoesNotKnow) {
   expect_named(message("ratio: 0.3\ntreshold: 2"), {"line 2", "treshold", "unknown", "threshold"});
   expect_named(message("region:\n  x: [0, 1]"), {"line 2", "'x'", "unknown", "x_mm"});

@@ -1,10 +1,14 @@
+#include <fcntl.h>
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <sys/stat.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include <thread>
 #include <vector>
 
+#include "io/host_locale.hpp"
 #include "io/scratch_folder.hpp"
 #include "palpate/pose_track.hpp"
 
@@ -90,6 +94,30 @@ TEST_F(PosedSensorSource, FileGivesEveryFrameItsPose) {
   EXPECT_EQ(poses.refused, 0u);
   EXPECT_EQ(poses.frames, 50u);
   EXPECT_EQ(poses.without, 50u);
+}
+
+TEST_F(PosedSensorSource, HostProgramWithDecimalCommasReadsTheSame) {
+  put_bytes(path_, "{\"time\": 100.000, \"x_mm\": 1.500, \"y_mm\": -0.125, \"theta_rad\": 5e-1}\n");
+  const HostLocale locale;
+  PosedSensor sensor = open(1);
+  const std::vector<Frame> frames = frames_of(sensor);
+  ASSERT_TRUE(frames.at(0).T_robot_sensor);
+  EXPECT_EQ(frames[0].T_robot_sensor->translation_mm, glm::dvec2(1.5, -0.125));
+  EXPECT_EQ(frames[0].T_robot_sensor->theta_rad, 0.5);
+}
+
+// A daemon has closed its standard input; the number 0 does not make it the file of poses.
+TEST_F(PosedSensorSource, FileIsClosedAgainInAProcessWithoutStandardInput) {
+  put_bytes(path_, line(100.0, 0.0));
+  const pid_t pid = ::fork();
+  if (pid == 0) {
+    ::close(STDIN_FILENO);
+    open(1);
+    ::_exit(::fcntl(STDIN_FILENO, F_GETFD) < 0 ? 0 : 1);
+  }
+  int status = -1;
+  ::waitpid(pid, &status, 0);
+  EXPECT_EQ(status, 0);
 }
 
 TEST_F(PosedSensorSource, LastLineOfAFileNeedsNoEnd) {

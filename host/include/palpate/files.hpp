@@ -17,6 +17,12 @@ namespace palpate {
 /// Reads a "palpate.recording" HDF5 file.
 Recording read_recording(const std::filesystem::path& path);
 void write_recording(const std::filesystem::path& path, const Recording& recording);
+/// Closes a recording of FrameRecorder that was cut off, as by a kill, in its place: keeps its
+/// whole rows, so that programs other than Palpate open it like any other file.
+/// @returns false where it is closed already
+/// @throws Error where it is being recorded, cannot be read or cannot be written; it can then be
+/// read as before
+bool close_recording(const std::filesystem::path& path);
 
 /// Reads a "palpate.map" HDF5 file.
 OccupancyGrid read_map(const std::filesystem::path& path);

@@ -15,16 +15,20 @@ namespace palpate {
 /// The file appears with the first frames in it and is appended to about four times a second, so
 /// that readers find whole rows at any time (HDF5's SWMR, single writer and multiple readers).
 /// read_recording() opens it while it is written and when it was never closed; h5py does with
-/// `h5py.File(path, "r", swmr=True)`. `h5clear -s --increment=0 FILE` turns a file that was never
-/// closed into a usual one; without `--increment=0` it cuts the frames off.
+/// `h5py.File(path, "r", swmr=True)`. close_recording() turns a file that was never closed into a
+/// usual one.
 ///
-/// Pressures are stored as float32, finer than any sensor resolves, and NaN where a reading is
-/// Unknown: see is_known(). A power cut may cost what the system has not yet brought to the disk.
+/// A pose or a device time that is not finite is stored as unknown; a name or a serial number that
+/// is not printable UTF-8 is stored with '?' in it. Pressures are stored as float32, finer than any
+/// sensor resolves, and NaN where a reading is Unknown: see is_known(). A power cut may cost what
+/// the system has not yet brought to the disk.
 class FrameRecorder {
  public:
   /// @param path the recording to be made; an older file stays until the first frames are saved
   /// @param sensor names the sensor and gives its elements, unit, baseline and truth
-  /// @throws Error where the sensor's lists disagree
+  /// @throws Error (Fault::input) where the sensor's lists disagree, or hold what no recording may:
+  /// a unit other than kPa and raw, labels that are not printable UTF-8, elements, baselines or a
+  /// truth that are not finite
   FrameRecorder(std::filesystem::path path, SensorDescription sensor);
   /// Closes the file as far as that succeeds.
   ~FrameRecorder();

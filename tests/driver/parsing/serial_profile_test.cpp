@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "io/host_locale.hpp"
 #include "io/scratch_folder.hpp"
 
 namespace palpate {
@@ -186,6 +187,29 @@ TEST_F(ProfileFile, SaysWhatIsWrongWithAPacket) {
                  {"line 5", "'most' is 4097", "at most 4096", "add 'checksum'"});
   read(with_packet("  - bytes: aa\n  - {length: u16le, most: 4096}\n" + parts));
   read(with_packet("  - bytes: aa\n  - {length: u16le, most: 65536}\n" + parts + checksum));
+}
+
+TEST_F(ProfileFile, HostProgramWithDecimalCommasReadsTheSame) {
+  const std::string yaml =
+      "name: own\nelements: [[1.125, -2.500], [1.500, 2]]\ngain: 1.500\noffset: -0.250\n"
+      "rate_hz: 1000.500\npacket: [{bytes: aa}, {values: u8}, {checksum: crc16, polynomial: "
+      "0x1021}]\n";
+  const HostLocale locale;
+  const SerialProfile profile = read(yaml);
+  EXPECT_EQ(profile.elements_mm, (std::vector<glm::dvec2>{{1.125, -2.5}, {1.5, 2.0}}));
+  EXPECT_EQ(profile.packet.gain, 1.5);
+  EXPECT_EQ(profile.packet.offset, -0.25);
+  EXPECT_EQ(profile.rate_hz, 1000.5);
+  expect_refused(with("gain: 1,5"), {"line 3", "gain", "give a number"});
+  EXPECT_EQ(shipped_profiles().size(), 4u);
+  for (const std::string& name : shipped_profiles()) {
+    EXPECT_NO_THROW(read_serial_profile(name));
+  }
+}
+
+TEST_F(ProfileFile, WholeNumbersAreDecimalOrHexadecimal) {
+  EXPECT_EQ(read(with("line: {baud: 0115200}")).line.baud, 115200u);
+  EXPECT_EQ(read(with("line: {baud: 0x1c200}")).line.baud, 115200u);
 }
 
 }  // namespace

@@ -1,0 +1,210 @@
+#include "forked_child.hpp"
+
+#include <fmt/format.h>
+#include <poll.h>
+#include <sys/prctl.h>
+#include <sys/resource.h>
+#include <sys/socket.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <charconv>
+#include <csignal>
+#include <cstring>
+
+#include "palpate/error.hpp"
+
+namespace palpate {
+
+namespace {
+
+using namespace std::chrono_literals;
+
+[[noreturn]] void fail(const char* action) {
+  throw Error(Fault::system,
+              fmt::format("cannot {} to read a file in a child process: {}; end other programs and "
+                          "try again",
+                          action, std::strerror(errno)));
+}
+
+/// Private writable memory of this process, as RLIMIT_DATA counts it.
+std::uint64_t data_bytes() {
+  char text[256] = {};
+  const Descriptor statm("/proc/self/statm", O_RDONLY);
+  const ssize_t size = ::read(statm.get(), text, sizeof text - 1);
+  const char* at = text;
+  const char* const end = text + std::max<ssize_t>(size, 0);
+  std::uint64_t pages[6] = {};  // size, resident, shared, text, library, data
+  for (std::uint64_t& field : pages) {
+    at = std::find_if(at, end, [](char c) { return c != ' '; });
+    at = std::from_chars(at, end, field).ptr;
+  }
+  return pages[5] * static_cast<std::uint64_t>(::sysconf(_SC_PAGESIZE));
+}
+
+/// A soft limit: the child raises it as it comes to know what it has to read.
+void limit(__rlimit_resource resource, std::uint64_t most) {
+  rlimit present{};
+  if (::getrlimit(resource, &present) == 0) {
+    present.rlim_cur = std::min<rlim_t>(most, present.rlim_max);
+    ::setrlimit(resource, &present);
+  }
+}
+
+[[noreturn]] void run_child(const ForkedChild::Work& work, int socket, const ForkedLimits& limits) {
+  // Handlers of the embedding program must not see this child's crash, nor its mask keep the
+  // signal of a limit away.
+  sigset_t fatal;
+  sigemptyset(&fatal);
+  for (const int signal : {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT, SIGPIPE, SIGXCPU}) {
+    std::signal(signal, SIG_DFL);
+    sigaddset(&fatal, signal);
+  }
+  ::pthread_sigmask(SIG_UNBLOCK, &fatal, nullptr);
+  ::prctl(PR_SET_DUMPABLE, 0);
+  allow_cpu_seconds(limits.cpu_seconds);
+  allow_memory_bytes(limits.memory_bytes);
+  // The C library and sanitizers report a corrupted heap on standard error.
+  const Descriptor nowhere("/dev/null", O_RDWR);
+  for (const int standard : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
+    ::dup2(nowhere.get(), standard);
+  }
+  try {
+    work(socket);
+  } catch (...) {
+    ::_exit(1);
+  }
+  ::_exit(0);
+}
+
+/// Waits until there is something to read. Time is counted in waits that brought nothing, not by a
+/// clock: a process that was stopped for an hour has not waited for an hour.
+bool wait_for_answer(int socket, std::chrono::milliseconds silence) {
+  while (silence > 0ms) {
+    const auto slice = std::min<std::chrono::milliseconds>(silence, 1s);
+    pollfd ready{.fd = socket, .events = POLLIN, .revents = 0};
+    const int count = ::poll(&ready, 1, static_cast<int>(slice.count()));
+    if (count > 0) {
+      return true;
+    }
+    if (count == 0) {
+      silence -= slice;
+    } else if (errno != EINTR) {
+      return false;
+    }
+  }
+  return false;
+}
+
+}  // namespace
+
+ForkedChild::ForkedChild(const Work& work, const ForkedLimits& limits, std::mutex& held)
+    : silence_(limits.silence) {
+  // Other children of this class are not forked meanwhile, and so do not keep the socket open.
+  const std::lock_guard lock(held);
+  int ends[2];
+  if (::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends) != 0) {
+    fail("open a socket");
+  }
+  socket_ = Descriptor(ends[0]);
+  const Descriptor childs(ends[1]);
+  if (!socket_.valid() || !childs.valid()) {
+    fail("open a socket");
+  }
+  pid_ = ::fork();
+  if (pid_ == 0) {
+    socket_ = Descriptor();
+    run_child(work, childs.get(), limits);
+  }
+  if (pid_ < 0) {
+    fail("fork");
+  }
+}
+
+ForkedChild::~ForkedChild() {
+  // Still this child, and not one that took its number after somebody else waited for it.
+  if (::waitpid(pid_, nullptr, WNOHANG) != 0) {
+    return;
+  }
+  ::kill(pid_, SIGKILL);
+  // A child that a dead disk holds in the kernel ends when the disk lets go, not now.
+  constexpr int patience_ms = 2000;
+  pollfd gone{.fd = socket_.get(), .events = 0, .revents = 0};
+  const int options = ::poll(&gone, 1, patience_ms) == 0 ? WNOHANG : 0;
+  while (::waitpid(pid_, nullptr, options) < 0 && errno == EINTR) {
+  }
+}
+
+bool ForkedChild::read(void* data, std::size_t bytes) {
+  char* rest = static_cast<char*>(data);
+  while (bytes > 0) {
+    if (!wait_for_answer(socket_.get(), silence_)) {
+      fell_silent_ = true;
+      return false;
+    }
+    const ssize_t got = ::read(socket_.get(), rest, bytes);
+    if (got > 0) {
+      rest += got;
+      bytes -= static_cast<std::size_t>(got);
+    } else if (got == 0 || errno != EINTR) {
+      return false;
+    }
+  }
+  return true;
+}
+
+bool ForkedChild::write(const void* data, std::size_t bytes) {
+  const char* rest = static_cast<const char*>(data);
+  while (bytes > 0) {
+    const ssize_t written = ::send(socket_.get(), rest, bytes, MSG_NOSIGNAL);
+    if (written > 0) {
+      rest += written;
+      bytes -= static_cast<std::size_t>(written);
+    } else if (errno != EINTR) {
+      return false;
+    }
+  }
+  return true;
+}
+
+void forked_read(int socket, void* data, std::size_t bytes) {
+  char* rest = static_cast<char*>(data);
+  while (bytes > 0) {
+    const ssize_t got = ::read(socket, rest, bytes);
+    if (got > 0) {
+      rest += got;
+      bytes -= static_cast<std::size_t>(got);
+    } else if (got == 0 || errno != EINTR) {
+      ::_exit(0);
+    }
+  }
+}
+
+void forked_write(int socket, const void* data, std::size_t bytes) {
+  const char* rest = static_cast<const char*>(data);
+  while (bytes > 0) {
+    const ssize_t written = ::write(socket, rest, bytes);
+    if (written > 0) {
+      rest += written;
+      bytes -= static_cast<std::size_t>(written);
+    } else if (errno != EINTR) {
+      ::_exit(1);
+    }
+  }
+}
+
+void allow_cpu_seconds(std::uint64_t seconds) {
+  rusage used{};
+  ::getrusage(RUSAGE_SELF, &used);
+  const auto spent = static_cast<std::uint64_t>(used.ru_utime.tv_sec + used.ru_stime.tv_sec);
+  limit(RLIMIT_CPU, spent + seconds);
+}
+
+void allow_memory_bytes(std::uint64_t bytes) {
+  const std::uint64_t held = data_bytes();
+  limit(RLIMIT_DATA, bytes < UINT64_MAX - held ? held + bytes : UINT64_MAX);
+}
+
+}  // namespace palpate

@@ -1,0 +1,230 @@
+#include "hdf5_rows.hpp"
+
+#include <algorithm>
+#include <functional>
+#include <numeric>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "available_memory.hpp"
+#include "forked_child.hpp"
+#include "hdf5_child.hpp"
+
+namespace palpate {
+
+namespace {
+
+// Milliseconds are usual; a child that needs this long for a piece loops.
+constexpr std::uint64_t cpu_seconds = 2;
+// A fifth of what inflating and widening were seen to do.
+constexpr std::uint64_t cpu_bytes_per_second = 20'000'000;
+// Metadata and a piece of an answer.
+constexpr std::uint64_t base_bytes = 256 << 20;
+// A stored chunk, what it is inflated to, which grows by doubling, and what it is shuffled to.
+constexpr std::uint64_t copies_of_a_chunk = 5;
+
+// How the name leads to its dataset; H5L_TYPE_ERROR where the file is damaged.
+H5L_type_t link_type(hid_t file, const std::string& name) {
+  H5L_info_t link{};
+  return H5Lget_info(file, name.c_str(), &link, H5P_DEFAULT) < 0 ? H5L_TYPE_ERROR : link.type;
+}
+
+// Asked before the shape: that of a virtual dataset is read from other files.
+std::string storage_problem(hid_t creation) {
+  if (H5Pget_layout(creation) == H5D_VIRTUAL) {
+    return "is a virtual dataset, whose other datasets are not looked for; copy the numbers into "
+           "this file";
+  }
+  if (H5Pget_external_count(creation) != 0) {
+    return "keeps its numbers in another file, which is not opened; copy them into this file";
+  }
+  return "";
+}
+
+// Bound of a dataset's size, from what is stored of it. A damaged shape would otherwise have
+// terabytes allocated before the first read fails.
+std::uint64_t largest_dataset(hid_t dataset, hid_t creation, std::uint64_t file_bytes) {
+  const std::uint64_t stored = std::min<std::uint64_t>(H5Dget_storage_size(dataset), file_bytes);
+  return H5Pget_layout(creation) == H5D_CHUNKED && H5Pget_nfilters(creation) > 0
+             ? stored * largest_compression
+             : stored;
+}
+
+hid_t open_dataset(hid_t file, const std::string& name, hid_t access = H5P_DEFAULT) {
+  return H5Dopen2(file, name.c_str(), access);
+}
+
+std::uint64_t product(std::span<const std::uint64_t> factors) {
+  return std::accumulate(factors.begin(), factors.end(), std::uint64_t{1}, std::multiplies<>());
+}
+
+}  // namespace
+
+std::uint64_t hdf5_stored_bytes(std::span<const std::uint64_t> shape, std::uint64_t width) {
+  std::uint64_t bytes = width;
+  for (const std::uint64_t extent : shape) {
+    if (__builtin_mul_overflow(bytes, extent, &bytes)) {
+      return UINT64_MAX;
+    }
+  }
+  return bytes;
+}
+
+Hdf5Rows::Hdf5Rows(hid_t file, const std::string& name, std::uint64_t file_bytes) {
+  open(file, name, file_bytes);
+}
+
+void Hdf5Rows::open(hid_t file, const std::string& name, std::uint64_t file_bytes) {
+  const H5L_type_t link = link_type(file, name);
+  if (link != H5L_TYPE_HARD && link != H5L_TYPE_SOFT && link != H5L_TYPE_ERROR) {
+    problem_ = "is a link to another file, which is not followed; copy the dataset into this file";
+    return;
+  }
+  dataset_ = Hdf5Handle(open_dataset(file, name), H5Dclose);
+  const Hdf5Handle creation(dataset_.valid() ? H5Dget_create_plist(dataset_.get()) : -1, H5Pclose);
+  if (!creation.valid()) {
+    problem_ = link == H5L_TYPE_SOFT
+                   ? "is a link that leads to no dataset of this file; store the dataset itself"
+                   : hdf5_damaged;
+    return;
+  }
+  if (problem_ = storage_problem(creation.get()); !problem_.empty()) {
+    return;
+  }
+  const Hdf5Handle type(H5Dget_type(dataset_.get()), H5Tclose);
+  const Hdf5Handle space(H5Dget_space(dataset_.get()), H5Sclose);
+  const int rank = space.valid() ? H5Sget_simple_extent_ndims(space.get()) : -1;
+  const std::size_t width = type.valid() ? H5Tget_size(type.get()) : 0;
+  if (rank < 0 || width == 0) {
+    problem_ = hdf5_damaged;
+    return;
+  }
+  std::vector<hsize_t> extents(static_cast<std::size_t>(rank));
+  H5Sget_simple_extent_dims(space.get(), extents.data(), nullptr);
+  shape_.assign(extents.begin(), extents.end());
+  if (H5Sget_simple_extent_type(space.get()) == H5S_NULL) {
+    shape_ = {0};
+  }
+  const H5T_class_t kind = H5Tget_class(type.get());
+  if (kind == H5T_STRING) {
+    problem_ = "holds strings; store numbers";
+  } else if (kind != H5T_INTEGER && kind != H5T_FLOAT && kind != H5T_ENUM) {
+    problem_ = "has a type that Palpate does not read; store numbers";
+  } else if (hdf5_stored_bytes(shape_, width) >
+             largest_dataset(dataset_.get(), creation.get(), file_bytes)) {
+    problem_ = fmt::format(
+        "has the shape {}, more than is stored of it: it is damaged or was never written; copy or "
+        "record it again",
+        shape_);
+  } else if (!reopen_with_cache(file, name, creation.get(), width)) {
+    problem_ = hdf5_damaged;
+  }
+}
+
+// A pass over the rows meets every chunk that its rows touch again and again: all of them have to
+// stay in HDF5's cache, or each would be inflated once for every piece.
+bool Hdf5Rows::reopen_with_cache(hid_t file, const std::string& name, hid_t creation,
+                                 std::size_t width) {
+  if (H5Pget_layout(creation) != H5D_CHUNKED) {
+    return true;
+  }
+  std::vector<hsize_t> chunk(shape_.size());
+  const int rank = static_cast<int>(chunk.size());
+  if (rank == 0 || H5Pget_chunk(creation, rank, chunk.data()) != rank ||
+      std::count(chunk.begin(), chunk.end(), 0) > 0) {
+    return false;
+  }
+  const auto deep = static_cast<std::size_t>(
+      std::find_if(chunk.begin(), chunk.end() - 1, [](hsize_t extent) { return extent > 1; }) -
+      chunk.begin());
+  std::uint64_t chunks = 1;
+  for (std::size_t axis = deep + 1; axis < chunk.size(); ++axis) {
+    chunks *= shape_[axis] / chunk[axis] + 1;
+  }
+  const std::uint64_t chunk_bytes =
+      hdf5_stored_bytes(std::vector<std::uint64_t>(chunk.begin(), chunk.end()), width);
+  if (__builtin_mul_overflow(chunk_bytes, chunks, &band_bytes_)) {
+    return false;
+  }
+  const std::uint64_t needed = band_bytes_ + copies_of_a_chunk * chunk_bytes;
+  allow_memory_bytes(UINT64_MAX);  // what there is, not what this child was allowed so far
+  const std::uint64_t available = available_memory_bytes();
+  allow_memory_bytes(base_bytes);
+  if (needed > available) {
+    problem_ = fmt::format(
+        "is stored in chunks of {}, of which {:.1f} GB have to be held at a time; {:.1f} GB of "
+        "memory are available: store it in smaller chunks",
+        chunk, static_cast<double>(needed) * 1e-9, static_cast<double>(available) * 1e-9);
+    return true;
+  }
+  needed_bytes_ = needed;
+  const Hdf5Handle access(H5Pcreate(H5P_DATASET_ACCESS), H5Pclose);
+  // HDF5 hashes chunks to slots; ten slots a chunk and an odd number keep two from meeting.
+  const std::size_t slots = std::min<std::size_t>(10 * chunks + 521, 1'000'003);
+  H5Pset_chunk_cache(access.get(), slots, std::max<std::size_t>(band_bytes_, 1 << 20), 1.0);
+  dataset_ = Hdf5Handle(H5I_INVALID_HID, H5Dclose);  // an open dataset would keep its cache
+  dataset_ = Hdf5Handle(open_dataset(file, name, access.get()), H5Dclose);
+  return dataset_.valid();
+}
+
+void Hdf5Rows::send(int socket, std::uint64_t first, std::uint64_t count) {
+  const std::size_t rank = shape_.size();
+  std::vector<hsize_t> begin(rank, 0);
+  std::vector<hsize_t> box(shape_.begin(), shape_.end());
+  // A piece is a block along one axis, whole along those after it and a single place along those
+  // before it.
+  std::size_t axis = 0;
+  while (axis + 1 < rank && product(std::span(shape_).subspan(axis + 1)) > hdf5_piece) {
+    box[axis++] = 1;
+  }
+  const std::uint64_t inner = rank == 0 ? 1 : product(std::span(shape_).subspan(axis + 1));
+  const std::uint64_t block =
+      std::max<std::uint64_t>(1, hdf5_piece / std::max<std::uint64_t>(inner, 1));
+  std::vector<double> values;
+  allow_memory_bytes(base_bytes + needed_bytes_);
+  const auto end = [&](std::size_t k) { return k == 0 ? first + count : shape_[k]; };
+  if (rank > 0) {
+    begin[0] = first;
+  }
+  for (bool more = true; more;) {
+    if (rank > 0) {
+      box[axis] = std::min<hsize_t>(block, end(axis) - begin[axis]);
+    }
+    values.resize((rank == 0 ? 1 : box[axis]) * inner);
+    // Its limit follows what it reads: the chunks of a pass, at most.
+    allow_cpu_seconds(cpu_seconds + band_bytes_ / cpu_bytes_per_second);
+    const std::uint64_t size = read(begin, box, values) ? values.size() : 0;
+    forked_write(socket, &size, sizeof size);
+    if (size == 0) {
+      return;
+    }
+    forked_write(socket, values.data(), size * sizeof(double));
+    more = false;
+    for (std::size_t k = rank == 0 ? 0 : axis + 1; k-- > 0 && !more;) {
+      begin[k] += box[k];
+      more = begin[k] < end(k);
+      if (!more && k > 0) {
+        begin[k] = 0;
+      }
+    }
+  }
+}
+
+bool Hdf5Rows::read(const std::vector<hsize_t>& begin, const std::vector<hsize_t>& count,
+                    std::span<double> values) const {
+  if (begin.empty()) {
+    return H5Dread(dataset_.get(), H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT,
+                   values.data()) >= 0;
+  }
+  const Hdf5Handle there(H5Dget_space(dataset_.get()), H5Sclose);
+  const hsize_t size = values.size();
+  const Hdf5Handle here(H5Screate_simple(1, &size, nullptr), H5Sclose);
+  return there.valid() &&
+         H5Sselect_hyperslab(there.get(), H5S_SELECT_SET, begin.data(), nullptr, count.data(),
+                             nullptr) >= 0 &&
+         H5Dread(dataset_.get(), H5T_NATIVE_DOUBLE, here.get(), there.get(), H5P_DEFAULT,
+                 values.data()) >= 0;
+}
+
+}  // namespace palpate

@@ -1,0 +1,129 @@
+#include <fmt/format.h>
+#include <sys/file.h>
+
+#include <cerrno>
+#include <cstring>
+
+#include "file_summary.hpp"
+#include "forked_child.hpp"
+#include "hdf5_failure.hpp"
+#include "hdf5_handle.hpp"
+#include "hdf5_writer.hpp"
+#include "input_file.hpp"
+#include "palpate/error.hpp"
+#include "palpate/files.hpp"
+#include "recording_state.hpp"
+
+namespace palpate {
+
+namespace {
+
+using namespace std::chrono_literals;
+
+// Cuts what is beyond the whole rows from every dataset that grows.
+bool cut_rows(hid_t file, std::uint64_t rows) {
+  for (const char* name : {"pressure", "sensor_pose", "device_time", "lost_before", "time"}) {
+    if (H5Lexists(file, name, H5P_DEFAULT) <= 0) {
+      continue;
+    }
+    const Hdf5Handle dataset(H5Dopen2(file, name, H5P_DEFAULT), H5Dclose);
+    const Hdf5Handle space(dataset.valid() ? H5Dget_space(dataset.get()) : -1, H5Sclose);
+    hsize_t extents[H5S_MAX_RANK] = {};
+    if (!space.valid() || H5Sget_simple_extent_dims(space.get(), extents, nullptr) < 1) {
+      return false;
+    }
+    if (extents[0] > rows) {
+      extents[0] = rows;
+      if (H5Dset_extent(dataset.get(), extents) < 0) {
+        return false;
+      }
+    }
+  }
+  return true;
+}
+
+// As h5clear does, by the same properties of HDF5's: opens the file in spite of its marks, takes
+// its end from its size, and closes it. It is opened as a recorder would, so that it can be read
+// whenever this is killed.
+bool close_file(const std::filesystem::path& path, std::uint64_t rows) {
+  const Hdf5Handle access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose);
+  set_appendable(access.get());
+  H5Pset_file_locking(access.get(), false, true);  // the caller holds the lock
+  hbool_t yes = 1;
+  if (H5Pset(access.get(), "clear_status_flags", &yes) < 0 ||
+      H5Pset(access.get(), "skip_eof_check", &yes) < 0) {
+    return false;
+  }
+  const hid_t file = H5Fopen(path.c_str(), H5F_ACC_RDWR | H5F_ACC_SWMR_WRITE, access.get());
+  const bool done = file >= 0 && H5Fincrement_filesize(file, 0) >= 0 && cut_rows(file, rows) &&
+                    H5Fflush(file, H5F_SCOPE_GLOBAL) >= 0;
+  return done && H5Fclose(file) >= 0;
+}
+
+Descriptor lock(const std::filesystem::path& path) {
+  Descriptor file(path, O_RDWR);
+  if (!file.valid()) {
+    refuse(path, fmt::format("cannot be closed: {}; check its permissions", std::strerror(errno)));
+  }
+  if (::flock(file.get(), LOCK_EX | LOCK_NB) == 0) {
+    return file;
+  }
+  if (errno == EWOULDBLOCK) {
+    refuse(path,
+           "cannot be closed: another program has it open, which may be recording it; wait "
+           "until it is done");
+  }
+  refuse(path,
+         "cannot be closed: its file system has no locks, which tell whether it is being "
+         "recorded; copy it to another disk first");
+}
+
+}  // namespace
+
+bool close_recording(const std::filesystem::path& path) {
+  // All of it is read before: nothing is changed in a file that is damaged or something else.
+  const RecordingSummary before = summarize_recording(path);
+  if (before.head.closed) {
+    return false;
+  }
+  std::string reason;
+  {
+    const Descriptor locked = lock(path);
+    if (!is_marked_open(path)) {
+      return false;
+    }
+    constexpr std::uint64_t memory_bytes = 256 << 20;
+    ForkedChild child(
+        [&](int socket) {
+          H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
+          H5PLset_loading_state(0);
+          const std::string failure = close_file(path, before.rows) ? "" : hdf5_failure();
+          const std::uint64_t size = failure.size();
+          forked_write(socket, &size, sizeof size);
+          forked_write(socket, failure.data(), size);
+        },
+        {.cpu_seconds = 10, .memory_bytes = memory_bytes, .silence = 1min}, hdf5_mutex);
+    std::uint64_t size = 0;
+    reason = "HDF5 failed";
+    if (child.read(&size, sizeof size) && size < memory_bytes) {
+      reason.resize(size);
+      if (!child.read(reason.data(), size)) {
+        reason = "HDF5 failed";
+      }
+    }
+  }
+  if (reason.empty()) {
+    const RecordingSummary after = summarize_recording(path);
+    if (!after.head.closed || after.rows != before.rows) {
+      reason = fmt::format("it has {} of {} rows", after.rows, before.rows);
+    }
+  }
+  if (!reason.empty()) {
+    throw Error(Fault::system,
+                fmt::format("{}: cannot be closed: {}; free or repair the disk and try again",
+                            path.string(), reason));
+  }
+  return true;
+}
+
+}  // namespace palpate

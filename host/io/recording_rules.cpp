@@ -1,0 +1,131 @@
+#include "recording_rules.hpp"
+
+#include <cmath>
+
+#include <fmt/format.h>
+
+#include "input_file.hpp"
+
+namespace palpate {
+
+namespace {
+
+void require_one_of(const std::filesystem::path& path, const char* attribute,
+                    const std::string& value, const char* first, const char* second) {
+  require_text(path, fmt::format("attribute '{}'", attribute), value);
+  if (value != first && value != second) {
+    refuse(path, fmt::format("attribute '{}' = '{}'; make it '{}' or '{}'", attribute, value, first,
+                             second));
+  }
+}
+
+}  // namespace
+
+bool is_finite(const Pose& pose) {
+  return std::isfinite(pose.translation_mm.x) && std::isfinite(pose.translation_mm.y) &&
+         std::isfinite(pose.theta_rad);
+}
+
+void require_text(const std::filesystem::path& path, std::string_view field,
+                  std::string_view text) {
+  if (!is_printable_utf8(text)) {
+    refuse(path, fmt::format("{} is not printable UTF-8 text; store it as such", field));
+  }
+}
+
+void require_head(const std::filesystem::path& path, const Recording& head, std::size_t elements) {
+  require_text(path, "attribute 'object'", head.object);
+  require_text(path, "attribute 'sensor'", head.sensor);
+  require_text(path, "attribute 'serial'", head.serial);
+  require_one_of(path, "pressure_unit", head.pressure_unit, "kPa", "raw");
+  require_one_of(path, "rows", head.rows, "touches", "frames");
+  if (head.truth) {
+    require_text(path, "attribute 'true_object'", head.truth->object);
+    const Pose& T = head.truth->T_object_robot;
+    if (!is_finite(T)) {
+      refuse(path, fmt::format("attribute 'true_T_object_robot' = [{}, {}, {}]; store finite "
+                               "numbers",
+                               T.translation_mm.x, T.translation_mm.y, T.theta_rad));
+    }
+  }
+  for (std::size_t i = 0; i < head.baseline.size(); ++i) {
+    if ((head.valid.size() != elements || head.valid[i] != 0) && !std::isfinite(head.baseline[i])) {
+      refuse(path,
+             fmt::format("dataset 'baseline'[{}] = {}; store finite numbers", i, head.baseline[i]));
+    }
+  }
+}
+
+void require_pressures(const std::filesystem::path& path, const Recording& head,
+                       std::size_t elements, std::size_t first, std::span<const double> pressure) {
+  for (std::size_t i = 0; i < pressure.size(); ++i) {
+    const std::size_t k = first + i;
+    const bool alive =
+        head.valid.empty() || head.valid[head.valid.size() == elements ? k % elements : k] != 0;
+    const bool unknown = head.rows == "frames" && std::isnan(pressure[i]);
+    if (alive && !unknown && !std::isfinite(pressure[i])) {
+      refuse(path, fmt::format("dataset 'pressure'[{}, {}] = {}; store finite numbers, and 0 in "
+                               "'valid' for a dead element",
+                               k / elements, k % elements, pressure[i]));
+    }
+  }
+}
+
+void require_poses(const std::filesystem::path& path, const Recording& head, std::size_t first,
+                   std::span<const Pose> T_robot_sensor) {
+  const bool may_be_unknown = head.rows == "frames";
+  for (std::size_t i = 0; i < T_robot_sensor.size(); ++i) {
+    const Pose& pose = T_robot_sensor[i];
+    const bool unknown = std::isnan(pose.translation_mm.x) && std::isnan(pose.translation_mm.y) &&
+                         std::isnan(pose.theta_rad);
+    if (!is_finite(pose) && !(unknown && may_be_unknown)) {
+      refuse(path,
+             fmt::format("dataset 'sensor_pose'[{}] = [{}, {}, {}]; store finite numbers",
+                         first + i, pose.translation_mm.x, pose.translation_mm.y, pose.theta_rad));
+    }
+  }
+}
+
+void require_elements(const std::filesystem::path& path, std::size_t first,
+                      std::span<const glm::dvec2> elements_mm) {
+  for (std::size_t i = 0; i < elements_mm.size(); ++i) {
+    const glm::dvec2& element = elements_mm[i];
+    if (!std::isfinite(element.x) || !std::isfinite(element.y)) {
+      refuse(path, fmt::format("dataset 'elements', position {} = [{}, {}]; store finite numbers",
+                               first + i, element.x, element.y));
+    }
+  }
+}
+
+void require_times(const std::filesystem::path& path, std::size_t first,
+                   std::span<const double> time_s) {
+  for (std::size_t i = 0; i < time_s.size(); ++i) {
+    if (!std::isfinite(time_s[i])) {
+      refuse(path, fmt::format("dataset 'time'[{}] = {}; store seconds since the Unix epoch",
+                               first + i, time_s[i]));
+    }
+  }
+}
+
+void require_device_times(const std::filesystem::path& path, std::size_t first,
+                          std::span<const double> device_time_s) {
+  for (std::size_t i = 0; i < device_time_s.size(); ++i) {
+    if (std::isinf(device_time_s[i])) {
+      refuse(path, fmt::format("dataset 'device_time'[{}] = {}; store seconds, or NaN where they "
+                               "are unknown",
+                               first + i, device_time_s[i]));
+    }
+  }
+}
+
+void require_lost_counts(const std::filesystem::path& path, std::size_t first,
+                         std::span<const std::uint64_t> lost_before) {
+  for (std::size_t i = 0; i < lost_before.size(); ++i) {
+    if (lost_before[i] > largest_count) {
+      refuse(path, fmt::format("dataset 'lost_before'[{}] = {}; store counts up to {}", first + i,
+                               lost_before[i], largest_count));
+    }
+  }
+}
+
+}  // namespace palpate

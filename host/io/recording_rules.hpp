@@ -1,0 +1,47 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <span>
+#include <string_view>
+
+#include "palpate/touch.hpp"
+
+namespace palpate {
+
+// What holds for every recording, whether it is read, about to be written or recorded: what may be
+// written is what may be read. Each function throws Error (Fault::input), which names the file, the
+// field and the remedy.
+
+/// Counts up to here are exact in float64, in which datasets are read.
+inline constexpr std::uint64_t largest_count = std::uint64_t{1} << 53;
+
+/// Texts of a file are printable UTF-8; `field` is such as "attribute 'object'".
+void require_text(const std::filesystem::path& path, std::string_view field, std::string_view text);
+
+/// All that is not a row: texts, units, truth, baseline.
+/// @param elements of the array; as many as `baseline` and, unless it changes, `valid` have
+void require_head(const std::filesystem::path& path, const Recording& head, std::size_t elements);
+
+// Rows, as many as one likes of them; `first` is the place of the first value among all.
+
+/// Pressures [n, e] of elements that are alive are finite or, in a stream of frames, NaN: Unknown.
+/// Uses `head.valid`.
+void require_pressures(const std::filesystem::path& path, const Recording& head,
+                       std::size_t elements, std::size_t first, std::span<const double> pressure);
+/// Poses are finite or, in a stream of frames, NaN as a whole: not known at that time.
+void require_poses(const std::filesystem::path& path, const Recording& head, std::size_t first,
+                   std::span<const Pose> T_robot_sensor);
+void require_elements(const std::filesystem::path& path, std::size_t first,
+                      std::span<const glm::dvec2> elements_mm);
+void require_times(const std::filesystem::path& path, std::size_t first,
+                   std::span<const double> time_s);
+/// Times of the sensor's own clock may be NaN: unknown.
+void require_device_times(const std::filesystem::path& path, std::size_t first,
+                          std::span<const double> device_time_s);
+void require_lost_counts(const std::filesystem::path& path, std::size_t first,
+                         std::span<const std::uint64_t> lost_before);
+
+bool is_finite(const Pose& pose);
+
+}  // namespace palpate

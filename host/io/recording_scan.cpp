@@ -1,0 +1,276 @@
+#include "recording_scan.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "available_memory.hpp"
+#include "file_format.hpp"
+#include "hdf5_contents.hpp"
+#include "recording_rules.hpp"
+
+namespace palpate {
+
+namespace {
+
+using Shape = std::vector<std::uint64_t>;
+
+// Datasets that have a row for each touch, `time` last: see FrameRecorder.
+const std::vector<std::string> row_names = {"pressure", "sensor_pose", "device_time", "lost_before",
+                                            "time"};
+
+// The rows of a stream that was cut off, or is being recorded, are those that all datasets have.
+// `time` is written last, and what was not written is NaN.
+std::uint64_t whole_rows(Hdf5Contents& file) {
+  std::uint64_t rows = UINT64_MAX;
+  for (const std::string& name : row_names) {
+    if (file.has_dataset(name)) {
+      const Shape& shape = file.shape(name);
+      rows = std::min(rows, shape.empty() ? 0 : shape[0]);
+    }
+  }
+  if (file.has_dataset("time") && file.shape("time").size() == 1) {
+    std::uint64_t written = UINT64_MAX;
+    file.read(
+        "time",
+        [&](std::uint64_t first, std::span<const double> times) {
+          const auto unwritten =
+              std::find_if(times.begin(), times.end(), [](double t) { return std::isnan(t); });
+          if (unwritten != times.end()) {
+            written =
+                std::min(written, first + static_cast<std::uint64_t>(unwritten - times.begin()));
+          }
+        },
+        rows);
+    rows = std::min(rows, written);
+  }
+  return rows;
+}
+
+std::optional<Truth> read_truth(const Hdf5Contents& file) {
+  if (!file.has_attribute("true_object") && !file.has_attribute("true_T_object_robot")) {
+    return {};
+  }
+  const std::vector<double> pose = file.numbers("true_T_object_robot", 3);
+  return Truth{file.text("true_object"), {{pose[0], pose[1]}, pose[2]}};
+}
+
+class Scan {
+ public:
+  Scan(const std::filesystem::path& path, const RecordingTakers& takers)
+      : path_(path),
+        takers_(takers),
+        file_(path,
+              {"format", "version", "object", "pressure_unit", "length_unit", "rows", "true_object",
+               "true_T_object_robot", "sensor", "serial"},
+              {"pressure", "sensor_pose", "elements", "valid", "time", "baseline", "device_time",
+               "lost_before"}) {}
+
+  void run() {
+    read_texts();
+    read_extents();
+    read_small_lists();
+    require_head(path_, head_.recording, head_.elements);
+    takers_.head(head_);
+    read_rows();
+  }
+
+ private:
+  void read_texts() {
+    require_format(file_, recording_format);
+    if (const std::string unit = file_.text("length_unit"); unit != "mm") {
+      file_.refuse(fmt::format("attribute 'length_unit' = '{}'; convert lengths to 'mm'", unit));
+    }
+    Recording& r = head_.recording;
+    r.closed = file_.closed();
+    r.path = path_.string();
+    r.object = file_.text("object");
+    r.pressure_unit = file_.text("pressure_unit");
+    for (const auto& [name, text] :
+         {std::pair{"rows", &r.rows}, {"sensor", &r.sensor}, {"serial", &r.serial}}) {
+      if (file_.has_attribute(name)) {
+        *text = file_.text(name);
+      }
+    }
+    r.truth = read_truth(file_);
+  }
+
+  void read_extents() {
+    if (!file_.closed()) {
+      rows_ = whole_rows(file_);
+    }
+    const Shape pressure = cut("pressure", file_.shape("pressure", 2));
+    head_.rows = pressure[0];
+    head_.elements = pressure[1];
+    if (head_.rows == 0 || head_.elements == 0) {
+      file_.refuse(
+          fmt::format("dataset 'pressure' is empty, {}; record at least one touch by one "
+                      "element",
+                      pressure));
+    }
+    const auto [n, e] = std::pair{head_.rows, head_.elements};
+    require_shape("sensor_pose", {{n, 3}});
+    require_shape("elements", {{e, 2}, {n, e, 2}});
+    head_.array_changes = file_.shape("elements").size() == 3;
+    head_.has_time = has("time", {{n}});
+    head_.has_device_time = has("device_time", {{n}});
+    head_.has_lost_before = has("lost_before", {{n}});
+  }
+
+  void read_small_lists() {
+    Recording& r = head_.recording;
+    const auto [n, e] = std::pair{head_.rows, head_.elements};
+    if (has("valid", {{e}, {n, e}})) {
+      const std::uint64_t count = file_.count("valid");
+      require_memory(path_, fmt::format("dataset 'valid' of {} numbers", count), count);
+      r.valid.reserve(count);
+      file_.read("valid", [&](std::uint64_t, std::span<const double> values) {
+        for (const double valid : values) {
+          if (std::isnan(valid)) {
+            file_.refuse(
+                "dataset 'valid' holds NaN; store 0 for a dead element and 1 for the others");
+          }
+          r.valid.push_back(valid != 0);
+        }
+      });
+    }
+    if (has("baseline", {{e}})) {
+      file_.read("baseline", [&](std::uint64_t, std::span<const double> values) {
+        r.baseline.insert(r.baseline.end(), values.begin(), values.end());
+      });
+      if (std::all_of(r.baseline.begin(), r.baseline.end(),
+                      [](double value) { return std::isnan(value); })) {
+        r.baseline.clear();  // the recording was cut off before it was taken
+      }
+    }
+  }
+
+  void read_rows() {
+    const Recording& head = head_.recording;
+    file_.read(
+        "pressure",
+        [&](std::uint64_t first, std::span<const double> values) {
+          require_pressures(path_, head, head_.elements, first, values);
+          takers_.pressure(values);
+        },
+        head_.rows);
+    std::size_t poses = 0;
+    read_tuples<3, Pose>(
+        "sensor_pose",
+        [](const double* v) {
+          return Pose{{v[0], v[1]}, v[2]};
+        },
+        [&](std::span<const Pose> some) {
+          require_poses(path_, head, std::exchange(poses, poses + some.size()), some);
+          takers_.T_robot_sensor(some);
+        });
+    std::size_t elements = 0;
+    read_tuples<2, glm::dvec2>(
+        "elements", [](const double* v) { return glm::dvec2(v[0], v[1]); },
+        [&](std::span<const glm::dvec2> some) {
+          require_elements(path_, std::exchange(elements, elements + some.size()), some);
+          takers_.elements_mm(some);
+        });
+    if (head_.has_time) {
+      read_list("time", [&](std::uint64_t first, std::span<const double> values) {
+        require_times(path_, first, values);
+        takers_.time_s(values);
+      });
+    }
+    if (head_.has_device_time) {
+      read_list("device_time", [&](std::uint64_t first, std::span<const double> values) {
+        require_device_times(path_, first, values);
+        takers_.device_time_s(values);
+      });
+    }
+    if (head_.has_lost_before) {
+      read_list("lost_before", [&](std::uint64_t first, std::span<const double> values) {
+        const std::vector<std::uint64_t> counts = counts_of(values);
+        require_lost_counts(path_, first, counts);
+        takers_.lost_before(counts);
+      });
+    }
+  }
+
+  void read_list(const char* name, const Hdf5Contents::Take& take) {
+    file_.read(name, take, head_.rows);
+  }
+
+  // Pieces end anywhere; what is left of a tuple waits for the next.
+  template <std::size_t width, typename Tuple, typename Make, typename Take>
+  void read_tuples(const char* name, const Make& make, const Take& take) {
+    std::vector<double> numbers;
+    std::vector<Tuple> tuples;
+    const auto take_whole = [&](std::uint64_t, std::span<const double> values) {
+      numbers.insert(numbers.end(), values.begin(), values.end());
+      tuples.clear();
+      std::size_t at = 0;
+      for (; at + width <= numbers.size(); at += width) {
+        tuples.push_back(make(&numbers[at]));
+      }
+      numbers.erase(numbers.begin(), numbers.begin() + static_cast<std::ptrdiff_t>(at));
+      take(std::span<const Tuple>(tuples));
+    };
+    // An array that does not change has as many rows as elements.
+    const bool by_row = std::string_view(name) != "elements" || head_.array_changes;
+    file_.read(name, take_whole, by_row ? head_.rows : head_.elements);
+  }
+
+  std::vector<std::uint64_t> counts_of(std::span<const double> values) const {
+    std::vector<std::uint64_t> counts;
+    counts.reserve(values.size());
+    for (const double value : values) {
+      if (!(value >= 0.0 && value <= static_cast<double>(largest_count) &&
+            value == std::floor(value))) {
+        file_.refuse(fmt::format("dataset 'lost_before' holds {}; store counts of frames up to {}",
+                                 value, largest_count));
+      }
+      counts.push_back(static_cast<std::uint64_t>(value));
+    }
+    return counts;
+  }
+
+  /// The shape without the rows beyond the whole ones.
+  Shape cut(std::string_view name, Shape shape) const {
+    const bool has_rows =
+        std::find(row_names.begin(), row_names.end(), name) != row_names.end() && !shape.empty();
+    if (has_rows) {
+      shape[0] = std::min(shape[0], rows_);
+    }
+    return shape;
+  }
+
+  void require_shape(const char* name, const std::vector<Shape>& fitting) const {
+    const Shape shape = cut(name, file_.shape(name));
+    if (std::find(fitting.begin(), fitting.end(), shape) == fitting.end()) {
+      file_.refuse(
+          fmt::format("dataset '{}' has the shape {}; 'pressure' is [{}, {}], so make it "
+                      "{}",
+                      name, shape, head_.rows, head_.elements, fmt::join(fitting, " or ")));
+    }
+  }
+
+  bool has(const char* name, const std::vector<Shape>& fitting) const {
+    if (!file_.has_dataset(name)) {
+      return false;
+    }
+    require_shape(name, fitting);
+    return true;
+  }
+
+  const std::filesystem::path& path_;
+  const RecordingTakers& takers_;
+  Hdf5Contents file_;
+  std::uint64_t rows_ = UINT64_MAX;  ///< that all datasets have, of a file that is not closed
+  RecordingHead head_;
+};
+
+}  // namespace
+
+void scan_recording(const std::filesystem::path& path, const RecordingTakers& takers) {
+  Scan(path, takers).run();
+}
+
+}  // namespace palpate

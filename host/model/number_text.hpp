@@ -1,0 +1,63 @@
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <cstdint>
+#include <optional>
+#include <string_view>
+#include <system_error>
+
+namespace palpate {
+
+// Numbers in files and on command lines, as C and YAML write them, such as -1.5, +2 or 1e-3. They
+// do not depend on the locale: a host program that shows its users decimal commas must not change
+// what a file says.
+
+namespace detail {
+
+inline std::string_view without_plus(std::string_view text) {
+  const bool plus = text.size() > 1 && text[0] == '+' && text[1] != '-';
+  return text.substr(plus ? 1 : 0);
+}
+
+}  // namespace detail
+
+/// The finite number that all of the text is, if it is one.
+inline std::optional<double> number_of(std::string_view text) {
+  text = detail::without_plus(text);
+  double number = 0.0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+  const bool whole = error == std::errc{} && end == text.data() + text.size();
+  return whole && std::isfinite(number) ? std::optional(number) : std::nullopt;
+}
+
+/// The whole decimal number that all of the text is, if it is one: "010" is 10.
+inline std::optional<std::int64_t> whole_number_of(std::string_view text) {
+  text = detail::without_plus(text);
+  std::int64_t number = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+  const bool whole = error == std::errc{} && end == text.data() + text.size();
+  return whole ? std::optional(number) : std::nullopt;
+}
+
+/// The two finite numbers, with blanks between and around them, that all of the line is.
+inline std::optional<std::array<double, 2>> two_numbers_of(std::string_view line) {
+  constexpr std::string_view blanks = " \t\r\v\f";
+  std::array<double, 2> numbers{};
+  for (double& number : numbers) {
+    line.remove_prefix(std::min(line.find_first_not_of(blanks), line.size()));
+    const std::string_view word = line.substr(0, line.find_first_of(blanks));
+    const std::optional<double> value = number_of(word);
+    if (!value) {
+      return {};
+    }
+    number = *value;
+    line.remove_prefix(word.size());
+  }
+  const bool all = line.find_first_not_of(blanks) == std::string_view::npos;
+  return all ? std::optional(numbers) : std::nullopt;
+}
+
+}  // namespace palpate

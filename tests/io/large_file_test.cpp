@@ -1,0 +1,167 @@
+// Files that hold far more than their size on the disk says.
+
+#include <gtest/gtest.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <functional>
+
+#include "available_memory.hpp"
+#include "file_parts.hpp"
+#include "file_summary.hpp"
+#include "hdf5_rows.hpp"
+#include "palpate/files.hpp"
+#include "scratch_folder.hpp"
+
+namespace palpate {
+namespace {
+
+constexpr std::uint64_t mib = 1 << 20;
+
+// A map whose chunks of 1 x 1 Ki cells, all of zeros, are stored as 18 KB each: made by copying the
+// stored bytes of the first.
+void save_map_of_zeros(const std::filesystem::path& path, hsize_t chunks_x, hsize_t chunks_y) {
+  map_parts().without("log_odds").save(path);
+  edit(path, [&](hid_t file) {
+    constexpr hsize_t edge = 1024;
+    const hsize_t extents[] = {edge * chunks_y, edge * chunks_x};
+    const hsize_t chunk[] = {edge, edge};
+    const Hdf5Handle space(H5Screate_simple(2, extents, nullptr), H5Sclose);
+    const Hdf5Handle creation(H5Pcreate(H5P_DATASET_CREATE), H5Pclose);
+    H5Pset_chunk(creation.get(), 2, chunk);
+    H5Pset_deflate(creation.get(), 1);
+    const Hdf5Handle dataset(H5Dcreate2(file, "log_odds", H5T_NATIVE_FLOAT, space.get(),
+                                        H5P_DEFAULT, creation.get(), H5P_DEFAULT),
+                             H5Dclose);
+    const hsize_t origin[] = {0, 0};
+    H5Sselect_hyperslab(space.get(), H5S_SELECT_SET, origin, nullptr, chunk, nullptr);
+    const Hdf5Handle memory(H5Screate_simple(2, chunk, nullptr), H5Sclose);
+    const std::vector<float> zeros(edge * edge, 0.0F);
+    ASSERT_GE(H5Dwrite(dataset.get(), H5T_NATIVE_FLOAT, memory.get(), space.get(), H5P_DEFAULT,
+                       zeros.data()),
+              0);
+    ASSERT_GE(H5Dflush(dataset.get()), 0);
+    hsize_t size = 0;
+    ASSERT_GE(H5Dget_chunk_storage_size(dataset.get(), origin, &size), 0);
+    std::string stored(size, '\0');
+    std::uint32_t filters = 0;
+    ASSERT_GE(H5Dread_chunk(dataset.get(), H5P_DEFAULT, origin, &filters, stored.data()), 0);
+    for (hsize_t j = 0; j < chunks_y; ++j) {
+      for (hsize_t i = 0; i < chunks_x; ++i) {
+        const hsize_t place[] = {j * edge, i * edge};
+        ASSERT_GE(H5Dwrite_chunk(dataset.get(), H5P_DEFAULT, 0, place, size, stored.data()), 0);
+      }
+    }
+  });
+}
+
+class LargeFile : public testing::Test {
+ protected:
+  // Runs the work in a process that may hold so much memory beyond what it holds already. The
+  // message of its Error, "" where it has none.
+  static std::string with_memory(std::uint64_t bytes, const std::function<void()>& work) {
+    int ends[2];
+    EXPECT_EQ(::pipe(ends), 0);
+    const pid_t pid = ::fork();
+    if (pid == 0) {
+      std::string message;
+      const std::uint64_t unlimited = available_memory_bytes();
+      // What is held is found by bisection: a limit below it leaves nothing.
+      rlimit limit{.rlim_cur = 0, .rlim_max = RLIM_INFINITY};
+      for (limit.rlim_cur = 16 * mib;; limit.rlim_cur += 16 * mib) {
+        ::setrlimit(RLIMIT_DATA, &limit);
+        if (available_memory_bytes() >= std::min(bytes, unlimited)) {
+          break;
+        }
+      }
+      try {
+        work();
+      } catch (const Error& error) {
+        message = error.what();
+      } catch (const std::exception& error) {
+        message = std::string("not an Error: ") + error.what();
+      }
+      if (::write(ends[1], message.data(), message.size()) < 0) {
+        ::_exit(1);
+      }
+      ::_exit(0);
+    }
+    ::close(ends[1]);
+    std::string message(4096, '\0');
+    message.resize(static_cast<std::size_t>(
+        std::max<ssize_t>(0, ::read(ends[0], message.data(), message.size()))));
+    ::close(ends[0]);
+    int status = -1;
+    ::waitpid(pid, &status, 0);
+    EXPECT_EQ(status, 0);
+    return message;
+  }
+
+  ScratchFolder folder_;
+  std::filesystem::path path_ = folder_ / "large.h5";
+};
+
+TEST_F(LargeFile, IsRefusedBeforeItTakesMoreThanThereIs) {
+  save_map_of_zeros(path_, 20, 20);  // 1.7 GB in 7 MB
+  EXPECT_LT(std::filesystem::file_size(path_), 16 * mib);
+  expect_named(with_memory(256 * mib, [&] { read_map(path_); }),
+               {path_.c_str(), "20480 x 20480 cells", "needs 1.7 GB", "0.3 GB are available"});
+}
+
+// 67 MB of cells.
+TEST_F(LargeFile, IsSummarizedInPieces) {
+  save_map_of_zeros(path_, 4, 4);
+  const std::string message = with_memory(40 * mib, [&] {
+    const MapSummary summary = summarize_map(path_);
+    if (summary.head.nx != 4096 || summary.occupied != 0 || summary.log_odds.most != 0.0) {
+      throw std::runtime_error("wrong summary");
+    }
+  });
+  EXPECT_EQ(message, "");
+}
+
+// What compresses by a factor of 1000 takes its time to read; the limit is for what is read.
+TEST_F(LargeFile, IsReadWhole) {
+  save_map_of_zeros(path_, 4, 4);
+  EXPECT_EQ(read_map(path_).log_odds.size(), 4096u * 4096u);
+}
+
+// Rows may be longer than a piece, and chunks may lie across them.
+TEST_F(LargeFile, PiecesComeInOrderWhateverTheChunks) {
+  const std::vector<hsize_t> shape{3, 2, 700, 101};
+  std::vector<double> values(3 * 2 * 700 * 101);
+  for (std::size_t k = 0; k < values.size(); ++k) {
+    values[k] = -static_cast<double>(k);
+  }
+  for (const std::vector<hsize_t>& chunk :
+       {std::vector<hsize_t>{}, {3, 2, 700, 1}, {1, 1, 1, 101}, {2, 2, 300, 50}, {1, 2, 7, 9}}) {
+    FileParts parts = posterior_parts();
+    parts.without("log_likelihood")
+        .attribute("objects", std::vector<std::string>{"A", "B", "C"})
+        .attribute("bins_theta", 2)
+        .attribute("bins_y", 700)
+        .attribute("bins_x", 101)
+        .save(path_);
+    edit(path_, [&](hid_t file) {
+      const Hdf5Handle space(H5Screate_simple(4, shape.data(), nullptr), H5Sclose);
+      const Hdf5Handle creation(H5Pcreate(H5P_DATASET_CREATE), H5Pclose);
+      if (!chunk.empty()) {
+        H5Pset_chunk(creation.get(), 4, chunk.data());
+        H5Pset_deflate(creation.get(), 1);
+      }
+      const Hdf5Handle dataset(H5Dcreate2(file, "log_likelihood", H5T_NATIVE_DOUBLE, space.get(),
+                                          H5P_DEFAULT, creation.get(), H5P_DEFAULT),
+                               H5Dclose);
+      H5Dwrite(dataset.get(), H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, values.data());
+    });
+    EXPECT_TRUE(read_posterior(path_).log_likelihood == values);
+    const PosteriorSummary summary = summarize_posterior(path_);
+    ASSERT_EQ(summary.peaks.size(), 3u);
+    EXPECT_EQ(summary.peaks[2].log_likelihood, values[2 * 2 * 700 * 101]);
+    EXPECT_EQ(summary.peaks[2].bin, 0);
+  }
+}
+
+}  // namespace
+}  // namespace palpate

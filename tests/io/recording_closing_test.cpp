@@ -1,0 +1,193 @@
+// A recording that was cut off is closed for programs other than Palpate.
+
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <csignal>
+#include <functional>
+
+#include "file_parts.hpp"
+#include "palpate/files.hpp"
+#include "palpate/frame_recorder.hpp"
+#include "recording_state.hpp"
+#include "scratch_folder.hpp"
+
+namespace palpate {
+namespace {
+
+constexpr std::size_t elements = 36;
+
+class RecordingClosing : public testing::Test {
+ protected:
+  static SensorDescription sensor() {
+    SensorDescription sensor;
+    sensor.elements_mm.assign(elements, {0.5, 1.5});
+    return sensor;
+  }
+
+  static Frame frame(std::size_t i) {
+    return {.host_time_s = 1.7e9 + static_cast<double>(i),
+            .values = std::vector<double>(elements, static_cast<double>(i))};
+  }
+
+  // A recording of so many frames whose recorder ended without closing it.
+  void cut_off(std::size_t frames) {
+    const pid_t pid = ::fork();
+    if (pid == 0) {
+      FrameRecorder recorder(path_, sensor());
+      for (std::size_t i = 0; i < frames; ++i) {
+        recorder.add(frame(i));
+        if (i % 100 == 0) {
+          recorder.flush();
+        }
+      }
+      recorder.flush();
+      ::_exit(0);  // as a kill
+    }
+    int status = -1;
+    ::waitpid(pid, &status, 0);
+    ASSERT_EQ(status, 0);
+  }
+
+  // As other programs open a file: for reading or for writing, without SWMR.
+  bool opens(unsigned flags = H5F_ACC_RDONLY) const {
+    const Hdf5Session session;
+    return Hdf5Handle(H5Fopen(path_.c_str(), flags, H5P_DEFAULT), H5Fclose).valid();
+  }
+
+  void expect_frames(std::size_t frames) const {
+    const Recording recording = read_recording(path_);
+    ASSERT_EQ(recording.size(), frames);
+    for (std::size_t i = 0; i < frames; ++i) {
+      ASSERT_EQ(recording.time_s[i], frame(i).host_time_s);
+      ASSERT_EQ(recording.pressure[i * elements + 7], static_cast<double>(i));
+    }
+  }
+
+  ScratchFolder folder_;
+  std::filesystem::path path_ = folder_ / "frames.h5";
+};
+
+TEST_F(RecordingClosing, OpensTheFileForOthersAndKeepsEveryRow) {
+  for (const std::size_t frames : {1u, 2u, 257u, 3001u}) {
+    cut_off(frames);
+    EXPECT_FALSE(opens());
+    EXPECT_FALSE(read_recording(path_).closed);
+    EXPECT_EQ(recorder_of(path_), Recorder::gone);
+    EXPECT_TRUE(close_recording(path_));
+    EXPECT_TRUE(opens());
+    EXPECT_TRUE(opens(H5F_ACC_RDWR));
+    EXPECT_TRUE(read_recording(path_).closed);
+    expect_frames(frames);
+    EXPECT_FALSE(close_recording(path_)) << "it is closed already";
+  }
+}
+
+// The recorder was killed between two datasets, or before it wrote the last times.
+TEST_F(RecordingClosing, KeepsWholeRowsOnly) {
+  cut_off(1000);
+  ASSERT_TRUE(close_recording(path_));
+  edit(path_, [](hid_t file) {
+    const auto extend = [&](const char* name, std::initializer_list<hsize_t> extents) {
+      const Hdf5Handle dataset(H5Dopen2(file, name, H5P_DEFAULT), H5Dclose);
+      EXPECT_GE(H5Dset_extent(dataset.get(), extents.begin()), 0);
+    };
+    extend("pressure", {1010, elements});
+    extend("sensor_pose", {1007, 3});
+    extend("lost_before", {1007});
+    extend("time", {1003});
+  });
+  // Marked as open, as the recorder left it.
+  {
+    const Hdf5Handle access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose);
+    set_appendable(access.get());
+    const pid_t pid = ::fork();
+    if (pid == 0) {
+      H5Fopen(path_.c_str(), H5F_ACC_RDWR | H5F_ACC_SWMR_WRITE, access.get());
+      ::_exit(0);
+    }
+    ::waitpid(pid, nullptr, 0);
+  }
+  ASSERT_FALSE(opens());
+  EXPECT_TRUE(close_recording(path_));
+  expect_frames(1000);
+  edit(path_, [](hid_t file) {
+    for (const char* name : {"pressure", "sensor_pose", "lost_before", "time"}) {
+      const Hdf5Handle dataset(H5Dopen2(file, name, H5P_DEFAULT), H5Dclose);
+      const Hdf5Handle space(H5Dget_space(dataset.get()), H5Sclose);
+      hsize_t extents[2] = {};
+      H5Sget_simple_extent_dims(space.get(), extents, nullptr);
+      EXPECT_EQ(extents[0], 1000u) << name;
+    }
+  });
+}
+
+TEST_F(RecordingClosing, WhileItIsRecordedIsRefusedAndCostsNothing) {
+  FrameRecorder recorder(path_, sensor());
+  for (std::size_t i = 0; i < 500; ++i) {
+    recorder.add(frame(i));
+  }
+  recorder.flush();
+  EXPECT_EQ(recorder_of(path_), Recorder::there);
+  expect_named(input_error([&] { close_recording(path_); }), {"frames.h5", "recording", "wait"});
+  // Another process is refused as well.
+  const pid_t pid = ::fork();
+  if (pid == 0) {
+    try {
+      close_recording(path_);
+      ::_exit(1);
+    } catch (const Error&) {
+      ::_exit(0);
+    }
+  }
+  int status = -1;
+  ::waitpid(pid, &status, 0);
+  EXPECT_EQ(status, 0);
+  for (std::size_t i = 500; i < 1000; ++i) {
+    recorder.add(frame(i));
+  }
+  recorder.close();
+  expect_frames(1000);
+  EXPECT_EQ(recorder_of(path_), Recorder::gone);
+}
+
+// The process that records finds the file open in its own HDF5 library.
+TEST_F(RecordingClosing, RecordingProcessKnowsThatItsFileIsNotClosed) {
+  FrameRecorder recorder(path_, sensor());
+  recorder.add(frame(0));
+  recorder.flush();
+  EXPECT_FALSE(read_recording(path_).closed);
+  recorder.add(frame(1));
+  recorder.close();
+  EXPECT_TRUE(read_recording(path_).closed);
+  expect_frames(2);
+}
+
+TEST_F(RecordingClosing, WhatIsNoRecordingIsLeftAlone) {
+  map_parts().save(path_);
+  const std::string before = bytes_of(path_);
+  expect_named(input_error([&] { close_recording(path_); }), {"a map"});
+  EXPECT_TRUE(bytes_of(path_) == before);
+  // A file that is cut off and damaged besides.
+  cut_off(300);
+  std::string bytes = bytes_of(path_);
+  bytes.resize(2000);
+  put_bytes(path_, bytes);
+  input_error([&] { close_recording(path_); });
+  EXPECT_TRUE(bytes_of(path_) == bytes);
+}
+
+TEST_F(RecordingClosing, NeedsTheRightToWrite) {
+  if (::geteuid() == 0) {
+    return;  // root may write everything
+  }
+  cut_off(300);
+  std::filesystem::permissions(path_, std::filesystem::perms::owner_read);
+  expect_named(input_error([&] { close_recording(path_); }), {"frames.h5", "permissions"});
+  expect_frames(300);
+}
+
+}  // namespace
+}  // namespace palpate
