@@ -1,5 +1,4 @@
 #include <algorithm>
-#include <cmath>
 #include <limits>
 
 #include <fmt/format.h>
@@ -17,32 +16,8 @@ namespace {
 
 // What holds for every map, read or about to be written.
 void validate(const std::filesystem::path& path, const OccupancyGrid& map) {
-  if (!(std::isfinite(map.cell_mm) && map.cell_mm > 0)) {
-    refuse(path, fmt::format("attribute 'cell_mm' = {}; make it positive", map.cell_mm));
-  }
-  if (!std::isfinite(map.origin_mm.x) || !std::isfinite(map.origin_mm.y)) {
-    refuse(path, fmt::format("attribute 'origin_mm' = [{}, {}]; store finite numbers",
-                             map.origin_mm.x, map.origin_mm.y));
-  }
-  if (!(map.prior > 0 && map.prior < 1)) {
-    refuse(path,
-           fmt::format("attribute 'prior' = {}; make it a probability between 0 and 1", map.prior));
-  }
-  if (map.symmetry < 0) {
-    refuse(path, fmt::format("attribute 'symmetry' = {}; make it 1, n for an n-fold symmetry or 0 "
-                             "for full symmetry",
-                             map.symmetry));
-  }
-  if (map.spread_mm && !(std::isfinite(*map.spread_mm) && *map.spread_mm > 0)) {
-    refuse(path, fmt::format("attribute 'spread_mm' = {}; make it positive, or leave it out",
-                             *map.spread_mm));
-  }
-  for (std::size_t k = 0; k < map.log_odds.size(); ++k) {
-    if (!std::isfinite(map.log_odds[k])) {
-      const auto nx = static_cast<std::size_t>(map.nx);
-      refuse(path, fmt::format("dataset 'log_odds'[{}, {}] = {} in float32; store finite numbers",
-                               k / nx, k % nx, map.log_odds[k]));
-    }
+  if (const auto fault = fault_of(map)) {
+    refuse(path, *fault);
   }
 }
 
@@ -78,12 +53,6 @@ OccupancyGrid read_map(const std::filesystem::path& path) {
 }
 
 void write_map(const std::filesystem::path& path, const OccupancyGrid& map) {
-  if (map.nx < 1 || map.ny < 1 ||
-      map.log_odds.size() != static_cast<std::size_t>(map.nx) * static_cast<std::size_t>(map.ny)) {
-    refuse(path, fmt::format("a map of {} x {} cells with {} log odds cannot be written; make them "
-                             "agree",
-                             map.nx, map.ny, map.log_odds.size()));
-  }
   validate(path, map);
   Hdf5Writer file(path);
   file.attribute("format", map_format);

@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 
 #include "frame_smoother.hpp"
+#include "moved_from.hpp"
 #include "palpate/error.hpp"
 #include "steady_phase.hpp"
 
@@ -174,18 +175,21 @@ TouchDetector::~TouchDetector() = default;
 TouchDetector::TouchDetector(TouchDetector&&) noexcept = default;
 TouchDetector& TouchDetector::operator=(TouchDetector&&) noexcept = default;
 
-std::optional<DetectedTouch> TouchDetector::add(const Frame& frame) { return impl_->add(frame); }
+TouchDetector::Impl& TouchDetector::impl() const { return held_by(impl_, "touch detector"); }
+
+std::optional<DetectedTouch> TouchDetector::add(const Frame& frame) { return impl().add(frame); }
 
 std::optional<DetectedTouch> TouchDetector::finish() {
-  const double now_s = impl_->last_s.value_or(0.0);
-  std::optional<DetectedTouch> touch = impl_->end_touch(now_s);
-  impl_->smoother.reset();
-  impl_->last_s.reset();
+  Impl& detector = impl();
+  const double now_s = detector.last_s.value_or(0.0);
+  std::optional<DetectedTouch> touch = detector.end_touch(now_s);
+  detector.smoother.reset();
+  detector.last_s.reset();
   return touch;
 }
 
-const std::optional<DetectedTouch>& TouchDetector::candidate() const { return impl_->best; }
-bool TouchDetector::touching() const { return impl_->touching; }
-const std::vector<double>& TouchDetector::baseline() const { return impl_->baseline; }
+const std::optional<DetectedTouch>& TouchDetector::candidate() const { return impl().best; }
+bool TouchDetector::touching() const { return impl().touching; }
+const std::vector<double>& TouchDetector::baseline() const { return impl().baseline; }
 
 }  // namespace palpate

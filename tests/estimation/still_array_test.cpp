@@ -72,6 +72,28 @@ TEST(StillArray, GivesTheSameBitsForAPressWhateverCameBefore) {
   }
 }
 
+TEST(StillArray, WhoseElementsMoveIsEvaluatedAnew) {
+  constexpr std::size_t elements = 60;
+  Recording recording = presses(4, elements);
+  std::vector<glm::dvec2> places;
+  for (std::size_t touch = 0; touch < 4; ++touch) {
+    places.insert(places.end(), recording.elements_mm.begin(), recording.elements_mm.end());
+  }
+  recording.elements_mm = places;
+  // Of the second touch a single element, of the third and fourth all of them.
+  recording.elements_mm[elements + 7].y += 1.5;
+  for (std::size_t i = 2 * elements; i < 4 * elements; ++i) {
+    recording.elements_mm[i].x -= 1.25;
+  }
+  const std::vector<Touch> touches = all_touches(recording);
+  const HistogramOptions options = options_of(true, 0.1, 0.1);
+  Device device = Device::open();
+  PoseHistogram histogram(device, objects(), options);
+  histogram.update(touches);
+  EXPECT_LT(likelihood_error(histogram, reference_posterior(objects(), options, touches)),
+            1e-4 * 4);
+}
+
 TEST(StillArray, ThatMovesAfterAllIsEvaluatedAnew) {
   Recording recording = presses(4, 60);
   recording.T_robot_sensor[2].translation_mm.x += 1.5;
