@@ -123,8 +123,9 @@ PoseLattice make_lattice(const RecognitionFlags& flags, const Scene& scene) {
     axis.lower = (*ends)[0] * unit;
     axis.upper = (*ends)[1] * unit;
     if (!(axis.lower >= -farthest_mm && axis.upper <= farthest_mm)) {
-      throw Error(Fault::input, fmt::format("{} {}:{}: give numbers within +-{:g}", flag,
-                                            (*ends)[0], (*ends)[1], farthest_mm / unit));
+      const std::string given = text.empty() ? fmt::format("{}:{}", (*ends)[0], (*ends)[1]) : text;
+      throw Error(Fault::input, fmt::format("{} {}: give numbers within +-{:g}", flag, given,
+                                            farthest_mm / unit));
     }
   };
   range("--x-mm", flags.x_mm, scene.region.x_mm, lattice.x_mm, 1.0);
