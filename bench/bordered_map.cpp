@@ -24,11 +24,11 @@ std::vector<BorderedMap> bordered_maps(std::span<const Hypothesis> hypotheses,
     }
     for (int i = 0; i < lattice.x_mm.count; ++i) {
       bordered.axes.push_back(
-          split((lattice.x_mm.centre(i) - map.origin_mm.x) / map.cell_mm + border));
+          split_axis((lattice.x_mm.centre(i) - map.origin_mm.x) / map.cell_mm + border));
     }
     for (int j = 0; j < lattice.y_mm.count; ++j) {
       bordered.axes.push_back(
-          split((lattice.y_mm.centre(j) - map.origin_mm.y) / map.cell_mm + border));
+          split_axis((lattice.y_mm.centre(j) - map.origin_mm.y) / map.cell_mm + border));
     }
   }
   return maps;

@@ -47,7 +47,8 @@ struct Options {
 
 /// The touches of every label, of all recordings that bear it.
 std::vector<ObjectTouches> group_by_label(const std::vector<Recording>& recordings,
-                                          const Options& options, bool one_map) {
+                                          const Options& options,
+                                          const ContactClassifier& classifier, bool one_map) {
   std::optional<Frames> frames;
   if (!options.frames.empty()) {
     frames = parse_frames("--frames", options.frames);
@@ -59,12 +60,24 @@ std::vector<ObjectTouches> group_by_label(const std::vector<Recording>& recordin
       throw Error(Fault::input,
                   fmt::format("{}: object is empty; name it with --label", recording.path));
     }
+    if (label == none_label) {
+      throw Error(Fault::input,
+                  fmt::format("{}: object '{}' is kept for objects that were never learned; give "
+                              "another --label",
+                              recording.path, label));
+    }
     if (label.find('/') != std::string::npos) {
       throw Error(Fault::input, fmt::format("{}: object '{}' cannot name a file; give --label",
                                             recording.path, label));
     }
     const auto [begin, end] = select(recording, frames);
     const std::vector<Touch> touches = recording.touches(begin, end);
+    for (std::size_t i = 0; i < touches.size(); ++i) {
+      if (const auto fault = fault_of(known_readings(touches[i], classifier))) {
+        throw Error(Fault::input,
+                    fmt::format("{}: sensor_pose[{}]: {}", recording.path, begin + i, *fault));
+      }
+    }
     auto& group = groups[label];
     group.insert(group.end(), touches.begin(), touches.end());
     if (one_map && groups.size() > 1) {
@@ -83,12 +96,23 @@ std::vector<ObjectTouches> group_by_label(const std::vector<Recording>& recordin
   return objects;
 }
 
+/// The value of a flag that is a cell's edge or a spread.
+double require_length(const std::string& flag, double mm) {
+  require_above(flag, mm, 0.0);
+  if (!(mm >= least_length_mm && mm <= most_length_mm)) {
+    throw Error(Fault::input, fmt::format("{} {}: give {:g} to {:g} mm", flag, mm, least_length_mm,
+                                          most_length_mm));
+  }
+  return mm;
+}
+
 MapOptions map_options(const Options& options, const std::vector<Recording>& recordings) {
   MapOptions result;
-  result.cell_mm = require_above("--cell-mm", options.cell_mm, 0.0);
-  require_above("--psf-mm", options.psf_mm, 0.0);
-  result.sensor.spread_mm =
-      require_above("--spread-mm", options.spread_mm.value_or(options.psf_mm / 2.0), 0.0);
+  result.cell_mm = require_length("--cell-mm", options.cell_mm);
+  result.sensor.spread_mm = require_length("--psf-mm", options.psf_mm) / 2.0;
+  if (options.spread_mm) {
+    result.sensor.spread_mm = require_length("--spread-mm", *options.spread_mm);
+  }
   result.sensor.peak = require_above("--peak", options.peak, 0.0);
   if (options.peak >= 1.0) {
     throw Error(Fault::input, fmt::format("--peak {}: must be below 1, or one reading would make a "
@@ -159,11 +183,18 @@ void build_maps(const Options& options) {
   if (!is_printable_utf8(options.label)) {
     throw Error(Fault::input, "--label: give printable text, in UTF-8");
   }
+  if (options.label == none_label) {
+    throw Error(Fault::input,
+                fmt::format("--label {}: is kept for objects that were never learned; choose "
+                            "another",
+                            none_label));
+  }
   const bool estimate = options.prior == "auto";
   const double given_prior = estimate ? 0.0 : parse_prior(options.prior);
   const std::vector<Recording> recordings = read_touch_recordings(options.recordings);
   MapOptions model = map_options(options, recordings);
-  const std::vector<ObjectTouches> objects = group_by_label(recordings, options, !folder);
+  const std::vector<ObjectTouches> objects =
+      group_by_label(recordings, options, model.classifier, !folder);
 
   std::vector<std::filesystem::path> map_paths;
   for (const ObjectTouches& object : objects) {
@@ -188,6 +219,8 @@ void build_maps(const Options& options) {
     }
   }
 
+  const std::string picture = options.png.empty() ? "" : draw_maps(maps);
+
   // Everything is computed; only now anything is written, the folders first.
   if (!options.ros.empty()) {
     make_folder(options.ros);
@@ -210,7 +243,7 @@ void build_maps(const Options& options) {
     }
   }
   if (!options.png.empty()) {
-    write_file(options.png, draw_maps(maps));
+    write_file(options.png, picture);
     fmt::print("{}\n", options.png);
   }
 }

@@ -74,6 +74,12 @@ void load_maps(const std::vector<Scene::Object>& objects, RecognitionTask& task)
                       object.map.string()));
     }
     map.label = object.label.value_or(map.label);
+    if (map.label == none_label) {
+      throw Error(Fault::input,
+                  fmt::format("{}: label {} is kept for objects that were never learned; label the "
+                              "map otherwise in the scene file",
+                              object.map.string(), none_label));
+    }
     map.symmetry = object.symmetry.value_or(map.symmetry);
     const auto known = std::find(task.labels.begin(), task.labels.end(), map.label);
     task.label_of.push_back(static_cast<std::size_t>(known - task.labels.begin()));
@@ -112,9 +118,15 @@ PoseLattice make_lattice(const RecognitionFlags& flags, const Scene& scene) {
   const auto range = [](const char* flag, const std::string& text,
                         const std::optional<std::array<double, 2>>& key, Axis& axis, double unit) {
     const auto ends = text.empty() ? key : parse_range(flag, text);
-    if (ends) {
-      axis.lower = (*ends)[0] * unit;
-      axis.upper = (*ends)[1] * unit;
+    if (!ends) {
+      return;
+    }
+    axis.lower = (*ends)[0] * unit;
+    axis.upper = (*ends)[1] * unit;
+    if (!(axis.lower >= -farthest_mm && axis.upper <= farthest_mm)) {
+      const std::string given = text.empty() ? fmt::format("{}:{}", (*ends)[0], (*ends)[1]) : text;
+      throw Error(Fault::input, fmt::format("{} {}: give numbers within +-{:g}", flag, given,
+                                            farthest_mm / unit));
     }
   };
   range("--x-mm", flags.x_mm, scene.region.x_mm, lattice.x_mm, 1.0);
@@ -133,6 +145,11 @@ PoseLattice make_lattice(const RecognitionFlags& flags, const Scene& scene) {
   } else if (scene.region.pivot_mm) {
     lattice.pivot_mm = *scene.region.pivot_mm;
   }
+  if (!(std::abs(lattice.pivot_mm.x) <= farthest_mm &&
+        std::abs(lattice.pivot_mm.y) <= farthest_mm)) {
+    throw Error(Fault::input, fmt::format("--pivot-mm {},{}: give numbers within +-{:g}",
+                                          lattice.pivot_mm.x, lattice.pivot_mm.y, farthest_mm));
+  }
   return lattice.collapse_fixed();
 }
 
@@ -142,13 +159,6 @@ void add_none(std::optional<double> weight, RecognitionTask& task) {
     return;
   }
   task.histogram.none_weight = require_above("--none", *weight, 0.0);
-  const auto taken = std::find(task.labels.begin(), task.labels.end(), none_label);
-  if (taken != task.labels.end()) {
-    throw Error(Fault::input,
-                fmt::format("--none: a map is labelled {}, as the hypothesis of an unknown object "
-                            "is; label it otherwise in a scene file",
-                            none_label));
-  }
   task.labels.emplace_back(none_label);
 }
 

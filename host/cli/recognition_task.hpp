@@ -42,9 +42,6 @@ struct RecognitionFlags {
 
 void add_recognition_flags(CLI::App& command, RecognitionFlags& flags);
 
-/// The label of "none of these", an object that was never learned.
-inline constexpr const char* none_label = "(none)";
-
 /// What the flags and the scene file together ask for; a flag overrides the scene's key.
 struct RecognitionTask {
   std::vector<Hypothesis> hypotheses;

@@ -7,6 +7,22 @@ namespace palpate {
 
 namespace {
 
+// Cells that are told apart, and what stands for those beyond. Clamped to the same bound, an
+// element and a bin that are both beyond would meet on the map. So they never do: these differ from
+// each other, and from what is told apart, by some 2^28 cells, the side of no map that a device
+// holds.
+constexpr int farthest_cell = 1 << 29;
+constexpr int element_beyond = (1 << 30) - 1;
+constexpr int axis_beyond = 3 << 28;
+
+shaders::Split split(double coordinate_cells, int beyond) {
+  if (!(std::abs(coordinate_cells) < farthest_cell)) {
+    return {std::signbit(coordinate_cells) ? -beyond : beyond, 0.0F};
+  }
+  const double cell = std::floor(coordinate_cells);
+  return {static_cast<int>(cell), static_cast<float>(coordinate_cells - cell)};
+}
+
 /// Adds the touch's elements of one reading as segments of one class.
 void append(ContactEvidence& evidence, const Touch& touch, std::span<const Reading> readings,
             Reading reading, shaders::uint segment_class, const glm::dvec2& pivot_mm,
@@ -71,12 +87,9 @@ ContactEvidence gather_differences(const Touch& touch, const ContactClassifier& 
   return evidence;
 }
 
-shaders::Split split(double coordinate_cells) {
-  constexpr double far = 1 << 29;
-  const double clamped = std::clamp(coordinate_cells, -far, far);
-  const double cell = std::floor(clamped);
-  return {static_cast<int>(cell), static_cast<float>(clamped - cell)};
-}
+shaders::Split split(double coordinate_cells) { return split(coordinate_cells, element_beyond); }
+
+shaders::Split split_axis(double coordinate_cells) { return split(coordinate_cells, axis_beyond); }
 
 std::vector<shaders::RotatedElement> rotate_evidence(std::span<const glm::dvec2> from_pivot_mm,
                                                      const Axis& theta_rad, double cell_mm) {

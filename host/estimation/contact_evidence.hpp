@@ -32,9 +32,12 @@ ContactEvidence gather_no_contact(const Touch& touch, const glm::dvec2& pivot_mm
 ContactEvidence gather_differences(const Touch& touch, const ContactClassifier& classifier,
                                    const glm::dvec2& pivot_mm, std::size_t segment_elements);
 
-/// Splits a coordinate into whole cells and the rest. Far outside any map the cell is clamped, so
-/// that sums of two stay within int32.
+/// Splits an element's coordinate into whole cells and the rest. One beyond 2^29 cells, or that is
+/// no number, counts as off every map: its cell becomes so large that the sum with any cell of
+/// split_axis() is outside, yet within int32.
 shaders::Split split(double coordinate_cells);
+/// The same for what an element's coordinate is added to: a place of the lattice.
+shaders::Split split_axis(double coordinate_cells);
 
 /// Every element rotated by every theta of the lattice, in cells, [theta, element].
 std::vector<shaders::RotatedElement> rotate_evidence(std::span<const glm::dvec2> from_pivot_mm,

@@ -31,10 +31,12 @@ std::size_t DenseLikelihood::batch_for(const gpu::Context& context, const PoseLa
                                        std::size_t objects) {
   const gpu::Limits& limits = context.limits();
   const auto thetas = static_cast<std::size_t>(lattice.theta_rad.count);
-  if (thetas > limits.table_texels) {
+  const std::size_t table = std::min<std::size_t>(
+      limits.table_texels, limits.allocation / sizeof(shaders::RotatedElement));
+  if (thetas > table) {
     throw Error(Fault::input,
                 fmt::format("bins theta = {}: device '{}' takes at most {}; use fewer", thetas,
-                            context.name(), limits.table_texels));
+                            context.name(), table));
   }
   // What bounds a dispatch: the table, the kernel's loops (which take up to two iterations for an
   // element), and the work. Below 16 elements reading and writing the belief would begin to count.
@@ -46,7 +48,7 @@ std::size_t DenseLikelihood::batch_for(const gpu::Context& context, const PoseLa
   const auto by_work = static_cast<std::size_t>(work_per_run(limits) / static_cast<double>(bins));
   const std::size_t wanted = std::min(
       {by_table, std::size_t{gpu::most_iterations / 2}, std::max<std::size_t>(16, by_work)});
-  const std::size_t elements = std::min(std::max(wanted, factors), limits.table_texels / thetas);
+  const std::size_t elements = std::min(std::max(wanted, factors), table / thetas);
   return elements < factors ? elements : elements / factors * factors;
 }
 

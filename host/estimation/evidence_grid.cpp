@@ -10,6 +10,7 @@
 #include "interface.h"
 #include "kernel_sizes.hpp"
 #include "palpate/error.hpp"
+#include "palpate/occupancy_grid.hpp"
 #include "two_float.hpp"
 
 namespace palpate {
@@ -112,6 +113,10 @@ TileLists assign_to_tiles(std::span<const ElementReading> readings, const CellRa
   return lists;
 }
 
+VkDeviceSize bytes_of(const CellRange& range) {
+  return static_cast<VkDeviceSize>(range.nx * range.ny) * sizeof(TwoFloat);
+}
+
 gpu::Kernel evidence_kernel(gpu::Context& context, const InverseSensorModel& sensor) {
   const std::uint32_t block = block_cells(context.limits());
   const std::uint32_t blocks_across = shaders::TILE_CELLS / block;
@@ -143,6 +148,12 @@ CellRange united(const CellRange& a, const CellRange& b) {
   return {x, y, std::max(a.x + a.nx, b.x + b.nx) - x, std::max(a.y + a.ny, b.y + b.ny) - y};
 }
 
+CellRange common(const CellRange& a, const CellRange& b) {
+  const std::int64_t x = std::max(a.x, b.x);
+  const std::int64_t y = std::max(a.y, b.y);
+  return {x, y, std::min(a.x + a.nx, b.x + b.nx) - x, std::min(a.y + a.ny, b.y + b.ny) - y};
+}
+
 CellRange cover(const glm::dvec2& lowest_mm, const glm::dvec2& highest_mm, double margin_mm,
                 double cell_mm) {
   const auto first = [&](double mm) { return std::ceil((mm - margin_mm) / cell_mm); };
@@ -150,7 +161,7 @@ CellRange cover(const glm::dvec2& lowest_mm, const glm::dvec2& highest_mm, doubl
   // A cell larger than the support may hold a reading without its centre being near.
   const double nx = std::max(1.0, last(highest_mm.x) - first(lowest_mm.x) + 1.0);
   const double ny = std::max(1.0, last(highest_mm.y) - first(lowest_mm.y) + 1.0);
-  if (!(nx * ny < 1 << 30)) {
+  if (!(nx * ny <= static_cast<double>(most_cells))) {
     throw Error(Fault::input,
                 fmt::format("the map would have {:.3g} x {:.3g} cells of {} mm; use larger cells, "
                             "or touches that lie closer together",
@@ -168,43 +179,51 @@ EvidenceGrid::EvidenceGrid(gpu::Context& context, double cell_mm, const InverseS
       sensor_(sensor),
       kernel_(evidence_kernel(context, sensor)) {}
 
-void EvidenceGrid::grow(const CellRange& needed) {
-  if (range_.contains(needed)) {
-    return;
-  }
-  CellRange larger = united(range_, needed);
-  const auto bytes_of = [](const CellRange& range) {
-    return static_cast<VkDeviceSize>(range.nx * range.ny) * sizeof(TwoFloat);
-  };
-  if (range_.nx > 0) {
-    // Room for what a moving sensor touches next, so that growing stays rare.
-    const CellRange roomy{larger.x - larger.nx / 4, larger.y - larger.ny / 4,
-                          larger.nx + larger.nx / 2, larger.ny + larger.ny / 2};
-    if (bytes_of(roomy) <= context_.limits().storage_range) {
-      larger = roomy;
-    }
-  }
-  const VkDeviceSize bytes = bytes_of(larger);
-  if (bytes > context_.limits().storage_range) {
+void EvidenceGrid::require_room(const CellRange& range) const {
+  const gpu::Limits& limits = context_.limits();
+  if (bytes_of(range) > std::min({limits.storage_range, limits.allocation, limits.memory})) {
     throw Error(
         Fault::input,
         fmt::format("the map would have {} x {} cells of {} mm, more than device '{}' binds "
                     "at once; use larger cells, or touches that lie closer together",
-                    larger.nx, larger.ny, cell_mm_, context_.name()));
+                    range.nx, range.ny, cell_mm_, context_.name()));
   }
-  gpu::Buffer cells(context_, bytes, gpu::Memory::device, "map cells");
+}
+
+void EvidenceGrid::grow(const CellRange& needed) {
+  needed_ = united(needed_, needed);
+  if (range_.contains(needed_)) {
+    return;
+  }
+  CellRange larger = needed_;
+  if (range_.nx > 0) {
+    // Room for what a moving sensor touches next, so that growing stays rare.
+    const CellRange roomy{larger.x - larger.nx / 4, larger.y - larger.ny / 4,
+                          larger.nx + larger.nx / 2, larger.ny + larger.ny / 2};
+    if (bytes_of(roomy) <=
+        std::min(context_.limits().storage_range, context_.limits().allocation)) {
+      larger = roomy;
+    }
+  }
+  require_room(larger);
+  gpu::Buffer cells(context_, bytes_of(larger), gpu::Memory::device, "map cells");
   std::vector<TwoFloat> old(static_cast<std::size_t>(range_.nx * range_.ny));
   if (!old.empty()) {
     stream_.download(cells_, std::span(old));
     stream_.run();
   }
   stream_.fill(cells, 0);
-  for (std::int64_t row = 0; row < range_.ny; ++row) {
-    const std::int64_t at = (row + range_.y - larger.y) * larger.nx + range_.x - larger.x;
-    stream_.upload(cells,
-                   std::span<const TwoFloat>(old).subspan(static_cast<std::size_t>(row * range_.nx),
-                                                          static_cast<std::size_t>(range_.nx)),
-                   static_cast<VkDeviceSize>(at) * sizeof(TwoFloat));
+  if (!old.empty()) {
+    // Room that is not taken along holds what lies beyond the radius.
+    const CellRange kept = common(range_, larger);
+    for (std::int64_t y = kept.y; y < kept.y + kept.ny; ++y) {
+      const std::int64_t from = (y - range_.y) * range_.nx + kept.x - range_.x;
+      const std::int64_t to = (y - larger.y) * larger.nx + kept.x - larger.x;
+      stream_.upload(cells,
+                     std::span<const TwoFloat>(old).subspan(static_cast<std::size_t>(from),
+                                                            static_cast<std::size_t>(kept.nx)),
+                     static_cast<VkDeviceSize>(to) * sizeof(TwoFloat));
+    }
   }
   stream_.run();
   cells_ = std::move(cells);
@@ -274,6 +293,7 @@ std::vector<double> EvidenceGrid::sums(const CellRange& range) {
 
 void EvidenceGrid::clear() {
   cells_ = {};
+  needed_ = {};
   range_ = {};
 }
 

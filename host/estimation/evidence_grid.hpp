@@ -23,8 +23,12 @@ struct CellRange {
 
 /// The smallest range that holds both; an empty one holds nothing.
 CellRange united(const CellRange& a, const CellRange& b);
+/// The cells that both hold, of which there is at least one.
+CellRange common(const CellRange& a, const CellRange& b);
 
-/// Cells whose centres lie within `margin_mm` of the rectangle.
+/// Cells whose centres lie within `margin_mm` of the rectangle, which reaches no further than
+/// `farthest_mm`.
+/// @throws Error where they are more than 2^30
 CellRange cover(const glm::dvec2& lowest_mm, const glm::dvec2& highest_mm, double margin_mm,
                 double cell_mm);
 
@@ -34,6 +38,8 @@ class EvidenceGrid {
  public:
   EvidenceGrid(gpu::Context& context, double cell_mm, const InverseSensorModel& sensor);
 
+  /// Throws Error where the device cannot hold these cells.
+  void require_room(const CellRange& range) const;
   /// Adds readings, each to the cells within the radius and some beyond. Runs on the device in
   /// passes of bounded memory.
   void add(std::span<const ElementReading> readings, double radius_mm);
@@ -50,8 +56,9 @@ class EvidenceGrid {
   double cell_mm_;
   InverseSensorModel sensor_;
   gpu::Kernel kernel_;
-  CellRange range_;
-  gpu::Buffer cells_;  ///< [ny, nx], two floats
+  CellRange needed_;   ///< so far
+  CellRange range_;    ///< the same and some room
+  gpu::Buffer cells_;  ///< of range_, [ny, nx], two floats
 };
 
 }  // namespace palpate

@@ -9,41 +9,13 @@
 
 namespace palpate {
 
-namespace {
-
-// Sums of this many nats over any number of touches stay within float32.
-constexpr float most_log_odds = 1e30F;
-
-}  // namespace
-
 void validate_hypotheses(std::span<const Hypothesis> hypotheses) {
   if (hypotheses.empty()) {
     throw Error(Fault::input, "no objects: give at least one map");
   }
   for (const auto& [map, weight] : hypotheses) {
-    if (map.nx < 1 || map.ny < 1 ||
-        map.log_odds.size() != static_cast<std::size_t>(map.nx) * map.ny) {
-      throw Error(Fault::input, fmt::format("map '{}': {} x {} cells but {} log odds", map.label,
-                                            map.nx, map.ny, map.log_odds.size()));
-    }
-    if (!(map.cell_mm > 0.0) || !std::isfinite(map.cell_mm)) {
-      throw Error(Fault::input, fmt::format("map '{}': cell_mm = {}: give a positive length",
-                                            map.label, map.cell_mm));
-    }
-    if (map.spread_mm && (!(*map.spread_mm > 0.0) || !std::isfinite(*map.spread_mm))) {
-      throw Error(Fault::input,
-                  fmt::format("map '{}': spread_mm = {}: give a positive length, or none",
-                              map.label, *map.spread_mm));
-    }
-    if (!std::isfinite(map.origin_mm.x) || !std::isfinite(map.origin_mm.y)) {
-      throw Error(Fault::input, fmt::format("map '{}': origin_mm = {},{}: give finite numbers",
-                                            map.label, map.origin_mm.x, map.origin_mm.y));
-    }
-    if (!std::all_of(map.log_odds.begin(), map.log_odds.end(),
-                     [](float l) { return std::abs(l) <= most_log_odds; })) {
-      throw Error(Fault::input,
-                  fmt::format("map '{}': log odds must be finite and within +-{:g}; build it anew",
-                              map.label, most_log_odds));
+    if (const auto fault = fault_of(map)) {
+      throw Error(Fault::input, fmt::format("map '{}': {}", map.label, *fault));
     }
     if (!(weight > 0.0) || !std::isfinite(weight)) {
       throw Error(Fault::input,

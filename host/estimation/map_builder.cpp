@@ -6,6 +6,8 @@
 #include <fmt/format.h>
 
 #include "evidence_grid.hpp"
+#include "half_done.hpp"
+#include "moved_from.hpp"
 #include "palpate/error.hpp"
 
 namespace palpate {
@@ -17,6 +19,21 @@ constexpr double cut_tolerance = 5e-4;
 // Readings that wait on the host before they go to the device: what a long recording takes up.
 constexpr std::size_t pending_readings = 1 << 18;
 
+/// Number and bounds of readings.
+struct Seen {
+  std::size_t readings = 0;
+  glm::dvec2 lowest_mm{0.0};
+  glm::dvec2 highest_mm{0.0};
+
+  void add(const glm::dvec2& p) {
+    if (readings++ == 0) {
+      lowest_mm = highest_mm = p;
+    }
+    lowest_mm = {std::min(lowest_mm.x, p.x), std::min(lowest_mm.y, p.y)};
+    highest_mm = {std::max(highest_mm.x, p.x), std::max(highest_mm.y, p.y)};
+  }
+};
+
 }  // namespace
 
 struct MapBuilder::Impl {
@@ -25,30 +42,37 @@ struct MapBuilder::Impl {
 
   /// Radius at which the Gaussian of the next readings is cut off. Reading i may lose
   /// tolerance / (16 max(i, 8192)): together that is below the tolerance up to 10^10 readings.
-  double radius_mm() const {
-    return options.sensor.support_radius_mm(16 * std::max<std::size_t>(readings, 8192),
+  double radius_mm(const Seen& all) const {
+    return options.sensor.support_radius_mm(16 * std::max<std::size_t>(all.readings, 8192),
                                             cut_tolerance);
   }
 
+  /// The cells of a map of all these readings. Throws Error where they are too many.
+  CellRange range_of(const Seen& all) const {
+    const CellRange range = cover(all.lowest_mm, all.highest_mm, radius_mm(all), options.cell_mm);
+    grid.require_room(range);
+    return range;
+  }
+
   void flush() {
-    grid.add(pending, radius_mm());
+    grid.add(pending, radius_mm(seen));
     pending.clear();
   }
 
   MapOptions options;
   EvidenceGrid grid;
   std::vector<ElementReading> pending;  ///< robot frame = object frame
-  std::size_t readings = 0;             ///< so far, those pending included
-  glm::dvec2 lowest_mm{0.0};            ///< of all positions so far
-  glm::dvec2 highest_mm{0.0};
+  Seen seen;                            ///< so far, those pending included
+  HalfDone half_done{"map: adding touches failed half-way; clear() the builder"};
 };
 
 MapBuilder::MapBuilder(Device& device, const MapOptions& options) {
-  if (!(options.cell_mm > 0.0) || !std::isfinite(options.cell_mm)) {
-    throw Error(Fault::input,
-                fmt::format("cell size = {} mm: give a positive length", options.cell_mm));
+  if (!(options.cell_mm >= least_length_mm && options.cell_mm <= most_length_mm)) {
+    throw Error(Fault::input, fmt::format("cell size = {} mm: give {:g} to {:g} mm",
+                                          options.cell_mm, least_length_mm, most_length_mm));
   }
   options.sensor.validate();
+  options.classifier.validate();
   impl_ = std::make_unique<Impl>(device, options);
 }
 
@@ -56,34 +80,50 @@ MapBuilder::~MapBuilder() = default;
 MapBuilder::MapBuilder(MapBuilder&&) noexcept = default;
 MapBuilder& MapBuilder::operator=(MapBuilder&&) noexcept = default;
 
+MapBuilder::Impl& MapBuilder::impl() const { return held_by(impl_, "map builder"); }
+
 void MapBuilder::add(std::span<const Touch> touches) {
-  for (const Touch& touch : touches) {
-    for (const ElementReading& r : known_readings(touch, impl_->options.classifier)) {
-      const glm::dvec2& p = r.position_mm;
-      if (impl_->readings++ == 0) {
-        impl_->lowest_mm = impl_->highest_mm = p;
-      }
-      impl_->lowest_mm = {std::min(impl_->lowest_mm.x, p.x), std::min(impl_->lowest_mm.y, p.y)};
-      impl_->highest_mm = {std::max(impl_->highest_mm.x, p.x), std::max(impl_->highest_mm.y, p.y)};
-      impl_->pending.push_back(r);
+  Impl& map = impl();
+  map.half_done.refuse();
+  // All of them before the first is taken in, for one that cannot be mapped refuses all.
+  Seen all = map.seen;
+  for (std::size_t i = 0; i < touches.size(); ++i) {
+    const std::vector<ElementReading> known = known_readings(touches[i], map.options.classifier);
+    if (const auto fault = fault_of(known)) {
+      throw Error(Fault::input, fmt::format("touch {}: {}", i, *fault));
     }
-    if (impl_->pending.size() >= pending_readings) {
-      impl_->flush();
+    for (const ElementReading& r : known) {
+      all.add(r.position_mm);
     }
   }
+  if (all.readings > 0) {
+    map.range_of(all);
+  }
+  map.half_done.change([&] {
+    for (const Touch& touch : touches) {
+      for (const ElementReading& r : known_readings(touch, map.options.classifier)) {
+        map.seen.add(r.position_mm);
+        map.pending.push_back(r);
+      }
+      if (map.pending.size() >= pending_readings) {
+        map.flush();
+      }
+    }
+  });
 }
 
 OccupancyGrid MapBuilder::build(const std::string& label) {
-  if (impl_->readings == 0) {
+  Impl& all = impl();
+  all.half_done.refuse();
+  if (all.seen.readings == 0) {
     throw Error(Fault::input,
                 fmt::format("object '{}': no element of any touch is In Contact or No "
                             "Contact; check the threshold and the pressure's unit",
                             label));
   }
-  impl_->flush();
-  const MapOptions& options = impl_->options;
-  const CellRange range =
-      cover(impl_->lowest_mm, impl_->highest_mm, impl_->radius_mm(), options.cell_mm);
+  all.half_done.change([&] { all.flush(); });
+  const MapOptions& options = all.options;
+  const CellRange range = all.range_of(all.seen);
   OccupancyGrid map;
   map.label = label;
   map.prior = options.sensor.prior;
@@ -95,16 +135,21 @@ OccupancyGrid MapBuilder::build(const std::string& label) {
   map.nx = static_cast<int>(range.nx);
   map.ny = static_cast<int>(range.ny);
   const double prior = map.prior_log_odds();
-  for (const double sum : impl_->grid.sums(range)) {
+  for (const double sum : all.grid.sums(range)) {
     map.log_odds.push_back(static_cast<float>(prior + sum));
+  }
+  if (const auto fault = fault_of(map)) {
+    throw Error(Fault::input, fmt::format("map '{}': {}", label, *fault));
   }
   return map;
 }
 
 void MapBuilder::clear() {
-  impl_->pending.clear();
-  impl_->readings = 0;
-  impl_->grid.clear();
+  Impl& map = impl();
+  map.pending.clear();
+  map.seen = {};
+  map.grid.clear();
+  map.half_done.forget();
 }
 
 double estimate_prior(Device& device, std::span<const ObjectTouches> objects, MapOptions options) {

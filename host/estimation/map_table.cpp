@@ -21,7 +21,7 @@ std::uint64_t cells_of(const OccupancyGrid& map) {
 }
 
 /// Most cells that kernels read at once.
-std::uint64_t most_cells(const gpu::Limits& limits, gpu::Access access) {
+std::uint64_t most_nodes(const gpu::Limits& limits, gpu::Access access) {
   if (access == gpu::Access::table) {
     return std::min<std::uint64_t>(limits.table_texels,
                                    limits.allocation / sizeof(shaders::Corners));
@@ -33,7 +33,7 @@ std::uint64_t most_cells(const gpu::Limits& limits, gpu::Access access) {
 gpu::Access access_of(const gpu::Context& context, const OccupancyGrid& map) {
   std::uint64_t most = 0;
   for (const gpu::Access access : {gpu::Access::table, gpu::Access::storage}) {
-    most = std::max(most, most_cells(context.limits(), access));
+    most = std::max(most, most_nodes(context.limits(), access));
     if (cells_of(map) <= most) {
       return access;
     }
@@ -52,7 +52,7 @@ std::size_t axis_bins(const PoseLattice& lattice) {
 void append_axis(std::vector<shaders::Split>& axes, const Axis& axis_mm, double origin_mm,
                  double cell_mm) {
   for (int i = 0; i < axis_mm.count; ++i) {
-    axes.push_back(split((axis_mm.centre(i) - origin_mm) / cell_mm + shaders::MAP_BORDER));
+    axes.push_back(split_axis((axis_mm.centre(i) - origin_mm) / cell_mm + shaders::MAP_BORDER));
   }
 }
 
@@ -66,14 +66,23 @@ std::vector<MapGroup> group_maps(const gpu::Context& context,
                                  std::span<const Hypothesis> hypotheses,
                                  const PoseLattice& lattice) {
   const gpu::Limits& limits = context.limits();
-  const std::size_t most_objects = std::min(limits.storage_range, limits.allocation) /
-                                   (axis_bins(lattice) * sizeof(shaders::Split));
+  const std::size_t most_places =
+      std::min(limits.storage_range, limits.allocation) / sizeof(shaders::Split);
+  const std::size_t most_objects = most_places / axis_bins(lattice);
+  if (most_objects == 0) {
+    const bool x = lattice.x_mm.count > lattice.y_mm.count;
+    throw Error(Fault::input,
+                fmt::format("bins {} = {}: device '{}' takes at most {} of x and y together; use "
+                            "fewer",
+                            x ? "x" : "y", (x ? lattice.x_mm : lattice.y_mm).count, context.name(),
+                            most_places));
+  }
   std::vector<MapGroup> groups;
   for (std::size_t object = 0; object < hypotheses.size(); ++object) {
     const OccupancyGrid& map = hypotheses[object].map;
     const MapKind kind{map.cell_mm, access_of(context, map)};
     const std::uint64_t cells = cells_of(map);
-    const std::uint64_t most = most_cells(limits, kind.access);
+    const std::uint64_t most = most_nodes(limits, kind.access);
     const auto group = std::find_if(groups.begin(), groups.end(), [&](const MapGroup& g) {
       return g.kind == kind && g.cells + cells <= most && g.objects.size() < most_objects;
     });

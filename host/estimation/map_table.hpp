@@ -21,7 +21,7 @@ struct MapGroup {
 };
 
 /// Puts every hypothesis's map into a group.
-/// @throws Error where a map is larger than what kernels read
+/// @throws Error where a map, or the lattice along x and y, is larger than what kernels read
 std::vector<MapGroup> group_maps(const gpu::Context& context,
                                  std::span<const Hypothesis> hypotheses,
                                  const PoseLattice& lattice);

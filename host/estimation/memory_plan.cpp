@@ -40,7 +40,7 @@ Room room_of(const gpu::Context& context, const HistogramOptions& options) {
         fmt::format("memory limit of {:.1f} MiB: {}; raise it, or use fewer bins or objects",
                     static_cast<double>(room.bytes) / mib, what));
   }
-  throw Error(Fault::system,
+  throw Error(Fault::input,
               fmt::format("{}, device '{}' has {:.0f}; use fewer bins or objects", what,
                           context.name(), static_cast<double>(room.bytes) / mib));
 }

@@ -9,11 +9,14 @@
 #include "command_stream.hpp"
 #include "contradiction.hpp"
 #include "draw_particles.hpp"
+#include "half_done.hpp"
 #include "hypotheses.hpp"
 #include "kernel_sizes.hpp"
 #include "likelihood_averages.hpp"
+#include "moved_from.hpp"
 #include "palpate/error.hpp"
 #include "particle_likelihood.hpp"
+#include "particle_options.hpp"
 #include "parzen_mode.hpp"
 #include "philox.hpp"
 #include "sum_weights.hpp"
@@ -24,9 +27,6 @@ namespace palpate {
 
 namespace {
 
-constexpr int most_particles = 1'000'000;
-// Beyond, float32 would no longer place a particle to a hundredth of a millimetre.
-constexpr double widest_mm = 100'000.0;
 constexpr gpu::Access draw_bindings[] = {gpu::Access::table, gpu::Access::table, gpu::Access::table,
                                          gpu::Access::storage, gpu::Access::storage};
 constexpr gpu::Access sum_bindings[] = {gpu::Access::table, gpu::Access::storage,
@@ -34,66 +34,6 @@ constexpr gpu::Access sum_bindings[] = {gpu::Access::table, gpu::Access::storage
 
 std::uint32_t groups_of(std::size_t count, std::size_t per_group) {
   return static_cast<std::uint32_t>((count + per_group - 1) / per_group);
-}
-
-/// A probability in units of 2^-32.
-shaders::uint in_words(double probability) {
-  return static_cast<shaders::uint>(
-      std::clamp(std::floor(probability * 0x1p32), 0.0, 0x1p32 - 1.0));
-}
-
-void require(bool sound, const char* name, double value, const char* remedy) {
-  if (!sound) {
-    throw Error(Fault::input, fmt::format("{} = {}: {}", name, value, remedy));
-  }
-}
-
-void validate(const ParticleOptions& options) {
-  require(options.particles >= 1 && options.particles <= most_particles, "particles",
-          options.particles, "give 1 to 1,000,000");
-  for (const auto& [name, axis] : {std::pair{"region x_mm", options.region.x_mm},
-                                   std::pair{"region y_mm", options.region.y_mm}}) {
-    require(axis.upper - axis.lower <= widest_mm, name, axis.upper - axis.lower,
-            "extends over more than 100 m; give a smaller one");
-  }
-  const auto is_deviation = [](double v) { return v >= 0.0 && v <= 1000.0; };
-  require(is_deviation(options.motion_mm), "motion_mm", options.motion_mm, "give 0 to 1000");
-  require(is_deviation(options.motion_rad), "motion_rad", options.motion_rad, "give 0 to 1000");
-  require(options.alpha_slow > 0.0 && options.alpha_slow < options.alpha_fast, "alpha_slow",
-          options.alpha_slow, "give a rate above 0 and below alpha_fast");
-  require(options.alpha_fast <= 1.0, "alpha_fast", options.alpha_fast, "give at most 1");
-  if (options.none_weight) {
-    require(*options.none_weight > 0.0 && std::isfinite(*options.none_weight), "none_weight",
-            *options.none_weight, "give a positive number");
-  }
-}
-
-/// The parts of the objects, and of "none of these" after them, in the initial distribution.
-std::vector<shaders::ObjectShare> object_shares(std::span<const Hypothesis> hypotheses,
-                                                const ParticleOptions& options) {
-  std::vector<double> weights;
-  for (const Hypothesis& hypothesis : hypotheses) {
-    weights.push_back(hypothesis.weight);
-  }
-  if (options.none_weight) {
-    weights.push_back(*options.none_weight);
-  }
-  // Relative to the largest, for the sum of the weights themselves may be infinite.
-  const double largest = *std::max_element(weights.begin(), weights.end());
-  double total = 0.0;
-  for (double& weight : weights) {
-    weight /= largest;
-    total += weight;
-  }
-  std::vector<shaders::ObjectShare> shares;
-  double before = 0.0;
-  for (const double weight : weights) {
-    before += weight;
-    shares.push_back({.particle_end = static_cast<shaders::uint>(
-                          std::lround(before / total * options.particles)),
-                      .chance_end = in_words(before / total)});
-  }
-  return shares;
 }
 
 double half(const Axis& axis) { return (axis.upper - axis.lower) / 2.0; }
@@ -123,10 +63,6 @@ struct ParticleFilter::Impl {
                              .push_bytes = sizeof(shaders::uint)}),
         averages(options.alpha_slow, options.alpha_fast) {
     const std::size_t n = size();
-    if (n > context.limits().table_texels) {
-      throw Error(Fault::input, fmt::format("particles = {}: device '{}' takes at most {}", n,
-                                            context.name(), context.limits().table_texels));
-    }
     for (gpu::Buffer* buffer : {&particles, &drawn}) {
       *buffer = gpu::Buffer(context, n * sizeof(shaders::Particle), gpu::Memory::device,
                             "particles", VK_FORMAT_R32G32B32A32_SINT);
@@ -160,6 +96,7 @@ struct ParticleFilter::Impl {
     // No evidence, equal weights; the driver compiles the kernel now, and no touch waits for that.
     likelihood.weigh({}, particles, size(), log_weights);
     sum_weights();
+    half_done.forget();
   }
 
   /// Records the drawing of all particles; see shaders::DrawPush.
@@ -308,6 +245,7 @@ struct ParticleFilter::Impl {
   bool weighed = false;     ///< by any touch since the start
   /// Of all touches since the start, the prior's log-likelihood over the best particle's.
   double prior_over_best = 0.0;
+  HalfDone half_done{"particle filter: an update failed half-way; reset() the filter"};
 };
 
 ParticleFilter::ParticleFilter(Device& device, std::span<const Hypothesis> hypotheses,
@@ -315,10 +253,12 @@ ParticleFilter::ParticleFilter(Device& device, std::span<const Hypothesis> hypot
   validate_hypotheses(hypotheses);
   ParticleOptions checked = options;
   checked.region.collapse_fixed().validate();
+  checked.classifier.validate();
   validate(checked);
   const ContactLikelihood model{.gamma = checked.gamma,
                                 .prior = checked.prior ? *checked.prior : common_prior(hypotheses)};
   model.validate();
+  require_room(checked, device.context());
   impl_ = std::make_unique<Impl>(device, hypotheses, checked, model);
 }
 
@@ -326,10 +266,19 @@ ParticleFilter::~ParticleFilter() = default;
 ParticleFilter::ParticleFilter(ParticleFilter&&) noexcept = default;
 ParticleFilter& ParticleFilter::operator=(ParticleFilter&&) noexcept = default;
 
-void ParticleFilter::reset() { impl_->start(); }
+ParticleFilter::Impl& ParticleFilter::impl() const { return held_by(impl_, "particle filter"); }
+
+ParticleFilter::Impl& ParticleFilter::whole() const {
+  Impl& held = impl();
+  held.half_done.refuse();
+  return held;
+}
+
+void ParticleFilter::reset() { impl().start(); }
 
 void ParticleFilter::update(std::span<const Touch> touches) {
-  const ParticleOptions& options = impl_->options;
+  Impl& filter = whole();
+  const ParticleOptions& options = filter.options;
   // All of them before the first is taken in, for one that is not sound refuses all.
   std::vector<ContactEvidence> evidence;
   std::vector<double> by_prior;
@@ -337,49 +286,54 @@ void ParticleFilter::update(std::span<const Touch> touches) {
     evidence.push_back(gather_evidence(std::span(&touch, 1), options.classifier,
                                        options.region.pivot_mm,
                                        ParticleLikelihood::segment_elements()));
-    by_prior.push_back(prior_log_likelihood(touch, options.classifier, impl_->prior_model));
+    by_prior.push_back(prior_log_likelihood(touch, options.classifier, filter.prior_model));
   }
-  for (std::size_t i = 0; i < evidence.size(); ++i) {
-    impl_->update(evidence[i], by_prior[i]);
-  }
+  filter.half_done.change([&] {
+    for (std::size_t i = 0; i < evidence.size(); ++i) {
+      filter.update(evidence[i], by_prior[i]);
+    }
+  });
 }
 
 Estimate ParticleFilter::estimate() const {
+  Impl& filter = whole();
   std::vector<double> weights;
-  const std::vector<shaders::Particle> particles = impl_->download(weights);
-  Estimate estimate{.identity = std::vector<double>(impl_->objects), .mode = {}};
+  const std::vector<shaders::Particle> particles = filter.download(weights);
+  Estimate estimate{.identity = std::vector<double>(filter.objects), .mode = {}};
   for (std::size_t i = 0; i < particles.size(); ++i) {
     const std::size_t object = particles[i].object;
-    (object < impl_->objects ? estimate.identity[object] : estimate.none) += weights[i];
+    (object < filter.objects ? estimate.identity[object] : estimate.none) += weights[i];
   }
   const auto maximum =
-      impl_->parzen.find(particles, weights, static_cast<std::uint32_t>(impl_->objects));
+      filter.parzen.find(particles, weights, static_cast<std::uint32_t>(filter.objects));
   estimate.mode.bin = -1;
   estimate.mode.log_likelihood = -std::numeric_limits<double>::infinity();
-  estimate.mode.T_object_robot = impl_->T_object_robot(0.0, 0.0, 0.0);
+  estimate.mode.T_object_robot = filter.T_object_robot(0.0, 0.0, 0.0);
   if (maximum) {
     estimate.mode.object = static_cast<int>(maximum->object);
     estimate.mode.T_object_robot =
-        impl_->T_object_robot(maximum->x_mm, maximum->y_mm, maximum->theta_rad);
+        filter.T_object_robot(maximum->x_mm, maximum->y_mm, maximum->theta_rad);
     estimate.mode.log_likelihood = std::log(maximum->density);
   }
-  estimate.contradicted = impl_->prior_over_best > contradiction_nats;
+  estimate.contradicted = filter.prior_over_best > contradiction_nats;
   return estimate;
 }
 
 double ParticleFilter::effective_sample_size() const {
+  Impl& filter = whole();
   // Rounding of the device's sums could leave the range.
-  return std::clamp(impl_->summary.effective_sample_size(), 1.0,
-                    static_cast<double>(impl_->size()));
+  return std::clamp(filter.summary.effective_sample_size(), 1.0,
+                    static_cast<double>(filter.size()));
 }
 
 std::vector<ParticleFilter::Particle> ParticleFilter::particles() const {
+  Impl& filter = whole();
   std::vector<double> weights;
   std::vector<Particle> particles;
-  const std::vector<shaders::Particle> states = impl_->download(weights);
+  const std::vector<shaders::Particle> states = filter.download(weights);
   for (std::size_t i = 0; i < states.size(); ++i) {
     particles.push_back({.object = static_cast<int>(states[i].object),
-                         .T_object_robot = impl_->T_object_robot(states[i].x_mm, states[i].y_mm,
+                         .T_object_robot = filter.T_object_robot(states[i].x_mm, states[i].y_mm,
                                                                  states[i].theta_rad),
                          .weight = weights[i]});
   }
@@ -387,10 +341,11 @@ std::vector<ParticleFilter::Particle> ParticleFilter::particles() const {
 }
 
 std::uint64_t ParticleFilter::device_bytes() const {
-  std::uint64_t bytes = impl_->likelihood.device_bytes() + impl_->parzen.peak_bytes();
+  const Impl& filter = impl();
+  std::uint64_t bytes = filter.likelihood.device_bytes() + filter.parzen.peak_bytes();
   for (const gpu::Buffer* buffer :
-       {&impl_->particles, &impl_->drawn, &impl_->log_weights, &impl_->cumulative,
-        &impl_->block_sums, &impl_->draw_blocks, &impl_->shares}) {
+       {&filter.particles, &filter.drawn, &filter.log_weights, &filter.cumulative,
+        &filter.block_sums, &filter.draw_blocks, &filter.shares}) {
     bytes += buffer->bytes();
   }
   return bytes;

@@ -40,11 +40,16 @@ std::vector<shaders::CoarseAndFine> headings() {
   return table;
 }
 
-/// In cells, and so near that a rotation stays a whole number of float32 and of int32.
+/// In cells. An element beyond 2^20 of them, of which products are no longer exact, or whose place
+/// is no number, counts as off every map: however it is turned, it lies further from the pivot than
+/// the region's centre does, whose cells end at 2^29 or are those of split_axis().
 shaders::CoarseAndFine element_in_cells(const glm::dvec2& from_pivot_mm, double cell_mm) {
   constexpr double far = 1 << 20;
   const glm::dvec2 cells = from_pivot_mm / cell_mm;
-  return split_coarse({std::clamp(cells.x, -far, far), std::clamp(cells.y, -far, far)}, 0.25);
+  if (!(std::abs(cells.x) <= far && std::abs(cells.y) <= far)) {
+    return {0x1p30F, 0.0F, 0.0F, 0.0F};
+  }
+  return split_coarse(cells, 0.25);
 }
 
 std::size_t index_of(std::vector<double>& values, double value) {
@@ -54,6 +59,26 @@ std::size_t index_of(std::vector<double>& values, double value) {
     values.push_back(value);
   }
   return index;
+}
+
+/// Throws Error where the maps together are more than the device reads as a table, before any is
+/// copied.
+void require_room(const gpu::Context& context, std::span<const Hypothesis> hypotheses) {
+  const gpu::Limits& limits = context.limits();
+  const std::uint64_t most = std::min<std::uint64_t>(
+      limits.table_texels, std::min(limits.allocation, limits.memory) / sizeof(shaders::Corners));
+  constexpr std::uint64_t border = 2 * shaders::MAP_BORDER;
+  std::uint64_t cells = border * border;  // of "none of these", which has only a border
+  for (const Hypothesis& hypothesis : hypotheses) {
+    const OccupancyGrid& map = hypothesis.map;
+    cells += (map.nx + border) * (map.ny + border);
+    if (cells > most) {
+      throw Error(Fault::input,
+                  fmt::format("maps up to '{}': {} cells together exceed the {} that device '{}' "
+                              "reads as a table; build them with larger cells",
+                              map.label, cells, most, context.name()));
+    }
+  }
 }
 
 double centre(const Axis& axis) { return axis.lower + (axis.upper - axis.lower) / 2.0; }
@@ -71,6 +96,7 @@ ParticleLikelihood::ParticleLikelihood(gpu::Context& context, gpu::CommandStream
                         .bindings = bindings,
                         .push_bytes = sizeof(shaders::WeighPush),
                         .constants = model_constants(context.limits(), model)}) {
+  require_room(context, hypotheses);
   std::vector<shaders::Corners> cells;
   std::vector<shaders::ParticleMap> objects;
   const auto append = [&](const OccupancyGrid& map) {
@@ -83,19 +109,12 @@ ParticleLikelihood::ParticleLikelihood(gpu::Context& context, gpu::CommandStream
          .scale = static_cast<shaders::uint>(index_of(cell_sizes_mm_, map.cell_mm)),
          .cells_per_mm_high = high,
          .cells_per_mm_low = static_cast<float>(cells_per_mm - static_cast<double>(high)),
-         .centre_x =
-             split((centre(region.x_mm) - map.origin_mm.x) / map.cell_mm + shaders::MAP_BORDER),
-         .centre_y =
-             split((centre(region.y_mm) - map.origin_mm.y) / map.cell_mm + shaders::MAP_BORDER)});
+         .centre_x = split_axis((centre(region.x_mm) - map.origin_mm.x) / map.cell_mm +
+                                shaders::MAP_BORDER),
+         .centre_y = split_axis((centre(region.y_mm) - map.origin_mm.y) / map.cell_mm +
+                                shaders::MAP_BORDER)});
     const std::vector<shaders::Corners> bordered = corners_with_border(map, model.prior);
     cells.insert(cells.end(), bordered.begin(), bordered.end());
-    if (cells.size() > context.limits().table_texels) {
-      throw Error(
-          Fault::input,
-          fmt::format("maps up to '{}': {} cells together exceed the {} that device '{}' "
-                      "reads as a table; build them with larger cells",
-                      map.label, cells.size(), context.limits().table_texels, context.name()));
-    }
   };
   for (const Hypothesis& hypothesis : hypotheses) {
     append(hypothesis.map);

@@ -10,8 +10,10 @@
 #include "command_stream.hpp"
 #include "contradiction.hpp"
 #include "dense_likelihood.hpp"
+#include "half_done.hpp"
 #include "hypotheses.hpp"
 #include "memory_plan.hpp"
+#include "moved_from.hpp"
 #include "palpate/error.hpp"
 #include "refinement.hpp"
 
@@ -24,12 +26,19 @@ struct StillArray {
   explicit StillArray(Belief belief) : no_contact(std::move(belief)) {}
 
   bool holds(const Touch& touch) const {
-    return same_placement(touch, {T_robot_sensor, elements_mm, {}});
+    return evaluated && same_placement(touch, {T_robot_sensor, elements_mm, {}});
   }
 
+  bool evaluated = false;
   Pose T_robot_sensor;
   std::vector<glm::dvec2> elements_mm;
   Belief no_contact;
+};
+
+/// What a touch says, and how an array at rest takes it in.
+struct StillTouch {
+  bool by_differences = false;  ///< from No Contact everywhere, or else all of it
+  ContactEvidence evidence;
 };
 
 /// A touch that may come next and its log-likelihood.
@@ -100,10 +109,6 @@ struct PoseHistogram::Impl {
     return probability;
   }
 
-  void add_to_prior(const Touch& touch) {
-    prior_log_likelihood += palpate::prior_log_likelihood(touch, options.classifier, prior_model);
-  }
-
   void require_object(int object) const {
     if (object < 0 || static_cast<std::size_t>(object) >= log_weight.size()) {
       throw Error(Fault::input, fmt::format("object {}: there are {}, counted from 0", object,
@@ -117,6 +122,7 @@ struct PoseHistogram::Impl {
   }
 
   void prepare(const Touch& touch) {
+    half_done.refuse();
     ContactEvidence evidence = evidence_of(std::span(&touch, 1));
     if (!prepared) {
       try {
@@ -127,15 +133,43 @@ struct PoseHistogram::Impl {
         return;
       }
     }
-    prepared->evidence.reset();
-    prepared->log_likelihood.clear();
-    likelihood.accumulate(evidence, prepared->log_likelihood, {});
-    prepared->evidence = std::move(evidence);
+    // A device that fails also drops what reset() has recorded of the belief.
+    half_done.change([&] {
+      prepared->evidence.reset();
+      prepared->log_likelihood.clear();
+      likelihood.accumulate(evidence, prepared->log_likelihood, {});
+      prepared->evidence = std::move(evidence);
+    });
+  }
+
+  void update(std::span<const Touch> touches, const std::function<void(double)>& progress) {
+    half_done.refuse();
+    // All of them before the first is taken in, for one that is not sound refuses all.
+    std::vector<StillTouch> still_touches;
+    ContactEvidence evidence;
+    if (options.still_array) {
+      for (const Touch& touch : touches) {
+        still_touches.push_back(look_at(touch));
+      }
+    } else {
+      evidence = evidence_of(touches);
+    }
+    half_done.change([&] {
+      summarised.reset();
+      if (options.still_array) {
+        update_still(touches, still_touches, progress);
+      } else {
+        update_plain(evidence, progress);
+      }
+      for (const Touch& touch : touches) {
+        prior_log_likelihood +=
+            palpate::prior_log_likelihood(touch, options.classifier, prior_model);
+      }
+    });
   }
 
   /// Adds touches element by element, unless they were prepared.
-  void update_plain(std::span<const Touch> touches, const std::function<void(double)>& progress) {
-    const ContactEvidence evidence = evidence_of(touches);
+  void update_plain(const ContactEvidence& evidence, const std::function<void(double)>& progress) {
     if (prepared && prepared->evidence == evidence) {
       belief.add(prepared->log_likelihood);
       stream.run();
@@ -145,36 +179,49 @@ struct PoseHistogram::Impl {
     } else {
       likelihood.accumulate(evidence, belief, progress);
     }
-    for (const Touch& touch : touches) {
-      add_to_prior(touch);
-    }
   }
 
-  /// Adds a touch as what it says beyond No Contact everywhere, where that is less.
-  void update_still(const Touch& touch) {
+  /// A touch as what it says beyond No Contact everywhere, where that is less.
+  StillTouch look_at(const Touch& touch) const {
     const std::vector<Reading> readings = options.classifier.classify(touch);
     const auto no_contact = std::count(readings.begin(), readings.end(), Reading::no_contact);
     if (2 * static_cast<std::size_t>(no_contact) < readings.size()) {
-      update_plain(std::span(&touch, 1), {});
+      return {false, evidence_of(std::span(&touch, 1))};
+    }
+    return {true, gather_differences(touch, options.classifier, options.lattice.pivot_mm,
+                                     likelihood.segment_elements())};
+  }
+
+  void update_still(std::span<const Touch> touches, std::span<const StillTouch> still_touches,
+                    const std::function<void(double)>& progress) {
+    for (std::size_t i = 0; i < touches.size(); ++i) {
+      if (still_touches[i].by_differences) {
+        rest_at(touches[i]);
+        belief.add(still->no_contact);
+      }
+      likelihood.accumulate(still_touches[i].evidence, belief, {});
+      if (progress) {
+        progress(static_cast<double>(i + 1) / static_cast<double>(touches.size()));
+      }
+    }
+  }
+
+  /// Evaluates No Contact everywhere where the array was not before.
+  void rest_at(const Touch& touch) {
+    if (still && still->holds(touch)) {
       return;
     }
-    const glm::dvec2& pivot_mm = options.lattice.pivot_mm;
-    if (!still || !still->holds(touch)) {
-      if (!still) {
-        still.emplace(Belief(context, stream, options.lattice, log_weight.size()));
-      }
-      still->elements_mm.clear();
-      still->no_contact.clear();
-      likelihood.accumulate(gather_no_contact(touch, pivot_mm, likelihood.segment_elements()),
-                            still->no_contact, {});
-      still->T_robot_sensor = touch.T_robot_sensor;
-      still->elements_mm.assign(touch.elements_mm.begin(), touch.elements_mm.end());
+    if (!still) {
+      still.emplace(Belief(context, stream, options.lattice, log_weight.size()));
     }
-    belief.add(still->no_contact);
+    still->evaluated = false;
+    still->no_contact.clear();
     likelihood.accumulate(
-        gather_differences(touch, options.classifier, pivot_mm, likelihood.segment_elements()),
-        belief, {});
-    add_to_prior(touch);
+        gather_no_contact(touch, options.lattice.pivot_mm, likelihood.segment_elements()),
+        still->no_contact, {});
+    still->T_robot_sensor = touch.T_robot_sensor;
+    still->elements_mm.assign(touch.elements_mm.begin(), touch.elements_mm.end());
+    still->evaluated = true;
   }
 
   /// Scales sums relative to an object's largest bin to that object's probability.
@@ -200,6 +247,7 @@ struct PoseHistogram::Impl {
   double prior_log_likelihood = 0.0;      ///< of all touches, by the prior alone
   std::vector<Body> bodies;
   std::optional<std::vector<BeliefSummary>> summarised;
+  HalfDone half_done{"histogram: an update was broken off half-way; reset() the belief"};
 };
 
 PoseHistogram::PoseHistogram(Device& device, std::span<const Hypothesis> hypotheses,
@@ -207,6 +255,7 @@ PoseHistogram::PoseHistogram(Device& device, std::span<const Hypothesis> hypothe
   validate_hypotheses(hypotheses);
   HistogramOptions checked = options;
   checked.lattice.collapse_fixed().validate();
+  checked.classifier.validate();
   const ContactLikelihood model{.gamma = checked.gamma,
                                 .prior = checked.prior ? *checked.prior : common_prior(hypotheses)};
   model.validate();
@@ -221,88 +270,93 @@ PoseHistogram::~PoseHistogram() = default;
 PoseHistogram::PoseHistogram(PoseHistogram&&) noexcept = default;
 PoseHistogram& PoseHistogram::operator=(PoseHistogram&&) noexcept = default;
 
+PoseHistogram::Impl& PoseHistogram::impl() const { return held_by(impl_, "histogram"); }
+
+PoseHistogram::Impl& PoseHistogram::whole() const {
+  Impl& held = impl();
+  held.half_done.refuse();
+  return held;
+}
+
 void PoseHistogram::reset() {
-  impl_->belief.clear();
-  impl_->prior_log_likelihood = 0.0;
-  impl_->summarised.reset();
+  Impl& histogram = impl();
+  histogram.belief.clear();
+  histogram.prior_log_likelihood = 0.0;
+  histogram.summarised.reset();
+  histogram.half_done.forget();
 }
 
 void PoseHistogram::update(std::span<const Touch> touches,
                            const std::function<void(double)>& progress) {
-  impl_->summarised.reset();
-  if (impl_->options.still_array) {
-    for (std::size_t i = 0; i < touches.size(); ++i) {
-      impl_->update_still(touches[i]);
-      if (progress) {
-        progress(static_cast<double>(i + 1) / static_cast<double>(touches.size()));
-      }
-    }
-    return;
-  }
-  impl_->update_plain(touches, progress);
+  impl().update(touches, progress);
 }
 
 void PoseHistogram::prepare(const Touch& touch) {
-  if (impl_->plan.room_to_prepare) {
-    impl_->prepare(touch);
+  if (Impl& histogram = impl(); histogram.plan.room_to_prepare) {
+    histogram.prepare(touch);
   }
 }
 
 Estimate PoseHistogram::estimate() const {
-  Estimate estimate{.identity = impl_->identity(), .mode = {}};
-  if (impl_->none_log_weight) {
+  Impl& histogram = whole();
+  Estimate estimate{.identity = histogram.identity(), .mode = {}};
+  if (histogram.none_log_weight) {
     estimate.none = estimate.identity.back();
     estimate.identity.pop_back();
   }
-  const std::vector<BeliefSummary>& summaries = impl_->summaries();
+  const std::vector<BeliefSummary>& summaries = histogram.summaries();
   double most = -std::numeric_limits<double>::infinity();
   double best = most;
   for (std::size_t i = 0; i < summaries.size(); ++i) {
     const double log_likelihood = summaries[i].max.value();
     best = std::max(best, log_likelihood);
-    if (impl_->log_weight[i] + log_likelihood > most) {
-      most = impl_->log_weight[i] + log_likelihood;
+    if (histogram.log_weight[i] + log_likelihood > most) {
+      most = histogram.log_weight[i] + log_likelihood;
       estimate.mode = {.object = static_cast<int>(i),
                        .bin = summaries[i].arg_max,
                        .T_object_robot = lattice().T_object_robot(summaries[i].arg_max),
                        .log_likelihood = log_likelihood};
     }
   }
-  estimate.contradicted = impl_->prior_log_likelihood - best > contradiction_nats;
+  estimate.contradicted = histogram.prior_log_likelihood - best > contradiction_nats;
   return estimate;
 }
 
 RefinedPose PoseHistogram::refine(const Mode& mode) const {
-  impl_->require_object(mode.object);
+  Impl& histogram = whole();
+  histogram.require_object(mode.object);
   if (mode.bin < 0 || mode.bin >= lattice().bins()) {
     throw Error(Fault::input,
                 fmt::format("bin {}: there are {}, counted from 0", mode.bin, lattice().bins()));
   }
-  return palpate::refine(impl_->belief, lattice(), static_cast<std::size_t>(mode.object),
-                         impl_->bodies[mode.object], mode.bin);
+  return palpate::refine(histogram.belief, lattice(), static_cast<std::size_t>(mode.object),
+                         histogram.bodies[mode.object], mode.bin);
 }
 
 Marginals PoseHistogram::marginals(int object) const {
-  impl_->require_object(object);
-  BeliefMarginals sums = impl_->belief.marginals(object, impl_->summaries()[object].max);
-  return {.xy = impl_->to_probability(object, std::move(sums.xy)),
-          .theta = impl_->to_probability(object, std::move(sums.theta))};
+  Impl& histogram = whole();
+  histogram.require_object(object);
+  BeliefMarginals sums = histogram.belief.marginals(object, histogram.summaries()[object].max);
+  return {.xy = histogram.to_probability(object, std::move(sums.xy)),
+          .theta = histogram.to_probability(object, std::move(sums.theta))};
 }
 
 std::vector<double> PoseHistogram::log_likelihood(int object) const {
-  impl_->require_object(object);
-  return impl_->belief.download(object);
+  Impl& histogram = whole();
+  histogram.require_object(object);
+  return histogram.belief.download(object);
 }
 
-const PoseLattice& PoseHistogram::lattice() const { return impl_->options.lattice; }
+const PoseLattice& PoseHistogram::lattice() const { return impl().options.lattice; }
 
-std::vector<std::string> PoseHistogram::paths() const { return impl_->likelihood.paths(); }
+std::vector<std::string> PoseHistogram::paths() const { return impl().likelihood.paths(); }
 
 std::uint64_t PoseHistogram::device_bytes() const {
-  const std::uint64_t still = impl_->still ? impl_->still->no_contact.device_bytes() : 0;
+  const Impl& histogram = impl();
+  const std::uint64_t still = histogram.still ? histogram.still->no_contact.device_bytes() : 0;
   const std::uint64_t prepared =
-      impl_->prepared ? impl_->prepared->log_likelihood.device_bytes() : 0;
-  return impl_->belief.device_bytes() + still + prepared + impl_->likelihood.device_bytes();
+      histogram.prepared ? histogram.prepared->log_likelihood.device_bytes() : 0;
+  return histogram.belief.device_bytes() + still + prepared + histogram.likelihood.device_bytes();
 }
 
 }  // namespace palpate

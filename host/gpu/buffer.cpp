@@ -16,7 +16,7 @@ Buffer::Buffer(Context& context, VkDeviceSize bytes, Memory memory, std::string_
   const auto doing = fmt::format("device '{}': {:.1f} MiB for {}", context.name(),
                                  static_cast<double>(bytes) / (1 << 20), purpose);
   if (bytes > context.limits().allocation) {
-    throw Error(Fault::system,
+    throw Error(Fault::input,
                 fmt::format("{}: more than the {:.1f} MiB it allocates at once; use fewer bins, "
                             "objects or cells",
                             doing, static_cast<double>(context.limits().allocation) / (1 << 20)));

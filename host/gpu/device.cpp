@@ -1,6 +1,7 @@
 #include "palpate/device.hpp"
 
 #include "context.hpp"
+#include "moved_from.hpp"
 #include "selection.hpp"
 
 namespace palpate {
@@ -23,7 +24,8 @@ Device::Device(Device&&) noexcept = default;
 Device& Device::operator=(Device&&) noexcept = default;
 Device::~Device() = default;
 
-const std::string& Device::name() const { return context_->name(); }
-std::uint64_t Device::memory_bytes() const { return context_->limits().memory; }
+const std::string& Device::name() const { return held_by(context_, "device").name(); }
+std::uint64_t Device::memory_bytes() const { return held_by(context_, "device").limits().memory; }
+gpu::Context& Device::context() { return held_by(context_, "device"); }
 
 }  // namespace palpate

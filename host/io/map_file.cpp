@@ -1,7 +1,6 @@
 #include "map_file.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <limits>
 
 #include <fmt/format.h>
@@ -19,40 +18,9 @@ namespace palpate {
 
 namespace {
 
-// What holds for every map without its cells, read or about to be written.
-void validate(const std::filesystem::path& path, const OccupancyGrid& map) {
-  require_text(path, "attribute 'label'", map.label);
-  if (!(std::isfinite(map.cell_mm) && map.cell_mm > 0)) {
-    refuse(path, fmt::format("attribute 'cell_mm' = {}; make it positive", map.cell_mm));
-  }
-  if (!std::isfinite(map.origin_mm.x) || !std::isfinite(map.origin_mm.y)) {
-    refuse(path, fmt::format("attribute 'origin_mm' = [{}, {}]; store finite numbers",
-                             map.origin_mm.x, map.origin_mm.y));
-  }
-  if (!(map.prior > 0 && map.prior < 1)) {
-    refuse(path,
-           fmt::format("attribute 'prior' = {}; make it a probability between 0 and 1", map.prior));
-  }
-  if (map.symmetry < 0) {
-    refuse(path, fmt::format("attribute 'symmetry' = {}; make it 1, n for an n-fold symmetry or 0 "
-                             "for full symmetry",
-                             map.symmetry));
-  }
-  if (map.spread_mm && !(std::isfinite(*map.spread_mm) && *map.spread_mm > 0)) {
-    refuse(path, fmt::format("attribute 'spread_mm' = {}; make it positive, or leave it out",
-                             *map.spread_mm));
-  }
-}
-
-void require_log_odds(const std::filesystem::path& path, int nx, std::size_t first,
-                      std::span<const float> log_odds) {
-  for (std::size_t i = 0; i < log_odds.size(); ++i) {
-    if (!std::isfinite(log_odds[i])) {
-      const std::size_t k = first + i;
-      const auto width = static_cast<std::size_t>(nx);
-      refuse(path, fmt::format("dataset 'log_odds'[{}, {}] = {} in float32; store finite numbers",
-                               k / width, k % width, log_odds[i]));
-    }
+void require_sound(const std::filesystem::path& path, const std::optional<std::string>& fault) {
+  if (fault) {
+    refuse(path, *fault);
   }
 }
 
@@ -83,12 +51,13 @@ void scan_map(const std::filesystem::path& path,
   }
   map.ny = static_cast<int>(shape[0]);
   map.nx = static_cast<int>(shape[1]);
-  validate(path, map);
+  require_text(path, "attribute 'label'", map.label);
+  require_sound(path, fault_without_cells(map));
   head(map);
   std::vector<float> narrow;
   file.read("log_odds", [&](std::uint64_t first, std::span<const double> log_odds) {
     narrow.assign(log_odds.begin(), log_odds.end());
-    require_log_odds(path, map.nx, first, narrow);
+    require_sound(path, fault_of_cells(map, first, narrow));
     cells(narrow);
   });
 }
@@ -111,14 +80,8 @@ OccupancyGrid read_map(const std::filesystem::path& path) {
 }
 
 void write_map(const std::filesystem::path& path, const OccupancyGrid& map) {
-  if (map.nx < 1 || map.ny < 1 ||
-      map.log_odds.size() != static_cast<std::size_t>(map.nx) * static_cast<std::size_t>(map.ny)) {
-    refuse(path, fmt::format("a map of {} x {} cells with {} log odds cannot be written; make them "
-                             "agree",
-                             map.nx, map.ny, map.log_odds.size()));
-  }
-  validate(path, map);
-  require_log_odds(path, map.nx, 0, map.log_odds);
+  require_text(path, "attribute 'label'", map.label);
+  require_sound(path, fault_of(map));
   Hdf5Writer file(path);
   file.attribute("format", map_format);
   file.attribute("version", format_version);

@@ -12,7 +12,7 @@ namespace palpate {
 
 namespace {
 
-void validate(const Touch& touch) {
+void require_sound(const Touch& touch) {
   const std::size_t e = touch.pressure.size();
   if (touch.elements_mm.size() != e || (!touch.valid.empty() && touch.valid.size() != e)) {
     throw Error(Fault::input,
@@ -37,8 +37,20 @@ void validate(const Touch& touch) {
 
 }  // namespace
 
+void ContactClassifier::validate() const {
+  if (!(threshold >= 0.0) || !std::isfinite(threshold)) {
+    throw Error(Fault::input, fmt::format("threshold = {}: give a pressure of at least 0, in the "
+                                          "recording's unit",
+                                          threshold));
+  }
+  if (!(ratio >= 0.0 && ratio < 1.0)) {
+    throw Error(Fault::input, fmt::format("ratio = {}: must be at least 0 and below 1", ratio));
+  }
+}
+
 std::vector<Reading> ContactClassifier::classify(const Touch& touch) const {
-  validate(touch);
+  validate();
+  require_sound(touch);
   const std::size_t e = touch.pressure.size();
   const auto alive = [&](std::size_t i) { return touch.valid.empty() || touch.valid[i] != 0; };
 
@@ -75,6 +87,19 @@ std::vector<ElementReading> known_readings(const Touch& touch,
     }
   }
   return known;
+}
+
+std::optional<std::string> fault_of(std::span<const ElementReading> readings) {
+  for (const ElementReading& reading : readings) {
+    const glm::dvec2& p = reading.position_mm;
+    if (!(std::abs(p.x) <= farthest_mm && std::abs(p.y) <= farthest_mm)) {
+      return fmt::format(
+          "an element at [{}, {}] mm; keep touches within {:g} mm of the robot "
+          "frame's origin, or check the poses' unit",
+          p.x, p.y, farthest_mm);
+    }
+  }
+  return {};
 }
 
 }  // namespace palpate

@@ -11,14 +11,16 @@ namespace palpate {
 
 namespace {
 
+// Of millimetres and, by the same bound, of radians.
+bool is_near(double place) { return std::abs(place) <= farthest_mm; }
+
 void validate_axis(const char* name, const Axis& axis) {
   if (axis.count < 1) {
     throw Error(Fault::input, fmt::format("bins {} = {}: give at least 1", name, axis.count));
   }
-  if (!std::isfinite(axis.lower) || !std::isfinite(axis.upper) ||
-      !std::isfinite(axis.upper - axis.lower)) {
-    throw Error(Fault::input,
-                fmt::format("range {} = {}:{}: give finite numbers", name, axis.lower, axis.upper));
+  if (!is_near(axis.lower) || !is_near(axis.upper)) {
+    throw Error(Fault::input, fmt::format("range {} = {}:{}: give numbers within +-{:g}", name,
+                                          axis.lower, axis.upper, farthest_mm));
   }
   if (axis.lower > axis.upper) {
     throw Error(Fault::input, fmt::format("range {} = {}:{}: reversed, write the lower end first",
@@ -41,9 +43,9 @@ void PoseLattice::validate() const {
   validate_axis("x_mm", x_mm);
   validate_axis("y_mm", y_mm);
   validate_axis("theta_rad", theta_rad);
-  if (!std::isfinite(pivot_mm.x) || !std::isfinite(pivot_mm.y)) {
-    throw Error(Fault::input,
-                fmt::format("pivot_mm = {},{}: give finite numbers", pivot_mm.x, pivot_mm.y));
+  if (!is_near(pivot_mm.x) || !is_near(pivot_mm.y)) {
+    throw Error(Fault::input, fmt::format("pivot_mm = {},{}: give numbers within +-{:g}",
+                                          pivot_mm.x, pivot_mm.y, farthest_mm));
   }
 }
 

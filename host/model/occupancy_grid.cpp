@@ -1,14 +1,92 @@
 #include "palpate/occupancy_grid.hpp"
 
+#include <algorithm>
 #include <cmath>
 
+#include <fmt/format.h>
+
+#include "palpate/pose.hpp"
+
 namespace palpate {
+
+namespace {
+
+bool is_length(double mm) { return mm >= least_length_mm && mm <= most_length_mm; }
+
+bool is_near(const glm::dvec2& p_mm) {
+  return std::abs(p_mm.x) <= farthest_mm && std::abs(p_mm.y) <= farthest_mm;
+}
+
+}  // namespace
 
 double log_odds_from_probability(double p) { return std::log(p) - std::log1p(-p); }
 
 double probability_from_log_odds(double l) {
   const double z = std::exp(-std::abs(l));
   return (l >= 0 ? 1.0 : z) / (1.0 + z);
+}
+
+std::optional<std::string> fault_of(const OccupancyGrid& map) {
+  if (auto fault = fault_without_cells(map)) {
+    return fault;
+  }
+  if (map.log_odds.size() != static_cast<std::size_t>(map.nx) * static_cast<std::size_t>(map.ny)) {
+    return fmt::format("{} x {} cells but {} log odds; make them agree", map.nx, map.ny,
+                       map.log_odds.size());
+  }
+  return fault_of_cells(map, 0, map.log_odds);
+}
+
+std::optional<std::string> fault_without_cells(const OccupancyGrid& map) {
+  if (map.nx < 1 || map.ny < 1 || std::int64_t{map.nx} * map.ny > most_cells) {
+    return fmt::format("{} x {} cells; use at least one and at most {}", map.nx, map.ny,
+                       most_cells);
+  }
+  if (map.label == none_label) {
+    return fmt::format("'label' = '{}' is kept for objects that were never learned; choose another",
+                       map.label);
+  }
+  if (!is_length(map.cell_mm)) {
+    return fmt::format("'cell_mm' = {}; give {:g} to {:g} mm", map.cell_mm, least_length_mm,
+                       most_length_mm);
+  }
+  if (!is_near(map.origin_mm) || !is_near(map.centre_mm(map.nx - 1, map.ny - 1))) {
+    return fmt::format(
+        "'origin_mm' = [{}, {}] of {} x {} cells; keep the map within {:g} mm of the "
+        "object frame's origin",
+        map.origin_mm.x, map.origin_mm.y, map.nx, map.ny, farthest_mm);
+  }
+  if (!(map.prior > 0.0 && map.prior < 1.0)) {
+    return fmt::format("'prior' = {}; make it a probability between 0 and 1", map.prior);
+  }
+  if (map.symmetry < 0) {
+    return fmt::format(
+        "'symmetry' = {}; make it 1, n for an n-fold symmetry or 0 for full symmetry",
+        map.symmetry);
+  }
+  // A map reaches several spreads beyond what was touched.
+  const double side_mm = map.cell_mm * std::max(map.nx, map.ny);
+  if (map.spread_mm && !(is_length(*map.spread_mm) && *map.spread_mm <= side_mm)) {
+    return fmt::format(
+        "'spread_mm' = {}; give {:g} mm to the grid's longer side of {:g} mm, or "
+        "leave it out",
+        *map.spread_mm, least_length_mm, side_mm);
+  }
+  return {};
+}
+
+std::optional<std::string> fault_of_cells(const OccupancyGrid& map, std::size_t first,
+                                          std::span<const float> log_odds) {
+  const auto wrong = std::find_if_not(log_odds.begin(), log_odds.end(), [](float l) {
+    return std::abs(l) <= static_cast<float>(most_log_odds);
+  });
+  if (wrong != log_odds.end()) {
+    const std::size_t k = first + static_cast<std::size_t>(wrong - log_odds.begin());
+    const auto nx = static_cast<std::size_t>(map.nx);
+    return fmt::format("'log_odds'[{}, {}] = {} in float32; give finite numbers within +-{:g}",
+                       k / nx, k % nx, *wrong, most_log_odds);
+  }
+  return {};
 }
 
 }  // namespace palpate

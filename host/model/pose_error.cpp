@@ -52,7 +52,8 @@ double pose_error_mm(const Body& body, int symmetry, const Pose& T_object_robot_
   }
   // 1 - cos(a) = 2 sin^2(a / 2), without cancellation at small angles.
   const double s = std::sin(turn_rad / 2.0);
-  return std::sqrt(glm::dot(shift, shift) + 4.0 * body.inertia_mm2 * s * s);
+  // Where the truth is absurdly far away, squares would be infinite.
+  return std::hypot(shift.x, shift.y, 2.0 * std::sqrt(body.inertia_mm2) * s);
 }
 
 }  // namespace palpate

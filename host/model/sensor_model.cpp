@@ -22,16 +22,17 @@ void require_probability(const char* name, double value) {
 }  // namespace
 
 void InverseSensorModel::validate() const {
-  if (!(spread_mm > 0.0) || !std::isfinite(spread_mm)) {
-    throw Error(Fault::input, fmt::format("spread = {} mm: give a positive length", spread_mm));
+  if (!(spread_mm >= least_length_mm && spread_mm <= most_length_mm)) {
+    throw Error(Fault::input, fmt::format("spread = {} mm: give {:g} to {:g} mm", spread_mm,
+                                          least_length_mm, most_length_mm));
   }
   // Beyond these, increments in float32 no longer keep to what MapBuilder promises.
   constexpr double largest_peak = 0.9999;
-  if (!(peak > 0.0 && peak <= largest_peak)) {
+  if (!(peak >= least_peak && peak <= largest_peak)) {
     throw Error(Fault::input,
-                fmt::format("peak = {}: must lie above 0 and be at most {}, or one reading would "
-                            "make a cell certain",
-                            peak, largest_peak));
+                fmt::format("peak = {}: must be at least {:g}, or a reading would say nothing, and "
+                            "at most {}, or one would make a cell certain",
+                            peak, least_peak, largest_peak));
   }
   if (!(prior >= least_prior && prior <= 1.0 - least_prior)) {
     throw Error(Fault::input, fmt::format("prior = {}: must lie between {:g} and 1 - {:g}", prior,

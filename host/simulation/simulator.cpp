@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 
 #include "displacement_field.hpp"
+#include "moved_from.hpp"
 #include "palpate/error.hpp"
 #include "palpate/simulation.hpp"
 #include "random.hpp"
@@ -84,22 +85,24 @@ Simulator::Simulator(Simulator&&) noexcept = default;
 Simulator& Simulator::operator=(Simulator&&) noexcept = default;
 
 Recording Simulator::touch(const std::vector<Pose>& T_robot_sensor, const Pose& T_object_robot) {
-  const SensorModel& model = impl_->model;
-  const std::size_t e = impl_->elements_mm.size();
+  Impl& simulator = held_by(impl_, "simulator");
+  const SensorModel& model = simulator.model;
+  const std::size_t e = simulator.elements_mm.size();
   Recording recording;
-  recording.object = impl_->label;
+  recording.object = simulator.label;
   recording.T_robot_sensor = T_robot_sensor;
-  recording.elements_mm = impl_->elements_mm;
+  recording.elements_mm = simulator.elements_mm;
   recording.pressure.reserve(T_robot_sensor.size() * e);
   recording.time_s.reserve(T_robot_sensor.size());
   for (const Pose& pose : T_robot_sensor) {
     const Pose T_object_sensor = T_object_robot * pose;
-    const double force_kpa = model.pressure_kpa * random_factor(impl_->random, model.force_spread);
+    const double force_kpa =
+        model.pressure_kpa * random_factor(simulator.random, model.force_spread);
     for (std::size_t i = 0; i < e; ++i) {
-      const Pose T_object_element = T_object_sensor * Pose{impl_->elements_mm[i], 0.0};
-      const double pressure_kpa =
-          force_kpa * impl_->gains[i] * impl_->field.mean(T_object_element, model.element_mm) +
-          model.noise_kpa * impl_->random.normal();
+      const Pose T_object_element = T_object_sensor * Pose{simulator.elements_mm[i], 0.0};
+      const double pressure_kpa = force_kpa * simulator.gains[i] *
+                                      simulator.field.mean(T_object_element, model.element_mm) +
+                                  model.noise_kpa * simulator.random.normal();
       recording.pressure.push_back(std::max(0.0, pressure_kpa));
     }
     recording.time_s.push_back(0.5 * static_cast<double>(recording.time_s.size()));

@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "frame_smoother.hpp"
+#include "moved_from.hpp"
 #include "palpate/error.hpp"
 #include "palpate/pose_track.hpp"
 #include "steady_phase.hpp"
@@ -182,18 +183,21 @@ TouchDetector::~TouchDetector() = default;
 TouchDetector::TouchDetector(TouchDetector&&) noexcept = default;
 TouchDetector& TouchDetector::operator=(TouchDetector&&) noexcept = default;
 
-std::optional<DetectedTouch> TouchDetector::add(const Frame& frame) { return impl_->add(frame); }
+TouchDetector::Impl& TouchDetector::impl() const { return held_by(impl_, "touch detector"); }
+
+std::optional<DetectedTouch> TouchDetector::add(const Frame& frame) { return impl().add(frame); }
 
 std::optional<DetectedTouch> TouchDetector::finish() {
-  std::optional<DetectedTouch> touch = impl_->end_touch();
-  impl_->smoother.reset();
-  impl_->last_s.reset();
-  impl_->released_s.reset();  // the next stream may be of any time
+  Impl& detector = impl();
+  std::optional<DetectedTouch> touch = detector.end_touch();
+  detector.smoother.reset();
+  detector.last_s.reset();
+  detector.released_s.reset();  // the next stream may be of any time
   return touch;
 }
 
-const std::optional<DetectedTouch>& TouchDetector::candidate() const { return impl_->best; }
-bool TouchDetector::touching() const { return impl_->touching; }
-const std::vector<double>& TouchDetector::baseline() const { return impl_->baseline; }
+const std::optional<DetectedTouch>& TouchDetector::candidate() const { return impl().best; }
+bool TouchDetector::touching() const { return impl().touching; }
+const std::vector<double>& TouchDetector::baseline() const { return impl().baseline; }
 
 }  // namespace palpate

@@ -146,5 +146,34 @@ TEST_F(MapCommand, ReplacesAnOlderFile) {
   EXPECT_EQ(map_of_a({}).label, "A");
 }
 
+TEST_F(MapCommand, RefusesLengthsThatNoMapCanHave) {
+  for (const char* flag : {"--cell-mm", "--psf-mm", "--spread-mm"}) {
+    for (const char* value : {"1e+200", "1e-200", "1e-07", "2000000"}) {
+      expect_refused({"map", "A.h5", "-o", "new/", flag, value}, {flag, value, "1e-06 to 1e+06"});
+    }
+  }
+}
+
+TEST_F(MapCommand, RefusesTouchesBeyondAnyRobotBeforeAnythingIsWritten) {
+  Recording recording = sample_training("A", 48);
+  for (const double x_mm : {1e300, -1.1e9}) {
+    recording.T_robot_sensor[7].translation_mm.x = x_mm;
+    write_recording(folder_ / "A.h5", recording);
+    for (const char* prior : {"auto", "0.2"}) {
+      expect_refused({"map", "I.h5", "A.h5", "-o", "new/", "--png", "maps.png", "--prior", prior},
+                     {"A.h5: sensor_pose[7]", "within 1e+09 mm", "unit"});
+    }
+  }
+}
+
+TEST_F(MapCommand, RefusesTheLabelOfObjectsThatWereNeverLearned) {
+  expect_refused({"map", "A.h5", "-o", "new/", "--label", "(none)"}, {"--label (none)", "choose"});
+  Recording recording = sample_training("A", 48);
+  recording.object = "(none)";
+  write_recording(folder_ / "A.h5", recording);
+  expect_refused({"map", "A.h5", "-o", "new/"}, {"A.h5", "'(none)'", "--label"});
+  EXPECT_EQ(map_of_a({"--label", "A"}).label, "A");
+}
+
 }  // namespace
 }  // namespace palpate

@@ -138,13 +138,16 @@ TEST(BalancedLattice, IsMadeCoarserAlikeToKeepToABound) {
 
 TEST(BalancedLattice, OfAnEndlessRegionIsBounded) {
   PoseLattice region;
-  region.x_mm = {-1e200, 1e200, 1};
-  region.y_mm = {-1e200, 1e200, 1};
+  region.x_mm = {-farthest_mm, farthest_mm, 1};
+  region.y_mm = {-farthest_mm, farthest_mm, 1};
+  region.theta_rad = {-1e9, 1e9, 1};
   const BalancedLattice balanced = balanced_lattice(region, letters());
   EXPECT_TRUE(balanced.bounded);
   EXPECT_LE(5 * balanced.lattice.bins(), most_balanced_bins);
-  region.x_mm = {1.0, -1.0, 1};
-  EXPECT_THROW(balanced_lattice(region, letters()), Error);
+  for (const Axis& x_mm : {Axis{1.0, -1.0, 1}, Axis{-1e200, 1e200, 1}}) {
+    region.x_mm = x_mm;
+    EXPECT_THROW(balanced_lattice(region, letters()), Error);
+  }
   EXPECT_THROW(balanced_lattice({}, {}), Error);
 }
 

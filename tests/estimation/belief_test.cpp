@@ -144,7 +144,7 @@ TEST(Belief, MoreBinsThanMemoryIsRefusedBeforeAnyIsTaken) {
       const PoseHistogram histogram(device, objects, too_many);
       ADD_FAILURE() << "accepted";
     } catch (const Error& error) {
-      EXPECT_EQ(error.fault(), Fault::system);
+      EXPECT_EQ(error.fault(), Fault::input);
       EXPECT_NE(std::string(error.what()).find("use fewer bins"), std::string::npos)
           << error.what();
     }

@@ -1,6 +1,10 @@
 #include "contact_evidence.hpp"
 
+#include <algorithm>
 #include <cmath>
+#include <cstdint>
+#include <limits>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -66,6 +70,30 @@ TEST(Split, AddsUpToTheCoordinate) {
     EXPECT_LE(parts.fraction, 1.0F);
     EXPECT_NEAR(parts.cell + static_cast<double>(parts.fraction), at, 6e-8)
         << "half the last digit of a float32 below 1";
+  }
+}
+
+TEST(Split, FarOutsideNeverMeetsAPlaceOfTheLattice) {
+  // No map that a device holds is as wide.
+  constexpr std::int64_t widest = (1 << 28) - 4;
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  const std::vector<double> places{
+      0.0,   1e6,   5e8, 536870911.5, 536870912.0, 6e8,
+      8.1e8, 1.1e9, 3e9, 1e15,        1e300,       std::numeric_limits<double>::infinity()};
+  for (const double element : places) {
+    for (const double axis : places) {
+      for (const double sign : {1.0, -1.0}) {
+        const std::int64_t sum =
+            std::int64_t{split(element).cell} + split_axis(sign * axis).cell + 2;
+        EXPECT_LT(std::abs(sum), std::int64_t{1} << 31) << element << " and " << sign * axis;
+        if (std::max(element, axis) >= 0x1p29) {
+          EXPECT_GE(std::abs(sum), widest) << element << " and " << sign * axis;
+        } else {
+          EXPECT_NEAR(static_cast<double>(sum), element + sign * axis, 3.0);
+        }
+      }
+    }
+    EXPECT_GE(std::abs(std::int64_t{split(nan).cell} + split_axis(element).cell), widest);
   }
 }
 

@@ -142,7 +142,7 @@ TEST(MemoryLimit, AboveTheDevicesMemoryIsTheDevices) {
     const PoseHistogram histogram(device, two_objects(), options);
     FAIL() << "accepted";
   } catch (const Error& error) {
-    EXPECT_EQ(error.fault(), Fault::system);
+    EXPECT_EQ(error.fault(), Fault::input);
     EXPECT_NE(std::string(error.what()).find("has 10;"), std::string::npos) << error.what();
   }
 }

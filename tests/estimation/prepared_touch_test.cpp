@@ -1,3 +1,4 @@
+#include <cmath>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -54,6 +55,42 @@ TEST_F(PreparedTouch, GivesTheReferencesLikelihoodOnEveryPath) {
     // 1e-4 nats per 36 elements and touch.
     EXPECT_LT(likelihood_error(histogram, reference_posterior(objects(), options, touches)),
               1e-4 * 3 * 60.0 / 36.0);
+  }
+}
+
+TEST_F(PreparedTouch, IsAddedAndNotEvaluatedAgain) {
+  PoseHistogram plain(device, objects(), options_of(0.1));
+  PoseHistogram prepared(device, objects(), options_of(0.1));
+  std::vector<double> plain_progress;
+  std::vector<double> prepared_progress;
+  for (const Touch& touch : touches) {
+    plain.update(std::span(&touch, 1), [&](double done) { plain_progress.push_back(done); });
+    prepared.prepare(touch);
+    prepared.update(std::span(&touch, 1), [&](double done) { prepared_progress.push_back(done); });
+  }
+  // So few bins are done before there is any progress; what was prepared is done at once.
+  EXPECT_EQ(plain_progress, std::vector<double>());
+  EXPECT_EQ(prepared_progress, (std::vector{1.0, 1.0, 1.0}));
+}
+
+TEST_F(PreparedTouch, CountsForThePriorAsAnyOther) {
+  for (const double none_weight : {0.1, 10.0}) {
+    HistogramOptions options = options_of(0.8);
+    options.none_weight = none_weight;
+    options.gamma = 0.6;  // so that touches of no object leave some doubt
+    PoseHistogram plain(device, objects(), options);
+    PoseHistogram prepared(device, objects(), options);
+    for (const Touch& touch : touches) {
+      plain.update(touch);
+      prepared.prepare(touch);
+      prepared.prepare(touch);
+      prepared.update(touch);
+      const double none = plain.estimate().none;
+      // 1e-4 nats per touch of 36 elements.
+      EXPECT_NEAR(std::log(prepared.estimate().none / none), 0.0, 1e-4 * 3 * 60.0 / 36.0);
+      EXPECT_GT(none, 1e-9) << "nothing would be seen";
+      EXPECT_LT(none, 1.0 - 1e-3) << "nothing would be seen";
+    }
   }
 }
 

@@ -1,11 +1,14 @@
 #include <functional>
 #include <limits>
 #include <string>
+#include <tuple>
 
 #include <gtest/gtest.h>
 
+#include "palpate/balanced_lattice.hpp"
 #include "palpate/error.hpp"
 #include "palpate/map_builder.hpp"
+#include "palpate/particle_filter.hpp"
 #include "palpate/pose_histogram.hpp"
 #include "synthetic.hpp"
 
@@ -32,10 +35,15 @@ TEST(MapOptions, OutOfRangeAreRefused) {
   const auto refuse = [&](const MapOptions& options, const std::string& says) {
     expect_refused([&] { const MapBuilder builder(device, options); }, says);
   };
-  for (const double length : {0.0, -0.5, nan, infinity}) {
+  for (const double length : {0.0, -0.5, nan, infinity, 1e-7, 1.1e6, 1e154, 1e200}) {
     refuse({.cell_mm = length}, "cell");
     refuse({.sensor = {.spread_mm = length}}, "spread");
   }
+  for (const double wrong : {nan, -1.0}) {
+    refuse({.classifier = {.threshold = wrong}}, "threshold");
+    refuse({.classifier = {.ratio = wrong}}, "ratio");
+  }
+  refuse({.sensor = {.peak = 1e-7}}, "peak");
   for (const double p : {0.0, 1.0, -0.5, 2.0, nan}) {
     refuse({.sensor = {.peak = p}}, "peak");
     refuse({.sensor = {.prior = p}}, "prior");
@@ -56,10 +64,27 @@ TEST(MapOptions, AMapTooLargeIsRefusedBeforeItIsBuilt) {
   EXPECT_NO_THROW(build(1000.0));
 }
 
+TEST(BalancedLattice, OfAMapThatIsNotSoundIsRefused) {
+  for (const auto& [cell_mm, spread_mm, says] :
+       {std::tuple(1e200, 0.5, "cell_mm"), std::tuple(0.5, 500.0, "spread_mm")}) {
+    Hypothesis object{random_map(5, 4, 0.5, 1.0, 122), 1.0};
+    object.map.cell_mm = cell_mm;
+    object.map.spread_mm = spread_mm;
+    expect_refused([&] { balanced_lattice({}, std::span(&object, 1)); }, says);
+  }
+}
+
 class HistogramInput : public testing::Test {
  protected:
+  /// Both filters are given the same.
   void refuse(const std::string& says) {
     expect_refused([&] { const PoseHistogram histogram(device, objects, options); }, says);
+    const ParticleOptions particles{.particles = 10,
+                                    .region = options.lattice,
+                                    .classifier = options.classifier,
+                                    .gamma = options.gamma,
+                                    .prior = options.prior};
+    expect_refused([&] { const ParticleFilter filter(device, objects, particles); }, says);
   }
 
   Device device = Device::open();
@@ -79,17 +104,17 @@ TEST_F(HistogramInput, WithAMapThatIsNoGridIsRefused) {
   objects[0].map = sound;
   objects[0].map.log_odds.pop_back();
   refuse("19 log odds");
-  for (const double cell_mm : {0.0, -1.0, nan, infinity}) {
+  for (const double cell_mm : {0.0, -1.0, nan, infinity, 1e-200, 1e154, 1e200}) {
     objects[0].map = sound;
     objects[0].map.cell_mm = cell_mm;
     refuse("cell_mm");
   }
-  for (const double spread_mm : {0.0, -1.0, nan, infinity}) {
+  for (const double spread_mm : {0.0, -1.0, nan, infinity, 500.0}) {
     objects[0].map = sound;
     objects[0].map.spread_mm = spread_mm;
     refuse("spread_mm");
   }
-  for (const double origin_mm : {nan, infinity}) {
+  for (const double origin_mm : {nan, infinity, 1e10}) {
     objects[0].map = sound;
     objects[0].map.origin_mm.y = origin_mm;
     refuse("origin_mm");
@@ -99,6 +124,24 @@ TEST_F(HistogramInput, WithAMapThatIsNoGridIsRefused) {
     objects[0].map.log_odds[7] = static_cast<float>(log_odds);
     refuse("finite");
   }
+  objects[0].map = sound;
+  objects[0].map.prior = nan;
+  refuse("prior");
+  objects[0].map = sound;
+  objects[0].map.symmetry = -1;
+  refuse("symmetry");
+  objects[0].map = sound;
+  objects[0].map.label = "(none)";
+  refuse("(none)");
+}
+
+TEST_F(HistogramInput, WithAClassifierThatDecidesNothingIsRefused) {
+  options.classifier.threshold = nan;
+  refuse("threshold");
+  options.classifier = {.ratio = nan};
+  refuse("ratio");
+  options.classifier = {.ratio = 1.5};
+  refuse("ratio");
 }
 
 TEST_F(HistogramInput, WithAWeightThatIsNotPositiveIsRefused) {
@@ -137,6 +180,8 @@ TEST_F(HistogramInput, WithALatticeOutOfRangeIsRefused) {
   refuse("theta_rad");
   options.lattice = {.pivot_mm = {infinity, 0.0}};
   refuse("pivot_mm");
+  options.lattice = {.y_mm = {-1e200, 1e200, 3}};
+  refuse("y_mm");
 }
 
 }  // namespace

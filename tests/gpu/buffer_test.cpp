@@ -45,7 +45,7 @@ TEST(Buffer, TooLargeAnAllocationSaysForWhatAndLeavesTheDeviceUsable) {
     FAIL() << "allocated";
   } catch (const Error& error) {
     const std::string message = error.what();
-    EXPECT_EQ(error.fault(), Fault::system);
+    EXPECT_EQ(error.fault(), Fault::input);
     EXPECT_NE(message.find("1.0 MiB for a test"), std::string::npos) << message;
     EXPECT_NE(message.find(context.name()), std::string::npos) << message;
     EXPECT_NE(message.find("use fewer"), std::string::npos) << message;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cctype>
 #include <cstdlib>
+#include <string>
 #include <utility>
 
 #include <gtest/gtest.h>
@@ -80,6 +81,24 @@ TEST(Device, Moves) {
   Device second(std::move(first));
   EXPECT_EQ(second.name(), name);
   EXPECT_EQ(&second.context(), context);
+}
+
+TEST(Device, ThatWasMovedFromSaysSo) {
+  Device first = Device::open();
+  const Device second(std::move(first));
+  const auto expect_refused = [](const auto& call) {
+    try {
+      call();
+      ADD_FAILURE() << "answered";
+    } catch (const Error& error) {
+      EXPECT_EQ(error.fault(), Fault::input);
+      EXPECT_NE(std::string(error.what()).find("device: was moved from"), std::string::npos);
+    }
+  };
+  // Asked on purpose.
+  expect_refused([&] { first.name(); });          // NOLINT(bugprone-use-after-move)
+  expect_refused([&] { first.memory_bytes(); });  // NOLINT(bugprone-use-after-move)
+  expect_refused([&] { first.context(); });       // NOLINT(bugprone-use-after-move)
 }
 
 TEST(Context, HasTheLimitsThatVulkanGuarantees) {

@@ -69,10 +69,10 @@ TEST_F(MapFile, NamesAttributesItCannotTake) {
   };
   const double nan = std::numeric_limits<double>::quiet_NaN();
   const double infinity = std::numeric_limits<double>::infinity();
-  for (const double cell_mm : {0.0, -0.5, nan, infinity}) {
+  for (const double cell_mm : {0.0, -0.5, nan, infinity, 1e-200, 1e154, 1e200}) {
     expect_named(spoilt("cell_mm", cell_mm), {"'cell_mm'"});
   }
-  for (const double spread_mm : {0.0, -0.5, nan, infinity}) {
+  for (const double spread_mm : {0.0, -0.5, nan, infinity, 500.0}) {
     expect_named(spoilt("spread_mm", spread_mm), {"'spread_mm'"});
   }
   for (const double prior : {0.0, 1.0, -0.1, nan}) {
@@ -82,6 +82,8 @@ TEST_F(MapFile, NamesAttributesItCannotTake) {
     expect_named(spoilt("symmetry", symmetry), {"'symmetry'"});
   }
   expect_named(spoilt("origin_mm", std::vector<double>{0, nan}), {"'origin_mm'", "nan"});
+  expect_named(spoilt("origin_mm", std::vector<double>{1e300, 0}), {"'origin_mm'", "1e+300"});
+  expect_named(spoilt("label", "(none)"), {"'label'", "(none)", "choose another"});
   expect_named(spoilt("origin_mm", std::vector<double>{0, 0, 0}), {"'origin_mm'", "3", "2"});
   expect_named(spoilt("version", 2), {"'version'", "newer"});
   expect_named(spoilt("format", "palpate.recording"), {"a recording", "palpate recognize", "map"});
@@ -94,6 +96,8 @@ TEST_F(MapFile, NamesAttributesItCannotTake) {
 TEST_F(MapFile, NamesLogOddsItCannotTake) {
   expect_named(message(map_parts().dataset("log_odds", {2, 3}, {0, 0, 0, 0, 0, NAN})),
                {"'log_odds'[1, 2]", "nan"});
+  expect_named(message(map_parts().dataset("log_odds", {2, 3}, 2e30)),
+               {"'log_odds'[0, 0]", "2e+30"});
   // Finite in float64, infinite in the grid's float32.
   expect_named(message(map_parts().dataset("log_odds", {2, 3}, 1e300)), {"'log_odds'", "inf"});
   expect_named(message(map_parts().dataset("log_odds", {0, 3})), {"'log_odds'", "[0, 3]"});
@@ -108,6 +112,12 @@ TEST_F(MapFile, IsNotWrittenWhereItCouldNotBeRead) {
   map = small_map();
   map.nx = 4;
   expect_named(input_error([&] { write_map(path_, map); }), {path_.c_str(), "4 x 2"});
+  map = small_map();
+  map.label = "(none)";
+  expect_named(input_error([&] { write_map(path_, map); }), {path_.c_str(), "'label'"});
+  map = small_map();
+  map.cell_mm = 1e200;
+  expect_named(input_error([&] { write_map(path_, map); }), {path_.c_str(), "'cell_mm'"});
   EXPECT_TRUE(std::filesystem::is_empty(folder_.path()));
 }
 

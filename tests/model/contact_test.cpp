@@ -2,9 +2,11 @@
 
 #include <limits>
 #include <random>
+#include <string>
 
 #include <gtest/gtest.h>
 
+#include "palpate/error.hpp"
 #include "reference.hpp"
 
 namespace palpate {
@@ -79,6 +81,40 @@ TEST(ContactClassifier, AgreesWithTheReference) {
     const Touch touch{
         .T_robot_sensor = {}, .elements_mm = elements, .pressure = pressure, .valid = valid};
     EXPECT_EQ(classifier.classify(touch), reference::classify(touch, classifier));
+  }
+}
+
+TEST(ContactClassifier, RefusesBoundsThatDecideNothing) {
+  const auto expect_refused = [](const ContactClassifier& classifier, const std::string& field) {
+    for (const bool by_use : {false, true}) {
+      try {
+        by_use ? static_cast<void>(classify({5.0, 1.0}, {}, classifier)) : classifier.validate();
+        ADD_FAILURE() << field << " was accepted";
+      } catch (const Error& error) {
+        EXPECT_EQ(error.fault(), Fault::input);
+        EXPECT_NE(std::string(error.what()).find(field), std::string::npos) << error.what();
+      }
+    }
+  };
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  const double infinity = std::numeric_limits<double>::infinity();
+  for (const double threshold : {nan, infinity, -infinity, -0.1}) {
+    expect_refused({.threshold = threshold}, "threshold = ");
+  }
+  for (const double ratio : {nan, infinity, -0.1, 1.0, 1.5}) {
+    expect_refused({.ratio = ratio}, "ratio = ");
+  }
+  ContactClassifier{.threshold = 0.0, .ratio = 0.0}.validate();
+}
+
+TEST(FaultOfReadings, IsAPlaceBeyondWhatAMapMayReach) {
+  const ElementReading near{{1e9, -1e9}, in};
+  EXPECT_EQ(fault_of(std::vector{near}), std::nullopt);
+  for (const double far : {1.1e9, -1e300, std::numeric_limits<double>::infinity(),
+                           std::numeric_limits<double>::quiet_NaN()}) {
+    for (const glm::dvec2 at : {glm::dvec2(far, 0.0), glm::dvec2(0.0, far)}) {
+      EXPECT_NE(fault_of(std::vector<ElementReading>{near, {at, no}}), std::nullopt) << far;
+    }
   }
 }
 

@@ -100,5 +100,17 @@ TEST(PoseLattice, RefusesWhatIsNoLattice) {
   expect_refused({.pivot_mm = {0.0, nan}}, "pivot_mm");
 }
 
+TEST(PoseLattice, RefusesPlacesOfWhichFloat64KeepsNoDigits) {
+  PoseLattice{.x_mm = {-1e9, 1e9, 5}, .theta_rad = {0.0, 1e9, 5}, .pivot_mm = {1e9, -1e9}}
+      .validate();
+  for (const double far : {1.1e9, 1e154, 1e300}) {
+    expect_refused({.x_mm = {-far, 1.0, 4}}, "x_mm");
+    expect_refused({.y_mm = {0.0, far, 4}}, "y_mm");
+    expect_refused({.theta_rad = {0.0, far, 4}}, "theta_rad");
+    expect_refused({.pivot_mm = {far, 0.0}}, "pivot_mm");
+    expect_refused({.pivot_mm = {0.0, -far}}, "pivot_mm");
+  }
+}
+
 }  // namespace
 }  // namespace palpate

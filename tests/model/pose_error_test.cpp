@@ -153,5 +153,11 @@ TEST(PoseError, AgreesWithTheReference) {
   }
 }
 
+TEST(PoseError, OfATruthThatIsAbsurdlyFarAwayIsFinite) {
+  const Body body = body_of(letter_l());
+  // The square of 1e200 mm is infinite.
+  EXPECT_NEAR(pose_error_mm(body, 1, {}, {{1e200, 0.0}, 0.0}) / 1e200, 1.0, 1e-12);
+}
+
 }  // namespace
 }  // namespace palpate

@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 #include <vector>
 
 #include <gmock/gmock.h>
@@ -177,6 +178,13 @@ TEST(Simulator, RefusesWhatItCannotSimulateNamingTheField) {
   expect_refused(shape, {}, array, "'plate'");
   shape = {.label = "thin", .strokes = {{{{0.0, 0.0}, {0.0, 5.0}}, -4.0}}, .polygons = {}};
   expect_refused(shape, {}, array, "'thin'");
+}
+
+TEST(Simulator, ThatWasMovedFromSaysSo) {
+  Simulator first(make_shape("A"), {}, digitacts_array(), 1);
+  Simulator second(std::move(first));
+  EXPECT_EQ(second.touch({Pose{}}, {}).size(), 1U);
+  EXPECT_THROW(first.touch({Pose{}}, {}), Error);  // NOLINT(bugprone-use-after-move): on purpose
 }
 
 }  // namespace

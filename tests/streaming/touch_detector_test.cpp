@@ -5,8 +5,10 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <utility>
 
 #include "io/scratch_folder.hpp"
+#include "palpate/error.hpp"
 #include "press.hpp"
 
 namespace palpate {
@@ -313,6 +315,19 @@ TEST(TouchDetector, RefusesWhatCannotBe) {
   expect_named(input_error([] { TouchDetector({}, {nan}, {}); }), {"baseline"});
   TouchDetector detector({}, {0.0, 0.0}, {});
   expect_named(input_error([&] { detector.add({.values = {1.0}}); }), {"1 values", "2"});
+}
+
+TEST(TouchDetector, ThatWasMovedFromSaysSo) {
+  TouchDetector first({}, {0.0, 0.0}, {});
+  const TouchDetector second(std::move(first));
+  EXPECT_EQ(second.baseline().size(), 2U);
+  // NOLINTBEGIN(bugprone-use-after-move): on purpose
+  EXPECT_THROW(first.add({}), Error);
+  EXPECT_THROW(first.finish(), Error);
+  EXPECT_THROW(first.candidate(), Error);
+  EXPECT_THROW(first.touching(), Error);
+  EXPECT_THROW(first.baseline(), Error);
+  // NOLINTEND(bugprone-use-after-move)
 }
 
 }  // namespace

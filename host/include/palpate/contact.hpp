@@ -1,6 +1,9 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
 #include <vector>
 
 #include <glm/vec2.hpp>
@@ -22,9 +25,13 @@ enum class Reading : std::uint8_t {
 /// maximum.
 struct ContactClassifier {
   double threshold = 2.0;  ///< in the recording's pressure unit
-  double ratio = 0.3;
+  double ratio = 0.3;      ///< of the touch's largest pressure, in [0, 1)
 
-  /// The class of every element, [e]. Throws Error on a touch that is not sound.
+  /// Throws Error unless the threshold is finite and at least 0 and the ratio in [0, 1): no
+  /// pressure compares with one that is no number, and none exceeds all of the largest.
+  void validate() const;
+  /// The class of every element, [e]. Throws Error on a touch that is not sound, or as validate()
+  /// does.
   std::vector<Reading> classify(const Touch& touch) const;
 };
 
@@ -36,5 +43,9 @@ struct ElementReading {
 
 /// The elements of the touch that say something, in the array's order.
 std::vector<ElementReading> known_readings(const Touch& touch, const ContactClassifier& classifier);
+
+/// What keeps known readings from being mapped, in a sentence with the remedy: a place beyond
+/// `farthest_mm` of the robot frame's origin. Nothing where they can be.
+std::optional<std::string> fault_of(std::span<const ElementReading> readings);
 
 }  // namespace palpate

@@ -26,7 +26,8 @@ struct DeviceInfo {
 };
 
 /// A Vulkan device, opened for compute. Objects made on it must not outlive it. Not thread-safe:
-/// use a device and what was made on it from one thread at a time.
+/// use a device and what was made on it from one thread at a time. One that was moved from throws
+/// Error whatever it is asked.
 class Device {
  public:
   /// Every device, in Vulkan's order, with the reason for or against each one.
@@ -46,7 +47,7 @@ class Device {
   const std::string& name() const;
   /// Memory that it computes in, in bytes; a CPU device shares the machine's.
   std::uint64_t memory_bytes() const;
-  gpu::Context& context() { return *context_; }
+  gpu::Context& context();
 
  private:
   explicit Device(std::unique_ptr<gpu::Context> context);

@@ -29,7 +29,8 @@ struct PoseLattice {
 
   /// A dimension of zero extent costs one bin, whatever count was asked for.
   PoseLattice& collapse_fixed();
-  /// Throws Error on counts below one, reversed or non-finite ranges.
+  /// Throws Error on counts below one, on reversed ranges, and on ends or a pivot beyond
+  /// `farthest_mm`, or as many radians, where float64 still tells 1e-7 apart.
   void validate() const;
 
   /// theta covers the whole circle once, so that its last bin neighbours its first.

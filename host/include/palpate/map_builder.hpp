@@ -20,25 +20,28 @@ struct MapOptions {
 };
 
 /// Builds an object's occupancy grid from touches at known poses (Sec. II). The object frame is
-/// the robot frame of the touches. Updates add up, so their order does not matter.
+/// the robot frame of the touches. Updates add up, so their order does not matter. A builder that
+/// was moved from throws Error whatever it is asked.
 class MapBuilder {
  public:
-  /// @throws Error on a cell size, spread, peak or prior out of range.
+  /// @throws Error on a cell size, spread, peak, prior, threshold or ratio out of range.
   MapBuilder(Device& device, const MapOptions& options);
   ~MapBuilder();
   MapBuilder(MapBuilder&&) noexcept;
   MapBuilder& operator=(MapBuilder&&) noexcept;
 
-  /// Adds the evidence of these touches. Memory does not grow with their number, only with the
-  /// area that they cover.
-  /// @throws Error on a touch that is not sound, or where the area has more cells than the device
-  /// holds
+  /// Adds the evidence of these touches, all of it or, where it throws, none. Memory does not grow
+  /// with their number, only with the area that they cover.
+  /// @throws Error on a touch that is not sound or lies beyond `farthest_mm`, where the area has
+  /// more cells than the device holds, or where the device fails: the evidence may then be half
+  /// added, and the builder refuses everything but clear()
   void add(std::span<const Touch> touches);
 
   /// The map of all touches so far. It covers the known elements and the support of the sensor
   /// model around them, no more; each cell is within 1e-3 nats, or a relative 1e-4, of the sum over
   /// all elements, as long as a cell is at most 200 times as wide as the sensor model's spread.
-  /// @throws Error if no element of any touch was In Contact or No Contact.
+  /// @throws Error if no element of any touch was In Contact or No Contact, on the label
+  /// `none_label`, or where the device fails
   OccupancyGrid build(const std::string& label);
 
   /// Forgets all touches, for the next object.
@@ -46,6 +49,7 @@ class MapBuilder {
 
  private:
   struct Impl;
+  Impl& impl() const;
   std::unique_ptr<Impl> impl_;
 };
 

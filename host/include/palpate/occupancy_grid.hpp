@@ -1,7 +1,10 @@
 #pragma once
 
+#include <cstdint>
 #include <optional>
+#include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include <glm/vec2.hpp>
@@ -12,6 +15,22 @@ namespace palpate {
 double log_odds_from_probability(double p);
 /// 1 / (1 + exp(-l)), without overflow.
 double probability_from_log_odds(double l);
+
+/// The label of "none of these", an object that was never learned. No map may bear it, or an
+/// unlearned object would count as recognised where that map is the best.
+inline constexpr std::string_view none_label = "(none)";
+
+/// Shortest and longest edge of a cell and spread of a sensor model, in mm: a nanometre and a
+/// kilometre. Kernels hold both lengths and their squares in float32, and a grid of the shortest
+/// cells at `farthest_mm` still numbers its cells exactly in float64.
+inline constexpr double least_length_mm = 1e-6;
+inline constexpr double most_length_mm = 1e6;
+
+/// Most cells of a map: kernels count them in 32 bits.
+inline constexpr std::int64_t most_cells = std::int64_t{1} << 30;
+
+/// Largest log odds of a cell, in nats: float32 holds sums over 1e8 elements of so much evidence.
+inline constexpr double most_log_odds = 1e30;
 
 /// The map of one object: log odds of occupancy on a regular grid in the object frame. Cell
 /// (row j, column i) is centred at origin_mm + cell_mm * (i, j). Everything beyond the grid holds
@@ -33,5 +52,17 @@ struct OccupancyGrid {
   glm::dvec2 centre_mm(int i, int j) const { return origin_mm + cell_mm * glm::dvec2(i, j); }
   double prior_log_odds() const { return log_odds_from_probability(prior); }
 };
+
+/// What keeps a map from being used, in a sentence that names the field, its value and the remedy;
+/// nothing where the map is sound. A sound map has nx * ny finite log odds within `most_log_odds`,
+/// at most `most_cells` of them; a cell and a spread within the bounds above; centres within
+/// `farthest_mm`; a spread no larger than the grid; a prior between 0 and 1; a symmetry of at least
+/// 0; and a label other than `none_label`. Files, MapBuilder and both filters take no other maps.
+std::optional<std::string> fault_of(const OccupancyGrid& map);
+/// The same for all but the log odds, which the map need not hold yet.
+std::optional<std::string> fault_without_cells(const OccupancyGrid& map);
+/// The same for some of the log odds; `first` is the place of the first among all.
+std::optional<std::string> fault_of_cells(const OccupancyGrid& map, std::size_t first,
+                                          std::span<const float> log_odds);
 
 }  // namespace palpate

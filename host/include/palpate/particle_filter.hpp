@@ -48,7 +48,7 @@ struct ParticleOptions {
 /// never all vanish. Particles are free to leave the region.
 ///
 /// Random numbers are a function of the seed, the touch and the particle, so that the order of
-/// execution is without influence.
+/// execution is without influence. A filter that was moved from throws Error whatever it is asked.
 class ParticleFilter {
  public:
   /// @throws Error as PoseHistogram does, and on a number of particles, a noise or a rate out of
@@ -63,6 +63,9 @@ class ParticleFilter {
   /// @throws Error if the device fails
   void reset();
 
+  /// Moves and weighs the particles by each touch in turn. A touch that is not sound refuses all of
+  /// them, and the particles stay as they were. Where the device fails, they are half-way between
+  /// before and after: all but reset() then throw Error until reset() is called.
   /// @throws Error on a touch that is not sound, or if the device fails
   void update(std::span<const Touch> touches);
   void update(const Touch& touch) { update(std::span(&touch, 1)); }
@@ -95,6 +98,9 @@ class ParticleFilter {
 
  private:
   struct Impl;
+  Impl& impl() const;
+  /// The same, with particles that no update has left half-way.
+  Impl& whole() const;
   std::unique_ptr<Impl> impl_;
 };
 

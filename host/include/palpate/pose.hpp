@@ -4,6 +4,10 @@
 
 namespace palpate {
 
+/// Farthest from its frame's origin, in mm, that a map or a lattice may reach: a thousand
+/// kilometres, where float64 still tells 1e-7 mm apart and squares are far from infinite.
+inline constexpr double farthest_mm = 1e9;
+
 /// A rigid transformation of the plane. Written T_a_b it maps coordinates in frame b to frame a:
 /// p_a = R(theta_rad) p_b + translation_mm.
 struct Pose {

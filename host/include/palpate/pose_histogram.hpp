@@ -43,14 +43,15 @@ struct Marginals {
 
 /// Histogram filter over object identity and planar pose (Sec. III-C, Eq. 13-16): a dense lattice
 /// of poses for every object, kept in logs on the device, in two floats per bin so that accuracy
-/// does not decay with the number of touches. The same input gives the same bits on one device.
+/// does not decay with the number of touches. The same input gives the same bits on one device. A
+/// histogram that was moved from throws Error whatever it is asked.
 class PoseHistogram {
  public:
   /// Uploads the maps and sets a uniform belief. Ties go to the first object and the lowest bin.
-  /// @throws Error on an empty list, a map with no cells or with infinite log odds, maps of
+  /// @throws Error on an empty list, a map that is not sound (see fault_of()), maps of
   /// different priors where none is given, weights that are not positive and finite, a lattice,
-  /// gamma or prior out of range, or more memory than the limit or the device allows, which is said
-  /// before any is taken.
+  /// classifier, gamma or prior out of range, or more memory than the limit or the device allows,
+  /// which is said before any is taken.
   PoseHistogram(Device& device, std::span<const Hypothesis> hypotheses,
                 const HistogramOptions& options);
   ~PoseHistogram();
@@ -61,8 +62,10 @@ class PoseHistogram {
   void reset();
 
   /// Multiplies the belief by the likelihood of these touches (Eq. 7, 13). `progress` is called
-  /// with the fraction done, now and then.
-  /// @throws Error on a touch that is not sound, or if the device fails
+  /// with the fraction done, now and then. A touch that is not sound refuses all of them, and the
+  /// belief stays as it was. Where the device fails or `progress` throws, the belief is half-way
+  /// between before and after: all but reset() then throw Error until reset() is called.
+  /// @throws Error on a touch that is not sound, or if the device fails; what `progress` throws
   void update(std::span<const Touch> touches, const std::function<void(double)>& progress = {});
   void update(const Touch& touch) { update(std::span(&touch, 1)); }
 
@@ -116,6 +119,9 @@ class PoseHistogram {
 
  private:
   struct Impl;
+  Impl& impl() const;
+  /// The same, with a belief that no update has left half-way.
+  Impl& whole() const;
   std::unique_ptr<Impl> impl_;
 };
 

@@ -10,6 +10,9 @@ namespace palpate {
 /// away would still outweigh the prior.
 inline constexpr double least_prior = 1e-6;
 
+/// The smallest peak: a reading of less says nothing.
+inline constexpr double least_peak = 1e-6;
+
 /// The inverse sensor model of Eq. 4-6: how much one element's reading changes the log odds of the
 /// cells around it. The printed equations contradict each other; the consistent reading is
 ///   G'(d) = peak * exp(-d^2 / (2 spread^2)),
@@ -20,8 +23,8 @@ struct InverseSensorModel {
   double peak = 0.9;       ///< at most 0.9999: at 1 a single reading would make a cell certain
   double prior = 0.2;      ///< m
 
-  /// Throws Error unless spread > 0, 0 < peak <= 0.9999 and
-  /// least_prior <= prior <= 1 - least_prior.
+  /// Throws Error unless the spread lies within the bounds of lengths that occupancy_grid.hpp
+  /// gives, least_peak <= peak <= 0.9999 and least_prior <= prior <= 1 - least_prior.
   void validate() const;
   /// Log-odds increment of a cell at this distance from the element's centre, in nats.
   double increment(Reading reading, double distance_mm) const;

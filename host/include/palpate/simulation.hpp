@@ -49,7 +49,8 @@ struct SensorModel {
   double noise_kpa = 0.7;      ///< standard deviation of the additive noise
 };
 
-/// Simulated touches of one shape with one array. The same seed gives the same recording.
+/// Simulated touches of one shape with one array. The same seed gives the same recording. A
+/// simulator that was moved from throws Error when it is asked for touches.
 class Simulator {
  public:
   /// @throws Error on a spread, element or noise out of range.

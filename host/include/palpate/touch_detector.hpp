@@ -53,7 +53,8 @@ struct DetectedTouch {
 /// `onset` in `drift_s`. Lost frames do no harm beyond what
 /// they do to the time a touch is seen; a silence longer than `largest_gap_s`, or a clock that goes
 /// back, ends a touch and begins anew. The memory in use is bounded: of a long steady phase, frames
-/// evenly spread over it are kept.
+/// evenly spread over it are kept. A detector that was moved from throws Error whatever it is
+/// asked.
 class TouchDetector {
  public:
   /// @param baseline [e] what the array reads when nothing is touched, subtracted from every frame;
@@ -84,6 +85,7 @@ class TouchDetector {
 
  private:
   struct Impl;
+  Impl& impl() const;
   std::unique_ptr<Impl> impl_;
 };
 

@@ -1,0 +1,94 @@
+#include "particle_options.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "palpate/error.hpp"
+#include "two_float.hpp"
+
+namespace palpate {
+
+namespace {
+
+constexpr int most_particles = 1'000'000;
+// Beyond, float32 would no longer place a particle to a hundredth of a millimetre.
+constexpr double widest_mm = 100'000.0;
+
+void require(bool sound, const char* name, double value, const char* remedy) {
+  if (!sound) {
+    throw Error(Fault::input, fmt::format("{} = {}: {}", name, value, remedy));
+  }
+}
+
+}  // namespace
+
+shaders::uint in_words(double probability) {
+  return static_cast<shaders::uint>(
+      std::clamp(std::floor(probability * 0x1p32), 0.0, 0x1p32 - 1.0));
+}
+
+void validate(const ParticleOptions& options) {
+  require(options.particles >= 1 && options.particles <= most_particles, "particles",
+          options.particles, "give 1 to 1,000,000");
+  for (const auto& [name, axis] : {std::pair{"region x_mm", options.region.x_mm},
+                                   std::pair{"region y_mm", options.region.y_mm}}) {
+    require(axis.upper - axis.lower <= widest_mm, name, axis.upper - axis.lower,
+            "extends over more than 100 m; give a smaller one");
+  }
+  const auto is_deviation = [](double v) { return v >= 0.0 && v <= 1000.0; };
+  require(is_deviation(options.motion_mm), "motion_mm", options.motion_mm, "give 0 to 1000");
+  require(is_deviation(options.motion_rad), "motion_rad", options.motion_rad, "give 0 to 1000");
+  require(options.alpha_slow > 0.0 && options.alpha_slow < options.alpha_fast, "alpha_slow",
+          options.alpha_slow, "give a rate above 0 and below alpha_fast");
+  require(options.alpha_fast <= 1.0, "alpha_fast", options.alpha_fast, "give at most 1");
+  if (options.none_weight) {
+    require(*options.none_weight > 0.0 && std::isfinite(*options.none_weight), "none_weight",
+            *options.none_weight, "give a positive number");
+  }
+}
+
+void require_room(const ParticleOptions& options, const gpu::Context& context) {
+  // Two generations, log weights in two floats and their running sums.
+  constexpr VkDeviceSize bytes = 2 * sizeof(shaders::Particle) + sizeof(TwoFloat) + sizeof(float);
+  const gpu::Limits& limits = context.limits();
+  const VkDeviceSize most =
+      std::min({VkDeviceSize{limits.table_texels},
+                std::min(limits.storage_range, limits.allocation) / sizeof(shaders::Particle),
+                limits.memory / bytes});
+  if (static_cast<VkDeviceSize>(options.particles) > most) {
+    throw Error(Fault::input, fmt::format("particles = {}: device '{}' takes at most {}; use fewer",
+                                          options.particles, context.name(), most));
+  }
+}
+
+std::vector<shaders::ObjectShare> object_shares(std::span<const Hypothesis> hypotheses,
+                                                const ParticleOptions& options) {
+  std::vector<double> weights;
+  for (const Hypothesis& hypothesis : hypotheses) {
+    weights.push_back(hypothesis.weight);
+  }
+  if (options.none_weight) {
+    weights.push_back(*options.none_weight);
+  }
+  // Relative to the largest, for the sum of the weights themselves may be infinite.
+  const double largest = *std::max_element(weights.begin(), weights.end());
+  double total = 0.0;
+  for (double& weight : weights) {
+    weight /= largest;
+    total += weight;
+  }
+  std::vector<shaders::ObjectShare> shares;
+  double before = 0.0;
+  for (const double weight : weights) {
+    before += weight;
+    shares.push_back({.particle_end = static_cast<shaders::uint>(
+                          std::lround(before / total * options.particles)),
+                      .chance_end = in_words(before / total)});
+  }
+  return shares;
+}
+
+}  // namespace palpate

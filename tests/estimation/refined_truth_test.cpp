@@ -1,0 +1,135 @@
+// The refined pose of beliefs whose peak and covariance are known: whatever way leads there.
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <numbers>
+#include <vector>
+
+#include <gtest/gtest.h>
+#include <glm/geometric.hpp>
+#include <glm/mat3x3.hpp>
+#include <glm/matrix.hpp>
+
+#include "belief.hpp"
+#include "context.hpp"
+#include "palpate/pose.hpp"
+#include "refinement.hpp"
+#include "synthetic.hpp"
+
+namespace palpate {
+namespace {
+
+constexpr double two_pi = 2.0 * std::numbers::pi;
+constexpr double spin_mm = 8.0;  // a radian moves the object by so much
+
+using LogBelief = std::function<double(const glm::dvec3&)>;
+
+/// Refines around the best bin of a belief over x, y and theta.
+RefinedPose refined(Device& device, const PoseLattice& lattice, const glm::dvec2& centroid_mm,
+                    const LogBelief& log_belief) {
+  gpu::Context& context = device.context();
+  gpu::CommandStream stream(context);
+  const Belief belief(context, stream, lattice, 1);
+  std::vector<TwoFloat> bins;
+  std::int64_t best = 0;
+  double most = -std::numeric_limits<double>::infinity();
+  for (std::int64_t bin = 0; bin < lattice.bins(); ++bin) {
+    const Pose pose = lattice.T_object_robot(bin);
+    const glm::dvec2 at = pose * lattice.pivot_mm;
+    const double l = log_belief({at, pose.theta_rad});
+    const auto high = static_cast<float>(l);
+    bins.push_back({high, static_cast<float>(l - high)});
+    if (l > most) {
+      most = l;
+      best = bin;
+    }
+  }
+  stream.upload(belief.slabs().front().log_likelihood, std::span<const TwoFloat>(bins));
+  stream.run();
+  return refine(belief, lattice, 0, {.centroid_mm = centroid_mm, .inertia_mm2 = spin_mm * spin_mm},
+                best);
+}
+
+/// Bins of 0.25 mm, and of as much for the object in theta.
+PoseLattice lattice_from(double theta_rad) {
+  return {.x_mm = {-4.0, 4.0, 32},
+          .y_mm = {-4.0, 4.0, 32},
+          .theta_rad = {theta_rad, theta_rad + two_pi, 201},
+          .pivot_mm = {}};
+}
+
+TEST(RefinedPose, OfAnExactQuadraticIsItsPeakAndItsCovarianceTheInverse) {
+  Device device = Device::open();
+  Uniform random(191);
+  for (int trial = 0; trial < 6; ++trial) {
+    const glm::dvec3 peak(random(-0.5, 0.5), random(-0.5, 0.5), random(0.0, two_pi));
+    // Standard deviations of 0.3 to 0.6 mm along axes that are turned against the lattice's.
+    glm::dmat3 root(1.0);
+    for (int i = 0; i < 3; ++i) {
+      for (int k = 0; k < 3; ++k) {
+        root[i][k] = i == k ? random(0.35, 0.55) : random(-0.12, 0.12);
+      }
+    }
+    const glm::dmat3 covariance_mm2 = root * glm::transpose(root);
+    const glm::dmat3 precision = glm::inverse(covariance_mm2);
+    for (const double from_rad : {0.0, -2.5}) {
+      const PoseLattice lattice = lattice_from(from_rad);
+      const RefinedPose pose =
+          refined(device, lattice, glm::dvec2(peak), [&](const glm::dvec3& at) {
+            const glm::dvec3 d(glm::dvec2(at) - glm::dvec2(peak),
+                               spin_mm * wrap_angle(at.z - peak.z, two_pi));
+            return -0.5 * glm::dot(d, precision * d);
+          });
+      // A turn about the mean also swings the centroid, by the mean's error times the turn.
+      EXPECT_NEAR(pose.T_object_robot.translation_mm.x, peak.x, 1e-3);
+      EXPECT_NEAR(pose.T_object_robot.translation_mm.y, peak.y, 1e-3);
+      EXPECT_NEAR(spin_mm * wrap_angle(pose.T_object_robot.theta_rad - peak.z, two_pi), 0.0, 1e-3);
+      const glm::dvec3 scale(1.0, 1.0, spin_mm);
+      const glm::dvec3 step(lattice.x_mm.step(), lattice.y_mm.step(),
+                            spin_mm * lattice.theta_rad.step());
+      for (int i = 0; i < 3; ++i) {
+        for (int k = 0; k < 3; ++k) {
+          const double of_bin = i == k ? step[i] * step[i] / 12.0 : 0.0;
+          EXPECT_NEAR(pose.covariance[3 * i + k] * scale[i] * scale[k],
+                      covariance_mm2[i][k] + of_bin, 1e-3)
+              << i << ", " << k;
+        }
+      }
+    }
+  }
+}
+
+TEST(RefinedPose, OfAFullCircleLiesOnItWhereverItBegins) {
+  Device device = Device::open();
+  const double step = lattice_from(0.0).theta_rad.step();
+  for (int shift = -16; shift <= 16; ++shift) {
+    // A peak about the seam, steeper to one side, so that mean and peak may lie on two sides of it.
+    const double peak = 0.25 * shift * step;
+    for (const double side : {-1.0, 1.0}) {
+      const auto log_belief = [&](const glm::dvec3& at) {
+        const double turn_mm = spin_mm * wrap_angle(at.z - peak, two_pi);
+        const double sd_mm = side * turn_mm > 0.0 ? 0.15 : 0.6;
+        return -0.5 * (at.x * at.x + at.y * at.y) / 0.16 -
+               0.5 * turn_mm * turn_mm / (sd_mm * sd_mm);
+      };
+      // The same bins, of which the seam is once at the peak and once opposite of it.
+      PoseLattice lattice = lattice_from(0.0);
+      lattice.x_mm = lattice.y_mm = {-1.0, 1.0, 8};
+      PoseLattice turned = lattice;
+      turned.theta_rad.lower -= 100 * step;
+      turned.theta_rad.upper -= 100 * step;
+      const double theta_rad = refined(device, lattice, {}, log_belief).T_object_robot.theta_rad;
+      const double other_rad = refined(device, turned, {}, log_belief).T_object_robot.theta_rad;
+      EXPECT_GE(theta_rad, lattice.theta_rad.lower) << shift;
+      EXPECT_LT(theta_rad, lattice.theta_rad.upper) << shift;
+      EXPECT_GE(other_rad, turned.theta_rad.lower) << shift;
+      EXPECT_LT(other_rad, turned.theta_rad.upper) << shift;
+      EXPECT_NEAR(wrap_angle(theta_rad - other_rad, two_pi), 0.0, 1e-6) << shift;
+      EXPECT_LT(spin_mm * std::abs(wrap_angle(theta_rad - peak, two_pi)), 1.0) << shift;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace palpate

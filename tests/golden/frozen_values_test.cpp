@@ -1,0 +1,272 @@
+// Numbers of every equation, worked out once in float64 apart from the reference and the product:
+// whoever changes both alike is contradicted by them.
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "palpate/map_builder.hpp"
+#include "palpate/particle_filter.hpp"
+#include "palpate/pose_error.hpp"
+#include "palpate/pose_histogram.hpp"
+#include "reference.hpp"
+
+namespace palpate {
+namespace {
+
+constexpr double digits = 1e-9;     // ten digits were written down
+constexpr double per_touch = 1e-4;  // what the method allows a log-likelihood, in nats
+constexpr double map_nats = 1e-3;   // what it allows a map's cell
+constexpr double prior = 0.25;
+constexpr Reading in = Reading::in_contact;
+constexpr Reading no = Reading::no_contact;
+constexpr Reading unknown = Reading::unknown;
+
+OccupancyGrid map_a() {
+  return {
+      .label = "a",
+      .cell_mm = 0.8,
+      .origin_mm = {-1.6, -0.8},
+      .prior = prior,
+      .nx = 4,
+      .ny = 3,
+      .log_odds = {-1.2F, 0.4F, 2.5F, -3.0F, 0.7F, 1.9F, -0.6F, 0.2F, -2.2F, 3.1F, 0.9F, -1.4F}};
+}
+
+OccupancyGrid map_b() {
+  return {
+      .label = "b",
+      .cell_mm = 1.1,
+      .origin_mm = {-1.1, -2.2},
+      .prior = prior,
+      .nx = 3,
+      .ny = 4,
+      .log_odds = {2.0F, -0.5F, 1.3F, -1.7F, 0.8F, -2.4F, 0.3F, -0.9F, 1.6F, 1.1F, 2.7F, -3.3F}};
+}
+
+/// Two touches of six elements; one pressure of the first equals the threshold.
+Recording two_touches() {
+  Recording recording;
+  recording.elements_mm = {{-2.0, 0.5}, {-0.7, -0.4}, {0.0, 0.9},
+                           {0.8, 0.1},  {1.9, -1.0},  {0.4, -1.6}};
+  recording.T_robot_sensor = {{{0.3, -0.2}, 0.4}, {{-0.5, 0.35}, -1.1}};
+  recording.pressure = {0.9, 5.5, 8.0, 2.0, 1.1, 3.0, 6.0, 0.2, 2.4, 1.0, 7.5, 1.8};
+  return recording;
+}
+
+HistogramOptions options() {
+  return {.lattice = {.x_mm = {-1.5, 1.5, 3},
+                      .y_mm = {-1.0, 2.0, 2},
+                      .theta_rad = {0.2, 6.2, 4},
+                      .pivot_mm = {0.5, -0.25}},
+          .classifier = {},
+          .gamma = 0.15,
+          .prior = prior,
+          .none_weight = 0.7};
+}
+
+const std::vector<Hypothesis>& objects() {
+  static const std::vector<Hypothesis> two{{map_a(), 1.0}, {map_b(), 2.0}};
+  return two;
+}
+
+struct Bin {
+  std::size_t index;
+  double log_likelihood;
+};
+constexpr Bin bins_of_a[] = {{0, -9.083368813},
+                             {5, -14.49486755},
+                             {11, -9.341436846},
+                             {16, -11.25736094},
+                             {23, -8.399947675}};
+constexpr Bin bins_of_b[] = {{0, -9.965924152},
+                             {5, -9.026854481},
+                             {11, -8.458265976},
+                             {16, -11.06022232},
+                             {23, -7.657319003}};
+
+TEST(FrozenValues, OfTheContactClassifier) {
+  const Recording recording = two_touches();
+  const std::vector<std::vector<Reading>> expected{{no, in, in, unknown, no, in},
+                                                   {in, no, in, no, in, no}};
+  for (const std::size_t touch : {0U, 1U}) {
+    EXPECT_EQ(ContactClassifier{}.classify(recording.touch(touch)), expected[touch]);
+    EXPECT_EQ(reference::classify(recording.touch(touch), {}), expected[touch]);
+  }
+}
+
+TEST(FrozenValues, OfTheInverseSensorModel) {
+  struct Increment {
+    double peak, prior;
+    Reading reading;
+    double distance_mm, nats;
+  };
+  for (const auto& [peak, m, reading, distance_mm, nats] :
+       {Increment{0.8, 0.25, in, 0.0, 2.833213344}, Increment{0.8, 0.25, in, 0.3, 2.36135647},
+        Increment{0.8, 0.25, in, 1.7, 0.05699370597}, Increment{0.8, 0.25, no, 0.0, -1.84582669},
+        Increment{0.8, 0.25, no, 0.3, -1.435507254}, Increment{0.8, 0.25, no, 1.7, -0.01936107467},
+        Increment{0.9, 0.04, in, 0.0, 5.420534999}, Increment{0.9, 0.04, in, 0.3, 4.579904034},
+        Increment{0.9, 0.04, in, 1.7, 0.3458099346}, Increment{0.9, 0.04, no, 0.0, -2.339399066},
+        Increment{0.9, 0.04, no, 0.3, -1.613637719},
+        Increment{0.9, 0.04, no, 1.7, -0.01706743592}}) {
+    const InverseSensorModel sensor{.spread_mm = 0.6, .peak = peak, .prior = m};
+    EXPECT_NEAR(sensor.increment(reading, distance_mm), nats, digits);
+    EXPECT_NEAR(reference::increment(reading, distance_mm, sensor), nats, digits);
+  }
+  EXPECT_EQ(InverseSensorModel{}.increment(unknown, 0.3), 0.0);
+  EXPECT_EQ(reference::increment(unknown, 0.3, {}), 0.0);
+}
+
+TEST(FrozenValues, OfTheLikelihood) {
+  struct Likelihood {
+    double gamma;
+    Reading reading;
+    double log_odds, nats;
+  };
+  for (const auto& [gamma, reading, log_odds, nats] :
+       {Likelihood{0.15, in, -3.0, -2.553459718}, Likelihood{0.15, in, 0.5, -0.5681185793},
+        Likelihood{0.15, in, 7.0, -0.1202196946}, Likelihood{0.15, no, -3.0, -0.1658326399},
+        Likelihood{0.15, no, 0.5, -1.0260789}, Likelihood{0.15, no, 7.0, -3.262974183},
+        Likelihood{0.0, in, -3.0, -3.048587352}, Likelihood{0.0, in, 0.5, -0.4740769842},
+        Likelihood{0.0, in, 7.0, -0.0009114664538}, Likelihood{0.0, no, -3.0, -0.04858735157},
+        Likelihood{0.0, no, 0.5, -0.9740769842}, Likelihood{0.0, no, 7.0, -7.000911466}}) {
+    const ContactLikelihood model{.gamma = gamma, .prior = prior};
+    EXPECT_NEAR(model.log_likelihood(reading, log_odds), nats, digits);
+    EXPECT_NEAR(reference::log_likelihood(reading, log_odds, model), nats, digits);
+  }
+  EXPECT_EQ(ContactLikelihood{}.log_likelihood(unknown, 2.0), 0.0);
+  EXPECT_EQ(reference::log_likelihood(unknown, 2.0, ContactLikelihood{}), 0.0);
+}
+
+TEST(FrozenValues, OfAMap) {
+  const Recording recording = two_touches();
+  const std::vector<Touch> touches = recording.touches(0, 2);
+  const MapOptions wanted{.cell_mm = 0.5, .sensor = {.prior = prior}};
+  Device device = Device::open();
+  MapBuilder builder(device, wanted);
+  builder.add(touches);
+  const OccupancyGrid map = builder.build("frozen");
+  const std::vector<double> expected =
+      reference::log_odds_map(touches, map, wanted.classifier, wanted.sensor);
+  struct Cell {
+    glm::dvec2 at_mm;
+    double log_odds;
+  };
+  for (const auto& [at_mm, log_odds] :
+       {Cell{{0.0, 0.0}, 0.1763145528}, Cell{{0.5, -0.5}, -0.5117576034},
+        Cell{{-1.0, 0.5}, -2.040433441}, Cell{{1.0, 1.0}, 0.1839702588},
+        Cell{{1.5, -1.0}, 0.365499858}}) {
+    const int i = static_cast<int>(std::lround((at_mm.x - map.origin_mm.x) / map.cell_mm));
+    const int j = static_cast<int>(std::lround((at_mm.y - map.origin_mm.y) / map.cell_mm));
+    EXPECT_NEAR(map.at(i, j), log_odds, map_nats);
+    EXPECT_NEAR(expected[static_cast<std::size_t>(j) * map.nx + i], log_odds, digits);
+  }
+}
+
+TEST(FrozenValues, OfTheHistogramFilter) {
+  const Recording recording = two_touches();
+  const std::vector<Touch> touches = recording.touches(0, 2);
+  const HistogramOptions wanted = options();
+  Device device = Device::open();
+  PoseHistogram histogram(device, objects(), wanted);
+  histogram.update(touches);
+  reference::Posterior posterior{.lattice = wanted.lattice, .log_likelihood = {}, .weight = {1, 2}};
+  for (const Hypothesis& object : objects()) {
+    posterior.log_likelihood.push_back(
+        reference::log_likelihoods(touches, wanted.lattice, object.map, wanted.classifier,
+                                   {.gamma = wanted.gamma, .prior = prior}));
+  }
+  for (const int object : {0, 1}) {
+    const std::vector<double> logs = histogram.log_likelihood(object);
+    for (const auto& [index, log_likelihood] : object == 0 ? bins_of_a : bins_of_b) {
+      EXPECT_NEAR(logs[index], log_likelihood, 2 * per_touch) << object << ", bin " << index;
+      // Maps hold float32.
+      EXPECT_NEAR(posterior.log_likelihood[object][index], log_likelihood, 1e-6);
+    }
+  }
+
+  // Two touches of that error change a probability by as much.
+  constexpr double probability = 4 * per_touch;
+  const Estimate estimate = histogram.estimate();
+  const std::vector<double> identity{0.284034994, 0.6533834248};
+  constexpr double none = 0.0625815812;
+  const std::vector<double> reference_identity = reference::identity(posterior);
+  for (const std::size_t object : {0U, 1U}) {
+    EXPECT_NEAR(estimate.identity[object], identity[object], probability);
+    EXPECT_NEAR(reference_identity[object], identity[object] / (1.0 - none), 1e-6);
+  }
+  EXPECT_NEAR(estimate.none, none, probability);
+  EXPECT_EQ(estimate.mode.object, 1);
+  EXPECT_EQ(estimate.mode.bin, 13);
+  EXPECT_NEAR(estimate.mode.log_likelihood, -7.56164965, 2 * per_touch);
+  EXPECT_EQ(reference::mode(posterior).object, 1);
+  EXPECT_EQ(reference::mode(posterior).bin, 13);
+
+  const std::vector<std::vector<double>> xy{
+      {0.07921338948, 0.0639638403, 0.02174207363, 0.05025344905, 0.03290101176, 0.03596122975},
+      {0.09368525665, 0.2133591975, 0.01604106401, 0.1058700148, 0.03696500113, 0.1874628908}};
+  const std::vector<std::vector<double>> theta{
+      {0.06630780513, 0.0713995075, 0.05637804064, 0.0899496407},
+      {0.1085772397, 0.1489954046, 0.2027864368, 0.1930243437}};
+  for (const int object : {0, 1}) {
+    const Marginals marginals = histogram.marginals(object);
+    const std::vector<double> reference_xy = reference::marginal_xy(posterior, object);
+    const std::vector<double> reference_theta = reference::marginal_theta(posterior, object);
+    for (std::size_t k = 0; k < 6; ++k) {
+      EXPECT_NEAR(marginals.xy[k], xy[object][k], probability);
+      EXPECT_NEAR(reference_xy[k] * (1.0 - none), xy[object][k], 1e-6);
+    }
+    for (std::size_t k = 0; k < 4; ++k) {
+      EXPECT_NEAR(marginals.theta[k], theta[object][k], probability);
+      EXPECT_NEAR(reference_theta[k] * (1.0 - none), theta[object][k], 1e-6);
+    }
+  }
+}
+
+TEST(FrozenValues, OfParticlesAtOnePose) {
+  // All at one pose, which no noise moves: a third of them of the first object.
+  const ParticleOptions wanted{
+      .particles = 3000,
+      .region = {.x_mm = {0.1, 0.1, 1}, .y_mm = {0.2, 0.2, 1}, .theta_rad = {0.7, 0.7, 1}},
+      .classifier = {},
+      .gamma = 0.15,
+      .prior = prior,
+      .motion_mm = 0.0,
+      .motion_rad = 0.0};
+  const Recording recording = two_touches();
+  Device device = Device::open();
+  ParticleFilter filter(device, objects(), wanted);
+  filter.update(recording.touch(0));
+  const std::vector<double> identity = filter.estimate().identity;
+  EXPECT_NEAR(identity[0], 0.262529213, 2 * per_touch);
+  EXPECT_NEAR(identity[1], 0.737470787, 2 * per_touch);
+  EXPECT_NEAR(filter.effective_sample_size() / 2933.814593, 1.0, 4 * per_touch);
+  const double logs[] = {-3.72808242, -3.388365487};
+  for (const std::size_t object : {0U, 1U}) {
+    EXPECT_NEAR(
+        reference::log_likelihood(recording.touch(0), {{0.1, 0.2}, 0.7}, objects()[object].map, {},
+                                  {.gamma = 0.15, .prior = prior}),
+        logs[object], 1e-6);
+  }
+}
+
+TEST(FrozenValues, OfThePoseError) {
+  OccupancyGrid map = map_a();
+  const Body body = body_of(map);
+  EXPECT_NEAR(body.inertia_mm2, 0.8881632653, digits);
+  EXPECT_NEAR(body.centroid_mm.x, -0.4571428571, digits);
+  EXPECT_NEAR(body.centroid_mm.y, 0.0, digits);
+  const Pose estimate{{0.5, -0.3}, 2.9};
+  const Pose truth{{-0.2, 0.4}, -0.5};
+  for (const auto& [symmetry, error_mm] : {std::pair(1, 2.175934927), std::pair(2, 1.140172902),
+                                           std::pair(3, 1.328743313), std::pair(0, 1.114009423)}) {
+    EXPECT_NEAR(pose_error_mm(body, symmetry, estimate, truth), error_mm, digits);
+    map.symmetry = symmetry;
+    EXPECT_NEAR(reference::pose_error_mm(map, estimate, truth), error_mm, digits);
+  }
+}
+
+}  // namespace
+}  // namespace palpate

@@ -1,0 +1,121 @@
+#include <cmath>
+#include <limits>
+
+#include <gtest/gtest.h>
+
+#include "hard_case.hpp"
+#include "palpate/balanced_lattice.hpp"
+#include "palpate/particle_filter.hpp"
+
+namespace palpate {
+namespace {
+
+constexpr double most_finite = std::numeric_limits<double>::max();
+
+bool is_finite(const Pose& pose) {
+  return all_finite(std::vector{pose.translation_mm.x, pose.translation_mm.y, pose.theta_rad});
+}
+
+/// Runs both filters and expects all that they say to be finite.
+void expect_numbers(Device& device, std::span<const Hypothesis> objects, const PoseLattice& lattice,
+                    std::span<const Touch> touches) {
+  PoseHistogram histogram(device, objects, {.lattice = lattice, .none_weight = 1.0});
+  histogram.update(touches);
+  const Estimate estimate = histogram.estimate();
+  EXPECT_TRUE(all_finite(estimate.identity));
+  EXPECT_NEAR(total(estimate.identity) + estimate.none, 1.0, 1e-12);
+  EXPECT_TRUE(is_finite(estimate.mode.T_object_robot));
+  EXPECT_TRUE(all_finite(std::vector{estimate.mode.log_likelihood, estimate.none}));
+  const RefinedPose refined = histogram.refine(estimate.mode);
+  EXPECT_TRUE(is_finite(refined.T_object_robot));
+  EXPECT_TRUE(all_finite(refined.covariance));
+  for (std::size_t object = 0; object < objects.size(); ++object) {
+    EXPECT_TRUE(all_finite(histogram.log_likelihood(static_cast<int>(object))));
+    EXPECT_TRUE(all_finite(histogram.marginals(static_cast<int>(object)).xy));
+  }
+  EXPECT_GE(balanced_lattice(lattice, objects, 10'000).lattice.bins(), 1);
+
+  ParticleOptions options{.particles = 200, .region = lattice, .classifier = {}};
+  options.region.x_mm.upper = std::min(lattice.x_mm.upper, lattice.x_mm.lower + 1e5);
+  options.region.y_mm.upper = std::min(lattice.y_mm.upper, lattice.y_mm.lower + 1e5);
+  ParticleFilter filter(device, objects, options);
+  filter.update(touches);
+  const Estimate of_particles = filter.estimate();
+  EXPECT_TRUE(all_finite(of_particles.identity));
+  EXPECT_NEAR(total(of_particles.identity), 1.0, 1e-9);
+  EXPECT_TRUE(is_finite(of_particles.mode.T_object_robot));
+}
+
+TEST(Bounds, OfMapsLatticesAndTouchesLeaveNumbers) {
+  Device device = Device::open();
+  const Recording usual = random_recording(2, 36, 521);
+  Recording far = usual;
+  far.T_robot_sensor[0].translation_mm = {most_finite, -most_finite};
+  far.T_robot_sensor[1] = {{1e300, 1e300}, 1e300};
+  far.elements_mm[3] = {most_finite, most_finite};
+  for (const double cell_mm : {least_length_mm, 0.5, most_length_mm}) {
+    for (const double origin_mm : {-farthest_mm, 0.0}) {
+      SCOPED_TRACE(::testing::Message() << cell_mm << " mm, from " << origin_mm << " mm");
+      std::vector<Hypothesis> objects{{random_map(9, 7, 0.5, 12.0, 522), 1.0},
+                                      {random_map(9, 7, 0.5, 12.0, 523), 1e-300}};
+      for (Hypothesis& object : objects) {
+        object.map.cell_mm = cell_mm;
+        object.map.origin_mm = {origin_mm, origin_mm};
+        object.map.log_odds[5] = 1e30F;
+        object.map.log_odds[6] = -1e30F;
+      }
+      for (const PoseLattice& lattice :
+           {PoseLattice{{-3, 3, 4}, {-3, 3, 3}, {0, 6, 3}, {}},
+            PoseLattice{{-1e9, 1e9, 5}, {-1e9, 1e9, 3}, {-1e9, 1e9, 3}, {1e9, -1e9}}}) {
+        expect_numbers(device, objects, lattice, all_touches(usual));
+        expect_numbers(device, objects, lattice, all_touches(far));
+      }
+    }
+  }
+}
+
+TEST(Bounds, WhatLiesBeyondThemOnBothSidesDoesNotMeet) {
+  HardCase hard("an element and a lattice that are both further away than cells are counted",
+                "both are clamped to the same bound, and meet in the middle of the map",
+                "beyond 2^29 cells they stand for places that never meet: the prior's likelihood");
+  Hypothesis object{random_map(21, 21, 0.5, 12.0, 524), 1.0};
+  object.map.cell_mm = 1e-3;
+  object.map.origin_mm = {-0.01, -0.01};
+  Recording recording = random_recording(1, 36, 525);
+  recording.T_robot_sensor[0] = {{3e6, 0.0}, 0.0};
+  Device device = Device::open();
+  // The object would lie at -1e6 mm, and the touch is 2e6 mm off it: 1e9 cells and more.
+  HistogramOptions options;
+  options.lattice = {.x_mm = {-1e6, -1e6, 1}, .y_mm = {0.0, 0.0, 1}, .theta_rad = {0.0, 0.0, 1}};
+  PoseHistogram histogram(device, std::span(&object, 1), options);
+  histogram.update(recording.touch(0));
+  const double by_prior =
+      reference_posterior(std::span(&object, 1), options, all_touches(recording))
+          .log_likelihood[0][0];
+  hard.expect("log-likelihood, nats", std::abs(histogram.log_likelihood(0)[0] - by_prior), 1e-4);
+
+  // Particles count elements to 2^20 cells, 524.288 mm of these. All of them are at one pose.
+  object.map.origin_mm = {-0.01, -0.01};
+  recording.T_robot_sensor[0] = {{530.0, 0.0}, 0.0};
+  const OccupancyGrid other = random_map(21, 21, 0.5, 12.0, 526);
+  std::vector<Hypothesis> objects{object, {other, 1.0}};
+  objects[1].map.cell_mm = 1e-3;
+  objects[1].map.origin_mm = {-0.01, -0.01};
+  ParticleFilter filter(device, objects,
+                        {.particles = 1000,
+                         .region = {.x_mm = {-524.288, -524.288, 1},
+                                    .y_mm = {0.0, 0.0, 1},
+                                    .theta_rad = {0.0, 0.0, 1}},
+                         .classifier = {},
+                         .motion_mm = 0.0,
+                         .motion_rad = 0.0});
+  for (glm::dvec2& element : recording.elements_mm) {
+    element *= 0.001;
+  }
+  filter.update(recording.touch(0));
+  const Estimate estimate = filter.estimate();
+  hard.expect("identity of particles off the map", std::abs(estimate.identity[0] - 0.5), 1e-5);
+}
+
+}  // namespace
+}  // namespace palpate
