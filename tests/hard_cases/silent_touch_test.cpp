@@ -91,7 +91,7 @@ TEST(SilentTouch, EveryElementAtTheThreshold) {
 TEST(SilentTouch, EntirelyOffTheMap) {
   HardCase hard("touches entirely off the map, by 40 to 1e300 mm",
                 "indices overflow, and bins that are alike differ by rounding",
-                "cells are clamped to +-2^29 into the border of prior: equal bits in every bin");
+                "places beyond 2^29 cells count as off every map: equal bits in every bin");
   const std::vector<Hypothesis> objects{{random_map(31, 27, 0.5, 6.0, 426), 1.0},
                                         {random_map(25, 25, 0.5, 6.0, 427), 1.0}};
   Device device = Device::open();
