@@ -90,13 +90,8 @@ std::optional<Pose> PoseTrack::at(double time_s) const {
   }
   const double part = (time_s - earlier_s) / (later_s - earlier_s);
   constexpr double turn_rad = 2.0 * std::numbers::pi;
-  const Pose pose{
-      earlier.translation_mm + part * (later.translation_mm - earlier.translation_mm),
-      earlier.theta_rad + part * wrap_angle(later.theta_rad - earlier.theta_rad, turn_rad)};
-  // The difference of two numbers of 1e308 is none.
-  const bool finite = std::isfinite(pose.translation_mm.x) &&
-                      std::isfinite(pose.translation_mm.y) && std::isfinite(pose.theta_rad);
-  return finite ? std::optional(pose) : std::nullopt;
+  return Pose{earlier.translation_mm + part * (later.translation_mm - earlier.translation_mm),
+              earlier.theta_rad + part * wrap_angle(later.theta_rad - earlier.theta_rad, turn_rad)};
 }
 
 std::optional<double> PoseTrack::last_s() const {

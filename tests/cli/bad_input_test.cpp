@@ -189,9 +189,11 @@ INSTANTIATE_TEST_SUITE_P(
                  [](auto& file) {
                    file.dataset("log_odds", {2, 3}, nan);
                  },
-                 {"'log_odds'[0, 0] = nan", "store finite"}),
+                 {"'log_odds'[0, 0] = nan", "give finite numbers"}),
         map_with("zero_cell", [](auto& file) { file.attribute("cell_mm", 0.0); },
-                 {"'cell_mm' = 0", "make it positive"}),
+                 {"'cell_mm' = 0", "give 1e-06 to 1e+06 mm"}),
+        map_with("label_of_none", [](auto& file) { file.attribute("label", "(none)"); },
+                 {"'label' = '(none)'", "choose another"}),
         map_with("certain_prior", [](auto& file) { file.attribute("prior", 1.0); },
                  {"'prior' = 1", "between 0 and 1"}),
         map_with("other_prior", [](auto& file) { file.attribute("prior", 0.4); },

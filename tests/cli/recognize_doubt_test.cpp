@@ -80,14 +80,6 @@ TEST_F(RecognizeDoubt, NoneForAnObjectThatWasLearnedIsWrong) {
   EXPECT_EQ(r["right"], false);
 }
 
-TEST_F(RecognizeDoubt, AMapThatIsLabelledLikeNoneIsRefused) {
-  OccupancyGrid map = sample_map("A");
-  map.label = "(none)";
-  write_map(folder_ / "n.map.h5", map);
-  expect_refused({"recognize", "a.h5", "--maps", "n.map.h5", "--none", "1"},
-                 {"--none", "(none)", "label it otherwise"});
-}
-
 TEST_F(RecognizeDoubt, ContradictedTouchesAreSaidToBeSo) {
   write_sure_map();
   const std::vector<std::string> call{"o.h5", "--maps", "sure.map.h5", "--gamma", "0"};

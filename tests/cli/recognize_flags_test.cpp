@@ -197,7 +197,7 @@ TEST_F(RecognizeFlags, MoreBinsThanTheDeviceHoldsLeaveNothing) {
   const Outcome outcome =
       palpate({"recognize", "u.h5", "--maps", "maps", "--bins", "2000000000x2000000000x2000000000",
                "--json", "r.json", "--png", "sheets"});
-  EXPECT_EQ(outcome.status, 1) << "not wrong, but too much for this machine";
+  EXPECT_EQ(outcome.status, 2) << "the number is the user's";
   EXPECT_EQ(std::count(outcome.err.begin(), outcome.err.end(), '\n'), 1) << outcome.err;
   expect_named(outcome.err, {"bins", "use fewer"});
   EXPECT_TRUE(content_of(folder_.path()) == before) << "the folder has changed";

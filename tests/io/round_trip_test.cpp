@@ -270,12 +270,14 @@ TEST_F(RoundTrip, Posterior) {
   expect_both_outcomes();
 }
 
-// What a stored frame is read back as: what is no pose and no time of a device is unknown.
+// What a stored frame is read back as: what is no pose, no time of a device and no reading of an
+// element that is alive is unknown.
 void expect_stored(const Recording& read, std::size_t i, const Frame& frame, std::size_t e) {
   EXPECT_EQ(read.time_s[i], frame.host_time_s);
   for (std::size_t k = 0; k < e; ++k) {
-    const auto narrow = static_cast<float>(frame.values[k]);
-    EXPECT_TRUE(same(read.pressure[i * e + k], narrow));
+    const bool alive = read.valid.empty() || read.valid[k] != 0;
+    const double kept = alive && !is_known(frame.values[k]) ? nan : frame.values[k];
+    EXPECT_TRUE(same(read.pressure[i * e + k], static_cast<float>(kept)));
   }
   const bool posed = frame.T_robot_sensor && is_finite(*frame.T_robot_sensor);
   EXPECT_TRUE(same(read.T_robot_sensor[i], posed ? *frame.T_robot_sensor : Pose{{nan, nan}, nan}));

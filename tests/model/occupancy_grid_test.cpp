@@ -75,7 +75,7 @@ TEST(FaultOfAMap, NamesCellsThatDoNotAgreeOrAreTooMany) {
   expect_fault([](OccupancyGrid& m) { m.nx = m.ny = -1; }, "-1 x -1 cells");
   expect_fault([](OccupancyGrid& m) { m.log_odds.clear(); }, "but 0 log odds");
   expect_fault([](OccupancyGrid& m) { m.nx = m.ny = std::numeric_limits<int>::max(); },
-               "use at most 1073741824");
+               "at most 1073741824");
 }
 
 }  // namespace
