@@ -71,6 +71,9 @@ TEST_P(KernelSizes, OfMapsAndLikelihoodsFitTheDevice) {
   const std::uint32_t edge = shaders::TILE_CELLS / block;
   EXPECT_LE(edge, std::min(limits.group_size[0], limits.group_size[1]));
   expect_workgroup(edge * edge);
+  if (block < 4) {
+    EXPECT_LT(edge / 2 * (edge / 2), limits.subgroup) << "no larger than the subgroup asks for";
+  }
   expect_workgroup(independent_lanes(limits));
 }
 

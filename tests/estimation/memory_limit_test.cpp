@@ -3,7 +3,10 @@
 
 #include <gtest/gtest.h>
 
+#include "belief.hpp"
 #include "context.hpp"
+#include "dense_likelihood.hpp"
+#include "kernel_sizes.hpp"
 #include "palpate/error.hpp"
 #include "palpate/pose_histogram.hpp"
 #include "synthetic.hpp"
@@ -24,6 +27,23 @@ HistogramOptions options_of(int x, int y, int theta, bool still) {
                      .theta_rad = {0.0, 2.0 * std::numbers::pi, theta}};
   options.still_array = still;
   return options;
+}
+
+TEST(Batches, TakeAsLongAsARunMay) {
+  Device device = Device::open();
+  const gpu::Context& context = device.context();
+  for (const int bins : {10, 40, 120, 200}) {
+    const PoseLattice lattice = options_of(bins, bins, bins, false).lattice;
+    std::int64_t largest = 0;
+    for (const SlabExtent& slab : Belief::cut(context, lattice, 5)) {
+      largest = std::max(largest, slab.object_count * slab.bins());
+    }
+    const auto elements = static_cast<double>(DenseLikelihood::batch_for(context, lattice, 5));
+    EXPECT_GE(elements, 8.0);
+    EXPECT_LE(elements * static_cast<double>(largest),
+              std::max(16.0 * static_cast<double>(largest), work_per_run(context.limits())))
+        << bins << " bins along each axis";
+  }
 }
 
 /// All that a histogram tells, and the most memory that it took on the way.

@@ -207,6 +207,39 @@ double prior_over_best(const ParticleFilter& filter, const Touch& touch,
              : 0.0;
 }
 
+TEST(NoneOfThese, WeighsParticlesByThePriorWhateverTheCellsOfTheMaps) {
+  const Recording recording = random_recording(1, 36, 161);
+  Device device = Device::open();
+  for (const double cell_mm : {0.5, 1.3}) {
+    const std::vector<Hypothesis> objects{{random_map(21, 23, cell_mm, 1.0, 162), 1.0}};
+    ParticleOptions options{.particles = 600, .region = {}};
+    options.none_weight = 1.0;
+    ParticleFilter filter(device, objects, options);
+    const Touch touch = recording.touch(0);
+    filter.update(touch);
+    std::vector<double> expected;
+    std::vector<double> weights;
+    double total = 0.0;
+    int none = 0;
+    for (const ParticleFilter::Particle& particle : filter.particles()) {
+      const bool is_none = particle.object == 1;
+      none += is_none ? 1 : 0;
+      const OccupancyGrid unseen{
+          .nx = 1, .ny = 1, .log_odds = {static_cast<float>(objects[0].map.prior_log_odds())}};
+      expected.push_back(std::exp(reference::log_likelihood(
+          touch, particle.T_object_robot, is_none ? unseen : objects[0].map, options.classifier,
+          {.gamma = options.gamma, .prior = objects[0].map.prior})));
+      weights.push_back(particle.weight);
+      total += expected.back();
+    }
+    EXPECT_GT(none, 200) << "half of the particles begin there";
+    for (std::size_t i = 0; i < weights.size(); ++i) {
+      // 1e-4 nats on either side.
+      EXPECT_NEAR(weights[i], expected[i] / total, 2e-4 * expected[i] / total);
+    }
+  }
+}
+
 TEST(Contradiction, IsSaidByParticlesWhereTheReferenceSaysSo) {
   Device device = Device::open();
   const Recording recording = random_recording(8, 36, 158);

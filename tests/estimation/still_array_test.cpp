@@ -72,6 +72,16 @@ TEST(StillArray, GivesTheSameBitsForAPressWhateverCameBefore) {
   }
 }
 
+TEST(StillArray, TellsItsProgressAfterEveryTouch) {
+  const Recording recording = presses(4, 60);
+  Device device = Device::open();
+  PoseHistogram histogram(device, objects(), options_of(true, 0.1, 0.1));
+  std::vector<double> told;
+  histogram.update(all_touches(recording), [&](double fraction) { told.push_back(fraction); });
+  // An array that may move has so few elements evaluated at once.
+  EXPECT_EQ(told, (std::vector<double>{0.25, 0.5, 0.75, 1.0}));
+}
+
 TEST(StillArray, WhoseElementsMoveIsEvaluatedAnew) {
   constexpr std::size_t elements = 60;
   Recording recording = presses(4, elements);

@@ -16,7 +16,7 @@ std::vector<shaders::WeightBlock> random_blocks(std::size_t count, std::uint64_t
   for (std::size_t i = 0; i < count; ++i) {
     const auto sum = static_cast<float>(random(1.0, 1024.0));
     blocks.push_back({.max_high = static_cast<float>(random(-1000.0, -990.0)),
-                      .max_low = 1e-5F,
+                      .max_low = static_cast<float>(random(-3e-5, 3e-5)),
                       .sum = sum,
                       .sum_squares = sum * static_cast<float>(random(0.1, 1.0))});
   }
