@@ -163,10 +163,11 @@ void add_info(CLI::App& app) {
   };
   const auto options = std::make_shared<Options>();
   command->add_option("FILE", options->path, "HDF5 file")->required();
-  command->add_flag("--close", options->close,
-                    "First close a recording that was cut off, in its place, so that programs "
-                    "other than Palpate open it (h5py needs swmr=True before). Its whole rows are "
-                    "kept. One that is being recorded is refused");
+  command->add_flag(
+      "--close", options->close,
+      "First close a recording that was cut off: the file itself is changed, keeps all "
+      "its whole rows, and opens in other programs as well (h5py opens it only with "
+      "swmr=True before). A recording that is still being made is refused");
   command->callback([options] { print_info(options->path, options->close); });
 }
 
