@@ -38,9 +38,8 @@ bool append(const DetectedTouch& touch, Recording& recording) {
 
 /// Leaves one list of dead elements, or none, where the same are dead in every touch.
 void shorten_valid(Recording& recording, const std::vector<std::uint8_t>& dead) {
-  const std::size_t e = recording.elements();
   const auto is_usual = [&](std::size_t k) {
-    return (recording.valid[k] != 0) == (dead.empty() || dead[k % e] != 0);
+    return (recording.valid[k] != 0) == (dead.empty() || dead[k % dead.size()] != 0);
   };
   for (std::size_t k = 0; k < recording.valid.size(); ++k) {
     if (!is_usual(k)) {
