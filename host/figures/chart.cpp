@@ -108,9 +108,10 @@ struct Legend {
   void draw(Canvas& canvas, glm::dvec2 corner) const {
     for (std::size_t i = 0; i < entries.size(); ++i) {
       const ChartSeries& series = *entries[i];
-      const glm::dvec2 left =
-          corner + glm::dvec2(column_px * static_cast<double>(i % columns),
-                              row_px * (static_cast<double>(i / columns) + 0.5));
+      const std::size_t row = i / columns;
+      const std::size_t column = i % columns;
+      const glm::dvec2 left = corner + glm::dvec2(column_px * static_cast<double>(column),
+                                                  row_px * (static_cast<double>(row) + 0.5));
       const glm::dvec2 right = left + glm::dvec2(sample_px, 0.0);
       if (series.line != Line::none) {
         canvas.line(std::array{left, right}, pen_of(series));
