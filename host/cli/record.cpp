@@ -89,7 +89,6 @@ class RecordingUnderWay {
   void add(const Frame& frame) {
     recorder_->add(frame);
     time_.advance(frame.host_time_s);
-    posed_ += frame.T_robot_sensor ? 1 : 0;
     if (taring()) {
       first_.push_back(frame);
       if (time_.elapsed_s() >= tare_s_) {
@@ -118,7 +117,7 @@ class RecordingUnderWay {
     if (frames > 1 && seconds > 0.0) {
       fmt::print(", {:.1f} Hz", static_cast<double>(frames - 1) / seconds);
     }
-    fmt::print(", {} lost, {} with a pose", recorder_->lost(), posed_);
+    fmt::print(", {} lost, {} with a pose", recorder_->lost(), recorder_->with_pose());
     if (recorder_->unknown_readings() > 0) {
       fmt::print(", {} readings unknown", recorder_->unknown_readings());
     }
@@ -160,7 +159,6 @@ class RecordingUnderWay {
   double tare_s_;
   std::vector<Frame> first_;  ///< of the tare
   StreamTime time_;
-  std::uint64_t posed_ = 0;
   std::optional<OlderFile> older_;  ///< until the tare is known to be good
   std::optional<FrameRecorder> recorder_;
 };
@@ -236,7 +234,8 @@ void add_record(CLI::App& app) {
   command
       ->add_option("--tare", options->tare_s,
                    "The array's baseline is read from the first seconds, when nothing touches it; "
-                   "they are recorded, too. 0: none")
+                   "they are recorded, too. Where the array is touched then, or an element has no "
+                   "known reading, there is no recording and an older file stays. 0: none")
       ->capture_default_str();
   command->add_option("--object", options->object, "Label of the object that is touched");
   command->callback([options] { record(*options); });

@@ -15,6 +15,7 @@
 #include "hdf5_failure.hpp"
 #include "hdf5_writer.hpp"
 #include "input_file.hpp"
+#include "lost_count.hpp"
 #include "palpate/error.hpp"
 #include "printable.hpp"
 #include "recording_rules.hpp"
@@ -61,11 +62,6 @@ Recording head_of(const SensorDescription& sensor) {
   return head;
 }
 
-// What is added to a count of frames that a board may have made up.
-void count_lost(std::uint64_t& count, std::uint64_t more) {
-  count = more < largest_count - count ? count + more : largest_count;
-}
-
 }  // namespace
 
 struct FrameRecorder::Impl {
@@ -74,7 +70,6 @@ struct FrameRecorder::Impl {
 
   bool alive(std::size_t element) const { return sensor.valid.empty() || sensor.valid[element]; }
   void require_recordable() const;
-  bool readable(const Frame& frame) const;
   bool due() const;
   void save();
   void create();
@@ -97,6 +92,7 @@ struct FrameRecorder::Impl {
   std::uint64_t lost = 0;
   std::uint64_t lost_since = 0;  // with the next frame
   std::uint64_t unreadable = 0;
+  std::uint64_t with_pose = 0;
   std::uint64_t unknown_readings = 0;
 
   // Open from the first save on.
@@ -119,17 +115,6 @@ void FrameRecorder::Impl::require_recordable() const {
   }
   require_head(path, head_of(sensor), e);
   require_elements(path, 0, sensor.elements_mm);
-}
-
-bool FrameRecorder::Impl::readable(const Frame& frame) const {
-  // A frame whose elements are all dead says what is expected of it.
-  bool any_alive = false;
-  bool any_known = false;
-  for (std::size_t i = 0; i < frame.values.size(); ++i) {
-    any_alive = any_alive || alive(i);
-    any_known = any_known || (alive(i) && is_known(frame.values[i]));
-  }
-  return (any_known || !any_alive) && std::isfinite(frame.host_time_s);
 }
 
 bool FrameRecorder::Impl::due() const {
@@ -346,7 +331,7 @@ void FrameRecorder::add(const Frame& frame) {
   }
   count_lost(r.lost, frame.lost_before);
   count_lost(r.lost_since, frame.lost_before);
-  if (!r.readable(frame)) {
+  if (!is_readable(frame, r.sensor.valid)) {
     count_lost(r.lost, 1);
     count_lost(r.lost_since, 1);
     ++r.unreadable;
@@ -370,6 +355,7 @@ void FrameRecorder::add(const Frame& frame) {
   rows.device_time_s.push_back(std::isfinite(device_time_s) ? device_time_s : unknown);
   rows.lost_before.push_back(std::exchange(r.lost_since, 0));
   rows.time_s.push_back(frame.host_time_s);
+  r.with_pose += posed ? 1 : 0;
   ++r.frames;
   if (r.due()) {
     r.save();
@@ -389,6 +375,7 @@ void FrameRecorder::close() {
 
 std::uint64_t FrameRecorder::frames() const { return impl_->frames; }
 std::uint64_t FrameRecorder::lost() const { return impl_->lost; }
+std::uint64_t FrameRecorder::with_pose() const { return impl_->with_pose; }
 std::uint64_t FrameRecorder::unreadable() const { return impl_->unreadable; }
 std::uint64_t FrameRecorder::unknown_readings() const { return impl_->unknown_readings; }
 

@@ -9,6 +9,7 @@
 #include "available_memory.hpp"
 #include "file_format.hpp"
 #include "hdf5_contents.hpp"
+#include "lost_count.hpp"
 #include "recording_rules.hpp"
 
 namespace palpate {

@@ -340,6 +340,34 @@ TEST_F(RecordCommand, AClockThatIsSetBackProlongsNothing) {
   EXPECT_EQ(r.baseline.size(), 36u) << "the first press is at 1.3 s";
 }
 
+// info counts the time of such a stream as record does.
+TEST_F(RecordCommand, InfoOfAClockThatIsSetBack) {
+  Recording frames = recorded("a.h5", {"--sensor", "simulate:A,touches=1,speed=max"});
+  for (std::size_t i = 100; i < frames.size(); ++i) {
+    frames.time_s[i] -= 3600.0;
+  }
+  write_recording(folder_ / "set.h5", frames);
+  expect_named(done({"record", "--sensor", "replay:set.h5,speed=max", "-o", "b.h5"}),
+               {"261 frames in 2.590 s, 100.4 Hz"});
+  expect_named(done({"info", "b.h5"}), {"duration          2.590 s", "rate              100.4 Hz"});
+}
+
+// What the file holds is counted: frames without a known reading are lost, poses that are no
+// numbers are unknown.
+TEST_F(RecordCommand, FramesWithoutAKnownReadingCountAsLost) {
+  Recording frames = recorded("a.h5", {"--sensor", "simulate:A,touches=1,speed=max"});
+  for (const std::size_t i : {10u, 11u, 50u}) {
+    std::fill_n(frames.pressure.begin() + static_cast<std::ptrdiff_t>(36 * i), 36, std::nan(""));
+  }
+  frames.pressure[36 * 20] = std::nan("");
+  write_recording(folder_ / "unknown.h5", frames);
+  expect_named(done({"record", "--sensor", "replay:unknown.h5,speed=max", "-o", "b.h5"}),
+               {"258 frames", "3 lost", "258 with a pose", "1 readings unknown"});
+  expect_named(done({"info", "b.h5"}), {"lost              3 ", "with a pose       258 "});
+  expect_named(done({"touches", "unknown.h5", "-o", "t.h5"}),
+               {"1 touches", "3 lost", "1 readings unknown"});
+}
+
 TEST_F(RecordCommand, RefusesWhatCannotBeRecorded) {
   expect_refused({"record", "--sensor", "replay:missing.h5", "-o", "s.h5"}, {"missing.h5"});
   expect_refused({"record", "--sensor", "simulate:A,rate=x", "-o", "s.h5"}, {"rate", "x"});
