@@ -40,7 +40,7 @@ std::filesystem::path make_beside(const std::filesystem::path& target, const cha
                                   const Make& make) {
   static std::atomic<unsigned> serial = 0;
   for (;;) {
-    const std::filesystem::path name =
+    std::filesystem::path name =
         folder_of(target) / fmt::format(".palpate-{}-{}.{}", ::getpid(), serial++, suffix);
     if (make(name)) {
       return name;
