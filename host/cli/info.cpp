@@ -27,8 +27,8 @@ std::string closed_of(const std::string& path, const Recording& r) {
     case Recorder::there:
       return "no: it is being recorded";
     case Recorder::gone:
-      return "no: it was cut off; h5py opens it only with swmr=True, until palpate info --close " +
-             path;
+      return fmt::format(
+          "no: it was cut off; run palpate info --close {} to let other programs open it", path);
     case Recorder::unknown:
       break;
   }
@@ -38,9 +38,8 @@ std::string closed_of(const std::string& path, const Recording& r) {
 /// What a stream of frames has besides.
 void print_stream(const std::string& path, const RecordingSummary& s) {
   const Recording& r = s.head;
-  if (s.first_s && *s.last_s > *s.first_s) {
-    fmt::print("  rate              {:.1f} Hz\n",
-               static_cast<double>(s.rows - 1) / (*s.last_s - *s.first_s));
+  if (s.elapsed_s && *s.elapsed_s > 0.0) {
+    fmt::print("  rate              {:.1f} Hz\n", static_cast<double>(s.rows - 1) / *s.elapsed_s);
   }
   if (s.lost) {
     fmt::print("  lost              {} frames\n", *s.lost);
@@ -77,8 +76,8 @@ void print_recording(const std::string& path) {
     fmt::print("  dead readings     {} of {}\n", std::count(r.valid.begin(), r.valid.end(), 0),
                r.valid.size());
   }
-  if (s.first_s) {
-    fmt::print("  duration          {:.3f} s\n", *s.last_s - *s.first_s);
+  if (s.elapsed_s) {
+    fmt::print("  duration          {:.3f} s\n", *s.elapsed_s);
   }
   if (r.rows == "frames") {
     print_stream(path, s);

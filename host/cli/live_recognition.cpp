@@ -5,6 +5,7 @@
 #include <limits>
 #include <utility>
 
+#include "lost_count.hpp"
 #include "palpate/baseline.hpp"
 #include "palpate/pose_track.hpp"
 
@@ -169,10 +170,10 @@ std::optional<TouchDetector> LiveRecognition::tare() {
     {
       const std::lock_guard lock(mutex_);
       state_.taring = false;
-      state_.counters = sensor_.counters();
       for (const Frame& frame : frames) {
-        state_.unknown_readings += unknown_readings(frame, description_.valid);
+        count(frame);
       }
+      state_.counters = counters();
       if (stop_) {
         return {};
       }
@@ -180,6 +181,17 @@ std::optional<TouchDetector> LiveRecognition::tare() {
     baseline = baseline_of(frames, description_, options_.detector.onset);
   }
   return TouchDetector(options_.detector, std::move(baseline), description_.valid);
+}
+
+void LiveRecognition::count(const Frame& frame) {
+  unreadable_ += is_readable(frame, description_.valid) ? 0 : 1;
+  state_.unknown_readings += unknown_readings(frame, description_.valid);
+}
+
+SensorCounters LiveRecognition::counters() const {
+  SensorCounters all = sensor_.counters();
+  count_lost(all.lost, unreadable_);
+  return all;
 }
 
 void LiveRecognition::take(TouchDetector& detector, const Frame& frame) {
@@ -195,12 +207,12 @@ void LiveRecognition::take(TouchDetector& detector, const Frame& frame) {
       state_.pressure[i] = is_known(value) ? value - (baseline.empty() ? 0.0 : baseline[i])
                                            : std::numeric_limits<double>::quiet_NaN();
     }
-    state_.unknown_readings += unknown_readings(frame, description_.valid);
+    count(frame);
     state_.T_robot_sensor = frame.T_robot_sensor && is_robot_pose(*frame.T_robot_sensor)
                                 ? frame.T_robot_sensor
                                 : std::nullopt;
     state_.touching = touching;
-    state_.counters = sensor_.counters();
+    state_.counters = counters();
   }
   hand_on(touch);
   hand_ahead(detector.candidate());
@@ -224,7 +236,7 @@ void LiveRecognition::hand_on(const std::optional<DetectedTouch>& touch) {
     ++state_.without_pose;
     return;
   }
-  push({.touch = touch, .taken = taken_, .frames_lost = sensor_.counters().lost});
+  push({.touch = touch, .taken = taken_, .frames_lost = counters().lost});
 }
 
 void LiveRecognition::hand_ahead(const std::optional<DetectedTouch>& candidate) {

@@ -93,6 +93,9 @@ class LiveRecognition {
 
   void read();
   std::optional<TouchDetector> tare();
+  void count(const Frame& frame);
+  /// What is_readable() refuses is lost, too.
+  SensorCounters counters() const;
   void take(TouchDetector& detector, const Frame& frame);
   void hand_on(const std::optional<DetectedTouch>& touch);
   void hand_ahead(const std::optional<DetectedTouch>& candidate);
@@ -124,6 +127,7 @@ class LiveRecognition {
   // Of the reading thread alone.
   Clock::time_point taken_;
   StreamTime time_;
+  std::uint64_t unreadable_ = 0;
   std::optional<double> last_contact_s_;  ///< of time_
   bool was_touching_ = false;
   std::optional<double> candidate_begin_s_;

@@ -1,7 +1,4 @@
-#include <unistd.h>
-
 #include <chrono>
-#include <filesystem>
 #include <memory>
 #include <optional>
 #include <string>
@@ -10,6 +7,7 @@
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
+#include "atomic_file.hpp"
 #include "command_files.hpp"
 #include "commands.hpp"
 #include "input_file.hpp"
@@ -75,64 +73,22 @@ class FrameSource {
   bool done_ = false;
 };
 
-/// What stood under a recording's name before it: kept beside it until the recording is known to be
-/// wanted. A process that is killed leaves both.
-class OlderFile {
- public:
-  explicit OlderFile(std::filesystem::path file)
-      : file_(std::move(file)), kept_(file_.string() + fmt::format(".before-{}", ::getpid())) {
-    existed_ = ::access(file_.c_str(), F_OK) == 0;
-    // Some file systems have no links.
-    is_kept_ = existed_ && ::link(file_.c_str(), kept_.c_str()) == 0;
-  }
-  ~OlderFile() { let_go(); }
-  OlderFile(const OlderFile&) = delete;
-  OlderFile& operator=(const OlderFile&) = delete;
-
-  /// Takes the recording away.
-  void restore() {
-    std::error_code ignored;
-    if (is_kept_) {
-      std::filesystem::rename(kept_, file_, ignored);
-      is_kept_ = false;
-    } else if (!existed_) {
-      std::filesystem::remove(file_, ignored);
-    }
-  }
-  /// The recording has taken its place.
-  void let_go() {
-    std::error_code ignored;
-    if (is_kept_) {
-      std::filesystem::remove(kept_, ignored);
-      is_kept_ = false;
-    }
-  }
-
- private:
-  std::filesystem::path file_;
-  std::filesystem::path kept_;
-  bool existed_ = false;
-  bool is_kept_ = false;
-};
-
 /// A recording under way. The frames of the tare are saved like all others, and the baseline is
 /// stored when it is known.
 class RecordingUnderWay {
  public:
   /// @param tare_s over which the baseline is taken; 0: it is known, or there is none
   RecordingUnderWay(const std::string& output, const SensorDescription& sensor, double tare_s)
-      : sensor_(sensor), tare_s_(tare_s), older_(output), recorder_(std::in_place, output, sensor) {
+      : sensor_(sensor), tare_s_(tare_s), recorder_(std::in_place, output, sensor) {
     if (taring()) {
+      older_.emplace(output);
       recorder_->expect_baseline();
-    } else {
-      older_.let_go();
     }
   }
 
   void add(const Frame& frame) {
     recorder_->add(frame);
     time_.advance(frame.host_time_s);
-    posed_ += frame.T_robot_sensor ? 1 : 0;
     if (taring()) {
       first_.push_back(frame);
       if (time_.elapsed_s() >= tare_s_) {
@@ -141,10 +97,13 @@ class RecordingUnderWay {
     }
   }
   void flush() { recorder_->flush(); }
-  bool empty() const { return recorder_->frames() + recorder_->lost() == 0; }
 
-  /// Throws Error where the array was touched during the tare: there is no recording then.
-  void close() {
+  /// Throws Error where there is no frame to keep, or where the array was touched during the tare:
+  /// there is no recording then.
+  void close(const std::string& sensor) {
+    if (recorder_->frames() == 0) {
+      refuse_empty(sensor);
+    }
     if (taring() && !first_.empty()) {
       end_tare();
     }
@@ -155,10 +114,10 @@ class RecordingUnderWay {
     const double seconds = time_.elapsed_s();
     const std::uint64_t frames = recorder_->frames();
     fmt::print("{}: {} frames in {:.3f} s", output, frames, seconds);
-    if (seconds > 0.0) {
+    if (frames > 1 && seconds > 0.0) {
       fmt::print(", {:.1f} Hz", static_cast<double>(frames - 1) / seconds);
     }
-    fmt::print(", {} lost, {} with a pose", recorder_->lost(), posed_);
+    fmt::print(", {} lost, {} with a pose", recorder_->lost(), recorder_->with_pose());
     if (recorder_->unknown_readings() > 0) {
       fmt::print(", {} readings unknown", recorder_->unknown_readings());
     }
@@ -168,6 +127,17 @@ class RecordingUnderWay {
  private:
   bool taring() const { return tare_s_ > 0.0; }
 
+  [[noreturn]] void refuse_empty(const std::string& sensor) const {
+    if (recorder_->unreadable() == 0) {
+      throw Error(Fault::system,
+                  fmt::format("sensor {}: no frame came; see palpate sensors", sensor));
+    }
+    throw Error(Fault::input,
+                fmt::format("sensor {}: none of its {} frames has a known reading and a time; "
+                            "repair its connection and look at its readings: palpate sensors",
+                            sensor, recorder_->unreadable()));
+  }
+
   void end_tare() {
     const bool raw = sensor_.pressure_unit == "raw";
     std::vector<double> baseline;
@@ -176,11 +146,11 @@ class RecordingUnderWay {
                              raw ? std::nullopt : std::optional(TouchDetectorOptions{}.onset));
     } catch (...) {
       recorder_.reset();
-      older_.restore();
+      older_->restore();
       throw;
     }
     recorder_->set_baseline(std::move(baseline));
-    older_.let_go();
+    older_.reset();
     tare_s_ = 0.0;
     first_ = {};
   }
@@ -189,8 +159,7 @@ class RecordingUnderWay {
   double tare_s_;
   std::vector<Frame> first_;  ///< of the tare
   StreamTime time_;
-  std::uint64_t posed_ = 0;
-  OlderFile older_;
+  std::optional<OlderFile> older_;  ///< until the tare is known to be good
   std::optional<FrameRecorder> recorder_;
 };
 
@@ -238,11 +207,7 @@ void record(const Options& options) {
     }
   }
   sensor->stop();
-  if (recording.empty()) {
-    throw Error(Fault::system,
-                fmt::format("sensor {}: no frame came; see palpate sensors", options.sensor));
-  }
-  recording.close();
+  recording.close(options.sensor);
   recording.print_summary(options.output);
   if (posed != nullptr) {
     report_refused(posed->poses());
@@ -269,7 +234,8 @@ void add_record(CLI::App& app) {
   command
       ->add_option("--tare", options->tare_s,
                    "The array's baseline is read from the first seconds, when nothing touches it; "
-                   "they are recorded, too. 0: none")
+                   "they are recorded, too. Where the array is touched then, or an element has no "
+                   "known reading, there is no recording and an older file stays. 0: none")
       ->capture_default_str();
   command->add_option("--object", options->object, "Label of the object that is touched");
   command->callback([options] { record(*options); });

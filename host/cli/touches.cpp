@@ -8,6 +8,7 @@
 #include "command_files.hpp"
 #include "commands.hpp"
 #include "detector_flags.hpp"
+#include "lost_count.hpp"
 #include "options.hpp"
 #include "palpate/error.hpp"
 #include "palpate/files.hpp"
@@ -84,6 +85,7 @@ void find_touches(const Options& options) {
   recording.serial = sensor.serial;
 
   std::uint64_t unknown = 0;
+  std::uint64_t unreadable = 0;
   std::size_t without_pose = 0;
   const auto take = [&](const std::optional<DetectedTouch>& touch) {
     without_pose += touch && !append(*touch, recording) ? 1 : 0;
@@ -92,6 +94,7 @@ void find_touches(const Options& options) {
   while (!stream->ended()) {
     if (const std::optional<Frame> frame = stream->next({})) {
       unknown += unknown_readings(*frame, sensor.valid);
+      unreadable += is_readable(*frame, sensor.valid) ? 0 : 1;
       take(detector.add(*frame));
     }
   }
@@ -111,6 +114,11 @@ void find_touches(const Options& options) {
              stream->counters().frames, options.frames);
   if (without_pose > 0) {
     fmt::print(", {} without a pose left out", without_pose);
+  }
+  std::uint64_t lost = stream->counters().lost;
+  count_lost(lost, unreadable);
+  if (lost > 0) {
+    fmt::print(", {} lost", lost);
   }
   if (unknown > 0) {
     fmt::print(", {} readings unknown", unknown);

@@ -7,6 +7,7 @@
 #include <cerrno>
 #include <cstring>
 #include <system_error>
+#include <utility>
 
 #include "descriptor.hpp"
 #include "input_file.hpp"
@@ -25,19 +26,41 @@ std::filesystem::path folder_of(const std::filesystem::path& target) {
   return target.has_parent_path() ? target.parent_path() : ".";
 }
 
+// A link stays a link: what it points to is replaced.
+std::filesystem::path file_behind(const std::filesystem::path& target) {
+  std::error_code ignored;
+  return std::filesystem::is_regular_file(target, ignored) ? std::filesystem::canonical(target)
+                                                           : target;
+}
+
+// A name in the target's folder that `make` has put there, of its own and not the target's with a
+// suffix, which might be too long for the file system; empty, with errno, where `make` fails.
+template <typename Make>
+std::filesystem::path make_beside(const std::filesystem::path& target, const char* suffix,
+                                  const Make& make) {
+  static std::atomic<unsigned> serial = 0;
+  for (;;) {
+    std::filesystem::path name =
+        folder_of(target) / fmt::format(".palpate-{}-{}.{}", ::getpid(), serial++, suffix);
+    if (make(name)) {
+      return name;
+    }
+    if (errno != EEXIST) {
+      return {};
+    }
+  }
+}
+
 }  // namespace
 
-AtomicFile::AtomicFile(const std::filesystem::path& target) : target_(target) {
+AtomicFile::AtomicFile(const std::filesystem::path& target) : target_(file_behind(target)) {
   std::error_code ignored;
   const auto type = std::filesystem::status(target, ignored).type();
   if (type == std::filesystem::file_type::directory || !target.has_filename()) {
     refuse(target, "is a folder; give the name of a file");
   }
-  if (type == std::filesystem::file_type::regular) {
-    // A link stays a link: what it points to is replaced.
-    target_ = std::filesystem::canonical(target);
-  } else if (type != std::filesystem::file_type::not_found &&
-             type != std::filesystem::file_type::none) {
+  if (type != std::filesystem::file_type::regular &&
+      type != std::filesystem::file_type::not_found && type != std::filesystem::file_type::none) {
     refuse(target, "is not a regular file; give the name of a file");
   }
   const std::filesystem::path folder = folder_of(target_);
@@ -45,18 +68,12 @@ AtomicFile::AtomicFile(const std::filesystem::path& target) : target_(target) {
     refuse(target,
            fmt::format("folder '{0}' does not exist; create it (mkdir -p '{0}')", folder.string()));
   }
-  // A name of its own, not the target's with a suffix, which might be too long for the file system.
-  static std::atomic<unsigned> serial = 0;
-  for (;;) {
-    std::filesystem::path name = folder / fmt::format(".palpate-{}-{}.part", ::getpid(), serial++);
-    if (Descriptor(name, O_WRONLY | O_CREAT | O_EXCL, 0666).valid()) {
-      temporary_ = std::move(name);
-      return;
-    }
-    if (errno != EEXIST) {
-      refuse(target, fmt::format("cannot create a file in folder '{}': {}; choose another folder",
-                                 folder.string(), std::strerror(errno)));
-    }
+  temporary_ = make_beside(target_, "part", [](const std::filesystem::path& name) {
+    return Descriptor(name, O_WRONLY | O_CREAT | O_EXCL, 0666).valid();
+  });
+  if (temporary_.empty()) {
+    refuse(target, fmt::format("cannot create a file in folder '{}': {}; choose another folder",
+                               folder.string(), std::strerror(errno)));
   }
 }
 
@@ -96,6 +113,42 @@ void AtomicFile::commit() {
   const Descriptor folder(folder_of(target_), O_RDONLY | O_DIRECTORY);
   if (folder.valid()) {
     ::fsync(folder.get());
+  }
+}
+
+OlderFile::OlderFile(const std::filesystem::path& target) : target_(file_behind(target)) {
+  if (::access(target_.c_str(), F_OK) != 0) {
+    return;
+  }
+  kept_ = make_beside(target_, "older", [&](const std::filesystem::path& name) {
+    return ::link(target_.c_str(), name.c_str()) == 0;
+  });
+  if (kept_.empty()) {
+    refuse(target, fmt::format("the older file cannot be kept until the new one is known to be "
+                               "wanted: {}; give another name, or move the older file away",
+                               std::strerror(errno)));
+  }
+}
+
+OlderFile::~OlderFile() { let_go(); }
+
+void OlderFile::restore() {
+  if (kept_.empty()) {
+    ::unlink(target_.c_str());
+  } else if (::rename(kept_.c_str(), target_.c_str()) == 0) {
+    let_go();  // two names of one file stay as they are
+  } else {
+    throw Error(
+        Fault::system,
+        fmt::format("{}: cannot become the older file again: {}; find that as {}", target_.string(),
+                    std::strerror(errno), std::exchange(kept_, {}).string()));
+  }
+}
+
+void OlderFile::let_go() {
+  if (!kept_.empty()) {
+    ::unlink(kept_.c_str());
+    kept_.clear();
   }
 }
 

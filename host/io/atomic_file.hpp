@@ -31,4 +31,29 @@ class AtomicFile {
   std::filesystem::path temporary_;  ///< empty once committed
 };
 
+/// What stands under an output's name, kept until the new file is known to be wanted: under a name
+/// of its own in the same folder, as another name of the same file. A process that is killed
+/// leaves both files.
+class OlderFile {
+ public:
+  /// @param target a file that an AtomicFile may replace; there may be none
+  /// @throws Error (Fault::input) where the older file cannot be kept, as on a file system without
+  /// hard links
+  explicit OlderFile(const std::filesystem::path& target);
+  /// As let_go().
+  ~OlderFile();
+  OlderFile(const OlderFile&) = delete;
+  OlderFile& operator=(const OlderFile&) = delete;
+
+  /// Takes the new file away, if there is one, and leaves what was there before.
+  /// @throws Error (Fault::system) where the disk refuses; it names the file that was kept
+  void restore();
+  /// The new file stays.
+  void let_go();
+
+ private:
+  std::filesystem::path target_;
+  std::filesystem::path kept_;  ///< empty where nothing is kept
+};
+
 }  // namespace palpate

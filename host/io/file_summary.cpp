@@ -4,9 +4,11 @@
 #include <cmath>
 #include <limits>
 
+#include "lost_count.hpp"
 #include "map_file.hpp"
 #include "posterior_file.hpp"
 #include "recording_scan.hpp"
+#include "stream_time.hpp"
 
 namespace palpate {
 
@@ -24,6 +26,7 @@ void widen(std::optional<Extremes>& extremes, double value) {
 
 RecordingSummary summarize_recording(const std::filesystem::path& path) {
   RecordingSummary summary;
+  StreamTime time;
   std::size_t k = 0;
   scan_recording(path, {.head =
                             [&](const RecordingHead& head) {
@@ -55,17 +58,16 @@ RecordingSummary summarize_recording(const std::filesystem::path& path) {
                         .elements_mm = [](std::span<const glm::dvec2>) {},
                         .time_s =
                             [&](std::span<const double> times) {
-                              summary.first_s = summary.first_s.value_or(times.front());
-                              summary.last_s = times.back();
+                              for (const double time_s : times) {
+                                summary.elapsed_s = time.advance(time_s);
+                              }
                             },
                         .device_time_s = [](std::span<const double>) {},
                         .lost_before =
                             [&](std::span<const std::uint64_t> counts) {
                               summary.lost = summary.lost.value_or(0);
                               for (const std::uint64_t count : counts) {
-                                if (__builtin_add_overflow(*summary.lost, count, &*summary.lost)) {
-                                  summary.lost = UINT64_MAX;
-                                }
+                                count_lost(*summary.lost, count);
                               }
                             }});
   return summary;

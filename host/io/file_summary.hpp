@@ -25,8 +25,7 @@ struct RecordingSummary {
   bool array_changes = false;
   std::optional<Extremes> pressure;    ///< of elements that are alive, where they are known
   std::uint64_t unknown_readings = 0;  ///< NaN, of elements that are alive
-  std::optional<double> first_s;       ///< time of the first row
-  std::optional<double> last_s;        ///< and of the last
+  std::optional<double> elapsed_s;     ///< from the first row to the last, see StreamTime
   std::optional<std::uint64_t> lost;   ///< frames that were lost, where the file counts them
   std::uint64_t with_pose = 0;
 };

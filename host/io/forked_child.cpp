@@ -13,6 +13,8 @@
 #include <charconv>
 #include <csignal>
 #include <cstring>
+#include <optional>
+#include <system_error>
 
 #include "palpate/error.hpp"
 
@@ -24,13 +26,14 @@ using namespace std::chrono_literals;
 
 [[noreturn]] void fail(const char* action) {
   throw Error(Fault::system,
-              fmt::format("cannot {} to read a file in a child process: {}; end other programs and "
+              fmt::format("cannot {} to use a file in a child process: {}; end other programs and "
                           "try again",
                           action, std::strerror(errno)));
 }
 
-/// Private writable memory of this process, as RLIMIT_DATA counts it.
-std::uint64_t data_bytes() {
+/// Private writable memory of this process, as RLIMIT_DATA counts it; none where the system does
+/// not tell.
+std::optional<std::uint64_t> data_bytes() {
   char text[256] = {};
   const Descriptor statm("/proc/self/statm", O_RDONLY);
   const ssize_t size = ::read(statm.get(), text, sizeof text - 1);
@@ -39,7 +42,11 @@ std::uint64_t data_bytes() {
   std::uint64_t pages[6] = {};  // size, resident, shared, text, library, data
   for (std::uint64_t& field : pages) {
     at = std::find_if(at, end, [](char c) { return c != ' '; });
-    at = std::from_chars(at, end, field).ptr;
+    const auto [rest, error] = std::from_chars(at, end, field);
+    if (error != std::errc{}) {
+      return {};
+    }
+    at = rest;
   }
   return pages[5] * static_cast<std::uint64_t>(::sysconf(_SC_PAGESIZE));
 }
@@ -203,8 +210,10 @@ void allow_cpu_seconds(std::uint64_t seconds) {
 }
 
 void allow_memory_bytes(std::uint64_t bytes) {
-  const std::uint64_t held = data_bytes();
-  limit(RLIMIT_DATA, bytes < UINT64_MAX - held ? held + bytes : UINT64_MAX);
+  // Without it, a limit might be less than what the process has.
+  if (const std::optional<std::uint64_t> held = data_bytes()) {
+    limit(RLIMIT_DATA, bytes < UINT64_MAX - *held ? *held + bytes : UINT64_MAX);
+  }
 }
 
 }  // namespace palpate

@@ -15,6 +15,7 @@
 #include "hdf5_failure.hpp"
 #include "hdf5_writer.hpp"
 #include "input_file.hpp"
+#include "lost_count.hpp"
 #include "palpate/error.hpp"
 #include "printable.hpp"
 #include "recording_rules.hpp"
@@ -61,11 +62,6 @@ Recording head_of(const SensorDescription& sensor) {
   return head;
 }
 
-// What is added to a count of frames that a board may have made up.
-void count_lost(std::uint64_t& count, std::uint64_t more) {
-  count = more < largest_count - count ? count + more : largest_count;
-}
-
 }  // namespace
 
 struct FrameRecorder::Impl {
@@ -74,10 +70,10 @@ struct FrameRecorder::Impl {
 
   bool alive(std::size_t element) const { return sensor.valid.empty() || sensor.valid[element]; }
   void require_recordable() const;
-  bool readable(const Frame& frame) const;
   bool due() const;
   void save();
   void create();
+  void open(const std::filesystem::path& finished);
   void append();
   void append(hid_t dataset, hid_t type, std::size_t width, const void* values);
   [[noreturn]] void fail();
@@ -86,6 +82,7 @@ struct FrameRecorder::Impl {
   std::filesystem::path path;
   SensorDescription sensor;
   bool baseline_follows = false;
+  bool has_baseline = false;  // the file, as it has the next
   bool has_device_time = false;
   bool failed = false;
   Rows pending;
@@ -94,6 +91,8 @@ struct FrameRecorder::Impl {
   std::uint64_t frames = 0;
   std::uint64_t lost = 0;
   std::uint64_t lost_since = 0;  // with the next frame
+  std::uint64_t unreadable = 0;
+  std::uint64_t with_pose = 0;
   std::uint64_t unknown_readings = 0;
 
   // Open from the first save on.
@@ -118,17 +117,6 @@ void FrameRecorder::Impl::require_recordable() const {
   require_elements(path, 0, sensor.elements_mm);
 }
 
-bool FrameRecorder::Impl::readable(const Frame& frame) const {
-  // A frame whose elements are all dead says what is expected of it.
-  bool any_alive = false;
-  bool any_known = false;
-  for (std::size_t i = 0; i < frame.values.size(); ++i) {
-    any_alive = any_alive || alive(i);
-    any_known = any_known || (alive(i) && is_known(frame.values[i]));
-  }
-  return (any_known || !any_alive) && std::isfinite(frame.host_time_s);
-}
-
 bool FrameRecorder::Impl::due() const {
   return pending.pressure.size() >= most_pending_values ||
          // By the stream's own time too: a late reader catches up faster than the clock runs.
@@ -150,8 +138,9 @@ void FrameRecorder::Impl::save() {
   pending.clear();
 }
 
-// The first rows make a whole file, which appears under its name with them and is then opened for
-// more: whenever the recorder is killed, there is no file or a readable one.
+// The first rows make a whole file, which is opened for more and then appears under its name:
+// whenever the recorder is killed, there is no file or a readable one, and whoever sees the file
+// while it is recorded sees that it is.
 void FrameRecorder::Impl::create() {
   const std::size_t n = pending.size();
   const std::size_t e = sensor.elements_mm.size();
@@ -181,9 +170,10 @@ void FrameRecorder::Impl::create() {
     if (!sensor.valid.empty()) {
       out.dataset("valid", {e}, sensor.valid);
     }
+    has_baseline = baseline_follows || !sensor.baseline.empty();
     if (!sensor.baseline.empty()) {
       out.dataset("baseline", {e}, sensor.baseline);
-    } else if (baseline_follows) {
+    } else if (has_baseline) {
       out.dataset("baseline", {e}, std::vector<double>(e, unknown));
     }
     constexpr auto growing = Hdf5Writer::Storage::growing;
@@ -194,34 +184,47 @@ void FrameRecorder::Impl::create() {
     }
     out.dataset("lost_before", {n}, pending.lost_before, growing);
     out.dataset("time", {n}, pending.time_s, growing);
-    out.save();
+    try {
+      out.save([&](const std::filesystem::path& finished) { open(finished); });
+    } catch (...) {
+      // The file has never been there.
+      if (file.valid()) {
+        give_up_hdf5_file(file.get());
+      }
+      close();
+      throw;
+    }
   }
   saved = n;
-  const Hdf5Session session;
+}
+
+void FrameRecorder::Impl::open(const std::filesystem::path& finished) {
   const Hdf5Handle access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose);
   set_appendable(access.get());
   H5Pset_file_locking(access.get(), true, true);  // some network file systems have no locks
   {
     const StandardDescriptorsTaken taken;
-    file = {H5Fopen(path.c_str(), H5F_ACC_RDWR | H5F_ACC_SWMR_WRITE, access.get()), H5Fclose};
+    file = {H5Fopen(finished.c_str(), H5F_ACC_RDWR | H5F_ACC_SWMR_WRITE, access.get()), H5Fclose};
   }
   // HDF5 holds its own lock only while it opens a file that may be read meanwhile.
   if (void* descriptor = nullptr; H5Fget_vfd_handle(file.get(), H5P_DEFAULT, &descriptor) >= 0) {
     mark_as_being_recorded(*static_cast<int*>(descriptor));
   }
-  const auto open = [&](const char* name) {
+  const auto dataset = [&](const char* name) {
     return Hdf5Handle(H5Dopen2(file.get(), name, H5P_DEFAULT), H5Dclose);
   };
-  pressure = open("pressure");
-  sensor_pose = open("sensor_pose");
-  lost_before = open("lost_before");
-  time = open("time");
+  pressure = dataset("pressure");
+  sensor_pose = dataset("sensor_pose");
+  lost_before = dataset("lost_before");
+  time = dataset("time");
   if (has_device_time) {
-    device_time = open("device_time");
+    device_time = dataset("device_time");
   }
   if (!file.valid() || !time.valid() || !pressure.valid() || !sensor_pose.valid() ||
       !lost_before.valid() || device_time.valid() != has_device_time) {
-    fail();
+    throw Error(Fault::system,
+                fmt::format("{}: cannot be written: {}; free or repair the disk and try again",
+                            path.string(), hdf5_failure()));
   }
 }
 
@@ -296,6 +299,11 @@ void FrameRecorder::expect_baseline() { impl_->baseline_follows = true; }
 
 void FrameRecorder::set_baseline(std::vector<double> baseline) {
   Impl& r = *impl_;
+  if (baseline.empty() || (r.saved > 0 && !r.has_baseline)) {
+    refuse(r.path, baseline.empty()
+                       ? "its baseline has no values; give one for each element"
+                       : "keeps no place for a baseline; expect it before the first frame");
+  }
   std::swap(r.sensor.baseline, baseline);
   try {
     r.require_recordable();
@@ -323,9 +331,10 @@ void FrameRecorder::add(const Frame& frame) {
   }
   count_lost(r.lost, frame.lost_before);
   count_lost(r.lost_since, frame.lost_before);
-  if (!r.readable(frame)) {
+  if (!is_readable(frame, r.sensor.valid)) {
     count_lost(r.lost, 1);
     count_lost(r.lost_since, 1);
+    ++r.unreadable;
     return;
   }
   Rows& rows = r.pending;
@@ -346,6 +355,7 @@ void FrameRecorder::add(const Frame& frame) {
   rows.device_time_s.push_back(std::isfinite(device_time_s) ? device_time_s : unknown);
   rows.lost_before.push_back(std::exchange(r.lost_since, 0));
   rows.time_s.push_back(frame.host_time_s);
+  r.with_pose += posed ? 1 : 0;
   ++r.frames;
   if (r.due()) {
     r.save();
@@ -365,6 +375,8 @@ void FrameRecorder::close() {
 
 std::uint64_t FrameRecorder::frames() const { return impl_->frames; }
 std::uint64_t FrameRecorder::lost() const { return impl_->lost; }
+std::uint64_t FrameRecorder::with_pose() const { return impl_->with_pose; }
+std::uint64_t FrameRecorder::unreadable() const { return impl_->unreadable; }
 std::uint64_t FrameRecorder::unknown_readings() const { return impl_->unknown_readings; }
 
 }  // namespace palpate

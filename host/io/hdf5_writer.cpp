@@ -120,13 +120,16 @@ void Hdf5Writer::dataset(const char* name, const Shape& shape,
   add_dataset(name, shape, H5T_NATIVE_UINT64, values.data(), storage);
 }
 
-void Hdf5Writer::save() {
+void Hdf5Writer::save(const std::function<void(const std::filesystem::path&)>& finished) {
   AtomicFile target(path_);
   require(H5Fflush(file_.get(), H5F_SCOPE_GLOBAL) >= 0, "the file");
   const ssize_t size = H5Fget_file_image(file_.get(), nullptr, 0);
   file_ = Hdf5Handle(H5I_INVALID_HID, H5Fclose);
   require(size > 0 && image_.bytes.size() >= static_cast<std::size_t>(size), "the file");
   target.write(std::string_view(image_.bytes).substr(0, static_cast<std::size_t>(size)));
+  if (finished) {
+    finished(target.path());
+  }
   target.commit();
 }
 

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -47,7 +48,9 @@ class Hdf5Writer {
                Storage storage = Storage::plain);
 
   /// The last that is done with it.
-  void save();
+  /// @param finished is called with the whole file before it appears under its name, and may keep
+  /// it open; where it throws, the file never appears
+  void save(const std::function<void(const std::filesystem::path&)>& finished = {});
 
  private:
   void add_attribute(const char* name, hid_t type, hid_t space, const void* values);

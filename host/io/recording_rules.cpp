@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 
 #include "input_file.hpp"
+#include "lost_count.hpp"
 
 namespace palpate {
 

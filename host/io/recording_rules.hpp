@@ -13,9 +13,6 @@ namespace palpate {
 // written is what may be read. Each function throws Error (Fault::input), which names the file, the
 // field and the remedy.
 
-/// Counts up to here are exact in float64, in which datasets are read.
-inline constexpr std::uint64_t largest_count = std::uint64_t{1} << 53;
-
 /// Texts of a file are printable UTF-8; `field` is such as "attribute 'object'".
 void require_text(const std::filesystem::path& path, std::string_view field, std::string_view text);
 

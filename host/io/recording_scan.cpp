@@ -9,6 +9,7 @@
 #include "available_memory.hpp"
 #include "file_format.hpp"
 #include "hdf5_contents.hpp"
+#include "lost_count.hpp"
 #include "recording_rules.hpp"
 
 namespace palpate {
@@ -140,9 +141,11 @@ class Scan {
       file_.read("baseline", [&](std::uint64_t, std::span<const double> values) {
         r.baseline.insert(r.baseline.end(), values.begin(), values.end());
       });
-      if (std::all_of(r.baseline.begin(), r.baseline.end(),
-                      [](double value) { return std::isnan(value); })) {
-        r.baseline.clear();  // the recording was cut off before it was taken
+      // The recording of a stream was cut off before the whole baseline was written.
+      for (std::uint64_t k = 0; r.rows == "frames" && k < r.baseline.size(); ++k) {
+        if ((r.valid.size() != e || r.valid[k] != 0) && std::isnan(r.baseline[k])) {
+          r.baseline.clear();
+        }
       }
     }
   }

@@ -6,8 +6,10 @@
 
 #include <fmt/format.h>
 
+#include "lost_count.hpp"
 #include "palpate/error.hpp"
 #include "palpate/files.hpp"
+#include "stream_time.hpp"
 
 namespace palpate {
 
@@ -44,8 +46,12 @@ ReplayedSensor::ReplayedSensor(const std::string& path, std::optional<double> sp
   description_.baseline = r.baseline;
   description_.object = r.object;
   description_.truth = r.truth;
-  if (const double seconds = r.time_s.back() - r.time_s.front(); seconds > 0.0) {
-    description_.rate_hz = static_cast<double>(r.size() - 1) / seconds;
+  StreamTime time;
+  for (const double time_s : r.time_s) {
+    time.advance(time_s);
+  }
+  if (time.elapsed_s() > 0.0) {
+    description_.rate_hz = static_cast<double>(r.size() - 1) / time.elapsed_s();
   }
 }
 
@@ -80,7 +86,7 @@ std::optional<Frame> ReplayedSensor::next(std::chrono::milliseconds timeout) {
     frame.T_robot_sensor = touch.T_robot_sensor;
   }
   ++counters_.frames;
-  counters_.lost += frame.lost_before;
+  count_lost(counters_.lost, frame.lost_before);
   return frame;
 }
 

@@ -216,6 +216,66 @@ TEST_F(RecordCommand, ATouchedTareLeavesWhatWasThere) {
   EXPECT_EQ(content_of(folder_.path()).size(), 1u);
 }
 
+TEST_F(RecordCommand, ATouchedTareLeavesWhatALinkNames) {
+  recorded("old.h5", {"--sensor", "simulate:E,touches=1,speed=max"});
+  std::filesystem::create_directory(folder_ / "links");
+  std::filesystem::create_symlink("../old.h5", folder_ / "links/s.h5");
+  expect_refused(
+      {"record", "--sensor", "simulate:A,touches=1,speed=max", "-o", "links/s.h5", "--tare", "1.6"},
+      {"touched", "element"});
+  EXPECT_EQ(read_recording(folder_ / "old.h5").object, "E");
+  EXPECT_EQ(recorded("links/s.h5", {"--sensor", "simulate:A,touches=1,speed=max"}).object, "A");
+  EXPECT_EQ(read_recording(folder_ / "old.h5").object, "A");
+  EXPECT_TRUE(std::filesystem::is_symlink(folder_ / "links/s.h5"));
+}
+
+// The longest name that a file system takes.
+TEST_F(RecordCommand, ATouchedTareLeavesAFileOfALongName) {
+  const std::string file = std::string(252, 'n') + ".h5";
+  recorded(file, {"--sensor", "simulate:E,touches=1,speed=max"});
+  expect_refused(
+      {"record", "--sensor", "simulate:A,touches=1,speed=max", "-o", file, "--tare", "1.6"},
+      {"touched", "element"});
+}
+
+// Of an array that is connected to nothing, no frame is saved before the tare ends.
+TEST_F(RecordCommand, FramesWithoutAKnownReadingAreNoRecording) {
+  Recording frames = recorded("a.h5", {"--sensor", "simulate:A,touches=1,speed=max"});
+  recorded("s.h5", {"--sensor", "simulate:E,touches=1,speed=max"});
+  std::fill(frames.pressure.begin(), frames.pressure.end(), std::nan(""));
+  write_recording(folder_ / "known.h5", frames);
+  frames.baseline.clear();
+  write_recording(folder_ / "unknown.h5", frames);
+  const std::string of_all = fmt::format("{} frames", frames.size());
+  for (const char* sensor : {"replay:known.h5,speed=max", "replay:unknown.h5,speed=max"}) {
+    for (const char* tare : {"0", "0.5", "60"}) {
+      for (const char* file : {"s.h5", "new.h5"}) {
+        expect_refused({"record", "--sensor", sensor, "-o", file, "--tare", tare}, {"read"});
+      }
+    }
+    expect_refused({"record", "--sensor", sensor, "-o", "new.h5", "--tare", "0"},
+                   {sensor, of_all, "known reading", "palpate sensors"});
+  }
+}
+
+// An element without a known reading in the tare, before anything of it is saved and afterwards.
+TEST_F(RecordCommand, ATareWithoutAReadingOfAnElementLeavesWhatWasThere) {
+  Recording frames = recorded("a.h5", {"--sensor", "simulate:A,touches=1,speed=max"});
+  recorded("s.h5", {"--sensor", "simulate:E,touches=1,speed=max"});
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    frames.pressure[36 * i + 7] = std::nan("");
+  }
+  frames.baseline.clear();
+  write_recording(folder_ / "unknown.h5", frames);
+  for (const char* tare : {"0.1", "1"}) {
+    for (const char* file : {"s.h5", "new.h5"}) {
+      expect_refused(
+          {"record", "--sensor", "replay:unknown.h5,speed=max", "-o", file, "--tare", tare},
+          {"element 7", "mark it dead"});
+    }
+  }
+}
+
 TEST_F(RecordCommand, KilledDuringTheTareItLeavesTheFrames) {
   const pid_t pid = start("s.h5", "simulate:A,rate=1000,speed=10", {"--tare", "1000"});
   ASSERT_TRUE(appears("s.h5", pid));
@@ -278,6 +338,34 @@ TEST_F(RecordCommand, AClockThatIsSetBackProlongsNothing) {
   // Each step hides the 10 ms between two frames.
   EXPECT_EQ(r.size(), 202u);
   EXPECT_EQ(r.baseline.size(), 36u) << "the first press is at 1.3 s";
+}
+
+// info counts the time of such a stream as record does.
+TEST_F(RecordCommand, InfoOfAClockThatIsSetBack) {
+  Recording frames = recorded("a.h5", {"--sensor", "simulate:A,touches=1,speed=max"});
+  for (std::size_t i = 100; i < frames.size(); ++i) {
+    frames.time_s[i] -= 3600.0;
+  }
+  write_recording(folder_ / "set.h5", frames);
+  expect_named(done({"record", "--sensor", "replay:set.h5,speed=max", "-o", "b.h5"}),
+               {"261 frames in 2.590 s, 100.4 Hz"});
+  expect_named(done({"info", "b.h5"}), {"duration          2.590 s", "rate              100.4 Hz"});
+}
+
+// What the file holds is counted: frames without a known reading are lost, poses that are no
+// numbers are unknown.
+TEST_F(RecordCommand, FramesWithoutAKnownReadingCountAsLost) {
+  Recording frames = recorded("a.h5", {"--sensor", "simulate:A,touches=1,speed=max"});
+  for (const std::size_t i : {10u, 11u, 50u}) {
+    std::fill_n(frames.pressure.begin() + static_cast<std::ptrdiff_t>(36 * i), 36, std::nan(""));
+  }
+  frames.pressure[36 * 20] = std::nan("");
+  write_recording(folder_ / "unknown.h5", frames);
+  expect_named(done({"record", "--sensor", "replay:unknown.h5,speed=max", "-o", "b.h5"}),
+               {"258 frames", "3 lost", "258 with a pose", "1 readings unknown"});
+  expect_named(done({"info", "b.h5"}), {"lost              3 ", "with a pose       258 "});
+  expect_named(done({"touches", "unknown.h5", "-o", "t.h5"}),
+               {"1 touches", "3 lost", "1 readings unknown"});
 }
 
 TEST_F(RecordCommand, RefusesWhatCannotBeRecorded) {

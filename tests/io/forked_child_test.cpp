@@ -1,12 +1,15 @@
 #include "forked_child.hpp"
 
 #include <gtest/gtest.h>
+#include <sched.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <cstdlib>
 #include <stdexcept>
 #include <string>
+
+#include "scratch_folder.hpp"
 
 namespace palpate {
 namespace {
@@ -106,6 +109,30 @@ TEST_F(Forked, MemoryOfTheChildIsBounded) {
     take(socket);
   };
   EXPECT_EQ(answer(allowed), "x");
+}
+
+// As in a container without /proc, in a process that has more memory than the child is allowed.
+TEST_F(Forked, MemoryThatNobodyTellsIsNotBounded) {
+  const ScratchFolder empty;
+  constexpr int needs_rights = 77;
+  const pid_t pid = ::fork();
+  if (pid == 0) {
+    if (::chroot(empty.path().c_str()) != 0 &&
+        (::unshare(CLONE_NEWUSER) != 0 || ::chroot(empty.path().c_str()) != 0)) {
+      ::_exit(needs_rights);
+    }
+    const std::string got = answer([](int socket) {
+      const std::string large(1 << 27, 'x');
+      forked_write(socket, large.data(), 1);
+    });
+    ::_exit(got == "x" ? 0 : 1);
+  }
+  int status = -1;
+  ::waitpid(pid, &status, 0);
+  if (WIFEXITED(status) && WEXITSTATUS(status) == needs_rights) {
+    GTEST_SKIP() << "this user may not change a process's root";
+  }
+  EXPECT_EQ(status, 0);
 }
 
 TEST_F(Forked, LockIsFreeWhileTheChildWorks) {

@@ -17,6 +17,7 @@
 #include <thread>
 
 #include "palpate/files.hpp"
+#include "recording_state.hpp"
 #include "scratch_folder.hpp"
 
 namespace palpate {
@@ -237,6 +238,52 @@ TEST_F(FrameRecorderFile, BaselineMayFollowTheFrames) {
     EXPECT_EQ(read.baseline, (std::vector<double>{1.5, -2.0})) << flushed;
     ASSERT_EQ(read.size(), 6u);
     expect_prefix(read, 2);
+  }
+}
+
+TEST_F(FrameRecorderFile, ABaselineThatHasNoPlaceCostsNothing) {
+  for (const bool expected : {true, false}) {
+    FrameRecorder recorder(path_, sensor_of(2));
+    if (expected) {
+      recorder.expect_baseline();
+    }
+    recorder.add(frame_of(0, 2));
+    recorder.flush();
+    expect_named(input_error([&] { recorder.set_baseline({}); }), {"stream.h5", "baseline"});
+    if (!expected) {
+      expect_named(input_error([&] {
+                     recorder.set_baseline({1.0, 2.0});
+                   }),
+                   {"stream.h5", "baseline", "before the first frame"});
+    }
+    recorder.add(frame_of(1, 2));
+    recorder.close();
+    const Recording read = read_recording(path_);
+    EXPECT_EQ(read.size(), 2u);
+    EXPECT_TRUE(read.baseline.empty());
+    expect_prefix(read, 2);
+  }
+}
+
+// Whoever sees the file sees that it is being recorded.
+TEST_F(FrameRecorderFile, AppearsAsBeingRecorded) {
+  for (int run = 0; run < 30; ++run) {
+    SCOPED_TRACE(run);
+    const pid_t pid = fork_recorder([&] {
+      FrameRecorder recorder(path_, sensor_of(2));
+      recorder.add(frame_of(0, 2));
+      recorder.flush();
+      ::pause();
+    });
+    while (::access(path_.c_str(), F_OK) != 0) {
+      ASSERT_EQ(::waitpid(pid, nullptr, WNOHANG), 0) << "the recorder has ended";
+    }
+    EXPECT_TRUE(is_marked_open(path_));
+    EXPECT_EQ(recorder_of(path_), Recorder::there);
+    ::kill(pid, SIGKILL);
+    ending(pid);
+    EXPECT_EQ(recorder_of(path_), Recorder::gone);
+    std::filesystem::remove(path_);
   }
 }
 

@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include <atomic>
+#include <cmath>
 #include <csignal>
 #include <functional>
 
@@ -49,6 +50,18 @@ class RecordingClosing : public testing::Test {
     int status = -1;
     ::waitpid(pid, &status, 0);
     ASSERT_EQ(status, 0);
+  }
+
+  // Marks the file as open, as a recorder that was killed leaves it.
+  void leave_open() const {
+    const Hdf5Handle access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose);
+    set_appendable(access.get());
+    const pid_t pid = ::fork();
+    if (pid == 0) {
+      H5Fopen(path_.c_str(), H5F_ACC_RDWR | H5F_ACC_SWMR_WRITE, access.get());
+      ::_exit(0);
+    }
+    ::waitpid(pid, nullptr, 0);
   }
 
   // As other programs open a file: for reading or for writing, without SWMR.
@@ -99,17 +112,7 @@ TEST_F(RecordingClosing, KeepsWholeRowsOnly) {
     extend("lost_before", {1007});
     extend("time", {1003});
   });
-  // Marked as open, as the recorder left it.
-  {
-    const Hdf5Handle access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose);
-    set_appendable(access.get());
-    const pid_t pid = ::fork();
-    if (pid == 0) {
-      H5Fopen(path_.c_str(), H5F_ACC_RDWR | H5F_ACC_SWMR_WRITE, access.get());
-      ::_exit(0);
-    }
-    ::waitpid(pid, nullptr, 0);
-  }
+  leave_open();
   ASSERT_FALSE(opens());
   EXPECT_TRUE(close_recording(path_));
   expect_frames(1000);
@@ -122,6 +125,37 @@ TEST_F(RecordingClosing, KeepsWholeRowsOnly) {
       EXPECT_EQ(extents[0], 1000u) << name;
     }
   });
+}
+
+// The recorder was killed within the one write of the baseline.
+TEST_F(RecordingClosing, ABaselineThatIsHalfWrittenWasNotTaken) {
+  SensorDescription with_baseline = sensor();
+  with_baseline.valid.assign(elements, 1);
+  with_baseline.valid[3] = 0;
+  with_baseline.baseline.assign(elements, 1.0);
+  FrameRecorder recorder(path_, with_baseline);
+  recorder.add(frame(0));
+  recorder.close();
+  const auto unwrite = [&](std::size_t first, std::size_t end) {
+    edit(path_, [&](hid_t file) {
+      std::vector<double> baseline(elements, 1.0);
+      std::fill(baseline.begin() + static_cast<std::ptrdiff_t>(first),
+                baseline.begin() + static_cast<std::ptrdiff_t>(end), std::nan(""));
+      const Hdf5Handle dataset(H5Dopen2(file, "baseline", H5P_DEFAULT), H5Dclose);
+      EXPECT_GE(H5Dwrite(dataset.get(), H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT,
+                         baseline.data()),
+                0);
+    });
+  };
+  unwrite(20, elements);
+  EXPECT_TRUE(read_recording(path_).baseline.empty());
+  leave_open();
+  EXPECT_TRUE(read_recording(path_).baseline.empty());
+  EXPECT_TRUE(close_recording(path_));
+  EXPECT_TRUE(read_recording(path_).baseline.empty());
+  expect_frames(1);
+  unwrite(3, 4);
+  EXPECT_EQ(read_recording(path_).baseline.size(), elements) << "element 3 is dead";
 }
 
 TEST_F(RecordingClosing, WhileItIsRecordedIsRefusedAndCostsNothing) {

@@ -8,6 +8,7 @@
 #include <limits>
 #include <random>
 
+#include "lost_count.hpp"
 #include "palpate/files.hpp"
 #include "palpate/frame_recorder.hpp"
 #include "recording_rules.hpp"

@@ -45,6 +45,8 @@ TEST(UnknownReading, IsWhatFloat32DoesNotHold) {
   const Frame frame{.values = {1.0, nan, infinity, nan}};
   EXPECT_EQ(unknown_readings(frame, {}), 3u);
   EXPECT_EQ(unknown_readings(frame, std::vector<std::uint8_t>{1, 0, 1, 1}), 2u);
+  // A frame without a known reading is lost, and has none that are unknown besides.
+  EXPECT_EQ(unknown_readings(frame, std::vector<std::uint8_t>{0, 1, 1, 1}), 0u);
 }
 
 TEST(UnknownReading, HugeReadingsLeaveNoTraceInLaterTouches) {

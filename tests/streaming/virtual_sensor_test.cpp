@@ -208,6 +208,19 @@ TEST_F(ReplayedFile, ComesAsItWasRecorded) {
   EXPECT_EQ(sensor->counters().lost, 3u);
 }
 
+// More lost frames than a count holds, at times of a clock that is set back.
+TEST_F(ReplayedFile, CountsAndTimesThatAFileMayHold) {
+  constexpr std::uint64_t most = std::uint64_t{1} << 53;
+  for (std::size_t i = 0; i < 50; ++i) {
+    recording_.lost_before[i] = most;
+    recording_.time_s[i] -= i < 25 ? 0.0 : 3600.0;
+  }
+  const auto sensor = open_virtual_sensor(saved() + ",speed=max");
+  EXPECT_NEAR(sensor->description().rate_hz, 49.0 / 0.48, 1e-3);  // as times are good to 2.4e-7 s
+  EXPECT_EQ(frames_of(*sensor).size(), 50u);
+  EXPECT_EQ(sensor->counters().lost, most);
+}
+
 TEST_F(ReplayedFile, TakesItsTime) {
   const auto sensor = open_virtual_sensor(saved() + ",speed=5");
   const auto begin = std::chrono::steady_clock::now();

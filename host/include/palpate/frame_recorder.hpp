@@ -38,12 +38,13 @@ class FrameRecorder {
   /// Keeps a place in the file for a baseline that is known only later; a file that is cut off
   /// before has none. To be called before the first frame is added.
   void expect_baseline();
-  /// Stores the baseline, [e], after expect_baseline(). @throws Error on another size or where the
-  /// disk is full
+  /// Stores the baseline, [e]. @throws Error (Fault::input) on another size, or where frames are
+  /// saved already and the file keeps no place for it; the recorder can be used on. Throws Error
+  /// (Fault::system) where the disk is full
   void set_baseline(std::vector<double> baseline);
 
-  /// Appends a frame. One without a known reading, or with a time that is not finite, counts as
-  /// lost: see `lost()`.
+  /// Appends a frame. A frame that is not is_readable() counts as lost instead: with the next frame
+  /// in the file, and in lost() even where no frame follows.
   /// @throws Error (Fault::input) on a frame of another size, (Fault::system) where the disk is
   /// full
   void add(const Frame& frame);
@@ -53,8 +54,10 @@ class FrameRecorder {
   void close();
 
   std::uint64_t frames() const;            ///< added so far
-  std::uint64_t lost() const;              ///< lost so far, as the frames say
-  std::uint64_t unknown_readings() const;  ///< so far, see is_known(); dead elements do not count
+  std::uint64_t with_pose() const;         ///< of them, with a pose that is finite
+  std::uint64_t lost() const;              ///< lost so far, as the frames say, and unreadable()
+  std::uint64_t unreadable() const;        ///< given to add() so far, and counted as lost
+  std::uint64_t unknown_readings() const;  ///< of frames(), see unknown_readings()
 
  private:
   struct Impl;

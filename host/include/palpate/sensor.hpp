@@ -33,9 +33,28 @@ struct Frame {
   std::optional<Pose> T_robot_sensor = {};   ///< where the source knows it: replays and simulations
 };
 
-/// How many of a frame's readings are Unknown. Dead elements do not count.
+/// Whether a frame says anything: an element that is alive has a known reading, or all are dead,
+/// and its time is finite. Every other frame counts as a lost frame, and its readings do not count
+/// as unknown ones.
+/// @param valid empty or [e]; 0 = dead element
+inline bool is_readable(const Frame& frame, std::span<const std::uint8_t> valid) {
+  bool any_alive = false;
+  bool any_known = false;
+  for (std::size_t i = 0; i < frame.values.size(); ++i) {
+    const bool alive = valid.empty() || valid[i] != 0;
+    any_alive = any_alive || alive;
+    any_known = any_known || (alive && is_known(frame.values[i]));
+  }
+  return (any_known || !any_alive) && std::isfinite(frame.host_time_s);
+}
+
+/// How many readings of a frame that is_readable() are Unknown; 0 of another. Dead elements do not
+/// count.
 /// @param valid empty or [e]; 0 = dead element
 inline std::size_t unknown_readings(const Frame& frame, std::span<const std::uint8_t> valid) {
+  if (!is_readable(frame, valid)) {
+    return 0;
+  }
   std::size_t count = 0;
   for (std::size_t i = 0; i < frame.values.size(); ++i) {
     count += (valid.empty() || valid[i] != 0) && !is_known(frame.values[i]) ? 1 : 0;

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <optional>
 
-namespace palpate::cli {
+namespace palpate {
 
 /// How long a stream of frames has run by their host times. The host's clock may be set meanwhile:
 /// a step back counts as no time, so that nothing waits until the clock has caught up; a step
@@ -24,4 +24,4 @@ class StreamTime {
   double elapsed_s_ = 0.0;
 };
 
-}  // namespace palpate::cli
+}  // namespace palpate
