@@ -13,14 +13,14 @@ namespace palpate::cli {
 
 namespace {
 
-/// The smallest distance between two elements that do not coincide; infinite where there are none.
-/// Sweeps along x over those elements alone that lie less than the distance so far behind.
-double least_distance_mm(std::vector<glm::dvec2> elements_mm) {
+/// The smallest distance between two elements that are further apart than `tiny_mm`; infinite where
+/// there are none. Sweeps along x over those elements alone that lie less than the distance so far
+/// behind.
+double least_distance_mm(std::vector<glm::dvec2> elements_mm, double tiny_mm) {
   const auto before = [](const glm::dvec2& a, const glm::dvec2& b) {
     return std::tie(a.x, a.y) < std::tie(b.x, b.y);
   };
   std::ranges::sort(elements_mm, before);
-  elements_mm.erase(std::unique(elements_mm.begin(), elements_mm.end()), elements_mm.end());
   double least = std::numeric_limits<double>::infinity();
   std::set<std::pair<double, double>> near;  // y and x
   auto last = elements_mm.begin();
@@ -28,11 +28,19 @@ double least_distance_mm(std::vector<glm::dvec2> elements_mm) {
     for (; p.x - last->x > least; ++last) {
       near.erase({last->y, last->x});
     }
+    bool coincides = false;
     for (auto q = near.lower_bound({p.y - least, -std::numeric_limits<double>::infinity()});
          q != near.end() && q->first - p.y <= least; ++q) {
-      least = std::min(least, std::hypot(p.x - q->second, p.y - q->first));
+      const double distance = std::hypot(p.x - q->second, p.y - q->first);
+      if (distance <= tiny_mm) {
+        coincides = true;
+      } else {
+        least = std::min(least, distance);
+      }
     }
-    near.emplace(p.y, p.x);
+    if (!coincides) {
+      near.emplace(p.y, p.x);
+    }
   }
   return least;
 }
@@ -43,13 +51,17 @@ ArrayPicture::ArrayPicture(const std::vector<glm::dvec2>& elements_mm) {
   if (elements_mm.empty()) {
     return;
   }
-  const double least_mm = least_distance_mm(elements_mm);
-  half_mm_ = std::isfinite(least_mm) ? 0.5 * least_mm : 1.0;
   lower_mm_ = upper_mm_ = elements_mm.front();
   for (const glm::dvec2& p : elements_mm) {
     lower_mm_ = glm::min(lower_mm_, p);
     upper_mm_ = glm::max(upper_mm_, p);
   }
+  // Positions that are meant to be the same may differ by rounding, which is some 1e-16 of a
+  // coordinate; no real array is a billion times wider than its elements are apart.
+  const glm::dvec2 largest_mm = glm::max(glm::abs(lower_mm_), glm::abs(upper_mm_));
+  const double tiny_mm = 1e-9 * std::max(largest_mm.x, largest_mm.y);
+  const double least_mm = least_distance_mm(elements_mm, tiny_mm);
+  half_mm_ = std::isfinite(least_mm) ? 0.5 * least_mm : 1.0;
   lower_mm_ -= half_mm_;
   upper_mm_ += half_mm_;
   placed_.reserve(elements_mm.size());
@@ -59,7 +71,7 @@ ArrayPicture::ArrayPicture(const std::vector<glm::dvec2>& elements_mm) {
   }
   std::ranges::sort(placed_, {},
                     [](const Placed& p) { return std::tuple(p.row, p.column, p.element); });
-  // Of elements that coincide only the first is ever seen.
+  // Of elements that coincide exactly only the first is ever seen.
   const auto end =
       std::unique(placed_.begin(), placed_.end(),
                   [](const Placed& a, const Placed& b) { return a.centre_mm == b.centre_mm; });
@@ -77,7 +89,9 @@ double ArrayPicture::column_of(double x_mm) const {
 std::optional<std::size_t> ArrayPicture::element_at(const glm::dvec2& p_mm) const {
   std::optional<std::size_t> found;
   // An element that covers the point has its centre in the point's cell or in one beside it.
-  for (double row = row_of(p_mm.y) - 1.0, last = row + 2.0; row <= last; ++row) {
+  // Rows are counted as integers: far away, a row and the next one are the same number.
+  for (int beside = -1; beside <= 1; ++beside) {
+    const double row = row_of(p_mm.y) + beside;
     const double column = column_of(p_mm.x);
     const auto in_row = [](const Placed& p, const std::pair<double, double>& cell) {
       return std::pair(p.row, p.column) < cell;

@@ -126,7 +126,7 @@ void live(const Options& options) {
   add_sensor_files(options.sensor, options.poses, files);
   add_recognition_files(options.recognition, scene, task, files);
   if (!options.json.empty()) {
-    files.writes("--json", options.json);
+    files.writes("--json", options.json, CommandFiles::Dash::stream);
   }
   files.require_distinct();
   Device device = Device::open(task.device);

@@ -62,6 +62,9 @@ void draw_pressure(TerminalCanvas& canvas, const Panel& panel, const LiveView& v
                  if (!alive(view, *element)) {
                    return Pixel{.colour = grey, .mark = 'x'};
                  }
+                 if (std::isnan(view.pressure[*element])) {
+                   return Pixel{.colour = white, .mark = '?'};
+                 }
                  const double part = view.pressure[*element] / view.full_scale;
                  return Pixel{.colour = sequential(part), .shade = part};
                });

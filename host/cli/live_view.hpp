@@ -28,8 +28,8 @@ struct LiveView {
 
   std::vector<glm::dvec2> elements_mm;  ///< [e] in the sensor frame
   std::vector<std::uint8_t> valid;      ///< empty or [e]
-  std::vector<double> pressure;         ///< [e] now, above the baseline; empty: none yet
-  double full_scale = 1.0;              ///< pressure of the brightest colour
+  std::vector<double> pressure;  ///< [e] now, above the baseline, NaN: Unknown; empty: none yet
+  double full_scale = 1.0;       ///< pressure of the brightest colour
   std::string pressure_unit;
 
   std::vector<std::string> labels;

@@ -76,7 +76,7 @@ void check_outputs(const Options& options, const Scene& scene, const Recognition
     files.writes("--posterior", options.posterior);
   }
   if (!options.json.empty()) {
-    files.writes("--json", options.json);
+    files.writes("--json", options.json, CommandFiles::Dash::stream);
   }
   if (!options.png.empty()) {
     for (const Unknown& unknown : unknowns) {

@@ -227,9 +227,10 @@ void add_record(CLI::App& app) {
       ->add_option("-o,--output", options->output,
                    "Recording of frames to write (HDF5); an older file is replaced")
       ->required();
-  command->add_option("--seconds", options->seconds,
-                      "End after this time, in seconds. A simulation that runs at more than 100 "
-                      "times real time needs it, unless its touches= are given");
+  command->add_option(
+      "--seconds", options->seconds,
+      "End after this time, in seconds. A simulation that gives more than 10 MB a "
+      "second, by rate=, array= and speed=, needs it, unless its touches= are given");
   command->add_option("--poses", options->poses, poses_help);
   command
       ->add_option("--tare", options->tare_s,

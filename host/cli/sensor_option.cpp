@@ -16,7 +16,7 @@ void add_sensor_files(const std::string& name, const std::string& poses, Command
     files.reads("--sensor", *file);
   }
   if (!poses.empty()) {
-    files.reads("--poses", poses);
+    files.reads("--poses", poses, CommandFiles::Dash::stream);
   }
 }
 
@@ -24,6 +24,10 @@ void report_refused(const PosedSensor::Poses& poses) {
   if (poses.refused > 0) {
     fmt::print(stderr, "palpate: {} lines were no poses or out of order; the first: {}\n",
                poses.refused, poses.first_refused);
+  }
+  if (poses.set_back > 0) {
+    fmt::print(stderr, "palpate: the clock of the poses was set back {}\n",
+               poses.set_back == 1 ? "once" : fmt::format("{} times", poses.set_back));
   }
 }
 

@@ -15,6 +15,9 @@ namespace {
 
 constexpr std::string_view reset = "\033[0m";
 
+/// Within [0, 1]; 0 for what is not a number, which no integer stands for.
+double in_unit(double v) { return std::isnan(v) ? 0.0 : std::clamp(v, 0.0, 1.0); }
+
 struct Bytes {
   int red;
   int green;
@@ -22,9 +25,7 @@ struct Bytes {
 };
 
 Bytes bytes_of(const Colour& colour) {
-  const auto byte = [](double c) {
-    return static_cast<int>(std::lround(255.0 * std::clamp(c, 0.0, 1.0)));
-  };
+  const auto byte = [](double c) { return static_cast<int>(std::lround(255.0 * in_unit(c))); };
   return {byte(colour.red), byte(colour.green), byte(colour.blue)};
 }
 
@@ -64,7 +65,7 @@ char ascii_of(const Pixel& upper, const Pixel& lower) {
     return upper.mark != 0 ? upper.mark : lower.mark;
   }
   constexpr std::string_view ramp = " .:-=+*#%@";
-  const double shade = std::clamp(0.5 * (upper.shade + lower.shade), 0.0, 1.0);
+  const double shade = in_unit(0.5 * (upper.shade + lower.shade));
   return ramp[static_cast<std::size_t>(std::lround(shade * static_cast<double>(ramp.size() - 1)))];
 }
 
@@ -98,7 +99,7 @@ void TerminalCanvas::text(int column, int row, std::string_view text, bool stron
 
 void TerminalCanvas::bar(int column, int row, int columns, double fraction, const Colour& colour) {
   constexpr std::array<const char*, 9> eighths{" ", "▏", "▎", "▍", "▌", "▋", "▊", "▉", "█"};
-  const auto filled = static_cast<int>(std::lround(8.0 * columns * std::clamp(fraction, 0.0, 1.0)));
+  const auto filled = static_cast<int>(std::lround(8.0 * columns * in_unit(fraction)));
   for (int i = 0; i < columns; ++i) {
     if (Cell* cell = at(column + i, row)) {
       const int part = std::clamp(filled - 8 * i, 0, 8);

@@ -61,7 +61,8 @@ void close_input(const std::string& frames) {
     }
   } catch (const Error& error) {
     // The touches are found; a disk for reading only is no reason to fail.
-    fmt::print("{}; only Palpate and readers of SWMR open it\n", error.what());
+    fmt::print(stderr, "palpate: {} (until then only Palpate and readers of SWMR open it)\n",
+               error.what());
   }
 }
 

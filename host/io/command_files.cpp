@@ -20,10 +20,9 @@ namespace {
 using Place = std::pair<FileIdentity, std::filesystem::path>;
 
 /// None for what cannot be overwritten, such as a terminal.
-std::optional<Place> place_of(const std::filesystem::path& file, int stream) {
+std::optional<Place> place_of(const std::filesystem::path& file, std::optional<int> stream) {
   struct stat status {};
-  const bool found =
-      file == "-" ? ::fstat(stream, &status) == 0 : ::stat(file.c_str(), &status) == 0;
+  const bool found = stream ? ::fstat(*stream, &status) == 0 : ::stat(file.c_str(), &status) == 0;
   if (!found) {
     std::error_code ignored;
     // Absolute first: what exists of a relative path may be nothing, and then it stays as it is.
@@ -36,35 +35,42 @@ std::optional<Place> place_of(const std::filesystem::path& file, int stream) {
   return Place{identity_of(status), {}};
 }
 
-void require_open(const std::string& flag, const std::filesystem::path& file, int stream,
-                  const char* name) {
-  if (file == "-" && was_closed(stream)) {
+void require_open(const std::string& flag, int stream, const char* name) {
+  if (was_closed(stream)) {
     throw Error(Fault::input, fmt::format("{} -: standard {} is closed; name a file", flag, name));
   }
 }
 
 }  // namespace
 
-void CommandFiles::reads(const std::string& flag, const std::filesystem::path& file) {
-  require_open(flag, file, STDIN_FILENO, "input");
-  read_.push_back({flag, file});
+void CommandFiles::reads(const std::string& flag, const std::filesystem::path& file, Dash dash) {
+  const bool is_stream = dash == Dash::stream && file == "-";
+  if (is_stream) {
+    require_open(flag, STDIN_FILENO, "input");
+  }
+  read_.push_back({flag, file, is_stream});
 }
 
-void CommandFiles::writes(const std::string& flag, const std::filesystem::path& file) {
-  require_open(flag, file, STDOUT_FILENO, "output");
-  written_.push_back({flag, file});
+void CommandFiles::writes(const std::string& flag, const std::filesystem::path& file, Dash dash) {
+  const bool is_stream = dash == Dash::stream && file == "-";
+  if (is_stream) {
+    require_open(flag, STDOUT_FILENO, "output");
+  }
+  written_.push_back({flag, file, is_stream});
 }
 
 void CommandFiles::require_distinct() const {
   // Every file so far, with what becomes of it.
   std::map<Place, std::pair<const Named*, const char*>> taken;
   for (const Named& input : read_) {
-    if (const auto place = place_of(input.file, STDIN_FILENO)) {
+    if (const auto place =
+            place_of(input.file, input.is_stream ? std::optional(STDIN_FILENO) : std::nullopt)) {
       taken.emplace(*place, std::pair{&input, "reads"});
     }
   }
   for (const Named& output : written_) {
-    const auto place = place_of(output.file, STDOUT_FILENO);
+    const auto place =
+        place_of(output.file, output.is_stream ? std::optional(STDOUT_FILENO) : std::nullopt);
     if (!place) {
       continue;
     }

@@ -11,12 +11,15 @@ namespace palpate {
 /// another name of the same file does not hide that.
 class CommandFiles {
  public:
-  /// Adds a file that the command reads; "-" is standard input.
-  /// @throws Error (Fault::input) where that is closed
-  void reads(const std::string& flag, const std::filesystem::path& file);
-  /// Adds a file that the command writes, which need not exist; "-" is standard output.
-  /// @throws Error (Fault::input) where that is closed
-  void writes(const std::string& flag, const std::filesystem::path& file);
+  /// What "-" names: a file called so, or standard input or output.
+  enum class Dash { file, stream };
+
+  /// Adds a file that the command reads.
+  /// @throws Error (Fault::input) where it is standard input, and closed
+  void reads(const std::string& flag, const std::filesystem::path& file, Dash dash = Dash::file);
+  /// Adds a file that the command writes, which need not exist.
+  /// @throws Error (Fault::input) where it is standard output, and closed
+  void writes(const std::string& flag, const std::filesystem::path& file, Dash dash = Dash::file);
 
   /// To be called before the work, which may take hours, and before anything is written. Compares
   /// existing regular files and FIFOs by device and inode, files to come by their paths. Terminals
@@ -28,6 +31,7 @@ class CommandFiles {
   struct Named {
     std::string flag;
     std::filesystem::path file;
+    bool is_stream = false;
   };
   std::vector<Named> read_;
   std::vector<Named> written_;

@@ -208,7 +208,8 @@ void PoseReader::refuse_line(Flaw flaw, std::uint64_t line, std::string_view pro
   if (is_file_) {
     throw Error(Fault::input, text);
   }
-  if (first_refused_.empty()) {
+  if (first_refused_.empty() &&
+      flaw != Flaw::clock_set_back) {  // those poses have joined the track
     first_refused_ = text;
   }
   const auto kind = static_cast<std::size_t>(flaw);

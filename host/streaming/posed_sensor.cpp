@@ -138,6 +138,7 @@ PosedSensor::Poses PosedSensor::poses() const {
   Poses counts = impl_->counts;
   counts.read = impl_->reader.poses();
   counts.refused = impl_->reader.refused();
+  counts.set_back = impl_->track.set_back();
   counts.first_refused = impl_->reader.first_refused();
   return counts;
 }

@@ -63,7 +63,6 @@ class SourceName {
   }
 
   const std::string& what() const { return what_; }
-  bool has(std::string_view key) const { return options_.contains(key); }
 
   template <typename Number>
   std::optional<Number> number(std::string_view key, Number least, Number most) const {
@@ -153,6 +152,18 @@ class SourceName {
   std::map<std::string_view, std::string_view> options_;
 };
 
+SimulatedSensorOptions options_of(const SourceName& source) {
+  SimulatedSensorOptions options;
+  options.rate_hz = source.number("rate", 1.0, 1e5).value_or(options.rate_hz);
+  options.seed = source.number<std::uint64_t>("seed", 0, UINT64_MAX).value_or(options.seed);
+  options.touches = source.number<std::uint64_t>("touches", 1, 1'000'000'000);
+  options.noise_kpa = source.number("noise", 0.0, 1e3).value_or(options.noise_kpa);
+  options.T_object_robot = source.object_pose(options.seed);
+  options.elements_mm = source.array();
+  options.speed = source.speed();
+  return options;
+}
+
 }  // namespace
 
 bool is_virtual_sensor(std::string_view name) {
@@ -171,9 +182,16 @@ bool is_endless_flood(const std::string& name) {
   if (!name.starts_with(simulate)) {
     return false;
   }
-  const SourceName source(name, simulate, simulate_keys);
-  constexpr double fast = 100.0;
-  return !source.has("touches") && source.speed().value_or(fast + 1.0) > fast;
+  const SimulatedSensorOptions options = options_of(SourceName(name, simulate, simulate_keys));
+  // 6 GB in ten minutes: a recording that somebody forgets for so long still fits on most disks.
+  // The DigiTacts array writes 1.8 MB/s at 100 Hz and 100 times real time.
+  constexpr double most_bytes_per_s = 10e6;
+  const std::size_t elements =
+      options.elements_mm.empty() ? digitacts_array().size() : options.elements_mm.size();
+  // Readings are stored as floats; time, losses and a pose of three numbers take 8 bytes each.
+  const auto frame_bytes = static_cast<double>(elements * sizeof(float) + 5 * sizeof(double));
+  return !options.touches &&
+         (!options.speed || options.rate_hz * *options.speed * frame_bytes > most_bytes_per_s);
 }
 
 std::unique_ptr<Sensor> open_virtual_sensor(const std::string& name) {
@@ -185,15 +203,7 @@ std::unique_ptr<Sensor> open_virtual_sensor(const std::string& name) {
     throw Error(Fault::input, fmt::format("sensor {}: write replay:FILE or simulate:SHAPE", name));
   }
   const SourceName source(name, simulate, simulate_keys);
-  SimulatedSensorOptions options;
-  options.rate_hz = source.number("rate", 1.0, 1e5).value_or(options.rate_hz);
-  options.seed = source.number<std::uint64_t>("seed", 0, UINT64_MAX).value_or(options.seed);
-  options.touches = source.number<std::uint64_t>("touches", 1, 1'000'000'000);
-  options.noise_kpa = source.number("noise", 0.0, 1e3).value_or(options.noise_kpa);
-  options.T_object_robot = source.object_pose(options.seed);
-  options.elements_mm = source.array();
-  options.speed = source.speed();
-  return std::make_unique<SimulatedSensor>(source.what(), options);
+  return std::make_unique<SimulatedSensor>(source.what(), options_of(source));
 }
 
 }  // namespace palpate

@@ -99,6 +99,28 @@ TEST(ArrayPicture, OfOneElementIsTwoMillimetresWide) {
   EXPECT_EQ(picture.upper_mm(), glm::dvec2(4.0, 5.0));
 }
 
+// 0.1 + 0.2 is not 0.3, and lists of elements are made by adding.
+TEST(ArrayPicture, ElementsThatCoincideButForRoundingAreOne) {
+  const Elements elements{{0.3, 0.1 + 0.2}, {0.1 + 0.2, 0.3}, {4.3, 0.3}, {0.3, 4.3}, {0.3, 0.3}};
+  const ArrayPicture picture(elements);
+  EXPECT_NEAR(picture.lower_mm().x, -1.7, 1e-9);  // 4 mm apart
+  EXPECT_NEAR(picture.upper_mm().y, 6.3, 1e-9);
+  EXPECT_EQ(picture.element_at({1.0, 1.0}), 0u);
+  EXPECT_EQ(picture.element_at({4.0, 1.0}), 2u);
+  EXPECT_EQ(picture.element_at({4.0, 4.0}), std::nullopt);
+  const ArrayPicture alone({{0.3, 0.0}, {0.1 + 0.2, 0.0}});
+  EXPECT_NEAR(alone.upper_mm().x, 1.3, 1e-9) << "as wide as of one element";
+}
+
+// Beyond 2^53 a row and the next one are the same number.
+TEST(ArrayPicture, AnswersHoweverFarAwayThePointIs) {
+  const ArrayPicture picture({{0.0, 0.0}, {1.0, 0.0}});
+  for (const double far : {1e15, 1e16, 1e300}) {
+    EXPECT_EQ(picture.element_at({0.0, far}), std::nullopt);
+    EXPECT_EQ(picture.element_at({far, 0.0}), std::nullopt);
+  }
+}
+
 TEST(ArrayPicture, OfNothingIsEmpty) {
   EXPECT_EQ(ArrayPicture({}).element_at({0.0, 0.0}), std::nullopt);
   EXPECT_EQ(ArrayPicture({{0.0, 0.0}, {0.0, 0.0}}).element_at({0.5, 0.5}), 0u);

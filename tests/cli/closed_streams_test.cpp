@@ -2,6 +2,8 @@
 
 #include <unistd.h>
 
+#include <fstream>
+
 #include "program.hpp"
 #include "sample_files.hpp"
 
@@ -26,12 +28,12 @@ TEST_F(ClosedStreams, NothingPrintedLandsInAFile) {
     const Outcome outcome = palpate(live, {.closed = closed});
     EXPECT_EQ(outcome.status, 0) << outcome.err;
     EXPECT_EQ(outcome.err, "");
-    const std::string lines = bytes_of(folder_ / "f");
-    EXPECT_EQ(std::count(lines.begin(), lines.end(), '\n'), 2) << lines;
-    for (std::size_t begin = 0; begin < lines.size(); begin = lines.find('\n', begin) + 1) {
-      const std::string line = lines.substr(begin, lines.find('\n', begin) - begin);
+    std::ifstream file(folder_ / "f");
+    int lines = 0;
+    for (std::string line; std::getline(file, line); ++lines) {
       EXPECT_TRUE(nlohmann::json::accept(line)) << line;
     }
+    EXPECT_EQ(lines, 2);
   }
 }
 
@@ -65,6 +67,14 @@ TEST_F(ClosedStreams, AreRefusedWhereTheyAreNamed) {
                                   {.closed = {STDIN_FILENO}});
   EXPECT_EQ(outcome.status, 2);
   EXPECT_EQ(outcome.err, "palpate: --poses -: standard input is closed; name a file\n");
+}
+
+// Of most flags "-" is a file of that name.
+TEST_F(ClosedStreams, AreNotAskedForByAFileCalledDash) {
+  const Outcome outcome =
+      palpate({"simulate", "A", "--touches", "3", "-o", "-"}, {.closed = every});
+  EXPECT_EQ(outcome.status, 0);
+  EXPECT_EQ(read_recording(folder_ / "-").size(), 3u);
 }
 
 TEST_F(ClosedStreams, KeepTheStatus) {

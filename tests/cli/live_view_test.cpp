@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <limits>
 
 #include "sample_files.hpp"
 
@@ -100,6 +101,35 @@ TEST(LiveView, DrawsTheArrayAsItLies) {
   });
   ASSERT_NE(touched, lines.end()) << joined(lines);
   EXPECT_LT(touched->find('@', 34), touched->find('o', 34));
+}
+
+// An element may miss readings for a while, which are Unknown.
+TEST(LiveView, AnUnknownReadingHasAMarkAndAColourOfItsOwn) {
+  const OccupancyGrid map = sample_map("E");
+  LiveView view = sample_view(map);
+  const auto array_of = [&](TerminalColours colours) {
+    std::string text;
+    for (const std::string& line : draw(view, 80, 24, colours)) {
+      text += line.substr(0, colours == TerminalColours::none ? 32 : line.size()) + "\n";
+    }
+    return text;
+  };
+  const auto colours = {TerminalColours::palette, TerminalColours::direct};
+  std::vector<std::string> before;
+  for (const TerminalColours c : colours) {
+    before.push_back(array_of(c));
+  }
+  EXPECT_EQ(array_of(TerminalColours::none).find('?'), std::string::npos);
+  view.pressure[1] = std::numeric_limits<double>::quiet_NaN();
+  const std::string plain = array_of(TerminalColours::none);
+  EXPECT_NE(plain.find("??"), std::string::npos) << plain;
+  EXPECT_NE(plain.find("xx"), std::string::npos) << "dead is another thing:\n" << plain;
+  std::size_t i = 0;
+  for (const TerminalColours c : colours) {
+    EXPECT_NE(array_of(c), before[i++]) << "0 is another thing";
+  }
+  view.valid[1] = 0;
+  EXPECT_EQ(array_of(TerminalColours::none).find('?'), std::string::npos) << "dead, not Unknown";
 }
 
 // With every element against every other, and against every pixel, this would take minutes.

@@ -143,6 +143,24 @@ TEST_F(Overwriting, RecordKeepsTheReplayAndThePoses) {
               {"record", "--sensor", presses, "--poses", "poses.jsonl"});
 }
 
+// "-" is a stream for --json and --poses alone, and a file of that name for all others.
+TEST_F(Overwriting, AFileCalledDashIsKept) {
+  done({"record", "--sensor", presses, "-o", "-"});
+  ASSERT_TRUE(std::filesystem::is_regular_file(folder_ / "-"));
+  for (const char* name : {"-", "./-"}) {
+    expect_refused({"touches", "-", "-o", name}, {"FRAMES reads", "overwrite"});
+    expect_refused({"record", "--sensor", "replay:-,speed=max", "-o", name},
+                   {"--sensor reads", "overwrite"});
+  }
+  std::filesystem::copy(folder_ / "u.h5", folder_ / "-",
+                        std::filesystem::copy_options::overwrite_existing);
+  expect_refused({"recognize", "-", "--maps", "maps", "--posterior", "-"},
+                 {"--posterior -", "RECORDING reads"});
+  expect_refused({"recognize", "-", "--maps", "maps", "--json", "./-"},
+                 {"--json ./-", "RECORDING reads"});
+  done({"recognize", "-", "--maps", "maps", "--bins", "5x5x4", "--json", "-"});
+}
+
 TEST_F(Overwriting, RecordKeepsTheProfile) {
   put_bytes(folder_ / "board.yaml", "name: A board\n");
   expect_kept("board.yaml", "-o", "--sensor", {"record", "--sensor", "board.yaml:serial 7"});

@@ -27,6 +27,7 @@ struct Surroundings {
   std::filesystem::path standard_output;     ///< a file in the place of Outcome::out
   std::filesystem::path standard_error;      ///< a file in the place of Outcome::err
   std::filesystem::path standard_input;      ///< a file in the place of the test's own
+  bool obeys_permissions = false;            ///< even where the test runs as root
   std::vector<int> closed;                   ///< standard streams that are closed, as a daemon's
 };
 

@@ -287,8 +287,9 @@ TEST_F(RecordCommand, KilledDuringTheTareItLeavesTheFrames) {
 }
 
 TEST_F(RecordCommand, AFloodWithoutAnEndIsRefused) {
-  for (const char* speed : {"speed=max", "speed=1e6", "speed=101"}) {
-    expect_refused({"record", "--sensor", fmt::format("simulate:A,{}", speed), "-o", "s.h5"},
+  for (const char* flood : {"speed=max", "speed=1e6", "rate=1000,speed=101", "rate=100000",
+                            "rate=1000,array=64:64:1"}) {
+    expect_refused({"record", "--sensor", fmt::format("simulate:A,{}", flood), "-o", "s.h5"},
                    {"simulate:A", "--seconds", "touches=N"});
   }
   expect_named(done({"record", "--sensor", "simulate:A,speed=max", "-o", "s.h5", "--seconds", "1"}),

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <limits>
+
 namespace palpate::cli {
 namespace {
 
@@ -42,6 +44,20 @@ TEST(TerminalCanvas, TakesTheNearestOfAPaletteOf256Colours) {
   EXPECT_EQ(code_of({0.0, 0.0, 1.0}), "21");
   EXPECT_EQ(code_of({1.0, 0.5, 0.0}), "208");
   EXPECT_EQ(code_of({0.5, 0.5, 0.5}), "244");
+}
+
+TEST(TerminalCanvas, NotANumberIsBlankAndBlack) {
+  constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+  TerminalCanvas canvas(3, 1);
+  canvas.pixel(0, 0, {.colour = {nan, nan, nan}, .shade = nan});
+  canvas.pixel(1, 0, {.shade = 1.0});
+  canvas.pixel(1, 1, {.shade = 1.0});
+  EXPECT_EQ(line_of(canvas, TerminalColours::none), " @");
+  EXPECT_TRUE(line_of(canvas, TerminalColours::direct).starts_with("\033[38;2;0;0;0m"));
+  EXPECT_TRUE(line_of(canvas, TerminalColours::palette).starts_with("\033[38;5;16m"));
+  TerminalCanvas bar(3, 1);
+  bar.bar(0, 0, 3, nan, ink);
+  EXPECT_EQ(line_of(bar, TerminalColours::none), "");
 }
 
 }  // namespace

@@ -1,6 +1,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "palpate/files.hpp"
@@ -20,6 +21,29 @@ class TouchesCommand : public ProgramTest {
     done({"record", "--sensor", sensor + ",speed=max", "-o", name + ".frames.h5"});
     done({"touches", name + ".frames.h5", "-o", name + ".h5"});
     return read_recording(folder_ / (name + ".h5"));
+  }
+
+  // The frames of three touches: whole.h5, and cut.h5, whose recorder was killed.
+  void cut_off() const {
+    done({"record", "--sensor", "simulate:A,touches=3,speed=max", "-o", "whole.h5"});
+    const Recording whole = read_recording(folder_ / "whole.h5");
+    const pid_t pid = ::fork();
+    if (pid == 0) {
+      FrameRecorder recorder(folder_ / "cut.h5",
+                             {.elements_mm = whole.elements_mm, .baseline = whole.baseline});
+      for (std::size_t i = 0; i < whole.size(); ++i) {
+        const Touch row = whole.touch(i);
+        recorder.add({.host_time_s = whole.time_s[i],
+                      .values = {row.pressure.begin(), row.pressure.end()},
+                      .T_robot_sensor = row.T_robot_sensor});
+      }
+      recorder.flush();
+      ::_exit(0);  // as a kill: nothing is closed
+    }
+    int status = -1;
+    ::waitpid(pid, &status, 0);
+    ASSERT_EQ(status, 0);
+    ASSERT_FALSE(read_recording(folder_ / "cut.h5").closed);
   }
 };
 
@@ -57,31 +81,26 @@ TEST_F(TouchesCommand, LettersAreRecognisedByWhatTheyFound) {
 }
 
 TEST_F(TouchesCommand, StreamThatWasCutOffIsClosedForOthers) {
-  done({"record", "--sensor", "simulate:A,touches=3,speed=max", "-o", "whole.h5"});
-  const Recording whole = read_recording(folder_ / "whole.h5");
-  const pid_t pid = ::fork();
-  if (pid == 0) {
-    FrameRecorder recorder(folder_ / "cut.h5",
-                           {.elements_mm = whole.elements_mm, .baseline = whole.baseline});
-    for (std::size_t i = 0; i < whole.size(); ++i) {
-      const Touch row = whole.touch(i);
-      recorder.add({.host_time_s = whole.time_s[i],
-                    .values = {row.pressure.begin(), row.pressure.end()},
-                    .T_robot_sensor = row.T_robot_sensor});
-    }
-    recorder.flush();
-    ::_exit(0);  // as a kill: nothing is closed
-  }
-  int status = -1;
-  ::waitpid(pid, &status, 0);
-  ASSERT_EQ(status, 0);
-  ASSERT_FALSE(read_recording(folder_ / "cut.h5").closed);
+  cut_off();
   expect_named(done({"touches", "cut.h5", "-o", "t.h5"}), {"3 touches", "cut.h5: was cut off"});
   EXPECT_TRUE(read_recording(folder_ / "cut.h5").closed);
-  EXPECT_EQ(read_recording(folder_ / "cut.h5").size(), whole.size());
+  EXPECT_EQ(read_recording(folder_ / "cut.h5").size(), read_recording(folder_ / "whole.h5").size());
   const std::string before = bytes_of(folder_ / "cut.h5");
   EXPECT_EQ(done({"touches", "cut.h5", "-o", "t.h5"}).find("cut off"), std::string::npos);
   EXPECT_TRUE(bytes_of(folder_ / "cut.h5") == before);
+}
+
+// The touches are found: what cannot be closed is left as it is.
+TEST_F(TouchesCommand, StreamThatCannotBeClosedIsALineOfItsOwn) {
+  cut_off();
+  std::filesystem::permissions(folder_ / "cut.h5", std::filesystem::perms::owner_read);
+  const Outcome outcome = palpate({"touches", "cut.h5", "-o", "t.h5"}, {.obeys_permissions = true});
+  EXPECT_EQ(outcome.status, 0) << outcome.err;
+  expect_named(outcome.out, {"t.h5: 3 touches"});
+  EXPECT_EQ(outcome.out.find("closed"), std::string::npos) << outcome.out;
+  EXPECT_TRUE(outcome.err.starts_with("palpate: cut.h5: cannot be closed: ")) << outcome.err;
+  EXPECT_EQ(std::count(outcome.err.begin(), outcome.err.end(), '\n'), 1) << outcome.err;
+  EXPECT_EQ(read_recording(folder_ / "t.h5").size(), 3u);
 }
 
 TEST_F(TouchesCommand, DeadElementsUnitAndSensorAreCopied) {

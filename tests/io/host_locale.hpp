@@ -1,5 +1,6 @@
 #pragma once
 
+#include <clocale>
 #include <locale>
 #include <string>
 
@@ -12,16 +13,28 @@ class DecimalComma : public std::numpunct<char> {
   std::string do_grouping() const override { return "\3"; }
 };
 
-/// C++'s global locale has decimal commas while this lives, as a host program may set it.
+/// C++'s global locale has decimal commas while this lives, as a host program may set it. So has
+/// C's locale where one that has them is installed: C takes none but those.
 class HostLocale {
  public:
   HostLocale()
-      : before_(std::locale::global(std::locale(std::locale::classic(), new DecimalComma))) {}
-  ~HostLocale() { std::locale::global(before_); }
+      : c_before_(std::setlocale(LC_ALL, nullptr)),
+        before_(std::locale::global(std::locale(std::locale::classic(), new DecimalComma))) {
+    for (const char* name : {"de_DE.UTF-8", "fr_FR.UTF-8", "es_ES.UTF-8", "de_DE"}) {
+      if (std::setlocale(LC_ALL, name) != nullptr) {
+        break;
+      }
+    }
+  }
+  ~HostLocale() {
+    std::locale::global(before_);
+    std::setlocale(LC_ALL, c_before_.c_str());
+  }
   HostLocale(const HostLocale&) = delete;
   HostLocale& operator=(const HostLocale&) = delete;
 
  private:
+  std::string c_before_;
   std::locale before_;
 };
 

@@ -156,6 +156,46 @@ TEST_F(PoseSource, EveryKindOfFaultIsSaidOnce) {
   EXPECT_EQ(sensor.poses().read, 11u);
 }
 
+// The poses of a clock that was set back join the track: none of their lines is refused.
+TEST_F(PoseSource, AClockThatIsSetBackRefusesNoLine) {
+  make_fifo();
+  PosedSensor sensor = open();
+  sensor.start();
+  std::string text;
+  for (const double step_s : {0.0, -3600.0, -7200.0}) {
+    for (int i = 0; i < 5; ++i) {
+      text += line(time_of(i) + step_s, 1.0);
+    }
+  }
+  ASSERT_EQ(send(text), text.size());
+  sensor.next(0ms);
+  ASSERT_EQ(complaints_.size(), 1u) << "said once";
+  expect_named(complaints_[0], {"line 6", "clock"});
+  EXPECT_EQ(sensor.poses().read, 15u);
+  EXPECT_EQ(sensor.poses().set_back, 2u);
+  EXPECT_EQ(sensor.poses().refused, 0u);
+  EXPECT_EQ(sensor.poses().first_refused, "");
+  ASSERT_EQ(send("nonsense\n"), 9u);
+  sensor.next(0ms);
+  EXPECT_EQ(sensor.poses().refused, 1u);
+  expect_named(sensor.poses().first_refused, {"line 16", "JSON"});
+}
+
+// As long as it may still come, which the clock decides after 0.2 s.
+TEST_F(PoseSource, FrameWaitsForThePoseAfterIt) {
+  make_fifo();
+  PosedSensor sensor = open();
+  sensor.start();
+  send(line(time_of(0), 0.0));
+  add_frames(0, 1);
+  EXPECT_FALSE(sensor.next(0ms));
+  send(line(time_of(1), 8.0));
+  const std::optional<Frame> frame = sensor.next(0ms);
+  ASSERT_TRUE(frame && frame->T_robot_sensor);
+  // Times since 1970 are good to 2.4e-7 s, and 800 mm pass in a second.
+  EXPECT_NEAR(frame->T_robot_sensor->translation_mm.x, 4.0, 1e-3);
+}
+
 TEST_F(PoseSource, FileWithAWrongStampNamesItsLine) {
   std::string text;
   for (int i = 0; i < 10; ++i) {

@@ -180,21 +180,5 @@ TEST_F(PosedSensorSource, FifoIsReadAsItComes) {
   expect_named(sensor.poses().first_refused, {"poses, line 2", "JSON"});
 }
 
-TEST_F(PosedSensorSource, FrameWaitsForThePoseAfterIt) {
-  ASSERT_EQ(::mkfifo(path_.c_str(), 0600), 0);
-  PosedSensor sensor = open(1, 1.0);
-  const std::jthread robot([&] {
-    std::ofstream writer(path_);
-    writer << line(99.9, 0.0) << std::flush;
-    std::this_thread::sleep_for(20ms);
-    writer << line(100.1, 8.0) << std::flush;
-  });
-  const std::vector<Frame> frames = frames_of(sensor);
-  ASSERT_EQ(frames.size(), 1u);
-  if (frames[0].T_robot_sensor) {  // on a busy machine the robot may be too late
-    EXPECT_NEAR(frames[0].T_robot_sensor->translation_mm.x, 4.0, 1e-9);
-  }
-}
-
 }  // namespace
 }  // namespace palpate

@@ -267,6 +267,15 @@ TEST_F(ReplayedFile, RefusesWhatIsNoStream) {
 TEST(VirtualSensor, KnowsWhatFloodsWithoutAnEnd) {
   EXPECT_TRUE(is_endless_flood("simulate:A,speed=max"));
   EXPECT_TRUE(is_endless_flood("simulate:A,rate=1000,speed=101"));
+  // 184 bytes a frame of 36 elements, and 16 KiB a frame of 4,096.
+  EXPECT_TRUE(is_endless_flood("simulate:A,rate=100000"));
+  EXPECT_TRUE(is_endless_flood("simulate:A,rate=1000,array=64:64:1"));
+  EXPECT_TRUE(is_endless_flood("simulate:A,array=64:64:1,speed=100"));
+  EXPECT_TRUE(is_endless_flood("simulate:A,rate=100000,array=1:1:1,speed=10"));
+  EXPECT_FALSE(is_endless_flood("simulate:A,rate=50000"));
+  EXPECT_FALSE(is_endless_flood("simulate:A,rate=1,speed=10000"));
+  EXPECT_FALSE(is_endless_flood("simulate:A,array=64:64:1"));
+  EXPECT_FALSE(is_endless_flood("simulate:A,rate=100000,touches=3"));
   EXPECT_FALSE(is_endless_flood("simulate:A,speed=100"));
   EXPECT_FALSE(is_endless_flood("simulate:A"));
   EXPECT_FALSE(is_endless_flood("simulate:A,touches=3,speed=max"));

@@ -78,10 +78,11 @@ class PosedSensor : public Sensor {
   /// What came from the robot, and since start() its frames.
   struct Poses {
     std::uint64_t read = 0;
-    std::uint64_t refused = 0;  ///< lines that are no pose, or out of the order of time
-    std::string first_refused;  ///< what was wrong with the first of them, naming the line
-    std::uint64_t frames = 0;   ///< frames with a pose
-    std::uint64_t without = 0;  ///< frames without one
+    std::uint64_t refused = 0;   ///< lines that are no pose, or out of the order of time
+    std::string first_refused;   ///< what was wrong with the first of them, naming the line
+    std::uint64_t set_back = 0;  ///< times the poses' clock went back; their lines are not refused
+    std::uint64_t frames = 0;    ///< frames with a pose
+    std::uint64_t without = 0;   ///< frames without one
   };
 
   /// Is told what is wrong with a line, naming it, when it is read: once for each kind of fault.

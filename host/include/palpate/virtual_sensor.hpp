@@ -17,8 +17,9 @@ bool is_virtual_sensor(std::string_view name);
 /// @throws Error (Fault::input) on an unknown option
 std::optional<std::filesystem::path> virtual_sensor_file(const std::string& name);
 
-/// True for a simulation that has no end and runs more than 100 times as fast as its frames' times:
-/// whoever keeps its frames needs an end of their own. @throws Error as open_virtual_sensor()
+/// True for a simulation that has no end and gives more than 10 MB of frames a second, by its rate,
+/// its speed and its array: whoever keeps its frames needs an end of their own.
+/// @throws Error (Fault::input) on an unknown or wrong option
 bool is_endless_flood(const std::string& name);
 
 /// A sensor without a board. Its frames wait for whoever is late; none is ever lost.
