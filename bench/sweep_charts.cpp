@@ -211,7 +211,7 @@ std::vector<NamedChart> charts_of(const SweepResult& result) {
       {chart_names[0], "Time against pose error", pose_chart(result),
        fmt::format(
            "Labels are bins per object, of which there are five, or particles in all. Solid "
-           "marks: maps of 0.5 mm cells; half filled: 0.25 mm; hollow: 1 mm. A refined pose "
+           "marks: maps of 0.5 mm cells; pale: 0.25 mm; hollow: 1 mm. A refined pose "
            "is drawn at the time of all estimates and one refinement after the last. Errors "
            "are over the trials whose mode has the right object; the front is of runs that "
            "recognise and locate all {} trials, where errors are from windows all those in "

@@ -94,7 +94,7 @@ std::string url_escaped(const std::string& bytes) {
   std::string escaped;
   for (const char c : bytes) {
     const bool plain = std::isalnum(static_cast<unsigned char>(c)) != 0 ||
-                       std::string_view(" -.,;:=/()").find(c) != std::string_view::npos;
+                       std::string_view(" -.,;:/()").find(c) != std::string_view::npos;
     escaped += plain ? std::string(1, c) : fmt::format("%{:02X}", static_cast<unsigned char>(c));
   }
   return escaped;

@@ -173,8 +173,8 @@ void record(const Options& options) {
     require_above("--seconds", *options.seconds, 0.0);
   } else if (is_endless_flood(options.sensor)) {
     throw Error(Fault::input,
-                fmt::format("sensor {}: frames without an end at this speed would fill the disk; "
-                            "give --seconds, touches=N or a lower speed",
+                fmt::format("sensor {}: frames without an end at this rate would fill the disk; "
+                            "give --seconds, touches=N, or a lower rate or speed",
                             options.sensor));
   }
   require_above("--tare", options.tare_s, 0.0, true);

@@ -179,9 +179,13 @@ EvidenceGrid::EvidenceGrid(gpu::Context& context, double cell_mm, const InverseS
       sensor_(sensor),
       kernel_(evidence_kernel(context, sensor)) {}
 
-void EvidenceGrid::require_room(const CellRange& range) const {
+bool EvidenceGrid::has_room(const CellRange& range) const {
   const gpu::Limits& limits = context_.limits();
-  if (bytes_of(range) > std::min({limits.storage_range, limits.allocation, limits.memory})) {
+  return bytes_of(range) <= std::min({limits.storage_range, limits.allocation, limits.memory});
+}
+
+void EvidenceGrid::require_room(const CellRange& range) const {
+  if (!has_room(range)) {
     throw Error(
         Fault::input,
         fmt::format("the map would have {} x {} cells of {} mm, more than device '{}' binds "
@@ -200,8 +204,7 @@ void EvidenceGrid::grow(const CellRange& needed) {
     // Room for what a moving sensor touches next, so that growing stays rare.
     const CellRange roomy{larger.x - larger.nx / 4, larger.y - larger.ny / 4,
                           larger.nx + larger.nx / 2, larger.ny + larger.ny / 2};
-    if (bytes_of(roomy) <=
-        std::min(context_.limits().storage_range, context_.limits().allocation)) {
+    if (has_room(roomy)) {
       larger = roomy;
     }
   }

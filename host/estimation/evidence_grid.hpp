@@ -40,6 +40,7 @@ class EvidenceGrid {
 
   /// Throws Error where the device cannot hold these cells.
   void require_room(const CellRange& range) const;
+  bool has_room(const CellRange& range) const;
   /// Adds readings, each to the cells within the radius and some beyond. Runs on the device in
   /// passes of bounded memory.
   void add(std::span<const ElementReading> readings, double radius_mm);

@@ -88,15 +88,17 @@ struct ParticleFilter::Impl {
 
   /// Uniform particles of equal weight.
   void start() {
-    touch = 0;
-    weighed = false;
-    prior_over_best = 0.0;
-    averages = LikelihoodAverages(options.alpha_slow, options.alpha_fast);
-    draw(shaders::DRAW_INITIAL, 0.0);
-    // No evidence, equal weights; the driver compiles the kernel now, and no touch waits for that.
-    likelihood.weigh({}, particles, size(), log_weights);
-    sum_weights();
     half_done.forget();
+    half_done.change([&] {
+      touch = 0;
+      weighed = false;
+      prior_over_best = 0.0;
+      averages = LikelihoodAverages(options.alpha_slow, options.alpha_fast);
+      draw(shaders::DRAW_INITIAL, 0.0);
+      // No evidence, equal weights; the driver compiles the kernel now, and no touch waits for it.
+      likelihood.weigh({}, particles, size(), log_weights);
+      sum_weights();
+    });
   }
 
   /// Records the drawing of all particles; see shaders::DrawPush.

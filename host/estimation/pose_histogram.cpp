@@ -247,7 +247,8 @@ struct PoseHistogram::Impl {
   double prior_log_likelihood = 0.0;      ///< of all touches, by the prior alone
   std::vector<Body> bodies;
   std::optional<std::vector<BeliefSummary>> summarised;
-  HalfDone half_done{"histogram: an update was broken off half-way; reset() the belief"};
+  HalfDone half_done{
+      "histogram: an update or a prepared touch was broken off half-way; call reset()"};
 };
 
 PoseHistogram::PoseHistogram(Device& device, std::span<const Hypothesis> hypotheses,
@@ -280,10 +281,14 @@ PoseHistogram::Impl& PoseHistogram::whole() const {
 
 void PoseHistogram::reset() {
   Impl& histogram = impl();
-  histogram.belief.clear();
-  histogram.prior_log_likelihood = 0.0;
-  histogram.summarised.reset();
   histogram.half_done.forget();
+  histogram.half_done.change([&] {
+    histogram.belief.clear();
+    // Now, or a device that fails later would leave the old belief behind a reset.
+    histogram.stream.run();
+    histogram.prior_log_likelihood = 0.0;
+    histogram.summarised.reset();
+  });
 }
 
 void PoseHistogram::update(std::span<const Touch> touches,

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <new>
 #include <numbers>
 #include <vector>
 
@@ -39,7 +40,11 @@ void trace(cairo_t* context, std::span<const glm::dvec2> points) {
 }
 
 cairo_status_t append(void* bytes, const unsigned char* data, unsigned int size) {
-  static_cast<std::string*>(bytes)->append(reinterpret_cast<const char*>(data), size);
+  try {
+    static_cast<std::string*>(bytes)->append(reinterpret_cast<const char*>(data), size);
+  } catch (const std::bad_alloc&) {
+    return CAIRO_STATUS_NO_MEMORY;  // Cairo called, which is C: nothing may be thrown
+  }
   return CAIRO_STATUS_SUCCESS;
 }
 

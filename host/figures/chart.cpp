@@ -164,35 +164,29 @@ class Plot {
       while (!free_of(label, taken_)) {
         label.top += 24.0;
       }
+      if (label.bottom() > box.bottom()) {
+        continue;  // no room within the frame
+      }
       taken_.push_back(label);
       canvas_.text(each.label, {label.left, label.top + 17.0}, small, Align::left, each.colour);
     }
   }
 
   void intervals(const ChartSeries& series) {
-    std::vector<glm::dvec2> lower;
-    std::vector<glm::dvec2> upper;
+    // Lower and upper ends of points in a row: a band has the gaps of its line.
+    std::vector<std::array<glm::dvec2, 2>> run;
     for (const ChartPoint& point : series.points) {
-      if (!drawn(point) || !y_.has(point.high) || !(point.low <= point.high)) {
-        continue;
-      }
-      // An interval that reaches below what a logarithmic axis has ends at the axis.
-      lower.push_back(
-          view_.pixel({x_.place(point.x), y_.has(point.low) ? y_.place(point.low) : y_.lower}));
-      upper.push_back(view_.pixel({x_.place(point.x), y_.place(point.high)}));
-    }
-    if (series.interval == IntervalShape::band) {
-      upper.insert(upper.end(), lower.rbegin(), lower.rend());
-      canvas_.fill(upper, {series.colour.red, series.colour.green, series.colour.blue, 0.12});
-      return;
-    }
-    for (std::size_t i = 0; i < lower.size(); ++i) {
-      canvas_.line(std::array{lower[i], upper[i]}, {.colour = series.colour, .width_px = 2.0});
-      for (const glm::dvec2& end : {lower[i], upper[i]}) {
-        canvas_.line(std::array{end - glm::dvec2(5.0, 0.0), end + glm::dvec2(5.0, 0.0)},
-                     {.colour = series.colour, .width_px = 2.0});
+      if (drawn(point) && y_.has(point.high) && point.low <= point.high) {
+        // An interval that reaches below what a logarithmic axis has ends at the axis.
+        const double x = x_.place(point.x);
+        run.push_back({view_.pixel({x, y_.has(point.low) ? y_.place(point.low) : y_.lower}),
+                       view_.pixel({x, y_.place(point.high)})});
+      } else {
+        draw_intervals(series, run);
+        run.clear();
       }
     }
+    draw_intervals(series, run);
   }
 
   void line(const ChartSeries& series) {
@@ -216,7 +210,7 @@ class Plot {
   void marks(const ChartSeries& series) {
     for (std::size_t i = 0; i < series.points.size(); i += series.mark_every) {
       const ChartPoint& point = series.points[i];
-      if (!drawn(point)) {
+      if (!drawn(point) || !view_.contains({x_.place(point.x), y_.place(point.y)})) {
         continue;
       }
       const glm::dvec2 at = pixel(point);
@@ -252,6 +246,29 @@ class Plot {
     canvas_.line(vertical ? std::array{glm::dvec2(at.x, box.top), glm::dvec2(at.x, box.bottom())}
                           : std::array{glm::dvec2(box.left, at.y), glm::dvec2(box.right(), at.y)},
                  pen);
+  }
+
+  void draw_intervals(const ChartSeries& series,
+                      const std::vector<std::array<glm::dvec2, 2>>& run) {
+    if (series.interval == IntervalShape::band) {
+      std::vector<glm::dvec2> outline;
+      for (const auto& ends : run) {
+        outline.push_back(ends[1]);
+      }
+      for (auto ends = run.rbegin(); ends != run.rend(); ++ends) {
+        outline.push_back((*ends)[0]);
+      }
+      canvas_.fill(outline, {series.colour.red, series.colour.green, series.colour.blue, 0.12});
+      return;
+    }
+    const Pen pen{.colour = series.colour, .width_px = 2.0};
+    constexpr glm::dvec2 half_cap(5.0, 0.0);
+    for (const auto& ends : run) {
+      canvas_.line(ends, pen);
+      for (const glm::dvec2& end : ends) {
+        canvas_.line(std::array{end - half_cap, end + half_cap}, pen);
+      }
+    }
   }
 
   /// Writes the text where it fits beside the point without covering a mark or another label, or

@@ -32,7 +32,7 @@ enum class Line { none, solid, dashed, dotted };
 enum class IntervalShape { bars, band };
 
 /// A point, drawn where both coordinates are finite and, on a logarithmic axis, positive. A point
-/// that is not drawn leaves a gap in its line.
+/// that is not drawn leaves a gap in its line; a point beyond the ends of an axis has no mark.
 struct ChartPoint {
   double x = 0.0;
   double y = 0.0;

@@ -49,6 +49,14 @@ void set_logarithmic_ticks(const ChartAxis& axis, AxisSpan& span) {
       }
     }
   }
+  if (span.ticks.size() < 2 && decades < 0.8) {
+    // So short an axis holds hardly a whole digit.
+    span.ticks.clear();
+    for (const Tick& tick :
+         even_ticks(std::pow(10.0, span.lower), std::pow(10.0, span.upper), most_ticks)) {
+      span.ticks.push_back({std::log10(tick.value), text_of(axis, tick.value)});
+    }
+  }
 }
 
 }  // namespace

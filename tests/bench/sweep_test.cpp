@@ -17,7 +17,9 @@ namespace palpate {
 namespace {
 
 void expect_well_formed(const std::filesystem::path& file) {
-  EXPECT_EQ(std::system(("xmllint --noout " + file.string()).c_str()), 0) << file;
+  const int status = std::system(("xmllint --noout " + file.string()).c_str());
+  ASSERT_NE(WEXITSTATUS(status), 127) << "xmllint is missing; install libxml2-utils";
+  EXPECT_EQ(status, 0) << file;
 }
 
 void expect_sound(const nlohmann::json& point, int trials) {

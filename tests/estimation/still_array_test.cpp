@@ -100,6 +100,7 @@ TEST(StillArray, WhoseElementsMoveIsEvaluatedAnew) {
   Device device = Device::open();
   PoseHistogram histogram(device, objects(), options);
   histogram.update(touches);
+  // A fifth of the elements of the test above, and four touches for three.
   EXPECT_LT(likelihood_error(histogram, reference_posterior(objects(), options, touches)), 1e-4);
 }
 

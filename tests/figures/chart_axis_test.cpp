@@ -60,6 +60,14 @@ TEST(LogarithmicAxis, LabelsAtMostElevenOfManyDecades) {
   }
 }
 
+TEST(LogarithmicAxis, HasTicksHoweverShortItIs) {
+  for (const double factor : {1.0001, 1.01, 1.33, 2.0, 5.0}) {
+    for (const double lower : {1.2, 3.1, 0.0097}) {
+      EXPECT_GE(labels(logarithmic({lower, factor * lower})).size(), 2u) << lower << ", " << factor;
+    }
+  }
+}
+
 TEST(LogarithmicAxis, HasNoPlaceForZeroAndBelow) {
   const AxisSpan span = logarithmic({0.0, -4.0, 1.0, NAN, INFINITY});
   EXPECT_FALSE(span.has(0.0));

@@ -75,6 +75,36 @@ TEST(Chart, LeavesOutWhatItsAxisDoesNotHold) {
   EXPECT_EQ(picture.spots[0].title, "one");
 }
 
+TEST(Chart, MarksNothingBeyondTheEndsOfAnAxis) {
+  const ChartPicture picture =
+      draw_chart(chart_of({.name = "",
+                           .colour = red,
+                           .points = {{.x = 5.0, .y = 10.5, .title = "above"},
+                                      {.x = -0.5, .y = 5.0, .title = "left"},
+                                      {.x = 10.0, .y = 10.0, .title = "corner"}}}),
+                 PictureFormat::png);
+  ASSERT_EQ(picture.spots.size(), 1u);
+  EXPECT_EQ(picture.spots[0].title, "corner");
+}
+
+TEST(Chart, BandHasTheGapsOfItsLine) {
+  ChartSeries series{.name = "", .colour = red, .mark = Mark::none};
+  series.interval = IntervalShape::band;
+  for (double x = 0.0; x <= 10.0; ++x) {
+    series.points.push_back({.x = x, .y = 5.0, .low = 3.0, .high = 7.0});
+  }
+  const auto pale = [&] {
+    const Picture picture = drawn(chart_of(series));
+    return static_cast<double>(
+        std::count_if(picture.pixels.begin(), picture.pixels.end(), [](std::uint32_t pixel) {
+          return pixel >> 16 > 0xF0 && (pixel & 0xFF) < 0xE8 && (pixel & 0xFF) > 0xC0;
+        }));
+  };
+  const double whole = pale();
+  series.points[4].y = NAN;
+  EXPECT_NEAR(pale() / whole, 0.8, 0.02) << "two of ten segments";
+}
+
 TEST(Chart, LineHasAGapWhereAPointIsMissing) {
   ChartSeries series{.name = "", .colour = red, .mark = Mark::none, .line = Line::solid};
   for (double x = 0.0; x <= 10.0; ++x) {

@@ -27,8 +27,8 @@ struct ContactClassifier {
   double threshold = 2.0;  ///< in the recording's pressure unit
   double ratio = 0.3;      ///< of the touch's largest pressure, in [0, 1)
 
-  /// Throws Error unless the threshold is finite and at least 0 and the ratio in [0, 1): no
-  /// pressure compares with one that is no number, and none exceeds all of the largest.
+  /// Throws Error unless the threshold is finite and at least 0 and the ratio in [0, 1). With NaN,
+  /// or a ratio of 1 or more, no element could ever count as touched.
   void validate() const;
   /// The class of every element, [e]. Throws Error on a touch that is not sound, or as validate()
   /// does.
