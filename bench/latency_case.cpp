@@ -1,5 +1,5 @@
-#include "belief.hpp"
 #include "cases.hpp"
+#include "dense_belief.hpp"
 #include "dense_likelihood.hpp"
 #include "letters.hpp"
 #include "measurement.hpp"
@@ -43,7 +43,7 @@ class Steps {
   PoseLattice lattice_;
   double cell_mm_;
   gpu::CommandStream stream_;
-  Belief belief_;
+  DenseBelief belief_;
   DenseLikelihood likelihood_;
   ContactEvidence evidence_;
 };

@@ -2,7 +2,7 @@
 
 #include <benchmark/benchmark.h>
 
-#include "belief.hpp"
+#include "dense_belief.hpp"
 #include "dense_likelihood.hpp"
 #include "evidence_grid.hpp"
 #include "letters.hpp"
@@ -49,7 +49,7 @@ class LetterBelief {
   Recording unknown_;
   std::vector<Hypothesis> maps_;
   gpu::CommandStream stream_;
-  Belief belief_;
+  DenseBelief belief_;
   DenseLikelihood likelihood_;
   ContactEvidence evidence_;
   BeliefSummary summary_;

@@ -98,7 +98,7 @@ PoseLattice choose_bins(const RecognitionTask& task, const Device& device) {
   const HistogramOptions& histogram = task.histogram;
   const std::int64_t most = most_bins_on(device, histogram.still_array);
   const BalancedLattice chosen = balanced_lattice(histogram.lattice, task.hypotheses, most);
-  if (chosen.bounded) {
+  if (chosen.coarsened) {
     fmt::print(stderr,
                "palpate: --bins auto: steps of {:.2f} mm, coarser than the maps are worth, to keep "
                "to {} bins in all; narrow the region, or give --bins\n",

@@ -20,9 +20,9 @@ inline constexpr std::int64_t most_balanced_bins = 100'000'000;
 
 /// Counts of bins chosen for a region.
 struct BalancedLattice {
-  PoseLattice lattice;   ///< the region with the counts
-  double step_mm = 0.0;  ///< largest step along x and y, and of the objects at a step in theta
-  bool bounded = false;  ///< coarser than the maps are worth, for there would be too many bins
+  PoseLattice lattice;     ///< the region with the counts
+  double step_mm = 0.0;    ///< largest step along x and y, and of the objects at a step in theta
+  bool coarsened = false;  ///< coarser than the maps are worth, for there would be too many bins
 };
 
 /// Counts for the region of a lattice, whose own are not read: x and y in steps of at most

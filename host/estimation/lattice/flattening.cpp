@@ -1,4 +1,4 @@
-#include "tempering.hpp"
+#include "flattening.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -33,7 +33,7 @@ double spread_mm(std::span<const DisplacedBin> bins, double top, double inverse_
 
 }  // namespace
 
-double tempering_root(std::span<const DisplacedBin> bins, double least) {
+double flattening_root(std::span<const DisplacedBin> bins, double least) {
   const double top =
       std::max_element(bins.begin(), bins.end(), [](const DisplacedBin& a, const DisplacedBin& b) {
         return a.log_likelihood < b.log_likelihood;

@@ -1,4 +1,4 @@
-#include "tempering.hpp"
+#include "flattening.hpp"
 
 #include <cmath>
 #include <vector>
@@ -21,35 +21,35 @@ std::vector<DisplacedBin> parabola(double nats) {
   return bins;
 }
 
-TEST(TemperingRoot, IsTheLeastWhereThatSpreadsTheBeliefEnough) {
-  EXPECT_EQ(tempering_root(parabola(0.0), least), least);
-  EXPECT_EQ(tempering_root(parabola(4.0), least), least);
+TEST(FlatteningRoot, IsTheLeastWhereThatSpreadsTheBeliefEnough) {
+  EXPECT_EQ(flattening_root(parabola(0.0), least), least);
+  EXPECT_EQ(flattening_root(parabola(4.0), least), least);
 }
 
-TEST(TemperingRoot, SpreadsASharpBeliefByAThirdOfItsWindow) {
+TEST(FlatteningRoot, SpreadsASharpBeliefByAThirdOfItsWindow) {
   // A normal distribution: its variance is root / (2 nats), a third of the window's own is 0.394
   // mm.
   const double window_mm = 0.1 * std::sqrt((41.0 * 41.0 - 1.0) / 12.0);
   for (const double nats : {100.0, 1e3, 1e4, 1e9}) {
-    const double root = tempering_root(parabola(nats), least);
+    const double root = flattening_root(parabola(nats), least);
     EXPECT_NEAR(std::sqrt(root / (2.0 * nats)), window_mm / 3.0, 0.03) << nats;
   }
 }
 
-TEST(TemperingRoot, FollowsTheBeliefWithoutSteps) {
-  double before = tempering_root(parabola(100.0), least);
+TEST(FlatteningRoot, FollowsTheBeliefWithoutSteps) {
+  double before = flattening_root(parabola(100.0), least);
   for (double nats = 101.0; nats < 400.0; nats += 1.0) {
-    const double root = tempering_root(parabola(nats), least);
+    const double root = flattening_root(parabola(nats), least);
     EXPECT_GT(root, before);
     EXPECT_LT(root, 1.03 * before);
     before = root;
   }
 }
 
-TEST(TemperingRoot, OfOneBinOrOneThatHasItAllIsFinite) {
-  EXPECT_EQ(tempering_root(std::vector<DisplacedBin>{{{0.0, 0.0, 0.0}, -5.0}}, least), least);
+TEST(FlatteningRoot, OfOneBinOrOneThatHasItAllIsFinite) {
+  EXPECT_EQ(flattening_root(std::vector<DisplacedBin>{{{0.0, 0.0, 0.0}, -5.0}}, least), least);
   const std::vector<DisplacedBin> certain{{{0.0, 0.0, 0.0}, 0.0}, {{1.0, 0.0, 0.0}, -1e30}};
-  EXPECT_TRUE(std::isfinite(tempering_root(certain, least)));
+  EXPECT_TRUE(std::isfinite(flattening_root(certain, least)));
 }
 
 }  // namespace

@@ -10,8 +10,8 @@
 #include <glm/mat3x3.hpp>
 #include <glm/matrix.hpp>
 
+#include "flattening.hpp"
 #include "quadratic_peak.hpp"
-#include "tempering.hpp"
 
 namespace palpate {
 
@@ -24,7 +24,7 @@ namespace {
 // at exact poses: the peak's error squared over it is about 1 in the mean, where 3 would be exact.
 // A fixed root leaves one of the coarse bins alone after many touches: on 13 x 13 x 55 bins and 60
 // others, poses of 15, 25 and 50 touches then err by 0.39, 0.35 and 0.37 mm; by 0.37, 0.30 and 0.25
-// with tempering_root().
+// with flattening_root().
 constexpr double least_root = 8.0;
 constexpr double radius_mm = 2.5;
 // One pass leaves 0.19 mm, two 0.18; a fourth moves nothing.
@@ -80,7 +80,8 @@ Range around_circle(int centre, int steps, const Axis& axis) {
 
 class Refinement {
  public:
-  Refinement(const Belief& belief, const PoseLattice& lattice, std::size_t object, const Body& body)
+  Refinement(const DenseBelief& belief, const PoseLattice& lattice, std::size_t object,
+             const Body& body)
       : belief_(belief), lattice_(lattice), object_(object), body_(body) {}
 
   RefinedPose around(std::int64_t bin) {
@@ -90,7 +91,7 @@ class Refinement {
     for (int pass = 1;; ++pass) {
       const std::vector<Sample> samples = sample(centre);
       const double root = root_of(samples);
-      glm::dvec3 mean = tempered_mean(samples, root);
+      glm::dvec3 mean = flattened_mean(samples, root);
       const BinIndex nearest = moved(centre, mean);
       if (pass < passes &&
           (nearest.x != centre.x || nearest.y != centre.y || nearest.theta != centre.theta)) {
@@ -174,10 +175,10 @@ class Refinement {
         bins.push_back({sample.moved_mm, sample.log_likelihood});
       }
     }
-    return tempering_root(bins, least_root);
+    return flattening_root(bins, least_root);
   }
 
-  static glm::dvec3 tempered_mean(const std::vector<Sample>& samples, double root) {
+  static glm::dvec3 flattened_mean(const std::vector<Sample>& samples, double root) {
     const double top = largest(samples);
     glm::dvec3 sum{0.0};
     double total = 0.0;
@@ -286,7 +287,7 @@ class Refinement {
     return rows;
   }
 
-  const Belief& belief_;
+  const DenseBelief& belief_;
   const PoseLattice& lattice_;
   std::size_t object_;
   const Body& body_;
@@ -305,7 +306,7 @@ Body displaced_body(const OccupancyGrid& map) {
               (static_cast<double>(map.nx) * map.nx + static_cast<double>(map.ny) * map.ny) / 12.0};
 }
 
-RefinedPose refine(const Belief& belief, const PoseLattice& lattice, std::size_t object,
+RefinedPose refine(const DenseBelief& belief, const PoseLattice& lattice, std::size_t object,
                    const Body& body, std::int64_t bin) {
   return Refinement(belief, lattice, object, body).around(bin);
 }

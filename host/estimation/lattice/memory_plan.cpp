@@ -5,8 +5,8 @@
 
 #include <fmt/format.h>
 
-#include "belief.hpp"
 #include "command_stream.hpp"
+#include "dense_belief.hpp"
 #include "dense_likelihood.hpp"
 #include "interface.h"
 #include "palpate/error.hpp"
@@ -62,8 +62,8 @@ MemoryPlan plan_memory(const gpu::Context& context, std::span<const Hypothesis> 
     refuse(context, lattice, objects, room, bins_alone);
   }
   const std::size_t most = DenseLikelihood::batch_for(context, lattice, objects);
-  const std::uint64_t held = beliefs * Belief::bytes_needed(context, lattice, objects) +
-                             Belief::marginal_bytes(context, lattice, objects) +
+  const std::uint64_t held = beliefs * DenseBelief::bytes_needed(context, lattice, objects) +
+                             DenseBelief::marginal_bytes(context, lattice, objects) +
                              (room.set_by_options ? gpu::CommandStream::staging_bytes : 0);
   const auto needed = [&](std::size_t elements) {
     return held + DenseLikelihood::bytes_needed(context, hypotheses, lattice, elements);
@@ -76,7 +76,7 @@ MemoryPlan plan_memory(const gpu::Context& context, std::span<const Hypothesis> 
   const auto plan = [&](std::size_t elements) {
     // An array at rest prepares for the next touch in a way of its own.
     const std::uint64_t with_one_more =
-        needed(elements) + Belief::bytes_needed(context, lattice, objects);
+        needed(elements) + DenseBelief::bytes_needed(context, lattice, objects);
     return MemoryPlan{elements, !options.still_array && with_one_more <= room.bytes};
   };
   if (needed(most) <= room.bytes) {

@@ -5,9 +5,9 @@
 #include <span>
 #include <vector>
 
-#include "belief.hpp"
 #include "command_stream.hpp"
 #include "contact_evidence.hpp"
+#include "dense_belief.hpp"
 #include "map_table.hpp"
 #include "palpate/lattice.hpp"
 #include "palpate/pose_histogram.hpp"
@@ -33,7 +33,7 @@ class DenseLikelihood {
   /// of every kernel: drivers compile them then, and no touch has to wait for that. Beyond each map
   /// lies the model's prior.
   /// @param most_elements of the tables; like batch_for(), which it may lower
-  DenseLikelihood(gpu::Context& context, gpu::CommandStream& stream, const Belief& belief,
+  DenseLikelihood(gpu::Context& context, gpu::CommandStream& stream, const DenseBelief& belief,
                   std::span<const Hypothesis> hypotheses, const PoseLattice& lattice,
                   const ContactLikelihood& model,
                   std::size_t most_elements = std::numeric_limits<std::size_t>::max());
@@ -43,7 +43,7 @@ class DenseLikelihood {
 
   /// Adds the evidence to the belief. Runs the stream from time to time, so that no submission
   /// keeps a device busy for long, and reports the fraction done.
-  void accumulate(const ContactEvidence& evidence, const Belief& belief,
+  void accumulate(const ContactEvidence& evidence, const DenseBelief& belief,
                   const std::function<void(double)>& progress);
 
   /// The path of every cell size among the maps, and why it was chosen.

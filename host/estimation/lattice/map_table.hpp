@@ -4,8 +4,8 @@
 #include <span>
 #include <vector>
 
-#include "belief.hpp"
 #include "command_stream.hpp"
+#include "dense_belief.hpp"
 #include "likelihood_path.hpp"
 #include "palpate/estimate.hpp"
 #include "palpate/lattice.hpp"
@@ -34,8 +34,8 @@ class MapTable {
 
   /// Records the upload. Beyond each map lies the prior.
   MapTable(gpu::Context& context, gpu::CommandStream& stream, const MapGroup& group,
-           std::span<const Hypothesis> hypotheses, const PoseLattice& lattice, const Belief& belief,
-           double prior);
+           std::span<const Hypothesis> hypotheses, const PoseLattice& lattice,
+           const DenseBelief& belief, double prior);
 
   const gpu::Buffer& log_odds() const { return log_odds_; }
   /// The lattice's x centres, then its y centres, in cells of each map, [object].

@@ -42,10 +42,10 @@ struct BeliefMarginals {
 
 /// The summed log-likelihood of every pose bin of every object, on the device, and the reductions
 /// over it. Zero bits at the start: a uniform belief.
-class Belief {
+class DenseBelief {
  public:
-  Belief(gpu::Context& context, gpu::CommandStream& stream, const PoseLattice& lattice,
-         std::size_t objects);
+  DenseBelief(gpu::Context& context, gpu::CommandStream& stream, const PoseLattice& lattice,
+              std::size_t objects);
 
   /// How a belief is cut.
   static std::vector<SlabExtent> cut(const gpu::Context& context, const PoseLattice& lattice,
@@ -59,7 +59,7 @@ class Belief {
   /// Records the return to a uniform belief.
   void clear();
   /// Records the addition of another belief over the same lattice and objects.
-  void add(const Belief& other);
+  void add(const DenseBelief& other);
   std::span<const Slab> slabs() const { return slabs_; }
   std::uint64_t device_bytes() const;
 

@@ -1,4 +1,4 @@
-#include "belief.hpp"
+#include "dense_belief.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -84,8 +84,8 @@ bool exceeds(const TwoFloat& a, const TwoFloat& b) { return a.value() > b.value(
 
 }  // namespace
 
-Belief::Belief(gpu::Context& context, gpu::CommandStream& stream, const PoseLattice& lattice,
-               std::size_t objects)
+DenseBelief::DenseBelief(gpu::Context& context, gpu::CommandStream& stream,
+                         const PoseLattice& lattice, std::size_t objects)
     : context_(context),
       stream_(stream),
       lattice_(lattice),
@@ -107,13 +107,13 @@ Belief::Belief(gpu::Context& context, gpu::CommandStream& stream, const PoseLatt
   clear();
 }
 
-std::vector<SlabExtent> Belief::cut(const gpu::Context& context, const PoseLattice& lattice,
-                                    std::size_t objects) {
+std::vector<SlabExtent> DenseBelief::cut(const gpu::Context& context, const PoseLattice& lattice,
+                                         std::size_t objects) {
   return cut_into_slabs(context, lattice, objects, sizes_for(context, lattice, objects).bins());
 }
 
-std::uint64_t Belief::bytes_needed(const gpu::Context& context, const PoseLattice& lattice,
-                                   std::size_t objects) {
+std::uint64_t DenseBelief::bytes_needed(const gpu::Context& context, const PoseLattice& lattice,
+                                        std::size_t objects) {
   const ReductionSizes sizes = sizes_for(context, lattice, objects);
   std::uint64_t bytes = 0;
   std::size_t partials = 0;
@@ -124,8 +124,8 @@ std::uint64_t Belief::bytes_needed(const gpu::Context& context, const PoseLattic
   return bytes + gpu::allocated(partials * sizeof(shaders::Partial));
 }
 
-std::uint64_t Belief::marginal_bytes(const gpu::Context& context, const PoseLattice& lattice,
-                                     std::size_t objects) {
+std::uint64_t DenseBelief::marginal_bytes(const gpu::Context& context, const PoseLattice& lattice,
+                                          std::size_t objects) {
   const MarginalSizes sizes =
       marginal_sizes(context.limits(), lattice.plane(), lattice.theta_rad.count);
   std::uint64_t most = 0;
@@ -140,13 +140,13 @@ std::uint64_t Belief::marginal_bytes(const gpu::Context& context, const PoseLatt
   return most;
 }
 
-void Belief::clear() {
+void DenseBelief::clear() {
   for (const Slab& slab : slabs_) {
     stream_.fill(slab.log_likelihood, 0);
   }
 }
 
-void Belief::add(const Belief& other) {
+void DenseBelief::add(const DenseBelief& other) {
   const std::uint32_t lanes = independent_lanes(context_.limits());
   for (std::size_t i = 0; i < slabs_.size(); ++i) {
     const std::int64_t bins = slabs_[i].object_count * slabs_[i].stride();
@@ -158,7 +158,7 @@ void Belief::add(const Belief& other) {
   }
 }
 
-std::uint64_t Belief::device_bytes() const {
+std::uint64_t DenseBelief::device_bytes() const {
   std::uint64_t bytes = partials_.bytes();
   for (const Slab& slab : slabs_) {
     bytes += slab.log_likelihood.bytes();
@@ -166,7 +166,7 @@ std::uint64_t Belief::device_bytes() const {
   return bytes;
 }
 
-std::vector<BeliefSummary> Belief::summarise() const {
+std::vector<BeliefSummary> DenseBelief::summarise() const {
   std::uint32_t first = 0;
   for (const Slab& slab : slabs_) {
     const shaders::ReducePush push{.bins = static_cast<shaders::uint>(slab.bins()),
@@ -208,7 +208,7 @@ std::vector<BeliefSummary> Belief::summarise() const {
   return summaries;
 }
 
-BeliefMarginals Belief::marginals(std::size_t object, TwoFloat max) const {
+BeliefMarginals DenseBelief::marginals(std::size_t object, TwoFloat max) const {
   BeliefMarginals sums;
   sums.xy.resize(static_cast<std::size_t>(lattice_.plane()));
   sums.theta.resize(static_cast<std::size_t>(lattice_.theta_rad.count));
@@ -243,7 +243,7 @@ BeliefMarginals Belief::marginals(std::size_t object, TwoFloat max) const {
   return sums;
 }
 
-std::vector<double> Belief::download(std::size_t object) const {
+std::vector<double> DenseBelief::download(std::size_t object) const {
   std::vector<double> values(static_cast<std::size_t>(lattice_.bins()));
   std::vector<TwoFloat> raw;
   for (const Slab& slab : slabs_) {
@@ -261,7 +261,7 @@ std::vector<double> Belief::download(std::size_t object) const {
   return values;
 }
 
-std::vector<double> Belief::download(std::size_t object, const BinWindow& window) const {
+std::vector<double> DenseBelief::download(std::size_t object, const BinWindow& window) const {
   const int thetas = lattice_.theta_rad.count;
   const auto nx = static_cast<std::size_t>(lattice_.x_mm.count);
   const int row_end = window.row_first + window.row_count;

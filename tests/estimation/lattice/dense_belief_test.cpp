@@ -135,7 +135,7 @@ TEST_F(Slabs, ByTheWorkgroupsOfAReduction) {
   expect_unseen(wanted);
 }
 
-TEST(Belief, MoreBinsThanMemoryIsRefusedBeforeAnyIsTaken) {
+TEST(DenseBelief, MoreBinsThanMemoryIsRefusedBeforeAnyIsTaken) {
   Device device = Device::open();
   const std::vector<Hypothesis> objects = two_objects();
   HistogramOptions too_many = options();

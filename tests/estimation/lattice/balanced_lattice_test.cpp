@@ -41,7 +41,7 @@ TEST(BalancedLattice, OfThePapersLettersIsNearWhatAHandWouldChoose) {
   EXPECT_EQ(balanced.lattice.y_mm.count, 67);
   // 0.3 mm where the lever is longest, 13.3 mm; the letters' mean would be content with 244.
   EXPECT_NEAR(balanced.lattice.theta_rad.count, 278, 5);
-  EXPECT_FALSE(balanced.bounded);
+  EXPECT_FALSE(balanced.coarsened);
   EXPECT_DOUBLE_EQ(balanced.step_mm, 0.3);
 }
 
@@ -125,7 +125,7 @@ TEST(BalancedLattice, IsMadeCoarserAlikeToKeepToABound) {
   for (const std::int64_t most : {1'000'000, 20'000, 100, 5}) {
     const BalancedLattice balanced = balanced_lattice({}, letters(), most);
     const PoseLattice& lattice = balanced.lattice;
-    EXPECT_TRUE(balanced.bounded);
+    EXPECT_TRUE(balanced.coarsened);
     EXPECT_LE(5 * lattice.bins(), most);
     EXPECT_GT(balanced.step_mm, 0.3);
     if (most >= 1'000'000) {
@@ -143,7 +143,7 @@ TEST(BalancedLattice, OfAnEndlessRegionIsBounded) {
   region.y_mm = {-farthest_mm, farthest_mm, 1};
   region.theta_rad = {-1e9, 1e9, 1};
   const BalancedLattice balanced = balanced_lattice(region, letters());
-  EXPECT_TRUE(balanced.bounded);
+  EXPECT_TRUE(balanced.coarsened);
   EXPECT_LE(5 * balanced.lattice.bins(), most_balanced_bins);
   for (const Axis& x_mm : {Axis{1.0, -1.0, 1}, Axis{-1e200, 1e200, 1}}) {
     region.x_mm = x_mm;

@@ -16,6 +16,6 @@ struct DisplacedBin {
 /// a third of what they would if all weighed the same, in the root mean square about their mean.
 /// Many touches leave nearly all of a belief in one bin of a coarse lattice, and a fixed root of it
 /// no better.
-double tempering_root(std::span<const DisplacedBin> bins, double least);
+double flattening_root(std::span<const DisplacedBin> bins, double least);
 
 }  // namespace palpate

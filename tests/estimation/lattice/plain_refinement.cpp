@@ -252,16 +252,16 @@ RefinedPose plain_refinement(const std::vector<double>& logs, const PoseLattice&
       }
     }
     root = plain_root(displaced);
-    double tempered = 0.0;
+    double flattened = 0.0;
     double sum[3] = {};
     for (const Inside& in : window) {
-      tempered += std::exp((in.log - top) / root);
+      flattened += std::exp((in.log - top) / root);
       for (int a = 0; a < 3; ++a) {
         sum[a] += std::exp((in.log - top) / root) * in.d[a];
       }
     }
     for (int a = 0; a < 3; ++a) {
-      offset[a] = sum[a] / tempered;
+      offset[a] = sum[a] / flattened;
       const Axis& axis = a == 0 ? lattice.x_mm : a == 1 ? lattice.y_mm : lattice.theta_rad;
       place[a] = axis.centre(centre[a]);
       if (step[a] > 0.0) {

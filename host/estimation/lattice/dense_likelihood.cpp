@@ -42,7 +42,7 @@ std::size_t DenseLikelihood::batch_for(const gpu::Context& context, const PoseLa
   // element), and the work. Below 16 elements reading and writing the belief would begin to count.
   const std::size_t by_table = table_bytes / bytes_per_element(lattice);
   std::int64_t bins = 0;
-  for (const SlabExtent& slab : Belief::cut(context, lattice, objects)) {
+  for (const SlabExtent& slab : DenseBelief::cut(context, lattice, objects)) {
     bins = std::max(bins, slab.object_count * slab.bins());
   }
   const auto by_work = static_cast<std::size_t>(work_per_run(limits) / static_cast<double>(bins));
@@ -65,7 +65,7 @@ std::uint64_t DenseLikelihood::bytes_needed(const gpu::Context& context,
 }
 
 DenseLikelihood::DenseLikelihood(gpu::Context& context, gpu::CommandStream& stream,
-                                 const Belief& belief, std::span<const Hypothesis> hypotheses,
+                                 const DenseBelief& belief, std::span<const Hypothesis> hypotheses,
                                  const PoseLattice& lattice, const ContactLikelihood& model,
                                  std::size_t most_elements)
     : context_(context),
@@ -137,7 +137,7 @@ void DenseLikelihood::reserve(std::size_t elements) {
   }
 }
 
-void DenseLikelihood::accumulate(const ContactEvidence& evidence, const Belief& belief,
+void DenseLikelihood::accumulate(const ContactEvidence& evidence, const DenseBelief& belief,
                                  const std::function<void(double)>& progress) {
   const auto& segments = evidence.segments;
   const double bins = static_cast<double>(lattice_.bins()) * static_cast<double>(objects_);

@@ -104,7 +104,7 @@ std::uint64_t MapTable::bytes_needed(const MapGroup& group, const PoseLattice& l
 
 MapTable::MapTable(gpu::Context& context, gpu::CommandStream& stream, const MapGroup& group,
                    std::span<const Hypothesis> hypotheses, const PoseLattice& lattice,
-                   const Belief& belief, double prior) {
+                   const DenseBelief& belief, double prior) {
   const gpu::Access access = group.kind.access;
   log_odds_ = gpu::Buffer(
       context, group.cells * cell_bytes(access), gpu::Memory::device,

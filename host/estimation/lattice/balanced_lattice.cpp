@@ -83,7 +83,7 @@ BalancedLattice balanced_lattice(const PoseLattice& region, std::span<const Hypo
   lattice.x_mm.count = static_cast<int>(count_of(extents_mm[0], step_mm));
   lattice.y_mm.count = static_cast<int>(count_of(extents_mm[1], step_mm));
   lattice.theta_rad.count = static_cast<int>(count_of(extents_mm[2], step_mm));
-  return {.lattice = lattice, .step_mm = step_mm, .bounded = step_mm > wanted_mm};
+  return {.lattice = lattice, .step_mm = step_mm, .coarsened = step_mm > wanted_mm};
 }
 
 std::int64_t most_bins_on(const Device& device, bool still_array) {

@@ -2,7 +2,7 @@
 
 #include <cstdint>
 
-#include "belief.hpp"
+#include "dense_belief.hpp"
 #include "palpate/estimate.hpp"
 #include "palpate/lattice.hpp"
 #include "palpate/pose_error.hpp"
@@ -15,7 +15,7 @@ Body displaced_body(const OccupancyGrid& map);
 
 /// Peak and covariance of one object's belief around a bin, as PoseHistogram::refine() has them.
 /// @throws Error if the device fails
-RefinedPose refine(const Belief& belief, const PoseLattice& lattice, std::size_t object,
+RefinedPose refine(const DenseBelief& belief, const PoseLattice& lattice, std::size_t object,
                    const Body& body, std::int64_t bin);
 
 }  // namespace palpate

@@ -3,8 +3,8 @@
 
 #include <gtest/gtest.h>
 
-#include "belief.hpp"
 #include "context.hpp"
+#include "dense_belief.hpp"
 #include "dense_likelihood.hpp"
 #include "kernel_sizes.hpp"
 #include "palpate/error.hpp"
@@ -35,7 +35,7 @@ TEST(Batches, TakeAsLongAsARunMay) {
   for (const int bins : {10, 40, 120, 200}) {
     const PoseLattice lattice = options_of(bins, bins, bins, false).lattice;
     std::int64_t largest = 0;
-    for (const SlabExtent& slab : Belief::cut(context, lattice, 5)) {
+    for (const SlabExtent& slab : DenseBelief::cut(context, lattice, 5)) {
       largest = std::max(largest, slab.object_count * slab.bins());
     }
     const auto elements = static_cast<double>(DenseLikelihood::batch_for(context, lattice, 5));

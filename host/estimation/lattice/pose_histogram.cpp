@@ -6,9 +6,9 @@
 
 #include <fmt/format.h>
 
-#include "belief.hpp"
 #include "command_stream.hpp"
 #include "contradiction.hpp"
+#include "dense_belief.hpp"
 #include "dense_likelihood.hpp"
 #include "half_done.hpp"
 #include "hypotheses.hpp"
@@ -23,7 +23,7 @@ namespace {
 
 /// An array at rest and the log-likelihood of its reading No Contact everywhere.
 struct StillArray {
-  explicit StillArray(Belief belief) : no_contact(std::move(belief)) {}
+  explicit StillArray(DenseBelief belief) : no_contact(std::move(belief)) {}
 
   bool holds(const Touch& touch) const {
     return evaluated && same_placement(touch, {T_robot_sensor, elements_mm, {}});
@@ -32,7 +32,7 @@ struct StillArray {
   bool evaluated = false;
   Pose T_robot_sensor;
   std::vector<glm::dvec2> elements_mm;
-  Belief no_contact;
+  DenseBelief no_contact;
 };
 
 /// What a touch says, and how an array at rest takes it in.
@@ -43,10 +43,10 @@ struct StillTouch {
 
 /// A touch that may come next and its log-likelihood.
 struct PreparedTouch {
-  explicit PreparedTouch(Belief belief) : log_likelihood(std::move(belief)) {}
+  explicit PreparedTouch(DenseBelief belief) : log_likelihood(std::move(belief)) {}
 
   std::optional<ContactEvidence> evidence;  ///< none while it is not sound
-  Belief log_likelihood;
+  DenseBelief log_likelihood;
 };
 
 }  // namespace
@@ -126,7 +126,7 @@ struct PoseHistogram::Impl {
     ContactEvidence evidence = evidence_of(std::span(&touch, 1));
     if (!prepared) {
       try {
-        prepared.emplace(Belief(context, stream, options.lattice, log_weight.size()));
+        prepared.emplace(DenseBelief(context, stream, options.lattice, log_weight.size()));
       } catch (const Error&) {
         // Others on the device have taken what the plan counted on; it works without, too.
         plan.room_to_prepare = false;
@@ -212,7 +212,7 @@ struct PoseHistogram::Impl {
       return;
     }
     if (!still) {
-      still.emplace(Belief(context, stream, options.lattice, log_weight.size()));
+      still.emplace(DenseBelief(context, stream, options.lattice, log_weight.size()));
     }
     still->evaluated = false;
     still->no_contact.clear();
@@ -238,7 +238,7 @@ struct PoseHistogram::Impl {
   gpu::Context& context;
   MemoryPlan plan;
   gpu::CommandStream stream;
-  Belief belief;
+  DenseBelief belief;
   DenseLikelihood likelihood;
   std::optional<StillArray> still;
   std::optional<PreparedTouch> prepared;

@@ -11,8 +11,8 @@
 #include <glm/mat3x3.hpp>
 #include <glm/matrix.hpp>
 
-#include "belief.hpp"
 #include "context.hpp"
+#include "dense_belief.hpp"
 #include "palpate/pose.hpp"
 #include "refinement.hpp"
 #include "synthetic.hpp"
@@ -30,7 +30,7 @@ RefinedPose refined(Device& device, const PoseLattice& lattice, const glm::dvec2
                     const LogBelief& log_belief) {
   gpu::Context& context = device.context();
   gpu::CommandStream stream(context);
-  const Belief belief(context, stream, lattice, 1);
+  const DenseBelief belief(context, stream, lattice, 1);
   std::vector<TwoFloat> bins;
   std::int64_t best = 0;
   double most = -std::numeric_limits<double>::infinity();
