@@ -18,10 +18,10 @@ namespace palpate {
 
 namespace {
 
-// The descriptor of a file, never one of standard input, output and error: a daemon may have closed
-// those, and the number 0 stands for poses from standard input here.
+// Opens a file or FIFO under a descriptor above 2: a daemon may have closed the standard streams,
+// and descriptor 0 means poses from standard input here.
 int open_poses(const std::string& path) {
-  // Without waiting for whoever writes to a FIFO.
+  // O_NONBLOCK: a FIFO opens without waiting for its writer.
   const int descriptor = ::open(path.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC);
   if (descriptor < 0 || descriptor > STDERR_FILENO) {
     return descriptor;
@@ -31,9 +31,9 @@ int open_poses(const std::string& path) {
   return moved;
 }
 
-// Far longer than any pose; what never ends a line must not fill the memory.
+// Far longer than any pose: input without line ends must not fill the memory.
 constexpr std::size_t longest_line = 4096;
-// What read() takes at most.
+// One read() takes at most this many bytes, and PoseReader::read() this many blocks.
 constexpr std::size_t block_bytes = 1 << 14;
 constexpr int blocks_at_once = 4;
 
@@ -85,7 +85,7 @@ void PoseReader::read() {
   }
 }
 
-// One block; false where there is none, or none yet.
+// Reads one block; false where there is none, or none yet.
 bool PoseReader::read_some() {
   char bytes[block_bytes];
   pollfd ready{.fd = descriptor_, .events = POLLIN, .revents = 0};
@@ -101,7 +101,7 @@ bool PoseReader::read_some() {
     throw Error(Fault::input, fmt::format("poses {}: cannot be read: {}; copy or record it again",
                                           name_, std::strerror(errno)));
   }
-  if (got == 0 && !is_fifo_) {  // of a FIFO another writer may come
+  if (got == 0 && !is_fifo_) {  // a FIFO may get another writer
     ended_ = true;
     if (!line_.empty() || overlong_) {
       end_line();
@@ -184,7 +184,7 @@ void PoseReader::add(double time_s, const Pose& T_robot_sensor) {
   }
 }
 
-// Says what has become of the poses that were set aside.
+// Reports what the track did with the poses that it had set aside.
 void PoseReader::judge_order(std::uint64_t dropped_before, std::uint64_t set_back_before) {
   const bool early = aside_.time_s <= aside_.before_s;
   if (track_.dropped() != dropped_before) {
@@ -208,8 +208,7 @@ void PoseReader::refuse_line(Flaw flaw, std::uint64_t line, std::string_view pro
   if (is_file_) {
     throw Error(Fault::input, text);
   }
-  if (first_refused_.empty() &&
-      flaw != Flaw::clock_set_back) {  // those poses have joined the track
+  if (first_refused_.empty() && flaw != Flaw::clock_set_back) {  // its poses have joined the track
     first_refused_ = text;
   }
   const auto kind = static_cast<std::size_t>(flaw);
