@@ -44,10 +44,10 @@ class Device {
   Device& operator=(Device&&) noexcept;
   ~Device();
 
-  const std::string& name() const;
+  const std::string& name() const;  ///< as Vulkan reports it
   /// Size of the memory in which the device computes, in bytes; a CPU device shares the machine's.
   std::uint64_t memory_bytes() const;
-  gpu::Context& context();
+  gpu::Context& context();  ///< for the library's own classes
 
  private:
   explicit Device(std::unique_ptr<gpu::Context> context);

@@ -17,7 +17,7 @@ namespace palpate {
 // failing disk throws Error (Fault::system). Messages are one line that names the file, the field
 // and the remedy.
 
-/// Reads a "palpate.recording" HDF5 file; of a file that is not closed, the complete rows.
+/// Read or write a "palpate.recording" HDF5 file; of an unclosed file, the whole rows are read.
 Recording read_recording(const std::filesystem::path& path);
 void write_recording(const std::filesystem::path& path, const Recording& recording);
 /// Closes, in place, a recording whose FrameRecorder was killed or crashed. The complete rows stay,
@@ -27,7 +27,7 @@ void write_recording(const std::filesystem::path& path, const Recording& recordi
 /// readable
 bool close_recording(const std::filesystem::path& path);
 
-/// Reads a "palpate.map" HDF5 file.
+/// Read or write a "palpate.map" HDF5 file.
 OccupancyGrid read_map(const std::filesystem::path& path);
 void write_map(const std::filesystem::path& path, const OccupancyGrid& map);
 
@@ -36,7 +36,7 @@ void write_map(const std::filesystem::path& path, const OccupancyGrid& map);
 /// black; resolution and origin are in metres; the first image row has the largest y.
 void write_map_server(const std::filesystem::path& yaml_path, const OccupancyGrid& map);
 
-/// The posterior of one recording, as in a "palpate.posterior" HDF5 file.
+/// The posterior of one recording, which a "palpate.posterior" HDF5 file holds.
 struct Posterior {
   std::vector<std::string> objects;
   PoseLattice lattice;

@@ -33,15 +33,15 @@ class PoseTrack {
   /// pose that is_robot_pose() refuses.
   bool add(double time_s, const Pose& T_robot_sensor);
   /// Ends the track: poses set aside join it where they are later than its last pose, and are
-  /// dropped elsewhere.
+  /// dropped otherwise.
   void end();
   /// Returns the pose at this time; none before the first pose, after the last, or in a larger gap.
   std::optional<Pose> at(double time_s) const;
-  /// Time of the last pose.
+  /// Returns the time of the last pose; none where the track is empty.
   std::optional<double> last_s() const;
   /// Forgets the poses that at() needs for no time from `time_s` on.
   void forget_before(double time_s);
-  std::size_t size() const { return poses_.size(); }
+  std::size_t size() const { return poses_.size(); }  ///< number of poses held
 
   std::size_t set_aside() const { return aside_.size(); }  ///< poses that are set aside now
   std::uint64_t dropped() const { return dropped_; }       ///< poses that add() and end() dropped
@@ -76,12 +76,12 @@ class PosedSensor : public Sensor {
 
   /// Counts of poses since the sensor was opened, and of frames since start().
   struct Poses {
-    std::uint64_t read = 0;
+    std::uint64_t read = 0;      ///< poses that joined the track
     std::uint64_t refused = 0;   ///< lines that are no pose, or out of order
     std::string first_refused;   ///< names the first refused line and its fault
     std::uint64_t set_back = 0;  ///< times the poses' clock went back; no line is refused for it
     std::uint64_t frames = 0;    ///< frames with a pose
-    std::uint64_t without = 0;   ///< frames without one
+    std::uint64_t without = 0;   ///< frames without a pose
   };
 
   /// Called with the fault of a refused line, which it names: once for each kind of fault.
@@ -102,7 +102,7 @@ class PosedSensor : public Sensor {
   void stop() override;
   SensorCounters counters() const override;
 
-  Poses poses() const;
+  Poses poses() const;  ///< counts so far
 
  private:
   struct Impl;

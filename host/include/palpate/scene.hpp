@@ -32,9 +32,9 @@ struct Scene {
   std::optional<std::vector<glm::dvec2>> array_mm;  ///< element centres in the sensor frame
   std::optional<std::filesystem::path> array_file;  ///< file of `array_mm`, if any
   std::optional<double> threshold;                  ///< in the recording's pressure unit
-  std::optional<double> ratio;
-  std::optional<double> gamma;
-  std::optional<double> prior;
+  std::optional<double> ratio;                      ///< of Eq. 3
+  std::optional<double> gamma;                      ///< of Eq. 7
+  std::optional<double> prior;                      ///< p(m) of Eq. 7
   std::vector<Object> objects;
   Region region;
   std::optional<double> none;              ///< prior weight of "none of these"

@@ -25,7 +25,7 @@ inline bool is_known(double reading) {
 
 /// One reading of a whole array, as a sensor delivers it.
 struct Frame {
-  double host_time_s = 0.0;                  ///< of arrival, since the Unix epoch
+  double host_time_s = 0.0;                  ///< time of arrival, since the Unix epoch
   std::optional<double> device_time_s = {};  ///< by the sensor's own clock, if any
   std::vector<double> values;                ///< [e] in the sensor's pressure unit; see is_known()
   std::uint64_t lost_before = 0;             ///< frames lost since the last frame
@@ -61,7 +61,7 @@ inline std::size_t unknown_readings(const Frame& frame, std::span<const std::uin
 
 /// Identity, geometry and units of a sensor.
 struct SensorDescription {
-  std::string name;                      ///< such as "TakkTile", for people
+  std::string name;                      ///< for people, such as "TakkTile"
   std::string serial;                    ///< "" if none
   std::string pressure_unit = "kPa";     ///< "kPa" or "raw"
   std::vector<glm::dvec2> elements_mm;   ///< [e] element centres in the sensor frame
@@ -75,7 +75,7 @@ struct SensorDescription {
 /// Counts of what arrived and failed since start().
 struct SensorCounters {
   std::uint64_t frames = 0;           ///< delivered by next() or waiting for it
-  std::uint64_t lost = 0;             ///< dropped because next() was not called in time, or missing
+  std::uint64_t lost = 0;             ///< frames dropped as next() came late, or missing
   std::uint64_t timeouts = 0;         ///< transfers that the host gave up
   std::uint64_t stalls = 0;           ///< halted endpoints, cleared
   std::uint64_t overflows = 0;        ///< packets larger than the endpoint allows
@@ -110,7 +110,7 @@ class Sensor {
   /// Stops the stream; start() begins a new one.
   virtual void stop() = 0;
 
-  virtual SensorCounters counters() const = 0;
+  virtual SensorCounters counters() const = 0;  ///< since start()
 };
 
 }  // namespace palpate

@@ -6,8 +6,8 @@
 
 namespace palpate {
 
-/// Smallest prior of a map, and of 1 - prior: beyond it, a reading 10 spreads away would outweigh
-/// the prior.
+/// Smallest prior of a map, and smallest 1 - prior: beyond these, increments in float32 miss the
+/// tolerance of MapBuilder::build().
 inline constexpr double least_prior = 1e-6;
 
 /// Smallest peak: a reading with a smaller one says nothing.
@@ -28,7 +28,7 @@ struct InverseSensorModel {
   void validate() const;
   /// Log-odds increment of a cell whose centre is this far from the element's, in nats (Eq. 5).
   double increment(Reading reading, double distance_mm) const;
-  /// Distance in mm beyond which `readings` increments together stay below `tolerance` nats.
+  /// Distance beyond which this many increments together stay below `tolerance` nats, in mm.
   double support_radius_mm(std::size_t readings, double tolerance) const;
 };
 
