@@ -24,9 +24,9 @@ Axis read_axis(const Hdf5Contents& file, const char* range, const char* bins) {
   return {ends[0], ends[1], file.integer(bins, 1)};
 }
 
-// Rules for a posterior without its log-likelihoods, for reading and writing.
+// What holds for every posterior without its log-likelihoods, read or about to be written.
 void validate(const std::filesystem::path& path, const Posterior& posterior) {
-  // HDF5 attributes hold at most 64 KiB, and each text takes 16 bytes.
+  // HDF5 keeps an attribute of at most 64 KiB, 16 bytes for each text.
   constexpr std::size_t most_objects = 4000;
   if (posterior.objects.empty() || posterior.objects.size() > most_objects) {
     refuse(path, fmt::format("attribute 'objects' has {} labels; store 1 to {}",
@@ -80,7 +80,7 @@ void scan_posterior(const std::filesystem::path& path,
   validate(path, posterior);
   const std::vector<std::uint64_t> expected = shape_of(posterior);
   if (const auto& shape = file.shape("log_likelihood", 4); shape != expected) {
-    file.refuse(fmt::format("dataset 'log_likelihood' has the shape {}; its attributes need {}",
+    file.refuse(fmt::format("dataset 'log_likelihood' has the shape {}; its attributes make it {}",
                             shape, expected));
   }
   head(posterior);

@@ -36,7 +36,7 @@ void write_map(const std::filesystem::path& path, const OccupancyGrid& map);
 /// black; resolution and origin are in metres; the first image row has the largest y.
 void write_map_server(const std::filesystem::path& yaml_path, const OccupancyGrid& map);
 
-/// The posterior of one recording, which a "palpate.posterior" HDF5 file holds.
+/// The posterior of one recording, the contents of a "palpate.posterior" HDF5 file.
 struct Posterior {
   std::vector<std::string> objects;
   PoseLattice lattice;
