@@ -18,10 +18,10 @@ namespace palpate {
 
 namespace {
 
-// Opens a file or FIFO under a descriptor above 2: a daemon may have closed the standard streams,
-// and descriptor 0 means poses from standard input here.
+// The descriptor of a file, never one of standard input, output and error: a daemon may have closed
+// those, and the number 0 stands for poses from standard input here.
 int open_poses(const std::string& path) {
-  // O_NONBLOCK: a FIFO opens without waiting for its writer.
+  // Without waiting for whoever writes to a FIFO.
   const int descriptor = ::open(path.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC);
   if (descriptor < 0 || descriptor > STDERR_FILENO) {
     return descriptor;
@@ -31,7 +31,7 @@ int open_poses(const std::string& path) {
   return moved;
 }
 
-// Far longer than any pose: input without line ends must not fill the memory.
+// Far longer than any pose; what never ends a line must not fill the memory.
 constexpr std::size_t longest_line = 4096;
 // One read() takes at most this many bytes, and PoseReader::read() this many blocks.
 constexpr std::size_t block_bytes = 1 << 14;
@@ -208,7 +208,8 @@ void PoseReader::refuse_line(Flaw flaw, std::uint64_t line, std::string_view pro
   if (is_file_) {
     throw Error(Fault::input, text);
   }
-  if (first_refused_.empty() && flaw != Flaw::clock_set_back) {  // its poses have joined the track
+  if (first_refused_.empty() &&
+      flaw != Flaw::clock_set_back) {  // those poses have joined the track
     first_refused_ = text;
   }
   const auto kind = static_cast<std::size_t>(flaw);
