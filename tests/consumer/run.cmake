@@ -1,4 +1,4 @@
-# Run by CTest. Installs the build tree into a scratch prefix, and uses Palpate only from there.
+# Run by CTest. Installs the build into a scratch prefix and uses Palpate only from this prefix.
 cmake_minimum_required(VERSION 3.25)
 
 function(run)
@@ -16,7 +16,7 @@ set(prefix ${SCRATCH_DIR}/prefix)
 file(REMOVE_RECURSE ${SCRATCH_DIR})
 run(${CMAKE_COMMAND} --install ${BUILD_DIR} --prefix ${prefix})
 
-# The program has to find its library beside itself, wherever the prefix is.
+# The program must find its library relative to itself, wherever the prefix lies.
 file(RENAME ${prefix} ${prefix}.moved)
 set(prefix ${prefix}.moved)
 run(${prefix}/bin/palpate --version)
@@ -24,19 +24,19 @@ if(NOT output STREQUAL "${VERSION}\n")
   message(FATAL_ERROR "palpate --version printed '${output}', not ${VERSION}")
 endif()
 
-# A user needs neither Vulkan's nor HDF5's headers.
+# The public headers include none of Vulkan, HDF5 and libusb.
 file(GLOB_RECURSE headers ${prefix}/include/*.hpp)
 if(NOT headers)
-  message(FATAL_ERROR "no header was installed")
+  message(FATAL_ERROR "no header was installed in ${prefix}/include")
 endif()
 foreach(header IN LISTS headers)
   file(STRINGS ${header} includes REGEX "#[ \t]*include.*(vulkan|hdf5|H5|libusb)")
   if(includes)
-    message(FATAL_ERROR "${header} is public, but says ${includes}")
+    message(FATAL_ERROR "${header} is public, but includes another library: ${includes}")
   endif()
 endforeach()
 
-# Sanitizers have to be in the program for them to work in the library.
+# A library with sanitizers needs a program with sanitizers.
 if(SANITIZE)
   string(APPEND FLAGS " -fsanitize=${SANITIZE}")
 endif()
@@ -47,13 +47,13 @@ run(${CMAKE_COMMAND} --build ${SCRATCH_DIR}/build)
 run(${SCRATCH_DIR}/build/consumer)
 run(${SCRATCH_DIR}/build/board_reader)
 
-# The core knows nothing of USB, and the driver nothing of the core.
+# The core library is linked without libusb, and the driver without Vulkan.
 foreach(program IN ITEMS consumer board_reader)
   file(GET_RUNTIME_DEPENDENCIES EXECUTABLES ${SCRATCH_DIR}/build/${program}
        RESOLVED_DEPENDENCIES_VAR ${program}_libraries UNRESOLVED_DEPENDENCIES_VAR unresolved)
 endforeach()
 if(consumer_libraries MATCHES "libusb" OR board_reader_libraries MATCHES "libvulkan")
-  message(FATAL_ERROR "more is linked than needed:\n${consumer_libraries}\n${board_reader_libraries}")
+  message(FATAL_ERROR "the core links libusb, or the driver Vulkan:\n${consumer_libraries}\n${board_reader_libraries}")
 endif()
 foreach(file IN ITEMS 70-palpate.rules profiles/tsf85.yaml)
   if(NOT EXISTS ${prefix}/share/palpate/${file})
