@@ -13,9 +13,9 @@ namespace palpate::cli {
 
 namespace {
 
-/// The smallest distance between two elements that are further apart than `tiny_mm`; infinite where
-/// there are none. Sweeps along x over those elements alone that lie less than the distance so far
-/// behind.
+/// The smallest distance of two elements that exceeds `tiny_mm`; infinite where there is none.
+/// A sweep along x compares each element with the elements behind it within the distance found so
+/// far.
 double least_distance_mm(std::vector<glm::dvec2> elements_mm, double tiny_mm) {
   const auto before = [](const glm::dvec2& a, const glm::dvec2& b) {
     return std::tie(a.x, a.y) < std::tie(b.x, b.y);
@@ -56,8 +56,8 @@ ArrayPicture::ArrayPicture(const std::vector<glm::dvec2>& elements_mm) {
     lower_mm_ = glm::min(lower_mm_, p);
     upper_mm_ = glm::max(upper_mm_, p);
   }
-  // Positions that are meant to be the same may differ by rounding, which is some 1e-16 of a
-  // coordinate; no real array is a billion times wider than its elements are apart.
+  // Elements closer than 1e-9 of the largest coordinate coincide but for rounding, which is about
+  // 1e-16 of a coordinate.
   const glm::dvec2 largest_mm = glm::max(glm::abs(lower_mm_), glm::abs(upper_mm_));
   const double tiny_mm = 1e-9 * std::max(largest_mm.x, largest_mm.y);
   const double least_mm = least_distance_mm(elements_mm, tiny_mm);
@@ -71,7 +71,7 @@ ArrayPicture::ArrayPicture(const std::vector<glm::dvec2>& elements_mm) {
   }
   std::ranges::sort(placed_, {},
                     [](const Placed& p) { return std::tuple(p.row, p.column, p.element); });
-  // Of elements that coincide exactly only the first is ever seen.
+  // Of elements at exactly equal positions, only the first can be seen.
   const auto end =
       std::unique(placed_.begin(), placed_.end(),
                   [](const Placed& a, const Placed& b) { return a.centre_mm == b.centre_mm; });
@@ -88,8 +88,8 @@ double ArrayPicture::column_of(double x_mm) const {
 
 std::optional<std::size_t> ArrayPicture::element_at(const glm::dvec2& p_mm) const {
   std::optional<std::size_t> found;
-  // An element that covers the point has its centre in the point's cell or in one beside it.
-  // Rows are counted as integers: far away, a row and the next one are the same number.
+  // An element that covers the point has its centre in the point's cell or in a neighbouring cell.
+  // `beside` is an integer: where rows are large numbers, row + 1 may equal row.
   for (int beside = -1; beside <= 1; ++beside) {
     const double row = row_of(p_mm.y) + beside;
     const double column = column_of(p_mm.x);

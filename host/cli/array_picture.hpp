@@ -8,23 +8,24 @@
 
 namespace palpate::cli {
 
-/// Where the elements of an array are, to be drawn as squares as wide as the closest two are apart.
-/// Made in e log e steps for e elements, asked in log e.
+/// Finds the element of an array at a point of a picture. Elements are drawn as squares; their edge
+/// is the distance of the two closest elements, 2 mm where there are no two. For e elements,
+/// construction takes O(e log e) steps and a look-up O(log e).
 class ArrayPicture {
  public:
   explicit ArrayPicture(const std::vector<glm::dvec2>& elements_mm);
 
-  /// Corners of the area that the squares cover; no area where there is no element.
+  /// Corners of the box around all squares, in the sensor frame; both are 0 for an empty array.
   const glm::dvec2& lower_mm() const { return lower_mm_; }
   const glm::dvec2& upper_mm() const { return upper_mm_; }
 
-  /// The element that covers this point of the sensor frame, the first of several.
+  /// Index of the first element whose square covers this point of the sensor frame.
   std::optional<std::size_t> element_at(const glm::dvec2& p_mm) const;
 
  private:
-  /// An element in the square cell, as wide as an element, that its centre lies in.
+  /// An element, and the row and column of its centre in a grid of cells as large as a square.
   struct Placed {
-    double row = 0.0;  ///< a whole number; an array may be wider than an int can count
+    double row = 0.0;  ///< a whole number, which may exceed the range of an int
     double column = 0.0;
     std::size_t element = 0;
     glm::dvec2 centre_mm{};

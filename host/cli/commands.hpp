@@ -6,7 +6,7 @@ class App;
 
 namespace palpate::cli {
 
-// Each adds one command with its options; the command runs when it was parsed.
+// Each function adds one command with its flags to the program; the command runs once it is parsed.
 void add_devices(CLI::App& app);
 void add_sensors(CLI::App& app);
 void add_record(CLI::App& app);

@@ -10,26 +10,26 @@ namespace palpate::cli {
 void add_detector_flags(CLI::App& command, DetectorFlags& flags) {
   TouchDetectorOptions& options = flags.options;
   command.add_option("--onset", flags.onset,
-                     "A touch begins where the largest pressure above the baseline exceeds this, "
-                     "in the sensor's unit [default: 2 kPa]");
+                     "A touch begins when the largest pressure above the baseline exceeds this "
+                     "value, in the sensor's unit [default: 2 kPa; required for raw pressure]");
   command.add_option("--release", flags.release,
-                     "and ends where it falls below this [default: half of --onset]");
+                     "A touch ends when the pressure falls below this [default: half of --onset]");
   command
       .add_option("--steady", options.steady,
-                  "In the steady phase the summed pressure stays within this part of its mean")
+                  "Largest relative deviation of the summed pressure in a touch's steady phase")
       ->capture_default_str();
   command
       .add_option("--min-steady-s", options.min_steady_s,
-                  "A shorter steady phase is no touch, in seconds")
+                  "Shortest steady phase of a touch, s; shorter contacts are ignored")
       ->capture_default_str();
   command
       .add_option("--smooth-s", options.smooth_s,
-                  "Onset, release and steadiness are judged by the mean over this time, in seconds")
+                  "Time over which pressures are averaged before they are judged, s")
       ->capture_default_str();
   command
       .add_option("--drift-s", options.drift_s,
-                  "Time constant, in seconds, with which the baseline follows drift while nothing "
-                  "is touched; 0: never")
+                  "Time constant, s, with which the baseline follows drift while nothing "
+                  "touches the array; 0: the baseline is fixed")
       ->capture_default_str();
 }
 

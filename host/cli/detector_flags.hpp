@@ -11,7 +11,7 @@ class App;
 
 namespace palpate::cli {
 
-/// The flags that say when a stream of frames is a touch.
+/// The flags of the touch detector; `onset` and `release` have defaults that depend on the unit.
 struct DetectorFlags {
   std::optional<double> onset;
   std::optional<double> release;
@@ -20,8 +20,8 @@ struct DetectorFlags {
 
 void add_detector_flags(CLI::App& command, DetectorFlags& flags);
 
-/// The detector's options for pressures of this unit: raw ones have no default onset, and the
-/// release is by default half of the onset. `source` is named where a flag is missing.
+/// The detector's options for pressures of this unit; the release is by default half of the onset.
+/// Throws Error naming `source` where the pressures are raw and --onset is missing.
 TouchDetectorOptions detector_options(const DetectorFlags& flags, const std::string& pressure_unit,
                                       const std::string& source);
 

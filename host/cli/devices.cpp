@@ -32,7 +32,7 @@ void print_devices(bool json) {
     return;
   }
   if (devices.empty()) {
-    fmt::print("no Vulkan device: install a driver (on Debian mesa-vulkan-drivers)\n");
+    fmt::print("no Vulkan device; install a driver, on Debian: mesa-vulkan-drivers\n");
   }
   for (const DeviceInfo& d : devices) {
     fmt::print("{} {}  {}\n", d.chosen ? '*' : ' ', d.index, d.name);
@@ -48,10 +48,10 @@ void print_devices(bool json) {
 }  // namespace
 
 void add_devices(CLI::App& app) {
-  auto* command =
-      app.add_subcommand("devices", "List the Vulkan devices, the one that is chosen (*), and why");
+  auto* command = app.add_subcommand(
+      "devices", "List the Vulkan devices and why each is used or not; (*) marks the default");
   const auto json = std::make_shared<bool>(false);
-  command->add_flag("--json", *json, "Print JSON");
+  command->add_flag("--json", *json, "Print the list as JSON");
   command->callback([json] { print_devices(*json); });
 }
 

@@ -18,7 +18,7 @@ namespace palpate::cli {
 
 namespace {
 
-/// Whether other programs can open the file, and what to do where they cannot.
+/// Says whether the recording is closed, so that other programs can open it, and if not, why.
 std::string closed_of(const std::string& path, const Recording& r) {
   if (r.closed) {
     return "yes";
@@ -27,15 +27,15 @@ std::string closed_of(const std::string& path, const Recording& r) {
     case Recorder::there:
       return "no: it is being recorded";
     case Recorder::gone:
-      return fmt::format(
-          "no: it was cut off; run palpate info --close {} to let other programs open it", path);
+      return fmt::format("no: it was cut off; palpate info --close {} lets other programs open it",
+                         path);
     case Recorder::unknown:
       break;
   }
   return "no: it is being recorded, or was cut off";
 }
 
-/// What a stream of frames has besides.
+/// Prints what only a recording of frames has.
 void print_stream(const std::string& path, const RecordingSummary& s) {
   const Recording& r = s.head;
   if (s.elapsed_s && *s.elapsed_s > 0.0) {
@@ -98,7 +98,8 @@ void print_map(const std::string& path) {
   fmt::print("  origin            {:.3f}, {:.3f} mm, centre of cell (0, 0)\n", m.origin_mm.x,
              m.origin_mm.y);
   if (m.spread_mm) {
-    fmt::print("  spread            {} mm, of the sensor model that built it\n", *m.spread_mm);
+    fmt::print("  spread            {} mm, standard deviation of the inverse sensor model\n",
+               *m.spread_mm);
   }
   fmt::print("  prior             {:.4f}, log odds {:.3f}\n", m.prior, m.prior_log_odds());
   fmt::print("  log odds          {:.3f} to {:.3f} nats\n", s.log_odds.least, s.log_odds.most);
@@ -134,7 +135,7 @@ void print_info(const std::string& path, bool close) {
     if (format != "palpate.recording") {
       throw Error(
           Fault::input,
-          fmt::format("{}: format '{}' is never cut off; give --close a recording", path, format));
+          fmt::format("{}: format '{}' needs no closing; give --close a recording", path, format));
     }
     close_recording(path);
   }
@@ -146,8 +147,8 @@ void print_info(const std::string& path, bool close) {
     print_posterior(path);
   } else {
     throw Error(Fault::input,
-                fmt::format("{}: format '{}' is not known; give a recording, a map or "
-                            "a posterior",
+                fmt::format("{}: attribute 'format' = '{}' is unknown; give a recording, a map "
+                            "or a posterior",
                             path, format));
   }
 }
@@ -155,18 +156,18 @@ void print_info(const std::string& path, bool close) {
 }  // namespace
 
 void add_info(CLI::App& app) {
-  auto* command = app.add_subcommand("info", "Say what a recording, a map or a posterior holds");
+  auto* command = app.add_subcommand("info", "Show what a recording, a map or a posterior holds");
   struct Options {
     std::string path;
     bool close = false;
   };
   const auto options = std::make_shared<Options>();
-  command->add_option("FILE", options->path, "HDF5 file")->required();
+  command->add_option("FILE", options->path, "Recording, map or posterior (HDF5)")->required();
   command->add_flag(
       "--close", options->close,
-      "First close a recording that was cut off: the file itself is changed, keeps all "
-      "its whole rows, and opens in other programs as well (h5py opens it only with "
-      "swmr=True before). A recording that is still being made is refused");
+      "First close a recording that was cut off, so that other programs open it too (before, h5py "
+      "needs swmr=True). This changes the file; it keeps all rows that are whole. A recording that "
+      "is still being made is refused");
   command->callback([options] { print_info(options->path, options->close); });
 }
 

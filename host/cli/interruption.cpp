@@ -17,7 +17,7 @@ Interruption::Interruption() {
   for (int i = 0; i < 3; ++i) {
     ::sigaction(signals[i], &action, &before_[i]);
     if (before_[i].sa_handler == SIG_IGN) {
-      ::sigaction(signals[i], &before_[i], nullptr);  // as nohup wants it
+      ::sigaction(signals[i], &before_[i], nullptr);  // nohup wants SIGHUP ignored
     }
   }
 }

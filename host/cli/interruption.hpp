@@ -4,8 +4,8 @@
 
 namespace palpate::cli {
 
-/// While it lives, Ctrl-C, a hang-up and SIGTERM do not end the program but are noted here. One at
-/// a time.
+/// During its lifetime, SIGINT (Ctrl-C), SIGHUP and SIGTERM do not end the program; requested()
+/// tells whether one of them came. Only one object may exist at a time.
 class Interruption {
  public:
   Interruption();

@@ -58,17 +58,17 @@ void LiveScreen::describe(const LiveState& state) {
   view_.frames = state.counters.frames;
   view_.lost = state.counters.lost;
   view_.warning = state.gone || state.taring;
-  view_.state = state.gone     ? "the board is gone; waiting until it is plugged in again"
-                : state.taring ? "reading the untouched array: keep it free"
+  view_.state = state.gone     ? "the board is unplugged; plug it in again to go on"
+                : state.taring ? "taring: do not touch the array"
                                : fmt::format("unknown {}, {} touches{}", state.unknown + 1,
                                              state.touches, state.touching ? ", touching" : "");
   if (state.without_pose > 0) {
     view_.warning = true;
-    view_.state += fmt::format("; {} touches without a pose passed over", state.without_pose);
+    view_.state += fmt::format("; skipped {} touches without a pose", state.without_pose);
   }
   view_.pressure = state.pressure;
-  // A press is mostly several times as strong as what counts as contact. A touch's robust mean may
-  // widen the scale; of single frames, one of 1e38 would leave nothing to be seen.
+  // Most presses are several times as strong as the contact threshold. Touches, which are robust
+  // means, may widen the scale; a single frame of 1e38 may not, or nothing else would be seen.
   view_.full_scale = std::max(5.0 * task_.histogram.classifier.threshold, 1e-6);
   if (state.last) {
     for (const double pressure : state.last->touch.pressure) {

@@ -11,16 +11,16 @@
 
 namespace palpate::cli {
 
-/// Shows on a terminal what is known of a stream: as a screen, or where the cursor cannot be moved,
-/// as a picture after each touch.
+/// Shows on a terminal what `live` knows: as a screen that is redrawn, or, on a terminal whose
+/// cursor cannot be moved, as a picture after each touch.
 class LiveScreen {
  public:
   /// @param output the terminal; keys are read from standard input
   LiveScreen(std::FILE* output, const SensorDescription& sensor,
              const std::vector<glm::dvec2>& elements_mm, const RecognitionTask& task);
 
-  /// Shows this; true where the next unknown is asked for.
-  /// @param warning shown beside the state; "" where there is none
+  /// Shows the state, and beside it the warning unless it is "". Returns true if the key for the
+  /// next unknown was pressed.
   bool update(const LiveState& state, const std::string& warning);
 
  private:
@@ -35,7 +35,7 @@ class LiveScreen {
   LiveView view_;
   TerminalColours colours_ = terminal_colours();
   std::optional<Terminal> terminal_;
-  std::size_t printed_ = 0;  ///< touches shown where the cursor cannot be moved
+  std::size_t printed_ = 0;  ///< touches that have a picture, where the cursor cannot be moved
   Clock::time_point rated_ = Clock::now();
   std::uint64_t rated_frames_ = 0;
 };

@@ -14,7 +14,7 @@ namespace palpate::cli {
 
 namespace {
 
-/// Part of the canvas, in cells.
+/// A rectangle of the canvas, in character cells.
 struct Panel {
   int column = 0;
   int row = 0;
@@ -22,8 +22,8 @@ struct Panel {
   int rows = 0;
 };
 
-/// Draws the area from `lower` to `upper`, as large as it fits into the panel, with y upwards.
-/// `pixel_at` is called with points in mm and returns a Pixel, or none.
+/// Draws the area from `lower_mm` to `upper_mm` as large as it fits into the panel, y upwards.
+/// `pixel_at(p_mm)` returns the Pixel of a point, or none.
 template <typename PixelAt>
 void draw_picture(TerminalCanvas& canvas, const Panel& panel, const glm::dvec2& lower_mm,
                   const glm::dvec2& upper_mm, const PixelAt& pixel_at) {
@@ -75,7 +75,7 @@ Colour mix(const Colour& a, const Colour& b, double part) {
           a.blue + part * (b.blue - a.blue)};
 }
 
-/// The map's evidence in nats around a point, over a square about as wide as a pixel may be.
+/// The map's evidence at the cell nearest to a point: log odds relative to the prior, in nats.
 double evidence_at(const OccupancyGrid& map, const glm::dvec2& p_mm) {
   const glm::dvec2 cell = (p_mm - map.origin_mm) / map.cell_mm;
   const int i = std::clamp(static_cast<int>(std::lround(cell.x)), 0, map.nx - 1);
@@ -118,7 +118,7 @@ void draw_map(TerminalCanvas& canvas, const Panel& panel, const LiveView& view) 
                });
 }
 
-/// The labels that there is room for: the most probable ones, in their own order.
+/// Indices of the `room` most probable labels, in the order of the labels.
 std::vector<std::size_t> shown_labels(const LiveView& view, std::size_t room) {
   std::vector<std::size_t> shown(view.labels.size());
   std::iota(shown.begin(), shown.end(), std::size_t{0});
@@ -145,7 +145,7 @@ void draw_identity(TerminalCanvas& canvas, const Panel& panel, const LiveView& v
   int row = panel.row;
   for (const std::size_t label : shown) {
     canvas.text(panel.column, row, view.labels[label]);
-    // Covers the end of a label that is too long.
+    // Cuts off the end of a long label.
     canvas.text(panel.column + width, row,
                 std::string(static_cast<std::size_t>(panel.columns), ' '));
     if (!view.identity.empty()) {

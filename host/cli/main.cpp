@@ -18,7 +18,7 @@ namespace {
 constexpr int wrong_input = 2;
 constexpr int failed = 1;
 
-/// Prints one line, whatever a path or a library's message holds.
+/// Prints the message as one line, without control characters, and returns the status.
 int complain(int status, std::string message) {
   std::replace_if(
       message.begin(), message.end(), [](unsigned char c) { return c < ' '; }, ' ');
@@ -28,27 +28,28 @@ int complain(int status, std::string message) {
 }
 
 int complain_of_output() {
-  return complain(failed, "standard output: cannot be written; is the disk full?");
+  return complain(failed,
+                  "standard output: cannot be written; free disk space, or read it to its end");
 }
 
-/// The status of a run that went well, unless something that it printed was lost.
+/// The exit status after a command has succeeded: 0, or 1 where a part of its output was lost.
 int finish() {
   return std::fflush(stdout) != 0 || std::ferror(stdout) != 0 ? complain_of_output() : 0;
 }
 
-/// CLI11 takes an empty value for a missing one, and so a script's unset variable for a default.
+/// CLI11 would take the default for an empty value, such as a script's unset variable.
 void refuse_empty_values(CLI::App& app) {
   for (CLI::App* command : app.get_subcommands({})) {
     for (CLI::Option* option : command->get_options()) {
       option->check([](const std::string& value) {
-        return value.empty() ? "empty; give a value or leave it out" : "";
+        return value.empty() ? "the value is empty; give a value or leave the flag out" : "";
       });
     }
   }
 }
 
 int run(int argc, char** argv) {
-  CLI::App app("Palpate recognises and locates objects by touch, on Vulkan compute.", "palpate");
+  CLI::App app("Palpate recognises objects by touch and finds their poses, on Vulkan.", "palpate");
   app.set_version_flag("--version", PALPATE_VERSION);
   app.require_subcommand(1);
   app.failure_message([](const CLI::App*, const CLI::Error&) { return std::string(); });
@@ -74,12 +75,14 @@ int run(int argc, char** argv) {
     const auto unexpected = app.remaining();
     if (commands.empty() && !unexpected.empty()) {
       // CLI11 would only say that a command is missing.
-      return complain(wrong_input,
-                      fmt::format("'{}' is not a command; see palpate --help", unexpected.front()));
+      return complain(wrong_input, fmt::format("'{}' is no command or flag; see palpate --help",
+                                               unexpected.front()));
     }
-    return complain(wrong_input,
-                    fmt::format("{}; see palpate {}--help", error.what(),
-                                commands.empty() ? "" : commands.front()->get_name() + " "));
+    const bool number = error.get_name() == "ConversionError";  // all values but texts are numbers
+    return complain(
+        wrong_input,
+        fmt::format("{}{}; see palpate {}--help", error.what(), number ? ": give a number" : "",
+                    commands.empty() ? "" : commands.front()->get_name() + " "));
   }
   return finish();
 }
@@ -95,7 +98,7 @@ int main(int argc, char** argv) {
   } catch (const std::bad_alloc&) {
     return complain(failed, "out of memory; use fewer bins, objects or cells");
   } catch (const std::exception& error) {
-    // What fmt::print throws names no file.
+    // fmt::print throws where standard output cannot be written, without naming it.
     return std::ferror(stdout) != 0 ? complain_of_output() : complain(failed, error.what());
   }
 }

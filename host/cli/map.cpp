@@ -45,7 +45,7 @@ struct Options {
   std::string device;
 };
 
-/// The touches of every label, of all recordings that bear it.
+/// The touches of all recordings, by label.
 std::vector<ObjectTouches> group_by_label(const std::vector<Recording>& recordings,
                                           const Options& options,
                                           const ContactClassifier& classifier, bool one_map) {
@@ -58,17 +58,20 @@ std::vector<ObjectTouches> group_by_label(const std::vector<Recording>& recordin
     const std::string& label = options.label.empty() ? recording.object : options.label;
     if (label.empty()) {
       throw Error(Fault::input,
-                  fmt::format("{}: object is empty; name it with --label", recording.path));
+                  fmt::format("{}: attribute 'object' is empty; name the object with --label",
+                              recording.path));
     }
     if (label == none_label) {
       throw Error(Fault::input,
-                  fmt::format("{}: object '{}' is kept for objects that were never learned; give "
-                              "another --label",
+                  fmt::format("{}: object '{}' stands for objects that were never learned; choose "
+                              "another name with --label",
                               recording.path, label));
     }
     if (label.find('/') != std::string::npos) {
-      throw Error(Fault::input, fmt::format("{}: object '{}' cannot name a file; give --label",
-                                            recording.path, label));
+      throw Error(Fault::input,
+                  fmt::format("{}: object '{}' holds a '/' and cannot name a file; choose another "
+                              "name with --label",
+                              recording.path, label));
     }
     const auto [begin, end] = select(recording, frames);
     const std::vector<Touch> touches = recording.touches(begin, end);
@@ -82,8 +85,8 @@ std::vector<ObjectTouches> group_by_label(const std::vector<Recording>& recordin
     group.insert(group.end(), touches.begin(), touches.end());
     if (one_map && groups.size() > 1) {
       throw Error(Fault::input,
-                  fmt::format("{}: object '{}' differs from '{}' of {}; give a folder, -o {}/, for "
-                              "a map of each, or one name for all with --label",
+                  fmt::format("{}: object '{}' differs from '{}' of {}; write a map of each object "
+                              "with -o {}/, or one map of all touches with --label",
                               recording.path, label, recordings.front().object,
                               recordings.front().path, options.output));
     }
@@ -137,7 +140,7 @@ std::filesystem::path ros_path(const Options& options, const std::string& label)
   return std::filesystem::path(options.ros) / (label + ".yaml");
 }
 
-/// Finds what would fail at the end before the work begins.
+/// Throws Error where an output cannot be written or would overwrite an input.
 void prepare_outputs(const Options& options, bool folder,
                      const std::vector<std::filesystem::path>& map_paths,
                      const std::vector<ObjectTouches>& objects) {
@@ -181,12 +184,12 @@ void build_maps(const Options& options) {
   const bool folder =
       options.output.ends_with('/') || std::filesystem::is_directory(output, ignored);
   if (!is_printable_utf8(options.label)) {
-    throw Error(Fault::input, "--label: give printable text, in UTF-8");
+    throw Error(Fault::input, "--label: is not printable UTF-8; choose another label");
   }
   if (options.label == none_label) {
     throw Error(Fault::input,
-                fmt::format("--label {}: is kept for objects that were never learned; choose "
-                            "another",
+                fmt::format("--label {}: stands for objects that were never learned; choose "
+                            "another label",
                             none_label));
   }
   const bool estimate = options.prior == "auto";
@@ -221,7 +224,7 @@ void build_maps(const Options& options) {
 
   const std::string picture = options.png.empty() ? "" : draw_maps(maps);
 
-  // Everything is computed; only now anything is written, the folders first.
+  // Nothing is written before all maps are built, so that a failure leaves nothing behind.
   if (!options.ros.empty()) {
     make_folder(options.ros);
   }
@@ -253,47 +256,47 @@ void build_maps(const Options& options) {
 void add_map(CLI::App& app) {
   auto* command = app.add_subcommand(
       "map",
-      "Build an object's occupancy grid from touches at known poses (robot frame = object "
-      "frame)");
+      "Build an object's occupancy grid from touches at known poses; the robot frame is the "
+      "object's frame");
   const auto options = std::make_shared<Options>();
-  command->add_option("RECORDING", options->recordings, "Recordings (HDF5)")->required();
+  command->add_option("RECORDING", options->recordings, "Recordings of touches (HDF5)")->required();
   command
       ->add_option("-o,--output", options->output,
-                   "Map to write (HDF5), or FOLDER/ for one map per object label")
+                   "Map to write (HDF5), or FOLDER/ for one map of each object")
       ->required();
   command->add_option("--cell-mm", options->cell_mm, "Edge of a cell, mm")->capture_default_str();
-  command
-      ->add_option("--psf-mm", options->psf_mm, "The sensor's point spread, standard deviation, mm")
+  command->add_option("--psf-mm", options->psf_mm, "Standard deviation of the point spread, mm")
       ->capture_default_str();
   command->add_option("--spread-mm", options->spread_mm,
-                      "Spread of the inverse sensor model, mm [default: half of --psf-mm]");
+                      "Standard deviation of the inverse sensor model, mm [default: half of "
+                      "--psf-mm]");
   command
       ->add_option("--peak", options->peak,
                    "Peak of the inverse sensor model, a probability below 1")
       ->capture_default_str();
   command
       ->add_option("--prior", options->prior,
-                   "Probability that an unseen cell is occupied; auto: the objects' area over the "
-                   "modelled area")
+                   "Probability that an unseen cell is occupied; auto: the area of all objects "
+                   "divided by the area that their maps cover")
       ->capture_default_str();
   command->add_option(
       "--threshold", options->threshold,
-      "Contact threshold, in the recording's pressure unit [default: 2 kPa; must be "
-      "given for raw pressure]");
+      "Contact threshold, in the recording's pressure unit [default: 2 kPa; required for raw "
+      "pressure]");
   command->add_option("--ratio", options->ratio,
-                      "Contact threshold as a part of the touch's largest pressure [default: 0.3]");
+                      "Threshold as a fraction of the touch's largest pressure [default: 0.3]");
   command->add_option("--frames", options->frames,
-                      "Use the touches A:B, from A up to before B, of every recording");
+                      "Use the touches A to B - 1 of every recording, counted from 0, as A:B");
   command
       ->add_option("--symmetry", options->symmetry,
-                   "The object's n-fold rotational symmetry; 0 = full")
+                   "n-fold rotational symmetry of the object; 1: none, 0: any rotation")
       ->check(require_whole_number)
       ->capture_default_str();
   command->add_option("--label", options->label,
-                      "Label of the map [default: the recording's object]");
-  command->add_option("--png", options->png, "Draw all maps side by side");
+                      "Label of the map [default: the object that the recording names]");
+  command->add_option("--png", options->png, "Picture to write (PNG): all maps side by side");
   command->add_option("--ros", options->ros,
-                      "Folder for each map as PGM + YAML, in the convention of ROS's map_server");
+                      "Folder to write every map to as PGM and YAML, for ROS's map_server");
   command->add_option("--device", options->device, "Vulkan device, by index or a part of its name");
   command->callback([options] { build_maps(*options); });
 }

@@ -20,7 +20,7 @@ namespace {
   throw Error(Fault::input, fmt::format("{} {}: {}", flag, text, remedy));
 }
 
-/// The numbers between the separators, or nothing if the text has another form.
+/// The numbers between the separators; none if the text is not a list of finite numbers.
 template <typename Number>
 std::optional<std::vector<Number>> split_numbers(const std::string& text, char separator) {
   std::vector<Number> numbers;
@@ -58,7 +58,7 @@ std::vector<Number> parse(const std::string& flag, const std::string& text, char
 std::array<double, 2> parse_range(const std::string& flag, const std::string& text) {
   const auto ends = parse<double>(flag, text, ':', 2, "LOWER:UPPER, such as -10:10");
   if (ends[0] > ends[1]) {
-    refuse(flag, text, "reversed; write the lower end first");
+    refuse(flag, text, "the range is reversed; write the lower end first");
   }
   return {ends[0], ends[1]};
 }
@@ -85,9 +85,9 @@ std::array<int, 3> parse_bins(const std::string& flag, const std::string& text) 
 
 Frames parse_frames(const std::string& flag, const std::string& text) {
   const auto ends =
-      parse<std::int64_t>(flag, text, ':', 2, "A:B, the touches from A up to before B");
+      parse<std::int64_t>(flag, text, ':', 2, "A:B, for the touches A to B - 1, counted from 0");
   if (ends[0] < 0 || ends[0] >= ends[1]) {
-    refuse(flag, text, "selects no touch; A must be at least 0 and below B");
+    refuse(flag, text, "selects no touch; give A:B with A from 0 and below B");
   }
   return {static_cast<std::size_t>(ends[0]), static_cast<std::size_t>(ends[1])};
 }
@@ -122,7 +122,7 @@ void make_folder(const std::filesystem::path& folder) {
   std::error_code error;
   std::filesystem::create_directories(folder, error);
   if (error || !std::filesystem::is_directory(folder)) {
-    throw Error(Fault::input, fmt::format("{}: cannot be made a folder ({}); choose another",
+    throw Error(Fault::input, fmt::format("{}: the folder cannot be made ({}); choose another name",
                                           folder.string(), error.message()));
   }
 }

@@ -11,9 +11,9 @@
 
 namespace palpate::cli {
 
-// Each parses the value of a flag. They throw Error naming the flag, the value and the form.
+// Each function parses the value of a flag. Throws Error naming flag, value and the form wanted.
 
-/// "A:B" with A <= B.
+/// "A:B" with A <= B
 std::array<double, 2> parse_range(const std::string& flag, const std::string& text);
 /// "X,Y"
 glm::dvec2 parse_point(const std::string& flag, const std::string& text);
@@ -22,7 +22,7 @@ Pose parse_pose(const std::string& flag, const std::string& text);
 /// "25x25x16", each at least 1
 std::array<int, 3> parse_bins(const std::string& flag, const std::string& text);
 
-/// A half-open range of touches.
+/// Touches [begin, end) of a recording.
 struct Frames {
   std::size_t begin = 0;
   std::size_t end = 0;
@@ -30,18 +30,18 @@ struct Frames {
 /// "A:B" with A < B
 Frames parse_frames(const std::string& flag, const std::string& text);
 
-/// Throws Error unless the value is finite and above `least` (or equal to it, if `inclusive`).
+/// The value. Throws Error unless it is finite and above `least`, or `inclusive` and equal to it.
 double require_above(const std::string& flag, double value, double least, bool inclusive = false);
 
-/// What is wrong with a whole number, or nothing. CLI11 alone reads 010 as octal and, where it
-/// wants no sign, wraps -1 around and takes the largest number for one that is larger.
+/// For CLI11: what is wrong with the text of a whole number from 0, or "". CLI11 alone reads 010 as
+/// octal, wraps -1 around and clamps numbers that are too large.
 std::string require_whole_number(const std::string& text);
 
-/// Throws Error unless a file can be made there: before hours of work, not after.
+/// Throws Error unless the file can be written. A command checks so before its work begins.
 void require_writable(const std::filesystem::path& file);
 /// Writes a file that appears whole or not at all. Throws Error.
 void write_file(const std::filesystem::path& file, std::string_view bytes);
-/// Makes the folder where it is missing. Throws Error where that fails.
+/// Makes the folder if it does not exist. Throws Error.
 void make_folder(const std::filesystem::path& folder);
 
 double degrees(double rad);

@@ -29,7 +29,7 @@ void Progress::show(double fraction) {
       fraction > 0.0 ? fmt::format(", {:.0f} s left", elapsed * (1.0 - fraction) / fraction) : "";
   // Carriage return, text, erase to the end of the line.
   const std::string line = fmt::format("\r{} {:3.0f} %{}\033[K", what_, 100.0 * fraction, left);
-  std::fputs(line.c_str(), output_);  // not fmt::print, which throws where a terminal has gone
+  std::fputs(line.c_str(), output_);  // not fmt::print, which throws if the terminal is closed
   std::fflush(output_);
 }
 

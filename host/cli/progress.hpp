@@ -7,20 +7,21 @@
 
 namespace palpate::cli {
 
-/// A progress line on standard error, for work over two seconds and only when it is a terminal.
+/// Shows a progress line on a terminal once the work has taken two seconds; erases it at the end.
 class Progress {
  public:
   using Clock = std::chrono::steady_clock;
 
-  /// @param output shows the line, if it is a terminal
-  /// @param now tells the time
+  /// @param what names the work, such as "building maps"
+  /// @param output where the line is shown; nothing is shown if it is not a terminal
+  /// @param now the clock
   explicit Progress(std::string what, std::FILE* output = stderr,
                     std::function<Clock::time_point()> now = Clock::now);
   ~Progress();
   Progress(const Progress&) = delete;
   Progress& operator=(const Progress&) = delete;
 
-  /// Shows the fraction done, in [0, 1].
+  /// Shows the fraction of the work that is done, in [0, 1].
   void show(double fraction);
 
  private:

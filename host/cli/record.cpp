@@ -38,16 +38,17 @@ struct Options {
   std::string object;
 };
 
-/// Frames until they are enough, the sensor has ended or somebody interrupts.
+/// The sensor's frames until --seconds are over, the sensor ends or a signal interrupts.
 class FrameSource {
  public:
   FrameSource(Sensor& sensor, std::optional<double> seconds) : sensor_(sensor), seconds_(seconds) {}
 
-  /// The next frame; none after the last, or where none came for a moment: see done().
+  /// The next frame; none after the last frame, and none where 0.1 s pass without a frame: see
+  /// done().
   std::optional<Frame> next() {
     std::optional<Frame> frame = sensor_.next(100ms);
     if (!frame) {
-      // A board that says nothing must not hold up a script.
+      // A silent board ends too, after --seconds, or a script would wait forever.
       done_ =
           interruption_.requested() || sensor_.ended() ||
           (seconds_ && std::chrono::duration<double>(Clock::now() - heard_).count() > *seconds_);
@@ -73,11 +74,10 @@ class FrameSource {
   bool done_ = false;
 };
 
-/// A recording under way. The frames of the tare are saved like all others, and the baseline is
-/// stored when it is known.
+/// Writes all frames to the recording, and the baseline when the tare ends.
 class RecordingUnderWay {
  public:
-  /// @param tare_s over which the baseline is taken; 0: it is known, or there is none
+  /// @param tare_s duration of the tare in seconds; 0: the sensor knows its baseline, or has none
   RecordingUnderWay(const std::string& output, const SensorDescription& sensor, double tare_s)
       : sensor_(sensor), tare_s_(tare_s), recorder_(std::in_place, output, sensor) {
     if (taring()) {
@@ -98,8 +98,8 @@ class RecordingUnderWay {
   }
   void flush() { recorder_->flush(); }
 
-  /// Throws Error where there is no frame to keep, or where the array was touched during the tare:
-  /// there is no recording then.
+  /// Closes the file. Throws Error where no frame was recorded or the array was touched during the
+  /// tare; no recording is left then.
   void close(const std::string& sensor) {
     if (recorder_->frames() == 0) {
       refuse_empty(sensor);
@@ -133,8 +133,8 @@ class RecordingUnderWay {
                   fmt::format("sensor {}: no frame came; see palpate sensors", sensor));
     }
     throw Error(Fault::input,
-                fmt::format("sensor {}: none of its {} frames has a known reading and a time; "
-                            "repair its connection and look at its readings: palpate sensors",
+                fmt::format("sensor {}: none of its {} frames has both a known reading and a time; "
+                            "check the board and its connection with palpate sensors",
                             sensor, recorder_->unreadable()));
   }
 
@@ -157,9 +157,9 @@ class RecordingUnderWay {
 
   SensorDescription sensor_;
   double tare_s_;
-  std::vector<Frame> first_;  ///< of the tare
+  std::vector<Frame> first_;  ///< frames of the tare
   StreamTime time_;
-  std::optional<OlderFile> older_;  ///< until the tare is known to be good
+  std::optional<OlderFile> older_;  ///< the replaced file, until the tare is over
   std::optional<FrameRecorder> recorder_;
 };
 
@@ -172,14 +172,16 @@ void record(const Options& options) {
   if (options.seconds) {
     require_above("--seconds", *options.seconds, 0.0);
   } else if (is_endless_flood(options.sensor)) {
-    throw Error(Fault::input,
-                fmt::format("sensor {}: frames without an end at this rate would fill the disk; "
-                            "give --seconds, touches=N, or a lower rate or speed",
-                            options.sensor));
+    throw Error(
+        Fault::input,
+        fmt::format("sensor {}: the simulation has no end and gives more than 10 MB/s, which "
+                    "would fill the disk; give --seconds, touches=N, or a lower rate or "
+                    "speed",
+                    options.sensor));
   }
   require_above("--tare", options.tare_s, 0.0, true);
   if (!is_printable_utf8(options.object)) {
-    throw Error(Fault::input, "--object: give printable text, in UTF-8");
+    throw Error(Fault::input, "--object: is not printable UTF-8; choose another label");
   }
   std::unique_ptr<Sensor> sensor = open_sensor(options.sensor);
   PosedSensor* posed = nullptr;
@@ -219,26 +221,26 @@ void record(const Options& options) {
 void add_record(CLI::App& app) {
   auto* command = app.add_subcommand(
       "record",
-      "Record the frames of a sensor until Ctrl-C. Whatever happens meanwhile, the file holds all "
-      "but the last second; 'palpate touches' finds the touches in it");
+      "Record the frames of a sensor until Ctrl-C; 'palpate touches' finds the touches in them. A "
+      "kill, a crash or a full disk costs at most the last second of the recording");
   const auto options = std::make_shared<Options>();
   command->add_option("--sensor", options->sensor, sensor_help)->required();
   command
       ->add_option("-o,--output", options->output,
-                   "Recording of frames to write (HDF5); an older file is replaced")
+                   "Recording of frames to write (HDF5); replaces an older file")
       ->required();
   command->add_option(
       "--seconds", options->seconds,
-      "End after this time, in seconds. A simulation that gives more than 10 MB a "
-      "second, by rate=, array= and speed=, needs it, unless its touches= are given");
+      "Stop after this time, s [default: at Ctrl-C]. Required for a simulation of more than "
+      "10 MB/s without touches=N");
   command->add_option("--poses", options->poses, poses_help);
   command
       ->add_option("--tare", options->tare_s,
-                   "The array's baseline is read from the first seconds, when nothing touches it; "
-                   "they are recorded, too. Where the array is touched then, or an element has no "
-                   "known reading, there is no recording and an older file stays. 0: none")
+                   "Duration of the tare at the start, s: nothing may touch the array, and the "
+                   "median of its frames becomes the baseline. If it is touched, or an element has "
+                   "no known reading, nothing is recorded and an older file stays. 0: no tare")
       ->capture_default_str();
-  command->add_option("--object", options->object, "Label of the object that is touched");
+  command->add_option("--object", options->object, "Label of the touched object");
   command->callback([options] { record(*options); });
 }
 

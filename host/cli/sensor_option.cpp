@@ -22,8 +22,8 @@ void add_sensor_files(const std::string& name, const std::string& poses, Command
 
 void report_refused(const PosedSensor::Poses& poses) {
   if (poses.refused > 0) {
-    fmt::print(stderr, "palpate: {} lines were no poses or out of order; the first: {}\n",
-               poses.refused, poses.first_refused);
+    fmt::print(stderr, "palpate: {} lines of poses were skipped; the first: {}\n", poses.refused,
+               poses.first_refused);
   }
   if (poses.set_back > 0) {
     fmt::print(stderr, "palpate: the clock of the poses was set back {}\n",

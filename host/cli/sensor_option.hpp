@@ -9,22 +9,23 @@
 
 namespace palpate::cli {
 
-/// What --sensor takes, for its help.
 inline constexpr const char* sensor_help =
-    "A board, as 'palpate sensors' lists it; replay:FILE[,speed=F|max], a recording of frames; or "
-    "simulate:SHAPE[,rate=HZ][,array=COLUMNS:ROWS:PITCH][,seed=N][,touches=N][,noise=KPA]"
-    "[,object=random|X:Y:DEG][,speed=F|max], a robot that presses an array onto a shape";
+    "A board, by its name in 'palpate sensors' or the path of its profile; "
+    "replay:FILE[,speed=F|max], which plays a recording of frames; or "
+    "simulate:SHAPE[,rate=HZ][,array=COLUMNS:ROWS:PITCH_MM][,seed=N][,touches=N][,noise=KPA]"
+    "[,object=random|X_MM:Y_MM:DEG][,speed=F|max], which simulates a robot that presses an array "
+    "onto a shape";
 
 inline constexpr const char* poses_help =
-    "File, FIFO or - (standard input) with the sensor's poses, a line each: "
+    "File, FIFO or - (standard input) with the poses T_robot_sensor, one line of JSON each: "
     "{\"time\": s since 1970, \"x_mm\": mm, \"y_mm\": mm, \"theta_rad\": rad}";
 
-/// Opens a board or a virtual sensor. Throws Error naming it and what there is.
+/// Opens a board, a replay or a simulation. Throws Error naming it, and what may be given instead.
 std::unique_ptr<Sensor> open_sensor(const std::string& name);
 
-/// Adds what a sensor of this name reads, and the poses of --poses, "" where there are none.
+/// Adds the file that the sensor reads, if any, and the file of --poses, unless `poses` is "".
 void add_sensor_files(const std::string& name, const std::string& poses, CommandFiles& files);
-/// Says on standard error how many lines of the poses were passed over, if any were.
+/// Warns on standard error of skipped lines of poses and of clocks that were set back.
 void report_refused(const PosedSensor::Poses& poses);
 
 }  // namespace palpate::cli

@@ -14,7 +14,7 @@ namespace palpate::cli {
 
 namespace {
 
-/// Bytes that are no UTF-8, as a bad string of a device may be, would stop the JSON.
+/// The JSON text, with replacement characters where a device's string is not UTF-8.
 std::string dumped(const nlohmann::ordered_json& value) {
   return value.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
 }
@@ -39,7 +39,7 @@ void print_json(const std::vector<BoardInfo>& boards) {
   fmt::print("{}\n", dumped(list));
 }
 
-/// What a terminal shows of a string that the device chose.
+/// The text with '?' for control characters: a device chooses its strings freely.
 std::string printable(std::string text) {
   std::ranges::replace_if(
       text, [](unsigned char c) { return c < ' ' || c == 0x7f; }, '?');
@@ -80,9 +80,9 @@ void print_sensors(bool json) {
 
 void add_sensors(CLI::App& app) {
   auto* command = app.add_subcommand(
-      "sensors", "List the USB devices, the boards that can be used (*), and why others cannot");
+      "sensors", "List the USB devices; (*) marks the usable boards, others are explained");
   const auto json = std::make_shared<bool>(false);
-  command->add_flag("--json", *json, "Print JSON");
+  command->add_flag("--json", *json, "Print the list as JSON");
   command->callback([json] { print_sensors(*json); });
 }
 

@@ -30,7 +30,7 @@ struct Options {
   std::optional<int> touches;
 };
 
-/// T_object_sensor of "grid" or "random:N".
+/// The poses T_object_sensor that --poses asks for, "grid" or "random:N".
 std::vector<Pose> sensor_poses(const std::string& text, std::uint64_t seed) {
   if (text == "grid") {
     return training_grid();
@@ -47,7 +47,7 @@ std::vector<Pose> sensor_poses(const std::string& text, std::uint64_t seed) {
   throw Error(Fault::input, fmt::format("--poses {}: give grid, or random:N with N above 0", text));
 }
 
-/// Draws n poses without replacement, in random order; the same for the same seed everywhere.
+/// Draws n poses without replacement, in random order. A seed gives the same poses on every system.
 std::vector<Pose> draw(std::vector<Pose> poses, std::size_t n, std::uint64_t seed) {
   std::mt19937_64 random(seed);
   for (std::size_t i = 0; i < n; ++i) {
@@ -84,9 +84,8 @@ void simulate(const Options& options) {
   const std::size_t all = poses.size();
   const auto wanted = static_cast<std::size_t>(options.touches.value_or(static_cast<int>(all)));
   if (options.touches && (*options.touches < 1 || wanted > all)) {
-    throw Error(Fault::input, fmt::format("--touches {}: must lie between 1 and the {} poses of "
-                                          "--poses {}",
-                                          *options.touches, all, options.poses));
+    throw Error(Fault::input, fmt::format("--touches {}: --poses {} has {} poses; give 1 to {}",
+                                          *options.touches, options.poses, all, all));
   }
   if (unknown || options.touches) {
     poses = draw(std::move(poses), wanted, options.seed);
@@ -114,30 +113,30 @@ void simulate(const Options& options) {
 
 void add_simulate(CLI::App& app) {
   auto* command = app.add_subcommand(
-      "simulate", "Simulate touches of a shape with a DigiTacts array, into a recording");
+      "simulate", "Simulate touches of a shape with a DigiTacts array and write a recording");
   const auto options = std::make_shared<Options>();
   command
       ->add_option("SHAPE", options->shape,
-                   "A letter A to Z, a digit, ring, bar, or a polygon file (lines 'x y' in mm)")
+                   "A to Z, 0 to 9, ring, bar, or a polygon file with lines 'x y' in mm")
       ->required();
   command->add_option("-o,--output", options->output, "Recording to write (HDF5)")->required();
-  command->add_option("--seed", options->seed, "Seed of noise, poses and order")
+  command->add_option("--seed", options->seed, "Seed of noise, random poses and order")
       ->check(require_whole_number)
       ->capture_default_str();
   command
       ->add_option("--poses", options->poses,
-                   "grid: 4 x 4 positions 6.8 mm apart, 12 angles each; or random:N")
+                   "grid (4 x 4 positions 6.8 mm apart, 12 angles at each) or random:N")
       ->capture_default_str();
-  command->add_option("--psf-mm", options->sensor.psf_mm, "Point spread, standard deviation, mm")
+  command->add_option("--psf-mm", options->sensor.psf_mm, "Point spread (standard deviation), mm")
       ->capture_default_str();
-  command->add_option("--noise-kpa", options->sensor.noise_kpa, "Noise, standard deviation, kPa")
+  command->add_option("--noise-kpa", options->sensor.noise_kpa, "Noise (standard deviation), kPa")
       ->capture_default_str();
   command->add_option("--object-pose", options->object_pose,
-                      "Make an unknown at this pose T_object_robot: X,Y,DEG in mm and degrees, or "
-                      "random; the truth is stored in the file");
+                      "Pose T_object_robot of an unknown object, X,Y,DEG in mm and degrees, or "
+                      "random; the file stores it as the truth");
   command
       ->add_option("--touches", options->touches,
-                   "Draw N of the poses, without replacement [default: all]")
+                   "Use N of the poses, drawn at random without replacement [default: all]")
       ->check(require_whole_number);
   command->callback([options] { simulate(*options); });
 }

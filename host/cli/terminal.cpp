@@ -18,7 +18,7 @@ std::string environment(const char* name) {
   return value == nullptr ? std::string() : value;
 }
 
-/// As setlocale() has it: the first that is set decides.
+/// Whether the locale is UTF-8: as for setlocale(), the first variable that is set decides.
 bool shows_utf8() {
   for (const char* name : {"LC_ALL", "LC_CTYPE", "LANG"}) {
     std::string locale = environment(name);
@@ -57,10 +57,10 @@ Terminal::Terminal(int output, int input) : output_(output), input_(input) {
     settings.c_lflag &= ~static_cast<tcflag_t>(ICANON | ECHO);
     settings.c_cc[VMIN] = 0;
     settings.c_cc[VTIME] = 0;
-    settings.c_cc[VSUSP] = _POSIX_VDISABLE;  // a stopped program would leave the screen as it is
+    settings.c_cc[VSUSP] = _POSIX_VDISABLE;  // Ctrl-Z would leave the screen as it is
     ::tcsetattr(input_, TCSANOW, &settings);
   }
-  // The other screen, no cursor, no wrapping: a window that shrinks must not break lines.
+  // Alternate screen, no cursor, and no wrapping: a shrinking window must not break lines.
   write("\033[?1049h\033[?25l\033[?7l\033[H\033[2J");
 }
 
@@ -103,7 +103,7 @@ std::string Terminal::keys() {
   return keys;
 }
 
-// A terminal that is gone or an interruption ends the picture, not the work.
+// If the terminal is closed or a signal comes, the picture is incomplete, but the work goes on.
 void Terminal::write(const std::string& text) const {
   std::string_view rest = text;
   while (!rest.empty()) {

@@ -10,13 +10,13 @@
 
 namespace palpate::cli {
 
-/// What the terminal can show, by TERM, COLORTERM, NO_COLOR and the locale's character set.
+/// The colours that the terminal can show, by TERM, COLORTERM, NO_COLOR and the locale.
 TerminalColours terminal_colours();
-/// False for a terminal that only prints line after line: TERM=dumb or none.
+/// Whether the terminal can move the cursor; not so with TERM=dumb or without TERM.
 bool terminal_moves_cursor();
 
-/// A terminal as a whole screen, and its keys. While it lives the cursor is hidden and what stood
-/// there before is kept, to be shown again. Only one at a time.
+/// Draws on the whole screen of a terminal and reads its keys. During its lifetime the cursor is
+/// hidden; the destructor shows the former screen again. Only one object may exist at a time.
 class Terminal {
  public:
   struct Size {
@@ -24,18 +24,18 @@ class Terminal {
     int rows = 24;
   };
 
-  /// @param output descriptor of a terminal to draw on
-  /// @param input descriptor that keys are read from, if it is a terminal
+  /// @param output file descriptor of the terminal
+  /// @param input file descriptor that keys are read from, if it is a terminal
   Terminal(int output, int input);
   ~Terminal();
   Terminal(const Terminal&) = delete;
   Terminal& operator=(const Terminal&) = delete;
 
-  /// By now: it changes with the window.
+  /// The present size, which follows the window.
   Size size() const { return size_of(output_); }
   static Size size_of(int output);
 
-  /// Shows these lines from the top of the screen on; there must be no more than rows.
+  /// Shows the lines from the top of the screen on; there may be at most as many as rows.
   void show(const std::vector<std::string>& lines);
   /// The keys pressed since the last call.
   std::string keys();
@@ -46,7 +46,7 @@ class Terminal {
 
   int output_;
   int input_;
-  std::optional<termios> before_;  ///< how the input was set, where it was changed
+  std::optional<termios> before_;  ///< former settings of the input, if it is a terminal
 };
 
 }  // namespace palpate::cli

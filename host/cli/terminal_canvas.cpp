@@ -15,7 +15,7 @@ namespace {
 
 constexpr std::string_view reset = "\033[0m";
 
-/// Within [0, 1]; 0 for what is not a number, which no integer stands for.
+/// The value clamped to [0, 1]; 0 for NaN, which must not be converted to an integer.
 double in_unit(double v) { return std::isnan(v) ? 0.0 : std::clamp(v, 0.0, 1.0); }
 
 struct Bytes {
@@ -29,7 +29,7 @@ Bytes bytes_of(const Colour& colour) {
   return {byte(colour.red), byte(colour.green), byte(colour.blue)};
 }
 
-/// The nearest of the 216 colours of xterm's cube and its 24 greys.
+/// Index of the nearest colour among the 216 of xterm's cube and its 24 greys.
 int palette_index(const Bytes& c) {
   constexpr std::array<int, 6> levels{0, 95, 135, 175, 215, 255};
   const auto level = [&](int value) {
@@ -52,7 +52,7 @@ int palette_index(const Bytes& c) {
              : 16 + 36 * r + 6 * g + b;
 }
 
-/// Select graphic rendition: 38 is the foreground, 48 the background.
+/// The escape code of a colour. @param ground 38 for the foreground, 48 for the background
 std::string colour_code(int ground, const Colour& colour, TerminalColours colours) {
   const Bytes c = bytes_of(colour);
   return colours == TerminalColours::direct
@@ -123,7 +123,7 @@ std::vector<std::string> TerminalCanvas::lines(TerminalColours colours) const {
   std::vector<std::string> lines;
   for (int row = 0; row < rows_; ++row) {
     std::string line;
-    std::string style;  // as set so far in this line
+    std::string style;  // the escape codes in effect
     std::size_t inked = 0;
     for (int column = 0; column < columns_; ++column) {
       const Cell& cell = cells_[static_cast<std::size_t>(row) * columns_ + column];
@@ -151,7 +151,7 @@ std::vector<std::string> TerminalCanvas::lines(TerminalColours colours) const {
       inked = glyph == " " ? inked : line.size();
     }
     line.resize(inked);
-    // The code that ends a style may stand among the blanks that were just cut off.
+    // The code that resets the style may have been cut off with the blanks.
     lines.push_back(line.find('\033') == line.npos ? line : line + std::string(reset));
   }
   return lines;

@@ -25,7 +25,7 @@ struct Options {
   DetectorFlags detector;
 };
 
-/// Appends the touch; false where it has no pose. Every touch has a `valid` of its own.
+/// Appends the touch and a row of `valid` for it; returns false where the touch has no pose.
 bool append(const DetectedTouch& touch, Recording& recording) {
   if (!touch.T_robot_sensor) {
     return false;
@@ -37,7 +37,8 @@ bool append(const DetectedTouch& touch, Recording& recording) {
   return true;
 }
 
-/// Leaves one list of dead elements, or none, where the same are dead in every touch.
+/// Where every touch has the same elements dead, keeps one list for all touches: `dead`, which may
+/// be empty.
 void shorten_valid(Recording& recording, const std::vector<std::uint8_t>& dead) {
   const auto is_usual = [&](std::size_t k) {
     return (recording.valid[k] != 0) == (dead.empty() || dead[k % dead.size()] != 0);
@@ -50,19 +51,18 @@ void shorten_valid(Recording& recording, const std::vector<std::uint8_t>& dead) 
   recording.valid = dead;
 }
 
-/// Closes a stream that was cut off, whose touches are found, so that other programs open it too.
+/// Closes the recording of frames if it was cut off, so that other programs can open it.
 void close_input(const std::string& frames) {
   if (!is_marked_open(frames) || recorder_of(frames) != Recorder::gone) {
     return;
   }
   try {
     if (close_recording(frames)) {
-      fmt::print("{}: was cut off, and is closed now\n", frames);
+      fmt::print("{}: was cut off; it is closed now, so that other programs can open it\n", frames);
     }
   } catch (const Error& error) {
-    // The touches are found; a disk for reading only is no reason to fail.
-    fmt::print(stderr, "palpate: {} (until then only Palpate and readers of SWMR open it)\n",
-               error.what());
+    // The touches are written: a disk for reading only is no reason to fail.
+    fmt::print(stderr, "palpate: {}; only Palpate and SWMR readers can open it\n", error.what());
   }
 }
 
@@ -102,12 +102,13 @@ void find_touches(const Options& options) {
   take(detector.finish());
 
   if (recording.size() == 0) {
-    throw Error(Fault::input,
-                without_pose > 0
-                    ? fmt::format("{}: none of its {} touches has a pose; record it with --poses",
-                                  options.frames, without_pose)
-                    : fmt::format("{}: no touch in its {} frames; lower --onset or --min-steady-s",
-                                  options.frames, stream->counters().frames));
+    throw Error(
+        Fault::input,
+        without_pose > 0
+            ? fmt::format("{}: none of its {} touches has a pose; record again with --poses",
+                          options.frames, without_pose)
+            : fmt::format("{}: no touch in its {} frames; lower --onset or --min-steady-s",
+                          options.frames, stream->counters().frames));
   }
   shorten_valid(recording, sensor.valid);
   write_recording(options.output, recording);
@@ -133,17 +134,17 @@ void find_touches(const Options& options) {
 void add_touches(CLI::App& app) {
   auto* command = app.add_subcommand(
       "touches",
-      "Find the touches in a recording of frames, for 'palpate map' and 'recognize'. A recording "
-      "of "
-      "frames that was cut off is closed afterwards, as by 'palpate info --close', so that other "
-      "programs open it");
+      "Find the touches in a recording of frames and write them for 'palpate map' and 'palpate "
+      "recognize'. A recording that was cut off is closed, as by 'palpate info --close'");
   const auto options = std::make_shared<Options>();
-  command->add_option("FRAMES", options->frames, "Recording of frames, of 'palpate record'")
+  command
+      ->add_option("FRAMES", options->frames,
+                   "Recording of frames, as 'palpate record' writes it (HDF5)")
       ->required();
   command
       ->add_option("-o,--output", options->output,
-                   "Recording of touches to write (HDF5): the mean of each touch's steady phase, "
-                   "above the baseline")
+                   "Recording of touches to write (HDF5): per touch, the mean pressures above the "
+                   "baseline in its steady phase")
       ->required();
   add_detector_flags(*command, options->detector);
   command->callback([options] { find_touches(*options); });

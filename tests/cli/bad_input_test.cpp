@@ -251,7 +251,7 @@ TEST_F(BadInput, NothingIsKnownAfterClassification) {
 }
 
 TEST_F(BadInput, UnknownObjectWithoutALabel) {
-  expect_refused({"map", "u.h5", "-o", "out/"}, {"u.h5", "object is empty", "--label"});
+  expect_refused({"map", "u.h5", "-o", "out/"}, {"u.h5", "'object' is empty", "--label"});
   EXPECT_EQ(palpate({"map", "u.h5", "-o", "out/", "--label", "A"}).status, 0);
 }
 
@@ -325,7 +325,7 @@ TEST_F(BadInput, ShapeThatDoesNotExist) {
 
 TEST_F(BadInput, CommandLineWithoutACommand) {
   expect_refused({}, {"subcommand is required", "--help"});
-  expect_refused({"frobnicate", "u.h5"}, {"'frobnicate'", "not a command", "--help"});
+  expect_refused({"frobnicate", "u.h5"}, {"'frobnicate'", "no command", "--help"});
   expect_refused({"--frobnicate"}, {"'--frobnicate'", "--help"});
 }
 

@@ -216,7 +216,7 @@ TEST_F(Live, JoinsFramesWithPosesFromAFifo) {
       palpate(live("replay:bare.h5,speed=max", {"--poses", "poses", "--json", "live.jsonl"}));
   ::close(fifo);
   EXPECT_EQ(outcome.status, 0) << outcome.err;
-  EXPECT_NE(outcome.err.find("3 lines were no poses"), std::string::npos) << outcome.err;
+  EXPECT_NE(outcome.err.find("3 lines of poses were skipped"), std::string::npos) << outcome.err;
   // When it happens, each kind once, before the lines of the end.
   EXPECT_EQ(std::count(outcome.err.begin(), outcome.err.end(), '\n'), 3) << outcome.err;
   expect_named(outcome.err, {"palpate: poses poses, line 1: is no JSON object",

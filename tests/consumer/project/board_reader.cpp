@@ -13,7 +13,7 @@ int main() {
     const auto sensor = open_board("tsf85:no such serial number");
     sensor->start();
     return sensor->next(std::chrono::seconds(1)) ? 0 : 1;
-  } catch (const Error& error) {  // its profile was found, the board was not
+  } catch (const Error& error) {  // the profile is installed, but no such board is plugged in
     std::cout << error.what() << "\n";
     return std::strstr(error.what(), "not plugged in") != nullptr ? 0 : 1;
   }

@@ -307,12 +307,12 @@ TEST(OwnBoard, MayCountTheWholePacket) {
   EXPECT_EQ(receiver.garbage(), packet.size() + 3);
 }
 
-TEST(OwnBoard, OfTheReadmeWorksAsPrinted) {
-  const std::string readme = bytes_of(PALPATE_SOURCE_DIR "/README.md");
-  const std::size_t begin = readme.find("name: My board");
+TEST(OwnBoard, OfTheDocumentsWorksAsPrinted) {
+  const std::string page = bytes_of(PALPATE_SOURCE_DIR "/docs/boards.md");
+  const std::size_t begin = page.find("name: My board");
   ASSERT_NE(begin, std::string::npos);
-  const std::string yaml = readme.substr(begin, readme.find("```", begin) - begin);
-  Receiver receiver(parse_serial_profile(yaml, "README.md"));
+  const std::string yaml = page.substr(begin, page.find("```", begin) - begin);
+  Receiver receiver(parse_serial_profile(yaml, "boards.md"));
 
   Bytes packet{0xaa, 0x55, 1 + 4 + 32, 0x01, 0x40, 0x42, 0x0f, 0x00};  // 1,000,000 us
   for (int cell = 0; cell < 16; ++cell) {
