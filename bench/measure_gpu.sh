@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# Everything that a machine with a GPU is asked for, in one call: builds, runs the tests on the
-# device and measures the kernels; logs and JSON are left in FOLDER. The packages must be there
-# (see dev). Ends with status 1 if any step failed, but never skips the steps after it.
+# Builds Palpate on a machine with a GPU, measures the kernels and runs the tests on the device.
+# Writes logs and JSON to FOLDER. Needs the packages that dev lists. Exits with 1 if a step failed;
+# without a build or a device it stops, and after any other failure it runs the remaining steps.
 set -euo pipefail
 
 usage() {
@@ -32,7 +32,7 @@ folder=$(cd "$folder" && pwd)
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
 status=0
-# step NAME COMMAND...: what the command says goes to FOLDER/NAME.log.
+# step NAME COMMAND...: runs the command with its output in FOLDER/NAME.log.
 step() {
   local name=$1 start=$SECONDS
   shift
@@ -45,7 +45,7 @@ step() {
   fi
 }
 
-# Programs that take no --device, such as the tests, follow the environment.
+# Programs without the option --device, such as the tests, read PALPATE_DEVICE.
 without_slow=() bench_options=()
 if [ -n "$device" ]; then
   export PALPATE_DEVICE=$device
@@ -60,7 +60,7 @@ step configure cmake --preset release -DPALPATE_TESTS=ON || exit 1
 step build cmake --build --preset release || exit 1
 step devices build/palpate devices || exit 1
 step bench build/palpate-bench kernels "${bench_options[@]}" --json "$folder/kernels.json" || true
-# The bench's own test would only run it once more.
+# Leaves out the benchmark's test, which would run the benchmark again.
 step tests ctest --preset release -j "$(nproc)" -E '^bench_test' "${without_slow[@]}" \
   --output-junit "$folder/tests.xml" || true
 exit $status

@@ -13,48 +13,48 @@
 
 namespace palpate {
 
-/// Where a board's stream comes from.
+/// The USB endpoint that carries a board's frames.
 struct StreamSource {
-  std::vector<int> interfaces;  ///< to be claimed, in this order
-  std::uint8_t endpoint = 0;    ///< bulk, towards the host
-  std::size_t transfer_bytes = 0;
+  std::vector<int> interfaces;     ///< interfaces to claim, in this order
+  std::uint8_t endpoint = 0;       ///< address of the bulk IN endpoint
+  std::size_t transfer_bytes = 0;  ///< size of one bulk transfer
 };
 
-/// What one kind of board has beyond the transport: its requests and its bytes. Used from one
-/// thread at a time; all that talks to the device throws Error.
+/// One kind of board: its USB ids, its requests and the meaning of its bytes. Use it from one
+/// thread at a time. Every function that talks to the device throws Error.
 class Board {
  public:
   virtual ~Board() = default;
 
-  /// What users call it, such as "takktile".
+  /// The name by which users open the board, such as "takktile".
   virtual const std::string& name() const = 0;
-  /// Its USB ids are known. False: only the user knows which device it is.
+  /// Whether the board's USB ids are known; if not, the user must say which device the board is.
   virtual bool has_ids() const { return true; }
-  /// The device bears one of its ids.
+  /// Whether the device bears one of the board's USB ids.
   virtual bool fits(const UsbDevice& device) const = 0;
-  /// From the descriptors alone.
+  /// Finds the endpoint of the stream from the device's descriptors alone.
   virtual StreamSource source(const UsbDevice& device) const = 0;
 
-  /// Reads what the board says of itself, its calibration too, and makes the deframer anew. Nothing
-  /// has to be claimed. The description's serial is left to the caller.
+  /// Reads the board's geometry and calibration and makes a new deframer. Needs no claimed
+  /// interface. Leaves the description's serial number to the caller.
   virtual SensorDescription configure(UsbHandle& handle) = 0;
-  /// Frames come from here on; the interfaces are claimed.
+  /// Makes the board send frames. The interfaces of source() must be claimed.
   virtual void start(UsbHandle& handle) = 0;
   virtual void stop(UsbHandle& handle) = 0;
 
-  /// Of the last configure().
+  /// The deframer that the last configure() made.
   virtual Deframer& deframer() = 0;
-  /// Gives the deframer what a transfer brought, in the pieces that it wants, and appends the
-  /// frames that are complete. Returns how many are known to be spoiled.
+  /// Passes the bytes of a transfer to the deframer and appends the frames that they complete.
+  /// @return the number of frames known to be spoiled
   virtual std::uint64_t parse(const TransferRing::Completion& completion,
                               std::vector<ParsedFrame>& frames);
 };
 
-/// The board of that name, without a serial number: "takktile", a shipped profile's name, or the
-/// path of a profile. @throws Error
+/// Makes the board of a name without serial number: "takktile", a shipped profile's name, or the
+/// path of a profile. @throws Error (Fault::input)
 std::unique_ptr<Board> make_board(const std::string& name);
 
-/// One of every board that Palpate knows by itself.
+/// One board of each kind that Palpate ships: the TakkTile and all shipped profiles.
 std::vector<std::unique_ptr<Board>> known_boards();
 
 }  // namespace palpate

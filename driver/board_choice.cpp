@@ -18,7 +18,7 @@ bool could_be(const UsbDevice& device, const Board& board) {
 }  // namespace
 
 BoardName parse_board_name(const std::string& name) {
-  // A path may hold colons; the part behind a profile's suffix, or behind the name, says which.
+  // A path may hold colons: the kind ends behind a profile's suffix, or else at the first colon.
   const std::string suffix = ".yaml";
   const std::size_t end = name.find(suffix + ":");
   const std::size_t colon = end != std::string::npos ? end + suffix.size()
@@ -71,8 +71,9 @@ UsbDevice choose_device(const std::vector<UsbDevice>& devices, const Board& boar
     for (const UsbDevice& device : fitting) {
       names.push_back(full_name(board, device, devices));
     }
-    throw Error(Fault::input, fmt::format("sensor '{}': {} of them are plugged in; say which: {}",
-                                          board.name(), names.size(), fmt::join(names, ", ")));
+    throw Error(Fault::input,
+                fmt::format("sensor '{}': {} such boards are plugged in; name one: {}",
+                            board.name(), names.size(), fmt::join(names, ", ")));
   }
   return fitting.front();
 }

@@ -8,24 +8,25 @@
 
 namespace palpate {
 
-/// The name of a board and, after the last colon, which of several: a serial number or a port.
+/// The two parts of a board's name, such as "takktile:0012".
 struct BoardName {
-  std::string kind;
-  std::string which;
+  std::string kind;   ///< "takktile", or the name or path of a profile
+  std::string which;  ///< serial number or port of one board out of several, or ""
 };
-/// @throws Error
+/// Splits a name at the colon behind its kind. @throws Error (Fault::input) for an empty part
 BoardName parse_board_name(const std::string& name);
 
-/// What tells the device from others of its board: its serial number, or its port where it has none
-/// or shares it, as copies of a board may.
+/// What tells the device from others of its kind: its serial number, or its port if it has no
+/// serial number or another such device bears the same serial number.
 std::string distinction(const Board& board, const UsbDevice& device,
                         const std::vector<UsbDevice>& devices);
 
-/// The name under which this very device out of `devices` is opened.
+/// The name that opens exactly this device out of `devices`.
 std::string full_name(const Board& board, const UsbDevice& device,
                       const std::vector<UsbDevice>& devices);
 
-/// The device that is meant. @throws Error where none is, or more than one
+/// Finds the one device of this kind whose serial number or port is `which`; "" fits every device.
+/// @throws Error (Fault::input) if none or several fit, or a board without USB ids lacks `which`
 UsbDevice choose_device(const std::vector<UsbDevice>& devices, const Board& board,
                         const std::string& which);
 

@@ -22,7 +22,7 @@ BoardLink::BoardLink(const UsbContext& context, Board& board, UsbDevice device,
 
 void BoardLink::begin() {
   board_.deframer().reset();
-  // The ring first: a board that begins at once must find it ready.
+  // The ring must be ready before the board sends.
   ring_.emplace(context_, handle_, source_.endpoint, source_.transfer_bytes, counters_);
   try {
     board_.start(handle_);
@@ -36,7 +36,7 @@ std::vector<TransferRing::Completion> BoardLink::end() {
   try {
     board_.stop(handle_);
   } catch (const Error&) {
-    // It may just have gone; the interfaces are given back either way.
+    // The board may be unplugged; the transfers and interfaces are released either way.
   }
   ring_->drain();
   std::vector<TransferRing::Completion> last = ring_->completed();

@@ -10,21 +10,22 @@
 
 namespace palpate {
 
-/// A board that is open, claimed and asked for its calibration, and its stream while it runs.
+/// An open board: its interfaces are claimed, its calibration is read. Between begin() and end()
+/// the link holds the board's stream.
 class BoardLink {
  public:
-  /// All of them have to outlive the link. @throws Error
+  /// The references must outlive the link. @throws Error
   BoardLink(const UsbContext& context, Board& board, UsbDevice device,
             TransferRing::Counters& counters);
 
   const SensorDescription& description() const { return description_; }
 
-  /// The stream runs from here on. @throws Error
+  /// Starts the stream. @throws Error
   void begin();
-  /// Asks the board to stop, takes what is still on its way, and takes the ring apart.
+  /// Ends the stream and frees the ring. Returns the transfers not yet taken from the ring.
   std::vector<TransferRing::Completion> end();
 
-  /// While the stream runs.
+  /// The ring of the running stream.
   TransferRing& ring() { return *ring_; }
 
  private:

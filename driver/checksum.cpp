@@ -30,7 +30,7 @@ std::uint32_t most_significant_first(std::uint32_t byte, std::uint32_t polynomia
   return crc;
 }
 
-/// The image of a register under a linear map, given those of its bits.
+/// The image of a register under a linear map that is given by the images of its bits.
 std::uint32_t mapped(const std::array<std::uint32_t, 32>& images, std::uint32_t value) {
   std::uint32_t image = 0;
   for (; value != 0; value &= value - 1) {
@@ -55,7 +55,7 @@ Checksum::Checksum(const Parameters& parameters)
       table_[byte] = most_significant_first(byte, parameters_.polynomial, parameters_.bytes);
     }
   }
-  // The register is linear over GF(2) in what it held and in the bytes that came, also Weiss'.
+  // Both kinds' registers are linear over GF(2) in their last value and in the bytes.
   if (parameters_.kind == Kind::crc || parameters_.kind == Kind::weiss) {
     Map one_byte{};
     for (std::size_t bit = 0; bit < width; ++bit) {
@@ -72,7 +72,7 @@ Checksum::Checksum(const Parameters& parameters)
 }
 
 std::uint32_t Checksum::begin() const {
-  // Only a CRC has a beginning other than its parameter says: a reflected one turns it round too.
+  // A reflected CRC reflects its initial value, too.
   switch (parameters_.kind) {
     case Kind::weiss:
       return 0xffff;
@@ -112,8 +112,8 @@ std::uint32_t Checksum::operator()(std::span<const std::uint8_t> bytes) const {
 
 std::uint32_t Checksum::of_stretch(std::uint32_t before, std::uint32_t end,
                                    std::size_t bytes) const {
-  // Sums and registers of streams that differ before the stretch only differ by what the stretch
-  // makes of that difference; here, of the one between `before` and the beginning.
+  // A stretch changes the difference of two running values as zero bytes would; here, the
+  // difference between `before` and the initial value.
   const std::uint32_t running = parameters_.kind == Kind::sum
                                     ? end - before + begin()
                                     : end ^ over_zeros(before ^ begin(), bytes);

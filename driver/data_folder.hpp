@@ -4,8 +4,8 @@
 
 namespace palpate {
 
-/// Where the driver's own files are, found from the library's place: the udev rule and the profiles
-/// of serial boards. It holds wherever the prefix was moved to, and in the build tree.
+/// The folder of the driver's data files: the udev rule and the profiles of serial boards. It is
+/// found from the loaded library's path, in the build tree and in a moved installation alike.
 std::filesystem::path data_folder();
 
 }  // namespace palpate

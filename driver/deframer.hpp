@@ -7,28 +7,28 @@
 
 namespace palpate {
 
-/// One frame as the bytes of a board give it.
+/// One frame decoded from a board's bytes.
 struct ParsedFrame {
-  std::vector<double> values;  ///< [e] in the board's pressure unit; NaN where it sent no number
-  std::optional<double> device_time_s = {};  ///< by the board's clock, where it sends one
+  std::vector<double> values;  ///< [e] in the board's pressure unit; NaN for a non-finite reading
+  std::optional<double> device_time_s = {};  ///< by the board's clock, if the board sends a time
 };
 
-/// What a deframer met that was no frame.
+/// What a deframer dropped.
 struct DeframerCounters {
-  std::uint64_t checksum_errors = 0;  ///< packets dropped for that
+  std::uint64_t checksum_errors = 0;  ///< packets with a wrong checksum
   std::uint64_t garbage_bytes = 0;    ///< bytes that belong to no packet
 };
 
-/// Turns the bytes of one board into frames, whatever the bytes are: pure, incremental, no I/O.
+/// Decodes the byte stream of one board into frames. Accepts any bytes and does no I/O.
 class Deframer {
  public:
   virtual ~Deframer() = default;
 
-  /// Takes what one USB transfer delivered, at any split of the stream (boards whose frames end
-  /// with a short packet get whole packets), and appends the frames that are complete.
+  /// Takes the next bytes of the stream, in pieces of any size, and appends the frames that they
+  /// complete. A board whose frames end with a short packet needs one USB packet per call.
   virtual void push(std::span<const std::uint8_t> bytes, std::vector<ParsedFrame>& frames) = 0;
 
-  /// Forgets a frame in parts: after a loss, or before a new start.
+  /// Forgets a partly received frame. Call it after lost bytes and before a new start.
   virtual void reset() = 0;
 
   virtual const DeframerCounters& counters() const = 0;

@@ -16,7 +16,7 @@ namespace palpate {
 
 namespace {
 
-/// Asks the board as far as that disturbs nobody.
+/// Fills in what the board tells without disturbing a program that uses the board.
 void inspect(Board& board, const UsbDevice& device, BoardInfo& info) {
   try {
     const StreamSource source = board.source(device);

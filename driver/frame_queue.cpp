@@ -21,7 +21,7 @@ void FrameQueue::push(Frame frame) {
 }
 
 std::optional<Frame> FrameQueue::pop(std::chrono::milliseconds timeout) {
-  // The end of a wait is a time of the clock, which has to be able to hold it.
+  // wait_for() adds the timeout to the clock's time: the sum must not overflow.
   constexpr std::chrono::milliseconds longest = std::chrono::hours(24 * 365);
   std::unique_lock lock(mutex_);
   changed_.wait_for(lock, std::clamp(timeout, std::chrono::milliseconds(0), longest),

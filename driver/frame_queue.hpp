@@ -13,17 +13,17 @@
 
 namespace palpate {
 
-/// Frames between the thread that reads the bus and the one that wants them. When it is full the
-/// oldest goes, and the next one says how many went.
+/// Passes frames from the thread that reads the bus to the thread that asks for frames. A full
+/// queue drops its oldest frame and counts the loss in the next frame's lost_before.
 class FrameQueue {
  public:
-  /// A second of the fastest boards.
+  /// Most frames held: 1 s of the fastest boards.
   static constexpr std::size_t capacity = 1024;
 
   void push(Frame frame);
-  /// The oldest, or none within the time. @throws what fail() was given, once no frame is left
+  /// Takes the oldest frame, or none if none comes in time. @throws fail()'s reason when empty
   std::optional<Frame> pop(std::chrono::milliseconds timeout);
-  /// No frame will come any more, and this is why.
+  /// Declares that no further frame will come, and why.
   void fail(std::exception_ptr reason);
   void clear();
 

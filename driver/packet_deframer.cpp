@@ -11,7 +11,7 @@ namespace {
 
 using Bytes = std::span<const std::uint8_t>;
 
-/// Whether the two agree as far as `bytes` goes.
+/// Whether `bytes` begins with `pattern`, or `pattern` with `bytes`.
 bool begins_like(Bytes bytes, const std::vector<std::uint8_t>& pattern) {
   const std::size_t known = std::min(bytes.size(), pattern.size());
   return std::equal(pattern.begin(), pattern.begin() + static_cast<std::ptrdiff_t>(known),
@@ -37,7 +37,7 @@ PacketDeframer::PacketDeframer(PacketFormat format)
       checksum_ = &check->checksum;
     } else if (const auto* parts = as<PacketFormat::Parts>(field)) {
       parts_.resize(256);
-      // The first part whose tag fits counts.
+      // A tag that fits several parts means the first of them.
       for (std::size_t tag = 0; tag < parts_.size(); ++tag) {
         std::size_t element = 0;
         for (const PacketFormat::Part& part : parts->parts) {
@@ -74,9 +74,9 @@ void PacketDeframer::push(Bytes bytes, std::vector<ParsedFrame>& frames) {
 }
 
 void PacketDeframer::forget_consumed() {
-  // A terminator that has been consumed still tells where the next packet begins.
+  // The last terminator stays: it tells where the next packet begins.
   const auto consumed = static_cast<std::ptrdiff_t>(at_ - std::min(at_, terminator_.size()));
-  // Only where no more is kept than goes, or each push would move a packet that is not whole yet.
+  // Erase once half of the buffer is consumed: erasing at each push would move the rest each time.
   if (2 * consumed >= static_cast<std::ptrdiff_t>(buffer_.size())) {
     buffer_.erase(buffer_.begin(), buffer_.begin() + consumed);
     if (checksum_ != nullptr) {
@@ -162,7 +162,7 @@ PacketDeframer::Candidate PacketDeframer::inspect(Bytes stream) const {
       }
       middle_bytes = static_cast<std::size_t>(count);
     }
-    // Fields behind a Length lie where they do only in packets with values; the tail comes below.
+    // Behind a Length, only packets with values have a field at `offset`. The tail follows below.
     offset += bytes_of(field, format_.elements, shape_.counted);
     if (offset > stream.size() || (shape_.counted && offset >= shape_.head_bytes)) {
       break;
@@ -185,7 +185,7 @@ PacketDeframer::Candidate PacketDeframer::inspect(Bytes stream) const {
 }
 
 bool PacketDeframer::checksum_is_right(Bytes packet) const {
-  // Its place counts from the beginning in the head, from the end in the tail.
+  // Offsets count from the packet's beginning, but in the tail from its end.
   std::size_t offset = 0;
   for (std::size_t i = 0; i < format_.fields.size(); ++i) {
     if (i == format_.fields.size() - shape_.tail_fields) {
@@ -287,7 +287,7 @@ void PacketDeframer::read_parts(const PacketFormat::Parts& field, Bytes bytes,
         values_.clear();
       }
       if (values_.size() != part.first_element) {
-        values_.clear();  // the part before this one was lost, and the frame with it
+        values_.clear();  // the previous part was lost, and the frame with it
       } else {
         for (std::size_t i = 0; i < part.values; ++i) {
           append_value(field.type.read(bytes.subspan(1 + i * field.type.bytes)));

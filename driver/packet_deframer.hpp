@@ -11,24 +11,21 @@
 
 namespace palpate {
 
-/// Finds packets of a declared format in a stream that may begin anywhere, lose bytes and hold
-/// others, and makes frames of them.
+/// Finds packets of a declared format in a byte stream and decodes them into frames. The stream may
+/// begin anywhere, lose bytes and hold other packets.
 ///
-/// In step, a packet is taken as soon as its last byte is there. Out of step, a candidate is tried
-/// at every byte; it is believed where its checksum is right or, in a format without one, where
-/// another preamble follows it, or a terminator precedes it. So, where the payload holds the
-/// marker at the same place frame after frame, a format without checksum may start on it; it gets
-/// into step when that byte changes. In the same format a lost byte spoils the frame that lost it.
+/// In step, the deframer takes a packet when its last byte arrives. Out of step, it tries every
+/// byte as the start of a packet, and accepts a packet with the right checksum; in a format without
+/// checksum, a packet that another preamble follows or a terminator precedes. Such a format has two
+/// limits: a payload that holds the preamble's bytes at one place in every frame may be taken for
+/// the preamble until it changes, and a lost byte spoils its frame.
 ///
-/// The work per byte is bounded whatever the bytes are: a candidate's checksum comes from running
-/// values, and only in formats without checksum the parts of a candidate, at most 4096 bytes, may
-/// be gone through in vain. Holds at most two packets of the largest size and what two pushes
-/// bring.
-///
-/// A reading that is no number, as a float may be, is a NaN in its frame.
+/// The work per byte is bounded for any input: checksums are computed from running values, and at
+/// most 4096 bytes of parts are read in vain, in formats without checksum only. Memory: two packets
+/// of the largest size and the bytes of two pushes. A non-finite reading becomes NaN.
 class PacketDeframer final : public Deframer {
  public:
-  /// @param format as read_serial_profile() checks it
+  /// @param format a format that read_serial_profile() has checked
   explicit PacketDeframer(PacketFormat format);
   PacketDeframer(const PacketDeframer&) = delete;
   PacketDeframer& operator=(const PacketDeframer&) = delete;
@@ -43,12 +40,12 @@ class PacketDeframer final : public Deframer {
   enum class Verdict { none, incomplete, wrong_checksum, whole };
   struct Candidate {
     Verdict verdict = Verdict::none;
-    std::size_t bytes = 0;  // of the whole packet
+    std::size_t bytes = 0;  // size of the packet
   };
   enum class Meaning { values, other, malformed };
-  /// What a tag byte begins.
+  /// The part that begins with a given tag byte.
   struct KnownPart {
-    std::size_t bytes = 0;  // its tag included; 0: no part has that tag
+    std::size_t bytes = 0;  // its size with the tag; 0: no part has this tag
     std::size_t values = 0;
     std::size_t first_element = 0;
   };
@@ -71,17 +68,17 @@ class PacketDeframer final : public Deframer {
 
   PacketFormat format_;
   PacketShape shape_;
-  std::vector<std::uint8_t> preamble_;    // empty: packets are told by their terminator
-  std::vector<std::uint8_t> terminator_;  // empty where there is a preamble
-  const Checksum* checksum_ = nullptr;    // of the format; none where it has none
-  std::vector<KnownPart> parts_;          // by tag byte, in formats with Parts
+  std::vector<std::uint8_t> preamble_;    // empty: a terminator marks the packets
+  std::vector<std::uint8_t> terminator_;  // empty if there is a preamble
+  const Checksum* checksum_ = nullptr;    // the format's checksum, if it has one
+  std::vector<KnownPart> parts_;          // [tag byte], in formats with Parts
 
-  std::vector<std::uint8_t> buffer_;    // of the stream; before at_, what may hold a terminator
-  std::vector<std::uint32_t> running_;  // the checksum's, before each byte and after the last
-  std::size_t at_ = 0;
+  std::vector<std::uint8_t> buffer_;    // recent bytes of the stream
+  std::vector<std::uint32_t> running_;  // running checksum before each of them and after the last
+  std::size_t at_ = 0;                  // index of the first byte not yet consumed
   bool in_step_ = true;
 
-  std::vector<double> values_;  // of the frame that is not complete, so far
+  std::vector<double> values_;  // of the frame in progress
   std::optional<double> time_s_;
   DeframerCounters counters_;
 };

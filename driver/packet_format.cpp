@@ -6,7 +6,7 @@
 namespace palpate {
 
 double NumberType::read(std::span<const std::uint8_t> wire) const {
-  // A negative integer's sign fills the bytes above those on the wire.
+  // Sign extension: a negative integer fills the bytes above its own with ones.
   const bool negative = kind == Kind::signed_integer && wire[big_endian ? 0 : bytes - 1] >= 0x80;
   std::uint64_t pattern = negative ? ~std::uint64_t{0} : 0;
   for (std::size_t i = 0; i < bytes; ++i) {

@@ -14,8 +14,7 @@ using Format = PacketFormat;
 using Entry = ProfileEntry;
 
 constexpr std::uint32_t most_packet_bytes = 65536;
-// Out of step, each byte may begin a packet whose parts are gone through before one is wrong; where
-// there is a checksum, it tells before.
+// Out of step, a deframer without checksum may read this many bytes of parts at every byte.
 constexpr std::uint32_t most_unchecked_parts_bytes = 4096;
 
 Format::Check read_check(const Entry& field) {
@@ -63,8 +62,7 @@ Format::Check read_check(const Entry& field) {
   }
   const std::uint64_t end = std::uint64_t{1} << (8 * kind.bytes);
   if (std::max({options.polynomial, options.init, options.xor_out}) >= end) {
-    field.refuse(
-        fmt::format("polynomial, init and xor_out have at most {} bits here", 8 * kind.bytes));
+    field.refuse(fmt::format("shorten polynomial, init and xor_out to {} bits", 8 * kind.bytes));
   }
   options.kind = kind.kind;
   options.bytes = kind.bytes;
@@ -133,7 +131,7 @@ Format::Part read_part(const Entry& entry, std::size_t elements) {
     entry.refuse("key 'tag' is missing; add the byte that the part begins with");
   }
   if (part.values > 0 && part.skip > 0) {
-    entry.refuse("a part has 'values' or bytes to 'skip'; remove one");
+    entry.refuse("a part has either 'values' or 'skip'; remove one");
   }
   return part;
 }
@@ -164,8 +162,7 @@ Format::Field read_field(const Entry& field, std::size_t elements) {
   if (!field.node.IsMap()) {
     field.refuse(fmt::format("give a field such as {{skip: 1}}; the fields are {}", kinds));
   }
-  // The key that says what the field is; the others are options of it. Where a key is wrong, the
-  // reader of the kind says so.
+  // One key names the field's kind; the other keys are its options, which the kind's reader checks.
   const auto has = [&](const char* kind) {
     return std::any_of(field.node.begin(), field.node.end(), [&](const auto& item) {
       return item.first.IsScalar() && item.first.Scalar() == kind;
@@ -221,20 +218,20 @@ void check_counts(const Entry& packet, const Format& format) {
   }
   if (!std::holds_alternative<Format::Fixed>(format.fields.front()) &&
       !std::holds_alternative<Format::Fixed>(format.fields.back())) {
-    packet.refuse("nothing marks a packet; put 'bytes' at its beginning or its end");
+    packet.refuse("nothing marks a packet; begin or end it with 'bytes'");
   }
 }
 
-// Without a Length a packet carries one part, so all of them have to be of one size.
+// Without a Length, a packet carries one part, so that all parts must have one size.
 void check_parts(const Entry& field, const Format::Parts& parts, bool counted) {
   for (const Format::Part& part : parts.parts) {
     if (!counted && bytes_of(parts, part) != bytes_of(parts, parts.parts.front())) {
-      field.refuse("parts differ in size, and no 'length' tells how many there are; add one");
+      field.refuse("parts differ in size, so that packets need a 'length'; add it");
     }
   }
 }
 
-// What lies behind a Length is found only in packets of the right size, its tail apart.
+// Behind a Length, a field's place is known only in packets with values, except in the tail.
 void check_places(const std::vector<Entry>& entries, const Format& format) {
   const PacketShape shape = shape_of(format);
   const std::size_t tail = format.fields.size() - shape.tail_fields;
@@ -243,7 +240,7 @@ void check_places(const std::vector<Entry>& entries, const Format& format) {
     const Format::Field& field = format.fields[i];
     const bool in_middle = shape.counted && i >= shape.head_fields && i < tail;
     if (in_middle && std::holds_alternative<Format::Fixed>(field)) {
-      entries[i].refuse("between the length and the end write 'only' instead of 'bytes'");
+      entries[i].refuse("behind 'length', only the end has 'bytes'; write 'only' instead");
     }
     if (in_middle && std::holds_alternative<Format::Check>(field)) {
       entries[i].refuse("put 'checksum' before 'length' or at the end");
@@ -254,14 +251,16 @@ void check_places(const std::vector<Entry>& entries, const Format& format) {
       entries[i].refuse("put 'values' or 'parts' behind 'length'");
     }
     if (const auto* check = std::get_if<Format::Check>(&field)) {
-      // The least that stands before it, in the shortest packet.
+      // Bytes in front of the checksum in the shortest packet.
       const std::size_t before = shape.counted && i >= tail ? shape.head_bytes : offset;
       if (!check->after && check->from_byte >= before) {
-        entries[i].refuse(fmt::format("'from' is {}, but only {} bytes stand before the checksum",
-                                      check->from_byte, before));
+        entries[i].refuse(
+            fmt::format("'from' is {}, but only {} bytes precede the checksum; lower it",
+                        check->from_byte, before));
       }
       if (check->after && (i >= tail || check->from_byte != 0)) {
-        entries[i].refuse("'covers: after' is for a checksum before the values, without 'from'");
+        entries[i].refuse(
+            "'covers: after' needs a checksum in front of the values, without 'from'");
       }
     }
     if (const auto* parts = std::get_if<Format::Parts>(&field)) {
@@ -270,18 +269,18 @@ void check_places(const std::vector<Entry>& entries, const Format& format) {
     offset += bytes_of(field, format.elements, shape.counted);
     if (offset > most_packet_bytes) {
       entries[i].refuse(fmt::format(
-          "a packet has more than {} bytes; give fewer elements or fields", most_packet_bytes));
+          "a packet is longer than {} bytes; give fewer elements or fields", most_packet_bytes));
     }
   }
 }
 
-// By default the largest packet is the one with the values.
+// By default, no packet is larger than the packet with the values.
 void set_most(const std::vector<Entry>& entries, Format& format) {
   const PacketShape shape = shape_of(format);
   for (std::size_t i = 0; i < format.fields.size(); ++i) {
     if (auto* length = std::get_if<Format::Length>(&format.fields[i])) {
       if (length->most == 0 && shape.parts) {
-        entries[i].refuse("add 'most', the largest count of bytes that the packets have");
+        entries[i].refuse("add 'most', the largest number of bytes that 'length' counts");
       }
       length->most = length->most == 0 ? shape.middle_bytes : length->most;
       if (shape.parts && count_of<Format::Check>(format) == 0 &&

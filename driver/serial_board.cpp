@@ -46,8 +46,8 @@ bool SerialBoard::fits(const UsbDevice& device) const {
 
 StreamSource SerialBoard::source(const UsbDevice& device) const {
   const BulkInterface data = data_interface(device);
-  // A transfer that is not ended by a short packet waits until it is full, and the ring has to last
-  // while the program is elsewhere: a transfer holds two milliseconds of the line.
+  // A transfer returns when it is full or a short packet ends it. 2 ms of the line per transfer
+  // keep the delay short, and let the ring buffer 32 ms while the program is busy.
   constexpr std::size_t bits_per_byte = 10;
   const std::size_t bytes = profile_.line.baud / bits_per_byte / 500;
   const std::size_t packets = std::clamp<std::size_t>(bytes / data.packet_bytes, 1, 64);
@@ -102,8 +102,8 @@ void SerialBoard::send(UsbHandle& handle, const std::vector<std::uint8_t>& bytes
   const BulkInterface data = data_interface(handle.device());
   if (!data.out_endpoint) {
     throw Error(Fault::system,
-                fmt::format("{}: {} has bytes to send, but the device takes none; is "
-                            "it the right board?",
+                fmt::format("{}: {} has bytes to send, but the device takes none; check that it is "
+                            "the right board",
                             handle.device().place(), profile_.path.string()));
   }
   handle.bulk_out(*data.out_endpoint, bytes);

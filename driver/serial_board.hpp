@@ -9,7 +9,7 @@
 
 namespace palpate {
 
-/// A board behind a CDC serial port, as its profile describes it.
+/// A board behind a USB serial port (CDC ACM) that a profile describes.
 class SerialBoard final : public Board {
  public:
   SerialBoard(std::string name, SerialProfile profile);

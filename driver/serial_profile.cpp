@@ -36,7 +36,7 @@ std::string text_of(const std::filesystem::path& path) {
     refuse(path, "no such profile; check the path");
   }
   if (std::filesystem::file_size(path, failure) > most_bytes) {
-    refuse(path, "larger than 1 MiB; name a profile");
+    refuse(path, "larger than 1 MiB, so that it is no profile; check the path");
   }
   std::ifstream file(path, std::ios::binary);
   if (!file) {
@@ -160,7 +160,7 @@ SerialProfile read_root(const Entry& root) {
       root.refuse(fmt::format("key '{}' is missing; add it", key));
     }
   }
-  // Only now: the keys come in any order, and the packet depends on the elements.
+  // The packet is read last: it depends on the elements, and keys come in any order.
   profile.packet = read_packet_format(*packet, profile.elements_mm.size());
   profile.packet.gain = gain;
   profile.packet.offset = offset;

@@ -29,16 +29,16 @@ struct SerialLine {
   std::uint8_t stop_bits = 1;  ///< 1 or 2
 };
 
-/// A board behind a CDC serial port, as a profile describes it.
+/// What a profile says of a board behind a USB serial port (CDC ACM).
 struct SerialProfile {
-  std::filesystem::path path;  ///< the file it was read from
+  std::filesystem::path path;  ///< the profile's file
   std::string name;            ///< for people, such as "Robotiq TSF-85"
-  std::vector<UsbId> usb;      ///< empty: the board's id is not known, the user has to say it
+  std::vector<UsbId> usb;      ///< empty if unknown: the user must say which device it is
   SerialLine line;
-  std::vector<std::uint8_t> start;      ///< bytes to send before frames come, may be empty
-  std::vector<std::uint8_t> stop;       ///< bytes to send when no more are wanted, may be empty
+  std::vector<std::uint8_t> start;      ///< bytes that make the board send frames; may be empty
+  std::vector<std::uint8_t> stop;       ///< bytes that make the board stop; may be empty
   std::string pressure_unit = "raw";    ///< "kPa" or "raw"
-  double rate_hz = 0.0;                 ///< 0 where it is not known
+  double rate_hz = 0.0;                 ///< frames per second; 0 if unknown
   std::vector<glm::dvec2> elements_mm;  ///< [e] in the sensor frame, in the order of the values
   PacketFormat packet;
 };
@@ -46,21 +46,20 @@ struct SerialProfile {
 /// Names of the profiles that Palpate ships, in alphabetical order.
 std::vector<std::string> shipped_profiles();
 
-/// True for the path of a profile, which holds a '/' or ends in ".yaml"; a shipped one's name is
-/// none.
+/// Whether a name is a path: it holds a '/' or ends in ".yaml", unlike a shipped profile's name.
 bool is_profile_path(const std::string& name);
 
-/// The file of a profile of this name or path, which need not exist.
+/// The file of the profile with this name or path; it need not exist.
 std::filesystem::path profile_path(const std::string& name_or_path);
 
-/// Reads a profile: a shipped one by its name ("tsf85"), any other by its path.
-/// @throws Error naming file, line, key, value and remedy.
+/// Reads a profile: a shipped profile by its name ("tsf85"), any other profile by its path.
+/// @throws Error (Fault::input) naming file, line, key, value and remedy
 SerialProfile read_serial_profile(const std::string& name_or_path);
 
 /// Reads a profile from its text. @param path names it in messages
 SerialProfile parse_serial_profile(const std::string& yaml, const std::filesystem::path& path);
 
-/// A deframer for the profile's stream. One push takes any piece of it.
+/// Makes a deframer for the profile's stream, which takes the stream in pieces of any size.
 std::unique_ptr<Deframer> make_deframer(const SerialProfile& profile);
 
 }  // namespace palpate

@@ -9,11 +9,12 @@ namespace palpate {
 
 namespace {
 
-// The firmware ANDs wIndex with the clock source of its timer, 0x06: 1 would stop the timer.
+// wIndex starts and stops the stream. The firmware ANDs it with the bits 0x06 of its timer's clock
+// source: a wIndex of 1 would stop the timer.
 constexpr std::uint16_t start_index = 0xff;
 constexpr std::uint16_t stop_index = 0;
 
-// Longer than any frame, so that every transfer ends where a frame ends.
+// A transfer is longer than any frame, so that a frame's short packet ends every transfer.
 constexpr std::size_t transfer_packets = 8;
 static_assert(transfer_packets * takktile::packet_bytes > 4 * takktile::rows * takktile::columns);
 
@@ -47,7 +48,7 @@ SensorDescription TakktileBoard::configure(UsbHandle& handle) {
         takktile::parse_calibration(handle.control_in(request, takktile::calibration_bytes)));
   }
   deframer_ = std::make_unique<takktile::Deframer>(std::move(calibrations));
-  // The rate is left open: the period counts from the end of reading all cells, which takes longer.
+  // The rate is unknown: the period begins only after all cells are read, which takes longer.
   return {.name = "TakkTile",
           .serial = {},
           .pressure_unit = "kPa",
@@ -68,8 +69,8 @@ void TakktileBoard::stop(UsbHandle& handle) {
 std::uint64_t TakktileBoard::parse(const TransferRing::Completion& completion,
                                    std::vector<ParsedFrame>& frames) {
   const std::size_t before = frames.size();
-  // The deframer takes packets: a transfer that ended early at a whole number of full ones ended
-  // with an empty one.
+  // The deframer takes single packets. A transfer that ended early behind full packets alone ended
+  // with an empty packet.
   std::span<const std::uint8_t> rest = completion.bytes;
   while (rest.size() >= takktile::packet_bytes) {
     deframer_->push(rest.first(takktile::packet_bytes), frames);
@@ -78,7 +79,7 @@ std::uint64_t TakktileBoard::parse(const TransferRing::Completion& completion,
   if (completion.ended || !rest.empty()) {
     deframer_->push(rest, frames);
   }
-  // What ended but is no frame had too few cells or too many.
+  // A transfer that ended without a frame had too few cells or too many.
   const bool spoiled = completion.ended && !completion.bytes.empty() && frames.size() == before;
   return spoiled ? 1 : 0;
 }

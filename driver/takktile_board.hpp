@@ -9,7 +9,7 @@
 
 namespace palpate {
 
-/// A TakkTile: barometers under rubber, in rows of five, behind vendor requests.
+/// A TakkTile: barometers under rubber, in strips of five, which answer USB vendor requests.
 class TakktileBoard final : public Board {
  public:
   static inline const std::string kind = "takktile";

@@ -78,10 +78,10 @@ Calibration parse_calibration(std::span<const std::uint8_t> reply) {
                        [=](std::uint8_t byte) { return byte == value; });
   };
   if (all(0x00) || all(0xff)) {
-    refuse(fmt::format("calibration of a cell is all 0x{:02x}: it does not answer; check the strip",
+    refuse(fmt::format("calibration of a cell is all 0x{:02x}: no answer; check the strip's cable",
                        reply[0]));
   }
-  // Scales by the data sheet's table: the bits behind the binary point, and those padded before.
+  // Scales by the data sheet's table: bits behind the binary point, and zeros padded in front.
   return {.a0 = signed_16(reply[0], reply[1]) / 8.0,         // 2^3
           .b1 = signed_16(reply[2], reply[3]) / 8192.0,      // 2^13
           .b2 = signed_16(reply[4], reply[5]) / 16384.0,     // 2^14
@@ -110,7 +110,7 @@ void Deframer::push(std::span<const std::uint8_t> packet, std::vector<ParsedFram
   if (whole_ && packet.size() <= frame_bytes() - frame_.size()) {
     frame_.insert(frame_.end(), packet.begin(), packet.end());
   } else {
-    // Longer than a frame: an end was lost. What follows is understood after the next one.
+    // More bytes than a frame: an end was lost. Decoding starts again after the next end.
     counters_.garbage_bytes += frame_.size() + packet.size();
     frame_.clear();
     whole_ = false;

@@ -11,7 +11,7 @@ namespace palpate {
 
 namespace {
 
-// A board may be slow or silent; a transfer without an end would hide that.
+// Ends and counts the transfers of a silent board.
 constexpr unsigned transfer_patience_ms = 1000;
 
 double now_s() {
@@ -76,7 +76,7 @@ void TransferRing::recover() {
 void TransferRing::begin() {
   for (Slot& slot : slots_) {
     if (const int code = submit(slot); code != LIBUSB_SUCCESS) {
-      throw usb_fault(handle_.device(), "no transfer can be begun", code);
+      throw usb_fault(handle_.device(), "no transfer can be submitted", code);
     }
   }
 }
@@ -87,7 +87,7 @@ int TransferRing::submit(Slot& slot) {
                             transfer_patience_ms);
   const int code = libusb_submit_transfer(slot.transfer.get());
   slot.under_way = code == LIBUSB_SUCCESS;
-  // Not only LIBUSB_ERROR_NO_DEVICE: nothing else would bring this transfer back into the ring.
+  // Any error loses the device: no callback would submit this transfer again.
   lost_ = lost_ || !slot.under_way;
   return code;
 }
@@ -101,7 +101,7 @@ void TransferRing::on_return(libusb_transfer* transfer) noexcept {
 void TransferRing::take(Slot& slot) {
   const int status = slot.transfer->status;
   const bool damaged = status == LIBUSB_TRANSFER_ERROR || status == LIBUSB_TRANSFER_OVERFLOW;
-  // A halted endpoint stalls all transfers under way; that is one event.
+  // A halted endpoint stalls all submitted transfers: count one stall.
   const bool stalled = status == LIBUSB_TRANSFER_STALL && !halted_;
   counters_.timeouts += status == LIBUSB_TRANSFER_TIMED_OUT ? 1 : 0;
   counters_.overflows += status == LIBUSB_TRANSFER_OVERFLOW ? 1 : 0;
@@ -114,7 +114,7 @@ void TransferRing::take(Slot& slot) {
   }
   lost_ = lost_ || status == LIBUSB_TRANSFER_NO_DEVICE || errors_in_a_row_ >= transfers;
 
-  // What was on its way when a transfer was given up still counts.
+  // A transfer that timed out or was cancelled may hold bytes.
   const auto length = static_cast<std::size_t>(damaged ? 0 : slot.transfer->actual_length);
   const bool ended = status == LIBUSB_TRANSFER_COMPLETED && length < transfer_bytes_;
   missing_ += damaged ? 1 : 0;
@@ -139,7 +139,7 @@ void TransferRing::keep(Slot& slot, std::size_t length, bool ended) noexcept {
     completed_.push_back({std::move(fresh), now_s(), ended, missing_});
     missing_ = 0;
   } catch (const std::bad_alloc&) {
-    ++missing_;  // libusb called, which is C: nothing may be thrown
+    ++missing_;  // the caller is libusb, C code: no exception may leave
   }
 }
 

@@ -9,25 +9,24 @@
 
 namespace palpate {
 
-/// A ring of bulk transfers towards the host that are always under way, so that the bus never waits
-/// for the program. Whoever pumps the events of the context owns the ring: it has no lock.
+/// Bulk IN transfers that are always submitted, so that the bus never waits for the program. The
+/// ring has no lock: use it only from the thread that handles the context's events.
 ///
-/// A transfer that comes back leaves its bytes in completed() and goes out again at once, also
-/// after a time-out or an error; not after a stall, which only recover() can end, nor once the
-/// device is gone.
+/// A transfer that returns leaves its bytes in completed() and is submitted again at once, also
+/// after a time-out or an error. A stall halts the ring until recover(); a lost device ends it.
 class TransferRing {
  public:
   /// What one transfer brought.
   struct Completion {
     std::vector<std::uint8_t> bytes;
-    double host_time_s = 0.0;  ///< since the Unix epoch
-    bool ended = false;  ///< by a packet that was not full; an empty one leaves no other trace
-    /// Transfers since the one before whose bytes are missing: an error or an overflow on the bus,
-    /// or no memory to keep them.
+    double host_time_s = 0.0;  ///< when it returned, since the Unix epoch
+    bool ended = false;        ///< whether a packet that was not full, perhaps empty, ended it
+    /// Transfers since the previous completion whose bytes are lost: by an error or an overflow on
+    /// the bus, or for want of memory.
     std::uint64_t missing = 0;
   };
 
-  /// What went wrong, over all rings of a board.
+  /// Counts of faults, over all rings of a board.
   struct Counters {
     std::uint64_t timeouts = 0;
     std::uint64_t stalls = 0;
@@ -36,28 +35,28 @@ class TransferRing {
 
   static constexpr std::size_t transfers = 16;
 
-  /// @param transfer_bytes of one transfer, a multiple of the endpoint's packet
-  /// @param counters has to outlive the ring
-  /// @throws Error where the device takes no transfers
+  /// @param transfer_bytes size of one transfer, a multiple of the endpoint's packet size
+  /// @param counters must outlive the ring
+  /// @throws Error if the device takes no transfers
   TransferRing(const UsbContext& context, UsbHandle& handle, std::uint8_t endpoint,
                std::size_t transfer_bytes, Counters& counters);
   ~TransferRing();
   TransferRing(const TransferRing&) = delete;
   TransferRing& operator=(const TransferRing&) = delete;
 
-  /// What came since the last call, in order; the last may stand for missing transfers alone. Give
-  /// it back by recycle(): a callback allocates memory only where more comes than was given back.
+  /// Takes the transfers that returned since the last call, in order. The last completion may hold
+  /// missing transfers alone. Pass the result to recycle(), so that callbacks reuse its memory.
   std::vector<Completion> completed();
   void recycle(std::vector<Completion>&& completions);
 
-  /// The endpoint is halted: recover() has to be called.
+  /// Whether a stall halted the endpoint; recover() ends the halt.
   bool halted() const { return halted_; }
-  /// The device is gone, or failed as many times in a row as there are transfers.
+  /// Whether the device is gone, or failed as often in a row as there are transfers.
   bool lost() const { return lost_; }
 
-  /// Takes all transfers back, clears the halt and begins anew. @throws Error
+  /// Cancels all transfers, clears the halt and submits the transfers again. @throws Error
   void recover();
-  /// Takes all transfers back: cancels, and waits until every callback has returned.
+  /// Cancels all transfers and waits until every callback has returned.
   void drain();
 
  private:
@@ -83,7 +82,7 @@ class TransferRing {
   std::size_t transfer_bytes_;
   std::vector<Slot> slots_;
   std::vector<Completion> completed_;
-  std::uint64_t missing_ = 0;  // since the last of them
+  std::uint64_t missing_ = 0;  // lost transfers since the last completion
   std::vector<std::vector<std::uint8_t>> spare_;
   Counters& counters_;
   std::size_t errors_in_a_row_ = 0;

@@ -17,7 +17,7 @@ namespace {
 
 const std::filesystem::path sysfs_devices = "/sys/bus/usb/devices";
 
-/// A string of the device that the kernel has read already: no need to open the device for it.
+/// A string of the device, from sysfs: the kernel has read it, so that the device is not opened.
 std::string attribute(const std::string& port, const char* name) {
   std::ifstream file(sysfs_devices / port / name);
   std::string line;
@@ -53,8 +53,8 @@ UsbContext::UsbContext() {
   const int code = libusb_init(&context);
   if (code != LIBUSB_SUCCESS) {
     throw Error(Fault::system,
-                fmt::format("USB: {}; is there a USB controller, and is /dev/bus/usb "
-                            "visible here?",
+                fmt::format("USB: {}; check that the machine has a USB controller and that "
+                            "/dev/bus/usb is visible",
                             libusb_strerror(code)));
   }
   context_.reset(context);
@@ -90,7 +90,7 @@ std::vector<UsbDevice> usb_devices(const UsbContext& context) {
 }
 
 std::string interface_driver(const UsbDevice& device, int interface) {
-  // Every board known here has one configuration.
+  // The 1 is the configuration: every supported board has one.
   const auto link = sysfs_devices / fmt::format("{}:1.{}", device.port, interface) / "driver";
   std::error_code none;
   return std::filesystem::read_symlink(link, none).filename().string();

@@ -24,7 +24,7 @@ class UsbContext {
   std::unique_ptr<libusb_context, Exit> context_;
 };
 
-/// A device on the bus, as far as it is known without opening it. Must go before its context.
+/// What is known of a USB device without opening it. Must not outlive its context.
 struct UsbDevice {
   std::shared_ptr<libusb_device> device;
   int bus = 0;
@@ -32,21 +32,21 @@ struct UsbDevice {
   std::uint16_t vendor = 0;
   std::uint16_t product = 0;
   std::uint8_t device_class = 0;
-  std::string port;    ///< where it is plugged in, such as "1-2.3": bus and ports
-  std::string serial;  ///< as the kernel read it; "" where it has none; so below
-  std::string manufacturer;
-  std::string product_name;
+  std::string port;          ///< where the device is plugged in: bus, then ports, such as "1-2.3"
+  std::string serial;        ///< as the kernel read it; "" if the device has none
+  std::string manufacturer;  ///< as the kernel read it; "" if the device has none
+  std::string product_name;  ///< as the kernel read it; "" if the device has none
 
-  /// The file by which it is opened.
+  /// The path of the device file.
   std::string node() const;
-  /// What messages call it.
+  /// The device's USB id and port, for messages.
   std::string place() const;
 };
 
-/// Every device except hubs, in the order of bus and address. @throws Error
+/// Lists every device except hubs, by bus and address. @throws Error
 std::vector<UsbDevice> usb_devices(const UsbContext& context);
 
-/// The kernel driver that has the interface, "usbfs" for a program's, "" for none.
+/// The kernel driver that holds the interface: "usbfs" if a program claimed it, "" for none.
 std::string interface_driver(const UsbDevice& device, int interface);
 
 }  // namespace palpate

@@ -17,8 +17,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// What the folder holds, as far as it can be read: processes end while they are looked at, and
-/// many are not ours to see.
+/// The folder's readable entries: processes may end meanwhile, or belong to other users.
 std::vector<fs::path> entries_of(const fs::path& folder) {
   std::vector<fs::path> entries;
   std::error_code code;
@@ -32,7 +31,7 @@ std::vector<fs::path> entries_of(const fs::path& folder) {
 bool holds(const fs::path& process, const std::string& node) {
   return std::ranges::any_of(entries_of(process / "fd"), [&](const fs::path& file) {
     std::error_code code;
-    // The end only: /dev of another program may lie elsewhere, as in a container.
+    // Compare the end only: a container's /dev may lie elsewhere.
     return fs::read_symlink(file, code).string().ends_with(node);
   });
 }
@@ -71,7 +70,7 @@ std::string help(const UsbDevice& device, int code) {
     case LIBUSB_ERROR_NO_DEVICE:
       return "it is unplugged; plug it in again";
     case LIBUSB_ERROR_PIPE:
-      return "it refuses the request; is its firmware the right one?";
+      return "it refuses the request; check the board's firmware";
     case LIBUSB_ERROR_TIMEOUT:
       return "it does not answer; unplug it and plug it in again";
     default:
@@ -84,7 +83,7 @@ std::string help(const UsbDevice& device, int code) {
 std::string in_use(const UsbDevice& device) {
   const std::vector<std::string> programs = holders(device.node());
   return programs.empty()
-             ? "another program has it, or this one twice; end that use of it"
+             ? "in use by another program, or opened twice by this program; end the other use"
              : fmt::format("in use by {}; end that program", fmt::join(programs, ", "));
 }
 

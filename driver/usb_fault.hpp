@@ -7,12 +7,12 @@
 
 namespace palpate {
 
-/// The error of a libusb call that returned `code`: what was tried at which device, why it failed,
-/// and what helps. Permission that is missing names the udev rule and how to install it; an
-/// interface in use names the program that has it, where /proc may be read.
+/// The error of a libusb call that returned `code`. Its message names the device, what was tried,
+/// why it failed, and the remedy: for missing permission, how to install the udev rule; for an
+/// interface in use, the program to end, if /proc shows it.
 Error usb_fault(const UsbDevice& device, const std::string& what, int code);
 
-/// Why a program's claim keeps others from the device.
+/// Says which program uses the device, and to end it.
 std::string in_use(const UsbDevice& device);
 
 }  // namespace palpate

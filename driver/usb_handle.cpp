@@ -19,13 +19,13 @@ UsbHandle::UsbHandle(UsbDevice device) : device_(std::move(device)) {
     throw usb_fault(device_, "cannot be opened", code);
   }
   handle_.reset(handle);
-  // Refused only where no kernel driver can be in the way.
+  // Fails only on systems whose kernel drivers never hold an interface.
   libusb_set_auto_detach_kernel_driver(handle, 1);
 }
 
 UsbHandle::~UsbHandle() {
-  // The last one first: the kernel's serial driver takes a board back with its control interface,
-  // which is claimed first, and only if the data interface is free by then.
+  // In reverse order: the kernel's serial driver attaches again when the control interface, which
+  // was claimed first, is released, and needs the data interface to be free by then.
   for (auto interface = claimed_.rbegin(); interface != claimed_.rend(); ++interface) {
     libusb_release_interface(handle_.get(), *interface);
   }
@@ -75,7 +75,8 @@ void UsbHandle::bulk_out(std::uint8_t endpoint, std::span<const std::uint8_t> by
 void UsbHandle::clear_halt(std::uint8_t endpoint) {
   const int code = libusb_clear_halt(handle_.get(), endpoint);
   if (code != LIBUSB_SUCCESS) {
-    throw usb_fault(device_, fmt::format("halt of endpoint 0x{:02X}", endpoint), code);
+    throw usb_fault(device_, fmt::format("clearing the stall of endpoint 0x{:02X}", endpoint),
+                    code);
   }
 }
 

@@ -17,8 +17,8 @@ struct ControlRequest {
   std::uint16_t index = 0;
 };
 
-/// An opened device. All calls wait for the device, a second at most, and throw Error. They may run
-/// callbacks of transfers under way, and must not be called from one.
+/// An opened device. Every call waits for the device, at most 1 s, and throws Error if it fails. A
+/// call may run callbacks of other transfers; do not make it from a callback.
 class UsbHandle {
  public:
   explicit UsbHandle(UsbDevice device);
@@ -26,7 +26,7 @@ class UsbHandle {
   UsbHandle(const UsbHandle&) = delete;
   UsbHandle& operator=(const UsbHandle&) = delete;
 
-  /// Takes the interface, from its kernel driver too, which has it back once the handle is gone.
+  /// Claims the interface. A kernel driver that holds it is detached until the handle is destroyed.
   void claim(int interface);
 
   std::vector<std::uint8_t> control_in(const ControlRequest& request, std::uint16_t length);

@@ -25,7 +25,7 @@ Configuration configuration_of(const UsbDevice& device) {
   return {descriptor, libusb_free_config_descriptor};
 }
 
-/// The interfaces in their first alternate setting, the one that is in force.
+/// The interfaces in their first alternate setting, which is the active one.
 std::vector<const libusb_interface_descriptor*> interfaces_of(const Configuration& configuration) {
   std::vector<const libusb_interface_descriptor*> interfaces;
   for (const libusb_interface& i :
@@ -38,7 +38,7 @@ std::vector<const libusb_interface_descriptor*> interfaces_of(const Configuratio
 }
 
 BulkInterface describe(const libusb_interface_descriptor& interface) {
-  constexpr int packet_bits = 0x07ff;  // USB 2.0, table 9-13: the others mean something else
+  constexpr int packet_bits = 0x07ff;  // of wMaxPacketSize, USB 2.0, table 9-13
   BulkInterface found{.number = interface.bInterfaceNumber};
   for (const libusb_endpoint_descriptor& e :
        std::span(interface.endpoint, interface.bNumEndpoints)) {
@@ -55,7 +55,7 @@ BulkInterface describe(const libusb_interface_descriptor& interface) {
   return found;
 }
 
-/// Whether the interface's union descriptor names this one as its subordinate.
+/// Whether the control interface's union descriptor names the data interface as subordinate.
 bool rules_over(const libusb_interface_descriptor& control, int data_interface) {
   constexpr std::uint8_t class_specific_interface = 0x24;
   constexpr std::uint8_t union_subtype = 0x06;
@@ -63,7 +63,7 @@ bool rules_over(const libusb_interface_descriptor& control, int data_interface) 
   std::span<const std::uint8_t> rest(control.extra, static_cast<std::size_t>(control.extra_length));
   while (rest.size() >= 3 && rest[0] >= 3 && rest[0] <= rest.size()) {
     if (rest[1] == class_specific_interface && rest[2] == union_subtype) {
-      // Its fourth byte is the control interface itself.
+      // The fourth byte is the control interface itself.
       const auto subordinates = rest.first(rest[0]).subspan(std::min<std::size_t>(4, rest[0]));
       return std::ranges::find(subordinates, data_interface) != subordinates.end();
     }
@@ -83,8 +83,8 @@ BulkInterface find_interface(const UsbDevice& device, std::uint8_t interface_cla
     }
   }
   throw Error(Fault::system,
-              fmt::format("{}: has no interface of class 0x{:02X} with a bulk endpoint; is its "
-                          "firmware the right one?",
+              fmt::format("{}: has no interface of class 0x{:02X} with a bulk endpoint; check its "
+                          "firmware",
                           device.place(), interface_class));
 }
 

@@ -16,12 +16,11 @@ struct BulkInterface {
   std::size_t packet_bytes = 0;  ///< the largest packet towards the host
 };
 
-/// The first interface of the class that has a bulk endpoint towards the host. @throws Error
+/// Finds the first interface of this class that has a bulk endpoint towards the host. @throws Error
 BulkInterface find_interface(const UsbDevice& device, std::uint8_t interface_class);
 
-/// The control interface of a CDC data interface, by the union descriptor (CDC 1.2, 5.2.3.2). Where
-/// firmware leaves that out, the nearest one before it; none where there is no such interface
-/// either.
+/// Finds the control interface of a CDC data interface by its union descriptor (CDC 1.2, 5.2.3.2);
+/// without such a descriptor, the nearest control interface before the data interface, if any.
 std::optional<int> find_control_interface(const UsbDevice& device, int data_interface);
 
 }  // namespace palpate

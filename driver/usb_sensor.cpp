@@ -18,14 +18,14 @@ using std::chrono::microseconds;
 using std::chrono::milliseconds;
 using std::chrono::steady_clock;
 
-// How long to wait before a board that is gone is looked for again: udev needs a moment to give
-// permission, and one that never comes back must not keep the machine busy.
+// Waits between two looks for a board that is gone: short at first, as udev needs a moment to grant
+// permission; longer later, as the board may never come back.
 constexpr milliseconds first_back_off{50};
 constexpr milliseconds longest_back_off{1000};
-// stop() interrupts the wait for events; this only bounds what a missed interrupt would cost.
+// Longest wait for events: stop() interrupts it, but an interrupt may be missed.
 constexpr milliseconds event_patience{100};
 
-/// A board came back that frames of before cannot be compared with: no use waiting for another.
+/// The board came back with other elements, so that the stream cannot continue.
 class OtherElements : public Error {
  public:
   using Error::Error;
@@ -56,7 +56,7 @@ UsbSensor::UsbSensor(std::unique_ptr<Board> board, const std::string& which)
 UsbSensor::~UsbSensor() { stop(); }
 
 void UsbSensor::watch_arrivals() {
-  // Where this does not work, a board that comes back is found by looking again and again.
+  // Without hotplug events, wait_for_return() finds the board by looking at intervals.
   if (libusb_has_capability(LIBUSB_CAP_HAS_HOTPLUG) != 0) {
     libusb_hotplug_register_callback(context_.get(), LIBUSB_HOTPLUG_EVENT_DEVICE_ARRIVED,
                                      LIBUSB_HOTPLUG_NO_FLAGS, LIBUSB_HOTPLUG_MATCH_ANY,
@@ -85,8 +85,7 @@ void UsbSensor::begin() {
       link_->begin();
       return;
     } catch (const Error&) {
-      // Also where the board is plugged in: to the kernel a board that was unplugged since it was
-      // opened is another device, which has to be opened anew.
+      // A board that was unplugged since is a new device to the kernel, and must be opened again.
       link_.reset();
     }
   }
@@ -185,7 +184,7 @@ void UsbSensor::reconnect() {
     throw OtherElements(
         Fault::system,
         fmt::format(
-            "{}: came back with {} elements instead of {}, or in other places; open it again",
+            "{}: came back with {} elements instead of {}, or at other positions; open it again",
             device.place(), elements, description_.elements_mm.size()));
   }
   link->begin();
@@ -201,7 +200,7 @@ void UsbSensor::deliver(std::vector<TransferRing::Completion>& completions) {
 void UsbSensor::deliver(const TransferRing::Completion& completion) {
   Deframer& deframer = board_->deframer();
   if (completion.missing > 0) {
-    // At least the frames that they belonged to.
+    // A lower bound: each missing transfer held at least part of a frame.
     deframer.reset();
     lost_before_next_ += completion.missing;
     tally_.lost += completion.missing;

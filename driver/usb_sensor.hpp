@@ -19,14 +19,14 @@
 
 namespace palpate {
 
-/// The stream of a board, over unplugging and plugging in again.
+/// A sensor that streams from a USB board, also after the board was unplugged and plugged in again.
 ///
-/// Between start() and stop() a thread of its own has the device: it pumps the events of libusb,
-/// parses what the transfers brought, ends stalls, and waits for a board that is gone. The thread
-/// that calls next() meets it only at the queue of frames.
+/// Between start() and stop(), a thread of the sensor's own uses the device: it handles libusb's
+/// events, decodes transfers, ends stalls and waits for an unplugged board. It passes frames to
+/// next() through a queue.
 class UsbSensor final : public Sensor {
  public:
-  /// @param which serial number or port of the board; "" where there is only one. @throws Error
+  /// @param which serial number or port of the board; "" if only one is plugged in. @throws Error
   UsbSensor(std::unique_ptr<Board> board, const std::string& which);
   ~UsbSensor() override;
   UsbSensor(const UsbSensor&) = delete;
@@ -53,10 +53,10 @@ class UsbSensor final : public Sensor {
 
   UsbContext context_;
   std::unique_ptr<Board> board_;
-  std::string which_;  // serial number or port, by which it is known when it comes back
-  std::atomic<bool> arrived_ = false;  // some device was plugged in
+  std::string which_;  // serial number or port, by which a board that comes back is known
+  std::atomic<bool> arrived_ = false;  // a device was plugged in
 
-  // The thread's alone between start() and stop().
+  // Between start() and stop(), only the sensor's thread uses these.
   TransferRing::Counters transfer_counters_;
   SensorCounters tally_;
   std::unique_ptr<BoardLink> link_;  // none while the board is gone
@@ -70,7 +70,7 @@ class UsbSensor final : public Sensor {
   std::atomic<bool> gone_ = false;
   FrameQueue queue_;
   mutable std::mutex mutex_;
-  SensorCounters published_;  // a copy of the tally, under the mutex
+  SensorCounters published_;  // copy of tally_ for counters(), guarded by mutex_
 };
 
 }  // namespace palpate

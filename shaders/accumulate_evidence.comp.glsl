@@ -2,10 +2,10 @@
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_control_flow_attributes : require
 
-// Adds readings to a map by parallel cell updates (Eq. 4-6): one tile of cells per workgroup, a
-// block of BLOCK_CELLS x BLOCK_CELLS of them per invocation, in registers. The Gaussian is separable:
-// its exponentials are shared along rows and columns. Positions are relative to the tile, so that
-// their float32 error does not grow with the map.
+// Adds readings to a map by parallel cell updates (Eq. 4-6). A workgroup updates one tile of cells,
+// an invocation BLOCK_CELLS x BLOCK_CELLS cells in registers. The Gaussian is separable, so that
+// rows and columns share its exponentials. Positions are relative to the tile, so that their
+// float32 error does not grow with the map.
 
 #include "interface.h"
 
@@ -22,7 +22,7 @@ layout(binding = 1) uniform samplerBuffer readings;  // TileReading
 layout(std430, binding = 2) buffer Map { vec2 log_odds[]; };  // relative to the prior, two floats
 layout(push_constant) uniform Push { EvidencePush push; };
 
-// Increments that are summed in one float before they join the two-float sum.
+// Number of increments that one float sums before they are added to the two-float sum.
 const uint CHUNK = 64;
 
 #define FOR_EACH_CELL                               \
@@ -42,20 +42,19 @@ void weigh(const vec2 corner, const vec4 reading) {
     const float d = offset.y + float(j) * push.cell_mm;
     const float along_y = exp(max(-d * d * INVERSE_TWICE_VARIANCE, -40.0));
     [[unroll]] for (int i = 0; i < BLOCK_CELLS; ++i) {
-      // What is too small to count is 0 at once: powers of it would be denormal, which CPUs take a
-      // hundred times longer for.
+      // Negligible weights become 0: their powers would be denormal numbers, slow on CPUs.
       const float g = along_x[i] * along_y;
       weight[j][i] = g > 1e-16 ? g : 0.0;
     }
   }
 }
 
-// tanh of half the increment.
+// tanh of half the log-odds increment, where the Gaussian weight is g.
 float half_tanh(const float g, const vec4 reading) {
   return g * reading.z / (2.0 + g * reading.w);
 }
 
-// 2 atanh(t) for |t| <= SERIES_REACH, to a relative 2e-7: a logarithm would lose the small
+// 2 atanh(t) for |t| <= SERIES_REACH, to a relative 2e-7. A logarithm would round away the small
 // increments far from an element, of which a long recording has many.
 float twice_atanh_series(const float t) {
   const float q = t * t;
@@ -79,7 +78,7 @@ void main() {
       FOR_EACH_CELL {
         const float g = weight[j][i];
         const float t = half_tanh(g, reading);
-        // (1 + t) / (1 - t) or its inverse, without the cancellation of 1 - t.
+        // (1 + |t|) / (1 - |t|) without the cancellation in 1 - |t|.
         const float odds = (2.0 + g * (reading.w + abs(reading.z))) / (2.0 - 2.0 * g);
         part[j][i] +=
             abs(t) < SERIES_REACH ? twice_atanh_series(t) : sign(reading.z) * log(odds);

@@ -1,7 +1,7 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
 
-// Adds one slab of log-likelihoods to another.
+// Adds one slab of log-likelihoods to another, bin by bin.
 
 #include "interface.h"
 
@@ -14,7 +14,7 @@ layout(std430, binding = 1) buffer Belief { vec2 belief[]; };
 layout(push_constant) uniform Push { AddPush push; };
 
 void main() {
-  // Rows of workgroups, for one row of them may not cover a slab.
+  // Workgroups form rows: the largest row that a device allows may be shorter than a slab.
   const uint bin = gl_WorkGroupID.y * push.row + gl_GlobalInvocationID.x;
   if (gl_GlobalInvocationID.x < push.row && bin < push.bins) {
     const vec4 pair = texelFetch(added, int(bin / 2));

@@ -1,9 +1,9 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
 
-// Draws the particles of the next touch from those of the last one (Sec. III-B): a particle by its
-// weight, with motion noise, or, in Augmented MCL, now and then a random one. One particle per
-// invocation.
+// Draws the next touch's particles from the last touch's (Sec. III-B): each invocation draws one
+// particle by weight and adds motion noise, or, in Augmented MCL, sometimes draws a random particle
+// from the initial distribution.
 
 #include "interface.h"
 
@@ -12,7 +12,7 @@ layout(local_size_x_id = 0) in;
 #include "philox.glsl"
 
 layout(binding = 0) uniform isamplerBuffer particles;  // Particle
-layout(binding = 1) uniform samplerBuffer cumulative;  // weight within the block, inclusive
+layout(binding = 1) uniform samplerBuffer cumulative;  // [particle], within its block, inclusive
 layout(binding = 2) uniform isamplerBuffer blocks;     // DrawBlock
 layout(std430, binding = 3) readonly buffer Shares { ObjectShare shares[]; };
 layout(std430, binding = 4) writeonly buffer Drawn { Particle drawn[]; };
@@ -30,7 +30,7 @@ float uniform_of(const uint word) { return (float(word) + 0.5) * 2.0 * PER_WORD 
 
 // Two independent standard normal numbers (Box and Muller 1958).
 vec2 normals(const uvec2 words) {
-  // Logarithms may round to above 0 at 1.
+  // log() of a number just below 1 may round to above 0.
   const float radius = sqrt(max(-2.0 * log((float(words.x) + 0.5) * PER_WORD), 0.0));
   const float angle = PI * uniform_of(words.y);
   return radius * vec2(cos(angle), sin(angle));
@@ -55,7 +55,7 @@ Particle initial(const uint particle) {
                   wrap(push.half_theta_rad * uniform_of(words.z)));
 }
 
-// The particle that a key falls on. `chance` says where in its block a random key falls.
+// The particle that `key` selects. In a multinomial draw, `chance` selects it within its block.
 uint find(const uint key, const uint chance) {
   uint low = 0;
   uint high = push.blocks - 1;
@@ -71,7 +71,7 @@ uint find(const uint key, const uint chance) {
                           ? (float(chance) + 0.5) * PER_WORD * sum
                           : intBitsToFloat(block.y) -
                                 float(uint(block.x) - 1 - key) * intBitsToFloat(block.z);
-  // Rounded up to the whole sum, it would fall behind the last particle that weighs anything.
+  // A place rounded up to the whole sum would fall behind the last particle with weight.
   const float target = clamp(place, 0.0, uintBitsToFloat(floatBitsToUint(sum) - 1));
 
   low *= WEIGHT_BLOCK;

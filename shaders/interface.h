@@ -1,5 +1,5 @@
-// What the kernels and the host agree on: constants, buffer records and push constants, of 4-byte
-// scalars only, so that C++ and GLSL (std430) lay them out alike.
+// The interface of the kernels, included by C++ and GLSL: constants, buffer records and push
+// constants. All members are 4-byte scalars, so that C++ and GLSL (std430) lay them out alike.
 #ifndef PALPATE_SHADERS_INTERFACE_H
 #define PALPATE_SHADERS_INTERFACE_H
 
@@ -16,35 +16,33 @@ const uint IN_CONTACT = 1;
 const uint CONTACT_INSTEAD = 2;
 const uint UNKNOWN_INSTEAD = 3;
 
-// Rows and columns of prior that surround an uploaded map, on each side: so many that a clamped
-// index finds all four nodes of a tile along an axis at the prior.
+// Width, in cells, of the border of prior around an uploaded map. An index clamped to the border
+// finds all four nodes of a tile along an axis at the prior.
 const int MAP_BORDER = 4;
 
-// Stands for log(gamma m) where gamma is 0: the likelihood has no floor.
+// Replaces log(gamma m) if gamma is 0: the likelihood then has no floor.
 const float NO_FLOOR = -1e38;
 
-// Elements whose likelihoods are multiplied before one logarithm, and before one division.
+// Likelihoods that are multiplied before one logarithm, and before one division.
 const uint FACTORS_PER_LOG = 8;
 const uint FACTORS_PER_DIVISION = 4;
 
-// Edge of the square tile of map cells that one workgroup of accumulate_evidence fills: small, for
-// few readings that reach none of its cells, and large, for few lists that a reading stands in.
+// Edge, in cells, of the map tile that one workgroup of accumulate_evidence fills. Smaller tiles
+// skip more readings; larger ones copy each reading into fewer lists.
 const int TILE_CELLS = 16;
 
-// Nats below the largest at which a bin no longer counts: sums of 1e9 such bins are below float32,
-// and an exponential that is not denormal, which costs CPUs a hundred times as much, takes its
-// place.
+// Log-likelihood differences are clamped at -80 nats: smaller terms change no float32 sum and would
+// make exp() slow.
 const float NEGLIGIBLE = -80.0;
 
-// Texels that a lane of reduce_belief takes at a time, for one new maximum and one rescaling of the
-// sum.
+// Texels that a lane of reduce_belief reads before it rescales its sum to a new maximum.
 const uint REDUCE_BATCH = 4;
 
-// Increments above 2 atanh(SERIES_REACH) take a logarithm, smaller ones a series.
+// Log-odds increments 2 atanh(t) are computed by a series for |t| < SERIES_REACH, else by log().
 const float SERIES_REACH = 0.2;
 
-// One known element's reading near a tile, relative to the centre of the tile's first cell. The
-// log-odds increment at Gaussian weight g is 2 atanh(g gain / (2 + g skew)).
+// One known element's reading near a tile, relative to the centre of the tile's first cell. Where
+// the Gaussian weight is g, the log odds grow by 2 atanh(g gain / (2 + g skew)) (Eq. 4-6).
 struct TileReading {
   float x_mm;
   float y_mm;
@@ -52,8 +50,8 @@ struct TileReading {
   float skew;
 };
 
-// A tile of the map and its readings, [first, first + count) of the list, of which the first `near`
-// come close to a cell of the tile.
+// A tile of the map and its readings, [first, first + count) of the list. The first `near` of them
+// lie close to a cell of the tile.
 struct Tile {
   uint column;
   uint row;
@@ -69,20 +67,19 @@ struct EvidencePush {
   float cell_mm;
 };
 
-// A coordinate in units of the map's cell, split so that no float32 digit is lost: cell + fraction.
+// A coordinate, cell + fraction, in units of the map's cell; the split keeps all float32 digits.
 struct Split {
   int cell;
   float fraction;  // [0, 1]
 };
 
-// One element rotated by one theta, in units of the map's cell. Kernels read it as an ivec4.
+// An element's position rotated by one theta, in units of the map's cell. Kernels read an ivec4.
 struct RotatedElement {
   Split x;
   Split y;
 };
 
-// Log odds at a node of a map, at the nodes to its right and above it, and at the one above that to
-// its right. Kernels read it as a vec4: one fetch in the place of four.
+// Log odds at four neighbouring nodes of a map. Kernels fetch them at once, as a vec4.
 struct Corners {
   float here;
   float right;
@@ -90,10 +87,10 @@ struct Corners {
   float above_right;
 };
 
-// Where an object stands in the tables of a dispatch.
+// Where an object's data begin in the tables of a dispatch.
 struct ObjectPlace {
   int first_node;  // of its map
-  int map_width;   // with border
+  int map_width;   // in nodes, with border
   int map_height;
   uint first_axis;  // the lattice's x, then y, in cells of its map
   uint first_bin;   // in the slab
@@ -113,22 +110,22 @@ struct LikelihoodPush {
   uint rows;         // the slab's number of rows
   uint theta_first;  // the slab's first theta
   uint segments;
-  uint elements;      // per theta in the table
-  uint object_first;  // of the dispatch, in the table of places
+  uint elements;      // per theta, in the table of rotated elements
+  uint object_first;  // first object of the dispatch, in the table of places
 };
 
 // Result of one workgroup of reduce_belief.
 struct Partial {
   float max_high;
   float max_low;
-  uint arg_max;  // index within the object's bins of the slab
+  uint arg_max;  // index of the largest bin among the object's bins in the slab
   float sum;     // of exp(log-likelihood - max)
 };
 
 struct ReducePush {
-  uint bins;    // of one object in the slab
-  uint stride;  // from one object's bins to the next one's, an even number
-  uint partial_first;
+  uint bins;           // of one object in the slab
+  uint stride;         // from one object's first bin to the next object's; even
+  uint partial_first;  // index of the dispatch's first result
 };
 
 struct AddPush {
@@ -137,39 +134,38 @@ struct AddPush {
 };
 
 struct MarginalPush {
-  uint plane;      // (x, y) indices of the slab
-  uint thetas;     // of the slab
-  uint first_bin;  // of the object in the slab, an even number
-  float max_high;  // the sums are of exp(log-likelihood - max)
+  uint plane;      // number of (x, y) places in the slab
+  uint thetas;     // number of thetas in the slab
+  uint first_bin;  // of the object in the slab; even
+  float max_high;  // the kernel sums exp(log-likelihood - max)
   float max_low;
 };
 
-// Angles to which cosine and sine are tabled; what is left of an angle is small.
+// Number of headings with tabled cosine and sine. A theta is a heading plus a small remainder.
 const uint HEADINGS = 256;
 
-// Particles that one workgroup of sum_weights covers, a run of them per lane.
+// Lanes and particles of one workgroup of sum_weights. Each lane takes consecutive particles.
 const uint WEIGHT_LANES = 64;
 const uint WEIGHT_BLOCK = 1024;
 
-// Where draw_particles takes a particle from.
+// How draw_particles finds a particle.
 const uint DRAW_INITIAL = 0;      // the initial distribution
 const uint DRAW_SAME = 1;         // the particle of the same index
 const uint DRAW_MULTINOMIAL = 2;  // an independent draw by weight
 const uint DRAW_SYSTEMATIC = 3;   // equal steps through the summed weights
 
-// What a random number is for: a word of its counter, so that no two uses share a number.
+// Uses of random numbers. The use is a word of the generator's counter: no two uses share a number.
 const uint RANDOM_ANCESTOR = 0;
 const uint RANDOM_MOTION = 1;
 const uint RANDOM_POSE = 2;
 const uint RANDOM_OFFSET = 3;
 
-// Grid points of the Parzen estimate that one workgroup of sum_cones evaluates: x, y and theta. A
-// lane takes all x of one (y, theta).
+// One workgroup of sum_cones evaluates the Parzen estimate at PARZEN_EDGE x PARZEN_EDGE x
+// PARZEN_THETAS grid points (x, y, theta). A lane takes all x of one (y, theta).
 const int PARZEN_EDGE = 4;
 const int PARZEN_THETAS = 10;
 
-// A hypothesis of the particle filter, relative to the region's centre. Kernels read it as an
-// ivec4.
+// A particle; its pose is relative to the region's centre. Kernels read it as an ivec4.
 struct Particle {
   uint object;
   float x_mm;
@@ -177,31 +173,30 @@ struct Particle {
   float theta_rad;  // [-pi, pi)
 };
 
-// One object's part in the initial distribution, as bounds that grow with the object: its particles
-// at the start, and 2^-32 of the chance that a random particle is of it.
+// One object's share of the initial distribution, summed over this and all objects before it.
 struct ObjectShare {
-  uint particle_end;
-  uint chance_end;
+  uint particle_end;  // particles at the start
+  uint chance_end;    // probability of a random particle, in units of 2^-32
 };
 
-// What draw_particles has to know of a block of weights. Keys are the particle drawn for
+// One block of weights. A key selects the particle to draw: it is the drawn particle's index
 // (systematic) or a random word (multinomial). Kernels read it as an ivec4.
 struct DrawBlock {
-  uint key_end;  // keys from the block before up to this one fall into the block
-  float last;    // systematic: where the last of them falls, as cumulated weight
-  float step;    // systematic: between keys
+  uint key_end;  // keys in [key_end of the previous block, key_end) fall into this block
+  float last;    // systematic: cumulated weight at the block's last key
+  float step;    // systematic: cumulated weight between two keys
   float sum;     // of the block's weights
 };
 
 struct DrawPush {
   uint key_low;  // of the generator: the seed
   uint key_high;
-  uint touch;  // word of the counters
+  uint touch;  // a word of the generator's counter
   uint particles;
   uint draw;      // one of DRAW_
-  uint injected;  // 2^-32 of the chance that a random particle takes the place
+  uint injected;  // probability of a random particle in place of a drawn one, in units of 2^-32
   uint objects;
-  uint blocks;      // up to the last that weighs anything
+  uint blocks;      // up to the last block with weight
   float half_x_mm;  // of the region
   float half_y_mm;
   float half_theta_rad;
@@ -209,20 +204,20 @@ struct DrawPush {
   float motion_rad;
 };
 
-// One object's map among all maps, which stand in one table.
+// One object's map in the table of all maps.
 struct ParticleMap {
-  int first;  // cell
+  int first;  // index of its first cell
   int width;  // with border
   int height;
-  uint scale;               // which of the tables of elements has its cell size
+  uint scale;               // index of the element table with its cell size
   float cells_per_mm_high;  // two floats
   float cells_per_mm_low;
   Split centre_x;  // the region's centre in cells of the bordered map
   Split centre_y;
 };
 
-// One known element in cells, or one heading's cosine and sine: the coarse part has so few bits
-// that products of the two are exact. Kernels read it as a vec4.
+// One known element's position in cells, or one heading's cosine and sine, as coarse + fine. Coarse
+// parts have so few bits that products of two are exact. Kernels read it as a vec4.
 struct CoarseAndFine {
   float coarse_x;
   float coarse_y;
@@ -233,21 +228,21 @@ struct CoarseAndFine {
 struct WeighPush {
   uint particles;
   uint segments;
-  uint elements;  // per cell size
-  uint fresh;     // 1 where the log-weights so far do not count
+  uint elements;  // per element table (one for each cell size)
+  uint fresh;     // 1: the kernel ignores the earlier log-weights
 };
 
-// Result of one workgroup of sum_weights; sums are relative to the block's largest weight.
+// Result of one workgroup of sum_weights. The sums are of weights / the block's largest weight.
 struct WeightBlock {
-  float max_high;  // of the log-weights
+  float max_high;  // the largest log-weight, high + low
   float max_low;
   float sum;
   float sum_squares;
 };
 
-// Grid points from this one on, and the ranges of particles that reach them.
+// The task of one workgroup of sum_cones: a tile of grid points and ranges of particles near it.
 struct ConeUnit {
-  int x;  // indices of the grid, which goes through the region's centre
+  int x;  // indices of the tile's first grid point; (0, 0, 0) is the region's centre
   int y;
   int theta;
   uint range_first;

@@ -2,10 +2,10 @@
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_control_flow_attributes : require
 
-// The largest log-likelihood of the bins of every workgroup, its first index, and the sum of
-// exp(log-likelihood - max) over them (Eq. 14, 15), in one pass: the sum is kept relative to the
-// largest value so far. Objects follow one another along y, and no workgroup spans two. The host
-// combines the partial results in float64 and in order, so equal input gives equal bits.
+// Finds, for the bins of each workgroup, the largest log-likelihood, the first index that has it,
+// and the sum of exp(log-likelihood - max) (Eq. 14, 15), in one pass: the sum is relative to the
+// largest value so far. gl_WorkGroupID.y is the object. The host combines the workgroups' results
+// in float64 and in order, so that equal input gives equal bits.
 
 #include "interface.h"
 
@@ -13,8 +13,8 @@ layout(local_size_x_id = 0) in;  // a power of two
 layout(constant_id = 1) const uint SIDE_BY_SIDE = 8;      // lanes that read one stretch of memory
 layout(constant_id = 2) const uint TEXELS_PER_LANE = 128;  // a multiple of REDUCE_BATCH
 
-// [object, bin]. Two bins a texel, which halves the fetches. Their two floats are normalised:
-// |low| <= ulp(high) / 2.
+// [object, bin]; a texel holds two bins, which halves the fetches. A bin's log-likelihood is high +
+// low with |low| <= ulp(high) / 2.
 layout(binding = 0) uniform samplerBuffer belief;
 layout(std430, binding = 1) writeonly buffer Partials { Partial partials[]; };
 layout(push_constant) uniform Push { ReducePush push; };

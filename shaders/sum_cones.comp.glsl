@@ -2,8 +2,8 @@
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_control_flow_attributes : require
 
-// The Parzen estimate with a cone kernel (Eq. 10, 11), rho = 1 mm and 1 rad, at the grid points of
-// one tile per workgroup, from ranges of the sorted particles. The host adds the units of a tile.
+// Evaluates the Parzen estimate with a cone kernel (Eq. 10, 11), rho = 1 mm and 1 rad, at a tile of
+// grid points per workgroup, over ranges of the sorted particles. The host adds a tile's units.
 
 #include "interface.h"
 
@@ -27,7 +27,7 @@ void main() {
   vec4 sum = vec4(0.0);
   for (uint r = unit.range_first; r < unit.range_end; ++r) {
     const uvec2 range = ranges[r];
-    vec4 part = vec4(0.0);  // a sum of its own for each range rounds less
+    vec4 part = vec4(0.0);  // one sum per range rounds less than one sum for all
     for (uint i = range.x; i < range.y; ++i) {
       const vec4 particle = texelFetch(particles, int(i));
       const vec4 dx = particle.x - x_mm;

@@ -2,9 +2,9 @@
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_control_flow_attributes : require
 
-// Sums the probabilities of an object's bins in a slab, relative to exp(max), over theta and over
-// (x, y) in one pass. A workgroup takes a block of (x, y) indices and a chunk of thetas and writes
-// its parts of both sums, which the host adds in order.
+// Sums exp(log-likelihood - max) of an object's bins in a slab over theta and over (x, y), in one
+// pass. A workgroup takes a block of (x, y) places and a chunk of thetas, and writes its part of
+// both sums. The host adds the parts in order.
 
 #include "interface.h"
 
@@ -12,7 +12,7 @@ layout(local_size_x_id = 0) in;
 layout(constant_id = 1) const uint SIDE_BY_SIDE = 8;  // lanes that read one stretch of memory
 layout(constant_id = 2) const uint PAIRS_PER_LANE = 16;
 layout(constant_id = 3) const uint THETAS = 64;  // at most the workgroup's lanes
-// Where planes have an even number of bins, every pair of bins of a plane is one texel.
+// If the planes have an even number of bins, every pair of bins of a plane is one texel.
 layout(constant_id = 4) const bool EVEN_PLANES = false;
 
 layout(binding = 0) uniform samplerBuffer belief;  // two bins a texel
@@ -20,11 +20,11 @@ layout(std430, binding = 1) writeonly buffer OverTheta { float over_theta[]; }; 
 layout(std430, binding = 2) writeonly buffer OverPlane { float over_plane[]; };  // [block, theta]
 layout(push_constant) uniform Push { MarginalPush push; };
 
-// [theta, lane]. One word more a row: lanes that sum a row each would all meet in one bank.
+// [theta, lane]. A row has one word more than lanes: lanes that sum a row each use separate banks.
 const uint ROW = gl_WorkGroupSize.x + 1;
 shared float parts[THETAS * ROW];
 
-// Two bins from this one on.
+// The log-likelihoods of `bin` and of the next bin, as two floats each.
 vec4 fetch_pair(const uint bin, const uint last) {
   const int object_texel = int(push.first_bin / 2);
   const vec4 texel = texelFetch(belief, object_texel + int(bin / 2));

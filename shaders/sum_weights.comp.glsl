@@ -2,10 +2,10 @@
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_control_flow_attributes : require
 
-// The cumulated weights of every WEIGHT_BLOCK particles, relative to the largest of the block, with
-// their sum and that of their squares. The host combines blocks in float64 and in order, so equal
-// input gives equal bits. Cumulated weights never fall, which the search among them relies on:
-// every lane starts from the very sum that the lane before it ends with.
+// Cumulates the weights of each block of WEIGHT_BLOCK particles, in units of the block's largest
+// weight, and sums the weights and their squares. The host combines blocks in float64 and in order,
+// so that equal input gives equal bits. Cumulated weights never decrease, on which the search among
+// them relies: every lane starts from exactly the sum with which the previous lane ends.
 
 #include "interface.h"
 
@@ -17,7 +17,7 @@ layout(std430, binding = 2) writeonly buffer Blocks { WeightBlock blocks[]; };
 layout(push_constant) uniform Push { uint particles; } push;
 
 const uint RUN = WEIGHT_BLOCK / WEIGHT_LANES;
-// Squares of smaller weights would be denormal, which CPUs take a hundred times longer for.
+// Squares of smaller weights would be denormal numbers, slow on CPUs.
 const float LEAST_SQUARED = 1e-18;
 
 shared vec2 largest[WEIGHT_LANES];

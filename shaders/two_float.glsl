@@ -1,5 +1,5 @@
-// A sum kept as an unevaluated pair high + low, after Knuth's TwoSum. `precise` keeps compilers from
-// simplifying the rounding errors away.
+// Sums as unevaluated pairs high + low (Knuth's TwoSum). `precise` keeps compilers from simplifying
+// the rounding errors away.
 
 vec2 two_float_add(vec2 sum, float value) {
   precise float high = sum.x + value;
@@ -16,7 +16,7 @@ vec2 two_float_sum(vec2 a, vec2 b) {
   return two_float_add(sum, b.y);
 }
 
-// The exact product of two floats, after Dekker 1971.
+// The exact product of two floats (Dekker 1971).
 vec2 two_float_product(float a, float b) {
   const float splitter = 4097.0;
   precise float a_scaled = splitter * a;

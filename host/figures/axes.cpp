@@ -13,7 +13,7 @@ namespace {
 constexpr double tick_px = 6.0;
 constexpr Pen axis_pen{.colour = ink, .width_px = 1.5};
 
-/// How far below the middle of a line of text its baseline lies.
+/// Distance from the middle of a line of text down to its baseline, in pixels.
 double half_height(const Font& font) { return 0.36 * font.size_px; }
 
 void draw_segment(Canvas& canvas, glm::dvec2 from, glm::dvec2 to) {

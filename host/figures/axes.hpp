@@ -11,14 +11,14 @@
 
 namespace palpate {
 
-/// The part of a plane of data that a box on the canvas shows; the data's y points up.
+/// A rectangle of data coordinates, y up, and the box on the canvas that shows it.
 struct View {
   Box box;
   glm::dvec2 lower{0.0, 0.0};
   glm::dvec2 upper{1.0, 1.0};
 
   glm::dvec2 pixel(glm::dvec2 data) const;
-  /// The pixels of a rectangle of data.
+  /// Returns the box in pixels of a rectangle of data.
   Box pixels(glm::dvec2 data_lower, glm::dvec2 data_upper) const;
   bool contains(glm::dvec2 data) const;
 };
@@ -33,20 +33,21 @@ inline constexpr Font body{20.0};
 inline constexpr Font small{18.0};
 inline constexpr Font heading{24.0, true};
 
-/// The number in its shortest form, to six digits, with a true minus sign.
+/// Returns the number in its shortest form, to six digits, with a true minus sign.
 std::string number(double value);
 
-/// At most `count` + 1 ticks within [lower, upper], 1, 2 or 5 times a power of ten and at least
-/// `smallest_step` apart.
+/// Returns at most `count` + 1 ticks within [lower, upper]. Their step is 1, 2 or 5 times a power
+/// of ten and at least `smallest_step`.
 std::vector<Tick> even_ticks(double lower, double upper, int count, double smallest_step = 0.0);
 
-/// A frame around the view, ticks and axis labels on its left and below it. They take 60
+/// Draws a frame around the view, with ticks and axis labels on its left and below it. They take 60
 /// pixels below, and on the left 84 or as many as the widest tick label needs.
 void draw_axes(Canvas& canvas, const View& view, const std::vector<Tick>& x_ticks,
                const std::vector<Tick>& y_ticks, std::string_view x_label,
                std::string_view y_label);
 
-/// A horizontal colour bar of [lower, upper] with ticks and a caption, which take 56 pixels below.
+/// Draws a horizontal colour bar of [lower, upper] with ticks and a caption, which take 56 pixels
+/// below.
 void draw_colour_bar(Canvas& canvas, const Box& box, double lower, double upper,
                      const std::function<Colour(double value)>& colour,
                      const std::vector<Tick>& ticks, std::string_view caption);

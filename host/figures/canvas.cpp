@@ -43,7 +43,7 @@ cairo_status_t append(void* bytes, const unsigned char* data, unsigned int size)
   try {
     static_cast<std::string*>(bytes)->append(reinterpret_cast<const char*>(data), size);
   } catch (const std::bad_alloc&) {
-    return CAIRO_STATUS_NO_MEMORY;  // Cairo called, which is C: nothing may be thrown
+    return CAIRO_STATUS_NO_MEMORY;  // Cairo is C: no exception may pass through it
   }
   return CAIRO_STATUS_SUCCESS;
 }
@@ -72,7 +72,7 @@ Canvas::Canvas(int width_px, int height_px, PictureFormat format)
   cairo_paint(context);
   cairo_set_line_join(context, CAIRO_LINE_JOIN_ROUND);
 
-  // The desktop's font settings must not change the picture.
+  // Fixed font options, so that the desktop's settings do not change the picture.
   const std::unique_ptr<cairo_font_options_t, void (*)(cairo_font_options_t*)> options(
       cairo_font_options_create(), cairo_font_options_destroy);
   cairo_font_options_set_antialias(options.get(), CAIRO_ANTIALIAS_GRAY);

@@ -32,7 +32,7 @@ struct Font {
 
 enum class Align { left, centre, right };
 
-/// How a line is drawn; a halo of white keeps it apart from any background.
+/// Style of a line; a white halo keeps it apart from any background.
 struct Pen {
   Colour colour = ink;
   double width_px = 2.0;
@@ -47,14 +47,14 @@ class Canvas {
   /// @throws Error (Fault::system) if there is no memory for that many pixels.
   Canvas(int width_px, int height_px, PictureFormat format = PictureFormat::png);
 
-  /// `at` is the left end, centre or right end of the baseline. Bytes that are not UTF-8 and
-  /// control characters show as '?'.
+  /// Writes text whose baseline has its left end, centre or right end at `at`. Bytes that are not
+  /// UTF-8 and control characters show as '?'.
   void text(std::string_view text, glm::dvec2 at, const Font& font, Align align = Align::left,
             const Colour& colour = ink);
-  /// The same, read from bottom to top.
+  /// Writes text that reads from bottom to top.
   void text_upwards(std::string_view text, glm::dvec2 at, const Font& font, Align align);
   double text_width(std::string_view text, const Font& font);
-  /// The text, or as much of its beginning as fits into this width with an ellipsis.
+  /// Returns the text, or as much of its beginning as fits into this width with an ellipsis.
   std::string fit(std::string_view text, double width_px, const Font& font);
 
   void line(std::span<const glm::dvec2> points, const Pen& pen);
@@ -66,7 +66,7 @@ class Canvas {
   /// Fills the box with nx * ny cells of these colours; row j = 0 is the lowest.
   void cells(const Box& box, int nx, int ny, const std::function<Colour(int i, int j)>& colour);
 
-  /// While it lives, nothing is drawn outside of the box.
+  /// Keeps drawing inside the box while it lives.
   class Clip {
    public:
     Clip(Canvas& canvas, const Box& box);
@@ -78,7 +78,7 @@ class Canvas {
     cairo_t* context_;
   };
 
-  /// The bytes of a file of the canvas' format. After an SVG file, nothing more can be drawn.
+  /// Returns the canvas as the bytes of a file. After an SVG file, nothing more can be drawn.
   /// @throws Error (Fault::system) if anything drawn so far failed.
   std::string encode();
 

@@ -25,7 +25,7 @@ Colour paler(const Colour& colour, double share) {
   return {mix(colour.red), mix(colour.green), mix(colour.blue)};
 }
 
-/// The corners of a mark's outline; none for a circle.
+/// Returns the corners of a mark's outline; none for a circle.
 std::vector<glm::dvec2> corners_of(Mark mark, glm::dvec2 at) {
   const double r = radius_px;
   switch (mark) {
@@ -47,7 +47,7 @@ void draw_mark(Canvas& canvas, const ChartSeries& series, glm::dvec2 at) {
   const Colour inside = series.fill == MarkFill::solid  ? series.colour
                         : series.fill == MarkFill::pale ? paler(series.colour, 0.4)
                                                         : white;
-  // A white edge tells solid marks apart that lie on each other.
+  // A white edge separates solid marks that overlap.
   const Pen edge{.colour = series.fill == MarkFill::solid ? white : series.colour,
                  .width_px = series.fill == MarkFill::solid ? 1.5 : 2.2};
   if (series.mark == Mark::circle) {
@@ -82,7 +82,7 @@ bool free_of(const Box& box, const std::vector<Box>& taken) {
                       [&](const Box& other) { return meet(box, other); });
 }
 
-/// The legend, in rows of as many entries as fit, each as wide as the widest.
+/// The legend: rows of as many entries as fit, each as wide as the widest entry.
 struct Legend {
   std::vector<const ChartSeries*> entries;
   double column_px = 0.0;
@@ -122,7 +122,7 @@ struct Legend {
   }
 };
 
-/// What lies within the frame of the axes.
+/// Draws the contents of the frame of the axes.
 class Plot {
  public:
   Plot(Canvas& canvas, const AxisSpan& x, const AxisSpan& y, const Box& box)
@@ -173,11 +173,11 @@ class Plot {
   }
 
   void intervals(const ChartSeries& series) {
-    // Lower and upper ends of points in a row: a band has the gaps of its line.
+    // Interval ends of consecutive points: a band has the gaps of its line.
     std::vector<std::array<glm::dvec2, 2>> run;
     for (const ChartPoint& point : series.points) {
       if (drawn(point) && y_.has(point.high) && point.low <= point.high) {
-        // An interval that reaches below what a logarithmic axis has ends at the axis.
+        // On a logarithmic axis, an interval that reaches 0 ends at the axis.
         const double x = x_.place(point.x);
         run.push_back({view_.pixel({x, y_.has(point.low) ? y_.place(point.low) : y_.lower}),
                        view_.pixel({x, y_.place(point.high)})});
@@ -271,8 +271,7 @@ class Plot {
     }
   }
 
-  /// Writes the text where it fits beside the point without covering a mark or another label, or
-  /// nowhere.
+  /// Writes the text beside the point where it covers no mark and no other label, or not at all.
   void label(const std::string& text, glm::dvec2 at, const Colour& colour) {
     const double w = canvas_.text_width(text, small);
     constexpr double h = 20.0;
@@ -299,7 +298,7 @@ class Plot {
   const AxisSpan& x_;
   const AxisSpan& y_;
   View view_;
-  std::vector<Box> taken_;  ///< by marks and text
+  std::vector<Box> taken_;  ///< boxes of marks and text
   std::vector<ChartSpot> spots_;
 };
 

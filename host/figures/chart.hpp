@@ -18,17 +18,17 @@ enum class Scale { linear, logarithmic };
 struct ChartAxis {
   std::string label;
   Scale scale = Scale::linear;
-  /// Ends of the axis. An end that is left out follows the data, with room for the marks.
+  /// Ends of the axis. An end that is not given follows the data, with room for the marks.
   std::optional<double> lower = {};
   std::optional<double> upper = {};
-  /// Text of a value beside its tick; empty for the number in its shortest form.
+  /// Writes the label of a tick; empty: the number in its shortest form.
   std::function<std::string(double)> text = {};
 };
 
 enum class Mark { none, circle, square, triangle, diamond, cross };
 enum class MarkFill { solid, pale, hollow };
 enum class Line { none, solid, dashed, dotted };
-/// How the interval of a point is drawn: as an error bar, or as a band along the series.
+/// Shape of the points' intervals: error bars, or a band along the series.
 enum class IntervalShape { bars, band };
 
 /// A point, drawn where both coordinates are finite and, on a logarithmic axis, positive. A point
@@ -70,7 +70,7 @@ struct Chart {
   std::vector<ChartRule> rules = {};
 };
 
-/// The middle of a mark in pixels of the picture, and the title of its point.
+/// The middle of a mark in pixels of the picture, and its point's title.
 struct ChartSpot {
   glm::dvec2 at_px;
   std::string title;
@@ -81,14 +81,14 @@ struct ChartPicture {
   std::string bytes;
   int width_px = 0;
   int height_px = 0;
-  std::vector<ChartSpot> spots;  ///< of the points that have a title
+  std::vector<ChartSpot> spots;  ///< of the points with a title
 };
 
 /// Draws the chart as a PNG or SVG file.
 /// @throws Error (Fault::system) where Cairo fails
 ChartPicture draw_chart(const Chart& chart, PictureFormat format);
 
-/// The chart's own grey, for what a series is compared with.
+/// Grey for a series that others are compared with.
 inline constexpr Colour comparison_grey{0.38, 0.38, 0.38};
 
 }  // namespace palpate

@@ -14,7 +14,7 @@ std::string text_of(const ChartAxis& axis, double value) {
   return axis.text ? axis.text(value) : number(value);
 }
 
-/// Ends at whole ticks, so that a curve never meets the frame between two of them.
+/// Ends the axis at whole ticks, so that no curve meets the frame between two ticks.
 void set_linear_ticks(const ChartAxis& axis, AxisSpan& span) {
   const std::vector<Tick> within = even_ticks(span.lower, span.upper, most_ticks);
   const double step = within.size() > 1 ? within[1].value - within[0].value : 0.0;
@@ -50,7 +50,7 @@ void set_logarithmic_ticks(const ChartAxis& axis, AxisSpan& span) {
     }
   }
   if (span.ticks.size() < 2 && decades < 0.8) {
-    // So short an axis holds hardly a whole digit.
+    // An axis this short may hold no whole digit; it gets evenly spaced ticks.
     span.ticks.clear();
     for (const Tick& tick :
          even_ticks(std::pow(10.0, span.lower), std::pow(10.0, span.upper), most_ticks)) {

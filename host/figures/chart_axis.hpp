@@ -8,8 +8,8 @@
 
 namespace palpate {
 
-/// The extent and the ticks of an axis that shows given values. Places are what the axis is linear
-/// in: the values themselves, or their decadic logarithms.
+/// Extent and ticks of an axis. A place is the coordinate in which the axis is linear: the value
+/// itself, or its decadic logarithm.
 struct AxisSpan {
   Scale scale = Scale::linear;
   double lower = 0.0;  ///< place of the axis' lower end
@@ -17,12 +17,13 @@ struct AxisSpan {
   std::vector<Tick> ticks = {};   ///< labelled; `value` is a place
   std::vector<double> fine = {};  ///< places of grid lines without a label
 
-  /// Whether the scale has a place for the value.
+  /// True where the scale has a place for the value.
   bool has(double value) const;
   double place(double value) const;
 };
 
-/// @param values those of them that the scale has count; none is required
+/// Fits an axis to the data.
+/// @param values values to show, of which those without a place are ignored; may be empty
 AxisSpan span_of(const ChartAxis& axis, std::span<const double> values);
 
 }  // namespace palpate

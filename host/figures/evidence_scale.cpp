@@ -8,10 +8,10 @@ namespace palpate {
 
 namespace {
 
-/// Evidence below this is a remnant of a Gaussian's tail.
+/// Smaller evidence is left by a Gaussian's tail and does not count.
 constexpr double least_evidence_nats = 0.01;
 
-/// The next larger number whose half is short, too.
+/// Returns the next larger 1, 2, 4, 6 or 8 times a power of ten: its half has one digit, too.
 double round_up(double value) {
   const double decade = std::pow(10.0, std::floor(std::log10(value)));
   for (const double factor : {1.0, 2.0, 4.0, 6.0, 8.0}) {

@@ -11,13 +11,13 @@
 
 namespace palpate {
 
-/// Maps side by side at one scale, as the bytes of a PNG file: log odds relative to each map's
-/// prior in a diverging palette (white = prior, blue = empty, red = occupied), one colour bar in
-/// nats and one scale bar in mm for all. y points up. The same maps give the same bytes.
-/// @throws Error on an empty list or a map without cells, or if there is no memory for the picture.
+/// Draws maps side by side at one scale and returns the bytes of a PNG file. Colours show log odds
+/// relative to each map's prior (white = prior, blue = empty, red = occupied); one colour bar in
+/// nats and one scale bar in mm serve all. y points up. The same maps give the same bytes.
+/// @throws Error on an empty list, a map without cells, or lack of memory
 std::string draw_maps(std::span<const OccupancyGrid> maps);
 
-/// What one recognised object's sheet shows.
+/// Contents of one recognised object's sheet.
 struct RecognitionSheet {
   std::string title;                                   ///< such as the recording's file name
   OccupancyGrid map;                                   ///< of the estimated object
@@ -26,7 +26,7 @@ struct RecognitionSheet {
   Pose T_object_robot;                                 ///< estimated
   bool none = false;          ///< "none of these" is more probable than the map's object
   std::string true_object;    ///< label, "" where it is unknown
-  std::optional<Pose> truth;  ///< T_object_robot, where it is known and the identity is right
+  std::optional<Pose> truth;  ///< T_object_robot, if known and the identity is right
   std::optional<double> error_mm;
   PoseLattice lattice;
   std::vector<double> belief_xy;              ///< [ny, nx] of the leading object, summed over theta
@@ -34,12 +34,12 @@ struct RecognitionSheet {
   std::vector<std::vector<double>> identity;  ///< [touch][object] probability after each touch
 };
 
-/// The sheet as the bytes of a PNG file: the map with the sensor's footprints at the estimated and
-/// at the true pose, the belief over (x, y), and the identity probabilities over the touches. Of
-/// the true poses of a symmetric object, the one nearest to the estimate is drawn. The same sheet
-/// gives the same bytes.
-/// @throws Error on a map without cells, on arrays of the wrong size, where a symmetric object with
-/// a truth has no occupied cell, or if there is no memory for the picture.
+/// Draws a sheet and returns the bytes of a PNG file: the map with the sensor's footprints at the
+/// estimated and at the true pose, the belief over (x, y), and the identity probabilities over the
+/// touches. For a symmetric object, the true pose drawn is the one nearest to the estimate. The
+/// same sheet gives the same bytes.
+/// @throws Error on a map without cells, arrays of the wrong size, a symmetric object with a truth
+/// but without an occupied cell, or lack of memory
 std::string draw_recognition(const RecognitionSheet& sheet);
 
 }  // namespace palpate

@@ -15,7 +15,7 @@ namespace {
 
 double cross(glm::dvec2 a, glm::dvec2 b) { return a.x * b.y - a.y * b.x; }
 
-/// Andrew's monotone chain; counter-clockwise.
+/// Returns the convex hull, counter-clockwise, by Andrew's monotone chain.
 std::vector<glm::dvec2> convex_hull(std::vector<glm::dvec2> points) {
   std::ranges::sort(
       points, [](glm::dvec2 a, glm::dvec2 b) { return a.x < b.x || (a.x == b.x && a.y < b.y); });
@@ -40,7 +40,7 @@ std::vector<glm::dvec2> convex_hull(std::vector<glm::dvec2> points) {
   return hull;
 }
 
-/// The hull without the corners that are none but for rounding, along straight rows of elements.
+/// Removes corners that only rounding makes, along straight rows of elements.
 std::vector<glm::dvec2> without_straight_corners(std::span<const glm::dvec2> hull) {
   std::vector<glm::dvec2> corners;
   const std::size_t n = hull.size();
@@ -54,9 +54,9 @@ std::vector<glm::dvec2> without_straight_corners(std::span<const glm::dvec2> hul
   return corners;
 }
 
-/// The direction of the hull's edge that the smallest enclosing rectangle lies along. By rotating
-/// calipers (Toussaint 1983): while the edge goes round, so do the corners that are farthest along
-/// it, across it and back along it.
+/// Returns the direction of the hull's edge along which the smallest enclosing rectangle lies, by
+/// rotating calipers (Toussaint 1983): as the edge goes round, so do the corners farthest along it,
+/// across it and back along it.
 double orientation_rad(std::span<const glm::dvec2> hull) {
   const std::size_t n = hull.size();
   const auto corner = [&](std::size_t k) { return hull[k % n]; };
@@ -68,7 +68,7 @@ double orientation_rad(std::span<const glm::dvec2> hull) {
   for (std::size_t k = 0; k < n; ++k) {
     const glm::dvec2 edge = corner(k + 1) - corner(k);
     const glm::dvec2 along = edge / glm::length(edge);
-    // The farthest corner in a direction, from the one that was farthest for the edge before.
+    // Returns the farthest corner in a direction, starting from the last edge's farthest corner.
     const auto advance = [&](std::size_t from, glm::dvec2 direction) {
       while (from < k + n && glm::dot(direction, corner(from + 1) - corner(from)) > 0.0) {
         ++from;

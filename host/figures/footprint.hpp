@@ -8,14 +8,14 @@
 
 namespace palpate {
 
-/// The area that one touch covers, in mm, in the frame of the element centres it is made from.
+/// The area that one touch covers, in mm, in the frame of its element centres.
 struct Footprint {
-  std::vector<std::array<glm::dvec2, 4>> elements;  ///< a square each
-  std::vector<glm::dvec2> outline;                  ///< their convex hull, counter-clockwise
+  std::vector<std::array<glm::dvec2, 4>> elements;  ///< one square each
+  std::vector<glm::dvec2> outline;  ///< convex hull of the squares, counter-clockwise
 };
 
-/// Squares of edge `element_mm` around the centres, turned as the smallest rectangle that holds
-/// all of them: for a rectangular array, as the array.
+/// Returns squares of edge `element_mm` around the centres, aligned with the smallest rectangle
+/// that holds all centres: for a rectangular array, with the array.
 Footprint footprint(std::span<const glm::dvec2> centres_mm, double element_mm);
 
 }  // namespace palpate

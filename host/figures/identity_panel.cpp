@@ -22,13 +22,13 @@ struct Curve {
   std::vector<double> probability;  ///< [touch]
   Colour colour = grey;
 
-  /// After the last touch; 0 where the belief has lost all its mass.
+  /// Probability after the last touch; 0 where the belief has lost all its mass.
   double last() const {
     return probability.empty() || !std::isfinite(probability.back()) ? 0.0 : probability.back();
   }
 };
 
-/// One curve per label, in the labels' order.
+/// Returns one curve per label, in the labels' order.
 std::vector<Curve> curves_of(const std::vector<std::string>& labels,
                              const std::vector<std::vector<double>>& identity) {
   std::vector<Curve> curves;
@@ -46,15 +46,14 @@ std::vector<Curve> curves_of(const std::vector<std::string>& labels,
   return curves;
 }
 
-/// Gives the curves their colours and puts the grey ones, which the others are drawn over, last.
-/// Returns how many are coloured. Where there are colours for all, an object keeps its own from
-/// sheet to sheet.
+/// Colours the curves and moves the grey ones to the end. Returns how many are coloured. Where the
+/// colours suffice for all, an object has the same colour on every sheet.
 std::size_t colour_curves(std::vector<Curve>& curves) {
   const bool enough = curves.size() <= series_colours;
   if (!enough) {
     std::ranges::stable_sort(curves, std::ranges::greater{}, &Curve::last);
   }
-  // One row less, where the others need a label as well.
+  // One colour less, since the others share a label.
   const std::size_t coloured = enough ? curves.size() : series_colours - 1;
   for (std::size_t k = 0; k < coloured; ++k) {
     curves[k].colour = series(k);
@@ -85,7 +84,7 @@ struct Label {
   double row_px = 0.0;  ///< where it is written
 };
 
-/// Moves the labels apart, each as near to its curve's end as the others leave room.
+/// Moves the labels apart, each as near to its curve's end as the others allow.
 void spread(std::vector<Label>& labels, double bottom_px) {
   std::ranges::stable_sort(labels, {}, &Label::end_px);
   for (std::size_t k = 0; k < labels.size(); ++k) {

@@ -25,7 +25,7 @@ constexpr double bar_px = 440.0;
 constexpr double bar_inset_px = 30.0;  ///< room for the last tick's label
 constexpr double longest_scale_bar_px = 240.0;
 
-/// The maps' places: rows of tiles as large as the largest map, at one scale.
+/// Layout of the maps: rows of tiles as large as the largest map, at one scale.
 struct Grid {
   int columns = 1;
   int rows = 1;
@@ -47,7 +47,7 @@ Grid arrange(std::span<const OccupancyGrid> maps) {
   const double side_px =
       std::clamp(tiles_px / grid.columns - gap_px, smallest_tile_px, largest_tile_px);
   grid.px_per_mm = side_px / std::max(extent_mm.x, extent_mm.y);
-  // A narrow map still has its label above.
+  // A narrow map still needs width for its label.
   grid.tile_px = glm::max(glm::ceil(grid.px_per_mm * extent_mm), glm::dvec2(smallest_tile_px, 1.0));
   return grid;
 }
@@ -65,7 +65,7 @@ void draw_tile(Canvas& canvas, const Box& tile, double px_per_mm, const Occupanc
               {tile.left + tile.width / 2, tile.top - 10.0}, heading, Align::centre);
 }
 
-/// A bar of the largest power of ten in mm that fits.
+/// Draws a bar of the largest power of ten in mm that fits.
 void draw_scale_bar(Canvas& canvas, glm::dvec2 left_px, double px_per_mm) {
   const double length_mm = std::pow(10.0, std::floor(std::log10(longest_scale_bar_px / px_per_mm)));
   const double length_px = length_mm * px_per_mm;

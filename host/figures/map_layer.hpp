@@ -6,14 +6,14 @@
 
 namespace palpate {
 
-/// Throws Error unless the map has cells, and a value for each.
+/// Throws Error unless the map has cells and a value for each cell.
 void require_cells(const OccupancyGrid& map);
 
 void draw_cells(Canvas& canvas, const View& view, const OccupancyGrid& map,
                 const EvidenceScale& scale);
 
-/// The scale's colour bar, with words for its ends above. Takes 26 pixels above the box and 56
-/// below it.
+/// Draws the scale's colour bar, with words for its ends above. It takes 26 pixels above the box
+/// and 56 below it.
 void draw_evidence_bar(Canvas& canvas, const Box& box, const EvidenceScale& scale);
 
 }  // namespace palpate

@@ -16,12 +16,12 @@ inline constexpr Colour white{1.0, 1.0, 1.0};
 inline constexpr Colour ink{0.13, 0.13, 0.13};
 inline constexpr Colour grey{0.55, 0.55, 0.55};
 
-/// Blue over white to red for t in [-1, 1], beyond which it saturates. Perceived lightness falls
-/// linearly with |t| and equally on both sides, so no colour-blind eye confuses a weak value with a
-/// strong one. NaN is white.
+/// Returns blue over white to red for t in [-1, 1], saturated beyond. Perceived lightness falls
+/// linearly and equally on both sides with |t|, so that no colour-blind eye confuses weak with
+/// strong. NaN is white.
 Colour diverging(double t);
 
-/// Dark violet over teal to yellow for t in [0, 1], beyond which it saturates. Perceived lightness
+/// Returns dark violet over teal to yellow for t in [0, 1], saturated beyond. Perceived lightness
 /// rises linearly with t. NaN is the dark end.
 Colour sequential(double t);
 

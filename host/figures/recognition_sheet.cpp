@@ -36,10 +36,10 @@ constexpr double height_px = bar_top_px + 96.0;
 constexpr double width_px =
     margin_px + 3 * (axis_px + side_px) + 2 * gap_px + identity_labels_px + margin_px;
 
-/// The element squares fade as they shrink, or they would hide the map below a large array.
+/// Element squares fade as they shrink, or they would hide the map below a large array.
 constexpr double opaque_element_px = 80.0;
 constexpr double smallest_element_px = 4.0;
-/// Probabilities this many powers of ten below the largest are still told from zero.
+/// The colour scale spans this many powers of ten below the largest probability.
 constexpr double decades = 6.0;
 
 constexpr Colour alarm{0.75, 0.1, 0.1};
@@ -76,12 +76,12 @@ void draw_title(Canvas& canvas, const Box& plot, std::string_view title) {
   canvas.text(canvas.fit(title, plot.width, heading), {plot.left, top_px - 50.0}, heading);
 }
 
-/// What a panel's marks mean, in a row below its title.
+/// Explains a panel's marks in a row below its title.
 class Legend {
  public:
   Legend(Canvas& canvas, const Box& plot) : canvas_(canvas), x_(plot.left) {}
 
-  /// A mark of this width, drawn by the function around the given point, and its meaning.
+  /// Adds a mark of this width, which draw(centre) draws, and its meaning.
   template <typename Draw>
   void add(double mark_px, const Draw& draw, std::string_view meaning) {
     draw(glm::dvec2(x_ + mark_px / 2, baseline_px - 7.0));
@@ -108,8 +108,8 @@ std::string headline(const RecognitionSheet& sheet) {
   return text;
 }
 
-/// Of the true poses, which are one but for the object's symmetry, the nearest in angle to the
-/// estimate: the one that the pose error compares it with.
+/// Returns the true pose nearest in angle to the estimate, among those that the object's symmetry
+/// makes equal: the pose that the pose error compares with.
 std::optional<Pose> nearest_truth(const RecognitionSheet& sheet) {
   const int symmetry = sheet.map.symmetry;
   if (!sheet.truth || symmetry == 1) {
@@ -127,7 +127,7 @@ std::string meaning_of_truth(const RecognitionSheet& sheet, const std::string& m
   return sheet.map.symmetry == 1 ? meaning : meaning + ", by symmetry";
 }
 
-/// The touches as they lie on the object, where T_object_robot is this.
+/// Returns the touches' footprints in the object frame, given T_object_robot.
 std::vector<Footprint> footprints(const RecognitionSheet& sheet, const Pose& T_object_robot) {
   std::vector<Footprint> result;
   for (const std::vector<glm::dvec2>& elements : sheet.footprints_mm) {
@@ -149,7 +149,7 @@ std::vector<glm::dvec2> pixels(const View& view, const Points& points) {
   return result;
 }
 
-/// A square of the object frame around the map and all touches.
+/// Returns the view of a square of the object frame that holds the map and all touches.
 View view_around(const Box& box, const OccupancyGrid& map,
                  std::initializer_list<const std::vector<Footprint>*> touches) {
   glm::dvec2 lower = lower_edge_mm(map);
@@ -223,7 +223,7 @@ void draw_cross(Canvas& canvas, glm::dvec2 at) {
   }
 }
 
-/// The axis as drawn: one of zero extent is given a width.
+/// Returns the axis's range as drawn: an axis of zero extent gets a width.
 glm::dvec2 shown_range(const Axis& axis) {
   const double half = axis.upper > axis.lower ? 0.0 : 0.5;
   return {axis.lower - half, axis.upper + half};

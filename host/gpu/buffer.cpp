@@ -32,7 +32,7 @@ Buffer::Buffer(Context& context, VkDeviceSize bytes, Memory memory, std::string_
                                      : VK_BUFFER_USAGE_TRANSFER_DST_BIT)};
   check(vkCreateBuffer(device, &info, nullptr, &buffer_), doing);
 
-  // A constructor that throws runs no destructor: this object gives back what it has so far.
+  // A constructor that throws runs no destructor: `owner` frees what exists so far.
   Buffer owner;
   swap(owner);
   VkMemoryRequirements needs;

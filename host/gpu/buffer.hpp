@@ -6,24 +6,24 @@
 
 namespace palpate::gpu {
 
-/// Where a buffer lives. Data always travels through staging memory, also where a device could
-/// map its own: one path for every machine, which the tests on a CPU device exercise too.
+/// The memory of a buffer. Data always passes through staging memory, even where the host could map
+/// the device's memory: all machines run the path that the tests run.
 enum class Memory {
-  device,    ///< storage of kernels; the host cannot see it
-  upload,    ///< host memory, mapped, that the device copies from
-  download,  ///< host memory, mapped, that the device copies to
+  device,    ///< read and written by kernels; the host cannot access it
+  upload,    ///< mapped host memory that the device copies from
+  download,  ///< mapped host memory that the device copies to
 };
 
-/// What a buffer of this many bytes takes of the device's memory, rounded up as drivers do.
+/// Device memory that a buffer of this size takes, in bytes, rounded up as drivers do.
 constexpr VkDeviceSize allocated(VkDeviceSize bytes) { return (bytes + 255) / 256 * 256; }
 
 /// A Vulkan buffer with memory of its own. Move-only.
 class Buffer {
  public:
   Buffer() = default;
-  /// @param purpose what it holds, for the message when memory runs out
-  /// @param texel the format as which kernels read it where they bind it as a table; device memory
-  /// only
+  /// @param purpose what the buffer holds, for the message when memory runs out
+  /// @param texel format of the buffer as a table (Access::table); only for Memory::device
+  /// @throws Error if the device does not have the memory
   Buffer(Context& context, VkDeviceSize bytes, Memory memory, std::string_view purpose,
          VkFormat texel = VK_FORMAT_UNDEFINED);
   Buffer(Buffer&& other) noexcept { swap(other); }
@@ -34,7 +34,7 @@ class Buffer {
   ~Buffer();
 
   VkBuffer handle() const { return buffer_; }
-  /// Null without a texel format.
+  /// The view that binds the buffer as a table; null without a texel format.
   VkBufferView table() const { return table_; }
   VkDeviceSize bytes() const { return bytes_; }
   /// Start of the mapped memory; null for Memory::device.

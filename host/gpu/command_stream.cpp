@@ -17,7 +17,7 @@ namespace {
 constexpr std::uint32_t sets_per_pool = 64;
 constexpr VkDeviceSize staging_block = CommandStream::staging_bytes / 2;
 
-/// Copies start at multiples of 16 bytes.
+/// Staging memory that a copy takes: copies start at multiples of 16 bytes.
 VkDeviceSize staged(VkDeviceSize bytes) { return (bytes + 15) / 16 * 16; }
 
 }  // namespace
@@ -100,7 +100,7 @@ std::size_t CommandStream::stage(Arena& arena, std::size_t bytes) {
   if (arena.block.bytes() == 0) {
     arena.block = Buffer(context_, staging_block, arena.memory, "staging");
   }
-  // A small copy is not worth two pieces.
+  // Small copies are not split in two.
   const VkDeviceSize room = staging_block - arena.used;
   if (room < std::min<VkDeviceSize>(bytes, staging_block / 4)) {
     run_recorded();
@@ -244,7 +244,7 @@ void CommandStream::run_recorded() {
 }
 
 void CommandStream::submit() {
-  // What the device wrote into staging memory must be visible to the host after the fence.
+  // Makes the device's writes to staging memory visible to the host after the fence.
   const VkMemoryBarrier to_host{.sType = VK_STRUCTURE_TYPE_MEMORY_BARRIER,
                                 .srcAccessMask = VK_ACCESS_TRANSFER_WRITE_BIT,
                                 .dstAccessMask = VK_ACCESS_HOST_READ_BIT};

@@ -11,14 +11,13 @@
 
 namespace palpate::gpu {
 
-/// Records copies and dispatches, then runs them in order. Every command sees the results of all
-/// commands before it: the one barrier function stands between any two. Staging memory does not
-/// grow with what is copied: where it is full, a copy first runs what was recorded. A call that
-/// throws drops everything recorded and not yet run, so that no later one meets what its caller has
-/// freed.
+/// Records copies and dispatches, then runs them in order. A barrier stands between any two
+/// commands, so that each sees the results of all before it. Staging memory has a fixed size: a
+/// copy that finds it full first runs the recorded commands. A call that throws drops all recorded
+/// commands, so that no later run uses a buffer that the caller has freed meanwhile.
 class CommandStream {
  public:
-  /// Most staging memory, both directions together, in bytes.
+  /// Size of the staging memory, both directions together, in bytes.
   static constexpr VkDeviceSize staging_bytes = 8 << 20;
 
   explicit CommandStream(Context& context);
@@ -26,17 +25,17 @@ class CommandStream {
   CommandStream(const CommandStream&) = delete;
   CommandStream& operator=(const CommandStream&) = delete;
 
-  /// Copies the values to the buffer, starting at a byte offset. They are read at once.
+  /// Copies the values to the buffer, from byte `offset` on. Reads `values` before it returns.
   template <typename T>
   void upload(const Buffer& target, std::span<const T> values, VkDeviceSize offset = 0) {
     upload_bytes(target, std::as_bytes(values), offset);
   }
-  /// Copies from the buffer into `values`, which run() fills: they must live until then.
+  /// Copies from the buffer, from byte `offset` on. `values` must live until run() fills them.
   template <typename T>
   void download(const Buffer& source, std::span<T> values, VkDeviceSize offset = 0) {
     download_bytes(source, std::as_writable_bytes(values), offset);
   }
-  /// Sets every 32-bit word of the buffer.
+  /// Sets every 32-bit word of the buffer to `word`.
   void fill(const Buffer& target, std::uint32_t word);
 
   /// Runs a kernel, with a buffer for each of its bindings, on groups[0] x groups[1] x groups[2]
@@ -52,7 +51,7 @@ class CommandStream {
   /// Submits everything recorded, waits for it and delivers the downloads.
   void run();
 
-  /// Time that the device spent on everything up to the last run(), in seconds.
+  /// Time that the device took for all commands of the last run(), in seconds.
   double device_seconds() const { return device_seconds_; }
 
  private:
@@ -61,20 +60,20 @@ class CommandStream {
     const std::byte* source;
     std::size_t bytes;
   };
-  /// Staging memory of one direction, taken from front to back and reused after every run.
+  /// Staging memory of one direction, filled from front to back and reused after every run.
   struct Arena {
     Memory memory;
     Buffer block;
     VkDeviceSize used = 0;
   };
 
-  /// Makes room for a copy of up to `bytes`, at least one, at arena.used, and says how many fit.
+  /// Makes room at arena.used for a copy. Returns how many of its `bytes` fit, at least one.
   std::size_t stage(Arena& arena, std::size_t bytes);
   void upload_bytes(const Buffer& target, std::span<const std::byte> bytes, VkDeviceSize offset);
   void download_bytes(const Buffer& source, std::span<std::byte> bytes, VkDeviceSize offset);
   void dispatch_bytes(const Kernel& kernel, std::span<const Buffer* const> buffers,
                       std::span<const std::byte> push, std::array<std::uint32_t, 3> groups);
-  /// Calls `commands` to add to the recording; see above for when that throws.
+  /// Calls `commands`, which add to the recording. Drops the recording if they throw.
   template <typename Commands>
   void record(const Commands& commands);
   void begin();
@@ -98,7 +97,7 @@ class CommandStream {
   std::vector<Download> downloads_;
   bool recording_ = false;
   double device_seconds_ = 0.0;
-  double seconds_before_run_ = 0.0;  ///< of what ran because staging memory was full
+  double seconds_before_run_ = 0.0;  ///< device time since the last run()
 };
 
 }  // namespace palpate::gpu

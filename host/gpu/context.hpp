@@ -13,11 +13,11 @@
 
 namespace palpate::gpu {
 
-/// What Vulkan's validation layer said, collected from its callback.
+/// Collects the messages of Vulkan's validation layer.
 class ValidationLog {
  public:
   void add(std::string message);
-  /// Throws Error with the first message, if there is any.
+  /// @throws Error with the first message, if there is any
   void throw_if_any();
   bool empty();
 
@@ -26,7 +26,7 @@ class ValidationLog {
   std::vector<std::string> messages_;
 };
 
-/// A Vulkan instance; with PALPATE_VALIDATION=1 in the environment the validation layer is on.
+/// A Vulkan instance. PALPATE_VALIDATION=1 in the environment turns the validation layer on.
 class Instance {
  public:
   Instance();
@@ -43,34 +43,34 @@ class Instance {
   ValidationLog validation_;
 };
 
-/// Iterations that all loops of a kernel together may take in one invocation. lavapipe ends loops
-/// after 65,535 iterations without a word; half of that leaves room for outer loops.
+/// Most iterations of all loops in one invocation of a kernel. The driver lavapipe silently ends
+/// loops after 65,535 iterations; half of this number leaves room for outer loops.
 inline constexpr std::uint32_t most_iterations = 1 << 15;
 
-/// Device limits that sizes are planned by.
+/// Limits of the device for the sizes of buffers, workgroups and dispatches.
 struct Limits {
-  std::uint32_t group_invocations = 0;  ///< of one workgroup
+  std::uint32_t group_invocations = 0;  ///< invocations of one workgroup
   std::uint32_t group_size[3] = {};     ///< invocations of one workgroup along each dimension
-  std::uint32_t shared_bytes = 0;       ///< memory that the invocations of a workgroup share
-  std::uint32_t subgroup = 0;           ///< invocations that run in step
-  VkDeviceSize storage_range = 0;       ///< bytes of one storage-buffer binding
-  VkDeviceSize allocation = 0;          ///< bytes of one allocation
-  std::uint32_t table_texels = 0;       ///< elements of one texel buffer
-  bool cpu = false;                     ///< a few cores that a few workgroups fill
-  VkDeviceSize memory = 0;              ///< bytes of the largest heap of device memory
-  std::uint32_t group_count[3] = {};
-  std::uint32_t push_bytes = 0;
-  std::uint64_t timestamp_mask = 0;  ///< the bits of a timestamp that count
-  float timestamp_ns = 0.0F;         ///< 0 where the queue has no timestamps
+  std::uint32_t shared_bytes = 0;       ///< shared memory of one workgroup, in bytes
+  std::uint32_t subgroup = 0;           ///< invocations that run in lockstep
+  VkDeviceSize storage_range = 0;       ///< size of one storage-buffer binding, in bytes
+  VkDeviceSize allocation = 0;          ///< size of one allocation, in bytes
+  std::uint32_t table_texels = 0;       ///< texels of one texel buffer
+  bool cpu = false;                     ///< the device is a CPU, whose cores a few workgroups fill
+  VkDeviceSize memory = 0;              ///< size of the largest heap of device memory, in bytes
+  std::uint32_t group_count[3] = {};    ///< workgroups of one dispatch along each dimension
+  std::uint32_t push_bytes = 0;         ///< size of the push constants, in bytes
+  std::uint64_t timestamp_mask = 0;     ///< the valid bits of a timestamp
+  float timestamp_ns = 0.0F;            ///< ns per tick; 0 if the queue has no timestamps
 };
 
-/// Memory that buffers hold, staging included, in bytes.
+/// Memory of all buffers of a device, staging included, in bytes.
 struct MemoryUse {
   VkDeviceSize now = 0;
   VkDeviceSize peak = 0;
 };
 
-/// A logical device with one compute queue.
+/// A logical device with one compute queue, opened as Device::open() says.
 class Context {
  public:
   explicit Context(std::string_view name_or_index);
@@ -84,17 +84,17 @@ class Context {
   const std::string& name() const { return name_; }
   const Limits& limits() const { return limits_; }
   ValidationLog& validation() { return instance_.validation(); }
-  /// Plans by limits below the device's own, so that a test reaches on any device what only much
-  /// smaller devices or much larger problems would.
+  /// Lowers the limits, so that a test on any device reaches the cases of much smaller devices and
+  /// much larger problems.
   void lower_limits(const Limits& limits) { limits_ = limits; }
 
   const MemoryUse& memory_use() const { return memory_use_; }
-  /// Called by buffers as they take memory and give it back.
+  /// Counts memory; buffers call this pair when they allocate memory and when they free it.
   void take_memory(VkDeviceSize bytes);
   void give_memory(VkDeviceSize bytes) { memory_use_.now -= bytes; }
 
-  /// The first memory type allowed by `type_bits` that has all of `flags`.
-  /// Throws Error where there is none.
+  /// The first memory type in `type_bits` that has all of `flags`, and if possible all of
+  /// `preferred`. @throws Error if no type has all of `flags`
   std::uint32_t memory_type(std::uint32_t type_bits, VkMemoryPropertyFlags flags,
                             VkMemoryPropertyFlags preferred) const;
 

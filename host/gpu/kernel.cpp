@@ -22,7 +22,7 @@ Kernel::Kernel(Context& context, const KernelInfo& info) {
                                            "than the device has",
                                            doing, info.push_bytes, info.bindings.size()));
   }
-  // A constructor that throws runs no destructor: `owner` gives back what it has so far.
+  // A constructor that throws runs no destructor: `owner` frees what exists so far.
   Kernel owner;
   owner.device_ = context.device();
   owner.bindings_.assign(info.bindings.begin(), info.bindings.end());

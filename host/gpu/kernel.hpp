@@ -10,26 +10,26 @@ namespace palpate::gpu {
 
 /// How a kernel reaches a buffer.
 enum class Access {
-  table,    ///< reads it as a texel buffer: the fast way on every device for what is not written
+  table,    ///< reads it as a texel buffer, on every device the fastest way to read
   storage,  ///< reads and writes it as a storage buffer
 };
 
 VkDescriptorType descriptor_type(Access access);
 
-/// A compute shader ready to run. Binding i of set 0 is bindings[i].
+/// A compiled compute shader and its interface. bindings[i] describes binding i of set 0.
 struct KernelInfo {
   const char* name = "";
   std::span<const std::uint32_t> spirv;
   std::span<const Access> bindings;
   std::uint32_t push_bytes = 0;
-  std::span<const std::uint32_t> constants = {};  ///< specialization constants 0, 1, ... as bits
+  std::span<const std::uint32_t> constants = {};  ///< bits of specialization constants 0, 1, ...
 };
 
 /// A compute pipeline with its layouts. Move-only.
 class Kernel {
  public:
   Kernel() = default;
-  /// @throws Error where the device's limits do not allow the kernel
+  /// @throws Error if the device's limits do not allow the kernel
   Kernel(Context& context, const KernelInfo& info);
   Kernel(Kernel&& other) noexcept { swap(other); }
   Kernel& operator=(Kernel&& other) noexcept {

@@ -6,7 +6,8 @@
 
 namespace palpate::gpu {
 
-/// Throws Error (Fault::system) unless the result is VK_SUCCESS; `doing` says what was tried.
+/// @param doing what was tried, for the message
+/// @throws Error (Fault::system) unless the result is VK_SUCCESS
 void check(VkResult result, std::string_view doing);
 
 }  // namespace palpate::gpu

@@ -40,7 +40,7 @@ std::string version_text(std::uint32_t version) {
                      VK_API_VERSION_PATCH(version));
 }
 
-/// A queue family for compute, one without graphics first: it does not wait for a desktop.
+/// A compute queue family, if possible without graphics, so that it does not wait for a desktop.
 std::optional<std::uint32_t> compute_family(VkPhysicalDevice physical) {
   std::uint32_t count = 0;
   vkGetPhysicalDeviceQueueFamilyProperties(physical, &count, nullptr);
@@ -151,14 +151,14 @@ void choose(std::span<Candidate> candidates, std::string_view name_or_index) {
       candidate.info.reason =
           candidate.rank == best->rank
               ? fmt::format("as good as device {}, which comes first", best->info.index)
-              : fmt::format("ranks behind device {}: discrete, integrated, virtual, CPU",
+              : fmt::format("ranks behind device {} (discrete, integrated, virtual, CPU)",
                             best->info.index);
     }
   }
   best->info.chosen = true;
   best->info.reason = name_or_index.empty()
                           ? "the best usable device"
-                          : fmt::format("the best that matches '{}'", name_or_index);
+                          : fmt::format("the best device that matches '{}'", name_or_index);
 }
 
 std::vector<Candidate> candidates(VkInstance instance, std::string_view name_or_index) {
@@ -190,7 +190,7 @@ const Candidate& chosen(std::span<const Candidate> candidates, std::string_view 
     reasons += fmt::format("{}{} '{}' {}", reasons.empty() ? "" : "; ", candidate.info.index,
                            candidate.info.name, candidate.info.reason);
   }
-  // A wish that no device fits is the caller's; a machine without a usable device is not.
+  // A name that no device matches is the user's fault, a machine without usable device is not.
   if (name_or_index.empty()) {
     throw Error(Fault::system, fmt::format("no usable Vulkan device: {}", reasons));
   }

@@ -11,10 +11,10 @@
 
 namespace palpate::gpu {
 
-/// Most buffers that one kernel binds. Every device takes 4 storage buffers and 16 tables.
+/// Most buffers that one kernel binds. Vulkan guarantees 4 storage buffers and 16 texel buffers.
 inline constexpr std::uint32_t max_bindings = 7;
 
-/// A physical device with what speaks for or against it.
+/// A physical device, how good it is, and why it is chosen or not.
 struct Candidate {
   VkPhysicalDevice physical = VK_NULL_HANDLE;
   std::uint32_t queue_family = 0;
@@ -22,20 +22,20 @@ struct Candidate {
   DeviceInfo info;
 };
 
-/// The wish, or where there is none, that of PALPATE_DEVICE in the environment.
+/// The device that the user wants: `name_or_index` or, if empty, PALPATE_DEVICE in the environment.
 std::string wished(std::string_view name_or_index);
 
-/// Every physical device of the instance. One of the usable ones is marked as chosen, if any fits
-/// the wish: an index, a part of a name (case ignored), or nothing for the best.
+/// Lists every physical device of the instance and marks the best usable device as chosen: among
+/// all devices, or among the devices with this index or this part of the name (case ignored).
 std::vector<Candidate> candidates(VkInstance instance, std::string_view name_or_index);
 
 /// Bytes of the largest heap of device memory.
 VkDeviceSize device_memory(const VkPhysicalDeviceMemoryProperties& memory);
 
-/// Marks the one to open and says in `reason` why it, or why not.
+/// Marks the candidate to open, and gives every candidate the `reason` for or against it.
 void choose(std::span<Candidate> candidates, std::string_view name_or_index);
 
-/// The chosen candidate. Throws Error naming every device and its reason when there is none.
+/// The chosen candidate. @throws Error naming every device and its reason if no device is chosen
 const Candidate& chosen(std::span<const Candidate> candidates, std::string_view name_or_index);
 
 }  // namespace palpate::gpu

@@ -26,15 +26,16 @@ std::filesystem::path folder_of(const std::filesystem::path& target) {
   return target.has_parent_path() ? target.parent_path() : ".";
 }
 
-// A link stays a link: what it points to is replaced.
+// A link stays a link; the file that it points to is replaced.
 std::filesystem::path file_behind(const std::filesystem::path& target) {
   std::error_code ignored;
   return std::filesystem::is_regular_file(target, ignored) ? std::filesystem::canonical(target)
                                                            : target;
 }
 
-// A name in the target's folder that `make` has put there, of its own and not the target's with a
-// suffix, which might be too long for the file system; empty, with errno, where `make` fails.
+// Calls `make` with names in the target's folder until one is new. The name does not extend the
+// target's, which might be too long for the file system. Returns it; empty, with errno, where
+// `make` fails.
 template <typename Make>
 std::filesystem::path make_beside(const std::filesystem::path& target, const char* suffix,
                                   const Make& make) {
@@ -109,7 +110,7 @@ void AtomicFile::commit() {
     fail(target_, "rename the finished file to it");
   }
   temporary_.clear();
-  // Makes the new name last through a power cut; file systems that cannot do it may refuse.
+  // The new name lasts through a power cut; file systems that cannot sync a folder may refuse.
   const Descriptor folder(folder_of(target_), O_RDONLY | O_DIRECTORY);
   if (folder.valid()) {
     ::fsync(folder.get());
@@ -140,7 +141,7 @@ void OlderFile::restore() {
   } else {
     throw Error(
         Fault::system,
-        fmt::format("{}: cannot become the older file again: {}; find that as {}", target_.string(),
+        fmt::format("{}: the older file cannot be put back: {}; it is kept as {}", target_.string(),
                     std::strerror(errno), std::exchange(kept_, {}).string()));
   }
 }

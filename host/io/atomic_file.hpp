@@ -6,8 +6,8 @@
 namespace palpate {
 
 /// An output file that appears whole or not at all. It is written under a temporary name in the
-/// target's folder, so that commit() can rename it into place; without commit() it is removed and
-/// an older file at the target stays as it was.
+/// target's folder; commit() renames it into place. Without commit() it is removed, and an older
+/// file at the target stays.
 class AtomicFile {
  public:
   /// Creates the empty temporary file.
@@ -31,12 +31,11 @@ class AtomicFile {
   std::filesystem::path temporary_;  ///< empty once committed
 };
 
-/// What stands under an output's name, kept until the new file is known to be wanted: under a name
-/// of its own in the same folder, as another name of the same file. A process that is killed
-/// leaves both files.
+/// Keeps the older file under an output's name until the new one is known to be wanted, as a hard
+/// link in the same folder. A killed process leaves both files.
 class OlderFile {
  public:
-  /// @param target a file that an AtomicFile may replace; there may be none
+  /// @param target a file that an AtomicFile may replace; it need not exist
   /// @throws Error (Fault::input) where the older file cannot be kept, as on a file system without
   /// hard links
   explicit OlderFile(const std::filesystem::path& target);
@@ -45,10 +44,10 @@ class OlderFile {
   OlderFile(const OlderFile&) = delete;
   OlderFile& operator=(const OlderFile&) = delete;
 
-  /// Takes the new file away, if there is one, and leaves what was there before.
-  /// @throws Error (Fault::system) where the disk refuses; it names the file that was kept
+  /// Removes the new file, if any, and puts the older one back.
+  /// @throws Error (Fault::system) where the disk refuses; the message names the file that was kept
   void restore();
-  /// The new file stays.
+  /// Keeps the new file and drops the older one.
   void let_go();
 
  private:

@@ -16,7 +16,7 @@ namespace palpate {
 
 namespace {
 
-/// The beginning of a file of the kernel's; "" where it is not there.
+/// Returns the beginning of a kernel file; "" where it does not exist.
 std::string text_of(const char* path) {
   const Descriptor file(path, O_RDONLY);
   std::string text(8192, '\0');
@@ -25,7 +25,7 @@ std::string text_of(const char* path) {
   return text;
 }
 
-/// The whole number after `key` and blanks.
+/// Returns the whole number after `key` and blanks.
 std::optional<std::uint64_t> number_after(const std::string& text, std::string_view key) {
   const std::size_t found = text.find(key);
   if (found == text.npos) {
@@ -43,7 +43,7 @@ std::uint64_t left_of(std::uint64_t most, std::uint64_t used) {
   return most > used ? most - used : 0;
 }
 
-/// Of the machine: what can be had without swapping, and the swap.
+/// Memory of the machine: what it gives without swapping, and its free swap.
 std::uint64_t of_machine() {
   const std::string text = text_of("/proc/meminfo");
   const auto available = number_after(text, "MemAvailable:");
@@ -52,7 +52,7 @@ std::uint64_t of_machine() {
   return available ? (*available + swap.value_or(0)) * kib : UINT64_MAX;
 }
 
-/// Of the control group, as a container sees its own (versions 2 and 1).
+/// Memory that the control group leaves, as a container sees its own (versions 2 and 1).
 std::uint64_t of_control_group() {
   constexpr const char* files[][3] = {
       {"/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory.current", "/sys/fs/cgroup/memory.stat"},
@@ -62,7 +62,7 @@ std::uint64_t of_control_group() {
     const auto most = number_after(text_of(most_file), "");
     const auto used = number_after(text_of(used_file), "");
     if (most && used) {
-      // Pages of files count as used, but are given up for others.
+      // Cached file pages count as used, but the kernel gives them up.
       const auto files_held = number_after(text_of(stat_file), "inactive_file ");
       return left_of(*most, left_of(*used, files_held.value_or(0)));
     }
@@ -70,7 +70,7 @@ std::uint64_t of_control_group() {
   return UINT64_MAX;
 }
 
-/// Of a limit of this process; the field of its status says how much of it is used.
+/// Memory that a limit of this process leaves; the field of its status says how much is used.
 std::uint64_t of_limit(__rlimit_resource resource, const char* status_key) {
   rlimit present{};
   if (::getrlimit(resource, &present) != 0 || present.rlim_cur == RLIM_INFINITY) {

@@ -6,13 +6,13 @@
 
 namespace palpate {
 
-/// Bytes of memory that this process can still be given: by the machine, swap included, by its
-/// control group and by its own limits.
+/// Returns the memory in bytes that this process can still get: the least of what the machine (swap
+/// included), its control group and its own limits leave.
 std::uint64_t available_memory_bytes();
 
-/// Throws Error (Fault::system), "<path>: <what> needs ... GB of memory", where there are fewer
-/// bytes. Called before they are allocated: where memory is overcommitted, no allocation fails and
-/// the system ends a process instead.
+/// Throws Error (Fault::system), "<path>: <what> needs ... GB of memory", where fewer than `bytes`
+/// are available. Call it before allocating: where memory is overcommitted, no allocation fails,
+/// and the system kills a process instead.
 void require_memory(const std::filesystem::path& path, std::string_view what, std::uint64_t bytes);
 
 }  // namespace palpate

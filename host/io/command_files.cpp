@@ -16,16 +16,17 @@ namespace palpate {
 
 namespace {
 
-/// What tells two files apart: their identities, or their paths where there is no file yet.
+/// Identity of a file; its path where it does not exist yet.
 using Place = std::pair<FileIdentity, std::filesystem::path>;
 
-/// None for what cannot be overwritten, such as a terminal.
+/// Returns none for what cannot be overwritten, such as a terminal.
 std::optional<Place> place_of(const std::filesystem::path& file, std::optional<int> stream) {
   struct stat status {};
   const bool found = stream ? ::fstat(*stream, &status) == 0 : ::stat(file.c_str(), &status) == 0;
   if (!found) {
     std::error_code ignored;
-    // Absolute first: what exists of a relative path may be nothing, and then it stays as it is.
+    // Absolute first: weakly_canonical() leaves a relative path as it is where no part of it
+    // exists.
     return Place{
         {}, std::filesystem::weakly_canonical(std::filesystem::absolute(file, ignored), ignored)};
   }
@@ -60,7 +61,7 @@ void CommandFiles::writes(const std::string& flag, const std::filesystem::path& 
 }
 
 void CommandFiles::require_distinct() const {
-  // Every file so far, with what becomes of it.
+  // Every file so far, with its flag and use.
   std::map<Place, std::pair<const Named*, const char*>> taken;
   for (const Named& input : read_) {
     if (const auto place =

@@ -6,24 +6,23 @@
 
 namespace palpate {
 
-/// The files that a command line names, each with the flag that names it. None that is written may
-/// be one that is read, or one that is written besides: a link, another spelling of the path or
-/// another name of the same file does not hide that.
+/// Refuses command lines that write a file which they also read, or write twice, even under another
+/// path, a symbolic link or a hard link. Holds each file with the flag that names it.
 class CommandFiles {
  public:
-  /// What "-" names: a file called so, or standard input or output.
+  /// Whether "-" names a file called "-", or standard input or output.
   enum class Dash { file, stream };
 
   /// Adds a file that the command reads.
-  /// @throws Error (Fault::input) where it is standard input, and closed
+  /// @throws Error (Fault::input) where it is standard input, which is closed
   void reads(const std::string& flag, const std::filesystem::path& file, Dash dash = Dash::file);
   /// Adds a file that the command writes, which need not exist.
-  /// @throws Error (Fault::input) where it is standard output, and closed
+  /// @throws Error (Fault::input) where it is standard output, which is closed
   void writes(const std::string& flag, const std::filesystem::path& file, Dash dash = Dash::file);
 
-  /// To be called before the work, which may take hours, and before anything is written. Compares
-  /// existing regular files and FIFOs by device and inode, files to come by their paths. Terminals
-  /// and other devices may be read and written at once.
+  /// Compares existing regular files and FIFOs by device and inode, others by their paths.
+  /// Terminals and other devices may be both read and written. Call it before the work, which may
+  /// take hours, and before anything is written.
   /// @throws Error (Fault::input) naming both flags and both files
   void require_distinct() const;
 

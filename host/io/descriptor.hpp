@@ -8,13 +8,12 @@
 
 namespace palpate {
 
-/// Owns an open file of the operating system. Its number is never 0, 1 or 2: where a daemon has
-/// closed those, whatever the process prints would go into the file.
+/// Owns an open file descriptor other than 0, 1 and 2: where a daemon has closed these, whatever
+/// the process prints would go into the file.
 class Descriptor {
  public:
   Descriptor() = default;
-  /// Takes over an open descriptor, which is closed on the program's exec; a negative one stays
-  /// invalid and leaves errno as it is.
+  /// Takes over an open close-on-exec descriptor; a negative one stays invalid and keeps errno.
   explicit Descriptor(int descriptor);
   /// Opens a file; invalid, with errno, where that fails.
   Descriptor(const std::filesystem::path& path, int flags, mode_t mode = 0);
@@ -32,8 +31,8 @@ class Descriptor {
   int descriptor_ = -1;
 };
 
-/// While this lives, the descriptors 0, 1 and 2 are taken, so that a library which opens a file by
-/// its name is given none of them.
+/// Occupies the descriptors 0, 1 and 2 while it lives, so that a library that opens a file by name
+/// gets none of them.
 class StandardDescriptorsTaken {
  public:
   StandardDescriptorsTaken();

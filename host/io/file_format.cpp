@@ -8,7 +8,7 @@ namespace palpate {
 
 namespace {
 
-// What each kind of file is called and where it is wanted.
+// Name of a kind of file and the command that takes it.
 struct Kind {
   std::string_view format;
   const char* name;

@@ -9,10 +9,10 @@ namespace palpate {
 inline constexpr std::string_view recording_format = "palpate.recording";
 inline constexpr std::string_view map_format = "palpate.map";
 inline constexpr std::string_view posterior_format = "palpate.posterior";
-/// Of every format; readers refuse a higher one.
+/// Version of every format; readers refuse a higher version.
 inline constexpr int format_version = 1;
 
-/// Throws Error unless the attributes `format` and `version` say that this is such a file.
+/// Throws Error unless the attributes `format` and `version` name this format.
 void require_format(const Hdf5Contents& file, std::string_view format);
 
 }  // namespace palpate

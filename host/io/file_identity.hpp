@@ -22,7 +22,7 @@ inline FileIdentity identity_of(const struct stat& status) {
   return {.device = status.st_dev, .inode = status.st_ino};
 }
 
-/// None where there is no such file.
+/// Returns none where the file does not exist.
 inline std::optional<FileIdentity> identity_of(const std::filesystem::path& file) {
   struct stat status {};
   return ::stat(file.c_str(), &status) == 0 ? std::optional(identity_of(status)) : std::nullopt;

@@ -9,8 +9,8 @@
 
 namespace palpate {
 
-// What can be said of a file without holding it: each function reads all of the file in pieces,
-// holds a few MB, and throws Error as the file's reader does.
+// Summaries of files. Each function reads the whole file in pieces, holds a few MB of it, and
+// throws Error as the file's reader does.
 
 /// The smallest and the largest of some numbers.
 struct Extremes {
@@ -19,14 +19,14 @@ struct Extremes {
 };
 
 struct RecordingSummary {
-  Recording head;  ///< without rows; see Recording for the rest
+  Recording head;  ///< the recording without its rows
   std::uint64_t rows = 0;
   std::uint64_t elements = 0;
   bool array_changes = false;
-  std::optional<Extremes> pressure;    ///< of elements that are alive, where they are known
-  std::uint64_t unknown_readings = 0;  ///< NaN, of elements that are alive
+  std::optional<Extremes> pressure;    ///< known readings of living elements
+  std::uint64_t unknown_readings = 0;  ///< NaN readings of living elements
   std::optional<double> elapsed_s;     ///< from the first row to the last, see StreamTime
-  std::optional<std::uint64_t> lost;   ///< frames that were lost, where the file counts them
+  std::optional<std::uint64_t> lost;   ///< lost frames, where the file counts them
   std::uint64_t with_pose = 0;
 };
 RecordingSummary summarize_recording(const std::filesystem::path& path);

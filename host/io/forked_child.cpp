@@ -31,8 +31,8 @@ using namespace std::chrono_literals;
                           action, std::strerror(errno)));
 }
 
-/// Private writable memory of this process, as RLIMIT_DATA counts it; none where the system does
-/// not tell.
+/// Returns the private writable memory of this process, as RLIMIT_DATA counts it; none where the
+/// system does not tell.
 std::optional<std::uint64_t> data_bytes() {
   char text[256] = {};
   const Descriptor statm("/proc/self/statm", O_RDONLY);
@@ -51,7 +51,7 @@ std::optional<std::uint64_t> data_bytes() {
   return pages[5] * static_cast<std::uint64_t>(::sysconf(_SC_PAGESIZE));
 }
 
-/// A soft limit: the child raises it as it comes to know what it has to read.
+/// Sets a soft limit, which the child raises as it learns what it has to read.
 void limit(__rlimit_resource resource, std::uint64_t most) {
   rlimit present{};
   if (::getrlimit(resource, &present) == 0) {
@@ -61,8 +61,8 @@ void limit(__rlimit_resource resource, std::uint64_t most) {
 }
 
 [[noreturn]] void run_child(const ForkedChild::Work& work, int socket, const ForkedLimits& limits) {
-  // Handlers of the embedding program must not see this child's crash, nor its mask keep the
-  // signal of a limit away.
+  // The embedding program's handlers must not see this child's crash, and its signal mask must not
+  // block the signals of the limits.
   sigset_t fatal;
   sigemptyset(&fatal);
   for (const int signal : {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT, SIGPIPE, SIGXCPU}) {
@@ -86,7 +86,7 @@ void limit(__rlimit_resource resource, std::uint64_t most) {
   ::_exit(0);
 }
 
-/// Waits until there is something to read. Time is counted in waits that brought nothing, not by a
+/// Waits until there is something to read. Time is counted in waits without an answer, not by a
 /// clock: a process that was stopped for an hour has not waited for an hour.
 bool wait_for_answer(int socket, std::chrono::milliseconds silence) {
   while (silence > 0ms) {
@@ -109,7 +109,7 @@ bool wait_for_answer(int socket, std::chrono::milliseconds silence) {
 
 ForkedChild::ForkedChild(const Work& work, const ForkedLimits& limits, std::mutex& held)
     : silence_(limits.silence) {
-  // Other children of this class are not forked meanwhile, and so do not keep the socket open.
+  // No other child of this class is forked meanwhile and keeps the socket open.
   const std::lock_guard lock(held);
   int ends[2];
   if (::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends) != 0) {
@@ -131,12 +131,13 @@ ForkedChild::ForkedChild(const Work& work, const ForkedLimits& limits, std::mute
 }
 
 ForkedChild::~ForkedChild() {
-  // Still this child, and not one that took its number after somebody else waited for it.
+  // 0: the child still runs. Otherwise somebody has waited for it, and its number may belong to
+  // another process.
   if (::waitpid(pid_, nullptr, WNOHANG) != 0) {
     return;
   }
   ::kill(pid_, SIGKILL);
-  // A child that a dead disk holds in the kernel ends when the disk lets go, not now.
+  // A child that a dead disk holds in the kernel ends only when the disk lets go.
   constexpr int patience_ms = 2000;
   pollfd gone{.fd = socket_.get(), .events = 0, .revents = 0};
   const int options = ::poll(&gone, 1, patience_ms) == 0 ? WNOHANG : 0;
@@ -210,7 +211,7 @@ void allow_cpu_seconds(std::uint64_t seconds) {
 }
 
 void allow_memory_bytes(std::uint64_t bytes) {
-  // Without it, a limit might be less than what the process has.
+  // Without the present size, the limit might be below what the process holds.
   if (const std::optional<std::uint64_t> held = data_bytes()) {
     limit(RLIMIT_DATA, bytes < UINT64_MAX - *held ? *held + bytes : UINT64_MAX);
   }

@@ -27,9 +27,9 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-// A quarter of what may be lost: a pause of the machine fits in as well.
+// A quarter of the second that may be lost, to leave time for a pause of the machine.
 constexpr double flush_interval_s = 0.25;
-// Frames replayed at full speed must not pile up between two flushes.
+// Bounds the memory of frames replayed at full speed between two flushes.
 constexpr std::size_t most_pending_values = 1 << 20;
 
 constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
@@ -46,7 +46,7 @@ struct Rows {
   void clear() { *this = {}; }
 };
 
-// What a recording says besides its rows.
+// Returns the recording without its rows.
 Recording head_of(const SensorDescription& sensor) {
   Recording head;
   head.rows = "frames";
@@ -56,7 +56,7 @@ Recording head_of(const SensorDescription& sensor) {
   head.valid = sensor.valid;
   head.baseline = sensor.baseline;
   head.truth = sensor.truth;
-  // What a board says of itself may be anything; no reader takes that.
+  // A board may send any bytes; readers refuse those that are not printable.
   head.sensor = printable(sensor.name);
   head.serial = printable(sensor.serial);
   return head;
@@ -82,7 +82,7 @@ struct FrameRecorder::Impl {
   std::filesystem::path path;
   SensorDescription sensor;
   bool baseline_follows = false;
-  bool has_baseline = false;  // the file, as it has the next
+  bool has_baseline = false;  // the file has space for it
   bool has_device_time = false;
   bool failed = false;
   Rows pending;
@@ -90,7 +90,7 @@ struct FrameRecorder::Impl {
   std::uint64_t saved = 0;
   std::uint64_t frames = 0;
   std::uint64_t lost = 0;
-  std::uint64_t lost_since = 0;  // with the next frame
+  std::uint64_t lost_since = 0;  // before the next frame
   std::uint64_t unreadable = 0;
   std::uint64_t with_pose = 0;
   std::uint64_t unknown_readings = 0;
@@ -119,7 +119,7 @@ void FrameRecorder::Impl::require_recordable() const {
 
 bool FrameRecorder::Impl::due() const {
   return pending.pressure.size() >= most_pending_values ||
-         // By the stream's own time too: a late reader catches up faster than the clock runs.
+         // Also by the stream's own time: a late reader catches up faster than the clock runs.
          std::abs(pending.time_s.back() - pending.time_s.front()) >= flush_interval_s ||
          std::chrono::duration<double>(Clock::now() - oldest_pending).count() >= flush_interval_s;
 }
@@ -138,9 +138,9 @@ void FrameRecorder::Impl::save() {
   pending.clear();
 }
 
-// The first rows make a whole file, which is opened for more and then appears under its name:
-// whenever the recorder is killed, there is no file or a readable one, and whoever sees the file
-// while it is recorded sees that it is.
+// Writes the first rows as a whole file, opens it for more, and then gives it its name: whenever
+// the recorder is killed, there is no file or a readable one, and a reader can always tell that the
+// file is being recorded.
 void FrameRecorder::Impl::create() {
   const std::size_t n = pending.size();
   const std::size_t e = sensor.elements_mm.size();
@@ -187,7 +187,7 @@ void FrameRecorder::Impl::create() {
     try {
       out.save([&](const std::filesystem::path& finished) { open(finished); });
     } catch (...) {
-      // The file has never been there.
+      // The file never appears.
       if (file.valid()) {
         give_up_hdf5_file(file.get());
       }
@@ -206,7 +206,7 @@ void FrameRecorder::Impl::open(const std::filesystem::path& finished) {
     const StandardDescriptorsTaken taken;
     file = {H5Fopen(finished.c_str(), H5F_ACC_RDWR | H5F_ACC_SWMR_WRITE, access.get()), H5Fclose};
   }
-  // HDF5 holds its own lock only while it opens a file that may be read meanwhile.
+  // HDF5 locks a file with SWMR only while it opens it.
   if (void* descriptor = nullptr; H5Fget_vfd_handle(file.get(), H5P_DEFAULT, &descriptor) >= 0) {
     mark_as_being_recorded(*static_cast<int*>(descriptor));
   }
@@ -239,7 +239,7 @@ void FrameRecorder::Impl::append() {
   if (has_device_time) {
     append(device_time.get(), H5T_NATIVE_DOUBLE, 1, pending.device_time_s.data());
   }
-  // Last: a row whose time is there is there as a whole.
+  // `time` comes last: a row that has its time is complete.
   append(time.get(), H5T_NATIVE_DOUBLE, 1, pending.time_s.data());
 }
 
@@ -291,7 +291,7 @@ FrameRecorder::~FrameRecorder() {
   try {
     close();
   } catch (const Error&) {
-    // Who wants to know calls close().
+    // Callers who want to know call close().
   }
 }
 
@@ -300,9 +300,10 @@ void FrameRecorder::expect_baseline() { impl_->baseline_follows = true; }
 void FrameRecorder::set_baseline(std::vector<double> baseline) {
   Impl& r = *impl_;
   if (baseline.empty() || (r.saved > 0 && !r.has_baseline)) {
-    refuse(r.path, baseline.empty()
-                       ? "its baseline has no values; give one for each element"
-                       : "keeps no place for a baseline; expect it before the first frame");
+    refuse(r.path,
+           baseline.empty()
+               ? "its baseline has no values; give one for each element"
+               : "has no space for a baseline; call expect_baseline() before the first frame");
   }
   std::swap(r.sensor.baseline, baseline);
   try {
@@ -312,7 +313,7 @@ void FrameRecorder::set_baseline(std::vector<double> baseline) {
     throw;
   }
   if (r.saved == 0) {
-    return;  // it comes with the first rows
+    return;  // the first save() writes it
   }
   const Hdf5Session session;
   const Hdf5Handle dataset(H5Dopen2(r.file.get(), "baseline", H5P_DEFAULT), H5Dclose);
@@ -346,7 +347,7 @@ void FrameRecorder::add(const Frame& frame) {
     rows.pressure.push_back(static_cast<float>(none ? unknown : frame.values[i]));
     r.unknown_readings += none ? 1 : 0;
   }
-  // A pose that is no pose costs itself, not the frame, and never the recording.
+  // A pose that is not finite is dropped; its frame is kept.
   const bool posed = frame.T_robot_sensor && is_finite(*frame.T_robot_sensor);
   const Pose pose = posed ? *frame.T_robot_sensor : Pose{{unknown, unknown}, unknown};
   rows.sensor_pose.insert(rows.sensor_pose.end(),

@@ -121,7 +121,7 @@ class Sender {
   int socket_;
 };
 
-// HDF5's own account of the last failure, where it began.
+// Returns HDF5's innermost account of the last failure.
 std::string innermost_reason() {
   std::string reason;
   H5Ewalk2(
@@ -146,14 +146,14 @@ std::string open_problem(const std::string& reason) {
   return hdf5_damaged;
 }
 
-// Invalid, with HDF5's account in `reason`, where the file cannot be opened.
+// Opens the file; invalid, with HDF5's account in `reason`, where that fails.
 Hdf5Handle open_file(const std::filesystem::path& path, std::string& reason) {
   const Hdf5Handle access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose);
   H5Pset_file_locking(access.get(), true, true);  // some network file systems have no locks
   Hdf5Handle file(H5Fopen(path.c_str(), H5F_ACC_RDONLY, access.get()), H5Fclose);
   if (!file.valid()) {
     reason = innermost_reason();
-    // A stream that is being recorded, or whose recorder was killed.
+    // SWMR opens a stream that is being recorded, or whose recorder was killed.
     file = {H5Fopen(path.c_str(), H5F_ACC_RDONLY | H5F_ACC_SWMR_READ, access.get()), H5Fclose};
   }
   return file;
@@ -167,7 +167,7 @@ void serve_hdf5(int socket, const std::filesystem::path& path, std::uint64_t fil
   Sender sender(socket);
   H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
   H5PLset_loading_state(0);          // a file's filters must not load code
-  H5Lunregister(H5L_TYPE_EXTERNAL);  // nor its links lead to other files, which may be FIFOs
+  H5Lunregister(H5L_TYPE_EXTERNAL);  // nor its links open other files, which may be FIFOs
   if (H5Fis_hdf5(path.c_str()) <= 0) {
     sender.refuse("is not an HDF5 file; give a file that Palpate or h5py wrote");
     return;
@@ -188,7 +188,7 @@ void serve_hdf5(int socket, const std::filesystem::path& path, std::uint64_t fil
   for (std::size_t i = 0; i < datasets.size(); ++i) {
     const std::string& name = datasets[i];
     if (const htri_t there = H5Lexists(file.get(), name.c_str(), H5P_DEFAULT); there != 0) {
-      // A file that is being written grows.
+      // A file that is being recorded grows.
       file_bytes = std::max<std::uint64_t>(file_bytes, std::filesystem::file_size(path));
       const Hdf5Rows& rows = opened.try_emplace(i, file.get(), name, file_bytes).first->second;
       Hdf5Value value;
@@ -200,7 +200,7 @@ void serve_hdf5(int socket, const std::filesystem::path& path, std::uint64_t fil
   sender.send(Hdf5Record::end);
   for (;;) {
     Hdf5Request request{};
-    forked_read(socket, &request, sizeof request);  // ends the child after the last
+    forked_read(socket, &request, sizeof request);  // ends the child after the last request
     opened.at(request.dataset).send(socket, request.first, request.count);
   }
 }

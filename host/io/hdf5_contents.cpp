@@ -19,15 +19,15 @@ namespace {
 
 using namespace std::chrono_literals;
 
-// Milliseconds are usual; a child that needs this long to open a file loops.
+// Opening a file takes milliseconds; a child that takes this long loops.
 constexpr std::uint64_t cpu_seconds = 2;
-// Metadata and a piece of the numbers.
+// Enough for metadata and a piece of the numbers.
 constexpr std::uint64_t memory_bytes = 256 << 20;
-// The slowest disk that is worth waiting for.
+// Rate of the slowest disk that is worth waiting for.
 constexpr std::uint64_t bytes_per_second = 1 << 20;
 
-// Takes the first answer of serve_hdf5() apart. Nothing in it is trusted: a damaged file may have
-// corrupted the child's memory. Once a length does not fit, every further value is empty.
+// Parses the first answer of serve_hdf5(). Nothing in the answer is trusted: a damaged file may
+// have corrupted the child's memory. Once a length does not fit, every further value is empty.
 class Receiver {
  public:
   explicit Receiver(ForkedChild& child) : child_(child) {}
@@ -90,7 +90,7 @@ Hdf5Contents::Hdf5Contents(const std::filesystem::path& path,
   if (file_bytes == 0) {
     refuse("is empty; copy or record it again");
   }
-  // Before the file is opened: what is closed by then is read as a whole.
+  // Checked before the file is opened: a file closed by now is read as a whole.
   closed_ = !is_marked_open(path);
   child_.emplace(
       [&](int socket) { serve_hdf5(socket, path, file_bytes, attributes, datasets); },

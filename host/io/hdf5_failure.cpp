@@ -31,7 +31,7 @@ void give_up_hdf5_file(hid_t file) {
   if (H5Fget_vfd_handle(file, H5P_DEFAULT, &descriptor) < 0) {
     return;
   }
-  // What is still to be written goes nowhere.
+  // The file's remaining writes go to /dev/null.
   if (const Descriptor nowhere("/dev/null", O_RDWR); nowhere.valid()) {
     ::dup3(nowhere.get(), *static_cast<int*>(descriptor), O_CLOEXEC);
   }

@@ -7,11 +7,11 @@
 
 namespace palpate {
 
-/// Held by every use of HDF5 in this process and while a child is forked that uses it: the child
-/// must not inherit the library in the middle of another thread's call.
+/// Locked for every use of HDF5 in this process and while a child that uses HDF5 is forked: the
+/// child must not inherit the library in the middle of another thread's call.
 inline std::mutex hdf5_mutex;
 
-/// Use of HDF5 by this thread, whose errors it does not print while this lives.
+/// Locks HDF5 for this thread and silences HDF5's error printing while it lives.
 class Hdf5Session {
  public:
   Hdf5Session() : lock_(hdf5_mutex) {

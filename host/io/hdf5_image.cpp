@@ -7,7 +7,7 @@ namespace palpate {
 
 namespace {
 
-// What HDF5 asks of whoever holds a file's memory.
+// Callbacks by which HDF5 manages a file's memory.
 
 void* allocate(std::size_t size, H5FD_file_image_op_t, void* image) {
   static_cast<Hdf5Image*>(image)->capacity = size;
@@ -23,7 +23,7 @@ void* grow(void* memory, std::size_t size, H5FD_file_image_op_t, void* user) {
   char* grown = static_cast<char*>(std::realloc(memory, size));
   if (grown != nullptr) {
     if (size > image.capacity) {
-      // The same content has to give the same bytes.
+      // Zeros, so that the same content gives the same bytes.
       std::memset(grown + image.capacity, 0, size - image.capacity);
     }
     image.capacity = size;

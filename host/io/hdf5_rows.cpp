@@ -15,26 +15,26 @@ namespace palpate {
 
 namespace {
 
-// Milliseconds are usual; a child that needs this long for a piece loops.
+// Reading a piece takes milliseconds; a child that takes this long loops.
 constexpr std::uint64_t cpu_seconds = 2;
-// A fifth of what inflating and widening were seen to do.
+// A fifth of the measured rate of inflating and widening.
 constexpr std::uint64_t cpu_bytes_per_second = 20'000'000;
-// Metadata and a piece of an answer.
+// Enough for metadata and a piece of an answer.
 constexpr std::uint64_t base_bytes = 256 << 20;
-// A stored chunk, what it is inflated to, which grows by doubling, and what it is shuffled to.
+// Copies of a chunk in memory: stored, inflated (which grows by doubling) and unshuffled.
 constexpr std::uint64_t copies_of_a_chunk = 5;
 
-// How the name leads to its dataset; H5L_TYPE_ERROR where the file is damaged.
+// Returns the type of the dataset's link; H5L_TYPE_ERROR where the file is damaged.
 H5L_type_t link_type(hid_t file, const std::string& name) {
   H5L_info_t link{};
   return H5Lget_info(file, name.c_str(), &link, H5P_DEFAULT) < 0 ? H5L_TYPE_ERROR : link.type;
 }
 
-// Asked before the shape: that of a virtual dataset is read from other files.
+// Checked before the shape: for a virtual dataset's shape, HDF5 reads other files.
 std::string storage_problem(hid_t creation) {
   if (H5Pget_layout(creation) == H5D_VIRTUAL) {
-    return "is a virtual dataset, whose other datasets are not looked for; copy the numbers into "
-           "this file";
+    return "is a virtual dataset, whose numbers lie in other datasets, which are not read; copy "
+           "them into this file";
   }
   if (H5Pget_external_count(creation) != 0) {
     return "keeps its numbers in another file, which is not opened; copy them into this file";
@@ -42,8 +42,8 @@ std::string storage_problem(hid_t creation) {
   return "";
 }
 
-// Bound of a dataset's size, from what is stored of it. A damaged shape would otherwise have
-// terabytes allocated before the first read fails.
+// Returns a bound of a dataset's size in bytes, from what is stored of it. A damaged shape would
+// otherwise have terabytes allocated before the first read fails.
 std::uint64_t largest_dataset(hid_t dataset, hid_t creation, std::uint64_t file_bytes) {
   const std::uint64_t stored = std::min<std::uint64_t>(H5Dget_storage_size(dataset), file_bytes);
   return H5Pget_layout(creation) == H5D_CHUNKED && H5Pget_nfilters(creation) > 0
@@ -122,8 +122,8 @@ void Hdf5Rows::open(hid_t file, const std::string& name, std::uint64_t file_byte
   }
 }
 
-// A pass over the rows meets every chunk that its rows touch again and again: all of them have to
-// stay in HDF5's cache, or each would be inflated once for every piece.
+// A pass over the rows meets each of their chunks again and again. All these chunks stay in HDF5's
+// cache; else each would be inflated once for every piece.
 bool Hdf5Rows::reopen_with_cache(hid_t file, const std::string& name, hid_t creation,
                                  std::size_t width) {
   if (H5Pget_layout(creation) != H5D_CHUNKED) {
@@ -148,7 +148,7 @@ bool Hdf5Rows::reopen_with_cache(hid_t file, const std::string& name, hid_t crea
     return false;
   }
   const std::uint64_t needed = band_bytes_ + copies_of_a_chunk * chunk_bytes;
-  allow_memory_bytes(UINT64_MAX);  // what there is, not what this child was allowed so far
+  allow_memory_bytes(UINT64_MAX);  // or the child's limit would count as what is available
   const std::uint64_t available = available_memory_bytes();
   allow_memory_bytes(base_bytes);
   if (needed > available) {
@@ -160,7 +160,7 @@ bool Hdf5Rows::reopen_with_cache(hid_t file, const std::string& name, hid_t crea
   }
   needed_bytes_ = needed;
   const Hdf5Handle access(H5Pcreate(H5P_DATASET_ACCESS), H5Pclose);
-  // HDF5 hashes chunks to slots; ten slots a chunk and an odd number keep two from meeting.
+  // HDF5 hashes chunks to slots: ten slots a chunk, and an odd number, make collisions rare.
   const std::size_t slots = std::min<std::size_t>(10 * chunks + 521, 1'000'003);
   H5Pset_chunk_cache(access.get(), slots, std::max<std::size_t>(band_bytes_, 1 << 20), 1.0);
   dataset_ = Hdf5Handle(H5I_INVALID_HID, H5Dclose);  // an open dataset would keep its cache
@@ -172,8 +172,7 @@ void Hdf5Rows::send(int socket, std::uint64_t first, std::uint64_t count) {
   const std::size_t rank = shape_.size();
   std::vector<hsize_t> begin(rank, 0);
   std::vector<hsize_t> box(shape_.begin(), shape_.end());
-  // A piece is a block along one axis, whole along those after it and a single place along those
-  // before it.
+  // A piece is a block along one axis: all of the axes after it, a single index of those before it.
   std::size_t axis = 0;
   while (axis + 1 < rank && product(std::span(shape_).subspan(axis + 1)) > hdf5_piece) {
     box[axis++] = 1;
@@ -192,7 +191,7 @@ void Hdf5Rows::send(int socket, std::uint64_t first, std::uint64_t count) {
       box[axis] = std::min<hsize_t>(block, end(axis) - begin[axis]);
     }
     values.resize((rank == 0 ? 1 : box[axis]) * inner);
-    // Its limit follows what it reads: the chunks of a pass, at most.
+    // The time limit follows what a piece reads: the chunks of a pass, at most.
     allow_cpu_seconds(cpu_seconds + band_bytes_ / cpu_bytes_per_second);
     const std::uint64_t size = read(begin, box, values) ? values.size() : 0;
     forked_write(socket, &size, sizeof size);

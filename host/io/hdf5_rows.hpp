@@ -9,15 +9,14 @@
 
 namespace palpate {
 
-/// A dataset of numbers that is read row by row, for forked children.
+/// A dataset of numbers that a forked child reads row by row.
 class Hdf5Rows {
  public:
-  /// Opens the dataset of this name, unless its numbers are not in this file: they are looked for
-  /// nowhere else.
+  /// Opens the dataset of this name; numbers stored outside this file are refused.
   /// @param file_bytes size of the file, which bounds what a damaged shape may claim
   Hdf5Rows(hid_t file, const std::string& name, std::uint64_t file_bytes);
 
-  const std::string& problem() const { return problem_; }  ///< why it cannot be read; empty: it can
+  const std::string& problem() const { return problem_; }  ///< why it cannot be read; "": it can
   const std::vector<std::uint64_t>& shape() const { return shape_; }
 
   /// Sends rows [first, first + count) to the socket, as serve_hdf5() answers.
@@ -31,16 +30,16 @@ class Hdf5Rows {
 
   Hdf5Handle dataset_{H5I_INVALID_HID, H5Dclose};
   std::vector<std::uint64_t> shape_;
-  std::uint64_t band_bytes_ = 0;    ///< of the chunks that one pass over the rows holds at a time
-  std::uint64_t needed_bytes_ = 0;  ///< of memory for these and for inflating one
+  std::uint64_t band_bytes_ = 0;    ///< of the chunks that a pass over the rows holds at once
+  std::uint64_t needed_bytes_ = 0;  ///< of memory for these chunks and for inflating one
   std::string problem_;
 };
 
-/// What is wrong with bytes that HDF5 fails on.
+/// Problem of a file on whose bytes HDF5 fails.
 inline constexpr const char* hdf5_damaged =
     "cannot be read: the file is damaged; copy or record it again";
 
-/// Bytes of values of this shape and width; more than can be said is the largest number.
+/// Returns the bytes of values of this shape and width; UINT64_MAX on overflow.
 std::uint64_t hdf5_stored_bytes(std::span<const std::uint64_t> shape, std::uint64_t width);
 
 }  // namespace palpate

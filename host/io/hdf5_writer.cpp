@@ -12,8 +12,8 @@ namespace palpate {
 
 void set_appendable(hid_t access) {
   H5Pset_libver_bounds(access, H5F_LIBVER_V110, H5F_LIBVER_V110);
-  // A process can be killed between two pages of one write; a checksum of metadata would not
-  // survive that.
+  // Metadata starts on pages: a process can be killed between two pages of one write, and a
+  // checksum would not survive half of its metadata.
   constexpr hsize_t page = 4096;
   H5Pset_alignment(access, 1, page);
 }
@@ -26,7 +26,7 @@ Hdf5Handle file_in_memory(Hdf5Image& image, Hdf5Writer::Layout layout) {
   if (layout == Hdf5Writer::Layout::appendable) {
     set_appendable(access.get());
   }
-  // The name is not used beyond HDF5's list of open files.
+  // HDF5 uses the name only for its list of open files.
   return {H5Fcreate("palpate", H5F_ACC_TRUNC, H5P_DEFAULT, access.get()), H5Fclose};
 }
 
@@ -44,7 +44,7 @@ Hdf5Handle extents(const Hdf5Writer::Shape& shape) {
   return {H5Screate_simple(static_cast<int>(sizes.size()), sizes.data(), nullptr), H5Sclose};
 }
 
-// Whole rows of about 64 KiB: what is written again with every flush of a growing dataset.
+// Chunks of whole rows, about 64 KiB: every flush of a growing dataset writes one again.
 std::vector<hsize_t> growing_chunk(const Hdf5Writer::Shape& shape, std::size_t value_bytes) {
   constexpr std::size_t bytes = 1 << 16;
   std::vector<hsize_t> chunk(shape.begin(), shape.end());
@@ -56,7 +56,7 @@ std::vector<hsize_t> growing_chunk(const Hdf5Writer::Shape& shape, std::size_t v
   return chunk;
 }
 
-// Whole inner dimensions up to a mebibyte of doubles, HDF5's chunk cache.
+// Chunks of whole inner dimensions, up to 1 MiB of doubles, the size of HDF5's chunk cache.
 std::vector<hsize_t> chunk_of(const Hdf5Writer::Shape& shape) {
   std::size_t room = (1 << 20) / sizeof(double);
   std::vector<hsize_t> chunk(shape.size());
@@ -156,7 +156,7 @@ void Hdf5Writer::add_dataset(const char* name, const Shape& shape, hid_t type, c
     std::vector<hsize_t> sizes(shape.begin(), shape.end());
     std::vector<hsize_t> most = sizes;
     most[0] = H5S_UNLIMITED;
-    // What a writer that was killed did not write reads as no number.
+    // NaN fills what a killed writer did not write.
     constexpr double unwritten = std::numeric_limits<double>::quiet_NaN();
     ready = ready &&
             H5Sset_extent_simple(space.get(), static_cast<int>(sizes.size()), sizes.data(),

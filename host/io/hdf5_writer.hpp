@@ -13,22 +13,22 @@
 
 namespace palpate {
 
-/// Makes a file access property list that of `appendable` files: see Hdf5Writer::Layout.
+/// Sets a file access property list up for `appendable` files: see Hdf5Writer::Layout.
 void set_appendable(hid_t access);
 
-/// An HDF5 file that is put together in memory and saved in one piece: a disk that refuses is met
-/// by AtomicFile, not in the middle of HDF5's caches. The same content gives the same bytes.
-/// Every function throws Error (Fault::system) where HDF5 or the disk refuses.
+/// Builds an HDF5 file in memory and saves it in one piece, so that a failing disk is met by
+/// AtomicFile, not in the middle of HDF5's caches. The same content gives the same bytes. Every
+/// function throws Error (Fault::system) where HDF5 or the disk fails.
 class Hdf5Writer {
  public:
   using Shape = std::vector<std::size_t>;
-  /// How a dataset lies in the file; `growing` ones can be extended along the first axis.
+  /// Storage of a dataset; a `growing` one can be extended along the first axis.
   enum class Storage { plain, compressed, growing };
-  /// What HDF5 may do with the file after save(). `appendable` ones can be opened by one writer and
+  /// What HDF5 can do with the file after save(): an `appendable` one can be open in one writer and
   /// many readers at a time (SWMR), which takes HDF5 1.10.
   enum class Layout { closed, appendable };
 
-  /// @param path where save() puts it; the target is not touched before.
+  /// @param path target of save(), which is not touched before
   explicit Hdf5Writer(std::filesystem::path path, Layout layout = Layout::closed);
   Hdf5Writer(const Hdf5Writer&) = delete;
   Hdf5Writer& operator=(const Hdf5Writer&) = delete;
@@ -47,9 +47,9 @@ class Hdf5Writer {
   void dataset(const char* name, const Shape& shape, std::span<const std::uint64_t> values,
                Storage storage = Storage::plain);
 
-  /// The last that is done with it.
-  /// @param finished is called with the whole file before it appears under its name, and may keep
-  /// it open; where it throws, the file never appears
+  /// Writes the file; no call may follow.
+  /// @param finished called with the whole file before it appears under its name, and may keep it
+  /// open; where it throws, the file never appears
   void save(const std::function<void(const std::filesystem::path&)>& finished = {});
 
  private:

@@ -8,9 +8,9 @@
 
 namespace palpate {
 
-/// Reads a "palpate.map" HDF5 file, holding a few MB of it at a time, and checks all of it.
-/// @param head is given the map without cells
-/// @param cells are given the log odds, row by row, in pieces
+/// Reads and checks a "palpate.map" HDF5 file, holding a few MB of it at a time.
+/// @param head called with the map without cells
+/// @param cells called with the log odds in row-major order, in pieces
 /// @throws Error as read_map() does
 void scan_map(const std::filesystem::path& path,
               const std::function<void(const OccupancyGrid&)>& head,

@@ -10,7 +10,7 @@ namespace palpate {
 
 namespace {
 
-// map_server's defaults, and the grey levels that its map_saver writes for them.
+// map_server's default thresholds, and the grey levels that its map_saver writes.
 constexpr double occupied_threshold = 0.65;
 constexpr double free_threshold = 0.196;
 constexpr char occupied_grey = 0;
@@ -19,7 +19,7 @@ constexpr char unknown_grey = static_cast<char>(205);
 
 std::string image_of(const OccupancyGrid& map) {
   std::string image = fmt::format("P5\n{} {}\n255\n", map.nx, map.ny);
-  // An unseen cell holds exactly the prior, which may well lie below the free threshold.
+  // Unseen cells hold exactly the prior, which may lie below the free threshold.
   const auto unseen = static_cast<float>(map.prior_log_odds());
   for (int j = map.ny - 1; j >= 0; --j) {
     for (int i = 0; i < map.nx; ++i) {

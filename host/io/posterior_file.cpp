@@ -45,7 +45,7 @@ void validate(const std::filesystem::path& path, const Posterior& posterior) {
 void require_log_likelihoods(const std::filesystem::path& path,
                              std::span<const double> log_likelihood) {
   for (const double value : log_likelihood) {
-    // A bin may be impossible, but not better than certain.
+    // A bin may be impossible (-inf), but not better than certain (+inf).
     if (std::isnan(value) || value == std::numeric_limits<double>::infinity()) {
       refuse(path, fmt::format("dataset 'log_likelihood' holds {}; store numbers or -inf", value));
     }

@@ -8,9 +8,9 @@
 
 namespace palpate {
 
-/// Reads a "palpate.posterior" HDF5 file, holding a few MB of it at a time, and checks all of it.
-/// @param head is given the posterior without log-likelihoods
-/// @param log_likelihood is given those, object by object, in pieces
+/// Reads and checks a "palpate.posterior" HDF5 file, holding a few MB of it at a time.
+/// @param head called with the posterior without log-likelihoods
+/// @param log_likelihood called with the log-likelihoods, object by object, in pieces
 /// @throws Error as read_posterior() does
 void scan_posterior(const std::filesystem::path& path,
                     const std::function<void(const Posterior&)>& head,

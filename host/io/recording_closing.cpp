@@ -20,7 +20,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-// Cuts what is beyond the whole rows from every dataset that grows.
+// Cuts every growing dataset to the complete rows.
 bool cut_rows(hid_t file, std::uint64_t rows) {
   for (const char* name : {"pressure", "sensor_pose", "device_time", "lost_before", "time"}) {
     if (H5Lexists(file, name, H5P_DEFAULT) <= 0) {
@@ -42,9 +42,9 @@ bool cut_rows(hid_t file, std::uint64_t rows) {
   return true;
 }
 
-// As h5clear does, by the same properties of HDF5's: opens the file in spite of its marks, takes
-// its end from its size, and closes it. It is opened as a recorder would, so that it can be read
-// whenever this is killed.
+// Works as h5clear does, with the same HDF5 properties: opens the file in spite of its marks, takes
+// its end from its size, and closes it. The file is opened as by a recorder, so that it stays
+// readable whenever this process is killed.
 bool close_file(const std::filesystem::path& path, std::uint64_t rows) {
   const Hdf5Handle access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose);
   set_appendable(access.get());
@@ -81,7 +81,7 @@ Descriptor lock(const std::filesystem::path& path) {
 }  // namespace
 
 bool close_recording(const std::filesystem::path& path) {
-  // All of it is read before: nothing is changed in a file that is damaged or something else.
+  // The whole file is read first, so that nothing changes in a damaged or foreign file.
   const RecordingSummary before = summarize_recording(path);
   if (before.head.closed) {
     return false;

@@ -61,7 +61,7 @@ void write_stream(Hdf5Writer& file, const Recording& recording) {
   }
 }
 
-// Sizes of a recording that is about to be written.
+// Checks the sizes of a recording that is about to be written.
 void require_agreement(const std::filesystem::path& path, const Recording& recording) {
   const std::size_t n = recording.size();
   const std::size_t e = recording.elements();

@@ -18,12 +18,12 @@ namespace {
 
 using Shape = std::vector<std::uint64_t>;
 
-// Datasets that have a row for each touch, `time` last: see FrameRecorder.
+// Datasets with a row for each touch or frame, `time` last: see FrameRecorder.
 const std::vector<std::string> row_names = {"pressure", "sensor_pose", "device_time", "lost_before",
                                             "time"};
 
-// The rows of a stream that was cut off, or is being recorded, are those that all datasets have.
-// `time` is written last, and what was not written is NaN.
+// Returns the complete rows of a stream that is being recorded or was cut off: the rows that all
+// datasets have and whose time, which is written last, is not NaN.
 std::uint64_t whole_rows(Hdf5Contents& file) {
   std::uint64_t rows = UINT64_MAX;
   for (const std::string& name : row_names) {
@@ -141,7 +141,7 @@ class Scan {
       file_.read("baseline", [&](std::uint64_t, std::span<const double> values) {
         r.baseline.insert(r.baseline.end(), values.begin(), values.end());
       });
-      // The recording of a stream was cut off before the whole baseline was written.
+      // A NaN in the baseline of a stream: the recording was cut off before the baseline was known.
       for (std::uint64_t k = 0; r.rows == "frames" && k < r.baseline.size(); ++k) {
         if ((r.valid.size() != e || r.valid[k] != 0) && std::isnan(r.baseline[k])) {
           r.baseline.clear();
@@ -201,7 +201,7 @@ class Scan {
     file_.read(name, take, head_.rows);
   }
 
-  // Pieces end anywhere; what is left of a tuple waits for the next.
+  // Pieces end anywhere; the rest of a tuple waits for the next piece.
   template <std::size_t width, typename Tuple, typename Make, typename Take>
   void read_tuples(const char* name, const Make& make, const Take& take) {
     std::vector<double> numbers;
@@ -216,7 +216,7 @@ class Scan {
       numbers.erase(numbers.begin(), numbers.begin() + static_cast<std::ptrdiff_t>(at));
       take(std::span<const Tuple>(tuples));
     };
-    // An array that does not change has as many rows as elements.
+    // An array that does not change has a row per element.
     const bool by_row = std::string_view(name) != "elements" || head_.array_changes;
     file_.read(name, take_whole, by_row ? head_.rows : head_.elements);
   }
@@ -235,7 +235,7 @@ class Scan {
     return counts;
   }
 
-  /// The shape without the rows beyond the whole ones.
+  /// Returns the shape without incomplete rows.
   Shape cut(std::string_view name, Shape shape) const {
     const bool has_rows =
         std::find(row_names.begin(), row_names.end(), name) != row_names.end() && !shape.empty();
@@ -266,7 +266,7 @@ class Scan {
   const std::filesystem::path& path_;
   const RecordingTakers& takers_;
   Hdf5Contents file_;
-  std::uint64_t rows_ = UINT64_MAX;  ///< that all datasets have, of a file that is not closed
+  std::uint64_t rows_ = UINT64_MAX;  ///< complete rows of a file that is not closed
   RecordingHead head_;
 };
 

@@ -20,7 +20,7 @@ struct RecordingHead {
   bool has_lost_before = false;
 };
 
-/// What is done with a recording's rows, which come in pieces, one dataset after the other.
+/// Called with a recording's rows, which come in pieces, one dataset after the other.
 struct RecordingTakers {
   std::function<void(const RecordingHead&)> head;  ///< before any row
   std::function<void(std::span<const double>)> pressure;
@@ -31,7 +31,7 @@ struct RecordingTakers {
   std::function<void(std::span<const std::uint64_t>)> lost_before;
 };
 
-/// Reads a "palpate.recording" HDF5 file, holding a few MB of it at a time, and checks all of it.
+/// Reads and checks a "palpate.recording" HDF5 file, holding a few MB of it at a time.
 /// @throws Error as read_recording() does
 void scan_recording(const std::filesystem::path& path, const RecordingTakers& takers);
 

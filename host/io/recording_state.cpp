@@ -11,8 +11,8 @@
 namespace palpate {
 
 bool is_marked_open(const std::filesystem::path& path) {
-  // The superblock of HDF5's file format specification: signature, version, two sizes and, from
-  // version 2 on, the flags of its writers.
+  // Layout of the superblock in HDF5's file format specification: signature, version, two sizes
+  // and, from version 2 on, the flags of its writers.
   constexpr char signature[] = {'\x89', 'H', 'D', 'F', '\r', '\n', '\x1a', '\n'};
   constexpr std::size_t version = 8;
   constexpr std::size_t flags = 11;

@@ -19,8 +19,8 @@ void open_closed_streams() {
       continue;
     }
     closed[static_cast<std::size_t>(stream)] = true;
-    // An open takes the lowest free number, which is this one. Where there is no /dev, a folder
-    // takes it: what is printed then fails.
+    // open() takes the lowest free number, which is this stream's. Without /dev, a folder takes it,
+    // and printing fails.
     if (::open("/dev/null", O_RDWR) < 0) {
       ::open("/", O_RDONLY | O_DIRECTORY);
     }

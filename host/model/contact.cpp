@@ -22,7 +22,7 @@ void require_sound(const Touch& touch) {
   const auto finite = [](const glm::dvec2& p) { return std::isfinite(p.x) && std::isfinite(p.y); };
   if (!finite(touch.T_robot_sensor.translation_mm) ||
       !std::isfinite(touch.T_robot_sensor.theta_rad)) {
-    throw Error(Fault::input, "touch: T_robot_sensor is not finite");
+    throw Error(Fault::input, "touch: T_robot_sensor is not finite; give finite numbers");
   }
   for (std::size_t i = 0; i < e; ++i) {
     const bool alive = touch.valid.empty() || touch.valid[i] != 0;

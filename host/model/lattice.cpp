@@ -11,7 +11,7 @@ namespace palpate {
 
 namespace {
 
-// Of millimetres and, by the same bound, of radians.
+// The bound serves millimetres and radians alike.
 bool is_near(double place) { return std::abs(place) <= farthest_mm; }
 
 void validate_axis(const char* name, const Axis& axis) {
@@ -51,7 +51,7 @@ void PoseLattice::validate() const {
 
 bool PoseLattice::full_circle() const {
   constexpr double circle_rad = 2.0 * std::numbers::pi;
-  constexpr double rounding = 1e-9;  // of ends that were given in degrees
+  constexpr double rounding = 1e-9;  // ends given in degrees are rounded
   return std::abs(theta_rad.upper - theta_rad.lower - circle_rad) < rounding;
 }
 

@@ -4,11 +4,11 @@
 
 namespace palpate {
 
-/// Counts up to here are exact in float64, in which datasets are read.
+/// Largest count that float64, the type in which datasets are read, holds exactly.
 inline constexpr std::uint64_t largest_count = std::uint64_t{1} << 53;
 
-/// Adds to a count of lost frames, which stays at largest_count: what a board or a file says was
-/// lost may be anything.
+/// Adds `more` to a count of lost frames and stops at largest_count: a board or a file may claim
+/// any loss.
 inline void count_lost(std::uint64_t& count, std::uint64_t more) {
   count = more < largest_count - count ? count + more : largest_count;
 }

@@ -8,7 +8,8 @@
 
 namespace palpate {
 
-/// What an object of a public class holds. Throws Error where the object was moved from.
+/// Returns what an object of a public class holds. Throws Error, naming the class, where the object
+/// was moved from.
 template <typename T>
 T& held_by(const std::unique_ptr<T>& held, const char* name) {
   if (!held) {

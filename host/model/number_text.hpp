@@ -11,9 +11,9 @@
 
 namespace palpate {
 
-// Numbers in files and on command lines, as C and YAML write them, such as -1.5, +2 or 1e-3. They
-// do not depend on the locale: a host program that shows its users decimal commas must not change
-// what a file says.
+// Numbers in files and on command lines, such as -1.5, +2 or 1e-3, are read independently of the
+// locale: an embedding program that shows its users decimal commas must not change what a file
+// says.
 
 namespace detail {
 
@@ -24,7 +24,7 @@ inline std::string_view without_plus(std::string_view text) {
 
 }  // namespace detail
 
-/// The finite number that all of the text is, if it is one.
+/// Returns the text as a finite number; none where it is not one as a whole.
 inline std::optional<double> number_of(std::string_view text) {
   text = detail::without_plus(text);
   double number = 0.0;
@@ -42,7 +42,7 @@ inline std::optional<std::int64_t> whole_number_of(std::string_view text) {
   return whole ? std::optional(number) : std::nullopt;
 }
 
-/// The two finite numbers, with blanks between and around them, that all of the line is.
+/// Returns the line as two finite numbers separated by blanks; none where it is anything else.
 inline std::optional<std::array<double, 2>> two_numbers_of(std::string_view line) {
   constexpr std::string_view blanks = " \t\r\v\f";
   std::array<double, 2> numbers{};

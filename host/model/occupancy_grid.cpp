@@ -64,7 +64,7 @@ std::optional<std::string> fault_without_cells(const OccupancyGrid& map) {
         "'symmetry' = {}; make it 1, n for an n-fold symmetry or 0 for full symmetry",
         map.symmetry);
   }
-  // A map reaches several spreads beyond what was touched.
+  // A map is wider than its spread, as it reaches several spreads beyond what was touched.
   const double side_mm = map.cell_mm * std::max(map.nx, map.ny);
   if (map.spread_mm && !(is_length(*map.spread_mm) && *map.spread_mm <= side_mm)) {
     return fmt::format(

@@ -27,12 +27,13 @@ Body body_of(const OccupancyGrid& map) {
     ++cells;
   });
   if (cells == 0) {
-    throw Error(Fault::input, fmt::format("map '{}': no cell has log odds above 0, so it has no "
-                                          "body to measure a pose error with",
-                                          map.label));
+    throw Error(Fault::input,
+                fmt::format("map '{}': no cell has log odds above 0, so no pose error can be "
+                            "measured; map touches that meet the object",
+                            map.label));
   }
   Body body{.centroid_mm = sum / static_cast<double>(cells)};
-  // A second pass about the centroid: no cancellation when the object is far from the origin.
+  // A second pass about the centroid does not cancel when the object is far from the origin.
   for_each_occupied([&](const glm::dvec2& p) {
     const glm::dvec2 d = p - body.centroid_mm;
     body.inertia_mm2 += glm::dot(d, d);

@@ -26,12 +26,12 @@ void InverseSensorModel::validate() const {
     throw Error(Fault::input, fmt::format("spread = {} mm: give {:g} to {:g} mm", spread_mm,
                                           least_length_mm, most_length_mm));
   }
-  // Beyond these, increments in float32 no longer keep to what MapBuilder promises.
+  // Outside these bounds, increments in float32 miss the tolerance of MapBuilder::build().
   constexpr double largest_peak = 0.9999;
   if (!(peak >= least_peak && peak <= largest_peak)) {
     throw Error(Fault::input,
                 fmt::format("peak = {}: must be at least {:g}, or a reading would say nothing, and "
-                            "at most {}, or one would make a cell certain",
+                            "at most {}, or a reading would make a cell certain",
                             peak, least_peak, largest_peak));
   }
   if (!(prior >= least_prior && prior <= 1.0 - least_prior)) {

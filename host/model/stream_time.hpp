@@ -5,12 +5,12 @@
 
 namespace palpate {
 
-/// How long a stream of frames has run by their host times. The host's clock may be set meanwhile:
-/// a step back counts as no time, so that nothing waits until the clock has caught up; a step
-/// forward cannot be told from a pause of the board and counts.
+/// Measures how long a stream has run by the host times of its frames. Where the host's clock is
+/// set back, no time is added, so that nothing waits for the clock to catch up. A clock set forward
+/// looks like a pause of the board, and its step is added.
 class StreamTime {
  public:
-  /// To be called with the time of every frame, in order; returns the seconds since the first.
+  /// Takes the time of the next frame; returns the seconds since the first frame.
   double advance(double host_time_s) {
     elapsed_s_ += std::max(0.0, host_time_s - last_s_.value_or(host_time_s));
     last_s_ = host_time_s;

@@ -16,7 +16,7 @@ namespace palpate {
 
 namespace {
 
-/// Reach of the point spread, in standard deviations: 6e-7 of it lies beyond.
+/// Radius at which the point spread is cut off, in standard deviations: 6e-7 of it lies beyond.
 constexpr double reach = 5.0;
 
 struct Box {
@@ -25,7 +25,7 @@ struct Box {
 };
 
 Box bounds(const Shape& shape) {
-  // 1 km: far beyond any object, and near enough that a cell is not lost to rounding.
+  // 1 km: far beyond any object, yet rounding does not swallow a cell there.
   constexpr double farthest_mm = 1e6;
   Box box;
   const auto include = [&](const glm::dvec2& p, double width_mm) {
@@ -35,7 +35,7 @@ Box bounds(const Shape& shape) {
       throw Error(
           Fault::input,
           fmt::format("shape '{}': point {},{} of a line {} mm wide: give coordinates within "
-                      "{} mm of 0 and a width from 0",
+                      "{} mm of 0 and a width that is not negative",
                       shape.label, p.x, p.y, width_mm, farthest_mm));
     }
     box.lower = glm::min(box.lower, p - width_mm / 2.0);
@@ -63,8 +63,8 @@ DisplacementField::DisplacementField(const Shape& shape, double psf_mm) {
                 fmt::format("shape '{}': covers no area, so it cannot be touched", shape.label));
   }
   const glm::dvec2 extent = box.upper - box.lower + 2.0 * reach * psf_mm;
-  // 0.1 mm is fine enough for the sensor at hand; coarser where a large shape would need more than
-  // 2000 x 2000 cells, or where the point spread hides what is smaller.
+  // Cells of 0.1 mm suffice for this sensor. They are larger where a large shape would need more
+  // than 2000 x 2000 cells, or where the point spread hides smaller ones.
   cell_mm_ = std::max({0.1, std::max(extent.x, extent.y) / 2000.0, psf_mm / 20.0});
   const double margin_mm = reach * psf_mm + cell_mm_;
   lower_mm_ = box.lower - margin_mm;
@@ -77,7 +77,7 @@ DisplacementField::DisplacementField(const Shape& shape, double psf_mm) {
   }
 }
 
-/// The covered part of every cell: exact along x, from 8 lines per cell along y.
+/// Computes the covered part of every cell: exactly along x, on 8 lines per cell along y.
 void DisplacementField::rasterize(const Shape& shape) {
   constexpr int lines = 8;
   for (int line = 0; line < lines * ny_; ++line) {
@@ -93,8 +93,8 @@ void DisplacementField::rasterize(const Shape& shape) {
 }
 
 void DisplacementField::blur(double psf_mm) {
-  // The Gaussian's integral over each cell rather than its value at the centre: right also where
-  // the point spread is narrower than a cell.
+  // Weights are the Gaussian's integrals over the cells, not its values at their centres: these
+  // would be wrong where the point spread is narrower than a cell.
   const int radius = static_cast<int>(std::ceil(reach * psf_mm / cell_mm_));
   const double scale = cell_mm_ / (psf_mm * std::numbers::sqrt2);
   std::vector<double> kernel;
@@ -127,7 +127,8 @@ void DisplacementField::blur(double psf_mm) {
 }
 
 double DisplacementField::mean(const Pose& T_object_element, double edge_mm) const {
-  // As fine as the field; the cap bounds the time that an element much larger than the shape takes.
+  // Samples are as fine as the field; the cap bounds the time for an element much larger than the
+  // shape.
   const int n = static_cast<int>(std::clamp(std::ceil(edge_mm / cell_mm_), 1.0, 256.0));
   const glm::dvec2 step_x = rotate(T_object_element.theta_rad, {edge_mm / n, 0.0});
   const glm::dvec2 step_y = rotate(T_object_element.theta_rad, {0.0, edge_mm / n});
@@ -141,7 +142,8 @@ double DisplacementField::mean(const Pose& T_object_element, double edge_mm) con
   return sum / (n * n);
 }
 
-/// Bilinear between cell centres; 0 beyond the grid, whose border the shape does not reach.
+/// Interpolates bilinearly between cell centres; 0 beyond the grid, whose border the shape does not
+/// reach.
 double DisplacementField::interpolate(const glm::dvec2& p_object_mm) const {
   const glm::dvec2 u = (p_object_mm - lower_mm_) / cell_mm_ - 0.5;
   if (!(u.x >= 0.0 && u.x < nx_ - 1 && u.y >= 0.0 && u.y < ny_ - 1)) {

@@ -13,12 +13,12 @@ namespace palpate {
 /// far from it, on a grid in the object frame.
 class DisplacementField {
  public:
-  /// A standard deviation of zero leaves the shape sharp.
-  /// @throws Error on a point that is not finite or more than a kilometre away, or if the shape
-  /// covers no area.
+  /// @param psf_mm standard deviation of the point spread; 0 leaves the shape sharp
+  /// @throws Error on a point that is not finite or more than 1 km from the origin, or a shape
+  /// without area
   DisplacementField(const Shape& shape, double psf_mm);
 
-  /// The mean over a square of this edge, centred in its frame.
+  /// Returns the field's mean over a square of this edge, centred at the element frame's origin.
   double mean(const Pose& T_object_element, double edge_mm) const;
 
  private:

@@ -26,9 +26,9 @@ struct Piece {
 };
 using CentreLine = std::vector<Piece>;
 
-// A child's bold capitals. No glyph is another one turned around: W has slanted sides where M has
-// upright ones, 9 has a straight stem where 6 is curved, 0 is narrower than O, 1 has a flag and a
-// base. x is relative within a glyph only: glyph_strokes() centres it.
+// Bold capitals as in a child's alphabet. No glyph is a rotated copy of another: W has slanted
+// sides where M has upright ones, 9 has a straight stem where 6 is curved, 0 is narrower than O, 1
+// has a flag and a base. Absolute x does not matter, as glyph_strokes() centres each glyph.
 // clang-format off
 const std::map<char, std::vector<CentreLine>> centre_lines = {
     {'A', {{{-8.5, -h}, {0, h}, {8.5, -h}}, {{-6, -4.5}, {6, -4.5}}}},
@@ -93,7 +93,7 @@ void centre(std::vector<Shape::Stroke>& strokes) {
 
 std::vector<glm::dvec2> arc(const glm::dvec2& centre_mm, const glm::dvec2& radii_mm,
                             double from_deg, double to_deg) {
-  // 2 degrees put the chords of the largest glyph's circle within 0.002 mm of it.
+  // Chords of 2 degrees lie within 0.002 mm of the largest glyph's circle.
   const int chords = static_cast<int>(std::ceil(std::abs(to_deg - from_deg) / 2.0));
   std::vector<glm::dvec2> points;
   for (int k = 0; k <= chords; ++k) {

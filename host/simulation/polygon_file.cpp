@@ -18,8 +18,8 @@ namespace {
   throw Error(Fault::input, fmt::format("{}:{}: {}", path.string(), line, why));
 }
 
-/// Whether any triangle from the first vertex to an edge has an area; if none has, all edges lie on
-/// rays from it and the polygon encloses nothing.
+/// True where some triangle of the first vertex and an edge has an area. Otherwise all edges lie on
+/// rays from the first vertex, and the polygon encloses nothing.
 bool encloses_area(const std::vector<glm::dvec2>& polygon) {
   for (std::size_t i = 2; i < polygon.size(); ++i) {
     const glm::dvec2 a = polygon[i - 1] - polygon[0];
@@ -36,7 +36,9 @@ bool encloses_area(const std::vector<glm::dvec2>& polygon) {
 std::vector<std::vector<glm::dvec2>> read_polygons(const std::filesystem::path& path) {
   std::ifstream file(path);
   if (!file) {
-    throw Error(Fault::input, fmt::format("{}: cannot be opened for reading", path.string()));
+    throw Error(
+        Fault::input,
+        fmt::format("{}: cannot be opened; check the path and its permissions", path.string()));
   }
   std::vector<std::vector<glm::dvec2>> polygons;
   std::vector<glm::dvec2> polygon;
@@ -79,11 +81,11 @@ std::vector<std::vector<glm::dvec2>> read_polygons(const std::filesystem::path& 
     polygon.emplace_back((*vertex)[0], (*vertex)[1]);
   }
   if (file.bad()) {
-    throw Error(Fault::input, fmt::format("{}: cannot be read", path.string()));
+    throw Error(Fault::input, fmt::format("{}: cannot be read; copy it again", path.string()));
   }
   finish_polygon();
   if (polygons.empty()) {
-    throw Error(Fault::input, fmt::format("{}: no polygon in it: write one vertex, x y, in mm, a "
+    throw Error(Fault::input, fmt::format("{}: holds no polygon; write one vertex 'x y' in mm per "
                                           "line",
                                           path.string()));
   }

@@ -7,8 +7,8 @@
 
 namespace palpate {
 
-/// What random numbers are for. Uses that share a seed draw from different streams, or the first
-/// random touch of an unknown would repeat the numbers of its pose.
+/// Purpose of random numbers. Each purpose has a stream of its own for the same seed; else the
+/// first random touch of an unknown would repeat the numbers of its pose.
 enum class Stream : std::uint32_t {
   sensor,
   touch_poses,
@@ -18,8 +18,8 @@ enum class Stream : std::uint32_t {
   pose_noise
 };
 
-/// Random numbers that are the same on every standard library: the engine and std::seed_seq are
-/// specified to the bit, the standard's distributions are not.
+/// Draws random numbers that are the same with every standard library: the engine and std::seed_seq
+/// are specified to the bit, the standard's distributions are not.
 class Random {
  public:
   Random(std::uint64_t seed, Stream stream) {
@@ -34,8 +34,8 @@ class Random {
   /// Uniform over [lower, upper).
   double uniform(double lower, double upper) { return lower + (upper - lower) * uniform(); }
 
-  /// Standard normal (Box and Muller 1958). The pair's second number is dropped, so that every call
-  /// takes the same two draws from the engine.
+  /// Standard normal (Box and Muller 1958). Each call takes two draws from the engine; the second
+  /// normal number that they would give is dropped.
   double normal() {
     const double radius = std::sqrt(-2.0 * std::log(1.0 - uniform()));
     return radius * std::cos(2.0 * std::numbers::pi * uniform());

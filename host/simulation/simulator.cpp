@@ -17,7 +17,7 @@ namespace {
 enum class Zero { allowed, refused };
 
 void require(const char* field, double value, Zero zero) {
-  // Far beyond any sensor, and small enough that the arithmetic stays finite. Refuses NaN too.
+  // The bound is far beyond any sensor and keeps the arithmetic finite. NaN is refused too.
   constexpr double largest = 1e6;
   const bool above_lower_end = zero == Zero::allowed ? value >= 0.0 : value > 0.0;
   if (!above_lower_end || value > largest) {
@@ -49,7 +49,7 @@ void validate(const std::vector<glm::dvec2>& elements_mm) {
   }
 }
 
-/// A factor around 1, kept positive: a press presses, an element responds.
+/// Draws a factor around 1, at least 0.1: every press has a force, every element a gain.
 double random_factor(Random& random, double spread) {
   return std::max(0.1, 1.0 + spread * random.normal());
 }

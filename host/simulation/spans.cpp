@@ -10,8 +10,9 @@ namespace palpate {
 
 namespace {
 
-/// Adds the line's part within `radius` of the segment ab, which is one interval: the capsule is
-/// convex, so its ends are the outermost of those of the two discs and the two sides.
+/// Adds the part of the line at `y` within `radius` of the segment ab. It is one interval, since
+/// the capsule is convex; its ends are the outermost crossings with the two discs and the two
+/// sides.
 void add_capsule(const glm::dvec2& a, const glm::dvec2& b, double radius, double y,
                  std::vector<Span>& spans) {
   if (y < std::min(a.y, b.y) - radius || y > std::max(a.y, b.y) + radius) {
@@ -30,7 +31,7 @@ void add_capsule(const glm::dvec2& a, const glm::dvec2& b, double radius, double
       include(p.x + std::sqrt(rest));
     }
   }
-  // A horizontal segment's interval ends on its discs.
+  // Sides parallel to the line add nothing: the interval then ends on the discs.
   const glm::dvec2 along = b - a;
   if (along.y != 0.0) {
     const glm::dvec2 across = glm::dvec2(-along.y, along.x) * (radius / glm::length(along));
@@ -46,7 +47,7 @@ void add_capsule(const glm::dvec2& a, const glm::dvec2& b, double radius, double
   }
 }
 
-/// Adds the line's part inside the polygons, by the even-odd rule.
+/// Adds the part of the line at `y` inside the polygons, by the even-odd rule.
 void add_polygons(const std::vector<std::vector<glm::dvec2>>& polygons, double y,
                   std::vector<Span>& spans) {
   std::vector<double> crossings;
@@ -54,7 +55,7 @@ void add_polygons(const std::vector<std::vector<glm::dvec2>>& polygons, double y
     for (std::size_t i = 0; i < polygon.size(); ++i) {
       const glm::dvec2& a = polygon[i];
       const glm::dvec2& b = polygon[(i + 1) % polygon.size()];
-      // Half open, so that a line through a vertex counts it once.
+      // Edges are half open, so that a line through a vertex counts it once.
       if ((a.y <= y) != (b.y <= y)) {
         crossings.push_back(a.x + (y - a.y) / (b.y - a.y) * (b.x - a.x));
       }
@@ -73,7 +74,7 @@ std::vector<Span> spans(const Shape& shape, double y_mm) {
   for (const Shape::Stroke& stroke : shape.strokes) {
     const std::vector<glm::dvec2>& points = stroke.points_mm;
     for (std::size_t i = 0; i < points.size(); ++i) {
-      // A stroke's first point stands alone too: a stroke of one point is a disc.
+      // The first point is also a capsule of its own: a stroke of one point is a disc.
       add_capsule(points[i == 0 ? 0 : i - 1], points[i], stroke.width_mm / 2.0, y_mm, found);
     }
   }

@@ -12,7 +12,7 @@ struct Span {
   double end;
 };
 
-/// Where the horizontal line at y_mm crosses the shape: disjoint, in ascending order.
+/// Returns where the horizontal line at y_mm crosses the shape: disjoint spans in ascending order.
 std::vector<Span> spans(const Shape& shape, double y_mm);
 
 }  // namespace palpate

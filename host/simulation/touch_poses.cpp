@@ -37,7 +37,7 @@ std::vector<Pose> random_poses(int n, std::uint64_t seed) {
   Random random(seed, Stream::touch_poses);
   std::vector<Pose> poses(n);
   for (Pose& pose : poses) {
-    // One draw per statement: the order of evaluation within one is the compiler's choice.
+    // One draw per statement: within a statement the compiler chooses the order of evaluation.
     pose.translation_mm.x = random.uniform(-reach_mm, reach_mm);
     pose.translation_mm.y = random.uniform(-reach_mm, reach_mm);
     pose.theta_rad = random.uniform(0.0, turn_rad);

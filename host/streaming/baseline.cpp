@@ -10,14 +10,15 @@ namespace palpate {
 
 namespace {
 
-// Of one element over some frames; reorders the values.
+// Returns the median; reorders the values.
 double median(std::span<double> values) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
   std::nth_element(values.begin(), middle, values.end());
   return *middle;
 }
 
-// How far the medians of the quarters lie apart; reorders the values within them.
+// Returns the largest difference between the medians of the four quarters; reorders the values
+// within each quarter.
 double change_over(std::span<double> values) {
   const std::size_t quarter = values.size() / 4;
   double least = median(values.first(quarter));
@@ -37,7 +38,7 @@ std::vector<double> baseline_of(std::span<const Frame> frames, const SensorDescr
   if (frames.empty()) {
     throw Error(Fault::input, "no frame came for the baseline; is the sensor connected?");
   }
-  // Quarters of fewer frames differ by their noise alone.
+  // With fewer frames, noise alone makes the quarters differ.
   constexpr std::size_t least_frames = 40;
   std::vector<double> baseline(sensor.elements_mm.size(), 0.0);
   for (const Frame& frame : frames) {

@@ -8,8 +8,7 @@ namespace palpate {
 
 namespace {
 
-// Bounds the memory and the work where times do not advance; more would not make the mean much
-// better.
+// Bounds memory and work where times do not advance; more frames would hardly improve the mean.
 constexpr std::size_t most_frames = 256;
 
 double median(double a, double b, double c) {
@@ -46,7 +45,7 @@ void FrameSmoother::append(double time_s, const std::vector<double>& pressure) {
     }
     Recent& recent = recent_[i];
     if (recent.count == 0) {
-      recent.readings.fill(pressure[i]);  // stands for those that are missing
+      recent.readings.fill(pressure[i]);  // stands in for the missing readings
     }
     recent.readings[recent.count++ % 3] = pressure[i];
     recent.last_s = time_s;
@@ -55,8 +54,8 @@ void FrameSmoother::append(double time_s, const std::vector<double>& pressure) {
   window_.push_back({.time_s = time_s, .values = std::move(middle), .whole = whole});
 }
 
-// Summed anew for every frame: in a running sum, a reading of 1e20 would leave its rounding, which
-// is larger than any pressure, until the sensor is stopped.
+// Sums anew for every frame: in a running sum, the rounding of a single reading of 1e20 would
+// exceed any pressure until the sensor is stopped.
 void FrameSmoother::take_means(double time_s) {
   const std::size_t e = recent_.size();
   sum_.assign(e, 0.0);
@@ -65,7 +64,7 @@ void FrameSmoother::take_means(double time_s) {
   double whole = 0.0;
   for (const Medians& medians : window_) {
     if (medians.whole) {
-      // Nearly all are, and this loop takes a third of the time of the other.
+      // Nearly all frames are whole; this loop takes a third of the other loop's time.
       for (std::size_t i = 0; i < e; ++i) {
         sum_[i] += medians.values[i];
       }

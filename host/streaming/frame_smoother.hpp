@@ -8,41 +8,40 @@
 
 namespace palpate {
 
-/// Frames without their noise, some frames late: per element the median of its last three readings,
-/// then the mean of these medians over a time.
+/// Smooths frames, at the cost of a delay: per element, a median over the last three readings, then
+/// the mean of these medians over `smooth_s`.
 ///
-/// The mean depends on the readings in its window alone, to the last bit: whatever an element has
-/// read leaves no trace once it has left the window. A reading of NaN is Unknown: it changes no
-/// median and takes no part in the mean. Where the window holds nothing else, an element keeps its
-/// last mean for `largest_gap_s` and is 0 from then on.
+/// The mean depends, to the last bit, only on the readings in its window. NaN means Unknown: it
+/// changes no median and takes no part in the mean. Where all of an element's window is Unknown,
+/// the element keeps its last mean for `largest_gap_s` and is 0 from then on.
 class FrameSmoother {
  public:
-  /// @param smooth_s time that the mean is over
-  /// @param largest_gap_s how long an element that is Unknown keeps its last mean
+  /// @param smooth_s length of the mean's window
+  /// @param largest_gap_s how long an Unknown element keeps its last mean
   FrameSmoother(double smooth_s, double largest_gap_s)
       : smooth_s_(smooth_s), largest_gap_s_(largest_gap_s) {}
 
   /// @param time_s not before the time of the last frame
-  /// @param pressure [e] the differences of two readings that is_known() knows, or NaN: Unknown.
-  /// So no sum overflows.
-  /// @return [e], until the next call
+  /// @param pressure [e] NaN for Unknown, else the difference of two readings that are is_known(),
+  /// so that no sum overflows
+  /// @return [e] the means, valid until the next call
   const std::vector<double>& add(double time_s, const std::vector<double>& pressure);
   /// Forgets every frame.
   void reset();
 
  private:
-  /// The last readings of an element that are known: a ring.
+  /// Ring of an element's last known readings.
   struct Recent {
     std::array<double, 3> readings{};
     std::uint64_t count = 0;
-    double last_s = 0.0;  ///< when the last of them came
+    double last_s = 0.0;  ///< time of the last known reading
   };
 
-  /// Of one frame.
+  /// The medians of one frame.
   struct Medians {
     double time_s;
     std::vector<double> values;  ///< [e] NaN: Unknown
-    bool whole;                  ///< none is Unknown
+    bool whole;                  ///< no element is Unknown
   };
 
   void append(double time_s, const std::vector<double>& pressure);
@@ -54,7 +53,7 @@ class FrameSmoother {
   std::deque<Medians> window_;
   std::vector<std::vector<double>> spare_;  ///< memory for the next medians
   std::vector<double> sum_;                 ///< [e] of the window
-  std::vector<double> known_;               ///< [e] how many of its frames that are not whole count
+  std::vector<double> known_;               ///< [e] known medians of frames that are not whole
   std::vector<double> mean_;                ///< [e]
 };
 

@@ -5,23 +5,23 @@
 
 namespace palpate {
 
-/// When the frames of a sensor without a board are due. Where the stream's clock was set back, the
-/// frame after the step is due at once, and those after it at their distance from it.
+/// Paces the frames of a sensor without a board by the stream's own times. Where these step back,
+/// the next frame is due at once, and later frames at their distance from it.
 class Pace {
  public:
-  /// @param speed times as fast as the stream's own time; nothing: at once
+  /// @param speed multiple of the stream's own time; none: every frame is due at once
   explicit Pace(std::optional<double> speed) : speed_(speed) {}
 
-  /// The stream begins now, at this time of its own.
+  /// Starts the stream now, at `stream_s` of its own time.
   void start(double stream_s);
-  /// Waits until what has this time is due, at most for `timeout`; false: it is not yet due, and
-  /// shall be asked for again.
+  /// Waits until a frame of time `stream_s` is due, at most for `timeout`. Returns false where it
+  /// is not yet due: ask again.
   bool wait(double stream_s, std::chrono::milliseconds timeout);
 
  private:
   std::optional<double> speed_;
-  double last_s_ = 0.0;     ///< time of the last that was due
-  double elapsed_s_ = 0.0;  ///< of the stream, up to it
+  double last_s_ = 0.0;     ///< time of the last frame that was due
+  double elapsed_s_ = 0.0;  ///< stream time up to that frame
   std::chrono::steady_clock::time_point start_;
 };
 

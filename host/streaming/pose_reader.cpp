@@ -33,7 +33,7 @@ int open_poses(const std::string& path) {
 
 // Far longer than any pose; what never ends a line must not fill the memory.
 constexpr std::size_t longest_line = 4096;
-// What read() takes at most.
+// One read() takes at most this many bytes, and PoseReader::read() this many blocks.
 constexpr std::size_t block_bytes = 1 << 14;
 constexpr int blocks_at_once = 4;
 
@@ -85,7 +85,7 @@ void PoseReader::read() {
   }
 }
 
-// One block; false where there is none, or none yet.
+// Reads one block; false where there is none, or none yet.
 bool PoseReader::read_some() {
   char bytes[block_bytes];
   pollfd ready{.fd = descriptor_, .events = POLLIN, .revents = 0};
@@ -101,7 +101,7 @@ bool PoseReader::read_some() {
     throw Error(Fault::input, fmt::format("poses {}: cannot be read: {}; copy or record it again",
                                           name_, std::strerror(errno)));
   }
-  if (got == 0 && !is_fifo_) {  // of a FIFO another writer may come
+  if (got == 0 && !is_fifo_) {  // a FIFO may get another writer
     ended_ = true;
     if (!line_.empty() || overlong_) {
       end_line();
@@ -184,7 +184,7 @@ void PoseReader::add(double time_s, const Pose& T_robot_sensor) {
   }
 }
 
-// Says what has become of the poses that were set aside.
+// Reports what the track did with the poses that it had set aside.
 void PoseReader::judge_order(std::uint64_t dropped_before, std::uint64_t set_back_before) {
   const bool early = aside_.time_s <= aside_.before_s;
   if (track_.dropped() != dropped_before) {

@@ -13,22 +13,23 @@ namespace palpate {
 class PoseReader {
  public:
   /// @param name path of a file or FIFO, or "-": standard input
-  /// @param complain is told of the first line of each kind that is refused; may be empty
-  /// @throws Error where it cannot be read, or a line of a file is refused
+  /// @param complain called for the first refused line of each kind; may be empty
+  /// @throws Error where `name` cannot be read, or a line of a file is refused
   PoseReader(const std::string& name, PoseTrack& track, PosedSensor::Complaint complain);
   ~PoseReader();
   PoseReader(const PoseReader&) = delete;
   PoseReader& operator=(const PoseReader&) = delete;
 
-  /// Takes what has come, without waiting: at most 64 KiB, so that a flood ends nobody's patience.
+  /// Reads what has come, without waiting and at most 64 KiB, so that a flood does not block the
+  /// caller.
   void read();
-  /// No more will come.
+  /// True where no more poses will come.
   bool ended() const { return ended_; }
-  /// The poses are those of a file and all in the track.
+  /// True where the poses come from a file; all of them are then in the track.
   bool is_file() const { return is_file_; }
   /// Poses that joined the track.
   std::uint64_t poses() const { return poses_ - track_.dropped() - track_.set_aside(); }
-  /// Lines that did not.
+  /// Lines that were refused.
   std::uint64_t refused() const { return malformed_ + track_.dropped(); }
   const std::string& first_refused() const { return first_refused_; }
 
@@ -50,11 +51,11 @@ class PoseReader {
   bool is_file_ = false;
   bool is_fifo_ = false;
   bool ended_ = false;
-  std::string line_;       ///< the one that has begun
-  bool overlong_ = false;  ///< it has more bytes than any pose
+  std::string line_;       ///< the line under way
+  bool overlong_ = false;  ///< the line under way is longer than any pose
   std::uint64_t lines_ = 0;
-  std::uint64_t poses_ = 0;      ///< lines that were handed to the track
-  std::uint64_t malformed_ = 0;  ///< lines that were not
+  std::uint64_t poses_ = 0;      ///< lines handed to the track
+  std::uint64_t malformed_ = 0;  ///< lines that hold no pose
   std::string first_refused_;
   std::bitset<static_cast<std::size_t>(Flaw::kinds)> told_;
 

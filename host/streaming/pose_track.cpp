@@ -8,9 +8,9 @@ namespace palpate {
 
 namespace {
 
-// Of a clock that was set: fewer may be stamped wrongly.
+// Poses in a row that show a set clock; fewer may be stamped wrongly.
 constexpr std::size_t enough_to_join = 3;
-// A pose that comes later than this may be stamped wrongly.
+// A pose that comes this many largest gaps later may be stamped wrongly.
 constexpr double gaps_of_a_leap = 10.0;
 
 }  // namespace
@@ -99,7 +99,7 @@ std::optional<double> PoseTrack::last_s() const {
 }
 
 void PoseTrack::forget_before(double time_s) {
-  // The last pose before this time is needed for the time itself.
+  // Interpolation at this time needs the last pose before it.
   while (poses_.size() > 1 && poses_[1].first <= time_s) {
     poses_.pop_front();
   }

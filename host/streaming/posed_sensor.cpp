@@ -16,13 +16,13 @@ using namespace std::chrono_literals;
 
 // How long a frame waits for the pose after it.
 constexpr auto patience = 200ms;
-// How often poses are looked for meanwhile.
+// Interval between looks for poses while waiting.
 constexpr auto look = 5ms;
-// Frames that a replay at full speed may have waiting.
+// Most frames that wait for their poses, as in a replay at full speed.
 constexpr std::size_t most_held = 4096;
-// Poses that a robot may be ahead of the frames.
+// Most poses that are read ahead of the frames.
 constexpr std::size_t most_poses = 1 << 16;
-// Frames of a board that comes back are not older than its poses of this time.
+// When the board is gone, poses this old are kept: frames of its return are not older.
 constexpr double kept_while_gone_s = 1.0;
 
 }  // namespace
@@ -37,13 +37,13 @@ struct PosedSensor::Impl {
        Complaint complain)
       : sensor(std::move(inner)), track(largest_gap_s), reader(name, track, std::move(complain)) {}
 
-  // No pose that is still to come tells more of this frame's.
+  // True where no pose that is still to come can change the frame's pose.
   bool decided(const Frame& frame) const {
     const auto last_s = track.last_s();
     return reader.ended() || (last_s && *last_s >= frame.host_time_s);
   }
 
-  // The first frame, once its pose is known or will not be.
+  // Returns the first frame once its pose is known or given up; none before.
   std::optional<Frame> release() {
     if (held.empty()) {
       return {};
@@ -64,7 +64,7 @@ struct PosedSensor::Impl {
     return frame;
   }
 
-  // Waits for a frame; false where none came. Robots are listened to meanwhile.
+  // Waits for a frame and reads poses meanwhile; false where no frame came.
   bool take(std::chrono::milliseconds wait) {
     if (sensor->ended() || held.size() >= most_held) {
       std::this_thread::sleep_for(wait);
@@ -83,7 +83,7 @@ struct PosedSensor::Impl {
     return false;
   }
 
-  // A file is there as a whole when the sensor starts again.
+  // The poses of a file stay, for when the sensor starts again.
   void forget_before(double time_s) {
     if (!reader.is_file()) {
       track.forget_before(time_s);

@@ -21,21 +21,21 @@ ReplayedSensor::ReplayedSensor(const std::string& path, std::optional<double> sp
   const Recording& r = recording_;
   if (r.rows != "frames") {
     refuse(
-        "rows = touches, single readings; give a stream of frames, or use the touches as they "
-        "are: palpate recognize");
+        "attribute 'rows' = 'touches' means single readings; give a stream of frames, or recognise "
+        "the touches: palpate recognize");
   }
   if (r.time_s.empty()) {
     refuse("dataset 'time' is missing; a replay needs the times of the frames");
   }
   const std::size_t e = r.elements();
   if (r.elements_mm.size() != e) {
-    refuse("its array changes from frame to frame; a sensor has one array, so record each apart");
+    refuse("dataset 'elements' changes from frame to frame; record each array to its own file");
   }
   description_.name = r.sensor;
   description_.serial = r.serial;
   description_.pressure_unit = r.pressure_unit;
   description_.elements_mm = r.elements_mm;
-  // Dead is what is valid in no frame.
+  // An element that is valid in no frame is dead.
   description_.valid.assign(r.valid.empty() ? 0 : e, 0);
   for (std::size_t i = 0; i < r.size(); ++i) {
     const Touch frame = r.touch(i);

@@ -26,7 +26,7 @@ class ReplayedSensor : public Sensor {
   Recording recording_;
   SensorDescription description_;
   Pace pace_;
-  std::size_t at_ = 0;  ///< the frame that is next
+  std::size_t at_ = 0;  ///< index of the next frame
   SensorCounters counters_;
 };
 

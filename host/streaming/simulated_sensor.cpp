@@ -10,25 +10,25 @@ namespace palpate {
 
 namespace {
 
-// Seconds of the robot's day.
+// Phases of the robot's motion, in s.
 constexpr double hover_s = 1.0;
 constexpr double travel_s = 0.3;
 constexpr double ramp_s = 0.1;
 constexpr double steady_s = 0.5;
 constexpr double cycle_s = travel_s + ramp_s + steady_s + ramp_s;
-// After the last press, long enough that its end is seen.
+// Frames go on for this long after the last press, so that its release is seen.
 constexpr double farewell_s = 0.6;
 
 constexpr double offset_kpa = 3.0;
 constexpr double offset_spread_kpa = 0.5;
 
-// 0 to 1 without a kink, at whose ends a real arm stands still too.
+// Rises from 0 to 1 for u in [0, 1] with zero slope at both ends, where an arm stands still.
 double smooth_step(double u) {
   u = std::clamp(u, 0.0, 1.0);
   return u * u * (3.0 - 2.0 * u);
 }
 
-// Part of the force, `t` seconds into a cycle.
+// Returns the part of the full force `t` seconds into a press.
 double force_at(double t) {
   return smooth_step((t - travel_s) / ramp_s) -
          smooth_step((t - travel_s - ramp_s - steady_s) / ramp_s);
@@ -65,7 +65,7 @@ SimulatedSensor::SimulatedSensor(const std::string& shape, const SimulatedSensor
 
 void SimulatedSensor::start() {
   SensorModel model;
-  model.noise_kpa = 0.0;  // every frame has its own
+  model.noise_kpa = 0.0;  // every frame adds its own
   simulator_.emplace(shape_, model, description_.elements_mm, options_.seed);
   noise_.emplace(options_.seed, Stream::frames);
   offset_kpa_.clear();
@@ -83,12 +83,12 @@ void SimulatedSensor::start() {
   pace_.start(0.0);
 }
 
-// A robot with a guarded move goes on to the next place where it meets nothing.
+// Draws the next press that meets the shape, as a guarded move goes on where it meets nothing.
 SimulatedSensor::Press SimulatedSensor::draw_press() {
   constexpr double least_kpa = 5.0;
   constexpr int batch = 256;
   Press press;
-  // A shape that is hardly ever met is pressed where it is not after so many tries.
+  // After so many misses, the robot presses where it is.
   for (int tries = 0; tries < 1000; ++tries) {
     if (poses_.empty()) {
       poses_ = random_poses(batch, options_.seed + batches_++);

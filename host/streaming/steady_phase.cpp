@@ -12,12 +12,14 @@ namespace palpate {
 namespace {
 
 constexpr double turn_rad = 2.0 * std::numbers::pi;
-// More would not make the mean better than the sensor is.
+// Beyond this many frames, the sensor's own error exceeds the mean's noise.
 constexpr std::size_t most_kept = 512;
-// So that one that is wrong does not decide.
+// Of fewer frames, a single wrong one would decide.
 constexpr std::size_t least_frames = 3;
 
-// Mean of the middle half; values at its borders count by their part. Reorders the values.
+// Returns the mean of the middle half; values at its borders count in part. Reorders the values. It
+// averages Gaussian noise with 84 % of the mean's efficiency (the median: 64 %) and, unlike the
+// median, resolves less than a step of the sensor's converter.
 double interquartile_mean(std::span<double> values) {
   std::sort(values.begin(), values.end());
   const double n = static_cast<double>(values.size());
@@ -37,7 +39,7 @@ bool SteadyPhase::fits(double load, const std::optional<Pose>& T_robot_sensor) c
     return true;
   }
   const double mean = load_sum_ / static_cast<double>(frames_);
-  // Noise of a light touch is a large part of its load, and no sign of a change.
+  // In a light touch, noise is a large part of the load and no sign of change.
   if (std::abs(load - mean) > std::max(options_.steady * mean, options_.release)) {
     return false;
   }
@@ -66,7 +68,7 @@ void SteadyPhase::add(double time_s, double load, const std::vector<double>& pre
   }
 }
 
-// Keeps every second frame, and of those to come too.
+// Drops every second frame kept, and keeps half as many from here on.
 void SteadyPhase::thin() {
   const std::size_t e = pressure_.size() / kept_.size();
   for (std::size_t i = 0; 2 * i < kept_.size(); ++i) {
@@ -79,7 +81,7 @@ void SteadyPhase::thin() {
   stride_ *= 2;
 }
 
-// The release shows late in what was smoothed: the last frames may belong to it.
+// Counts the frames kept before the release, which shows late in the smoothed pressures.
 std::size_t SteadyPhase::steady_frames() const {
   constexpr std::size_t median_delay = 2;
   if (kept_.size() < median_delay) {

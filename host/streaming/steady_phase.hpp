@@ -8,21 +8,21 @@
 
 namespace palpate {
 
-/// Frames in a row that are alike: the candidate for a touch's reading.
+/// Consecutive frames of steady load and pose: a candidate for a touch's reading.
 class SteadyPhase {
  public:
   explicit SteadyPhase(const TouchDetectorOptions& options) : options_(options) {}
 
   bool empty() const { return frames_ == 0; }
-  /// Whether a frame of this load and pose is like those before it.
+  /// True where a frame of this load and pose continues the phase.
   bool fits(double load, const std::optional<Pose>& T_robot_sensor) const;
   /// @param pressure [e] above the baseline; NaN: Unknown
   void add(double time_s, double load, const std::vector<double>& pressure,
            const std::optional<Pose>& T_robot_sensor);
-  /// The reading, unless the phase is too short. An element that was known in fewer than three of
-  /// its frames is not valid in it.
+  /// Returns the reading; none where the phase is too short. An element known in fewer than three
+  /// frames is not valid in it.
   std::optional<DetectedTouch> touch() const;
-  /// Forgets its frames.
+  /// Forgets all frames.
   void clear();
 
  private:
@@ -38,7 +38,7 @@ class SteadyPhase {
   std::size_t frames_ = 0;
   double load_sum_ = 0.0;
   std::optional<Pose> first_pose_;
-  std::size_t stride_ = 1;  ///< every how many frames one is kept
+  std::size_t stride_ = 1;  ///< one of this many frames is kept
   std::vector<Kept> kept_;
   std::vector<double> pressure_;  ///< [kept, e]
 };

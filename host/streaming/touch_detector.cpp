@@ -17,7 +17,7 @@ namespace palpate {
 
 namespace {
 
-// After a release, the skin creeps back for a while; that is not drift.
+// After a release the skin creeps back for a while, which is no drift.
 constexpr double rest_s = 0.5;
 
 void require(const char* field, double value, bool in_range, const char* range) {
@@ -61,15 +61,15 @@ struct TouchDetector::Impl {
   std::vector<double> baseline;
   std::vector<std::uint8_t> valid;
   FrameSmoother smoother;
-  SteadyPhase phase;                  // the one under way
-  std::optional<DetectedTouch> best;  // of the phases of this touch that are over
-  std::vector<double> pressure;       // [e] of the frame under way, above the baseline; NaN: none
-  std::optional<double> last_s;       // time of the frame before
-  std::optional<double> released_s;   // end of the touch before
+  SteadyPhase phase;                  // steady phase under way
+  std::optional<DetectedTouch> best;  // longest finished phase of this touch
+  std::vector<double> pressure;       // [e] of the present frame, above the baseline; NaN: Unknown
+  std::optional<double> last_s;       // time of the last frame
+  std::optional<double> released_s;   // end of the last touch
   bool touching = false;
 };
 
-// Subtracts the baseline. False for a frame that says nothing.
+// Subtracts the baseline. Returns false for a frame without a known reading or a finite time.
 bool TouchDetector::Impl::take(const Frame& frame) {
   const std::size_t e = frame.values.size();
   if (baseline.empty()) {
@@ -119,7 +119,7 @@ std::optional<DetectedTouch> TouchDetector::Impl::add(const Frame& frame) {
   }
   if (touching && largest < options.release) {
     released_s = time_s;
-    return end_touch();  // never after a gap, which touches nothing
+    return end_touch();  // `ended` is none: a gap leaves nothing touched
   }
   touching = true;
   const std::optional<Pose> pose = frame.T_robot_sensor && is_robot_pose(*frame.T_robot_sensor)
@@ -138,7 +138,7 @@ void TouchDetector::Impl::follow_drift(const std::vector<double>& smooth, double
   }
   const double part = std::clamp(elapsed_s / options.drift_s, 0.0, 1.0);
   for (std::size_t i = 0; i < baseline.size(); ++i) {
-    // Two frames of -1e38 are no drift, and would be the baseline from here on.
+    // The bound keeps two frames of -1e38 from becoming the baseline.
     baseline[i] += part * std::max(smooth[i], -options.onset);
   }
 }
@@ -192,7 +192,7 @@ std::optional<DetectedTouch> TouchDetector::finish() {
   std::optional<DetectedTouch> touch = detector.end_touch();
   detector.smoother.reset();
   detector.last_s.reset();
-  detector.released_s.reset();  // the next stream may be of any time
+  detector.released_s.reset();  // the next stream may begin at any time
   return touch;
 }
 

@@ -27,10 +27,10 @@ constexpr std::array<std::string_view, 1> replay_keys{"speed"};
 constexpr std::array<std::string_view, 7> simulate_keys{"rate",  "array",  "seed", "touches",
                                                         "noise", "object", "speed"};
 
-// "WHAT,key=value,key=value" taken apart, and what each key says.
+// Parses "WHAT,key=value,key=value" and each key's value.
 class SourceName {
  public:
-  // Only known keys end what the name is about: a path may hold commas and equals signs.
+  // A path may hold commas and equals signs, so that only a known key ends it.
   SourceName(const std::string& name, std::string_view scheme,
              std::span<const std::string_view> keys)
       : name_(name) {
@@ -44,7 +44,7 @@ class SourceName {
       const std::string_view key = option.substr(0, option.find('='));
       if (std::find(keys.begin(), keys.end(), key) == keys.end()) {
         if (scheme == simulate) {
-          refuse(key, fmt::format("is no option; there are {}", fmt::join(keys, ", ")));
+          refuse(key, fmt::format("is no option; the options are {}", fmt::join(keys, ", ")));
         }
         break;
       }
@@ -183,12 +183,13 @@ bool is_endless_flood(const std::string& name) {
     return false;
   }
   const SimulatedSensorOptions options = options_of(SourceName(name, simulate, simulate_keys));
-  // 6 GB in ten minutes: a recording that somebody forgets for so long still fits on most disks.
-  // The DigiTacts array writes 1.8 MB/s at 100 Hz and 100 times real time.
+  // 6 GB in ten minutes: such a recording, if forgotten, still fits on most disks. The DigiTacts
+  // array gives 1.8 MB/s at 100 Hz and 100 times real time.
   constexpr double most_bytes_per_s = 10e6;
   const std::size_t elements =
       options.elements_mm.empty() ? digitacts_array().size() : options.elements_mm.size();
-  // Readings are stored as floats; time, losses and a pose of three numbers take 8 bytes each.
+  // A recording stores readings as floats, and time, losses and a pose of three numbers in 8 bytes
+  // each.
   const auto frame_bytes = static_cast<double>(elements * sizeof(float) + 5 * sizeof(double));
   return !options.touches &&
          (!options.speed || options.rate_hz * *options.speed * frame_bytes > most_bytes_per_s);

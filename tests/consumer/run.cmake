@@ -1,4 +1,4 @@
-# Run by CTest. Installs the build into a scratch prefix and uses Palpate only from this prefix.
+# Installs the build tree into a scratch prefix, and uses Palpate only from there. CTest runs this.
 cmake_minimum_required(VERSION 3.25)
 
 function(run)
@@ -16,7 +16,7 @@ set(prefix ${SCRATCH_DIR}/prefix)
 file(REMOVE_RECURSE ${SCRATCH_DIR})
 run(${CMAKE_COMMAND} --install ${BUILD_DIR} --prefix ${prefix})
 
-# The program must find its library relative to itself, wherever the prefix lies.
+# The program must find its library relative to itself after the prefix was moved.
 file(RENAME ${prefix} ${prefix}.moved)
 set(prefix ${prefix}.moved)
 run(${prefix}/bin/palpate --version)
@@ -24,7 +24,7 @@ if(NOT output STREQUAL "${VERSION}\n")
   message(FATAL_ERROR "palpate --version printed '${output}', not ${VERSION}")
 endif()
 
-# The public headers include none of Vulkan, HDF5 and libusb.
+# A user needs no headers of Vulkan, HDF5 or libusb.
 file(GLOB_RECURSE headers ${prefix}/include/*.hpp)
 if(NOT headers)
   message(FATAL_ERROR "no header was installed in ${prefix}/include")
@@ -36,7 +36,7 @@ foreach(header IN LISTS headers)
   endif()
 endforeach()
 
-# A library with sanitizers needs a program with sanitizers.
+# Sanitizers work in the library only if the program is built with them.
 if(SANITIZE)
   string(APPEND FLAGS " -fsanitize=${SANITIZE}")
 endif()
@@ -47,7 +47,7 @@ run(${CMAKE_COMMAND} --build ${SCRATCH_DIR}/build)
 run(${SCRATCH_DIR}/build/consumer)
 run(${SCRATCH_DIR}/build/board_reader)
 
-# The core library is linked without libusb, and the driver without Vulkan.
+# The core must not load libusb, nor the driver Vulkan.
 foreach(program IN ITEMS consumer board_reader)
   file(GET_RUNTIME_DEPENDENCIES EXECUTABLES ${SCRATCH_DIR}/build/${program}
        RESOLVED_DEPENDENCIES_VAR ${program}_libraries UNRESOLVED_DEPENDENCIES_VAR unresolved)

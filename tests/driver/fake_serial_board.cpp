@@ -4,7 +4,7 @@ namespace palpate {
 
 namespace {
 
-// Interfaces 0 and 1 are another function of the board, without the CDC descriptors of one.
+// Interfaces 0 and 1 are another function of the board and have no CDC union descriptor.
 constexpr std::uint8_t control_interface = 2;
 constexpr std::uint8_t data_interface = 3;
 

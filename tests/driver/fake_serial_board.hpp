@@ -8,21 +8,20 @@
 
 namespace palpate {
 
-/// A board behind a CDC ACM port: a control interface that rules over a data interface.
+/// A board behind a CDC ACM port: a control interface and the data interface that belongs to it.
 class FakeSerialBoard {
  public:
   struct Ids {
     std::uint16_t vendor = 0x16d0;  // Robotiq's TSF-85
     std::uint16_t product = 0x14cc;
   };
-  /// How the descriptors tell which control interface belongs to the data interface; there is none
-  /// where the data interface is `alone`.
+  /// How the descriptors show the control interface; `alone`: the board has no control interface.
   enum class Union { present, missing, alone };
 
   FakeSerialBoard(FakeUsb& usb, const std::string& serial, Ids ids,
                   Union descriptor = Union::present, int address = 2);
 
-  /// As the host set them; none before.
+  /// The settings that the host made last; none before it made any.
   std::optional<Bytes> line_coding() const;
   std::optional<int> line_state() const;
 
@@ -34,7 +33,7 @@ class FakeSerialBoard {
   mutable std::mutex mutex_;
   std::optional<Bytes> line_coding_;
   std::optional<int> line_state_;
-  FakeUsbDevice device_;  // the last: it calls the others
+  FakeUsbDevice device_;  // last member: it calls functions that use the other members
 };
 
 }  // namespace palpate

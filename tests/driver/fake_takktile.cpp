@@ -8,7 +8,7 @@ namespace {
 
 constexpr int columns = 5;
 
-/// One vendor interface: bulk 0x81 towards the host, 0x02 from it.
+/// One vendor interface: bulk endpoint 0x81 towards the host, 0x02 from the host.
 Bytes configuration() {
   return {9, 2, 32,   0, 1,  1,    0, 0x80, 50,  // one interface
           9, 4, 0,    0, 2,  0xff, 0, 0,    0,   //
@@ -93,7 +93,7 @@ std::optional<Bytes> FakeTakktile::answer(const FakeUsbDevice::Setup& setup) {
                    0x33,
                    0xc8};
     case 0xc7: {
-      // TCC0.CTRLA = TC_CLKSEL_DIV256_gc & wIndex: the timer runs where bits of 0x06 are left.
+      // TCC0.CTRLA = TC_CLKSEL_DIV256_gc & wIndex: the timer runs if a bit of 0x06 is set.
       constexpr int clock_by_256 = 0x06;
       streaming_ = (setup.index & clock_by_256) == clock_by_256;
       return Bytes{static_cast<std::uint8_t>(setup.index != 0 ? 1 : 0)};

@@ -8,30 +8,30 @@
 
 namespace palpate {
 
-/// What a cell of the fake reads, in kPa, by the formula of the MPL115A2's data sheet with the
-/// coefficients of its worked example; a0 grows by 32 each time the fake is recalibrated.
+/// The pressure of a cell of the fake, in kPa, by the formula and the worked example's coefficients
+/// of the MPL115A2's data sheet. Each recalibration of the fake adds 32 to a0.
 double expected_kpa(int raw_pressure, int raw_temperature = 512, int recalibrations = 0);
-/// The data sheet rounds the coefficients to 1e-6; they are multiplied by up to 1023 twice.
+/// The data sheet rounds the coefficients to 1e-6; readings of up to 1023 multiply them twice.
 constexpr double kpa_tolerance = 0.05;
 
 /// A TakkTile as its published firmware behaves.
 class FakeTakktile {
  public:
-  /// Which firmware answers: they tell the cells alive in 8 bytes of bits, or in 40 bytes.
+  /// The firmware that answers: its alive map has 8 bytes of bits, or 40 bytes.
   enum class Layout { bits, bytes };
 
-  /// @param alive_rows cells of each row that are alive, as bits
+  /// @param alive_rows [row] the cells that are alive, as bits
   FakeTakktile(FakeUsb& usb, const std::string& serial, std::vector<std::uint8_t> alive_rows,
                Layout layout = Layout::bits, int address = 2);
 
-  /// Sends a frame whose cells all read these 10-bit numbers.
+  /// Sends a frame in which every cell reads these 10-bit numbers.
   void send_frame(int raw_pressure, int raw_temperature = 512);
-  /// The host has asked for frames.
+  /// Whether the host asked for frames.
   bool streaming() const { return streaming_; }
   int cells() const;
-  /// Its calibration is another one from here on.
+  /// Changes the calibration.
   void recalibrate() { ++recalibrations_; }
-  /// Its cells are others from here on.
+  /// Changes the cells that are alive.
   void replace_cells(std::vector<std::uint8_t> alive_rows);
 
   FakeUsbDevice& usb() { return device_; }
@@ -43,7 +43,7 @@ class FakeTakktile {
   Layout layout_;
   std::atomic<bool> streaming_ = false;
   std::atomic<int> recalibrations_ = 0;
-  FakeUsbDevice device_;  // the last: it calls the others
+  FakeUsbDevice device_;  // last member: it calls functions that use the other members
 };
 
 }  // namespace palpate

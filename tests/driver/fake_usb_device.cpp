@@ -129,7 +129,7 @@ void FakeUsbDevice::plug(int by) {
   attribute("manufacturer", identity_.manufacturer);
   attribute("product", identity_.product_name);
   attribute("serial", identity_.serial);
-  // Before the device appears, so that whoever sees it can open it.
+  // Comes before the device appears: a program that sees the device can open it.
   GError* error = nullptr;
   if (!umockdev_testbed_attach_ioctl(usb_.testbed(), node().c_str(), last().handler, &error)) {
     throw std::runtime_error(error->message);
@@ -224,7 +224,7 @@ void FakeUsbDevice::occupy(bool occupied) {
 }
 
 void FakeUsbDevice::forbid() {
-  // umockdev would ask its own socket before the file.
+  // Otherwise umockdev would ask its own socket before the file.
   umockdev_testbed_detach_ioctl(usb_.testbed(), node().c_str(), nullptr);
   const bool is_root = geteuid() == 0;
   chmod((usb_.root() + node()).c_str(), is_root ? S_IRUSR | S_IWUSR : 0);

@@ -20,8 +20,8 @@ namespace palpate {
 
 using Bytes = std::vector<std::uint8_t>;
 
-/// The USB of a test: /sys, /dev and udev as umockdev shows them to libusb in this process and in
-/// those it starts.
+/// The USB of a test: umockdev shows this /sys, /dev and udev to libusb in the test's process and
+/// in the processes that it starts.
 class FakeUsb {
  public:
   FakeUsb();
@@ -36,8 +36,8 @@ class FakeUsb {
   UMockdevTestbed* testbed_;
 };
 
-/// A device behind Linux's usbfs: what the kernel and the hardware would answer to libusb's ioctls.
-/// Its firmware is the function that answers control requests, and whoever sends packets.
+/// A USB device that answers libusb's ioctls as Linux's usbfs and the hardware would. Its firmware
+/// is a function that answers control requests, and the test, which sends packets.
 class FakeUsbDevice {
  public:
   static constexpr std::size_t packet_bytes = 64;  ///< of every endpoint
@@ -55,51 +55,51 @@ class FakeUsbDevice {
     std::uint16_t value = 0;
     std::uint16_t index = 0;
   };
-  /// The bytes for the host, empty for a request from it (whose bytes come along); none = stall.
-  /// Called from the thread that plays the kernel.
+  /// Answers a control request, from the thread that plays the kernel: with bytes for the host,
+  /// with no bytes to a request that brings `data`, or with nullopt for a stall.
   using Firmware = std::function<std::optional<Bytes>(const Setup& setup, const Bytes& data)>;
-  /// What a packet's turn on the bus ends with, as the kernel reports it in the status of a URB.
+  /// How a packet's turn on the bus ends, as the kernel reports it in the status of a URB.
   enum class Fault { none, stall, overflow, protocol };
 
-  /// @param configuration the configuration descriptor with all that follows it
+  /// @param configuration the configuration descriptor and the descriptors behind it
   FakeUsbDevice(FakeUsb& usb, int address, int port, Identity identity, Bytes configuration,
                 Firmware firmware);
-  /// Sensors that have transfers under way have to be stopped before: nobody would end them.
+  /// Sensors with submitted transfers must be stopped before: nobody would end the transfers.
   ~FakeUsbDevice();
   FakeUsbDevice(const FakeUsbDevice&) = delete;
   FakeUsbDevice& operator=(const FakeUsbDevice&) = delete;
 
-  /// Appears on the bus again, `by` addresses further: a bus gives each device that is plugged in a
-  /// new one, and the old one only after all 127 have had their turn (0).
+  /// Makes the device appear again, `by` addresses further. A bus gives each new device the next
+  /// address, so that the old address (0) comes back only after 127 devices.
   void plug(int by = 1);
-  /// Disappears: the URBs under way fail, and whoever has it open has nothing any more, also once
-  /// it is plugged in again.
+  /// Makes the device disappear: submitted URBs fail, and files opened before stay dead, even after
+  /// the device is plugged in again.
   void unplug();
 
   /// Queues a packet of the bulk endpoint towards the host.
   void send_packet(Bytes bytes);
-  /// Queues bytes as packets of 64 bytes, the last one short; empty where they are a multiple.
+  /// Queues bytes as packets of 64 bytes and a last, shorter packet, which may be empty.
   void send_message(const Bytes& bytes);
-  /// The next turn on the bus ends so. A stall stays until the halt is cleared.
+  /// Makes the next turn on the bus end this way. A stall stays until the halt is cleared.
   void send_fault(Fault fault, int times = 1);
-  /// Every control request is refused by a stall, or never answered.
+  /// Refuses every control request by a stall, or never answers one.
   void refuse_requests(bool refuse);
   void ignore_requests(bool ignore);
-  /// Only root may open it, and nobody where the test is not run by root.
+  /// Lets only root open the device; nobody if the test is not run by root.
   void forbid();
-  /// Another program has the interfaces.
+  /// Lets another program hold the interfaces.
   void occupy(bool occupied);
-  /// A driver of the kernel has the interface, except while it is claimed.
+  /// Lets a kernel driver hold the interface while no program claims it.
   void bind_kernel_driver(int interface);
 
-  // What the host has done.
+  // What the host did.
   std::vector<Setup> requests() const;
   int halts_cleared() const;
   int urbs_under_way() const;
   bool claimed(int interface) const;
   bool has_kernel_driver(int interface) const;
   Bytes received() const;  ///< through the bulk endpoint from the host
-  /// Packets that nobody has fetched yet.
+  /// Number of packets that the host has not fetched yet.
   std::size_t waiting_packets() const;
 
   std::string node() const;
@@ -124,8 +124,8 @@ class FakeUsbDevice {
     Fault fault = Fault::none;
   };
 
-  /// The device from one plugging in to the unplugging, which is what an open file belongs to: the
-  /// kernel knows a device that comes back as another one.
+  /// The device between one plugging in and the next unplugging. An open file belongs to it: to the
+  /// kernel, a device that comes back is a new device.
   struct Attachment {
     explicit Attachment(FakeUsbDevice& device);
     ~Attachment();
@@ -162,7 +162,7 @@ class FakeUsbDevice {
 
   mutable std::mutex mutex_;
   std::condition_variable changed_;
-  std::vector<std::unique_ptr<Attachment>> attachments_;  // those of before may still be open
+  std::vector<std::unique_ptr<Attachment>> attachments_;  // earlier ones may still be open
   bool refusing_ = false;
   bool ignoring_ = false;
   bool occupied_ = false;

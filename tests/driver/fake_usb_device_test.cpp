@@ -1,5 +1,5 @@
-// The fake has to be as strict as a kernel: what works with a file of before the unplugging here
-// would not work with any board.
+// Tests that the fake is as strict as a kernel: a file that was opened before the device was
+// unplugged must stay dead.
 #include <fcntl.h>
 #include <linux/usbdevice_fs.h>
 #include <sys/ioctl.h>
@@ -25,7 +25,7 @@ class OpenedFile {
   OpenedFile(const OpenedFile&) = delete;
   OpenedFile& operator=(const OpenedFile&) = delete;
 
-  /// The errno of the call; 0 where it succeeds.
+  /// The errno of the call; 0 if the call succeeds.
   template <class Argument>
   int answer(unsigned long request, Argument* argument) const {
     return ioctl(file_, request, argument) == 0 ? 0 : errno;
@@ -42,7 +42,7 @@ class OpenedFile {
   int file_;
 };
 
-/// A transfer from the bulk endpoint into the bytes.
+/// A transfer from the bulk endpoint into `bytes`.
 usbdevfs_urb bulk_read(std::array<std::uint8_t, 64>& bytes) {
   usbdevfs_urb urb{};
   urb.type = USBDEVFS_URB_TYPE_BULK;
@@ -91,7 +91,7 @@ TEST_F(FakeUsbDeviceFile, IsDeadForEverOnceTheDeviceIsUnplugged) {
   expect_dead(file);
   expect_dead(never_used);
 
-  // Under another address, and once all have had their turn under the old one.
+  // At another address, and after all others had their turn at the old address.
   for (const int by : {1, 0}) {
     const std::string before = board_.usb().node();
     board_.usb().plug(by);

@@ -1,4 +1,4 @@
-// What the kernel's usbfs answers to a program that has a fake device open.
+// Answers the ioctls of a program that has a fake device open, as the kernel's usbfs would.
 
 #include <sys/ioctl.h>
 
@@ -146,7 +146,7 @@ int FakeUsbDevice::discard(UMockdevIoctlData* argument, Attachment& attachment) 
   return EINVAL;
 }
 
-/// Lets packets take their turn until one ends a transfer.
+/// Lets packets take their turn until a packet ends a transfer.
 void FakeUsbDevice::run_bulk(Attachment& attachment) {
   while (attachment.finished.empty() && (attachment.halted || !turns_.empty()) &&
          !attachment.under_way.empty() && attachment.plugged) {
@@ -193,8 +193,7 @@ int FakeUsbDevice::reap(UMockdevIoctlData* argument, Attachment& attachment,
                         std::unique_lock<std::mutex>& lock) {
   run_bulk(attachment);
   if (attachment.finished.empty() && attachment.plugged) {
-    // libusb sees a file that is always ready and asks without end: a short wait here leaves the
-    // processor to others.
+    // libusb sees a file that is always ready, and asks without pause: a short wait saves time.
     changed_.wait_for(lock, std::chrono::microseconds(500));
     run_bulk(attachment);
   }

@@ -49,7 +49,7 @@ TEST(FrameQueueTest, SaysWhyNoFrameComesOnceNoneIsLeft) {
 TEST(FrameQueueTest, WaitsAsLongAsATimeCanBe) {
   FrameQueue queue;
   auto frame = std::async(std::launch::async, [&] { return queue.pop(milliseconds::max()); });
-  // Where the end of the wait lay in the past, it would be over by now.
+  // If the end of the wait overflowed into the past, pop() would have returned by now.
   EXPECT_EQ(frame.wait_for(milliseconds(50)), std::future_status::timeout);
   queue.push(numbered(1));
   ASSERT_EQ(frame.wait_for(patience), std::future_status::ready);

@@ -43,7 +43,7 @@ TEST_F(Hotplug, AStreamOutlivesUnpluggingAndReadsTheCalibrationAgain) {
   sensor->start();
   for (int round = 1; round <= 3; ++round) {
     expect_frame(*sensor, board, 100 + round, round - 1);
-    board.send_frame(500);  // perhaps on its way when the plug is pulled
+    board.send_frame(500);  // may be in transfer when the plug is pulled
     board.usb().unplug();
     ASSERT_TRUE(becomes_true([&] { return sensor->gone(); }));
     while (sensor->next(std::chrono::milliseconds(10))) {
@@ -65,7 +65,7 @@ TEST_F(Hotplug, AnotherBoardDoesNotTakeThePlace) {
   board.usb().unplug();
   ASSERT_TRUE(becomes_true([&] { return sensor->gone(); }));
   FakeTakktile other(usb_, "2", {0b11111}, FakeTakktile::Layout::bits, 9);
-  // Long enough for several looks: it is the arrival that makes the sensor look at once.
+  // Long enough for the sensor to look several times; the arrival makes it look at once.
   std::this_thread::sleep_for(std::chrono::milliseconds(300));
   EXPECT_TRUE(sensor->gone());
   EXPECT_TRUE(other.usb().requests().empty());
@@ -96,7 +96,7 @@ TEST_F(Hotplug, BoardsThatShareASerialNumberAreKnownByTheirPorts) {
     open_board("takktile:0001");
     ADD_FAILURE() << "it could be either";
   } catch (const Error& error) {
-    EXPECT_THAT(error.what(), HasSubstr("say which: takktile:1-2, takktile:1-3"));
+    EXPECT_THAT(error.what(), HasSubstr("name one: takktile:1-2, takktile:1-3"));
   }
   const auto sensor = open_board("takktile:1-3");
   sensor->start();
@@ -119,7 +119,7 @@ TEST_F(Hotplug, OtherCellsThanBeforeAreRefused) {
   board.replace_cells({0b1111});
   board.usb().plug();
   try {
-    // The first may time out while the board comes back.
+    // The first next() may time out while the board comes back.
     for (int i = 0; i < 2; ++i) {
       sensor->next(patience);
     }
@@ -172,7 +172,7 @@ TEST_F(Hotplug, TwoBoardsStreamAtOnce) {
     EXPECT_NEAR(from_left[i].values.at(4), expected_kpa(i), kpa_tolerance);
     EXPECT_NEAR(from_right[i].values.at(2), expected_kpa(500 + i), kpa_tolerance);
   }
-  // One of them goes; the other does not notice.
+  // One board is unplugged; the other board's stream continues.
   right.usb().unplug();
   ASSERT_TRUE(becomes_true([&] { return r->gone(); }));
   expect_frame(*l, left, 700);

@@ -22,7 +22,7 @@ using testing::Not;
 
 class Refusal : public testing::Test {
  protected:
-  /// What open_board says; "" where it succeeds.
+  /// The message of open_board()'s error; "" if it succeeds.
   static std::string refusal(const std::string& name, Fault fault) {
     try {
       open_board(name);
@@ -36,12 +36,12 @@ class Refusal : public testing::Test {
   FakeUsb usb_;
 };
 
-/// An ordinary user, where the test is run by root.
+/// Makes the process an ordinary user's while it lives, if the test is run by root.
 class OrdinaryUser {
  public:
   explicit OrdinaryUser(const FakeUsb& usb) : was_root_(geteuid() == 0) {
     if (was_root_) {
-      // The library that plays udev and the kernel makes and uses sockets there.
+      // umockdev's library makes and uses sockets there.
       chmod(usb.root().c_str(), 0777);
       chmod((usb.root() + "/ioctl/_default").c_str(), 0777);
       constexpr uid_t nobody = 65534;
@@ -67,7 +67,7 @@ TEST_F(Refusal, MissingPermissionNamesTheRuleAndHowToInstallIt) {
   const std::string message = refusal("takktile", Fault::system);
   EXPECT_THAT(message, AllOf(HasSubstr("no permission"), HasSubstr("/dev/bus/usb/001/002"),
                              HasSubstr("sudo cp "), HasSubstr("udevadm control --reload")));
-  // The file that the message names is there.
+  // The message names a file that exists.
   const std::size_t begin = message.find("sudo cp ") + 8;
   const std::string rule = message.substr(begin, message.find(' ', begin) - begin);
   EXPECT_EQ(access(rule.c_str(), R_OK), 0) << rule;
@@ -110,7 +110,7 @@ class OtherProgram {
 };
 
 TEST_F(Refusal, ABoardInUseNamesWhoHasIt) {
-  // An address of its own: tests that run beside this one have their boards open.
+  // The address is unique: tests that run in parallel have boards open, too.
   FakeTakktile board(usb_, "1", {0b11111}, FakeTakktile::Layout::bits, 99);
   board.usb().occupy(true);
   {

@@ -1,5 +1,5 @@
-// A sensor outlives its board's handle: start() finds the board again that was unplugged since it
-// was opened or stopped.
+// Tests that start() finds a board again that was unplugged and plugged in after the sensor was
+// opened or stopped.
 #include <future>
 
 #include <gmock/gmock.h>
@@ -19,7 +19,7 @@ namespace {
 using testing::AllOf;
 using testing::HasSubstr;
 
-/// What start() says; "" where it succeeds.
+/// The message of start()'s error; "" if it succeeds.
 std::string refusal(Sensor& sensor) {
   try {
     sensor.start();
@@ -62,7 +62,7 @@ TEST_F(Restart, FindsABoardThatWasPluggedInAgainWhileStopped) {
   const auto sensor = open_board("takktile");
   sensor->start();
   expect_frame(*sensor, board, 100);
-  // The last time under the address of before, as after 127 others.
+  // The last time at the first address, as after 127 other devices.
   int recalibrations = 0;
   for (const int by : {1, 1, 0}) {
     sensor->stop();
@@ -141,12 +141,12 @@ TEST_F(Restart, FindsABoardThatIsMovedToAnotherPortWhileItStarts) {
   const auto sensor = open_board("takktile");
   const std::size_t asked = board.usb().requests().size();
   board.usb().ignore_requests(true);
-  // Plugged in before it is unplugged: so start() meets it whenever it looks.
+  // The board appears at the new port before it leaves the old port: start() always finds it.
   FakeTakktile elsewhere(usb_, "1", {0b11111}, FakeTakktile::Layout::bits, 5);
   auto started = std::async(std::launch::async, [&] { return refusal(*sensor); });
   ASSERT_TRUE(becomes_true([&] { return board.usb().requests().size() > asked; }));
   board.usb().unplug();
-  // A transfer tells of the unplugging before udev does: for a moment both are listed.
+  // A transfer reports the unplugging before udev does: for a moment both ports are listed.
   if (const std::string message = started.get(); !message.empty()) {
     EXPECT_THAT(message, HasSubstr("2 of them are plugged in"));
     EXPECT_EQ(refusal(*sensor), "");
@@ -199,8 +199,8 @@ TEST_F(Restart, StopsABoardThatIsGone) {
 
 class SerialRestart : public testing::TestWithParam<FakeSerialBoard::Union> {};
 
-// A FlexiTac wants no bytes before it streams: without a control interface nothing is sent to it at
-// start(), and only the transfers can tell that it is another device now.
+// start() sends nothing to a FlexiTac without control interface: only the transfers can show that
+// it is a new device.
 TEST_P(SerialRestart, FindsABoardThatWasPluggedInAgain) {
   FakeUsb usb;
   FakeSerialBoard board(usb, "A1", {}, GetParam());

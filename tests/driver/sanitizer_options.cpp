@@ -1,6 +1,6 @@
-// Read by AddressSanitizer's run-time library in every build that has one.
+// AddressSanitizer's run-time library reads these options, in every build that has the library.
 
-/// umockdev's library stands before the sanitizer's, and GLib keeps what it allocates.
+/// umockdev's library is loaded before the sanitizer's, and GLib keeps memory until exit.
 extern "C" const char* __asan_default_options() {  // NOLINT(bugprone-reserved-identifier)
   return "verify_asan_link_order=0:detect_leaks=0";
 }

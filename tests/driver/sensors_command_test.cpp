@@ -13,10 +13,10 @@ using nlohmann::json;
 using testing::HasSubstr;
 using testing::Not;
 
-/// The program sees the USB of the test.
+/// Runs the program with the USB of the test.
 class SensorsCommand : public ProgramTest {
  protected:
-  // As in sanitizer_options.cpp, for the program.
+  // The options of sanitizer_options.cpp, for the program.
   SensorsCommand() { setenv("ASAN_OPTIONS", "verify_asan_link_order=0:detect_leaks=0", 1); }
 
   FakeUsb usb_;

@@ -22,7 +22,7 @@ namespace {
 using testing::AllOf;
 using testing::HasSubstr;
 
-// An id that stands in no profile.
+// A USB id that no profile lists.
 constexpr FakeSerialBoard::Ids some_controller{.vendor = 0x2341, .product = 0x8036};
 constexpr int data_interface = 3;
 
@@ -118,7 +118,7 @@ TEST_F(SerialBoards, StreamWhereverPacketsCutTheFrames) {
       while (!waiting.empty()) {
         const std::size_t packet = std::min<std::size_t>(waiting.size(), 1 + cuts() % 64);
         if (packet == waiting.size() && !last) {
-          break;  // the rest goes with the next frame
+          break;  // the next frame brings the rest
         }
         const auto end = waiting.begin() + static_cast<std::ptrdiff_t>(packet);
         board.usb().send_packet(Bytes(waiting.begin(), end));
@@ -146,9 +146,9 @@ TEST_F(SerialBoards, WithoutAnIdOfTheirOwnAreNamedBySerialOrPort) {
     const auto sensor = open_board(name);
     sensor->start();
     const std::vector<SentFrame> sent = frames_of("flexitac", 50);
-    // Whole packets only: nothing ends a transfer before it is full, except the last frame's rest.
+    // Full packets: only the last frame's rest ends a transfer before the transfer is full.
     board.usb().send_message(stream_of(sent));
-    // A marker is believed once another follows at the distance of a frame, so the last one is due.
+    // A marker counts once another marker follows one frame later, so that the last frame waits.
     const std::vector<SentFrame> more = frames_of("flexitac", 1);
     board.usb().send_message(more[0].bytes);
     expect_values(*sensor, sent);
@@ -181,7 +181,7 @@ TEST_F(SerialBoards, AreStartedAgainWhenTheyComeBack) {
   const auto sensor = open_board("tsf85:A1");
   sensor->start();
   const std::vector<SentFrame> sent = frames_of("tsf85", 2);
-  // Half of a frame is on its way when the plug is pulled.
+  // The plug is pulled within a frame.
   board.usb().send_packet(Bytes(sent[0].bytes.begin(), sent[0].bytes.begin() + 30));
   ASSERT_TRUE(becomes_true([&] { return board.usb().waiting_packets() == 0; }));
   board.usb().unplug();

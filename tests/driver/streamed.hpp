@@ -9,11 +9,10 @@
 
 namespace palpate {
 
-/// Longer than anything here takes on a machine that is busy with other things: only a failure
-/// waits so long.
+/// Longest wait, which only a failing test reaches, even on a busy machine.
 constexpr std::chrono::seconds patience{20};
 
-/// Waits until it holds. False: it did not within the time.
+/// Waits until the condition holds. Returns false if it does not hold in time.
 inline bool becomes_true(const std::function<bool()>& condition) {
   const auto end = std::chrono::steady_clock::now() + patience;
   while (!condition()) {
@@ -25,7 +24,7 @@ inline bool becomes_true(const std::function<bool()>& condition) {
   return true;
 }
 
-/// The next `count` frames, or fewer where they do not come.
+/// The next `count` frames, or fewer if fewer come.
 inline std::vector<Frame> take(Sensor& sensor, std::size_t count) {
   std::vector<Frame> frames;
   while (frames.size() < count) {
@@ -38,7 +37,7 @@ inline std::vector<Frame> take(Sensor& sensor, std::size_t count) {
   return frames;
 }
 
-/// Calls `send` with 0, 1, ... at that rate, as a board sends its frames.
+/// Calls `send` with 0, 1, ... at a board's frame rate.
 inline void at_rate(double rate_hz, int count, const std::function<void(int)>& send) {
   auto next = std::chrono::steady_clock::now();
   for (int i = 0; i < count; ++i) {

@@ -17,7 +17,7 @@ class TransferFault : public testing::Test {
  protected:
   TransferFault() { sensor_->start(); }
 
-  /// Sends a frame and expects it.
+  /// Sends a frame and expects that it arrives.
   Frame frame_after(int raw) {
     board_.send_frame(raw);
     const std::vector<Frame> frames = take(*sensor_, 1);

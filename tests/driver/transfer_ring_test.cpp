@@ -16,7 +16,7 @@ namespace {
 
 using Completion = TransferRing::Completion;
 
-/// A ring whose events this thread pumps.
+/// A ring whose events this thread handles.
 class Ring : public testing::Test {
  protected:
   Ring() {
@@ -24,7 +24,7 @@ class Ring : public testing::Test {
     ring_.emplace(context_, handle_, std::uint8_t{0x81}, transfer_bytes, counters_);
   }
 
-  /// Until the callbacks of all that was sent have returned.
+  /// Handles events until the callbacks of all sent packets have returned.
   bool pump() {
     const auto end = std::chrono::steady_clock::now() + patience;
     while (board_.usb().waiting_packets() > 0 && std::chrono::steady_clock::now() < end) {
@@ -63,7 +63,7 @@ TEST_F(Ring, TellsWhichTransferAPacketEnded) {
 TEST_F(Ring, CountsWhatItHasNoMemoryToKeep) {
   board_.usb().send_packet(Bytes(1, 1));
   ASSERT_TRUE(pump());
-  // More than the ring keeps spare buffers for.
+  // More transfers than the ring keeps spare buffers for.
   constexpr std::uint64_t lost = 2 * TransferRing::transfers;
   for (std::uint64_t i = 0; i < lost; ++i) {
     board_.usb().send_packet(Bytes(2, 2));
@@ -111,7 +111,7 @@ TEST_F(Ring, NeedsNoMemoryForAsMuchAsWasRecycled) {
 }
 
 TEST_F(Ring, EndsWithoutMemory) {
-  board_.usb().send_packet(Bytes(64, 1));  // on its way: the transfer waits for more
+  board_.usb().send_packet(Bytes(64, 1));  // the transfer waits for more packets
   ASSERT_TRUE(pump());
   {
     const WithoutMemory none;

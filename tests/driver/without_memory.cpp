@@ -7,7 +7,7 @@ namespace {
 thread_local bool without_memory = false;
 }
 
-// In place of the standard library's, for the driver's library too.
+// Replaces the standard library's operator new, also for the driver's library.
 void* operator new(std::size_t bytes) {
   void* memory = without_memory ? nullptr : std::malloc(bytes > 0 ? bytes : 1);
   if (memory == nullptr) {

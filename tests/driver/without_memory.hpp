@@ -2,7 +2,7 @@
 
 namespace palpate {
 
-/// While it lives, whatever this thread allocates by `new` throws std::bad_alloc.
+/// While it lives, every `new` of this thread throws std::bad_alloc.
 class WithoutMemory {
  public:
   WithoutMemory();

@@ -1,5 +1,5 @@
-// Numbers of every equation, worked out once in float64 apart from the reference and the product:
-// whoever changes both alike is contradicted by them.
+// Tests against numbers of every equation, computed once in float64 without the reference and the
+// product: a wrong change of both alike fails here.
 
 #include <algorithm>
 #include <cmath>
@@ -16,9 +16,9 @@
 namespace palpate {
 namespace {
 
-constexpr double digits = 1e-9;     // ten digits were written down
-constexpr double per_touch = 1e-4;  // what the method allows a log-likelihood, in nats
-constexpr double map_nats = 1e-3;   // what it allows a map's cell
+constexpr double digits = 1e-9;     // the numbers have ten digits
+constexpr double per_touch = 1e-4;  // error allowed for a log-likelihood, in nats
+constexpr double map_nats = 1e-3;   // error allowed for a map's cell, in nats
 constexpr double prior = 0.25;
 constexpr Reading in = Reading::in_contact;
 constexpr Reading no = Reading::no_contact;
@@ -46,7 +46,7 @@ OccupancyGrid map_b() {
       .log_odds = {2.0F, -0.5F, 1.3F, -1.7F, 0.8F, -2.4F, 0.3F, -0.9F, 1.6F, 1.1F, 2.7F, -3.3F}};
 }
 
-/// Two touches of six elements; one pressure of the first equals the threshold.
+/// Two touches of six elements; one pressure of the first touch equals the threshold.
 Recording two_touches() {
   Recording recording;
   recording.elements_mm = {{-2.0, 0.5}, {-0.7, -0.4}, {0.0, 0.9},
@@ -182,12 +182,12 @@ TEST(FrozenValues, OfTheHistogramFilter) {
     const std::vector<double> logs = histogram.log_likelihood(object);
     for (const auto& [index, log_likelihood] : object == 0 ? bins_of_a : bins_of_b) {
       EXPECT_NEAR(logs[index], log_likelihood, 2 * per_touch) << object << ", bin " << index;
-      // Maps hold float32.
+      // A map holds float32.
       EXPECT_NEAR(posterior.log_likelihood[object][index], log_likelihood, 1e-6);
     }
   }
 
-  // Two touches of that error change a probability by as much.
+  // Two touches with this error change a probability by at most the error.
   constexpr double probability = 4 * per_touch;
   const Estimate estimate = histogram.estimate();
   const std::vector<double> identity{0.284034994, 0.6533834248};
@@ -226,7 +226,7 @@ TEST(FrozenValues, OfTheHistogramFilter) {
 }
 
 TEST(FrozenValues, OfParticlesAtOnePose) {
-  // All at one pose, which no noise moves: a third of them of the first object.
+  // All particles have one pose, which no noise moves; a third of them are of the first object.
   const ParticleOptions wanted{
       .particles = 3000,
       .region = {.x_mm = {0.1, 0.1, 1}, .y_mm = {0.2, 0.2, 1}, .theta_rad = {0.7, 0.7, 1}},

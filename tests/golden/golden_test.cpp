@@ -9,14 +9,14 @@
 namespace palpate {
 namespace {
 
-constexpr double map_tolerance = 1e-3;  // what the method allows a map, in nats per cell
-constexpr double per_touch = 1e-4;      // what it allows a log-likelihood, in nats per touch
+constexpr double map_tolerance = 1e-3;  // error allowed for a map, in nats per cell
+constexpr double per_touch = 1e-4;      // error allowed for a log-likelihood, in nats per touch
 
 GoldenValues golden_values() {
   return read_golden(std::filesystem::path(PALPATE_SOURCE_DIR) / "tests/golden/golden.json");
 }
 
-/// Ten digits were written: a relative 5e-10, and more than that is a change of the reference.
+/// The file keeps ten digits, a relative 5e-10: a larger difference is a change of the reference.
 void expect_reproduced(double now, double written) {
   ASSERT_NEAR(now, written, 1e-9 * std::max(1.0, std::abs(written)));
 }
@@ -87,7 +87,7 @@ TEST(Golden, RecognitionIsWithinItsTolerance) {
       const double tolerance = per_touch * static_cast<double>(touch + 1);
       EXPECT_NEAR(estimate.mode.log_likelihood, expected.max_log_likelihood, tolerance);
       for (std::size_t i = 0; i < golden.objects.size(); ++i) {
-        // Errors of e nats on either side change a probability p by 2 e p (1 - p), at most e / 2.
+        // An error of e nats on either side changes a probability p by 2 e p (1 - p) <= e / 2.
         EXPECT_NEAR(estimate.identity[i], expected.identity[i], tolerance);
       }
     }

@@ -9,21 +9,21 @@
 
 namespace palpate {
 
-/// Inputs of a small recognition and what the float64 reference makes of them, so that product and
-/// reference cannot drift together unseen.
+/// The inputs of a small recognition, and the results that the float64 reference gave for them when
+/// the file was written: a change of the product or of the reference shows.
 struct GoldenValues {
   struct Object {
     Recording training;            ///< in the object frame
     OccupancyGrid map;             ///< geometry, label and symmetry, and the log odds in float32
-    std::vector<double> log_odds;  ///< [ny, nx], expected
+    std::vector<double> log_odds;  ///< [ny, nx] expected
   };
-  /// Expected after a touch.
+  /// The results expected after a touch.
   struct Step {
     std::vector<double> identity;     ///< [object]
-    double max_log_likelihood = 0.0;  ///< of the mode, in nats
+    double max_log_likelihood = 0.0;  ///< log-likelihood of the mode, in nats
   };
   struct Unknown {
-    Recording touches;                                ///< with its truth
+    Recording touches;                                ///< with the true object and pose
     std::vector<Step> trace;                          ///< [touch]
     std::vector<std::vector<double>> log_likelihood;  ///< [object][bin] after all touches
     double error_mm = 0.0;                            ///< pose error of the final mode
@@ -35,10 +35,10 @@ struct GoldenValues {
   std::vector<Unknown> unknowns;
 };
 
-/// As many digits as the file keeps: 10.
+/// Rounds to the 10 digits that the file keeps.
 double rounded(double value);
 
-/// Fills in everything that is expected, from the reference.
+/// Fills in all expected results, from the reference.
 void compute_expected(GoldenValues& golden);
 
 /// The objects' maps as hypotheses.

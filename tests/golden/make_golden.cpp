@@ -1,5 +1,5 @@
-// Simulates training touches and unknowns of three letters and writes them, with what the reference
-// makes of them, to the file that golden_test reads: make_golden tests/golden/golden.json
+// Simulates training touches and unknowns of three letters and writes them, with the reference's
+// results, to the file that golden_test reads: make_golden tests/golden/golden.json
 
 #include <cstdio>
 #include <numbers>
@@ -11,7 +11,7 @@
 namespace palpate {
 namespace {
 
-/// A recording as it will be read back from the file.
+/// The recording with its numbers rounded as in the file.
 Recording as_written(Recording recording) {
   for (double& pressure : recording.pressure) {
     pressure = rounded(pressure);

@@ -1,4 +1,4 @@
-// Golden values of an independent float64 program, where they lie beside the source tree.
+// Tests against an independent float64 program's golden values, if they lie beside the source tree.
 
 #include <algorithm>
 #include <cmath>
@@ -18,8 +18,8 @@ namespace {
 
 using nlohmann::json;
 
-constexpr double map_tolerance = 1e-3;       // nats per cell, as the golden values' own page allows
-constexpr double per_touch = 1e-4;           // nats per touch, likewise
+constexpr double map_tolerance = 1e-3;       // nats per cell, by the golden values' own page
+constexpr double per_touch = 1e-4;           // nats per touch, by the golden values' own page
 constexpr double identity_tolerance = 5e-4;  // of a probability, at every touch
 constexpr double metric_tolerance = 1e-6;    // mm: float64 on both sides, printed to 16 digits
 
@@ -123,7 +123,7 @@ TEST_F(SharedGolden, RecognitionAgreesInEveryBin) {
       ASSERT_NEAR(product[bin], expected[bin], tolerance) << file << ", bin " << bin;
     }
 
-    // Bins within the tolerance of the largest may change places.
+    // The mode may be any bin within the tolerance of the largest.
     const Mode mode = histogram.estimate().mode;
     const auto at = static_cast<std::size_t>(mode.object * options.lattice.bins() + mode.bin);
     EXPECT_GE(expected[at], *std::max_element(expected.begin(), expected.end()) - 2.0 * tolerance);

@@ -32,7 +32,7 @@ TEST(Buffer, MovesWithItsMemory) {
   Buffer third;
   third = std::move(second);
   EXPECT_EQ(third.data(), data);
-  // Freed once: at the end the validation layer reports leaked and twice freed objects.
+  // The validation layer reports leaked and twice freed objects at the end.
 }
 
 TEST(Buffer, TooLargeAnAllocationSaysForWhatAndLeavesTheDeviceUsable) {
@@ -58,7 +58,7 @@ TEST(Buffer, TheDevicesOwnAllocationLimitHolds) {
   EXPECT_THROW(Buffer(context, context.limits().allocation + 1, Memory::device, "a test"), Error);
 }
 
-/// Sizes around the staging block of 4 MiB, and odd ones.
+/// Sizes around the staging block of 4 MiB, and odd sizes.
 class RoundTrip : public testing::TestWithParam<std::size_t> {};
 
 TEST_P(RoundTrip, BringsBackWhatWasSent) {

@@ -82,7 +82,7 @@ TEST(CommandStream, DeviceTimeIsPartOfTheWallTime) {
   }
   stream.run();
   const std::chrono::duration<double> wall = std::chrono::steady_clock::now() - start;
-  // 20 million words written take any device more than a microsecond.
+  // Any device takes more than 1 us to write 20 million words.
   EXPECT_GT(stream.device_seconds(), 1e-6);
   // The device's clock may run a little faster than the host's.
   EXPECT_LT(stream.device_seconds(), 1.01 * wall.count());
@@ -97,7 +97,7 @@ TEST(CommandStream, StagingMemoryDoesNotGrowWithWhatIsCopied) {
     const Buffer b = words_buffer(context, words.size());
     const VkDeviceSize buffers = context.memory_use().now;
     const ScaleAndAdd triple(context, 3);
-    // All of it recorded before the one run: 8 MB up and twice 8 MB down.
+    // One run takes all of the copies: 8 MB up and twice 8 MB down.
     Words tripled(words.size());
     Words plain(words.size());
     stream.upload(a, std::span<const std::uint32_t>(words));
@@ -120,7 +120,7 @@ TEST(CommandStream, AnyValidationMessageFailsTheRun) {
   CommandStream stream(context);
   const Buffer a = words_buffer(context, 3);
   stream.fill(a, 1);
-  vkResetFences(context.device(), 0, nullptr);  // needs at least one: wrong, but harmless
+  vkResetFences(context.device(), 0, nullptr);  // invalid without a fence, but harmless
   try {
     stream.run();
     FAIL() << "Vulkan's validation layer is off: set PALPATE_VALIDATION=1";
@@ -129,11 +129,11 @@ TEST(CommandStream, AnyValidationMessageFailsTheRun) {
   }
 }
 
-/// Commands that a stream must refuse, and what its message has to say.
+/// Commands that a stream must refuse, with the words that the message must hold.
 class Refusal : public testing::Test {
  protected:
   void expect_refused(const std::function<void()>& command, const std::string& says) {
-    // What was recorded before goes with it, even a command on a buffer that is gone by then.
+    // The earlier recording is dropped, too: its buffer may be destroyed by the next run.
     Words never(8, 42);
     {
       const Buffer gone = words_buffer(context, 8);
@@ -177,7 +177,7 @@ TEST_F(Refusal, OfTooManyWorkgroups) {
   const auto& most = context.limits().group_count;
   for (const std::size_t dimension : {0U, 1U, 2U}) {
     if (most[dimension] == ~0U) {
-      continue;  // no number of workgroups exceeds it
+      continue;  // no number of workgroups exceeds this limit
     }
     std::array<std::uint32_t, 3> groups{1, 1, 1};
     groups[dimension] = most[dimension] + 1;

@@ -62,7 +62,7 @@ TEST(Device, OneThatDoesNotExistIsRefusedNamingThoseThatDo) {
 
 TEST(Device, AMachineWithoutADriverSaysSo) {
   setenv("VK_DRIVER_FILES", "/nonexistent.json", 1);
-  setenv("VK_ICD_FILENAMES", "/nonexistent.json", 1);  // its name in older loaders
+  setenv("VK_ICD_FILENAMES", "/nonexistent.json", 1);  // the variable's name in older loaders
   try {
     Device::open();
     ADD_FAILURE() << "opened a device without a driver";
@@ -95,7 +95,7 @@ TEST(Device, ThatWasMovedFromSaysSo) {
       EXPECT_NE(std::string(error.what()).find("device: was moved from"), std::string::npos);
     }
   };
-  // Asked on purpose.
+  // The test uses a moved-from device on purpose.
   expect_refused([&] { first.name(); });          // NOLINT(bugprone-use-after-move)
   expect_refused([&] { first.memory_bytes(); });  // NOLINT(bugprone-use-after-move)
   expect_refused([&] { first.context(); });       // NOLINT(bugprone-use-after-move)

@@ -32,7 +32,7 @@ std::vector<std::uint32_t> scaled_count(std::size_t n, std::uint32_t factor, std
 }
 
 TEST(Kernel, TakesSpecializationAndPushConstantsAtEverySize) {
-  // One workgroup is 32 invocations: sizes around one, two and many.
+  // A workgroup has 32 invocations: sizes around one, two and many workgroups.
   for (const std::size_t n : {1U, 7U, 31U, 32U, 63U, 65U, 1000U}) {
     const std::vector<std::uint32_t> words = scaled_count(n, 5, 11);
     for (std::size_t i = 0; i < n; ++i) {

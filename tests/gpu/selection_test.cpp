@@ -10,7 +10,7 @@
 namespace palpate::gpu {
 namespace {
 
-// Ranks as they are given to the Vulkan device types.
+// The ranks of the Vulkan device types.
 enum Rank { discrete, integrated, virtual_gpu, cpu };
 
 Candidate usable(int index, Rank rank, const std::string& name) {
@@ -27,13 +27,13 @@ Candidate unusable(int index, Rank rank, const std::string& name, const std::str
           .info = {.index = index, .name = name, .reason = reason}};
 }
 
-/// A machine with one of each kind, the best neither first nor last.
+/// A machine with one device of each type; the best device is neither first nor last.
 std::vector<Candidate> one_of_each() {
   return {usable(0, cpu, "llvmpipe (LLVM 15)"), usable(1, integrated, "Intel UHD 770"),
           usable(2, discrete, "NVIDIA RTX A2000"), usable(3, virtual_gpu, "Virtio GPU Venus")};
 }
 
-/// Index of the chosen device, -1 for none.
+/// Index of the chosen device; -1 if none is chosen.
 int choice(std::vector<Candidate>& candidates, std::string_view wish = {}) {
   choose(candidates, wish);
   int found = -1;
@@ -91,7 +91,7 @@ TEST(Choose, TakesADeviceByAPartOfItsNameInAnyCase) {
 }
 
 TEST(Choose, ANumberIsAnIndexEvenWhereANameHasIt) {
-  // Else a wrong index would open some device whose name has that digit.
+  // Otherwise a wrong index would open a device whose name has the digit.
   std::vector<Candidate> candidates = one_of_each();
   EXPECT_EQ(choice(candidates, "15"), -1);
 }

@@ -16,7 +16,7 @@ bool is_finite(const Pose& pose) {
   return all_finite(std::vector{pose.translation_mm.x, pose.translation_mm.y, pose.theta_rad});
 }
 
-/// Runs both filters and expects all that they say to be finite.
+/// Runs both filters and expects all of their results to be finite.
 void expect_numbers(Device& device, std::span<const Hypothesis> objects, const PoseLattice& lattice,
                     std::span<const Touch> touches) {
   PoseHistogram histogram(device, objects, {.lattice = lattice, .none_weight = 1.0});
@@ -84,7 +84,7 @@ TEST(Bounds, WhatLiesBeyondThemOnBothSidesDoesNotMeet) {
   Recording recording = random_recording(1, 36, 525);
   recording.T_robot_sensor[0] = {{3e6, 0.0}, 0.0};
   Device device = Device::open();
-  // The object would lie at -1e6 mm, and the touch is 2e6 mm off it: 1e9 cells and more.
+  // The object lies at -1e6 mm, and the touch is 2e6 mm away from it: more than 1e9 cells.
   HistogramOptions options;
   options.lattice = {.x_mm = {-1e6, -1e6, 1}, .y_mm = {0.0, 0.0, 1}, .theta_rad = {0.0, 0.0, 1}};
   PoseHistogram histogram(device, std::span(&object, 1), options);
@@ -94,7 +94,7 @@ TEST(Bounds, WhatLiesBeyondThemOnBothSidesDoesNotMeet) {
           .log_likelihood[0][0];
   hard.expect("log-likelihood, nats", std::abs(histogram.log_likelihood(0)[0] - by_prior), 1e-4);
 
-  // Particles count elements to 2^20 cells, 524.288 mm of these. All of them are at one pose.
+  // The particle filter clamps places at 2^20 cells, here 524.288 mm. All particles have one pose.
   object.map.origin_mm = {-0.01, -0.01};
   recording.T_robot_sensor[0] = {{530.0, 0.0}, 0.0};
   const OccupancyGrid other = random_map(21, 21, 0.5, 12.0, 526);

@@ -7,7 +7,7 @@
 namespace palpate {
 namespace {
 
-/// Map nodes of which nothing is doubted: every cell at +1,000 or -1,000.
+/// A map without doubt: the log odds of every cell are +1,000 or -1,000.
 OccupancyGrid certain_map(std::uint64_t seed) {
   OccupancyGrid map = random_map(41, 41, 0.5, 1.0, seed);
   for (float& l : map.log_odds) {
@@ -29,11 +29,11 @@ HistogramOptions without_gamma() {
   return options;
 }
 
-// Interpolation between -1,000 and 1,000 keeps the seven digits of float32: 1e-4 nats for each of
-// the elements, and of the sum what its 36 roundings leave.
+// Interpolation between -1,000 and 1,000 keeps the seven digits of float32: an error of 1e-4 nats
+// per element. The sum adds 36 roundings.
 constexpr Allowed seven_digits{.nats = 2e-3, .relative = 3e-7};
 
-/// A touch of the map's middle with as many elements of this pressure beside one of 10 kPa.
+/// A touch of the map's middle with 35 elements of this pressure and one of `first`.
 Recording press(double pressure, double first = 10.0) {
   Recording recording;
   recording.T_robot_sensor.push_back({{0.5, -0.25}, 0.3});
@@ -73,7 +73,7 @@ TEST(Contradiction, OfEveryHypothesis) {
   EXPECT_NEAR(estimate.mode.log_likelihood, -36.0 * 999.0, 36.0 * 1e-4);
   EXPECT_EQ(estimate.mode.object, 1);
   EXPECT_TRUE(estimate.contradicted);
-  // "None of these" then takes all of the mass, and nothing else does.
+  // "None of these" then takes all of the mass.
   HistogramOptions options = without_gamma();
   options.none_weight = 1e-30;
   PoseHistogram histogram(device, objects, options);
@@ -113,7 +113,7 @@ TEST(Contradiction, LogOddsAtTheLargestThatAMapMayHold) {
     options.gamma = gamma;
     for (const double pressure : {0.0, 10.0}) {
       const Recording recording = press(pressure);
-      // All bins of an object are alike, and the objects as far apart as can be.
+      // All bins of an object are equal, and the objects differ as much as possible.
       hard.expect_posterior(device, objects, options, all_touches(recording),
                             {.nats = 2e-3, .relative = 3e-7, .near_top_nats = 2e-3});
     }

@@ -9,7 +9,7 @@
 namespace palpate {
 namespace {
 
-// 400 MB of belief on the device, in several bindings where one does not hold it all.
+// The belief takes 400 MB on the device, in several bindings if one binding cannot hold it.
 constexpr PoseLattice fifty_million() {
   constexpr double step = 2.0 * std::numbers::pi / 250;
   // Bins as wide as the map's cells, and centred on them.
@@ -18,10 +18,10 @@ constexpr PoseLattice fifty_million() {
           .theta_rad = {-step / 2, 2.0 * std::numbers::pi - step / 2, 250}};
 }
 
-// In the last tenth of the bins; half a turn away, with both ends swapped, lies beyond the region.
+// In the last tenth of the bins. The pose half a turn away, which swaps the ends, is not in a bin.
 constexpr std::int64_t chosen_bin = (std::int64_t{231} * 400 + 317) * 500 + 349;
 
-/// One row of cells that are impossible but for both ends, which are certain.
+/// One row of cells that are certainly empty except for both ends, which are certainly occupied.
 OccupancyGrid two_certain_cells(const glm::dvec2& first_mm) {
   OccupancyGrid map{.label = "two cells",
                     .cell_mm = 0.02,
@@ -34,7 +34,7 @@ OccupancyGrid two_certain_cells(const glm::dvec2& first_mm) {
   return map;
 }
 
-/// A touch whose two elements lie on the map's two ends at this pose, and nowhere else.
+/// A touch whose two elements lie on the map's two ends at this pose only.
 Recording touch_of_both_ends(const Pose& T_object_robot, const OccupancyGrid& map) {
   Recording recording;
   recording.T_robot_sensor.resize(1);
@@ -79,7 +79,7 @@ TEST(FiftyMillionBins, OfWhichOneOrAllHoldTheMass) {
     EXPECT_TRUE(all_finite(product));
     Uniform random(481);
     for (int sample = 0; sample < 2000; ++sample) {
-      // Half of them near the one.
+      // Half of the bins are near the pose.
       const auto bin = sample % 2 == 0
                            ? static_cast<std::int64_t>(random(0.0, bins))
                            : chosen_bin + static_cast<std::int64_t>(random(-1500.0, 1500.0));
@@ -92,7 +92,7 @@ TEST(FiftyMillionBins, OfWhichOneOrAllHoldTheMass) {
     }
   }
 
-  // One reading in unseen space says the same of every bin: log m = -69 nats.
+  // One reading in unseen space gives every bin the same log-likelihood: log m = -69 nats.
   histogram.reset();
   const Recording off = moved(recording, {{1000.0, 1000.0}, 0.0});
   histogram.update(all_touches(off));
@@ -103,7 +103,7 @@ TEST(FiftyMillionBins, OfWhichOneOrAllHoldTheMass) {
   EXPECT_EQ(estimate.identity, std::vector{1.0});
   marginals = histogram.marginals(0);
   const auto [least, most] = std::minmax_element(marginals.xy.begin(), marginals.xy.end());
-  // Sums of 250 equal terms, and of 200,000.
+  // Sums of 250 and of 200,000 equal terms.
   hard.expect("equal marginals, relative", std::abs(*least * bins / 250.0 - 1.0), 1e-6);
   hard.expect("equal marginals, relative", std::abs(*most * bins / 250.0 - 1.0), 1e-6);
   for (const double p : marginals.theta) {

@@ -12,10 +12,10 @@ namespace palpate {
 
 namespace {
 
-// What the reductions add to a probability: sums of float32 terms, at most 16,384 to a part.
+// Error that the reductions add to a probability: float32 sums of at most 16,384 terms.
 constexpr double reduction = 2e-6;
 
-// Bins this far below the top hold one part in 1e9 of the mass.
+// Bins this many nats below the top hold one part in 1e9 of the mass.
 constexpr double near_top_nats = 20.0;
 
 std::string digits(double number) { return number == 0.0 ? "0" : fmt::format("{:.1e}", number); }
@@ -110,7 +110,7 @@ Estimate HardCase::expect_posterior_of_repeated(Device& device, std::span<const 
   for (std::size_t object = 0; object < objects.size(); ++object) {
     bins.push_back(histogram.log_likelihood(static_cast<int>(object)));
     EXPECT_TRUE(all_finite(bins.back())) << name_ << ": bins of object " << object;
-    // Of all bins, the one that has the least left of what it is allowed, or exceeds it the most.
+    // The bin whose error comes closest to the allowed error, or exceeds it the most.
     std::optional<Largest> largest;
     for (std::size_t bin = 0; bin < bins.back().size(); ++bin) {
       const double l = expected.log_likelihood[object][bin];

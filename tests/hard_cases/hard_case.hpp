@@ -12,29 +12,29 @@
 
 namespace palpate {
 
-// AddressSanitizer makes float64 ten times as slow: a few cases are smaller under it.
+// AddressSanitizer makes float64 ten times slower: with it, a few cases are smaller.
 #ifdef __SANITIZE_ADDRESS__
 inline constexpr bool sanitized = true;
 #else
 inline constexpr bool sanitized = false;
 #endif
 
-/// What may differ from float64, and by how much. None of it depends on what is measured.
+/// Differences from float64 that a case allows. They do not depend on measured errors.
 struct Allowed {
-  double nats = 1e-4;     ///< of a log-likelihood; 0.8e-5 to 1.8e-5 are seen
-  double relative = 0.0;  ///< of the log-likelihood itself, besides
-  /// Of the log posterior near its top; by default twice as much as of the log-likelihoods.
+  double nats = 1e-4;     ///< error of a log-likelihood, in nats; 0.8e-5 to 1.8e-5 nats are seen
+  double relative = 0.0;  ///< further error, as a share of the log-likelihood
+  /// Error of the log posterior near its top, in nats; by default twice the log-likelihoods' error.
   std::optional<double> near_top_nats = {};
-  /// Of identities: sums of float32 terms, at most 16,384 to a part, of which 2.3e-7 is seen; and
-  /// twice the error in nats of the log posterior where it says little.
+  /// Error of identities: float32 sums of at most 16,384 terms (2.3e-7 is seen), and twice the log
+  /// posterior's error, in nats, if the posterior is broad.
   double identity = 2e-6;
-  /// Of marginals, which have the error in nats of a few bins: up to 1.6e-5 times a probability.
+  /// Error of marginals, from a few bins' errors in nats: up to 1.6e-5 of a probability is seen.
   double marginal = 2e-5;
 
   double at(double log_likelihood) const;
 };
 
-/// A case of docs/hard_cases.md. Prints the case's row of the table there when it ends.
+/// A case of docs/hard_cases.md. Its destructor prints the case's row of the table there.
 class HardCase {
  public:
   HardCase(std::string name, std::string risk, std::string bound);
@@ -42,22 +42,22 @@ class HardCase {
   HardCase(const HardCase&) = delete;
   HardCase& operator=(const HardCase&) = delete;
 
-  /// Expects the error to be within what is allowed, and keeps the largest of every quantity.
+  /// Expects the error to be allowed, and keeps each quantity's largest error.
   void expect(const std::string& quantity, double error, double allowed);
 
-  /// Runs a histogram over the touches and expects all that it says to be finite and as float64 has
-  /// it: every bin, the posterior near its top, identity, mode, marginals and their sums.
+  /// Runs a histogram over the touches and expects finite results that agree with float64: every
+  /// bin, the posterior near its top, identity, mode, marginals and their sums.
   Estimate expect_posterior(Device& device, std::span<const Hypothesis> objects,
                             const HistogramOptions& options, std::span<const Touch> touches,
                             Allowed allowed = {});
-  /// The same of touches that are given `times` over: float64 sums them once.
+  /// As expect_posterior() for `times` repetitions of the touches, which float64 sums once.
   Estimate expect_posterior_of_repeated(Device& device, std::span<const Hypothesis> objects,
                                         const HistogramOptions& options,
                                         std::span<const Touch> touches, int times, Allowed allowed);
 
-  /// Expects a map's cell to be within what MapBuilder promises: 1e-3 nats or a relative 1e-4.
+  /// Expects a map's cell within MapBuilder's promise: 1e-3 nats or a relative 1e-4.
   void expect_cell(double log_odds, double expected);
-  /// Builds a map of the touches and expects every cell to be finite and as float64 has it.
+  /// Builds a map of the touches and expects finite cells that agree with float64.
   OccupancyGrid expect_map(Device& device, std::span<const Touch> touches,
                            const MapOptions& options);
 
@@ -67,7 +67,7 @@ class HardCase {
     double allowed = 0.0;
   };
 
-  /// As expect(), of what follows from the log-likelihoods and has no place in the table.
+  /// As expect(), for a quantity that the table leaves out as it follows from the log-likelihoods.
   void check(const std::string& quantity, double error, double allowed) const;
 
   std::string name_;
@@ -76,7 +76,7 @@ class HardCase {
   std::map<std::string, Largest> largest_;
 };
 
-/// Whether no number among them is infinite or not a number.
+/// Whether all numbers are finite.
 bool all_finite(std::span<const double> numbers);
 
 /// The sum of the numbers.

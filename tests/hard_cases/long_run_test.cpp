@@ -5,9 +5,9 @@
 namespace palpate {
 namespace {
 
-/// Errors of a touch add up over a run, to 3e-6 to 5e-6 nats a touch: the rounding of a logarithm
-/// of eight factors goes one way where touches repeat. Near the top bins err alike, and what is
-/// left of the error is that of the identities, which are even here, too.
+/// Errors add up over a run, by 3e-6 to 5e-6 nats per touch: where touches repeat, the logarithm of
+/// eight factors always rounds the same way. Near the top, all bins err alike, and what remains is
+/// the error of the identities, which are nearly even here.
 constexpr Allowed long_run(int touches, double near_top_nats, double identity) {
   return {.nats = touches * 3e-5,
           .near_top_nats = near_top_nats,
@@ -18,7 +18,7 @@ constexpr Allowed long_run(int touches, double near_top_nats, double identity) {
 constexpr int most_touches = sanitized ? 1'000 : 10'000;
 constexpr int still_touches = sanitized ? 1'000 : 4'000;
 
-/// Two objects that differ so little that thousands of touches hardly tell them apart.
+/// Two objects so similar that thousands of touches hardly distinguish them.
 std::vector<Hypothesis> near_twins() {
   const OccupancyGrid one = random_map(61, 61, 0.5, 40.0, 401);
   OccupancyGrid other = one;
@@ -29,7 +29,7 @@ std::vector<Hypothesis> near_twins() {
   return {{one, 1.0}, {other, 1.0}};
 }
 
-/// A few bins so close together that all of them stay within sight of the top.
+/// A few bins so close together that all of them stay near the top.
 HistogramOptions near_the_top(int rows) {
   HistogramOptions options;
   options.lattice = {
@@ -80,7 +80,7 @@ TEST(LongRun, TouchesOneByOneOfAStillArray) {
   options.still_array = true;
   Recording recording = random_recording(2, 36, 405);
   recording.T_robot_sensor[1] = recording.T_robot_sensor[0];
-  // Mostly No Contact, or the base is not taken.
+  // Most elements are No Contact, so that the kernels use the base.
   for (std::size_t i = 0; i < recording.pressure.size(); ++i) {
     recording.pressure[i] = i % 8 == 0 ? 10.0 : i % 8 == 1 ? 2.0 : 1.0 * static_cast<double>(i % 2);
   }

@@ -44,8 +44,8 @@ TEST(Map, AMillionTouchesOfOneSpot) {
     HistogramOptions recognition{.gamma = gamma};
     recognition.lattice = {
         .x_mm = {-3.0, 3.0, 5}, .y_mm = {-3.0, 3.0, 5}, .theta_rad = {0.0, 0.5, 3}};
-    // Interpolation keeps seven digits of millions of nats: with gamma only elements where the
-    // likelihood is steep, a strip of 1e-6 cells, feel it.
+    // Interpolation keeps seven digits of millions of nats. With gamma, this error matters only
+    // where the likelihood is steep, in a strip of 1e-6 cells.
     hard.expect_posterior(
         device, objects, recognition, all_touches(spot),
         {.nats = gamma > 0.0 ? 1e-4 : 0.3, .relative = 3e-7, .near_top_nats = 2e-5});
@@ -75,7 +75,7 @@ TEST(Map, OfOneCell) {
                 "at least one cell; it holds what reaches its centre");
   Recording recording = random_recording(1, 4, 493);
   Device device = Device::open();
-  // The nearest cell's centre lies 30 mm away, then amid the readings.
+  // The nearest cell's centre lies 30 mm away, then among the readings.
   for (const double x_mm : {30.0, 0.0}) {
     recording.T_robot_sensor[0] = {{x_mm, 0.0}, 0.0};
     const OccupancyGrid map = hard.expect_map(device, all_touches(recording), {.cell_mm = 100.0});
@@ -106,12 +106,12 @@ TEST(Map, CellsOfAHundredMillimetres) {
   Recording recording = random_recording(60, 36, 495);
   Uniform random(496);
   for (Pose& pose : recording.T_robot_sensor) {
-    // Around the centres of cells, or no cell would feel anything.
+    // Touches lie around the centres of cells: elsewhere, they would change no cell.
     pose.translation_mm = {100.0 * std::floor(random(-8.0, 9.0)),
                            100.0 * std::floor(random(-8.0, 9.0))};
   }
   Device device = Device::open();
-  // Cells of 200, 20 and 2 spreads.
+  // Cells that are 200, 20 and 2 spreads wide.
   for (const double spread_mm : {0.5, 5.0, 50.0}) {
     MapOptions options{.cell_mm = 100.0};
     options.sensor.spread_mm = spread_mm;
@@ -125,7 +125,7 @@ TEST(Map, PriorsAndPeaksAtTheirEnds) {
                 "weights below 1e-16 are cut off: 1e-10 nats; 1e-7 / (1 - a) nats; what lies "
                 "beyond is refused");
   Recording recording = random_recording(2, 36, 497);
-  // At the centre of a cell, where the peak is felt.
+  // At the centre of a cell, where the weight has its peak.
   recording.T_robot_sensor[0] = {};
   recording.elements_mm[0] = {1.0, 1.0};
   Device device = Device::open();
@@ -134,7 +134,7 @@ TEST(Map, PriorsAndPeaksAtTheirEnds) {
       MapOptions options;
       options.sensor = {.peak = peak, .prior = prior};
       hard.expect_map(device, all_touches(recording), options);
-      // Many equal readings: what each of them loses adds up.
+      // Many equal readings, whose errors add up.
       const std::vector<Touch> many(200, recording.touch(0));
       hard.expect_map(device, many, {.cell_mm = 2.0, .sensor = options.sensor});
     }

@@ -24,7 +24,7 @@ std::vector<Hypothesis> two_objects() {
   return {{random_map(61, 61, 0.5, 4.0, 502), 1.0}, {random_map(31, 31, 1.0, 4.0, 503), 1.0}};
 }
 
-/// All that a filter says is finite, and what has to sum to 1 does.
+/// Expects a filter's results to be finite, and its probabilities to sum to 1.
 Estimate expect_sound(const ParticleFilter& filter, int particles) {
   std::vector<double> weights;
   for (const ParticleFilter::Particle& particle : filter.particles()) {
@@ -46,7 +46,7 @@ Estimate expect_sound(const ParticleFilter& filter, int particles) {
   return estimate;
 }
 
-/// Gives one touch to the filter and expects every particle's weight to be as float64 has it at the
+/// Gives one touch to the filter and expects every particle's weight to agree with float64 at the
 /// particle's pose.
 Estimate expect_weights(HardCase& hard, ParticleFilter& filter, const Touch& touch,
                         std::span<const Hypothesis> objects, const ParticleOptions& options,
@@ -65,7 +65,7 @@ Estimate expect_weights(HardCase& hard, ParticleFilter& filter, const Touch& tou
   for (const double l : expected) {
     sum += std::exp(l - most);
   }
-  // Of every weight that is not negligible beside the largest.
+  // The largest error of the weights that are not negligible.
   double error = 0.0;
   for (std::size_t i = 0; i < expected.size(); ++i) {
     if (expected[i] > most - 20.0) {

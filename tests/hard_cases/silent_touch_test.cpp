@@ -26,7 +26,7 @@ HistogramOptions small_options() {
   return options;
 }
 
-/// Touches that say nothing leave every bin where it was, to the bit, and make no map.
+/// Expects that touches without known elements change no bit of a bin, and make no map.
 void expect_nothing_said(HardCase& hard, const Recording& recording) {
   const std::vector<Hypothesis> objects = three_objects();
   Device device = Device::open();
@@ -60,7 +60,7 @@ TEST(SilentTouch, AllUnknown) {
         recording.pressure[i] = std::numeric_limits<double>::quiet_NaN();
         break;
       default:
-        // Above 0.3 of the largest and below the threshold.
+        // Above 0.3 of the largest pressure and below the threshold.
         recording.pressure[i] = 1.0 + 0.01 * static_cast<double>(i % 36);
     }
   }
@@ -72,13 +72,13 @@ TEST(SilentTouch, EveryElementAtTheThreshold) {
                 "a comparison that counts equality as contact, or as none", "exact: Unknown");
   Recording recording = random_recording(2, 36, 425);
   recording.pressure.assign(recording.pressure.size(), 2.0);
-  // The second touch's largest is at the threshold, and the others are at the ratio of it.
+  // The second touch's largest pressure equals the threshold; the others equal 0.3 of the largest.
   for (std::size_t i = 37; i < 72; ++i) {
     recording.pressure[i] = 0.3 * 2.0;
   }
   expect_nothing_said(hard, recording);
 
-  // At the ratio of the largest and above the threshold.
+  // Equal to 0.3 of the largest pressure and above the threshold.
   recording.pressure[36] = 20.0;
   for (std::size_t i = 37; i < 72; ++i) {
     recording.pressure[i] = 0.3 * 20.0;
@@ -121,7 +121,7 @@ TEST(SilentTouch, EntirelyOffTheMap) {
 TEST(SilentTouch, SubnormalPressures) {
   HardCase hard("subnormal pressures and thresholds", "pressures flushed to zero change class",
                 "exact: classes are decided in float64, and subnormals are kept");
-  // Small whole numbers, once as they are and once as multiples of the smallest number.
+  // Small whole numbers, and these numbers times `subnormal`.
   Recording recording = random_recording(4, 36, 429);
   Uniform random(430);
   for (double& p : recording.pressure) {
@@ -134,7 +134,7 @@ TEST(SilentTouch, SubnormalPressures) {
   HistogramOptions options = small_options();
   const std::vector<Hypothesis> objects = three_objects();
   Device device = Device::open();
-  // At these ratios the product with the largest pressure is a whole number, or never one.
+  // ratio * (largest pressure) is a whole multiple of `subnormal`, or lies between two multiples.
   for (const double ratio : {0.5, 0.25}) {
     options.classifier = {.threshold = 3.0 * subnormal, .ratio = ratio};
     const Estimate estimate = hard.expect_posterior(device, objects, options, all_touches(tiny));
@@ -144,7 +144,7 @@ TEST(SilentTouch, SubnormalPressures) {
                 reference::classify(tiny.touch(i), options.classifier));
     }
   }
-  // Against readings as large as usual: all of them are No Contact.
+  // Beside one reading of usual size, all of them are No Contact.
   options.classifier = {};
   tiny.pressure[0] = 20.0;
   EXPECT_EQ(known_readings(tiny.touch(0), {}).size(), 36U);

@@ -85,12 +85,12 @@ TEST(Size, FourThousandElements) {
                 "each logarithm of eight factors to some 1e-7 nats: 1e-4 nats per 36 elements");
   const std::vector<Hypothesis> objects{{random_map(61, 61, 0.5, 6.0, 461), 1.0},
                                         {random_map(31, 31, 1.0, 6.0, 462), 1.0}};
-  // 4.7e-4 and 3.5e-5 nats are seen: of 1,024 logarithms a bin, some 1e-7 each.
+  // 1,024 logarithms per bin with errors of some 1e-7 nats each: 4.7e-4 and 3.5e-5 nats are seen.
   constexpr Allowed per_36{.nats = 4e-3, .near_top_nats = 3e-4};
   Recording recording = random_recording(2, 4096, 463);
   Device device = Device::open();
   hard.expect_posterior(device, objects, small_options(), all_touches(recording), per_36);
-  // At rest, and mostly No Contact, so that the shared base is used.
+  // The array rests and most elements are No Contact, so that the kernels use the base.
   recording.T_robot_sensor[1] = recording.T_robot_sensor[0];
   for (std::size_t i = 0; i < recording.pressure.size(); ++i) {
     recording.pressure[i] = i % 7 == 0 ? 10.0 : i % 7 == 1 ? 2.0 : 0.5;

@@ -18,7 +18,7 @@ HistogramOptions symmetric_options() {
   return options;
 }
 
-/// The bin of the pose turned by half a turn about the object's middle.
+/// The bin of the pose that is turned by half a turn about the object's middle.
 std::int64_t half_a_turn_on(const PoseLattice& lattice, std::int64_t bin) {
   const std::int64_t in_plane = bin % lattice.plane();
   const std::int64_t theta = bin / lattice.plane();
@@ -26,8 +26,8 @@ std::int64_t half_a_turn_on(const PoseLattice& lattice, std::int64_t bin) {
   return turned * lattice.plane() + lattice.plane() - 1 - in_plane;
 }
 
-/// The bin of the pose turned by a quarter of a turn about the object's middle, where x and y have
-/// the same bins.
+/// The bin of the pose that is turned by a quarter of a turn about the object's middle. The lattice
+/// must have the same bins in x and y.
 std::int64_t a_quarter_turn_on(const PoseLattice& lattice, std::int64_t bin) {
   const std::int64_t n = lattice.x_mm.count;
   const std::int64_t x = bin % n;
@@ -37,7 +37,7 @@ std::int64_t a_quarter_turn_on(const PoseLattice& lattice, std::int64_t bin) {
   return turned * lattice.plane() + x * n + (n - 1 - y);  // (x, y) becomes (-y, x)
 }
 
-/// Rings around the origin: the same at every quarter turn to the last bit, at others nearly.
+/// Rings around the origin: equal to the bit after a quarter turn, nearly equal after other turns.
 OccupancyGrid rings() {
   OccupancyGrid map = random_map(41, 41, 0.5, 1.0, 435);
   map.symmetry = 0;
@@ -52,7 +52,7 @@ OccupancyGrid rings() {
   return map;
 }
 
-/// Three runs beside float64, of equal bits and with the same mode; `look` sees each.
+/// Expects three runs to agree with float64, and with each other to the bit; `look` sees each run.
 void expect_the_same_each_time(HardCase& hard, const std::vector<Hypothesis>& objects,
                                const HistogramOptions& options, const Recording& recording,
                                const std::function<void(const PoseHistogram&)>& look) {

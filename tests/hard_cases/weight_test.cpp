@@ -24,7 +24,7 @@ TEST(Weight, ExtremelyUnequal) {
   const Estimate before = hard.expect_posterior(device, objects, small_options(), {});
   EXPECT_NEAR(before.identity[1], 1e-30, 1e-36) << "the weight itself, to six digits";
 
-  // Whichever the touches favour is made the light one: the evidence has to outweigh 69 nats.
+  // The object that the touches favour gets the small weight: the evidence must outweigh 69 nats.
   const Estimate equal = [&] {
     std::vector<Hypothesis> even = objects;
     even[1].weight = 1.0;

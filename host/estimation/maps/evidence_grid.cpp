@@ -17,20 +17,20 @@ namespace palpate {
 
 namespace {
 
-// Readings per pass times the tiles that each of them reaches.
+// Entries of a pass: its readings times the tiles that each reading reaches.
 constexpr std::size_t entries_per_pass = 1 << 20;
 constexpr gpu::Access bindings[] = {gpu::Access::storage, gpu::Access::table, gpu::Access::storage};
 
-/// Tiles that some reading supports, each with its readings.
+/// Tiles that at least one reading reaches, each with its readings.
 struct TileLists {
   std::vector<shaders::Tile> tiles;
   std::vector<shaders::TileReading> readings;
 };
 
 shaders::TileReading tile_reading(const glm::dvec2& local_mm, Reading reading, double prior) {
-  // Eq. 5 in log odds: log((1 + g a) / (1 - g)) for contact, a = (1 - m) / m, and
-  // log((1 - g) / (1 + g b)) for none, b = m / (1 - m). As 2 atanh of their difference over their
-  // sum, t = g gain / (2 + g skew), neither loses digits where g is small.
+  // Eq. 5 in log odds: log((1 + g a) / (1 - g)) for contact, a = (1 - m) / m, and log((1 - g) / (1
+  // + g b)) for no contact, b = m / (1 - m). Both equal 2 atanh(t), t = g gain / (2 + g skew), a
+  // form that loses no digits where g is small.
   const bool contact = reading == Reading::in_contact;
   const double gain = contact ? 1.0 / prior : -1.0 / (1.0 - prior);
   const double skew = contact ? (1.0 - prior) / prior - 1.0 : prior / (1.0 - prior) - 1.0;
@@ -38,11 +38,11 @@ shaders::TileReading tile_reading(const glm::dvec2& local_mm, Reading reading, d
           static_cast<float>(skew)};
 }
 
-/// Distance at which the increment falls to what the kernel's series represents.
+/// Returns the distance at which the increment falls to what the kernel's series represents.
 double near_radius_mm(const InverseSensorModel& sensor) {
   const double reach = shaders::SERIES_REACH;
   const double p = sensor.prior;
-  // |t| = reach solved for g, of the class that reaches further.
+  // g where |t| = reach, of the class that reaches further.
   const double contact = 2.0 * reach / (1.0 / p - reach * ((1.0 - p) / p - 1.0));
   const double none = 2.0 * reach / (1.0 / (1.0 - p) + reach * (p / (1.0 - p) - 1.0));
   const double g = std::min(contact, none);
@@ -61,8 +61,8 @@ TileLists assign_to_tiles(std::span<const ElementReading> readings, const CellRa
         std::clamp(mm / cell_mm - static_cast<double>(origin), 0.0, static_cast<double>(cells - 1));
     return static_cast<std::int64_t>(cell) / shaders::TILE_CELLS;
   };
-  // Calls visit(list, reading relative to the tile) for every list that a reading belongs to: tile
-  // i has list 2 i for its near and list 2 i + 1 for its far readings.
+  // Calls visit(list, place relative to the tile, reading) for every list of every reading: tile i
+  // has list 2 i for its near and list 2 i + 1 for its far readings.
   const auto for_each_entry = [&](const auto& visit) {
     for (const ElementReading& r : readings) {
       const glm::dvec2& p = r.position_mm;
@@ -158,7 +158,7 @@ CellRange cover(const glm::dvec2& lowest_mm, const glm::dvec2& highest_mm, doubl
                 double cell_mm) {
   const auto first = [&](double mm) { return std::ceil((mm - margin_mm) / cell_mm); };
   const auto last = [&](double mm) { return std::floor((mm + margin_mm) / cell_mm); };
-  // A cell larger than the support may hold a reading without its centre being near.
+  // At least one cell: a reading may lie in a cell whose centre is beyond its support.
   const double nx = std::max(1.0, last(highest_mm.x) - first(lowest_mm.x) + 1.0);
   const double ny = std::max(1.0, last(highest_mm.y) - first(lowest_mm.y) + 1.0);
   if (!(nx * ny <= static_cast<double>(most_cells))) {
@@ -201,7 +201,7 @@ void EvidenceGrid::grow(const CellRange& needed) {
   }
   CellRange larger = needed_;
   if (range_.nx > 0) {
-    // Room for what a moving sensor touches next, so that growing stays rare.
+    // Spare cells around, for what a moving sensor touches next, keep growing rare.
     const CellRange roomy{larger.x - larger.nx / 4, larger.y - larger.ny / 4,
                           larger.nx + larger.nx / 2, larger.ny + larger.ny / 2};
     if (has_room(roomy)) {
@@ -217,7 +217,7 @@ void EvidenceGrid::grow(const CellRange& needed) {
   }
   stream_.fill(cells, 0);
   if (!old.empty()) {
-    // Room that is not taken along holds what lies beyond the radius.
+    // Spare cells outside the new range hold only increments beyond the radius and are dropped.
     const CellRange kept = common(range_, larger);
     for (std::int64_t y = kept.y; y < kept.y + kept.ny; ++y) {
       const std::int64_t from = (y - range_.y) * range_.nx + kept.x - range_.x;

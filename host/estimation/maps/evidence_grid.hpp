@@ -21,19 +21,19 @@ struct CellRange {
   bool contains(const CellRange& other) const;
 };
 
-/// The smallest range that holds both; an empty one holds nothing.
+/// Returns the smallest range that holds both; an empty range adds nothing.
 CellRange united(const CellRange& a, const CellRange& b);
-/// The cells that both hold, of which there is at least one.
+/// Returns the cells that both hold; at least one cell must be in both.
 CellRange common(const CellRange& a, const CellRange& b);
 
-/// Cells whose centres lie within `margin_mm` of the rectangle, which reaches no further than
-/// `farthest_mm`.
-/// @throws Error where they are more than 2^30
+/// Returns the cells whose centres lie within `margin_mm` of the rectangle, whose corners must lie
+/// within `farthest_mm`.
+/// @throws Error where these are more than most_cells
 CellRange cover(const glm::dvec2& lowest_mm, const glm::dvec2& highest_mm, double margin_mm,
                 double cell_mm);
 
-/// Log-odds increments of readings, summed per cell on the device (Eq. 4-6) in two floats, so that
-/// the sum stays exact to float32 however many readings there are. It grows with what is added.
+/// Sums the log-odds increments of readings per cell on the device (Eq. 4-6), in two floats, so
+/// that each sum is exact to float32 for any number of readings. The grid grows with the readings.
 class EvidenceGrid {
  public:
   EvidenceGrid(gpu::Context& context, double cell_mm, const InverseSensorModel& sensor);
@@ -41,12 +41,12 @@ class EvidenceGrid {
   /// Throws Error where the device cannot hold these cells.
   void require_room(const CellRange& range) const;
   bool has_room(const CellRange& range) const;
-  /// Adds readings, each to the cells within the radius and some beyond. Runs on the device in
-  /// passes of bounded memory.
+  /// Adds each reading to the cells within `radius_mm` of it and to some beyond, in passes of
+  /// bounded device memory.
   void add(std::span<const ElementReading> readings, double radius_mm);
-  /// The sums over the cells of a range, row by row; 0 where nothing was added.
+  /// Returns the sums over the cells of a range, in row-major order; 0 where nothing was added.
   std::vector<double> sums(const CellRange& range);
-  /// Back to no evidence and no cells.
+  /// Removes all evidence and all cells.
   void clear();
 
  private:
@@ -57,8 +57,8 @@ class EvidenceGrid {
   double cell_mm_;
   InverseSensorModel sensor_;
   gpu::Kernel kernel_;
-  CellRange needed_;   ///< so far
-  CellRange range_;    ///< the same and some room
+  CellRange needed_;   ///< cells that the readings so far need
+  CellRange range_;    ///< needed_ and room to grow
   gpu::Buffer cells_;  ///< of range_, [ny, nx], two floats
 };
 

@@ -14,9 +14,9 @@ namespace palpate {
 
 namespace {
 
-// Half of what the documentation allows; the rest is for float32.
+// Half of the documented tolerance in nats; the other half is for float32 rounding.
 constexpr double cut_tolerance = 5e-4;
-// Readings that wait on the host before they go to the device: what a long recording takes up.
+// Most readings that wait on the host: bounds the memory that a long recording takes.
 constexpr std::size_t pending_readings = 1 << 18;
 
 /// Number and bounds of readings.
@@ -40,14 +40,14 @@ struct MapBuilder::Impl {
   Impl(Device& device, const MapOptions& wanted)
       : options(wanted), grid(device.context(), wanted.cell_mm, wanted.sensor) {}
 
-  /// Radius at which the Gaussian of the next readings is cut off. Reading i may lose
-  /// tolerance / (16 max(i, 8192)): together that is below the tolerance up to 10^10 readings.
+  /// Radius in mm at which the Gaussian of the next readings is cut off. Reading i may lose
+  /// tolerance / (16 max(i, 8192)) nats: together below the tolerance for up to 10^10 readings.
   double radius_mm(const Seen& all) const {
     return options.sensor.support_radius_mm(16 * std::max<std::size_t>(all.readings, 8192),
                                             cut_tolerance);
   }
 
-  /// The cells of a map of all these readings. Throws Error where they are too many.
+  /// Returns the cells of a map of all these readings. Throws Error where they are too many.
   CellRange range_of(const Seen& all) const {
     const CellRange range = cover(all.lowest_mm, all.highest_mm, radius_mm(all), options.cell_mm);
     grid.require_room(range);
@@ -62,7 +62,7 @@ struct MapBuilder::Impl {
   MapOptions options;
   EvidenceGrid grid;
   std::vector<ElementReading> pending;  ///< robot frame = object frame
-  Seen seen;                            ///< so far, those pending included
+  Seen seen;                            ///< all readings so far, pending ones too
   HalfDone half_done{"map: adding touches failed half-way; clear() the builder"};
 };
 
@@ -85,7 +85,7 @@ MapBuilder::Impl& MapBuilder::impl() const { return held_by(impl_, "map builder"
 void MapBuilder::add(std::span<const Touch> touches) {
   Impl& map = impl();
   map.half_done.refuse();
-  // All of them before the first is taken in, for one that cannot be mapped refuses all.
+  // Every touch is checked before the first is added: one that cannot be mapped refuses all.
   Seen all = map.seen;
   for (std::size_t i = 0; i < touches.size(); ++i) {
     const std::vector<ElementReading> known = known_readings(touches[i], map.options.classifier);
@@ -154,7 +154,7 @@ void MapBuilder::clear() {
 
 double estimate_prior(Device& device, std::span<const ObjectTouches> objects, MapOptions options) {
   options.sensor.prior = 0.5;
-  // Below the map's own tolerance there is no evidence to speak of.
+  // Evidence below the map's own tolerance counts as none.
   constexpr double no_evidence = 2.0 * cut_tolerance;
   std::size_t occupied = 0;
   std::size_t modelled = 0;

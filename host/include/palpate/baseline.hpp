@@ -8,12 +8,13 @@
 
 namespace palpate {
 
-/// What an array reads untouched: the median of every element's known readings in these frames (a
-/// tare). Dead elements read 0.
-/// @param onset pressure that is a touch; a touch that begins or ends among 40 readings or more is
-/// found by it. One that lasts all the time is not, nor is any where this is not given.
-/// @throws Error (Fault::input) where there is no frame, one of another size or no known reading of
-/// an element, or where the array was touched
+/// Takes a tare: returns what the untouched array reads, [e] in the sensor's pressure unit, as the
+/// median of each element's known readings (see is_known()) over the frames; 0 for a dead element.
+/// @param onset if given, the array counts as touched where the medians over the four quarters of
+/// an element's readings differ by more than `onset`. This check needs 40 known readings, and
+/// misses a touch that lasts through all frames.
+/// @throws Error (Fault::input) on no frame, a frame of another size, an element without a known
+/// reading, or a touched array
 std::vector<double> baseline_of(std::span<const Frame> frames, const SensorDescription& sensor,
                                 std::optional<double> onset);
 

@@ -44,8 +44,8 @@ struct ElementReading {
 /// The elements of the touch that say something, in the array's order.
 std::vector<ElementReading> known_readings(const Touch& touch, const ContactClassifier& classifier);
 
-/// What keeps known readings from being mapped, in a sentence with the remedy: a place beyond
-/// `farthest_mm` of the robot frame's origin. Nothing where they can be.
+/// Returns why readings cannot be mapped, with the remedy, as one line of text: an element lies
+/// beyond `farthest_mm` of the robot frame's origin. None where all readings can be mapped.
 std::optional<std::string> fault_of(std::span<const ElementReading> readings);
 
 }  // namespace palpate

@@ -12,7 +12,7 @@ namespace gpu {
 class Context;
 }
 
-/// What `palpate devices` shows of a Vulkan device.
+/// A Vulkan device as `palpate devices` lists it.
 struct DeviceInfo {
   int index = 0;
   std::string name;
@@ -21,33 +21,33 @@ struct DeviceInfo {
   std::string api;     ///< Vulkan version, such as "1.3.230"
   double memory_gib = 0.0;
   bool usable = false;
-  bool chosen = false;  ///< the one that Device::open() takes
-  std::string reason;   ///< why it was chosen, or why it was not
+  bool chosen = false;  ///< Device::open() takes this device
+  std::string reason;   ///< why the device is chosen or refused
 };
 
-/// A Vulkan device, opened for compute. Objects made on it must not outlive it. Not thread-safe:
-/// use a device and what was made on it from one thread at a time. One that was moved from throws
-/// Error whatever it is asked.
+/// An open Vulkan device for compute. It must outlive every object made on it. A device and the
+/// objects made on it are not thread-safe: use them from one thread at a time. Every call on a
+/// moved-from device throws Error.
 class Device {
  public:
-  /// Every device, in Vulkan's order, with the reason for or against each one.
+  /// Lists every device in Vulkan's order and marks the one that open(name_or_index) would take.
   static std::vector<DeviceInfo> list(std::string_view name_or_index = {});
 
-  /// Opens a device: by index, by a part of its name (case ignored), or, given nothing, the one
-  /// that PALPATE_DEVICE in the environment names in the same way, or else the best: discrete
-  /// before integrated before virtual before CPU. With PALPATE_VALIDATION=1 in the environment,
-  /// Vulkan's validation layer is on and any message it has becomes an Error.
-  /// @throws Error where none fits, naming every device and why it was refused.
+  /// Opens a device by its index or by a part of its name (case ignored). An empty `name_or_index`
+  /// stands for the environment variable PALPATE_DEVICE. Without both, the best device is opened:
+  /// discrete before integrated before virtual before CPU. With PALPATE_VALIDATION=1 in the
+  /// environment, Vulkan's validation layer is on and each of its messages becomes an Error.
+  /// @throws Error where no device fits; the message names every device and why it is refused
   static Device open(std::string_view name_or_index = {});
 
   Device(Device&&) noexcept;
   Device& operator=(Device&&) noexcept;
   ~Device();
 
-  const std::string& name() const;
-  /// Memory that it computes in, in bytes; a CPU device shares the machine's.
+  const std::string& name() const;  ///< as Vulkan reports it
+  /// Size of the memory in which the device computes, in bytes; a CPU device shares the machine's.
   std::uint64_t memory_bytes() const;
-  gpu::Context& context();
+  gpu::Context& context();  ///< for the library's own classes
 
  private:
   explicit Device(std::unique_ptr<gpu::Context> context);

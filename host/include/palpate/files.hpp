@@ -10,30 +10,33 @@
 
 namespace palpate {
 
-// Every reader throws Error (Fault::input) in one line that names the file, the field and the
-// remedy; readers ignore what they do not know and refuse a higher version. Every writer leaves a
-// whole file or none: it writes beside the target and renames.
+// Every reader throws Error (Fault::input) on a missing, damaged or inconsistent file, ignores
+// attributes and datasets that it does not know, and refuses a higher version. Every writer throws
+// Error (Fault::input) on content that no reader takes. It writes a temporary file beside the
+// target and renames it, so that the target is whole or stays as it was. Lack of memory or a
+// failing disk throws Error (Fault::system). Messages are one line that names the file, the field
+// and the remedy.
 
-/// Reads a "palpate.recording" HDF5 file.
+/// Read or write a "palpate.recording" HDF5 file; of an unclosed file, the whole rows are read.
 Recording read_recording(const std::filesystem::path& path);
 void write_recording(const std::filesystem::path& path, const Recording& recording);
-/// Closes a recording of FrameRecorder that was cut off, as by a kill, in its place: keeps its
-/// whole rows, so that programs other than Palpate open it like any other file.
-/// @returns false where it is closed already
-/// @throws Error where it is being recorded, cannot be read or cannot be written; it can then be
-/// read as before
+/// Closes, in place, a recording whose FrameRecorder was killed or crashed. The complete rows stay,
+/// and programs other than Palpate can then open the file like any other.
+/// @returns false where the file is closed already
+/// @throws Error where the file is still being recorded, or cannot be read or written; it stays
+/// readable
 bool close_recording(const std::filesystem::path& path);
 
-/// Reads a "palpate.map" HDF5 file.
+/// Read or write a "palpate.map" HDF5 file.
 OccupancyGrid read_map(const std::filesystem::path& path);
 void write_map(const std::filesystem::path& path, const OccupancyGrid& map);
 
-/// Writes map.pgm and map.yaml in the map_server convention of ROS (trinary; occupied is black;
-/// the resolution and origin in metres; the first image row is the largest y), beside each other.
-/// `yaml_path` ends in .yaml; the image takes its stem.
+/// Writes a map in the map_server format of ROS: `yaml_path`, which ends in .yaml, and beside it
+/// the image, with the same stem and the ending .pgm. The mode is trinary; occupied cells are
+/// black; resolution and origin are in metres; the first image row has the largest y.
 void write_map_server(const std::filesystem::path& yaml_path, const OccupancyGrid& map);
 
-/// The posterior of one recording, as in a "palpate.posterior" HDF5 file.
+/// The posterior of one recording, the contents of a "palpate.posterior" HDF5 file.
 struct Posterior {
   std::vector<std::string> objects;
   PoseLattice lattice;
@@ -42,7 +45,7 @@ struct Posterior {
 Posterior read_posterior(const std::filesystem::path& path);
 void write_posterior(const std::filesystem::path& path, const Posterior& posterior);
 
-/// The `format` attribute of an HDF5 file, such as "palpate.map".
+/// Returns the `format` attribute of an HDF5 file, such as "palpate.map".
 std::string read_format(const std::filesystem::path& path);
 
 }  // namespace palpate

@@ -12,16 +12,16 @@
 
 namespace palpate {
 
-/// What a map is made with.
+/// Resolution, sensor model and contact classifier of a map.
 struct MapOptions {
   double cell_mm = 0.5;       ///< edge of a cell
   InverseSensorModel sensor;  ///< also holds the prior
   ContactClassifier classifier;
 };
 
-/// Builds an object's occupancy grid from touches at known poses (Sec. II). The object frame is
-/// the robot frame of the touches. Updates add up, so their order does not matter. A builder that
-/// was moved from throws Error whatever it is asked.
+/// Builds an object's occupancy grid from touches at known poses (Sec. II) by adding up the
+/// log-odds increments of Eq. 4-6, in any order. The object frame is the robot frame of the
+/// touches. Every call on a moved-from builder throws Error.
 class MapBuilder {
  public:
   /// @throws Error on a cell size, spread, peak, prior, threshold or ratio out of range.
@@ -30,16 +30,16 @@ class MapBuilder {
   MapBuilder(MapBuilder&&) noexcept;
   MapBuilder& operator=(MapBuilder&&) noexcept;
 
-  /// Adds the evidence of these touches, all of it or, where it throws, none. Memory does not grow
-  /// with their number, only with the area that they cover.
-  /// @throws Error on a touch that is not sound or lies beyond `farthest_mm`, where the area has
-  /// more cells than the device holds, or where the device fails: the evidence may then be half
-  /// added, and the builder refuses everything but clear()
+  /// Adds the evidence of all these touches. Memory grows with the area that they cover, not with
+  /// their number.
+  /// @throws Error, and adds none of them, on a touch that is not sound or lies beyond
+  /// `farthest_mm`, or where the area has more cells than the device holds; Error where the device
+  /// fails: the touches may then be added in part, and every call but clear() throws
   void add(std::span<const Touch> touches);
 
-  /// The map of all touches so far. It covers the known elements and the support of the sensor
-  /// model around them, no more; each cell is within 1e-3 nats, or a relative 1e-4, of the sum over
-  /// all elements, as long as a cell is at most 200 times as wide as the sensor model's spread.
+  /// Returns the map of all touches so far. It covers the known elements and the sensor model's
+  /// support around them. Where a cell is at most 200 spreads wide, its log odds lie within
+  /// max(1e-3 nats, 1e-4 of their value) of the sum over all elements.
   /// @throws Error if no element of any touch was In Contact or No Contact, on the label
   /// `none_label`, or where the device fails
   OccupancyGrid build(const std::string& label);
@@ -59,10 +59,10 @@ struct ObjectTouches {
   std::vector<Touch> touches;
 };
 
-/// p(m) estimated as in the paper: the objects' area over the modelled area, pooled over all
-/// objects. Both areas are counted on maps built with an even prior, in which a cell is occupied
-/// when its evidence speaks for contact and modelled when it has evidence at all.
-/// @throws Error as MapBuilder does, naming the object.
+/// Estimates p(m) as in the paper: occupied area over modelled area, pooled over all objects. The
+/// areas are counted on maps built with a prior of 0.5: a cell is occupied where its log odds
+/// exceed 1e-3 nats, and modelled where |log odds| does.
+/// @throws Error as MapBuilder does
 double estimate_prior(Device& device, std::span<const ObjectTouches> objects, MapOptions options);
 
 }  // namespace palpate

@@ -16,20 +16,19 @@ double log_odds_from_probability(double p);
 /// 1 / (1 + exp(-l)), without overflow.
 double probability_from_log_odds(double l);
 
-/// The label of "none of these", an object that was never learned. No map may bear it, or an
-/// unlearned object would count as recognised where that map is the best.
+/// Label under which results report "none of these", an object that was never learned. No map may
+/// bear it: results could not tell its object from an unlearned one.
 inline constexpr std::string_view none_label = "(none)";
 
-/// Shortest and longest edge of a cell and spread of a sensor model, in mm: a nanometre and a
-/// kilometre. Kernels hold both lengths and their squares in float32, and a grid of the shortest
-/// cells at `farthest_mm` still numbers its cells exactly in float64.
+/// Shortest and longest cell edge and sensor-model spread, in mm (1 nm and 1 km). Their squares fit
+/// float32, and a grid of the shortest cells at `farthest_mm` has exact cell indices in float64.
 inline constexpr double least_length_mm = 1e-6;
 inline constexpr double most_length_mm = 1e6;
 
-/// Most cells of a map: kernels count them in 32 bits.
+/// Most cells of a map: kernels index them in 32 bits.
 inline constexpr std::int64_t most_cells = std::int64_t{1} << 30;
 
-/// Largest log odds of a cell, in nats: float32 holds sums over 1e8 elements of so much evidence.
+/// Largest magnitude of a cell's log odds, in nats: float32 holds sums of 1e8 such values.
 inline constexpr double most_log_odds = 1e30;
 
 /// The map of one object: log odds of occupancy on a regular grid in the object frame. Cell
@@ -41,8 +40,8 @@ struct OccupancyGrid {
   glm::dvec2 origin_mm{0.0, 0.0};  ///< centre of cell (0, 0)
   double prior = 0.2;              ///< p(m), probability that an unseen cell is occupied
   int symmetry = 1;                ///< n-fold rotational symmetry of the object; 0 = full
-  /// Spread of the inverse sensor model that built it: a finer cell shows no more. None where that
-  /// is not known.
+  /// Spread of the inverse sensor model that built the map, in mm; none where it is unknown. Cells
+  /// finer than the spread resolve no more.
   std::optional<double> spread_mm = {};
   int nx = 0;
   int ny = 0;
@@ -53,15 +52,17 @@ struct OccupancyGrid {
   double prior_log_odds() const { return log_odds_from_probability(prior); }
 };
 
-/// What keeps a map from being used, in a sentence that names the field, its value and the remedy;
-/// nothing where the map is sound. A sound map has nx * ny finite log odds within `most_log_odds`,
-/// at most `most_cells` of them; a cell and a spread within the bounds above; centres within
-/// `farthest_mm`; a spread no larger than the grid; a prior between 0 and 1; a symmetry of at least
-/// 0; and a label other than `none_label`. Files, MapBuilder and both filters take no other maps.
+/// Returns why a map is not sound, as one line of text that names the field, its value and the
+/// remedy; none where the map is sound. A sound map has nx * ny log odds, at most `most_cells` of
+/// them, finite and within `most_log_odds`; a cell and a spread within the bounds above; centres
+/// within `farthest_mm`; a spread no larger than the grid; a prior between 0 and 1; a symmetry of
+/// at least 0; and a label other than `none_label`. Files, MapBuilder and both filters refuse any
+/// other map.
 std::optional<std::string> fault_of(const OccupancyGrid& map);
-/// The same for all but the log odds, which the map need not hold yet.
+/// Checks a map like fault_of(), except its log odds, which it need not hold yet.
 std::optional<std::string> fault_without_cells(const OccupancyGrid& map);
-/// The same for some of the log odds; `first` is the place of the first among all.
+/// Checks a part of the map's log odds like fault_of(); `first` is the part's row-major index in
+/// the map.
 std::optional<std::string> fault_of_cells(const OccupancyGrid& map, std::size_t first,
                                           std::span<const float> log_odds);
 

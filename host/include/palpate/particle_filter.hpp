@@ -21,8 +21,8 @@ enum class Resampling {
 
 struct ParticleOptions {
   int particles = 10'000;  ///< n, over all objects together; at most 1,000,000
-  /// Where particles start: uniform over the lattice's ranges, about its pivot. Its counts do not
-  /// matter.
+  /// Particles start uniformly distributed over the ranges of this lattice, about its pivot; its
+  /// bin counts are ignored.
   PoseLattice region;
   ContactClassifier classifier;
   double gamma = 0.1;
@@ -33,8 +33,8 @@ struct ParticleOptions {
   Resampling resampling = Resampling::multinomial;
   /// Augmented MCL (Thrun, Burgard and Fox 2005, Table 8.3), the paper's second variant: each new
   /// particle is a random one with probability max(0, 1 - w_fast / w_slow). Both are running
-  /// averages of the particles' mean likelihood of a touch, taken to the power of one over its
-  /// known elements: the likelihood itself falls by orders with every element.
+  /// averages of the particles' mean likelihood of a touch, to the power of 1 / (number of its
+  /// known elements), since the likelihood itself falls by orders with every element.
   bool augmented = false;
   double alpha_slow = 0.05;  ///< rate of w_slow, above 0 and below alpha_fast
   double alpha_fast = 0.5;   ///< rate of w_fast, at most 1
@@ -47,8 +47,8 @@ struct ParticleOptions {
 /// leaves the weights as they are. Weights are kept in logs relative to the largest, so that they
 /// never all vanish. Particles are free to leave the region.
 ///
-/// Random numbers are a function of the seed, the touch and the particle, so that the order of
-/// execution is without influence. A filter that was moved from throws Error whatever it is asked.
+/// Random numbers depend on the seed, the touch and the particle alone, not on the order of
+/// execution. Every call on a moved-from filter throws Error.
 class ParticleFilter {
  public:
   /// @throws Error as PoseHistogram does, and on a number of particles, a noise or a rate out of
@@ -59,14 +59,13 @@ class ParticleFilter {
   ParticleFilter(ParticleFilter&&) noexcept;
   ParticleFilter& operator=(ParticleFilter&&) noexcept;
 
-  /// The initial particles once more, for the next unknown: the same touches give the same run.
+  /// Restores the initial particles for the next unknown: the same touches give the same run.
   /// @throws Error if the device fails
   void reset();
 
-  /// Moves and weighs the particles by each touch in turn. A touch that is not sound refuses all of
-  /// them, and the particles stay as they were. Where the device fails, they are half-way between
-  /// before and after: all but reset() then throw Error until reset() is called.
-  /// @throws Error on a touch that is not sound, or if the device fails
+  /// Resamples, moves and weighs the particles by each touch in turn (Eq. 7-8).
+  /// @throws Error, and changes nothing, on a touch that is not sound; Error if the device fails:
+  /// the particles may then be updated in part, and every call but reset() throws
   void update(std::span<const Touch> touches);
   void update(const Touch& touch) { update(std::span(&touch, 1)); }
 
@@ -75,10 +74,10 @@ class ParticleFilter {
   /// `mode.bin` is -1, and `mode.log_likelihood` the log of the Parzen sum's value there, at most
   /// 0; where all particles are of "none of these", it is -infinity and the mode says nothing.
   ///
-  /// `contradicted` compares as PoseHistogram's does, with the best particle of each touch in place
-  /// of the best bin. Only the particles there are can speak: too few of them may miss the pose
-  /// that explains the touches, and a particle may wander with the motion noise between one touch
-  /// and the next. A touch that meets particles of "none of these" only is not compared.
+  /// `contradicted` uses the best particle of each touch in place of the best bin. It is a hint:
+  /// too few particles may miss the pose that explains the touches, and motion noise may carry a
+  /// particle to another pose for each touch. A touch does not count while all particles are of
+  /// "none of these".
   /// @throws Error if the device fails
   Estimate estimate() const;
 
@@ -93,13 +92,13 @@ class ParticleFilter {
   /// All particles, for inspection. @throws Error if the device fails
   std::vector<Particle> particles() const;
 
-  /// Device memory held, in bytes, and the most that an estimate has needed besides.
+  /// Device memory in bytes: what the filter holds, plus the most that an estimate needed so far.
   std::uint64_t device_bytes() const;
 
  private:
   struct Impl;
   Impl& impl() const;
-  /// The same, with particles that no update has left half-way.
+  /// Like impl(), but throws Error where a failed update left the particles half-way.
   Impl& whole() const;
   std::unique_ptr<Impl> impl_;
 };

@@ -4,8 +4,8 @@
 
 namespace palpate {
 
-/// Farthest from its frame's origin, in mm, that a map or a lattice may reach: a thousand
-/// kilometres, where float64 still tells 1e-7 mm apart and squares are far from infinite.
+/// Largest |x| and |y| of a map or a lattice, in mm: 1,000 km, where float64 still resolves 1e-7 mm
+/// and squares are far from infinite.
 inline constexpr double farthest_mm = 1e9;
 
 /// A rigid transformation of the plane. Written T_a_b it maps coordinates in frame b to frame a:
@@ -24,10 +24,10 @@ glm::dvec2 operator*(const Pose& T_a_b, const glm::dvec2& p_b);
 /// T_b_a from T_a_b.
 Pose inverse(const Pose& T_a_b);
 
-/// R(theta) v.
+/// R(theta) v: rotates v counter-clockwise.
 glm::dvec2 rotate(double theta_rad, const glm::dvec2& v);
 
-/// The same angle in [-period/2, period/2).
+/// Returns the angle plus a whole number of periods, in [-period/2, period/2).
 double wrap_angle(double theta_rad, double period_rad);
 
 }  // namespace palpate

@@ -13,13 +13,13 @@ struct Body {
   double inertia_mm2 = 0.0;  ///< mean squared distance from the centroid
 };
 
-/// Throws Error if no cell is occupied.
+/// Returns the body of a map. @throws Error if no cell is occupied
 Body body_of(const OccupancyGrid& map);
 
-/// Root mean squared displacement in mm of the body between the estimated and the true pose
-/// (Chirikjian and Zhou 1998; Eq. 17-20): sqrt(|centroid difference|^2 + 2 J (1 - cos dtheta)),
-/// centroids compared in the robot frame. Symmetry n wraps dtheta into [-pi/n, pi/n); n = 0, full
-/// symmetry, ignores it. 1 mm of pure translation scores 1.
+/// Returns the root mean squared displacement of the body between the estimated and the true pose,
+/// in mm (Chirikjian and Zhou 1998; Eq. 17-20): sqrt(|dc|^2 + 2 J (1 - cos dtheta)), where dc is
+/// the difference of the centroids in the robot frame and J is `inertia_mm2`. Symmetry n wraps
+/// dtheta into [-pi/n, pi/n); n = 0, full symmetry, sets it to 0. A translation by 1 mm scores 1.
 double pose_error_mm(const Body& body, int symmetry, const Pose& T_object_robot_estimate,
                      const Pose& T_object_robot_truth);
 

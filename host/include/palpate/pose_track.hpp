@@ -15,34 +15,33 @@
 
 namespace palpate {
 
-/// Whether a robot can be there: x and y within +-1e9 mm, theta within +-1e9 rad, no NaN.
+/// True for a pose that a robot can have: |x|, |y| <= 1e9 mm and |theta| <= 1e9 rad, no NaN.
 bool is_robot_pose(const Pose& T_robot_sensor);
 
-/// Where the sensor was, by time: poses T_robot_sensor between which it is interpolated, the angle
-/// the short way round.
+/// The sensor's poses T_robot_sensor over time, interpolated linearly, angles the short way round.
 ///
-/// A pose that is not later than the last, or later by more than 10 of the largest gaps, is set
-/// aside at first: it may be stamped wrongly. It is dropped as soon as a pose follows the last one
-/// after all. Three such poses in a row, each later than the one before, are another thing: the
-/// robot has paused, or its clock was set. They join the track, and where the clock went back, what
-/// the track knew of the times from there on is forgotten.
+/// A pose whose time is not later than the last pose's, or later by more than 10 `largest_gap_s`,
+/// may be stamped wrongly and is set aside. The next pose in order drops it. Three poses set aside
+/// in a row, each later than the one before, join the track instead: the robot paused, or its clock
+/// was set. Where the clock went back, they replace the track's poses from their first time on.
 class PoseTrack {
  public:
-  /// @param largest_gap_s between two poses further apart in time nothing is known
+  /// @param largest_gap_s poses further apart in time are not interpolated, in s
   explicit PoseTrack(double largest_gap_s = 0.1) : largest_gap_s_(largest_gap_s) {}
 
-  /// Adds a pose; false where it is not of the track, or not yet: set aside or dropped.
+  /// Adds a pose. Returns false where it is set aside, or dropped: a time that is not finite, or a
+  /// pose that is_robot_pose() refuses.
   bool add(double time_s, const Pose& T_robot_sensor);
-  /// No more poses will come: those that are set aside join the track where they are later than its
-  /// last, and are dropped where they are not.
+  /// Ends the track: poses set aside join it where they are later than its last pose, and are
+  /// dropped otherwise.
   void end();
-  /// The pose at this time; none before the first, after the last and in a larger gap.
+  /// Returns the pose at this time; none before the first pose, after the last, or in a larger gap.
   std::optional<Pose> at(double time_s) const;
-  /// Time of the last pose.
+  /// Returns the time of the last pose; none where the track is empty.
   std::optional<double> last_s() const;
-  /// Forgets what is not needed to know the poses from this time on.
+  /// Forgets the poses that at() needs for no time from `time_s` on.
   void forget_before(double time_s);
-  std::size_t size() const { return poses_.size(); }
+  std::size_t size() const { return poses_.size(); }  ///< number of poses held
 
   std::size_t set_aside() const { return aside_.size(); }  ///< poses that are set aside now
   std::uint64_t dropped() const { return dropped_; }       ///< poses that add() and end() dropped
@@ -61,36 +60,36 @@ class PoseTrack {
   std::uint64_t set_back_ = 0;
 };
 
-/// Another sensor with the poses of a robot: lines of JSON such as
+/// Adds a robot's poses to the frames of another sensor. Poses are lines of JSON such as
 ///   {"time": 1700000000.25, "x_mm": 12.5, "y_mm": -3.0, "theta_rad": 0.79}
-/// in the order of time (seconds since the Unix epoch, as the frames' host times), from a file, a
-/// FIFO or standard input. Other keys and empty lines are passed over.
+/// in the order of time (seconds since the Unix epoch, like the frames' host times), from a file, a
+/// FIFO or standard input. Other keys and empty lines are ignored.
 ///
-/// A file is read when the sensor is opened, and a line of it that is no pose, or out of the order
-/// of time, is an error. A FIFO or standard input is read as it comes, without waiting: such a line
-/// is passed over and counted, and the track goes on as PoseTrack says. A frame is held back until
-/// the pose after it has come, at most for 0.2 s. Poses that no frame asks for yet are left to the
-/// FIFO once 65,536 wait; while the board is gone, all but those of the last second are forgotten.
+/// A file is read when the sensor is opened; a line that is no pose, or out of order, is an error.
+/// A FIFO or standard input is read without blocking; such a line is skipped and counted, and
+/// PoseTrack decides which poses count. A frame waits at most 0.2 s for the first pose after it. At
+/// most 65,536 poses are read ahead of the frames; while the sensor is unplugged, only the poses of
+/// the last second are kept.
 class PosedSensor : public Sensor {
  public:
-  static constexpr double usual_gap_s = 0.1;
+  static constexpr double usual_gap_s = 0.1;  ///< default of PoseTrack's `largest_gap_s`
 
-  /// What came from the robot, and since start() its frames.
+  /// Counts of poses since the sensor was opened, and of frames since start().
   struct Poses {
-    std::uint64_t read = 0;
-    std::uint64_t refused = 0;   ///< lines that are no pose, or out of the order of time
-    std::string first_refused;   ///< what was wrong with the first of them, naming the line
-    std::uint64_t set_back = 0;  ///< times the poses' clock went back; their lines are not refused
+    std::uint64_t read = 0;      ///< poses that joined the track
+    std::uint64_t refused = 0;   ///< lines that are no pose, or out of order
+    std::string first_refused;   ///< names the first refused line and its fault
+    std::uint64_t set_back = 0;  ///< times the poses' clock went back; no line is refused for it
     std::uint64_t frames = 0;    ///< frames with a pose
-    std::uint64_t without = 0;   ///< frames without one
+    std::uint64_t without = 0;   ///< frames without a pose
   };
 
-  /// Is told what is wrong with a line, naming it, when it is read: once for each kind of fault.
+  /// Called with the fault of a refused line, which it names: once for each kind of fault.
   using Complaint = std::function<void(const std::string&)>;
 
   /// @param poses path of a file or FIFO, or "-": standard input
   /// @param complain called from within next(); may be empty
-  /// @throws Error (Fault::input) where it cannot be read, or a line of a file is no pose
+  /// @throws Error (Fault::input) where `poses` cannot be read, or a line of a file is no pose
   PosedSensor(std::unique_ptr<Sensor> sensor, const std::string& poses,
               double largest_gap_s = usual_gap_s, Complaint complain = {});
   ~PosedSensor() override;
@@ -103,7 +102,7 @@ class PosedSensor : public Sensor {
   void stop() override;
   SensorCounters counters() const override;
 
-  Poses poses() const;
+  Poses poses() const;  ///< counts so far
 
  private:
   struct Impl;

@@ -10,10 +10,10 @@
 
 namespace palpate {
 
-/// What a scene file says. Everything that it may leave out is optional; a flag of the command line
-/// overrides its key.
+/// Contents of a scene file; a key that the file leaves out is empty here. A flag of the command
+/// line overrides its key.
 struct Scene {
-  /// One of the objects to tell apart. What is given here overrides the map's own.
+  /// An object to recognise. Its label and symmetry, where given, override the map's own.
   struct Object {
     std::filesystem::path map;
     std::optional<std::string> label;
@@ -30,25 +30,25 @@ struct Scene {
   };
 
   std::optional<std::vector<glm::dvec2>> array_mm;  ///< element centres in the sensor frame
-  std::optional<std::filesystem::path> array_file;  ///< that they were read from, if from a file
+  std::optional<std::filesystem::path> array_file;  ///< file of `array_mm`, if any
   std::optional<double> threshold;                  ///< in the recording's pressure unit
-  std::optional<double> ratio;
-  std::optional<double> gamma;
-  std::optional<double> prior;
+  std::optional<double> ratio;                      ///< of Eq. 3
+  std::optional<double> gamma;                      ///< of Eq. 7
+  std::optional<double> prior;                      ///< p(m) of Eq. 7
   std::vector<Object> objects;
   Region region;
   std::optional<double> none;              ///< prior weight of "none of these"
   std::optional<std::array<int, 3>> bins;  ///< of x, y, theta
-  bool auto_bins = false;                  ///< as many as the maps are worth: balanced_lattice()
+  bool auto_bins = false;                  ///< counts by balanced_lattice()
   std::optional<std::string> filter;       ///< "auto", "histogram", "bounded" or "particles"
   std::optional<std::string> device;       ///< a device's name or index
 };
 
-/// Reads a YAML scene file. Paths in it are relative to the file's folder; those returned are not.
+/// Reads a YAML scene file. Its relative paths start from its folder; returned paths include it.
 /// `array` is "digitacts", a text file with a line "x y" in mm per element ('#' starts a comment),
 /// or a list of [x, y] in mm.
-/// @throws Error naming the file, the line, the key, the value and the remedy, also for a key that
-/// is not known or given twice.
+/// @throws Error (Fault::input) naming the file, line, key, value and remedy, also on an unknown
+/// key or one given twice
 Scene read_scene(const std::filesystem::path& path);
 
 }  // namespace palpate

@@ -6,11 +6,11 @@
 
 namespace palpate {
 
-/// The smallest prior of a map, and its distance from 1: beyond it, what a reading says 10 spreads
-/// away would still outweigh the prior.
+/// Smallest prior of a map, and smallest 1 - prior: beyond these, increments in float32 miss the
+/// tolerance of MapBuilder::build().
 inline constexpr double least_prior = 1e-6;
 
-/// The smallest peak: a reading of less says nothing.
+/// Smallest peak: a reading with a smaller one says nothing.
 inline constexpr double least_peak = 1e-6;
 
 /// The inverse sensor model of Eq. 4-6: how much one element's reading changes the log odds of the
@@ -23,12 +23,12 @@ struct InverseSensorModel {
   double peak = 0.9;       ///< at most 0.9999: at 1 a single reading would make a cell certain
   double prior = 0.2;      ///< m
 
-  /// Throws Error unless the spread lies within the bounds of lengths that occupancy_grid.hpp
-  /// gives, least_peak <= peak <= 0.9999 and least_prior <= prior <= 1 - least_prior.
+  /// Throws Error unless least_length_mm <= spread_mm <= most_length_mm (see OccupancyGrid),
+  /// least_peak <= peak <= 0.9999 and least_prior <= prior <= 1 - least_prior.
   void validate() const;
-  /// Log-odds increment of a cell at this distance from the element's centre, in nats.
+  /// Log-odds increment of a cell whose centre is this far from the element's, in nats (Eq. 5).
   double increment(Reading reading, double distance_mm) const;
-  /// Distance beyond which `readings` increments together stay below `tolerance` nats.
+  /// Distance beyond which this many increments together stay below `tolerance` nats, in mm.
   double support_radius_mm(std::size_t readings, double tolerance) const;
 };
 

@@ -15,7 +15,7 @@
 
 namespace palpate {
 
-/// A raised planar shape in its object frame, in mm: strokes of a width, and filled polygons.
+/// A raised planar shape in its object frame, in mm: the union of its strokes and filled polygons.
 struct Shape {
   struct Stroke {
     std::vector<glm::dvec2> points_mm;  ///< a polyline, with round caps and joints
@@ -25,15 +25,15 @@ struct Shape {
   std::vector<Stroke> strokes;
   std::vector<std::vector<glm::dvec2>> polygons;  ///< together filled by the even-odd rule
 
-  bool contains(const glm::dvec2& p_object_mm) const;
+  bool contains(const glm::dvec2& p_object_mm) const;  ///< true for a point on the shape
 };
 
-/// The shape of this name that make_shape() knows without a file, if there is one.
+/// Returns the shape that make_shape() knows by this name without a file; none for other names.
 std::optional<Shape> built_in_shape(const std::string& name);
 
-/// A capital letter "A".."Z" or digit "0".."9" about 25 mm high, "ring", "bar", or the path of a
-/// polygon file: lines "x y" in mm, an empty line between polygons, '#' starts a comment.
-/// @throws Error naming the file and line, or what shapes there are.
+/// Makes a shape: a capital letter "A".."Z" or digit "0".."9" about 25 mm high, "ring", "bar", or
+/// the polygons of a file: lines "x y" in mm, an empty line between polygons, '#' starts a comment.
+/// @throws Error (Fault::input) naming the file and line, or the shapes that there are
 Shape make_shape(const std::string& name_or_file);
 
 /// The sensor of Pezzementi et al. (Haptics Symposium 2010), the paper's reference [19]: the
@@ -43,26 +43,25 @@ Shape make_shape(const std::string& name_or_file);
 struct SensorModel {
   double psf_mm = 1.0;                       ///< standard deviation of the point spread
   double element_mm = digitacts_element_mm;  ///< edge of a square element
-  double pressure_kpa = 20.0;  ///< reading of an element wholly on the shape, on average
-  double force_spread = 0.15;  ///< relative standard deviation of the press force
-  double gain_spread = 0.05;   ///< relative standard deviation of the elements' gains
-  double noise_kpa = 0.7;      ///< standard deviation of the additive noise
+  double pressure_kpa = 20.0;                ///< mean reading of an element wholly on the shape
+  double force_spread = 0.15;                ///< relative standard deviation of the press force
+  double gain_spread = 0.05;                 ///< relative standard deviation of the elements' gains
+  double noise_kpa = 0.7;                    ///< standard deviation of the additive noise
 };
 
-/// Simulated touches of one shape with one array. The same seed gives the same recording. A
-/// simulator that was moved from throws Error when it is asked for touches.
+/// Simulates touches of one shape with one array. The same seed gives the same recording. touch()
+/// of a moved-from simulator throws Error.
 class Simulator {
  public:
-  /// @throws Error on a spread, element or noise out of range.
+  /// @throws Error on a shape without area, an array without elements, or a value out of range
   Simulator(const Shape& shape, const SensorModel& model, std::vector<glm::dvec2> elements_mm,
             std::uint64_t seed);
   ~Simulator();
   Simulator(Simulator&&) noexcept;
   Simulator& operator=(Simulator&&) noexcept;
 
-  /// Touches at these sensor poses, [n], with the object at T_object_robot: pressures in kPa, [n,
-  /// e], and times 0.5 s apart from 0. Every call goes on with the random numbers of the one
-  /// before.
+  /// Simulates touches at these sensor poses, [n], with the object at T_object_robot: pressures in
+  /// kPa, [n, e], and times from 0 s on, 0.5 s apart. Calls share one sequence of random numbers.
   Recording touch(const std::vector<Pose>& T_robot_sensor, const Pose& T_object_robot);
 
  private:
@@ -70,12 +69,12 @@ class Simulator {
   std::unique_ptr<Impl> impl_;
 };
 
-/// Sec. II: 4 x 4 positions 6.8 mm apart around the object's origin, 12 angles at each: 192 poses
-/// T_object_sensor.
+/// Returns the 192 training poses T_object_sensor of Sec. II: 4 x 4 positions 6.8 mm apart around
+/// the object's origin, 12 angles at each.
 std::vector<Pose> training_grid();
-/// n poses T_object_sensor, uniform over the training grid's extent and all angles.
+/// Returns n poses T_object_sensor, uniform over the training grid's extent and all angles.
 std::vector<Pose> random_poses(int n, std::uint64_t seed);
-/// T_object_robot uniform over [-10, 10]^2 mm and all angles (Sec. IV).
+/// Returns a T_object_robot, uniform over [-10, 10]^2 mm and all angles (Sec. IV).
 Pose random_object_pose(std::uint64_t seed);
 
 }  // namespace palpate

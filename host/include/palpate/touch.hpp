@@ -12,16 +12,16 @@
 
 namespace palpate {
 
-/// The central 6 x 6 region of two PPS DigiTacts pads side by side, in the sensor frame, in mm:
-/// columns at x = +-1.1, +-3.0, +-4.9, rows at y = (k - 2.5) * 1.9; row by row, x fastest.
+/// Returns the element centres, [36] in mm in the sensor frame, of the central 6 x 6 region of two
+/// PPS DigiTacts pads side by side: x = +-1.1, +-3.0, +-4.9, y = (k - 2.5) * 1.9; x varies fastest.
 std::vector<glm::dvec2> digitacts_array();
 
 /// Edge length of a DigiTacts element, in mm.
 inline constexpr double digitacts_element_mm = 1.8;
 
-/// One reading of the tactile array at a known pose. A view: the caller keeps the memory alive.
-/// What takes a touch throws Error where the sizes disagree, or where the pose or the place of an
-/// element is not finite or the pressure of one that is alive is infinite.
+/// One reading of the tactile array at a known pose. It is a view: the caller keeps the memory
+/// alive. A touch is sound if its lists have one size, its pose and its element centres are finite,
+/// and no living element's pressure is infinite. Whatever takes a touch throws Error on any other.
 struct Touch {
   Pose T_robot_sensor;
   std::span<const glm::dvec2> elements_mm;   ///< [e] element centres in the sensor frame
@@ -29,10 +29,10 @@ struct Touch {
   std::span<const std::uint8_t> valid = {};  ///< [e] 0 = dead element; empty: all are alive
 };
 
-/// True where both touches have the same elements in the same places of the robot frame, exactly.
+/// True where both touches have exactly the same pose and element centres.
 bool same_placement(const Touch& a, const Touch& b);
 
-/// Where an unknown object really was, when it is known.
+/// The true identity and pose of an unknown object.
 struct Truth {
   std::string object;
   Pose T_object_robot;
@@ -51,22 +51,23 @@ struct Recording {
   std::vector<double> time_s;           ///< empty or [n], since the Unix epoch
   std::optional<Truth> truth;
 
-  // What a stream of frames has besides. Its poses may be NaN, not known at that time, and so may
-  // its pressures: Unknown.
+  // Fields of a stream of frames. In a stream, a pose may be NaN (unknown at that time), and so may
+  // a pressure (Unknown).
   std::string sensor;                 ///< name of the sensor, "" when unknown
-  std::string serial;                 ///< its serial number, "" where it has none
-  std::vector<double> baseline;       ///< empty or [e]: what it reads untouched
+  std::string serial;                 ///< its serial number, "" if none
+  std::vector<double> baseline;       ///< empty or [e]: untouched readings
   std::vector<double> device_time_s;  ///< empty or [n], by the sensor's own clock; NaN: unknown
-  std::vector<std::uint64_t> lost_before;  ///< empty or [n]: frames lost since the one before
-  bool closed = true;                      ///< false: it was cut off, or is still being recorded
+  std::vector<std::uint64_t> lost_before;  ///< empty or [n]: frames lost since the last row
+  bool closed = true;                      ///< false: cut off, or being recorded
 
   /// Number of touches, n.
   std::size_t size() const { return T_robot_sensor.size(); }
   /// Number of elements of the array, e.
   std::size_t elements() const { return size() == 0 ? 0 : pressure.size() / size(); }
-  /// Touch i < size(), a view into this recording: valid as long as it is unchanged.
+  /// Returns touch i < size() as a view into this recording, valid while the recording is
+  /// unchanged.
   Touch touch(std::size_t i) const;
-  /// Touches [begin, end), end <= size(), views into this recording.
+  /// Returns touches [begin, end), end <= size(), as such views.
   std::vector<Touch> touches(std::size_t begin, std::size_t end) const;
 };
 

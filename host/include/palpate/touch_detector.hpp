@@ -10,57 +10,52 @@
 
 namespace palpate {
 
-/// When a stream of frames is a touch. Pressures are in the sensor's unit, above the baseline.
+/// Thresholds of the touch detector. Pressures are in the sensor's unit, above the baseline.
 struct TouchDetectorOptions {
   double onset = 2.0;    ///< a touch begins where the largest pressure exceeds this
-  double release = 1.0;  ///< and ends where it falls below this
-  /// In the steady phase the load, the sum of what every element reads above `release`, stays
-  /// within this part of its mean, or within `release` where that is more.
+  double release = 1.0;  ///< a touch ends where it falls below this
+  /// The load is the sum over elements of max(0, pressure - release). In a steady phase it differs
+  /// from its mean by at most max(steady * mean, release).
   double steady = 0.15;
-  double min_steady_s = 0.1;  ///< shorter ones are no touch
-  double steady_mm = 0.5;     ///< a pose that is known moves less than this in the steady phase
+  double min_steady_s = 0.1;  ///< shortest steady phase of a touch
+  double steady_mm = 0.5;     ///< a known pose moves less than this in a steady phase
   double steady_rad = 0.05;   ///< and turns less than this
-  double smooth_s = 0.05;     ///< onset, release and load are judged by the mean over this time
-  /// Time constant with which the baseline follows what is read while nothing is touched; 0: never.
+  double smooth_s = 0.05;     ///< onset, release and load are judged on means over this time
+  /// Time constant with which the baseline follows drift while nothing is touched; 0: never.
   double drift_s = 60.0;
   double largest_gap_s = 0.5;  ///< a longer silence ends a touch
 };
 
-/// One touch of a stream: a robust mean of its steady frames, one better reading than any of them.
+/// One touch of a stream: robust means over its longest steady phase.
 struct DetectedTouch {
-  double begin_s = 0.0;  ///< host times of the first and the last of its frames
+  double begin_s = 0.0;  ///< host times of the first and last frame averaged
   double end_s = 0.0;
-  std::size_t frames = 0;                   ///< that the means are of
+  std::size_t frames = 0;                   ///< number of frames averaged
   std::vector<double> pressure;             ///< [e] interquartile mean, above the baseline
-  std::vector<std::uint8_t> valid = {};     ///< [e] 0 = dead, or Unknown in its frames; it reads 0
-  std::optional<Pose> T_robot_sensor = {};  ///< mean of those that are known
+  std::vector<std::uint8_t> valid = {};     ///< [e] 0 = dead, or known in < 3 frames; reads 0
+  std::optional<Pose> T_robot_sensor = {};  ///< mean of the known poses
 };
 
-/// Finds touches in a stream of frames: onset, steady phase, release.
+/// Finds touches in a stream of frames by onset, steady phase and release.
 ///
-/// Of every three frames in a row each element's median is taken, so that single bad frames neither
-/// begin nor end a touch, then the mean over `smooth_s`. A touch's longest steady phase becomes one
-/// reading: per element the interquartile mean of its frames. Unlike the median it resolves less
-/// than a step of the sensor's converter and averages noise almost as well as the mean (84 %
-/// against 64 % of its efficiency); and a quarter of the frames may be wrong to either side.
+/// Each element's pressure passes a median over three frames, so that single bad frames neither
+/// begin nor end a touch, and a mean over `smooth_s`; onset, release and load are judged on the
+/// result. The longest steady phase of a touch becomes one reading: per element, the interquartile
+/// mean of the phase's pressures, which tolerates a quarter of wrong frames to either side.
 ///
-/// A reading that is_known() does not know changes nothing: the touch is found by the others, and
-/// the means are of the readings that are known. An element that is Unknown for longer than
-/// `largest_gap_s` counts as untouched until it can be read again. Whatever finite numbers an
-/// element reads, they leave no trace in the touches after them.
+/// Readings that are not is_known() take no part in medians and means. An element that is Unknown
+/// for longer than `largest_gap_s` counts as untouched until it can be read again. Wild readings
+/// have no effect on later touches.
 ///
-/// While nothing is touched the baseline follows slow drift, of what is read below it by at most
-/// `onset` in `drift_s`. Lost frames do no harm beyond what
-/// they do to the time a touch is seen; a silence longer than `largest_gap_s`, or a clock that goes
-/// back, ends a touch and begins anew. The memory in use is bounded: of a long steady phase, frames
-/// evenly spread over it are kept. A detector that was moved from throws Error whatever it is
-/// asked.
+/// While nothing is touched, the baseline follows drift; readings count as at most `onset` below
+/// it. Lost frames only coarsen the times of a touch. A silence longer than `largest_gap_s`, or a
+/// clock that goes back, ends a touch and restarts detection. Memory is bounded: a long steady
+/// phase keeps frames evenly spread over it. Every call on a moved-from detector throws Error.
 class TouchDetector {
  public:
-  /// @param baseline [e] what the array reads when nothing is touched, subtracted from every frame;
-  /// empty: it reads nothing
+  /// @param baseline [e] what the untouched array reads, subtracted from every frame; empty: zeros
   /// @param valid empty or [e]; 0 = dead element, which takes no part and reads 0 in every touch
-  /// @throws Error on options out of range, a baseline that is_known() refuses or sizes that
+  /// @throws Error on options out of range, a baseline that is not is_known(), or sizes that
   /// disagree
   TouchDetector(const TouchDetectorOptions& options, std::vector<double> baseline,
                 std::vector<std::uint8_t> valid);
@@ -68,19 +63,21 @@ class TouchDetector {
   TouchDetector(TouchDetector&&) noexcept;
   TouchDetector& operator=(TouchDetector&&) noexcept;
 
-  /// Takes one frame; returns the touch that ends with it. A frame without a known reading, or with
-  /// a time that is not finite, is passed over; a pose that is_robot_pose() refuses is not known.
+  /// Takes one frame and returns the touch that ends with it, if any. A frame without a known
+  /// reading, or with a time that is not finite, is ignored; a pose that is_robot_pose() refuses is
+  /// unknown.
   /// @throws Error on a frame of another size than the one before
   std::optional<DetectedTouch> add(const Frame& frame);
-  /// The touch under way when the stream ends, if it was steady long enough; begins anew.
+  /// Ends the stream: returns the touch under way, if it was steady long enough, and restarts
+  /// detection.
   std::optional<DetectedTouch> finish();
 
-  /// The touch that the next release will end, unless a longer steady phase comes before; empty
-  /// where no steady phase is over yet. It changes with add() and finish() alone.
+  /// Returns the longest finished steady phase of the touch under way, which the release returns
+  /// unless a longer one follows; none before. Only add() and finish() change it.
   const std::optional<DetectedTouch>& candidate() const;
-  /// Between onset and release.
+  /// True between onset and release.
   bool touching() const;
-  /// [e] what the array reads untouched by now; empty before the first frame where none was given.
+  /// Returns the present baseline, [e]; empty before the first frame where none was given.
   const std::vector<double>& baseline() const;
 
  private:

@@ -26,13 +26,13 @@ TEST(Wts, DropsAPacketWithAWrongChecksumAndCountsIt) {
     Receiver receiver(read_serial_profile("wts"));
     receiver.send(damaged);
     receiver.expect_exactly({sent[0], sent[2]});
-    // Bytes 0 to 2 are the preamble, and a change of 4 or 5 makes the length more than any has.
+    // Bytes 0 to 2 are the preamble; a change of byte 4 or 5 makes the length larger than allowed.
     EXPECT_EQ(receiver.checksum_errors(), at < 3 || at == 4 || at == 5 ? 0u : 1u) << at;
     EXPECT_EQ(receiver.garbage(), sent[1].bytes.size()) << at;
   }
 }
 
-// Out of step, what begins like a packet is mostly none.
+// Out of step, most bytes that look like a packet's beginning are not.
 TEST(Wts, CountsAWrongChecksumOnlyInStep) {
   Receiver receiver(read_serial_profile("wts"));
   Bytes damaged = wts_packet(0x21, {0x00, 0x00});
@@ -95,14 +95,14 @@ TEST(Wts, FindsItsWayOutOfFalsePreambles) {
   }
 }
 
-// A request to start and stop is a packet too.
+// The commands that start and stop the stream are packets, too.
 TEST(Wts, CommandsCarryRightChecksums) {
   const SerialProfile profile = read_serial_profile("wts");
   EXPECT_EQ(profile.start, wts_packet(0x21, {0x00, 20, 0x00}));
   EXPECT_EQ(profile.stop, wts_packet(0x22, {}));
 }
 
-/// A FlexiTac frame of zeros, but for these bytes of the payload.
+/// A FlexiTac frame of zeros except for these bytes of the payload.
 Bytes flexitac(std::initializer_list<std::pair<std::size_t, std::uint8_t>> set) {
   Bytes bytes(514, 0);
   bytes[0] = 0xaa;
@@ -118,7 +118,7 @@ TEST(FlexiTac, IsNotMisledByMarkersInThePayload) {
   Receiver receiver(profile);
   receiver.push(Bytes(100, 0x00));
   for (std::size_t i = 0; i < 6; ++i) {
-    // Never twice at the same place.
+    // The markers change their place from frame to frame.
     receiver.push(flexitac({{40 * i, 0xaa}, {40 * i + 1, 0x55}}));
   }
   ASSERT_EQ(receiver.frames().size(), 6u);
@@ -226,7 +226,7 @@ TEST_F(Tsf85, MayHoldThePreambleInItsPayload) {
 
 TEST_F(Tsf85, RefusesTagsAndLengthsThatAreNone) {
   for (const Bytes& packet : {
-           Bytes{0x9a, 0x00, 0x58, 61},                      // longer than any
+           Bytes{0x9a, 0x00, 0x58, 61},                      // longer than any packet
            Bytes{0x9a, 0x00, 0x58, 3, 0xf0, 1, 2},           // unknown tag
            Bytes{0x9a, 0x00, 0x58, 5, 0x20, 1, 2, 0x30, 1},  // cut short
            Bytes{0x9a, 0x00, 0x57, 3, 0x20, 1, 2},           // another command
@@ -241,8 +241,8 @@ TEST_F(Tsf85, RefusesTagsAndLengthsThatAreNone) {
   }
 }
 
-// A board that nobody has seen: 2 x 3 cells, a packet per row, big-endian, signed, in kPa, with a
-// checksum in front that covers what follows.
+// An imaginary board: 2 x 3 cells, a packet per row, big-endian, signed, in kPa, with a checksum in
+// front that covers the bytes behind it.
 constexpr const char* rows_of_a_users_board = R"(
 name: rows
 gain: 0.25
@@ -272,7 +272,7 @@ TEST(OwnBoard, MaySendRowsWithAChecksumInFront) {
   EXPECT_EQ(receiver.checksum_errors(), 1u);
 }
 
-// Its length counts the whole packet; preamble, checksum and terminator.
+// A board whose length field counts the whole packet: preamble, checksum and terminator, too.
 constexpr const char* counted_board = R"(
 name: counted
 elements: [[0, 0], [1, 0]]
@@ -286,7 +286,7 @@ packet:
 )";
 
 TEST(OwnBoard, MayNotSkipBehindItsChecksum) {
-  // `skip` ends the tail, and the checksum would stand where only some packets have it.
+  // `skip` ends the tail: the checksum's place would be known only in packets with values.
   EXPECT_THROW(parse_serial_profile(counted_board, "counted.yaml"), Error);
 }
 
@@ -303,7 +303,7 @@ TEST(OwnBoard, MayCountTheWholePacket) {
   receiver.push(packet);
   EXPECT_EQ(receiver.frames().size(), 1u);
   EXPECT_EQ(receiver.garbage(), packet.size());
-  receiver.push(Bytes{0x02, 0x00, 5});  // shorter than what surrounds the values
+  receiver.push(Bytes{0x02, 0x00, 5});  // shorter than the fields around the values
   EXPECT_EQ(receiver.garbage(), packet.size() + 3);
 }
 

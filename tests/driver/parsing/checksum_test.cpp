@@ -17,7 +17,7 @@ std::uint32_t of(const Checksum::Parameters& parameters, std::string_view text) 
   return Checksum(parameters)(bytes);
 }
 
-// The "check" values over "123456789" of the catalogue of parametrised CRC algorithms.
+// The values named "check", over "123456789", of the catalogue of parametrised CRC algorithms.
 TEST(Checksum, GivesTheCatalogueValues) {
   constexpr std::string_view check = "123456789";
   EXPECT_EQ(of({.bytes = 1, .polynomial = 0x07}, check), 0xf4u) << "CRC-8/SMBUS";
@@ -27,7 +27,7 @@ TEST(Checksum, GivesTheCatalogueValues) {
   EXPECT_EQ(of({.bytes = 2, .polynomial = 0x1021}, check), 0x31c3u) << "CRC-16/XMODEM";
   EXPECT_EQ(of({.bytes = 2, .polynomial = 0x8005, .init = 0xffff, .reflect = true}, check), 0x4b37u)
       << "CRC-16/MODBUS";
-  // An asymmetric start tells whether init is turned round with the register.
+  // An asymmetric initial value shows whether it is reflected with the register.
   EXPECT_EQ(of({.bytes = 2, .polynomial = 0x1021, .init = 0xb2aa, .reflect = true}, check), 0x63d0u)
       << "CRC-16/RIELLO";
   EXPECT_EQ(of({.bytes = 4,
@@ -52,7 +52,7 @@ TEST(Checksum, AgreesWithWeissRoboticsExamples) {
   EXPECT_EQ(weiss({"\xaa\xaa\xaa\x01\x02\x00\x12\x34", 8}), 0x666du);
   EXPECT_EQ(weiss({"\xaa\xaa\xaa\x01\x00\x00", 6}), 0x10e8u);
   EXPECT_EQ(weiss({"\xaa\xaa\xaa\x06\x00\x00", 6}), 0x2697u);
-  // It is not the CRC-16 whose table it uses.
+  // The checksum differs from the CRC-16 whose table it uses.
   EXPECT_NE(of({.bytes = 2, .polynomial = 0x1021, .init = 0xffff}, {"\xaa\xaa\xaa\x01\x00\x00", 6}),
             0x10e8u);
 }

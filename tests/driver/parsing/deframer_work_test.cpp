@@ -1,5 +1,5 @@
-// Streams that begin like a packet at every byte, by profiles that allow the largest packets. They
-// take milliseconds; where a packet were gone through anew for each byte, minutes.
+// Tests the work per byte on streams that look like a packet's beginning at every byte, with
+// profiles of the largest packets. They take milliseconds; reading a packet per byte takes minutes.
 #include <gtest/gtest.h>
 
 #include <string>
@@ -39,7 +39,7 @@ TEST_P(LargestPacket, IsFoundBehindManyThatBeginLikeIt) {
   Bytes noise(1'000'000, 0);
   noise[0] = 1;  // out of step from here on
   receiver.push(noise);
-  // As a board with short packets delivers it.
+  // In pieces, as a board with short packets delivers them.
   for (std::size_t at = 0; at < packet.size(); at += 7) {
     const auto begin = packet.begin() + static_cast<std::ptrdiff_t>(at);
     receiver.push(Bytes(
@@ -50,7 +50,7 @@ TEST_P(LargestPacket, IsFoundBehindManyThatBeginLikeIt) {
   EXPECT_EQ(receiver.garbage(), noise.size());
 }
 
-// Each of them is wrong for a packet of zeros.
+// Each of these checksums is wrong for a packet of zeros.
 INSTANTIATE_TEST_SUITE_P(
     Checksums, LargestPacket,
     testing::Values("checksum: sum16, init: 0x1234", "checksum: weiss16",

@@ -1,5 +1,5 @@
-// A million random and damaged packets through all that parses bytes: nothing may crash, be read
-// out of bounds (the sanitizers watch), or keep a deframer out of step for longer than two frames.
+// Feeds a million random and damaged packets to the driver's parsers: none may crash, read out of
+// bounds (the sanitizers watch), or be out of step for longer than two frames.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -15,7 +15,7 @@
 namespace palpate {
 namespace {
 
-/// Damages bytes in one of the ways in which a line or a board may.
+/// Damages bytes in one of the ways in which a line or a board may damage them.
 void mutate(Bytes& bytes, std::mt19937& random) {
   const auto place = [&] { return static_cast<std::ptrdiff_t>(random() % (bytes.size() + 1)); };
   switch (random() % 6) {
@@ -88,7 +88,7 @@ TEST_P(MutatedStream, IsInStepAgainAfterTwoFrames) {
       ASSERT_EQ(frame.values.size(), profile.elements_mm.size());
       ASSERT_TRUE(none_infinite(frame));
     }
-    // The third is there at the latest when the fourth is.
+    // The third frame is decoded at the latest when the fourth has arrived.
     missed += std::none_of(frames.begin(), frames.end(), [&](const ParsedFrame& frame) {
       return frame.values == sent[2].values;
     });
@@ -172,7 +172,7 @@ TEST(MutatedReplies, OfATakkTileAreUnderstoodOrRefused) {
   EXPECT_GT(calibrations, 1000);
 }
 
-// What the shipped profiles say, torn up and put together anew.
+// Lines of the shipped profiles, changed and put together at random.
 TEST(MutatedProfile, IsReadOrRefusedInOneLine) {
   std::mt19937 random(61);
   std::vector<std::string> texts;
@@ -191,7 +191,7 @@ TEST(MutatedProfile, IsReadOrRefusedInOneLine) {
         line.clear();
       }
     }
-    texts.back() = kept;  // comments take time and hide nothing
+    texts.back() = kept;  // comments would only take time
   }
   const std::vector<std::string> words = {
       "0",  "-1",  "65536",  "1e308", ".nan",  "u16le",   "[",  "]",         "{",  "}",

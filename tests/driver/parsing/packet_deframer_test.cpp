@@ -20,7 +20,7 @@ class ShippedBoard : public testing::TestWithParam<const char*> {
     }
     return frames;
   }
-  // Without a checksum the frame that was hit may come out wrong, and one more beside it.
+  // Without a checksum, the damaged frame and one more may have wrong values.
   std::size_t most_strangers() const { return board_ == "wts" ? 0 : 2; }
 
   const std::string board_ = GetParam();
@@ -59,7 +59,7 @@ TEST_P(ShippedBoard, FrameComesWithItsLastByte) {
     for (std::size_t i = 0; i + 1 < frame.bytes.size(); ++i) {
       receiver.push(Bytes{frame.bytes[i]});
     }
-    // A packet of acceleration may follow the values within what stands for one frame here.
+    // The bytes of one frame may end with a packet of acceleration behind the values.
     if (board_ != "tsf85") {
       EXPECT_TRUE(receiver.frames().empty());
     }
@@ -87,7 +87,7 @@ TEST_P(ShippedBoard, IsInStepTwoFramesAfterGarbage) {
     Receiver receiver(profile_);
     receiver.send({sent.begin(), sent.begin() + 3});
     receiver.push(garbage);
-    // The frame that a format without checksum waits for is told by what follows it.
+    // A format without checksum accepts a frame when the next frame's beginning follows.
     receiver.send({sent.begin() + 3, sent.end()});
     ASSERT_TRUE(receiver.has(sent, 0, 3)) << count;
     ASSERT_TRUE(receiver.has(sent, 5, 8)) << count;

@@ -13,7 +13,7 @@
 
 namespace palpate {
 
-/// Pushes streams through one deframer and compares what comes out with what was sent.
+/// Pushes streams through one deframer and compares the decoded frames with the sent frames.
 class Receiver {
  public:
   explicit Receiver(const SerialProfile& profile) : deframer_(make_deframer(profile)) {}
@@ -21,7 +21,7 @@ class Receiver {
   void push(const Bytes& bytes) { deframer_->push(bytes, frames_); }
   void send(const std::vector<SentFrame>& sent) { push(stream_of(sent)); }
 
-  /// Whether the frames [begin, end) came, in order, whatever else did.
+  /// Whether the frames [begin, end) came in order, perhaps among other frames.
   bool has(const std::vector<SentFrame>& sent, std::size_t begin, std::size_t end) const {
     auto at = frames_.begin();
     for (std::size_t i = begin; i < end; ++i) {

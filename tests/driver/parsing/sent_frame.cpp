@@ -24,7 +24,7 @@ SentFrame tsf85_frame(std::mt19937& random) {
     append(frame.bytes, {0x9a, static_cast<std::uint8_t>(random()), 0x58,
                          static_cast<std::uint8_t>(data.size())});
     append(frame.bytes, data);
-    // Acceleration, of now and then, in a packet of its own.
+    // Acceleration comes now and then, in a packet of its own.
     if (random() % 2 == 0) {
       append(frame.bytes, {0x9a, 0x00, 0x58, 7, static_cast<std::uint8_t>(0x30 | finger << 2)});
       append(frame.bytes, random_bytes(6, random));

@@ -11,14 +11,14 @@ namespace palpate {
 
 using Bytes = std::vector<std::uint8_t>;
 
-/// What a board sends for one frame, and what it means.
+/// The bytes that a board sends for one frame, and the frame's values.
 struct SentFrame {
   Bytes bytes;
   std::vector<double> values;
 };
 
-/// A frame of a shipped profile's board with random readings, written byte by byte after the
-/// board's protocol, apart from the profile. "wts", "tsf85", "flexitac" or "anyskin".
+/// A frame with random readings of "wts", "tsf85", "flexitac" or "anyskin", written byte by byte
+/// after the board's protocol, without the profile.
 SentFrame random_frame(const std::string& board, std::mt19937& random);
 
 /// Weiss Robotics' checksum, bit by bit.
@@ -29,7 +29,7 @@ Bytes wts_packet(std::uint8_t id, const Bytes& payload);
 
 Bytes random_bytes(std::size_t count, std::mt19937& random);
 
-/// The bytes of frames, one after the other.
+/// The bytes of all frames, in order.
 Bytes stream_of(const std::vector<SentFrame>& frames);
 
 }  // namespace palpate

@@ -42,7 +42,7 @@ class ProfileFile : public testing::Test {
     return read_serial_profile(path_.string());
   }
 
-  /// The message must be one line that names the file and these.
+  /// Expects a message of one line that names the file and these words.
   void expect_refused(const std::string& yaml, std::initializer_list<const char*> parts) {
     const std::string message = input_error([&] { read(yaml); });
     expect_named(message, {path_.c_str()});
@@ -53,7 +53,7 @@ class ProfileFile : public testing::Test {
   std::filesystem::path path_ = folder_ / "own.yaml";
 };
 
-// All that has to be said.
+// The least that a profile must say.
 constexpr const char* head = "name: own\nelements: [[0, 0], [2, 0]]\n";
 constexpr const char* packet = "packet: [{bytes: aa}, {values: u8}]\n";
 

@@ -57,7 +57,7 @@ TEST(TakkTileElements, LieOnAGridAboutTheOrigin) {
   EXPECT_EQ(sum, glm::dvec2(0.0)) << "multiples of half the pitch are exact";
   EXPECT_EQ(elements_mm[1] - elements_mm[0], glm::dvec2(default_pitch_mm, 0));
   EXPECT_EQ(elements_mm[5] - elements_mm[0], glm::dvec2(0, default_pitch_mm));
-  // A cell keeps its place when others are dead.
+  // A cell keeps its place when other cells are dead.
   EXPECT_EQ(element_positions(std::vector<Cell>{{7, 4}}, 2.0).front(), glm::dvec2(4, 7));
 }
 
@@ -100,7 +100,7 @@ TEST(TakkTileCalibration, RefusesACellThatDoesNotAnswer) {
   system_error([] { parse_calibration(Bytes(8, 0xff)); });
 }
 
-// kPa = 50 + P * 65 / 1023, so that what was sent can be told from a value.
+// kPa = 50 + P * 65 / 1023, so that a value tells which reading P was sent.
 constexpr Calibration plain{.a0 = 0.0, .b1 = 1.0, .b2 = 0.0, .c12 = 0.0};
 
 /// A frame whose cell i reads first + i, in packets.
@@ -159,7 +159,7 @@ TEST_P(TakkTileFrames, ThatLoseAPacketAreDropped) {
     frames_.clear();
     push(damaged);
     EXPECT_TRUE(frames_.empty());
-    push(packets_of(cells_, 200));  // lost with it where the end was
+    push(packets_of(cells_, 200));  // lost, too, if the lost packet was the end
     frames_.clear();
     push(packets_of(cells_, 300));
     ASSERT_EQ(frames_.size(), 1u) << "not in step two frames after";
@@ -197,7 +197,7 @@ TEST_P(TakkTileFrames, DoNotComeOfEmptyPackets) {
   EXPECT_EQ(deframer_.counters().garbage_bytes, 0u);
 }
 
-// One cell; below, at and above a packet's 16; two packets; a whole board.
+// Numbers of cells: one; just below, at and above the 16 of a packet; two packets; a whole board.
 INSTANTIATE_TEST_SUITE_P(Cells, TakkTileFrames, testing::Values(1, 15, 16, 17, 32, 40));
 
 }  // namespace

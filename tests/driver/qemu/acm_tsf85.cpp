@@ -1,4 +1,4 @@
-// The far end of a CDC serial gadget, behaving as a Robotiq TSF-85 (driver/profiles/tsf85.yaml):
+// Plays a Robotiq TSF-85 (driver/profiles/tsf85.yaml) at the far end of a CDC serial gadget:
 //
 //   acm_tsf85 TTY
 //
@@ -22,7 +22,7 @@ constexpr std::uint8_t preamble = 0x9A;
 constexpr std::uint8_t send_by_itself = 0x58;
 constexpr int taxels = 28;
 
-/// The static pressures of one finger; the checksum's polynomial is public nowhere, so it is 0.
+/// A packet with the pressures of one finger; its checksum is 0, as the polynomial is not public.
 std::vector<std::uint8_t> packet(int finger, std::uint64_t frame) {
   std::vector<std::uint8_t> bytes = {preamble, 0, send_by_itself, 1 + 2 * taxels,
                                      static_cast<std::uint8_t>(0x10 | finger << 2)};
@@ -46,7 +46,7 @@ bool send(int port, const std::vector<std::uint8_t>& bytes) {
   return true;
 }
 
-/// The period in ms of a start or stop command among the bytes that came, or -1.
+/// The period, in ms, of a start or stop command among the received bytes, or -1.
 int read_command(int port, std::vector<std::uint8_t>& received) {
   std::uint8_t buffer[64];
   const ssize_t n = read(port, buffer, sizeof(buffer));

@@ -1,10 +1,10 @@
-// A TakkTile made of Linux's FunctionFS: the vendor requests and the stream of frames of a real
-// board, for a kernel with a gadget controller such as dummy_hcd.
+// Plays a TakkTile by Linux's FunctionFS: answers the vendor requests and streams frames as a real
+// board does, on a kernel with a gadget controller such as dummy_hcd.
 //
 //   functionfs_takktile FOLDER FRAMES_PER_SECOND
 //
-// FOLDER is a mounted functionfs. Prints "ready" once the descriptors are written, and when a
-// stream ends the number of frames that went out.
+// FOLDER is a mounted functionfs. Prints "ready" once the descriptors are written, and the number
+// of sent frames when a stream ends.
 
 #include <endian.h>
 #include <fcntl.h>
@@ -93,7 +93,7 @@ void describe(int control) {
   }
 }
 
-/// Sends frames from a thread of its own, as the host asks.
+/// Sends frames from a thread of its own while the host asks for them.
 class Stream {
  public:
   Stream(std::string folder, int rate) : folder_(std::move(folder)), rate_(rate) {}
@@ -105,7 +105,7 @@ class Stream {
     thread_ = std::thread([this] { send(); });
   }
 
-  /// Without waiting: the frame on its way is stuck until the host reads it or goes.
+  /// Does not wait for the thread: its write blocks until the host reads the frame or is gone.
   void stop() { running_ = false; }
 
   void join() {
@@ -190,7 +190,7 @@ int main(int argc, char** argv) {
   while (true) {
     if (read(control, &event, sizeof(event)) != sizeof(event)) {
       if (errno == EIDRM || errno == EINTR) {
-        continue;  // the host gave a request up for the next
+        continue;  // the host gave up this request and sent the next
       }
       std::perror("ep0");
       return 1;
@@ -205,7 +205,7 @@ int main(int argc, char** argv) {
     const usb_ctrlrequest& request = event.u.setup;
     std::vector<std::uint8_t> reply = reply_to(request);
     if ((request.bRequestType & USB_DIR_IN) == 0 || reply.empty()) {
-      // The wrong direction of access halts the endpoint.
+      // Access in the wrong direction stalls the endpoint.
       char none = 0;
       if ((request.bRequestType & USB_DIR_IN) != 0) {
         (void)!read(control, &none, 0);

@@ -1,5 +1,5 @@
 #!/bin/sh
-# The first process of the guest: a real kernel with a USB gadget of its own, udev with the shipped
+# The guest's first process: tests the driver with a real kernel, a USB gadget, udev with the shipped
 # rule, and an ordinary user. Prints "ok NAME" or "not ok NAME" lines, then turns the machine off.
 export PATH=/bin:/sbin LD_LIBRARY_PATH=/lib
 mount -t proc none /proc
@@ -84,7 +84,7 @@ check "a member of plugdev streams" [ $? -eq 0 ]
 cat /tmp/frames.txt
 check "10 s at 200 frames/s without loss" stream_frames --check /tmp/frames.txt 1900 0
 
-# Unplugged while it streams, and plugged in again.
+# The board is unplugged while it streams, and plugged in again.
 as_user 1000,46 stream_frames takktile:QEMU-1 15 > /tmp/frames.txt 2>&1 &
 streaming=$!
 sleep 2

@@ -1,13 +1,13 @@
 #!/usr/bin/env bash
-# The driver on a real kernel: boots Debian's own under QEMU with a USB gadget (see guest_init.sh).
+# Tests the driver on Debian's kernel, booted under QEMU with a USB gadget (see guest_init.sh).
 #
 #   run.sh SCRATCH DRIVER PROGRAM...
 #
 # DRIVER is the folder with the udev rule and the boards' profiles.
 #
-# Exits with 77 (skipped) and the reason where QEMU, busybox, udev or a kernel with its modules is
-# missing. PALPATE_TEST_KERNEL names the folder of a kernel package unpacked with dpkg -x; without
-# it, the machine's own kernels are looked at.
+# Exits with 77 (skipped) and the reason if QEMU, busybox, udev or a kernel with its modules is
+# missing. PALPATE_TEST_KERNEL names the folder of a kernel package unpacked with dpkg -x; by
+# default, the script looks for the machine's own kernels.
 set -euo pipefail
 
 skip() {
@@ -53,7 +53,7 @@ for module in "${order[@]}"; do
   fi
 done
 
-# Programs with the libraries that they load.
+# Copies the programs and the libraries that they load.
 busybox=$(command -v busybox)
 cp "$busybox" "$guest/bin/busybox"
 for applet in $("$busybox" --list); do

@@ -1,4 +1,4 @@
-// Streams frames from a board and says what came:
+// Streams frames from a board and reports them:
 //
 //   stream_frames BOARD SECONDS
 //   stream_frames --check FILE LEAST_FRAMES RECONNECTS    # of a run's output
@@ -26,7 +26,7 @@ int check(const std::string& file, std::uint64_t least_frames, std::uint64_t rec
     std::cout << file << ": holds no counts\n";
     return 1;
   }
-  // What was on its way when the board was unplugged may be lost.
+  // Frames in transfer when the board was unplugged may be lost.
   const bool whole = lost == 0 || reconnects > 0;
   return frames >= least_frames && whole && reconnected == reconnects ? 0 : 1;
 }
