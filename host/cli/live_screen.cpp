@@ -67,8 +67,8 @@ void LiveScreen::describe(const LiveState& state) {
     view_.state += fmt::format("; skipped {} touches without a pose", state.without_pose);
   }
   view_.pressure = state.pressure;
-  // Most presses are several times as strong as the contact threshold. Touches, which are robust
-  // means, may widen the scale; a single frame of 1e38 may not, or nothing else would be seen.
+  // A press is mostly several times as strong as what counts as contact. A touch's robust mean may
+  // widen the scale; of single frames, one of 1e38 would leave nothing to be seen.
   view_.full_scale = std::max(5.0 * task_.histogram.classifier.threshold, 1e-6);
   if (state.last) {
     for (const double pressure : state.last->touch.pressure) {

@@ -184,7 +184,7 @@ void build_maps(const Options& options) {
   const bool folder =
       options.output.ends_with('/') || std::filesystem::is_directory(output, ignored);
   if (!is_printable_utf8(options.label)) {
-    throw Error(Fault::input, "--label: is not printable UTF-8; choose another label");
+    throw Error(Fault::input, "--label: give printable text, in UTF-8");
   }
   if (options.label == none_label) {
     throw Error(Fault::input,

@@ -181,7 +181,7 @@ void record(const Options& options) {
   }
   require_above("--tare", options.tare_s, 0.0, true);
   if (!is_printable_utf8(options.object)) {
-    throw Error(Fault::input, "--object: is not printable UTF-8; choose another label");
+    throw Error(Fault::input, "--object: give printable text, in UTF-8");
   }
   std::unique_ptr<Sensor> sensor = open_sensor(options.sensor);
   PosedSensor* posed = nullptr;

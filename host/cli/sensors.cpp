@@ -39,7 +39,7 @@ void print_json(const std::vector<BoardInfo>& boards) {
   fmt::print("{}\n", dumped(list));
 }
 
-/// The text with '?' for control characters: a device chooses its strings freely.
+/// What a terminal shows of a string that the device chose.
 std::string printable(std::string text) {
   std::ranges::replace_if(
       text, [](unsigned char c) { return c < ' ' || c == 0x7f; }, '?');
