@@ -46,6 +46,8 @@ class DenseBelief {
  public:
   DenseBelief(gpu::Context& context, gpu::CommandStream& stream, const PoseLattice& lattice,
               std::size_t objects);
+  /// A uniform belief over the same lattice and objects.
+  DenseBelief uniform() const { return {context_, stream_, lattice_, objects_}; }
 
   /// How a belief is cut.
   static std::vector<SlabExtent> cut(const gpu::Context& context, const PoseLattice& lattice,
