@@ -4,6 +4,7 @@
 #include <span>
 #include <vector>
 
+#include "bin_window.hpp"
 #include "command_stream.hpp"
 #include "kernel_sizes.hpp"
 #include "palpate/lattice.hpp"
@@ -11,21 +12,6 @@
 #include "two_float.hpp"
 
 namespace palpate {
-
-/// A block of an object's bins. Its planes go on with the first after the last; its rows and
-/// columns (indices along y and x) lie within the lattice.
-struct BinWindow {
-  int theta_first = 0;  ///< may be negative
-  int theta_count = 0;
-  int row_first = 0;
-  int row_count = 0;
-  int column_first = 0;
-  int column_count = 0;
-
-  std::size_t bins() const {
-    return static_cast<std::size_t>(theta_count) * row_count * column_count;
-  }
-};
 
 /// What a reduction over one object's bins finds.
 struct BeliefSummary {

@@ -229,12 +229,15 @@ Estimate PoseHistogram::estimate() const {
 RefinedPose PoseHistogram::refine(const Mode& mode) const {
   Impl& histogram = whole();
   histogram.require_object(mode.object);
-  if (mode.bin < 0 || mode.bin >= lattice().bins()) {
+  const std::int64_t bin = mode.bin ? *mode.bin : lattice().bin_of(mode.T_object_robot);
+  if (bin < 0 || bin >= lattice().bins()) {
     throw Error(Fault::input,
-                fmt::format("bin {}: there are {}, counted from 0", mode.bin, lattice().bins()));
+                fmt::format("bin {}: there are {}, counted from 0", bin, lattice().bins()));
   }
-  return palpate::refine(histogram.belief, lattice(), static_cast<std::size_t>(mode.object),
-                         histogram.bodies[mode.object], mode.bin);
+  const auto log_likelihood = [&](const BinWindow& window) {
+    return histogram.belief.download(static_cast<std::size_t>(mode.object), window);
+  };
+  return palpate::refine(log_likelihood, lattice(), histogram.bodies[mode.object], bin);
 }
 
 Marginals PoseHistogram::marginals(int object) const {
@@ -248,7 +251,7 @@ Marginals PoseHistogram::marginals(int object) const {
       sum *= scale;
     }
   }
-  return {.xy = std::move(sums.xy), .theta = std::move(sums.theta)};
+  return {.grid = lattice(), .xy = std::move(sums.xy), .theta = std::move(sums.theta)};
 }
 
 std::vector<double> PoseHistogram::log_likelihood(int object) const {

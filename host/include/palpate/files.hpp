@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -33,7 +34,7 @@ void write_map(const std::filesystem::path& path, const OccupancyGrid& map);
 /// `yaml_path` ends in .yaml; the image takes its stem.
 void write_map_server(const std::filesystem::path& yaml_path, const OccupancyGrid& map);
 
-/// The posterior of one recording, as in a "palpate.posterior" HDF5 file.
+/// The posterior of one recording, the contents of a "palpate.posterior" HDF5 file.
 struct Posterior {
   std::vector<std::string> objects;
   PoseLattice lattice;
@@ -41,6 +42,12 @@ struct Posterior {
 };
 Posterior read_posterior(const std::filesystem::path& path);
 void write_posterior(const std::filesystem::path& path, const Posterior& posterior);
+/// Writes a posterior object by object, so that the bins of one object at a time are in memory.
+/// @param log_likelihood is called once for each object in order, and returns the log-likelihood of
+/// the object's bins, [theta, y, x] in nats, without prior weights
+void write_posterior(const std::filesystem::path& path, const std::vector<std::string>& objects,
+                     const PoseLattice& lattice,
+                     const std::function<std::vector<double>(std::size_t object)>& log_likelihood);
 
 /// The `format` attribute of an HDF5 file, such as "palpate.map".
 std::string read_format(const std::filesystem::path& path);

@@ -39,8 +39,12 @@ struct PoseLattice {
   std::int64_t bins() const { return plane() * theta_rad.count; }
   /// The pose of a bin; index order is theta, y, x, x fastest.
   Pose T_object_robot(std::int64_t index) const;
-  /// The pose of any (x, y, theta) of the lattice's parameters.
+  /// The pose at any (x, y, theta), in mm and radians.
   Pose T_object_robot(double x_mm, double y_mm, double theta_rad) const;
+  /// The bin that a pose lies in, or the nearest bin where the pose is outside the region. Angles
+  /// are compared modulo a full turn.
+  /// @throws Error on a pose that is not finite
+  std::int64_t bin_of(const Pose& T_object_robot) const;
 };
 
 }  // namespace palpate

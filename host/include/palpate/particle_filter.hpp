@@ -72,8 +72,8 @@ class ParticleFilter {
 
   /// Identity by Eq. 9; the pose is the maximum of the Parzen estimate with a cone kernel (Eq.
   /// 10-12), rho = 1 mm and 1 rad, on a grid of 0.5 mm and 0.04 pi rad through the region's centre.
-  /// `mode.bin` is -1, and `mode.log_likelihood` the log of the Parzen sum's value there, at most
-  /// 0; where all particles are of "none of these", it is -infinity and the mode says nothing.
+  /// The mode has no bin, and `mode.log_likelihood` is the log of the Parzen sum's value there, at
+  /// most 0; where all particles are of "none of these", it is -infinity and the mode says nothing.
   ///
   /// `contradicted` compares as PoseHistogram's does, with the best particle of each touch in place
   /// of the best bin. Only the particles there are can speak: too few of them may miss the pose

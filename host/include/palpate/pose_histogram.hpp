@@ -35,12 +35,6 @@ struct HistogramOptions {
   std::optional<std::uint64_t> memory_limit_bytes = {};
 };
 
-/// Probabilities of parts of one object's poses.
-struct Marginals {
-  std::vector<double> xy;     ///< of every (x, y), summed over theta, [ny, nx]
-  std::vector<double> theta;  ///< of every theta, summed over (x, y), [ntheta]
-};
-
 /// Histogram filter over object identity and planar pose (Sec. III-C, Eq. 13-16): a dense lattice
 /// of poses for every object, kept in logs on the device, in two floats per bin so that accuracy
 /// does not decay with the number of touches. The same input gives the same bits on one device. A
@@ -81,30 +75,27 @@ class PoseHistogram {
   /// @throws Error if the device fails
   Estimate estimate() const;
 
-  /// The pose between the bins around a mode, of which only `object` and `bin` count: where a
-  /// quadratic in how far the object moves, fitted to the logs of the belief, has its peak. It is
-  /// fitted near the mean of a root of the belief over a window, which is moved to that mean until
-  /// it rests: the eighth, or a higher one where bins so weighted spread by less than a third of
-  /// the window. In the fit they count by thrice that root times a Gaussian of 0.8 mm about the
-  /// mean. Roots and fit even out the ripples that readings leave in the belief: the peak errs less
-  /// than the mode and than the mean of the belief itself. The pose is that mean where fewer than
-  /// two bins within the window's radius stand for every unknown of the quadratic, as on bins wider
-  /// than some 1.5 mm along three axes, or where it has no peak within 1 mm and the region. The
-  /// covariance is the second moment of the belief itself about that pose, over the same window,
-  /// plus that of a bin.
+  /// The pose between the bins near a mode, and its covariance. Reads of the mode only `object` and
+  /// `bin`, or `T_object_robot` where the mode has no bin.
   ///
-  /// The window holds the poses at which the object lies within 2.5 mm (root mean square over its
-  /// occupied cells) of where the bin has it, at least the neighbouring bins; it goes on at 0 where
-  /// theta covers the whole circle and ends at the region's edges. Other modes, and what is unknown
-  /// by more than the window, do not show in the result. An axis of zero extent stays where it is.
-  /// On bins much wider than the belief, where the best bin need not be the nearest to the truth,
-  /// the covariance is too small. So it is where touches lie elsewhere than reported: the belief
-  /// takes their poses to be exact. After one or two touches a pose is better than its mode
-  /// on average, but worse in about a third of the cases.
-  /// @throws Error if there is no such object or bin, or the device fails
+  /// Fits a quadratic to the log-belief around its mean under weights belief^(1/n), n >= 8, and
+  /// returns the quadratic's peak. The window holds the poses that move the object by at most 2.5
+  /// mm (root mean square over its occupied cells), and at least the neighbouring bins; it is
+  /// re-centred on the mean up to twice. Returns the weighted mean instead where the window holds
+  /// fewer than two bins per coefficient or the quadratic has no peak within 1 mm and the region.
+  /// The covariance is the second moment of the belief in the window about the returned pose, plus
+  /// the variance of a uniform distribution over one bin.
+  ///
+  /// Modes outside the window do not show in the result. The window continues at theta's first bin
+  /// after its last where theta covers the full circle, and ends at the region's edges. An axis of
+  /// zero extent keeps its value. The covariance is too small on bins much wider than the belief
+  /// and where touches lie elsewhere than reported. docs/refinement.md says how large the errors
+  /// are.
+  /// @throws Error if there is no such object or bin, the pose is not finite, or the device fails
   RefinedPose refine(const Mode& mode) const;
 
-  /// Marginal probabilities of one object's poses; all objects' and `none` sum to 1.
+  /// Marginal probabilities of one object's poses, on lattice(). The marginals of all objects and
+  /// `none` together sum to 1.
   /// @throws Error if there is no such object, or the device fails
   Marginals marginals(int object) const;
   /// Log-likelihood of every bin of one object in nats, [theta, y, x], without prior weights.
