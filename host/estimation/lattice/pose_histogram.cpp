@@ -21,6 +21,24 @@
 
 namespace palpate {
 
+namespace {
+
+/// exp(logs) over their sum, by a log-sum-exp.
+std::vector<double> normalised(std::vector<double> logs) {
+  const double most = *std::max_element(logs.begin(), logs.end());
+  double total = 0.0;
+  for (double& p : logs) {
+    p = std::exp(p - most);
+    total += p;
+  }
+  for (double& p : logs) {
+    p /= total;
+  }
+  return logs;
+}
+
+}  // namespace
+
 struct PoseHistogram::Impl {
   Impl(Device& device, std::span<const Hypothesis> hypotheses, const HistogramOptions& wanted,
        const ContactLikelihood& model)
@@ -77,7 +95,7 @@ struct PoseHistogram::Impl {
     });
   }
 
-  /// The reductions of the belief as it is now; kept until the next touch.
+  /// The largest bin and the sum of every object; reduced once after each update.
   const std::vector<BeliefSummary>& summaries() {
     if (!summarised) {
       summarised = belief.summarise();
@@ -85,29 +103,21 @@ struct PoseHistogram::Impl {
     return *summarised;
   }
 
-  /// Eq. 14, as a log-sum-exp over objects and, where it is asked for, "none of these": the last.
+  /// Eq. 14: an object's prior weight times the summed likelihood of its bins, over the sum for all
+  /// objects and, where the options ask for it, "none of these", which stands last.
   std::vector<double> identity() {
-    std::vector<double> probability;  // in logs first: prior weight times the sum over the bins
+    std::vector<double> log_evidence;
     for (std::size_t i = 0; i < log_weight.size(); ++i) {
       const BeliefSummary& summary = summaries()[i];
-      probability.push_back(log_weight[i] + summary.max.value() + std::log(summary.sum));
+      log_evidence.push_back(log_weight[i] + summary.max.value() + std::log(summary.sum));
     }
     if (none_log_weight) {
-      probability.push_back(*none_log_weight + prior_log_likelihood);
+      log_evidence.push_back(*none_log_weight + prior_log_likelihood);
     }
-    const double most = *std::max_element(probability.begin(), probability.end());
-    double total = 0.0;
-    for (double& p : probability) {
-      p = std::exp(p - most);
-      total += p;
-    }
-    for (double& p : probability) {
-      p /= total;
-    }
-    return probability;
+    return normalised(std::move(log_evidence));
   }
 
-  /// Eq. 15-16: the bin of the largest posterior probability, of the first object that has it.
+  /// Eq. 15-16: the bin of the largest posterior probability; of equal bins the first object's.
   Mode mode() {
     Mode mode;
     double most = -std::numeric_limits<double>::infinity();
@@ -125,7 +135,7 @@ struct PoseHistogram::Impl {
     return mode;
   }
 
-  /// The prior alone explains the touches better than the best bin of any object.
+  /// True where the prior alone explains the touches far better than the best bin of any object.
   bool contradicted() {
     return std::all_of(summaries().begin(), summaries().end(), [&](const BeliefSummary& summary) {
       return prior_log_likelihood - summary.max.value() > contradiction_nats;
@@ -148,8 +158,8 @@ struct PoseHistogram::Impl {
   std::optional<StillArray> still;  ///< where the options say so
   PreparedTouch prepared;
   std::vector<double> log_weight;
-  std::optional<double> none_log_weight;  ///< times the number of bins
-  double prior_log_likelihood = 0.0;      ///< of all touches, by the prior alone
+  std::optional<double> none_log_weight;  ///< log of its prior weight times the number of bins
+  double prior_log_likelihood = 0.0;      ///< of all touches, by a map that holds only the prior
   std::vector<Body> bodies;
   std::optional<std::vector<BeliefSummary>> summarised;
   HalfDone half_done{
@@ -229,29 +239,18 @@ Estimate PoseHistogram::estimate() const {
 RefinedPose PoseHistogram::refine(const Mode& mode) const {
   Impl& histogram = whole();
   histogram.require_object(mode.object);
-  const std::int64_t bin = mode.bin ? *mode.bin : lattice().bin_of(mode.T_object_robot);
-  if (bin < 0 || bin >= lattice().bins()) {
-    throw Error(Fault::input,
-                fmt::format("bin {}: there are {}, counted from 0", bin, lattice().bins()));
-  }
   const auto log_likelihood = [&](const BinWindow& window) {
     return histogram.belief.download(static_cast<std::size_t>(mode.object), window);
   };
-  return palpate::refine(log_likelihood, lattice(), histogram.bodies[mode.object], bin);
+  return palpate::refine(log_likelihood, lattice(), histogram.bodies[mode.object], mode);
 }
 
 Marginals PoseHistogram::marginals(int object) const {
   Impl& histogram = whole();
   histogram.require_object(object);
   const BeliefSummary& summary = histogram.summaries()[object];
-  BeliefMarginals sums = histogram.belief.marginals(object, summary.max);
-  const double scale = histogram.identity()[object] / summary.sum;
-  for (std::vector<double>* marginal : {&sums.xy, &sums.theta}) {
-    for (double& sum : *marginal) {
-      sum *= scale;
-    }
-  }
-  return {.grid = lattice(), .xy = std::move(sums.xy), .theta = std::move(sums.theta)};
+  const double of_largest = histogram.identity()[object] / summary.sum;
+  return histogram.belief.marginals(static_cast<std::size_t>(object), summary.max, of_largest);
 }
 
 std::vector<double> PoseHistogram::log_likelihood(int object) const {

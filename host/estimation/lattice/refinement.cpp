@@ -6,12 +6,14 @@
 #include <numbers>
 #include <optional>
 
+#include <fmt/format.h>
 #include <glm/geometric.hpp>
 #include <glm/mat3x3.hpp>
 #include <glm/matrix.hpp>
 
 #include "body_window.hpp"
 #include "flattening.hpp"
+#include "palpate/error.hpp"
 #include "quadratic_peak.hpp"
 
 namespace palpate {
@@ -30,7 +32,13 @@ constexpr double farthest_peak_mm = 1.0;  ///< from the mean; farther peaks are 
 /// much.
 constexpr double least_curvature = 1e-3;
 
-BinIndex index_of(const PoseLattice& lattice, std::int64_t bin) {
+/// The mode's bin, or the bin of its pose.
+BinIndex bin_of(const PoseLattice& lattice, const Mode& mode) {
+  const std::int64_t bin = mode.bin ? *mode.bin : lattice.bin_of(mode.T_object_robot);
+  if (bin < 0 || bin >= lattice.bins()) {
+    throw Error(Fault::input,
+                fmt::format("bin {}: there are {}, counted from 0", bin, lattice.bins()));
+  }
   return {.x = static_cast<int>(bin % lattice.x_mm.count),
           .y = static_cast<int>(bin % lattice.plane() / lattice.x_mm.count),
           .theta = static_cast<int>(bin / lattice.plane())};
@@ -175,11 +183,11 @@ Body displaced_body(const OccupancyGrid& map) {
 }
 
 RefinedPose refine(const WindowLogLikelihood& log_likelihood, const PoseLattice& lattice,
-                   const Body& body, std::int64_t bin) {
+                   const Body& body, const Mode& mode) {
   BodyWindow window;
   double root = 0.0;
   glm::dvec3 mean{0.0};
-  BinIndex centre = index_of(lattice, bin);
+  BinIndex centre = bin_of(lattice, mode);
   for (int pass = 1; pass <= passes; ++pass) {
     window = body_window(log_likelihood, lattice, body, centre, radius_mm);
     root = root_of(window);

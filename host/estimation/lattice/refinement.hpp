@@ -1,7 +1,5 @@
 #pragma once
 
-#include <cstdint>
-
 #include "bin_window.hpp"
 #include "palpate/estimate.hpp"
 #include "palpate/lattice.hpp"
@@ -13,9 +11,10 @@ namespace palpate {
 /// the whole grid where no cell is occupied.
 Body displaced_body(const OccupancyGrid& map);
 
-/// The pose between the bins near `bin`, and its covariance, as PoseHistogram::refine() says.
-/// Throws what `log_likelihood` throws.
+/// The pose between the bins near the mode, and its covariance, as PoseHistogram::refine() says.
+/// @param log_likelihood of the mode's object
+/// @throws Error if there is no such bin or the pose is not finite; what `log_likelihood` throws
 RefinedPose refine(const WindowLogLikelihood& log_likelihood, const PoseLattice& lattice,
-                   const Body& body, std::int64_t bin);
+                   const Body& body, const Mode& mode);
 
 }  // namespace palpate

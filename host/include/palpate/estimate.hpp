@@ -39,9 +39,9 @@ struct Estimate {
   std::vector<ProbabilityInterval> identity_bounds = {};
   double none = 0.0;  ///< probability of "none of these", where the options ask for it
   Mode mode;
-  /// Even the best bin, or the best particle of each touch, explains the touches worse than a map
-  /// of nothing but the prior does, by a factor below exp(-700), which is 0 in float64: the object,
-  /// its pose or the sensor model cannot be what the hypotheses say. `identity` and `mode` still
+  /// True where a map that holds only the prior explains the touches better, by more than 700 nats,
+  /// than the best bin of any object (particle filter: than the best particle of each touch). The
+  /// object, its pose or the sensor model is then none of the hypotheses; `identity` and `mode`
   /// name the least impossible.
   bool contradicted = false;
 };
@@ -56,7 +56,8 @@ struct Marginals {
 /// A pose between the bins, with its uncertainty.
 struct RefinedPose {
   Pose T_object_robot;
-  /// Of (x_mm, y_mm, theta_rad) of T_object_robot, row by row, in mm^2, mm rad and rad^2.
+  /// Covariance of (x_mm, y_mm, theta_rad) of T_object_robot, row by row, in mm^2, mm rad and
+  /// rad^2.
   std::array<double, 9> covariance{};
 };
 

@@ -49,7 +49,7 @@ RefinedPose refined(const PoseLattice& lattice, const glm::dvec2& centroid_mm,
     best = at_bin(bin) > at_bin(best) ? bin : best;
   }
   return refine(in_window, lattice, {.centroid_mm = centroid_mm, .inertia_mm2 = spin_mm * spin_mm},
-                best);
+                {.bin = best});
 }
 
 /// Bins of 0.25 mm, and of as much for the object in theta.

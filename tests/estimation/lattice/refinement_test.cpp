@@ -86,7 +86,7 @@ TEST_P(Refinement, IsThePlainPeakAndCovarianceOfTheReferencesBelief) {
     const RefinedPose plain =
         plain_refinement(expected.log_likelihood[0], lattice, object.map, bin);
     expect_near(histogram.refine(mode), plain, lever_mm);
-    expect_near(refine(reference_window, lattice, displaced_body(object.map), bin), plain,
+    expect_near(refine(reference_window, lattice, displaced_body(object.map), mode), plain,
                 lever_mm);
     const RefinedPose from_pose =
         histogram.refine({.bin = {}, .T_object_robot = lattice.T_object_robot(bin)});
