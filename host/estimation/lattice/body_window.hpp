@@ -20,9 +20,9 @@ struct BinIndex {
   bool operator==(const BinIndex&) const = default;
 };
 
-/// How far the body moves when the pose changes from a given (x_mm, y_mm, theta_rad) of the
-/// lattice: the shift of its centroid in mm and its turn, as the root mean square displacement in
-/// mm.
+/// How far a body moves when its pose changes from a given (x_mm, y_mm, theta_rad) of the lattice:
+/// the shift of its centroid along x and y, and its turn, all in mm. The turn counts as the root
+/// mean square displacement of the body about its centroid.
 class BodyMotion {
  public:
   BodyMotion(const Body& body, const glm::dvec3& place);
@@ -53,7 +53,7 @@ struct WindowBin {
 struct BodyWindow {
   glm::dvec3 centre{0.0};  ///< of the centre bin, in (x_mm, y_mm, theta_rad)
   std::vector<WindowBin> bins;
-  double largest = 0.0;  ///< log-likelihood among the bins
+  double largest = 0.0;  ///< log-likelihood of the best of the bins
 };
 
 BodyWindow body_window(const WindowLogLikelihood& log_likelihood, const PoseLattice& lattice,
