@@ -36,7 +36,7 @@ class LetterBelief {
     return stream_.device_seconds();
   }
   double sum_marginals() {
-    belief_.marginals(0, summary_.max);
+    belief_.marginals(0, summary_.max, 1.0);
     return stream_.device_seconds();
   }
 

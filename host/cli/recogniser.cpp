@@ -1,8 +1,5 @@
 #include "recogniser.hpp"
 
-#include <algorithm>
-#include <cmath>
-
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
@@ -29,9 +26,7 @@ class HistogramRecogniser : public Recogniser {
     return histogram_.refine(mode);
   }
   std::optional<double> effective_sample_size() const override { return {}; }
-  std::vector<double> belief_xy(int object) const override {
-    return histogram_.marginals(object).xy;
-  }
+  Marginals marginals(int object) const override { return histogram_.marginals(object); }
   std::string description() const override {
     const PoseLattice& lattice = histogram_.lattice();
     return fmt::format("{} x {} x {} bins each, in {}", lattice.x_mm.count, lattice.y_mm.count,
@@ -42,12 +37,6 @@ class HistogramRecogniser : public Recogniser {
  private:
   PoseHistogram histogram_;
 };
-
-/// The bin that a value falls into, the nearest one where it lies beyond all.
-int bin_of(const Axis& axis, double value) {
-  const double bin = axis.count > 1 ? std::floor((value - axis.lower) / axis.step()) : 0.0;
-  return static_cast<int>(std::clamp(bin, 0.0, axis.count - 1.0));
-}
 
 class ParticleRecogniser : public Recogniser {
  public:
@@ -68,17 +57,19 @@ class ParticleRecogniser : public Recogniser {
   std::optional<double> effective_sample_size() const override {
     return filter_.effective_sample_size();
   }
-  std::vector<double> belief_xy(int object) const override {
-    const PoseLattice& lattice = options_.region;
-    std::vector<double> belief(static_cast<std::size_t>(lattice.plane()));
+  Marginals marginals(int object) const override {
+    const PoseLattice& grid = options_.region;
+    Marginals sums{.grid = grid,
+                   .xy = std::vector<double>(static_cast<std::size_t>(grid.plane())),
+                   .theta = std::vector<double>(static_cast<std::size_t>(grid.theta_rad.count))};
     for (const ParticleFilter::Particle& particle : filter_.particles()) {
       if (particle.object == object) {
-        const glm::dvec2 at = particle.T_object_robot * lattice.pivot_mm;
-        const auto row = static_cast<std::size_t>(bin_of(lattice.y_mm, at.y));
-        belief[row * lattice.x_mm.count + bin_of(lattice.x_mm, at.x)] += particle.weight;
+        const std::int64_t bin = grid.bin_of(particle.T_object_robot);
+        sums.xy[bin % grid.plane()] += particle.weight;
+        sums.theta[bin / grid.plane()] += particle.weight;
       }
     }
-    return belief;
+    return sums;
   }
   std::string description() const override {
     return fmt::format(

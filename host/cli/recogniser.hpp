@@ -30,8 +30,8 @@ class Recogniser {
   virtual std::optional<RefinedPose> refine(const Mode& mode) const = 0;
   /// Of the particles, where there are any.
   virtual std::optional<double> effective_sample_size() const = 0;
-  /// Probability of every (x, y) of one object over the task's lattice, [ny, nx].
-  virtual std::vector<double> belief_xy(int object) const = 0;
+  /// Marginal probabilities of one object's poses.
+  virtual Marginals marginals(int object) const = 0;
   /// What is evaluated, where and how, in a few words.
   virtual std::string description() const = 0;
   /// The dense belief, where there is one.

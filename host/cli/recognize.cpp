@@ -150,8 +150,7 @@ std::string draw_sheet(const RecognitionRecord& record, const Unknown& unknown,
     sheet.truth = unknown.recording->truth->T_object_robot;
     sheet.error_mm = last.error_mm;
   }
-  sheet.lattice = task.histogram.lattice;
-  sheet.belief_xy = recogniser.belief_xy(last.mode.object);
+  sheet.belief = recogniser.marginals(last.mode.object);
   sheet.labels = task.labels;
   for (const Touch& touch : unknown.touches) {
     auto& footprint = sheet.footprints_mm.emplace_back();
@@ -165,14 +164,15 @@ std::string draw_sheet(const RecognitionRecord& record, const Unknown& unknown,
   return draw_recognition(sheet);
 }
 
-Posterior export_posterior(const RecognitionTask& task, const PoseHistogram& histogram) {
-  Posterior posterior{.objects = {}, .lattice = histogram.lattice(), .log_likelihood = {}};
-  for (std::size_t i = 0; i < task.hypotheses.size(); ++i) {
-    posterior.objects.push_back(task.hypotheses[i].map.label);
-    const std::vector<double> logs = histogram.log_likelihood(static_cast<int>(i));
-    posterior.log_likelihood.insert(posterior.log_likelihood.end(), logs.begin(), logs.end());
+void export_posterior(const std::filesystem::path& path, const RecognitionTask& task,
+                      const PoseHistogram& histogram) {
+  std::vector<std::string> labels;
+  for (const Hypothesis& hypothesis : task.hypotheses) {
+    labels.push_back(hypothesis.map.label);
   }
-  return posterior;
+  write_posterior(path, labels, histogram.lattice(), [&](std::size_t object) {
+    return histogram.log_likelihood(static_cast<int>(object));
+  });
 }
 
 /// Writes posterior and JSON, both or none.
@@ -184,7 +184,7 @@ void write_results(const Options& options, const RecognitionTask& task,
     json_file->write(json);
   }
   if (!options.posterior.empty()) {
-    write_posterior(options.posterior, export_posterior(task, *recogniser.histogram()));
+    export_posterior(options.posterior, task, *recogniser.histogram());
   }
   if (json_file) {
     json_file->commit();

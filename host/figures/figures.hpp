@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "palpate/lattice.hpp"
+#include "palpate/estimate.hpp"
 #include "palpate/occupancy_grid.hpp"
 #include "palpate/pose.hpp"
 
@@ -28,8 +28,7 @@ struct RecognitionSheet {
   std::string true_object;    ///< label, "" where it is unknown
   std::optional<Pose> truth;  ///< T_object_robot, if known and the identity is right
   std::optional<double> error_mm;
-  PoseLattice lattice;
-  std::vector<double> belief_xy;              ///< [ny, nx] of the leading object, summed over theta
+  Marginals belief;                           ///< of the estimated object
   std::vector<std::string> labels;            ///< [object]; equal labels are drawn as one, summed
   std::vector<std::vector<double>> identity;  ///< [touch][object] probability after each touch
 };

@@ -55,12 +55,12 @@ Box bar(int panel) { return {plot(panel).left, bar_top_px, side_px, bar_height_p
 
 void validate(const RecognitionSheet& sheet) {
   require_cells(sheet.map);
-  sheet.lattice.validate();
-  const auto plane = static_cast<std::size_t>(sheet.lattice.plane());
-  if (sheet.belief_xy.size() != plane) {
-    throw Error(Fault::input, fmt::format("sheet '{}': belief_xy has {} values: give {}, one per "
-                                          "x and y of the lattice",
-                                          sheet.title, sheet.belief_xy.size(), plane));
+  sheet.belief.grid.validate();
+  const auto plane = static_cast<std::size_t>(sheet.belief.grid.plane());
+  if (sheet.belief.xy.size() != plane) {
+    throw Error(Fault::input, fmt::format("sheet '{}': belief.xy has {} values: give {}, one per "
+                                          "x and y of its grid",
+                                          sheet.title, sheet.belief.xy.size(), plane));
   }
   for (const std::vector<double>& probabilities : sheet.identity) {
     if (probabilities.size() != sheet.labels.size()) {
@@ -239,19 +239,19 @@ std::string power_of_ten(int exponent) {
 }
 
 void draw_belief(Canvas& canvas, const RecognitionSheet& sheet) {
-  const PoseLattice& lattice = sheet.lattice;
-  const glm::dvec2 x = shown_range(lattice.x_mm);
-  const glm::dvec2 y = shown_range(lattice.y_mm);
+  const PoseLattice& grid = sheet.belief.grid;
+  const std::vector<double>& belief_xy = sheet.belief.xy;
+  const glm::dvec2 x = shown_range(grid.x_mm);
+  const glm::dvec2 y = shown_range(grid.y_mm);
   const View view{.box = plot(1), .lower = {x[0], y[0]}, .upper = {x[1], y[1]}};
 
-  const double largest = *std::ranges::max_element(sheet.belief_xy);
+  const double largest = *std::ranges::max_element(belief_xy);
   const double top = largest > 0.0 ? std::ceil(std::log10(largest)) : 0.0;
   const auto colour = [&](double log10_p) {
     return sequential((log10_p - top + decades) / decades);
   };
-  canvas.cells(view.box, lattice.x_mm.count, lattice.y_mm.count, [&](int i, int j) {
-    return colour(
-        std::log10(sheet.belief_xy[static_cast<std::size_t>(j) * lattice.x_mm.count + i]));
+  canvas.cells(view.box, grid.x_mm.count, grid.y_mm.count, [&](int i, int j) {
+    return colour(std::log10(belief_xy[static_cast<std::size_t>(j) * grid.x_mm.count + i]));
   });
   draw_axes(canvas, view, even_ticks(x[0], x[1], 7), even_ticks(y[0], y[1], 7),
             "x of the pivot in the object frame, mm", "y, mm");
@@ -266,7 +266,7 @@ void draw_belief(Canvas& canvas, const RecognitionSheet& sheet) {
   draw_title(canvas, view.box, "Where is it? Belief over position");
   Legend legend(canvas, view.box);
   const auto mark = [&](const Pose& T_object_robot, auto draw, std::string meaning) {
-    const glm::dvec2 pivot = T_object_robot * lattice.pivot_mm;
+    const glm::dvec2 pivot = T_object_robot * grid.pivot_mm;
     if (view.contains(pivot)) {
       draw(canvas, view.pixel(pivot));
     } else {

@@ -105,6 +105,26 @@ void Hdf5Writer::dataset(const char* name, const Shape& shape, std::span<const d
   add_dataset(name, shape, H5T_NATIVE_DOUBLE, values.data(), storage);
 }
 
+void Hdf5Writer::dataset(const char* name, const Shape& shape,
+                         const std::function<std::vector<double>(std::size_t)>& part,
+                         Storage storage) {
+  const Hdf5Handle dataset = create_dataset(name, shape, H5T_NATIVE_DOUBLE, storage);
+  std::vector<hsize_t> first(shape.size(), 0);
+  std::vector<hsize_t> extent(shape.begin(), shape.end());
+  extent[0] = 1;
+  const Hdf5Handle memory(H5Screate_simple(static_cast<int>(extent.size()), extent.data(), nullptr),
+                          H5Sclose);
+  const Hdf5Handle space = extents(shape);
+  for (; first[0] < shape[0]; ++first[0]) {
+    const std::vector<double> values = part(first[0]);
+    require(H5Sselect_hyperslab(space.get(), H5S_SELECT_SET, first.data(), nullptr, extent.data(),
+                                nullptr) >= 0 &&
+                H5Dwrite(dataset.get(), H5T_NATIVE_DOUBLE, memory.get(), space.get(), H5P_DEFAULT,
+                         values.data()) >= 0,
+            name);
+  }
+}
+
 void Hdf5Writer::dataset(const char* name, const Shape& shape, std::span<const float> values,
                          Storage storage) {
   add_dataset(name, shape, H5T_NATIVE_FLOAT, values.data(), storage);
@@ -141,6 +161,12 @@ void Hdf5Writer::add_attribute(const char* name, hid_t type, hid_t space, const 
 
 void Hdf5Writer::add_dataset(const char* name, const Shape& shape, hid_t type, const void* values,
                              Storage storage) {
+  const Hdf5Handle dataset = create_dataset(name, shape, type, storage);
+  require(H5Dwrite(dataset.get(), type, H5S_ALL, H5S_ALL, H5P_DEFAULT, values) >= 0, name);
+}
+
+Hdf5Handle Hdf5Writer::create_dataset(const char* name, const Shape& shape, hid_t type,
+                                      Storage storage) {
   const Hdf5Handle creation(H5Pcreate(H5P_DATASET_CREATE), H5Pclose);
   bool ready = H5Pset_obj_track_times(creation.get(), false) >= 0;
   if (storage == Storage::compressed) {
@@ -165,12 +191,11 @@ void Hdf5Writer::add_dataset(const char* name, const Shape& shape, hid_t type, c
             (H5Tget_class(type) != H5T_FLOAT ||
              H5Pset_fill_value(creation.get(), H5T_NATIVE_DOUBLE, &unwritten) >= 0);
   }
-  const Hdf5Handle dataset(
+  Hdf5Handle dataset(
       H5Dcreate2(file_.get(), name, type, space.get(), H5P_DEFAULT, creation.get(), H5P_DEFAULT),
       H5Dclose);
-  require(ready && dataset.valid() &&
-              H5Dwrite(dataset.get(), type, H5S_ALL, H5S_ALL, H5P_DEFAULT, values) >= 0,
-          name);
+  require(ready && dataset.valid(), name);
+  return dataset;
 }
 
 void Hdf5Writer::require(bool done, std::string_view what) const {

@@ -41,6 +41,9 @@ class Hdf5Writer {
 
   void dataset(const char* name, const Shape& shape, std::span<const double> values,
                Storage storage = Storage::plain);
+  /// Writes a dataset in parts, each one step along the first axis, in order.
+  void dataset(const char* name, const Shape& shape,
+               const std::function<std::vector<double>(std::size_t)>& part, Storage storage);
   void dataset(const char* name, const Shape& shape, std::span<const float> values,
                Storage storage = Storage::plain);
   void dataset(const char* name, const Shape& shape, std::span<const std::uint8_t> values);
@@ -56,6 +59,8 @@ class Hdf5Writer {
   void add_attribute(const char* name, hid_t type, hid_t space, const void* values);
   void add_dataset(const char* name, const Shape& shape, hid_t type, const void* values,
                    Storage storage);
+  /// A dataset without values.
+  Hdf5Handle create_dataset(const char* name, const Shape& shape, hid_t type, Storage storage);
   void require(bool done, std::string_view what) const;
 
   std::filesystem::path path_;

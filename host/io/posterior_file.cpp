@@ -24,19 +24,20 @@ Axis read_axis(const Hdf5Contents& file, const char* range, const char* bins) {
   return {ends[0], ends[1], file.integer(bins, 1)};
 }
 
-// What holds for every posterior without its log-likelihoods, read or about to be written.
-void validate(const std::filesystem::path& path, const Posterior& posterior) {
+// What holds for every posterior, read or about to be written, without its log-likelihoods.
+void validate(const std::filesystem::path& path, const std::vector<std::string>& objects,
+              const PoseLattice& lattice) {
   // HDF5 keeps an attribute of at most 64 KiB, 16 bytes for each text.
   constexpr std::size_t most_objects = 4000;
-  if (posterior.objects.empty() || posterior.objects.size() > most_objects) {
-    refuse(path, fmt::format("attribute 'objects' has {} labels; store 1 to {}",
-                             posterior.objects.size(), most_objects));
+  if (objects.empty() || objects.size() > most_objects) {
+    refuse(path, fmt::format("attribute 'objects' has {} labels; store 1 to {}", objects.size(),
+                             most_objects));
   }
-  for (const std::string& label : posterior.objects) {
+  for (const std::string& label : objects) {
     require_text(path, "attribute 'objects'", label);
   }
   try {
-    posterior.lattice.validate();
+    lattice.validate();
   } catch (const Error& error) {
     refuse(path, error.what());
   }
@@ -52,9 +53,8 @@ void require_log_likelihoods(const std::filesystem::path& path,
   }
 }
 
-std::vector<std::uint64_t> shape_of(const Posterior& posterior) {
-  const PoseLattice& lattice = posterior.lattice;
-  return {posterior.objects.size(), static_cast<std::uint64_t>(lattice.theta_rad.count),
+std::vector<std::uint64_t> shape_of(std::size_t objects, const PoseLattice& lattice) {
+  return {objects, static_cast<std::uint64_t>(lattice.theta_rad.count),
           static_cast<std::uint64_t>(lattice.y_mm.count),
           static_cast<std::uint64_t>(lattice.x_mm.count)};
 }
@@ -77,8 +77,8 @@ void scan_posterior(const std::filesystem::path& path,
   lattice.theta_rad = read_axis(file, "theta_rad", "bins_theta");
   const std::vector<double> pivot = file.numbers("pivot_mm", 2);
   lattice.pivot_mm = {pivot[0], pivot[1]};
-  validate(path, posterior);
-  const std::vector<std::uint64_t> expected = shape_of(posterior);
+  validate(path, posterior.objects, lattice);
+  const std::vector<std::uint64_t> expected = shape_of(posterior.objects.size(), lattice);
   if (const auto& shape = file.shape("log_likelihood", 4); shape != expected) {
     file.refuse(fmt::format("dataset 'log_likelihood' has the shape {}; its attributes make it {}",
                             shape, expected));
@@ -96,7 +96,8 @@ Posterior read_posterior(const std::filesystem::path& path) {
       path,
       [&](const Posterior& head) {
         posterior = head;
-        const std::vector<std::uint64_t> shape = shape_of(posterior);
+        const std::vector<std::uint64_t> shape =
+            shape_of(posterior.objects.size(), posterior.lattice);
         require_memory(path, fmt::format("a posterior of {} bins", fmt::join(shape, " x ")),
                        hdf5_stored_bytes(shape, sizeof(double)));
         posterior.log_likelihood.reserve(hdf5_stored_bytes(shape, 1));
@@ -108,20 +109,14 @@ Posterior read_posterior(const std::filesystem::path& path) {
   return posterior;
 }
 
-void write_posterior(const std::filesystem::path& path, const Posterior& posterior) {
-  const PoseLattice& lattice = posterior.lattice;
-  validate(path, posterior);
-  if (posterior.log_likelihood.size() != hdf5_stored_bytes(shape_of(posterior), 1)) {
-    refuse(path,
-           fmt::format("a posterior of {} bins and {} log-likelihoods cannot be written; make "
-                       "them agree",
-                       fmt::join(shape_of(posterior), " x "), posterior.log_likelihood.size()));
-  }
-  require_log_likelihoods(path, posterior.log_likelihood);
+void write_posterior(const std::filesystem::path& path, const std::vector<std::string>& objects,
+                     const PoseLattice& lattice,
+                     const std::function<std::vector<double>(std::size_t object)>& log_likelihood) {
+  validate(path, objects, lattice);
   Hdf5Writer file(path);
   file.attribute("format", posterior_format);
   file.attribute("version", format_version);
-  file.attribute("objects", posterior.objects);
+  file.attribute("objects", objects);
   file.attribute("bins_x", lattice.x_mm.count);
   file.attribute("bins_y", lattice.y_mm.count);
   file.attribute("bins_theta", lattice.theta_rad.count);
@@ -129,12 +124,37 @@ void write_posterior(const std::filesystem::path& path, const Posterior& posteri
   file.attribute("y_mm", {lattice.y_mm.lower, lattice.y_mm.upper});
   file.attribute("theta_rad", {lattice.theta_rad.lower, lattice.theta_rad.upper});
   file.attribute("pivot_mm", {lattice.pivot_mm.x, lattice.pivot_mm.y});
+  const std::vector<std::uint64_t> shape = shape_of(objects.size(), lattice);
+  const std::uint64_t bins = hdf5_stored_bytes(shape_of(1, lattice), 1);
   file.dataset(
-      "log_likelihood",
-      {posterior.objects.size(), static_cast<std::size_t>(lattice.theta_rad.count),
-       static_cast<std::size_t>(lattice.y_mm.count), static_cast<std::size_t>(lattice.x_mm.count)},
-      posterior.log_likelihood, Hdf5Writer::Storage::compressed);
+      "log_likelihood", {shape.begin(), shape.end()},
+      [&](std::size_t object) {
+        std::vector<double> values = log_likelihood(object);
+        if (values.size() != bins) {
+          refuse(path, fmt::format("object '{}': {} bins and {} log-likelihoods; make them agree",
+                                   objects[object], bins, values.size()));
+        }
+        require_log_likelihoods(path, values);
+        return values;
+      },
+      Hdf5Writer::Storage::compressed);
   file.save();
+}
+
+void write_posterior(const std::filesystem::path& path, const Posterior& posterior) {
+  const auto& [objects, lattice, logs] = posterior;
+  validate(path, objects, lattice);
+  if (logs.size() != hdf5_stored_bytes(shape_of(objects.size(), lattice), 1)) {
+    refuse(path,
+           fmt::format("a posterior of {} bins and {} log-likelihoods cannot be written; make "
+                       "them agree",
+                       fmt::join(shape_of(objects.size(), lattice), " x "), logs.size()));
+  }
+  write_posterior(path, objects, lattice, [&posterior](std::size_t object) {
+    const std::size_t bins = posterior.log_likelihood.size() / posterior.objects.size();
+    const double* first = posterior.log_likelihood.data() + object * bins;
+    return std::vector<double>(first, first + bins);
+  });
 }
 
 }  // namespace palpate

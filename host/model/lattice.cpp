@@ -1,5 +1,6 @@
 #include "palpate/lattice.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -26,6 +27,11 @@ void validate_axis(const char* name, const Axis& axis) {
     throw Error(Fault::input, fmt::format("range {} = {}:{}: reversed, write the lower end first",
                                           name, axis.lower, axis.upper));
   }
+}
+
+std::int64_t nearest_index(const Axis& axis, double value) {
+  const double index = axis.step() > 0.0 ? std::floor((value - axis.lower) / axis.step()) : 0.0;
+  return static_cast<std::int64_t>(std::clamp(index, 0.0, axis.count - 1.0));
 }
 
 }  // namespace
@@ -64,6 +70,19 @@ Pose PoseLattice::T_object_robot(std::int64_t index) const {
 
 Pose PoseLattice::T_object_robot(double x, double y, double theta) const {
   return {glm::dvec2(x, y) - rotate(theta, pivot_mm), theta};
+}
+
+std::int64_t PoseLattice::bin_of(const Pose& T_object_robot) const {
+  const glm::dvec2 place_mm = T_object_robot * pivot_mm;
+  if (!std::isfinite(place_mm.x) || !std::isfinite(place_mm.y) ||
+      !std::isfinite(T_object_robot.theta_rad)) {
+    throw Error(Fault::input, fmt::format("pose {}, {}, {}: give finite numbers", place_mm.x,
+                                          place_mm.y, T_object_robot.theta_rad));
+  }
+  const double middle_rad = (theta_rad.lower + theta_rad.upper) / 2.0;
+  const double turn_rad = wrap_angle(T_object_robot.theta_rad - middle_rad, 2.0 * std::numbers::pi);
+  return nearest_index(theta_rad, middle_rad + turn_rad) * plane() +
+         nearest_index(y_mm, place_mm.y) * x_mm.count + nearest_index(x_mm, place_mm.x);
 }
 
 }  // namespace palpate

@@ -25,10 +25,10 @@ RecognitionSheet example() {
       sheet.map.log_odds.push_back(on ? 8.0F : -4.0F);
     }
   }
-  sheet.lattice.pivot_mm = {200.0, -50.0};
-  sheet.T_object_robot = sheet.lattice.T_object_robot(2.0, 1.0, 0.3);
+  sheet.belief.grid.pivot_mm = {200.0, -50.0};
+  sheet.T_object_robot = sheet.belief.grid.T_object_robot(2.0, 1.0, 0.3);
   sheet.true_object = "bar";
-  sheet.truth = sheet.lattice.T_object_robot(2.4, 0.7, 0.35);
+  sheet.truth = sheet.belief.grid.T_object_robot(2.4, 0.7, 0.35);
   sheet.error_mm = 0.5;
   for (const Pose& T_robot_sensor : {Pose{{198.0, -49.0}, 0.1}, Pose{{204.0, -52.0}, 1.0}}) {
     std::vector<glm::dvec2> elements = digitacts_array();
@@ -37,8 +37,8 @@ RecognitionSheet example() {
     }
     sheet.footprints_mm.push_back(elements);
   }
-  sheet.belief_xy.assign(static_cast<std::size_t>(sheet.lattice.plane()), 1e-9);
-  sheet.belief_xy[15 * 25 + 4] = 0.8;
+  sheet.belief.xy.assign(static_cast<std::size_t>(sheet.belief.grid.plane()), 1e-9);
+  sheet.belief.xy[15 * 25 + 4] = 0.8;
   sheet.labels = {"bar", "ring"};
   sheet.identity = {{0.6, 0.4}, {0.9, 0.1}};
   return sheet;
@@ -70,13 +70,13 @@ TEST(RecognitionSheet, GivesTheSameBytesAgain) {
 
 TEST(RecognitionSheet, ShowsTheBeliefsLargestBinInTheBrightestColours) {
   RecognitionSheet sheet = example();
-  sheet.T_object_robot = sheet.lattice.T_object_robot(-5.0, -5.0, 0.3);
+  sheet.T_object_robot = sheet.belief.grid.T_object_robot(-5.0, -5.0, 0.3);
   sheet.truth.reset();
   // log10 0.8 = -0.097 on the scale of six powers of ten below 1.
   const Colour peak = sequential((std::log10(0.8) + 6.0) / 6.0);
   const int with = count(decode(draw_recognition(sheet)), peak);
-  sheet.belief_xy[15 * 25 + 4] = 1e-9;
-  sheet.belief_xy[0] = 0.7;  // keeps the scale
+  sheet.belief.xy[15 * 25 + 4] = 1e-9;
+  sheet.belief.xy[0] = 0.7;  // keeps the scale
   const int without = count(decode(draw_recognition(sheet)), peak);
   // A bin is 480 / 25 = 19.2 pixels wide.
   EXPECT_NEAR(with - without, 19.2 * 19.2, 2 * 19.2);
@@ -88,9 +88,9 @@ TEST(RecognitionSheet, MarksThePivotAtTheEstimateWhateverTheAngle) {
   sheet.truth.reset();
   sheet.footprints_mm.clear();
   const Picture a = decode(draw_recognition(sheet));
-  sheet.T_object_robot = sheet.lattice.T_object_robot(2.0, 1.0, 2.8);
+  sheet.T_object_robot = sheet.belief.grid.T_object_robot(2.0, 1.0, 2.8);
   EXPECT_LE(difference(a, decode(draw_recognition(sheet))).pixels, 4) << "antialiasing alone";
-  sheet.T_object_robot = sheet.lattice.T_object_robot(3.0, 1.0, 0.3);
+  sheet.T_object_robot = sheet.belief.grid.T_object_robot(3.0, 1.0, 0.3);
   EXPECT_GT(difference(a, decode(draw_recognition(sheet))).pixels, 100);
 }
 
@@ -145,20 +145,20 @@ TEST(RecognitionSheet, AddsUpObjectsOfEqualLabel) {
 
 TEST(RecognitionSheet, DrawsALatticeOfOneBin) {
   RecognitionSheet sheet = example();
-  sheet.lattice.x_mm = {3.0, 3.0, 1};
-  sheet.lattice.y_mm = {-10.0, 10.0, 1};
-  sheet.belief_xy = {1.0};
+  sheet.belief.grid.x_mm = {3.0, 3.0, 1};
+  sheet.belief.grid.y_mm = {-10.0, 10.0, 1};
+  sheet.belief.xy = {1.0};
   decode(draw_recognition(sheet));
 }
 
 TEST(RecognitionSheet, DrawsABeliefWithoutMass) {
   RecognitionSheet sheet = example();
   const double nan = std::numeric_limits<double>::quiet_NaN();
-  sheet.belief_xy.assign(sheet.belief_xy.size(), 0.0);
+  sheet.belief.xy.assign(sheet.belief.xy.size(), 0.0);
   sheet.identity = {{0.5, 0.5}, {nan, nan}};
   const Picture picture = decode(draw_recognition(sheet));
   EXPECT_GE(count(picture, sequential(0.0)), 400 * 400) << "no belief is the dark end";
-  sheet.belief_xy.assign(sheet.belief_xy.size(), nan);
+  sheet.belief.xy.assign(sheet.belief.xy.size(), nan);
   decode(draw_recognition(sheet));
 }
 
@@ -187,14 +187,14 @@ TEST(RecognitionSheet, DrawsManyLabelsAndTouches) {
 
 TEST(RecognitionSheet, DrawsPosesOutsideOfTheLattice) {
   RecognitionSheet sheet = example();
-  sheet.T_object_robot = sheet.lattice.T_object_robot(500.0, -3.0, 0.0);
-  sheet.truth = sheet.lattice.T_object_robot(0.0, -2000.0, 0.0);
+  sheet.T_object_robot = sheet.belief.grid.T_object_robot(500.0, -3.0, 0.0);
+  sheet.truth = sheet.belief.grid.T_object_robot(0.0, -2000.0, 0.0);
   decode(draw_recognition(sheet));
 }
 
 TEST(RecognitionSheet, RefusesArraysOfTheWrongSize) {
   RecognitionSheet sheet = example();
-  sheet.belief_xy.pop_back();
+  sheet.belief.xy.pop_back();
   EXPECT_THROW(draw_recognition(sheet), Error);
   sheet = example();
   sheet.identity[1].pop_back();

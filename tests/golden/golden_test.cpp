@@ -100,7 +100,7 @@ TEST(Golden, RecognitionIsWithinItsTolerance) {
       }
     }
     const Mode mode = histogram.estimate().mode;
-    EXPECT_NEAR(unknown.log_likelihood[mode.object][mode.bin],
+    EXPECT_NEAR(unknown.log_likelihood[mode.object][mode.bin.value()],
                 unknown.trace.back().max_log_likelihood, 2.0 * tolerance);
     const OccupancyGrid& map = golden.objects[mode.object].map;
     EXPECT_NEAR(pose_error_mm(body_of(map), map.symmetry, mode.T_object_robot,

@@ -125,7 +125,8 @@ TEST_F(SharedGolden, RecognitionAgreesInEveryBin) {
 
     // The mode may be any bin within the tolerance of the largest.
     const Mode mode = histogram.estimate().mode;
-    const auto at = static_cast<std::size_t>(mode.object * options.lattice.bins() + mode.bin);
+    const auto at =
+        static_cast<std::size_t>(mode.object * options.lattice.bins() + mode.bin.value());
     EXPECT_GE(expected[at], *std::max_element(expected.begin(), expected.end()) - 2.0 * tolerance);
     const OccupancyGrid& map = objects[static_cast<std::size_t>(mode.object)].map;
     EXPECT_NEAR(pose_error_mm(body_of(map), map.symmetry, mode.T_object_robot,

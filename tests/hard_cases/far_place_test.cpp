@@ -75,7 +75,7 @@ TEST(FarPlace, AnglesOfAMillionTurns) {
   Device device = Device::open();
   const Estimate estimate = hard.expect_posterior(device, objects, far, all_touches(turned));
   EXPECT_EQ(estimate.mode.T_object_robot.theta_rad,
-            far.lattice.T_object_robot(estimate.mode.bin).theta_rad);
+            far.lattice.T_object_robot(*estimate.mode.bin).theta_rad);
   PoseHistogram histogram(device, objects, far);
   histogram.update(all_touches(turned));
   PoseHistogram unturned(device, objects, options);

@@ -148,10 +148,10 @@ Estimate HardCase::expect_posterior_of_repeated(Device& device, std::span<const 
          allowed.identity);
 
   const auto object = static_cast<std::size_t>(estimate.mode.object);
-  const auto bin = static_cast<std::size_t>(estimate.mode.bin);
+  const auto bin = static_cast<std::size_t>(estimate.mode.bin.value());
   EXPECT_EQ(estimate.mode.log_likelihood, bins[object][bin]) << name_;
   check("mode below the best bin, nats", top - expected_logs[object][bin], near_top_nats_allowed);
-  const Pose pose = reference::bin_pose(histogram.lattice(), estimate.mode.bin);
+  const Pose pose = reference::bin_pose(histogram.lattice(), *estimate.mode.bin);
   const glm::dvec2 shift = estimate.mode.T_object_robot.translation_mm - pose.translation_mm;
   EXPECT_LE(std::hypot(shift.x, shift.y), 1e-8) << name_;
   EXPECT_EQ(estimate.mode.T_object_robot.theta_rad, pose.theta_rad) << name_;
@@ -165,7 +165,7 @@ Estimate HardCase::expect_posterior_of_repeated(Device& device, std::span<const 
   }
 
   for (int o = 0; o < static_cast<int>(objects.size()); ++o) {
-    const auto [xy, theta] = histogram.marginals(o);
+    const auto [grid, xy, theta] = histogram.marginals(o);
     EXPECT_TRUE(all_finite(xy)) << name_;
     EXPECT_TRUE(all_finite(theta)) << name_;
     check("marginals", largest_difference(xy, reference::marginal_xy(expected, o)),

@@ -112,7 +112,7 @@ TEST(Tie, TwoFoldSymmetry) {
   expect_the_same_each_time(hard, objects, options, recording, [&](const PoseHistogram& histogram) {
     const std::vector<double> bins = histogram.log_likelihood(0);
     const Mode mode = histogram.estimate().mode;
-    const auto twin = static_cast<std::size_t>(half_a_turn_on(options.lattice, mode.bin));
+    const auto twin = static_cast<std::size_t>(half_a_turn_on(options.lattice, mode.bin.value()));
     EXPECT_NEAR(bins[twin], mode.log_likelihood, 1e-4);
     const std::vector<double> theta = histogram.marginals(0).theta;
     for (std::size_t t = 0; t < 4; ++t) {

@@ -49,6 +49,44 @@ TEST_F(PosteriorFile, ComesBackAsItWasWritten) {
   EXPECT_LT(std::filesystem::file_size(path_), written.log_likelihood.size() * sizeof(double));
 }
 
+TEST_F(PosteriorFile, WrittenObjectByObjectIsTheSameFile) {
+  // Chunks that hold a part of one object, one object, and several objects.
+  for (const int thetas : {150, 70, 3}) {
+    Posterior whole;
+    whole.objects = {"A", "B", "C", "D", "E"};
+    whole.lattice.x_mm.count = 47;
+    whole.lattice.y_mm.count = 29;
+    whole.lattice.theta_rad.count = thetas;
+    const auto bins = static_cast<std::size_t>(whole.lattice.bins());
+    for (std::size_t k = 0; k < whole.objects.size() * bins; ++k) {
+      whole.log_likelihood.push_back(-std::sqrt(static_cast<double>(k)));
+    }
+    std::vector<std::size_t> asked;
+    write_posterior(path_, whole.objects, whole.lattice, [&](std::size_t object) {
+      asked.push_back(object);
+      const double* first = whole.log_likelihood.data() + object * bins;
+      return std::vector<double>(first, first + bins);
+    });
+    EXPECT_EQ(asked, (std::vector<std::size_t>{0, 1, 2, 3, 4}));
+    EXPECT_EQ(read_posterior(path_).log_likelihood, whole.log_likelihood);
+  }
+}
+
+TEST_F(PosteriorFile, OfAnObjectThatIsNotSoundIsNeverWritten) {
+  const PoseLattice lattice;
+  const auto bins = static_cast<std::size_t>(lattice.bins());
+  const auto refusal = [&](const std::vector<double>& second) {
+    return input_error([&] {
+      write_posterior(path_, {"A", "B"}, lattice, [&](std::size_t object) {
+        return object == 0 ? std::vector<double>(bins, -1.0) : second;
+      });
+    });
+  };
+  expect_named(refusal(std::vector<double>(bins - 1, -1.0)), {path_.c_str(), "'B'", "9999"});
+  expect_named(refusal(std::vector<double>(bins, NAN)), {"'log_likelihood'", "nan"});
+  EXPECT_FALSE(std::filesystem::exists(path_));
+}
+
 TEST_F(PosteriorFile, NamesWhatItCannotTake) {
   const auto spoilt = [&](const char* name, auto value) {
     return message(posterior_parts().attribute(name, value));

@@ -100,6 +100,47 @@ TEST(PoseLattice, RefusesWhatIsNoLattice) {
   expect_refused({.pivot_mm = {0.0, nan}}, "pivot_mm");
 }
 
+TEST(PoseLattice, BinOfAPoseIsTheBinThatHoldsIt) {
+  const PoseLattice full{.x_mm = {-5.0, 5.0, 4},
+                         .y_mm = {-3.0, 9.0, 3},
+                         .theta_rad = {-1.0, -1.0 + 2.0 * std::numbers::pi, 5},
+                         .pivot_mm = {700.0, -400.0}};
+  PoseLattice part = full;
+  part.theta_rad = {6.0, 8.0, 5};
+  PoseLattice fixed = full;
+  fixed.x_mm = {1.0, 1.0, 1};
+  for (const PoseLattice& lattice : {full, part, fixed}) {
+    const double step_rad = lattice.theta_rad.step();
+    for (std::int64_t bin = 0; bin < lattice.bins(); ++bin) {
+      const Pose centre = lattice.T_object_robot(bin);
+      const glm::dvec2 at = centre * lattice.pivot_mm;
+      for (const double share : {-0.49, 0.0, 0.49}) {
+        Pose pose = lattice.T_object_robot(at.x + share * lattice.x_mm.step(),
+                                           at.y - share * lattice.y_mm.step(),
+                                           centre.theta_rad + share * step_rad);
+        for (const double turns : {0.0, -1.0, 2.0}) {
+          pose.theta_rad += turns * 2.0 * std::numbers::pi;
+          EXPECT_EQ(lattice.bin_of(pose), bin) << share << " of a step, " << turns << " turns on";
+        }
+      }
+    }
+  }
+}
+
+TEST(PoseLattice, BinOfAPoseOutsideIsTheNearest) {
+  const PoseLattice lattice{.x_mm = {-5.0, 5.0, 4}, .y_mm = {-3.0, 9.0, 3}, .theta_rad = {0, 2, 5}};
+  const auto bin_of = [&](double x, double y, double theta) {
+    return lattice.bin_of(lattice.T_object_robot(x, y, theta));
+  };
+  EXPECT_EQ(bin_of(-1e12, 0.0, 1.0), 2 * 12 + 0 * 4 + 0);
+  EXPECT_EQ(bin_of(5.0, 1e12, 1.0), 2 * 12 + 2 * 4 + 3);
+  EXPECT_EQ(bin_of(0.1, 0.0, 2.5), 4 * 12 + 0 * 4 + 2);
+  EXPECT_EQ(bin_of(0.1, 0.0, -0.5), 0 * 12 + 0 * 4 + 2);
+  constexpr double infinity = std::numeric_limits<double>::infinity();
+  EXPECT_THROW(bin_of(infinity, 0.0, 0.0), Error);
+  EXPECT_THROW(bin_of(0.0, 0.0, std::numeric_limits<double>::quiet_NaN()), Error);
+}
+
 TEST(PoseLattice, RefusesPlacesOfWhichFloat64KeepsNoDigits) {
   PoseLattice{.x_mm = {-1e9, 1e9, 5}, .theta_rad = {0.0, 1e9, 5}, .pivot_mm = {1e9, -1e9}}
       .validate();

@@ -208,8 +208,8 @@ std::vector<BeliefSummary> DenseBelief::summarise() const {
   return summaries;
 }
 
-BeliefMarginals DenseBelief::marginals(std::size_t object, TwoFloat max) const {
-  BeliefMarginals sums;
+Marginals DenseBelief::marginals(std::size_t object, TwoFloat max, double of_largest) const {
+  Marginals sums{.grid = lattice_, .xy = {}, .theta = {}};
   sums.xy.resize(static_cast<std::size_t>(lattice_.plane()));
   sums.theta.resize(static_cast<std::size_t>(lattice_.theta_rad.count));
   for (const Slab& slab : slabs_) {
@@ -239,6 +239,11 @@ BeliefMarginals DenseBelief::marginals(std::size_t object, TwoFloat max) const {
     add_rows(over_theta,
              std::span(sums.xy).subspan(std::size_t{slab.row_first} * slab.nx, slab.plane()));
     add_rows(over_plane, std::span(sums.theta).subspan(slab.theta_first, slab.theta_count));
+  }
+  for (std::vector<double>* marginal : {&sums.xy, &sums.theta}) {
+    for (double& sum : *marginal) {
+      sum *= of_largest;
+    }
   }
   return sums;
 }

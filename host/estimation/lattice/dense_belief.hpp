@@ -4,68 +4,53 @@
 #include <span>
 #include <vector>
 
+#include "bin_window.hpp"
 #include "command_stream.hpp"
 #include "kernel_sizes.hpp"
+#include "palpate/estimate.hpp"
 #include "palpate/lattice.hpp"
 #include "slab.hpp"
 #include "two_float.hpp"
 
 namespace palpate {
 
-/// A block of an object's bins. Its planes go on with the first after the last; its rows and
-/// columns (indices along y and x) lie within the lattice.
-struct BinWindow {
-  int theta_first = 0;  ///< may be negative
-  int theta_count = 0;
-  int row_first = 0;
-  int row_count = 0;
-  int column_first = 0;
-  int column_count = 0;
-
-  std::size_t bins() const {
-    return static_cast<std::size_t>(theta_count) * row_count * column_count;
-  }
-};
-
-/// What a reduction over one object's bins finds.
+/// The largest log-likelihood of one object's bins, and their sum (Eq. 14).
 struct BeliefSummary {
   TwoFloat max;
-  std::int64_t arg_max = 0;  ///< the lowest bin that has it
+  std::int64_t arg_max = 0;  ///< the lowest bin of this log-likelihood
   double sum = 0.0;          ///< of exp(log-likelihood - max) over the bins, at least 1
 };
 
-/// Sums of exp(log-likelihood - max) over parts of one object's bins.
-struct BeliefMarginals {
-  std::vector<double> xy;     ///< over theta, [ny, nx]
-  std::vector<double> theta;  ///< over (x, y), [ntheta]
-};
-
 /// The summed log-likelihood of every pose bin of every object, on the device, and the reductions
-/// over it. Zero bits at the start: a uniform belief.
+/// over it. Starts uniform, all zero bits.
 class DenseBelief {
  public:
   DenseBelief(gpu::Context& context, gpu::CommandStream& stream, const PoseLattice& lattice,
               std::size_t objects);
+  /// A uniform belief over the same lattice and objects.
+  DenseBelief uniform() const { return {context_, stream_, lattice_, objects_}; }
 
-  /// How a belief is cut.
+  /// The slabs that a dense belief is cut into.
   static std::vector<SlabExtent> cut(const gpu::Context& context, const PoseLattice& lattice,
                                      std::size_t objects);
-  /// Device memory that a belief takes, in bytes, and what marginals() takes while it runs.
+  /// Device memory in bytes that a dense belief takes, and that marginals() takes while it runs.
   static std::uint64_t bytes_needed(const gpu::Context& context, const PoseLattice& lattice,
                                     std::size_t objects);
   static std::uint64_t marginal_bytes(const gpu::Context& context, const PoseLattice& lattice,
                                       std::size_t objects);
 
-  /// Records the return to a uniform belief.
+  /// Records the return to uniform.
   void clear();
-  /// Records the addition of another belief over the same lattice and objects.
+  /// Records the addition of another dense belief over the same lattice and objects.
   void add(const DenseBelief& other);
   std::span<const Slab> slabs() const { return slabs_; }
   std::uint64_t device_bytes() const;
 
   // These run the stream.
   std::vector<BeliefSummary> summarise() const;
-  BeliefMarginals marginals(std::size_t object, TwoFloat max) const;
+  /// @param max the object's largest log-likelihood
+  /// @param of_largest the probability of a bin of this log-likelihood
+  Marginals marginals(std::size_t object, TwoFloat max, double of_largest) const;
   /// All bins of one object, [theta, y, x].
   std::vector<double> download(std::size_t object) const;
   /// The bins of a window, [theta, y, x].

@@ -9,14 +9,12 @@ namespace palpate {
 
 namespace {
 
-// The larger, the less refined poses err on coarse bins after many touches, and the more on fine
-// ones after few. Of 0.26, 0.31, 0.36, 0.41 and 0.46: 0.30, 0.25, 0.23, 0.22 and 0.21 mm on 13 x 13
-// x 55 bins after 50 touches; 0.211, 0.212, 0.215, 0.226 and 0.232 mm on 30 x 30 x 113 after 15.
+// A larger share suits coarse bins after many touches, a smaller share fine bins after few.
 constexpr double wanted_share = 1.0 / 3.0;
-// To a root of 1e20. Where bins differ by more nats one has it all, whatever the root.
+// To an n of 1e20. Where bins differ by more nats, one bin has all the weight whatever the n.
 constexpr int most_doublings = 64;
 
-/// Root mean square distance from the mean, bins weighted by exp(log-likelihood * inverse_root).
+/// Root mean square distance from the mean under weights exp(log-likelihood * inverse_root).
 double spread_mm(std::span<const DisplacedBin> bins, double top, double inverse_root) {
   glm::dvec3 sum{0.0};
   double squares = 0.0;
@@ -44,7 +42,7 @@ double flattening_root(std::span<const DisplacedBin> bins, double least) {
   for (int i = 0; i < most_doublings && narrow_mm < wanted_mm; ++i) {
     const double wide_mm = spread_mm(bins, top, 0.5 / root);
     if (wide_mm >= wanted_mm) {
-      // Between the two, so that the root follows the belief without steps.
+      // Interpolated, so that the root follows the belief without steps.
       return root * std::exp2((wanted_mm - narrow_mm) / (wide_mm - narrow_mm));
     }
     root *= 2.0;

@@ -6,16 +6,16 @@
 
 namespace palpate {
 
-/// A bin of a window of the belief.
+/// A bin of a window.
 struct DisplacedBin {
-  glm::dvec3 moved_mm{0.0};  ///< how far it moves the object: shift and turn, in mm
+  glm::dvec3 moved_mm{0.0};  ///< how far the bin moves the object: shift and turn, in mm
   double log_likelihood = 0.0;
 };
 
-/// The root of the belief in at least one bin, no less than `least`, under which its bins spread by
-/// a third of what they would if all weighed the same, in the root mean square about their mean.
-/// Many touches leave nearly all of a belief in one bin of a coarse lattice, and a fixed root of it
-/// no better.
+/// The n, at least `least`, for which the bins under weights belief^(1/n) spread by a third of
+/// their spread under equal weights. The spread is the root mean square distance from the weighted
+/// mean. Returns `least` where the bins spread as far already. docs/refinement.md says why.
+/// @param bins at least one
 double flattening_root(std::span<const DisplacedBin> bins, double least);
 
 }  // namespace palpate

@@ -52,7 +52,7 @@ MemoryPlan plan_memory(const gpu::Context& context, std::span<const Hypothesis> 
   const PoseLattice& lattice = options.lattice;
   const std::size_t objects = hypotheses.size();
   const Room room = room_of(context, options);
-  // The belief, and for an array at rest that of No Contact everywhere.
+  // The belief and, for an array at rest, No Contact everywhere.
   const std::size_t beliefs = options.still_array ? 2 : 1;
 
   // A first look in floating point: bins may be too many to count.
@@ -74,7 +74,7 @@ MemoryPlan plan_memory(const gpu::Context& context, std::span<const Hypothesis> 
     refuse(context, lattice, objects, room, static_cast<double>(needed(std::min(most, step))));
   }
   const auto plan = [&](std::size_t elements) {
-    // An array at rest prepares for the next touch in a way of its own.
+    // An array at rest prepares no touch.
     const std::uint64_t with_one_more =
         needed(elements) + DenseBelief::bytes_needed(context, lattice, objects);
     return MemoryPlan{elements, !options.still_array && with_one_more <= room.bytes};

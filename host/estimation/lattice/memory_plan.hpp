@@ -8,16 +8,16 @@
 
 namespace palpate {
 
-/// What a histogram may take so that it stays within the device's memory and within the limit that
-/// the options set: beliefs, maps, tables, what reductions take while they run, and for the limit
-/// also the staging memory.
+/// The memory that keeps a histogram within the device's memory and the options' limit. The plan
+/// counts dense beliefs, maps, tables and the buffers of reductions; for the limit, staging memory
+/// too.
 struct MemoryPlan {
-  std::size_t batch_elements = 0;  ///< most that the likelihood's tables may hold
-  bool room_to_prepare = false;    ///< for one more belief beside all of it
+  std::size_t batch_elements = 0;  ///< most elements in the likelihood's tables
+  bool room_to_prepare = false;    ///< for one more dense belief
 };
 
-/// Nothing is allocated.
-/// @throws Error where the histogram does not fit, with what it needs
+/// Allocates nothing.
+/// @throws Error where the histogram does not fit; the message says how much memory it needs
 MemoryPlan plan_memory(const gpu::Context& context, std::span<const Hypothesis> hypotheses,
                        const HistogramOptions& options);
 

@@ -8,8 +8,8 @@ namespace palpate {
 
 namespace {
 
-/// Solves for a symmetric matrix, [n, n]. False where it is not positive definite,
-/// as far as rounding lets one tell.
+/// Solves matrix x = right in place, for a symmetric matrix, [n, n]. Returns false where the matrix
+/// is not positive definite within rounding.
 bool solve(std::vector<double> matrix, std::vector<double>& right) {
   constexpr double rounding = 1e-9;
   const std::size_t n = right.size();

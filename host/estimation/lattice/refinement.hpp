@@ -1,8 +1,6 @@
 #pragma once
 
-#include <cstdint>
-
-#include "dense_belief.hpp"
+#include "bin_window.hpp"
 #include "palpate/estimate.hpp"
 #include "palpate/lattice.hpp"
 #include "palpate/pose_error.hpp"
@@ -10,12 +8,13 @@
 namespace palpate {
 
 /// The body whose displacement measures how far two poses are apart: the map's occupied cells, or
-/// the whole grid where none is.
+/// the whole grid where no cell is occupied.
 Body displaced_body(const OccupancyGrid& map);
 
-/// Peak and covariance of one object's belief around a bin, as PoseHistogram::refine() has them.
-/// @throws Error if the device fails
-RefinedPose refine(const DenseBelief& belief, const PoseLattice& lattice, std::size_t object,
-                   const Body& body, std::int64_t bin);
+/// The pose between the bins near the mode, and its covariance, as PoseHistogram::refine() says.
+/// @param log_likelihood of the mode's object
+/// @throws Error if there is no such bin or the pose is not finite; what `log_likelihood` throws
+RefinedPose refine(const WindowLogLikelihood& log_likelihood, const PoseLattice& lattice,
+                   const Body& body, const Mode& mode);
 
 }  // namespace palpate

@@ -308,7 +308,6 @@ Estimate ParticleFilter::estimate() const {
   }
   const auto maximum =
       filter.parzen.find(particles, weights, static_cast<std::uint32_t>(filter.objects));
-  estimate.mode.bin = -1;
   estimate.mode.log_likelihood = -std::numeric_limits<double>::infinity();
   estimate.mode.T_object_robot = filter.T_object_robot(0.0, 0.0, 0.0);
   if (maximum) {

@@ -2,8 +2,10 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
+#include "palpate/lattice.hpp"
 #include "palpate/occupancy_grid.hpp"
 #include "palpate/pose.hpp"
 
@@ -15,30 +17,47 @@ struct Hypothesis {
   double weight = 1.0;  ///< prior weight, relative to the other objects'
 };
 
-/// The bin of the largest posterior probability (Eq. 15-16).
+/// The pose of the largest posterior probability (Eq. 15-16).
 struct Mode {
-  int object = 0;        ///< index into the hypotheses
-  std::int64_t bin = 0;  ///< index into the lattice
-  Pose T_object_robot;
-  double log_likelihood = 0.0;  ///< of all touches, without prior weights, in nats
+  int object = 0;                        ///< index into the hypotheses
+  std::optional<std::int64_t> bin = {};  ///< index into the lattice, where the filter has bins
+  Pose T_object_robot;                   ///< the bin's centre, where there is a bin
+  double log_likelihood = 0.0;           ///< of all touches, without prior weights, in nats
+};
+
+/// The bounds of a probability.
+struct ProbabilityInterval {
+  double low = 0.0;
+  double high = 1.0;
 };
 
 /// What the belief says about the unknown object, after any number of touches.
 struct Estimate {
   std::vector<double> identity;  ///< probability of every hypothesis, Eq. 14; with `none` sums to 1
-  double none = 0.0;             ///< probability of "none of these", where that was asked for
+  /// Bounds of every probability in `identity`, from a filter that knows no more than the bounds;
+  /// empty where `identity` is exact.
+  std::vector<ProbabilityInterval> identity_bounds = {};
+  double none = 0.0;  ///< probability of "none of these", where the options ask for it
   Mode mode;
-  /// Even the best bin, or the best particle of each touch, explains the touches worse than a map
-  /// of nothing but the prior does, by a factor below exp(-700), which is 0 in float64: the object,
-  /// its pose or the sensor model cannot be what the hypotheses say. `identity` and `mode` still
+  /// True where a map that holds only the prior explains the touches better, by more than 700 nats,
+  /// than the best bin of any object (particle filter: than the best particle of each touch). The
+  /// object, its pose or the sensor model is then none of the hypotheses; `identity` and `mode`
   /// name the least impossible.
   bool contradicted = false;
+};
+
+/// Probabilities of parts of one object's poses, over a grid that may be coarser than the belief.
+struct Marginals {
+  PoseLattice grid;
+  std::vector<double> xy;     ///< of every (x, y) of the grid, summed over theta, [ny, nx]
+  std::vector<double> theta;  ///< of every theta of the grid, summed over (x, y), [ntheta]
 };
 
 /// A pose between the bins, with its uncertainty.
 struct RefinedPose {
   Pose T_object_robot;
-  /// Of (x_mm, y_mm, theta_rad) of T_object_robot, row by row, in mm^2, mm rad and rad^2.
+  /// Covariance of (x_mm, y_mm, theta_rad) of T_object_robot, row by row, in mm^2, mm rad and
+  /// rad^2.
   std::array<double, 9> covariance{};
 };
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -44,6 +45,12 @@ struct Posterior {
 };
 Posterior read_posterior(const std::filesystem::path& path);
 void write_posterior(const std::filesystem::path& path, const Posterior& posterior);
+/// Writes a posterior object by object, so that the bins of one object at a time are in memory.
+/// @param log_likelihood is called once for each object in order, and returns the log-likelihood of
+/// the object's bins, [theta, y, x] in nats, without prior weights
+void write_posterior(const std::filesystem::path& path, const std::vector<std::string>& objects,
+                     const PoseLattice& lattice,
+                     const std::function<std::vector<double>(std::size_t object)>& log_likelihood);
 
 /// Returns the `format` attribute of an HDF5 file, such as "palpate.map".
 std::string read_format(const std::filesystem::path& path);

@@ -71,8 +71,8 @@ class ParticleFilter {
 
   /// Identity by Eq. 9; the pose is the maximum of the Parzen estimate with a cone kernel (Eq.
   /// 10-12), rho = 1 mm and 1 rad, on a grid of 0.5 mm and 0.04 pi rad through the region's centre.
-  /// `mode.bin` is -1, and `mode.log_likelihood` the log of the Parzen sum's value there, at most
-  /// 0; where all particles are of "none of these", it is -infinity and the mode says nothing.
+  /// The mode has no bin, and `mode.log_likelihood` is the log of the Parzen sum's value there, at
+  /// most 0; where all particles are of "none of these", it is -infinity and the mode says nothing.
   ///
   /// `contradicted` uses the best particle of each touch in place of the best bin. It is a hint:
   /// too few particles may miss the pose that explains the touches, and motion noise may carry a

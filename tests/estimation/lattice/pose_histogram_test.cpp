@@ -79,18 +79,18 @@ TEST(PoseHistogram, AgreesWithTheReferenceInIdentityModeAndMarginals) {
     EXPECT_LT(largest_difference(estimate.identity, reference::identity(expected)), tolerance);
 
     const reference::Mode mode = reference::mode(expected);
-    const auto bin = static_cast<std::size_t>(estimate.mode.bin);
+    const auto bin = static_cast<std::size_t>(estimate.mode.bin.value());
     EXPECT_EQ(estimate.mode.object, mode.object);
     EXPECT_NEAR(estimate.mode.log_likelihood, expected.log_likelihood[mode.object][mode.bin],
                 tolerance);
     EXPECT_NEAR(expected.log_likelihood[mode.object][bin],
                 expected.log_likelihood[mode.object][mode.bin], 2.0 * tolerance);
     EXPECT_EQ(estimate.mode.T_object_robot.theta_rad,
-              options.lattice.T_object_robot(estimate.mode.bin).theta_rad);
+              options.lattice.T_object_robot(*estimate.mode.bin).theta_rad);
 
     double total = 0.0;
     for (int object = 0; object < 3; ++object) {
-      const auto [xy, theta] = histogram.marginals(object);
+      const auto [grid, xy, theta] = histogram.marginals(object);
       EXPECT_LT(largest_difference(xy, reference::marginal_xy(expected, object)), tolerance);
       EXPECT_LT(largest_difference(theta, reference::marginal_theta(expected, object)), tolerance);
       double sum_xy = 0.0;

@@ -11,8 +11,6 @@
 #include <glm/mat3x3.hpp>
 #include <glm/matrix.hpp>
 
-#include "context.hpp"
-#include "dense_belief.hpp"
 #include "palpate/pose.hpp"
 #include "refinement.hpp"
 #include "synthetic.hpp"
@@ -25,30 +23,33 @@ constexpr double spin_mm = 8.0;  // a radian moves the object by so much
 
 using LogBelief = std::function<double(const glm::dvec3&)>;
 
-/// Refines around the best bin of a belief over x, y and theta.
-RefinedPose refined(Device& device, const PoseLattice& lattice, const glm::dvec2& centroid_mm,
+/// Refines around the best bin of a belief over x, y and theta, which is evaluated where it is
+/// asked.
+RefinedPose refined(const PoseLattice& lattice, const glm::dvec2& centroid_mm,
                     const LogBelief& log_belief) {
-  gpu::Context& context = device.context();
-  gpu::CommandStream stream(context);
-  const DenseBelief belief(context, stream, lattice, 1);
-  std::vector<TwoFloat> bins;
-  std::int64_t best = 0;
-  double most = -std::numeric_limits<double>::infinity();
-  for (std::int64_t bin = 0; bin < lattice.bins(); ++bin) {
+  const auto at_bin = [&](std::int64_t bin) {
     const Pose pose = lattice.T_object_robot(bin);
-    const glm::dvec2 at = pose * lattice.pivot_mm;
-    const double l = log_belief({at, pose.theta_rad});
-    const auto high = static_cast<float>(l);
-    bins.push_back({high, static_cast<float>(l - high)});
-    if (l > most) {
-      most = l;
-      best = bin;
+    return log_belief({pose * lattice.pivot_mm, pose.theta_rad});
+  };
+  const auto in_window = [&](const BinWindow& window) {
+    const int thetas = lattice.theta_rad.count;
+    std::vector<double> values;
+    for (int t = 0; t < window.theta_count; ++t) {
+      const std::int64_t theta = (window.theta_first + t + thetas) % thetas;
+      for (int j = window.row_first; j < window.row_first + window.row_count; ++j) {
+        for (int i = window.column_first; i < window.column_first + window.column_count; ++i) {
+          values.push_back(at_bin((theta * lattice.y_mm.count + j) * lattice.x_mm.count + i));
+        }
+      }
     }
+    return values;
+  };
+  std::int64_t best = 0;
+  for (std::int64_t bin = 1; bin < lattice.bins(); ++bin) {
+    best = at_bin(bin) > at_bin(best) ? bin : best;
   }
-  stream.upload(belief.slabs().front().log_likelihood, std::span<const TwoFloat>(bins));
-  stream.run();
-  return refine(belief, lattice, 0, {.centroid_mm = centroid_mm, .inertia_mm2 = spin_mm * spin_mm},
-                best);
+  return refine(in_window, lattice, {.centroid_mm = centroid_mm, .inertia_mm2 = spin_mm * spin_mm},
+                {.bin = best});
 }
 
 /// Bins of 0.25 mm, and of as much for the object in theta.
@@ -60,7 +61,6 @@ PoseLattice lattice_from(double theta_rad) {
 }
 
 TEST(RefinedPose, OfAnExactQuadraticIsItsPeakAndItsCovarianceTheInverse) {
-  Device device = Device::open();
   Uniform random(191);
   for (int trial = 0; trial < 6; ++trial) {
     const glm::dvec3 peak(random(-0.5, 0.5), random(-0.5, 0.5), random(0.0, two_pi));
@@ -75,12 +75,11 @@ TEST(RefinedPose, OfAnExactQuadraticIsItsPeakAndItsCovarianceTheInverse) {
     const glm::dmat3 precision = glm::inverse(covariance_mm2);
     for (const double from_rad : {0.0, -2.5}) {
       const PoseLattice lattice = lattice_from(from_rad);
-      const RefinedPose pose =
-          refined(device, lattice, glm::dvec2(peak), [&](const glm::dvec3& at) {
-            const glm::dvec3 d(glm::dvec2(at) - glm::dvec2(peak),
-                               spin_mm * wrap_angle(at.z - peak.z, two_pi));
-            return -0.5 * glm::dot(d, precision * d);
-          });
+      const RefinedPose pose = refined(lattice, glm::dvec2(peak), [&](const glm::dvec3& at) {
+        const glm::dvec3 d(glm::dvec2(at) - glm::dvec2(peak),
+                           spin_mm * wrap_angle(at.z - peak.z, two_pi));
+        return -0.5 * glm::dot(d, precision * d);
+      });
       // A turn about the mean also swings the centroid, by the mean's error times the turn.
       EXPECT_NEAR(pose.T_object_robot.translation_mm.x, peak.x, 1e-3);
       EXPECT_NEAR(pose.T_object_robot.translation_mm.y, peak.y, 1e-3);
@@ -101,7 +100,6 @@ TEST(RefinedPose, OfAnExactQuadraticIsItsPeakAndItsCovarianceTheInverse) {
 }
 
 TEST(RefinedPose, OfAFullCircleLiesOnItWhereverItBegins) {
-  Device device = Device::open();
   const double step = lattice_from(0.0).theta_rad.step();
   for (int shift = -16; shift <= 16; ++shift) {
     // A peak about the seam, steeper to one side, so that mean and peak may lie on two sides of it.
@@ -119,8 +117,8 @@ TEST(RefinedPose, OfAFullCircleLiesOnItWhereverItBegins) {
       PoseLattice turned = lattice;
       turned.theta_rad.lower -= 100 * step;
       turned.theta_rad.upper -= 100 * step;
-      const double theta_rad = refined(device, lattice, {}, log_belief).T_object_robot.theta_rad;
-      const double other_rad = refined(device, turned, {}, log_belief).T_object_robot.theta_rad;
+      const double theta_rad = refined(lattice, {}, log_belief).T_object_robot.theta_rad;
+      const double other_rad = refined(turned, {}, log_belief).T_object_robot.theta_rad;
       EXPECT_GE(theta_rad, lattice.theta_rad.lower) << shift;
       EXPECT_LT(theta_rad, lattice.theta_rad.upper) << shift;
       EXPECT_GE(other_rad, turned.theta_rad.lower) << shift;

@@ -14,6 +14,7 @@
 #include "palpate/pose_histogram.hpp"
 #include "palpate/simulation.hpp"
 #include "plain_refinement.hpp"
+#include "refinement.hpp"
 #include "synthetic.hpp"
 
 namespace palpate {
@@ -33,6 +34,22 @@ void expect_near(const RefinedPose& a, const RefinedPose& b, double lever_mm = 0
     const double larger = std::max(a.covariance[4 * (i / 3)], a.covariance[4 * (i % 3)]);
     EXPECT_NEAR(a.covariance[i], b.covariance[i], 1e-3 * larger + 1e-9) << "entry " << i;
   }
+}
+
+/// A window of one object's bins, as a belief gives it.
+std::vector<double> bins_of(const std::vector<double>& logs, const PoseLattice& lattice,
+                            const BinWindow& window) {
+  const int thetas = lattice.theta_rad.count;
+  std::vector<double> values;
+  for (int t = 0; t < window.theta_count; ++t) {
+    const int theta = (window.theta_first + t + thetas) % thetas;
+    for (int j = window.row_first; j < window.row_first + window.row_count; ++j) {
+      const std::int64_t row = theta * lattice.plane() + std::int64_t{j} * lattice.x_mm.count;
+      const auto first = logs.begin() + row + window.column_first;
+      values.insert(values.end(), first, first + window.column_count);
+    }
+  }
+  return values;
 }
 
 struct Region {
@@ -55,14 +72,26 @@ TEST_P(Refinement, IsThePlainPeakAndCovarianceOfTheReferencesBelief) {
   histogram.update(all_touches(recording));
   const reference::Posterior expected =
       reference_posterior(std::span(&object, 1), {.lattice = lattice}, all_touches(recording));
+  // The reference's belief refines as the device's does.
+  const auto reference_window = [&](const BinWindow& window) {
+    return bins_of(expected.log_likelihood[0], lattice, window);
+  };
   Mode mode = histogram.estimate().mode;
   const std::int64_t n = lattice.bins();
   const double lever_mm = std::hypot(lattice.pivot_mm.x, lattice.pivot_mm.y);
-  for (const std::int64_t bin : {mode.bin, std::int64_t{0}, n - 1, n / 3, n / 2, 2 * n / 3}) {
+  for (const std::int64_t bin :
+       {mode.bin.value(), std::int64_t{0}, n - 1, n / 3, n / 2, 2 * n / 3}) {
     SCOPED_TRACE("bin " + std::to_string(bin));
     mode.bin = bin;
-    expect_near(histogram.refine(mode),
-                plain_refinement(expected.log_likelihood[0], lattice, object.map, bin), lever_mm);
+    const RefinedPose plain =
+        plain_refinement(expected.log_likelihood[0], lattice, object.map, bin);
+    expect_near(histogram.refine(mode), plain, lever_mm);
+    expect_near(refine(reference_window, lattice, displaced_body(object.map), mode), plain,
+                lever_mm);
+    const RefinedPose from_pose =
+        histogram.refine({.bin = {}, .T_object_robot = lattice.T_object_robot(bin)});
+    EXPECT_EQ(from_pose.T_object_robot.theta_rad, histogram.refine(mode).T_object_robot.theta_rad);
+    EXPECT_EQ(from_pose.covariance, histogram.refine(mode).covariance);
   }
 }
 
@@ -141,7 +170,7 @@ TEST(RefinedPose, OfAUniformBeliefIsTheBinsOwnAndSoIsThatOfTies) {
   Mode mode{.bin = (7 * lattice.plane()) + 16 * 33 + 16};
   // The window is symmetric only about the centroid's image, so ask for an angle alone.
   const RefinedPose refined = histogram.refine(mode);
-  EXPECT_NEAR(refined.T_object_robot.theta_rad, lattice.T_object_robot(mode.bin).theta_rad,
+  EXPECT_NEAR(refined.T_object_robot.theta_rad, lattice.T_object_robot(*mode.bin).theta_rad,
               lattice.theta_rad.step() / 2);
   for (const int variance : {0, 4}) {
     // A ball of 2.5 mm: a fifth of the radius's square along each axis.
@@ -187,8 +216,8 @@ TEST(RefinedPose, OfATwoFoldSymmetricObjectKeepsToOneMode) {
       0.2);
   // The other mode: half the circle on, the place mirrored.
   const std::int64_t n = lattice.plane();
-  const std::int64_t in_plane = mode.bin % n;
-  mode.bin = (mode.bin / n + 40) % 80 * n + (n - 1 - in_plane);
+  const std::int64_t in_plane = mode.bin.value() % n;
+  mode.bin = (*mode.bin / n + 40) % 80 * n + (n - 1 - in_plane);
   const RefinedPose other = histogram.refine(mode);
   EXPECT_NEAR(
       std::abs(wrap_angle(one.T_object_robot.theta_rad - other.T_object_robot.theta_rad, two_pi)),
@@ -303,8 +332,10 @@ TEST(RefinedPose, OfWhatIsNotThereIsRefused) {
   const Hypothesis object{random_map(5, 4, 0.5, 1.0, 139), 1.0};
   Device device = Device::open();
   const PoseHistogram histogram(device, std::span(&object, 1), {});
-  for (const Mode& mode : {Mode{.object = 1}, Mode{.object = -1}, Mode{.bin = -1},
-                           Mode{.bin = histogram.lattice().bins()}}) {
+  const Pose nowhere{{std::numeric_limits<double>::quiet_NaN(), 0.0}, 0.0};
+  for (const Mode& mode :
+       {Mode{.object = 1}, Mode{.object = -1}, Mode{.bin = -1},
+        Mode{.bin = histogram.lattice().bins()}, Mode{.T_object_robot = nowhere}}) {
     EXPECT_THROW(histogram.refine(mode), Error);
   }
 }

@@ -1,0 +1,58 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "contact_evidence.hpp"
+#include "dense_belief.hpp"
+#include "dense_likelihood.hpp"
+#include "palpate/contact.hpp"
+#include "palpate/lattice.hpp"
+
+namespace palpate {
+
+/// A touch as an array at rest takes it in.
+struct StillTouch {
+  Touch touch;
+  bool by_differences = false;  ///< the evidence holds only what differs from No Contact everywhere
+  ContactEvidence evidence;
+};
+
+/// An array that stays in one place from touch to touch. The log-likelihood of an array that reads
+/// No Contact everywhere is evaluated once for each place. A touch adds this log-likelihood and the
+/// elements that read something else.
+class StillArray {
+ public:
+  StillArray(const ContactClassifier& classifier, const PoseLattice& lattice)
+      : classifier_(classifier), lattice_(lattice) {}
+
+  /// Gathers every touch by its differences where at least half of its elements read No Contact,
+  /// or else as a whole.
+  /// @throws Error on a touch that is not sound
+  std::vector<StillTouch> gather(std::span<const Touch> touches,
+                                 std::size_t segment_elements) const;
+
+  /// Adds the touches to the belief one after the other, with the fraction done after each (Eq.
+  /// 13).
+  void accumulate(std::span<const StillTouch> touches, DenseLikelihood& likelihood,
+                  DenseBelief& belief, const std::function<void(double)>& progress);
+
+  std::uint64_t device_bytes() const { return no_contact_ ? no_contact_->device_bytes() : 0; }
+
+ private:
+  /// Evaluates No Contact everywhere where the array was not before.
+  const DenseBelief& no_contact_at(const Touch& touch, DenseLikelihood& likelihood,
+                                   const DenseBelief& belief);
+
+  ContactClassifier classifier_;
+  PoseLattice lattice_;
+  std::optional<DenseBelief> no_contact_;  ///< log-likelihood of No Contact everywhere
+  bool evaluated_ = false;                 ///< for the place below
+  Pose T_robot_sensor_;
+  std::vector<glm::dvec2> elements_mm_;
+};
+
+}  // namespace palpate
