@@ -13,26 +13,44 @@
 #include "palpate/sensor_model.hpp"
 #include "palpate/touch.hpp"
 
-/// Every equation once more, written plainly in float64 from Pezzementi, Reyda and Hager (ICRA
-/// 2011), to measure the product against. It shares the product's data types and none of its
-/// functions. Units and frames are those of the types; nothing is checked.
+/// The method of Pezzementi, Reyda and Hager (ICRA 2011) in plain float64, in the paper's order:
+/// what to read first, and what every kernel is tested against. It shares the product's data types
+/// and none of its functions. Units and frames are those of the types; nothing is checked.
+///
+///   e, e_max    pressure of an element; the largest of the touch
+///   m           p(m), the prior probability that a cell is occupied
+///   l           log odds of a cell in nats: log(p / (1 - p))
+///   G'          inverse of the sensor's point spread: peak a, standard deviation s
+///   gamma       probability that an element is classified at random
+///   C, x        object and pose (x, y, theta) of a hypothesis: T_object_robot
+///   w           weight of a particle
+///   p_k         probability of bin k, at whose centroid Eq. 7 is evaluated
 namespace palpate::reference {
 
 /// p_a = R(theta) p_b + t, in mm.
 glm::dvec2 transform(const Pose& T_a_b, const glm::dvec2& p_b);
 
+// --- contact.cpp: Eq. 3 ---
+
 /// Eq. 3: the class of every element, [e].
 std::vector<Reading> classify(const Touch& touch, const ContactClassifier& classifier);
+
+// --- map.cpp: Eq. 1, 2, 4-6 ---
+
+/// Eq. 1: log odds of a probability.
+double logit(double p);
 
 /// Eq. 4-6: log-odds increment in nats of a cell at this distance from an element's centre.
 double increment(Reading reading, double distance_mm, const InverseSensorModel& sensor);
 
-/// Eq. 4-6: log odds of every cell of a grid, [ny, nx], of which only the geometry is read: the
+/// Eq. 2 and 6: log odds of every cell of a grid, [ny, nx], of which only the geometry is read: the
 /// prior and the increments of all elements, with no Gaussian cut off. The object frame is the
 /// touches' robot frame.
 std::vector<double> log_odds_map(std::span<const Touch> touches, const OccupancyGrid& grid,
                                  const ContactClassifier& classifier,
                                  const InverseSensorModel& sensor);
+
+// --- likelihood.cpp: Eq. 7 ---
 
 /// Bilinear interpolation of the map's log odds; every cell beyond the map holds the prior's.
 double interpolate(const OccupancyGrid& map, double prior, const glm::dvec2& p_object_mm);
@@ -44,7 +62,9 @@ double log_likelihood(Reading reading, double log_odds, const ContactLikelihood&
 double log_likelihood(const Touch& touch, const Pose& T_object_robot, const OccupancyGrid& map,
                       const ContactClassifier& classifier, const ContactLikelihood& model);
 
-/// The pose of a bin: p_o = R(theta) (p_r - pivot) + (x, y) at the bin's centroid.
+// --- histogram.cpp: Eq. 13-16 ---
+
+/// The centroid of a bin as a pose: p_o = R(theta) (p_r - pivot) + (x, y).
 Pose bin_pose(const PoseLattice& lattice, std::int64_t bin);
 
 /// Eq. 13 in logs: the touches' log-likelihood at every bin, [theta, y, x], in nats.
@@ -73,6 +93,8 @@ Mode mode(const Posterior& posterior);
 std::vector<double> marginal_xy(const Posterior& posterior, int object);
 /// Probability of every theta of one object, [ntheta].
 std::vector<double> marginal_theta(const Posterior& posterior, int object);
+
+// --- pose_error.cpp: Eq. 17-20 ---
 
 /// Eq. 17-20 of Chirikjian and Zhou 1998: root mean squared displacement in mm of the map's
 /// occupied cells between two poses, with the turn wrapped by the map's symmetry.
