@@ -11,12 +11,36 @@ namespace palpate {
 namespace {
 
 using Format = PacketFormat;
-using Entry = ProfileEntry;
+using Entry = YamlEntry;
 
 constexpr std::uint32_t most_packet_bytes = 65536;
 // Out of step, each byte may begin a packet whose parts are gone through before one is wrong; where
 // there is a checksum, it tells before.
 constexpr std::uint32_t most_unchecked_parts_bytes = 4096;
+
+int digit(char c) {
+  if (c >= '0' && c <= '9') {
+    return c - '0';
+  }
+  const char lower = static_cast<char>(c | 0x20);
+  return lower >= 'a' && lower <= 'f' ? lower - 'a' + 10 : -1;
+}
+
+NumberType read_number_type(const Entry& entry) {
+  using Kind = NumberType::Kind;
+  return entry.one_of<NumberType>({{"u8", {Kind::unsigned_integer, 1, false}},
+                                   {"s8", {Kind::signed_integer, 1, false}},
+                                   {"u16le", {Kind::unsigned_integer, 2, false}},
+                                   {"u16be", {Kind::unsigned_integer, 2, true}},
+                                   {"s16le", {Kind::signed_integer, 2, false}},
+                                   {"s16be", {Kind::signed_integer, 2, true}},
+                                   {"u32le", {Kind::unsigned_integer, 4, false}},
+                                   {"u32be", {Kind::unsigned_integer, 4, true}},
+                                   {"s32le", {Kind::signed_integer, 4, false}},
+                                   {"s32be", {Kind::signed_integer, 4, true}},
+                                   {"f32le", {Kind::real, 4, false}},
+                                   {"f32be", {Kind::real, 4, true}}});
+}
 
 Format::Check read_check(const Entry& field) {
   using Kind = Checksum::Kind;
@@ -35,9 +59,9 @@ Format::Check read_check(const Entry& field) {
                                                  {"crc32", {.kind = Kind::crc, .bytes = 4}},
                                                  {"weiss16", {.kind = Kind::weiss, .bytes = 2}}});
         }},
-       {"polynomial", [&](const Entry& e) { options.polynomial = e.integer(1); }},
-       {"init", [&](const Entry& e) { options.init = e.integer(); }},
-       {"xor_out", [&](const Entry& e) { options.xor_out = e.integer(); }},
+       {"polynomial", [&](const Entry& e) { options.polynomial = read_whole(e, 1u); }},
+       {"init", [&](const Entry& e) { options.init = read_whole(e, 0u); }},
+       {"xor_out", [&](const Entry& e) { options.xor_out = read_whole(e, 0u); }},
        {"reflect",
         [&](const Entry& e) {
           options.reflect = e.one_of<bool>({{"false", false}, {"true", true}});
@@ -46,7 +70,7 @@ Format::Check read_check(const Entry& field) {
         [&](const Entry& e) {
           check.big_endian = e.one_of<bool>({{"le", false}, {"be", true}});
         }},
-       {"from", [&](const Entry& e) { check.from_byte = e.integer(0, most_packet_bytes); }},
+       {"from", [&](const Entry& e) { check.from_byte = read_whole(e, 0u, most_packet_bytes); }},
        {"covers", [&](const Entry& e) {
           check.after = e.one_of<bool>({{"before", false}, {"after", true}});
         }}});
@@ -74,16 +98,17 @@ Format::Check read_check(const Entry& field) {
 
 Format::Length read_length(const Entry& field) {
   Format::Length length;
-  read_keys(field,
-            {{"length",
-              [&](const Entry& e) {
-                length.type = e.number_type();
-                if (length.type.kind != NumberType::Kind::unsigned_integer) {
-                  e.refuse("give u8, u16le, u16be, u32le or u32be");
-                }
-              }},
-             {"extra", [&](const Entry& e) { length.extra = e.integer(0, most_packet_bytes); }},
-             {"most", [&](const Entry& e) { length.most = e.integer(1, most_packet_bytes); }}});
+  read_keys(
+      field,
+      {{"length",
+        [&](const Entry& e) {
+          length.type = read_number_type(e);
+          if (length.type.kind != NumberType::Kind::unsigned_integer) {
+            e.refuse("give u8, u16le, u16be, u32le or u32be");
+          }
+        }},
+       {"extra", [&](const Entry& e) { length.extra = read_whole(e, 0u, most_packet_bytes); }},
+       {"most", [&](const Entry& e) { length.most = read_whole(e, 1u, most_packet_bytes); }}});
   return length;
 }
 
@@ -91,7 +116,7 @@ Format::Time read_time(const Entry& field) {
   Format::Time time;
   read_keys(field, {{"time",
                      [&](const Entry& e) {
-                       time.type = e.number_type();
+                       time.type = read_number_type(e);
                        if (time.type.kind == NumberType::Kind::real) {
                          e.refuse("give an integer type, such as u32le");
                        }
@@ -102,9 +127,10 @@ Format::Time read_time(const Entry& field) {
 
 Format::Values read_values(const Entry& field) {
   Format::Values values{.stride_bytes = 0};
-  read_keys(field, {{"values", [&](const Entry& e) { values.type = e.number_type(); }},
-                    {"stride", [&](const Entry& e) { values.stride_bytes = e.integer(1, 256); }},
-                    {"at", [&](const Entry& e) { values.at_byte = e.integer(0, 255); }}});
+  read_keys(field,
+            {{"values", [&](const Entry& e) { values.type = read_number_type(e); }},
+             {"stride", [&](const Entry& e) { values.stride_bytes = read_whole(e, 1u, 256u); }},
+             {"at", [&](const Entry& e) { values.at_byte = read_whole(e, 0u, 255u); }}});
   if (values.stride_bytes == 0) {
     values.stride_bytes = values.at_byte + values.type.bytes;
   }
@@ -118,17 +144,17 @@ Format::Values read_values(const Entry& field) {
 Format::Part read_part(const Entry& entry, std::size_t elements) {
   Format::Part part;
   bool tagged = false;
-  read_keys(
-      entry,
-      {{"tag",
-        [&](const Entry& e) {
-          part.tag = static_cast<std::uint8_t>(e.integer(0, 255));
-          tagged = true;
-        }},
-       {"mask", [&](const Entry& e) { part.mask = static_cast<std::uint8_t>(e.integer(0, 255)); }},
-       {"values",
-        [&](const Entry& e) { part.values = e.integer(1, static_cast<std::uint32_t>(elements)); }},
-       {"skip", [&](const Entry& e) { part.skip = e.integer(0, 4096); }}});
+  read_keys(entry, {{"tag",
+                     [&](const Entry& e) {
+                       part.tag = read_whole<std::uint8_t>(e, 0);
+                       tagged = true;
+                     }},
+                    {"mask", [&](const Entry& e) { part.mask = read_whole<std::uint8_t>(e, 0); }},
+                    {"values",
+                     [&](const Entry& e) {
+                       part.values = read_whole(e, 1u, static_cast<std::uint32_t>(elements));
+                     }},
+                    {"skip", [&](const Entry& e) { part.skip = read_whole(e, 0u, 4096u); }}});
   if (!tagged) {
     entry.refuse("key 'tag' is missing; add the byte that the part begins with");
   }
@@ -140,7 +166,7 @@ Format::Part read_part(const Entry& entry, std::size_t elements) {
 
 Format::Parts read_parts(const Entry& field, std::size_t elements) {
   Format::Parts parts;
-  read_keys(field, {{"parts", [&](const Entry& e) { parts.type = e.number_type(); }},
+  read_keys(field, {{"parts", [&](const Entry& e) { parts.type = read_number_type(e); }},
                     {"tags", [&](const Entry& e) {
                        for (const Entry& part : e.list("give a list of {tag: ..., values: N}")) {
                          parts.parts.push_back(read_part(part, elements));
@@ -173,17 +199,17 @@ Format::Field read_field(const Entry& field, std::size_t elements) {
   };
   if (has("bytes")) {
     Format::Fixed fixed;
-    read_keys(field, {{"bytes", [&](const Entry& e) { fixed.bytes = e.bytes(); }}});
+    read_keys(field, {{"bytes", [&](const Entry& e) { fixed.bytes = read_bytes(e); }}});
     return fixed;
   }
   if (has("only")) {
     Format::Only only;
-    read_keys(field, {{"only", [&](const Entry& e) { only.bytes = e.bytes(); }}});
+    read_keys(field, {{"only", [&](const Entry& e) { only.bytes = read_bytes(e); }}});
     return only;
   }
   if (has("skip")) {
     Format::Skip skip;
-    read_keys(field, {{"skip", [&](const Entry& e) { skip.bytes = e.integer(1, 4096); }}});
+    read_keys(field, {{"skip", [&](const Entry& e) { skip.bytes = read_whole(e, 1u, 4096u); }}});
     return skip;
   }
   if (has("length")) {
@@ -301,7 +327,26 @@ void set_most(const std::vector<Entry>& entries, Format& format) {
 
 }  // namespace
 
-PacketFormat read_packet_format(const ProfileEntry& packet, std::size_t elements) {
+std::vector<std::uint8_t> read_bytes(const YamlEntry& entry, std::size_t least) {
+  constexpr std::size_t most = 256;
+  std::vector<std::uint8_t> bytes;
+  std::string digits = entry.node.IsScalar() ? entry.node.Scalar() : "?";
+  std::erase(digits, ' ');
+  for (std::size_t i = 0; i < digits.size(); i += 2) {
+    const int high = digit(digits[i]);
+    const int low = i + 1 < digits.size() ? digit(digits[i + 1]) : -1;
+    if (high < 0 || low < 0) {
+      entry.refuse("give bytes of two hexadecimal digits each, such as aa 55");
+    }
+    bytes.push_back(static_cast<std::uint8_t>(16 * high + low));
+  }
+  if (bytes.size() < least || bytes.size() > most) {
+    entry.refuse(fmt::format("give {} to {} bytes", least, most));
+  }
+  return bytes;
+}
+
+PacketFormat read_packet_format(const YamlEntry& packet, std::size_t elements) {
   constexpr std::size_t most_fields = 64;
   PacketFormat format;
   format.elements = elements;
