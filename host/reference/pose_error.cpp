@@ -5,38 +5,31 @@
 
 namespace palpate::reference {
 
-namespace {
-
-glm::dvec2 robot_from_object(const Pose& T_object_robot, const glm::dvec2& p_object) {
-  const double dx = p_object.x - T_object_robot.translation_mm.x;
-  const double dy = p_object.y - T_object_robot.translation_mm.y;
-  const double c = std::cos(T_object_robot.theta_rad);
-  const double s = std::sin(T_object_robot.theta_rad);
-  return {c * dx + s * dy, -s * dx + c * dy};
-}
-
-}  // namespace
-
-double pose_error_mm(const OccupancyGrid& map, const Pose& T_object_robot_estimate,
-                     const Pose& T_object_robot_truth) {
-  std::vector<glm::dvec2> body;
-  glm::dvec2 centroid{0.0, 0.0};
+Body body_of(const OccupancyGrid& map) {
+  std::vector<glm::dvec2> cells;
+  Body body;
   for (int j = 0; j < map.ny; ++j) {
     for (int i = 0; i < map.nx; ++i) {
       if (map.at(i, j) > 0.0F) {
-        body.emplace_back(map.origin_mm.x + map.cell_mm * i, map.origin_mm.y + map.cell_mm * j);
-        centroid += body.back();
+        cells.emplace_back(map.origin_mm.x + map.cell_mm * i, map.origin_mm.y + map.cell_mm * j);
+        body.centroid_mm += cells.back();
       }
     }
   }
-  const auto cells = static_cast<double>(body.size());
-  centroid /= cells;
-  double J = 0.0;
-  for (const glm::dvec2& p : body) {
-    J += (std::pow(p.x - centroid.x, 2) + std::pow(p.y - centroid.y, 2)) / cells;
+  const auto count = static_cast<double>(cells.size());
+  body.centroid_mm /= count;
+  for (const glm::dvec2& p : cells) {
+    body.inertia_mm2 +=
+        (std::pow(p.x - body.centroid_mm.x, 2) + std::pow(p.y - body.centroid_mm.y, 2)) / count;
   }
-  const glm::dvec2 shift = robot_from_object(T_object_robot_estimate, centroid) -
-                           robot_from_object(T_object_robot_truth, centroid);
+  return body;
+}
+
+double pose_error_mm(const OccupancyGrid& map, const Pose& T_object_robot_estimate,
+                     const Pose& T_object_robot_truth) {
+  const auto [centroid, J] = reference::body_of(map);
+  const glm::dvec2 shift = transform_back(T_object_robot_estimate, centroid) -
+                           transform_back(T_object_robot_truth, centroid);
   double turn = 0.0;
   if (map.symmetry > 0) {
     const double period = 2.0 * std::numbers::pi / map.symmetry;

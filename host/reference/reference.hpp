@@ -10,6 +10,7 @@
 #include "palpate/lattice.hpp"
 #include "palpate/occupancy_grid.hpp"
 #include "palpate/pose.hpp"
+#include "palpate/pose_error.hpp"
 #include "palpate/sensor_model.hpp"
 #include "palpate/touch.hpp"
 
@@ -29,6 +30,9 @@ namespace palpate::reference {
 
 /// p_a = R(theta) p_b + t, in mm.
 glm::dvec2 transform(const Pose& T_a_b, const glm::dvec2& p_b);
+
+/// p_b = R(-theta) (p_a - t), in mm.
+glm::dvec2 transform_back(const Pose& T_a_b, const glm::dvec2& p_a);
 
 // --- contact.cpp: Eq. 3 ---
 
@@ -61,6 +65,31 @@ double log_likelihood(Reading reading, double log_odds, const ContactLikelihood&
 /// Eq. 7 for all elements of a touch on an object at a pose, in nats.
 double log_likelihood(const Touch& touch, const Pose& T_object_robot, const OccupancyGrid& map,
                       const ContactClassifier& classifier, const ContactLikelihood& model);
+
+// --- particles.cpp: Eq. 8-12 ---
+
+/// x^[m] = (C, x, y, theta) and its weight w^[m].
+struct Particle {
+  int object = 0;
+  Pose pose;
+  double weight = 0.0;
+};
+
+/// Weights of particles by their log-likelihoods of Eq. 7, in nats; they sum to 1.
+std::vector<double> importance_weights(std::span<const double> log_likelihoods);
+
+/// Eq. 8-9: summed weight of the particles of every object, [objects].
+std::vector<double> identity(std::span<const Particle> particles, int objects);
+
+/// Eq. 10 with rho = 1 mm and 1 rad; angles differ by at most half a turn.
+double cone(const Pose& a, const Pose& b);
+
+/// Eq. 11: Parzen density of one object at a pose.
+double parzen(std::span<const Particle> particles, int object, const Pose& pose);
+
+/// Eq. 12: the largest Parzen density of any object on a grid of 0.5 mm by 0.04 pi rad about the
+/// origin, within `extent_mm` of it in x and y.
+double largest_parzen(std::span<const Particle> particles, int objects, double extent_mm);
 
 // --- histogram.cpp: Eq. 13-16 ---
 
@@ -95,6 +124,9 @@ std::vector<double> marginal_xy(const Posterior& posterior, int object);
 std::vector<double> marginal_theta(const Posterior& posterior, int object);
 
 // --- pose_error.cpp: Eq. 17-20 ---
+
+/// Centroid and mean squared distance from it, J, of the map's cells with log odds > 0.
+Body body_of(const OccupancyGrid& map);
 
 /// Eq. 17-20 of Chirikjian and Zhou 1998: root mean squared displacement in mm of the map's
 /// occupied cells between two poses, with the turn wrapped by the map's symmetry.
