@@ -16,7 +16,6 @@
 namespace palpate {
 namespace {
 
-constexpr double two_pi = 6.283185307179586;
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 constexpr double infinity = std::numeric_limits<double>::infinity();
 

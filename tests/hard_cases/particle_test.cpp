@@ -1,6 +1,5 @@
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include <gtest/gtest.h>
 
@@ -9,8 +8,6 @@
 
 namespace palpate {
 namespace {
-
-constexpr double two_pi = 2.0 * std::numbers::pi;
 
 ParticleOptions two_thousand() {
   ParticleOptions options;

@@ -17,10 +17,6 @@
 namespace palpate {
 namespace {
 
-constexpr double two_pi = 2.0 * std::numbers::pi;
-// What the method allows a log-likelihood to differ from float64, in nats per touch.
-constexpr double per_touch = 1e-4;
-
 Recording says_nothing() {
   Recording recording = random_recording(1, 36, 431);
   recording.valid.assign(36, 0);

@@ -10,9 +10,6 @@
 namespace palpate {
 namespace {
 
-// What the method allows a log-likelihood to differ from float64, in nats per touch.
-constexpr double per_touch = 1e-4;
-
 TEST(ParticleWeights, WeighsAsTheReferenceDoesAtTheParticlesOwnPoses) {
   const std::vector<Hypothesis> objects = three_objects();
   Device device = Device::open();
