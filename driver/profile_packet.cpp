@@ -47,33 +47,32 @@ Format::Check read_check(const Entry& field) {
   Checksum::Parameters kind;
   Checksum::Parameters options;
   Format::Check check{.checksum = Checksum(kind)};
-  read_keys(
-      field,
-      {{"checksum",
-        [&](const Entry& e) {
-          kind = e.one_of<Checksum::Parameters>({{"sum8", {.kind = Kind::sum, .bytes = 1}},
-                                                 {"sum16", {.kind = Kind::sum, .bytes = 2}},
-                                                 {"xor8", {.kind = Kind::exor, .bytes = 1}},
-                                                 {"crc8", {.kind = Kind::crc, .bytes = 1}},
-                                                 {"crc16", {.kind = Kind::crc, .bytes = 2}},
-                                                 {"crc32", {.kind = Kind::crc, .bytes = 4}},
-                                                 {"weiss16", {.kind = Kind::weiss, .bytes = 2}}});
-        }},
-       {"polynomial", [&](const Entry& e) { options.polynomial = read_whole(e, 1u); }},
-       {"init", [&](const Entry& e) { options.init = read_whole(e, 0u); }},
-       {"xor_out", [&](const Entry& e) { options.xor_out = read_whole(e, 0u); }},
-       {"reflect",
-        [&](const Entry& e) {
-          options.reflect = e.one_of<bool>({{"false", false}, {"true", true}});
-        }},
-       {"order",
-        [&](const Entry& e) {
-          check.big_endian = e.one_of<bool>({{"le", false}, {"be", true}});
-        }},
-       {"from", [&](const Entry& e) { check.from_byte = read_whole(e, 0u, most_packet_bytes); }},
-       {"covers", [&](const Entry& e) {
-          check.after = e.one_of<bool>({{"before", false}, {"after", true}});
-        }}});
+  read_keys(field, {{"checksum",
+                     [&](const Entry& e) {
+                       kind = e.one_of<Checksum::Parameters>(
+                           {{"sum8", {.kind = Kind::sum, .bytes = 1}},
+                            {"sum16", {.kind = Kind::sum, .bytes = 2}},
+                            {"xor8", {.kind = Kind::exor, .bytes = 1}},
+                            {"crc8", {.kind = Kind::crc, .bytes = 1}},
+                            {"crc16", {.kind = Kind::crc, .bytes = 2}},
+                            {"crc32", {.kind = Kind::crc, .bytes = 4}},
+                            {"weiss16", {.kind = Kind::weiss, .bytes = 2}}});
+                     }},
+                    {"polynomial", whole(options.polynomial, 1)},
+                    {"init", whole(options.init, 0)},
+                    {"xor_out", whole(options.xor_out, 0)},
+                    {"reflect",
+                     [&](const Entry& e) {
+                       options.reflect = e.one_of<bool>({{"false", false}, {"true", true}});
+                     }},
+                    {"order",
+                     [&](const Entry& e) {
+                       check.big_endian = e.one_of<bool>({{"le", false}, {"be", true}});
+                     }},
+                    {"from", whole(check.from_byte, 0, most_packet_bytes)},
+                    {"covers", [&](const Entry& e) {
+                       check.after = e.one_of<bool>({{"before", false}, {"after", true}});
+                     }}});
   const bool is_crc = kind.kind == Kind::crc;
   if (is_crc != (options.polynomial != 0)) {
     field.refuse(is_crc ? "a crc needs 'polynomial', such as 0x1021; add it"
@@ -98,17 +97,15 @@ Format::Check read_check(const Entry& field) {
 
 Format::Length read_length(const Entry& field) {
   Format::Length length;
-  read_keys(
-      field,
-      {{"length",
-        [&](const Entry& e) {
-          length.type = read_number_type(e);
-          if (length.type.kind != NumberType::Kind::unsigned_integer) {
-            e.refuse("give u8, u16le, u16be, u32le or u32be");
-          }
-        }},
-       {"extra", [&](const Entry& e) { length.extra = read_whole(e, 0u, most_packet_bytes); }},
-       {"most", [&](const Entry& e) { length.most = read_whole(e, 1u, most_packet_bytes); }}});
+  read_keys(field, {{"length",
+                     [&](const Entry& e) {
+                       length.type = read_number_type(e);
+                       if (length.type.kind != NumberType::Kind::unsigned_integer) {
+                         e.refuse("give u8, u16le, u16be, u32le or u32be");
+                       }
+                     }},
+                    {"extra", whole(length.extra, 0, most_packet_bytes)},
+                    {"most", whole(length.most, 1, most_packet_bytes)}});
   return length;
 }
 
@@ -127,10 +124,9 @@ Format::Time read_time(const Entry& field) {
 
 Format::Values read_values(const Entry& field) {
   Format::Values values{.stride_bytes = 0};
-  read_keys(field,
-            {{"values", [&](const Entry& e) { values.type = read_number_type(e); }},
-             {"stride", [&](const Entry& e) { values.stride_bytes = read_whole(e, 1u, 256u); }},
-             {"at", [&](const Entry& e) { values.at_byte = read_whole(e, 0u, 255u); }}});
+  read_keys(field, {{"values", [&](const Entry& e) { values.type = read_number_type(e); }},
+                    {"stride", whole(values.stride_bytes, 1, 256)},
+                    {"at", whole(values.at_byte, 0, 255)}});
   if (values.stride_bytes == 0) {
     values.stride_bytes = values.at_byte + values.type.bytes;
   }
@@ -143,21 +139,15 @@ Format::Values read_values(const Entry& field) {
 
 Format::Part read_part(const Entry& entry, std::size_t elements) {
   Format::Part part;
-  bool tagged = false;
-  read_keys(entry, {{"tag",
-                     [&](const Entry& e) {
-                       part.tag = read_whole<std::uint8_t>(e, 0);
-                       tagged = true;
-                     }},
-                    {"mask", [&](const Entry& e) { part.mask = read_whole<std::uint8_t>(e, 0); }},
-                    {"values",
-                     [&](const Entry& e) {
-                       part.values = read_whole(e, 1u, static_cast<std::uint32_t>(elements));
-                     }},
-                    {"skip", [&](const Entry& e) { part.skip = read_whole(e, 0u, 4096u); }}});
-  if (!tagged) {
+  std::optional<std::uint8_t> tag;
+  read_keys(entry, {{"tag", whole(tag, 0, 255)},
+                    {"mask", whole(part.mask, 0, 255)},
+                    {"values", whole(part.values, 1, static_cast<std::uint32_t>(elements))},
+                    {"skip", whole(part.skip, 0, 4096)}});
+  if (!tag) {
     entry.refuse("key 'tag' is missing; add the byte that the part begins with");
   }
+  part.tag = *tag;
   if (part.values > 0 && part.skip > 0) {
     entry.refuse("a part has 'values' or bytes to 'skip'; remove one");
   }
@@ -185,6 +175,18 @@ Format::Parts read_parts(const Entry& field, std::size_t elements) {
   return parts;
 }
 
+std::vector<std::uint8_t> read_only_bytes(const Entry& field, std::string_view kind) {
+  std::vector<std::uint8_t> bytes;
+  read_keys(field, {{kind, [&](const Entry& e) { bytes = read_bytes(e); }}});
+  return bytes;
+}
+
+Format::Skip read_skip(const Entry& field) {
+  Format::Skip skip;
+  read_keys(field, {{"skip", whole(skip.bytes, 1, 4096)}});
+  return skip;
+}
+
 Format::Field read_field(const Entry& field, std::size_t elements) {
   constexpr const char* kinds = "bytes, only, skip, length, time, values, parts, checksum";
   if (!field.node.IsMap()) {
@@ -192,40 +194,21 @@ Format::Field read_field(const Entry& field, std::size_t elements) {
   }
   // The key that says what the field is; the others are options of it. Where a key is wrong, the
   // reader of the kind says so.
-  const auto has = [&](const char* kind) {
-    return std::any_of(field.node.begin(), field.node.end(), [&](const auto& item) {
-      return item.first.IsScalar() && item.first.Scalar() == kind;
-    });
-  };
-  if (has("bytes")) {
-    Format::Fixed fixed;
-    read_keys(field, {{"bytes", [&](const Entry& e) { fixed.bytes = read_bytes(e); }}});
-    return fixed;
-  }
-  if (has("only")) {
-    Format::Only only;
-    read_keys(field, {{"only", [&](const Entry& e) { only.bytes = read_bytes(e); }}});
-    return only;
-  }
-  if (has("skip")) {
-    Format::Skip skip;
-    read_keys(field, {{"skip", [&](const Entry& e) { skip.bytes = read_whole(e, 1u, 4096u); }}});
-    return skip;
-  }
-  if (has("length")) {
-    return read_length(field);
-  }
-  if (has("time")) {
-    return read_time(field);
-  }
-  if (has("values")) {
-    return read_values(field);
-  }
-  if (has("parts")) {
-    return read_parts(field, elements);
-  }
-  if (has("checksum")) {
-    return read_check(field);
+  const std::pair<std::string_view, std::function<Format::Field()>> readers[] = {
+      {"bytes", [&] { return Format::Fixed{read_only_bytes(field, "bytes")}; }},
+      {"only", [&] { return Format::Only{read_only_bytes(field, "only")}; }},
+      {"skip", [&] { return read_skip(field); }},
+      {"length", [&] { return read_length(field); }},
+      {"time", [&] { return read_time(field); }},
+      {"values", [&] { return read_values(field); }},
+      {"parts", [&] { return read_parts(field, elements); }},
+      {"checksum", [&] { return read_check(field); }}};
+  for (const auto& [kind, read] : readers) {
+    if (std::any_of(field.node.begin(), field.node.end(), [&](const auto& item) {
+          return item.first.IsScalar() && item.first.Scalar() == kind;
+        })) {
+      return read();
+    }
   }
   field.refuse(fmt::format("unknown field; the fields are {}", kinds));
 }

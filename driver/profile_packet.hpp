@@ -14,11 +14,13 @@ namespace palpate {
 /// @throws Error
 std::vector<std::uint8_t> read_bytes(const YamlEntry& entry, std::size_t least = 1);
 
-/// A whole number, decimal or hexadecimal after 0x. @throws Error
-template <class Integer>
-Integer read_whole(const YamlEntry& entry, Integer least,
-                   Integer most = std::numeric_limits<Integer>::max()) {
-  return entry.integer(least, most, YamlEntry::Digits::also_hexadecimal);
+/// Reads a whole number, decimal or hexadecimal after 0x, into `value`.
+template <class Number>
+auto whole(Number& value, std::uint32_t least,
+           std::uint32_t most = std::numeric_limits<std::uint32_t>::max()) {
+  return [&value, least, most](const YamlEntry& entry) {
+    value = static_cast<Number>(entry.integer(least, most, YamlEntry::Digits::also_hexadecimal));
+  };
 }
 
 /// Reads the list of fields under the key `packet` of a profile.

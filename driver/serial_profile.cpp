@@ -72,16 +72,14 @@ UsbId read_usb_id(const Entry& entry) {
 SerialLine read_line(const Entry& entry) {
   using Parity = SerialLine::Parity;
   SerialLine line;
-  read_keys(
-      entry,
-      {{"baud", [&](const Entry& e) { line.baud = read_whole(e, 50u, 100'000'000u); }},
-       {"data_bits", [&](const Entry& e) { line.data_bits = read_whole<std::uint8_t>(e, 5, 8); }},
-       {"parity",
-        [&](const Entry& e) {
-          line.parity = e.one_of<Parity>(
-              {{"none", Parity::none}, {"odd", Parity::odd}, {"even", Parity::even}});
-        }},
-       {"stop_bits", [&](const Entry& e) { line.stop_bits = read_whole<std::uint8_t>(e, 1, 2); }}});
+  read_keys(entry, {{"baud", whole(line.baud, 50, 100'000'000)},
+                    {"data_bits", whole(line.data_bits, 5, 8)},
+                    {"parity",
+                     [&](const Entry& e) {
+                       line.parity = e.one_of<Parity>(
+                           {{"none", Parity::none}, {"odd", Parity::odd}, {"even", Parity::even}});
+                     }},
+                    {"stop_bits", whole(line.stop_bits, 1, 2)}});
   return line;
 }
 
@@ -100,8 +98,8 @@ void append_grid(const Entry& entry, std::vector<glm::dvec2>& elements_mm) {
   read_keys(entry, {{"grid",
                      [&](const Entry& e) {
                        const std::vector<Entry> counts = e.list(2, "give the counts [x, y]");
-                       nx = read_whole<std::size_t>(counts[0], 1, 1024);
-                       ny = read_whole<std::size_t>(counts[1], 1, 1024);
+                       whole(nx, 1, 1024)(counts[0]);
+                       whole(ny, 1, 1024)(counts[1]);
                      }},
                     {"pitch_mm", [&](const Entry& e) { pitch_mm = read_point(e); }},
                     {"center_mm", [&](const Entry& e) { center_mm = read_point(e); }},
