@@ -14,7 +14,7 @@ std::vector<Reading> classify(const Touch& touch, const ContactClassifier& class
   }
   std::vector<Reading> readings;
   for (std::size_t i = 0; i < touch.pressure.size(); ++i) {
-    const double e = touch.pressure[i];
+    const double e = touch.pressure[i];  // Eq. 3
     if (!dead(i) && e > classifier.threshold && e > classifier.ratio * e_max) {
       readings.push_back(Reading::in_contact);
     } else if (!dead(i) && e < classifier.threshold && e < classifier.ratio * e_max) {

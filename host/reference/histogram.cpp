@@ -60,6 +60,7 @@ std::vector<double> log_likelihoods(std::span<const Touch> touches, const PoseLa
   for (std::size_t bin = 0; bin < logs.size(); ++bin) {
     const Pose pose = bin_pose(lattice, static_cast<std::int64_t>(bin));
     for (const Touch& touch : touches) {
+      // Eq. 13.
       logs[bin] += log_likelihood(touch, pose, map, classifier, model);
     }
   }
@@ -71,7 +72,7 @@ std::vector<double> identity(const Posterior& posterior) {
   for (std::size_t object = 0; object < posterior.weight.size(); ++object) {
     double sum = 0.0;
     for (const double q : probabilities(posterior, static_cast<int>(object))) {
-      sum += q;
+      sum += q;  // Eq. 14
     }
     p.push_back(sum);
   }
@@ -83,7 +84,7 @@ Mode mode(const Posterior& posterior) {
   for (std::size_t object = 0; object < posterior.weight.size(); ++object) {
     const std::vector<double>& logs = posterior.log_likelihood[object];
     for (std::size_t bin = 0; bin < logs.size(); ++bin) {
-      if (std::log(posterior.weight[object]) + logs[bin] == most) {
+      if (std::log(posterior.weight[object]) + logs[bin] == most) {  // Eq. 15, 16
         return {static_cast<int>(object), static_cast<std::int64_t>(bin)};
       }
     }

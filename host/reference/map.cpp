@@ -8,6 +8,7 @@ double logit(double p) { return std::log(p / (1.0 - p)); }
 
 double increment(Reading reading, double distance_mm, const InverseSensorModel& sensor) {
   const double m = sensor.prior;
+  // Eq. 4, and Eq. 5 within Eq. 6.
   const double g = sensor.peak * std::exp(-distance_mm * distance_mm /
                                           (2.0 * sensor.spread_mm * sensor.spread_mm));
   switch (reading) {
@@ -33,6 +34,7 @@ std::vector<double> log_odds_map(std::span<const Touch> touches, const Occupancy
         for (int i = 0; i < grid.nx; ++i) {
           const double dx = grid.origin_mm.x + grid.cell_mm * i - element_mm.x;
           const double dy = grid.origin_mm.y + grid.cell_mm * j - element_mm.y;
+          // Eq. 2 and 6.
           log_odds[static_cast<std::size_t>(j) * grid.nx + i] +=
               increment(readings[k], std::hypot(dx, dy), sensor);
         }

@@ -22,7 +22,7 @@ std::vector<double> importance_weights(std::span<const double> log_likelihoods) 
 std::vector<double> identity(std::span<const Particle> particles, int objects) {
   std::vector<double> p(static_cast<std::size_t>(objects), 0.0);
   for (const Particle& particle : particles) {
-    p[static_cast<std::size_t>(particle.object)] += particle.weight;
+    p[static_cast<std::size_t>(particle.object)] += particle.weight;  // Eq. 9
   }
   return p;
 }
@@ -31,12 +31,13 @@ double cone(const Pose& a, const Pose& b) {
   const double dtheta = std::remainder(a.theta_rad - b.theta_rad, 2.0 * std::numbers::pi);
   const double d = std::hypot(a.translation_mm.x - b.translation_mm.x,
                               a.translation_mm.y - b.translation_mm.y, dtheta);
-  return std::max(0.0, 1.0 - d);
+  return std::max(0.0, 1.0 - d);  // Eq. 10
 }
 
 double parzen(std::span<const Particle> particles, int object, const Pose& pose) {
   double sum = 0.0;
   for (const Particle& particle : particles) {
+    // Eq. 11; the condition is Eq. 8.
     sum += particle.object == object ? particle.weight * cone(particle.pose, pose) : 0.0;
   }
   return sum;
@@ -50,7 +51,7 @@ double largest_parzen(std::span<const Particle> particles, int objects, double e
       for (int j = -cells; j <= cells; ++j) {
         for (int i = -cells; i <= cells; ++i) {
           const Pose point{{0.5 * i, 0.5 * j}, 0.04 * std::numbers::pi * k};
-          most = std::max(most, parzen(particles, object, point));
+          most = std::max(most, parzen(particles, object, point));  // Eq. 12
         }
       }
     }

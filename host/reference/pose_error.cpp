@@ -36,6 +36,7 @@ double pose_error_mm(const OccupancyGrid& map, const Pose& T_object_robot_estima
     turn =
         std::remainder(T_object_robot_estimate.theta_rad - T_object_robot_truth.theta_rad, period);
   }
+  // Eq. 17-20.
   return std::sqrt(shift.x * shift.x + shift.y * shift.y + 2.0 * J * (1.0 - std::cos(turn)));
 }
 
