@@ -5,10 +5,13 @@
 #include <cmath>
 #include <thread>
 
+#include "bordered_map.hpp"
+
 namespace palpate::bench {
 
 namespace {
 
+constexpr std::size_t segment_elements = 64;  // summed in one float, as in the product
 // Eight likelihoods of at least the floor's size multiply within float32: one logarithm for all.
 constexpr std::uint32_t factors_per_log = 8;
 constexpr float clamp_nats = 20.0F;  // beyond it the likelihood is flat to one part in 1e7
@@ -72,9 +75,17 @@ CpuLoop::CpuLoop(std::span<const Hypothesis> hypotheses, const PoseLattice& latt
     : lattice_(lattice),
       random_floor_(static_cast<float>(model.gamma * model.prior)),
       trust_(static_cast<float>(1.0 - model.gamma)),
-      maps_(bordered_maps(hypotheses, lattice, model.prior)),
       belief_(hypotheses.size(),
-              std::vector<double>(static_cast<std::size_t>(lattice.bins()), 0.0)) {}
+              std::vector<double>(static_cast<std::size_t>(lattice.bins()), 0.0)) {
+  for (const Hypothesis& hypothesis : hypotheses) {
+    const OccupancyGrid& map = hypothesis.map;
+    maps_.push_back({.cell_mm = map.cell_mm,
+                     .width = map.nx + 2 * shaders::MAP_BORDER,
+                     .height = map.ny + 2 * shaders::MAP_BORDER,
+                     .log_odds = with_border(map, model.prior),
+                     .axes = axes_in_cells(map, lattice)});
+  }
+}
 
 void CpuLoop::update(std::span<const Touch> touches) {
   const ContactEvidence evidence =

@@ -3,11 +3,20 @@
 #include <span>
 #include <vector>
 
-#include "bordered_map.hpp"
 #include "contact_evidence.hpp"
+#include "palpate/pose_histogram.hpp"
 #include "palpate/sensor_model.hpp"
 
 namespace palpate::bench {
+
+/// A map with its border, and the lattice's axes in its cells.
+struct BorderedMap {
+  double cell_mm;
+  int width;
+  int height;
+  std::vector<float> log_odds;       ///< [height, width]
+  std::vector<shaders::Split> axes;  ///< nx of x, then ny of y
+};
 
 /// The likelihood on the host's cores, for comparison: a thread per core, rows of bins vectorised
 /// by the compiler. Coordinates are split into cell and fraction as on the device.

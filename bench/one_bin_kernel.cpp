@@ -2,6 +2,7 @@
 
 #include <bit>
 
+#include "bordered_map.hpp"
 #include "contact_evidence.hpp"
 #include "one_bin.hpp"
 #include "one_bin_push.h"
@@ -12,6 +13,7 @@ namespace palpate::bench {
 namespace {
 
 constexpr std::uint32_t workgroup = 64;
+constexpr std::size_t segment_elements = 64;  // summed in one float, as in the product
 constexpr gpu::Access bindings[] = {gpu::Access::storage, gpu::Access::storage,
                                     gpu::Access::storage, gpu::Access::storage,
                                     gpu::Access::storage};
@@ -45,14 +47,16 @@ OneBinKernel::OneBinKernel(Device& device, std::span<const Hypothesis> hypothese
       kernel_(make_kernel(context_, model)),
       lattice_(lattice),
       cell_mm_(hypotheses.front().map.cell_mm) {
-  for (const BorderedMap& map : bordered_maps(hypotheses, lattice, model.prior)) {
-    objects_.push_back({.width = map.width,
-                        .height = map.height,
-                        .map = uploaded(context_, stream_, map.log_odds, "a map"),
-                        .axes = uploaded(context_, stream_, map.axes, "the lattice's axes"),
-                        .belief = gpu::Buffer(
-                            context_, static_cast<VkDeviceSize>(lattice.bins()) * sizeof(TwoFloat),
-                            gpu::Memory::device, "pose bins")});
+  for (const Hypothesis& hypothesis : hypotheses) {
+    const OccupancyGrid& map = hypothesis.map;
+    objects_.push_back(
+        {.width = map.nx + 2 * shaders::MAP_BORDER,
+         .height = map.ny + 2 * shaders::MAP_BORDER,
+         .map = uploaded(context_, stream_, with_border(map, model.prior), "a map"),
+         .axes = uploaded(context_, stream_, axes_in_cells(map, lattice), "the lattice's axes"),
+         .belief =
+             gpu::Buffer(context_, static_cast<VkDeviceSize>(lattice.bins()) * sizeof(TwoFloat),
+                         gpu::Memory::device, "pose bins")});
     stream_.fill(objects_.back().belief, 0);
   }
   stream_.run();

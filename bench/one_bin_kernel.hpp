@@ -3,8 +3,8 @@
 #include <span>
 #include <vector>
 
-#include "bordered_map.hpp"
 #include "command_stream.hpp"
+#include "palpate/pose_histogram.hpp"
 #include "palpate/sensor_model.hpp"
 
 namespace palpate::bench {

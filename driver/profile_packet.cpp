@@ -11,44 +11,67 @@ namespace palpate {
 namespace {
 
 using Format = PacketFormat;
-using Entry = ProfileEntry;
+using Entry = YamlEntry;
 
 constexpr std::uint32_t most_packet_bytes = 65536;
 // Out of step, a deframer without checksum may read this many bytes of parts at every byte.
 constexpr std::uint32_t most_unchecked_parts_bytes = 4096;
+
+int digit(char c) {
+  if (c >= '0' && c <= '9') {
+    return c - '0';
+  }
+  const char lower = static_cast<char>(c | 0x20);
+  return lower >= 'a' && lower <= 'f' ? lower - 'a' + 10 : -1;
+}
+
+NumberType read_number_type(const Entry& entry) {
+  using Kind = NumberType::Kind;
+  return entry.one_of<NumberType>({{"u8", {Kind::unsigned_integer, 1, false}},
+                                   {"s8", {Kind::signed_integer, 1, false}},
+                                   {"u16le", {Kind::unsigned_integer, 2, false}},
+                                   {"u16be", {Kind::unsigned_integer, 2, true}},
+                                   {"s16le", {Kind::signed_integer, 2, false}},
+                                   {"s16be", {Kind::signed_integer, 2, true}},
+                                   {"u32le", {Kind::unsigned_integer, 4, false}},
+                                   {"u32be", {Kind::unsigned_integer, 4, true}},
+                                   {"s32le", {Kind::signed_integer, 4, false}},
+                                   {"s32be", {Kind::signed_integer, 4, true}},
+                                   {"f32le", {Kind::real, 4, false}},
+                                   {"f32be", {Kind::real, 4, true}}});
+}
 
 Format::Check read_check(const Entry& field) {
   using Kind = Checksum::Kind;
   Checksum::Parameters kind;
   Checksum::Parameters options;
   Format::Check check{.checksum = Checksum(kind)};
-  read_keys(
-      field,
-      {{"checksum",
-        [&](const Entry& e) {
-          kind = e.one_of<Checksum::Parameters>({{"sum8", {.kind = Kind::sum, .bytes = 1}},
-                                                 {"sum16", {.kind = Kind::sum, .bytes = 2}},
-                                                 {"xor8", {.kind = Kind::exor, .bytes = 1}},
-                                                 {"crc8", {.kind = Kind::crc, .bytes = 1}},
-                                                 {"crc16", {.kind = Kind::crc, .bytes = 2}},
-                                                 {"crc32", {.kind = Kind::crc, .bytes = 4}},
-                                                 {"weiss16", {.kind = Kind::weiss, .bytes = 2}}});
-        }},
-       {"polynomial", [&](const Entry& e) { options.polynomial = e.integer(1); }},
-       {"init", [&](const Entry& e) { options.init = e.integer(); }},
-       {"xor_out", [&](const Entry& e) { options.xor_out = e.integer(); }},
-       {"reflect",
-        [&](const Entry& e) {
-          options.reflect = e.one_of<bool>({{"false", false}, {"true", true}});
-        }},
-       {"order",
-        [&](const Entry& e) {
-          check.big_endian = e.one_of<bool>({{"le", false}, {"be", true}});
-        }},
-       {"from", [&](const Entry& e) { check.from_byte = e.integer(0, most_packet_bytes); }},
-       {"covers", [&](const Entry& e) {
-          check.after = e.one_of<bool>({{"before", false}, {"after", true}});
-        }}});
+  read_keys(field, {{"checksum",
+                     [&](const Entry& e) {
+                       kind = e.one_of<Checksum::Parameters>(
+                           {{"sum8", {.kind = Kind::sum, .bytes = 1}},
+                            {"sum16", {.kind = Kind::sum, .bytes = 2}},
+                            {"xor8", {.kind = Kind::exor, .bytes = 1}},
+                            {"crc8", {.kind = Kind::crc, .bytes = 1}},
+                            {"crc16", {.kind = Kind::crc, .bytes = 2}},
+                            {"crc32", {.kind = Kind::crc, .bytes = 4}},
+                            {"weiss16", {.kind = Kind::weiss, .bytes = 2}}});
+                     }},
+                    {"polynomial", whole(options.polynomial, 1)},
+                    {"init", whole(options.init, 0)},
+                    {"xor_out", whole(options.xor_out, 0)},
+                    {"reflect",
+                     [&](const Entry& e) {
+                       options.reflect = e.one_of<bool>({{"false", false}, {"true", true}});
+                     }},
+                    {"order",
+                     [&](const Entry& e) {
+                       check.big_endian = e.one_of<bool>({{"le", false}, {"be", true}});
+                     }},
+                    {"from", whole(check.from_byte, 0, most_packet_bytes)},
+                    {"covers", [&](const Entry& e) {
+                       check.after = e.one_of<bool>({{"before", false}, {"after", true}});
+                     }}});
   const bool is_crc = kind.kind == Kind::crc;
   if (is_crc != (options.polynomial != 0)) {
     field.refuse(is_crc ? "a crc needs 'polynomial', such as 0x1021; add it"
@@ -72,16 +95,15 @@ Format::Check read_check(const Entry& field) {
 
 Format::Length read_length(const Entry& field) {
   Format::Length length;
-  read_keys(field,
-            {{"length",
-              [&](const Entry& e) {
-                length.type = e.number_type();
-                if (length.type.kind != NumberType::Kind::unsigned_integer) {
-                  e.refuse("give u8, u16le, u16be, u32le or u32be");
-                }
-              }},
-             {"extra", [&](const Entry& e) { length.extra = e.integer(0, most_packet_bytes); }},
-             {"most", [&](const Entry& e) { length.most = e.integer(1, most_packet_bytes); }}});
+  read_keys(field, {{"length",
+                     [&](const Entry& e) {
+                       length.type = read_number_type(e);
+                       if (length.type.kind != NumberType::Kind::unsigned_integer) {
+                         e.refuse("give u8, u16le, u16be, u32le or u32be");
+                       }
+                     }},
+                    {"extra", whole(length.extra, 0, most_packet_bytes)},
+                    {"most", whole(length.most, 1, most_packet_bytes)}});
   return length;
 }
 
@@ -89,7 +111,7 @@ Format::Time read_time(const Entry& field) {
   Format::Time time;
   read_keys(field, {{"time",
                      [&](const Entry& e) {
-                       time.type = e.number_type();
+                       time.type = read_number_type(e);
                        if (time.type.kind == NumberType::Kind::real) {
                          e.refuse("give an integer type, such as u32le");
                        }
@@ -100,9 +122,9 @@ Format::Time read_time(const Entry& field) {
 
 Format::Values read_values(const Entry& field) {
   Format::Values values{.stride_bytes = 0};
-  read_keys(field, {{"values", [&](const Entry& e) { values.type = e.number_type(); }},
-                    {"stride", [&](const Entry& e) { values.stride_bytes = e.integer(1, 256); }},
-                    {"at", [&](const Entry& e) { values.at_byte = e.integer(0, 255); }}});
+  read_keys(field, {{"values", [&](const Entry& e) { values.type = read_number_type(e); }},
+                    {"stride", whole(values.stride_bytes, 1, 256)},
+                    {"at", whole(values.at_byte, 0, 255)}});
   if (values.stride_bytes == 0) {
     values.stride_bytes = values.at_byte + values.type.bytes;
   }
@@ -115,21 +137,15 @@ Format::Values read_values(const Entry& field) {
 
 Format::Part read_part(const Entry& entry, std::size_t elements) {
   Format::Part part;
-  bool tagged = false;
-  read_keys(
-      entry,
-      {{"tag",
-        [&](const Entry& e) {
-          part.tag = static_cast<std::uint8_t>(e.integer(0, 255));
-          tagged = true;
-        }},
-       {"mask", [&](const Entry& e) { part.mask = static_cast<std::uint8_t>(e.integer(0, 255)); }},
-       {"values",
-        [&](const Entry& e) { part.values = e.integer(1, static_cast<std::uint32_t>(elements)); }},
-       {"skip", [&](const Entry& e) { part.skip = e.integer(0, 4096); }}});
-  if (!tagged) {
+  std::optional<std::uint8_t> tag;
+  read_keys(entry, {{"tag", whole(tag, 0, 255)},
+                    {"mask", whole(part.mask, 0, 255)},
+                    {"values", whole(part.values, 1, static_cast<std::uint32_t>(elements))},
+                    {"skip", whole(part.skip, 0, 4096)}});
+  if (!tag) {
     entry.refuse("key 'tag' is missing; add the byte that the part begins with");
   }
+  part.tag = *tag;
   if (part.values > 0 && part.skip > 0) {
     entry.refuse("a part has either 'values' or 'skip'; remove one");
   }
@@ -138,7 +154,7 @@ Format::Part read_part(const Entry& entry, std::size_t elements) {
 
 Format::Parts read_parts(const Entry& field, std::size_t elements) {
   Format::Parts parts;
-  read_keys(field, {{"parts", [&](const Entry& e) { parts.type = e.number_type(); }},
+  read_keys(field, {{"parts", [&](const Entry& e) { parts.type = read_number_type(e); }},
                     {"tags", [&](const Entry& e) {
                        for (const Entry& part : e.list("give a list of {tag: ..., values: N}")) {
                          parts.parts.push_back(read_part(part, elements));
@@ -157,46 +173,39 @@ Format::Parts read_parts(const Entry& field, std::size_t elements) {
   return parts;
 }
 
+std::vector<std::uint8_t> read_only_bytes(const Entry& field, std::string_view kind) {
+  std::vector<std::uint8_t> bytes;
+  read_keys(field, {{kind, [&](const Entry& e) { bytes = read_bytes(e); }}});
+  return bytes;
+}
+
+Format::Skip read_skip(const Entry& field) {
+  Format::Skip skip;
+  read_keys(field, {{"skip", whole(skip.bytes, 1, 4096)}});
+  return skip;
+}
+
 Format::Field read_field(const Entry& field, std::size_t elements) {
   constexpr const char* kinds = "bytes, only, skip, length, time, values, parts, checksum";
   if (!field.node.IsMap()) {
     field.refuse(fmt::format("give a field such as {{skip: 1}}; the fields are {}", kinds));
   }
   // One key names the field's kind; the other keys are its options, which the kind's reader checks.
-  const auto has = [&](const char* kind) {
-    return std::any_of(field.node.begin(), field.node.end(), [&](const auto& item) {
-      return item.first.IsScalar() && item.first.Scalar() == kind;
-    });
-  };
-  if (has("bytes")) {
-    Format::Fixed fixed;
-    read_keys(field, {{"bytes", [&](const Entry& e) { fixed.bytes = e.bytes(); }}});
-    return fixed;
-  }
-  if (has("only")) {
-    Format::Only only;
-    read_keys(field, {{"only", [&](const Entry& e) { only.bytes = e.bytes(); }}});
-    return only;
-  }
-  if (has("skip")) {
-    Format::Skip skip;
-    read_keys(field, {{"skip", [&](const Entry& e) { skip.bytes = e.integer(1, 4096); }}});
-    return skip;
-  }
-  if (has("length")) {
-    return read_length(field);
-  }
-  if (has("time")) {
-    return read_time(field);
-  }
-  if (has("values")) {
-    return read_values(field);
-  }
-  if (has("parts")) {
-    return read_parts(field, elements);
-  }
-  if (has("checksum")) {
-    return read_check(field);
+  const std::pair<std::string_view, std::function<Format::Field()>> readers[] = {
+      {"bytes", [&] { return Format::Fixed{read_only_bytes(field, "bytes")}; }},
+      {"only", [&] { return Format::Only{read_only_bytes(field, "only")}; }},
+      {"skip", [&] { return read_skip(field); }},
+      {"length", [&] { return read_length(field); }},
+      {"time", [&] { return read_time(field); }},
+      {"values", [&] { return read_values(field); }},
+      {"parts", [&] { return read_parts(field, elements); }},
+      {"checksum", [&] { return read_check(field); }}};
+  for (const auto& [kind, read] : readers) {
+    if (std::any_of(field.node.begin(), field.node.end(), [&](const auto& item) {
+          return item.first.IsScalar() && item.first.Scalar() == kind;
+        })) {
+      return read();
+    }
   }
   field.refuse(fmt::format("unknown field; the fields are {}", kinds));
 }
@@ -300,7 +309,26 @@ void set_most(const std::vector<Entry>& entries, Format& format) {
 
 }  // namespace
 
-PacketFormat read_packet_format(const ProfileEntry& packet, std::size_t elements) {
+std::vector<std::uint8_t> read_bytes(const YamlEntry& entry, std::size_t least) {
+  constexpr std::size_t most = 256;
+  std::vector<std::uint8_t> bytes;
+  std::string digits = entry.node.IsScalar() ? entry.node.Scalar() : "?";
+  std::erase(digits, ' ');
+  for (std::size_t i = 0; i < digits.size(); i += 2) {
+    const int high = digit(digits[i]);
+    const int low = i + 1 < digits.size() ? digit(digits[i + 1]) : -1;
+    if (high < 0 || low < 0) {
+      entry.refuse("give bytes of two hexadecimal digits each, such as aa 55");
+    }
+    bytes.push_back(static_cast<std::uint8_t>(16 * high + low));
+  }
+  if (bytes.size() < least || bytes.size() > most) {
+    entry.refuse(fmt::format("give {} to {} bytes", least, most));
+  }
+  return bytes;
+}
+
+PacketFormat read_packet_format(const YamlEntry& packet, std::size_t elements) {
   constexpr std::size_t most_fields = 64;
   PacketFormat format;
   format.elements = elements;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <span>
 #include <utility>
 
 #include <fmt/format.h>
@@ -32,6 +33,19 @@ std::array<std::uint8_t, 7> line_coding(const SerialLine& line) {
           static_cast<std::uint8_t>(line.stop_bits == 2 ? 2 : 0),
           static_cast<std::uint8_t>(line.parity),
           line.data_bits};
+}
+
+/// Sends a request to the control interface, if there is one.
+void ask(UsbHandle& handle, std::uint8_t request, std::uint16_t value,
+         std::span<const std::uint8_t> bytes = {}) {
+  const UsbDevice& device = handle.device();
+  if (const auto control = find_control_interface(device, data_interface(device).number)) {
+    handle.control_out({.type = class_request_out,
+                        .request = request,
+                        .value = value,
+                        .index = static_cast<std::uint16_t>(*control)},
+                       bytes);
+  }
 }
 
 }  // namespace
@@ -69,30 +83,14 @@ SensorDescription SerialBoard::configure(UsbHandle&) {
 }
 
 void SerialBoard::start(UsbHandle& handle) {
-  const UsbDevice& device = handle.device();
-  if (const auto control = find_control_interface(device, data_interface(device).number)) {
-    handle.control_out({.type = class_request_out,
-                        .request = set_line_coding,
-                        .index = static_cast<std::uint16_t>(*control)},
-                       line_coding(profile_.line));
-    set_line_state(handle, terminal_ready_and_request_to_send);
-  }
+  ask(handle, set_line_coding, 0, line_coding(profile_.line));
+  ask(handle, set_control_line_state, terminal_ready_and_request_to_send);
   send(handle, profile_.start);
 }
 
 void SerialBoard::stop(UsbHandle& handle) {
   send(handle, profile_.stop);
-  set_line_state(handle, 0);
-}
-
-void SerialBoard::set_line_state(UsbHandle& handle, std::uint16_t state) {
-  const UsbDevice& device = handle.device();
-  if (const auto control = find_control_interface(device, data_interface(device).number)) {
-    handle.control_out({.type = class_request_out,
-                        .request = set_control_line_state,
-                        .value = state,
-                        .index = static_cast<std::uint16_t>(*control)});
-  }
+  ask(handle, set_control_line_state, 0);
 }
 
 void SerialBoard::send(UsbHandle& handle, const std::vector<std::uint8_t>& bytes) {

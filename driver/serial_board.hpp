@@ -24,7 +24,6 @@ class SerialBoard final : public Board {
   Deframer& deframer() override { return *deframer_; }
 
  private:
-  void set_line_state(UsbHandle& handle, std::uint16_t state);
   void send(UsbHandle& handle, const std::vector<std::uint8_t>& bytes);
 
   std::string name_;

@@ -11,14 +11,13 @@
 #include "data_folder.hpp"
 #include "packet_deframer.hpp"
 #include "palpate/error.hpp"
-#include "profile_entry.hpp"
 #include "profile_packet.hpp"
 
 namespace palpate {
 
 namespace {
 
-using Entry = ProfileEntry;
+using Entry = YamlEntry;
 
 constexpr const char* suffix = ".yaml";
 constexpr std::size_t most_elements = 16384;
@@ -45,6 +44,15 @@ std::string text_of(const std::filesystem::path& path) {
   return {std::istreambuf_iterator<char>(file), {}};
 }
 
+std::string read_short_text(const Entry& entry) {
+  std::string text = entry.text();
+  if (text.size() > 60 ||
+      std::any_of(text.begin(), text.end(), [](char c) { return (c & 0x80) != 0; })) {
+    entry.refuse("give a text of at most 60 ASCII characters");
+  }
+  return text;
+}
+
 UsbId read_usb_id(const Entry& entry) {
   const std::string text = entry.text();
   const auto is_hex = [&](std::size_t i) {
@@ -64,19 +72,21 @@ UsbId read_usb_id(const Entry& entry) {
 SerialLine read_line(const Entry& entry) {
   using Parity = SerialLine::Parity;
   SerialLine line;
-  read_keys(entry,
-            {{"baud", [&](const Entry& e) { line.baud = e.integer(50, 100'000'000); }},
-             {"data_bits",
-              [&](const Entry& e) { line.data_bits = static_cast<std::uint8_t>(e.integer(5, 8)); }},
-             {"parity",
-              [&](const Entry& e) {
-                line.parity = e.one_of<Parity>(
-                    {{"none", Parity::none}, {"odd", Parity::odd}, {"even", Parity::even}});
-              }},
-             {"stop_bits", [&](const Entry& e) {
-                line.stop_bits = static_cast<std::uint8_t>(e.integer(1, 2));
-              }}});
+  read_keys(entry, {{"baud", whole(line.baud, 50, 100'000'000)},
+                    {"data_bits", whole(line.data_bits, 5, 8)},
+                    {"parity",
+                     [&](const Entry& e) {
+                       line.parity = e.one_of<Parity>(
+                           {{"none", Parity::none}, {"odd", Parity::odd}, {"even", Parity::even}});
+                     }},
+                    {"stop_bits", whole(line.stop_bits, 1, 2)}});
   return line;
+}
+
+glm::dvec2 read_point(const Entry& entry) {
+  constexpr double most_mm = 1e4;
+  const std::vector<Entry> xy = entry.list(2, "give [x, y]");
+  return {xy[0].number(-most_mm, most_mm), xy[1].number(-most_mm, most_mm)};
 }
 
 void append_grid(const Entry& entry, std::vector<glm::dvec2>& elements_mm) {
@@ -87,15 +97,12 @@ void append_grid(const Entry& entry, std::vector<glm::dvec2>& elements_mm) {
   bool x_fastest = true;
   read_keys(entry, {{"grid",
                      [&](const Entry& e) {
-                       const std::vector<Entry> counts = e.list("give the counts [x, y]");
-                       if (counts.size() != 2) {
-                         e.refuse("give the counts [x, y]");
-                       }
-                       nx = counts[0].integer(1, 1024);
-                       ny = counts[1].integer(1, 1024);
+                       const std::vector<Entry> counts = e.list(2, "give the counts [x, y]");
+                       whole(nx, 1, 1024)(counts[0]);
+                       whole(ny, 1, 1024)(counts[1]);
                      }},
-                    {"pitch_mm", [&](const Entry& e) { pitch_mm = e.point(); }},
-                    {"center_mm", [&](const Entry& e) { center_mm = e.point(); }},
+                    {"pitch_mm", [&](const Entry& e) { pitch_mm = read_point(e); }},
+                    {"center_mm", [&](const Entry& e) { center_mm = read_point(e); }},
                     {"fastest", [&](const Entry& e) {
                        x_fastest = e.one_of<bool>({{"x", true}, {"y", false}});
                      }}});
@@ -118,7 +125,7 @@ std::vector<glm::dvec2> read_elements_mm(const Entry& entry) {
     if (item.node.IsMap()) {
       append_grid(item, elements_mm);
     } else {
-      elements_mm.push_back(item.point());
+      elements_mm.push_back(read_point(item));
     }
   }
   if (elements_mm.empty() || elements_mm.size() > most_elements) {
@@ -134,7 +141,7 @@ SerialProfile read_root(const Entry& root) {
   double gain = 1.0;
   double offset = 0.0;
   read_keys(root,
-            {{"name", [&](const Entry& e) { profile.name = e.text(); }},
+            {{"name", [&](const Entry& e) { profile.name = read_short_text(e); }},
              {"usb",
               [&](const Entry& e) {
                 for (const Entry& id : e.list("give a list such as [16d0:14cc]")) {
@@ -142,14 +149,14 @@ SerialProfile read_root(const Entry& root) {
                 }
               }},
              {"line", [&](const Entry& e) { profile.line = read_line(e); }},
-             {"start", [&](const Entry& e) { profile.start = e.bytes(0); }},
-             {"stop", [&](const Entry& e) { profile.stop = e.bytes(0); }},
+             {"start", [&](const Entry& e) { profile.start = read_bytes(e, 0); }},
+             {"stop", [&](const Entry& e) { profile.stop = read_bytes(e, 0); }},
              {"unit",
               [&](const Entry& e) {
                 profile.pressure_unit = e.one_of<std::string>({{"raw", "raw"}, {"kPa", "kPa"}});
               }},
-             {"gain", [&](const Entry& e) { gain = e.number(); }},
-             {"offset", [&](const Entry& e) { offset = e.number(); }},
+             {"gain", [&](const Entry& e) { gain = e.number(-1e12, 1e12); }},
+             {"offset", [&](const Entry& e) { offset = e.number(-1e12, 1e12); }},
              {"rate_hz", [&](const Entry& e) { profile.rate_hz = e.number(0.0, 1e6); }},
              {"elements", [&](const Entry& e) { profile.elements_mm = read_elements_mm(e); }},
              {"packet", [&](const Entry& e) { packet.emplace(e); }}});

@@ -17,23 +17,18 @@ namespace palpate::takktile {
 inline constexpr std::uint16_t vendor_id = 0x59e3;
 inline constexpr std::uint16_t product_id = 0x74c7;
 inline constexpr std::uint8_t request_type = 0xc0;
-inline constexpr std::uint8_t bulk_in_endpoint = 0x81;
 inline constexpr std::size_t packet_bytes = 64;
 
-inline constexpr std::uint8_t request_version = 0x00;      ///< wIndex 0: hardware, 1: firmware
 inline constexpr std::uint8_t request_alive_map = 0x5c;    ///< ask for alive_map_request_bytes
-inline constexpr std::uint8_t request_calibration = 0x6c;  ///< wValue: column, wIndex: row
-inline constexpr std::uint8_t request_stream = 0xc7;       ///< wValue: ticks, wIndex 0: stop
-inline constexpr std::uint8_t request_ping = 0xba;
+inline constexpr std::uint8_t request_calibration = 0x6c;  ///< wValue column, wIndex row
+inline constexpr std::uint8_t request_stream = 0xc7;       ///< wValue ticks, wIndex 0: stop
 
 inline constexpr std::size_t calibration_bytes = 8;
 inline constexpr std::size_t stream_reply_bytes = 1;
-inline constexpr std::size_t ping_reply_bytes = 1;
 /// Length of the longer alive map, so that one request serves both firmwares.
 inline constexpr std::size_t alive_map_request_bytes = 40;
 
-/// Duration of a tick, the unit of the stream's period.
-inline constexpr double tick_s = 8e-6;
+/// The stream's period, wValue of request_stream, in ticks of 8 us.
 inline constexpr std::uint16_t default_period_ticks = 120;
 
 /// A board's grid: up to 8 rows (strips, each on an I2C bus of its own) of 5 cells.

@@ -9,15 +9,22 @@
 namespace palpate {
 
 namespace {
+
 constexpr unsigned patience_ms = 1000;
+
+/// What a libusb call returned; throws where it failed.
+int checked(const UsbDevice& device, const std::string& what, int code) {
+  if (code < 0) {
+    throw usb_fault(device, what, code);
+  }
+  return code;
 }
+
+}  // namespace
 
 UsbHandle::UsbHandle(UsbDevice device) : device_(std::move(device)) {
   libusb_device_handle* handle = nullptr;
-  const int code = libusb_open(device_.device.get(), &handle);
-  if (code != LIBUSB_SUCCESS) {
-    throw usb_fault(device_, "cannot be opened", code);
-  }
+  checked(device_, "cannot be opened", libusb_open(device_.device.get(), &handle));
   handle_.reset(handle);
   // Fails only on systems whose kernel drivers never hold an interface.
   libusb_set_auto_detach_kernel_driver(handle, 1);
@@ -32,52 +39,41 @@ UsbHandle::~UsbHandle() {
 }
 
 void UsbHandle::claim(int interface) {
-  const int code = libusb_claim_interface(handle_.get(), interface);
-  if (code != LIBUSB_SUCCESS) {
-    throw usb_fault(device_, fmt::format("interface {} cannot be claimed", interface), code);
-  }
+  checked(device_, fmt::format("interface {} cannot be claimed", interface),
+          libusb_claim_interface(handle_.get(), interface));
   claimed_.push_back(interface);
 }
 
 std::vector<std::uint8_t> UsbHandle::control_in(const ControlRequest& request,
                                                 std::uint16_t length) {
   std::vector<std::uint8_t> reply(length);
-  const int got =
-      libusb_control_transfer(handle_.get(), request.type, request.request, request.value,
-                              request.index, reply.data(), length, patience_ms);
-  if (got < 0) {
-    throw usb_fault(device_, fmt::format("request 0x{:02X}", request.request), got);
-  }
-  reply.resize(static_cast<std::size_t>(got));
+  reply.resize(static_cast<std::size_t>(control(request, reply)));
   return reply;
 }
 
 void UsbHandle::control_out(const ControlRequest& request, std::span<const std::uint8_t> bytes) {
   std::vector<std::uint8_t> data(bytes.begin(), bytes.end());  // libusb takes no const bytes
-  const int code = libusb_control_transfer(handle_.get(), request.type, request.request,
-                                           request.value, request.index, data.data(),
-                                           static_cast<std::uint16_t>(data.size()), patience_ms);
-  if (code < 0) {
-    throw usb_fault(device_, fmt::format("request 0x{:02X}", request.request), code);
-  }
+  control(request, data);
+}
+
+int UsbHandle::control(const ControlRequest& request, std::span<std::uint8_t> bytes) {
+  return checked(device_, fmt::format("request 0x{:02X}", request.request),
+                 libusb_control_transfer(handle_.get(), request.type, request.request,
+                                         request.value, request.index, bytes.data(),
+                                         static_cast<std::uint16_t>(bytes.size()), patience_ms));
 }
 
 void UsbHandle::bulk_out(std::uint8_t endpoint, std::span<const std::uint8_t> bytes) {
   std::vector<std::uint8_t> data(bytes.begin(), bytes.end());
   int sent = 0;
-  const int code = libusb_bulk_transfer(handle_.get(), endpoint, data.data(),
-                                        static_cast<int>(data.size()), &sent, patience_ms);
-  if (code != LIBUSB_SUCCESS) {
-    throw usb_fault(device_, fmt::format("sending to endpoint 0x{:02X}", endpoint), code);
-  }
+  checked(device_, fmt::format("sending to endpoint 0x{:02X}", endpoint),
+          libusb_bulk_transfer(handle_.get(), endpoint, data.data(), static_cast<int>(data.size()),
+                               &sent, patience_ms));
 }
 
 void UsbHandle::clear_halt(std::uint8_t endpoint) {
-  const int code = libusb_clear_halt(handle_.get(), endpoint);
-  if (code != LIBUSB_SUCCESS) {
-    throw usb_fault(device_, fmt::format("clearing the stall of endpoint 0x{:02X}", endpoint),
-                    code);
-  }
+  checked(device_, fmt::format("clearing the stall of endpoint 0x{:02X}", endpoint),
+          libusb_clear_halt(handle_.get(), endpoint));
 }
 
 }  // namespace palpate

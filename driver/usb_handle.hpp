@@ -41,6 +41,8 @@ class UsbHandle {
   struct Close {
     void operator()(libusb_device_handle* handle) const { libusb_close(handle); }
   };
+  int control(const ControlRequest& request, std::span<std::uint8_t> bytes);
+
   UsbDevice device_;
   std::unique_ptr<libusb_device_handle, Close> handle_;
   std::vector<int> claimed_;

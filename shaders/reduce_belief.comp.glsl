@@ -8,6 +8,7 @@
 // in float64 and in order, so that equal input gives equal bits.
 
 #include "interface.h"
+#include "log_pair.glsl"
 
 layout(local_size_x_id = 0) in;  // a power of two
 layout(constant_id = 1) const uint SIDE_BY_SIDE = 8;      // lanes that read one stretch of memory
@@ -22,13 +23,6 @@ layout(push_constant) uniform Push { ReducePush push; };
 shared vec2 best_value[gl_WorkGroupSize.x];
 shared uint best_index[gl_WorkGroupSize.x];
 shared float sums[gl_WorkGroupSize.x];
-
-bool exceeds(const vec2 a, const vec2 b) { return a.x > b.x || (a.x == b.x && a.y > b.y); }
-
-float relative(const vec2 value, const vec2 reference) {
-  precise float difference = (value.x - reference.x) + (value.y - reference.y);
-  return exp(max(difference, NEGLIGIBLE));
-}
 
 void main() {
   const uint lane = gl_LocalInvocationID.x;

@@ -7,6 +7,7 @@
 // both sums. The host adds the parts in order.
 
 #include "interface.h"
+#include "log_pair.glsl"
 
 layout(local_size_x_id = 0) in;
 layout(constant_id = 1) const uint SIDE_BY_SIDE = 8;  // lanes that read one stretch of memory
@@ -35,12 +36,8 @@ vec4 fetch_pair(const uint bin, const uint last) {
   return bin % 2 == 0 ? texel : vec4(texel.zw, next.xy);
 }
 
-float relative(const vec2 value) {
-  precise float difference = (value.x - push.max_high) + (value.y - push.max_low);
-  return exp(max(difference, NEGLIGIBLE));
-}
-
 void main() {
+  const vec2 most = vec2(push.max_high, push.max_low);
   const uint lane = gl_LocalInvocationID.x;
   const uint block = gl_WorkGroupID.x;
   const uint chunk = gl_WorkGroupID.y;
@@ -59,8 +56,8 @@ void main() {
       const uint bin = (theta + t) * push.plane + at;
       const vec4 pair = fetch_pair(min(bin, last), last);
       const vec2 probability =
-          vec2(at < push.plane ? relative(pair.xy) : 0.0,
-               at + 1 < push.plane ? relative(pair.zw) : 0.0);
+          vec2(at < push.plane ? relative(pair.xy, most) : 0.0,
+               at + 1 < push.plane ? relative(pair.zw, most) : 0.0);
       sum[i] += probability;
       part += probability.x + probability.y;
     }

@@ -8,6 +8,7 @@
 // them relies: every lane starts from exactly the sum with which the previous lane ends.
 
 #include "interface.h"
+#include "log_pair.glsl"
 
 layout(local_size_x = WEIGHT_LANES) in;
 
@@ -23,13 +24,6 @@ const float LEAST_SQUARED = 1e-18;
 shared vec2 largest[WEIGHT_LANES];
 shared float sums[WEIGHT_LANES];
 shared float squares[WEIGHT_LANES];
-
-bool exceeds(const vec2 a, const vec2 b) { return a.x > b.x || (a.x == b.x && a.y > b.y); }
-
-float relative(const vec2 value, const vec2 reference) {
-  precise float difference = (value.x - reference.x) + (value.y - reference.y);
-  return exp(max(difference, NEGLIGIBLE));
-}
 
 void main() {
   const uint lane = gl_LocalInvocationID.x;

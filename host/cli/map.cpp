@@ -14,12 +14,12 @@
 
 #include "command_files.hpp"
 #include "figures.hpp"
-#include "input_file.hpp"
 #include "number_text.hpp"
 #include "options.hpp"
 #include "palpate/error.hpp"
 #include "palpate/files.hpp"
 #include "palpate/map_builder.hpp"
+#include "printable.hpp"
 #include "progress.hpp"
 #include "recordings.hpp"
 
@@ -183,7 +183,7 @@ void build_maps(const Options& options) {
   std::error_code ignored;
   const bool folder =
       options.output.ends_with('/') || std::filesystem::is_directory(output, ignored);
-  if (!is_printable_utf8(options.label)) {
+  if (!is_printable(options.label)) {
     throw Error(Fault::input, "--label: give printable text, in UTF-8");
   }
   if (options.label == none_label) {

@@ -10,7 +10,6 @@
 #include "atomic_file.hpp"
 #include "command_files.hpp"
 #include "commands.hpp"
-#include "input_file.hpp"
 #include "interruption.hpp"
 #include "options.hpp"
 #include "palpate/baseline.hpp"
@@ -19,6 +18,7 @@
 #include "palpate/pose_track.hpp"
 #include "palpate/touch_detector.hpp"
 #include "palpate/virtual_sensor.hpp"
+#include "printable.hpp"
 #include "sensor_option.hpp"
 #include "stream_time.hpp"
 
@@ -180,7 +180,7 @@ void record(const Options& options) {
                     options.sensor));
   }
   require_above("--tare", options.tare_s, 0.0, true);
-  if (!is_printable_utf8(options.object)) {
+  if (!is_printable(options.object)) {
     throw Error(Fault::input, "--object: give printable text, in UTF-8");
   }
   std::unique_ptr<Sensor> sensor = open_sensor(options.sensor);

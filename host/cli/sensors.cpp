@@ -1,4 +1,3 @@
-#include <algorithm>
 #include <memory>
 #include <string>
 #include <vector>
@@ -9,6 +8,7 @@
 
 #include "commands.hpp"
 #include "palpate/driver.hpp"
+#include "printable.hpp"
 
 namespace palpate::cli {
 
@@ -37,13 +37,6 @@ void print_json(const std::vector<BoardInfo>& boards) {
                     {"reason", b.reason}});
   }
   fmt::print("{}\n", dumped(list));
-}
-
-/// What a terminal shows of a string that the device chose.
-std::string printable(std::string text) {
-  std::ranges::replace_if(
-      text, [](unsigned char c) { return c < ' ' || c == 0x7f; }, '?');
-  return text;
 }
 
 void print_text(const std::vector<BoardInfo>& boards) {

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cstddef>
 
+#include "contact_evidence.hpp"
+
 namespace palpate {
 
 std::vector<float> with_border(const OccupancyGrid& map, double prior) {
@@ -29,6 +31,19 @@ std::vector<shaders::Corners> corners_with_border(const OccupancyGrid& map, doub
     corners.push_back({nodes[i], node(i + 1), node(i + width), node(i + width + 1)});
   }
   return corners;
+}
+
+std::vector<shaders::Split> axes_in_cells(const OccupancyGrid& map, const PoseLattice& lattice) {
+  std::vector<shaders::Split> places;
+  const auto append = [&](const Axis& axis_mm, double origin_mm) {
+    for (int i = 0; i < axis_mm.count; ++i) {
+      places.push_back(
+          split_axis((axis_mm.centre(i) - origin_mm) / map.cell_mm + shaders::MAP_BORDER));
+    }
+  };
+  append(lattice.x_mm, map.origin_mm.x);
+  append(lattice.y_mm, map.origin_mm.y);
+  return places;
 }
 
 }  // namespace palpate

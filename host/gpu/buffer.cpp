@@ -1,17 +1,14 @@
 #include "buffer.hpp"
 
-#include <utility>
-
 #include <fmt/format.h>
 
 #include "palpate/error.hpp"
-#include "result.hpp"
 
 namespace palpate::gpu {
 
 Buffer::Buffer(Context& context, VkDeviceSize bytes, Memory memory, std::string_view purpose,
                VkFormat texel)
-    : context_(&context), bytes_(bytes) {
+    : bytes_(bytes) {
   const VkDevice device = context.device();
   const auto doing = fmt::format("device '{}': {:.1f} MiB for {}", context.name(),
                                  static_cast<double>(bytes) / (1 << 20), purpose);
@@ -30,13 +27,9 @@ Buffer::Buffer(Context& context, VkDeviceSize bytes, Memory memory, std::string_
                     VK_BUFFER_USAGE_TRANSFER_SRC_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT
           : memory == Memory::upload ? VK_BUFFER_USAGE_TRANSFER_SRC_BIT
                                      : VK_BUFFER_USAGE_TRANSFER_DST_BIT)};
-  check(vkCreateBuffer(device, &info, nullptr, &buffer_), doing);
-
-  // A constructor that throws runs no destructor: `owner` frees what exists so far.
-  Buffer owner;
-  swap(owner);
+  buffer_ = make_owned<vkDestroyBuffer>(vkCreateBuffer, device, info, doing);
   VkMemoryRequirements needs;
-  vkGetBufferMemoryRequirements(device, owner.buffer_, &needs);
+  vkGetBufferMemoryRequirements(device, buffer_.get(), &needs);
   constexpr VkMemoryPropertyFlags mapped =
       VK_MEMORY_PROPERTY_HOST_VISIBLE_BIT | VK_MEMORY_PROPERTY_HOST_COHERENT_BIT;
   const std::uint32_t type =
@@ -48,43 +41,22 @@ Buffer::Buffer(Context& context, VkDeviceSize bytes, Memory memory, std::string_
   const VkMemoryAllocateInfo allocation{.sType = VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_INFO,
                                         .allocationSize = needs.size,
                                         .memoryTypeIndex = type};
-  check(vkAllocateMemory(device, &allocation, nullptr, &owner.memory_), doing);
-  owner.allocated_ = needs.size;
+  memory_ = make_owned<vkFreeMemory>(vkAllocateMemory, device, allocation, doing);
   context.take_memory(needs.size);
-  check(vkBindBufferMemory(device, owner.buffer_, owner.memory_, 0), doing);
+  counted_ = {&context, {needs.size}};
+  check(vkBindBufferMemory(device, buffer_.get(), memory_.get(), 0), doing);
   if (texel != VK_FORMAT_UNDEFINED) {
     const VkBufferViewCreateInfo view{.sType = VK_STRUCTURE_TYPE_BUFFER_VIEW_CREATE_INFO,
-                                      .buffer = owner.buffer_,
+                                      .buffer = buffer_.get(),
                                       .format = texel,
                                       .range = VK_WHOLE_SIZE};
-    check(vkCreateBufferView(device, &view, nullptr, &owner.table_), doing);
+    table_ = make_owned<vkDestroyBufferView>(vkCreateBufferView, device, view, doing);
   }
   if (memory != Memory::device) {
     void* mapping = nullptr;
-    check(vkMapMemory(device, owner.memory_, 0, VK_WHOLE_SIZE, 0, &mapping), doing);
-    owner.data_ = static_cast<std::byte*>(mapping);
+    check(vkMapMemory(device, memory_.get(), 0, VK_WHOLE_SIZE, 0, &mapping), doing);
+    data_ = static_cast<std::byte*>(mapping);
   }
-  swap(owner);
-}
-
-Buffer::~Buffer() {
-  if (context_ != nullptr) {
-    const VkDevice device = context_->device();
-    vkDestroyBufferView(device, table_, nullptr);
-    vkDestroyBuffer(device, buffer_, nullptr);
-    vkFreeMemory(device, memory_, nullptr);
-    context_->give_memory(allocated_);
-  }
-}
-
-void Buffer::swap(Buffer& other) noexcept {
-  std::swap(context_, other.context_);
-  std::swap(buffer_, other.buffer_);
-  std::swap(memory_, other.memory_);
-  std::swap(table_, other.table_);
-  std::swap(bytes_, other.bytes_);
-  std::swap(allocated_, other.allocated_);
-  std::swap(data_, other.data_);
 }
 
 }  // namespace palpate::gpu

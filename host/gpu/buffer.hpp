@@ -3,6 +3,7 @@
 #include <string_view>
 
 #include "context.hpp"
+#include "owned.hpp"
 
 namespace palpate::gpu {
 
@@ -26,29 +27,25 @@ class Buffer {
   /// @throws Error if the device does not have the memory
   Buffer(Context& context, VkDeviceSize bytes, Memory memory, std::string_view purpose,
          VkFormat texel = VK_FORMAT_UNDEFINED);
-  Buffer(Buffer&& other) noexcept { swap(other); }
-  Buffer& operator=(Buffer&& other) noexcept {
-    swap(other);
-    return *this;
-  }
-  ~Buffer();
 
-  VkBuffer handle() const { return buffer_; }
+  VkBuffer handle() const { return buffer_.get(); }
   /// The view that binds the buffer as a table; null without a texel format.
-  VkBufferView table() const { return table_; }
+  VkBufferView table() const { return table_.get(); }
   VkDeviceSize bytes() const { return bytes_; }
   /// Start of the mapped memory; null for Memory::device.
   std::byte* data() const { return data_; }
 
  private:
-  void swap(Buffer& other) noexcept;
+  struct GiveBack {
+    VkDeviceSize bytes;
+    void operator()(Context* context) const { context->give_memory(bytes); }
+  };
 
-  Context* context_ = nullptr;
-  VkBuffer buffer_ = VK_NULL_HANDLE;
-  VkDeviceMemory memory_ = VK_NULL_HANDLE;
-  VkBufferView table_ = VK_NULL_HANDLE;
+  std::unique_ptr<Context, GiveBack> counted_;  ///< what the context counts of it
+  Owned<VkDeviceMemory, vkFreeMemory> memory_;
+  Owned<VkBuffer, vkDestroyBuffer> buffer_;
+  Owned<VkBufferView, vkDestroyBufferView> table_;
   VkDeviceSize bytes_ = 0;
-  VkDeviceSize allocated_ = 0;
   std::byte* data_ = nullptr;
 };
 

@@ -7,7 +7,6 @@
 #include <fmt/format.h>
 
 #include "palpate/error.hpp"
-#include "result.hpp"
 #include "selection.hpp"
 
 namespace palpate::gpu {
@@ -24,40 +23,25 @@ VkDeviceSize staged(VkDeviceSize bytes) { return (bytes + 15) / 16 * 16; }
 
 CommandStream::CommandStream(Context& context) : context_(context) {
   const VkDevice device = context.device();
-  try {
-    const VkCommandPoolCreateInfo pool_info{.sType = VK_STRUCTURE_TYPE_COMMAND_POOL_CREATE_INFO,
-                                            .queueFamilyIndex = context.queue_family()};
-    check(vkCreateCommandPool(device, &pool_info, nullptr, &pool_), "creating a command pool");
-    const VkCommandBufferAllocateInfo buffer_info{
-        .sType = VK_STRUCTURE_TYPE_COMMAND_BUFFER_ALLOCATE_INFO,
-        .commandPool = pool_,
-        .level = VK_COMMAND_BUFFER_LEVEL_PRIMARY,
-        .commandBufferCount = 1};
-    check(vkAllocateCommandBuffers(device, &buffer_info, &commands_), "creating commands");
-    const VkFenceCreateInfo fence_info{.sType = VK_STRUCTURE_TYPE_FENCE_CREATE_INFO};
-    check(vkCreateFence(device, &fence_info, nullptr, &fence_), "creating a fence");
-    if (context.limits().timestamp_ns > 0.0F) {
-      const VkQueryPoolCreateInfo query_info{.sType = VK_STRUCTURE_TYPE_QUERY_POOL_CREATE_INFO,
-                                             .queryType = VK_QUERY_TYPE_TIMESTAMP,
-                                             .queryCount = 2};
-      check(vkCreateQueryPool(device, &query_info, nullptr, &timestamps_), "creating timestamps");
-    }
-  } catch (...) {
-    reset();
-    throw;
+  const VkCommandPoolCreateInfo pool_info{.sType = VK_STRUCTURE_TYPE_COMMAND_POOL_CREATE_INFO,
+                                          .queueFamilyIndex = context.queue_family()};
+  pool_ = make_owned<vkDestroyCommandPool>(vkCreateCommandPool, device, pool_info,
+                                           "creating a command pool");
+  const VkCommandBufferAllocateInfo buffer_info{
+      .sType = VK_STRUCTURE_TYPE_COMMAND_BUFFER_ALLOCATE_INFO,
+      .commandPool = pool_.get(),
+      .level = VK_COMMAND_BUFFER_LEVEL_PRIMARY,
+      .commandBufferCount = 1};
+  check(vkAllocateCommandBuffers(device, &buffer_info, &commands_), "creating commands");
+  const VkFenceCreateInfo fence_info{.sType = VK_STRUCTURE_TYPE_FENCE_CREATE_INFO};
+  fence_ = make_owned<vkDestroyFence>(vkCreateFence, device, fence_info, "creating a fence");
+  if (context.limits().timestamp_ns > 0.0F) {
+    const VkQueryPoolCreateInfo query_info{.sType = VK_STRUCTURE_TYPE_QUERY_POOL_CREATE_INFO,
+                                           .queryType = VK_QUERY_TYPE_TIMESTAMP,
+                                           .queryCount = 2};
+    timestamps_ = make_owned<vkDestroyQueryPool>(vkCreateQueryPool, device, query_info,
+                                                 "creating timestamps");
   }
-}
-
-CommandStream::~CommandStream() { reset(); }
-
-void CommandStream::reset() {
-  const VkDevice device = context_.device();
-  for (const VkDescriptorPool pool : descriptor_pools_) {
-    vkDestroyDescriptorPool(device, pool, nullptr);
-  }
-  vkDestroyQueryPool(device, timestamps_, nullptr);
-  vkDestroyFence(device, fence_, nullptr);
-  vkDestroyCommandPool(device, pool_, nullptr);
 }
 
 template <typename Commands>
@@ -78,9 +62,9 @@ void CommandStream::begin() {
   const VkCommandBufferBeginInfo info{.sType = VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO,
                                       .flags = VK_COMMAND_BUFFER_USAGE_ONE_TIME_SUBMIT_BIT};
   check(vkBeginCommandBuffer(commands_, &info), "recording commands");
-  if (timestamps_ != VK_NULL_HANDLE) {
-    vkCmdResetQueryPool(commands_, timestamps_, 0, 2);
-    vkCmdWriteTimestamp(commands_, VK_PIPELINE_STAGE_TOP_OF_PIPE_BIT, timestamps_, 0);
+  if (timestamps_) {
+    vkCmdResetQueryPool(commands_, timestamps_.get(), 0, 2);
+    vkCmdWriteTimestamp(commands_, VK_PIPELINE_STAGE_TOP_OF_PIPE_BIT, timestamps_.get(), 0);
   }
   recording_ = true;
 }
@@ -159,14 +143,13 @@ VkDescriptorSet CommandStream::descriptor_set(const Kernel& kernel,
                                           .maxSets = sets_per_pool,
                                           .poolSizeCount = 2,
                                           .pPoolSizes = sizes};
-    VkDescriptorPool pool = VK_NULL_HANDLE;
-    check(vkCreateDescriptorPool(device, &info, nullptr, &pool), "creating a descriptor pool");
-    descriptor_pools_.push_back(pool);
+    descriptor_pools_.push_back(make_owned<vkDestroyDescriptorPool>(
+        vkCreateDescriptorPool, device, info, "creating a descriptor pool"));
   }
   const VkDescriptorSetLayout layout = kernel.set_layout();
   const VkDescriptorSetAllocateInfo info{
       .sType = VK_STRUCTURE_TYPE_DESCRIPTOR_SET_ALLOCATE_INFO,
-      .descriptorPool = descriptor_pools_[sets_used_ / sets_per_pool],
+      .descriptorPool = descriptor_pools_[sets_used_ / sets_per_pool].get(),
       .descriptorSetCount = 1,
       .pSetLayouts = &layout};
   VkDescriptorSet set = VK_NULL_HANDLE;
@@ -250,23 +233,24 @@ void CommandStream::submit() {
                                 .dstAccessMask = VK_ACCESS_HOST_READ_BIT};
   vkCmdPipelineBarrier(commands_, VK_PIPELINE_STAGE_TRANSFER_BIT, VK_PIPELINE_STAGE_HOST_BIT, 0, 1,
                        &to_host, 0, nullptr, 0, nullptr);
-  if (timestamps_ != VK_NULL_HANDLE) {
-    vkCmdWriteTimestamp(commands_, VK_PIPELINE_STAGE_BOTTOM_OF_PIPE_BIT, timestamps_, 1);
+  if (timestamps_) {
+    vkCmdWriteTimestamp(commands_, VK_PIPELINE_STAGE_BOTTOM_OF_PIPE_BIT, timestamps_.get(), 1);
   }
   check(vkEndCommandBuffer(commands_), "recording commands");
   const VkSubmitInfo submit{.sType = VK_STRUCTURE_TYPE_SUBMIT_INFO,
                             .commandBufferCount = 1,
                             .pCommandBuffers = &commands_};
   const VkDevice device = context_.device();
+  const VkFence fence = fence_.get();
   const auto doing = fmt::format("running on device '{}'", context_.name());
   const auto start = std::chrono::steady_clock::now();
-  check(vkQueueSubmit(context_.queue(), 1, &submit, fence_), doing);
-  check(vkWaitForFences(device, 1, &fence_, VK_TRUE, std::numeric_limits<std::uint64_t>::max()),
+  check(vkQueueSubmit(context_.queue(), 1, &submit, fence), doing);
+  check(vkWaitForFences(device, 1, &fence, VK_TRUE, std::numeric_limits<std::uint64_t>::max()),
         doing);
   double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-  if (timestamps_ != VK_NULL_HANDLE) {
+  if (timestamps_) {
     std::array<std::uint64_t, 2> ticks{};
-    check(vkGetQueryPoolResults(device, timestamps_, 0, 2, sizeof ticks, ticks.data(),
+    check(vkGetQueryPoolResults(device, timestamps_.get(), 0, 2, sizeof ticks, ticks.data(),
                                 sizeof ticks[0], VK_QUERY_RESULT_64_BIT | VK_QUERY_RESULT_WAIT_BIT),
           doing);
     seconds = static_cast<double>((ticks[1] - ticks[0]) & context_.limits().timestamp_mask) *
@@ -285,12 +269,13 @@ void CommandStream::drop() {
 
 void CommandStream::rewind() {
   const VkDevice device = context_.device();
+  const VkFence fence = fence_.get();
   recording_ = false;
   downloads_.clear();
-  check(vkResetFences(device, 1, &fence_), "resetting a fence");
-  check(vkResetCommandPool(device, pool_, 0), "resetting commands");
-  for (const VkDescriptorPool pool : descriptor_pools_) {
-    check(vkResetDescriptorPool(device, pool, 0), "resetting a descriptor pool");
+  check(vkResetFences(device, 1, &fence), "resetting a fence");
+  check(vkResetCommandPool(device, pool_.get(), 0), "resetting commands");
+  for (const auto& pool : descriptor_pools_) {
+    check(vkResetDescriptorPool(device, pool.get(), 0), "resetting a descriptor pool");
   }
   sets_used_ = 0;
   upload_.used = 0;

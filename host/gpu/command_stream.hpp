@@ -21,7 +21,6 @@ class CommandStream {
   static constexpr VkDeviceSize staging_bytes = 8 << 20;
 
   explicit CommandStream(Context& context);
-  ~CommandStream();
   CommandStream(const CommandStream&) = delete;
   CommandStream& operator=(const CommandStream&) = delete;
 
@@ -82,15 +81,14 @@ class CommandStream {
   void submit();
   void rewind();
   void drop();
-  void reset();
   VkDescriptorSet descriptor_set(const Kernel& kernel, std::span<const Buffer* const> buffers);
 
   Context& context_;
-  VkCommandPool pool_ = VK_NULL_HANDLE;
+  Owned<VkCommandPool, vkDestroyCommandPool> pool_;
   VkCommandBuffer commands_ = VK_NULL_HANDLE;
-  VkFence fence_ = VK_NULL_HANDLE;
-  VkQueryPool timestamps_ = VK_NULL_HANDLE;
-  std::vector<VkDescriptorPool> descriptor_pools_;
+  Owned<VkFence, vkDestroyFence> fence_;
+  Owned<VkQueryPool, vkDestroyQueryPool> timestamps_;  ///< none where the queue has none
+  std::vector<Owned<VkDescriptorPool, vkDestroyDescriptorPool>> descriptor_pools_;
   std::size_t sets_used_ = 0;
   Arena upload_{Memory::upload, {}, 0};
   Arena download_{Memory::download, {}, 0};

@@ -1,11 +1,8 @@
 #include "kernel.hpp"
 
-#include <utility>
-
 #include <fmt/format.h>
 
 #include "palpate/error.hpp"
-#include "result.hpp"
 #include "selection.hpp"
 
 namespace palpate::gpu {
@@ -15,20 +12,17 @@ VkDescriptorType descriptor_type(Access access) {
                                  : VK_DESCRIPTOR_TYPE_STORAGE_BUFFER;
 }
 
-Kernel::Kernel(Context& context, const KernelInfo& info) {
+Kernel::Kernel(Context& context, const KernelInfo& info)
+    : bindings_(info.bindings.begin(), info.bindings.end()),
+      push_bytes_(info.push_bytes),
+      name_(info.name) {
+  const VkDevice device = context.device();
   const auto doing = fmt::format("device '{}': kernel {}", context.name(), info.name);
   if (info.push_bytes > context.limits().push_bytes || info.bindings.size() > max_bindings) {
     throw Error(Fault::system, fmt::format("{}: needs {} B of push constants and {} buffers, more "
                                            "than the device has",
                                            doing, info.push_bytes, info.bindings.size()));
   }
-  // A constructor that throws runs no destructor: `owner` frees what exists so far.
-  Kernel owner;
-  owner.device_ = context.device();
-  owner.bindings_.assign(info.bindings.begin(), info.bindings.end());
-  owner.push_bytes_ = info.push_bytes;
-  owner.name_ = info.name;
-
   std::vector<VkDescriptorSetLayoutBinding> bindings;
   for (const Access access : info.bindings) {
     bindings.push_back({.binding = static_cast<std::uint32_t>(bindings.size()),
@@ -40,17 +34,19 @@ Kernel::Kernel(Context& context, const KernelInfo& info) {
       .sType = VK_STRUCTURE_TYPE_DESCRIPTOR_SET_LAYOUT_CREATE_INFO,
       .bindingCount = static_cast<std::uint32_t>(bindings.size()),
       .pBindings = bindings.data()};
-  check(vkCreateDescriptorSetLayout(owner.device_, &set_info, nullptr, &owner.set_layout_), doing);
+  set_layout_ = make_owned<vkDestroyDescriptorSetLayout>(vkCreateDescriptorSetLayout, device,
+                                                         set_info, doing);
+  const VkDescriptorSetLayout set_layout = set_layout_.get();
 
   const VkPushConstantRange push{.stageFlags = VK_SHADER_STAGE_COMPUTE_BIT,
                                  .size = info.push_bytes};
   const VkPipelineLayoutCreateInfo layout_info{
       .sType = VK_STRUCTURE_TYPE_PIPELINE_LAYOUT_CREATE_INFO,
       .setLayoutCount = 1,
-      .pSetLayouts = &owner.set_layout_,
+      .pSetLayouts = &set_layout,
       .pushConstantRangeCount = info.push_bytes > 0 ? 1U : 0U,
       .pPushConstantRanges = &push};
-  check(vkCreatePipelineLayout(owner.device_, &layout_info, nullptr, &owner.layout_), doing);
+  layout_ = make_owned<vkDestroyPipelineLayout>(vkCreatePipelineLayout, device, layout_info, doing);
 
   std::vector<VkSpecializationMapEntry> entries;
   for (std::uint32_t i = 0; i < info.constants.size(); ++i) {
@@ -64,40 +60,21 @@ Kernel::Kernel(Context& context, const KernelInfo& info) {
   const VkShaderModuleCreateInfo module_info{.sType = VK_STRUCTURE_TYPE_SHADER_MODULE_CREATE_INFO,
                                              .codeSize = info.spirv.size_bytes(),
                                              .pCode = info.spirv.data()};
-  VkShaderModule module = VK_NULL_HANDLE;
-  check(vkCreateShaderModule(owner.device_, &module_info, nullptr, &module), doing);
+  const auto module =
+      make_owned<vkDestroyShaderModule>(vkCreateShaderModule, device, module_info, doing);
   const VkComputePipelineCreateInfo pipeline_info{
       .sType = VK_STRUCTURE_TYPE_COMPUTE_PIPELINE_CREATE_INFO,
       .stage = {.sType = VK_STRUCTURE_TYPE_PIPELINE_SHADER_STAGE_CREATE_INFO,
                 .stage = VK_SHADER_STAGE_COMPUTE_BIT,
-                .module = module,
+                .module = module.get(),
                 .pName = "main",
                 .pSpecializationInfo = &specialization},
-      .layout = owner.layout_};
-  const VkResult result = vkCreateComputePipelines(owner.device_, VK_NULL_HANDLE, 1, &pipeline_info,
-                                                   nullptr, &owner.pipeline_);
-  vkDestroyShaderModule(owner.device_, module, nullptr);
-  check(result, doing);
+      .layout = layout_.get()};
+  VkPipeline pipeline = VK_NULL_HANDLE;
+  check(vkCreateComputePipelines(device, VK_NULL_HANDLE, 1, &pipeline_info, nullptr, &pipeline),
+        doing);
+  pipeline_ = {pipeline, {device}};
   context.validation().throw_if_any();
-  swap(owner);
-}
-
-Kernel::~Kernel() {
-  if (device_ != VK_NULL_HANDLE) {
-    vkDestroyPipeline(device_, pipeline_, nullptr);
-    vkDestroyPipelineLayout(device_, layout_, nullptr);
-    vkDestroyDescriptorSetLayout(device_, set_layout_, nullptr);
-  }
-}
-
-void Kernel::swap(Kernel& other) noexcept {
-  std::swap(device_, other.device_);
-  std::swap(set_layout_, other.set_layout_);
-  std::swap(layout_, other.layout_);
-  std::swap(pipeline_, other.pipeline_);
-  std::swap(bindings_, other.bindings_);
-  std::swap(push_bytes_, other.push_bytes_);
-  std::swap(name_, other.name_);
 }
 
 }  // namespace palpate::gpu

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "context.hpp"
+#include "owned.hpp"
 
 namespace palpate::gpu {
 
@@ -31,27 +32,18 @@ class Kernel {
   Kernel() = default;
   /// @throws Error if the device's limits do not allow the kernel
   Kernel(Context& context, const KernelInfo& info);
-  Kernel(Kernel&& other) noexcept { swap(other); }
-  Kernel& operator=(Kernel&& other) noexcept {
-    swap(other);
-    return *this;
-  }
-  ~Kernel();
 
-  VkPipeline pipeline() const { return pipeline_; }
-  VkPipelineLayout layout() const { return layout_; }
-  VkDescriptorSetLayout set_layout() const { return set_layout_; }
+  VkPipeline pipeline() const { return pipeline_.get(); }
+  VkPipelineLayout layout() const { return layout_.get(); }
+  VkDescriptorSetLayout set_layout() const { return set_layout_.get(); }
   std::span<const Access> bindings() const { return bindings_; }
   std::uint32_t push_bytes() const { return push_bytes_; }
   const char* name() const { return name_; }
 
  private:
-  void swap(Kernel& other) noexcept;
-
-  VkDevice device_ = VK_NULL_HANDLE;
-  VkDescriptorSetLayout set_layout_ = VK_NULL_HANDLE;
-  VkPipelineLayout layout_ = VK_NULL_HANDLE;
-  VkPipeline pipeline_ = VK_NULL_HANDLE;
+  Owned<VkDescriptorSetLayout, vkDestroyDescriptorSetLayout> set_layout_;
+  Owned<VkPipelineLayout, vkDestroyPipelineLayout> layout_;
+  Owned<VkPipeline, vkDestroyPipeline> pipeline_;
   std::vector<Access> bindings_;
   std::uint32_t push_bytes_ = 0;
   const char* name_ = "";

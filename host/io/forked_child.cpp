@@ -105,6 +105,40 @@ bool wait_for_answer(int socket, std::chrono::milliseconds silence) {
   return false;
 }
 
+/// Reads exactly so many bytes, each once `ready` says that it may; false where that fails.
+template <class Ready>
+bool read_all(int socket, void* data, std::size_t bytes, const Ready& ready) {
+  char* rest = static_cast<char*>(data);
+  while (bytes > 0) {
+    if (!ready()) {
+      return false;
+    }
+    const ssize_t got = ::read(socket, rest, bytes);
+    if (got > 0) {
+      rest += got;
+      bytes -= static_cast<std::size_t>(got);
+    } else if (got == 0 || errno != EINTR) {
+      return false;
+    }
+  }
+  return true;
+}
+
+/// Writes all bytes; false where the other end is gone.
+bool write_all(int socket, const void* data, std::size_t bytes) {
+  const char* rest = static_cast<const char*>(data);
+  while (bytes > 0) {
+    const ssize_t written = ::send(socket, rest, bytes, MSG_NOSIGNAL);
+    if (written > 0) {
+      rest += written;
+      bytes -= static_cast<std::size_t>(written);
+    } else if (errno != EINTR) {
+      return false;
+    }
+  }
+  return true;
+}
+
 }  // namespace
 
 ForkedChild::ForkedChild(const Work& work, const ForkedLimits& limits, std::mutex& held)
@@ -146,60 +180,25 @@ ForkedChild::~ForkedChild() {
 }
 
 bool ForkedChild::read(void* data, std::size_t bytes) {
-  char* rest = static_cast<char*>(data);
-  while (bytes > 0) {
-    if (!wait_for_answer(socket_.get(), silence_)) {
-      fell_silent_ = true;
-      return false;
-    }
-    const ssize_t got = ::read(socket_.get(), rest, bytes);
-    if (got > 0) {
-      rest += got;
-      bytes -= static_cast<std::size_t>(got);
-    } else if (got == 0 || errno != EINTR) {
-      return false;
-    }
-  }
-  return true;
+  return read_all(socket_.get(), data, bytes, [this] {
+    fell_silent_ = !wait_for_answer(socket_.get(), silence_);
+    return !fell_silent_;
+  });
 }
 
 bool ForkedChild::write(const void* data, std::size_t bytes) {
-  const char* rest = static_cast<const char*>(data);
-  while (bytes > 0) {
-    const ssize_t written = ::send(socket_.get(), rest, bytes, MSG_NOSIGNAL);
-    if (written > 0) {
-      rest += written;
-      bytes -= static_cast<std::size_t>(written);
-    } else if (errno != EINTR) {
-      return false;
-    }
-  }
-  return true;
+  return write_all(socket_.get(), data, bytes);
 }
 
 void forked_read(int socket, void* data, std::size_t bytes) {
-  char* rest = static_cast<char*>(data);
-  while (bytes > 0) {
-    const ssize_t got = ::read(socket, rest, bytes);
-    if (got > 0) {
-      rest += got;
-      bytes -= static_cast<std::size_t>(got);
-    } else if (got == 0 || errno != EINTR) {
-      ::_exit(0);
-    }
+  if (!read_all(socket, data, bytes, [] { return true; })) {
+    ::_exit(0);
   }
 }
 
 void forked_write(int socket, const void* data, std::size_t bytes) {
-  const char* rest = static_cast<const char*>(data);
-  while (bytes > 0) {
-    const ssize_t written = ::write(socket, rest, bytes);
-    if (written > 0) {
-      rest += written;
-      bytes -= static_cast<std::size_t>(written);
-    } else if (errno != EINTR) {
-      ::_exit(1);
-    }
+  if (!write_all(socket, data, bytes)) {
+    ::_exit(1);
   }
 }
 

@@ -11,6 +11,7 @@
 #include "hdf5_rows.hpp"
 #include "input_file.hpp"
 #include "palpate/error.hpp"
+#include "printable.hpp"
 #include "recording_state.hpp"
 
 namespace palpate {
@@ -158,7 +159,7 @@ std::vector<std::string> Hdf5Contents::texts(const std::string& name) const {
     refuse(fmt::format("attribute '{}' holds no string; store one", name));
   }
   for (const std::string& text : value.strings) {
-    if (!is_printable_utf8(text)) {
+    if (!is_printable(text)) {
       refuse(fmt::format("attribute '{}' is not printable UTF-8 text; store it as such", name));
     }
   }

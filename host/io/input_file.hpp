@@ -13,8 +13,4 @@ namespace palpate {
 /// @throws Error where it is missing, a folder, not a regular file or not readable.
 std::uintmax_t require_readable(const std::filesystem::path& path);
 
-/// True for UTF-8 text without control characters: what may stand in a message, in JSON, on a
-/// picture.
-bool is_printable_utf8(std::string_view text);
-
 }  // namespace palpate

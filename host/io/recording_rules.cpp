@@ -6,6 +6,7 @@
 
 #include "input_file.hpp"
 #include "lost_count.hpp"
+#include "printable.hpp"
 
 namespace palpate {
 
@@ -29,7 +30,7 @@ bool is_finite(const Pose& pose) {
 
 void require_text(const std::filesystem::path& path, std::string_view field,
                   std::string_view text) {
-  if (!is_printable_utf8(text)) {
+  if (!is_printable(text)) {
     refuse(path, fmt::format("{} is not printable UTF-8 text; store it as such", field));
   }
 }

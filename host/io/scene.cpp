@@ -1,124 +1,37 @@
 #include "palpate/scene.hpp"
 
-#include <yaml-cpp/yaml.h>
-
-#include <algorithm>
-#include <functional>
-#include <limits>
-#include <optional>
-#include <set>
-#include <string_view>
+#include <array>
 #include <utility>
 
 #include <fmt/format.h>
 
 #include "element_file.hpp"
 #include "input_file.hpp"
-#include "number_text.hpp"
 #include "palpate/touch.hpp"
+#include "yaml_entry.hpp"
 
 namespace palpate {
 
 namespace {
 
-// A node of the scene with what a message about it has to name.
-struct Entry {
-  const std::filesystem::path& file;
-  std::string key;
-  YAML::Node node;
+using Entry = YamlEntry;
 
-  [[noreturn]] void refuse(std::string_view remedy) const {
-    const bool shown = node.IsScalar() && is_printable_utf8(node.Scalar());
-    const std::string value = shown ? fmt::format(" = '{}'", node.Scalar()) : "";
-    palpate::refuse(file,
-                    fmt::format("line {}: '{}'{}: {}", node.Mark().line + 1, key, value, remedy));
-  }
+std::array<double, 2> read_pair(const Entry& entry, const char* remedy) {
+  const std::vector<Entry> entries = entry.list(2, remedy);
+  return {entries[0].number(), entries[1].number()};
+}
 
-  double number(
-      bool (*fits)(double) = [](double) { return true; },
-      const char* remedy = "give a number") const {
-    // Not yaml-cpp's conversion, which reads 1.500 as 1500 where the locale has decimal commas.
-    const std::optional<double> value = node.IsScalar() ? number_of(node.Scalar()) : std::nullopt;
-    if (!value || !fits(*value)) {
-      refuse(remedy);
-    }
-    return *value;
+std::array<double, 2> read_range(const Entry& entry) {
+  const std::array<double, 2> ends = read_pair(entry, "give [lower, upper]");
+  if (ends[0] > ends[1]) {
+    entry.refuse(fmt::format("[{}, {}] is reversed; write the lower end first", ends[0], ends[1]));
   }
+  return ends;
+}
 
-  int integer(int least) const {
-    // Not yaml-cpp's conversion either, which reads 010 as 8.
-    const auto value = node.IsScalar() ? whole_number_of(node.Scalar()) : std::nullopt;
-    if (!value || *value < least || *value > std::numeric_limits<int>::max()) {
-      refuse(fmt::format("give a whole number from {}", least));
-    }
-    return static_cast<int>(*value);
-  }
-
-  std::string text() const {
-    if (!node.IsScalar() || node.Scalar().empty() || !is_printable_utf8(node.Scalar())) {
-      refuse("give a text");
-    }
-    return node.Scalar();
-  }
-
-  std::vector<Entry> list(const char* remedy) const {
-    if (!node.IsSequence()) {
-      refuse(remedy);
-    }
-    std::vector<Entry> entries;
-    for (const YAML::Node& item : node) {
-      entries.push_back({file, fmt::format("{}[{}]", key, entries.size()), item});
-    }
-    return entries;
-  }
-
-  std::array<double, 2> pair(const char* remedy) const {
-    const std::vector<Entry> entries = list(remedy);
-    if (entries.size() != 2) {
-      refuse(remedy);
-    }
-    return {entries[0].number(), entries[1].number()};
-  }
-
-  std::array<double, 2> range() const {
-    const std::array<double, 2> ends = pair("give [lower, upper]");
-    if (ends[0] > ends[1]) {
-      refuse(fmt::format("[{}, {}] is reversed; write the lower end first", ends[0], ends[1]));
-    }
-    return ends;
-  }
-
-  glm::dvec2 point() const {
-    const std::array<double, 2> xy = pair("give [x, y]");
-    return {xy[0], xy[1]};
-  }
-};
-
-using Readers = std::vector<std::pair<std::string_view, std::function<void(const Entry&)>>>;
-
-// Hands each value of a map to its key's reader.
-void read_keys(const Entry& map, const Readers& readers) {
-  std::string known;
-  for (const auto& [key, reader] : readers) {
-    known += fmt::format("{}{}", known.empty() ? "" : ", ", key);
-  }
-  if (!map.node.IsMap()) {
-    map.refuse(fmt::format("give a map with keys out of {}", known));
-  }
-  std::set<std::string_view> seen;
-  for (const auto& item : map.node) {
-    const Entry name{map.file, map.key, item.first};
-    const auto found = std::find_if(readers.begin(), readers.end(), [&](const auto& entry) {
-      return item.first.IsScalar() && entry.first == item.first.Scalar();
-    });
-    if (found == readers.end()) {
-      name.refuse(fmt::format("unknown key; the keys are {}", known));
-    }
-    if (!seen.insert(found->first).second) {
-      name.refuse("key given twice; remove one");
-    }
-    found->second({map.file, std::string(found->first), item.second});
-  }
+glm::dvec2 read_point(const Entry& entry) {
+  const std::array<double, 2> xy = read_pair(entry, "give [x, y]");
+  return {xy[0], xy[1]};
 }
 
 void read_array(const Entry& array, Scene& scene) {
@@ -134,7 +47,7 @@ void read_array(const Entry& array, Scene& scene) {
   }
   std::vector<glm::dvec2> elements;
   for (const Entry& element : array.list("give 'digitacts', a file or a list of [x, y] in mm")) {
-    elements.push_back(element.point());
+    elements.push_back(read_point(element));
   }
   if (elements.empty()) {
     array.refuse("give at least one [x, y] in mm");
@@ -167,10 +80,10 @@ std::vector<Scene::Object> read_objects(const Entry& entry) {
 
 Scene::Region read_region(const Entry& entry) {
   Scene::Region region;
-  read_keys(entry, {{"x_mm", [&](const Entry& e) { region.x_mm = e.range(); }},
-                    {"y_mm", [&](const Entry& e) { region.y_mm = e.range(); }},
-                    {"theta_deg", [&](const Entry& e) { region.theta_deg = e.range(); }},
-                    {"pivot_mm", [&](const Entry& e) { region.pivot_mm = e.point(); }}});
+  read_keys(entry, {{"x_mm", [&](const Entry& e) { region.x_mm = read_range(e); }},
+                    {"y_mm", [&](const Entry& e) { region.y_mm = read_range(e); }},
+                    {"theta_deg", [&](const Entry& e) { region.theta_deg = read_range(e); }},
+                    {"pivot_mm", [&](const Entry& e) { region.pivot_mm = read_point(e); }}});
   return region;
 }
 
@@ -179,20 +92,8 @@ void read_bins(const Entry& entry, Scene& scene) {
     scene.auto_bins = true;
     return;
   }
-  constexpr const char* remedy = "give the counts of bins [x, y, theta], or auto";
-  const std::vector<Entry> counts = entry.list(remedy);
-  if (counts.size() != 3) {
-    entry.refuse(remedy);
-  }
+  const std::vector<Entry> counts = entry.list(3, "give the counts of bins [x, y, theta], or auto");
   scene.bins = {counts[0].integer(1), counts[1].integer(1), counts[2].integer(1)};
-}
-
-std::string read_filter(const Entry& entry) {
-  std::string filter = entry.text();
-  if (filter != "auto" && filter != "histogram" && filter != "bounded" && filter != "particles") {
-    entry.refuse("give auto, histogram, bounded or particles");
-  }
-  return filter;
 }
 
 }  // namespace
@@ -225,10 +126,16 @@ Scene read_scene(const std::filesystem::path& path) {
          {"none",
           [&](const Entry& e) { scene.none = e.number(positive, "give a number above 0"); }},
          {"bins", [&](const Entry& e) { read_bins(e, scene); }},
-         {"filter", [&](const Entry& e) { scene.filter = read_filter(e); }},
+         {"filter",
+          [&](const Entry& e) {
+            scene.filter = e.one_of<std::string>({{"auto", "auto"},
+                                                  {"histogram", "histogram"},
+                                                  {"bounded", "bounded"},
+                                                  {"particles", "particles"}});
+          }},
          {"device", [&](const Entry& e) { scene.device = e.text(); }}});
   } catch (const YAML::Exception& error) {
-    refuse(path, fmt::format("line {}: {}; correct the YAML", error.mark.line + 1, error.msg));
+    refuse(path, fmt::format("line {}: {}; correct the YAML", line_of(error.mark), error.msg));
   }
   return scene;
 }

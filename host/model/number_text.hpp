@@ -33,11 +33,12 @@ inline std::optional<double> number_of(std::string_view text) {
   return whole && std::isfinite(number) ? std::optional(number) : std::nullopt;
 }
 
-/// The whole decimal number that all of the text is, if it is one: "010" is 10.
-inline std::optional<std::int64_t> whole_number_of(std::string_view text) {
+/// The whole number, decimal unless another base is given, that all of the text is, if it is one:
+/// "010" is 10.
+inline std::optional<std::int64_t> whole_number_of(std::string_view text, int base = 10) {
   text = detail::without_plus(text);
   std::int64_t number = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number, base);
   const bool whole = error == std::errc{} && end == text.data() + text.size();
   return whole ? std::optional(number) : std::nullopt;
 }

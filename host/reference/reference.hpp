@@ -10,29 +10,57 @@
 #include "palpate/lattice.hpp"
 #include "palpate/occupancy_grid.hpp"
 #include "palpate/pose.hpp"
+#include "palpate/pose_error.hpp"
 #include "palpate/sensor_model.hpp"
 #include "palpate/touch.hpp"
 
-/// Every equation once more, written plainly in float64 from Pezzementi, Reyda and Hager (ICRA
-/// 2011), to measure the product against. It shares the product's data types and none of its
-/// functions. Units and frames are those of the types; nothing is checked.
+/// The method of Pezzementi, Reyda and Hager (ICRA 2011) in plain float64 and in the paper's order.
+/// Read this page first; every kernel is tested against it. It shares the product's data types,
+/// with their units and frames, and none of the product's functions. It checks nothing.
+///
+///   e, e_max    pressure of an element; largest pressure of the touch
+///   T, ratio    thresholds of the contact classifier
+///   m           prior probability that a cell is occupied, the paper's p(m)
+///   p, l        probability that a cell is occupied; its log odds, in nats
+///   a, s        peak and standard deviation of G', the sensor's inverse point spread
+///   gamma       probability that an element is classified at random
+///   C, x        object and pose (x, y, theta) of a hypothesis; the pose is T_object_robot
+///   w           weight of a particle
+///   p_k         probability of bin k of the histogram
 namespace palpate::reference {
 
 /// p_a = R(theta) p_b + t, in mm.
 glm::dvec2 transform(const Pose& T_a_b, const glm::dvec2& p_b);
 
+/// p_b = R(-theta) (p_a - t), in mm.
+glm::dvec2 transform_back(const Pose& T_a_b, const glm::dvec2& p_a);
+
+// --- contact.cpp: Eq. 3 ---
+// In Contact: e > T and e > ratio e_max. No Contact: e < T and e < ratio e_max. Unknown: otherwise.
+
 /// Eq. 3: the class of every element, [e].
 std::vector<Reading> classify(const Touch& touch, const ContactClassifier& classifier);
 
-/// Eq. 4-6: log-odds increment in nats of a cell at this distance from an element's centre.
+// --- map.cpp: Eq. 1, 2, 4-6 ---
+// At a distance d from an element, G'(d) = a exp(-d^2 / (2 s^2)) (Eq. 4). The element alone makes
+// p = m + (1 - m) G' In Contact, p = m - m G' with No Contact and p = m where Unknown (Eq. 5).
+
+/// Eq. 1: l = log(p / (1 - p)).
+double logit(double p);
+
+/// Eq. 6: logit(p) - logit(m), what one element adds to the log odds of a cell at this distance.
 double increment(Reading reading, double distance_mm, const InverseSensorModel& sensor);
 
-/// Eq. 4-6: log odds of every cell of a grid, [ny, nx], of which only the geometry is read: the
-/// prior and the increments of all elements, with no Gaussian cut off. The object frame is the
+/// Eq. 2 and 6: log odds of every cell, [ny, nx]: logit(m) plus the increments of all elements. No
+/// Gaussian is cut off. The function reads the geometry of `grid` alone. The object frame is the
 /// touches' robot frame.
 std::vector<double> log_odds_map(std::span<const Touch> touches, const OccupancyGrid& grid,
                                  const ContactClassifier& classifier,
                                  const InverseSensorModel& sensor);
+
+// --- likelihood.cpp: Eq. 7 ---
+// In Contact: gamma m + (1 - gamma) p. No Contact: gamma m + (1 - gamma) (1 - p). Unknown: 1. The
+// elements of a touch multiply, and so do touches.
 
 /// Bilinear interpolation of the map's log odds; every cell beyond the map holds the prior's.
 double interpolate(const OccupancyGrid& map, double prior, const glm::dvec2& p_object_mm);
@@ -44,7 +72,37 @@ double log_likelihood(Reading reading, double log_odds, const ContactLikelihood&
 double log_likelihood(const Touch& touch, const Pose& T_object_robot, const OccupancyGrid& map,
                       const ContactClassifier& classifier, const ContactLikelihood& model);
 
-/// The pose of a bin: p_o = R(theta) (p_r - pivot) + (x, y) at the bin's centroid.
+// --- particles.cpp: Eq. 8-12 ---
+
+/// A hypothesis (C, x, y, theta) with its weight.
+struct Particle {
+  int object = 0;
+  Pose pose;
+  double weight = 0.0;
+};
+
+/// Weights of particles, proportional to the likelihoods of Eq. 7, which are given in nats. The
+/// weights sum to 1.
+std::vector<double> importance_weights(std::span<const double> log_likelihoods);
+
+/// Eq. 8-9: summed weight of the particles of every object, [objects].
+std::vector<double> identity(std::span<const Particle> particles, int objects);
+
+/// Eq. 10: max(0, 1 - d / rho) with d^2 = dx^2 + dy^2 + dtheta^2 and rho = 1 mm and 1 rad. dtheta
+/// is at most half a turn.
+double cone(const Pose& a, const Pose& b);
+
+/// Eq. 11: Parzen density of one object at a pose, the sum of w cone over the object's particles.
+double parzen(std::span<const Particle> particles, int object, const Pose& pose);
+
+/// Eq. 12: the largest Parzen density of any object on a grid of 0.5 mm by 0.04 pi rad about the
+/// origin, within `extent_mm` of it in x and y.
+double largest_parzen(std::span<const Particle> particles, int objects, double extent_mm);
+
+// --- histogram.cpp: Eq. 13-16 ---
+// Every touch multiplies p_k by its likelihood at the bin's centroid (Eq. 13).
+
+/// The pose of a bin's centroid (x, y, theta): p_o = R(theta) (p_r - pivot) + (x, y).
 Pose bin_pose(const PoseLattice& lattice, std::int64_t bin);
 
 /// Eq. 13 in logs: the touches' log-likelihood at every bin, [theta, y, x], in nats.
@@ -74,8 +132,14 @@ std::vector<double> marginal_xy(const Posterior& posterior, int object);
 /// Probability of every theta of one object, [ntheta].
 std::vector<double> marginal_theta(const Posterior& posterior, int object);
 
-/// Eq. 17-20 of Chirikjian and Zhou 1998: root mean squared displacement in mm of the map's
-/// occupied cells between two poses, with the turn wrapped by the map's symmetry.
+// --- pose_error.cpp: Eq. 17-20 ---
+
+/// Centroid and mean squared distance from it, J, of the map's cells with log odds > 0.
+Body body_of(const OccupancyGrid& map);
+
+/// Eq. 17-20 (Chirikjian and Zhou 1998): root mean squared displacement of the body between two
+/// poses, sqrt(|centroid difference|^2 + 2 J (1 - cos dtheta)), in mm. The map's symmetry wraps
+/// dtheta.
 double pose_error_mm(const OccupancyGrid& map, const Pose& T_object_robot_estimate,
                      const Pose& T_object_robot_truth);
 

@@ -1,6 +1,5 @@
 #include "pose_reader.hpp"
 
-#include <fcntl.h>
 #include <fmt/format.h>
 #include <poll.h>
 #include <sys/stat.h>
@@ -17,19 +16,6 @@
 namespace palpate {
 
 namespace {
-
-// The descriptor of a file, never one of standard input, output and error: a daemon may have closed
-// those, and the number 0 stands for poses from standard input here.
-int open_poses(const std::string& path) {
-  // Without waiting for whoever writes to a FIFO.
-  const int descriptor = ::open(path.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC);
-  if (descriptor < 0 || descriptor > STDERR_FILENO) {
-    return descriptor;
-  }
-  const int moved = ::fcntl(descriptor, F_DUPFD_CLOEXEC, STDERR_FILENO + 1);
-  ::close(descriptor);
-  return moved;
-}
 
 // Far longer than any pose; what never ends a line must not fill the memory.
 constexpr std::size_t longest_line = 4096;
@@ -50,7 +36,10 @@ std::optional<double> number(const nlohmann::json& line, const char* key) {
 
 PoseReader::PoseReader(const std::string& name, PoseTrack& track, PosedSensor::Complaint complain)
     : name_(name == "-" ? "standard input" : name), track_(track), complain_(std::move(complain)) {
-  descriptor_ = name == "-" ? STDIN_FILENO : open_poses(name);
+  if (name != "-") {
+    file_ = Descriptor(name, O_RDONLY | O_NONBLOCK);  // not waiting for the writer of a FIFO
+  }
+  descriptor_ = name == "-" ? STDIN_FILENO : file_.get();
   struct stat status {};
   if (descriptor_ < 0 || ::fstat(descriptor_, &status) != 0) {
     throw Error(Fault::input, fmt::format("poses {}: cannot be read: {}; give a file, a FIFO or "
@@ -58,25 +47,11 @@ PoseReader::PoseReader(const std::string& name, PoseTrack& track, PosedSensor::C
                                           name, std::strerror(errno)));
   }
   if (S_ISDIR(status.st_mode)) {
-    ::close(descriptor_);
     throw Error(Fault::input, fmt::format("poses {}: is a folder; name a file in it", name));
   }
   is_file_ = S_ISREG(status.st_mode);
   is_fifo_ = S_ISFIFO(status.st_mode) && descriptor_ != STDIN_FILENO;
-  if (is_file_) {
-    try {
-      while (read_some()) {
-      }
-    } catch (...) {
-      ::close(descriptor_);  // no destructor runs
-      throw;
-    }
-  }
-}
-
-PoseReader::~PoseReader() {
-  if (descriptor_ != STDIN_FILENO) {
-    ::close(descriptor_);
+  while (is_file_ && read_some()) {
   }
 }
 
@@ -134,7 +109,6 @@ void PoseReader::end_line() {
   ++lines_;
   const std::string text = std::exchange(line_, {});
   if (std::exchange(overlong_, false)) {
-    ++malformed_;
     refuse_line(Flaw::too_long, lines_, "is longer than any pose");
     return;
   }
@@ -143,7 +117,6 @@ void PoseReader::end_line() {
   }
   const nlohmann::json line = nlohmann::json::parse(text, nullptr, false);
   if (!line.is_object()) {
-    ++malformed_;
     refuse_line(Flaw::no_json, lines_, "is no JSON object");
     return;
   }
@@ -152,7 +125,6 @@ void PoseReader::end_line() {
   const auto y = number(line, "y_mm");
   const auto theta = number(line, "theta_rad");
   if (!time || !x || !y || !theta) {
-    ++malformed_;
     refuse_line(Flaw::no_number, lines_,
                 fmt::format("has no number '{}'", !time ? "time"
                                                   : !x  ? "x_mm"
@@ -162,7 +134,6 @@ void PoseReader::end_line() {
   }
   const Pose T_robot_sensor{{*x, *y}, *theta};
   if (!is_robot_pose(T_robot_sensor)) {
-    ++malformed_;
     refuse_line(Flaw::far_away, lines_,
                 fmt::format("x_mm = {}, y_mm = {}, theta_rad = {}: no robot is further away than "
                             "1e9 mm, or has turned by more than 1e9 rad",
@@ -208,6 +179,7 @@ void PoseReader::refuse_line(Flaw flaw, std::uint64_t line, std::string_view pro
   if (is_file_) {
     throw Error(Fault::input, text);
   }
+  malformed_ += flaw < Flaw::out_of_order ? 1 : 0;  // the track counts the others
   if (first_refused_.empty() &&
       flaw != Flaw::clock_set_back) {  // those poses have joined the track
     first_refused_ = text;

@@ -5,6 +5,7 @@
 #include <string>
 #include <string_view>
 
+#include "descriptor.hpp"
 #include "palpate/pose_track.hpp"
 
 namespace palpate {
@@ -16,7 +17,6 @@ class PoseReader {
   /// @param complain called for the first refused line of each kind; may be empty
   /// @throws Error where `name` cannot be read, or a line of a file is refused
   PoseReader(const std::string& name, PoseTrack& track, PosedSensor::Complaint complain);
-  ~PoseReader();
   PoseReader(const PoseReader&) = delete;
   PoseReader& operator=(const PoseReader&) = delete;
 
@@ -47,7 +47,8 @@ class PoseReader {
   std::string name_;
   PoseTrack& track_;
   PosedSensor::Complaint complain_;
-  int descriptor_ = -1;
+  Descriptor file_;      ///< none for standard input
+  int descriptor_ = -1;  ///< its number
   bool is_file_ = false;
   bool is_fifo_ = false;
   bool ended_ = false;

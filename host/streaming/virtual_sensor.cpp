@@ -66,60 +66,35 @@ class SourceName {
 
   template <typename Number>
   std::optional<Number> number(std::string_view key, Number least, Number most) const {
-    const auto found = options_.find(key);
-    if (found == options_.end()) {
-      return {};
-    }
-    return parse<Number>(key, found->second, least, most);
+    const auto text = option(key);
+    return text ? std::optional(parse<Number>(key, *text, least, most)) : std::nullopt;
   }
 
   std::optional<double> speed() const {
-    const auto found = options_.find("speed");
-    if (found == options_.end()) {
-      return 1.0;
-    }
-    if (found->second == "max") {
-      return {};
-    }
-    return parse(found->first, found->second, 1e-3, 1e6);
+    const std::string_view text = option("speed").value_or("1");
+    return text == "max" ? std::nullopt : std::optional(parse("speed", text, 1e-3, 1e6));
   }
 
   std::optional<Pose> object_pose(std::uint64_t seed) const {
-    const auto found = options_.find("object");
-    if (found == options_.end()) {
-      return {};
+    const auto text = option("object");
+    if (!text || *text == "random") {
+      return text ? std::optional(random_object_pose(seed)) : std::nullopt;
     }
-    const std::string_view text = found->second;
-    if (text == "random") {
-      return random_object_pose(seed);
-    }
-    const std::size_t first = text.find(':');
-    const std::size_t second = text.find(':', first == text.npos ? first : first + 1);
-    if (second == text.npos) {
-      refuse("object", "must be random, or X:Y:DEG in mm and degrees");
-    }
-    constexpr double far_mm = 1e6;
-    constexpr double far_deg = 1e6;
-    const double x = parse("object", text.substr(0, first), -far_mm, far_mm);
-    const double y = parse("object", text.substr(first + 1, second - first - 1), -far_mm, far_mm);
-    const double deg = parse("object", text.substr(second + 1), -far_deg, far_deg);
-    return Pose{{x, y}, deg * std::numbers::pi / 180.0};
+    const auto [x, y, deg] = three("object", *text, "must be random, or X:Y:DEG in mm and degrees");
+    constexpr double far = 1e6;  // in mm and in degrees
+    return Pose{{parse("object", x, -far, far), parse("object", y, -far, far)},
+                parse("object", deg, -far, far) * std::numbers::pi / 180.0};
   }
 
   std::vector<glm::dvec2> array() const {
-    const auto found = options_.find("array");
-    if (found == options_.end()) {
+    const auto text = option("array");
+    if (!text) {
       return {};
     }
-    const std::string_view text = found->second;
-    const std::size_t first = text.find(':');
-    const std::size_t second = text.find(':', first == text.npos ? first : first + 1);
-    if (second == text.npos) {
-      refuse("array", "must be COLUMNS:ROWS:PITCH, the pitch in mm");
-    }
-    const int columns = parse("array", text.substr(0, first), 1, 64);
-    const int rows = parse("array", text.substr(first + 1, second - first - 1), 1, 64);
-    const double pitch_mm = parse("array", text.substr(second + 1), 0.01, 100.0);
+    const auto parts = three("array", *text, "must be COLUMNS:ROWS:PITCH, the pitch in mm");
+    const int columns = parse("array", parts[0], 1, 64);
+    const int rows = parse("array", parts[1], 1, 64);
+    const double pitch_mm = parse("array", parts[2], 0.01, 100.0);
     std::vector<glm::dvec2> elements_mm;
     for (int row = 0; row < rows; ++row) {
       for (int column = 0; column < columns; ++column) {
@@ -133,6 +108,23 @@ class SourceName {
  private:
   [[noreturn]] void refuse(std::string_view key, std::string_view message) const {
     throw Error(Fault::input, fmt::format("sensor {}: {} {}", name_, key, message));
+  }
+
+  std::optional<std::string_view> option(std::string_view key) const {
+    const auto found = options_.find(key);
+    return found == options_.end() ? std::nullopt : std::optional(found->second);
+  }
+
+  /// The parts of A:B:C.
+  std::array<std::string_view, 3> three(std::string_view key, std::string_view text,
+                                        std::string_view remedy) const {
+    const std::size_t first = text.find(':');
+    const std::size_t second = text.find(':', first == text.npos ? first : first + 1);
+    if (second == text.npos) {
+      refuse(key, remedy);
+    }
+    return {text.substr(0, first), text.substr(first + 1, second - first - 1),
+            text.substr(second + 1)};
   }
 
   template <typename Number>

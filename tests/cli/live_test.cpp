@@ -76,14 +76,7 @@ class Live : public ProgramTest {
 
   /// The program while it recognises, once its table has begun.
   pid_t start(const Arguments& arguments) const {
-    const pid_t pid = ::fork();
-    if (pid == 0) {
-      if (::chdir(folder_.path().c_str()) != 0 || std::freopen("said", "w", stdout) == nullptr ||
-          std::freopen("complained", "w", stderr) == nullptr) {
-        ::_exit(126);
-      }
-      become_program(arguments);
-    }
+    const pid_t pid = ProgramTest::start(arguments);
     while (bytes_of(folder_ / "said").find("latency ms") == std::string::npos) {
       if (::waitpid(pid, nullptr, WNOHANG) != 0) {
         ADD_FAILURE() << "it has ended: " << bytes_of(folder_ / "complained");

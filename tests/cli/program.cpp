@@ -176,6 +176,18 @@ std::map<std::string, std::string> content_of(const std::filesystem::path& folde
   return content;
 }
 
+pid_t ProgramTest::start(const std::vector<std::string>& arguments) const {
+  const pid_t pid = require_process(::fork(), "fork");
+  if (pid == 0) {
+    if (::chdir(folder_.path().c_str()) != 0 || std::freopen("said", "w", stdout) == nullptr ||
+        std::freopen("complained", "w", stderr) == nullptr) {
+      ::_exit(126);
+    }
+    become_program(arguments);
+  }
+  return pid;
+}
+
 std::string ProgramTest::done(const std::vector<std::string>& arguments) const {
   const Outcome outcome = palpate(arguments);
   EXPECT_EQ(outcome.status, 0) << outcome.err;

@@ -76,6 +76,8 @@ class ProgramTest : public testing::Test {
                   const Surroundings& surroundings = {}) const {
     return run_program(folder_.path(), arguments, surroundings);
   }
+  /// Starts the program, whose output goes to the files "said" and "complained".
+  pid_t start(const std::vector<std::string>& arguments) const;
   /// Standard output of a run that has to go well and say nothing else.
   std::string done(const std::vector<std::string>& arguments) const;
   /// The records of `recognize` with these arguments, as `--json -` prints them.

@@ -30,15 +30,7 @@ class RecordCommand : public ProgramTest {
               const std::vector<std::string>& more = {}) const {
     std::vector<std::string> arguments{"record", "--sensor", sensor, "-o", file};
     arguments.insert(arguments.end(), more.begin(), more.end());
-    const pid_t pid = ::fork();
-    if (pid == 0) {
-      if (::chdir(folder_.path().c_str()) != 0 || std::freopen("said", "w", stdout) == nullptr ||
-          std::freopen("complained", "w", stderr) == nullptr) {
-        ::_exit(126);
-      }
-      become_program(arguments);
-    }
-    return pid;
+    return ProgramTest::start(arguments);
   }
 
   static int end(pid_t pid, int signal) {

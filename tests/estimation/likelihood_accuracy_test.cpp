@@ -1,5 +1,4 @@
 #include <cmath>
-#include <numbers>
 
 #include <gtest/gtest.h>
 
@@ -8,11 +7,6 @@
 
 namespace palpate {
 namespace {
-
-constexpr double two_pi = 2.0 * std::numbers::pi;
-
-// What the method allows a log-likelihood to differ from float64, in nats per touch.
-constexpr double per_touch = 1e-4;
 
 HistogramOptions small_options() {
   HistogramOptions options;

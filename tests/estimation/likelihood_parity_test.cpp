@@ -1,6 +1,5 @@
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include <gtest/gtest.h>
 
@@ -9,11 +8,6 @@
 
 namespace palpate {
 namespace {
-
-constexpr double two_pi = 2.0 * std::numbers::pi;
-
-// What the method allows a log-likelihood to differ from float64, in nats per touch.
-constexpr double per_touch = 1e-4;
 
 // As steep as maps of some hundred touches are from cell to cell.
 constexpr double steepness = 12.0;

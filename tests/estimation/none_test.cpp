@@ -16,7 +16,6 @@
 namespace palpate {
 namespace {
 
-constexpr double two_pi = 6.283185307179586;
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 constexpr double infinity = std::numeric_limits<double>::infinity();
 
@@ -217,25 +216,24 @@ TEST(NoneOfThese, WeighsParticlesByThePriorWhateverTheCellsOfTheMaps) {
     ParticleFilter filter(device, objects, options);
     const Touch touch = recording.touch(0);
     filter.update(touch);
-    std::vector<double> expected;
+    std::vector<double> logs;
     std::vector<double> weights;
-    double total = 0.0;
     int none = 0;
     for (const ParticleFilter::Particle& particle : filter.particles()) {
       const bool is_none = particle.object == 1;
       none += is_none ? 1 : 0;
       const OccupancyGrid unseen{
           .nx = 1, .ny = 1, .log_odds = {static_cast<float>(objects[0].map.prior_log_odds())}};
-      expected.push_back(std::exp(reference::log_likelihood(
+      logs.push_back(reference::log_likelihood(
           touch, particle.T_object_robot, is_none ? unseen : objects[0].map, options.classifier,
-          {.gamma = options.gamma, .prior = objects[0].map.prior})));
+          {.gamma = options.gamma, .prior = objects[0].map.prior}));
       weights.push_back(particle.weight);
-      total += expected.back();
     }
+    const std::vector<double> expected = reference::importance_weights(logs);
     EXPECT_GT(none, 200) << "half of the particles begin there";
     for (std::size_t i = 0; i < weights.size(); ++i) {
       // 1e-4 nats on either side.
-      EXPECT_NEAR(weights[i], expected[i] / total, 2e-4 * expected[i] / total);
+      EXPECT_NEAR(weights[i], expected[i], 2e-4 * expected[i]);
     }
   }
 }

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <numbers>
 #include <span>
 #include <string>
 #include <vector>
@@ -11,6 +12,11 @@
 #include "reference.hpp"
 
 namespace palpate {
+
+inline constexpr double two_pi = 2.0 * std::numbers::pi;
+
+/// What the method allows a log-likelihood to differ from float64, in nats per touch.
+inline constexpr double per_touch = 1e-4;
 
 /// Numbers spread evenly over [lower, upper), the same on every standard library.
 class Uniform {

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -225,6 +226,25 @@ TEST(FrozenValues, OfTheHistogramFilter) {
   }
 }
 
+TEST(FrozenValues, OfWeightsAndTheParzenDensity) {
+  const double logs[] = {-1.2, -3.4, 0.7};
+  const double weights[] = {0.1282594313, 0.01421155007, 0.8575290187};
+  const std::vector<double> weighed = reference::importance_weights(logs);
+  for (const int i : {0, 1, 2}) {
+    EXPECT_NEAR(weighed[i], weights[i], digits);
+  }
+  // The first two lie on either side of half a turn.
+  const std::vector<reference::Particle> particles{
+      {0, {{0.1, -0.2}, 3.0}, 0.5}, {0, {{0.3, 0.1}, -3.1}, 0.3}, {1, {{0.6, 0.0}, 0.5}, 0.2}};
+  EXPECT_EQ(reference::identity(particles, 3), (std::vector<double>{0.8, 0.2, 0.0}));
+  EXPECT_NEAR(reference::cone(particles[0].pose, particles[1].pose), 0.5955783676, digits);
+  EXPECT_NEAR(reference::parzen(particles, 0, {{0.5, 0.0}, std::numbers::pi}), 0.4972207174,
+              digits);
+  EXPECT_NEAR(reference::parzen(particles, 1, {{0.5, 0.0}, 0.16 * std::numbers::pi}), 0.1799929531,
+              digits);
+  EXPECT_NEAR(reference::largest_parzen(particles, 2, 2.0), 0.580592629, digits);
+}
+
 TEST(FrozenValues, OfParticlesAtOnePose) {
   // All particles have one pose, which no noise moves; a third of them are of the first object.
   const ParticleOptions wanted{
@@ -258,6 +278,9 @@ TEST(FrozenValues, OfThePoseError) {
   EXPECT_NEAR(body.inertia_mm2, 0.8881632653, digits);
   EXPECT_NEAR(body.centroid_mm.x, -0.4571428571, digits);
   EXPECT_NEAR(body.centroid_mm.y, 0.0, digits);
+  const Body plain = reference::body_of(map);
+  EXPECT_NEAR(plain.inertia_mm2, body.inertia_mm2, digits);
+  EXPECT_NEAR(plain.centroid_mm.x, body.centroid_mm.x, digits);
   const Pose estimate{{0.5, -0.3}, 2.9};
   const Pose truth{{-0.2, 0.4}, -0.5};
   for (const auto& [symmetry, error_mm] : {std::pair(1, 2.175934927), std::pair(2, 1.140172902),

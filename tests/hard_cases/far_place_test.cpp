@@ -1,5 +1,4 @@
 #include <cmath>
-#include <numbers>
 
 #include <gtest/gtest.h>
 
@@ -7,8 +6,6 @@
 
 namespace palpate {
 namespace {
-
-constexpr double two_pi = 2.0 * std::numbers::pi;
 
 /// Bins of 0.1 mm.
 HistogramOptions fine_options() {

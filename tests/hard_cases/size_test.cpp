@@ -1,4 +1,3 @@
-#include <numbers>
 
 #include <gtest/gtest.h>
 
@@ -6,8 +5,6 @@
 
 namespace palpate {
 namespace {
-
-constexpr double two_pi = 2.0 * std::numbers::pi;
 
 HistogramOptions small_options() {
   HistogramOptions options;

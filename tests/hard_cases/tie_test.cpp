@@ -1,7 +1,6 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
-#include <numbers>
 
 #include <gtest/gtest.h>
 
@@ -9,8 +8,6 @@
 
 namespace palpate {
 namespace {
-
-constexpr double two_pi = 2.0 * std::numbers::pi;
 
 HistogramOptions symmetric_options() {
   HistogramOptions options;

@@ -13,6 +13,7 @@
 #include <functional>
 
 #include "file_parts.hpp"
+#include "numbered_frames.hpp"
 #include "palpate/files.hpp"
 #include "palpate/frame_recorder.hpp"
 #include "recording_state.hpp"
@@ -43,24 +44,13 @@ class ObeyedPermissions {
 
 class RecordingClosing : public testing::Test {
  protected:
-  static SensorDescription sensor() {
-    SensorDescription sensor;
-    sensor.elements_mm.assign(elements, {0.5, 1.5});
-    return sensor;
-  }
-
-  static Frame frame(std::size_t i) {
-    return {.host_time_s = 1.7e9 + static_cast<double>(i),
-            .values = std::vector<double>(elements, static_cast<double>(i))};
-  }
-
   // A recording of so many frames whose recorder ended without closing it.
   void cut_off(std::size_t frames) {
     const pid_t pid = ::fork();
     if (pid == 0) {
-      FrameRecorder recorder(path_, sensor());
+      FrameRecorder recorder(path_, sensor_of(elements));
       for (std::size_t i = 0; i < frames; ++i) {
-        recorder.add(frame(i));
+        recorder.add(frame_of(i, elements));
         if (i % 100 == 0) {
           recorder.flush();
         }
@@ -94,10 +84,7 @@ class RecordingClosing : public testing::Test {
   void expect_frames(std::size_t frames) const {
     const Recording recording = read_recording(path_);
     ASSERT_EQ(recording.size(), frames);
-    for (std::size_t i = 0; i < frames; ++i) {
-      ASSERT_EQ(recording.time_s[i], frame(i).host_time_s);
-      ASSERT_EQ(recording.pressure[i * elements + 7], static_cast<double>(i));
-    }
+    expect_prefix(recording, elements);
   }
 
   ScratchFolder folder_;
@@ -150,12 +137,12 @@ TEST_F(RecordingClosing, KeepsWholeRowsOnly) {
 
 // The recorder was killed within the one write of the baseline.
 TEST_F(RecordingClosing, ABaselineThatIsHalfWrittenWasNotTaken) {
-  SensorDescription with_baseline = sensor();
+  SensorDescription with_baseline = sensor_of(elements);
   with_baseline.valid.assign(elements, 1);
   with_baseline.valid[3] = 0;
   with_baseline.baseline.assign(elements, 1.0);
   FrameRecorder recorder(path_, with_baseline);
-  recorder.add(frame(0));
+  recorder.add(frame_of(0, elements));
   recorder.close();
   const auto unwrite = [&](std::size_t first, std::size_t end) {
     edit(path_, [&](hid_t file) {
@@ -180,9 +167,9 @@ TEST_F(RecordingClosing, ABaselineThatIsHalfWrittenWasNotTaken) {
 }
 
 TEST_F(RecordingClosing, WhileItIsRecordedIsRefusedAndCostsNothing) {
-  FrameRecorder recorder(path_, sensor());
+  FrameRecorder recorder(path_, sensor_of(elements));
   for (std::size_t i = 0; i < 500; ++i) {
-    recorder.add(frame(i));
+    recorder.add(frame_of(i, elements));
   }
   recorder.flush();
   EXPECT_EQ(recorder_of(path_), Recorder::there);
@@ -201,7 +188,7 @@ TEST_F(RecordingClosing, WhileItIsRecordedIsRefusedAndCostsNothing) {
   ::waitpid(pid, &status, 0);
   EXPECT_EQ(status, 0);
   for (std::size_t i = 500; i < 1000; ++i) {
-    recorder.add(frame(i));
+    recorder.add(frame_of(i, elements));
   }
   recorder.close();
   expect_frames(1000);
@@ -210,11 +197,11 @@ TEST_F(RecordingClosing, WhileItIsRecordedIsRefusedAndCostsNothing) {
 
 // The process that records finds the file open in its own HDF5 library.
 TEST_F(RecordingClosing, RecordingProcessKnowsThatItsFileIsNotClosed) {
-  FrameRecorder recorder(path_, sensor());
-  recorder.add(frame(0));
+  FrameRecorder recorder(path_, sensor_of(elements));
+  recorder.add(frame_of(0, elements));
   recorder.flush();
   EXPECT_FALSE(read_recording(path_).closed);
-  recorder.add(frame(1));
+  recorder.add(frame_of(1, elements));
   recorder.close();
   EXPECT_TRUE(read_recording(path_).closed);
   expect_frames(2);

@@ -1,6 +1,7 @@
 #include "press.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 namespace palpate {
 
@@ -9,6 +10,16 @@ double press(double time_s, double begin_s, double steady_s) {
   const double into = (time_s - begin_s) / ramp_s;
   const double out = (begin_s + 2.0 * ramp_s + steady_s - time_s) / ramp_s;
   return std::clamp(std::min(into, out), 0.0, 1.0);
+}
+
+Pressures presses_of(const std::vector<double>& pattern) {
+  return [pattern](double time_s) {
+    std::vector<double> values = pattern;
+    for (double& value : values) {
+      value *= press(std::fmod(time_s, 1.0), 0.3, 0.4);
+    }
+    return values;
+  };
 }
 
 std::vector<Frame> Stream::frames(double seconds, const Pressures& pressures) const {

@@ -15,6 +15,9 @@ using Pressures = std::function<std::vector<double>(double time_s)>;
 /// then back in another 0.1 s.
 double press(double time_s, double begin_s, double steady_s);
 
+/// The pattern pressed every second from 0.3 s on, for 0.4 s each.
+Pressures presses_of(const std::vector<double>& pattern);
+
 /// A stream of frames with Gaussian noise, from 1.7e9 s on.
 struct Stream {
   double rate_hz = 100.0;

@@ -16,15 +16,7 @@ namespace {
 
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 const std::vector<double> pattern = {12.0, 6.0, 0.0, 3.0};
-
-// The pattern pressed every second from 0.5 s on, for half a second each.
-std::vector<double> presses(double time_s) {
-  std::vector<double> values = pattern;
-  for (double& value : values) {
-    value *= press(std::fmod(time_s, 1.0), 0.3, 0.4);
-  }
-  return values;
-}
+const Pressures presses = presses_of(pattern);
 
 // Five standard errors of the interquartile mean, 0.3 / sqrt(0.84 n), of 30 frames or more.
 constexpr double mean_tolerance = 0.3;

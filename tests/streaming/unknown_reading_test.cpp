@@ -17,15 +17,7 @@ namespace {
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 constexpr double infinity = std::numeric_limits<double>::infinity();
 const std::vector<double> pattern = {20.0, 6.0, 0.0, 3.0};
-
-// The pattern pressed every second from 0.3 s on, for 0.4 s each.
-std::vector<double> presses(double time_s) {
-  std::vector<double> values = pattern;
-  for (double& value : values) {
-    value *= press(std::fmod(time_s, 1.0), 0.3, 0.4);
-  }
-  return values;
-}
+const Pressures presses = presses_of(pattern);
 
 void expect_same(const DetectedTouch& touch, const DetectedTouch& expected) {
   EXPECT_EQ(touch.begin_s, expected.begin_s);

@@ -5,7 +5,6 @@
 #include <fmt/format.h>
 
 #include "bordered_map.hpp"
-#include "contact_evidence.hpp"
 #include "interface.h"
 #include "palpate/error.hpp"
 
@@ -47,13 +46,6 @@ gpu::Access access_of(const gpu::Context& context, const OccupancyGrid& map) {
 
 std::size_t axis_bins(const PoseLattice& lattice) {
   return static_cast<std::size_t>(lattice.x_mm.count) + lattice.y_mm.count;
-}
-
-void append_axis(std::vector<shaders::Split>& axes, const Axis& axis_mm, double origin_mm,
-                 double cell_mm) {
-  for (int i = 0; i < axis_mm.count; ++i) {
-    axes.push_back(split_axis((axis_mm.centre(i) - origin_mm) / cell_mm + shaders::MAP_BORDER));
-  }
 }
 
 std::uint64_t cell_bytes(gpu::Access access) {
@@ -122,8 +114,8 @@ MapTable::MapTable(gpu::Context& context, gpu::CommandStream& stream, const MapG
                       .map_height = bordered(map.ny),
                       .first_axis = static_cast<shaders::uint>(axes.size()),
                       .first_bin = static_cast<shaders::uint>(slab->first_bin(object))});
-    append_axis(axes, lattice.x_mm, map.origin_mm.x, map.cell_mm);
-    append_axis(axes, lattice.y_mm, map.origin_mm.y, map.cell_mm);
+    const std::vector<shaders::Split> own_axes = axes_in_cells(map, lattice);
+    axes.insert(axes.end(), own_axes.begin(), own_axes.end());
     const VkDeviceSize offset = first_node * cell_bytes(access);
     if (access == gpu::Access::table) {
       const std::vector<shaders::Corners> cells = corners_with_border(map, prior);

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <optional>
 
 #include <gtest/gtest.h>
@@ -14,8 +13,6 @@
 
 namespace palpate {
 namespace {
-
-constexpr double two_pi = 2.0 * std::numbers::pi;
 
 /// A letter as it is, on cells of 0.5 mm.
 Hypothesis letter(const char* name) {

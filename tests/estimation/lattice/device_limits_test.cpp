@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include <gtest/gtest.h>
 
@@ -14,10 +13,6 @@
 
 namespace palpate {
 namespace {
-
-constexpr double two_pi = 2.0 * std::numbers::pi;
-// What the method allows a log-likelihood to differ from float64, in nats per touch.
-constexpr double per_touch = 1e-4;
 
 std::vector<Hypothesis> two_objects() {
   return {{random_map(31, 27, 0.5, 12.0, 141), 1.0}, {random_map(23, 29, 0.5, 12.0, 142), 2.0}};

@@ -12,8 +12,6 @@
 namespace palpate {
 namespace {
 
-// What the method allows a log-likelihood to differ from float64, in nats per touch of 36 elements.
-constexpr double per_touch = 1e-4;
 constexpr double cell_mm = 0.5;
 
 /// A lattice of this step in map cells whose first bin lies at no special place.

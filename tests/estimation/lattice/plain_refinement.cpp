@@ -13,32 +13,6 @@ namespace {
 
 constexpr double two_pi = 2.0 * std::numbers::pi;
 
-/// The body of PoseHistogram::refine(): the occupied cells.
-struct Cells {
-  glm::dvec2 centroid_mm{0.0};
-  double inertia_mm2 = 0.0;
-};
-
-Cells occupied_cells(const OccupancyGrid& map) {
-  Cells cells;
-  double count = 0.0;
-  double squares = 0.0;
-  for (int j = 0; j < map.ny; ++j) {
-    for (int i = 0; i < map.nx; ++i) {
-      if (map.at(i, j) > 0.0F) {
-        const glm::dvec2 p = map.origin_mm + map.cell_mm * glm::dvec2(i, j);
-        cells.centroid_mm += p;
-        squares += p.x * p.x + p.y * p.y;
-        count += 1.0;
-      }
-    }
-  }
-  cells.centroid_mm /= count;
-  const glm::dvec2& c = cells.centroid_mm;
-  cells.inertia_mm2 = squares / count - c.x * c.x - c.y * c.y;
-  return cells;
-}
-
 bool is_circle(const Axis& theta_rad) {
   return std::abs(theta_rad.upper - theta_rad.lower - two_pi) < 1e-9;
 }
@@ -208,7 +182,7 @@ RefinedPose plain_refinement(const std::vector<double>& logs, const PoseLattice&
   const int ny = lattice.y_mm.count;
   const int nt = lattice.theta_rad.count;
   const double step[] = {lattice.x_mm.step(), lattice.y_mm.step(), lattice.theta_rad.step()};
-  const Cells body = occupied_cells(map);
+  const Body body = reference::body_of(map);
   int centre[] = {static_cast<int>(bin % nx), static_cast<int>(bin / nx % ny),
                   static_cast<int>(bin / nx / ny)};
   struct Inside {
@@ -224,10 +198,7 @@ RefinedPose plain_refinement(const std::vector<double>& logs, const PoseLattice&
   for (int pass = 0; pass < 3; ++pass) {
     const std::int64_t middle = (std::int64_t{centre[2]} * ny + centre[1]) * nx + centre[0];
     const Pose T = reference::bin_pose(lattice, middle);
-    const double c = std::cos(T.theta_rad);
-    const double s = std::sin(T.theta_rad);
-    const glm::dvec2 from = body.centroid_mm - T.translation_mm;
-    const glm::dvec2 centroid_robot(c * from.x + s * from.y, -s * from.x + c * from.y);
+    const glm::dvec2 centroid_robot = reference::transform_back(T, body.centroid_mm);
     window.clear();
     std::vector<Moved> displaced;
     double top = -1e300;
@@ -279,10 +250,8 @@ RefinedPose plain_refinement(const std::vector<double>& logs, const PoseLattice&
   };
   // How far a bin moves the object from where the mean has it.
   const auto mean_pose = plain(place[0] + offset[0], place[1] + offset[1], place[2] + offset[2]);
-  const double c = std::cos(mean_pose[2]);
-  const double s = std::sin(mean_pose[2]);
-  const glm::dvec2 from = body.centroid_mm - glm::dvec2(mean_pose[0], mean_pose[1]);
-  const glm::dvec2 centroid_robot(c * from.x + s * from.y, -s * from.x + c * from.y);
+  const glm::dvec2 centroid_robot =
+      reference::transform_back({{mean_pose[0], mean_pose[1]}, mean_pose[2]}, body.centroid_mm);
   const double spin_mm = std::sqrt(body.inertia_mm2);
   std::vector<Moved> moved_bins;
   for (const Inside& in : window) {

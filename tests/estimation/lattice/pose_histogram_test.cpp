@@ -1,7 +1,6 @@
 #include "palpate/pose_histogram.hpp"
 
 #include <algorithm>
-#include <numbers>
 #include <utility>
 
 #include <gtest/gtest.h>
@@ -11,11 +10,6 @@
 
 namespace palpate {
 namespace {
-
-constexpr double two_pi = 2.0 * std::numbers::pi;
-
-// What the method allows a log-likelihood to differ from float64, in nats per touch.
-constexpr double per_touch = 1e-4;
 
 HistogramOptions small_options() {
   HistogramOptions options;

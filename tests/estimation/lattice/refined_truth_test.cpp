@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
-#include <numbers>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -18,7 +17,6 @@
 namespace palpate {
 namespace {
 
-constexpr double two_pi = 2.0 * std::numbers::pi;
 constexpr double spin_mm = 8.0;  // a radian moves the object by so much
 
 using LogBelief = std::function<double(const glm::dvec3&)>;

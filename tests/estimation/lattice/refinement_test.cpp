@@ -20,8 +20,6 @@
 namespace palpate {
 namespace {
 
-constexpr double two_pi = 2.0 * std::numbers::pi;
-
 /// `lever_mm` is how far from the robot's origin, where a turn shows, the poses are compared.
 void expect_near(const RefinedPose& a, const RefinedPose& b, double lever_mm = 0.0) {
   // Logs that are 1e-4 nats off per touch move a mean within 2.5 mm by at most some 1e-3 mm.

@@ -11,15 +11,11 @@
 #include <glm/vec3.hpp>
 
 #include "palpate/error.hpp"
-#include "particle_reference.hpp"
 #include "synthetic.hpp"
+#include "weighed_particles.hpp"
 
 namespace palpate {
 namespace {
-
-constexpr double two_pi = 2.0 * std::numbers::pi;
-// What the method allows a log-likelihood to differ from float64, in nats per touch.
-constexpr double per_touch = 1e-4;
 
 Recording says_nothing() {
   Recording recording = random_recording(1, 36, 431);
@@ -200,27 +196,25 @@ TEST(ParticleFilter, NoneOfTheseCompetesByThePriorAlone) {
     none_likelihood += model.log_likelihood(element.reading, log_odds_from_probability(0.2));
   }
   double none_weight = 0.0;
-  std::vector<double> identity(3);
-  double none = 0.0;
+  std::vector<reference::Particle> weighed;
   const auto particles = filter.particles();
   for (const auto& particle : particles) {
-    if (particle.object == 3) {
-      none_weight = particle.weight;
-      none += particle.weight;
-    }
+    none_weight = particle.object == 3 ? particle.weight : none_weight;
+    weighed.push_back({particle.object, particle.T_object_robot, particle.weight});
   }
   for (const auto& particle : particles) {
     if (particle.object == 3) {
       EXPECT_EQ(particle.weight, none_weight);
       continue;
     }
-    identity[particle.object] += particle.weight;
     const double expected = reference::log_likelihood(touch, particle.T_object_robot,
                                                       objects[particle.object].map, {}, model);
     EXPECT_NEAR(std::log(particle.weight / none_weight), expected - none_likelihood, per_touch);
   }
   const Estimate estimate = filter.estimate();
-  EXPECT_NEAR(estimate.none, none, 1e-12) << "float64 sums";
+  std::vector<double> identity = reference::identity(weighed, 4);
+  EXPECT_NEAR(estimate.none, identity.back(), 1e-12) << "float64 sums";
+  identity.pop_back();
   EXPECT_LT(largest_difference(estimate.identity, identity), 1e-12);
   EXPECT_LT(estimate.mode.object, 3);
 }

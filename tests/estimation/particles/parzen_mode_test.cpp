@@ -12,8 +12,6 @@
 namespace palpate {
 namespace {
 
-constexpr double two_pi = 2.0 * std::numbers::pi;
-
 struct Cloud {
   std::vector<shaders::Particle> particles;
   std::vector<double> weights;
@@ -40,34 +38,18 @@ Cloud random_cloud(std::size_t n, std::uint32_t objects, double extent, std::uin
   return cloud;
 }
 
-/// Eq. 10 and 11 as they stand.
-double density(const Cloud& cloud, std::uint32_t object, double x_mm, double y_mm,
-               double theta_rad) {
-  double sum = 0.0;
+std::vector<reference::Particle> reference_particles(const Cloud& cloud) {
+  std::vector<reference::Particle> particles;
   for (std::size_t i = 0; i < cloud.particles.size(); ++i) {
-    const auto& [of, x, y, theta] = cloud.particles[i];
-    const double dtheta = std::remainder(theta - theta_rad, two_pi);
-    const double d = std::hypot(x - x_mm, y - y_mm, dtheta);
-    sum += of == object ? cloud.weights[i] * std::max(0.0, 1.0 - d) : 0.0;
+    const auto& [object, x, y, theta] = cloud.particles[i];
+    particles.push_back({static_cast<int>(object), {{x, y}, theta}, cloud.weights[i]});
   }
-  return sum;
+  return particles;
 }
 
-/// The largest density over the whole grid, Eq. 12.
-double largest_density(const Cloud& cloud, std::uint32_t objects, double extent) {
-  const int cells = static_cast<int>(std::ceil(extent / 0.5)) + 2;
-  double most = 0.0;
-  for (std::uint32_t object = 0; object < objects; ++object) {
-    for (int k = 0; k < 50; ++k) {
-      for (int j = -cells; j <= cells; ++j) {
-        for (int i = -cells; i <= cells; ++i) {
-          most =
-              std::max(most, density(cloud, object, 0.5 * i, 0.5 * j, 0.04 * std::numbers::pi * k));
-        }
-      }
-    }
-  }
-  return most;
+/// The largest density over all of the grid that a particle within `extent` reaches.
+double largest_density(const Cloud& cloud, int objects, double extent) {
+  return reference::largest_parzen(reference_particles(cloud), objects, extent + 2.0);
 }
 
 std::optional<ParzenMaximum> find(const Cloud& cloud, std::uint32_t objects) {
@@ -93,7 +75,8 @@ TEST(ParzenMode, IsThePlainMaximumOverTheGrid) {
       // Points are compared by float32 sums of so many terms; the answer's density is in float64,
       // of weights that were rounded to float32.
       EXPECT_NEAR(maximum->density, expected, 1e-5 * expected) << n << ", seed " << seed;
-      EXPECT_NEAR(density(cloud, maximum->object, maximum->x_mm, maximum->y_mm, maximum->theta_rad),
+      EXPECT_NEAR(reference::parzen(reference_particles(cloud), static_cast<int>(maximum->object),
+                                    {{maximum->x_mm, maximum->y_mm}, maximum->theta_rad}),
                   maximum->density, 1e-6 * expected);
       expect_on_grid(maximum->x_mm, 0.5);
       expect_on_grid(maximum->y_mm, 0.5);

@@ -1,4 +1,4 @@
-#include "particle_reference.hpp"
+#include "weighed_particles.hpp"
 
 #include <cmath>
 

@@ -1,0 +1,47 @@
+#include "reference.hpp"
+
+#include <cmath>
+
+namespace palpate::reference {
+
+double logit(double p) { return std::log(p / (1.0 - p)); }
+
+double increment(Reading reading, double distance_mm, const InverseSensorModel& sensor) {
+  const double m = sensor.prior;
+  // Eq. 4, and Eq. 5 within Eq. 6.
+  const double g = sensor.peak * std::exp(-distance_mm * distance_mm /
+                                          (2.0 * sensor.spread_mm * sensor.spread_mm));
+  switch (reading) {
+    case Reading::in_contact:
+      return logit(m + (1.0 - m) * g) - logit(m);
+    case Reading::no_contact:
+      return logit(m - m * g) - logit(m);
+    case Reading::unknown:
+      return 0.0;
+  }
+  return 0.0;
+}
+
+std::vector<double> log_odds_map(std::span<const Touch> touches, const OccupancyGrid& grid,
+                                 const ContactClassifier& classifier,
+                                 const InverseSensorModel& sensor) {
+  std::vector<double> log_odds(static_cast<std::size_t>(grid.nx) * grid.ny, logit(sensor.prior));
+  for (const Touch& touch : touches) {
+    const std::vector<Reading> readings = classify(touch, classifier);
+    for (std::size_t k = 0; k < readings.size(); ++k) {
+      const glm::dvec2 element_mm = transform(touch.T_robot_sensor, touch.elements_mm[k]);
+      for (int j = 0; j < grid.ny; ++j) {
+        for (int i = 0; i < grid.nx; ++i) {
+          const double dx = grid.origin_mm.x + grid.cell_mm * i - element_mm.x;
+          const double dy = grid.origin_mm.y + grid.cell_mm * j - element_mm.y;
+          // Eq. 2 and 6.
+          log_odds[static_cast<std::size_t>(j) * grid.nx + i] +=
+              increment(readings[k], std::hypot(dx, dy), sensor);
+        }
+      }
+    }
+  }
+  return log_odds;
+}
+
+}  // namespace palpate::reference

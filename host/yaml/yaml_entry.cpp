@@ -1,0 +1,106 @@
+#include "yaml_entry.hpp"
+
+#include <algorithm>
+#include <charconv>
+#include <optional>
+#include <set>
+
+#include <fmt/format.h>
+
+#include "number_text.hpp"
+#include "palpate/error.hpp"
+#include "printable.hpp"
+
+namespace palpate {
+
+int line_of(const YAML::Mark& mark) { return std::max(mark.line, 0) + 1; }
+
+void YamlEntry::refuse(std::string_view remedy) const {
+  // A message stays one short line whatever the file holds.
+  const bool shown = node.IsScalar() && node.Scalar().size() <= 60 && is_printable(node.Scalar());
+  throw Error(Fault::input,
+              fmt::format("{}: line {}: '{}'{}: {}", file.string(), line_of(node.Mark()), key,
+                          shown ? fmt::format(" = '{}'", node.Scalar()) : "", remedy));
+}
+
+std::string YamlEntry::text() const {
+  if (!node.IsScalar() || node.Scalar().empty() || !is_printable(node.Scalar())) {
+    refuse("give a text");
+  }
+  return node.Scalar();
+}
+
+double YamlEntry::number(const std::function<bool(double)>& fits, std::string_view remedy) const {
+  // Not yaml-cpp's conversion, which reads 1.500 as 1500 where the locale has decimal commas.
+  const std::optional<double> value = node.IsScalar() ? number_of(node.Scalar()) : std::nullopt;
+  if (!value || !fits(*value)) {
+    refuse(remedy);
+  }
+  return *value;
+}
+
+double YamlEntry::number(double least, double most) const {
+  return number([&](double value) { return value >= least && value <= most; },
+                fmt::format("give a number from {:g} to {:g}", least, most));
+}
+
+double YamlEntry::number() const {
+  return number([](double) { return true; }, "give a number");
+}
+
+std::int64_t YamlEntry::whole_number(std::int64_t least, std::int64_t most, Digits digits) const {
+  // Not yaml-cpp's conversion either, which reads 010 as 8.
+  const std::string text = node.IsScalar() ? node.Scalar() : "";
+  const bool hexadecimal = digits == Digits::also_hexadecimal && text.starts_with("0x");
+  const std::optional<std::int64_t> value =
+      hexadecimal ? whole_number_of(text.substr(2), 16) : whole_number_of(text);
+  if (!value || *value < least || *value > most) {
+    refuse(fmt::format("give a whole number from {} to {}", least, most));
+  }
+  return *value;
+}
+
+std::vector<YamlEntry> YamlEntry::list(std::string_view remedy) const {
+  if (!node.IsSequence()) {
+    refuse(remedy);
+  }
+  std::vector<YamlEntry> entries;
+  for (const YAML::Node& item : node) {
+    entries.push_back({file, fmt::format("{}[{}]", key, entries.size()), item});
+  }
+  return entries;
+}
+
+std::vector<YamlEntry> YamlEntry::list(std::size_t count, std::string_view remedy) const {
+  std::vector<YamlEntry> entries = list(remedy);
+  if (entries.size() != count) {
+    refuse(remedy);
+  }
+  return entries;
+}
+
+void read_keys(const YamlEntry& map, const YamlKeys& readers) {
+  std::string known;
+  for (const auto& [key, reader] : readers) {
+    known += fmt::format("{}{}", known.empty() ? "" : ", ", key);
+  }
+  if (!map.node.IsMap()) {
+    map.refuse(fmt::format("give a map with keys out of {}", known));
+  }
+  std::set<std::string_view> seen;
+  for (const auto& item : map.node) {
+    const YamlEntry name{map.file, map.key, item.first};
+    const auto found = std::find_if(readers.begin(), readers.end(), [&](const auto& entry) {
+      return item.first.IsScalar() && entry.first == item.first.Scalar();
+    });
+    if (found == readers.end()) {
+      name.refuse(fmt::format("unknown key; the keys are {}", known));
+    }
+    if (!seen.insert(found->first).second) {
+      name.refuse("key given twice; remove one");
+    }
+    found->second({map.file, std::string(found->first), item.second});
+  }
+}
+
+}  // namespace palpate

@@ -1,0 +1,67 @@
+#pragma once
+
+#include <yaml-cpp/yaml.h>
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <limits>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+namespace palpate {
+
+/// Counted from 1, also where there is no mark, as in an empty file.
+int line_of(const YAML::Mark& mark);
+
+/// A node of a YAML file with what a message about it has to name. What reads its value throws
+/// Error (Fault::input): file, line, key, value, remedy.
+struct YamlEntry {
+  const std::filesystem::path& file;
+  std::string key;
+  YAML::Node node;
+
+  [[noreturn]] void refuse(std::string_view remedy) const;
+
+  /// Printable UTF-8, not empty.
+  std::string text() const;
+  /// A finite number that satisfies `fits`.
+  double number(const std::function<bool(double)>& fits, std::string_view remedy) const;
+  double number(double least, double most) const;
+  double number() const;
+  /// A whole number, decimal or, where `digits` says so, also hexadecimal after 0x.
+  enum class Digits { decimal, also_hexadecimal };
+  template <class Integer>
+  Integer integer(Integer least, Integer most = std::numeric_limits<Integer>::max(),
+                  Digits digits = Digits::decimal) const {
+    return static_cast<Integer>(whole_number(least, most, digits));
+  }
+  std::vector<YamlEntry> list(std::string_view remedy) const;
+  std::vector<YamlEntry> list(std::size_t count, std::string_view remedy) const;
+
+  /// The value for one of the names.
+  template <class Value>
+  Value one_of(const std::vector<std::pair<std::string_view, Value>>& choices) const {
+    std::string names;
+    for (const auto& [name, value] : choices) {
+      if (node.IsScalar() && node.Scalar() == name) {
+        return value;
+      }
+      names.append(names.empty() ? "" : ", ").append(name);
+    }
+    refuse("give one of " + names);
+  }
+
+ private:
+  std::int64_t whole_number(std::int64_t least, std::int64_t most, Digits digits) const;
+};
+
+using YamlKeys = std::vector<std::pair<std::string_view, std::function<void(const YamlEntry&)>>>;
+
+/// Hands each value of a map to its key's reader; keys without a reader, or twice, are refused.
+void read_keys(const YamlEntry& map, const YamlKeys& readers);
+
+}  // namespace palpate
