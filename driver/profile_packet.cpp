@@ -200,11 +200,12 @@ Format::Field read_field(const Entry& field, std::size_t elements) {
       {"values", [&] { return read_values(field); }},
       {"parts", [&] { return read_parts(field, elements); }},
       {"checksum", [&] { return read_check(field); }}};
-  for (const auto& [kind, read] : readers) {
-    if (std::any_of(field.node.begin(), field.node.end(), [&](const auto& item) {
-          return item.first.IsScalar() && item.first.Scalar() == kind;
-        })) {
-      return read();
+  for (const auto& reader : readers) {
+    const auto is_kind = [&](const auto& item) {
+      return item.first.IsScalar() && item.first.Scalar() == reader.first;
+    };
+    if (std::any_of(field.node.begin(), field.node.end(), is_kind)) {
+      return reader.second();
     }
   }
   field.refuse(fmt::format("unknown field; the fields are {}", kinds));
