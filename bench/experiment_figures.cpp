@@ -21,6 +21,7 @@ constexpr std::array figure_names{"fig6a",  "fig6b",   "fig7a",      "fig7b",   
                                   "errors", "refined", "pose_noise", "calibration", "none"};
 
 const ChartAxis touches_axis{.label = "touches", .lower = 0.0};
+constexpr const char* mean_error = "mean pose error of trials with the right letter (mm)";
 
 /// The look of the i-th series: told apart by mark and dashes as well as by colour.
 ChartSeries series_like(std::size_t i, std::string name) {
@@ -35,7 +36,7 @@ ChartSeries series_like(std::size_t i, std::string name) {
 /// A field of records over another, a gap where a record has none.
 std::vector<ChartPoint> points_of(const Json& records, const char* x, const char* y) {
   const auto number_of = [](const Json& record, const char* field) {
-    const Json value = value_of({.head = {}, .field = field}, record);
+    const Json value = field_of(record, field);
     return value.is_null() ? NAN : value.get<double>();
   };
   std::vector<ChartPoint> points;
@@ -75,11 +76,9 @@ ChartAxis percent_axis(std::string label, double upper = 1.05) {
           }};
 }
 
-ChartAxis error_axis(double lower_mm, double upper_mm) {
-  return {.label = "pose error of trials with the right letter (mm)",
-          .scale = Scale::logarithmic,
-          .lower = lower_mm,
-          .upper = upper_mm};
+ChartAxis error_axis(std::string label, double lower_mm, double upper_mm) {
+  return {
+      .label = std::move(label), .scale = Scale::logarithmic, .lower = lower_mm, .upper = upper_mm};
 }
 
 /// A series for each run of a filter.
@@ -109,9 +108,7 @@ Chart accuracy_chart(const Json& document, const std::string& filter) {
 }
 
 Chart error_chart(const Json& document, const std::string& filter) {
-  return chart_of_runs(
-      document, filter, "/error_mm/mean",
-      {.label = "mean pose error of trials with the right letter (mm)", .lower = 0.0});
+  return chart_of_runs(document, filter, "/error_mm/mean", {.label = mean_error, .lower = 0.0});
 }
 
 void draw_paper_figures(const Json& document, const std::filesystem::path& folder) {
@@ -155,7 +152,8 @@ Chart augmented_chart(const Json& document) {
 
 /// Mean, median, 95th percentile and refined error of the finest histogram.
 Chart errors_chart(const Json& document) {
-  Chart chart{.x = touches_axis, .y = error_axis(0.3, 30.0)};
+  Chart chart{.x = touches_axis,
+              .y = error_axis("pose error of trials with the right letter (mm)", 0.3, 30.0)};
   for (const Json& run : runs_of(document, "histogram")) {
     if (run.at("count") != most_of(document, "histogram")) {
       continue;
@@ -175,11 +173,11 @@ Chart errors_chart(const Json& document) {
 
 /// The mode's mean error beside the refined pose's, of the histograms with the most bins.
 Chart refined_chart(const Json& document) {
-  Chart chart{.x = touches_axis, .y = error_axis(0.2, 20.0)};
+  Chart chart{.x = touches_axis, .y = error_axis(mean_error, 0.2, 20.0)};
   for (const Json& run : runs_of(document, "histogram")) {
     if (as_many(run.at("count"), most_of(document, "histogram"))) {
-      for (const auto& [kind, field] : {std::pair{"mode, mean", "/error_mm/mean"},
-                                        std::pair{"refined, mean", "/refined_error_mm/mean"}}) {
+      for (const auto& [kind, field] :
+           {std::pair{"mode", "/error_mm/mean"}, std::pair{"refined", "/refined_error_mm/mean"}}) {
         chart.series.push_back(
             curve(run, field,
                   series_like(chart.series.size(),
@@ -193,7 +191,9 @@ Chart refined_chart(const Json& document) {
 /// Pose errors with the array where it is reported and off by each noise, for the largest counts:
 /// colours tell the noise apart, dashes the filters.
 Chart pose_noise_chart(const Json& document) {
-  Chart chart{.x = touches_axis, .y = error_axis(0.3, 20.0)};
+  Chart chart{.title = "standard deviation of the error of the reported sensor pose",
+              .x = touches_axis,
+              .y = error_axis(mean_error, 0.3, 20.0)};
   const auto add = [&](const Json& runs, const std::string& filter, const std::string& noise,
                        std::size_t colour) {
     const bool first = filter == "histogram";
@@ -201,7 +201,7 @@ Chart pose_noise_chart(const Json& document) {
       if (run.at("filter") == filter && run.at("count") == most_of(document, filter)) {
         chart.series.push_back(
             curve(run, "/error_mm/mean",
-                  {.name = fmt::format("{}, mean, {}", plain_text(run.at("name")), noise),
+                  {.name = fmt::format("{}, {}", plain_text(run.at("name")), noise),
                    .colour = series(colour),
                    .mark = first ? Mark::circle : Mark::square,
                    .fill = first ? MarkFill::solid : MarkFill::hollow,
@@ -211,7 +211,7 @@ Chart pose_noise_chart(const Json& document) {
   };
   for (const char* filter : {"histogram", "particles"}) {
     std::size_t colour = 0;
-    add(document.at("filters"), filter, "exact", colour);
+    add(document.at("filters"), filter, "0 mm, 0 rad", colour);
     for (const Json& noisy : document.at("pose_noise")) {
       add(noisy.at("filters"), filter,
           fmt::format("{} mm, {} rad", plain_text(noisy.at("translation_mm")),
@@ -225,9 +225,11 @@ Chart pose_noise_chart(const Json& document) {
 
 Chart calibration_chart(const Json& document) {
   constexpr int fewest = 10;  // estimates of which a fraction says something
-  Chart chart{.title = fmt::format("at least {} estimates per point", fewest),
-              .x = percent_axis("confidence: probability of the most probable letter (%)", 1.0),
-              .y = percent_axis("estimates that are right (%)")};
+  Chart chart{
+      .title = fmt::format(
+          "expected calibration error in brackets; at least {} estimates per point", fewest),
+      .x = percent_axis("confidence: probability of the most probable letter (%)", 1.0),
+      .y = percent_axis("estimates that are right (%)")};
   chart.series.push_back({.name = "perfectly calibrated",
                           .colour = comparison_grey,
                           .mark = Mark::none,
@@ -242,7 +244,7 @@ Chart calibration_chart(const Json& document) {
                   [](const Json& bin) { return bin.at("count") < fewest; });
     ChartSeries series =
         series_like(chart.series.size() - 1,
-                    fmt::format("{}, {:.1f} % off", plain_text(run.at("name")),
+                    fmt::format("{} ({:.1f} %)", plain_text(run.at("name")),
                                 100.0 * calibration.at("expected_error").get<double>()));
     series.points = points_of(bins, "/mean_confidence", "/fraction_right");
     chart.series.push_back(std::move(series));

@@ -173,9 +173,8 @@ std::string trials(const ExperimentResult& result) {
 }  // namespace
 
 Json document_of(const ExperimentResult& result) {
-  Json document{{"filters", records_of(result.runs)},
-                {"pose_noise", Json::array()},
-                {"none", Json::array()}};
+  Json document{
+      {"filters", records_of(result.runs)}, {"pose_noise", Json::array()}, {"none", Json::array()}};
   for (const PoseNoiseRuns& noisy : result.pose_noise) {
     document["pose_noise"].push_back({{"translation_mm", noisy.noise.translation_mm},
                                       {"rotation_rad", noisy.noise.rotation_rad},

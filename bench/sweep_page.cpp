@@ -41,7 +41,7 @@ std::string url_escaped(const std::string& bytes) {
 
 /// The chart as a picture in the page. Invisible discs over its marks show their titles under the
 /// pointer.
-std::string figure_of(const Chart& chart, const std::string& name) {
+std::string figure_of(const Chart& chart) {
   const ChartPicture picture = draw_chart(chart, PictureFormat::svg);
   std::string spots;
   for (const ChartSpot& spot : picture.spots) {
@@ -50,9 +50,10 @@ std::string figure_of(const Chart& chart, const std::string& name) {
                     spot.at_px.x, spot.at_px.y, xml_escaped(spot.title));
   }
   return fmt::format(
-      "<div class=\"chart\"><img alt=\"{}\" src=\"data:image/svg+xml,{}\"/>\n"
+      "<div class=\"chart\"><img alt=\"{} against {}\" src=\"data:image/svg+xml,{}\"/>\n"
       "<svg viewBox=\"0 0 {} {}\">\n{}</svg></div>",
-      name, url_escaped(picture.bytes), picture.width_px, picture.height_px, spots);
+      xml_escaped(chart.y.label), xml_escaped(chart.x.label), url_escaped(picture.bytes),
+      picture.width_px, picture.height_px, spots);
 }
 
 /// What a column is sorted by: a number, the mean of a record, or the text.
@@ -64,9 +65,6 @@ std::string sort_key(const Json& value, const std::string& text) {
 }
 
 std::string table(Columns columns, const Json& records) {
-  if (records.empty()) {
-    return {};
-  }
   std::string html = "<div class=\"wide\"><table>\n<thead><tr>";
   for (const Column& column : columns) {
     html += fmt::format("<th scope=\"col\">{}</th>", xml_escaped(column.head));
@@ -76,7 +74,7 @@ std::string table(Columns columns, const Json& records) {
     html += "<tr>";
     const std::vector<std::string> texts = texts_of(columns, record, "–");
     for (std::size_t i = 0; i < columns.size(); ++i) {
-      const Json value = value_of(columns[i], record);
+      const Json value = field_of(record, columns[i].field);
       const std::string text = xml_escaped(texts[i]);
       html += fmt::format("<td{} data-value=\"{}\">{}</td>",
                           value.is_boolean() ? fmt::format(" class=\"{}\"", text) : "",
@@ -110,7 +108,6 @@ std::string page_of(const Json& document) {
       {"sampled bins", fmt::format("{}", sampled_bins)},
       {"least gain", fmt::format("{:.0f}", 100.0 * least_gain)},
       {"window reach", fmt::format("{}", window_reach_mm)},
-      {"goals", table(verdict_columns(), document.at("verdicts"))},
       {"steps", table(step_columns(), steps_of(document))},
       {"limits", table(limit_columns(), document.at("limits"))},
       {"runs", table(run_columns(), document.at("points"))},
@@ -122,9 +119,11 @@ std::string page_of(const Json& document) {
   for (const Json& knee : document.at("knees")) {
     parts["knees"] += fmt::format("<li>{}</li>\n", xml_escaped(knee.at("sentence")));
   }
+  const Json& verdicts = document.at("verdicts");
+  parts["goals"] = verdicts.empty() ? "" : "<h2>Goals</h2>\n" + table(verdict_columns(), verdicts);
   const std::vector<Chart> charts = charts_of(document);
   for (std::size_t i = 0; i < charts.size(); ++i) {
-    parts[chart_names[i]] = figure_of(charts[i], chart_names[i]);
+    parts[chart_names[i]] = figure_of(charts[i]);
   }
   return filled(parts);
 }

@@ -52,15 +52,15 @@ Text number_text(const char* format, double factor) {
   };
 }
 
-Json value_of(const Column& column, const Json& record) {
-  const Json::json_pointer field(column.field);
-  return record.contains(field) ? record.at(field) : Json(nullptr);
+Json field_of(const Json& record, const std::string& field) {
+  const Json::json_pointer pointer(field);
+  return record.contains(pointer) ? record.at(pointer) : Json(nullptr);
 }
 
 std::vector<std::string> texts_of(Columns columns, const Json& record, const std::string& none) {
   std::vector<std::string> texts;
   for (const Column& column : columns) {
-    const Json value = value_of(column, record);
+    const Json value = field_of(record, column.field);
     texts.push_back(value.is_null() ? none : column.text(value));
   }
   return texts;

@@ -35,8 +35,8 @@ struct Column {
 };
 using Columns = std::span<const Column>;
 
-/// The column's field; null where the record has none.
-Json value_of(const Column& column, const Json& record);
+/// What a JSON pointer finds in a record, or null.
+Json field_of(const Json& record, const std::string& field);
 /// The texts of a record; `none` stands for null.
 std::vector<std::string> texts_of(Columns columns, const Json& record, const std::string& none);
 
