@@ -16,8 +16,6 @@ namespace palpate::bench {
 
 namespace {
 
-constexpr int touches_per_trial = 15;
-constexpr std::uint64_t trial_seed = 1'000;  ///< the experiment's
 constexpr std::uint64_t particle_seed = 1;
 constexpr double goal_mode_mm = 0.3;
 constexpr double goal_refined_mm = 0.2;
@@ -110,11 +108,7 @@ Json measure(Device& device, const SweepOptions& options) {
   const Json& points = document["points"];
   document["windows"] = window_sentence(points);
   document["fronts"] = fronts_of(points, document["precisions"], trials);
-  document["limits"] = measure_limits(device, {.lattices = plan.limits,
-                                               .trials_each = plan.limit_trials_each,
-                                               .touches = touches_per_trial,
-                                               .seed = trial_seed,
-                                               .quick = options.quick});
+  document["limits"] = measure_limits(device, plan);
   document["verdicts"] = verdicts_of(points);
   return document;
 }

@@ -32,7 +32,7 @@ std::vector<glm::dvec2> square_array(int n, double pitch_mm) {
   return elements_mm;
 }
 
-std::vector<Variant> variants_of(const LimitPlan& plan) {
+std::vector<Variant> variants_of(const SweepPlan& plan) {
   std::vector<Variant> variants;
   const auto add = [&variants](const std::string& name) -> Variant& {
     variants.emplace_back().name = name;
@@ -116,7 +116,7 @@ Json record_of(const Variant& variant, const BinCounts& bins, std::span<const Tr
 
 }  // namespace
 
-Json measure_limits(Device& device, const LimitPlan& plan) {
+Json measure_limits(Device& device, const SweepPlan& plan) {
   Json limits = Json::array();
   Compared unchanged;
   for (Variant& variant : variants_of(plan)) {
@@ -124,16 +124,16 @@ Json measure_limits(Device& device, const LimitPlan& plan) {
         device, variant.map, training_recordings(variant.sensor, variant.training_poses));
     variant.trials.sensor = variant.sensor;
     const std::vector<Recording> trials =
-        make_trials(vowels, plan.trials_each, plan.touches, plan.seed, variant.trials);
+        make_trials(vowels, plan.limit_trials_each, touches_per_trial, trial_seed, variant.trials);
     Compared with = unchanged;
     for (const BinCounts& bins :
-         std::span(plan.lattices).first(variant.all_lattices ? plan.lattices.size() : 1)) {
+         std::span(plan.limits).first(variant.all_lattices ? plan.limits.size() : 1)) {
       std::vector<TrialErrors> errors = errors_of(device, learned, trials, bins);
       limits.push_back(record_of(variant, bins, errors, with));
       if (unchanged.name.is_null()) {
         unchanged = {variant.name, errors};
       }
-      if (bins == plan.lattices.front()) {
+      if (bins == plan.limits.front()) {
         with = {count_text(static_cast<double>(product(bins))) + " bins", std::move(errors)};
       }
     }

@@ -80,7 +80,8 @@ SweepPlan plan_of(const SweepOptions& options) {
                  .most_full = options.quick ? 50'000 : 320'000,
                  .most_twice = options.quick ? 50'000 : 1'200'000,
                  .cells = options.quick ? quick_cells() : full_cells(),
-                 .limits = {goal_bins}};
+                 .limits = {goal_bins},
+                 .quick = options.quick};
   plan.limit_trials_each = options.quick ? std::min(plan.trials_each, 2) : plan.trials_each;
   if (!options.quick) {
     plan.limits.insert(plan.limits.end(), {scaled(3e5), scaled(3e6)});

@@ -18,6 +18,9 @@ PoseLattice lattice_with(const BinCounts& bins);
 inline constexpr BinCounts goal_bins = {64, 64, 244};
 inline constexpr double goal_cell_mm = 0.5;
 
+inline constexpr int touches_per_trial = 15;
+inline constexpr std::uint64_t trial_seed = 1'000;  ///< the experiment's
+
 /// What is run on maps of one cell size.
 struct CellPlan {
   double cell_mm = 0.0;
@@ -34,6 +37,7 @@ struct SweepPlan {
   std::vector<CellPlan> cells;
   std::vector<BinCounts> limits;  ///< lattices of measure_limits()
   int limit_trials_each = 0;
+  bool quick = false;  ///< two of the limits' variants
 
   /// Trials of every letter that get the full posterior: all of them on the goal's lattice.
   int full_each(double cell_mm, const BinCounts& bins) const;
