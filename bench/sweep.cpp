@@ -96,20 +96,19 @@ Json verdicts_of(const Json& points) {
 Json measure(Device& device, const SweepOptions& options) {
   const SweepPlan plan = plan_of(options);
   const int trials = plan.trials_each * static_cast<int>(vowels.size());
-  Json document{{"touches", touches_per_trial},
-                {"trials", trials},
-                {"points", Json::array()},
-                {"precisions", Json::array()},
-                {"knees", Json::array()}};
+  Json document{{"touches", touches_per_trial}, {"trials", trials},
+                {"points", Json::array()},      {"windows", ""},
+                {"precisions", Json::array()},  {"fronts", Json::object()},
+                {"knees", Json::array()},       {"limits", Json::array()},
+                {"verdicts", Json::array()}};
   print_head(Columns(run_columns()).first(printed_run_columns));
   for (const CellPlan& cells : plan.cells) {
     sweep_cells(device, plan, cells, document);
   }
-  const Json& points = document["points"];
-  document["windows"] = window_sentence(points);
-  document["fronts"] = fronts_of(points, document["precisions"], trials);
+  document["windows"] = window_sentence(document["points"]);
+  document["fronts"] = fronts_of(document["points"], document["precisions"], trials);
   document["limits"] = measure_limits(device, plan);
-  document["verdicts"] = verdicts_of(points);
+  document["verdicts"] = verdicts_of(document["points"]);
   return document;
 }
 

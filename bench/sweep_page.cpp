@@ -104,6 +104,7 @@ std::string page_of(const Json& document) {
   const auto text = [&](const char* field) { return xml_escaped(plain_text(document.at(field))); };
   std::map<std::string, std::string> parts{
       {"trials", text("trials")},
+      {"limit trials", plain_text(document.at("limits").front().at("error_mm").at("trials"))},
       {"windows", text("windows")},
       {"sampled bins", fmt::format("{}", sampled_bins)},
       {"least gain", fmt::format("{:.0f}", 100.0 * least_gain)},
