@@ -14,26 +14,22 @@ namespace palpate::bench {
 
 namespace {
 
-std::map<std::string, std::unique_ptr<AtomicFile>> open_files(const std::vector<Output>& outputs) {
+/// Opens the files and makes the folders that are asked for.
+std::map<std::string, std::unique_ptr<AtomicFile>> open_outputs(std::vector<Output> outputs) {
+  std::erase_if(outputs, [](const Output& output) { return output.path.empty(); });
   CommandFiles files;
   for (const Output& output : outputs) {
-    if (!output.path.empty() && output.names.empty()) {
+    if (output.names.empty()) {
       files.writes(output.flag, output.path);
     }
     for (const std::string& name : output.names) {
-      if (!output.path.empty()) {
-        files.writes(output.flag, std::filesystem::path(output.path) / name);
-      }
+      files.writes(output.flag, std::filesystem::path(output.path) / name);
     }
   }
   files.require_distinct();
   std::map<std::string, std::unique_ptr<AtomicFile>> opened;
   for (const Output& output : outputs) {
-    std::error_code error;
-    if (output.path.empty()) {
-      continue;
-    }
-    if (output.names.empty()) {
+    if (std::error_code error; output.names.empty()) {
       opened.emplace(output.path, std::make_unique<AtomicFile>(output.path));
     } else if (!std::filesystem::create_directories(output.path, error) && error) {
       throw Error(Fault::input, fmt::format("folder {}: {}; give one that can be written to",
@@ -43,17 +39,11 @@ std::map<std::string, std::unique_ptr<AtomicFile>> open_files(const std::vector<
   return opened;
 }
 
-std::vector<Output> with_json(std::vector<Output> outputs, const RunOptions& options) {
-  outputs.push_back({"--json", options.json});
-  return outputs;
-}
-
 }  // namespace
 
 CommandRun::CommandRun(const RunOptions& options, std::vector<Output> outputs,
                        std::span<char* const> command_line)
-    : files_(open_files(with_json(std::move(outputs), options))),
-      device_(Device::open(options.device)) {
+    : files_(open_outputs(std::move(outputs))), device_(Device::open(options.device)) {
   const auto now = std::chrono::floor<std::chrono::seconds>(std::chrono::system_clock::now());
   facts_ = {{"device", device_.name()},
             {"host threads", std::thread::hardware_concurrency()},

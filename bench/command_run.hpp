@@ -25,8 +25,8 @@ struct Output {
 /// A run of a command: its device, the facts that explain its numbers, and its files.
 class CommandRun {
  public:
-  /// Opens --json and the other outputs, then the device, and prints the facts: what cannot be
-  /// opened is known before the minutes of work.
+  /// Opens the outputs, then the device, and prints the facts: what cannot be opened is known
+  /// before the minutes of work.
   /// @throws Error where two outputs are one file, or a file, a folder or the device cannot be
   /// opened
   CommandRun(const RunOptions& options, std::vector<Output> outputs,

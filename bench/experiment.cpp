@@ -120,9 +120,11 @@ ExperimentResult measure(Device& device, const ExperimentOptions& options, Repor
 }  // namespace
 
 void run_experiment(const ExperimentOptions& options, std::span<char* const> command_line) {
-  CommandRun run(
-      options, {{"--csv", options.csv, table_files()}, {"--plots", options.plots, figure_files()}},
-      command_line);
+  CommandRun run(options,
+                 {{"--json", options.json},
+                  {"--csv", options.csv, table_files()},
+                  {"--plots", options.plots, figure_files()}},
+                 command_line);
   Report report(run.facts());
   const ExperimentResult result = measure(run.device(), options, report);
   Json document = report.document();

@@ -26,7 +26,7 @@ PoseHistogram letter_histogram(const Inputs& inputs, const PoseLattice& lattice)
 }
 
 void measure_kernels(const RunOptions& options, std::span<char* const> command_line) {
-  CommandRun run(options, {}, command_line);
+  CommandRun run(options, {{"--json", options.json}}, command_line);
   const bool quick = options.quick;
   const Inputs inputs = make_inputs(run.device(), options);
   Report report(run.facts());

@@ -138,7 +138,9 @@ void run_sweep(const SweepOptions& options, std::span<char* const> command_line)
   require_at_least("--max-bins", options.max_bins, 1'000);
   require_at_least("--trials", options.trials, 1);
   CommandRun run(options,
-                 {{"--html", options.html}, {"--plots", options.plots, chart_files(chart_names)}},
+                 {{"--json", options.json},
+                  {"--html", options.html},
+                  {"--plots", options.plots, chart_files(chart_names)}},
                  command_line);
   Json document = run.facts();
   Json measured;
