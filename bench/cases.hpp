@@ -23,26 +23,27 @@ struct Inputs {
 /// An empty histogram of the letters.
 PoseHistogram letter_histogram(const Inputs& inputs, const PoseLattice& lattice);
 
-/// Likelihood of an unknown's touches on a lattice, with its error and against two baselines, the
-/// straightforward kernel and the CPU loop. Leaves the histogram with some touches in it.
+/// Times the likelihood of an unknown's touches beside two baselines, the one-bin kernel and the
+/// CPU loop, with the error of each. Leaves some touches in the histogram.
 Case likelihood_case(const Inputs& inputs, PoseHistogram& histogram, double goal_ns);
 
-/// Error of the likelihood after 1, 50 and 1,000 touches.
+/// Measures the error of the log-likelihood after 1, 50 and 1,000 touches.
 Case accuracy_case(const Inputs& inputs, const PoseLattice& lattice);
 
-/// Identity, mode and marginals of a belief.
+/// Times identity, mode and marginals of a belief.
 Case reduction_case(const Inputs& inputs, PoseHistogram& histogram);
 
-/// The letters' maps at 0.1 mm cells.
+/// Times the letters' maps at cells of 0.1 mm, with their error.
 Case fine_map_case(const Inputs& inputs);
 
-/// Very many touches streamed into one map, of one spot or from all over the letter.
+/// Streams very many touches of one spot, or from all over a letter, into one map: time, memory and
+/// error.
 Case map_stream_case(const Inputs& inputs, bool one_spot);
 
-/// Many unknown objects one after the other, in one process and in a process each.
+/// Times the recognition of many unknown objects in turn, in one process and in a process each.
 Case many_unknowns_case(const Inputs& inputs);
 
-/// From one touch to the estimate.
+/// Times an estimate from the moment of its touch, in all and step by step.
 Case latency_case(const Inputs& inputs);
 
 }  // namespace palpate::bench

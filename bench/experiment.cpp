@@ -1,17 +1,9 @@
-#include "experiment.hpp"
-
 #include <algorithm>
 #include <array>
-#include <chrono>
-#include <filesystem>
-#include <memory>
-#include <system_error>
 
-#include <fmt/chrono.h>
 #include <fmt/format.h>
 
-#include "atomic_file.hpp"
-#include "command_files.hpp"
+#include "command_run.hpp"
 #include "comparison.hpp"
 #include "experiment_result.hpp"
 #include "letters.hpp"
@@ -25,33 +17,6 @@ namespace {
 constexpr std::uint64_t learned_seed = 1'000;  ///< of the letters' trials
 constexpr std::uint64_t unlearned_seed = 100'000'000;
 constexpr std::uint64_t particle_seed = 1;
-
-/// Before the minutes of work, so that a folder that cannot be is known at once.
-void make_folder(const std::string& folder) {
-  std::error_code error;
-  if (!folder.empty() && !std::filesystem::create_directories(folder, error) && error) {
-    throw Error(Fault::input, fmt::format("folder {}: {}; give one that can be written to", folder,
-                                          error.message()));
-  }
-}
-
-void require_distinct_outputs(const ExperimentOptions& options) {
-  CommandFiles files;
-  const auto add = [&](const char* flag, const std::string& folder,
-                       const std::vector<std::string>& names) {
-    for (const std::string& name : names) {
-      if (!folder.empty()) {
-        files.writes(flag, std::filesystem::path(folder) / name);
-      }
-    }
-  };
-  add("--csv", options.csv, table_files());
-  add("--plots", options.plots, figure_files());
-  if (!options.json.empty()) {
-    files.writes("--json", options.json);
-  }
-  files.require_distinct();
-}
 
 int least_one(const char* field, int value) {
   if (value < 1) {
@@ -155,31 +120,21 @@ ExperimentResult measure(Device& device, const ExperimentOptions& options, Repor
 }  // namespace
 
 void run_experiment(const ExperimentOptions& options, std::span<char* const> command_line) {
-  require_distinct_outputs(options);
-  std::unique_ptr<AtomicFile> file;
-  if (!options.json.empty()) {
-    file = std::make_unique<AtomicFile>(options.json);
-  }
-  make_folder(options.csv);
-  make_folder(options.plots);
-  Device device = Device::open(options.device);
-  const auto now = std::chrono::floor<std::chrono::seconds>(std::chrono::system_clock::now());
-  Report report({{"device", device.name()},
-                 {"data", "simulated letters and sensor; the paper's recordings are not public"},
-                 {"date", fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", now)},
-                 {"command line", fmt::format("{}", fmt::join(command_line, " "))}});
-  const ExperimentResult result = measure(device, options, report);
-  if (file) {
-    nlohmann::ordered_json document = report.document();
-    document.update(document_of(result));
-    file->write(document.dump(2) + "\n");
-    file->commit();
-  }
+  CommandRun run(options,
+                 {{"--json", options.json},
+                  {"--csv", options.csv, table_files()},
+                  {"--plots", options.plots, figure_files()}},
+                 command_line);
+  Report report(run.facts());
+  const ExperimentResult result = measure(run.device(), options, report);
+  Json document = report.document();
+  document.update(document_of(result));
+  run.write(options.json, document.dump(2) + "\n");
   if (!options.csv.empty()) {
     write_tables(result, options.csv);
   }
   if (!options.plots.empty()) {
-    draw_figures(result, options.plots);
+    draw_figures(document, options.plots);
   }
 }
 

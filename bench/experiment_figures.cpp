@@ -1,6 +1,6 @@
 #include <algorithm>
+#include <array>
 #include <cmath>
-#include <functional>
 #include <iterator>
 #include <optional>
 #include <string>
@@ -8,7 +8,7 @@
 #include <fmt/format.h>
 
 #include "chart.hpp"
-#include "chart_file.hpp"
+#include "command_run.hpp"
 #include "comparison.hpp"
 #include "experiment_result.hpp"
 #include "published.hpp"
@@ -17,13 +17,11 @@ namespace palpate::bench {
 
 namespace {
 
-using Value = std::function<double(const CurvePoint&)>;
+constexpr std::array figure_names{"fig6a",  "fig6b",   "fig7a",      "fig7b",       "augmented",
+                                  "errors", "refined", "pose_noise", "calibration", "none"};
 
-double accuracy_percent(const CurvePoint& point) { return 100.0 * point.accuracy; }
-double mean_error_mm(const CurvePoint& point) { return point.error ? point.error->mean_mm : NAN; }
-double refined_error_mm(const CurvePoint& point) {
-  return point.refined_error ? point.refined_error->mean_mm : NAN;
-}
+const ChartAxis touches_axis{.label = "touches", .lower = 0.0};
+constexpr const char* mean_error = "mean pose error of trials with the right letter (mm)";
 
 /// The look of the i-th series: told apart by mark and dashes as well as by colour.
 ChartSeries series_like(std::size_t i, std::string name) {
@@ -35,34 +33,47 @@ ChartSeries series_like(std::size_t i, std::string name) {
           .line = lines[i % std::size(lines)]};
 }
 
-/// A run over its touches, with the mark at every fifth so that the dashes show between them.
-ChartSeries curve(const FilterRun& run, const Value& value, ChartSeries like) {
-  like.mark_every = 5;
-  for (const CurvePoint& point : curve_of(run)) {
-    like.points.push_back({.x = static_cast<double>(point.touches), .y = value(point)});
+/// A field of records over another, a gap where a record has none.
+std::vector<ChartPoint> points_of(const Json& records, const char* x, const char* y) {
+  const auto number_of = [](const Json& record, const char* field) {
+    const Json value = field_of(record, field);
+    return value.is_null() ? NAN : value.get<double>();
+  };
+  std::vector<ChartPoint> points;
+  for (const Json& record : records) {
+    points.push_back({.x = number_of(record, x), .y = number_of(record, y)});
   }
+  return points;
+}
+
+/// A field of a run over its touches, with the mark at every fifth so that the dashes show between.
+ChartSeries curve(const Json& run, const char* field, ChartSeries like) {
+  like.mark_every = 5;
+  like.points = points_of(run.at("curve"), "/touches", field);
   return like;
 }
 
-/// One series for every run of a filter.
-void add_runs(Chart& chart, const ExperimentResult& result, const std::string& filter,
-              const Value& value, std::optional<Line> line = {}) {
-  std::size_t i = 0;
-  for (const FilterRun& run : result.runs) {
-    if (run.filter == filter) {
-      ChartSeries like = series_like(i++, run.name);
-      like.line = line.value_or(like.line);
-      chart.series.push_back(curve(run, value, std::move(like)));
-    }
+std::vector<Json> runs_of(const Json& document, const std::string& filter) {
+  std::vector<Json> runs;
+  std::ranges::copy_if(document.at("filters"), std::back_inserter(runs),
+                       [&](const Json& run) { return run.at("filter") == filter; });
+  return runs;
+}
+
+/// The largest count of a filter's runs.
+std::int64_t most_of(const Json& document, const std::string& filter) {
+  std::int64_t most = 0;
+  for (const Json& run : runs_of(document, filter)) {
+    most = std::max<std::int64_t>(most, run.at("count"));
   }
+  return most;
 }
 
-Chart chart_over_touches(ChartAxis y) {
-  return {.x = {.label = "touches", .lower = 0.0}, .y = std::move(y)};
-}
-
-ChartAxis percent_axis(std::string label) {
-  return {.label = std::move(label), .lower = 0.0, .upper = 105.0};
+/// An axis of fractions, in percent.
+ChartAxis percent_axis(std::string label, double upper = 1.05) {
+  return {.label = std::move(label), .lower = 0.0, .upper = upper, .text = [](double fraction) {
+            return fmt::format("{:.0f}", 100.0 * fraction);
+          }};
 }
 
 ChartAxis error_axis(std::string label, double lower_mm, double upper_mm) {
@@ -70,111 +81,108 @@ ChartAxis error_axis(std::string label, double lower_mm, double upper_mm) {
       .label = std::move(label), .scale = Scale::logarithmic, .lower = lower_mm, .upper = upper_mm};
 }
 
-constexpr const char* mean_error = "mean pose error where the letter is right (mm)";
-
-Chart error_chart_of(const ExperimentResult& result, const std::string& filter) {
-  Chart chart = chart_over_touches({.label = mean_error, .lower = 0.0});
-  add_runs(chart, result, filter, mean_error_mm);
-  return chart;
-}
-
-/// With the 95 % interval as a light band along every curve.
-Chart accuracy_chart_of(const ExperimentResult& result, const std::string& filter) {
-  Chart chart =
-      chart_over_touches(percent_axis("trials with the right letter, and 95 % interval (%)"));
-  std::size_t i = 0;
-  for (const FilterRun& run : result.runs) {
-    if (run.filter != filter) {
-      continue;
-    }
-    ChartSeries series = curve(run, accuracy_percent, series_like(i++, run.name));
-    series.interval = IntervalShape::band;
-    const std::vector<CurvePoint> points = curve_of(run);
-    for (std::size_t k = 0; k < points.size(); ++k) {
-      series.points[k].low = 100.0 * points[k].accuracy_interval.low;
-      series.points[k].high = 100.0 * points[k].accuracy_interval.high;
-    }
-    chart.series.push_back(std::move(series));
+/// A series for each run of a filter.
+Chart chart_of_runs(const Json& document, const std::string& filter, const char* field,
+                    ChartAxis y) {
+  Chart chart{.x = touches_axis, .y = std::move(y)};
+  for (const Json& run : runs_of(document, filter)) {
+    chart.series.push_back(curve(run, field, series_like(chart.series.size(), run.at("name"))));
   }
   return chart;
 }
 
-void draw_paper_figures(const ExperimentResult& result, const std::filesystem::path& folder) {
-  Chart fig6a = accuracy_chart_of(result, "particles");
-  fig6a.rules.push_back({.at = 100.0 * published::particle_accuracy,
+/// With the 95 % interval as a light band along every curve.
+Chart accuracy_chart(const Json& document, const std::string& filter) {
+  Chart chart = chart_of_runs(document, filter, "/accuracy",
+                              percent_axis("trials with the right letter, and 95 % interval (%)"));
+  std::size_t i = 0;
+  for (const Json& run : runs_of(document, filter)) {
+    ChartSeries& series = chart.series[i++];
+    series.interval = IntervalShape::band;
+    for (std::size_t k = 0; k < series.points.size(); ++k) {
+      series.points[k].low = run.at("curve")[k].at("accuracy_low");
+      series.points[k].high = run.at("curve")[k].at("accuracy_high");
+    }
+  }
+  return chart;
+}
+
+Chart error_chart(const Json& document, const std::string& filter) {
+  return chart_of_runs(document, filter, "/error_mm/mean", {.label = mean_error, .lower = 0.0});
+}
+
+void draw_paper_figures(const Json& document, const std::filesystem::path& folder) {
+  Chart fig6a = accuracy_chart(document, "particles");
+  fig6a.rules.push_back({.at = published::particle_accuracy,
                          .colour = comparison_grey,
                          .label = "paper: 10,000 particles level out"});
   write_chart(fig6a, folder, "fig6a");
-  write_chart(error_chart_of(result, "particles"), folder, "fig6b");
+  write_chart(error_chart(document, "particles"), folder, "fig6b");
 
-  Chart fig7a = accuracy_chart_of(result, "histogram");
-  const auto reached = [&](const char* name, Mark mark, int touches) {
+  Chart fig7a = accuracy_chart(document, "histogram");
+  const auto reached = [&](const char* name, Mark mark, double touches) {
     fig7a.series.push_back({.name = name,
                             .colour = comparison_grey,
                             .mark = mark,
-                            .points = {{.x = static_cast<double>(touches), .y = 100.0}}});
+                            .points = {{.x = touches, .y = 1.0}}});
   };
   reached("paper: 1,000 bins reach 100 %", Mark::cross, published::bins_1000_know_after);
   reached("paper: 10,000 bins reach 100 %", Mark::diamond, published::bins_10000_know_after);
   write_chart(fig7a, folder, "fig7a");
-  Chart fig7b = error_chart_of(result, "histogram");
+  Chart fig7b = error_chart(document, "histogram");
   fig7b.rules.push_back(
       {.at = published::error_mm, .colour = comparison_grey, .label = "paper: 1.3 mm"});
   write_chart(fig7b, folder, "fig7b");
 }
 
-/// The largest size of a filter.
-std::int64_t most_of(const ExperimentResult& result, const std::string& filter) {
-  std::int64_t most = 0;
-  for (const FilterRun& run : result.runs) {
-    most = run.filter == filter ? std::max(most, run.count) : most;
-  }
-  return most;
-}
-
 /// Plain and Augmented MCL, in the same colours.
-Chart augmented_chart(const ExperimentResult& result) {
-  Chart chart = chart_over_touches(percent_axis("trials with the right letter (%)"));
-  add_runs(chart, result, "particles", accuracy_percent, Line::solid);
-  add_runs(chart, result, "augmented", accuracy_percent, Line::dashed);
+Chart augmented_chart(const Json& document) {
+  const ChartAxis accuracy = percent_axis("trials with the right letter (%)");
+  Chart chart = chart_of_runs(document, "particles", "/accuracy", accuracy);
+  Chart augmented = chart_of_runs(document, "augmented", "/accuracy", accuracy);
+  for (ChartSeries& series : chart.series) {
+    series.line = Line::solid;
+  }
+  for (ChartSeries& series : augmented.series) {
+    series.line = Line::dashed;
+    chart.series.push_back(std::move(series));
+  }
   return chart;
 }
 
 /// Mean, median, 95th percentile and refined error of the finest histogram.
-Chart errors_chart(const ExperimentResult& result) {
-  const auto finest =
-      std::find_if(result.runs.begin(), result.runs.end(), [&](const FilterRun& run) {
-        return run.filter == "histogram" && run.count == most_of(result, "histogram");
-      });
-  Chart chart =
-      chart_over_touches(error_axis("pose error where the letter is right (mm)", 0.3, 30.0));
-  chart.title = finest->name;
-  const auto add = [&](double ErrorSummary::*field, std::optional<ErrorSummary> CurvePoint::*of,
-                       const char* name) {
-    const auto value = [=](const CurvePoint& point) {
-      return point.*of ? *(point.*of).*field : NAN;
-    };
-    chart.series.push_back(curve(*finest, value, series_like(chart.series.size(), name)));
-  };
-  add(&ErrorSummary::mean_mm, &CurvePoint::error, "mode, mean");
-  add(&ErrorSummary::p95_mm, &CurvePoint::error, "mode, 95th percentile");
-  add(&ErrorSummary::median_mm, &CurvePoint::error, "mode, median");
-  add(&ErrorSummary::p95_mm, &CurvePoint::refined_error, "refined, 95th percentile");
-  add(&ErrorSummary::mean_mm, &CurvePoint::refined_error, "refined, mean");
+Chart errors_chart(const Json& document) {
+  Chart chart{.x = touches_axis,
+              .y = error_axis("pose error of trials with the right letter (mm)", 0.3, 30.0)};
+  for (const Json& run : runs_of(document, "histogram")) {
+    if (run.at("count") != most_of(document, "histogram")) {
+      continue;
+    }
+    chart.title = run.at("name");
+    for (const auto& [name, field] :
+         {std::pair{"mode, mean", "/error_mm/mean"},
+          std::pair{"mode, 95th percentile", "/error_mm/p95"},
+          std::pair{"mode, median", "/error_mm/median"},
+          std::pair{"refined, 95th percentile", "/refined_error_mm/p95"},
+          std::pair{"refined, mean", "/refined_error_mm/mean"}}) {
+      chart.series.push_back(curve(run, field, series_like(chart.series.size(), name)));
+    }
+  }
   return chart;
 }
 
-/// The mode's error beside the refined pose's, of the histograms with the most bins.
-Chart refined_chart(const ExperimentResult& result) {
-  Chart chart = chart_over_touches(error_axis(mean_error, 0.2, 20.0));
-  for (const FilterRun& run : result.runs) {
-    if (run.filter == "histogram" && as_many(run.count, most_of(result, "histogram"))) {
-      const auto add = [&](const Value& value, const char* kind) {
+/// The mode's mean error beside the refined pose's, of the histograms with the most bins.
+Chart refined_chart(const Json& document) {
+  Chart chart{.x = touches_axis, .y = error_axis(mean_error, 0.2, 20.0)};
+  for (const Json& run : runs_of(document, "histogram")) {
+    if (as_many(run.at("count"), most_of(document, "histogram"))) {
+      for (const auto& [kind, field] :
+           {std::pair{"mode", "/error_mm/mean"}, std::pair{"refined", "/refined_error_mm/mean"}}) {
         chart.series.push_back(
-            curve(run, value, series_like(chart.series.size(), run.name + kind)));
-      };
-      add(mean_error_mm, ", mode");
-      add(refined_error_mm, ", refined");
+            curve(run, field,
+                  series_like(chart.series.size(),
+                              fmt::format("{}, {}", plain_text(run.at("name")), kind))));
+      }
     }
   }
   return chart;
@@ -182,87 +190,83 @@ Chart refined_chart(const ExperimentResult& result) {
 
 /// Pose errors with the array where it is reported and off by each noise, for the largest counts:
 /// colours tell the noise apart, dashes the filters.
-Chart pose_noise_chart(const ExperimentResult& result) {
-  const std::vector<FilterRun>& noisy = result.pose_noise.front().runs;
-  Chart chart = chart_over_touches(error_axis(mean_error, 0.3, 20.0));
-  chart.x.upper = static_cast<double>(noisy.front().scores.front().size());
-  bool first = true;
-  for (const FilterRun& filter : noisy) {
-    if (filter.count != most_of(result, filter.filter)) {
-      continue;
+Chart pose_noise_chart(const Json& document) {
+  Chart chart{.title = "standard deviation of the error of the reported sensor pose",
+              .x = touches_axis,
+              .y = error_axis(mean_error, 0.3, 20.0)};
+  const auto add = [&](const Json& runs, const std::string& filter, const std::string& noise,
+                       std::size_t colour) {
+    const bool first = filter == "histogram";
+    for (const Json& run : runs) {
+      if (run.at("filter") == filter && run.at("count") == most_of(document, filter)) {
+        chart.series.push_back(
+            curve(run, "/error_mm/mean",
+                  {.name = fmt::format("{}, {}", plain_text(run.at("name")), noise),
+                   .colour = series(colour),
+                   .mark = first ? Mark::circle : Mark::square,
+                   .fill = first ? MarkFill::solid : MarkFill::hollow,
+                   .line = first ? Line::solid : Line::dashed}));
+      }
     }
+  };
+  for (const char* filter : {"histogram", "particles"}) {
     std::size_t colour = 0;
-    const auto add = [&](const std::vector<FilterRun>& runs, const std::string& noise) {
-      const auto run = std::find_if(runs.begin(), runs.end(), [&](const FilterRun& candidate) {
-        return candidate.name == filter.name;
-      });
-      chart.series.push_back(curve(*run, mean_error_mm,
-                                   {.name = fmt::format("{}, {}", filter.name, noise),
-                                    .colour = series(colour++),
-                                    .mark = first ? Mark::circle : Mark::square,
-                                    .fill = first ? MarkFill::solid : MarkFill::hollow,
-                                    .line = first ? Line::solid : Line::dashed}));
-    };
-    add(result.runs, "exact");
-    for (const PoseNoiseRuns& runs : result.pose_noise) {
-      add(runs.runs,
-          fmt::format("{} mm, {} rad", runs.noise.translation_mm, runs.noise.rotation_rad));
+    add(document.at("filters"), filter, "0 mm, 0 rad", colour);
+    for (const Json& noisy : document.at("pose_noise")) {
+      add(noisy.at("filters"), filter,
+          fmt::format("{} mm, {} rad", plain_text(noisy.at("translation_mm")),
+                      plain_text(noisy.at("rotation_rad"))),
+          ++colour);
+      chart.x.upper = static_cast<double>(noisy.at("filters").front().at("curve").size());
     }
-    first = false;
   }
   return chart;
 }
 
-Chart calibration_chart(const ExperimentResult& result) {
+Chart calibration_chart(const Json& document) {
   constexpr int fewest = 10;  // estimates of which a fraction says something
-  Chart chart{.title = fmt::format("at least {} estimates per point", fewest),
-              .x = {.label = "confidence: probability of the most probable letter (%)",
-                    .lower = 0.0,
-                    .upper = 100.0},
-              .y = percent_axis("estimates that are right (%)")};
-  chart.series.push_back({.name = "as sure as right",
+  Chart chart{
+      .title = fmt::format(
+          "expected calibration error in brackets; at least {} estimates per point", fewest),
+      .x = percent_axis("confidence: probability of the most probable letter (%)", 1.0),
+      .y = percent_axis("estimates that are right (%)")};
+  chart.series.push_back({.name = "perfectly calibrated",
                           .colour = comparison_grey,
                           .mark = Mark::none,
                           .line = Line::dotted,
-                          .points = {{.x = 0.0, .y = 0.0}, {.x = 100.0, .y = 100.0}}});
-  for (const FilterRun& run : result.runs) {
-    const bool shown = run.filter == "histogram" ||
-                       (run.filter == "particles" && run.count == most_of(result, "particles"));
-    if (!shown) {
-      continue;  // all nine would hide more than they show
-    }
-    const Calibration calibration = calibration_of(run);
-    ChartSeries points =
+                          .points = {{.x = 0.0, .y = 0.0}, {.x = 1.0, .y = 1.0}}});
+  std::vector<Json> shown = runs_of(document, "histogram");
+  shown.push_back(runs_of(document, "particles").back());  // all would hide more than they show
+  for (const Json& run : shown) {
+    const Json& calibration = run.at("calibration");
+    Json bins = calibration.at("bins");
+    std::erase_if(bins.get_ref<Json::array_t&>(),
+                  [](const Json& bin) { return bin.at("count") < fewest; });
+    ChartSeries series =
         series_like(chart.series.size() - 1,
-                    fmt::format("{}, {:.1f} % off", run.name, 100.0 * calibration.expected_error));
-    for (const Calibration::Bin& bin : calibration.bins) {
-      if (bin.count >= fewest) {
-        points.points.push_back(
-            {.x = 100.0 * bin.mean_confidence, .y = 100.0 * bin.fraction_right});
-      }
-    }
-    chart.series.push_back(std::move(points));
+                    fmt::format("{} ({:.1f} %)", plain_text(run.at("name")),
+                                100.0 * calibration.at("expected_error").get<double>()));
+    series.points = points_of(bins, "/mean_confidence", "/fraction_right");
+    chart.series.push_back(std::move(series));
   }
   return chart;
 }
 
-Chart none_chart(const ExperimentResult& result) {
+Chart none_chart(const Json& document) {
   Chart chart{
       .x = {.label = "log10 of the prior weight of \"none of these\", each letter having 1"},
       .y = percent_axis("unknowns called \"none of these\" (%)")};
   std::size_t colour = 0;
-  for (const NoneRun& run : result.none) {
-    const auto add = [&](const char* who, double (NoneRun::*share)(double) const, Line line) {
-      ChartSeries curve = series_like(colour, fmt::format("{}, {} touches", who, run.touches));
-      curve.line = line;
-      curve.mark_every = 10;
-      for (const double log10_weight : sampled_log10_weights(result.none)) {
-        curve.points.push_back({.x = log10_weight, .y = 100.0 * (run.*share)(log10_weight)});
-      }
-      chart.series.push_back(std::move(curve));
-    };
-    add("never learned", &NoneRun::noticed, Line::solid);
-    add("learned", &NoneRun::lost, Line::dashed);
+  for (const Json& run : document.at("none")) {
+    for (const auto& [who, share, line] : {std::tuple{"never learned", "/noticed", Line::solid},
+                                           std::tuple{"learned", "/lost", Line::dashed}}) {
+      ChartSeries series =
+          series_like(colour, fmt::format("{}, {} touches", who, plain_text(run.at("touches"))));
+      series.line = line;
+      series.mark_every = 10;
+      series.points = points_of(run.at("curve"), "/log10_weight", share);
+      chart.series.push_back(std::move(series));
+    }
     ++colour;
   }
   return chart;
@@ -270,23 +274,16 @@ Chart none_chart(const ExperimentResult& result) {
 
 }  // namespace
 
-std::vector<std::string> figure_files() {
-  std::vector<std::string> files;
-  for (const char* name : {"fig6a", "fig6b", "fig7a", "fig7b", "augmented", "errors", "refined",
-                           "pose_noise", "calibration", "none"}) {
-    std::ranges::copy(chart_files(name), std::back_inserter(files));
-  }
-  return files;
-}
+std::vector<std::string> figure_files() { return chart_files(figure_names); }
 
-void draw_figures(const ExperimentResult& result, const std::filesystem::path& folder) {
-  draw_paper_figures(result, folder);
-  write_chart(augmented_chart(result), folder, "augmented");
-  write_chart(errors_chart(result), folder, "errors");
-  write_chart(refined_chart(result), folder, "refined");
-  write_chart(pose_noise_chart(result), folder, "pose_noise");
-  write_chart(calibration_chart(result), folder, "calibration");
-  write_chart(none_chart(result), folder, "none");
+void draw_figures(const Json& document, const std::filesystem::path& folder) {
+  draw_paper_figures(document, folder);
+  write_chart(augmented_chart(document), folder, "augmented");
+  write_chart(errors_chart(document), folder, "errors");
+  write_chart(refined_chart(document), folder, "refined");
+  write_chart(pose_noise_chart(document), folder, "pose_noise");
+  write_chart(calibration_chart(document), folder, "calibration");
+  write_chart(none_chart(document), folder, "none");
 }
 
 }  // namespace palpate::bench

@@ -1,34 +1,39 @@
 #include <algorithm>
+#include <cmath>
 #include <string>
 
 #include <fmt/format.h>
 
-#include "atomic_file.hpp"
-#include "error_json.hpp"
+#include "command_run.hpp"
 #include "experiment_result.hpp"
 
 namespace palpate::bench {
 
 namespace {
 
-using Json = nlohmann::ordered_json;
-
-Json curve_json(const FilterRun& run) {
-  Json curve = Json::array();
-  for (const CurvePoint& point : curve_of(run)) {
-    curve.push_back({{"touches", point.touches},
-                     {"accuracy", point.accuracy},
-                     {"accuracy_low", point.accuracy_interval.low},
-                     {"accuracy_high", point.accuracy_interval.high},
-                     {"mean_confidence", point.mean_confidence},
-                     {"located", point.located},
-                     {"error_mm", json_of(point.error)},
-                     {"refined_error_mm", json_of(point.refined_error)}});
-  }
-  return curve;
+/// A summary of pose errors; null where there is none.
+Json record_of(const std::optional<ErrorSummary>& error) {
+  return error
+             ? Json{{"mean", error->mean_mm}, {"median", error->median_mm}, {"p95", error->p95_mm}}
+             : Json(nullptr);
 }
 
-Json json_of(const FilterRun& run) {
+Json record_of(const FilterRun& run) {
+  Json record{{"filter", run.filter},
+              {"name", run.name},
+              {"count", run.count},
+              {"seconds", run.seconds},
+              {"curve", Json::array()}};
+  for (const CurvePoint& point : curve_of(run)) {
+    record["curve"].push_back({{"touches", point.touches},
+                               {"accuracy", point.accuracy},
+                               {"accuracy_low", point.accuracy_interval.low},
+                               {"accuracy_high", point.accuracy_interval.high},
+                               {"mean_confidence", point.mean_confidence},
+                               {"located", point.located},
+                               {"error_mm", record_of(point.error)},
+                               {"refined_error_mm", record_of(point.refined_error)}});
+  }
   const Calibration calibration = calibration_of(run);
   Json bins = Json::array();
   for (const Calibration::Bin& bin : calibration.bins) {
@@ -37,29 +42,39 @@ Json json_of(const FilterRun& run) {
                     {"mean_confidence", bin.mean_confidence},
                     {"fraction_right", bin.fraction_right}});
   }
-  return {
-      {"filter", run.filter},
-      {"name", run.name},
-      {"count", run.count},
-      {"seconds", run.seconds},
-      {"curve", curve_json(run)},
-      {"calibration", {{"expected_error", calibration.expected_error}, {"bins", std::move(bins)}}}};
+  record["calibration"] = {{"expected_error", calibration.expected_error},
+                           {"bins", std::move(bins)}};
+  return record;
 }
 
-Json json_of(const PoseNoiseRuns& noisy) {
-  Json filters = Json::array();
-  for (const FilterRun& run : noisy.runs) {
-    filters.push_back({{"filter", run.filter},
-                       {"name", run.name},
-                       {"count", run.count},
-                       {"curve", curve_json(run)}});
+Json records_of(const std::vector<FilterRun>& runs) {
+  Json records = Json::array();
+  for (const FilterRun& run : runs) {
+    records.push_back(record_of(run));
   }
-  return {{"translation_mm", noisy.noise.translation_mm},
-          {"rotation_rad", noisy.noise.rotation_rad},
-          {"filters", std::move(filters)}};
+  return records;
 }
 
-Json json_of(const NoneRun& run, const std::vector<double>& log10_weights) {
+/// Weights of "none of these", as log10, that reach beyond those at which all trials turn.
+std::vector<double> sampled_log10_weights(const std::vector<NoneRun>& runs) {
+  constexpr double step = 2.0;
+  double least = 0.0;
+  double most = 0.0;
+  for (const NoneRun& run : runs) {
+    for (const auto* weights : {&run.learned_log10_weight, &run.unlearned_log10_weight}) {
+      const auto [low, high] = std::ranges::minmax(*weights);
+      least = std::min(least, low);
+      most = std::max(most, high);
+    }
+  }
+  std::vector<double> samples;
+  for (double i = std::floor(least / step) - 1.0; i <= std::ceil(most / step) + 1.0; ++i) {
+    samples.push_back(i * step);
+  }
+  return samples;
+}
+
+Json record_of(const NoneRun& run, const std::vector<double>& log10_weights) {
   Json curve = Json::array();
   for (const double log10_weight : log10_weights) {
     curve.push_back({{"log10_weight", log10_weight},
@@ -157,35 +172,16 @@ std::string trials(const ExperimentResult& result) {
 
 }  // namespace
 
-std::vector<double> sampled_log10_weights(const std::vector<NoneRun>& runs) {
-  constexpr double step = 2.0;
-  double least = 0.0;
-  double most = 0.0;
-  for (const NoneRun& run : runs) {
-    for (const auto* weights : {&run.learned_log10_weight, &run.unlearned_log10_weight}) {
-      for (const double weight : *weights) {
-        least = std::min(least, weight);
-        most = std::max(most, weight);
-      }
-    }
-  }
-  std::vector<double> samples;
-  for (double i = std::floor(least / step) - 1.0; i <= std::ceil(most / step) + 1.0; ++i) {
-    samples.push_back(i * step);
-  }
-  return samples;
-}
-
-nlohmann::ordered_json document_of(const ExperimentResult& result) {
-  Json document{{"filters", Json::array()}, {"pose_noise", Json::array()}, {"none", Json::array()}};
-  for (const FilterRun& run : result.runs) {
-    document["filters"].push_back(json_of(run));
-  }
+Json document_of(const ExperimentResult& result) {
+  Json document{
+      {"filters", records_of(result.runs)}, {"pose_noise", Json::array()}, {"none", Json::array()}};
   for (const PoseNoiseRuns& noisy : result.pose_noise) {
-    document["pose_noise"].push_back(json_of(noisy));
+    document["pose_noise"].push_back({{"translation_mm", noisy.noise.translation_mm},
+                                      {"rotation_rad", noisy.noise.rotation_rad},
+                                      {"filters", records_of(noisy.runs)}});
   }
   for (const NoneRun& run : result.none) {
-    document["none"].push_back(json_of(run, sampled_log10_weights(result.none)));
+    document["none"].push_back(record_of(run, sampled_log10_weights(result.none)));
   }
   return document;
 }
@@ -195,16 +191,11 @@ std::vector<std::string> table_files() {
 }
 
 void write_tables(const ExperimentResult& result, const std::filesystem::path& folder) {
-  const auto write = [&](const char* name, const std::string& table) {
-    AtomicFile file(folder / name);
-    file.write(table);
-    file.commit();
-  };
-  write("curves.csv", curves(result));
-  write("calibration.csv", calibration(result));
-  write("pose_noise.csv", pose_noise(result));
-  write("none.csv", none(result));
-  write("trials.csv", trials(result));
+  write_file(folder / "curves.csv", curves(result));
+  write_file(folder / "calibration.csv", calibration(result));
+  write_file(folder / "pose_noise.csv", pose_noise(result));
+  write_file(folder / "none.csv", none(result));
+  write_file(folder / "trials.csv", trials(result));
 }
 
 }  // namespace palpate::bench

@@ -1,10 +1,9 @@
 #pragma once
 
 #include <filesystem>
+#include <span>
 #include <string>
 #include <vector>
-
-#include <nlohmann/json.hpp>
 
 #include "filter_run.hpp"
 #include "none_run.hpp"
@@ -33,13 +32,10 @@ Case case_of(const PoseNoiseRuns& noisy);
 /// "None" at even odds, and at the largest weight that loses no learned object.
 Case case_of(const NoneRun& run);
 
-/// Weights of "none of these" at which its curves are sampled, as log10.
-std::vector<double> sampled_log10_weights(const std::vector<NoneRun>& runs);
-
 /// Every curve, calibration and "none" table, as `filters`, `pose_noise` and `none`.
-nlohmann::ordered_json document_of(const ExperimentResult& result);
+Json document_of(const ExperimentResult& result);
 
-/// The files that write_tables() and draw_figures() make of a result in their folders.
+/// The files that write_tables() and draw_figures() make in their folders.
 std::vector<std::string> table_files();
 std::vector<std::string> figure_files();
 
@@ -48,9 +44,9 @@ std::vector<std::string> figure_files();
 /// @throws Error where the disk refuses
 void write_tables(const ExperimentResult& result, const std::filesystem::path& folder);
 
-/// Draws the paper's Fig. 6a, 6b, 7a and 7b with its headline numbers marked, and what goes beyond
-/// it, each as PNG and SVG.
+/// Draws the document's Fig. 6a, 6b, 7a and 7b with the paper's headline numbers marked, and what
+/// goes beyond the paper, each as PNG and SVG.
 /// @throws Error where the disk refuses
-void draw_figures(const ExperimentResult& result, const std::filesystem::path& folder);
+void draw_figures(const Json& document, const std::filesystem::path& folder);
 
 }  // namespace palpate::bench

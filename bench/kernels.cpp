@@ -1,14 +1,5 @@
-#include "kernels.hpp"
-
-#include <chrono>
-#include <memory>
-#include <thread>
-
-#include <fmt/chrono.h>
-#include <fmt/format.h>
-
-#include "atomic_file.hpp"
 #include "cases.hpp"
+#include "command_run.hpp"
 #include "letters.hpp"
 #include "measurement.hpp"
 
@@ -16,7 +7,7 @@ namespace palpate::bench {
 
 namespace {
 
-Inputs make_inputs(Device& device, const KernelOptions& options) {
+Inputs make_inputs(Device& device, const RunOptions& options) {
   Inputs inputs{
       .device = device,
       .device_name = options.device,
@@ -28,23 +19,27 @@ Inputs make_inputs(Device& device, const KernelOptions& options) {
   return inputs;
 }
 
-void measure_all(const Inputs& inputs, Report& report) {
-  const bool quick = inputs.quick;
-  {
+}  // namespace
+
+PoseHistogram letter_histogram(const Inputs& inputs, const PoseLattice& lattice) {
+  return {inputs.device, inputs.letters, HistogramOptions{.lattice = lattice}};
+}
+
+void measure_kernels(const RunOptions& options, std::span<char* const> command_line) {
+  CommandRun run(options, {{"--json", options.json}}, command_line);
+  const bool quick = options.quick;
+  const Inputs inputs = make_inputs(run.device(), options);
+  Report report(run.facts());
+  const PoseLattice fine = lattice_of(200, 200, quick ? 4 : 250);
+  const PoseLattice middle = lattice_of(100, 100, quick ? 4 : 100);
+  for (const auto& [lattice, goal_ns] :
+       {std::pair{fine, 0.8}, std::pair{middle, 1.2}, std::pair{lattice_of(25, 25, 16), 4.0}}) {
     restart_peak_memory();
-    PoseHistogram histogram = letter_histogram(inputs, lattice_of(200, 200, quick ? 4 : 250));
-    report.add(likelihood_case(inputs, histogram, 0.8));
-    report.add(reduction_case(inputs, histogram));
-  }
-  {
-    restart_peak_memory();
-    PoseHistogram histogram = letter_histogram(inputs, lattice_of(100, 100, quick ? 4 : 100));
-    report.add(likelihood_case(inputs, histogram, 1.2));
-  }
-  {
-    restart_peak_memory();
-    PoseHistogram histogram = letter_histogram(inputs, lattice_of(25, 25, 16));
-    report.add(likelihood_case(inputs, histogram, 4.0));
+    PoseHistogram histogram = letter_histogram(inputs, lattice);
+    report.add(likelihood_case(inputs, histogram, goal_ns));
+    if (lattice.x_mm.count == fine.x_mm.count) {
+      report.add(reduction_case(inputs, histogram));
+    }
   }
   report.add(accuracy_case(inputs, lattice_of(100, 100, 1)));
   report.add(accuracy_case(inputs, lattice_of(25, 25, quick ? 2 : 16)));
@@ -53,32 +48,7 @@ void measure_all(const Inputs& inputs, Report& report) {
   report.add(map_stream_case(inputs, false));
   report.add(many_unknowns_case(inputs));
   report.add(latency_case(inputs));
-}
-
-}  // namespace
-
-PoseHistogram letter_histogram(const Inputs& inputs, const PoseLattice& lattice) {
-  return {inputs.device, inputs.letters, HistogramOptions{.lattice = lattice}};
-}
-
-void measure_kernels(const KernelOptions& options, std::span<char* const> command_line) {
-  // Before the minutes of work, so that a wrong name is known at once.
-  std::unique_ptr<AtomicFile> file;
-  if (!options.json.empty()) {
-    file = std::make_unique<AtomicFile>(options.json);
-  }
-  Device device = Device::open(options.device);
-  const auto now = std::chrono::floor<std::chrono::seconds>(std::chrono::system_clock::now());
-  Report report({{"device", device.name()},
-                 {"host threads", std::thread::hardware_concurrency()},
-                 {"compiler", PALPATE_COMPILER},
-                 {"date", fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", now)},
-                 {"command line", fmt::format("{}", fmt::join(command_line, " "))}});
-  measure_all(make_inputs(device, options), report);
-  if (file) {
-    file->write(report.document().dump(2) + "\n");
-    file->commit();
-  }
+  run.write(options.json, report.document().dump(2) + "\n");
 }
 
 }  // namespace palpate::bench

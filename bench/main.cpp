@@ -5,61 +5,68 @@
 
 #include <CLI/CLI.hpp>
 
-#include "experiment.hpp"
-#include "kernels.hpp"
+#include "commands.hpp"
 #include "palpate/error.hpp"
 #include "standard_streams.hpp"
-#include "sweep.hpp"
+
+namespace palpate::bench {
+namespace {
+
+/// A subcommand with the flags that all have, which calls `run` with the options.
+template <typename Options>
+CLI::App* add_command(CLI::App& app, const char* name, const char* description, Options& options,
+                      void (*run)(const Options&, std::span<char* const>),
+                      std::span<char* const> command_line) {
+  CLI::App* command = app.add_subcommand(name, description);
+  command->add_option("--json", options.json, "Write the results to this file");
+  command->add_flag("--quick", options.quick, "Small sizes and few trials, in less than a minute");
+  command->add_option("--device", options.device, "Vulkan device, by a part of its name or index");
+  command->callback([&options, run, command_line] { run(options, command_line); });
+  return command;
+}
+
+}  // namespace
+}  // namespace palpate::bench
 
 int main(int argc, char** argv) {
+  using namespace palpate::bench;
   palpate::open_closed_streams();
+  const std::span<char* const> command_line(argv, argc);
   CLI::App app("Measures Palpate's speed and accuracy on simulated letters.", "palpate-bench");
   app.require_subcommand(1);
-  palpate::bench::KernelOptions options;
-  auto* kernels = app.add_subcommand(
-      "kernels",
-      "Likelihood (ns per pose bin, element and touch), reductions (ms), maps (s), many unknowns "
-      "(per second) and latency (ms), with errors in nats against float64; takes some minutes");
-  kernels->add_option("--json", options.json, "Also write the results to this file");
-  kernels->add_flag("--quick", options.quick, "Small sizes, in less than a minute");
-  kernels->add_option("--device", options.device, "Vulkan device, by a part of its name or index");
-  kernels->callback([&] { palpate::bench::measure_kernels(options, std::span(argv, argc)); });
-  palpate::bench::ExperimentOptions experiment_options;
-  auto* experiment = app.add_subcommand(
-      "experiment",
-      "The paper's Sec. IV on simulated letters: identity and pose error against the number of "
-      "touches, for histogram and particle filters; calibration; misplaced touches; objects "
-      "never learned");
-  experiment->add_option("--trials", experiment_options.trials,
-                         "Trials per letter, 10 by default, or 4 with --quick");
-  experiment->add_option("--touches", experiment_options.touches,
-                         "Touches per trial, 50 by default, or 12 with --quick; at most 192");
-  experiment->add_option("--json", experiment_options.json, "Also write the results to this file");
-  experiment->add_option("--csv", experiment_options.csv, "Also write tables to this folder");
-  experiment->add_option("--plots", experiment_options.plots,
-                         "Also draw the paper's figures in this folder, as PNG and SVG");
-  experiment->add_flag("--quick", experiment_options.quick, "Few trials and touches, in seconds");
-  experiment->add_option("--device", experiment_options.device,
-                         "Vulkan device, by a part of its name or index");
-  experiment->callback(
-      [&] { palpate::bench::run_experiment(experiment_options, std::span(argv, argc)); });
-  palpate::bench::SweepOptions sweep_options;
-  auto* sweep = app.add_subcommand(
-      "sweep",
-      "Speed against error on simulated letters: every filter from 100 to 10,000,000 bins per "
-      "object and maps of several cell sizes; takes many minutes on a CPU");
-  sweep->add_option("--json", sweep_options.json, "Also write the results to this file");
-  sweep->add_option("--html", sweep_options.html, "Also write them as a page with charts");
-  sweep->add_option("--plots", sweep_options.plots,
-                    "Also write the page's charts to this folder, as PNG and SVG");
-  sweep->add_option("--max-bins", sweep_options.max_bins, "Most bins per object");
-  sweep->add_option("--trials", sweep_options.trials,
-                    "Trials per letter, 10 by default, or 4 with --quick; few of them in full "
-                    "where bins are many");
-  sweep->add_flag("--quick", sweep_options.quick, "Few counts and trials, in less than a minute");
-  sweep->add_option("--device", sweep_options.device,
-                    "Vulkan device, by a part of its name or index");
-  sweep->callback([&] { palpate::bench::run_sweep(sweep_options, std::span(argv, argc)); });
+  RunOptions kernels;
+  add_command(
+      app, "kernels",
+      "Measure every kernel, in some minutes on two CPU cores: likelihood (ns per pose bin, "
+      "element and touch), reductions (ms), maps (s), many unknowns (per second) and "
+      "latency (ms), with errors in nats against float64",
+      kernels, measure_kernels, command_line);
+  constexpr const char* trials = "Trials per letter (default 10, or 4 with --quick)";
+  ExperimentOptions experiment;
+  CLI::App* command = add_command(
+      app, "experiment",
+      "Repeat Sec. IV of the paper on simulated letters: identity and pose error against the "
+      "number of touches, for histogram and particle filters; calibration; misplaced touches; "
+      "objects never learned",
+      experiment, run_experiment, command_line);
+  command->add_option("--trials", experiment.trials, trials);
+  command->add_option("--touches", experiment.touches,
+                      "Touches per trial, at most 192 (default 50, or 12 with --quick)");
+  command->add_option("--csv", experiment.csv, "Write tables to this folder");
+  command->add_option("--plots", experiment.plots,
+                      "Draw the paper's figures in this folder, as PNG and SVG");
+  SweepOptions sweep;
+  command = add_command(app, "sweep",
+                        "Measure speed against error on simulated letters, in some 20 minutes on "
+                        "two CPU cores: every filter, from 100 to 10,000,000 bins per object, on "
+                        "maps of several cell sizes",
+                        sweep, run_sweep, command_line);
+  command->add_option("--html", sweep.html, "Write the results as a page with charts and tables");
+  command->add_option("--plots", sweep.plots,
+                      "Draw the page's charts in this folder, as PNG and SVG");
+  command->add_option("--max-bins", sweep.max_bins,
+                      "Most bins per object (default 10,000,000, or 100,000 with --quick)");
+  command->add_option("--trials", sweep.trials, trials);
   try {
     try {
       app.parse(argc, argv);

@@ -8,21 +8,6 @@ namespace palpate::bench {
 
 namespace {
 
-/// Strings as they are, lists of them separated by semicolons, anything else as JSON.
-std::string text_of(const nlohmann::ordered_json& value) {
-  if (value.is_string()) {
-    return value.get<std::string>();
-  }
-  if (value.is_array() && !value.empty() && value.front().is_string()) {
-    std::string text;
-    for (const auto& item : value) {
-      text += (text.empty() ? "" : "; ") + item.get<std::string>();
-    }
-    return text;
-  }
-  return value.dump();
-}
-
 std::string row(const std::string& name, const Measurement& m) {
   std::string goal;
   std::string reached;
@@ -43,37 +28,38 @@ bool Measurement::reached() const {
   return !goal || (goal->kind == Goal::Kind::at_most ? value <= goal->value : value >= goal->value);
 }
 
-Report::Report(nlohmann::ordered_json facts) : document_(std::move(facts)) {
-  for (const auto& [name, value] : document_.items()) {
-    fmt::print("{}: {}  \n", name, text_of(value));
+Json record_of(const Measurement& m) {
+  Json record{{"name", m.name}, {"value", m.value}, {"unit", m.unit}};
+  if (m.goal) {
+    record[m.goal->kind == Goal::Kind::at_most ? "at_most" : "at_least"] = m.goal->value;
+    record["reached"] = m.reached();
   }
-  document_["cases"] = nlohmann::ordered_json::array();
+  if (m.interval) {
+    record["low"] = m.interval->low;
+    record["high"] = m.interval->high;
+  }
+  return record;
+}
+
+Report::Report(Json facts) : document_(std::move(facts)) {
+  document_["cases"] = Json::array();
   fmt::print("\n| {:<28} | {:<46} | {:<28} | {:<8} | {:<7} |\n|:--|:--|--:|:--|:--|\n", "case",
              "measured", "value", "goal", "reached");
   std::fflush(stdout);
 }
 
 void Report::add(const Case& measured) {
-  nlohmann::ordered_json record{{"name", measured.name}};
+  Json record{{"name", measured.name}};
   std::string facts;
   for (const auto& [name, value] : measured.facts.items()) {
     record[name] = value;
-    facts += fmt::format("{}{}: {}", facts.empty() ? "" : ", ", name, text_of(value));
+    facts += fmt::format("{}{}: {}", facts.empty() ? "" : ", ", name, plain_text(value));
   }
-  record["measurements"] = nlohmann::ordered_json::array();
+  record["measurements"] = Json::array();
   fmt::print("| **{}** | {} | | | |\n", measured.name, facts);
   for (const Measurement& m : measured.measurements) {
     fmt::print("{}\n", row(measured.name, m));
-    nlohmann::ordered_json entry{{"name", m.name}, {"value", m.value}, {"unit", m.unit}};
-    if (m.goal) {
-      entry[m.goal->kind == Goal::Kind::at_most ? "at_most" : "at_least"] = m.goal->value;
-      entry["reached"] = m.reached();
-    }
-    if (m.interval) {
-      entry["low"] = m.interval->low;
-      entry["high"] = m.interval->high;
-    }
-    record["measurements"].push_back(std::move(entry));
+    record["measurements"].push_back(record_of(m));
   }
   std::fflush(stdout);
   document_["cases"].push_back(std::move(record));

@@ -4,9 +4,8 @@
 #include <string>
 #include <vector>
 
-#include <nlohmann/json.hpp>
-
 #include "measurement.hpp"
+#include "table.hpp"
 
 namespace palpate::bench {
 
@@ -27,27 +26,28 @@ struct Measurement {
 
   bool reached() const;
 };
+/// Name, value and unit; the goal, and whether it is reached; the interval.
+Json record_of(const Measurement& measurement);
 
-/// One case: what was run, and what was measured. `facts` are its sizes and whatever else explains
-/// the numbers.
+/// What was measured in one case. `facts` are its sizes and whatever else explains the numbers.
 struct Case {
   std::string name;
-  nlohmann::ordered_json facts;
+  Json facts;
   std::vector<Measurement> measurements = {};
 };
 
 /// Prints every case as rows of one Markdown table, as soon as it is known, and keeps all of them.
 class Report {
  public:
-  /// Prints the table's head below a line per fact, such as the device and the command line.
-  explicit Report(nlohmann::ordered_json facts);
+  /// Prints the table's head.
+  explicit Report(Json facts);
 
   void add(const Case& measured);
   /// The facts, and `cases`.
-  const nlohmann::ordered_json& document() const { return document_; }
+  const Json& document() const { return document_; }
 
  private:
-  nlohmann::ordered_json document_;
+  Json document_;
 };
 
 }  // namespace palpate::bench

@@ -4,11 +4,14 @@
 
 #include <fmt/format.h>
 
+#include "pose_window.hpp"
+#include "sweep_document.hpp"
+
 namespace palpate::bench {
 
 namespace {
 
-/// What is otherwise. `sensor` holds for training and trials alike.
+/// What is changed. `sensor` holds for training and trials alike.
 struct Variant {
   std::string name;
   TouchingSensor sensor = {};
@@ -29,7 +32,7 @@ std::vector<glm::dvec2> square_array(int n, double pitch_mm) {
   return elements_mm;
 }
 
-std::vector<Variant> variants_of(const LimitPlan& plan) {
+std::vector<Variant> variants_of(const SweepPlan& plan) {
   std::vector<Variant> variants;
   const auto add = [&variants](const std::string& name) -> Variant& {
     variants.emplace_back().name = name;
@@ -80,36 +83,58 @@ std::vector<Variant> variants_of(const LimitPlan& plan) {
   return variants;
 }
 
-Limit measure(Device& device, const LearnedLetters& learned, std::span<const Recording> trials,
-              const PoseLattice& lattice) {
-  Limit limit{
-      .name = {}, .count = lattice.bins(), .elements = trials.front().elements(), .errors = {}};
+std::vector<TrialErrors> errors_of(Device& device, const LearnedLetters& learned,
+                                   std::span<const Recording> trials, const BinCounts& bins) {
+  std::vector<TrialErrors> errors;
   for (const Recording& trial : trials) {
-    limit.errors.push_back(estimate_in_window(device, learned, trial, lattice).errors);
+    errors.push_back(estimate_in_window(device, learned, trial, lattice_with(bins)).errors);
   }
-  return limit;
+  return errors;
+}
+
+/// What a run is compared with.
+struct Compared {
+  Json name;  ///< null for nothing
+  std::vector<TrialErrors> errors;
+};
+
+Json record_of(const Variant& variant, const BinCounts& bins, std::span<const TrialErrors> errors,
+               const Compared& with) {
+  const auto difference = [&](PoseKind kind) {
+    return with.name.is_null() ? Json(nullptr)
+                               : difference_of(paired_errors(errors, with.errors, kind));
+  };
+  return {{"name", variant.name},
+          {"count", product(bins)},
+          {"elements", variant.sensor.elements_mm.size()},
+          {"error_mm", record_of(errors_over(errors, PoseKind::mode))},
+          {"refined_error_mm", record_of(errors_over(errors, PoseKind::refined))},
+          {"against", with.name},
+          {"difference_mm", difference(PoseKind::mode)},
+          {"refined_difference_mm", difference(PoseKind::refined)}};
 }
 
 }  // namespace
 
-std::vector<Limit> measure_limits(Device& device, const LimitPlan& plan) {
-  std::vector<Limit> limits;
+Json measure_limits(Device& device, const SweepPlan& plan) {
+  Json limits = Json::array();
+  Compared unchanged;
   for (Variant& variant : variants_of(plan)) {
     const LearnedLetters learned = learn_letters(
         device, variant.map, training_recordings(variant.sensor, variant.training_poses));
     variant.trials.sensor = variant.sensor;
     const std::vector<Recording> trials =
-        make_trials(vowels, plan.trials_each, plan.touches, plan.seed, variant.trials);
-    const std::size_t first = limits.size();
-    for (const BinCounts& bins : plan.lattices) {
-      const bool is_first = limits.size() == first;
-      if (!is_first && !variant.all_lattices) {
-        break;
+        make_trials(vowels, plan.limit_trials_each, touches_per_trial, trial_seed, variant.trials);
+    Compared with = unchanged;
+    for (const BinCounts& bins :
+         std::span(plan.limits).first(variant.all_lattices ? plan.limits.size() : 1)) {
+      std::vector<TrialErrors> errors = errors_of(device, learned, trials, bins);
+      limits.push_back(record_of(variant, bins, errors, with));
+      if (unchanged.name.is_null()) {
+        unchanged = {variant.name, errors};
       }
-      limits.push_back(measure(device, learned, trials, lattice_with(bins)));
-      limits.back().name = variant.name;
-      if (!is_first || first > 0) {
-        limits.back().against = is_first ? 0 : first;
+      if (bins == plan.limits.front()) {
+        with = {count_text(static_cast<double>(product(bins))) + " bins", std::move(errors)};
       }
     }
   }

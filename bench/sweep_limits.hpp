@@ -1,37 +1,16 @@
 #pragma once
 
-#include <cstdint>
-#include <optional>
-#include <string>
-#include <vector>
-
+#include "palpate/device.hpp"
 #include "sweep_plan.hpp"
-#include "sweep_point.hpp"
+#include "table.hpp"
 
 namespace palpate::bench {
 
-/// Pose errors of all trials on one lattice where one thing about the sensor, its touches or the
-/// maps is otherwise, from windows: of how well the object and its neighbourhood are found they say
-/// nothing.
-struct Limit {
-  std::string name;
-  std::int64_t count = 0;    ///< bins per object
-  std::size_t elements = 0;  ///< of the array
-  std::vector<TrialErrors> errors;
-  std::optional<std::size_t> against = {};  ///< the limit it is compared with
-};
-
-struct LimitPlan {
-  std::vector<BinCounts> lattices;  ///< the first for every variant, all for arrays
-  int trials_each = 0;
-  int touches = 0;
-  std::uint64_t seed = 0;  ///< of the trials
-  bool quick = false;      ///< two of the variants
-};
-
-/// Where the errors that no bin mends come from: the variants one by one, each against the first,
-/// which is as everywhere else; the arrays, that one's included, on all lattices, each against its
-/// first.
-std::vector<Limit> measure_limits(Device& device, const LimitPlan& plan);
+/// Where the errors come from that more bins do not mend: changes one thing about the sensor, its
+/// touches or the maps at a time and returns a record of each variant on each lattice, with pose
+/// errors from windows (estimate_in_window()). Every variant is compared with the first, which
+/// changes nothing, on the first of plan.limits; arrays, its own included, also run on the other
+/// lattices, each compared with the same array on the first.
+Json measure_limits(Device& device, const SweepPlan& plan);
 
 }  // namespace palpate::bench

@@ -10,6 +10,7 @@
 #include "one_bin_kernel.hpp"
 #include "palpate/error.hpp"
 #include "palpate/pose_histogram.hpp"
+#include "sweep_document.hpp"
 
 namespace palpate::bench {
 
@@ -51,8 +52,8 @@ std::string path_of(const PoseHistogram& histogram) {
 
 }  // namespace
 
-std::vector<Precision> compare_paths(Device& device, const LearnedLetters& learned,
-                                     const Recording& unknown, const PoseLattice& lattice) {
+Json compare_paths(Device& device, const LearnedLetters& learned, const Recording& unknown,
+                   const PoseLattice& lattice) {
   const ContactLikelihood product{.prior = learned.objects.front().map.prior};
   const ContactLikelihood logs{.gamma = 0.0, .prior = product.prior};
   const std::vector<Touch> moving = unknown.touches(0, timed_touches);
@@ -79,26 +80,28 @@ std::vector<Precision> compare_paths(Device& device, const LearnedLetters& learn
       way("one-bin kernel", product, moving, one_bin),
       way("CPU loop", product, moving, cpu_loop),
   };
-  std::vector<Precision> compared;
+  Json compared = Json::array();
   std::vector<std::function<void()>> contenders;
   for (const Way& one : ways) {
     const auto first = std::span(one.touches).first(1);
     one.update(first);
-    compared.push_back(
-        {.path = one.path,
-         .count = lattice.bins(),
-         .deviation = deviation_of(likelihood_errors(learned.objects, one.model, lattice, first,
-                                                     sampled_bins, one.log_likelihood),
-                                   learned)});
+    const Deviation deviation =
+        deviation_of(likelihood_errors(learned.objects, one.model, lattice, first, sampled_bins,
+                                       one.log_likelihood),
+                     learned);
+    compared.push_back({{"path", one.path},
+                        {"count", lattice.bins()},
+                        {"nanoseconds", nullptr},
+                        {"deviation_nats", record_of(deviation)}});
     contenders.emplace_back([&one] { one.update(one.touches); });
-    contenders.back()();
+    contenders.back()();  // warms up
   }
   const std::vector<std::vector<double>> seconds = interleave(contenders, repeats);
   const double evaluations = static_cast<double>(lattice.bins()) *
                              static_cast<double>(learned.objects.size() * unknown.elements()) *
                              timed_touches;
   for (std::size_t i = 0; i < compared.size(); ++i) {
-    compared[i].nanoseconds = 1e9 * median(seconds[i]) / evaluations;
+    compared[i]["nanoseconds"] = 1e9 * median(seconds[i]) / evaluations;
   }
   return compared;
 }

@@ -28,29 +28,27 @@ std::vector<BinCounts> scaled(std::initializer_list<double> counts) {
   return lattices;
 }
 
+std::vector<BinCounts> with_table_1(std::vector<BinCounts> lattices) {
+  lattices.insert(lattices.end(), table_1.begin(), table_1.end());
+  return lattices;
+}
+
 std::vector<CellPlan> quick_cells() {
-  CellPlan paper{.cell_mm = goal_cell_mm,
-                 .lattices = scaled({1e2, 1e3, 1e4, 1e5}),
-                 .particles = {1'000, 10'000},
-                 .compared = {{25, 25, 4}, {100, 100, 2}}};
-  paper.lattices.insert(paper.lattices.end(), {table_1[0], table_1[1], table_1[2]});
-  return {{.cell_mm = 1.0, .lattices = scaled({1e3, 1e4, 1e5}), .particles = {}, .compared = {}},
-          paper};
+  return {{.cell_mm = 1.0, .lattices = scaled({1e3, 1e4, 1e5})},
+          {.cell_mm = goal_cell_mm,
+           .lattices = with_table_1(scaled({1e2, 1e3, 1e4, 1e5})),
+           .particles = {1'000, 10'000},
+           .compared = {{25, 25, 4}, {100, 100, 2}}}};
 }
 
 std::vector<CellPlan> full_cells() {
-  const auto alone = [](double cell_mm) {
-    return CellPlan{.cell_mm = cell_mm,
-                    .lattices = scaled({1e2, 1e3, 1e4, 1e5, 1e6, 1e7}),
-                    .particles = {},
-                    .compared = {}};
-  };
-  CellPlan paper{.cell_mm = goal_cell_mm,
-                 .lattices = scaled({1e2, 1e3, 1e4, 3e4, 1e5, 3e5, 1e6, 3e6, 1e7}),
-                 .particles = {100, 1'000, 10'000, 100'000, 1'000'000},
-                 .compared = {{25, 25, 16}, {50, 50, 40}, {100, 100, 10}, {200, 200, 4}}};
-  paper.lattices.insert(paper.lattices.end(), table_1.begin(), table_1.end());
-  return {alone(1.0), paper, alone(0.25)};
+  const std::vector<BinCounts> decades = scaled({1e2, 1e3, 1e4, 1e5, 1e6, 1e7});
+  return {{.cell_mm = 1.0, .lattices = decades},
+          {.cell_mm = goal_cell_mm,
+           .lattices = with_table_1(scaled({1e2, 1e3, 1e4, 3e4, 1e5, 3e5, 1e6, 3e6, 1e7})),
+           .particles = {100, 1'000, 10'000, 100'000, 1'000'000},
+           .compared = {{25, 25, 16}, {50, 50, 40}, {100, 100, 10}, {200, 200, 4}}},
+          {.cell_mm = 0.25, .lattices = decades}};
 }
 
 }  // namespace
@@ -82,7 +80,8 @@ SweepPlan plan_of(const SweepOptions& options) {
                  .most_full = options.quick ? 50'000 : 320'000,
                  .most_twice = options.quick ? 50'000 : 1'200'000,
                  .cells = options.quick ? quick_cells() : full_cells(),
-                 .limits = {goal_bins}};
+                 .limits = {goal_bins},
+                 .quick = options.quick};
   plan.limit_trials_each = options.quick ? std::min(plan.trials_each, 2) : plan.trials_each;
   if (!options.quick) {
     plan.limits.insert(plan.limits.end(), {scaled(3e5), scaled(3e6)});

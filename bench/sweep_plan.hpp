@@ -4,8 +4,8 @@
 #include <cstdint>
 #include <vector>
 
+#include "commands.hpp"
 #include "palpate/lattice.hpp"
-#include "sweep.hpp"
 
 namespace palpate::bench {
 
@@ -18,35 +18,38 @@ PoseLattice lattice_with(const BinCounts& bins);
 inline constexpr BinCounts goal_bins = {64, 64, 244};
 inline constexpr double goal_cell_mm = 0.5;
 
-/// Cells of one size and the lattices to try with their maps.
+inline constexpr int touches_per_trial = 15;
+inline constexpr std::uint64_t trial_seed = 1'000;  ///< the experiment's
+
+/// What is run on maps of one cell size.
 struct CellPlan {
   double cell_mm = 0.0;
-  std::vector<BinCounts> lattices;  ///< by rising count
-  std::vector<int> particles;
-  std::vector<BinCounts> compared;  ///< with the baselines
+  std::vector<BinCounts> lattices = {};  ///< by rising count
+  std::vector<int> particles = {};
+  std::vector<BinCounts> compared = {};  ///< lattices for compare_paths()
 };
 
 /// What is measured, in this order.
 struct SweepPlan {
-  int trials_each = 0;  ///< for every letter
-  // Bins per object, but for the goal's lattice, up to which every trial is in full, and two of
-  // every letter; beyond, one.
-  std::int64_t most_full = 0;
-  std::int64_t most_twice = 0;
+  int trials_each = 0;          ///< for every letter
+  std::int64_t most_full = 0;   ///< bins per object up to which all trials get the full posterior
+  std::int64_t most_twice = 0;  ///< the same for two trials of every letter; beyond, one trial does
   std::vector<CellPlan> cells;
-  std::vector<BinCounts> limits;  ///< their lattices
+  std::vector<BinCounts> limits;  ///< lattices of measure_limits()
   int limit_trials_each = 0;
+  bool quick = false;  ///< two of the limits' variants
 
-  /// Trials of every letter with the full posterior, at most trials_each.
+  /// Trials of every letter that get the full posterior: all of them on the goal's lattice.
   int full_each(double cell_mm, const BinCounts& bins) const;
   /// Trials of every letter for this many particles.
   int particle_trials_each(int particles) const;
 };
 
-/// Counts in the proportions of the goal's lattice and, for cells of 0.5 mm, the paper's Table I.
+/// Lattices in the proportions of the goal's and, for cells of 0.5 mm, those of the paper's Table
+/// I.
 SweepPlan plan_of(const SweepOptions& options);
 
-/// One of the proportions of the goal's lattice, not of Table I.
+/// Whether the lattice has the proportions of the goal's, and is none of Table I.
 bool is_balanced(const BinCounts& bins);
 
 }  // namespace palpate::bench

@@ -64,7 +64,9 @@ void expect_windows(const nlohmann::json& document) {
     }
   }
   EXPECT_GT(compared, 0);
-  EXPECT_NE(document.at("windows").get<std::string>().find("recognised"), std::string::npos);
+  EXPECT_TRUE(document.at("windows").get<std::string>().starts_with(
+      "Of " + std::to_string(compared) + " trials with the full posterior"))
+      << document["windows"];
 }
 
 /// Mean of the first run's errors over the second's, over the trials that both located.
@@ -107,6 +109,31 @@ void expect_order(const nlohmann::json& points) {
     EXPECT_EQ(finest.at("accuracy"), 1.0);
     EXPECT_LT(finest.at("refined_error_mm").at("mean"), finest.at("error_mm").at("mean"))
         << "a pose between the bins is nearer than the bin";
+  }
+}
+
+/// Each step is of two runs of the document, and its errors are those of the trials that both
+/// locate.
+void expect_steps(const nlohmann::json& knee, const nlohmann::json& points) {
+  ASSERT_FALSE(knee.at("steps").empty());
+  const auto run_of = [&](const nlohmann::json& count) {
+    return *std::find_if(points.begin(), points.end(), [&](const nlohmann::json& point) {
+      return point.at("balanced") == true && point.at("cell_mm") == knee.at("cell_mm") &&
+             point.at("count") == count;
+    });
+  };
+  for (const auto& step : knee["steps"]) {
+    const nlohmann::json from = run_of(step.at("from"));
+    const nlohmann::json to = run_of(step.at("to"));
+    EXPECT_GE(step["to"].get<int>(), 5 * step["from"].get<int>());
+    for (const auto& [change, errors] :
+         {std::pair{"error_mm", "errors_mm"}, std::pair{"refined_error_mm", "refined_errors_mm"}}) {
+      const double less =
+          step.at(change).at("from").get<double>() / step[change].at("to").get<double>();
+      EXPECT_NEAR(less, paired_ratio(from, to, errors), 1e-9);
+      EXPECT_NEAR(step[change].at("mean").get<double>(),
+                  step[change]["to"].get<double>() - step[change]["from"].get<double>(), 1e-9);
+    }
   }
 }
 
@@ -173,14 +200,19 @@ void expect_page(const std::filesystem::path& file, const nlohmann::json& docume
   for (const char* fact : {"device", "date", "command line"}) {
     EXPECT_NE(page.find(document.at(fact).get<std::string>()), std::string::npos) << fact;
   }
+  EXPECT_EQ(page.find("{{"), std::string::npos) << "a part of the template is missing";
   std::size_t rows = 0;
   for (std::size_t at = page.find("<tr><td"); at != std::string::npos;
        at = page.find("<tr><td", at + 1)) {
     ++rows;
   }
-  EXPECT_EQ(rows, document.at("points").size() + document.at("precisions").size() +
-                      document.at("limits").size())
-      << "three tables";
+  std::size_t expected = document.at("points").size() + document.at("precisions").size() +
+                         document.at("limits").size();
+  for (const auto& knee : document.at("knees")) {
+    expected += knee.at("steps").size();
+    EXPECT_NE(page.find(knee.at("sentence").get<std::string>()), std::string::npos);
+  }
+  EXPECT_EQ(rows, expected) << "four tables; there are no goals in a quick run";
 }
 
 TEST(Sweep, QuickRunKeepsTheOrderAndTheErrorBounds) {
@@ -219,6 +251,7 @@ TEST(Sweep, QuickRunKeepsTheOrderAndTheErrorBounds) {
     EXPECT_GT(knee.at("floor_mm").at("mean"), 0.0);
     EXPECT_EQ(knee["floor_mm"].at("trials"), trials);
     EXPECT_NE(knee.at("sentence").get<std::string>().find("--bins auto takes"), std::string::npos);
+    expect_steps(knee, document.at("points"));
   }
   expect_page(folder / "s.html", document);
   for (const char* chart : {"front", "precision", "bins"}) {

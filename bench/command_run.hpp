@@ -1,0 +1,58 @@
+#pragma once
+
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "atomic_file.hpp"
+#include "chart.hpp"
+#include "commands.hpp"
+#include "palpate/device.hpp"
+#include "table.hpp"
+
+namespace palpate::bench {
+
+/// What a flag asks to be written: a file, or files of these names in a folder.
+struct Output {
+  const char* flag;
+  std::string path;  ///< empty where nothing is asked for
+  std::vector<std::string> names = {};
+};
+
+/// A run of a command: its device, the facts that explain its numbers, and its files.
+class CommandRun {
+ public:
+  /// Opens the outputs, then the device, and prints the facts: what cannot be opened is known
+  /// before the minutes of work.
+  /// @throws Error where two outputs are one file, or a file, a folder or the device cannot be
+  /// opened
+  CommandRun(const RunOptions& options, std::vector<Output> outputs,
+             std::span<char* const> command_line);
+
+  Device& device() { return device_; }
+  /// Device, host threads, compiler, data, date and command line.
+  const Json& facts() const { return facts_; }
+  /// Writes to the file of an output; an empty path is none.
+  /// @throws Error where the disk refuses
+  void write(const std::string& path, const std::string& content);
+
+ private:
+  std::map<std::string, std::unique_ptr<AtomicFile>> files_;  ///< by path
+  Device device_;
+  Json facts_;
+};
+
+/// Writes a file whole or not at all.
+/// @throws Error where the disk refuses
+void write_file(const std::filesystem::path& path, const std::string& content);
+
+/// NAME.png and NAME.svg for each of the charts.
+std::vector<std::string> chart_files(std::span<const char* const> names);
+/// Writes the chart into the folder as NAME.png and NAME.svg.
+/// @throws Error where the disk refuses
+void write_chart(const Chart& chart, const std::filesystem::path& folder, const std::string& name);
+
+}  // namespace palpate::bench

@@ -1,0 +1,48 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+
+namespace palpate::bench {
+
+/// What all commands take. Files and folders that are empty are not written.
+struct RunOptions {
+  std::string device;  ///< a device's name or index; empty for the best
+  std::string json;    ///< file for the results
+  bool quick = false;  ///< small sizes and few trials, in less than a minute
+};
+
+struct ExperimentOptions : RunOptions {
+  std::string csv;             ///< folder for tables
+  std::string plots;           ///< folder for charts
+  std::optional<int> trials;   ///< per letter; by default 10, or 4 if quick
+  std::optional<int> touches;  ///< per trial; by default 50, or 12 if quick
+};
+
+struct SweepOptions : RunOptions {
+  std::string html;                      ///< file for a page with charts and tables
+  std::string plots;                     ///< folder for the page's charts
+  std::optional<std::int64_t> max_bins;  ///< per object; by default 10,000,000, or 100,000 if quick
+  std::optional<int> trials;             ///< per letter; by default 10, or 4 if quick
+};
+
+// Each prints its results as Markdown tables and writes the files that its options name.
+// They throw Error where an option is out of range, or the device, a file or a folder cannot be
+// opened.
+
+/// Speed, memory and error of every kernel, beside two baselines and float64.
+void measure_kernels(const RunOptions& options, std::span<char* const> command_line);
+
+/// The experiments of Sec. IV on simulated letters: identity and pose against the number of
+/// touches, for both filters, beside the paper's claims. Beyond the paper: calibration, refined
+/// poses, an array that is not quite where it is reported, and objects that were never learned.
+void run_experiment(const ExperimentOptions& options, std::span<char* const> command_line);
+
+/// Speed against error on simulated letters: every filter at counts from 100 to 10,000,000 bins per
+/// object, maps of several cell sizes, the engine's ways to evaluate the likelihood beside two
+/// baselines, and the causes of the errors that more bins do not mend.
+void run_sweep(const SweepOptions& options, std::span<char* const> command_line);
+
+}  // namespace palpate::bench
