@@ -11,7 +11,7 @@
 namespace palpate::bench {
 
 ErrorStatistics likelihood_errors(
-    std::span<const Hypothesis> objects, const ContactLikelihood& model, const PoseLattice& lattice,
+    std::span<const Hypothesis> objects, const ContactModel& model, const PoseLattice& lattice,
     std::span<const Touch> touches, int bins_per_object,
     const std::function<std::vector<double>(int object)>& log_likelihood) {
   std::mt19937_64 random(7);
@@ -23,8 +23,7 @@ ErrorStatistics likelihood_errors(
       const Pose T_object_robot = reference::bin_pose(lattice, static_cast<std::int64_t>(bin));
       double expected = 0.0;
       for (const Touch& touch : touches) {
-        expected += reference::log_likelihood(touch, T_object_robot, objects[object].map,
-                                              ContactClassifier{}, model);
+        expected += reference::log_likelihood(touch, T_object_robot, objects[object].map, model);
       }
       errors.add(measured[bin] - expected);
     }

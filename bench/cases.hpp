@@ -3,8 +3,8 @@
 #include <string>
 #include <vector>
 
+#include "palpate/contact_model.hpp"
 #include "palpate/pose_histogram.hpp"
-#include "palpate/sensor_model.hpp"
 #include "report.hpp"
 
 namespace palpate::bench {
@@ -16,7 +16,7 @@ struct Inputs {
   bool quick = false;       ///< small sizes, a few repeats
   std::vector<Recording> training;
   std::vector<Hypothesis> letters;  ///< maps of 0.5 mm cells
-  ContactLikelihood model;          ///< that of the letters' histograms
+  ContactModel model;               ///< that of the letters' histograms
   std::vector<Recording> unknowns;  ///< of touches_per_unknown touches
 };
 

@@ -71,9 +71,9 @@ void multiply(Row& row, const BorderedMap& map, const shaders::Split& bin_y,
 }  // namespace
 
 CpuLoop::CpuLoop(std::span<const Hypothesis> hypotheses, const PoseLattice& lattice,
-                 const ContactLikelihood& model)
+                 const ContactModel& model)
     : lattice_(lattice),
-      random_floor_(static_cast<float>(model.gamma * model.prior)),
+      random_floor_(static_cast<float>(model.gamma * *model.prior)),
       trust_(static_cast<float>(1.0 - model.gamma)),
       belief_(hypotheses.size(),
               std::vector<double>(static_cast<std::size_t>(lattice.bins()), 0.0)) {
@@ -82,14 +82,14 @@ CpuLoop::CpuLoop(std::span<const Hypothesis> hypotheses, const PoseLattice& latt
     maps_.push_back({.cell_mm = map.cell_mm,
                      .width = map.nx + 2 * shaders::MAP_BORDER,
                      .height = map.ny + 2 * shaders::MAP_BORDER,
-                     .log_odds = with_border(map, model.prior),
+                     .log_odds = with_border(map, *model.prior),
                      .axes = axes_in_cells(map, lattice)});
   }
 }
 
 void CpuLoop::update(std::span<const Touch> touches) {
   const ContactEvidence evidence =
-      gather_evidence(touches, ContactClassifier{}, lattice_.pivot_mm, segment_elements);
+      gather_evidence(touches, ContactModel{}, lattice_.pivot_mm, segment_elements);
   const std::size_t elements = evidence.from_pivot_mm.size();
   const std::vector<shaders::RotatedElement> rotated =
       rotate_evidence(evidence.from_pivot_mm, lattice_.theta_rad, maps_.front().cell_mm);

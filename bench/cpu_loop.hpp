@@ -4,8 +4,8 @@
 #include <vector>
 
 #include "contact_evidence.hpp"
+#include "palpate/contact_model.hpp"
 #include "palpate/pose_histogram.hpp"
-#include "palpate/sensor_model.hpp"
 
 namespace palpate::bench {
 
@@ -23,7 +23,7 @@ struct BorderedMap {
 class CpuLoop {
  public:
   CpuLoop(std::span<const Hypothesis> hypotheses, const PoseLattice& lattice,
-          const ContactLikelihood& model);
+          const ContactModel& model);
 
   /// Adds the touches' log-likelihood to all bins.
   void update(std::span<const Touch> touches);

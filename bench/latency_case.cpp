@@ -26,7 +26,7 @@ class Steps {
   /// Seconds that the host classifies the touch and rotates its elements.
   double prepare(const Touch& touch) {
     return seconds_of([&] {
-      evidence_ = gather_evidence(std::span(&touch, 1), ContactClassifier{}, lattice_.pivot_mm,
+      evidence_ = gather_evidence(std::span(&touch, 1), ContactModel{}, lattice_.pivot_mm,
                                   likelihood_.segment_elements());
       rotate_evidence(evidence_.from_pivot_mm, lattice_.theta_rad, cell_mm_);
     });

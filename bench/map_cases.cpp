@@ -44,7 +44,7 @@ Recording streamed_touches(int count, bool one_spot) {
 
 Case fine_map_case(const Inputs& inputs) {
   MapOptions options{.cell_mm = fine_cell_mm};
-  options.sensor.prior = inputs.model.prior;
+  options.sensor.prior = *inputs.model.prior;
   MapBuilder builder(inputs.device, options);
   std::vector<std::vector<Touch>> touches;
   for (const Recording& recording : inputs.training) {
@@ -90,7 +90,7 @@ Case map_stream_case(const Inputs& inputs, bool one_spot) {
   const Recording recording = streamed_touches(batch, one_spot);
   const std::vector<Touch> touches = all_touches(recording);
   MapOptions options;
-  options.sensor.prior = inputs.model.prior;
+  options.sensor.prior = *inputs.model.prior;
   MapBuilder builder(inputs.device, options);
   builder.add(touches);
   builder.build("warm-up");

@@ -20,7 +20,7 @@ class LetterBelief {
         belief_(device_.context(), stream_, lattice, 1),
         likelihood_(device_.context(), stream_, belief_, std::span(maps_).first(1), lattice,
                     {.prior = maps_.front().map.prior}),
-        evidence_(gather_evidence(all_touches(unknown_), ContactClassifier{}, lattice.pivot_mm,
+        evidence_(gather_evidence(all_touches(unknown_), ContactModel{}, lattice.pivot_mm,
                                   likelihood_.segment_elements())) {
     stream_.run();
     accumulate();

@@ -5,9 +5,8 @@
 #include <limits>
 #include <numbers>
 
-#include "palpate/contact.hpp"
+#include "palpate/contact_model.hpp"
 #include "palpate/pose_histogram.hpp"
-#include "palpate/sensor_model.hpp"
 
 namespace palpate::bench {
 
@@ -24,12 +23,12 @@ double log_mean(std::span<const double> log_likelihood) {
 }
 
 /// Log-likelihood of touches under a map that holds only the prior, the same at every pose (Eq. 7).
-double log_likelihood_of_none(std::span<const Touch> touches, const ContactLikelihood& model) {
-  const double prior_log_odds = log_odds_from_probability(model.prior);
+double log_likelihood_of_none(std::span<const Touch> touches, const ContactModel& model) {
+  const MapSample prior{.log_odds = log_odds_from_probability(*model.prior)};
   double sum = 0.0;
   for (const Touch& touch : touches) {
-    for (const Reading reading : ContactClassifier{}.classify(touch)) {
-      sum += model.log_likelihood(reading, prior_log_odds);
+    for (const Reading reading : model.classify(touch)) {
+      sum += model.log_likelihood(reading, prior);
     }
   }
   return sum;
@@ -76,7 +75,7 @@ std::vector<NoneRun> run_none(Device& device, const LearnedLetters& learned,
                               std::span<const Recording> unlearned_trials,
                               const PoseLattice& lattice, std::span<const int> touches) {
   PoseHistogram histogram(device, learned.objects, HistogramOptions{.lattice = lattice});
-  const ContactLikelihood model{.prior = learned.objects.front().map.prior};
+  const ContactModel model{.prior = learned.objects.front().map.prior};
   std::vector<NoneRun> runs;
   for (const int n : touches) {
     runs.push_back({.touches = n, .learned_log10_weight = {}, .unlearned_log10_weight = {}});

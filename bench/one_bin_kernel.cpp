@@ -18,9 +18,9 @@ constexpr gpu::Access bindings[] = {gpu::Access::storage, gpu::Access::storage,
                                     gpu::Access::storage, gpu::Access::storage,
                                     gpu::Access::storage};
 
-gpu::Kernel make_kernel(gpu::Context& context, const ContactLikelihood& model) {
+gpu::Kernel make_kernel(gpu::Context& context, const ContactModel& model) {
   const std::uint32_t constants[] = {
-      workgroup, std::bit_cast<std::uint32_t>(static_cast<float>(model.gamma * model.prior)),
+      workgroup, std::bit_cast<std::uint32_t>(static_cast<float>(model.gamma * *model.prior)),
       std::bit_cast<std::uint32_t>(static_cast<float>(1.0 - model.gamma))};
   return {context,
           {.name = "one_bin",
@@ -41,7 +41,7 @@ gpu::Buffer uploaded(gpu::Context& context, gpu::CommandStream& stream,
 }  // namespace
 
 OneBinKernel::OneBinKernel(Device& device, std::span<const Hypothesis> hypotheses,
-                           const PoseLattice& lattice, const ContactLikelihood& model)
+                           const PoseLattice& lattice, const ContactModel& model)
     : context_(device.context()),
       stream_(context_),
       kernel_(make_kernel(context_, model)),
@@ -52,7 +52,7 @@ OneBinKernel::OneBinKernel(Device& device, std::span<const Hypothesis> hypothese
     objects_.push_back(
         {.width = map.nx + 2 * shaders::MAP_BORDER,
          .height = map.ny + 2 * shaders::MAP_BORDER,
-         .map = uploaded(context_, stream_, with_border(map, model.prior), "a map"),
+         .map = uploaded(context_, stream_, with_border(map, *model.prior), "a map"),
          .axes = uploaded(context_, stream_, axes_in_cells(map, lattice), "the lattice's axes"),
          .belief =
              gpu::Buffer(context_, static_cast<VkDeviceSize>(lattice.bins()) * sizeof(TwoFloat),
@@ -64,7 +64,7 @@ OneBinKernel::OneBinKernel(Device& device, std::span<const Hypothesis> hypothese
 
 void OneBinKernel::update(std::span<const Touch> touches) {
   const ContactEvidence evidence =
-      gather_evidence(touches, ContactClassifier{}, lattice_.pivot_mm, segment_elements);
+      gather_evidence(touches, ContactModel{}, lattice_.pivot_mm, segment_elements);
   const gpu::Buffer elements =
       uploaded(context_, stream_,
                rotate_evidence(evidence.from_pivot_mm, lattice_.theta_rad, cell_mm_), "elements");

@@ -4,8 +4,8 @@
 #include <vector>
 
 #include "command_stream.hpp"
+#include "palpate/contact_model.hpp"
 #include "palpate/pose_histogram.hpp"
-#include "palpate/sensor_model.hpp"
 
 namespace palpate::bench {
 
@@ -14,7 +14,7 @@ namespace palpate::bench {
 class OneBinKernel {
  public:
   OneBinKernel(Device& device, std::span<const Hypothesis> hypotheses, const PoseLattice& lattice,
-               const ContactLikelihood& model);
+               const ContactModel& model);
 
   /// Adds the touches' log-likelihood to all bins.
   void update(std::span<const Touch> touches);

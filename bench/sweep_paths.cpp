@@ -40,7 +40,7 @@ Touch resting_touch(const Recording& unknown) {
 /// One of the ways.
 struct Way {
   std::string path;
-  ContactLikelihood model;
+  ContactModel model;
   std::vector<Touch> touches;  ///< timed together; the first alone is held against float64
   std::function<void(std::span<const Touch>)> update;
   std::function<std::vector<double>(int object)> log_likelihood;
@@ -54,16 +54,16 @@ std::string path_of(const PoseHistogram& histogram) {
 
 Json compare_paths(Device& device, const LearnedLetters& learned, const Recording& unknown,
                    const PoseLattice& lattice) {
-  const ContactLikelihood product{.prior = learned.objects.front().map.prior};
-  const ContactLikelihood logs{.gamma = 0.0, .prior = product.prior};
+  const ContactModel product{.prior = learned.objects.front().map.prior};
+  const ContactModel logs{.gamma = 0.0, .prior = product.prior};
   const std::vector<Touch> moving = unknown.touches(0, timed_touches);
   const std::vector<Touch> resting(timed_touches, resting_touch(unknown));
   PoseHistogram histogram(device, learned.objects, {.lattice = lattice});
-  PoseHistogram in_logs(device, learned.objects, {.lattice = lattice, .gamma = logs.gamma});
+  PoseHistogram in_logs(device, learned.objects, {.lattice = lattice, .contact = logs});
   PoseHistogram at_rest(device, learned.objects, {.lattice = lattice, .still_array = true});
   OneBinKernel one_bin(device, learned.objects, lattice, product);
   CpuLoop cpu_loop(learned.objects, lattice, product);
-  const auto way = [](const std::string& path, const ContactLikelihood& model,
+  const auto way = [](const std::string& path, const ContactModel& model,
                       const std::vector<Touch>& touches, auto& engine) {
     return Way{.path = path,
                .model = model,

@@ -92,11 +92,9 @@ Deviation weight_deviation(Device& device, const LearnedLetters& learned, const 
   ParticleFilter filter(device, learned.objects, options);
   filter.update(touch);
   const std::vector<ParticleFilter::Particle> particles = filter.particles();
-  const ContactLikelihood model{.prior = learned.objects.front().map.prior};
   const auto reference_of = [&](const ParticleFilter::Particle& particle) {
     return reference::log_likelihood(touch, particle.T_object_robot,
-                                     learned.objects[particle.object].map, options.classifier,
-                                     model);
+                                     learned.objects[particle.object].map, options.contact);
   };
   const ParticleFilter::Particle& heaviest =
       *std::max_element(particles.begin(), particles.end(),
@@ -165,10 +163,9 @@ SweepPoint measure_histogram(Device& device, const LearnedLetters& learned,
   const Touch touch = trials.front().touch(0);
   histogram.reset();
   histogram.update(touch);
-  const ContactLikelihood model{.prior = learned.objects.front().map.prior};
   point.deviation = deviation_of(
-      likelihood_errors(learned.objects, model, lattice, std::span(&touch, 1), sampled_bins,
-                        [&](int object) { return histogram.log_likelihood(object); }),
+      likelihood_errors(learned.objects, ContactModel{}, lattice, std::span(&touch, 1),
+                        sampled_bins, [&](int object) { return histogram.log_likelihood(object); }),
       learned);
   return point;
 }

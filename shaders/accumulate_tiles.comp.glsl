@@ -10,19 +10,23 @@
 #include "interface.h"
 
 layout(local_size_x_id = 0) in;
-layout(constant_id = 5) const uint TILE_X = 5;
-layout(constant_id = 6) const uint TILE_Y = 5;
-layout(constant_id = 7) const float STEP_X = 0.2;  // between bins, in cells
-layout(constant_id = 8) const float STEP_Y = 0.2;
-layout(constant_id = 9) const uint CELLS = 1;  // 1 or 2
+layout(constant_id = 9) const uint TILE_X = 5;
+layout(constant_id = 10) const uint TILE_Y = 5;
+layout(constant_id = 11) const float STEP_X = 0.2;  // between bins, in cells
+layout(constant_id = 12) const float STEP_Y = 0.2;
+layout(constant_id = 13) const uint CELLS = 1;  // 1 or 2
 
 const uint NODES = CELLS + 2;
+const uint BINS = TILE_X * TILE_Y;  // row by row
+const uint FACTORS_PER_DIVISION = 4;
 
-#include "contact_likelihood.glsl"
 #include "likelihood_buffers.glsl"
-#include "two_float.glsl"
+#include "segment_sum.glsl"
 
-float log_odds_of[TILE_Y][TILE_X];  // under one element, at every bin of the tile
+ObjectPlace object;
+Split bin_x;  // the tile's first bin, in cells of the map
+Split bin_y;
+int table;  // the first element of the tile's theta
 
 // How far along it lies in each of the cells that the tile may reach, from 0 to 1.
 vec3 shares(const float place) {
@@ -36,8 +40,8 @@ float along(const vec4 nodes, const vec3 share) {
 }
 
 // Bilinear in log odds, for all bins of the tile.
-void interpolate(const ObjectPlace object, const Split bin_x, const Split bin_y,
-                 const ivec4 element) {
+void interpolate(const int element_index) {
+  const ivec4 element = texelFetch(elements, table + element_index);
   const float x = bin_x.fraction + intBitsToFloat(element.y);
   const float y = bin_y.fraction + intBitsToFloat(element.w);
   const float whole_x = floor(x);
@@ -65,14 +69,10 @@ void interpolate(const ObjectPlace object, const Split bin_x, const Split bin_y,
       column_nodes[r] = along(node_rows[r], share);
     }
     [[unroll]] for (uint j = 0; j < TILE_Y; ++j) {
-      log_odds_of[j][i] = along(column_nodes, shares(fy + float(j) * STEP_Y));
+      log_odds_of[j * TILE_X + i] = along(column_nodes, shares(fy + float(j) * STEP_Y));
     }
   }
 }
-
-#define FOR_EACH_BIN                            \
-  [[unroll]] for (uint j = 0; j < TILE_Y; ++j) \
-  [[unroll]] for (uint i = 0; i < TILE_X; ++i)
 
 void main() {
   const uint tiles_x = (push.nx + TILE_X - 1) / TILE_X;
@@ -84,60 +84,24 @@ void main() {
   }
   const uint x = tile % tiles_x * TILE_X;
   const uint y = tile / tiles_x * TILE_Y;
-  const ObjectPlace object = places[push.object_first + gl_WorkGroupID.y];
-  const Split bin_x = axis[object.first_axis + x];
-  const Split bin_y = axis[object.first_axis + push.nx + push.row_first + y];
-  const int table = int((push.theta_first + theta) * push.elements);
+  object = places[push.object_first + gl_WorkGroupID.y];
+  bin_x = axis[object.first_axis + x];
+  bin_y = axis[object.first_axis + push.nx + push.row_first + y];
+  table = int((push.theta_first + theta) * push.elements);
 
-  vec2 sum[TILE_Y][TILE_X];
-  float product[TILE_Y][TILE_X];
-  float numerator[TILE_Y][TILE_X];
-  float denominator[TILE_Y][TILE_X];
   // The belief's own sum goes on, so that it does not matter which touches share a dispatch.
   const uint bin = object.first_bin + (theta * push.rows + y) * push.nx + x;
   FOR_EACH_BIN {
-    sum[j][i] = x + i < push.nx && y + j < push.rows ? belief[bin + j * push.nx + i] : vec2(0.0);
+    const uint i = b % TILE_X;
+    const uint j = b / TILE_X;
+    sum[b] = x + i < push.nx && y + j < push.rows ? belief[bin + j * push.nx + i] : vec2(0.0);
   }
-
-  for (uint s = 0; s < push.segments; ++s) {
-    const ivec4 segment = texelFetch(segments, int(s));
-    const uint reading = uint(segment.z);
-    const ReadingRatio reading_says = reading_ratio(reading);
-    if (IN_LOGS) {
-      for (int k = segment.x; k < segment.y; ++k) {
-        interpolate(object, bin_x, bin_y, texelFetch(elements, table + k));
-        FOR_EACH_BIN {
-          sum[j][i] = two_float_add(sum[j][i], log_likelihood(reading, log_odds_of[j][i]));
-        }
-      }
-    } else {
-      for (int group = segment.x; group < segment.y; group += int(FACTORS_PER_LOG)) {
-        const int group_end = min(group + int(FACTORS_PER_LOG), segment.y);
-        FOR_EACH_BIN { product[j][i] = 1.0; }
-        for (int quotient = group; quotient < group_end; quotient += int(FACTORS_PER_DIVISION)) {
-          const int end = min(quotient + int(FACTORS_PER_DIVISION), group_end);
-          FOR_EACH_BIN {
-            numerator[j][i] = 1.0;
-            denominator[j][i] = 1.0;
-          }
-          for (int k = quotient; k < end; ++k) {
-            interpolate(object, bin_x, bin_y, texelFetch(elements, table + k));
-            FOR_EACH_BIN {
-              const vec2 ratio = likelihood_ratio(reading_says, log_odds_of[j][i]);
-              numerator[j][i] *= ratio.x;
-              denominator[j][i] *= ratio.y;
-            }
-          }
-          FOR_EACH_BIN { product[j][i] *= numerator[j][i] / denominator[j][i]; }
-        }
-        FOR_EACH_BIN { sum[j][i] = two_float_add(sum[j][i], log(product[j][i])); }
-      }
-    }
-  }
-
+  add_segments(push.segments, object.first_table_node);
   FOR_EACH_BIN {
+    const uint i = b % TILE_X;
+    const uint j = b / TILE_X;
     if (x + i < push.nx && y + j < push.rows) {
-      belief[bin + j * push.nx + i] = sum[j][i];
+      belief[bin + j * push.nx + i] = sum[b];
     }
   }
 }

@@ -1,39 +1,37 @@
-// Eq. 7 for one element, as ContactLikelihood in host/model/sensor_model.cpp. Any other function of
-// the reading class and the interpolated log odds takes its place here.
+// The log-likelihood of an element's reading by the map's log odds below it: Eq. 7, or a table in
+// its place. The same as ContactModel in host/model/contact_model.cpp.
 
-// gamma m; where IN_LOGS its logarithm, for float32 does not hold every floor, or NO_FLOOR.
-layout(constant_id = 1) const float RANDOM_FLOOR = 0.02;
-layout(constant_id = 2) const float TRUST = 0.9;          // 1 - gamma
-// Products of likelihoods need a floor that eight factors keep within float32; below it, the
-// likelihood is evaluated and summed in logs.
-layout(constant_id = 3) const bool IN_LOGS = false;
+// How the kernel evaluates it: AS_PRODUCTS or AS_LOGS (Eq. 7), or AS_TABLE.
+layout(constant_id = 1) const uint FORM = AS_PRODUCTS;
+// Of Eq. 7: gamma m; AS_LOGS its logarithm or NO_FLOOR, because float32 does not hold every floor.
+layout(constant_id = 2) const float RANDOM_FLOOR = 0.02;
+layout(constant_id = 3) const float TRUST = 0.9;  // 1 - gamma
+// Of a table: the log odds of its first node, nodes per nat of log odds, nodes of a row, and levels.
+layout(constant_id = 4) const float FIRST_LOG_ODDS = -1.0;
+layout(constant_id = 5) const float NODES_PER_NAT = 1.0;
+layout(constant_id = 6) const uint TABLE_NODES = 2;
+layout(constant_id = 7) const uint TABLE_LEVELS = 2;
+
+layout(binding = 1) uniform samplerBuffer contact_table;  // TableNode, [object or one, row, node]
 
 const float LOG2_E = 1.4426950408889634;
 
-// With odds z = exp(log odds of occupancy) the likelihood of every reading class is a ratio,
-// (n.x + n.y z) / (d.x + d.y z).
-struct ReadingRatio {
-  vec2 n;
-  vec2 d;
-};
-
-ReadingRatio reading_ratio(const uint reading) {
+// The likelihood of a reading (Eq. 7) is (x + y z) / (1 + z), where z = exp(log odds) are the odds of
+// occupancy. Unknown has the likelihood 1: x = y = 1.
+vec2 likelihood_terms(const uint reading) {
   const vec2 contact = vec2(RANDOM_FLOOR, RANDOM_FLOOR + TRUST);
-  const vec2 no_contact = contact.yx;
-  return ReadingRatio(reading == NO_CONTACT        ? no_contact
-                      : reading == UNKNOWN_INSTEAD ? vec2(1.0)
-                                                   : contact,
-                      reading <= IN_CONTACT ? vec2(1.0) : no_contact);
+  return reading == NO_CONTACT ? contact.yx : reading == IN_CONTACT ? contact : vec2(1.0);
 }
 
-// Numerator and denominator, so that several elements share one division. The clamp at 2^30 changes
-// the likelihood by less than one part in 1e6 and lets four factors multiply safely.
-vec2 likelihood_ratio(const ReadingRatio ratio, const float log_odds) {
+// Numerator and denominator of a likelihood ratio, from the terms of both readings: several elements
+// share one division. The clamp at 2^30 changes the ratio by less than one part in 1e6 and keeps the
+// product of four factors within float32.
+vec2 likelihood_ratio(const vec2 reading, const vec2 instead, const float log_odds) {
   const float odds = exp2(clamp(log_odds * LOG2_E, -30.0, 30.0));
-  return vec2(ratio.n.x + ratio.n.y * odds, ratio.d.x + ratio.d.y * odds);
+  return vec2(reading.x + reading.y * odds, instead.x + instead.y * odds);
 }
 
-// Log-likelihood of contact; that of none is the same at the negative log odds.
+// Eq. 7 in logs for contact; that for no contact is the same at the negative log odds.
 float contact_log_likelihood(const float log_odds) {
   const float trusted = min(log_odds, 0.0) - log(1.0 + exp(-abs(log_odds))) + log(TRUST);
   if (RANDOM_FLOOR == NO_FLOOR) {
@@ -43,8 +41,22 @@ float contact_log_likelihood(const float log_odds) {
 }
 
 float log_likelihood(const uint reading, const float log_odds) {
-  const float said = reading == UNKNOWN_INSTEAD ? 0.0
-                     : reading == NO_CONTACT    ? contact_log_likelihood(-log_odds)
-                                                : contact_log_likelihood(log_odds);
-  return reading <= IN_CONTACT ? said : said - contact_log_likelihood(-log_odds);
+  return reading == UNKNOWN ? 0.0
+                            : contact_log_likelihood(reading == NO_CONTACT ? -log_odds : log_odds);
+}
+
+// First node of L(reading) - L(instead) in an object's part of the table. The first TABLE_LEVELS rows
+// hold L(reading), the others L(reading) - L(NO_CONTACT), where Unknown takes the row of No Contact.
+int row_of(const uint reading, const uint instead) {
+  const uint row = reading == UNKNOWN ? 0 : reading;
+  return int((instead == UNKNOWN ? row : TABLE_LEVELS + row) * TABLE_NODES);
+}
+
+// Linear between the nodes of a row, constant beyond the first and the last.
+float tabled_log_ratio(const int first_node, const float log_odds) {
+  const float place =
+      clamp((log_odds - FIRST_LOG_ODDS) * NODES_PER_NAT, 0.0, float(TABLE_NODES - 1));
+  const float whole = floor(place);
+  const vec2 node = texelFetch(contact_table, first_node + int(whole)).xy;
+  return node.x + node.y * (place - whole);
 }

@@ -9,12 +9,17 @@ namespace palpate::shaders {
 using uint = std::uint32_t;
 #endif
 
-// Reading classes, as in palpate::Reading. Unknown elements never reach a kernel.
+// Readings, as in palpate::Reading. The numbers between IN_CONTACT and UNKNOWN are In Contact too, at
+// higher levels of pressure.
 const uint NO_CONTACT = 0;
 const uint IN_CONTACT = 1;
-// What an element says instead of No Contact: its likelihood over that of No Contact.
-const uint CONTACT_INSTEAD = 2;
-const uint UNKNOWN_INSTEAD = 3;
+const uint UNKNOWN = 8;
+
+// How kernels evaluate the contact model: Eq. 7 as products of likelihood ratios, Eq. 7 in logs where
+// float32 cannot hold the products, or a table.
+const uint AS_PRODUCTS = 0;
+const uint AS_LOGS = 1;
+const uint AS_TABLE = 2;
 
 // Width, in cells, of the border of prior around an uploaded map. An index clamped to the border
 // finds all four nodes of a tile along an axis at the prior.
@@ -23,9 +28,8 @@ const int MAP_BORDER = 4;
 // Replaces log(gamma m) if gamma is 0: the likelihood then has no floor.
 const float NO_FLOOR = -1e38;
 
-// Likelihoods that are multiplied before one logarithm, and before one division.
+// Likelihoods that are multiplied before one logarithm.
 const uint FACTORS_PER_LOG = 8;
-const uint FACTORS_PER_DIVISION = 4;
 
 // Edge, in cells, of the map tile that one workgroup of accumulate_evidence fills. Smaller tiles
 // skip more readings; larger ones copy each reading into fewer lists.
@@ -94,14 +98,23 @@ struct ObjectPlace {
   int map_height;
   uint first_axis;  // the lattice's x, then y, in cells of its map
   uint first_bin;   // in the slab
+  int first_table_node;  // index of its first node in the contact table
 };
 
-// Consecutive elements [begin, end) of the same reading class. Kernels read it as an ivec4.
+// Consecutive elements [begin, end) of one reading. Each adds L(reading) - L(instead), where L is the
+// log-likelihood, L(UNKNOWN) = 0, and `instead` is UNKNOWN or NO_CONTACT. Kernels read it as an ivec4.
 struct Segment {
   uint begin;
   uint end;
   uint reading;
-  uint unused;
+  uint instead;
+};
+
+// A log-likelihood ratio at a node of the contact table, and its rise to the next node. Kernels read
+// it as a vec2.
+struct TableNode {
+  float nats;
+  float rise;
 };
 
 struct LikelihoodPush {
@@ -212,6 +225,7 @@ struct ParticleMap {
   uint scale;               // index of the element table with its cell size
   float cells_per_mm_high;  // two floats
   float cells_per_mm_low;
+  int first_table_node;  // index of its first node in the contact table
   Split centre_x;  // the region's centre in cells of the bordered map
   Split centre_y;
 };
@@ -256,12 +270,12 @@ struct ConePush {
 
 #ifdef __cplusplus
 static_assert(sizeof(TileReading) == 16 && sizeof(Tile) == 20 && sizeof(EvidencePush) == 16);
-static_assert(sizeof(RotatedElement) == 16 && sizeof(Segment) == 16);
-static_assert(sizeof(Corners) == 16 && sizeof(ObjectPlace) == 20);
+static_assert(sizeof(RotatedElement) == 16 && sizeof(Segment) == 16 && sizeof(TableNode) == 8);
+static_assert(sizeof(Corners) == 16 && sizeof(ObjectPlace) == 24);
 static_assert(sizeof(LikelihoodPush) == 28 && sizeof(Partial) == 16);
 static_assert(sizeof(ReducePush) == 12 && sizeof(AddPush) == 8 && sizeof(MarginalPush) == 20);
 static_assert(sizeof(Particle) == 16 && sizeof(ObjectShare) == 8 && sizeof(DrawBlock) == 16);
-static_assert(sizeof(DrawPush) == 52 && sizeof(ParticleMap) == 40 && sizeof(CoarseAndFine) == 16);
+static_assert(sizeof(DrawPush) == 52 && sizeof(ParticleMap) == 44 && sizeof(CoarseAndFine) == 16);
 static_assert(sizeof(WeighPush) == 16 && sizeof(WeightBlock) == 16);
 static_assert(sizeof(ConeUnit) == 20 && sizeof(ConePush) == 8);
 }  // namespace palpate::shaders

@@ -1,5 +1,6 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_control_flow_attributes : require
 
 // Weighs particles by the log-likelihood of a touch (Eq. 7), one particle per invocation, each at a
 // pose and on a map of its own.
@@ -12,21 +13,28 @@
 
 layout(local_size_x_id = 0) in;
 
-#include "contact_likelihood.glsl"
-#include "two_float.glsl"
+const uint BINS = 1;
+const uint FACTORS_PER_DIVISION = 1;
 
-layout(binding = 0) uniform samplerBuffer maps;           // Corners of nodes, with a border of prior
-layout(std430, binding = 1) readonly buffer Objects { ParticleMap objects[]; };
-layout(binding = 2) uniform samplerBuffer turns;          // CoarseAndFine: headings, then elements
-layout(binding = 3) uniform isamplerBuffer segments;      // Segment
-layout(binding = 4) uniform isamplerBuffer particles;     // Particle
-layout(std430, binding = 5) buffer LogWeights { vec2 log_weights[]; };  // two floats
+#include "segment_sum.glsl"
+
+layout(binding = 2) uniform samplerBuffer turns;       // CoarseAndFine: headings, then elements
+layout(binding = 3) uniform samplerBuffer maps;        // Corners of nodes, with a border of prior
+layout(std430, binding = 4) readonly buffer Objects { ParticleMap objects[]; };
+layout(binding = 5) uniform isamplerBuffer particles;  // Particle
+layout(std430, binding = 6) buffer LogWeights { vec2 log_weights[]; };  // two floats
 layout(push_constant) uniform Push { WeighPush push; };
 
 // 2 pi / HEADINGS as a number of few bits, of which multiples are exact, and the rest.
 const float HEADING_COARSE = 51471.0 / 2097152.0;
 const float HEADING_FINE = 4.07236297e-07;
 const float FARTHEST_CELLS = 16777216.0;
+
+ParticleMap object;
+Split x;  // the particle's place, in cells of the map
+Split y;
+vec4 turn;  // its direction
+int table;  // the first element in cells of the map
 
 // Cosine and sine of an angle in [-pi, pi], coarse and fine.
 vec4 direction(const float theta_rad) {
@@ -43,7 +51,7 @@ vec4 direction(const float theta_rad) {
 }
 
 // A coordinate relative to the region's centre, in cells of the map.
-Split in_cells(const float from_centre_mm, const ParticleMap object, const Split centre) {
+Split in_cells(const float from_centre_mm, const Split centre) {
   const vec2 cells = two_float_product(from_centre_mm, object.cells_per_mm_high);
   const float whole = floor(cells.x);
   const float rest = (cells.x - whole) + (cells.y + from_centre_mm * object.cells_per_mm_low);
@@ -53,8 +61,8 @@ Split in_cells(const float from_centre_mm, const ParticleMap object, const Split
 
 // Bilinear in log odds, where an element meets the map. Outside of it both nodes are of the border
 // and hold the prior.
-float log_odds(const ParticleMap object, const Split x, const Split y, const vec4 turn,
-               const vec4 element) {
+void interpolate(const int element_index) {
+  const vec4 element = texelFetch(turns, table + element_index);
   const vec2 coarse = vec2(turn.x * element.x - turn.y * element.y,
                            turn.y * element.x + turn.x * element.y);
   const vec2 whole_element = element.xy + element.zw;
@@ -73,7 +81,7 @@ float log_odds(const ParticleMap object, const Split x, const Split y, const vec
   const vec4 corner = texelFetch(maps, node);
   const float low = corner.x + (corner.y - corner.x) * f.x;
   const float high = corner.z + (corner.w - corner.z) * f.x;
-  return low + (high - low) * f.y;
+  log_odds_of[0] = low + (high - low) * f.y;
 }
 
 void main() {
@@ -82,34 +90,13 @@ void main() {
     return;
   }
   const ivec4 state = texelFetch(particles, int(particle));
-  const ParticleMap object = objects[state.x];
-  const Split x = in_cells(intBitsToFloat(state.y), object, object.centre_x);
-  const Split y = in_cells(intBitsToFloat(state.z), object, object.centre_y);
-  const vec4 turn = direction(intBitsToFloat(state.w));
-  const int table = int(HEADINGS + object.scale * push.elements);
+  object = objects[state.x];
+  x = in_cells(intBitsToFloat(state.y), object.centre_x);
+  y = in_cells(intBitsToFloat(state.z), object.centre_y);
+  turn = direction(intBitsToFloat(state.w));
+  table = int(HEADINGS + object.scale * push.elements);
 
-  vec2 sum = push.fresh != 0 ? vec2(0.0) : log_weights[particle];
-  for (uint s = 0; s < push.segments; ++s) {
-    const ivec4 segment = texelFetch(segments, int(s));
-    const uint reading = uint(segment.z);
-    if (IN_LOGS) {
-      for (int k = segment.x; k < segment.y; ++k) {
-        const float l = log_odds(object, x, y, turn, texelFetch(turns, table + k));
-        sum = two_float_add(sum, log_likelihood(reading, l));
-      }
-    } else {
-      const ReadingRatio says = reading_ratio(reading);
-      for (int group = segment.x; group < segment.y; group += int(FACTORS_PER_LOG)) {
-        const int end = min(group + int(FACTORS_PER_LOG), segment.y);
-        float product = 1.0;
-        for (int k = group; k < end; ++k) {
-          const float l = log_odds(object, x, y, turn, texelFetch(turns, table + k));
-          const vec2 ratio = likelihood_ratio(says, l);
-          product *= ratio.x / ratio.y;
-        }
-        sum = two_float_add(sum, log(product));
-      }
-    }
-  }
-  log_weights[particle] = sum;
+  sum[0] = push.fresh != 0 ? vec2(0.0) : log_weights[particle];
+  add_segments(push.segments, object.first_table_node);
+  log_weights[particle] = sum[0];
 }

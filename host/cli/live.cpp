@@ -94,7 +94,7 @@ void warm_up(Recogniser& recogniser, const RecognitionTask& task, const SensorDe
   // In Contact and No Contact by turns: what is Unknown would be passed over.
   std::vector<double> pressure(elements_mm.size(), 0.0);
   for (std::size_t i = 0; i < pressure.size(); i += 2) {
-    pressure[i] = 2.0 * task.histogram.classifier.threshold + 1.0;
+    pressure[i] = 2.0 * task.histogram.contact.classifier.threshold + 1.0;
   }
   const Touch touch{.T_robot_sensor = {},
                     .elements_mm = elements_mm,

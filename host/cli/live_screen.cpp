@@ -67,9 +67,9 @@ void LiveScreen::describe(const LiveState& state) {
     view_.state += fmt::format("; skipped {} touches without a pose", state.without_pose);
   }
   view_.pressure = state.pressure;
-  // A press is mostly several times as strong as what counts as contact. A touch's robust mean may
-  // widen the scale; of single frames, one of 1e38 would leave nothing to be seen.
-  view_.full_scale = std::max(5.0 * task_.histogram.classifier.threshold, 1e-6);
+  // Most presses are several times as strong as the contact threshold. Touches, which are robust
+  // means, may widen the scale; a single frame of 1e38 may not, or nothing else would be seen.
+  view_.full_scale = std::max(5.0 * task_.histogram.contact.classifier.threshold, 1e-6);
   if (state.last) {
     for (const double pressure : state.last->touch.pressure) {
       view_.full_scale = std::max(view_.full_scale, pressure);
@@ -105,10 +105,11 @@ void LiveScreen::place_array(const LiveState& state) {
   const std::vector<std::uint8_t>& valid = now ? view_.valid : state.last->touch.valid;
   view_.readings.clear();
   if (pressure.size() == view_.elements_mm.size()) {
-    view_.readings = task_.histogram.classifier.classify({.T_robot_sensor = *view_.T_robot_sensor,
-                                                          .elements_mm = view_.elements_mm,
-                                                          .pressure = pressure,
-                                                          .valid = valid});
+    view_.readings =
+        task_.histogram.contact.classifier.classify({.T_robot_sensor = *view_.T_robot_sensor,
+                                                     .elements_mm = view_.elements_mm,
+                                                     .pressure = pressure,
+                                                     .valid = valid});
   }
 }
 

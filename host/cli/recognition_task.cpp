@@ -91,26 +91,20 @@ void load_maps(const std::vector<Scene::Object>& objects, RecognitionTask& task)
   }
 }
 
-/// Maps recognised together share one prior: unequal ones favour the emptier or fuller map.
-double common_prior(const RecognitionTask& task, std::optional<double> given) {
-  if (given) {
-    if (!(*given > 0.0 && *given < 1.0)) {
-      throw Error(Fault::input,
-                  fmt::format("--prior {}: give a probability between 0 and 1", *given));
-    }
-    return *given;
+/// The prior that was given, if any. Throws Error where none was and the maps' own differ.
+std::optional<double> prior_of(const RecognitionTask& task, std::optional<double> given) {
+  if (given && !(*given > 0.0 && *given < 1.0)) {
+    throw Error(Fault::input,
+                fmt::format("--prior {}: give a probability between 0 and 1", *given));
   }
-  const double first = task.hypotheses.front().map.prior;
-  for (std::size_t i = 1; i < task.hypotheses.size(); ++i) {
-    const double prior = task.hypotheses[i].map.prior;
-    if (std::abs(prior - first) > 1e-6) {
-      throw Error(Fault::input,
-                  fmt::format("{}: prior {} differs from {} of {}; build the maps in one call of "
-                              "palpate map, or say which prior to use with --prior",
-                              task.map_paths[i], prior, first, task.map_paths.front()));
-    }
+  if (const auto other = given ? std::nullopt : differing_prior(task.hypotheses)) {
+    throw Error(Fault::input,
+                fmt::format("{}: prior {} differs from {} of {}; build the maps in one call of "
+                            "palpate map, or say which prior to use with --prior",
+                            task.map_paths[*other], task.hypotheses[*other].map.prior,
+                            task.hypotheses.front().map.prior, task.map_paths.front()));
   }
-  return first;
+  return given;
 }
 
 PoseLattice make_lattice(const RecognitionFlags& flags, const Scene& scene) {
@@ -196,9 +190,7 @@ bool wants_particles(const RecognitionFlags& flags, const Scene& scene) {
 /// What the histogram's options and the flags say to the particle filter.
 ParticleOptions particle_options(const RecognitionFlags& flags, const HistogramOptions& histogram) {
   ParticleOptions particles{.region = histogram.lattice,
-                            .classifier = histogram.classifier,
-                            .gamma = histogram.gamma,
-                            .prior = histogram.prior,
+                            .contact = histogram.contact,
                             .none_weight = histogram.none_weight,
                             .augmented = flags.augmented};
   particles.particles = flags.particles.value_or(particles.particles);
@@ -243,12 +235,12 @@ RecognitionTask prepare(const RecognitionFlags& flags, const Scene& scene,
   const bool with_particles = wants_particles(flags, scene);
   task.histogram.lattice = make_lattice(flags, scene);
   task.auto_bins = flags.bins.empty() ? scene.auto_bins : flags.bins == "auto";
-  task.histogram.gamma = flags.gamma ? *flags.gamma : scene.gamma.value_or(0.1);
-  if (!(task.histogram.gamma >= 0.0 && task.histogram.gamma < 1.0)) {
-    throw Error(Fault::input,
-                fmt::format("--gamma {}: must be at least 0 and below 1", task.histogram.gamma));
+  task.histogram.contact.gamma = flags.gamma ? *flags.gamma : scene.gamma.value_or(0.1);
+  if (!(task.histogram.contact.gamma >= 0.0 && task.histogram.contact.gamma < 1.0)) {
+    throw Error(Fault::input, fmt::format("--gamma {}: must be at least 0 and below 1",
+                                          task.histogram.contact.gamma));
   }
-  task.histogram.classifier =
+  task.histogram.contact.classifier =
       make_classifier(pressure_unit, source, flags.threshold ? flags.threshold : scene.threshold,
                       flags.ratio ? flags.ratio : scene.ratio);
   if (flags.memory_mib) {
@@ -259,7 +251,7 @@ RecognitionTask prepare(const RecognitionFlags& flags, const Scene& scene,
   }
   load_maps(objects_of(flags, scene), task);
   add_none(flags.none ? flags.none : scene.none, task);
-  task.histogram.prior = common_prior(task, flags.prior ? flags.prior : scene.prior);
+  task.histogram.contact.prior = prior_of(task, flags.prior ? flags.prior : scene.prior);
   if (with_particles) {
     task.particles = particle_options(flags, task.histogram);
   }

@@ -5,6 +5,10 @@
 
 namespace palpate {
 
+static_assert(shaders::NO_CONTACT == static_cast<shaders::uint>(Reading::no_contact) &&
+              shaders::IN_CONTACT == static_cast<shaders::uint>(Reading::in_contact) &&
+              shaders::UNKNOWN == static_cast<shaders::uint>(Reading::unknown));
+
 namespace {
 
 // Cells that are told apart, and what stands for those beyond. Clamped to the same bound, an
@@ -23,9 +27,9 @@ shaders::Split split(double coordinate_cells, int beyond) {
   return {static_cast<int>(cell), static_cast<float>(coordinate_cells - cell)};
 }
 
-/// Adds the touch's elements of one reading as segments of one class.
+/// Adds the touch's elements of one reading as segments.
 void append(ContactEvidence& evidence, const Touch& touch, std::span<const Reading> readings,
-            Reading reading, shaders::uint segment_class, const glm::dvec2& pivot_mm,
+            Reading reading, Reading instead, const glm::dvec2& pivot_mm,
             std::size_t segment_elements) {
   const std::size_t first = evidence.from_pivot_mm.size();
   for (std::size_t i = 0; i < readings.size(); ++i) {
@@ -38,8 +42,23 @@ void append(ContactEvidence& evidence, const Touch& touch, std::span<const Readi
     evidence.segments.push_back(
         {.begin = static_cast<shaders::uint>(begin),
          .end = static_cast<shaders::uint>(std::min(begin + segment_elements, end)),
-         .reading = segment_class,
-         .unused = 0});
+         .reading = static_cast<shaders::uint>(reading),
+         .instead = static_cast<shaders::uint>(instead)});
+  }
+}
+
+/// Adds the touch's elements that do not read `instead`.
+void append(ContactEvidence& evidence, const Touch& touch, std::span<const Reading> readings,
+            Reading instead, const glm::dvec2& pivot_mm, std::size_t segment_elements) {
+  ReadingCounts counts{};
+  for (const Reading reading : readings) {
+    ++counts[static_cast<std::size_t>(reading)];
+  }
+  for (std::size_t i = 0; i < counts.size(); ++i) {
+    if (const auto reading = static_cast<Reading>(i); counts[i] > 0 && reading != instead) {
+      append(evidence, touch, readings, reading, instead, pivot_mm, segment_elements);
+    }
+    evidence.counts[i] += counts[i];
   }
 }
 
@@ -47,43 +66,27 @@ void append(ContactEvidence& evidence, const Touch& touch, std::span<const Readi
 
 bool ContactEvidence::operator==(const ContactEvidence& other) const {
   const auto same = [](const shaders::Segment& a, const shaders::Segment& b) {
-    return a.begin == b.begin && a.end == b.end && a.reading == b.reading;
+    return a.begin == b.begin && a.end == b.end && a.reading == b.reading && a.instead == b.instead;
   };
   return from_pivot_mm == other.from_pivot_mm &&
          std::equal(segments.begin(), segments.end(), other.segments.begin(), other.segments.end(),
                     same);
 }
 
-ContactEvidence gather_evidence(std::span<const Touch> touches, const ContactClassifier& classifier,
+ContactEvidence gather_evidence(std::span<const Touch> touches, const ContactModel& model,
                                 const glm::dvec2& pivot_mm, std::size_t segment_elements) {
   ContactEvidence evidence;
   for (const Touch& touch : touches) {
-    const std::vector<Reading> readings = classifier.classify(touch);
-    append(evidence, touch, readings, Reading::no_contact, shaders::NO_CONTACT, pivot_mm,
-           segment_elements);
-    append(evidence, touch, readings, Reading::in_contact, shaders::IN_CONTACT, pivot_mm,
-           segment_elements);
+    append(evidence, touch, model.classify(touch), Reading::unknown, pivot_mm, segment_elements);
   }
   return evidence;
 }
 
-ContactEvidence gather_no_contact(const Touch& touch, const glm::dvec2& pivot_mm,
-                                  std::size_t segment_elements) {
-  const std::vector<Reading> readings(touch.elements_mm.size(), Reading::no_contact);
+ContactEvidence gather_evidence(const Touch& touch, std::span<const Reading> readings,
+                                Reading instead, const glm::dvec2& pivot_mm,
+                                std::size_t segment_elements) {
   ContactEvidence evidence;
-  append(evidence, touch, readings, Reading::no_contact, shaders::NO_CONTACT, pivot_mm,
-         segment_elements);
-  return evidence;
-}
-
-ContactEvidence gather_differences(const Touch& touch, const ContactClassifier& classifier,
-                                   const glm::dvec2& pivot_mm, std::size_t segment_elements) {
-  const std::vector<Reading> readings = classifier.classify(touch);
-  ContactEvidence evidence;
-  append(evidence, touch, readings, Reading::in_contact, shaders::CONTACT_INSTEAD, pivot_mm,
-         segment_elements);
-  append(evidence, touch, readings, Reading::unknown, shaders::UNKNOWN_INSTEAD, pivot_mm,
-         segment_elements);
+  append(evidence, touch, readings, instead, pivot_mm, segment_elements);
   return evidence;
 }
 

@@ -1,36 +1,40 @@
 #pragma once
 
+#include <array>
+#include <cstdint>
 #include <span>
 #include <vector>
 
 #include "interface.h"
-#include "palpate/contact.hpp"
+#include "palpate/contact_model.hpp"
 #include "palpate/lattice.hpp"
 
 namespace palpate {
 
-/// The known elements of some touches, in the robot frame and relative to the lattice's pivot,
-/// ordered so that equal reading classes of a touch stand together.
+/// Number of elements of every reading.
+using ReadingCounts = std::array<std::uint64_t, most_reading_levels + 1>;
+
+/// Elements of some touches, in the robot frame and relative to the lattice's pivot, ordered so
+/// that equal readings of a touch stand together.
 struct ContactEvidence {
   std::vector<glm::dvec2> from_pivot_mm;
   std::vector<shaders::Segment> segments;
+  ReadingCounts counts{};  ///< of the whole touches, elements that stand in no segment included
 
   bool operator==(const ContactEvidence& other) const;
 };
 
-/// Classifies the touches' elements (Eq. 3) and leaves out those that are Unknown. No segment is
+/// Classifies the touches' elements (Eq. 3) and gathers those that are not Unknown. No segment is
 /// longer than `segment_elements`, what one dispatch takes.
-ContactEvidence gather_evidence(std::span<const Touch> touches, const ContactClassifier& classifier,
+ContactEvidence gather_evidence(std::span<const Touch> touches, const ContactModel& model,
                                 const glm::dvec2& pivot_mm, std::size_t segment_elements);
 
-/// The same for an array that reads No Contact everywhere.
-ContactEvidence gather_no_contact(const Touch& touch, const glm::dvec2& pivot_mm,
-                                  std::size_t segment_elements);
-
-/// What a touch adds to that: the elements that are not in No Contact, by the ratio of their
-/// likelihood to that of No Contact.
-ContactEvidence gather_differences(const Touch& touch, const ContactClassifier& classifier,
-                                   const glm::dvec2& pivot_mm, std::size_t segment_elements);
+/// Gathers the elements of a classified touch that read something else than `instead`. They add
+/// their log-likelihood less that of `instead`: nothing less for Unknown, and with No Contact what
+/// the touch says beyond an array that reads No Contact everywhere.
+ContactEvidence gather_evidence(const Touch& touch, std::span<const Reading> readings,
+                                Reading instead, const glm::dvec2& pivot_mm,
+                                std::size_t segment_elements);
 
 /// Splits an element's coordinate into whole cells and the rest. One beyond 2^29 cells, or that is
 /// no number, counts as off every map: its cell becomes so large that the sum with any cell of

@@ -1,20 +1,29 @@
 #include "contradiction.hpp"
 
-#include <algorithm>
-#include <vector>
+#include <cmath>
 
 #include "palpate/occupancy_grid.hpp"
 
 namespace palpate {
 
-double prior_log_likelihood(const Touch& touch, const ContactClassifier& classifier,
-                            const ContactLikelihood& model) {
-  const double log_odds = log_odds_from_probability(model.prior);
-  const std::vector<Reading> readings = classifier.classify(touch);
+double prior_log_likelihood(Reading reading, const ContactModel& model) {
+  const MapSample prior{.log_odds = log_odds_from_probability(model.prior.value())};
+  const std::size_t sets = model.table ? model.table->sets() : 1;
+  const double first = model.log_likelihood(reading, prior);
+  double ratio = 0.0;  // of the sum over the sets to the first set's likelihood
+  for (std::size_t set = 0; set < sets; ++set) {
+    ratio += std::exp(model.log_likelihood(reading, prior, set) - first);
+  }
+  return first + std::log(ratio / static_cast<double>(sets));
+}
+
+double prior_log_likelihood(const ReadingCounts& counts, const ContactModel& model) {
   double sum = 0.0;
-  for (const Reading reading : {Reading::no_contact, Reading::in_contact}) {
-    sum += static_cast<double>(std::count(readings.begin(), readings.end(), reading)) *
-           model.log_likelihood(reading, log_odds);
+  for (std::size_t reading = 0; reading < counts.size(); ++reading) {
+    if (counts[reading] > 0) {
+      sum += static_cast<double>(counts[reading]) *
+             prior_log_likelihood(static_cast<Reading>(reading), model);
+    }
   }
   return sum;
 }

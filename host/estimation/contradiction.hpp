@@ -1,8 +1,7 @@
 #pragma once
 
-#include "palpate/contact.hpp"
-#include "palpate/sensor_model.hpp"
-#include "palpate/touch.hpp"
+#include "contact_evidence.hpp"
+#include "palpate/contact_model.hpp"
 
 namespace palpate {
 
@@ -11,8 +10,11 @@ namespace palpate {
 /// holds at full precision.
 inline constexpr double contradiction_nats = 700.0;
 
-/// Log-likelihood in nats of a touch by a map of nothing but the prior, at whatever pose (Eq. 7).
-double prior_log_likelihood(const Touch& touch, const ContactClassifier& classifier,
-                            const ContactLikelihood& model);
+/// Log-likelihood in nats of a reading on a map of nothing but the prior (Eq. 7). Where a table
+/// holds numbers of their own for every object, this is the log of the mean of the objects'
+/// likelihoods.
+double prior_log_likelihood(Reading reading, const ContactModel& model);
+/// Log-likelihood in nats of all readings on a map of nothing but the prior, at whatever pose.
+double prior_log_likelihood(const ReadingCounts& counts, const ContactModel& model);
 
 }  // namespace palpate

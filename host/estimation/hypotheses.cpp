@@ -26,19 +26,37 @@ void validate_hypotheses(std::span<const Hypothesis> hypotheses) {
   }
 }
 
-double common_prior(std::span<const Hypothesis> hypotheses) {
-  const OccupancyGrid& first = hypotheses.front().map;
-  for (const Hypothesis& hypothesis : hypotheses) {
+std::optional<std::size_t> differing_prior(std::span<const Hypothesis> hypotheses) {
+  for (std::size_t i = 1; i < hypotheses.size(); ++i) {
     // Readers may have rounded one of them.
-    if (std::abs(hypothesis.map.prior - first.prior) > 1e-6) {
-      throw Error(
-          Fault::input,
-          fmt::format("map '{}': prior {} differs from {} of map '{}'; build the maps "
-                      "together, or say which prior to use",
-                      hypothesis.map.label, hypothesis.map.prior, first.prior, first.label));
+    if (std::abs(hypotheses[i].map.prior - hypotheses.front().map.prior) > 1e-6) {
+      return i;
     }
   }
-  return first.prior;
+  return {};
+}
+
+ContactModel resolve(const ContactModel& contact, std::span<const Hypothesis> hypotheses) {
+  contact.validate();
+  if (contact.table && contact.table->sets() != 1 && contact.table->sets() != hypotheses.size()) {
+    throw Error(Fault::input,
+                fmt::format("likelihood table: numbers of {} objects, but there are {} maps; give "
+                            "one set for all, or one for each",
+                            contact.table->sets(), hypotheses.size()));
+  }
+  ContactModel resolved = contact;
+  if (!contact.prior) {
+    const OccupancyGrid& first = hypotheses.front().map;
+    if (const auto other = differing_prior(hypotheses)) {
+      const OccupancyGrid& map = hypotheses[*other].map;
+      throw Error(Fault::input,
+                  fmt::format("map '{}': prior {} differs from {} of map '{}'; build the maps "
+                              "together, or say which prior to use",
+                              map.label, map.prior, first.prior, first.label));
+    }
+    resolved.prior = first.prior;
+  }
+  return resolved;
 }
 
 double log_total_weight(std::span<const Hypothesis> hypotheses) {

@@ -3,6 +3,7 @@
 #include <span>
 #include <vector>
 
+#include "palpate/contact_model.hpp"
 #include "palpate/estimate.hpp"
 
 namespace palpate {
@@ -10,8 +11,10 @@ namespace palpate {
 /// @throws Error on an empty list, a map that is not sound or a weight that is not positive.
 void validate_hypotheses(std::span<const Hypothesis> hypotheses);
 
-/// The maps' prior. @throws Error where they differ.
-double common_prior(std::span<const Hypothesis> hypotheses);
+/// The contact model with the maps' prior where it has none of its own.
+/// @throws Error where the model is not sound, the maps' priors differ, or a table has numbers of
+/// their own for another number of objects
+ContactModel resolve(const ContactModel& contact, std::span<const Hypothesis> hypotheses);
 
 /// log of the sum of the prior weights.
 double log_total_weight(std::span<const Hypothesis> hypotheses);

@@ -10,17 +10,6 @@
 
 namespace palpate {
 
-namespace {
-
-void require_probability(const char* name, double value) {
-  if (!(value > 0.0 && value < 1.0)) {
-    throw Error(Fault::input,
-                fmt::format("{} = {}: must lie strictly between 0 and 1", name, value));
-  }
-}
-
-}  // namespace
-
 void InverseSensorModel::validate() const {
   if (!(spread_mm >= least_length_mm && spread_mm <= most_length_mm)) {
     throw Error(Fault::input, fmt::format("spread = {} mm: give {:g} to {:g} mm", spread_mm,
@@ -57,28 +46,6 @@ double InverseSensorModel::support_radius_mm(std::size_t readings, double tolera
   const double g =
       std::min(0.5, tolerance * least / static_cast<double>(std::max<std::size_t>(readings, 1)));
   return spread_mm * std::sqrt(std::max(0.0, 2.0 * std::log(peak / g)));
-}
-
-void ContactLikelihood::validate() const {
-  if (!(gamma >= 0.0 && gamma < 1.0)) {
-    throw Error(Fault::input, fmt::format("gamma = {}: must lie in [0, 1)", gamma));
-  }
-  require_probability("prior", prior);
-}
-
-double ContactLikelihood::log_likelihood(Reading reading, double log_odds) const {
-  if (reading == Reading::unknown) {
-    return 0.0;
-  }
-  const double l = reading == Reading::in_contact ? log_odds : -log_odds;
-  // log of the logistic function, exact where the function itself would underflow.
-  const double log_p = std::min(l, 0.0) - std::log1p(std::exp(-std::abs(l)));
-  if (gamma == 0.0) {
-    return log_p;
-  }
-  const double a = std::log(gamma) + std::log(prior);
-  const double b = std::log1p(-gamma) + log_p;
-  return std::max(a, b) + std::log1p(std::exp(-std::abs(a - b)));
 }
 
 }  // namespace palpate

@@ -26,4 +26,20 @@ std::vector<Reading> classify(const Touch& touch, const ContactClassifier& class
   return readings;
 }
 
+std::vector<Reading> classify(const Touch& touch, const ContactModel& model) {
+  std::vector<Reading> readings = classify(touch, model.classifier);
+  if (model.table) {
+    for (std::size_t i = 0; i < readings.size(); ++i) {
+      if (readings[i] == Reading::in_contact) {
+        int level = 1;
+        for (const double edge : model.table->level_edges) {
+          level += touch.pressure[i] >= edge ? 1 : 0;
+        }
+        readings[i] = static_cast<Reading>(level);
+      }
+    }
+  }
+  return readings;
+}
+
 }  // namespace palpate::reference

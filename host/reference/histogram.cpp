@@ -54,14 +54,14 @@ Pose bin_pose(const PoseLattice& lattice, std::int64_t bin) {
 }
 
 std::vector<double> log_likelihoods(std::span<const Touch> touches, const PoseLattice& lattice,
-                                    const OccupancyGrid& map, const ContactClassifier& classifier,
-                                    const ContactLikelihood& model) {
+                                    const OccupancyGrid& map, const ContactModel& model,
+                                    std::size_t object) {
   std::vector<double> logs(static_cast<std::size_t>(lattice.bins()), 0.0);
   for (std::size_t bin = 0; bin < logs.size(); ++bin) {
     const Pose pose = bin_pose(lattice, static_cast<std::int64_t>(bin));
     for (const Touch& touch : touches) {
       // Eq. 13.
-      logs[bin] += log_likelihood(touch, pose, map, classifier, model);
+      logs[bin] += log_likelihood(touch, pose, map, model, object);
     }
   }
   return logs;

@@ -1,5 +1,6 @@
 #include "reference.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 namespace palpate::reference {
@@ -9,6 +10,28 @@ namespace {
 /// log(1 / (1 + exp(-l))): the form that does not overflow on either side.
 double log_logistic(double l) {
   return l >= 0.0 ? -std::log1p(std::exp(-l)) : l - std::log1p(std::exp(l));
+}
+
+/// A straight line between the nodes on either side of the log odds, flat beyond the first and
+/// last.
+double tabled(const LikelihoodTable& table, std::size_t level, double log_odds,
+              std::size_t object) {
+  const std::size_t levels = table.level_edges.size() + 2;
+  const bool shared = table.log_likelihood.size() == levels * table.nodes;
+  const double* nats =
+      table.log_likelihood.data() + ((shared ? 0 : object) * levels + level) * table.nodes;
+  const double steps = static_cast<double>(table.nodes) - 1.0;
+  const double step = (table.last_log_odds - table.first_log_odds) / steps;
+  if (log_odds <= table.first_log_odds) {
+    return nats[0];
+  }
+  if (log_odds >= table.last_log_odds) {
+    return nats[table.nodes - 1];
+  }
+  const double below = std::min(std::floor((log_odds - table.first_log_odds) / step), steps - 1.0);
+  const double share = (log_odds - (table.first_log_odds + below * step)) / step;
+  const auto node = static_cast<std::size_t>(below);
+  return (1.0 - share) * nats[node] + share * nats[node + 1];
 }
 
 }  // namespace
@@ -29,25 +52,31 @@ double interpolate(const OccupancyGrid& map, double prior, const glm::dvec2& p_o
          fy * ((1.0 - fx) * cell(column, row + 1.0) + fx * cell(column + 1.0, row + 1.0));
 }
 
-double log_likelihood(Reading reading, double log_odds, const ContactLikelihood& model) {
+double log_likelihood(Reading reading, const MapSample& map, const ContactModel& model,
+                      std::size_t object) {
   if (reading == Reading::unknown) {
     return 0.0;
   }
-  const double log_p = log_logistic(reading == Reading::in_contact ? log_odds : -log_odds);
+  if (model.table) {
+    return tabled(*model.table, static_cast<std::size_t>(reading), map.log_odds, object);
+  }
+  const double log_p = log_logistic(reading == Reading::no_contact ? -map.log_odds : map.log_odds);
   if (model.gamma == 0.0) {
     return log_p;
   }
-  return std::log(model.gamma * model.prior + (1.0 - model.gamma) * std::exp(log_p));
+  return std::log(model.gamma * *model.prior + (1.0 - model.gamma) * std::exp(log_p));
 }
 
 double log_likelihood(const Touch& touch, const Pose& T_object_robot, const OccupancyGrid& map,
-                      const ContactClassifier& classifier, const ContactLikelihood& model) {
-  const std::vector<Reading> readings = classify(touch, classifier);
+                      const ContactModel& contact, std::size_t object) {
+  ContactModel model = contact;
+  model.prior = contact.prior.value_or(map.prior);
+  const std::vector<Reading> readings = classify(touch, model);
   double sum = 0.0;
   for (std::size_t k = 0; k < readings.size(); ++k) {
     const glm::dvec2 p_object =
         transform(T_object_robot, transform(touch.T_robot_sensor, touch.elements_mm[k]));
-    sum += log_likelihood(readings[k], interpolate(map, model.prior, p_object), model);
+    sum += log_likelihood(readings[k], {interpolate(map, *model.prior, p_object)}, model, object);
   }
   return sum;
 }

@@ -1,12 +1,13 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <span>
 #include <vector>
 
 #include <glm/vec2.hpp>
 
-#include "palpate/contact.hpp"
+#include "palpate/contact_model.hpp"
 #include "palpate/lattice.hpp"
 #include "palpate/occupancy_grid.hpp"
 #include "palpate/pose.hpp"
@@ -40,6 +41,8 @@ glm::dvec2 transform_back(const Pose& T_a_b, const glm::dvec2& p_a);
 
 /// Eq. 3: the class of every element, [e].
 std::vector<Reading> classify(const Touch& touch, const ContactClassifier& classifier);
+/// The same, with In Contact at the levels of the model's table.
+std::vector<Reading> classify(const Touch& touch, const ContactModel& model);
 
 // --- map.cpp: Eq. 1, 2, 4-6 ---
 // At a distance d from an element, G'(d) = a exp(-d^2 / (2 s^2)) (Eq. 4). The element alone makes
@@ -65,12 +68,14 @@ std::vector<double> log_odds_map(std::span<const Touch> touches, const Occupancy
 /// Bilinear interpolation of the map's log odds; every cell beyond the map holds the prior's.
 double interpolate(const OccupancyGrid& map, double prior, const glm::dvec2& p_object_mm);
 
-/// Eq. 7 for one element, in nats.
-double log_likelihood(Reading reading, double log_odds, const ContactLikelihood& model);
+/// Eq. 7 for one element, in nats, or the table in its place; the prior must be set for Eq. 7.
+double log_likelihood(Reading reading, const MapSample& map, const ContactModel& model,
+                      std::size_t object = 0);
 
-/// Eq. 7 for all elements of a touch on an object at a pose, in nats.
+/// Eq. 7 for all elements of a touch on an object at a pose, in nats. The prior is the map's where
+/// the model has none. `object` says whose numbers of a table count.
 double log_likelihood(const Touch& touch, const Pose& T_object_robot, const OccupancyGrid& map,
-                      const ContactClassifier& classifier, const ContactLikelihood& model);
+                      const ContactModel& model, std::size_t object = 0);
 
 // --- particles.cpp: Eq. 8-12 ---
 
@@ -107,8 +112,8 @@ Pose bin_pose(const PoseLattice& lattice, std::int64_t bin);
 
 /// Eq. 13 in logs: the touches' log-likelihood at every bin, [theta, y, x], in nats.
 std::vector<double> log_likelihoods(std::span<const Touch> touches, const PoseLattice& lattice,
-                                    const OccupancyGrid& map, const ContactClassifier& classifier,
-                                    const ContactLikelihood& model);
+                                    const OccupancyGrid& map, const ContactModel& model,
+                                    std::size_t object = 0);
 
 /// The belief over objects and bins: log-likelihoods [object][bin] and prior weights [object].
 struct Posterior {

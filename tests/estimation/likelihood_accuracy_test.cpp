@@ -78,12 +78,12 @@ TEST(Accuracy, WithoutGammaIsRelativeToTheNatsThatATouchCosts) {
   const Hypothesis hypothesis{random_map(31, 27, 0.5, 130.0, 75), 1.0};
   const Recording recording = random_recording(1, 36, 76);
   HistogramOptions options = small_options();
-  options.gamma = 0.0;
+  options.contact.gamma = 0.0;
   Device device = Device::open();
   PoseHistogram histogram(device, std::span(&hypothesis, 1), options);
   histogram.update(all_touches(recording));
   const std::vector<double> expected = reference::log_likelihoods(
-      all_touches(recording), options.lattice, hypothesis.map, {}, {.gamma = 0.0, .prior = 0.2});
+      all_touches(recording), options.lattice, hypothesis.map, options.contact);
   const std::vector<double> product = histogram.log_likelihood(0);
   for (std::size_t bin = 0; bin < expected.size(); ++bin) {
     ASSERT_NEAR(product[bin], expected[bin], per_touch + 3e-7 * std::abs(expected[bin]));
@@ -96,7 +96,7 @@ TEST(Accuracy, WithoutGammaAnImpossibleElementCostsItsLogOdds) {
   const Hypothesis hypothesis{map, 1.0};
   HistogramOptions options;
   options.lattice = {.x_mm = {0, 0, 1}, .y_mm = {0, 0, 1}, .theta_rad = {0, 0, 1}};
-  options.gamma = 0.0;
+  options.contact.gamma = 0.0;
   Device device = Device::open();
   PoseHistogram histogram(device, std::span(&hypothesis, 1), options);
   Recording recording;

@@ -91,8 +91,8 @@ TEST(Likelihood, AgreesForEveryGammaAndPrior) {
     for (const double prior : {0.01, 0.2, 0.8}) {
       HistogramOptions options;
       options.lattice = small_lattice();
-      options.gamma = gamma;
-      options.prior = prior;
+      options.contact.gamma = gamma;
+      options.contact.prior = prior;
       EXPECT_LT(error_per_touch({map}, options, recording), per_touch)
           << "gamma " << gamma << ", prior " << prior;
     }
@@ -138,7 +138,8 @@ TEST(Likelihood, OfTouchesOffTheMapIsThePriors) {
     double expected = 0.0;
     for (const Touch& touch : all_touches(recording)) {
       for (const ElementReading& element : known_readings(touch, {})) {
-        expected += reference::log_likelihood(element.reading, std::log(0.2 / 0.8), {});
+        expected +=
+            reference::log_likelihood(element.reading, {std::log(0.2 / 0.8)}, {.prior = 0.2});
       }
     }
     histogram.update(all_touches(recording));

@@ -38,7 +38,7 @@ double sum(const std::vector<double>& values) {
 double plain_none(const std::vector<Hypothesis>& objects, const HistogramOptions& options,
                   std::span<const Touch> touches) {
   OccupancyGrid nothing{.nx = 1, .ny = 1, .log_odds = {}};
-  const double prior = options.prior.value_or(objects.front().map.prior);
+  const double prior = options.contact.prior.value_or(objects.front().map.prior);
   nothing.log_odds = {static_cast<float>(std::log(prior / (1.0 - prior)))};
   std::vector<Hypothesis> with = objects;
   with.push_back({nothing, *options.none_weight});
@@ -53,7 +53,7 @@ TEST(NoneOfThese, CompetesAsAMapOfThePriorWould) {
   for (const double weight : {0.01, 1.0, 20.0}) {
     for (const double gamma : {0.0, 0.3}) {
       HistogramOptions options = with_none(weight);
-      options.gamma = gamma;
+      options.contact.gamma = gamma;
       PoseHistogram histogram(device, objects, options);
       for (std::size_t touches = 0; touches <= recording.size(); ++touches) {
         if (touches > 0) {
@@ -155,7 +155,7 @@ TEST(Contradiction, IsSaidWhereNothingExplainsTheTouches) {
   recording.T_robot_sensor = {{}};
   recording.pressure = {9.0, 0.0};
   HistogramOptions options = with_none(1.0);
-  options.gamma = 0.0;
+  options.contact.gamma = 0.0;
   Device device = Device::open();
   PoseHistogram histogram(device, sure_objects(), options);
   EXPECT_FALSE(histogram.estimate().contradicted) << "before any touch";
@@ -179,7 +179,7 @@ TEST(Contradiction, IsNotSaidWhereReadingsMayBeRandom) {
   recording.T_robot_sensor = {{}};
   recording.pressure = {9.0, 0.0};
   HistogramOptions options = with_none(1.0);
-  options.gamma = 0.1;
+  options.contact.gamma = 0.1;
   Device device = Device::open();
   PoseHistogram histogram(device, sure_objects(), options);
   histogram.update(all_touches(recording));
@@ -190,20 +190,18 @@ TEST(Contradiction, IsNotSaidWhereReadingsMayBeRandom) {
 /// reference; 0 where all particles are of "none of these".
 double prior_over_best(const ParticleFilter& filter, const Touch& touch,
                        const std::vector<Hypothesis>& objects, const ParticleOptions& options) {
-  const ContactLikelihood model{.gamma = options.gamma, .prior = objects.front().map.prior};
   double best = -std::numeric_limits<double>::infinity();
   for (const ParticleFilter::Particle& particle : filter.particles()) {
     if (static_cast<std::size_t>(particle.object) < objects.size()) {
-      best = std::max(
-          best, reference::log_likelihood(touch, particle.T_object_robot,
-                                          objects[particle.object].map, options.classifier, model));
+      best =
+          std::max(best, reference::log_likelihood(touch, particle.T_object_robot,
+                                                   objects[particle.object].map, options.contact));
     }
   }
   const OccupancyGrid unseen{
       .nx = 1, .ny = 1, .log_odds = {static_cast<float>(objects.front().map.prior_log_odds())}};
-  return std::isfinite(best)
-             ? reference::log_likelihood(touch, {}, unseen, options.classifier, model) - best
-             : 0.0;
+  return std::isfinite(best) ? reference::log_likelihood(touch, {}, unseen, options.contact) - best
+                             : 0.0;
 }
 
 TEST(NoneOfThese, WeighsParticlesByThePriorWhateverTheCellsOfTheMaps) {
@@ -224,9 +222,8 @@ TEST(NoneOfThese, WeighsParticlesByThePriorWhateverTheCellsOfTheMaps) {
       none += is_none ? 1 : 0;
       const OccupancyGrid unseen{
           .nx = 1, .ny = 1, .log_odds = {static_cast<float>(objects[0].map.prior_log_odds())}};
-      logs.push_back(reference::log_likelihood(
-          touch, particle.T_object_robot, is_none ? unseen : objects[0].map, options.classifier,
-          {.gamma = options.gamma, .prior = objects[0].map.prior}));
+      logs.push_back(reference::log_likelihood(touch, particle.T_object_robot,
+                                               is_none ? unseen : objects[0].map, options.contact));
       weights.push_back(particle.weight);
     }
     const std::vector<double> expected = reference::importance_weights(logs);
@@ -246,7 +243,7 @@ TEST(Contradiction, IsSaidByParticlesWhereTheReferenceSaysSo) {
     const std::vector<Hypothesis> objects{{random_map(121, 121, 0.5, steepness, 159), 1.0},
                                           {random_map(121, 121, 0.5, steepness, 160), 1.0}};
     ParticleOptions options{.particles = 500, .region = {}};
-    options.gamma = gamma;
+    options.contact.gamma = gamma;
     options.none_weight = none_weight;
     ParticleFilter filter(device, objects, options);
     EXPECT_FALSE(filter.estimate().contradicted) << "before any touch";

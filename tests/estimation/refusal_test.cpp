@@ -79,11 +79,8 @@ class HistogramInput : public testing::Test {
   /// Both filters are given the same.
   void refuse(const std::string& says) {
     expect_refused([&] { const PoseHistogram histogram(device, objects, options); }, says);
-    const ParticleOptions particles{.particles = 10,
-                                    .region = options.lattice,
-                                    .classifier = options.classifier,
-                                    .gamma = options.gamma,
-                                    .prior = options.prior};
+    const ParticleOptions particles{
+        .particles = 10, .region = options.lattice, .contact = options.contact};
     expect_refused([&] { const ParticleFilter filter(device, objects, particles); }, says);
   }
 
@@ -136,11 +133,11 @@ TEST_F(HistogramInput, WithAMapThatIsNoGridIsRefused) {
 }
 
 TEST_F(HistogramInput, WithAClassifierThatDecidesNothingIsRefused) {
-  options.classifier.threshold = nan;
+  options.contact.classifier.threshold = nan;
   refuse("threshold");
-  options.classifier = {.ratio = nan};
+  options.contact.classifier = {.ratio = nan};
   refuse("ratio");
-  options.classifier = {.ratio = 1.5};
+  options.contact.classifier = {.ratio = 1.5};
   refuse("ratio");
 }
 
@@ -153,12 +150,12 @@ TEST_F(HistogramInput, WithAWeightThatIsNotPositiveIsRefused) {
 
 TEST_F(HistogramInput, WithAGammaOrPriorOutOfRangeIsRefused) {
   for (const double gamma : {-0.1, 1.0, nan}) {
-    options.gamma = gamma;
+    options.contact.gamma = gamma;
     refuse("gamma");
   }
-  options.gamma = 0.1;
+  options.contact.gamma = 0.1;
   for (const double prior : {0.0, 1.0, nan}) {
-    options.prior = prior;
+    options.contact.prior = prior;
     refuse("prior");
   }
 }
@@ -167,7 +164,7 @@ TEST_F(HistogramInput, WithMapsOfDifferentPriorsIsRefusedUnlessOneIsGiven) {
   objects.push_back({random_map(5, 4, 0.5, 1.0, 123), 1.0});
   objects[1].map.prior = 0.3;
   refuse("0.3");
-  options.prior = 0.25;
+  options.contact.prior = 0.25;
   EXPECT_NO_THROW(PoseHistogram(device, objects, options));
 }
 

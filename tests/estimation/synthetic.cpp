@@ -78,11 +78,10 @@ reference::Posterior reference_posterior(std::span<const Hypothesis> hypotheses,
                                          const HistogramOptions& options,
                                          std::span<const Touch> touches) {
   reference::Posterior posterior{.lattice = options.lattice, .log_likelihood = {}, .weight = {}};
-  const ContactLikelihood model{.gamma = options.gamma,
-                                .prior = options.prior.value_or(hypotheses.front().map.prior)};
-  for (const Hypothesis& hypothesis : hypotheses) {
+  for (std::size_t object = 0; object < hypotheses.size(); ++object) {
+    const Hypothesis& hypothesis = hypotheses[object];
     posterior.log_likelihood.push_back(reference::log_likelihoods(
-        touches, options.lattice, hypothesis.map, options.classifier, model));
+        touches, options.lattice, hypothesis.map, options.contact, object));
     posterior.weight.push_back(hypothesis.weight);
   }
   return posterior;

@@ -62,9 +62,7 @@ HistogramOptions options() {
                       .y_mm = {-1.0, 2.0, 2},
                       .theta_rad = {0.2, 6.2, 4},
                       .pivot_mm = {0.5, -0.25}},
-          .classifier = {},
-          .gamma = 0.15,
-          .prior = prior,
+          .contact = {.gamma = 0.15, .prior = prior},
           .none_weight = 0.7};
 }
 
@@ -94,7 +92,7 @@ TEST(FrozenValues, OfTheContactClassifier) {
                                                    {in, no, in, no, in, no}};
   for (const std::size_t touch : {0U, 1U}) {
     EXPECT_EQ(ContactClassifier{}.classify(recording.touch(touch)), expected[touch]);
-    EXPECT_EQ(reference::classify(recording.touch(touch), {}), expected[touch]);
+    EXPECT_EQ(reference::classify(recording.touch(touch), ContactClassifier{}), expected[touch]);
   }
 }
 
@@ -133,12 +131,12 @@ TEST(FrozenValues, OfTheLikelihood) {
         Likelihood{0.0, in, -3.0, -3.048587352}, Likelihood{0.0, in, 0.5, -0.4740769842},
         Likelihood{0.0, in, 7.0, -0.0009114664538}, Likelihood{0.0, no, -3.0, -0.04858735157},
         Likelihood{0.0, no, 0.5, -0.9740769842}, Likelihood{0.0, no, 7.0, -7.000911466}}) {
-    const ContactLikelihood model{.gamma = gamma, .prior = prior};
-    EXPECT_NEAR(model.log_likelihood(reading, log_odds), nats, digits);
-    EXPECT_NEAR(reference::log_likelihood(reading, log_odds, model), nats, digits);
+    const ContactModel model{.gamma = gamma, .prior = prior};
+    EXPECT_NEAR(model.log_likelihood(reading, {log_odds}), nats, digits);
+    EXPECT_NEAR(reference::log_likelihood(reading, {log_odds}, model), nats, digits);
   }
-  EXPECT_EQ(ContactLikelihood{}.log_likelihood(unknown, 2.0), 0.0);
-  EXPECT_EQ(reference::log_likelihood(unknown, 2.0, ContactLikelihood{}), 0.0);
+  EXPECT_EQ(ContactModel{}.log_likelihood(unknown, {2.0}), 0.0);
+  EXPECT_EQ(reference::log_likelihood(unknown, {2.0}, ContactModel{}), 0.0);
 }
 
 TEST(FrozenValues, OfAMap) {
@@ -176,8 +174,7 @@ TEST(FrozenValues, OfTheHistogramFilter) {
   reference::Posterior posterior{.lattice = wanted.lattice, .log_likelihood = {}, .weight = {1, 2}};
   for (const Hypothesis& object : objects()) {
     posterior.log_likelihood.push_back(
-        reference::log_likelihoods(touches, wanted.lattice, object.map, wanted.classifier,
-                                   {.gamma = wanted.gamma, .prior = prior}));
+        reference::log_likelihoods(touches, wanted.lattice, object.map, wanted.contact));
   }
   for (const int object : {0, 1}) {
     const std::vector<double> logs = histogram.log_likelihood(object);
@@ -250,9 +247,7 @@ TEST(FrozenValues, OfParticlesAtOnePose) {
   const ParticleOptions wanted{
       .particles = 3000,
       .region = {.x_mm = {0.1, 0.1, 1}, .y_mm = {0.2, 0.2, 1}, .theta_rad = {0.7, 0.7, 1}},
-      .classifier = {},
-      .gamma = 0.15,
-      .prior = prior,
+      .contact = {.gamma = 0.15, .prior = prior},
       .motion_mm = 0.0,
       .motion_rad = 0.0};
   const Recording recording = two_touches();
@@ -265,10 +260,9 @@ TEST(FrozenValues, OfParticlesAtOnePose) {
   EXPECT_NEAR(filter.effective_sample_size() / 2933.814593, 1.0, 4 * per_touch);
   const double logs[] = {-3.72808242, -3.388365487};
   for (const std::size_t object : {0U, 1U}) {
-    EXPECT_NEAR(
-        reference::log_likelihood(recording.touch(0), {{0.1, 0.2}, 0.7}, objects()[object].map, {},
-                                  {.gamma = 0.15, .prior = prior}),
-        logs[object], 1e-6);
+    EXPECT_NEAR(reference::log_likelihood(recording.touch(0), {{0.1, 0.2}, 0.7},
+                                          objects()[object].map, wanted.contact),
+                logs[object], 1e-6);
   }
 }
 

@@ -124,7 +124,6 @@ double rounded(double value) { return std::stod(fmt::format("{:.10g}", value)); 
 
 void compute_expected(GoldenValues& golden) {
   const HistogramOptions& options = golden.histogram_options;
-  const ContactLikelihood model{.gamma = options.gamma, .prior = *options.prior};
   for (GoldenValues::Object& object : golden.objects) {
     object.log_odds =
         reference::log_odds_map(object.training.touches(0, object.training.size()), object.map,
@@ -145,7 +144,7 @@ void compute_expected(GoldenValues& golden) {
     for (const Touch& touch : unknown.touches.touches(0, unknown.touches.size())) {
       for (std::size_t object = 0; object < objects; ++object) {
         const std::vector<double> logs = reference::log_likelihoods(
-            {&touch, 1}, options.lattice, golden.objects[object].map, options.classifier, model);
+            {&touch, 1}, options.lattice, golden.objects[object].map, options.contact);
         for (std::size_t bin = 0; bin < logs.size(); ++bin) {
           posterior.log_likelihood[object][bin] += logs[bin];
         }
@@ -181,9 +180,9 @@ GoldenValues read_golden(const std::filesystem::path& path) {
                                           .y_mm = axis_from(j.at("y_mm")),
                                           .theta_rad = axis_from(j.at("theta_rad")),
                                           .pivot_mm = point_from(j.at("pivot_mm"))},
-                              .classifier = golden.map_options.classifier,
-                              .gamma = j.at("gamma"),
-                              .prior = golden.map_options.sensor.prior};
+                              .contact = {.classifier = golden.map_options.classifier,
+                                          .gamma = j.at("gamma"),
+                                          .prior = golden.map_options.sensor.prior}};
   for (const json& object : j.at("objects")) {
     golden.objects.push_back(object_from(object, golden.map_options.sensor.prior));
   }
@@ -202,7 +201,7 @@ void write_golden(const std::filesystem::path& path, const GoldenValues& golden)
          {"prior", map.sensor.prior},
          {"threshold_kpa", map.classifier.threshold},
          {"ratio", map.classifier.ratio},
-         {"gamma", histogram.gamma},
+         {"gamma", histogram.contact.gamma},
          {"x_mm", to_json(histogram.lattice.x_mm)},
          {"y_mm", to_json(histogram.lattice.y_mm)},
          {"theta_rad", to_json(histogram.lattice.theta_rad)},

@@ -30,8 +30,8 @@ GoldenValues simulate() {
                                           .y_mm = {-9.0, 9.0, 9},
                                           .theta_rad = {0.0, rounded(2.0 * std::numbers::pi), 8},
                                           .pivot_mm = {3.0, -2.0}},
-                              .classifier = golden.map_options.classifier,
-                              .prior = golden.map_options.sensor.prior};
+                              .contact = {.classifier = golden.map_options.classifier,
+                                          .prior = golden.map_options.sensor.prior}};
 
   // A quarter of the training grid still reaches every part of a letter, at 3 angles.
   std::vector<Pose> training;

@@ -35,9 +35,9 @@ class SharedGolden : public testing::Test {
 
   HistogramOptions histogram_options() const {
     HistogramOptions options;
-    options.classifier = classifier();
-    options.gamma = golden.at("gamma");
-    options.prior = golden.at("prior").get<double>();
+    options.contact.classifier = classifier();
+    options.contact.gamma = golden.at("gamma");
+    options.contact.prior = golden.at("prior").get<double>();
     return options;
   }
 

@@ -35,7 +35,7 @@ void expect_numbers(Device& device, std::span<const Hypothesis> objects, const P
   }
   EXPECT_GE(balanced_lattice(lattice, objects, 10'000).lattice.bins(), 1);
 
-  ParticleOptions options{.particles = 200, .region = lattice, .classifier = {}};
+  ParticleOptions options{.particles = 200, .region = lattice};
   options.region.x_mm.upper = std::min(lattice.x_mm.upper, lattice.x_mm.lower + 1e5);
   options.region.y_mm.upper = std::min(lattice.y_mm.upper, lattice.y_mm.lower + 1e5);
   ParticleFilter filter(device, objects, options);
@@ -106,7 +106,6 @@ TEST(Bounds, WhatLiesBeyondThemOnBothSidesDoesNotMeet) {
                          .region = {.x_mm = {-524.288, -524.288, 1},
                                     .y_mm = {0.0, 0.0, 1},
                                     .theta_rad = {0.0, 0.0, 1}},
-                         .classifier = {},
                          .motion_mm = 0.0,
                          .motion_rad = 0.0});
   for (glm::dvec2& element : recording.elements_mm) {

@@ -24,7 +24,7 @@ OccupancyGrid filled_map(float log_odds) {
 
 HistogramOptions without_gamma() {
   HistogramOptions options;
-  options.gamma = 0.0;
+  options.contact.gamma = 0.0;
   options.lattice = {.x_mm = {-3.0, 3.0, 5}, .y_mm = {-3.0, 3.0, 6}, .theta_rad = {0.0, 6.0, 4}};
   return options;
 }
@@ -110,7 +110,7 @@ TEST(Contradiction, LogOddsAtTheLargestThatAMapMayHold) {
   Device device = Device::open();
   for (const double gamma : {0.0, 0.1}) {
     HistogramOptions options = without_gamma();
-    options.gamma = gamma;
+    options.contact.gamma = gamma;
     for (const double pressure : {0.0, 10.0}) {
       const Recording recording = press(pressure);
       // All bins of an object are equal, and the objects differ as much as possible.
@@ -130,7 +130,7 @@ TEST(Contradiction, AFloorThatNoFloatHolds) {
   Device device = Device::open();
   for (const double gamma : {1e-30, 1e-42, 1e-300}) {
     HistogramOptions options = without_gamma();
-    options.gamma = gamma;
+    options.contact.gamma = gamma;
     const Estimate estimate =
         hard.expect_posterior(device, objects, options, all_touches(recording), seven_digits);
     EXPECT_GE(estimate.mode.log_likelihood, 36.0 * std::log(0.2 * gamma) - 0.1);

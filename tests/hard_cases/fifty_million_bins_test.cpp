@@ -55,7 +55,7 @@ TEST(FiftyMillionBins, OfWhichOneOrAllHoldTheMass) {
   const Pose chosen = reference::bin_pose(lattice, chosen_bin);
   const OccupancyGrid map = two_certain_cells(chosen.translation_mm);
   const Hypothesis hypothesis{map, 1.0};
-  const HistogramOptions options{.lattice = lattice, .gamma = 0.0};
+  const HistogramOptions options{.lattice = lattice, .contact = {.gamma = 0.0}};
   const auto bins = static_cast<double>(lattice.bins());
   Device device = Device::open();
   PoseHistogram histogram(device, std::span(&hypothesis, 1), options);
@@ -83,9 +83,8 @@ TEST(FiftyMillionBins, OfWhichOneOrAllHoldTheMass) {
       const auto bin = sample % 2 == 0
                            ? static_cast<std::int64_t>(random(0.0, bins))
                            : chosen_bin + static_cast<std::int64_t>(random(-1500.0, 1500.0));
-      const double expected =
-          reference::log_likelihood(recording.touch(0), reference::bin_pose(lattice, bin), map, {},
-                                    {.gamma = 0.0, .prior = map.prior});
+      const double expected = reference::log_likelihood(
+          recording.touch(0), reference::bin_pose(lattice, bin), map, options.contact);
       hard.expect("log-likelihood, nats",
                   std::abs(product[static_cast<std::size_t>(bin)] - expected),
                   Allowed{.nats = 5e-4, .relative = 3e-7}.at(expected));

@@ -41,7 +41,7 @@ TEST(Map, AMillionTouchesOfOneSpot) {
 
   const std::vector<Hypothesis> objects{{map, 1.0}, {random_map(31, 27, 0.5, 6.0, 491), 1.0}};
   for (const double gamma : {0.1, 0.0}) {
-    HistogramOptions recognition{.gamma = gamma};
+    HistogramOptions recognition{.contact = {.gamma = gamma}};
     recognition.lattice = {
         .x_mm = {-3.0, 3.0, 5}, .y_mm = {-3.0, 3.0, 5}, .theta_rad = {0.0, 0.5, 3}};
     // Interpolation keeps seven digits of millions of nats. With gamma, this error matters only

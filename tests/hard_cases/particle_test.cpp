@@ -53,9 +53,8 @@ Estimate expect_weights(HardCase& hard, ParticleFilter& filter, const Touch& tou
   std::vector<double> expected;
   for (const ParticleFilter::Particle& particle : particles) {
     const OccupancyGrid& map = objects[static_cast<std::size_t>(particle.object)].map;
-    expected.push_back(reference::log_likelihood(touch, particle.T_object_robot, map,
-                                                 options.classifier,
-                                                 {.gamma = options.gamma, .prior = map.prior}));
+    expected.push_back(
+        reference::log_likelihood(touch, particle.T_object_robot, map, options.contact));
   }
   const double most = *std::max_element(expected.begin(), expected.end());
   const std::vector<double> weights = reference::importance_weights(expected);
@@ -86,7 +85,7 @@ TEST(Particles, OfTouchesThatSayNothing) {
   Device device = Device::open();
   ParticleFilter filter(device, objects, options);
   Recording unknown = random_recording(5, 36, 504);
-  unknown.pressure.assign(unknown.pressure.size(), options.classifier.threshold);
+  unknown.pressure.assign(unknown.pressure.size(), options.contact.classifier.threshold);
   filter.update(all_touches(unknown));
   const Estimate estimate = expect_sound(filter, options.particles);
   EXPECT_TRUE(all_weigh_the_same(filter));
@@ -152,7 +151,7 @@ TEST(Particles, OfCertainMapsWithoutGamma) {
   Device device = Device::open();
   for (const bool augmented : {false, true}) {
     ParticleOptions options = two_thousand();
-    options.gamma = 0.0;
+    options.contact.gamma = 0.0;
     options.augmented = augmented;
     ParticleFilter filter(device, objects, options);
     for (const Touch& touch : all_touches(recording)) {

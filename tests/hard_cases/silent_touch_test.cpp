@@ -84,7 +84,7 @@ TEST(SilentTouch, EveryElementAtTheThreshold) {
     recording.pressure[i] = 0.3 * 20.0;
   }
   const Touch touch = recording.touch(1);
-  EXPECT_EQ(ContactClassifier{}.classify(touch), reference::classify(touch, {}));
+  EXPECT_EQ(ContactClassifier{}.classify(touch), reference::classify(touch, ContactClassifier{}));
   EXPECT_EQ(known_readings(touch, {}).size(), 1U) << "only the 20 kPa say anything";
 }
 
@@ -100,12 +100,13 @@ TEST(SilentTouch, EntirelyOffTheMap) {
     double expected = 0.0;
     for (const Touch& touch : all_touches(recording)) {
       for (const ElementReading& r : known_readings(touch, {})) {
-        expected += ContactLikelihood{}.log_likelihood(r.reading, std::log(0.2 / 0.8));
+        expected +=
+            ContactModel{.prior = 0.2}.log_likelihood(r.reading, {.log_odds = std::log(0.2 / 0.8)});
       }
     }
     for (const double gamma : {0.1, 0.0}) {
       HistogramOptions options = small_options();
-      options.gamma = gamma;
+      options.contact.gamma = gamma;
       const Estimate estimate =
           hard.expect_posterior(device, objects, options, all_touches(recording));
       EXPECT_EQ(estimate.mode.bin, 0) << "all bins are alike";
@@ -136,16 +137,16 @@ TEST(SilentTouch, SubnormalPressures) {
   Device device = Device::open();
   // ratio * (largest pressure) is a whole multiple of `subnormal`, or lies between two multiples.
   for (const double ratio : {0.5, 0.25}) {
-    options.classifier = {.threshold = 3.0 * subnormal, .ratio = ratio};
+    options.contact.classifier = {.threshold = 3.0 * subnormal, .ratio = ratio};
     const Estimate estimate = hard.expect_posterior(device, objects, options, all_touches(tiny));
     EXPECT_NE(estimate.mode.log_likelihood, 0.0) << "nothing was said";
     for (std::size_t i = 0; i < tiny.size(); ++i) {
-      EXPECT_EQ(options.classifier.classify(tiny.touch(i)),
-                reference::classify(tiny.touch(i), options.classifier));
+      EXPECT_EQ(options.contact.classify(tiny.touch(i)),
+                reference::classify(tiny.touch(i), options.contact));
     }
   }
   // Beside one reading of usual size, all of them are No Contact.
-  options.classifier = {};
+  options.contact.classifier = {};
   tiny.pressure[0] = 20.0;
   EXPECT_EQ(known_readings(tiny.touch(0), {}).size(), 36U);
   hard.expect_posterior(device, objects, options, all_touches(tiny));

@@ -23,7 +23,7 @@ TEST(Size, OneObjectOneBinOneElement) {
     options.lattice = {
         .x_mm = {-half_mm, half_mm, 1}, .y_mm = {0.3, 0.3, 1}, .theta_rad = {1, 1, 1}};
     for (const double gamma : {0.1, 0.0}) {
-      options.gamma = gamma;
+      options.contact.gamma = gamma;
       const Recording recording = random_recording(1, 1, 452);
       const Estimate estimate =
           hard.expect_posterior(device, objects, options, all_touches(recording), {1e-5});

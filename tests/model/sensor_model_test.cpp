@@ -116,53 +116,5 @@ TEST(InverseSensorModel, RefusesWhatIsOutOfRange) {
   }
 }
 
-TEST(ContactLikelihood, IsEquation7) {
-  for (const double gamma : {0.0, 1e-6, 0.1, 0.5, 0.99}) {
-    for (const double prior : {0.02, 0.2, 0.7}) {
-      const ContactLikelihood model{.gamma = gamma, .prior = prior};
-      for (double l = -30.0; l <= 30.0; l += 0.7) {
-        const double p = 1.0 / (1.0 + std::exp(-l));
-        const double q = 1.0 / (1.0 + std::exp(l));
-        EXPECT_NEAR(model.log_likelihood(in, l), std::log(gamma * prior + (1.0 - gamma) * p), 1e-12)
-            << "float64 rounding of logs below 30";
-        EXPECT_NEAR(model.log_likelihood(no, l), std::log(gamma * prior + (1.0 - gamma) * q), 1e-12)
-            << "float64 rounding of logs below 30";
-        EXPECT_NEAR(model.log_likelihood(in, l), reference::log_likelihood(in, l, model), 1e-12)
-            << "float64 rounding of logs below 30";
-      }
-      EXPECT_EQ(model.log_likelihood(Reading::unknown, 3.0), 0.0);
-    }
-  }
-}
-
-TEST(ContactLikelihood, WithoutGammaHasNoFloor) {
-  const ContactLikelihood model{.gamma = 0.0, .prior = 0.2};
-  EXPECT_EQ(model.log_likelihood(in, -1000.0), -1000.0);
-  EXPECT_EQ(model.log_likelihood(in, 1000.0), 0.0);
-  EXPECT_EQ(model.log_likelihood(no, 1000.0), -1000.0);
-  EXPECT_EQ(model.log_likelihood(no, -1000.0), 0.0);
-  EXPECT_EQ(model.log_likelihood(in, 0.0), -std::log(2.0));
-}
-
-TEST(ContactLikelihood, WithGammaHasAFloor) {
-  const ContactLikelihood model{.gamma = 0.1, .prior = 0.2};
-  EXPECT_NEAR(model.log_likelihood(in, -1000.0), std::log(0.02), 1e-15);
-  EXPECT_NEAR(model.log_likelihood(no, 1000.0), std::log(0.02), 1e-15);
-  EXPECT_NEAR(model.log_likelihood(in, 1000.0), std::log(0.92), 1e-15);
-  // Half of 0.9 beside 0.02.
-  EXPECT_NEAR(model.log_likelihood(in, 0.0), std::log(0.47), 1e-15);
-}
-
-TEST(ContactLikelihood, RefusesWhatIsOutOfRange) {
-  ContactLikelihood().validate();
-  ContactLikelihood{.gamma = 0.0}.validate();
-  for (const double gamma : {-0.1, 1.0, 2.0, nan}) {
-    EXPECT_THROW((ContactLikelihood{.gamma = gamma}.validate()), Error) << gamma;
-  }
-  for (const double prior : {0.0, 1.0, -1.0, nan}) {
-    EXPECT_THROW((ContactLikelihood{.prior = prior}.validate()), Error) << prior;
-  }
-}
-
 }  // namespace
 }  // namespace palpate

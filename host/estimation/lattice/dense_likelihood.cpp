@@ -54,10 +54,11 @@ std::size_t DenseLikelihood::batch_for(const gpu::Context& context, const PoseLa
 
 std::uint64_t DenseLikelihood::bytes_needed(const gpu::Context& context,
                                             std::span<const Hypothesis> hypotheses,
-                                            const PoseLattice& lattice, std::size_t elements) {
+                                            const PoseLattice& lattice, const ContactModel& model,
+                                            std::size_t elements) {
   std::uint64_t bytes = gpu::allocated(elements * bytes_per_element(lattice)) +
                         gpu::allocated(elements * sizeof(shaders::Segment)) +
-                        gpu::allocated(sizeof(shaders::Corners));
+                        gpu::allocated(ContactTable::bytes_needed(model));
   for (const MapGroup& group : group_maps(context, hypotheses, lattice)) {
     bytes += MapTable::bytes_needed(group, lattice);
   }
@@ -66,22 +67,21 @@ std::uint64_t DenseLikelihood::bytes_needed(const gpu::Context& context,
 
 DenseLikelihood::DenseLikelihood(gpu::Context& context, gpu::CommandStream& stream,
                                  const DenseBelief& belief, std::span<const Hypothesis> hypotheses,
-                                 const PoseLattice& lattice, const ContactLikelihood& model,
+                                 const PoseLattice& lattice, const ContactModel& model,
                                  std::size_t most_elements)
     : context_(context),
       stream_(stream),
       lattice_(lattice),
       objects_(hypotheses.size()),
+      contact_(context, stream, model),
       bytes_per_element_(bytes_per_element(lattice)),
-      batch_elements_(std::min(batch_for(context, lattice, hypotheses.size()), most_elements)),
-      no_table_(context, sizeof(shaders::Corners), gpu::Memory::device, "no table",
-                VK_FORMAT_R32G32B32A32_SFLOAT) {
+      batch_elements_(std::min(batch_for(context, lattice, hypotheses.size()), most_elements)) {
   for (const MapGroup& group : group_maps(context, hypotheses, lattice)) {
     groups_.push_back(
         {.path = choose_path(context, lattice, group.objects.size(), group.kind, model),
          .kind = group.kind,
          .objects = group.objects,
-         .maps = {context, stream, group, hypotheses, lattice, belief, model.prior}});
+         .maps = {context, stream, group, hypotheses, lattice, belief, *model.prior, contact_}});
   }
   reserve(1);
   for (const Group& group : groups_) {
@@ -119,8 +119,9 @@ void DenseLikelihood::dispatch(const Group& group, const Range& range, const Sla
   const bool in_table = group.kind.access == gpu::Access::table;
   stream_.dispatch(
       path.kernel,
-      {in_table ? &maps.log_odds() : &no_table_, &maps.axes(), &elements_, &segments_,
-       &slab.log_likelihood, in_table ? &maps.axes() : &maps.log_odds(), &maps.places()},
+      {&segments_, &contact_.nodes(), &elements_, in_table ? &maps.log_odds() : &contact_.nodes(),
+       in_table ? &maps.axes() : &maps.log_odds(), &maps.axes(), &maps.places(),
+       &slab.log_likelihood},
       push,
       {blocks(invocations, independent_lanes(context_.limits())), range.count, slab.theta_count});
 }
@@ -197,7 +198,7 @@ std::vector<std::string> DenseLikelihood::paths() const {
 }
 
 std::uint64_t DenseLikelihood::device_bytes() const {
-  std::uint64_t bytes = elements_.bytes() + segments_.bytes() + no_table_.bytes();
+  std::uint64_t bytes = elements_.bytes() + segments_.bytes() + contact_.nodes().bytes();
   for (const Group& group : groups_) {
     bytes += group.maps.device_bytes();
   }

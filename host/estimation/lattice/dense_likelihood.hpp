@@ -7,11 +7,11 @@
 
 #include "command_stream.hpp"
 #include "contact_evidence.hpp"
+#include "contact_kernel.hpp"
 #include "dense_belief.hpp"
 #include "map_table.hpp"
 #include "palpate/lattice.hpp"
 #include "palpate/pose_histogram.hpp"
-#include "palpate/sensor_model.hpp"
 
 namespace palpate {
 
@@ -27,7 +27,8 @@ class DenseLikelihood {
   /// @throws Error where a map is larger than what kernels read
   static std::uint64_t bytes_needed(const gpu::Context& context,
                                     std::span<const Hypothesis> hypotheses,
-                                    const PoseLattice& lattice, std::size_t elements);
+                                    const PoseLattice& lattice, const ContactModel& model,
+                                    std::size_t elements);
 
   /// Records the upload of the maps, in the order of the belief's objects, and a first, empty run
   /// of every kernel: drivers compile them then, and no touch has to wait for that. Beyond each map
@@ -35,7 +36,7 @@ class DenseLikelihood {
   /// @param most_elements of the tables; like batch_for(), which it may lower
   DenseLikelihood(gpu::Context& context, gpu::CommandStream& stream, const DenseBelief& belief,
                   std::span<const Hypothesis> hypotheses, const PoseLattice& lattice,
-                  const ContactLikelihood& model,
+                  const ContactModel& model,
                   std::size_t most_elements = std::numeric_limits<std::size_t>::max());
 
   /// Most elements that one segment of the evidence may hold.
@@ -76,10 +77,10 @@ class DenseLikelihood {
   gpu::CommandStream& stream_;
   PoseLattice lattice_;
   std::size_t objects_;
+  ContactTable contact_;
   std::vector<Group> groups_;
   VkDeviceSize bytes_per_element_ = 0;  ///< rotated by every theta
   std::size_t batch_elements_ = 0;      ///< most elements in the tables
-  gpu::Buffer no_table_;                ///< bound where a map is none
   gpu::Buffer elements_;
   gpu::Buffer segments_;
 };

@@ -5,8 +5,8 @@
 #include <string>
 
 #include "kernel.hpp"
+#include "palpate/contact_model.hpp"
 #include "palpate/lattice.hpp"
-#include "palpate/sensor_model.hpp"
 
 namespace palpate {
 
@@ -28,12 +28,9 @@ struct MapKind {
   bool operator==(const MapKind&) const = default;
 };
 
-/// What every kernel that evaluates Eq. 7 is specialised by: the workgroup, then the model.
-std::vector<std::uint32_t> model_constants(const gpu::Limits& limits,
-                                           const ContactLikelihood& model);
-/// The same and the maps' place: what every path's kernel is specialised by.
+/// What every path's kernel is specialised by: contact_constants(), and the maps' place.
 std::vector<std::uint32_t> path_constants(const gpu::Limits& limits, const MapKind& maps,
-                                          const ContactLikelihood& model);
+                                          const ContactModel& model);
 /// The buffers of shaders/likelihood_buffers.glsl.
 std::span<const gpu::Access> likelihood_bindings();
 
@@ -41,15 +38,15 @@ std::span<const gpu::Access> likelihood_bindings();
 /// within two of the map's cells.
 std::optional<LikelihoodPath> tile_path(gpu::Context& context, const PoseLattice& lattice,
                                         std::size_t objects, const MapKind& maps,
-                                        const ContactLikelihood& model);
+                                        const ContactModel& model);
 /// Bins of a row, each with map nodes of its own; for any lattice, in particular for those that
 /// tile_path refuses.
 LikelihoodPath row_path(gpu::Context& context, const PoseLattice& lattice, std::size_t objects,
-                        const MapKind& maps, const ContactLikelihood& model);
+                        const MapKind& maps, const ContactModel& model);
 
 /// The fastest of them that is sound.
 /// @param objects whose bins a dispatch takes together
 LikelihoodPath choose_path(gpu::Context& context, const PoseLattice& lattice, std::size_t objects,
-                           const MapKind& maps, const ContactLikelihood& model);
+                           const MapKind& maps, const ContactModel& model);
 
 }  // namespace palpate

@@ -96,7 +96,7 @@ std::uint64_t MapTable::bytes_needed(const MapGroup& group, const PoseLattice& l
 
 MapTable::MapTable(gpu::Context& context, gpu::CommandStream& stream, const MapGroup& group,
                    std::span<const Hypothesis> hypotheses, const PoseLattice& lattice,
-                   const DenseBelief& belief, double prior) {
+                   const DenseBelief& belief, double prior, const ContactTable& contact) {
   const gpu::Access access = group.kind.access;
   log_odds_ = gpu::Buffer(
       context, group.cells * cell_bytes(access), gpu::Memory::device,
@@ -113,7 +113,8 @@ MapTable::MapTable(gpu::Context& context, gpu::CommandStream& stream, const MapG
                       .map_width = bordered(map.nx),
                       .map_height = bordered(map.ny),
                       .first_axis = static_cast<shaders::uint>(axes.size()),
-                      .first_bin = static_cast<shaders::uint>(slab->first_bin(object))});
+                      .first_bin = static_cast<shaders::uint>(slab->first_bin(object)),
+                      .first_table_node = contact.first_node(object)});
     const std::vector<shaders::Split> own_axes = axes_in_cells(map, lattice);
     axes.insert(axes.end(), own_axes.begin(), own_axes.end());
     const VkDeviceSize offset = first_node * cell_bytes(access);

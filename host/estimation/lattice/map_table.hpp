@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "command_stream.hpp"
+#include "contact_kernel.hpp"
 #include "dense_belief.hpp"
 #include "likelihood_path.hpp"
 #include "palpate/estimate.hpp"
@@ -35,7 +36,7 @@ class MapTable {
   /// Records the upload. Beyond each map lies the prior.
   MapTable(gpu::Context& context, gpu::CommandStream& stream, const MapGroup& group,
            std::span<const Hypothesis> hypotheses, const PoseLattice& lattice,
-           const DenseBelief& belief, double prior);
+           const DenseBelief& belief, double prior, const ContactTable& contact);
 
   const gpu::Buffer& log_odds() const { return log_odds_; }
   /// The lattice's x centres, then its y centres, in cells of each map, [object].

@@ -66,7 +66,8 @@ MemoryPlan plan_memory(const gpu::Context& context, std::span<const Hypothesis> 
                              DenseBelief::marginal_bytes(context, lattice, objects) +
                              (room.set_by_options ? gpu::CommandStream::staging_bytes : 0);
   const auto needed = [&](std::size_t elements) {
-    return held + DenseLikelihood::bytes_needed(context, hypotheses, lattice, elements);
+    return held +
+           DenseLikelihood::bytes_needed(context, hypotheses, lattice, options.contact, elements);
   };
   // Whole products, so that the limit does not change a bit of the result.
   constexpr std::size_t step = shaders::FACTORS_PER_LOG;

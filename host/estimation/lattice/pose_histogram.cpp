@@ -40,14 +40,12 @@ std::vector<double> normalised(std::vector<double> logs) {
 }  // namespace
 
 struct PoseHistogram::Impl {
-  Impl(Device& device, std::span<const Hypothesis> hypotheses, const HistogramOptions& wanted,
-       const ContactLikelihood& model)
+  Impl(Device& device, std::span<const Hypothesis> hypotheses, const HistogramOptions& wanted)
       : options(wanted),
-        prior_model(model),
         plan(plan_memory(device.context(), hypotheses, options)),
         stream(device.context()),
         belief(device.context(), stream, options.lattice, hypotheses.size()),
-        likelihood(device.context(), stream, belief, hypotheses, options.lattice, model,
+        likelihood(device.context(), stream, belief, hypotheses, options.lattice, options.contact,
                    plan.batch_elements),
         prepared(stream, plan.room_to_prepare),
         log_weight(log_weights(hypotheses)) {
@@ -55,7 +53,7 @@ struct PoseHistogram::Impl {
       bodies.push_back(displaced_body(hypothesis.map));
     }
     if (options.still_array) {
-      still.emplace(options.classifier, options.lattice);
+      still.emplace(options.contact, options.lattice);
     }
     if (options.none_weight) {
       none_log_weight = std::log(*options.none_weight) - log_total_weight(hypotheses) +
@@ -65,7 +63,7 @@ struct PoseHistogram::Impl {
   }
 
   ContactEvidence gather(std::span<const Touch> touches) const {
-    return gather_evidence(touches, options.classifier, options.lattice.pivot_mm,
+    return gather_evidence(touches, options.contact, options.lattice.pivot_mm,
                            likelihood.segment_elements());
   }
 
@@ -88,9 +86,10 @@ struct PoseHistogram::Impl {
       } else {
         likelihood.accumulate(evidence, belief, progress);
       }
-      for (const Touch& touch : touches) {
+      prior_log_likelihood += palpate::prior_log_likelihood(evidence.counts, options.contact);
+      for (const StillTouch& touch : still_touches) {
         prior_log_likelihood +=
-            palpate::prior_log_likelihood(touch, options.classifier, prior_model);
+            palpate::prior_log_likelihood(touch.evidence.counts, options.contact);
       }
     });
   }
@@ -150,7 +149,6 @@ struct PoseHistogram::Impl {
   }
 
   HistogramOptions options;
-  ContactLikelihood prior_model;
   MemoryPlan plan;
   gpu::CommandStream stream;
   DenseBelief belief;
@@ -171,15 +169,12 @@ PoseHistogram::PoseHistogram(Device& device, std::span<const Hypothesis> hypothe
   validate_hypotheses(hypotheses);
   HistogramOptions checked = options;
   checked.lattice.collapse_fixed().validate();
-  checked.classifier.validate();
-  const ContactLikelihood model{.gamma = checked.gamma,
-                                .prior = checked.prior ? *checked.prior : common_prior(hypotheses)};
-  model.validate();
+  checked.contact = resolve(options.contact, hypotheses);
   if (checked.none_weight && !(*checked.none_weight > 0.0 && std::isfinite(*checked.none_weight))) {
     throw Error(Fault::input, fmt::format("none_weight = {}: give a positive number, or none",
                                           *checked.none_weight));
   }
-  impl_ = std::make_unique<Impl>(device, hypotheses, checked, model);
+  impl_ = std::make_unique<Impl>(device, hypotheses, checked);
 }
 
 PoseHistogram::~PoseHistogram() = default;

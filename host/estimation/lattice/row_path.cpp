@@ -29,7 +29,7 @@ std::uint32_t run_for(std::uint32_t nx, std::uint32_t longest) {
 }  // namespace
 
 LikelihoodPath row_path(gpu::Context& context, const PoseLattice& lattice, std::size_t objects,
-                        const MapKind& maps, const ContactLikelihood& model) {
+                        const MapKind& maps, const ContactModel& model) {
   const std::int64_t bins = lattice.bins() * static_cast<std::int64_t>(objects);
   const std::uint32_t run =
       run_for(static_cast<std::uint32_t>(lattice.x_mm.count),

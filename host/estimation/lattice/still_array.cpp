@@ -8,14 +8,13 @@ std::vector<StillTouch> StillArray::gather(std::span<const Touch> touches,
                                            std::size_t segment_elements) const {
   std::vector<StillTouch> gathered;
   for (const Touch& touch : touches) {
-    const std::vector<Reading> readings = classifier_.classify(touch);
+    const std::vector<Reading> readings = contact_.classify(touch);
     const auto no_contact = std::count(readings.begin(), readings.end(), Reading::no_contact);
     const bool by_differences = 2 * static_cast<std::size_t>(no_contact) >= readings.size();
-    gathered.push_back({touch, by_differences,
-                        by_differences ? gather_differences(touch, classifier_, lattice_.pivot_mm,
-                                                            segment_elements)
-                                       : gather_evidence(std::span(&touch, 1), classifier_,
-                                                         lattice_.pivot_mm, segment_elements)});
+    gathered.push_back(
+        {touch, by_differences,
+         gather_evidence(touch, readings, by_differences ? Reading::no_contact : Reading::unknown,
+                         lattice_.pivot_mm, segment_elements)});
   }
   return gathered;
 }
@@ -42,9 +41,10 @@ const DenseBelief& StillArray::no_contact_at(const Touch& touch, DenseLikelihood
   if (!evaluated_ || !same_placement(touch, {T_robot_sensor_, elements_mm_, {}})) {
     evaluated_ = false;  // a device that fails leaves it half-way
     no_contact_->clear();
-    likelihood.accumulate(
-        gather_no_contact(touch, lattice_.pivot_mm, likelihood.segment_elements()), *no_contact_,
-        {});
+    const std::vector<Reading> readings(touch.elements_mm.size(), Reading::no_contact);
+    likelihood.accumulate(gather_evidence(touch, readings, Reading::unknown, lattice_.pivot_mm,
+                                          likelihood.segment_elements()),
+                          *no_contact_, {});
     T_robot_sensor_ = touch.T_robot_sensor;
     elements_mm_.assign(touch.elements_mm.begin(), touch.elements_mm.end());
     evaluated_ = true;

@@ -9,7 +9,7 @@
 #include "contact_evidence.hpp"
 #include "dense_belief.hpp"
 #include "dense_likelihood.hpp"
-#include "palpate/contact.hpp"
+#include "palpate/contact_model.hpp"
 #include "palpate/lattice.hpp"
 
 namespace palpate {
@@ -26,8 +26,8 @@ struct StillTouch {
 /// elements that read something else.
 class StillArray {
  public:
-  StillArray(const ContactClassifier& classifier, const PoseLattice& lattice)
-      : classifier_(classifier), lattice_(lattice) {}
+  StillArray(const ContactModel& contact, const PoseLattice& lattice)
+      : contact_(contact), lattice_(lattice) {}
 
   /// Gathers every touch by its differences where at least half of its elements read No Contact,
   /// or else as a whole.
@@ -47,7 +47,7 @@ class StillArray {
   const DenseBelief& no_contact_at(const Touch& touch, DenseLikelihood& likelihood,
                                    const DenseBelief& belief);
 
-  ContactClassifier classifier_;
+  ContactModel contact_;
   PoseLattice lattice_;
   std::optional<DenseBelief> no_contact_;  ///< log-likelihood of No Contact everywhere
   bool evaluated_ = false;                 ///< for the place below

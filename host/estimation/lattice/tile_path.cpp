@@ -51,7 +51,7 @@ std::uint32_t least_bins(const gpu::Limits& limits) { return limits.cpu ? 10 : 5
 
 std::optional<LikelihoodPath> tile_path(gpu::Context& context, const PoseLattice& lattice,
                                         std::size_t objects, const MapKind& maps,
-                                        const ContactLikelihood& model) {
+                                        const ContactModel& model) {
   const glm::dvec2 step_cells = glm::dvec2(lattice.x_mm.step(), lattice.y_mm.step()) / maps.cell_mm;
   const std::uint32_t most_bins = most_bins_per_invocation(
       context.limits(), lattice.bins() * static_cast<std::int64_t>(objects));

@@ -42,14 +42,12 @@ double centre(const Axis& axis) { return axis.lower + half(axis); }
 }  // namespace
 
 struct ParticleFilter::Impl {
-  Impl(Device& device, std::span<const Hypothesis> hypotheses, const ParticleOptions& wanted,
-       const ContactLikelihood& model)
+  Impl(Device& device, std::span<const Hypothesis> hypotheses, const ParticleOptions& wanted)
       : options(wanted),
-        prior_model(model),
         objects(hypotheses.size()),
         context(device.context()),
         stream(context),
-        likelihood(context, stream, hypotheses, options.region, model),
+        likelihood(context, stream, hypotheses, options.region, options.contact),
         parzen(context, stream),
         lanes(independent_lanes(context.limits())),
         draw_kernel(context, {.name = "draw_particles",
@@ -158,8 +156,7 @@ struct ParticleFilter::Impl {
     return best;
   }
 
-  /// @param by_prior log-likelihood of the touch by the prior alone
-  void update(const ContactEvidence& evidence, double by_prior) {
+  void update(const ContactEvidence& evidence) {
     ++touch;
     // A touch that says nothing moves the particles and leaves their weights: drawing anew would
     // only lose some. So would it before the first touch, when all weigh the same.
@@ -179,7 +176,7 @@ struct ParticleFilter::Impl {
     sum_weights();
     weighed = true;
     if (const double best = best_log_likelihood(); std::isfinite(best)) {
-      prior_over_best += by_prior - best;
+      prior_over_best += prior_log_likelihood(evidence.counts, options.contact) - best;
     }
     averages.add(summary.log_largest + std::log(summary.sum / static_cast<double>(size())),
                  evidence.from_pivot_mm.size());
@@ -223,7 +220,6 @@ struct ParticleFilter::Impl {
   }
 
   ParticleOptions options;
-  ContactLikelihood prior_model;
   std::size_t objects;
   gpu::Context& context;
   gpu::CommandStream stream;
@@ -255,13 +251,10 @@ ParticleFilter::ParticleFilter(Device& device, std::span<const Hypothesis> hypot
   validate_hypotheses(hypotheses);
   ParticleOptions checked = options;
   checked.region.collapse_fixed().validate();
-  checked.classifier.validate();
+  checked.contact = resolve(options.contact, hypotheses);
   validate(checked);
-  const ContactLikelihood model{.gamma = checked.gamma,
-                                .prior = checked.prior ? *checked.prior : common_prior(hypotheses)};
-  model.validate();
   require_room(checked, device.context());
-  impl_ = std::make_unique<Impl>(device, hypotheses, checked, model);
+  impl_ = std::make_unique<Impl>(device, hypotheses, checked);
 }
 
 ParticleFilter::~ParticleFilter() = default;
@@ -283,16 +276,14 @@ void ParticleFilter::update(std::span<const Touch> touches) {
   const ParticleOptions& options = filter.options;
   // All of them before the first is taken in, for one that is not sound refuses all.
   std::vector<ContactEvidence> evidence;
-  std::vector<double> by_prior;
   for (const Touch& touch : touches) {
-    evidence.push_back(gather_evidence(std::span(&touch, 1), options.classifier,
+    evidence.push_back(gather_evidence(std::span(&touch, 1), options.contact,
                                        options.region.pivot_mm,
                                        ParticleLikelihood::segment_elements()));
-    by_prior.push_back(prior_log_likelihood(touch, options.classifier, filter.prior_model));
   }
   filter.half_done.change([&] {
-    for (std::size_t i = 0; i < evidence.size(); ++i) {
-      filter.update(evidence[i], by_prior[i]);
+    for (const ContactEvidence& of_touch : evidence) {
+      filter.update(of_touch);
     }
   });
 }

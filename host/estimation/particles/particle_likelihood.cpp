@@ -9,7 +9,6 @@
 #include "bordered_map.hpp"
 #include "interface.h"
 #include "kernel_sizes.hpp"
-#include "likelihood_path.hpp"
 #include "palpate/error.hpp"
 #include "weigh_particles.hpp"
 
@@ -17,8 +16,9 @@ namespace palpate {
 
 namespace {
 
-constexpr gpu::Access bindings[] = {gpu::Access::table, gpu::Access::storage, gpu::Access::table,
-                                    gpu::Access::table, gpu::Access::table,   gpu::Access::storage};
+constexpr gpu::Access bindings[] = {gpu::Access::table,  gpu::Access::table,   gpu::Access::table,
+                                    gpu::Access::table,  gpu::Access::storage, gpu::Access::table,
+                                    gpu::Access::storage};
 // The table's least guaranteed size, less the headings, holds this many elements at 15 cell sizes.
 constexpr std::size_t most_elements = 4096;
 static_assert(most_elements <= gpu::most_iterations / 2);
@@ -87,7 +87,7 @@ double centre(const Axis& axis) { return axis.lower + (axis.upper - axis.lower) 
 
 ParticleLikelihood::ParticleLikelihood(gpu::Context& context, gpu::CommandStream& stream,
                                        std::span<const Hypothesis> hypotheses,
-                                       const PoseLattice& region, const ContactLikelihood& model)
+                                       const PoseLattice& region, const ContactModel& model)
     : context_(context),
       stream_(stream),
       theta_centre_rad_(centre(region.theta_rad)),
@@ -95,11 +95,12 @@ ParticleLikelihood::ParticleLikelihood(gpu::Context& context, gpu::CommandStream
                         .spirv = shaders::weigh_particles,
                         .bindings = bindings,
                         .push_bytes = sizeof(shaders::WeighPush),
-                        .constants = model_constants(context.limits(), model)}) {
+                        .constants = contact_constants(context.limits(), model)}),
+      contact_(context, stream, model) {
   require_room(context, hypotheses);
   std::vector<shaders::Corners> cells;
   std::vector<shaders::ParticleMap> objects;
-  const auto append = [&](const OccupancyGrid& map) {
+  const auto append = [&](const OccupancyGrid& map, int first_table_node) {
     const double cells_per_mm = 1.0 / map.cell_mm;
     const auto high = static_cast<float>(cells_per_mm);
     objects.push_back(
@@ -109,19 +110,20 @@ ParticleLikelihood::ParticleLikelihood(gpu::Context& context, gpu::CommandStream
          .scale = static_cast<shaders::uint>(index_of(cell_sizes_mm_, map.cell_mm)),
          .cells_per_mm_high = high,
          .cells_per_mm_low = static_cast<float>(cells_per_mm - static_cast<double>(high)),
+         .first_table_node = first_table_node,
          .centre_x = split_axis((centre(region.x_mm) - map.origin_mm.x) / map.cell_mm +
                                 shaders::MAP_BORDER),
          .centre_y = split_axis((centre(region.y_mm) - map.origin_mm.y) / map.cell_mm +
                                 shaders::MAP_BORDER)});
-    const std::vector<shaders::Corners> bordered = corners_with_border(map, model.prior);
+    const std::vector<shaders::Corners> bordered = corners_with_border(map, *model.prior);
     cells.insert(cells.end(), bordered.begin(), bordered.end());
   };
-  for (const Hypothesis& hypothesis : hypotheses) {
-    append(hypothesis.map);
+  for (std::size_t i = 0; i < hypotheses.size(); ++i) {
+    append(hypotheses[i].map, contact_.first_node(i));
   }
   OccupancyGrid none;
   none.cell_mm = hypotheses.front().map.cell_mm;
-  append(none);
+  append(none, contact_.first_node_of_none());
 
   maps_ = gpu::Buffer(context, std::span(cells).size_bytes(), gpu::Memory::device, "maps",
                       VK_FORMAT_R32G32B32A32_SFLOAT);
@@ -195,13 +197,16 @@ void ParticleLikelihood::weigh(const ContactEvidence& evidence, const gpu::Buffe
                                   .segments = static_cast<shaders::uint>(batch.size()),
                                   .elements = static_cast<shaders::uint>(elements),
                                   .fresh = fresh ? 1U : 0U};
-    stream_.dispatch(kernel_, {&maps_, &objects_, &turns_, &segments_, &particles, &log_weights},
-                     push, {(invocations + lanes - 1) / lanes, 1, 1});
+    stream_.dispatch(
+        kernel_,
+        {&segments_, &contact_.nodes(), &turns_, &maps_, &objects_, &particles, &log_weights}, push,
+        {(invocations + lanes - 1) / lanes, 1, 1});
   } while (s < segments.size());
 }
 
 std::uint64_t ParticleLikelihood::device_bytes() const {
-  return maps_.bytes() + objects_.bytes() + turns_.bytes() + segments_.bytes();
+  return maps_.bytes() + objects_.bytes() + turns_.bytes() + segments_.bytes() +
+         contact_.nodes().bytes();
 }
 
 }  // namespace palpate

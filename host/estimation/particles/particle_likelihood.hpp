@@ -5,9 +5,9 @@
 
 #include "command_stream.hpp"
 #include "contact_evidence.hpp"
+#include "contact_kernel.hpp"
 #include "palpate/estimate.hpp"
 #include "palpate/lattice.hpp"
-#include "palpate/sensor_model.hpp"
 
 namespace palpate {
 
@@ -20,7 +20,7 @@ class ParticleLikelihood {
   /// @throws Error where the maps together are more than the device reads as a table
   ParticleLikelihood(gpu::Context& context, gpu::CommandStream& stream,
                      std::span<const Hypothesis> hypotheses, const PoseLattice& region,
-                     const ContactLikelihood& model);
+                     const ContactModel& model);
 
   /// Most elements that one segment of the evidence may hold.
   static std::size_t segment_elements();
@@ -42,6 +42,7 @@ class ParticleLikelihood {
   double theta_centre_rad_ = 0.0;
   std::vector<double> cell_sizes_mm_;  ///< of the maps, each once
   gpu::Kernel kernel_;
+  ContactTable contact_;
   gpu::Buffer maps_;
   gpu::Buffer objects_;
   gpu::Buffer turns_;  ///< headings, then the elements in cells, [cell size, element]

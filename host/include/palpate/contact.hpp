@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <span>
@@ -12,12 +13,19 @@
 
 namespace palpate {
 
-/// What one element says about the surface below it (Eq. 3).
+/// Most classes of readings that a contact model tells apart, besides Unknown.
+inline constexpr std::size_t most_reading_levels = 8;
+
+/// What one element says about the surface below it (Eq. 3). The values between `in_contact` and
+/// `unknown` are In Contact too, at higher levels of pressure (see LikelihoodTable).
 enum class Reading : std::uint8_t {
   no_contact = 0,
   in_contact = 1,
-  unknown = 2,  ///< changes nothing, anywhere
+  unknown = most_reading_levels,  ///< changes nothing, anywhere
 };
+
+/// In Contact at the given level of pressure, counted from 0, `in_contact` itself.
+constexpr Reading contact_level(std::size_t level) { return static_cast<Reading>(1 + level); }
 
 /// Eq. 3: In Contact where the pressure exceeds both the threshold and ratio times the touch's
 /// largest pressure, No Contact where it is below both, else Unknown (which includes equality).

@@ -5,6 +5,7 @@
 #include "palpate/balanced_lattice.hpp"
 #include "palpate/baseline.hpp"
 #include "palpate/contact.hpp"
+#include "palpate/contact_model.hpp"
 #include "palpate/device.hpp"
 #include "palpate/error.hpp"
 #include "palpate/estimate.hpp"

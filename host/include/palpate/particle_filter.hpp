@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-#include "palpate/contact.hpp"
+#include "palpate/contact_model.hpp"
 #include "palpate/device.hpp"
 #include "palpate/estimate.hpp"
 #include "palpate/lattice.hpp"
@@ -24,9 +24,7 @@ struct ParticleOptions {
   /// Particles start uniformly distributed over the ranges of this lattice, about its pivot; its
   /// bin counts are ignored.
   PoseLattice region;
-  ContactClassifier classifier;
-  double gamma = 0.1;
-  std::optional<double> prior = {};        ///< p(m) of Eq. 7, see HistogramOptions
+  ContactModel contact = {};               ///< what the sensor says about a place (Eq. 3, 7)
   std::optional<double> none_weight = {};  ///< see HistogramOptions
   double motion_mm = 1.0;   ///< standard deviation of the noise added to x and y at each touch
   double motion_rad = 0.1;  ///< the same for theta

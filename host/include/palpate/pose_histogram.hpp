@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "palpate/contact.hpp"
+#include "palpate/contact_model.hpp"
 #include "palpate/device.hpp"
 #include "palpate/estimate.hpp"
 #include "palpate/lattice.hpp"
@@ -17,11 +17,7 @@ namespace palpate {
 
 struct HistogramOptions {
   PoseLattice lattice;
-  ContactClassifier classifier;
-  double gamma = 0.1;
-  /// p(m) of Eq. 7 and of the space beyond the maps; by default the maps' own, which must then be
-  /// the same for all: unequal priors would favour the emptier or the fuller map in unseen space.
-  std::optional<double> prior = {};
+  ContactModel contact = {};  ///< what the sensor says about a place (Eq. 3, 7)
   /// True where the array stays in one place from touch to touch, like a large array under a table
   /// of objects. The filter then evaluates No Contact everywhere once, and of each touch only the
   /// elements that read something else. The result differs by rounding only. The filter takes twice
@@ -44,9 +40,9 @@ class PoseHistogram {
  public:
   /// Uploads the maps and starts with a uniform belief.
   /// @throws Error on an empty list, a map that is not sound (see fault_of()), maps of different
-  /// priors where the options give none, a weight that is not positive and finite, a lattice,
-  /// classifier, gamma or prior out of range, or, before any memory is taken, where the device or
-  /// the limit has too little
+  /// priors where the options give none, a weight that is not positive and finite, a lattice or a
+  /// contact model out of range, a table for another number of objects, or, before any memory is
+  /// taken, where the device or the limit has too little
   PoseHistogram(Device& device, std::span<const Hypothesis> hypotheses,
                 const HistogramOptions& options);
   ~PoseHistogram();

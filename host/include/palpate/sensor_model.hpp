@@ -32,16 +32,4 @@ struct InverseSensorModel {
   double support_radius_mm(std::size_t readings, double tolerance) const;
 };
 
-/// The forward model of Eq. 7 for one element: gamma m + (1 - gamma) p(reading | occupancy).
-/// Any other likelihood per reading class and interpolated log odds takes this place, here and in
-/// shaders/contact_likelihood.glsl.
-struct ContactLikelihood {
-  double gamma = 0.1;  ///< rate at which the classifier answers at random, in [0, 1)
-  double prior = 0.2;  ///< m
-
-  void validate() const;
-  /// Log-likelihood in nats. With gamma = 0 it is that of the logistic function, without a floor.
-  double log_likelihood(Reading reading, double log_odds) const;
-};
-
 }  // namespace palpate

@@ -45,7 +45,7 @@ TEST(LargeLattice, FiveMillionBinsAreAsGoodAsTenThousand) {
       const Pose pose = reference::bin_pose(options.lattice, bin);
       double expected = 0.0;
       for (const Touch& touch : touches) {
-        expected += reference::log_likelihood(touch, pose, map, {}, {});
+        expected += reference::log_likelihood(touch, pose, map, {});
       }
       // 1e-4 nats per touch is what the method allows.
       ASSERT_NEAR(product[static_cast<std::size_t>(bin)], expected, 9e-4)

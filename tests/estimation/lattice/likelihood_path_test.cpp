@@ -33,7 +33,7 @@ Result run(const PoseLattice& lattice, double steepness, std::size_t elements, d
   const Recording recording = random_recording(2, elements, 7 + elements);
   HistogramOptions options;
   options.lattice = lattice;
-  options.gamma = gamma;
+  options.contact.gamma = gamma;
   Device device = Device::open();
   PoseHistogram histogram(device, hypotheses, options);
   const std::vector<Touch> touches = all_touches(recording);

@@ -131,7 +131,7 @@ TEST(PoseHistogram, TakesTheMapsPriorUnlessOneIsGiven) {
   PoseHistogram own(device, objects, options);
   own.update(all_touches(recording));
   for (const double prior : {0.35, 0.1}) {
-    options.prior = prior;
+    options.contact.prior = prior;
     PoseHistogram given(device, objects, options);
     given.update(all_touches(recording));
     EXPECT_EQ(all_bins(own, 3) == all_bins(given, 3), prior == 0.35);

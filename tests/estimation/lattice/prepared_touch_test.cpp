@@ -77,7 +77,7 @@ TEST_F(PreparedTouch, CountsForThePriorAsAnyOther) {
   for (const double none_weight : {0.1, 10.0}) {
     HistogramOptions options = options_of(0.8);
     options.none_weight = none_weight;
-    options.gamma = 0.6;  // so that touches of no object leave some doubt
+    options.contact.gamma = 0.6;  // so that touches of no object leave some doubt
     PoseHistogram plain(device, objects(), options);
     PoseHistogram prepared(device, objects(), options);
     for (const Touch& touch : touches) {

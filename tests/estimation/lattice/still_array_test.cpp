@@ -27,7 +27,7 @@ HistogramOptions options_of(bool still, double step_mm, double gamma) {
   options.lattice = {.x_mm = {-3.0, -3.0 + 11 * step_mm, 11},
                      .y_mm = {-2.0, -2.0 + 9 * step_mm, 9},
                      .theta_rad = {0.0, 3.0, 4}};
-  options.gamma = gamma;
+  options.contact.gamma = gamma;
   options.still_array = still;
   return options;
 }

@@ -19,7 +19,7 @@ struct Draw {
 
 /// Draws n particles once from weights that one touch gave. `elements` decides how uneven they are.
 Draw draw_once(Resampling resampling, int n, std::size_t elements, std::uint64_t seed) {
-  ParticleOptions options{.particles = n, .region = {}, .classifier = {}};
+  ParticleOptions options{.particles = n, .region = {}};
   options.motion_mm = 0.0;
   options.motion_rad = 0.0;
   options.resampling = resampling;

@@ -83,8 +83,7 @@ TEST(ParticleFilter, MovesByNormalNoiseOfTheGivenDeviations) {
   constexpr int n = 200'000;
   ParticleOptions options{
       .particles = n,
-      .region = {.x_mm = {2.0, 2.0, 1}, .y_mm = {0.0, 0.0, 1}, .theta_rad = {3.0, 3.0, 1}},
-      .classifier = {}};
+      .region = {.x_mm = {2.0, 2.0, 1}, .y_mm = {0.0, 0.0, 1}, .theta_rad = {3.0, 3.0, 1}}};
   options.motion_mm = 1.5;
   options.motion_rad = 0.2;
   Device device = Device::open();
@@ -130,8 +129,7 @@ TEST(ParticleFilter, MovesByNormalNoiseOfTheGivenDeviations) {
 
 TEST(ParticleFilter, ATouchThatSaysNothingMovesButWeighsNothing) {
   Device device = Device::open();
-  ParticleFilter filter(device, three_objects(),
-                        {.particles = 1000, .region = {}, .classifier = {}});
+  ParticleFilter filter(device, three_objects(), {.particles = 1000, .region = {}});
   const Recording recording = random_recording(1, 36, 437);
   const Recording nothing = says_nothing();
   for (const bool touched : {false, true}) {
@@ -155,7 +153,7 @@ TEST(ParticleFilter, TheSeedDecidesEveryBit) {
   const Recording recording = random_recording(4, 36, 438);
   Device device = Device::open();
   for (const Resampling resampling : {Resampling::multinomial, Resampling::systematic}) {
-    ParticleOptions options{.particles = 3000, .region = {}, .classifier = {}};
+    ParticleOptions options{.particles = 3000, .region = {}};
     options.resampling = resampling;
     options.augmented = true;
     options.seed = 0x1234'5678'9ABC;
@@ -178,7 +176,7 @@ TEST(ParticleFilter, TheSeedDecidesEveryBit) {
 
 TEST(ParticleFilter, NoneOfTheseCompetesByThePriorAlone) {
   std::vector<Hypothesis> objects = three_objects();
-  ParticleOptions options{.particles = 40'000, .region = {}, .classifier = {}};
+  ParticleOptions options{.particles = 40'000, .region = {}};
   options.motion_mm = 0.0;
   options.motion_rad = 0.0;
   options.none_weight = 4.0;
@@ -190,10 +188,10 @@ TEST(ParticleFilter, NoneOfTheseCompetesByThePriorAlone) {
   filter.update(touch);
 
   // Every other particle's weight against that of none must be the reference's ratio.
-  const ContactLikelihood model{.gamma = 0.1, .prior = 0.2};
+  const ContactModel model{.gamma = 0.1, .prior = 0.2};
   double none_likelihood = 0.0;
   for (const ElementReading& element : known_readings(touch, {})) {
-    none_likelihood += model.log_likelihood(element.reading, log_odds_from_probability(0.2));
+    none_likelihood += model.log_likelihood(element.reading, {log_odds_from_probability(0.2)});
   }
   double none_weight = 0.0;
   std::vector<reference::Particle> weighed;
@@ -208,7 +206,7 @@ TEST(ParticleFilter, NoneOfTheseCompetesByThePriorAlone) {
       continue;
     }
     const double expected = reference::log_likelihood(touch, particle.T_object_robot,
-                                                      objects[particle.object].map, {}, model);
+                                                      objects[particle.object].map, model);
     EXPECT_NEAR(std::log(particle.weight / none_weight), expected - none_likelihood, per_touch);
   }
   const Estimate estimate = filter.estimate();
@@ -220,7 +218,7 @@ TEST(ParticleFilter, NoneOfTheseCompetesByThePriorAlone) {
 }
 
 TEST(ParticleFilter, AModeThatNoParticleSupportsHasNoDensity) {
-  ParticleOptions options{.particles = 1, .region = {}, .classifier = {}};
+  ParticleOptions options{.particles = 1, .region = {}};
   options.none_weight = 1e9;
   Device device = Device::open();
   const Estimate estimate = ParticleFilter(device, three_objects(), options).estimate();
@@ -231,7 +229,7 @@ TEST(ParticleFilter, AModeThatNoParticleSupportsHasNoDensity) {
 
 TEST(ParticleFilter, RunsWithAMillionParticles) {
   const std::vector<Hypothesis> objects = three_objects();
-  const ParticleOptions options{.particles = 1'000'000, .region = {}, .classifier = {}};
+  const ParticleOptions options{.particles = 1'000'000, .region = {}};
   Device device = Device::open();
   ParticleFilter filter(device, objects, options);
   const Recording recording = random_recording(2, 12, 442);
@@ -285,8 +283,8 @@ TEST(ParticleFilter, OptionsOutOfRangeAreRefused) {
   }
   refuse([](ParticleOptions& o) { o.alpha_fast = 1.1; }, "alpha_fast = ");
   refuse([](ParticleOptions& o) { o.none_weight = 0.0; }, "none_weight = ");
-  refuse([](ParticleOptions& o) { o.gamma = 1.0; }, "gamma = ");
-  refuse([](ParticleOptions& o) { o.prior = 0.0; }, "prior = ");
+  refuse([](ParticleOptions& o) { o.contact.gamma = 1.0; }, "gamma = ");
+  refuse([](ParticleOptions& o) { o.contact.prior = 0.0; }, "prior = ");
   refuse([](ParticleOptions& o) { o.region.y_mm = {0.0, 2e5, 1}; }, "region y_mm = ");
   refuse([](ParticleOptions& o) { o.region.x_mm = {1.0, -1.0, 1}; }, "x_mm = ");
 }

@@ -29,7 +29,7 @@ TEST(ParticleTracking, AgreesWithTheHistogramWhereThereIsNoNoise) {
   for (std::size_t k = 0; k < recording.elements(); ++k) {
     recording.valid.push_back(k % 4 == 0 ? 1 : 0);
   }
-  ParticleOptions particles{.particles = 100'000, .region = {}, .classifier = {}};
+  ParticleOptions particles{.particles = 100'000, .region = {}};
   particles.motion_mm = 0.0;
   particles.motion_rad = 0.0;
   HistogramOptions bins;
@@ -62,7 +62,7 @@ TEST(ParticleTracking, FindsTheObjectAndThePoseAsTheHistogramDoes) {
   histogram.update(all_touches(recording));
   ASSERT_GT(histogram.estimate().identity[0], 0.99);
   for (const Resampling resampling : {Resampling::multinomial, Resampling::systematic}) {
-    ParticleOptions options{.particles = 20'000, .region = {}, .classifier = {}};
+    ParticleOptions options{.particles = 20'000, .region = {}};
     options.resampling = resampling;
     ParticleFilter filter(device, objects, options);
     filter.update(all_touches(recording));
@@ -83,7 +83,7 @@ TEST(ParticleTracking, RandomParticlesFindAnObjectThatWasTakenElsewhere) {
   const Recording after = touches_of(on_letter_l, second, 25, 464);
   Device device = Device::open();
   for (const bool augmented : {false, true}) {
-    ParticleOptions options{.particles = 5000, .region = {}, .classifier = {}};
+    ParticleOptions options{.particles = 5000, .region = {}};
     options.augmented = augmented;
     ParticleFilter filter(device, objects, options);
     filter.update(all_touches(before));

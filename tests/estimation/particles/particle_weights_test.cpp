@@ -15,7 +15,7 @@ TEST(ParticleWeights, WeighsAsTheReferenceDoesAtTheParticlesOwnPoses) {
   Device device = Device::open();
   // Around blocks of 64 and 1,024.
   for (const int n : {1, 7, 63, 65, 1000, 1025, 5000}) {
-    const ParticleOptions options{.particles = n, .region = {}, .classifier = {}};
+    const ParticleOptions options{.particles = n, .region = {}};
     ParticleFilter filter(device, objects, options);
     const Recording recording = random_recording(3, 36, 433);
     for (std::size_t i = 0; i < recording.size(); ++i) {
@@ -29,7 +29,7 @@ TEST(ParticleWeights, WeighsAsTheReferenceDoesAtTheParticlesOwnPoses) {
 TEST(ParticleWeights, WeighsAsTheReferenceDoesOnLargeMapsAndAlienCells) {
   // 0.07 mm is no binary fraction, and 900 cells make float32 coordinates coarse.
   const std::vector<Hypothesis> objects = {{random_map(900, 700, 0.07, 4.0, 84), 1.0}};
-  const ParticleOptions options{.particles = 3000, .region = {}, .classifier = {}};
+  const ParticleOptions options{.particles = 3000, .region = {}};
   Device device = Device::open();
   ParticleFilter filter(device, objects, options);
   const Recording recording = random_recording(1, 36, 434);
@@ -42,16 +42,15 @@ TEST(ParticleWeights, WeighsAsTheReferenceDoesWithoutAFloorAndWithManyElements) 
   const Recording recording = random_recording(1, 10'000, 435);
   Device device = Device::open();
   for (const double gamma : {0.0, 0.1}) {
-    const ParticleOptions options{.particles = 65, .region = {}, .classifier = {}, .gamma = gamma};
+    const ParticleOptions options{.particles = 65, .region = {}, .contact = {.gamma = gamma}};
     ParticleFilter filter(device, objects, options);
     filter.update(recording.touch(0));
     // Weights below exp(-745) are 0 in float64: compare what is left, at least the largest.
     const auto particles = filter.particles();
-    const ContactLikelihood model{.gamma = gamma, .prior = 0.2};
     std::vector<double> logs;
     for (const auto& particle : particles) {
       logs.push_back(reference::log_likelihood(recording.touch(0), particle.T_object_robot,
-                                               objects[particle.object].map, {}, model));
+                                               objects[particle.object].map, options.contact));
     }
     // 277 touches' worth of elements, and a probability changes by at most the error in nats.
     EXPECT_LT(largest_difference(weights_of(filter), reference::importance_weights(logs)),
@@ -62,7 +61,7 @@ TEST(ParticleWeights, WeighsAsTheReferenceDoesWithoutAFloorAndWithManyElements) 
 
 TEST(ParticleWeights, KeepsItsPrecisionFarFromTheRobotsOrigin) {
   const std::vector<Hypothesis> objects = three_objects();
-  ParticleOptions options{.particles = 1000, .region = {}, .classifier = {}};
+  ParticleOptions options{.particles = 1000, .region = {}};
   const Recording recording = random_recording(2, 36, 436);
   Device device = Device::open();
   ParticleFilter near(device, objects, options);
@@ -90,8 +89,7 @@ TEST(ParticleWeights, TheEffectiveSampleSizeIsThatOfTheWeights) {
   Device device = Device::open();
   const Recording recording = random_recording(3, 36, 439);
   for (const int n : {1, 65, 5000}) {
-    ParticleFilter filter(device, three_objects(),
-                          {.particles = n, .region = {}, .classifier = {}});
+    ParticleFilter filter(device, three_objects(), {.particles = n, .region = {}});
     for (std::size_t i = 0; i < recording.size(); ++i) {
       filter.update(recording.touch(i));
       double squares = 0.0;
@@ -120,7 +118,7 @@ TEST(ParticleWeights, SumToOneHoweverFarApartTheyAre) {
   const Touch touch{.T_robot_sensor = {}, .elements_mm = element, .pressure = pressure_kpa};
   Device device = Device::open();
   for (const std::uint64_t seed : {1, 2, 3, 4}) {
-    ParticleOptions options{.particles = 8192, .region = {}, .classifier = {}, .gamma = 0.0};
+    ParticleOptions options{.particles = 8192, .region = {}, .contact = {.gamma = 0.0}};
     options.region.x_mm = options.region.y_mm = {-25.0, 25.0};
     options.seed = seed;
     ParticleFilter filter(device, objects, options);
@@ -142,7 +140,7 @@ TEST(ParticleWeights, WeightsSumToOneHoweverUnlikelyTheTouch) {
     l = -1000.0F;
   }
   Device device = Device::open();
-  ParticleOptions options{.particles = 2000, .region = {}, .classifier = {}, .gamma = 0.0};
+  ParticleOptions options{.particles = 2000, .region = {}, .contact = {.gamma = 0.0}};
   options.augmented = true;
   ParticleFilter filter(device, objects, options);
   const Recording recording = random_recording(3, 36, 440);

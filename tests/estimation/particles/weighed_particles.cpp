@@ -21,15 +21,14 @@ std::vector<double> weights_of(const ParticleFilter& filter) {
 double weight_error(const ParticleFilter& filter, const Touch& touch,
                     const std::vector<Hypothesis>& objects, const ParticleOptions& options,
                     std::size_t stride) {
-  const ContactLikelihood model{.gamma = options.gamma,
-                                .prior = options.prior.value_or(objects.front().map.prior)};
   std::vector<double> differences;
   double mean = 0.0;
   const std::vector<ParticleFilter::Particle> particles = filter.particles();
   for (std::size_t i = 0; i < particles.size(); i += stride) {
     const ParticleFilter::Particle& particle = particles[i];
-    const double expected = reference::log_likelihood(
-        touch, particle.T_object_robot, objects[particle.object].map, options.classifier, model);
+    const double expected =
+        reference::log_likelihood(touch, particle.T_object_robot, objects[particle.object].map,
+                                  options.contact, particle.object);
     differences.push_back(std::log(particle.weight) - expected);
     mean += differences.back();
   }

@@ -1,0 +1,131 @@
+#include "contact_kernel.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <span>
+
+#include <fmt/format.h>
+
+#include "contradiction.hpp"
+#include "interface.h"
+#include "kernel_sizes.hpp"
+#include "palpate/error.hpp"
+
+namespace palpate {
+
+namespace {
+
+// Eight factors of at least this multiply to 1e-24, and the kernel's clamp of the odds at 2^-30
+// changes them by less than one part in 1e6.
+constexpr double least_product_floor = 1e-3;
+
+std::uint32_t bits(double value) { return std::bit_cast<std::uint32_t>(static_cast<float>(value)); }
+
+/// The rows of a set: see row_of() in shaders/contact_likelihood.glsl.
+std::size_t nodes_of_a_set(const ContactModel& model) {
+  return model.table ? 2 * model.table->levels() * model.table->nodes : 0;
+}
+
+/// The log-likelihoods [level, node] of one set as ratios to Unknown and to No Contact.
+void append_set(std::vector<shaders::TableNode>& nodes, const LikelihoodTable& table,
+                std::span<const double> log_likelihood) {
+  const auto append_row = [&](const auto& ratio) {
+    for (std::size_t i = 0; i < table.nodes; ++i) {
+      const double nats = ratio(i);
+      nodes.push_back({.nats = static_cast<float>(nats),
+                       .rise = static_cast<float>(ratio(std::min(i + 1, table.nodes - 1)) - nats)});
+    }
+  };
+  const auto at = [&](std::size_t level, std::size_t node) {
+    return log_likelihood[level * table.nodes + node];
+  };
+  for (std::size_t level = 0; level < table.levels(); ++level) {
+    append_row([&](std::size_t i) { return at(level, i); });
+  }
+  append_row([&](std::size_t i) { return -at(0, i); });  // Unknown's
+  for (std::size_t level = 1; level < table.levels(); ++level) {
+    append_row([&](std::size_t i) { return at(level, i) - at(0, i); });
+  }
+}
+
+/// The numbers of an object whose map is of nothing but the prior.
+std::vector<double> set_of_none(const ContactModel& model) {
+  std::vector<double> numbers;
+  for (std::size_t level = 0; level < model.table->levels(); ++level) {
+    numbers.resize(numbers.size() + model.table->nodes,
+                   prior_log_likelihood(static_cast<Reading>(level), model));
+  }
+  return numbers;
+}
+
+}  // namespace
+
+std::vector<std::uint32_t> contact_constants(const gpu::Limits& limits, const ContactModel& model) {
+  const std::uint32_t lanes = independent_lanes(limits);
+  if (const auto& table = model.table) {
+    const double nodes_per_nat =
+        static_cast<double>(table->nodes - 1) / (table->last_log_odds - table->first_log_odds);
+    return {lanes,
+            shaders::AS_TABLE,
+            0,
+            0,
+            bits(table->first_log_odds),
+            bits(nodes_per_nat),
+            static_cast<std::uint32_t>(table->nodes),
+            static_cast<std::uint32_t>(table->levels())};
+  }
+  const double floor = model.gamma * model.prior.value();
+  const bool as_logs = floor < least_product_floor;
+  // A product of two small numbers may be 0 where both logarithms are sound.
+  const double log_floor =
+      model.gamma > 0.0 ? std::log(model.gamma) + std::log(*model.prior) : shaders::NO_FLOOR;
+  return {lanes,
+          as_logs ? shaders::AS_LOGS : shaders::AS_PRODUCTS,
+          bits(as_logs ? log_floor : floor),
+          bits(1.0 - model.gamma),
+          0,
+          0,
+          0,
+          0};
+}
+
+std::uint64_t ContactTable::bytes_needed(const ContactModel& model) {
+  const std::size_t sets = model.table ? model.table->sets() + 1 : 0;
+  return std::max<std::uint64_t>(1, sets * nodes_of_a_set(model)) * sizeof(shaders::TableNode);
+}
+
+ContactTable::ContactTable(gpu::Context& context, gpu::CommandStream& stream,
+                           const ContactModel& model)
+    : nodes_of_a_set_(nodes_of_a_set(model)) {
+  const std::uint64_t bytes = bytes_needed(model);
+  const std::uint64_t most = std::min<std::uint64_t>(
+      context.limits().table_texels, context.limits().allocation / sizeof(shaders::TableNode));
+  if (bytes / sizeof(shaders::TableNode) > most) {
+    throw Error(Fault::input,
+                fmt::format("likelihood table: {} numbers exceed the {} that kernels of device "
+                            "'{}' read; use fewer nodes",
+                            bytes / sizeof(shaders::TableNode), most, context.name()));
+  }
+  nodes_ = gpu::Buffer(context, bytes, gpu::Memory::device, "the likelihood table",
+                       VK_FORMAT_R32G32_SFLOAT);
+  std::vector<shaders::TableNode> nodes;
+  if (const auto& table = model.table) {
+    sets_ = table->sets();
+    const std::size_t numbers = table->levels() * table->nodes;
+    for (std::size_t set = 0; set < sets_; ++set) {
+      append_set(nodes, *table, std::span(table->log_likelihood).subspan(set * numbers, numbers));
+    }
+    append_set(nodes, *table, set_of_none(model));
+  }
+  nodes.resize(bytes / sizeof(shaders::TableNode));
+  stream.upload(nodes_, std::span<const shaders::TableNode>(nodes));
+}
+
+int ContactTable::first_node(std::size_t object) const {
+  return static_cast<int>((sets_ == 1 ? 0 : object) * nodes_of_a_set_);
+}
+
+int ContactTable::first_node_of_none() const { return static_cast<int>(sets_ * nodes_of_a_set_); }
+
+}  // namespace palpate

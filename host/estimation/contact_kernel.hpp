@@ -1,0 +1,40 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "command_stream.hpp"
+#include "palpate/contact_model.hpp"
+
+namespace palpate {
+
+/// The specialization constants 0 to 7 of the kernels that evaluate the contact model: the
+/// lanes of a workgroup, then those of shaders/contact_likelihood.glsl. The model's prior must be
+/// set.
+std::vector<std::uint32_t> contact_constants(const gpu::Limits& limits, const ContactModel& model);
+
+/// The model's table on the device, shaders::TableNode: the objects' numbers, then those of "none
+/// of these", whose map holds nothing but the prior. A model without a table has one node that no
+/// kernel reads, because kernels bind the buffer all the same.
+class ContactTable {
+ public:
+  /// Device memory that it takes, in bytes.
+  static std::uint64_t bytes_needed(const ContactModel& model);
+
+  /// Records the upload.
+  /// @throws Error where the table has more nodes than the device reads
+  ContactTable(gpu::Context& context, gpu::CommandStream& stream, const ContactModel& model);
+
+  const gpu::Buffer& nodes() const { return nodes_; }
+  /// Index of the first node of an object's numbers.
+  int first_node(std::size_t object) const;
+  /// Index of the first node of the numbers of "none of these".
+  int first_node_of_none() const;
+
+ private:
+  std::size_t sets_ = 1;
+  std::size_t nodes_of_a_set_ = 0;
+  gpu::Buffer nodes_;
+};
+
+}  // namespace palpate

@@ -1,0 +1,125 @@
+#include "palpate/contact_model.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <span>
+
+#include <fmt/format.h>
+
+#include "palpate/error.hpp"
+#include "palpate/occupancy_grid.hpp"
+
+namespace palpate {
+
+namespace {
+
+/// log(1 / (1 + exp(-l))), exact where the logistic function itself would underflow.
+double log_logistic(double l) { return std::min(l, 0.0) - std::log1p(std::exp(-std::abs(l))); }
+
+/// log(exp(a) + exp(b))
+double log_sum(double a, double b) {
+  return std::max(a, b) + std::log1p(std::exp(-std::abs(a - b)));
+}
+
+/// Linear between the nodes of one level, constant beyond them.
+double interpolate(const LikelihoodTable& table, Reading level, double log_odds,
+                   std::size_t object) {
+  const std::size_t set = table.sets() == 1 ? 0 : object;
+  const std::size_t row = set * table.levels() + static_cast<std::size_t>(level);
+  const std::span<const double> nats =
+      std::span(table.log_likelihood).subspan(row * table.nodes, table.nodes);
+  const double last = static_cast<double>(table.nodes - 1);
+  const double place = std::clamp(
+      (log_odds - table.first_log_odds) * last / (table.last_log_odds - table.first_log_odds), 0.0,
+      last);
+  const auto node = std::min(static_cast<std::size_t>(place), table.nodes - 2);
+  return std::lerp(nats[node], nats[node + 1], place - static_cast<double>(node));
+}
+
+[[noreturn]] void refuse_table(const std::string& fault) {
+  throw Error(Fault::input, "likelihood table: " + fault);
+}
+
+}  // namespace
+
+void LikelihoodTable::validate() const {
+  constexpr double farthest = 1000.0;
+  constexpr double least_step = 0.001;
+  if (nodes < 2) {
+    refuse_table(fmt::format("nodes = {}: give at least 2", nodes));
+  }
+  if (!(std::abs(first_log_odds) <= farthest && std::abs(last_log_odds) <= farthest &&
+        last_log_odds - first_log_odds >= least_step * static_cast<double>(nodes - 1))) {
+    refuse_table(
+        fmt::format("{} nodes from log odds {} to {}: give ascending ones within +-{} "
+                    "nats, at least {} apart",
+                    nodes, first_log_odds, last_log_odds, farthest, least_step));
+  }
+  if (levels() > most_reading_levels) {
+    refuse_table(fmt::format("level_edges: {} of them make {} levels, more than {}; give fewer",
+                             level_edges.size(), levels(), most_reading_levels));
+  }
+  for (std::size_t i = 0; i < level_edges.size(); ++i) {
+    if (!std::isfinite(level_edges[i]) || (i > 0 && !(level_edges[i] > level_edges[i - 1]))) {
+      refuse_table(
+          fmt::format("level_edges[{}] = {}: give finite, ascending pressures", i, level_edges[i]));
+    }
+  }
+  const std::size_t of_a_set = levels() * nodes;
+  if (log_likelihood.empty() || log_likelihood.size() % of_a_set != 0) {
+    refuse_table(fmt::format("log_likelihood: {} numbers are no multiple of {} levels x {} nodes",
+                             log_likelihood.size(), levels(), nodes));
+  }
+  for (std::size_t i = 0; i < log_likelihood.size(); ++i) {
+    if (!(std::abs(log_likelihood[i]) <= most_log_odds)) {
+      refuse_table(fmt::format("log_likelihood[{}, {}, {}] = {}: give nats within +-{:g}",
+                               i / of_a_set, i % of_a_set / nodes, i % nodes, log_likelihood[i],
+                               most_log_odds));
+    }
+  }
+}
+
+void ContactModel::validate() const {
+  classifier.validate();
+  if (!(gamma >= 0.0 && gamma < 1.0)) {
+    throw Error(Fault::input, fmt::format("gamma = {}: must lie in [0, 1)", gamma));
+  }
+  if (prior && !(*prior > 0.0 && *prior < 1.0)) {
+    throw Error(Fault::input, fmt::format("prior = {}: must lie strictly between 0 and 1", *prior));
+  }
+  if (table) {
+    table->validate();
+  }
+}
+
+std::vector<Reading> ContactModel::classify(const Touch& touch) const {
+  std::vector<Reading> readings = classifier.classify(touch);
+  if (table) {
+    const std::vector<double>& edges = table->level_edges;
+    for (std::size_t i = 0; i < readings.size(); ++i) {
+      if (readings[i] == Reading::in_contact) {
+        const auto reached = std::upper_bound(edges.begin(), edges.end(), touch.pressure[i]);
+        readings[i] = contact_level(static_cast<std::size_t>(reached - edges.begin()));
+      }
+    }
+  }
+  return readings;
+}
+
+double ContactModel::log_likelihood(Reading reading, const MapSample& map,
+                                    std::size_t object) const {
+  if (reading == Reading::unknown) {
+    return 0.0;
+  }
+  if (table) {
+    return interpolate(*table, reading, map.log_odds, object);
+  }
+  // Eq. 7: p is the probability of a cell that is occupied, or one that is not.
+  const double log_p = log_logistic(reading == Reading::no_contact ? -map.log_odds : map.log_odds);
+  if (gamma == 0.0) {
+    return log_p;
+  }
+  return log_sum(std::log(gamma) + std::log(prior.value()), std::log1p(-gamma) + log_p);
+}
+
+}  // namespace palpate

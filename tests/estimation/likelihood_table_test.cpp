@@ -1,0 +1,248 @@
+// Tables in the place of Eq. 7, on every way that a likelihood takes.
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "context.hpp"
+#include "palpate/error.hpp"
+#include "palpate/particle_filter.hpp"
+#include "palpate/pose_histogram.hpp"
+#include "particles/particle_reference.hpp"
+#include "synthetic.hpp"
+
+namespace palpate {
+namespace {
+
+// What the method allows a log-likelihood to differ from float64, in nats per touch of 36 elements.
+constexpr double per_touch = 1e-4;
+// Of the maps' log odds: within the tables' nodes.
+constexpr double steepness = 12.0;
+constexpr double node_step = 0.05;
+// The second derivative of Eq. 7 in the log odds is at most 1, so that a straight line between two
+// nodes is off by at most step^2 / 8.
+constexpr double interpolation_nats = node_step * node_step / 8.0;
+
+LikelihoodTable empty_table(std::vector<double> level_edges) {
+  constexpr double end = 13.0;
+  return {.first_log_odds = -end,
+          .last_log_odds = end,
+          .nodes = static_cast<std::size_t>(std::lround(2.0 * end / node_step)) + 1,
+          .level_edges = std::move(level_edges),
+          .log_likelihood = {}};
+}
+
+/// Eq. 7 at the nodes of a table.
+ContactModel tabled(double gamma) {
+  const ContactModel eq7{.gamma = gamma, .prior = 0.2};
+  LikelihoodTable table = empty_table({});
+  for (const Reading reading : {Reading::no_contact, Reading::in_contact}) {
+    for (std::size_t i = 0; i < table.nodes; ++i) {
+      const double l = table.first_log_odds + node_step * static_cast<double>(i);
+      table.log_likelihood.push_back(reference::log_likelihood(reading, {l}, eq7));
+    }
+  }
+  return {.table = std::move(table)};
+}
+
+/// Random numbers for every object, and four levels of contact between 6 and 20 kPa.
+ContactModel learned(std::size_t objects) {
+  LikelihoodTable table = empty_table({8.0, 11.0, 15.0});
+  Uniform random(71);
+  for (std::size_t row = 0; row < objects * table.levels(); ++row) {
+    // As smooth as counts of readings are.
+    const double slope = random(-0.2, 0.2);
+    for (std::size_t i = 0; i < table.nodes; ++i) {
+      table.log_likelihood.push_back(-3.0 + slope * node_step * static_cast<double>(i) +
+                                     random(-0.1, 0.1));
+    }
+  }
+  return {.table = std::move(table)};
+}
+
+const std::vector<Hypothesis>& objects() {
+  static const std::vector<Hypothesis> three{{random_map(31, 27, 0.5, steepness, 72), 1.0},
+                                             {random_map(61, 61, 0.25, steepness, 73), 2.0},
+                                             {random_map(23, 29, 0.5, steepness, 74), 1.0}};
+  return three;
+}
+
+HistogramOptions options_of(double step_mm, ContactModel contact) {
+  return {.lattice = {.x_mm = {-3.0, -3.0 + 11 * step_mm, 11},
+                      .y_mm = {-2.0, -2.0 + 9 * step_mm, 9},
+                      .theta_rad = {0.0, 3.0, 4}},
+          .contact = std::move(contact)};
+}
+
+/// Presses of an array at rest, most of which reads No Contact.
+Recording presses() {
+  Recording recording = random_recording(3, 36, 75);
+  recording.T_robot_sensor.assign(3, {{0.7, -0.4}, 0.3});
+  for (std::size_t i = 0; i < recording.pressure.size(); ++i) {
+    if (i % 36 != 0 && i % 4 != 0) {
+      recording.pressure[i] = 0.0;
+    }
+  }
+  return recording;
+}
+
+/// Every way of a touch into a histogram.
+class EveryWay : public testing::Test {
+ protected:
+  /// Compares what three touches leave with the reference of `expected`'s model.
+  void compare(const ContactModel& contact, const ContactModel& expected, double nats_per_touch) {
+    // Register tiles over one and two cells, and runs of bins.
+    for (const double step_mm : {0.1, 0.25, 0.8}) {
+      const HistogramOptions options = options_of(step_mm, contact);
+      const HistogramOptions other = options_of(step_mm, expected);
+      const std::vector<Touch> moving = all_touches(moving_);
+      const std::vector<Touch> resting = all_touches(resting_);
+      const reference::Posterior of_moving = reference_posterior(objects(), other, moving);
+      const reference::Posterior of_resting = reference_posterior(objects(), other, resting);
+
+      PoseHistogram histogram(device_, objects(), options);
+      histogram.update(moving);
+      EXPECT_LT(likelihood_error(histogram, of_moving), 3 * nats_per_touch) << step_mm << " mm";
+
+      histogram.reset();
+      for (const Touch& touch : moving) {
+        histogram.prepare(touch);
+        histogram.update(touch);
+      }
+      EXPECT_LT(likelihood_error(histogram, of_moving), 3 * nats_per_touch)
+          << "prepared, " << step_mm << " mm";
+
+      HistogramOptions still = options;
+      still.still_array = true;
+      PoseHistogram at_rest(device_, objects(), still);
+      at_rest.update(resting);
+      // An element that is not in No Contact counts twice.
+      EXPECT_LT(likelihood_error(at_rest, of_resting), 6 * nats_per_touch)
+          << "at rest, " << step_mm << " mm";
+    }
+  }
+
+  Device device_ = Device::open();
+  Recording moving_ = random_recording(3, 36, 76);
+  Recording resting_ = presses();
+};
+
+TEST_F(EveryWay, GivesTheReferenceOfATable) {
+  for (const double gamma : {0.1, 1e-6, 0.0}) {
+    compare(tabled(gamma), tabled(gamma), per_touch);
+  }
+}
+
+TEST_F(EveryWay, GivesEquation7FromATableOfIt) {
+  // In products, in logs, and without a floor.
+  for (const double gamma : {0.1, 1e-6, 0.0}) {
+    compare(tabled(gamma), {.gamma = gamma}, per_touch + 36 * interpolation_nats);
+  }
+}
+
+TEST_F(EveryWay, TellsLevelsAndObjectsApart) {
+  compare(learned(objects().size()), learned(objects().size()), per_touch);
+  compare(learned(1), learned(1), per_touch);
+}
+
+TEST_F(EveryWay, ReadsMapsFromStorageBesideATable) {
+  gpu::Limits limits = device_.context().limits();
+  // Above the table's 4 sets of 10 rows of 521 nodes, and below the map's cells.
+  limits.table_texels = 22'000;
+  device_.context().lower_limits(limits);
+  std::vector<Hypothesis> large = objects();
+  large[1].map = random_map(160, 170, 0.1, steepness, 77);
+  const std::vector<Touch> touches = all_touches(moving_);
+  for (const double step_mm : {0.1, 0.8}) {
+    const HistogramOptions options = options_of(step_mm, learned(large.size()));
+    PoseHistogram histogram(device_, large, options);
+    histogram.update(touches);
+    EXPECT_LT(likelihood_error(histogram, reference_posterior(large, options, touches)),
+              3 * per_touch);
+  }
+}
+
+TEST_F(EveryWay, WeighsParticles) {
+  const Touch touch = moving_.touch(0);
+  for (const ContactModel& contact : {tabled(0.1), tabled(0.0), learned(1), learned(3)}) {
+    const ParticleOptions options{.particles = 1000, .region = {}, .contact = contact};
+    ParticleFilter filter(device_, objects(), options);
+    filter.update(touch);
+    EXPECT_LT(weight_error(filter, touch, objects(), options), per_touch);
+  }
+}
+
+/// What an object that was never learned makes of a touch, by the numbers of the objects' tables.
+double mean_by_prior(const Touch& touch, const ContactModel& contact, std::size_t sets) {
+  ContactModel model = contact;
+  model.prior = 0.2;
+  double sum = 0.0;
+  for (const Reading reading : reference::classify(touch, model)) {
+    double likelihood = 0.0;
+    for (std::size_t set = 0; set < sets; ++set) {
+      likelihood += std::exp(
+          reference::log_likelihood(reading, {.log_odds = std::log(0.2 / 0.8)}, model, set));
+    }
+    sum += std::log(likelihood / static_cast<double>(sets));
+  }
+  return sum;
+}
+
+TEST_F(EveryWay, GivesNoneOfTheseTheMeanOfTheObjectsNumbers) {
+  const ContactModel contact = learned(objects().size());
+  const Touch touch = moving_.touch(0);
+  const double none = mean_by_prior(touch, contact, objects().size());
+
+  HistogramOptions options = options_of(0.8, contact);
+  options.none_weight = 2.0;
+  PoseHistogram histogram(device_, objects(), options);
+  histogram.update(touch);
+  reference::Posterior expected = reference_posterior(objects(), options, std::span(&touch, 1));
+  expected.log_likelihood.emplace_back(options.lattice.bins(), none);
+  expected.weight.push_back(2.0);
+  // An error in nats changes a probability by at most as much.
+  EXPECT_NEAR(histogram.estimate().none, reference::identity(expected).back(), 2 * per_touch);
+
+  const ParticleOptions of_particles{
+      .particles = 2000, .region = {}, .contact = contact, .none_weight = 2.0};
+  ParticleFilter filter(device_, objects(), of_particles);
+  filter.update(touch);
+  std::vector<double> differences;
+  int of_none = 0;
+  for (const ParticleFilter::Particle& particle : filter.particles()) {
+    const auto object = static_cast<std::size_t>(particle.object);
+    const bool is_none = object == objects().size();
+    of_none += is_none ? 1 : 0;
+    differences.push_back(
+        std::log(particle.weight) -
+        (is_none ? none
+                 : reference::log_likelihood(touch, particle.T_object_robot, objects()[object].map,
+                                             contact, object)));
+  }
+  EXPECT_GT(of_none, 300) << "2 of 6 parts";
+  const auto [least, most] = std::minmax_element(differences.begin(), differences.end());
+  EXPECT_LT(*most - *least, 2 * per_touch);
+}
+
+TEST_F(EveryWay, RefusesATableOfOtherObjectsOrTooLargeForTheDevice) {
+  const auto refuse = [&](const ContactModel& contact, const std::string& says) {
+    try {
+      const PoseHistogram histogram(device_, objects(), options_of(0.8, contact));
+      ADD_FAILURE() << "accepted: " << says;
+    } catch (const Error& error) {
+      EXPECT_EQ(error.fault(), Fault::input);
+      EXPECT_NE(std::string(error.what()).find(says), std::string::npos) << error.what();
+    }
+  };
+  refuse(learned(2), "2 objects, but there are 3 maps");
+  gpu::Limits limits = device_.context().limits();
+  limits.table_texels = 20'000;
+  device_.context().lower_limits(limits);
+  refuse(learned(3), "use fewer nodes");
+}
+
+}  // namespace
+}  // namespace palpate

@@ -1,0 +1,185 @@
+#include "palpate/contact_model.hpp"
+
+#include <cmath>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "palpate/error.hpp"
+#include "reference.hpp"
+
+namespace palpate {
+namespace {
+
+constexpr Reading in = Reading::in_contact;
+constexpr Reading no = Reading::no_contact;
+constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+constexpr double infinity = std::numeric_limits<double>::infinity();
+
+TEST(ContactModel, IsEquation7) {
+  for (const double gamma : {0.0, 1e-6, 0.1, 0.5, 0.99}) {
+    for (const double prior : {0.02, 0.2, 0.7}) {
+      const ContactModel model{.gamma = gamma, .prior = prior};
+      for (double l = -30.0; l <= 30.0; l += 0.7) {
+        const double p = 1.0 / (1.0 + std::exp(-l));
+        const double q = 1.0 / (1.0 + std::exp(l));
+        EXPECT_NEAR(model.log_likelihood(in, {l}), std::log(gamma * prior + (1.0 - gamma) * p),
+                    1e-12)
+            << "float64 rounding of logs below 30";
+        EXPECT_NEAR(model.log_likelihood(no, {l}), std::log(gamma * prior + (1.0 - gamma) * q),
+                    1e-12)
+            << "float64 rounding of logs below 30";
+        EXPECT_NEAR(model.log_likelihood(in, {l}), reference::log_likelihood(in, {l}, model), 1e-12)
+            << "float64 rounding of logs below 30";
+      }
+      EXPECT_EQ(model.log_likelihood(Reading::unknown, {3.0}), 0.0);
+    }
+  }
+}
+
+TEST(ContactModel, WithoutGammaHasNoFloor) {
+  const ContactModel model{.gamma = 0.0, .prior = 0.2};
+  EXPECT_EQ(model.log_likelihood(in, {-1000.0}), -1000.0);
+  EXPECT_EQ(model.log_likelihood(in, {1000.0}), 0.0);
+  EXPECT_EQ(model.log_likelihood(no, {1000.0}), -1000.0);
+  EXPECT_EQ(model.log_likelihood(no, {-1000.0}), 0.0);
+  EXPECT_EQ(model.log_likelihood(in, {0.0}), -std::log(2.0));
+}
+
+TEST(ContactModel, WithGammaHasAFloor) {
+  const ContactModel model{.gamma = 0.1, .prior = 0.2};
+  EXPECT_NEAR(model.log_likelihood(in, {-1000.0}), std::log(0.02), 1e-15);
+  EXPECT_NEAR(model.log_likelihood(no, {1000.0}), std::log(0.02), 1e-15);
+  EXPECT_NEAR(model.log_likelihood(in, {1000.0}), std::log(0.92), 1e-15);
+  // Half of 0.9 beside 0.02.
+  EXPECT_NEAR(model.log_likelihood(in, {0.0}), std::log(0.47), 1e-15);
+}
+
+TEST(ContactModel, RefusesWhatIsOutOfRange) {
+  ContactModel().validate();
+  ContactModel{.gamma = 0.0}.validate();
+  for (const double gamma : {-0.1, 1.0, 2.0, nan}) {
+    EXPECT_THROW((ContactModel{.gamma = gamma}.validate()), Error) << gamma;
+  }
+  for (const double prior : {0.0, 1.0, -1.0, nan}) {
+    EXPECT_THROW((ContactModel{.prior = prior}.validate()), Error) << prior;
+  }
+}
+
+/// Two objects, three levels, three nodes.
+LikelihoodTable small_table() {
+  return {.first_log_odds = -2.0,
+          .last_log_odds = 2.0,
+          .nodes = 3,
+          .level_edges = {10.0},
+          .log_likelihood = {-1.0, -2.0, -4.0, -5.0, -3.0, -1.0, -9.0, -8.0, -7.0,  //
+                             -0.1, -0.2, -0.3, -0.4, -0.5, -0.6, -0.7, -0.8, -0.9}};
+}
+
+TEST(LikelihoodTable, IsLinearBetweenItsNodesAndConstantBeyond) {
+  const ContactModel model{.table = small_table()};
+  const auto at = [&](Reading reading, double log_odds, std::size_t object) {
+    EXPECT_NEAR(reference::log_likelihood(reading, {log_odds}, model, object),
+                model.log_likelihood(reading, {log_odds}, object), 1e-12);
+    return model.log_likelihood(reading, {log_odds}, object);
+  };
+  EXPECT_EQ(at(no, -2.0, 0), -1.0);
+  EXPECT_EQ(at(no, 0.0, 0), -2.0);
+  EXPECT_EQ(at(no, 1.0, 0), -3.0);
+  EXPECT_EQ(at(no, 2.0, 0), -4.0);
+  EXPECT_EQ(at(no, -100.0, 0), -1.0);
+  EXPECT_EQ(at(no, 100.0, 0), -4.0);
+  EXPECT_EQ(at(in, -1.0, 0), -4.0);
+  EXPECT_EQ(at(contact_level(1), 1.5, 0), -7.25);
+  EXPECT_DOUBLE_EQ(at(in, 1.0, 1), -0.55);
+  EXPECT_EQ(at(Reading::unknown, 1.0, 1), 0.0);
+}
+
+TEST(LikelihoodTable, OfOneSetIsAllObjects) {
+  LikelihoodTable shared = small_table();
+  shared.log_likelihood.resize(9);
+  const ContactModel model{.table = shared};
+  for (const std::size_t object : {0U, 1U, 7U}) {
+    EXPECT_EQ(model.log_likelihood(no, {1.0}, object), -3.0);
+    EXPECT_EQ(reference::log_likelihood(no, {1.0}, model, object), -3.0);
+  }
+}
+
+TEST(LikelihoodTable, DividesContactByItsEdges) {
+  ContactModel model{.table = small_table()};
+  model.table->level_edges = {7.0, 10.0, 15.0};
+  const std::vector<double> pressure{20.0, 1.0, 6.5, 7.0, 9.99, 10.0, 15.0, 3.0, nan, 40.0};
+  const std::vector<std::uint8_t> valid{1, 1, 1, 1, 1, 1, 1, 1, 1, 0};
+  const std::vector<glm::dvec2> elements(pressure.size());
+  const Touch touch{
+      .T_robot_sensor = {}, .elements_mm = elements, .pressure = pressure, .valid = valid};
+  // Eq. 3 asks for more than 2 and 6; 3.0 is between them.
+  const std::vector<Reading> expected{contact_level(3),
+                                      no,
+                                      in,
+                                      contact_level(1),
+                                      contact_level(1),
+                                      contact_level(2),
+                                      contact_level(3),
+                                      Reading::unknown,
+                                      Reading::unknown,
+                                      Reading::unknown};
+  EXPECT_EQ(model.classify(touch), expected);
+  EXPECT_EQ(reference::classify(touch, model), expected);
+  model.table.reset();
+  EXPECT_EQ(model.classify(touch), model.classifier.classify(touch)) << "Eq. 7 knows one level";
+}
+
+/// Throws what a table is refused with, changed in one respect.
+template <typename Change>
+void expect_refused(const Change& change, const std::string& says) {
+  ContactModel model{.table = small_table()};
+  change(*model.table);
+  try {
+    model.validate();
+    ADD_FAILURE() << "accepted: " << says;
+  } catch (const Error& error) {
+    const std::string what = error.what();
+    EXPECT_EQ(error.fault(), Fault::input);
+    EXPECT_EQ(what.find("likelihood table: "), 0U) << what;
+    EXPECT_NE(what.find(says), std::string::npos) << what;
+    EXPECT_EQ(what.find('\n'), std::string::npos);
+  }
+}
+
+TEST(LikelihoodTable, ThatIsNotSoundIsRefused) {
+  ContactModel{.table = small_table()}.validate();
+  using Table = LikelihoodTable;
+  for (const std::size_t nodes : {0U, 1U}) {
+    expect_refused([&](Table& t) { t.nodes = nodes; }, "nodes = ");
+  }
+  for (const double end : {nan, infinity, -2.0, -3.0, -1.999, 1001.0}) {
+    expect_refused([&](Table& t) { t.last_log_odds = end; }, "3 nodes from log odds -2 to");
+  }
+  expect_refused([](Table& t) { t.first_log_odds = nan; }, "3 nodes from log odds nan to");
+  for (const double edge : {nan, infinity}) {
+    expect_refused([&](Table& t) { t.level_edges = {edge}; }, "level_edges[0] = ");
+  }
+  expect_refused([](Table& t) { t.level_edges = {5.0, 3.0}; }, "level_edges[1] = 3");
+  expect_refused([](Table& t) { t.level_edges = {5.0, 5.0}; }, "level_edges[1] = 5");
+  expect_refused([](Table& t) { t.level_edges = {1, 2, 3, 4, 5, 6, 7}; }, "9 levels");
+  expect_refused([](Table& t) { t.log_likelihood.clear(); }, "0 numbers");
+  expect_refused([](Table& t) { t.log_likelihood.pop_back(); }, "17 numbers");
+  for (const double nats : {nan, infinity, -infinity, -2e30}) {
+    expect_refused([&](Table& t) { t.log_likelihood[13] = nats; }, "log_likelihood[1, 1, 1] = ");
+  }
+}
+
+TEST(LikelihoodTable, HasUpToEightLevels) {
+  ContactModel model{.table = small_table()};
+  model.table->level_edges = {1, 2, 3, 4, 5, 6};
+  model.table->log_likelihood.assign(8 * 3, -1.0);
+  model.validate();
+  EXPECT_EQ(model.table->levels(), most_reading_levels);
+  EXPECT_EQ(model.log_likelihood(contact_level(6), {0.5}), -1.0);
+}
+
+}  // namespace
+}  // namespace palpate
