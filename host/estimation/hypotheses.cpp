@@ -81,4 +81,17 @@ std::vector<double> log_weights(std::span<const Hypothesis> hypotheses) {
   return logs;
 }
 
+std::vector<double> normalised(std::vector<double> logs) {
+  const double most = *std::max_element(logs.begin(), logs.end());
+  double total = 0.0;
+  for (double& p : logs) {
+    p = std::exp(p - most);
+    total += p;
+  }
+  for (double& p : logs) {
+    p /= total;
+  }
+  return logs;
+}
+
 }  // namespace palpate

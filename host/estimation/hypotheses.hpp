@@ -22,4 +22,7 @@ double log_total_weight(std::span<const Hypothesis> hypotheses);
 /// log of every prior weight over their sum.
 std::vector<double> log_weights(std::span<const Hypothesis> hypotheses);
 
+/// exp(logs) over their sum, by a log-sum-exp: probabilities from log evidence (Eq. 14).
+std::vector<double> normalised(std::vector<double> logs);
+
 }  // namespace palpate

@@ -21,24 +21,6 @@
 
 namespace palpate {
 
-namespace {
-
-/// exp(logs) over their sum, by a log-sum-exp.
-std::vector<double> normalised(std::vector<double> logs) {
-  const double most = *std::max_element(logs.begin(), logs.end());
-  double total = 0.0;
-  for (double& p : logs) {
-    p = std::exp(p - most);
-    total += p;
-  }
-  for (double& p : logs) {
-    p /= total;
-  }
-  return logs;
-}
-
-}  // namespace
-
 struct PoseHistogram::Impl {
   Impl(Device& device, std::span<const Hypothesis> hypotheses, const HistogramOptions& wanted)
       : options(wanted),
