@@ -94,22 +94,22 @@ std::vector<TrialErrors> errors_of(Device& device, const LearnedLetters& learned
 
 /// What a run is compared with.
 struct Compared {
-  Json name;  ///< null for nothing
+  std::string name;  ///< empty for nothing
   std::vector<TrialErrors> errors;
 };
 
 Json record_of(const Variant& variant, const BinCounts& bins, std::span<const TrialErrors> errors,
                const Compared& with) {
   const auto difference = [&](PoseKind kind) {
-    return with.name.is_null() ? Json(nullptr)
-                               : difference_of(paired_errors(errors, with.errors, kind));
+    return with.name.empty() ? Json(nullptr)
+                             : difference_of(paired_errors(errors, with.errors, kind));
   };
   return {{"name", variant.name},
           {"count", product(bins)},
           {"elements", variant.sensor.elements_mm.size()},
           {"error_mm", record_of(errors_over(errors, PoseKind::mode))},
           {"refined_error_mm", record_of(errors_over(errors, PoseKind::refined))},
-          {"against", with.name},
+          {"against", with.name.empty() ? Json(nullptr) : Json(with.name)},
           {"difference_mm", difference(PoseKind::mode)},
           {"refined_difference_mm", difference(PoseKind::refined)}};
 }
@@ -130,7 +130,7 @@ Json measure_limits(Device& device, const SweepPlan& plan) {
          std::span(plan.limits).first(variant.all_lattices ? plan.limits.size() : 1)) {
       std::vector<TrialErrors> errors = errors_of(device, learned, trials, bins);
       limits.push_back(record_of(variant, bins, errors, with));
-      if (unchanged.name.is_null()) {
+      if (unchanged.name.empty()) {
         unchanged = {variant.name, errors};
       }
       if (bins == plan.limits.front()) {
