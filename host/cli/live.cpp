@@ -22,7 +22,8 @@
 #include "palpate/error.hpp"
 #include "palpate/pose_track.hpp"
 #include "palpate/virtual_sensor.hpp"
-#include "recogniser.hpp"
+#include "recognition_flags.hpp"
+#include "record_output.hpp"
 #include "sensor_option.hpp"
 
 namespace palpate::cli {
@@ -94,14 +95,14 @@ void warm_up(Recogniser& recogniser, const RecognitionTask& task, const SensorDe
   // In Contact and No Contact by turns: what is Unknown would be passed over.
   std::vector<double> pressure(elements_mm.size(), 0.0);
   for (std::size_t i = 0; i < pressure.size(); i += 2) {
-    pressure[i] = 2.0 * task.histogram.classifier.threshold + 1.0;
+    pressure[i] = 2.0 * task.classifier().threshold + 1.0;
   }
   const Touch touch{.T_robot_sensor = {},
                     .elements_mm = elements_mm,
                     .pressure = pressure,
                     .valid = sensor.valid};
   recogniser.prepare(touch);
-  recogniser.update(std::span(&touch, 1), [](double) {});
+  recogniser.update(std::span(&touch, 1));
   recogniser.refine(recogniser.estimate().mode);
   recogniser.reset();
 }
@@ -121,7 +122,7 @@ void live(const Options& options) {
   replace_array(scene, options.recognition.scene, source, elements_mm.size(), elements_mm);
   const TouchDetectorOptions detector =
       detector_options(options.detector, description.pressure_unit, source);
-  RecognitionTask task = prepare(options.recognition, scene, description.pressure_unit, source);
+  RecognitionTask task = task_of(options.recognition, scene, description.pressure_unit, source);
   CommandFiles files;
   add_sensor_files(options.sensor, options.poses, files);
   add_recognition_files(options.recognition, scene, task, files);
@@ -129,10 +130,9 @@ void live(const Options& options) {
     files.writes("--json", options.json, CommandFiles::Dash::stream);
   }
   files.require_distinct();
-  Device device = Device::open(task.device);
-  settle_bins(device, task);
-  const std::unique_ptr<Recogniser> recogniser = make_recogniser(device, task);
-  warm_up(*recogniser, task, description, elements_mm);
+  Device device = open_device(options.recognition, scene);
+  Recogniser recogniser = open_recogniser(device, task);
+  warm_up(recogniser, task, description, elements_mm);
   std::optional<LineFile> json;
   if (!options.json.empty()) {
     json.emplace(options.json);
@@ -147,12 +147,12 @@ void live(const Options& options) {
       isatty(fileno(people)) != 0 && !(to_program && isatty(STDOUT_FILENO) != 0);
   if (!to_program && !on_terminal) {
     fmt::print("{}: {} maps, {}\n{}\n", device.name(), task.hypotheses.size(),
-               recogniser->description(), table_heading());
+               filter_words(recogniser, task), table_heading());
     std::fflush(stdout);
   }
   complaints.show(on_terminal && isatty(STDERR_FILENO) != 0);
   LiveRecognition recognition(
-      *sensor, elements_mm, *recogniser, task,
+      *sensor, elements_mm, recogniser, task,
       {.detector = detector, .tare_s = options.tare_s, .reset_after_s = options.reset_after_s},
       [&](const LiveTouch& touch) {
         if (json) {

@@ -69,7 +69,7 @@ void LiveScreen::describe(const LiveState& state) {
   view_.pressure = state.pressure;
   // A press is mostly several times as strong as what counts as contact. A touch's robust mean may
   // widen the scale; of single frames, one of 1e38 would leave nothing to be seen.
-  view_.full_scale = std::max(5.0 * task_.histogram.classifier.threshold, 1e-6);
+  view_.full_scale = std::max(5.0 * task_.classifier().threshold, 1e-6);
   if (state.last) {
     for (const double pressure : state.last->touch.pressure) {
       view_.full_scale = std::max(view_.full_scale, pressure);
@@ -82,7 +82,7 @@ void LiveScreen::describe(const LiveState& state) {
   if (!state.last) {
     return;
   }
-  const Step& step = state.last->step;
+  const RecognitionStep& step = state.last->step;
   if (step.contradicted) {
     view_.state += "; no map fits these touches";
     view_.warning = true;
@@ -105,10 +105,10 @@ void LiveScreen::place_array(const LiveState& state) {
   const std::vector<std::uint8_t>& valid = now ? view_.valid : state.last->touch.valid;
   view_.readings.clear();
   if (pressure.size() == view_.elements_mm.size()) {
-    view_.readings = task_.histogram.classifier.classify({.T_robot_sensor = *view_.T_robot_sensor,
-                                                          .elements_mm = view_.elements_mm,
-                                                          .pressure = pressure,
-                                                          .valid = valid});
+    view_.readings = task_.classifier().classify({.T_robot_sensor = *view_.T_robot_sensor,
+                                                  .elements_mm = view_.elements_mm,
+                                                  .pressure = pressure,
+                                                  .valid = valid});
   }
 }
 

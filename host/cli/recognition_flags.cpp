@@ -1,6 +1,8 @@
-#include "recognition_task.hpp"
+#include "recognition_flags.hpp"
 
 #include <CLI/CLI.hpp>
+
+#include "options.hpp"
 
 namespace palpate::cli {
 

@@ -14,12 +14,12 @@
 #include "atomic_file.hpp"
 #include "command_files.hpp"
 #include "figures.hpp"
+#include "options.hpp"
 #include "palpate/error.hpp"
 #include "palpate/files.hpp"
 #include "progress.hpp"
-#include "recogniser.hpp"
-#include "recognition_record.hpp"
-#include "recognition_task.hpp"
+#include "recognition_flags.hpp"
+#include "record_output.hpp"
 #include "unknowns.hpp"
 
 namespace palpate::cli {
@@ -36,7 +36,7 @@ struct Options {
 };
 
 std::filesystem::path png_path(const Options& options, const Unknown& unknown) {
-  const std::string stem = std::filesystem::path(unknown.recording->path).stem().string();
+  const std::string stem = std::filesystem::path(unknown.recording).stem().string();
   return std::filesystem::path(options.png) /
          (unknown.frame ? fmt::format("{}.{}.png", stem, *unknown.frame) : stem + ".png");
 }
@@ -45,7 +45,7 @@ std::filesystem::path png_path(const Options& options, const Unknown& unknown) {
 void check_outputs(const Options& options, const Scene& scene, const RecognitionTask& task,
                    const std::vector<Unknown>& unknowns) {
   if (!options.posterior.empty()) {
-    if (task.particles) {
+    if (std::holds_alternative<ParticleOptions>(task.filter)) {
       throw Error(Fault::input, fmt::format("--posterior {}: particles have no bins; use --filter "
                                             "histogram",
                                             options.posterior));
@@ -63,7 +63,7 @@ void check_outputs(const Options& options, const Scene& scene, const Recognition
         throw Error(Fault::input,
                     fmt::format("{}: another recording has the same name, and so would its "
                                 "picture; rename one",
-                                unknown.recording->path));
+                                unknown.recording));
       }
     }
   }
@@ -96,35 +96,6 @@ void check_outputs(const Options& options, const Scene& scene, const Recognition
   }
 }
 
-RecognitionRecord recognize_one(const Unknown& unknown, const RecognitionTask& task, bool trace,
-                                Recogniser& recogniser,
-                                const std::function<void(double)>& progress) {
-  RecognitionRecord record{.recording = unknown.recording->path,
-                           .frame = unknown.frame,
-                           .touches = unknown.touches.size(),
-                           .true_label = true_label(*unknown.recording),
-                           .trace = {}};
-  const auto look = [&] {
-    record.trace.push_back(judge(recogniser, record.true_label, unknown.recording->truth, task));
-  };
-  const auto start = std::chrono::steady_clock::now();
-  recogniser.reset();
-  if (trace) {
-    const auto touches = static_cast<double>(unknown.touches.size());
-    for (const Touch& touch : unknown.touches) {
-      const auto done = static_cast<double>(record.trace.size());
-      recogniser.update(std::span(&touch, 1),
-                        [&](double fraction) { progress((done + fraction) / touches); });
-      look();
-    }
-  } else {
-    recogniser.update(unknown.touches, progress);
-    look();
-  }
-  record.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-  return record;
-}
-
 /// Edge at which an element is drawn: as a DigiTacts's, or where others lie closer, as their pitch
 /// allows.
 double element_edge_mm(const Touch& touch) {
@@ -138,7 +109,7 @@ double element_edge_mm(const Touch& touch) {
 
 std::string draw_sheet(const RecognitionRecord& record, const Unknown& unknown,
                        const RecognitionTask& task, const Recogniser& recogniser) {
-  const Step& last = record.last();
+  const RecognitionStep& last = record.last();
   RecognitionSheet sheet;
   sheet.title = name_of(record);
   sheet.map = task.hypotheses[last.mode.object].map;
@@ -147,11 +118,11 @@ std::string draw_sheet(const RecognitionRecord& record, const Unknown& unknown,
   sheet.none = task.labels[last.best] == none_label;
   sheet.true_object = record.true_label;
   if (last.error_mm) {
-    sheet.truth = unknown.recording->truth->T_object_robot;
+    sheet.truth = unknown.truth.T_object_robot;
     sheet.error_mm = last.error_mm;
   }
-  sheet.lattice = task.histogram.lattice;
-  sheet.belief_xy = recogniser.belief_xy(last.mode.object);
+  sheet.lattice = task.lattice();
+  sheet.belief_xy = recogniser.marginal_xy(last.mode.object);
   sheet.labels = task.labels;
   for (const Touch& touch : unknown.touches) {
     auto& footprint = sheet.footprints_mm.emplace_back();
@@ -159,7 +130,7 @@ std::string draw_sheet(const RecognitionRecord& record, const Unknown& unknown,
       footprint.push_back(touch.T_robot_sensor * element);
     }
   }
-  for (const Step& step : record.trace) {
+  for (const RecognitionStep& step : record.trace) {
     sheet.identity.push_back(step.identity);
   }
   return draw_recognition(sheet);
@@ -195,12 +166,13 @@ void recognize(const Options& options) {
   const Scene scene = scene_of(options.recognition);
   const Unknowns unknowns = read_unknowns(options.unknowns, scene, options.recognition.scene);
   const Recording& first = unknowns.recordings.front();
-  RecognitionTask task = prepare(options.recognition, scene, first.pressure_unit, first.path);
-  task.histogram.still_array = unknowns.still_array;
+  RecognitionTask task = task_of(options.recognition, scene, first.pressure_unit, first.path);
+  if (auto* histogram = std::get_if<HistogramOptions>(&task.filter)) {
+    histogram->still_array = array_is_still(unknowns.list);
+  }
   check_outputs(options, scene, task, unknowns.list);
-  Device device = Device::open(task.device);
-  settle_bins(device, task);
-  const std::unique_ptr<Recogniser> recogniser = make_recogniser(device, task);
+  Device device = open_device(options.recognition, scene);
+  Recogniser recogniser = open_recogniser(device, task);
   if (!options.png.empty()) {
     make_folder(options.png);
   }
@@ -216,12 +188,13 @@ void recognize(const Options& options) {
         progress.show((static_cast<double>(records.size()) + fraction) /
                       static_cast<double>(unknowns.list.size()));
       };
-      records.push_back(recognize_one(unknown, task, trace, *recogniser, show));
+      records.push_back(recognise(recogniser, task, unknown, trace, show));
+      records.back().require_steps();
       show(0.0);
       json.push_back(to_json(records.back(), task, device.name(), options.trace));
       if (!options.png.empty()) {
         write_file(png_path(options, unknown),
-                   draw_sheet(records.back(), unknown, task, *recogniser));
+                   draw_sheet(records.back(), unknown, task, recogniser));
       }
     }
   }
@@ -230,12 +203,12 @@ void recognize(const Options& options) {
   const std::string json_text =
       json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
   // The files before anything is printed: nobody may be listening any more.
-  write_results(options, task, *recogniser, json_text);
+  write_results(options, task, recogniser, json_text);
   if (options.json == "-") {
     fmt::print("{}", json_text);
   } else {
     fmt::print("{}: {} maps, {}\n\n", device.name(), task.hypotheses.size(),
-               recogniser->description());
+               filter_words(recogniser, task));
     if (options.trace) {
       for (const RecognitionRecord& record : records) {
         print_trace(record, task);

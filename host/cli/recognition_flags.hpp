@@ -6,10 +6,8 @@
 #include <vector>
 
 #include "command_files.hpp"
-#include "options.hpp"
-#include "palpate/particle_filter.hpp"
-#include "palpate/pose_histogram.hpp"
 #include "palpate/scene.hpp"
+#include "recogniser.hpp"
 
 namespace CLI {
 class App;
@@ -42,18 +40,6 @@ struct RecognitionFlags {
 
 void add_recognition_flags(CLI::App& command, RecognitionFlags& flags);
 
-/// What the flags and the scene file together ask for; a flag overrides the scene's key.
-struct RecognitionTask {
-  std::vector<Hypothesis> hypotheses;
-  std::vector<std::string> map_paths;  ///< [hypothesis]
-  std::vector<std::string> labels;     ///< each once, in the order of the maps; last, if any, none
-  std::vector<std::size_t> label_of;   ///< [hypothesis] index into labels
-  HistogramOptions histogram;
-  std::optional<ParticleOptions> particles;  ///< where the particle filter was asked for
-  bool auto_bins = false;                    ///< the lattice's counts are still to be chosen
-  std::string device;
-};
-
 /// The scene file that the flags name, or an empty scene. Throws Error.
 Scene scene_of(const RecognitionFlags& flags);
 
@@ -62,10 +48,18 @@ Scene scene_of(const RecognitionFlags& flags);
 void replace_array(const Scene& scene, const std::string& scene_file, const std::string& source,
                    std::size_t elements, std::vector<glm::dvec2>& elements_mm);
 
-/// Reads and checks everything that the flags name, for pressures of this unit. `source` is where
-/// they come from, for messages. Throws Error.
-RecognitionTask prepare(const RecognitionFlags& flags, const Scene& scene,
+/// The task that the flags and the scene file ask for; a flag overrides the scene's key. Reads the
+/// maps. Throws Error.
+/// @param pressure_unit of the touches to come, which `source` gives
+RecognitionTask task_of(const RecognitionFlags& flags, const Scene& scene,
                         const std::string& pressure_unit, const std::string& source);
+
+/// Opens the device that the flags or the scene name. Throws Error.
+Device open_device(const RecognitionFlags& flags, const Scene& scene);
+
+/// Makes the task's filter and, with --bins auto, counts its bins; where the device allows fewer
+/// than the maps are worth, standard error says so. Throws Error.
+Recogniser open_recogniser(Device& device, RecognitionTask& task);
 
 /// Adds the scene file and its array's, and the maps.
 void add_recognition_files(const RecognitionFlags& flags, const Scene& scene,

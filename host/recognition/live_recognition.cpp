@@ -9,7 +9,7 @@
 #include "palpate/baseline.hpp"
 #include "palpate/pose_track.hpp"
 
-namespace palpate::cli {
+namespace palpate {
 
 namespace {
 
@@ -285,10 +285,9 @@ void LiveRecognition::use(const Job& job) {
     recogniser_.prepare(touch);
     return;
   }
-  recogniser_.update(std::span(&touch, 1), [](double) {});
-  const std::string& label = sensor.truth ? sensor.truth->object : sensor.object;
+  recogniser_.update(std::span(&touch, 1));
   LiveTouch result{.touch = *job.touch,
-                   .step = judge(recogniser_, label, sensor.truth, task_),
+                   .step = judge(recogniser_, ground_truth(sensor.object, sensor.truth), task_),
                    .frames_lost = job.frames_lost};
   result.latency_ms = std::chrono::duration<double, std::milli>(Clock::now() - job.taken).count();
   {
@@ -303,4 +302,4 @@ void LiveRecognition::use(const Job& job) {
   on_touch_(result);
 }
 
-}  // namespace palpate::cli
+}  // namespace palpate

@@ -1,13 +1,15 @@
-#include "recognition_task.hpp"
+#include "recognition_flags.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <set>
+#include <utility>
 
 #include <fmt/format.h>
 
 #include "file_identity.hpp"
+#include "options.hpp"
 #include "palpate/error.hpp"
 #include "palpate/files.hpp"
 #include "recordings.hpp"
@@ -62,7 +64,8 @@ std::vector<Scene::Object> objects_of(const RecognitionFlags& flags, const Scene
   return objects;
 }
 
-void load_maps(const std::vector<Scene::Object>& objects, RecognitionTask& task) {
+std::vector<Hypothesis> read_maps(const std::vector<Scene::Object>& objects) {
+  std::vector<Hypothesis> hypotheses;
   std::set<std::optional<FileIdentity>> seen;
   for (const Scene::Object& object : objects) {
     OccupancyGrid map = read_map(object.map);
@@ -81,18 +84,14 @@ void load_maps(const std::vector<Scene::Object>& objects, RecognitionTask& task)
                               object.map.string(), none_label));
     }
     map.symmetry = object.symmetry.value_or(map.symmetry);
-    const auto known = std::find(task.labels.begin(), task.labels.end(), map.label);
-    task.label_of.push_back(static_cast<std::size_t>(known - task.labels.begin()));
-    if (known == task.labels.end()) {
-      task.labels.push_back(map.label);
-    }
-    task.map_paths.push_back(object.map.string());
-    task.hypotheses.push_back({std::move(map), object.weight});
+    hypotheses.push_back({std::move(map), object.weight});
   }
+  return hypotheses;
 }
 
 /// Maps recognised together share one prior: unequal ones favour the emptier or fuller map.
-double common_prior(const RecognitionTask& task, std::optional<double> given) {
+double common_prior(const std::vector<Scene::Object>& objects,
+                    const std::vector<Hypothesis>& hypotheses, std::optional<double> given) {
   if (given) {
     if (!(*given > 0.0 && *given < 1.0)) {
       throw Error(Fault::input,
@@ -100,14 +99,14 @@ double common_prior(const RecognitionTask& task, std::optional<double> given) {
     }
     return *given;
   }
-  const double first = task.hypotheses.front().map.prior;
-  for (std::size_t i = 1; i < task.hypotheses.size(); ++i) {
-    const double prior = task.hypotheses[i].map.prior;
+  const double first = hypotheses.front().map.prior;
+  for (std::size_t i = 1; i < hypotheses.size(); ++i) {
+    const double prior = hypotheses[i].map.prior;
     if (std::abs(prior - first) > 1e-6) {
       throw Error(Fault::input,
                   fmt::format("{}: prior {} differs from {} of {}; build the maps in one call of "
                               "palpate map, or say which prior to use with --prior",
-                              task.map_paths[i], prior, first, task.map_paths.front()));
+                              objects[i].map.string(), prior, first, objects.front().map.string()));
     }
   }
   return first;
@@ -151,15 +150,6 @@ PoseLattice make_lattice(const RecognitionFlags& flags, const Scene& scene) {
                                           lattice.pivot_mm.x, lattice.pivot_mm.y, farthest_mm));
   }
   return lattice.collapse_fixed();
-}
-
-/// The weight of "none of these", which becomes the last label.
-void add_none(std::optional<double> weight, RecognitionTask& task) {
-  if (!weight) {
-    return;
-  }
-  task.histogram.none_weight = require_above("--none", *weight, 0.0);
-  task.labels.emplace_back(none_label);
 }
 
 /// Whether the particle filter is asked for. Throws Error on a filter that there is not, and on
@@ -237,34 +227,52 @@ void replace_array(const Scene& scene, const std::string& scene_file, const std:
   elements_mm = *scene.array_mm;
 }
 
-RecognitionTask prepare(const RecognitionFlags& flags, const Scene& scene,
+RecognitionTask task_of(const RecognitionFlags& flags, const Scene& scene,
                         const std::string& pressure_unit, const std::string& source) {
-  RecognitionTask task;
   const bool with_particles = wants_particles(flags, scene);
-  task.histogram.lattice = make_lattice(flags, scene);
-  task.auto_bins = flags.bins.empty() ? scene.auto_bins : flags.bins == "auto";
-  task.histogram.gamma = flags.gamma ? *flags.gamma : scene.gamma.value_or(0.1);
-  if (!(task.histogram.gamma >= 0.0 && task.histogram.gamma < 1.0)) {
+  HistogramOptions histogram{.lattice = make_lattice(flags, scene)};
+  histogram.gamma = flags.gamma ? *flags.gamma : scene.gamma.value_or(0.1);
+  if (!(histogram.gamma >= 0.0 && histogram.gamma < 1.0)) {
     throw Error(Fault::input,
-                fmt::format("--gamma {}: must be at least 0 and below 1", task.histogram.gamma));
+                fmt::format("--gamma {}: must be at least 0 and below 1", histogram.gamma));
   }
-  task.histogram.classifier =
+  histogram.classifier =
       make_classifier(pressure_unit, source, flags.threshold ? flags.threshold : scene.threshold,
                       flags.ratio ? flags.ratio : scene.ratio);
   if (flags.memory_mib) {
     if (*flags.memory_mib < 1) {
       throw Error(Fault::input, fmt::format("--memory-mib {}: give at least 1", *flags.memory_mib));
     }
-    task.histogram.memory_limit_bytes = static_cast<std::uint64_t>(*flags.memory_mib) << 20;
+    histogram.memory_limit_bytes = static_cast<std::uint64_t>(*flags.memory_mib) << 20;
   }
-  load_maps(objects_of(flags, scene), task);
-  add_none(flags.none ? flags.none : scene.none, task);
-  task.histogram.prior = common_prior(task, flags.prior ? flags.prior : scene.prior);
-  if (with_particles) {
-    task.particles = particle_options(flags, task.histogram);
+  const std::vector<Scene::Object> objects = objects_of(flags, scene);
+  std::vector<Hypothesis> hypotheses = read_maps(objects);
+  if (const auto none = flags.none ? flags.none : scene.none) {
+    histogram.none_weight = require_above("--none", *none, 0.0);
   }
-  task.device = flags.device.empty() ? scene.device.value_or("") : flags.device;
+  histogram.prior = common_prior(objects, hypotheses, flags.prior ? flags.prior : scene.prior);
+  RecognitionTask task(std::move(hypotheses),
+                       with_particles ? FilterOptions(particle_options(flags, histogram))
+                                      : FilterOptions(histogram));
+  for (const Scene::Object& object : objects) {
+    task.map_paths.push_back(object.map.string());
+  }
+  task.auto_bins = flags.bins.empty() ? scene.auto_bins : flags.bins == "auto";
   return task;
+}
+
+Device open_device(const RecognitionFlags& flags, const Scene& scene) {
+  return Device::open(flags.device.empty() ? scene.device.value_or("") : flags.device);
+}
+
+Recogniser open_recogniser(Device& device, RecognitionTask& task) {
+  if (const std::optional<CoarsenedBins> bins = settle_bins(device, task)) {
+    fmt::print(stderr,
+               "palpate: --bins auto: steps of {:.2f} mm, coarser than the maps are worth, to keep "
+               "to {} bins in all; narrow the region, or give --bins\n",
+               bins->step_mm, bins->most_bins);
+  }
+  return {device, task};
 }
 
 void add_recognition_files(const RecognitionFlags& flags, const Scene& scene,
