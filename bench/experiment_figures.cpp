@@ -185,7 +185,7 @@ Chart refined_chart(const ExperimentResult& result) {
 Chart pose_noise_chart(const ExperimentResult& result) {
   const std::vector<FilterRun>& noisy = result.pose_noise.front().runs;
   Chart chart = chart_over_touches(error_axis(mean_error, 0.3, 20.0));
-  chart.x.upper = static_cast<double>(noisy.front().scores.front().size());
+  chart.x.upper = static_cast<double>(noisy.front().records.front().trace.size());
   bool first = true;
   for (const FilterRun& filter : noisy) {
     if (filter.count != most_of(result, filter.filter)) {

@@ -5,7 +5,9 @@
 #include <limits>
 #include <numbers>
 #include <optional>
+#include <string>
 
+#include "palpate/error.hpp"
 #include "palpate/pose_histogram.hpp"
 
 namespace palpate::bench {
@@ -77,10 +79,20 @@ WindowMode mode_of(Device& device, const Hypothesis& object, std::span<const Tou
 
 }  // namespace
 
-PlacedBody truth_of(const LearnedLetters& learned, const Recording& trial) {
-  const std::size_t object = object_of(learned, trial.truth->object);
-  return {.body = learned.bodies[object],
-          .symmetry = learned.objects[object].map.symmetry,
+const Hypothesis& letter_of(std::span<const Hypothesis> letters, const Recording& trial) {
+  const std::string& label = trial.truth->object;
+  const auto letter = std::find_if(letters.begin(), letters.end(), [&](const Hypothesis& known) {
+    return known.map.label == label;
+  });
+  if (letter == letters.end()) {
+    throw Error(Fault::input, "'" + label + "' is no learned letter");
+  }
+  return *letter;
+}
+
+PlacedBody truth_of(const Hypothesis& letter, const Recording& trial) {
+  return {.body = body_of(letter.map),
+          .symmetry = letter.map.symmetry,
           .T_object_robot = trial.truth->T_object_robot};
 }
 
@@ -130,11 +142,11 @@ double nearest_bin_mm(const PoseLattice& lattice, const PlacedBody& placed) {
   return least_mm;
 }
 
-WindowEstimate estimate_in_window(Device& device, const LearnedLetters& learned,
+WindowEstimate estimate_in_window(Device& device, std::span<const Hypothesis> letters,
                                   const Recording& trial, const PoseLattice& lattice) {
-  const PlacedBody truth = truth_of(learned, trial);
-  const Hypothesis& object = learned.objects[object_of(learned, trial.truth->object)];
-  const std::vector<Touch> touches = all_touches(trial);
+  const Hypothesis& object = letter_of(letters, trial);
+  const PlacedBody truth = truth_of(object, trial);
+  const std::vector<Touch> touches = trial.touches(0, trial.size());
   std::optional<Mode> best;
   for (const PoseLattice& window : windows_about(lattice, truth, window_reach_mm)) {
     const Mode mode = mode_of(device, object, touches, window).mode;

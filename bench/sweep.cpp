@@ -21,6 +21,7 @@
 #include "sweep_plan.hpp"
 #include "sweep_result.hpp"
 #include "sweep_words.hpp"
+#include "trials.hpp"
 
 namespace palpate::bench {
 
@@ -108,13 +109,13 @@ void print(const SweepResult& result) {
 }
 
 /// Each of the particle filters at each of the counts.
-void sweep_particles(Device& device, const LearnedLetters& learned, const SweepPlan& plan,
+void sweep_particles(Device& device, const std::vector<Hypothesis>& letters, const SweepPlan& plan,
                      const CellPlan& cells, SweepResult& result) {
   for (const auto& [resampling, augmented] :
        {std::pair{Resampling::multinomial, false}, std::pair{Resampling::systematic, false},
         std::pair{Resampling::multinomial, true}}) {
     for (const int particles : cells.particles) {
-      result.points.push_back(measure_particles(device, learned,
+      result.points.push_back(measure_particles(device, letters,
                                                 trials_of(plan.particle_trials_each(particles)),
                                                 {.particles = particles,
                                                  .region = lattice_with(goal_bins),
@@ -128,23 +129,24 @@ void sweep_particles(Device& device, const LearnedLetters& learned, const SweepP
 
 void sweep_cells(Device& device, const SweepPlan& plan, const CellPlan& cells,
                  SweepResult& result) {
-  const LearnedLetters learned = learn_letters(device, MapOptions{.cell_mm = cells.cell_mm});
+  const std::vector<Hypothesis> letters =
+      learn_letters(device, MapOptions{.cell_mm = cells.cell_mm});
   const std::vector<Recording> trials = trials_of(plan.trials_each);
   for (const BinCounts& bins : cells.lattices) {
     result.points.push_back(measure_histogram(
-        device, learned, trials, plan.full_each(cells.cell_mm, bins), lattice_with(bins)));
+        device, letters, trials, plan.full_each(cells.cell_mm, bins), lattice_with(bins)));
     result.points.back().balanced = is_balanced(bins);
     print(result.points.back());
   }
-  sweep_particles(device, learned, plan, cells, result);
+  sweep_particles(device, letters, plan, cells, result);
   for (const BinCounts& bins : cells.compared) {
     for (Precision& precision :
-         compare_paths(device, learned, trials.front(), lattice_with(bins))) {
+         compare_paths(device, letters, trials.front(), lattice_with(bins))) {
       result.precisions.push_back(std::move(precision));
     }
   }
   if (!cells.lattices.empty()) {
-    const PoseLattice balanced = balanced_lattice(lattice_with(goal_bins), learned.objects).lattice;
+    const PoseLattice balanced = balanced_lattice(lattice_with(goal_bins), letters).lattice;
     result.findings.push_back(
         find_knee(result, cells.cell_mm,
                   {balanced.x_mm.count, balanced.y_mm.count, balanced.theta_rad.count}));

@@ -4,6 +4,8 @@
 
 #include <fmt/format.h>
 
+#include "trials.hpp"
+
 namespace palpate::bench {
 
 namespace {
@@ -80,12 +82,12 @@ std::vector<Variant> variants_of(const LimitPlan& plan) {
   return variants;
 }
 
-Limit measure(Device& device, const LearnedLetters& learned, std::span<const Recording> trials,
-              const PoseLattice& lattice) {
+Limit measure(Device& device, std::span<const Hypothesis> letters,
+              std::span<const Recording> trials, const PoseLattice& lattice) {
   Limit limit{
       .name = {}, .count = lattice.bins(), .elements = trials.front().elements(), .errors = {}};
   for (const Recording& trial : trials) {
-    limit.errors.push_back(estimate_in_window(device, learned, trial, lattice).errors);
+    limit.errors.push_back(estimate_in_window(device, letters, trial, lattice).errors);
   }
   return limit;
 }
@@ -95,7 +97,7 @@ Limit measure(Device& device, const LearnedLetters& learned, std::span<const Rec
 std::vector<Limit> measure_limits(Device& device, const LimitPlan& plan) {
   std::vector<Limit> limits;
   for (Variant& variant : variants_of(plan)) {
-    const LearnedLetters learned = learn_letters(
+    const std::vector<Hypothesis> letters = learn_letters(
         device, variant.map, training_recordings(variant.sensor, variant.training_poses));
     variant.trials.sensor = variant.sensor;
     const std::vector<Recording> trials =
@@ -106,7 +108,7 @@ std::vector<Limit> measure_limits(Device& device, const LimitPlan& plan) {
       if (!is_first && !variant.all_lattices) {
         break;
       }
-      limits.push_back(measure(device, learned, trials, lattice_with(bins)));
+      limits.push_back(measure(device, letters, trials, lattice_with(bins)));
       limits.back().name = variant.name;
       if (!is_first || first > 0) {
         limits.back().against = is_first ? 0 : first;

@@ -7,6 +7,7 @@
 
 #include "accuracy.hpp"
 #include "cpu_loop.hpp"
+#include "letters.hpp"
 #include "one_bin_kernel.hpp"
 #include "palpate/error.hpp"
 #include "palpate/pose_histogram.hpp"
@@ -51,17 +52,17 @@ std::string path_of(const PoseHistogram& histogram) {
 
 }  // namespace
 
-std::vector<Precision> compare_paths(Device& device, const LearnedLetters& learned,
+std::vector<Precision> compare_paths(Device& device, std::span<const Hypothesis> letters,
                                      const Recording& unknown, const PoseLattice& lattice) {
-  const ContactLikelihood product{.prior = learned.objects.front().map.prior};
+  const ContactLikelihood product{.prior = letters.front().map.prior};
   const ContactLikelihood logs{.gamma = 0.0, .prior = product.prior};
   const std::vector<Touch> moving = unknown.touches(0, timed_touches);
   const std::vector<Touch> resting(timed_touches, resting_touch(unknown));
-  PoseHistogram histogram(device, learned.objects, {.lattice = lattice});
-  PoseHistogram in_logs(device, learned.objects, {.lattice = lattice, .gamma = logs.gamma});
-  PoseHistogram at_rest(device, learned.objects, {.lattice = lattice, .still_array = true});
-  OneBinKernel one_bin(device, learned.objects, lattice, product);
-  CpuLoop cpu_loop(learned.objects, lattice, product);
+  PoseHistogram histogram(device, letters, {.lattice = lattice});
+  PoseHistogram in_logs(device, letters, {.lattice = lattice, .gamma = logs.gamma});
+  PoseHistogram at_rest(device, letters, {.lattice = lattice, .still_array = true});
+  OneBinKernel one_bin(device, letters, lattice, product);
+  CpuLoop cpu_loop(letters, lattice, product);
   const auto way = [](const std::string& path, const ContactLikelihood& model,
                       const std::vector<Touch>& touches, auto& engine) {
     return Way{.path = path,
@@ -87,15 +88,14 @@ std::vector<Precision> compare_paths(Device& device, const LearnedLetters& learn
     compared.push_back(
         {.path = one.path,
          .count = lattice.bins(),
-         .deviation = deviation_of(likelihood_errors(learned.objects, one.model, lattice, first,
-                                                     sampled_bins, one.log_likelihood),
-                                   learned)});
+         .deviation = deviation_of(likelihood_errors(letters, one.model, lattice, first,
+                                                     sampled_bins, one.log_likelihood))});
     contenders.emplace_back([&one] { one.update(one.touches); });
     contenders.back()();
   }
   const std::vector<std::vector<double>> seconds = interleave(contenders, repeats);
   const double evaluations = static_cast<double>(lattice.bins()) *
-                             static_cast<double>(learned.objects.size() * unknown.elements()) *
+                             static_cast<double>(letters.size() * unknown.elements()) *
                              timed_touches;
   for (std::size_t i = 0; i < compared.size(); ++i) {
     compared[i].nanoseconds = 1e9 * median(seconds[i]) / evaluations;

@@ -21,7 +21,7 @@ struct Precision {
 /// an array at rest; the baselines the one-bin kernel and the loop on the host's cores.
 /// @throws Error unless a touch of the unknown has half its elements or more in No Contact, which
 /// is what makes an array at rest worth while
-std::vector<Precision> compare_paths(Device& device, const LearnedLetters& learned,
+std::vector<Precision> compare_paths(Device& device, std::span<const Hypothesis> letters,
                                      const Recording& unknown, const PoseLattice& lattice);
 
 }  // namespace palpate::bench

@@ -12,7 +12,6 @@
 #include "palpate/particle_filter.hpp"
 #include "pose_window.hpp"
 #include "trial_errors.hpp"
-#include "trials.hpp"
 
 namespace palpate::bench {
 
@@ -25,7 +24,7 @@ struct Deviation {
   double rms = 0.0;
   int samples = 0;
 };
-Deviation deviation_of(const ErrorStatistics& errors, const LearnedLetters& learned);
+Deviation deviation_of(const ErrorStatistics& errors);
 
 /// Poses by windows that the full posterior gave, too.
 struct WindowCheck {
@@ -63,13 +62,13 @@ struct SweepPoint {
 /// All trials by the histogram: the first `full_each` of each of the letters by the full posterior,
 /// and the errors, where that leaves some out, in windows. The refined pose is taken after the last
 /// touch.
-SweepPoint measure_histogram(Device& device, const LearnedLetters& learned,
+SweepPoint measure_histogram(Device& device, const std::vector<Hypothesis>& letters,
                              std::span<const Recording> trials, int full_each,
                              const PoseLattice& lattice);
 
 /// All trials by the particle filter or Augmented MCL; trial i has the seed options.seed + i. The
 /// deviation is that of the weights after one touch, which nothing has resampled yet.
-SweepPoint measure_particles(Device& device, const LearnedLetters& learned,
-                             std::span<const Recording> trials, ParticleOptions options);
+SweepPoint measure_particles(Device& device, const std::vector<Hypothesis>& letters,
+                             std::span<const Recording> trials, const ParticleOptions& options);
 
 }  // namespace palpate::bench

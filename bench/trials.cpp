@@ -1,6 +1,5 @@
 #include "trials.hpp"
 
-#include <algorithm>
 #include <numeric>
 #include <utility>
 
@@ -53,14 +52,13 @@ Recording trial_of(const Recording& test_set, int touches, std::uint64_t seed,
 
 }  // namespace
 
-LearnedLetters learn_letters(Device& device, const MapOptions& options,
-                             const std::vector<Recording>& training) {
-  LearnedLetters learned{.objects = letter_maps(device, training, options), .bodies = {}};
-  for (Hypothesis& object : learned.objects) {
-    object.map.symmetry = symmetry_of(object.map.label);
-    learned.bodies.push_back(body_of(object.map));
+std::vector<Hypothesis> learn_letters(Device& device, const MapOptions& options,
+                                      const std::vector<Recording>& training) {
+  std::vector<Hypothesis> letters = letter_maps(device, training, options);
+  for (Hypothesis& letter : letters) {
+    letter.map.symmetry = symmetry_of(letter.map.label);
   }
-  return learned;
+  return letters;
 }
 
 std::vector<Recording> make_trials(std::span<const std::string> shapes, int trials_each,
@@ -83,37 +81,6 @@ std::vector<Recording> make_trials(std::span<const std::string> shapes, int tria
     seed += seeds_per_shape;
   }
   return trials;
-}
-
-std::size_t object_of(const LearnedLetters& learned, const std::string& label) {
-  const auto object =
-      std::find_if(learned.objects.begin(), learned.objects.end(),
-                   [&](const Hypothesis& hypothesis) { return hypothesis.map.label == label; });
-  if (object == learned.objects.end()) {
-    throw Error(Fault::input, fmt::format("'{}' is no learned letter", label));
-  }
-  return static_cast<std::size_t>(object - learned.objects.begin());
-}
-
-Score score(const LearnedLetters& learned, const Estimate& estimate, const Truth& truth) {
-  const auto best = std::max_element(estimate.identity.begin(), estimate.identity.end());
-  const auto label = [&](std::ptrdiff_t object) -> const std::string& {
-    return learned.objects[object].map.label;
-  };
-  Score score{.right = label(best - estimate.identity.begin()) == truth.object,
-              .confidence = *best,
-              .error_mm = {}};
-  const Mode& mode = estimate.mode;
-  if (label(mode.object) == truth.object) {
-    score.error_mm = error_mm(learned, mode.object, mode.T_object_robot, truth);
-  }
-  return score;
-}
-
-double error_mm(const LearnedLetters& learned, int object, const Pose& T_object_robot,
-                const Truth& truth) {
-  return pose_error_mm(learned.bodies[object], learned.objects[object].map.symmetry, T_object_robot,
-                       truth.T_object_robot);
 }
 
 }  // namespace palpate::bench
