@@ -74,29 +74,6 @@ FilterOptions particles_of(int count, bool augmented) {
                          .seed = particle_seed};
 }
 
-/// The filters that are compared, histograms first.
-std::vector<FilterOptions> compared_filters(std::span<const Hypothesis> letters, bool quick) {
-  std::vector<PoseLattice> lattices;
-  for (const PoseLattice& lattice : table_1()) {
-    lattices.push_back(lattice);
-  }
-  // As many bins as Table I's most, shaped by what a turn moves.
-  const std::int64_t most_bins = lattices.back().bins() * static_cast<std::int64_t>(letters.size());
-  lattices.push_back(balanced_lattice(lattices.back(), letters, most_bins).lattice);
-  std::vector<FilterOptions> filters;
-  for (const PoseLattice& lattice : lattices) {
-    filters.push_back(HistogramOptions{.lattice = lattice});
-  }
-  for (const bool augmented : {false, true}) {
-    for (const int count : {100, 1'000, most_particles}) {
-      if (!quick || count > 100) {
-        filters.push_back(particles_of(count, augmented));
-      }
-    }
-  }
-  return filters;
-}
-
 /// The trials' letters again, with the array displaced.
 std::vector<PoseNoiseRuns> measure_pose_noise(Device& device,
                                               const std::vector<Hypothesis>& letters,
@@ -138,14 +115,28 @@ ExperimentResult measure(Device& device, const ExperimentOptions& options, Repor
   const int trials_each = least_one("--trials", options.trials.value_or(options.quick ? 4 : 10));
   const int touches = options.touches.value_or(options.quick ? 12 : 50);
   const std::vector<Recording> trials = make_trials(vowels, trials_each, touches, learned_seed);
-  const std::vector<Hypothesis> letters = learn_letters(device, MapOptions{});
+  const std::vector<Hypothesis> letters = letter_maps(device, training_recordings(), MapOptions{});
   ExperimentResult result;
   for (const Recording& trial : trials) {
     result.true_objects.push_back(trial.truth->object);
   }
-  for (const FilterOptions& filter : compared_filters(letters, options.quick)) {
+  const auto add = [&](const FilterOptions& filter) {
     result.runs.push_back(run_filter(device, {letters, filter}, trials));
     report.add(case_of(result.runs.back()));
+  };
+  const std::array lattices = table_1();
+  for (const PoseLattice& lattice : lattices) {
+    add(HistogramOptions{.lattice = lattice});
+  }
+  // As many bins as Table I's most, shaped by what a turn moves.
+  const std::int64_t most_bins = lattices.back().bins() * static_cast<std::int64_t>(letters.size());
+  add(HistogramOptions{.lattice = balanced_lattice(lattices.back(), letters, most_bins).lattice});
+  for (const bool augmented : {false, true}) {
+    for (const int count : {100, 1'000, most_particles}) {
+      if (!options.quick || count > 100) {
+        add(particles_of(count, augmented));
+      }
+    }
   }
   for (const auto& [histogram, particles] : equal_counts(result.runs)) {
     report.add(comparison_of(histogram, particles));

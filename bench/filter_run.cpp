@@ -6,6 +6,7 @@
 #include <numeric>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 namespace palpate::bench {
 
@@ -47,8 +48,6 @@ CurvePoint point_of(const FilterRun& run, std::size_t touch) {
   return point;
 }
 
-}  // namespace
-
 std::string filter_name(const FilterOptions& filter) {
   const auto* particles = std::get_if<ParticleOptions>(&filter);
   return particles == nullptr                              ? "histogram"
@@ -57,10 +56,13 @@ std::string filter_name(const FilterOptions& filter) {
                                                            : "particles";
 }
 
+}  // namespace
+
 FilterRun run_filter(Device& device, RecognitionTask task, std::span<const Recording> trials) {
   FilterRun run{.filter = filter_name(task.filter), .name = {}, .records = {}};
   auto* particles = std::get_if<ParticleOptions>(&task.filter);
   if (particles != nullptr) {
+    run.path = "particles";
     run.count = particles->particles;
     run.name = fmt::format("{} {}", particles->augmented ? "augmented MCL" : run.filter, run.count);
   } else {
@@ -70,10 +72,14 @@ FilterRun run_filter(Device& device, RecognitionTask task, std::span<const Recor
                            lattice.theta_rad.count);
   }
   Recogniser recogniser(device, task);
+  if (particles == nullptr) {
+    run.path = fmt::format("{}", fmt::join(recogniser.histogram()->paths(), "; "));
+  }
   run.seconds = seconds_of([&] {
     for (const Recording& trial : trials) {
       run.records.push_back(recognise(recogniser, task, unknown_of(trial), true));
       run.records.back().require_steps();
+      run.device_bytes = std::max(run.device_bytes, recogniser.device_bytes());
       if (particles != nullptr) {  // Reset, they would be the same particles again.
         ++particles->seed;
         recogniser = Recogniser(device, task);

@@ -13,15 +13,14 @@ namespace palpate::bench {
 
 /// What one filter made of all trials.
 struct FilterRun {
-  std::string filter;                      ///< see filter_name()
-  std::string name;                        ///< with its size, such as "histogram 25x25x16"
-  std::int64_t count = 0;                  ///< bins per object, or particles in all
+  std::string filter;      ///< "histogram", "particles", "systematic" or "augmented"
+  std::string name;        ///< with its size, such as "histogram 25x25x16"
+  std::int64_t count = 0;  ///< bins per object, or particles in all
   std::vector<RecognitionRecord> records;  ///< [trial], with a step after every touch
   double seconds = 0.0;                    ///< wall time of all trials
+  std::string path;                        ///< how the likelihood is evaluated
+  std::uint64_t device_bytes = 0;          ///< most device memory held
 };
-
-/// "histogram", "particles", "systematic" for particles so resampled, or "augmented".
-std::string filter_name(const FilterOptions& filter);
 
 /// All trials by the task's filter. Of particles, trial i has the task's seed + i.
 FilterRun run_filter(Device& device, RecognitionTask task, std::span<const Recording> trials);

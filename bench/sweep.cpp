@@ -130,7 +130,7 @@ void sweep_particles(Device& device, const std::vector<Hypothesis>& letters, con
 void sweep_cells(Device& device, const SweepPlan& plan, const CellPlan& cells,
                  SweepResult& result) {
   const std::vector<Hypothesis> letters =
-      learn_letters(device, MapOptions{.cell_mm = cells.cell_mm});
+      letter_maps(device, training_recordings(), MapOptions{.cell_mm = cells.cell_mm});
   const std::vector<Recording> trials = trials_of(plan.trials_each);
   for (const BinCounts& bins : cells.lattices) {
     result.points.push_back(measure_histogram(

@@ -97,8 +97,8 @@ Limit measure(Device& device, std::span<const Hypothesis> letters,
 std::vector<Limit> measure_limits(Device& device, const LimitPlan& plan) {
   std::vector<Limit> limits;
   for (Variant& variant : variants_of(plan)) {
-    const std::vector<Hypothesis> letters = learn_letters(
-        device, variant.map, training_recordings(variant.sensor, variant.training_poses));
+    const std::vector<Hypothesis> letters = letter_maps(
+        device, training_recordings(variant.sensor, variant.training_poses), variant.map);
     variant.trials.sensor = variant.sensor;
     const std::vector<Recording> trials =
         make_trials(vowels, plan.trials_each, plan.touches, plan.seed, variant.trials);

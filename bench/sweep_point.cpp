@@ -15,42 +15,45 @@ namespace palpate::bench {
 
 namespace {
 
-/// Trials recognised touch by touch, each timed from the touch to the estimate.
-struct TimedTrials {
-  FilterRun run;
+SweepPoint point_of(const FilterRun& run, double cell_mm) {
+  SweepPoint point{.filter = run.filter,
+                   .cell_mm = cell_mm,
+                   .count = run.count,
+                   .path = run.path,
+                   .full_trials = static_cast<int>(run.records.size()),
+                   .device_bytes = run.device_bytes,
+                   .calibration_error = calibration_of(run).expected_error};
   std::vector<double> seconds_touch;
-
-  RecognitionStep& add(Recogniser& recogniser, const RecognitionTask& task, const Unknown& trial) {
-    RecognitionRecord& record = run.records.emplace_back();
-    recogniser.reset();
-    for (const Touch& touch : trial.touches) {
-      Estimate estimate;
-      seconds_touch.push_back(seconds_of([&] {
-        recogniser.update(std::span(&touch, 1));
-        estimate = recogniser.estimate();
-      }));
-      record.seconds += seconds_touch.back();
-      record.trace.push_back(judge(estimate, trial.truth, task));
+  std::vector<double> seconds_unknown;
+  for (const RecognitionRecord& record : run.records) {
+    double sum = 0.0;
+    for (const RecognitionStep& step : record.trace) {
+      seconds_touch.push_back(step.seconds);
+      sum += step.seconds;
     }
-    return record.trace.back();
+    seconds_unknown.push_back(sum);
+    const RecognitionStep& last = record.last();
+    point.errors.push_back({.mode_mm = last.error_mm, .refined_mm = last.refined_error_mm});
+    point.accuracy += *last.right ? 1.0 : 0.0;
+    point.least_confidence = std::min(point.least_confidence, last.confidence());
   }
+  point.seconds_touch = median(seconds_touch);
+  point.seconds_unknown = median(seconds_unknown);
+  point.accuracy /= point.full_trials;
+  return point;
+}
 
-  void fill(SweepPoint& point) const {
-    point.full_trials = static_cast<int>(run.records.size());
-    point.seconds_touch = median(seconds_touch);
-    std::vector<double> seconds_unknown;
-    for (const RecognitionRecord& record : run.records) {
-      const RecognitionStep& last = record.last();
-      seconds_unknown.push_back(record.seconds);
-      point.errors.push_back({.mode_mm = last.error_mm, .refined_mm = last.refined_error_mm});
-      point.accuracy += *last.right ? 1.0 : 0.0;
-      point.least_confidence = std::min(point.least_confidence, last.confidence());
+/// The first `count` of every `each` trials.
+std::vector<Recording> first_of_each(std::span<const Recording> trials, std::size_t each,
+                                     std::size_t count) {
+  std::vector<Recording> first;
+  for (std::size_t i = 0; i < trials.size(); ++i) {
+    if (i % each < count) {
+      first.push_back(trials[i]);
     }
-    point.seconds_unknown = median(seconds_unknown);
-    point.accuracy /= static_cast<double>(run.records.size());
-    point.calibration_error = calibration_of(run).expected_error;
   }
-};
+  return first;
+}
 
 /// Puts errors from windows in the place of those of the full posterior, which they are held
 /// against. `full` are of the first trials of every letter, as many of each.
@@ -117,30 +120,19 @@ Deviation deviation_of(const ErrorStatistics& errors) {
 SweepPoint measure_histogram(Device& device, const std::vector<Hypothesis>& letters,
                              std::span<const Recording> trials, int full_each,
                              const PoseLattice& lattice) {
-  SweepPoint point{.filter = "histogram",
-                   .cell_mm = letters.front().map.cell_mm,
-                   .count = lattice.bins(),
-                   .bins = {lattice.x_mm.count, lattice.y_mm.count, lattice.theta_rad.count}};
   const RecognitionTask task(letters, HistogramOptions{.lattice = lattice});
-  Recogniser recogniser(device, task);
-  point.path = fmt::format("{}", fmt::join(recogniser.histogram()->paths(), "; "));
-  const std::size_t each = trials.size() / letters.size();
-  TimedTrials full;
+  const FilterRun run = run_filter(
+      device, task,
+      first_of_each(trials, trials.size() / letters.size(), static_cast<std::size_t>(full_each)));
+  SweepPoint point = point_of(run, letters.front().map.cell_mm);
+  point.bins = {lattice.x_mm.count, lattice.y_mm.count, lattice.theta_rad.count};
   std::vector<double> seconds_refine;
-  for (std::size_t i = 0; i < trials.size(); ++i) {
-    if (i % each < static_cast<std::size_t>(full_each)) {
-      const Unknown trial = unknown_of(trials[i]);
-      RecognitionStep& last = full.add(recogniser, task, trial);
-      std::optional<RefinedPose> refined;
-      seconds_refine.push_back(seconds_of([&] { refined = recogniser.refine(last.mode); }));
-      add_refined(*refined, trial.truth, task, last);
-    }
+  for (const RecognitionRecord& record : run.records) {
+    seconds_refine.push_back(record.last().refine_seconds);
   }
-  full.fill(point);
   point.seconds_refine = median(seconds_refine);
-  point.device_bytes = recogniser.device_bytes();
-  if (full.run.records.size() < trials.size()) {
-    look_into_windows(point, device, letters, trials, lattice, full.run.records);
+  if (run.records.size() < trials.size()) {
+    look_into_windows(point, device, letters, trials, lattice, run.records);
   }
   double nearest_mm = 0.0;
   for (const Recording& trial : trials) {
@@ -148,32 +140,21 @@ SweepPoint measure_histogram(Device& device, const std::vector<Hypothesis>& lett
   }
   point.nearest_bin_mm = nearest_mm / static_cast<double>(trials.size());
   const Touch touch = trials.front().touch(0);
-  recogniser.reset();
-  recogniser.update(std::span(&touch, 1));
+  PoseHistogram histogram(device, letters, {.lattice = lattice});
+  histogram.update(touch);
   const ContactLikelihood model{.prior = letters.front().map.prior};
-  point.deviation = deviation_of(likelihood_errors(
-      letters, model, lattice, std::span(&touch, 1), sampled_bins,
-      [&](int object) { return recogniser.histogram()->log_likelihood(object); }));
+  point.deviation =
+      deviation_of(likelihood_errors(letters, model, lattice, std::span(&touch, 1), sampled_bins,
+                                     [&](int object) { return histogram.log_likelihood(object); }));
   return point;
 }
 
 SweepPoint measure_particles(Device& device, const std::vector<Hypothesis>& letters,
-                             std::span<const Recording> trials, const ParticleOptions& options) {
-  RecognitionTask task(letters, options);
-  auto& particles = std::get<ParticleOptions>(task.filter);
-  SweepPoint point{.filter = filter_name(task.filter),
-                   .cell_mm = letters.front().map.cell_mm,
-                   .count = particles.particles,
-                   .path = "particles"};
-  TimedTrials results;
-  for (const Recording& trial : trials) {
-    Recogniser recogniser(device, task);  // reset() would draw the same particles again
-    ++particles.seed;
-    results.add(recogniser, task, unknown_of(trial));
-    point.device_bytes = std::max(point.device_bytes, recogniser.device_bytes());
-  }
-  results.fill(point);
-  point.deviation = weight_deviation(device, letters, trials.front().touch(0), particles);
+                             std::span<const Recording> trials, ParticleOptions options) {
+  SweepPoint point =
+      point_of(run_filter(device, {letters, options}, trials), letters.front().map.cell_mm);
+  options.seed += trials.size();
+  point.deviation = weight_deviation(device, letters, trials.front().touch(0), options);
   return point;
 }
 

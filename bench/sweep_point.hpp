@@ -69,6 +69,6 @@ SweepPoint measure_histogram(Device& device, const std::vector<Hypothesis>& lett
 /// All trials by the particle filter or Augmented MCL; trial i has the seed options.seed + i. The
 /// deviation is that of the weights after one touch, which nothing has resampled yet.
 SweepPoint measure_particles(Device& device, const std::vector<Hypothesis>& letters,
-                             std::span<const Recording> trials, const ParticleOptions& options);
+                             std::span<const Recording> trials, ParticleOptions options);
 
 }  // namespace palpate::bench

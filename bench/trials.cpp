@@ -15,8 +15,6 @@ namespace {
 
 constexpr std::uint64_t seeds_per_shape = 1'000'000;  ///< more trials begin with the same ones
 
-int symmetry_of(const std::string& letter) { return letter == "I" ? 2 : letter == "O" ? 0 : 1; }
-
 /// 0 to n - 1 in a random order (Fisher and Yates).
 std::vector<std::size_t> random_order(std::size_t n, std::uint64_t seed) {
   std::vector<std::size_t> order(n);
@@ -51,15 +49,6 @@ Recording trial_of(const Recording& test_set, int touches, std::uint64_t seed,
 }
 
 }  // namespace
-
-std::vector<Hypothesis> learn_letters(Device& device, const MapOptions& options,
-                                      const std::vector<Recording>& training) {
-  std::vector<Hypothesis> letters = letter_maps(device, training, options);
-  for (Hypothesis& letter : letters) {
-    letter.map.symmetry = symmetry_of(letter.map.label);
-  }
-  return letters;
-}
 
 std::vector<Recording> make_trials(std::span<const std::string> shapes, int trials_each,
                                    int touches, std::uint64_t seed, const TrialTouches& how) {

@@ -6,21 +6,9 @@
 #include <vector>
 
 #include "letters.hpp"
-#include "palpate/device.hpp"
-#include "palpate/estimate.hpp"
-#include "palpate/map_builder.hpp"
 #include "palpate/touch.hpp"
 
 namespace palpate::bench {
-
-/// The objects of Sec. IV.
-inline const std::vector<std::string> vowels = {"A", "E", "I", "O", "U"};
-
-/// Maps of the letters A, E, I, O and U as letter_maps() builds them, with the symmetries of Eq.
-/// 18-20: 2 for I, 0 (full) for O, 1 for the others.
-std::vector<Hypothesis> learn_letters(
-    Device& device, const MapOptions& options,
-    const std::vector<Recording>& training = training_recordings());
 
 /// Standard deviations of the pose that the robot reports for the array about the true one.
 struct SensorPoseNoise {

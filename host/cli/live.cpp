@@ -42,8 +42,8 @@ struct Options {
   std::string json;
 };
 
-/// What is wrong with the poses, said at once: on standard error, or on the screen where that would
-/// be drawn over.
+/// Tells what is wrong with the poses as it happens: on standard error, or on the screen where the
+/// screen would overwrite standard error.
 class PoseComplaints {
  public:
   void add(const std::string& problem) {
@@ -53,7 +53,7 @@ class PoseComplaints {
       fmt::print(stderr, "palpate: {}\n", problem);
     }
   }
-  /// There is a screen from here on.
+  /// Whether there is a screen from now on.
   void show(bool on_screen) {
     const std::lock_guard lock(mutex_);
     on_screen_ = on_screen;
@@ -69,7 +69,7 @@ class PoseComplaints {
   bool on_screen_ = false;
 };
 
-/// The sensor with its poses. `posed` is left as it is where they are the sensor's own.
+/// The sensor with its poses. `posed` stays as it is where the sensor knows its poses.
 std::unique_ptr<Sensor> open_posed_sensor(const Options& options, PoseComplaints& complaints,
                                           const PosedSensor*& posed) {
   if (options.poses.empty() && !is_virtual_sensor(options.sensor)) {
@@ -89,10 +89,11 @@ std::unique_ptr<Sensor> open_posed_sensor(const Options& options, PoseComplaints
   return with_poses;
 }
 
-/// A first touch pages memory in, and may compile; a real one should not have to wait for that.
+/// Uses the recogniser once and forgets: the first touch pages memory in and may compile shaders,
+/// for which no real touch should wait.
 void warm_up(Recogniser& recogniser, const RecognitionTask& task, const SensorDescription& sensor,
              const std::vector<glm::dvec2>& elements_mm) {
-  // In Contact and No Contact by turns: what is Unknown would be passed over.
+  // In Contact and No Contact by turns, since Unknown elements are skipped.
   std::vector<double> pressure(elements_mm.size(), 0.0);
   for (std::size_t i = 0; i < pressure.size(); i += 2) {
     pressure[i] = 2.0 * task.classifier().threshold + 1.0;
@@ -138,7 +139,8 @@ void live(const Options& options) {
     json.emplace(options.json);
   }
 
-  // A reader of our output that ends is an error like a full disk, and no end without a word.
+  // Where the reader of our output ends, writing fails with an error as on a full disk; SIGPIPE
+  // would end the program silently.
   std::signal(SIGPIPE, SIG_IGN);
   const Interruption interruption;
   const bool to_program = options.json == "-";
@@ -190,29 +192,31 @@ void live(const Options& options) {
 }  // namespace
 
 void add_live(CLI::App& app) {
-  auto* command = app.add_subcommand("live",
-                                     "Recognise and locate what a sensor touches, touch by touch, "
-                                     "until Ctrl-C. On a terminal: the "
-                                     "pressure, the identity, the object's map with the array on "
-                                     "it; key r begins the next unknown. "
-                                     "Poses are T_object_robot");
+  auto* command = app.add_subcommand(
+      "live",
+      "Recognise what a sensor touches and find its pose T_object_robot, touch by touch, until "
+      "Ctrl-C. A terminal shows the pressure, the identity and the array on the object's map; key "
+      "r "
+      "begins the next unknown object");
   const auto options = std::make_shared<Options>();
   command->add_option("--sensor", options->sensor, sensor_help)->required();
   command->add_option(
       "--poses", options->poses,
-      std::string(poses_help) + " [default: the frames' own, in replays and simulations]");
+      std::string(poses_help) + " [default: the poses of the replay or simulation]");
   add_recognition_flags(*command, options->recognition);
   add_detector_flags(*command, options->detector);
   command
-      ->add_option("--tare", options->tare_s,
-                   "The array's baseline is read from the first seconds, when nothing touches it, "
-                   "unless the sensor knows it; 0: none")
+      ->add_option(
+          "--tare", options->tare_s,
+          "Seconds at the start in which nothing may touch the array and its baseline is read, "
+          "unless the sensor knows the baseline; 0: no baseline")
       ->capture_default_str();
-  command->add_option("--reset-after", options->reset_after_s,
-                      "The first touch after so many seconds without contact is of another unknown "
-                      "[default: never]");
+  command->add_option(
+      "--reset-after", options->reset_after_s,
+      "Seconds without contact after which the next touch is of another unknown object "
+      "[default: never]");
   command->add_option("--json", options->json,
-                      "Write a line of JSON for each touch, at once; - is standard output");
+                      "Write a line of JSON for each touch as it comes; - is standard output");
   command->callback([options] { live(*options); });
 }
 

@@ -89,8 +89,8 @@ void LiveScreen::describe(const LiveState& state) {
   }
   view_.identity = step.identity;
   view_.map = &task_.hypotheses[step.mode.object].map;
-  view_.T_object_robot = step.refined ? step.refined->T_object_robot : step.mode.T_object_robot;
-  if (const auto error_mm = step.refined ? step.refined_error_mm : step.error_mm) {
+  view_.T_object_robot = step.pose();
+  if (const auto error_mm = step.pose_error_mm()) {
     view_.state += fmt::format("; error {:.2f} mm", *error_mm);
   }
   view_.latency_ms = state.last->latency_ms;

@@ -15,7 +15,7 @@ class App;
 
 namespace palpate::cli {
 
-/// The flags that say what is known and how it is recognised, as given.
+/// The flags of a task, as given.
 struct RecognitionFlags {
   std::vector<std::string> maps;
   std::string scene;
@@ -43,8 +43,8 @@ void add_recognition_flags(CLI::App& command, RecognitionFlags& flags);
 /// The scene file that the flags name, or an empty scene. Throws Error.
 Scene scene_of(const RecognitionFlags& flags);
 
-/// Puts the scene's array, where it has one, in the place of the source's own. Throws Error where
-/// it has not as many elements.
+/// Replaces the source's array by the scene's, where the scene has an array. Throws Error where the
+/// two differ in their number of elements.
 void replace_array(const Scene& scene, const std::string& scene_file, const std::string& source,
                    std::size_t elements, std::vector<glm::dvec2>& elements_mm);
 
@@ -57,11 +57,11 @@ RecognitionTask task_of(const RecognitionFlags& flags, const Scene& scene,
 /// Opens the device that the flags or the scene name. Throws Error.
 Device open_device(const RecognitionFlags& flags, const Scene& scene);
 
-/// Makes the task's filter and, with --bins auto, counts its bins; where the device allows fewer
-/// than the maps are worth, standard error says so. Throws Error.
+/// Makes the task's filter, after --bins auto has chosen its bins. Says on standard error where the
+/// device's memory made bins wider than the maps resolve. Throws Error.
 Recogniser open_recogniser(Device& device, RecognitionTask& task);
 
-/// Adds the scene file and its array's, and the maps.
+/// Adds the files that the task was read from: the scene, its array and the maps.
 void add_recognition_files(const RecognitionFlags& flags, const Scene& scene,
                            const RecognitionTask& task, CommandFiles& files);
 

@@ -41,7 +41,7 @@ std::filesystem::path png_path(const Options& options, const Unknown& unknown) {
          (unknown.frame ? fmt::format("{}.{}.png", stem, *unknown.frame) : stem + ".png");
 }
 
-/// Throws Error where a result could not be kept: before the work, not after.
+/// Throws Error where an output cannot be written, before any work is done.
 void check_outputs(const Options& options, const Scene& scene, const RecognitionTask& task,
                    const std::vector<Unknown>& unknowns) {
   if (!options.posterior.empty()) {
@@ -51,19 +51,22 @@ void check_outputs(const Options& options, const Scene& scene, const Recognition
                                             options.posterior));
     }
     if (unknowns.size() != 1) {
-      throw Error(Fault::input, fmt::format("--posterior {}: holds one unknown, not {}; select one "
-                                            "recording or frame",
-                                            options.posterior, unknowns.size()));
+      throw Error(Fault::input,
+                  fmt::format("--posterior {}: the file holds one unknown, not {}; select "
+                              "one recording or frame",
+                              options.posterior, unknowns.size()));
     }
   }
   if (!options.png.empty()) {
     std::set<std::filesystem::path> pictures;
     for (const Unknown& unknown : unknowns) {
       if (!pictures.insert(png_path(options, unknown)).second) {
-        throw Error(Fault::input,
-                    fmt::format("{}: another recording has the same name, and so would its "
-                                "picture; rename one",
-                                unknown.recording));
+        throw Error(
+            Fault::input,
+            fmt::format(
+                "{}: its picture would overwrite the picture of another recording of the same "
+                "name; rename one of them",
+                unknown.recording));
       }
     }
   }
@@ -96,8 +99,7 @@ void check_outputs(const Options& options, const Scene& scene, const Recognition
   }
 }
 
-/// Edge at which an element is drawn: as a DigiTacts's, or where others lie closer, as their pitch
-/// allows.
+/// Edge of the squares that stand for elements, mm: 90 % of the pitch, at most 1.8 mm.
 double element_edge_mm(const Touch& touch) {
   const glm::dvec2& first = touch.elements_mm.front();
   double nearest = 2.0;
@@ -122,7 +124,7 @@ std::string draw_sheet(const RecognitionRecord& record, const Unknown& unknown,
     sheet.error_mm = last.error_mm;
   }
   sheet.lattice = task.lattice();
-  sheet.belief_xy = recogniser.marginal_xy(last.mode.object);
+  sheet.belief_xy = recogniser.marginals(last.mode.object).xy;
   sheet.labels = task.labels;
   for (const Touch& touch : unknown.touches) {
     auto& footprint = sheet.footprints_mm.emplace_back();
@@ -146,7 +148,7 @@ Posterior export_posterior(const RecognitionTask& task, const PoseHistogram& his
   return posterior;
 }
 
-/// Writes posterior and JSON, both or none.
+/// Writes posterior and JSON; where one of them cannot be written, neither appears.
 void write_results(const Options& options, const RecognitionTask& task,
                    const Recogniser& recogniser, const std::string& json) {
   std::optional<AtomicFile> json_file;
@@ -177,7 +179,7 @@ void recognize(const Options& options) {
     make_folder(options.png);
   }
 
-  // The sheet shows the identity over the touches, so it needs the trace too.
+  // The picture shows the identity after every touch, so it needs the trace.
   const bool trace = options.trace || !options.png.empty();
   std::vector<RecognitionRecord> records;
   auto json = nlohmann::ordered_json::array();
@@ -202,7 +204,7 @@ void recognize(const Options& options) {
   // The path of a recording need not be UTF-8, as JSON must.
   const std::string json_text =
       json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
-  // The files before anything is printed: nobody may be listening any more.
+  // Files come first: printing fails where the reader of standard output has ended.
   write_results(options, task, recogniser, json_text);
   if (options.json == "-") {
     fmt::print("{}", json_text);
@@ -222,10 +224,10 @@ void recognize(const Options& options) {
 }  // namespace
 
 void add_recognize(CLI::App& app) {
-  auto* command = app.add_subcommand("recognize",
-                                     "Recognise and locate the object of each recording among "
-                                     "known maps. Poses are T_object_robot, "
-                                     "p_object = R(theta) p_robot + (x, y)");
+  auto* command = app.add_subcommand(
+      "recognize",
+      "Recognise the object of each recording among known maps and find its pose "
+      "T_object_robot: p_object = R(theta) p_robot + (x, y)");
   const auto options = std::make_shared<Options>();
   command
       ->add_option("RECORDING", options->unknowns.recordings,
@@ -233,18 +235,21 @@ void add_recognize(CLI::App& app) {
       ->required();
   add_recognition_flags(*command, options->recognition);
   command->add_option("--frames", options->unknowns.frames,
-                      "Use the touches A:B, from A up to before B, of every recording");
+                      "Use the touches A to B - 1 of every recording, counted from 0, as A:B");
   command
-      ->add_option("--touches", options->unknowns.touches, "Use the first N touches [default: all]")
+      ->add_option("--touches", options->unknowns.touches,
+                   "Use the first N touches of every recording [default: all]")
       ->check(require_whole_number);
   command->add_flag("--each-frame", options->unknowns.each_frame,
-                    "Take every touch for an unknown object of its own");
+                    "Recognise every touch by itself, as an unknown object of its own");
   command->add_flag("--trace", options->trace, "Show the estimate after every touch");
   command->add_option("--json", options->json, "Write the records as JSON; - is standard output");
   command->add_option("--posterior", options->posterior,
-                      "Write the log-likelihood of every bin of one recording (HDF5)");
-  command->add_option("--png", options->png,
-                      "Folder for a sheet per unknown: footprints, belief, identities");
+                      "Write the log-likelihood of every bin (HDF5); for one recording or frame");
+  command->add_option(
+      "--png", options->png,
+      "Folder for a picture of each unknown: the touches on the map, the belief over x and y, "
+      "the identity after every touch");
   command->callback([options] { recognize(*options); });
 }
 

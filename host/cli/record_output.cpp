@@ -30,11 +30,7 @@ nlohmann::ordered_json to_json(std::optional<double> error_mm) {
   return error_mm ? nlohmann::ordered_json(*error_mm) : nullptr;
 }
 
-std::string error_text(std::optional<double> error_mm) {
-  return error_mm ? fmt::format("{:.2f}", *error_mm) : "-";
-}
-
-/// What each label was taken for, most often first; only labels that were not always right.
+/// Prints what the labels that were not always right were taken for, most often first.
 void print_confusions(const std::vector<RecognitionRecord>& records, const RecognitionTask& task) {
   struct Row {
     int all = 0;
@@ -72,6 +68,10 @@ void print_confusions(const std::vector<RecognitionRecord>& records, const Recog
 }
 
 }  // namespace
+
+std::string error_text(std::optional<double> error_mm) {
+  return error_mm ? fmt::format("{:.2f}", *error_mm) : "-";
+}
 
 std::string filter_words(const Recogniser& recogniser, const RecognitionTask& task) {
   if (const auto* particles = std::get_if<ParticleOptions>(&task.filter)) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -9,7 +10,9 @@
 
 namespace palpate::cli {
 
-/// What is evaluated, where and how, in a few words.
+/// A pose error in mm for tables, "-" where there is none.
+std::string error_text(std::optional<double> error_mm);
+/// The filter's size and options in a few words.
 std::string filter_words(const Recogniser& recogniser, const RecognitionTask& task);
 
 /// One step in the form that other programs rely on.
@@ -21,10 +24,10 @@ nlohmann::ordered_json to_json(const RecognitionRecord& record, const Recognitio
 /// "A.h5", or "A.h5 frame 3".
 std::string name_of(const RecognitionRecord& record);
 
-/// The trace touch by touch, for people.
+/// Prints the trace, a line per touch.
 void print_trace(const RecognitionRecord& record, const RecognitionTask& task);
-/// The table of all unknowns; with known truths also how many are right, the pose error and what
-/// was taken for what.
+/// Prints a line per unknown and, where truths are known, how many are right, the mean pose errors
+/// and what each wrongly recognised label was taken for.
 void print_table(const std::vector<RecognitionRecord>& records, const RecognitionTask& task);
 
 }  // namespace palpate::cli

@@ -72,16 +72,17 @@ std::vector<Hypothesis> read_maps(const std::vector<Scene::Object>& objects) {
     if (!seen.insert(identity_of(object.map)).second) {
       throw Error(
           Fault::input,
-          fmt::format("{}: the same map is given twice; leave one out, or give the object a "
-                      "weight in a scene file",
+          fmt::format("{}: the map is given twice; leave one out, or give the object a weight "
+                      "in a scene file",
                       object.map.string()));
     }
     map.label = object.label.value_or(map.label);
     if (map.label == none_label) {
-      throw Error(Fault::input,
-                  fmt::format("{}: label {} is kept for objects that were never learned; label the "
-                              "map otherwise in the scene file",
-                              object.map.string(), none_label));
+      throw Error(
+          Fault::input,
+          fmt::format("{}: label {} stands for objects that were never learned; give the map "
+                      "another label in the scene file",
+                      object.map.string(), none_label));
     }
     map.symmetry = object.symmetry.value_or(map.symmetry);
     hypotheses.push_back({std::move(map), object.weight});
@@ -89,7 +90,7 @@ std::vector<Hypothesis> read_maps(const std::vector<Scene::Object>& objects) {
   return hypotheses;
 }
 
-/// Maps recognised together share one prior: unequal ones favour the emptier or fuller map.
+/// The prior that all maps share: unequal priors would favour the emptier or the fuller map.
 double common_prior(const std::vector<Scene::Object>& objects,
                     const std::vector<Hypothesis>& hypotheses, std::optional<double> given) {
   if (given) {
@@ -152,8 +153,8 @@ PoseLattice make_lattice(const RecognitionFlags& flags, const Scene& scene) {
   return lattice.collapse_fixed();
 }
 
-/// Whether the particle filter is asked for. Throws Error on a filter that there is not, and on
-/// flags that the other one would leave without effect.
+/// Whether the particle filter is asked for. Throws Error on a filter that does not exist and on
+/// flags that only the other filter reads.
 bool wants_particles(const RecognitionFlags& flags, const Scene& scene) {
   const std::string filter = !flags.filter.empty() ? flags.filter : scene.filter.value_or("auto");
   if (filter == "bounded") {
@@ -183,7 +184,7 @@ bool wants_particles(const RecognitionFlags& flags, const Scene& scene) {
   return particles;
 }
 
-/// What the histogram's options and the flags say to the particle filter.
+/// The particle filter's options: those that it shares with the histogram, and its flags.
 ParticleOptions particle_options(const RecognitionFlags& flags, const HistogramOptions& histogram) {
   ParticleOptions particles{.region = histogram.lattice,
                             .classifier = histogram.classifier,
@@ -267,10 +268,11 @@ Device open_device(const RecognitionFlags& flags, const Scene& scene) {
 
 Recogniser open_recogniser(Device& device, RecognitionTask& task) {
   if (const std::optional<CoarsenedBins> bins = settle_bins(device, task)) {
-    fmt::print(stderr,
-               "palpate: --bins auto: steps of {:.2f} mm, coarser than the maps are worth, to keep "
-               "to {} bins in all; narrow the region, or give --bins\n",
-               bins->step_mm, bins->most_bins);
+    fmt::print(
+        stderr,
+        "palpate: --bins auto: steps of {:.2f} mm, wider than the maps resolve, keep to {} bins "
+        "in all; narrow the region, or give --bins\n",
+        bins->step_mm, bins->most_bins);
   }
   return {device, task};
 }

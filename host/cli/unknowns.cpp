@@ -20,8 +20,9 @@ std::vector<Unknown> list_unknowns(const UnknownsFlags& flags,
     throw Error(Fault::input, fmt::format("--touches {}: give at least 1", *flags.touches));
   }
   if (flags.touches && flags.each_frame) {
-    throw Error(Fault::input,
-                "--touches: with --each-frame every unknown has one touch; leave one of them out");
+    throw Error(
+        Fault::input,
+        "--touches: with --each-frame every unknown has one touch; leave out one of the two flags");
   }
   std::vector<Unknown> unknowns;
   for (const Recording& recording : recordings) {

@@ -19,11 +19,10 @@ struct UnknownsFlags {
 
 struct Unknowns {
   std::vector<Recording> recordings;
-  std::vector<Unknown> list;  ///< views into `recordings`; moving them along is safe
+  std::vector<Unknown> list;  ///< views into the recordings' memory, which a move keeps
 };
 
-/// Reads the recordings, with the scene's array in the place of their own where it has one.
-/// Throws Error.
+/// Reads the recordings and selects their touches; see replace_array(). Throws Error.
 Unknowns read_unknowns(const UnknownsFlags& flags, const Scene& scene,
                        const std::string& scene_file);
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 namespace palpate {
 
@@ -16,9 +17,9 @@ std::variant<PoseHistogram, ParticleFilter> make_filter(Device& device,
 }
 
 /// The bin that a value falls into, the nearest one where it lies beyond all.
-int bin_of(const Axis& axis, double value) {
+std::size_t bin_of(const Axis& axis, double value) {
   const double bin = axis.count > 1 ? std::floor((value - axis.lower) / axis.step()) : 0.0;
-  return static_cast<int>(std::clamp(bin, 0.0, axis.count - 1.0));
+  return static_cast<std::size_t>(std::clamp(bin, 0.0, axis.count - 1.0));
 }
 
 }  // namespace
@@ -64,19 +65,25 @@ std::optional<double> Recogniser::effective_sample_size() const {
   return particles != nullptr ? std::optional(particles->effective_sample_size()) : std::nullopt;
 }
 
-std::vector<double> Recogniser::marginal_xy(int object) const {
+Marginals Recogniser::marginals(int object) const {
   if (histogram() != nullptr) {
-    return histogram()->marginals(object).xy;
+    return histogram()->marginals(object);
   }
-  std::vector<double> belief(static_cast<std::size_t>(lattice_.plane()));
+  const auto& [x_mm, y_mm, theta_rad, pivot_mm] = lattice_;
+  const double middle_rad = (theta_rad.lower + theta_rad.upper) / 2.0;
+  Marginals sums{.xy = std::vector<double>(static_cast<std::size_t>(lattice_.plane())),
+                 .theta = std::vector<double>(static_cast<std::size_t>(theta_rad.count))};
   for (const ParticleFilter::Particle& particle : std::get<ParticleFilter>(filter_).particles()) {
     if (particle.object == object) {
-      const glm::dvec2 at = particle.T_object_robot * lattice_.pivot_mm;
-      const auto row = static_cast<std::size_t>(bin_of(lattice_.y_mm, at.y));
-      belief[row * lattice_.x_mm.count + bin_of(lattice_.x_mm, at.x)] += particle.weight;
+      const Pose& T_object_robot = particle.T_object_robot;
+      const glm::dvec2 at = T_object_robot * pivot_mm;
+      const double turn_rad =
+          wrap_angle(T_object_robot.theta_rad - middle_rad, 2.0 * std::numbers::pi);
+      sums.xy[bin_of(y_mm, at.y) * x_mm.count + bin_of(x_mm, at.x)] += particle.weight;
+      sums.theta[bin_of(theta_rad, middle_rad + turn_rad)] += particle.weight;
     }
   }
-  return belief;
+  return sums;
 }
 
 std::uint64_t Recogniser::device_bytes() const {

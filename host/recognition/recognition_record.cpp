@@ -4,42 +4,28 @@
 #include <chrono>
 
 #include "palpate/error.hpp"
+#include "palpate/pose_error.hpp"
 
 namespace palpate {
 
 namespace {
 
-/// Pose error of a hypothesis, where the truth is known and it is the true object.
+/// Pose error (Eq. 17-20) of a hypothesis that has the true label, where the true pose is known.
 std::optional<double> error_mm(const RecognitionTask& task, int object, const Pose& T_object_robot,
                                const GroundTruth& truth) {
   const OccupancyGrid& map = task.hypotheses[object].map;
-  const std::optional<Body>& body = task.bodies[object];
-  if (!truth.T_object_robot || map.label != truth.label || !body) {
+  const bool has_body =
+      std::any_of(map.log_odds.begin(), map.log_odds.end(), [](float l) { return l > 0.0F; });
+  if (!truth.T_object_robot || map.label != truth.label || !has_body) {
     return {};
   }
-  return pose_error_mm(*body, map.symmetry, T_object_robot, *truth.T_object_robot);
+  return pose_error_mm(body_of(map), map.symmetry, T_object_robot, *truth.T_object_robot);
 }
 
-std::vector<RecognitionStep> steps_of(Recogniser& recogniser, const RecognitionTask& task,
-                                      const Unknown& unknown, bool trace,
-                                      const std::function<void(double)>& progress) {
-  const std::span<const Touch> touches = unknown.touches;
-  const std::size_t between = trace ? 1 : touches.size();
-  std::size_t done = 0;
-  std::function<void(double)> show;
-  if (progress) {
-    show = [&](double fraction) {
-      progress((static_cast<double>(done) + fraction * static_cast<double>(between)) /
-               static_cast<double>(touches.size()));
-    };
-  }
-  std::vector<RecognitionStep> steps;
-  recogniser.reset();
-  for (; done < touches.size(); done += between) {
-    recogniser.update(touches.subspan(done, between), show);
-    steps.push_back(judge(recogniser, unknown.truth, task));
-  }
-  return steps;
+using Clock = std::chrono::steady_clock;
+
+double seconds_since(Clock::time_point start) {
+  return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
 }  // namespace
@@ -94,17 +80,20 @@ RecognitionStep judge(const Estimate& estimate, const GroundTruth& truth,
   return step;
 }
 
-void add_refined(const RefinedPose& refined, const GroundTruth& truth, const RecognitionTask& task,
-                 RecognitionStep& step) {
-  step.refined = refined;
-  step.refined_error_mm = error_mm(task, step.mode.object, refined.T_object_robot, truth);
-}
-
-RecognitionStep judge(const Recogniser& recogniser, const GroundTruth& truth,
-                      const RecognitionTask& task) {
-  RecognitionStep step = judge(recogniser.estimate(), truth, task);
-  if (const std::optional<RefinedPose> refined = recogniser.refine(step.mode)) {
-    add_refined(*refined, truth, task, step);
+RecognitionStep take_step(Recogniser& recogniser, const RecognitionTask& task,
+                          std::span<const Touch> touches, const GroundTruth& truth,
+                          const std::function<void(double)>& progress) {
+  const Clock::time_point start = Clock::now();
+  recogniser.update(touches, progress);
+  const Estimate estimate = recogniser.estimate();
+  const double seconds = seconds_since(start);
+  RecognitionStep step = judge(estimate, truth, task);
+  step.seconds = seconds;
+  const Clock::time_point estimated = Clock::now();
+  step.refined = recogniser.refine(step.mode);
+  step.refine_seconds = seconds_since(estimated);
+  if (step.refined) {
+    step.refined_error_mm = error_mm(task, step.mode.object, step.refined->T_object_robot, truth);
   }
   step.effective_sample_size = recogniser.effective_sample_size();
   return step;
@@ -125,16 +114,28 @@ RecognitionRecord recognise(Recogniser& recogniser, const RecognitionTask& task,
   if (!record.error.empty()) {
     return record;
   }
-  const auto start = std::chrono::steady_clock::now();
+  const Clock::time_point start = Clock::now();
+  const std::span<const Touch> touches = unknown.touches;
+  const std::size_t together = trace ? 1 : touches.size();
   try {
-    record.trace = steps_of(recogniser, task, unknown, trace, progress);
+    recogniser.reset();
+    for (std::size_t done = 0; done < touches.size(); done += together) {
+      const auto show = [&](double fraction) {
+        progress((static_cast<double>(done) + fraction * static_cast<double>(together)) /
+                 static_cast<double>(touches.size()));
+      };
+      record.trace.push_back(
+          take_step(recogniser, task, touches.subspan(done, together), unknown.truth,
+                    progress ? std::function<void(double)>(show) : std::function<void(double)>()));
+    }
   } catch (const Error& error) {
     if (error.fault() != Fault::input) {
       throw;
     }
+    record.trace.clear();
     record.error = error.what();
   }
-  record.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  record.seconds = seconds_since(start);
   return record;
 }
 

@@ -7,17 +7,6 @@
 
 namespace palpate {
 
-namespace {
-
-std::optional<Body> body_if_any(const OccupancyGrid& map) {
-  // A map that is not sound is for the filter to refuse.
-  const bool has_body = !fault_of(map) && std::any_of(map.log_odds.begin(), map.log_odds.end(),
-                                                      [](float l) { return l > 0.0F; });
-  return has_body ? std::optional(body_of(map)) : std::nullopt;
-}
-
-}  // namespace
-
 RecognitionTask::RecognitionTask(std::vector<Hypothesis> objects, FilterOptions options)
     : hypotheses(std::move(objects)), filter(std::move(options)) {
   for (const Hypothesis& hypothesis : hypotheses) {
@@ -27,7 +16,6 @@ RecognitionTask::RecognitionTask(std::vector<Hypothesis> objects, FilterOptions 
     if (known == labels.end()) {
       labels.push_back(label);
     }
-    bodies.push_back(body_if_any(hypothesis.map));
   }
   if (std::visit([](const auto& one) { return one.none_weight.has_value(); }, filter)) {
     labels.emplace_back(none_label);

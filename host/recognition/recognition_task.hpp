@@ -9,7 +9,6 @@
 
 #include "palpate/device.hpp"
 #include "palpate/particle_filter.hpp"
-#include "palpate/pose_error.hpp"
 #include "palpate/pose_histogram.hpp"
 
 namespace palpate {
@@ -17,12 +16,12 @@ namespace palpate {
 /// The filter that recognises, by its options.
 using FilterOptions = std::variant<HistogramOptions, ParticleOptions>;
 
-/// What unknowns are recognised among, and how. The constructor derives labels and bodies from the
-/// hypotheses; the filter's none_weight stays as it is from then on.
+/// The objects that an unknown may be, and the filter that tells which. The constructor derives the
+/// labels; neither the hypotheses nor the filter's none_weight may change afterwards.
 struct RecognitionTask {
   RecognitionTask(std::vector<Hypothesis> objects, FilterOptions options);
 
-  /// The histogram's lattice, or the region of the particles, whose bins count for pictures alone.
+  /// The histogram's lattice, or the particles' region, whose bins only marginals have.
   const PoseLattice& lattice() const;
   const ContactClassifier& classifier() const;
 
@@ -32,19 +31,18 @@ struct RecognitionTask {
   /// weight.
   std::vector<std::string> labels;
   std::vector<std::size_t> label_of;        ///< [hypothesis] index into labels
-  std::vector<std::optional<Body>> bodies;  ///< [hypothesis] none where no cell is occupied
-  std::vector<std::string> map_paths = {};  ///< [hypothesis] or empty: the files of the maps
-  bool auto_bins = false;                   ///< settle_bins() has yet to count the lattice's bins
+  std::vector<std::string> map_paths = {};  ///< [hypothesis] file of the map; empty without files
+  bool auto_bins = false;                   ///< settle_bins() is to choose the lattice's counts
 };
 
-/// Bins wider than the maps are worth.
+/// Bins that are wider than the maps resolve, since the device has no memory for more.
 struct CoarsenedBins {
   double step_mm = 0.0;        ///< along x and y
-  std::int64_t most_bins = 0;  ///< of all objects together, that the device holds
+  std::int64_t most_bins = 0;  ///< limit of all objects' bins together
 };
 
-/// Counts the lattice's bins where they are left to the maps and the device, by balanced_lattice().
-/// @returns the coarser bins that the device's memory made necessary, if any
+/// Chooses the lattice's counts by balanced_lattice() if the task leaves them to it (auto_bins).
+/// @returns the bins if they had to be coarsened
 /// @throws Error as balanced_lattice() does
 std::optional<CoarsenedBins> settle_bins(const Device& device, RecognitionTask& task);
 

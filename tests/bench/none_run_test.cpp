@@ -27,7 +27,7 @@ bool called_none(Device& device, const std::vector<Hypothesis>& letters, const R
 // What is worked out for every weight from one belief is what the library says at that weight.
 TEST(NoneRun, TurnsWhereTheHistogramDoes) {
   Device device = Device::open();
-  const std::vector<Hypothesis> letters = learn_letters(device, MapOptions{});
+  const std::vector<Hypothesis> letters = letter_maps(device, training_recordings(), MapOptions{});
   const std::vector<std::string> letter = {"E"};
   const std::vector<std::string> shape = {"ring"};
   const std::vector<Recording> known = make_trials(letter, 1, 4, 3);

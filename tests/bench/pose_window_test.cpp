@@ -69,7 +69,7 @@ TEST(PoseWindow, NearestBinIsTheNearestOfAll) {
 
 TEST(PoseWindow, GivesThePosesOfTheFullPosterior) {
   Device device = Device::open();
-  const std::vector<Hypothesis> letters = learn_letters(device, MapOptions{});
+  const std::vector<Hypothesis> letters = letter_maps(device, training_recordings(), MapOptions{});
   const PoseLattice fine = lattice_of(32, 32, 122);
   PoseHistogram histogram(device, letters, {.lattice = fine});
   // Without, with two-fold and with full symmetry.

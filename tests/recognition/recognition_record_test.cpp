@@ -122,7 +122,6 @@ TEST(Judge, HoldsNoneForRightWhereNoMapHasTheLabel) {
 TEST(Judge, ErrsAsTheReferenceSays) {
   std::vector<Hypothesis> two = shapes();
   const Pose found{{2.5, -1.0}, 1.9};
-  const Pose refined{{2.25, -0.5}, 2.1};
   const Pose truth{{-1.0, 3.0}, 5.2};
   for (const int symmetry : {0, 1, 2}) {
     for (Hypothesis& hypothesis : two) {
@@ -131,19 +130,46 @@ TEST(Judge, ErrsAsTheReferenceSays) {
     const RecognitionTask task(two, HistogramOptions{});
     for (const int object : {0, 1}) {
       const OccupancyGrid& map = two[object].map;
-      const GroundTruth known{.label = map.label, .T_object_robot = truth};
-      RecognitionStep step = judge(estimate_of({0.5, 0.5}, object, found), known, task);
-      add_refined({.T_object_robot = refined}, known, task, step);
+      const Estimate estimate = estimate_of({0.5, 0.5}, object, found);
+      const RecognitionStep step =
+          judge(estimate, {.label = map.label, .T_object_robot = truth}, task);
       ASSERT_TRUE(step.error_mm);
-      ASSERT_TRUE(step.refined_error_mm);
       // Sums over 2,000 cells of some 100 mm^2 each, in another order.
       EXPECT_NEAR(*step.error_mm, reference::pose_error_mm(map, found, truth), 1e-9);
-      EXPECT_NEAR(*step.refined_error_mm, reference::pose_error_mm(map, refined, truth), 1e-9);
-      EXPECT_FALSE(judge(estimate_of({0.5, 0.5}, 1 - object, found), known, task).error_mm);
-      EXPECT_FALSE(
-          judge(estimate_of({0.5, 0.5}, object, found), {.label = map.label}, task).error_mm);
+      EXPECT_FALSE(judge(estimate, {.label = map.label}, task).error_mm);
+      EXPECT_FALSE(judge(estimate, {.label = "ring", .T_object_robot = truth}, task).error_mm);
     }
   }
+}
+
+TEST(Judge, FindsNoErrorOfAnObjectWithoutABody) {
+  std::vector<Hypothesis> empty = shapes();
+  empty[0].map.log_odds.assign(empty[0].map.log_odds.size(), -1.0F);
+  const RecognitionTask task(empty, HistogramOptions{});
+  const RecognitionStep step =
+      judge(estimate_of({0.7, 0.3}, 0, {}), {.label = "L", .T_object_robot = Pose{}}, task);
+  EXPECT_EQ(step.right, true);
+  EXPECT_FALSE(step.error_mm);
+}
+
+TEST(TakeStep, JudgesTheRefinedPoseToo) {
+  Device device = Device::open();
+  const RecognitionTask task(shapes(), both_filters()[0]);
+  Recogniser recogniser(device, task);
+  const Recording letter = touched_letter(9);
+  const Unknown unknown = unknown_of(letter);
+  const RecognitionStep step = take_step(recogniser, task, unknown.touches, unknown.truth);
+  ASSERT_EQ(step.mode.object, 0);
+  const OccupancyGrid& map = task.hypotheses[0].map;
+  const Pose& truth = letter.truth->T_object_robot;
+  EXPECT_NEAR(*step.error_mm, reference::pose_error_mm(map, step.mode.T_object_robot, truth), 1e-9);
+  EXPECT_NEAR(*step.refined_error_mm,
+              reference::pose_error_mm(map, step.refined->T_object_robot, truth), 1e-9);
+  // Bins of 0.5 mm and 22.5 degrees; touches without noise.
+  EXPECT_LT(*step.refined_error_mm, 1.0);
+  EXPECT_EQ(step.pose_error_mm(), step.refined_error_mm);
+  EXPECT_GT(step.seconds, 0.0);
+  EXPECT_GT(step.refine_seconds, 0.0);
 }
 
 TEST(GroundTruth, IsTheTruthOrElseTheObjectThatIsNamed) {

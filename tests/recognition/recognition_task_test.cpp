@@ -18,16 +18,6 @@ TEST(RecognitionTask, NamesEachLabelOnceAndNoneLast) {
   EXPECT_EQ(with_none.labels, (std::vector<std::string>{"L", "disc", "(none)"}));
 }
 
-TEST(RecognitionTask, HasNoBodyForAMapWithoutOccupiedCells) {
-  std::vector<Hypothesis> two = shapes();
-  two[1].map.log_odds.assign(two[1].map.log_odds.size(), -1.0F);
-  const RecognitionTask task(two, HistogramOptions{});
-  EXPECT_TRUE(task.bodies[0]);
-  EXPECT_FALSE(task.bodies[1]);
-  two[1].map.nx = 1'000'000;  // more than it has log odds: for the filter to refuse
-  EXPECT_FALSE(RecognitionTask(two, HistogramOptions{}).bodies[1]);
-}
-
 TEST(SettleBins, CountsTheBinsOnceWhereTheyAreLeftToTheMaps) {
   const Device device = Device::open();
   for (const FilterOptions& filter : both_filters()) {
