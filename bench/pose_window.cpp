@@ -8,7 +8,6 @@
 #include <string>
 
 #include "palpate/error.hpp"
-#include "palpate/pose_histogram.hpp"
 
 namespace palpate::bench {
 
@@ -63,18 +62,13 @@ PoseLattice window_of(const PoseLattice& lattice, const PlacedBody& placed, cons
           .pivot_mm = lattice.pivot_mm};
 }
 
-/// Where a window's posterior of all touches has its mode.
-struct WindowMode {
-  Mode mode;
-  PoseHistogram histogram;
-};
-
-WindowMode mode_of(Device& device, const Hypothesis& object, std::span<const Touch> touches,
-                   const PoseLattice& window) {
-  PoseHistogram histogram(device, std::span(&object, 1), HistogramOptions{.lattice = window});
-  histogram.update(touches);
-  const Mode mode = histogram.estimate().mode;
-  return {mode, std::move(histogram)};
+RecognitionStep step_in(Device& device, const Hypothesis& letter, const Recording& trial,
+                        const PoseLattice& window) {
+  const RecognitionTask task({letter}, HistogramOptions{.lattice = window});
+  Recogniser recogniser(device, task);
+  const RecognitionRecord record = recognise(recogniser, task, unknown_of(trial), false);
+  record.require_steps();
+  return record.last();
 }
 
 }  // namespace
@@ -142,29 +136,20 @@ double nearest_bin_mm(const PoseLattice& lattice, const PlacedBody& placed) {
   return least_mm;
 }
 
-WindowEstimate estimate_in_window(Device& device, std::span<const Hypothesis> letters,
-                                  const Recording& trial, const PoseLattice& lattice) {
-  const Hypothesis& object = letter_of(letters, trial);
-  const PlacedBody truth = truth_of(object, trial);
-  const std::vector<Touch> touches = trial.touches(0, trial.size());
+RecognitionStep estimate_in_window(Device& device, std::span<const Hypothesis> letters,
+                                   const Recording& trial, const PoseLattice& lattice) {
+  const Hypothesis& letter = letter_of(letters, trial);
+  const PlacedBody truth = truth_of(letter, trial);
   std::optional<Mode> best;
   for (const PoseLattice& window : windows_about(lattice, truth, window_reach_mm)) {
-    const Mode mode = mode_of(device, object, touches, window).mode;
+    const Mode mode = step_in(device, letter, trial, window).mode;
     if (!best || mode.log_likelihood > best->log_likelihood) {
       best = mode;
     }
   }
   // About the mode, so that no edge of a window cuts off what the refined pose is made of.
   const PlacedBody found{.body = truth.body, .symmetry = 1, .T_object_robot = best->T_object_robot};
-  const PoseLattice window = windows_about(lattice, found, refined_reach_mm).front();
-  const auto [mode, histogram] = mode_of(device, object, touches, window);
-  WindowEstimate estimate{
-      .mode = mode.T_object_robot, .refined = histogram.refine(mode).T_object_robot, .errors = {}};
-  const auto error_mm = [&](const Pose& T_object_robot) {
-    return pose_error_mm(truth.body, truth.symmetry, T_object_robot, truth.T_object_robot);
-  };
-  estimate.errors = {.mode_mm = error_mm(estimate.mode), .refined_mm = error_mm(estimate.refined)};
-  return estimate;
+  return step_in(device, letter, trial, windows_about(lattice, found, refined_reach_mm).front());
 }
 
 }  // namespace palpate::bench

@@ -133,8 +133,9 @@ void sweep_cells(Device& device, const SweepPlan& plan, const CellPlan& cells,
       letter_maps(device, training_recordings(), MapOptions{.cell_mm = cells.cell_mm});
   const std::vector<Recording> trials = trials_of(plan.trials_each);
   for (const BinCounts& bins : cells.lattices) {
-    result.points.push_back(measure_histogram(
-        device, letters, trials, plan.full_each(cells.cell_mm, bins), lattice_with(bins)));
+    result.points.push_back(measure_histogram(device, letters, trials,
+                                              trials_of(plan.full_each(cells.cell_mm, bins)),
+                                              lattice_with(bins)));
     result.points.back().balanced = is_balanced(bins);
     print(result.points.back());
   }

@@ -87,7 +87,7 @@ Limit measure(Device& device, std::span<const Hypothesis> letters,
   Limit limit{
       .name = {}, .count = lattice.bins(), .elements = trials.front().elements(), .errors = {}};
   for (const Recording& trial : trials) {
-    limit.errors.push_back(estimate_in_window(device, letters, trial, lattice).errors);
+    limit.errors.push_back(errors_of(estimate_in_window(device, letters, trial, lattice)));
   }
   return limit;
 }

@@ -33,7 +33,7 @@ SweepPoint point_of(const FilterRun& run, double cell_mm) {
     }
     seconds_unknown.push_back(sum);
     const RecognitionStep& last = record.last();
-    point.errors.push_back({.mode_mm = last.error_mm, .refined_mm = last.refined_error_mm});
+    point.errors.push_back(errors_of(last));
     point.accuracy += *last.right ? 1.0 : 0.0;
     point.least_confidence = std::min(point.least_confidence, last.confidence());
   }
@@ -43,20 +43,8 @@ SweepPoint point_of(const FilterRun& run, double cell_mm) {
   return point;
 }
 
-/// The first `count` of every `each` trials.
-std::vector<Recording> first_of_each(std::span<const Recording> trials, std::size_t each,
-                                     std::size_t count) {
-  std::vector<Recording> first;
-  for (std::size_t i = 0; i < trials.size(); ++i) {
-    if (i % each < count) {
-      first.push_back(trials[i]);
-    }
-  }
-  return first;
-}
-
-/// Puts errors from windows in the place of those of the full posterior, which they are held
-/// against. `full` are of the first trials of every letter, as many of each.
+/// Replaces the point's errors by errors from windows of all trials, and compares the two. `full`
+/// are by the full posterior, of the first trials of every letter, equally many of each.
 void look_into_windows(SweepPoint& point, Device& device, std::span<const Hypothesis> letters,
                        std::span<const Recording> trials, const PoseLattice& lattice,
                        std::span<const RecognitionRecord> full) {
@@ -65,8 +53,8 @@ void look_into_windows(SweepPoint& point, Device& device, std::span<const Hypoth
   WindowCheck check;
   point.errors.clear();
   for (std::size_t i = 0; i < trials.size(); ++i) {
-    const WindowEstimate estimate = estimate_in_window(device, letters, trials[i], lattice);
-    point.errors.push_back(estimate.errors);
+    const RecognitionStep step = estimate_in_window(device, letters, trials[i], lattice);
+    point.errors.push_back(errors_of(step));
     if (i % each >= full_each) {
       continue;
     }
@@ -74,10 +62,11 @@ void look_into_windows(SweepPoint& point, Device& device, std::span<const Hypoth
     if (same.error_mm) {
       const Body body = body_of(letter_of(letters, trials[i]).map);
       ++check.trials;
-      check.mode_mm =
-          std::max(check.mode_mm, pose_error_mm(body, 1, estimate.mode, same.mode.T_object_robot));
+      check.mode_mm = std::max(check.mode_mm, pose_error_mm(body, 1, step.mode.T_object_robot,
+                                                            same.mode.T_object_robot));
       check.refined_mm = std::max(
-          check.refined_mm, pose_error_mm(body, 1, estimate.refined, same.refined->T_object_robot));
+          check.refined_mm,
+          pose_error_mm(body, 1, step.refined->T_object_robot, same.refined->T_object_robot));
     }
   }
   point.window = check;
@@ -118,12 +107,9 @@ Deviation deviation_of(const ErrorStatistics& errors) {
 }
 
 SweepPoint measure_histogram(Device& device, const std::vector<Hypothesis>& letters,
-                             std::span<const Recording> trials, int full_each,
+                             std::span<const Recording> trials, std::span<const Recording> full,
                              const PoseLattice& lattice) {
-  const RecognitionTask task(letters, HistogramOptions{.lattice = lattice});
-  const FilterRun run = run_filter(
-      device, task,
-      first_of_each(trials, trials.size() / letters.size(), static_cast<std::size_t>(full_each)));
+  const FilterRun run = run_filter(device, {letters, HistogramOptions{.lattice = lattice}}, full);
   SweepPoint point = point_of(run, letters.front().map.cell_mm);
   point.bins = {lattice.x_mm.count, lattice.y_mm.count, lattice.theta_rad.count};
   std::vector<double> seconds_refine;
@@ -131,7 +117,7 @@ SweepPoint measure_histogram(Device& device, const std::vector<Hypothesis>& lett
     seconds_refine.push_back(record.last().refine_seconds);
   }
   point.seconds_refine = median(seconds_refine);
-  if (run.records.size() < trials.size()) {
+  if (full.size() < trials.size()) {
     look_into_windows(point, device, letters, trials, lattice, run.records);
   }
   double nearest_mm = 0.0;
@@ -153,7 +139,7 @@ SweepPoint measure_particles(Device& device, const std::vector<Hypothesis>& lett
                              std::span<const Recording> trials, ParticleOptions options) {
   SweepPoint point =
       point_of(run_filter(device, {letters, options}, trials), letters.front().map.cell_mm);
-  options.seed += trials.size();
+  options.seed += trials.size();  // no trial's
   point.deviation = weight_deviation(device, letters, trials.front().touch(0), options);
   return point;
 }

@@ -59,11 +59,10 @@ struct SweepPoint {
   Deviation deviation;
 };
 
-/// All trials by the histogram: the first `full_each` of each of the letters by the full posterior,
-/// and the errors, where that leaves some out, in windows. The refined pose is taken after the last
-/// touch.
+/// The histogram over `full`, which are the first of the trials of every letter, equally many of
+/// each; where these are not all, the errors are those of all trials in windows.
 SweepPoint measure_histogram(Device& device, const std::vector<Hypothesis>& letters,
-                             std::span<const Recording> trials, int full_each,
+                             std::span<const Recording> trials, std::span<const Recording> full,
                              const PoseLattice& lattice);
 
 /// All trials by the particle filter or Augmented MCL; trial i has the seed options.seed + i. The

@@ -15,8 +15,8 @@ void add_recognition_flags(CLI::App& command, RecognitionFlags& flags) {
   command.add_option(
       "--bins", flags.bins,
       "Pose bins per object along x, y and theta [default: 25x25x16]; auto: steps of "
-      "0.6 times the maps' cell or sensor spread, whichever is larger, as finer steps do not "
-      "improve the refined pose; wider steps where the device has too little memory");
+      "0.6 times the maps' cell or sensor spread, whichever is larger (finer steps do not improve "
+      "the refined pose), or wider steps where the device's memory is short");
   command.add_option("--x-mm", flags.x_mm, "Range of x, mm, as --x-mm=-10:10 [default: -10:10]");
   command.add_option("--y-mm", flags.y_mm, "Range of y, mm, as --y-mm=-10:10 [default: -10:10]");
   command.add_option("--theta-deg", flags.theta_deg,
@@ -31,9 +31,9 @@ void add_recognition_flags(CLI::App& command, RecognitionFlags& flags) {
                      "Probability that an element's contact class is random [default: 0.1]");
   command.add_option(
       "--none", flags.none,
-      "Prior weight of \"(none)\", an object that was never learned; a map has weight 1 or "
-      "its weight in the scene, so that 5 beside 5 maps is a probability of 0.5. The likelihood "
-      "of (none) is the likelihood of a map that holds only the prior [default: no (none)]");
+      "Prior weight of \"(none)\", an object that was never learned: with 5 maps of weight 1, "
+      "--none 5 gives it a probability of 0.5 before the first touch. Its likelihood is that of a "
+      "map that holds only the prior [default: no (none)]");
   command.add_option(
       "--threshold", flags.threshold,
       "Contact threshold, in the recording's pressure unit [default: 2 kPa; required for raw "

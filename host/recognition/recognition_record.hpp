@@ -24,7 +24,7 @@ GroundTruth ground_truth(const std::string& object, const std::optional<Truth>& 
 /// One unknown object: its touches in order, views into memory that the caller keeps alive.
 struct Unknown {
   std::string recording;             ///< file of the touches, or another name
-  std::optional<std::size_t> frame;  ///< index of the only touch in the file (--each-frame)
+  std::optional<std::size_t> frame;  ///< index in the file where each touch is an unknown
   std::vector<Touch> touches;
   GroundTruth truth;
   std::string error = {};  ///< why the touches are missing, such as a file that cannot be read

@@ -79,15 +79,17 @@ TEST(PoseWindow, GivesThePosesOfTheFullPosterior) {
     histogram.update(all_touches(trial));
     const Mode mode = histogram.estimate().mode;
     ASSERT_EQ(letters[mode.object].map.label, trial.truth->object);
-    const WindowEstimate estimate = estimate_in_window(device, letters, trial, fine);
-    EXPECT_TRUE(same_bin(estimate.mode, mode.T_object_robot)) << trial.truth->object;
+    const RecognitionStep step = estimate_in_window(device, letters, trial, fine);
+    EXPECT_TRUE(same_bin(step.mode.T_object_robot, mode.T_object_robot)) << trial.truth->object;
     const OccupancyGrid& map = letters[mode.object].map;
     const Body body = body_of(map);
     // Float32 logs differ by some 1e-5 nats, for other tiles of bins; the window cuts off less.
-    EXPECT_LT(pose_error_mm(body, 1, estimate.refined, histogram.refine(mode).T_object_robot), 1e-5)
+    EXPECT_LT(
+        pose_error_mm(body, 1, step.refined->T_object_robot, histogram.refine(mode).T_object_robot),
+        1e-5)
         << trial.truth->object;
-    EXPECT_EQ(estimate.errors.mode_mm,
-              pose_error_mm(body, map.symmetry, estimate.mode, trial.truth->T_object_robot));
+    EXPECT_EQ(step.error_mm, pose_error_mm(body, map.symmetry, step.mode.T_object_robot,
+                                           trial.truth->T_object_robot));
   }
 }
 
