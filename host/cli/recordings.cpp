@@ -28,7 +28,7 @@ std::vector<Recording> read_touch_recordings(const std::vector<std::string>& pat
     if (recording.pressure_unit != recordings.front().pressure_unit) {
       throw Error(Fault::input,
                   fmt::format("{}: pressure_unit is {} but {} has {}; one threshold does not fit "
-                              "both, use a separate call for each",
+                              "both, use a call for each",
                               path, recording.pressure_unit, paths.front(),
                               recordings.front().pressure_unit));
     }

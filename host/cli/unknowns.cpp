@@ -20,9 +20,8 @@ std::vector<Unknown> list_unknowns(const UnknownsFlags& flags,
     throw Error(Fault::input, fmt::format("--touches {}: give at least 1", *flags.touches));
   }
   if (flags.touches && flags.each_frame) {
-    throw Error(
-        Fault::input,
-        "--touches: with --each-frame every unknown has one touch; leave out one of the two flags");
+    throw Error(Fault::input,
+                "--touches: with --each-frame every unknown has one touch; leave one of them out");
   }
   std::vector<Unknown> unknowns;
   for (const Recording& recording : recordings) {

@@ -7,8 +7,8 @@
 
 namespace palpate {
 
-RecognitionTask::RecognitionTask(std::vector<Hypothesis> objects, FilterOptions options)
-    : hypotheses(std::move(objects)), filter(std::move(options)) {
+RecognitionTask::RecognitionTask(std::vector<Hypothesis> objects, const FilterOptions& options)
+    : hypotheses(std::move(objects)), filter(options) {
   for (const Hypothesis& hypothesis : hypotheses) {
     const std::string& label = hypothesis.map.label;
     const auto known = std::find(labels.begin(), labels.end(), label);

@@ -19,7 +19,7 @@ using FilterOptions = std::variant<HistogramOptions, ParticleOptions>;
 /// The objects that an unknown may be, and the filter that tells which. The constructor derives the
 /// labels; neither the hypotheses nor the filter's none_weight may change afterwards.
 struct RecognitionTask {
-  RecognitionTask(std::vector<Hypothesis> objects, FilterOptions options);
+  RecognitionTask(std::vector<Hypothesis> objects, const FilterOptions& options);
 
   /// The histogram's lattice, or the particles' region, whose bins only marginals have.
   const PoseLattice& lattice() const;
