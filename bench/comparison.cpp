@@ -10,14 +10,14 @@ namespace palpate::bench {
 
 std::vector<PairedPoint> compare(const FilterRun& first, const FilterRun& second) {
   std::vector<PairedPoint> curve;
-  for (std::size_t touch = 0; touch < first.scores.front().size(); ++touch) {
+  for (std::size_t touch = 0; touch < first.records.front().trace.size(); ++touch) {
     PairedPoint point{
         .touches = static_cast<int>(touch) + 1, .error_lead_mm = {}, .error_lead_interval = {}};
     std::vector<double> leads_mm;
-    for (std::size_t trial = 0; trial < first.scores.size(); ++trial) {
-      const Score& a = first.scores[trial][touch];
-      const Score& b = second.scores[trial][touch];
-      point.right_lead += static_cast<int>(a.right) - static_cast<int>(b.right);
+    for (std::size_t trial = 0; trial < first.records.size(); ++trial) {
+      const RecognitionStep& a = first.records[trial].trace[touch];
+      const RecognitionStep& b = second.records[trial].trace[touch];
+      point.right_lead += static_cast<int>(*a.right) - static_cast<int>(*b.right);
       if (a.error_mm && b.error_mm) {
         leads_mm.push_back(*b.error_mm - *a.error_mm);
       }

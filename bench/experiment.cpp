@@ -32,8 +32,16 @@ std::array<PoseLattice, 3> table_1() {
   return {lattice_of(5, 5, 4), lattice_of(10, 10, 10), lattice_of(25, 25, 16)};
 }
 
+FilterOptions particles_of(int count, bool augmented) {
+  return ParticleOptions{.particles = count,
+                         .region = table_1().back(),
+                         .augmented = augmented,
+                         .seed = particle_seed};
+}
+
 /// The trials' letters again, with the array displaced.
-std::vector<PoseNoiseRuns> measure_pose_noise(Device& device, const LearnedLetters& learned,
+std::vector<PoseNoiseRuns> measure_pose_noise(Device& device,
+                                              const std::vector<Hypothesis>& letters,
                                               int trials_each, int touches) {
   constexpr int most_touches = 20;
   std::vector<PoseNoiseRuns> levels;
@@ -43,18 +51,16 @@ std::vector<PoseNoiseRuns> measure_pose_noise(Device& device, const LearnedLette
     PoseNoiseRuns& level = levels.emplace_back();
     level.noise = noise;
     const std::array lattices = table_1();
-    for (const PoseLattice& lattice : {lattices[1], lattices[2]}) {
-      level.runs.push_back(run_histogram(device, learned, trials, lattice));
+    for (const FilterOptions& filter : {FilterOptions(HistogramOptions{.lattice = lattices[1]}),
+                                        FilterOptions(HistogramOptions{.lattice = lattices[2]}),
+                                        particles_of(most_particles, false)}) {
+      level.runs.push_back(run_filter(device, {letters, filter}, trials));
     }
-    level.runs.push_back(run_particles(
-        device, learned, trials,
-        ParticleOptions{
-            .particles = most_particles, .region = lattices.back(), .seed = particle_seed}));
   }
   return levels;
 }
 
-std::vector<NoneRun> measure_none(Device& device, const LearnedLetters& learned,
+std::vector<NoneRun> measure_none(Device& device, const std::vector<Hypothesis>& letters,
                                   std::span<const Recording> trials, int trials_each, int touches) {
   std::vector<int> none_touches;  // few, the paper's nine, many
   for (const int n : {3, 9, 25}) {
@@ -65,7 +71,7 @@ std::vector<NoneRun> measure_none(Device& device, const LearnedLetters& learned,
   if (none_touches.empty()) {
     none_touches.push_back(touches);
   }
-  return run_none(device, learned, trials,
+  return run_none(device, letters, trials,
                   make_trials(unlearned_shapes, trials_each, none_touches.back(), unlearned_seed),
                   table_1().back(), none_touches);
 }
@@ -74,43 +80,37 @@ ExperimentResult measure(Device& device, const ExperimentOptions& options, Repor
   const int trials_each = least_one("--trials", options.trials.value_or(options.quick ? 4 : 10));
   const int touches = options.touches.value_or(options.quick ? 12 : 50);
   const std::vector<Recording> trials = make_trials(vowels, trials_each, touches, learned_seed);
-  const LearnedLetters learned = learn_letters(device, MapOptions{});
+  const std::vector<Hypothesis> letters = letter_maps(device, training_recordings(), MapOptions{});
   ExperimentResult result;
   for (const Recording& trial : trials) {
     result.true_objects.push_back(trial.truth->object);
   }
-  const auto add = [&](FilterRun run) {
-    report.add(case_of(run));
-    result.runs.push_back(std::move(run));
+  const auto add = [&](const FilterOptions& filter) {
+    result.runs.push_back(run_filter(device, {letters, filter}, trials));
+    report.add(case_of(result.runs.back()));
   };
   const std::array lattices = table_1();
   for (const PoseLattice& lattice : lattices) {
-    add(run_histogram(device, learned, trials, lattice));
+    add(HistogramOptions{.lattice = lattice});
   }
-  // As many as Table I's most, shaped by what a turn moves.
-  const std::int64_t most_bins =
-      lattices.back().bins() * static_cast<std::int64_t>(learned.objects.size());
-  add(run_histogram(device, learned, trials,
-                    balanced_lattice(lattices.back(), learned.objects, most_bins).lattice));
-  const std::vector<int> counts =
-      options.quick ? std::vector{1'000, most_particles} : std::vector{100, 1'000, most_particles};
+  // As many bins as Table I's most, shaped by what a turn moves.
+  const std::int64_t most_bins = lattices.back().bins() * static_cast<std::int64_t>(letters.size());
+  add(HistogramOptions{.lattice = balanced_lattice(lattices.back(), letters, most_bins).lattice});
   for (const bool augmented : {false, true}) {
-    for (const int particles : counts) {
-      add(run_particles(device, learned, trials,
-                        ParticleOptions{.particles = particles,
-                                        .region = lattices.back(),
-                                        .augmented = augmented,
-                                        .seed = particle_seed}));
+    for (const int count : {100, 1'000, most_particles}) {
+      if (!options.quick || count > 100) {
+        add(particles_of(count, augmented));
+      }
     }
   }
   for (const auto& [histogram, particles] : equal_counts(result.runs)) {
     report.add(comparison_of(histogram, particles));
   }
-  result.pose_noise = measure_pose_noise(device, learned, trials_each, touches);
+  result.pose_noise = measure_pose_noise(device, letters, trials_each, touches);
   for (const PoseNoiseRuns& runs : result.pose_noise) {
     report.add(case_of(runs));
   }
-  result.none = measure_none(device, learned, trials, trials_each, touches);
+  result.none = measure_none(device, letters, trials, trials_each, touches);
   for (const NoneRun& run : result.none) {
     report.add(case_of(run));
   }

@@ -48,7 +48,7 @@ Case case_of(const FilterRun& run) {
   const std::vector<CurvePoint> curve = curve_of(run);
   const CurvePoint& last = curve.back();
   Case result{.name = run.name,
-              .facts = {{"trials", run.scores.size()},
+              .facts = {{"trials", run.records.size()},
                         {"touches", last.touches},
                         {"seconds", std::round(10.0 * run.seconds) / 10.0}},
               .measurements = {accuracy_of("accuracy at the end", last)}};
@@ -122,7 +122,7 @@ void add_error_lead(Case& result, const std::string& name, const PairedPoint& po
 
 Case comparison_of(const FilterRun& histogram, const FilterRun& particles) {
   const std::vector<PairedPoint> curve = compare(histogram, particles);
-  const double trials = static_cast<double>(histogram.scores.size());
+  const double trials = static_cast<double>(histogram.records.size());
   int right_lead = 0;
   double error_lead_mm = 0.0;
   int compared = 0;
@@ -155,8 +155,8 @@ Case comparison_of(const FilterRun& histogram, const FilterRun& particles) {
 Case case_of(const PoseNoiseRuns& noisy) {
   Case result{.name = fmt::format("array off by {} mm, {} rad", noisy.noise.translation_mm,
                                   noisy.noise.rotation_rad),
-              .facts = {{"trials", noisy.runs.front().scores.size()},
-                        {"touches", noisy.runs.front().scores.front().size()}}};
+              .facts = {{"trials", noisy.runs.front().records.size()},
+                        {"touches", noisy.runs.front().records.front().trace.size()}}};
   for (const FilterRun& run : noisy.runs) {
     const CurvePoint last = curve_of(run).back();
     result.measurements.push_back(accuracy_of(run.name + ": accuracy at the end", last));

@@ -158,12 +158,12 @@ std::string trials(const ExperimentResult& result) {
   std::string table =
       "filter,count,trial,object,touches,right,confidence,error_mm,refined_error_mm\n";
   for (const FilterRun& run : result.runs) {
-    for (std::size_t trial = 0; trial < run.scores.size(); ++trial) {
+    for (std::size_t trial = 0; trial < run.records.size(); ++trial) {
       int touches = 0;
-      for (const Score& score : run.scores[trial]) {
+      for (const RecognitionStep& step : run.records[trial].trace) {
         table += fmt::format("{},{},{},{},{},{:d},{:.6g},{},{}\n", run.filter, run.count, trial,
-                             result.true_objects[trial], ++touches, score.right, score.confidence,
-                             cell(score.error_mm), cell(score.refined_error_mm));
+                             result.true_objects[trial], ++touches, *step.right, step.confidence(),
+                             cell(step.error_mm), cell(step.refined_error_mm));
       }
     }
   }

@@ -8,6 +8,7 @@
 #include "filter_run.hpp"
 #include "none_run.hpp"
 #include "report.hpp"
+#include "trials.hpp"
 
 namespace palpate::bench {
 

@@ -6,9 +6,7 @@
 #include <numeric>
 
 #include <fmt/format.h>
-
-#include "letters.hpp"
-#include "palpate/pose_histogram.hpp"
+#include <fmt/ranges.h>
 
 namespace palpate::bench {
 
@@ -29,18 +27,18 @@ CurvePoint point_of(const FilterRun& run, std::size_t touch) {
   std::vector<double> errors_mm;
   std::vector<double> refined_errors_mm;
   int right = 0;
-  for (const std::vector<Score>& trial : run.scores) {
-    const Score& score = trial[touch];
-    right += score.right ? 1 : 0;
-    point.mean_confidence += score.confidence;
-    if (score.error_mm) {
-      errors_mm.push_back(*score.error_mm);
+  for (const RecognitionRecord& record : run.records) {
+    const RecognitionStep& step = record.trace[touch];
+    right += *step.right ? 1 : 0;
+    point.mean_confidence += step.confidence();
+    if (step.error_mm) {
+      errors_mm.push_back(*step.error_mm);
     }
-    if (score.refined_error_mm) {
-      refined_errors_mm.push_back(*score.refined_error_mm);
+    if (step.refined_error_mm) {
+      refined_errors_mm.push_back(*step.refined_error_mm);
     }
   }
-  const auto trials = static_cast<int>(run.scores.size());
+  const auto trials = static_cast<int>(run.records.size());
   point.accuracy = static_cast<double>(right) / trials;
   point.accuracy_interval = wilson_interval(right, trials);
   point.mean_confidence /= trials;
@@ -50,51 +48,41 @@ CurvePoint point_of(const FilterRun& run, std::size_t touch) {
   return point;
 }
 
-}  // namespace
-
-FilterRun run_histogram(Device& device, const LearnedLetters& learned,
-                        std::span<const Recording> trials, const PoseLattice& lattice) {
-  FilterRun run{.filter = "histogram",
-                .name = fmt::format("histogram {}x{}x{}", lattice.x_mm.count, lattice.y_mm.count,
-                                    lattice.theta_rad.count),
-                .count = lattice.bins(),
-                .scores = {}};
-  PoseHistogram histogram(device, learned.objects, HistogramOptions{.lattice = lattice});
-  run.seconds = seconds_of([&] {
-    for (const Recording& trial : trials) {
-      std::vector<Score>& scores = run.scores.emplace_back();
-      histogram.reset();
-      for (const Touch& touch : all_touches(trial)) {
-        histogram.update(touch);
-        const Estimate estimate = histogram.estimate();
-        Score& scored = scores.emplace_back(score(learned, estimate, *trial.truth));
-        if (scored.error_mm) {
-          scored.refined_error_mm =
-              error_mm(learned, estimate.mode.object,
-                       histogram.refine(estimate.mode).T_object_robot, *trial.truth);
-        }
-      }
-    }
-  });
-  return run;
+std::string filter_name(const FilterOptions& filter) {
+  const auto* particles = std::get_if<ParticleOptions>(&filter);
+  return particles == nullptr                              ? "histogram"
+         : particles->augmented                            ? "augmented"
+         : particles->resampling == Resampling::systematic ? "systematic"
+                                                           : "particles";
 }
 
-FilterRun run_particles(Device& device, const LearnedLetters& learned,
-                        std::span<const Recording> trials, ParticleOptions options) {
-  FilterRun run{.filter = options.augmented ? "augmented" : "particles",
-                .name = fmt::format("{} {}", options.augmented ? "augmented MCL" : "particles",
-                                    options.particles),
-                .count = options.particles,
-                .scores = {}};
+}  // namespace
+
+FilterRun run_filter(Device& device, RecognitionTask task, std::span<const Recording> trials) {
+  FilterRun run{.filter = filter_name(task.filter), .name = {}, .records = {}};
+  auto* particles = std::get_if<ParticleOptions>(&task.filter);
+  if (particles != nullptr) {
+    run.path = "particles";
+    run.count = particles->particles;
+    run.name = fmt::format("{} {}", particles->augmented ? "augmented MCL" : run.filter, run.count);
+  } else {
+    const PoseLattice& lattice = task.lattice();
+    run.count = lattice.bins();
+    run.name = fmt::format("histogram {}x{}x{}", lattice.x_mm.count, lattice.y_mm.count,
+                           lattice.theta_rad.count);
+  }
+  Recogniser recogniser(device, task);
+  if (particles == nullptr) {
+    run.path = fmt::format("{}", fmt::join(recogniser.histogram()->paths(), "; "));
+  }
   run.seconds = seconds_of([&] {
     for (const Recording& trial : trials) {
-      // Not reset(), which would draw the same particles again.
-      ParticleFilter particles(device, learned.objects, options);
-      ++options.seed;
-      std::vector<Score>& scores = run.scores.emplace_back();
-      for (const Touch& touch : all_touches(trial)) {
-        particles.update(touch);
-        scores.push_back(score(learned, particles.estimate(), *trial.truth));
+      run.records.push_back(recognise(recogniser, task, unknown_of(trial), true));
+      run.records.back().require_steps();
+      run.device_bytes = std::max(run.device_bytes, recogniser.device_bytes());
+      if (particles != nullptr) {  // Reset, they would be the same particles again.
+        ++particles->seed;
+        recogniser = Recogniser(device, task);
       }
     }
   });
@@ -103,7 +91,7 @@ FilterRun run_particles(Device& device, const LearnedLetters& learned,
 
 std::vector<CurvePoint> curve_of(const FilterRun& run) {
   std::vector<CurvePoint> curve;
-  for (std::size_t touch = 0; touch < run.scores.front().size(); ++touch) {
+  for (std::size_t touch = 0; touch < run.records.front().trace.size(); ++touch) {
     curve.push_back(point_of(run, touch));
   }
   return curve;
@@ -113,12 +101,12 @@ Calibration calibration_of(const FilterRun& run) {
   constexpr int width = 10;  // bins over [0, 1]
   std::array<Calibration::Bin, width> bins;
   int total = 0;
-  for (const std::vector<Score>& trial : run.scores) {
-    for (const Score& score : trial) {
-      const int i = std::min(static_cast<int>(score.confidence * width), width - 1);
+  for (const RecognitionRecord& record : run.records) {
+    for (const RecognitionStep& step : record.trace) {
+      const int i = std::min(static_cast<int>(step.confidence() * width), width - 1);
       ++bins[i].count;
-      bins[i].mean_confidence += score.confidence;
-      bins[i].fraction_right += score.right ? 1.0 : 0.0;
+      bins[i].mean_confidence += step.confidence();
+      bins[i].fraction_right += *step.right ? 1.0 : 0.0;
       ++total;
     }
   }

@@ -7,28 +7,23 @@
 #include <vector>
 
 #include "measurement.hpp"
-#include "palpate/lattice.hpp"
-#include "palpate/particle_filter.hpp"
-#include "trials.hpp"
+#include "recognition_record.hpp"
 
 namespace palpate::bench {
 
 /// What one filter made of all trials.
 struct FilterRun {
-  std::string filter;                      ///< "histogram", "particles" or "augmented"
-  std::string name;                        ///< with its size, such as "histogram 25x25x16"
-  std::int64_t count = 0;                  ///< bins per object, or particles in all
-  std::vector<std::vector<Score>> scores;  ///< [trial][touch]
+  std::string filter;      ///< "histogram", "particles", "systematic" or "augmented"
+  std::string name;        ///< with its size, such as "histogram 25x25x16"
+  std::int64_t count = 0;  ///< bins per object, or particles in all
+  std::vector<RecognitionRecord> records;  ///< [trial], with a step after every touch
   double seconds = 0.0;                    ///< wall time of all trials
+  std::string path;                        ///< how the likelihood is evaluated
+  std::uint64_t device_bytes = 0;          ///< most device memory held
 };
 
-/// The histogram filter, with the error of the refined pose.
-FilterRun run_histogram(Device& device, const LearnedLetters& learned,
-                        std::span<const Recording> trials, const PoseLattice& lattice);
-
-/// The particle filter, or Augmented MCL. Trial i has the seed options.seed + i.
-FilterRun run_particles(Device& device, const LearnedLetters& learned,
-                        std::span<const Recording> trials, ParticleOptions options);
+/// All trials by the task's filter. Of particles, trial i has the task's seed + i.
+FilterRun run_filter(Device& device, RecognitionTask task, std::span<const Recording> trials);
 
 /// Mean, median and 95th percentile.
 struct ErrorSummary {

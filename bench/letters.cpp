@@ -7,9 +7,9 @@ namespace palpate::bench {
 
 namespace {
 
-constexpr const char* names[] = {"A", "E", "I", "O", "U"};
+int symmetry_of(const std::string& letter) { return letter == "I" ? 2 : letter == "O" ? 0 : 1; }
 
-Simulator simulator_of(const char* name, const TouchingSensor& sensor, std::uint64_t seed) {
+Simulator simulator_of(const std::string& name, const TouchingSensor& sensor, std::uint64_t seed) {
   return {make_shape(name), sensor.model, sensor.elements_mm, seed};
 }
 
@@ -19,7 +19,7 @@ std::vector<Recording> training_recordings(const TouchingSensor& sensor,
                                            const std::vector<Pose>& poses) {
   std::vector<Recording> recordings;
   std::uint64_t seed = 1;
-  for (const char* name : names) {
+  for (const std::string& name : vowels) {
     recordings.push_back(simulator_of(name, sensor, seed++).touch(poses, Pose{}));
   }
   return recordings;
@@ -38,14 +38,15 @@ std::vector<Hypothesis> letter_maps(Device& device, const std::vector<Recording>
   for (const ObjectTouches& letter : letters) {
     builder.clear();
     builder.add(letter.touches);
-    hypotheses.push_back({.map = builder.build(letter.label)});
+    Hypothesis& hypothesis = hypotheses.emplace_back(builder.build(letter.label));
+    hypothesis.map.symmetry = symmetry_of(letter.label);
   }
   return hypotheses;
 }
 
 std::vector<Recording> unknown_recordings(int count, int touches, std::uint64_t seed) {
   std::vector<Simulator> simulators;
-  for (const char* name : names) {
+  for (const std::string& name : vowels) {
     simulators.push_back(simulator_of(name, {}, ++seed));
   }
   std::vector<Recording> recordings;
@@ -57,7 +58,7 @@ std::vector<Recording> unknown_recordings(int count, int touches, std::uint64_t 
       pose = inverse(T_object_robot) * pose;  // T_robot_sensor from T_object_sensor
     }
     recordings.push_back(simulators[letter].touch(poses, T_object_robot));
-    recordings.back().truth = {.object = names[letter], .T_object_robot = T_object_robot};
+    recordings.back().truth = {.object = vowels[letter], .T_object_robot = T_object_robot};
   }
   return recordings;
 }

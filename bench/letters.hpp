@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <string>
 #include <vector>
 
 #include "palpate/device.hpp"
@@ -18,11 +19,15 @@ struct TouchingSensor {
   std::vector<glm::dvec2> elements_mm = digitacts_array();
 };
 
-/// The letters A, E, I, O and U, touched at known poses T_object_sensor, with fixed seeds.
+/// The objects of Sec. IV.
+inline const std::vector<std::string> vowels = {"A", "E", "I", "O", "U"};
+
+/// The vowels, touched at known poses T_object_sensor, with fixed seeds.
 std::vector<Recording> training_recordings(const TouchingSensor& sensor = {},
                                            const std::vector<Pose>& poses = training_grid());
 
-/// Maps of the letters, which share the prior that their training touches give.
+/// The letters' maps, which share the prior that their training touches give, with the symmetries
+/// of Eq. 18-20: 2 for I, 0 (full) for O, 1 for the others.
 std::vector<Hypothesis> letter_maps(Device& device, const std::vector<Recording>& training,
                                     const MapOptions& options);
 

@@ -50,6 +50,7 @@ class ErrorStatistics {
   void add(double error);
   double largest() const { return largest_; }
   double rms() const;
+  std::uint64_t count() const { return count_; }
 
  private:
   double largest_ = 0.0;

@@ -70,12 +70,12 @@ double NoneRun::separation() const {
   return sum / static_cast<double>(learned_log10_weight.size());
 }
 
-std::vector<NoneRun> run_none(Device& device, const LearnedLetters& learned,
+std::vector<NoneRun> run_none(Device& device, std::span<const Hypothesis> letters,
                               std::span<const Recording> learned_trials,
                               std::span<const Recording> unlearned_trials,
                               const PoseLattice& lattice, std::span<const int> touches) {
-  PoseHistogram histogram(device, learned.objects, HistogramOptions{.lattice = lattice});
-  const ContactModel model{.prior = learned.objects.front().map.prior};
+  PoseHistogram histogram(device, letters, HistogramOptions{.lattice = lattice});
+  const ContactModel model{.prior = letters.front().map.prior};
   std::vector<NoneRun> runs;
   for (const int n : touches) {
     runs.push_back({.touches = n, .learned_log10_weight = {}, .unlearned_log10_weight = {}});
@@ -87,7 +87,7 @@ std::vector<NoneRun> run_none(Device& device, const LearnedLetters& learned,
       const auto until = static_cast<std::size_t>(run.touches);
       histogram.update(trial.touches(done, until));
       (run.*weights)
-          .push_back(turning_log10_weight(histogram, static_cast<int>(learned.objects.size()),
+          .push_back(turning_log10_weight(histogram, static_cast<int>(letters.size()),
                                           log_likelihood_of_none(trial.touches(0, until), model)));
       done = until;
     }

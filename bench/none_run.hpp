@@ -5,7 +5,8 @@
 #include <vector>
 
 #include "palpate/lattice.hpp"
-#include "trials.hpp"
+#include "palpate/pose_histogram.hpp"
+#include "palpate/touch.hpp"
 
 namespace palpate::bench {
 
@@ -32,7 +33,7 @@ struct NoneRun {
 };
 
 /// The histogram filter over the given lattice, after each of these numbers of touches in turn.
-std::vector<NoneRun> run_none(Device& device, const LearnedLetters& learned,
+std::vector<NoneRun> run_none(Device& device, std::span<const Hypothesis> letters,
                               std::span<const Recording> learned_trials,
                               std::span<const Recording> unlearned_trials,
                               const PoseLattice& lattice, std::span<const int> touches);

@@ -5,8 +5,9 @@
 #include <limits>
 #include <numbers>
 #include <optional>
+#include <string>
 
-#include "palpate/pose_histogram.hpp"
+#include "palpate/error.hpp"
 
 namespace palpate::bench {
 
@@ -61,26 +62,31 @@ PoseLattice window_of(const PoseLattice& lattice, const PlacedBody& placed, cons
           .pivot_mm = lattice.pivot_mm};
 }
 
-/// Where a window's posterior of all touches has its mode.
-struct WindowMode {
-  Mode mode;
-  PoseHistogram histogram;
-};
-
-WindowMode mode_of(Device& device, const Hypothesis& object, std::span<const Touch> touches,
-                   const PoseLattice& window) {
-  PoseHistogram histogram(device, std::span(&object, 1), HistogramOptions{.lattice = window});
-  histogram.update(touches);
-  const Mode mode = histogram.estimate().mode;
-  return {mode, std::move(histogram)};
+RecognitionStep step_in(Device& device, const Hypothesis& letter, const Recording& trial,
+                        const PoseLattice& window) {
+  const RecognitionTask task({letter}, HistogramOptions{.lattice = window});
+  Recogniser recogniser(device, task);
+  const RecognitionRecord record = recognise(recogniser, task, unknown_of(trial), false);
+  record.require_steps();
+  return record.last();
 }
 
 }  // namespace
 
-PlacedBody truth_of(const LearnedLetters& learned, const Recording& trial) {
-  const std::size_t object = object_of(learned, trial.truth->object);
-  return {.body = learned.bodies[object],
-          .symmetry = learned.objects[object].map.symmetry,
+const Hypothesis& letter_of(std::span<const Hypothesis> letters, const Recording& trial) {
+  const std::string& label = trial.truth->object;
+  const auto letter = std::find_if(letters.begin(), letters.end(), [&](const Hypothesis& known) {
+    return known.map.label == label;
+  });
+  if (letter == letters.end()) {
+    throw Error(Fault::input, "'" + label + "' is no learned letter");
+  }
+  return *letter;
+}
+
+PlacedBody truth_of(const Hypothesis& letter, const Recording& trial) {
+  return {.body = body_of(letter.map),
+          .symmetry = letter.map.symmetry,
           .T_object_robot = trial.truth->T_object_robot};
 }
 
@@ -130,29 +136,20 @@ double nearest_bin_mm(const PoseLattice& lattice, const PlacedBody& placed) {
   return least_mm;
 }
 
-WindowEstimate estimate_in_window(Device& device, const LearnedLetters& learned,
-                                  const Recording& trial, const PoseLattice& lattice) {
-  const PlacedBody truth = truth_of(learned, trial);
-  const Hypothesis& object = learned.objects[object_of(learned, trial.truth->object)];
-  const std::vector<Touch> touches = all_touches(trial);
+RecognitionStep estimate_in_window(Device& device, std::span<const Hypothesis> letters,
+                                   const Recording& trial, const PoseLattice& lattice) {
+  const Hypothesis& letter = letter_of(letters, trial);
+  const PlacedBody truth = truth_of(letter, trial);
   std::optional<Mode> best;
   for (const PoseLattice& window : windows_about(lattice, truth, window_reach_mm)) {
-    const Mode mode = mode_of(device, object, touches, window).mode;
+    const Mode mode = step_in(device, letter, trial, window).mode;
     if (!best || mode.log_likelihood > best->log_likelihood) {
       best = mode;
     }
   }
   // About the mode, so that no edge of a window cuts off what the refined pose is made of.
   const PlacedBody found{.body = truth.body, .symmetry = 1, .T_object_robot = best->T_object_robot};
-  const PoseLattice window = windows_about(lattice, found, refined_reach_mm).front();
-  const auto [mode, histogram] = mode_of(device, object, touches, window);
-  WindowEstimate estimate{
-      .mode = mode.T_object_robot, .refined = histogram.refine(mode).T_object_robot, .errors = {}};
-  const auto error_mm = [&](const Pose& T_object_robot) {
-    return pose_error_mm(truth.body, truth.symmetry, T_object_robot, truth.T_object_robot);
-  };
-  estimate.errors = {.mode_mm = error_mm(estimate.mode), .refined_mm = error_mm(estimate.refined)};
-  return estimate;
+  return step_in(device, letter, trial, windows_about(lattice, found, refined_reach_mm).front());
 }
 
 }  // namespace palpate::bench

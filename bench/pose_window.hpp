@@ -1,13 +1,14 @@
 #pragma once
 
+#include <span>
 #include <vector>
 
 #include "palpate/device.hpp"
+#include "palpate/estimate.hpp"
 #include "palpate/lattice.hpp"
 #include "palpate/pose_error.hpp"
 #include "palpate/touch.hpp"
-#include "trial_errors.hpp"
-#include "trials.hpp"
+#include "recognition_record.hpp"
 
 namespace palpate::bench {
 
@@ -18,8 +19,11 @@ struct PlacedBody {
   Pose T_object_robot;
 };
 
-/// The true object of a trial.
-PlacedBody truth_of(const LearnedLetters& learned, const Recording& trial);
+/// The letter that a trial is of.
+/// @throws Error where it was not learned
+const Hypothesis& letter_of(std::span<const Hypothesis> letters, const Recording& trial);
+/// The body of that letter where the trial has it.
+PlacedBody truth_of(const Hypothesis& letter, const Recording& trial);
 
 /// Parts of a lattice, of the same bins, that together hold every bin within `reach_mm` of the body
 /// by pose_error_mm(): one for each of its n places of equal error, or, for a body of full
@@ -34,17 +38,11 @@ double nearest_bin_mm(const PoseLattice& lattice, const PlacedBody& placed);
 /// How far from the truth a mode is looked for.
 inline constexpr double window_reach_mm = 3.0;
 
-/// What the posterior of the whole lattice says of the true object near the truth.
-struct WindowEstimate {
-  Pose mode;
-  Pose refined;
-  TrialErrors errors;
-};
-
-/// Mode and refined pose of a trial's true object from its posterior within `window_reach_mm` of
-/// the truth. They are those of the full posterior, but for rounding, wherever that has its mode
-/// there: the likelihood of a bin does not depend on the others.
-WindowEstimate estimate_in_window(Device& device, const LearnedLetters& learned,
-                                  const Recording& trial, const PoseLattice& lattice);
+/// Recognises a trial among the bins of its true object within `window_reach_mm` of the truth.
+/// Where the full posterior has its mode there, mode and refined pose are the same but for
+/// rounding, since no bin's likelihood depends on other bins; `identity` is that of one object
+/// alone.
+RecognitionStep estimate_in_window(Device& device, std::span<const Hypothesis> letters,
+                                   const Recording& trial, const PoseLattice& lattice);
 
 }  // namespace palpate::bench

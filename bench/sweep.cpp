@@ -11,6 +11,8 @@
 #include "sweep_limits.hpp"
 #include "sweep_page.hpp"
 #include "sweep_paths.hpp"
+#include "sweep_plan.hpp"
+#include "trials.hpp"
 
 namespace palpate::bench {
 
@@ -30,7 +32,8 @@ void print_run(const Json& point) {
 
 /// Measures maps of one cell size, and prints every run once it is known.
 void sweep_cells(Device& device, const SweepPlan& plan, const CellPlan& cells, Json& document) {
-  const LearnedLetters learned = learn_letters(device, MapOptions{.cell_mm = cells.cell_mm});
+  const std::vector<Hypothesis> letters =
+      letter_maps(device, training_recordings(), MapOptions{.cell_mm = cells.cell_mm});
   const std::vector<Recording> trials = trials_of(plan.trials_each);
   std::vector<SweepPoint> points;
   const auto add = [&](SweepPoint point) {
@@ -39,8 +42,9 @@ void sweep_cells(Device& device, const SweepPlan& plan, const CellPlan& cells, J
     points.push_back(std::move(point));
   };
   for (const BinCounts& bins : cells.lattices) {
-    SweepPoint point = measure_histogram(device, learned, trials,
-                                         plan.full_each(cells.cell_mm, bins), lattice_with(bins));
+    SweepPoint point =
+        measure_histogram(device, letters, trials, trials_of(plan.full_each(cells.cell_mm, bins)),
+                          lattice_with(bins));
     point.balanced = is_balanced(bins);
     add(std::move(point));
   }
@@ -48,7 +52,7 @@ void sweep_cells(Device& device, const SweepPlan& plan, const CellPlan& cells, J
        {std::pair{Resampling::multinomial, false}, std::pair{Resampling::systematic, false},
         std::pair{Resampling::multinomial, true}}) {
     for (const int particles : cells.particles) {
-      add(measure_particles(device, learned, trials_of(plan.particle_trials_each(particles)),
+      add(measure_particles(device, letters, trials_of(plan.particle_trials_each(particles)),
                             {.particles = particles,
                              .region = lattice_with(goal_bins),
                              .resampling = resampling,
@@ -57,12 +61,12 @@ void sweep_cells(Device& device, const SweepPlan& plan, const CellPlan& cells, J
     }
   }
   for (const BinCounts& bins : cells.compared) {
-    for (const Json& way : compare_paths(device, learned, trials.front(), lattice_with(bins))) {
+    for (const Json& way : compare_paths(device, letters, trials.front(), lattice_with(bins))) {
       document["precisions"].push_back(way);
     }
   }
   if (!cells.lattices.empty()) {
-    const PoseLattice balanced = balanced_lattice(lattice_with(goal_bins), learned.objects).lattice;
+    const PoseLattice balanced = balanced_lattice(lattice_with(goal_bins), letters).lattice;
     document["knees"].push_back(
         knee_record(points, cells.cell_mm,
                     {balanced.x_mm.count, balanced.y_mm.count, balanced.theta_rad.count}));

@@ -6,6 +6,7 @@
 
 #include "pose_window.hpp"
 #include "sweep_document.hpp"
+#include "trials.hpp"
 
 namespace palpate::bench {
 
@@ -83,11 +84,12 @@ std::vector<Variant> variants_of(const SweepPlan& plan) {
   return variants;
 }
 
-std::vector<TrialErrors> errors_of(Device& device, const LearnedLetters& learned,
-                                   std::span<const Recording> trials, const BinCounts& bins) {
+std::vector<TrialErrors> errors_of_trials(Device& device, std::span<const Hypothesis> letters,
+                                          std::span<const Recording> trials,
+                                          const BinCounts& bins) {
   std::vector<TrialErrors> errors;
   for (const Recording& trial : trials) {
-    errors.push_back(estimate_in_window(device, learned, trial, lattice_with(bins)).errors);
+    errors.push_back(errors_of(estimate_in_window(device, letters, trial, lattice_with(bins))));
   }
   return errors;
 }
@@ -120,15 +122,15 @@ Json measure_limits(Device& device, const SweepPlan& plan) {
   Json limits = Json::array();
   Compared unchanged;
   for (Variant& variant : variants_of(plan)) {
-    const LearnedLetters learned = learn_letters(
-        device, variant.map, training_recordings(variant.sensor, variant.training_poses));
+    const std::vector<Hypothesis> letters = letter_maps(
+        device, training_recordings(variant.sensor, variant.training_poses), variant.map);
     variant.trials.sensor = variant.sensor;
     const std::vector<Recording> trials =
         make_trials(vowels, plan.limit_trials_each, touches_per_trial, trial_seed, variant.trials);
     Compared with = unchanged;
     for (const BinCounts& bins :
          std::span(plan.limits).first(variant.all_lattices ? plan.limits.size() : 1)) {
-      std::vector<TrialErrors> errors = errors_of(device, learned, trials, bins);
+      std::vector<TrialErrors> errors = errors_of_trials(device, letters, trials, bins);
       limits.push_back(record_of(variant, bins, errors, with));
       if (unchanged.name.empty()) {
         unchanged = {variant.name, errors};

@@ -7,6 +7,7 @@
 
 #include "accuracy.hpp"
 #include "cpu_loop.hpp"
+#include "letters.hpp"
 #include "one_bin_kernel.hpp"
 #include "palpate/error.hpp"
 #include "palpate/pose_histogram.hpp"
@@ -52,17 +53,17 @@ std::string path_of(const PoseHistogram& histogram) {
 
 }  // namespace
 
-Json compare_paths(Device& device, const LearnedLetters& learned, const Recording& unknown,
+Json compare_paths(Device& device, std::span<const Hypothesis> letters, const Recording& unknown,
                    const PoseLattice& lattice) {
-  const ContactModel product{.prior = learned.objects.front().map.prior};
+  const ContactModel product{.prior = letters.front().map.prior};
   const ContactModel logs{.gamma = 0.0, .prior = product.prior};
   const std::vector<Touch> moving = unknown.touches(0, timed_touches);
   const std::vector<Touch> resting(timed_touches, resting_touch(unknown));
-  PoseHistogram histogram(device, learned.objects, {.lattice = lattice});
-  PoseHistogram in_logs(device, learned.objects, {.lattice = lattice, .contact = logs});
-  PoseHistogram at_rest(device, learned.objects, {.lattice = lattice, .still_array = true});
-  OneBinKernel one_bin(device, learned.objects, lattice, product);
-  CpuLoop cpu_loop(learned.objects, lattice, product);
+  PoseHistogram histogram(device, letters, {.lattice = lattice});
+  PoseHistogram in_logs(device, letters, {.lattice = lattice, .contact = logs});
+  PoseHistogram at_rest(device, letters, {.lattice = lattice, .still_array = true});
+  OneBinKernel one_bin(device, letters, lattice, product);
+  CpuLoop cpu_loop(letters, lattice, product);
   const auto way = [](const std::string& path, const ContactModel& model,
                       const std::vector<Touch>& touches, auto& engine) {
     return Way{.path = path,
@@ -85,10 +86,8 @@ Json compare_paths(Device& device, const LearnedLetters& learned, const Recordin
   for (const Way& one : ways) {
     const auto first = std::span(one.touches).first(1);
     one.update(first);
-    const Deviation deviation =
-        deviation_of(likelihood_errors(learned.objects, one.model, lattice, first, sampled_bins,
-                                       one.log_likelihood),
-                     learned);
+    const Deviation deviation = deviation_of(
+        likelihood_errors(letters, one.model, lattice, first, sampled_bins, one.log_likelihood));
     compared.push_back({{"path", one.path},
                         {"count", lattice.bins()},
                         {"nanoseconds", nullptr},
@@ -98,7 +97,7 @@ Json compare_paths(Device& device, const LearnedLetters& learned, const Recordin
   }
   const std::vector<std::vector<double>> seconds = interleave(contenders, repeats);
   const double evaluations = static_cast<double>(lattice.bins()) *
-                             static_cast<double>(learned.objects.size() * unknown.elements()) *
+                             static_cast<double>(letters.size() * unknown.elements()) *
                              timed_touches;
   for (std::size_t i = 0; i < compared.size(); ++i) {
     compared[i]["nanoseconds"] = 1e9 * median(seconds[i]) / evaluations;

@@ -11,7 +11,7 @@ namespace palpate::bench {
 /// an array at rest, the one-bin kernel, and the loop on the host's cores. The ways take turns.
 /// @throws Error unless some touch of the unknown has at least half its elements in No Contact,
 /// which an array at rest needs to gain anything
-Json compare_paths(Device& device, const LearnedLetters& learned, const Recording& unknown,
+Json compare_paths(Device& device, std::span<const Hypothesis> letters, const Recording& unknown,
                    const PoseLattice& lattice);
 
 }  // namespace palpate::bench

@@ -12,7 +12,6 @@
 #include "palpate/particle_filter.hpp"
 #include "pose_window.hpp"
 #include "trial_errors.hpp"
-#include "trials.hpp"
 
 namespace palpate::bench {
 
@@ -25,7 +24,7 @@ struct Deviation {
   double rms = 0.0;
   int samples = 0;
 };
-Deviation deviation_of(const ErrorStatistics& errors, const LearnedLetters& learned);
+Deviation deviation_of(const ErrorStatistics& errors);
 
 /// Poses by windows that the full posterior gave, too.
 struct WindowCheck {
@@ -60,16 +59,15 @@ struct SweepPoint {
   Deviation deviation;
 };
 
-/// All trials by the histogram: the first `full_each` of each of the letters by the full posterior,
-/// and the errors, where that leaves some out, in windows. The refined pose is taken after the last
-/// touch.
-SweepPoint measure_histogram(Device& device, const LearnedLetters& learned,
-                             std::span<const Recording> trials, int full_each,
+/// The histogram over `full`, which are the first of the trials of every letter, equally many of
+/// each; where these are not all, the errors are those of all trials in windows.
+SweepPoint measure_histogram(Device& device, const std::vector<Hypothesis>& letters,
+                             std::span<const Recording> trials, std::span<const Recording> full,
                              const PoseLattice& lattice);
 
 /// All trials by the particle filter or Augmented MCL; trial i has the seed options.seed + i. The
 /// deviation is that of the weights after one touch, which nothing has resampled yet.
-SweepPoint measure_particles(Device& device, const LearnedLetters& learned,
+SweepPoint measure_particles(Device& device, const std::vector<Hypothesis>& letters,
                              std::span<const Recording> trials, ParticleOptions options);
 
 }  // namespace palpate::bench

@@ -15,6 +15,10 @@ double standard_error_or_0(std::span<const double> values) {
 
 }  // namespace
 
+TrialErrors errors_of(const RecognitionStep& last) {
+  return {.mode_mm = last.error_mm, .refined_mm = last.refined_error_mm};
+}
+
 std::optional<ErrorsOverTrials> errors_over(std::span<const TrialErrors> trials, PoseKind kind) {
   constexpr std::size_t least_for_p95 = 20;
   std::vector<double> errors_mm;

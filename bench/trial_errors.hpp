@@ -3,6 +3,8 @@
 #include <optional>
 #include <span>
 
+#include "recognition_record.hpp"
+
 namespace palpate::bench {
 
 /// Which pose of an estimate: the best bin, or the one between the bins.
@@ -17,6 +19,9 @@ struct TrialErrors {
     return kind == PoseKind::mode ? mode_mm : refined_mm;
   }
 };
+
+/// The errors of a trial's last step.
+TrialErrors errors_of(const RecognitionStep& last);
 
 /// The errors that a run's trials have.
 struct ErrorsOverTrials {

@@ -1,6 +1,5 @@
 #include "trials.hpp"
 
-#include <algorithm>
 #include <numeric>
 #include <utility>
 
@@ -15,8 +14,6 @@ namespace palpate::bench {
 namespace {
 
 constexpr std::uint64_t seeds_per_shape = 1'000'000;  ///< more trials begin with the same ones
-
-int symmetry_of(const std::string& letter) { return letter == "I" ? 2 : letter == "O" ? 0 : 1; }
 
 /// 0 to n - 1 in a random order (Fisher and Yates).
 std::vector<std::size_t> random_order(std::size_t n, std::uint64_t seed) {
@@ -53,16 +50,6 @@ Recording trial_of(const Recording& test_set, int touches, std::uint64_t seed,
 
 }  // namespace
 
-LearnedLetters learn_letters(Device& device, const MapOptions& options,
-                             const std::vector<Recording>& training) {
-  LearnedLetters learned{.objects = letter_maps(device, training, options), .bodies = {}};
-  for (Hypothesis& object : learned.objects) {
-    object.map.symmetry = symmetry_of(object.map.label);
-    learned.bodies.push_back(body_of(object.map));
-  }
-  return learned;
-}
-
 std::vector<Recording> make_trials(std::span<const std::string> shapes, int trials_each,
                                    int touches, std::uint64_t seed, const TrialTouches& how) {
   const std::vector<Pose> grid = training_grid();
@@ -83,37 +70,6 @@ std::vector<Recording> make_trials(std::span<const std::string> shapes, int tria
     seed += seeds_per_shape;
   }
   return trials;
-}
-
-std::size_t object_of(const LearnedLetters& learned, const std::string& label) {
-  const auto object =
-      std::find_if(learned.objects.begin(), learned.objects.end(),
-                   [&](const Hypothesis& hypothesis) { return hypothesis.map.label == label; });
-  if (object == learned.objects.end()) {
-    throw Error(Fault::input, fmt::format("'{}' is no learned letter", label));
-  }
-  return static_cast<std::size_t>(object - learned.objects.begin());
-}
-
-Score score(const LearnedLetters& learned, const Estimate& estimate, const Truth& truth) {
-  const auto best = std::max_element(estimate.identity.begin(), estimate.identity.end());
-  const auto label = [&](std::ptrdiff_t object) -> const std::string& {
-    return learned.objects[object].map.label;
-  };
-  Score score{.right = label(best - estimate.identity.begin()) == truth.object,
-              .confidence = *best,
-              .error_mm = {}};
-  const Mode& mode = estimate.mode;
-  if (label(mode.object) == truth.object) {
-    score.error_mm = error_mm(learned, mode.object, mode.T_object_robot, truth);
-  }
-  return score;
-}
-
-double error_mm(const LearnedLetters& learned, int object, const Pose& T_object_robot,
-                const Truth& truth) {
-  return pose_error_mm(learned.bodies[object], learned.objects[object].map.symmetry, T_object_robot,
-                       truth.T_object_robot);
 }
 
 }  // namespace palpate::bench

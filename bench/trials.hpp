@@ -1,31 +1,14 @@
 #pragma once
 
 #include <cstdint>
-#include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "letters.hpp"
-#include "palpate/device.hpp"
-#include "palpate/estimate.hpp"
-#include "palpate/map_builder.hpp"
-#include "palpate/pose_error.hpp"
 #include "palpate/touch.hpp"
 
 namespace palpate::bench {
-
-/// The objects of Sec. IV.
-inline const std::vector<std::string> vowels = {"A", "E", "I", "O", "U"};
-
-/// Maps of the letters A, E, I, O and U as letter_maps() builds them, with the symmetries of Eq.
-/// 18-20: 2 for I, 0 (full) for O, 1 for the others.
-struct LearnedLetters {
-  std::vector<Hypothesis> objects;
-  std::vector<Body> bodies;  ///< of every object, for pose errors
-};
-LearnedLetters learn_letters(Device& device, const MapOptions& options,
-                             const std::vector<Recording>& training = training_recordings());
 
 /// Standard deviations of the pose that the robot reports for the array about the true one.
 struct SensorPoseNoise {
@@ -49,24 +32,5 @@ struct TrialTouches {
 /// @throws Error unless touches is from 1 to the test set's 192
 std::vector<Recording> make_trials(std::span<const std::string> shapes, int trials_each,
                                    int touches, std::uint64_t seed, const TrialTouches& how = {});
-
-/// The learned object of this label, as an index.
-/// @throws Error where it was not learned
-std::size_t object_of(const LearnedLetters& learned, const std::string& label);
-
-/// What an estimate is worth.
-struct Score {
-  bool right = false;       ///< the most probable object is the true one
-  double confidence = 0.0;  ///< its probability
-  /// Of the mode's pose; only where the mode's object is the true one, as in Sec. IV.
-  std::optional<double> error_mm;
-  /// The same for a pose between the bins, where the caller has one; see error_mm() below.
-  std::optional<double> refined_error_mm = {};
-};
-Score score(const LearnedLetters& learned, const Estimate& estimate, const Truth& truth);
-
-/// Error of any pose estimate of an object, in mm.
-double error_mm(const LearnedLetters& learned, int object, const Pose& T_object_robot,
-                const Truth& truth);
 
 }  // namespace palpate::bench

@@ -22,7 +22,8 @@
 #include "palpate/error.hpp"
 #include "palpate/pose_track.hpp"
 #include "palpate/virtual_sensor.hpp"
-#include "recogniser.hpp"
+#include "recognition_flags.hpp"
+#include "record_output.hpp"
 #include "sensor_option.hpp"
 
 namespace palpate::cli {
@@ -41,8 +42,8 @@ struct Options {
   std::string json;
 };
 
-/// What is wrong with the poses, said at once: on standard error, or on the screen where that would
-/// be drawn over.
+/// Tells what is wrong with the poses as it happens: on standard error, or on the screen where the
+/// screen would overwrite standard error.
 class PoseComplaints {
  public:
   void add(const std::string& problem) {
@@ -52,7 +53,7 @@ class PoseComplaints {
       fmt::print(stderr, "palpate: {}\n", problem);
     }
   }
-  /// There is a screen from here on.
+  /// Whether there is a screen from now on.
   void show(bool on_screen) {
     const std::lock_guard lock(mutex_);
     on_screen_ = on_screen;
@@ -68,7 +69,7 @@ class PoseComplaints {
   bool on_screen_ = false;
 };
 
-/// The sensor with its poses. `posed` is left as it is where they are the sensor's own.
+/// The sensor with its poses. `posed` stays as it is where the sensor knows its poses.
 std::unique_ptr<Sensor> open_posed_sensor(const Options& options, PoseComplaints& complaints,
                                           const PosedSensor*& posed) {
   if (options.poses.empty() && !is_virtual_sensor(options.sensor)) {
@@ -88,20 +89,21 @@ std::unique_ptr<Sensor> open_posed_sensor(const Options& options, PoseComplaints
   return with_poses;
 }
 
-/// A first touch pages memory in, and may compile; a real one should not have to wait for that.
+/// Uses the recogniser once and forgets: the first touch pages memory in and may compile shaders,
+/// for which no real touch should wait.
 void warm_up(Recogniser& recogniser, const RecognitionTask& task, const SensorDescription& sensor,
              const std::vector<glm::dvec2>& elements_mm) {
-  // In Contact and No Contact by turns: what is Unknown would be passed over.
+  // In Contact and No Contact by turns, since Unknown elements are skipped.
   std::vector<double> pressure(elements_mm.size(), 0.0);
   for (std::size_t i = 0; i < pressure.size(); i += 2) {
-    pressure[i] = 2.0 * task.histogram.contact.classifier.threshold + 1.0;
+    pressure[i] = 2.0 * task.classifier().threshold + 1.0;
   }
   const Touch touch{.T_robot_sensor = {},
                     .elements_mm = elements_mm,
                     .pressure = pressure,
                     .valid = sensor.valid};
   recogniser.prepare(touch);
-  recogniser.update(std::span(&touch, 1), [](double) {});
+  recogniser.update(std::span(&touch, 1));
   recogniser.refine(recogniser.estimate().mode);
   recogniser.reset();
 }
@@ -121,7 +123,7 @@ void live(const Options& options) {
   replace_array(scene, options.recognition.scene, source, elements_mm.size(), elements_mm);
   const TouchDetectorOptions detector =
       detector_options(options.detector, description.pressure_unit, source);
-  RecognitionTask task = prepare(options.recognition, scene, description.pressure_unit, source);
+  RecognitionTask task = task_of(options.recognition, scene, description.pressure_unit, source);
   CommandFiles files;
   add_sensor_files(options.sensor, options.poses, files);
   add_recognition_files(options.recognition, scene, task, files);
@@ -129,16 +131,16 @@ void live(const Options& options) {
     files.writes("--json", options.json, CommandFiles::Dash::stream);
   }
   files.require_distinct();
-  Device device = Device::open(task.device);
-  settle_bins(device, task);
-  const std::unique_ptr<Recogniser> recogniser = make_recogniser(device, task);
-  warm_up(*recogniser, task, description, elements_mm);
+  Device device = open_device(options.recognition, scene);
+  Recogniser recogniser = open_recogniser(device, task);
+  warm_up(recogniser, task, description, elements_mm);
   std::optional<LineFile> json;
   if (!options.json.empty()) {
     json.emplace(options.json);
   }
 
-  // A reader of our output that ends is an error like a full disk, and no end without a word.
+  // Where the reader of our output ends, writing fails with an error as on a full disk; SIGPIPE
+  // would end the program silently.
   std::signal(SIGPIPE, SIG_IGN);
   const Interruption interruption;
   const bool to_program = options.json == "-";
@@ -147,12 +149,12 @@ void live(const Options& options) {
       isatty(fileno(people)) != 0 && !(to_program && isatty(STDOUT_FILENO) != 0);
   if (!to_program && !on_terminal) {
     fmt::print("{}: {} maps, {}\n{}\n", device.name(), task.hypotheses.size(),
-               recogniser->description(), table_heading());
+               filter_words(recogniser, task), table_heading());
     std::fflush(stdout);
   }
   complaints.show(on_terminal && isatty(STDERR_FILENO) != 0);
   LiveRecognition recognition(
-      *sensor, elements_mm, *recogniser, task,
+      *sensor, elements_mm, recogniser, task,
       {.detector = detector, .tare_s = options.tare_s, .reset_after_s = options.reset_after_s},
       [&](const LiveTouch& touch) {
         if (json) {
@@ -190,29 +192,31 @@ void live(const Options& options) {
 }  // namespace
 
 void add_live(CLI::App& app) {
-  auto* command = app.add_subcommand("live",
-                                     "Recognise and locate what a sensor touches, touch by touch, "
-                                     "until Ctrl-C. On a terminal: the "
-                                     "pressure, the identity, the object's map with the array on "
-                                     "it; key r begins the next unknown. "
-                                     "Poses are T_object_robot");
+  auto* command = app.add_subcommand(
+      "live",
+      "Recognise what a sensor touches and find its pose T_object_robot, touch by touch, until "
+      "Ctrl-C. A terminal shows the pressure, the identity and the array on the object's map; key "
+      "r "
+      "begins the next unknown object");
   const auto options = std::make_shared<Options>();
   command->add_option("--sensor", options->sensor, sensor_help)->required();
   command->add_option(
       "--poses", options->poses,
-      std::string(poses_help) + " [default: the frames' own, in replays and simulations]");
+      std::string(poses_help) + " [default: the poses of the replay or simulation]");
   add_recognition_flags(*command, options->recognition);
   add_detector_flags(*command, options->detector);
   command
-      ->add_option("--tare", options->tare_s,
-                   "The array's baseline is read from the first seconds, when nothing touches it, "
-                   "unless the sensor knows it; 0: none")
+      ->add_option(
+          "--tare", options->tare_s,
+          "Seconds at the start in which nothing may touch the array and its baseline is read, "
+          "unless the sensor knows the baseline; 0: no baseline")
       ->capture_default_str();
-  command->add_option("--reset-after", options->reset_after_s,
-                      "The first touch after so many seconds without contact is of another unknown "
-                      "[default: never]");
+  command->add_option(
+      "--reset-after", options->reset_after_s,
+      "Seconds without contact after which the next touch is of another unknown object "
+      "[default: never]");
   command->add_option("--json", options->json,
-                      "Write a line of JSON for each touch, at once; - is standard output");
+                      "Write a line of JSON for each touch as it comes; - is standard output");
   command->callback([options] { live(*options); });
 }
 

@@ -9,17 +9,13 @@
 #include "options.hpp"
 #include "palpate/error.hpp"
 #include "printable.hpp"
+#include "record_output.hpp"
 
 namespace palpate::cli {
 
 namespace {
 
 double time_s(const LiveTouch& touch) { return 0.5 * (touch.touch.begin_s + touch.touch.end_s); }
-
-/// The best there is: between the bins where the filter has some.
-const Pose& pose_of(const Step& step) {
-  return step.refined ? step.refined->T_object_robot : step.mode.T_object_robot;
-}
 
 }  // namespace
 
@@ -45,14 +41,12 @@ std::string table_heading() {
 }
 
 std::string table_line(const LiveTouch& touch, const RecognitionTask& task) {
-  const Step& step = touch.step;
-  const Pose& T = pose_of(step);
-  const std::optional<double> error_mm = step.refined ? step.refined_error_mm : step.error_mm;
+  const RecognitionStep& step = touch.step;
+  const Pose& T = step.pose();
   return fmt::format("{:>7}  {:>5}  {:<10} {:>11.6f} {:>8.2f} {:>8.2f} {:>10.1f}  {:>8}  {:>10.2f}",
                      touch.unknown + 1, touch.index + 1, printable(task.labels[step.best]),
                      step.identity[step.best], T.translation_mm.x, T.translation_mm.y,
-                     degrees(T.theta_rad), error_mm ? fmt::format("{:.2f}", *error_mm) : "-",
-                     touch.latency_ms);
+                     degrees(T.theta_rad), error_text(step.pose_error_mm()), touch.latency_ms);
 }
 
 std::string summary(const LiveState& state, std::vector<double> latencies_ms,
@@ -76,8 +70,8 @@ std::string summary(const LiveState& state, std::vector<double> latencies_ms,
                         state.worst_latency_ms);
   }
   if (state.last) {
-    const Step& step = state.last->step;
-    const Pose& T = pose_of(step);
+    const RecognitionStep& step = state.last->step;
+    const Pose& T = step.pose();
     text += fmt::format("{} ({:.1f} %); {} at x {:.2f} mm, y {:.2f} mm, theta {:.1f} deg\n",
                         printable(task.labels[step.best]), 100.0 * step.identity[step.best],
                         printable(task.labels[task.label_of[step.mode.object]]), T.translation_mm.x,

@@ -8,20 +8,20 @@
 
 namespace palpate::cli {
 
-/// One touch in the form that other programs rely on, a line of JSON: time (of the middle of the
-/// steady phase, in seconds since the Unix epoch), unknown and touch from 0 on, pose
-/// (T_robot_sensor), what `recognize` writes of an estimate, latency_ms, frames_lost.
+/// A line of JSON for one touch: time (the middle of the steady phase, seconds since the Unix
+/// epoch), unknown and touch (counted from 0), pose (T_robot_sensor), the fields that `recognize`
+/// writes of an estimate, latency_ms and frames_lost.
 std::string json_line(const LiveTouch& touch, const RecognitionTask& task);
 
 /// Heading and lines of a table for people.
 std::string table_heading();
 std::string table_line(const LiveTouch& touch, const RecognitionTask& task);
 
-/// What became of it all, in a few lines.
+/// The whole stream in a few lines.
 std::string summary(const LiveState& state, std::vector<double> latencies_ms,
                     const RecognitionTask& task);
 
-/// A file that lines are added to, each there for others to read at once.
+/// A file to which lines are added; other programs can read each line at once.
 class LineFile {
  public:
   /// Replaces an older file; "-" is standard output. Throws Error.

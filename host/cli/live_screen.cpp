@@ -67,9 +67,9 @@ void LiveScreen::describe(const LiveState& state) {
     view_.state += fmt::format("; skipped {} touches without a pose", state.without_pose);
   }
   view_.pressure = state.pressure;
-  // Most presses are several times as strong as the contact threshold. Touches, which are robust
-  // means, may widen the scale; a single frame of 1e38 may not, or nothing else would be seen.
-  view_.full_scale = std::max(5.0 * task_.histogram.contact.classifier.threshold, 1e-6);
+  // Most presses are several times as strong as the contact threshold. A touch may widen the scale;
+  // a single frame may not, because a reading of 1e38 would leave nothing else to be seen.
+  view_.full_scale = std::max(5.0 * task_.classifier().threshold, 1e-6);
   if (state.last) {
     for (const double pressure : state.last->touch.pressure) {
       view_.full_scale = std::max(view_.full_scale, pressure);
@@ -82,15 +82,15 @@ void LiveScreen::describe(const LiveState& state) {
   if (!state.last) {
     return;
   }
-  const Step& step = state.last->step;
+  const RecognitionStep& step = state.last->step;
   if (step.contradicted) {
     view_.state += "; no map fits these touches";
     view_.warning = true;
   }
   view_.identity = step.identity;
   view_.map = &task_.hypotheses[step.mode.object].map;
-  view_.T_object_robot = step.refined ? step.refined->T_object_robot : step.mode.T_object_robot;
-  if (const auto error_mm = step.refined ? step.refined_error_mm : step.error_mm) {
+  view_.T_object_robot = step.pose();
+  if (const auto error_mm = step.pose_error_mm()) {
     view_.state += fmt::format("; error {:.2f} mm", *error_mm);
   }
   view_.latency_ms = state.last->latency_ms;
@@ -105,11 +105,10 @@ void LiveScreen::place_array(const LiveState& state) {
   const std::vector<std::uint8_t>& valid = now ? view_.valid : state.last->touch.valid;
   view_.readings.clear();
   if (pressure.size() == view_.elements_mm.size()) {
-    view_.readings =
-        task_.histogram.contact.classifier.classify({.T_robot_sensor = *view_.T_robot_sensor,
-                                                     .elements_mm = view_.elements_mm,
-                                                     .pressure = pressure,
-                                                     .valid = valid});
+    view_.readings = task_.classifier().classify({.T_robot_sensor = *view_.T_robot_sensor,
+                                                  .elements_mm = view_.elements_mm,
+                                                  .pressure = pressure,
+                                                  .valid = valid});
   }
 }
 

@@ -14,12 +14,12 @@
 #include "atomic_file.hpp"
 #include "command_files.hpp"
 #include "figures.hpp"
+#include "options.hpp"
 #include "palpate/error.hpp"
 #include "palpate/files.hpp"
 #include "progress.hpp"
-#include "recogniser.hpp"
-#include "recognition_record.hpp"
-#include "recognition_task.hpp"
+#include "recognition_flags.hpp"
+#include "record_output.hpp"
 #include "unknowns.hpp"
 
 namespace palpate::cli {
@@ -36,34 +36,37 @@ struct Options {
 };
 
 std::filesystem::path png_path(const Options& options, const Unknown& unknown) {
-  const std::string stem = std::filesystem::path(unknown.recording->path).stem().string();
+  const std::string stem = std::filesystem::path(unknown.recording).stem().string();
   return std::filesystem::path(options.png) /
          (unknown.frame ? fmt::format("{}.{}.png", stem, *unknown.frame) : stem + ".png");
 }
 
-/// Throws Error where a result could not be kept: before the work, not after.
+/// Throws Error where an output cannot be written, before any work is done.
 void check_outputs(const Options& options, const Scene& scene, const RecognitionTask& task,
                    const std::vector<Unknown>& unknowns) {
   if (!options.posterior.empty()) {
-    if (task.particles) {
+    if (std::holds_alternative<ParticleOptions>(task.filter)) {
       throw Error(Fault::input, fmt::format("--posterior {}: particles have no bins; use --filter "
                                             "histogram",
                                             options.posterior));
     }
     if (unknowns.size() != 1) {
-      throw Error(Fault::input, fmt::format("--posterior {}: holds one unknown, not {}; select one "
-                                            "recording or frame",
-                                            options.posterior, unknowns.size()));
+      throw Error(Fault::input,
+                  fmt::format("--posterior {}: the file holds one unknown, not {}; select "
+                              "one recording or frame",
+                              options.posterior, unknowns.size()));
     }
   }
   if (!options.png.empty()) {
     std::set<std::filesystem::path> pictures;
     for (const Unknown& unknown : unknowns) {
       if (!pictures.insert(png_path(options, unknown)).second) {
-        throw Error(Fault::input,
-                    fmt::format("{}: another recording has the same name, and so would its "
-                                "picture; rename one",
-                                unknown.recording->path));
+        throw Error(
+            Fault::input,
+            fmt::format(
+                "{}: its picture would overwrite the picture of another recording of the same "
+                "name; rename one of them",
+                unknown.recording));
       }
     }
   }
@@ -96,37 +99,7 @@ void check_outputs(const Options& options, const Scene& scene, const Recognition
   }
 }
 
-RecognitionRecord recognize_one(const Unknown& unknown, const RecognitionTask& task, bool trace,
-                                Recogniser& recogniser,
-                                const std::function<void(double)>& progress) {
-  RecognitionRecord record{.recording = unknown.recording->path,
-                           .frame = unknown.frame,
-                           .touches = unknown.touches.size(),
-                           .true_label = true_label(*unknown.recording),
-                           .trace = {}};
-  const auto look = [&] {
-    record.trace.push_back(judge(recogniser, record.true_label, unknown.recording->truth, task));
-  };
-  const auto start = std::chrono::steady_clock::now();
-  recogniser.reset();
-  if (trace) {
-    const auto touches = static_cast<double>(unknown.touches.size());
-    for (const Touch& touch : unknown.touches) {
-      const auto done = static_cast<double>(record.trace.size());
-      recogniser.update(std::span(&touch, 1),
-                        [&](double fraction) { progress((done + fraction) / touches); });
-      look();
-    }
-  } else {
-    recogniser.update(unknown.touches, progress);
-    look();
-  }
-  record.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-  return record;
-}
-
-/// Edge at which an element is drawn: as a DigiTacts's, or where others lie closer, as their pitch
-/// allows.
+/// Edge of the squares that stand for elements, mm: 90 % of the pitch, at most 1.8 mm.
 double element_edge_mm(const Touch& touch) {
   const glm::dvec2& first = touch.elements_mm.front();
   double nearest = 2.0;
@@ -138,7 +111,7 @@ double element_edge_mm(const Touch& touch) {
 
 std::string draw_sheet(const RecognitionRecord& record, const Unknown& unknown,
                        const RecognitionTask& task, const Recogniser& recogniser) {
-  const Step& last = record.last();
+  const RecognitionStep& last = record.last();
   RecognitionSheet sheet;
   sheet.title = name_of(record);
   sheet.map = task.hypotheses[last.mode.object].map;
@@ -147,7 +120,7 @@ std::string draw_sheet(const RecognitionRecord& record, const Unknown& unknown,
   sheet.none = task.labels[last.best] == none_label;
   sheet.true_object = record.true_label;
   if (last.error_mm) {
-    sheet.truth = unknown.recording->truth->T_object_robot;
+    sheet.truth = unknown.truth.T_object_robot;
     sheet.error_mm = last.error_mm;
   }
   sheet.belief = recogniser.marginals(last.mode.object);
@@ -158,7 +131,7 @@ std::string draw_sheet(const RecognitionRecord& record, const Unknown& unknown,
       footprint.push_back(touch.T_robot_sensor * element);
     }
   }
-  for (const Step& step : record.trace) {
+  for (const RecognitionStep& step : record.trace) {
     sheet.identity.push_back(step.identity);
   }
   return draw_recognition(sheet);
@@ -175,7 +148,7 @@ void export_posterior(const std::filesystem::path& path, const RecognitionTask& 
   });
 }
 
-/// Writes posterior and JSON, both or none.
+/// Writes posterior and JSON; where one of them cannot be written, neither appears.
 void write_results(const Options& options, const RecognitionTask& task,
                    const Recogniser& recogniser, const std::string& json) {
   std::optional<AtomicFile> json_file;
@@ -195,17 +168,18 @@ void recognize(const Options& options) {
   const Scene scene = scene_of(options.recognition);
   const Unknowns unknowns = read_unknowns(options.unknowns, scene, options.recognition.scene);
   const Recording& first = unknowns.recordings.front();
-  RecognitionTask task = prepare(options.recognition, scene, first.pressure_unit, first.path);
-  task.histogram.still_array = unknowns.still_array;
+  RecognitionTask task = task_of(options.recognition, scene, first.pressure_unit, first.path);
+  if (auto* histogram = std::get_if<HistogramOptions>(&task.filter)) {
+    histogram->still_array = array_is_still(unknowns.list);
+  }
   check_outputs(options, scene, task, unknowns.list);
-  Device device = Device::open(task.device);
-  settle_bins(device, task);
-  const std::unique_ptr<Recogniser> recogniser = make_recogniser(device, task);
+  Device device = open_device(options.recognition, scene);
+  Recogniser recogniser = open_recogniser(device, task);
   if (!options.png.empty()) {
     make_folder(options.png);
   }
 
-  // The sheet shows the identity over the touches, so it needs the trace too.
+  // The picture shows the identity after every touch, so it needs the trace.
   const bool trace = options.trace || !options.png.empty();
   std::vector<RecognitionRecord> records;
   auto json = nlohmann::ordered_json::array();
@@ -216,12 +190,13 @@ void recognize(const Options& options) {
         progress.show((static_cast<double>(records.size()) + fraction) /
                       static_cast<double>(unknowns.list.size()));
       };
-      records.push_back(recognize_one(unknown, task, trace, *recogniser, show));
+      records.push_back(recognise(recogniser, task, unknown, trace, show));
+      records.back().require_steps();
       show(0.0);
       json.push_back(to_json(records.back(), task, device.name(), options.trace));
       if (!options.png.empty()) {
         write_file(png_path(options, unknown),
-                   draw_sheet(records.back(), unknown, task, *recogniser));
+                   draw_sheet(records.back(), unknown, task, recogniser));
       }
     }
   }
@@ -229,13 +204,13 @@ void recognize(const Options& options) {
   // The path of a recording need not be UTF-8, as JSON must.
   const std::string json_text =
       json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
-  // The files before anything is printed: nobody may be listening any more.
-  write_results(options, task, *recogniser, json_text);
+  // Files come first: printing fails where the reader of standard output has ended.
+  write_results(options, task, recogniser, json_text);
   if (options.json == "-") {
     fmt::print("{}", json_text);
   } else {
     fmt::print("{}: {} maps, {}\n\n", device.name(), task.hypotheses.size(),
-               recogniser->description());
+               filter_words(recogniser, task));
     if (options.trace) {
       for (const RecognitionRecord& record : records) {
         print_trace(record, task);
@@ -249,10 +224,10 @@ void recognize(const Options& options) {
 }  // namespace
 
 void add_recognize(CLI::App& app) {
-  auto* command = app.add_subcommand("recognize",
-                                     "Recognise and locate the object of each recording among "
-                                     "known maps. Poses are T_object_robot, "
-                                     "p_object = R(theta) p_robot + (x, y)");
+  auto* command = app.add_subcommand(
+      "recognize",
+      "Recognise the object of each recording among known maps and find its pose "
+      "T_object_robot: p_object = R(theta) p_robot + (x, y)");
   const auto options = std::make_shared<Options>();
   command
       ->add_option("RECORDING", options->unknowns.recordings,
@@ -260,18 +235,21 @@ void add_recognize(CLI::App& app) {
       ->required();
   add_recognition_flags(*command, options->recognition);
   command->add_option("--frames", options->unknowns.frames,
-                      "Use the touches A:B, from A up to before B, of every recording");
+                      "Use the touches A to B - 1 of every recording, counted from 0, as A:B");
   command
-      ->add_option("--touches", options->unknowns.touches, "Use the first N touches [default: all]")
+      ->add_option("--touches", options->unknowns.touches,
+                   "Use the first N touches of every recording [default: all]")
       ->check(require_whole_number);
   command->add_flag("--each-frame", options->unknowns.each_frame,
-                    "Take every touch for an unknown object of its own");
+                    "Recognise every touch by itself, as an unknown object of its own");
   command->add_flag("--trace", options->trace, "Show the estimate after every touch");
   command->add_option("--json", options->json, "Write the records as JSON; - is standard output");
   command->add_option("--posterior", options->posterior,
-                      "Write the log-likelihood of every bin of one recording (HDF5)");
-  command->add_option("--png", options->png,
-                      "Folder for a sheet per unknown: footprints, belief, identities");
+                      "Write the log-likelihood of every bin (HDF5); for one recording or frame");
+  command->add_option(
+      "--png", options->png,
+      "Folder for a picture of each unknown: the touches on the map, the belief over x and y, "
+      "the identity after every touch");
   command->callback([options] { recognize(*options); });
 }
 

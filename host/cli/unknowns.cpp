@@ -1,11 +1,9 @@
 #include "unknowns.hpp"
 
-#include <algorithm>
-
 #include <fmt/format.h>
 
 #include "palpate/error.hpp"
-#include "recognition_task.hpp"
+#include "recognition_flags.hpp"
 #include "recordings.hpp"
 
 namespace palpate::cli {
@@ -32,26 +30,17 @@ std::vector<Unknown> list_unknowns(const UnknownsFlags& flags,
       throw Error(Fault::input, fmt::format("{}: has {} touches; --touches {} is too many",
                                             recording.path, end - begin, *flags.touches));
     }
+    const GroundTruth truth = ground_truth(recording.object, recording.truth);
     if (flags.each_frame) {
       for (std::size_t i = begin; i < end; ++i) {
-        unknowns.push_back({&recording, i, {recording.touch(i)}});
+        unknowns.push_back({recording.path, i, {recording.touch(i)}, truth});
       }
     } else {
       end = flags.touches ? begin + static_cast<std::size_t>(*flags.touches) : end;
-      unknowns.push_back({&recording, {}, recording.touches(begin, end)});
+      unknowns.push_back({recording.path, {}, recording.touches(begin, end), truth});
     }
   }
   return unknowns;
-}
-
-/// Presses one by one of one large array that never moves share most of the work.
-bool array_is_still(const std::vector<Unknown>& unknowns, bool each_frame) {
-  constexpr std::size_t large = 256;
-  const Touch& first = unknowns.front().touches.front();
-  return each_frame && unknowns.size() > 1 && first.elements_mm.size() >= large &&
-         std::all_of(unknowns.begin(), unknowns.end(), [&](const Unknown& unknown) {
-           return same_placement(unknown.touches.front(), first);
-         });
 }
 
 }  // namespace
@@ -63,7 +52,6 @@ Unknowns read_unknowns(const UnknownsFlags& flags, const Scene& scene,
     replace_array(scene, scene_file, recording.path, recording.elements(), recording.elements_mm);
   }
   result.list = list_unknowns(flags, result.recordings);
-  result.still_array = array_is_still(result.list, flags.each_frame);
   return result;
 }
 

@@ -8,16 +8,28 @@
 namespace palpate::bench {
 namespace {
 
+RecognitionStep step(bool right, double confidence, std::optional<double> error_mm = {},
+                     std::optional<double> refined_error_mm = {}) {
+  return {.identity = {confidence},
+          .right = right,
+          .error_mm = error_mm,
+          .refined_error_mm = refined_error_mm};
+}
+
+FilterRun run_of(const std::vector<std::vector<RecognitionStep>>& trials) {
+  FilterRun run;
+  for (const std::vector<RecognitionStep>& trace : trials) {
+    run.records.push_back({.trace = trace});
+  }
+  return run;
+}
+
 /// Four trials of two touches.
 FilterRun small_run() {
-  FilterRun run;
-  run.scores = {
-      {{.right = true, .confidence = 0.5, .error_mm = 4.0}, {true, 1.0, 1.0, 0.5}},
-      {{.right = true, .confidence = 0.5, .error_mm = 2.0}, {true, 1.0, 2.0, 1.5}},
-      {{.right = false, .confidence = 0.3, .error_mm = {}}, {true, 1.0, 6.0, 1.0}},
-      {{.right = false, .confidence = 0.3, .error_mm = {}}, {false, 0.6, {}, {}}},
-  };
-  return run;
+  return run_of({{step(true, 0.5, 4.0), step(true, 1.0, 1.0, 0.5)},
+                 {step(true, 0.5, 2.0), step(true, 1.0, 2.0, 1.5)},
+                 {step(false, 0.3), step(true, 1.0, 6.0, 1.0)},
+                 {step(false, 0.3), step(false, 0.6)}});
 }
 
 TEST(Curve, CountsTrialsAfterEveryTouch) {
@@ -45,9 +57,7 @@ TEST(Curve, TakesErrorsOverTheLocatedTrialsOnly) {
 }
 
 TEST(Curve, HasNoErrorWhereNothingIsLocated) {
-  FilterRun run;
-  run.scores = {{{.right = false, .confidence = 0.3, .error_mm = {}}}};
-  EXPECT_FALSE(curve_of(run).front().error);
+  EXPECT_FALSE(curve_of(run_of({{step(false, 0.3)}})).front().error);
 }
 
 TEST(Calibration, ComparesConfidenceWithTheFractionRight) {
@@ -91,9 +101,9 @@ TEST(MeanInterval, IsStudents) {
 
 TEST(Comparison, PairsTrialByTrial) {
   FilterRun other = small_run();
-  other.scores[0][0].error_mm = 7.0;  // 3 mm behind where both locate
-  other.scores[1][0].error_mm = {};   // lost: 2 mm of the other do not count
-  other.scores[2][1].right = false;
+  other.records[0].trace[0].error_mm = 7.0;  // 3 mm behind where both locate
+  other.records[1].trace[0].error_mm = {};   // lost: 2 mm of the other do not count
+  other.records[2].trace[1].right = false;
   const std::vector<PairedPoint> curve = compare(small_run(), other);
   ASSERT_EQ(curve.size(), 2U);
   EXPECT_EQ(curve[0].right_lead, 0);
@@ -104,7 +114,7 @@ TEST(Comparison, PairsTrialByTrial) {
   EXPECT_EQ(curve[1].right_lead, 1);
   EXPECT_EQ(curve[1].located_by_both, 3);
   EXPECT_DOUBLE_EQ(*curve[1].error_lead_mm, 0.0);
-  other.scores[0][0].error_mm = {};
+  other.records[0].trace[0].error_mm = {};
   EXPECT_FALSE(compare(small_run(), other)[0].error_lead_mm);
 }
 

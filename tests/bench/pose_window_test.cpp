@@ -7,6 +7,7 @@
 
 #include "letters.hpp"
 #include "palpate/pose_histogram.hpp"
+#include "trials.hpp"
 
 namespace palpate::bench {
 namespace {
@@ -68,23 +69,27 @@ TEST(PoseWindow, NearestBinIsTheNearestOfAll) {
 
 TEST(PoseWindow, GivesThePosesOfTheFullPosterior) {
   Device device = Device::open();
-  const LearnedLetters learned = learn_letters(device, MapOptions{});
+  const std::vector<Hypothesis> letters = letter_maps(device, training_recordings(), MapOptions{});
   const PoseLattice fine = lattice_of(32, 32, 122);
-  PoseHistogram histogram(device, learned.objects, {.lattice = fine});
+  PoseHistogram histogram(device, letters, {.lattice = fine});
   // Without, with two-fold and with full symmetry.
-  const std::vector<std::string> letters = {"E", "I", "O"};
-  for (const Recording& trial : make_trials(letters, 1, 15, 5)) {
+  const std::vector<std::string> names = {"E", "I", "O"};
+  for (const Recording& trial : make_trials(names, 1, 15, 5)) {
     histogram.reset();
     histogram.update(all_touches(trial));
     const Mode mode = histogram.estimate().mode;
-    ASSERT_EQ(learned.objects[mode.object].map.label, trial.truth->object);
-    const WindowEstimate estimate = estimate_in_window(device, learned, trial, fine);
-    EXPECT_TRUE(same_bin(estimate.mode, mode.T_object_robot)) << trial.truth->object;
-    const Body body = learned.bodies[mode.object];
+    ASSERT_EQ(letters[mode.object].map.label, trial.truth->object);
+    const RecognitionStep step = estimate_in_window(device, letters, trial, fine);
+    EXPECT_TRUE(same_bin(step.mode.T_object_robot, mode.T_object_robot)) << trial.truth->object;
+    const OccupancyGrid& map = letters[mode.object].map;
+    const Body body = body_of(map);
     // Float32 logs differ by some 1e-5 nats, for other tiles of bins; the window cuts off less.
-    EXPECT_LT(pose_error_mm(body, 1, estimate.refined, histogram.refine(mode).T_object_robot), 1e-5)
+    EXPECT_LT(
+        pose_error_mm(body, 1, step.refined->T_object_robot, histogram.refine(mode).T_object_robot),
+        1e-5)
         << trial.truth->object;
-    EXPECT_EQ(estimate.errors.mode_mm, error_mm(learned, mode.object, estimate.mode, *trial.truth));
+    EXPECT_EQ(step.error_mm, pose_error_mm(body, map.symmetry, step.mode.T_object_robot,
+                                           trial.truth->T_object_robot));
   }
 }
 

@@ -119,48 +119,5 @@ TEST(Trials, RefuseMoreTouchesThanThereAreToDraw) {
   EXPECT_THROW(make_trials(shapes, 1, 0, 7), Error);
 }
 
-/// A map of one occupied cell below three in a row.
-OccupancyGrid small_map(const std::string& label, int symmetry) {
-  return {.label = label,
-          .cell_mm = 1.0,
-          .symmetry = symmetry,
-          .nx = 3,
-          .ny = 2,
-          .log_odds = {1.0F, 1.0F, 1.0F, -1.0F, 1.0F, -1.0F}};
-}
-
-LearnedLetters two_objects() {
-  LearnedLetters learned;
-  learned.objects = {{.map = small_map("A", 1)}, {.map = small_map("O", 0)}};
-  for (const Hypothesis& object : learned.objects) {
-    learned.bodies.push_back(body_of(object.map));
-  }
-  return learned;
-}
-
-TEST(Score, CountsTheErrorWhereTheModesObjectIsRight) {
-  const LearnedLetters learned = two_objects();
-  Estimate estimate{.identity = {0.4, 0.6},
-                    .mode = {.object = 0, .T_object_robot = {{3.0, 4.0}, 0.0}}};
-  const Score located = score(learned, estimate, {.object = "A", .T_object_robot = {}});
-  EXPECT_FALSE(located.right);
-  EXPECT_EQ(located.confidence, 0.6);
-  ASSERT_TRUE(located.error_mm);
-  EXPECT_NEAR(*located.error_mm, 5.0, 1e-12) << "a translation by (3, 4) mm";
-
-  const Score recognised = score(learned, estimate, {.object = "O", .T_object_robot = {}});
-  EXPECT_TRUE(recognised.right);
-  EXPECT_FALSE(recognised.error_mm);
-}
-
-TEST(Score, KnowsThatAnOLooksTheSameFromAllSides) {
-  const LearnedLetters learned = two_objects();
-  // A turn about the centroid, which the robot then sees where it was.
-  const glm::dvec2 centroid_mm = learned.bodies[1].centroid_mm;
-  const Pose turned{centroid_mm - rotate(1.0, centroid_mm), 1.0};
-  EXPECT_NEAR(error_mm(learned, 1, turned, {.object = "O", .T_object_robot = {}}), 0.0, 1e-12);
-  EXPECT_GT(error_mm(learned, 0, turned, {.object = "A", .T_object_robot = {}}), 0.5);
-}
-
 }  // namespace
 }  // namespace palpate::bench

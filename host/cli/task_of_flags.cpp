@@ -1,13 +1,15 @@
-#include "recognition_task.hpp"
+#include "recognition_flags.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <set>
+#include <utility>
 
 #include <fmt/format.h>
 
 #include "file_identity.hpp"
+#include "options.hpp"
 #include "palpate/error.hpp"
 #include "palpate/files.hpp"
 #include "recordings.hpp"
@@ -62,47 +64,46 @@ std::vector<Scene::Object> objects_of(const RecognitionFlags& flags, const Scene
   return objects;
 }
 
-void load_maps(const std::vector<Scene::Object>& objects, RecognitionTask& task) {
+std::vector<Hypothesis> read_maps(const std::vector<Scene::Object>& objects) {
+  std::vector<Hypothesis> hypotheses;
   std::set<std::optional<FileIdentity>> seen;
   for (const Scene::Object& object : objects) {
     OccupancyGrid map = read_map(object.map);
     if (!seen.insert(identity_of(object.map)).second) {
       throw Error(
           Fault::input,
-          fmt::format("{}: the same map is given twice; leave one out, or give the object a "
-                      "weight in a scene file",
+          fmt::format("{}: the map is given twice; leave one out, or give the object a weight "
+                      "in a scene file",
                       object.map.string()));
     }
     map.label = object.label.value_or(map.label);
     if (map.label == none_label) {
-      throw Error(Fault::input,
-                  fmt::format("{}: label {} is kept for objects that were never learned; label the "
-                              "map otherwise in the scene file",
-                              object.map.string(), none_label));
+      throw Error(
+          Fault::input,
+          fmt::format("{}: label {} stands for objects that were never learned; give the map "
+                      "another label in the scene file",
+                      object.map.string(), none_label));
     }
     map.symmetry = object.symmetry.value_or(map.symmetry);
-    const auto known = std::find(task.labels.begin(), task.labels.end(), map.label);
-    task.label_of.push_back(static_cast<std::size_t>(known - task.labels.begin()));
-    if (known == task.labels.end()) {
-      task.labels.push_back(map.label);
-    }
-    task.map_paths.push_back(object.map.string());
-    task.hypotheses.push_back({std::move(map), object.weight});
+    hypotheses.push_back({std::move(map), object.weight});
   }
+  return hypotheses;
 }
 
 /// The prior that was given, if any. Throws Error where none was and the maps' own differ.
-std::optional<double> prior_of(const RecognitionTask& task, std::optional<double> given) {
+std::optional<double> prior_of(const std::vector<Scene::Object>& objects,
+                               const std::vector<Hypothesis>& hypotheses,
+                               std::optional<double> given) {
   if (given && !(*given > 0.0 && *given < 1.0)) {
     throw Error(Fault::input,
                 fmt::format("--prior {}: give a probability between 0 and 1", *given));
   }
-  if (const auto other = given ? std::nullopt : differing_prior(task.hypotheses)) {
+  if (const auto other = given ? std::nullopt : differing_prior(hypotheses)) {
     throw Error(Fault::input,
                 fmt::format("{}: prior {} differs from {} of {}; build the maps in one call of "
                             "palpate map, or say which prior to use with --prior",
-                            task.map_paths[*other], task.hypotheses[*other].map.prior,
-                            task.hypotheses.front().map.prior, task.map_paths.front()));
+                            objects[*other].map.string(), hypotheses[*other].map.prior,
+                            hypotheses.front().map.prior, objects.front().map.string()));
   }
   return given;
 }
@@ -147,17 +148,8 @@ PoseLattice make_lattice(const RecognitionFlags& flags, const Scene& scene) {
   return lattice.collapse_fixed();
 }
 
-/// The weight of "none of these", which becomes the last label.
-void add_none(std::optional<double> weight, RecognitionTask& task) {
-  if (!weight) {
-    return;
-  }
-  task.histogram.none_weight = require_above("--none", *weight, 0.0);
-  task.labels.emplace_back(none_label);
-}
-
-/// Whether the particle filter is asked for. Throws Error on a filter that there is not, and on
-/// flags that the other one would leave without effect.
+/// Whether the particle filter is asked for. Throws Error on a filter that does not exist and on
+/// flags that only the other filter reads.
 bool wants_particles(const RecognitionFlags& flags, const Scene& scene) {
   const std::string filter = !flags.filter.empty() ? flags.filter : scene.filter.value_or("auto");
   if (filter == "bounded") {
@@ -187,7 +179,7 @@ bool wants_particles(const RecognitionFlags& flags, const Scene& scene) {
   return particles;
 }
 
-/// What the histogram's options and the flags say to the particle filter.
+/// The particle filter's options: those that it shares with the histogram, and its flags.
 ParticleOptions particle_options(const RecognitionFlags& flags, const HistogramOptions& histogram) {
   ParticleOptions particles{.region = histogram.lattice,
                             .contact = histogram.contact,
@@ -229,34 +221,54 @@ void replace_array(const Scene& scene, const std::string& scene_file, const std:
   elements_mm = *scene.array_mm;
 }
 
-RecognitionTask prepare(const RecognitionFlags& flags, const Scene& scene,
+RecognitionTask task_of(const RecognitionFlags& flags, const Scene& scene,
                         const std::string& pressure_unit, const std::string& source) {
-  RecognitionTask task;
   const bool with_particles = wants_particles(flags, scene);
-  task.histogram.lattice = make_lattice(flags, scene);
-  task.auto_bins = flags.bins.empty() ? scene.auto_bins : flags.bins == "auto";
-  task.histogram.contact.gamma = flags.gamma ? *flags.gamma : scene.gamma.value_or(0.1);
-  if (!(task.histogram.contact.gamma >= 0.0 && task.histogram.contact.gamma < 1.0)) {
-    throw Error(Fault::input, fmt::format("--gamma {}: must be at least 0 and below 1",
-                                          task.histogram.contact.gamma));
+  HistogramOptions histogram{.lattice = make_lattice(flags, scene)};
+  ContactModel& contact = histogram.contact;
+  contact.gamma = flags.gamma ? *flags.gamma : scene.gamma.value_or(0.1);
+  if (!(contact.gamma >= 0.0 && contact.gamma < 1.0)) {
+    throw Error(Fault::input,
+                fmt::format("--gamma {}: must be at least 0 and below 1", contact.gamma));
   }
-  task.histogram.contact.classifier =
+  contact.classifier =
       make_classifier(pressure_unit, source, flags.threshold ? flags.threshold : scene.threshold,
                       flags.ratio ? flags.ratio : scene.ratio);
   if (flags.memory_mib) {
     if (*flags.memory_mib < 1) {
       throw Error(Fault::input, fmt::format("--memory-mib {}: give at least 1", *flags.memory_mib));
     }
-    task.histogram.memory_limit_bytes = static_cast<std::uint64_t>(*flags.memory_mib) << 20;
+    histogram.memory_limit_bytes = static_cast<std::uint64_t>(*flags.memory_mib) << 20;
   }
-  load_maps(objects_of(flags, scene), task);
-  add_none(flags.none ? flags.none : scene.none, task);
-  task.histogram.contact.prior = prior_of(task, flags.prior ? flags.prior : scene.prior);
-  if (with_particles) {
-    task.particles = particle_options(flags, task.histogram);
+  const std::vector<Scene::Object> objects = objects_of(flags, scene);
+  std::vector<Hypothesis> hypotheses = read_maps(objects);
+  if (const auto none = flags.none ? flags.none : scene.none) {
+    histogram.none_weight = require_above("--none", *none, 0.0);
   }
-  task.device = flags.device.empty() ? scene.device.value_or("") : flags.device;
+  contact.prior = prior_of(objects, hypotheses, flags.prior ? flags.prior : scene.prior);
+  RecognitionTask task(std::move(hypotheses),
+                       with_particles ? FilterOptions(particle_options(flags, histogram))
+                                      : FilterOptions(histogram));
+  for (const Scene::Object& object : objects) {
+    task.map_paths.push_back(object.map.string());
+  }
+  task.auto_bins = flags.bins.empty() ? scene.auto_bins : flags.bins == "auto";
   return task;
+}
+
+Device open_device(const RecognitionFlags& flags, const Scene& scene) {
+  return Device::open(flags.device.empty() ? scene.device.value_or("") : flags.device);
+}
+
+Recogniser open_recogniser(Device& device, RecognitionTask& task) {
+  if (const std::optional<CoarsenedBins> bins = settle_bins(device, task)) {
+    fmt::print(
+        stderr,
+        "palpate: --bins auto: steps of {:.2f} mm, wider than the maps resolve, keep to {} bins "
+        "in all; narrow the region, or give --bins\n",
+        bins->step_mm, bins->most_bins);
+  }
+  return {device, task};
 }
 
 void add_recognition_files(const RecognitionFlags& flags, const Scene& scene,

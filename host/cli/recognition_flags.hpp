@@ -6,10 +6,8 @@
 #include <vector>
 
 #include "command_files.hpp"
-#include "options.hpp"
-#include "palpate/particle_filter.hpp"
-#include "palpate/pose_histogram.hpp"
 #include "palpate/scene.hpp"
+#include "recogniser.hpp"
 
 namespace CLI {
 class App;
@@ -17,7 +15,7 @@ class App;
 
 namespace palpate::cli {
 
-/// The flags that say what is known and how it is recognised, as given.
+/// The flags of a task, as given.
 struct RecognitionFlags {
   std::vector<std::string> maps;
   std::string scene;
@@ -42,32 +40,28 @@ struct RecognitionFlags {
 
 void add_recognition_flags(CLI::App& command, RecognitionFlags& flags);
 
-/// What the flags and the scene file together ask for; a flag overrides the scene's key.
-struct RecognitionTask {
-  std::vector<Hypothesis> hypotheses;
-  std::vector<std::string> map_paths;  ///< [hypothesis]
-  std::vector<std::string> labels;     ///< each once, in the order of the maps; last, if any, none
-  std::vector<std::size_t> label_of;   ///< [hypothesis] index into labels
-  HistogramOptions histogram;
-  std::optional<ParticleOptions> particles;  ///< where the particle filter was asked for
-  bool auto_bins = false;                    ///< the lattice's counts are still to be chosen
-  std::string device;
-};
-
 /// The scene file that the flags name, or an empty scene. Throws Error.
 Scene scene_of(const RecognitionFlags& flags);
 
-/// Puts the scene's array, where it has one, in the place of the source's own. Throws Error where
-/// it has not as many elements.
+/// Replaces the source's array by the scene's, where the scene has an array. Throws Error where the
+/// two differ in their number of elements.
 void replace_array(const Scene& scene, const std::string& scene_file, const std::string& source,
                    std::size_t elements, std::vector<glm::dvec2>& elements_mm);
 
-/// Reads and checks everything that the flags name, for pressures of this unit. `source` is where
-/// they come from, for messages. Throws Error.
-RecognitionTask prepare(const RecognitionFlags& flags, const Scene& scene,
+/// The task that the flags and the scene file ask for; a flag overrides the scene's key. Reads the
+/// maps. Throws Error.
+/// @param pressure_unit of the touches to come, which `source` gives
+RecognitionTask task_of(const RecognitionFlags& flags, const Scene& scene,
                         const std::string& pressure_unit, const std::string& source);
 
-/// Adds the scene file and its array's, and the maps.
+/// Opens the device that the flags or the scene name. Throws Error.
+Device open_device(const RecognitionFlags& flags, const Scene& scene);
+
+/// Makes the task's filter, after --bins auto has chosen its bins. Says on standard error where the
+/// device's memory made bins wider than the maps resolve. Throws Error.
+Recogniser open_recogniser(Device& device, RecognitionTask& task);
+
+/// Adds the files that the task was read from: the scene, its array and the maps.
 void add_recognition_files(const RecognitionFlags& flags, const Scene& scene,
                            const RecognitionTask& task, CommandFiles& files);
 

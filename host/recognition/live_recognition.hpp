@@ -17,14 +17,14 @@
 #include "recognition_record.hpp"
 #include "stream_time.hpp"
 
-namespace palpate::cli {
+namespace palpate {
 
-/// What was believed after a touch of a stream.
+/// A touch of a stream and what was believed after it.
 struct LiveTouch {
   DetectedTouch touch;
-  std::size_t unknown = 0;  ///< which one, from 0
-  std::size_t index = 0;    ///< of the touch on that unknown, from 0
-  Step step;
+  std::size_t unknown = 0;  ///< the unknown's number, from 0
+  std::size_t index = 0;    ///< the touch's number on that unknown, from 0
+  RecognitionStep step;
   double latency_ms = 0.0;        ///< from taking the frame that ended the touch to its estimate
   std::uint64_t frames_lost = 0;  ///< up to that frame
 };
@@ -53,15 +53,16 @@ struct LiveOptions {
   std::optional<double> reset_after_s;  ///< after so long without contact another unknown comes
 };
 
-/// Finds the touches in a sensor's stream and updates the belief with each, from construction on.
-/// Frames are read and touches found on one thread, so that no frame is lost meanwhile the belief
-/// is updated on another; while 64 touches wait for that, none is read. While a press is released,
-/// its steady phase is evaluated already, so that the estimate does not have to wait for that.
+/// Recognises what a sensor's stream touches, from construction on. One thread reads frames and
+/// finds touches; another updates the belief, so that a slow update loses no frame. The first
+/// thread waits while 64 touches wait for the second. A press's steady phase is evaluated while the
+/// press is still being released, so that the estimate comes sooner.
 class LiveRecognition {
  public:
-  /// `on_touch` is called after each touch, on a thread of its own. What is passed by reference
-  /// must outlive this and be left alone, the task excepted.
+  /// Sensor, recogniser and task must outlive this object; nothing else may use sensor and
+  /// recogniser meanwhile.
   /// @param elements_mm [e] in the sensor frame
+  /// @param on_touch called after each touch, on another thread than the constructor's
   LiveRecognition(Sensor& sensor, std::vector<glm::dvec2> elements_mm, Recogniser& recogniser,
                   const RecognitionTask& task, const LiveOptions& options,
                   std::function<void(const LiveTouch&)> on_touch);
@@ -71,14 +72,15 @@ class LiveRecognition {
   LiveRecognition& operator=(const LiveRecognition&) = delete;
 
   LiveState state() const;
-  /// Of every touch so far.
+  /// LiveTouch::latency_ms of every touch so far.
   std::vector<double> latencies_ms() const;
-  /// Waits at most so long; true when the stream has ended and all its touches are used, or failed.
+  /// Waits for at most `timeout`. Returns true once the stream has ended and all its touches are
+  /// used, or something has failed.
   bool wait_for_end(std::chrono::milliseconds timeout);
   /// The touches to come are of another unknown.
   void reset();
-  /// Reads no more and uses what was read, the touch under way included. @throws Error where
-  /// something failed meanwhile
+  /// Stops reading and uses the touches that were read, the touch under way included.
+  /// @throws Error if the sensor or the device has failed; what `on_touch` has thrown
   void finish();
 
  private:
@@ -136,4 +138,4 @@ class LiveRecognition {
   std::thread believer_;
 };
 
-}  // namespace palpate::cli
+}  // namespace palpate

@@ -1,4 +1,4 @@
-#include "recognition_record.hpp"
+#include "record_output.hpp"
 
 #include <algorithm>
 #include <filesystem>
@@ -6,8 +6,9 @@
 #include <numbers>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
-#include "palpate/pose_error.hpp"
+#include "options.hpp"
 
 namespace palpate::cli {
 
@@ -29,11 +30,7 @@ nlohmann::ordered_json to_json(std::optional<double> error_mm) {
   return error_mm ? nlohmann::ordered_json(*error_mm) : nullptr;
 }
 
-std::string error_text(std::optional<double> error_mm) {
-  return error_mm ? fmt::format("{:.2f}", *error_mm) : "-";
-}
-
-/// What each label was taken for, most often first; only labels that were not always right.
+/// Prints what the labels that were not always right were taken for, most often first.
 void print_confusions(const std::vector<RecognitionRecord>& records, const RecognitionTask& task) {
   struct Row {
     int all = 0;
@@ -72,49 +69,23 @@ void print_confusions(const std::vector<RecognitionRecord>& records, const Recog
 
 }  // namespace
 
-const std::string& true_label(const Recording& recording) {
-  return recording.truth ? recording.truth->object : recording.object;
+std::string error_text(std::optional<double> error_mm) {
+  return error_mm ? fmt::format("{:.2f}", *error_mm) : "-";
 }
 
-Step judge(const Recogniser& recogniser, const std::string& true_label,
-           const std::optional<Truth>& truth, const RecognitionTask& task) {
-  const Estimate estimate = recogniser.estimate();
-  Step step;
-  step.mode = estimate.mode;
-  step.refined = recogniser.refine(estimate.mode);
-  step.effective_sample_size = recogniser.effective_sample_size();
-  step.contradicted = estimate.contradicted;
-  step.identity.assign(task.labels.size(), 0.0);
-  for (std::size_t i = 0; i < estimate.identity.size(); ++i) {
-    step.identity[task.label_of[i]] += estimate.identity[i];
+std::string filter_words(const Recogniser& recogniser, const RecognitionTask& task) {
+  if (const auto* particles = std::get_if<ParticleOptions>(&task.filter)) {
+    return fmt::format(
+        "{} particles, {} resampling{}, seed {}", particles->particles,
+        particles->resampling == Resampling::multinomial ? "multinomial" : "systematic",
+        particles->augmented ? ", random particles added" : "", particles->seed);
   }
-  if (task.histogram.none_weight) {
-    step.identity.back() = estimate.none;
-  }
-  step.best = static_cast<std::size_t>(
-      std::max_element(step.identity.begin(), step.identity.end()) - step.identity.begin());
-
-  if (!true_label.empty()) {
-    const bool learned =
-        std::find(task.labels.begin(), task.labels.end(), true_label) != task.labels.end();
-    step.right = task.labels[step.best] == (learned ? true_label : none_label);
-  }
-  const OccupancyGrid& map = task.hypotheses[step.mode.object].map;
-  const bool has_body =
-      std::any_of(map.log_odds.begin(), map.log_odds.end(), [](float l) { return l > 0.0F; });
-  if (truth && map.label == true_label && has_body) {
-    const auto error_mm = [&, body = body_of(map)](const Pose& T_object_robot) {
-      return pose_error_mm(body, map.symmetry, T_object_robot, truth->T_object_robot);
-    };
-    step.error_mm = error_mm(step.mode.T_object_robot);
-    if (step.refined) {
-      step.refined_error_mm = error_mm(step.refined->T_object_robot);
-    }
-  }
-  return step;
+  const PoseLattice& lattice = task.lattice();
+  return fmt::format("{} x {} x {} bins each, in {}", lattice.x_mm.count, lattice.y_mm.count,
+                     lattice.theta_rad.count, fmt::join(recogniser.histogram()->paths(), "; "));
 }
 
-nlohmann::ordered_json to_json(const Step& step, const RecognitionTask& task) {
+nlohmann::ordered_json to_json(const RecognitionStep& step, const RecognitionTask& task) {
   nlohmann::ordered_json identity;
   for (std::size_t i = 0; i < task.labels.size(); ++i) {
     identity[task.labels[i]] = step.identity[i];
@@ -163,7 +134,7 @@ nlohmann::ordered_json to_json(const RecognitionRecord& record, const Recognitio
   json["device"] = device;
   if (with_trace) {
     auto trace = nlohmann::ordered_json::array();
-    for (const Step& step : record.trace) {
+    for (const RecognitionStep& step : record.trace) {
       trace.push_back(to_json(step, task));
     }
     json["trace"] = trace;
@@ -181,7 +152,7 @@ void print_trace(const RecognitionRecord& record, const RecognitionTask& task) {
   fmt::print("{}\n  touch  best       probability     x mm     y mm  theta deg  error mm  {}\n",
              name_of(record), particles ? "effective particles" : " refined");
   for (std::size_t i = 0; i < record.trace.size(); ++i) {
-    const Step& step = record.trace[i];
+    const RecognitionStep& step = record.trace[i];
     const Pose& T = step.mode.T_object_robot;
     const std::string last = particles ? fmt::format("{:>19.1f}", *step.effective_sample_size)
                                        : fmt::format("{:>8}", error_text(step.refined_error_mm));
@@ -207,7 +178,7 @@ void print_table(const std::vector<RecognitionRecord>& records, const Recognitio
   double error_sum = 0.0;
   double refined_sum = 0.0;
   for (const RecognitionRecord& record : records) {
-    const Step& step = record.last();
+    const RecognitionStep& step = record.last();
     const Pose& T = step.mode.T_object_robot;
     fmt::print("{:<{}}  {:>7}  {:<10} {:>11.6f} {:>8.2f} {:>8.2f} {:>10.1f}  {:<10} {:>8} {:>8}\n",
                name_of(record), width, record.touches, task.labels[step.best],

@@ -9,7 +9,7 @@
 #include "palpate/baseline.hpp"
 #include "palpate/pose_track.hpp"
 
-namespace palpate::cli {
+namespace palpate {
 
 namespace {
 
@@ -276,7 +276,6 @@ void LiveRecognition::use(const Job& job) {
     }
     return;
   }
-  const SensorDescription& sensor = description_;
   const Touch touch{.T_robot_sensor = *job.touch->T_robot_sensor,
                     .elements_mm = elements_mm_,
                     .pressure = job.touch->pressure,
@@ -285,10 +284,9 @@ void LiveRecognition::use(const Job& job) {
     recogniser_.prepare(touch);
     return;
   }
-  recogniser_.update(std::span(&touch, 1), [](double) {});
-  const std::string& label = sensor.truth ? sensor.truth->object : sensor.object;
+  const GroundTruth truth = ground_truth(description_.object, description_.truth);
   LiveTouch result{.touch = *job.touch,
-                   .step = judge(recogniser_, label, sensor.truth, task_),
+                   .step = take_step(recogniser_, task_, std::span(&touch, 1), truth),
                    .frames_lost = job.frames_lost};
   result.latency_ms = std::chrono::duration<double, std::milli>(Clock::now() - job.taken).count();
   {
@@ -303,4 +301,4 @@ void LiveRecognition::use(const Job& job) {
   on_touch_(result);
 }
 
-}  // namespace palpate::cli
+}  // namespace palpate

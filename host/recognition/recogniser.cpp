@@ -1,0 +1,79 @@
+#include "recogniser.hpp"
+
+namespace palpate {
+
+namespace {
+
+std::variant<PoseHistogram, ParticleFilter> make_filter(Device& device,
+                                                        const RecognitionTask& task) {
+  if (const auto* particles = std::get_if<ParticleOptions>(&task.filter)) {
+    return ParticleFilter(device, task.hypotheses, *particles);
+  }
+  return PoseHistogram(device, task.hypotheses, std::get<HistogramOptions>(task.filter));
+}
+
+}  // namespace
+
+Recogniser::Recogniser(Device& device, const RecognitionTask& task)
+    : lattice_(task.lattice()), filter_(make_filter(device, task)) {}
+
+void Recogniser::reset() {
+  std::visit([](auto& filter) { filter.reset(); }, filter_);
+}
+
+void Recogniser::update(std::span<const Touch> touches,
+                        const std::function<void(double)>& progress) {
+  if (auto* histogram = std::get_if<PoseHistogram>(&filter_)) {
+    histogram->update(touches, progress);
+    return;
+  }
+  auto& particles = std::get<ParticleFilter>(filter_);
+  for (std::size_t i = 0; i < touches.size(); ++i) {
+    particles.update(touches[i]);
+    if (progress) {
+      progress(static_cast<double>(i + 1) / static_cast<double>(touches.size()));
+    }
+  }
+}
+
+void Recogniser::prepare(const Touch& touch) {
+  if (auto* histogram = std::get_if<PoseHistogram>(&filter_)) {
+    histogram->prepare(touch);
+  }
+}
+
+Estimate Recogniser::estimate() const {
+  return std::visit([](const auto& filter) { return filter.estimate(); }, filter_);
+}
+
+std::optional<RefinedPose> Recogniser::refine(const Mode& mode) const {
+  return histogram() != nullptr ? std::optional(histogram()->refine(mode)) : std::nullopt;
+}
+
+std::optional<double> Recogniser::effective_sample_size() const {
+  const auto* particles = std::get_if<ParticleFilter>(&filter_);
+  return particles != nullptr ? std::optional(particles->effective_sample_size()) : std::nullopt;
+}
+
+Marginals Recogniser::marginals(int object) const {
+  if (histogram() != nullptr) {
+    return histogram()->marginals(object);
+  }
+  Marginals sums{.grid = lattice_,
+                 .xy = std::vector<double>(static_cast<std::size_t>(lattice_.plane())),
+                 .theta = std::vector<double>(static_cast<std::size_t>(lattice_.theta_rad.count))};
+  for (const ParticleFilter::Particle& particle : std::get<ParticleFilter>(filter_).particles()) {
+    if (particle.object == object) {
+      const std::int64_t bin = lattice_.bin_of(particle.T_object_robot);
+      sums.xy[bin % lattice_.plane()] += particle.weight;
+      sums.theta[bin / lattice_.plane()] += particle.weight;
+    }
+  }
+  return sums;
+}
+
+std::uint64_t Recogniser::device_bytes() const {
+  return std::visit([](const auto& filter) { return filter.device_bytes(); }, filter_);
+}
+
+}  // namespace palpate

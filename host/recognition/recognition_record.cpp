@@ -1,0 +1,142 @@
+#include "recognition_record.hpp"
+
+#include <algorithm>
+#include <chrono>
+
+#include "palpate/error.hpp"
+#include "palpate/pose_error.hpp"
+
+namespace palpate {
+
+namespace {
+
+/// Pose error (Eq. 17-20) of a hypothesis that has the true label, where the true pose is known.
+std::optional<double> error_mm(const RecognitionTask& task, int object, const Pose& T_object_robot,
+                               const GroundTruth& truth) {
+  const OccupancyGrid& map = task.hypotheses[object].map;
+  const bool has_body =
+      std::any_of(map.log_odds.begin(), map.log_odds.end(), [](float l) { return l > 0.0F; });
+  if (!truth.T_object_robot || map.label != truth.label || !has_body) {
+    return {};
+  }
+  return pose_error_mm(body_of(map), map.symmetry, T_object_robot, *truth.T_object_robot);
+}
+
+using Clock = std::chrono::steady_clock;
+
+double seconds_since(Clock::time_point start) {
+  return std::chrono::duration<double>(Clock::now() - start).count();
+}
+
+}  // namespace
+
+GroundTruth ground_truth(const std::string& object, const std::optional<Truth>& truth) {
+  return truth ? GroundTruth{truth->object, truth->T_object_robot} : GroundTruth{object, {}};
+}
+
+Unknown unknown_of(const Recording& recording) {
+  return {.recording = recording.path,
+          .frame = {},
+          .touches = recording.touches(0, recording.size()),
+          .truth = ground_truth(recording.object, recording.truth)};
+}
+
+bool array_is_still(std::span<const Unknown> unknowns) {
+  constexpr std::size_t large = 256;
+  const auto is_press = [&](const Unknown& unknown) {
+    return unknown.frame && unknown.touches.size() == 1 &&
+           same_placement(unknown.touches.front(), unknowns.front().touches.front());
+  };
+  return unknowns.size() > 1 && std::all_of(unknowns.begin(), unknowns.end(), is_press) &&
+         unknowns.front().touches.front().elements_mm.size() >= large;
+}
+
+void RecognitionRecord::require_steps() const {
+  if (!error.empty()) {
+    throw Error(Fault::input, error);
+  }
+}
+
+RecognitionStep judge(const Estimate& estimate, const GroundTruth& truth,
+                      const RecognitionTask& task) {
+  const std::vector<std::string>& labels = task.labels;
+  RecognitionStep step{.identity = std::vector<double>(labels.size()),
+                       .mode = estimate.mode,
+                       .refined = {},
+                       .contradicted = estimate.contradicted};
+  for (std::size_t i = 0; i < estimate.identity.size(); ++i) {
+    step.identity[task.label_of[i]] += estimate.identity[i];
+  }
+  if (labels.back() == none_label) {
+    step.identity.back() = estimate.none;
+  }
+  step.best = static_cast<std::size_t>(
+      std::max_element(step.identity.begin(), step.identity.end()) - step.identity.begin());
+  if (!truth.label.empty()) {
+    const bool learned = std::find(labels.begin(), labels.end(), truth.label) != labels.end();
+    step.right = labels[step.best] == (learned ? truth.label : none_label);
+  }
+  step.error_mm = error_mm(task, step.mode.object, step.mode.T_object_robot, truth);
+  return step;
+}
+
+RecognitionStep take_step(Recogniser& recogniser, const RecognitionTask& task,
+                          std::span<const Touch> touches, const GroundTruth& truth,
+                          const std::function<void(double)>& progress) {
+  const Clock::time_point start = Clock::now();
+  recogniser.update(touches, progress);
+  const Estimate estimate = recogniser.estimate();
+  const double seconds = seconds_since(start);
+  RecognitionStep step = judge(estimate, truth, task);
+  step.seconds = seconds;
+  const Clock::time_point estimated = Clock::now();
+  step.refined = recogniser.refine(step.mode);
+  step.refine_seconds = seconds_since(estimated);
+  if (step.refined) {
+    step.refined_error_mm = error_mm(task, step.mode.object, step.refined->T_object_robot, truth);
+  }
+  step.effective_sample_size = recogniser.effective_sample_size();
+  return step;
+}
+
+RecognitionRecord recognise(Recogniser& recogniser, const RecognitionTask& task,
+                            const Unknown& unknown, bool trace,
+                            const std::function<void(double)>& progress) {
+  RecognitionRecord record{.recording = unknown.recording,
+                           .frame = unknown.frame,
+                           .touches = unknown.touches.size(),
+                           .true_label = unknown.truth.label,
+                           .trace = {},
+                           .error = unknown.error};
+  if (record.error.empty() && unknown.touches.empty()) {
+    record.error = unknown.recording + ": no touches";
+  }
+  if (!record.error.empty()) {
+    return record;
+  }
+  const Clock::time_point start = Clock::now();
+  const std::span<const Touch> touches = unknown.touches;
+  const std::size_t together = trace ? 1 : touches.size();
+  try {
+    recogniser.reset();
+    for (std::size_t done = 0; done < touches.size(); done += together) {
+      const auto show = [&](double fraction) {
+        progress((static_cast<double>(done) + fraction * static_cast<double>(together)) /
+                 static_cast<double>(touches.size()));
+      };
+      record.trace.push_back(
+          take_step(recogniser, task, touches.subspan(done, together), unknown.truth,
+                    progress ? std::function<void(double)>(show) : std::function<void(double)>()));
+    }
+  } catch (const Error& error) {
+    if (error.fault() != Fault::input) {
+      throw;
+    }
+    record.trace.clear();
+    record.error = error.what();
+  }
+  record.seconds = seconds_since(start);
+  return record;
+}
+
+}  // namespace palpate

@@ -1,0 +1,99 @@
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "palpate/touch.hpp"
+#include "recogniser.hpp"
+#include "recognition_task.hpp"
+
+namespace palpate {
+
+/// What is known about an unknown object.
+struct GroundTruth {
+  std::string label;                   ///< "" where it is not known
+  std::optional<Pose> T_object_robot;  ///< where it is known
+};
+/// The truth that a recording or a sensor has, or else the label of the object that it names.
+GroundTruth ground_truth(const std::string& object, const std::optional<Truth>& truth);
+
+/// One unknown object: its touches in order, views into memory that the caller keeps alive.
+struct Unknown {
+  std::string recording;             ///< file of the touches, or another name
+  std::optional<std::size_t> frame;  ///< index in the file where each touch is an unknown
+  std::vector<Touch> touches;
+  GroundTruth truth;
+  std::string error = {};  ///< why the touches are missing, such as a file that cannot be read
+};
+/// All touches of a recording as one unknown.
+Unknown unknown_of(const Recording& recording);
+
+/// Whether the unknowns are single presses of one large array that stays in its place, so that
+/// HistogramOptions::still_array saves time.
+bool array_is_still(std::span<const Unknown> unknowns);
+
+/// What the filter believes after a touch.
+struct RecognitionStep {
+  std::vector<double> identity;  ///< [label] probability, summed over the maps of the label
+  std::size_t best = 0;          ///< index of the label with the largest probability
+  Mode mode;
+  std::optional<RefinedPose> refined;  ///< empty for particles
+  bool contradicted = false;           ///< see Estimate
+  /// Whether `best` is the true label, where that label is known. "(none)" is right where no map
+  /// has the true label.
+  std::optional<bool> right;
+  /// Pose error of the mode, mm; see pose_error_mm(). Only where the true pose is known and the
+  /// mode's map has the true label, as in Sec. IV.
+  std::optional<double> error_mm;
+  std::optional<double> refined_error_mm;       ///< pose error of the refined pose, mm
+  std::optional<double> effective_sample_size;  ///< of the particles; empty for a histogram
+  double seconds = 0.0;                         ///< wall time from the touch to the estimate
+  double refine_seconds = 0.0;                  ///< wall time of the refined pose
+
+  double confidence() const { return identity[best]; }
+  /// The refined pose, or the mode's where there is none; T_object_robot.
+  const Pose& pose() const { return refined ? refined->T_object_robot : mode.T_object_robot; }
+  /// The error of pose(), mm.
+  std::optional<double> pose_error_mm() const { return refined ? refined_error_mm : error_mm; }
+};
+
+/// The result for one unknown: its steps, or the error that prevented them.
+struct RecognitionRecord {
+  std::string recording;
+  std::optional<std::size_t> frame;
+  std::size_t touches = 0;
+  std::string true_label;              ///< "" where it is not known
+  std::vector<RecognitionStep> trace;  ///< after every touch, or only after the last touch
+  double seconds = 0.0;                ///< wall time of the whole trace
+  std::string error = {};              ///< "" where there are steps
+
+  const RecognitionStep& last() const { return trace.back(); }
+  /// Throws `error` as Error (Fault::input) where there is one.
+  void require_steps() const;
+};
+
+/// Sums an estimate by label and compares it with the truth, as far as the truth is known.
+RecognitionStep judge(const Estimate& estimate, const GroundTruth& truth,
+                      const RecognitionTask& task);
+
+/// Updates the belief with these touches, then judges the estimate and its refined pose.
+/// @throws Error as Recogniser::update() does
+RecognitionStep take_step(Recogniser& recogniser, const RecognitionTask& task,
+                          std::span<const Touch> touches, const GroundTruth& truth,
+                          const std::function<void(double)>& progress = {});
+
+/// Recognises one unknown; what the recogniser believed before is forgotten. Where the unknown is
+/// at fault (it has an error or no touches, or a touch is not sound), the record holds the error,
+/// and the next unknown can follow.
+/// @param trace whether to record a step after every touch instead of only after the last touch
+/// @param progress called now and then with the fraction done
+/// @throws Error (Fault::system) if the device fails; what `progress` throws
+RecognitionRecord recognise(Recogniser& recogniser, const RecognitionTask& task,
+                            const Unknown& unknown, bool trace,
+                            const std::function<void(double)>& progress = {});
+
+}  // namespace palpate

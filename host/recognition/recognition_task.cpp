@@ -1,0 +1,47 @@
+#include "recognition_task.hpp"
+
+#include <algorithm>
+#include <utility>
+
+#include "palpate/balanced_lattice.hpp"
+
+namespace palpate {
+
+RecognitionTask::RecognitionTask(std::vector<Hypothesis> objects, const FilterOptions& options)
+    : hypotheses(std::move(objects)), filter(options) {
+  for (const Hypothesis& hypothesis : hypotheses) {
+    const std::string& label = hypothesis.map.label;
+    const auto known = std::find(labels.begin(), labels.end(), label);
+    label_of.push_back(static_cast<std::size_t>(known - labels.begin()));
+    if (known == labels.end()) {
+      labels.push_back(label);
+    }
+  }
+  if (std::visit([](const auto& one) { return one.none_weight.has_value(); }, filter)) {
+    labels.emplace_back(none_label);
+  }
+}
+
+const PoseLattice& RecognitionTask::lattice() const {
+  const auto* histogram = std::get_if<HistogramOptions>(&filter);
+  return histogram != nullptr ? histogram->lattice : std::get<ParticleOptions>(filter).region;
+}
+
+const ContactClassifier& RecognitionTask::classifier() const {
+  return std::visit(
+      [](const auto& one) -> const ContactClassifier& { return one.contact.classifier; }, filter);
+}
+
+std::optional<CoarsenedBins> settle_bins(const Device& device, RecognitionTask& task) {
+  if (!std::exchange(task.auto_bins, false)) {
+    return {};
+  }
+  auto* histogram = std::get_if<HistogramOptions>(&task.filter);
+  const std::int64_t most = most_bins_on(device, histogram != nullptr && histogram->still_array);
+  const BalancedLattice chosen = balanced_lattice(task.lattice(), task.hypotheses, most);
+  (histogram != nullptr ? histogram->lattice : std::get<ParticleOptions>(task.filter).region) =
+      chosen.lattice;
+  return chosen.coarsened ? std::optional(CoarsenedBins{chosen.step_mm, most}) : std::nullopt;
+}
+
+}  // namespace palpate

@@ -1,0 +1,49 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "palpate/device.hpp"
+#include "palpate/particle_filter.hpp"
+#include "palpate/pose_histogram.hpp"
+
+namespace palpate {
+
+/// The filter that recognises, by its options.
+using FilterOptions = std::variant<HistogramOptions, ParticleOptions>;
+
+/// The objects that an unknown may be, and the filter that tells which. The constructor derives the
+/// labels; neither the hypotheses nor the filter's none_weight may change afterwards.
+struct RecognitionTask {
+  RecognitionTask(std::vector<Hypothesis> objects, const FilterOptions& options);
+
+  /// The histogram's lattice, or the particles' region, whose bins only marginals have.
+  const PoseLattice& lattice() const;
+  const ContactClassifier& classifier() const;
+
+  std::vector<Hypothesis> hypotheses;
+  FilterOptions filter;
+  /// Each label once, in the order of the maps; none_label comes last where "none of these" has a
+  /// weight.
+  std::vector<std::string> labels;
+  std::vector<std::size_t> label_of;        ///< [hypothesis] index into labels
+  std::vector<std::string> map_paths = {};  ///< [hypothesis] file of the map; empty without files
+  bool auto_bins = false;                   ///< settle_bins() is to choose the lattice's counts
+};
+
+/// Bins that are wider than the maps resolve, since the device has no memory for more.
+struct CoarsenedBins {
+  double step_mm = 0.0;        ///< along x and y
+  std::int64_t most_bins = 0;  ///< limit of all objects' bins together
+};
+
+/// Chooses the lattice's counts by balanced_lattice() if the task leaves them to it (auto_bins).
+/// @returns the bins if they had to be coarsened
+/// @throws Error as balanced_lattice() does
+std::optional<CoarsenedBins> settle_bins(const Device& device, RecognitionTask& task);
+
+}  // namespace palpate

@@ -1,0 +1,206 @@
+#include "recognition_record.hpp"
+
+#include <algorithm>
+#include <limits>
+#include <stdexcept>
+
+#include <gtest/gtest.h>
+
+#include "palpate/error.hpp"
+#include "reference.hpp"
+#include "shapes.hpp"
+
+namespace palpate {
+namespace {
+
+Estimate estimate_of(std::vector<double> identity, int object, const Pose& T_object_robot,
+                     double none = 0.0) {
+  return {.identity = std::move(identity),
+          .none = none,
+          .mode = {.object = object, .T_object_robot = T_object_robot}};
+}
+
+/// What a record is worth, to be compared bit by bit.
+void expect_same(const RecognitionRecord& actual, const RecognitionRecord& expected) {
+  ASSERT_EQ(actual.error, "");
+  EXPECT_EQ(actual.last().identity, expected.last().identity);
+  EXPECT_EQ(actual.last().error_mm, expected.last().error_mm);
+  EXPECT_EQ(actual.last().refined_error_mm, expected.last().refined_error_mm);
+}
+
+TEST(Recognise, MakesABrokenUnknownARecordAndTheOthersAreRight) {
+  Device device = Device::open();
+  const Recording letter = touched_letter(4);
+  const Recording disc = touched_disc(5);
+  Recording unsound = touched_letter(6);
+  unsound.T_robot_sensor[3].translation_mm.x = std::numeric_limits<double>::quiet_NaN();
+  Unknown unreadable{.recording = "gone.h5", .error = "gone.h5: cannot be read"};
+  const std::vector<Unknown> unknowns{unknown_of(letter),
+                                      unknown_of(unsound),
+                                      unreadable,
+                                      {.recording = "empty"},
+                                      unknown_of(disc)};
+  for (const FilterOptions& filter : both_filters()) {
+    const RecognitionTask task(shapes(), filter);
+    Recogniser recogniser(device, task);
+    for (const bool trace : {false, true}) {
+      std::vector<RecognitionRecord> records;
+      for (const Unknown& unknown : unknowns) {
+        records.push_back(recognise(recogniser, task, unknown, trace));
+      }
+      for (const std::size_t good : {0U, 4U}) {
+        Recogniser alone(device, task);
+        expect_same(records[good], recognise(alone, task, unknowns[good], trace));
+        EXPECT_EQ(records[good].last().right, true);
+        EXPECT_EQ(records[good].trace.size(), trace ? 6U : 1U);
+        EXPECT_NO_THROW(records[good].require_steps());
+      }
+      EXPECT_NE(records[1].error.find("finite"), std::string::npos) << records[1].error;
+      EXPECT_TRUE(records[1].trace.empty()) << "none of the touches before the unsound one";
+      EXPECT_EQ(records[1].recording, "L");
+      EXPECT_EQ(records[2].error, unreadable.error);
+      EXPECT_EQ(records[3].error, "empty: no touches");
+      EXPECT_THROW(records[3].require_steps(), Error);
+    }
+  }
+}
+
+TEST(Recognise, EndsItsTraceWithTheSameBits) {
+  Device device = Device::open();
+  const Recording letter = touched_letter(7);
+  for (const FilterOptions& filter : both_filters()) {
+    const RecognitionTask task(shapes(), filter);
+    Recogniser recogniser(device, task);
+    expect_same(recognise(recogniser, task, unknown_of(letter), true),
+                recognise(recogniser, task, unknown_of(letter), false));
+  }
+}
+
+TEST(Recognise, SaysHowFarItIsAndCanBeLeft) {
+  Device device = Device::open();
+  const RecognitionTask task(shapes(), both_filters()[1]);
+  Recogniser recogniser(device, task);
+  const Recording recording = touched_letter(8);
+  for (const bool trace : {false, true}) {
+    std::vector<double> fractions;
+    const RecognitionRecord before =
+        recognise(recogniser, task, unknown_of(recording), trace,
+                  [&](double fraction) { fractions.push_back(fraction); });
+    EXPECT_EQ(fractions.size(), 6U);
+    EXPECT_TRUE(std::is_sorted(fractions.begin(), fractions.end()));
+    EXPECT_EQ(fractions.back(), 1.0);
+    EXPECT_THROW(recognise(recogniser, task, unknown_of(recording), trace,
+                           [](double) { throw std::runtime_error("Ctrl-C"); }),
+                 std::runtime_error);
+    expect_same(recognise(recogniser, task, unknown_of(recording), trace), before);
+  }
+}
+
+TEST(Judge, AddsUpTheMapsOfALabel) {
+  std::vector<Hypothesis> three = shapes();
+  three.push_back(three[0]);
+  const RecognitionTask task(three, HistogramOptions{});
+  const RecognitionStep step =
+      judge(estimate_of({0.3, 0.4, 0.3}, 1, {}), {.label = "L", .T_object_robot = Pose{}}, task);
+  EXPECT_EQ(step.identity, (std::vector<double>{0.3 + 0.3, 0.4}));
+  EXPECT_EQ(task.labels[step.best], "L") << "although the mode's map is the disc's";
+  EXPECT_EQ(step.confidence(), 0.3 + 0.3);
+  EXPECT_EQ(step.right, true);
+  EXPECT_FALSE(step.error_mm) << "the mode has another object";
+}
+
+TEST(Judge, HoldsNoneForRightWhereNoMapHasTheLabel) {
+  const RecognitionTask task(shapes(), HistogramOptions{.none_weight = 1.0});
+  const Estimate none = estimate_of({0.1, 0.2}, 1, {}, 0.7);
+  EXPECT_EQ(judge(none, {.label = "ring"}, task).right, true);
+  EXPECT_EQ(judge(none, {.label = "disc"}, task).right, false);
+  EXPECT_EQ(judge(none, {}, task).right, std::nullopt);
+  EXPECT_EQ(judge(none, {}, task).identity, (std::vector<double>{0.1, 0.2, 0.7}));
+  EXPECT_EQ(judge(estimate_of({0.1, 0.2}, 1, {}, 0.0), {.label = "ring"}, task).right, false);
+}
+
+TEST(Judge, ErrsAsTheReferenceSays) {
+  std::vector<Hypothesis> two = shapes();
+  const Pose found{{2.5, -1.0}, 1.9};
+  const Pose truth{{-1.0, 3.0}, 5.2};
+  for (const int symmetry : {0, 1, 2}) {
+    for (Hypothesis& hypothesis : two) {
+      hypothesis.map.symmetry = symmetry;
+    }
+    const RecognitionTask task(two, HistogramOptions{});
+    for (const int object : {0, 1}) {
+      const OccupancyGrid& map = two[object].map;
+      const Estimate estimate = estimate_of({0.5, 0.5}, object, found);
+      const RecognitionStep step =
+          judge(estimate, {.label = map.label, .T_object_robot = truth}, task);
+      ASSERT_TRUE(step.error_mm);
+      // Sums over 2,000 cells of some 100 mm^2 each, in another order.
+      EXPECT_NEAR(*step.error_mm, reference::pose_error_mm(map, found, truth), 1e-9);
+      EXPECT_FALSE(judge(estimate, {.label = map.label}, task).error_mm);
+      EXPECT_FALSE(judge(estimate, {.label = "ring", .T_object_robot = truth}, task).error_mm);
+    }
+  }
+}
+
+TEST(Judge, FindsNoErrorOfAnObjectWithoutABody) {
+  std::vector<Hypothesis> empty = shapes();
+  empty[0].map.log_odds.assign(empty[0].map.log_odds.size(), -1.0F);
+  const RecognitionTask task(empty, HistogramOptions{});
+  const RecognitionStep step =
+      judge(estimate_of({0.7, 0.3}, 0, {}), {.label = "L", .T_object_robot = Pose{}}, task);
+  EXPECT_EQ(step.right, true);
+  EXPECT_FALSE(step.error_mm);
+}
+
+TEST(TakeStep, JudgesTheRefinedPoseToo) {
+  Device device = Device::open();
+  const RecognitionTask task(shapes(), both_filters()[0]);
+  Recogniser recogniser(device, task);
+  const Recording letter = touched_letter(9);
+  const Unknown unknown = unknown_of(letter);
+  const RecognitionStep step = take_step(recogniser, task, unknown.touches, unknown.truth);
+  ASSERT_EQ(step.mode.object, 0);
+  const OccupancyGrid& map = task.hypotheses[0].map;
+  const Pose& truth = letter.truth->T_object_robot;
+  EXPECT_NEAR(*step.error_mm, reference::pose_error_mm(map, step.mode.T_object_robot, truth), 1e-9);
+  EXPECT_NEAR(*step.refined_error_mm,
+              reference::pose_error_mm(map, step.refined->T_object_robot, truth), 1e-9);
+  // Bins of 0.5 mm and 22.5 degrees; touches without noise.
+  EXPECT_LT(*step.refined_error_mm, 1.0);
+  EXPECT_EQ(step.pose_error_mm(), step.refined_error_mm);
+  EXPECT_GT(step.seconds, 0.0);
+  EXPECT_GT(step.refine_seconds, 0.0);
+}
+
+TEST(GroundTruth, IsTheTruthOrElseTheObjectThatIsNamed) {
+  const GroundTruth named = ground_truth("L", {});
+  EXPECT_EQ(named.label, "L");
+  EXPECT_FALSE(named.T_object_robot);
+  const GroundTruth known = ground_truth("", Truth{.object = "disc", .T_object_robot = {}});
+  EXPECT_EQ(known.label, "disc");
+  EXPECT_TRUE(known.T_object_robot);
+}
+
+TEST(ArrayIsStill, ForPressesOfOneLargeArrayInOnePlace) {
+  const std::vector<glm::dvec2> elements_mm(256);
+  const std::vector<double> pressure(256);
+  const Touch touch{.T_robot_sensor = {}, .elements_mm = elements_mm, .pressure = pressure};
+  const Unknown press{.recording = "rest.h5", .frame = 0, .touches = {touch}};
+  std::vector<Unknown> unknowns(3, press);
+  EXPECT_TRUE(array_is_still(unknowns));
+  EXPECT_FALSE(array_is_still(std::span(unknowns).first(1))) << "nothing to share";
+  unknowns[1].frame.reset();
+  EXPECT_FALSE(array_is_still(unknowns)) << "recordings by themselves";
+  unknowns[1] = press;
+  unknowns[1].touches.front().T_robot_sensor.translation_mm.x = 1e-9;
+  EXPECT_FALSE(array_is_still(unknowns));
+  unknowns[1] = {.recording = "gone.h5", .frame = 1, .error = "gone.h5: cannot be read"};
+  EXPECT_FALSE(array_is_still(unknowns));
+  EXPECT_FALSE(array_is_still({}));
+  Unknown small = press;
+  small.touches.front().elements_mm = small.touches.front().elements_mm.first(255);
+  EXPECT_FALSE(array_is_still(std::vector<Unknown>(3, small)));
+}
+
+}  // namespace
+}  // namespace palpate

@@ -1,0 +1,22 @@
+#pragma once
+
+#include <vector>
+
+#include "palpate/estimate.hpp"
+#include "palpate/touch.hpp"
+#include "recognition_task.hpp"
+
+namespace palpate {
+
+/// Maps of the letter L and of a disc of full symmetry.
+std::vector<Hypothesis> shapes();
+
+/// A lattice on which few touches tell the shapes apart, and as many particles as it has bins.
+std::vector<FilterOptions> both_filters();
+
+/// Six touches of the letter at a pose within the lattice, with the truth.
+Recording touched_letter(std::uint64_t seed);
+/// The same of the disc.
+Recording touched_disc(std::uint64_t seed);
+
+}  // namespace palpate
