@@ -60,6 +60,7 @@ std::string filter_name(const FilterOptions& filter) {
 
 FilterRun run_filter(Device& device, RecognitionTask task, std::span<const Recording> trials) {
   FilterRun run{.filter = filter_name(task.filter), .name = {}, .records = {}};
+  Recogniser recogniser(device, task);
   auto* particles = std::get_if<ParticleOptions>(&task.filter);
   if (particles != nullptr) {
     run.path = "particles";
@@ -67,20 +68,17 @@ FilterRun run_filter(Device& device, RecognitionTask task, std::span<const Recor
     run.name = fmt::format("{} {}", particles->augmented ? "augmented MCL" : run.filter, run.count);
   } else {
     const PoseLattice& lattice = task.lattice();
+    run.path = fmt::format("{}", fmt::join(recogniser.histogram()->paths(), "; "));
     run.count = lattice.bins();
     run.name = fmt::format("histogram {}x{}x{}", lattice.x_mm.count, lattice.y_mm.count,
                            lattice.theta_rad.count);
-  }
-  Recogniser recogniser(device, task);
-  if (particles == nullptr) {
-    run.path = fmt::format("{}", fmt::join(recogniser.histogram()->paths(), "; "));
   }
   run.seconds = seconds_of([&] {
     for (const Recording& trial : trials) {
       run.records.push_back(recognise(recogniser, task, unknown_of(trial), true));
       run.records.back().require_steps();
       run.device_bytes = std::max(run.device_bytes, recogniser.device_bytes());
-      if (particles != nullptr) {  // Reset, they would be the same particles again.
+      if (particles != nullptr) {  // reset() would start from the same particles again
         ++particles->seed;
         recogniser = Recogniser(device, task);
       }

@@ -4,8 +4,6 @@
 #include <cmath>
 #include <random>
 
-#include <fmt/format.h>
-
 #include "accuracy.hpp"
 #include "filter_run.hpp"
 #include "palpate/pose_histogram.hpp"

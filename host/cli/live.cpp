@@ -195,9 +195,8 @@ void add_live(CLI::App& app) {
   auto* command = app.add_subcommand(
       "live",
       "Recognise what a sensor touches and find its pose T_object_robot, touch by touch, until "
-      "Ctrl-C. A terminal shows the pressure, the identity and the array on the object's map; key "
-      "r "
-      "begins the next unknown object");
+      "Ctrl-C. A terminal shows the pressure, the identity and the array on the object's map; "
+      "key r begins the next unknown object");
   const auto options = std::make_shared<Options>();
   command->add_option("--sensor", options->sensor, sensor_help)->required();
   command->add_option(

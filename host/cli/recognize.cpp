@@ -1,6 +1,5 @@
 #include "commands.hpp"
 
-#include <chrono>
 #include <cmath>
 #include <filesystem>
 #include <memory>
