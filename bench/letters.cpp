@@ -38,7 +38,8 @@ std::vector<Hypothesis> letter_maps(Device& device, const std::vector<Recording>
   for (const ObjectTouches& letter : letters) {
     builder.clear();
     builder.add(letter.touches);
-    Hypothesis& hypothesis = hypotheses.emplace_back(builder.build(letter.label));
+    Hypothesis& hypothesis =
+        hypotheses.emplace_back(Hypothesis{.map = builder.build(letter.label)});
     hypothesis.map.symmetry = symmetry_of(letter.label);
   }
   return hypotheses;
