@@ -28,7 +28,7 @@ CLI::App* add_command(CLI::App& app, const char* name, const char* description, 
 }  // namespace
 }  // namespace palpate::bench
 
-int main(int argc, char** argv) {
+int main(int argc, char** argv) try {
   using namespace palpate::bench;
   palpate::open_closed_streams();
   const std::span<char* const> command_line(argv, argc);
@@ -68,24 +68,22 @@ int main(int argc, char** argv) {
                       "Most bins per object (default 10,000,000, or 100,000 with --quick)");
   command->add_option("--trials", sweep.trials, trials);
   try {
-    try {
-      app.parse(argc, argv);
-    } catch (const CLI::ParseError& error) {
-      if (app.exit(error) != 0) {
-        return 2;
-      }
-      std::cout.flush();  // --help
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    if (app.exit(error) != 0) {
+      return 2;
     }
-    if (std::fflush(stdout) != 0 || std::ferror(stdout) != 0) {
-      throw palpate::Error(palpate::Fault::system,
-                           "standard output: cannot be written; is the disk full?");
-    }
-    return 0;
-  } catch (const palpate::Error& error) {
-    std::fprintf(stderr, "palpate-bench: %s\n", error.what());
-    return error.fault() == palpate::Fault::input ? 2 : 1;
-  } catch (const std::exception& error) {
-    std::fprintf(stderr, "palpate-bench: %s\n", error.what());
-    return 1;
+    std::cout.flush();  // --help
   }
+  if (std::fflush(stdout) != 0 || std::ferror(stdout) != 0) {
+    throw palpate::Error(palpate::Fault::system,
+                         "standard output: cannot be written; is the disk full?");
+  }
+  return 0;
+} catch (const palpate::Error& error) {
+  std::fprintf(stderr, "palpate-bench: %s\n", error.what());
+  return error.fault() == palpate::Fault::input ? 2 : 1;
+} catch (const std::exception& error) {
+  std::fprintf(stderr, "palpate-bench: %s\n", error.what());
+  return 1;
 }
