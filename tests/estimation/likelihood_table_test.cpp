@@ -11,7 +11,7 @@
 #include "palpate/error.hpp"
 #include "palpate/particle_filter.hpp"
 #include "palpate/pose_histogram.hpp"
-#include "particles/particle_reference.hpp"
+#include "particles/weighed_particles.hpp"
 #include "synthetic.hpp"
 
 namespace palpate {

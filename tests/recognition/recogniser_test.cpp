@@ -61,7 +61,8 @@ TEST(Recogniser, OfParticlesTellsWhatTheParticlesTell) {
   EXPECT_EQ(fractions.size(), 6U);
   EXPECT_EQ(fractions.back(), 1.0);
   for (const int object : {0, 1}) {
-    const auto [xy, theta] = recogniser.marginals(object);
+    const auto [grid, xy, theta] = recogniser.marginals(object);
+    EXPECT_EQ(grid.bins(), 400 * 16);
     EXPECT_EQ(xy.size(), 400U);
     EXPECT_EQ(theta.size(), 16U);
     // Every particle lies in a bin; the sums differ in their order.
