@@ -75,13 +75,14 @@ FilterRun run_filter(Device& device, RecognitionTask task, std::span<const Recor
   }
   run.seconds = seconds_of([&] {
     for (const Recording& trial : trials) {
-      run.records.push_back(recognise(recogniser, task, unknown_of(trial), true));
-      run.records.back().require_steps();
-      run.device_bytes = std::max(run.device_bytes, recogniser.device_bytes());
-      if (particles != nullptr) {  // reset() would start from the same particles again
+      if (particles != nullptr && !run.records.empty()) {
+        // reset() would start from the same particles again.
         ++particles->seed;
         recogniser = Recogniser(device, task);
       }
+      run.records.push_back(recognise(recogniser, task, unknown_of(trial), true));
+      run.records.back().require_steps();
+      run.device_bytes = std::max(run.device_bytes, recogniser.device_bytes());
     }
   });
   return run;

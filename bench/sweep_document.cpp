@@ -161,8 +161,7 @@ std::string window_sentence(const Json& points) {
   }
   return fmt::format(
       "Of {} trials with the full posterior on the same lattices, modes lie within {:.1e} mm of "
-      "the "
-      "windows', and refined poses within {:.1e} mm.",
+      "the windows', and refined poses within {:.1e} mm.",
       trials, mode_mm, refined_mm);
 }
 

@@ -90,7 +90,7 @@ std::string filled(const std::map<std::string, std::string>& parts) {
   std::string html;
   std::string_view rest = page_template;
   for (std::size_t begin = 0; (begin = rest.find("{{")) != rest.npos;) {
-    const std::size_t end = rest.find("}}");
+    const std::size_t end = rest.find("}}", begin);
     html += rest.substr(0, begin);
     html += parts.at(std::string(rest.substr(begin + 2, end - begin - 2)));
     rest.remove_prefix(end + 2);

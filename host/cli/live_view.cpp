@@ -108,7 +108,7 @@ void draw_map(TerminalCanvas& canvas, const Panel& panel, const LiveView& view) 
                  const double part = evidence_at(map, p_mm) / view.evidence_nats;
                  Pixel pixel{.colour = diverging(part), .shade = 0.25 * std::clamp(part, 0.0, 1.0)};
                  const auto element = array.element_at(T_sensor_object * p_mm);
-                 if (element && view.readings[*element] == Reading::in_contact) {
+                 if (element && is_contact(view.readings[*element])) {
                    pixel = {.colour = ink, .mark = '@'};
                  } else if (element) {
                    pixel.colour = mix(pixel.colour, ink, 0.35);

@@ -29,9 +29,9 @@ struct ContactEvidence {
 ContactEvidence gather_evidence(std::span<const Touch> touches, const ContactModel& model,
                                 const glm::dvec2& pivot_mm, std::size_t segment_elements);
 
-/// Gathers the elements of a classified touch that read something else than `instead`. They add
-/// their log-likelihood less that of `instead`: nothing less for Unknown, and with No Contact what
-/// the touch says beyond an array that reads No Contact everywhere.
+/// Gathers the elements of a classified touch that read something else than `instead`. Each adds
+/// log L(reading) - log L(instead), with log L(Unknown) = 0: with No Contact, what the touch says
+/// beyond an array that reads No Contact everywhere.
 ContactEvidence gather_evidence(const Touch& touch, std::span<const Reading> readings,
                                 Reading instead, const glm::dvec2& pivot_mm,
                                 std::size_t segment_elements);

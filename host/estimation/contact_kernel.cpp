@@ -102,10 +102,11 @@ ContactTable::ContactTable(gpu::Context& context, gpu::CommandStream& stream,
   const std::uint64_t most = std::min<std::uint64_t>(
       context.limits().table_texels, context.limits().allocation / sizeof(shaders::TableNode));
   if (bytes / sizeof(shaders::TableNode) > most) {
-    throw Error(Fault::input,
-                fmt::format("likelihood table: {} numbers exceed the {} that kernels of device "
-                            "'{}' read; use fewer nodes",
-                            bytes / sizeof(shaders::TableNode), most, context.name()));
+    throw Error(
+        Fault::input,
+        fmt::format("likelihood table: its {} nodes on the device exceed the {} that device '{}' "
+                    "reads; use fewer nodes, levels or objects",
+                    bytes / sizeof(shaders::TableNode), most, context.name()));
   }
   nodes_ = gpu::Buffer(context, bytes, gpu::Memory::device, "the likelihood table",
                        VK_FORMAT_R32G32_SFLOAT);

@@ -1,6 +1,8 @@
 #include "contradiction.hpp"
 
+#include <algorithm>
 #include <cmath>
+#include <vector>
 
 #include "palpate/occupancy_grid.hpp"
 
@@ -9,12 +11,16 @@ namespace palpate {
 double prior_log_likelihood(Reading reading, const ContactModel& model) {
   const MapSample prior{.log_odds = log_odds_from_probability(model.prior.value())};
   const std::size_t sets = model.table ? model.table->sets() : 1;
-  const double first = model.log_likelihood(reading, prior);
-  double ratio = 0.0;  // of the sum over the sets to the first set's likelihood
+  std::vector<double> logs;
   for (std::size_t set = 0; set < sets; ++set) {
-    ratio += std::exp(model.log_likelihood(reading, prior, set) - first);
+    logs.push_back(model.log_likelihood(reading, prior, set));
   }
-  return first + std::log(ratio / static_cast<double>(sets));
+  const double most = *std::max_element(logs.begin(), logs.end());
+  double sum = 0.0;
+  for (const double l : logs) {
+    sum += std::exp(l - most);
+  }
+  return most + std::log(sum / static_cast<double>(sets));
 }
 
 double prior_log_likelihood(const ReadingCounts& counts, const ContactModel& model) {

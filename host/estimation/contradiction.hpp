@@ -5,9 +5,9 @@
 
 namespace palpate {
 
-/// Touches are contradicted where the prior alone explains them better by more nats than this: than
-/// the best pose, that is, of any object. exp(-700) is among the smallest numbers that float64
-/// holds at full precision.
+/// Touches contradict all hypotheses where a map of nothing but the prior explains them better than
+/// the best pose of any object does, by more than this many nats. exp(-700) is among the smallest
+/// numbers that float64 holds at full precision.
 inline constexpr double contradiction_nats = 700.0;
 
 /// Log-likelihood in nats of a reading on a map of nothing but the prior (Eq. 7). Where a table

@@ -4,21 +4,20 @@
 
 namespace palpate {
 
-/// Guards what is changed in several steps. Where an exception ends a change between two of them,
-/// the object is neither as before nor as after: it then refuses to say anything until it is begun
-/// anew.
+/// Remembers that an exception interrupted a change of several steps. The object then refuses every
+/// call until it is reset.
 class HalfDone {
  public:
-  /// @param refusal that what was left half done is answered with; says how to begin anew
+  /// @param refusal message of the Error; says how to reset the object
   explicit HalfDone(const char* refusal) : refusal_(refusal) {}
 
-  /// Throws Error where a change was left half done.
+  /// Throws Error where a change was interrupted.
   void refuse() const {
     if (half_done_) {
       throw Error(Fault::input, refusal_);
     }
   }
-  /// Makes a change; what would refuse it has been looked at before.
+  /// Runs `steps`, unless an earlier change was interrupted.
   template <typename Steps>
   void change(const Steps& steps) {
     refuse();
@@ -26,7 +25,7 @@ class HalfDone {
     steps();
     half_done_ = false;
   }
-  /// All was begun anew.
+  /// The object was reset.
   void forget() { half_done_ = false; }
 
  private:

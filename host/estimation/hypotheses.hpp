@@ -12,8 +12,8 @@ namespace palpate {
 void validate_hypotheses(std::span<const Hypothesis> hypotheses);
 
 /// The contact model with the maps' prior where it has none of its own.
-/// @throws Error where the model is not sound, the maps' priors differ, or a table has numbers of
-/// their own for another number of objects
+/// @throws Error where the model is not sound, the maps' priors differ, or a table has neither one
+/// set of numbers nor one for every hypothesis
 ContactModel resolve(const ContactModel& contact, std::span<const Hypothesis> hypotheses);
 
 /// log of the sum of the prior weights.

@@ -112,6 +112,13 @@ double ContactModel::log_likelihood(Reading reading, const MapSample& map,
     return 0.0;
   }
   if (table) {
+    const std::size_t sets = table->sets();
+    if (static_cast<std::size_t>(reading) >= table->levels() || (sets > 1 && object >= sets)) {
+      refuse_table(
+          fmt::format("it has {} levels and {} sets of numbers, none for level {} of object "
+                      "{}",
+                      table->levels(), sets, static_cast<int>(reading), object));
+    }
     return interpolate(*table, reading, map.log_odds, object);
   }
   // Eq. 7: p is the probability of a cell that is occupied, or one that is not.

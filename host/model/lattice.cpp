@@ -76,8 +76,9 @@ std::int64_t PoseLattice::bin_of(const Pose& T_object_robot) const {
   const glm::dvec2 place_mm = T_object_robot * pivot_mm;
   if (!std::isfinite(place_mm.x) || !std::isfinite(place_mm.y) ||
       !std::isfinite(T_object_robot.theta_rad)) {
-    throw Error(Fault::input, fmt::format("pose {}, {}, {}: give finite numbers", place_mm.x,
-                                          place_mm.y, T_object_robot.theta_rad));
+    throw Error(Fault::input,
+                fmt::format("pose {}, {}, {}: give finite numbers", T_object_robot.translation_mm.x,
+                            T_object_robot.translation_mm.y, T_object_robot.theta_rad));
   }
   const double middle_rad = (theta_rad.lower + theta_rad.upper) / 2.0;
   const double turn_rad = wrap_angle(T_object_robot.theta_rad - middle_rad, 2.0 * std::numbers::pi);

@@ -35,8 +35,8 @@ double InverseSensorModel::increment(Reading reading, double distance_mm) const 
   }
   const double g = peak * std::exp(-distance_mm * distance_mm / (2.0 * spread_mm * spread_mm));
   // Eq. 5 put into log odds; log1p keeps the small increments far from the element exact.
-  return reading == Reading::in_contact ? std::log1p(g * (1.0 - prior) / prior) - std::log1p(-g)
-                                        : std::log1p(-g) - std::log1p(g * prior / (1.0 - prior));
+  return is_contact(reading) ? std::log1p(g * (1.0 - prior) / prior) - std::log1p(-g)
+                             : std::log1p(-g) - std::log1p(g * prior / (1.0 - prior));
 }
 
 double InverseSensorModel::support_radius_mm(std::size_t readings, double tolerance) const {

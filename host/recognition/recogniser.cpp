@@ -23,17 +23,7 @@ void Recogniser::reset() {
 
 void Recogniser::update(std::span<const Touch> touches,
                         const std::function<void(double)>& progress) {
-  if (auto* histogram = std::get_if<PoseHistogram>(&filter_)) {
-    histogram->update(touches, progress);
-    return;
-  }
-  auto& particles = std::get<ParticleFilter>(filter_);
-  for (std::size_t i = 0; i < touches.size(); ++i) {
-    particles.update(touches[i]);
-    if (progress) {
-      progress(static_cast<double>(i + 1) / static_cast<double>(touches.size()));
-    }
-  }
+  std::visit([&](auto& filter) { filter.update(touches, progress); }, filter_);
 }
 
 void Recogniser::prepare(const Touch& touch) {

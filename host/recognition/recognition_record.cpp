@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <chrono>
 
+#include <fmt/format.h>
+
 #include "palpate/error.hpp"
 #include "palpate/pose_error.hpp"
 
@@ -117,23 +119,26 @@ RecognitionRecord recognise(Recogniser& recogniser, const RecognitionTask& task,
   const Clock::time_point start = Clock::now();
   const std::span<const Touch> touches = unknown.touches;
   const std::size_t together = trace ? 1 : touches.size();
+  bool progress_threw = false;  // its Error is the caller's, not the unknown's
   try {
     recogniser.reset();
     for (std::size_t done = 0; done < touches.size(); done += together) {
       const auto show = [&](double fraction) {
+        progress_threw = true;
         progress((static_cast<double>(done) + fraction * static_cast<double>(together)) /
                  static_cast<double>(touches.size()));
+        progress_threw = false;
       };
       record.trace.push_back(
           take_step(recogniser, task, touches.subspan(done, together), unknown.truth,
                     progress ? std::function<void(double)>(show) : std::function<void(double)>()));
     }
   } catch (const Error& error) {
-    if (error.fault() != Fault::input) {
+    if (progress_threw || error.fault() != Fault::input) {
       throw;
     }
     record.trace.clear();
-    record.error = error.what();
+    record.error = fmt::format("{}: {}", unknown.recording, error.what());
   }
   record.seconds = seconds_since(start);
   return record;

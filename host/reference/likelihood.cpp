@@ -34,6 +34,22 @@ double tabled(const LikelihoodTable& table, std::size_t level, double log_odds,
   return (1.0 - share) * nats[node] + share * nats[node + 1];
 }
 
+/// Eq. 7 or the table, with m = `prior`.
+double of_element(Reading reading, double log_odds, const ContactModel& model, double prior,
+                  std::size_t object) {
+  if (reading == Reading::unknown) {
+    return 0.0;
+  }
+  if (model.table) {
+    return tabled(*model.table, static_cast<std::size_t>(reading), log_odds, object);
+  }
+  const double log_p = log_logistic(reading == Reading::no_contact ? -log_odds : log_odds);
+  if (model.gamma == 0.0) {
+    return log_p;
+  }
+  return std::log(model.gamma * prior + (1.0 - model.gamma) * std::exp(log_p));
+}
+
 }  // namespace
 
 double interpolate(const OccupancyGrid& map, double prior, const glm::dvec2& p_object_mm) {
@@ -54,29 +70,18 @@ double interpolate(const OccupancyGrid& map, double prior, const glm::dvec2& p_o
 
 double log_likelihood(Reading reading, const MapSample& map, const ContactModel& model,
                       std::size_t object) {
-  if (reading == Reading::unknown) {
-    return 0.0;
-  }
-  if (model.table) {
-    return tabled(*model.table, static_cast<std::size_t>(reading), map.log_odds, object);
-  }
-  const double log_p = log_logistic(reading == Reading::no_contact ? -map.log_odds : map.log_odds);
-  if (model.gamma == 0.0) {
-    return log_p;
-  }
-  return std::log(model.gamma * *model.prior + (1.0 - model.gamma) * std::exp(log_p));
+  return of_element(reading, map.log_odds, model, model.prior.value_or(0.0), object);
 }
 
 double log_likelihood(const Touch& touch, const Pose& T_object_robot, const OccupancyGrid& map,
                       const ContactModel& contact, std::size_t object) {
-  ContactModel model = contact;
-  model.prior = contact.prior.value_or(map.prior);
-  const std::vector<Reading> readings = classify(touch, model);
+  const double prior = contact.prior.value_or(map.prior);
+  const std::vector<Reading> readings = classify(touch, contact);
   double sum = 0.0;
   for (std::size_t k = 0; k < readings.size(); ++k) {
     const glm::dvec2 p_object =
         transform(T_object_robot, transform(touch.T_robot_sensor, touch.elements_mm[k]));
-    sum += log_likelihood(readings[k], {interpolate(map, *model.prior, p_object)}, model, object);
+    sum += of_element(readings[k], interpolate(map, prior, p_object), contact, prior, object);
   }
   return sum;
 }

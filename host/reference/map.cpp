@@ -11,15 +11,11 @@ double increment(Reading reading, double distance_mm, const InverseSensorModel& 
   // Eq. 4, and Eq. 5 within Eq. 6.
   const double g = sensor.peak * std::exp(-distance_mm * distance_mm /
                                           (2.0 * sensor.spread_mm * sensor.spread_mm));
-  switch (reading) {
-    case Reading::in_contact:
-      return logit(m + (1.0 - m) * g) - logit(m);
-    case Reading::no_contact:
-      return logit(m - m * g) - logit(m);
-    case Reading::unknown:
-      return 0.0;
+  if (reading == Reading::unknown) {
+    return 0.0;
   }
-  return 0.0;
+  const double p = reading == Reading::no_contact ? m - m * g : m + (1.0 - m) * g;
+  return logit(p) - logit(m);
 }
 
 std::vector<double> log_odds_map(std::span<const Touch> touches, const OccupancyGrid& grid,

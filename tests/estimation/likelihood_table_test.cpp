@@ -227,6 +227,39 @@ TEST_F(EveryWay, GivesNoneOfTheseTheMeanOfTheObjectsNumbers) {
   EXPECT_LT(*most - *least, 2 * per_touch);
 }
 
+TEST_F(EveryWay, NamesNoneWhereTheObjectsNumbersLieFarApart) {
+  // exp(799) is beyond float64: a mean relative to the first object's number would be infinite.
+  ContactModel contact = learned(objects().size());
+  LikelihoodTable& table = *contact.table;
+  const std::size_t numbers = table.log_likelihood.size() / objects().size();
+  std::fill_n(table.log_likelihood.begin(), numbers, -800.0);
+  HistogramOptions options = options_of(0.8, contact);
+  options.none_weight = 1.0;
+  PoseHistogram histogram(device_, objects(), options);
+  histogram.update(moving_.touch(0));
+  const Estimate estimate = histogram.estimate();
+  EXPECT_TRUE(estimate.none > 0.0 && estimate.none < 1.0) << estimate.none;
+  EXPECT_EQ(estimate.identity[0], 0.0);
+  EXPECT_FALSE(estimate.contradicted);
+}
+
+TEST_F(EveryWay, AddsManyShortSegmentsInOneUpdateAsInSeveral) {
+  // 8 levels make up to 8 segments of one element or two in every touch. lavapipe ends an
+  // invocation after 65,535 loop iterations, of which segments take their part.
+  const ContactModel contact = learned(1);
+  const Recording recording = random_recording(2500, 8, 77);
+  const std::vector<Touch> touches = all_touches(recording);
+  for (const double step_mm : {0.1, 0.8}) {
+    PoseHistogram together(device_, objects(), options_of(step_mm, contact));
+    together.update(touches);
+    PoseHistogram apart(device_, objects(), options_of(step_mm, contact));
+    for (std::size_t first = 0; first < touches.size(); first += 250) {
+      apart.update(std::span(touches).subspan(first, 250));
+    }
+    EXPECT_EQ(together.log_likelihood(0), apart.log_likelihood(0)) << step_mm << " mm";
+  }
+}
+
 TEST_F(EveryWay, RefusesATableOfOtherObjectsOrTooLargeForTheDevice) {
   const auto refuse = [&](const ContactModel& contact, const std::string& says) {
     try {

@@ -5,6 +5,7 @@
 
 #include <gtest/gtest.h>
 
+#include "palpate/error.hpp"
 #include "shapes.hpp"
 #include "synthetic.hpp"
 
@@ -91,6 +92,21 @@ TEST(Recogniser, FindsParticlesAndHistogramInTheSamePlace) {
   EXPECT_LE(std::abs(a / 20 - b / 20), 4);
   const std::ptrdiff_t turn = most(marginals[0].theta) - most(marginals[1].theta);
   EXPECT_LE(std::abs((turn + 24) % 16 - 8), 1);
+}
+
+TEST(Recogniser, TakesInAllTouchesOfACallOrNone) {
+  Device device = Device::open();
+  const Recording recording = touched_letter(3);
+  std::vector<Touch> touches = all_touches(recording);
+  for (const FilterOptions& filter : both_filters()) {
+    Recogniser recogniser(device, RecognitionTask(shapes(), filter));
+    recogniser.update(std::span(touches).first(1));
+    const Estimate before = recogniser.estimate();
+    std::vector<Touch> unsound = touches;
+    unsound.back().pressure = unsound.back().pressure.first(1);
+    EXPECT_THROW(recogniser.update(unsound), Error);
+    expect_same(recogniser.estimate(), before);
+  }
 }
 
 TEST(Recogniser, ForgetsTheUnknownBefore) {

@@ -38,8 +38,9 @@ std::size_t DenseLikelihood::batch_for(const gpu::Context& context, const PoseLa
                 fmt::format("bins theta = {}: device '{}' takes at most {}; use fewer", thetas,
                             context.name(), table));
   }
-  // What bounds a dispatch: the table, the kernel's loops (which take up to two iterations for an
-  // element), and the work. Below 16 elements reading and writing the belief would begin to count.
+  // What bounds a dispatch: the table, the kernel's loops (at most half of their iterations are for
+  // the elements of one segment, see accumulate()), and the work. Below 16 elements reading and
+  // writing the belief would begin to count.
   const std::size_t by_table = table_bytes / bytes_per_element(lattice);
   std::int64_t bins = 0;
   for (const SlabExtent& slab : DenseBelief::cut(context, lattice, objects)) {
@@ -148,10 +149,16 @@ void DenseLikelihood::accumulate(const ContactEvidence& evidence, const DenseBel
   reserve(std::min(evidence.from_pivot_mm.size(), batch_elements_));
 
   for (std::size_t s = 0; s < segments.size();) {
-    // As many whole segments as the table holds.
+    // As many whole segments as the table holds and as the kernel's loops take together: up to two
+    // iterations for an element and eight for a segment.
     const std::size_t first = segments[s].begin;
     std::vector<shaders::Segment> batch;
-    for (; s < segments.size() && segments[s].end - first <= batch_elements_; ++s) {
+    const auto fits = [&](const shaders::Segment& next) {
+      const std::size_t elements = next.end - first;
+      return elements <= batch_elements_ &&
+             elements + 4 * (batch.size() + 1) <= gpu::most_iterations;
+    };
+    for (; s < segments.size() && fits(segments[s]); ++s) {
       batch.push_back(segments[s]);
       batch.back().begin -= static_cast<shaders::uint>(first);
       batch.back().end -= static_cast<shaders::uint>(first);

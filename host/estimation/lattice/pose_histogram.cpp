@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <optional>
 
 #include <fmt/format.h>
@@ -185,11 +186,11 @@ void PoseHistogram::reset() {
 
 void PoseHistogram::update(std::span<const Touch> touches,
                            const std::function<void(double)>& progress) {
-  impl().update(touches, progress);
+  whole().update(touches, progress);
 }
 
 void PoseHistogram::prepare(const Touch& touch) {
-  Impl& histogram = impl();
+  Impl& histogram = whole();
   if (!histogram.prepared.has_room()) {
     return;
   }

@@ -31,7 +31,7 @@ shaders::TileReading tile_reading(const glm::dvec2& local_mm, Reading reading, d
   // Eq. 5 in log odds: log((1 + g a) / (1 - g)) for contact, a = (1 - m) / m, and log((1 - g) / (1
   // + g b)) for no contact, b = m / (1 - m). Both equal 2 atanh(t), t = g gain / (2 + g skew), a
   // form that loses no digits where g is small.
-  const bool contact = reading == Reading::in_contact;
+  const bool contact = is_contact(reading);
   const double gain = contact ? 1.0 / prior : -1.0 / (1.0 - prior);
   const double skew = contact ? (1.0 - prior) / prior - 1.0 : prior / (1.0 - prior) - 1.0;
   return {static_cast<float>(local_mm.x), static_cast<float>(local_mm.y), static_cast<float>(gain),

@@ -271,7 +271,8 @@ ParticleFilter::Impl& ParticleFilter::whole() const {
 
 void ParticleFilter::reset() { impl().start(); }
 
-void ParticleFilter::update(std::span<const Touch> touches) {
+void ParticleFilter::update(std::span<const Touch> touches,
+                            const std::function<void(double)>& progress) {
   Impl& filter = whole();
   const ParticleOptions& options = filter.options;
   // All of them before the first is taken in, for one that is not sound refuses all.
@@ -282,8 +283,11 @@ void ParticleFilter::update(std::span<const Touch> touches) {
                                        ParticleLikelihood::segment_elements()));
   }
   filter.half_done.change([&] {
-    for (const ContactEvidence& of_touch : evidence) {
-      filter.update(of_touch);
+    for (std::size_t i = 0; i < evidence.size(); ++i) {
+      filter.update(evidence[i]);
+      if (progress) {
+        progress(static_cast<double>(i + 1) / static_cast<double>(evidence.size()));
+      }
     }
   });
 }

@@ -27,6 +27,11 @@ enum class Reading : std::uint8_t {
 /// In Contact at the given level of pressure, counted from 0, `in_contact` itself.
 constexpr Reading contact_level(std::size_t level) { return static_cast<Reading>(1 + level); }
 
+/// True for In Contact at any level.
+constexpr bool is_contact(Reading reading) {
+  return reading != Reading::no_contact && reading != Reading::unknown;
+}
+
 /// Eq. 3: In Contact where the pressure exceeds both the threshold and ratio times the touch's
 /// largest pressure, No Contact where it is below both, else Unknown (which includes equality).
 /// Dead elements, and those whose pressure is no number, are Unknown and do not take part in the

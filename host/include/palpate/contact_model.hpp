@@ -24,14 +24,14 @@ struct LikelihoodTable {
   /// level of contact, and one level higher for every edge that its pressure reaches.
   std::vector<double> level_edges;
   /// In nats: [level, node] for all objects together, or [object, level, node]. No Contact is the
-  /// first level. With numbers of their own for every object, "none of these" takes the mean of the
-  /// objects' likelihoods.
+  /// first level. With numbers of their own for every object, "none of these" takes, for every
+  /// reading, the plain mean of the objects' likelihoods at the prior's log odds.
   std::vector<double> log_likelihood;
 
   /// Number of levels, No Contact included.
   std::size_t levels() const { return level_edges.size() + 2; }
-  /// 1 where all objects share the numbers, or else the number of objects; of a table that is
-  /// sound.
+  /// 1 where all objects share the numbers, or else the number of objects. Only for a table that
+  /// validate() accepts.
   std::size_t sets() const { return log_likelihood.size() / (levels() * nodes); }
   /// Throws Error unless there are 2 nodes or more, at least 0.001 nats apart and within 1000 nats;
   /// finite, ascending edges, of at most `most_reading_levels` levels; and finite numbers of at
@@ -57,8 +57,10 @@ struct ContactModel {
   /// Log-likelihood of a reading in nats, 0 for Unknown:
   ///   Eq. 7: log(gamma m + (1 - gamma) p), p = 1 / (1 + exp(-l)) for contact at log odds l,
   ///   1 / (1 + exp(l)) for none; with gamma = 0 without a floor, however large l is.
-  /// The prior must be set, unless there is a table.
-  /// @param object whose numbers count, where a table has several sets
+  /// The prior must be set for Eq. 7 with gamma > 0.
+  /// @param object index of the object whose numbers are used; ignored where all objects share one
+  /// set
+  /// @throws Error where the table has no numbers for this reading or object
   double log_likelihood(Reading reading, const MapSample& map, std::size_t object = 0) const;
 };
 

@@ -18,8 +18,8 @@ struct Hypothesis {
   double weight = 1.0;  ///< prior weight, relative to the other objects'
 };
 
-/// The first hypothesis whose map's prior differs from the first map's; none where all agree. Maps
-/// recognised together share one prior, unless the contact model says which one to use.
+/// Index of the first hypothesis whose map's prior differs from the first map's; none where all
+/// agree. Maps recognised together share one prior, unless the contact model says which one to use.
 std::optional<std::size_t> differing_prior(std::span<const Hypothesis> hypotheses);
 
 /// The pose of the largest posterior probability (Eq. 15-16).

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <span>
@@ -62,9 +63,10 @@ class ParticleFilter {
   void reset();
 
   /// Resamples, moves and weighs the particles by each touch in turn (Eq. 7-8).
+  /// @param progress called with the fraction done after each touch
   /// @throws Error, and changes nothing, on a touch that is not sound; Error if the device fails:
   /// the particles may then be updated in part, and every call but reset() throws
-  void update(std::span<const Touch> touches);
+  void update(std::span<const Touch> touches, const std::function<void(double)>& progress = {});
   void update(const Touch& touch) { update(std::span(&touch, 1)); }
 
   /// Identity by Eq. 9; the pose is the maximum of the Parzen estimate with a cone kernel (Eq.
