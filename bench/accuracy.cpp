@@ -41,8 +41,7 @@ Case accuracy_case(const Inputs& inputs, const PoseLattice& lattice) {
   const Recording recording =
       unknown_recordings(1, static_cast<int>(std::end(stages)[-1].touches), 300).front();
   PoseHistogram histogram = letter_histogram(inputs, lattice);
-  Case result{.name = fmt::format("accuracy {}x{}x{}", lattice.x_mm.count, lattice.y_mm.count,
-                                  lattice.theta_rad.count),
+  Case result{.name = "accuracy " + size_of(lattice),
               .facts = {{"path", histogram.paths()}, {"sampled bins", 5 * bins_per_object}}};
   std::size_t done = 0;
   for (const auto& [touches, goal] : stages) {

@@ -1,14 +1,10 @@
 #include <algorithm>
 #include <array>
 
-#include <fmt/format.h>
-
 #include "command_run.hpp"
-#include "comparison.hpp"
 #include "experiment_result.hpp"
 #include "letters.hpp"
 #include "palpate/balanced_lattice.hpp"
-#include "palpate/error.hpp"
 
 namespace palpate::bench {
 
@@ -17,13 +13,6 @@ namespace {
 constexpr std::uint64_t learned_seed = 1'000;  ///< of the letters' trials
 constexpr std::uint64_t unlearned_seed = 100'000'000;
 constexpr std::uint64_t particle_seed = 1;
-
-int least_one(const char* field, int value) {
-  if (value < 1) {
-    throw Error(Fault::input, fmt::format("{} = {}: give 1 or more", field, value));
-  }
-  return value;
-}
 
 constexpr int most_particles = 10'000;
 
@@ -62,12 +51,8 @@ std::vector<PoseNoiseRuns> measure_pose_noise(Device& device,
 
 std::vector<NoneRun> measure_none(Device& device, const std::vector<Hypothesis>& letters,
                                   std::span<const Recording> trials, int trials_each, int touches) {
-  std::vector<int> none_touches;  // few, the paper's nine, many
-  for (const int n : {3, 9, 25}) {
-    if (n <= touches) {
-      none_touches.push_back(n);
-    }
-  }
+  std::vector<int> none_touches = {3, 9, 25};  // few, the paper's nine, many
+  std::erase_if(none_touches, [&](int n) { return n > touches; });
   if (none_touches.empty()) {
     none_touches.push_back(touches);
   }
@@ -77,14 +62,12 @@ std::vector<NoneRun> measure_none(Device& device, const std::vector<Hypothesis>&
 }
 
 ExperimentResult measure(Device& device, const ExperimentOptions& options, Report& report) {
-  const int trials_each = least_one("--trials", options.trials.value_or(options.quick ? 4 : 10));
+  require_at_least("--trials", options.trials, 1);
+  const int trials_each = options.trials.value_or(options.quick ? 4 : 10);
   const int touches = options.touches.value_or(options.quick ? 12 : 50);
   const std::vector<Recording> trials = make_trials(vowels, trials_each, touches, learned_seed);
   const std::vector<Hypothesis> letters = letter_maps(device, training_recordings(), MapOptions{});
   ExperimentResult result;
-  for (const Recording& trial : trials) {
-    result.true_objects.push_back(trial.truth->object);
-  }
   const auto add = [&](const FilterOptions& filter) {
     result.runs.push_back(run_filter(device, {letters, filter}, trials));
     report.add(case_of(result.runs.back()));

@@ -3,9 +3,7 @@
 
 #include <fmt/format.h>
 
-#include "comparison.hpp"
 #include "experiment_result.hpp"
-#include "published.hpp"
 
 namespace palpate::bench {
 

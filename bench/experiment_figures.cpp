@@ -1,24 +1,20 @@
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <iterator>
-#include <optional>
-#include <string>
+#include <tuple>
 
 #include <fmt/format.h>
 
 #include "chart.hpp"
 #include "command_run.hpp"
-#include "comparison.hpp"
 #include "experiment_result.hpp"
-#include "published.hpp"
 
 namespace palpate::bench {
 
 namespace {
 
-constexpr std::array figure_names{"fig6a",  "fig6b",   "fig7a",      "fig7b",       "augmented",
-                                  "errors", "refined", "pose_noise", "calibration", "none"};
+constexpr const char* figure_names[] = {"fig6a",       "fig6b",  "fig7a",   "fig7b",
+                                        "augmented",   "errors", "refined", "pose_noise",
+                                        "calibration", "none"};
 
 const ChartAxis touches_axis{.label = "touches", .lower = 0.0};
 constexpr const char* mean_error = "mean pose error of trials with the right letter (mm)";
@@ -111,28 +107,33 @@ Chart error_chart(const Json& document, const std::string& filter) {
   return chart_of_runs(document, filter, "/error_mm/mean", {.label = mean_error, .lower = 0.0});
 }
 
-void draw_paper_figures(const Json& document, const std::filesystem::path& folder) {
-  Chart fig6a = accuracy_chart(document, "particles");
-  fig6a.rules.push_back({.at = published::particle_accuracy,
+Chart fig6a(const Json& document) {
+  Chart chart = accuracy_chart(document, "particles");
+  chart.rules.push_back({.at = published::particle_accuracy,
                          .colour = comparison_grey,
                          .label = "paper: 10,000 particles level out"});
-  write_chart(fig6a, folder, "fig6a");
-  write_chart(error_chart(document, "particles"), folder, "fig6b");
+  return chart;
+}
 
-  Chart fig7a = accuracy_chart(document, "histogram");
-  const auto reached = [&](const char* name, Mark mark, double touches) {
-    fig7a.series.push_back({.name = name,
+Chart fig7a(const Json& document) {
+  Chart chart = accuracy_chart(document, "histogram");
+  for (const auto& [name, mark, touches] :
+       {std::tuple{"paper: 1,000 bins reach 100 %", Mark::cross, published::bins_1000_know_after},
+        std::tuple{"paper: 10,000 bins reach 100 %", Mark::diamond,
+                   published::bins_10000_know_after}}) {
+    chart.series.push_back({.name = name,
                             .colour = comparison_grey,
                             .mark = mark,
-                            .points = {{.x = touches, .y = 1.0}}});
-  };
-  reached("paper: 1,000 bins reach 100 %", Mark::cross, published::bins_1000_know_after);
-  reached("paper: 10,000 bins reach 100 %", Mark::diamond, published::bins_10000_know_after);
-  write_chart(fig7a, folder, "fig7a");
-  Chart fig7b = error_chart(document, "histogram");
-  fig7b.rules.push_back(
+                            .points = {{.x = static_cast<double>(touches), .y = 1.0}}});
+  }
+  return chart;
+}
+
+Chart fig7b(const Json& document) {
+  Chart chart = error_chart(document, "histogram");
+  chart.rules.push_back(
       {.at = published::error_mm, .colour = comparison_grey, .label = "paper: 1.3 mm"});
-  write_chart(fig7b, folder, "fig7b");
+  return chart;
 }
 
 /// Plain and Augmented MCL, in the same colours.
@@ -277,13 +278,12 @@ Chart none_chart(const Json& document) {
 std::vector<std::string> figure_files() { return chart_files(figure_names); }
 
 void draw_figures(const Json& document, const std::filesystem::path& folder) {
-  draw_paper_figures(document, folder);
-  write_chart(augmented_chart(document), folder, "augmented");
-  write_chart(errors_chart(document), folder, "errors");
-  write_chart(refined_chart(document), folder, "refined");
-  write_chart(pose_noise_chart(document), folder, "pose_noise");
-  write_chart(calibration_chart(document), folder, "calibration");
-  write_chart(none_chart(document), folder, "none");
+  const Chart charts[] = {
+      fig6a(document),         error_chart(document, "particles"), fig7a(document),
+      fig7b(document),         augmented_chart(document),          errors_chart(document),
+      refined_chart(document), pose_noise_chart(document),         calibration_chart(document),
+      none_chart(document)};
+  write_charts(charts, folder, figure_names);
 }
 
 }  // namespace palpate::bench

@@ -12,7 +12,7 @@ namespace palpate::bench {
 namespace {
 
 /// A summary of pose errors; null where there is none.
-Json record_of(const std::optional<ErrorSummary>& error) {
+Json record_of(const std::optional<ErrorsOverTrials>& error) {
   return error
              ? Json{{"mean", error->mean_mm}, {"median", error->median_mm}, {"p95", error->p95_mm}}
              : Json(nullptr);
@@ -87,7 +87,7 @@ Json record_of(const NoneRun& run, const std::vector<double>& log10_weights) {
           {"curve", std::move(curve)}};
 }
 
-std::string cells(const std::optional<ErrorSummary>& error) {
+std::string cells(const std::optional<ErrorsOverTrials>& error) {
   return error
              ? fmt::format("{:.6g},{:.6g},{:.6g}", error->mean_mm, error->median_mm, error->p95_mm)
              : ",,";
@@ -162,8 +162,8 @@ std::string trials(const ExperimentResult& result) {
       int touches = 0;
       for (const RecognitionStep& step : run.records[trial].trace) {
         table += fmt::format("{},{},{},{},{},{:d},{:.6g},{},{}\n", run.filter, run.count, trial,
-                             result.true_objects[trial], ++touches, *step.right, step.confidence(),
-                             cell(step.error_mm), cell(step.refined_error_mm));
+                             run.records[trial].true_label, ++touches, *step.right,
+                             step.confidence(), cell(step.error_mm), cell(step.refined_error_mm));
       }
     }
   }

@@ -3,48 +3,34 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numeric>
+#include <cstdlib>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+
+#include "letters.hpp"
 
 namespace palpate::bench {
 
 namespace {
 
-std::optional<ErrorSummary> summary_of(std::span<const double> errors_mm) {
-  if (errors_mm.empty()) {
-    return {};
-  }
-  const double sum_mm = std::accumulate(errors_mm.begin(), errors_mm.end(), 0.0);
-  return ErrorSummary{.mean_mm = sum_mm / static_cast<double>(errors_mm.size()),
-                      .median_mm = median(errors_mm),
-                      .p95_mm = quantile(errors_mm, 0.95)};
-}
-
 CurvePoint point_of(const FilterRun& run, std::size_t touch) {
   CurvePoint point{.touches = static_cast<int>(touch) + 1, .error = {}, .refined_error = {}};
-  std::vector<double> errors_mm;
-  std::vector<double> refined_errors_mm;
+  PoseErrors errors;
   int right = 0;
   for (const RecognitionRecord& record : run.records) {
     const RecognitionStep& step = record.trace[touch];
     right += *step.right ? 1 : 0;
     point.mean_confidence += step.confidence();
-    if (step.error_mm) {
-      errors_mm.push_back(*step.error_mm);
-    }
-    if (step.refined_error_mm) {
-      refined_errors_mm.push_back(*step.refined_error_mm);
-    }
+    errors.add(step);
   }
   const auto trials = static_cast<int>(run.records.size());
   point.accuracy = static_cast<double>(right) / trials;
   point.accuracy_interval = wilson_interval(right, trials);
   point.mean_confidence /= trials;
-  point.located = static_cast<int>(errors_mm.size());
-  point.error = summary_of(errors_mm);
-  point.refined_error = summary_of(refined_errors_mm);
+  point.error = errors_over(errors.mode_mm);
+  point.refined_error = errors_over(errors.refined_mm);
+  point.located = point.error ? point.error->trials : 0;
   return point;
 }
 
@@ -70,8 +56,7 @@ FilterRun run_filter(Device& device, RecognitionTask task, std::span<const Recor
     const PoseLattice& lattice = task.lattice();
     run.path = fmt::format("{}", fmt::join(recogniser.histogram()->paths(), "; "));
     run.count = lattice.bins();
-    run.name = fmt::format("histogram {}x{}x{}", lattice.x_mm.count, lattice.y_mm.count,
-                           lattice.theta_rad.count);
+    run.name = "histogram " + size_of(lattice);
   }
   run.seconds = seconds_of([&] {
     for (const Recording& trial : trials) {
@@ -123,6 +108,62 @@ Calibration calibration_of(const FilterRun& run) {
     calibration.bins.push_back(bin);
   }
   return calibration;
+}
+
+std::vector<PairedPoint> compare(const FilterRun& first, const FilterRun& second) {
+  std::vector<PairedPoint> curve;
+  for (std::size_t touch = 0; touch < first.records.front().trace.size(); ++touch) {
+    PairedPoint point{
+        .touches = static_cast<int>(touch) + 1, .error_lead_mm = {}, .error_lead_interval = {}};
+    std::vector<double> leads_mm;
+    for (std::size_t trial = 0; trial < first.records.size(); ++trial) {
+      const RecognitionStep& a = first.records[trial].trace[touch];
+      const RecognitionStep& b = second.records[trial].trace[touch];
+      point.right_lead += static_cast<int>(*a.right) - static_cast<int>(*b.right);
+      if (a.error_mm && b.error_mm) {
+        leads_mm.push_back(*b.error_mm - *a.error_mm);
+      }
+    }
+    point.located_by_both = static_cast<int>(leads_mm.size());
+    if (!leads_mm.empty()) {
+      point.error_lead_mm = mean(leads_mm);
+    }
+    if (leads_mm.size() > 2) {
+      point.error_lead_interval = mean_interval(leads_mm);
+    }
+    curve.push_back(point);
+  }
+  return curve;
+}
+
+bool as_many(std::int64_t a, std::int64_t b) { return 10 * std::abs(a - b) <= std::max(a, b); }
+
+std::vector<EqualCount> equal_counts(const std::vector<FilterRun>& runs) {
+  std::vector<EqualCount> pairs;
+  for (const FilterRun& particles : runs) {
+    for (const FilterRun& histogram : runs) {
+      if (particles.filter != "histogram" && histogram.filter == "histogram" &&
+          as_many(histogram.count, particles.count)) {
+        pairs.push_back({histogram, particles});
+      }
+    }
+  }
+  return pairs;
+}
+
+std::string ranges_of(const std::vector<int>& touches) {
+  std::string text;
+  for (std::size_t begin = 0; begin < touches.size();) {
+    std::size_t end = begin + 1;
+    while (end < touches.size() && touches[end] == touches[end - 1] + 1) {
+      ++end;
+    }
+    text += text.empty() ? "" : ", ";
+    text += end - begin == 1 ? fmt::format("{}", touches[begin])
+                             : fmt::format("{}-{}", touches[begin], touches[end - 1]);
+    begin = end;
+  }
+  return text;
 }
 
 }  // namespace palpate::bench

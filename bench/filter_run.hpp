@@ -8,6 +8,7 @@
 
 #include "measurement.hpp"
 #include "recognition_record.hpp"
+#include "trial_errors.hpp"
 
 namespace palpate::bench {
 
@@ -25,13 +26,6 @@ struct FilterRun {
 /// All trials by the task's filter. Of particles, trial i has the task's seed + i.
 FilterRun run_filter(Device& device, RecognitionTask task, std::span<const Recording> trials);
 
-/// Mean, median and 95th percentile.
-struct ErrorSummary {
-  double mean_mm = 0.0;
-  double median_mm = 0.0;
-  double p95_mm = 0.0;
-};
-
 /// A run after some number of touches, over all trials.
 struct CurvePoint {
   int touches = 0;
@@ -39,8 +33,8 @@ struct CurvePoint {
   Interval accuracy_interval;  ///< 95 %, see wilson_interval()
   double mean_confidence = 0.0;
   int located = 0;  ///< trials whose mode's object is the true one; the errors are over these
-  std::optional<ErrorSummary> error;          ///< none where nothing is located
-  std::optional<ErrorSummary> refined_error;  ///< none where the filter has no refined pose, too
+  std::optional<ErrorsOverTrials> error;          ///< none where nothing is located
+  std::optional<ErrorsOverTrials> refined_error;  ///< none of particles, too
 };
 /// After 1, 2, ... touches.
 std::vector<CurvePoint> curve_of(const FilterRun& run);
@@ -60,5 +54,34 @@ struct Calibration {
   double expected_error = 0.0;
 };
 Calibration calibration_of(const FilterRun& run);
+
+/// One filter against another over the same trials, after some number of touches.
+struct PairedPoint {
+  int touches = 0;
+  int right_lead = 0;  ///< trials that the first filter has right, minus those of the second
+  int located_by_both = 0;
+  /// Mean error of the second filter minus the mean error of the first, over the trials that both
+  /// locate: errors over its own trials would flatter the filter that loses the hard ones. None
+  /// where no trial is located by both.
+  std::optional<double> error_lead_mm;
+  std::optional<Interval> error_lead_interval;  ///< 95 %; none of fewer than three such trials
+};
+/// After 1, 2, ... touches. Both runs are of the same trials and touches.
+std::vector<PairedPoint> compare(const FilterRun& first, const FilterRun& second);
+
+/// Whether two counts agree within a tenth: whole numbers of balanced bins along each axis rarely
+/// multiply to a given count.
+bool as_many(std::int64_t a, std::int64_t b);
+
+struct EqualCount {
+  const FilterRun& histogram;
+  const FilterRun& particles;
+};
+/// All pairs of a histogram and a particle filter with as many particles as the histogram has bins
+/// per object. The pairs refer to the runs.
+std::vector<EqualCount> equal_counts(const std::vector<FilterRun>& runs);
+
+/// Touch counts in order, such as "1-4, 8".
+std::string ranges_of(const std::vector<int>& touches);
 
 }  // namespace palpate::bench

@@ -3,6 +3,8 @@
 #include <numbers>
 #include <string>
 
+#include <fmt/format.h>
+
 namespace palpate::bench {
 
 namespace {
@@ -72,6 +74,10 @@ PoseLattice lattice_of(int nx, int ny, int ntheta) {
   return {.x_mm = {-10.0, 10.0, nx},
           .y_mm = {-10.0, 10.0, ny},
           .theta_rad = {0.0, 2.0 * std::numbers::pi, ntheta}};
+}
+
+std::string size_of(const PoseLattice& lattice) {
+  return fmt::format("{}x{}x{}", lattice.x_mm.count, lattice.y_mm.count, lattice.theta_rad.count);
 }
 
 }  // namespace palpate::bench

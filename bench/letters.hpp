@@ -39,5 +39,7 @@ std::vector<Touch> all_touches(const Recording& recording);
 
 /// Bins over x and y in [-10, 10] mm and the full circle (Sec. IV).
 PoseLattice lattice_of(int nx, int ny, int ntheta);
+/// Its numbers of bins, such as "25x25x16".
+std::string size_of(const PoseLattice& lattice);
 
 }  // namespace palpate::bench

@@ -2,8 +2,6 @@
 #include <functional>
 #include <thread>
 
-#include <fmt/format.h>
-
 #include "accuracy.hpp"
 #include "cases.hpp"
 #include "cpu_loop.hpp"
@@ -40,24 +38,21 @@ Case likelihood_case(const Inputs& inputs, PoseHistogram& histogram, double goal
            (static_cast<double>(l.bins()) *
             static_cast<double>(objects * elements * touches.size()));
   };
-  const auto errors_of = [&](const PoseLattice& l, const auto& log_likelihood) {
+  const auto errors_of = [&](const PoseLattice& l, auto& engine) {
     return likelihood_errors(inputs.letters, inputs.model, l, touches, inputs.quick ? 100 : 500,
-                             log_likelihood);
+                             [&](int object) { return engine.log_likelihood(object); });
   };
 
   // The first touches warm up, and show the error and the memory.
   histogram.update(touches);
   const auto peak = static_cast<double>(peak_resident_bytes());
-  const ErrorStatistics errors =
-      errors_of(lattice, [&](int object) { return histogram.log_likelihood(object); });
+  const ErrorStatistics errors = errors_of(lattice, histogram);
   OneBinKernel one_bin(inputs.device, inputs.letters, part, inputs.model);
   one_bin.update(touches);
-  const ErrorStatistics one_bin_errors =
-      errors_of(part, [&](int object) { return one_bin.log_likelihood(object); });
+  const ErrorStatistics one_bin_errors = errors_of(part, one_bin);
   CpuLoop cpu_loop(inputs.letters, part, inputs.model);
   cpu_loop.update(touches);
-  const ErrorStatistics cpu_errors =
-      errors_of(part, [&](int object) { return cpu_loop.log_likelihood(object); });
+  const ErrorStatistics cpu_errors = errors_of(part, cpu_loop);
 
   const auto bins = static_cast<double>(objects) * static_cast<double>(lattice.bins());
   const int repeats = inputs.quick ? 3 : bins > 1e7 ? 3 : bins > 1e6 ? 7 : 25;
@@ -69,8 +64,7 @@ Case likelihood_case(const Inputs& inputs, PoseHistogram& histogram, double goal
   const double one_bin_ns = ns_per_ber(part, median(seconds[1]));
   const double cpu_ns = ns_per_ber(part, median(seconds[2]));
   const auto per_touch = static_cast<double>(touches.size());
-  return {.name = fmt::format("likelihood {}x{}x{}", lattice.x_mm.count, lattice.y_mm.count,
-                              lattice.theta_rad.count),
+  return {.name = "likelihood " + size_of(lattice),
           .facts = {{"objects", objects},
                     {"touches", touches.size()},
                     {"elements", elements},

@@ -80,23 +80,21 @@ std::vector<NoneRun> run_none(Device& device, std::span<const Hypothesis> letter
   for (const int n : touches) {
     runs.push_back({.touches = n, .learned_log10_weight = {}, .unlearned_log10_weight = {}});
   }
-  const auto add = [&](const Recording& trial, std::vector<double> NoneRun::*weights) {
-    histogram.reset();
-    std::size_t done = 0;
-    for (NoneRun& run : runs) {
-      const auto until = static_cast<std::size_t>(run.touches);
-      histogram.update(trial.touches(done, until));
-      (run.*weights)
-          .push_back(turning_log10_weight(histogram, static_cast<int>(letters.size()),
-                                          log_likelihood_of_none(trial.touches(0, until), model)));
-      done = until;
+  for (const auto& [trials, weights] :
+       {std::pair(learned_trials, &NoneRun::learned_log10_weight),
+        std::pair(unlearned_trials, &NoneRun::unlearned_log10_weight)}) {
+    for (const Recording& trial : trials) {
+      histogram.reset();
+      std::size_t done = 0;
+      for (NoneRun& run : runs) {
+        const auto until = static_cast<std::size_t>(run.touches);
+        histogram.update(trial.touches(done, until));
+        const double none = log_likelihood_of_none(trial.touches(0, until), model);
+        (run.*weights)
+            .push_back(turning_log10_weight(histogram, static_cast<int>(letters.size()), none));
+        done = until;
+      }
     }
-  };
-  for (const Recording& trial : learned_trials) {
-    add(trial, &NoneRun::learned_log10_weight);
-  }
-  for (const Recording& trial : unlearned_trials) {
-    add(trial, &NoneRun::unlearned_log10_weight);
   }
   return runs;
 }

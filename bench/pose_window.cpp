@@ -20,17 +20,19 @@ constexpr int sectors = 8;
 // The refined pose takes bins within 2.5 mm of one that may lie a bin or two from the mode.
 constexpr double refined_reach_mm = 4.0;
 
+/// Index of the bin that holds a value, which may lie beyond the axis.
+int index_of(const Axis& axis, double value) {
+  return static_cast<int>(std::floor((value - axis.lower) / axis.step()));
+}
+
 /// Indices along an axis, [first, end).
 struct Span {
   int first = std::numeric_limits<int>::max();
   int end = std::numeric_limits<int>::min();
 
   void add(double lower, double upper, const Axis& axis) {
-    const auto index = [&axis](double value) {
-      return static_cast<int>(std::floor((value - axis.lower) / axis.step()));
-    };
-    first = std::min(first, std::clamp(index(lower), 0, axis.count - 1));
-    end = std::max(end, std::clamp(index(upper), 0, axis.count - 1) + 1);
+    first = std::min(first, std::clamp(index_of(axis, lower), 0, axis.count - 1));
+    end = std::max(end, std::clamp(index_of(axis, upper), 0, axis.count - 1) + 1);
   }
 };
 
@@ -71,8 +73,7 @@ RecognitionStep step_in(Device& device, const Hypothesis& letter, const Recordin
   return record.last();
 }
 
-}  // namespace
-
+/// The letter that a trial is of.
 const Hypothesis& letter_of(std::span<const Hypothesis> letters, const Recording& trial) {
   const std::string& label = trial.truth->object;
   const auto letter = std::find_if(letters.begin(), letters.end(), [&](const Hypothesis& known) {
@@ -84,9 +85,12 @@ const Hypothesis& letter_of(std::span<const Hypothesis> letters, const Recording
   return *letter;
 }
 
-PlacedBody truth_of(const Hypothesis& letter, const Recording& trial) {
-  return {.body = body_of(letter.map),
-          .symmetry = letter.map.symmetry,
+}  // namespace
+
+PlacedBody truth_of(std::span<const Hypothesis> letters, const Recording& trial) {
+  const OccupancyGrid& map = letter_of(letters, trial).map;
+  return {.body = body_of(map),
+          .symmetry = map.symmetry,
           .T_object_robot = trial.truth->T_object_robot};
 }
 
@@ -107,11 +111,8 @@ std::vector<PoseLattice> windows_about(const PoseLattice& lattice, const PlacedB
   const double turn_rad = 2.0 * std::asin(std::min(1.0, reach_mm / (2.0 * spin_mm)));
   for (int i = 0; i < placed.symmetry; ++i) {
     const double middle_rad = placed.T_object_robot.theta_rad + i * two_pi / placed.symmetry;
-    const auto index = [&](double theta_rad) {
-      return static_cast<int>(std::floor((theta_rad - theta.lower) / theta.step()));
-    };
-    const int first = index(middle_rad - turn_rad);
-    const int end = std::min(index(middle_rad + turn_rad) + 1, first + theta.count);
+    const int first = index_of(theta, middle_rad - turn_rad);
+    const int end = std::min(index_of(theta, middle_rad + turn_rad) + 1, first + theta.count);
     windows.push_back(window_of(lattice, placed, {first, end}, reach_mm));
   }
   return windows;
@@ -139,7 +140,7 @@ double nearest_bin_mm(const PoseLattice& lattice, const PlacedBody& placed) {
 RecognitionStep estimate_in_window(Device& device, std::span<const Hypothesis> letters,
                                    const Recording& trial, const PoseLattice& lattice) {
   const Hypothesis& letter = letter_of(letters, trial);
-  const PlacedBody truth = truth_of(letter, trial);
+  const PlacedBody truth = truth_of(letters, trial);
   std::optional<Mode> best;
   for (const PoseLattice& window : windows_about(lattice, truth, window_reach_mm)) {
     const Mode mode = step_in(device, letter, trial, window).mode;

@@ -19,11 +19,9 @@ struct PlacedBody {
   Pose T_object_robot;
 };
 
-/// The letter that a trial is of.
-/// @throws Error where it was not learned
-const Hypothesis& letter_of(std::span<const Hypothesis> letters, const Recording& trial);
-/// The body of that letter where the trial has it.
-PlacedBody truth_of(const Hypothesis& letter, const Recording& trial);
+/// The body of the letter that a trial is of, where the trial has it.
+/// @throws Error where the letter was not learned
+PlacedBody truth_of(std::span<const Hypothesis> letters, const Recording& trial);
 
 /// Parts of a lattice, of the same bins, that together hold every bin within `reach_mm` of the body
 /// by pose_error_mm(): one for each of its n places of equal error, or, for a body of full

@@ -1,9 +1,8 @@
 #include <algorithm>
-#include <bit>
-
-#include <fmt/format.h>
+#include <span>
 
 #include "cases.hpp"
+#include "letters.hpp"
 #include "measurement.hpp"
 
 namespace palpate::bench {
@@ -19,9 +18,7 @@ struct Answers {
 };
 
 bool same_bits(const std::vector<double>& a, const std::vector<double>& b) {
-  return std::ranges::equal(
-      a, b, {}, [](double x) { return std::bit_cast<std::uint64_t>(x); },
-      [](double x) { return std::bit_cast<std::uint64_t>(x); });
+  return std::ranges::equal(std::as_bytes(std::span(a)), std::as_bytes(std::span(b)));
 }
 
 bool same_bits(const Answers& a, const Answers& b) {
@@ -52,8 +49,7 @@ Case reduction_case(const Inputs& inputs, PoseHistogram& histogram) {
   const bool large = objects * lattice.bins() > 10'000'000;
   const auto goal = [&](double ms) { return large ? std::optional(at_most(ms)) : std::nullopt; };
   return {
-      .name = fmt::format("reductions {}x{}x{}", lattice.x_mm.count, lattice.y_mm.count,
-                          lattice.theta_rad.count),
+      .name = "reductions " + size_of(lattice),
       .facts = {{"objects", objects}, {"repeats", repeats}},
       .measurements = {
           {"identity and mode", 1e3 * median_seconds([&] { ask(false); }, repeats), "ms",

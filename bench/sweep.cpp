@@ -5,13 +5,10 @@
 #include "command_run.hpp"
 #include "letters.hpp"
 #include "palpate/balanced_lattice.hpp"
-#include "palpate/error.hpp"
 #include "report.hpp"
 #include "sweep_document.hpp"
-#include "sweep_limits.hpp"
+#include "sweep_measurements.hpp"
 #include "sweep_page.hpp"
-#include "sweep_paths.hpp"
-#include "sweep_plan.hpp"
 #include "trials.hpp"
 
 namespace palpate::bench {
@@ -26,27 +23,19 @@ std::vector<Recording> trials_of(int each) {
   return make_trials(vowels, each, touches_per_trial, trial_seed);
 }
 
-void print_run(const Json& point) {
-  print_row(Columns(run_columns()).first(printed_run_columns), point);
-}
-
 /// Measures maps of one cell size, and prints every run once it is known.
 void sweep_cells(Device& device, const SweepPlan& plan, const CellPlan& cells, Json& document) {
   const std::vector<Hypothesis> letters =
       letter_maps(device, training_recordings(), MapOptions{.cell_mm = cells.cell_mm});
   const std::vector<Recording> trials = trials_of(plan.trials_each);
-  std::vector<SweepPoint> points;
-  const auto add = [&](SweepPoint point) {
-    document["points"].push_back(record_of(point));
-    print_run(document["points"].back());
+  Json& points = document["points"];
+  const auto add = [&](Json point) {
+    print_row(Columns(run_columns()).first(printed_run_columns), point);
     points.push_back(std::move(point));
   };
   for (const BinCounts& bins : cells.lattices) {
-    SweepPoint point =
-        measure_histogram(device, letters, trials, trials_of(plan.full_each(cells.cell_mm, bins)),
-                          lattice_with(bins));
-    point.balanced = is_balanced(bins);
-    add(std::move(point));
+    add(measure_histogram(device, letters, trials, trials_of(plan.full_each(cells.cell_mm, bins)),
+                          bins));
   }
   for (const auto& [resampling, augmented] :
        {std::pair{Resampling::multinomial, false}, std::pair{Resampling::systematic, false},
@@ -129,13 +118,6 @@ void print(const Json& document) {
   print_table(verdict_columns(), document.at("verdicts"));
 }
 
-void require_at_least(const char* flag, const std::optional<std::int64_t>& value,
-                      std::int64_t least) {
-  if (value && *value < least) {
-    throw Error(Fault::input, fmt::format("{} = {}: give {} or more", flag, *value, least));
-  }
-}
-
 }  // namespace
 
 void run_sweep(const SweepOptions& options, std::span<char* const> command_line) {
@@ -155,10 +137,7 @@ void run_sweep(const SweepOptions& options, std::span<char* const> command_line)
   run.write(options.json, document.dump(2) + "\n");
   run.write(options.html, page_of(document));
   if (!options.plots.empty()) {
-    const std::vector<Chart> charts = charts_of(document);
-    for (std::size_t i = 0; i < charts.size(); ++i) {
-      write_chart(charts[i], options.plots, chart_names[i]);
-    }
+    write_charts(charts_of(document), options.plots, chart_names);
   }
 }
 

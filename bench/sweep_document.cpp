@@ -1,57 +1,52 @@
 #include "sweep_document.hpp"
 
 #include <algorithm>
-#include <cmath>
-#include <functional>
+#include <iterator>
 
 #include <fmt/format.h>
-
-#include "sweep_findings.hpp"
 
 namespace palpate::bench {
 
 namespace {
 
-template <typename Value>
-Json or_null(const std::optional<Value>& value) {
-  return value ? Json(*value) : Json(nullptr);
-}
-
-Json errors_of(std::span<const TrialErrors> trials, PoseKind kind) {
-  Json errors_mm = Json::array();
-  for (const TrialErrors& trial : trials) {
-    errors_mm.push_back(or_null(trial.of(kind)));
+/// A field of the runs' records that holds a TrialErrors.
+std::vector<TrialErrors> errors_of(const std::vector<Json>& runs, const char* field) {
+  std::vector<TrialErrors> errors;
+  for (const Json& run : runs) {
+    TrialErrors& errors_mm = errors.emplace_back();
+    for (const Json& error_mm : run.at(field)) {
+      errors_mm.push_back(error_mm.is_null() ? std::nullopt : std::optional<double>(error_mm));
+    }
   }
-  return errors_mm;
+  return errors;
 }
 
-/// What more bins gain, over the trials that both runs locate.
-Json step_record(const SweepPoint& from, const SweepPoint& to) {
-  const auto gain = [&](PoseKind kind) {
-    const PairedErrors paired = paired_errors(to.errors, from.errors, kind);
-    Json errors{{"from", paired.second_mm}, {"to", paired.first_mm}};
-    errors.update(difference_of(paired));
-    return errors;
-  };
-  return {{"cell_mm", from.cell_mm},
-          {"from", from.count},
-          {"to", to.count},
-          {"trials", paired_errors(from.errors, to.errors, PoseKind::mode).trials},
-          {"error_mm", gain(PoseKind::mode)},
-          {"refined_error_mm", gain(PoseKind::refined)}};
-}
-
-/// To each of the runs, by rising count, from the finest one of at most a fifth of its bins.
-Json steps_of(std::span<const SweepPoint> runs) {
+/// What more bins gain over the trials that both runs locate: to each of the runs, by rising count,
+/// from the finest run of at most a fifth of its bins.
+Json steps_of(const std::vector<Json>& runs, const std::vector<TrialErrors>& modes_mm,
+              const std::vector<TrialErrors>& refined_mm) {
+  const auto count = [&](std::size_t i) { return runs[i].at("count").get<std::int64_t>(); };
   Json steps = Json::array();
   for (std::size_t to = 0; to < runs.size(); ++to) {
     std::size_t from = to;
-    while (from > 0 && 5 * runs[from].count > runs[to].count) {
+    while (from > 0 && 5 * count(from) > count(to)) {
       --from;
     }
-    if (5 * runs[from].count <= runs[to].count) {
-      steps.push_back(step_record(runs[from], runs[to]));
+    if (5 * count(from) > count(to)) {
+      continue;
     }
+    const auto gain = [&](const std::vector<TrialErrors>& errors_mm) {
+      const PairedErrors paired = paired_errors(errors_mm[to], errors_mm[from]);
+      Json errors{{"from", paired.second_mm}, {"to", paired.first_mm}};
+      errors.update(difference_of(paired));
+      return errors;
+    };
+    steps.push_back({{"cell_mm", runs[from].at("cell_mm")},
+                     {"from", count(from)},
+                     {"to", count(to)},
+                     {"trials", paired_errors(modes_mm[from], modes_mm[to]).trials},
+                     {"error_mm", gain(modes_mm)},
+                     {"refined_error_mm", gain(refined_mm)}});
   }
   return steps;
 }
@@ -67,16 +62,18 @@ std::vector<std::size_t> front_of(const Json& entries, const char* cost, const c
 
 }  // namespace
 
-Json record_of(const Deviation& deviation) {
-  return {{"largest", deviation.largest}, {"rms", deviation.rms}, {"samples", deviation.samples}};
+Json record_of(const ErrorStatistics& deviation) {
+  return {
+      {"largest", deviation.largest()}, {"rms", deviation.rms()}, {"samples", deviation.count()}};
 }
 
 Json record_of(const std::optional<ErrorsOverTrials>& errors) {
+  constexpr int least_for_p95 = 20;  // of fewer trials it is the largest error
   return errors ? Json{{"trials", errors->trials},
                        {"mean", errors->mean_mm},
                        {"standard_error", errors->standard_error_mm},
                        {"median", errors->median_mm},
-                       {"p95", or_null(errors->p95_mm)}}
+                       {"p95", errors->trials < least_for_p95 ? Json() : Json(errors->p95_mm)}}
                 : Json(nullptr);
 }
 
@@ -85,67 +82,36 @@ Json difference_of(const PairedErrors& paired) {
           {"standard_error", paired.standard_error_mm}};
 }
 
-Json record_of(const SweepPoint& point) {
-  const auto& window = point.window;
-  return {{"filter", point.filter},
-          {"cell_mm", point.cell_mm},
-          {"count", point.count},
-          {"bins", point.filter == "histogram" ? Json(point.bins) : Json(nullptr)},
-          {"balanced", point.balanced},
-          {"path", point.path},
-          {"full_trials", point.full_trials},
-          {"seconds_per_touch", point.seconds_touch},
-          {"seconds_per_unknown", point.seconds_unknown},
-          {"seconds_refine", or_null(point.seconds_refine)},
-          {"device_bytes", point.device_bytes},
-          {"accuracy", point.accuracy},
-          {"least_confidence", point.least_confidence},
-          {"expected_calibration_error", point.calibration_error},
-          {"trials", point.errors.size()},
-          {"windows", window ? Json{{"compared_trials", window->trials},
-                                    {"mode_difference_mm", window->mode_mm},
-                                    {"refined_difference_mm", window->refined_mm}}
-                             : Json(nullptr)},
-          {"error_mm", record_of(errors_over(point.errors, PoseKind::mode))},
-          {"refined_error_mm", record_of(errors_over(point.errors, PoseKind::refined))},
-          {"errors_mm", errors_of(point.errors, PoseKind::mode)},
-          {"refined_errors_mm", errors_of(point.errors, PoseKind::refined)},
-          {"nearest_bin_mm", or_null(point.nearest_bin_mm)},
-          {"deviation_nats", record_of(point.deviation)}};
-}
-
-Json knee_record(std::span<const SweepPoint> points, double cell_mm, const BinCounts& balanced) {
-  std::vector<SweepPoint> runs;
-  std::copy_if(points.begin(), points.end(), std::back_inserter(runs),
-               [&](const SweepPoint& point) { return point.balanced && point.cell_mm == cell_mm; });
-  std::ranges::sort(runs, std::less(), &SweepPoint::count);
-  std::vector<std::vector<TrialErrors>> errors;
-  for (const SweepPoint& run : runs) {
-    errors.push_back(run.errors);
-  }
-  const auto knee = [&](PoseKind kind) {
-    const std::optional<std::size_t> i = knee_of(errors, kind);
-    return i ? std::optional(runs[*i].count) : std::nullopt;
+Json knee_record(const Json& points, double cell_mm, const BinCounts& balanced) {
+  std::vector<Json> runs;
+  std::ranges::copy_if(points, std::back_inserter(runs), [&](const Json& point) {
+    return point.at("balanced") == true && point.at("cell_mm") == cell_mm;
+  });
+  std::ranges::sort(runs, {}, [](const Json& run) { return run.at("count").get<std::int64_t>(); });
+  const std::vector<TrialErrors> modes_mm = errors_of(runs, "errors_mm");
+  const std::vector<TrialErrors> refined_mm = errors_of(runs, "refined_errors_mm");
+  const auto knee = [&](const std::vector<TrialErrors>& errors_mm) {
+    const std::optional<std::size_t> i = knee_of(errors_mm);
+    return i ? runs[*i].at("count") : Json(nullptr);
   };
-  const auto bins_text = [&](const std::optional<std::int64_t>& bins) {
-    return (bins ? "" : "at least ") +
-           count_text(static_cast<double>(bins.value_or(runs.back().count)));
+  const auto bins_text = [&](const Json& bins) {
+    return bins.is_null() ? "at least " + count_text(runs.back().at("count")) : count_text(bins);
   };
-  const std::optional<std::int64_t> mode = knee(PoseKind::mode);
-  const std::optional<std::int64_t> refined = knee(PoseKind::refined);
+  const Json mode = knee(modes_mm);
+  const Json refined = knee(refined_mm);
   const std::int64_t count = product(balanced);
   return {{"cell_mm", cell_mm},
           {"balanced_bins", balanced},
           {"balanced_count", count},
-          {"mode_knee", or_null(mode)},
-          {"refined_knee", or_null(refined)},
-          {"floor_mm", record_of(errors_over(errors.back(), PoseKind::refined))},
+          {"mode_knee", mode},
+          {"refined_knee", refined},
+          {"floor_mm", runs.back().at("refined_error_mm")},
           {"sentence",
            fmt::format("Maps with cells of {} mm need {} bins for the mode and {} for the refined "
                        "pose; --bins auto takes {} = {}.",
                        cell_mm, bins_text(mode), bins_text(refined), plain_text(balanced),
                        bins_text(count))},
-          {"steps", steps_of(runs)}};
+          {"steps", steps_of(runs, modes_mm, refined_mm)}};
 }
 
 std::string window_sentence(const Json& points) {
@@ -160,8 +126,8 @@ std::string window_sentence(const Json& points) {
     }
   }
   return fmt::format(
-      "Of {} trials with the full posterior on the same lattices, modes lie within {:.1e} mm of "
-      "the windows', and refined poses within {:.1e} mm.",
+      "Of {} trials with the full posterior on the same lattices, modes lie within "
+      "{:.1e} mm of the windows', and refined poses within {:.1e} mm.",
       trials, mode_mm, refined_mm);
 }
 

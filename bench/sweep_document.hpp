@@ -1,12 +1,11 @@
 #pragma once
 
 #include <optional>
-#include <span>
 #include <string>
 #include <vector>
 
+#include "measurement.hpp"
 #include "sweep_plan.hpp"
-#include "sweep_point.hpp"
 #include "table.hpp"
 #include "trial_errors.hpp"
 
@@ -14,17 +13,18 @@ namespace palpate::bench {
 
 // The records of the sweep's document.
 
-Json record_of(const SweepPoint& point);
-Json record_of(const Deviation& deviation);
-/// Mean, standard error, median and 95th percentile; null where no trial has an error.
+/// How far log-likelihoods are from float64, in nats.
+Json record_of(const ErrorStatistics& deviation);
+/// Mean, standard error, median and 95th percentile, which is null for fewer than 20 trials; null
+/// where no trial has an error.
 Json record_of(const std::optional<ErrorsOverTrials>& errors);
 /// By how much the first run's mean error exceeds the second's, with its standard error.
 Json difference_of(const PairedErrors& paired);
 
-/// Where more bins stop helping on maps of one cell size: the fewest bins that suffice (knee_of()),
-/// the error on the finest lattice, the lattice that --bins auto takes, and what more bins gain
-/// from step to step.
-Json knee_record(std::span<const SweepPoint> points, double cell_mm, const BinCounts& balanced);
+/// Where more bins stop helping on maps of one cell size, by the document's points: the fewest bins
+/// that suffice (knee_of()), the error on the finest lattice, the lattice that --bins auto takes,
+/// and what more bins gain from step to step.
+Json knee_record(const Json& points, double cell_mm, const BinCounts& balanced);
 
 /// How well windows agree with the full posterior over the document's points.
 std::string window_sentence(const Json& points);

@@ -1,11 +1,10 @@
-#include "sweep_limits.hpp"
-
 #include <tuple>
 
 #include <fmt/format.h>
 
 #include "pose_window.hpp"
 #include "sweep_document.hpp"
+#include "sweep_measurements.hpp"
 #include "trials.hpp"
 
 namespace palpate::bench {
@@ -84,12 +83,11 @@ std::vector<Variant> variants_of(const SweepPlan& plan) {
   return variants;
 }
 
-std::vector<TrialErrors> errors_of_trials(Device& device, std::span<const Hypothesis> letters,
-                                          std::span<const Recording> trials,
-                                          const BinCounts& bins) {
-  std::vector<TrialErrors> errors;
+PoseErrors errors_of_trials(Device& device, std::span<const Hypothesis> letters,
+                            std::span<const Recording> trials, const BinCounts& bins) {
+  PoseErrors errors;
   for (const Recording& trial : trials) {
-    errors.push_back(errors_of(estimate_in_window(device, letters, trial, lattice_with(bins))));
+    errors.add(estimate_in_window(device, letters, trial, lattice_with(bins)));
   }
   return errors;
 }
@@ -97,23 +95,23 @@ std::vector<TrialErrors> errors_of_trials(Device& device, std::span<const Hypoth
 /// What a run is compared with.
 struct Compared {
   std::string name;  ///< empty for nothing
-  std::vector<TrialErrors> errors;
+  PoseErrors errors;
 };
 
-Json record_of(const Variant& variant, const BinCounts& bins, std::span<const TrialErrors> errors,
+Json record_of(const Variant& variant, const BinCounts& bins, const PoseErrors& errors,
                const Compared& with) {
-  const auto difference = [&](PoseKind kind) {
+  const auto difference = [&](TrialErrors PoseErrors::*kind) {
     return with.name.empty() ? Json(nullptr)
-                             : difference_of(paired_errors(errors, with.errors, kind));
+                             : difference_of(paired_errors(errors.*kind, with.errors.*kind));
   };
   return {{"name", variant.name},
           {"count", product(bins)},
           {"elements", variant.sensor.elements_mm.size()},
-          {"error_mm", record_of(errors_over(errors, PoseKind::mode))},
-          {"refined_error_mm", record_of(errors_over(errors, PoseKind::refined))},
+          {"error_mm", record_of(errors_over(errors.mode_mm))},
+          {"refined_error_mm", record_of(errors_over(errors.refined_mm))},
           {"against", with.name.empty() ? Json(nullptr) : Json(with.name)},
-          {"difference_mm", difference(PoseKind::mode)},
-          {"refined_difference_mm", difference(PoseKind::refined)}};
+          {"difference_mm", difference(&PoseErrors::mode_mm)},
+          {"refined_difference_mm", difference(&PoseErrors::refined_mm)}};
 }
 
 }  // namespace
@@ -130,7 +128,7 @@ Json measure_limits(Device& device, const SweepPlan& plan) {
     Compared with = unchanged;
     for (const BinCounts& bins :
          std::span(plan.limits).first(variant.all_lattices ? plan.limits.size() : 1)) {
-      std::vector<TrialErrors> errors = errors_of_trials(device, letters, trials, bins);
+      PoseErrors errors = errors_of_trials(device, letters, trials, bins);
       limits.push_back(record_of(variant, bins, errors, with));
       if (unchanged.name.empty()) {
         unchanged = {variant.name, errors};

@@ -7,8 +7,8 @@
 #include <fmt/format.h>
 
 #include "pose_window.hpp"
+#include "sweep_measurements.hpp"
 #include "sweep_page_template.hpp"
-#include "sweep_point.hpp"
 #include "trial_errors.hpp"
 
 namespace palpate::bench {

@@ -1,5 +1,3 @@
-#include "sweep_paths.hpp"
-
 #include <algorithm>
 #include <functional>
 
@@ -12,6 +10,7 @@
 #include "palpate/error.hpp"
 #include "palpate/pose_histogram.hpp"
 #include "sweep_document.hpp"
+#include "sweep_measurements.hpp"
 
 namespace palpate::bench {
 
@@ -47,10 +46,6 @@ struct Way {
   std::function<std::vector<double>(int object)> log_likelihood;
 };
 
-std::string path_of(const PoseHistogram& histogram) {
-  return fmt::format("{}", fmt::join(histogram.paths(), "; "));
-}
-
 }  // namespace
 
 Json compare_paths(Device& device, std::span<const Hypothesis> letters, const Recording& unknown,
@@ -73,10 +68,11 @@ Json compare_paths(Device& device, std::span<const Hypothesis> letters, const Re
                .log_likelihood = [&engine](int object) { return engine.log_likelihood(object); }};
   };
   const Way ways[] = {
-      way(path_of(histogram), product, moving, histogram),
-      way("in logs: " + path_of(in_logs), logs, moving, in_logs),
+      way(plain_text(histogram.paths()), product, moving, histogram),
+      way("in logs: " + plain_text(in_logs.paths()), logs, moving, in_logs),
       way(fmt::format("array at rest, {} of {} elements in No Contact: {}",
-                      no_contacts(resting.front()), unknown.elements(), path_of(at_rest)),
+                      no_contacts(resting.front()), unknown.elements(),
+                      plain_text(at_rest.paths())),
           product, resting, at_rest),
       way("one-bin kernel", product, moving, one_bin),
       way("CPU loop", product, moving, cpu_loop),
@@ -86,8 +82,8 @@ Json compare_paths(Device& device, std::span<const Hypothesis> letters, const Re
   for (const Way& one : ways) {
     const auto first = std::span(one.touches).first(1);
     one.update(first);
-    const Deviation deviation = deviation_of(
-        likelihood_errors(letters, one.model, lattice, first, sampled_bins, one.log_likelihood));
+    const ErrorStatistics deviation =
+        likelihood_errors(letters, one.model, lattice, first, sampled_bins, one.log_likelihood);
     compared.push_back({{"path", one.path},
                         {"count", lattice.bins()},
                         {"nanoseconds", nullptr},

@@ -1,28 +1,39 @@
-#include "sweep_point.hpp"
-
 #include <algorithm>
 #include <cmath>
 #include <random>
 
 #include "accuracy.hpp"
 #include "filter_run.hpp"
-#include "palpate/pose_histogram.hpp"
+#include "pose_window.hpp"
 #include "reference.hpp"
+#include "sweep_document.hpp"
+#include "sweep_measurements.hpp"
 
 namespace palpate::bench {
 
 namespace {
 
-SweepPoint point_of(const FilterRun& run, double cell_mm) {
-  SweepPoint point{.filter = run.filter,
-                   .cell_mm = cell_mm,
-                   .count = run.count,
-                   .path = run.path,
-                   .full_trials = static_cast<int>(run.records.size()),
-                   .device_bytes = run.device_bytes,
-                   .calibration_error = calibration_of(run).expected_error};
-  std::vector<double> seconds_touch;
-  std::vector<double> seconds_unknown;
+/// Puts pose errors into the record of a run.
+void set_errors(Json& record, const PoseErrors& errors) {
+  record["trials"] = errors.mode_mm.size();
+  record["error_mm"] = record_of(errors_over(errors.mode_mm));
+  record["refined_error_mm"] = record_of(errors_over(errors.refined_mm));
+  for (const auto& [field, errors_mm] : {std::pair("errors_mm", &errors.mode_mm),
+                                         std::pair("refined_errors_mm", &errors.refined_mm)}) {
+    record[field] = Json::array();
+    for (const std::optional<double>& error_mm : *errors_mm) {
+      record[field].push_back(error_mm ? Json(*error_mm) : Json(nullptr));
+    }
+  }
+}
+
+/// What a run cost, as medians, and what it is worth. What only some runs have is null.
+Json record_of(const FilterRun& run, double cell_mm) {
+  std::vector<double> seconds_touch;    // from a touch to its estimate
+  std::vector<double> seconds_unknown;  // of all touches of a trial with an estimate each
+  int right = 0;
+  double least_confidence = 1.0;
+  PoseErrors errors;
   for (const RecognitionRecord& record : run.records) {
     double sum = 0.0;
     for (const RecognitionStep& step : record.trace) {
@@ -30,50 +41,71 @@ SweepPoint point_of(const FilterRun& run, double cell_mm) {
       sum += step.seconds;
     }
     seconds_unknown.push_back(sum);
-    const RecognitionStep& last = record.last();
-    point.errors.push_back(errors_of(last));
-    point.accuracy += *last.right ? 1.0 : 0.0;
-    point.least_confidence = std::min(point.least_confidence, last.confidence());
+    right += *record.last().right ? 1 : 0;
+    least_confidence = std::min(least_confidence, record.last().confidence());
+    errors.add(record.last());
   }
-  point.seconds_touch = median(seconds_touch);
-  point.seconds_unknown = median(seconds_unknown);
-  point.accuracy /= point.full_trials;
-  return point;
+  const std::size_t trials = run.records.size();
+  Json record{{"filter", run.filter},
+              {"cell_mm", cell_mm},
+              {"count", run.count},
+              {"bins", nullptr},
+              {"balanced", false},
+              {"path", run.path},
+              {"full_trials", trials},
+              {"seconds_per_touch", median(seconds_touch)},
+              {"seconds_per_unknown", median(seconds_unknown)},
+              {"seconds_refine", nullptr},
+              {"device_bytes", run.device_bytes},
+              {"accuracy", right / static_cast<double>(trials)},
+              {"least_confidence", least_confidence},
+              {"expected_calibration_error", calibration_of(run).expected_error},
+              {"trials", trials},
+              {"windows", nullptr}};
+  set_errors(record, errors);
+  record["nearest_bin_mm"] = nullptr;
+  return record;
 }
 
-/// Replaces the point's errors by errors from windows of all trials, and compares the two. `full`
-/// are by the full posterior, of the first trials of every letter, equally many of each.
-void look_into_windows(SweepPoint& point, Device& device, std::span<const Hypothesis> letters,
+/// Replaces the record's errors by errors from windows of all trials, and adds how far apart the
+/// two poses of a trial lie at the most, by the pose error. `full` are by the full posterior, of
+/// the first trials of every letter, equally many of each.
+void look_into_windows(Json& record, Device& device, std::span<const Hypothesis> letters,
                        std::span<const Recording> trials, const PoseLattice& lattice,
                        std::span<const RecognitionRecord> full) {
   const std::size_t each = trials.size() / letters.size();
   const std::size_t full_each = full.size() / letters.size();
-  WindowCheck check;
-  point.errors.clear();
+  int compared = 0;
+  double mode_mm = 0.0;
+  double refined_mm = 0.0;
+  PoseErrors errors;
   for (std::size_t i = 0; i < trials.size(); ++i) {
     const RecognitionStep step = estimate_in_window(device, letters, trials[i], lattice);
-    point.errors.push_back(errors_of(step));
+    errors.add(step);
     if (i % each >= full_each) {
       continue;
     }
     const RecognitionStep& same = full[i / each * full_each + i % each].last();
     if (same.error_mm) {
-      const Body body = body_of(letter_of(letters, trials[i]).map);
-      ++check.trials;
-      check.mode_mm = std::max(check.mode_mm, pose_error_mm(body, 1, step.mode.T_object_robot,
-                                                            same.mode.T_object_robot));
-      check.refined_mm = std::max(
-          check.refined_mm,
-          pose_error_mm(body, 1, step.refined->T_object_robot, same.refined->T_object_robot));
+      const Body body = truth_of(letters, trials[i]).body;
+      const auto apart_mm = [&body](const auto& a, const auto& b) {
+        return pose_error_mm(body, 1, a.T_object_robot, b.T_object_robot);
+      };
+      ++compared;
+      mode_mm = std::max(mode_mm, apart_mm(step.mode, same.mode));
+      refined_mm = std::max(refined_mm, apart_mm(*step.refined, *same.refined));
     }
   }
-  point.window = check;
+  record["windows"] = {{"compared_trials", compared},
+                       {"mode_difference_mm", mode_mm},
+                       {"refined_difference_mm", refined_mm}};
+  set_errors(record, errors);
 }
 
 /// Weights after one touch against the likelihood of each particle. Weights are relative, so both
 /// sides are taken relative to the heaviest particle.
-Deviation weight_deviation(Device& device, const std::vector<Hypothesis>& letters,
-                           const Touch& touch, const ParticleOptions& options) {
+ErrorStatistics weight_deviation(Device& device, const std::vector<Hypothesis>& letters,
+                                 const Touch& touch, const ParticleOptions& options) {
   ParticleFilter filter(device, letters, options);
   filter.update(touch);
   const std::vector<ParticleFilter::Particle> particles = filter.particles();
@@ -92,52 +124,49 @@ Deviation weight_deviation(Device& device, const std::vector<Hypothesis>& letter
     errors.add(std::log(particle.weight / heaviest.weight) -
                (reference_of(particle) - heaviest_reference));
   }
-  return deviation_of(errors);
+  return errors;
 }
 
 }  // namespace
 
-Deviation deviation_of(const ErrorStatistics& errors) {
-  return {.largest = errors.largest(),
-          .rms = errors.rms(),
-          .samples = static_cast<int>(errors.count())};
-}
-
-SweepPoint measure_histogram(Device& device, const std::vector<Hypothesis>& letters,
-                             std::span<const Recording> trials, std::span<const Recording> full,
-                             const PoseLattice& lattice) {
+Json measure_histogram(Device& device, const std::vector<Hypothesis>& letters,
+                       std::span<const Recording> trials, std::span<const Recording> full,
+                       const BinCounts& bins) {
+  const PoseLattice lattice = lattice_with(bins);
   const FilterRun run = run_filter(device, {letters, HistogramOptions{.lattice = lattice}}, full);
-  SweepPoint point = point_of(run, letters.front().map.cell_mm);
-  point.bins = {lattice.x_mm.count, lattice.y_mm.count, lattice.theta_rad.count};
+  Json record = record_of(run, letters.front().map.cell_mm);
+  record["bins"] = bins;
+  record["balanced"] = is_balanced(bins);
   std::vector<double> seconds_refine;
-  for (const RecognitionRecord& record : run.records) {
-    seconds_refine.push_back(record.last().refine_seconds);
+  for (const RecognitionRecord& trial : run.records) {
+    seconds_refine.push_back(trial.last().refine_seconds);
   }
-  point.seconds_refine = median(seconds_refine);
+  record["seconds_refine"] = median(seconds_refine);
   if (full.size() < trials.size()) {
-    look_into_windows(point, device, letters, trials, lattice, run.records);
+    look_into_windows(record, device, letters, trials, lattice, run.records);
   }
   double nearest_mm = 0.0;
   for (const Recording& trial : trials) {
-    nearest_mm += nearest_bin_mm(lattice, truth_of(letter_of(letters, trial), trial));
+    nearest_mm += nearest_bin_mm(lattice, truth_of(letters, trial));
   }
-  point.nearest_bin_mm = nearest_mm / static_cast<double>(trials.size());
+  record["nearest_bin_mm"] = nearest_mm / static_cast<double>(trials.size());
   const Touch touch = trials.front().touch(0);
   PoseHistogram histogram(device, letters, {.lattice = lattice});
   histogram.update(touch);
-  point.deviation = deviation_of(
+  record["deviation_nats"] = record_of(
       likelihood_errors(letters, ContactModel{}, lattice, std::span(&touch, 1), sampled_bins,
                         [&](int object) { return histogram.log_likelihood(object); }));
-  return point;
+  return record;
 }
 
-SweepPoint measure_particles(Device& device, const std::vector<Hypothesis>& letters,
-                             std::span<const Recording> trials, ParticleOptions options) {
-  SweepPoint point =
-      point_of(run_filter(device, {letters, options}, trials), letters.front().map.cell_mm);
+Json measure_particles(Device& device, const std::vector<Hypothesis>& letters,
+                       std::span<const Recording> trials, ParticleOptions options) {
+  Json record =
+      record_of(run_filter(device, {letters, options}, trials), letters.front().map.cell_mm);
   options.seed += trials.size();  // no trial's
-  point.deviation = weight_deviation(device, letters, trials.front().touch(0), options);
-  return point;
+  record["deviation_nats"] =
+      record_of(weight_deviation(device, letters, trials.front().touch(0), options));
+  return record;
 }
 
 }  // namespace palpate::bench

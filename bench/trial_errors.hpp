@@ -1,27 +1,26 @@
 #pragma once
 
+#include <cstddef>
 #include <optional>
 #include <span>
+#include <vector>
 
 #include "recognition_record.hpp"
 
 namespace palpate::bench {
 
-/// Which pose of an estimate: the best bin, or the one between the bins.
-enum class PoseKind { mode, refined };
+/// Pose errors of a run in mm, [trial]; none where the mode has the wrong object, and none for
+/// refined poses of a filter that has no such pose.
+using TrialErrors = std::vector<std::optional<double>>;
 
-/// Pose errors of one trial after its last touch, where the mode has the right object.
-struct TrialErrors {
-  std::optional<double> mode_mm = {};
-  std::optional<double> refined_mm = {};  ///< none for filters without a refined pose, too
+/// Those of a run's modes and of its refined poses.
+struct PoseErrors {
+  TrialErrors mode_mm = {};
+  TrialErrors refined_mm = {};
 
-  const std::optional<double>& of(PoseKind kind) const {
-    return kind == PoseKind::mode ? mode_mm : refined_mm;
-  }
+  /// Adds a trial, which ended with this step.
+  void add(const RecognitionStep& last);
 };
-
-/// The errors of a trial's last step.
-TrialErrors errors_of(const RecognitionStep& last);
 
 /// The errors that a run's trials have.
 struct ErrorsOverTrials {
@@ -29,10 +28,10 @@ struct ErrorsOverTrials {
   double mean_mm = 0.0;
   double standard_error_mm = 0.0;  ///< of the mean; 0 for a single trial
   double median_mm = 0.0;
-  std::optional<double> p95_mm = {};  ///< none of fewer than 20, where it is the largest
+  double p95_mm = 0.0;  ///< of fewer than 20 trials, the largest error
 };
 /// None where no trial has one.
-std::optional<ErrorsOverTrials> errors_over(std::span<const TrialErrors> trials, PoseKind kind);
+std::optional<ErrorsOverTrials> errors_over(const TrialErrors& errors_mm);
 
 /// Least part of the mean error by which a gain counts.
 inline constexpr double least_gain = 0.09;
@@ -48,7 +47,19 @@ struct PairedErrors {
   bool gain() const;
 };
 /// Trial i of one run is trial i of the other.
-PairedErrors paired_errors(std::span<const TrialErrors> first, std::span<const TrialErrors> second,
-                           PoseKind kind);
+PairedErrors paired_errors(const TrialErrors& first_mm, const TrialErrors& second_mm);
+
+/// Where more bins stop helping: the first of the runs, by rising count, that locates every trial
+/// and over which no finer run has a gain(). None where only the last run would do, which no finer
+/// run confirms, or where a finer run has no errors.
+std::optional<std::size_t> knee_of(std::span<const TrialErrors> runs);
+
+struct CostAndError {
+  double cost = 0.0;
+  double error = 0.0;
+};
+/// Indices of the entries on the Pareto front of cost and error, by rising cost; of equal entries,
+/// the first.
+std::vector<std::size_t> pareto_front(std::span<const CostAndError> entries);
 
 }  // namespace palpate::bench

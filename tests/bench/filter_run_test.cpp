@@ -2,7 +2,6 @@
 
 #include <gtest/gtest.h>
 
-#include "comparison.hpp"
 #include "none_run.hpp"
 
 namespace palpate::bench {
