@@ -14,12 +14,10 @@ namespace {
 
 constexpr std::uint32_t workgroup = 64;
 constexpr std::size_t segment_elements = 64;  // summed in one float, as in the product
-constexpr gpu::Access bindings[] = {gpu::Access::storage, gpu::Access::storage,
-                                    gpu::Access::storage, gpu::Access::storage,
-                                    gpu::Access::storage};
 
 gpu::Kernel make_kernel(gpu::Context& context, const ContactModel& model) {
-  const std::uint32_t constants[] = {
+  const std::vector<gpu::Access> bindings(5, gpu::Access::storage);
+  const std::vector<std::uint32_t> constants{
       workgroup, std::bit_cast<std::uint32_t>(static_cast<float>(model.gamma * *model.prior)),
       std::bit_cast<std::uint32_t>(static_cast<float>(1.0 - model.gamma))};
   return {context,
@@ -28,14 +26,6 @@ gpu::Kernel make_kernel(gpu::Context& context, const ContactModel& model) {
            .bindings = bindings,
            .push_bytes = sizeof(shaders::OneBinPush),
            .constants = constants}};
-}
-
-template <typename T>
-gpu::Buffer uploaded(gpu::Context& context, gpu::CommandStream& stream,
-                     const std::vector<T>& values, const char* purpose) {
-  gpu::Buffer buffer(context, std::span(values).size_bytes(), gpu::Memory::device, purpose);
-  stream.upload(buffer, std::span(values));
-  return buffer;
 }
 
 }  // namespace
@@ -49,14 +39,13 @@ OneBinKernel::OneBinKernel(Device& device, std::span<const Hypothesis> hypothese
       cell_mm_(hypotheses.front().map.cell_mm) {
   for (const Hypothesis& hypothesis : hypotheses) {
     const OccupancyGrid& map = hypothesis.map;
-    objects_.push_back(
-        {.width = map.nx + 2 * shaders::MAP_BORDER,
-         .height = map.ny + 2 * shaders::MAP_BORDER,
-         .map = uploaded(context_, stream_, with_border(map, *model.prior), "a map"),
-         .axes = uploaded(context_, stream_, axes_in_cells(map, lattice), "the lattice's axes"),
-         .belief =
-             gpu::Buffer(context_, static_cast<VkDeviceSize>(lattice.bins()) * sizeof(TwoFloat),
-                         gpu::Memory::device, "pose bins")});
+    objects_.push_back({.width = map.nx + 2 * shaders::MAP_BORDER,
+                        .height = map.ny + 2 * shaders::MAP_BORDER,
+                        .map = stream_.uploaded(with_border(map, *model.prior), "a map"),
+                        .axes = stream_.uploaded(axes_in_cells(map, lattice), "the lattice's axes"),
+                        .belief = gpu::Buffer(
+                            context_, static_cast<VkDeviceSize>(lattice.bins()) * sizeof(TwoFloat),
+                            gpu::Memory::device, "pose bins")});
     stream_.fill(objects_.back().belief, 0);
   }
   stream_.run();
@@ -65,10 +54,9 @@ OneBinKernel::OneBinKernel(Device& device, std::span<const Hypothesis> hypothese
 void OneBinKernel::update(std::span<const Touch> touches) {
   const ContactEvidence evidence =
       gather_evidence(touches, ContactModel{}, lattice_.pivot_mm, segment_elements);
-  const gpu::Buffer elements =
-      uploaded(context_, stream_,
-               rotate_evidence(evidence.from_pivot_mm, lattice_.theta_rad, cell_mm_), "elements");
-  const gpu::Buffer segments = uploaded(context_, stream_, evidence.segments, "segments");
+  const gpu::Buffer elements = stream_.uploaded(
+      rotate_evidence(evidence.from_pivot_mm, lattice_.theta_rad, cell_mm_), "elements");
+  const gpu::Buffer segments = stream_.uploaded(evidence.segments, "segments");
   for (const Object& object : objects_) {
     const shaders::OneBinPush push{
         .nx = static_cast<shaders::uint>(lattice_.x_mm.count),

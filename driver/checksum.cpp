@@ -44,16 +44,14 @@ std::uint32_t mapped(const std::array<std::uint32_t, 32>& images, std::uint32_t 
 Checksum::Checksum(const Parameters& parameters)
     : parameters_(parameters), mask_(mask_of(parameters.bytes)) {
   const std::size_t width = 8 * parameters_.bytes;
+  const std::uint32_t polynomial =
+      parameters_.kind == Kind::weiss ? 0x1021 : parameters_.polynomial;
   for (std::uint32_t byte = 0; byte < table_.size(); ++byte) {
-    if (parameters_.kind == Kind::weiss) {
-      table_[byte] = most_significant_first(byte, 0x1021, 2);
-    } else if (parameters_.reflect) {
-      table_[byte] = reflected(
-          most_significant_first(reflected(byte, 8), parameters_.polynomial, parameters_.bytes),
-          width);
-    } else {
-      table_[byte] = most_significant_first(byte, parameters_.polynomial, parameters_.bytes);
-    }
+    table_[byte] =
+        parameters_.reflect
+            ? reflected(most_significant_first(reflected(byte, 8), polynomial, parameters_.bytes),
+                        width)
+            : most_significant_first(byte, polynomial, parameters_.bytes);
   }
   // Both kinds' registers are linear over GF(2) in their last value and in the bytes.
   if (parameters_.kind == Kind::crc || parameters_.kind == Kind::weiss) {
@@ -72,29 +70,20 @@ Checksum::Checksum(const Parameters& parameters)
 }
 
 std::uint32_t Checksum::begin() const {
-  // A reflected CRC reflects its initial value, too.
-  switch (parameters_.kind) {
-    case Kind::weiss:
-      return 0xffff;
-    case Kind::crc:
-      return parameters_.reflect ? reflected(parameters_.init, 8 * parameters_.bytes)
-                                 : parameters_.init;
-    case Kind::sum:
-    case Kind::exor:
-      break;
+  if (parameters_.kind == Kind::weiss) {
+    return 0xffff;
   }
-  return parameters_.init;
+  // A reflected CRC reflects its initial value, too.
+  return parameters_.reflect ? reflected(parameters_.init, 8 * parameters_.bytes)
+                             : parameters_.init;
 }
 
 std::uint32_t Checksum::run_on(std::uint32_t running, std::uint8_t byte) const {
-  switch (parameters_.kind) {
-    case Kind::sum:
-      return running + byte;
-    case Kind::exor:
-      return running ^ byte;
-    case Kind::weiss:
-    case Kind::crc:
-      break;
+  if (parameters_.kind == Kind::sum) {
+    return running + byte;
+  }
+  if (parameters_.kind == Kind::exor) {
+    return running ^ byte;
   }
   const bool least_first = parameters_.kind == Kind::weiss || parameters_.reflect;
   const std::size_t width = 8 * parameters_.bytes;

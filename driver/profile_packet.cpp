@@ -1,6 +1,7 @@
 #include "profile_packet.hpp"
 
 #include <algorithm>
+#include <charconv>
 #include <optional>
 #include <utility>
 
@@ -16,14 +17,6 @@ using Entry = YamlEntry;
 constexpr std::uint32_t most_packet_bytes = 65536;
 // Out of step, a deframer without checksum may read this many bytes of parts at every byte.
 constexpr std::uint32_t most_unchecked_parts_bytes = 4096;
-
-int digit(char c) {
-  if (c >= '0' && c <= '9') {
-    return c - '0';
-  }
-  const char lower = static_cast<char>(c | 0x20);
-  return lower >= 'a' && lower <= 'f' ? lower - 'a' + 10 : -1;
-}
 
 NumberType read_number_type(const Entry& entry) {
   using Kind = NumberType::Kind;
@@ -310,18 +303,24 @@ void set_most(const std::vector<Entry>& entries, Format& format) {
 
 }  // namespace
 
+std::optional<std::uint16_t> hexadecimal(std::string_view digits) {
+  std::uint16_t number = 0;
+  const char* end = digits.data() + digits.size();
+  const auto [rest, error] = std::from_chars(digits.data(), end, number, 16);
+  return error == std::errc{} && rest == end ? std::optional(number) : std::nullopt;
+}
+
 std::vector<std::uint8_t> read_bytes(const YamlEntry& entry, std::size_t least) {
   constexpr std::size_t most = 256;
   std::vector<std::uint8_t> bytes;
   std::string digits = entry.node.IsScalar() ? entry.node.Scalar() : "?";
   std::erase(digits, ' ');
   for (std::size_t i = 0; i < digits.size(); i += 2) {
-    const int high = digit(digits[i]);
-    const int low = i + 1 < digits.size() ? digit(digits[i + 1]) : -1;
-    if (high < 0 || low < 0) {
+    const auto byte = hexadecimal(std::string_view(digits).substr(i, 2));
+    if (!byte || digits.size() - i < 2) {
       entry.refuse("give bytes of two hexadecimal digits each, such as aa 55");
     }
-    bytes.push_back(static_cast<std::uint8_t>(16 * high + low));
+    bytes.push_back(static_cast<std::uint8_t>(*byte));
   }
   if (bytes.size() < least || bytes.size() > most) {
     entry.refuse(fmt::format("give {} to {} bytes", least, most));

@@ -3,12 +3,17 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <optional>
+#include <string_view>
 #include <vector>
 
 #include "packet_format.hpp"
 #include "yaml_entry.hpp"
 
 namespace palpate {
+
+/// The number that the hexadecimal digits make; none where the text holds anything else.
+std::optional<std::uint16_t> hexadecimal(std::string_view digits);
 
 /// Bytes of two hexadecimal digits each, such as "aa 55"; at least `least` of them.
 /// @throws Error

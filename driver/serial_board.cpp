@@ -21,8 +21,7 @@ constexpr std::uint8_t set_control_line_state = 0x22;
 constexpr std::uint16_t terminal_ready_and_request_to_send = 3;
 
 BulkInterface data_interface(const UsbDevice& device) {
-  constexpr std::uint8_t class_cdc_data = LIBUSB_CLASS_DATA;
-  return find_interface(device, class_cdc_data);
+  return find_interface(device, LIBUSB_CLASS_DATA);
 }
 
 std::array<std::uint8_t, 7> line_coding(const SerialLine& line) {

@@ -55,18 +55,13 @@ std::string read_short_text(const Entry& entry) {
 
 UsbId read_usb_id(const Entry& entry) {
   const std::string text = entry.text();
-  const auto is_hex = [&](std::size_t i) {
-    return std::string_view("0123456789abcdefABCDEF").find(text[i]) != std::string_view::npos;
-  };
-  bool fits = text.size() == 9 && text[4] == ':';
-  for (std::size_t i = 0; fits && i < text.size(); ++i) {
-    fits = i == 4 || is_hex(i);
-  }
-  if (!fits) {
+  const bool in_two = text.size() == 9 && text[4] == ':';
+  const auto vendor = in_two ? hexadecimal(text.substr(0, 4)) : std::nullopt;
+  const auto product = in_two ? hexadecimal(text.substr(5)) : std::nullopt;
+  if (!vendor || !product) {
     entry.refuse("give vendor and product as lsusb shows them, such as 16d0:14cc");
   }
-  return {static_cast<std::uint16_t>(std::stoul(text.substr(0, 4), nullptr, 16)),
-          static_cast<std::uint16_t>(std::stoul(text.substr(5), nullptr, 16))};
+  return {*vendor, *product};
 }
 
 SerialLine read_line(const Entry& entry) {

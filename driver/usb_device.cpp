@@ -39,7 +39,6 @@ UsbDevice describe(libusb_device* device, const libusb_device_descriptor& descri
           .address = libusb_get_device_address(device),
           .vendor = descriptor.idVendor,
           .product = descriptor.idProduct,
-          .device_class = descriptor.bDeviceClass,
           .port = port,
           .serial = attribute(port, "serial"),
           .manufacturer = attribute(port, "manufacturer"),

@@ -31,7 +31,6 @@ struct UsbDevice {
   int address = 0;
   std::uint16_t vendor = 0;
   std::uint16_t product = 0;
-  std::uint8_t device_class = 0;
   std::string port;          ///< where the device is plugged in: bus, then ports, such as "1-2.3"
   std::string serial;        ///< as the kernel read it; "" if the device has none
   std::string manufacturer;  ///< as the kernel read it; "" if the device has none

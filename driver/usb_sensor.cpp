@@ -122,8 +122,7 @@ void UsbSensor::run() {
       publish();
     }
     if (link_) {
-      std::vector<TransferRing::Completion> last = link_->end();
-      deliver(last);
+      deliver(link_->end());
       publish();
     }
   } catch (...) {
@@ -191,33 +190,29 @@ void UsbSensor::reconnect() {
   link_ = std::move(link);
 }
 
-void UsbSensor::deliver(std::vector<TransferRing::Completion>& completions) {
-  for (const TransferRing::Completion& completion : completions) {
-    deliver(completion);
-  }
-}
-
-void UsbSensor::deliver(const TransferRing::Completion& completion) {
+void UsbSensor::deliver(const std::vector<TransferRing::Completion>& completions) {
   Deframer& deframer = board_->deframer();
-  if (completion.missing > 0) {
-    // A lower bound: each missing transfer held at least part of a frame.
-    deframer.reset();
-    lost_before_next_ += completion.missing;
-    tally_.lost += completion.missing;
-  }
-  const DeframerCounters before = deframer.counters();
-  parsed_.clear();
-  const std::uint64_t spoiled = board_->parse(completion, parsed_);
-  tally_.checksum_errors += deframer.counters().checksum_errors - before.checksum_errors;
-  tally_.garbage_bytes += deframer.counters().garbage_bytes - before.garbage_bytes;
-  tally_.lost += spoiled;
-  lost_before_next_ += spoiled;
-  for (ParsedFrame& frame : parsed_) {
-    queue_.push({.host_time_s = completion.host_time_s,
-                 .device_time_s = frame.device_time_s,
-                 .values = std::move(frame.values),
-                 .lost_before = std::exchange(lost_before_next_, 0)});
-    back_off_ = first_back_off;
+  for (const TransferRing::Completion& completion : completions) {
+    if (completion.missing > 0) {
+      // A lower bound: each missing transfer held at least part of a frame.
+      deframer.reset();
+      lost_before_next_ += completion.missing;
+      tally_.lost += completion.missing;
+    }
+    const DeframerCounters before = deframer.counters();
+    parsed_.clear();
+    const std::uint64_t spoiled = board_->parse(completion, parsed_);
+    tally_.checksum_errors += deframer.counters().checksum_errors - before.checksum_errors;
+    tally_.garbage_bytes += deframer.counters().garbage_bytes - before.garbage_bytes;
+    tally_.lost += spoiled;
+    lost_before_next_ += spoiled;
+    for (ParsedFrame& frame : parsed_) {
+      queue_.push({.host_time_s = completion.host_time_s,
+                   .device_time_s = frame.device_time_s,
+                   .values = std::move(frame.values),
+                   .lost_before = std::exchange(lost_before_next_, 0)});
+      back_off_ = first_back_off;
+    }
   }
 }
 

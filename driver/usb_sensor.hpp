@@ -47,8 +47,7 @@ class UsbSensor final : public Sensor {
   void lose();
   void wait_for_return();
   void reconnect();
-  void deliver(std::vector<TransferRing::Completion>& completions);
-  void deliver(const TransferRing::Completion& completion);
+  void deliver(const std::vector<TransferRing::Completion>& completions);
   void publish();
 
   UsbContext context_;

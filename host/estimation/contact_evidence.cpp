@@ -27,38 +27,33 @@ shaders::Split split(double coordinate_cells, int beyond) {
   return {static_cast<int>(cell), static_cast<float>(coordinate_cells - cell)};
 }
 
-/// Adds the touch's elements of one reading as segments.
-void append(ContactEvidence& evidence, const Touch& touch, std::span<const Reading> readings,
-            Reading reading, Reading instead, const glm::dvec2& pivot_mm,
-            std::size_t segment_elements) {
-  const std::size_t first = evidence.from_pivot_mm.size();
-  for (std::size_t i = 0; i < readings.size(); ++i) {
-    if (readings[i] == reading) {
-      evidence.from_pivot_mm.push_back(touch.T_robot_sensor * touch.elements_mm[i] - pivot_mm);
-    }
-  }
-  const std::size_t end = evidence.from_pivot_mm.size();
-  for (std::size_t begin = first; begin < end; begin += segment_elements) {
-    evidence.segments.push_back(
-        {.begin = static_cast<shaders::uint>(begin),
-         .end = static_cast<shaders::uint>(std::min(begin + segment_elements, end)),
-         .reading = static_cast<shaders::uint>(reading),
-         .instead = static_cast<shaders::uint>(instead)});
-  }
-}
-
-/// Adds the touch's elements that do not read `instead`.
+/// Adds the touch's elements that do not read `instead`, as segments of one reading each.
 void append(ContactEvidence& evidence, const Touch& touch, std::span<const Reading> readings,
             Reading instead, const glm::dvec2& pivot_mm, std::size_t segment_elements) {
   ReadingCounts counts{};
   for (const Reading reading : readings) {
     ++counts[static_cast<std::size_t>(reading)];
   }
-  for (std::size_t i = 0; i < counts.size(); ++i) {
-    if (const auto reading = static_cast<Reading>(i); counts[i] > 0 && reading != instead) {
-      append(evidence, touch, readings, reading, instead, pivot_mm, segment_elements);
+  for (std::size_t level = 0; level < counts.size(); ++level) {
+    evidence.counts[level] += counts[level];
+    const auto reading = static_cast<Reading>(level);
+    if (counts[level] == 0 || reading == instead) {
+      continue;
     }
-    evidence.counts[i] += counts[i];
+    const std::size_t first = evidence.from_pivot_mm.size();
+    for (std::size_t i = 0; i < readings.size(); ++i) {
+      if (readings[i] == reading) {
+        evidence.from_pivot_mm.push_back(touch.T_robot_sensor * touch.elements_mm[i] - pivot_mm);
+      }
+    }
+    const std::size_t end = evidence.from_pivot_mm.size();
+    for (std::size_t begin = first; begin < end; begin += segment_elements) {
+      evidence.segments.push_back(
+          {.begin = static_cast<shaders::uint>(begin),
+           .end = static_cast<shaders::uint>(std::min(begin + segment_elements, end)),
+           .reading = static_cast<shaders::uint>(reading),
+           .instead = static_cast<shaders::uint>(instead)});
+    }
   }
 }
 
@@ -68,9 +63,7 @@ bool ContactEvidence::operator==(const ContactEvidence& other) const {
   const auto same = [](const shaders::Segment& a, const shaders::Segment& b) {
     return a.begin == b.begin && a.end == b.end && a.reading == b.reading && a.instead == b.instead;
   };
-  return from_pivot_mm == other.from_pivot_mm &&
-         std::equal(segments.begin(), segments.end(), other.segments.begin(), other.segments.end(),
-                    same);
+  return from_pivot_mm == other.from_pivot_mm && std::ranges::equal(segments, other.segments, same);
 }
 
 ContactEvidence gather_evidence(std::span<const Touch> touches, const ContactModel& model,

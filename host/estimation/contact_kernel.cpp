@@ -108,8 +108,6 @@ ContactTable::ContactTable(gpu::Context& context, gpu::CommandStream& stream,
                     "reads; use fewer nodes, levels or objects",
                     bytes / sizeof(shaders::TableNode), most, context.name()));
   }
-  nodes_ = gpu::Buffer(context, bytes, gpu::Memory::device, "the likelihood table",
-                       VK_FORMAT_R32G32_SFLOAT);
   std::vector<shaders::TableNode> nodes;
   if (const auto& table = model.table) {
     sets_ = table->sets();
@@ -120,7 +118,7 @@ ContactTable::ContactTable(gpu::Context& context, gpu::CommandStream& stream,
     append_set(nodes, *table, set_of_none(model));
   }
   nodes.resize(bytes / sizeof(shaders::TableNode));
-  stream.upload(nodes_, std::span<const shaders::TableNode>(nodes));
+  nodes_ = stream.uploaded(nodes, "the likelihood table", VK_FORMAT_R32G32_SFLOAT);
 }
 
 int ContactTable::first_node(std::size_t object) const {

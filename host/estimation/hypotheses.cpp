@@ -61,10 +61,7 @@ ContactModel resolve(const ContactModel& contact, std::span<const Hypothesis> hy
 
 double log_total_weight(std::span<const Hypothesis> hypotheses) {
   // Relative to the largest, for the sum of the weights themselves may be infinite.
-  double largest = 0.0;
-  for (const Hypothesis& hypothesis : hypotheses) {
-    largest = std::max(largest, hypothesis.weight);
-  }
+  const double largest = std::ranges::max(hypotheses, {}, &Hypothesis::weight).weight;
   double total = 0.0;
   for (const Hypothesis& hypothesis : hypotheses) {
     total += hypothesis.weight / largest;

@@ -6,6 +6,11 @@
 
 namespace palpate {
 
+/// Workgroups that cover `count` things.
+constexpr std::uint32_t groups_of(std::int64_t count, std::int64_t per_group) {
+  return static_cast<std::uint32_t>((count + per_group - 1) / per_group);
+}
+
 // How the kernels divide their work, by the device's limits and the size of the problem. A CPU
 // device has a few cores: it wants few, long-running workgroups, each of whose vectors walks
 // through memory of its own. A GPU wants tens of thousands of invocations, in whole subgroups that

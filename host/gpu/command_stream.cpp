@@ -93,6 +93,14 @@ std::size_t CommandStream::stage(Arena& arena, std::size_t bytes) {
   return std::min<std::size_t>(bytes, staging_block - arena.used);
 }
 
+Buffer CommandStream::uploaded_bytes(std::span<const std::byte> bytes, std::string_view purpose,
+                                     VkFormat texel) {
+  Buffer buffer;
+  record([&] { buffer = Buffer(context_, bytes.size(), Memory::device, purpose, texel); });
+  upload_bytes(buffer, bytes, 0);
+  return buffer;
+}
+
 void CommandStream::upload_bytes(const Buffer& target, std::span<const std::byte> bytes,
                                  VkDeviceSize offset) {
   while (!bytes.empty()) {

@@ -3,6 +3,7 @@
 #include <array>
 #include <cstring>
 #include <initializer_list>
+#include <ranges>
 #include <span>
 #include <vector>
 
@@ -25,14 +26,20 @@ class CommandStream {
   CommandStream& operator=(const CommandStream&) = delete;
 
   /// Copies the values to the buffer, from byte `offset` on. Reads `values` before it returns.
-  template <typename T>
-  void upload(const Buffer& target, std::span<const T> values, VkDeviceSize offset = 0) {
-    upload_bytes(target, std::as_bytes(values), offset);
+  template <std::ranges::contiguous_range Values>
+  void upload(const Buffer& target, const Values& values, VkDeviceSize offset = 0) {
+    upload_bytes(target, std::as_bytes(std::span(values)), offset);
+  }
+  /// Makes a buffer of the device and copies the values to it.
+  template <std::ranges::contiguous_range Values>
+  Buffer uploaded(const Values& values, std::string_view purpose,
+                  VkFormat texel = VK_FORMAT_UNDEFINED) {
+    return uploaded_bytes(std::as_bytes(std::span(values)), purpose, texel);
   }
   /// Copies from the buffer, from byte `offset` on. `values` must live until run() fills them.
-  template <typename T>
-  void download(const Buffer& source, std::span<T> values, VkDeviceSize offset = 0) {
-    download_bytes(source, std::as_writable_bytes(values), offset);
+  template <std::ranges::contiguous_range Values>
+  void download(const Buffer& source, Values&& values, VkDeviceSize offset = 0) {
+    download_bytes(source, std::as_writable_bytes(std::span(values)), offset);
   }
   /// Sets every 32-bit word of the buffer to `word`.
   void fill(const Buffer& target, std::uint32_t word);
@@ -68,6 +75,7 @@ class CommandStream {
 
   /// Makes room at arena.used for a copy. Returns how many of its `bytes` fit, at least one.
   std::size_t stage(Arena& arena, std::size_t bytes);
+  Buffer uploaded_bytes(std::span<const std::byte> bytes, std::string_view purpose, VkFormat texel);
   void upload_bytes(const Buffer& target, std::span<const std::byte> bytes, VkDeviceSize offset);
   void download_bytes(const Buffer& source, std::span<std::byte> bytes, VkDeviceSize offset);
   void dispatch_bytes(const Kernel& kernel, std::span<const Buffer* const> buffers,

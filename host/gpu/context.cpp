@@ -49,11 +49,6 @@ void ValidationLog::throw_if_any() {
   }
 }
 
-bool ValidationLog::empty() {
-  const std::scoped_lock lock(mutex_);
-  return messages_.empty();
-}
-
 Instance::Instance() {
   const VkApplicationInfo application{.sType = VK_STRUCTURE_TYPE_APPLICATION_INFO,
                                       .pApplicationName = "palpate",
@@ -96,13 +91,11 @@ Instance::~Instance() {
   }
   vkDestroyInstance(instance_, nullptr);
   // A destructor cannot throw, yet a message about a leaked or misused object must not get lost.
-  if (!validation_.empty()) {
-    try {
-      validation_.throw_if_any();
-    } catch (const Error& error) {
-      std::fputs(error.what(), stderr);
-      std::fputc('\n', stderr);
-    }
+  try {
+    validation_.throw_if_any();
+  } catch (const Error& error) {
+    std::fputs(error.what(), stderr);
+    std::fputc('\n', stderr);
     std::abort();
   }
 }
@@ -134,13 +127,10 @@ Context::Context(std::string_view name_or_index) {
   std::copy_n(limits.maxComputeWorkGroupCount, 3, limits_.group_count);
   limits_.push_bytes = limits.maxPushConstantsSize;
 
-  std::uint32_t families = 0;
-  vkGetPhysicalDeviceQueueFamilyProperties(physical_, &families, nullptr);
-  std::vector<VkQueueFamilyProperties> family(families);
-  vkGetPhysicalDeviceQueueFamilyProperties(physical_, &families, family.data());
-  if (family[queue_family_].timestampValidBits > 0) {
+  const std::uint32_t timestamp_bits = queue_families(physical_)[queue_family_].timestampValidBits;
+  if (timestamp_bits > 0) {
     limits_.timestamp_ns = limits.timestampPeriod;
-    limits_.timestamp_mask = ~std::uint64_t{0} >> (64 - family[queue_family_].timestampValidBits);
+    limits_.timestamp_mask = ~std::uint64_t{0} >> (64 - timestamp_bits);
   }
   vkGetPhysicalDeviceMemoryProperties(physical_, &memory_);
   limits_.memory = device_memory(memory_);

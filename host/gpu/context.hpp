@@ -19,7 +19,6 @@ class ValidationLog {
   void add(std::string message);
   /// @throws Error with the first message, if there is any
   void throw_if_any();
-  bool empty();
 
  private:
   std::mutex mutex_;

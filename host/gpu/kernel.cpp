@@ -13,9 +13,7 @@ VkDescriptorType descriptor_type(Access access) {
 }
 
 Kernel::Kernel(Context& context, const KernelInfo& info)
-    : bindings_(info.bindings.begin(), info.bindings.end()),
-      push_bytes_(info.push_bytes),
-      name_(info.name) {
+    : bindings_(info.bindings), push_bytes_(info.push_bytes), name_(info.name) {
   const VkDevice device = context.device();
   const auto doing = fmt::format("device '{}': kernel {}", context.name(), info.name);
   if (info.push_bytes > context.limits().push_bytes || info.bindings.size() > max_bindings) {
@@ -55,7 +53,7 @@ Kernel::Kernel(Context& context, const KernelInfo& info)
   const VkSpecializationInfo specialization{
       .mapEntryCount = static_cast<std::uint32_t>(entries.size()),
       .pMapEntries = entries.data(),
-      .dataSize = info.constants.size_bytes(),
+      .dataSize = info.constants.size() * sizeof(std::uint32_t),
       .pData = info.constants.data()};
   const VkShaderModuleCreateInfo module_info{.sType = VK_STRUCTURE_TYPE_SHADER_MODULE_CREATE_INFO,
                                              .codeSize = info.spirv.size_bytes(),

@@ -21,9 +21,9 @@ VkDescriptorType descriptor_type(Access access);
 struct KernelInfo {
   const char* name = "";
   std::span<const std::uint32_t> spirv;
-  std::span<const Access> bindings;
+  std::vector<Access> bindings;
   std::uint32_t push_bytes = 0;
-  std::span<const std::uint32_t> constants = {};  ///< bits of specialization constants 0, 1, ...
+  std::vector<std::uint32_t> constants = {};  ///< bits of specialization constants 0, 1, ...
 };
 
 /// A compute pipeline with its layouts. Move-only.

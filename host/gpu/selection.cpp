@@ -42,23 +42,17 @@ std::string version_text(std::uint32_t version) {
 
 /// A compute queue family, if possible without graphics, so that it does not wait for a desktop.
 std::optional<std::uint32_t> compute_family(VkPhysicalDevice physical) {
-  std::uint32_t count = 0;
-  vkGetPhysicalDeviceQueueFamilyProperties(physical, &count, nullptr);
-  std::vector<VkQueueFamilyProperties> families(count);
-  vkGetPhysicalDeviceQueueFamilyProperties(physical, &count, families.data());
-  std::optional<std::uint32_t> found;
-  for (std::uint32_t i = 0; i < count; ++i) {
-    if ((families[i].queueFlags & VK_QUEUE_COMPUTE_BIT) == 0) {
-      continue;
-    }
-    if ((families[i].queueFlags & VK_QUEUE_GRAPHICS_BIT) == 0) {
-      return i;
-    }
-    if (!found) {
-      found = i;
+  const std::vector<VkQueueFamilyProperties> families = queue_families(physical);
+  constexpr VkQueueFlags graphics = VK_QUEUE_GRAPHICS_BIT;
+  for (const VkQueueFlags unwanted : {graphics, VkQueueFlags{0}}) {
+    for (std::uint32_t i = 0; i < families.size(); ++i) {
+      const VkQueueFlags flags = families[i].queueFlags;
+      if ((flags & VK_QUEUE_COMPUTE_BIT) != 0 && (flags & unwanted) == 0) {
+        return i;
+      }
     }
   }
-  return found;
+  return {};
 }
 
 Candidate inspect(VkPhysicalDevice physical, int index) {
@@ -121,6 +115,14 @@ std::string wished(std::string_view name_or_index) {
   return name_or_index.empty() && value != nullptr ? value : std::string(name_or_index);
 }
 
+std::vector<VkQueueFamilyProperties> queue_families(VkPhysicalDevice physical) {
+  std::uint32_t count = 0;
+  vkGetPhysicalDeviceQueueFamilyProperties(physical, &count, nullptr);
+  std::vector<VkQueueFamilyProperties> families(count);
+  vkGetPhysicalDeviceQueueFamilyProperties(physical, &count, families.data());
+  return families;
+}
+
 VkDeviceSize device_memory(const VkPhysicalDeviceMemoryProperties& memory) {
   VkDeviceSize bytes = 0;
   for (std::uint32_t i = 0; i < memory.memoryHeapCount; ++i) {
@@ -175,8 +177,8 @@ std::vector<Candidate> candidates(VkInstance instance, std::string_view name_or_
 }
 
 const Candidate& chosen(std::span<const Candidate> candidates, std::string_view name_or_index) {
-  const auto found = std::find_if(candidates.begin(), candidates.end(),
-                                  [](const Candidate& c) { return c.info.chosen; });
+  const auto found =
+      std::ranges::find_if(candidates, [](const Candidate& c) { return c.info.chosen; });
   if (found != candidates.end()) {
     return *found;
   }

@@ -29,6 +29,8 @@ std::string wished(std::string_view name_or_index);
 /// all devices, or among the devices with this index or this part of the name (case ignored).
 std::vector<Candidate> candidates(VkInstance instance, std::string_view name_or_index);
 
+std::vector<VkQueueFamilyProperties> queue_families(VkPhysicalDevice physical);
+
 /// Bytes of the largest heap of device memory.
 VkDeviceSize device_memory(const VkPhysicalDeviceMemoryProperties& memory);
 

@@ -17,30 +17,29 @@ namespace palpate {
 
 namespace detail {
 
-inline std::string_view without_plus(std::string_view text) {
+/// Reads all of the text, after a plus sign if it has one, as std::from_chars() does.
+template <class Number, class... Base>
+std::optional<Number> all_of(std::string_view text, Base... base) {
   const bool plus = text.size() > 1 && text[0] == '+' && text[1] != '-';
-  return text.substr(plus ? 1 : 0);
+  text.remove_prefix(plus ? 1 : 0);
+  Number number{};
+  const char* text_end = text.data() + text.size();
+  const auto [end, error] = std::from_chars(text.data(), text_end, number, base...);
+  return error == std::errc{} && end == text_end ? std::optional(number) : std::nullopt;
 }
 
 }  // namespace detail
 
 /// Returns the text as a finite number; none where it is not one as a whole.
 inline std::optional<double> number_of(std::string_view text) {
-  text = detail::without_plus(text);
-  double number = 0.0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
-  const bool whole = error == std::errc{} && end == text.data() + text.size();
-  return whole && std::isfinite(number) ? std::optional(number) : std::nullopt;
+  const std::optional<double> number = detail::all_of<double>(text);
+  return number && std::isfinite(*number) ? number : std::nullopt;
 }
 
 /// The whole number, decimal unless another base is given, that all of the text is, if it is one:
 /// "010" is 10.
 inline std::optional<std::int64_t> whole_number_of(std::string_view text, int base = 10) {
-  text = detail::without_plus(text);
-  std::int64_t number = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number, base);
-  const bool whole = error == std::errc{} && end == text.data() + text.size();
-  return whole ? std::optional(number) : std::nullopt;
+  return detail::all_of<std::int64_t>(text, base);
 }
 
 /// Returns the line as two finite numbers separated by blanks; none where it is anything else.

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -21,7 +20,12 @@ class ScaleAndAdd {
     std::uint32_t addend;
   };
 
-  ScaleAndAdd(Context& context, std::uint32_t factor) : ScaleAndAdd(context, {workgroup, factor}) {}
+  ScaleAndAdd(Context& context, std::uint32_t factor)
+      : kernel_(context, {.name = "scale_and_add",
+                          .spirv = shaders::scale_and_add,
+                          .bindings = {Access::storage, Access::storage},
+                          .push_bytes = sizeof(Push),
+                          .constants = {workgroup, factor}}) {}
 
   void dispatch(CommandStream& stream, const Buffer& source, const Buffer& target,
                 std::uint32_t addend) const {
@@ -32,15 +36,6 @@ class ScaleAndAdd {
   const Kernel& kernel() const { return kernel_; }
 
  private:
-  ScaleAndAdd(Context& context, const std::array<std::uint32_t, 2>& constants)
-      : kernel_(context, {.name = "scale_and_add",
-                          .spirv = shaders::scale_and_add,
-                          .bindings = bindings,
-                          .push_bytes = sizeof(Push),
-                          .constants = constants}) {}
-
-  static constexpr Access bindings[] = {Access::storage, Access::storage};
-
   Kernel kernel_;
 };
 

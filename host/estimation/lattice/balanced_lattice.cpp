@@ -21,14 +21,6 @@ double resolution_mm(const OccupancyGrid& map) {
   return std::max(map.cell_mm, map.spread_mm.value_or(0.0));
 }
 
-double finest_resolution_mm(std::span<const Hypothesis> hypotheses) {
-  double finest_mm = std::numeric_limits<double>::infinity();
-  for (const Hypothesis& hypothesis : hypotheses) {
-    finest_mm = std::min(finest_mm, resolution_mm(hypothesis.map));
-  }
-  return finest_mm;
-}
-
 /// Root mean square distance of an object's cells from the pivot, wherever in the region that is.
 double lever_mm(const OccupancyGrid& map, const PoseLattice& region) {
   const Body body = displaced_body(map);
@@ -53,8 +45,10 @@ BalancedLattice balanced_lattice(const PoseLattice& region, std::span<const Hypo
     axis->count = 1;
   }
   lattice.validate();
+  double finest_mm = std::numeric_limits<double>::infinity();
   double longest_mm = 0.0;
   for (const Hypothesis& hypothesis : hypotheses) {
+    finest_mm = std::min(finest_mm, resolution_mm(hypothesis.map));
     longest_mm = std::max(longest_mm, lever_mm(hypothesis.map, region));
   }
   const double extents_mm[] = {lattice.x_mm.upper - lattice.x_mm.lower,
@@ -67,7 +61,7 @@ BalancedLattice balanced_lattice(const PoseLattice& region, std::span<const Hypo
     }
     return product;
   };
-  const double wanted_mm = balanced_step * finest_resolution_mm(hypotheses);
+  const double wanted_mm = balanced_step * finest_mm;
   // Counts are ints.
   const auto most =
       static_cast<double>(std::min<std::int64_t>(most_bins, std::numeric_limits<int>::max()));

@@ -15,50 +15,14 @@ namespace palpate {
 
 namespace {
 
-constexpr float least = -std::numeric_limits<float>::infinity();
-constexpr gpu::Access read_and_write[] = {gpu::Access::table, gpu::Access::storage};
-constexpr gpu::Access marginal_bindings[] = {gpu::Access::table, gpu::Access::storage,
-                                             gpu::Access::storage};
+using gpu::Access;
 
-std::uint32_t groups_of(std::int64_t count, std::uint32_t per_group) {
-  return static_cast<std::uint32_t>((count + per_group - 1) / per_group);
-}
+constexpr float least = -std::numeric_limits<float>::infinity();
 
 /// Index in the lattice of a slab's bin.
 std::int64_t lattice_index(const PoseLattice& lattice, const Slab& slab, std::int64_t in_slab) {
   return (slab.theta_first + in_slab / slab.plane()) * lattice.plane() +
          std::int64_t{slab.row_first} * slab.nx + in_slab % slab.plane();
-}
-
-gpu::Kernel reduction_kernel(gpu::Context& context, const ReductionSizes& sizes) {
-  const std::uint32_t constants[] = {sizes.lanes, sizes.side_by_side, sizes.texels_per_lane};
-  return {context,
-          {.name = "reduce_belief",
-           .spirv = shaders::reduce_belief,
-           .bindings = read_and_write,
-           .push_bytes = sizeof(shaders::ReducePush),
-           .constants = constants}};
-}
-
-gpu::Kernel marginal_kernel(gpu::Context& context, const MarginalSizes& sizes, bool even_planes) {
-  const std::uint32_t constants[] = {sizes.lanes, sizes.side_by_side, sizes.pairs_per_lane,
-                                     sizes.thetas, even_planes ? 1U : 0U};
-  return {context,
-          {.name = "sum_marginals",
-           .spirv = shaders::sum_marginals,
-           .bindings = marginal_bindings,
-           .push_bytes = sizeof(shaders::MarginalPush),
-           .constants = constants}};
-}
-
-gpu::Kernel addition_kernel(gpu::Context& context) {
-  const std::uint32_t constants[] = {independent_lanes(context.limits())};
-  return {context,
-          {.name = "add_belief",
-           .spirv = shaders::add_belief,
-           .bindings = read_and_write,
-           .push_bytes = sizeof(shaders::AddPush),
-           .constants = constants}};
 }
 
 ReductionSizes sizes_for(const gpu::Context& context, const PoseLattice& lattice,
@@ -80,8 +44,6 @@ void add_rows(std::span<const float> parts, std::span<double> sums) {
   }
 }
 
-bool exceeds(const TwoFloat& a, const TwoFloat& b) { return a.value() > b.value(); }
-
 }  // namespace
 
 DenseBelief::DenseBelief(gpu::Context& context, gpu::CommandStream& stream,
@@ -92,9 +54,24 @@ DenseBelief::DenseBelief(gpu::Context& context, gpu::CommandStream& stream,
       objects_(objects),
       reduction_(sizes_for(context, lattice, objects)),
       marginal_(marginal_sizes(context.limits(), lattice.plane(), lattice.theta_rad.count)),
-      reduce_(reduction_kernel(context, reduction_)),
-      sum_marginals_(marginal_kernel(context, marginal_, lattice.x_mm.count % 2 == 0)),
-      add_(addition_kernel(context)) {
+      reduce_(context, {.name = "reduce_belief",
+                        .spirv = shaders::reduce_belief,
+                        .bindings = {Access::table, Access::storage},
+                        .push_bytes = sizeof(shaders::ReducePush),
+                        .constants = {reduction_.lanes, reduction_.side_by_side,
+                                      reduction_.texels_per_lane}}),
+      sum_marginals_(
+          context, {.name = "sum_marginals",
+                    .spirv = shaders::sum_marginals,
+                    .bindings = {Access::table, Access::storage, Access::storage},
+                    .push_bytes = sizeof(shaders::MarginalPush),
+                    .constants = {marginal_.lanes, marginal_.side_by_side, marginal_.pairs_per_lane,
+                                  marginal_.thetas, lattice.x_mm.count % 2 == 0 ? 1U : 0U}}),
+      add_(context, {.name = "add_belief",
+                     .spirv = shaders::add_belief,
+                     .bindings = {Access::table, Access::storage},
+                     .push_bytes = sizeof(shaders::AddPush),
+                     .constants = {independent_lanes(context.limits())}}) {
   for (const SlabExtent& extent : cut(context, lattice, objects)) {
     slabs_.push_back(
         {extent, gpu::Buffer(context, extent.bytes(), gpu::Memory::device,
@@ -178,7 +155,7 @@ std::vector<BeliefSummary> DenseBelief::summarise() const {
     first += static_cast<std::uint32_t>(partials_of(slab, reduction_));
   }
   std::vector<shaders::Partial> partials(partial_count_);
-  stream_.download(partials_, std::span(partials));
+  stream_.download(partials_, partials);
   stream_.run();
 
   std::vector<BeliefSummary> summaries(objects_, {.max = {least, 0.0F}});
@@ -196,7 +173,7 @@ std::vector<BeliefSummary> DenseBelief::summarise() const {
   // An object's slabs stand in the lattice's order, so the first of equals has the lowest bin.
   for_each_partial([&](BeliefSummary& summary, const Slab& slab, const shaders::Partial& partial,
                        const TwoFloat& max) {
-    if (exceeds(max, summary.max)) {
+    if (max.value() > summary.max.value()) {
       summary.max = max;
       summary.arg_max = lattice_index(lattice_, slab, partial.arg_max);
     }
@@ -232,8 +209,8 @@ Marginals DenseBelief::marginals(std::size_t object, TwoFloat max, double of_lar
         .max_low = max.low};
     stream_.dispatch(sum_marginals_, {&slab.log_likelihood, &theta_parts, &plane_parts}, push,
                      {blocks, chunks, 1});
-    stream_.download(theta_parts, std::span(over_theta));
-    stream_.download(plane_parts, std::span(over_plane));
+    stream_.download(theta_parts, over_theta);
+    stream_.download(plane_parts, over_plane);
     stream_.run();
 
     add_rows(over_theta,
@@ -246,24 +223,6 @@ Marginals DenseBelief::marginals(std::size_t object, TwoFloat max, double of_lar
     }
   }
   return sums;
-}
-
-std::vector<double> DenseBelief::download(std::size_t object) const {
-  std::vector<double> values(static_cast<std::size_t>(lattice_.bins()));
-  std::vector<TwoFloat> raw;
-  for (const Slab& slab : slabs_) {
-    if (!slab.holds(object)) {
-      continue;
-    }
-    raw.resize(static_cast<std::size_t>(slab.bins()));
-    stream_.download(slab.log_likelihood, std::span(raw),
-                     slab.first_bin(object) * sizeof(TwoFloat));
-    stream_.run();
-    for (std::int64_t i = 0; i < slab.bins(); ++i) {
-      values[lattice_index(lattice_, slab, i)] = raw[i].value();
-    }
-  }
-  return values;
 }
 
 std::vector<double> DenseBelief::download(std::size_t object, const BinWindow& window) const {

@@ -51,9 +51,7 @@ class DenseBelief {
   /// @param max the object's largest log-likelihood
   /// @param of_largest the probability of a bin of this log-likelihood
   Marginals marginals(std::size_t object, TwoFloat max, double of_largest) const;
-  /// All bins of one object, [theta, y, x].
-  std::vector<double> download(std::size_t object) const;
-  /// The bins of a window, [theta, y, x].
+  /// One object's log-likelihoods in a window, [theta, y, x].
   std::vector<double> download(std::size_t object, const BinWindow& window) const;
 
  private:

@@ -17,12 +17,9 @@ constexpr VkDeviceSize table_bytes = 16 << 20;
 // A batch of whole products, so that it does not matter which elements share one.
 constexpr std::size_t factors = shaders::FACTORS_PER_LOG;
 
+/// Of an element rotated by every theta.
 VkDeviceSize bytes_per_element(const PoseLattice& lattice) {
   return static_cast<VkDeviceSize>(lattice.theta_rad.count) * sizeof(shaders::RotatedElement);
-}
-
-std::uint32_t blocks(std::uint32_t count, std::uint32_t per_block) {
-  return (count + per_block - 1) / per_block;
 }
 
 }  // namespace
@@ -75,14 +72,11 @@ DenseLikelihood::DenseLikelihood(gpu::Context& context, gpu::CommandStream& stre
       lattice_(lattice),
       objects_(hypotheses.size()),
       contact_(context, stream, model),
-      bytes_per_element_(bytes_per_element(lattice)),
       batch_elements_(std::min(batch_for(context, lattice, hypotheses.size()), most_elements)) {
   for (const MapGroup& group : group_maps(context, hypotheses, lattice)) {
     groups_.push_back(
-        {.path = choose_path(context, lattice, group.objects.size(), group.kind, model),
-         .kind = group.kind,
-         .objects = group.objects,
-         .maps = {context, stream, group, hypotheses, lattice, belief, *model.prior, contact_}});
+        {group, choose_path(context, lattice, group.objects.size(), group.kind, model),
+         MapTable(context, stream, group, hypotheses, lattice, belief, *model.prior, contact_)});
   }
   reserve(1);
   for (const Group& group : groups_) {
@@ -115,7 +109,7 @@ void DenseLikelihood::dispatch(const Group& group, const Range& range, const Sla
   const LikelihoodPath& path = group.path;
   const MapTable& maps = group.maps;
   const std::uint32_t invocations =
-      blocks(slab.nx, path.bins_x) * blocks(slab.row_count, path.bins_y);
+      groups_of(slab.nx, path.bins_x) * groups_of(slab.row_count, path.bins_y);
   // A kernel that reads maps in one way is given any buffer for the other.
   const bool in_table = group.kind.access == gpu::Access::table;
   stream_.dispatch(
@@ -124,17 +118,18 @@ void DenseLikelihood::dispatch(const Group& group, const Range& range, const Sla
        in_table ? &maps.axes() : &maps.log_odds(), &maps.axes(), &maps.places(),
        &slab.log_likelihood},
       push,
-      {blocks(invocations, independent_lanes(context_.limits())), range.count, slab.theta_count});
+      {groups_of(invocations, independent_lanes(context_.limits())), range.count,
+       slab.theta_count});
 }
 
 void DenseLikelihood::reserve(std::size_t elements) {
-  if (elements * bytes_per_element_ > elements_.bytes()) {
+  if (elements * bytes_per_element(lattice_) > elements_.bytes()) {
     // The old ones go first, so that both never count at once.
     segments_ = {};
     elements_ = {};
     segments_ = gpu::Buffer(context_, elements * sizeof(shaders::Segment), gpu::Memory::device,
                             "segments", VK_FORMAT_R32G32B32A32_SINT);
-    elements_ = gpu::Buffer(context_, elements * bytes_per_element_, gpu::Memory::device,
+    elements_ = gpu::Buffer(context_, elements * bytes_per_element(lattice_), gpu::Memory::device,
                             "rotated elements", VK_FORMAT_R32G32B32A32_SINT);
   }
 }
@@ -164,13 +159,12 @@ void DenseLikelihood::accumulate(const ContactEvidence& evidence, const DenseBel
       batch.back().end -= static_cast<shaders::uint>(first);
     }
     const std::size_t elements = batch.back().end;
-    stream_.upload(segments_, std::span<const shaders::Segment>(batch));
+    stream_.upload(segments_, batch);
 
     for (const Group& group : groups_) {
-      const std::vector<shaders::RotatedElement> rotated =
-          rotate_evidence(std::span(evidence.from_pivot_mm).subspan(first, elements),
-                          lattice_.theta_rad, group.kind.cell_mm);
-      stream_.upload(elements_, std::span<const shaders::RotatedElement>(rotated));
+      stream_.upload(elements_,
+                     rotate_evidence(std::span(evidence.from_pivot_mm).subspan(first, elements),
+                                     lattice_.theta_rad, group.kind.cell_mm));
       for (const Slab& slab : belief.slabs()) {
         const Range range = within(group, slab);
         if (range.count == 0) {

@@ -54,10 +54,8 @@ class DenseLikelihood {
 
  private:
   /// Objects that a dispatch takes together.
-  struct Group {
+  struct Group : MapGroup {
     LikelihoodPath path;
-    MapKind kind;
-    std::vector<std::size_t> objects;
     MapTable maps;
   };
   /// Those of a group that a slab holds: a range of group.objects.
@@ -79,8 +77,7 @@ class DenseLikelihood {
   std::size_t objects_;
   ContactTable contact_;
   std::vector<Group> groups_;
-  VkDeviceSize bytes_per_element_ = 0;  ///< rotated by every theta
-  std::size_t batch_elements_ = 0;      ///< most elements in the tables
+  std::size_t batch_elements_ = 0;  ///< most elements in the tables
   gpu::Buffer elements_;
   gpu::Buffer segments_;
 };

@@ -32,10 +32,7 @@ double spread_mm(std::span<const DisplacedBin> bins, double top, double inverse_
 }  // namespace
 
 double flattening_root(std::span<const DisplacedBin> bins, double least) {
-  const double top =
-      std::max_element(bins.begin(), bins.end(), [](const DisplacedBin& a, const DisplacedBin& b) {
-        return a.log_likelihood < b.log_likelihood;
-      })->log_likelihood;
+  const double top = std::ranges::max(bins, {}, &DisplacedBin::log_likelihood).log_likelihood;
   const double wanted_mm = wanted_share * spread_mm(bins, top, 0.0);
   double root = least;
   double narrow_mm = spread_mm(bins, top, 1.0 / root);

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <cstdint>
-#include <optional>
 #include <string>
 
 #include "kernel.hpp"
@@ -11,7 +10,8 @@
 namespace palpate {
 
 /// A way to evaluate the likelihood over the lattice, for maps of one cell size: a kernel of which
-/// an invocation takes bins_x x bins_y bins of one theta. All of them bind the same buffers.
+/// an invocation takes bins_x x bins_y bins of one theta. All of them bind the buffers of
+/// shaders/likelihood_buffers.glsl.
 struct LikelihoodPath {
   gpu::Kernel kernel;
   std::uint32_t bins_x = 1;
@@ -28,23 +28,8 @@ struct MapKind {
   bool operator==(const MapKind&) const = default;
 };
 
-/// What every path's kernel is specialised by: contact_constants(), and the maps' place.
-std::vector<std::uint32_t> path_constants(const gpu::Limits& limits, const MapKind& maps,
-                                          const ContactModel& model);
-/// The buffers of shaders/likelihood_buffers.glsl.
-std::span<const gpu::Access> likelihood_bindings();
-
-/// Neighbouring bins in register tiles; none where too few lie side by side
-/// within two of the map's cells.
-std::optional<LikelihoodPath> tile_path(gpu::Context& context, const PoseLattice& lattice,
-                                        std::size_t objects, const MapKind& maps,
-                                        const ContactModel& model);
-/// Bins of a row, each with map nodes of its own; for any lattice, in particular for those that
-/// tile_path refuses.
-LikelihoodPath row_path(gpu::Context& context, const PoseLattice& lattice, std::size_t objects,
-                        const MapKind& maps, const ContactModel& model);
-
-/// The fastest of them that is sound.
+/// Chooses neighbouring bins in register tiles or, where too few bins lie side by side within two
+/// of the map's cells, runs of bins of a row.
 /// @param objects whose bins a dispatch takes together
 LikelihoodPath choose_path(gpu::Context& context, const PoseLattice& lattice, std::size_t objects,
                            const MapKind& maps, const ContactModel& model);

@@ -119,20 +119,14 @@ MapTable::MapTable(gpu::Context& context, gpu::CommandStream& stream, const MapG
     axes.insert(axes.end(), own_axes.begin(), own_axes.end());
     const VkDeviceSize offset = first_node * cell_bytes(access);
     if (access == gpu::Access::table) {
-      const std::vector<shaders::Corners> cells = corners_with_border(map, prior);
-      stream.upload(log_odds_, std::span(cells), offset);
+      stream.upload(log_odds_, corners_with_border(map, prior), offset);
     } else {
-      const std::vector<float> cells = with_border(map, prior);
-      stream.upload(log_odds_, std::span(cells), offset);
+      stream.upload(log_odds_, with_border(map, prior), offset);
     }
     first_node += cells_of(map);
   }
-  axes_ =
-      gpu::Buffer(context, std::span(axes).size_bytes(), gpu::Memory::device, "the lattice's axes");
-  places_ = gpu::Buffer(context, std::span(places).size_bytes(), gpu::Memory::device,
-                        "the objects' places");
-  stream.upload(axes_, std::span<const shaders::Split>(axes));
-  stream.upload(places_, std::span<const shaders::ObjectPlace>(places));
+  axes_ = stream.uploaded(axes, "the lattice's axes");
+  places_ = stream.uploaded(places, "the objects' places");
 }
 
 }  // namespace palpate

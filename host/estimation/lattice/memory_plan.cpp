@@ -21,13 +21,6 @@ struct Room {
   bool set_by_options = false;
 };
 
-Room room_of(const gpu::Context& context, const HistogramOptions& options) {
-  if (options.memory_limit_bytes && *options.memory_limit_bytes < context.limits().memory) {
-    return {*options.memory_limit_bytes, true};
-  }
-  return {context.limits().memory, false};
-}
-
 [[noreturn]] void refuse(const gpu::Context& context, const PoseLattice& lattice,
                          std::size_t objects, const Room& room, double needed) {
   constexpr double mib = 1 << 20;
@@ -51,7 +44,9 @@ MemoryPlan plan_memory(const gpu::Context& context, std::span<const Hypothesis> 
                        const HistogramOptions& options) {
   const PoseLattice& lattice = options.lattice;
   const std::size_t objects = hypotheses.size();
-  const Room room = room_of(context, options);
+  const std::uint64_t all = context.limits().memory;
+  const std::uint64_t limit = options.memory_limit_bytes.value_or(all);
+  const Room room{.bytes = std::min(limit, all), .set_by_options = limit < all};
   // The belief and, for an array at rest, No Contact everywhere.
   const std::size_t beliefs = options.still_array ? 2 : 1;
 

@@ -234,7 +234,10 @@ Marginals PoseHistogram::marginals(int object) const {
 std::vector<double> PoseHistogram::log_likelihood(int object) const {
   Impl& histogram = whole();
   histogram.require_object(object);
-  return histogram.belief.download(object);
+  return histogram.belief.download(static_cast<std::size_t>(object),
+                                   {.theta_count = lattice().theta_rad.count,
+                                    .row_count = lattice().y_mm.count,
+                                    .column_count = lattice().x_mm.count});
 }
 
 const PoseLattice& PoseHistogram::lattice() const { return impl().options.lattice; }

@@ -100,9 +100,7 @@ std::optional<glm::dvec3> peak_near(const BodyWindow& window, const PoseLattice&
     values.push_back({moved_mm, below, std::exp(log_weight)});
   }
   const std::array<const Axis*, 3> axes{&lattice.x_mm, &lattice.y_mm, &lattice.theta_rad};
-  std::array<bool, 3> varies{};
-  std::transform(axes.begin(), axes.end(), varies.begin(),
-                 [](const Axis* axis) { return axis->count > 1; });
+  const std::array varies{axes[0]->count > 1, axes[1]->count > 1, axes[2]->count > 1};
   const std::optional<glm::dvec3> moved_mm = quadratic_peak(values, varies, least_curvature);
   if (!moved_mm || glm::dot(*moved_mm, *moved_mm) > farthest_peak_mm * farthest_peak_mm) {
     return {};

@@ -33,22 +33,18 @@ std::vector<SlabExtent> cut_into_slabs(const gpu::Context& context, const PoseLa
           : std::min({binding_bins / lattice.plane(),
                       std::int64_t{std::min(limits.group_count[1], limits.group_count[2])},
                       std::int64_t{lattice.theta_rad.count}});
-  SlabExtent extent{.nx = static_cast<std::uint32_t>(lattice.x_mm.count)};
-  std::vector<SlabExtent> slabs;
-  if (rows == lattice.y_mm.count && thetas == lattice.theta_rad.count) {
-    extent.theta_count = static_cast<std::uint32_t>(thetas);
-    extent.row_count = static_cast<std::uint32_t>(rows);
-    const auto together = static_cast<std::size_t>(std::clamp<std::int64_t>(
+  SlabExtent extent{.theta_count = static_cast<std::uint32_t>(thetas),
+                    .row_count = static_cast<std::uint32_t>(rows),
+                    .nx = static_cast<std::uint32_t>(lattice.x_mm.count)};
+  std::size_t together = 1;  // objects of a slab
+  if (extent.bins() == lattice.bins()) {
+    together = static_cast<std::size_t>(std::clamp<std::int64_t>(
         binding_bins / extent.stride(), 1, std::int64_t{limits.group_count[1]}));
-    for (std::size_t object = 0; object < objects; object += together) {
-      extent.object_first = static_cast<std::uint32_t>(object);
-      extent.object_count = static_cast<std::uint32_t>(std::min(together, objects - object));
-      slabs.push_back(extent);
-    }
-    return slabs;
   }
-  for (std::size_t object = 0; object < objects; ++object) {
+  std::vector<SlabExtent> slabs;
+  for (std::size_t object = 0; object < objects; object += together) {
     extent.object_first = static_cast<std::uint32_t>(object);
+    extent.object_count = static_cast<std::uint32_t>(std::min(together, objects - object));
     for (std::int64_t theta = 0; theta < lattice.theta_rad.count; theta += thetas) {
       extent.theta_first = static_cast<std::uint32_t>(theta);
       extent.theta_count =

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include <fmt/format.h>
+#include <glm/common.hpp>
 
 #include "accumulate_evidence.hpp"
 #include "interface.h"
@@ -19,7 +20,6 @@ namespace {
 
 // Entries of a pass: its readings times the tiles that each reading reaches.
 constexpr std::size_t entries_per_pass = 1 << 20;
-constexpr gpu::Access bindings[] = {gpu::Access::storage, gpu::Access::table, gpu::Access::storage};
 
 /// Tiles that at least one reading reaches, each with its readings.
 struct TileLists {
@@ -120,16 +120,16 @@ VkDeviceSize bytes_of(const CellRange& range) {
 gpu::Kernel evidence_kernel(gpu::Context& context, const InverseSensorModel& sensor) {
   const std::uint32_t block = block_cells(context.limits());
   const std::uint32_t blocks_across = shaders::TILE_CELLS / block;
-  const std::uint32_t constants[] = {blocks_across, blocks_across, block,
-                                     std::bit_cast<std::uint32_t>(static_cast<float>(sensor.peak)),
-                                     std::bit_cast<std::uint32_t>(static_cast<float>(
-                                         1.0 / (2.0 * sensor.spread_mm * sensor.spread_mm)))};
+  const auto bits = [](double value) {
+    return std::bit_cast<std::uint32_t>(static_cast<float>(value));
+  };
   return {context,
           {.name = "accumulate_evidence",
            .spirv = shaders::accumulate_evidence,
-           .bindings = bindings,
+           .bindings = {gpu::Access::storage, gpu::Access::table, gpu::Access::storage},
            .push_bytes = sizeof(shaders::EvidencePush),
-           .constants = constants}};
+           .constants = {blocks_across, blocks_across, block, bits(sensor.peak),
+                         bits(1.0 / (2.0 * sensor.spread_mm * sensor.spread_mm))}}};
 }
 
 }  // namespace
@@ -212,21 +212,16 @@ void EvidenceGrid::grow(const CellRange& needed) {
   gpu::Buffer cells(context_, bytes_of(larger), gpu::Memory::device, "map cells");
   std::vector<TwoFloat> old(static_cast<std::size_t>(range_.nx * range_.ny));
   if (!old.empty()) {
-    stream_.download(cells_, std::span(old));
+    stream_.download(cells_, old);
     stream_.run();
   }
   stream_.fill(cells, 0);
-  if (!old.empty()) {
-    // Spare cells outside the new range hold only increments beyond the radius and are dropped.
-    const CellRange kept = common(range_, larger);
-    for (std::int64_t y = kept.y; y < kept.y + kept.ny; ++y) {
-      const std::int64_t from = (y - range_.y) * range_.nx + kept.x - range_.x;
-      const std::int64_t to = (y - larger.y) * larger.nx + kept.x - larger.x;
-      stream_.upload(cells,
-                     std::span<const TwoFloat>(old).subspan(static_cast<std::size_t>(from),
-                                                            static_cast<std::size_t>(kept.nx)),
-                     static_cast<VkDeviceSize>(to) * sizeof(TwoFloat));
-    }
+  // Spare cells outside the new range hold only increments beyond the radius and are dropped.
+  const CellRange kept = common(range_, larger);
+  for (std::int64_t y = kept.y; y < kept.y + kept.ny; ++y) {
+    stream_.upload(
+        cells, std::span(old).subspan(range_.index(kept.x, y), static_cast<std::size_t>(kept.nx)),
+        larger.index(kept.x, y) * sizeof(TwoFloat));
   }
   stream_.run();
   cells_ = std::move(cells);
@@ -246,8 +241,8 @@ void EvidenceGrid::add(std::span<const ElementReading> readings, double radius_m
     glm::dvec2 lowest = part.front().position_mm;
     glm::dvec2 highest = lowest;
     for (const ElementReading& r : part) {
-      lowest = {std::min(lowest.x, r.position_mm.x), std::min(lowest.y, r.position_mm.y)};
-      highest = {std::max(highest.x, r.position_mm.x), std::max(highest.y, r.position_mm.y)};
+      lowest = glm::min(lowest, r.position_mm);
+      highest = glm::max(highest, r.position_mm);
     }
     grow(cover(lowest, highest, radius_mm, cell_mm_));
 
@@ -255,12 +250,9 @@ void EvidenceGrid::add(std::span<const ElementReading> readings, double radius_m
     if (lists.tiles.empty()) {
       continue;  // every reading falls between the centres of cells larger than its support
     }
-    const gpu::Buffer tiles(context_, std::span(lists.tiles).size_bytes(), gpu::Memory::device,
-                            "map tiles");
-    const gpu::Buffer list(context_, std::span(lists.readings).size_bytes(), gpu::Memory::device,
-                           "readings per map tile", VK_FORMAT_R32G32B32A32_SFLOAT);
-    stream_.upload(tiles, std::span(lists.tiles));
-    stream_.upload(list, std::span(lists.readings));
+    const gpu::Buffer tiles = stream_.uploaded(lists.tiles, "map tiles");
+    const gpu::Buffer list =
+        stream_.uploaded(lists.readings, "readings per map tile", VK_FORMAT_R32G32B32A32_SFLOAT);
     const std::size_t most = context_.limits().group_count[0];
     for (std::size_t tile = 0; tile < lists.tiles.size(); tile += most) {
       const shaders::EvidencePush push{.tile_first = static_cast<shaders::uint>(tile),
@@ -277,18 +269,14 @@ void EvidenceGrid::add(std::span<const ElementReading> readings, double radius_m
 std::vector<double> EvidenceGrid::sums(const CellRange& range) {
   std::vector<TwoFloat> cells(static_cast<std::size_t>(range_.nx * range_.ny));
   if (!cells.empty()) {
-    stream_.download(cells_, std::span(cells));
+    stream_.download(cells_, cells);
     stream_.run();
   }
   std::vector<double> sums(static_cast<std::size_t>(range.nx * range.ny), 0.0);
-  for (std::int64_t row = 0; row < range.ny; ++row) {
-    for (std::int64_t column = 0; column < range.nx; ++column) {
-      const std::int64_t x = column + range.x - range_.x;
-      const std::int64_t y = row + range.y - range_.y;
-      if (x >= 0 && x < range_.nx && y >= 0 && y < range_.ny) {
-        sums[static_cast<std::size_t>(row * range.nx + column)] =
-            cells[static_cast<std::size_t>(y * range_.nx + x)].value();
-      }
+  const CellRange summed = common(range, range_);
+  for (std::int64_t y = summed.y; y < summed.y + summed.ny; ++y) {
+    for (std::int64_t x = summed.x; x < summed.x + summed.nx; ++x) {
+      sums[range.index(x, y)] = cells[range_.index(x, y)].value();
     }
   }
   return sums;

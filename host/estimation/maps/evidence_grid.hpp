@@ -19,11 +19,15 @@ struct CellRange {
   std::int64_t ny = 0;
 
   bool contains(const CellRange& other) const;
+  /// Index of cell (i, j) in row-major order.
+  std::size_t index(std::int64_t i, std::int64_t j) const {
+    return static_cast<std::size_t>((j - y) * nx + i - x);
+  }
 };
 
 /// Returns the smallest range that holds both; an empty range adds nothing.
 CellRange united(const CellRange& a, const CellRange& b);
-/// Returns the cells that both hold; at least one cell must be in both.
+/// Returns the cells that both hold; nx or ny is at most 0 where there are none.
 CellRange common(const CellRange& a, const CellRange& b);
 
 /// Returns the cells whose centres lie within `margin_mm` of the rectangle, whose corners must lie

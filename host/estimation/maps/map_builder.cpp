@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include <fmt/format.h>
+#include <glm/common.hpp>
 
 #include "evidence_grid.hpp"
 #include "half_done.hpp"
@@ -29,8 +30,8 @@ struct Seen {
     if (readings++ == 0) {
       lowest_mm = highest_mm = p;
     }
-    lowest_mm = {std::min(lowest_mm.x, p.x), std::min(lowest_mm.y, p.y)};
-    highest_mm = {std::max(highest_mm.x, p.x), std::max(highest_mm.y, p.y)};
+    lowest_mm = glm::min(lowest_mm, p);
+    highest_mm = glm::max(highest_mm, p);
   }
 };
 

@@ -27,14 +27,7 @@ namespace palpate {
 
 namespace {
 
-constexpr gpu::Access draw_bindings[] = {gpu::Access::table, gpu::Access::table, gpu::Access::table,
-                                         gpu::Access::storage, gpu::Access::storage};
-constexpr gpu::Access sum_bindings[] = {gpu::Access::table, gpu::Access::storage,
-                                        gpu::Access::storage};
-
-std::uint32_t groups_of(std::size_t count, std::size_t per_group) {
-  return static_cast<std::uint32_t>((count + per_group - 1) / per_group);
-}
+using gpu::Access;
 
 double half(const Axis& axis) { return (axis.upper - axis.lower) / 2.0; }
 double centre(const Axis& axis) { return axis.lower + half(axis); }
@@ -52,12 +45,13 @@ struct ParticleFilter::Impl {
         lanes(independent_lanes(context.limits())),
         draw_kernel(context, {.name = "draw_particles",
                               .spirv = shaders::draw_particles,
-                              .bindings = draw_bindings,
+                              .bindings = {Access::table, Access::table, Access::table,
+                                           Access::storage, Access::storage},
                               .push_bytes = sizeof(shaders::DrawPush),
-                              .constants = {&lanes, 1}}),
+                              .constants = {lanes}}),
         sum_kernel(context, {.name = "sum_weights",
                              .spirv = shaders::sum_weights,
-                             .bindings = sum_bindings,
+                             .bindings = {Access::table, Access::storage, Access::storage},
                              .push_bytes = sizeof(shaders::uint)}),
         averages(options.alpha_slow, options.alpha_fast) {
     const std::size_t n = size();
@@ -76,9 +70,7 @@ struct ParticleFilter::Impl {
                               gpu::Memory::device, "sums of weights", VK_FORMAT_R32G32B32A32_SINT);
     const std::vector<shaders::ObjectShare> all_shares = object_shares(hypotheses, options);
     share_count = static_cast<shaders::uint>(all_shares.size());
-    shares = gpu::Buffer(context, std::span(all_shares).size_bytes(), gpu::Memory::device,
-                         "prior weights");
-    stream.upload(shares, std::span<const shaders::ObjectShare>(all_shares));
+    shares = stream.uploaded(all_shares, "prior weights");
     start();
   }
 
@@ -108,7 +100,7 @@ struct ParticleFilter::Impl {
       const auto words = philox({0, touch, shaders::RANDOM_OFFSET, 0}, key());
       bounds = systematic_blocks(sums, summary, options.particles, words[0] * 0x1p-32);
     }
-    stream.upload(draw_blocks, std::span<const shaders::DrawBlock>(bounds));
+    stream.upload(draw_blocks, bounds);
     const shaders::DrawPush push{
         .key_low = key()[0],
         .key_high = key()[1],
@@ -133,7 +125,7 @@ struct ParticleFilter::Impl {
     stream.dispatch(sum_kernel, {&log_weights, &cumulative, &block_sums},
                     static_cast<shaders::uint>(size()),
                     {static_cast<std::uint32_t>(sums.size()), 1, 1});
-    stream.download(block_sums, std::span(sums));
+    stream.download(block_sums, sums);
     stream.run();
     summary = summarise(sums);
   }
@@ -186,8 +178,8 @@ struct ParticleFilter::Impl {
   std::vector<shaders::Particle> download(std::vector<TwoFloat>& logs) {
     std::vector<shaders::Particle> states(size());
     logs.resize(size());
-    stream.download(particles, std::span(states));
-    stream.download(log_weights, std::span(logs));
+    stream.download(particles, states);
+    stream.download(log_weights, logs);
     stream.run();
     return states;
   }

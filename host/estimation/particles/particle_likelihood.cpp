@@ -16,9 +16,8 @@ namespace palpate {
 
 namespace {
 
-constexpr gpu::Access bindings[] = {gpu::Access::table,  gpu::Access::table,   gpu::Access::table,
-                                    gpu::Access::table,  gpu::Access::storage, gpu::Access::table,
-                                    gpu::Access::storage};
+using gpu::Access;
+
 // The table's least guaranteed size, less the headings, holds this many elements at 15 cell sizes.
 constexpr std::size_t most_elements = 4096;
 static_assert(most_elements <= gpu::most_iterations / 2);
@@ -93,7 +92,8 @@ ParticleLikelihood::ParticleLikelihood(gpu::Context& context, gpu::CommandStream
       theta_centre_rad_(centre(region.theta_rad)),
       kernel_(context, {.name = "weigh_particles",
                         .spirv = shaders::weigh_particles,
-                        .bindings = bindings,
+                        .bindings = {Access::table, Access::table, Access::table, Access::table,
+                                     Access::storage, Access::table, Access::storage},
                         .push_bytes = sizeof(shaders::WeighPush),
                         .constants = contact_constants(context.limits(), model)}),
       contact_(context, stream, model) {
@@ -125,11 +125,8 @@ ParticleLikelihood::ParticleLikelihood(gpu::Context& context, gpu::CommandStream
   none.cell_mm = hypotheses.front().map.cell_mm;
   append(none, contact_.first_node_of_none());
 
-  maps_ = gpu::Buffer(context, std::span(cells).size_bytes(), gpu::Memory::device, "maps",
-                      VK_FORMAT_R32G32B32A32_SFLOAT);
-  objects_ = gpu::Buffer(context, std::span(objects).size_bytes(), gpu::Memory::device, "maps");
-  stream.upload(maps_, std::span<const shaders::Corners>(cells));
-  stream.upload(objects_, std::span<const shaders::ParticleMap>(objects));
+  maps_ = stream.uploaded(cells, "maps", VK_FORMAT_R32G32B32A32_SFLOAT);
+  objects_ = stream.uploaded(objects, "maps");
   reserve(64);
 }
 
@@ -148,7 +145,7 @@ void ParticleLikelihood::reserve(std::size_t elements) {
                             "segments", VK_FORMAT_R32G32B32A32_SINT);
     turns_ = gpu::Buffer(context_, texels * sizeof(shaders::CoarseAndFine), gpu::Memory::device,
                          "elements", VK_FORMAT_R32G32B32A32_SFLOAT);
-    stream_.upload(turns_, std::span<const shaders::CoarseAndFine>(headings()));
+    stream_.upload(turns_, headings());
   }
 }
 
@@ -188,11 +185,9 @@ void ParticleLikelihood::weigh(const ContactEvidence& evidence, const gpu::Buffe
       pending = 0.0;
     }
     pending += work;
-    stream_.upload(segments_, std::span<const shaders::Segment>(batch));
-    stream_.upload(turns_, std::span<const shaders::CoarseAndFine>(table),
-                   shaders::HEADINGS * sizeof(shaders::CoarseAndFine));
+    stream_.upload(segments_, batch);
+    stream_.upload(turns_, table, shaders::HEADINGS * sizeof(shaders::CoarseAndFine));
     const auto invocations = static_cast<std::uint32_t>(count);
-    const std::uint32_t lanes = independent_lanes(context_.limits());
     const shaders::WeighPush push{.particles = invocations,
                                   .segments = static_cast<shaders::uint>(batch.size()),
                                   .elements = static_cast<shaders::uint>(elements),
@@ -200,7 +195,7 @@ void ParticleLikelihood::weigh(const ContactEvidence& evidence, const gpu::Buffe
     stream_.dispatch(
         kernel_,
         {&segments_, &contact_.nodes(), &turns_, &maps_, &objects_, &particles, &log_weights}, push,
-        {(invocations + lanes - 1) / lanes, 1, 1});
+        {groups_of(invocations, independent_lanes(context_.limits())), 1, 1});
   } while (s < segments.size());
 }
 

@@ -29,9 +29,6 @@ static_assert(unit_particles < gpu::most_iterations / 2);
 constexpr std::size_t units_per_run = 1 << 14;
 constexpr std::size_t first_tiles = 16;
 
-constexpr gpu::Access bindings[] = {gpu::Access::table, gpu::Access::storage, gpu::Access::storage,
-                                    gpu::Access::storage};
-
 /// Object, sector of theta, y, x: whole numbers in one that sorts in this order. y and x may be
 /// negative; where they do not fit, they are clamped, at 65 m from the region's centre.
 struct Key {
@@ -220,7 +217,8 @@ ParzenMode::ParzenMode(gpu::Context& context, gpu::CommandStream& stream)
       stream_(stream),
       sum_cones_(context, {.name = "sum_cones",
                            .spirv = shaders::sum_cones,
-                           .bindings = bindings,
+                           .bindings = {gpu::Access::table, gpu::Access::storage,
+                                        gpu::Access::storage, gpu::Access::storage},
                            .push_bytes = sizeof(shaders::ConePush)}) {
   // The driver compiles the kernel at its first run, and no estimate has to wait for that.
   const shaders::Particle particle{};
@@ -245,9 +243,8 @@ std::optional<ParzenMaximum> ParzenMode::find(std::span<const shaders::Particle>
   std::stable_sort(tiles.begin(), tiles.end(),
                    [](const Tile& a, const Tile& b) { return a.mass > b.mass; });
 
-  const gpu::Buffer table(context_, std::span(sorted.particle).size_bytes(), gpu::Memory::device,
-                          "particles", VK_FORMAT_R32G32B32A32_SFLOAT);
-  stream_.upload(table, std::span<const glm::vec4>(sorted.particle));
+  const gpu::Buffer table =
+      stream_.uploaded(sorted.particle, "particles", VK_FORMAT_R32G32B32A32_SFLOAT);
   double best = 0.0;
   std::size_t best_tile = 0;
   int best_point = 0;
@@ -263,21 +260,17 @@ std::optional<ParzenMaximum> ParzenMode::find(std::span<const shaders::Particle>
       append_units(tiles[t], units, ranges);
       unit_end.push_back(units.size());
     }
-    const gpu::Buffer range_table(context_, std::span(ranges).size_bytes(), gpu::Memory::device,
-                                  "ranges of particles");
-    const gpu::Buffer unit_table(context_, std::span(units).size_bytes(), gpu::Memory::device,
-                                 "tiles of the Parzen estimate");
     std::vector<float> densities(units.size() * points);
     const gpu::Buffer sums(context_, std::span(densities).size_bytes(), gpu::Memory::device,
                            "the Parzen estimate");
+    const gpu::Buffer range_table = stream_.uploaded(ranges, "ranges of particles");
+    const gpu::Buffer unit_table = stream_.uploaded(units, "tiles of the Parzen estimate");
     peak_bytes_ = std::max<std::uint64_t>(
         peak_bytes_, table.bytes() + range_table.bytes() + unit_table.bytes() + sums.bytes());
-    stream_.upload(range_table, std::span<const Range>(ranges));
-    stream_.upload(unit_table, std::span<const shaders::ConeUnit>(units));
     stream_.dispatch(sum_cones_, {&table, &range_table, &unit_table, &sums},
                      shaders::ConePush{static_cast<float>(step_mm), static_cast<float>(step_rad)},
                      {static_cast<std::uint32_t>(units.size()), 1, 1});
-    stream_.download(sums, std::span(densities));
+    stream_.download(sums, densities);
     stream_.run();
 
     std::size_t unit = 0;

@@ -19,12 +19,11 @@ struct Input {
 };
 
 std::vector<Words> on_device(std::span<const Input> inputs) {
-  constexpr gpu::Access bindings[] = {gpu::Access::storage, gpu::Access::storage};
   Device device = Device::open();
   gpu::Context& context = device.context();
   const gpu::Kernel kernel(context, {.name = "philox_words",
                                      .spirv = shaders::philox_words,
-                                     .bindings = bindings,
+                                     .bindings = {gpu::Access::storage, gpu::Access::storage},
                                      .push_bytes = 4});
   gpu::CommandStream stream(context);
   std::vector<Words> words(inputs.size());
