@@ -1,9 +1,8 @@
 #include "detector_flags.hpp"
 
-#include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
-#include "palpate/error.hpp"
+#include "input_file.hpp"
 
 namespace palpate::cli {
 
@@ -39,8 +38,7 @@ TouchDetectorOptions detector_options(const DetectorFlags& flags, const std::str
   if (flags.onset) {
     options.onset = *flags.onset;
   } else if (pressure_unit == "raw") {
-    throw Error(Fault::input,
-                fmt::format("{}: pressure_unit = raw has no default onset; give --onset", source));
+    refuse(source, "pressure_unit = raw has no default onset; give --onset");
   }
   options.release = flags.release.value_or(options.onset / 2.0);
   return options;

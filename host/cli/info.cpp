@@ -10,7 +10,6 @@
 
 #include "file_summary.hpp"
 #include "options.hpp"
-#include "palpate/error.hpp"
 #include "palpate/files.hpp"
 #include "recording_state.hpp"
 
@@ -133,9 +132,7 @@ void print_info(const std::string& path, bool close) {
   const std::string format = read_format(path);
   if (close) {
     if (format != "palpate.recording") {
-      throw Error(
-          Fault::input,
-          fmt::format("{}: format '{}' needs no closing; give --close a recording", path, format));
+      refuse(path, "format '{}' needs no closing; give --close a recording", format);
     }
     close_recording(path);
   }
@@ -146,10 +143,8 @@ void print_info(const std::string& path, bool close) {
   } else if (format == "palpate.posterior") {
     print_posterior(path);
   } else {
-    throw Error(Fault::input,
-                fmt::format("{}: attribute 'format' = '{}' is unknown; give a recording, a map "
-                            "or a posterior",
-                            path, format));
+    refuse(path, "attribute 'format' = '{}' is unknown; give a recording, a map or a posterior",
+           format);
   }
 }
 

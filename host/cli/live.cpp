@@ -19,7 +19,6 @@
 #include "live_record.hpp"
 #include "live_screen.hpp"
 #include "options.hpp"
-#include "palpate/error.hpp"
 #include "palpate/pose_track.hpp"
 #include "palpate/virtual_sensor.hpp"
 #include "recognition_flags.hpp"
@@ -69,26 +68,6 @@ class PoseComplaints {
   bool on_screen_ = false;
 };
 
-/// The sensor with its poses. `posed` stays as it is where the sensor knows its poses.
-std::unique_ptr<Sensor> open_posed_sensor(const Options& options, PoseComplaints& complaints,
-                                          const PosedSensor*& posed) {
-  if (options.poses.empty() && !is_virtual_sensor(options.sensor)) {
-    throw Error(Fault::input,
-                fmt::format("--poses: missing; sensor {} does not know where it is: give a file, a "
-                            "FIFO or - with the robot's poses",
-                            options.sensor));
-  }
-  std::unique_ptr<Sensor> sensor = open_sensor(options.sensor);
-  if (options.poses.empty()) {
-    return sensor;
-  }
-  auto with_poses = std::make_unique<PosedSensor>(
-      std::move(sensor), options.poses, PosedSensor::usual_gap_s,
-      [&complaints](const std::string& problem) { complaints.add(problem); });
-  posed = with_poses.get();
-  return with_poses;
-}
-
 /// Uses the recogniser once and forgets: the first touch pages memory in and may compile shaders,
 /// for which no real touch should wait.
 void warm_up(Recogniser& recogniser, const RecognitionTask& task, const SensorDescription& sensor,
@@ -114,10 +93,18 @@ void live(const Options& options) {
   }
   require_above("--tare", options.tare_s, 0.0, true);
   const Scene scene = scene_of(options.recognition);
-  const PosedSensor* posed = nullptr;
+  if (options.poses.empty() && !is_virtual_sensor(options.sensor)) {
+    refuse(
+        "--poses",
+        "missing; sensor {} does not know where it is: give a file, a FIFO or - with the robot's "
+        "poses",
+        options.sensor);
+  }
   PoseComplaints complaints;
-  const std::unique_ptr<Sensor> sensor = open_posed_sensor(options, complaints, posed);
-  const SensorDescription& description = sensor->description();
+  const OpenSensor opened =
+      open_sensor(options.sensor, options.poses,
+                  [&complaints](const std::string& problem) { complaints.add(problem); });
+  const SensorDescription& description = opened.sensor->description();
   std::vector<glm::dvec2> elements_mm = description.elements_mm;
   const std::string source = "sensor " + options.sensor;
   replace_array(scene, options.recognition.scene, source, elements_mm.size(), elements_mm);
@@ -154,7 +141,7 @@ void live(const Options& options) {
   }
   complaints.show(on_terminal && isatty(STDERR_FILENO) != 0);
   LiveRecognition recognition(
-      *sensor, elements_mm, recogniser, task,
+      *opened.sensor, elements_mm, recogniser, task,
       {.detector = detector, .tare_s = options.tare_s, .reset_after_s = options.reset_after_s},
       [&](const LiveTouch& touch) {
         if (json) {
@@ -180,13 +167,10 @@ void live(const Options& options) {
 
   const LiveState state = recognition.state();
   if (state.all_touches == 0 && state.without_pose > 0 && !interruption.requested()) {
-    throw Error(Fault::input, fmt::format("{}: none of its {} touches has a pose; give --poses",
-                                          source, state.without_pose));
+    refuse(source, "none of its {} touches has a pose; give --poses", state.without_pose);
   }
   fmt::print(people, "{}", summary(state, recognition.latencies_ms(), task));
-  if (posed != nullptr) {
-    report_refused(posed->poses());
-  }
+  report_refused(opened);
 }
 
 }  // namespace

@@ -83,8 +83,7 @@ std::string summary(const LiveState& state, std::vector<double> latencies_ms,
 LineFile::LineFile(const std::string& path)
     : path_(path), file_(path == "-" ? stdout : std::fopen(path.c_str(), "we")) {
   if (!file_) {
-    throw Error(Fault::input,
-                fmt::format("--json {}: cannot be made: {}", path_, std::strerror(errno)));
+    refuse_flag("--json", path_, "cannot be made: {}", std::strerror(errno));
   }
 }
 

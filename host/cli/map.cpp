@@ -16,7 +16,6 @@
 #include "figures.hpp"
 #include "number_text.hpp"
 #include "options.hpp"
-#include "palpate/error.hpp"
 #include "palpate/files.hpp"
 #include "palpate/map_builder.hpp"
 #include "printable.hpp"
@@ -57,38 +56,33 @@ std::vector<ObjectTouches> group_by_label(const std::vector<Recording>& recordin
   for (const Recording& recording : recordings) {
     const std::string& label = options.label.empty() ? recording.object : options.label;
     if (label.empty()) {
-      throw Error(Fault::input,
-                  fmt::format("{}: attribute 'object' is empty; name the object with --label",
-                              recording.path));
+      refuse(recording.path, "attribute 'object' is empty; name the object with --label");
     }
     if (label == none_label) {
-      throw Error(Fault::input,
-                  fmt::format("{}: object '{}' stands for objects that were never learned; choose "
-                              "another name with --label",
-                              recording.path, label));
+      refuse(recording.path,
+             "object '{}' stands for objects that were never learned; choose another name with "
+             "--label",
+             label);
     }
     if (label.find('/') != std::string::npos) {
-      throw Error(Fault::input,
-                  fmt::format("{}: object '{}' holds a '/' and cannot name a file; choose another "
-                              "name with --label",
-                              recording.path, label));
+      refuse(recording.path,
+             "object '{}' holds a '/' and cannot name a file; choose another name with --label",
+             label);
     }
     const auto [begin, end] = select(recording, frames);
     const std::vector<Touch> touches = recording.touches(begin, end);
     for (std::size_t i = 0; i < touches.size(); ++i) {
       if (const auto fault = fault_of(known_readings(touches[i], classifier))) {
-        throw Error(Fault::input,
-                    fmt::format("{}: sensor_pose[{}]: {}", recording.path, begin + i, *fault));
+        refuse(recording.path, "sensor_pose[{}]: {}", begin + i, *fault);
       }
     }
     auto& group = groups[label];
     group.insert(group.end(), touches.begin(), touches.end());
     if (one_map && groups.size() > 1) {
-      throw Error(Fault::input,
-                  fmt::format("{}: object '{}' differs from '{}' of {}; write a map of each object "
-                              "with -o {}/, or one map of all touches with --label",
-                              recording.path, label, recordings.front().object,
-                              recordings.front().path, options.output));
+      refuse(recording.path,
+             "object '{}' differs from '{}' of {}; write a map of each object with -o {}/, or one "
+             "map of all touches with --label",
+             label, recordings.front().object, recordings.front().path, options.output);
     }
   }
   std::vector<ObjectTouches> objects;
@@ -103,8 +97,7 @@ std::vector<ObjectTouches> group_by_label(const std::vector<Recording>& recordin
 double require_length(const std::string& flag, double mm) {
   require_above(flag, mm, 0.0);
   if (!(mm >= least_length_mm && mm <= most_length_mm)) {
-    throw Error(Fault::input, fmt::format("{} {}: give {:g} to {:g} mm", flag, mm, least_length_mm,
-                                          most_length_mm));
+    refuse_flag(flag, mm, "give {:g} to {:g} mm", least_length_mm, most_length_mm);
   }
   return mm;
 }
@@ -118,9 +111,8 @@ MapOptions map_options(const Options& options, const std::vector<Recording>& rec
   }
   result.sensor.peak = require_above("--peak", options.peak, 0.0);
   if (options.peak >= 1.0) {
-    throw Error(Fault::input, fmt::format("--peak {}: must be below 1, or one reading would make a "
-                                          "cell certain",
-                                          options.peak));
+    refuse_flag("--peak", options.peak,
+                "must be below 1, or one reading would make a cell certain");
   }
   result.classifier = make_classifier(recordings.front().pressure_unit, recordings.front().path,
                                       options.threshold, options.ratio);
@@ -130,8 +122,7 @@ MapOptions map_options(const Options& options, const std::vector<Recording>& rec
 double parse_prior(const std::string& text) {
   const std::optional<double> prior = number_of(text);
   if (!prior || !(*prior > 0.0 && *prior < 1.0)) {
-    throw Error(Fault::input,
-                fmt::format("--prior {}: give auto, or a probability between 0 and 1", text));
+    refuse_flag("--prior", text, "give auto, or a probability between 0 and 1");
   }
   return *prior;
 }
@@ -184,13 +175,11 @@ void build_maps(const Options& options) {
   const bool folder =
       options.output.ends_with('/') || std::filesystem::is_directory(output, ignored);
   if (!is_printable(options.label)) {
-    throw Error(Fault::input, "--label: give printable text, in UTF-8");
+    refuse("--label", "give printable text, in UTF-8");
   }
   if (options.label == none_label) {
-    throw Error(Fault::input,
-                fmt::format("--label {}: stands for objects that were never learned; choose "
-                            "another label",
-                            none_label));
+    refuse_flag("--label", none_label,
+                "stands for objects that were never learned; choose another label");
   }
   const bool estimate = options.prior == "auto";
   const double given_prior = estimate ? 0.0 : parse_prior(options.prior);

@@ -1,101 +1,75 @@
 #include "options.hpp"
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <numbers>
 #include <system_error>
-#include <vector>
-
-#include <fmt/format.h>
 
 #include "atomic_file.hpp"
-#include "palpate/error.hpp"
 
 namespace palpate::cli {
 
 namespace {
 
-[[noreturn]] void refuse(const std::string& flag, const std::string& text,
-                         const std::string& remedy) {
-  throw Error(Fault::input, fmt::format("{} {}: {}", flag, text, remedy));
-}
-
-/// The numbers between the separators; none if the text is not a list of finite numbers.
-template <typename Number>
-std::optional<std::vector<Number>> split_numbers(const std::string& text, char separator) {
-  std::vector<Number> numbers;
+/// The `count` finite numbers between the separators, which are all of the text.
+template <typename Number, std::size_t count>
+std::array<Number, count> parse(const std::string& flag, const std::string& text, char separator,
+                                const char* form) {
+  std::array<Number, count> numbers{};
   const char* at = text.data();
   const char* const end = at + text.size();
-  while (true) {
-    Number number{};
-    const auto [rest, error] = std::from_chars(at, end, number);
-    if (error != std::errc{} || !std::isfinite(static_cast<double>(number))) {
-      return {};
-    }
-    numbers.push_back(number);
-    if (rest == end) {
-      return numbers;
-    }
-    if (*rest != separator) {
-      return {};
+  for (std::size_t i = 0; i < count; ++i) {
+    const auto [rest, error] = std::from_chars(at, end, numbers[i]);
+    const bool followed = i + 1 < count ? rest != end && *rest == separator : rest == end;
+    if (error != std::errc{} || !std::isfinite(static_cast<double>(numbers[i])) || !followed) {
+      refuse_flag(flag, text, "give it as {}", form);
     }
     at = rest + 1;
   }
-}
-
-template <typename Number>
-std::vector<Number> parse(const std::string& flag, const std::string& text, char separator,
-                          std::size_t count, const char* form) {
-  const auto numbers = split_numbers<Number>(text, separator);
-  if (!numbers || numbers->size() != count) {
-    refuse(flag, text, fmt::format("give it as {}", form));
-  }
-  return *numbers;
+  return numbers;
 }
 
 }  // namespace
 
 std::array<double, 2> parse_range(const std::string& flag, const std::string& text) {
-  const auto ends = parse<double>(flag, text, ':', 2, "LOWER:UPPER, such as -10:10");
+  const auto ends = parse<double, 2>(flag, text, ':', "LOWER:UPPER, such as -10:10");
   if (ends[0] > ends[1]) {
-    refuse(flag, text, "the range is reversed; write the lower end first");
+    refuse_flag(flag, text, "the range is reversed; write the lower end first");
   }
-  return {ends[0], ends[1]};
+  return ends;
 }
 
 glm::dvec2 parse_point(const std::string& flag, const std::string& text) {
-  const auto xy = parse<double>(flag, text, ',', 2, "X,Y in mm");
-  return {xy[0], xy[1]};
+  const auto [x, y] = parse<double, 2>(flag, text, ',', "X,Y in mm");
+  return {x, y};
 }
 
 Pose parse_pose(const std::string& flag, const std::string& text) {
-  const auto values = parse<double>(flag, text, ',', 3, "X,Y,DEG, in mm and degrees");
-  return {{values[0], values[1]}, radians(values[2])};
+  const auto [x, y, deg] = parse<double, 3>(flag, text, ',', "X,Y,DEG, in mm and degrees");
+  return {{x, y}, radians(deg)};
 }
 
 std::array<int, 3> parse_bins(const std::string& flag, const std::string& text) {
-  const auto bins = parse<int>(flag, text, 'x', 3, "XxYxTHETA, such as 25x25x16, or auto");
-  for (const int count : bins) {
-    if (count < 1) {
-      refuse(flag, text, "every count must be at least 1");
-    }
+  const auto bins = parse<int, 3>(flag, text, 'x', "XxYxTHETA, such as 25x25x16, or auto");
+  if (std::ranges::min(bins) < 1) {
+    refuse_flag(flag, text, "every count must be at least 1");
   }
-  return {bins[0], bins[1], bins[2]};
+  return bins;
 }
 
 Frames parse_frames(const std::string& flag, const std::string& text) {
-  const auto ends =
-      parse<std::int64_t>(flag, text, ':', 2, "A:B, for the touches A to B - 1, counted from 0");
-  if (ends[0] < 0 || ends[0] >= ends[1]) {
-    refuse(flag, text, "selects no touch; give A:B with A from 0 and below B");
+  const auto [begin, end] =
+      parse<std::int64_t, 2>(flag, text, ':', "A:B, for the touches A to B - 1, counted from 0");
+  if (begin < 0 || begin >= end) {
+    refuse_flag(flag, text, "selects no touch; give A:B with A from 0 and below B");
   }
-  return {static_cast<std::size_t>(ends[0]), static_cast<std::size_t>(ends[1])};
+  return {static_cast<std::size_t>(begin), static_cast<std::size_t>(end)};
 }
 
 double require_above(const std::string& flag, double value, double least, bool inclusive) {
   if (!std::isfinite(value) || value < least || (!inclusive && value == least)) {
-    refuse(flag, fmt::format("{}", value),
-           fmt::format("must be {} {}", inclusive ? "at least" : "above", least));
+    refuse_flag(flag, value, "must be {} {}", inclusive ? "at least" : "above", least);
   }
   return value;
 }
@@ -122,8 +96,7 @@ void make_folder(const std::filesystem::path& folder) {
   std::error_code error;
   std::filesystem::create_directories(folder, error);
   if (error || !std::filesystem::is_directory(folder)) {
-    throw Error(Fault::input, fmt::format("{}: the folder cannot be made ({}); choose another name",
-                                          folder.string(), error.message()));
+    refuse(folder, "the folder cannot be made ({}); choose another name", error.message());
   }
 }
 

@@ -3,13 +3,20 @@
 #include <array>
 #include <cstddef>
 #include <filesystem>
-#include <optional>
 #include <string>
 #include <string_view>
 
+#include "input_file.hpp"
 #include "palpate/pose.hpp"
 
 namespace palpate::cli {
+
+/// Throws Error, "<flag> <value>: <message>"; the message is formatted as by fmt::format().
+template <typename Value, typename... Parts>
+[[noreturn]] void refuse_flag(std::string_view flag, const Value& value,
+                              fmt::format_string<const Parts&...> message, const Parts&... parts) {
+  throw Error(Fault::input, fmt::format("{} {}: {}", flag, value, fmt::format(message, parts...)));
+}
 
 // Each function parses the value of a flag. Throws Error naming flag, value and the form wanted.
 

@@ -14,25 +14,60 @@
 #include "command_files.hpp"
 #include "figures.hpp"
 #include "options.hpp"
-#include "palpate/error.hpp"
 #include "palpate/files.hpp"
 #include "progress.hpp"
 #include "recognition_flags.hpp"
 #include "record_output.hpp"
-#include "unknowns.hpp"
+#include "recordings.hpp"
 
 namespace palpate::cli {
 
 namespace {
 
 struct Options {
-  UnknownsFlags unknowns;
+  std::vector<std::string> recordings;
+  std::string frames;
+  std::optional<int> touches;
+  bool each_frame = false;
   RecognitionFlags recognition;
   bool trace = false;
   std::string json;
   std::string posterior;
   std::string png;
 };
+
+/// The unknowns that the flags select: views into the recordings' memory.
+std::vector<Unknown> list_unknowns(const Options& options,
+                                   const std::vector<Recording>& recordings) {
+  std::optional<Frames> frames;
+  if (!options.frames.empty()) {
+    frames = parse_frames("--frames", options.frames);
+  }
+  if (options.touches && *options.touches < 1) {
+    refuse_flag("--touches", *options.touches, "give at least 1");
+  }
+  if (options.touches && options.each_frame) {
+    refuse("--touches", "with --each-frame every unknown has one touch; leave one of them out");
+  }
+  std::vector<Unknown> unknowns;
+  for (const Recording& recording : recordings) {
+    auto [begin, end] = select(recording, frames);
+    if (options.touches && static_cast<std::size_t>(*options.touches) > end - begin) {
+      refuse(recording.path, "has {} touches; --touches {} is too many", end - begin,
+             *options.touches);
+    }
+    const GroundTruth truth = ground_truth(recording.object, recording.truth);
+    if (options.each_frame) {
+      for (std::size_t i = begin; i < end; ++i) {
+        unknowns.push_back({recording.path, i, {recording.touch(i)}, truth});
+      }
+    } else {
+      end = options.touches ? begin + static_cast<std::size_t>(*options.touches) : end;
+      unknowns.push_back({recording.path, {}, recording.touches(begin, end), truth});
+    }
+  }
+  return unknowns;
+}
 
 std::filesystem::path png_path(const Options& options, const Unknown& unknown) {
   const std::string stem = std::filesystem::path(unknown.recording).stem().string();
@@ -43,45 +78,34 @@ std::filesystem::path png_path(const Options& options, const Unknown& unknown) {
 /// Throws Error where an output cannot be written, before any work is done.
 void check_outputs(const Options& options, const Scene& scene, const RecognitionTask& task,
                    const std::vector<Unknown>& unknowns) {
-  if (!options.posterior.empty()) {
-    if (std::holds_alternative<ParticleOptions>(task.filter)) {
-      throw Error(Fault::input, fmt::format("--posterior {}: particles have no bins; use --filter "
-                                            "histogram",
-                                            options.posterior));
-    }
-    if (unknowns.size() != 1) {
-      throw Error(Fault::input,
-                  fmt::format("--posterior {}: the file holds one unknown, not {}; select "
-                              "one recording or frame",
-                              options.posterior, unknowns.size()));
-    }
-  }
-  if (!options.png.empty()) {
-    std::set<std::filesystem::path> pictures;
-    for (const Unknown& unknown : unknowns) {
-      if (!pictures.insert(png_path(options, unknown)).second) {
-        throw Error(
-            Fault::input,
-            fmt::format(
-                "{}: its picture would overwrite the picture of another recording of the same "
-                "name; rename one of them",
-                unknown.recording));
-      }
-    }
-  }
   CommandFiles files;
-  for (const std::string& recording : options.unknowns.recordings) {
+  for (const std::string& recording : options.recordings) {
     files.reads("RECORDING", recording);
   }
   add_recognition_files(options.recognition, scene, task, files);
   if (!options.posterior.empty()) {
+    if (std::holds_alternative<ParticleOptions>(task.filter)) {
+      refuse_flag("--posterior", options.posterior,
+                  "particles have no bins; use --filter histogram");
+    }
+    if (unknowns.size() != 1) {
+      refuse_flag("--posterior", options.posterior,
+                  "the file holds one unknown, not {}; select one recording or frame",
+                  unknowns.size());
+    }
     files.writes("--posterior", options.posterior);
   }
   if (!options.json.empty()) {
     files.writes("--json", options.json, CommandFiles::Dash::stream);
   }
   if (!options.png.empty()) {
+    std::set<std::filesystem::path> pictures;
     for (const Unknown& unknown : unknowns) {
+      if (!pictures.insert(png_path(options, unknown)).second) {
+        refuse(unknown.recording,
+               "its picture would overwrite the picture of another recording of the same name; "
+               "rename one of them");
+      }
       files.writes("--png", png_path(options, unknown));
     }
   }
@@ -165,13 +189,18 @@ void write_results(const Options& options, const RecognitionTask& task,
 
 void recognize(const Options& options) {
   const Scene scene = scene_of(options.recognition);
-  const Unknowns unknowns = read_unknowns(options.unknowns, scene, options.recognition.scene);
-  const Recording& first = unknowns.recordings.front();
+  std::vector<Recording> recordings = read_touch_recordings(options.recordings);
+  for (Recording& recording : recordings) {
+    replace_array(scene, options.recognition.scene, recording.path, recording.elements(),
+                  recording.elements_mm);
+  }
+  const std::vector<Unknown> unknowns = list_unknowns(options, recordings);
+  const Recording& first = recordings.front();
   RecognitionTask task = task_of(options.recognition, scene, first.pressure_unit, first.path);
   if (auto* histogram = std::get_if<HistogramOptions>(&task.filter)) {
-    histogram->still_array = array_is_still(unknowns.list);
+    histogram->still_array = array_is_still(unknowns);
   }
-  check_outputs(options, scene, task, unknowns.list);
+  check_outputs(options, scene, task, unknowns);
   Device device = open_device(options.recognition, scene);
   Recogniser recogniser = open_recogniser(device, task);
   if (!options.png.empty()) {
@@ -184,10 +213,10 @@ void recognize(const Options& options) {
   auto json = nlohmann::ordered_json::array();
   {
     Progress progress("recognising");
-    for (const Unknown& unknown : unknowns.list) {
+    for (const Unknown& unknown : unknowns) {
       const auto show = [&](double fraction) {
         progress.show((static_cast<double>(records.size()) + fraction) /
-                      static_cast<double>(unknowns.list.size()));
+                      static_cast<double>(unknowns.size()));
       };
       records.push_back(recognise(recogniser, task, unknown, trace, show));
       records.back().require_steps();
@@ -228,18 +257,16 @@ void add_recognize(CLI::App& app) {
       "Recognise the object of each recording among known maps and find its pose "
       "T_object_robot: p_object = R(theta) p_robot + (x, y)");
   const auto options = std::make_shared<Options>();
-  command
-      ->add_option("RECORDING", options->unknowns.recordings,
-                   "Recordings of unknown objects (HDF5)")
+  command->add_option("RECORDING", options->recordings, "Recordings of unknown objects (HDF5)")
       ->required();
   add_recognition_flags(*command, options->recognition);
-  command->add_option("--frames", options->unknowns.frames,
+  command->add_option("--frames", options->frames,
                       "Use the touches A to B - 1 of every recording, counted from 0, as A:B");
   command
-      ->add_option("--touches", options->unknowns.touches,
+      ->add_option("--touches", options->touches,
                    "Use the first N touches of every recording [default: all]")
       ->check(require_whole_number);
-  command->add_flag("--each-frame", options->unknowns.each_frame,
+  command->add_flag("--each-frame", options->each_frame,
                     "Recognise every touch by itself, as an unknown object of its own");
   command->add_flag("--trace", options->trace, "Show the estimate after every touch");
   command->add_option("--json", options->json, "Write the records as JSON; - is standard output");

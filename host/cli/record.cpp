@@ -101,8 +101,15 @@ class RecordingUnderWay {
   /// Closes the file. Throws Error where no frame was recorded or the array was touched during the
   /// tare; no recording is left then.
   void close(const std::string& sensor) {
+    if (recorder_->frames() == 0 && recorder_->unreadable() == 0) {
+      throw Error(Fault::system,
+                  fmt::format("sensor {}: no frame came; see palpate sensors", sensor));
+    }
     if (recorder_->frames() == 0) {
-      refuse_empty(sensor);
+      refuse("sensor " + sensor,
+             "none of its {} frames has both a known reading and a time; check the board and its "
+             "connection with palpate sensors",
+             recorder_->unreadable());
     }
     if (taring() && !first_.empty()) {
       end_tare();
@@ -126,17 +133,6 @@ class RecordingUnderWay {
 
  private:
   bool taring() const { return tare_s_ > 0.0; }
-
-  [[noreturn]] void refuse_empty(const std::string& sensor) const {
-    if (recorder_->unreadable() == 0) {
-      throw Error(Fault::system,
-                  fmt::format("sensor {}: no frame came; see palpate sensors", sensor));
-    }
-    throw Error(Fault::input,
-                fmt::format("sensor {}: none of its {} frames has both a known reading and a time; "
-                            "check the board and its connection with palpate sensors",
-                            sensor, recorder_->unreadable()));
-  }
 
   void end_tare() {
     const bool raw = sensor_.pressure_unit == "raw";
@@ -172,35 +168,27 @@ void record(const Options& options) {
   if (options.seconds) {
     require_above("--seconds", *options.seconds, 0.0);
   } else if (is_endless_flood(options.sensor)) {
-    throw Error(
-        Fault::input,
-        fmt::format("sensor {}: the simulation has no end and gives more than 10 MB/s, which "
-                    "would fill the disk; give --seconds, touches=N, or a lower rate or "
-                    "speed",
-                    options.sensor));
+    refuse("sensor " + options.sensor,
+           "the simulation has no end and gives more than 10 MB/s, which would fill the disk; give "
+           "--seconds, touches=N, or a lower rate or speed");
   }
   require_above("--tare", options.tare_s, 0.0, true);
   if (!is_printable(options.object)) {
-    throw Error(Fault::input, "--object: give printable text, in UTF-8");
+    refuse("--object", "give printable text, in UTF-8");
   }
-  std::unique_ptr<Sensor> sensor = open_sensor(options.sensor);
-  PosedSensor* posed = nullptr;
-  if (!options.poses.empty()) {
-    auto with_poses = std::make_unique<PosedSensor>(
-        std::move(sensor), options.poses, PosedSensor::usual_gap_s,
-        [](const std::string& problem) { fmt::print(stderr, "palpate: {}\n", problem); });
-    posed = with_poses.get();
-    sensor = std::move(with_poses);
-  }
-  SensorDescription description = sensor->description();
+  const OpenSensor opened =
+      open_sensor(options.sensor, options.poses,
+                  [](const std::string& problem) { fmt::print(stderr, "palpate: {}\n", problem); });
+  Sensor& sensor = *opened.sensor;
+  SensorDescription description = sensor.description();
   if (!options.object.empty()) {
     description.object = options.object;
   }
 
-  FrameSource source(*sensor, options.seconds);
+  FrameSource source(sensor, options.seconds);
   RecordingUnderWay recording(options.output, description,
                               description.baseline.empty() ? options.tare_s : 0.0);
-  sensor->start();
+  sensor.start();
   while (!source.done()) {
     if (const std::optional<Frame> frame = source.next()) {
       recording.add(*frame);
@@ -208,12 +196,10 @@ void record(const Options& options) {
       recording.flush();
     }
   }
-  sensor->stop();
+  sensor.stop();
   recording.close(options.sensor);
   recording.print_summary(options.output);
-  if (posed != nullptr) {
-    report_refused(posed->poses());
-  }
+  report_refused(opened);
 }
 
 }  // namespace

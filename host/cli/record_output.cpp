@@ -39,11 +39,10 @@ void print_confusions(const std::vector<RecognitionRecord>& records, const Recog
   };
   std::map<std::string, Row> rows;
   for (const RecognitionRecord& record : records) {
-    if (record.last().right) {
+    if (const auto right = record.last().right) {
       Row& row = rows[record.true_label];
       ++row.all;
-      row.right += *record.last().right ? 1 : 0;
-      row.wrong[task.labels[record.last().best]] += *record.last().right ? 0 : 1;
+      ++(*right ? row.right : row.wrong[task.labels[record.last().best]]);
     }
   }
   if (std::all_of(rows.begin(), rows.end(),
@@ -54,9 +53,7 @@ void print_confusions(const std::vector<RecognitionRecord>& records, const Recog
   for (const auto& [label, row] : rows) {
     std::vector<std::pair<int, std::string>> wrong;
     for (const auto& [other, count] : row.wrong) {
-      if (count > 0) {
-        wrong.emplace_back(-count, other);
-      }
+      wrong.emplace_back(-count, other);
     }
     std::sort(wrong.begin(), wrong.end());
     std::string list;

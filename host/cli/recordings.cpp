@@ -2,10 +2,7 @@
 
 #include <set>
 
-#include <fmt/format.h>
-
 #include "file_identity.hpp"
-#include "palpate/error.hpp"
 #include "palpate/files.hpp"
 
 namespace palpate::cli {
@@ -17,20 +14,19 @@ std::vector<Recording> read_touch_recordings(const std::vector<std::string>& pat
     recordings.push_back(read_recording(path));
     const Recording& recording = recordings.back();
     if (!seen.insert(identity_of(path)).second) {
-      throw Error(Fault::input, fmt::format("{}: given twice; leave one out", path));
+      refuse(path, "given twice; leave one out");
     }
     if (recording.rows == "frames") {
-      throw Error(Fault::input,
-                  fmt::format("{}: rows = frames, a raw stream; find its touches first: palpate "
-                              "touches {} -o TOUCHES.h5",
-                              path, path));
+      refuse(
+          path,
+          "rows = frames, a raw stream; find its touches first: palpate touches {} -o TOUCHES.h5",
+          path);
     }
     if (recording.pressure_unit != recordings.front().pressure_unit) {
-      throw Error(Fault::input,
-                  fmt::format("{}: pressure_unit is {} but {} has {}; one threshold does not fit "
-                              "both, use a call for each",
-                              path, recording.pressure_unit, paths.front(),
-                              recordings.front().pressure_unit));
+      refuse(
+          path,
+          "pressure_unit is {} but {} has {}; one threshold does not fit both, use a call for each",
+          recording.pressure_unit, paths.front(), recordings.front().pressure_unit);
     }
   }
   return recordings;
@@ -41,10 +37,8 @@ Frames select(const Recording& recording, const std::optional<Frames>& frames) {
     return {0, recording.size()};
   }
   if (frames->end > recording.size()) {
-    throw Error(Fault::input,
-                fmt::format("{}: has {} touches, --frames {}:{} reaches beyond; end at most at {}",
-                            recording.path, recording.size(), frames->begin, frames->end,
-                            recording.size()));
+    refuse(recording.path, "has {} touches, --frames {}:{} reaches beyond; end at most at {}",
+           recording.size(), frames->begin, frames->end, recording.size());
   }
   return *frames;
 }
@@ -55,13 +49,11 @@ ContactClassifier make_classifier(const std::string& pressure_unit, const std::s
   if (threshold) {
     classifier.threshold = require_above("--threshold", *threshold, 0.0, true);
   } else if (pressure_unit == "raw") {
-    throw Error(
-        Fault::input,
-        fmt::format("{}: pressure_unit = raw has no default threshold; give --threshold", source));
+    refuse(source, "pressure_unit = raw has no default threshold; give --threshold");
   }
   if (ratio) {
     if (!(*ratio >= 0.0 && *ratio < 1.0)) {
-      throw Error(Fault::input, fmt::format("--ratio {}: must be at least 0 and below 1", *ratio));
+      refuse_flag("--ratio", *ratio, "must be at least 0 and below 1");
     }
     classifier.ratio = *ratio;
   }

@@ -1,5 +1,7 @@
 #include "sensor_option.hpp"
 
+#include <utility>
+
 #include <fmt/format.h>
 
 #include "palpate/driver.hpp"
@@ -7,8 +9,16 @@
 
 namespace palpate::cli {
 
-std::unique_ptr<Sensor> open_sensor(const std::string& name) {
-  return is_virtual_sensor(name) ? open_virtual_sensor(name) : open_board(name);
+OpenSensor open_sensor(const std::string& name, const std::string& poses,
+                       PosedSensor::Complaint complain) {
+  auto sensor = is_virtual_sensor(name) ? open_virtual_sensor(name) : open_board(name);
+  if (poses.empty()) {
+    return {std::move(sensor)};
+  }
+  auto posed = std::make_unique<PosedSensor>(std::move(sensor), poses, PosedSensor::usual_gap_s,
+                                             std::move(complain));
+  const PosedSensor* const same = posed.get();
+  return {std::move(posed), same};
 }
 
 void add_sensor_files(const std::string& name, const std::string& poses, CommandFiles& files) {
@@ -20,7 +30,11 @@ void add_sensor_files(const std::string& name, const std::string& poses, Command
   }
 }
 
-void report_refused(const PosedSensor::Poses& poses) {
+void report_refused(const OpenSensor& opened) {
+  if (opened.posed == nullptr) {
+    return;
+  }
+  const PosedSensor::Poses poses = opened.posed->poses();
   if (poses.refused > 0) {
     fmt::print(stderr, "palpate: {} lines of poses were skipped; the first: {}\n", poses.refused,
                poses.first_refused);

@@ -20,12 +20,20 @@ inline constexpr const char* poses_help =
     "File, FIFO or - (standard input) with the poses T_robot_sensor, one line of JSON each: "
     "{\"time\": s since 1970, \"x_mm\": mm, \"y_mm\": mm, \"theta_rad\": rad}";
 
-/// Opens a board, a replay or a simulation. Throws Error naming it, and what may be given instead.
-std::unique_ptr<Sensor> open_sensor(const std::string& name);
+/// A sensor; `posed` is the same sensor where --poses gives its poses, else null.
+struct OpenSensor {
+  std::unique_ptr<Sensor> sensor;
+  const PosedSensor* posed = nullptr;
+};
+/// Opens a board, a replay or a simulation, with the poses of --poses unless `poses` is "". Throws
+/// Error naming it, and what may be given instead.
+/// @param complain see PosedSensor
+OpenSensor open_sensor(const std::string& name, const std::string& poses,
+                       PosedSensor::Complaint complain);
 
 /// Adds the file that the sensor reads, if any, and the file of --poses, unless `poses` is "".
 void add_sensor_files(const std::string& name, const std::string& poses, CommandFiles& files);
-/// Warns on standard error of skipped lines of poses and of clocks that were set back.
-void report_refused(const PosedSensor::Poses& poses);
+/// Warns on standard error of skipped lines of --poses and of clocks that were set back.
+void report_refused(const OpenSensor& opened);
 
 }  // namespace palpate::cli

@@ -14,11 +14,6 @@ namespace palpate::cli {
 
 namespace {
 
-/// The JSON text, with replacement characters where a device's string is not UTF-8.
-std::string dumped(const nlohmann::ordered_json& value) {
-  return value.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
-}
-
 void print_json(const std::vector<BoardInfo>& boards) {
   auto list = nlohmann::ordered_json::array();
   for (const BoardInfo& b : boards) {
@@ -36,7 +31,8 @@ void print_json(const std::vector<BoardInfo>& boards) {
                     {"usable", b.usable},
                     {"reason", b.reason}});
   }
-  fmt::print("{}\n", dumped(list));
+  // A device's strings need not be UTF-8, as JSON must.
+  fmt::print("{}\n", list.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
 }
 
 void print_text(const std::vector<BoardInfo>& boards) {
@@ -60,15 +56,6 @@ void print_text(const std::vector<BoardInfo>& boards) {
   }
 }
 
-void print_sensors(bool json) {
-  const std::vector<BoardInfo> boards = list_boards();
-  if (json) {
-    print_json(boards);
-  } else {
-    print_text(boards);
-  }
-}
-
 }  // namespace
 
 void add_sensors(CLI::App& app) {
@@ -76,7 +63,7 @@ void add_sensors(CLI::App& app) {
       "sensors", "List the USB devices; (*) marks the usable boards, others are explained");
   const auto json = std::make_shared<bool>(false);
   command->add_flag("--json", *json, "Print the list as JSON");
-  command->callback([json] { print_sensors(*json); });
+  command->callback([json] { (*json ? print_json : print_text)(list_boards()); });
 }
 
 }  // namespace palpate::cli

@@ -12,7 +12,6 @@
 
 #include "command_files.hpp"
 #include "options.hpp"
-#include "palpate/error.hpp"
 #include "palpate/files.hpp"
 #include "palpate/simulation.hpp"
 
@@ -44,7 +43,7 @@ std::vector<Pose> sensor_poses(const std::string& text, std::uint64_t seed) {
       return random_poses(n, seed);
     }
   }
-  throw Error(Fault::input, fmt::format("--poses {}: give grid, or random:N with N above 0", text));
+  refuse_flag("--poses", text, "give grid, or random:N with N above 0");
 }
 
 /// Draws n poses without replacement, in random order. A seed gives the same poses on every system.
@@ -84,8 +83,8 @@ void simulate(const Options& options) {
   const std::size_t all = poses.size();
   const auto wanted = static_cast<std::size_t>(options.touches.value_or(static_cast<int>(all)));
   if (options.touches && (*options.touches < 1 || wanted > all)) {
-    throw Error(Fault::input, fmt::format("--touches {}: --poses {} has {} poses; give 1 to {}",
-                                          *options.touches, options.poses, all, all));
+    refuse_flag("--touches", *options.touches, "--poses {} has {} poses; give 1 to {}",
+                options.poses, all, all);
   }
   if (unknown || options.touches) {
     poses = draw(std::move(poses), wanted, options.seed);

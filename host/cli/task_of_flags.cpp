@@ -10,7 +10,6 @@
 
 #include "file_identity.hpp"
 #include "options.hpp"
-#include "palpate/error.hpp"
 #include "palpate/files.hpp"
 #include "recordings.hpp"
 
@@ -27,8 +26,7 @@ std::vector<std::filesystem::path> map_files(const std::filesystem::path& argume
   std::vector<std::filesystem::path> files;
   const std::filesystem::directory_iterator entries(argument, error);
   if (error) {
-    throw Error(Fault::input, fmt::format("{}: cannot be read: {}; check its permissions",
-                                          argument.string(), error.message()));
+    refuse(argument, "cannot be read: {}; check its permissions", error.message());
   }
   for (const auto& entry : entries) {
     if (entry.path().extension() == ".h5" && read_format(entry.path()) == "palpate.map") {
@@ -36,9 +34,8 @@ std::vector<std::filesystem::path> map_files(const std::filesystem::path& argume
     }
   }
   if (files.empty()) {
-    throw Error(Fault::input, fmt::format("{}: a folder without maps; build some with palpate map "
-                                          "RECORDING... -o {}",
-                                          argument.string(), (argument / "").string()));
+    refuse(argument, "a folder without maps; build some with palpate map RECORDING... -o {}",
+           (argument / "").string());
   }
   std::sort(files.begin(), files.end());
   return files;
@@ -47,11 +44,10 @@ std::vector<std::filesystem::path> map_files(const std::filesystem::path& argume
 std::vector<Scene::Object> objects_of(const RecognitionFlags& flags, const Scene& scene) {
   if (flags.maps.empty()) {
     if (scene.objects.empty()) {
-      throw Error(Fault::input,
-                  flags.scene.empty()
-                      ? "--maps: missing; give the objects' maps, or a --scene with objects"
-                      : fmt::format("{}: objects: missing; list the maps there or give --maps",
-                                    flags.scene));
+      if (flags.scene.empty()) {
+        refuse("--maps", "missing; give the objects' maps, or a --scene with objects");
+      }
+      refuse(flags.scene, "objects: missing; list the maps there or give --maps");
     }
     return scene.objects;
   }
@@ -70,19 +66,15 @@ std::vector<Hypothesis> read_maps(const std::vector<Scene::Object>& objects) {
   for (const Scene::Object& object : objects) {
     OccupancyGrid map = read_map(object.map);
     if (!seen.insert(identity_of(object.map)).second) {
-      throw Error(
-          Fault::input,
-          fmt::format("{}: the map is given twice; leave one out, or give the object a weight "
-                      "in a scene file",
-                      object.map.string()));
+      refuse(object.map,
+             "the map is given twice; leave one out, or give the object a weight in a scene file");
     }
     map.label = object.label.value_or(map.label);
     if (map.label == none_label) {
-      throw Error(
-          Fault::input,
-          fmt::format("{}: label {} stands for objects that were never learned; give the map "
-                      "another label in the scene file",
-                      object.map.string(), none_label));
+      refuse(object.map,
+             "label {} stands for objects that were never learned; give the map another label in "
+             "the scene file",
+             none_label);
     }
     map.symmetry = object.symmetry.value_or(map.symmetry);
     hypotheses.push_back({std::move(map), object.weight});
@@ -95,15 +87,14 @@ std::optional<double> prior_of(const std::vector<Scene::Object>& objects,
                                const std::vector<Hypothesis>& hypotheses,
                                std::optional<double> given) {
   if (given && !(*given > 0.0 && *given < 1.0)) {
-    throw Error(Fault::input,
-                fmt::format("--prior {}: give a probability between 0 and 1", *given));
+    refuse_flag("--prior", *given, "give a probability between 0 and 1");
   }
   if (const auto other = given ? std::nullopt : differing_prior(hypotheses)) {
-    throw Error(Fault::input,
-                fmt::format("{}: prior {} differs from {} of {}; build the maps in one call of "
-                            "palpate map, or say which prior to use with --prior",
-                            objects[*other].map.string(), hypotheses[*other].map.prior,
-                            hypotheses.front().map.prior, objects.front().map.string()));
+    refuse(objects[*other].map,
+           "prior {} differs from {} of {}; build the maps in one call of palpate map, or say "
+           "which prior to use with --prior",
+           hypotheses[*other].map.prior, hypotheses.front().map.prior,
+           objects.front().map.string());
   }
   return given;
 }
@@ -120,8 +111,7 @@ PoseLattice make_lattice(const RecognitionFlags& flags, const Scene& scene) {
     axis.upper = (*ends)[1] * unit;
     if (!(axis.lower >= -farthest_mm && axis.upper <= farthest_mm)) {
       const std::string given = text.empty() ? fmt::format("{}:{}", (*ends)[0], (*ends)[1]) : text;
-      throw Error(Fault::input, fmt::format("{} {}: give numbers within +-{:g}", flag, given,
-                                            farthest_mm / unit));
+      refuse_flag(flag, given, "give numbers within +-{:g}", farthest_mm / unit);
     }
   };
   range("--x-mm", flags.x_mm, scene.region.x_mm, lattice.x_mm, 1.0);
@@ -142,8 +132,8 @@ PoseLattice make_lattice(const RecognitionFlags& flags, const Scene& scene) {
   }
   if (!(std::abs(lattice.pivot_mm.x) <= farthest_mm &&
         std::abs(lattice.pivot_mm.y) <= farthest_mm)) {
-    throw Error(Fault::input, fmt::format("--pivot-mm {},{}: give numbers within +-{:g}",
-                                          lattice.pivot_mm.x, lattice.pivot_mm.y, farthest_mm));
+    refuse_flag("--pivot-mm", fmt::format("{},{}", lattice.pivot_mm.x, lattice.pivot_mm.y),
+                "give numbers within +-{:g}", farthest_mm);
   }
   return lattice.collapse_fixed();
 }
@@ -153,12 +143,10 @@ PoseLattice make_lattice(const RecognitionFlags& flags, const Scene& scene) {
 bool wants_particles(const RecognitionFlags& flags, const Scene& scene) {
   const std::string filter = !flags.filter.empty() ? flags.filter : scene.filter.value_or("auto");
   if (filter == "bounded") {
-    throw Error(Fault::input,
-                fmt::format("--filter {}: not in this version yet; use histogram", filter));
+    refuse_flag("--filter", filter, "not in this version yet; use histogram");
   }
   if (filter != "auto" && filter != "histogram" && filter != "particles") {
-    throw Error(Fault::input,
-                fmt::format("--filter {}: not known; use histogram or particles", filter));
+    refuse_flag("--filter", filter, "not known; use histogram or particles");
   }
   const bool particles = filter == "particles";
   for (const auto& [flag, given] :
@@ -166,15 +154,12 @@ bool wants_particles(const RecognitionFlags& flags, const Scene& scene) {
         std::pair{"--resampling", !flags.resampling.empty()},
         std::pair{"--augmented", flags.augmented}, std::pair{"--seed", flags.seed.has_value()}}) {
     if (given && !particles) {
-      throw Error(
-          Fault::input,
-          fmt::format("{}: has no effect on --filter {}; add --filter particles", flag, filter));
+      refuse(flag, "has no effect on --filter {}; add --filter particles", filter);
     }
   }
   if (flags.memory_mib && particles) {
-    throw Error(Fault::input,
-                "--memory-mib: has no effect on --filter particles; use --filter histogram, or "
-                "fewer --particles");
+    refuse("--memory-mib",
+           "has no effect on --filter particles; use --filter histogram, or fewer --particles");
   }
   return particles;
 }
@@ -187,15 +172,12 @@ ParticleOptions particle_options(const RecognitionFlags& flags, const HistogramO
                             .augmented = flags.augmented};
   particles.particles = flags.particles.value_or(particles.particles);
   if (particles.particles < 1 || particles.particles > 1'000'000) {
-    throw Error(Fault::input,
-                fmt::format("--particles {}: give 1 to 1,000,000", particles.particles));
+    refuse_flag("--particles", particles.particles, "give 1 to 1,000,000");
   }
   if (flags.resampling == "systematic") {
     particles.resampling = Resampling::systematic;
   } else if (!flags.resampling.empty() && flags.resampling != "multinomial") {
-    throw Error(Fault::input, fmt::format("--resampling {}: not known; use multinomial or "
-                                          "systematic",
-                                          flags.resampling));
+    refuse_flag("--resampling", flags.resampling, "not known; use multinomial or systematic");
   }
   particles.seed = flags.seed.value_or(particles.seed);
   return particles;
@@ -213,10 +195,10 @@ void replace_array(const Scene& scene, const std::string& scene_file, const std:
     return;
   }
   if (elements != scene.array_mm->size()) {
-    throw Error(Fault::input,
-                fmt::format("{}: pressure: {} elements, but array of {} has {}; use its own array "
-                            "by leaving the key out",
-                            source, elements, scene_file, scene.array_mm->size()));
+    refuse(
+        source,
+        "pressure: {} elements, but array of {} has {}; use its own array by leaving the key out",
+        elements, scene_file, scene.array_mm->size());
   }
   elements_mm = *scene.array_mm;
 }
@@ -228,15 +210,14 @@ RecognitionTask task_of(const RecognitionFlags& flags, const Scene& scene,
   ContactModel& contact = histogram.contact;
   contact.gamma = flags.gamma ? *flags.gamma : scene.gamma.value_or(0.1);
   if (!(contact.gamma >= 0.0 && contact.gamma < 1.0)) {
-    throw Error(Fault::input,
-                fmt::format("--gamma {}: must be at least 0 and below 1", contact.gamma));
+    refuse_flag("--gamma", contact.gamma, "must be at least 0 and below 1");
   }
   contact.classifier =
       make_classifier(pressure_unit, source, flags.threshold ? flags.threshold : scene.threshold,
                       flags.ratio ? flags.ratio : scene.ratio);
   if (flags.memory_mib) {
     if (*flags.memory_mib < 1) {
-      throw Error(Fault::input, fmt::format("--memory-mib {}: give at least 1", *flags.memory_mib));
+      refuse_flag("--memory-mib", *flags.memory_mib, "give at least 1");
     }
     histogram.memory_limit_bytes = static_cast<std::uint64_t>(*flags.memory_mib) << 20;
   }

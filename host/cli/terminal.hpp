@@ -32,7 +32,6 @@ class Terminal {
   Terminal& operator=(const Terminal&) = delete;
 
   /// The present size, which follows the window.
-  Size size() const { return size_of(output_); }
   static Size size_of(int output);
 
   /// Shows the lines from the top of the screen on; there may be at most as many as rows.

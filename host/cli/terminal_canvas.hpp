@@ -28,9 +28,6 @@ class TerminalCanvas {
  public:
   TerminalCanvas(int columns, int rows);
 
-  int columns() const { return columns_; }
-  int rows() const { return rows_; }
-
   /// Writes UTF-8 text, one column per code point; characters that are not printable become '?'.
   /// @param strong in bold
   void text(int column, int row, std::string_view text, bool strong = false);

@@ -40,11 +40,9 @@ bool append(const DetectedTouch& touch, Recording& recording) {
 /// Where every touch has the same elements dead, keeps one list for all touches: `dead`, which may
 /// be empty.
 void shorten_valid(Recording& recording, const std::vector<std::uint8_t>& dead) {
-  const auto is_usual = [&](std::size_t k) {
-    return (recording.valid[k] != 0) == (dead.empty() || dead[k % dead.size()] != 0);
-  };
   for (std::size_t k = 0; k < recording.valid.size(); ++k) {
-    if (!is_usual(k)) {
+    const bool alive = dead.empty() || dead[k % dead.size()] != 0;
+    if ((recording.valid[k] != 0) != alive) {
       return;
     }
   }
@@ -102,13 +100,12 @@ void find_touches(const Options& options) {
   take(detector.finish());
 
   if (recording.size() == 0) {
-    throw Error(
-        Fault::input,
-        without_pose > 0
-            ? fmt::format("{}: none of its {} touches has a pose; record again with --poses",
-                          options.frames, without_pose)
-            : fmt::format("{}: no touch in its {} frames; lower --onset or --min-steady-s",
-                          options.frames, stream->counters().frames));
+    if (without_pose > 0) {
+      refuse(options.frames, "none of its {} touches has a pose; record again with --poses",
+             without_pose);
+    }
+    refuse(options.frames, "no touch in its {} frames; lower --onset or --min-steady-s",
+           stream->counters().frames);
   }
   shorten_valid(recording, sensor.valid);
   write_recording(options.output, recording);

@@ -66,15 +66,14 @@ AtomicFile::AtomicFile(const std::filesystem::path& target) : target_(file_behin
   }
   const std::filesystem::path folder = folder_of(target_);
   if (!std::filesystem::is_directory(folder, ignored)) {
-    refuse(target,
-           fmt::format("folder '{0}' does not exist; create it (mkdir -p '{0}')", folder.string()));
+    refuse(target, "folder '{0}' does not exist; create it (mkdir -p '{0}')", folder.string());
   }
   temporary_ = make_beside(target_, "part", [](const std::filesystem::path& name) {
     return Descriptor(name, O_WRONLY | O_CREAT | O_EXCL, 0666).valid();
   });
   if (temporary_.empty()) {
-    refuse(target, fmt::format("cannot create a file in folder '{}': {}; choose another folder",
-                               folder.string(), std::strerror(errno)));
+    refuse(target, "cannot create a file in folder '{}': {}; choose another folder",
+           folder.string(), std::strerror(errno));
   }
 }
 
@@ -125,9 +124,10 @@ OlderFile::OlderFile(const std::filesystem::path& target) : target_(file_behind(
     return ::link(target_.c_str(), name.c_str()) == 0;
   });
   if (kept_.empty()) {
-    refuse(target, fmt::format("the older file cannot be kept until the new one is known to be "
-                               "wanted: {}; give another name, or move the older file away",
-                               std::strerror(errno)));
+    refuse(target,
+           "the older file cannot be kept until the new one is known to be wanted: {}; give "
+           "another name, or move the older file away",
+           std::strerror(errno));
   }
 }
 

@@ -16,6 +16,8 @@ namespace palpate {
 
 namespace {
 
+constexpr std::uint64_t kib = 1024;
+
 /// Returns the beginning of a kernel file; "" where it does not exist.
 std::string text_of(const char* path) {
   const Descriptor file(path, O_RDONLY);
@@ -48,7 +50,6 @@ std::uint64_t of_machine() {
   const std::string text = text_of("/proc/meminfo");
   const auto available = number_after(text, "MemAvailable:");
   const auto swap = number_after(text, "SwapFree:");
-  constexpr std::uint64_t kib = 1024;
   return available ? (*available + swap.value_or(0)) * kib : UINT64_MAX;
 }
 
@@ -76,7 +77,6 @@ std::uint64_t of_limit(__rlimit_resource resource, const char* status_key) {
   if (::getrlimit(resource, &present) != 0 || present.rlim_cur == RLIM_INFINITY) {
     return UINT64_MAX;
   }
-  constexpr std::uint64_t kib = 1024;
   const auto held = number_after(text_of("/proc/self/status"), status_key);
   return left_of(present.rlim_cur, held.value_or(0) * kib);
 }

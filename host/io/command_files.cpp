@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "file_identity.hpp"
+#include "input_file.hpp"
 #include "palpate/error.hpp"
 #include "standard_streams.hpp"
 
@@ -78,11 +79,9 @@ void CommandFiles::require_distinct() const {
     const auto [other, is_new] = taken.emplace(*place, std::pair{&output, "writes"});
     if (!is_new) {
       const auto& [named, verb] = other->second;
-      throw Error(
-          Fault::input,
-          fmt::format("{} {}: would overwrite {}, which {} {}; choose another "
-                      "name",
-                      output.flag, output.file.string(), named->file.string(), named->flag, verb));
+      refuse(output.flag + " " + output.file.string(),
+             "would overwrite {}, which {} {}; choose another name", named->file.string(),
+             named->flag, verb);
     }
   }
 }

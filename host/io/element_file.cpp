@@ -1,7 +1,5 @@
 #include "element_file.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <fstream>
 #include <string>
@@ -23,7 +21,7 @@ std::vector<glm::dvec2> read_elements(const std::filesystem::path& path) {
     }
     const auto xy = two_numbers_of(line);
     if (!xy) {
-      refuse(path, fmt::format("line {} is not a position; write 'x y' in mm", number));
+      refuse(path, "line {} is not a position; write 'x y' in mm", number);
     }
     elements.emplace_back((*xy)[0], (*xy)[1]);
   }

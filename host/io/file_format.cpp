@@ -1,7 +1,5 @@
 #include "file_format.hpp"
 
-#include <fmt/format.h>
-
 #include "palpate/files.hpp"
 
 namespace palpate {
@@ -46,17 +44,15 @@ void require_format(const Hdf5Contents& file, std::string_view format) {
   if (found != format) {
     const char* wanted = find_kind(format)->name;
     if (const Kind* kind = find_kind(found)) {
-      file.refuse(fmt::format("attribute 'format' = '{}': this is a {}, {}; give a {} here", found,
-                              kind->name, kind->use, wanted));
+      file.refuse("attribute 'format' = '{}': this is a {}, {}; give a {} here", found, kind->name,
+                  kind->use, wanted);
     }
-    file.refuse(fmt::format("attribute 'format' = '{}' is unknown; give a {} ('{}')", found, wanted,
-                            format));
+    file.refuse("attribute 'format' = '{}' is unknown; give a {} ('{}')", found, wanted, format);
   }
   if (const int version = file.integer("version", 1); version > format_version) {
     file.refuse(
-        fmt::format("attribute 'version' = {} is newer than this program, which reads {}; "
-                    "update Palpate",
-                    version, format_version));
+        "attribute 'version' = {} is newer than this program, which reads {}; update Palpate",
+        version, format_version);
   }
 }
 

@@ -2,9 +2,9 @@
 
 #include <sys/stat.h>
 
+#include <compare>
 #include <filesystem>
 #include <optional>
-#include <tuple>
 
 namespace palpate {
 
@@ -13,9 +13,7 @@ struct FileIdentity {
   dev_t device = 0;
   ino_t inode = 0;
 
-  friend bool operator<(const FileIdentity& a, const FileIdentity& b) {
-    return std::tie(a.device, a.inode) < std::tie(b.device, b.inode);
-  }
+  auto operator<=>(const FileIdentity&) const = default;
 };
 
 inline FileIdentity identity_of(const struct stat& status) {

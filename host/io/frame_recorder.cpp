@@ -6,7 +6,9 @@
 #include <chrono>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -75,7 +77,7 @@ struct FrameRecorder::Impl {
   void create();
   void open(const std::filesystem::path& finished);
   void append();
-  void append(hid_t dataset, hid_t type, std::size_t width, const void* values);
+  void append(std::string_view name, hid_t type, std::size_t width, const void* values);
   [[noreturn]] void fail();
   void close();
 
@@ -97,21 +99,15 @@ struct FrameRecorder::Impl {
 
   // Open from the first save on.
   Hdf5Handle file{H5I_INVALID_HID, H5Fclose};
-  Hdf5Handle pressure{H5I_INVALID_HID, H5Dclose};
-  Hdf5Handle sensor_pose{H5I_INVALID_HID, H5Dclose};
-  Hdf5Handle device_time{H5I_INVALID_HID, H5Dclose};
-  Hdf5Handle lost_before{H5I_INVALID_HID, H5Dclose};
-  Hdf5Handle time{H5I_INVALID_HID, H5Dclose};
+  std::map<std::string_view, Hdf5Handle> datasets;
 };
 
 void FrameRecorder::Impl::require_recordable() const {
   const std::size_t e = sensor.elements_mm.size();
   const auto fits = [&](const auto& list) { return list.empty() || list.size() == e; };
   if (e == 0 || !fits(sensor.valid) || !fits(sensor.baseline)) {
-    refuse(path,
-           fmt::format("sensor '{}' has {} elements, {} valid and {} baseline values; make "
-                       "them agree",
-                       printable(sensor.name), e, sensor.valid.size(), sensor.baseline.size()));
+    refuse(path, "sensor '{}' has {} elements, {} valid and {} baseline values; make them agree",
+           printable(sensor.name), e, sensor.valid.size(), sensor.baseline.size());
   }
   require_head(path, head_of(sensor), e);
   require_elements(path, 0, sensor.elements_mm);
@@ -210,18 +206,15 @@ void FrameRecorder::Impl::open(const std::filesystem::path& finished) {
   if (void* descriptor = nullptr; H5Fget_vfd_handle(file.get(), H5P_DEFAULT, &descriptor) >= 0) {
     mark_as_being_recorded(*static_cast<int*>(descriptor));
   }
-  const auto dataset = [&](const char* name) {
-    return Hdf5Handle(H5Dopen2(file.get(), name, H5P_DEFAULT), H5Dclose);
-  };
-  pressure = dataset("pressure");
-  sensor_pose = dataset("sensor_pose");
-  lost_before = dataset("lost_before");
-  time = dataset("time");
-  if (has_device_time) {
-    device_time = dataset("device_time");
+  bool open = file.valid();
+  for (const char* name : {"pressure", "sensor_pose", "device_time", "lost_before", "time"}) {
+    if (has_device_time || std::string_view(name) != "device_time") {
+      Hdf5Handle dataset(H5Dopen2(file.get(), name, H5P_DEFAULT), H5Dclose);
+      open = open && dataset.valid();
+      datasets.emplace(name, std::move(dataset));
+    }
   }
-  if (!file.valid() || !time.valid() || !pressure.valid() || !sensor_pose.valid() ||
-      !lost_before.valid() || device_time.valid() != has_device_time) {
+  if (!open) {
     throw Error(Fault::system,
                 fmt::format("{}: cannot be written: {}; free or repair the disk and try again",
                             path.string(), hdf5_failure()));
@@ -233,17 +226,19 @@ void FrameRecorder::Impl::append() {
     throw Error(Fault::system, fmt::format("{}: is closed; record to another file", path.string()));
   }
   const Hdf5Session session;
-  append(pressure.get(), H5T_NATIVE_FLOAT, sensor.elements_mm.size(), pending.pressure.data());
-  append(sensor_pose.get(), H5T_NATIVE_DOUBLE, 3, pending.sensor_pose.data());
-  append(lost_before.get(), H5T_NATIVE_UINT64, 1, pending.lost_before.data());
+  append("pressure", H5T_NATIVE_FLOAT, sensor.elements_mm.size(), pending.pressure.data());
+  append("sensor_pose", H5T_NATIVE_DOUBLE, 3, pending.sensor_pose.data());
+  append("lost_before", H5T_NATIVE_UINT64, 1, pending.lost_before.data());
   if (has_device_time) {
-    append(device_time.get(), H5T_NATIVE_DOUBLE, 1, pending.device_time_s.data());
+    append("device_time", H5T_NATIVE_DOUBLE, 1, pending.device_time_s.data());
   }
   // `time` comes last: a row that has its time is complete.
-  append(time.get(), H5T_NATIVE_DOUBLE, 1, pending.time_s.data());
+  append("time", H5T_NATIVE_DOUBLE, 1, pending.time_s.data());
 }
 
-void FrameRecorder::Impl::append(hid_t dataset, hid_t type, std::size_t width, const void* values) {
+void FrameRecorder::Impl::append(std::string_view name, hid_t type, std::size_t width,
+                                 const void* values) {
+  const hid_t dataset = datasets.at(name).get();
   const int rank = width == 1 ? 1 : 2;
   const hsize_t begin[] = {saved, 0};
   const hsize_t count[] = {pending.size(), width};
@@ -274,9 +269,8 @@ void FrameRecorder::Impl::fail() {
 }
 
 void FrameRecorder::Impl::close() {
-  for (Hdf5Handle* handle : {&pressure, &sensor_pose, &device_time, &lost_before, &time, &file}) {
-    const Hdf5Handle closing = std::exchange(*handle, Hdf5Handle(H5I_INVALID_HID, H5Fclose));
-  }
+  datasets.clear();
+  const Hdf5Handle closing = std::exchange(file, Hdf5Handle(H5I_INVALID_HID, H5Fclose));
 }
 
 FrameRecorder::FrameRecorder(std::filesystem::path path, SensorDescription sensor)
@@ -299,11 +293,11 @@ void FrameRecorder::expect_baseline() { impl_->baseline_follows = true; }
 
 void FrameRecorder::set_baseline(std::vector<double> baseline) {
   Impl& r = *impl_;
-  if (baseline.empty() || (r.saved > 0 && !r.has_baseline)) {
-    refuse(r.path,
-           baseline.empty()
-               ? "its baseline has no values; give one for each element"
-               : "has no space for a baseline; call expect_baseline() before the first frame");
+  if (baseline.empty()) {
+    refuse(r.path, "its baseline has no values; give one for each element");
+  }
+  if (r.saved > 0 && !r.has_baseline) {
+    refuse(r.path, "has no space for a baseline; call expect_baseline() before the first frame");
   }
   std::swap(r.sensor.baseline, baseline);
   try {
@@ -327,8 +321,8 @@ void FrameRecorder::set_baseline(std::vector<double> baseline) {
 void FrameRecorder::add(const Frame& frame) {
   Impl& r = *impl_;
   if (frame.values.size() != r.sensor.elements_mm.size()) {
-    refuse(r.path, fmt::format("a frame has {} values but the sensor {} elements; record one array",
-                               frame.values.size(), r.sensor.elements_mm.size()));
+    refuse(r.path, "a frame has {} values but the sensor {} elements; record one array",
+           frame.values.size(), r.sensor.elements_mm.size());
   }
   count_lost(r.lost, frame.lost_before);
   count_lost(r.lost_since, frame.lost_before);

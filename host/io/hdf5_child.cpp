@@ -2,9 +2,6 @@
 
 #include <algorithm>
 
-#include <fmt/format.h>
-#include <fmt/ranges.h>
-
 #include "forked_child.hpp"
 #include "hdf5_contents.hpp"
 #include "hdf5_handle.hpp"
@@ -47,17 +44,10 @@ Hdf5Value read_attribute(hid_t attribute, std::uint64_t file_bytes) {
   Hdf5Value value;
   const Hdf5Handle type(attribute >= 0 ? H5Aget_type(attribute) : -1, H5Tclose);
   const Hdf5Handle space(attribute >= 0 ? H5Aget_space(attribute) : -1, H5Sclose);
-  const int rank = space.valid() ? H5Sget_simple_extent_ndims(space.get()) : -1;
   const std::size_t width = type.valid() ? H5Tget_size(type.get()) : 0;
-  if (rank < 0 || width == 0) {
+  if (!hdf5_shape(space.get(), value.shape) || width == 0) {
     value.problem = hdf5_damaged;
     return value;
-  }
-  std::vector<hsize_t> extents(static_cast<std::size_t>(rank));
-  H5Sget_simple_extent_dims(space.get(), extents.data(), nullptr);
-  value.shape.assign(extents.begin(), extents.end());
-  if (H5Sget_simple_extent_type(space.get()) == H5S_NULL) {
-    value.shape = {0};  // h5py's Empty, its form of an empty fixed-length string
   }
   const H5T_class_t kind = H5Tget_class(type.get());
   if (kind != H5T_STRING && kind != H5T_INTEGER && kind != H5T_FLOAT && kind != H5T_ENUM) {

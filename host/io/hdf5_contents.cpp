@@ -9,8 +9,6 @@
 #include "hdf5_child.hpp"
 #include "hdf5_handle.hpp"
 #include "hdf5_rows.hpp"
-#include "input_file.hpp"
-#include "palpate/error.hpp"
 #include "printable.hpp"
 #include "recording_state.hpp"
 
@@ -117,7 +115,7 @@ void Hdf5Contents::receive(const std::vector<std::string>& datasets) {
       refuse_damaged();
     }
     if (kind == Hdf5Record::refused) {
-      refuse(value.problem);
+      refuse("{}", value.problem);
     }
     if (kind == Hdf5Record::attribute) {
       attributes_[name] = std::move(value);
@@ -127,7 +125,7 @@ void Hdf5Contents::receive(const std::vector<std::string>& datasets) {
     if (found == datasets.end()) {
       refuse_damaged();
     }
-    datasets_[name] = {static_cast<std::uint64_t>(found - datasets.begin()), std::move(value)};
+    datasets_[name] = {std::move(value), static_cast<std::uint64_t>(found - datasets.begin())};
   }
 }
 
@@ -148,7 +146,7 @@ std::string Hdf5Contents::text(const std::string& name) const {
   }
   const std::vector<std::string> all = texts(name);
   if (all.size() != 1) {
-    refuse(fmt::format("attribute '{}' has {} strings; store one", name, all.size()));
+    refuse("attribute '{}' has {} strings; store one", name, all.size());
   }
   return all.front();
 }
@@ -156,11 +154,11 @@ std::string Hdf5Contents::text(const std::string& name) const {
 std::vector<std::string> Hdf5Contents::texts(const std::string& name) const {
   const Hdf5Value& value = attribute(name);
   if (value.strings.empty()) {
-    refuse(fmt::format("attribute '{}' holds no string; store one", name));
+    refuse("attribute '{}' holds no string; store one", name);
   }
   for (const std::string& text : value.strings) {
     if (!is_printable(text)) {
-      refuse(fmt::format("attribute '{}' is not printable UTF-8 text; store it as such", name));
+      refuse("attribute '{}' is not printable UTF-8 text; store it as such", name);
     }
   }
   return value.strings;
@@ -171,12 +169,11 @@ double Hdf5Contents::number(const std::string& name) const { return numbers(name
 std::vector<double> Hdf5Contents::numbers(const std::string& name, std::size_t count) const {
   const Hdf5Value& value = attribute(name);
   if (value.numbers.size() != count) {
-    refuse(fmt::format("attribute '{}' holds {} numbers; store {}", name, value.numbers.size(),
-                       count));
+    refuse("attribute '{}' holds {} numbers; store {}", name, value.numbers.size(), count);
   }
   for (const double number : value.numbers) {
     if (!std::isfinite(number)) {
-      refuse(fmt::format("attribute '{}' = {}; store finite numbers", name, number));
+      refuse("attribute '{}' = {}; store finite numbers", name, number);
     }
   }
   return value.numbers;
@@ -185,17 +182,16 @@ std::vector<double> Hdf5Contents::numbers(const std::string& name, std::size_t c
 int Hdf5Contents::integer(const std::string& name, int least) const {
   const double value = number(name);
   if (value != std::floor(value) || value < least || value > std::numeric_limits<int>::max()) {
-    refuse(fmt::format("attribute '{}' = {}; store a whole number from {}", name, value, least));
+    refuse("attribute '{}' = {}; store a whole number from {}", name, value, least);
   }
   return static_cast<int>(value);
 }
 
 const std::vector<std::uint64_t>& Hdf5Contents::shape(const std::string& name,
                                                       std::optional<std::size_t> rank) const {
-  const Hdf5Value& value = dataset(name).value;
+  const Hdf5Value& value = dataset(name);
   if (rank && value.shape.size() != *rank) {
-    refuse(
-        fmt::format("dataset '{}' has {} dimensions; give it {}", name, value.shape.size(), *rank));
+    refuse("dataset '{}' has {} dimensions; give it {}", name, value.shape.size(), *rank);
   }
   return value.shape;
 }
@@ -206,7 +202,7 @@ std::uint64_t Hdf5Contents::count(const std::string& name) const {
 
 void Hdf5Contents::read(const std::string& name, const Take& take, std::uint64_t rows) {
   const Dataset& found = dataset(name);
-  const std::vector<std::uint64_t>& shape = found.value.shape;
+  const std::vector<std::uint64_t>& shape = found.shape;
   std::uint64_t total = 1;
   for (std::size_t axis = 0; axis < shape.size(); ++axis) {
     total *= axis == 0 ? std::min(rows, shape[0]) : shape[axis];
@@ -221,7 +217,7 @@ void Hdf5Contents::read(const std::string& name, const Take& take, std::uint64_t
     std::uint64_t count = 0;
     intact = child_->read(&count, sizeof count);
     if (intact && count == 0) {
-      refuse(fmt::format("dataset '{}' {}", name, hdf5_damaged));
+      refuse("dataset '{}' {}", name, hdf5_damaged);
     }
     intact = intact && count <= std::min(hdf5_piece, total - first);
     piece.resize(intact ? count : 0);
@@ -235,28 +231,25 @@ void Hdf5Contents::read(const std::string& name, const Take& take, std::uint64_t
   }
 }
 
-void Hdf5Contents::refuse(std::string_view message) const { palpate::refuse(path_, message); }
-
-const Hdf5Value& Hdf5Contents::attribute(const std::string& name) const {
-  const auto found = attributes_.find(name);
-  if (found == attributes_.end()) {
-    refuse(fmt::format("attribute '{}' is missing; add it", name));
+template <typename Field>
+const Field& Hdf5Contents::find(const std::map<std::string, Field>& fields, const char* kind,
+                                const std::string& name) const {
+  const auto found = fields.find(name);
+  if (found == fields.end()) {
+    refuse("{} '{}' is missing; add it", kind, name);
   }
   if (!found->second.problem.empty()) {
-    refuse(fmt::format("attribute '{}' {}", name, found->second.problem));
+    refuse("{} '{}' {}", kind, name, found->second.problem);
   }
   return found->second;
 }
 
+const Hdf5Value& Hdf5Contents::attribute(const std::string& name) const {
+  return find(attributes_, "attribute", name);
+}
+
 const Hdf5Contents::Dataset& Hdf5Contents::dataset(const std::string& name) const {
-  const auto found = datasets_.find(name);
-  if (found == datasets_.end()) {
-    refuse(fmt::format("dataset '{}' is missing; add it", name));
-  }
-  if (const std::string& problem = found->second.value.problem; !problem.empty()) {
-    refuse(fmt::format("dataset '{}' {}", name, problem));
-  }
-  return found->second;
+  return find(datasets_, "dataset", name);
 }
 
 }  // namespace palpate

@@ -7,10 +7,10 @@
 #include <optional>
 #include <span>
 #include <string>
-#include <string_view>
 #include <vector>
 
 #include "forked_child.hpp"
+#include "input_file.hpp"
 
 namespace palpate {
 
@@ -61,19 +61,25 @@ class Hdf5Contents {
   /// Reads the dataset's first rows, or all.
   void read(const std::string& dataset, const Take& take, std::uint64_t rows = UINT64_MAX);
 
-  /// Throws Error, "<path>: <message>".
-  [[noreturn]] void refuse(std::string_view message) const;
+  /// Throws Error, "<path>: <message>"; see palpate::refuse().
+  template <typename... Parts>
+  [[noreturn]] void refuse(fmt::format_string<const Parts&...> message,
+                           const Parts&... parts) const {
+    palpate::refuse(path_, message, parts...);
+  }
 
  private:
-  struct Dataset {
-    std::uint64_t index;
-    Hdf5Value value;
+  struct Dataset : Hdf5Value {
+    std::uint64_t index = 0;  ///< among the names
   };
 
   void receive(const std::vector<std::string>& datasets);
   [[noreturn]] void refuse_damaged() const;
   const Hdf5Value& attribute(const std::string& name) const;
   const Dataset& dataset(const std::string& name) const;
+  template <typename Field>
+  const Field& find(const std::map<std::string, Field>& fields, const char* kind,
+                    const std::string& name) const;
 
   std::filesystem::path path_;
   bool closed_ = true;

@@ -51,10 +51,6 @@ std::uint64_t largest_dataset(hid_t dataset, hid_t creation, std::uint64_t file_
              : stored;
 }
 
-hid_t open_dataset(hid_t file, const std::string& name, hid_t access = H5P_DEFAULT) {
-  return H5Dopen2(file, name.c_str(), access);
-}
-
 std::uint64_t product(std::span<const std::uint64_t> factors) {
   return std::accumulate(factors.begin(), factors.end(), std::uint64_t{1}, std::multiplies<>());
 }
@@ -71,17 +67,27 @@ std::uint64_t hdf5_stored_bytes(std::span<const std::uint64_t> shape, std::uint6
   return bytes;
 }
 
-Hdf5Rows::Hdf5Rows(hid_t file, const std::string& name, std::uint64_t file_bytes) {
-  open(file, name, file_bytes);
+bool hdf5_shape(hid_t space, std::vector<std::uint64_t>& shape) {
+  const int rank = space >= 0 ? H5Sget_simple_extent_ndims(space) : -1;
+  if (rank < 0) {
+    return false;
+  }
+  std::vector<hsize_t> extents(static_cast<std::size_t>(rank));
+  H5Sget_simple_extent_dims(space, extents.data(), nullptr);
+  shape.assign(extents.begin(), extents.end());
+  if (H5Sget_simple_extent_type(space) == H5S_NULL) {
+    shape = {0};  // h5py's Empty, its form of an empty fixed-length string
+  }
+  return true;
 }
 
-void Hdf5Rows::open(hid_t file, const std::string& name, std::uint64_t file_bytes) {
+Hdf5Rows::Hdf5Rows(hid_t file, const std::string& name, std::uint64_t file_bytes) {
   const H5L_type_t link = link_type(file, name);
   if (link != H5L_TYPE_HARD && link != H5L_TYPE_SOFT && link != H5L_TYPE_ERROR) {
     problem_ = "is a link to another file, which is not followed; copy the dataset into this file";
     return;
   }
-  dataset_ = Hdf5Handle(open_dataset(file, name), H5Dclose);
+  dataset_ = Hdf5Handle(H5Dopen2(file, name.c_str(), H5P_DEFAULT), H5Dclose);
   const Hdf5Handle creation(dataset_.valid() ? H5Dget_create_plist(dataset_.get()) : -1, H5Pclose);
   if (!creation.valid()) {
     problem_ = link == H5L_TYPE_SOFT
@@ -94,17 +100,10 @@ void Hdf5Rows::open(hid_t file, const std::string& name, std::uint64_t file_byte
   }
   const Hdf5Handle type(H5Dget_type(dataset_.get()), H5Tclose);
   const Hdf5Handle space(H5Dget_space(dataset_.get()), H5Sclose);
-  const int rank = space.valid() ? H5Sget_simple_extent_ndims(space.get()) : -1;
   const std::size_t width = type.valid() ? H5Tget_size(type.get()) : 0;
-  if (rank < 0 || width == 0) {
+  if (!hdf5_shape(space.get(), shape_) || width == 0) {
     problem_ = hdf5_damaged;
     return;
-  }
-  std::vector<hsize_t> extents(static_cast<std::size_t>(rank));
-  H5Sget_simple_extent_dims(space.get(), extents.data(), nullptr);
-  shape_.assign(extents.begin(), extents.end());
-  if (H5Sget_simple_extent_type(space.get()) == H5S_NULL) {
-    shape_ = {0};
   }
   const H5T_class_t kind = H5Tget_class(type.get());
   if (kind == H5T_STRING) {
@@ -164,7 +163,7 @@ bool Hdf5Rows::reopen_with_cache(hid_t file, const std::string& name, hid_t crea
   const std::size_t slots = std::min<std::size_t>(10 * chunks + 521, 1'000'003);
   H5Pset_chunk_cache(access.get(), slots, std::max<std::size_t>(band_bytes_, 1 << 20), 1.0);
   dataset_ = Hdf5Handle(H5I_INVALID_HID, H5Dclose);  // an open dataset would keep its cache
-  dataset_ = Hdf5Handle(open_dataset(file, name, access.get()), H5Dclose);
+  dataset_ = Hdf5Handle(H5Dopen2(file, name.c_str(), access.get()), H5Dclose);
   return dataset_.valid();
 }
 

@@ -23,7 +23,6 @@ class Hdf5Rows {
   void send(int socket, std::uint64_t first, std::uint64_t count);
 
  private:
-  void open(hid_t file, const std::string& name, std::uint64_t file_bytes);
   bool reopen_with_cache(hid_t file, const std::string& name, hid_t creation, std::size_t width);
   bool read(const std::vector<hsize_t>& begin, const std::vector<hsize_t>& count,
             std::span<double> values) const;
@@ -38,6 +37,9 @@ class Hdf5Rows {
 /// Problem of a file on whose bytes HDF5 fails.
 inline constexpr const char* hdf5_damaged =
     "cannot be read: the file is damaged; copy or record it again";
+
+/// Reads the shape of a dataspace, which may be invalid; false where the file is damaged.
+bool hdf5_shape(hid_t space, std::vector<std::uint64_t>& shape);
 
 /// Returns the bytes of values of this shape and width; UINT64_MAX on overflow.
 std::uint64_t hdf5_stored_bytes(std::span<const std::uint64_t> shape, std::uint64_t width);

@@ -100,11 +100,6 @@ void Hdf5Writer::attribute(const char* name, const std::vector<double>& numbers)
   add_attribute(name, H5T_NATIVE_DOUBLE, extents({numbers.size()}).get(), numbers.data());
 }
 
-void Hdf5Writer::dataset(const char* name, const Shape& shape, std::span<const double> values,
-                         Storage storage) {
-  add_dataset(name, shape, H5T_NATIVE_DOUBLE, values.data(), storage);
-}
-
 void Hdf5Writer::dataset(const char* name, const Shape& shape,
                          const std::function<std::vector<double>(std::size_t)>& part,
                          Storage storage) {
@@ -123,21 +118,6 @@ void Hdf5Writer::dataset(const char* name, const Shape& shape,
                          values.data()) >= 0,
             name);
   }
-}
-
-void Hdf5Writer::dataset(const char* name, const Shape& shape, std::span<const float> values,
-                         Storage storage) {
-  add_dataset(name, shape, H5T_NATIVE_FLOAT, values.data(), storage);
-}
-
-void Hdf5Writer::dataset(const char* name, const Shape& shape,
-                         std::span<const std::uint8_t> values) {
-  add_dataset(name, shape, H5T_NATIVE_UINT8, values.data(), Storage::plain);
-}
-
-void Hdf5Writer::dataset(const char* name, const Shape& shape,
-                         std::span<const std::uint64_t> values, Storage storage) {
-  add_dataset(name, shape, H5T_NATIVE_UINT64, values.data(), storage);
 }
 
 void Hdf5Writer::save(const std::function<void(const std::filesystem::path&)>& finished) {

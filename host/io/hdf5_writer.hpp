@@ -39,16 +39,14 @@ class Hdf5Writer {
   void attribute(const char* name, int number);
   void attribute(const char* name, const std::vector<double>& numbers);
 
-  void dataset(const char* name, const Shape& shape, std::span<const double> values,
-               Storage storage = Storage::plain);
+  template <typename Value>
+  void dataset(const char* name, const Shape& shape, const std::vector<Value>& values,
+               Storage storage = Storage::plain) {
+    add_dataset(name, shape, native_type(Value{}), values.data(), storage);
+  }
   /// Writes a dataset in parts, each one step along the first axis, in order.
   void dataset(const char* name, const Shape& shape,
                const std::function<std::vector<double>(std::size_t)>& part, Storage storage);
-  void dataset(const char* name, const Shape& shape, std::span<const float> values,
-               Storage storage = Storage::plain);
-  void dataset(const char* name, const Shape& shape, std::span<const std::uint8_t> values);
-  void dataset(const char* name, const Shape& shape, std::span<const std::uint64_t> values,
-               Storage storage = Storage::plain);
 
   /// Writes the file; no call may follow.
   /// @param finished called with the whole file before it appears under its name, and may keep it
@@ -56,6 +54,11 @@ class Hdf5Writer {
   void save(const std::function<void(const std::filesystem::path&)>& finished = {});
 
  private:
+  static hid_t native_type(double) { return H5T_NATIVE_DOUBLE; }
+  static hid_t native_type(float) { return H5T_NATIVE_FLOAT; }
+  static hid_t native_type(std::uint8_t) { return H5T_NATIVE_UINT8; }
+  static hid_t native_type(std::uint64_t) { return H5T_NATIVE_UINT64; }
+
   void add_attribute(const char* name, hid_t type, hid_t space, const void* values);
   void add_dataset(const char* name, const Shape& shape, hid_t type, const void* values,
                    Storage storage);

@@ -1,19 +1,12 @@
 #include "input_file.hpp"
 
-#include <fmt/format.h>
-
 #include <cerrno>
 #include <cstring>
 #include <system_error>
 
 #include "descriptor.hpp"
-#include "palpate/error.hpp"
 
 namespace palpate {
-
-void refuse(const std::filesystem::path& path, std::string_view message) {
-  throw Error(Fault::input, fmt::format("{}: {}", path.string(), message));
-}
 
 std::uintmax_t require_readable(const std::filesystem::path& path) {
   std::error_code failure;
@@ -28,7 +21,7 @@ std::uintmax_t require_readable(const std::filesystem::path& path) {
     refuse(path, "is not a regular file; save the data to one first");
   }
   if (!Descriptor(path, O_RDONLY | O_NONBLOCK).valid()) {
-    refuse(path, fmt::format("cannot be read: {}; check its permissions", std::strerror(errno)));
+    refuse(path, "cannot be read: {}; check its permissions", std::strerror(errno));
   }
   return std::filesystem::file_size(path);
 }

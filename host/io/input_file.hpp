@@ -2,12 +2,20 @@
 
 #include <cstdint>
 #include <filesystem>
-#include <string_view>
+
+#include <fmt/format.h>
+
+#include "palpate/error.hpp"
 
 namespace palpate {
 
-/// Throws Error (Fault::input), "<path>: <message>".
-[[noreturn]] void refuse(const std::filesystem::path& path, std::string_view message);
+/// Throws Error (Fault::input), "<source>: <message>"; the source is mostly a file, and the message
+/// is formatted as by fmt::format().
+template <typename... Parts>
+[[noreturn]] void refuse(const std::filesystem::path& source,
+                         fmt::format_string<const Parts&...> message, const Parts&... parts) {
+  throw Error(Fault::input, fmt::format("{}: {}", source.string(), fmt::format(message, parts...)));
+}
 
 /// Size in bytes of a regular file that may be read.
 /// @throws Error where it is missing, a folder, not a regular file or not readable.

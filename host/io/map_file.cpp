@@ -20,7 +20,7 @@ namespace {
 
 void require_sound(const std::filesystem::path& path, const std::optional<std::string>& fault) {
   if (fault) {
-    refuse(path, *fault);
+    refuse(path, "{}", *fault);
   }
 }
 
@@ -47,7 +47,7 @@ void scan_map(const std::filesystem::path& path,
   const std::vector<std::uint64_t>& shape = file.shape("log_odds", 2);
   const auto [least, most] = std::minmax(shape[0], shape[1]);
   if (least < 1 || most > std::numeric_limits<int>::max()) {
-    file.refuse(fmt::format("dataset 'log_odds' has the shape {}; store at least one cell", shape));
+    file.refuse("dataset 'log_odds' has the shape {}; store at least one cell", shape);
   }
   map.ny = static_cast<int>(shape[0]);
   map.nx = static_cast<int>(shape[1]);

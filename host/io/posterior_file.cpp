@@ -30,8 +30,7 @@ void validate(const std::filesystem::path& path, const std::vector<std::string>&
   // HDF5 keeps an attribute of at most 64 KiB, 16 bytes for each text.
   constexpr std::size_t most_objects = 4000;
   if (objects.empty() || objects.size() > most_objects) {
-    refuse(path, fmt::format("attribute 'objects' has {} labels; store 1 to {}", objects.size(),
-                             most_objects));
+    refuse(path, "attribute 'objects' has {} labels; store 1 to {}", objects.size(), most_objects);
   }
   for (const std::string& label : objects) {
     require_text(path, "attribute 'objects'", label);
@@ -39,7 +38,7 @@ void validate(const std::filesystem::path& path, const std::vector<std::string>&
   try {
     lattice.validate();
   } catch (const Error& error) {
-    refuse(path, error.what());
+    refuse(path, "{}", error.what());
   }
 }
 
@@ -48,7 +47,7 @@ void require_log_likelihoods(const std::filesystem::path& path,
   for (const double value : log_likelihood) {
     // A bin may be impossible (-inf), but not better than certain (+inf).
     if (std::isnan(value) || value == std::numeric_limits<double>::infinity()) {
-      refuse(path, fmt::format("dataset 'log_likelihood' holds {}; store numbers or -inf", value));
+      refuse(path, "dataset 'log_likelihood' holds {}; store numbers or -inf", value);
     }
   }
 }
@@ -80,8 +79,8 @@ void scan_posterior(const std::filesystem::path& path,
   validate(path, posterior.objects, lattice);
   const std::vector<std::uint64_t> expected = shape_of(posterior.objects.size(), lattice);
   if (const auto& shape = file.shape("log_likelihood", 4); shape != expected) {
-    file.refuse(fmt::format("dataset 'log_likelihood' has the shape {}; its attributes make it {}",
-                            shape, expected));
+    file.refuse("dataset 'log_likelihood' has the shape {}; its attributes make it {}", shape,
+                expected);
   }
   head(posterior);
   file.read("log_likelihood", [&](std::uint64_t, std::span<const double> values) {
@@ -131,8 +130,8 @@ void write_posterior(const std::filesystem::path& path, const std::vector<std::s
       [&](std::size_t object) {
         std::vector<double> values = log_likelihood(object);
         if (values.size() != bins) {
-          refuse(path, fmt::format("object '{}': {} bins and {} log-likelihoods; make them agree",
-                                   objects[object], bins, values.size()));
+          refuse(path, "object '{}': {} bins and {} log-likelihoods; make them agree",
+                 objects[object], bins, values.size());
         }
         require_log_likelihoods(path, values);
         return values;
@@ -145,10 +144,8 @@ void write_posterior(const std::filesystem::path& path, const Posterior& posteri
   const auto& [objects, lattice, logs] = posterior;
   validate(path, objects, lattice);
   if (logs.size() != hdf5_stored_bytes(shape_of(objects.size(), lattice), 1)) {
-    refuse(path,
-           fmt::format("a posterior of {} bins and {} log-likelihoods cannot be written; make "
-                       "them agree",
-                       fmt::join(shape_of(objects.size(), lattice), " x "), logs.size()));
+    refuse(path, "a posterior of {} bins and {} log-likelihoods cannot be written; make them agree",
+           fmt::format("{}", fmt::join(shape_of(objects.size(), lattice), " x ")), logs.size());
   }
   write_posterior(path, objects, lattice, [&posterior](std::size_t object) {
     const std::size_t bins = posterior.log_likelihood.size() / posterior.objects.size();

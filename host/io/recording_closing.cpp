@@ -63,7 +63,7 @@ bool close_file(const std::filesystem::path& path, std::uint64_t rows) {
 Descriptor lock(const std::filesystem::path& path) {
   Descriptor file(path, O_RDWR);
   if (!file.valid()) {
-    refuse(path, fmt::format("cannot be closed: {}; check its permissions", std::strerror(errno)));
+    refuse(path, "cannot be closed: {}; check its permissions", std::strerror(errno));
   }
   if (::flock(file.get(), LOCK_EX | LOCK_NB) == 0) {
     return file;

@@ -73,12 +73,11 @@ void require_agreement(const std::filesystem::path& path, const Recording& recor
       !(recording.device_time_s.empty() || recording.device_time_s.size() == n) ||
       !(recording.lost_before.empty() || recording.lost_before.size() == n)) {
     refuse(path,
-           fmt::format("a recording of {} poses, {} pressures, {} elements, {} valid, {} "
-                       "times, {} baseline values, {} device times and {} lost counts "
-                       "cannot be written; make them agree",
-                       n, recording.pressure.size(), recording.elements_mm.size(),
-                       recording.valid.size(), recording.time_s.size(), recording.baseline.size(),
-                       recording.device_time_s.size(), recording.lost_before.size()));
+           "a recording of {} poses, {} pressures, {} elements, {} valid, {} times, {} baseline "
+           "values, {} device times and {} lost counts cannot be written; make them agree",
+           n, recording.pressure.size(), recording.elements_mm.size(), recording.valid.size(),
+           recording.time_s.size(), recording.baseline.size(), recording.device_time_s.size(),
+           recording.lost_before.size());
   }
 }
 

@@ -16,8 +16,7 @@ void require_one_of(const std::filesystem::path& path, const char* attribute,
                     const std::string& value, const char* first, const char* second) {
   require_text(path, fmt::format("attribute '{}'", attribute), value);
   if (value != first && value != second) {
-    refuse(path, fmt::format("attribute '{}' = '{}'; make it '{}' or '{}'", attribute, value, first,
-                             second));
+    refuse(path, "attribute '{}' = '{}'; make it '{}' or '{}'", attribute, value, first, second);
   }
 }
 
@@ -31,7 +30,7 @@ bool is_finite(const Pose& pose) {
 void require_text(const std::filesystem::path& path, std::string_view field,
                   std::string_view text) {
   if (!is_printable(text)) {
-    refuse(path, fmt::format("{} is not printable UTF-8 text; store it as such", field));
+    refuse(path, "{} is not printable UTF-8 text; store it as such", field);
   }
 }
 
@@ -45,15 +44,13 @@ void require_head(const std::filesystem::path& path, const Recording& head, std:
     require_text(path, "attribute 'true_object'", head.truth->object);
     const Pose& T = head.truth->T_object_robot;
     if (!is_finite(T)) {
-      refuse(path, fmt::format("attribute 'true_T_object_robot' = [{}, {}, {}]; store finite "
-                               "numbers",
-                               T.translation_mm.x, T.translation_mm.y, T.theta_rad));
+      refuse(path, "attribute 'true_T_object_robot' = [{}, {}, {}]; store finite numbers",
+             T.translation_mm.x, T.translation_mm.y, T.theta_rad);
     }
   }
   for (std::size_t i = 0; i < head.baseline.size(); ++i) {
     if ((head.valid.size() != elements || head.valid[i] != 0) && !std::isfinite(head.baseline[i])) {
-      refuse(path,
-             fmt::format("dataset 'baseline'[{}] = {}; store finite numbers", i, head.baseline[i]));
+      refuse(path, "dataset 'baseline'[{}] = {}; store finite numbers", i, head.baseline[i]);
     }
   }
 }
@@ -66,9 +63,10 @@ void require_pressures(const std::filesystem::path& path, const Recording& head,
         head.valid.empty() || head.valid[head.valid.size() == elements ? k % elements : k] != 0;
     const bool unknown = head.rows == "frames" && std::isnan(pressure[i]);
     if (alive && !unknown && !std::isfinite(pressure[i])) {
-      refuse(path, fmt::format("dataset 'pressure'[{}, {}] = {}; store finite numbers, and 0 in "
-                               "'valid' for a dead element",
-                               k / elements, k % elements, pressure[i]));
+      refuse(path,
+             "dataset 'pressure'[{}, {}] = {}; store finite numbers, and 0 in 'valid' for a dead "
+             "element",
+             k / elements, k % elements, pressure[i]);
     }
   }
 }
@@ -81,9 +79,8 @@ void require_poses(const std::filesystem::path& path, const Recording& head, std
     const bool unknown = std::isnan(pose.translation_mm.x) && std::isnan(pose.translation_mm.y) &&
                          std::isnan(pose.theta_rad);
     if (!is_finite(pose) && !(unknown && may_be_unknown)) {
-      refuse(path,
-             fmt::format("dataset 'sensor_pose'[{}] = [{}, {}, {}]; store finite numbers",
-                         first + i, pose.translation_mm.x, pose.translation_mm.y, pose.theta_rad));
+      refuse(path, "dataset 'sensor_pose'[{}] = [{}, {}, {}]; store finite numbers", first + i,
+             pose.translation_mm.x, pose.translation_mm.y, pose.theta_rad);
     }
   }
 }
@@ -93,8 +90,8 @@ void require_elements(const std::filesystem::path& path, std::size_t first,
   for (std::size_t i = 0; i < elements_mm.size(); ++i) {
     const glm::dvec2& element = elements_mm[i];
     if (!std::isfinite(element.x) || !std::isfinite(element.y)) {
-      refuse(path, fmt::format("dataset 'elements', position {} = [{}, {}]; store finite numbers",
-                               first + i, element.x, element.y));
+      refuse(path, "dataset 'elements', position {} = [{}, {}]; store finite numbers", first + i,
+             element.x, element.y);
     }
   }
 }
@@ -103,8 +100,8 @@ void require_times(const std::filesystem::path& path, std::size_t first,
                    std::span<const double> time_s) {
   for (std::size_t i = 0; i < time_s.size(); ++i) {
     if (!std::isfinite(time_s[i])) {
-      refuse(path, fmt::format("dataset 'time'[{}] = {}; store seconds since the Unix epoch",
-                               first + i, time_s[i]));
+      refuse(path, "dataset 'time'[{}] = {}; store seconds since the Unix epoch", first + i,
+             time_s[i]);
     }
   }
 }
@@ -113,9 +110,8 @@ void require_device_times(const std::filesystem::path& path, std::size_t first,
                           std::span<const double> device_time_s) {
   for (std::size_t i = 0; i < device_time_s.size(); ++i) {
     if (std::isinf(device_time_s[i])) {
-      refuse(path, fmt::format("dataset 'device_time'[{}] = {}; store seconds, or NaN where they "
-                               "are unknown",
-                               first + i, device_time_s[i]));
+      refuse(path, "dataset 'device_time'[{}] = {}; store seconds, or NaN where they are unknown",
+             first + i, device_time_s[i]);
     }
   }
 }
@@ -124,8 +120,8 @@ void require_lost_counts(const std::filesystem::path& path, std::size_t first,
                          std::span<const std::uint64_t> lost_before) {
   for (std::size_t i = 0; i < lost_before.size(); ++i) {
     if (lost_before[i] > largest_count) {
-      refuse(path, fmt::format("dataset 'lost_before'[{}] = {}; store counts up to {}", first + i,
-                               lost_before[i], largest_count));
+      refuse(path, "dataset 'lost_before'[{}] = {}; store counts up to {}", first + i,
+             lost_before[i], largest_count);
     }
   }
 }

@@ -82,7 +82,7 @@ class Scan {
   void read_texts() {
     require_format(file_, recording_format);
     if (const std::string unit = file_.text("length_unit"); unit != "mm") {
-      file_.refuse(fmt::format("attribute 'length_unit' = '{}'; convert lengths to 'mm'", unit));
+      file_.refuse("attribute 'length_unit' = '{}'; convert lengths to 'mm'", unit);
     }
     Recording& r = head_.recording;
     r.closed = file_.closed();
@@ -106,18 +106,16 @@ class Scan {
     head_.rows = pressure[0];
     head_.elements = pressure[1];
     if (head_.rows == 0 || head_.elements == 0) {
-      file_.refuse(
-          fmt::format("dataset 'pressure' is empty, {}; record at least one touch by one "
-                      "element",
-                      pressure));
+      file_.refuse("dataset 'pressure' is empty, {}; record at least one touch by one element",
+                   pressure);
     }
     const auto [n, e] = std::pair{head_.rows, head_.elements};
     require_shape("sensor_pose", {{n, 3}});
     require_shape("elements", {{e, 2}, {n, e, 2}});
     head_.array_changes = file_.shape("elements").size() == 3;
-    head_.has_time = has("time", {{n}});
-    head_.has_device_time = has("device_time", {{n}});
-    head_.has_lost_before = has("lost_before", {{n}});
+    for (const char* name : {"time", "device_time", "lost_before"}) {
+      has(name, {{n}});
+    }
   }
 
   void read_small_lists() {
@@ -152,13 +150,10 @@ class Scan {
 
   void read_rows() {
     const Recording& head = head_.recording;
-    file_.read(
-        "pressure",
-        [&](std::uint64_t first, std::span<const double> values) {
-          require_pressures(path_, head, head_.elements, first, values);
-          takers_.pressure(values);
-        },
-        head_.rows);
+    read_list("pressure", [&](std::uint64_t first, std::span<const double> values) {
+      require_pressures(path_, head, head_.elements, first, values);
+      takers_.pressure(values);
+    });
     std::size_t poses = 0;
     read_tuples<3, Pose>(
         "sensor_pose",
@@ -176,29 +171,25 @@ class Scan {
           require_elements(path_, std::exchange(elements, elements + some.size()), some);
           takers_.elements_mm(some);
         });
-    if (head_.has_time) {
-      read_list("time", [&](std::uint64_t first, std::span<const double> values) {
-        require_times(path_, first, values);
-        takers_.time_s(values);
-      });
-    }
-    if (head_.has_device_time) {
-      read_list("device_time", [&](std::uint64_t first, std::span<const double> values) {
-        require_device_times(path_, first, values);
-        takers_.device_time_s(values);
-      });
-    }
-    if (head_.has_lost_before) {
-      read_list("lost_before", [&](std::uint64_t first, std::span<const double> values) {
-        const std::vector<std::uint64_t> counts = counts_of(values);
-        require_lost_counts(path_, first, counts);
-        takers_.lost_before(counts);
-      });
-    }
+    read_list("time", [&](std::uint64_t first, std::span<const double> values) {
+      require_times(path_, first, values);
+      takers_.time_s(values);
+    });
+    read_list("device_time", [&](std::uint64_t first, std::span<const double> values) {
+      require_device_times(path_, first, values);
+      takers_.device_time_s(values);
+    });
+    read_list("lost_before", [&](std::uint64_t first, std::span<const double> values) {
+      const std::vector<std::uint64_t> counts = counts_of(values);
+      require_lost_counts(path_, first, counts);
+      takers_.lost_before(counts);
+    });
   }
 
   void read_list(const char* name, const Hdf5Contents::Take& take) {
-    file_.read(name, take, head_.rows);
+    if (file_.has_dataset(name)) {
+      file_.read(name, take, head_.rows);
+    }
   }
 
   // Pieces end anywhere; the rest of a tuple waits for the next piece.
@@ -227,8 +218,8 @@ class Scan {
     for (const double value : values) {
       if (!(value >= 0.0 && value <= static_cast<double>(largest_count) &&
             value == std::floor(value))) {
-        file_.refuse(fmt::format("dataset 'lost_before' holds {}; store counts of frames up to {}",
-                                 value, largest_count));
+        file_.refuse("dataset 'lost_before' holds {}; store counts of frames up to {}", value,
+                     largest_count);
       }
       counts.push_back(static_cast<std::uint64_t>(value));
     }
@@ -248,19 +239,18 @@ class Scan {
   void require_shape(const char* name, const std::vector<Shape>& fitting) const {
     const Shape shape = cut(name, file_.shape(name));
     if (std::find(fitting.begin(), fitting.end(), shape) == fitting.end()) {
-      file_.refuse(
-          fmt::format("dataset '{}' has the shape {}; 'pressure' is [{}, {}], so make it "
-                      "{}",
-                      name, shape, head_.rows, head_.elements, fmt::join(fitting, " or ")));
+      file_.refuse("dataset '{}' has the shape {}; 'pressure' is [{}, {}], so make it {}", name,
+                   shape, head_.rows, head_.elements,
+                   fmt::format("{}", fmt::join(fitting, " or ")));
     }
   }
 
+  /// Whether the file has the dataset. Throws Error where its shape does not fit.
   bool has(const char* name, const std::vector<Shape>& fitting) const {
-    if (!file_.has_dataset(name)) {
-      return false;
+    if (file_.has_dataset(name)) {
+      require_shape(name, fitting);
     }
-    require_shape(name, fitting);
-    return true;
+    return file_.has_dataset(name);
   }
 
   const std::filesystem::path& path_;

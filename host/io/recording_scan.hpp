@@ -15,9 +15,6 @@ struct RecordingHead {
   std::uint64_t rows = 0;      ///< n
   std::uint64_t elements = 0;  ///< e
   bool array_changes = false;  ///< `elements` is [n, e, 2]
-  bool has_time = false;
-  bool has_device_time = false;
-  bool has_lost_before = false;
 };
 
 /// Called with a recording's rows, which come in pieces, one dataset after the other.

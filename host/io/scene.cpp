@@ -106,36 +106,32 @@ Scene read_scene(const std::filesystem::path& path) {
     if (root.node.IsNull()) {
       return scene;  // comments alone: everything is left out
     }
+    const auto number = [](std::optional<double>& key, bool (*fits)(double), const char* remedy) {
+      return [&key, fits, remedy](const Entry& e) { key = e.number(fits, remedy); };
+    };
     const auto at_least_0 = [](double value) { return value >= 0; };
     const auto positive = [](double value) { return value > 0; };
     const auto rate = [](double value) { return value >= 0 && value < 1; };
     const auto inner = [](double value) { return value > 0 && value < 1; };
-    read_keys(
-        root,
-        {{"array", [&](const Entry& e) { read_array(e, scene); }},
-         {"threshold",
-          [&](const Entry& e) { scene.threshold = e.number(at_least_0, "give a number from 0"); }},
-         {"ratio",
-          [&](const Entry& e) { scene.ratio = e.number(rate, "give a number in [0, 1)"); }},
-         {"gamma",
-          [&](const Entry& e) { scene.gamma = e.number(rate, "give a number in [0, 1)"); }},
-         {"prior",
-          [&](const Entry& e) { scene.prior = e.number(inner, "give a number in (0, 1)"); }},
-         {"objects", [&](const Entry& e) { scene.objects = read_objects(e); }},
-         {"region", [&](const Entry& e) { scene.region = read_region(e); }},
-         {"none",
-          [&](const Entry& e) { scene.none = e.number(positive, "give a number above 0"); }},
-         {"bins", [&](const Entry& e) { read_bins(e, scene); }},
-         {"filter",
-          [&](const Entry& e) {
-            scene.filter = e.one_of<std::string>({{"auto", "auto"},
-                                                  {"histogram", "histogram"},
-                                                  {"bounded", "bounded"},
-                                                  {"particles", "particles"}});
-          }},
-         {"device", [&](const Entry& e) { scene.device = e.text(); }}});
+    read_keys(root, {{"array", [&](const Entry& e) { read_array(e, scene); }},
+                     {"threshold", number(scene.threshold, at_least_0, "give a number from 0")},
+                     {"ratio", number(scene.ratio, rate, "give a number in [0, 1)")},
+                     {"gamma", number(scene.gamma, rate, "give a number in [0, 1)")},
+                     {"prior", number(scene.prior, inner, "give a number in (0, 1)")},
+                     {"objects", [&](const Entry& e) { scene.objects = read_objects(e); }},
+                     {"region", [&](const Entry& e) { scene.region = read_region(e); }},
+                     {"none", number(scene.none, positive, "give a number above 0")},
+                     {"bins", [&](const Entry& e) { read_bins(e, scene); }},
+                     {"filter",
+                      [&](const Entry& e) {
+                        scene.filter = e.one_of<std::string>({{"auto", "auto"},
+                                                              {"histogram", "histogram"},
+                                                              {"bounded", "bounded"},
+                                                              {"particles", "particles"}});
+                      }},
+                     {"device", [&](const Entry& e) { scene.device = e.text(); }}});
   } catch (const YAML::Exception& error) {
-    refuse(path, fmt::format("line {}: {}; correct the YAML", line_of(error.mark), error.msg));
+    refuse(path, "line {}: {}; correct the YAML", line_of(error.mark), error.msg);
   }
   return scene;
 }

@@ -120,27 +120,24 @@ void PoseReader::end_line() {
     refuse_line(Flaw::no_json, lines_, "is no JSON object");
     return;
   }
-  const auto time = number(line, "time");
-  const auto x = number(line, "x_mm");
-  const auto y = number(line, "y_mm");
-  const auto theta = number(line, "theta_rad");
-  if (!time || !x || !y || !theta) {
-    refuse_line(Flaw::no_number, lines_,
-                fmt::format("has no number '{}'", !time ? "time"
-                                                  : !x  ? "x_mm"
-                                                  : !y  ? "y_mm"
-                                                        : "theta_rad"));
-    return;
+  std::vector<double> numbers;
+  for (const char* key : {"time", "x_mm", "y_mm", "theta_rad"}) {
+    const std::optional<double> found = number(line, key);
+    if (!found) {
+      refuse_line(Flaw::no_number, lines_, fmt::format("has no number '{}'", key));
+      return;
+    }
+    numbers.push_back(*found);
   }
-  const Pose T_robot_sensor{{*x, *y}, *theta};
+  const Pose T_robot_sensor{{numbers[1], numbers[2]}, numbers[3]};
   if (!is_robot_pose(T_robot_sensor)) {
     refuse_line(Flaw::far_away, lines_,
                 fmt::format("x_mm = {}, y_mm = {}, theta_rad = {}: no robot is further away than "
                             "1e9 mm, or has turned by more than 1e9 rad",
-                            *x, *y, *theta));
+                            numbers[1], numbers[2], numbers[3]));
     return;
   }
-  add(*time, T_robot_sensor);
+  add(numbers[0], T_robot_sensor);
 }
 
 void PoseReader::add(double time_s, const Pose& T_robot_sensor) {

@@ -17,9 +17,8 @@ constexpr double gaps_of_a_leap = 10.0;
 
 bool is_robot_pose(const Pose& T_robot_sensor) {
   constexpr double largest = 1e9;
-  const auto& [x_mm, y_mm] =
-      std::pair(T_robot_sensor.translation_mm.x, T_robot_sensor.translation_mm.y);
-  return std::abs(x_mm) <= largest && std::abs(y_mm) <= largest &&
+  return std::abs(T_robot_sensor.translation_mm.x) <= largest &&
+         std::abs(T_robot_sensor.translation_mm.y) <= largest &&
          std::abs(T_robot_sensor.theta_rad) <= largest;
 }
 
