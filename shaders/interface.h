@@ -9,14 +9,14 @@ namespace palpate::shaders {
 using uint = std::uint32_t;
 #endif
 
-// Readings, as in palpate::Reading. The numbers between IN_CONTACT and UNKNOWN are In Contact too, at
-// higher levels of pressure.
+// Readings, as in palpate::Reading. The numbers between IN_CONTACT and UNKNOWN are In Contact too,
+// at higher levels of pressure.
 const uint NO_CONTACT = 0;
 const uint IN_CONTACT = 1;
 const uint UNKNOWN = 8;
 
-// How kernels evaluate the contact model: Eq. 7 as products of likelihood ratios, Eq. 7 in logs where
-// float32 cannot hold the products, or a table.
+// How kernels evaluate the contact model: Eq. 7 as products of likelihood ratios, Eq. 7 in logs
+// where float32 cannot hold the products, or a table.
 const uint AS_PRODUCTS = 0;
 const uint AS_LOGS = 1;
 const uint AS_TABLE = 2;
@@ -93,16 +93,17 @@ struct Corners {
 
 // Where an object's data begin in the tables of a dispatch.
 struct ObjectPlace {
-  int first_node;  // of its map
-  int map_width;   // in nodes, with border
-  int map_height;
-  uint first_axis;  // the lattice's x, then y, in cells of its map
-  uint first_bin;   // in the slab
+  int first_node;        // of its map
+  int map_width;         // in nodes, with border
+  int map_height;        // in nodes, with border
+  uint first_axis;       // the lattice's x, then y, in cells of its map
+  uint first_bin;        // in the slab
   int first_table_node;  // index of its first node in the contact table
 };
 
-// Consecutive elements [begin, end) of one reading. Each adds L(reading) - L(instead), where L is the
-// log-likelihood, L(UNKNOWN) = 0, and `instead` is UNKNOWN or NO_CONTACT. Kernels read it as an ivec4.
+// Consecutive elements [begin, end) of one reading. Each adds L(reading) - L(instead), where L is
+// the log-likelihood, L(UNKNOWN) = 0, and `instead` is UNKNOWN or NO_CONTACT. Kernels read it as an
+// ivec4.
 struct Segment {
   uint begin;
   uint end;
@@ -110,8 +111,8 @@ struct Segment {
   uint instead;
 };
 
-// A log-likelihood ratio at a node of the contact table, and its rise to the next node. Kernels read
-// it as a vec2.
+// A log-likelihood ratio at a node of the contact table, and its rise to the next node. Kernels
+// read it as a vec2.
 struct TableNode {
   float nats;
   float rise;
@@ -226,7 +227,7 @@ struct ParticleMap {
   float cells_per_mm_high;  // two floats
   float cells_per_mm_low;
   int first_table_node;  // index of its first node in the contact table
-  Split centre_x;  // the region's centre in cells of the bordered map
+  Split centre_x;        // the region's centre in cells of the bordered map
   Split centre_y;
 };
 
