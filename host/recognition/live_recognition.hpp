@@ -104,6 +104,7 @@ class LiveRecognition {
   bool wait_for_room();
   void believe();
   void use(const Job& job);
+  Touch view_of(const DetectedTouch& touch) const;
   void push(Job job);
   /// Runs a thread's work and keeps what it throws.
   void guard(void (LiveRecognition::*work)());
@@ -133,6 +134,8 @@ class LiveRecognition {
   std::optional<double> last_contact_s_;  ///< of time_
   bool was_touching_ = false;
   std::optional<double> candidate_begin_s_;
+
+  std::deque<DetectedTouch> used_;  ///< the touches of this unknown; of the believing thread alone
 
   std::thread reader_;
   std::thread believer_;

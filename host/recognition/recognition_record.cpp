@@ -83,10 +83,10 @@ RecognitionStep judge(const Estimate& estimate, const GroundTruth& truth,
 }
 
 RecognitionStep take_step(Recogniser& recogniser, const RecognitionTask& task,
-                          std::span<const Touch> touches, const GroundTruth& truth,
-                          const std::function<void(double)>& progress) {
+                          std::span<const Touch> touches, std::size_t used,
+                          const GroundTruth& truth, const std::function<void(double)>& progress) {
   const Clock::time_point start = Clock::now();
-  recogniser.update(touches, progress);
+  recogniser.update(touches.subspan(used), progress);
   const Estimate estimate = recogniser.estimate();
   const double seconds = seconds_since(start);
   RecognitionStep step = judge(estimate, truth, task);
@@ -130,7 +130,7 @@ RecognitionRecord recognise(Recogniser& recogniser, const RecognitionTask& task,
         progress_threw = false;
       };
       record.trace.push_back(
-          take_step(recogniser, task, touches.subspan(done, together), unknown.truth,
+          take_step(recogniser, task, touches.first(done + together), done, unknown.truth,
                     progress ? std::function<void(double)>(show) : std::function<void(double)>()));
     }
   } catch (const Error& error) {

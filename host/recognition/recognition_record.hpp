@@ -36,6 +36,15 @@ Unknown unknown_of(const Recording& recording);
 /// HistogramOptions::still_array saves time.
 bool array_is_still(std::span<const Unknown> unknowns);
 
+/// How well the best hypothesis explains the touches.
+enum class Verdict { fits, doubtful, does_not_fit };
+struct Fit {
+  /// Standard deviations by which the touches' log-likelihood differs from what the hypothesis
+  /// predicts for touches of its own; negative: they fit worse.
+  double z = 0.0;
+  Verdict verdict = Verdict::fits;
+};
+
 /// What the filter believes after a touch.
 struct RecognitionStep {
   std::vector<double> identity;  ///< [label] probability, summed over the maps of the label
@@ -51,8 +60,10 @@ struct RecognitionStep {
   std::optional<double> error_mm;
   std::optional<double> refined_error_mm;       ///< pose error of the refined pose, mm
   std::optional<double> effective_sample_size;  ///< of the particles; empty for a histogram
-  double seconds = 0.0;                         ///< wall time from the touch to the estimate
-  double refine_seconds = 0.0;                  ///< wall time of the refined pose
+  std::optional<Fit> fit;                       ///< empty where no element of any touch is known
+  std::vector<std::string> warnings;  ///< what looks wrong with the touches, in whole sentences
+  double seconds = 0.0;               ///< wall time from the touch to the estimate
+  double refine_seconds = 0.0;        ///< wall time of the refined pose
 
   double confidence() const { return identity[best]; }
   /// The refined pose, or the mode's where there is none; T_object_robot.
@@ -80,10 +91,14 @@ struct RecognitionRecord {
 RecognitionStep judge(const Estimate& estimate, const GroundTruth& truth,
                       const RecognitionTask& task);
 
-/// Updates the belief with these touches, then judges the estimate and its refined pose.
+/// Updates the belief with the touches from `used` on, then judges the estimate and its refined
+/// pose.
+/// @param touches all touches of the unknown so far
+/// @param used the number of those that the recogniser has already
 /// @throws Error as Recogniser::update() does
 RecognitionStep take_step(Recogniser& recogniser, const RecognitionTask& task,
-                          std::span<const Touch> touches, const GroundTruth& truth,
+                          std::span<const Touch> touches, std::size_t used,
+                          const GroundTruth& truth,
                           const std::function<void(double)>& progress = {});
 
 /// Recognises one unknown; what the recogniser believed before is forgotten. Where the unknown is
