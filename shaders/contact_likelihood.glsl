@@ -12,7 +12,7 @@ layout(constant_id = 5) const float NODES_PER_NAT = 1.0;
 layout(constant_id = 6) const uint TABLE_NODES = 2;
 layout(constant_id = 7) const uint TABLE_LEVELS = 2;
 
-layout(binding = 1) uniform samplerBuffer contact_table;  // TableNode, [object or one, row, node]
+layout(binding = 1) uniform samplerBuffer contact_table;  // TableNode, [set, row, node]
 
 const float LOG2_E = 1.4426950408889634;
 

@@ -171,7 +171,7 @@ void export_posterior(const std::filesystem::path& path, const RecognitionTask& 
   });
 }
 
-/// Writes posterior and JSON; where one of them cannot be written, neither appears.
+/// Writes posterior and JSON. The JSON appears only after the posterior.
 void write_results(const Options& options, const RecognitionTask& task,
                    const Recogniser& recogniser, const std::string& json) {
   std::optional<AtomicFile> json_file;

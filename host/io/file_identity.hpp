@@ -2,9 +2,9 @@
 
 #include <sys/stat.h>
 
-#include <compare>
 #include <filesystem>
 #include <optional>
+#include <tuple>
 
 namespace palpate {
 
@@ -13,7 +13,9 @@ struct FileIdentity {
   dev_t device = 0;
   ino_t inode = 0;
 
-  auto operator<=>(const FileIdentity&) const = default;
+  friend bool operator<(const FileIdentity& a, const FileIdentity& b) {
+    return std::tie(a.device, a.inode) < std::tie(b.device, b.inode);
+  }
 };
 
 inline FileIdentity identity_of(const struct stat& status) {

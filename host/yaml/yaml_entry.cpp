@@ -51,7 +51,8 @@ double YamlEntry::number() const {
 std::int64_t YamlEntry::whole_number(std::int64_t least, std::int64_t most, Digits digits) const {
   // Not yaml-cpp's conversion either, which reads 010 as 8.
   const std::string text = node.IsScalar() ? node.Scalar() : "";
-  const bool hexadecimal = digits == Digits::also_hexadecimal && text.starts_with("0x");
+  const bool hexadecimal = digits == Digits::also_hexadecimal && text.starts_with("0x") &&
+                           text.find_first_of("+-") == std::string::npos;
   const std::optional<std::int64_t> value =
       hexadecimal ? whole_number_of(text.substr(2), 16) : whole_number_of(text);
   if (!value || *value < least || *value > most) {
@@ -89,7 +90,7 @@ void read_keys(const YamlEntry& map, const YamlKeys& readers) {
   }
   std::set<std::string_view> seen;
   for (const auto& item : map.node) {
-    const YamlEntry name{map.file, map.key, item.first};
+    const YamlEntry name{map.file, "key", item.first};
     const auto found = std::find_if(readers.begin(), readers.end(), [&](const auto& entry) {
       return item.first.IsScalar() && entry.first == item.first.Scalar();
     });

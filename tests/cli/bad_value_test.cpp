@@ -124,7 +124,7 @@ INSTANTIATE_TEST_SUITE_P(
     testing::Values(
         Scene{"unknown_key",
               "objects: [{map: A.map.h5}]\ntreshold: 2\n",
-              {"line 2", "'treshold'", "unknown key", "threshold"}},
+              {"line 2", "key", "'treshold'", "unknown key", "threshold"}},
         Scene{"unknown_key_of_object",
               "objects: [{map: A.map.h5, mass: 2}]\n",
               {"line 1", "'mass'", "unknown key", "weight"}},

@@ -210,6 +210,8 @@ TEST_F(ProfileFile, HostProgramWithDecimalCommasReadsTheSame) {
 TEST_F(ProfileFile, WholeNumbersAreDecimalOrHexadecimal) {
   EXPECT_EQ(read(with("line: {baud: 0115200}")).line.baud, 115200u);
   EXPECT_EQ(read(with("line: {baud: 0x1c200}")).line.baud, 115200u);
+  expect_refused(with("line: {baud: 0x+1c200}"), {"baud", "0x+1c200", "whole number"});
+  expect_refused(with("line: {baud: 0x}"), {"baud", "0x", "whole number"});
 }
 
 }  // namespace

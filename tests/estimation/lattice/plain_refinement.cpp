@@ -33,7 +33,8 @@ struct Moved {
   double log;
 };
 
-/// How far bins weighted by a root of the belief spread about their mean; by none, for a root of 0.
+/// Root mean square distance of the bins from their mean under weights belief^root; under equal
+/// weights for a root of 0.
 double plain_spread_mm(const std::vector<Moved>& window, double root) {
   double top = -1e300;
   for (const Moved& bin : window) {
