@@ -62,14 +62,13 @@ void print_pressures(const RecordingSurvey& s) {
   const Recording& r = s.head.recording;
   const PressureSurvey& pressure = s.pressure;
   if (const std::optional<Extremes>& range = pressure.range()) {
-    fmt::print(
-        "  pressure          {:.3g} to {:.3g} {}, half of it up to {:.3g}, 99 % up to {:.3g}\n",
-        range->least, range->most, r.pressure_unit, pressure.readings().quantile(0.5),
-        pressure.readings().quantile(0.99));
+    fmt::print("  pressure          {:.3g} to {:.3g} {}, median {:.3g}, 99th percentile {:.3g}\n",
+               range->least, range->most, r.pressure_unit, pressure.readings().quantile(0.5),
+               pressure.readings().quantile(0.99));
   }
   if (s.threshold) {
-    fmt::print("  in contact        {} {}, above {} {}{}\n", pressure.in_contact(), r.rows,
-               *s.threshold, r.pressure_unit, r.baseline.empty() ? "" : " over the baseline");
+    fmt::print("  in contact        {} {}, more than {} {} above {}\n", pressure.in_contact(),
+               r.rows, *s.threshold, r.pressure_unit, r.baseline.empty() ? "0" : "the baseline");
   } else {
     fmt::print("  in contact        not known: raw pressure has no default threshold\n");
   }

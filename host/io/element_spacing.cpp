@@ -34,7 +34,8 @@ std::optional<ElementSpacing> spacing_of(std::span<const glm::dvec2> elements_mm
       if (std::abs(along(j) - along(i)) >= nearest_mm) {
         return false;
       }
-      if (const double distance = glm::distance(elements_mm[i], elements_mm[j]);
+      if (const double distance =
+              std::hypot(elements_mm[i].x - elements_mm[j].x, elements_mm[i].y - elements_mm[j].y);
           distance < nearest_mm) {
         nearest_mm = distance;
         nearest = j;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <limits>
 #include <numeric>
 
 namespace palpate {
@@ -18,7 +19,9 @@ ReadingHistogram::ReadingHistogram() : counts_(1 << 16, 0) {}
 // The bits of floats, read as whole numbers, have the floats' order where the sign bit is flipped
 // and the other bits of negative numbers are flipped too.
 std::size_t ReadingHistogram::bin_of(double reading) {
-  const auto bits = std::bit_cast<std::uint32_t>(static_cast<float>(reading) + 0.0F);  // -0 is 0
+  constexpr double largest = std::numeric_limits<float>::max();
+  const auto number = static_cast<float>(std::clamp(reading, -largest, largest));
+  const auto bits = std::bit_cast<std::uint32_t>(number + 0.0F);  // 0 for -0
   return ((bits & sign) != 0 ? ~bits : bits | sign) >> 16;
 }
 

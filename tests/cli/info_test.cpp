@@ -30,9 +30,9 @@ TEST_F(InfoCommand, RangesOfPosesPressuresAndArray) {
   std::fill(recording.pressure.begin(), recording.pressure.begin() + 10, 16.0);
   write_recording(folder_ / "r.h5", recording);
   expect_info("r.h5", {"9.8 x 9.5 mm: x -4.9 to 4.9, y -4.75 to 4.75 mm",
-                       "pitch             1.9 mm", "1 to 16 kPa, half of it up to 1, 99 % up to 16",
-                       "in contact        1 touches, above 2 kPa", "x -3.5 to 4 mm, y 2 to 8.25 mm",
-                       "theta -1 to 0.5 rad, -57.3 to 28.6 deg"});
+                       "pitch             1.9 mm", "1 to 16 kPa, median 1, 99th percentile 16",
+                       "in contact        1 touches, more than 2 kPa above 0",
+                       "x -3.5 to 4 mm, y 2 to 8.25 mm", "theta -1 to 0.5 rad, -57.3 to 28.6 deg"});
 }
 
 TEST_F(InfoCommand, SuspicionsComeLast) {
