@@ -155,8 +155,9 @@ void find_touches(const Options& options) {
     if (!complaint.empty()) {
       refuse(options.frames, "no touch in its {} frames: {}", stream->counters().frames, complaint);
     }
-    refuse(options.frames, "no touch in its {} frames; lower --onset or --min-steady-s",
-           stream->counters().frames);
+    refuse(options.frames, "no touch in its {} frames; lower --onset or --min-steady-s{}",
+           stream->counters().frames,
+           tared ? ", or give --tare 0 where the readings have a baseline of 0" : "");
   }
   shorten_valid(recording, sensor.valid);
   write_recording(options.output, recording);

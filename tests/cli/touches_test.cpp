@@ -205,6 +205,26 @@ TEST_F(TouchesCommand, TareRefusesATouchedArray) {
   expect_refused({"touches", "f.h5", "-o", "t.h5", "--tare=-1"}, {"--tare -1"});
 }
 
+// A tare of fewer than 40 frames cannot tell that the array is touched.
+TEST_F(TouchesCommand, TareInATouchIsNamedWhereNoTouchIsLeft) {
+  done({"record", "--sensor", "simulate:A,touches=1,speed=max", "-o", "f.h5"});
+  Recording frames = read_recording(folder_ / "f.h5");
+  for (std::size_t k = 0; k < frames.pressure.size(); ++k) {
+    frames.pressure[k] -= frames.baseline[k % 36];
+  }
+  frames.baseline.clear();
+  const auto begin = static_cast<std::ptrdiff_t>(150);  // the press is steady from 1.4 to 1.9 s
+  frames.pressure.erase(frames.pressure.begin(), frames.pressure.begin() + 36 * begin);
+  frames.T_robot_sensor.erase(frames.T_robot_sensor.begin(), frames.T_robot_sensor.begin() + begin);
+  frames.time_s.erase(frames.time_s.begin(), frames.time_s.begin() + begin);
+  frames.lost_before.clear();
+  frames.device_time_s.clear();
+  write_recording(folder_ / "cut.h5", frames);
+  expect_refused({"touches", "cut.h5", "-o", "t.h5", "--tare", "0.3"},
+                 {"cut.h5: no touch in its", "--tare 0"});
+  expect_named(done({"touches", "cut.h5", "-o", "t.h5", "--tare", "0"}), {"1 touches"});
+}
+
 TEST_F(TouchesCommand, TellsOfAnArrayThatNeverReleases) {
   done({"record", "--sensor", "simulate:A,touches=3,speed=max", "-o", "f.h5"});
   const Outcome outcome = palpate({"touches", "f.h5", "-o", "t.h5", "--tare", "0"});
