@@ -83,8 +83,7 @@ void print_pressures(const RecordingSurvey& s) {
 
 void print_poses(const RecordingSurvey& s) {
   if (s.head.recording.rows == "frames") {
-    fmt::print("  with a pose       {} frames{}\n", s.with_pose,
-               s.has_poses ? "" : ": the file has no 'sensor_pose'");
+    fmt::print("  with a pose       {} frames\n", s.with_pose);
   }
   if (s.poses) {
     const auto& [x_mm, y_mm, theta_rad] = *s.poses;

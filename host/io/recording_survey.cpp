@@ -28,7 +28,6 @@ class Survey {
                                },
                            .T_robot_sensor =
                                [&](std::span<const Pose> poses) {
-                                 result_.has_poses = true;
                                  for (const Pose& pose : poses) {
                                    take(pose);
                                  }

@@ -29,7 +29,6 @@ struct RecordingSurvey {
   /// Pressure above the baseline from which on a reading counts as contact; none for raw pressure.
   std::optional<double> threshold;
   PressureSurvey pressure;
-  bool has_poses = false;       ///< the file has a list of poses
   std::uint64_t with_pose = 0;  ///< rows with a known pose
   std::optional<Poses> poses;   ///< none where no pose is known
   std::optional<Array> array;   ///< none where all elements are dead
