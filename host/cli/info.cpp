@@ -12,6 +12,8 @@
 #include "options.hpp"
 #include "palpate/files.hpp"
 #include "recording_state.hpp"
+#include "recording_survey.hpp"
+#include "recording_suspicions.hpp"
 
 namespace palpate::cli {
 
@@ -34,16 +36,73 @@ std::string closed_of(const std::string& path, const Recording& r) {
   return "no: it is being recorded, or was cut off";
 }
 
+std::string range_of(const Extremes& range) {
+  return fmt::format("{:.4g} to {:.4g}", range.least, range.most);
+}
+
+void print_array(const RecordingSurvey& s) {
+  fmt::print("  elements          {}{}\n", s.head.elements,
+             s.head.array_changes ? ", positions change per touch" : "");
+  if (!s.array) {
+    return;
+  }
+  const auto& [x_mm, y_mm] = *s.array;
+  fmt::print("  array             {:.4g} x {:.4g} mm: x {}, y {} mm\n", x_mm.span(), y_mm.span(),
+             range_of(x_mm), range_of(y_mm));
+  if (s.spacing) {
+    const Extremes& nearest_mm = s.spacing->nearest_mm;
+    const std::string pitch = fmt::format("{:.3g}", nearest_mm.least);
+    const std::string widest = fmt::format("{:.3g}", nearest_mm.most);
+    fmt::print("  pitch             {}{} mm from an element to its nearest neighbour\n", pitch,
+               widest == pitch ? "" : " to " + widest);
+  }
+}
+
+void print_pressures(const RecordingSurvey& s) {
+  const Recording& r = s.head.recording;
+  const PressureSurvey& pressure = s.pressure;
+  if (const std::optional<Extremes>& range = pressure.range()) {
+    fmt::print("  pressure          {:.3g} to {:.3g} {}, median {:.3g}, 99th percentile {:.3g}\n",
+               range->least, range->most, r.pressure_unit, pressure.readings().quantile(0.5),
+               pressure.readings().quantile(0.99));
+  }
+  if (s.threshold) {
+    fmt::print("  in contact        {} {}, more than {} {} above {}\n", pressure.in_contact(),
+               r.rows, *s.threshold, r.pressure_unit, r.baseline.empty() ? "0" : "the baseline");
+  } else {
+    fmt::print("  in contact        not known: raw pressure has no default threshold\n");
+  }
+  if (pressure.unknown() > 0) {
+    fmt::print("  unknown readings  {} of {}\n", pressure.unknown(), s.head.rows * s.head.elements);
+  }
+  if (!r.valid.empty()) {
+    fmt::print("  dead readings     {} of {}\n", std::count(r.valid.begin(), r.valid.end(), 0),
+               r.valid.size());
+  }
+}
+
+void print_poses(const RecordingSurvey& s) {
+  if (s.head.recording.rows == "frames") {
+    fmt::print("  with a pose       {} frames\n", s.with_pose);
+  }
+  if (s.poses) {
+    const auto& [x_mm, y_mm, theta_rad] = *s.poses;
+    fmt::print("  poses             x {} mm, y {} mm\n", range_of(x_mm), range_of(y_mm));
+    fmt::print("                    theta {} rad, {:.1f} to {:.1f} deg\n", range_of(theta_rad),
+               degrees(theta_rad.least), degrees(theta_rad.most));
+  }
+}
+
 /// Prints what only a recording of frames has.
-void print_stream(const std::string& path, const RecordingSummary& s) {
-  const Recording& r = s.head;
+void print_stream(const std::string& path, const RecordingSurvey& s) {
+  const Recording& r = s.head.recording;
   if (s.elapsed_s && *s.elapsed_s > 0.0) {
-    fmt::print("  rate              {:.1f} Hz\n", static_cast<double>(s.rows - 1) / *s.elapsed_s);
+    fmt::print("  rate              {:.1f} Hz\n",
+               static_cast<double>(s.head.rows - 1) / *s.elapsed_s);
   }
   if (s.lost) {
     fmt::print("  lost              {} frames\n", *s.lost);
   }
-  fmt::print("  with a pose       {} frames\n", s.with_pose);
   if (r.baseline.empty()) {
     fmt::print("  baseline          none\n");
   } else {
@@ -58,23 +117,13 @@ void print_stream(const std::string& path, const RecordingSummary& s) {
 }
 
 void print_recording(const std::string& path) {
-  const RecordingSummary s = summarize_recording(path);
-  const Recording& r = s.head;
+  const RecordingSurvey s = survey_recording(path);
+  const Recording& r = s.head.recording;
   fmt::print("{}: recording of {}\n", path, r.object.empty() ? "an unknown object" : r.object);
-  fmt::print("  {}           {}\n", r.rows, s.rows);
-  fmt::print("  elements          {}{}\n", s.elements,
-             s.array_changes ? ", positions change per touch" : "");
-  if (s.pressure) {
-    fmt::print("  pressure          {:.3g} to {:.3g} {}\n", s.pressure->least, s.pressure->most,
-               r.pressure_unit);
-  }
-  if (s.unknown_readings > 0) {
-    fmt::print("  unknown readings  {} of {}\n", s.unknown_readings, s.rows * s.elements);
-  }
-  if (!r.valid.empty()) {
-    fmt::print("  dead readings     {} of {}\n", std::count(r.valid.begin(), r.valid.end(), 0),
-               r.valid.size());
-  }
+  fmt::print("  {}           {}\n", r.rows, s.head.rows);
+  print_array(s);
+  print_pressures(s);
+  print_poses(s);
   if (s.elapsed_s) {
     fmt::print("  duration          {:.3f} s\n", *s.elapsed_s);
   }
@@ -85,6 +134,12 @@ void print_recording(const std::string& path) {
     const Pose& T = r.truth->T_object_robot;
     fmt::print("  truth             {} at x {:.3f} mm, y {:.3f} mm, theta {:.2f} deg\n",
                r.truth->object, T.translation_mm.x, T.translation_mm.y, degrees(T.theta_rad));
+  }
+  if (const std::vector<std::string> suspicions = suspicions_of(s); !suspicions.empty()) {
+    fmt::print("Suspicious:\n");
+    for (const std::string& suspicion : suspicions) {
+      fmt::print("  {}\n", suspicion);
+    }
   }
 }
 
@@ -151,7 +206,9 @@ void print_info(const std::string& path, bool close) {
 }  // namespace
 
 void add_info(CLI::App& app) {
-  auto* command = app.add_subcommand("info", "Show what a recording, a map or a posterior holds");
+  auto* command = app.add_subcommand(
+      "info",
+      "Show what a recording, a map or a posterior holds, and what is suspicious in a recording");
   struct Options {
     std::string path;
     bool close = false;

@@ -1,6 +1,9 @@
 #include <algorithm>
 #include <memory>
+#include <optional>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
@@ -8,22 +11,58 @@
 #include "command_files.hpp"
 #include "commands.hpp"
 #include "detector_flags.hpp"
+#include "endless_touch.hpp"
 #include "lost_count.hpp"
 #include "options.hpp"
+#include "palpate/baseline.hpp"
 #include "palpate/error.hpp"
 #include "palpate/files.hpp"
 #include "palpate/virtual_sensor.hpp"
 #include "recording_state.hpp"
+#include "stream_time.hpp"
 
 namespace palpate::cli {
 
 namespace {
 
+/// Seconds of the tare where a recording has no baseline, as in `palpate record`.
+constexpr double usual_tare_s = 0.5;
+
 struct Options {
   std::string frames;
   std::string output;
   DetectorFlags detector;
+  std::optional<double> tare_s;
 };
+
+/// Returns the baseline: by --tare, else as the recording holds it, else by a tare as of `palpate
+/// record`.
+std::vector<double> baseline_for(const Options& options, Sensor& stream,
+                                 const TouchDetectorOptions& detector) {
+  const SensorDescription& sensor = stream.description();
+  if (!options.tare_s && !sensor.baseline.empty()) {
+    return sensor.baseline;
+  }
+  const double tare_s = options.tare_s.value_or(usual_tare_s);
+  if (tare_s == 0.0) {
+    return {};
+  }
+  std::vector<Frame> frames;
+  StreamTime time;
+  stream.start();
+  while (!stream.ended() && (frames.empty() || time.elapsed_s() < tare_s)) {
+    if (std::optional<Frame> frame = stream.next({})) {
+      time.advance(frame->host_time_s);
+      frames.push_back(std::move(*frame));
+    }
+  }
+  stream.stop();
+  try {
+    return baseline_of(frames, sensor, detector.onset);
+  } catch (const Error& error) {
+    refuse(options.frames, "{}, or give another --tare; 0: no baseline", error.what());
+  }
+}
 
 /// Appends the touch and a row of `valid` for it; returns false where the touch has no pose.
 bool append(const DetectedTouch& touch, Recording& recording) {
@@ -70,11 +109,16 @@ void find_touches(const Options& options) {
   files.writes("-o", options.output);
   files.require_distinct();
   require_writable(options.output);
+  if (options.tare_s) {
+    require_above("--tare", *options.tare_s, 0.0, true);
+  }
   const std::unique_ptr<Sensor> stream =
       open_virtual_sensor("replay:" + options.frames + ",speed=max");
   const SensorDescription& sensor = stream->description();
-  TouchDetector detector(detector_options(options.detector, sensor.pressure_unit, options.frames),
-                         sensor.baseline, sensor.valid);
+  const TouchDetectorOptions thresholds =
+      detector_options(options.detector, sensor.pressure_unit, options.frames);
+  TouchDetector detector(thresholds, baseline_for(options, *stream, thresholds), sensor.valid);
+  EndlessTouch endless(thresholds.release);
   Recording recording;
   recording.object = sensor.object;
   recording.pressure_unit = sensor.pressure_unit;
@@ -95,17 +139,25 @@ void find_touches(const Options& options) {
       unknown += unknown_readings(*frame, sensor.valid);
       unreadable += is_readable(*frame, sensor.valid) ? 0 : 1;
       take(detector.add(*frame));
+      endless.add(*frame, detector);
     }
   }
   take(detector.finish());
+  const bool tared = options.tare_s.value_or(sensor.baseline.empty() ? usual_tare_s : 0.0) > 0.0;
+  const std::string complaint = endless.complaint(
+      sensor.pressure_unit, tared ? "raise --onset" : "give --tare, or raise --onset");
 
   if (recording.size() == 0) {
     if (without_pose > 0) {
       refuse(options.frames, "none of its {} touches has a pose; record again with --poses",
              without_pose);
     }
-    refuse(options.frames, "no touch in its {} frames; lower --onset or --min-steady-s",
-           stream->counters().frames);
+    if (!complaint.empty()) {
+      refuse(options.frames, "no touch in its {} frames: {}", stream->counters().frames, complaint);
+    }
+    refuse(options.frames, "no touch in its {} frames; lower --onset or --min-steady-s{}",
+           stream->counters().frames,
+           tared ? ", or give --tare 0 where the readings have a baseline of 0" : "");
   }
   shorten_valid(recording, sensor.valid);
   write_recording(options.output, recording);
@@ -123,6 +175,9 @@ void find_touches(const Options& options) {
     fmt::print(", {} readings unknown", unknown);
   }
   fmt::print("\n");
+  if (!complaint.empty()) {
+    fmt::print(stderr, "palpate: {}: {}\n", options.frames, complaint);
+  }
   close_input(options.frames);
 }
 
@@ -144,6 +199,10 @@ void add_touches(CLI::App& app) {
                    "baseline in its steady phase")
       ->required();
   add_detector_flags(*command, options->detector);
+  command->add_option(
+      "--tare", options->tare_s,
+      "Seconds at the start in which nothing may touch the array and its baseline is read; 0: no "
+      "baseline [default: the recording's baseline, or 0.5 where it has none]");
   command->callback([options] { find_touches(*options); });
 }
 

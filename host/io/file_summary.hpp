@@ -2,34 +2,15 @@
 
 #include <cstdint>
 #include <filesystem>
-#include <optional>
 #include <vector>
 
+#include "extremes.hpp"
 #include "palpate/files.hpp"
 
 namespace palpate {
 
 // Summaries of files. Each function reads the whole file in pieces, holds a few MB of it, and
 // throws Error as the file's reader does.
-
-/// The smallest and the largest of some numbers.
-struct Extremes {
-  double least;
-  double most;
-};
-
-struct RecordingSummary {
-  Recording head;  ///< the recording without its rows
-  std::uint64_t rows = 0;
-  std::uint64_t elements = 0;
-  bool array_changes = false;
-  std::optional<Extremes> pressure;    ///< known readings of living elements
-  std::uint64_t unknown_readings = 0;  ///< NaN readings of living elements
-  std::optional<double> elapsed_s;     ///< from the first row to the last, see StreamTime
-  std::optional<std::uint64_t> lost;   ///< lost frames, where the file counts them
-  std::uint64_t with_pose = 0;
-};
-RecordingSummary summarize_recording(const std::filesystem::path& path);
 
 struct MapSummary {
   OccupancyGrid head;  ///< without cells

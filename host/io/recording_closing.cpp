@@ -4,7 +4,6 @@
 #include <cerrno>
 #include <cstring>
 
-#include "file_summary.hpp"
 #include "forked_child.hpp"
 #include "hdf5_failure.hpp"
 #include "hdf5_handle.hpp"
@@ -13,6 +12,7 @@
 #include "palpate/error.hpp"
 #include "palpate/files.hpp"
 #include "recording_state.hpp"
+#include "recording_survey.hpp"
 
 namespace palpate {
 
@@ -82,8 +82,8 @@ Descriptor lock(const std::filesystem::path& path) {
 
 bool close_recording(const std::filesystem::path& path) {
   // The whole file is read first, so that nothing changes in a damaged or foreign file.
-  const RecordingSummary before = summarize_recording(path);
-  if (before.head.closed) {
+  const RecordingHead before = survey_recording(path).head;
+  if (before.recording.closed) {
     return false;
   }
   std::string reason;
@@ -113,8 +113,8 @@ bool close_recording(const std::filesystem::path& path) {
     }
   }
   if (reason.empty()) {
-    const RecordingSummary after = summarize_recording(path);
-    if (!after.head.closed || after.rows != before.rows) {
+    const RecordingHead after = survey_recording(path).head;
+    if (!after.recording.closed || after.rows != before.rows) {
       reason = fmt::format("it has {} of {} rows", after.rows, before.rows);
     }
   }

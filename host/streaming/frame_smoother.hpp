@@ -26,6 +26,8 @@ class FrameSmoother {
   /// so that no sum overflows
   /// @return [e] the means, valid until the next call
   const std::vector<double>& add(double time_s, const std::vector<double>& pressure);
+  /// [e] what the last add() returned; empty before it
+  const std::vector<double>& means() const { return mean_; }
   /// Forgets every frame.
   void reset();
 

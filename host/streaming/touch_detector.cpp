@@ -198,6 +198,7 @@ std::optional<DetectedTouch> TouchDetector::finish() {
 
 const std::optional<DetectedTouch>& TouchDetector::candidate() const { return impl().best; }
 bool TouchDetector::touching() const { return impl().touching; }
+const std::vector<double>& TouchDetector::smoothed() const { return impl().smoother.means(); }
 const std::vector<double>& TouchDetector::baseline() const { return impl().baseline; }
 
 }  // namespace palpate

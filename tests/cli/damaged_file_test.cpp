@@ -21,8 +21,11 @@ class DamagedInput : public ProgramTest {
     write_map(folder_ / "A.map.h5", map);
   }
 
-  /// Spoils the file in many ways and recognises with it: done, or refused in one line.
-  void expect_robust(const char* name) const {
+  const std::vector<std::string> recognize_{"recognize", "u.h5",  "--maps", "A.map.h5",
+                                            "--bins",    "5x5x4", "--json", "-"};
+
+  /// Spoils the file in many ways and runs the program on it: done, or refused in one line.
+  void expect_robust(const char* name, const std::vector<std::string>& arguments) const {
     const std::string good = bytes_of(folder_ / name);
     std::mt19937 random(20110509);
     const auto below = [&](std::size_t bound) { return random() % bound; };
@@ -38,8 +41,7 @@ class DamagedInput : public ProgramTest {
         byte = static_cast<char>(byte ^ (1 << below(8)));
       }
       put_bytes(folder_ / name, bytes);
-      const Outcome outcome =
-          palpate({"recognize", "u.h5", "--maps", "A.map.h5", "--bins", "5x5x4", "--json", "-"});
+      const Outcome outcome = palpate(arguments);
       SCOPED_TRACE(k);
       if (outcome.status == 0) {
         EXPECT_EQ(outcome.err, "");
@@ -55,9 +57,11 @@ class DamagedInput : public ProgramTest {
   }
 };
 
-TEST_F(DamagedInput, RecordingIsReadOrRefused) { expect_robust("u.h5"); }
+TEST_F(DamagedInput, RecordingIsReadOrRefused) { expect_robust("u.h5", recognize_); }
 
-TEST_F(DamagedInput, MapIsReadOrRefused) { expect_robust("A.map.h5"); }
+TEST_F(DamagedInput, RecordingIsSurveyedOrRefused) { expect_robust("u.h5", {"info", "u.h5"}); }
+
+TEST_F(DamagedInput, MapIsReadOrRefused) { expect_robust("A.map.h5", recognize_); }
 
 }  // namespace
 }  // namespace palpate

@@ -1,4 +1,6 @@
+#include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "program.hpp"
 #include "sample_files.hpp"
@@ -21,6 +23,50 @@ TEST_F(InfoCommand, Recording) {
   expect_info("A.h5", {"recording of A"});
 }
 
+TEST_F(InfoCommand, RangesOfPosesPressuresAndArray) {
+  Recording recording = sample_training("A", 2);
+  recording.T_robot_sensor = {{{-3.5, 2.0}, 0.5}, {{4.0, 8.25}, -1.0}};
+  recording.pressure.assign(72, 1.0);
+  std::fill(recording.pressure.begin(), recording.pressure.begin() + 10, 16.0);
+  write_recording(folder_ / "r.h5", recording);
+  expect_info("r.h5", {"9.8 x 9.5 mm: x -4.9 to 4.9, y -4.75 to 4.75 mm",
+                       "pitch             1.9 mm", "1 to 16 kPa, median 1, 99th percentile 16",
+                       "in contact        1 touches, more than 2 kPa above 0",
+                       "x -3.5 to 4 mm, y 2 to 8.25 mm", "theta -1 to 0.5 rad, -57.3 to 28.6 deg"});
+}
+
+TEST_F(InfoCommand, SuspicionsComeLast) {
+  Recording recording = sample_training("A", 9);
+  for (Pose& pose : recording.T_robot_sensor) {
+    pose.translation_mm *= 1e-3;
+    pose.theta_rad *= 180.0 / std::numbers::pi;
+  }
+  write_recording(folder_ / "r.h5", recording);
+  const std::string said = done({"info", "r.h5"});
+  const std::string suspicions = said.substr(std::min(said.find("Suspicious:\n"), said.size()));
+  expect_named(suspicions, {"are these metres?\n", "are these degrees?\n"});
+  EXPECT_EQ(std::count(suspicions.begin(), suspicions.end(), '\n'), 3) << suspicions;
+}
+
+// Streams have offsets, phases of rest, and ramps; without noise, most frames are equal.
+TEST_F(InfoCommand, SimulatedRecordingsAreNotSuspicious) {
+  for (const std::string noise : {"0", "0.7"}) {
+    done({"simulate", "E", "--noise-kpa", noise, "-o", "train.h5"});
+    done({"simulate", "E", "--noise-kpa", noise, "--object-pose", "random", "--touches", "9", "-o",
+          "unknown.h5"});
+    for (const std::string touches : {"1", "12"}) {
+      done({"record", "--sensor",
+            "simulate:A,object=random,speed=max,noise=" + noise + ",touches=" + touches, "-o",
+            "frames" + touches + ".h5"});
+    }
+    done({"touches", "frames12.h5", "-o", "touches.h5"});
+    for (const char* file : {"train.h5", "unknown.h5", "frames1.h5", "frames12.h5", "touches.h5"}) {
+      const std::string said = done({"info", file});
+      EXPECT_EQ(said.find("Suspicious"), std::string::npos) << said;
+    }
+  }
+}
+
 TEST_F(InfoCommand, RawStreamOfAChangingArray) {
   Recording stream = sample_training("A", 2);
   stream.rows = "frames";
@@ -28,7 +74,8 @@ TEST_F(InfoCommand, RawStreamOfAChangingArray) {
   stream.time_s = {1.7e9, 1.7e9 + 2.5};
   stream.elements_mm.resize(2 * stream.elements());
   write_recording(folder_ / "s.h5", stream);
-  expect_info("s.h5", {"frames           2", "raw", "positions change", "2.500 s"});
+  expect_info("s.h5", {"frames           2", "raw", "positions change", "2.500 s",
+                       "in contact        not known"});
 }
 
 TEST_F(InfoCommand, DeadElementsDoNotCountAmongThePressures) {

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "palpate/files.hpp"
 #include "palpate/frame_recorder.hpp"
@@ -21,6 +22,10 @@ class TouchesCommand : public ProgramTest {
     done({"record", "--sensor", sensor + ",speed=max", "-o", name + ".frames.h5"});
     done({"touches", name + ".frames.h5", "-o", name + ".h5"});
     return read_recording(folder_ / (name + ".h5"));
+  }
+
+  static double mean(const std::vector<double>& values) {
+    return std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
   }
 
   // The frames of three touches: whole.h5, and cut.h5, whose recorder was killed.
@@ -158,6 +163,102 @@ TEST_F(TouchesCommand, TouchesWithoutAPoseAreLeftOut) {
   frames.T_robot_sensor.assign(frames.size(), unknown);
   write_recording(folder_ / "b.h5", frames);
   expect_refused({"touches", "b.h5", "-o", "u.h5"}, {"b.h5", "3 touches", "--poses"});
+}
+
+// The sensor reads about 3 kPa untouched, more than the onset.
+TEST_F(TouchesCommand, TareReadsTheBaseline) {
+  const std::string sensor = "simulate:A,touches=3,speed=max";
+  done({"record", "--sensor", sensor, "-o", "tared.h5"});
+  done({"record", "--sensor", sensor, "-o", "untared.h5", "--tare", "0"});
+  done({"touches", "tared.h5", "-o", "recorded.h5"});
+  done({"touches", "untared.h5", "-o", "usual.h5"});
+  done({"touches", "untared.h5", "-o", "half.h5", "--tare", "0.5"});
+  const Recording recorded = read_recording(folder_ / "recorded.h5");
+  const Recording usual = read_recording(folder_ / "usual.h5");
+  ASSERT_EQ(recorded.size(), 3u);
+  // The file holds a baseline as float64: the tares are of the same frames, as float32.
+  for (std::size_t k = 0; k < recorded.pressure.size(); ++k) {
+    EXPECT_NEAR(usual.pressure[k], recorded.pressure[k], 1e-5) << k;
+  }
+  EXPECT_EQ(usual.pressure, read_recording(folder_ / "half.h5").pressure);
+
+  // A baseline in the file is used unless --tare is given.
+  Recording shifted = read_recording(folder_ / "tared.h5");
+  for (double& baseline : shifted.baseline) {
+    baseline += 0.5;
+  }
+  write_recording(folder_ / "shifted.h5", shifted);
+  done({"touches", "shifted.h5", "-o", "own.h5", "--drift-s", "0"});
+  done({"touches", "shifted.h5", "-o", "again.h5", "--drift-s", "0", "--tare", "0.5"});
+  const Recording own = read_recording(folder_ / "own.h5");
+  const Recording again = read_recording(folder_ / "again.h5");
+  ASSERT_EQ(own.pressure.size(), again.pressure.size());
+  // The steady phases may differ by a frame or two of 0.7 kPa of noise among 50.
+  EXPECT_NEAR(mean(again.pressure) - mean(own.pressure), 0.5, 0.05);
+}
+
+TEST_F(TouchesCommand, TareRefusesATouchedArray) {
+  done({"record", "--sensor", "simulate:A,touches=1,speed=max", "-o", "f.h5", "--tare", "0"});
+  // The press begins at 1.3 s.
+  expect_refused({"touches", "f.h5", "-o", "t.h5", "--tare", "1.6"},
+                 {"f.h5: the array is touched", "--tare"});
+  expect_refused({"touches", "f.h5", "-o", "t.h5", "--tare=-1"}, {"--tare -1"});
+}
+
+// A tare of fewer than 40 frames cannot tell that the array is touched.
+TEST_F(TouchesCommand, TareInATouchIsNamedWhereNoTouchIsLeft) {
+  done({"record", "--sensor", "simulate:A,touches=1,speed=max", "-o", "f.h5"});
+  Recording frames = read_recording(folder_ / "f.h5");
+  for (std::size_t k = 0; k < frames.pressure.size(); ++k) {
+    frames.pressure[k] -= frames.baseline[k % 36];
+  }
+  frames.baseline.clear();
+  const auto begin = static_cast<std::ptrdiff_t>(150);  // the press is steady from 1.4 to 1.9 s
+  frames.pressure.erase(frames.pressure.begin(), frames.pressure.begin() + 36 * begin);
+  frames.T_robot_sensor.erase(frames.T_robot_sensor.begin(), frames.T_robot_sensor.begin() + begin);
+  frames.time_s.erase(frames.time_s.begin(), frames.time_s.begin() + begin);
+  frames.lost_before.clear();
+  frames.device_time_s.clear();
+  write_recording(folder_ / "cut.h5", frames);
+  expect_refused({"touches", "cut.h5", "-o", "t.h5", "--tare", "0.3"},
+                 {"cut.h5: no touch in its", "--tare 0"});
+  expect_named(done({"touches", "cut.h5", "-o", "t.h5", "--tare", "0"}), {"1 touches"});
+}
+
+TEST_F(TouchesCommand, TellsOfAnArrayThatNeverReleases) {
+  done({"record", "--sensor", "simulate:A,touches=3,speed=max", "-o", "f.h5"});
+  const Outcome outcome = palpate({"touches", "f.h5", "-o", "t.h5", "--tare", "0"});
+  EXPECT_EQ(outcome.status, 0);
+  expect_named(outcome.out, {"t.h5: 1 touches"});
+  expect_named(outcome.err, {"palpate: f.h5: the array never reads below 1 kPa from 0.00 s on",
+                             "give --tare, or raise --onset"});
+  EXPECT_EQ(std::count(outcome.err.begin(), outcome.err.end(), '\n'), 1) << outcome.err;
+  // Where a touch that is nowhere steady is all there is, nothing is written.
+  expect_refused({"touches", "f.h5", "-o", "u.h5", "--tare", "0", "--min-steady-s", "60"},
+                 {"f.h5: no touch", "never reads below 1 kPa"});
+}
+
+TEST_F(TouchesCommand, TellsOfElementsThatNeverRelease) {
+  done({"record", "--sensor", "simulate:A,touches=3,speed=max", "-o", "f.h5"});
+  const Recording frames = read_recording(folder_ / "f.h5");
+  const auto stuck_from = [&](std::size_t first) {
+    Recording stuck = frames;
+    for (std::size_t i = first; i < stuck.size(); ++i) {
+      stuck.pressure[36 * i + 4] = 9.0;
+      stuck.pressure[36 * i + 31] = 9.0;
+    }
+    write_recording(folder_ / "stuck.h5", stuck);
+    return palpate({"touches", "stuck.h5", "-o", "t.h5"});
+  };
+  const Outcome all = stuck_from(0);
+  EXPECT_EQ(all.status, 0);
+  expect_named(all.err, {"palpate: stuck.h5: elements 4, 31 never read below 1 kPa from 0.00 s on",
+                         "'valid'", "--tare"});
+  // Of 461 frames, the first press is over at frame 230; the stuck elements begin another touch.
+  const Outcome later = stuck_from(215);
+  EXPECT_EQ(later.status, 0);
+  expect_named(later.err, {"elements 4, 31 never read below 1 kPa from 2.1"});
+  done({"touches", "stuck.h5", "-o", "t.h5", "--onset", "12"});
 }
 
 TEST_F(TouchesCommand, RefusesWhatHoldsNoTouches) {

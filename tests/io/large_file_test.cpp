@@ -5,12 +5,14 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <array>
 #include <functional>
 
 #include "file_parts.hpp"
 #include "file_summary.hpp"
 #include "hdf5_rows.hpp"
 #include "palpate/files.hpp"
+#include "recording_suspicions.hpp"
 #include "scratch_folder.hpp"
 
 namespace palpate {
@@ -18,27 +20,24 @@ namespace {
 
 constexpr std::uint64_t mib = 1 << 20;
 
-// A map whose chunks of 1 x 1 Ki cells, all of zeros, are stored as 18 KB each: made by copying the
-// stored bytes of the first.
-void save_map_of_zeros(const std::filesystem::path& path, hsize_t chunks_x, hsize_t chunks_y) {
-  map_parts().without("log_odds").save(path);
+// Writes a dataset of floats whose chunks all hold these values: made by copying the stored bytes
+// of the first chunk.
+void save_equal_chunks(const std::filesystem::path& path, const char* name,
+                       const std::array<hsize_t, 2>& extents, const std::array<hsize_t, 2>& chunk,
+                       const std::vector<float>& values) {
   edit(path, [&](hid_t file) {
-    constexpr hsize_t edge = 1024;
-    const hsize_t extents[] = {edge * chunks_y, edge * chunks_x};
-    const hsize_t chunk[] = {edge, edge};
-    const Hdf5Handle space(H5Screate_simple(2, extents, nullptr), H5Sclose);
+    const Hdf5Handle space(H5Screate_simple(2, extents.data(), nullptr), H5Sclose);
     const Hdf5Handle creation(H5Pcreate(H5P_DATASET_CREATE), H5Pclose);
-    H5Pset_chunk(creation.get(), 2, chunk);
+    H5Pset_chunk(creation.get(), 2, chunk.data());
     H5Pset_deflate(creation.get(), 1);
-    const Hdf5Handle dataset(H5Dcreate2(file, "log_odds", H5T_NATIVE_FLOAT, space.get(),
-                                        H5P_DEFAULT, creation.get(), H5P_DEFAULT),
+    const Hdf5Handle dataset(H5Dcreate2(file, name, H5T_NATIVE_FLOAT, space.get(), H5P_DEFAULT,
+                                        creation.get(), H5P_DEFAULT),
                              H5Dclose);
     const hsize_t origin[] = {0, 0};
-    H5Sselect_hyperslab(space.get(), H5S_SELECT_SET, origin, nullptr, chunk, nullptr);
-    const Hdf5Handle memory(H5Screate_simple(2, chunk, nullptr), H5Sclose);
-    const std::vector<float> zeros(edge * edge, 0.0F);
+    H5Sselect_hyperslab(space.get(), H5S_SELECT_SET, origin, nullptr, chunk.data(), nullptr);
+    const Hdf5Handle memory(H5Screate_simple(2, chunk.data(), nullptr), H5Sclose);
     ASSERT_GE(H5Dwrite(dataset.get(), H5T_NATIVE_FLOAT, memory.get(), space.get(), H5P_DEFAULT,
-                       zeros.data()),
+                       values.data()),
               0);
     ASSERT_GE(H5Dflush(dataset.get()), 0);
     hsize_t size = 0;
@@ -46,13 +45,42 @@ void save_map_of_zeros(const std::filesystem::path& path, hsize_t chunks_x, hsiz
     std::string stored(size, '\0');
     std::uint32_t filters = 0;
     ASSERT_GE(H5Dread_chunk(dataset.get(), H5P_DEFAULT, origin, &filters, stored.data()), 0);
-    for (hsize_t j = 0; j < chunks_y; ++j) {
-      for (hsize_t i = 0; i < chunks_x; ++i) {
-        const hsize_t place[] = {j * edge, i * edge};
+    for (hsize_t j = 0; j < extents[0]; j += chunk[0]) {
+      for (hsize_t i = 0; i < extents[1]; i += chunk[1]) {
+        const hsize_t place[] = {j, i};
         ASSERT_GE(H5Dwrite_chunk(dataset.get(), H5P_DEFAULT, 0, place, size, stored.data()), 0);
       }
     }
   });
+}
+
+// A map in chunks of 1 x 1 Ki cells, all of zeros, stored as 18 KB each.
+void save_map_of_zeros(const std::filesystem::path& path, hsize_t chunks_x, hsize_t chunks_y) {
+  map_parts().without("log_odds").save(path);
+  constexpr hsize_t edge = 1024;
+  save_equal_chunks(path, "log_odds", {edge * chunks_y, edge * chunks_x}, {edge, edge},
+                    std::vector<float>(edge * edge, 0.0F));
+}
+
+// A stream of `chunks` times 4,096 frames of 40 elements: 640 KiB of pressures each.
+void save_frames(const std::filesystem::path& path, hsize_t chunks) {
+  constexpr hsize_t rows = 4096;
+  constexpr hsize_t elements = 40;
+  std::vector<double> places;
+  for (hsize_t k = 0; k < elements; ++k) {
+    places.insert(places.end(), {2.0 * static_cast<double>(k), 0.0});
+  }
+  recording_parts()
+      .attribute("rows", "frames")
+      .without("pressure")
+      .without("sensor_pose")
+      .dataset("elements", {elements, 2}, places)
+      .save(path);
+  std::vector<float> pressures(rows * elements, 0.0F);
+  pressures.back() = 5.0F;
+  save_equal_chunks(path, "pressure", {rows * chunks, elements}, {rows, elements}, pressures);
+  save_equal_chunks(path, "sensor_pose", {rows * chunks, 3}, {rows, 3},
+                    std::vector<float>(rows * 3, 1.5F));
 }
 
 class LargeFile : public testing::Test {
@@ -124,6 +152,24 @@ TEST_F(LargeFile, IsSummarizedInPieces) {
     }
   });
   EXPECT_EQ(message, "");
+}
+
+// 168 MB of pressures.
+TEST_F(LargeFile, RecordingIsSurveyedInPieces) {
+#ifdef __SANITIZE_ADDRESS__
+  GTEST_SKIP() << "the sanitizer holds memory of its own";
+#endif
+  constexpr hsize_t chunks = 256;
+  save_frames(path_, chunks);
+  const std::string message = with_memory(20 * mib, [&] {
+    const RecordingSurvey survey = survey_recording(path_);
+    if (survey.head.rows != 4096 * chunks || survey.pressure.in_contact() != chunks ||
+        survey.with_pose != 4096 * chunks || suspicions_of(survey).size() != 0) {
+      throw std::runtime_error("wrong survey");
+    }
+  });
+  EXPECT_EQ(message, "");
+  EXPECT_NE(with_memory(20 * mib, [&] { read_recording(path_); }), "") << "the limit holds";
 }
 
 // What compresses by a factor of 1000 takes its time to read; the limit is for what is read.

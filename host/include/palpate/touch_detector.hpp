@@ -77,6 +77,9 @@ class TouchDetector {
   const std::optional<DetectedTouch>& candidate() const;
   /// True between onset and release.
   bool touching() const;
+  /// Returns the smoothed pressures of the last frame, [e] above the baseline, on which onset and
+  /// release are judged; empty before the first frame.
+  const std::vector<double>& smoothed() const;
   /// Returns the present baseline, [e]; empty before the first frame where none was given.
   const std::vector<double>& baseline() const;
 
