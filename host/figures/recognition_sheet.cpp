@@ -108,19 +108,13 @@ std::string headline(const RecognitionSheet& sheet) {
   return text;
 }
 
-/// Returns the true pose nearest in angle to the estimate, among those that the object's symmetry
-/// makes equal: the pose that the pose error compares with.
+/// Returns the true pose that the pose error compares with.
 std::optional<Pose> nearest_truth(const RecognitionSheet& sheet) {
-  const int symmetry = sheet.map.symmetry;
-  if (!sheet.truth || symmetry == 1) {
+  if (!sheet.truth || sheet.map.symmetry == 1) {
     return sheet.truth;
   }
-  double turn_rad = sheet.T_object_robot.theta_rad - sheet.truth->theta_rad;
-  if (symmetry > 0) {
-    turn_rad -= wrap_angle(turn_rad, 2.0 * std::numbers::pi / symmetry);
-  }
-  const glm::dvec2 centroid = body_of(sheet.map).centroid_mm;
-  return Pose{centroid - rotate(turn_rad, centroid), turn_rad} * *sheet.truth;
+  return nearest_equal_pose(body_of(sheet.map), sheet.map.symmetry, sheet.T_object_robot,
+                            *sheet.truth);
 }
 
 std::string meaning_of_truth(const RecognitionSheet& sheet, const std::string& meaning) {
