@@ -16,6 +16,9 @@ namespace palpate::cli {
 
 /// What `live` shows on a terminal.
 struct LiveView {
+  std::string result;              ///< the object and its pose, in words; "" before the first touch
+  std::string truth;               ///< the same of the truth, and the error; "" where unknown
+  std::vector<std::string> notes;  ///< what is wrong with the touches
   std::string sensor;
   double rate_hz = 0.0;
   std::uint64_t frames = 0;

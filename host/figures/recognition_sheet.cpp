@@ -29,7 +29,7 @@ constexpr double margin_px = 40.0;
 constexpr double side_px = 480.0;  ///< of every panel's plot
 constexpr double axis_px = 84.0;   ///< to the left of every plot
 constexpr double gap_px = 40.0;    ///< between a plot and the next one's axis
-constexpr double top_px = 200.0;   ///< of the plots
+constexpr double top_px = 256.0;   ///< of the plots
 constexpr double bar_top_px = top_px + side_px + 104.0;
 constexpr double bar_height_px = 20.0;
 constexpr double height_px = bar_top_px + 96.0;
@@ -96,16 +96,25 @@ class Legend {
   double x_;
 };
 
-std::string headline(const RecognitionSheet& sheet) {
-  std::string text = (sheet.none ? "estimated (none), most like " : "estimated ") + sheet.map.label;
-  const std::string& truth = sheet.true_object;
-  if (!truth.empty()) {
-    text += ", true " + truth;
+/// Draws the result in words with the title at its right, and the captions below.
+void draw_captions(Canvas& canvas, const RecognitionSheet& sheet) {
+  constexpr Font result{.size_px = 28.0, .bold = true};
+  constexpr double first_px = 52.0;
+  constexpr double below_px = 36.0;  ///< from the result to the first caption
+  constexpr double row_px = 28.0;    ///< from caption to caption
+  constexpr std::size_t most_captions = 4;
+  constexpr double room_px = width_px - 2 * margin_px;
+  const std::string words = canvas.fit(sheet.result, 0.8 * room_px, result);
+  canvas.text(words, {margin_px, first_px}, result);
+  const double left_px = room_px - canvas.text_width(words, result) - margin_px;
+  canvas.text(canvas.fit(sheet.title, left_px, heading), {width_px - margin_px, first_px}, heading,
+              Align::right);
+  double row = first_px + below_px;
+  for (std::size_t i = 0; i < std::min(sheet.captions.size(), most_captions); ++i, row += row_px) {
+    const RecognitionSheet::Caption& caption = sheet.captions[i];
+    canvas.text(canvas.fit(caption.text, room_px, body), {margin_px, row}, body, Align::left,
+                caption.alarm ? alarm : ink);
   }
-  if (sheet.error_mm) {
-    text += fmt::format(", error {:.2f} mm", *sheet.error_mm);
-  }
-  return text;
 }
 
 /// Returns the true pose that the pose error compares with.
@@ -280,15 +289,7 @@ void draw_belief(Canvas& canvas, const RecognitionSheet& sheet) {
 std::string draw_recognition(const RecognitionSheet& sheet) {
   validate(sheet);
   Canvas canvas(static_cast<int>(width_px), static_cast<int>(height_px));
-  constexpr Font title{.size_px = 28.0, .bold = true};
-  constexpr Font result{.size_px = 24.0};
-  const double room = width_px - 2 * margin_px;
-  canvas.text(canvas.fit(sheet.title, room, title), {margin_px, 58.0}, title);
-  const bool wrong = !sheet.true_object.empty() &&
-                     (sheet.none ? std::ranges::count(sheet.labels, sheet.true_object) > 0
-                                 : sheet.true_object != sheet.map.label);
-  canvas.text(canvas.fit(headline(sheet), room, result), {margin_px, 96.0}, result, Align::left,
-              wrong ? alarm : ink);
+  draw_captions(canvas, sheet);
   draw_touches(canvas, sheet);
   draw_belief(canvas, sheet);
   draw_title(canvas, plot(2), "What is it? Belief over identity");
