@@ -219,7 +219,7 @@ void recognize(const Options& options) {
       seconds += record.seconds;
     }
     print_engine(device, recogniser, task);
-    fmt::print(stderr, "seconds: {:.3f} for {} unknowns\n", seconds, records.size());
+    fmt::print(stderr, "seconds: {:.3f} to recognise\n", seconds);
   }
 }
 

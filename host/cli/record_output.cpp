@@ -41,12 +41,12 @@ nlohmann::ordered_json to_json(std::optional<double> error_mm) {
 std::string setup_words(const Device& device, const RecognitionTask& task) {
   const auto* particles = std::get_if<ParticleOptions>(&task.filter);
   const PoseLattice& lattice = task.lattice();
-  return fmt::format("{} maps, {} on {}", task.hypotheses.size(),
-                     particles != nullptr
-                         ? fmt::format("{} particles", particles->particles)
-                         : fmt::format("{} x {} x {} bins each,", lattice.x_mm.count,
-                                       lattice.y_mm.count, lattice.theta_rad.count),
-                     device.name());
+  return fmt::format(
+      "{} map{}, {} on {}", task.hypotheses.size(), task.hypotheses.size() == 1 ? "" : "s",
+      particles != nullptr ? fmt::format("{} particles", particles->particles)
+                           : fmt::format("{} x {} x {} bins each,", lattice.x_mm.count,
+                                         lattice.y_mm.count, lattice.theta_rad.count),
+      device.name());
 }
 
 void print_engine(const Device& device, const Recogniser& recogniser, const RecognitionTask& task) {

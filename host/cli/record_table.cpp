@@ -171,7 +171,7 @@ std::string result_table(const std::vector<RecognitionRecord>& records, const Re
                             std::optional<double> error_mm) {
     const PoseText pose = pose_text(T_robot_object);
     table.add({what, "", label, "", pose.value[0], pose.value[1], pose.value[2],
-               error_mm ? fmt::format("error {:.2f} mm", *error_mm) : ""});
+               error_mm ? fmt::format("{:.2f} mm off", *error_mm) : ""});
   };
   for (const RecognitionRecord& record : records) {
     const RecognitionStep& step = record.last();
