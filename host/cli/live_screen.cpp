@@ -76,7 +76,7 @@ void LiveScreen::describe(const LiveState& state) {
       view_.full_scale = std::max(view_.full_scale, pressure);
     }
   }
-  view_.result.clear();
+  view_.pose.clear();
   view_.truth.clear();
   view_.notes.clear();
   view_.identity.clear();
@@ -91,7 +91,8 @@ void LiveScreen::describe(const LiveState& state) {
     view_.state += "; no map fits these touches";
     view_.warning = true;
   }
-  view_.result = result_words(step, task_);
+  view_.object = identity_words(step, task_);
+  view_.pose = pose_words(pose_text(step));
   view_.truth = truth_words(step, task_);
   if (const auto misfit = misfit_sentence(step, state.touches, task_); !misfit.empty()) {
     view_.notes.push_back(misfit);

@@ -8,7 +8,7 @@
 
 #include "array_picture.hpp"
 #include "evidence_scale.hpp"
-#include "options.hpp"
+#include "text_table.hpp"
 
 namespace palpate::cli {
 
@@ -156,7 +156,7 @@ void draw_identity(TerminalCanvas& canvas, const Panel& panel, const LiveView& v
 
 /// Draws the result first, then what there is to say of it, the state and the stream. Returns the
 /// number of rows.
-int draw_words(TerminalCanvas& canvas, const LiveView& view) {
+int draw_words(TerminalCanvas& canvas, const LiveView& view, int columns) {
   constexpr std::size_t most_notes = 3;
   std::string stream = fmt::format("{}  {:.0f} Hz  {} frames, {} lost", view.sensor, view.rate_hz,
                                    view.frames, view.lost);
@@ -170,7 +170,12 @@ int draw_words(TerminalCanvas& canvas, const LiveView& view) {
       canvas.text(0, row++, words, strong);
     }
   };
-  add(view.result, true);
+  if (!view.pose.empty()) {
+    // A long label leaves the pose its room.
+    const int room = columns - static_cast<int>(view.pose.size()) - 2;
+    const std::size_t object = static_cast<std::size_t>(std::max(room, 0));
+    add((room > 0 ? shorten_middle(view.object, object) + ": " : "") + view.pose, true);
+  }
   add(view.truth, false);
   for (std::size_t i = 0; i < std::min(view.notes.size(), most_notes); ++i) {
     add(view.notes[i], true);
@@ -188,7 +193,7 @@ std::vector<std::string> draw(const LiveView& view, int columns, int rows,
   constexpr int least_body = 9;
   constexpr int gap = 2;
   TerminalCanvas canvas(columns, rows);
-  const int top = draw_words(canvas, view) + 1;
+  const int top = draw_words(canvas, view, columns) + 1;
   if (columns < least_columns || rows - top - 2 < least_body) {
     draw_identity(canvas, {0, top, columns, rows - top}, view);
     return canvas.lines(colours);

@@ -8,6 +8,7 @@
 
 #include "record_table.hpp"
 #include "step_words.hpp"
+#include "text_table.hpp"
 
 namespace palpate::cli {
 
@@ -71,7 +72,10 @@ RecognitionSheet sheet_of(const RecognitionRecord& record, const Unknown& unknow
   const RecognitionStep& last = record.last();
   RecognitionSheet sheet;
   sheet.title = name_of(record);
-  sheet.result = printed(result_words(last, task)) + " in the robot frame";
+  // A long label must leave the pose its room.
+  constexpr std::size_t longest_identity = 32;
+  sheet.result = shorten_middle(identity_words(last, task), longest_identity) + ": " +
+                 printed(pose_words(pose_text(last))) + " in the robot frame";
   sheet.captions = captions(record, task);
   sheet.map = task.hypotheses[last.mode.object].map;
   sheet.element_mm = element_edge_mm(unknown.touches.front());

@@ -60,9 +60,12 @@ std::string object_words(const RecognitionStep& step, const RecognitionTask& tas
   return printable(best == posed ? best : fmt::format("{}, pose of {}", best, posed));
 }
 
+std::string identity_words(const RecognitionStep& step, const RecognitionTask& task) {
+  return fmt::format("{} ({:.1f} %)", object_words(step, task), 100.0 * step.confidence());
+}
+
 std::string result_words(const RecognitionStep& step, const RecognitionTask& task) {
-  return fmt::format("{} ({:.1f} %): {}", object_words(step, task), 100.0 * step.confidence(),
-                     pose_words(pose_text(step)));
+  return identity_words(step, task) + ": " + pose_words(pose_text(step));
 }
 
 std::string truth_words(const RecognitionStep& step, const RecognitionTask& task) {

@@ -28,6 +28,8 @@ std::string pose_words(const PoseText& pose);
 /// The object of the step and, where the pose is another object's, that object: "A",
 /// "(none), pose of A".
 std::string object_words(const RecognitionStep& step, const RecognitionTask& task);
+/// The object and its probability: "A (98.8 %)".
+std::string identity_words(const RecognitionStep& step, const RecognitionTask& task);
 /// The object, its probability and its pose in the robot frame.
 std::string result_words(const RecognitionStep& step, const RecognitionTask& task);
 /// The true object and its pose, as far as the step can be compared with them, and the error of the

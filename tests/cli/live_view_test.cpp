@@ -14,7 +14,8 @@ namespace {
 
 LiveView sample_view(const OccupancyGrid& map) {
   LiveView view;
-  view.result = "E (75.2 %): x -9.87 +-0.25 mm, y 0.85 +-1.20 mm, theta -78.75 +-6.50 deg";
+  view.object = "E (75.2 %)";
+  view.pose = "x -9.87 +-0.25 mm, y 0.85 +-1.20 mm, theta -78.75 +-6.50 deg";
   view.sensor = "TakkTile 0012";
   view.state = "unknown 1, 3 touches";
   view.keys = "Ctrl-C: end";
@@ -88,13 +89,16 @@ TEST(LiveView, SaysThePoseFirstThenTheTruthAndWhatIsWrong) {
   view.notes = {"unlike E: its 3 touches fit 11 standard deviations worse", "one", "two", "three"};
   for (const int rows : {8, 24}) {  // without and with pictures
     const auto lines = draw(view, 80, rows, TerminalColours::none);
-    EXPECT_EQ(lines[0], view.result);
+    EXPECT_EQ(lines[0], "E (75.2 %): " + view.pose);
     EXPECT_EQ(lines[1], view.truth);
     EXPECT_EQ(lines[2], view.notes[0]);
     EXPECT_EQ(lines[4], "two") << "three notes leave room for the pictures";
     EXPECT_EQ(lines[5], view.state);
     EXPECT_TRUE(lines[6].starts_with("TakkTile 0012")) << joined(lines);
   }
+  view.object = "a label that is far too long to be shown (75.2 %)";
+  const std::string first = draw(view, 80, 24, TerminalColours::none)[0];
+  EXPECT_EQ(first, "a label ...75.2 %): " + view.pose);
 }
 
 TEST(LiveView, DrawsTheArrayAsItLies) {
