@@ -121,6 +121,9 @@ void live(const Options& options) {
   Device device = open_device(options.recognition, scene);
   Recogniser recogniser = open_recogniser(device, task);
   warm_up(recogniser, task, description, elements_mm);
+  if (options.recognition.verbose) {
+    print_engine(device, recogniser, task);
+  }
   std::optional<LineFile> json;
   if (!options.json.empty()) {
     json.emplace(options.json);
@@ -135,8 +138,7 @@ void live(const Options& options) {
   const bool on_terminal =
       isatty(fileno(people)) != 0 && !(to_program && isatty(STDOUT_FILENO) != 0);
   if (!to_program && !on_terminal) {
-    fmt::print("{}: {} maps, {}\n{}\n", device.name(), task.hypotheses.size(),
-               filter_words(recogniser, task), table_heading());
+    fmt::print("{}\n", table_heading());
     std::fflush(stdout);
   }
   complaints.show(on_terminal && isatty(STDERR_FILENO) != 0);
@@ -169,7 +171,8 @@ void live(const Options& options) {
   if (state.all_touches == 0 && state.without_pose > 0 && !interruption.requested()) {
     refuse(source, "none of its {} touches has a pose; give --poses", state.without_pose);
   }
-  fmt::print(people, "{}", summary(state, recognition.latencies_ms(), task));
+  fmt::print(people, "{}{}\n", summary(state, recognition.latencies_ms(), task),
+             setup_words(device, task));
   report_refused(opened);
 }
 
@@ -178,8 +181,9 @@ void live(const Options& options) {
 void add_live(CLI::App& app) {
   auto* command = app.add_subcommand(
       "live",
-      "Recognise what a sensor touches and find its pose T_object_robot, touch by touch, until "
-      "Ctrl-C. A terminal shows the pressure, the identity and the array on the object's map; "
+      "Recognise what a sensor touches and find its pose in the robot frame, T_robot_object, with "
+      "one standard deviation, touch by touch, until Ctrl-C. A terminal shows the pressure, the "
+      "identity and the array on the object's map; "
       "key r begins the next unknown object");
   const auto options = std::make_shared<Options>();
   command->add_option("--sensor", options->sensor, sensor_help)->required();

@@ -10,6 +10,7 @@
 #include "palpate/error.hpp"
 #include "printable.hpp"
 #include "record_output.hpp"
+#include "step_words.hpp"
 
 namespace palpate::cli {
 
@@ -29,30 +30,47 @@ std::string json_line(const LiveTouch& touch, const RecognitionTask& task) {
                                 {"y_mm", pose.translation_mm.y},
                                 {"theta_rad", pose.theta_rad}}}};
   json.update(to_json(touch.step, task));
+  if (!touch.step.truth.label.empty()) {
+    json["truth"] = truth_to_json(touch.step.truth);
+  }
   json["latency_ms"] = touch.latency_ms;
   json["frames_lost"] = touch.frames_lost;
   // A label need not be UTF-8, as JSON must.
   return json.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
 }
 
+// Lines are printed as touches come, so columns cannot be as wide as their content.
 std::string table_heading() {
-  return "unknown  touch  best       probability     x mm     y mm  theta deg  error mm  latency "
-         "ms";
+  return fmt::format("{:>7}  {:>5}  {:<10}  {:>5}  {:>14}  {:>14}  {:>15}  {:>8}  {:>10}  fit",
+                     "unknown", "touch", "best", "prob.", "x mm", "y mm", "theta deg", "error mm",
+                     "latency ms");
 }
 
 std::string table_line(const LiveTouch& touch, const RecognitionTask& task) {
   const RecognitionStep& step = touch.step;
-  const Pose& T = step.pose();
-  return fmt::format("{:>7}  {:>5}  {:<10} {:>11.6f} {:>8.2f} {:>8.2f} {:>10.1f}  {:>8}  {:>10.2f}",
-                     touch.unknown + 1, touch.index + 1, printable(task.labels[step.best]),
-                     step.identity[step.best], T.translation_mm.x, T.translation_mm.y,
-                     degrees(T.theta_rad), error_text(step.pose_error_mm()), touch.latency_ms);
+  const std::array<std::string, 3> pose = pose_cells(pose_text(step));
+  const std::string fit = fit_word(step);
+  return fmt::format("{:>7}  {:>5}  {:<10}  {:>5.3f}  {:>14}  {:>14}  {:>15}  {:>8}  {:>10.2f}  {}",
+                     touch.unknown + 1, touch.index + 1, object_words(step, task),
+                     step.confidence(), pose[0], pose[1], pose[2], error_text(step.pose_error_mm()),
+                     touch.latency_ms, fit.empty() ? "-" : fit);
 }
 
 std::string summary(const LiveState& state, std::vector<double> latencies_ms,
                     const RecognitionTask& task) {
-  std::string text = fmt::format("{} touches, {} frames, {} lost", state.all_touches,
-                                 state.counters.frames, state.counters.lost);
+  std::string text;
+  if (state.last) {
+    const RecognitionStep& step = state.last->step;
+    text += result_words(step, task) + "\n";
+    std::vector<std::string> more{truth_words(step, task),
+                                  misfit_sentence(step, state.touches, task)};
+    more.insert(more.end(), step.warnings.begin(), step.warnings.end());
+    for (const std::string& words : more) {
+      text += words.empty() ? "" : printable(words) + "\n";
+    }
+  }
+  text += fmt::format("{} touches, {} frames, {} lost", state.all_touches, state.counters.frames,
+                      state.counters.lost);
   if (state.counters.reconnects > 0) {
     text += fmt::format(", the board came back {} times", state.counters.reconnects);
   }
@@ -68,14 +86,6 @@ std::string summary(const LiveState& state, std::vector<double> latencies_ms,
     std::nth_element(latencies_ms.begin(), middle, latencies_ms.end());
     text += fmt::format("from frame to estimate: median {:.2f} ms, worst {:.2f} ms\n", *middle,
                         state.worst_latency_ms);
-  }
-  if (state.last) {
-    const RecognitionStep& step = state.last->step;
-    const Pose& T = step.pose();
-    text += fmt::format("{} ({:.1f} %); {} at x {:.2f} mm, y {:.2f} mm, theta {:.1f} deg\n",
-                        printable(task.labels[step.best]), 100.0 * step.identity[step.best],
-                        printable(task.labels[task.label_of[step.mode.object]]), T.translation_mm.x,
-                        T.translation_mm.y, degrees(T.theta_rad));
   }
   return text;
 }

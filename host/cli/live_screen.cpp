@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "evidence_scale.hpp"
+#include "step_words.hpp"
 
 namespace palpate::cli {
 
@@ -75,6 +76,9 @@ void LiveScreen::describe(const LiveState& state) {
       view_.full_scale = std::max(view_.full_scale, pressure);
     }
   }
+  view_.pose.clear();
+  view_.truth.clear();
+  view_.notes.clear();
   view_.identity.clear();
   view_.map = nullptr;
   view_.latency_ms.reset();
@@ -87,12 +91,18 @@ void LiveScreen::describe(const LiveState& state) {
     view_.state += "; no map fits these touches";
     view_.warning = true;
   }
+  view_.object = identity_words(step, task_);
+  view_.pose = pose_words(pose_text(step));
+  view_.truth = truth_words(step, task_);
+  if (const auto misfit = misfit_sentence(step, state.touches, task_); !misfit.empty()) {
+    view_.notes.push_back(misfit);
+  } else if (step.fit) {
+    view_.state += "; " + fit_word(step);
+  }
+  view_.notes.insert(view_.notes.end(), step.warnings.begin(), step.warnings.end());
   view_.identity = step.identity;
   view_.map = &task_.hypotheses[step.mode.object].map;
   view_.T_object_robot = step.pose();
-  if (const auto error_mm = step.pose_error_mm()) {
-    view_.state += fmt::format("; error {:.2f} mm", *error_mm);
-  }
   view_.latency_ms = state.last->latency_ms;
   view_.worst_latency_ms = state.worst_latency_ms;
   place_array(state);

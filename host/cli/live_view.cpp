@@ -8,7 +8,7 @@
 
 #include "array_picture.hpp"
 #include "evidence_scale.hpp"
-#include "options.hpp"
+#include "text_table.hpp"
 
 namespace palpate::cli {
 
@@ -83,18 +83,12 @@ double evidence_at(const OccupancyGrid& map, const glm::dvec2& p_mm) {
   return map.at(i, j) - map.prior_log_odds();
 }
 
-std::string pose_text(const LiveView& view) {
-  const Pose& T = view.T_object_robot;
-  return fmt::format("{}  x {:.2f} mm  y {:.2f} mm  theta {:.1f} deg", view.map->label,
-                     T.translation_mm.x, T.translation_mm.y, degrees(T.theta_rad));
-}
-
 void draw_map(TerminalCanvas& canvas, const Panel& panel, const LiveView& view) {
   if (view.map == nullptr) {
     canvas.text(panel.column, panel.row, "no touch yet", true);
     return;
   }
-  canvas.text(panel.column, panel.row, pose_text(view), true);
+  canvas.text(panel.column, panel.row, "the array on the map of " + view.map->label, true);
   const OccupancyGrid& map = *view.map;
   const bool with_array = view.T_robot_sensor && view.readings.size() == view.elements_mm.size() &&
                           !view.elements_mm.empty();
@@ -160,15 +154,35 @@ void draw_identity(TerminalCanvas& canvas, const Panel& panel, const LiveView& v
   }
 }
 
-void draw_status(TerminalCanvas& canvas, const LiveView& view) {
-  std::string status = fmt::format("{}  {:.0f} Hz  {} frames, {} lost", view.sensor, view.rate_hz,
+/// Draws the result first, then what there is to say of it, the state and the stream. Returns the
+/// number of rows.
+int draw_words(TerminalCanvas& canvas, const LiveView& view, int columns) {
+  constexpr std::size_t most_notes = 3;
+  std::string stream = fmt::format("{}  {:.0f} Hz  {} frames, {} lost", view.sensor, view.rate_hz,
                                    view.frames, view.lost);
   if (view.latency_ms && view.worst_latency_ms) {
-    status +=
+    stream +=
         fmt::format("  latency {:.1f} ms, worst {:.1f}", *view.latency_ms, *view.worst_latency_ms);
   }
-  canvas.text(0, 0, status);
-  canvas.text(0, 1, view.state, view.warning);
+  int row = 0;
+  const auto add = [&](const std::string& words, bool strong) {
+    if (!words.empty()) {
+      canvas.text(0, row++, words, strong);
+    }
+  };
+  if (!view.pose.empty()) {
+    // A long label leaves the pose its room.
+    const int room = columns - static_cast<int>(view.pose.size()) - 2;
+    const std::size_t object = static_cast<std::size_t>(std::max(room, 0));
+    add((room > 0 ? shorten_middle(view.object, object) + ": " : "") + view.pose, true);
+  }
+  add(view.truth, false);
+  for (std::size_t i = 0; i < std::min(view.notes.size(), most_notes); ++i) {
+    add(view.notes[i], true);
+  }
+  add(view.state, view.warning);
+  add(stream, false);
+  return row;
 }
 
 }  // namespace
@@ -176,18 +190,14 @@ void draw_status(TerminalCanvas& canvas, const LiveView& view) {
 std::vector<std::string> draw(const LiveView& view, int columns, int rows,
                               TerminalColours colours) {
   constexpr int least_columns = 44;
-  constexpr int least_rows = 14;
+  constexpr int least_body = 9;
   constexpr int gap = 2;
   TerminalCanvas canvas(columns, rows);
-  draw_status(canvas, view);
-  if (columns < least_columns || rows < least_rows) {
-    if (view.map != nullptr) {
-      canvas.text(0, 2, pose_text(view), true);
-    }
-    draw_identity(canvas, {0, 3, columns, rows - 3}, view);
+  const int top = draw_words(canvas, view, columns) + 1;
+  if (columns < least_columns || rows - top - 2 < least_body) {
+    draw_identity(canvas, {0, top, columns, rows - top}, view);
     return canvas.lines(colours);
   }
-  const int top = 3;
   const int body = rows - top - 2;
   const int left = std::clamp(columns * 2 / 5, 20, 60);
   const int bars = std::min(static_cast<int>(view.labels.size()), std::max(3, body / 2));

@@ -16,6 +16,10 @@ namespace palpate::cli {
 
 /// What `live` shows on a terminal.
 struct LiveView {
+  std::string object;              ///< the object and its probability
+  std::string pose;                ///< T_robot_object in words; "" before the first touch
+  std::string truth;               ///< the same of the truth, and the error; "" where unknown
+  std::vector<std::string> notes;  ///< what is wrong with the touches
   std::string sensor;
   double rate_hz = 0.0;
   std::uint64_t frames = 0;

@@ -59,6 +59,9 @@ void add_recognition_flags(CLI::App& command, RecognitionFlags& flags) {
           "[default: none]")
       ->check(require_whole_number);
   command.add_option("--device", flags.device, "Vulkan device, by index or a part of its name");
+  command.add_flag("--verbose", flags.verbose,
+                   "Say on standard error how the device works: its memory, the likelihood's path, "
+                   "the lattice, the seconds it took");
 }
 
 }  // namespace palpate::cli

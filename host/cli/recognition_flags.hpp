@@ -36,6 +36,7 @@ struct RecognitionFlags {
   bool augmented = false;
   std::optional<std::uint64_t> seed;
   std::string device;
+  bool verbose = false;
 };
 
 void add_recognition_flags(CLI::App& command, RecognitionFlags& flags);

@@ -1,6 +1,7 @@
 #include "commands.hpp"
 
-#include <cmath>
+#include <unistd.h>
+
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -12,13 +13,15 @@
 
 #include "atomic_file.hpp"
 #include "command_files.hpp"
-#include "figures.hpp"
 #include "options.hpp"
 #include "palpate/files.hpp"
 #include "progress.hpp"
 #include "recognition_flags.hpp"
 #include "record_output.hpp"
+#include "record_table.hpp"
 #include "recordings.hpp"
+#include "sheet.hpp"
+#include "terminal.hpp"
 
 namespace palpate::cli {
 
@@ -122,44 +125,6 @@ void check_outputs(const Options& options, const Scene& scene, const Recognition
   }
 }
 
-/// Edge of the squares that stand for elements, mm: 90 % of the pitch, at most 1.8 mm.
-double element_edge_mm(const Touch& touch) {
-  const glm::dvec2& first = touch.elements_mm.front();
-  double nearest = 2.0;
-  for (const glm::dvec2& other : touch.elements_mm.subspan(1)) {
-    nearest = std::min(nearest, std::hypot(other.x - first.x, other.y - first.y));
-  }
-  return 0.9 * nearest;
-}
-
-std::string draw_sheet(const RecognitionRecord& record, const Unknown& unknown,
-                       const RecognitionTask& task, const Recogniser& recogniser) {
-  const RecognitionStep& last = record.last();
-  RecognitionSheet sheet;
-  sheet.title = name_of(record);
-  sheet.map = task.hypotheses[last.mode.object].map;
-  sheet.element_mm = element_edge_mm(unknown.touches.front());
-  sheet.T_object_robot = last.mode.T_object_robot;
-  sheet.none = task.labels[last.best] == none_label;
-  sheet.true_object = record.true_label;
-  if (last.error_mm) {
-    sheet.truth = unknown.truth.T_object_robot;
-    sheet.error_mm = last.error_mm;
-  }
-  sheet.belief = recogniser.marginals(last.mode.object);
-  sheet.labels = task.labels;
-  for (const Touch& touch : unknown.touches) {
-    auto& footprint = sheet.footprints_mm.emplace_back();
-    for (const glm::dvec2& element : touch.elements_mm) {
-      footprint.push_back(touch.T_robot_sensor * element);
-    }
-  }
-  for (const RecognitionStep& step : record.trace) {
-    sheet.identity.push_back(step.identity);
-  }
-  return draw_recognition(sheet);
-}
-
 void export_posterior(const std::filesystem::path& path, const RecognitionTask& task,
                       const PoseHistogram& histogram) {
   std::vector<std::string> labels;
@@ -223,8 +188,10 @@ void recognize(const Options& options) {
       show(0.0);
       json.push_back(to_json(records.back(), task, device.name(), options.trace));
       if (!options.png.empty()) {
-        write_file(png_path(options, unknown),
-                   draw_sheet(records.back(), unknown, task, recogniser));
+        write_file(
+            png_path(options, unknown),
+            draw_recognition(sheet_of(records.back(), unknown, task,
+                                      recogniser.marginals(records.back().last().mode.object))));
       }
     }
   }
@@ -237,15 +204,22 @@ void recognize(const Options& options) {
   if (options.json == "-") {
     fmt::print("{}", json_text);
   } else {
-    fmt::print("{}: {} maps, {}\n\n", device.name(), task.hypotheses.size(),
-               filter_words(recogniser, task));
+    const std::optional<int> columns = terminal_columns(STDOUT_FILENO);
     if (options.trace) {
       for (const RecognitionRecord& record : records) {
-        print_trace(record, task);
+        fmt::print("{}\n", trace_table(record, task, columns));
       }
-      fmt::print("\n");
     }
-    print_table(records, task);
+    fmt::print("{}{}\n", result_table(records, task, options.recognition.verbose, columns),
+               setup_words(device, task));
+  }
+  if (options.recognition.verbose) {
+    double seconds = 0.0;
+    for (const RecognitionRecord& record : records) {
+      seconds += record.seconds;
+    }
+    print_engine(device, recogniser, task);
+    fmt::print(stderr, "seconds: {:.3f} to recognise\n", seconds);
   }
 }
 
@@ -254,8 +228,9 @@ void recognize(const Options& options) {
 void add_recognize(CLI::App& app) {
   auto* command = app.add_subcommand(
       "recognize",
-      "Recognise the object of each recording among known maps and find its pose "
-      "T_object_robot: p_object = R(theta) p_robot + (x, y)");
+      "Recognise the object of each recording among known maps and find its pose in the robot "
+      "frame, T_robot_object: p_robot = R(theta) p_object + (x, y), with one standard deviation. "
+      "The JSON file has T_object_robot as well");
   const auto options = std::make_shared<Options>();
   command->add_option("RECORDING", options->recordings, "Recordings of unknown objects (HDF5)")
       ->required();

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cctype>
+#include <charconv>
 #include <cstdlib>
 #include <string_view>
 
@@ -48,6 +49,17 @@ TerminalColours terminal_colours() {
   }
   return environment("TERM").find("256color") != std::string::npos ? TerminalColours::palette
                                                                    : TerminalColours::none;
+}
+
+std::optional<int> terminal_columns(int output) {
+  if (::isatty(output) == 0) {
+    return {};
+  }
+  const std::string wish = environment("COLUMNS");
+  int columns = 0;
+  const auto [end, error] = std::from_chars(wish.data(), wish.data() + wish.size(), columns);
+  const bool given = error == std::errc{} && end == wish.data() + wish.size() && columns > 0;
+  return given ? columns : Terminal::size_of(output).columns;
 }
 
 Terminal::Terminal(int output, int input) : output_(output), input_(input) {

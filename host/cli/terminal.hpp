@@ -15,6 +15,10 @@ TerminalColours terminal_colours();
 /// Whether the terminal can move the cursor; not so with TERM=dumb or without TERM.
 bool terminal_moves_cursor();
 
+/// Columns of the terminal that a file descriptor belongs to, by COLUMNS or its window; none where
+/// it is no terminal.
+std::optional<int> terminal_columns(int output);
+
 /// Draws on the whole screen of a terminal and reads its keys. During its lifetime the cursor is
 /// hidden; the destructor shows the former screen again. Only one object may exist at a time.
 class Terminal {

@@ -19,17 +19,20 @@ std::string draw_maps(std::span<const OccupancyGrid> maps);
 
 /// Contents of one recognised object's sheet.
 struct RecognitionSheet {
-  std::string title;                                   ///< such as the recording's file name
+  struct Caption {
+    std::string text;
+    bool alarm = false;  ///< in red
+  };
+  std::string title;   ///< such as the recording's file name
+  std::string result;  ///< the object and its pose in words; stands first, in large letters
+  std::vector<Caption> captions = {};                  ///< below; the first four are drawn
   OccupancyGrid map;                                   ///< of the estimated object
   std::vector<std::vector<glm::dvec2>> footprints_mm;  ///< [touch][element] in the robot frame
   double element_mm = 1.8;                             ///< edge at which an element is drawn
   Pose T_object_robot;                                 ///< estimated
-  bool none = false;          ///< "none of these" is more probable than the map's object
-  std::string true_object;    ///< label, "" where it is unknown
-  std::optional<Pose> truth;  ///< T_object_robot, if known and the identity is right
-  std::optional<double> error_mm;
-  Marginals belief;                           ///< of the estimated object
-  std::vector<std::string> labels;            ///< [object]; equal labels are drawn as one, summed
+  std::optional<Pose> truth;        ///< T_object_robot, if known and the identity is right
+  Marginals belief;                 ///< of the estimated object
+  std::vector<std::string> labels;  ///< [object]; equal labels are drawn as one, summed
   std::vector<std::vector<double>> identity;  ///< [touch][object] probability after each touch
 };
 

@@ -29,7 +29,7 @@ constexpr double margin_px = 40.0;
 constexpr double side_px = 480.0;  ///< of every panel's plot
 constexpr double axis_px = 84.0;   ///< to the left of every plot
 constexpr double gap_px = 40.0;    ///< between a plot and the next one's axis
-constexpr double top_px = 200.0;   ///< of the plots
+constexpr double top_px = 256.0;   ///< of the plots
 constexpr double bar_top_px = top_px + side_px + 104.0;
 constexpr double bar_height_px = 20.0;
 constexpr double height_px = bar_top_px + 96.0;
@@ -96,31 +96,34 @@ class Legend {
   double x_;
 };
 
-std::string headline(const RecognitionSheet& sheet) {
-  std::string text = (sheet.none ? "estimated (none), most like " : "estimated ") + sheet.map.label;
-  const std::string& truth = sheet.true_object;
-  if (!truth.empty()) {
-    text += ", true " + truth;
+/// Draws the result in words with the title at its right, and the captions below.
+void draw_captions(Canvas& canvas, const RecognitionSheet& sheet) {
+  constexpr Font result{.size_px = 28.0, .bold = true};
+  constexpr double first_px = 52.0;
+  constexpr double below_px = 36.0;  ///< from the result to the first caption
+  constexpr double row_px = 28.0;    ///< from caption to caption
+  constexpr std::size_t most_captions = 4;
+  constexpr double room_px = width_px - 2 * margin_px;
+  const std::string words = canvas.fit(sheet.result, 0.8 * room_px, result);
+  canvas.text(words, {margin_px, first_px}, result);
+  const double left_px = room_px - canvas.text_width(words, result) - margin_px;
+  canvas.text(canvas.fit(sheet.title, left_px, heading), {width_px - margin_px, first_px}, heading,
+              Align::right);
+  double row = first_px + below_px;
+  for (std::size_t i = 0; i < std::min(sheet.captions.size(), most_captions); ++i, row += row_px) {
+    const RecognitionSheet::Caption& caption = sheet.captions[i];
+    canvas.text(canvas.fit(caption.text, room_px, body), {margin_px, row}, body, Align::left,
+                caption.alarm ? alarm : ink);
   }
-  if (sheet.error_mm) {
-    text += fmt::format(", error {:.2f} mm", *sheet.error_mm);
-  }
-  return text;
 }
 
-/// Returns the true pose nearest in angle to the estimate, among those that the object's symmetry
-/// makes equal: the pose that the pose error compares with.
+/// Returns the true pose that the pose error compares with.
 std::optional<Pose> nearest_truth(const RecognitionSheet& sheet) {
-  const int symmetry = sheet.map.symmetry;
-  if (!sheet.truth || symmetry == 1) {
+  if (!sheet.truth || sheet.map.symmetry == 1) {
     return sheet.truth;
   }
-  double turn_rad = sheet.T_object_robot.theta_rad - sheet.truth->theta_rad;
-  if (symmetry > 0) {
-    turn_rad -= wrap_angle(turn_rad, 2.0 * std::numbers::pi / symmetry);
-  }
-  const glm::dvec2 centroid = body_of(sheet.map).centroid_mm;
-  return Pose{centroid - rotate(turn_rad, centroid), turn_rad} * *sheet.truth;
+  return nearest_equal_pose(body_of(sheet.map), sheet.map.symmetry, sheet.T_object_robot,
+                            *sheet.truth);
 }
 
 std::string meaning_of_truth(const RecognitionSheet& sheet, const std::string& meaning) {
@@ -286,15 +289,7 @@ void draw_belief(Canvas& canvas, const RecognitionSheet& sheet) {
 std::string draw_recognition(const RecognitionSheet& sheet) {
   validate(sheet);
   Canvas canvas(static_cast<int>(width_px), static_cast<int>(height_px));
-  constexpr Font title{.size_px = 28.0, .bold = true};
-  constexpr Font result{.size_px = 24.0};
-  const double room = width_px - 2 * margin_px;
-  canvas.text(canvas.fit(sheet.title, room, title), {margin_px, 58.0}, title);
-  const bool wrong = !sheet.true_object.empty() &&
-                     (sheet.none ? std::ranges::count(sheet.labels, sheet.true_object) > 0
-                                 : sheet.true_object != sheet.map.label);
-  canvas.text(canvas.fit(headline(sheet), room, result), {margin_px, 96.0}, result, Align::left,
-              wrong ? alarm : ink);
+  draw_captions(canvas, sheet);
   draw_touches(canvas, sheet);
   draw_belief(canvas, sheet);
   draw_title(canvas, plot(2), "What is it? Belief over identity");

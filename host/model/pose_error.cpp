@@ -42,6 +42,16 @@ Body body_of(const OccupancyGrid& map) {
   return body;
 }
 
+Pose nearest_equal_pose(const Body& body, int symmetry, const Pose& T_object_robot_estimate,
+                        const Pose& T_object_robot_truth) {
+  double turn_rad = T_object_robot_estimate.theta_rad - T_object_robot_truth.theta_rad;
+  if (symmetry > 0) {
+    turn_rad -= wrap_angle(turn_rad, 2.0 * std::numbers::pi / symmetry);
+  }
+  return Pose{body.centroid_mm - rotate(turn_rad, body.centroid_mm), turn_rad} *
+         T_object_robot_truth;
+}
+
 double pose_error_mm(const Body& body, int symmetry, const Pose& T_object_robot_estimate,
                      const Pose& T_object_robot_truth) {
   const glm::dvec2 shift = inverse(T_object_robot_estimate) * body.centroid_mm -

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <numbers>
 
 #include <fmt/format.h>
 
@@ -30,7 +31,30 @@ double seconds_since(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
+/// T_robot_object from T_object_robot, theta in [-pi, pi).
+Pose robot_pose(const Pose& T_object_robot) {
+  Pose T_robot_object = inverse(T_object_robot);
+  T_robot_object.theta_rad = wrap_angle(T_robot_object.theta_rad, 2.0 * std::numbers::pi);
+  return T_robot_object;
+}
+
 }  // namespace
+
+Pose RecognitionStep::T_robot_object() const { return robot_pose(pose()); }
+
+Pose RecognitionStep::mode_T_robot_object() const { return robot_pose(mode.T_object_robot); }
+
+std::optional<std::array<double, 3>> RecognitionStep::sd() const {
+  return refined ? std::optional(inverse(*refined).sd()) : std::nullopt;
+}
+
+std::optional<Pose> RecognitionStep::true_T_robot_object(const RecognitionTask& task) const {
+  if (!error_mm) {
+    return {};
+  }
+  const OccupancyGrid& map = task.hypotheses[mode.object].map;
+  return robot_pose(nearest_equal_pose(body_of(map), map.symmetry, pose(), *truth.T_object_robot));
+}
 
 GroundTruth ground_truth(const std::string& object, const std::optional<Truth>& truth) {
   return truth ? GroundTruth{truth->object, truth->T_object_robot} : GroundTruth{object, {}};
@@ -65,7 +89,8 @@ RecognitionStep judge(const Estimate& estimate, const GroundTruth& truth,
   RecognitionStep step{.identity = std::vector<double>(labels.size()),
                        .mode = estimate.mode,
                        .refined = {},
-                       .contradicted = estimate.contradicted};
+                       .contradicted = estimate.contradicted,
+                       .truth = truth};
   for (std::size_t i = 0; i < estimate.identity.size(); ++i) {
     step.identity[task.label_of[i]] += estimate.identity[i];
   }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <functional>
 #include <optional>
@@ -52,6 +53,7 @@ struct RecognitionStep {
   Mode mode;
   std::optional<RefinedPose> refined;  ///< empty for particles
   bool contradicted = false;           ///< see Estimate
+  GroundTruth truth = {};
   /// Whether `best` is the true label, where that label is known. "(none)" is right where no map
   /// has the true label.
   std::optional<bool> right;
@@ -70,6 +72,15 @@ struct RecognitionStep {
   const Pose& pose() const { return refined ? refined->T_object_robot : mode.T_object_robot; }
   /// The error of pose(), mm.
   std::optional<double> pose_error_mm() const { return refined ? refined_error_mm : error_mm; }
+  /// The inverse of pose(), for a robot to act on; theta in [-pi, pi).
+  Pose T_robot_object() const;
+  /// The same of the mode.
+  Pose mode_T_robot_object() const;
+  /// Standard deviations of T_robot_object(), in mm, mm and rad; empty for particles.
+  std::optional<std::array<double, 3>> sd() const;
+  /// The true T_robot_object, of those that the object's symmetry makes equal the nearest to
+  /// T_robot_object(); theta in [-pi, pi). Only where there is an error.
+  std::optional<Pose> true_T_robot_object(const RecognitionTask& task) const;
 };
 
 /// The result for one unknown: its steps, or the error that prevented them.

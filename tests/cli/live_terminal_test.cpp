@@ -33,9 +33,11 @@ const std::string leave = "\033[?25h\033[?1049l";
 TEST_F(LiveTerminal, ShowsThePictureUntilCtrlC) {
   ProgramOnTerminal program(folder_.path(), endless(), utf8_colours);
   ASSERT_TRUE(program.shows(enter));
+  ASSERT_TRUE(program.shows(" deg"));  // the pose in the robot frame
+  ASSERT_TRUE(program.shows("truth: E at x "));
   ASSERT_TRUE(program.shows("unknown 1, 1 touches"));
   ASSERT_TRUE(program.shows("pressure, 0 to "));
-  ASSERT_TRUE(program.shows("theta "));  // the pose, over the map
+  ASSERT_TRUE(program.shows("the array on the map of "));
   ASSERT_TRUE(program.shows("\033[38;2;"));
   ASSERT_TRUE(program.shows("identity"));
   ASSERT_TRUE(program.shows(" %"));

@@ -10,6 +10,7 @@
 #include <cmath>
 #include <csignal>
 #include <fstream>
+#include <numbers>
 #include <sstream>
 #include <thread>
 
@@ -257,6 +258,42 @@ TEST_F(Live, PrintsALineForEachTouch) {
   EXPECT_NE(out.find("4 touches"), std::string::npos) << out;
   EXPECT_NE(out.find(" 0 lost"), std::string::npos) << out;
   EXPECT_NE(out.find("from frame to estimate: median "), std::string::npos) << out;
+}
+
+// The table of a stream, the trace and the table of the touches found in it.
+TEST_F(Live, SaysThePoseThatRecognizeSays) {
+  done({"record", "--sensor", unknown_e, "-o", "frames.h5"});
+  done({"touches", "frames.h5", "-o", "touches.h5"});
+  const std::string live_out = done(live("replay:frames.h5,speed=max"));
+  const Arguments call{"touches.h5", "--maps", "A.map.h5", "E.map.h5", "--bins", "20x20x24"};
+  const nlohmann::json r = record(call);
+  Arguments shown = call;
+  shown.insert(shown.begin(), "recognize");
+  shown.emplace_back("--trace");
+  const std::string recognize_out = done(shown);
+  const std::vector<double> pose = r.at("refined").at("T_robot_object");
+  const std::vector<double> sd = r.at("refined").at("sd");
+  const auto in = [&](std::size_t i, const char* between) {
+    const double unit = i < 2 ? 1.0 : 180.0 / std::numbers::pi;
+    return fmt::format("{:.2f}{}+-{:.2f}", pose[i] * unit, between, sd[i] * unit);
+  };
+  for (const std::string& out : {live_out, recognize_out}) {
+    for (std::size_t i = 0; i < 3; ++i) {
+      EXPECT_NE(out.find(" " + in(i, "")), std::string::npos) << in(i, "") << " not in\n" << out;
+    }
+  }
+  EXPECT_NE(
+      live_out.find(fmt::format("\nE ({:.1f} %): x {} mm, y {} mm, theta {} deg\ntruth: E at ",
+                                100.0 * r.at("identity").at("E").get<double>(), in(0, " "),
+                                in(1, " "), in(2, " "))),
+      std::string::npos)
+      << live_out;
+  // The trace and the end of the stream say the same of the truth.
+  const std::string truth = recognize_out.substr(recognize_out.find("truth: E at "));
+  EXPECT_NE(live_out.find(truth.substr(0, truth.find('\n') + 1)), std::string::npos) << live_out;
+  EXPECT_NE(truth.find(fmt::format("; error {:.2f} mm\n", r.at("refined_error_mm").get<double>())),
+            std::string::npos)
+      << truth;
 }
 
 TEST_F(Live, TakesTheFlagsOfRecognize) {

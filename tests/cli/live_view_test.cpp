@@ -14,6 +14,8 @@ namespace {
 
 LiveView sample_view(const OccupancyGrid& map) {
   LiveView view;
+  view.object = "E (75.2 %)";
+  view.pose = "x -9.87 +-0.25 mm, y 0.85 +-1.20 mm, theta -78.75 +-6.50 deg";
   view.sensor = "TakkTile 0012";
   view.state = "unknown 1, 3 touches";
   view.keys = "Ctrl-C: end";
@@ -80,12 +82,31 @@ TEST(LiveView, FitsWindowsOfAnySize) {
   }
 }
 
+TEST(LiveView, SaysThePoseFirstThenTheTruthAndWhatIsWrong) {
+  const OccupancyGrid map = sample_map("E");
+  LiveView view = sample_view(map);
+  view.truth = "truth: E at x -9.94 mm, y 0.79 mm, theta -79.51 deg; error 0.15 mm";
+  view.notes = {"unlike E: its 3 touches fit 11 standard deviations worse", "one", "two", "three"};
+  for (const int rows : {8, 24}) {  // without and with pictures
+    const auto lines = draw(view, 80, rows, TerminalColours::none);
+    EXPECT_EQ(lines[0], "E (75.2 %): " + view.pose);
+    EXPECT_EQ(lines[1], view.truth);
+    EXPECT_EQ(lines[2], view.notes[0]);
+    EXPECT_EQ(lines[4], "two") << "three notes leave room for the pictures";
+    EXPECT_EQ(lines[5], view.state);
+    EXPECT_TRUE(lines[6].starts_with("TakkTile 0012")) << joined(lines);
+  }
+  view.object = "a label that is far too long to be shown (75.2 %)";
+  const std::string first = draw(view, 80, 24, TerminalColours::none)[0];
+  EXPECT_EQ(first, "a label ...75.2 %): " + view.pose);
+}
+
 TEST(LiveView, DrawsTheArrayAsItLies) {
   const OccupancyGrid map = sample_map("E");
   const LiveView view = sample_view(map);
   const auto lines = draw(view, 80, 24, TerminalColours::none);
   // Below the heading: elements at the top left and right, at the bottom only the dead one.
-  const std::string top = lines[4].substr(0, 32);
+  const std::string top = lines[5].substr(0, 32);
   EXPECT_EQ(top.find('@'), 0u) << joined(lines);
   EXPECT_EQ(top.find_first_not_of("@ "), std::string::npos) << joined(lines);
   // The last row of it: the first may share its cells with the element above.
@@ -144,7 +165,7 @@ TEST(LiveView, DrawsALargeArrayAtOnce) {
   view.valid.clear();
   view.readings.assign(view.elements_mm.size(), Reading::in_contact);
   const auto lines = draw(view, 80, 24, TerminalColours::none);
-  EXPECT_NE(lines[4].substr(0, 32).find("@@@@"), std::string::npos) << joined(lines);
+  EXPECT_NE(lines[5].substr(0, 32).find("@@@@"), std::string::npos) << joined(lines);
   EXPECT_NE(joined(lines).find("@@@@", 34), std::string::npos);
 }
 

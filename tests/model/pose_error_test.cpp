@@ -130,6 +130,20 @@ TEST(PoseError, SymmetryForgivesItsOwnTurns) {
   EXPECT_NEAR(pose_error_mm(body, 1, turned(2.0 * pi), {}), 0.0, rounding);
 }
 
+TEST(NearestEqualPose, IsNoErrorAwayFromTheTruthAndAtMostHalfATurnOfTheSymmetryFromTheEstimate) {
+  const Body body = body_of(letter_l());
+  const std::vector<Pose> poses = some_poses();
+  for (const int symmetry : {0, 1, 2, 3, 6}) {
+    for (std::size_t i = 0; i + 1 < poses.size(); ++i) {
+      const Pose nearest = nearest_equal_pose(body, symmetry, poses[i], poses[i + 1]);
+      EXPECT_NEAR(pose_error_mm(body, symmetry, nearest, poses[i + 1]), 0.0, rounding);
+      // Compared with the nearest pose, the symmetry has no turn to forgive.
+      EXPECT_NEAR(pose_error_mm(body, 1, poses[i], nearest),
+                  pose_error_mm(body, symmetry, poses[i], poses[i + 1]), rounding);
+    }
+  }
+}
+
 TEST(PoseError, DoesNotDependOnTheRobotFrameNorOnTheOrderOfThePoses) {
   const Body body = body_of(letter_l());
   const std::vector<Pose> poses = some_poses();

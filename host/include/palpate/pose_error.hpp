@@ -23,4 +23,9 @@ Body body_of(const OccupancyGrid& map);
 double pose_error_mm(const Body& body, int symmetry, const Pose& T_object_robot_estimate,
                      const Pose& T_object_robot_truth);
 
+/// Returns the pose nearest in angle to the estimate among those that the symmetry makes equal to
+/// the truth: the pose that pose_error_mm() compares the estimate with.
+Pose nearest_equal_pose(const Body& body, int symmetry, const Pose& T_object_robot_estimate,
+                        const Pose& T_object_robot_truth);
+
 }  // namespace palpate

@@ -1,0 +1,196 @@
+#include "record_table.hpp"
+
+#include <algorithm>
+#include <filesystem>
+#include <map>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "printable.hpp"
+#include "step_words.hpp"
+#include "text_table.hpp"
+
+namespace palpate::cli {
+
+namespace {
+
+using Column = TextTable::Column;
+
+std::string printable_name(const RecognitionRecord& record) { return printable(name_of(record)); }
+
+/// What the labels that were not always right were taken for, most often first.
+std::string confusions(const std::vector<RecognitionRecord>& records, const RecognitionTask& task) {
+  struct Row {
+    int all = 0;
+    int right = 0;
+    std::map<std::string, int> wrong;
+  };
+  std::map<std::string, Row> rows;
+  for (const RecognitionRecord& record : records) {
+    if (const auto right = record.last().right) {
+      Row& row = rows[record.true_label];
+      ++row.all;
+      ++(*right ? row.right : row.wrong[task.labels[record.last().best]]);
+    }
+  }
+  if (std::all_of(rows.begin(), rows.end(),
+                  [](const auto& row) { return row.second.right == row.second.all; })) {
+    return "";
+  }
+  std::string text = fmt::format("\n{:<16} {:>9}  taken for\n", "object", "right");
+  for (const auto& [label, row] : rows) {
+    std::vector<std::pair<int, std::string>> wrong;
+    for (const auto& [other, count] : row.wrong) {
+      wrong.emplace_back(-count, other);
+    }
+    std::sort(wrong.begin(), wrong.end());
+    std::string list;
+    for (const auto& [count, other] : wrong) {
+      list += fmt::format("{}{} {}", list.empty() ? "" : ", ", -count, printable(other));
+    }
+    text += fmt::format("{:<16} {:>4} of {:<2}  {}\n", printable(label), row.right, row.all, list);
+  }
+  return text;
+}
+
+/// Every warning once, after the names of the unknowns that it is of.
+std::string warnings(const std::vector<RecognitionRecord>& records) {
+  constexpr std::size_t most_names = 3;
+  std::vector<std::pair<std::string, std::vector<std::string>>> names_of;  // by warning
+  for (const RecognitionRecord& record : records) {
+    for (const std::string& warning : record.last().warnings) {
+      auto known = std::ranges::find(names_of, warning, &decltype(names_of)::value_type::first);
+      if (known == names_of.end()) {
+        known = names_of.insert(names_of.end(), {warning, {}});
+      }
+      known->second.push_back(printable_name(record));
+    }
+  }
+  std::string text;
+  for (auto& [warning, names] : names_of) {
+    const std::size_t more = names.size() - std::min(names.size(), most_names);
+    names.resize(names.size() - more);
+    text += fmt::format("{}{}: {}\n", fmt::join(names, ", "),
+                        more > 0 ? fmt::format(" and {} more", more) : "", printable(warning));
+  }
+  return text;
+}
+
+/// A line for each thing that is wrong with an unknown.
+std::string complaints(const std::vector<RecognitionRecord>& records, const RecognitionTask& task) {
+  std::string text;
+  for (const RecognitionRecord& record : records) {
+    if (record.last().contradicted) {
+      text += fmt::format(
+          "{}: contradicted: no map explains these touches at any pose tried; the object may be "
+          "unknown, its pose outside the region, or gamma too small\n",
+          printable_name(record));
+    }
+    if (const auto misfit = misfit_sentence(record.last(), record.touches, task); !misfit.empty()) {
+      text += fmt::format("{}: {}\n", printable_name(record), misfit);
+    }
+  }
+  return text + warnings(records);
+}
+
+/// How many unknowns of a known truth are right, and their mean pose errors.
+std::string summary(const std::vector<RecognitionRecord>& records) {
+  int known = 0;
+  int right = 0;
+  int located = 0;
+  double mode_sum = 0.0;
+  double refined_sum = 0.0;
+  for (const RecognitionRecord& record : records) {
+    const RecognitionStep& step = record.last();
+    known += step.right ? 1 : 0;
+    right += step.right.value_or(false) ? 1 : 0;
+    located += step.error_mm ? 1 : 0;
+    mode_sum += step.error_mm.value_or(0.0);
+    refined_sum += step.refined_error_mm.value_or(0.0);
+  }
+  if (known == 0) {
+    return "";
+  }
+  std::string text = fmt::format("{} of {} right ({:.1f} %)", right, known, 100.0 * right / known);
+  if (located > 0) {
+    text += "; mean error of ";
+    if (records.front().last().refined) {
+      text += fmt::format("refined poses {:.2f} mm, of ", refined_sum / located);
+    }
+    text += fmt::format("modes {:.2f} mm", mode_sum / located);
+  }
+  return text + "\n";
+}
+
+}  // namespace
+
+std::string name_of(const RecognitionRecord& record) {
+  const std::string file = std::filesystem::path(record.recording).filename().string();
+  return record.frame ? fmt::format("{} frame {}", file, *record.frame) : file;
+}
+
+std::string trace_table(const RecognitionRecord& record, const RecognitionTask& task,
+                        std::optional<int> columns) {
+  TextTable table({{"  touch", true},
+                   {"best", false, true},
+                   {"prob.", true},
+                   {"x mm", true},
+                   {"y mm", true},
+                   {"theta deg", true},
+                   {"error mm", true},
+                   {"effective particles", true},
+                   {"fit"}});
+  for (std::size_t i = 0; i < record.trace.size(); ++i) {
+    const RecognitionStep& step = record.trace[i];
+    const std::array<std::string, 3> pose = pose_cells(pose_text(step));
+    const auto& particles = step.effective_sample_size;
+    table.add({fmt::format("{}", i + 1), object_words(step, task),
+               fmt::format("{:.3f}", step.confidence()), pose[0], pose[1], pose[2],
+               step.right ? error_text(step.pose_error_mm()) : "",
+               particles ? fmt::format("{:.1f}", *particles) : "", fit_word(step)});
+  }
+  const std::string truth = truth_words(record.last(), task);
+  return printable_name(record) + "\n" + table.text(columns) +
+         (truth.empty() ? "" : "  " + truth + "\n");
+}
+
+std::string result_table(const std::vector<RecognitionRecord>& records, const RecognitionTask& task,
+                         bool with_modes, std::optional<int> columns) {
+  const bool with_fit = std::ranges::any_of(
+      records, [](const RecognitionRecord& record) { return !fit_word(record.last()).empty(); });
+  TextTable table({{"recording", false, true},
+                   {"touches", true},
+                   {"best", false, true},
+                   {"prob.", true},
+                   {"x mm", true},
+                   {"y mm", true},
+                   {"theta deg", true},
+                   {with_fit ? "fit" : ""}});
+  const auto add_pose = [&](const char* what, const std::string& label, const Pose& T_robot_object,
+                            std::optional<double> error_mm) {
+    const PoseText pose = pose_text(T_robot_object);
+    table.add({what, "", label, "", pose.value[0], pose.value[1], pose.value[2],
+               error_mm ? fmt::format("{:.2f} mm off", *error_mm) : ""});
+  };
+  for (const RecognitionRecord& record : records) {
+    const RecognitionStep& step = record.last();
+    const std::array<std::string, 3> pose = pose_cells(pose_text(step));
+    table.add({name_of(record), fmt::format("{}", record.touches), object_words(step, task),
+               fmt::format("{:.3f}", step.confidence()), pose[0], pose[1], pose[2],
+               fit_word(step)});
+    if (with_modes && step.refined) {
+      add_pose("  mode", task.hypotheses[step.mode.object].map.label, step.mode_T_robot_object(),
+               step.error_mm);
+    }
+    if (const std::optional<Pose> truth = step.true_T_robot_object(task)) {
+      add_pose("  truth", step.truth.label, *truth, step.pose_error_mm());
+    } else if (step.right == false) {
+      table.add({"  truth", "", step.truth.label, "", "", "", "", "wrong object"});
+    }
+  }
+  return table.text(columns) + complaints(records, task) + summary(records) +
+         confusions(records, task);
+}
+
+}  // namespace palpate::cli

@@ -1,0 +1,100 @@
+#include "sheet.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "record_table.hpp"
+#include "step_words.hpp"
+#include "text_table.hpp"
+
+namespace palpate::cli {
+
+namespace {
+
+/// Edge of the squares that stand for elements, mm: 90 % of the pitch, at most 1.8 mm.
+double element_edge_mm(const Touch& touch) {
+  const glm::dvec2& first = touch.elements_mm.front();
+  double nearest = 2.0;
+  for (const glm::dvec2& other : touch.elements_mm.subspan(1)) {
+    nearest = std::min(nearest, std::hypot(other.x - first.x, other.y - first.y));
+  }
+  return 0.9 * nearest;
+}
+
+/// The words with the signs of print in the place of those of a terminal.
+std::string printed(std::string words) {
+  for (const auto& [plain, sign] : {std::pair{"+-", "± "}, std::pair{" deg", "°"}}) {
+    for (std::size_t at = words.find(plain); at != words.npos; at = words.find(plain, at)) {
+      words.replace(at, std::string_view(plain).size(), sign);
+    }
+  }
+  return words;
+}
+
+std::vector<RecognitionSheet::Caption> captions(const RecognitionRecord& record,
+                                                const RecognitionTask& task) {
+  const RecognitionStep& last = record.last();
+  std::vector<RecognitionSheet::Caption> lines;
+  const auto add = [&](const std::string& words, bool alarm) {
+    if (!words.empty()) {
+      lines.push_back({words, alarm});
+    }
+  };
+  add(printed(truth_words(last, task)), last.right == false);
+  if (last.refined) {
+    std::string mode = "most probable bin: " + pose_words(pose_text(last.mode_T_robot_object()));
+    mode += last.error_mm ? "; error " + error_text(last.error_mm) + " mm" : "";
+    add(printed(mode), false);
+  }
+  const std::string misfit = misfit_sentence(last, record.touches, task);
+  if (last.contradicted) {
+    add("contradicted: no map explains these touches at any pose tried", true);
+  } else if (misfit.empty()) {
+    const bool doubtful = last.fit && last.fit->verdict == Verdict::doubtful;
+    add(last.fit ? fmt::format("fit: {} (z {:.1f})", fit_word(last), last.fit->z) : "", doubtful);
+  } else {
+    add(misfit, true);
+  }
+  if (!last.warnings.empty()) {
+    const std::size_t more = last.warnings.size() - 1;
+    add((more > 0 ? fmt::format("(1 of {}) ", more + 1) : "") + last.warnings.front(), true);
+  }
+  return lines;
+}
+
+}  // namespace
+
+RecognitionSheet sheet_of(const RecognitionRecord& record, const Unknown& unknown,
+                          const RecognitionTask& task, Marginals belief) {
+  const RecognitionStep& last = record.last();
+  RecognitionSheet sheet;
+  sheet.title = name_of(record);
+  // A long label must leave the pose its room.
+  constexpr std::size_t longest_identity = 32;
+  sheet.result = shorten_middle(identity_words(last, task), longest_identity) + ": " +
+                 printed(pose_words(pose_text(last))) + " in the robot frame";
+  sheet.captions = captions(record, task);
+  sheet.map = task.hypotheses[last.mode.object].map;
+  sheet.element_mm = element_edge_mm(unknown.touches.front());
+  sheet.T_object_robot = last.pose();
+  if (last.error_mm) {
+    sheet.truth = last.truth.T_object_robot;
+  }
+  sheet.belief = std::move(belief);
+  sheet.labels = task.labels;
+  for (const Touch& touch : unknown.touches) {
+    auto& footprint = sheet.footprints_mm.emplace_back();
+    for (const glm::dvec2& element : touch.elements_mm) {
+      footprint.push_back(touch.T_robot_sensor * element);
+    }
+  }
+  for (const RecognitionStep& step : record.trace) {
+    sheet.identity.push_back(step.identity);
+  }
+  return sheet;
+}
+
+}  // namespace palpate::cli

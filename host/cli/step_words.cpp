@@ -1,0 +1,120 @@
+#include "step_words.hpp"
+
+#include <cmath>
+
+#include <fmt/format.h>
+
+#include "options.hpp"
+#include "printable.hpp"
+
+namespace palpate::cli {
+
+namespace {
+
+/// Two decimals, without the sign of "-0.00".
+std::string two_decimals(double value) {
+  const std::string text = fmt::format("{:.2f}", value);
+  return text == "-0.00" ? "0.00" : text;
+}
+
+/// The label of the object that the pose belongs to.
+const std::string& posed_label(const RecognitionStep& step, const RecognitionTask& task) {
+  return task.labels[task.label_of[static_cast<std::size_t>(step.mode.object)]];
+}
+
+}  // namespace
+
+PoseText pose_text(const Pose& T_robot_object, const std::optional<std::array<double, 3>>& sd) {
+  PoseText text{.value = {two_decimals(T_robot_object.translation_mm.x),
+                          two_decimals(T_robot_object.translation_mm.y),
+                          two_decimals(degrees(T_robot_object.theta_rad))},
+                .sd = {}};
+  if (sd) {
+    text.sd = {two_decimals((*sd)[0]), two_decimals((*sd)[1]), two_decimals(degrees((*sd)[2]))};
+  }
+  return text;
+}
+
+PoseText pose_text(const RecognitionStep& step) {
+  return pose_text(step.T_robot_object(), step.sd());
+}
+
+std::array<std::string, 3> pose_cells(const PoseText& pose) {
+  std::array<std::string, 3> cells = pose.value;
+  for (std::size_t k = 0; k < cells.size(); ++k) {
+    cells[k] += pose.sd[k].empty() ? "" : "+-" + pose.sd[k];
+  }
+  return cells;
+}
+
+std::string pose_words(const PoseText& pose) {
+  const auto with_sd = [&](std::size_t k) {
+    return pose.sd[k].empty() ? pose.value[k] : pose.value[k] + " +-" + pose.sd[k];
+  };
+  return fmt::format("x {} mm, y {} mm, theta {} deg", with_sd(0), with_sd(1), with_sd(2));
+}
+
+std::string object_words(const RecognitionStep& step, const RecognitionTask& task) {
+  const std::string& best = task.labels[step.best];
+  const std::string& posed = posed_label(step, task);
+  return printable(best == posed ? best : fmt::format("{}, pose of {}", best, posed));
+}
+
+std::string identity_words(const RecognitionStep& step, const RecognitionTask& task) {
+  return fmt::format("{} ({:.1f} %)", object_words(step, task), 100.0 * step.confidence());
+}
+
+std::string result_words(const RecognitionStep& step, const RecognitionTask& task) {
+  return identity_words(step, task) + ": " + pose_words(pose_text(step));
+}
+
+std::string truth_words(const RecognitionStep& step, const RecognitionTask& task) {
+  if (step.truth.label.empty()) {
+    return "";
+  }
+  std::string words = "truth: " + printable(step.truth.label);
+  if (const std::optional<Pose> truth = step.true_T_robot_object(task)) {
+    words += fmt::format(" at {}; error {} mm", pose_words(pose_text(*truth)),
+                         error_text(step.pose_error_mm()));
+  }
+  return words;
+}
+
+std::string verdict_text(Verdict verdict) {
+  switch (verdict) {
+    case Verdict::fits:
+      return "fits";
+    case Verdict::doubtful:
+      return "doubtful";
+    case Verdict::does_not_fit:
+      break;
+  }
+  return "does not fit";
+}
+
+std::string fit_word(const RecognitionStep& step) {
+  if (step.contradicted) {
+    return "contradicted";
+  }
+  if (!step.fit) {
+    return "";
+  }
+  return step.fit->verdict == Verdict::does_not_fit ? "no fit" : verdict_text(step.fit->verdict);
+}
+
+std::string misfit_sentence(const RecognitionStep& step, std::size_t touches,
+                            const RecognitionTask& task) {
+  if (!step.fit || step.fit->verdict != Verdict::does_not_fit) {
+    return "";
+  }
+  const std::string label = printable(posed_label(step, task));
+  return fmt::format("unlike {}: its {} {:.0f} standard deviations {} than touches of {} do", label,
+                     touches == 1 ? "touch fits" : fmt::format("{} touches fit", touches),
+                     std::abs(step.fit->z), step.fit->z < 0.0 ? "worse" : "better", label);
+}
+
+std::string error_text(std::optional<double> error_mm) {
+  return error_mm ? fmt::format("{:.2f}", *error_mm) : "-";
+}
+
+}  // namespace palpate::cli

@@ -1,0 +1,50 @@
+#pragma once
+
+#include <array>
+#include <optional>
+#include <span>
+#include <string>
+
+#include "recognition_record.hpp"
+
+// What a step says, in the words and digits that the tables, `live` and the recognition sheet
+// share.
+
+namespace palpate::cli {
+
+/// The numbers of a pose in the robot frame: x and y in mm, theta in degrees, two decimals each.
+struct PoseText {
+  std::array<std::string, 3> value;
+  std::array<std::string, 3> sd;  ///< "" where there is none
+};
+PoseText pose_text(const Pose& T_robot_object, const std::optional<std::array<double, 3>>& sd = {});
+/// T_robot_object of a step, to act on, with its standard deviations.
+PoseText pose_text(const RecognitionStep& step);
+
+/// x, y and theta for a table: "9.81+-0.05".
+std::array<std::string, 3> pose_cells(const PoseText& pose);
+/// "x 9.81 +-0.05 mm, y 0.23 +-0.05 mm, theta -126.04 +-0.31 deg"
+std::string pose_words(const PoseText& pose);
+/// The object of the step and, where the pose is another object's, that object: "A",
+/// "(none), pose of A".
+std::string object_words(const RecognitionStep& step, const RecognitionTask& task);
+/// The object and its probability: "A (98.8 %)".
+std::string identity_words(const RecognitionStep& step, const RecognitionTask& task);
+/// The object, its probability and its pose in the robot frame.
+std::string result_words(const RecognitionStep& step, const RecognitionTask& task);
+/// The true object and its pose, as far as the step can be compared with them, and the error of the
+/// step's pose; "" where nothing is known.
+std::string truth_words(const RecognitionStep& step, const RecognitionTask& task);
+
+/// "fits", "doubtful" or "does not fit".
+std::string verdict_text(Verdict verdict);
+/// What a table says of the fit in a word; "" where nothing is known.
+std::string fit_word(const RecognitionStep& step);
+/// A sentence on touches that do not fit; "" where they fit or are doubtful.
+std::string misfit_sentence(const RecognitionStep& step, std::size_t touches,
+                            const RecognitionTask& task);
+
+/// A pose error in mm, "-" where there is none.
+std::string error_text(std::optional<double> error_mm);
+
+}  // namespace palpate::cli

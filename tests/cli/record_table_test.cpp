@@ -1,0 +1,305 @@
+// What people read of records, from records filled by hand: tables, sentences, the sheet and
+// `live`, which all say the same numbers.
+
+#include "record_table.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <numbers>
+
+#include "live_record.hpp"
+#include "palpate/pose_error.hpp"
+#include "record_output.hpp"
+#include "sample_files.hpp"
+#include "sheet.hpp"
+#include "step_words.hpp"
+
+namespace palpate::cli {
+namespace {
+
+using testing::HasSubstr;
+using testing::Not;
+
+RecognitionTask sample_task() {
+  std::vector<Hypothesis> maps{{sample_map("A")}, {sample_map("I")}};
+  maps[1].map.symmetry = 2;
+  RecognitionTask task(std::move(maps), HistogramOptions{});
+  task.map_paths = {"A.map.h5", "I.map.h5"};
+  return task;
+}
+
+/// T_object_robot of an object at `T_robot_object`, known to 0.05 mm, 0.1 mm and 0.01 rad there.
+RefinedPose refined_at(const Pose& T_robot_object) {
+  const ObjectPose seen =
+      inverse(RefinedPose{.T_object_robot = T_robot_object,
+                          .covariance = {0.0025, 0.0, 0.0, 0.0, 0.01, 0.0, 0.0, 0.0, 1e-4}});
+  return {.T_object_robot = seen.T_robot_object, .covariance = seen.covariance};
+}
+
+/// An A at x 398.76 mm, y -20.5 mm, theta 0.5 rad, between the bins.
+RecognitionRecord sample_record(const std::string& name) {
+  RecognitionStep step{.identity = {0.9876, 0.0124},
+                       .mode = {.object = 0,
+                                .T_object_robot = inverse(Pose{{399.0, -20.0}, 0.55}),
+                                .log_likelihood = -30.0},
+                       .refined = refined_at({{398.76, -20.5}, 0.5})};
+  return {
+      .recording = "/data/" + name, .frame = {}, .touches = 9, .true_label = {}, .trace = {step}};
+}
+
+/// The same with a truth.
+RecognitionRecord sample_trial(const std::string& name, const RecognitionTask& task) {
+  RecognitionRecord record = sample_record(name);
+  RecognitionStep& step = record.trace.back();
+  const Pose truth = inverse(Pose{{398.8, -20.4}, 0.51});
+  const Body body = body_of(task.hypotheses[0].map);
+  record.true_label = "A";
+  step.truth = {.label = "A", .T_object_robot = truth};
+  step.right = true;
+  step.error_mm = pose_error_mm(body, 1, step.mode.T_object_robot, truth);
+  step.refined_error_mm = pose_error_mm(body, 1, step.refined->T_object_robot, truth);
+  return record;
+}
+
+TEST(ResultTable, SaysThePoseInTheRobotFrameWithItsDeviation) {
+  // 0.5 rad is 28.65 degrees and 0.01 rad 0.57.
+  EXPECT_EQ(result_table({sample_record("mug.h5")}, sample_task(), false, {}),
+            "recording  touches  best  prob.          x mm          y mm    theta deg\n"
+            "mug.h5           9  A     0.988  398.76+-0.05  -20.50+-0.10  28.65+-0.57\n");
+}
+
+TEST(ResultTable, SaysTheTruthBelowAndTheModeWhereAskedFor) {
+  const RecognitionTask task = sample_task();
+  const RecognitionRecord record = sample_trial("mug.h5", task);
+  const std::string error = error_text(record.last().refined_error_mm);
+  const std::string mode_error = error_text(record.last().error_mm);
+  ASSERT_NE(error, mode_error);
+  const std::string heading =
+      "recording  touches  best  prob.          x mm          y mm    theta deg\n"
+      "mug.h5           9  A     0.988  398.76+-0.05  -20.50+-0.10  28.65+-0.57\n";
+  const std::string mode =
+      "  mode              A                  399.00        -20.00        31.51"
+      "  " +
+      mode_error + " mm off\n";
+  const std::string truth =
+      "  truth             A                  398.80        -20.40        29.22"
+      "  " +
+      error + " mm off\n";
+  const std::string summary = "1 of 1 right (100.0 %); mean error of refined poses " + error +
+                              " mm, of modes " + mode_error + " mm\n";
+  EXPECT_EQ(result_table({record}, task, false, {}), heading + truth + summary);
+  EXPECT_EQ(result_table({record}, task, true, {}), heading + mode + truth + summary);
+}
+
+TEST(ResultTable, ShowsOfEqualTruthsTheNearest) {
+  RecognitionTask task = sample_task();
+  task.hypotheses[0].map.symmetry = 2;
+  RecognitionRecord record = sample_trial("mug.h5", task);
+  const glm::dvec2 c = body_of(task.hypotheses[0].map).centroid_mm;
+  std::optional<Pose>& truth = record.trace.back().truth.T_object_robot;
+  truth = Pose{2.0 * c, std::numbers::pi} * *truth;  // half a turn about the centroid
+  EXPECT_THAT(result_table({record}, task, false, {}),
+              HasSubstr(" 398.80        -20.40        29.22"));
+}
+
+TEST(ResultTable, SaysWhichObjectAWrongOneWasAndWhosePoseItIs) {
+  RecognitionRecord record = sample_record("mug.h5");
+  record.true_label = "I";
+  record.trace.back().truth = {.label = "I", .T_object_robot = {}};
+  record.trace.back().right = false;
+  const std::string text = result_table({record}, sample_task(), false, {});
+  EXPECT_THAT(text, HasSubstr("\n  truth             I"));
+  EXPECT_THAT(text, HasSubstr("wrong object\n0 of 1 right (0.0 %)\n"));
+  EXPECT_THAT(text, HasSubstr("I                   0 of 1   1 A\n"));
+
+  record.trace.back().identity = {0.4, 0.6};
+  record.trace.back().best = 1;
+  record.trace.back().right = true;
+  EXPECT_THAT(result_table({record}, sample_task(), false, {}),
+              HasSubstr("  I, pose of A  0.600 "));
+}
+
+TEST(ResultTable, OfParticlesHasTheModesPoseWithoutADeviation) {
+  const RecognitionTask task = sample_task();
+  RecognitionRecord record = sample_trial("mug.h5", task);
+  record.trace.back().refined.reset();
+  record.trace.back().refined_error_mm.reset();
+  const std::string error = error_text(record.last().error_mm);
+  EXPECT_EQ(result_table({record}, task, true, {}),
+            "recording  touches  best  prob.    x mm    y mm  theta deg\n"
+            "mug.h5           9  A     0.988  399.00  -20.00      31.51\n"
+            "  truth             A            398.80  -20.40      29.22  " +
+                error +
+                " mm off\n"
+                "1 of 1 right (100.0 %); mean error of modes " +
+                error + " mm\n");
+}
+
+TEST(ResultTable, SaysInASentenceWhatDoesNotFit) {
+  std::vector<RecognitionRecord> records{sample_record("a.h5"), sample_record("b.h5"),
+                                         sample_record("c.h5"), sample_record("d.h5")};
+  records[0].trace.back().fit = {.z = 0.4, .verdict = Verdict::fits};
+  records[1].trace.back().fit = {.z = -3.1, .verdict = Verdict::doubtful};
+  records[2].trace.back().fit = {.z = -11.2, .verdict = Verdict::does_not_fit};
+  records[3].trace.back().fit = {.z = -25.0, .verdict = Verdict::does_not_fit};
+  records[3].trace.back().contradicted = true;
+  records[3].touches = 1;
+  const std::string text = result_table(records, sample_task(), false, {});
+  EXPECT_THAT(text, HasSubstr("  theta deg  fit\n"));
+  EXPECT_THAT(text, HasSubstr("28.65+-0.57  fits\n"));
+  EXPECT_THAT(text, HasSubstr("28.65+-0.57  doubtful\n"));
+  EXPECT_THAT(text, HasSubstr("28.65+-0.57  no fit\n"));
+  EXPECT_THAT(text, HasSubstr("28.65+-0.57  contradicted\n"));
+  EXPECT_THAT(text, HasSubstr("\nc.h5: unlike A: its 9 touches fit 11 standard deviations worse "
+                              "than touches of A do\nd.h5: contradicted: "));
+  EXPECT_THAT(text, HasSubstr("\nd.h5: unlike A: its touch fits 25 standard deviations worse "
+                              "than touches of A do\n"));
+  EXPECT_THAT(text, Not(HasSubstr("a.h5: ")));
+  EXPECT_THAT(text, Not(HasSubstr("b.h5: ")));
+}
+
+TEST(ResultTable, SaysAWarningOfManyRecordingsOnce) {
+  std::vector<RecognitionRecord> records;
+  for (int i = 0; i < 500; ++i) {
+    records.push_back(sample_record("u" + std::to_string(i) + ".h5"));
+    records.back().trace.back().warnings = {"every touch misses every map"};
+  }
+  records[7].trace.back().warnings.emplace_back("the poses look like metres");
+  const std::string text = result_table(records, sample_task(), false, {});
+  EXPECT_TRUE(
+      text.ends_with("u0.h5, u1.h5, u2.h5 and 497 more: every touch misses every map\n"
+                     "u7.h5: the poses look like metres\n"))
+      << text.substr(text.size() - 300);
+}
+
+// Letters within +-10 mm of the robot's origin, with truths and fits: no line wraps.
+TEST(ResultTable, OfTheUsualCaseFitsEightyColumns) {
+  const RecognitionTask task = sample_task();
+  RecognitionRecord record = sample_trial("unknown.h5", task);
+  RecognitionStep& step = record.trace.back();
+  step.refined = refined_at({{-9.87, -9.65}, -2.2});
+  step.mode.T_object_robot = step.refined->T_object_robot;
+  step.truth.T_object_robot = inverse(Pose{{-9.87, -9.65}, -2.21});
+  for (const Verdict verdict : {Verdict::fits, Verdict::doubtful, Verdict::does_not_fit}) {
+    step.fit = {.z = 0.0, .verdict = verdict};
+    const std::string text = result_table({record}, task, true, 80);
+    const std::string table = text.substr(0, text.find("unlike"));
+    for (std::size_t begin = 0; begin < table.size();) {
+      const std::size_t end = std::min(table.find('\n', begin), table.size());
+      EXPECT_LE(end - begin, 80u) << text;
+      begin = end + 1;
+    }
+    EXPECT_THAT(text, HasSubstr("unknown.h5 ")) << "no name needs to be cut";
+  }
+}
+
+TEST(TraceTable, HasALinePerTouchAndThenTheTruth) {
+  const RecognitionTask task = sample_task();
+  RecognitionRecord record = sample_trial("mug.h5", task);
+  record.trace.push_back(record.trace.back());
+  record.trace.front().contradicted = true;
+  record.trace.back().fit = {.z = 0.1, .verdict = Verdict::fits};
+  const std::string error = error_text(record.last().refined_error_mm);
+  EXPECT_EQ(trace_table(record, task, {}),
+            "mug.h5\n"
+            "  touch  best  prob.          x mm          y mm    theta deg  error mm  fit\n"
+            "      1  A     0.988  398.76+-0.05  -20.50+-0.10  28.65+-0.57      " +
+                error +
+                "  contradicted\n"
+                "      2  A     0.988  398.76+-0.05  -20.50+-0.10  28.65+-0.57      " +
+                error +
+                "  fits\n"
+                "  truth: A at x 398.80 mm, y -20.40 mm, theta 29.22 deg; error " +
+                error + " mm\n");
+}
+
+TEST(RecordOutput, FitAndWarningsStandInJson) {
+  const RecognitionTask task = sample_task();
+  RecognitionStep step = sample_record("mug.h5").last();
+  EXPECT_FALSE(to_json(step, task).contains("fit"));
+  EXPECT_FALSE(to_json(step, task).contains("warnings"));
+  step.warnings = {"one", "two"};
+  for (const auto& [verdict, text] : {std::pair{Verdict::fits, "fits"},
+                                      {Verdict::doubtful, "doubtful"},
+                                      {Verdict::does_not_fit, "does not fit"}}) {
+    step.fit = {.z = -4.5, .verdict = verdict};
+    const nlohmann::json json = to_json(step, task);
+    EXPECT_EQ(json.at("fit"), (nlohmann::json{{"z", -4.5}, {"verdict", text}}));
+    EXPECT_EQ(json.at("warnings"), (nlohmann::json{"one", "two"}));
+  }
+}
+
+// One pose, one error, one truth in JSON, in both tables, on the sheet and in `live`.
+TEST(RecordOutput, SaysTheSameNumbersEverywhere) {
+  const RecognitionTask task = sample_task();
+  RecognitionRecord record = sample_trial("mug.h5", task);
+  record.trace.back().fit = {.z = -11.0, .verdict = Verdict::does_not_fit};
+  record.trace.back().warnings = {"the poses look like metres"};
+  const RecognitionStep& step = record.last();
+  const nlohmann::json json = to_json(record, task, "device", false);
+  const std::vector<double> pose = json.at("refined").at("T_robot_object");
+  const std::vector<double> sd = json.at("refined").at("sd");
+  const std::vector<double> truth = json.at("truth").at("T_robot_object");
+  EXPECT_EQ(json.at("truth").at("object"), "A");
+  const std::string words = pose_words(
+      pose_text(Pose{{pose[0], pose[1]}, pose[2]}, std::array<double, 3>{sd[0], sd[1], sd[2]}));
+  EXPECT_EQ(words, "x 398.76 +-0.05 mm, y -20.50 +-0.10 mm, theta 28.65 +-0.57 deg");
+  const std::string error = error_text(json.at("refined_error_mm").get<double>());
+  const std::string true_words = "truth: A at " +
+                                 pose_words(pose_text(Pose{{truth[0], truth[1]}, truth[2]})) +
+                                 "; error " + error + " mm";
+  const std::string misfit =
+      "unlike A: its 9 touches fit 11 standard deviations worse than touches of A do";
+
+  LiveState state;
+  state.touches = 9;
+  state.last = LiveTouch{.touch = {.T_robot_sensor = Pose{}}, .step = step};
+  EXPECT_TRUE(summary(state, {}, task)
+                  .starts_with("A (98.8 %): " + words + "\n" + true_words + "\n" + misfit +
+                               "\nthe poses look like metres\n"))
+      << summary(state, {}, task);
+  for (const std::string& line : {table_line(*state.last, task), trace_table(record, task, {}),
+                                  result_table({record}, task, false, {})}) {
+    EXPECT_THAT(line, HasSubstr(" 398.76+-0.05 "));
+    EXPECT_THAT(line, HasSubstr(" -20.50+-0.10 "));
+    EXPECT_THAT(line, HasSubstr(" 28.65+-0.57 "));
+    EXPECT_THAT(line, HasSubstr(" " + error + " "));
+    EXPECT_THAT(line, HasSubstr("no fit"));
+  }
+  const nlohmann::json live = nlohmann::json::parse(json_line(*state.last, task));
+  for (const char* key : {"refined", "truth", "fit", "warnings", "refined_error_mm"}) {
+    EXPECT_EQ(live.at(key), json.at(key)) << key;
+  }
+
+  const Recording touches = sample_unknown("A", {}, 2);
+  const RecognitionSheet sheet = sheet_of(record, unknown_of(touches), task, {});
+  EXPECT_EQ(sheet.title, "mug.h5");
+  EXPECT_EQ(sheet.result,
+            "A (98.8 %): x 398.76 ± 0.05 mm, y -20.50 ± 0.10 mm, theta 28.65 ± 0.57° in the robot "
+            "frame");
+  ASSERT_EQ(sheet.captions.size(), 4u);
+  EXPECT_EQ(sheet.captions[0].text,
+            "truth: A at x 398.80 mm, y -20.40 mm, theta 29.22°; error " + error + " mm");
+  EXPECT_FALSE(sheet.captions[0].alarm);
+  EXPECT_THAT(sheet.captions[1].text, HasSubstr("x 399.00 mm, y -20.00 mm, theta 31.51°; error "));
+  EXPECT_EQ(sheet.captions[2].text, misfit);
+  EXPECT_TRUE(sheet.captions[2].alarm);
+  EXPECT_EQ(sheet.captions[3].text, "the poses look like metres");
+  EXPECT_TRUE(sheet.captions[3].alarm);
+  EXPECT_EQ(sheet.T_object_robot.theta_rad, step.refined->T_object_robot.theta_rad);
+}
+
+TEST(RecordOutput, AWrongObjectIsRedOnTheSheet) {
+  RecognitionRecord record = sample_record("mug.h5");
+  record.trace.back().truth = {.label = "I", .T_object_robot = {}};
+  record.trace.back().right = false;
+  const Recording touches = sample_unknown("I", {}, 2);
+  const RecognitionSheet sheet = sheet_of(record, unknown_of(touches), sample_task(), {});
+  EXPECT_EQ(sheet.captions.at(0).text, "truth: I");
+  EXPECT_TRUE(sheet.captions.at(0).alarm);
+  EXPECT_FALSE(sheet.truth);
+}
+
+}  // namespace
+}  // namespace palpate::cli
