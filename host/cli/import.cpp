@@ -5,41 +5,19 @@
 #include <string>
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 #include <CLI/CLI.hpp>
 
 #include "array_table.hpp"
 #include "command_files.hpp"
 #include "commands.hpp"
-#include "npy_file.hpp"
+#include "imported_recording.hpp"
 #include "number_text.hpp"
 #include "options.hpp"
 #include "palpate/files.hpp"
-#include "palpate/pose_track.hpp"
-#include "pose_table.hpp"
-#include "pressure_table.hpp"
 
 namespace palpate::cli {
 
 namespace {
-
-struct Options {
-  std::string pressures;
-  std::string poses;
-  std::string array;
-  std::string output;
-  std::string pressure_unit = "kPa";
-  std::string pose_unit;
-  std::string time_unit;
-  std::string time_column;
-  std::string pressure_columns;
-  std::string pose_columns;
-  double largest_gap_s = PosedSensor::usual_gap_s;
-  std::optional<double> rate_hz;
-  std::string rows;
-  std::string object;
-  std::string truth;
-};
 
 /// Splits the text into `count` parts, the first of which may hold the separator itself.
 std::vector<std::string> split_last(std::string text, char separator, std::size_t count) {
@@ -60,7 +38,7 @@ std::optional<Unit> unit_named(std::span<const Unit> units, const std::string& n
   return found == units.end() ? std::nullopt : std::optional(*found);
 }
 
-TableOptions table_options(const Options& options) {
+TableOptions table_options(const ImportOptions& options) {
   TableOptions table{.time_column = options.time_column,
                      .pressure_columns = options.pressure_columns};
   if (!options.time_unit.empty()) {
@@ -87,12 +65,6 @@ TableOptions table_options(const Options& options) {
   return table;
 }
 
-/// The array of --array: a grid, or a file.
-struct Array : ArrayTable {
-  std::size_t columns = 0;  ///< 0: not a grid
-  std::size_t rows = 0;
-};
-
 Array array_of(const std::string& text) {
   const auto parts = split_last(text, ':', 3);
   const auto columns = parts.empty() ? std::nullopt : whole_number_of(parts[0]);
@@ -116,139 +88,6 @@ Array array_of(const std::string& text) {
   return array;
 }
 
-PressureTable read_npy_pressures(const std::string& path, const Array& array) {
-  NpyArray npy = read_npy(path);
-  const std::size_t elements = array.elements_mm.size();
-  const auto& shape = npy.shape;
-  const bool fits = (shape.size() == 2 && shape[1] == elements) ||
-                    (shape.size() == 3 && shape[1] * shape[2] == elements &&
-                     (array.columns == 0 || shape[2] == array.columns));
-  if (!fits || shape[0] == 0) {
-    refuse(path, "has the shape ({}); save [n, {}]{}, n at least 1, or correct --array",
-           fmt::format("{}", fmt::join(shape, ", ")), elements,
-           array.columns == 0 ? "" : fmt::format(" or [n, {}, {}]", array.rows, array.columns));
-  }
-  const auto infinite = std::ranges::find_if(npy.values, [](double p) { return std::isinf(p); });
-  if (infinite != npy.values.end()) {
-    const auto at = static_cast<std::size_t>(infinite - npy.values.begin());
-    refuse(path, "row {}, element {} = {}; save finite numbers, or NaN where a reading is unknown",
-           at / elements, at % elements, *infinite);
-  }
-  return {.pressure = std::move(npy.values)};
-}
-
-/// Marks as dead the elements without any reading. In touches, which have no unknown readings, it
-/// also marks single readings.
-void mark_unknown(const std::string& path, Recording& recording) {
-  const std::size_t e = recording.elements_mm.size();
-  std::vector<std::uint8_t> read(e, 0);
-  bool some_unknown = false;
-  for (std::size_t k = 0; k < recording.pressure.size(); ++k) {
-    read[k % e] |= std::isnan(recording.pressure[k]) ? 0 : 1;
-  }
-  for (std::size_t i = 0; i < e; ++i) {
-    read[i] = recording.valid.empty() ? read[i] : read[i] & recording.valid[i];
-  }
-  if (std::ranges::count(read, 0) == static_cast<std::ptrdiff_t>(e)) {
-    refuse(path, "holds no reading of a living element; write the pressures");
-  }
-  for (std::size_t k = 0; k < recording.pressure.size(); ++k) {
-    some_unknown = some_unknown || (read[k % e] != 0 && std::isnan(recording.pressure[k]));
-  }
-  if (!recording.valid.empty() || std::ranges::count(read, 0) > 0) {
-    recording.valid = read;
-  }
-  if (some_unknown && recording.rows == "touches") {
-    recording.valid.resize(recording.pressure.size());
-    for (std::size_t k = 0; k < recording.pressure.size(); ++k) {
-      recording.valid[k] = std::isnan(recording.pressure[k]) ? 0 : read[k % e];
-    }
-  }
-}
-
-std::vector<Pose> poses_by_time(const PoseTable& poses, const std::vector<double>& time_s,
-                                double largest_gap_s) {
-  PoseTrack track(largest_gap_s);
-  for (std::size_t i = 0; i < poses.time_s.size(); ++i) {
-    if (!std::isnan(poses.T_robot_sensor[i].theta_rad)) {
-      track.add(poses.time_s[i], poses.T_robot_sensor[i]);
-    }
-  }
-  track.end();
-  std::vector<Pose> joined;
-  joined.reserve(time_s.size());
-  for (const double time : time_s) {
-    joined.push_back(track.at(time).value_or(unknown_pose));
-  }
-  return joined;
-}
-
-/// Gives every row its pose, by time or row by row.
-void join(PoseTable poses, const Options& options, Recording& recording) {
-  const std::size_t n = recording.pressure.size() / recording.elements_mm.size();
-  const bool same_rows = poses.time_s.empty() || options.poses == options.pressures;
-  if (!same_rows && recording.time_s.empty()) {
-    refuse(options.poses,
-           "has times, {} has none; give both a column 'time' or neither, or give the frames' "
-           "--rate",
-           options.pressures);
-  }
-  if (!same_rows) {
-    recording.T_robot_sensor = poses_by_time(poses, recording.time_s, options.largest_gap_s);
-    return;
-  }
-  if (poses.T_robot_sensor.size() != n) {
-    refuse(options.poses,
-           "holds {} poses without a time for {} rows of {}; write one for each row, or give both "
-           "a column 'time'",
-           poses.T_robot_sensor.size(), n, options.pressures);
-  }
-  recording.T_robot_sensor = std::move(poses.T_robot_sensor);
-}
-
-/// Requires a pose of every touch.
-void require_touch_poses(const Options& options, const Recording& recording) {
-  if (options.poses.empty()) {
-    refuse(options.pressures,
-           "its rows are touches, and each needs a pose; give --poses, or for a stream of frames a "
-           "column 'time' or --rate");
-  }
-  for (std::size_t i = 0; i < recording.size(); ++i) {
-    if (std::isnan(recording.T_robot_sensor[i].theta_rad)) {
-      refuse(options.poses,
-             "has no pose for row {} of {}, counted from 0{}, and a touch needs one; add it, or "
-             "give --rows frames",
-             i, options.pressures,
-             recording.time_s.empty() ? "" : fmt::format(", at {} s", recording.time_s[i]));
-    }
-  }
-}
-
-void choose_rows(const Options& options, Recording& recording) {
-  const std::size_t n = recording.pressure.size() / recording.elements_mm.size();
-  if (options.rate_hz) {
-    require_above("--rate", *options.rate_hz, 0.0);
-    if (!recording.time_s.empty()) {
-      refuse_flag("--rate", *options.rate_hz, "{} has times; leave the flag out",
-                  options.pressures);
-    }
-    for (std::size_t i = 0; i < n; ++i) {
-      recording.time_s.push_back(static_cast<double>(i) / *options.rate_hz);
-    }
-  }
-  recording.rows = recording.time_s.empty() ? "touches" : "frames";
-  if (options.rows.empty()) {
-    return;
-  }
-  if (options.rows != "touches" && options.rows != "frames") {
-    refuse_flag("--rows", options.rows, "give frames or touches");
-  }
-  if (options.rows == "frames" && recording.time_s.empty()) {
-    refuse(options.pressures, "frames need times; add a column 'time', or give --rate");
-  }
-  recording.rows = options.rows;
-}
-
 Truth truth_of(const std::string& text, const TableOptions& units) {
   const auto parts = split_last(text, ',', 4);
   std::array<std::optional<double>, 3> pose;
@@ -265,7 +104,7 @@ Truth truth_of(const std::string& text, const TableOptions& units) {
 }
 
 /// The command that takes the recording.
-std::string next_command(const Options& options, const Recording& recording) {
+std::string next_command(const ImportOptions& options, const Recording& recording) {
   const bool raw = recording.pressure_unit == "raw";
   if (recording.rows == "frames") {
     return options.poses.empty()
@@ -279,7 +118,7 @@ std::string next_command(const Options& options, const Recording& recording) {
              : fmt::format("palpate map {} -o MAPS/{}", options.output, threshold);
 }
 
-void print_summary(const Options& options, const Recording& r, bool assumed_units) {
+void print_summary(const ImportOptions& options, const Recording& r, bool assumed_units) {
   fmt::print("{}: {} {} of {} elements", options.output, r.size(), r.rows, r.elements());
   if (!r.time_s.empty()) {
     fmt::print(" in {:.3f} s", r.time_s.back() - r.time_s.front());
@@ -303,7 +142,7 @@ void print_summary(const Options& options, const Recording& r, bool assumed_unit
   fmt::print("; next: {}\n", next_command(options, r));
 }
 
-void import_tables(const Options& options) {
+void import_tables(const ImportOptions& options) {
   const TableOptions tables = table_options(options);
   require_above("--largest-gap-s", options.largest_gap_s, 0.0);
   if (options.pressure_unit != "kPa" && options.pressure_unit != "raw") {
@@ -319,38 +158,13 @@ void import_tables(const Options& options) {
   files.require_distinct();
   require_writable(options.output);
 
-  Recording recording;
-  recording.object = options.object;
-  recording.pressure_unit = options.pressure_unit;
+  std::optional<Truth> truth;
   if (!options.truth.empty()) {
-    recording.truth = truth_of(options.truth, tables);
+    truth = truth_of(options.truth, tables);
   }
-  Array array = array_of(options.array);
-  PressureTable pressures =
-      is_npy(options.pressures)
-          ? read_npy_pressures(options.pressures, array)
-          : read_pressures(options.pressures, array.elements_mm.size(), tables);
-  recording.elements_mm = std::move(array.elements_mm);
-  recording.valid = std::move(array.valid);
-  recording.baseline = std::move(array.baseline);
-  recording.pressure = std::move(pressures.pressure);
-  recording.time_s = std::move(pressures.time_s);
-  recording.device_time_s = std::move(pressures.device_time_s);
-  recording.lost_before = std::move(pressures.lost_before);
-  choose_rows(options, recording);
-  mark_unknown(options.pressures, recording);
-  bool assumed_units = false;
-  if (options.poses.empty()) {
-    recording.T_robot_sensor.assign(recording.pressure.size() / recording.elements_mm.size(),
-                                    unknown_pose);
-  } else {
-    PoseTable poses = read_poses(options.poses, tables);
-    assumed_units = poses.assumed_units;
-    join(std::move(poses), options, recording);
-  }
-  if (recording.rows == "touches") {
-    require_touch_poses(options, recording);
-  }
+  auto [recording, assumed_units] = read_tables(options, tables, array_of(options.array));
+  recording.object = options.object;
+  recording.truth = truth;
   write_recording(options.output, recording);
   print_summary(options, recording, assumed_units);
 }
@@ -363,7 +177,7 @@ void add_import(CLI::App& app) {
       "Write a recording (HDF5) from tables: pressures, poses and the positions of the elements. "
       "Tables are CSV files, with commas, semicolons, tabs or blanks between the cells; the "
       "pressures may also be an array of numpy.save. docs/files.md describes them");
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<ImportOptions>();
   command
       ->add_option("PRESSURES", options->pressures,
                    "CSV: a row for each frame or touch, with a column for each element (and time, "
