@@ -108,7 +108,10 @@ std::string next_command(const ImportOptions& options, const Recording& recordin
   const bool raw = recording.pressure_unit == "raw";
   if (recording.rows == "frames") {
     return options.poses.empty()
-               ? fmt::format("import it with --poses, for the poses of its touches")
+               ? fmt::format(
+                     "palpate live --sensor replay:{} --poses POSES --maps MAPS/, or import again "
+                     "with --poses",
+                     options.output)
                : fmt::format("palpate touches {} -o TOUCHES.h5{}", options.output,
                              raw ? " --onset P" : "");
   }

@@ -106,14 +106,16 @@ bool CsvTable::is_header() const {
   if (!std::ranges::all_of(cells_, is_number)) {
     return true;
   }
-  // pandas names the columns of an array so, after an empty cell for the index.
+  // pandas names the columns of an array so, after an empty cell for the index. A short row that
+  // counts may be a pose.
+  constexpr std::size_t enough = 5;
   const std::size_t first = cells_.front().empty() ? 1 : 0;
   for (std::size_t i = first; i < cells_.size(); ++i) {
     if (cells_[i] != fmt::format_int(i - first).c_str()) {
       return false;
     }
   }
-  return cells_.size() > first + 2;
+  return cells_.size() >= first + enough;
 }
 
 void CsvTable::name_columns() {

@@ -18,10 +18,10 @@ namespace palpate {
 ///
 /// The first row decides: cells are separated by tabs, else by semicolons, else by commas, else by
 /// blanks. The first row is the header where one of its cells is no number, or where it counts 0,
-/// 1, 2, ... '#' at the start of a line or after a blank begins a comment. Empty lines, a byte
-/// order mark, CRLF, quotes around a cell and a separator after the last cell of a row are
-/// accepted; so are decimal commas where commas do not separate. Every error is one line that names
-/// the file, the line and the column.
+/// 1, 2, ... (five columns at least). '#' at the start of a line or after a blank begins a comment.
+/// Empty lines, a byte order mark, CRLF, quotes around a cell and a separator after the last cell
+/// of a row are accepted; so are decimal commas where commas do not separate. Every error is one
+/// line that names the file, the line and the column.
 class CsvTable {
  public:
   /// @throws Error where the file cannot be read, is not text or holds no row

@@ -42,15 +42,12 @@ class Csv : public testing::Test {
 const Rows two_by_two{{1.5, -2.0}, {3e-3, 4.0}};
 
 TEST_F(Csv, SeparatorsLineEndsAndDecorationsMakeNoDifference) {
-  for (const char* text : {"a,b\n1.5,-2\n3e-3,4\n",
-                           "a,b\r\n1.5,-2\r\n3e-3,4",
-                           "\xEF\xBB\xBF\"a\",\"b\"\n1.5,\"-2\"\n\n3e-3,+4\n",
-                           "# made by hand\n a , b \n1.5, -2 # first\n\n  # second\n3e-3,4\n",
-                           "a;b\n1,5;-2\n3e-3;4\n",
-                           "a;b\n1.5;-2\n3e-3;4\n",
-                           "a\tb\n1,5\t-2\n3e-3\t4\n",
-                           "a b\n1.5   -2\n  3e-3 4  \n",
-                           "a,b,\n1.5,-2,\n3e-3,4,\n"}) {
+  for (const char* text :
+       {"a,b\n1.5,-2\n3e-3,4\n", "a,b\r\n1.5,-2\r\n3e-3,4",
+        "\xEF\xBB\xBF\"a\",\"b\"\n1.5,\"-2\"\n\n3e-3,+4\n",
+        "# made by hand\n a , b \n1.5, -2 # first\n\n  # second\n3e-3,4\n", "a;b\n1,5;-2\n3e-3;4\n",
+        "a;b\n1.5;-2\n3e-3;4\n", "a\tb\n1,5\t-2\n3e-3\t4\n", "a b\n1.5   -2\n  3e-3 4  \n",
+        "a,b,\n1.5,-2,\n3e-3,4,\n"}) {
     EXPECT_EQ(rows_of(text), two_by_two) << text;
     EXPECT_EQ(table(text).columns(), (std::vector<std::string>{"a", "b"})) << text;
   }
@@ -65,9 +62,10 @@ TEST_F(Csv, NumbersAloneHaveNoHeader) {
 
 // pandas.DataFrame(array).to_csv() writes such names, after an empty one for the index.
 TEST_F(Csv, CountedColumnsAreAHeader) {
-  EXPECT_EQ(rows_of("0,1,2\n7,8,9\n"), (Rows{{7.0, 8.0, 9.0}}));
-  EXPECT_EQ(rows_of(",0,1,2\n0,7,8,9\n"), (Rows{{0.0, 7.0, 8.0, 9.0}}));
-  EXPECT_EQ(rows_of("0,1,3\n7,8,9\n").size(), 2u);
+  EXPECT_EQ(rows_of("0,1,2,3,4\n5,6,7,8,9\n"), (Rows{{5.0, 6.0, 7.0, 8.0, 9.0}}));
+  EXPECT_EQ(rows_of(",0,1,2,3,4\n0,5,6,7,8,9\n"), (Rows{{0.0, 5.0, 6.0, 7.0, 8.0, 9.0}}));
+  EXPECT_EQ(rows_of("0,1,2,3,5\n5,6,7,8,9\n").size(), 2u);
+  EXPECT_EQ(rows_of("0,1,2,3\n5,6,7,8\n").size(), 2u) << "it may be a pose";
 }
 
 TEST_F(Csv, EmptyCellsAndNanAreNoNumbers) {
@@ -107,7 +105,10 @@ TEST_F(Csv, FilesThatHoldNoTable) {
   expect_named(message("# nothing\n\n"), {"holds no row"});
   expect_named(message("a,a\n1,2\n"), {":1: ", "two columns are called 'a'"});
   expect_named(message(std::string("a,b\n\0", 5)), {"is no text", "CSV"});
-  expect_named(message(std::string("\xFF\xFE" "1\0,\0", 6)), {"is no text", "UTF-8"});
+  expect_named(message(std::string("\xFF\xFE"
+                                   "1\0,\0",
+                                   6)),
+               {"is no text", "UTF-8"});
   expect_named(message(std::string((17 << 20) + 1, '1')), {"line 1", "longer than 16 MB"});
   expect_named(input_error([&] { CsvTable(folder_ / "none.csv"); }), {"none.csv", "no such file"});
 }

@@ -97,14 +97,13 @@ TEST_F(Npy, NamesWhatIsWrong) {
   expect_named(message(header("<f8", "(4294967296, 4294967296)"), eight), {"8 bytes"});
   expect_named(message("{'descr': [('x', '<f4')], 'fortran_order': False, 'shape': (1,), }", eight),
                {"named fields"});
-  for (const char* broken :
-       {"", "{}", "{'descr': '<f8', 'fortran_order': False, }",
-        "{'descr': '<f8', 'fortran_order': 0, 'shape': (1,), }",
-        "{'descr': '<f8', 'descr': '<f8', 'shape': (1,), }",
-        "{'descr': '<f8', 'fortran_order': False, 'shape': (-1,), }",
-        "{'descr': '<f8', 'fortran_order': False, 'shape': (1 2), }",
-        "{'descr': '<f8', 'fortran_order': False, 'shape': (1,), 'more': 1}",
-        "{'descr': '<f8', 'fortran_order': False, 'shape': (1,), } x"}) {
+  for (const char* broken : {"", "{}", "{'descr': '<f8', 'fortran_order': False, }",
+                             "{'descr': '<f8', 'fortran_order': 0, 'shape': (1,), }",
+                             "{'descr': '<f8', 'descr': '<f8', 'shape': (1,), }",
+                             "{'descr': '<f8', 'fortran_order': False, 'shape': (-1,), }",
+                             "{'descr': '<f8', 'fortran_order': False, 'shape': (1 2), }",
+                             "{'descr': '<f8', 'fortran_order': False, 'shape': (1,), 'more': 1}",
+                             "{'descr': '<f8', 'fortran_order': False, 'shape': (1,), } x"}) {
     expect_named(message(broken, eight), {"NPY header is damaged"});
   }
   put_bytes(path_, std::string("\x93NUMPY\x04\x00\x00\x00\x00\x00", 12));
