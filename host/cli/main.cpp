@@ -56,12 +56,14 @@ int run(int argc, char** argv) {
   palpate::cli::add_devices(app);
   palpate::cli::add_sensors(app);
   palpate::cli::add_record(app);
+  palpate::cli::add_import(app);
   palpate::cli::add_touches(app);
   palpate::cli::add_live(app);
   palpate::cli::add_simulate(app);
   palpate::cli::add_map(app);
   palpate::cli::add_recognize(app);
   palpate::cli::add_info(app);
+  palpate::cli::add_export(app);
   refuse_empty_values(app);
   try {
     app.parse(argc, argv);

@@ -83,8 +83,12 @@ AtomicFile::~AtomicFile() {
   }
 }
 
-void AtomicFile::write(std::string_view bytes) {
-  const Descriptor file(temporary_, O_WRONLY | O_TRUNC);
+void AtomicFile::write(std::string_view bytes) { write(bytes, O_TRUNC); }
+
+void AtomicFile::append(std::string_view bytes) { write(bytes, O_APPEND); }
+
+void AtomicFile::write(std::string_view bytes, int flags) {
+  const Descriptor file(temporary_, O_WRONLY | flags);
   if (!file.valid()) {
     fail(target_, "open its temporary file");
   }

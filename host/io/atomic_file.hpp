@@ -22,11 +22,16 @@ class AtomicFile {
   /// Makes `bytes` the file's content.
   /// @throws Error (Fault::system) where the disk refuses, as when it is full.
   void write(std::string_view bytes);
+  /// Adds `bytes` to the file's content.
+  /// @throws Error (Fault::system) where the disk refuses
+  void append(std::string_view bytes);
   /// Brings the content to the disk and renames the file to its target.
   /// @throws Error (Fault::system) where the disk refuses.
   void commit();
 
  private:
+  void write(std::string_view bytes, int flags);
+
   std::filesystem::path target_;
   std::filesystem::path temporary_;  ///< empty once committed
 };

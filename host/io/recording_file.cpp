@@ -134,11 +134,14 @@ void write_recording(const std::filesystem::path& path, const Recording& recordi
   } else {
     file.dataset("pressure", {n, e}, recording.pressure);
   }
-  std::vector<double> poses;
-  for (const Pose& pose : recording.T_robot_sensor) {
-    poses.insert(poses.end(), {pose.translation_mm.x, pose.translation_mm.y, pose.theta_rad});
+  if (recording.rows != "frames" ||
+      std::any_of(recording.T_robot_sensor.begin(), recording.T_robot_sensor.end(), is_finite)) {
+    std::vector<double> poses;
+    for (const Pose& pose : recording.T_robot_sensor) {
+      poses.insert(poses.end(), {pose.translation_mm.x, pose.translation_mm.y, pose.theta_rad});
+    }
+    file.dataset("sensor_pose", {n, 3}, poses);
   }
-  file.dataset("sensor_pose", {n, 3}, poses);
   std::vector<double> elements;
   for (const glm::dvec2& element : recording.elements_mm) {
     elements.insert(elements.end(), {element.x, element.y});

@@ -110,7 +110,9 @@ class Scan {
                    pressure);
     }
     const auto [n, e] = std::pair{head_.rows, head_.elements};
-    require_shape("sensor_pose", {{n, 3}});
+    if (head_.recording.rows != "frames" || file_.has_dataset("sensor_pose")) {
+      require_shape("sensor_pose", {{n, 3}});
+    }
     require_shape("elements", {{e, 2}, {n, e, 2}});
     head_.array_changes = file_.shape("elements").size() == 3;
     for (const char* name : {"time", "device_time", "lost_before"}) {
@@ -154,16 +156,7 @@ class Scan {
       require_pressures(path_, head, head_.elements, first, values);
       takers_.pressure(values);
     });
-    std::size_t poses = 0;
-    read_tuples<3, Pose>(
-        "sensor_pose",
-        [](const double* v) {
-          return Pose{{v[0], v[1]}, v[2]};
-        },
-        [&](std::span<const Pose> some) {
-          require_poses(path_, head, std::exchange(poses, poses + some.size()), some);
-          takers_.T_robot_sensor(some);
-        });
+    read_poses();
     std::size_t elements = 0;
     read_tuples<2, glm::dvec2>(
         "elements", [](const double* v) { return glm::dvec2(v[0], v[1]); },
@@ -184,6 +177,27 @@ class Scan {
       require_lost_counts(path_, first, counts);
       takers_.lost_before(counts);
     });
+  }
+
+  void read_poses() {
+    if (!file_.has_dataset("sensor_pose")) {
+      // A stream without poses: every pose is unknown.
+      const std::vector<Pose> unknown(std::min<std::uint64_t>(head_.rows, 4096), unknown_pose);
+      for (std::uint64_t left = head_.rows; left > 0; left -= std::min(left, unknown.size())) {
+        takers_.T_robot_sensor(std::span(unknown).first(std::min(left, unknown.size())));
+      }
+      return;
+    }
+    std::size_t poses = 0;
+    read_tuples<3, Pose>(
+        "sensor_pose",
+        [](const double* v) {
+          return Pose{{v[0], v[1]}, v[2]};
+        },
+        [&](std::span<const Pose> some) {
+          require_poses(path_, head_.recording, std::exchange(poses, poses + some.size()), some);
+          takers_.T_robot_sensor(some);
+        });
   }
 
   void read_list(const char* name, const Hdf5Contents::Take& take) {

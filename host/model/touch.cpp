@@ -16,6 +16,17 @@ std::vector<glm::dvec2> digitacts_array() {
   return elements;
 }
 
+std::vector<glm::dvec2> grid_array(int columns, int rows, double pitch_mm) {
+  std::vector<glm::dvec2> elements;
+  for (int row = 0; row < rows; ++row) {
+    for (int column = 0; column < columns; ++column) {
+      elements.emplace_back((column - (columns - 1) / 2.0) * pitch_mm,
+                            (row - (rows - 1) / 2.0) * pitch_mm);
+    }
+  }
+  return elements;
+}
+
 bool same_placement(const Touch& a, const Touch& b) {
   return a.T_robot_sensor.translation_mm == b.T_robot_sensor.translation_mm &&
          a.T_robot_sensor.theta_rad == b.T_robot_sensor.theta_rad &&

@@ -94,15 +94,7 @@ class SourceName {
     const auto parts = three("array", *text, "must be COLUMNS:ROWS:PITCH, the pitch in mm");
     const int columns = parse("array", parts[0], 1, 64);
     const int rows = parse("array", parts[1], 1, 64);
-    const double pitch_mm = parse("array", parts[2], 0.01, 100.0);
-    std::vector<glm::dvec2> elements_mm;
-    for (int row = 0; row < rows; ++row) {
-      for (int column = 0; column < columns; ++column) {
-        elements_mm.emplace_back((column - (columns - 1) / 2.0) * pitch_mm,
-                                 (row - (rows - 1) / 2.0) * pitch_mm);
-      }
-    }
-    return elements_mm;
+    return grid_array(columns, rows, parse("array", parts[2], 0.01, 100.0));
   }
 
  private:

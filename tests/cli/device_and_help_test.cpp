@@ -77,7 +77,30 @@ INSTANTIATE_TEST_SUITE_P(
         Help{"touches",
              {"FRAMES", "-o,", "--onset", "2 kPa", "--release", "half", "--steady", "=0.15",
               "--min-steady-s", "=0.1", "--smooth-s", "=0.05", "--drift-s", "=60"}},
-        Help{"info", {"FILE"}}),
+        Help{"import",
+             {"PRESSURES",
+              "--poses",
+              "--array",
+              "COLUMNS:ROWS:PITCH",
+              "mm",
+              "-o,",
+              "--rows",
+              "frames",
+              "touches",
+              "--pressure-unit",
+              "=kPa",
+              "--pose-unit",
+              "mm,rad",
+              "--time-unit",
+              "--time-column",
+              "--pressure-columns",
+              "--pose-columns",
+              "--largest-gap-s",
+              "=0.1",
+              "--rate",
+              "--object",
+              "--truth"}},
+        Help{"export", {"FILE", "-o,", "Folder"}}, Help{"info", {"FILE"}}),
     [](const auto& test) { return std::string(test.param.command); });
 
 using ProgramHelp = ProgramTest;
@@ -85,7 +108,7 @@ using ProgramHelp = ProgramTest;
 TEST_F(ProgramHelp, ListsTheCommands) {
   const std::string help = done({"--help"});
   for (const char* command : {"devices", "sensors", "record", "touches", "simulate", "map",
-                              "recognize", "live", "info"}) {
+                              "recognize", "live", "info", "import", "export"}) {
     EXPECT_NE(help.find(std::string("\n  ") + command), std::string::npos) << help;
   }
 }

@@ -194,6 +194,21 @@ TEST_F(RecordingFile, NamesWhatIsMissing) {
                {"'true_T_object_robot'", "missing"});
 }
 
+TEST_F(RecordingFile, AStreamMayLackPoses) {
+  // More rows than one piece of unknown poses.
+  constexpr std::size_t n = 10'000;
+  const Recording stream = read(recording_parts()
+                                    .without("sensor_pose")
+                                    .attribute("rows", "frames")
+                                    .dataset("pressure", {n, 3}, 1.0));
+  ASSERT_EQ(stream.size(), n);
+  for (const Pose& pose : stream.T_robot_sensor) {
+    ASSERT_TRUE(std::isnan(pose.translation_mm.x) && std::isnan(pose.translation_mm.y) &&
+                std::isnan(pose.theta_rad));
+  }
+  EXPECT_EQ(stream.elements(), 3u);
+}
+
 TEST_F(RecordingFile, NamesValuesThatAreNoNumbers) {
   const std::vector<double> row_of_nan{1, 2, 3, 4, nan, 6};
   expect_named(message(recording_parts().dataset("pressure", {2, 3}, row_of_nan)),

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <span>
 #include <string>
@@ -18,6 +19,15 @@ std::vector<glm::dvec2> digitacts_array();
 
 /// Edge length of a DigiTacts element, in mm.
 inline constexpr double digitacts_element_mm = 1.8;
+
+/// Returns the element centres of a grid, [columns * rows] in mm, centred about the sensor's
+/// origin; x varies fastest, along the columns.
+std::vector<glm::dvec2> grid_array(int columns, int rows, double pitch_mm);
+
+/// Pose of a frame whose pose is unknown: all NaN.
+inline const Pose unknown_pose{
+    {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::quiet_NaN()},
+    std::numeric_limits<double>::quiet_NaN()};
 
 /// One reading of the tactile array at a known pose. It is a view: the caller keeps the memory
 /// alive. A touch is sound if its lists have one size, its pose and its element centres are finite,

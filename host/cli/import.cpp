@@ -1,0 +1,242 @@
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include <fmt/format.h>
+#include <CLI/CLI.hpp>
+
+#include "array_table.hpp"
+#include "command_files.hpp"
+#include "commands.hpp"
+#include "imported_recording.hpp"
+#include "number_text.hpp"
+#include "options.hpp"
+#include "palpate/files.hpp"
+
+namespace palpate::cli {
+
+namespace {
+
+/// Splits the text into `count` parts, the first of which may hold the separator itself.
+std::vector<std::string> split_last(std::string text, char separator, std::size_t count) {
+  std::vector<std::string> parts;
+  for (std::size_t at = text.npos; parts.size() + 1 < count; text.resize(at)) {
+    at = text.rfind(separator);
+    if (at == text.npos) {
+      return {};
+    }
+    parts.insert(parts.begin(), text.substr(at + 1));
+  }
+  parts.insert(parts.begin(), text);
+  return parts;
+}
+
+std::optional<Unit> unit_named(std::span<const Unit> units, const std::string& name) {
+  const auto found = std::ranges::find(units, name, &Unit::name);
+  return found == units.end() ? std::nullopt : std::optional(*found);
+}
+
+TableOptions table_options(const ImportOptions& options) {
+  TableOptions table{.time_column = options.time_column,
+                     .pressure_columns = options.pressure_columns};
+  if (!options.time_unit.empty()) {
+    table.time_unit = unit_named(time_units, options.time_unit);
+    if (!table.time_unit) {
+      refuse_flag("--time-unit", options.time_unit, "give s, ms, us or ns");
+    }
+  }
+  if (!options.pose_unit.empty()) {
+    const auto names = split_last(options.pose_unit, ',', 2);
+    table.length_unit = names.empty() ? std::nullopt : unit_named(length_units, names[0]);
+    table.angle_unit = names.empty() ? std::nullopt : unit_named(angle_units, names[1]);
+    if (!table.length_unit || !table.angle_unit) {
+      refuse_flag("--pose-unit", options.pose_unit, "give mm,rad or mm,deg or m,rad or m,deg");
+    }
+  }
+  if (!options.pose_columns.empty()) {
+    const auto names = split_last(options.pose_columns, ',', 3);
+    if (names.empty()) {
+      refuse_flag("--pose-columns", options.pose_columns, "give three names, X,Y,THETA");
+    }
+    std::ranges::copy(names, table.pose_columns.begin());
+  }
+  return table;
+}
+
+Array array_of(const std::string& text) {
+  const auto parts = split_last(text, ':', 3);
+  const auto columns = parts.empty() ? std::nullopt : whole_number_of(parts[0]);
+  if (!columns) {
+    return {read_array(text)};
+  }
+  constexpr std::int64_t most = 1024;
+  const auto rows = whole_number_of(parts[1]);
+  const auto pitch_mm = number_of(parts[2]);
+  if (*columns < 1 || *columns > most || !rows || *rows < 1 || *rows > most || !pitch_mm ||
+      *pitch_mm < 1e-3 || *pitch_mm > 1e3) {
+    refuse_flag("--array", text,
+                "give COLUMNS:ROWS:PITCH, with 1 to {} columns and rows and a pitch of 0.001 to "
+                "1000 mm, or a file",
+                most);
+  }
+  Array array;
+  array.columns = static_cast<std::size_t>(*columns);
+  array.rows = static_cast<std::size_t>(*rows);
+  array.elements_mm = grid_array(static_cast<int>(*columns), static_cast<int>(*rows), *pitch_mm);
+  return array;
+}
+
+Truth truth_of(const std::string& text, const TableOptions& units) {
+  const auto parts = split_last(text, ',', 4);
+  std::array<std::optional<double>, 3> pose;
+  for (std::size_t i = 0; i < 3; ++i) {
+    pose[i] = parts.empty() ? std::nullopt : number_of(parts[i + 1]);
+    if (!pose[i]) {
+      refuse_flag("--truth", text, "give LABEL,X,Y,THETA, in the units of --pose-unit");
+    }
+  }
+  const Unit length = units.length_unit.value_or(length_units.front());
+  const Unit angle = units.angle_unit.value_or(angle_units.front());
+  return {parts[0],
+          {{length.convert(*pose[0]), length.convert(*pose[1])}, angle.convert(*pose[2])}};
+}
+
+/// The command that takes the recording.
+std::string next_command(const ImportOptions& options, const Recording& recording) {
+  const bool raw = recording.pressure_unit == "raw";
+  if (recording.rows == "frames") {
+    return options.poses.empty()
+               ? fmt::format(
+                     "palpate live --sensor replay:{} --poses POSES --maps MAPS/, or import again "
+                     "with --poses",
+                     options.output)
+               : fmt::format("palpate touches {} -o TOUCHES.h5{}", options.output,
+                             raw ? " --onset P" : "");
+  }
+  const std::string threshold = raw ? " --threshold P" : "";
+  return recording.object.empty()
+             ? fmt::format("palpate recognize {} --maps MAPS/{}", options.output, threshold)
+             : fmt::format("palpate map {} -o MAPS/{}", options.output, threshold);
+}
+
+void print_summary(const ImportOptions& options, const Recording& r, bool assumed_units) {
+  fmt::print("{}: {} {} of {} elements", options.output, r.size(), r.rows, r.elements());
+  if (!r.time_s.empty()) {
+    fmt::print(" in {:.3f} s", r.time_s.back() - r.time_s.front());
+  }
+  if (r.rows == "frames") {
+    fmt::print(", {} with a pose", std::ranges::count_if(r.T_robot_sensor, [](const Pose& pose) {
+                 return !std::isnan(pose.theta_rad);
+               }));
+  }
+  std::size_t unknown = 0;
+  for (std::size_t k = 0; k < r.pressure.size(); ++k) {
+    const bool alive = r.valid.empty() || r.valid[k % r.valid.size()] != 0;
+    unknown += !alive || std::isnan(r.pressure[k]) ? 1 : 0;
+  }
+  if (unknown > 0) {
+    fmt::print(", {} readings unknown or dead", unknown);
+  }
+  if (assumed_units) {
+    fmt::print(", poses taken to be in mm and rad");
+  }
+  fmt::print("; next: {}\n", next_command(options, r));
+}
+
+void import_tables(const ImportOptions& options) {
+  const TableOptions tables = table_options(options);
+  require_above("--largest-gap-s", options.largest_gap_s, 0.0);
+  if (options.pressure_unit != "kPa" && options.pressure_unit != "raw") {
+    refuse_flag("--pressure-unit", options.pressure_unit, "give kPa or raw");
+  }
+  CommandFiles files;
+  files.reads("PRESSURES", options.pressures);
+  if (!options.poses.empty()) {
+    files.reads("--poses", options.poses);
+  }
+  files.reads("--array", options.array);
+  files.writes("-o", options.output);
+  files.require_distinct();
+  require_writable(options.output);
+
+  std::optional<Truth> truth;
+  if (!options.truth.empty()) {
+    truth = truth_of(options.truth, tables);
+  }
+  auto [recording, assumed_units] = read_tables(options, tables, array_of(options.array));
+  recording.object = options.object;
+  recording.truth = truth;
+  write_recording(options.output, recording);
+  print_summary(options, recording, assumed_units);
+}
+
+}  // namespace
+
+void add_import(CLI::App& app) {
+  auto* command = app.add_subcommand(
+      "import",
+      "Write a recording (HDF5) from tables: pressures, poses and the positions of the elements. "
+      "Tables are CSV files, with commas, semicolons, tabs or blanks between the cells; the "
+      "pressures may also be an array of numpy.save. docs/files.md describes them");
+  const auto options = std::make_shared<ImportOptions>();
+  command
+      ->add_option("PRESSURES", options->pressures,
+                   "CSV: a row for each frame or touch, with a column for each element (and time, "
+                   "where it is known); or a row for each reading, with the columns time, element "
+                   "(counted from 0) and pressure. NPY: [n, elements] or [n, rows, columns]. An "
+                   "empty cell or NaN is an unknown reading; an element without any reading is "
+                   "dead")
+      ->required();
+  command->add_option(
+      "--poses", options->poses,
+      "CSV with the poses T_robot_sensor: columns x, y, theta (or yaw) and time. Frames take the "
+      "pose interpolated at their time; without a column time, rows are taken one by one. It may "
+      "be PRESSURES itself [default: frames without poses]");
+  command
+      ->add_option("--array", options->array,
+                   "COLUMNS:ROWS:PITCH, a grid with its pitch in mm, centred about the sensor's "
+                   "origin; or a CSV file with a row 'x y' in mm for each element. Elements are "
+                   "counted row by row: x grows along a row, y from row to row")
+      ->required();
+  command->add_option("-o,--output", options->output, "Recording to write (HDF5)")->required();
+  command->add_option(
+      "--rows", options->rows,
+      "What a row of the pressures is: frames (a stream, of which 'palpate touches' "
+      "finds the touches) or touches (single presses, each with a pose) [default: "
+      "frames where there are times, else touches]");
+  command
+      ->add_option("--pressure-unit", options->pressure_unit,
+                   "Unit of the pressures: kPa, or raw for readings of another unit")
+      ->capture_default_str();
+  command->add_option(
+      "--pose-unit", options->pose_unit,
+      "Units of the poses: mm,rad or mm,deg or m,rad or m,deg [default: by the columns' names, as "
+      "in x_m or theta_deg, else mm,rad]");
+  command->add_option("--time-unit", options->time_unit,
+                      "Unit of the times: s, ms, us or ns [default: by the column's name, as in "
+                      "time_ns, else s]");
+  command->add_option("--time-column", options->time_column,
+                      "Name of the column of times, in both tables; a column without a name is "
+                      "called by its number, from 1 [default: time, timestamp, stamp or t]");
+  command->add_option("--pressure-columns", options->pressure_columns,
+                      "Columns of the pressures: a prefix of their names, or FIRST:LAST [default: "
+                      "all columns that are neither time nor pose]");
+  command->add_option("--pose-columns", options->pose_columns,
+                      "Names of the columns of the poses, X,Y,THETA [default: x,y,theta]");
+  command
+      ->add_option("--largest-gap-s", options->largest_gap_s,
+                   "Poses further apart in time than this are not interpolated: a frame between "
+                   "them has no pose, s")
+      ->capture_default_str();
+  command->add_option("--rate", options->rate_hz,
+                      "Frames per second of pressures without times; the first frame is at 0 s");
+  command->add_option("--object", options->object, "Label of the touched object");
+  command->add_option("--truth", options->truth,
+                      "True identity and pose T_object_robot of the object, LABEL,X,Y,THETA in the "
+                      "units of --pose-unit");
+  command->callback([options] { import_tables(*options); });
+}
+
+}  // namespace palpate::cli

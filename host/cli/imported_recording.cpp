@@ -1,0 +1,195 @@
+#include "imported_recording.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+#include <vector>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "npy_file.hpp"
+#include "options.hpp"
+#include "pose_table.hpp"
+#include "pressure_table.hpp"
+#include "recording_rules.hpp"
+
+namespace palpate::cli {
+
+namespace {
+
+PressureTable read_npy_pressures(const std::string& path, const Array& array) {
+  NpyArray npy = read_npy(path);
+  const std::size_t elements = array.elements_mm.size();
+  const auto& shape = npy.shape;
+  const bool fits = (shape.size() == 2 && shape[1] == elements) ||
+                    (shape.size() == 3 && shape[1] * shape[2] == elements &&
+                     (array.columns == 0 || shape[2] == array.columns));
+  if (!fits || shape[0] == 0) {
+    refuse(path, "has the shape ({}); save [n, {}]{}, n at least 1, or correct --array",
+           fmt::format("{}", fmt::join(shape, ", ")), elements,
+           array.columns == 0 ? "" : fmt::format(" or [n, {}, {}]", array.rows, array.columns));
+  }
+  const auto infinite = std::ranges::find_if(npy.values, [](double p) { return std::isinf(p); });
+  if (infinite != npy.values.end()) {
+    const auto at = static_cast<std::size_t>(infinite - npy.values.begin());
+    refuse(path, "row {}, element {} = {}; save finite numbers, or NaN where a reading is unknown",
+           at / elements, at % elements, *infinite);
+  }
+  return {.pressure = std::move(npy.values)};
+}
+
+/// Marks as dead the elements without any reading. In touches, which have no unknown readings, it
+/// also marks single readings.
+void mark_unknown(const std::string& path, Recording& recording) {
+  const std::size_t e = recording.elements_mm.size();
+  std::vector<std::uint8_t> read(e, 0);
+  bool some_unknown = false;
+  for (std::size_t k = 0; k < recording.pressure.size(); ++k) {
+    read[k % e] |= std::isnan(recording.pressure[k]) ? 0 : 1;
+  }
+  for (std::size_t i = 0; i < e; ++i) {
+    read[i] = recording.valid.empty() ? read[i] : read[i] & recording.valid[i];
+  }
+  if (std::ranges::count(read, 0) == static_cast<std::ptrdiff_t>(e)) {
+    refuse(path, "holds no reading of a living element; write the pressures");
+  }
+  for (std::size_t k = 0; k < recording.pressure.size(); ++k) {
+    some_unknown = some_unknown || (read[k % e] != 0 && std::isnan(recording.pressure[k]));
+  }
+  if (!recording.valid.empty() || std::ranges::count(read, 0) > 0) {
+    recording.valid = read;
+  }
+  if (some_unknown && recording.rows == "touches") {
+    recording.valid.resize(recording.pressure.size());
+    for (std::size_t k = 0; k < recording.pressure.size(); ++k) {
+      recording.valid[k] = std::isnan(recording.pressure[k]) ? 0 : read[k % e];
+    }
+  }
+}
+
+std::vector<Pose> poses_by_time(const PoseTable& poses, const std::vector<double>& time_s,
+                                double largest_gap_s) {
+  PoseTrack track(largest_gap_s);
+  for (std::size_t i = 0; i < poses.time_s.size(); ++i) {
+    if (is_finite(poses.T_robot_sensor[i])) {
+      track.add(poses.time_s[i], poses.T_robot_sensor[i]);
+    }
+  }
+  track.end();
+  std::vector<Pose> joined;
+  joined.reserve(time_s.size());
+  for (const double time : time_s) {
+    joined.push_back(track.at(time).value_or(unknown_pose));
+  }
+  return joined;
+}
+
+/// Gives every row its pose, by time or row by row.
+void join(PoseTable poses, const ImportOptions& options, Recording& recording) {
+  const std::size_t n = recording.pressure.size() / recording.elements_mm.size();
+  const bool same_rows = poses.time_s.empty() || options.poses == options.pressures;
+  if (!same_rows && recording.time_s.empty()) {
+    refuse(options.poses,
+           "has times, {} has none; give both a column 'time' or neither, or give the frames' "
+           "--rate",
+           options.pressures);
+  }
+  if (!same_rows) {
+    recording.T_robot_sensor = poses_by_time(poses, recording.time_s, options.largest_gap_s);
+    if (std::ranges::none_of(recording.T_robot_sensor, is_finite)) {
+      refuse(options.poses,
+             "no row of {} finds a pose: its times are {} to {} s, the poses' are {} to {} s; "
+             "check clocks and units, or raise --largest-gap-s",
+             options.pressures, recording.time_s.front(), recording.time_s.back(),
+             poses.time_s.front(), poses.time_s.back());
+    }
+    return;
+  }
+  if (poses.T_robot_sensor.size() != n) {
+    refuse(options.poses,
+           "holds {} poses without a time for {} rows of {}; write one for each row, or give both "
+           "a column 'time'",
+           poses.T_robot_sensor.size(), n, options.pressures);
+  }
+  recording.T_robot_sensor = std::move(poses.T_robot_sensor);
+}
+
+/// Requires a pose of every touch.
+void require_touch_poses(const ImportOptions& options, const Recording& recording) {
+  if (options.poses.empty()) {
+    refuse(options.pressures,
+           "its rows are touches, and each needs a pose; give --poses, or for a stream of frames a "
+           "column 'time' or --rate");
+  }
+  for (std::size_t i = 0; i < recording.size(); ++i) {
+    if (!is_finite(recording.T_robot_sensor[i])) {
+      refuse(options.poses,
+             "has no pose for row {} of {}, counted from 0{}, and a touch needs one; add it, or "
+             "give --rows frames",
+             i, options.pressures,
+             recording.time_s.empty() ? "" : fmt::format(", at {} s", recording.time_s[i]));
+    }
+  }
+}
+
+void choose_rows(const ImportOptions& options, Recording& recording) {
+  const std::size_t n = recording.pressure.size() / recording.elements_mm.size();
+  if (options.rate_hz) {
+    require_above("--rate", *options.rate_hz, 0.0);
+    if (!recording.time_s.empty()) {
+      refuse_flag("--rate", *options.rate_hz, "{} has times; leave the flag out",
+                  options.pressures);
+    }
+    for (std::size_t i = 0; i < n; ++i) {
+      recording.time_s.push_back(static_cast<double>(i) / *options.rate_hz);
+    }
+  }
+  recording.rows = recording.time_s.empty() ? "touches" : "frames";
+  if (options.rows.empty()) {
+    return;
+  }
+  if (options.rows != "touches" && options.rows != "frames") {
+    refuse_flag("--rows", options.rows, "give frames or touches");
+  }
+  if (options.rows == "frames" && recording.time_s.empty()) {
+    refuse(options.pressures, "frames need times; add a column 'time', or give --rate");
+  }
+  recording.rows = options.rows;
+}
+
+}  // namespace
+
+ImportedRecording read_tables(const ImportOptions& options, const TableOptions& columns,
+                              Array array) {
+  PressureTable pressures =
+      is_npy(options.pressures)
+          ? read_npy_pressures(options.pressures, array)
+          : read_pressures(options.pressures, array.elements_mm.size(), columns);
+  ImportedRecording imported;
+  Recording& recording = imported.recording;
+  recording.pressure_unit = options.pressure_unit;
+  recording.elements_mm = std::move(array.elements_mm);
+  recording.valid = std::move(array.valid);
+  recording.baseline = std::move(array.baseline);
+  recording.pressure = std::move(pressures.pressure);
+  recording.time_s = std::move(pressures.time_s);
+  recording.device_time_s = std::move(pressures.device_time_s);
+  recording.lost_before = std::move(pressures.lost_before);
+  choose_rows(options, recording);
+  mark_unknown(options.pressures, recording);
+  if (options.poses.empty()) {
+    recording.T_robot_sensor.assign(recording.pressure.size() / recording.elements_mm.size(),
+                                    unknown_pose);
+  } else {
+    PoseTable poses = read_poses(options.poses, columns);
+    imported.assumed_units = poses.assumed_units;
+    join(std::move(poses), options, recording);
+  }
+  if (recording.rows == "touches") {
+    require_touch_poses(options, recording);
+  }
+  return imported;
+}
+
+}  // namespace palpate::cli

@@ -1,0 +1,50 @@
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <string>
+
+#include "array_table.hpp"
+#include "palpate/pose_track.hpp"
+#include "palpate/touch.hpp"
+#include "table_columns.hpp"
+
+namespace palpate::cli {
+
+/// The flags of 'palpate import'.
+struct ImportOptions {
+  std::string pressures;
+  std::string poses;
+  std::string array;
+  std::string output;
+  std::string pressure_unit = "kPa";
+  std::string pose_unit;
+  std::string time_unit;
+  std::string time_column;
+  std::string pressure_columns;
+  std::string pose_columns;
+  double largest_gap_s = PosedSensor::usual_gap_s;
+  std::optional<double> rate_hz;
+  std::string rows;
+  std::string object;
+  std::string truth;
+};
+
+/// The array of --array: a grid, or a file.
+struct Array : ArrayTable {
+  std::size_t columns = 0;  ///< 0: not a grid
+  std::size_t rows = 0;
+};
+
+/// The recording that the tables make.
+struct ImportedRecording {
+  Recording recording;
+  bool assumed_units = false;  ///< nothing said that the poses are in mm and rad
+};
+
+/// Reads the pressures and the poses and joins them.
+/// @throws Error, naming file and line or row, where the tables do not make a recording
+ImportedRecording read_tables(const ImportOptions& options, const TableOptions& columns,
+                              Array array);
+
+}  // namespace palpate::cli

@@ -1,0 +1,248 @@
+#include "npy_file.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <cstdint>
+#include <cstring>
+#include <fstream>
+#include <functional>
+#include <numeric>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "available_memory.hpp"
+#include "input_file.hpp"
+#include "number_text.hpp"
+#include "printable.hpp"
+
+namespace palpate {
+
+namespace {
+
+static_assert(std::endian::native == std::endian::little, "NPY files are read as they are stored");
+
+constexpr std::string_view magic = "\x93NUMPY";
+
+/// Returns the values of `count` numbers of this type.
+template <typename Number>
+void widen(const char* bytes, std::size_t count, double* values) {
+  for (std::size_t i = 0; i < count; ++i) {
+    Number number;
+    std::memcpy(&number, bytes + i * sizeof number, sizeof number);
+    values[i] = static_cast<double>(number);
+  }
+}
+
+/// A type of numbers, as numpy's `descr` names it.
+struct NumberType {
+  std::string_view descr;
+  std::size_t width;
+  void (*widen)(const char*, std::size_t, double*);
+};
+
+constexpr NumberType types[] = {{"<f4", 4, widen<float>},        {"<f8", 8, widen<double>},
+                                {"|i1", 1, widen<std::int8_t>},  {"|u1", 1, widen<std::uint8_t>},
+                                {"<i2", 2, widen<std::int16_t>}, {"<u2", 2, widen<std::uint16_t>},
+                                {"<i4", 4, widen<std::int32_t>}, {"<u4", 4, widen<std::uint32_t>},
+                                {"<i8", 8, widen<std::int64_t>}, {"<u8", 8, widen<std::uint64_t>}};
+
+/// The header's dictionary, which has exactly three keys: a literal of Python such as
+/// {'descr': '<f4', 'fortran_order': False, 'shape': (3, 4), }
+class Header {
+ public:
+  Header(const std::filesystem::path& path, std::string_view text) : path_(path), rest_(text) {
+    skip("{");
+    for (int key = 0; key < 3; ++key) {
+      read_entry();
+      if (!try_skip(",")) {
+        break;
+      }
+    }
+    skip("}");
+    if (!descr_ || !fortran_order_ || !shape_ || !rest_.empty()) {
+      refuse_header();
+    }
+  }
+
+  const std::string& descr() const { return *descr_; }
+  bool fortran_order() const { return *fortran_order_; }
+  const std::vector<std::size_t>& shape() const { return *shape_; }
+
+ private:
+  void read_entry() {
+    const std::string key = quoted();
+    skip(":");
+    if (key == "descr" && !descr_) {
+      if (rest_.starts_with('[')) {
+        refuse(path_, "holds records with named fields; save one array of numbers");
+      }
+      descr_ = quoted();
+    } else if (key == "fortran_order" && !fortran_order_) {
+      fortran_order_ = try_skip("True");
+      if (!*fortran_order_) {
+        skip("False");
+      }
+    } else if (key == "shape" && !shape_) {
+      read_shape();
+    } else {
+      refuse_header();
+    }
+  }
+
+  void read_shape() {
+    shape_.emplace();
+    skip("(");
+    while (!try_skip(")")) {
+      const std::size_t digits = std::min(rest_.find_first_not_of("0123456789"), rest_.size());
+      const auto extent = whole_number_of(rest_.substr(0, digits));
+      if (!extent) {
+        refuse_header();
+      }
+      shape_->push_back(static_cast<std::size_t>(*extent));
+      rest_.remove_prefix(digits);
+      if (!try_skip(",")) {
+        skip(")");
+        return;
+      }
+    }
+  }
+
+  std::string quoted() {
+    skip("'");
+    const std::size_t end = rest_.find('\'');
+    if (end == rest_.npos) {
+      refuse_header();
+    }
+    const std::string text(rest_.substr(0, end));
+    rest_.remove_prefix(end);
+    skip("'");
+    return text;
+  }
+
+  bool try_skip(std::string_view token) {
+    if (!rest_.starts_with(token)) {
+      return false;
+    }
+    rest_.remove_prefix(token.size());
+    rest_.remove_prefix(std::min(rest_.find_first_not_of(" \n"), rest_.size()));
+    return true;
+  }
+
+  void skip(std::string_view token) {
+    if (!try_skip(token)) {
+      refuse_header();
+    }
+  }
+
+  [[noreturn]] void refuse_header() const {
+    refuse(path_, "its NPY header is damaged; save the array again with numpy.save");
+  }
+
+  const std::filesystem::path& path_;
+  std::string_view rest_;
+  std::optional<std::string> descr_;
+  std::optional<bool> fortran_order_;
+  std::optional<std::vector<std::size_t>> shape_;
+};
+
+/// Reads the header's text, up to the numbers.
+std::string read_header(std::ifstream& file, const std::filesystem::path& path) {
+  char begin[8] = {};
+  file.read(begin, sizeof begin);
+  const int version = begin[6];
+  const std::size_t size_bytes = version == 1 ? 2 : 4;
+  std::uint32_t size = 0;
+  file.read(reinterpret_cast<char*>(&size), static_cast<std::streamsize>(size_bytes));
+  if (!file || version < 1 || version > 3 || begin[7] != 0) {
+    refuse(path, "is cut off, or of a newer NPY version than 3.0; save the array again");
+  }
+  constexpr std::uint32_t largest = 1 << 16;
+  std::string text(std::min(size, largest), '\0');
+  file.read(text.data(), static_cast<std::streamsize>(text.size()));
+  if (!file || size > largest) {
+    refuse(path, "its NPY header is cut off; save the array again with numpy.save");
+  }
+  return text;
+}
+
+const NumberType& type_of(const std::filesystem::path& path, const std::string& descr) {
+  const auto* type = std::ranges::find(types, descr, &NumberType::descr);
+  if (type == std::end(types)) {
+    refuse(path,
+           "holds numbers of type '{}'; save them as float32: numpy.save(file, "
+           "array.astype('<f4'))",
+           printable(descr));
+  }
+  return *type;
+}
+
+/// Reverses the order of the values: stored with the first index varying fastest.
+std::vector<double> from_fortran_order(const std::vector<double>& stored,
+                                       const std::vector<std::size_t>& shape) {
+  std::vector<double> values(stored.size());
+  std::vector<std::size_t> index(shape.size(), 0);
+  for (const double value : stored) {
+    std::size_t place = 0;
+    for (std::size_t axis = 0; axis < shape.size(); ++axis) {
+      place = place * shape[axis] + index[axis];
+    }
+    values[place] = value;
+    for (std::size_t axis = 0; axis < shape.size() && ++index[axis] == shape[axis]; ++axis) {
+      index[axis] = 0;
+    }
+  }
+  return values;
+}
+
+}  // namespace
+
+bool is_npy(const std::filesystem::path& path) {
+  require_readable(path);
+  std::ifstream file(path, std::ios::binary);
+  std::string begin(magic.size(), '\0');
+  file.read(begin.data(), static_cast<std::streamsize>(begin.size()));
+  return file && begin == magic;
+}
+
+NpyArray read_npy(const std::filesystem::path& path) {
+  const std::uintmax_t file_bytes = require_readable(path);
+  std::ifstream file(path, std::ios::binary);
+  const std::string text = read_header(file, path);
+  const Header header(path, text);
+  const NumberType& type = type_of(path, header.descr());
+  std::uint64_t bytes = type.width;
+  for (const std::size_t extent : header.shape()) {
+    if (__builtin_mul_overflow(bytes, extent, &bytes)) {
+      bytes = UINT64_MAX;
+      break;
+    }
+  }
+  const auto begin = static_cast<std::uintmax_t>(file.tellg());
+  if (bytes != file_bytes - begin) {
+    refuse(path, "holds {} bytes of numbers, its shape ({}) makes {}; save the array again",
+           file_bytes - begin, fmt::format("{}", fmt::join(header.shape(), ", ")), bytes);
+  }
+  const std::size_t count = bytes / type.width;
+  require_memory(path, fmt::format("an array of {} numbers", count),
+                 (header.fortran_order() ? 2 : 1) * count * sizeof(double));
+  NpyArray array{.shape = header.shape(), .values = std::vector<double>(count)};
+  constexpr std::size_t piece = 1 << 16;
+  std::vector<char> stored(piece * type.width);
+  for (std::size_t first = 0; first < count; first += piece) {
+    const std::size_t some = std::min(piece, count - first);
+    if (!file.read(stored.data(), static_cast<std::streamsize>(some * type.width))) {
+      refuse(path, "cannot be read to its end; copy or save it again");
+    }
+    type.widen(stored.data(), some, array.values.data() + first);
+  }
+  if (header.fortran_order()) {
+    array.values = from_fortran_order(array.values, array.shape);
+  }
+  return array;
+}
+
+}  // namespace palpate

@@ -1,0 +1,35 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <vector>
+
+#include "table_columns.hpp"
+
+namespace palpate {
+
+/// Readings of an array, row by row.
+struct PressureTable {
+  std::vector<double> pressure;            ///< [n, e]; NaN where a cell is empty
+  std::vector<double> time_s;              ///< [n], or empty
+  std::vector<double> device_time_s;       ///< [n], or empty
+  std::vector<std::uint64_t> lost_before;  ///< [n], or empty
+};
+
+/// Reads pressures from a CSV file.
+///
+/// Wide: a row for each frame and a column for each element, in the order of the elements. The
+/// columns are those that `options` names or, in a table with a header, all columns that have a
+/// name and hold neither times, nor poses, nor `device_time`, nor `lost_before`. A table without a
+/// header holds the pressures, and before them the times where it has one column more than
+/// elements.
+///
+/// Long: a row for each reading, in a table with the columns `element` (or taxel, counted from 0)
+/// and `pressure` (or value), and `time` or `frame`, which is the same in all readings of a frame.
+///
+/// @param elements of the array, e
+/// @throws Error, naming file, line and column, where a row does not fit
+PressureTable read_pressures(const std::filesystem::path& path, std::size_t elements,
+                             const TableOptions& options);
+
+}  // namespace palpate

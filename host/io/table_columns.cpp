@@ -1,0 +1,111 @@
+#include "table_columns.hpp"
+
+#include <algorithm>
+#include <cctype>
+#include <cmath>
+
+#include "printable.hpp"
+
+namespace palpate {
+
+namespace {
+
+// rostopic echo -p names its times %time.
+constexpr std::string_view time_names[] = {"time", "timestamp", "stamp", "t", "%time"};
+constexpr std::string_view x_names[] = {"x"};
+constexpr std::string_view y_names[] = {"y"};
+constexpr std::string_view theta_names[] = {"theta", "yaw"};
+
+constexpr Quantity time{time_names, time_units, "--time-unit"};
+constexpr Quantity pose[] = {{x_names, length_units, "--pose-unit"},
+                             {y_names, length_units, "--pose-unit"},
+                             {theta_names, angle_units, "--pose-unit"}};
+
+// The year 5138; a time in ms is larger.
+constexpr double latest_s = 1e11;
+
+/// The unit with which a column's name ends, such as "_ms".
+std::optional<Unit> unit_of(std::string name, std::span<const Unit> units) {
+  std::ranges::transform(name, name.begin(), [](unsigned char c) { return std::tolower(c); });
+  for (const Unit& unit : units) {
+    if (name.ends_with("_" + std::string(unit.name))) {
+      return unit;
+    }
+  }
+  return {};
+}
+
+std::optional<std::size_t> find_usual(const CsvTable& table, const Quantity& quantity) {
+  for (const std::string_view name : quantity.names) {
+    if (const auto found = table.find(name)) {
+      return found;
+    }
+    for (const Unit& unit : quantity.units) {
+      if (const auto found = table.find(std::string(name) + "_" + std::string(unit.name))) {
+        return found;
+      }
+    }
+  }
+  return {};
+}
+
+}  // namespace
+
+std::optional<UnitColumn> find_column(const CsvTable& table, const Quantity& quantity,
+                                      const std::string& name, const std::optional<Unit>& unit) {
+  const auto index = name.empty() ? find_usual(table, quantity) : table.find(name);
+  if (!index) {
+    return {};
+  }
+  const std::string& found = table.columns()[*index];
+  const std::optional<Unit> named = unit_of(found, quantity.units);
+  if (named && unit && named->name != unit->name) {
+    table.refuse("column '{}' is in {} by its name, in {} by {}; make them agree", printable(found),
+                 named->name, unit->name, quantity.flag);
+  }
+  return UnitColumn{.index = *index,
+                    .unit = named.value_or(unit.value_or(quantity.units.front())),
+                    .assumed = !named && !unit};
+}
+
+std::optional<UnitColumn> find_time(const CsvTable& table, const TableOptions& options) {
+  const std::string& name = options.time_column;
+  const auto column =
+      find_column(table, time, table.find(name) ? name : std::string(), options.time_unit);
+  if (!column && !name.empty()) {
+    table.refuse("no column is called '{}'; give --time-column a name of the header",
+                 printable(name));
+  }
+  return column;
+}
+
+double time_in(const CsvTable& table, const UnitColumn& column, double last_s, bool later) {
+  const double number = table.require_number(column.index);
+  const double time_s = column.unit.convert(number);
+  const std::string name = printable(table.columns()[column.index]);
+  if (std::abs(time_s) > latest_s) {
+    table.refuse("column '{}': {} {} is no time; give the unit by --time-unit ms, us or ns", name,
+                 number, column.unit.name);
+  }
+  if (time_s < last_s || (later && time_s == last_s)) {
+    table.refuse("column '{}': {} s is {} the row before, at {} s; sort the rows by time", name,
+                 time_s, later ? "not later than" : "earlier than", last_s);
+  }
+  return time_s;
+}
+
+std::optional<std::array<UnitColumn, 3>> find_pose(const CsvTable& table,
+                                                   const TableOptions& options) {
+  std::array<UnitColumn, 3> columns;
+  for (std::size_t i = 0; i < columns.size(); ++i) {
+    const auto found = find_column(table, pose[i], options.pose_columns[i],
+                                   i < 2 ? options.length_unit : options.angle_unit);
+    if (!found) {
+      return {};
+    }
+    columns[i] = *found;
+  }
+  return columns;
+}
+
+}  // namespace palpate

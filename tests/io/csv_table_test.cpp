@@ -1,0 +1,132 @@
+#include "csv_table.hpp"
+
+#include <gtest/gtest.h>
+
+#include <vector>
+
+#include "scratch_folder.hpp"
+
+namespace palpate {
+namespace {
+
+using Rows = std::vector<std::vector<std::optional<double>>>;
+
+class Csv : public testing::Test {
+ protected:
+  CsvTable table(const std::string& text) const {
+    put_bytes(path_, text);
+    return CsvTable(path_);
+  }
+
+  static Rows rows_of(CsvTable table) {
+    Rows rows;
+    while (table.next()) {
+      rows.emplace_back();
+      for (std::size_t i = 0; i < table.columns().size(); ++i) {
+        rows.back().push_back(table.number(i));
+      }
+    }
+    return rows;
+  }
+  Rows rows_of(const std::string& text) const { return rows_of(table(text)); }
+
+  // What reading all of the table says.
+  std::string message(const std::string& text) const {
+    return input_error([&] { rows_of(text); });
+  }
+
+  ScratchFolder folder_;
+  std::filesystem::path path_ = folder_ / "log.csv";
+};
+
+const Rows two_by_two{{1.5, -2.0}, {3e-3, 4.0}};
+
+TEST_F(Csv, SeparatorsLineEndsAndDecorationsMakeNoDifference) {
+  for (const char* text :
+       {"a,b\n1.5,-2\n3e-3,4\n", "a,b\r\n1.5,-2\r\n3e-3,4",
+        "\xEF\xBB\xBF\"a\",\"b\"\n1.5,\"-2\"\n\n3e-3,+4\n",
+        "# made by hand\n a , b \n1.5, -2 # first\n\n  # second\n3e-3,4\n", "a;b\n1,5;-2\n3e-3;4\n",
+        "a;b\n1.5;-2\n3e-3;4\n", "a\tb\n1,5\t-2\n3e-3\t4\n", "a b\n1.5   -2\n  3e-3 4  \n",
+        "a,b,\n1.5,-2,\n3e-3,4,\n"}) {
+    EXPECT_EQ(rows_of(text), two_by_two) << text;
+    EXPECT_EQ(table(text).columns(), (std::vector<std::string>{"a", "b"})) << text;
+  }
+}
+
+TEST_F(Csv, NumbersAloneHaveNoHeader) {
+  const CsvTable plain = table("1.5,-2\n3e-3,4\n");
+  EXPECT_FALSE(plain.has_header());
+  EXPECT_EQ(plain.columns(), (std::vector<std::string>{"1", "2"}));
+  EXPECT_EQ(rows_of("1.5,-2\n3e-3,4\n"), two_by_two);
+}
+
+// pandas.DataFrame(array).to_csv() writes such names, after an empty one for the index.
+TEST_F(Csv, CountedColumnsAreAHeader) {
+  EXPECT_EQ(rows_of("0,1,2,3,4\n5,6,7,8,9\n"), (Rows{{5.0, 6.0, 7.0, 8.0, 9.0}}));
+  EXPECT_EQ(rows_of(",0,1,2,3,4\n0,5,6,7,8,9\n"), (Rows{{0.0, 5.0, 6.0, 7.0, 8.0, 9.0}}));
+  EXPECT_EQ(rows_of("0,1,2,3,5\n5,6,7,8,9\n").size(), 2u);
+  EXPECT_EQ(rows_of("0,1,2,3\n5,6,7,8\n").size(), 2u) << "it may be a pose";
+}
+
+TEST_F(Csv, EmptyCellsAndNanAreNoNumbers) {
+  const Rows expected{{1.0, {}, {}}, {{}, {}, 2.0}};
+  EXPECT_EQ(rows_of("a,b,c\n1,,\n,nan,2\n"), expected);
+  EXPECT_EQ(rows_of("a;b;c\n1;;NaN\n;\"\";2\n"), expected);
+}
+
+TEST_F(Csv, NamesAreFoundInAnyCase) {
+  const CsvTable named = table("Time,\"p, 0\",P1\n1,2,3\n");
+  EXPECT_EQ(named.find("time"), 0u);
+  EXPECT_EQ(named.find("p, 0"), 1u);
+  EXPECT_EQ(named.find("p1"), 2u);
+  EXPECT_EQ(named.find("p2"), std::nullopt);
+}
+
+TEST_F(Csv, ErrorsNameLineAndColumn) {
+  const std::string place = path_.string() + ":4: ";
+  const auto expect = [&](const std::string& text, std::initializer_list<const char*> parts) {
+    const std::string said = message(text);
+    EXPECT_TRUE(said.starts_with(place)) << said;
+    expect_named(said, parts);
+  };
+  expect("# c\na,b\n1,2\n3,abc\n", {"column 'b': 'abc' is not a finite number; correct it"});
+  expect("# c\na,b\n1,2\n3,inf\n", {"column 'b': 'inf' is not a finite number"});
+  expect("# c\n9,8\n1,2\n3,0x1\n", {"column '2': '0x1'"});
+  expect("# c\na,b\n1,2\n3\n", {"1 cells, the first row 2", "same columns"});
+  expect("# c\na,b\n1,2\n3,4,5\n", {"3 cells"});
+  expect("# c\na,b\n1,2\n3,1.234,5\n", {"3 cells"});
+  expect("# c\na,b\n1,2\n3,\"4\n", {"quote is not closed"});
+  expect("# c\na,b\n1,2\n3,\"4\"5\n", {"follows a closing quote"});
+  expect("# c\na;b\n1;2\n3;1.234,5\n", {"'1.234,5'"});
+}
+
+TEST_F(Csv, FilesThatHoldNoTable) {
+  expect_named(message(""), {"log.csv: holds no row"});
+  expect_named(message("# nothing\n\n"), {"holds no row"});
+  expect_named(message("a,a\n1,2\n"), {":1: ", "two columns are called 'a'"});
+  expect_named(message(std::string("a,b\n\0", 5)), {"is no text", "CSV"});
+  expect_named(message(std::string("\xFF\xFE"
+                                   "1\0,\0",
+                                   6)),
+               {"is no text", "UTF-8"});
+  expect_named(message(std::string((17 << 20) + 1, '1')), {"line 1", "longer than 16 MB"});
+  expect_named(input_error([&] { CsvTable(folder_ / "none.csv"); }), {"none.csv", "no such file"});
+}
+
+// Rows lie across the blocks in which the file is read.
+TEST_F(Csv, LongTablesAreReadWhole) {
+  std::string text = "a,b\n";
+  for (int i = 0; i < 300'000; ++i) {
+    text += std::to_string(i) + ",0.5\n";
+  }
+  CsvTable large = table(text);
+  EXPECT_EQ(large.count_lines(), 300'002u);
+  double sum = 0.0;
+  while (large.next()) {
+    sum += large.require_number(0) + large.require_number(1);
+  }
+  EXPECT_EQ(sum, 300'000.0 * 299'999.0 / 2.0 + 150'000.0);
+}
+
+}  // namespace
+}  // namespace palpate
