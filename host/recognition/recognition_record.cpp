@@ -7,6 +7,7 @@
 
 #include "palpate/error.hpp"
 #include "palpate/pose_error.hpp"
+#include "warnings.hpp"
 
 namespace palpate {
 
@@ -98,6 +99,7 @@ RecognitionStep take_step(Recogniser& recogniser, const RecognitionTask& task,
     step.refined_error_mm = error_mm(task, step.mode.object, step.refined->T_object_robot, truth);
   }
   step.effective_sample_size = recogniser.effective_sample_size();
+  step.warnings = warnings_about(touches, task, step);
   return step;
 }
 
