@@ -66,6 +66,9 @@ bool differ(const std::vector<Reading>& a, const std::vector<Reading>& b) {
 /// brings the touch to the map. Angles count as free, so that the distance is never too large.
 double gap_mm(const Touch& touch, const Box& cells, const PoseLattice& region,
               const glm::dvec2& pivot_mm) {
+  if (touch.elements_mm.empty()) {
+    return 0.0;
+  }
   const Box elements = elements_of(touch);
   const glm::dvec2 middle_mm =
       touch.T_robot_sensor * ((elements.lower + elements.upper) / 2.0) - pivot_mm;
@@ -138,10 +141,10 @@ std::optional<std::string> angles_in_degrees(std::span<const Touch> touches) {
 std::optional<std::string> other_scale(std::span<const Touch> touches,
                                        const RecognitionTask& task) {
   const std::span<const glm::dvec2> elements_mm = touches.front().elements_mm;
-  const double array_mm = elements_of(touches.front()).diagonal();
-  if (array_mm == 0.0) {
+  if (elements_mm.size() < 2) {
     return {};  // a single element has no scale
   }
+  const double array_mm = elements_of(touches.front()).diagonal();
   double pitch_mm = array_mm;
   for (const glm::dvec2& element : elements_mm.subspan(1)) {
     pitch_mm = std::min(pitch_mm, glm::distance(element, elements_mm.front()));
@@ -183,7 +186,8 @@ std::optional<std::string> nothing_felt(std::span<const Touch> touches,
         least = std::min(least, touch.pressure[i]);
       }
     }
-    if (contact && none) {
+    // Eq. 3 compares a single element with itself, and so never finds it out of contact.
+    if (contact && (none || readings.size() == 1)) {
       return {};
     }
   }
@@ -198,14 +202,14 @@ std::optional<std::string> nothing_felt(std::span<const Touch> touches,
       "pressures range from {:.3g} to {:.3g}, and the contact threshold is {:.3g}, in the "
       "recording's unit",
       least, largest, classifier.threshold);
+  if (touches.size() < few) {
+    return {};
+  }
   if (!contact && !none) {
     return fmt::format(
         "no element is known to be in contact or out of contact {}: {}; choose a "
         "--threshold within that range, and a --ratio above 0",
         over, evidence);
-  }
-  if (touches.size() < few) {
-    return {};
   }
   return contact ? fmt::format(
                        "no element is ever out of contact {}: {}; choose a --threshold "

@@ -8,9 +8,8 @@ namespace palpate {
 std::vector<Hypothesis> learned_letters(Device& device) {
   constexpr std::uint64_t seed = 1;
   std::vector<Hypothesis> letters;
-  for (const auto& [letter, symmetry] :
-       {std::pair{"A", 1}, std::pair{"E", 1}, std::pair{"I", 2}, std::pair{"O", 0},
-        std::pair{"U", 1}}) {
+  for (const auto& [letter, symmetry] : {std::pair{"A", 1}, std::pair{"E", 1}, std::pair{"I", 2},
+                                         std::pair{"O", 0}, std::pair{"U", 1}}) {
     const Recording training =
         Simulator(make_shape(letter), {}, digitacts_array(), seed).touch(training_grid(), {});
     MapBuilder builder(device, {});
@@ -28,8 +27,8 @@ Recording letter_touches(const std::string& letter, int touches, std::uint64_t s
   for (Pose& pose : T_robot_sensor) {
     pose = inverse(T_object_robot) * pose;
   }
-  Recording recording =
-      Simulator(make_shape(letter), {}, digitacts_array(), seed).touch(T_robot_sensor, T_object_robot);
+  Recording recording = Simulator(make_shape(letter), {}, digitacts_array(), seed)
+                            .touch(T_robot_sensor, T_object_robot);
   recording.path = letter;
   recording.truth = {.object = letter, .T_object_robot = T_object_robot};
   return recording;
