@@ -2,11 +2,13 @@
 
 #include <algorithm>
 #include <chrono>
+#include <utility>
 
 #include <fmt/format.h>
 
 #include "palpate/error.hpp"
 #include "palpate/pose_error.hpp"
+#include "turn_warning.hpp"
 #include "warnings.hpp"
 
 namespace palpate {
@@ -100,6 +102,11 @@ RecognitionStep take_step(Recogniser& recogniser, const RecognitionTask& task,
   }
   step.effective_sample_size = recogniser.effective_sample_size();
   step.warnings = warnings_about(touches, task, step);
+  if (step.warnings.empty()) {
+    if (auto turned = turned_alike(recogniser, task, step, truth)) {
+      step.warnings.push_back(*std::move(turned));
+    }
+  }
   return step;
 }
 
