@@ -5,16 +5,20 @@
 
 namespace palpate {
 
+OccupancyGrid learned_map(Device& device, const std::string& shape, std::uint64_t seed) {
+  const Recording training =
+      Simulator(make_shape(shape), {}, digitacts_array(), seed).touch(training_grid(), {});
+  MapBuilder builder(device, {});
+  builder.add(training.touches(0, training.size()));
+  return builder.build(shape);
+}
+
 std::vector<Hypothesis> learned_letters(Device& device) {
   constexpr std::uint64_t seed = 1;
   std::vector<Hypothesis> letters;
   for (const auto& [letter, symmetry] : {std::pair{"A", 1}, std::pair{"E", 1}, std::pair{"I", 2},
                                          std::pair{"O", 0}, std::pair{"U", 1}}) {
-    const Recording training =
-        Simulator(make_shape(letter), {}, digitacts_array(), seed).touch(training_grid(), {});
-    MapBuilder builder(device, {});
-    builder.add(training.touches(0, training.size()));
-    letters.push_back({.map = builder.build(letter)});
+    letters.push_back({.map = learned_map(device, letter, seed)});
     letters.back().map.symmetry = symmetry;
   }
   return letters;

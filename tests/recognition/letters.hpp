@@ -10,6 +10,9 @@
 
 namespace palpate {
 
+/// The map of a simulated shape as the paper learns it, of symmetry 1.
+OccupancyGrid learned_map(Device& device, const std::string& shape, std::uint64_t seed);
+
 /// Maps of the letters A, E, I, O and U as the paper learns them, with their symmetries.
 std::vector<Hypothesis> learned_letters(Device& device);
 
