@@ -159,7 +159,12 @@ void print_map(const std::string& path) {
   fmt::print("  log odds          {:.3f} to {:.3f} nats\n", s.log_odds.least, s.log_odds.most);
   fmt::print("  occupied          {} cells, {:.1f} mm2\n", s.occupied,
              static_cast<double>(s.occupied) * m.cell_mm * m.cell_mm);
-  fmt::print("  symmetry          {}\n", m.symmetry == 0 ? "full" : fmt::format("{}", m.symmetry));
+  const auto symmetry_text = [](int n) { return n == 0 ? "full" : fmt::format("{}", n); };
+  fmt::print("  symmetry          {}\n", symmetry_text(m.symmetry));
+  if (m.suggested_symmetry) {
+    fmt::print("  suggested         {}, the symmetry that the map shows\n",
+               symmetry_text(*m.suggested_symmetry));
+  }
 }
 
 void print_posterior(const std::string& path) {

@@ -18,6 +18,7 @@
 #include "options.hpp"
 #include "palpate/files.hpp"
 #include "palpate/map_builder.hpp"
+#include "palpate/rotational_symmetry.hpp"
 #include "printable.hpp"
 #include "progress.hpp"
 #include "recordings.hpp"
@@ -169,6 +170,22 @@ void add_in_batches(MapBuilder& builder, std::span<const Touch> touches,
   }
 }
 
+/// What the map says about the object's symmetry, and what --symmetry to give.
+std::string symmetry_words(const OccupancyGrid& map, const RotationalSymmetry& measured) {
+  const int n = measured.suggested;
+  const std::string given =
+      n == map.symmetry ? ""
+      : n == 1          ? fmt::format("; --symmetry {} was given", map.symmetry)
+                        : fmt::format("; --symmetry {} lets pose errors ignore such turns", n);
+  if (n == 1) {
+    return fmt::format("{} looks different after every turn, by {:.2f} mm or more{}", map.label,
+                       measured.apart_mm[measured.nearest()], given);
+  }
+  return fmt::format("{} looks the same after {}, within {:.2f} mm{}", map.label,
+                     n == 0 ? "any turn" : fmt::format("every 1/{} of a turn", n),
+                     measured.apart_mm[n], given);
+}
+
 void build_maps(const Options& options) {
   const std::filesystem::path output = options.output;
   std::error_code ignored;
@@ -197,6 +214,7 @@ void build_maps(const Options& options) {
   Device device = Device::open(options.device);
   model.sensor.prior = estimate ? estimate_prior(device, objects, model) : given_prior;
   std::vector<OccupancyGrid> maps;
+  std::vector<std::optional<RotationalSymmetry>> symmetries;
   {
     Progress progress("building maps");
     MapBuilder builder(device, model);
@@ -208,6 +226,10 @@ void build_maps(const Options& options) {
       });
       maps.push_back(builder.build(object.label));
       maps.back().symmetry = options.symmetry;
+      symmetries.push_back(measure_symmetry(maps.back()));
+      if (symmetries.back()) {
+        maps.back().suggested_symmetry = symmetries.back()->suggested;
+      }
     }
   }
 
@@ -226,6 +248,9 @@ void build_maps(const Options& options) {
     fmt::print("{}: {} from {} touches, {} x {} cells of {} mm, prior {:.3g}\n",
                map_paths[i].string(), map.label, objects[i].touches.size(), map.nx, map.ny,
                map.cell_mm, map.prior);
+    if (symmetries[i]) {
+      fmt::print("{}: {}\n", map_paths[i].string(), symmetry_words(map, *symmetries[i]));
+    }
   }
   if (!options.ros.empty()) {
     for (const OccupancyGrid& map : maps) {

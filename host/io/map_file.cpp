@@ -29,10 +29,10 @@ void require_sound(const std::filesystem::path& path, const std::optional<std::s
 void scan_map(const std::filesystem::path& path,
               const std::function<void(const OccupancyGrid&)>& head,
               const std::function<void(std::span<const float>)>& cells) {
-  Hdf5Contents file(
-      path,
-      {"format", "version", "label", "cell_mm", "origin_mm", "prior", "symmetry", "spread_mm"},
-      {"log_odds"});
+  Hdf5Contents file(path,
+                    {"format", "version", "label", "cell_mm", "origin_mm", "prior", "symmetry",
+                     "spread_mm", "suggested_symmetry"},
+                    {"log_odds"});
   require_format(file, map_format);
   OccupancyGrid map;
   map.label = file.text("label");
@@ -43,6 +43,9 @@ void scan_map(const std::filesystem::path& path,
   map.symmetry = file.integer("symmetry", 0);
   if (file.has_attribute("spread_mm")) {  // other programs' maps may have none
     map.spread_mm = file.number("spread_mm");
+  }
+  if (file.has_attribute("suggested_symmetry")) {
+    map.suggested_symmetry = file.integer("suggested_symmetry", 0);
   }
   const std::vector<std::uint64_t>& shape = file.shape("log_odds", 2);
   const auto [least, most] = std::minmax(shape[0], shape[1]);
@@ -92,6 +95,9 @@ void write_map(const std::filesystem::path& path, const OccupancyGrid& map) {
   file.attribute("symmetry", map.symmetry);
   if (map.spread_mm) {
     file.attribute("spread_mm", *map.spread_mm);
+  }
+  if (map.suggested_symmetry) {
+    file.attribute("suggested_symmetry", *map.suggested_symmetry);
   }
   file.dataset("log_odds", {static_cast<std::size_t>(map.ny), static_cast<std::size_t>(map.nx)},
                map.log_odds);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -59,10 +60,13 @@ std::optional<std::string> fault_without_cells(const OccupancyGrid& map) {
   if (!(map.prior > 0.0 && map.prior < 1.0)) {
     return fmt::format("'prior' = {}; make it a probability between 0 and 1", map.prior);
   }
-  if (map.symmetry < 0) {
-    return fmt::format(
-        "'symmetry' = {}; make it 1, n for an n-fold symmetry or 0 for full symmetry",
-        map.symmetry);
+  for (const auto& [field, symmetry] :
+       {std::pair{"symmetry", map.symmetry},
+        std::pair{"suggested_symmetry", map.suggested_symmetry.value_or(1)}}) {
+    if (symmetry < 0) {
+      return fmt::format("'{}' = {}; make it 1, n for an n-fold symmetry or 0 for full symmetry",
+                         field, symmetry);
+    }
   }
   // A map is wider than its spread, as it reaches several spreads beyond what was touched.
   const double side_mm = map.cell_mm * std::max(map.nx, map.ny);

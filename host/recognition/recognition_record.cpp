@@ -3,11 +3,14 @@
 #include <algorithm>
 #include <chrono>
 #include <numbers>
+#include <utility>
 
 #include <fmt/format.h>
 
 #include "palpate/error.hpp"
 #include "palpate/pose_error.hpp"
+#include "turn_warning.hpp"
+#include "warnings.hpp"
 
 namespace palpate {
 
@@ -123,6 +126,12 @@ RecognitionStep take_step(Recogniser& recogniser, const RecognitionTask& task,
     step.refined_error_mm = error_mm(task, step.mode.object, step.refined->T_object_robot, truth);
   }
   step.effective_sample_size = recogniser.effective_sample_size();
+  step.warnings = warnings_about(touches, task, step);
+  if (step.warnings.empty()) {
+    if (auto turned = turned_alike(recogniser, task, step, truth)) {
+      step.warnings.push_back(*std::move(turned));
+    }
+  }
   return step;
 }
 

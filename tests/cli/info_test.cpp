@@ -103,10 +103,12 @@ TEST_F(InfoCommand, Map) {
   OccupancyGrid map = sample_map("I");
   map.symmetry = 2;
   map.spread_mm = 0.7;
+  map.suggested_symmetry = 0;
   write_map(folder_ / "I.map.h5", map);
   expect_info("I.map.h5",
               {"map of I", "65 x 65 of 0.5 mm", "-16.000, -16.000 mm", "0.2000",
-               "spread            0.7 mm", "-4.000 to 4.000 nats", "symmetry          2"});
+               "spread            0.7 mm", "-4.000 to 4.000 nats", "symmetry          2",
+               "suggested         full, the symmetry that the map shows"});
 }
 
 TEST_F(InfoCommand, Posterior) {

@@ -39,6 +39,21 @@ TEST_F(MapCommand, FolderGetsAMapPerLabel) {
   }
 }
 
+TEST_F(MapCommand, SaysAndStoresTheSymmetryThatTheMapsShow) {
+  const std::string out = done({"map", "A.h5", "I.h5", "-o", "maps/"});
+  EXPECT_NE(out.find("A looks different after every turn, by "), std::string::npos) << out;
+  EXPECT_NE(out.find("I looks the same after every 1/2 of a turn, within 0."), std::string::npos)
+      << out;
+  EXPECT_NE(out.find("; --symmetry 2 lets pose errors ignore such turns\n"), std::string::npos)
+      << out;
+  const OccupancyGrid i = read_map(folder_ / "maps/I.map.h5");
+  EXPECT_EQ(i.suggested_symmetry, 2);
+  EXPECT_EQ(i.symmetry, 1) << "as given";
+  EXPECT_EQ(read_map(folder_ / "maps/A.map.h5").suggested_symmetry, 1);
+  const std::string given = done({"map", "I.h5", "-o", "I.map.h5", "--symmetry", "2"});
+  EXPECT_EQ(given.find("--symmetry"), std::string::npos) << given;
+}
+
 TEST_F(MapCommand, FolderThatExistsNeedsNoSlash) {
   std::filesystem::create_directory(folder_ / "maps");
   done({"map", "A.h5", "-o", "maps"});

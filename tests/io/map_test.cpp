@@ -19,6 +19,7 @@ OccupancyGrid small_map() {
   map.prior = 0.1;
   map.symmetry = 2;
   map.spread_mm = 0.7;
+  map.suggested_symmetry = 0;
   map.nx = 3;
   map.ny = 2;
   const auto unseen = static_cast<float>(map.prior_log_odds());
@@ -50,6 +51,7 @@ TEST_F(MapFile, ComesBackAsItWasWritten) {
   EXPECT_EQ(read.prior, written.prior);
   EXPECT_EQ(read.symmetry, written.symmetry);
   EXPECT_EQ(read.spread_mm, written.spread_mm);
+  EXPECT_EQ(read.suggested_symmetry, written.suggested_symmetry);
   EXPECT_EQ(read.nx, written.nx);
   EXPECT_EQ(read.ny, written.ny);
   EXPECT_EQ(read.log_odds, written.log_odds);
@@ -80,6 +82,7 @@ TEST_F(MapFile, NamesAttributesItCannotTake) {
   }
   for (const double symmetry : {-1.0, 0.5, 1e12, nan}) {
     expect_named(spoilt("symmetry", symmetry), {"'symmetry'"});
+    expect_named(spoilt("suggested_symmetry", symmetry), {"'suggested_symmetry'"});
   }
   expect_named(spoilt("origin_mm", std::vector<double>{0, nan}), {"'origin_mm'", "nan"});
   expect_named(spoilt("origin_mm", std::vector<double>{1e300, 0}), {"'origin_mm'", "1e+300"});

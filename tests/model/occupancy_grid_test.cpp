@@ -62,6 +62,7 @@ TEST(FaultOfAMap, NamesTheFieldAndItsValue) {
     expect_fault([&](OccupancyGrid& m) { m.prior = prior; }, "'prior' = ");
   }
   expect_fault([](OccupancyGrid& m) { m.symmetry = -1; }, "'symmetry' = -1");
+  expect_fault([](OccupancyGrid& m) { m.suggested_symmetry = -1; }, "'suggested_symmetry' = -1");
   expect_fault([](OccupancyGrid& m) { m.label = "(none)"; }, "'label' = '(none)'");
   for (const double l : {nan, infinity, -infinity, 1.1e30, -2e30}) {
     expect_fault([&](OccupancyGrid& m) { m.log_odds[5] = static_cast<float>(l); },

@@ -43,6 +43,9 @@ struct OccupancyGrid {
   /// Spread of the inverse sensor model that built the map, in mm; none where it is unknown. Cells
   /// finer than the spread resolve no more.
   std::optional<double> spread_mm = {};
+  /// The symmetry that the map itself shows, see measure_symmetry(); none where it is not measured.
+  /// Pose errors and filters go by `symmetry` alone.
+  std::optional<int> suggested_symmetry = {};
   int nx = 0;
   int ny = 0;
   std::vector<float> log_odds;  ///< [ny, nx], row-major

@@ -19,6 +19,7 @@
 #include "palpate/pose_error.hpp"
 #include "palpate/pose_histogram.hpp"
 #include "palpate/pose_track.hpp"
+#include "palpate/rotational_symmetry.hpp"
 #include "palpate/scene.hpp"
 #include "palpate/sensor.hpp"
 #include "palpate/sensor_model.hpp"

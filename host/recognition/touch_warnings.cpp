@@ -1,0 +1,262 @@
+#include "touch_warnings.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include <fmt/format.h>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+
+namespace palpate {
+
+namespace {
+
+/// An axis-parallel box; empty until it takes in a point.
+struct Box {
+  glm::dvec2 lower{std::numeric_limits<double>::infinity()};
+  glm::dvec2 upper{-std::numeric_limits<double>::infinity()};
+
+  void take_in(const glm::dvec2& p) {
+    lower = glm::min(lower, p);
+    upper = glm::max(upper, p);
+  }
+  double diagonal() const { return glm::distance(lower, upper); }
+};
+
+/// The cells of a map, in the object frame. The box is no tighter than the grid, so that it costs
+/// no look at the cells.
+Box cells_of(const OccupancyGrid& map) {
+  Box box;
+  box.take_in(map.origin_mm - map.cell_mm / 2.0);
+  box.take_in(map.centre_mm(map.nx - 1, map.ny - 1) + map.cell_mm / 2.0);
+  return box;
+}
+
+/// The elements of an array, in the sensor frame.
+Box elements_of(const Touch& touch) {
+  Box box;
+  for (const glm::dvec2& element : touch.elements_mm) {
+    box.take_in(element);
+  }
+  return box;
+}
+
+/// "1 touch", "2 touches"
+std::string touches_in_words(std::size_t touches) {
+  return fmt::format("{} touch{}", touches, touches == 1 ? "" : "es");
+}
+
+/// Whether two touches felt something else: whether more than a tenth of the elements that both
+/// know read differently.
+bool differ(const std::vector<Reading>& a, const std::vector<Reading>& b) {
+  std::size_t known = 0;
+  std::size_t different = 0;
+  for (std::size_t i = 0; i < std::min(a.size(), b.size()); ++i) {
+    if (a[i] != Reading::unknown && b[i] != Reading::unknown) {
+      ++known;
+      different += a[i] != b[i] ? 1 : 0;
+    }
+  }
+  return 10 * different > known;
+}
+
+/// Distance by which the poses of a region keep a touch from a map, or 0 or less where some pose
+/// brings the touch to the map. Angles count as free, so that the distance is never too large.
+double gap_mm(const Touch& touch, const Box& cells, const PoseLattice& region,
+              const glm::dvec2& pivot_mm) {
+  if (touch.elements_mm.empty()) {
+    return 0.0;
+  }
+  const Box elements = elements_of(touch);
+  const glm::dvec2 middle_mm =
+      touch.T_robot_sensor * ((elements.lower + elements.upper) / 2.0) - pivot_mm;
+  // p_o = R(theta) middle + (x, y) is in the box of cells where R(theta) middle is in this box.
+  const glm::dvec2 lower = cells.lower - glm::dvec2(region.x_mm.upper, region.y_mm.upper);
+  const glm::dvec2 upper = cells.upper - glm::dvec2(region.x_mm.lower, region.y_mm.lower);
+  const double nearest = glm::length(glm::max(glm::max(lower, -upper), glm::dvec2(0.0)));
+  const double farthest = glm::length(glm::max(glm::abs(lower), glm::abs(upper)));
+  const double distance = glm::length(middle_mm);
+  return std::max(nearest - distance, distance - farthest) - elements.diagonal() / 2.0;
+}
+
+}  // namespace
+
+std::optional<std::string> positions_in_metres(std::span<const Touch> touches,
+                                               const ContactClassifier& classifier) {
+  // Arms reach 2 m, and touches of one object lie within 1 m. Presses in one place differ by less
+  // than 0.001 mm where they are copies of one number. In mm, presses within 1 mm and 2 mm from the
+  // origin would all feel alike.
+  constexpr double reach = 2.0;
+  constexpr double widest = 1.0;
+  constexpr double narrowest = 1e-3;
+  constexpr double same_angle_rad = 0.1;
+  if (touches.size() < 3) {
+    return {};
+  }
+  Box positions;
+  for (const Touch& touch : touches) {
+    positions.take_in(touch.T_robot_sensor.translation_mm);
+  }
+  const double span = positions.diagonal();
+  const glm::dvec2 farthest = glm::max(glm::abs(positions.lower), glm::abs(positions.upper));
+  if (!(std::max(farthest.x, farthest.y) < reach && span < widest && span > narrowest)) {
+    return {};
+  }
+  const std::vector<Reading> first = classifier.classify(touches.front());
+  const bool alike = std::all_of(touches.begin(), touches.end(), [&](const Touch& touch) {
+    const double turn_rad =
+        wrap_angle(touch.T_robot_sensor.theta_rad - touches.front().T_robot_sensor.theta_rad,
+                   2.0 * std::numbers::pi);
+    return std::abs(turn_rad) < same_angle_rad && !differ(classifier.classify(touch), first);
+  });
+  if (alike) {
+    return {};
+  }
+  return fmt::format(
+      "the sensor's positions span {:.2g} mm over {}, which differ in angle or in what they feel: "
+      "are the positions in metres? Palpate takes millimetres; multiply x and y of sensor_pose by "
+      "1000",
+      span, touches_in_words(touches.size()));
+}
+
+std::optional<std::string> angles_in_degrees(std::span<const Touch> touches) {
+  constexpr double circle_rad = 2.0 * std::numbers::pi;
+  constexpr double rounding = 1e-5;  // of a full turn in float32
+  const auto largest =
+      std::max_element(touches.begin(), touches.end(), [](const Touch& a, const Touch& b) {
+        return std::abs(a.T_robot_sensor.theta_rad) < std::abs(b.T_robot_sensor.theta_rad);
+      });
+  const double theta_rad = largest->T_robot_sensor.theta_rad;
+  if (std::abs(theta_rad) <= circle_rad + rounding) {
+    return {};
+  }
+  return fmt::format(
+      "the sensor's angle is {:.4g} rad at touch {}, beyond a full turn of 6.283 rad: are the "
+      "angles in degrees? Palpate takes radians; multiply theta of sensor_pose by 0.0174533",
+      theta_rad, largest - touches.begin() + 1);
+}
+
+std::optional<std::string> other_scale(std::span<const Touch> touches,
+                                       const RecognitionTask& task) {
+  const std::span<const glm::dvec2> elements_mm = touches.front().elements_mm;
+  if (elements_mm.size() < 2) {
+    return {};  // a single element has no scale
+  }
+  const double array_mm = elements_of(touches.front()).diagonal();
+  double pitch_mm = array_mm;
+  for (const glm::dvec2& element : elements_mm.subspan(1)) {
+    pitch_mm = std::min(pitch_mm, glm::distance(element, elements_mm.front()));
+  }
+  for (const Hypothesis& hypothesis : task.hypotheses) {
+    const OccupancyGrid& map = hypothesis.map;
+    const double map_mm = cells_of(map).diagonal();
+    if (map.cell_mm > array_mm) {
+      return fmt::format(
+          "the array measures {:.2g} mm across, less than one cell of {:.2g} mm of map '{}': one "
+          "of them is not in millimetres; check the unit of the array's elements, then of the map",
+          array_mm, map.cell_mm, map.label);
+    }
+    if (map_mm < pitch_mm) {
+      return fmt::format(
+          "map '{}' measures {:.2g} mm across, less than the {:.2g} mm between two elements of the "
+          "array: one of them is not in millimetres; check the unit of the map, then of the "
+          "array's elements",
+          map.label, map_mm, pitch_mm);
+    }
+  }
+  return {};
+}
+
+std::optional<std::string> nothing_felt(std::span<const Touch> touches,
+                                        const ContactClassifier& classifier) {
+  constexpr std::size_t few = 3;  // a touch or two may well miss the object, or lie wholly on it
+  bool contact = false;
+  bool none = false;
+  double largest = -std::numeric_limits<double>::infinity();
+  double least = std::numeric_limits<double>::infinity();
+  for (const Touch& touch : touches) {
+    const std::vector<Reading> readings = classifier.classify(touch);
+    for (std::size_t i = 0; i < readings.size(); ++i) {
+      contact = contact || is_contact(readings[i]);
+      none = none || readings[i] == Reading::no_contact;
+      if ((touch.valid.empty() || touch.valid[i] != 0) && !std::isnan(touch.pressure[i])) {
+        largest = std::max(largest, touch.pressure[i]);
+        least = std::min(least, touch.pressure[i]);
+      }
+    }
+    // Eq. 3 compares a single element with itself, and so never finds it out of contact.
+    if (contact && (none || readings.size() == 1)) {
+      return {};
+    }
+  }
+  const std::string over = "in " + touches_in_words(touches.size());
+  if (largest < least) {
+    return fmt::format(
+        "no element is alive and has a number for its pressure {}: check the "
+        "recording's pressure and valid",
+        over);
+  }
+  const std::string evidence = fmt::format(
+      "pressures range from {:.3g} to {:.3g}, and the contact threshold is {:.3g}, in the "
+      "recording's unit",
+      least, largest, classifier.threshold);
+  if (touches.size() < few) {
+    return {};
+  }
+  if (!contact && !none) {
+    return fmt::format(
+        "no element is known to be in contact or out of contact {}: {}; choose a "
+        "--threshold within that range, and a --ratio above 0",
+        over, evidence);
+  }
+  return contact ? fmt::format(
+                       "no element is ever out of contact {}: {}; choose a --threshold "
+                       "above the pressure of an untouched element, or tare the sensor",
+                       over, evidence)
+                 : fmt::format(
+                       "no element is ever in contact {}: {}; choose a --threshold below "
+                       "the pressure of a touched element, or touch the object",
+                       over, evidence);
+}
+
+std::optional<std::string> out_of_reach(std::span<const Touch> touches,
+                                        const RecognitionTask& task) {
+  const PoseLattice& region = task.lattice();
+  double nearest_mm = std::numeric_limits<double>::infinity();
+  Box cells;  // of the nearest map
+  for (const Touch& touch : touches) {
+    for (const Hypothesis& hypothesis : task.hypotheses) {
+      const Box box = cells_of(hypothesis.map);
+      const double mm = gap_mm(touch, box, region, region.pivot_mm);
+      if (mm <= 0.0) {
+        return {};
+      }
+      if (mm < nearest_mm) {
+        nearest_mm = mm;
+        cells = box;
+      }
+    }
+  }
+  glm::dvec2 middle_mm{0.0};
+  for (const Touch& touch : touches) {
+    middle_mm += touch.T_robot_sensor.translation_mm / static_cast<double>(touches.size());
+  }
+  // A pivot among the touches brings them into the region; the region must then meet the map.
+  Touch at_pivot = touches.front();
+  at_pivot.T_robot_sensor.translation_mm = middle_mm;
+  const std::string ranges =
+      gap_mm(at_pivot, cells, region, middle_mm) <= 0.0
+          ? ""
+          : fmt::format(" --x-mm={:.1f}:{:.1f} --y-mm={:.1f}:{:.1f}", cells.lower.x, cells.upper.x,
+                        cells.lower.y, cells.upper.y);
+  return fmt::format(
+      "no pose of the region brings {} nearer than {:.1f} mm to any map: the sensor is on average "
+      "{:.1f} mm from the pivot at {:g},{:g} mm; give --pivot-mm={:.1f},{:.1f}{}, near the touches",
+      touches.size() == 1 ? "the touch" : fmt::format("one of {} touches", touches.size()),
+      nearest_mm, glm::distance(middle_mm, region.pivot_mm), region.pivot_mm.x, region.pivot_mm.y,
+      middle_mm.x, middle_mm.y, ranges);
+}
+
+}  // namespace palpate

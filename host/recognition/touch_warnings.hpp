@@ -1,0 +1,30 @@
+#pragma once
+
+#include <optional>
+#include <span>
+#include <string>
+
+#include "palpate/touch.hpp"
+#include "recognition_task.hpp"
+
+namespace palpate {
+
+// Rules about the touches of an unknown. Each rule returns a warning (see warnings_about()), or
+// none where the touches look right. The touches are all sound, and at least one.
+
+/// The sensor's positions look like metres.
+std::optional<std::string> positions_in_metres(std::span<const Touch> touches,
+                                               const ContactClassifier& classifier);
+/// The sensor's angles look like degrees.
+std::optional<std::string> angles_in_degrees(std::span<const Touch> touches);
+/// The array and a map have scales that do not fit together.
+std::optional<std::string> other_scale(std::span<const Touch> touches, const RecognitionTask& task);
+/// The threshold leaves no element known, or the touches tell nothing, since no element was ever in
+/// contact or all were.
+std::optional<std::string> nothing_felt(std::span<const Touch> touches,
+                                        const ContactClassifier& classifier);
+/// No pose of the region brings any touch to any map.
+std::optional<std::string> out_of_reach(std::span<const Touch> touches,
+                                        const RecognitionTask& task);
+
+}  // namespace palpate

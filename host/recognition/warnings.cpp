@@ -1,0 +1,178 @@
+#include "warnings.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <optional>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <glm/matrix.hpp>
+
+#include "palpate/pose_error.hpp"
+#include "touch_warnings.hpp"
+
+namespace palpate {
+
+namespace {
+
+using Place = std::array<double, 3>;  ///< (x_mm, y_mm, theta_rad) of a lattice
+
+constexpr double degrees_per_rad = 180.0 / std::numbers::pi;
+
+std::array<const Axis*, 3> axes_of(const PoseLattice& lattice) {
+  return {&lattice.x_mm, &lattice.y_mm, &lattice.theta_rad};
+}
+
+/// A refined pose on the lattice. Theta has the turn that is nearest to the region's middle.
+Place place_of(const RefinedPose& refined, const PoseLattice& lattice) {
+  const glm::dvec2 xy_mm = refined.T_object_robot * lattice.pivot_mm;
+  const double middle_rad = (lattice.theta_rad.lower + lattice.theta_rad.upper) / 2.0;
+  return {xy_mm.x, xy_mm.y,
+          middle_rad +
+              wrap_angle(refined.T_object_robot.theta_rad - middle_rad, 2.0 * std::numbers::pi)};
+}
+
+/// Variances of the place. The covariance is of T_object_robot, whose translation is
+/// (x, y) - R(theta) pivot.
+Place variances_of(const RefinedPose& refined, const PoseLattice& lattice) {
+  const glm::dvec2 slope =
+      rotate(refined.T_object_robot.theta_rad + std::numbers::pi / 2.0, lattice.pivot_mm);
+  const std::array<double, 9>& c = refined.covariance;
+  const auto variance = [&](int i) {
+    return c[4 * i] + 2.0 * slope[i] * c[3 * i + 2] + slope[i] * slope[i] * c[8];
+  };
+  return {variance(0), variance(1), c[8]};
+}
+
+/// Whether enough elements were in contact to tell one place from another. After fewer, the best
+/// pose lies anywhere in the region, its edges included.
+bool felt_enough(std::span<const Touch> touches, const ContactClassifier& classifier) {
+  constexpr std::ptrdiff_t enough = 24;  // two to three touches of a letter by the 6 x 6 array
+  std::ptrdiff_t contacts = 0;
+  for (const Touch& touch : touches) {
+    const std::vector<Reading> readings = classifier.classify(touch);
+    contacts += std::count_if(readings.begin(), readings.end(), is_contact);
+    if (contacts >= enough) {
+      return true;
+    }
+  }
+  return false;
+}
+
+/// The refined pose's standard deviations are those of a bin, since the bins are too wide for the
+/// refinement.
+std::optional<std::string> coarse_bins(const RecognitionTask& task, const RecognitionStep& step) {
+  // docs/refinement.md: the refinement needs 20 bins within 2.5 mm, and steps up to about 1.5 mm.
+  constexpr double widest_bin_mm3 = 4.0 / 3.0 * std::numbers::pi * 2.5 * 2.5 * 2.5 / 20.0;
+  constexpr double widest_step_mm = 1.5;
+  constexpr double own_share = 1.1;  // the belief adds less than a tenth to the bin's variance
+  const OccupancyGrid& map = task.hypotheses[step.mode.object].map;
+  if (!step.refined ||
+      std::none_of(map.log_odds.begin(), map.log_odds.end(), [](float l) { return l > 0.0F; })) {
+    return {};
+  }
+  const PoseLattice& lattice = task.lattice();
+  const Place variances = variances_of(*step.refined, lattice);
+  // How far the object moves, root mean square, where the pose moves by 1 mm or 1 rad.
+  const Place lever_mm{1.0, 1.0, std::sqrt(body_of(map).inertia_mm2)};
+  constexpr std::array names{"x", "y", "theta"};
+  std::vector<std::string> coarse;
+  std::array<int, 3> counts{};
+  double bin_mm3 = 1.0;
+  for (int i = 0; i < 3; ++i) {
+    const Axis& axis = *axes_of(lattice)[i];
+    const double step_mm = axis.step() * lever_mm[i];
+    counts[i] = axis.count;
+    if (axis.count == 1) {
+      continue;
+    }
+    bin_mm3 *= step_mm;
+    const double bins_own = axis.step() * axis.step() / 12.0;
+    if (step_mm > widest_step_mm && variances[i] < own_share * bins_own) {
+      coarse.push_back(i < 2 ? fmt::format("{} in bins of {:.3g} mm", names[i], axis.step())
+                             : fmt::format("{} in bins of {:.3g} degrees, which turn the object by "
+                                           "{:.2g} mm",
+                                           names[i], axis.step() * degrees_per_rad, step_mm));
+      counts[i] = static_cast<int>(std::ceil(axis.count * step_mm / 1.0));
+    }
+  }
+  if (coarse.empty() || bin_mm3 < widest_bin_mm3) {
+    return {};
+  }
+  return fmt::format(
+      "the pose's standard deviation is only the width of a bin: {}; give --bins {}x{}x{} or more, "
+      "or --bins auto",
+      fmt::join(coarse, ", "), counts[0], counts[1], counts[2]);
+}
+
+/// The best pose lies at an end of an axis.
+std::optional<std::string> at_the_edge(std::span<const Touch> touches, const RecognitionTask& task,
+                                       const RecognitionStep& step) {
+  if (!step.refined || !step.mode.bin) {
+    return {};
+  }
+  const PoseLattice& lattice = task.lattice();
+  const std::int64_t in_plane = *step.mode.bin % lattice.plane();
+  const std::array<std::int64_t, 3> index{in_plane % lattice.x_mm.count,
+                                          in_plane / lattice.x_mm.count,
+                                          *step.mode.bin / lattice.plane()};
+  const Place place = place_of(*step.refined, lattice);
+  const Place variances = variances_of(*step.refined, lattice);
+  constexpr std::array names{"x", "y", "theta"};
+  constexpr std::array flags{"--x-mm", "--y-mm", "--theta-deg"};
+  for (int i = 0; i < 3; ++i) {
+    const Axis& axis = *axes_of(lattice)[i];
+    if (axis.count < 3 || (i == 2 && lattice.full_circle())) {
+      continue;
+    }
+    const bool first = index[i] == 0;
+    if (!first && index[i] != axis.count - 1) {
+      continue;
+    }
+    // Between the bins the pose may lie well inside, as that of an object within the region does.
+    const double inside = first ? place[i] - axis.lower : axis.upper - place[i];
+    if (inside > std::max(axis.step(), std::sqrt(variances[i])) ||
+        !felt_enough(touches, task.classifier())) {
+      continue;
+    }
+    const double unit = i < 2 ? 1.0 : degrees_per_rad;
+    const double more = (axis.upper - axis.lower) / 2.0;
+    return fmt::format(
+        "the best pose lies at the edge of the region, {} = {:.4g} {} of {:.4g} to {:.4g}: the "
+        "object may lie outside; widen the region, such as with {}={:.4g}:{:.4g}",
+        names[i], place[i] * unit, i < 2 ? "mm" : "degrees", axis.lower * unit, axis.upper * unit,
+        flags[i], (axis.lower - (first ? more : 0.0)) * unit,
+        (axis.upper + (first ? 0.0 : more)) * unit);
+  }
+  return {};
+}
+
+}  // namespace
+
+std::vector<std::string> warnings_about(std::span<const Touch> touches, const RecognitionTask& task,
+                                        const RecognitionStep& step) {
+  std::vector<std::string> warnings;
+  const auto add = [&](std::optional<std::string> warning) {
+    if (warning) {
+      warnings.push_back(*std::move(warning));
+    }
+  };
+  add(positions_in_metres(touches, task.classifier()));
+  add(angles_in_degrees(touches));
+  add(other_scale(touches, task));
+  add(nothing_felt(touches, task.classifier()));
+  add(out_of_reach(touches, task));
+  // An estimate from such touches is not worth a word. On bins that are too coarse, the edge is no
+  // sign of an object outside.
+  if (warnings.empty()) {
+    add(coarse_bins(task, step));
+  }
+  if (warnings.empty()) {
+    add(at_the_edge(touches, task, step));
+  }
+  return warnings;
+}
+
+}  // namespace palpate

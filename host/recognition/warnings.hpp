@@ -1,0 +1,21 @@
+#pragma once
+
+#include <span>
+#include <string>
+#include <vector>
+
+#include "palpate/touch.hpp"
+#include "recognition_record.hpp"
+#include "recognition_task.hpp"
+
+namespace palpate {
+
+/// What looks wrong with an unknown's touches, or else with the lattice on which they were
+/// evaluated. Each warning is a sentence that names the evidence and the remedy. Touches that look
+/// right and lie well within the region give none.
+/// @param touches all touches of the unknown so far, each of them sound
+/// @param step what the filter believes after them; its own warnings are not read
+std::vector<std::string> warnings_about(std::span<const Touch> touches, const RecognitionTask& task,
+                                        const RecognitionStep& step);
+
+}  // namespace palpate

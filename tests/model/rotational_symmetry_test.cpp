@@ -1,0 +1,124 @@
+#include "palpate/rotational_symmetry.hpp"
+
+#include <cmath>
+#include <numbers>
+
+#include <gtest/gtest.h>
+
+#include "palpate/simulation.hpp"
+
+namespace palpate {
+namespace {
+
+/// The map of a shape that is turned about a point off its middle: 4 nats on the shape and -4
+/// beside it, within 17 mm of the origin.
+OccupancyGrid map_of(const Shape& shape, double turn_rad = 0.0, double cell_mm = 0.5) {
+  const int n = static_cast<int>(std::lround(34.0 / cell_mm)) + 1;
+  OccupancyGrid map{.label = shape.label,
+                    .cell_mm = cell_mm,
+                    .origin_mm = {-17.0, -17.0},
+                    .spread_mm = 0.5,
+                    .nx = n,
+                    .ny = n};
+  const Pose T_shape_map = Pose{{0.4, -0.3}, 0.0} * Pose{{}, turn_rad};
+  for (int j = 0; j < n; ++j) {
+    for (int i = 0; i < n; ++i) {
+      map.log_odds.push_back(shape.contains(T_shape_map * map.centre_mm(i, j)) ? 4.0F : -4.0F);
+    }
+  }
+  return map;
+}
+
+/// A regular polygon.
+Shape polygon(int corners, double radius_mm) {
+  Shape shape{.label = "polygon", .strokes = {}, .polygons = {{}}};
+  for (int k = 0; k < corners; ++k) {
+    const double a = 2.0 * std::numbers::pi * k / corners;
+    shape.polygons.front().push_back(radius_mm * glm::dvec2(std::cos(a), std::sin(a)));
+  }
+  return shape;
+}
+
+int suggested(const OccupancyGrid& map) {
+  const auto symmetry = measure_symmetry(map);
+  EXPECT_TRUE(symmetry);
+  return symmetry ? symmetry->suggested : -1;
+}
+
+TEST(RotationalSymmetry, OfTheCharactersIsTheirOwn) {
+  // X is taller than wide, 0 an oval; B, M and 8 are nearly 2-fold, Q and G nearly full.
+  for (const auto& [names, n] :
+       {std::pair{"HINSXZ0", 2}, std::pair{"O", 0}, std::pair{"ABCDEFGJKLMPQRTUVWY123456789", 1}}) {
+    for (const char* name = names; *name != '\0'; ++name) {
+      const Shape shape = make_shape(std::string(1, *name));
+      EXPECT_EQ(suggested(map_of(shape)), n) << *name;
+      EXPECT_EQ(suggested(map_of(shape, 0.4)), n) << *name << ", turned";
+    }
+  }
+}
+
+TEST(RotationalSymmetry, OfRegularPolygonsIsTheNumberOfTheirCorners) {
+  for (const int corners : {3, 4, 5, 6}) {
+    for (const double turn_rad : {0.0, 0.3}) {
+      EXPECT_EQ(suggested(map_of(polygon(corners, 13.0), turn_rad)), corners);
+    }
+  }
+  EXPECT_EQ(suggested(map_of(polygon(90, 9.0))), 0) << "a disc";
+  EXPECT_EQ(suggested(map_of(make_shape("ring"))), 0);
+  EXPECT_EQ(suggested(map_of(make_shape("bar"))), 2);
+}
+
+TEST(RotationalSymmetry, IsMeasuredAsTheDistanceOfTheOutlines) {
+  const auto square = measure_symmetry(map_of(polygon(4, 13.0), 0.2));
+  ASSERT_TRUE(square);
+  // Of a square of side 2 a, another that is turned by 45 degrees leaves four corners of the area
+  // a^2 (sqrt(2) - 1)^2 uncovered. At an edge, the measure forgives a part of a cell of 0.5 mm.
+  const double a = 13.0 / std::numbers::sqrt2;
+  const double corners_mm2 = 4.0 * a * a * std::pow(std::numbers::sqrt2 - 1.0, 2);
+  EXPECT_NEAR(square->apart_mm[8], 2.0 * corners_mm2 / (8.0 * a), 0.25);
+  EXPECT_LT(square->apart_mm[4], 0.1);  // a fifth of a cell
+  EXPECT_EQ(square->apart_mm[1], 0.0);
+  EXPECT_EQ(square->nearest(), 2) << "of 2 and 4, whose turns include those of 2";
+  EXPECT_DOUBLE_EQ(square->tolerance_mm, 0.25);
+}
+
+TEST(RotationalSymmetry, OfManyCellsIsSampled) {
+  // 681 x 681 cells, more than 100,000 of them occupied.
+  EXPECT_EQ(suggested(map_of(make_shape("S"), 0.7, 0.05)), 2);
+  EXPECT_EQ(suggested(map_of(make_shape("B"), 0.7, 0.05)), 1);
+}
+
+TEST(RotationalSymmetry, IsNoneOfAlmostNothing) {
+  OccupancyGrid map = map_of(make_shape("I"));
+  for (float& l : map.log_odds) {
+    l = -4.0F;
+  }
+  EXPECT_FALSE(measure_symmetry(map));
+  for (std::size_t k = 0; k < 15; ++k) {
+    map.log_odds[2000 + k] = 4.0F;
+  }
+  EXPECT_FALSE(measure_symmetry(map));
+  map.log_odds[2015] = 4.0F;
+  EXPECT_TRUE(measure_symmetry(map));
+}
+
+TEST(RotationalSymmetry, ComparesOnlyWhatWasSeen) {
+  OccupancyGrid map = map_of(make_shape("I"));
+  for (int j = 0; j < map.ny / 4; ++j) {
+    for (int i = 0; i < map.nx; ++i) {
+      map.log_odds[static_cast<std::size_t>(j) * map.nx + i] =
+          static_cast<float>(map.prior_log_odds());
+    }
+  }
+  EXPECT_EQ(suggested(map), 2) << "where the end of the I is not seen";
+  // Without a cell that was seen to be free, nothing contradicts a turn; but it must not carry the
+  // object to where nothing was seen.
+  OccupancyGrid bare = map_of(make_shape("J"));
+  for (float& l : bare.log_odds) {
+    l = l < 0.0F ? static_cast<float>(bare.prior_log_odds()) : l;
+  }
+  EXPECT_EQ(suggested(bare), 1);
+}
+
+}  // namespace
+}  // namespace palpate

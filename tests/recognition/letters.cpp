@@ -1,0 +1,41 @@
+#include "letters.hpp"
+
+#include "palpate/map_builder.hpp"
+#include "palpate/simulation.hpp"
+
+namespace palpate {
+
+OccupancyGrid learned_map(Device& device, const std::string& shape, std::uint64_t seed) {
+  const Recording training =
+      Simulator(make_shape(shape), {}, digitacts_array(), seed).touch(training_grid(), {});
+  MapBuilder builder(device, {});
+  builder.add(training.touches(0, training.size()));
+  return builder.build(shape);
+}
+
+std::vector<Hypothesis> learned_letters(Device& device) {
+  constexpr std::uint64_t seed = 1;
+  std::vector<Hypothesis> letters;
+  for (const auto& [letter, symmetry] : {std::pair{"A", 1}, std::pair{"E", 1}, std::pair{"I", 2},
+                                         std::pair{"O", 0}, std::pair{"U", 1}}) {
+    letters.push_back({.map = learned_map(device, letter, seed)});
+    letters.back().map.symmetry = symmetry;
+  }
+  return letters;
+}
+
+Recording letter_touches(const std::string& letter, int touches, std::uint64_t seed) {
+  Pose T_object_robot = random_object_pose(seed);
+  T_object_robot.translation_mm *= 0.8;
+  std::vector<Pose> T_robot_sensor = random_poses(touches, seed);
+  for (Pose& pose : T_robot_sensor) {
+    pose = inverse(T_object_robot) * pose;
+  }
+  Recording recording = Simulator(make_shape(letter), {}, digitacts_array(), seed)
+                            .touch(T_robot_sensor, T_object_robot);
+  recording.path = letter;
+  recording.truth = {.object = letter, .T_object_robot = T_object_robot};
+  return recording;
+}
+
+}  // namespace palpate
