@@ -20,10 +20,11 @@ struct Fit {
   Verdict verdict = Verdict::fits;
 };
 
-/// The touches fit from this z on, and are doubtful from the next one on. Of touches that are drawn
-/// from the object's own predictions, 98 % fit and less than 2 in 1,000 do not; z is not normally
-/// distributed, since a few surprising readings cost more than many expected ones gain.
-inline constexpr double fits_from_z = -2.5;
+/// The touches fit from this z on. Of touches drawn from the object's own predictions 98 % or more
+/// fit: z is not normally distributed, since a surprising reading costs far more than an expected
+/// one gains.
+inline constexpr double fits_from_z = -3.0;
+/// Below this z the touches do not fit, as less than 0.5 % of those drawn do not.
 inline constexpr double doubtful_from_z = -4.0;
 /// z is cut off here, for readings that the object holds to be impossible.
 inline constexpr double largest_fit_z = 1e6;
