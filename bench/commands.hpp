@@ -21,6 +21,10 @@ struct ExperimentOptions : RunOptions {
   std::optional<int> touches;  ///< per trial; by default 50, or 12 if quick
 };
 
+struct FitOptions : RunOptions {
+  std::optional<int> trials;  ///< per letter and shape; by default 20, or 2 if quick
+};
+
 struct SweepOptions : RunOptions {
   std::string html;                      ///< file for a page with charts and tables
   std::string plots;                     ///< folder for the page's charts
@@ -39,6 +43,11 @@ void measure_kernels(const RunOptions& options, std::span<char* const> command_l
 /// touches, for both filters, beside the paper's claims. Beyond the paper: calibration, refined
 /// poses, an array that is not quite where it is reported, and objects that were never learned.
 void run_experiment(const ExperimentOptions& options, std::span<char* const> command_line);
+
+/// How well learned letters and shapes never learned fit, after some numbers of touches: how often
+/// the two are told apart, and their verdicts, of a small and a large array, on coarse bins and
+/// with an array that is not quite where it is reported.
+void measure_fit(const FitOptions& options, std::span<char* const> command_line);
 
 /// Speed against error on simulated letters: every filter at counts from 100 to 10,000,000 bins per
 /// object, maps of several cell sizes, the engine's ways to evaluate the likelihood beside two

@@ -55,6 +55,14 @@ int main(int argc, char** argv) try {
   command->add_option("--csv", experiment.csv, "Write tables to this folder");
   command->add_option("--plots", experiment.plots,
                       "Draw the paper's figures in this folder, as PNG and SVG");
+  FitOptions fit;
+  command = add_command(app, "fit",
+                        "Measure how well touches of learned letters and of shapes never learned "
+                        "fit, in some minutes on two CPU cores: pairs told apart and verdicts, of "
+                        "arrays of 6 x 6 and 16 x 16 elements",
+                        fit, measure_fit, command_line);
+  command->add_option("--trials", fit.trials,
+                      "Trials per letter and shape (default 20, or 2 with --quick)");
   SweepOptions sweep;
   command = add_command(app, "sweep",
                         "Measure speed against error on simulated letters, in some 20 minutes on "

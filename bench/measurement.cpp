@@ -70,7 +70,7 @@ double quantile(std::span<const double> values, double fraction) {
   return sorted[static_cast<std::size_t>(std::max(rank, 1.0)) - 1];
 }
 
-Interval wilson_interval(int successes, int trials) {
+Interval wilson_interval(double successes, int trials) {
   constexpr double z = z_975;
   const double n = trials;
   const double p = successes / n;

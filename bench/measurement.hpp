@@ -28,8 +28,8 @@ struct Interval {
 };
 /// The 95 % score interval of a probability of which `successes` of `trials` are known (Wilson
 /// 1927). Unlike the normal approximation's it is not empty where all or none succeed.
-/// trials > 0.
-Interval wilson_interval(int successes, int trials);
+/// trials > 0; `successes` may be a fraction, of an estimate that varies no more than a binomial's.
+Interval wilson_interval(double successes, int trials);
 /// Of at least one value.
 double mean(std::span<const double> values);
 /// Of the mean of at least two values.

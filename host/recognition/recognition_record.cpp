@@ -126,6 +126,8 @@ RecognitionStep take_step(Recogniser& recogniser, const RecognitionTask& task,
     step.refined_error_mm = error_mm(task, step.mode.object, step.refined->T_object_robot, truth);
   }
   step.effective_sample_size = recogniser.effective_sample_size();
+  step.fit = fit_of(touches, step.pose(), task.hypotheses[step.mode.object].map, task.contact(),
+                    static_cast<std::size_t>(step.mode.object));
   step.warnings = warnings_about(touches, task, step);
   if (step.warnings.empty()) {
     if (auto turned = turned_alike(recogniser, task, step, truth)) {

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "palpate/fit.hpp"
 #include "palpate/touch.hpp"
 #include "recogniser.hpp"
 #include "recognition_task.hpp"
@@ -37,15 +38,6 @@ Unknown unknown_of(const Recording& recording);
 /// HistogramOptions::still_array saves time.
 bool array_is_still(std::span<const Unknown> unknowns);
 
-/// How well the best hypothesis explains the touches.
-enum class Verdict { fits, doubtful, does_not_fit };
-struct Fit {
-  /// Standard deviations by which the touches' log-likelihood differs from what the hypothesis
-  /// predicts for touches of its own; negative: they fit worse.
-  double z = 0.0;
-  Verdict verdict = Verdict::fits;
-};
-
 /// What the filter believes after a touch.
 struct RecognitionStep {
   std::vector<double> identity;  ///< [label] probability, summed over the maps of the label
@@ -62,7 +54,9 @@ struct RecognitionStep {
   std::optional<double> error_mm;
   std::optional<double> refined_error_mm;       ///< pose error of the refined pose, mm
   std::optional<double> effective_sample_size;  ///< of the particles; empty for a histogram
-  std::optional<Fit> fit;                       ///< empty where no element of any touch is known
+  /// How well `mode.object` at pose() explains all touches so far, also where `best` is "(none)".
+  /// Empty where no element of any touch is known.
+  std::optional<Fit> fit;
   std::vector<std::string> warnings;  ///< what looks wrong with the touches, in whole sentences
   double seconds = 0.0;               ///< wall time from the touch to the estimate
   double refine_seconds = 0.0;        ///< wall time of the refined pose

@@ -27,9 +27,8 @@ const PoseLattice& RecognitionTask::lattice() const {
   return histogram != nullptr ? histogram->lattice : std::get<ParticleOptions>(filter).region;
 }
 
-const ContactClassifier& RecognitionTask::classifier() const {
-  return std::visit(
-      [](const auto& one) -> const ContactClassifier& { return one.contact.classifier; }, filter);
+const ContactModel& RecognitionTask::contact() const {
+  return std::visit([](const auto& one) -> const ContactModel& { return one.contact; }, filter);
 }
 
 std::optional<CoarsenedBins> settle_bins(const Device& device, RecognitionTask& task) {

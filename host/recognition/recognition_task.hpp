@@ -23,7 +23,8 @@ struct RecognitionTask {
 
   /// The histogram's lattice, or the particles' region, whose bins only marginals have.
   const PoseLattice& lattice() const;
-  const ContactClassifier& classifier() const;
+  const ContactModel& contact() const;
+  const ContactClassifier& classifier() const { return contact().classifier; }
 
   std::vector<Hypothesis> hypotheses;
   FilterOptions filter;

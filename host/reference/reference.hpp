@@ -2,12 +2,14 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
 #include <glm/vec2.hpp>
 
 #include "palpate/contact_model.hpp"
+#include "palpate/fit.hpp"
 #include "palpate/lattice.hpp"
 #include "palpate/occupancy_grid.hpp"
 #include "palpate/pose.hpp"
@@ -76,6 +78,16 @@ double log_likelihood(Reading reading, const MapSample& map, const ContactModel&
 /// the model has none. `object` says whose numbers of a table count.
 double log_likelihood(const Touch& touch, const Pose& T_object_robot, const OccupancyGrid& map,
                       const ContactModel& model, std::size_t object = 0);
+
+// --- fit.cpp ---
+// At a place the map predicts reading r with probability q(r), the likelihood of r over the sum of
+// the likelihoods of all readings but Unknown. M and V are mean and variance of log-likelihood(r)
+// under q. Over the known elements, z = sum (log-likelihood(reading) - M) / sqrt(sum V).
+
+/// How well one object at one pose explains the touches; none where no element is known.
+std::optional<Fit> fit_of(std::span<const Touch> touches, const Pose& T_object_robot,
+                          const OccupancyGrid& map, const ContactModel& model,
+                          std::size_t object = 0);
 
 // --- particles.cpp: Eq. 8-12 ---
 

@@ -1,6 +1,7 @@
 #include "recognition_record.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <stdexcept>
 
@@ -9,6 +10,7 @@
 #include "palpate/error.hpp"
 #include "reference.hpp"
 #include "shapes.hpp"
+#include "touched_shape.hpp"
 
 namespace palpate {
 namespace {
@@ -93,6 +95,53 @@ TEST(Recognise, SaysHowFarItIsAndCanBeLeft) {
                            [](double) { throw std::runtime_error("Ctrl-C"); }),
                  std::runtime_error);
     expect_same(recognise(recogniser, task, unknown_of(recording), trace), before);
+  }
+}
+
+/// A cross as large as the learned shapes.
+bool on_cross(const glm::dvec2& p_mm) {
+  const double x = std::abs(p_mm.x);
+  const double y = std::abs(p_mm.y);
+  return (x < 1.5 && y < 8.0) || (y < 1.5 && x < 8.0);
+}
+
+TEST(Recognise, SaysWhatFitsAndWhatDoesNot) {
+  Device device = Device::open();
+  Recording cross = touches_of(on_cross, {{1.0, -2.0}, 0.4}, 15, 21);
+  for (const FilterOptions& filter : both_filters()) {
+    const RecognitionTask task(shapes(), filter);
+    Recogniser recogniser(device, task);
+    for (const Recording& learned : {touched_letter(22), touched_disc(23)}) {
+      const Fit fit = recognise(recogniser, task, unknown_of(learned), false).last().fit.value();
+      EXPECT_EQ(fit.verdict, Verdict::fits) << learned.path << ", z = " << fit.z;
+    }
+    const Fit fit = recognise(recogniser, task, unknown_of(cross), false).last().fit.value();
+    EXPECT_EQ(fit.verdict, Verdict::does_not_fit) << "z = " << fit.z;
+  }
+  std::fill(cross.pressure.begin(), cross.pressure.end(), 2.0);
+  const RecognitionTask task(shapes(), both_filters()[0]);
+  Recogniser recogniser(device, task);
+  EXPECT_FALSE(recognise(recogniser, task, unknown_of(cross), false).last().fit)
+      << "all at the threshold: nothing is known";
+}
+
+TEST(Recognise, FitsTheBestLearnedObjectAtThePoseThatItReports) {
+  Device device = Device::open();
+  const Recording recording = touched_letter(24);
+  HistogramOptions filter = std::get<HistogramOptions>(both_filters()[0]);
+  filter.none_weight = 1e300;
+  filter.contact.gamma = 0.2;
+  const RecognitionTask task(shapes(), filter);
+  Recogniser recogniser(device, task);
+  const RecognitionRecord record = recognise(recogniser, task, unknown_of(recording), true);
+  ASSERT_EQ(record.trace.size(), 6U);
+  for (std::size_t i = 0; i < 6; ++i) {
+    const RecognitionStep& step = record.trace[i];
+    EXPECT_EQ(task.labels[step.best], none_label);
+    EXPECT_EQ(step.fit.value().z,
+              fit_of(recording.touches(0, i + 1), step.refined.value().T_object_robot,
+                     task.hypotheses[step.mode.object].map, filter.contact)
+                  ->z);
   }
 }
 

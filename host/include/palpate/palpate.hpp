@@ -10,6 +10,7 @@
 #include "palpate/error.hpp"
 #include "palpate/estimate.hpp"
 #include "palpate/files.hpp"
+#include "palpate/fit.hpp"
 #include "palpate/frame_recorder.hpp"
 #include "palpate/lattice.hpp"
 #include "palpate/map_builder.hpp"

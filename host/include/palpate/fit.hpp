@@ -1,0 +1,48 @@
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <span>
+
+#include "palpate/contact_model.hpp"
+#include "palpate/occupancy_grid.hpp"
+#include "palpate/pose.hpp"
+#include "palpate/touch.hpp"
+
+namespace palpate {
+
+/// How well one object at one pose explains the touches.
+enum class Verdict { fits, doubtful, does_not_fit };
+struct Fit {
+  /// Standard deviations by which the touches' log-likelihood differs from what the object predicts
+  /// for touches of its own; negative: the touches fit worse. Within +-`largest_fit_z`.
+  double z = 0.0;
+  Verdict verdict = Verdict::fits;
+};
+
+/// The touches fit from this z on. Of touches drawn from the object's own predictions 98 % or more
+/// fit: z is not normally distributed, since a surprising reading costs far more than an expected
+/// one gains.
+inline constexpr double fits_from_z = -3.0;
+/// Below this z the touches do not fit, as less than 0.5 % of those drawn do not.
+inline constexpr double doubtful_from_z = -4.0;
+/// z is cut off here, for readings that the object holds to be impossible.
+inline constexpr double largest_fit_z = 1e6;
+
+/// Compares the log-likelihood of the touches' known elements with what the object at this pose
+/// predicts for them. An element at log odds l of the map reads r with probability
+///   q(r) = P(r | l) / sum over all r' of P(r' | l), P by Eq. 7 or the table,
+/// over No Contact and In Contact at every level. With L(r) = log P(r | l), mean M and variance V
+/// of L(r) under q, and sums over the known elements of all touches,
+///   z = sum (L(reading) - M) / sqrt(sum V).
+/// Elements count as independent; Unknown elements do not count.
+/// @param T_object_robot pose of the robot frame in the object frame
+/// @param contact its prior is the map's where it has none
+/// @param object index of the object whose numbers of a table are used
+/// @returns none where no element is known
+/// @throws Error on a touch that is not sound, or a table without numbers for the object
+std::optional<Fit> fit_of(std::span<const Touch> touches, const Pose& T_object_robot,
+                          const OccupancyGrid& map, const ContactModel& contact,
+                          std::size_t object = 0);
+
+}  // namespace palpate

@@ -1,0 +1,211 @@
+#include "palpate/fit.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "palpate/error.hpp"
+#include "reference.hpp"
+#include "synthetic.hpp"
+#include "touched_shape.hpp"
+
+namespace palpate {
+namespace {
+
+constexpr Pose T_object_robot{{1.5, -0.8}, 0.7};
+
+/// Three levels of contact, at pressures of 7, 10 and 13, whose probabilities follow the log odds.
+/// The rows of each object's numbers have no sum in particular.
+ContactModel three_levels(std::size_t objects) {
+  LikelihoodTable table{.nodes = 17, .level_edges = {8.0, 12.0}, .log_likelihood = {}};
+  Uniform random(31);
+  for (std::size_t row = 0; row < objects * table.levels(); ++row) {
+    const double slope = row % table.levels() == 0 ? -0.3 : 0.2;
+    for (std::size_t node = 0; node < table.nodes; ++node) {
+      table.log_likelihood.push_back(slope * static_cast<double>(node) - random(1.0, 3.0));
+    }
+  }
+  return {.table = std::move(table)};
+}
+
+// By hand: a map of log odds log 3 everywhere, so p = 3/4. By Eq. 7 with m = 1/5, contact has the
+// likelihood 0.02 + 0.9 * 3/4 = 0.695 and no contact 0.02 + 0.9 / 4 = 0.245. They predict contact
+// with q = 0.695 / 0.94 = 139/188 = 1 - 49/188. In units of D = log(0.695 / 0.245), contact is
+// 49/188 above the mean, no contact 139/188 below it, and the variance is 49 * 139 / 188^2.
+class SmallCase : public testing::Test {
+ protected:
+  SmallCase() { map_.log_odds.assign(9, static_cast<float>(std::log(3.0))); }
+
+  std::optional<Fit> fit(const std::vector<double>& pressure) const {
+    const std::vector<glm::dvec2> elements_mm(pressure.size(), {0.2, 0.1});
+    const Touch touch{.elements_mm = elements_mm, .pressure = pressure};
+    return fit_of(std::span(&touch, 1), Pose{}, map_, ContactModel{.gamma = 0.1});
+  }
+
+  OccupancyGrid map_{
+      .label = "small", .origin_mm = {-0.5, -0.5}, .prior = 0.2, .nx = 3, .ny = 3, .log_odds = {}};
+};
+
+TEST_F(SmallCase, IsWhatOneComputesByHand) {
+  constexpr double tolerance = 1e-6;  // of the map's float32
+  const double sd = std::sqrt(49.0 * 139.0);
+  const double contact = 49.0 / sd;
+  const double none = -139.0 / sd;
+  EXPECT_NEAR(fit({10.0})->z, contact, tolerance);
+  EXPECT_NEAR(fit({10.0, 0.0})->z, (contact + none) / std::sqrt(2.0), tolerance);
+  EXPECT_NEAR(fit({10.0, 0.0, 0.0, 0.0})->z, (contact + 3.0 * none) / 2.0, tolerance);
+}
+
+TEST_F(SmallCase, LeadsToAVerdict) {
+  // One contact among n readings: z = (0.594 - (n - 1) 1.684) / sqrt(n).
+  EXPECT_EQ(fit({10.0, 0.0, 0.0})->verdict, Verdict::fits) << "z = -1.60";
+  EXPECT_EQ(fit({10.0, 0.0, 0.0, 0.0, 0.0, 0.0})->verdict, Verdict::doubtful) << "z = -3.20";
+  EXPECT_EQ(fit(std::vector<double>{10.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0})->verdict,
+            Verdict::does_not_fit)
+      << "z = -4.60";
+}
+
+TEST_F(SmallCase, IsNoneWhereNothingIsKnown) {
+  EXPECT_FALSE(fit({2.0, 2.0})) << "at the threshold";
+  EXPECT_FALSE(fit({}));
+  EXPECT_FALSE(fit_of({}, Pose{}, map_, ContactModel{}));
+}
+
+TEST_F(SmallCase, CutsOffWhatIsHeldToBeImpossible) {
+  map_.log_odds.assign(9, 1000.0F);
+  const std::vector<glm::dvec2> elements_mm(2, {0.0, 0.0});
+  const ContactModel sure{.gamma = 0.0};
+  const auto fit = [&](const std::vector<double>& pressure) {
+    const Touch touch{.elements_mm = elements_mm, .pressure = pressure};
+    return fit_of(std::span(&touch, 1), Pose{}, map_, sure);
+  };
+  EXPECT_EQ(fit({10.0, 10.0})->z, 0.0) << "nothing else is possible";
+  EXPECT_EQ(fit({10.0, 0.0})->z, -largest_fit_z);
+  EXPECT_EQ(fit({10.0, 0.0})->verdict, Verdict::does_not_fit);
+}
+
+TEST_F(SmallCase, RefusesWhatIsNotSound) {
+  EXPECT_THROW(fit({10.0, HUGE_VAL}), Error);
+  const std::vector<glm::dvec2> element(1, {0.0, 0.0});
+  const std::vector<double> pressure(1, 10.0);
+  const Touch touch{.elements_mm = element, .pressure = pressure};
+  EXPECT_NO_THROW(fit_of(std::span(&touch, 1), Pose{}, map_, three_levels(2), 1));
+  EXPECT_THROW(fit_of(std::span(&touch, 1), Pose{}, map_, three_levels(2), 2), Error);
+}
+
+/// Contact models of every kind.
+std::vector<ContactModel> models() {
+  return {{.gamma = 0.0},
+          {.gamma = 0.1},
+          {.gamma = 0.5, .prior = 0.07},
+          three_levels(1),
+          three_levels(3)};
+}
+
+TEST(Fit, IsTheReferences) {
+  for (const double cell_mm : {0.3, 1.1}) {
+    const OccupancyGrid map = random_map(33, 21, cell_mm, 8.0, 5);
+    const Recording recording = random_recording(7, 65, 6);
+    for (const ContactModel& model : models()) {
+      for (const Pose& pose : {T_object_robot, Pose{{-4.0, 7.0}, -2.5}, Pose{{1e8, 0.0}, 0.0}}) {
+        const auto touches = all_touches(recording);
+        const std::optional<Fit> expected = reference::fit_of(touches, pose, map, model, 2);
+        const std::optional<Fit> actual = fit_of(touches, pose, map, model, 2);
+        ASSERT_TRUE(actual && expected);
+        // Both are float64; the sum over 455 elements may be near 0.
+        EXPECT_NEAR(actual->z, expected->z, 1e-9 * std::max(1.0, std::abs(expected->z)));
+        EXPECT_EQ(actual->verdict, expected->verdict);
+      }
+    }
+  }
+}
+
+TEST(Fit, IsTheSameInAMovedRobotFrame) {
+  const OccupancyGrid map = random_map(33, 21, 0.5, 8.0, 7);
+  const Recording recording = random_recording(5, 36, 8);
+  const Pose T_moved_robot{{12.0, -31.0}, 2.1};
+  const Recording elsewhere = moved(recording, T_moved_robot);
+  for (const ContactModel& model : models()) {
+    EXPECT_NEAR(
+        fit_of(all_touches(recording), T_object_robot, map, model)->z,
+        fit_of(all_touches(elsewhere), T_object_robot * inverse(T_moved_robot), map, model)->z,
+        1e-9)
+        << "rounding of places some 30 mm away";
+  }
+}
+
+TEST(Fit, IsUnchangedByAnUnknownTouch) {
+  const OccupancyGrid map = random_map(33, 21, 0.5, 8.0, 9);
+  Recording recording = random_recording(3, 36, 10);
+  const std::optional<Fit> without =
+      fit_of(recording.touches(0, 2), T_object_robot, map, ContactModel{});
+  std::fill(recording.pressure.begin() + 2 * 36, recording.pressure.end(), 2.0);
+  const std::optional<Fit> with =
+      fit_of(all_touches(recording), T_object_robot, map, ContactModel{});
+  EXPECT_EQ(with->z, without->z);
+  EXPECT_EQ(with->verdict, without->verdict);
+}
+
+/// A touch whose readings are drawn from what the map at the pose predicts.
+Recording drawn_touch(const OccupancyGrid& map, const ContactModel& model, Uniform& random) {
+  constexpr double no_contact = -20.0;  // No Contact also where no element is in contact
+  constexpr double of_level[] = {no_contact, 7.0, 10.0, 13.0};
+  const std::size_t levels = model.table ? model.table->levels() : 2;
+  Recording recording{
+      .T_robot_sensor = {{{random(-9.0, 9.0), random(-9.0, 9.0)}, random(0.0, two_pi)}},
+      .elements_mm = digitacts_array()};
+  const Pose T_object_sensor = T_object_robot * recording.T_robot_sensor[0];
+  for (const glm::dvec2& element : recording.elements_mm) {
+    const MapSample sample{reference::interpolate(map, *model.prior, T_object_sensor * element)};
+    std::vector<double> sums;
+    double sum = 0.0;
+    for (std::size_t level = 0; level < levels; ++level) {
+      sum += std::exp(reference::log_likelihood(static_cast<Reading>(level), sample, model));
+      sums.push_back(sum);
+    }
+    const auto level = std::upper_bound(sums.begin(), sums.end(), random(0.0, sum));
+    recording.pressure.push_back(of_level[level - sums.begin()]);
+  }
+  return recording;
+}
+
+TEST(Fit, OfTouchesAsPredictedHasMeanZeroAndVarianceOne) {
+  constexpr int draws = 4000;
+  OccupancyGrid doubtful = map_of(on_letter_l, "L");
+  OccupancyGrid sure = doubtful;
+  for (float& l : sure.log_odds) {
+    l *= 5.0F;
+  }
+  ContactModel levels = three_levels(1);
+  levels.prior = sure.prior;
+  const ContactModel eq7{.gamma = 0.1, .prior = sure.prior};
+  Uniform random(11);
+  for (const auto& [map, model] :
+       {std::pair(doubtful, eq7), std::pair(sure, eq7), std::pair(sure, levels)}) {
+    double sum = 0.0;
+    double squares = 0.0;
+    int fitting = 0;
+    int not_fitting = 0;
+    for (int i = 0; i < draws; ++i) {
+      const Recording touch = drawn_touch(map, model, random);
+      const Fit fit = fit_of(all_touches(touch), T_object_robot, map, model).value();
+      sum += fit.z;
+      squares += fit.z * fit.z;
+      fitting += fit.verdict == Verdict::fits ? 1 : 0;
+      not_fitting += fit.verdict == Verdict::does_not_fit ? 1 : 0;
+    }
+    // Four standard errors: 1 / sqrt(n) of the mean; of the variance at most 2 / sqrt(n), for a
+    // kurtosis of 5, which one surprise among 36 elements has.
+    EXPECT_NEAR(sum / draws, 0.0, 4.0 / std::sqrt(draws));
+    EXPECT_NEAR(squares / draws, 1.0, 8.0 / std::sqrt(draws));
+    // What the header promises, less three standard errors.
+    EXPECT_GE(fitting, (0.98 - 0.007) * draws);
+    EXPECT_LE(not_fitting, (0.005 + 0.0034) * draws);
+  }
+}
+
+}  // namespace
+}  // namespace palpate
