@@ -28,15 +28,14 @@ ObjectPose inverse(const RefinedPose& refined) {
   glm::dmat3 covariance{0.0};
   for (int row = 0; row < 3; ++row) {
     for (int column = 0; column < 3; ++column) {
-      covariance[column][row] = refined.covariance[static_cast<std::size_t>(3 * row + column)];
+      covariance[column][row] = refined.covariance[3 * row + column];
     }
   }
   const glm::dmat3 carried = jacobian * covariance * glm::transpose(jacobian);
   for (int row = 0; row < 3; ++row) {
     for (int column = 0; column < 3; ++column) {
       // Rounding must not leave it unsymmetric.
-      result.covariance[static_cast<std::size_t>(3 * row + column)] =
-          (carried[column][row] + carried[row][column]) / 2.0;
+      result.covariance[3 * row + column] = (carried[column][row] + carried[row][column]) / 2.0;
     }
   }
   return result;
