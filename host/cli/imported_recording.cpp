@@ -176,15 +176,22 @@ ImportedRecording read_tables(const ImportOptions& options, const TableOptions& 
   recording.time_s = std::move(pressures.time_s);
   recording.device_time_s = std::move(pressures.device_time_s);
   recording.lost_before = std::move(pressures.lost_before);
+  std::optional<PoseTable> poses;
+  if (!options.poses.empty()) {
+    poses = read_poses(options.poses, columns);
+  }
+  if (!options.time_column.empty() && recording.time_s.empty() &&
+      (!poses || poses->time_s.empty())) {
+    refuse_flag("--time-column", options.time_column, "no table has this column; give its name");
+  }
   choose_rows(options, recording);
   mark_unknown(options.pressures, recording);
-  if (options.poses.empty()) {
+  if (poses) {
+    imported.assumed_units = poses->assumed_units;
+    join(std::move(*poses), options, recording);
+  } else {
     recording.T_robot_sensor.assign(recording.pressure.size() / recording.elements_mm.size(),
                                     unknown_pose);
-  } else {
-    PoseTable poses = read_poses(options.poses, columns);
-    imported.assumed_units = poses.assumed_units;
-    join(std::move(poses), options, recording);
   }
   if (recording.rows == "touches") {
     require_touch_poses(options, recording);

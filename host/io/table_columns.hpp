@@ -59,7 +59,6 @@ std::optional<UnitColumn> find_column(const CsvTable& table, const Quantity& qua
                                       const std::string& name, const std::optional<Unit>& unit);
 
 /// Finds the column of times: `options.time_column` where the table has it, else a usual name.
-/// @throws Error where `options.time_column` is given and there is neither
 std::optional<UnitColumn> find_time(const CsvTable& table, const TableOptions& options);
 /// Returns the row's time in seconds.
 /// @throws Error where the cell holds no time, or one before `last_s`, or at `last_s` where

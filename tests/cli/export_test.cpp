@@ -25,13 +25,14 @@ class ExportCommand : public ProgramTest {
   static std::vector<std::string> words_of(const std::string& command) {
     std::vector<std::string> words(1);
     bool quoted = false;
-    for (const char c : command) {
+    for (std::size_t i = 0; i < command.size(); ++i) {
+      const char c = command[i];
       if (c == '\'') {
         quoted = !quoted;
       } else if (!quoted && (c == ' ' || c == '\n')) {
         words.emplace_back();
-      } else if (quoted || c != '\\') {
-        words.back() += c;
+      } else {
+        words.back() += !quoted && c == '\\' ? command[++i] : c;
       }
     }
     words.pop_back();

@@ -1,5 +1,6 @@
 #include <sys/resource.h>
 
+#include <algorithm>
 #include <cmath>
 #include <fstream>
 
@@ -27,7 +28,12 @@ class ImportCommand : public ProgramTest {
   }
 
   static Arguments command(const Arguments& more) {
-    Arguments arguments{"import", "log.csv", "--array", "2:1:2", "-o", "o.h5"};
+    Arguments arguments{"import", "log.csv"};
+    for (const auto& [flag, value] : {std::pair{"--array", "2:1:2"}, {"-o", "o.h5"}}) {
+      if (std::ranges::find(more, flag) == more.end()) {
+        arguments.insert(arguments.end(), {flag, value});
+      }
+    }
     arguments.insert(arguments.end(), more.begin(), more.end());
     return arguments;
   }
@@ -308,9 +314,10 @@ INSTANTIATE_TEST_SUITE_P(
         Case{"half_a_pose", "poses.csv", "time,x,y,theta\n0,1,,3\n", with_poses,
              "poses.csv:2: a part of the pose is empty; write x, y and theta, or leave all three "
              "empty"},
-        Case{"a_far_pose", "poses.csv", "time,x_m,y_m,theta\n0,2e6,0,0\n", with_poses,
-             "poses.csv:2: column 'x_m': 2e+06 m is further than any robot gets; check the number "
-             "and its unit"},
+        Case{
+            "a_far_pose", "poses.csv", "time,x_m,y_m,theta\n0,2e6,0,0\n", with_poses,
+            "poses.csv:2: column 'x_m': 2000000 m is further than any robot gets; check the number "
+            "and its unit"},
         Case{"no_angle", "poses.csv", "time,x,y\n0,1,2\n", with_poses,
              "poses.csv:1: has no columns 'x', 'y' and 'theta'; rename its columns, or give "
              "--pose-columns X,Y,THETA"},
@@ -343,6 +350,9 @@ TEST_F(ImportCommand, FlagsNameTheirForm) {
               "of 0.001 to 1000 mm, or a file");
   expect_said({"-o", "log.csv"},
               "-o log.csv: would overwrite log.csv, which PRESSURES reads; choose another name");
+  put("log.csv", "p0,p1\n1,2\n");
+  expect_said({"--time-column", "when"},
+              "--time-column when: no table has this column; give its name");
 }
 
 // 200,000 frames: 7 MB of text and 6 MB of pressures.
