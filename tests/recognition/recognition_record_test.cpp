@@ -107,7 +107,7 @@ bool on_cross(const glm::dvec2& p_mm) {
 
 TEST(Recognise, SaysWhatFitsAndWhatDoesNot) {
   Device device = Device::open();
-  Recording cross = touches_of(on_cross, {{1.0, -2.0}, 0.4}, 15, 21);
+  Recording cross = touches_of(on_cross, {{1.0, -2.0}, 0.4}, 30, 21);
   for (const FilterOptions& filter : both_filters()) {
     const RecognitionTask task(shapes(), filter);
     Recogniser recogniser(device, task);
