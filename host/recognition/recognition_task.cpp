@@ -33,12 +33,15 @@ const ContactClassifier& RecognitionTask::classifier() const {
 }
 
 std::optional<CoarsenedBins> settle_bins(const Device& device, RecognitionTask& task) {
-  if (!std::exchange(task.auto_bins, false)) {
+  const std::optional<double> step = std::exchange(task.bin_step, {});
+  if (!step) {
     return {};
   }
   auto* histogram = std::get_if<HistogramOptions>(&task.filter);
-  const std::int64_t most = most_bins_on(device, histogram != nullptr && histogram->still_array);
-  const BalancedLattice chosen = balanced_lattice(task.lattice(), task.hypotheses, most);
+  const std::int64_t most = histogram == nullptr ? most_bins_on(device, false)
+                                                 : most_bins_on(device, histogram->still_array,
+                                                                histogram->memory_limit_bytes);
+  const BalancedLattice chosen = balanced_lattice(task.lattice(), task.hypotheses, most, *step);
   (histogram != nullptr ? histogram->lattice : std::get<ParticleOptions>(task.filter).region) =
       chosen.lattice;
   return chosen.coarsened ? std::optional(CoarsenedBins{chosen.step_mm, most}) : std::nullopt;

@@ -32,7 +32,11 @@ struct RecognitionTask {
   std::vector<std::string> labels;
   std::vector<std::size_t> label_of;        ///< [hypothesis] index into labels
   std::vector<std::string> map_paths = {};  ///< [hypothesis] file of the map; empty without files
-  bool auto_bins = false;                   ///< settle_bins() is to choose the lattice's counts
+  /// Step by which settle_bins() chooses the lattice's counts, as balanced_lattice() takes it; none
+  /// where the counts are given.
+  std::optional<double> bin_step = {};
+  /// The pivot is the sensor's origin at the first touch of each unknown.
+  bool auto_pivot = false;
 };
 
 /// Bins that are wider than the maps resolve, since the device has no memory for more.
@@ -41,7 +45,7 @@ struct CoarsenedBins {
   std::int64_t most_bins = 0;  ///< limit of all objects' bins together
 };
 
-/// Chooses the lattice's counts by balanced_lattice() if the task leaves them to it (auto_bins).
+/// Chooses the lattice's counts by balanced_lattice() if the task leaves them to it (bin_step).
 /// @returns the bins if they had to be coarsened
 /// @throws Error as balanced_lattice() does
 std::optional<CoarsenedBins> settle_bins(const Device& device, RecognitionTask& task);
