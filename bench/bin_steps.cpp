@@ -1,6 +1,6 @@
 #include <cmath>
 #include <limits>
-#include <map>
+#include <optional>
 
 #include <fmt/format.h>
 
@@ -23,18 +23,18 @@ struct Plan {
   int trials_each = 0;  ///< for every letter
   std::vector<double> cells_mm;
   std::vector<int> touches;
-  std::vector<double> steps;  ///< by rising size; the first is what the others are compared with
+  std::vector<double> steps_mm;  ///< rising; the first is what the others are compared with
 };
 
 Plan plan_of(const BinStepsOptions& options) {
   Plan plan{.trials_each = options.trials.value_or(options.quick ? 1 : 20),
-            .cells_mm = {0.5, 1.0, 0.25},
-            .touches = {3, 5, 9},
-            .steps = {fine_step, 0.8, 1.0, balanced_step, 1.4, 1.6, 1.8, 2.0, 2.5}};
+            .cells_mm = {0.5, 1.0},
+            .touches = {9, 5, 3},
+            .steps_mm = {0.3, 0.45, 0.6, 0.75, 0.9, 1.2}};
   if (options.quick) {
     plan.cells_mm = {0.5};
     plan.touches = {5};
-    plan.steps = {fine_step, balanced_step};
+    plan.steps_mm = {0.3, 0.6};
   }
   return plan;
 }
@@ -45,6 +45,17 @@ Recording first_touches(const Recording& trial, int touches) {
   first.T_robot_sensor.resize(static_cast<std::size_t>(touches));
   first.pressure.resize(trial.elements() * static_cast<std::size_t>(touches));
   return first;
+}
+
+/// The region in steps of at most this length; in theta, of what moves an object as far.
+PoseLattice in_steps(const PoseLattice& region, std::span<const Hypothesis> letters,
+                     double step_mm) {
+  BalancedLattice fine =
+      balanced_lattice(region, letters, std::numeric_limits<std::int64_t>::max(), BinWidth::fine);
+  for (Axis* axis : {&fine.lattice.x_mm, &fine.lattice.y_mm, &fine.lattice.theta_rad}) {
+    axis->count = static_cast<int>(std::ceil(axis->count * fine.step_mm / step_mm));
+  }
+  return fine.lattice;
 }
 
 TrialErrors refined_errors(Device& device, std::span<const Hypothesis> letters,
@@ -59,11 +70,12 @@ TrialErrors refined_errors(Device& device, std::span<const Hypothesis> letters,
 
 std::vector<Column> columns() {
   return {{"map cells, mm", "/cell_mm"},
-          {"step", "/step"},
+          {"step, mm", "/step_mm"},
           {"bins per object", "/bins"},
           {"", "/count", count_text},
           {"touches", "/touches"},
           {"refined: mean error, mm", "/refined_error_mm", mean_text},
+          {"median, mm", "/refined_error_mm/median", number_text("{:.3f}")},
           {"over the finest, %", "/excess", number_text("{:+.1f}", 100.0)},
           {"difference, mm", "/difference_mm", difference_text}};
 }
@@ -79,23 +91,22 @@ Json measure(Device& device, const Plan& plan) {
         letter_maps(device, training_recordings(), MapOptions{.cell_mm = cell_mm});
     const PoseLattice region =
         touch_region(letters, array_reach_mm(trials.front().elements_mm)).lattice;
-    std::map<int, TrialErrors> finest;  // by touches
-    for (const double step : plan.steps) {
-      const PoseLattice lattice =
-          balanced_lattice(region, letters, std::numeric_limits<std::int64_t>::max(), step).lattice;
-      for (const int touches : plan.touches) {
+    for (const int touches : plan.touches) {
+      std::optional<TrialErrors> finest;
+      for (const double step_mm : plan.steps_mm) {
+        const PoseLattice lattice = in_steps(region, letters, step_mm);
         const TrialErrors errors = refined_errors(device, letters, trials, lattice, touches);
-        const TrialErrors& best = finest.emplace(touches, errors).first->second;
-        const PairedErrors paired = paired_errors(errors, best);
-        runs.push_back(
-            {{"cell_mm", cell_mm},
-             {"step", step},
-             {"bins", {lattice.x_mm.count, lattice.y_mm.count, lattice.theta_rad.count}},
-             {"count", lattice.bins()},
-             {"touches", touches},
-             {"refined_error_mm", record_of(errors_over(errors))},
-             {"excess", paired.first_mm / paired.second_mm - 1.0},
-             {"difference_mm", step == plan.steps.front() ? Json() : difference_of(paired)}});
+        const bool is_finest = !finest;
+        finest = finest.value_or(errors);
+        const PairedErrors paired = paired_errors(errors, *finest);
+        runs.push_back({{"cell_mm", cell_mm},
+                        {"step_mm", step_mm},
+                        {"bins", {lattice.x_mm.count, lattice.y_mm.count, lattice.theta_rad.count}},
+                        {"count", lattice.bins()},
+                        {"touches", touches},
+                        {"refined_error_mm", record_of(errors_over(errors))},
+                        {"excess", paired.first_mm / paired.second_mm - 1.0},
+                        {"difference_mm", is_finest ? Json() : difference_of(paired)}});
         print_row(columns(), runs.back());
         std::fflush(stdout);
       }

@@ -49,8 +49,8 @@ void run_experiment(const ExperimentOptions& options, std::span<char* const> com
 /// baselines, and the causes of the errors that more bins do not mend.
 void run_sweep(const SweepOptions& options, std::span<char* const> command_line);
 
-/// The error of the refined pose against the step of balanced_lattice(), on the region that
-/// touch_region() gives about the first touch: what balanced_step was chosen by.
+/// The error of the refined pose against the step of the bins, on the region that touch_region()
+/// gives about the first touch: what BinWidth::automatic was chosen by.
 void run_bin_steps(const BinStepsOptions& options, std::span<char* const> command_line);
 
 }  // namespace palpate::bench

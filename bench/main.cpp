@@ -69,7 +69,7 @@ int main(int argc, char** argv) try {
   command->add_option("--trials", sweep.trials, trials);
   BinStepsOptions bin_steps;
   command = add_command(app, "bin-steps",
-                        "Measure the refined pose's error against the step of --bins, after 3, 5 "
+                        "Measure the refined pose's error against the step of the bins, after 3, 5 "
                         "and 9 touches at random poses, over windows about the truth",
                         bin_steps, run_bin_steps, command_line);
   command->add_option("--trials", bin_steps.trials,

@@ -15,9 +15,10 @@ void add_recognition_flags(CLI::App& command, RecognitionFlags& flags) {
   command.add_option(
       "--bins", flags.bins,
       "Pose bins per object along x, y and theta, as 25x25x16; auto: as many as the refined pose "
-      "needs, in steps of 1.2 times the maps' cell or sensor spread, whichever is larger; fine: in "
-      "steps of 0.6 times that length, for the mode too. Both take wider steps where the device's "
-      "memory is short [default: auto, or 25x25x16 where a range or a pivot is given]");
+      "needs, in steps of 0.6 times the maps' cell or 1.2 times the sensor's spread, whichever is "
+      "larger; fine: also as the mode needs, in steps of 0.6 times the larger of both. Auto and "
+      "fine take wider steps where the device's memory is short [default: auto, or 25x25x16 where "
+      "a range or a pivot is given]");
   command.add_option("--x-mm", flags.x_mm,
                      "Range of the pivot's x in the object frame, mm, as --x-mm=-10:10 [default: "
                      "every place of an array that touches an object of the maps, or -10:10 where "

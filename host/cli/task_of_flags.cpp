@@ -103,7 +103,7 @@ std::optional<double> prior_of(const std::vector<Scene::Object>& objects,
 /// The lattice that the flags and the scene give, and what they leave to the maps and the touches.
 struct WantedLattice {
   PoseLattice lattice;
-  std::optional<double> bin_step;  ///< as RecognitionTask has it
+  std::optional<BinWidth> bin_width;  ///< as RecognitionTask has it
   bool auto_pivot = false;
 };
 
@@ -116,18 +116,18 @@ std::optional<std::array<int, 3>> counts_of(const RecognitionFlags& flags, const
              : std::optional(parse_bins("--bins", flags.bins));
 }
 
-/// The step of --bins auto or fine, where one of them is given.
-std::optional<double> bin_step_of(const RecognitionFlags& flags, const Scene& scene) {
+/// What --bins auto or fine asks for, where one of them is given.
+std::optional<BinWidth> bin_width_of(const RecognitionFlags& flags, const Scene& scene) {
   if (flags.bins.empty() ? scene.fine_bins : flags.bins == "fine") {
-    return fine_step;
+    return BinWidth::fine;
   }
   const bool is_auto = flags.bins.empty() ? scene.auto_bins : flags.bins == "auto";
-  return is_auto ? std::optional(balanced_step) : std::nullopt;
+  return is_auto ? std::optional(BinWidth::automatic) : std::nullopt;
 }
 
 /// Where neither counts nor any part of a region is given, all of the lattice follows from the maps
 /// and the array, about the first touch.
-WantedLattice automatic_lattice(std::optional<double> bin_step,
+WantedLattice automatic_lattice(std::optional<BinWidth> bin_width,
                                 std::span<const Hypothesis> hypotheses, double reach_mm) {
   // As many times the bins that the objects themselves need.
   constexpr double much = 2.0;
@@ -140,13 +140,13 @@ WantedLattice automatic_lattice(std::optional<double> bin_step,
         "or give --x-mm and --y-mm\n",
         region.excess);
   }
-  return {region.lattice, bin_step.value_or(balanced_step), true};
+  return {region.lattice, bin_width.value_or(BinWidth::automatic), true};
 }
 
 WantedLattice lattice_of(const RecognitionFlags& flags, const Scene& scene,
                          std::span<const Hypothesis> hypotheses, double reach_mm) {
   const std::optional<std::array<int, 3>> counts = counts_of(flags, scene);
-  const std::optional<double> bin_step = bin_step_of(flags, scene);
+  const std::optional<BinWidth> bin_width = bin_width_of(flags, scene);
   const bool pivot_flag = !flags.pivot_mm.empty();
   const bool auto_pivot = pivot_flag ? flags.pivot_mm == "auto" : scene.region.auto_pivot;
   const std::optional<glm::dvec2> pivot_mm =
@@ -156,7 +156,7 @@ WantedLattice lattice_of(const RecognitionFlags& flags, const Scene& scene,
   const bool has_range = !flags.x_mm.empty() || !flags.y_mm.empty() || !flags.theta_deg.empty() ||
                          scene.region.x_mm || scene.region.y_mm || scene.region.theta_deg;
   if (!counts && !pivot_mm && !has_range) {
-    return automatic_lattice(bin_step, hypotheses, reach_mm);
+    return automatic_lattice(bin_width, hypotheses, reach_mm);
   }
   PoseLattice lattice;
   const auto range = [](const char* flag, const std::string& text,
@@ -186,7 +186,7 @@ WantedLattice lattice_of(const RecognitionFlags& flags, const Scene& scene,
     refuse_flag("--pivot-mm", fmt::format("{},{}", lattice.pivot_mm.x, lattice.pivot_mm.y),
                 "give numbers within +-{:g}", farthest_mm);
   }
-  return {lattice.collapse_fixed(), bin_step, auto_pivot};
+  return {lattice.collapse_fixed(), bin_width, auto_pivot};
 }
 
 /// Whether the particle filter is asked for. Throws Error on a filter that does not exist and on
@@ -287,7 +287,7 @@ RecognitionTask task_of(const RecognitionFlags& flags, const Scene& scene,
   for (const Scene::Object& object : objects) {
     task.map_paths.push_back(object.map.string());
   }
-  task.bin_step = wanted.bin_step;
+  task.bin_width = wanted.bin_width;
   task.auto_pivot = wanted.auto_pivot;
   return task;
 }
@@ -297,7 +297,7 @@ Device open_device(const RecognitionFlags& flags, const Scene& scene) {
 }
 
 Recogniser open_recogniser(Device& device, RecognitionTask& task) {
-  const bool fine = task.bin_step == fine_step;
+  const bool fine = task.bin_width == BinWidth::fine;
   if (const std::optional<CoarsenedBins> bins = settle_bins(device, task)) {
     fmt::print(
         stderr,

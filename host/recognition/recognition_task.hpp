@@ -7,6 +7,7 @@
 #include <variant>
 #include <vector>
 
+#include "palpate/balanced_lattice.hpp"
 #include "palpate/device.hpp"
 #include "palpate/particle_filter.hpp"
 #include "palpate/pose_histogram.hpp"
@@ -32,9 +33,8 @@ struct RecognitionTask {
   std::vector<std::string> labels;
   std::vector<std::size_t> label_of;        ///< [hypothesis] index into labels
   std::vector<std::string> map_paths = {};  ///< [hypothesis] file of the map; empty without files
-  /// Step by which settle_bins() chooses the lattice's counts, as balanced_lattice() takes it; none
-  /// where the counts are given.
-  std::optional<double> bin_step = {};
+  /// By which settle_bins() chooses the lattice's counts; none where the counts are given.
+  std::optional<BinWidth> bin_width = {};
   /// The pivot is the sensor's origin at the first touch of each unknown.
   bool auto_pivot = false;
 };
@@ -45,7 +45,7 @@ struct CoarsenedBins {
   std::int64_t most_bins = 0;  ///< limit of all objects' bins together
 };
 
-/// Chooses the lattice's counts by balanced_lattice() if the task leaves them to it (bin_step).
+/// Chooses the lattice's counts by balanced_lattice() if the task leaves them to it (bin_width).
 /// @returns the bins if they had to be coarsened
 /// @throws Error as balanced_lattice() does
 std::optional<CoarsenedBins> settle_bins(const Device& device, RecognitionTask& task);

@@ -17,10 +17,13 @@ namespace palpate {
 
 namespace {
 
-/// The least distance over which a map can change much: cells are interpolated, and every cell is
-/// a sum of Gaussians of the sensor model's spread.
-double resolution_mm(const OccupancyGrid& map) {
-  return std::max(map.cell_mm, map.spread_mm.value_or(0.0));
+/// The widest step that suits a map. A map changes little over less than a cell, since cells are
+/// interpolated, or than the spread of its sensor model, since every cell is a sum of Gaussians.
+double step_for(const OccupancyGrid& map, BinWidth width) {
+  // docs/refinement.md holds the measurements behind these numbers.
+  const double spreads = width == BinWidth::fine ? 1.0 : 2.0;
+  const double unknown_mm = width == BinWidth::fine ? 0.0 : map.cell_mm;
+  return balanced_step * std::max(map.cell_mm, spreads * map.spread_mm.value_or(unknown_mm));
 }
 
 /// Root mean square distance of an object's cells from the pivot, wherever in the region that is.
@@ -68,21 +71,17 @@ Box occupied_box(const OccupancyGrid& map) {
 }  // namespace
 
 BalancedLattice balanced_lattice(const PoseLattice& region, std::span<const Hypothesis> hypotheses,
-                                 std::int64_t most_bins, double step) {
+                                 std::int64_t most_bins, BinWidth width) {
   validate_hypotheses(hypotheses);
-  if (!(step > 0.0 && std::isfinite(step))) {
-    throw Error(Fault::input,
-                fmt::format("step = {} of the maps' finest detail: give a positive number", step));
-  }
   PoseLattice lattice = region;
   for (Axis* axis : {&lattice.x_mm, &lattice.y_mm, &lattice.theta_rad}) {
     axis->count = 1;
   }
   lattice.validate();
-  double finest_mm = std::numeric_limits<double>::infinity();
+  double wanted_mm = std::numeric_limits<double>::infinity();
   double longest_mm = 0.0;
   for (const Hypothesis& hypothesis : hypotheses) {
-    finest_mm = std::min(finest_mm, resolution_mm(hypothesis.map));
+    wanted_mm = std::min(wanted_mm, step_for(hypothesis.map, width));
     longest_mm = std::max(longest_mm, lever_mm(hypothesis.map, region));
   }
   const double extents_mm[] = {lattice.x_mm.upper - lattice.x_mm.lower,
@@ -95,7 +94,6 @@ BalancedLattice balanced_lattice(const PoseLattice& region, std::span<const Hypo
     }
     return product;
   };
-  const double wanted_mm = step * finest_mm;
   // Counts are ints.
   const auto most =
       static_cast<double>(std::min<std::int64_t>(most_bins, std::numeric_limits<int>::max()));

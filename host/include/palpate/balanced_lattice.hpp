@@ -10,13 +10,18 @@
 
 namespace palpate {
 
-/// Step of a balanced lattice, relative to the finest detail that the maps resolve: the larger of a
-/// map's cell and, where the map knows it, its sensor model's spread. The refined pose errs by at
-/// most 10 % more than on the finest lattice; docs/refinement.md holds the measurements.
-inline constexpr double balanced_step = 1.2;
-/// Step at which the mode, too, errs little more than on the finest lattice, and the refined pose
-/// no more.
-inline constexpr double fine_step = 0.6;
+/// Step of a balanced lattice, relative to the length that BinWidth names. docs/refinement.md says
+/// why.
+inline constexpr double balanced_step = 0.6;
+
+/// What bins are to resolve.
+enum class BinWidth {
+  /// What the refined pose needs: steps of 0.6 times a map's cell, or 1.2 times the spread of its
+  /// sensor model where this is more. Of a map that does not know the spread, 1.2 times the cell.
+  automatic,
+  /// What the mode needs, too: steps of 0.6 times the larger of a map's cell and spread.
+  fine,
+};
 
 /// Default limit of balanced_lattice() on the bins of all objects together: 0.8 GB.
 inline constexpr std::int64_t most_balanced_bins = 100'000'000;
@@ -29,16 +34,14 @@ struct BalancedLattice {
 };
 
 /// Chooses the bin counts for `region`; ignores the counts it already has. Steps along x and y are
-/// at most `step` of the finest detail. A step in theta moves each object by at most the same
-/// length: the root mean square over its occupied cells and over where in the region its pivot may
-/// be. An axis of zero extent gets one bin. Where all objects together would have more than
-/// `most_bins` bins, the steps of all axes grow by one factor.
-/// @param step relative to the finest detail, such as balanced_step or fine_step
-/// @throws Error on an empty list, a map that is not sound, a step that is not positive or a region
-/// that is out of range
+/// at most the least that any map asks for (BinWidth). A step in theta moves each object by at most
+/// the same length: the root mean square over its occupied cells and over where in the region its
+/// pivot may be. An axis of zero extent gets one bin. Where all objects together would have more
+/// than `most_bins` bins, the steps of all axes grow by one factor.
+/// @throws Error on an empty list, a map that is not sound or a region that is out of range
 BalancedLattice balanced_lattice(const PoseLattice& region, std::span<const Hypothesis> hypotheses,
                                  std::int64_t most_bins = most_balanced_bins,
-                                 double step = balanced_step);
+                                 BinWidth width = BinWidth::automatic);
 
 /// The poses of an object that an array touches, about the sensor's origin.
 struct TouchRegion {

@@ -41,7 +41,7 @@ struct Scene {
   std::optional<double> none;              ///< prior weight of "none of these"
   std::optional<std::array<int, 3>> bins;  ///< of x, y, theta
   bool auto_bins = false;                  ///< counts by balanced_lattice()
-  bool fine_bins = false;                  ///< counts by balanced_lattice() with fine_step
+  bool fine_bins = false;                  ///< the same with BinWidth::fine
   std::optional<std::string> filter;       ///< "auto", "histogram", "bounded" or "particles"
   std::optional<std::string> device;       ///< a device's name or index
 };

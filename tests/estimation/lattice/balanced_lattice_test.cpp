@@ -36,7 +36,7 @@ const std::vector<Hypothesis>& letters() {
 /// In steps of 0.6 of the finest detail.
 BalancedLattice fine_lattice(const PoseLattice& region, std::span<const Hypothesis> hypotheses,
                              std::int64_t most_bins = most_balanced_bins) {
-  return balanced_lattice(region, hypotheses, most_bins, fine_step);
+  return balanced_lattice(region, hypotheses, most_bins, BinWidth::fine);
 }
 
 TEST(BalancedLattice, OfThePapersLettersIsNearWhatAHandWouldChoose) {
@@ -106,17 +106,22 @@ TEST(BalancedLattice, StopsAtWhatTheSensorShows) {
   EXPECT_EQ(fine_lattice({}, objects).lattice.x_mm.count, 67) << "the finest counts";
 }
 
-TEST(BalancedLattice, TakesTheStepThatIsGiven) {
+TEST(BalancedLattice, ForTheRefinedPoseSkipsWhatItEvensOut) {
+  const auto step_mm = [](double cell_mm, std::optional<double> spread_mm) {
+    Hypothesis object = letter("O");
+    object.map.cell_mm = cell_mm;
+    object.map.spread_mm = spread_mm;
+    return balanced_lattice({}, std::span(&object, 1)).step_mm;
+  };
+  EXPECT_DOUBLE_EQ(step_mm(0.5, 0.5), 0.6) << "twice the spread";
+  EXPECT_DOUBLE_EQ(step_mm(0.25, 0.5), 0.6);
+  EXPECT_DOUBLE_EQ(step_mm(1.0, 0.5), 0.6) << "the cell";
+  EXPECT_DOUBLE_EQ(step_mm(2.0, 0.5), 1.2);
+  EXPECT_DOUBLE_EQ(step_mm(0.5, {}), 0.6) << "as if the spread were the cell";
   const PoseLattice fine = fine_lattice({}, letters()).lattice;
-  const BalancedLattice twice =
-      balanced_lattice({}, letters(), most_balanced_bins, 2.0 * fine_step);
-  EXPECT_EQ(twice.step_mm, 2.0 * fine_step * 0.5);
-  EXPECT_EQ(twice.lattice.x_mm.count, 34) << "20 mm in steps of 0.6 mm";
-  EXPECT_NEAR(twice.lattice.theta_rad.count, fine.theta_rad.count / 2.0, 1.0);
-  EXPECT_EQ(balanced_lattice({}, letters()).step_mm, balanced_step * 0.5);
-  for (const double step : {0.0, -1.0, std::nan(""), HUGE_VAL}) {
-    EXPECT_THROW(balanced_lattice({}, letters(), most_balanced_bins, step), Error) << step;
-  }
+  const PoseLattice lattice = balanced_lattice({}, letters()).lattice;
+  EXPECT_EQ(lattice.x_mm.count, 34) << "20 mm in steps of 0.6 mm";
+  EXPECT_NEAR(lattice.theta_rad.count, fine.theta_rad.count / 2.0, 1.0);
 }
 
 TEST(BalancedLattice, FollowsTheRegionAndCollapsesWhatIsFixed) {
@@ -210,8 +215,7 @@ TEST(TouchRegion, IsTheObjectsBoxGrownByTheArray) {
 TEST(TouchRegion, HoldsTheSensorWhereverItMeetsTheObject) {
   const Hypothesis bar = bar_at(3.0, -1.0);
   const std::vector<glm::dvec2> elements_mm = digitacts_array();
-  const PoseLattice region =
-      touch_region(std::span(&bar, 1), array_reach_mm(elements_mm)).lattice;
+  const PoseLattice region = touch_region(std::span(&bar, 1), array_reach_mm(elements_mm)).lattice;
   Uniform random(190);
   int met = 0;
   for (int i = 0; i < 2000; ++i) {
