@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <optional>
@@ -82,8 +83,9 @@ std::vector<Column> columns() {
 
 /// Prints every run once it is known.
 Json measure(Device& device, const Plan& plan) {
-  const std::vector<Recording> trials = make_trials(vowels, plan.trials_each, plan.touches.back(),
-                                                    unknown_seed, {.at_random_poses = true});
+  const std::vector<Recording> trials =
+      make_trials(vowels, plan.trials_each, std::ranges::max(plan.touches), unknown_seed,
+                  {.at_random_poses = true});
   Json runs = Json::array();
   print_head(columns());
   for (const double cell_mm : plan.cells_mm) {

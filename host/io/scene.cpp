@@ -103,7 +103,7 @@ void read_bins(const Entry& entry, Scene& scene) {
     return;
   }
   const std::vector<Entry> counts =
-      entry.list(3, "give the counts of bins [x, y, theta], auto or fine");
+      entry.list(3, "give the counts of bins [x, y, theta], or auto, or fine");
   scene.bins = {counts[0].integer(1), counts[1].integer(1), counts[2].integer(1)};
 }
 

@@ -206,7 +206,7 @@ TEST_F(Defaults, LiveAndRecognizeGiveTheSameNumbers) {
 }
 
 TEST_F(Defaults, KeepToTheMemoryThatIsGiven) {
-  // Half of it holds 5e5 bins of 8 bytes; the default would take 1.7 million for both maps.
+  // 8 MiB are for copies; half of the rest holds 5e5 bins of 8 bytes, a third of the default's.
   const Outcome outcome =
       palpate({"recognize", "u.h5", "--maps", "maps", "--memory-mib", "16", "--json", "r.json"});
   EXPECT_EQ(outcome.status, 0) << outcome.err;
@@ -231,7 +231,7 @@ TEST_F(Defaults, RefuseAFirstTouchBeyondEveryRobot) {
   beyond.T_robot_sensor.front().translation_mm.x = 1e10;
   write_recording(folder_ / "beyond.h5", beyond);
   expect_refused({"recognize", "beyond.h5", "--maps", "maps"},
-                 {"beyond.h5", "first touch", "1e+10", "poses' unit"});
+                 {"beyond.h5", "first touch", "10000000000", "poses' unit"});
 }
 
 }  // namespace

@@ -80,7 +80,7 @@ TEST_F(SceneFile, LeavesBinsAndPivotToTheMapsAndTheTouches) {
   const Scene fine = read("bins: fine\nregion: {pivot_mm: [1, 2]}");
   EXPECT_TRUE(fine.fine_bins);
   EXPECT_FALSE(fine.auto_bins || fine.bins || fine.region.auto_pivot);
-  expect_named(message("bins: coarse"), {"bins", "auto or fine"});
+  expect_named(message("bins: coarse"), {"bins", "or auto, or fine"});
   expect_named(message("region: {pivot_mm: here}"), {"pivot_mm", "[x, y], or auto"});
 }
 

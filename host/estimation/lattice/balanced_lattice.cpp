@@ -9,6 +9,7 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
+#include "command_stream.hpp"
 #include "hypotheses.hpp"
 #include "palpate/error.hpp"
 #include "refinement.hpp"
@@ -139,8 +140,11 @@ TouchRegion touch_region(std::span<const Hypothesis> hypotheses, double reach_mm
 std::int64_t most_bins_on(const Device& device, bool still_array,
                           std::optional<std::uint64_t> memory_limit_bytes) {
   constexpr std::uint64_t bytes_per_bin = 8;
+  constexpr std::uint64_t staging = gpu::CommandStream::staging_bytes;
   const std::uint64_t all = device.memory_bytes();
-  const std::uint64_t memory = std::min(memory_limit_bytes.value_or(all), all);
+  // A limit counts the staging memory, too.
+  const std::uint64_t memory =
+      memory_limit_bytes ? std::min(std::max(*memory_limit_bytes, staging) - staging, all) : all;
   const std::uint64_t held = memory / 2 / (still_array ? 2 : 1) / bytes_per_bin;
   return static_cast<std::int64_t>(std::min(held, static_cast<std::uint64_t>(most_balanced_bins)));
 }
