@@ -32,6 +32,10 @@ struct SweepOptions : RunOptions {
   std::optional<int> trials;             ///< per letter; by default 10, or 4 if quick
 };
 
+struct BinStepsOptions : RunOptions {
+  std::optional<int> trials;  ///< per letter; by default 20, or 1 if quick
+};
+
 // Each prints its results as Markdown tables and writes the files that its options name.
 // They throw Error where an option is out of range, or the device, a file or a folder cannot be
 // opened.
@@ -53,5 +57,9 @@ void measure_fit(const FitOptions& options, std::span<char* const> command_line)
 /// object, maps of several cell sizes, the engine's ways to evaluate the likelihood beside two
 /// baselines, and the causes of the errors that more bins do not mend.
 void run_sweep(const SweepOptions& options, std::span<char* const> command_line);
+
+/// The error of the refined pose against the step of the bins, on the region that touch_region()
+/// gives about the first touch: what BinWidth::automatic was chosen by.
+void run_bin_steps(const BinStepsOptions& options, std::span<char* const> command_line);
 
 }  // namespace palpate::bench

@@ -78,7 +78,8 @@ ExperimentResult measure(Device& device, const ExperimentOptions& options, Repor
   }
   // As many bins as Table I's most, shaped by what a turn moves.
   const std::int64_t most_bins = lattices.back().bins() * static_cast<std::int64_t>(letters.size());
-  add(HistogramOptions{.lattice = balanced_lattice(lattices.back(), letters, most_bins).lattice});
+  add(HistogramOptions{
+      .lattice = balanced_lattice(lattices.back(), letters, most_bins, BinWidth::fine).lattice});
   for (const bool augmented : {false, true}) {
     for (const int count : {100, 1'000, most_particles}) {
       if (!options.quick || count > 100) {

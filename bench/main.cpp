@@ -75,6 +75,13 @@ int main(int argc, char** argv) try {
   command->add_option("--max-bins", sweep.max_bins,
                       "Most bins per object (default 10,000,000, or 100,000 with --quick)");
   command->add_option("--trials", sweep.trials, trials);
+  BinStepsOptions bin_steps;
+  command = add_command(app, "bin-steps",
+                        "Measure the refined pose's error against the step of the bins, after 3, 5 "
+                        "and 9 touches at random poses, over windows about the truth",
+                        bin_steps, run_bin_steps, command_line);
+  command->add_option("--trials", bin_steps.trials,
+                      "Trials per letter (default 20, or 1 with --quick)");
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

@@ -55,7 +55,9 @@ void sweep_cells(Device& device, const SweepPlan& plan, const CellPlan& cells, J
     }
   }
   if (!cells.lattices.empty()) {
-    const PoseLattice balanced = balanced_lattice(lattice_with(goal_bins), letters).lattice;
+    const PoseLattice balanced =
+        balanced_lattice(lattice_with(goal_bins), letters, most_balanced_bins, BinWidth::fine)
+            .lattice;
     document["knees"].push_back(
         knee_record(points, cells.cell_mm,
                     {balanced.x_mm.count, balanced.y_mm.count, balanced.theta_rad.count}));

@@ -149,7 +149,7 @@ Chart knee_chart(const Json& document) {
     }
     if (const double balanced = knee.at("balanced_count"); balanced <= 2.0 * finest) {
       chart.rules.push_back(
-          {.vertical = true, .at = balanced, .colour = own, .label = "auto, " + cells + " mm"});
+          {.vertical = true, .at = balanced, .colour = own, .label = "fine, " + cells + " mm"});
     }
     chart.series.push_back(std::move(mode));
     chart.series.push_back(std::move(refined));

@@ -108,7 +108,7 @@ Json knee_record(const Json& points, double cell_mm, const BinCounts& balanced) 
           {"floor_mm", runs.back().at("refined_error_mm")},
           {"sentence",
            fmt::format("Maps with cells of {} mm need {} bins for the mode and {} for the refined "
-                       "pose; --bins auto takes {} = {}.",
+                       "pose; --bins fine takes {} = {}.",
                        cell_mm, bins_text(mode), bins_text(refined), plain_text(balanced),
                        bins_text(count))},
           {"steps", steps_of(runs, modes_mm, refined_mm)}};

@@ -110,7 +110,8 @@ void live(const Options& options) {
   replace_array(scene, options.recognition.scene, source, elements_mm.size(), elements_mm);
   const TouchDetectorOptions detector =
       detector_options(options.detector, description.pressure_unit, source);
-  RecognitionTask task = task_of(options.recognition, scene, description.pressure_unit, source);
+  RecognitionTask task = task_of(options.recognition, scene, description.pressure_unit, source,
+                                 array_reach_mm(elements_mm));
   CommandFiles files;
   add_sensor_files(options.sensor, options.poses, files);
   add_recognition_files(options.recognition, scene, task, files);

@@ -51,7 +51,7 @@ Pose parse_pose(const std::string& flag, const std::string& text) {
 }
 
 std::array<int, 3> parse_bins(const std::string& flag, const std::string& text) {
-  const auto bins = parse<int, 3>(flag, text, 'x', "XxYxTHETA, such as 25x25x16, or auto");
+  const auto bins = parse<int, 3>(flag, text, 'x', "XxYxTHETA, such as 25x25x16, or auto, or fine");
   if (std::ranges::min(bins) < 1) {
     refuse_flag(flag, text, "every count must be at least 1");
   }

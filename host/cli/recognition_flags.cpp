@@ -14,17 +14,23 @@ void add_recognition_flags(CLI::App& command, RecognitionFlags& flags) {
       "region, bins, filter and device, and a flag overrides its key");
   command.add_option(
       "--bins", flags.bins,
-      "Pose bins per object along x, y and theta [default: 25x25x16]; auto: steps of "
-      "0.6 times the maps' cell or sensor spread, whichever is larger (finer steps do not improve "
-      "the refined pose), or wider steps where the device's memory is short");
-  command.add_option("--x-mm", flags.x_mm, "Range of x, mm, as --x-mm=-10:10 [default: -10:10]");
-  command.add_option("--y-mm", flags.y_mm, "Range of y, mm, as --y-mm=-10:10 [default: -10:10]");
+      "Pose bins per object along x, y and theta, as 25x25x16; auto: as many as the refined pose "
+      "needs, in steps of 0.6 times the maps' cell or 1.2 times the sensor's spread, whichever is "
+      "larger; fine: also as the mode needs, in steps of 0.6 times the larger of both. Auto and "
+      "fine take wider steps where the device's memory is short [default: auto, or 25x25x16 where "
+      "a range or a pivot is given]");
+  command.add_option("--x-mm", flags.x_mm,
+                     "Range of the pivot's x in the object frame, mm, as --x-mm=-10:10 [default: "
+                     "every place of an array that touches an object of the maps, or -10:10 where "
+                     "counts of --bins, another range or a pivot X,Y is given]");
+  command.add_option("--y-mm", flags.y_mm, "Range of the pivot's y [default: as for --x-mm]");
   command.add_option("--theta-deg", flags.theta_deg,
                      "Range of theta, degrees [default: 0:360]; 30:30 fixes theta at 30");
   command.add_option(
       "--pivot-mm", flags.pivot_mm,
       "Point X,Y in the robot frame, mm, about which theta turns; the bins' x and y are the "
-      "point's coordinates in the object frame [default: 0,0]");
+      "point's coordinates in the object frame. auto: the sensor's origin at the first touch of "
+      "each unknown [default: auto, or 0,0 where counts of --bins or a range is given]");
   command.add_option("--prior", flags.prior,
                      "Probability that an unseen cell is occupied [default: the maps' own]");
   command.add_option("--gamma", flags.gamma,

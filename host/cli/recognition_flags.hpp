@@ -52,14 +52,16 @@ void replace_array(const Scene& scene, const std::string& scene_file, const std:
 /// The task that the flags and the scene file ask for; a flag overrides the scene's key. Reads the
 /// maps. Throws Error.
 /// @param pressure_unit of the touches to come, which `source` gives
+/// @param reach_mm of the arrays that touch; see array_reach_mm()
 RecognitionTask task_of(const RecognitionFlags& flags, const Scene& scene,
-                        const std::string& pressure_unit, const std::string& source);
+                        const std::string& pressure_unit, const std::string& source,
+                        double reach_mm);
 
 /// Opens the device that the flags or the scene name. Throws Error.
 Device open_device(const RecognitionFlags& flags, const Scene& scene);
 
-/// Makes the task's filter, after --bins auto has chosen its bins. Says on standard error where the
-/// device's memory made bins wider than the maps resolve. Throws Error.
+/// Makes the task's filter, after --bins auto or fine has chosen its bins. Says on standard error
+/// where the device's memory made bins wider than the maps resolve. Throws Error.
 Recogniser open_recogniser(Device& device, RecognitionTask& task);
 
 /// Adds the files that the task was read from: the scene, its array and the maps.

@@ -161,7 +161,12 @@ void recognize(const Options& options) {
   }
   const std::vector<Unknown> unknowns = list_unknowns(options, recordings);
   const Recording& first = recordings.front();
-  RecognitionTask task = task_of(options.recognition, scene, first.pressure_unit, first.path);
+  double farthest_element_mm = 0.0;
+  for (const Recording& recording : recordings) {
+    farthest_element_mm = std::max(farthest_element_mm, array_reach_mm(recording.elements_mm));
+  }
+  RecognitionTask task =
+      task_of(options.recognition, scene, first.pressure_unit, first.path, farthest_element_mm);
   if (auto* histogram = std::get_if<HistogramOptions>(&task.filter)) {
     histogram->still_array = array_is_still(unknowns);
   }

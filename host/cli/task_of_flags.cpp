@@ -10,6 +10,7 @@
 
 #include "file_identity.hpp"
 #include "options.hpp"
+#include "palpate/balanced_lattice.hpp"
 #include "palpate/files.hpp"
 #include "recordings.hpp"
 
@@ -99,7 +100,64 @@ std::optional<double> prior_of(const std::vector<Scene::Object>& objects,
   return given;
 }
 
-PoseLattice make_lattice(const RecognitionFlags& flags, const Scene& scene) {
+/// The lattice that the flags and the scene give, and what they leave to the maps and the touches.
+struct WantedLattice {
+  PoseLattice lattice;
+  std::optional<BinWidth> bin_width;  ///< as RecognitionTask has it
+  bool auto_pivot = false;
+};
+
+std::optional<std::array<int, 3>> counts_of(const RecognitionFlags& flags, const Scene& scene) {
+  if (flags.bins.empty()) {
+    return scene.bins;
+  }
+  return flags.bins == "auto" || flags.bins == "fine"
+             ? std::nullopt
+             : std::optional(parse_bins("--bins", flags.bins));
+}
+
+/// What --bins auto or fine asks for, where one of them is given.
+std::optional<BinWidth> bin_width_of(const RecognitionFlags& flags, const Scene& scene) {
+  if (flags.bins.empty() ? scene.fine_bins : flags.bins == "fine") {
+    return BinWidth::fine;
+  }
+  const bool is_auto = flags.bins.empty() ? scene.auto_bins : flags.bins == "auto";
+  return is_auto ? std::optional(BinWidth::automatic) : std::nullopt;
+}
+
+/// Where neither counts nor any part of a region is given, all of the lattice follows from the maps
+/// and the array, about the first touch.
+WantedLattice automatic_lattice(std::optional<BinWidth> bin_width,
+                                std::span<const Hypothesis> hypotheses, double reach_mm) {
+  // As many times the bins that the objects themselves need.
+  constexpr double much = 2.0;
+  const TouchRegion region = touch_region(hypotheses, reach_mm);
+  if (region.excess > much) {
+    fmt::print(
+        stderr,
+        "palpate: the objects lie far apart in the frames of their maps; the bins cover {:.0f}"
+        " times the area that the objects need. Learn each object near its frame's origin, "
+        "or give --x-mm and --y-mm\n",
+        region.excess);
+  }
+  return {region.lattice, bin_width.value_or(BinWidth::automatic), true};
+}
+
+WantedLattice lattice_of(const RecognitionFlags& flags, const Scene& scene,
+                         std::span<const Hypothesis> hypotheses, double reach_mm) {
+  const std::optional<std::array<int, 3>> counts = counts_of(flags, scene);
+  const std::optional<BinWidth> bin_width = bin_width_of(flags, scene);
+  const bool pivot_flag = !flags.pivot_mm.empty();
+  const bool auto_pivot = pivot_flag ? flags.pivot_mm == "auto" : scene.region.auto_pivot;
+  const std::optional<glm::dvec2> pivot_mm =
+      auto_pivot   ? std::nullopt
+      : pivot_flag ? std::optional(parse_point("--pivot-mm", flags.pivot_mm))
+                   : scene.region.pivot_mm;
+  const bool has_range = !flags.x_mm.empty() || !flags.y_mm.empty() || !flags.theta_deg.empty() ||
+                         scene.region.x_mm || scene.region.y_mm || scene.region.theta_deg;
+  if (!counts && !pivot_mm && !has_range) {
+    return automatic_lattice(bin_width, hypotheses, reach_mm);
+  }
   PoseLattice lattice;
   const auto range = [](const char* flag, const std::string& text,
                         const std::optional<std::array<double, 2>>& key, Axis& axis, double unit) {
@@ -117,25 +175,18 @@ PoseLattice make_lattice(const RecognitionFlags& flags, const Scene& scene) {
   range("--x-mm", flags.x_mm, scene.region.x_mm, lattice.x_mm, 1.0);
   range("--y-mm", flags.y_mm, scene.region.y_mm, lattice.y_mm, 1.0);
   range("--theta-deg", flags.theta_deg, scene.region.theta_deg, lattice.theta_rad, radians(1.0));
-  const auto bins = flags.bins.empty()     ? scene.bins
-                    : flags.bins == "auto" ? std::nullopt
-                                           : std::optional(parse_bins("--bins", flags.bins));
-  if (bins) {
-    lattice.x_mm.count = (*bins)[0];
-    lattice.y_mm.count = (*bins)[1];
-    lattice.theta_rad.count = (*bins)[2];
+  if (counts) {
+    lattice.x_mm.count = (*counts)[0];
+    lattice.y_mm.count = (*counts)[1];
+    lattice.theta_rad.count = (*counts)[2];
   }
-  if (!flags.pivot_mm.empty()) {
-    lattice.pivot_mm = parse_point("--pivot-mm", flags.pivot_mm);
-  } else if (scene.region.pivot_mm) {
-    lattice.pivot_mm = *scene.region.pivot_mm;
-  }
+  lattice.pivot_mm = pivot_mm.value_or(lattice.pivot_mm);
   if (!(std::abs(lattice.pivot_mm.x) <= farthest_mm &&
         std::abs(lattice.pivot_mm.y) <= farthest_mm)) {
     refuse_flag("--pivot-mm", fmt::format("{},{}", lattice.pivot_mm.x, lattice.pivot_mm.y),
                 "give numbers within +-{:g}", farthest_mm);
   }
-  return lattice.collapse_fixed();
+  return {lattice.collapse_fixed(), bin_width, auto_pivot};
 }
 
 /// Whether the particle filter is asked for. Throws Error on a filter that does not exist and on
@@ -204,9 +255,10 @@ void replace_array(const Scene& scene, const std::string& scene_file, const std:
 }
 
 RecognitionTask task_of(const RecognitionFlags& flags, const Scene& scene,
-                        const std::string& pressure_unit, const std::string& source) {
+                        const std::string& pressure_unit, const std::string& source,
+                        double reach_mm) {
   const bool with_particles = wants_particles(flags, scene);
-  HistogramOptions histogram{.lattice = make_lattice(flags, scene)};
+  HistogramOptions histogram;
   ContactModel& contact = histogram.contact;
   contact.gamma = flags.gamma ? *flags.gamma : scene.gamma.value_or(0.1);
   if (!(contact.gamma >= 0.0 && contact.gamma < 1.0)) {
@@ -223,6 +275,8 @@ RecognitionTask task_of(const RecognitionFlags& flags, const Scene& scene,
   }
   const std::vector<Scene::Object> objects = objects_of(flags, scene);
   std::vector<Hypothesis> hypotheses = read_maps(objects);
+  const WantedLattice wanted = lattice_of(flags, scene, hypotheses, reach_mm);
+  histogram.lattice = wanted.lattice;
   if (const auto none = flags.none ? flags.none : scene.none) {
     histogram.none_weight = require_above("--none", *none, 0.0);
   }
@@ -233,7 +287,8 @@ RecognitionTask task_of(const RecognitionFlags& flags, const Scene& scene,
   for (const Scene::Object& object : objects) {
     task.map_paths.push_back(object.map.string());
   }
-  task.auto_bins = flags.bins.empty() ? scene.auto_bins : flags.bins == "auto";
+  task.bin_width = wanted.bin_width;
+  task.auto_pivot = wanted.auto_pivot;
   return task;
 }
 
@@ -242,12 +297,13 @@ Device open_device(const RecognitionFlags& flags, const Scene& scene) {
 }
 
 Recogniser open_recogniser(Device& device, RecognitionTask& task) {
+  const bool fine = task.bin_width == BinWidth::fine;
   if (const std::optional<CoarsenedBins> bins = settle_bins(device, task)) {
     fmt::print(
         stderr,
-        "palpate: --bins auto: steps of {:.2f} mm, wider than the maps resolve, keep to {} bins "
+        "palpate: --bins {}: steps of {:.2f} mm, wider than the maps resolve, keep to {} bins "
         "in all; narrow the region, or give --bins\n",
-        bins->step_mm, bins->most_bins);
+        fine ? "fine" : "auto", bins->step_mm, bins->most_bins);
   }
   return {device, task};
 }

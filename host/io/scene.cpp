@@ -78,21 +78,32 @@ std::vector<Scene::Object> read_objects(const Entry& entry) {
   return objects;
 }
 
+void read_pivot(const Entry& entry, Scene::Region& region) {
+  if (entry.node.IsScalar() && entry.node.Scalar() == "auto") {
+    region.auto_pivot = true;
+    return;
+  }
+  const std::array<double, 2> xy = read_pair(entry, "give [x, y], or auto");
+  region.pivot_mm = {xy[0], xy[1]};
+}
+
 Scene::Region read_region(const Entry& entry) {
   Scene::Region region;
   read_keys(entry, {{"x_mm", [&](const Entry& e) { region.x_mm = read_range(e); }},
                     {"y_mm", [&](const Entry& e) { region.y_mm = read_range(e); }},
                     {"theta_deg", [&](const Entry& e) { region.theta_deg = read_range(e); }},
-                    {"pivot_mm", [&](const Entry& e) { region.pivot_mm = read_point(e); }}});
+                    {"pivot_mm", [&](const Entry& e) { read_pivot(e, region); }}});
   return region;
 }
 
 void read_bins(const Entry& entry, Scene& scene) {
-  if (entry.node.IsScalar() && entry.node.Scalar() == "auto") {
-    scene.auto_bins = true;
+  scene.auto_bins = entry.node.IsScalar() && entry.node.Scalar() == "auto";
+  scene.fine_bins = entry.node.IsScalar() && entry.node.Scalar() == "fine";
+  if (scene.auto_bins || scene.fine_bins) {
     return;
   }
-  const std::vector<Entry> counts = entry.list(3, "give the counts of bins [x, y, theta], or auto");
+  const std::vector<Entry> counts =
+      entry.list(3, "give the counts of bins [x, y, theta], or auto, or fine");
   scene.bins = {counts[0].integer(1), counts[1].integer(1), counts[2].integer(1)};
 }
 

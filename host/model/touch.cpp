@@ -1,6 +1,7 @@
 #include "palpate/touch.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 namespace palpate {
 
@@ -31,6 +32,14 @@ bool same_placement(const Touch& a, const Touch& b) {
   return a.T_robot_sensor.translation_mm == b.T_robot_sensor.translation_mm &&
          a.T_robot_sensor.theta_rad == b.T_robot_sensor.theta_rad &&
          std::ranges::equal(a.elements_mm, b.elements_mm);
+}
+
+double array_reach_mm(std::span<const glm::dvec2> elements_mm) {
+  double reach = 0.0;
+  for (const glm::dvec2& element : elements_mm) {
+    reach = std::max(reach, std::hypot(element.x, element.y));
+  }
+  return reach;
 }
 
 Touch Recording::touch(std::size_t i) const {

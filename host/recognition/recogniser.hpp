@@ -17,10 +17,12 @@ class Recogniser {
  public:
   Recogniser(Device& device, const RecognitionTask& task);
 
-  /// Forgets all touches, for the next unknown. Particles start from the same places again.
+  /// Forgets all touches, for the next unknown. Particles start from the same places again. An
+  /// automatic pivot returns to the robot frame's origin until the next touch.
   void reset();
-  /// Updates the belief with these touches. `progress` is called now and then with the fraction
-  /// done.
+  /// Updates the belief with these touches. The first touch since reset() places an automatic
+  /// pivot, whether the touch meets an object or not. `progress` is called now and then with the
+  /// fraction done.
   void update(std::span<const Touch> touches, const std::function<void(double)>& progress = {});
   /// Evaluates a touch that is likely to come next; see PoseHistogram::prepare(). Particles cannot
   /// be weighed ahead, since weighing follows resampling and noise: for them it does nothing.
@@ -33,6 +35,8 @@ class Recogniser {
   /// Marginal probabilities of one object's poses over the task's lattice. A particle counts in the
   /// nearest bin.
   Marginals marginals(int object) const;
+  /// The task's lattice about the pivot in use.
+  const PoseLattice& lattice() const { return lattice_; }
   /// Device memory held, in bytes.
   std::uint64_t device_bytes() const;
 
@@ -40,7 +44,13 @@ class Recogniser {
   const PoseHistogram* histogram() const { return std::get_if<PoseHistogram>(&filter_); }
 
  private:
+  /// Moves an automatic pivot to the sensor's origin, unless an earlier touch has placed it.
+  void place_pivot(const Touch& touch);
+  void move_pivot(const glm::dvec2& pivot_mm);
+
   PoseLattice lattice_;
+  bool auto_pivot_;
+  bool touched_ = false;  ///< since reset()
   std::variant<PoseHistogram, ParticleFilter> filter_;
 };
 

@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <utility>
 
-#include "palpate/balanced_lattice.hpp"
-
 namespace palpate {
 
 RecognitionTask::RecognitionTask(std::vector<Hypothesis> objects, const FilterOptions& options)
@@ -32,12 +30,15 @@ const ContactModel& RecognitionTask::contact() const {
 }
 
 std::optional<CoarsenedBins> settle_bins(const Device& device, RecognitionTask& task) {
-  if (!std::exchange(task.auto_bins, false)) {
+  const std::optional<BinWidth> width = std::exchange(task.bin_width, {});
+  if (!width) {
     return {};
   }
   auto* histogram = std::get_if<HistogramOptions>(&task.filter);
-  const std::int64_t most = most_bins_on(device, histogram != nullptr && histogram->still_array);
-  const BalancedLattice chosen = balanced_lattice(task.lattice(), task.hypotheses, most);
+  const std::int64_t most = histogram == nullptr ? most_bins_on(device, false)
+                                                 : most_bins_on(device, histogram->still_array,
+                                                                histogram->memory_limit_bytes);
+  const BalancedLattice chosen = balanced_lattice(task.lattice(), task.hypotheses, most, *width);
   (histogram != nullptr ? histogram->lattice : std::get<ParticleOptions>(task.filter).region) =
       chosen.lattice;
   return chosen.coarsened ? std::optional(CoarsenedBins{chosen.step_mm, most}) : std::nullopt;

@@ -7,6 +7,7 @@
 #include <variant>
 #include <vector>
 
+#include "palpate/balanced_lattice.hpp"
 #include "palpate/device.hpp"
 #include "palpate/particle_filter.hpp"
 #include "palpate/pose_histogram.hpp"
@@ -33,7 +34,10 @@ struct RecognitionTask {
   std::vector<std::string> labels;
   std::vector<std::size_t> label_of;        ///< [hypothesis] index into labels
   std::vector<std::string> map_paths = {};  ///< [hypothesis] file of the map; empty without files
-  bool auto_bins = false;                   ///< settle_bins() is to choose the lattice's counts
+  /// By which settle_bins() chooses the lattice's counts; none where the counts are given.
+  std::optional<BinWidth> bin_width = {};
+  /// The pivot is the sensor's origin at the first touch of each unknown.
+  bool auto_pivot = false;
 };
 
 /// Bins that are wider than the maps resolve, since the device has no memory for more.
@@ -42,7 +46,7 @@ struct CoarsenedBins {
   std::int64_t most_bins = 0;  ///< limit of all objects' bins together
 };
 
-/// Chooses the lattice's counts by balanced_lattice() if the task leaves them to it (auto_bins).
+/// Chooses the lattice's counts by balanced_lattice() if the task leaves them to it (bin_width).
 /// @returns the bins if they had to be coarsened
 /// @throws Error as balanced_lattice() does
 std::optional<CoarsenedBins> settle_bins(const Device& device, RecognitionTask& task);

@@ -250,7 +250,7 @@ TEST(Sweep, QuickRunKeepsTheOrderAndTheErrorBounds) {
   for (const auto& knee : document["knees"]) {
     EXPECT_GT(knee.at("floor_mm").at("mean"), 0.0);
     EXPECT_EQ(knee["floor_mm"].at("trials"), trials);
-    EXPECT_NE(knee.at("sentence").get<std::string>().find("--bins auto takes"), std::string::npos);
+    EXPECT_NE(knee.at("sentence").get<std::string>().find("--bins fine takes"), std::string::npos);
     expect_steps(knee, document.at("points"));
   }
   expect_page(folder / "s.html", document);

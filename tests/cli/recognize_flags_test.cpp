@@ -28,37 +28,38 @@ class RecognizeFlags : public ProgramTest {
   }
 };
 
+// The lattice's defaults are in defaults_test.cpp.
 TEST_F(RecognizeFlags, DefaultsAreTheDocumentedOnes) {
-  const json bare = mode({});
-  EXPECT_EQ(
-      mode({"--bins",      "25x25x16", "--x-mm=-10:10", "--y-mm=-10:10", "--theta-deg", "0:360",
-            "--pivot-mm",  "0,0",      "--prior",       "0.2",           "--gamma",     "0.1",
-            "--threshold", "2",        "--ratio",       "0.3",           "--frames",    "0:6",
-            "--touches",   "6",        "--filter",      "histogram"}),
-      bare);
-  EXPECT_EQ(mode({"--filter", "auto"}), bare);
+  const json bare = mode({"--bins=9x9x8"});
+  EXPECT_EQ(mode({"--bins=9x9x8", "--prior", "0.2", "--gamma", "0.1", "--threshold", "2", "--ratio",
+                  "0.3", "--frames", "0:6", "--touches", "6", "--filter", "histogram"}),
+            bare);
+  EXPECT_EQ(mode({"--bins=9x9x8", "--filter", "auto"}), bare);
 }
 
 TEST_F(RecognizeFlags, EveryFlagOfTheModelMatters) {
-  const json bare = mode({});
+  const json bare = mode({"--bins=25x25x16"});
   for (const char* flag : {"--bins=24x25x16", "--x-mm=-9:10", "--y-mm=-9:10", "--theta-deg=5:365",
-                           "--pivot-mm=1.3,0", "--prior=0.4", "--gamma=0.3", "--threshold=6",
-                           "--ratio=0.7", "--frames=0:3", "--touches=3"}) {
+                           "--pivot-mm=1.3,0"}) {
     EXPECT_NE(mode({flag}), bare) << flag;
+  }
+  for (const char* flag : {"--prior=0.4", "--gamma=0.3", "--threshold=6", "--ratio=0.7",
+                           "--frames=0:3", "--touches=3"}) {
+    EXPECT_NE(mode({"--bins=25x25x16", flag}), bare) << flag;
   }
 }
 
 TEST_F(RecognizeFlags, MemoryIsBoundedWithoutAnotherResult) {
-  EXPECT_EQ(mode({"--memory-mib", "10"}), mode({}));
+  EXPECT_EQ(mode({"--bins=25x25x16", "--memory-mib", "10"}), mode({"--bins=25x25x16"}));
   // 8 MiB are for copies alone.
-  expect_refused({"recognize", "u.h5", "--maps", "maps", "--memory-mib", "8"},
+  expect_refused({"recognize", "u.h5", "--maps", "maps", "--bins=25x25x16", "--memory-mib", "8"},
                  {"memory limit of 8.0 MiB", "raise it"});
   expect_refused({"recognize", "u.h5", "--maps", "maps", "--memory-mib", "0"}, {"--memory-mib 0"});
 }
 
-TEST_F(RecognizeFlags, AutoBinsAreChosenByTheMapsAndSaid) {
+TEST_F(RecognizeFlags, FineBinsAreChosenByTheMapsAndSaid) {
   const std::vector<std::string> region{"--x-mm=1:3", "--y-mm=-4:-2.5", "--theta-deg=40:70"};
-  std::vector<std::string> chosen{"recognize", "u.h5", "--maps", "maps", "--bins", "auto"};
+  std::vector<std::string> chosen{"recognize", "u.h5", "--maps", "maps", "--bins", "fine"};
   chosen.insert(chosen.end(), region.begin(), region.end());
   const std::string out = done(chosen);
   // 2 and 1.5 mm in steps of 0.3.
@@ -68,20 +69,20 @@ TEST_F(RecognizeFlags, AutoBinsAreChosenByTheMapsAndSaid) {
   // 30 degrees of a lever of some 9 mm, the letters' and the pivot's distance from their middle.
   EXPECT_NEAR(angles, 0.52 * 9.0 / 0.3, 3);
   std::vector<std::string> automatic = region;
-  automatic.emplace_back("--bins=auto");
+  automatic.emplace_back("--bins=fine");
   std::vector<std::string> by_hand = region;
   by_hand.push_back(fmt::format("--bins=7x5x{}", angles));
   EXPECT_EQ(mode(automatic), mode(by_hand));
-  put_bytes(folder_ / "auto.yaml",
-            "bins: auto\nregion: {x_mm: [1, 3], y_mm: [-4, -2.5], theta_deg: [40, 70]}\n");
-  EXPECT_EQ(mode({"--scene=auto.yaml"}), mode(by_hand));
+  put_bytes(folder_ / "fine.yaml",
+            "bins: fine\nregion: {x_mm: [1, 3], y_mm: [-4, -2.5], theta_deg: [40, 70]}\n");
+  EXPECT_EQ(mode({"--scene=fine.yaml"}), mode(by_hand));
 }
 
-TEST_F(RecognizeFlags, AutoBinsAreNotFinerThanTheSensorShows) {
+TEST_F(RecognizeFlags, FineBinsAreNotFinerThanTheSensorShows) {
   write_recording(folder_ / "train.h5", sample_training("A", 48));
   done({"map", "train.h5", "--cell-mm", "0.25", "-o", "fine.map.h5"});
   const std::vector<std::string> recognize{"recognize",   "u.h5",           "--maps",
-                                           "fine.map.h5", "--bins",         "auto",
+                                           "fine.map.h5", "--bins",         "fine",
                                            "--x-mm=1:3",  "--y-mm=-4:-2.5", "--theta-deg=40:70"};
   const std::string out = done(recognize);
   EXPECT_NE(out.find("7 x 5 x "), std::string::npos) << "steps of 0.3 mm\n" << out;

@@ -72,6 +72,18 @@ TEST_F(SceneFile, MayLeaveEverythingOut) {
   }
 }
 
+TEST_F(SceneFile, LeavesBinsAndPivotToTheMapsAndTheTouches) {
+  const Scene automatic = read("bins: auto\nregion: {pivot_mm: auto}");
+  EXPECT_TRUE(automatic.auto_bins);
+  EXPECT_FALSE(automatic.fine_bins || automatic.bins || automatic.region.pivot_mm);
+  EXPECT_TRUE(automatic.region.auto_pivot);
+  const Scene fine = read("bins: fine\nregion: {pivot_mm: [1, 2]}");
+  EXPECT_TRUE(fine.fine_bins);
+  EXPECT_FALSE(fine.auto_bins || fine.bins || fine.region.auto_pivot);
+  expect_named(message("bins: coarse"), {"bins", "or auto, or fine"});
+  expect_named(message("region: {pivot_mm: here}"), {"pivot_mm", "[x, y], or auto"});
+}
+
 TEST_F(SceneFile, TakesTheArrayAsAList) {
   EXPECT_EQ(read("array: [[0, 1], [2.5, -3]]").array_mm,
             (std::vector<glm::dvec2>{{0, 1}, {2.5, -3}}));

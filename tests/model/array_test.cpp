@@ -19,6 +19,11 @@ TEST(DigitactsArray, HasTheGeometryOfTwoPadsSideBySide) {
   EXPECT_NEAR(elements[35].y - elements[0].y + digitacts_element_mm, 11.3, 1e-12);
 }
 
+TEST(ArrayReach, IsTheDistanceOfTheFarthestElement) {
+  EXPECT_DOUBLE_EQ(array_reach_mm(std::vector<glm::dvec2>{{0.5, 0.5}, {-3.0, 4.0}}), 5.0);
+  EXPECT_EQ(array_reach_mm({}), 0.0);
+}
+
 /// Three touches of two elements, with pressures 0, 1, 2, ...
 Recording small_recording() {
   Recording r;

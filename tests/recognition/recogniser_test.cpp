@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <numeric>
+#include <stdexcept>
 
 #include <gtest/gtest.h>
 
@@ -121,6 +122,103 @@ TEST(Recogniser, ForgetsTheUnknownBefore) {
     recogniser.reset();
     recogniser.update(all_touches(recording));
     expect_same(recogniser.estimate(), first);
+  }
+}
+
+/// Tasks whose pivot is the sensor's origin at the first touch.
+std::vector<RecognitionTask> automatic_tasks() {
+  std::vector<RecognitionTask> tasks;
+  for (const FilterOptions& filter : both_filters()) {
+    tasks.emplace_back(shapes(), filter).auto_pivot = true;
+  }
+  return tasks;
+}
+
+/// The same task about this pivot.
+RecognitionTask about(RecognitionTask task, const glm::dvec2& pivot_mm) {
+  task.auto_pivot = false;
+  if (auto* histogram = std::get_if<HistogramOptions>(&task.filter)) {
+    histogram->lattice.pivot_mm = pivot_mm;
+  } else {
+    std::get<ParticleOptions>(task.filter).region.pivot_mm = pivot_mm;
+  }
+  return task;
+}
+
+TEST(AutomaticPivot, IsTheSensorsOriginAtTheFirstTouchOfEachUnknown) {
+  Device device = Device::open();
+  for (const RecognitionTask& task : automatic_tasks()) {
+    Recogniser automatic(device, task);
+    const Estimate untouched = automatic.estimate();
+    expect_same(untouched, Recogniser(device, about(task, {0.0, 0.0})).estimate());
+    for (const std::uint64_t seed : {1, 4}) {
+      const Recording recording = moved(touched_letter(seed), {{400.0, 200.0}, 0.7});
+      const glm::dvec2 origin_mm = recording.T_robot_sensor.front().translation_mm;
+      Recogniser fixed(device, about(task, origin_mm));
+      fixed.update(all_touches(recording));
+      automatic.reset();
+      expect_same(automatic.estimate(), untouched);
+      automatic.update(all_touches(recording));
+      EXPECT_EQ(automatic.lattice().pivot_mm, origin_mm);
+      EXPECT_EQ(automatic.marginals(0).grid.pivot_mm, origin_mm);
+      expect_same(automatic.estimate(), fixed.estimate());
+      EXPECT_EQ(automatic.marginals(0).xy, fixed.marginals(0).xy);
+    }
+  }
+}
+
+TEST(AutomaticPivot, IsThatOfTheTouchItselfAfterAnotherWasPrepared) {
+  Device device = Device::open();
+  const RecognitionTask task = automatic_tasks()[0];
+  const Recording recording = moved(touched_letter(1), {{400.0, 200.0}, 0.7});
+  const std::vector<Touch> touches = all_touches(recording);
+  Recogniser plain(device, task);
+  plain.update(touches);
+  for (const std::size_t prepared : {0U, 3U}) {
+    Recogniser ahead(device, task);
+    ahead.prepare(touches[prepared]);
+    ahead.update(std::span(touches).first(1));
+    ahead.prepare(touches[2]);  // moves no pivot that has a touch
+    ahead.update(std::span(touches).subspan(1));
+    EXPECT_EQ(ahead.lattice().pivot_mm, touches[0].T_robot_sensor.translation_mm);
+    EXPECT_EQ(ahead.estimate().mode.bin, plain.estimate().mode.bin);
+    // Evaluated ahead, a touch is added in one step: float32 rounds it by some 1e-5 nats.
+    EXPECT_NEAR(ahead.estimate().identity[0], plain.estimate().identity[0], 1e-4);
+  }
+}
+
+TEST(AutomaticPivot, IsNotPlacedByATouchThatIsRefused) {
+  Device device = Device::open();
+  const Recording recording = moved(touched_letter(2), {{400.0, 200.0}, 0.7});
+  const std::vector<Touch> touches = all_touches(recording);
+  for (const RecognitionTask& task : automatic_tasks()) {
+    Recogniser recogniser(device, task);
+    Touch unsound = touches[3];
+    unsound.pressure = unsound.pressure.first(1);
+    EXPECT_THROW(recogniser.update(std::span(&unsound, 1)), Error);
+    Touch beyond = touches[3];
+    beyond.T_robot_sensor.translation_mm.x = 2.0 * farthest_mm;
+    EXPECT_THROW(recogniser.update(std::span(&beyond, 1)), Error);
+    recogniser.update(touches);
+    EXPECT_EQ(recogniser.lattice().pivot_mm, touches[0].T_robot_sensor.translation_mm);
+  }
+}
+
+TEST(AutomaticPivot, WaitsForAResetAfterAnUpdateWasBrokenOff) {
+  Device device = Device::open();
+  const Recording recording = touched_letter(2);
+  for (const RecognitionTask& task : automatic_tasks()) {
+    Recogniser recogniser(device, task);
+    const auto update = [&] {
+      recogniser.prepare(recording.touch(0));  // or else there may be no progress
+      const Touch first = recording.touch(0);
+      recogniser.update(std::span(&first, 1),
+                        [](double) { throw std::runtime_error("broken off"); });
+    };
+    EXPECT_THROW(update(), std::runtime_error);
+    EXPECT_THROW(recogniser.update(all_touches(recording)), Error);
+    recogniser.reset();
+    recogniser.update(all_touches(recording));
   }
 }
 

@@ -24,12 +24,14 @@ TEST(SettleBins, CountsTheBinsOnceWhereTheyAreLeftToTheMaps) {
     RecognitionTask task(shapes(), filter);
     EXPECT_FALSE(settle_bins(device, task));
     EXPECT_EQ(task.lattice().x_mm.count, 20) << "as given";
-    task.auto_bins = true;
+    task.bin_width = BinWidth::fine;
     EXPECT_FALSE(settle_bins(device, task)) << "the device holds so many";
-    const PoseLattice balanced = balanced_lattice(task.lattice(), task.hypotheses).lattice;
+    const PoseLattice balanced =
+        balanced_lattice(task.lattice(), task.hypotheses, most_balanced_bins, BinWidth::fine)
+            .lattice;
     EXPECT_EQ(task.lattice().x_mm.count, balanced.x_mm.count);
     EXPECT_EQ(task.lattice().theta_rad.count, balanced.theta_rad.count);
-    EXPECT_FALSE(task.auto_bins);
+    EXPECT_FALSE(task.bin_width);
   }
 }
 
@@ -37,7 +39,7 @@ TEST(SettleBins, TellsOfBinsThatTheDeviceMadeCoarser) {
   const Device device = Device::open();
   const PoseLattice wide{.x_mm = {-1000.0, 1000.0, 1}, .y_mm = {-1000.0, 1000.0, 1}};
   RecognitionTask task(shapes(), HistogramOptions{.lattice = wide, .still_array = true});
-  task.auto_bins = true;
+  task.bin_width = BinWidth::fine;
   const std::optional<CoarsenedBins> bins = settle_bins(device, task);
   ASSERT_TRUE(bins);
   EXPECT_EQ(bins->most_bins, most_bins_on(device, true));

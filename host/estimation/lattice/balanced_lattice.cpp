@@ -3,10 +3,13 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 
 #include <fmt/format.h>
+#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
+#include "command_stream.hpp"
 #include "hypotheses.hpp"
 #include "palpate/error.hpp"
 #include "refinement.hpp"
@@ -15,10 +18,13 @@ namespace palpate {
 
 namespace {
 
-/// The least distance over which a map can change much: cells are interpolated, and every cell is
-/// a sum of Gaussians of the sensor model's spread.
-double resolution_mm(const OccupancyGrid& map) {
-  return std::max(map.cell_mm, map.spread_mm.value_or(0.0));
+/// The widest step that suits a map. A map changes little over less than a cell, since cells are
+/// interpolated, or than the spread of its sensor model, since every cell is a sum of Gaussians.
+double step_for(const OccupancyGrid& map, BinWidth width) {
+  // docs/refinement.md holds the measurements behind these numbers.
+  const double spreads = width == BinWidth::fine ? 1.0 : 2.0;
+  const double unknown_mm = width == BinWidth::fine ? 0.0 : map.cell_mm;
+  return balanced_step * std::max(map.cell_mm, spreads * map.spread_mm.value_or(unknown_mm));
 }
 
 /// Root mean square distance of an object's cells from the pivot, wherever in the region that is.
@@ -35,20 +41,48 @@ double lever_mm(const OccupancyGrid& map, const PoseLattice& region) {
 
 double count_of(double extent, double step) { return std::max(1.0, std::ceil(extent / step)); }
 
+struct Box {
+  glm::dvec2 lower{std::numeric_limits<double>::infinity()};
+  glm::dvec2 upper{-std::numeric_limits<double>::infinity()};
+
+  void add(const glm::dvec2& low, const glm::dvec2& high) {
+    lower = glm::min(lower, low);
+    upper = glm::max(upper, high);
+  }
+  glm::dvec2 extent() const { return upper - lower; }
+};
+
+/// The box around the cells with log odds above 0, or around the whole map where there are none.
+Box occupied_box(const OccupancyGrid& map) {
+  const glm::dvec2 half_cell(map.cell_mm / 2.0);
+  Box box;
+  for (int j = 0; j < map.ny; ++j) {
+    for (int i = 0; i < map.nx; ++i) {
+      if (map.at(i, j) > 0.0F) {
+        box.add(map.centre_mm(i, j) - half_cell, map.centre_mm(i, j) + half_cell);
+      }
+    }
+  }
+  if (box.lower.x > box.upper.x) {
+    box.add(map.centre_mm(0, 0) - half_cell, map.centre_mm(map.nx - 1, map.ny - 1) + half_cell);
+  }
+  return box;
+}
+
 }  // namespace
 
 BalancedLattice balanced_lattice(const PoseLattice& region, std::span<const Hypothesis> hypotheses,
-                                 std::int64_t most_bins) {
+                                 std::int64_t most_bins, BinWidth width) {
   validate_hypotheses(hypotheses);
   PoseLattice lattice = region;
   for (Axis* axis : {&lattice.x_mm, &lattice.y_mm, &lattice.theta_rad}) {
     axis->count = 1;
   }
   lattice.validate();
-  double finest_mm = std::numeric_limits<double>::infinity();
+  double wanted_mm = std::numeric_limits<double>::infinity();
   double longest_mm = 0.0;
   for (const Hypothesis& hypothesis : hypotheses) {
-    finest_mm = std::min(finest_mm, resolution_mm(hypothesis.map));
+    wanted_mm = std::min(wanted_mm, step_for(hypothesis.map, width));
     longest_mm = std::max(longest_mm, lever_mm(hypothesis.map, region));
   }
   const double extents_mm[] = {lattice.x_mm.upper - lattice.x_mm.lower,
@@ -61,7 +95,6 @@ BalancedLattice balanced_lattice(const PoseLattice& region, std::span<const Hypo
     }
     return product;
   };
-  const double wanted_mm = balanced_step * finest_mm;
   // Counts are ints.
   const auto most =
       static_cast<double>(std::min<std::int64_t>(most_bins, std::numeric_limits<int>::max()));
@@ -80,9 +113,39 @@ BalancedLattice balanced_lattice(const PoseLattice& region, std::span<const Hypo
   return {.lattice = lattice, .step_mm = step_mm, .coarsened = step_mm > wanted_mm};
 }
 
-std::int64_t most_bins_on(const Device& device, bool still_array) {
+TouchRegion touch_region(std::span<const Hypothesis> hypotheses, double reach_mm) {
+  validate_hypotheses(hypotheses);
+  if (!(reach_mm >= 0.0 && reach_mm <= farthest_mm)) {
+    throw Error(Fault::input,
+                fmt::format("reach of the array = {} mm: give 0 to {:g}", reach_mm, farthest_mm));
+  }
+  Box all;
+  glm::dvec2 largest_mm(0.0);
+  for (const Hypothesis& hypothesis : hypotheses) {
+    const Box box = occupied_box(hypothesis.map);
+    all.add(box.lower, box.upper);
+    largest_mm = glm::max(largest_mm, box.extent());
+  }
+  const glm::dvec2 reach(reach_mm);
+  const glm::dvec2 together = all.extent() + 2.0 * reach;
+  const glm::dvec2 alone = largest_mm + 2.0 * reach;
+  TouchRegion region{.lattice = {.x_mm = {all.lower.x - reach_mm, all.upper.x + reach_mm, 1},
+                                 .y_mm = {all.lower.y - reach_mm, all.upper.y + reach_mm, 1},
+                                 .theta_rad = {0.0, 2.0 * std::numbers::pi, 1}},
+                     .excess = together.x * together.y / (alone.x * alone.y)};
+  region.lattice.validate();
+  return region;
+}
+
+std::int64_t most_bins_on(const Device& device, bool still_array,
+                          std::optional<std::uint64_t> memory_limit_bytes) {
   constexpr std::uint64_t bytes_per_bin = 8;
-  const std::uint64_t held = device.memory_bytes() / 2 / (still_array ? 2 : 1) / bytes_per_bin;
+  constexpr std::uint64_t staging = gpu::CommandStream::staging_bytes;
+  const std::uint64_t all = device.memory_bytes();
+  // A limit counts the staging memory, too.
+  const std::uint64_t memory =
+      memory_limit_bytes ? std::min(std::max(*memory_limit_bytes, staging) - staging, all) : all;
+  const std::uint64_t held = memory / 2 / (still_array ? 2 : 1) / bytes_per_bin;
   return static_cast<std::int64_t>(std::min(held, static_cast<std::uint64_t>(most_balanced_bins)));
 }
 

@@ -15,6 +15,7 @@
 #include "hypotheses.hpp"
 #include "memory_plan.hpp"
 #include "moved_from.hpp"
+#include "moved_pivot.hpp"
 #include "palpate/error.hpp"
 #include "prepared_touch.hpp"
 #include "refinement.hpp"
@@ -61,6 +62,7 @@ struct PoseHistogram::Impl {
       evidence = gather(touches);
     }
     half_done.change([&] {
+      touched = touched || !touches.empty();
       summarised.reset();
       if (still) {
         still->accumulate(still_touches, likelihood, belief, progress);
@@ -142,6 +144,7 @@ struct PoseHistogram::Impl {
   std::optional<double> none_log_weight;  ///< log of its prior weight times the number of bins
   double prior_log_likelihood = 0.0;      ///< of all touches, by a map that holds only the prior
   std::vector<Body> bodies;
+  bool touched = false;  ///< since reset()
   std::optional<std::vector<BeliefSummary>> summarised;
   HalfDone half_done{
       "histogram: an update or a prepared touch was broken off half-way; call reset()"};
@@ -179,9 +182,16 @@ void PoseHistogram::reset() {
     histogram.belief.clear();
     // Now, or a device that fails later would leave the old belief behind a reset.
     histogram.stream.run();
+    histogram.touched = false;
     histogram.prior_log_likelihood = 0.0;
     histogram.summarised.reset();
   });
+}
+
+void PoseHistogram::move_pivot(const glm::dvec2& pivot_mm) {
+  Impl& histogram = whole();
+  histogram.options.lattice =
+      with_pivot(histogram.options.lattice, pivot_mm, "histogram", histogram.touched);
 }
 
 void PoseHistogram::update(std::span<const Touch> touches,
@@ -228,7 +238,10 @@ Marginals PoseHistogram::marginals(int object) const {
   histogram.require_object(object);
   const BeliefSummary& summary = histogram.summaries()[object];
   const double of_largest = histogram.identity()[object] / summary.sum;
-  return histogram.belief.marginals(static_cast<std::size_t>(object), summary.max, of_largest);
+  Marginals marginals =
+      histogram.belief.marginals(static_cast<std::size_t>(object), summary.max, of_largest);
+  marginals.grid = lattice();  // the belief does not know where the pivot has moved to
+  return marginals;
 }
 
 std::vector<double> PoseHistogram::log_likelihood(int object) const {

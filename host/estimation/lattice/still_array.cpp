@@ -38,7 +38,8 @@ const DenseBelief& StillArray::no_contact_at(const Touch& touch, DenseLikelihood
   if (!no_contact_) {
     no_contact_.emplace(belief.uniform());
   }
-  if (!evaluated_ || !same_placement(touch, {T_robot_sensor_, elements_mm_, {}})) {
+  if (!evaluated_ || pivot_mm_ != lattice_.pivot_mm ||
+      !same_placement(touch, {T_robot_sensor_, elements_mm_, {}})) {
     evaluated_ = false;  // a device that fails leaves it half-way
     no_contact_->clear();
     const std::vector<Reading> readings(touch.elements_mm.size(), Reading::no_contact);
@@ -47,6 +48,7 @@ const DenseBelief& StillArray::no_contact_at(const Touch& touch, DenseLikelihood
                           *no_contact_, {});
     T_robot_sensor_ = touch.T_robot_sensor;
     elements_mm_.assign(touch.elements_mm.begin(), touch.elements_mm.end());
+    pivot_mm_ = lattice_.pivot_mm;
     evaluated_ = true;
   }
   return *no_contact_;

@@ -26,6 +26,7 @@ struct StillTouch {
 /// elements that read something else.
 class StillArray {
  public:
+  /// @param lattice outlives this object; its pivot may move
   StillArray(const ContactModel& contact, const PoseLattice& lattice)
       : contact_(contact), lattice_(lattice) {}
 
@@ -48,11 +49,12 @@ class StillArray {
                                    const DenseBelief& belief);
 
   ContactModel contact_;
-  PoseLattice lattice_;
+  const PoseLattice& lattice_;
   std::optional<DenseBelief> no_contact_;  ///< log-likelihood of No Contact everywhere
   bool evaluated_ = false;                 ///< for the place below
   Pose T_robot_sensor_;
   std::vector<glm::dvec2> elements_mm_;
+  glm::dvec2 pivot_mm_{0.0, 0.0};
 };
 
 }  // namespace palpate

@@ -14,6 +14,7 @@
 #include "kernel_sizes.hpp"
 #include "likelihood_averages.hpp"
 #include "moved_from.hpp"
+#include "moved_pivot.hpp"
 #include "palpate/error.hpp"
 #include "particle_likelihood.hpp"
 #include "particle_options.hpp"
@@ -262,6 +263,13 @@ ParticleFilter::Impl& ParticleFilter::whole() const {
 }
 
 void ParticleFilter::reset() { impl().start(); }
+
+void ParticleFilter::move_pivot(const glm::dvec2& pivot_mm) {
+  Impl& filter = whole();
+  // Particles are kept about the region's centre, wherever the region lies.
+  filter.options.region =
+      with_pivot(filter.options.region, pivot_mm, "particle filter", filter.touch > 0);
+}
 
 void ParticleFilter::update(std::span<const Touch> touches,
                             const std::function<void(double)>& progress) {

@@ -62,6 +62,11 @@ class ParticleFilter {
   /// @throws Error if the device fails
   void reset();
 
+  /// Moves the region to another pivot, in the robot frame, and the initial particles with it. The
+  /// pivot stays over reset(). @throws Error, and changes nothing, after an update() or on a pivot
+  /// out of range
+  void move_pivot(const glm::dvec2& pivot_mm);
+
   /// Resamples, moves and weighs the particles by each touch in turn (Eq. 7-8).
   /// @param progress called with the fraction done after each touch
   /// @throws Error, and changes nothing, on a touch that is not sound; Error if the device fails:

@@ -52,6 +52,11 @@ class PoseHistogram {
   /// Returns to the uniform belief, for the next unknown. @throws Error if the device fails
   void reset();
 
+  /// Turns theta about another pivot, in the robot frame. The belief must be the uniform one, so
+  /// that the same bins serve the new poses and no memory changes. The pivot stays over reset().
+  /// @throws Error, and changes nothing, after an update() or on a pivot out of range
+  void move_pivot(const glm::dvec2& pivot_mm);
+
   /// Multiplies the belief by the likelihood of these touches (Eq. 7, 13). Calls `progress` with
   /// the fraction done from time to time. Takes in no touch at all if one of them is not sound. If
   /// the device fails or `progress` throws, the belief is left half-way: every call but reset()

@@ -27,6 +27,7 @@ struct Scene {
     std::optional<std::array<double, 2>> y_mm;
     std::optional<std::array<double, 2>> theta_deg;
     std::optional<glm::dvec2> pivot_mm;  ///< in the robot frame
+    bool auto_pivot = false;             ///< the pivot is the sensor's origin at the first touch
   };
 
   std::optional<std::vector<glm::dvec2>> array_mm;  ///< element centres in the sensor frame
@@ -40,6 +41,7 @@ struct Scene {
   std::optional<double> none;              ///< prior weight of "none of these"
   std::optional<std::array<int, 3>> bins;  ///< of x, y, theta
   bool auto_bins = false;                  ///< counts by balanced_lattice()
+  bool fine_bins = false;                  ///< the same with BinWidth::fine
   std::optional<std::string> filter;       ///< "auto", "histogram", "bounded" or "particles"
   std::optional<std::string> device;       ///< a device's name or index
 };

@@ -42,6 +42,9 @@ struct Touch {
 /// True where both touches have exactly the same pose and element centres.
 bool same_placement(const Touch& a, const Touch& b);
 
+/// The largest distance of an element from the sensor frame's origin, in mm; 0 without elements.
+double array_reach_mm(std::span<const glm::dvec2> elements_mm);
+
 /// The true identity and pose of an unknown object.
 struct Truth {
   std::string object;

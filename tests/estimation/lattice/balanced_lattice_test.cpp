@@ -9,6 +9,7 @@
 #include "palpate/error.hpp"
 #include "palpate/pose_histogram.hpp"
 #include "palpate/simulation.hpp"
+#include "palpate/touch.hpp"
 #include "synthetic.hpp"
 
 namespace palpate {
@@ -32,8 +33,14 @@ const std::vector<Hypothesis>& letters() {
   return five;
 }
 
+/// In steps of 0.6 of the finest detail.
+BalancedLattice fine_lattice(const PoseLattice& region, std::span<const Hypothesis> hypotheses,
+                             std::int64_t most_bins = most_balanced_bins) {
+  return balanced_lattice(region, hypotheses, most_bins, BinWidth::fine);
+}
+
 TEST(BalancedLattice, OfThePapersLettersIsNearWhatAHandWouldChoose) {
-  const BalancedLattice balanced = balanced_lattice({}, letters());
+  const BalancedLattice balanced = fine_lattice({}, letters());
   EXPECT_EQ(balanced.lattice.x_mm.count, 67) << "20 mm in steps of 0.6 x 0.5 mm";
   EXPECT_EQ(balanced.lattice.y_mm.count, 67);
   // 0.3 mm where the lever is longest, 13.3 mm; the letters' mean would be content with 244.
@@ -45,7 +52,7 @@ TEST(BalancedLattice, OfThePapersLettersIsNearWhatAHandWouldChoose) {
 TEST(BalancedLattice, TurnsAnObjectByAsMuchAsItShiftsIt) {
   const PoseLattice region;
   for (const Hypothesis& object : letters()) {
-    const BalancedLattice balanced = balanced_lattice(region, std::span(&object, 1));
+    const BalancedLattice balanced = fine_lattice(region, std::span(&object, 1));
     // Mean squared displacement of the cells by one step of theta, the pivot anywhere.
     Uniform random(160);
     double squares = 0.0;
@@ -69,16 +76,16 @@ TEST(BalancedLattice, TurnsAnObjectByAsMuchAsItShiftsIt) {
 
 TEST(BalancedLattice, TakesTheFinestMapAndTheLongestLever) {
   std::vector<Hypothesis> objects{letter("O")};
-  const BalancedLattice one = balanced_lattice({}, objects);
+  const BalancedLattice one = fine_lattice({}, objects);
   objects.push_back(letter("O"));
   objects[1].map.cell_mm = 0.25;
   objects[1].map.origin_mm /= 2.0;
-  const BalancedLattice finer = balanced_lattice({}, objects);
+  const BalancedLattice finer = fine_lattice({}, objects);
   EXPECT_EQ(finer.lattice.x_mm.count, 134);
   EXPECT_NEAR(finer.lattice.theta_rad.count, 2 * one.lattice.theta_rad.count, 2);
   objects[1] = letter("O");
   objects[1].map.origin_mm.x += 30.0;
-  EXPECT_GT(balanced_lattice({}, objects).lattice.theta_rad.count, 2 * one.lattice.theta_rad.count);
+  EXPECT_GT(fine_lattice({}, objects).lattice.theta_rad.count, 2 * one.lattice.theta_rad.count);
 }
 
 TEST(BalancedLattice, StopsAtWhatTheSensorShows) {
@@ -87,7 +94,7 @@ TEST(BalancedLattice, StopsAtWhatTheSensorShows) {
     object.map.origin_mm *= cell_mm / object.map.cell_mm;
     object.map.cell_mm = cell_mm;
     object.map.spread_mm = spread_mm;
-    return balanced_lattice({}, std::span(&object, 1)).lattice.x_mm.count;
+    return fine_lattice({}, std::span(&object, 1)).lattice.x_mm.count;
   };
   EXPECT_EQ(counts(0.25, {}), 134) << "not known";
   EXPECT_EQ(counts(0.25, 0.5), 67) << "20 mm in steps of 0.6 x 0.5 mm";
@@ -96,7 +103,25 @@ TEST(BalancedLattice, StopsAtWhatTheSensorShows) {
   EXPECT_EQ(counts(1.0, 0.5), 34);
   std::vector<Hypothesis> objects{letter("O"), letter("O")};
   objects[0].map.spread_mm = 2.0;
-  EXPECT_EQ(balanced_lattice({}, objects).lattice.x_mm.count, 67) << "the finest counts";
+  EXPECT_EQ(fine_lattice({}, objects).lattice.x_mm.count, 67) << "the finest counts";
+}
+
+TEST(BalancedLattice, ForTheRefinedPoseSkipsWhatItEvensOut) {
+  const auto step_mm = [](double cell_mm, std::optional<double> spread_mm) {
+    Hypothesis object = letter("O");
+    object.map.cell_mm = cell_mm;
+    object.map.spread_mm = spread_mm;
+    return balanced_lattice({}, std::span(&object, 1)).step_mm;
+  };
+  EXPECT_DOUBLE_EQ(step_mm(0.5, 0.5), 0.6) << "twice the spread";
+  EXPECT_DOUBLE_EQ(step_mm(0.25, 0.5), 0.6);
+  EXPECT_DOUBLE_EQ(step_mm(1.0, 0.5), 0.6) << "the cell";
+  EXPECT_DOUBLE_EQ(step_mm(2.0, 0.5), 1.2);
+  EXPECT_DOUBLE_EQ(step_mm(0.5, {}), 0.6) << "as if the spread were the cell";
+  const PoseLattice fine = fine_lattice({}, letters()).lattice;
+  const PoseLattice lattice = balanced_lattice({}, letters()).lattice;
+  EXPECT_EQ(lattice.x_mm.count, 34) << "20 mm in steps of 0.6 mm";
+  EXPECT_NEAR(lattice.theta_rad.count, fine.theta_rad.count / 2.0, 1.0);
 }
 
 TEST(BalancedLattice, FollowsTheRegionAndCollapsesWhatIsFixed) {
@@ -105,22 +130,22 @@ TEST(BalancedLattice, FollowsTheRegionAndCollapsesWhatIsFixed) {
   region.y_mm = {-1.0, 2.0, 9};
   region.theta_rad = {1.0, 1.0, 9};
   region.pivot_mm = {7.0, 8.0};
-  const PoseLattice lattice = balanced_lattice(region, letters()).lattice;
+  const PoseLattice lattice = fine_lattice(region, letters()).lattice;
   EXPECT_EQ(lattice.x_mm.count, 1);
   EXPECT_EQ(lattice.y_mm.count, 10);
   EXPECT_EQ(lattice.theta_rad.count, 1);
   EXPECT_EQ(lattice.x_mm.lower, 3.0);
   EXPECT_EQ(lattice.pivot_mm, region.pivot_mm);
   region.theta_rad = {0.0, two_pi / 4, 1};
-  const int quarter = balanced_lattice(region, letters()).lattice.theta_rad.count;
+  const int quarter = fine_lattice(region, letters()).lattice.theta_rad.count;
   region.theta_rad = {0.0, two_pi, 1};
-  EXPECT_NEAR(balanced_lattice(region, letters()).lattice.theta_rad.count, 4 * quarter, 4);
+  EXPECT_NEAR(fine_lattice(region, letters()).lattice.theta_rad.count, 4 * quarter, 4);
 }
 
 TEST(BalancedLattice, IsMadeCoarserAlikeToKeepToABound) {
-  const PoseLattice free = balanced_lattice({}, letters()).lattice;
+  const PoseLattice free = fine_lattice({}, letters()).lattice;
   for (const std::int64_t most : {1'000'000, 20'000, 100, 5}) {
-    const BalancedLattice balanced = balanced_lattice({}, letters(), most);
+    const BalancedLattice balanced = fine_lattice({}, letters(), most);
     const PoseLattice& lattice = balanced.lattice;
     EXPECT_TRUE(balanced.coarsened);
     EXPECT_LE(5 * lattice.bins(), most);
@@ -131,7 +156,7 @@ TEST(BalancedLattice, IsMadeCoarserAlikeToKeepToABound) {
                   static_cast<double>(free.theta_rad.count) / free.x_mm.count, 0.2);
     }
   }
-  EXPECT_THROW(balanced_lattice({}, letters(), 4), Error) << "fewer bins than objects";
+  EXPECT_THROW(fine_lattice({}, letters(), 4), Error) << "fewer bins than objects";
 }
 
 TEST(BalancedLattice, OfAnEndlessRegionIsBounded) {
@@ -139,14 +164,14 @@ TEST(BalancedLattice, OfAnEndlessRegionIsBounded) {
   region.x_mm = {-farthest_mm, farthest_mm, 1};
   region.y_mm = {-farthest_mm, farthest_mm, 1};
   region.theta_rad = {-1e9, 1e9, 1};
-  const BalancedLattice balanced = balanced_lattice(region, letters());
+  const BalancedLattice balanced = fine_lattice(region, letters());
   EXPECT_TRUE(balanced.coarsened);
   EXPECT_LE(5 * balanced.lattice.bins(), most_balanced_bins);
   for (const Axis& x_mm : {Axis{1.0, -1.0, 1}, Axis{-1e200, 1e200, 1}}) {
     region.x_mm = x_mm;
-    EXPECT_THROW(balanced_lattice(region, letters()), Error);
+    EXPECT_THROW(fine_lattice(region, letters()), Error);
   }
-  EXPECT_THROW(balanced_lattice({}, {}), Error);
+  EXPECT_THROW(fine_lattice({}, {}), Error);
 }
 
 TEST(BalancedLattice, FitsTheDevice) {
@@ -157,9 +182,82 @@ TEST(BalancedLattice, FitsTheDevice) {
   EXPECT_EQ(most_bins_on(device, true),
             std::min(static_cast<std::int64_t>(device.memory_bytes() / 32), most_balanced_bins));
   const PoseLattice region{{-0.9, 0.9, 1}, {-0.9, 0.9, 1}, {0.0, 0.3, 1}, {}};
-  const PoseLattice lattice = balanced_lattice(region, letters(), most).lattice;
+  const PoseLattice lattice = fine_lattice(region, letters(), most).lattice;
   const PoseHistogram histogram(device, letters(), {.lattice = lattice});
   EXPECT_EQ(histogram.lattice().bins(), lattice.bins());
+}
+
+/// A map of this many cells of 0.5 mm around (x, y), of which the innermost 5 x 3 are occupied.
+Hypothesis bar_at(double x, double y) {
+  OccupancyGrid map{
+      .label = "bar", .origin_mm = {x - 10.0, y - 8.0}, .nx = 41, .ny = 33, .log_odds = {}};
+  for (int j = 0; j < map.ny; ++j) {
+    for (int i = 0; i < map.nx; ++i) {
+      map.log_odds.push_back(std::abs(i - 20) <= 2 && std::abs(j - 16) <= 1 ? 0.1F : -4.0F);
+    }
+  }
+  return {map, 1.0};
+}
+
+TEST(TouchRegion, IsTheObjectsBoxGrownByTheArray) {
+  const Hypothesis bar = bar_at(3.0, -1.0);
+  const TouchRegion region = touch_region(std::span(&bar, 1), 7.0);
+  // Five cells by three, and 7 mm to every side.
+  EXPECT_DOUBLE_EQ(region.lattice.x_mm.lower, 3.0 - 1.25 - 7.0);
+  EXPECT_DOUBLE_EQ(region.lattice.x_mm.upper, 3.0 + 1.25 + 7.0);
+  EXPECT_DOUBLE_EQ(region.lattice.y_mm.lower, -1.0 - 0.75 - 7.0);
+  EXPECT_DOUBLE_EQ(region.lattice.y_mm.upper, -1.0 + 0.75 + 7.0);
+  EXPECT_TRUE(region.lattice.full_circle());
+  EXPECT_EQ(region.lattice.pivot_mm, glm::dvec2(0.0));
+  EXPECT_DOUBLE_EQ(region.excess, 1.0);
+}
+
+TEST(TouchRegion, HoldsTheSensorWhereverItMeetsTheObject) {
+  const Hypothesis bar = bar_at(3.0, -1.0);
+  const std::vector<glm::dvec2> elements_mm = digitacts_array();
+  const PoseLattice region = touch_region(std::span(&bar, 1), array_reach_mm(elements_mm)).lattice;
+  Uniform random(190);
+  int met = 0;
+  for (int i = 0; i < 2000; ++i) {
+    const Pose T_object_sensor{{random(-15.0, 20.0), random(-18.0, 16.0)}, random(0.0, two_pi)};
+    const bool meets = std::ranges::any_of(elements_mm, [&](const glm::dvec2& element) {
+      const glm::dvec2 from_bar = T_object_sensor * element - glm::dvec2(3.0, -1.0);
+      return std::abs(from_bar.x) <= 1.25 && std::abs(from_bar.y) <= 0.75;
+    });
+    if (meets) {
+      ++met;
+      const glm::dvec2& origin = T_object_sensor.translation_mm;
+      EXPECT_GE(origin.x, region.x_mm.lower);
+      EXPECT_LE(origin.x, region.x_mm.upper);
+      EXPECT_GE(origin.y, region.y_mm.lower);
+      EXPECT_LE(origin.y, region.y_mm.upper);
+    }
+  }
+  EXPECT_GT(met, 100);
+}
+
+TEST(TouchRegion, OfAMapWithoutAnObjectIsTheWholeMaps) {
+  Hypothesis empty = bar_at(0.0, 0.0);
+  std::ranges::fill(empty.map.log_odds, -1.0F);
+  const PoseLattice region = touch_region(std::span(&empty, 1), 0.0).lattice;
+  EXPECT_DOUBLE_EQ(region.x_mm.lower, -10.25);
+  EXPECT_DOUBLE_EQ(region.y_mm.upper, 8.25);
+}
+
+TEST(TouchRegion, TellsHowFarApartTheObjectsLie) {
+  const std::vector<Hypothesis> apart{bar_at(-50.0, 0.0), bar_at(50.0, 0.0)};
+  const TouchRegion region = touch_region(apart, 7.0);
+  EXPECT_DOUBLE_EQ(region.lattice.x_mm.lower, -50.0 - 1.25 - 7.0);
+  EXPECT_DOUBLE_EQ(region.lattice.x_mm.upper, 50.0 + 1.25 + 7.0);
+  EXPECT_DOUBLE_EQ(region.excess, (100.0 + 16.5) / 16.5);
+  EXPECT_DOUBLE_EQ(touch_region(letters(), 7.0).excess, 1.0) << "about one origin";
+}
+
+TEST(TouchRegion, RefusesAnArrayThatCannotBe) {
+  EXPECT_THROW(touch_region({}, 1.0), Error);
+  for (const double reach : {-1.0, std::nan(""), 2.0 * farthest_mm}) {
+    EXPECT_THROW(touch_region(letters(), reach), Error) << reach;
+  }
 }
 
 }  // namespace
