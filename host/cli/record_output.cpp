@@ -66,11 +66,13 @@ void print_engine(const Device& device, const Recogniser& recogniser, const Reco
   }
   fmt::print(stderr,
              "device: {}, {:.1f} MiB of its memory\nfilter: {}\nlattice: {}\n         {}\n"
-             "         {}\n         pivot {:g}, {:g} mm in the robot frame\n",
+             "         {}\n         pivot {}\n",
              device.name(), static_cast<double>(recogniser.device_bytes()) / (1 << 20), filter,
              words("x", lattice.x_mm, 1.0, "mm"), words("y", lattice.y_mm, 1.0, "mm"),
-             words("theta", lattice.theta_rad, degrees(1.0), "deg"), lattice.pivot_mm.x,
-             lattice.pivot_mm.y);
+             words("theta", lattice.theta_rad, degrees(1.0), "deg"),
+             task.auto_pivot ? "at the sensor of the first touch"
+                             : fmt::format("{:g}, {:g} mm in the robot frame", lattice.pivot_mm.x,
+                                           lattice.pivot_mm.y));
 }
 
 nlohmann::ordered_json truth_to_json(const GroundTruth& truth) {

@@ -128,7 +128,7 @@ RecognitionStep take_step(Recogniser& recogniser, const RecognitionTask& task,
   step.effective_sample_size = recogniser.effective_sample_size();
   step.fit = fit_of(touches, step.pose(), task.hypotheses[step.mode.object].map, task.contact(),
                     static_cast<std::size_t>(step.mode.object));
-  step.warnings = warnings_about(touches, task, step);
+  step.warnings = warnings_about(touches, task, recogniser.lattice(), step);
   if (step.warnings.empty()) {
     if (auto turned = turned_alike(recogniser, task, step, truth)) {
       step.warnings.push_back(*std::move(turned));

@@ -116,8 +116,8 @@ std::optional<std::string> positions_in_metres(std::span<const Touch> touches,
   }
   return fmt::format(
       "the sensor's positions span {:.2g} mm over {}, which differ in angle or in what they feel: "
-      "are the positions in metres? Palpate takes millimetres; multiply x and y of sensor_pose by "
-      "1000",
+      "are the positions in metres? Palpate takes millimetres; import them with --pose-unit m,rad, "
+      "or multiply x and y of sensor_pose by 1000",
       span, touches_in_words(touches.size()));
 }
 
@@ -134,7 +134,8 @@ std::optional<std::string> angles_in_degrees(std::span<const Touch> touches) {
   }
   return fmt::format(
       "the sensor's angle is {:.4g} rad at touch {}, beyond a full turn of 6.283 rad: are the "
-      "angles in degrees? Palpate takes radians; multiply theta of sensor_pose by 0.0174533",
+      "angles in degrees? Palpate takes radians; import them with --pose-unit mm,deg, or multiply "
+      "theta of sensor_pose by 0.0174533",
       theta_rad, largest - touches.begin() + 1);
 }
 
@@ -221,9 +222,8 @@ std::optional<std::string> nothing_felt(std::span<const Touch> touches,
                        over, evidence);
 }
 
-std::optional<std::string> out_of_reach(std::span<const Touch> touches,
-                                        const RecognitionTask& task) {
-  const PoseLattice& region = task.lattice();
+std::optional<std::string> out_of_reach(std::span<const Touch> touches, const RecognitionTask& task,
+                                        const PoseLattice& region) {
   double nearest_mm = std::numeric_limits<double>::infinity();
   Box cells;  // of the nearest map
   for (const Touch& touch : touches) {

@@ -24,7 +24,7 @@ std::optional<std::string> other_scale(std::span<const Touch> touches, const Rec
 std::optional<std::string> nothing_felt(std::span<const Touch> touches,
                                         const ContactClassifier& classifier);
 /// No pose of the region brings any touch to any map.
-std::optional<std::string> out_of_reach(std::span<const Touch> touches,
-                                        const RecognitionTask& task);
+std::optional<std::string> out_of_reach(std::span<const Touch> touches, const RecognitionTask& task,
+                                        const PoseLattice& region);
 
 }  // namespace palpate

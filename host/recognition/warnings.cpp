@@ -63,7 +63,8 @@ bool felt_enough(std::span<const Touch> touches, const ContactClassifier& classi
 
 /// The refined pose's standard deviations are those of a bin, since the bins are too wide for the
 /// refinement.
-std::optional<std::string> coarse_bins(const RecognitionTask& task, const RecognitionStep& step) {
+std::optional<std::string> coarse_bins(const RecognitionTask& task, const PoseLattice& lattice,
+                                       const RecognitionStep& step) {
   // docs/refinement.md: the refinement needs 20 bins within 2.5 mm, and steps up to about 1.5 mm.
   constexpr double widest_bin_mm3 = 4.0 / 3.0 * std::numbers::pi * 2.5 * 2.5 * 2.5 / 20.0;
   constexpr double widest_step_mm = 1.5;
@@ -73,7 +74,6 @@ std::optional<std::string> coarse_bins(const RecognitionTask& task, const Recogn
       std::none_of(map.log_odds.begin(), map.log_odds.end(), [](float l) { return l > 0.0F; })) {
     return {};
   }
-  const PoseLattice& lattice = task.lattice();
   const Place variances = variances_of(*step.refined, lattice);
   // How far the object moves, root mean square, where the pose moves by 1 mm or 1 rad.
   const Place lever_mm{1.0, 1.0, std::sqrt(body_of(map).inertia_mm2)};
@@ -109,11 +109,10 @@ std::optional<std::string> coarse_bins(const RecognitionTask& task, const Recogn
 
 /// The best pose lies at an end of an axis.
 std::optional<std::string> at_the_edge(std::span<const Touch> touches, const RecognitionTask& task,
-                                       const RecognitionStep& step) {
+                                       const PoseLattice& lattice, const RecognitionStep& step) {
   if (!step.refined || !step.mode.bin) {
     return {};
   }
-  const PoseLattice& lattice = task.lattice();
   const std::int64_t in_plane = *step.mode.bin % lattice.plane();
   const std::array<std::int64_t, 3> index{in_plane % lattice.x_mm.count,
                                           in_plane / lattice.x_mm.count,
@@ -139,12 +138,17 @@ std::optional<std::string> at_the_edge(std::span<const Touch> touches, const Rec
     }
     const double unit = i < 2 ? 1.0 : degrees_per_rad;
     const double more = (axis.upper - axis.lower) / 2.0;
+    const std::string remedy =
+        task.auto_pivot
+            ? "the region surrounds the first touch; begin with a touch that meets the object"
+            : fmt::format("widen the region, such as with {}={:.4g}:{:.4g}", flags[i],
+                          (axis.lower - (first ? more : 0.0)) * unit,
+                          (axis.upper + (first ? 0.0 : more)) * unit);
     return fmt::format(
         "the best pose lies at the edge of the region, {} = {:.4g} {} of {:.4g} to {:.4g}: the "
-        "object may lie outside; widen the region, such as with {}={:.4g}:{:.4g}",
+        "object may lie outside; {}",
         names[i], place[i] * unit, i < 2 ? "mm" : "degrees", axis.lower * unit, axis.upper * unit,
-        flags[i], (axis.lower - (first ? more : 0.0)) * unit,
-        (axis.upper + (first ? 0.0 : more)) * unit);
+        remedy);
   }
   return {};
 }
@@ -152,7 +156,7 @@ std::optional<std::string> at_the_edge(std::span<const Touch> touches, const Rec
 }  // namespace
 
 std::vector<std::string> warnings_about(std::span<const Touch> touches, const RecognitionTask& task,
-                                        const RecognitionStep& step) {
+                                        const PoseLattice& lattice, const RecognitionStep& step) {
   std::vector<std::string> warnings;
   const auto add = [&](std::optional<std::string> warning) {
     if (warning) {
@@ -163,14 +167,14 @@ std::vector<std::string> warnings_about(std::span<const Touch> touches, const Re
   add(angles_in_degrees(touches));
   add(other_scale(touches, task));
   add(nothing_felt(touches, task.classifier()));
-  add(out_of_reach(touches, task));
+  add(out_of_reach(touches, task, lattice));
   // An estimate from such touches is not worth a word. On bins that are too coarse, the edge is no
   // sign of an object outside.
   if (warnings.empty()) {
-    add(coarse_bins(task, step));
+    add(coarse_bins(task, lattice, step));
   }
   if (warnings.empty()) {
-    add(at_the_edge(touches, task, step));
+    add(at_the_edge(touches, task, lattice, step));
   }
   return warnings;
 }

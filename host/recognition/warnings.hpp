@@ -14,8 +14,9 @@ namespace palpate {
 /// evaluated. Each warning is a sentence that names the evidence and the remedy. Touches that look
 /// right and lie well within the region give none.
 /// @param touches all touches of the unknown so far, each of them sound
+/// @param lattice the task's, about the pivot in use
 /// @param step what the filter believes after them; its own warnings are not read
 std::vector<std::string> warnings_about(std::span<const Touch> touches, const RecognitionTask& task,
-                                        const RecognitionStep& step);
+                                        const PoseLattice& lattice, const RecognitionStep& step);
 
 }  // namespace palpate

@@ -79,7 +79,7 @@ TEST_F(Warnings, GoodTouchesGiveNoneOnBinsThatSuitTheMaps) {
     HistogramOptions options;
     options.lattice.pivot_mm = recording.T_robot_sensor.front().translation_mm;
     RecognitionTask task(*letters_, options);
-    task.auto_bins = true;
+    task.bin_width = BinWidth::fine;
     settle_bins(*device_, task);
     expect_silence(task, letter, 3, 50);
   }
