@@ -37,6 +37,8 @@ TEST_F(OwnSensorDocument, ItsCommandsFindTheUnknown) {
   EXPECT_EQ(bytes_of(folder_ / "complained"), "") << "the logs of the page are in order";
   const std::string said = bytes_of(folder_ / "said");
   EXPECT_EQ(said.find("Suspicious"), said.npos);
+  expect_named(said, {"with a pose       4161 frames", "E.h5: 40 touches in 4161 frames",
+                      "A looks different after every turn"});  // as the page quotes
   for (const char* picture : {"maps.png", "sheets/unknown.png"}) {
     EXPECT_TRUE(std::filesystem::exists(folder_ / picture)) << picture;
   }
