@@ -172,8 +172,10 @@ void live(const Options& options) {
   if (state.all_touches == 0 && state.without_pose > 0 && !interruption.requested()) {
     refuse(source, "none of its {} touches has a pose; give --poses", state.without_pose);
   }
-  fmt::print(people, "{}{}\n", summary(state, recognition.latencies_ms(), task),
-             setup_words(device, task));
+  fmt::print(people, "{}", summary(state, recognition.latencies_ms(), task));
+  if (!to_program) {
+    fmt::print("{}\n", setup_words(device, task));
+  }
   report_refused(opened);
 }
 

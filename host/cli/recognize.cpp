@@ -215,8 +215,7 @@ void recognize(const Options& options) {
         fmt::print("{}\n", trace_table(record, task, columns));
       }
     }
-    fmt::print("{}{}\n", result_table(records, task, options.recognition.verbose, columns),
-               setup_words(device, task));
+    fmt::print("{}{}\n", result_table(records, task, columns), setup_words(device, task));
   }
   if (options.recognition.verbose) {
     double seconds = 0.0;

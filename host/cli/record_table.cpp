@@ -156,9 +156,11 @@ std::string trace_table(const RecognitionRecord& record, const RecognitionTask& 
 }
 
 std::string result_table(const std::vector<RecognitionRecord>& records, const RecognitionTask& task,
-                         bool with_modes, std::optional<int> columns) {
+                         std::optional<int> columns) {
   const bool with_fit = std::ranges::any_of(
       records, [](const RecognitionRecord& record) { return !fit_word(record.last()).empty(); });
+  const bool with_error = std::ranges::any_of(
+      records, [](const RecognitionRecord& record) { return record.last().right.has_value(); });
   TextTable table({{"recording", false, true},
                    {"touches", true},
                    {"best", false, true},
@@ -166,7 +168,8 @@ std::string result_table(const std::vector<RecognitionRecord>& records, const Re
                    {"x mm", true},
                    {"y mm", true},
                    {"theta deg", true},
-                   {with_fit ? "fit" : ""}});
+                   {fmt::format("{}{}{}", with_fit ? "fit" : "", with_fit && with_error ? ", " : "",
+                                with_error ? "error" : "")}});
   const auto add_pose = [&](const char* what, const std::string& label, const Pose& T_robot_object,
                             std::optional<double> error_mm) {
     const PoseText pose = pose_text(T_robot_object);
@@ -179,7 +182,7 @@ std::string result_table(const std::vector<RecognitionRecord>& records, const Re
     table.add({name_of(record), fmt::format("{}", record.touches), object_words(step, task),
                fmt::format("{:.3f}", step.confidence()), pose[0], pose[1], pose[2],
                fit_word(step)});
-    if (with_modes && step.refined) {
+    if (step.refined) {
       add_pose("  mode", task.hypotheses[step.mode.object].map.label, step.mode_T_robot_object(),
                step.error_mm);
     }

@@ -16,12 +16,12 @@ std::string name_of(const RecognitionRecord& record);
 std::string trace_table(const RecognitionRecord& record, const RecognitionTask& task,
                         std::optional<int> columns);
 
-/// A line per unknown, with its pose in the robot frame and, where the true pose is known, a line
-/// with the truth below it. Then what is wrong with which unknown and, where truths are known, how
-/// many are right, the mean pose errors and what each wrongly recognised label was taken for.
-/// @param with_modes whether a line below each unknown shows the mode
+/// For each unknown a line with its pose in the robot frame, below it a line with the mode where
+/// the pose is between the bins, and a line with the truth where it is known. Then what is wrong
+/// with which unknown and, where truths are known, how many are right, the mean pose errors and
+/// what each wrongly recognised label was taken for.
 /// @param columns see TextTable::text()
 std::string result_table(const std::vector<RecognitionRecord>& records, const RecognitionTask& task,
-                         bool with_modes, std::optional<int> columns);
+                         std::optional<int> columns);
 
 }  // namespace palpate::cli

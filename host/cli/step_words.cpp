@@ -1,7 +1,5 @@
 #include "step_words.hpp"
 
-#include <cmath>
-
 #include <fmt/format.h>
 
 #include "options.hpp"
@@ -108,9 +106,9 @@ std::string misfit_sentence(const RecognitionStep& step, std::size_t touches,
     return "";
   }
   const std::string label = printable(posed_label(step, task));
-  return fmt::format("unlike {}: its {} {:.0f} standard deviations {} than touches of {} do", label,
-                     touches == 1 ? "touch fits" : fmt::format("{} touches fit", touches),
-                     std::abs(step.fit->z), step.fit->z < 0.0 ? "worse" : "better", label);
+  return fmt::format("unlike {}: its {} {:.0f} standard deviations worse than touches of {} do",
+                     label, touches == 1 ? "touch fits" : fmt::format("{} touches fit", touches),
+                     -step.fit->z, label);
 }
 
 std::string error_text(std::optional<double> error_mm) {

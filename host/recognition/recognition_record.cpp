@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 
+#include "nearby_fit.hpp"
 #include "palpate/error.hpp"
 #include "palpate/pose_error.hpp"
 #include "turn_warning.hpp"
@@ -126,8 +127,9 @@ RecognitionStep take_step(Recogniser& recogniser, const RecognitionTask& task,
     step.refined_error_mm = error_mm(task, step.mode.object, step.refined->T_object_robot, truth);
   }
   step.effective_sample_size = recogniser.effective_sample_size();
-  step.fit = fit_of(touches, step.pose(), task.hypotheses[step.mode.object].map, task.contact(),
-                    static_cast<std::size_t>(step.mode.object));
+  step.fit = (step.refined ? fit_of : best_fit_near)(
+      touches, step.pose(), task.hypotheses[step.mode.object].map, task.contact(),
+      static_cast<std::size_t>(step.mode.object));
   step.warnings = warnings_about(touches, task, recogniser.lattice(), step);
   if (step.warnings.empty()) {
     if (auto turned = turned_alike(recogniser, task, step, truth)) {

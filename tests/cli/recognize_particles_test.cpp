@@ -67,12 +67,14 @@ TEST_F(RecognizeParticles, ASceneMayAskForThem) {
 }
 
 TEST_F(RecognizeParticles, ThePeoplesTraceShowsTheEffectiveParticles) {
-  const std::string text = done(
-      {"recognize", "u.h5", "--maps", "maps", "--filter", "particles", "--trace", "--augmented"});
-  for (const char* part :
-       {"10000 particles, multinomial resampling, random particles added", "effective particles"}) {
-    EXPECT_NE(text.find(part), std::string::npos) << text;
-  }
+  const Outcome outcome = palpate({"recognize", "u.h5", "--maps", "maps", "--filter", "particles",
+                                   "--trace", "--augmented", "--verbose"});
+  EXPECT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_NE(outcome.out.find("effective particles"), std::string::npos) << outcome.out;
+  EXPECT_NE(outcome.err.find("10000 particles, multinomial resampling, random particles added"),
+            std::string::npos)
+      << outcome.err;
+  EXPECT_EQ(outcome.out.find("no fit"), std::string::npos) << outcome.out;
 }
 
 TEST_F(RecognizeParticles, AreDrawn) {
