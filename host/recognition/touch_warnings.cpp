@@ -122,14 +122,14 @@ std::optional<std::string> positions_in_metres(std::span<const Touch> touches,
 }
 
 std::optional<std::string> angles_in_degrees(std::span<const Touch> touches) {
-  constexpr double circle_rad = 2.0 * std::numbers::pi;
-  constexpr double rounding = 1e-5;  // of a full turn in float32
+  // Angles within a full turn, interpolated the short way round, reach up to half a turn beyond.
+  constexpr double most_rad = 3.0 * std::numbers::pi;
   const auto largest =
       std::max_element(touches.begin(), touches.end(), [](const Touch& a, const Touch& b) {
         return std::abs(a.T_robot_sensor.theta_rad) < std::abs(b.T_robot_sensor.theta_rad);
       });
   const double theta_rad = largest->T_robot_sensor.theta_rad;
-  if (std::abs(theta_rad) <= circle_rad + rounding) {
+  if (std::abs(theta_rad) <= most_rad) {
     return {};
   }
   return fmt::format(
