@@ -121,7 +121,8 @@ std::string next_command(const ImportOptions& options, const Recording& recordin
              : fmt::format("palpate map {} -o MAPS/{}", options.output, threshold);
 }
 
-void print_summary(const ImportOptions& options, const Recording& r, bool assumed_units) {
+void print_summary(const ImportOptions& options, const ImportedRecording& imported) {
+  const Recording& r = imported.recording;
   fmt::print("{}: {} {} of {} elements", options.output, r.size(), r.rows, r.elements());
   if (!r.time_s.empty()) {
     fmt::print(" in {:.3f} s", r.time_s.back() - r.time_s.front());
@@ -131,6 +132,12 @@ void print_summary(const ImportOptions& options, const Recording& r, bool assume
                  return !std::isnan(pose.theta_rad);
                }));
   }
+  if (imported.in_gaps > 0) {
+    fmt::print(
+        ", {} without one as the poses around them are more than {:.3g} s apart "
+        "(--largest-gap-s)",
+        imported.in_gaps, imported.largest_gap_s);
+  }
   std::size_t unknown = 0;
   for (std::size_t k = 0; k < r.pressure.size(); ++k) {
     const bool alive = r.valid.empty() || r.valid[k % r.valid.size()] != 0;
@@ -139,7 +146,7 @@ void print_summary(const ImportOptions& options, const Recording& r, bool assume
   if (unknown > 0) {
     fmt::print(", {} readings unknown or dead", unknown);
   }
-  if (assumed_units) {
+  if (imported.assumed_units) {
     fmt::print(", poses taken to be in mm and rad");
   }
   fmt::print("; next: {}\n", next_command(options, r));
@@ -147,7 +154,9 @@ void print_summary(const ImportOptions& options, const Recording& r, bool assume
 
 void import_tables(const ImportOptions& options) {
   const TableOptions tables = table_options(options);
-  require_above("--largest-gap-s", options.largest_gap_s, 0.0);
+  if (options.largest_gap_s) {
+    require_above("--largest-gap-s", *options.largest_gap_s, 0.0);
+  }
   if (options.pressure_unit != "kPa" && options.pressure_unit != "raw") {
     refuse_flag("--pressure-unit", options.pressure_unit, "give kPa or raw");
   }
@@ -165,11 +174,11 @@ void import_tables(const ImportOptions& options) {
   if (!options.truth.empty()) {
     truth = truth_of(options.truth, tables);
   }
-  auto [recording, assumed_units] = read_tables(options, tables, array_of(options.array));
-  recording.object = options.object;
-  recording.truth = truth;
-  write_recording(options.output, recording);
-  print_summary(options, recording, assumed_units);
+  ImportedRecording imported = read_tables(options, tables, array_of(options.array));
+  imported.recording.object = options.object;
+  imported.recording.truth = truth;
+  write_recording(options.output, imported.recording);
+  print_summary(options, imported);
 }
 
 }  // namespace
@@ -225,11 +234,10 @@ void add_import(CLI::App& app) {
                       "all columns that are neither time nor pose]");
   command->add_option("--pose-columns", options->pose_columns,
                       "Names of the columns of the poses, X,Y,THETA [default: x,y,theta]");
-  command
-      ->add_option("--largest-gap-s", options->largest_gap_s,
-                   "Poses further apart in time than this are not interpolated: a frame between "
-                   "them has no pose, s")
-      ->capture_default_str();
+  command->add_option("--largest-gap-s", options->largest_gap_s,
+                      "Poses further apart in time than this are not interpolated: a frame between "
+                      "them has no pose, s [default: 2.5 times the median step of the poses' "
+                      "times, at least 0.1]");
   command->add_option("--rate", options->rate_hz,
                       "Frames per second of pressures without times; the first frame is at 0 s");
   command->add_option("--object", options->object, "Label of the touched object");

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <utility>
 #include <vector>
 
@@ -68,25 +69,53 @@ void mark_unknown(const std::string& path, Recording& recording) {
   }
 }
 
-std::vector<Pose> poses_by_time(const PoseTable& poses, const std::vector<double>& time_s,
-                                double largest_gap_s) {
-  PoseTrack track(largest_gap_s);
+/// Drops the poses that are unknown.
+void keep_known(PoseTable& poses) {
+  std::size_t kept = 0;
   for (std::size_t i = 0; i < poses.time_s.size(); ++i) {
     if (is_finite(poses.T_robot_sensor[i])) {
-      track.add(poses.time_s[i], poses.T_robot_sensor[i]);
+      poses.time_s[kept] = poses.time_s[i];
+      poses.T_robot_sensor[kept++] = poses.T_robot_sensor[i];
     }
   }
-  track.end();
-  std::vector<Pose> joined;
-  joined.reserve(time_s.size());
-  for (const double time : time_s) {
-    joined.push_back(track.at(time).value_or(unknown_pose));
+  poses.time_s.resize(kept);
+  poses.T_robot_sensor.resize(kept);
+}
+
+/// A gap that a regular log does not reach when its steps jitter or a single pose is lost.
+double usual_gap_s(const std::vector<double>& time_s) {
+  constexpr double steps = 2.5;
+  if (time_s.size() < 2) {
+    return PosedSensor::usual_gap_s;
   }
-  return joined;
+  std::vector<double> step_s(time_s.size());
+  std::adjacent_difference(time_s.begin(), time_s.end(), step_s.begin());
+  step_s.erase(step_s.begin());
+  const auto median = step_s.begin() + static_cast<std::ptrdiff_t>(step_s.size() / 2);
+  std::ranges::nth_element(step_s, median);
+  return std::max(PosedSensor::usual_gap_s, steps * *median);
+}
+
+/// Gives every frame the pose interpolated at its time.
+void join_by_time(const PoseTable& poses, ImportedRecording& imported) {
+  Recording& recording = imported.recording;
+  PoseTrack track(imported.largest_gap_s);
+  for (std::size_t i = 0; i < poses.time_s.size(); ++i) {
+    track.add(poses.time_s[i], poses.T_robot_sensor[i]);
+  }
+  track.end();
+  recording.T_robot_sensor.reserve(recording.time_s.size());
+  for (const double time_s : recording.time_s) {
+    const std::optional<Pose> pose = track.at(time_s);
+    recording.T_robot_sensor.push_back(pose.value_or(unknown_pose));
+    imported.in_gaps +=
+        !pose && time_s > poses.time_s.front() && time_s < poses.time_s.back() ? 1 : 0;
+  }
 }
 
 /// Gives every row its pose, by time or row by row.
-void join(PoseTable poses, const ImportOptions& options, Recording& recording) {
+void join(PoseTable poses, const ImportOptions& options, ImportedRecording& imported) {
+  Recording& recording = imported.recording;
   const std::size_t n = recording.pressure.size() / recording.elements_mm.size();
   const bool same_rows = poses.time_s.empty() || options.poses == options.pressures;
   if (!same_rows && recording.time_s.empty()) {
@@ -96,7 +125,12 @@ void join(PoseTable poses, const ImportOptions& options, Recording& recording) {
            options.pressures);
   }
   if (!same_rows) {
-    recording.T_robot_sensor = poses_by_time(poses, recording.time_s, options.largest_gap_s);
+    keep_known(poses);
+    if (poses.time_s.empty()) {
+      refuse(options.poses, "holds no pose; write x, y and theta where they are known");
+    }
+    imported.largest_gap_s = options.largest_gap_s.value_or(usual_gap_s(poses.time_s));
+    join_by_time(poses, imported);
     if (std::ranges::none_of(recording.T_robot_sensor, is_finite)) {
       refuse(options.poses,
              "no row of {} finds a pose: its times are {} to {} s, the poses' are {} to {} s; "
@@ -188,7 +222,7 @@ ImportedRecording read_tables(const ImportOptions& options, const TableOptions& 
   mark_unknown(options.pressures, recording);
   if (poses) {
     imported.assumed_units = poses->assumed_units;
-    join(std::move(*poses), options, recording);
+    join(std::move(*poses), options, imported);
   } else {
     recording.T_robot_sensor.assign(recording.pressure.size() / recording.elements_mm.size(),
                                     unknown_pose);

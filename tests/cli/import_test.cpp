@@ -4,6 +4,8 @@
 #include <cmath>
 #include <fstream>
 
+#include <fmt/format.h>
+
 #include "program.hpp"
 #include "sample_files.hpp"
 
@@ -89,6 +91,34 @@ TEST_F(ImportCommand, FramesOutsideThePosesOrInAGapHaveNone) {
                   "poses' are 0.01 to 0.08 s; check clocks and units, or raise --largest-gap-s");
     }
   }
+}
+
+// Frames at 100 Hz and poses at 10 Hz, of which one is lost; the steps of the poses round to both
+// sides of 0.1 s.
+TEST_F(ImportCommand, TheLargestGapFollowsThePoses) {
+  std::string log = "time,p0,p1\n";
+  for (int i = 0; i <= 200; ++i) {
+    log += fmt::format("{},1,2\n", 1.7e9 + i * 0.01);
+  }
+  put("log.csv", log);
+  const auto put_poses = [&](int lost) {
+    std::string text = "time,x_mm,y_mm,theta_rad\n";
+    for (int i = 0; i <= 20; ++i) {
+      if (i < 8 || i >= 8 + lost) {
+        text += fmt::format("{},{},0,0\n", 1.7e9 + i * 0.1, i);
+      }
+    }
+    put("poses.csv", text);
+  };
+  put_poses(1);
+  const std::string whole = done(command({"--poses", "poses.csv"}));
+  expect_named(whole, {"201 frames", "201 with a pose; next"});
+  put_poses(2);  // 0.3 s, in which 29 frames lie
+  expect_named(done(command({"--poses", "poses.csv"})),
+               {"172 with a pose, 29 without one as the poses around them are more than 0.25 s "
+                "apart (--largest-gap-s); next"});
+  expect_named(done(command({"--poses", "poses.csv", "--largest-gap-s", "0.31"})),
+               {"201 with a pose; next"});
 }
 
 TEST_F(ImportCommand, FramesNeedNoPoses) {
