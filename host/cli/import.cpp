@@ -14,6 +14,7 @@
 #include "number_text.hpp"
 #include "options.hpp"
 #include "palpate/files.hpp"
+#include "recording_rules.hpp"
 
 namespace palpate::cli {
 
@@ -107,7 +108,7 @@ Truth truth_of(const std::string& text, const TableOptions& units) {
 std::string next_command(const ImportOptions& options, const Recording& recording) {
   const bool raw = recording.pressure_unit == "raw";
   if (recording.rows == "frames") {
-    return options.poses.empty()
+    return std::ranges::none_of(recording.T_robot_sensor, is_finite)
                ? fmt::format(
                      "palpate live --sensor replay:{} --poses POSES --maps MAPS/, or import again "
                      "with --poses",

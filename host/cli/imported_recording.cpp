@@ -167,6 +167,11 @@ void require_touch_poses(const ImportOptions& options, const Recording& recordin
   }
 }
 
+/// True where a table of this name is given and has the column.
+bool has_column(const std::string& path, const std::string& name) {
+  return !path.empty() && !is_npy(path) && CsvTable(path).find(name);
+}
+
 void choose_rows(const ImportOptions& options, Recording& recording) {
   const std::size_t n = recording.pressure.size() / recording.elements_mm.size();
   if (options.rate_hz) {
@@ -196,6 +201,10 @@ void choose_rows(const ImportOptions& options, Recording& recording) {
 
 ImportedRecording read_tables(const ImportOptions& options, const TableOptions& columns,
                               Array array) {
+  if (!options.time_column.empty() && !has_column(options.pressures, options.time_column) &&
+      !has_column(options.poses, options.time_column)) {
+    refuse_flag("--time-column", options.time_column, "no table has this column; give its name");
+  }
   PressureTable pressures =
       is_npy(options.pressures)
           ? read_npy_pressures(options.pressures, array)
@@ -213,10 +222,6 @@ ImportedRecording read_tables(const ImportOptions& options, const TableOptions& 
   std::optional<PoseTable> poses;
   if (!options.poses.empty()) {
     poses = read_poses(options.poses, columns);
-  }
-  if (!options.time_column.empty() && recording.time_s.empty() &&
-      (!poses || poses->time_s.empty())) {
-    refuse_flag("--time-column", options.time_column, "no table has this column; give its name");
   }
   choose_rows(options, recording);
   mark_unknown(options.pressures, recording);

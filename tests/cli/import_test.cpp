@@ -383,6 +383,9 @@ TEST_F(ImportCommand, FlagsNameTheirForm) {
   put("log.csv", "p0,p1\n1,2\n");
   expect_said({"--time-column", "when"},
               "--time-column when: no table has this column; give its name");
+  put("log.csv", frames);
+  expect_said({"--poses", "poses.csv", "--time-column", "stmap"},
+              "--time-column stmap: no table has this column; give its name");
 }
 
 // 200,000 frames: 7 MB of text and 6 MB of pressures.
