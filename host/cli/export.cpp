@@ -46,7 +46,7 @@ std::string import_command(const std::filesystem::path& folder, const Recording&
   if (!r.object.empty()) {
     command += " " + shell_word("--object=" + r.object);
   }
-  if (r.truth) {
+  if (r.truth && !r.truth->object.empty()) {  // --truth needs a label
     const Pose& T = r.truth->T_object_robot;
     command += " " + shell_word(fmt::format("--truth={},{},{},{}", r.truth->object,
                                             T.translation_mm.x, T.translation_mm.y, T.theta_rad));

@@ -14,6 +14,7 @@
 #include "number_text.hpp"
 #include "options.hpp"
 #include "palpate/files.hpp"
+#include "palpate/pose_track.hpp"
 #include "recording_rules.hpp"
 
 namespace palpate::cli {
@@ -89,19 +90,31 @@ Array array_of(const std::string& text) {
   return array;
 }
 
-Truth truth_of(const std::string& text, const TableOptions& units) {
+/// The label and the pose of --truth, whose numbers are still in the units of the tables.
+Truth truth_of(const std::string& text) {
   const auto parts = split_last(text, ',', 4);
   std::array<std::optional<double>, 3> pose;
   for (std::size_t i = 0; i < 3; ++i) {
-    pose[i] = parts.empty() ? std::nullopt : number_of(parts[i + 1]);
+    pose[i] = parts.empty() || parts[0].empty() ? std::nullopt : number_of(parts[i + 1]);
     if (!pose[i]) {
-      refuse_flag("--truth", text, "give LABEL,X,Y,THETA, in the units of --pose-unit");
+      refuse_flag("--truth", text, "give LABEL,X,Y,THETA, in the units of the poses");
     }
   }
-  const Unit length = units.length_unit.value_or(length_units.front());
-  const Unit angle = units.angle_unit.value_or(angle_units.front());
-  return {parts[0],
-          {{length.convert(*pose[0]), length.convert(*pose[1])}, angle.convert(*pose[2])}};
+  return {parts[0], {{*pose[0], *pose[1]}, *pose[2]}};
+}
+
+/// The pose of --truth in mm and rad.
+Pose truth_pose(const std::string& text, const Pose& in_units, const std::array<Unit, 3>& units) {
+  const Pose pose{
+      {units[0].convert(in_units.translation_mm.x), units[1].convert(in_units.translation_mm.y)},
+      units[2].convert(in_units.theta_rad)};
+  if (!is_robot_pose(pose)) {
+    refuse_flag("--truth", text,
+                "is further than {:g} mm or turned by more than 1e9 rad; check the numbers and "
+                "their units, {}, {} and {}",
+                farthest_mm, units[0].name, units[1].name, units[2].name);
+  }
+  return pose;
 }
 
 /// The command that takes the recording.
@@ -147,6 +160,9 @@ void print_summary(const ImportOptions& options, const ImportedRecording& import
   if (unknown > 0) {
     fmt::print(", {} readings unknown or dead", unknown);
   }
+  if (imported.holds_poses && options.poses.empty()) {
+    fmt::print(", its columns of poses left out (--poses {})", options.pressures);
+  }
   if (imported.assumed_units) {
     fmt::print(", poses taken to be in mm and rad");
   }
@@ -157,6 +173,11 @@ void import_tables(const ImportOptions& options) {
   const TableOptions tables = table_options(options);
   if (options.largest_gap_s) {
     require_above("--largest-gap-s", *options.largest_gap_s, 0.0);
+  }
+  constexpr double slowest_hz = 1e-3;
+  constexpr double fastest_hz = 1e6;
+  if (options.rate_hz && !(*options.rate_hz >= slowest_hz && *options.rate_hz <= fastest_hz)) {
+    refuse_flag("--rate", *options.rate_hz, "give {} to {} Hz", slowest_hz, fastest_hz);
   }
   if (options.pressure_unit != "kPa" && options.pressure_unit != "raw") {
     refuse_flag("--pressure-unit", options.pressure_unit, "give kPa or raw");
@@ -173,11 +194,14 @@ void import_tables(const ImportOptions& options) {
 
   std::optional<Truth> truth;
   if (!options.truth.empty()) {
-    truth = truth_of(options.truth, tables);
+    truth = truth_of(options.truth);
   }
   ImportedRecording imported = read_tables(options, tables, array_of(options.array));
   imported.recording.object = options.object;
-  imported.recording.truth = truth;
+  if (truth) {
+    truth->T_object_robot = truth_pose(options.truth, truth->T_object_robot, imported.pose_units);
+    imported.recording.truth = truth;
+  }
   write_recording(options.output, imported.recording);
   print_summary(options, imported);
 }
@@ -244,7 +268,7 @@ void add_import(CLI::App& app) {
   command->add_option("--object", options->object, "Label of the touched object");
   command->add_option("--truth", options->truth,
                       "True identity and pose T_object_robot of the object, LABEL,X,Y,THETA in the "
-                      "units of --pose-unit");
+                      "units of the poses, else of --pose-unit");
   command->callback([options] { import_tables(*options); });
 }
 

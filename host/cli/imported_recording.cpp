@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include "file_identity.hpp"
 #include "npy_file.hpp"
 #include "options.hpp"
 #include "pose_table.hpp"
@@ -117,7 +118,7 @@ void join_by_time(const PoseTable& poses, ImportedRecording& imported) {
 void join(PoseTable poses, const ImportOptions& options, ImportedRecording& imported) {
   Recording& recording = imported.recording;
   const std::size_t n = recording.pressure.size() / recording.elements_mm.size();
-  const bool same_rows = poses.time_s.empty() || options.poses == options.pressures;
+  const bool same_rows = poses.time_s.empty();
   if (!same_rows && recording.time_s.empty()) {
     refuse(options.poses,
            "has times, {} has none; give both a column 'time' or neither, or give the frames' "
@@ -150,11 +151,13 @@ void join(PoseTable poses, const ImportOptions& options, ImportedRecording& impo
 }
 
 /// Requires a pose of every touch.
-void require_touch_poses(const ImportOptions& options, const Recording& recording) {
+void require_touch_poses(const ImportOptions& options, const ImportedRecording& imported) {
+  const Recording& recording = imported.recording;
   if (options.poses.empty()) {
     refuse(options.pressures,
-           "its rows are touches, and each needs a pose; give --poses, or for a stream of frames a "
-           "column 'time' or --rate");
+           "its rows are touches, and each needs a pose; give --poses{}, or for a stream of frames "
+           "a column 'time' or --rate",
+           imported.holds_poses ? " " + options.pressures : "");
   }
   for (std::size_t i = 0; i < recording.size(); ++i) {
     if (!is_finite(recording.T_robot_sensor[i])) {
@@ -175,7 +178,6 @@ bool has_column(const std::string& path, const std::string& name) {
 void choose_rows(const ImportOptions& options, Recording& recording) {
   const std::size_t n = recording.pressure.size() / recording.elements_mm.size();
   if (options.rate_hz) {
-    require_above("--rate", *options.rate_hz, 0.0);
     if (!recording.time_s.empty()) {
       refuse_flag("--rate", *options.rate_hz, "{} has times; leave the flag out",
                   options.pressures);
@@ -210,6 +212,10 @@ ImportedRecording read_tables(const ImportOptions& options, const TableOptions& 
           ? read_npy_pressures(options.pressures, array)
           : read_pressures(options.pressures, array.elements_mm.size(), columns);
   ImportedRecording imported;
+  imported.pose_units[0] = columns.length_unit.value_or(length_units.front());
+  imported.pose_units[1] = imported.pose_units[0];
+  imported.pose_units[2] = columns.angle_unit.value_or(angle_units.front());
+  imported.holds_poses = pressures.holds_poses;
   Recording& recording = imported.recording;
   recording.pressure_unit = options.pressure_unit;
   recording.elements_mm = std::move(array.elements_mm);
@@ -221,19 +227,23 @@ ImportedRecording read_tables(const ImportOptions& options, const TableOptions& 
   recording.lost_before = std::move(pressures.lost_before);
   std::optional<PoseTable> poses;
   if (!options.poses.empty()) {
-    poses = read_poses(options.poses, columns);
+    // The rows of one file belong together, even where their times are equal.
+    const bool one_file = identity_of(std::filesystem::path(options.poses)) ==
+                          identity_of(std::filesystem::path(options.pressures));
+    poses = read_poses(options.poses, columns, !one_file);
   }
   choose_rows(options, recording);
   mark_unknown(options.pressures, recording);
   if (poses) {
     imported.assumed_units = poses->assumed_units;
+    imported.pose_units = poses->units;
     join(std::move(*poses), options, imported);
   } else {
     recording.T_robot_sensor.assign(recording.pressure.size() / recording.elements_mm.size(),
                                     unknown_pose);
   }
   if (recording.rows == "touches") {
-    require_touch_poses(options, recording);
+    require_touch_poses(options, imported);
   }
   return imported;
 }

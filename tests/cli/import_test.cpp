@@ -160,6 +160,27 @@ TEST_F(ImportCommand, RowsWithoutTimesAreTouches) {
   expect_pose(r.truth->T_object_robot, {{1.0, 2.0}, 0.5});
 }
 
+TEST_F(ImportCommand, TruthIsInTheUnitsOfThePoses) {
+  put("poses.csv", "time,x_m,y_mm,theta_deg\n0,0,0,0\n0.1,0,0,0\n");
+  const Recording r = imported({"--poses", "poses.csv", "--truth", "A,0.5,2,90"});
+  ASSERT_TRUE(r.truth);
+  expect_pose(r.truth->T_object_robot, {{500.0, 2.0}, M_PI / 2.0});
+}
+
+// Two frames of one time: their poses cannot be told apart by time.
+TEST_F(ImportCommand, OneFileHoldsPressuresAndPosesRowByRow) {
+  put("log.csv",
+      "t,T,x_mm,y_mm,theta_rad,p0,p1\n0,20,1,0,0,1,2\n0,20,2,0,0,3,4\n"
+      "0.1,20,3,0,0,5,6\n");
+  const Recording r = imported({"--poses", "./log.csv", "--pressure-columns", "P"});
+  EXPECT_EQ(r.pressure, (std::vector<double>{1, 2, 3, 4, 5, 6}));
+  EXPECT_EQ(r.time_s, (std::vector<double>{0.0, 0.0, 0.1}));
+  expect_pose(r.T_robot_sensor[0], {{1.0, 0.0}, 0.0});
+  expect_pose(r.T_robot_sensor[1], {{2.0, 0.0}, 0.0});
+  expect_named(done(command({"--pressure-columns", "P"})),
+               {"0 with a pose, its columns of poses left out (--poses log.csv); next"});
+}
+
 TEST_F(ImportCommand, TheSameReadingsInAnyTable) {
   const Recording wide = imported();
   const auto expect_same = [&](const std::string& text, const Arguments& more) {
@@ -286,6 +307,35 @@ INSTANTIATE_TEST_SUITE_P(
              {"--pressure-columns", "q"},
              "log.csv:1: no column is called or begins with 'q'; give --pressure-columns a prefix "
              "of the columns' names, or FIRST:LAST"},
+        Case{"columns_back_to_front",
+             "log.csv",
+             frames,
+             {"--pressure-columns", "p1:p0"},
+             "log.csv:1: column 'p0' comes before 'p1'; give --pressure-columns FIRST:LAST"},
+        Case{"times_as_pressures",
+             "log.csv",
+             frames,
+             {"--pressure-columns", "time:p0"},
+             "log.csv:1: column 'time', between 'time' and 'p0', holds no pressures; correct "
+             "--pressure-columns FIRST:LAST"},
+        Case{"a_temperature_is_no_time",
+             "log.csv",
+             "T,p0,p1\n20,1,2\n",
+             {"--pressure-columns", "p"},
+             "log.csv: its rows are touches, and each needs a pose; give --poses, or for a stream "
+             "of frames a column 'time' or --rate"},
+        Case{"touches_without_their_poses",
+             "log.csv",
+             "x,y,theta,p0,p1\n0,0,0,1,2\n",
+             {},
+             "log.csv: its rows are touches, and each needs a pose; give --poses log.csv, or for a "
+             "stream of frames a column 'time' or --rate"},
+        Case{"a_bad_cell_in_the_first_row",
+             "log.csv",
+             "0,1,NA\n1,2,3\n",
+             {},
+             "log.csv:1: column '3': 'NA' is not a finite number; correct it, or leave the cell "
+             "empty; in a header, no cell is a number"},
         Case{"ragged",
              "log.csv",
              "time,p0,p1\n0,1,2\n1,3\n",
@@ -370,11 +420,18 @@ TEST_F(ImportCommand, FlagsNameTheirForm) {
   expect_said({"--pressure-unit", "psi"}, "--pressure-unit psi: give kPa or raw");
   expect_said({"--rows", "rows"}, "--rows rows: give frames or touches");
   expect_said({"--rate", "5"}, "--rate 5: log.csv has times; leave the flag out");
-  expect_said({"--rate", "0"}, "--rate 0: must be above 0");
+  expect_said({"--rate", "0"}, "--rate 0: give 0.001 to 1000000 Hz");
+  expect_said({"--rate", "1e-300"}, "--rate 1e-300: give 0.001 to 1000000 Hz");
+  expect_said({"--rate", "1e300"}, "--rate 1e+300: give 0.001 to 1000000 Hz");
   expect_said({"--largest-gap-s", "0"}, "--largest-gap-s 0: must be above 0");
   expect_said({"--pose-columns", "x,y"}, "--pose-columns x,y: give three names, X,Y,THETA");
   expect_said({"--truth", "1,2,3"},
-              "--truth 1,2,3: give LABEL,X,Y,THETA, in the units of --pose-unit");
+              "--truth 1,2,3: give LABEL,X,Y,THETA, in the units of the poses");
+  expect_said({"--truth", ",1,2,3"},
+              "--truth ,1,2,3: give LABEL,X,Y,THETA, in the units of the poses");
+  expect_said({"--truth", "A,0,1e12,0"},
+              "--truth A,0,1e12,0: is further than 1e+09 mm or turned by more than 1e9 rad; check "
+              "the numbers and their units, mm, mm and rad");
   expect_said({"--array", "0:1:2"},
               "--array 0:1:2: give COLUMNS:ROWS:PITCH, with 1 to 1024 columns and rows and a pitch "
               "of 0.001 to 1000 mm, or a file");
