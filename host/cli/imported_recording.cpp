@@ -114,6 +114,12 @@ void join_by_time(const PoseTable& poses, ImportedRecording& imported) {
   }
 }
 
+/// True where --poses is the table of the pressures, under this or another path.
+bool in_one_file(const ImportOptions& options) {
+  return identity_of(std::filesystem::path(options.poses)) ==
+         identity_of(std::filesystem::path(options.pressures));
+}
+
 /// Gives every row its pose, by time or row by row.
 void join(PoseTable poses, const ImportOptions& options, ImportedRecording& imported) {
   Recording& recording = imported.recording;
@@ -140,6 +146,12 @@ void join(PoseTable poses, const ImportOptions& options, ImportedRecording& impo
              poses.time_s.front(), poses.time_s.back());
     }
     return;
+  }
+  if (poses.T_robot_sensor.size() != n && in_one_file(options)) {
+    refuse(options.poses,
+           "has {} rows of readings for {} frames or touches; give the poses in a table of their "
+           "own, with a row for each",
+           poses.T_robot_sensor.size(), n);
   }
   if (poses.T_robot_sensor.size() != n) {
     refuse(options.poses,
@@ -228,9 +240,7 @@ ImportedRecording read_tables(const ImportOptions& options, const TableOptions& 
   std::optional<PoseTable> poses;
   if (!options.poses.empty()) {
     // The rows of one file belong together, even where their times are equal.
-    const bool one_file = identity_of(std::filesystem::path(options.poses)) ==
-                          identity_of(std::filesystem::path(options.pressures));
-    poses = read_poses(options.poses, columns, !one_file);
+    poses = read_poses(options.poses, columns, !in_one_file(options));
   }
   choose_rows(options, recording);
   mark_unknown(options.pressures, recording);
