@@ -40,16 +40,13 @@ std::string shell_word(const std::string& text) {
 /// The command that makes the recording from its tables.
 std::string import_command(const std::filesystem::path& folder, const Recording& r) {
   const auto file = [&](const char* name) { return shell_word((folder / name).string()); };
-  std::string command =
-      fmt::format("palpate import {} --array {}", file("pressures.csv"), file("array.csv"));
-  if (table_names(r).size() > 2) {
-    command += " --poses " + file("poses.csv");
-  }
+  std::string command = fmt::format("palpate import {} --array {} --poses {}",
+                                    file("pressures.csv"), file("array.csv"), file("poses.csv"));
   command += fmt::format(" --rows {} --pressure-unit {}", r.rows, r.pressure_unit);
   if (!r.object.empty()) {
     command += " " + shell_word("--object=" + r.object);
   }
-  if (r.truth) {
+  if (r.truth && !r.truth->object.empty()) {  // --truth needs a label
     const Pose& T = r.truth->T_object_robot;
     command += " " + shell_word(fmt::format("--truth={},{},{},{}", r.truth->object,
                                             T.translation_mm.x, T.translation_mm.y, T.theta_rad));
@@ -65,7 +62,7 @@ void export_tables(const Options& options) {
   const std::filesystem::path folder = options.folder;
   CommandFiles files;
   files.reads("FILE", options.recording);
-  for (const std::string& name : table_names(recording)) {
+  for (const std::string& name : table_names()) {
     files.writes("-o", folder / name);
   }
   files.require_distinct();

@@ -14,6 +14,8 @@
 #include "number_text.hpp"
 #include "options.hpp"
 #include "palpate/files.hpp"
+#include "palpate/pose_track.hpp"
+#include "recording_rules.hpp"
 
 namespace palpate::cli {
 
@@ -88,26 +90,38 @@ Array array_of(const std::string& text) {
   return array;
 }
 
-Truth truth_of(const std::string& text, const TableOptions& units) {
+/// The label and the pose of --truth, whose numbers are still in the units of the tables.
+Truth truth_of(const std::string& text) {
   const auto parts = split_last(text, ',', 4);
   std::array<std::optional<double>, 3> pose;
   for (std::size_t i = 0; i < 3; ++i) {
-    pose[i] = parts.empty() ? std::nullopt : number_of(parts[i + 1]);
+    pose[i] = parts.empty() || parts[0].empty() ? std::nullopt : number_of(parts[i + 1]);
     if (!pose[i]) {
-      refuse_flag("--truth", text, "give LABEL,X,Y,THETA, in the units of --pose-unit");
+      refuse_flag("--truth", text, "give LABEL,X,Y,THETA, in the units of the poses");
     }
   }
-  const Unit length = units.length_unit.value_or(length_units.front());
-  const Unit angle = units.angle_unit.value_or(angle_units.front());
-  return {parts[0],
-          {{length.convert(*pose[0]), length.convert(*pose[1])}, angle.convert(*pose[2])}};
+  return {parts[0], {{*pose[0], *pose[1]}, *pose[2]}};
+}
+
+/// The pose of --truth in mm and rad.
+Pose truth_pose(const std::string& text, const Pose& in_units, const std::array<Unit, 3>& units) {
+  const Pose pose{
+      {units[0].convert(in_units.translation_mm.x), units[1].convert(in_units.translation_mm.y)},
+      units[2].convert(in_units.theta_rad)};
+  if (!is_robot_pose(pose)) {
+    refuse_flag("--truth", text,
+                "is further than {:g} mm or turned by more than 1e9 rad; check the numbers and "
+                "their units, {}, {} and {}",
+                farthest_mm, units[0].name, units[1].name, units[2].name);
+  }
+  return pose;
 }
 
 /// The command that takes the recording.
 std::string next_command(const ImportOptions& options, const Recording& recording) {
   const bool raw = recording.pressure_unit == "raw";
   if (recording.rows == "frames") {
-    return options.poses.empty()
+    return std::ranges::none_of(recording.T_robot_sensor, is_finite)
                ? fmt::format(
                      "palpate live --sensor replay:{} --poses POSES --maps MAPS/, or import again "
                      "with --poses",
@@ -121,7 +135,8 @@ std::string next_command(const ImportOptions& options, const Recording& recordin
              : fmt::format("palpate map {} -o MAPS/{}", options.output, threshold);
 }
 
-void print_summary(const ImportOptions& options, const Recording& r, bool assumed_units) {
+void print_summary(const ImportOptions& options, const ImportedRecording& imported) {
+  const Recording& r = imported.recording;
   fmt::print("{}: {} {} of {} elements", options.output, r.size(), r.rows, r.elements());
   if (!r.time_s.empty()) {
     fmt::print(" in {:.3f} s", r.time_s.back() - r.time_s.front());
@@ -131,6 +146,12 @@ void print_summary(const ImportOptions& options, const Recording& r, bool assume
                  return !std::isnan(pose.theta_rad);
                }));
   }
+  if (imported.in_gaps > 0) {
+    fmt::print(
+        ", {} without one as the poses around them are more than {:.3g} s apart "
+        "(--largest-gap-s)",
+        imported.in_gaps, imported.largest_gap_s);
+  }
   std::size_t unknown = 0;
   for (std::size_t k = 0; k < r.pressure.size(); ++k) {
     const bool alive = r.valid.empty() || r.valid[k % r.valid.size()] != 0;
@@ -139,7 +160,10 @@ void print_summary(const ImportOptions& options, const Recording& r, bool assume
   if (unknown > 0) {
     fmt::print(", {} readings unknown or dead", unknown);
   }
-  if (assumed_units) {
+  if (imported.holds_poses && options.poses.empty()) {
+    fmt::print(", its columns of poses left out (--poses {})", options.pressures);
+  }
+  if (imported.assumed_units) {
     fmt::print(", poses taken to be in mm and rad");
   }
   fmt::print("; next: {}\n", next_command(options, r));
@@ -147,7 +171,14 @@ void print_summary(const ImportOptions& options, const Recording& r, bool assume
 
 void import_tables(const ImportOptions& options) {
   const TableOptions tables = table_options(options);
-  require_above("--largest-gap-s", options.largest_gap_s, 0.0);
+  if (options.largest_gap_s) {
+    require_above("--largest-gap-s", *options.largest_gap_s, 0.0);
+  }
+  constexpr double slowest_hz = 1e-3;
+  constexpr double fastest_hz = 1e6;
+  if (options.rate_hz && !(*options.rate_hz >= slowest_hz && *options.rate_hz <= fastest_hz)) {
+    refuse_flag("--rate", *options.rate_hz, "give {} to {} Hz", slowest_hz, fastest_hz);
+  }
   if (options.pressure_unit != "kPa" && options.pressure_unit != "raw") {
     refuse_flag("--pressure-unit", options.pressure_unit, "give kPa or raw");
   }
@@ -163,13 +194,16 @@ void import_tables(const ImportOptions& options) {
 
   std::optional<Truth> truth;
   if (!options.truth.empty()) {
-    truth = truth_of(options.truth, tables);
+    truth = truth_of(options.truth);
   }
-  auto [recording, assumed_units] = read_tables(options, tables, array_of(options.array));
-  recording.object = options.object;
-  recording.truth = truth;
-  write_recording(options.output, recording);
-  print_summary(options, recording, assumed_units);
+  ImportedRecording imported = read_tables(options, tables, array_of(options.array));
+  imported.recording.object = options.object;
+  if (truth) {
+    truth->T_object_robot = truth_pose(options.truth, truth->T_object_robot, imported.pose_units);
+    imported.recording.truth = truth;
+  }
+  write_recording(options.output, imported.recording);
+  print_summary(options, imported);
 }
 
 }  // namespace
@@ -225,17 +259,16 @@ void add_import(CLI::App& app) {
                       "all columns that are neither time nor pose]");
   command->add_option("--pose-columns", options->pose_columns,
                       "Names of the columns of the poses, X,Y,THETA [default: x,y,theta]");
-  command
-      ->add_option("--largest-gap-s", options->largest_gap_s,
-                   "Poses further apart in time than this are not interpolated: a frame between "
-                   "them has no pose, s")
-      ->capture_default_str();
+  command->add_option("--largest-gap-s", options->largest_gap_s,
+                      "Poses further apart in time than this are not interpolated: a frame between "
+                      "them has no pose, s [default: 2.5 times the median step of the poses' "
+                      "times, at least 0.1]");
   command->add_option("--rate", options->rate_hz,
                       "Frames per second of pressures without times; the first frame is at 0 s");
   command->add_option("--object", options->object, "Label of the touched object");
   command->add_option("--truth", options->truth,
                       "True identity and pose T_object_robot of the object, LABEL,X,Y,THETA in the "
-                      "units of --pose-unit");
+                      "units of the poses, else of --pose-unit");
   command->callback([options] { import_tables(*options); });
 }
 

@@ -2,12 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <utility>
 #include <vector>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include "file_identity.hpp"
 #include "npy_file.hpp"
 #include "options.hpp"
 #include "pose_table.hpp"
@@ -68,27 +70,61 @@ void mark_unknown(const std::string& path, Recording& recording) {
   }
 }
 
-std::vector<Pose> poses_by_time(const PoseTable& poses, const std::vector<double>& time_s,
-                                double largest_gap_s) {
-  PoseTrack track(largest_gap_s);
+/// Drops the poses that are unknown.
+void keep_known(PoseTable& poses) {
+  std::size_t kept = 0;
   for (std::size_t i = 0; i < poses.time_s.size(); ++i) {
     if (is_finite(poses.T_robot_sensor[i])) {
-      track.add(poses.time_s[i], poses.T_robot_sensor[i]);
+      poses.time_s[kept] = poses.time_s[i];
+      poses.T_robot_sensor[kept++] = poses.T_robot_sensor[i];
     }
   }
-  track.end();
-  std::vector<Pose> joined;
-  joined.reserve(time_s.size());
-  for (const double time : time_s) {
-    joined.push_back(track.at(time).value_or(unknown_pose));
+  poses.time_s.resize(kept);
+  poses.T_robot_sensor.resize(kept);
+}
+
+/// A gap that a regular log does not reach when its steps jitter or a single pose is lost.
+double usual_gap_s(const std::vector<double>& time_s) {
+  constexpr double steps = 2.5;
+  if (time_s.size() < 2) {
+    return PosedSensor::usual_gap_s;
   }
-  return joined;
+  std::vector<double> step_s(time_s.size());
+  std::adjacent_difference(time_s.begin(), time_s.end(), step_s.begin());
+  step_s.erase(step_s.begin());
+  const auto median = step_s.begin() + static_cast<std::ptrdiff_t>(step_s.size() / 2);
+  std::ranges::nth_element(step_s, median);
+  return std::max(PosedSensor::usual_gap_s, steps * *median);
+}
+
+/// Gives every frame the pose interpolated at its time.
+void join_by_time(const PoseTable& poses, ImportedRecording& imported) {
+  Recording& recording = imported.recording;
+  PoseTrack track(imported.largest_gap_s);
+  for (std::size_t i = 0; i < poses.time_s.size(); ++i) {
+    track.add(poses.time_s[i], poses.T_robot_sensor[i]);
+  }
+  track.end();
+  recording.T_robot_sensor.reserve(recording.time_s.size());
+  for (const double time_s : recording.time_s) {
+    const std::optional<Pose> pose = track.at(time_s);
+    recording.T_robot_sensor.push_back(pose.value_or(unknown_pose));
+    imported.in_gaps +=
+        !pose && time_s > poses.time_s.front() && time_s < poses.time_s.back() ? 1 : 0;
+  }
+}
+
+/// True where --poses is the table of the pressures, under this or another path.
+bool in_one_file(const ImportOptions& options) {
+  return identity_of(std::filesystem::path(options.poses)) ==
+         identity_of(std::filesystem::path(options.pressures));
 }
 
 /// Gives every row its pose, by time or row by row.
-void join(PoseTable poses, const ImportOptions& options, Recording& recording) {
+void join(PoseTable poses, const ImportOptions& options, ImportedRecording& imported) {
+  Recording& recording = imported.recording;
   const std::size_t n = recording.pressure.size() / recording.elements_mm.size();
-  const bool same_rows = poses.time_s.empty() || options.poses == options.pressures;
+  const bool same_rows = poses.time_s.empty();
   if (!same_rows && recording.time_s.empty()) {
     refuse(options.poses,
            "has times, {} has none; give both a column 'time' or neither, or give the frames' "
@@ -96,7 +132,12 @@ void join(PoseTable poses, const ImportOptions& options, Recording& recording) {
            options.pressures);
   }
   if (!same_rows) {
-    recording.T_robot_sensor = poses_by_time(poses, recording.time_s, options.largest_gap_s);
+    keep_known(poses);
+    if (poses.time_s.empty()) {
+      refuse(options.poses, "holds no pose; write x, y and theta where they are known");
+    }
+    imported.largest_gap_s = options.largest_gap_s.value_or(usual_gap_s(poses.time_s));
+    join_by_time(poses, imported);
     if (std::ranges::none_of(recording.T_robot_sensor, is_finite)) {
       refuse(options.poses,
              "no row of {} finds a pose: its times are {} to {} s, the poses' are {} to {} s; "
@@ -105,6 +146,12 @@ void join(PoseTable poses, const ImportOptions& options, Recording& recording) {
              poses.time_s.front(), poses.time_s.back());
     }
     return;
+  }
+  if (poses.T_robot_sensor.size() != n && in_one_file(options)) {
+    refuse(options.poses,
+           "has {} rows of readings for {} frames or touches; give the poses in a table of their "
+           "own, with a row for each",
+           poses.T_robot_sensor.size(), n);
   }
   if (poses.T_robot_sensor.size() != n) {
     refuse(options.poses,
@@ -116,11 +163,13 @@ void join(PoseTable poses, const ImportOptions& options, Recording& recording) {
 }
 
 /// Requires a pose of every touch.
-void require_touch_poses(const ImportOptions& options, const Recording& recording) {
+void require_touch_poses(const ImportOptions& options, const ImportedRecording& imported) {
+  const Recording& recording = imported.recording;
   if (options.poses.empty()) {
     refuse(options.pressures,
-           "its rows are touches, and each needs a pose; give --poses, or for a stream of frames a "
-           "column 'time' or --rate");
+           "its rows are touches, and each needs a pose; give --poses{}, or for a stream of frames "
+           "a column 'time' or --rate",
+           imported.holds_poses ? " " + options.pressures : "");
   }
   for (std::size_t i = 0; i < recording.size(); ++i) {
     if (!is_finite(recording.T_robot_sensor[i])) {
@@ -133,10 +182,14 @@ void require_touch_poses(const ImportOptions& options, const Recording& recordin
   }
 }
 
+/// True where a table of this name is given and has the column.
+bool has_column(const std::string& path, const std::string& name) {
+  return !path.empty() && !is_npy(path) && CsvTable(path).find(name);
+}
+
 void choose_rows(const ImportOptions& options, Recording& recording) {
   const std::size_t n = recording.pressure.size() / recording.elements_mm.size();
   if (options.rate_hz) {
-    require_above("--rate", *options.rate_hz, 0.0);
     if (!recording.time_s.empty()) {
       refuse_flag("--rate", *options.rate_hz, "{} has times; leave the flag out",
                   options.pressures);
@@ -162,11 +215,19 @@ void choose_rows(const ImportOptions& options, Recording& recording) {
 
 ImportedRecording read_tables(const ImportOptions& options, const TableOptions& columns,
                               Array array) {
+  if (!options.time_column.empty() && !has_column(options.pressures, options.time_column) &&
+      !has_column(options.poses, options.time_column)) {
+    refuse_flag("--time-column", options.time_column, "no table has this column; give its name");
+  }
   PressureTable pressures =
       is_npy(options.pressures)
           ? read_npy_pressures(options.pressures, array)
           : read_pressures(options.pressures, array.elements_mm.size(), columns);
   ImportedRecording imported;
+  imported.pose_units[0] = columns.length_unit.value_or(length_units.front());
+  imported.pose_units[1] = imported.pose_units[0];
+  imported.pose_units[2] = columns.angle_unit.value_or(angle_units.front());
+  imported.holds_poses = pressures.holds_poses;
   Recording& recording = imported.recording;
   recording.pressure_unit = options.pressure_unit;
   recording.elements_mm = std::move(array.elements_mm);
@@ -178,23 +239,21 @@ ImportedRecording read_tables(const ImportOptions& options, const TableOptions& 
   recording.lost_before = std::move(pressures.lost_before);
   std::optional<PoseTable> poses;
   if (!options.poses.empty()) {
-    poses = read_poses(options.poses, columns);
-  }
-  if (!options.time_column.empty() && recording.time_s.empty() &&
-      (!poses || poses->time_s.empty())) {
-    refuse_flag("--time-column", options.time_column, "no table has this column; give its name");
+    // The rows of one file belong together, even where their times are equal.
+    poses = read_poses(options.poses, columns, !in_one_file(options));
   }
   choose_rows(options, recording);
   mark_unknown(options.pressures, recording);
   if (poses) {
     imported.assumed_units = poses->assumed_units;
-    join(std::move(*poses), options, recording);
+    imported.pose_units = poses->units;
+    join(std::move(*poses), options, imported);
   } else {
     recording.T_robot_sensor.assign(recording.pressure.size() / recording.elements_mm.size(),
                                     unknown_pose);
   }
   if (recording.rows == "touches") {
-    require_touch_poses(options, recording);
+    require_touch_poses(options, imported);
   }
   return imported;
 }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <optional>
 #include <string>
@@ -23,7 +24,7 @@ struct ImportOptions {
   std::string time_column;
   std::string pressure_columns;
   std::string pose_columns;
-  double largest_gap_s = PosedSensor::usual_gap_s;
+  std::optional<double> largest_gap_s;  ///< none: by the times of the poses
   std::optional<double> rate_hz;
   std::string rows;
   std::string object;
@@ -39,7 +40,11 @@ struct Array : ArrayTable {
 /// The recording that the tables make.
 struct ImportedRecording {
   Recording recording;
-  bool assumed_units = false;  ///< nothing said that the poses are in mm and rad
+  bool assumed_units = false;      ///< nothing said that the poses are in mm and rad
+  std::array<Unit, 3> pose_units;  ///< of x, y and theta in the tables
+  bool holds_poses = false;        ///< the table of pressures has columns of poses
+  double largest_gap_s = 0.0;      ///< poses further apart in time were not interpolated
+  std::size_t in_gaps = 0;         ///< frames between two poses that are further apart
 };
 
 /// Reads the pressures and the poses and joins them.

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cctype>
 #include <cerrno>
+#include <charconv>
 #include <cstring>
 #include <set>
 
@@ -25,11 +26,6 @@ constexpr std::string_view byte_order_mark = "\xEF\xBB\xBF";
 std::string_view trimmed(std::string_view text) {
   text.remove_prefix(std::min(text.find_first_not_of(blanks), text.size()));
   return text.substr(0, text.find_last_not_of(blanks) + 1);
-}
-
-bool alike(std::string_view a, std::string_view b) {
-  return std::ranges::equal(
-      a, b, [](unsigned char x, unsigned char y) { return std::tolower(x) == std::tolower(y); });
 }
 
 bool is_unknown(std::string_view cell) { return cell.empty() || alike(cell, "nan"); }
@@ -84,7 +80,23 @@ std::optional<double> number_in(std::string_view cell, char separator) {
   return number_of(with_point);
 }
 
+/// True for the text of a number, finite or not: 1, -2.5, inf, nan, 1e999.
+bool is_numeric(std::string_view cell, char separator) {
+  std::string text(cell.substr(cell.starts_with('+') ? 1 : 0));
+  if (separator != ',') {
+    std::ranges::replace(text, ',', '.');
+  }
+  double number = 0.0;
+  const char* const end = text.data() + text.size();
+  return !text.empty() && std::from_chars(text.data(), end, number).ptr == end;
+}
+
 }  // namespace
+
+bool alike(std::string_view a, std::string_view b) {
+  return std::ranges::equal(
+      a, b, [](unsigned char x, unsigned char y) { return std::tolower(x) == std::tolower(y); });
+}
 
 CsvTable::CsvTable(std::filesystem::path path) : path_(std::move(path)) {
   require_readable(path_);
@@ -100,22 +112,24 @@ CsvTable::CsvTable(std::filesystem::path path) : path_(std::move(path)) {
 }
 
 bool CsvTable::is_header() const {
-  const auto is_number = [this](std::string_view cell) {
-    return is_unknown(cell) || number_in(cell, separator_);
-  };
-  if (!std::ranges::all_of(cells_, is_number)) {
-    return true;
-  }
-  // pandas names the columns of an array so, after an empty cell for the index. A short row that
-  // counts may be a pose.
-  constexpr std::size_t enough = 5;
-  const std::size_t first = cells_.front().empty() ? 1 : 0;
-  for (std::size_t i = first; i < cells_.size(); ++i) {
-    if (cells_[i] != fmt::format_int(i - first).c_str()) {
-      return false;
+  bool counts = true;
+  std::size_t numbers = 0;
+  std::size_t names = 0;
+  for (const std::string_view cell : cells_) {
+    if (is_numeric(cell, separator_)) {
+      counts = counts && cell == fmt::format_int(numbers).c_str();
+      ++numbers;
+    } else {
+      names += cell.empty() ? 0 : 1;
     }
   }
-  return cells_.size() >= first + enough;
+  if (numbers == 0) {
+    return names > 0;
+  }
+  // pandas names the columns of an array by counting, beside the names of other columns. A short
+  // row that counts may be a pose.
+  constexpr std::size_t enough = 5;
+  return counts && numbers >= enough;
 }
 
 void CsvTable::name_columns() {
@@ -133,8 +147,11 @@ void CsvTable::name_columns() {
 }
 
 std::optional<std::size_t> CsvTable::find(std::string_view name) const {
-  const auto found = std::ranges::find_if(
-      columns_, [name](const std::string& column) { return alike(column, name); });
+  auto found = std::ranges::find(columns_, name);
+  if (found == columns_.end()) {
+    found = std::ranges::find_if(columns_,
+                                 [name](const std::string& column) { return alike(column, name); });
+  }
   return found == columns_.end() ? std::nullopt
                                  : std::optional<std::size_t>(found - columns_.begin());
 }
@@ -142,8 +159,10 @@ std::optional<std::size_t> CsvTable::find(std::string_view name) const {
 bool CsvTable::next() {
   if (row_is_ready_) {
     row_is_ready_ = false;
+    row_is_first_ = true;
     return true;
   }
+  row_is_first_ = false;
   if (!next_line()) {
     return false;
   }
@@ -166,8 +185,9 @@ std::optional<double> CsvTable::number(std::size_t column) const {
   const std::optional<double> number = number_in(cell, separator_);
   if (!number) {
     constexpr std::size_t enough = 40;
-    refuse("column '{}': '{}' is not a finite number; correct it, or leave the cell empty",
-           printable(columns_[column]), printable(cell.substr(0, enough)));
+    refuse("column '{}': '{}' is not a finite number; correct it, or leave the cell empty{}",
+           printable(columns_[column]), printable(cell.substr(0, enough)),
+           row_is_first_ ? "; in a header, no cell is a number" : "");
   }
   return number;
 }

@@ -14,14 +14,17 @@
 
 namespace palpate {
 
+/// True for equal texts, upper and lower case alike.
+bool alike(std::string_view a, std::string_view b);
+
 /// Reads a table of numbers from a text file, row by row, in constant memory.
 ///
 /// The first row decides: cells are separated by tabs, else by semicolons, else by commas, else by
-/// blanks. The first row is the header where one of its cells is no number, or where it counts 0,
-/// 1, 2, ... (five columns at least). '#' at the start of a line or after a blank begins a comment.
-/// Empty lines, a byte order mark, CRLF, quotes around a cell and a separator after the last cell
-/// of a row are accepted; so are decimal commas where commas do not separate. Every error is one
-/// line that names the file, the line and the column.
+/// blanks. The first row is the header where it holds names and no number, or where its numbers
+/// count 0, 1, 2, ... (five at least); "inf" and "nan" are numbers. '#' at the start of a line or
+/// after a blank begins a comment. Empty lines, a byte order mark, CRLF, quotes around a cell and a
+/// separator after the last cell of a row are accepted; so are decimal commas where commas do not
+/// separate. Every error is one line that names the file, the line and the column.
 class CsvTable {
  public:
   /// @throws Error where the file cannot be read, is not text or holds no row
@@ -31,7 +34,8 @@ class CsvTable {
   bool has_header() const { return has_header_; }
   /// Names of the columns; "1", "2", ... where the table has no header.
   const std::vector<std::string>& columns() const { return columns_; }
-  /// Returns the column of this name, upper and lower case alike; none where there is none.
+  /// Returns the column of this name, else of this name in upper and lower case alike; none where
+  /// there is none.
   std::optional<std::size_t> find(std::string_view name) const;
 
   /// Goes on to the next row; false after the last.
@@ -72,6 +76,7 @@ class CsvTable {
   char separator_ = ',';
   bool has_header_ = false;
   bool row_is_ready_ = false;  ///< the first row, which was no header
+  bool row_is_first_ = false;  ///< the row is the table's first, which was no header
   std::vector<std::string> columns_;
   std::vector<std::string_view> cells_;
 };

@@ -16,6 +16,7 @@ struct FileIdentity {
   friend bool operator<(const FileIdentity& a, const FileIdentity& b) {
     return std::tie(a.device, a.inode) < std::tie(b.device, b.inode);
   }
+  friend bool operator==(const FileIdentity&, const FileIdentity&) = default;
 };
 
 inline FileIdentity identity_of(const struct stat& status) {

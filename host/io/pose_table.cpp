@@ -80,16 +80,18 @@ Pose pose_in(const CsvTable& table, const std::array<UnitColumn, 3>& columns) {
 
 }  // namespace
 
-PoseTable read_poses(const std::filesystem::path& path, const TableOptions& options) {
+PoseTable read_poses(const std::filesystem::path& path, const TableOptions& options,
+                     bool with_times) {
   CsvTable table(path);
   const PoseColumns columns = find_columns(table, options);
   PoseTable poses;
-  for (const UnitColumn& column : columns.pose) {
-    poses.assumed_units = poses.assumed_units || column.assumed;
+  for (std::size_t i = 0; i < columns.pose.size(); ++i) {
+    poses.units[i] = columns.pose[i].unit;
+    poses.assumed_units = poses.assumed_units || columns.pose[i].assumed;
   }
   double last_s = -std::numeric_limits<double>::infinity();
   while (table.next()) {
-    if (columns.time) {
+    if (columns.time && with_times) {
       last_s = time_in(table, *columns.time, last_s, true);
       poses.time_s.push_back(last_s);
     }

@@ -66,21 +66,37 @@ void require_counting_names(const CsvTable& table, const std::vector<std::size_t
   }
 }
 
-std::vector<std::size_t> columns_named(const CsvTable& table, const std::string& names) {
+/// The columns that --pressure-columns names.
+/// @param taken columns of times, poses and what else is no pressure
+std::vector<std::size_t> columns_named(const CsvTable& table, const std::string& names,
+                                       const std::vector<std::size_t>& taken) {
   std::vector<std::size_t> columns;
   for (std::size_t colon = names.find(':'); colon != names.npos;
        colon = names.find(':', colon + 1)) {
     const auto first = table.find(std::string_view(names).substr(0, colon));
     const auto last = table.find(std::string_view(names).substr(colon + 1));
-    if (first && last) {
-      for (std::size_t i = *first; i <= *last; ++i) {
-        columns.push_back(i);
-      }
-      return columns;
+    if (!first || !last) {
+      continue;
     }
+    if (*last < *first) {
+      table.refuse("column '{}' comes before '{}'; give --pressure-columns FIRST:LAST",
+                   printable(table.columns()[*last]), printable(table.columns()[*first]));
+    }
+    for (std::size_t i = *first; i <= *last; ++i) {
+      if (std::ranges::find(taken, i) != taken.end()) {
+        table.refuse(
+            "column '{}', between '{}' and '{}', holds no pressures; correct "
+            "--pressure-columns FIRST:LAST",
+            printable(table.columns()[i]), printable(table.columns()[*first]),
+            printable(table.columns()[*last]));
+      }
+      columns.push_back(i);
+    }
+    return columns;
   }
   for (std::size_t i = 0; i < table.columns().size(); ++i) {
-    if (table.columns()[i].starts_with(names)) {
+    const std::string_view name = table.columns()[i];
+    if (alike(name.substr(0, names.size()), names) && std::ranges::find(taken, i) == taken.end()) {
       columns.push_back(i);
     }
   }
@@ -104,8 +120,11 @@ class WideTable {
     }
     device_time_ = table.find("device_time");
     lost_before_ = table.find("lost_before");
-    columns_ = options.pressure_columns.empty() ? columns_left(options)
-                                                : columns_named(table, options.pressure_columns);
+    pose_ = find_pose(table, options);
+    const std::vector<std::size_t> taken = columns_taken();
+    columns_ = options.pressure_columns.empty()
+                   ? columns_left(taken)
+                   : columns_named(table, options.pressure_columns, taken);
     if (columns_.size() != elements) {
       table.refuse(
           "{} columns of pressure{} for an array of {} elements; correct --array, or name "
@@ -117,6 +136,7 @@ class WideTable {
 
   PressureTable read() {
     PressureTable all;
+    all.holds_poses = pose_.has_value();
     reserve(table_, table_.count_lines(), columns_.size(), all);
     double last_s = before_all;
     while (table_.next()) {
@@ -139,7 +159,7 @@ class WideTable {
   }
 
  private:
-  std::vector<std::size_t> columns_left(const TableOptions& options) const {
+  std::vector<std::size_t> columns_taken() const {
     std::vector<std::size_t> taken;
     for (const auto& column : {device_time_, lost_before_}) {
       if (column) {
@@ -149,11 +169,15 @@ class WideTable {
     if (time_) {
       taken.push_back(time_->index);
     }
-    if (const auto pose = find_pose(table_, options)) {
-      for (const UnitColumn& column : *pose) {
+    if (pose_) {
+      for (const UnitColumn& column : *pose_) {
         taken.push_back(column.index);
       }
     }
+    return taken;
+  }
+
+  std::vector<std::size_t> columns_left(const std::vector<std::size_t>& taken) const {
     std::vector<std::size_t> left;
     for (std::size_t i = 0; i < table_.columns().size(); ++i) {
       // A column without a name is the index that pandas writes.
@@ -175,6 +199,7 @@ class WideTable {
   std::optional<UnitColumn> time_;
   std::optional<std::size_t> device_time_;
   std::optional<std::size_t> lost_before_;
+  std::optional<std::array<UnitColumn, 3>> pose_;
   std::vector<std::size_t> columns_;  ///< [e]
 };
 

@@ -14,15 +14,16 @@ struct PressureTable {
   std::vector<double> time_s;              ///< [n], or empty
   std::vector<double> device_time_s;       ///< [n], or empty
   std::vector<std::uint64_t> lost_before;  ///< [n], or empty
+  bool holds_poses = false;  ///< a wide table has columns of poses beside the readings
 };
 
 /// Reads pressures from a CSV file.
 ///
 /// Wide: a row for each frame and a column for each element, in the order of the elements. The
-/// columns are those that `options` names or, in a table with a header, all columns that have a
-/// name and hold neither times, nor poses, nor `device_time`, nor `lost_before`. A table without a
-/// header holds the pressures, and before them the times where it has one column more than
-/// elements.
+/// columns are those that `options` names, by their first and last or by a prefix, or, in a table
+/// with a header, all columns that have a name and hold neither times, nor poses, nor
+/// `device_time`, nor `lost_before`. A table without a header holds the pressures, and before them
+/// the times where it has one column more than elements.
 ///
 /// Long: a row for each reading, in a table with the columns `element` (or taxel, counted from 0)
 /// and `pressure` (or value), and `time` or `frame`, which is the same in all readings of a frame.

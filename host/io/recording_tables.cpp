@@ -1,6 +1,5 @@
 #include "recording_tables.hpp"
 
-#include <algorithm>
 #include <cmath>
 #include <iterator>
 #include <memory>
@@ -9,7 +8,6 @@
 
 #include "atomic_file.hpp"
 #include "input_file.hpp"
-#include "recording_rules.hpp"
 
 namespace palpate {
 
@@ -137,8 +135,6 @@ std::unique_ptr<Table> array_of(const Recording& r, const std::filesystem::path&
   return table;
 }
 
-bool has_poses(const Recording& r) { return std::ranges::any_of(r.T_robot_sensor, is_finite); }
-
 }  // namespace
 
 void write_tables(const std::filesystem::path& folder, const Recording& recording) {
@@ -150,9 +146,7 @@ void write_tables(const std::filesystem::path& folder, const Recording& recordin
   std::vector<std::unique_ptr<Table>> tables;
   tables.push_back(pressures_of(recording, folder / pressures_name));
   tables.push_back(array_of(recording, folder / array_name));
-  if (has_poses(recording)) {
-    tables.push_back(poses_of(recording, folder / poses_name));
-  }
+  tables.push_back(poses_of(recording, folder / poses_name));
   for (const auto& table : tables) {
     table->flush();
   }
@@ -161,12 +155,6 @@ void write_tables(const std::filesystem::path& folder, const Recording& recordin
   }
 }
 
-std::vector<std::string> table_names(const Recording& recording) {
-  std::vector<std::string> names{pressures_name, array_name};
-  if (has_poses(recording)) {
-    names.emplace_back(poses_name);
-  }
-  return names;
-}
+std::vector<std::string> table_names() { return {pressures_name, array_name, poses_name}; }
 
 }  // namespace palpate

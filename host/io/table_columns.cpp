@@ -37,7 +37,8 @@ std::optional<Unit> unit_of(std::string name, std::span<const Unit> units) {
 
 std::optional<std::size_t> find_usual(const CsvTable& table, const Quantity& quantity) {
   for (const std::string_view name : quantity.names) {
-    if (const auto found = table.find(name)) {
+    if (const auto found = table.find(name);
+        found && (name != "t" || table.columns()[*found] == name)) {  // T is a temperature
       return found;
     }
     for (const Unit& unit : quantity.units) {

@@ -96,7 +96,7 @@ INSTANTIATE_TEST_SUITE_P(
               "--pressure-columns",
               "--pose-columns",
               "--largest-gap-s",
-              "=0.1",
+              "2.5 times",
               "--rate",
               "--object",
               "--truth"}},

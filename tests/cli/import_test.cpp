@@ -1,53 +1,14 @@
 #include <sys/resource.h>
 
-#include <algorithm>
 #include <cmath>
 #include <fstream>
 
-#include "program.hpp"
-#include "sample_files.hpp"
+#include <fmt/format.h>
+
+#include "import_command.hpp"
 
 namespace palpate {
 namespace {
-
-using Arguments = std::vector<std::string>;
-
-// Three frames of two elements, 2 mm apart.
-const std::string frames = "time,p0,p1\n0,1,2\n0.05,3,4\n0.1,5,6\n";
-const std::string poses = "time,x_mm,y_mm,theta_rad\n0,0,5,-1\n0.1,10,7,1\n";
-
-class ImportCommand : public ProgramTest {
- protected:
-  ImportCommand() {
-    put("log.csv", frames);
-    put("poses.csv", poses);
-  }
-
-  void put(const std::string& name, const std::string& text) const {
-    put_bytes(folder_ / name, text);
-  }
-
-  static Arguments command(const Arguments& more) {
-    Arguments arguments{"import", "log.csv"};
-    for (const auto& [flag, value] : {std::pair{"--array", "2:1:2"}, {"-o", "o.h5"}}) {
-      if (std::ranges::find(more, flag) == more.end()) {
-        arguments.insert(arguments.end(), {flag, value});
-      }
-    }
-    arguments.insert(arguments.end(), more.begin(), more.end());
-    return arguments;
-  }
-
-  Recording imported(const Arguments& more = {}) const {
-    done(command(more));
-    return read_recording(folder_ / "o.h5");
-  }
-
-  // Refused with exactly this line.
-  void expect_said(const Arguments& more, const std::string& line) const {
-    expect_refused(command(more), {"palpate: " + line + "\n"});
-  }
-};
 
 void expect_pose(const Pose& pose, const Pose& expected) {
   // Interpolation rounds a few times.
@@ -91,6 +52,34 @@ TEST_F(ImportCommand, FramesOutsideThePosesOrInAGapHaveNone) {
   }
 }
 
+// Frames at 100 Hz and poses at 10 Hz, of which one is lost; the steps of the poses round to both
+// sides of 0.1 s.
+TEST_F(ImportCommand, TheLargestGapFollowsThePoses) {
+  std::string log = "time,p0,p1\n";
+  for (int i = 0; i <= 200; ++i) {
+    log += fmt::format("{},1,2\n", 1.7e9 + i * 0.01);
+  }
+  put("log.csv", log);
+  const auto put_poses = [&](int lost) {
+    std::string text = "time,x_mm,y_mm,theta_rad\n";
+    for (int i = 0; i <= 20; ++i) {
+      if (i < 8 || i >= 8 + lost) {
+        text += fmt::format("{},{},0,0\n", 1.7e9 + i * 0.1, i);
+      }
+    }
+    put("poses.csv", text);
+  };
+  put_poses(1);
+  const std::string whole = done(command({"--poses", "poses.csv"}));
+  expect_named(whole, {"201 frames", "201 with a pose; next"});
+  put_poses(2);  // 0.3 s, in which 29 frames lie
+  expect_named(done(command({"--poses", "poses.csv"})),
+               {"172 with a pose, 29 without one as the poses around them are more than 0.25 s "
+                "apart (--largest-gap-s); next"});
+  expect_named(done(command({"--poses", "poses.csv", "--largest-gap-s", "0.31"})),
+               {"201 with a pose; next"});
+}
+
 TEST_F(ImportCommand, FramesNeedNoPoses) {
   expect_named(done(command({})), {"3 frames", "0 with a pose", "--sensor replay:o.h5 --poses"});
   const std::string bytes = bytes_of(folder_ / "o.h5");
@@ -128,6 +117,27 @@ TEST_F(ImportCommand, RowsWithoutTimesAreTouches) {
   ASSERT_TRUE(r.truth);
   EXPECT_EQ(r.truth->object, "A");
   expect_pose(r.truth->T_object_robot, {{1.0, 2.0}, 0.5});
+}
+
+TEST_F(ImportCommand, TruthIsInTheUnitsOfThePoses) {
+  put("poses.csv", "time,x_m,y_mm,theta_deg\n0,0,0,0\n0.1,0,0,0\n");
+  const Recording r = imported({"--poses", "poses.csv", "--truth", "A,0.5,2,90"});
+  ASSERT_TRUE(r.truth);
+  expect_pose(r.truth->T_object_robot, {{500.0, 2.0}, M_PI / 2.0});
+}
+
+// Two frames of one time: their poses cannot be told apart by time.
+TEST_F(ImportCommand, OneFileHoldsPressuresAndPosesRowByRow) {
+  put("log.csv",
+      "t,T,x_mm,y_mm,theta_rad,p0,p1\n0,20,1,0,0,1,2\n0,20,2,0,0,3,4\n"
+      "0.1,20,3,0,0,5,6\n");
+  const Recording r = imported({"--poses", "./log.csv", "--pressure-columns", "P"});
+  EXPECT_EQ(r.pressure, (std::vector<double>{1, 2, 3, 4, 5, 6}));
+  EXPECT_EQ(r.time_s, (std::vector<double>{0.0, 0.0, 0.1}));
+  expect_pose(r.T_robot_sensor[0], {{1.0, 0.0}, 0.0});
+  expect_pose(r.T_robot_sensor[1], {{2.0, 0.0}, 0.0});
+  expect_named(done(command({"--pressure-columns", "P"})),
+               {"0 with a pose, its columns of poses left out (--poses log.csv); next"});
 }
 
 TEST_F(ImportCommand, TheSameReadingsInAnyTable) {
@@ -185,174 +195,6 @@ TEST_F(ImportCommand, AGridCountsRowByRow) {
   EXPECT_EQ(read_recording(folder_ / "o.h5").elements_mm,
             (std::vector<glm::dvec2>{
                 {-2.5, -1.25}, {0, -1.25}, {2.5, -1.25}, {-2.5, 1.25}, {0, 1.25}, {2.5, 1.25}}));
-}
-
-/// A table that makes no recording, and what is said of it.
-struct Case {
-  const char* name;
-  const char* file;
-  std::string text;
-  Arguments flags;
-  std::string said;
-
-  friend void PrintTo(const Case& value, std::ostream* out) { *out << value.name; }
-};
-
-class BadTable : public ImportCommand, public testing::WithParamInterface<Case> {};
-
-TEST_P(BadTable, IsRefusedInOneLine) {
-  put(GetParam().file, GetParam().text);
-  expect_said(GetParam().flags, GetParam().said);
-}
-
-const Arguments with_poses{"--poses", "poses.csv"};
-
-INSTANTIATE_TEST_SUITE_P(
-    All, BadTable,
-    testing::Values(
-        Case{"text",
-             "log.csv",
-             "time,p0,p1\n0,1,2\n1,3,abc\n",
-             {},
-             "log.csv:3: column 'p1': 'abc' is not a finite number; correct it, or leave the cell "
-             "empty"},
-        Case{"no_time",
-             "log.csv",
-             "time,p0,p1\n,1,2\n",
-             {},
-             "log.csv:2: column 'time' is empty; write a number"},
-        Case{"times_descend",
-             "log.csv",
-             "time,p0,p1\n2,1,2\n1,1,2\n",
-             {},
-             "log.csv:3: column 'time': 1 s is earlier than the row before, at 2 s; sort the rows "
-             "by time"},
-        Case{"nanoseconds",
-             "log.csv",
-             "time,p0,p1\n1700000000000000000,1,2\n",
-             {},
-             "log.csv:2: column 'time': 1.7e+18 s is no time; give the unit by --time-unit ms, us "
-             "or ns"},
-        Case{"two_units",
-             "log.csv",
-             "time_ns,p0,p1\n1,1,2\n",
-             {"--time-unit", "s"},
-             "log.csv:1: column 'time_ns' is in ns by its name, in s by --time-unit; make them "
-             "agree"},
-        Case{"more_columns",
-             "log.csv",
-             "time,p0,p1,p2\n0,1,2,3\n",
-             {},
-             "log.csv:1: 3 columns of pressure ('p0' to 'p2') for an array of 2 elements; correct "
-             "--array, or name the columns by --pressure-columns"},
-        Case{"sorted_as_text",
-             "log.csv",
-             "time,p10,p2\n0,1,2\n",
-             {},
-             "log.csv:1: column 'p2' comes after 'p10'; order the columns as the array's elements"},
-        Case{"no_such_columns",
-             "log.csv",
-             frames,
-             {"--pressure-columns", "q"},
-             "log.csv:1: no column is called or begins with 'q'; give --pressure-columns a prefix "
-             "of the columns' names, or FIRST:LAST"},
-        Case{"ragged",
-             "log.csv",
-             "time,p0,p1\n0,1,2\n1,3\n",
-             {},
-             "log.csv:3: the row has 2 cells, the first row 3; write the same columns in every "
-             "row"},
-        Case{"header_alone",
-             "log.csv",
-             "time,p0,p1\n",
-             {},
-             "log.csv: holds a header and no row; write a row for each frame"},
-        Case{"nothing_read",
-             "log.csv",
-             "time,p0,p1\n0,,\n",
-             {},
-             "log.csv: holds no reading of a living element; write the pressures"},
-        Case{"no_such_element",
-             "log.csv",
-             "time,element,pressure\n0,2,1\n",
-             {},
-             "log.csv:2: column 'element': 2 is no element; the array has 2, counted from 0"},
-        Case{"element_twice", "log.csv", "frame,element,pressure\n0,1,1\n0,1,1\n", with_poses,
-             "log.csv:3: element 1 has two readings in one frame; leave one out"},
-        Case{"no_frame",
-             "log.csv",
-             "element,pressure\n0,1\n",
-             {},
-             "log.csv:1: a table with a row for each reading needs a column 'time' or 'frame'; add "
-             "it, or name it by --time-column"},
-        Case{"touches_without_poses",
-             "log.csv",
-             "p0,p1\n1,2\n",
-             {},
-             "log.csv: its rows are touches, and each needs a pose; give --poses, or for a stream "
-             "of frames a column 'time' or --rate"},
-        Case{"frames_without_times",
-             "log.csv",
-             "p0,p1\n1,2\n",
-             {"--rows", "frames"},
-             "log.csv: frames need times; add a column 'time', or give --rate"},
-        Case{"poses_alone_have_times", "log.csv", "p0,p1\n1,2\n", with_poses,
-             "poses.csv: has times, log.csv has none; give both a column 'time' or neither, or "
-             "give the frames' --rate"},
-        Case{"fewer_poses", "poses.csv", "x,y,theta\n1,2,3\n", with_poses,
-             "poses.csv: holds 1 poses without a time for 3 rows of log.csv; write one for each "
-             "row, or give both a column 'time'"},
-        Case{"a_touch_without_a_pose",
-             "poses.csv",
-             "time,x,y,theta\n0,1,2,3\n0.05,1,2,3\n",
-             {"--poses", "poses.csv", "--rows", "touches"},
-             "poses.csv: has no pose for row 2 of log.csv, counted from 0, at 0.1 s, and a touch "
-             "needs one; add it, or give --rows frames"},
-        Case{"equal_times_of_poses", "poses.csv", "time,x,y,theta\n0,1,2,3\n0,1,2,3\n", with_poses,
-             "poses.csv:3: column 'time': 0 s is not later than the row before, at 0 s; sort the "
-             "rows by time"},
-        Case{"half_a_pose", "poses.csv", "time,x,y,theta\n0,1,,3\n", with_poses,
-             "poses.csv:2: a part of the pose is empty; write x, y and theta, or leave all three "
-             "empty"},
-        Case{
-            "a_far_pose", "poses.csv", "time,x_m,y_m,theta\n0,2e6,0,0\n", with_poses,
-            "poses.csv:2: column 'x_m': 2000000 m is further than any robot gets; check the number "
-            "and its unit"},
-        Case{"no_angle", "poses.csv", "time,x,y\n0,1,2\n", with_poses,
-             "poses.csv:1: has no columns 'x', 'y' and 'theta'; rename its columns, or give "
-             "--pose-columns X,Y,THETA"},
-        Case{"an_array_of_one_column",
-             "a.txt",
-             "1\n2\n",
-             {"--array", "a.txt"},
-             "a.txt:1: no column is called 'x'; write a row 'x y' in mm for each element"},
-        Case{"binary",
-             "log.csv",
-             std::string("\0\1\2", 3),
-             {},
-             "log.csv: is no text; save the table as CSV in UTF-8, or one array with numpy.save"}),
-    [](const auto& test) { return test.param.name; });
-
-TEST_F(ImportCommand, FlagsNameTheirForm) {
-  expect_said({"--pose-unit", "cm,rad"},
-              "--pose-unit cm,rad: give mm,rad or mm,deg or m,rad or m,deg");
-  expect_said({"--time-unit", "h"}, "--time-unit h: give s, ms, us or ns");
-  expect_said({"--pressure-unit", "psi"}, "--pressure-unit psi: give kPa or raw");
-  expect_said({"--rows", "rows"}, "--rows rows: give frames or touches");
-  expect_said({"--rate", "5"}, "--rate 5: log.csv has times; leave the flag out");
-  expect_said({"--rate", "0"}, "--rate 0: must be above 0");
-  expect_said({"--largest-gap-s", "0"}, "--largest-gap-s 0: must be above 0");
-  expect_said({"--pose-columns", "x,y"}, "--pose-columns x,y: give three names, X,Y,THETA");
-  expect_said({"--truth", "1,2,3"},
-              "--truth 1,2,3: give LABEL,X,Y,THETA, in the units of --pose-unit");
-  expect_said({"--array", "0:1:2"},
-              "--array 0:1:2: give COLUMNS:ROWS:PITCH, with 1 to 1024 columns and rows and a pitch "
-              "of 0.001 to 1000 mm, or a file");
-  expect_said({"-o", "log.csv"},
-              "-o log.csv: would overwrite log.csv, which PRESSURES reads; choose another name");
-  put("log.csv", "p0,p1\n1,2\n");
-  expect_said({"--time-column", "when"},
-              "--time-column when: no table has this column; give its name");
 }
 
 // 200,000 frames: 7 MB of text and 6 MB of pressures.

@@ -64,8 +64,28 @@ TEST_F(Csv, NumbersAloneHaveNoHeader) {
 TEST_F(Csv, CountedColumnsAreAHeader) {
   EXPECT_EQ(rows_of("0,1,2,3,4\n5,6,7,8,9\n"), (Rows{{5.0, 6.0, 7.0, 8.0, 9.0}}));
   EXPECT_EQ(rows_of(",0,1,2,3,4\n0,5,6,7,8,9\n"), (Rows{{0.0, 5.0, 6.0, 7.0, 8.0, 9.0}}));
+  EXPECT_EQ(rows_of("time,0,1,2,3,4\n0,5,6,7,8,9\n"), (Rows{{0.0, 5.0, 6.0, 7.0, 8.0, 9.0}}));
   EXPECT_EQ(rows_of("0,1,2,3,5\n5,6,7,8,9\n").size(), 2u);
   EXPECT_EQ(rows_of("0,1,2,3\n5,6,7,8\n").size(), 2u) << "it may be a pose";
+}
+
+// A bad cell must not make a header of a row of data.
+TEST_F(Csv, AHeaderHoldsNoNumber) {
+  for (const auto& [row, said] : {std::pair{"inf,1,2,3", "column '1': 'inf'"},
+                                  {"1,2,3,NA", "column '4': 'NA'"},
+                                  {"1e999,a,b,c", "column '1': '1e999'"},
+                                  {"nan,a,b,c", "column '2': 'a'"},
+                                  {"-inf;1,5;2;3", "column '1': '-inf'"},
+                                  {"time,0,1,3", "column '1': 'time'"},
+                                  {"0,1,2,NA", "column '4': 'NA'"}}) {
+    const std::string text = std::string(row) + "\n";
+    expect_named(message(text), {":1: ", said,
+                                 "is not a finite number; correct it, or leave the "
+                                 "cell empty; in a header, no cell is a number"});
+  }
+  for (const char* row : {"a,b,c,d", ",a,b,c", "a,,infra,nano", "a,1st,0x1,e5"}) {
+    EXPECT_TRUE(table(std::string(row) + "\n1,2,3,4\n").has_header()) << row;
+  }
 }
 
 TEST_F(Csv, EmptyCellsAndNanAreNoNumbers) {
@@ -80,6 +100,7 @@ TEST_F(Csv, NamesAreFoundInAnyCase) {
   EXPECT_EQ(named.find("p, 0"), 1u);
   EXPECT_EQ(named.find("p1"), 2u);
   EXPECT_EQ(named.find("p2"), std::nullopt);
+  EXPECT_EQ(table("T,t\n1,2\n").find("t"), 1u) << "the same case comes first";
 }
 
 TEST_F(Csv, ErrorsNameLineAndColumn) {
