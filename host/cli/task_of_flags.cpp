@@ -126,7 +126,7 @@ std::optional<BinWidth> bin_width_of(const RecognitionFlags& flags, const Scene&
 }
 
 /// Where neither counts nor any part of a region is given, all of the lattice follows from the maps
-/// and the array, about the first touch.
+/// and the array, about the first touch in contact.
 WantedLattice automatic_lattice(std::optional<BinWidth> bin_width,
                                 std::span<const Hypothesis> hypotheses, double reach_mm) {
   // As many times the bins that the objects themselves need.
