@@ -298,14 +298,16 @@ Device open_device(const RecognitionFlags& flags, const Scene& scene) {
 
 Recogniser open_recogniser(Device& device, RecognitionTask& task) {
   const bool fine = task.bin_width == BinWidth::fine;
-  if (const std::optional<CoarsenedBins> bins = settle_bins(device, task)) {
+  const std::optional<CoarsenedBins> bins = settle_bins(device, task);
+  Recogniser recogniser(device, task);  // first: bins that do not fit deserve only their refusal
+  if (bins) {
     fmt::print(
         stderr,
         "palpate: --bins {}: steps of {:.2f} mm, wider than the maps resolve, keep to {} bins "
         "in all; narrow the region, or give --bins\n",
         fine ? "fine" : "auto", bins->step_mm, bins->most_bins);
   }
-  return {device, task};
+  return recogniser;
 }
 
 void add_recognition_files(const RecognitionFlags& flags, const Scene& scene,
