@@ -17,7 +17,9 @@ void add_recognition_flags(CLI::App& command, RecognitionFlags& flags) {
       "Pose bins per object along x, y and theta, as 25x25x16; auto: as many as the refined pose "
       "needs, in steps of 0.6 times the maps' cell or 1.2 times the sensor's spread, whichever is "
       "larger; fine: also as the mode needs, in steps of 0.6 times the larger of both. Auto and "
-      "fine take wider steps where the device's memory is short [default: auto, or 25x25x16 where "
+      "fine take wider steps where the device's memory is short; the region about an automatic "
+      "pivot "
+      "fits the largest array of all RECORDINGs [default: auto, or 25x25x16 where "
       "a range or a pivot is given]");
   command.add_option("--x-mm", flags.x_mm,
                      "Range of the pivot's x in the object frame, mm, as --x-mm=-10:10 [default: "
@@ -29,8 +31,9 @@ void add_recognition_flags(CLI::App& command, RecognitionFlags& flags) {
   command.add_option(
       "--pivot-mm", flags.pivot_mm,
       "Point X,Y in the robot frame, mm, about which theta turns; the bins' x and y are the "
-      "point's coordinates in the object frame. auto: the sensor's origin at the first touch of "
-      "each unknown [default: auto, or 0,0 where counts of --bins or a range is given]");
+      "point's coordinates in the object frame. auto: the array's centre at the first touch of "
+      "each unknown with an element in contact [default: auto, or 0,0 where counts of --bins or a "
+      "range is given]");
   command.add_option("--prior", flags.prior,
                      "Probability that an unseen cell is occupied [default: the maps' own]");
   command.add_option("--gamma", flags.gamma,

@@ -161,12 +161,14 @@ void recognize(const Options& options) {
   }
   const std::vector<Unknown> unknowns = list_unknowns(options, recordings);
   const Recording& first = recordings.front();
-  double farthest_element_mm = 0.0;
+  double reach_mm = 0.0;
   for (const Recording& recording : recordings) {
-    farthest_element_mm = std::max(farthest_element_mm, array_reach_mm(recording.elements_mm));
+    for (std::size_t i = 0; i < recording.size(); ++i) {  // the array may change between touches
+      reach_mm = std::max(reach_mm, array_reach_mm(recording.touch(i).elements_mm));
+    }
   }
   RecognitionTask task =
-      task_of(options.recognition, scene, first.pressure_unit, first.path, farthest_element_mm);
+      task_of(options.recognition, scene, first.pressure_unit, first.path, reach_mm);
   if (auto* histogram = std::get_if<HistogramOptions>(&task.filter)) {
     histogram->still_array = array_is_still(unknowns);
   }

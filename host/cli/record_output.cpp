@@ -70,7 +70,7 @@ void print_engine(const Device& device, const Recogniser& recogniser, const Reco
              device.name(), static_cast<double>(recogniser.device_bytes()) / (1 << 20), filter,
              words("x", lattice.x_mm, 1.0, "mm"), words("y", lattice.y_mm, 1.0, "mm"),
              words("theta", lattice.theta_rad, degrees(1.0), "deg"),
-             task.auto_pivot ? "at the sensor of the first touch"
+             task.auto_pivot ? "at the array's centre at the first touch in contact"
                              : fmt::format("{:g}, {:g} mm in the robot frame", lattice.pivot_mm.x,
                                            lattice.pivot_mm.y));
 }

@@ -126,7 +126,7 @@ std::optional<BinWidth> bin_width_of(const RecognitionFlags& flags, const Scene&
 }
 
 /// Where neither counts nor any part of a region is given, all of the lattice follows from the maps
-/// and the array, about the first touch.
+/// and the array, about the first touch in contact.
 WantedLattice automatic_lattice(std::optional<BinWidth> bin_width,
                                 std::span<const Hypothesis> hypotheses, double reach_mm) {
   // As many times the bins that the objects themselves need.
@@ -298,14 +298,16 @@ Device open_device(const RecognitionFlags& flags, const Scene& scene) {
 
 Recogniser open_recogniser(Device& device, RecognitionTask& task) {
   const bool fine = task.bin_width == BinWidth::fine;
-  if (const std::optional<CoarsenedBins> bins = settle_bins(device, task)) {
+  const std::optional<CoarsenedBins> bins = settle_bins(device, task);
+  Recogniser recogniser(device, task);  // first: bins that do not fit deserve only their refusal
+  if (bins) {
     fmt::print(
         stderr,
         "palpate: --bins {}: steps of {:.2f} mm, wider than the maps resolve, keep to {} bins "
         "in all; narrow the region, or give --bins\n",
         fine ? "fine" : "auto", bins->step_mm, bins->most_bins);
   }
-  return {device, task};
+  return recogniser;
 }
 
 void add_recognition_files(const RecognitionFlags& flags, const Scene& scene,

@@ -3,11 +3,11 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
-#include <numbers>
 #include <utility>
 
 #include <fmt/format.h>
 
+#include "angle_unit.hpp"
 #include "elements_that.hpp"
 
 namespace palpate {
@@ -98,11 +98,10 @@ class Suspicions {
           "'sensor_pose' holds mm: are these metres?",
           s_.poses->x_mm.span(), s_.poses->y_mm.span());
     }
-    // Interpolation of poses in [-2 pi, 2 pi] the short way round adds up to half a turn.
-    const double largest_rad = s_.poses->theta_rad.largest_magnitude();
-    if (largest_rad > 3.0 * std::numbers::pi) {
+    const Extremes& theta_rad = s_.poses->theta_rad;
+    if (seem_degrees(theta_rad.least, theta_rad.most)) {
       say("The angle of a pose is {:.4g}; 'sensor_pose' holds radians: are these degrees?",
-          largest_rad);
+          theta_rad.largest_magnitude());
     }
   }
 

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include <glm/common.hpp>
+
 namespace palpate {
 
 std::vector<glm::dvec2> digitacts_array() {
@@ -34,10 +36,24 @@ bool same_placement(const Touch& a, const Touch& b) {
          std::ranges::equal(a.elements_mm, b.elements_mm);
 }
 
+glm::dvec2 array_centre_mm(std::span<const glm::dvec2> elements_mm) {
+  if (elements_mm.empty()) {
+    return {0.0, 0.0};
+  }
+  glm::dvec2 lower = elements_mm.front();
+  glm::dvec2 upper = lower;
+  for (const glm::dvec2& element : elements_mm) {
+    lower = glm::min(lower, element);
+    upper = glm::max(upper, element);
+  }
+  return (lower + upper) / 2.0;
+}
+
 double array_reach_mm(std::span<const glm::dvec2> elements_mm) {
+  const glm::dvec2 centre_mm = array_centre_mm(elements_mm);
   double reach = 0.0;
   for (const glm::dvec2& element : elements_mm) {
-    reach = std::max(reach, std::hypot(element.x, element.y));
+    reach = std::max(reach, std::hypot(element.x - centre_mm.x, element.y - centre_mm.y));
   }
   return reach;
 }

@@ -1,5 +1,6 @@
 #include "recogniser.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 #include <fmt/format.h>
@@ -21,11 +22,15 @@ std::variant<PoseHistogram, ParticleFilter> make_filter(Device& device,
 }  // namespace
 
 Recogniser::Recogniser(Device& device, const RecognitionTask& task)
-    : lattice_(task.lattice()), auto_pivot_(task.auto_pivot), filter_(make_filter(device, task)) {}
+    : lattice_(task.lattice()),
+      classifier_(task.classifier()),
+      auto_pivot_(task.auto_pivot),
+      filter_(make_filter(device, task)) {}
 
 void Recogniser::reset() {
   std::visit([](auto& filter) { filter.reset(); }, filter_);
-  touched_ = false;
+  waiting_.clear();
+  pivot_placed_ = false;
   if (auto_pivot_) {
     move_pivot({0.0, 0.0});
   }
@@ -36,34 +41,69 @@ void Recogniser::move_pivot(const glm::dvec2& pivot_mm) {
   lattice_.pivot_mm = pivot_mm;
 }
 
+bool Recogniser::meets_object(const Touch& touch) const {
+  const std::vector<Reading> readings = classifier_.classify(touch);
+  return std::any_of(readings.begin(), readings.end(), is_contact);
+}
+
 void Recogniser::place_pivot(const Touch& touch) {
-  if (!auto_pivot_ || touched_) {
-    return;
-  }
-  const glm::dvec2& origin_mm = touch.T_robot_sensor.translation_mm;
-  if (!(std::abs(origin_mm.x) <= farthest_mm && std::abs(origin_mm.y) <= farthest_mm)) {
+  const glm::dvec2 centre_mm = touch.T_robot_sensor * array_centre_mm(touch.elements_mm);
+  if (!(std::abs(centre_mm.x) <= farthest_mm && std::abs(centre_mm.y) <= farthest_mm)) {
     throw Error(Fault::input,
-                fmt::format("the first touch's sensor is at [{}, {}] mm; keep touches within {:g} "
-                            "mm of the robot frame's origin, or check the poses' unit",
-                            origin_mm.x, origin_mm.y, farthest_mm));
+                fmt::format("the first touch in contact has its array at [{}, {}] mm; keep touches "
+                            "within {:g} mm of the robot frame's origin, or check the poses' unit",
+                            centre_mm.x, centre_mm.y, farthest_mm));
   }
-  move_pivot(origin_mm);
+  move_pivot(centre_mm);
 }
 
 void Recogniser::update(std::span<const Touch> touches,
                         const std::function<void(double)>& progress) {
-  if (!touches.empty()) {
-    place_pivot(touches.front());
+  if (!lacks_pivot()) {
+    std::visit([&](auto& filter) { filter.update(touches, progress); }, filter_);
+    return;
   }
-  std::visit([&](auto& filter) { filter.update(touches, progress); }, filter_);
-  touched_ = touched_ || !touches.empty();
+  std::optional<std::size_t> first;  // that meets an object
+  for (std::size_t i = 0; i < touches.size(); ++i) {
+    // Looks at all touches, so that a bad touch is refused before the pivot moves.
+    if (meets_object(touches[i]) && !first) {
+      first = i;
+    }
+  }
+  if (!first) {
+    for (const Touch& touch : touches) {
+      waiting_.push_back({touch.T_robot_sensor,
+                          {touch.elements_mm.begin(), touch.elements_mm.end()},
+                          {touch.pressure.begin(), touch.pressure.end()},
+                          {touch.valid.begin(), touch.valid.end()}});
+    }
+    return;
+  }
+  place_pivot(touches[*first]);
+  std::vector<Touch> all;
+  all.reserve(waiting_.size() + touches.size());
+  for (const WaitingTouch& touch : waiting_) {
+    all.push_back({touch.T_robot_sensor, touch.elements_mm, touch.pressure, touch.valid});
+  }
+  all.insert(all.end(), touches.begin(), touches.end());
+  std::visit([&](auto& filter) { filter.update(all, progress); }, filter_);
+  waiting_.clear();
+  pivot_placed_ = true;
 }
 
 void Recogniser::prepare(const Touch& touch) {
-  if (auto* histogram = std::get_if<PoseHistogram>(&filter_)) {
-    place_pivot(touch);
-    histogram->prepare(touch);
+  auto* histogram = std::get_if<PoseHistogram>(&filter_);
+  if (histogram == nullptr) {
+    return;
   }
+  if (lacks_pivot()) {
+    // A touch that comes after waiting touches is taken in together with them, not by itself.
+    if (!waiting_.empty() || !meets_object(touch)) {
+      return;
+    }
+    place_pivot(touch);
+  }
+  histogram->prepare(touch);
 }
 
 Estimate Recogniser::estimate() const {

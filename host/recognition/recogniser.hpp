@@ -18,14 +18,16 @@ class Recogniser {
   Recogniser(Device& device, const RecognitionTask& task);
 
   /// Forgets all touches, for the next unknown. Particles start from the same places again. An
-  /// automatic pivot returns to the robot frame's origin until the next touch.
+  /// automatic pivot returns to the robot frame's origin until a touch places it.
   void reset();
-  /// Updates the belief with these touches. The first touch since reset() places an automatic
-  /// pivot, whether the touch meets an object or not. `progress` is called now and then with the
-  /// fraction done.
+  /// Updates the belief with these touches. The first touch since reset() that has an element In
+  /// Contact (Eq. 3) places an automatic pivot. Copies of the touches before it wait, and join the
+  /// belief together with that touch; until then the belief is the one before any touch.
+  /// `progress` is called now and then with the fraction done.
   void update(std::span<const Touch> touches, const std::function<void(double)>& progress = {});
-  /// Evaluates a touch that is likely to come next; see PoseHistogram::prepare(). Particles cannot
-  /// be weighed ahead, since weighing follows resampling and noise: for them it does nothing.
+  /// Evaluates a touch that is likely to come next; see PoseHistogram::prepare(). Does nothing
+  /// with a touch that would wait for an automatic pivot, and nothing for particles: they cannot be
+  /// weighed ahead, since weighing follows resampling and noise.
   void prepare(const Touch& touch);
   Estimate estimate() const;
   /// The mode's pose between the bins; empty for particles.
@@ -44,13 +46,27 @@ class Recogniser {
   const PoseHistogram* histogram() const { return std::get_if<PoseHistogram>(&filter_); }
 
  private:
-  /// Moves an automatic pivot to the sensor's origin, unless an earlier touch has placed it.
+  /// A copy of a touch that waits for the pivot.
+  struct WaitingTouch {
+    Pose T_robot_sensor;
+    std::vector<glm::dvec2> elements_mm;
+    std::vector<double> pressure;
+    std::vector<std::uint8_t> valid;
+  };
+
+  /// Whether an automatic pivot has yet to be placed.
+  bool lacks_pivot() const { return auto_pivot_ && !pivot_placed_; }
+  /// Whether the touch has an element In Contact.
+  bool meets_object(const Touch& touch) const;
+  /// Moves the pivot to the array's centre.
   void place_pivot(const Touch& touch);
   void move_pivot(const glm::dvec2& pivot_mm);
 
   PoseLattice lattice_;
+  ContactClassifier classifier_;
   bool auto_pivot_;
-  bool touched_ = false;  ///< since reset()
+  bool pivot_placed_ = false;          ///< by a touch since reset(); only where it is automatic
+  std::vector<WaitingTouch> waiting_;  ///< in order; empty once the pivot is placed
   std::variant<PoseHistogram, ParticleFilter> filter_;
 };
 

@@ -35,9 +35,14 @@ std::optional<CoarsenedBins> settle_bins(const Device& device, RecognitionTask& 
     return {};
   }
   auto* histogram = std::get_if<HistogramOptions>(&task.filter);
-  const std::int64_t most = histogram == nullptr ? most_bins_on(device, false)
-                                                 : most_bins_on(device, histogram->still_array,
-                                                                histogram->memory_limit_bytes);
+  std::int64_t most = most_bins_on(device, false);
+  if (histogram != nullptr) {
+    most = most_bins_on(device, histogram->still_array, histogram->memory_limit_bytes);
+    if (histogram->memory_limit_bytes) {
+      // One bin an object may still exceed the limit: the histogram says how much memory it needs.
+      most = std::max(most, static_cast<std::int64_t>(task.hypotheses.size()));
+    }
+  }
   const BalancedLattice chosen = balanced_lattice(task.lattice(), task.hypotheses, most, *width);
   (histogram != nullptr ? histogram->lattice : std::get<ParticleOptions>(task.filter).region) =
       chosen.lattice;

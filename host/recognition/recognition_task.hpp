@@ -36,7 +36,7 @@ struct RecognitionTask {
   std::vector<std::string> map_paths = {};  ///< [hypothesis] file of the map; empty without files
   /// By which settle_bins() chooses the lattice's counts; none where the counts are given.
   std::optional<BinWidth> bin_width = {};
-  /// The pivot is the sensor's origin at the first touch of each unknown.
+  /// The pivot is the array's centre at the first touch of each unknown with an element In Contact.
   bool auto_pivot = false;
 };
 

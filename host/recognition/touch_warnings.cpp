@@ -9,6 +9,9 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
+#include "angle_unit.hpp"
+#include "element_spacing.hpp"
+
 namespace palpate {
 
 namespace {
@@ -62,23 +65,31 @@ bool differ(const std::vector<Reading>& a, const std::vector<Reading>& b) {
   return 10 * different > known;
 }
 
-/// Distance by which the poses of a region keep a touch from a map, or 0 or less where some pose
-/// brings the touch to the map. Angles count as free, so that the distance is never too large.
-double gap_mm(const Touch& touch, const Box& cells, const PoseLattice& region,
-              const glm::dvec2& pivot_mm) {
-  if (touch.elements_mm.empty()) {
-    return 0.0;
-  }
-  const Box elements = elements_of(touch);
-  const glm::dvec2 middle_mm =
-      touch.T_robot_sensor * ((elements.lower + elements.upper) / 2.0) - pivot_mm;
-  // p_o = R(theta) middle + (x, y) is in the box of cells where R(theta) middle is in this box.
+/// Place of the array's middle in the robot frame.
+glm::dvec2 middle_of(const Touch& touch) {
+  return touch.T_robot_sensor * array_centre_mm(touch.elements_mm);
+}
+
+/// Whether the touch has an element In Contact.
+bool in_contact(const Touch& touch, const ContactClassifier& classifier) {
+  const std::vector<Reading> readings = classifier.classify(touch);
+  return std::any_of(readings.begin(), readings.end(), is_contact);
+}
+
+/// Distance by which the poses of a region keep an array from a map, or 0 or less where some pose
+/// brings the array to the map. Angles count as free, so that the distance is never too large.
+/// @param from_pivot_mm the array's middle minus the pivot
+/// @param array_mm diagonal of the array
+double gap_mm(const glm::dvec2& from_pivot_mm, double array_mm, const Box& cells,
+              const PoseLattice& region) {
+  // p_o = R(theta) from_pivot + (x, y) is in the box of cells where R(theta) from_pivot is in this
+  // box.
   const glm::dvec2 lower = cells.lower - glm::dvec2(region.x_mm.upper, region.y_mm.upper);
   const glm::dvec2 upper = cells.upper - glm::dvec2(region.x_mm.lower, region.y_mm.lower);
   const double nearest = glm::length(glm::max(glm::max(lower, -upper), glm::dvec2(0.0)));
   const double farthest = glm::length(glm::max(glm::abs(lower), glm::abs(upper)));
-  const double distance = glm::length(middle_mm);
-  return std::max(nearest - distance, distance - farthest) - elements.diagonal() / 2.0;
+  const double distance = glm::length(from_pivot_mm);
+  return std::max(nearest - distance, distance - farthest) - array_mm / 2.0;
 }
 
 }  // namespace
@@ -122,21 +133,21 @@ std::optional<std::string> positions_in_metres(std::span<const Touch> touches,
 }
 
 std::optional<std::string> angles_in_degrees(std::span<const Touch> touches) {
-  // Angles within a full turn, interpolated the short way round, reach up to half a turn beyond.
-  constexpr double most_rad = 3.0 * std::numbers::pi;
-  const auto largest =
-      std::max_element(touches.begin(), touches.end(), [](const Touch& a, const Touch& b) {
-        return std::abs(a.T_robot_sensor.theta_rad) < std::abs(b.T_robot_sensor.theta_rad);
+  const auto [least, most] =
+      std::minmax_element(touches.begin(), touches.end(), [](const Touch& a, const Touch& b) {
+        return a.T_robot_sensor.theta_rad < b.T_robot_sensor.theta_rad;
       });
-  const double theta_rad = largest->T_robot_sensor.theta_rad;
-  if (std::abs(theta_rad) <= most_rad) {
+  const double least_rad = least->T_robot_sensor.theta_rad;
+  const double most_rad = most->T_robot_sensor.theta_rad;
+  if (!seem_degrees(least_rad, most_rad)) {
     return {};
   }
+  const auto largest = most_rad > -least_rad ? most : least;
   return fmt::format(
       "the sensor's angle is {:.4g} rad at touch {}, beyond a full turn of 6.283 rad: are the "
       "angles in degrees? Palpate takes radians; import them with --pose-unit mm,deg, or multiply "
       "theta of sensor_pose by 0.0174533",
-      theta_rad, largest - touches.begin() + 1);
+      largest->T_robot_sensor.theta_rad, largest - touches.begin() + 1);
 }
 
 std::optional<std::string> other_scale(std::span<const Touch> touches,
@@ -146,10 +157,7 @@ std::optional<std::string> other_scale(std::span<const Touch> touches,
     return {};  // a single element has no scale
   }
   const double array_mm = elements_of(touches.front()).diagonal();
-  double pitch_mm = array_mm;
-  for (const glm::dvec2& element : elements_mm.subspan(1)) {
-    pitch_mm = std::min(pitch_mm, glm::distance(element, elements_mm.front()));
-  }
+  const double pitch_mm = spacing_of(elements_mm)->nearest_mm.least;
   for (const Hypothesis& hypothesis : task.hypotheses) {
     const OccupancyGrid& map = hypothesis.map;
     const double map_mm = cells_of(map).diagonal();
@@ -224,38 +232,63 @@ std::optional<std::string> nothing_felt(std::span<const Touch> touches,
 
 std::optional<std::string> out_of_reach(std::span<const Touch> touches, const RecognitionTask& task,
                                         const PoseLattice& region) {
+  std::size_t contacts = 0;
+  std::size_t beyond = 0;
   double nearest_mm = std::numeric_limits<double>::infinity();
-  Box cells;  // of the nearest map
+  Box cells;                   // of the nearest map
+  double array_mm = 0.0;       // of a touch out of reach
+  glm::dvec2 middles_mm{0.0};  // sum over the touches out of reach
   for (const Touch& touch : touches) {
+    if (!in_contact(touch, task.classifier())) {
+      continue;
+    }
+    ++contacts;
+    const glm::dvec2 middle_mm = middle_of(touch);
+    const double diagonal_mm = elements_of(touch).diagonal();
+    double gap = std::numeric_limits<double>::infinity();
+    Box nearest;
     for (const Hypothesis& hypothesis : task.hypotheses) {
       const Box box = cells_of(hypothesis.map);
-      const double mm = gap_mm(touch, box, region, region.pivot_mm);
-      if (mm <= 0.0) {
-        return {};
-      }
-      if (mm < nearest_mm) {
-        nearest_mm = mm;
-        cells = box;
+      const double mm = gap_mm(middle_mm - region.pivot_mm, diagonal_mm, box, region);
+      if (mm < gap) {
+        gap = mm;
+        nearest = box;
       }
     }
+    if (gap <= 0.0) {
+      continue;
+    }
+    ++beyond;
+    middles_mm += middle_mm;
+    array_mm = diagonal_mm;
+    if (gap < nearest_mm) {
+      nearest_mm = gap;
+      cells = nearest;
+    }
   }
-  glm::dvec2 middle_mm{0.0};
-  for (const Touch& touch : touches) {
-    middle_mm += touch.T_robot_sensor.translation_mm / static_cast<double>(touches.size());
+  if (2 * beyond <= contacts) {
+    return {};
+  }
+  const std::string evidence = fmt::format(
+      "no pose of the region brings {} of {} in contact nearer than {:.1f} mm to any map", beyond,
+      touches_in_words(contacts), nearest_mm);
+  const glm::dvec2 middle_mm = middles_mm / static_cast<double>(beyond);
+  if (task.auto_pivot) {
+    return fmt::format(
+        "{}: the array is on average {:.1f} mm from the first touch in contact; check that all "
+        "touches are of one object that lay still, and that the positions are in mm",
+        evidence, glm::distance(middle_mm, region.pivot_mm));
   }
   // A pivot among the touches brings them into the region; the region must then meet the map.
-  Touch at_pivot = touches.front();
-  at_pivot.T_robot_sensor.translation_mm = middle_mm;
   const std::string ranges =
-      gap_mm(at_pivot, cells, region, middle_mm) <= 0.0
+      gap_mm({0.0, 0.0}, array_mm, cells, region) <= 0.0
           ? ""
           : fmt::format(" --x-mm={:.1f}:{:.1f} --y-mm={:.1f}:{:.1f}", cells.lower.x, cells.upper.x,
                         cells.lower.y, cells.upper.y);
   return fmt::format(
-      "no pose of the region brings {} nearer than {:.1f} mm to any map: the sensor is on average "
-      "{:.1f} mm from the pivot at {:g},{:g} mm; give --pivot-mm={:.1f},{:.1f}{}, near the touches",
-      touches.size() == 1 ? "the touch" : fmt::format("one of {} touches", touches.size()),
-      nearest_mm, glm::distance(middle_mm, region.pivot_mm), region.pivot_mm.x, region.pivot_mm.y,
+      "{}: the array is on average {:.1f} mm from the pivot at {:g},{:g} mm; give "
+      "--pivot-mm={:.1f},{:.1f}{}, near the touches",
+      evidence, glm::distance(middle_mm, region.pivot_mm), region.pivot_mm.x, region.pivot_mm.y,
       middle_mm.x, middle_mm.y, ranges);
 }
 

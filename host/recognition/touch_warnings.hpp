@@ -23,7 +23,7 @@ std::optional<std::string> other_scale(std::span<const Touch> touches, const Rec
 /// contact or all were.
 std::optional<std::string> nothing_felt(std::span<const Touch> touches,
                                         const ContactClassifier& classifier);
-/// No pose of the region brings any touch to any map.
+/// No pose of the region brings most of the touches that have an element In Contact to any map.
 std::optional<std::string> out_of_reach(std::span<const Touch> touches, const RecognitionTask& task,
                                         const PoseLattice& region);
 

@@ -140,7 +140,7 @@ std::optional<std::string> at_the_edge(std::span<const Touch> touches, const Rec
     const double more = (axis.upper - axis.lower) / 2.0;
     const std::string remedy =
         task.auto_pivot
-            ? "the region surrounds the first touch; begin with a touch that meets the object"
+            ? "the region surrounds the first touch in contact; begin with a touch of the object"
             : fmt::format("widen the region, such as with {}={:.4g}:{:.4g}", flags[i],
                           (axis.lower - (first ? more : 0.0)) * unit,
                           (axis.upper + (first ? 0.0 : more)) * unit);
@@ -164,17 +164,19 @@ std::vector<std::string> warnings_about(std::span<const Touch> touches, const Re
     }
   };
   add(positions_in_metres(touches, task.classifier()));
-  add(angles_in_degrees(touches));
   add(other_scale(touches, task));
   add(nothing_felt(touches, task.classifier()));
   add(out_of_reach(touches, task, lattice));
+  const std::optional<std::string> degrees = angles_in_degrees(touches);
+  // Touches at wrong angles do not fit; where the touches fit, the estimate deserves its warnings.
+  const bool fits = step.fit && step.fit->verdict == Verdict::fits;
+  const bool estimate_counts = warnings.empty() && (!degrees || fits);
+  add(degrees);
   // An estimate from such touches is not worth a word. On bins that are too coarse, the edge is no
   // sign of an object outside.
-  if (warnings.empty()) {
-    add(coarse_bins(task, lattice, step));
-  }
-  if (warnings.empty()) {
-    add(at_the_edge(touches, task, lattice, step));
+  if (estimate_counts) {
+    const std::optional<std::string> coarse = coarse_bins(task, lattice, step);
+    add(coarse ? coarse : at_the_edge(touches, task, lattice, step));
   }
   return warnings;
 }

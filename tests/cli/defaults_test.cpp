@@ -103,6 +103,36 @@ TEST_F(Defaults, GiveTheSameNumbersInAnyRobotFrame) {
               1e-4);
 }
 
+TEST_F(Defaults, GiveTheSameNumbersInAnySensorFrame) {
+  // Elements and poses of a frame 100 mm beside the array, such as the robot's flange.
+  const glm::dvec2 offset_mm{100.0, 0.0};
+  Recording of_flange = unknown_;
+  for (glm::dvec2& element_mm : of_flange.elements_mm) {
+    element_mm += offset_mm;
+  }
+  for (Pose& pose : of_flange.T_robot_sensor) {
+    pose = pose * Pose{-offset_mm, 0.0};
+  }
+  write_recording(folder_ / "flange.h5", of_flange);
+  const PoseLattice lattice = posterior_of("u.h5");
+  const PoseLattice flange = posterior_of("flange.h5");
+  EXPECT_NEAR(flange.pivot_mm.x, lattice.pivot_mm.x, 1e-9);
+  EXPECT_NEAR(flange.pivot_mm.y, lattice.pivot_mm.y, 1e-9);
+  for (const auto axis : {&PoseLattice::x_mm, &PoseLattice::y_mm, &PoseLattice::theta_rad}) {
+    EXPECT_NEAR((flange.*axis).lower, (lattice.*axis).lower, 1e-9);
+    EXPECT_NEAR((flange.*axis).upper, (lattice.*axis).upper, 1e-9);
+    EXPECT_EQ((flange.*axis).count, (lattice.*axis).count);
+  }
+  // Places relative to the pivot differ by the rounding of 100 mm, 1e-14 mm.
+  const json here = u({});
+  const json there = record(with("flange.h5", {}));
+  EXPECT_EQ(there["best"], here["best"]);
+  EXPECT_NEAR(there["identity"]["A"].get<double>(), here["identity"]["A"].get<double>(), 1e-6);
+  for (const char* field : {"x_mm", "y_mm", "theta_rad"}) {
+    EXPECT_NEAR(there["refined"][field].get<double>(), here["refined"][field].get<double>(), 1e-4);
+  }
+}
+
 TEST_F(Defaults, AreWhatAutoAsksFor) {
   const json bare = u({});
   expect_same(u({"--bins", "auto"}), bare);

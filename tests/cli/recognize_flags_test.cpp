@@ -54,6 +54,8 @@ TEST_F(RecognizeFlags, MemoryIsBoundedWithoutAnotherResult) {
   // 8 MiB are for copies alone.
   expect_refused({"recognize", "u.h5", "--maps", "maps", "--bins=25x25x16", "--memory-mib", "8"},
                  {"memory limit of 8.0 MiB", "raise it"});
+  expect_refused({"recognize", "u.h5", "--maps", "maps", "--memory-mib", "8"},
+                 {"memory limit of 8.0 MiB", "need 9 MiB", "raise it"});
   expect_refused({"recognize", "u.h5", "--maps", "maps", "--memory-mib", "0"}, {"--memory-mib 0"});
 }
 

@@ -214,6 +214,15 @@ TEST_F(RecordingSurveyed, AnglesInDegrees) {
   expect_suspicion(r, {"330", "degrees"});
 }
 
+TEST_F(RecordingSurveyed, AnglesCountedOnOverAFullTurn) {
+  Recording r = training();
+  for (Pose& pose : r.T_robot_sensor) {
+    pose.theta_rad += 1.5 * std::numbers::pi;
+  }
+  ASSERT_GT(survey(r).poses->theta_rad.most, 7.0 * std::numbers::pi / 3.0);
+  expect_sound(r);
+}
+
 TEST_F(RecordingSurveyed, ConstantElements) {
   for (const double value : {0.0, 7.25}) {
     Recording r = training();

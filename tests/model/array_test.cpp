@@ -19,8 +19,12 @@ TEST(DigitactsArray, HasTheGeometryOfTwoPadsSideBySide) {
   EXPECT_NEAR(elements[35].y - elements[0].y + digitacts_element_mm, 11.3, 1e-12);
 }
 
-TEST(ArrayReach, IsTheDistanceOfTheFarthestElement) {
-  EXPECT_DOUBLE_EQ(array_reach_mm(std::vector<glm::dvec2>{{0.5, 0.5}, {-3.0, 4.0}}), 5.0);
+TEST(ArrayReach, IsTheDistanceOfTheFarthestElementFromTheCentre) {
+  const std::vector<glm::dvec2> elements{{97.0, 4.0}, {103.0, -4.0}, {100.0, 3.0}};
+  EXPECT_EQ(array_centre_mm(elements), glm::dvec2(100.0, 0.0));
+  EXPECT_EQ(array_reach_mm(elements), 5.0);
+  EXPECT_EQ(array_centre_mm(digitacts_array()), glm::dvec2(0.0, 0.0));
+  EXPECT_EQ(array_centre_mm({}), glm::dvec2(0.0, 0.0));
   EXPECT_EQ(array_reach_mm({}), 0.0);
 }
 

@@ -5,6 +5,7 @@
 #include <stdexcept>
 
 #include <gtest/gtest.h>
+#include <glm/geometric.hpp>
 
 #include "palpate/error.hpp"
 #include "shapes.hpp"
@@ -125,7 +126,7 @@ TEST(Recogniser, ForgetsTheUnknownBefore) {
   }
 }
 
-/// Tasks whose pivot is the sensor's origin at the first touch.
+/// Tasks whose pivot is the array's centre at the first touch in contact.
 std::vector<RecognitionTask> automatic_tasks() {
   std::vector<RecognitionTask> tasks;
   for (const FilterOptions& filter : both_filters()) {
@@ -145,7 +146,7 @@ RecognitionTask about(RecognitionTask task, const glm::dvec2& pivot_mm) {
   return task;
 }
 
-TEST(AutomaticPivot, IsTheSensorsOriginAtTheFirstTouchOfEachUnknown) {
+TEST(AutomaticPivot, IsTheArraysCentreAtTheFirstTouchOfEachUnknown) {
   Device device = Device::open();
   for (const RecognitionTask& task : automatic_tasks()) {
     Recogniser automatic(device, task);
@@ -201,6 +202,114 @@ TEST(AutomaticPivot, IsNotPlacedByATouchThatIsRefused) {
     EXPECT_THROW(recogniser.update(std::span(&beyond, 1)), Error);
     recogniser.update(touches);
     EXPECT_EQ(recogniser.lattice().pivot_mm, touches[0].T_robot_sensor.translation_mm);
+  }
+}
+
+/// A touch whose elements are all out of contact but one, which is Unknown.
+struct TouchBeside {
+  TouchBeside(const Touch& like, const glm::dvec2& place_mm) : touch(like) {
+    pressure.assign(like.pressure.size(), 0.0);
+    pressure[7] = 1.0;
+    touch.T_robot_sensor.translation_mm = place_mm;
+    touch.pressure = pressure;
+  }
+  TouchBeside(const TouchBeside&) = delete;
+  TouchBeside& operator=(const TouchBeside&) = delete;
+
+  Touch touch;
+  std::vector<double> pressure;
+};
+
+TEST(AutomaticPivot, PassesOverTouchesWithoutContactButTakesThemIn) {
+  Device device = Device::open();
+  const Recording recording = moved(touched_letter(1), {{400.0, 200.0}, 0.7});
+  const glm::dvec2 first_mm = recording.T_robot_sensor.front().translation_mm;
+  for (const double away_mm : {6.0, 60.0, 400.0}) {
+    SCOPED_TRACE(away_mm);
+    const TouchBeside beside(recording.touch(0), first_mm + glm::dvec2(0.0, away_mm));
+    std::vector<Touch> touches = all_touches(recording);
+    touches.insert(touches.begin(), 2, beside.touch);
+    for (const RecognitionTask& task : automatic_tasks()) {
+      Recogniser fixed(device, about(task, first_mm));
+      fixed.update(touches);
+      Recogniser together(device, task);
+      const Estimate untouched = together.estimate();
+      together.update(touches);
+      expect_same(together.estimate(), fixed.estimate());
+      EXPECT_EQ(together.lattice().pivot_mm, first_mm);
+
+      Recogniser one_by_one(device, task);
+      for (std::size_t i = 0; i < touches.size(); ++i) {
+        one_by_one.prepare(touches[i]);
+        // The recogniser keeps copies: the caller's memory may go.
+        std::vector<double> pressure(touches[i].pressure.begin(), touches[i].pressure.end());
+        Touch copy = touches[i];
+        copy.pressure = pressure;
+        one_by_one.update(std::span(&copy, 1));
+        std::fill(pressure.begin(), pressure.end(), 50.0);
+        if (i < 2) {
+          expect_same(one_by_one.estimate(), untouched);
+        }
+      }
+      EXPECT_EQ(one_by_one.lattice().pivot_mm, first_mm);
+      EXPECT_EQ(one_by_one.estimate().mode.bin, together.estimate().mode.bin);
+      // Evaluated ahead, a touch is added in one step: float32 rounds it by some 1e-5 nats.
+      EXPECT_NEAR(one_by_one.estimate().identity[0], together.estimate().identity[0], 1e-4);
+    }
+  }
+}
+
+TEST(AutomaticPivot, ForgetsTouchesThatWaitForItOnlyByAReset) {
+  Device device = Device::open();
+  const Recording recording = touched_letter(2);
+  const std::vector<Touch> touches = all_touches(recording);
+  // Over the object, so that the touch without contact changes the belief.
+  const TouchBeside beside(touches[0], touches[0].T_robot_sensor.translation_mm);
+  for (const RecognitionTask& task : automatic_tasks()) {
+    Recogniser plain(device, task);
+    plain.update(touches);
+    Recogniser recogniser(device, task);
+    Touch unsound = touches[3];
+    unsound.pressure = unsound.pressure.first(1);
+    EXPECT_THROW(recogniser.update(std::vector{beside.touch, unsound}), Error);
+    recogniser.update(touches);
+    expect_same(recogniser.estimate(), plain.estimate());
+
+    recogniser.reset();
+    recogniser.update(std::span(&beside.touch, 1));
+    EXPECT_THROW(recogniser.update(std::vector{touches[0], unsound}), Error);
+    recogniser.update(touches);
+    EXPECT_NE(recogniser.estimate().identity, plain.estimate().identity);
+
+    recogniser.reset();
+    recogniser.update(std::span(&beside.touch, 1));
+    recogniser.reset();
+    recogniser.update(touches);
+    expect_same(recogniser.estimate(), plain.estimate());
+  }
+}
+
+TEST(AutomaticPivot, DependsOnTheElementsAndNotOnTheSensorFramesOrigin) {
+  Device device = Device::open();
+  const Recording recording = moved(touched_letter(1), {{400.0, 200.0}, 0.7});
+  // The same touches, of a frame 100 mm beside the elements such as the robot's flange.
+  const Pose T_flange_sensor{{100.0, 30.0}, 0.5};
+  Recording of_flange = recording;
+  for (Pose& pose : of_flange.T_robot_sensor) {
+    pose = pose * inverse(T_flange_sensor);
+  }
+  for (glm::dvec2& element_mm : of_flange.elements_mm) {
+    element_mm = T_flange_sensor * element_mm;
+  }
+  for (const RecognitionTask& task : automatic_tasks()) {
+    Recogniser plain(device, task);
+    plain.update(all_touches(recording));
+    Recogniser flange(device, task);
+    flange.update(all_touches(of_flange));
+    // Places differ by rounding, some 1e-13 mm, but for the box of a turned array.
+    EXPECT_LT(glm::distance(flange.lattice().pivot_mm, plain.lattice().pivot_mm), 1e-9);
+    EXPECT_EQ(flange.estimate().mode.bin, plain.estimate().mode.bin);
+    EXPECT_NEAR(flange.estimate().identity[0], plain.estimate().identity[0], 1e-6);
   }
 }
 

@@ -111,7 +111,7 @@ TEST_F(Warnings, TouchesFarFromThePivotMissEveryMap) {
   // The sensor is 447 mm from the pivot; 14 mm of region, 29 mm of map, 12 mm of its own and 8 mm
   // of the object's place bring it nearer.
   const std::vector<std::string> said = warnings(recording);
-  ASSERT_THAT(said, ElementsAre(AllOf(HasSubstr("no pose of the region brings one of 9 touches"),
+  ASSERT_THAT(said, ElementsAre(AllOf(HasSubstr("no pose of the region brings 9 of 9 touches in"),
                                       HasSubstr("from the pivot at 0,0 mm"),
                                       HasSubstr("; give --pivot-mm="), Not(HasSubstr("--x-mm")))));
   HistogramOptions remedied;
@@ -124,6 +124,25 @@ TEST_F(Warnings, TouchesFarFromThePivotMissEveryMap) {
   EXPECT_NEAR(remedied.lattice.pivot_mm.y, 200.0, 12.0);
   EXPECT_THAT(warnings(recording, remedied), IsEmpty());
   EXPECT_THAT(warnings(recording, ParticleOptions{.particles = 100}), said);
+}
+
+TEST_F(Warnings, MostTouchesMissTheMapsAboutAnAutomaticPivot) {
+  RecognitionTask task(*letters_, HistogramOptions{});
+  task.auto_pivot = true;
+  Recording recording = letter_touches("A", 9, 1);
+  const auto move = [&](std::size_t i) {
+    recording.T_robot_sensor[i].translation_mm += glm::dvec2(400.0, 200.0);
+  };
+  for (const std::size_t i : {1, 3, 5, 7}) {
+    move(i);
+  }
+  EXPECT_THAT(record_of(task, unknown_of(recording)).last().warnings,
+              Not(testing::Contains(HasSubstr("no pose of the region"))));
+  move(8);
+  EXPECT_THAT(
+      record_of(task, unknown_of(recording)).last().warnings,
+      ElementsAre(AllOf(HasSubstr("brings 5 of 9 touches in contact"),
+                        HasSubstr("one object that lay still"), Not(HasSubstr("--pivot")))));
 }
 
 TEST_F(Warnings, ARegionBesideEveryMapIsNamedWithOneThatMeetsThem) {
@@ -208,6 +227,36 @@ TEST_F(Warnings, AnAngleInterpolatedBeyondAFullTurnIsNotInDegrees) {
   EXPECT_THAT(warnings(recording), IsEmpty());
 }
 
+TEST_F(Warnings, AnglesCountedOnOverAFullTurnAreNotInDegrees) {
+  Recording recording = letter_touches("A", 9, 6);
+  for (Pose& pose : recording.T_robot_sensor) {
+    pose.theta_rad = 5.5 + wrap_angle(pose.theta_rad - 5.5, 2.0 * std::numbers::pi);
+  }
+  EXPECT_THAT(warnings(recording), IsEmpty());
+}
+
+TEST_F(Warnings, AnglesOfSeveralTurnsHideNoWarningAboutTouchesThatFit) {
+  const auto turned = [](Recording recording) {
+    for (Pose& pose : recording.T_robot_sensor) {
+      pose.theta_rad += 6.0 * std::numbers::pi;
+    }
+    return recording;
+  };
+  // A region whose edge lies 0.4 mm short of the object: the best pose fits still.
+  const Recording recording = letter_touches("A", 9, 3);
+  const Pose& truth = recording.truth->T_object_robot;
+  HistogramOptions options;
+  options.lattice.x_mm = {truth.translation_mm.x + 0.4, truth.translation_mm.x + 8.4, 16};
+  options.lattice.y_mm.count = 40;
+  options.lattice.theta_rad.count = 72;
+  const RecognitionTask task(*letters_, options);
+  const RecognitionRecord plain = record_of(task, unknown_of(recording));
+  ASSERT_EQ(plain.last().fit->verdict, Verdict::fits) << plain.last().fit->z;
+  ASSERT_THAT(plain.last().warnings, ElementsAre(HasSubstr("at the edge of the region, x = ")));
+  EXPECT_THAT(record_of(task, unknown_of(turned(recording))).last().warnings,
+              ElementsAre(HasSubstr("in degrees?"), HasSubstr("at the edge of the region, x = ")));
+}
+
 TEST_F(Warnings, MapsAndArraysOfAnotherUnit) {
   const auto scaled = [](double factor) {
     std::vector<Hypothesis> maps = *letters_;
@@ -231,6 +280,12 @@ TEST_F(Warnings, MapsAndArraysOfAnotherUnit) {
   EXPECT_THAT(warnings(recording),
               ElementsAre(AllOf(HasSubstr("the array measures 0.014 mm across"),
                                 HasSubstr("check the unit of the array's elements"))));
+}
+
+TEST_F(Warnings, AnElementThatLiesApartIsNoScale) {
+  Recording recording = letter_touches("A", 9, 7);
+  recording.elements_mm.front() += glm::dvec2(-60.0, -60.0);  // farther than the maps are wide
+  EXPECT_THAT(warnings(recording), Not(testing::Contains(HasSubstr("between two elements"))));
 }
 
 TEST_F(Warnings, ASingleElementHasNoScaleAndIsNeverOutOfContact) {

@@ -43,19 +43,19 @@ BalancedLattice balanced_lattice(const PoseLattice& region, std::span<const Hypo
                                  std::int64_t most_bins = most_balanced_bins,
                                  BinWidth width = BinWidth::automatic);
 
-/// The poses of an object that an array touches, about the sensor's origin.
+/// The poses of an object that an array touches, about the array's centre.
 struct TouchRegion {
   PoseLattice lattice;  ///< one bin along each axis; pivot at the robot frame's origin
   /// Area over the area for objects of these sizes that all lie about one origin; 1 at least.
   double excess = 1.0;
 };
 
-/// The region of a lattice whose pivot is the sensor's origin at a touch. x and y, the pivot's
+/// The region of a lattice whose pivot is the array's centre at a touch. x and y, the pivot's
 /// place in the object frame, cover the box around every map's cells with log odds above 0, grown
 /// by the array's reach at any angle; a map without such a cell counts with all of its cells. Theta
 /// covers the circle. The pose of a touch that meets an object lies in the region; the pose of a
 /// touch beside all objects need not.
-/// @param reach_mm largest distance of an element from the sensor's origin; see array_reach_mm()
+/// @param reach_mm largest distance of an element from the array's centre; see array_reach_mm()
 /// @throws Error on an empty list, a map that is not sound, or a reach that is negative or out of
 /// range
 TouchRegion touch_region(std::span<const Hypothesis> hypotheses, double reach_mm);

@@ -27,7 +27,7 @@ struct Scene {
     std::optional<std::array<double, 2>> y_mm;
     std::optional<std::array<double, 2>> theta_deg;
     std::optional<glm::dvec2> pivot_mm;  ///< in the robot frame
-    bool auto_pivot = false;             ///< the pivot is the sensor's origin at the first touch
+    bool auto_pivot = false;             ///< pivot_mm is "auto": where the unknown is first felt
   };
 
   std::optional<std::vector<glm::dvec2>> array_mm;  ///< element centres in the sensor frame

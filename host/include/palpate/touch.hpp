@@ -42,7 +42,11 @@ struct Touch {
 /// True where both touches have exactly the same pose and element centres.
 bool same_placement(const Touch& a, const Touch& b);
 
-/// The largest distance of an element from the sensor frame's origin, in mm; 0 without elements.
+/// The centre of the box around the elements, in mm in the frame of the elements; (0, 0) without
+/// elements. The sensor frame's origin may lie elsewhere, such as at the robot's flange.
+glm::dvec2 array_centre_mm(std::span<const glm::dvec2> elements_mm);
+
+/// The largest distance of an element from the array's centre, in mm; 0 without elements.
 double array_reach_mm(std::span<const glm::dvec2> elements_mm);
 
 /// The true identity and pose of an unknown object.
