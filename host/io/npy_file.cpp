@@ -117,7 +117,7 @@ class Header {
     if (end == rest_.npos) {
       refuse_header();
     }
-    const std::string text(rest_.substr(0, end));
+    std::string text(rest_.substr(0, end));
     rest_.remove_prefix(end);
     skip("'");
     return text;
@@ -153,7 +153,7 @@ class Header {
 std::string read_header(std::ifstream& file, const std::filesystem::path& path) {
   char begin[8] = {};
   file.read(begin, sizeof begin);
-  const int version = begin[6];
+  const auto version = static_cast<unsigned char>(begin[6]);
   const std::size_t size_bytes = version == 1 ? 2 : 4;
   std::uint32_t size = 0;
   file.read(reinterpret_cast<char*>(&size), static_cast<std::streamsize>(size_bytes));
