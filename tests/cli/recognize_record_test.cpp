@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <regex>
 #include <sstream>
 
 #include <fmt/format.h>
+#include <gmock/gmock.h>
 
 #include "palpate/pose_error.hpp"
 #include "program.hpp"
@@ -174,7 +174,7 @@ TEST_F(RecognizeRecord, ATableFitsItsTerminalAndAFileHasTheFullNames) {
   ProgramOnTerminal program(folder_.path(), call, {{"COLUMNS", "80"}}, 200);
   const std::string shown = program.finish().out;
   EXPECT_EQ(shown.find(name), std::string::npos) << shown;
-  EXPECT_TRUE(std::regex_search(shown, std::regex("\na-.*\\.\\.\\..*\\.h5 "))) << shown;
+  EXPECT_THAT(shown, testing::ContainsRegex("\na-.*\\.\\.\\..*\\.h5 "));
   std::istringstream lines(shown);
   for (std::string line; std::getline(lines, line);) {
     EXPECT_LE(line.size(), 81u) << line;  // with the carriage return
