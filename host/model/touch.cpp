@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include <glm/common.hpp>
+#include "bounding_box.hpp"
 
 namespace palpate {
 
@@ -37,16 +37,7 @@ bool same_placement(const Touch& a, const Touch& b) {
 }
 
 glm::dvec2 array_centre_mm(std::span<const glm::dvec2> elements_mm) {
-  if (elements_mm.empty()) {
-    return {0.0, 0.0};
-  }
-  glm::dvec2 lower = elements_mm.front();
-  glm::dvec2 upper = lower;
-  for (const glm::dvec2& element : elements_mm) {
-    lower = glm::min(lower, element);
-    upper = glm::max(upper, element);
-  }
-  return (lower + upper) / 2.0;
+  return elements_mm.empty() ? glm::dvec2(0.0) : bounding_box(elements_mm).middle();
 }
 
 double array_reach_mm(std::span<const glm::dvec2> elements_mm) {

@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 
 #include "palpate/error.hpp"
+#include "random.hpp"
 
 namespace palpate {
 
@@ -134,6 +135,31 @@ Marginals Recogniser::marginals(int object) const {
     }
   }
   return sums;
+}
+
+std::vector<PoseSample> Recogniser::sample(std::size_t count, std::uint64_t seed) const {
+  if (histogram() != nullptr) {
+    return histogram()->sample(count, seed);
+  }
+  const std::vector<ParticleFilter::Particle> particles =
+      std::get<ParticleFilter>(filter_).particles();
+  double all = 0.0;
+  for (const ParticleFilter::Particle& particle : particles) {
+    all += particle.weight;
+  }
+  Random random(seed, Stream::belief);
+  std::vector<PoseSample> samples;
+  auto particle = particles.begin();
+  double reached = particle->weight;
+  for (std::size_t i = 0; i < count; ++i) {
+    const double at =
+        (static_cast<double>(i) + random.uniform()) / static_cast<double>(count) * all;
+    while (particle + 1 != particles.end() && reached <= at) {
+      reached += (++particle)->weight;
+    }
+    samples.push_back({particle->object, particle->T_object_robot});
+  }
+  return samples;
 }
 
 std::uint64_t Recogniser::device_bytes() const {

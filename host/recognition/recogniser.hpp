@@ -34,6 +34,8 @@ class Recogniser {
   std::optional<RefinedPose> refine(const Mode& mode) const;
   /// ParticleFilter::effective_sample_size(); empty for a histogram.
   std::optional<double> effective_sample_size() const;
+  /// PoseHistogram::sample(); for particles, draws by their weights.
+  std::vector<PoseSample> sample(std::size_t count, std::uint64_t seed) const;
   /// Marginal probabilities of one object's poses over the task's lattice. A particle counts in the
   /// nearest bin.
   Marginals marginals(int object) const;

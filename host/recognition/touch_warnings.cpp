@@ -10,39 +10,19 @@
 #include <glm/geometric.hpp>
 
 #include "angle_unit.hpp"
+#include "bounding_box.hpp"
 #include "element_spacing.hpp"
 
 namespace palpate {
 
 namespace {
 
-/// An axis-parallel box; empty until it takes in a point.
-struct Box {
-  glm::dvec2 lower{std::numeric_limits<double>::infinity()};
-  glm::dvec2 upper{-std::numeric_limits<double>::infinity()};
-
-  void take_in(const glm::dvec2& p) {
-    lower = glm::min(lower, p);
-    upper = glm::max(upper, p);
-  }
-  double diagonal() const { return glm::distance(lower, upper); }
-};
-
 /// The cells of a map, in the object frame. The box is no tighter than the grid, so that it costs
 /// no look at the cells.
-Box cells_of(const OccupancyGrid& map) {
-  Box box;
+BoundingBox cells_of(const OccupancyGrid& map) {
+  BoundingBox box;
   box.take_in(map.origin_mm - map.cell_mm / 2.0);
   box.take_in(map.centre_mm(map.nx - 1, map.ny - 1) + map.cell_mm / 2.0);
-  return box;
-}
-
-/// The elements of an array, in the sensor frame.
-Box elements_of(const Touch& touch) {
-  Box box;
-  for (const glm::dvec2& element : touch.elements_mm) {
-    box.take_in(element);
-  }
   return box;
 }
 
@@ -80,7 +60,7 @@ bool in_contact(const Touch& touch, const ContactClassifier& classifier) {
 /// brings the array to the map. Angles count as free, so that the distance is never too large.
 /// @param from_pivot_mm the array's middle minus the pivot
 /// @param array_mm diagonal of the array
-double gap_mm(const glm::dvec2& from_pivot_mm, double array_mm, const Box& cells,
+double gap_mm(const glm::dvec2& from_pivot_mm, double array_mm, const BoundingBox& cells,
               const PoseLattice& region) {
   // p_o = R(theta) from_pivot + (x, y) is in the box of cells where R(theta) from_pivot is in this
   // box.
@@ -106,7 +86,7 @@ std::optional<std::string> positions_in_metres(std::span<const Touch> touches,
   if (touches.size() < 3) {
     return {};
   }
-  Box positions;
+  BoundingBox positions;
   for (const Touch& touch : touches) {
     positions.take_in(touch.T_robot_sensor.translation_mm);
   }
@@ -156,7 +136,7 @@ std::optional<std::string> other_scale(std::span<const Touch> touches,
   if (elements_mm.size() < 2) {
     return {};  // a single element has no scale
   }
-  const double array_mm = elements_of(touches.front()).diagonal();
+  const double array_mm = bounding_box(touches.front().elements_mm).diagonal();
   const double pitch_mm = spacing_of(elements_mm)->nearest_mm.least;
   for (const Hypothesis& hypothesis : task.hypotheses) {
     const OccupancyGrid& map = hypothesis.map;
@@ -235,7 +215,7 @@ std::optional<std::string> out_of_reach(std::span<const Touch> touches, const Re
   std::size_t contacts = 0;
   std::size_t beyond = 0;
   double nearest_mm = std::numeric_limits<double>::infinity();
-  Box cells;                   // of the nearest map
+  BoundingBox cells;                   // of the nearest map
   double array_mm = 0.0;       // of a touch out of reach
   glm::dvec2 middles_mm{0.0};  // sum over the touches out of reach
   for (const Touch& touch : touches) {
@@ -244,11 +224,11 @@ std::optional<std::string> out_of_reach(std::span<const Touch> touches, const Re
     }
     ++contacts;
     const glm::dvec2 middle_mm = middle_of(touch);
-    const double diagonal_mm = elements_of(touch).diagonal();
+    const double diagonal_mm = bounding_box(touch.elements_mm).diagonal();
     double gap = std::numeric_limits<double>::infinity();
-    Box nearest;
+    BoundingBox nearest;
     for (const Hypothesis& hypothesis : task.hypotheses) {
-      const Box box = cells_of(hypothesis.map);
+      const BoundingBox box = cells_of(hypothesis.map);
       const double mm = gap_mm(middle_mm - region.pivot_mm, diagonal_mm, box, region);
       if (mm < gap) {
         gap = mm;

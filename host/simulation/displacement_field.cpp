@@ -2,13 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <numbers>
 #include <utility>
 
 #include <fmt/format.h>
 #include <glm/common.hpp>
 
+#include "bounding_box.hpp"
 #include "palpate/error.hpp"
 #include "spans.hpp"
 
@@ -19,15 +19,10 @@ namespace {
 /// Radius at which the point spread is cut off, in standard deviations: 6e-7 of it lies beyond.
 constexpr double reach = 5.0;
 
-struct Box {
-  glm::dvec2 lower{std::numeric_limits<double>::infinity()};
-  glm::dvec2 upper{-std::numeric_limits<double>::infinity()};
-};
-
-Box bounds(const Shape& shape) {
+BoundingBox bounds(const Shape& shape) {
   // 1 km: far beyond any object, yet rounding does not swallow a cell there.
   constexpr double farthest_mm = 1e6;
-  Box box;
+  BoundingBox box;
   const auto include = [&](const glm::dvec2& p, double width_mm) {
     // Written so that NaN is refused.
     if (!(std::abs(p.x) <= farthest_mm && std::abs(p.y) <= farthest_mm && width_mm >= 0.0 &&
@@ -38,8 +33,8 @@ Box bounds(const Shape& shape) {
                       "{} mm of 0 and a width that is not negative",
                       shape.label, p.x, p.y, width_mm, farthest_mm));
     }
-    box.lower = glm::min(box.lower, p - width_mm / 2.0);
-    box.upper = glm::max(box.upper, p + width_mm / 2.0);
+    box.take_in(p - width_mm / 2.0);
+    box.take_in(p + width_mm / 2.0);
   };
   for (const Shape::Stroke& stroke : shape.strokes) {
     for (const glm::dvec2& p : stroke.points_mm) {
@@ -57,12 +52,12 @@ Box bounds(const Shape& shape) {
 }  // namespace
 
 DisplacementField::DisplacementField(const Shape& shape, double psf_mm) {
-  const Box box = bounds(shape);
+  const BoundingBox box = bounds(shape);
   if (!(box.lower.x < box.upper.x && box.lower.y < box.upper.y)) {
     throw Error(Fault::input,
                 fmt::format("shape '{}': covers no area, so it cannot be touched", shape.label));
   }
-  const glm::dvec2 extent = box.upper - box.lower + 2.0 * reach * psf_mm;
+  const glm::dvec2 extent = box.extent() + 2.0 * reach * psf_mm;
   // Cells of 0.1 mm suffice for this sensor. They are larger where a large shape would need more
   // than 2000 x 2000 cells, or where the point spread hides smaller ones.
   cell_mm_ = std::max({0.1, std::max(extent.x, extent.y) / 2000.0, psf_mm / 20.0});

@@ -9,6 +9,7 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
+#include "bounding_box.hpp"
 #include "command_stream.hpp"
 #include "hypotheses.hpp"
 #include "palpate/error.hpp"
@@ -40,34 +41,6 @@ double lever_mm(const OccupancyGrid& map, const PoseLattice& region) {
 }
 
 double count_of(double extent, double step) { return std::max(1.0, std::ceil(extent / step)); }
-
-struct Box {
-  glm::dvec2 lower{std::numeric_limits<double>::infinity()};
-  glm::dvec2 upper{-std::numeric_limits<double>::infinity()};
-
-  void add(const glm::dvec2& low, const glm::dvec2& high) {
-    lower = glm::min(lower, low);
-    upper = glm::max(upper, high);
-  }
-  glm::dvec2 extent() const { return upper - lower; }
-};
-
-/// The box around the cells with log odds above 0, or around the whole map where there are none.
-Box occupied_box(const OccupancyGrid& map) {
-  const glm::dvec2 half_cell(map.cell_mm / 2.0);
-  Box box;
-  for (int j = 0; j < map.ny; ++j) {
-    for (int i = 0; i < map.nx; ++i) {
-      if (map.at(i, j) > 0.0F) {
-        box.add(map.centre_mm(i, j) - half_cell, map.centre_mm(i, j) + half_cell);
-      }
-    }
-  }
-  if (box.lower.x > box.upper.x) {
-    box.add(map.centre_mm(0, 0) - half_cell, map.centre_mm(map.nx - 1, map.ny - 1) + half_cell);
-  }
-  return box;
-}
 
 }  // namespace
 
@@ -119,11 +92,12 @@ TouchRegion touch_region(std::span<const Hypothesis> hypotheses, double reach_mm
     throw Error(Fault::input,
                 fmt::format("reach of the array = {} mm: give 0 to {:g}", reach_mm, farthest_mm));
   }
-  Box all;
+  BoundingBox all;
   glm::dvec2 largest_mm(0.0);
   for (const Hypothesis& hypothesis : hypotheses) {
-    const Box box = occupied_box(hypothesis.map);
-    all.add(box.lower, box.upper);
+    const BoundingBox box = occupied_box(hypothesis.map);
+    all.take_in(box.lower);
+    all.take_in(box.upper);
     largest_mm = glm::max(largest_mm, box.extent());
   }
   const glm::dvec2 reach(reach_mm);

@@ -178,11 +178,70 @@ std::vector<BeliefSummary> DenseBelief::summarise() const {
       summary.arg_max = lattice_index(lattice_, slab, partial.arg_max);
     }
   });
-  for_each_partial([&](BeliefSummary& summary, const Slab&, const shaders::Partial& partial,
+  for_each_partial([&](BeliefSummary& summary, const Slab& slab, const shaders::Partial& partial,
                        const TwoFloat& max) {
-    summary.sum += partial.sum * std::exp(max.value() - summary.max.value());
+    const double sum = partial.sum * std::exp(max.value() - summary.max.value());
+    summary.sum += sum;
+    const auto at = static_cast<std::size_t>(&slab - slabs_.data());
+    const bool same_slab = !summary.blocks.empty() && summary.blocks.back().slab == at;
+    const std::int64_t begin =
+        same_slab ? summary.blocks.back().first + summary.blocks.back().bins : 0;
+    summary.blocks.push_back(
+        {at, begin, std::min<std::int64_t>(reduction_.bins(), slab.bins() - begin), sum});
   });
   return summaries;
+}
+
+std::vector<std::int64_t> DenseBelief::bins_at(std::size_t object, const BeliefSummary& summary,
+                                               std::span<const double> parts) const {
+  /// A block with some of the parts in it.
+  struct Hit {
+    const BeliefBlock* block;
+    double before;  ///< summed probability before the block
+    std::vector<TwoFloat> bins;
+  };
+  std::vector<Hit> hits;
+  std::vector<std::size_t> hit_of;  // [part]
+  auto block = summary.blocks.begin();
+  double before = 0.0;
+  for (const double part : parts) {
+    while (block + 1 != summary.blocks.end() && before + block->sum <= part * summary.sum) {
+      before += block->sum;
+      ++block;
+    }
+    if (hits.empty() || hits.back().block != &*block) {
+      hits.push_back({&*block, before, std::vector<TwoFloat>(block->bins)});
+    }
+    hit_of.push_back(hits.size() - 1);
+  }
+  for (Hit& hit : hits) {
+    const Slab& slab = slabs_[hit.block->slab];
+    stream_.download(slab.log_likelihood, hit.bins,
+                     (slab.first_bin(object) + hit.block->first) * sizeof(TwoFloat));
+  }
+  stream_.run();
+
+  std::vector<std::int64_t> found;
+  std::size_t hit = hits.size();
+  std::size_t bin = 0;
+  double reached = 0.0;  // up to and with `bin`
+  const auto mass = [&] { return std::exp(hits[hit].bins[bin].value() - summary.max.value()); };
+  for (std::size_t i = 0; i < parts.size(); ++i) {
+    if (hit_of[i] != hit) {
+      hit = hit_of[i];
+      bin = 0;
+      reached = hits[hit].before + mass();
+    }
+    // Rounding must not lead past the block's last bin.
+    while (bin + 1 < hits[hit].bins.size() && reached <= parts[i] * summary.sum) {
+      ++bin;
+      reached += mass();
+    }
+    const BeliefBlock& from = *hits[hit].block;
+    found.push_back(
+        lattice_index(lattice_, slabs_[from.slab], from.first + static_cast<std::int64_t>(bin)));
+  }
+  return found;
 }
 
 Marginals DenseBelief::marginals(std::size_t object, TwoFloat max, double of_largest) const {

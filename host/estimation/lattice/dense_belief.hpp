@@ -14,11 +14,20 @@
 
 namespace palpate {
 
+/// The bins of one object that one workgroup of a reduction covers.
+struct BeliefBlock {
+  std::size_t slab = 0;
+  std::int64_t first = 0;  ///< in the object's part of the slab
+  std::int64_t bins = 0;
+  double sum = 0.0;  ///< of exp(log-likelihood - the object's max)
+};
+
 /// The largest log-likelihood of one object's bins, and their sum (Eq. 14).
 struct BeliefSummary {
   TwoFloat max;
-  std::int64_t arg_max = 0;  ///< the lowest bin of this log-likelihood
-  double sum = 0.0;          ///< of exp(log-likelihood - max) over the bins, at least 1
+  std::int64_t arg_max = 0;              ///< the lowest bin of this log-likelihood
+  double sum = 0.0;                      ///< of exp(log-likelihood - max) over the bins, at least 1
+  std::vector<BeliefBlock> blocks = {};  ///< in the order of the lattice's bins
 };
 
 /// The summed log-likelihood of every pose bin of every object, on the device, and the reductions
@@ -51,6 +60,10 @@ class DenseBelief {
   /// @param max the object's largest log-likelihood
   /// @param of_largest the probability of a bin of this log-likelihood
   Marginals marginals(std::size_t object, TwoFloat max, double of_largest) const;
+  /// Bins of one object at which the summed probability reaches these parts of the whole, in [0,
+  /// 1), ascending. Reads only the blocks that hold them.
+  std::vector<std::int64_t> bins_at(std::size_t object, const BeliefSummary& summary,
+                                    std::span<const double> parts) const;
   /// One object's log-likelihoods in a window, [theta, y, x].
   std::vector<double> download(std::size_t object, const BinWindow& window) const;
 

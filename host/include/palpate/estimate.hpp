@@ -36,6 +36,12 @@ struct ProbabilityInterval {
   double high = 1.0;
 };
 
+/// An object and its pose, drawn from a belief.
+struct PoseSample {
+  int object = 0;  ///< index into the hypotheses
+  Pose T_object_robot;
+};
+
 /// What the belief says about the unknown object, after any number of touches.
 struct Estimate {
   std::vector<double> identity;  ///< probability of every hypothesis, Eq. 14; with `none` sums to 1

@@ -10,6 +10,7 @@
 
 #include "palpate/contact_model.hpp"
 #include "palpate/device.hpp"
+#include "palpate/displacement.hpp"
 #include "palpate/estimate.hpp"
 #include "palpate/lattice.hpp"
 
@@ -27,6 +28,13 @@ struct HistogramOptions {
   /// learned, whose map holds only the prior. Its likelihood is the same at every pose, so it takes
   /// no bins. Positive; by default "none of these" is left out.
   std::optional<double> none_weight = {};
+  /// How far the sensor may really have been from T_robot_sensor, in its own frame, at each touch
+  /// by itself. A touch's likelihood is its mean over these displacements. By default poses are
+  /// exact.
+  DisplacementSd touch_sd = {};
+  /// How far the object may move between two touches, about the centroid of its map's cells with
+  /// log odds above 0, which leaves the identity as it is. By default the object rests.
+  DisplacementSd slip_sd = {};
   /// Device memory in bytes that the histogram may take, staging memory included; by default all of
   /// it. A lower limit makes tables smaller, which costs time; the result keeps its bits.
   std::optional<std::uint64_t> memory_limit_bytes = {};
@@ -104,6 +112,12 @@ class PoseHistogram {
   /// Log-likelihood of every bin of one object in nats, [theta, y, x], without prior weights.
   /// @throws Error if there is no such object, or the device fails
   std::vector<double> log_likelihood(int object) const;
+
+  /// Draws objects and poses from the belief, "none of these" left out. A pose lies anywhere in its
+  /// bin with equal probability. Draws come in the order of objects and bins; the same seed gives
+  /// the same draws on one device.
+  /// @throws Error if the device fails
+  std::vector<PoseSample> sample(std::size_t count, std::uint64_t seed) const;
 
   const PoseLattice& lattice() const;
   /// How the likelihood is evaluated for each cell size among the maps, and why.

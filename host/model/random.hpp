@@ -15,7 +15,9 @@ enum class Stream : std::uint32_t {
   object_pose,
   touch_order,
   frames,
-  pose_noise
+  pose_noise,
+  belief,    // draws from it
+  readings,  // of touches that are only imagined
 };
 
 /// Draws random numbers that are the same with every standard library: the engine and std::seed_seq

@@ -1,0 +1,54 @@
+#include "displacement_points.hpp"
+
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+namespace palpate {
+namespace {
+
+TEST(NormalQuantile, InvertsTheDistributionFunction) {
+  for (const double x : {-6.0, -2.5, -1.0, -0.1, 0.0, 0.3, 1.7, 4.0}) {
+    const double probability = 0.5 * std::erfc(-x / std::sqrt(2.0));
+    EXPECT_NEAR(normal_quantile(probability), x, 1e-8);
+  }
+}
+
+TEST(DisplacementPoints, HaveTheMomentsOfTheDistribution) {
+  const DisplacementSd sd{.mm = 1.5, .rad = 0.05};
+  const std::vector<Pose> points = displacement_points(sd, 256);
+  double x = 0.0;
+  double xx = 0.0;
+  double yy = 0.0;
+  double xy = 0.0;
+  double tt = 0.0;
+  for (const Pose& point : points) {
+    x += point.translation_mm.x / 256.0;
+    xx += point.translation_mm.x * point.translation_mm.x / 256.0;
+    yy += point.translation_mm.y * point.translation_mm.y / 256.0;
+    xy += point.translation_mm.x * point.translation_mm.y / 256.0;
+    tt += point.theta_rad * point.theta_rad / 256.0;
+  }
+  // Independent random points would be off by 6 and 9 %.
+  EXPECT_NEAR(x / sd.mm, 0.0, 0.01);
+  EXPECT_NEAR(xx / (sd.mm * sd.mm), 1.0, 0.03);
+  EXPECT_NEAR(yy / (sd.mm * sd.mm), 1.0, 0.03);
+  EXPECT_NEAR(xy / (sd.mm * sd.mm), 0.0, 0.03);
+  EXPECT_NEAR(tt / (sd.rad * sd.rad), 1.0, 0.03);
+}
+
+TEST(DisplacementPoints, AreOneWhereNothingIsDisplaced) {
+  const std::vector<Pose> points = displacement_points({}, 256);
+  ASSERT_EQ(points.size(), 1U);
+  EXPECT_EQ(points.front().translation_mm, glm::dvec2(0.0));
+  EXPECT_EQ(points.front().theta_rad, 0.0);
+}
+
+TEST(DisplacementPoints, LeaveAnExactPartAlone) {
+  for (const Pose& point : displacement_points({.mm = 1.0}, 16)) {
+    EXPECT_EQ(point.theta_rad, 0.0);
+  }
+}
+
+}  // namespace
+}  // namespace palpate
