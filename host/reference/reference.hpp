@@ -9,6 +9,7 @@
 #include <glm/vec2.hpp>
 
 #include "palpate/contact_model.hpp"
+#include "palpate/displacement.hpp"
 #include "palpate/fit.hpp"
 #include "palpate/lattice.hpp"
 #include "palpate/occupancy_grid.hpp"
@@ -88,6 +89,14 @@ double log_likelihood(const Touch& touch, const Pose& T_object_robot, const Occu
 std::optional<Fit> fit_of(std::span<const Touch> touches, const Pose& T_object_robot,
                           const OccupancyGrid& map, const ContactModel& model,
                           std::size_t object = 0);
+
+/// The same where each touch by itself may have been displaced by delta, normally distributed. Per
+/// touch: L(readings) = log E_delta prod P(reading), and M and V are mean and variance of L under
+/// Q(readings) = E_delta prod q(reading). E_delta is a sum over a grid of displacements, M and V
+/// are sums over all readings that the known elements could have had: for few elements.
+std::optional<Fit> fit_of(std::span<const Touch> touches, const Pose& T_object_robot,
+                          const OccupancyGrid& map, const ContactModel& model,
+                          const DisplacementSd& touch_sd, std::size_t object = 0);
 
 // --- particles.cpp: Eq. 8-12 ---
 
