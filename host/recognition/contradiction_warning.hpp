@@ -1,0 +1,31 @@
+#pragma once
+
+#include <optional>
+#include <span>
+#include <string>
+
+#include "palpate/touch.hpp"
+#include "recognition_record.hpp"
+#include "recognition_task.hpp"
+
+namespace palpate {
+
+/// A warning where touches are not where they were said to be, or else none: where the last touches
+/// surprise the belief (a mean above `surprising_from`) or all touches together do not fit, and
+/// every touch displaced by itself, by up to 4 mm and the turn that belongs to it, makes them fit
+/// the object at the step's pose. Names the root mean square of these displacements over the
+/// touches in contact. Never for a single touch, nor for particles.
+/// @param touches all touches of the unknown so far
+/// @param step what the filter believes after them; reads mode, pose and fit
+/// @param surprises of the touches so far; see surprise_of()
+std::optional<std::string> touches_contradict(std::span<const Touch> touches,
+                                              const RecognitionTask& task,
+                                              const RecognitionStep& step,
+                                              std::span<const double> surprises);
+
+/// Mean of the last `surprises_judged` surprises from which they are surprising. Of 780 such means
+/// over simulated touches of letters at exact poses none reached 0.9; with 1 mm and 0.05 rad of
+/// misplacement a quarter exceed 1.5.
+inline constexpr double surprising_from = 1.5;
+
+}  // namespace palpate
