@@ -107,7 +107,8 @@ std::optional<std::string> touches_contradict(std::span<const Touch> touches,
   constexpr std::size_t most_touches = 12;   // the last of them; more would only take longer
   constexpr double usual_rad_per_mm = 0.05;  // a robot that is 1 mm off is some 3 degrees off
   const bool misfit = step.fit && step.fit->verdict != Verdict::fits;
-  if (!step.refined || touches.size() < 2 || !(misfit || are_surprising(surprises))) {
+  if (!step.refined || task.labels[step.best] == none_label || touches.size() < 2 ||
+      !(misfit || are_surprising(surprises))) {
     return {};
   }
   const auto object = static_cast<std::size_t>(step.mode.object);
