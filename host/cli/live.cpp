@@ -41,9 +41,9 @@ struct Options {
   std::string json;
 };
 
-/// Tells what is wrong with the poses as it happens: on standard error, or on the screen where the
-/// screen would overwrite standard error.
-class PoseComplaints {
+/// Tells what is wrong with the poses or the lattice as it happens: on standard error, or on the
+/// screen where the screen would overwrite standard error.
+class Complaints {
  public:
   void add(const std::string& problem) {
     const std::lock_guard lock(mutex_);
@@ -100,7 +100,7 @@ void live(const Options& options) {
         "poses",
         options.sensor);
   }
-  PoseComplaints complaints;
+  Complaints complaints;
   const OpenSensor opened =
       open_sensor(options.sensor, options.poses,
                   [&complaints](const std::string& problem) { complaints.add(problem); });
@@ -142,11 +142,19 @@ void live(const Options& options) {
     fmt::print("{}\n", table_heading());
     std::fflush(stdout);
   }
+  bool resolved = true;  // nothing was said yet
   complaints.show(on_terminal && isatty(STDERR_FILENO) != 0);
   LiveRecognition recognition(
       *opened.sensor, elements_mm, recogniser, task,
       {.detector = detector, .tare_s = options.tare_s, .reset_after_s = options.reset_after_s},
       [&](const LiveTouch& touch) {
+        // This thread alone uses the recogniser meanwhile.
+        const auto unresolved = unresolved_words(task, recogniser.lattice(),
+                                                 std::span(&*touch.touch.T_robot_sensor, 1));
+        if (resolved && !unresolved.empty()) {
+          resolved = false;
+          complaints.add(unresolved);
+        }
         if (json) {
           json->add(json_line(touch, task));
         }

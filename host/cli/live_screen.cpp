@@ -99,6 +99,12 @@ void LiveScreen::describe(const LiveState& state) {
   } else if (step.fit) {
     view_.state += "; " + fit_word(step);
   }
+  if (const std::string surprise = surprise_text(step); !surprise.empty()) {
+    view_.state += "; surprise " + surprise;
+  }
+  if (auto words = single_touch_words(task_, state.touches); !words.empty()) {
+    view_.notes.push_back(std::move(words));
+  }
   view_.notes.insert(view_.notes.end(), step.warnings.begin(), step.warnings.end());
   view_.identity = step.identity;
   view_.map = &task_.hypotheses[step.mode.object].map;

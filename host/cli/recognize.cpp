@@ -2,6 +2,7 @@
 
 #include <unistd.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -136,6 +137,14 @@ void export_posterior(const std::filesystem::path& path, const RecognitionTask& 
   });
 }
 
+std::vector<Pose> poses_of(const Unknown& unknown) {
+  std::vector<Pose> T_robot_sensor;
+  for (const Touch& touch : unknown.touches) {
+    T_robot_sensor.push_back(touch.T_robot_sensor);
+  }
+  return T_robot_sensor;
+}
+
 /// Writes posterior and JSON. The JSON appears only after the posterior.
 void write_results(const Options& options, const RecognitionTask& task,
                    const Recogniser& recogniser, const std::string& json) {
@@ -174,6 +183,7 @@ void recognize(const Options& options) {
   }
   check_outputs(options, scene, task, unknowns);
   Device device = open_device(options.recognition, scene);
+  std::string unresolved;
   Recogniser recogniser = open_recogniser(device, task);
   if (!options.png.empty()) {
     make_folder(options.png);
@@ -192,6 +202,9 @@ void recognize(const Options& options) {
       };
       records.push_back(recognise(recogniser, task, unknown, trace, show));
       records.back().require_steps();
+      if (unresolved.empty()) {
+        unresolved = unresolved_words(task, recogniser.lattice(), poses_of(unknown));
+      }
       show(0.0);
       json.push_back(to_json(records.back(), task, device.name(), options.trace));
       if (!options.png.empty()) {
@@ -201,6 +214,10 @@ void recognize(const Options& options) {
                                       recogniser.marginals(records.back().last().mode.object))));
       }
     }
+  }
+
+  if (!unresolved.empty()) {
+    fmt::print(stderr, "palpate: {}\n", unresolved);
   }
 
   // The path of a recording need not be UTF-8, as JSON must.
