@@ -180,10 +180,15 @@ std::string table_of(const Plan& plan, std::optional<int> columns) {
 PlanFigure figure_of(const Plan& plan) {
   PlanFigure figure;
   const RecognitionStep& last = plan.record.last();
-  figure.result =
-      fmt::format("{}: {}", std::filesystem::path(plan.record.recording).filename().string(),
-                  result_words(last, plan.task));
-  figure.captions = {believed_words(plan), next_touch_words(plan.ranked.front(), plan.goal)};
+  const auto printed = [](std::string words) {
+    const std::size_t at = words.find(" deg");
+    return at == words.npos ? words : words.replace(at, 4, "°");
+  };
+  const std::string name = std::filesystem::path(plan.record.recording).filename().string();
+  figure.result = fmt::format("{}: {}", name, identity_words(last, plan.task));
+  figure.captions = {
+      "object at " + printed(pose_words(pose_text(last.T_robot_object()))) + " in the robot frame",
+      believed_words(plan), printed(next_touch_words(plan.ranked.front(), plan.goal))};
   figure.gain_caption =
       plan.goal == PlanGoal::both
           ? "expected information about object and pose, nats"

@@ -25,7 +25,7 @@ constexpr double top_px = 214.0;
 constexpr double bar_below_px = 104.0;
 constexpr double bar_height_px = 20.0;
 constexpr double below_bar_px = 90.0;
-constexpr double needle_px = 15.0;
+constexpr double needle_px = 18.0;
 
 constexpr Pen touch_pen{.colour = {0.35, 0.35, 0.35, 0.75}, .width_px = 1.5, .dashed = true};
 constexpr Pen best_pen{.colour = {0.80, 0.05, 0.30}, .width_px = 4.0, .halo_px = 2.0};
@@ -84,7 +84,7 @@ struct GainScale {
   explicit GainScale(const PlanFigure& figure) {
     const auto [least, most] =
         std::ranges::minmax_element(figure.candidates, {}, &PlanFigure::Candidate::gain_nats);
-    lower = std::min(0.0, least->gain_nats);
+    lower = least->gain_nats;
     upper = std::max(most->gain_nats, lower + 1e-3);
   }
   Colour colour(double gain) const { return sequential((gain - lower) / (upper - lower)); }
@@ -120,11 +120,11 @@ void draw_legend(Canvas& canvas, double baseline) {
   const std::array ends{glm::dvec2(x + 4.0, baseline - 6.0), glm::dvec2(x + 19.0, baseline - 6.0)};
   canvas.line(ends, {.colour = shade, .width_px = 4.0});
   x += 28.0;
-  meaning("candidate, along its x axis");
+  meaning("candidates, along x");
   const Box box{x, baseline - 14.0, 26.0, 16.0};
   canvas.cells(box, 1, 1, [](int, int) { return occupancy_colour(1.0); });
   x += 34.0;
-  meaning("object expected");
+  meaning("object");
 }
 
 }  // namespace
