@@ -8,6 +8,7 @@
 
 #include "options.hpp"
 #include "palpate/error.hpp"
+#include "planned_touch.hpp"
 #include "printable.hpp"
 #include "record_output.hpp"
 #include "step_words.hpp"
@@ -32,6 +33,10 @@ std::string json_line(const LiveTouch& touch, const RecognitionTask& task) {
   json.update(to_json(touch.step, task));
   if (!touch.step.truth.label.empty()) {
     json["truth"] = truth_to_json(touch.step.truth);
+  }
+  if (touch.next) {
+    json["next"] = to_json(*touch.next);
+    json["next"].erase("index");  // of a grid that nobody else knows
   }
   json["latency_ms"] = touch.latency_ms;
   json["frames_lost"] = touch.frames_lost;
