@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
 #include <numbers>
 #include <utility>
 
@@ -25,12 +24,16 @@ std::array<double, 2> squares(const std::vector<Pose>& displacements, const Disp
 }  // namespace
 
 DisplacementPopulation::DisplacementPopulation(std::span<const LivingElements> touches,
-                                               std::span<const BorderedLogOdds> objects,
+                                               std::span<const SmoothOccupancy> objects,
                                                const ReadingModel& readings,
                                                const PoseLattice& region,
                                                std::span<const PoseSample> starts,
                                                std::uint64_t seed)
-    : touches_(touches), objects_(objects), readings_(readings), region_(region), random_(seed, Stream::belief) {
+    : touches_(touches),
+      objects_(objects),
+      readings_(readings),
+      region_(region),
+      random_(seed, Stream::belief) {
   const auto n = static_cast<double>(touches.size());
   for (const LivingElements& touch : touches) {
     middle_mm_ += touch.T_robot_sensor.translation_mm / n;
@@ -53,13 +56,12 @@ DisplacementPopulation::DisplacementPopulation(std::span<const LivingElements> t
 double DisplacementPopulation::likelihood(const Sample& sample, const Pose& T_object_robot,
                                           std::size_t touch, const Pose& displacement) const {
   double nats = 0.0;
-  objects_[sample.object].sample(
-      touches_[touch], T_object_robot * touches_[touch].T_robot_sensor * displacement,
-      [&](const LivingElements::Element& element, double log_odds) {
-        nats += readings_.log_probability(element.reading, log_odds);
-      });
-  static const double beta = std::getenv("BETA") ? std::atof(std::getenv("BETA")) : 1.0;
-  return beta * nats;
+  objects_[sample.object].sample(touches_[touch],
+                                 T_object_robot * touches_[touch].T_robot_sensor * displacement,
+                                 [&](const LivingElements::Element& element, double occupancy) {
+                                   nats += readings_.log_probability(element.reading, occupancy);
+                                 });
+  return nats;
 }
 
 bool DisplacementPopulation::accepts(double log_ratio) {
@@ -92,8 +94,8 @@ bool DisplacementPopulation::in_region(const Pose& T_object_robot) const {
   const Axis& theta = region_.theta_rad;
   const double middle = (theta.lower + theta.upper) / 2.0;
   return within(region_.x_mm, pivot.x) && within(region_.y_mm, pivot.y) &&
-         within(theta, middle + wrap_angle(T_object_robot.theta_rad - middle,
-                                           2.0 * std::numbers::pi));
+         within(theta,
+                middle + wrap_angle(T_object_robot.theta_rad - middle, 2.0 * std::numbers::pi));
 }
 
 void DisplacementPopulation::move_touches(Sample& sample, const DisplacementSd& sd) {
@@ -109,8 +111,7 @@ void DisplacementPopulation::move_touches(Sample& sample, const DisplacementSd& 
         to = {sd.mm * to.translation_mm, sd.rad * to.theta_rad};
       } else {
         const double step = std::pow(10.0, -random_.uniform());
-        to = {from.translation_mm +
-                  step * std::min(1.5 * sd.mm, widest_mm) * to.translation_mm,
+        to = {from.translation_mm + step * std::min(1.5 * sd.mm, widest_mm) * to.translation_mm,
               from.theta_rad + step * std::min(1.5 * sd.rad, widest_rad) * to.theta_rad};
         const auto before = squares({from}, sd);
         const auto after = squares({to}, sd);
@@ -126,7 +127,8 @@ void DisplacementPopulation::move_touches(Sample& sample, const DisplacementSd& 
 }
 
 void DisplacementPopulation::move_object(Sample& sample, const DisplacementSd& sd) {
-  constexpr double optimal = 1.4;  // 2.4 over the root of 3 dimensions (Roberts, Gelman, Gilks 1997)
+  constexpr double optimal =
+      1.4;  // 2.4 over the root of 3 dimensions (Roberts, Gelman, Gilks 1997)
   const auto n = static_cast<double>(touches_.size());
   const double scale_mm = optimal * sd.mm / std::sqrt(n);
   const double scale_rad =
@@ -157,8 +159,8 @@ void DisplacementPopulation::move_robot(Sample& sample) {
   constexpr double arm_mm = 5.0;  // of an array: what a turn moves where all touches are in a place
   const double step_mm = widest_mm * std::pow(10.0, -random_.uniform());
   const double mean_arm_mm2 = spread_mm2_ / static_cast<double>(touches_.size());
-  const Pose to = moved(sample.T_object_robot, step_mm,
-                        step_mm / std::sqrt(mean_arm_mm2 + arm_mm * arm_mm));
+  const Pose to =
+      moved(sample.T_object_robot, step_mm, step_mm / std::sqrt(mean_arm_mm2 + arm_mm * arm_mm));
   if (!in_region(to)) {
     return;
   }
@@ -179,10 +181,9 @@ void DisplacementPopulation::count(ReadingModel::Counts& counts) const {
   for (const Sample& sample : samples_) {
     for (std::size_t i = 0; i < touches_.size(); ++i) {
       objects_[sample.object].sample(
-          touches_[i],
-          sample.T_object_robot * touches_[i].T_robot_sensor * sample.displacement[i],
-          [&](const LivingElements::Element& element, double log_odds) {
-            readings_.count(counts, element.reading, log_odds, weight);
+          touches_[i], sample.T_object_robot * touches_[i].T_robot_sensor * sample.displacement[i],
+          [&](const LivingElements::Element& element, double occupancy) {
+            readings_.count(counts, element.reading, occupancy, weight);
           });
     }
   }
@@ -191,8 +192,8 @@ void DisplacementPopulation::count(ReadingModel::Counts& counts) const {
 void DisplacementPopulation::refresh() {
   for (Sample& sample : samples_) {
     for (std::size_t i = 0; i < touches_.size(); ++i) {
-      sample.log_likelihood[i] = likelihood(sample, sample.T_object_robot, i,
-                                            sample.displacement[i]);
+      sample.log_likelihood[i] =
+          likelihood(sample, sample.T_object_robot, i, sample.displacement[i]);
     }
   }
 }

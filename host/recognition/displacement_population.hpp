@@ -6,10 +6,13 @@
 #include <span>
 #include <vector>
 
-#include "displaced_touches.hpp"
+#include "living_elements.hpp"
 #include "palpate/displacement.hpp"
+#include "palpate/estimate.hpp"
 #include "palpate/lattice.hpp"
 #include "random.hpp"
+#include "reading_model.hpp"
+#include "smooth_occupancy.hpp"
 
 namespace palpate {
 
@@ -21,6 +24,16 @@ struct SdScore {
   std::array<double, 2> mean{};
   std::array<double, 2> complete{};
   std::array<double, 3> covariance{};  ///< (mm, mm), (mm, rad), (rad, rad)
+
+  void add(const SdScore& other, double weight) {
+    for (std::size_t k = 0; k < mean.size(); ++k) {
+      mean[k] += weight * other.mean[k];
+      complete[k] += weight * other.complete[k];
+    }
+    for (std::size_t k = 0; k < covariance.size(); ++k) {
+      covariance[k] += weight * other.covariance[k];
+    }
+  }
 };
 
 /// Samples of one unknown's object, pose and displacements of every touch from their posterior
@@ -32,7 +45,7 @@ class DisplacementPopulation {
   /// @param region with the pivot that the unknown was recognised with; its counts are not read
   /// @param starts from the belief about the unknown, one for every sample
   DisplacementPopulation(std::span<const LivingElements> touches,
-                         std::span<const BorderedLogOdds> objects, const ReadingModel& readings,
+                         std::span<const SmoothOccupancy> objects, const ReadingModel& readings,
                          const PoseLattice& region, std::span<const PoseSample> starts,
                          std::uint64_t seed);
 
@@ -73,7 +86,7 @@ class DisplacementPopulation {
   void move_robot(Sample& sample);
 
   std::span<const LivingElements> touches_;
-  std::span<const BorderedLogOdds> objects_;
+  std::span<const SmoothOccupancy> objects_;
   const ReadingModel& readings_;
   PoseLattice region_;
   glm::dvec2 middle_mm_{0.0, 0.0};  ///< of the sensors' origins, robot frame
