@@ -165,6 +165,7 @@ LargestEvidence find_largest_evidence(std::vector<DisplacementPopulation>& unkno
   constexpr int most_steps = 60;
   constexpr int averaged_steps = 8;
   constexpr double small_step = 0.03;  // 3 %, about what the samples' noise moves
+  constexpr double of_an_error = 0.3;  // steps far below the standard error lead nowhere
   Search search(unknowns, readings, range);
   const DisplacementSd& least = range.least;
   const double whole_way = std::log(range.start.mm / least.mm) / search.longest_step();
@@ -179,17 +180,20 @@ LargestEvidence find_largest_evidence(std::vector<DisplacementPopulation>& unkno
   LargestEvidence result;
   int small_steps = 0;
   for (int i = 0; i < most_steps && !result.ended; ++i) {
-    const std::array<double, 2> step = search.step(search.move(range.sweeps));
+    const Slope slope = search.move(range.sweeps);
+    const std::array<double, 2> step = search.step(slope);
     search.follow(step);
     search.learn();
     show();
-    const auto rests = [&](double part, double sd, double lowest) {
-      return std::abs(part) < small_step || (sd <= lowest && part < 0.0);
+    const auto rests = [&](double part, double information, double sd, double lowest) {
+      const double enough =
+          std::max(small_step, information > 0.0 ? of_an_error / std::sqrt(information) : 0.0);
+      return std::abs(part) < enough || (sd <= lowest && part < 0.0);
     };
-    small_steps =
-        rests(step[0], search.sd().mm, least.mm) && rests(step[1], search.sd().rad, least.rad)
-            ? small_steps + 1
-            : 0;
+    small_steps = rests(step[0], slope.information.mm, search.sd().mm, least.mm) &&
+                          rests(step[1], slope.information.rad, search.sd().rad, least.rad)
+                      ? small_steps + 1
+                      : 0;
     result.ended = small_steps == 3;
   }
 
@@ -222,7 +226,7 @@ LargestEvidence find_largest_evidence(std::vector<DisplacementPopulation>& unkno
 
   while (search.sd().mm > least.mm || search.sd().rad > least.rad) {
     result.gain -= search.follow({-search.longest_step(), -search.longest_step()});
-    search.move(range.sweeps / 2);
+    search.move(std::max(1, range.sweeps / 4));  // one number of nats needs no more
     show();
   }
   return result;

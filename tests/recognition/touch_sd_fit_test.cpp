@@ -49,7 +49,7 @@ TEST(TouchSdFit, FindsTheMisplacement) {
   const std::vector<Recording> recordings = misplaced_letters(12, 8, {1.0, 0.05});
   double shown = 0.0;
   const TouchSdFit fit = fit_touch_sd(device, letter_task(device), as_unknowns(recordings),
-                                      {.samples = 24}, [&](double fraction) {
+                                      {.samples = 16, .sweeps = 10}, [&](double fraction) {
                                         EXPECT_GE(fraction, shown);
                                         EXPECT_LE(fraction, 1.0);
                                         shown = fraction;
@@ -67,12 +67,13 @@ TEST(TouchSdFit, FindsTheMisplacement) {
 
 TEST(TouchSdFit, OfExactTouchesIsNextToNothing) {
   Device device = Device::open();
-  const std::vector<Recording> recordings = misplaced_letters(9, 8, {});
+  const std::vector<Recording> recordings = misplaced_letters(6, 8, {});
   std::vector<TouchedObject> unknowns = as_unknowns(recordings);
   for (std::size_t i = 0; i < unknowns.size(); i += 2) {
     unknowns[i].label = recordings[i].truth->object;
   }
-  const TouchSdFit fit = fit_touch_sd(device, letter_task(device), unknowns, {.samples = 24});
+  const TouchSdFit fit =
+      fit_touch_sd(device, letter_task(device), unknowns, {.samples = 16, .sweeps = 10});
   EXPECT_LT(fit.sd.mm, 0.2);  // the maps' cells have 0.5 mm
   EXPECT_LT(fit.sd.rad, 0.03);
 }
@@ -80,8 +81,8 @@ TEST(TouchSdFit, OfExactTouchesIsNextToNothing) {
 TEST(TouchSdFit, SaysWhereTouchesAreTooFew) {
   Device device = Device::open();
   const std::vector<Recording> recordings = misplaced_letters(2, 1, {});
-  const TouchSdFit fit =
-      fit_touch_sd(device, letter_task(device), as_unknowns(recordings), {.samples = 8});
+  const TouchSdFit fit = fit_touch_sd(device, letter_task(device), as_unknowns(recordings),
+                                      {.samples = 8, .sweeps = 4});
   ASSERT_GE(fit.warnings.size(), 2U);
   EXPECT_NE(fit.warnings[0].find("2 of 2 unknowns have fewer than 3 touches"), std::string::npos);
   EXPECT_NE(fit.warnings[1].find("in one place only"), std::string::npos);
@@ -200,12 +201,12 @@ TEST(DisplacementPopulation, FollowsTheEvidenceOfDenseSums) {
   const DenseEvidence evidence(touches, maps[0], readings);
   const DisplacementSd sd{0.8, 0.1};
   population.move(sd, 100);
-  const SdScore score = population.move(sd, 600);
+  const SdScore score = population.move(sd, 300);
   constexpr double part = 0.05;
   const auto at = [&](double mm, double rad) {
     return evidence({sd.mm * std::exp(mm), sd.rad * std::exp(rad)});
   };
-  // 50 samples of 300 sweeps, of which about one in 15 counts, and scores that vary by 3 and 2.
+  // 50 samples of 150 sweeps, of which about one in 15 counts, and scores that vary by 3 and 2.
   constexpr double noise = 0.3;
   EXPECT_NEAR(score.mean[0], (at(part, 0.0) - at(-part, 0.0)) / (2.0 * part), noise);
   EXPECT_NEAR(score.mean[1], (at(0.0, part) - at(0.0, -part)) / (2.0 * part), noise);
