@@ -3,10 +3,12 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <filesystem>
 #include <memory>
 #include <optional>
 #include <set>
+#include <span>
 #include <string>
 
 #include <fmt/format.h>
@@ -23,6 +25,7 @@
 #include "recordings.hpp"
 #include "sheet.hpp"
 #include "terminal.hpp"
+#include "touch_sd_output.hpp"
 
 namespace palpate::cli {
 
@@ -38,6 +41,7 @@ struct Options {
   std::string json;
   std::string posterior;
   std::string png;
+  bool fit_touch_sd = false;
 };
 
 /// The unknowns that the flags select: views into the recordings' memory.
@@ -161,6 +165,26 @@ void write_results(const Options& options, const RecognitionTask& task,
   }
 }
 
+/// The whole command with --fit-touch-sd.
+void fit_touch_sd(const Options& options, const Scene& scene, const RecognitionTask& task,
+                  std::span<const Recording> recordings, std::span<const Unknown> unknowns) {
+  Device device = open_device(options.recognition, scene);
+  TouchSdFit fit;
+  {
+    Progress progress("fitting touch-sd");
+    fit = palpate::fit_touch_sd(device, task, touched_objects(recordings, unknowns, task), {},
+                                [&](double fraction) { progress.show(fraction); });
+  }
+  const std::string json =
+      to_json(fit, device.name())
+          .dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) +
+      "\n";
+  if (!options.json.empty() && options.json != "-") {
+    write_file(options.json, json);
+  }
+  fmt::print("{}", options.json == "-" ? json : touch_sd_text(fit));
+}
+
 void recognize(const Options& options) {
   const Scene scene = scene_of(options.recognition);
   std::vector<Recording> recordings = read_touch_recordings(options.recordings);
@@ -181,7 +205,18 @@ void recognize(const Options& options) {
   if (auto* histogram = std::get_if<HistogramOptions>(&task.filter)) {
     histogram->still_array = array_is_still(unknowns);
   }
+  if (options.fit_touch_sd) {
+    refuse_beside_fit(std::array<OtherFlag, 4>{{{"--each-frame", options.each_frame},
+                                                {"--trace", options.trace},
+                                                {"--posterior", !options.posterior.empty()},
+                                                {"--png", !options.png.empty()}}},
+                      task);
+  }
   check_outputs(options, scene, task, unknowns);
+  if (options.fit_touch_sd) {
+    fit_touch_sd(options, scene, task, recordings, unknowns);
+    return;
+  }
   Device device = open_device(options.recognition, scene);
   std::string unresolved;
   Recogniser recogniser = open_recogniser(device, task);
@@ -274,6 +309,12 @@ void add_recognize(CLI::App& app) {
       "--png", options->png,
       "Folder for a picture of each unknown: the touches on the map, the belief over x and y, "
       "the identity after every touch");
+  command->add_flag(
+      "--fit-touch-sd", options->fit_touch_sd,
+      "Instead of recognising, find how far the touches lie from where the robot reports them: the "
+      "standard deviations for --touch-sd-mm and --touch-sd-deg under which all RECORDINGs have "
+      "the "
+      "largest evidence. Give about 50 objects, each touched 5 times or more");
   command->callback([options] { recognize(*options); });
 }
 
