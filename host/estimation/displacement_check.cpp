@@ -3,16 +3,11 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-<<<<<<< HEAD
-
-#include <fmt/format.h>
-=======
 #include <numbers>
 #include <tuple>
 
 #include <fmt/format.h>
 #include <glm/geometric.hpp>
->>>>>>> cli13
 
 #include "palpate/error.hpp"
 
@@ -50,8 +45,6 @@ void validate_displacement(const DisplacementSd& sd, const PoseLattice& lattice,
   require(sd.rad, widest.rad, name, "rad");
 }
 
-<<<<<<< HEAD
-=======
 std::optional<std::string> unresolved_by_steps(const DisplacementSd& sd, const PoseLattice& lattice,
                                                const char* name) {
   constexpr double degrees_per_rad = 180.0 / std::numbers::pi;
@@ -83,5 +76,4 @@ std::optional<std::string> unresolved_at(const Pose& T_robot_sensor, const Displ
       name, r_mm, moved_mm, most_mm);
 }
 
->>>>>>> cli13
 }  // namespace palpate

@@ -1,11 +1,8 @@
 #pragma once
 
-<<<<<<< HEAD
-=======
 #include <optional>
 #include <string>
 
->>>>>>> cli13
 #include "palpate/displacement.hpp"
 #include "palpate/lattice.hpp"
 
@@ -19,8 +16,6 @@ DisplacementSd widest_displacement(const PoseLattice& lattice);
 /// finite, at least 0 and within widest_displacement().
 void validate_displacement(const DisplacementSd& sd, const PoseLattice& lattice, const char* name);
 
-<<<<<<< HEAD
-=======
 // A lattice does not resolve a displacement where it blurs too little or at the wrong place. Each
 // function returns that as a sentence with the remedy, or none where the lattice does resolve it.
 // `name` is that of the displacement. An axis of one bin, or a deviation of 0, is not blurred.
@@ -33,5 +28,4 @@ std::optional<std::string> unresolved_by_steps(const DisplacementSd& sd, const P
 std::optional<std::string> unresolved_at(const Pose& T_robot_sensor, const DisplacementSd& sd,
                                          const PoseLattice& lattice, const char* name);
 
->>>>>>> cli13
 }  // namespace palpate

@@ -10,10 +10,7 @@
 
 #include "palpate/contact_model.hpp"
 #include "palpate/displacement.hpp"
-<<<<<<< HEAD
 #include "palpate/estimate.hpp"
-=======
->>>>>>> cli13
 #include "palpate/fit.hpp"
 #include "palpate/lattice.hpp"
 #include "palpate/occupancy_grid.hpp"
