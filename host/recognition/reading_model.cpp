@@ -29,10 +29,11 @@ ReadingModel::ReadingModel(const ContactModel& contact) : classes_(reading_level
 void ReadingModel::tabulate(const std::vector<double>& probability) {
   log_p_.clear();
   for (std::size_t c = 0; c < classes_; ++c) {
-    for (std::size_t i = 0; i < fine_; ++i) {
-      const std::size_t node = std::min(i / fine_per_node_, nodes_ - 2);
+    for (std::size_t i = 0; i < parts_; ++i) {
+      const double place = (static_cast<double>(i) + 0.5) / parts_ * (nodes_ - 1);
+      const auto node = std::min(static_cast<std::size_t>(place), nodes_ - 2);
       const double* at = &probability[c * nodes_ + node];
-      const double part = static_cast<double>(i - node * fine_per_node_) / fine_per_node_;
+      const double part = place - static_cast<double>(node);
       log_p_.push_back(static_cast<float>(std::log(std::lerp(at[0], at[1], part))));
     }
   }

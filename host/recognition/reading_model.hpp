@@ -22,7 +22,8 @@ class ReadingModel {
   /// Log-probability of a class, which is below classes(), in nats.
   /// @param occupancy from 0 to 1
   double log_probability(std::size_t reading, double occupancy) const {
-    return log_p_[reading * fine_ + static_cast<std::size_t>(occupancy * (fine_ - 1) + 0.5)];
+    const auto part = static_cast<std::size_t>(occupancy * static_cast<double>(parts_));
+    return log_p_[reading * parts_ + (part < parts_ ? part : parts_ - 1)];
   }
 
   /// Expected numbers of readings, [class, node].
@@ -36,11 +37,10 @@ class ReadingModel {
   void tabulate(const std::vector<double>& probability);
 
   static constexpr std::size_t nodes_ = 33;
-  static constexpr std::size_t fine_per_node_ = 64;
-  static constexpr std::size_t fine_ = (nodes_ - 1) * fine_per_node_ + 1;
+  static constexpr std::size_t parts_ = 2048;
   std::size_t classes_;        ///< Unknown is the last
   std::vector<double> start_;  ///< probabilities, [class, node]
-  std::vector<float> log_p_;   ///< [class, fine node]
+  std::vector<float> log_p_;   ///< [class, part of the occupancy], at the middle of each part
 };
 
 }  // namespace palpate

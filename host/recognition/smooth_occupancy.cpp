@@ -22,10 +22,9 @@ std::vector<float> blurred_and_transposed(const std::vector<float>& values, int 
   for (int j = 0; j < rows; ++j) {
     for (int i = 0; i < columns; ++i) {
       double sum = 0.0;
-      for (int k = -reach; k <= reach; ++k) {
-        const int from = std::clamp(i + k, 0, columns - 1);
-        sum += weights[static_cast<std::size_t>(k + reach)] *
-               values[static_cast<std::size_t>(j) * columns + from];
+      for (std::size_t w = 0; w < weights.size(); ++w) {
+        const int from = std::clamp(i + static_cast<int>(w) - reach, 0, columns - 1);
+        sum += weights[w] * values[static_cast<std::size_t>(j) * columns + from];
       }
       blurred[static_cast<std::size_t>(i) * rows + j] = static_cast<float>(sum);
     }
