@@ -2,96 +2,130 @@
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_control_flow_attributes : require
 
-// Replaces likelihoods by their weighted means over neighbours along one axis, in logs. An invocation
-// takes STRIP consecutive bins of a line, so that each likelihood is read once for all of them. The
-// pass along y writes the second word of each bin and reads the first; the pass along x reads the
-// second and writes the first: no invocation reads what another one writes.
+// Replaces likelihoods by their weighted means over neighbours along one axis. An invocation takes a
+// strip of consecutive bins of one line or of two, so that each likelihood is read once for all of
+// them. The pass along y writes the second word of each bin and reads the first; the pass along x
+// reads the second and writes the first: no invocation reads what another one writes.
 
 #include "interface.h"
 
 layout(local_size_x_id = 0) in;
 layout(constant_id = 1) const uint SOURCE = BLUR_TOUCH;
-layout(constant_id = 2) const uint STRIP = 16;
+layout(constant_id = 2) const uint STEPS = 0;     // the weights reach as many bins to either side
+layout(constant_id = 3) const bool EVEN = false;  // rows have an even number of bins
 
-layout(binding = 0) uniform samplerBuffer source;       // two words a bin
-layout(binding = 1) uniform samplerBuffer references;   // [object] log-likelihood in two floats
-layout(binding = 2) uniform samplerBuffer plane_max;    // [object, theta]
-// By distance in bins, STRIP zeros after the last; then, for each bin of the axis, 1 over the sum of
-// the weights that lie inside.
+#include "blur_weights.glsl"
+
+layout(binding = 0) uniform samplerBuffer source;      // two bins a texel
+layout(binding = 1) uniform samplerBuffer references;  // [object] log-likelihood in two floats
+layout(binding = 2) uniform samplerBuffer plane_max;   // [object, theta]
+// By distance in bins; then, for each bin of the axis, 1 over the sum of the weights that lie inside.
 layout(binding = 3) uniform samplerBuffer weights;
 layout(std430, binding = 4) writeonly buffer Result { float result[]; };  // two words a bin
-layout(push_constant) uniform Push { BlurPush push; };
+layout(push_constant) uniform Push { PlanesPush push; };
 
 #include "blurred_bin.glsl"
 
 const bool ALONG_X = SOURCE == BLUR_ALONG_Y;
 const float LEAST = ALONG_X ? LEAST_ALONG_X : LEAST_ALONG_Y;
+const int BINS = int(ALONG_X ? BLUR_STRIP_X : BLUR_STRIP_Y);  // of a line
+const int LINES = ALONG_X ? 1 : 2;
+const int REACH = int(STEPS);
+// A read takes two neighbouring bins of a row.
+const int STRIDE = ALONG_X ? 2 : 1;
+const int BEGIN = ALONG_X ? -REACH - REACH % 2 : -REACH;
 
-#define FOR_EACH_BIN [[unroll]] for (uint b = 0; b < STRIP; ++b)
+float weight_of(const int distance) {
+  return STEPS <= BLUR_CONSTANT_STEPS ? weight_at[min(distance, int(BLUR_CONSTANT_STEPS))]
+                             : texelFetch(weights, distance).x;
+}
+
+float sum[BINS * LINES];
+
+// Adds what lies `j` bins behind the strip's first.
+void add(const int j, const vec2 words, const bvec2 inside, const float largest) {
+  const vec2 likelihood = vec2(inside.x ? lifted(words.x, largest) : 0.0,
+                               inside.y ? lifted(words.y, largest) : 0.0);
+  [[unroll]] for (int b = 0; b < BINS; ++b) {
+    if (ALONG_X) {
+      if (abs(j - b) <= REACH) {
+        sum[b] += weight_of(abs(j - b)) * likelihood.x;
+      }
+      if (abs(j + 1 - b) <= REACH) {
+        sum[b] += weight_of(abs(j + 1 - b)) * likelihood.y;
+      }
+    } else if (abs(j - b) <= REACH) {
+      sum[2 * b] += weight_of(abs(j - b)) * likelihood.x;
+      sum[2 * b + 1] += weight_of(abs(j - b)) * likelihood.y;
+    }
+  }
+}
 
 void main() {
-  const uint count = ALONG_X ? push.slab.nx : push.slab.ny;
-  const uint lines = ALONG_X ? push.slab.ny : push.slab.nx;
-  const uint strips = (count + STRIP - 1) / STRIP;
+  const int nx = int(push.nx);
+  const int count = ALONG_X ? nx : int(push.ny);
+  const uint across = ALONG_X ? push.ny : (push.nx + 1) / 2;
+  const uint strips = uint((count + BINS - 1) / BINS);
   const uint id = gl_GlobalInvocationID.x;
-  if (id >= strips * lines) {
+  if (id >= strips * across) {
     return;
   }
-  const uint line = ALONG_X ? id / strips : id % lines;
-  const int begin = int((ALONG_X ? id % strips : id / lines) * STRIP);
-  const uint object = push.slab.object_first + gl_WorkGroupID.y;
-  const uint theta = push.slab.theta_first + gl_WorkGroupID.z;
-  const uint first = gl_WorkGroupID.y * push.slab.stride +
-                     gl_WorkGroupID.z * push.slab.nx * push.slab.ny +
-                     line * (ALONG_X ? push.slab.nx : 1);
-  const uint step = ALONG_X ? 1 : push.slab.nx;
+  const uint line = ALONG_X ? id / strips : id % across * 2;
+  const int begin = int(ALONG_X ? id % strips : id / across) * BINS;
+  const uint object = push.object_first + gl_WorkGroupID.y;
+  const uint theta = push.theta_first + gl_WorkGroupID.z;
+  const uint first = gl_WorkGroupID.y * push.stride + gl_WorkGroupID.z * push.nx * push.ny +
+                     line * (ALONG_X ? push.nx : 1);
+  const uint step = ALONG_X ? 1 : push.nx;
   const vec2 reference = texelFetch(references, int(object)).xy;
-  const float largest = texelFetch(plane_max, int(object * push.slab.all_thetas + theta)).x;
-  const int steps = int(push.steps);
-  const int norms = steps + 1 + int(STRIP);
+  const float largest = texelFetch(plane_max, int(object * push.all_thetas + theta)).x;
 
-  // weight[b] is the weight of the current bin for bin b of the strip.
-  float weight[STRIP];
-  float sum[STRIP];
-  FOR_EACH_BIN {
-    weight[b] = 0.0;
-    sum[b] = 0.0;
-  }
-  const int end = int(STRIP) + steps;
-  for (int j = -steps; j < end; ++j) {
-    [[unroll]] for (uint b = STRIP - 1; b > 0; --b) { weight[b] = weight[b - 1]; }
-    weight[0] = texelFetch(weights, min(abs(j), norms - 1)).x;
-    const int at = begin + j;
-    const float likelihood =
-        at >= 0 && at < int(count)
-            ? lifted(word_of(first + uint(at) * step, reference), largest)
-            : 0.0;
-    FOR_EACH_BIN { sum[b] += weight[b] * likelihood; }
+  fill_weights();
+  [[unroll]] for (int b = 0; b < BINS * LINES; ++b) { sum[b] = 0.0; }
+  if (STEPS <= BLUR_CONSTANT_STEPS) {
+    [[unroll]] for (int j = BEGIN; j < BINS + REACH; j += STRIDE) {
+      const int at = begin + j;
+      const bool inside = at >= 0 && at < count;
+      const bool next_inside = ALONG_X ? at + 1 >= 0 && at + 1 < count : inside;
+      const uint bin = first + uint(inside || next_inside ? at : 0) * step;
+      add(j, words_of(bin, reference, EVEN), bvec2(inside, next_inside), largest);
+    }
+  } else {
+    for (int j = BEGIN; j < BINS + REACH; j += STRIDE) {
+      const int at = begin + j;
+      const bool inside = at >= 0 && at < count;
+      const bool next_inside = ALONG_X ? at + 1 >= 0 && at + 1 < count : inside;
+      const uint bin = first + uint(inside || next_inside ? at : 0) * step;
+      add(j, words_of(bin, reference, EVEN), bvec2(inside, next_inside), largest);
+    }
   }
 
   const uint word = ALONG_X ? 0 : 1;
   uint poor = 0;
-  FOR_EACH_BIN {
-    const uint at = uint(begin) + b;
-    if (at < count) {
-      const float mean = sum[b] * texelFetch(weights, norms + int(at)).x;
+  [[unroll]] for (int b = 0; b < BINS * LINES; ++b) {
+    const int at = begin + b / LINES;
+    const uint beside = ALONG_X ? 0 : uint(b % 2);
+    if (at < count && line + beside < (ALONG_X ? push.ny : push.nx)) {
+      const float mean = sum[b] * texelFetch(weights, REACH + 1 + at).x;
       poor |= mean < LEAST ? 1u << b : 0;
-      result[2 * (first + at * step) + word] = mean;
+      result[2 * (first + beside + uint(at) * step) + word] = mean;
     }
   }
-  for (uint b = 0; poor >> b != 0; ++b) {
-    const int at = begin + int(b);
+  for (int b = 0; poor >> b != 0; ++b) {
+    const bool wanted = (poor >> b & 1u) != 0;
+    const int at = begin + b / LINES;
+    const uint from = first + (ALONG_X ? 0 : uint(b % 2));
     vec2 logs = vec2(LOWEST, 0.0);
-    for (int k = (poor >> b & 1u) != 0 ? -steps : end; k <= steps; ++k) {
-      if (at + k >= 0 && at + k < int(count)) {
+    for (int k = wanted ? -REACH : REACH + 1; k <= REACH; ++k) {
+      if (at + k >= 0 && at + k < count) {
         logs = log_sum_add(logs,
-                           lifted_log(word_of(first + uint(at + k) * step, reference), largest),
+                           lifted_log(word_of(from + uint(at + k) * step, reference), largest),
                            texelFetch(weights, abs(k)).x);
       }
     }
-    if ((poor >> b & 1u) != 0) {
-      result[2 * (first + uint(at) * step) + word] =
-          min(logs.x + log(logs.y * texelFetch(weights, norms + at).x), log(LEAST));
+    if (wanted) {
+      result[2 * (from + uint(at) * step) + word] =
+          min(logs.x + log(logs.y * texelFetch(weights, REACH + 1 + at).x), log(LEAST));
     }
   }
 }

@@ -1,26 +1,37 @@
-// A bin's likelihood as the passes of a blur read it. A kernel defines SOURCE and the table `source`
-// of single floats, two a bin, before it includes this file.
+// A bin's likelihood as the passes of a blur read it. A kernel defines SOURCE and the table `source`,
+// two bins of two words a texel, before it includes this file.
 
 const float LOWEST = -3e38;
 
-// The word of a bin that holds what SOURCE names.
-const int WORD = SOURCE == BLUR_ALONG_Y ? 1 : 0;
-
-float word_of(const uint bin, const vec2 reference) {
-  const float word = texelFetch(source, int(2 * bin) + WORD).x;
+// What SOURCE names, of a bin's two words.
+float word_in(const vec2 bin, const vec2 reference) {
   if (SOURCE == BLUR_BELIEF) {
-    precise float difference =
-        (word - reference.x) + (texelFetch(source, int(2 * bin) + 1).x - reference.y);
+    precise float difference = (bin.x - reference.x) + (bin.y - reference.y);
     return difference;
   }
-  return word;
+  return SOURCE == BLUR_ALONG_Y ? bin.y : bin.x;
+}
+
+float word_of(const uint bin, const vec2 reference) {
+  const vec4 texel = texelFetch(source, int(bin / 2));
+  return word_in(bin % 2 == 0 ? texel.xy : texel.zw, reference);
+}
+
+// Of a bin and the next one.
+vec2 words_of(const uint bin, const vec2 reference, const bool even) {
+  if (even) {
+    const vec4 texel = texelFetch(source, int(bin / 2));
+    return vec2(word_in(texel.xy, reference), word_in(texel.zw, reference));
+  }
+  return vec2(word_of(bin, reference), word_of(bin + 1, reference));
 }
 
 const bool IN_LOGS = SOURCE == BLUR_TOUCH || SOURCE == BLUR_BELIEF;
 
 // A term of a sum of likelihoods, relative to the largest of the plane and lifted.
 float lifted(const float word, const float largest) {
-  return IN_LOGS ? exp(max(word - largest + BLUR_LIFT, BLUR_SMALLEST)) : max(word, 0.0);
+  return IN_LOGS ? exp(clamp(word - largest + BLUR_LIFT, BLUR_SMALLEST, BLUR_LARGEST))
+                 : max(word, 0.0);
 }
 
 // The logarithm of the same, however small it is.

@@ -158,9 +158,17 @@ const uint BLUR_ALONG_Y = 2;
 const uint BLUR_ALONG_X = 3;
 const float BLUR_LIFT = 80.0;
 const float BLUR_SMALLEST = -86.0;  // exp() of it is a normal float
+const float BLUR_LARGEST = 88.0;    // exp() of it is finite
 const float LEAST_ALONG_Y = 1e-31;
 const float LEAST_ALONG_X = 1e-25;
 const float LEAST_OF_TURNS = 1e-19;
+
+// Bins of a line that an invocation of blur_axis takes; along y, of two lines.
+const uint BLUR_STRIP_X = 16;
+const uint BLUR_STRIP_Y = 8;
+
+// Weights that the kernel holds as constants; a Gaussian that reaches farther reads a table.
+const uint BLUR_CONSTANT_STEPS = 32;
 
 // The bins of a slab that holds whole planes.
 struct PlanesPush {
@@ -171,11 +179,6 @@ struct PlanesPush {
   uint all_thetas;    // of the lattice
   uint object_first;  // of the slab
   uint stride;        // from one object's first bin to the next object's; even
-};
-
-struct BlurPush {
-  PlanesPush slab;
-  uint steps;  // the weights reach as many bins to either side
 };
 
 // The slabs that hold the thetas before and after those of the slab.
@@ -374,7 +377,7 @@ static_assert(sizeof(RotatedElement) == 16 && sizeof(Segment) == 16 && sizeof(Ta
 static_assert(sizeof(Corners) == 16 && sizeof(ObjectPlace) == 24);
 static_assert(sizeof(LikelihoodPush) == 28 && sizeof(Partial) == 16);
 static_assert(sizeof(ReducePush) == 12 && sizeof(AddPush) == 8 && sizeof(MarginalPush) == 20);
-static_assert(sizeof(BlurPush) == 32 && sizeof(TurnPush) == 52 && sizeof(Turn) == 64);
+static_assert(sizeof(TurnPush) == 52 && sizeof(Turn) == 64);
 static_assert(sizeof(ArrayAtTheta) == 16 && sizeof(ObjectBox) == 16);
 static_assert(sizeof(OverlapPush) == 56 && sizeof(OverlapPartial) == 12);
 static_assert(sizeof(Particle) == 16 && sizeof(ObjectShare) == 8 && sizeof(DrawBlock) == 16);

@@ -9,7 +9,7 @@
 
 layout(local_size_x_id = 0) in;  // a power of two
 
-layout(binding = 0) uniform samplerBuffer source;  // two words a bin; the second counts
+layout(binding = 0) uniform samplerBuffer source;  // two bins a texel; their second words count
 layout(binding = 1) uniform samplerBuffer arrays;  // ArrayAtTheta, [theta]
 layout(binding = 2) uniform samplerBuffer boxes;   // ObjectBox, [object]
 layout(std430, binding = 3) writeonly buffer Partials { OverlapPartial partials[]; };

@@ -10,13 +10,14 @@
 
 layout(local_size_x_id = 0) in;
 layout(constant_id = 1) const bool SLIP = false;
-layout(constant_id = 2) const uint STRIP = 8;  // bins along y of an invocation; 1 for a slip
+layout(constant_id = 2) const uint ROWS = 4;  // bins along y of an invocation; 1 for a slip
 layout(constant_id = 3) const bool KEEP = false;   // leaves a touch's result in the second words
 layout(constant_id = 4) const uint SOURCE = BLUR_ALONG_X;  // or BLUR_TOUCH, not blurred along x, y
+layout(constant_id = 5) const bool ONE_SLAB = true;        // every slab holds all thetas
 
-layout(binding = 0) uniform samplerBuffer source;  // two words a bin
-layout(binding = 1) uniform samplerBuffer source_before;
-layout(binding = 2) uniform samplerBuffer source_after;
+layout(binding = 0) uniform samplerBuffer source;  // two bins a texel
+layout(binding = 1) uniform samplerBuffer source_before;  // of the thetas before the slab's
+layout(binding = 2) uniform samplerBuffer source_after;   // and after them
 layout(binding = 3) uniform samplerBuffer references;  // [object] log-likelihood in two floats
 layout(binding = 4) uniform samplerBuffer plane_max;   // [object, theta], then weights by steps
 layout(binding = 5) uniform samplerBuffer turns;       // Turn, [theta or object, step]
@@ -28,7 +29,10 @@ layout(push_constant) uniform Push { TurnPush push; };
 
 #include "blurred_bin.glsl"
 
-#define FOR_EACH_BIN [[unroll]] for (uint b = 0; b < STRIP; ++b)
+// A slip takes each bin from a place of its own; neighbours of a touch share what they read.
+const uint COLUMNS = SLIP ? 1 : 2;
+const uint BINS = ROWS * COLUMNS;
+#define FOR_EACH_BIN [[unroll]] for (uint b = 0; b < BINS; ++b)
 
 // Where the likelihoods of one step of theta come from.
 struct Tap {
@@ -101,13 +105,24 @@ Tap tap_at(const int k, const uint object, const uint theta, const int x, const 
   return tap;
 }
 
-float word_at(const Tap tap, const bool inside, const int column, const int row) {
-  const int word = 2 * int(tap.first + (inside ? uint(row) * push.slab.nx + uint(column) : 0));
-  // Where one slab holds all thetas, the condition is a constant of the dispatch.
-  if (push.slab.thetas == push.slab.all_thetas || tap.slab == 0) {
-    return texelFetch(source, word).x;
+vec2 texel_words(const Tap tap, const int texel) {
+  if (ONE_SLAB || tap.slab == 0) {
+    return texelFetch(source, texel).xz;
   }
-  return tap.slab == 1 ? texelFetch(source_before, word).x : texelFetch(source_after, word).x;
+  return tap.slab == 1 ? texelFetch(source_before, texel).xz : texelFetch(source_after, texel).xz;
+}
+
+float word_at(const Tap tap, const int column, const int row) {
+  const int bin = int(tap.first) + row * int(push.slab.nx) + column;
+  return texel_words(tap, bin / 2)[bin % 2];
+}
+
+// Words of three neighbouring columns; of those outside the plane, any finite number.
+vec3 words_from(const Tap tap, const int column, const int row) {
+  const int bin = max(int(tap.first) + row * int(push.slab.nx) + column, -2);
+  const vec2 left = texel_words(tap, max(bin >> 1, 0));
+  const vec2 right = texel_words(tap, (bin >> 1) + 1);
+  return (bin & 1) == 0 ? vec3(left, right.x) : vec3(left.y, right);
 }
 
 void put(const uint bin, const float value, const vec2 reference) {
@@ -120,13 +135,14 @@ void put(const uint bin, const float value, const vec2 reference) {
 void main() {
   const int nx = int(push.slab.nx);
   const int ny = int(push.slab.ny);
-  const uint strips = (push.slab.ny + STRIP - 1) / STRIP;
+  const uint strips_x = (push.slab.nx + COLUMNS - 1) / COLUMNS;
+  const uint strips_y = (push.slab.ny + ROWS - 1) / ROWS;
   const uint id = gl_GlobalInvocationID.x;
-  if (id >= push.slab.nx * strips) {
+  if (id >= strips_x * strips_y) {
     return;
   }
-  const int x = int(id % push.slab.nx);
-  const int y = int(id / push.slab.nx * STRIP);
+  const int x = int(id % strips_x * COLUMNS);
+  const int y = int(id / strips_x * ROWS);
   const uint object = push.slab.object_first + gl_WorkGroupID.y;
   const uint theta = push.slab.theta_first + gl_WorkGroupID.z;
   const int steps = int(push.steps);
@@ -138,35 +154,43 @@ void main() {
     largest = tap.used ? max(largest, tap.largest) : largest;
   }
 
-  float sum[STRIP];
-  float weight[STRIP];
+  float sum[BINS];
+  float weight[BINS];
   FOR_EACH_BIN {
     sum[b] = 0.0;
     weight[b] = 0.0;
   }
   for (int k = -steps; k <= steps; ++k) {
     const Tap tap = tap_at(k, object, theta, x, y);
-    const bool left_inside = tap.used && tap.column >= 0 && tap.column < nx;
-    const bool right_inside = tap.used && tap.column >= -1 && tap.column < nx - 1;
-    const float left = left_inside ? tap.weight * tap.x.x : 0.0;
-    const float right = right_inside ? tap.weight * tap.x.y : 0.0;
-    const float plane = IN_LOGS ? 1.0 : exp(max(tap.largest - largest, BLUR_SMALLEST));
-    const float reference_of = IN_LOGS ? largest : 0.0;
-    float below = 0.0;
-    float below_weight = 0.0;
-    [[unroll]] for (uint b = 0; b <= STRIP; ++b) {
-      const int row = tap.row + int(b);
-      const bool inside = row >= 0 && row < ny;
-      const float above =
-          inside ? left * lifted(word_at(tap, inside && left_inside, tap.column, row),
-                                 reference_of) +
-                       right * lifted(word_at(tap, inside && right_inside, tap.column + 1, row),
-                                      reference_of)
-                 : 0.0;
-      const float above_weight = inside ? left + right : 0.0;
-      if (b > 0) {
-        sum[b - 1] += plane * (tap.y.x * below + tap.y.y * above);
-        weight[b - 1] += tap.y.x * below_weight + tap.y.y * above_weight;
+    // Weights of the three columns that the bins' places lie between.
+    const float inside[3] = float[](tap.used && tap.column >= 0 && tap.column < nx ? 1.0 : 0.0,
+                                    tap.used && tap.column >= -1 && tap.column < nx - 1 ? 1.0 : 0.0,
+                                    tap.used && tap.column >= -2 && tap.column < nx - 2 ? 1.0 : 0.0);
+    const float plane =
+        tap.weight * (IN_LOGS ? 1.0 : exp(max(tap.largest - largest, BLUR_SMALLEST)));
+    const float of_plane = IN_LOGS ? largest : 0.0;
+    vec2 below = vec2(0.0);
+    vec2 below_weight = vec2(0.0);
+    [[unroll]] for (uint r = 0; r <= ROWS; ++r) {
+      const int row = tap.row + int(r);
+      const bool row_inside = row >= 0 && row < ny;
+      const vec3 words = words_from(tap, tap.column, row_inside ? row : 0);
+      const float left = inside[0] * lifted(words.x, of_plane);
+      const float middle = inside[1] * lifted(words.y, of_plane);
+      const float right = inside[2] * lifted(words.z, of_plane);
+      const vec2 above = row_inside ? vec2(tap.x.x * left + tap.x.y * middle,
+                                           tap.x.x * middle + tap.x.y * right)
+                                    : vec2(0.0);
+      const vec2 above_weight = row_inside ? vec2(tap.x.x * inside[0] + tap.x.y * inside[1],
+                                                  tap.x.x * inside[1] + tap.x.y * inside[2])
+                                           : vec2(0.0);
+      if (r > 0) {
+        [[unroll]] for (uint c = 0; c < COLUMNS; ++c) {
+          const uint b = (r - 1) * COLUMNS + c;
+          sum[b] += plane * (tap.y.x * below[c] + tap.y.y * above[c]);
+          weight[b] +=
+              tap.weight * (tap.y.x * below_weight[c] + tap.y.y * above_weight[c]);
+        }
       }
       below = above;
       below_weight = above_weight;
@@ -177,11 +201,12 @@ void main() {
                      (gl_WorkGroupID.z * push.slab.ny + uint(y)) * push.slab.nx + uint(x);
   uint poor = 0;
   FOR_EACH_BIN {
-    if (y + int(b) < ny) {
+    const uint bin = first + b / COLUMNS * push.slab.nx + b % COLUMNS;
+    if (y + int(b / COLUMNS) < ny && x + int(b % COLUMNS) < nx) {
       if (sum[b] < LEAST_OF_TURNS * weight[b]) {
         poor |= 1u << b;
       } else {
-        put(first + b * push.slab.nx, log(sum[b] / weight[b]) + (largest - BLUR_LIFT), reference);
+        put(bin, log(sum[b] / weight[b]) + (largest - BLUR_LIFT), reference);
       }
     }
   }
@@ -192,18 +217,21 @@ void main() {
     for (int k = wanted ? -steps : steps + 1; k <= steps; ++k) {
       const Tap tap = tap_at(k, object, theta, x, y);
       for (int corner = tap.used ? 0 : 4; corner < 4; ++corner) {
-        const int column = tap.column + corner % 2;
-        const int row = tap.row + int(b) + corner / 2;
+        const int column = tap.column + int(b % COLUMNS) + corner % 2;
+        const int row = tap.row + int(b / COLUMNS) + corner / 2;
         const float part = tap.weight * tap.x[corner % 2] * tap.y[corner / 2];
-        const bool inside = column >= 0 && column < nx && row >= 0 && row < ny && part > 0.0;
-        total += inside ? part : 0.0;
-        const float value = lifted_log(word_at(tap, inside, column, row), tap.largest) +
-                            (tap.largest - BLUR_LIFT);
-        logs = inside ? log_sum_add(logs, value, part) : logs;
+        if (column >= 0 && column < nx && row >= 0 && row < ny && part > 0.0) {
+          total += part;
+          logs = log_sum_add(logs,
+                             lifted_log(word_at(tap, column, row), tap.largest) +
+                                 (tap.largest - BLUR_LIFT),
+                             part);
+        }
       }
     }
     if (wanted) {
-      put(first + b * push.slab.nx, logs.x + log(logs.y / total), reference);
+      put(first + b / COLUMNS * push.slab.nx + b % COLUMNS, logs.x + log(logs.y / total),
+          reference);
     }
   }
 }

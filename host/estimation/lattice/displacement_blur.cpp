@@ -1,6 +1,7 @@
 #include "displacement_blur.hpp"
 
 #include <algorithm>
+#include <bit>
 
 #include <fmt/format.h>
 
@@ -17,16 +18,7 @@ namespace {
 
 using gpu::Access;
 
-/// Bins of a line that an invocation takes: as many as share a read well, and fewer where the loops
-/// of so many would grow too long.
-/// @param reads of one bin in the longest loop
-std::uint32_t strip_of(std::uint32_t best, std::int64_t reads) {
-  const std::int64_t most = gpu::most_iterations / std::max<std::int64_t>(reads, 1);
-  return static_cast<std::uint32_t>(std::clamp<std::int64_t>(most, 1, best));
-}
-
-constexpr std::uint32_t best_strip = 16;      // of blur_axis
-constexpr std::uint32_t best_turn_strip = 8;  // of sum_turns
+constexpr std::uint32_t rows_of_a_turn = 4;  // of an invocation of sum_turns
 
 std::uint32_t source_of(DisplacementBlur::Of of) {
   return of == DisplacementBlur::Of::touch ? shaders::BLUR_TOUCH : shaders::BLUR_BELIEF;
@@ -42,6 +34,21 @@ const Slab& slab_with(std::span<const Slab> slabs, std::uint32_t object, std::ui
 std::uint64_t turns_of(const PoseLattice& lattice, std::size_t objects, int steps) {
   return std::max<std::uint64_t>(objects, static_cast<std::uint64_t>(lattice.theta_rad.count)) *
          (2 * static_cast<std::uint64_t>(steps) + 1);
+}
+
+/// Bins that a Gaussian along x or y reaches. Farther than the axis is long there is nothing to
+/// weigh.
+int plane_steps(double sd_mm, const Axis& axis) {
+  return std::min(blur_steps(sd_mm, axis), axis.count - 1);
+}
+
+/// Whether no object's bins are cut into parts.
+bool objects_in_one_slab(const gpu::Context& context, const PoseLattice& lattice,
+                         std::size_t objects) {
+  const std::vector<SlabExtent> slabs = DenseBelief::cut(context, lattice, objects);
+  return std::all_of(slabs.begin(), slabs.end(), [&](const SlabExtent& slab) {
+    return static_cast<int>(slab.theta_count) == lattice.theta_rad.count;
+  });
 }
 
 /// Throws Error where the blur would need parts of an object's bins that no dispatch has at hand.
@@ -86,15 +93,14 @@ DisplacementBlur::DisplacementBlur(gpu::Context& context, gpu::CommandStream& st
       lanes_(independent_lanes(context.limits())),
       max_planes_(context, {.name = "max_planes",
                             .spirv = shaders::max_planes,
-                            .bindings = {Access::words, Access::table, Access::storage},
+                            .bindings = {Access::table, Access::table, Access::storage},
                             .push_bytes = sizeof(shaders::PlanesPush),
                             .constants = {lanes_, source_of(of)}}),
       along_y_(make_pass(lattice.y_mm, false)),
       along_x_(make_pass(lattice.x_mm, true)),
       // A slip takes each bin from a place of its own: neighbours share no reads.
-      strip_(of == Of::belief
-                 ? 1
-                 : strip_of(best_turn_strip, 8 * (2 * std::int64_t{theta_steps_} + 1))),
+      turn_rows_(of == Of::belief ? 1 : rows_of_a_turn),
+      turn_columns_(of == Of::belief ? 1 : 2),
       turns_(context, turns_of(lattice, objects, theta_steps_) * sizeof(shaders::Turn),
              gpu::Memory::device, "turns of a blur", VK_FORMAT_R32G32B32A32_SFLOAT),
       plane_max_(context, (planes() + static_cast<std::size_t>(theta_steps_) + 1) * sizeof(float),
@@ -102,38 +108,50 @@ DisplacementBlur::DisplacementBlur(gpu::Context& context, gpu::CommandStream& st
       references_(context, objects * sizeof(TwoFloat), gpu::Memory::device, "maxima of objects",
                   VK_FORMAT_R32G32_SFLOAT) {
   require_whole_planes(context, lattice, objects, lanes_, theta_steps_);
+  for (const Axis& axis : {lattice.x_mm, lattice.y_mm}) {
+    // A loop over the bins of a strip and over the steps, and other loops.
+    if (int{shaders::BLUR_STRIP_X} * (2 * plane_steps(sd.mm, axis) + 1) >
+        int{gpu::most_iterations}) {
+      throw Error(Fault::input,
+                  fmt::format("a standard deviation of {} mm reaches {} bins; use fewer bins",
+                              sd.mm, plane_steps(sd.mm, axis)));
+    }
+  }
   sum_turns_ = gpu::Kernel(
       context, {.name = "sum_turns",
                 .spirv = shaders::sum_turns,
-                .bindings = {Access::words, Access::words, Access::words, Access::table,
+                .bindings = {Access::table, Access::table, Access::table, Access::table,
                              Access::table, Access::table, Access::storage, Access::storage},
                 .push_bytes = sizeof(shaders::TurnPush),
-                .constants = {lanes_, of == Of::belief ? 1U : 0U, strip_, keep_touch ? 1U : 0U,
-                              blurs_planes() ? shaders::BLUR_ALONG_X : shaders::BLUR_TOUCH}});
+                .constants = {lanes_, of == Of::belief ? 1U : 0U, turn_rows_, keep_touch ? 1U : 0U,
+                              blurs_planes() ? shaders::BLUR_ALONG_X : shaders::BLUR_TOUCH,
+                              objects_in_one_slab(context, lattice, objects) ? 1U : 0U}});
   stream.upload(plane_max_, blur_weights(sd.rad, lattice.theta_rad, theta_steps_),
                 planes() * sizeof(float));
 }
 
 DisplacementBlur::Pass DisplacementBlur::make_pass(const Axis& axis, bool along_x) {
-  // Farther than the axis is long there is nothing to weigh.
-  const int steps = std::min(blur_steps(sd_.mm, axis), axis.count - 1);
-  const std::uint32_t strip = strip_of(best_strip, 2 * (2 * std::int64_t{steps} + 2));
+  const int steps = plane_steps(sd_.mm, axis);
   std::vector<float> table = blur_weights(sd_.mm, axis, steps);
+  std::vector<std::uint32_t> constants{lanes_, along_x ? shaders::BLUR_ALONG_Y : source_of(of_),
+                                       static_cast<std::uint32_t>(steps),
+                                       lattice_.x_mm.count % 2 == 0 ? 1U : 0U};
+  for (std::size_t k = 0; k <= shaders::BLUR_CONSTANT_STEPS; ++k) {
+    constants.push_back(std::bit_cast<std::uint32_t>(k < table.size() ? table[k] : 0.0F));
+  }
   const std::vector<float> norms = blur_norms(table, axis);
-  table.insert(table.end(), strip, 0.0F);
   table.insert(table.end(), norms.begin(), norms.end());
-  const Axis& across = along_x ? lattice_.y_mm : lattice_.x_mm;
-  return {.kernel = gpu::Kernel(
-              context_,
-              {.name = "blur_axis",
-               .spirv = shaders::blur_axis,
-               .bindings = {Access::words, Access::table, Access::table, Access::table,
-                            Access::storage},
-               .push_bytes = sizeof(shaders::BlurPush),
-               .constants = {lanes_, along_x ? shaders::BLUR_ALONG_Y : source_of(of_), strip}}),
-          .weights = stream_.uploaded(table, "weights of a blur", VK_FORMAT_R32_SFLOAT),
-          .steps = static_cast<std::uint32_t>(steps),
-          .invocations = std::int64_t{groups_of(axis.count, strip)} * across.count};
+  const std::int64_t strips =
+      groups_of(axis.count, along_x ? shaders::BLUR_STRIP_X : shaders::BLUR_STRIP_Y);
+  return {
+      .kernel = gpu::Kernel(context_, {.name = "blur_axis",
+                                       .spirv = shaders::blur_axis,
+                                       .bindings = {Access::table, Access::table, Access::table,
+                                                    Access::table, Access::storage},
+                                       .push_bytes = sizeof(shaders::PlanesPush),
+                                       .constants = constants}),
+      .weights = stream_.uploaded(table, "weights of a blur", VK_FORMAT_R32_SFLOAT),
+      .invocations = strips * (along_x ? lattice_.y_mm.count : groups_of(lattice_.x_mm.count, 2))};
 }
 
 std::uint64_t DisplacementBlur::bytes_needed(const PoseLattice& lattice, std::size_t objects,
@@ -141,9 +159,10 @@ std::uint64_t DisplacementBlur::bytes_needed(const PoseLattice& lattice, std::si
   const int steps = blur_steps(sd.rad, lattice.theta_rad);
   const auto thetas = static_cast<std::uint64_t>(lattice.theta_rad.count);
   const auto pass_bytes = [&](const Axis& axis) {
-    const int reach = std::min(blur_steps(sd.mm, axis), axis.count - 1);
-    return gpu::allocated((static_cast<std::uint64_t>(reach) + 1 + best_strip + axis.count) *
-                          sizeof(float));
+    const int reach = plane_steps(sd.mm, axis);
+    return gpu::allocated(
+        (static_cast<std::uint64_t>(reach) + 1 + static_cast<std::uint64_t>(axis.count)) *
+        sizeof(float));
   };
   return pass_bytes(lattice.x_mm) + pass_bytes(lattice.y_mm) +
          gpu::allocated(turns_of(lattice, objects, steps) * sizeof(shaders::Turn)) +
@@ -166,7 +185,7 @@ void DisplacementBlur::run_pass(const Pass& pass, const DenseBelief& from,
     stream_.dispatch(pass.kernel,
                      {&from.slabs()[i].log_likelihood, &references_, &plane_max_, &pass.weights,
                       &slab.log_likelihood},
-                     shaders::BlurPush{planes_of(slab, lattice_.theta_rad.count), pass.steps},
+                     planes_of(slab, lattice_.theta_rad.count),
                      few_groups ? std::array<std::uint32_t, 3>{1, 1, 1} : groups);
   }
 }
@@ -207,7 +226,8 @@ void DisplacementBlur::record_turns(const DenseBelief& scratch,
                                  .thetas_before = before.theta_count,
                                  .theta_after = after.theta_first,
                                  .first_weight = static_cast<shaders::uint>(planes())};
-    const std::int64_t invocations = std::int64_t{slab.nx} * groups_of(slab.row_count, strip_);
+    const std::int64_t invocations =
+        std::int64_t{groups_of(slab.nx, turn_columns_)} * groups_of(slab.row_count, turn_rows_);
     stream_.dispatch(
         sum_turns_,
         {&slab.log_likelihood, &before.log_likelihood, &after.log_likelihood, &references_,

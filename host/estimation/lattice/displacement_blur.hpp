@@ -57,7 +57,6 @@ class DisplacementBlur {
   struct Pass {
     gpu::Kernel kernel;
     gpu::Buffer weights;
-    std::uint32_t steps = 0;
     std::int64_t invocations = 0;  ///< of a plane
   };
 
@@ -87,7 +86,8 @@ class DisplacementBlur {
   Pass along_y_;
   Pass along_x_;
   gpu::Kernel sum_turns_;
-  std::uint32_t strip_;
+  std::uint32_t turn_rows_;     ///< bins along y of an invocation of sum_turns
+  std::uint32_t turn_columns_;  ///< along x
   gpu::Buffer turns_;
   gpu::Buffer plane_max_;   ///< [object, theta], then the weights of theta
   gpu::Buffer references_;  ///< [object]
