@@ -147,6 +147,92 @@ struct AddPush {
   uint row;  // bins that one row of workgroups covers
 };
 
+// What blur_axis reads of a bin: the high float of a touch's log-likelihood, the difference of a
+// belief from its object's largest, or the low word, where an earlier pass has left its result.
+const uint BLUR_TOUCH = 0;
+const uint BLUR_BELIEF = 1;
+const uint BLUR_LOW_WORD = 2;
+
+// Linear sums of likelihoods are relative to the largest of a plane, times exp(BLUR_LIFT). A sum
+// below BLUR_LEAST may have lost terms and is summed again in logs.
+const float BLUR_LIFT = 80.0;
+const float BLUR_LEAST = 1e-24;
+
+// The bins of a slab that holds whole planes.
+struct PlanesPush {
+  uint nx;
+  uint ny;
+  uint thetas;        // of the slab
+  uint theta_first;   // of the slab
+  uint all_thetas;    // of the lattice
+  uint object_first;  // of the slab
+  uint stride;        // from one object's first bin to the next object's; even
+};
+
+struct BlurPush {
+  PlanesPush slab;
+  uint steps;  // the weights reach as many bins to either side
+};
+
+// The slabs that hold the thetas before and after those of the slab.
+struct TurnPush {
+  PlanesPush slab;
+  uint steps;
+  uint around;  // 1: theta continues at its first bin after its last
+  uint theta_before;
+  uint thetas_before;
+  uint theta_after;
+  uint touch_turns;  // 1: a turn for every theta; 0: for every object
+};
+
+// Where a bin's likelihood comes from when theta grows by some steps: the place (x, y) of the plane,
+// in bins, moved by whole + fraction + matrix (x, y). Kernels read two vec4.
+struct Turn {
+  float xx;
+  float xy;
+  float yx;
+  float yy;
+  float whole_x;
+  float fraction_x;
+  float whole_y;
+  float fraction_y;
+};
+
+// An array at one theta: its centre, relative to the pivot's place, and the direction of its x axis,
+// in the object frame. Kernels read a vec4.
+struct ArrayAtTheta {
+  float x_mm;
+  float y_mm;
+  float cosine;
+  float sine;
+};
+
+// The box around the cells of an object. Kernels read a vec4.
+struct ObjectBox {
+  float x_mm;  // of its middle
+  float y_mm;
+  float half_x_mm;
+  float half_y_mm;
+};
+
+struct OverlapPush {
+  PlanesPush slab;
+  uint partial_first;
+  float first_x_mm;  // of the lattice's first bin
+  float first_y_mm;
+  float step_x_mm;
+  float step_y_mm;
+  float half_x_mm;  // of the array
+  float half_y_mm;
+};
+
+// Result of one workgroup of sum_overlap, over the bins at which the array overlaps the object.
+struct OverlapPartial {
+  float max;
+  float sum;  // of exp(log-likelihood - max)
+  uint bins;
+};
+
 struct MarginalPush {
   uint plane;      // number of (x, y) places in the slab
   uint thetas;     // number of thetas in the slab
@@ -275,6 +361,9 @@ static_assert(sizeof(RotatedElement) == 16 && sizeof(Segment) == 16 && sizeof(Ta
 static_assert(sizeof(Corners) == 16 && sizeof(ObjectPlace) == 24);
 static_assert(sizeof(LikelihoodPush) == 28 && sizeof(Partial) == 16);
 static_assert(sizeof(ReducePush) == 12 && sizeof(AddPush) == 8 && sizeof(MarginalPush) == 20);
+static_assert(sizeof(BlurPush) == 32 && sizeof(TurnPush) == 52 && sizeof(Turn) == 32);
+static_assert(sizeof(ArrayAtTheta) == 16 && sizeof(ObjectBox) == 16);
+static_assert(sizeof(OverlapPush) == 56 && sizeof(OverlapPartial) == 12);
 static_assert(sizeof(Particle) == 16 && sizeof(ObjectShare) == 8 && sizeof(DrawBlock) == 16);
 static_assert(sizeof(DrawPush) == 52 && sizeof(ParticleMap) == 44 && sizeof(CoarseAndFine) == 16);
 static_assert(sizeof(WeighPush) == 16 && sizeof(WeightBlock) == 16);

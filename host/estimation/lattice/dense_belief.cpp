@@ -244,6 +244,42 @@ std::vector<std::int64_t> DenseBelief::bins_at(std::size_t object, const BeliefS
   return found;
 }
 
+double DenseBelief::entropy(std::size_t object, const BeliefSummary& summary) const {
+  constexpr double negligible = 1e-5;                      // nats, of all blocks left out together
+  constexpr std::size_t most_bins = std::size_t{1} << 20;  // read at once
+  double below_max = 0.0;                                  // mean of max - log-likelihood
+  std::vector<std::vector<TwoFloat>> read;
+  std::size_t bins = 0;
+  const auto take_in = [&] {
+    stream_.run();
+    for (const std::vector<TwoFloat>& block : read) {
+      for (const TwoFloat& bin : block) {
+        const double below = summary.max.value() - bin.value();
+        below_max += std::exp(-below) / summary.sum * below;
+      }
+    }
+    read.clear();
+    bins = 0;
+  };
+  for (const BeliefBlock& block : summary.blocks) {
+    // The largest that n bins of a summed probability p can add: p log(n / p).
+    const double p = block.sum / summary.sum;
+    const double most = p * (std::log(static_cast<double>(block.bins)) - std::log(p));
+    if (!(most > negligible / static_cast<double>(summary.blocks.size()))) {
+      continue;
+    }
+    const Slab& slab = slabs_[block.slab];
+    stream_.download(slab.log_likelihood, read.emplace_back(block.bins),
+                     (slab.first_bin(object) + block.first) * sizeof(TwoFloat));
+    bins += read.back().size();
+    if (bins >= most_bins) {
+      take_in();
+    }
+  }
+  take_in();
+  return below_max + std::log(summary.sum);
+}
+
 Marginals DenseBelief::marginals(std::size_t object, TwoFloat max, double of_largest) const {
   Marginals sums{.grid = lattice_, .xy = {}, .theta = {}};
   sums.xy.resize(static_cast<std::size_t>(lattice_.plane()));

@@ -64,6 +64,9 @@ class DenseBelief {
   /// 1), ascending. Reads only the blocks that hold them.
   std::vector<std::int64_t> bins_at(std::size_t object, const BeliefSummary& summary,
                                     std::span<const double> parts) const;
+  /// Entropy of one object's bins by themselves, in nats, within 1e-4. Reads only the blocks that
+  /// hold a part of it.
+  double entropy(std::size_t object, const BeliefSummary& summary) const;
   /// One object's log-likelihoods in a window, [theta, y, x].
   std::vector<double> download(std::size_t object, const BinWindow& window) const;
 

@@ -255,6 +255,21 @@ std::vector<double> PoseHistogram::log_likelihood(int object) const {
                                     .column_count = lattice().x_mm.count});
 }
 
+double PoseHistogram::entropy() const {
+  Impl& histogram = whole();
+  const std::vector<double> identity = histogram.identity();
+  const std::size_t objects = histogram.log_weight.size();
+  const double all = std::accumulate(identity.begin(), identity.begin() + objects, 0.0);
+  double entropy = 0.0;
+  for (std::size_t i = 0; i < objects; ++i) {
+    // So unlikely an object adds less than 1e-7 nats, however many bins it has.
+    if (const double p = identity[i] / all; p > 1e-9) {
+      entropy += p * (histogram.belief.entropy(i, histogram.summaries()[i]) - std::log(p));
+    }
+  }
+  return entropy;
+}
+
 std::vector<PoseSample> PoseHistogram::sample(std::size_t count, std::uint64_t seed) const {
   Impl& histogram = whole();
   Random random(seed, Stream::belief);

@@ -1,6 +1,8 @@
 #include "palpate/pose_histogram.hpp"
 
 #include <algorithm>
+#include <cmath>
+#include <optional>
 #include <utility>
 
 #include <gtest/gtest.h>
@@ -50,6 +52,43 @@ TEST(PoseHistogram, StartsUniformAndReturnsToIt) {
     histogram.update(all_touches(recording));
     EXPECT_NE(histogram.estimate().mode.log_likelihood, 0.0) << after_reset;
     histogram.reset();
+  }
+}
+
+TEST(PoseHistogram, HasTheEntropyOfItsBins) {
+  std::vector<Hypothesis> objects = three_objects();
+  objects[1].weight = 3.0;
+  HistogramOptions options = small_options();
+  const Recording recording = random_recording(4, 36, 87);
+  Device device = Device::open();
+  for (const auto& none_weight : {std::optional<double>(), std::optional(2.0)}) {
+    options.none_weight = none_weight;
+    PoseHistogram histogram(device, objects, options);
+    // 0.2, 0.6 and 0.2 of log(432) nats each, and the entropy of these three.
+    EXPECT_NEAR(histogram.entropy(), std::log(9.0 * 8.0 * 6.0) + 0.950271, 1e-5)
+        << "rounding of the expected value, and what is left out";
+    for (std::size_t touch = 0; touch < recording.size(); ++touch) {
+      histogram.update(recording.touch(touch));
+      // Plainly, in float64, over all bins at once.
+      std::vector<double> logs;
+      for (std::size_t object = 0; object < objects.size(); ++object) {
+        for (const double log_likelihood : histogram.log_likelihood(static_cast<int>(object))) {
+          logs.push_back(std::log(objects[object].weight) + log_likelihood);
+        }
+      }
+      const double most = *std::max_element(logs.begin(), logs.end());
+      double sum = 0.0;
+      for (const double log : logs) {
+        sum += std::exp(log - most);
+      }
+      double expected = 0.0;
+      for (const double log : logs) {
+        const double log_p = log - most - std::log(sum);
+        expected -= std::exp(log_p) * log_p;
+      }
+      // The sums of the reduction are float32.
+      EXPECT_NEAR(histogram.entropy(), expected, 1e-4) << "after touch " << touch;
+    }
   }
 }
 

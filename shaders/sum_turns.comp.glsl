@@ -1,0 +1,186 @@
+#version 450
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_control_flow_attributes : require
+
+// The last pass of a blur: sums the likelihoods of neighbouring thetas, each at the place to which
+// the turn moves the bin, between the bins. Adds the result to the belief (a touch), or puts it in
+// the belief's place (a slip).
+
+#include "interface.h"
+
+layout(local_size_x_id = 0) in;
+layout(constant_id = 1) const bool SLIP = false;
+layout(constant_id = 2) const uint STRIP = 8;  // bins along y of an invocation; 1 for a slip
+layout(constant_id = 3) const bool KEEP = false;  // leaves a touch's result in the low words, too
+
+layout(binding = 0) uniform samplerBuffer source;  // two bins a texel, blurred along x and y
+layout(binding = 1) uniform samplerBuffer source_before;
+layout(binding = 2) uniform samplerBuffer source_after;
+layout(binding = 3) uniform samplerBuffer references;  // [object] log-likelihood in two floats
+layout(binding = 4) uniform samplerBuffer plane_max;   // [object, theta]
+layout(binding = 5) uniform samplerBuffer weights;     // by steps of theta
+layout(binding = 6) uniform samplerBuffer turns;       // Turn, [theta or object, step]
+layout(std430, binding = 7) buffer Belief { vec2 belief[]; };
+layout(std430, binding = 8) writeonly buffer Kept { float kept[]; };  // two words a bin
+layout(push_constant) uniform Push { TurnPush push; };
+
+#include "two_float.glsl"
+
+const uint SOURCE = BLUR_TOUCH;
+#include "blurred_bin.glsl"
+
+#define FOR_EACH_BIN [[unroll]] for (uint b = 0; b < STRIP; ++b)
+
+// Where the likelihoods of one step of theta come from.
+struct Tap {
+  bool used;
+  int slab;     // 0: this one, 1: before, 2: after
+  float largest;
+  float weight;
+  uint first;   // bin of the plane
+  int column;
+  int row;
+  float fx;
+  float fy;
+};
+
+Tap tap_at(const int k, const uint object, const uint theta, const int x, const int y) {
+  Tap tap;
+  const int all = int(push.slab.all_thetas);
+  const int steps = int(push.steps);
+  int from = int(theta) + k;
+  tap.used = push.around != 0 || (from >= 0 && from < all);
+  from = push.around != 0 ? (from % all + all) % all : clamp(from, 0, all - 1);
+  const int here = int(push.slab.theta_first);
+  int first_theta = here;
+  tap.slab = 0;
+  if (from < here || from >= here + int(push.slab.thetas)) {
+    const int before = int(push.theta_before);
+    const bool is_before = from >= before && from < before + int(push.thetas_before);
+    tap.slab = is_before ? 1 : 2;
+    first_theta = is_before ? before : int(push.theta_after);
+  }
+  tap.first = (object - push.slab.object_first) * push.slab.stride +
+              uint(from - first_theta) * push.slab.nx * push.slab.ny;
+  tap.largest = texelFetch(plane_max, int(object) * all + from).x;
+  tap.weight = texelFetch(weights, abs(k)).x;
+  const int entry = 2 * (int(push.touch_turns != 0 ? theta : object) * (2 * steps + 1) + k + steps);
+  const vec4 matrix = texelFetch(turns, entry);
+  const vec4 shift = texelFetch(turns, entry + 1);
+  const float moved_x = shift.y + matrix.x * float(x) + matrix.y * float(y);
+  const float moved_y = shift.w + matrix.z * float(x) + matrix.w * float(y);
+  tap.column = x + int(shift.x) + int(floor(moved_x));
+  tap.row = y + int(shift.z) + int(floor(moved_y));
+  tap.fx = moved_x - floor(moved_x);
+  tap.fy = moved_y - floor(moved_y);
+  return tap;
+}
+
+float log_at(const Tap tap, const bool inside, const int column, const int row) {
+  const uint bin =
+      tap.first + (inside ? uint(row) * push.slab.nx + uint(column) : 0);
+  vec4 texel = vec4(0.0);
+  // The slab is the same for a whole workgroup.
+  if (tap.slab == 0) {
+    texel = texelFetch(source, int(bin / 2));
+  } else if (tap.slab == 1) {
+    texel = texelFetch(source_before, int(bin / 2));
+  } else {
+    texel = texelFetch(source_after, int(bin / 2));
+  }
+  return bin % 2 == 0 ? texel.x : texel.z;
+}
+
+void put(const uint bin, const float value, const vec2 reference) {
+  belief[bin] = SLIP ? two_float_add(reference, value) : two_float_add(belief[bin], value);
+  if (KEEP) {
+    kept[2 * bin + 1] = value;
+  }
+}
+
+void main() {
+  const int nx = int(push.slab.nx);
+  const int ny = int(push.slab.ny);
+  const uint strips = (push.slab.ny + STRIP - 1) / STRIP;
+  const uint id = gl_GlobalInvocationID.x;
+  if (id >= push.slab.nx * strips) {
+    return;
+  }
+  const int x = int(id % push.slab.nx);
+  const int y = int(id / push.slab.nx * STRIP);
+  const uint object = push.slab.object_first + gl_WorkGroupID.y;
+  const uint theta = push.slab.theta_first + gl_WorkGroupID.z;
+  const int steps = int(push.steps);
+  const vec2 reference = texelFetch(references, int(object)).xy;
+
+  float largest = LOWEST;
+  for (int k = -steps; k <= steps; ++k) {
+    const Tap tap = tap_at(k, object, theta, x, y);
+    largest = tap.used ? max(largest, tap.largest) : largest;
+  }
+
+  float sum[STRIP];
+  float weight[STRIP];
+  FOR_EACH_BIN {
+    sum[b] = 0.0;
+    weight[b] = 0.0;
+  }
+  for (int k = -steps; k <= steps; ++k) {
+    const Tap tap = tap_at(k, object, theta, x, y);
+    const bool left_inside = tap.used && tap.column >= 0 && tap.column < nx;
+    const bool right_inside = tap.used && tap.column >= -1 && tap.column < nx - 1;
+    const float left = left_inside ? tap.weight * (1.0 - tap.fx) : 0.0;
+    const float right = right_inside ? tap.weight * tap.fx : 0.0;
+    float below = 0.0;
+    float below_weight = 0.0;
+    [[unroll]] for (uint b = 0; b <= STRIP; ++b) {
+      const int row = tap.row + int(b);
+      const bool inside = row >= 0 && row < ny;
+      const float above =
+          inside ? left * lifted(log_at(tap, inside && left_inside, tap.column, row) - largest) +
+                       right * lifted(log_at(tap, inside && right_inside, tap.column + 1, row) -
+                                      largest)
+                 : 0.0;
+      const float above_weight = inside ? left + right : 0.0;
+      if (b > 0) {
+        sum[b - 1] += (1.0 - tap.fy) * below + tap.fy * above;
+        weight[b - 1] += (1.0 - tap.fy) * below_weight + tap.fy * above_weight;
+      }
+      below = above;
+      below_weight = above_weight;
+    }
+  }
+
+  const uint first = gl_WorkGroupID.y * push.slab.stride +
+                     (gl_WorkGroupID.z * push.slab.ny + uint(y)) * push.slab.nx + uint(x);
+  uint poor = 0;
+  FOR_EACH_BIN {
+    if (y + int(b) < ny) {
+      if (sum[b] < BLUR_LEAST) {
+        poor |= 1u << b;
+      } else {
+        put(first + b * push.slab.nx, log(sum[b] / weight[b]) + (largest - BLUR_LIFT), reference);
+      }
+    }
+  }
+  for (uint b = 0; poor >> b != 0; ++b) {
+    const bool wanted = (poor >> b & 1u) != 0;
+    vec2 logs = vec2(LOWEST, 0.0);
+    float total = 0.0;
+    for (int k = wanted ? -steps : steps + 1; k <= steps; ++k) {
+      const Tap tap = tap_at(k, object, theta, x, y);
+      for (int corner = tap.used ? 0 : 4; corner < 4; ++corner) {
+        const int column = tap.column + corner % 2;
+        const int row = tap.row + int(b) + corner / 2;
+        const float part = tap.weight * (corner % 2 == 0 ? 1.0 - tap.fx : tap.fx) *
+                           (corner / 2 == 0 ? 1.0 - tap.fy : tap.fy);
+        const bool inside = column >= 0 && column < nx && row >= 0 && row < ny && part > 0.0;
+        total += inside ? part : 0.0;
+        logs = inside ? log_sum_add(logs, log_at(tap, inside, column, row), part) : logs;
+      }
+    }
+    if (wanted) {
+      put(first + b * push.slab.nx, logs.x + log(logs.y / total), reference);
+    }
+  }
+}
