@@ -54,9 +54,8 @@ Case touch_cost_case(Device& device, const std::vector<Hypothesis>& letters,
   std::vector<Touches> touches(histograms.size());
   std::vector<std::function<void()>> contenders;
   for (std::size_t i = 0; i < histograms.size(); ++i) {
-    contenders.emplace_back([&histogram = histograms[i], &of_it = touches[i]] {
-      histogram.update(of_it.next());
-    });
+    contenders.emplace_back(
+        [&histogram = histograms[i], &of_it = touches[i]] { histogram.update(of_it.next()); });
     contenders.back()();  // the first touch warms up; the object slips before the second
   }
   const std::vector<std::vector<double>> seconds = interleave(contenders, repeats);
@@ -81,8 +80,7 @@ Case touch_cost_case(Device& device, const std::vector<Hypothesis>& letters,
                            {"memory, none of these over plain", memory(3), "times", at_most(2.0)}}};
 }
 
-Case latency_of_averaged_case(Device& device, const std::vector<Hypothesis>& letters,
-                              int repeats) {
+Case latency_of_averaged_case(Device& device, const std::vector<Hypothesis>& letters, int repeats) {
   const PoseLattice lattice = lattice_of(25, 25, 16);
   std::array<std::vector<double>, 2> milliseconds;
   std::vector<PoseHistogram> histograms;
@@ -102,14 +100,13 @@ Case latency_of_averaged_case(Device& device, const std::vector<Hypothesis>& let
       }
     }
   }
-  return {.name = "latency " + size_of(lattice) + ", uncertain",
-          .facts = {{"objects", letters.size()},
-                    {"touch_sd", "1 mm, 0.05 rad"},
-                    {"repeats", repeats}},
-          .measurements = {{"touch to estimate, median", median(milliseconds[1]), "ms",
-                            at_most(most_latency_ms)},
-                           {"95th percentile", quantile(milliseconds[1], 0.95), "ms"},
-                           {"plain touch to estimate, median", median(milliseconds[0]), "ms"}}};
+  return {
+      .name = "latency " + size_of(lattice) + ", uncertain",
+      .facts = {{"objects", letters.size()}, {"touch_sd", "1 mm, 0.05 rad"}, {"repeats", repeats}},
+      .measurements = {
+          {"touch to estimate, median", median(milliseconds[1]), "ms", at_most(most_latency_ms)},
+          {"95th percentile", quantile(milliseconds[1], 0.95), "ms"},
+          {"plain touch to estimate, median", median(milliseconds[0]), "ms"}}};
 }
 
 Case large_belief_case(Device& device, const std::vector<Hypothesis>& letters) {
@@ -120,9 +117,9 @@ Case large_belief_case(Device& device, const std::vector<Hypothesis>& letters) {
   const double seconds = seconds_of([&] { histogram.update(touches.next()); });
   return {.name = "touch " + size_of(lattice),
           .facts = {{"objects", letters.size()}, {"touch_sd", "1 mm, 0.05 rad"}},
-          .measurements = {{"device memory", mib(histogram.device_bytes()), "MiB",
-                            at_most(most_memory_mib)},
-                           {"uncertain touch", seconds, "s"}}};
+          .measurements = {
+              {"device memory", mib(histogram.device_bytes()), "MiB", at_most(most_memory_mib)},
+              {"uncertain touch", seconds, "s"}}};
 }
 
 }  // namespace palpate::bench

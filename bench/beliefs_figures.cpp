@@ -45,7 +45,7 @@ Chart misplaced_chart(const Json& records, const std::string& field, ChartAxis y
       const bool averaged = belief == std::string("averaged");
       ChartSeries series{.name = fmt::format("{} mm, {} rad, {}", plain_text(noise),
                                              plain_text(of_both.front().at("noise_rad")), belief),
-                         .colour = bench::series(colour),
+                         .colour = palpate::series(colour),
                          .mark = averaged ? Mark::circle : Mark::square,
                          .fill = averaged ? MarkFill::solid : MarkFill::hollow,
                          .line = averaged ? Line::solid : Line::dashed};
@@ -75,8 +75,8 @@ Chart none_chart(const Json& records) {
   Chart chart{.x = touches_axis, .y = percent_axis("never learned, called none (%)")};
   for (const Json& name : values_of(records, "name")) {
     ChartSeries series = series_like(chart.series.size(), name);
-    series.points = points_of(records_where(records, "name", name), "/touches",
-                              "/unlearned_called_none");
+    series.points =
+        points_of(records_where(records, "name", name), "/touches", "/unlearned_called_none");
     chart.series.push_back(std::move(series));
   }
   return chart;
@@ -96,8 +96,7 @@ Chart slip_chart(const Json& records) {
 }
 
 Chart plan_chart(const Json& records) {
-  Chart chart{.x = touches_axis,
-              .y = {.label = "entropy of the belief (nats)", .lower = 0.0}};
+  Chart chart{.x = touches_axis, .y = {.label = "entropy of the belief (nats)", .lower = 0.0}};
   for (const Json& record : records) {
     ChartSeries series = series_like(chart.series.size(), record.at("order"));
     series.points = points_of(record.at("curve"), "/touches", "/entropy/mean");

@@ -12,9 +12,9 @@ namespace palpate::bench {
 
 namespace {
 
-constexpr const char* figure_names[] = {"fig6a",       "fig6b",  "fig7a",   "fig7b",
-                                        "augmented",   "errors", "refined", "pose_noise",
-                                        "calibration"};
+constexpr const char* figure_names[] = {"fig6a",   "fig6b",      "fig7a",
+                                        "fig7b",   "augmented",  "errors",
+                                        "refined", "pose_noise", "calibration"};
 
 const ChartAxis touches_axis{.label = "touches", .lower = 0.0};
 constexpr const char* mean_error = "mean pose error of trials with the right letter (mm)";

@@ -45,8 +45,8 @@ Json document_of(const ExperimentResult& result);
 std::vector<std::string> table_files();
 std::vector<std::string> figure_files();
 
-/// Writes curves.csv, calibration.csv, pose_noise.csv and trials.csv, the last with a line for every
-/// touch of every trial.
+/// Writes curves.csv, calibration.csv, pose_noise.csv and trials.csv, the last with a line for
+/// every touch of every trial.
 /// @throws Error where the disk refuses
 void write_tables(const ExperimentResult& result, const std::filesystem::path& folder);
 

@@ -72,8 +72,8 @@ int main(int argc, char** argv) try {
                         "touches, and what each costs",
                         beliefs, measure_beliefs, command_line);
   command->add_option("--part", beliefs.part, "Measure only this part")
-      ->check(CLI::IsMember(std::vector<std::string>(std::begin(belief_parts),
-                                                     std::end(belief_parts))));
+      ->check(CLI::IsMember(
+          std::vector<std::string>(std::begin(belief_parts), std::end(belief_parts))));
   command->add_option("--trials", beliefs.trials,
                       "Unknowns per letter and shape (default: each part's own)");
   command->add_option("--plots", beliefs.plots, "Draw charts in this folder, as PNG and SVG");

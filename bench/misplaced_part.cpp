@@ -12,9 +12,9 @@ namespace palpate::bench {
 namespace {
 
 constexpr std::uint64_t trial_seed = 500'000'000;
-constexpr double most_error_ratio = 0.85;      ///< of the plain belief's, after 9 and 12 touches
-constexpr double most_log_loss = 0.02;         ///< nats, after 5 touches
-constexpr double least_normalised_error = 2.0; ///< after 5, 9 and 12 touches
+constexpr double most_error_ratio = 0.85;       ///< of the plain belief's, after 9 and 12 touches
+constexpr double most_log_loss = 0.02;          ///< nats, after 5 touches
+constexpr double least_normalised_error = 2.0;  ///< after 5, 9 and 12 touches
 constexpr double most_normalised_error = 4.0;
 
 /// The mean of some values and its bootstrap interval.
@@ -78,11 +78,11 @@ Case case_of(const MisplacedSetting& setting, const MisplacedRun& run, bool held
   add_errors(result, "as if exact", run.as_if_exact, run.touches, false);
   add_errors(result, "averaged", run.averaged, run.touches, held_to_goals);
   const MisplacedRun::Paired paired = run.refined();
-  Measurement ratio{.name = "refined error, averaged over as if exact",
-                    .value = mean(paired.averaged_mm) / mean(paired.as_if_exact_mm),
-                    .unit = "times",
-                    .interval = bootstrap_ratio_interval(paired.averaged_mm,
-                                                         paired.as_if_exact_mm)};
+  Measurement ratio{
+      .name = "refined error, averaged over as if exact",
+      .value = mean(paired.averaged_mm) / mean(paired.as_if_exact_mm),
+      .unit = "times",
+      .interval = bootstrap_ratio_interval(paired.averaged_mm, paired.as_if_exact_mm)};
   if (held_to_goals && run.touches >= 9) {
     ratio.goal = at_most(most_error_ratio);
   }

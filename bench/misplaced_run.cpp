@@ -52,8 +52,8 @@ std::vector<MisplacedRun> run_misplaced(Device& device, const std::vector<Hypoth
   const DisplacementSd sd{setting.noise.translation_mm, setting.noise.rotation_rad};
   for (const auto& [touch_sd, errors] : {std::pair(DisplacementSd{}, &MisplacedRun::as_if_exact),
                                          std::pair(sd, &MisplacedRun::averaged)}) {
-    const RecognitionTask task(
-        letters, HistogramOptions{.lattice = setting.lattice, .touch_sd = touch_sd});
+    const RecognitionTask task(letters,
+                               HistogramOptions{.lattice = setting.lattice, .touch_sd = touch_sd});
     PoseHistogram histogram = histogram_of(device, task);
     for (const Recording& trial : trials) {
       const std::vector<RecognitionStep> steps = steps_after(histogram, task, trial, touches);

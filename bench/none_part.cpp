@@ -47,8 +47,8 @@ std::vector<NoneSetting> settings_of(const BeliefInputs& inputs) {
     settings.push_back({.name = "exact, ±40 mm", .lattice = lattice_over(40.0, 52, 55)});
   }
   const DisplacementSd sd{1.0, 0.05};
-  for (const auto& [name, touch_sd] :
-       {std::pair("misplaced, averaged", sd), std::pair("misplaced, as if exact", DisplacementSd{})}) {
+  for (const auto& [name, touch_sd] : {std::pair("misplaced, averaged", sd),
+                                       std::pair("misplaced, as if exact", DisplacementSd{})}) {
     settings.push_back({.name = name,
                         .lattice = quick ? lattice_of(13, 13, 55) : lattice_of(20, 20, 75),
                         .touching = {.at_random_poses = true, .pose_noise = {sd.mm, sd.rad}},

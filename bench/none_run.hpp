@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "judged_belief.hpp"
+#include "measurement.hpp"
 #include "palpate/displacement.hpp"
 #include "trials.hpp"
 

@@ -38,16 +38,15 @@ double normalised_error(const OccupancyGrid& map, const RefinedPose& refined,
   const Pose& estimate = refined.T_object_robot;
   const Body body = body_of(map);
   if (map.symmetry == 0) {
-    const glm::dvec2 error = inverse(estimate) * body.centroid_mm -
-                             inverse(T_object_robot_truth) * body.centroid_mm;
+    const glm::dvec2 error =
+        inverse(estimate) * body.centroid_mm - inverse(T_object_robot_truth) * body.centroid_mm;
     const glm::dmat3x2 jacobian = jacobian_of_place(estimate, body.centroid_mm);
     const glm::dmat2 covariance = jacobian * matrix_of(refined) * glm::transpose(jacobian);
     return expected_normalised_error / 2.0 * glm::dot(error, glm::inverse(covariance) * error);
   }
   const Pose truth = nearest_equal_pose(body, map.symmetry, estimate, T_object_robot_truth);
-  const glm::dvec3 error(
-      estimate.translation_mm - truth.translation_mm,
-      wrap_angle(estimate.theta_rad - truth.theta_rad, 2.0 * std::numbers::pi));
+  const glm::dvec3 error(estimate.translation_mm - truth.translation_mm,
+                         wrap_angle(estimate.theta_rad - truth.theta_rad, 2.0 * std::numbers::pi));
   return glm::dot(error, glm::inverse(matrix_of(refined)) * error);
 }
 

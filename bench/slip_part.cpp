@@ -53,8 +53,8 @@ Json measure_slip(const BeliefInputs& inputs, Report& report) {
         mean_error(name + ": mode's error, mean over touches", *errors, 0, goal));
     result.measurements.push_back(mean_error(name + ": mode's error, second half of the touches",
                                              *errors, errors->size() / 2, {}));
-    result.measurements.push_back({name + ": touches at which the mode has the right letter",
-                                   100.0 * located(*errors), "%"});
+    result.measurements.push_back(
+        {name + ": touches at which the mode has the right letter", 100.0 * located(*errors), "%"});
     records.push_back({{"belief", belief}, {"curve", curve_of(*errors)}});
   }
   report.add(result);

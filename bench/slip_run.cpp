@@ -60,8 +60,8 @@ SlipRun run_slip(Device& device, const std::vector<Hypothesis>& letters,
   for (const Recording& trial :
        make_trials(vowels, setting.trials_each, setting.touches, trial_seed)) {
     const std::size_t letter = trials.size() / static_cast<std::size_t>(setting.trials_each);
-    trials.push_back(slipping_trial(trial, body_of(letters[letter].map).centroid_mm, setting.step,
-                                    seed++));
+    trials.push_back(
+        slipping_trial(trial, body_of(letters[letter].map).centroid_mm, setting.step, seed++));
   }
   const auto errors = [&](const DisplacementSd& slip_sd) {
     return errors_of(device,

@@ -5,6 +5,7 @@
 
 #include "judged_belief.hpp"
 #include "palpate/displacement.hpp"
+#include "trial_errors.hpp"
 #include "trials.hpp"
 
 namespace palpate::bench {
