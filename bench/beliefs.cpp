@@ -43,9 +43,12 @@ void measure_beliefs(const BeliefsOptions& options, std::span<char* const> comma
   if (!options.part.empty()) {
     parts = {options.part};
   }
-  CommandRun run(options,
-                 {{"--json", options.json}, {"--plots", options.plots, figure_files_of(parts)}},
-                 command_line);
+  std::vector<Output> outputs = {{"--json", options.json}};
+  const std::vector<std::string> figures = figure_files_of(parts);
+  if (!figures.empty()) {
+    outputs.push_back({"--plots", options.plots, figures});
+  }
+  CommandRun run(options, outputs, command_line);
   const std::vector<Hypothesis> letters =
       letter_maps(run.device(), training_recordings(), MapOptions{});
   const BeliefInputs inputs{run.device(), letters, options};

@@ -1,5 +1,6 @@
 #include <algorithm>
-#include <cmath>
+#include <iterator>
+#include <tuple>
 
 #include <fmt/format.h>
 
@@ -13,6 +14,17 @@ namespace palpate::bench {
 namespace {
 
 const ChartAxis touches_axis{.label = "touches", .lower = 0.0};
+
+/// An axis that leaves room for the marks at the most touches of the records.
+ChartAxis touches_axis_to(const Json& records) {
+  ChartAxis axis = touches_axis;
+  double most = 0.0;
+  for (const Json& record : records) {
+    most = std::max(most, record.at("touches").get<double>());
+  }
+  axis.upper = most + 0.5;
+  return axis;
+}
 
 Json records_where(const Json& records, const char* field, const Json& value) {
   Json found = Json::array();
@@ -35,7 +47,7 @@ std::vector<Json> values_of(const Json& records, const char* field) {
 /// A mean with its interval over touches: colours tell the noise apart, dashes the beliefs.
 Chart misplaced_chart(const Json& records, const std::string& field, ChartAxis y) {
   Chart chart{.title = "standard deviation of the error of the reported sensor pose",
-              .x = touches_axis,
+              .x = touches_axis_to(records),
               .y = std::move(y)};
   std::size_t colour = 0;
   for (const Json& noise : values_of(records, "noise_mm")) {
@@ -71,13 +83,28 @@ Chart sureness_chart(const Json& records) {
   return chart;
 }
 
+/// Shares called none over touches: colours tell the settings apart, dashes who was learned. Larger
+/// regions are left to the tables.
 Chart none_chart(const Json& records) {
-  Chart chart{.x = touches_axis, .y = percent_axis("never learned, called none (%)")};
+  Chart chart{.x = touches_axis_to(records), .y = percent_axis("called none (%)")};
+  std::size_t colour = 0;
   for (const Json& name : values_of(records, "name")) {
-    ChartSeries series = series_like(chart.series.size(), name);
-    series.points =
-        points_of(records_where(records, "name", name), "/touches", "/unlearned_called_none");
-    chart.series.push_back(std::move(series));
+    const std::string text = name;
+    if (text.starts_with("exact") && !chart.series.empty()) {
+      continue;
+    }
+    for (const auto& [who, field, learned] :
+         {std::tuple("never learned", "/unlearned_called_none", false),
+          std::tuple("learned", "/learned_called_none", true)}) {
+      chart.series.push_back(
+          {.name = fmt::format("{}: {}", text, who),
+           .colour = palpate::series(colour),
+           .mark = learned ? Mark::square : Mark::circle,
+           .fill = learned ? MarkFill::hollow : MarkFill::solid,
+           .line = learned ? Line::dashed : Line::solid,
+           .points = points_of(records_where(records, "name", name), "/touches", field)});
+    }
+    ++colour;
   }
   return chart;
 }
@@ -96,7 +123,8 @@ Chart slip_chart(const Json& records) {
 }
 
 Chart plan_chart(const Json& records) {
-  Chart chart{.x = touches_axis, .y = {.label = "entropy of the belief (nats)", .lower = 0.0}};
+  Chart chart{.x = touches_axis_to(records.front().at("curve")),
+              .y = {.label = "entropy of the belief (nats)", .lower = 0.0}};
   for (const Json& record : records) {
     ChartSeries series = series_like(chart.series.size(), record.at("order"));
     series.points = points_of(record.at("curve"), "/touches", "/entropy/mean");

@@ -26,7 +26,7 @@ constexpr int touches = 5;
 constexpr SensorPoseNoise noise{.translation_mm = 1.0, .rotation_rad = 0.05};
 
 constexpr double margin_px = 40.0;
-constexpr double side_px = 480.0;
+constexpr double side_px = 520.0;
 constexpr double axis_px = 84.0;
 constexpr double top_px = 130.0;
 constexpr double bar_px = top_px + side_px + 104.0;
@@ -116,7 +116,7 @@ void draw_panel(Canvas& canvas, double left_px, const std::string& title, const 
             "x of the robot's origin in the object frame, mm", "y, mm");
   canvas.text(title, {left_px, top_px - 80.0}, heading);
   canvas.text(
-      fmt::format("refined pose off by {:.1f} mm; standard deviations {:.1f} and {:.1f} mm",
+      fmt::format("error {:.1f} mm; standard deviations in x and y {:.1f} and {:.1f} mm",
                   *shown.step.refined_error_mm, std::sqrt(shown.step.refined->covariance[0]),
                   std::sqrt(shown.step.refined->covariance[4])),
       {left_px, top_px - 50.0}, small);
@@ -140,10 +140,10 @@ std::string draw_misplaced_unknown(Device& device, const std::vector<Hypothesis>
   const glm::dvec2 truth_mm = trial.truth->T_object_robot.translation_mm;
   Canvas canvas(static_cast<int>(width_px), static_cast<int>(height_px));
   const double first_px = margin_px + axis_px;
-  draw_panel(canvas, first_px, "Five touches, taken as exact", believe(device, letters, trial, {}),
+  draw_panel(canvas, first_px, "Five touches taken as exact", believe(device, letters, trial, {}),
              truth_mm);
   draw_panel(canvas, first_px + side_px + margin_px + axis_px,
-             "The same touches, known to 1 mm and 3°",
+             "The same, each known to 1 mm and 3°",
              believe(device, letters, trial, {noise.translation_mm, noise.rotation_rad}), truth_mm);
   return canvas.encode();
 }
