@@ -182,24 +182,33 @@ struct TurnPush {
   uint theta_before;
   uint thetas_before;
   uint theta_after;
-  uint touch_turns;  // 1: a turn for every theta; 0: for every object
+  uint first_weight;  // index in the table of the planes' maxima
 };
 
-// Where a bin's likelihood comes from when theta grows by some steps: the place (x, y) of the plane,
-// in bins, moved by whole + fraction + matrix (x, y). Kernels read two vec4.
+// Where a bin's likelihood comes from when theta grows by some steps: the place (x, y) of the
+// plane, in bins, moved by whole + fraction + matrix (x, y). Fraction and matrix are two floats
+// each: a bin next to the place may have a weight below 1e-7 and yet count more than all others.
+// Kernels read four vec4.
 struct Turn {
-  float xx;
-  float xy;
-  float yx;
-  float yy;
   float whole_x;
-  float fraction_x;
   float whole_y;
+  float unused[2];
+  float fraction_x;
+  float fraction_x_low;
   float fraction_y;
+  float fraction_y_low;
+  float xx;
+  float xx_low;
+  float xy;
+  float xy_low;
+  float yx;
+  float yx_low;
+  float yy;
+  float yy_low;
 };
 
-// An array at one theta: its centre, relative to the pivot's place, and the direction of its x axis,
-// in the object frame. Kernels read a vec4.
+// An array at one theta: its centre, relative to the pivot's place, and the direction of its x
+// axis, in the object frame. Kernels read a vec4.
 struct ArrayAtTheta {
   float x_mm;
   float y_mm;
@@ -361,7 +370,7 @@ static_assert(sizeof(RotatedElement) == 16 && sizeof(Segment) == 16 && sizeof(Ta
 static_assert(sizeof(Corners) == 16 && sizeof(ObjectPlace) == 24);
 static_assert(sizeof(LikelihoodPush) == 28 && sizeof(Partial) == 16);
 static_assert(sizeof(ReducePush) == 12 && sizeof(AddPush) == 8 && sizeof(MarginalPush) == 20);
-static_assert(sizeof(BlurPush) == 32 && sizeof(TurnPush) == 52 && sizeof(Turn) == 32);
+static_assert(sizeof(BlurPush) == 32 && sizeof(TurnPush) == 52 && sizeof(Turn) == 64);
 static_assert(sizeof(ArrayAtTheta) == 16 && sizeof(ObjectBox) == 16);
 static_assert(sizeof(OverlapPush) == 56 && sizeof(OverlapPartial) == 12);
 static_assert(sizeof(Particle) == 16 && sizeof(ObjectShare) == 8 && sizeof(DrawBlock) == 16);

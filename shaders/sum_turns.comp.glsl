@@ -17,11 +17,10 @@ layout(binding = 0) uniform samplerBuffer source;  // two bins a texel, blurred 
 layout(binding = 1) uniform samplerBuffer source_before;
 layout(binding = 2) uniform samplerBuffer source_after;
 layout(binding = 3) uniform samplerBuffer references;  // [object] log-likelihood in two floats
-layout(binding = 4) uniform samplerBuffer plane_max;   // [object, theta]
-layout(binding = 5) uniform samplerBuffer weights;     // by steps of theta
-layout(binding = 6) uniform samplerBuffer turns;       // Turn, [theta or object, step]
-layout(std430, binding = 7) buffer Belief { vec2 belief[]; };
-layout(std430, binding = 8) writeonly buffer Kept { float kept[]; };  // two words a bin
+layout(binding = 4) uniform samplerBuffer plane_max;   // [object, theta], then weights by steps
+layout(binding = 5) uniform samplerBuffer turns;       // Turn, [theta or object, step]
+layout(std430, binding = 6) buffer Belief { vec2 belief[]; };
+layout(std430, binding = 7) writeonly buffer Kept { float kept[]; };  // two words a bin
 layout(push_constant) uniform Push { TurnPush push; };
 
 #include "two_float.glsl"
@@ -40,9 +39,32 @@ struct Tap {
   uint first;   // bin of the plane
   int column;
   int row;
-  float fx;
-  float fy;
+  vec2 x;  // weights of the column and of the next one
+  vec2 y;  // of the row and of the next one
 };
+
+// A distance in bins, fraction + a i + b j, as a whole number and the weights of the bins before and
+// behind it.
+vec2 split_distance(const vec2 fraction, const vec2 a, const vec2 b, const vec2 place,
+                    out int whole) {
+  vec2 distance = fraction;
+  if (SLIP) {
+    distance = two_float_sum(distance, two_float_product(a.x, place.x));
+    distance = two_float_add(distance, a.y * place.x);
+    distance = two_float_sum(distance, two_float_product(b.x, place.y));
+    distance = two_float_add(distance, b.y * place.y);
+  }
+  float before = floor(distance.x);
+  precise float rest = distance.x - before;
+  if (rest + distance.y < 0.0) {
+    before -= 1.0;
+    rest += 1.0;
+  }
+  whole = int(before);
+  precise float behind = rest + distance.y;
+  precise float near = (1.0 - rest) - distance.y;
+  return vec2(near, behind);
+}
 
 Tap tap_at(const int k, const uint object, const uint theta, const int x, const int y) {
   Tap tap;
@@ -63,16 +85,18 @@ Tap tap_at(const int k, const uint object, const uint theta, const int x, const 
   tap.first = (object - push.slab.object_first) * push.slab.stride +
               uint(from - first_theta) * push.slab.nx * push.slab.ny;
   tap.largest = texelFetch(plane_max, int(object) * all + from).x;
-  tap.weight = texelFetch(weights, abs(k)).x;
-  const int entry = 2 * (int(push.touch_turns != 0 ? theta : object) * (2 * steps + 1) + k + steps);
-  const vec4 matrix = texelFetch(turns, entry);
-  const vec4 shift = texelFetch(turns, entry + 1);
-  const float moved_x = shift.y + matrix.x * float(x) + matrix.y * float(y);
-  const float moved_y = shift.w + matrix.z * float(x) + matrix.w * float(y);
-  tap.column = x + int(shift.x) + int(floor(moved_x));
-  tap.row = y + int(shift.z) + int(floor(moved_y));
-  tap.fx = moved_x - floor(moved_x);
-  tap.fy = moved_y - floor(moved_y);
+  tap.weight = texelFetch(plane_max, int(push.first_weight) + abs(k)).x;
+  const int entry = 4 * (int(SLIP ? object : theta) * (2 * steps + 1) + k + steps);
+  const vec2 whole = texelFetch(turns, entry).xy;
+  const vec4 fraction = texelFetch(turns, entry + 1);
+  const vec4 to_x = SLIP ? texelFetch(turns, entry + 2) : vec4(0.0);
+  const vec4 to_y = SLIP ? texelFetch(turns, entry + 3) : vec4(0.0);
+  int more_columns;
+  int more_rows;
+  tap.x = split_distance(fraction.xy, to_x.xy, to_x.zw, vec2(x, y), more_columns);
+  tap.y = split_distance(fraction.zw, to_y.xy, to_y.zw, vec2(x, y), more_rows);
+  tap.column = x + int(whole.x) + more_columns;
+  tap.row = y + int(whole.y) + more_rows;
   return tap;
 }
 
@@ -129,8 +153,8 @@ void main() {
     const Tap tap = tap_at(k, object, theta, x, y);
     const bool left_inside = tap.used && tap.column >= 0 && tap.column < nx;
     const bool right_inside = tap.used && tap.column >= -1 && tap.column < nx - 1;
-    const float left = left_inside ? tap.weight * (1.0 - tap.fx) : 0.0;
-    const float right = right_inside ? tap.weight * tap.fx : 0.0;
+    const float left = left_inside ? tap.weight * tap.x.x : 0.0;
+    const float right = right_inside ? tap.weight * tap.x.y : 0.0;
     float below = 0.0;
     float below_weight = 0.0;
     [[unroll]] for (uint b = 0; b <= STRIP; ++b) {
@@ -143,8 +167,8 @@ void main() {
                  : 0.0;
       const float above_weight = inside ? left + right : 0.0;
       if (b > 0) {
-        sum[b - 1] += (1.0 - tap.fy) * below + tap.fy * above;
-        weight[b - 1] += (1.0 - tap.fy) * below_weight + tap.fy * above_weight;
+        sum[b - 1] += tap.y.x * below + tap.y.y * above;
+        weight[b - 1] += tap.y.x * below_weight + tap.y.y * above_weight;
       }
       below = above;
       below_weight = above_weight;
@@ -172,8 +196,7 @@ void main() {
       for (int corner = tap.used ? 0 : 4; corner < 4; ++corner) {
         const int column = tap.column + corner % 2;
         const int row = tap.row + int(b) + corner / 2;
-        const float part = tap.weight * (corner % 2 == 0 ? 1.0 - tap.fx : tap.fx) *
-                           (corner / 2 == 0 ? 1.0 - tap.fy : tap.fy);
+        const float part = tap.weight * tap.x[corner % 2] * tap.y[corner / 2];
         const bool inside = column >= 0 && column < nx && row >= 0 && row < ny && part > 0.0;
         total += inside ? part : 0.0;
         logs = inside ? log_sum_add(logs, log_at(tap, inside, column, row), part) : logs;

@@ -9,6 +9,8 @@
 #include <glm/vec2.hpp>
 
 #include "palpate/contact_model.hpp"
+#include "palpate/displacement.hpp"
+#include "palpate/estimate.hpp"
 #include "palpate/fit.hpp"
 #include "palpate/lattice.hpp"
 #include "palpate/occupancy_grid.hpp"
@@ -126,6 +128,40 @@ Pose bin_pose(const PoseLattice& lattice, std::int64_t bin);
 std::vector<double> log_likelihoods(std::span<const Touch> touches, const PoseLattice& lattice,
                                     const OccupancyGrid& map, const ContactModel& model,
                                     std::size_t object = 0);
+
+// --- displaced.cpp: touches of uncertain pose, objects that slip, "none of these" ---
+// G_sigma blurs every plane of a theta along y, then along x: weights exp(-(k step)^2 / (2
+// sigma^2)) for steps k up to ceil(4 sigma / step), over the sum of those whose bin lies inside. An
+// axis of one bin is not blurred, and a place keeps its coordinate on it.
+
+/// f~(theta, t) = sum over alpha of w(alpha) (G_sigma * f(theta + alpha, .)) (t + (R(theta) -
+/// R(theta + alpha)) r): one touch's log-likelihoods f, [theta, y, x], averaged over where the
+/// sensor may have been. r is the sensor's origin relative to the pivot, in the robot frame. The
+/// angles alpha are steps of theta, wrapped where theta covers the circle and left out where it
+/// ends; a place between bins takes its four neighbours bilinearly, as far as they lie inside; the
+/// sum is divided by that of all weights used.
+std::vector<double> displaced_touch(const std::vector<double>& log_likelihood,
+                                    const PoseLattice& lattice, const DisplacementSd& sd,
+                                    const Pose& T_robot_sensor);
+
+/// b~(theta, t) = sum over alpha of w(alpha) (G_sigma * b(theta + alpha, .)) (g + R(alpha) (t -
+/// g)): one object's log-belief after the object has moved about its centroid g, of the same total.
+std::vector<double> slipped(const std::vector<double>& log_belief, const PoseLattice& lattice,
+                            const DisplacementSd& sd, const glm::dvec2& centroid_mm);
+
+/// Whether the rectangle around the array's elements, parallel to the sensor's axes, meets the box
+/// around the map's cells with log odds above 0, or around all of its cells where there are none.
+/// Rectangles that come within 1e-3 mm meet.
+bool overlaps(const Touch& touch, const Pose& T_object_robot, const OccupancyGrid& map);
+
+/// Log evidence of "none of these" without its weight: log s + the sum over touches of the log of
+/// the touch's mean likelihood, over the hypotheses by prior weight and over the bins at which the
+/// array overlaps the object. s is the share of such bins at the first touch. Where a touch has no
+/// such bin all bins count.
+/// @param log_likelihood [touch][object][bin], averaged where touches are uncertain
+double none_log_evidence(std::span<const Touch> touches, const PoseLattice& lattice,
+                         std::span<const Hypothesis> hypotheses,
+                         const std::vector<std::vector<std::vector<double>>>& log_likelihood);
 
 /// The belief over objects and bins: log-likelihoods [object][bin] and prior weights [object].
 struct Posterior {

@@ -117,13 +117,13 @@ std::uint64_t DenseBelief::marginal_bytes(const gpu::Context& context, const Pos
   return most;
 }
 
-void DenseBelief::clear() {
+void DenseBelief::clear() const {
   for (const Slab& slab : slabs_) {
     stream_.fill(slab.log_likelihood, 0);
   }
 }
 
-void DenseBelief::add(const DenseBelief& other) {
+void DenseBelief::add(const DenseBelief& other) const {
   const std::uint32_t lanes = independent_lanes(context_.limits());
   for (std::size_t i = 0; i < slabs_.size(); ++i) {
     const std::int64_t bins = slabs_[i].object_count * slabs_[i].stride();

@@ -49,9 +49,9 @@ class DenseBelief {
                                       std::size_t objects);
 
   /// Records the return to uniform.
-  void clear();
+  void clear() const;
   /// Records the addition of another dense belief over the same lattice and objects.
-  void add(const DenseBelief& other);
+  void add(const DenseBelief& other) const;
   std::span<const Slab> slabs() const { return slabs_; }
   std::uint64_t device_bytes() const;
 

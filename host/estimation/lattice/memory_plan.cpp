@@ -10,6 +10,7 @@
 #include "dense_likelihood.hpp"
 #include "interface.h"
 #include "palpate/error.hpp"
+#include "touch_by_touch.hpp"
 
 namespace palpate {
 
@@ -49,17 +50,20 @@ MemoryPlan plan_memory(const gpu::Context& context, std::span<const Hypothesis> 
   const Room room{.bytes = std::min(limit, all), .set_by_options = limit < all};
   // The belief and, for an array at rest, No Contact everywhere.
   const std::size_t beliefs = options.still_array ? 2 : 1;
+  const bool by_touch = TouchByTouch::wanted_by(options);
 
   // A first look in floating point: bins may be too many to count.
-  const double bins_alone = 8.0 * static_cast<double>(beliefs * objects) * lattice.x_mm.count *
-                            lattice.y_mm.count * lattice.theta_rad.count;
+  const double bins_alone = 8.0 * static_cast<double>((beliefs + (by_touch ? 1 : 0)) * objects) *
+                            lattice.x_mm.count * lattice.y_mm.count * lattice.theta_rad.count;
   if (bins_alone > static_cast<double>(room.bytes)) {
     refuse(context, lattice, objects, room, bins_alone);
   }
   const std::size_t most = DenseLikelihood::batch_for(context, lattice, objects);
-  const std::uint64_t held = beliefs * DenseBelief::bytes_needed(context, lattice, objects) +
-                             DenseBelief::marginal_bytes(context, lattice, objects) +
-                             (room.set_by_options ? gpu::CommandStream::staging_bytes : 0);
+  const std::uint64_t held =
+      beliefs * DenseBelief::bytes_needed(context, lattice, objects) +
+      (by_touch ? TouchByTouch::bytes_needed(context, options, objects) : 0) +
+      DenseBelief::marginal_bytes(context, lattice, objects) +
+      (room.set_by_options ? gpu::CommandStream::staging_bytes : 0);
   const auto needed = [&](std::size_t elements) {
     return held +
            DenseLikelihood::bytes_needed(context, hypotheses, lattice, options.contact, elements);
@@ -70,10 +74,10 @@ MemoryPlan plan_memory(const gpu::Context& context, std::span<const Hypothesis> 
     refuse(context, lattice, objects, room, static_cast<double>(needed(std::min(most, step))));
   }
   const auto plan = [&](std::size_t elements) {
-    // An array at rest prepares no touch.
+    // An array at rest prepares no touch, and a touch by itself has memory of its own.
     const std::uint64_t with_one_more =
         needed(elements) + DenseBelief::bytes_needed(context, lattice, objects);
-    return MemoryPlan{elements, !options.still_array && with_one_more <= room.bytes};
+    return MemoryPlan{elements, !options.still_array && !by_touch && with_one_more <= room.bytes};
   };
   if (needed(most) <= room.bytes) {
     return plan(most);

@@ -12,6 +12,7 @@
 #include "contradiction.hpp"
 #include "dense_belief.hpp"
 #include "dense_likelihood.hpp"
+#include "displacement_check.hpp"
 #include "half_done.hpp"
 #include "hypotheses.hpp"
 #include "memory_plan.hpp"
@@ -22,6 +23,7 @@
 #include "random.hpp"
 #include "refinement.hpp"
 #include "still_array.hpp"
+#include "touch_by_touch.hpp"
 
 namespace palpate {
 
@@ -40,6 +42,9 @@ struct PoseHistogram::Impl {
     }
     if (options.still_array) {
       still.emplace(options.contact, options.lattice);
+    }
+    if (TouchByTouch::wanted_by(options)) {
+      by_touch.emplace(device.context(), stream, options, hypotheses, log_weight, belief);
     }
     if (options.none_weight) {
       none_log_weight = std::log(*options.none_weight) - log_total_weight(hypotheses) +
@@ -66,7 +71,9 @@ struct PoseHistogram::Impl {
     half_done.change([&] {
       touched = touched || !touches.empty();
       summarised.reset();
-      if (still) {
+      if (by_touch) {
+        update_by_touch(touches, still_touches, progress);
+      } else if (still) {
         still->accumulate(still_touches, likelihood, belief, progress);
       } else if (prepared.holds(evidence)) {
         prepared.accumulate(belief, progress);
@@ -81,6 +88,27 @@ struct PoseHistogram::Impl {
     });
   }
 
+  /// The same where each touch's likelihood is wanted by itself.
+  void update_by_touch(std::span<const Touch> touches, std::span<const StillTouch> still_touches,
+                       const std::function<void(double)>& progress) {
+    for (std::size_t i = 0; i < touches.size(); ++i) {
+      const ContactEvidence evidence = gather(touches.subspan(i, 1));
+      by_touch->update(
+          touches[i], evidence,
+          [&](const DenseBelief& uniform) {
+            if (still) {
+              still->accumulate(still_touches.subspan(i, 1), likelihood, uniform, {});
+            } else {
+              likelihood.accumulate(evidence, uniform, {});
+            }
+          },
+          belief);
+      if (progress) {
+        progress(static_cast<double>(i + 1) / static_cast<double>(touches.size()));
+      }
+    }
+  }
+
   /// The largest bin and the sum of every object; reduced once after each update.
   const std::vector<BeliefSummary>& summaries() {
     if (!summarised) {
@@ -89,16 +117,22 @@ struct PoseHistogram::Impl {
     return *summarised;
   }
 
+  /// What is to be added to the log-likelihoods that the belief holds of an object.
+  double lost_mass(std::size_t object) const {
+    return by_touch ? by_touch->lost_mass()[object] : 0.0;
+  }
+
   /// Eq. 14: an object's prior weight times the summed likelihood of its bins, over the sum for all
   /// objects and, where the options ask for it, "none of these", which stands last.
   std::vector<double> identity() {
     std::vector<double> log_evidence;
     for (std::size_t i = 0; i < log_weight.size(); ++i) {
       const BeliefSummary& summary = summaries()[i];
-      log_evidence.push_back(log_weight[i] + summary.max.value() + std::log(summary.sum));
+      log_evidence.push_back(log_weight[i] + lost_mass(i) + summary.max.value() +
+                             std::log(summary.sum));
     }
     if (none_log_weight) {
-      log_evidence.push_back(*none_log_weight + prior_log_likelihood);
+      log_evidence.push_back(*none_log_weight + by_touch->none_log_evidence());
     }
     return normalised(std::move(log_evidence));
   }
@@ -109,7 +143,7 @@ struct PoseHistogram::Impl {
     double most = -std::numeric_limits<double>::infinity();
     for (std::size_t i = 0; i < log_weight.size(); ++i) {
       const BeliefSummary& summary = summaries()[i];
-      const double log_likelihood = summary.max.value();
+      const double log_likelihood = summary.max.value() + lost_mass(i);
       if (log_weight[i] + log_likelihood > most) {
         most = log_weight[i] + log_likelihood;
         mode = {.object = static_cast<int>(i),
@@ -123,9 +157,12 @@ struct PoseHistogram::Impl {
 
   /// True where the prior alone explains the touches far better than the best bin of any object.
   bool contradicted() {
-    return std::all_of(summaries().begin(), summaries().end(), [&](const BeliefSummary& summary) {
-      return prior_log_likelihood - summary.max.value() > contradiction_nats;
-    });
+    bool all = true;
+    for (std::size_t i = 0; i < log_weight.size(); ++i) {
+      const double best = summaries()[i].max.value() + lost_mass(i);
+      all = all && prior_log_likelihood - best > contradiction_nats;
+    }
+    return all;
   }
 
   void require_object(int object) const {
@@ -143,6 +180,7 @@ struct PoseHistogram::Impl {
   std::optional<StillArray> still;  ///< where the options say so
   PreparedTouch prepared;
   std::vector<double> log_weight;
+  std::optional<TouchByTouch> by_touch;   ///< where the options need each touch by itself
   std::optional<double> none_log_weight;  ///< log of its prior weight times the number of bins
   double prior_log_likelihood = 0.0;      ///< of all touches, by a map that holds only the prior
   std::vector<Body> bodies;
@@ -157,6 +195,8 @@ PoseHistogram::PoseHistogram(Device& device, std::span<const Hypothesis> hypothe
   validate_hypotheses(hypotheses);
   HistogramOptions checked = options;
   checked.lattice.collapse_fixed().validate();
+  validate_displacement(checked.touch_sd, checked.lattice, "touch_sd");
+  validate_displacement(checked.slip_sd, checked.lattice, "slip_sd");
   checked.contact = resolve(options.contact, hypotheses);
   if (checked.none_weight && !(*checked.none_weight > 0.0 && std::isfinite(*checked.none_weight))) {
     throw Error(Fault::input, fmt::format("none_weight = {}: give a positive number, or none",
@@ -186,6 +226,9 @@ void PoseHistogram::reset() {
     histogram.stream.run();
     histogram.touched = false;
     histogram.prior_log_likelihood = 0.0;
+    if (histogram.by_touch) {
+      histogram.by_touch->reset();
+    }
     histogram.summarised.reset();
   });
 }
@@ -203,10 +246,18 @@ void PoseHistogram::update(std::span<const Touch> touches,
 
 void PoseHistogram::prepare(const Touch& touch) {
   Impl& histogram = whole();
+  ContactEvidence evidence = histogram.gather(std::span(&touch, 1));
+  if (histogram.by_touch && !histogram.still) {
+    histogram.half_done.change([&] {
+      histogram.by_touch->prepare(evidence, [&](const DenseBelief& uniform) {
+        histogram.likelihood.accumulate(evidence, uniform, {});
+      });
+    });
+    return;
+  }
   if (!histogram.prepared.has_room()) {
     return;
   }
-  ContactEvidence evidence = histogram.gather(std::span(&touch, 1));
   if (histogram.prepared.make_room(histogram.belief)) {
     // A device that fails also drops what reset() has recorded of the belief.
     histogram.half_done.change(
@@ -249,10 +300,16 @@ Marginals PoseHistogram::marginals(int object) const {
 std::vector<double> PoseHistogram::log_likelihood(int object) const {
   Impl& histogram = whole();
   histogram.require_object(object);
-  return histogram.belief.download(static_cast<std::size_t>(object),
-                                   {.theta_count = lattice().theta_rad.count,
-                                    .row_count = lattice().y_mm.count,
-                                    .column_count = lattice().x_mm.count});
+  std::vector<double> logs = histogram.belief.download(static_cast<std::size_t>(object),
+                                                       {.theta_count = lattice().theta_rad.count,
+                                                        .row_count = lattice().y_mm.count,
+                                                        .column_count = lattice().x_mm.count});
+  if (const double lost = histogram.lost_mass(static_cast<std::size_t>(object)); lost != 0.0) {
+    for (double& log_likelihood : logs) {
+      log_likelihood += lost;
+    }
+  }
+  return logs;
 }
 
 double PoseHistogram::entropy() const {
@@ -316,7 +373,8 @@ std::uint64_t PoseHistogram::device_bytes() const {
   const Impl& histogram = impl();
   return histogram.belief.device_bytes() + histogram.likelihood.device_bytes() +
          histogram.prepared.device_bytes() +
-         (histogram.still ? histogram.still->device_bytes() : 0);
+         (histogram.still ? histogram.still->device_bytes() : 0) +
+         (histogram.by_touch ? histogram.by_touch->device_bytes() : 0);
 }
 
 }  // namespace palpate

@@ -10,6 +10,16 @@
 
 namespace palpate {
 
+shaders::PlanesPush planes_of(const SlabExtent& slab, int thetas) {
+  return {.nx = slab.nx,
+          .ny = slab.row_count,
+          .thetas = slab.theta_count,
+          .theta_first = slab.theta_first,
+          .all_thetas = static_cast<shaders::uint>(thetas),
+          .object_first = slab.object_first,
+          .stride = static_cast<shaders::uint>(slab.stride())};
+}
+
 std::vector<SlabExtent> cut_into_slabs(const gpu::Context& context, const PoseLattice& lattice,
                                        std::size_t objects, std::uint32_t reduction_bins) {
   const gpu::Limits& limits = context.limits();

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "buffer.hpp"
+#include "interface.h"
 #include "palpate/lattice.hpp"
 
 namespace palpate {
@@ -33,6 +34,10 @@ struct SlabExtent {
   /// Bytes of all objects, two floats per bin.
   VkDeviceSize bytes() const { return static_cast<VkDeviceSize>(object_count * stride()) * 8; }
 };
+
+/// A slab of whole planes as kernels see it.
+/// @param thetas of the lattice
+shaders::PlanesPush planes_of(const SlabExtent& slab, int thetas);
 
 /// A slab's extent with its memory.
 struct Slab : SlabExtent {

@@ -20,7 +20,8 @@ std::vector<StillTouch> StillArray::gather(std::span<const Touch> touches,
 }
 
 void StillArray::accumulate(std::span<const StillTouch> touches, DenseLikelihood& likelihood,
-                            DenseBelief& belief, const std::function<void(double)>& progress) {
+                            const DenseBelief& belief,
+                            const std::function<void(double)>& progress) {
   double done = 0.0;
   for (const StillTouch& still : touches) {
     if (still.by_differences) {

@@ -39,7 +39,7 @@ class StillArray {
   /// Adds the touches to the belief one after the other, with the fraction done after each (Eq.
   /// 13).
   void accumulate(std::span<const StillTouch> touches, DenseLikelihood& likelihood,
-                  DenseBelief& belief, const std::function<void(double)>& progress);
+                  const DenseBelief& belief, const std::function<void(double)>& progress);
 
   std::uint64_t device_bytes() const { return no_contact_ ? no_contact_->device_bytes() : 0; }
 

@@ -1,0 +1,75 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "contact_evidence.hpp"
+#include "dense_belief.hpp"
+#include "dense_likelihood.hpp"
+#include "displacement_blur.hpp"
+#include "overlap_mean.hpp"
+#include "palpate/pose_histogram.hpp"
+#include "still_array.hpp"
+
+namespace palpate {
+
+/// The update of a belief where each touch's likelihood is wanted by itself before it joins the
+/// belief: touches of uncertain pose, objects that slip between touches, or "none of these". Takes
+/// one more dense belief.
+class TouchByTouch {
+ public:
+  /// Whether the options ask for it.
+  static bool wanted_by(const HistogramOptions& options);
+  /// Device memory in bytes that it takes, the dense belief included.
+  static std::uint64_t bytes_needed(const gpu::Context& context, const HistogramOptions& options,
+                                    std::size_t objects);
+
+  /// Leaves the belief uniform.
+  /// @param options outlive this object; the lattice's pivot may move
+  /// @throws Error where the device cannot blur such a lattice
+  TouchByTouch(gpu::Context& context, gpu::CommandStream& stream, const HistogramOptions& options,
+               std::span<const Hypothesis> hypotheses, const std::vector<double>& log_weight,
+               DenseBelief& belief);
+
+  /// Adds a touch. `evaluate` adds its log-likelihood at every bin to a belief that is uniform.
+  void update(const Touch& touch, const ContactEvidence& evidence,
+              const std::function<void(const DenseBelief&)>& evaluate, DenseBelief& belief);
+  /// Evaluates a touch that may come next; an update() with the same evidence need not. Does
+  /// nothing where objects slip: the memory is needed for the slip that comes first.
+  void prepare(ContactEvidence evidence, const std::function<void(const DenseBelief&)>& evaluate);
+  /// Forgets all touches.
+  void reset();
+
+  /// What a slip has taken from the summed likelihood of each object, in nats, [object]: to be
+  /// added to the log-likelihood of every bin.
+  const std::vector<double>& lost_mass() const { return lost_mass_; }
+  /// Log evidence of "none of these" without its weight: the share of the bins at which the first
+  /// touch's array overlaps an object, times the mean likelihoods of all touches over such bins.
+  double none_log_evidence() const { return none_log_evidence_; }
+
+  std::uint64_t device_bytes() const;
+
+ private:
+  void slip(DenseBelief& belief);
+  void evaluate_planes(const std::function<void(const DenseBelief&)>& evaluate);
+  void add_to_none(const Touch& touch);
+
+  gpu::CommandStream& stream_;
+  const HistogramOptions& options_;
+  const std::vector<double>& log_weight_;
+  std::size_t objects_;
+  std::vector<glm::dvec2> centroids_mm_;
+  DenseBelief scratch_;
+  DisplacementBlur touch_blur_;
+  std::optional<DisplacementBlur> slip_blur_;
+  std::optional<OverlapMean> overlap_;
+  std::optional<ContactEvidence> prepared_;  ///< of what scratch_ holds, blurred along x and y
+  std::vector<double> lost_mass_;
+  double none_log_evidence_ = 0.0;
+  bool touched_ = false;
+};
+
+}  // namespace palpate

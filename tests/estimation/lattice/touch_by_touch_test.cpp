@@ -1,0 +1,347 @@
+// Touches of uncertain pose, objects that slip between touches, and "none of these", against their
+// definitions in float64.
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "palpate/error.hpp"
+#include "palpate/pose_error.hpp"
+#include "palpate/pose_histogram.hpp"
+#include "synthetic.hpp"
+
+namespace palpate {
+namespace {
+
+/// What the method allows a mean likelihood to differ from float64, in nats per touch.
+constexpr double per_mean = 1e-3;
+
+using Logs = std::vector<double>;
+
+const std::vector<Hypothesis>& objects() {
+  static const std::vector<Hypothesis> two{{random_map(31, 27, 0.5, 12.0, 71), 2.0},
+                                           {random_map(23, 29, 0.5, 12.0, 72), 1.0}};
+  return two;
+}
+
+struct Case {
+  const char* name;
+  PoseLattice lattice;
+  DisplacementSd sd;
+  double gamma = 0.1;
+};
+
+/// [touch][object][bin]: every touch's likelihood, averaged where touches are uncertain.
+std::vector<std::vector<Logs>> reference_touches(const HistogramOptions& options,
+                                                 std::span<const Touch> touches) {
+  std::vector<std::vector<Logs>> logs;
+  for (const Touch& touch : touches) {
+    logs.emplace_back();
+    for (std::size_t object = 0; object < objects().size(); ++object) {
+      logs.back().push_back(reference::displaced_touch(
+          reference::log_likelihoods(std::span(&touch, 1), options.lattice, objects()[object].map,
+                                     options.contact, object),
+          options.lattice, options.touch_sd, touch.T_robot_sensor));
+    }
+  }
+  return logs;
+}
+
+reference::Posterior expected_posterior(const HistogramOptions& options,
+                                        std::span<const Touch> touches) {
+  reference::Posterior posterior{.lattice = options.lattice, .log_likelihood = {}, .weight = {}};
+  const std::vector<std::vector<Logs>> logs = reference_touches(options, touches);
+  for (std::size_t object = 0; object < objects().size(); ++object) {
+    Logs belief(static_cast<std::size_t>(options.lattice.bins()), 0.0);
+    for (std::size_t i = 0; i < touches.size(); ++i) {
+      if (i > 0 && !options.slip_sd.none()) {
+        belief = reference::slipped(belief, options.lattice, options.slip_sd,
+                                    reference::body_of(objects()[object].map).centroid_mm);
+      }
+      for (std::size_t bin = 0; bin < belief.size(); ++bin) {
+        belief[bin] += logs[i][object][bin];
+      }
+    }
+    posterior.log_likelihood.push_back(belief);
+    posterior.weight.push_back(objects()[object].weight);
+  }
+  return posterior;
+}
+
+std::vector<Case> cases() {
+  const PoseLattice plain{
+      .x_mm = {-5.0, 6.0, 17}, .y_mm = {-4.0, 5.0, 19}, .theta_rad = {0, two_pi, 24}};
+  PoseLattice part = plain;
+  part.theta_rad = {0.4, 2.0, 11};
+  PoseLattice one_theta = plain;
+  one_theta.theta_rad = {0.7, 0.7, 1};
+  PoseLattice one_x = plain;
+  one_x.x_mm = {1.5, 1.5, 1};
+  PoseLattice wide_x = plain;
+  wide_x.x_mm = {-5.0, 6.0, 1};
+  PoseLattice one_y = plain;
+  one_y.y_mm = {-0.5, -0.5, 1};
+  PoseLattice near = plain;
+  near.pivot_mm = {3.0, -2.0};
+  PoseLattice far = plain;
+  far.pivot_mm = {-600.0, 800.0};
+  PoseLattice fine{.x_mm = {-2.0, 2.0, 41}, .y_mm = {-2.0, 2.0, 39}, .theta_rad = {0, 0.5, 9}};
+  const DisplacementSd sd{.mm = 1.0, .rad = 0.2};
+  return {{"plain", plain, sd},
+          {"part of the circle", part, sd},
+          {"a single theta", one_theta, sd},
+          {"a fixed x", one_x, sd},
+          {"one wide bin of x", wide_x, sd},
+          {"a fixed y", one_y, sd},
+          {"a pivot near the touches", near, sd},
+          {"a pivot a metre away", far, {.mm = 1.0, .rad = 0.05}},
+          {"fine bins", fine, {.mm = 0.4, .rad = 0.05}},
+          {"mm alone", plain, {.mm = 1.3}},
+          {"theta alone", near, {.rad = 0.3}},
+          {"below the bins' steps", near, {.mm = 0.2, .rad = 0.02}},
+          {"as wide as the region", plain, {.mm = 9.0, .rad = 3.0}},
+          // Without a floor a single element may cost a thousand nats: neighbouring bins then lie
+          // farther apart than a float's range.
+          {"no floor", plain, sd, 0.0},
+          {"no floor, fine", fine, {.mm = 0.4, .rad = 0.05}, 0.0}};
+}
+
+class TouchByTouch : public testing::Test {
+ protected:
+  /// Elements over [-6, 6]^2 mm, poses over [-8, 8]^2 mm.
+  const Recording recording = random_recording(3, 40, 73);
+  const std::vector<Touch> touches = all_touches(recording);
+  Device device = Device::open();
+};
+
+TEST_F(TouchByTouch, AveragesATouchAsTheReferenceDoes) {
+  for (const Case& c : cases()) {
+    SCOPED_TRACE(c.name);
+    HistogramOptions options{.lattice = c.lattice, .touch_sd = c.sd};
+    options.contact.gamma = c.gamma;
+    options.contact.prior = 0.2;
+    PoseHistogram histogram(device, objects(), options);
+    histogram.update(touches);
+    EXPECT_LT(likelihood_error(histogram, expected_posterior(options, touches)),
+              per_mean * static_cast<double>(touches.size()));
+  }
+}
+
+TEST_F(TouchByTouch, SlipsAsTheReferenceDoes) {
+  for (const Case& c : cases()) {
+    SCOPED_TRACE(c.name);
+    HistogramOptions options{.lattice = c.lattice, .slip_sd = c.sd};
+    options.contact.gamma = c.gamma;
+    options.contact.prior = 0.2;
+    PoseHistogram histogram(device, objects(), options);
+    histogram.update(touches);
+    const reference::Posterior expected = expected_posterior(options, touches);
+    // Without a floor, log-likelihoods are thousands of nats, of which float32 keeps 6 digits.
+    EXPECT_LT(likelihood_error(histogram, expected),
+              (c.gamma > 0.0 ? per_mean : 5e-3) * static_cast<double>(touches.size()));
+    EXPECT_LT(largest_difference(histogram.estimate().identity, reference::identity(expected)),
+              1e-3);
+  }
+}
+
+TEST_F(TouchByTouch, SlippingSaysNothingAboutTheObject) {
+  HistogramOptions options{.lattice = cases().front().lattice, .slip_sd = {.mm = 1.0, .rad = 0.2}};
+  PoseHistogram histogram(device, objects(), options);
+  PoseHistogram at_rest(device, objects(), {.lattice = options.lattice});
+  // A touch without a known element says nothing either; only the slip comes between.
+  const Touch felt = touches.front();
+  const std::vector<std::uint8_t> dead(felt.elements_mm.size(), 0);
+  Touch silent = felt;
+  silent.valid = dead;
+  for (PoseHistogram* one : {&histogram, &at_rest}) {
+    one->update(felt);
+    one->update(silent);
+  }
+  EXPECT_LT(largest_difference(histogram.estimate().identity, at_rest.estimate().identity), 1e-5);
+  EXPECT_GT(largest_difference(histogram.log_likelihood(0), at_rest.log_likelihood(0)), 0.1);
+}
+
+TEST_F(TouchByTouch, TakesUncertaintySlipAndNoneTogether) {
+  for (const double gamma : {0.1, 0.0}) {
+    HistogramOptions options{.lattice = cases().front().lattice,
+                             .none_weight = 3.0,
+                             .touch_sd = {.mm = 0.8, .rad = 0.1},
+                             .slip_sd = {.mm = 0.7, .rad = 0.3}};
+    options.contact.gamma = gamma;
+    options.contact.prior = 0.2;
+    PoseHistogram histogram(device, objects(), options);
+    histogram.update(touches);
+    EXPECT_LT(likelihood_error(histogram, expected_posterior(options, touches)),
+              (gamma > 0.0 ? per_mean : 5e-3) * static_cast<double>(touches.size()));
+  }
+}
+
+/// The probability of "none of these" by its definition.
+double expected_none(const HistogramOptions& options, std::span<const Touch> touches) {
+  const reference::Posterior posterior = expected_posterior(options, touches);
+  double total_weight = 0.0;
+  std::vector<double> evidence;
+  for (std::size_t i = 0; i < objects().size(); ++i) {
+    const Logs& logs = posterior.log_likelihood[i];
+    const double most = *std::max_element(logs.begin(), logs.end());
+    double sum = 0.0;
+    for (const double l : logs) {
+      sum += std::exp(l - most);
+    }
+    evidence.push_back(std::log(objects()[i].weight / static_cast<double>(logs.size())) + most +
+                       std::log(sum));
+    total_weight += objects()[i].weight;
+  }
+  const double none =
+      std::log(*options.none_weight) +
+      (touches.empty() ? 0.0
+                       : reference::none_log_evidence(touches, options.lattice, objects(),
+                                                      reference_touches(options, touches)));
+  const double most = std::max(none, *std::max_element(evidence.begin(), evidence.end()));
+  double sum = std::exp(none - most);
+  for (const double e : evidence) {
+    sum += std::exp(e - most);
+  }
+  return std::exp(none - most) / sum;
+}
+
+TEST_F(TouchByTouch, NoneIsTheProductOfMeanLikelihoods) {
+  for (const DisplacementSd& sd : {DisplacementSd{}, DisplacementSd{.mm = 1.0, .rad = 0.2}}) {
+    for (const double gamma : {0.1, 0.0}) {
+      HistogramOptions options{
+          .lattice = cases().front().lattice, .none_weight = 3.0, .touch_sd = sd};
+      options.contact.gamma = gamma;
+      options.contact.prior = 0.2;
+      PoseHistogram histogram(device, objects(), options);
+      EXPECT_NEAR(histogram.estimate().none, 0.5, 1e-12);  // before any touch: W over all weights
+      for (std::size_t n = 1; n <= touches.size(); ++n) {
+        histogram.update(touches[n - 1]);
+        const double none = histogram.estimate().none;
+        EXPECT_NEAR(std::log(none / (1.0 - none)),
+                    std::log(expected_none(options, std::span(touches).first(n)) /
+                             (1.0 - expected_none(options, std::span(touches).first(n)))),
+                    (gamma > 0.0 ? per_mean : 5e-3) * static_cast<double>(n));
+      }
+    }
+  }
+}
+
+TEST_F(TouchByTouch, NoneTakesAllBinsWhereTheArrayMeetsNoObject) {
+  HistogramOptions options{.lattice = cases().front().lattice, .none_weight = 3.0};
+  Recording far = recording;
+  for (Pose& pose : far.T_robot_sensor) {
+    pose.translation_mm += glm::dvec2(100.0, 0.0);
+  }
+  PoseHistogram histogram(device, objects(), options);
+  histogram.update(all_touches(far));
+  // Every bin of every object sees nothing but the prior: nobody is favoured.
+  EXPECT_NEAR(histogram.estimate().none, 0.5, 1e-6);
+}
+
+TEST_F(TouchByTouch, ForgetsAtAReset) {
+  const HistogramOptions options{.lattice = cases().front().lattice,
+                                 .none_weight = 1.0,
+                                 .touch_sd = {.mm = 0.8, .rad = 0.1},
+                                 .slip_sd = {.mm = 0.7, .rad = 0.3}};
+  PoseHistogram histogram(device, objects(), options);
+  const auto told = [&] {
+    histogram.update(touches);
+    return std::pair(histogram.log_likelihood(1), histogram.estimate().none);
+  };
+  const auto first = told();
+  histogram.reset();
+  EXPECT_EQ(told(), first);
+}
+
+TEST_F(TouchByTouch, APreparedTouchIsTheSame) {
+  const HistogramOptions options{
+      .lattice = cases().front().lattice, .none_weight = 1.0, .touch_sd = {.mm = 0.8, .rad = 0.1}};
+  PoseHistogram plain(device, objects(), options);
+  PoseHistogram prepared(device, objects(), options);
+  for (const Touch& touch : touches) {
+    plain.update(touch);
+    prepared.prepare(touches.back());  // mostly another one
+    prepared.prepare(touch);
+    prepared.update(touch);
+    EXPECT_EQ(plain.log_likelihood(0), prepared.log_likelihood(0));
+    EXPECT_EQ(plain.estimate().none, prepared.estimate().none);
+  }
+}
+
+TEST_F(TouchByTouch, APreparedTouchSurvivesASlip) {
+  const HistogramOptions options{.lattice = cases().front().lattice,
+                                 .touch_sd = {.mm = 0.8, .rad = 0.1},
+                                 .slip_sd = {.mm = 0.5, .rad = 0.1}};
+  PoseHistogram plain(device, objects(), options);
+  PoseHistogram prepared(device, objects(), options);
+  for (const Touch& touch : touches) {
+    plain.update(touch);
+    prepared.prepare(touch);
+    prepared.update(touch);
+    EXPECT_EQ(plain.log_likelihood(0), prepared.log_likelihood(0));
+  }
+}
+
+TEST_F(TouchByTouch, TakesAStillArray) {
+  Recording presses = recording;
+  presses.T_robot_sensor.assign(presses.size(), presses.T_robot_sensor.front());
+  for (std::size_t i = 0; i < presses.pressure.size(); ++i) {
+    presses.pressure[i] = i % 4 == 0 ? presses.pressure[i] : 0.0;  // mostly No Contact
+  }
+  HistogramOptions options{.lattice = cases().front().lattice,
+                           .still_array = true,
+                           .none_weight = 1.0,
+                           .touch_sd = {.mm = 0.8, .rad = 0.1}};
+  options.contact.prior = 0.2;
+  PoseHistogram histogram(device, objects(), options);
+  const std::vector<Touch> pressed = all_touches(presses);
+  histogram.update(pressed);
+  EXPECT_LT(likelihood_error(histogram, expected_posterior(options, pressed)),
+            per_mean * static_cast<double>(pressed.size()));
+}
+
+TEST_F(TouchByTouch, TakesAnArrayThatChanges) {
+  // Each touch with elements of its own, and fewer from touch to touch.
+  std::vector<std::vector<glm::dvec2>> elements;
+  std::vector<Touch> changing;
+  for (std::size_t i = 0; i < touches.size(); ++i) {
+    const std::size_t kept = touches[i].elements_mm.size() - 10 * i;
+    elements.emplace_back(touches[i].elements_mm.begin(), touches[i].elements_mm.begin() + kept);
+    for (glm::dvec2& element : elements.back()) {
+      element += glm::dvec2(0.4 * static_cast<double>(i), 0.0);
+    }
+  }
+  for (std::size_t i = 0; i < touches.size(); ++i) {
+    changing.push_back({.T_robot_sensor = touches[i].T_robot_sensor,
+                        .elements_mm = elements[i],
+                        .pressure = touches[i].pressure.first(elements[i].size())});
+  }
+  HistogramOptions options{
+      .lattice = cases().front().lattice, .none_weight = 1.0, .touch_sd = {.mm = 0.8, .rad = 0.1}};
+  options.contact.prior = 0.2;
+  PoseHistogram histogram(device, objects(), options);
+  histogram.update(changing);
+  EXPECT_LT(likelihood_error(histogram, expected_posterior(options, changing)),
+            per_mean * static_cast<double>(changing.size()));
+  EXPECT_NEAR(histogram.estimate().none, expected_none(options, changing), 1e-3);
+}
+
+TEST_F(TouchByTouch, RefusesWhatALatticeDoesNotTake) {
+  const auto refuse = [&](const DisplacementSd& sd) {
+    EXPECT_THROW(
+        PoseHistogram(device, objects(), {.lattice = cases().front().lattice, .touch_sd = sd}),
+        Error);
+    EXPECT_THROW(
+        PoseHistogram(device, objects(), {.lattice = cases().front().lattice, .slip_sd = sd}),
+        Error);
+  };
+  refuse({.mm = -1.0});
+  refuse({.rad = std::nan("")});
+  refuse({.mm = 30.0});
+}
+
+}  // namespace
+}  // namespace palpate
