@@ -79,7 +79,9 @@ std::vector<double> blurred_planes(const std::vector<double>& logs, const PoseLa
   return along(along(logs, false), true);
 }
 
-/// The sum over angles; `moved` says where the value for theta and theta + alpha comes from.
+/// The sum over angles. `moved` says how far from t the value for theta and theta + alpha comes
+/// from: a distance, because the rounding of a place would let a neighbour in with a weight of
+/// 1e-16, which counts where likelihoods lie far apart.
 std::vector<double> summed_turns(
     const std::vector<double>& logs, const PoseLattice& lattice, double sd_rad,
     const std::function<glm::dvec2(double theta, double alpha, const glm::dvec2& t)>& moved) {
@@ -99,10 +101,10 @@ std::vector<double> summed_turns(
             continue;
           }
           const int from = ((t + k) % angle.count + angle.count) % angle.count;
-          const glm::dvec2 place =
+          const glm::dvec2 distance =
               moved(centre_of(angle, t), k * step_of(angle), {centre_of(x, i), centre_of(y, j)});
-          const double u = x.count == 1 ? 0.0 : (place.x - centre_of(x, 0)) / step_of(x);
-          const double v = y.count == 1 ? 0.0 : (place.y - centre_of(y, 0)) / step_of(y);
+          const double u = x.count == 1 ? 0.0 : i + distance.x / step_of(x);
+          const double v = y.count == 1 ? 0.0 : j + distance.y / step_of(y);
           for (const double column : {std::floor(u), std::floor(u) + 1.0}) {
             for (const double row : {std::floor(v), std::floor(v) + 1.0}) {
               if (column >= 0.0 && column < x.count && row >= 0.0 && row < y.count) {
@@ -156,17 +158,18 @@ std::vector<double> displaced_touch(const std::vector<double>& log_likelihood,
                                     const Pose& T_robot_sensor) {
   const glm::dvec2 r = T_robot_sensor.translation_mm - lattice.pivot_mm;
   return summed_turns(blurred_planes(log_likelihood, lattice, sd.mm), lattice, sd.rad,
-                      [&](double theta, double alpha, const glm::dvec2& t) {
-                        return t + turned(theta, r) - turned(theta + alpha, r);
+                      [&](double theta, double alpha, const glm::dvec2&) {
+                        return turned(theta, r) - turned(theta + alpha, r);
                       });
 }
 
 std::vector<double> slipped(const std::vector<double>& log_belief, const PoseLattice& lattice,
                             const DisplacementSd& sd, const glm::dvec2& centroid_mm) {
-  std::vector<double> moved = summed_turns(blurred_planes(log_belief, lattice, sd.mm), lattice,
-                                           sd.rad, [&](double, double alpha, const glm::dvec2& t) {
-                                             return centroid_mm + turned(alpha, t - centroid_mm);
-                                           });
+  std::vector<double> moved =
+      summed_turns(blurred_planes(log_belief, lattice, sd.mm), lattice, sd.rad,
+                   [&](double, double alpha, const glm::dvec2& t) {
+                     return turned(alpha, t - centroid_mm) - (t - centroid_mm);
+                   });
   const double lost = log_sum(log_belief) - log_sum(moved);
   for (double& l : moved) {
     l += lost;
