@@ -8,7 +8,7 @@ Json measure_costs(const BeliefInputs& inputs, Report& report) {
   const bool quick = inputs.options.quick;
   report.add(touch_cost_case(inputs.device, inputs.letters,
                              quick ? lattice_of(30, 30, 113) : lattice_of(100, 100, 100),
-                             quick ? 5 : 25));
+                             quick ? 3 : 9));
   report.add(latency_of_averaged_case(inputs.device, inputs.letters, quick ? 20 : 300));
   if (!quick) {
     report.add(large_belief_case(inputs.device, inputs.letters));

@@ -21,14 +21,10 @@ std::size_t best_of(const PoseHistogram& histogram, const Recording& test_set,
   for (const std::size_t candidate : candidates) {
     T_robot_sensor.push_back(test_set.T_robot_sensor[candidate]);
   }
-#if __has_include("palpate/plan.hpp")
   const std::vector<TouchGain> gains =
       histogram.expected_gain(T_robot_sensor, test_set.elements_mm, {.seed = seed});
   const auto best = std::ranges::max_element(gains, {}, &TouchGain::both);
   return static_cast<std::size_t>(best - gains.begin());
-#else
-  return histogram.lattice().bins() > 0 ? seed % T_robot_sensor.size() : 0;
-#endif
 }
 
 double log_loss(const PoseHistogram& histogram, const RecognitionTask& task,

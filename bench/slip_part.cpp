@@ -10,6 +10,15 @@ namespace {
 
 constexpr double most_error_mm = 1.0;  ///< of the mode that follows, mean over touches
 
+/// Bins over x and y in [-8, 8] mm and the full circle. Steps of 0.5 mm and 2 degrees resolve slips
+/// of 0.3 mm and 1 degree.
+PoseLattice lattice_near(int count, int ntheta) {
+  PoseLattice lattice = lattice_of(count, count, ntheta);
+  lattice.x_mm = {-8.0, 8.0, count};
+  lattice.y_mm = lattice.x_mm;
+  return lattice;
+}
+
 Measurement mean_error(const std::string& name, const std::vector<PoseErrors>& errors,
                        std::size_t from, std::optional<Goal> goal) {
   const std::vector<double> means_mm = present(mean_mode_errors(errors, from));
@@ -36,7 +45,7 @@ Json curve_of(const std::vector<PoseErrors>& errors) {
 Json measure_slip(const BeliefInputs& inputs, Report& report) {
   const bool quick = inputs.options.quick;
   const SlipSetting setting{.step = {0.3, std::numbers::pi / 180.0},
-                            .lattice = quick ? lattice_of(20, 20, 75) : lattice_of(40, 40, 180),
+                            .lattice = quick ? lattice_near(20, 75) : lattice_near(32, 180),
                             .trials_each = inputs.trials_each(5, 1),
                             .touches = quick ? 12 : 50};
   const SlipRun run = run_slip(inputs.device, inputs.letters, setting);

@@ -33,7 +33,8 @@ SlippingTrial slipping_trial(const Recording& trial, const glm::dvec2& centroid_
   const Pose T_object_robot_at_rest = trial.truth->T_object_robot;
   SlippingTrial slipping{.recording = trial, .T_object_robot = {}};
   slipping.recording.object = trial.truth->object;
-  Pose T_object_robot{T_object_robot_at_rest.translation_mm / 2.0,
+  constexpr double nearer = 0.3;
+  Pose T_object_robot{nearer * T_object_robot_at_rest.translation_mm,
                       T_object_robot_at_rest.theta_rad};
   slipping.recording.truth->T_object_robot = T_object_robot;
   Random random(seed, Stream::object_pose);

@@ -17,9 +17,9 @@ struct SlippingTrial {
 };
 
 /// A trial whose object takes a step of a random walk before every touch but the first: a turn
-/// about its centroid and a translation, of these standard deviations. The walk begins at half the
-/// trial's distance from the robot frame's origin, within 5 mm along x and y, so that few walks
-/// leave the region of +-10 mm. The readings stay as they are.
+/// about its centroid and a translation, of these standard deviations. The walk begins at 3/10 of
+/// the trial's distance from the robot frame's origin, within 3 mm along x and y, so that few walks
+/// of 50 steps of 0.3 mm leave a region of +-8 mm. The readings stay as they are.
 SlippingTrial slipping_trial(const Recording& trial, const glm::dvec2& centroid_mm,
                              const DisplacementSd& step, std::uint64_t seed);
 
