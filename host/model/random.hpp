@@ -18,6 +18,7 @@ enum class Stream : std::uint32_t {
   pose_noise,
   belief,    // draws from it
   readings,  // of touches that are only imagined
+  slips,     // of objects between touches
 };
 
 /// Draws random numbers that are the same with every standard library: the engine and std::seed_seq

@@ -185,6 +185,31 @@ std::vector<double> marginal_xy(const Posterior& posterior, int object);
 /// Probability of every theta of one object, [ntheta].
 std::vector<double> marginal_theta(const Posterior& posterior, int object);
 
+// --- gain.cpp ---
+// Given sample i of the belief, with the probability w_i, element e reads z_e with the probability
+// q(z_e | i), the likelihood of z_e over the sum of the likelihoods of all readings but Unknown;
+// f(z | i) is the mean over displacements of the product over e. Then both = sum over i and z of
+// w_i f(z | i) log(f(z | i) / f(z)) with f(z) = sum over i of w_i f(z | i).
+
+/// An object at a pose, with its probability.
+struct BeliefSample {
+  std::size_t object = 0;
+  std::size_t label = 0;
+  Pose T_object_robot;
+  double probability = 0.0;
+};
+
+/// Mutual information between one touch's readings and the unknown, in nats, by summing over all
+/// readings of the array: few elements only.
+struct Gain {
+  double identity = 0.0;  ///< about the label
+  double both = 0.0;      ///< about the sample
+};
+/// @param displacements of the sensor, of equal probability; one at 0 where touches are exact
+Gain expected_gain(std::span<const BeliefSample> samples, std::span<const OccupancyGrid> maps,
+                   const Pose& T_robot_sensor, std::span<const glm::dvec2> elements_mm,
+                   const ContactModel& model, std::span<const Pose> displacements);
+
 // --- pose_error.cpp: Eq. 17-20 ---
 
 /// Centroid and mean squared distance from it, J, of the map's cells with log odds > 0.

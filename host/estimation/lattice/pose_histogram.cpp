@@ -13,6 +13,7 @@
 #include "dense_belief.hpp"
 #include "dense_likelihood.hpp"
 #include "displacement_check.hpp"
+#include "expected_gain.hpp"
 #include "half_done.hpp"
 #include "hypotheses.hpp"
 #include "memory_plan.hpp"
@@ -21,6 +22,7 @@
 #include "palpate/error.hpp"
 #include "prepared_touch.hpp"
 #include "random.hpp"
+#include "reading_predictor.hpp"
 #include "refinement.hpp"
 #include "still_array.hpp"
 #include "touch_by_touch.hpp"
@@ -36,6 +38,7 @@ struct PoseHistogram::Impl {
         likelihood(device.context(), stream, belief, hypotheses, options.lattice, options.contact,
                    plan.batch_elements),
         prepared(stream, plan.room_to_prepare),
+        predictor(hypotheses, options.contact),
         log_weight(log_weights(hypotheses)) {
     for (const Hypothesis& hypothesis : hypotheses) {
       bodies.push_back(displaced_body(hypothesis.map));
@@ -179,6 +182,7 @@ struct PoseHistogram::Impl {
   DenseLikelihood likelihood;
   std::optional<StillArray> still;  ///< where the options say so
   PreparedTouch prepared;
+  ReadingPredictor predictor;  ///< of touches that are only imagined
   std::vector<double> log_weight;
   std::optional<TouchByTouch> by_touch;   ///< where the options need each touch by itself
   std::optional<double> none_log_weight;  ///< log of its prior weight times the number of bins
@@ -363,6 +367,19 @@ std::vector<PoseSample> PoseHistogram::sample(std::size_t count, std::uint64_t s
     }
   }
   return samples;
+}
+
+std::vector<TouchGain> PoseHistogram::expected_gain(std::span<const Pose> T_robot_sensor,
+                                                    std::span<const glm::dvec2> elements_mm,
+                                                    const PlanOptions& plan) const {
+  Impl& histogram = whole();
+  require_plan(T_robot_sensor, elements_mm, plan, histogram.log_weight.size());
+  std::vector<PoseSample> samples = sample(plan.samples, plan.seed);
+  if (histogram.touched) {  // the object slips between touches, not before the first
+    slip(samples, histogram.bodies, histogram.options.slip_sd, plan.seed);
+  }
+  return palpate::expected_gain(histogram.predictor, samples, T_robot_sensor, elements_mm,
+                                histogram.options.touch_sd, plan);
 }
 
 const PoseLattice& PoseHistogram::lattice() const { return impl().options.lattice; }

@@ -16,6 +16,7 @@
 #include "palpate/map_builder.hpp"
 #include "palpate/occupancy_grid.hpp"
 #include "palpate/particle_filter.hpp"
+#include "palpate/plan.hpp"
 #include "palpate/pose.hpp"
 #include "palpate/pose_error.hpp"
 #include "palpate/pose_histogram.hpp"

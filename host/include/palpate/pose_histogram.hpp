@@ -13,6 +13,7 @@
 #include "palpate/displacement.hpp"
 #include "palpate/estimate.hpp"
 #include "palpate/lattice.hpp"
+#include "palpate/plan.hpp"
 
 namespace palpate {
 
@@ -125,6 +126,21 @@ class PoseHistogram {
   /// the same draws on one device.
   /// @throws Error if the device fails
   std::vector<PoseSample> sample(std::size_t count, std::uint64_t seed) const;
+
+  /// What one more touch at each candidate pose T_robot_sensor is expected to tell, for choosing
+  /// the next best touch (greedy). Each of `samples` draws of the belief simulates a touch's
+  /// readings by the maps and the contact model, elements independent given the pose; the gain is
+  /// the mutual information between these readings and the draws. Where the object slips, the draws
+  /// slip first, if it has been touched; where touches are uncertain, readings come from a
+  /// displaced sensor and likelihoods are means over displacements. Leaves "none of these" out. The
+  /// same seed gives the same gains on one device, and all candidates the same random numbers.
+  /// @param elements_mm [e] living elements of the array, in the sensor frame
+  /// @returns a gain for each candidate, in their order
+  /// @throws Error on no candidate or element, one that is not finite, samples out of [2, 4096],
+  /// labels for another number of objects, or if the device fails
+  std::vector<TouchGain> expected_gain(std::span<const Pose> T_robot_sensor,
+                                       std::span<const glm::dvec2> elements_mm,
+                                       const PlanOptions& options = {}) const;
 
   const PoseLattice& lattice() const;
   /// How the likelihood is evaluated for each cell size among the maps, and why.

@@ -1,0 +1,260 @@
+#include "expected_gain.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include <gtest/gtest.h>
+#include <glm/geometric.hpp>
+
+#include "displacement_points.hpp"
+#include "palpate/error.hpp"
+#include "palpate/pose_histogram.hpp"
+#include "synthetic.hpp"
+
+namespace palpate {
+namespace {
+
+// Few enough elements that all 64 readings can be listed.
+const std::vector<glm::dvec2> elements{{-2.0, -1.0}, {0.0, -1.2}, {2.1, -1.0},
+                                       {-1.9, 1.0},  {0.3, 1.0},  {2.0, 1.1}};
+const ContactModel contact{.prior = 0.2};
+
+std::vector<Hypothesis> three_objects() {
+  return {{random_map(31, 27, 0.5, 4.0, 81)},
+          {random_map(25, 25, 0.5, 4.0, 82)},
+          {random_map(14, 15, 1.0, 4.0, 83)}};
+}
+
+std::vector<OccupancyGrid> maps_of(std::span<const Hypothesis> objects) {
+  std::vector<OccupancyGrid> maps;
+  for (const Hypothesis& object : objects) {
+    maps.push_back(object.map);
+  }
+  return maps;
+}
+
+std::vector<PoseSample> random_samples(std::size_t count) {
+  Uniform uniform(21);
+  std::vector<PoseSample> samples;
+  for (std::size_t i = 0; i < count; ++i) {
+    samples.push_back({.object = static_cast<int>(i % 3),
+                       .T_object_robot = {{uniform(-3, 3), uniform(-3, 3)}, uniform(0, two_pi)}});
+  }
+  return samples;
+}
+
+reference::Gain exact_gain(std::span<const PoseSample> samples, std::span<const Hypothesis> objects,
+                           const std::vector<std::size_t>& label_of, const Pose& candidate,
+                           const DisplacementSd& touch_sd = {}) {
+  std::vector<reference::BeliefSample> belief;
+  for (const PoseSample& sample : samples) {
+    const auto object = static_cast<std::size_t>(sample.object);
+    belief.push_back({.object = object,
+                      .label = label_of.empty() ? object : label_of[object],
+                      .T_object_robot = sample.T_object_robot,
+                      .probability = 1.0 / static_cast<double>(samples.size())});
+  }
+  return reference::expected_gain(belief, maps_of(objects), candidate, elements, contact,
+                                  displacement_points(touch_sd, 64));
+}
+
+/// Mean and its standard error over seeds.
+struct Estimated {
+  double mean = 0.0;
+  double error = 0.0;
+};
+Estimated estimated(const std::vector<double>& values) {
+  const auto n = static_cast<double>(values.size());
+  const double mean = std::accumulate(values.begin(), values.end(), 0.0) / n;
+  double squares = 0.0;
+  for (const double value : values) {
+    squares += (value - mean) * (value - mean);
+  }
+  return {mean, std::sqrt(squares / (n - 1.0) / n)};
+}
+
+TEST(ExpectedGain, IsTheMutualInformationOfItsSamples) {
+  const std::vector<Hypothesis> objects = three_objects();
+  const ReadingPredictor predictor(objects, contact);
+  const std::vector<PoseSample> samples = random_samples(40);
+  const std::vector<Pose> candidates{{{1.0, 0.5}, 0.4}, {{-2.0, 3.0}, 2.0}};
+  for (const auto& label_of : {std::vector<std::size_t>{}, std::vector<std::size_t>{0, 1, 0}}) {
+    for (const Pose& candidate : candidates) {
+      std::vector<double> identity;
+      std::vector<double> both;
+      for (std::uint64_t seed = 0; seed < 300; ++seed) {
+        const TouchGain gain = expected_gain(predictor, samples, std::span(&candidate, 1), elements,
+                                             {}, {.seed = seed, .label_of = label_of})
+                                   .front();
+        identity.push_back(gain.identity);
+        both.push_back(gain.both());
+      }
+      const reference::Gain exact = exact_gain(samples, objects, label_of, candidate);
+      EXPECT_GT(exact.identity, 0.03);
+      EXPECT_GT(exact.both, exact.identity + 0.1);
+      // Four standard errors, and what the predictor's tables are off by.
+      const Estimated by_identity = estimated(identity);
+      EXPECT_NEAR(by_identity.mean, exact.identity, 4.0 * by_identity.error + 1e-3);
+      EXPECT_LT(by_identity.error, 0.01) << "or the test would see nothing";
+      const Estimated by_both = estimated(both);
+      EXPECT_NEAR(by_both.mean, exact.both, 4.0 * by_both.error + 1e-3);
+      EXPECT_LT(by_both.error, 0.015);
+    }
+  }
+}
+
+TEST(ExpectedGain, AveragesOverWhereTheSensorMayHaveBeen) {
+  // Cells as wide as an object's features are on a real one.
+  const std::vector<Hypothesis> objects{{random_map(9, 9, 3.0, 4.0, 81)},
+                                        {random_map(8, 9, 3.0, 4.0, 82)},
+                                        {random_map(9, 8, 3.0, 4.0, 83)}};
+  const ReadingPredictor predictor(objects, contact);
+  const std::vector<PoseSample> samples = random_samples(40);
+  const Pose candidate{{1.0, 0.5}, 0.4};
+  const DisplacementSd touch_sd{.mm = 1.0, .rad = 0.1};
+  std::vector<double> both;
+  for (std::uint64_t seed = 0; seed < 300; ++seed) {
+    both.push_back(expected_gain(predictor, samples, std::span(&candidate, 1), elements, touch_sd,
+                                 {.seed = seed})
+                       .front()
+                       .both());
+  }
+  const double exact = exact_gain(samples, objects, {}, candidate, touch_sd).both;
+  EXPECT_LT(exact, exact_gain(samples, objects, {}, candidate).both - 0.1);
+  // Eight displacements of each sample stand for all: they tell a little more than all would.
+  EXPECT_NEAR(estimated(both).mean, exact, 0.08);
+}
+
+/// A lattice of four places in a row, known up to 1 mm, after one touch.
+struct Touched {
+  Touched() {
+    options.lattice = {.x_mm = {-2.0, 2.0, 4}, .y_mm = {0.5, 0.5, 1}, .theta_rad = {0.3, 0.3, 1}};
+    options.contact = contact;
+    histogram.emplace(device, objects, options);
+    histogram->update(random_recording(1, 9, 85).touch(0));
+  }
+  Device device = Device::open();
+  std::vector<Hypothesis> objects = three_objects();
+  HistogramOptions options;
+  std::optional<PoseHistogram> histogram;
+};
+
+TEST(ExpectedGain, OfAHistogramIsThatOfItsBins) {
+  const Touched touched;
+  // The belief is uniform within a bin: eight places of each stand for all.
+  std::vector<reference::BeliefSample> belief;
+  const std::vector<double> identity = touched.histogram->estimate().identity;
+  for (std::size_t object = 0; object < 3; ++object) {
+    const Marginals marginals = touched.histogram->marginals(static_cast<int>(object));
+    for (int bin = 0; bin < 4; ++bin) {
+      for (int part = 0; part < 8; ++part) {
+        const double x = touched.options.lattice.x_mm.centre(bin) + (part - 3.5) / 8.0;
+        belief.push_back({.object = object,
+                          .label = object,
+                          .T_object_robot = touched.options.lattice.T_object_robot(x, 0.5, 0.3),
+                          .probability = marginals.xy[bin] / 8.0});
+      }
+    }
+  }
+  const Pose candidate{{1.0, 0.5}, 0.4};
+  const reference::Gain exact = reference::expected_gain(
+      belief, maps_of(touched.objects), candidate, elements, contact, std::array{Pose{}});
+  std::vector<double> by_identity;
+  std::vector<double> both;
+  for (std::uint64_t seed = 0; seed < 40; ++seed) {
+    const TouchGain gain =
+        touched.histogram
+            ->expected_gain(std::span(&candidate, 1), elements, {.samples = 512, .seed = seed})
+            .front();
+    by_identity.push_back(gain.identity);
+    both.push_back(gain.both());
+  }
+  // Finite samples tell on average (samples per bin, 8 readings that matter) some 0.01 more.
+  EXPECT_NEAR(estimated(by_identity).mean, exact.identity, 0.02);
+  EXPECT_NEAR(estimated(both).mean, exact.both, 0.02);
+  EXPECT_GT(exact.both, 0.2);
+}
+
+TEST(ExpectedGain, IsReproducibleAndTheSameAmongOtherCandidates) {
+  const Touched touched;
+  std::vector<Pose> candidates;
+  for (int i = 0; i < 40; ++i) {
+    candidates.push_back({{0.2 * i - 4.0, 0.1 * i}, 0.3 * i});
+  }
+  const auto gains = [&](std::span<const Pose> poses, std::uint64_t seed) {
+    std::vector<double> values;
+    for (const TouchGain& gain :
+         touched.histogram->expected_gain(poses, elements, {.seed = seed})) {
+      values.push_back(gain.identity);
+      values.push_back(gain.pose);
+    }
+    return values;
+  };
+  const std::vector<double> all = gains(candidates, 5);
+  EXPECT_EQ(gains(candidates, 5), all);
+  EXPECT_NE(gains(candidates, 6), all);
+  const std::vector<double> one = gains(std::span(candidates).subspan(17, 1), 5);
+  EXPECT_EQ(one[0], all[34]);
+  EXPECT_EQ(one[1], all[35]);
+}
+
+TEST(ExpectedGain, IsNothingWhereNoObjectCanBe) {
+  const Touched touched;
+  const Pose far{{500.0, -500.0}, 0.0};
+  const TouchGain gain = touched.histogram->expected_gain(std::span(&far, 1), elements).front();
+  // Every sample predicts the prior everywhere; sums of floats are equal or off by an ulp.
+  EXPECT_NEAR(gain.identity, 0.0, 1e-5);
+  EXPECT_NEAR(gain.pose, 0.0, 1e-5);
+}
+
+TEST(ExpectedGain, ObjectsOfOneLabelAreNotToldApart) {
+  const Touched touched;
+  const Pose candidate{{1.0, 0.5}, 0.4};
+  const auto gain = [&](const std::vector<std::size_t>& label_of) {
+    return touched.histogram
+        ->expected_gain(std::span(&candidate, 1), elements, {.label_of = label_of})
+        .front();
+  };
+  EXPECT_NEAR(gain({7, 7, 7}).identity, 0.0, 1e-12);
+  EXPECT_GT(gain({}).identity, 0.01);
+  EXPECT_NEAR(gain({7, 7, 7}).both(), gain({}).both(), 0.2) << "other readings, one information";
+}
+
+TEST(ExpectedGain, SlipMovesObjectsAboutTheirMiddle) {
+  const Body body{.centroid_mm = {30.0, -10.0}};
+  const PoseSample start{.object = 0, .T_object_robot = {{2.0, 1.0}, 0.7}};
+  std::vector<PoseSample> samples(4000, start);
+  slip(samples, std::span(&body, 1), {.mm = 0.5, .rad = 0.1}, 3);
+  // Where the robot finds the centroid of the object that has slipped, seen from where it was.
+  double squares = 0.0;
+  double turns = 0.0;
+  for (const PoseSample& sample : samples) {
+    const glm::dvec2 now =
+        start.T_object_robot * (inverse(sample.T_object_robot) * body.centroid_mm);
+    squares += glm::dot(now - body.centroid_mm, now - body.centroid_mm) / 2.0;
+    const double turn = sample.T_object_robot.theta_rad - start.T_object_robot.theta_rad;
+    turns += turn * turn;
+  }
+  // Relative errors of a variance from 8000 and 4000 draws: 1.6 and 2.2 %.
+  EXPECT_NEAR(squares / 4000.0, 0.25, 0.05 * 0.25);
+  EXPECT_NEAR(turns / 4000.0, 0.01, 0.08 * 0.01);
+}
+
+TEST(ExpectedGain, RefusesWhatItCannotRank) {
+  const Touched touched;
+  const PoseHistogram& histogram = *touched.histogram;
+  const std::vector<Pose> one(1);
+  const std::vector<Pose> unknown{Pose{}, unknown_pose};
+  const std::vector<glm::dvec2> nan{{0.0, std::nan("")}};
+  EXPECT_THROW(histogram.expected_gain({}, elements), Error);
+  EXPECT_THROW(histogram.expected_gain(one, {}), Error);
+  EXPECT_THROW(histogram.expected_gain(unknown, elements), Error);
+  EXPECT_THROW(histogram.expected_gain(one, nan), Error);
+  EXPECT_THROW(histogram.expected_gain(one, elements, {.samples = 1}), Error);
+  EXPECT_THROW(histogram.expected_gain(one, elements, {.samples = 5000}), Error);
+  EXPECT_THROW(histogram.expected_gain(one, elements, {.label_of = {0, 1}}), Error);
+}
+
+}  // namespace
+}  // namespace palpate
