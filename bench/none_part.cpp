@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <array>
 #include <optional>
 
@@ -38,7 +39,7 @@ PoseLattice lattice_over(double extent_mm, int count, int ntheta) {
 
 std::vector<NoneSetting> settings_of(const BeliefInputs& inputs) {
   const bool quick = inputs.options.quick;
-  const int trials_each = inputs.trials_each(40, 2);
+  const int trials_each = inputs.trials_each(40, 4);
   std::vector<NoneSetting> settings = {
       {.name = "exact, ±10 mm", .lattice = lattice_over(10.0, 13, 55), .held_to_goals = true}};
   if (!quick) {
@@ -55,7 +56,10 @@ std::vector<NoneSetting> settings_of(const BeliefInputs& inputs) {
                         .touch_sd = touch_sd});
   }
   for (NoneSetting& setting : settings) {
-    setting.trials_each = trials_each;
+    // As many bins as of +-40 mm take too long for all unknowns.
+    setting.learned_each =
+        std::max(setting.lattice.bins() > 100'000 ? trials_each / 4 : trials_each, 1);
+    setting.unlearned_each = std::max(setting.learned_each / 2, 1);
   }
   return settings;
 }

@@ -52,18 +52,18 @@ std::vector<NoneRun> run_none(Device& device, const std::vector<Hypothesis>& let
   for (const int count : touches) {
     runs.push_back({.touches = count});
   }
-  const auto add = [&](std::span<const std::string> shapes, std::uint64_t seed,
+  const auto add = [&](std::span<const std::string> shapes, int trials_each, std::uint64_t seed,
                        NoneCalls NoneRun::*calls) {
     for (const Recording& trial :
-         make_trials(shapes, setting.trials_each, touches.back(), seed, setting.touching)) {
+         make_trials(shapes, trials_each, touches.back(), seed, setting.touching)) {
       const std::vector<RecognitionStep> steps = steps_after(histogram, task, trial, touches);
       for (std::size_t i = 0; i < runs.size(); ++i) {
         (runs[i].*calls).add(steps[i]);
       }
     }
   };
-  add(vowels, learned_seed, &NoneRun::learned);
-  add(misfits, unlearned_seed, &NoneRun::unlearned);
+  add(vowels, setting.learned_each, learned_seed, &NoneRun::learned);
+  add(misfits, setting.unlearned_each, unlearned_seed, &NoneRun::unlearned);
   return runs;
 }
 

@@ -39,7 +39,8 @@ struct NoneSetting {
   PoseLattice lattice;
   TrialTouches touching = {};
   DisplacementSd touch_sd = {};
-  int trials_each = 0;  ///< unknowns of every vowel and of every shape that was never learned
+  int learned_each = 0;    ///< unknowns of every vowel
+  int unlearned_each = 0;  ///< and of every shape that was never learned
   bool held_to_goals = false;
 };
 

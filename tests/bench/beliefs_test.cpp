@@ -67,7 +67,7 @@ TEST(Beliefs, CallUnlearnedShapesNoneMoreOftenWithTouches) {
   const auto exact_after = [&](int touches, const char* field) {
     return value_where(records, {{"name", "exact, ±10 mm"}, {"touches", touches}}, field);
   };
-  // Ten letters and 16 shapes; over 200 and 320 none calls less than 1 % and more than 90 %.
+  // Twenty letters and 16 shapes; over 200 and 160 none calls less than 1 % and more than 90 %.
   EXPECT_LE(exact_after(9, "/learned_called_none"), 0.1);
   EXPECT_GE(exact_after(15, "/unlearned_called_none"), 0.75);
   EXPECT_GE(exact_after(9, "/told_apart"), 0.9);
