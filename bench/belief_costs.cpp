@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "letters.hpp"
+#include "palpate/simulation.hpp"
 
 namespace palpate::bench {
 
@@ -15,6 +16,7 @@ constexpr DisplacementSd slip_sd{0.3, std::numbers::pi / 180.0};
 constexpr std::uint64_t seed = 900'000'000;
 constexpr double most_times = 2.5;        ///< of a plain touch's time
 constexpr double most_latency_ms = 8.0;   ///< from touch to estimate
+constexpr double most_plan_ms = 150.0;    ///< over 200 candidates
 constexpr double most_memory_mib = 2048;  ///< of 5 x 10,000,000 bins
 
 double mib(std::uint64_t bytes) { return static_cast<double>(bytes) / (1 << 20); }
@@ -107,6 +109,32 @@ Case latency_of_averaged_case(Device& device, const std::vector<Hypothesis>& let
           {"touch to estimate, median", median(milliseconds[1]), "ms", at_most(most_latency_ms)},
           {"95th percentile", quantile(milliseconds[1], 0.95), "ms"},
           {"plain touch to estimate, median", median(milliseconds[0]), "ms"}}};
+}
+
+Case plan_cost_case(Device& device, const std::vector<Hypothesis>& letters, int repeats) {
+  constexpr int candidates = 200;
+  const PoseLattice lattice = lattice_of(25, 25, 16);
+  const Recording unknown = unknown_recordings(1, touches_per_unknown, seed).front();
+  // Places all over the unknown, which the robot could press next.
+  std::vector<Pose> T_robot_sensor = random_poses(candidates, seed);
+  for (Pose& pose : T_robot_sensor) {
+    pose = inverse(unknown.truth->T_object_robot) * pose;
+  }
+  std::vector<double> milliseconds;
+  for (const DisplacementSd& sd : {DisplacementSd{}, touch_sd}) {
+    PoseHistogram histogram(device, letters, HistogramOptions{.lattice = lattice, .touch_sd = sd});
+    histogram.update(unknown.touches(0, 3));
+    milliseconds.push_back(
+        1e3 * median_seconds([&] { histogram.expected_gain(T_robot_sensor, unknown.elements_mm); },
+                             repeats));
+  }
+  return {.name = "plan " + size_of(lattice),
+          .facts = {{"objects", letters.size()},
+                    {"candidates", candidates},
+                    {"samples", PlanOptions{}.samples},
+                    {"repeats", repeats}},
+          .measurements = {{"exact touches, median", milliseconds[0], "ms", at_most(most_plan_ms)},
+                           {"uncertain touches, median", milliseconds[1], "ms"}}};
 }
 
 Case large_belief_case(Device& device, const std::vector<Hypothesis>& letters) {

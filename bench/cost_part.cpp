@@ -10,6 +10,7 @@ Json measure_costs(const BeliefInputs& inputs, Report& report) {
                              quick ? lattice_of(30, 30, 113) : lattice_of(100, 100, 100),
                              quick ? 3 : 9));
   report.add(latency_of_averaged_case(inputs.device, inputs.letters, quick ? 20 : 300));
+  report.add(plan_cost_case(inputs.device, inputs.letters, quick ? 2 : 15));
   if (!quick) {
     report.add(large_belief_case(inputs.device, inputs.letters));
   }
