@@ -4,26 +4,28 @@
 
 // Replaces likelihoods by their weighted means over neighbours along one axis, in logs. An invocation
 // takes STRIP consecutive bins of a line, so that each likelihood is read once for all of them. The
-// pass along y writes the low word of each bin of a touch's slab and reads the high word; the pass
-// along x reads the low word and writes the high one: no invocation reads what another one writes.
+// pass along y writes the second word of each bin and reads the first; the pass along x reads the
+// second and writes the first: no invocation reads what another one writes.
 
 #include "interface.h"
 
 layout(local_size_x_id = 0) in;
 layout(constant_id = 1) const uint SOURCE = BLUR_TOUCH;
-layout(constant_id = 2) const bool ALONG_X = false;
-layout(constant_id = 3) const uint STRIP = 16;
+layout(constant_id = 2) const uint STRIP = 16;
 
-layout(binding = 0) uniform samplerBuffer source;       // two bins a texel
+layout(binding = 0) uniform samplerBuffer source;       // two words a bin
 layout(binding = 1) uniform samplerBuffer references;   // [object] log-likelihood in two floats
 layout(binding = 2) uniform samplerBuffer plane_max;    // [object, theta]
-// By distance in bins, STRIP zeros after the last; then, for each bin of the axis, the logarithm of
-// the sum of the weights that lie inside.
+// By distance in bins, STRIP zeros after the last; then, for each bin of the axis, 1 over the sum of
+// the weights that lie inside.
 layout(binding = 3) uniform samplerBuffer weights;
 layout(std430, binding = 4) writeonly buffer Result { float result[]; };  // two words a bin
 layout(push_constant) uniform Push { BlurPush push; };
 
 #include "blurred_bin.glsl"
+
+const bool ALONG_X = SOURCE == BLUR_ALONG_Y;
+const float LEAST = ALONG_X ? LEAST_ALONG_X : LEAST_ALONG_Y;
 
 #define FOR_EACH_BIN [[unroll]] for (uint b = 0; b < STRIP; ++b)
 
@@ -62,7 +64,7 @@ void main() {
     const int at = begin + j;
     const float likelihood =
         at >= 0 && at < int(count)
-            ? lifted(value_of(first + uint(at) * step, reference) - largest)
+            ? lifted(word_of(first + uint(at) * step, reference), largest)
             : 0.0;
     FOR_EACH_BIN { sum[b] += weight[b] * likelihood; }
   }
@@ -72,11 +74,9 @@ void main() {
   FOR_EACH_BIN {
     const uint at = uint(begin) + b;
     if (at < count) {
-      if (sum[b] < BLUR_LEAST) {
-        poor |= 1u << b;
-      }
-      result[2 * (first + at * step) + word] =
-          log(sum[b]) + (largest - BLUR_LIFT) - texelFetch(weights, norms + int(at)).x;
+      const float mean = sum[b] * texelFetch(weights, norms + int(at)).x;
+      poor |= mean < LEAST ? 1u << b : 0;
+      result[2 * (first + at * step) + word] = mean;
     }
   }
   for (uint b = 0; poor >> b != 0; ++b) {
@@ -84,13 +84,14 @@ void main() {
     vec2 logs = vec2(LOWEST, 0.0);
     for (int k = (poor >> b & 1u) != 0 ? -steps : end; k <= steps; ++k) {
       if (at + k >= 0 && at + k < int(count)) {
-        logs = log_sum_add(logs, value_of(first + uint(at + k) * step, reference),
+        logs = log_sum_add(logs,
+                           lifted_log(word_of(first + uint(at + k) * step, reference), largest),
                            texelFetch(weights, abs(k)).x);
       }
     }
     if ((poor >> b & 1u) != 0) {
       result[2 * (first + uint(at) * step) + word] =
-          logs.x + log(logs.y) - texelFetch(weights, norms + at).x;
+          min(logs.x + log(logs.y * texelFetch(weights, norms + at).x), log(LEAST));
     }
   }
 }

@@ -1,21 +1,31 @@
-// The log-likelihood of a bin as the passes of a blur read it. A kernel defines SOURCE and the table
-// `source` before it includes this file.
+// A bin's likelihood as the passes of a blur read it. A kernel defines SOURCE and the table `source`
+// of single floats, two a bin, before it includes this file.
 
 const float LOWEST = -3e38;
 
-float value_of(const uint bin, const vec2 reference) {
-  const vec4 texel = texelFetch(source, int(bin / 2));
-  const vec2 pair = bin % 2 == 0 ? texel.xy : texel.zw;
+// The word of a bin that holds what SOURCE names.
+const int WORD = SOURCE == BLUR_ALONG_Y ? 1 : 0;
+
+float word_of(const uint bin, const vec2 reference) {
+  const float word = texelFetch(source, int(2 * bin) + WORD).x;
   if (SOURCE == BLUR_BELIEF) {
-    precise float difference = (pair.x - reference.x) + (pair.y - reference.y);
+    precise float difference =
+        (word - reference.x) + (texelFetch(source, int(2 * bin) + 1).x - reference.y);
     return difference;
   }
-  return SOURCE == BLUR_TOUCH ? pair.x : pair.y;
+  return word;
 }
 
-// exp(value) for a sum; what is clamped is too small to count in one that is kept.
-float lifted(const float below_largest) {
-  return exp(max(below_largest + BLUR_LIFT, NEGLIGIBLE));
+const bool IN_LOGS = SOURCE == BLUR_TOUCH || SOURCE == BLUR_BELIEF;
+
+// A term of a sum of likelihoods, relative to the largest of the plane and lifted.
+float lifted(const float word, const float largest) {
+  return IN_LOGS ? exp(max(word - largest + BLUR_LIFT, BLUR_SMALLEST)) : max(word, 0.0);
+}
+
+// The logarithm of the same, however small it is.
+float lifted_log(const float word, const float largest) {
+  return IN_LOGS ? word - largest + BLUR_LIFT : word > 0.0 ? log(word) : word;
 }
 
 // Adds a likelihood to a sum of logs, a pair of the largest term and the sum relative to it.

@@ -147,16 +147,20 @@ struct AddPush {
   uint row;  // bins that one row of workgroups covers
 };
 
-// What blur_axis reads of a bin: the high float of a touch's log-likelihood, the difference of a
-// belief from its object's largest, or the low word, where an earlier pass has left its result.
+// What the passes of a blur read of a bin: the log-likelihood of a touch, the difference of a
+// belief from its object's largest, or what the pass along y or x has left: a mean likelihood
+// relative to the largest of the plane, times exp(BLUR_LIFT), or the logarithm of this, which is
+// negative, where it lies below a limit. The limits grow from pass to pass, so that what a sum
+// leaves out below one changes no sum above the next by more than 1e-4.
 const uint BLUR_TOUCH = 0;
 const uint BLUR_BELIEF = 1;
-const uint BLUR_LOW_WORD = 2;
-
-// Linear sums of likelihoods are relative to the largest of a plane, times exp(BLUR_LIFT). A sum
-// below BLUR_LEAST may have lost terms and is summed again in logs.
+const uint BLUR_ALONG_Y = 2;
+const uint BLUR_ALONG_X = 3;
 const float BLUR_LIFT = 80.0;
-const float BLUR_LEAST = 1e-24;
+const float BLUR_SMALLEST = -86.0;  // exp() of it is a normal float
+const float LEAST_ALONG_Y = 1e-31;
+const float LEAST_ALONG_X = 1e-25;
+const float LEAST_OF_TURNS = 1e-19;
 
 // The bins of a slab that holds whole planes.
 struct PlanesPush {

@@ -9,7 +9,7 @@
 layout(local_size_x_id = 0) in;  // a power of two
 layout(constant_id = 1) const uint SOURCE = BLUR_TOUCH;
 
-layout(binding = 0) uniform samplerBuffer source;  // two bins a texel
+layout(binding = 0) uniform samplerBuffer source;  // two words a bin
 layout(binding = 1) uniform samplerBuffer references;  // [object] log-likelihood in two floats
 layout(std430, binding = 2) writeonly buffer PlaneMax { float plane_max[]; };  // [object, theta]
 layout(push_constant) uniform Push { PlanesPush push; };
@@ -27,7 +27,7 @@ void main() {
   const vec2 reference = texelFetch(references, int(push.object_first + object)).xy;
   float most = LOWEST;
   for (uint i = lane; i < plane; i += gl_WorkGroupSize.x) {
-    most = max(most, value_of(first + i, reference));
+    most = max(most, word_of(first + i, reference));
   }
   largest[lane] = most;
   barrier();

@@ -9,13 +9,13 @@
 
 layout(local_size_x_id = 0) in;  // a power of two
 
-layout(binding = 0) uniform samplerBuffer source;  // two bins a texel; the low words count
+layout(binding = 0) uniform samplerBuffer source;  // two words a bin; the second counts
 layout(binding = 1) uniform samplerBuffer arrays;  // ArrayAtTheta, [theta]
 layout(binding = 2) uniform samplerBuffer boxes;   // ObjectBox, [object]
 layout(std430, binding = 3) writeonly buffer Partials { OverlapPartial partials[]; };
 layout(push_constant) uniform Push { OverlapPush push; };
 
-const uint SOURCE = BLUR_LOW_WORD;
+const uint SOURCE = BLUR_ALONG_Y;
 #include "blurred_bin.glsl"
 
 // Rectangles that come as close count as overlapping, so that rounding decides nothing on round
@@ -51,7 +51,7 @@ void main() {
                              array.z * apart.y - array.w * apart.x);
     const bool overlaps = all(lessThanEqual(abs(apart), reach)) &&
                           all(lessThanEqual(abs(turned), turned_reach));
-    const vec2 more = log_sum_add(sum, value_of(first + i, vec2(0.0)), 1.0);
+    const vec2 more = log_sum_add(sum, word_of(first + i, vec2(0.0)), 1.0);
     sum = overlaps ? more : sum;
     count += overlaps ? 1 : 0;
   }

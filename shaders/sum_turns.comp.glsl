@@ -11,9 +11,10 @@
 layout(local_size_x_id = 0) in;
 layout(constant_id = 1) const bool SLIP = false;
 layout(constant_id = 2) const uint STRIP = 8;  // bins along y of an invocation; 1 for a slip
-layout(constant_id = 3) const bool KEEP = false;  // leaves a touch's result in the low words, too
+layout(constant_id = 3) const bool KEEP = false;   // leaves a touch's result in the second words
+layout(constant_id = 4) const uint SOURCE = BLUR_ALONG_X;  // or BLUR_TOUCH, not blurred along x, y
 
-layout(binding = 0) uniform samplerBuffer source;  // two bins a texel, blurred along x and y
+layout(binding = 0) uniform samplerBuffer source;  // two words a bin
 layout(binding = 1) uniform samplerBuffer source_before;
 layout(binding = 2) uniform samplerBuffer source_after;
 layout(binding = 3) uniform samplerBuffer references;  // [object] log-likelihood in two floats
@@ -25,7 +26,6 @@ layout(push_constant) uniform Push { TurnPush push; };
 
 #include "two_float.glsl"
 
-const uint SOURCE = BLUR_TOUCH;
 #include "blurred_bin.glsl"
 
 #define FOR_EACH_BIN [[unroll]] for (uint b = 0; b < STRIP; ++b)
@@ -72,7 +72,8 @@ Tap tap_at(const int k, const uint object, const uint theta, const int x, const 
   const int steps = int(push.steps);
   int from = int(theta) + k;
   tap.used = push.around != 0 || (from >= 0 && from < all);
-  from = push.around != 0 ? (from % all + all) % all : clamp(from, 0, all - 1);
+  from = push.around != 0 ? from - all * int(floor(float(from) / float(all)))
+                          : clamp(from, 0, all - 1);
   const int here = int(push.slab.theta_first);
   int first_theta = here;
   tap.slab = 0;
@@ -100,19 +101,13 @@ Tap tap_at(const int k, const uint object, const uint theta, const int x, const 
   return tap;
 }
 
-float log_at(const Tap tap, const bool inside, const int column, const int row) {
-  const uint bin =
-      tap.first + (inside ? uint(row) * push.slab.nx + uint(column) : 0);
-  vec4 texel = vec4(0.0);
-  // The slab is the same for a whole workgroup.
-  if (tap.slab == 0) {
-    texel = texelFetch(source, int(bin / 2));
-  } else if (tap.slab == 1) {
-    texel = texelFetch(source_before, int(bin / 2));
-  } else {
-    texel = texelFetch(source_after, int(bin / 2));
+float word_at(const Tap tap, const bool inside, const int column, const int row) {
+  const int word = 2 * int(tap.first + (inside ? uint(row) * push.slab.nx + uint(column) : 0));
+  // Where one slab holds all thetas, the condition is a constant of the dispatch.
+  if (push.slab.thetas == push.slab.all_thetas || tap.slab == 0) {
+    return texelFetch(source, word).x;
   }
-  return bin % 2 == 0 ? texel.x : texel.z;
+  return tap.slab == 1 ? texelFetch(source_before, word).x : texelFetch(source_after, word).x;
 }
 
 void put(const uint bin, const float value, const vec2 reference) {
@@ -155,19 +150,22 @@ void main() {
     const bool right_inside = tap.used && tap.column >= -1 && tap.column < nx - 1;
     const float left = left_inside ? tap.weight * tap.x.x : 0.0;
     const float right = right_inside ? tap.weight * tap.x.y : 0.0;
+    const float plane = IN_LOGS ? 1.0 : exp(max(tap.largest - largest, BLUR_SMALLEST));
+    const float reference_of = IN_LOGS ? largest : 0.0;
     float below = 0.0;
     float below_weight = 0.0;
     [[unroll]] for (uint b = 0; b <= STRIP; ++b) {
       const int row = tap.row + int(b);
       const bool inside = row >= 0 && row < ny;
       const float above =
-          inside ? left * lifted(log_at(tap, inside && left_inside, tap.column, row) - largest) +
-                       right * lifted(log_at(tap, inside && right_inside, tap.column + 1, row) -
-                                      largest)
+          inside ? left * lifted(word_at(tap, inside && left_inside, tap.column, row),
+                                 reference_of) +
+                       right * lifted(word_at(tap, inside && right_inside, tap.column + 1, row),
+                                      reference_of)
                  : 0.0;
       const float above_weight = inside ? left + right : 0.0;
       if (b > 0) {
-        sum[b - 1] += tap.y.x * below + tap.y.y * above;
+        sum[b - 1] += plane * (tap.y.x * below + tap.y.y * above);
         weight[b - 1] += tap.y.x * below_weight + tap.y.y * above_weight;
       }
       below = above;
@@ -180,7 +178,7 @@ void main() {
   uint poor = 0;
   FOR_EACH_BIN {
     if (y + int(b) < ny) {
-      if (sum[b] < BLUR_LEAST) {
+      if (sum[b] < LEAST_OF_TURNS * weight[b]) {
         poor |= 1u << b;
       } else {
         put(first + b * push.slab.nx, log(sum[b] / weight[b]) + (largest - BLUR_LIFT), reference);
@@ -199,7 +197,9 @@ void main() {
         const float part = tap.weight * tap.x[corner % 2] * tap.y[corner / 2];
         const bool inside = column >= 0 && column < nx && row >= 0 && row < ny && part > 0.0;
         total += inside ? part : 0.0;
-        logs = inside ? log_sum_add(logs, log_at(tap, inside, column, row), part) : logs;
+        const float value = lifted_log(word_at(tap, inside, column, row), tap.largest) +
+                            (tap.largest - BLUR_LIFT);
+        logs = inside ? log_sum_add(logs, value, part) : logs;
       }
     }
     if (wanted) {

@@ -46,11 +46,15 @@ Buffer::Buffer(Context& context, VkDeviceSize bytes, Memory memory, std::string_
   counted_ = {&context, {needs.size}};
   check(vkBindBufferMemory(device, buffer_.get(), memory_.get(), 0), doing);
   if (texel != VK_FORMAT_UNDEFINED) {
-    const VkBufferViewCreateInfo view{.sType = VK_STRUCTURE_TYPE_BUFFER_VIEW_CREATE_INFO,
-                                      .buffer = buffer_.get(),
-                                      .format = texel,
-                                      .range = VK_WHOLE_SIZE};
+    VkBufferViewCreateInfo view{.sType = VK_STRUCTURE_TYPE_BUFFER_VIEW_CREATE_INFO,
+                                .buffer = buffer_.get(),
+                                .format = texel,
+                                .range = VK_WHOLE_SIZE};
     table_ = make_owned<vkDestroyBufferView>(vkCreateBufferView, device, view, doing);
+    if (bytes / sizeof(float) <= context.limits().table_texels) {
+      view.format = VK_FORMAT_R32_SFLOAT;
+      words_ = make_owned<vkDestroyBufferView>(vkCreateBufferView, device, view, doing);
+    }
   }
   if (memory != Memory::device) {
     void* mapping = nullptr;

@@ -31,6 +31,9 @@ class Buffer {
   VkBuffer handle() const { return buffer_.get(); }
   /// The view that binds the buffer as a table; null without a texel format.
   VkBufferView table() const { return table_.get(); }
+  /// The view that binds the buffer as single floats; null without a texel format, and where these
+  /// are more texels than the device reads.
+  VkBufferView words() const { return words_.get(); }
   VkDeviceSize bytes() const { return bytes_; }
   /// Start of the mapped memory; null for Memory::device.
   std::byte* data() const { return data_; }
@@ -45,6 +48,7 @@ class Buffer {
   Owned<VkDeviceMemory, vkFreeMemory> memory_;
   Owned<VkBuffer, vkDestroyBuffer> buffer_;
   Owned<VkBufferView, vkDestroyBufferView> table_;
+  Owned<VkBufferView, vkDestroyBufferView> words_;
   VkDeviceSize bytes_ = 0;
   std::byte* data_ = nullptr;
 };

@@ -169,7 +169,7 @@ VkDescriptorSet CommandStream::descriptor_set(const Kernel& kernel,
   std::array<VkWriteDescriptorSet, max_bindings> writes{};
   for (std::size_t i = 0; i < buffers.size(); ++i) {
     ranges[i] = {buffers[i]->handle(), 0, VK_WHOLE_SIZE};
-    tables[i] = buffers[i]->table();
+    tables[i] = kernel.bindings()[i] == Access::words ? buffers[i]->words() : buffers[i]->table();
     writes[i] = {.sType = VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET,
                  .dstSet = set,
                  .dstBinding = static_cast<std::uint32_t>(i),

@@ -8,8 +8,8 @@
 namespace palpate::gpu {
 
 VkDescriptorType descriptor_type(Access access) {
-  return access == Access::table ? VK_DESCRIPTOR_TYPE_UNIFORM_TEXEL_BUFFER
-                                 : VK_DESCRIPTOR_TYPE_STORAGE_BUFFER;
+  return access == Access::storage ? VK_DESCRIPTOR_TYPE_STORAGE_BUFFER
+                                   : VK_DESCRIPTOR_TYPE_UNIFORM_TEXEL_BUFFER;
 }
 
 Kernel::Kernel(Context& context, const KernelInfo& info)

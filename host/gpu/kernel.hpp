@@ -12,6 +12,7 @@ namespace palpate::gpu {
 /// How a kernel reaches a buffer.
 enum class Access {
   table,    ///< reads it as a texel buffer, on every device the fastest way to read
+  words,    ///< reads it as a texel buffer of single floats, whatever the format of its table
   storage,  ///< reads and writes it as a storage buffer
 };
 

@@ -43,7 +43,7 @@ std::vector<float> blur_weights(double sd, const Axis& axis, int steps) {
   return weights;
 }
 
-std::vector<float> blur_log_norms(const std::vector<float>& weights, const Axis& axis) {
+std::vector<float> blur_norms(const std::vector<float>& weights, const Axis& axis) {
   const int steps = static_cast<int>(weights.size()) - 1;
   std::vector<float> norms;
   for (int i = 0; i < axis.count; ++i) {
@@ -51,7 +51,7 @@ std::vector<float> blur_log_norms(const std::vector<float>& weights, const Axis&
     for (int k = std::max(-steps, -i); k <= std::min(steps, axis.count - 1 - i); ++k) {
       sum += weights[static_cast<std::size_t>(std::abs(k))];
     }
-    norms.push_back(static_cast<float>(std::log(sum)));
+    norms.push_back(static_cast<float>(1.0 / sum));
   }
   return norms;
 }

@@ -18,8 +18,8 @@ int blur_steps(double sd, const Axis& axis);
 /// The weights of a Gaussian by distance in bins, the first is 1; `steps` + 1 numbers.
 std::vector<float> blur_weights(double sd, const Axis& axis, int steps);
 
-/// For every bin of the axis the logarithm of the sum of the weights whose bins lie inside.
-std::vector<float> blur_log_norms(const std::vector<float>& weights, const Axis& axis);
+/// For every bin of the axis 1 over the sum of the weights whose bins lie inside.
+std::vector<float> blur_norms(const std::vector<float>& weights, const Axis& axis);
 
 /// Where an uncertain touch takes the likelihood of a bin from as theta grows by k steps, |k| <=
 /// `steps`: t + (R(theta) - R(theta + alpha)) r, [theta, k].

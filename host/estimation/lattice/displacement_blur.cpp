@@ -86,7 +86,7 @@ DisplacementBlur::DisplacementBlur(gpu::Context& context, gpu::CommandStream& st
       lanes_(independent_lanes(context.limits())),
       max_planes_(context, {.name = "max_planes",
                             .spirv = shaders::max_planes,
-                            .bindings = {Access::table, Access::table, Access::storage},
+                            .bindings = {Access::words, Access::table, Access::storage},
                             .push_bytes = sizeof(shaders::PlanesPush),
                             .constants = {lanes_, source_of(of)}}),
       along_y_(make_pass(lattice.y_mm, false)),
@@ -105,10 +105,11 @@ DisplacementBlur::DisplacementBlur(gpu::Context& context, gpu::CommandStream& st
   sum_turns_ = gpu::Kernel(
       context, {.name = "sum_turns",
                 .spirv = shaders::sum_turns,
-                .bindings = {Access::table, Access::table, Access::table, Access::table,
+                .bindings = {Access::words, Access::words, Access::words, Access::table,
                              Access::table, Access::table, Access::storage, Access::storage},
                 .push_bytes = sizeof(shaders::TurnPush),
-                .constants = {lanes_, of == Of::belief ? 1U : 0U, strip_, keep_touch ? 1U : 0U}});
+                .constants = {lanes_, of == Of::belief ? 1U : 0U, strip_, keep_touch ? 1U : 0U,
+                              blurs_planes() ? shaders::BLUR_ALONG_X : shaders::BLUR_TOUCH}});
   stream.upload(plane_max_, blur_weights(sd.rad, lattice.theta_rad, theta_steps_),
                 planes() * sizeof(float));
 }
@@ -118,18 +119,18 @@ DisplacementBlur::Pass DisplacementBlur::make_pass(const Axis& axis, bool along_
   const int steps = std::min(blur_steps(sd_.mm, axis), axis.count - 1);
   const std::uint32_t strip = strip_of(best_strip, 2 * (2 * std::int64_t{steps} + 2));
   std::vector<float> table = blur_weights(sd_.mm, axis, steps);
-  const std::vector<float> norms = blur_log_norms(table, axis);
+  const std::vector<float> norms = blur_norms(table, axis);
   table.insert(table.end(), strip, 0.0F);
   table.insert(table.end(), norms.begin(), norms.end());
   const Axis& across = along_x ? lattice_.y_mm : lattice_.x_mm;
   return {.kernel = gpu::Kernel(
-              context_, {.name = "blur_axis",
-                         .spirv = shaders::blur_axis,
-                         .bindings = {Access::table, Access::table, Access::table, Access::table,
-                                      Access::storage},
-                         .push_bytes = sizeof(shaders::BlurPush),
-                         .constants = {lanes_, along_x ? shaders::BLUR_LOW_WORD : source_of(of_),
-                                       along_x ? 1U : 0U, strip}}),
+              context_,
+              {.name = "blur_axis",
+               .spirv = shaders::blur_axis,
+               .bindings = {Access::words, Access::table, Access::table, Access::table,
+                            Access::storage},
+               .push_bytes = sizeof(shaders::BlurPush),
+               .constants = {lanes_, along_x ? shaders::BLUR_ALONG_Y : source_of(of_), strip}}),
           .weights = stream_.uploaded(table, "weights of a blur", VK_FORMAT_R32_SFLOAT),
           .steps = static_cast<std::uint32_t>(steps),
           .invocations = std::int64_t{groups_of(axis.count, strip)} * across.count};
@@ -181,9 +182,7 @@ void DisplacementBlur::record_planes(const DenseBelief& from, const DenseBelief&
                          ? std::array<std::uint32_t, 3>{1, 1, 1}
                          : std::array<std::uint32_t, 3>{slab.theta_count, slab.object_count, 1});
   }
-  // A touch that is not displaced along x and y stays as it is; a belief's difference from its
-  // largest must be written.
-  if (sd_.mm > 0.0 || of_ == Of::belief) {
+  if (blurs_planes()) {
     run_pass(along_y_, from, scratch, few_groups);
     run_pass(along_x_, scratch, scratch, few_groups);
   }

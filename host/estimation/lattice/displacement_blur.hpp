@@ -64,6 +64,9 @@ class DisplacementBlur {
   std::size_t planes() const {
     return objects_ * static_cast<std::size_t>(lattice_.theta_rad.count);
   }
+  /// A touch that is not displaced along x and y stays as it is; of a belief, the difference from
+  /// its largest is wanted.
+  bool blurs_planes() const { return sd_.mm > 0.0 || of_ == Of::belief; }
   Pass make_pass(const Axis& axis, bool along_x);
   void run_pass(const Pass& pass, const DenseBelief& from, const DenseBelief& scratch,
                 bool few_groups);
