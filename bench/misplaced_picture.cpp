@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include <fmt/format.h>
+#include <glm/mat2x2.hpp>
 
 #include "axes.hpp"
 #include "judged_belief.hpp"
@@ -42,34 +43,50 @@ constexpr Pen ellipse_pen{.colour = {0.0, 0.0, 0.0}, .width_px = 2.5, .halo_px =
 struct ShownBelief {
   RecognitionStep step;
   Marginals marginals;
+  glm::dvec2 truth_mm;  ///< where the pivot truly lies in the object frame
 };
 
 ShownBelief believe(Device& device, const std::vector<Hypothesis>& letters, const Recording& trial,
                     const DisplacementSd& touch_sd) {
-  const RecognitionTask task(
-      letters, HistogramOptions{.lattice = lattice_of(60, 60, 113), .touch_sd = touch_sd});
+  // As --pivot-mm auto: x and y then hardly depend on the angle.
+  PoseLattice lattice = lattice_of(60, 60, 113);
+  lattice.pivot_mm = trial.T_robot_sensor.front().translation_mm;
+  const RecognitionTask task(letters, HistogramOptions{.lattice = lattice, .touch_sd = touch_sd});
   PoseHistogram histogram = histogram_of(device, task);
   ShownBelief shown{.step = steps_after(histogram, task, trial, std::array{touches}).back(),
-                    .marginals = {}};
+                    .marginals = {},
+                    .truth_mm = trial.truth->T_object_robot * lattice.pivot_mm};
   shown.marginals = histogram.marginals(shown.step.mode.object);
   return shown;
 }
 
-/// Points about the refined place at two standard deviations of x and y together.
-std::vector<glm::dvec2> ellipse_of(const RefinedPose& refined) {
+/// Covariance of the pivot's place in the object frame, R(theta) p + t, to first order.
+glm::dmat2 covariance_of_place(const RefinedPose& refined, const glm::dvec2& pivot_mm) {
+  const glm::dvec2 lever = rotate(refined.T_object_robot.theta_rad, {-pivot_mm.y, pivot_mm.x});
+  const std::array<double, 9>& c = refined.covariance;
+  glm::dmat2 covariance;
+  for (int i = 0; i < 2; ++i) {
+    for (int j = 0; j < 2; ++j) {
+      covariance[i][j] =
+          c[3 * i + j] + lever[i] * c[6 + j] + lever[j] * c[3 * i + 2] + lever[i] * lever[j] * c[8];
+    }
+  }
+  return covariance;
+}
+
+/// Points about the pivot's refined place at two standard deviations of x and y together.
+std::vector<glm::dvec2> ellipse_of(const glm::dvec2& place_mm, const glm::dmat2& covariance) {
   constexpr int corners = 72;
   constexpr double deviations = 2.0;
-  const std::array<double, 9>& c = refined.covariance;
   // The Cholesky factor carries the circle to the ellipse.
-  const double xx = std::sqrt(c[0]);
-  const double yx = c[1] / xx;
-  const double yy = std::sqrt(std::max(c[4] - yx * yx, 0.0));
+  const double xx = std::sqrt(covariance[0][0]);
+  const double yx = covariance[0][1] / xx;
+  const double yy = std::sqrt(std::max(covariance[1][1] - yx * yx, 0.0));
   std::vector<glm::dvec2> points;
   for (int i = 0; i < corners; ++i) {
     const double angle = 2.0 * std::numbers::pi * i / corners;
     const glm::dvec2 unit(std::cos(angle), std::sin(angle));
-    points.push_back(refined.T_object_robot.translation_mm +
-                     deviations * glm::dvec2(xx * unit.x, yx * unit.x + yy * unit.y));
+    points.push_back(place_mm + deviations * glm::dvec2(xx * unit.x, yx * unit.x + yy * unit.y));
   }
   return points;
 }
@@ -86,8 +103,7 @@ double level_of(double probability, double largest) {
   return (std::log10(probability / largest) + decades) / decades;
 }
 
-void draw_belief(Canvas& canvas, const View& view, const ShownBelief& shown,
-                 const glm::dvec2& truth_mm) {
+void draw_belief(Canvas& canvas, const View& view, const ShownBelief& shown) {
   const PoseLattice& grid = shown.marginals.grid;
   const std::vector<double>& belief = shown.marginals.xy;
   const double largest = *std::ranges::max_element(belief);
@@ -98,28 +114,31 @@ void draw_belief(Canvas& canvas, const View& view, const ShownBelief& shown,
     return sequential(level_of(belief[static_cast<std::size_t>(j) * grid.x_mm.count + i], largest));
   });
   std::vector<glm::dvec2> ellipse;
-  for (const glm::dvec2& point : ellipse_of(*shown.step.refined)) {
+  const RefinedPose& refined = *shown.step.refined;
+  for (const glm::dvec2& point : ellipse_of(refined.T_object_robot * grid.pivot_mm,
+                                            covariance_of_place(refined, grid.pivot_mm))) {
     ellipse.push_back(view.pixel(point));
   }
   canvas.polygon(ellipse, ellipse_pen);
-  draw_cross(canvas, view.pixel(truth_mm));
+  draw_cross(canvas, view.pixel(shown.truth_mm));
 }
 
-void draw_panel(Canvas& canvas, double left_px, const std::string& title, const ShownBelief& shown,
-                const glm::dvec2& truth_mm) {
+void draw_panel(Canvas& canvas, double left_px, const std::string& title,
+                const ShownBelief& shown) {
   const Box box{left_px, top_px, side_px, side_px};
   const glm::dvec2 half(half_view_mm);
-  const View view{.box = box, .lower = truth_mm - half, .upper = truth_mm + half};
-  draw_belief(canvas, view, shown, truth_mm);
+  const View view{.box = box, .lower = shown.truth_mm - half, .upper = shown.truth_mm + half};
+  draw_belief(canvas, view, shown);
   draw_axes(canvas, view, even_ticks(view.lower.x, view.upper.x, 7),
             even_ticks(view.lower.y, view.upper.y, 7),
-            "x of the robot's origin in the object frame, mm", "y, mm");
+            "x of the first touch in the object frame, mm", "y, mm");
   canvas.text(title, {left_px, top_px - 80.0}, heading);
-  canvas.text(
-      fmt::format("error {:.1f} mm; standard deviations {:.1f} and {:.1f} mm",
-                  *shown.step.refined_error_mm, std::sqrt(shown.step.refined->covariance[0]),
-                  std::sqrt(shown.step.refined->covariance[4])),
-      {left_px, top_px - 50.0}, small);
+  const glm::dmat2 covariance =
+      covariance_of_place(*shown.step.refined, shown.marginals.grid.pivot_mm);
+  canvas.text(fmt::format("error {:.1f} mm; standard deviations {:.1f} and {:.1f} mm",
+                          *shown.step.refined_error_mm, std::sqrt(covariance[0][0]),
+                          std::sqrt(covariance[1][1])),
+              {left_px, top_px - 50.0}, small);
   const double legend_px = top_px - 22.0;
   draw_cross(canvas, {left_px + 12.0, legend_px - 6.0});
   canvas.text("true", {left_px + 32.0, legend_px}, small);
@@ -137,14 +156,12 @@ void draw_panel(Canvas& canvas, double left_px, const std::string& title, const 
 std::string draw_misplaced_unknown(Device& device, const std::vector<Hypothesis>& letters) {
   const Recording trial = make_trials(vowels, trials_each, touches, trial_seed,
                                       {.at_random_poses = true, .pose_noise = noise})[shown_trial];
-  const glm::dvec2 truth_mm = trial.truth->T_object_robot.translation_mm;
   Canvas canvas(static_cast<int>(width_px), static_cast<int>(height_px));
   const double first_px = margin_px + axis_px;
-  draw_panel(canvas, first_px, "Five touches taken as exact", believe(device, letters, trial, {}),
-             truth_mm);
+  draw_panel(canvas, first_px, "Five touches taken as exact", believe(device, letters, trial, {}));
   draw_panel(canvas, first_px + side_px + margin_px + axis_px,
              "The same, each known to 1 mm and 3°",
-             believe(device, letters, trial, {noise.translation_mm, noise.rotation_rad}), truth_mm);
+             believe(device, letters, trial, {noise.translation_mm, noise.rotation_rad}));
   return canvas.encode();
 }
 
