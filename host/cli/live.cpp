@@ -21,6 +21,7 @@
 #include "options.hpp"
 #include "palpate/pose_track.hpp"
 #include "palpate/virtual_sensor.hpp"
+#include "planned_touch.hpp"
 #include "recognition_flags.hpp"
 #include "record_output.hpp"
 #include "sensor_option.hpp"
@@ -38,12 +39,13 @@ struct Options {
   DetectorFlags detector;
   double tare_s = 0.5;
   std::optional<double> reset_after_s;
+  std::string plan;
   std::string json;
 };
 
-/// Tells what is wrong with the poses as it happens: on standard error, or on the screen where the
-/// screen would overwrite standard error.
-class PoseComplaints {
+/// Tells what is wrong with the poses or the lattice as it happens: on standard error, or on the
+/// screen where the screen would overwrite standard error.
+class Complaints {
  public:
   void add(const std::string& problem) {
     const std::lock_guard lock(mutex_);
@@ -91,6 +93,10 @@ void live(const Options& options) {
   if (options.reset_after_s) {
     require_above("--reset-after", *options.reset_after_s, 0.0);
   }
+  std::optional<PlanGoal> goal;
+  if (!options.plan.empty()) {
+    goal = parse_goal("--plan", options.plan);
+  }
   require_above("--tare", options.tare_s, 0.0, true);
   const Scene scene = scene_of(options.recognition);
   if (options.poses.empty() && !is_virtual_sensor(options.sensor)) {
@@ -100,7 +106,7 @@ void live(const Options& options) {
         "poses",
         options.sensor);
   }
-  PoseComplaints complaints;
+  Complaints complaints;
   const OpenSensor opened =
       open_sensor(options.sensor, options.poses,
                   [&complaints](const std::string& problem) { complaints.add(problem); });
@@ -112,6 +118,10 @@ void live(const Options& options) {
       detector_options(options.detector, description.pressure_unit, source);
   RecognitionTask task = task_of(options.recognition, scene, description.pressure_unit, source,
                                  array_reach_mm(elements_mm));
+  if (goal && std::holds_alternative<ParticleOptions>(task.filter)) {
+    refuse_flag("--plan", options.plan,
+                "a plan needs the belief of all poses; use --filter histogram, or leave it out");
+  }
   CommandFiles files;
   add_sensor_files(options.sensor, options.poses, files);
   add_recognition_files(options.recognition, scene, task, files);
@@ -142,23 +152,37 @@ void live(const Options& options) {
     fmt::print("{}\n", table_heading());
     std::fflush(stdout);
   }
+  bool resolved = true;  // nothing was said yet
   complaints.show(on_terminal && isatty(STDERR_FILENO) != 0);
   LiveRecognition recognition(
       *opened.sensor, elements_mm, recogniser, task,
-      {.detector = detector, .tare_s = options.tare_s, .reset_after_s = options.reset_after_s},
+      {.detector = detector,
+       .tare_s = options.tare_s,
+       .reset_after_s = options.reset_after_s,
+       .plan = goal},
       [&](const LiveTouch& touch) {
+        // This thread alone uses the recogniser meanwhile.
+        const auto unresolved = unresolved_words(task, recogniser.lattice(),
+                                                 std::span(&*touch.touch.T_robot_sensor, 1));
+        if (resolved && !unresolved.empty()) {
+          resolved = false;
+          complaints.add(unresolved);
+        }
         if (json) {
           json->add(json_line(touch, task));
         }
         if (!to_program && !on_terminal) {
           fmt::print("{}\n", table_line(touch, task));
+          if (touch.next) {
+            fmt::print("         {}\n", next_touch_words(*touch.next, *goal));
+          }
           std::fflush(stdout);
         }
       });
   {
     std::optional<LiveScreen> screen;
     if (on_terminal) {
-      screen.emplace(people, description, elements_mm, task);
+      screen.emplace(people, description, elements_mm, task, goal);
     }
     while (!recognition.wait_for_end(50ms) && !interruption.requested()) {
       if (screen && screen->update(recognition.state(), complaints.last())) {
@@ -205,6 +229,11 @@ void add_live(CLI::App& app) {
       "--reset-after", options->reset_after_s,
       "Seconds without contact after which the next touch is of another unknown object "
       "[default: never]");
+  command->add_option(
+      "--plan", options->plan,
+      "After each estimate, plan the next touch by this goal, identity, pose or both: the best "
+      "sensor pose of a grid about the places where the object may be (see 'palpate plan') "
+      "[default: no plan]");
   command->add_option("--json", options->json,
                       "Write a line of JSON for each touch as it comes; - is standard output");
   command->callback([options] { live(*options); });

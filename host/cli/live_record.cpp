@@ -8,6 +8,7 @@
 
 #include "options.hpp"
 #include "palpate/error.hpp"
+#include "planned_touch.hpp"
 #include "printable.hpp"
 #include "record_output.hpp"
 #include "step_words.hpp"
@@ -33,6 +34,10 @@ std::string json_line(const LiveTouch& touch, const RecognitionTask& task) {
   if (!touch.step.truth.label.empty()) {
     json["truth"] = truth_to_json(touch.step.truth);
   }
+  if (touch.next) {
+    json["next"] = to_json(*touch.next);
+    json["next"].erase("index");  // of a grid that nobody else knows
+  }
   json["latency_ms"] = touch.latency_ms;
   json["frames_lost"] = touch.frames_lost;
   // A label need not be UTF-8, as JSON must.
@@ -41,19 +46,21 @@ std::string json_line(const LiveTouch& touch, const RecognitionTask& task) {
 
 // Lines are printed as touches come, so columns cannot be as wide as their content.
 std::string table_heading() {
-  return fmt::format("{:>7}  {:>5}  {:<10}  {:>5}  {:>14}  {:>14}  {:>15}  {:>8}  {:>10}  fit",
-                     "unknown", "touch", "best", "prob.", "x mm", "y mm", "theta deg", "error mm",
-                     "latency ms");
+  return fmt::format(
+      "{:>7}  {:>5}  {:<10}  {:>5}  {:>14}  {:>14}  {:>15}  {:>8}  {:>10}  {:>8}  fit", "unknown",
+      "touch", "best", "prob.", "x mm", "y mm", "theta deg", "error mm", "latency ms", "surprise");
 }
 
 std::string table_line(const LiveTouch& touch, const RecognitionTask& task) {
   const RecognitionStep& step = touch.step;
   const std::array<std::string, 3> pose = pose_cells(pose_text(step));
   const std::string fit = fit_word(step);
-  return fmt::format("{:>7}  {:>5}  {:<10}  {:>5.3f}  {:>14}  {:>14}  {:>15}  {:>8}  {:>10.2f}  {}",
-                     touch.unknown + 1, touch.index + 1, object_words(step, task),
-                     step.confidence(), pose[0], pose[1], pose[2], error_text(step.pose_error_mm()),
-                     touch.latency_ms, fit.empty() ? "-" : fit);
+  const std::string surprise = surprise_text(step);
+  return fmt::format(
+      "{:>7}  {:>5}  {:<10}  {:>5.3f}  {:>14}  {:>14}  {:>15}  {:>8}  {:>10.2f}  {:>8}  {}",
+      touch.unknown + 1, touch.index + 1, object_words(step, task), step.confidence(), pose[0],
+      pose[1], pose[2], error_text(step.pose_error_mm()), touch.latency_ms,
+      surprise.empty() ? "-" : surprise, fit.empty() ? "-" : fit);
 }
 
 std::string summary(const LiveState& state, std::vector<double> latencies_ms,
@@ -63,7 +70,8 @@ std::string summary(const LiveState& state, std::vector<double> latencies_ms,
     const RecognitionStep& step = state.last->step;
     text += result_words(step, task) + "\n";
     std::vector<std::string> more{truth_words(step, task),
-                                  misfit_sentence(step, state.touches, task)};
+                                  misfit_sentence(step, state.touches, task),
+                                  single_touch_words(task, state.touches)};
     more.insert(more.end(), step.warnings.begin(), step.warnings.end());
     for (const std::string& words : more) {
       text += words.empty() ? "" : printable(words) + "\n";

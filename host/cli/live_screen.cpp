@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "evidence_scale.hpp"
+#include "planned_touch.hpp"
 #include "step_words.hpp"
 
 namespace palpate::cli {
@@ -15,8 +16,9 @@ namespace palpate::cli {
 using namespace std::chrono_literals;
 
 LiveScreen::LiveScreen(std::FILE* output, const SensorDescription& sensor,
-                       const std::vector<glm::dvec2>& elements_mm, const RecognitionTask& task)
-    : output_(output), task_(task) {
+                       const std::vector<glm::dvec2>& elements_mm, const RecognitionTask& task,
+                       std::optional<PlanGoal> plan)
+    : output_(output), task_(task), plan_(plan) {
   view_.sensor = sensor.serial.empty() ? sensor.name : sensor.name + " " + sensor.serial;
   view_.elements_mm = elements_mm;
   view_.valid = sensor.valid;
@@ -78,6 +80,7 @@ void LiveScreen::describe(const LiveState& state) {
   }
   view_.pose.clear();
   view_.truth.clear();
+  view_.next.clear();
   view_.notes.clear();
   view_.identity.clear();
   view_.map = nullptr;
@@ -94,10 +97,19 @@ void LiveScreen::describe(const LiveState& state) {
   view_.object = identity_words(step, task_);
   view_.pose = pose_words(pose_text(step));
   view_.truth = truth_words(step, task_);
+  if (plan_) {
+    view_.next = state.last->next ? next_touch_words(*state.last->next, *plan_) : "planning";
+  }
   if (const auto misfit = misfit_sentence(step, state.touches, task_); !misfit.empty()) {
     view_.notes.push_back(misfit);
   } else if (step.fit) {
     view_.state += "; " + fit_word(step);
+  }
+  if (const std::string surprise = surprise_text(step); !surprise.empty()) {
+    view_.state += "; surprise " + surprise;
+  }
+  if (auto words = single_touch_words(task_, state.touches); !words.empty()) {
+    view_.notes.push_back(std::move(words));
   }
   view_.notes.insert(view_.notes.end(), step.warnings.begin(), step.warnings.end());
   view_.identity = step.identity;

@@ -17,7 +17,8 @@ class LiveScreen {
  public:
   /// @param output the terminal; keys are read from standard input
   LiveScreen(std::FILE* output, const SensorDescription& sensor,
-             const std::vector<glm::dvec2>& elements_mm, const RecognitionTask& task);
+             const std::vector<glm::dvec2>& elements_mm, const RecognitionTask& task,
+             std::optional<PlanGoal> plan = {});
 
   /// Shows the state, and beside it the warning unless it is "". Returns true if the key for the
   /// next unknown was pressed.
@@ -32,6 +33,7 @@ class LiveScreen {
 
   std::FILE* output_;
   const RecognitionTask& task_;
+  std::optional<PlanGoal> plan_;
   LiveView view_;
   TerminalColours colours_ = terminal_colours();
   std::optional<Terminal> terminal_;

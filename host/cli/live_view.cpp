@@ -176,6 +176,7 @@ int draw_words(TerminalCanvas& canvas, const LiveView& view, int columns) {
     const std::size_t object = static_cast<std::size_t>(std::max(room, 0));
     add((room > 0 ? shorten_middle(view.object, object) + ": " : "") + view.pose, true);
   }
+  add(view.next, false);
   add(view.truth, false);
   for (std::size_t i = 0; i < std::min(view.notes.size(), most_notes); ++i) {
     add(view.notes[i], true);

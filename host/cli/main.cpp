@@ -62,6 +62,7 @@ int run(int argc, char** argv) {
   palpate::cli::add_simulate(app);
   palpate::cli::add_map(app);
   palpate::cli::add_recognize(app);
+  palpate::cli::add_plan(app);
   palpate::cli::add_info(app);
   palpate::cli::add_export(app);
   refuse_empty_values(app);

@@ -10,8 +10,8 @@ void add_recognition_flags(CLI::App& command, RecognitionFlags& flags) {
   command.add_option("--maps", flags.maps, "Maps of the known objects, or folders of maps");
   command.add_option(
       "--scene", flags.scene,
-      "Scene file (YAML); its keys are array, threshold, ratio, gamma, prior, none, objects, "
-      "region, bins, filter and device, and a flag overrides its key");
+      "Scene file (YAML); its keys are array, threshold, ratio, gamma, prior, touch_sd, slip_sd, "
+      "none, objects, region, bins, filter and device, and a flag overrides its key");
   command.add_option(
       "--bins", flags.bins,
       "Pose bins per object along x, y and theta, as 25x25x16; auto: as many as the refined pose "
@@ -38,11 +38,7 @@ void add_recognition_flags(CLI::App& command, RecognitionFlags& flags) {
                      "Probability that an unseen cell is occupied [default: the maps' own]");
   command.add_option("--gamma", flags.gamma,
                      "Probability that an element's contact class is random [default: 0.1]");
-  command.add_option(
-      "--none", flags.none,
-      "Prior weight of \"(none)\", an object that was never learned: with 5 maps of weight 1, "
-      "--none 5 gives it a probability of 0.5 before the first touch. Its likelihood is that of a "
-      "map that holds only the prior [default: no (none)]");
+  add_uncertainty_flags(command, flags.uncertainty);
   command.add_option(
       "--threshold", flags.threshold,
       "Contact threshold, in the recording's pressure unit [default: 2 kPa; required for raw "

@@ -8,6 +8,7 @@
 #include "command_files.hpp"
 #include "palpate/scene.hpp"
 #include "recogniser.hpp"
+#include "uncertainty_flags.hpp"
 
 namespace CLI {
 class App;
@@ -26,7 +27,7 @@ struct RecognitionFlags {
   std::string pivot_mm;
   std::optional<double> prior;
   std::optional<double> gamma;
-  std::optional<double> none;
+  UncertaintyFlags uncertainty;
   std::optional<double> threshold;
   std::optional<double> ratio;
   std::optional<int> memory_mib;

@@ -2,10 +2,13 @@
 
 #include <unistd.h>
 
+#include <algorithm>
+#include <array>
 #include <filesystem>
 #include <memory>
 #include <optional>
 #include <set>
+#include <span>
 #include <string>
 
 #include <fmt/format.h>
@@ -22,6 +25,7 @@
 #include "recordings.hpp"
 #include "sheet.hpp"
 #include "terminal.hpp"
+#include "touch_sd_output.hpp"
 
 namespace palpate::cli {
 
@@ -37,6 +41,7 @@ struct Options {
   std::string json;
   std::string posterior;
   std::string png;
+  bool fit_touch_sd = false;
 };
 
 /// The unknowns that the flags select: views into the recordings' memory.
@@ -136,6 +141,14 @@ void export_posterior(const std::filesystem::path& path, const RecognitionTask& 
   });
 }
 
+std::vector<Pose> poses_of(const Unknown& unknown) {
+  std::vector<Pose> T_robot_sensor;
+  for (const Touch& touch : unknown.touches) {
+    T_robot_sensor.push_back(touch.T_robot_sensor);
+  }
+  return T_robot_sensor;
+}
+
 /// Writes posterior and JSON. The JSON appears only after the posterior.
 void write_results(const Options& options, const RecognitionTask& task,
                    const Recogniser& recogniser, const std::string& json) {
@@ -150,6 +163,26 @@ void write_results(const Options& options, const RecognitionTask& task,
   if (json_file) {
     json_file->commit();
   }
+}
+
+/// The whole command with --fit-touch-sd.
+void fit_touch_sd(const Options& options, const Scene& scene, const RecognitionTask& task,
+                  std::span<const Recording> recordings, std::span<const Unknown> unknowns) {
+  Device device = open_device(options.recognition, scene);
+  TouchSdFit fit;
+  {
+    Progress progress("fitting touch-sd");
+    fit = palpate::fit_touch_sd(device, task, touched_objects(recordings, unknowns, task), {},
+                                [&](double fraction) { progress.show(fraction); });
+  }
+  const std::string json =
+      to_json(fit, device.name())
+          .dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) +
+      "\n";
+  if (!options.json.empty() && options.json != "-") {
+    write_file(options.json, json);
+  }
+  fmt::print("{}", options.json == "-" ? json : touch_sd_text(fit));
 }
 
 void recognize(const Options& options) {
@@ -172,8 +205,20 @@ void recognize(const Options& options) {
   if (auto* histogram = std::get_if<HistogramOptions>(&task.filter)) {
     histogram->still_array = array_is_still(unknowns);
   }
+  if (options.fit_touch_sd) {
+    refuse_beside_fit(std::array<OtherFlag, 4>{{{"--each-frame", options.each_frame},
+                                                {"--trace", options.trace},
+                                                {"--posterior", !options.posterior.empty()},
+                                                {"--png", !options.png.empty()}}},
+                      task);
+  }
   check_outputs(options, scene, task, unknowns);
+  if (options.fit_touch_sd) {
+    fit_touch_sd(options, scene, task, recordings, unknowns);
+    return;
+  }
   Device device = open_device(options.recognition, scene);
+  std::string unresolved;
   Recogniser recogniser = open_recogniser(device, task);
   if (!options.png.empty()) {
     make_folder(options.png);
@@ -192,6 +237,9 @@ void recognize(const Options& options) {
       };
       records.push_back(recognise(recogniser, task, unknown, trace, show));
       records.back().require_steps();
+      if (unresolved.empty()) {
+        unresolved = unresolved_words(task, recogniser.lattice(), poses_of(unknown));
+      }
       show(0.0);
       json.push_back(to_json(records.back(), task, device.name(), options.trace));
       if (!options.png.empty()) {
@@ -201,6 +249,10 @@ void recognize(const Options& options) {
                                       recogniser.marginals(records.back().last().mode.object))));
       }
     }
+  }
+
+  if (!unresolved.empty()) {
+    fmt::print(stderr, "palpate: {}\n", unresolved);
   }
 
   // The path of a recording need not be UTF-8, as JSON must.
@@ -257,6 +309,12 @@ void add_recognize(CLI::App& app) {
       "--png", options->png,
       "Folder for a picture of each unknown: the touches on the map, the belief over x and y, "
       "the identity after every touch");
+  command->add_flag(
+      "--fit-touch-sd", options->fit_touch_sd,
+      "Instead of recognising, find how far the touches lie from where the robot reports them: the "
+      "standard deviations for --touch-sd-mm and --touch-sd-deg under which all RECORDINGs have "
+      "the "
+      "largest evidence. Give about 50 objects, each touched 5 times or more");
   command->callback([options] { recognize(*options); });
 }
 

@@ -109,6 +109,9 @@ nlohmann::ordered_json to_json(const RecognitionStep& step, const RecognitionTas
   if (step.fit) {
     json["fit"] = {{"z", step.fit->z}, {"verdict", verdict_text(step.fit->verdict)}};
   }
+  if (step.surprise) {
+    json["surprise"] = *step.surprise;
+  }
   if (!step.warnings.empty()) {
     json["warnings"] = step.warnings;
   }

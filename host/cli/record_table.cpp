@@ -91,7 +91,13 @@ std::string complaints(const std::vector<RecognitionRecord>& records, const Reco
       text += fmt::format("{}: {}\n", printable_name(record), misfit);
     }
   }
-  return text + warnings(records);
+  text += warnings(records);
+  const bool any_single = std::ranges::any_of(
+      records, [](const RecognitionRecord& record) { return record.touches == 1; });
+  if (const auto words = single_touch_words(task, any_single ? 1 : 0); !words.empty()) {
+    text += words + "\n";
+  }
+  return text;
 }
 
 /// How many unknowns of a known truth are right, and their mean pose errors.
@@ -140,6 +146,7 @@ std::string trace_table(const RecognitionRecord& record, const RecognitionTask& 
                    {"theta deg", true},
                    {"error mm", true},
                    {"effective particles", true},
+                   {"surprise", true},
                    {"fit"}});
   for (std::size_t i = 0; i < record.trace.size(); ++i) {
     const RecognitionStep& step = record.trace[i];
@@ -148,7 +155,8 @@ std::string trace_table(const RecognitionRecord& record, const RecognitionTask& 
     table.add({fmt::format("{}", i + 1), object_words(step, task),
                fmt::format("{:.3f}", step.confidence()), pose[0], pose[1], pose[2],
                step.right ? error_text(step.pose_error_mm()) : "",
-               particles ? fmt::format("{:.1f}", *particles) : "", fit_word(step)});
+               particles ? fmt::format("{:.1f}", *particles) : "", surprise_text(step),
+               fit_word(step)});
   }
   const std::string truth = truth_words(record.last(), task);
   return printable_name(record) + "\n" + table.text(columns) +

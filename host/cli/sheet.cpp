@@ -14,16 +14,6 @@ namespace palpate::cli {
 
 namespace {
 
-/// Edge of the squares that stand for elements, mm: 90 % of the pitch, at most 1.8 mm.
-double element_edge_mm(const Touch& touch) {
-  const glm::dvec2& first = touch.elements_mm.front();
-  double nearest = 2.0;
-  for (const glm::dvec2& other : touch.elements_mm.subspan(1)) {
-    nearest = std::min(nearest, std::hypot(other.x - first.x, other.y - first.y));
-  }
-  return 0.9 * nearest;
-}
-
 /// The words with the signs of print in the place of those of a terminal.
 std::string printed(std::string words) {
   for (const auto& [plain, sign] : {std::pair{"+-", "± "}, std::pair{" deg", "°"}}) {
@@ -67,6 +57,15 @@ std::vector<RecognitionSheet::Caption> captions(const RecognitionRecord& record,
 
 }  // namespace
 
+double element_edge_mm(std::span<const glm::dvec2> elements_mm) {
+  const glm::dvec2& first = elements_mm.front();
+  double nearest = 2.0;
+  for (const glm::dvec2& other : elements_mm.subspan(1)) {
+    nearest = std::min(nearest, std::hypot(other.x - first.x, other.y - first.y));
+  }
+  return 0.9 * nearest;
+}
+
 RecognitionSheet sheet_of(const RecognitionRecord& record, const Unknown& unknown,
                           const RecognitionTask& task, Marginals belief) {
   const RecognitionStep& last = record.last();
@@ -78,7 +77,7 @@ RecognitionSheet sheet_of(const RecognitionRecord& record, const Unknown& unknow
                  printed(pose_words(pose_text(last))) + " in the robot frame";
   sheet.captions = captions(record, task);
   sheet.map = task.hypotheses[last.mode.object].map;
-  sheet.element_mm = element_edge_mm(unknown.touches.front());
+  sheet.element_mm = element_edge_mm(unknown.touches.front().elements_mm);
   sheet.T_object_robot = last.pose();
   if (last.error_mm) {
     sheet.truth = last.truth.T_object_robot;

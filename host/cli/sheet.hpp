@@ -1,9 +1,14 @@
 #pragma once
 
+#include <span>
+
 #include "figures.hpp"
 #include "recognition_record.hpp"
 
 namespace palpate::cli {
+
+/// Edge of the squares that stand for elements, mm: 90 % of the pitch, at most 1.8 mm.
+double element_edge_mm(std::span<const glm::dvec2> elements_mm);
 
 /// The picture of one recognised unknown: its result in words, its touches, its trace.
 /// @param belief of the object of the last step's mode

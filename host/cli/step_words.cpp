@@ -111,6 +111,18 @@ std::string misfit_sentence(const RecognitionStep& step, std::size_t touches,
                      -step.fit->z, label);
 }
 
+std::string single_touch_words(const RecognitionTask& task, std::size_t touches) {
+  if (touches != 1 || task.labels.back() != none_label) {
+    return "";
+  }
+  return "one touch cannot tell whether the object is one of the maps': the odds of (none) are "
+         "about the prior's";
+}
+
+std::string surprise_text(const RecognitionStep& step) {
+  return step.surprise ? fmt::format("{:+.1f}", *step.surprise) : "";
+}
+
 std::string error_text(std::optional<double> error_mm) {
   return error_mm ? fmt::format("{:.2f}", *error_mm) : "-";
 }

@@ -44,6 +44,13 @@ std::string fit_word(const RecognitionStep& step);
 std::string misfit_sentence(const RecognitionStep& step, std::size_t touches,
                             const RecognitionTask& task);
 
+/// What to say where "(none)" was asked for and an unknown was touched once only; else "".
+std::string single_touch_words(const RecognitionTask& task, std::size_t touches);
+
+/// The surprise of the last touch in standard deviations, with its sign: "+2.3"; "" where there is
+/// none.
+std::string surprise_text(const RecognitionStep& step);
+
 /// A pose error in mm, "-" where there is none.
 std::string error_text(std::optional<double> error_mm);
 

@@ -216,11 +216,10 @@ bool wants_particles(const RecognitionFlags& flags, const Scene& scene) {
 }
 
 /// The particle filter's options: those that it shares with the histogram, and its flags.
-ParticleOptions particle_options(const RecognitionFlags& flags, const HistogramOptions& histogram) {
-  ParticleOptions particles{.region = histogram.lattice,
-                            .contact = histogram.contact,
-                            .none_weight = histogram.none_weight,
-                            .augmented = flags.augmented};
+ParticleOptions particle_options(const RecognitionFlags& flags, const Scene& scene,
+                                 const HistogramOptions& histogram) {
+  ParticleOptions particles{
+      .region = histogram.lattice, .contact = histogram.contact, .augmented = flags.augmented};
   particles.particles = flags.particles.value_or(particles.particles);
   if (particles.particles < 1 || particles.particles > 1'000'000) {
     refuse_flag("--particles", particles.particles, "give 1 to 1,000,000");
@@ -231,6 +230,7 @@ ParticleOptions particle_options(const RecognitionFlags& flags, const HistogramO
     refuse_flag("--resampling", flags.resampling, "not known; use multinomial or systematic");
   }
   particles.seed = flags.seed.value_or(particles.seed);
+  set_uncertainty(flags.uncertainty, scene, flags.scene, particles);
   return particles;
 }
 
@@ -277,12 +277,12 @@ RecognitionTask task_of(const RecognitionFlags& flags, const Scene& scene,
   std::vector<Hypothesis> hypotheses = read_maps(objects);
   const WantedLattice wanted = lattice_of(flags, scene, hypotheses, reach_mm);
   histogram.lattice = wanted.lattice;
-  if (const auto none = flags.none ? flags.none : scene.none) {
-    histogram.none_weight = require_above("--none", *none, 0.0);
+  if (!with_particles) {
+    set_uncertainty(flags.uncertainty, scene, flags.scene, hypotheses, histogram);
   }
   contact.prior = prior_of(objects, hypotheses, flags.prior ? flags.prior : scene.prior);
   RecognitionTask task(std::move(hypotheses),
-                       with_particles ? FilterOptions(particle_options(flags, histogram))
+                       with_particles ? FilterOptions(particle_options(flags, scene, histogram))
                                       : FilterOptions(histogram));
   for (const Scene::Object& object : objects) {
     task.map_paths.push_back(object.map.string());

@@ -96,6 +96,23 @@ Scene::Region read_region(const Entry& entry) {
   return region;
 }
 
+Scene::Displacement read_displacement(const Entry& entry) {
+  const auto at_least_0 = [](double value) { return value >= 0; };
+  constexpr const char* remedy = "give a number from 0";
+  Scene::Displacement sd;
+  read_keys(entry, {{"mm", [&](const Entry& e) { sd.mm = e.number(at_least_0, remedy); }},
+                    {"deg", [&](const Entry& e) { sd.deg = e.number(at_least_0, remedy); }}});
+  return sd;
+}
+
+void read_none(const Entry& entry, Scene& scene) {
+  scene.auto_none = entry.node.IsScalar() && entry.node.Scalar() == "auto";
+  if (!scene.auto_none) {
+    scene.none =
+        entry.number([](double weight) { return weight > 0; }, "give a number above 0, or auto");
+  }
+}
+
 void read_bins(const Entry& entry, Scene& scene) {
   scene.auto_bins = entry.node.IsScalar() && entry.node.Scalar() == "auto";
   scene.fine_bins = entry.node.IsScalar() && entry.node.Scalar() == "fine";
@@ -121,7 +138,6 @@ Scene read_scene(const std::filesystem::path& path) {
       return [&key, fits, remedy](const Entry& e) { key = e.number(fits, remedy); };
     };
     const auto at_least_0 = [](double value) { return value >= 0; };
-    const auto positive = [](double value) { return value > 0; };
     const auto rate = [](double value) { return value >= 0 && value < 1; };
     const auto inner = [](double value) { return value > 0 && value < 1; };
     read_keys(root, {{"array", [&](const Entry& e) { read_array(e, scene); }},
@@ -131,7 +147,9 @@ Scene read_scene(const std::filesystem::path& path) {
                      {"prior", number(scene.prior, inner, "give a number in (0, 1)")},
                      {"objects", [&](const Entry& e) { scene.objects = read_objects(e); }},
                      {"region", [&](const Entry& e) { scene.region = read_region(e); }},
-                     {"none", number(scene.none, positive, "give a number above 0")},
+                     {"none", [&](const Entry& e) { read_none(e, scene); }},
+                     {"touch_sd", [&](const Entry& e) { scene.touch_sd = read_displacement(e); }},
+                     {"slip_sd", [&](const Entry& e) { scene.slip_sd = read_displacement(e); }},
                      {"bins", [&](const Entry& e) { read_bins(e, scene); }},
                      {"filter",
                       [&](const Entry& e) {

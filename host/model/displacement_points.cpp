@@ -37,4 +37,10 @@ std::vector<Pose> displacement_points(const DisplacementSd& sd, std::size_t coun
   return points;
 }
 
+Pose random_displacement(const DisplacementSd& sd, Random& random) {
+  const double x = sd.mm * random.normal();
+  const double y = sd.mm * random.normal();
+  return {{x, y}, sd.rad * random.normal()};
+}
+
 }  // namespace palpate

@@ -5,6 +5,7 @@
 
 #include "palpate/displacement.hpp"
 #include "palpate/pose.hpp"
+#include "random.hpp"
 
 namespace palpate {
 
@@ -13,6 +14,9 @@ namespace palpate {
 /// multiples of powers of the generalised golden ratio), so that fewer suffice than of random ones.
 /// One point at 0 where nothing is displaced.
 std::vector<Pose> displacement_points(const DisplacementSd& sd, std::size_t count);
+
+/// One displacement drawn from the distribution.
+Pose random_displacement(const DisplacementSd& sd, Random& random);
 
 /// The x below which a standard normal variable lies with this probability, within 1e-9.
 /// @param probability above 0 and below 1

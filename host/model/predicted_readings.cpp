@@ -1,6 +1,32 @@
 #include "predicted_readings.hpp"
 
+#include <cmath>
+
 namespace palpate {
+
+namespace {
+
+/// ContactModel::log_likelihood() of No Contact and In Contact by Eq. 7 with gamma > 0, in a third
+/// of its time: gamma m keeps both arguments of the logarithm away from 0.
+class BothReadings {
+ public:
+  explicit BothReadings(const ContactModel& contact)
+      : floor_(contact.gamma * contact.prior.value()), share_(1.0 - contact.gamma) {}
+
+  void add(double log_odds, std::vector<double>& logs) const {
+    const double less = std::exp(-std::abs(log_odds));  // never overflows
+    const double more_likely = std::log(floor_ + share_ / (1.0 + less));
+    const double less_likely = std::log(floor_ + share_ * less / (1.0 + less));
+    logs.push_back(log_odds > 0.0 ? less_likely : more_likely);
+    logs.push_back(log_odds > 0.0 ? more_likely : less_likely);
+  }
+
+ private:
+  double floor_;
+  double share_;
+};
+
+}  // namespace
 
 std::size_t reading_levels(const ContactModel& model) {
   return model.table ? model.table->levels() : 2;
@@ -12,6 +38,17 @@ std::vector<double> reading_log_likelihoods(std::span<const glm::dvec2> elements
   const std::size_t levels = reading_levels(contact);
   std::vector<double> logs;
   logs.reserve(elements_mm.size() * levels);
+  if (!contact.table && contact.gamma > 0.0) {
+    const BothReadings both(contact);
+    const glm::dvec2 along_x = rotate(T_object_sensor.theta_rad, {1.0, 0.0});
+    const glm::dvec2 along_y = rotate(T_object_sensor.theta_rad, {0.0, 1.0});
+    for (const glm::dvec2& element : elements_mm) {
+      both.add(
+          map.log_odds(T_object_sensor.translation_mm + element.x * along_x + element.y * along_y),
+          logs);
+    }
+    return logs;
+  }
   for (const glm::dvec2& element : elements_mm) {
     const MapSample sample{map.log_odds(T_object_sensor * element)};
     for (std::size_t level = 0; level < levels; ++level) {

@@ -308,7 +308,28 @@ void LiveRecognition::use(const Job& job) {
     latencies_ms_.push_back(result.latency_ms);
     state_.last = result;
   }
+  if (options_.plan) {
+    result.next = plan(*job.touch);
+    const std::lock_guard lock(mutex_);
+    state_.last->next = result.next;
+  }
   on_touch_(result);
+}
+
+PlannedTouch LiveRecognition::plan(const DetectedTouch& touch) const {
+  std::vector<glm::dvec2> living_mm;
+  for (std::size_t e = 0; e < elements_mm_.size(); ++e) {
+    if (touch.valid.empty() || touch.valid[e] != 0) {
+      living_mm.push_back(elements_mm_[e]);
+    }
+  }
+  const PlanOptions options;
+  const std::vector<PoseSample> samples = recogniser_.sample(options.samples, options.seed);
+  const std::vector<Pose> candidates =
+      candidate_grid(samples, task_, living_mm, touch.T_robot_sensor->theta_rad);
+  return rank_touches(*recogniser_.histogram(), task_, candidates, living_mm, *options_.plan,
+                      options)
+      .front();
 }
 
 }  // namespace palpate

@@ -16,6 +16,7 @@
 #include "recogniser.hpp"
 #include "recognition_record.hpp"
 #include "stream_time.hpp"
+#include "touch_plan.hpp"
 
 namespace palpate {
 
@@ -27,6 +28,7 @@ struct LiveTouch {
   RecognitionStep step;
   double latency_ms = 0.0;        ///< from taking the frame that ended the touch to its estimate
   std::uint64_t frames_lost = 0;  ///< up to that frame
+  std::optional<PlannedTouch> next = {};  ///< the best of a grid, where the options ask for it
 };
 
 /// What is known of a stream at one moment.
@@ -51,6 +53,9 @@ struct LiveOptions {
   TouchDetectorOptions detector;
   double tare_s = 0.5;                  ///< where the sensor knows no baseline
   std::optional<double> reset_after_s;  ///< after so long without contact another unknown comes
+  /// Plans the next touch by this goal after each estimate, which state() shows before; on_touch is
+  /// called after planning. Not for particles.
+  std::optional<PlanGoal> plan = {};
 };
 
 /// Recognises what a sensor's stream touches, from construction on. One thread reads frames and
@@ -104,6 +109,8 @@ class LiveRecognition {
   bool wait_for_room();
   void believe();
   void use(const Job& job);
+  /// The best next touch of a grid about the belief, with the array of this touch.
+  PlannedTouch plan(const DetectedTouch& touch) const;
   Touch view_of(const DetectedTouch& touch) const;
   void push(Job job);
   /// Runs a thread's work and keeps what it throws.

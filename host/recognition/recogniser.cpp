@@ -31,7 +31,9 @@ Recogniser::Recogniser(Device& device, const RecognitionTask& task)
 void Recogniser::reset() {
   std::visit([](auto& filter) { filter.reset(); }, filter_);
   waiting_.clear();
+  surprises_.clear();
   pivot_placed_ = false;
+  touched_ = false;
   if (auto_pivot_) {
     move_pivot({0.0, 0.0});
   }
@@ -62,6 +64,7 @@ void Recogniser::update(std::span<const Touch> touches,
                         const std::function<void(double)>& progress) {
   if (!lacks_pivot()) {
     std::visit([&](auto& filter) { filter.update(touches, progress); }, filter_);
+    touched_ = touched_ || !touches.empty();
     return;
   }
   std::optional<std::size_t> first;  // that meets an object
@@ -90,6 +93,7 @@ void Recogniser::update(std::span<const Touch> touches,
   std::visit([&](auto& filter) { filter.update(all, progress); }, filter_);
   waiting_.clear();
   pivot_placed_ = true;
+  touched_ = true;
 }
 
 void Recogniser::prepare(const Touch& touch) {

@@ -36,6 +36,13 @@ class Recogniser {
   std::optional<double> effective_sample_size() const;
   /// PoseHistogram::sample(); for particles, draws by their weights.
   std::vector<PoseSample> sample(std::size_t count, std::uint64_t seed) const;
+  /// Whether the belief has taken in a touch since reset(). Touches that wait for an automatic
+  /// pivot do not count.
+  bool touched() const { return touched_; }
+  /// Keeps the surprise of a touch until reset().
+  void note_surprise(double surprise) { surprises_.push_back(surprise); }
+  /// What note_surprise() was given since reset(), in order.
+  std::span<const double> surprises() const { return surprises_; }
   /// Marginal probabilities of one object's poses over the task's lattice. A particle counts in the
   /// nearest bin.
   Marginals marginals(int object) const;
@@ -69,6 +76,8 @@ class Recogniser {
   bool auto_pivot_;
   bool pivot_placed_ = false;          ///< by a touch since reset(); only where it is automatic
   std::vector<WaitingTouch> waiting_;  ///< in order; empty once the pivot is placed
+  bool touched_ = false;               ///< since reset()
+  std::vector<double> surprises_;      ///< since reset()
   std::variant<PoseHistogram, ParticleFilter> filter_;
 };
 

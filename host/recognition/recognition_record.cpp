@@ -7,9 +7,11 @@
 
 #include <fmt/format.h>
 
+#include "contradiction_warning.hpp"
 #include "nearby_fit.hpp"
 #include "palpate/error.hpp"
 #include "palpate/pose_error.hpp"
+#include "surprise.hpp"
 #include "turn_warning.hpp"
 #include "warnings.hpp"
 
@@ -33,6 +35,64 @@ using Clock = std::chrono::steady_clock;
 
 double seconds_since(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
+}
+
+struct Updated {
+  std::optional<double> surprise;  ///< of the last touch
+  double seconds = 0.0;            ///< wall time without that of the surprises
+};
+
+/// Recogniser::update(), and the surprises of the last touches.
+Updated update(Recogniser& recogniser, const RecognitionTask& task, std::span<const Touch> touches,
+               const std::function<void(double)>& progress) {
+  constexpr std::uint64_t seed = 0;
+  const bool measures = recogniser.histogram() != nullptr;
+  // Nothing but the prior comes before the first touch.
+  const std::size_t before = recogniser.touched() ? 0 : 1;
+  const std::size_t one_by_one =
+      measures ? std::min(surprises_judged, touches.size() - std::min(before, touches.size())) : 0;
+  Updated updated;
+  const auto take = [&](std::size_t begin, std::size_t end) {
+    const Clock::time_point start = Clock::now();
+    const auto show = [&, n = static_cast<double>(touches.size())](double fraction) {
+      progress((static_cast<double>(begin) + fraction * static_cast<double>(end - begin)) / n);
+    };
+    recogniser.update(touches.subspan(begin, end - begin),
+                      progress ? std::function<void(double)>(show) : progress);
+    updated.seconds += seconds_since(start);
+  };
+  const std::size_t together = touches.size() - one_by_one;
+  if (together > 0) {
+    take(0, together);
+  }
+  for (std::size_t i = together; i < touches.size(); ++i) {
+    std::vector<PoseSample> samples;
+    if (recogniser.touched()) {
+      samples = recogniser.sample(surprise_samples(touches[i].elements_mm.size()), seed);
+    }
+    take(i, i + 1);
+    updated.surprise = samples.empty() ? std::nullopt : surprise_of(touches[i], samples, task);
+    if (updated.surprise) {
+      recogniser.note_surprise(*updated.surprise);
+    }
+  }
+  return updated;
+}
+
+/// RecognitionStep::fit
+std::optional<Fit> fit_of(const RecognitionStep& step, std::span<const Touch> touches,
+                          const RecognitionTask& task) {
+  if (std::none_of(touches.begin(), touches.end(), [&](const Touch& touch) {
+        const std::vector<Reading> readings = task.classifier().classify(touch);
+        return std::any_of(readings.begin(), readings.end(), is_contact);
+      })) {
+    return {};
+  }
+  const auto object = static_cast<std::size_t>(step.mode.object);
+  const OccupancyGrid& map = task.hypotheses[object].map;
+  return step.refined
+             ? palpate::fit_of(touches, step.pose(), map, task.contact(), task.touch_sd(), object)
+             : best_fit_near(touches, step.pose(), map, task.contact(), object);
 }
 
 /// T_robot_object from T_object_robot, theta in [-pi, pi).
@@ -114,11 +174,12 @@ RecognitionStep judge(const Estimate& estimate, const GroundTruth& truth,
 RecognitionStep take_step(Recogniser& recogniser, const RecognitionTask& task,
                           std::span<const Touch> touches, std::size_t used,
                           const GroundTruth& truth, const std::function<void(double)>& progress) {
+  const Updated updated = update(recogniser, task, touches.subspan(used), progress);
   const Clock::time_point start = Clock::now();
-  recogniser.update(touches.subspan(used), progress);
   const Estimate estimate = recogniser.estimate();
-  const double seconds = seconds_since(start);
+  const double seconds = updated.seconds + seconds_since(start);
   RecognitionStep step = judge(estimate, truth, task);
+  step.surprise = updated.surprise;
   step.seconds = seconds;
   const Clock::time_point estimated = Clock::now();
   step.refined = recogniser.refine(step.mode);
@@ -127,13 +188,14 @@ RecognitionStep take_step(Recogniser& recogniser, const RecognitionTask& task,
     step.refined_error_mm = error_mm(task, step.mode.object, step.refined->T_object_robot, truth);
   }
   step.effective_sample_size = recogniser.effective_sample_size();
-  step.fit = (step.refined ? fit_of : best_fit_near)(
-      touches, step.pose(), task.hypotheses[step.mode.object].map, task.contact(),
-      static_cast<std::size_t>(step.mode.object));
+  step.fit = fit_of(step, touches, task);
   step.warnings = warnings_about(touches, task, recogniser.lattice(), step);
   if (step.warnings.empty()) {
-    if (auto turned = turned_alike(recogniser, task, step, truth)) {
-      step.warnings.push_back(*std::move(turned));
+    for (auto warning : {turned_alike(recogniser, task, step, truth),
+                         touches_contradict(touches, task, step, recogniser.surprises())}) {
+      if (warning) {
+        step.warnings.push_back(*std::move(warning));
+      }
     }
   }
   return step;

@@ -54,9 +54,15 @@ struct RecognitionStep {
   std::optional<double> error_mm;
   std::optional<double> refined_error_mm;       ///< pose error of the refined pose, mm
   std::optional<double> effective_sample_size;  ///< of the particles; empty for a histogram
-  /// How well `mode.object` at pose() explains all touches so far, also where `best` is "(none)".
-  /// Empty where no element of any touch is known.
+  /// How well `mode.object` at pose() explains all touches so far, also where `best` is "(none)";
+  /// averaged over displacements where the task has a touch_sd. Empty where no element of any touch
+  /// is in contact: an object out of reach explains them.
   std::optional<Fit> fit;
+  /// How much the last touch surprised the belief before it; see surprise_of(). Empty for
+  /// particles, for a touch without a known element, and for an unknown's first touch (so for all
+  /// of
+  /// `--each-frame`), before which there is no belief but the prior.
+  std::optional<double> surprise;
   std::vector<std::string> warnings;  ///< what looks wrong with the touches, in whole sentences
   double seconds = 0.0;               ///< wall time from the touch to the estimate
   double refine_seconds = 0.0;        ///< wall time of the refined pose
@@ -97,7 +103,8 @@ RecognitionStep judge(const Estimate& estimate, const GroundTruth& truth,
                       const RecognitionTask& task);
 
 /// Updates the belief with the touches from `used` on, then judges the estimate and its refined
-/// pose.
+/// pose. Of these touches a histogram takes the last three one by one, to measure their surprise;
+/// the belief is the same, bit for bit.
 /// @param touches all touches of the unknown so far
 /// @param used the number of those that the recogniser has already
 /// @throws Error as Recogniser::update() does

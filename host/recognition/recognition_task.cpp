@@ -15,7 +15,8 @@ RecognitionTask::RecognitionTask(std::vector<Hypothesis> objects, const FilterOp
       labels.push_back(label);
     }
   }
-  if (std::visit([](const auto& one) { return one.none_weight.has_value(); }, filter)) {
+  const auto* histogram = std::get_if<HistogramOptions>(&filter);
+  if (histogram != nullptr && histogram->none_weight) {
     labels.emplace_back(none_label);
   }
 }
@@ -27,6 +28,11 @@ const PoseLattice& RecognitionTask::lattice() const {
 
 const ContactModel& RecognitionTask::contact() const {
   return std::visit([](const auto& one) -> const ContactModel& { return one.contact; }, filter);
+}
+
+DisplacementSd RecognitionTask::touch_sd() const {
+  const auto* histogram = std::get_if<HistogramOptions>(&filter);
+  return histogram != nullptr ? histogram->touch_sd : DisplacementSd{};
 }
 
 std::optional<CoarsenedBins> settle_bins(const Device& device, RecognitionTask& task) {

@@ -18,13 +18,15 @@ namespace palpate {
 using FilterOptions = std::variant<HistogramOptions, ParticleOptions>;
 
 /// The objects that an unknown may be, and the filter that tells which. The constructor derives the
-/// labels; neither the hypotheses nor the filter's none_weight may change afterwards.
+/// labels; neither the hypotheses nor the histogram's none_weight may change afterwards.
 struct RecognitionTask {
   RecognitionTask(std::vector<Hypothesis> objects, const FilterOptions& options);
 
   /// The histogram's lattice, or the particles' region, whose bins only marginals have.
   const PoseLattice& lattice() const;
   const ContactModel& contact() const;
+  /// How far a touch may be displaced; none for particles.
+  DisplacementSd touch_sd() const;
   const ContactClassifier& classifier() const { return contact().classifier; }
 
   std::vector<Hypothesis> hypotheses;

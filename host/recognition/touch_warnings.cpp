@@ -215,7 +215,7 @@ std::optional<std::string> out_of_reach(std::span<const Touch> touches, const Re
   std::size_t contacts = 0;
   std::size_t beyond = 0;
   double nearest_mm = std::numeric_limits<double>::infinity();
-  BoundingBox cells;                   // of the nearest map
+  BoundingBox cells;           // of the nearest map
   double array_mm = 0.0;       // of a touch out of reach
   glm::dvec2 middles_mm{0.0};  // sum over the touches out of reach
   for (const Touch& touch : touches) {

@@ -91,6 +91,14 @@ std::optional<Fit> fit_of(std::span<const Touch> touches, const Pose& T_object_r
                           const OccupancyGrid& map, const ContactModel& model,
                           std::size_t object = 0);
 
+/// The same where each touch by itself may have been displaced by delta, normally distributed. Per
+/// touch: L(readings) = log E_delta prod P(reading), and M and V are mean and variance of L under
+/// Q(readings) = E_delta prod q(reading). E_delta is a sum over a grid of displacements, M and V
+/// are sums over all readings that the known elements could have had: for few elements.
+std::optional<Fit> fit_of(std::span<const Touch> touches, const Pose& T_object_robot,
+                          const OccupancyGrid& map, const ContactModel& model,
+                          const DisplacementSd& touch_sd, std::size_t object = 0);
+
 // --- particles.cpp: Eq. 8-12 ---
 
 /// A hypothesis (C, x, y, theta) with its weight.

@@ -298,11 +298,22 @@ TEST_F(Live, SaysThePoseThatRecognizeSays) {
 
 TEST_F(Live, TakesTheFlagsOfRecognize) {
   const auto records =
-      records_of(unknown_e, {"--filter", "particles", "--particles", "500", "--none", "1"});
+      records_of(unknown_e, {"--filter", "particles", "--particles", "500", "--slip-sd-mm", "0.5"});
   ASSERT_EQ(records.size(), 4u);
-  EXPECT_TRUE(records.back().at("identity").contains("(none)"));
   EXPECT_TRUE(records.back().contains("effective_sample_size"));
   EXPECT_FALSE(records.back().contains("refined"));
+  EXPECT_FALSE(records.back().contains("surprise"));
+}
+
+TEST_F(Live, TellsTheSurpriseOfEveryTouchButTheFirst) {
+  const auto records = records_of(unknown_e, {"--none", "--touch-sd-mm", "0.5"});
+  ASSERT_EQ(records.size(), 4u);
+  EXPECT_FALSE(records.front().contains("surprise")) << "only the prior comes before";
+  for (std::size_t i = 1; i < records.size(); ++i) {
+    // The letter lies where the sensor says; see recognition/surprise_test.cpp for how it spreads.
+    EXPECT_LT(std::abs(records[i].at("surprise").get<double>()), 5.0);
+    EXPECT_TRUE(records[i].at("identity").contains("(none)"));
+  }
 }
 
 TEST_F(Live, RefusesWhatCannotBeMeant) {
@@ -314,6 +325,7 @@ TEST_F(Live, RefusesWhatCannotBeMeant) {
   expect_refused(live(unknown_e, {"--reset-after", "0"}), {"--reset-after"});
   expect_refused(live(unknown_e, {"--tare", "-1"}), {"--tare"});
   expect_refused(live(unknown_e, {"--gamma", "1"}), {"--gamma"});
+  expect_refused(live(unknown_e, {"--touch-sd-mm", "-1"}), {"--touch-sd-mm -1", "at least 0"});
   expect_refused(live(unknown_e, {"--json", "E.map.h5"}), {"--json", "E.map.h5", "overwrite"});
   expect_refused(live(unknown_e, {"--json", "no/such.jsonl"}), {"--json", "no/such.jsonl"});
 

@@ -68,6 +68,9 @@ INSTANTIATE_TEST_SUITE_P(
                     Setting{"pivot_mm", "region: {pivot_mm: [3, -2]}", "--pivot-mm=3,-2"},
                     Setting{"bins", "bins: [8, 9, 10]", "--bins=8x9x10"},
                     Setting{"none", "none: 0.5", "--none=0.5"},
+                    Setting{"auto_none", "none: auto", "--none"},
+                    Setting{"touch_sd", "touch_sd: {mm: 1}", "--touch-sd-mm=1"},
+                    Setting{"slip_sd", "slip_sd: {deg: 9}", "--slip-sd-deg=9"},
                     Setting{"filter", "filter: histogram", "--filter=histogram"}),
     [](const auto& test) { return std::string(test.param.name); });
 
@@ -91,6 +94,8 @@ INSTANTIATE_TEST_SUITE_P(
                     Setting{"bins", "bins: [1, 1, 1]", "--bins=12x12x12"},
                     Setting{"auto_bins", "bins: auto", "--bins=12x12x12"},
                     Setting{"none", "none: 1e300", "--none=0.5"},
+                    Setting{"none_by_auto", "none: 1e300", "--none"},
+                    Setting{"touch_sd", "touch_sd: {mm: 5}", "--touch-sd-mm=1"},
                     Setting{"filter", "filter: particles", "--filter=histogram"},
                     Setting{"device", "device: no such device", "--device=0"}),
     [](const auto& test) { return std::string(test.param.name); });

@@ -39,6 +39,9 @@ region: {x_mm: [-10, 20], y_mm: [-1, 1], theta_deg: [0, 90], pivot_mm: [400, -5]
 bins: [25, 24, 16]
 filter: particles
 device: llvmpipe
+touch_sd: {mm: 1, deg: 3}
+slip_sd: {deg: 0.5}
+none: auto
 )");
   EXPECT_EQ(scene.array_mm, digitacts_array());
   EXPECT_EQ(scene.threshold, 2.5);
@@ -61,6 +64,11 @@ device: llvmpipe
   EXPECT_EQ(scene.bins, (std::array{25, 24, 16}));
   EXPECT_EQ(scene.filter, "particles");
   EXPECT_EQ(scene.device, "llvmpipe");
+  EXPECT_EQ(scene.touch_sd.mm, 1.0);
+  EXPECT_EQ(scene.touch_sd.deg, 3.0);
+  EXPECT_FALSE(scene.slip_sd.mm);
+  EXPECT_EQ(scene.slip_sd.deg, 0.5);
+  EXPECT_TRUE(scene.auto_none && !scene.none);
 }
 
 TEST_F(SceneFile, MayLeaveEverythingOut) {

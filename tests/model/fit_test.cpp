@@ -7,6 +7,7 @@
 
 #include <gtest/gtest.h>
 
+#include "displacement_points.hpp"
 #include "palpate/error.hpp"
 #include "reference.hpp"
 #include "synthetic.hpp"
@@ -205,6 +206,82 @@ TEST(Fit, OfTouchesAsPredictedHasMeanZeroAndVarianceOne) {
     EXPECT_GE(fitting, (0.98 - 0.007) * draws);
     EXPECT_LE(not_fitting, (0.005 + 0.0034) * draws);
   }
+}
+
+constexpr DisplacementSd usual_sd{.mm = 1.0, .rad = 0.05};
+
+TEST(DisplacedFit, WithoutADisplacementIsThePlainOne) {
+  const OccupancyGrid map = random_map(33, 21, 0.5, 8.0, 12);
+  const Recording recording = random_recording(4, 36, 13);
+  for (const ContactModel& model : models()) {
+    EXPECT_EQ(fit_of(all_touches(recording), T_object_robot, map, model, DisplacementSd{}, 2)->z,
+              fit_of(all_touches(recording), T_object_robot, map, model, 2)->z);
+  }
+}
+
+TEST(DisplacedFit, IsThePlainOneWhereItIsTooSmallToMatter) {
+  const OccupancyGrid map = map_of(on_letter_l, "L");
+  const Recording recording = random_recording(4, 36, 14);
+  const double plain = fit_of(all_touches(recording), T_object_robot, map, ContactModel{})->z;
+  const double displaced = fit_of(all_touches(recording), T_object_robot, map, ContactModel{},
+                                  DisplacementSd{.mm = 1e-6, .rad = 1e-7})
+                               ->z;
+  // The log odds change by up to 12 nats/mm; the control variate takes all other chance away.
+  EXPECT_NEAR(displaced, plain, 1e-3);
+}
+
+TEST(DisplacedFit, IsTheReferences) {
+  const OccupancyGrid map = map_of(on_letter_l, "L");
+  for (const ContactModel& model :
+       {ContactModel{.gamma = 0.0}, ContactModel{.gamma = 0.1}, three_levels(3)}) {
+    for (const DisplacementSd& sd :
+         {usual_sd, DisplacementSd{.mm = 2.0}, DisplacementSd{.rad = 0.3}}) {
+      double squares = 0.0;
+      int compared = 0;
+      for (const std::uint64_t seed : {15U, 16U, 17U, 18U}) {
+        const Recording recording = random_recording(3, 6, seed);
+        const auto touches = all_touches(recording);
+        const std::optional<Fit> expected =
+            reference::fit_of(touches, T_object_robot, map, model, sd, 2);
+        const std::optional<Fit> actual = fit_of(touches, T_object_robot, map, model, sd, 2);
+        ASSERT_TRUE(actual && expected);
+        // z is out by about 1 / sqrt(64) by chance in M, and by a tenth of itself by chance in V.
+        const double out = (actual->z - expected->z) / std::hypot(0.125, 0.1 * expected->z);
+        EXPECT_LT(std::abs(out), 4.0) << expected->z << ' ' << actual->z;
+        squares += out * out;
+        ++compared;
+      }
+      EXPECT_LT(squares / compared, 4.0) << "two standard errors on average";
+    }
+  }
+}
+
+TEST(DisplacedFit, OfTouchesAsPredictedHasMeanZeroAndVarianceOne) {
+  constexpr int draws = 600;
+  const OccupancyGrid map = map_of(on_letter_l, "L");
+  const ContactModel model{.gamma = 0.1, .prior = map.prior};
+  Uniform random(19);
+  Random displacements(20, Stream::pose_noise);
+  double sum = 0.0;
+  double squares = 0.0;
+  int fitting = 0;
+  double plain_sum = 0.0;
+  for (int i = 0; i < draws; ++i) {
+    Recording touch = drawn_touch(map, model, random);
+    // The sensor reports another place than it was at.
+    touch.T_robot_sensor[0] =
+        touch.T_robot_sensor[0] * inverse(random_displacement(usual_sd, displacements));
+    const Fit fit = fit_of(all_touches(touch), T_object_robot, map, model, usual_sd).value();
+    sum += fit.z;
+    squares += fit.z * fit.z;
+    fitting += fit.verdict == Verdict::fits ? 1 : 0;
+    plain_sum += fit_of(all_touches(touch), T_object_robot, map, model)->z;
+  }
+  // As for the plain fit; the chance in M and V of every touch adds less than a tenth.
+  EXPECT_NEAR(sum / draws, 0.0, 4.5 / std::sqrt(draws));
+  EXPECT_NEAR(squares / draws, 1.0, 9.0 / std::sqrt(draws));
+  EXPECT_GE(fitting, (0.98 - 0.018) * draws) << "three standard errors less";
+  EXPECT_LT(plain_sum / draws, -1.0) << "as if exact, such touches fit worse";
 }
 
 }  // namespace

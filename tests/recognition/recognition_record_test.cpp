@@ -10,6 +10,7 @@
 #include "palpate/error.hpp"
 #include "reference.hpp"
 #include "shapes.hpp"
+#include "synthetic.hpp"
 #include "touched_shape.hpp"
 
 namespace palpate {
@@ -123,6 +124,36 @@ TEST(Recognise, SaysWhatFitsAndWhatDoesNot) {
   Recogniser recogniser(device, task);
   EXPECT_FALSE(recognise(recogniser, task, unknown_of(cross), false).last().fit)
       << "all at the threshold: nothing is known";
+}
+
+TEST(Recognise, SaysNothingOfTheFitWhereNothingWasTouched) {
+  Device device = Device::open();
+  for (const FilterOptions& filter : both_filters()) {
+    const RecognitionTask task(shapes(), filter);
+    Recogniser recogniser(device, task);
+    Recording recording = touched_letter(25);
+    for (double& pressure : recording.pressure) {
+      pressure = -20.0;  // No Contact, also where no element is in contact
+    }
+    EXPECT_FALSE(recognise(recogniser, task, unknown_of(recording), false).last().fit)
+        << "an object out of reach explains such touches";
+    recording.pressure.back() = 10.0;
+    EXPECT_TRUE(recognise(recogniser, task, unknown_of(recording), false).last().fit);
+  }
+}
+
+TEST(Recognise, FitsTheAveragedLikelihoodWhereTouchesMayBeDisplaced) {
+  Device device = Device::open();
+  const Recording recording = touched_letter(26);
+  HistogramOptions filter = std::get<HistogramOptions>(both_filters()[0]);
+  filter.touch_sd = {.mm = 1.0, .rad = 0.05};
+  const RecognitionTask task(shapes(), filter);
+  Recogniser recogniser(device, task);
+  const RecognitionStep step = recognise(recogniser, task, unknown_of(recording), false).last();
+  const OccupancyGrid& map = task.hypotheses[step.mode.object].map;
+  EXPECT_EQ(step.fit.value().z,
+            fit_of(all_touches(recording), step.pose(), map, filter.contact, filter.touch_sd)->z);
+  EXPECT_NE(step.fit->z, fit_of(all_touches(recording), step.pose(), map, filter.contact)->z);
 }
 
 TEST(Recognise, FitsTheBestLearnedObjectAtThePoseThatItReports) {

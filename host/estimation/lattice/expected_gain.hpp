@@ -31,8 +31,10 @@ void slip(std::span<PoseSample> samples, std::span<const Body> bodies, const Dis
 ///   identity = mean over i of log mean over the j of i's label of f(z_i | j)
 ///              - log mean over all j of f(z_i | j)
 /// All candidates share random numbers, so that their differences are less noisy than their gains.
-/// Where touches are uncertain, the readings come from a displaced sensor, and f is a mean over
-/// displacements.
+/// Where touches are uncertain, eight displacements of each sample stand for all: gains come out
+/// too large where the belief is narrower than the displacements, by up to 0.8 nats at 1 mm and
+/// 0.05 rad, and their ranking holds (correlation 0.87 to 0.90 with 128 displacements of 768
+/// samples).
 /// @param options `samples` is not read
 std::vector<TouchGain> expected_gain(const ReadingPredictor& predictor,
                                      std::span<const PoseSample> samples,

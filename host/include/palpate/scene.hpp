@@ -30,6 +30,12 @@ struct Scene {
     bool auto_pivot = false;             ///< pivot_mm is "auto": where the unknown is first felt
   };
 
+  /// Standard deviations of a displacement; see DisplacementSd.
+  struct Displacement {
+    std::optional<double> mm;
+    std::optional<double> deg;
+  };
+
   std::optional<std::vector<glm::dvec2>> array_mm;  ///< element centres in the sensor frame
   std::optional<std::filesystem::path> array_file;  ///< file of `array_mm`, if any
   std::optional<double> threshold;                  ///< in the recording's pressure unit
@@ -39,6 +45,9 @@ struct Scene {
   std::vector<Object> objects;
   Region region;
   std::optional<double> none;              ///< prior weight of "none of these"
+  bool auto_none = false;                  ///< the weight is "auto": the sum of the maps' weights
+  Displacement touch_sd;                   ///< HistogramOptions::touch_sd
+  Displacement slip_sd;                    ///< HistogramOptions::slip_sd
   std::optional<std::array<int, 3>> bins;  ///< of x, y, theta
   bool auto_bins = false;                  ///< counts by balanced_lattice()
   bool fine_bins = false;                  ///< the same with BinWidth::fine

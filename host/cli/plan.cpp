@@ -1,0 +1,385 @@
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include <fmt/format.h>
+#include <CLI/CLI.hpp>
+
+#include "bounding_box.hpp"
+#include "command_files.hpp"
+#include "commands.hpp"
+#include "options.hpp"
+#include "palpate/files.hpp"
+#include "plan_figure.hpp"
+#include "planned_touch.hpp"
+#include "pose_table.hpp"
+#include "recognition_flags.hpp"
+#include "record_output.hpp"
+#include "recordings.hpp"
+#include "sheet.hpp"
+#include "step_words.hpp"
+#include "terminal.hpp"
+#include "text_table.hpp"
+
+namespace palpate::cli {
+
+namespace {
+
+struct Options {
+  std::string recording;
+  std::string candidates;
+  std::string goal = "both";
+  std::string frames;
+  std::optional<int> touches;
+  std::size_t samples = PlanOptions{}.samples;
+  std::uint64_t seed = 0;
+  RecognitionFlags recognition;
+  std::string json;
+  std::string png;
+};
+
+constexpr const char* grid = "grid";
+
+/// What was planned, and what is believed before the touch.
+struct Plan {
+  const Options& options;
+  PlanGoal goal;
+  const RecognitionTask& task;
+  const RecognitionRecord& record;
+  const std::vector<Touch>& touches;
+  std::vector<glm::dvec2> elements_mm;  ///< of the array that touches next
+  std::vector<PoseSample> samples;      ///< of the belief
+  double identity_nats = 0.0;           ///< entropy of the labels
+  double both_nats = 0.0;               ///< entropy of objects and bins
+  std::vector<PlannedTouch> ranked;
+  double seconds = 0.0;
+};
+
+/// The touches of the recording that the flags select.
+std::vector<Touch> select_touches(const Options& options, const Recording& recording) {
+  std::optional<Frames> frames;
+  if (!options.frames.empty()) {
+    frames = parse_frames("--frames", options.frames);
+  }
+  if (options.touches && *options.touches < 1) {
+    refuse_flag("--touches", *options.touches, "give at least 1");
+  }
+  auto [begin, end] = select(recording, frames);
+  if (options.touches && static_cast<std::size_t>(*options.touches) > end - begin) {
+    refuse(recording.path, "has {} touches; --touches {} is too many", end - begin,
+           *options.touches);
+  }
+  end = options.touches ? begin + static_cast<std::size_t>(*options.touches) : end;
+  if (begin == end) {
+    refuse(recording.path, "has no touches; give a recording with at least one");
+  }
+  return recording.touches(begin, end);
+}
+
+/// The elements of a touch that are alive.
+std::vector<glm::dvec2> living_elements(const Touch& touch, const std::string& recording) {
+  std::vector<glm::dvec2> living;
+  for (std::size_t e = 0; e < touch.elements_mm.size(); ++e) {
+    if (touch.valid.empty() || touch.valid[e] != 0) {
+      living.push_back(touch.elements_mm[e]);
+    }
+  }
+  if (living.empty()) {
+    refuse(recording, "valid: every element is dead; a touch would tell nothing");
+  }
+  return living;
+}
+
+/// The poses of a file: of a recording's touches, or the rows of a table.
+std::vector<Pose> read_candidates(const std::filesystem::path& path) {
+  const std::string extension = path.extension().string();
+  if (extension == ".h5" || extension == ".hdf5") {
+    return read_touch_recordings({path.string()}).front().T_robot_sensor;
+  }
+  const PoseTable table = read_poses(path, {}, false);
+  if (table.assumed_units) {
+    fmt::print(stderr,
+               "palpate: {}: poses taken to be in mm and rad; name the columns x_mm, y_mm, "
+               "theta_deg for others\n",
+               path.string());
+  }
+  return table.T_robot_sensor;
+}
+
+/// Throws Error on a candidate that no robot reaches.
+void check_candidates(const std::string& file, const std::vector<Pose>& candidates) {
+  constexpr std::size_t most = 1'000'000;
+  if (candidates.empty()) {
+    refuse(file, "holds no pose; write one for each candidate touch");
+  }
+  if (candidates.size() > most) {
+    refuse(file, "holds {} poses; give at most {}", candidates.size(), most);
+  }
+  for (std::size_t i = 0; i < candidates.size(); ++i) {
+    const Pose& pose = candidates[i];
+    if (!(std::abs(pose.translation_mm.x) <= farthest_mm &&
+          std::abs(pose.translation_mm.y) <= farthest_mm && std::isfinite(pose.theta_rad))) {
+      refuse(file, "pose {} (counted from 0) is unknown or out of reach; give x, y and theta", i);
+    }
+  }
+}
+
+nlohmann::ordered_json plan_json(const Plan& plan, const std::string& device) {
+  nlohmann::ordered_json json{{"recording", plan.record.recording},
+                              {"touches", plan.record.touches},
+                              {"goal", goal_word(plan.goal)},
+                              {"believed", to_json(plan.record.last(), plan.task)}};
+  json["believed"]["entropy"] = {{"identity", plan.identity_nats},
+                                 {"pose", plan.both_nats - plan.identity_nats},
+                                 {"both", plan.both_nats}};
+  json["candidates"] = nlohmann::ordered_json::array();
+  for (const PlannedTouch& touch : plan.ranked) {
+    json["candidates"].push_back(to_json(touch));
+  }
+  json["samples"] = plan.options.samples;
+  json["seed"] = plan.options.seed;
+  json["seconds"] = plan.seconds;
+  json["device"] = device;
+  return json;
+}
+
+std::string believed_words(const Plan& plan) {
+  return fmt::format("after {} {}: {:.2f} nats unknown of the identity, {:.2f} of the pose",
+                     plan.record.touches, plan.record.touches == 1 ? "touch" : "touches",
+                     plan.identity_nats, std::max(plan.both_nats - plan.identity_nats, 0.0));
+}
+
+std::string table_of(const Plan& plan, std::optional<int> columns) {
+  constexpr std::size_t most_rows = 10;
+  TextTable table(
+      {{"rank", true},
+       {"x mm", true},
+       {"y mm", true},
+       {"theta deg", true},
+       {plan.goal == PlanGoal::both ? "gain nats" : goal_word(plan.goal) + " nats", true},
+       {plan.goal == PlanGoal::identity ? "" : "identity", true},
+       {plan.goal == PlanGoal::pose ? "" : "pose", true},
+       {"candidate", true}});
+  for (std::size_t i = 0; i < std::min(plan.ranked.size(), most_rows); ++i) {
+    const PlannedTouch& touch = plan.ranked[i];
+    const std::array<std::string, 3> pose = pose_text(touch.T_robot_sensor).value;
+    table.add({std::to_string(i + 1), pose[0], pose[1], pose[2],
+               fmt::format("{:.2f}", gain_for(touch.gain, plan.goal)),
+               fmt::format("{:.2f}", touch.gain.identity), fmt::format("{:.2f}", touch.gain.pose),
+               std::to_string(touch.index)});
+  }
+  return table.text(columns);
+}
+
+PlanFigure figure_of(const Plan& plan) {
+  PlanFigure figure;
+  const RecognitionStep& last = plan.record.last();
+  const auto printed = [](std::string words) {
+    const std::size_t at = words.find(" deg");
+    return at == words.npos ? words : words.replace(at, 4, "°");
+  };
+  const std::string name = std::filesystem::path(plan.record.recording).filename().string();
+  figure.result = fmt::format("{}: {}", name, identity_words(last, plan.task));
+  figure.captions = {
+      "object at " + printed(pose_words(pose_text(last.T_robot_object()))) + " in the robot frame",
+      believed_words(plan), printed(next_touch_words(plan.ranked.front(), plan.goal))};
+  figure.gain_caption =
+      plan.goal == PlanGoal::both
+          ? "expected information about object and pose, nats"
+          : fmt::format("expected information about the {}, nats", goal_word(plan.goal));
+  figure.elements_mm = plan.elements_mm;
+  figure.element_mm = element_edge_mm(plan.elements_mm);
+  BoundingBox area;
+  for (const PlannedTouch& touch : plan.ranked) {
+    figure.candidates.push_back({touch.T_robot_sensor, gain_for(touch.gain, plan.goal)});
+    area.take_in(touch.T_robot_sensor * array_centre_mm(plan.elements_mm));
+  }
+  const double margin_mm = array_reach_mm(plan.elements_mm) + figure.element_mm;
+  for (const Touch& touch : plan.touches) {
+    auto& elements = figure.touches_mm.emplace_back();
+    for (const glm::dvec2& element : touch.elements_mm) {
+      elements.push_back(touch.T_robot_sensor * element);
+    }
+    area.take_in(touch.T_robot_sensor * array_centre_mm(touch.elements_mm));
+  }
+  area.lower -= margin_mm;
+  area.upper += margin_mm;
+  constexpr int cells = 160;
+  const OccupancyField field =
+      expected_occupancy(plan.samples, plan.task, area.lower, area.upper, cells);
+  figure.lower_mm = field.lower_mm;
+  figure.cell_mm = field.cell_mm;
+  figure.nx = field.nx;
+  figure.ny = field.ny;
+  figure.occupied = field.probability;
+  return figure;
+}
+
+/// Throws Error where an output cannot be written, before any work is done.
+void check_outputs(const Options& options, const Scene& scene, const RecognitionTask& task) {
+  CommandFiles files;
+  files.reads("RECORDING", options.recording);
+  if (options.candidates != grid && options.candidates != options.recording) {
+    files.reads("--candidates", options.candidates);
+  }
+  add_recognition_files(options.recognition, scene, task, files);
+  if (!options.json.empty()) {
+    files.writes("--json", options.json, CommandFiles::Dash::stream);
+  }
+  if (!options.png.empty()) {
+    files.writes("--png", options.png);
+  }
+  files.require_distinct();
+  for (const std::string& file : {options.json, options.png}) {
+    if (!file.empty() && file != "-") {
+      require_writable(file);
+    }
+  }
+}
+
+void write_results(const Plan& plan, const Device& device) {
+  const Options& options = plan.options;
+  // The path of a recording need not be UTF-8, as JSON must.
+  const std::string json =
+      plan_json(plan, device.name())
+          .dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) +
+      "\n";
+  // Files come first: printing fails where the reader of standard output has ended.
+  if (!options.png.empty()) {
+    write_file(options.png, draw_plan(figure_of(plan)));
+  }
+  if (options.json == "-") {
+    fmt::print("{}", json);
+    return;
+  }
+  if (!options.json.empty()) {
+    write_file(options.json, json);
+  }
+  const RecognitionStep& last = plan.record.last();
+  fmt::print("{}\n", result_words(last, plan.task));
+  if (const auto misfit = misfit_sentence(last, plan.record.touches, plan.task); !misfit.empty()) {
+    fmt::print("{}\n", misfit);
+  }
+  fmt::print("{}\n\n{}\n{}, {} candidates in {:.0f} ms\n{}\n", believed_words(plan),
+             table_of(plan, terminal_columns(STDOUT_FILENO)),
+             next_touch_words(plan.ranked.front(), plan.goal), plan.ranked.size(),
+             1e3 * plan.seconds, setup_words(device, plan.task));
+}
+
+void plan_touches(const Options& options) {
+  const PlanGoal goal = parse_goal("--goal", options.goal);
+  constexpr std::size_t most_samples = 4096;
+  if (options.samples < 2 || options.samples > most_samples) {
+    refuse_flag("--samples", options.samples, "give 2 to {}", most_samples);
+  }
+  const Scene scene = scene_of(options.recognition);
+  std::vector<Recording> recordings = read_touch_recordings({options.recording});
+  Recording& recording = recordings.front();
+  replace_array(scene, options.recognition.scene, recording.path, recording.elements(),
+                recording.elements_mm);
+  const std::vector<Touch> touches = select_touches(options, recording);
+  const std::vector<glm::dvec2> elements_mm = living_elements(touches.front(), recording.path);
+  std::vector<Pose> candidates;
+  if (options.candidates != grid) {
+    candidates = read_candidates(options.candidates);
+    check_candidates(options.candidates, candidates);
+  }
+  double reach_mm = 0.0;
+  for (const Touch& touch : touches) {  // the array may change between touches
+    reach_mm = std::max(reach_mm, array_reach_mm(touch.elements_mm));
+  }
+  RecognitionTask task =
+      task_of(options.recognition, scene, recording.pressure_unit, recording.path, reach_mm);
+  if (std::holds_alternative<ParticleOptions>(task.filter)) {
+    refuse("--filter particles",
+           "a plan needs the belief of all poses; use --filter histogram, or leave it out");
+  }
+  check_outputs(options, scene, task);
+  Device device = open_device(options.recognition, scene);
+  Recogniser recogniser = open_recogniser(device, task);
+  const Unknown unknown{.recording = recording.path,
+                        .frame = {},
+                        .touches = touches,
+                        .truth = ground_truth(recording.object, recording.truth)};
+  const RecognitionRecord record = recognise(recogniser, task, unknown, false);
+  record.require_steps();
+
+  const auto start = std::chrono::steady_clock::now();
+  Plan plan{.options = options,
+            .goal = goal,
+            .task = task,
+            .record = record,
+            .touches = touches,
+            .elements_mm = elements_mm,
+            .samples = recogniser.sample(options.samples, options.seed)};
+  if (options.candidates == grid) {
+    candidates =
+        candidate_grid(plan.samples, task, elements_mm, touches.front().T_robot_sensor.theta_rad);
+  }
+  plan.ranked = rank_touches(*recogniser.histogram(), task, candidates, elements_mm, goal,
+                             {.samples = options.samples, .seed = options.seed});
+  plan.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  plan.identity_nats = label_entropy(record.last().identity, task);
+  plan.both_nats = recogniser.histogram()->entropy();
+  write_results(plan, device);
+  if (options.recognition.verbose) {
+    print_engine(device, recogniser, task);
+  }
+}
+
+}  // namespace
+
+void add_plan(CLI::App& app) {
+  auto* command = app.add_subcommand(
+      "plan",
+      "Rank poses for the next touch by what each is expected to tell, in nats, given the touches "
+      "of a recording: the mutual information between the touch's readings and the object and its "
+      "pose. Prints the ten best poses T_robot_sensor, in the robot frame");
+  const auto options = std::make_shared<Options>();
+  command->add_option("RECORDING", options->recording, "Recording of the touches so far (HDF5)")
+      ->required();
+  add_recognition_flags(*command, options->recognition);
+  command
+      ->add_option(
+          "--candidates", options->candidates,
+          "Sensor poses T_robot_sensor to choose from: a CSV file with the columns x, y and theta "
+          "(or yaw; in mm and rad, or as the names say: x_m, theta_deg), the touches of a "
+          "recording (.h5), or grid: 100 to 300 poses about the places where the object may be, "
+          "half an array apart, at four angles")
+      ->required();
+  command
+      ->add_option("--goal", options->goal,
+                   "What the touch shall tell: identity, pose (once the object is known) or both")
+      ->capture_default_str();
+  command->add_option("--frames", options->frames,
+                      "Use the touches A to B - 1 of the recording, counted from 0, as A:B");
+  command
+      ->add_option("--touches", options->touches,
+                   "Use the first N touches of the recording [default: all]")
+      ->check(require_whole_number);
+  command
+      ->add_option("--samples", options->samples,
+                   "Objects and poses that stand for the belief; the time grows with its square")
+      ->check(require_whole_number)
+      ->capture_default_str();
+  command
+      ->add_option("--plan-seed", options->seed,
+                   "Seed of the samples and of the readings that they simulate")
+      ->check(require_whole_number)
+      ->capture_default_str();
+  command->add_option("--json", options->json,
+                      "Write what is believed and all candidates, the best first, as JSON; - is "
+                      "standard output");
+  command->add_option("--png", options->png,
+                      "Write a picture: the candidates, coloured by gain, over the places where "
+                      "the object may be");
+  command->callback([options] { plan_touches(*options); });
+}
+
+}  // namespace palpate::cli

@@ -1,0 +1,40 @@
+#include "planned_touch.hpp"
+
+#include <fmt/format.h>
+
+#include "options.hpp"
+#include "step_words.hpp"
+
+namespace palpate::cli {
+
+PlanGoal parse_goal(const std::string& flag, const std::string& text) {
+  for (const PlanGoal goal : {PlanGoal::identity, PlanGoal::pose, PlanGoal::both}) {
+    if (text == goal_word(goal)) {
+      return goal;
+    }
+  }
+  refuse_flag(flag, text, "not known; use identity, pose or both");
+}
+
+std::string goal_word(PlanGoal goal) {
+  return goal == PlanGoal::identity ? "identity" : goal == PlanGoal::pose ? "pose" : "both";
+}
+
+nlohmann::ordered_json to_json(const PlannedTouch& touch) {
+  const Pose& pose = touch.T_robot_sensor;
+  return {{"index", touch.index},
+          {"x_mm", pose.translation_mm.x},
+          {"y_mm", pose.translation_mm.y},
+          {"theta_rad", pose.theta_rad},
+          {"gain",
+           {{"identity", touch.gain.identity},
+            {"pose", touch.gain.pose},
+            {"both", touch.gain.both()}}}};
+}
+
+std::string next_touch_words(const PlannedTouch& touch, PlanGoal goal) {
+  return fmt::format("touch next at {}: {:.2f} nats expected",
+                     pose_words(pose_text(touch.T_robot_sensor)), gain_for(touch.gain, goal));
+}
+
+}  // namespace palpate::cli

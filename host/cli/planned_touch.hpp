@@ -1,0 +1,22 @@
+#pragma once
+
+#include <string>
+
+#include <nlohmann/json.hpp>
+
+#include "touch_plan.hpp"
+
+namespace palpate::cli {
+
+/// "identity", "pose" or "both". Throws Error naming the flag.
+PlanGoal parse_goal(const std::string& flag, const std::string& text);
+/// The goal's word.
+std::string goal_word(PlanGoal goal);
+
+/// index, x_mm, y_mm, theta_rad, and the gain in nats: identity, pose, both.
+nlohmann::ordered_json to_json(const PlannedTouch& touch);
+
+/// "touch next at x 1.20 mm, y 3.40 mm, theta 45.00 deg: 2.31 nats expected"
+std::string next_touch_words(const PlannedTouch& touch, PlanGoal goal);
+
+}  // namespace palpate::cli

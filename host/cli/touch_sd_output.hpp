@@ -1,0 +1,35 @@
+#pragma once
+
+#include <span>
+#include <string>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+#include "palpate/touch.hpp"
+#include "recognition_record.hpp"
+#include "touch_sd_fit.hpp"
+
+namespace palpate::cli {
+
+/// A flag that --fit-touch-sd cannot stand beside, and whether it was given.
+struct OtherFlag {
+  const char* name;
+  bool given = false;
+};
+
+/// Throws Error where one of the flags was given, or the task has particles or a touch-sd.
+void refuse_beside_fit(std::span<const OtherFlag> flags, const RecognitionTask& task);
+
+/// The unknowns as the fit takes them: a recording that names an object of the task has its label.
+/// @param recordings of which each is one of the unknowns
+std::vector<TouchedObject> touched_objects(std::span<const Recording> recordings,
+                                           std::span<const Unknown> unknowns,
+                                           const RecognitionTask& task);
+
+/// The result as a table and the flags to paste.
+std::string touch_sd_text(const TouchSdFit& fit);
+/// The result in the form that other programs rely on.
+nlohmann::ordered_json to_json(const TouchSdFit& fit, const std::string& device);
+
+}  // namespace palpate::cli

@@ -1,0 +1,168 @@
+#include "uncertainty_flags.hpp"
+
+#include <limits>
+
+#include <fmt/format.h>
+#include <CLI/CLI.hpp>
+
+#include "displacement_check.hpp"
+#include "number_text.hpp"
+#include "options.hpp"
+
+namespace palpate::cli {
+
+namespace {
+
+constexpr double none_given = std::numeric_limits<double>::quiet_NaN();
+
+/// One standard deviation: its flag, its scene key, and what they give.
+struct Given {
+  const char* flag;
+  const char* key;
+  std::optional<double> by_flag;
+  std::optional<double> by_key;
+
+  bool any() const { return by_flag || by_key; }
+};
+
+/// The standard deviation; 0 where it is not given.
+/// @param widest in the flag's unit
+double checked(const Given& sd, const std::string& scene_file, double widest) {
+  const double value =
+      sd.by_flag ? require_above(sd.flag, *sd.by_flag, 0.0, true) : sd.by_key.value_or(0.0);
+  if (value > widest) {
+    const std::string remedy =
+        fmt::format("wider than the region, {:g}; give less, or widen the region", widest);
+    if (sd.by_flag) {
+      refuse_flag(sd.flag, value, "{}", remedy);
+    }
+    refuse(scene_file, "{} = {}: {}", sd.key, value, remedy);
+  }
+  return value;
+}
+
+/// Throws Error where any of these is given.
+void refuse_given(std::initializer_list<Given> all, const std::string& scene_file,
+                  const char* remedy) {
+  for (const Given& sd : all) {
+    if (sd.by_flag) {
+      refuse(sd.flag, "{}", remedy);
+    }
+    if (sd.by_key) {
+      refuse(scene_file, "{}: {}", sd.key, remedy);
+    }
+  }
+}
+
+Given touch_mm(const UncertaintyFlags& flags, const Scene& scene) {
+  return {"--touch-sd-mm", "touch_sd mm", flags.touch_sd_mm, scene.touch_sd.mm};
+}
+Given touch_deg(const UncertaintyFlags& flags, const Scene& scene) {
+  return {"--touch-sd-deg", "touch_sd deg", flags.touch_sd_deg, scene.touch_sd.deg};
+}
+Given slip_mm(const UncertaintyFlags& flags, const Scene& scene) {
+  return {"--slip-sd-mm", "slip_sd mm", flags.slip_sd_mm, scene.slip_sd.mm};
+}
+Given slip_deg(const UncertaintyFlags& flags, const Scene& scene) {
+  return {"--slip-sd-deg", "slip_sd deg", flags.slip_sd_deg, scene.slip_sd.deg};
+}
+
+std::optional<double> none_weight(const UncertaintyFlags& flags, const Scene& scene,
+                                  std::span<const Hypothesis> hypotheses) {
+  if (flags.none ? *flags.none == "auto" : scene.auto_none) {
+    double sum = 0.0;
+    for (const Hypothesis& hypothesis : hypotheses) {
+      sum += hypothesis.weight;
+    }
+    return sum;
+  }
+  if (!flags.none) {
+    return scene.none;
+  }
+  const std::optional<double> weight = number_of(*flags.none);
+  if (!weight || !(*weight > 0.0)) {
+    refuse_flag("--none", *flags.none,
+                "give a weight above 0, or no value; recordings stand before the flags");
+  }
+  return weight;
+}
+
+}  // namespace
+
+void add_uncertainty_flags(CLI::App& command, UncertaintyFlags& flags) {
+  command.add_option("--touch-sd-mm", flags.touch_sd_mm,
+                     "Standard deviation of where the sensor really is at a touch, along each of x "
+                     "and y, mm, about the pose that the robot reports: its repeatability. "
+                     "Independent from touch to touch [default: 0, exact]");
+  command.add_option("--touch-sd-deg", flags.touch_sd_deg,
+                     "The same of the sensor's angle, degrees [default: 0, exact]");
+  command.add_option("--slip-sd-mm", flags.slip_sd_mm,
+                     "Standard deviation of how far the object moves between two touches, along "
+                     "each of x and y, mm; the particles' motion noise [default: 0, at rest; "
+                     "particles: 1]");
+  command.add_option("--slip-sd-deg", flags.slip_sd_deg,
+                     "The same of how far the object turns, about its middle, degrees [default: 0; "
+                     "particles: 5.73, which is 0.1 rad]");
+  command
+      .add_option(
+          "--none", flags.none,
+          "Prior weight W of \"(none)\", an object that was never learned: none of these explains "
+          "each touch by a piece of some known object, pieces share no pose; W relative to a map's "
+          "weight of 1; with a number left out W is the sum of the maps' weights, i.e. even odds "
+          "before the first touch; after one touch the odds are about the prior's, because one "
+          "touch cannot tell [default: no (none)]")
+      ->type_name("W")
+      ->expected(0, 1)
+      ->default_str("auto");
+}
+
+void set_uncertainty(const UncertaintyFlags& flags, const Scene& scene,
+                     const std::string& scene_file, std::span<const Hypothesis> hypotheses,
+                     HistogramOptions& histogram) {
+  const DisplacementSd widest = widest_displacement(histogram.lattice);
+  const auto sd_of = [&](const Given& mm, const Given& deg) {
+    return DisplacementSd{.mm = checked(mm, scene_file, widest.mm),
+                          .rad = radians(checked(deg, scene_file, degrees(widest.rad)))};
+  };
+  histogram.touch_sd = sd_of(touch_mm(flags, scene), touch_deg(flags, scene));
+  histogram.slip_sd = sd_of(slip_mm(flags, scene), slip_deg(flags, scene));
+  histogram.none_weight = none_weight(flags, scene, hypotheses);
+}
+
+void set_uncertainty(const UncertaintyFlags& flags, const Scene& scene,
+                     const std::string& scene_file, ParticleOptions& particles) {
+  refuse_given({touch_mm(flags, scene), touch_deg(flags, scene)}, scene_file,
+               "particles take every touch's pose to be exact; use --filter histogram, or "
+               "--slip-sd-mm and --slip-sd-deg, their motion noise");
+  refuse_given({{"--none", "none", flags.none ? std::optional(none_given) : std::nullopt,
+                 scene.none || scene.auto_none ? std::optional(none_given) : std::nullopt}},
+               scene_file,
+               "particles have no mean over all poses, which (none) needs; use --filter histogram");
+  const DisplacementSd widest = widest_displacement(particles.region);
+  if (const Given mm = slip_mm(flags, scene); mm.any()) {
+    particles.motion_mm = checked(mm, scene_file, widest.mm);
+  }
+  if (const Given deg = slip_deg(flags, scene); deg.any()) {
+    particles.motion_rad = radians(checked(deg, scene_file, degrees(widest.rad)));
+  }
+}
+
+std::string unresolved_words(const RecognitionTask& task, const PoseLattice& lattice,
+                             std::span<const Pose> T_robot_sensor) {
+  const auto* histogram = std::get_if<HistogramOptions>(&task.filter);
+  if (histogram == nullptr) {
+    return "";
+  }
+  std::optional<std::string> fault = unresolved_by_steps(histogram->touch_sd, lattice, "touch-sd");
+  if (!fault) {
+    fault = unresolved_by_steps(histogram->slip_sd, lattice, "slip-sd");
+  }
+  for (const Pose& pose : T_robot_sensor) {
+    if (!fault) {
+      fault = unresolved_at(pose, histogram->touch_sd, lattice, "touch-sd");
+    }
+  }
+  return fault.value_or("");
+}
+
+}  // namespace palpate::cli

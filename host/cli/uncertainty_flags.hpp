@@ -1,0 +1,49 @@
+#pragma once
+
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "palpate/scene.hpp"
+#include "recognition_task.hpp"
+
+namespace CLI {
+class App;
+}
+
+namespace palpate::cli {
+
+/// The flags that say what a belief has to allow for: touches that lie elsewhere than reported,
+/// objects that slip, and objects that were never learned. As given.
+struct UncertaintyFlags {
+  std::optional<double> touch_sd_mm;
+  std::optional<double> touch_sd_deg;
+  std::optional<double> slip_sd_mm;
+  std::optional<double> slip_sd_deg;
+  std::optional<std::string> none;  ///< a weight, or "auto"
+};
+
+void add_uncertainty_flags(CLI::App& command, UncertaintyFlags& flags);
+
+// A flag overrides its scene key. Each function throws Error naming the flag, or the scene file and
+// its key, whose value cannot be meant.
+
+/// Sets touch_sd, slip_sd and none_weight.
+/// @param histogram has its lattice already
+void set_uncertainty(const UncertaintyFlags& flags, const Scene& scene,
+                     const std::string& scene_file, std::span<const Hypothesis> hypotheses,
+                     HistogramOptions& histogram);
+/// Sets the motion noise; what is not given keeps the paper's values. Refuses the flags and keys
+/// that a particle filter has no use for.
+/// @param particles have their region already
+void set_uncertainty(const UncertaintyFlags& flags, const Scene& scene,
+                     const std::string& scene_file, ParticleOptions& particles);
+
+/// What to say where the lattice does not resolve the task's touch_sd or slip_sd at one of these
+/// poses of the sensor; else "".
+/// @param lattice the task's, about the pivot in use
+std::string unresolved_words(const RecognitionTask& task, const PoseLattice& lattice,
+                             std::span<const Pose> T_robot_sensor);
+
+}  // namespace palpate::cli

@@ -1,0 +1,65 @@
+#pragma once
+
+#include <cstddef>
+#include <limits>
+#include <span>
+#include <vector>
+
+#include "palpate/contact.hpp"
+#include "random.hpp"
+
+namespace palpate {
+
+/// What equally likely hypotheses, such as poses drawn from a belief, say about the readings of one
+/// touch. No element is Unknown; given the hypothesis, elements are independent.
+class ReadingMixture {
+ public:
+  ReadingMixture(std::size_t hypotheses, std::size_t elements, std::size_t levels);
+
+  std::size_t hypotheses() const { return hypotheses_; }
+
+  /// What one hypothesis says: the log-likelihood of every reading, [element, level], in nats, as
+  /// reading_log_likelihoods() gives it.
+  void set(std::size_t hypothesis, std::span<const double> log_likelihoods);
+
+  /// log of the mean likelihood of the readings, [element], over all hypotheses but `left_out`, in
+  /// nats.
+  double log_mean(std::span<const Reading> readings, std::size_t left_out = all) const;
+  static constexpr std::size_t all = std::numeric_limits<std::size_t>::max();
+
+  /// A touch as a hypothesis predicts it: it gives reading r of an element the probability
+  /// q(r) = P(r) / sum over all r' of P(r'), with P the likelihood.
+  struct DrawnTouch {
+    std::vector<Reading> readings;
+    double log_likelihood = 0.0;  ///< of the readings under the hypothesis, in nats
+    double mean = 0.0;            ///< of that log-likelihood over all such touches
+    double variance = 0.0;
+  };
+  DrawnTouch draw(std::size_t hypothesis, Random& random) const;
+
+ private:
+  std::size_t hypotheses_;
+  std::size_t elements_;
+  std::size_t levels_;
+  std::vector<double> log_likelihood_;  ///< [element, level, hypothesis]
+};
+
+/// Mean and variance of a log-likelihood.
+struct Moments {
+  double mean = 0.0;
+  double variance = 0.0;
+
+  /// Standard deviations by which a value exceeds the mean, within +-`largest_fit_z`; 0 at the
+  /// mean.
+  double deviations(double value) const;
+};
+
+/// Mean and variance of `judge.log_mean()` over touches as `source` predicts them: one touch is
+/// drawn from each of its hypotheses. Where judge and source are one object, a touch's own
+/// hypothesis is left out of its mean. The log-likelihood under the touch's own hypothesis, whose
+/// moments are sums over the elements, serves as control variate (regression estimator), so that
+/// readings too rare to be drawn still count.
+Moments predicted_log_mean(const ReadingMixture& judge, const ReadingMixture& source,
+                           Random& random);
+
+}  // namespace palpate

@@ -1,0 +1,78 @@
+#include "surprise.hpp"
+
+#include <algorithm>
+#include <cstdint>
+#include <vector>
+
+#include "displacement_points.hpp"
+#include "interpolated_map.hpp"
+#include "palpate/pose_error.hpp"
+#include "predicted_readings.hpp"
+#include "reading_mixture.hpp"
+
+namespace palpate {
+
+namespace {
+
+constexpr std::uint64_t seed = 0;
+
+/// About what an object turns when it slips: the centroid of its map's cells with log odds above 0.
+glm::dvec2 centroid_mm(const OccupancyGrid& map) {
+  const bool has_body =
+      std::any_of(map.log_odds.begin(), map.log_odds.end(), [](float l) { return l > 0.0F; });
+  return has_body ? body_of(map).centroid_mm : glm::dvec2(0.0, 0.0);
+}
+
+}  // namespace
+
+std::size_t surprise_samples(std::size_t elements) {
+  constexpr std::size_t most = 128;
+  constexpr std::size_t least = 32;
+  constexpr std::size_t readings = most * 288;  // as many as take about 1 ms
+  return std::clamp(readings / std::max<std::size_t>(elements, 1), least, most);
+}
+
+std::optional<double> surprise_of(const Touch& touch, std::span<const PoseSample> samples,
+                                  const RecognitionTask& task) {
+  const auto* options = std::get_if<HistogramOptions>(&task.filter);
+  if (options == nullptr) {
+    return {};
+  }
+  ContactModel contact = options->contact;
+  contact.prior = contact.prior.value_or(task.hypotheses.front().map.prior);
+  std::vector<glm::dvec2> elements_mm;
+  std::vector<Reading> readings;
+  const std::vector<Reading> classes = contact.classify(touch);
+  for (std::size_t e = 0; e < classes.size(); ++e) {
+    if (classes[e] != Reading::unknown) {
+      elements_mm.push_back(touch.elements_mm[e]);
+      readings.push_back(classes[e]);
+    }
+  }
+  if (readings.empty()) {
+    return {};
+  }
+  std::vector<InterpolatedMap> maps;
+  std::vector<glm::dvec2> centroids_mm;
+  for (const Hypothesis& hypothesis : task.hypotheses) {
+    maps.emplace_back(hypothesis.map, *contact.prior);
+    centroids_mm.push_back(options->slip_sd.none() ? glm::dvec2(0.0, 0.0)
+                                                   : centroid_mm(hypothesis.map));
+  }
+  Random random(seed, Stream::readings);
+  ReadingMixture mixture(samples.size(), readings.size(), reading_levels(contact));
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    const auto object = static_cast<std::size_t>(samples[i].object);
+    const Pose slip = random_displacement(options->slip_sd, random);
+    const glm::dvec2& g = centroids_mm[object];
+    const Pose moved{g + slip.translation_mm - rotate(slip.theta_rad, g), slip.theta_rad};
+    const Pose T_object_sensor = moved * samples[i].T_object_robot * touch.T_robot_sensor *
+                                 random_displacement(options->touch_sd, random);
+    mixture.set(
+        i, reading_log_likelihoods(elements_mm, T_object_sensor, maps[object], contact, object));
+  }
+  const Moments predicted = predicted_log_mean(mixture, mixture, random);
+  return -predicted.deviations(mixture.log_mean(readings));
+}
+
+}  // namespace palpate

@@ -1,0 +1,63 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "palpate/displacement.hpp"
+#include "recognition_task.hpp"
+
+namespace palpate {
+
+/// An object and the touches that it was touched with, views into memory that the caller keeps
+/// alive.
+struct TouchedObject {
+  std::string name;  ///< of its recording, for messages
+  std::vector<Touch> touches;
+  std::string label = {};  ///< of the object where it is known and has a map; "" otherwise
+};
+
+struct TouchSdFitOptions {
+  /// Where the search begins: with displacements so large that every pose which may explain the
+  /// touches is among the samples.
+  DisplacementSd start{2.0, 0.1};
+  std::size_t samples = 64;  ///< of every unknown's object, pose and displacements
+  int sweeps = 20;           ///< moves of every sample in every step of the search
+  std::uint64_t seed = 0;
+};
+
+/// Standard deviations of the touches' poses about the poses that the robot reported.
+struct TouchSdFit {
+  DisplacementSd sd;  ///< 0: not distinguishable from 0, given the maps
+  /// One standard error, from the scatter of the unknowns' scores about 0 and the evidence's
+  /// curvature; 0 where sd is 0.
+  DisplacementSd standard_error;
+  /// By how much the log evidence at sd exceeds the log evidence of exact poses, in nats.
+  double evidence_gain = 0.0;
+  std::size_t unknowns = 0;
+  std::size_t touches = 0;
+  std::vector<std::string> warnings;  ///< why the result may be far off, in whole sentences
+};
+
+/// Finds the standard deviations under which all the recordings' touches have the largest evidence,
+/// and with them how often an element reads No Contact, In Contact or Unknown where the map is
+/// occupied to a given degree (see ReadingModel and SmoothOccupancy).
+///
+/// Recognises every unknown with TouchSdFitOptions::start on the task's lattice (of which bin_width
+/// chooses a coarse one), draws samples, and follows them through a sequence of standard deviations
+/// by importance weights and Metropolis moves (Del Moral, Doucet and Jasra 2006). The steps are
+/// Newton's on the log evidence, whose first and second derivatives are expectations over the
+/// samples (Louis 1982). The same input gives the same result.
+/// @param task with a histogram filter; its touch_sd, slip_sd and none_weight are not used
+/// @param progress called now and then with the fraction done
+/// @throws Error on a particle filter, no unknowns, an unknown without touches, a touch that is not
+/// sound, or if the device fails; what `progress` throws
+TouchSdFit fit_touch_sd(Device& device, const RecognitionTask& task,
+                        std::span<const TouchedObject> unknowns,
+                        const TouchSdFitOptions& options = {},
+                        const std::function<void(double)>& progress = {});
+
+}  // namespace palpate

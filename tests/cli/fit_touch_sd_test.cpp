@@ -1,0 +1,48 @@
+#include "program.hpp"
+#include "sample_files.hpp"
+
+namespace palpate {
+namespace {
+
+using nlohmann::json;
+
+class FitTouchSd : public ProgramTest {
+ protected:
+  FitTouchSd() {
+    std::filesystem::create_directory(folder_ / "maps");
+    write_map(folder_ / "maps/A.map.h5", sample_map("A"));
+    write_map(folder_ / "maps/I.map.h5", sample_map("I"));
+    write_recording(folder_ / "u.h5", sample_unknown("A", {{2.0, -3.0}, 1.0}, 4));
+    write_recording(folder_ / "v.h5", sample_unknown("I", {{1.0, 2.0}, 0.3}, 4));
+  }
+
+  const std::vector<std::string> fit_{"recognize", "u.h5",           "v.h5",       "--maps",
+                                      "maps",      "--fit-touch-sd", "--touches=2"};
+};
+
+TEST_F(FitTouchSd, ReportsTheDeviationsAndTheFlagsToPaste) {
+  std::vector<std::string> with_json = fit_;
+  with_json.insert(with_json.end(), {"--json", "fit.json"});
+  const std::string text = done(with_json);
+  const json fit = json::parse(bytes_of(folder_ / "fit.json"));
+  EXPECT_EQ(fit["unknowns"], 2);
+  EXPECT_EQ(fit["touches"], 4);
+  EXPECT_GE(fit["touch_sd"]["mm"], 0.0);
+  EXPECT_GE(fit["touch_sd"]["deg"], 0.0);
+  EXPECT_EQ(fit["exact"]["mm"], fit["touch_sd"]["mm"] == 0.0);
+  EXPECT_NE(text.find("\n" + fit["flags"].get<std::string>() + "\n"), std::string::npos) << text;
+  EXPECT_NE(text.find("fewer than 3 touches"), std::string::npos) << text;
+}
+
+TEST_F(FitTouchSd, IsRefusedBesideFlagsOfOneResult) {
+  for (const char* flag : {"--trace", "--posterior=p.h5", "--png=pictures", "--filter=particles"}) {
+    std::vector<std::string> with_flag = fit_;
+    with_flag.emplace_back(flag);
+    expect_refused(with_flag, {"--fit-touch-sd"});
+  }
+  expect_refused({"recognize", "u.h5", "--maps", "maps", "--fit-touch-sd", "--each-frame"},
+                 {"--each-frame", "--fit-touch-sd"});
+}
+
+}  // namespace
+}  // namespace palpate

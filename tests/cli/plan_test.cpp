@@ -1,0 +1,148 @@
+#include <cmath>
+#include <sstream>
+
+#include <fmt/format.h>
+
+#include "program.hpp"
+#include "sample_files.hpp"
+
+namespace palpate {
+namespace {
+
+using nlohmann::json;
+
+class PlanCommand : public ProgramTest {
+ protected:
+  PlanCommand() {
+    std::filesystem::create_directory(folder_ / "maps");
+    write_map(folder_ / "maps/A.map.h5", sample_map("A"));
+    write_map(folder_ / "maps/I.map.h5", sample_map("I"));
+    write_recording(folder_ / "u.h5", sample_unknown("A", {{2.0, -3.0}, 1.0}, 6));
+    put_bytes(folder_ / "c.csv",
+              "x_mm,y_mm,theta_deg\n400,400,0\n0,0,0\n3,-2,45\n-5,4,90\n6,6,135\n");
+  }
+
+  std::vector<std::string> command(const std::vector<std::string>& more) const {
+    std::vector<std::string> arguments{"plan",       "u.h5", "--maps", "maps", "--bins=15x15x24",
+                                       "--touches=2"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return arguments;
+  }
+  json plan(std::vector<std::string> more) const {
+    more.insert(more.end(), {"--json", "-"});
+    return json::parse(done(command(more)));
+  }
+};
+
+TEST_F(PlanCommand, RanksTheRowsOfATable) {
+  const json all = plan({"--candidates", "c.csv"});
+  EXPECT_EQ(all["goal"], "both");
+  EXPECT_EQ(all["touches"], 2);
+  EXPECT_EQ(all["believed"]["best"], "A");
+  const json& entropy = all["believed"]["entropy"];
+  EXPECT_NEAR(entropy["identity"].get<double>() + entropy["pose"].get<double>(),
+              entropy["both"].get<double>(), 1e-12);
+  const json& ranked = all["candidates"];
+  ASSERT_EQ(ranked.size(), 5U);
+  double before = 1e9;
+  for (const json& candidate : ranked) {
+    const json& gain = candidate["gain"];
+    EXPECT_LE(gain["both"].get<double>(), before);
+    before = gain["both"];
+    EXPECT_NEAR(gain["identity"].get<double>() + gain["pose"].get<double>(), before, 1e-12);
+  }
+  // The touch 400 mm away tells nothing.
+  EXPECT_EQ(ranked.back()["index"], 0);
+  EXPECT_NEAR(before, 0.0, 1e-4);
+  EXPECT_GT(ranked.front()["gain"]["both"].get<double>(), 0.5);
+  for (const json& candidate : ranked) {
+    if (candidate["index"] == 2) {
+      EXPECT_EQ(candidate["x_mm"], 3.0);
+      EXPECT_EQ(candidate["y_mm"], -2.0);
+      EXPECT_NEAR(candidate["theta_rad"].get<double>(), std::acos(-1.0) / 4.0, 1e-12);
+    }
+  }
+}
+
+TEST_F(PlanCommand, IsReproducibleBySeed) {
+  const auto gains = [&](const std::string& seed) {
+    return plan({"--candidates", "c.csv", "--plan-seed", seed})["candidates"];
+  };
+  EXPECT_EQ(gains("3"), gains("3"));
+  EXPECT_NE(gains("3"), gains("4"));
+}
+
+TEST_F(PlanCommand, ARecordingsTouchesAreCandidatesToo) {
+  const json ranked = plan({"--candidates", "u.h5"})["candidates"];
+  EXPECT_EQ(ranked.size(), 6U);
+}
+
+TEST_F(PlanCommand, TheGridLiesAboutTheObject) {
+  const json ranked = plan({"--candidates", "grid", "--goal", "pose"})["candidates"];
+  EXPECT_GE(ranked.size(), 100U);
+  EXPECT_LE(ranked.size(), 300U);
+  double before = 1e9;
+  for (const json& candidate : ranked) {
+    EXPECT_LE(candidate["gain"]["pose"].get<double>(), before);
+    before = candidate["gain"]["pose"];
+    // A letter of 25 mm about 4 mm from the robot's origin.
+    EXPECT_LT(std::hypot(candidate["x_mm"].get<double>(), candidate["y_mm"].get<double>()), 40.0);
+  }
+}
+
+TEST_F(PlanCommand, PrintsTheTenBestAndDrawsThem) {
+  const std::string out = done(command({"--candidates", "grid", "--png", "p.png"}));
+  EXPECT_NE(out.find("touch next at x "), std::string::npos) << out;
+  EXPECT_NE(out.find("gain nats"), std::string::npos) << out;
+  EXPECT_NE(out.find("\n  10  "), std::string::npos) << out;
+  EXPECT_EQ(out.find("\n  11  "), std::string::npos) << out;
+  EXPECT_TRUE(content_of(folder_.path())["p.png"].starts_with("\x89PNG"));
+}
+
+TEST_F(PlanCommand, RefusesBadInputInOneLine) {
+  const auto refuse = [&](const std::vector<std::string>& more,
+                          const std::vector<std::string>& named) {
+    expect_refused(command(more), named);
+  };
+  refuse({}, {"--candidates"});
+  refuse({"--candidates", "none.csv"}, {"none.csv"});
+  put_bytes(folder_ / "empty.csv", "x,y,theta\n");
+  refuse({"--candidates", "empty.csv"}, {"empty.csv", "no row"});
+  put_bytes(folder_ / "wrong.csv", "x,y,angle\n1,2,3\n");
+  refuse({"--candidates", "wrong.csv"}, {"wrong.csv", "'theta'"});
+  put_bytes(folder_ / "nan.csv", "x_mm,y_mm,theta_rad\n1,2,3\nnan,nan,nan\n");
+  refuse({"--candidates", "nan.csv"}, {"nan.csv", "pose 1", "unknown"});
+  refuse({"--candidates", "grid", "--goal", "all"}, {"--goal all", "identity, pose or both"});
+  refuse({"--candidates", "grid", "--samples", "1"}, {"--samples 1"});
+  refuse({"--candidates", "grid", "--png", "u.h5"}, {"u.h5", "--png"});
+  expect_refused(
+      {"plan", "u.h5", "--maps", "maps", "--candidates", "grid", "--filter", "particles"},
+      {"--filter particles", "histogram"});
+}
+
+TEST_F(PlanCommand, LiveShowsTheNextTouch) {
+  const std::string sensor = "simulate:A,rate=100,seed=3,object=random,touches=3,speed=max";
+  const std::vector<std::string> live{"live", "--sensor",      sensor,   "--maps",
+                                      "maps", "--bins=9x9x16", "--plan", "both"};
+  std::vector<std::string> to_program = live;
+  to_program.insert(to_program.end(), {"--json", "live.jsonl"});
+  const std::string out = palpate(to_program).out;
+  EXPECT_NE(out.find("touch next at x "), std::string::npos) << out;
+  std::istringstream lines(content_of(folder_.path())["live.jsonl"]);
+  int touches = 0;
+  for (std::string line; std::getline(lines, line); ++touches) {
+    const json next = json::parse(line).at("next");
+    EXPECT_EQ(next.size(), 4U) << next;
+    EXPECT_GT(next["gain"]["both"].get<double>(), 0.1);
+    EXPECT_TRUE(next.contains("x_mm") && next.contains("y_mm") && next.contains("theta_rad"));
+  }
+  EXPECT_EQ(touches, 3);
+  expect_refused({"live", "--sensor", "simulate:A,touches=2", "--maps", "maps", "--plan", "all"},
+                 {"--plan all", "identity, pose or both"});
+  expect_refused({"live", "--sensor", "simulate:A,touches=2", "--maps", "maps", "--plan", "both",
+                  "--filter", "particles"},
+                 {"--plan both", "histogram"});
+}
+
+}  // namespace
+}  // namespace palpate

@@ -1,0 +1,178 @@
+// Touches that lie elsewhere than reported, objects that slip, and objects that were never learned.
+
+#include <cmath>
+
+#include "program.hpp"
+#include "sample_files.hpp"
+
+namespace palpate {
+namespace {
+
+using nlohmann::json;
+using Arguments = std::vector<std::string>;
+
+class UncertaintyFlags : public ProgramTest {
+ protected:
+  UncertaintyFlags() {
+    std::filesystem::create_directory(folder_ / "maps");
+    write_map(folder_ / "maps/A.map.h5", sample_map("A"));
+    write_map(folder_ / "maps/I.map.h5", sample_map("I"));
+    write_recording(folder_ / "u.h5", sample_unknown("A", {{2.0, -3.0}, 1.0}, 6));
+  }
+
+  static Arguments with(Arguments flags) {
+    flags.insert(flags.begin(), {"recognize", "u.h5", "--maps", "maps"});
+    return flags;
+  }
+  json record_with(Arguments flags) const {
+    flags.insert(flags.begin(), {"u.h5", "--maps", "maps"});
+    json r = record(flags);
+    r.erase("seconds");
+    return r;
+  }
+  /// The record with a scene of these keys; the maps are given by flag.
+  json record_in_scene(const std::string& keys) const {
+    put_bytes(folder_ / "scene.yaml", keys);
+    return record_with({"--scene", "scene.yaml"});
+  }
+  void expect_scene_refused(const std::string& keys, const Arguments& named) {
+    put_bytes(folder_ / "scene.yaml", keys);
+    expect_refused(with({"--scene", "scene.yaml"}), named);
+  }
+};
+
+TEST_F(UncertaintyFlags, OfNothingChangeNothing) {
+  const json plain = record_with({});
+  EXPECT_EQ(record_with({"--touch-sd-mm", "0", "--touch-sd-deg", "0", "--slip-sd-mm", "0",
+                         "--slip-sd-deg=0"}),
+            plain);
+  EXPECT_EQ(record_in_scene("touch_sd: {mm: 0, deg: 0}\nslip_sd: {mm: 0}\n"), plain);
+}
+
+TEST_F(UncertaintyFlags, ReachTheFit) {
+  const json plain = record_with({});
+  const json displaced = record_with({"--touch-sd-mm", "1", "--touch-sd-deg", "3"});
+  EXPECT_NE(displaced["fit"]["z"], plain["fit"]["z"]);
+  EXPECT_EQ(record_in_scene("touch_sd: {mm: 1, deg: 3}\n"), displaced);
+  put_bytes(folder_ / "scene.yaml", "touch_sd: {mm: 5, deg: 3}\n");
+  EXPECT_EQ(record_with({"--scene", "scene.yaml", "--touch-sd-mm", "1"}), displaced)
+      << "a flag overrides its key, and leaves the other alone";
+}
+
+TEST_F(UncertaintyFlags, AreRefusedWhereTheyCannotBeMeant) {
+  for (const std::string flag :
+       {"--touch-sd-mm", "--touch-sd-deg", "--slip-sd-mm", "--slip-sd-deg"}) {
+    for (const char* value : {"-1", "nan", "inf"}) {
+      expect_refused(with({flag + "=" + value}), {flag, "at least 0"});
+    }
+    expect_refused(with({flag, "x"}), {flag, "x", "give a number"});
+    expect_refused(with({flag, ""}), {flag, "give a value"});
+    const Arguments region{"--x-mm=-4:4", "--theta-deg=0:5", flag + "=9"};
+    expect_refused(with(region), {flag + " 9: wider than the region"});
+  }
+  expect_refused(with({"--filter", "particles", "--x-mm=-4:4", "--slip-sd-mm=9"}),
+                 {"--slip-sd-mm 9: wider than the region, 8"});
+  EXPECT_EQ(palpate(with({"--x-mm=2:2", "--touch-sd-mm=9"})).status, 0)
+      << "an axis of one bin is not blurred; y is 20 mm long";
+}
+
+TEST_F(UncertaintyFlags, SceneKeysAreRefusedByName) {
+  expect_scene_refused("touch_sd: {mm: -1}\n", {"scene.yaml", "line 1", "'mm'", "from 0"});
+  expect_scene_refused("slip_sd: {deg: .nan}\n", {"scene.yaml", "'deg'", "from 0"});
+  expect_scene_refused("touch_sd: {rad: 0.1}\n", {"scene.yaml", "'rad'", "unknown key", "deg"});
+  expect_scene_refused("touch_sd: 1\n", {"scene.yaml", "touch_sd"});
+  expect_scene_refused("bins: [5, 5, 5]\nslip_sd: {mm: 25}\n",
+                       {"scene.yaml", "slip_sd mm = 25: wider than the region, 20"});
+}
+
+TEST_F(UncertaintyFlags, ParticlesTakeTheSlipAsTheirMotion) {
+  const Arguments particles{"--filter", "particles", "--particles", "2000"};
+  const auto by_particles = [&](Arguments flags) {
+    flags.insert(flags.end(), particles.begin(), particles.end());
+    return record_with(flags);
+  };
+  const json plain = by_particles({});
+  EXPECT_EQ(by_particles({"--slip-sd-mm", "1"}), plain) << "the paper's 1 mm";
+  EXPECT_NE(by_particles({"--slip-sd-mm", "0.5"}), plain);
+  EXPECT_NE(by_particles({"--slip-sd-deg", "1"}), plain);
+}
+
+TEST_F(UncertaintyFlags, ParticlesRefuseTheOthers) {
+  const auto refused = [&](Arguments flags, const Arguments& named) {
+    flags.insert(flags.end(), {"--filter", "particles"});
+    expect_refused(with(flags), named);
+  };
+  refused({"--touch-sd-mm", "1"}, {"--touch-sd-mm", "--filter histogram"});
+  refused({"--touch-sd-deg", "1"}, {"--touch-sd-deg", "--slip-sd-deg"});
+  refused({"--none", "1"}, {"--none", "--filter histogram"});
+  refused({"--none"}, {"--none", "--filter histogram"});
+  expect_scene_refused("filter: particles\nnone: auto\n", {"scene.yaml", "none", "particles"});
+  expect_scene_refused("filter: particles\ntouch_sd: {mm: 1}\n", {"scene.yaml", "touch_sd mm"});
+}
+
+TEST_F(UncertaintyFlags, NoneWithoutANumberIsAsLikelyAsAllMaps) {
+  const json even = record_with({"--none"});
+  EXPECT_EQ(even, record_with({"--none", "2"})) << "two maps of weight 1";
+  EXPECT_EQ(even, record_in_scene("none: auto\n"));
+  EXPECT_EQ(even, record_with({"--none", "--gamma", "0.1"})) << "a flag is no number";
+  EXPECT_EQ(even, record_with({"--none=auto"}));
+  put_bytes(folder_ / "scene.yaml",
+            "none: auto\nobjects: [{map: maps/A.map.h5, weight: 3}, {map: maps/I.map.h5}]\n");
+  const json heavy = record({"u.h5", "--scene", "scene.yaml"});
+  const json four = record({"u.h5", "--scene", "scene.yaml", "--none", "4"});
+  EXPECT_EQ(heavy["identity"], four["identity"]);
+}
+
+TEST_F(UncertaintyFlags, NoneTakesNoFileForItsNumber) {
+  EXPECT_EQ(palpate({"recognize", "--maps", "maps", "--none", "u.h5"}).status, 0)
+      << "the recording that every call needs";
+  expect_refused({"recognize", "u.h5", "--maps", "maps", "--none", "v.h5"},
+                 {"--none v.h5", "above 0", "recordings stand before"});
+  for (const char* wrong : {"nan", "inf", "0", "-1", "x"}) {
+    expect_refused(with({std::string("--none=") + wrong}), {"--none", wrong, "above 0"});
+  }
+  expect_refused(with({"--none", ""}), {"--none", "give a"});
+}
+
+TEST_F(UncertaintyFlags, OneTouchCannotTell) {
+  const std::string note = "one touch cannot tell";
+  EXPECT_NE(done(with({"--none", "--touches", "1"})).find(note), std::string::npos);
+  const std::string frames = done(with({"--none", "--each-frame"}));
+  EXPECT_NE(frames.find(note), std::string::npos);
+  EXPECT_EQ(frames.find(note), frames.rfind(note)) << "once";
+  EXPECT_EQ(done(with({"--none"})).find(note), std::string::npos);
+  EXPECT_EQ(done(with({"--touches", "1"})).find(note), std::string::npos);
+}
+
+TEST_F(UncertaintyFlags, SayOnceWhatTheLatticeDoesNotResolve) {
+  write_recording(folder_ / "v.h5", sample_unknown("I", {}, 3));
+  const auto said = [&](Arguments flags) {
+    flags.insert(flags.begin(), {"recognize", "u.h5", "v.h5", "--maps", "maps"});
+    const Outcome outcome = palpate(flags);
+    EXPECT_EQ(outcome.status, 0) << outcome.err;
+    return outcome.err;
+  };
+  const std::string narrow = said({"--bins", "10x10x36", "--touch-sd-mm", "0.9"});
+  expect_named(narrow, {"does not resolve touch-sd of 0.9 mm", "step of x is 2 mm", "more bins"});
+  EXPECT_EQ(std::count(narrow.begin(), narrow.end(), '\n'), 1) << narrow;
+  expect_named(said({"--bins", "10x10x36", "--slip-sd-deg", "1"}), {"slip-sd of 1 degrees"});
+  expect_named(said({"--bins", "10x10x36", "--pivot-mm=90,0", "--touch-sd-deg", "9"}),
+               {"touch-sd", "mm from the pivot", "move the pivot near the touches, or use more"});
+  EXPECT_EQ(said({"--bins", "25x25x48", "--touch-sd-mm", "1", "--touch-sd-deg", "5"}), "");
+}
+
+TEST_F(UncertaintyFlags, TheSurpriseStandsInTheRecordAndInTheTrace) {
+  const json r = record_with({"--trace"});
+  ASSERT_EQ(r["trace"].size(), 6u);
+  EXPECT_FALSE(r["trace"][0].contains("surprise")) << "only the prior comes before";
+  for (std::size_t i = 1; i < 6; ++i) {
+    EXPECT_TRUE(r["trace"][i]["surprise"].is_number());
+  }
+  EXPECT_EQ(r["surprise"], r["trace"][5]["surprise"]);
+  EXPECT_EQ(record_with({})["surprise"], r["surprise"]) << "also without the trace";
+  EXPECT_NE(done(with({"--trace"})).find("surprise"), std::string::npos);
+  EXPECT_FALSE(record_with({"--touches", "1"}).contains("surprise"));
+}
+
+}  // namespace
+}  // namespace palpate

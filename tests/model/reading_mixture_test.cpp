@@ -1,0 +1,133 @@
+#include "reading_mixture.hpp"
+
+#include <cmath>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "palpate/fit.hpp"
+
+namespace palpate {
+namespace {
+
+constexpr Reading no = Reading::no_contact;
+constexpr Reading yes = Reading::in_contact;
+
+/// The log-likelihoods of elements that are in contact with these probabilities.
+std::vector<double> logs_of(const std::vector<double>& contact) {
+  std::vector<double> logs;
+  for (const double p : contact) {
+    logs.push_back(std::log1p(-p));
+    logs.push_back(std::log(p));
+  }
+  return logs;
+}
+
+ReadingMixture two_hypotheses() {
+  ReadingMixture mixture(2, 2, 2);
+  mixture.set(0, logs_of({0.9, 0.2}));
+  mixture.set(1, logs_of({0.5, 0.5}));
+  return mixture;
+}
+
+constexpr double rounding = 1e-12;
+
+TEST(ReadingMixture, AveragesLikelihoods) {
+  const ReadingMixture mixture = two_hypotheses();
+  EXPECT_NEAR(mixture.log_mean(std::vector{yes, no}), std::log((0.9 * 0.8 + 0.25) / 2.0), rounding);
+  EXPECT_NEAR(mixture.log_mean(std::vector{no, yes}), std::log((0.1 * 0.2 + 0.25) / 2.0), rounding);
+  EXPECT_NEAR(mixture.log_mean(std::vector{yes, no}, 1), std::log(0.9 * 0.8), rounding);
+  EXPECT_NEAR(mixture.log_mean(std::vector{yes, no}, 0), std::log(0.25), rounding);
+}
+
+TEST(ReadingMixture, StaysInRange) {
+  ReadingMixture mixture(2, 1, 2);
+  mixture.set(0, std::vector{-5000.0, -2000.0});
+  mixture.set(1, std::vector{-5001.0, -1e30});
+  EXPECT_NEAR(mixture.log_mean(std::vector{no}), -5000.0 + std::log((1.0 + std::exp(-1.0)) / 2.0),
+              1e-9);
+  EXPECT_NEAR(mixture.log_mean(std::vector{yes}), -2000.0 - std::log(2.0), 1e-9);
+}
+
+TEST(ReadingMixture, DrawsWhatAHypothesisPredicts) {
+  const ReadingMixture mixture = two_hypotheses();
+  Random random(1, Stream::readings);
+  constexpr int draws = 4000;
+  int first = 0;
+  int second = 0;
+  double sum = 0.0;
+  double squares = 0.0;
+  ReadingMixture::DrawnTouch touch;
+  for (int i = 0; i < draws; ++i) {
+    touch = mixture.draw(0, random);
+    first += touch.readings[0] == yes ? 1 : 0;
+    second += touch.readings[1] == yes ? 1 : 0;
+    EXPECT_NEAR(touch.log_likelihood, mixture.log_mean(touch.readings, 1), rounding);
+    sum += touch.log_likelihood - touch.mean;
+    squares += std::pow(touch.log_likelihood - touch.mean, 2.0);
+  }
+  // Four standard errors.
+  EXPECT_NEAR(first, 0.9 * draws, 4.0 * std::sqrt(0.09 * draws));
+  EXPECT_NEAR(second, 0.2 * draws, 4.0 * std::sqrt(0.16 * draws));
+  const double mean =
+      0.9 * std::log(0.9) + 0.1 * std::log(0.1) + 0.2 * std::log(0.2) + 0.8 * std::log(0.8);
+  EXPECT_NEAR(touch.mean, mean, rounding);
+  EXPECT_NEAR(sum / draws, 0.0, 4.0 * std::sqrt(touch.variance / draws));
+  EXPECT_NEAR(squares / draws, touch.variance, 0.1 * touch.variance) << "a kurtosis of about 3";
+}
+
+TEST(ReadingMixture, PredictsExactlyWhereAllHypothesesAgree) {
+  ReadingMixture mixture(8, 3, 2);
+  for (std::size_t h = 0; h < 8; ++h) {
+    mixture.set(h, logs_of({0.7, 0.01, 1e-6}));
+  }
+  Random random(2, Stream::readings);
+  const Moments predicted = predicted_log_mean(mixture, mixture, random);
+  double mean = 0.0;
+  double variance = 0.0;
+  for (const double p : {0.7, 0.01, 1e-6}) {
+    const double between = std::log(p) - std::log1p(-p);
+    mean += p * std::log(p) + (1.0 - p) * std::log1p(-p);
+    variance += p * (1.0 - p) * between * between;
+  }
+  // Nothing is left to chance: the control variate is the log-likelihood itself.
+  EXPECT_NEAR(predicted.mean, mean, 1e-9);
+  EXPECT_NEAR(predicted.variance, variance, 1e-9);
+}
+
+TEST(ReadingMixture, PredictsTheMomentsOfItsOwnTouches) {
+  ReadingMixture mixture(64, 12, 2);
+  Random random(3, Stream::readings);
+  for (std::size_t h = 0; h < 64; ++h) {
+    std::vector<double> contact;
+    for (int e = 0; e < 12; ++e) {
+      contact.push_back(random.uniform(0.02, 0.98));
+    }
+    mixture.set(h, logs_of(contact));
+  }
+  const Moments predicted = predicted_log_mean(mixture, mixture, random);
+  constexpr int draws = 6400;
+  double sum = 0.0;
+  double squares = 0.0;
+  for (std::size_t i = 0; i < draws; ++i) {
+    const double out =
+        predicted.deviations(mixture.log_mean(mixture.draw(i % 64, random).readings, i % 64));
+    sum += out;
+    squares += out * out;
+  }
+  // The prediction is from 64 touches: four standard errors, of the variance with a kurtosis of 5.
+  EXPECT_NEAR(sum / draws, 0.0, 4.0 / 8.0);
+  EXPECT_NEAR(squares / draws, 1.0, 4.0 * 2.0 / 8.0);
+}
+
+TEST(Moments, CountDeviations) {
+  const Moments moments{.mean = 3.0, .variance = 4.0};
+  EXPECT_EQ(moments.deviations(3.0), 0.0);
+  EXPECT_EQ(moments.deviations(-1.0), -2.0);
+  const Moments sure{.mean = 3.0, .variance = 0.0};
+  EXPECT_EQ(sure.deviations(3.0), 0.0);
+  EXPECT_EQ(sure.deviations(2.0), -largest_fit_z);
+}
+
+}  // namespace
+}  // namespace palpate
