@@ -25,6 +25,14 @@ struct FitOptions : RunOptions {
   std::optional<int> trials;  ///< per letter and shape; by default 20, or 2 if quick
 };
 
+struct BeliefsOptions : RunOptions {
+  std::string part;           ///< the only part to measure; empty for all
+  std::string plots;          ///< folder for charts
+  std::optional<int> trials;  ///< per letter and shape; by default each part's own
+};
+/// Names of the parts, in order.
+inline constexpr const char* belief_parts[] = {"misplaced", "none", "slip", "plan", "cost"};
+
 struct SweepOptions : RunOptions {
   std::string html;                      ///< file for a page with charts and tables
   std::string plots;                     ///< folder for the page's charts
@@ -45,13 +53,18 @@ void measure_kernels(const RunOptions& options, std::span<char* const> command_l
 
 /// The experiments of Sec. IV on simulated letters: identity and pose against the number of
 /// touches, for both filters, beside the paper's claims. Beyond the paper: calibration, refined
-/// poses, an array that is not quite where it is reported, and objects that were never learned.
+/// poses, and an array that is not quite where it is reported.
 void run_experiment(const ExperimentOptions& options, std::span<char* const> command_line);
 
 /// How well learned letters and shapes never learned fit, after some numbers of touches: how often
 /// the two are told apart, and their verdicts, of a small and a large array, on coarse bins and
 /// with an array that is not quite where it is reported.
 void measure_fit(const FitOptions& options, std::span<char* const> command_line);
+
+/// How honest beliefs are: touches that are not quite where the robot says, with and without
+/// averaging over where they may have been; objects that nobody learned and "none of these";
+/// objects that slip; planned touches beside random ones; and the time and memory of all these.
+void measure_beliefs(const BeliefsOptions& options, std::span<char* const> command_line);
 
 /// Speed against error on simulated letters: every filter at counts from 100 to 10,000,000 bins per
 /// object, maps of several cell sizes, the engine's ways to evaluate the likelihood beside two

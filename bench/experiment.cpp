@@ -11,7 +11,6 @@ namespace palpate::bench {
 namespace {
 
 constexpr std::uint64_t learned_seed = 1'000;  ///< of the letters' trials
-constexpr std::uint64_t unlearned_seed = 100'000'000;
 constexpr std::uint64_t particle_seed = 1;
 
 constexpr int most_particles = 10'000;
@@ -49,18 +48,6 @@ std::vector<PoseNoiseRuns> measure_pose_noise(Device& device,
   return levels;
 }
 
-std::vector<NoneRun> measure_none(Device& device, const std::vector<Hypothesis>& letters,
-                                  std::span<const Recording> trials, int trials_each, int touches) {
-  std::vector<int> none_touches = {3, 9, 25};  // few, the paper's nine, many
-  std::erase_if(none_touches, [&](int n) { return n > touches; });
-  if (none_touches.empty()) {
-    none_touches.push_back(touches);
-  }
-  return run_none(device, letters, trials,
-                  make_trials(unlearned_shapes, trials_each, none_touches.back(), unlearned_seed),
-                  table_1().back(), none_touches);
-}
-
 ExperimentResult measure(Device& device, const ExperimentOptions& options, Report& report) {
   require_at_least("--trials", options.trials, 1);
   const int trials_each = options.trials.value_or(options.quick ? 4 : 10);
@@ -93,10 +80,6 @@ ExperimentResult measure(Device& device, const ExperimentOptions& options, Repor
   result.pose_noise = measure_pose_noise(device, letters, trials_each, touches);
   for (const PoseNoiseRuns& runs : result.pose_noise) {
     report.add(case_of(runs));
-  }
-  result.none = measure_none(device, letters, trials, trials_each, touches);
-  for (const NoneRun& run : result.none) {
-    report.add(case_of(run));
   }
   return result;
 }

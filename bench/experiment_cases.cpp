@@ -172,19 +172,4 @@ Case case_of(const PoseNoiseRuns& noisy) {
   return result;
 }
 
-Case case_of(const NoneRun& run) {
-  const double safe =
-      *std::min_element(run.learned_log10_weight.begin(), run.learned_log10_weight.end());
-  return {
-      .name = fmt::format("none of these, {} touches", run.touches),
-      .facts = {{"learned", run.learned_log10_weight.size()},
-                {"never learned", run.unlearned_log10_weight.size()}},
-      .measurements = {
-          {"called none at weight 1: never learned", percent(run.noticed(0.0)), "%"},
-          {"called none at weight 1: learned", percent(run.lost(0.0)), "%"},
-          {"largest weight that loses no learned one", safe, "log10"},
-          {"never learned, called none at that weight", percent(run.noticed(safe)), "%"},
-          {"unlearned turn to none before learned ones", percent(run.separation()), "% of pairs"}}};
-}
-
 }  // namespace palpate::bench

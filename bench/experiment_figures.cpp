@@ -4,7 +4,7 @@
 
 #include <fmt/format.h>
 
-#include "chart.hpp"
+#include "chart_series.hpp"
 #include "command_run.hpp"
 #include "experiment_result.hpp"
 
@@ -12,35 +12,12 @@ namespace palpate::bench {
 
 namespace {
 
-constexpr const char* figure_names[] = {"fig6a",       "fig6b",  "fig7a",   "fig7b",
-                                        "augmented",   "errors", "refined", "pose_noise",
-                                        "calibration", "none"};
+constexpr const char* figure_names[] = {"fig6a",   "fig6b",      "fig7a",
+                                        "fig7b",   "augmented",  "errors",
+                                        "refined", "pose_noise", "calibration"};
 
 const ChartAxis touches_axis{.label = "touches", .lower = 0.0};
 constexpr const char* mean_error = "mean pose error of trials with the right letter (mm)";
-
-/// The look of the i-th series: told apart by mark and dashes as well as by colour.
-ChartSeries series_like(std::size_t i, std::string name) {
-  constexpr Line lines[] = {Line::solid, Line::dashed, Line::dotted};
-  constexpr Mark marks[] = {Mark::circle, Mark::square, Mark::triangle, Mark::diamond};
-  return {.name = std::move(name),
-          .colour = series(i % series_colours),
-          .mark = marks[i % std::size(marks)],
-          .line = lines[i % std::size(lines)]};
-}
-
-/// A field of records over another, a gap where a record has none.
-std::vector<ChartPoint> points_of(const Json& records, const char* x, const char* y) {
-  const auto number_of = [](const Json& record, const char* field) {
-    const Json value = field_of(record, field);
-    return value.is_null() ? NAN : value.get<double>();
-  };
-  std::vector<ChartPoint> points;
-  for (const Json& record : records) {
-    points.push_back({.x = number_of(record, x), .y = number_of(record, y)});
-  }
-  return points;
-}
 
 /// A field of a run over its touches, with the mark at every fifth so that the dashes show between.
 ChartSeries curve(const Json& run, const char* field, ChartSeries like) {
@@ -63,13 +40,6 @@ std::int64_t most_of(const Json& document, const std::string& filter) {
     most = std::max<std::int64_t>(most, run.at("count"));
   }
   return most;
-}
-
-/// An axis of fractions, in percent.
-ChartAxis percent_axis(std::string label, double upper = 1.05) {
-  return {.label = std::move(label), .lower = 0.0, .upper = upper, .text = [](double fraction) {
-            return fmt::format("{:.0f}", 100.0 * fraction);
-          }};
 }
 
 ChartAxis error_axis(std::string label, double lower_mm, double upper_mm) {
@@ -253,26 +223,6 @@ Chart calibration_chart(const Json& document) {
   return chart;
 }
 
-Chart none_chart(const Json& document) {
-  Chart chart{
-      .x = {.label = "log10 of the prior weight of \"none of these\", each letter having 1"},
-      .y = percent_axis("unknowns called \"none of these\" (%)")};
-  std::size_t colour = 0;
-  for (const Json& run : document.at("none")) {
-    for (const auto& [who, share, line] : {std::tuple{"never learned", "/noticed", Line::solid},
-                                           std::tuple{"learned", "/lost", Line::dashed}}) {
-      ChartSeries series =
-          series_like(colour, fmt::format("{}, {} touches", who, plain_text(run.at("touches"))));
-      series.line = line;
-      series.mark_every = 10;
-      series.points = points_of(run.at("curve"), "/log10_weight", share);
-      chart.series.push_back(std::move(series));
-    }
-    ++colour;
-  }
-  return chart;
-}
-
 }  // namespace
 
 std::vector<std::string> figure_files() { return chart_files(figure_names); }
@@ -281,8 +231,7 @@ void draw_figures(const Json& document, const std::filesystem::path& folder) {
   const Chart charts[] = {
       fig6a(document),         error_chart(document, "particles"), fig7a(document),
       fig7b(document),         augmented_chart(document),          errors_chart(document),
-      refined_chart(document), pose_noise_chart(document),         calibration_chart(document),
-      none_chart(document)};
+      refined_chart(document), pose_noise_chart(document),         calibration_chart(document)};
   write_charts(charts, folder, figure_names);
 }
 

@@ -55,38 +55,6 @@ Json records_of(const std::vector<FilterRun>& runs) {
   return records;
 }
 
-/// Weights of "none of these", as log10, that reach beyond those at which all trials turn.
-std::vector<double> sampled_log10_weights(const std::vector<NoneRun>& runs) {
-  constexpr double step = 2.0;
-  double least = 0.0;
-  double most = 0.0;
-  for (const NoneRun& run : runs) {
-    for (const auto* weights : {&run.learned_log10_weight, &run.unlearned_log10_weight}) {
-      const auto [low, high] = std::ranges::minmax(*weights);
-      least = std::min(least, low);
-      most = std::max(most, high);
-    }
-  }
-  std::vector<double> samples;
-  for (double i = std::floor(least / step) - 1.0; i <= std::ceil(most / step) + 1.0; ++i) {
-    samples.push_back(i * step);
-  }
-  return samples;
-}
-
-Json record_of(const NoneRun& run, const std::vector<double>& log10_weights) {
-  Json curve = Json::array();
-  for (const double log10_weight : log10_weights) {
-    curve.push_back({{"log10_weight", log10_weight},
-                     {"lost", run.lost(log10_weight)},
-                     {"noticed", run.noticed(log10_weight)}});
-  }
-  return {{"touches", run.touches},
-          {"learned_log10_weight", run.learned_log10_weight},
-          {"unlearned_log10_weight", run.unlearned_log10_weight},
-          {"curve", std::move(curve)}};
-}
-
 std::string cells(const std::optional<ErrorsOverTrials>& error) {
   return error
              ? fmt::format("{:.6g},{:.6g},{:.6g}", error->mean_mm, error->median_mm, error->p95_mm)
@@ -143,17 +111,6 @@ std::string calibration(const ExperimentResult& result) {
   return table;
 }
 
-std::string none(const ExperimentResult& result) {
-  std::string table = "touches,log10_weight,lost,noticed\n";
-  for (const NoneRun& run : result.none) {
-    for (const double log10_weight : sampled_log10_weights(result.none)) {
-      table += fmt::format("{},{:g},{:.6g},{:.6g}\n", run.touches, log10_weight,
-                           run.lost(log10_weight), run.noticed(log10_weight));
-    }
-  }
-  return table;
-}
-
 std::string trials(const ExperimentResult& result) {
   std::string table =
       "filter,count,trial,object,touches,right,confidence,error_mm,refined_error_mm\n";
@@ -173,28 +130,23 @@ std::string trials(const ExperimentResult& result) {
 }  // namespace
 
 Json document_of(const ExperimentResult& result) {
-  Json document{
-      {"filters", records_of(result.runs)}, {"pose_noise", Json::array()}, {"none", Json::array()}};
+  Json document{{"filters", records_of(result.runs)}, {"pose_noise", Json::array()}};
   for (const PoseNoiseRuns& noisy : result.pose_noise) {
     document["pose_noise"].push_back({{"translation_mm", noisy.noise.translation_mm},
                                       {"rotation_rad", noisy.noise.rotation_rad},
                                       {"filters", records_of(noisy.runs)}});
   }
-  for (const NoneRun& run : result.none) {
-    document["none"].push_back(record_of(run, sampled_log10_weights(result.none)));
-  }
   return document;
 }
 
 std::vector<std::string> table_files() {
-  return {"curves.csv", "calibration.csv", "pose_noise.csv", "none.csv", "trials.csv"};
+  return {"curves.csv", "calibration.csv", "pose_noise.csv", "trials.csv"};
 }
 
 void write_tables(const ExperimentResult& result, const std::filesystem::path& folder) {
   write_file(folder / "curves.csv", curves(result));
   write_file(folder / "calibration.csv", calibration(result));
   write_file(folder / "pose_noise.csv", pose_noise(result));
-  write_file(folder / "none.csv", none(result));
   write_file(folder / "trials.csv", trials(result));
 }
 

@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "filter_run.hpp"
-#include "none_run.hpp"
 #include "report.hpp"
 #include "trials.hpp"
 
@@ -31,7 +30,6 @@ struct PoseNoiseRuns {
 struct ExperimentResult {
   std::vector<FilterRun> runs;
   std::vector<PoseNoiseRuns> pose_noise;
-  std::vector<NoneRun> none;
 };
 
 /// What a run reached beside what the paper reports of its filter.
@@ -39,18 +37,16 @@ Case case_of(const FilterRun& run);
 /// A histogram against particles over the same trials, over all touches and at the end.
 Case comparison_of(const FilterRun& histogram, const FilterRun& particles);
 Case case_of(const PoseNoiseRuns& noisy);
-/// "None" at even odds, and at the largest weight that loses no learned object.
-Case case_of(const NoneRun& run);
 
-/// Every curve, calibration and "none" table, as `filters`, `pose_noise` and `none`.
+/// Every curve and calibration, as `filters` and `pose_noise`.
 Json document_of(const ExperimentResult& result);
 
 /// The files that write_tables() and draw_figures() make in their folders.
 std::vector<std::string> table_files();
 std::vector<std::string> figure_files();
 
-/// Writes curves.csv, calibration.csv, pose_noise.csv, none.csv and trials.csv, the last with a
-/// line for every touch of every trial.
+/// Writes curves.csv, calibration.csv, pose_noise.csv and trials.csv, the last with a line for
+/// every touch of every trial.
 /// @throws Error where the disk refuses
 void write_tables(const ExperimentResult& result, const std::filesystem::path& folder);
 

@@ -13,15 +13,6 @@ namespace palpate::bench {
 
 namespace {
 
-Measurement share_of(const std::string& name, int count, std::size_t unknowns) {
-  const auto trials = static_cast<int>(unknowns);
-  const Interval interval = wilson_interval(count, trials);
-  return {.name = name,
-          .value = 100.0 * count / trials,
-          .unit = "%",
-          .interval = Interval{100.0 * interval.low, 100.0 * interval.high}};
-}
-
 std::string name_of(const FitSetting& setting, const FitRun& run) {
   return fmt::format("{}, touch {}", setting.name, run.touches);
 }

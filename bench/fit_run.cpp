@@ -32,19 +32,10 @@ void Fits::add(const Fit& fit) {
   ++verdicts[static_cast<std::size_t>(fit.verdict)];
 }
 
-double FitRun::told_apart() const {
-  double worse = 0.0;
-  for (const double own : learned.z) {
-    for (const double other : unlearned.z) {
-      worse += other < own ? 1.0 : other == own ? 0.5 : 0.0;
-    }
-  }
-  return worse / static_cast<double>(learned.z.size() * unlearned.z.size());
-}
+double FitRun::told_apart() const { return bench::told_apart(unlearned.z, learned.z); }
 
 Interval FitRun::told_apart_interval() const {
-  const auto rarer = static_cast<int>(std::min(learned.z.size(), unlearned.z.size()));
-  return wilson_interval(told_apart() * rarer, rarer);
+  return bench::told_apart_interval(unlearned.z, learned.z);
 }
 
 std::vector<FitSetting> fit_settings() {

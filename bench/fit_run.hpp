@@ -31,10 +31,8 @@ struct FitRun {
   Fits unlearned;
 
   /// Of all pairs of a learned and an unlearned unknown, the fraction in which the unlearned one
-  /// fits worse (the area under the ROC curve); a tie counts half.
+  /// fits worse; see told_apart() of values.
   double told_apart() const;
-  /// Its 95 % interval: Wilson's, for as many trials as there are unknowns of the rarer kind. The
-  /// estimate varies no more than that (van Dantzig 1951).
   Interval told_apart_interval() const;
 };
 

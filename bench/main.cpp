@@ -1,7 +1,10 @@
 #include <cstdio>
 #include <exception>
 #include <iostream>
+#include <iterator>
 #include <span>
+#include <string>
+#include <vector>
 
 #include <CLI/CLI.hpp>
 
@@ -46,8 +49,7 @@ int main(int argc, char** argv) try {
   CLI::App* command = add_command(
       app, "experiment",
       "Repeat Sec. IV of the paper on simulated letters: identity and pose error against the "
-      "number of touches, for histogram and particle filters; calibration; misplaced touches; "
-      "objects never learned",
+      "number of touches, for histogram and particle filters; calibration; misplaced touches",
       experiment, run_experiment, command_line);
   command->add_option("--trials", experiment.trials, trials);
   command->add_option("--touches", experiment.touches,
@@ -63,6 +65,18 @@ int main(int argc, char** argv) try {
                         fit, measure_fit, command_line);
   command->add_option("--trials", fit.trials,
                       "Trials per letter and shape (default 20, or 2 with --quick)");
+  BeliefsOptions beliefs;
+  command = add_command(app, "beliefs",
+                        "Measure how honest beliefs are, in some 25 minutes on two CPU cores: "
+                        "misplaced touches, objects never learned, objects that slip, planned "
+                        "touches, and what each costs",
+                        beliefs, measure_beliefs, command_line);
+  command->add_option("--part", beliefs.part, "Measure only this part")
+      ->check(CLI::IsMember(
+          std::vector<std::string>(std::begin(belief_parts), std::end(belief_parts))));
+  command->add_option("--trials", beliefs.trials,
+                      "Unknowns per letter and shape (default: each part's own)");
+  command->add_option("--plots", beliefs.plots, "Draw charts in this folder, as PNG and SVG");
   SweepOptions sweep;
   command = add_command(app, "sweep",
                         "Measure speed against error on simulated letters, in some 20 minutes on "

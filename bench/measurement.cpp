@@ -103,6 +103,21 @@ Interval mean_interval(std::span<const double> values) {
   return {centre - half_width, centre + half_width};
 }
 
+double told_apart(std::span<const double> lower, std::span<const double> higher) {
+  double apart = 0.0;
+  for (const double low : lower) {
+    for (const double high : higher) {
+      apart += low < high ? 1.0 : low == high ? 0.5 : 0.0;
+    }
+  }
+  return apart / static_cast<double>(lower.size() * higher.size());
+}
+
+Interval told_apart_interval(std::span<const double> lower, std::span<const double> higher) {
+  const auto rarer = static_cast<int>(std::min(lower.size(), higher.size()));
+  return wilson_interval(told_apart(lower, higher) * rarer, rarer);
+}
+
 std::uint64_t resident_bytes() { return status_bytes("VmRSS:"); }
 
 std::uint64_t peak_resident_bytes() { return status_bytes("VmHWM:"); }

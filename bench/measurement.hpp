@@ -37,6 +37,13 @@ double standard_error(std::span<const double> values);
 /// The 95 % interval of the mean of what at least three values are drawn from, by Student's t.
 Interval mean_interval(std::span<const double> values);
 
+/// Of all pairs of a value of one kind and one of the other, the fraction in which the value of
+/// `lower` is the lower one (the area under the ROC curve); a tie counts half. Neither is empty.
+double told_apart(std::span<const double> lower, std::span<const double> higher);
+/// The 95 % interval of told_apart(): Wilson's, for as many trials as there are values of the rarer
+/// kind. The estimate varies no more than that (van Dantzig 1951).
+Interval told_apart_interval(std::span<const double> lower, std::span<const double> higher);
+
 /// Resident memory of the process. The peak is since the last restart_peak_memory(), or since the
 /// process began where the kernel does not allow that.
 std::uint64_t resident_bytes();

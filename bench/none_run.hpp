@@ -1,41 +1,52 @@
 #pragma once
 
+#include <cstdint>
 #include <span>
 #include <string>
 #include <vector>
 
-#include "palpate/lattice.hpp"
-#include "palpate/pose_histogram.hpp"
-#include "palpate/touch.hpp"
+#include "judged_belief.hpp"
+#include "measurement.hpp"
+#include "palpate/displacement.hpp"
+#include "trials.hpp"
 
 namespace palpate::bench {
 
-/// Shapes that nobody learned. T and F share strokes with I and E, and the ring is an O of another
-/// size.
-inline const std::vector<std::string> unlearned_shapes = {"F", "H", "T", "X", "ring"};
+/// What "none of these" makes of some unknowns after some number of touches.
+struct NoneCalls {
+  std::vector<double> log_odds;  ///< [unknown] of none against all letters together, in nats
+  int called_none = 0;           ///< unknowns for which none is more probable than every letter
 
-/// Which unknowns are called "none of these" after a number of touches, for any prior weight of
-/// that hypothesis.
-struct NoneRun {
-  int touches = 0;
-  /// Of every trial, log10 of the weight above which "none" is more probable than every learned
-  /// object, each of which has weight 1.
-  std::vector<double> learned_log10_weight;
-  std::vector<double> unlearned_log10_weight;
-
-  /// Fraction of the learned objects that are called none at a weight.
-  double lost(double log10_weight) const;
-  /// Fraction of the unlearned ones that are.
-  double noticed(double log10_weight) const;
-  /// How often an unlearned object turns before a learned one, over all pairs (the area under the
-  /// curve of `noticed` over `lost`): 0.5 is chance, 1 means that some weight tells all apart.
-  double separation() const;
+  /// Adds the step of a task whose last label is none's.
+  void add(const RecognitionStep& step);
+  double share_called_none() const;
 };
 
-/// The histogram filter over the given lattice, after each of these numbers of touches in turn.
-std::vector<NoneRun> run_none(Device& device, std::span<const Hypothesis> letters,
-                              std::span<const Recording> learned_trials,
-                              std::span<const Recording> unlearned_trials,
-                              const PoseLattice& lattice, std::span<const int> touches);
+/// Learned and unlearned unknowns after some number of touches.
+struct NoneRun {
+  int touches = 0;
+  NoneCalls learned;
+  NoneCalls unlearned;
+
+  /// Of all pairs of a learned and an unlearned unknown, the fraction in which none has the higher
+  /// odds for the unlearned one; see told_apart() of values.
+  double told_apart() const;
+  Interval told_apart_interval() const;
+};
+
+struct NoneSetting {
+  std::string name;
+  PoseLattice lattice;
+  TrialTouches touching = {};
+  DisplacementSd touch_sd = {};
+  int learned_each = 0;    ///< unknowns of every vowel
+  int unlearned_each = 0;  ///< and of every shape that was never learned
+  bool held_to_goals = false;
+};
+
+/// The vowels and shapes that nobody learned (see misfits), after each of these numbers of touches,
+/// with "none of these" as likely before the first touch as all letters together.
+std::vector<NoneRun> run_none(Device& device, const std::vector<Hypothesis>& letters,
+                              const NoneSetting& setting, std::span<const int> touches);
 
 }  // namespace palpate::bench

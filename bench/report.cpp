@@ -28,6 +28,17 @@ bool Measurement::reached() const {
   return !goal || (goal->kind == Goal::Kind::at_most ? value <= goal->value : value >= goal->value);
 }
 
+Measurement share_of(const std::string& name, int count, std::size_t trials,
+                     std::optional<Goal> goal) {
+  const auto of = static_cast<int>(trials);
+  const Interval interval = wilson_interval(count, of);
+  return {.name = name,
+          .value = 100.0 * count / of,
+          .unit = "%",
+          .goal = goal,
+          .interval = Interval{100.0 * interval.low, 100.0 * interval.high}};
+}
+
 Json record_of(const Measurement& m) {
   Json record{{"name", m.name}, {"value", m.value}, {"unit", m.unit}};
   if (m.goal) {

@@ -26,6 +26,9 @@ struct Measurement {
 
   bool reached() const;
 };
+/// `count` of `trials` in percent, with its 95 % score interval (Wilson).
+Measurement share_of(const std::string& name, int count, std::size_t trials,
+                     std::optional<Goal> goal = {});
 /// Name, value and unit; the goal, and whether it is reached; the interval.
 Json record_of(const Measurement& measurement);
 

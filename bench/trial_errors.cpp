@@ -21,13 +21,18 @@ void PoseErrors::add(const RecognitionStep& last) {
   refined_mm.push_back(last.refined_error_mm);
 }
 
-std::optional<ErrorsOverTrials> errors_over(const TrialErrors& errors_mm) {
+std::vector<double> present(const TrialErrors& errors_mm) {
   std::vector<double> present_mm;
   for (const std::optional<double>& error_mm : errors_mm) {
     if (error_mm) {
       present_mm.push_back(*error_mm);
     }
   }
+  return present_mm;
+}
+
+std::optional<ErrorsOverTrials> errors_over(const TrialErrors& errors_mm) {
+  const std::vector<double> present_mm = present(errors_mm);
   if (present_mm.empty()) {
     return {};
   }

@@ -13,6 +13,9 @@ namespace palpate::bench {
 /// refined poses of a filter that has no such pose.
 using TrialErrors = std::vector<std::optional<double>>;
 
+/// The errors that there are, in order.
+std::vector<double> present(const TrialErrors& errors_mm);
+
 /// Those of a run's modes and of its refined poses.
 struct PoseErrors {
   TrialErrors mode_mm = {};

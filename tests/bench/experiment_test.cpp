@@ -191,28 +191,9 @@ void expect_pose_noise_to_cost(const nlohmann::json& pose_noise, const Filters& 
   }
 }
 
-void expect_none_to_notice(const nlohmann::json& none) {
-  ASSERT_EQ(none.size(), 2U) << "after 3 and 9 touches";
-  for (const auto& run : none) {
-    double lost = 0.0;
-    double noticed = 0.0;
-    for (const auto& point : run.at("curve")) {
-      EXPECT_GE(point.at("lost"), lost) << "a larger weight loses no less";
-      EXPECT_GE(point.at("noticed"), noticed);
-      lost = point["lost"];
-      noticed = point["noticed"];
-      if (run.at("touches") == 9) {
-        EXPECT_GE(noticed, lost) << "better than chance at 10^" << point.at("log10_weight");
-      }
-    }
-    EXPECT_EQ(lost, 1.0) << "the curve shows where everything is none";
-    EXPECT_EQ(noticed, 1.0);
-  }
-}
-
 void expect_pictures(const std::filesystem::path& folder) {
   for (const char* name : {"fig6a", "fig6b", "fig7a", "fig7b", "augmented", "errors", "refined",
-                           "pose_noise", "calibration", "none"}) {
+                           "pose_noise", "calibration"}) {
     const std::string png = content_of(folder / (std::string(name) + ".png"));
     EXPECT_TRUE(png.starts_with("\x89PNG")) << name;
     const std::string svg = content_of(folder / (std::string(name) + ".svg"));
@@ -237,7 +218,6 @@ TEST(Experiment, QuickRunKeepsThePapersOrder) {
   expect_identity(filters);
   expect_finer_bins_to_err_less(table);
   expect_pose_noise_to_cost(document.at("pose_noise"), filters);
-  expect_none_to_notice(document.at("none"));
   expect_pictures(folder / "plots");
   expect_no_file_written_twice("experiment --csv " + (folder / "csv").string(), folder / "csv");
   expect_no_file_written_twice("experiment --plots " + (folder / "plots").string(),

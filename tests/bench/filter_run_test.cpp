@@ -2,8 +2,6 @@
 
 #include <gtest/gtest.h>
 
-#include "none_run.hpp"
-
 namespace palpate::bench {
 namespace {
 
@@ -127,17 +125,6 @@ TEST(Comparison, TakesBalancedBinsForAsMany) {
   EXPECT_TRUE(as_many(9'295, 10'000));
   EXPECT_TRUE(as_many(10'000, 9'295));
   EXPECT_FALSE(as_many(1'000, 10'000));
-}
-
-TEST(None, IsCalledAboveEachTrialsOwnWeight) {
-  const NoneRun run{.touches = 9,
-                    .learned_log10_weight = {2.0, 4.0},
-                    .unlearned_log10_weight = {-3.0, 0.0, 1.0, 3.0}};
-  EXPECT_EQ(run.lost(2.0), 0.0);
-  EXPECT_EQ(run.lost(3.0), 0.5);
-  EXPECT_EQ(run.noticed(2.0), 0.75);
-  EXPECT_EQ(run.noticed(300.0), 1.0);
-  EXPECT_EQ(run.separation(), (0.75 + 1.0) / 2.0) << "3 of 4 turn below 2, all below 4";
 }
 
 }  // namespace

@@ -1,50 +1,45 @@
 #include "none_run.hpp"
 
-#include <algorithm>
 #include <cmath>
 
 #include <gtest/gtest.h>
 
-#include "letters.hpp"
-#include "palpate/device.hpp"
-#include "palpate/pose_histogram.hpp"
-#include "trials.hpp"
-
 namespace palpate::bench {
 namespace {
 
-/// Whether a histogram that has the hypothesis finds it the most probable.
-bool called_none(Device& device, const std::vector<Hypothesis>& letters, const Recording& trial,
-                 int touches, double log10_weight) {
-  PoseHistogram histogram(device, letters,
-                          HistogramOptions{.lattice = lattice_of(10, 10, 8),
-                                           .none_weight = std::pow(10.0, log10_weight)});
-  histogram.update(trial.touches(0, touches));
-  const Estimate estimate = histogram.estimate();
-  return estimate.none > *std::max_element(estimate.identity.begin(), estimate.identity.end());
+RecognitionStep step_of(std::vector<double> identity, std::size_t best) {
+  RecognitionStep step;
+  step.identity = std::move(identity);
+  step.best = best;
+  return step;
 }
 
-// What is worked out for every weight from one belief is what the library says at that weight.
-TEST(NoneRun, TurnsWhereTheHistogramDoes) {
-  Device device = Device::open();
-  const std::vector<Hypothesis> letters = letter_maps(device, training_recordings(), MapOptions{});
-  const std::vector<std::string> letter = {"E"};
-  const std::vector<std::string> shape = {"ring"};
-  const std::vector<Recording> known = make_trials(letter, 1, 4, 3);
-  const std::vector<Recording> unlearned = make_trials(shape, 1, 4, 4);
-  const int touches[] = {1, 4};
-  const std::vector<NoneRun> runs =
-      run_none(device, letters, known, unlearned, lattice_of(10, 10, 8), touches);
-  ASSERT_EQ(runs.size(), 2U);
-  for (const NoneRun& run : runs) {
-    for (const auto& [trial, log10_weight] :
-         {std::pair(known[0], run.learned_log10_weight.at(0)),
-          std::pair(unlearned[0], run.unlearned_log10_weight.at(0))}) {
-      // The belief is exact to 1e-4 nats a touch.
-      EXPECT_TRUE(called_none(device, letters, trial, run.touches, log10_weight + 0.001));
-      EXPECT_FALSE(called_none(device, letters, trial, run.touches, log10_weight - 0.001));
-    }
-  }
+TEST(NoneCalls, CountsWhereNoneIsTheMostProbable) {
+  NoneCalls calls;
+  calls.add(step_of({0.5, 0.1, 0.4}, 0));
+  calls.add(step_of({0.3, 0.3, 0.4}, 2));
+  EXPECT_EQ(calls.called_none, 1);
+  EXPECT_DOUBLE_EQ(calls.share_called_none(), 0.5);
+  ASSERT_EQ(calls.log_odds.size(), 2U);
+  // None against all letters together, not against the best.
+  EXPECT_DOUBLE_EQ(calls.log_odds[0], std::log(0.4 / 0.6));
+  EXPECT_EQ(calls.log_odds[0], calls.log_odds[1]);
+}
+
+TEST(NoneCalls, StayFiniteWhereProbabilitiesVanish) {
+  NoneCalls calls;
+  calls.add(step_of({0.0, 0.0, 1.0}, 2));
+  calls.add(step_of({1.0, 0.0, 0.0}, 0));
+  EXPECT_GT(calls.log_odds[0], 700.0);
+  EXPECT_LT(calls.log_odds[1], -700.0);
+}
+
+TEST(NoneRun, TellsApartByTheOdds) {
+  NoneRun run;
+  run.learned.log_odds = {-3.0, -1.0};
+  run.unlearned.log_odds = {-2.0, 4.0, 5.0};
+  EXPECT_DOUBLE_EQ(run.told_apart(), 5.0 / 6.0);
+  EXPECT_LT(run.told_apart_interval().low, 5.0 / 6.0);
 }
 
 }  // namespace
