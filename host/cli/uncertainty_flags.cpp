@@ -91,26 +91,26 @@ std::optional<double> none_weight(const UncertaintyFlags& flags, const Scene& sc
 
 void add_uncertainty_flags(CLI::App& command, UncertaintyFlags& flags) {
   command.add_option("--touch-sd-mm", flags.touch_sd_mm,
-                     "Standard deviation of where the sensor really is at a touch, along each of x "
-                     "and y, mm, about the pose that the robot reports: its repeatability. "
-                     "Independent from touch to touch [default: 0, exact]");
+                     "The robot's repeatability: standard deviation of the sensor's true position "
+                     "about the reported one, along x and along y, mm. Independent from touch to "
+                     "touch [default: 0, exact]");
   command.add_option("--touch-sd-deg", flags.touch_sd_deg,
                      "The same of the sensor's angle, degrees [default: 0, exact]");
   command.add_option("--slip-sd-mm", flags.slip_sd_mm,
-                     "Standard deviation of how far the object moves between two touches, along "
-                     "each of x and y, mm; the particles' motion noise [default: 0, at rest; "
+                     "Standard deviation of how far the object moves between two touches, along x "
+                     "and along y, mm; the motion noise of particles [default: 0, at rest; "
                      "particles: 1]");
   command.add_option("--slip-sd-deg", flags.slip_sd_deg,
-                     "The same of how far the object turns, about its middle, degrees [default: 0; "
+                     "The same of how far the object turns about its middle, degrees [default: 0; "
                      "particles: 5.73, which is 0.1 rad]");
   command
       .add_option(
           "--none", flags.none,
-          "Prior weight W of \"(none)\", an object that was never learned: none of these explains "
-          "each touch by a piece of some known object, pieces share no pose; W relative to a map's "
-          "weight of 1; with a number left out W is the sum of the maps' weights, i.e. even odds "
-          "before the first touch; after one touch the odds are about the prior's, because one "
-          "touch cannot tell [default: no (none)]")
+          "Adds \"(none)\", an object that was never learned, with prior weight W; a map "
+          "has the weight 1. Without W, (none) has the sum of the maps' weights: even odds "
+          "before the first touch. (none) explains each touch by a piece of some known "
+          "object; the pieces need not belong to one pose. One touch cannot tell: after it, "
+          "the odds are about the prior's [default: no (none)]")
       ->type_name("W")
       ->expected(0, 1)
       ->default_str("auto");

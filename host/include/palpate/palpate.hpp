@@ -7,6 +7,7 @@
 #include "palpate/contact.hpp"
 #include "palpate/contact_model.hpp"
 #include "palpate/device.hpp"
+#include "palpate/displacement.hpp"
 #include "palpate/error.hpp"
 #include "palpate/estimate.hpp"
 #include "palpate/files.hpp"
