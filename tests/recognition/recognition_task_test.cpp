@@ -14,7 +14,7 @@ TEST(RecognitionTask, NamesEachLabelOnceAndNoneLast) {
   const RecognitionTask known(three, HistogramOptions{});
   EXPECT_EQ(known.labels, (std::vector<std::string>{"L", "disc"}));
   EXPECT_EQ(known.label_of, (std::vector<std::size_t>{0, 1, 0}));
-  const RecognitionTask with_none(three, ParticleOptions{.none_weight = 2.0});
+  const RecognitionTask with_none(three, HistogramOptions{.none_weight = 2.0});
   EXPECT_EQ(with_none.labels, (std::vector<std::string>{"L", "disc", "(none)"}));
 }
 
