@@ -7,7 +7,6 @@
 
 #include <fmt/format.h>
 
-#include "contradiction.hpp"
 #include "interface.h"
 #include "kernel_sizes.hpp"
 #include "palpate/error.hpp"
@@ -49,16 +48,6 @@ void append_set(std::vector<shaders::TableNode>& nodes, const LikelihoodTable& t
   }
 }
 
-/// The numbers of an object whose map is of nothing but the prior.
-std::vector<double> set_of_none(const ContactModel& model) {
-  std::vector<double> numbers;
-  for (std::size_t level = 0; level < model.table->levels(); ++level) {
-    numbers.resize(numbers.size() + model.table->nodes,
-                   prior_log_likelihood(static_cast<Reading>(level), model));
-  }
-  return numbers;
-}
-
 }  // namespace
 
 std::vector<std::uint32_t> contact_constants(const gpu::Limits& limits, const ContactModel& model) {
@@ -91,7 +80,7 @@ std::vector<std::uint32_t> contact_constants(const gpu::Limits& limits, const Co
 }
 
 std::uint64_t ContactTable::bytes_needed(const ContactModel& model) {
-  const std::size_t sets = model.table ? model.table->sets() + 1 : 0;
+  const std::size_t sets = model.table ? model.table->sets() : 0;
   return std::max<std::uint64_t>(1, sets * nodes_of_a_set(model)) * sizeof(shaders::TableNode);
 }
 
@@ -115,7 +104,6 @@ ContactTable::ContactTable(gpu::Context& context, gpu::CommandStream& stream,
     for (std::size_t set = 0; set < sets_; ++set) {
       append_set(nodes, *table, std::span(table->log_likelihood).subspan(set * numbers, numbers));
     }
-    append_set(nodes, *table, set_of_none(model));
   }
   nodes.resize(bytes / sizeof(shaders::TableNode));
   nodes_ = stream.uploaded(nodes, "the likelihood table", VK_FORMAT_R32G32_SFLOAT);
@@ -124,7 +112,5 @@ ContactTable::ContactTable(gpu::Context& context, gpu::CommandStream& stream,
 int ContactTable::first_node(std::size_t object) const {
   return static_cast<int>((sets_ == 1 ? 0 : object) * nodes_of_a_set_);
 }
-
-int ContactTable::first_node_of_none() const { return static_cast<int>(sets_ * nodes_of_a_set_); }
 
 }  // namespace palpate

@@ -13,9 +13,8 @@ namespace palpate {
 /// set.
 std::vector<std::uint32_t> contact_constants(const gpu::Limits& limits, const ContactModel& model);
 
-/// The model's table on the device, shaders::TableNode: the objects' numbers, then those of "none
-/// of these", whose map holds nothing but the prior. A model without a table has one node that no
-/// kernel reads, because kernels bind the buffer all the same.
+/// The objects' numbers of the model's table on the device, shaders::TableNode. A model without a
+/// table has one node that no kernel reads, because kernels bind the buffer all the same.
 class ContactTable {
  public:
   /// Device memory that it takes, in bytes.
@@ -28,8 +27,6 @@ class ContactTable {
   const gpu::Buffer& nodes() const { return nodes_; }
   /// Index of the first node of an object's numbers.
   int first_node(std::size_t object) const;
-  /// Index of the first node of the numbers of "none of these".
-  int first_node_of_none() const;
 
  private:
   std::size_t sets_ = 1;

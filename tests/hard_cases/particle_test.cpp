@@ -36,7 +36,7 @@ Estimate expect_sound(const ParticleFilter& filter, int particles) {
   EXPECT_LE(effective, particles);
   Estimate estimate = filter.estimate();
   EXPECT_TRUE(all_finite(estimate.identity));
-  EXPECT_NEAR(total(estimate.identity) + estimate.none, 1.0, 1e-12);
+  EXPECT_NEAR(total(estimate.identity), 1.0, 1e-12);
   EXPECT_TRUE(std::isfinite(estimate.mode.log_likelihood));
   EXPECT_TRUE(std::isfinite(estimate.mode.T_object_robot.theta_rad));
   EXPECT_TRUE(std::isfinite(estimate.mode.T_object_robot.translation_mm.x));

@@ -20,10 +20,13 @@ void set_two_floats(double value, float& high, float& low) {
 /// A distance along an axis in whole bins and the rest. An axis of one bin keeps its place.
 void set_shift(double distance_mm, const Axis& axis, float& whole, float& fraction,
                float& fraction_low) {
-  // Farther than any lattice has bins, yet whole numbers are exact.
+  // Farther than any lattice has bins, yet whole numbers are exact. So far is what is no number:
+  // the difference of places beyond float64.
   constexpr double farthest = 1 << 23;
-  const double bins =
-      axis.count > 1 ? std::clamp(distance_mm / axis.step(), -farthest, farthest) : 0.0;
+  const double bins = axis.count == 1 ? 0.0
+                      : std::isnan(distance_mm)
+                          ? farthest
+                          : std::clamp(distance_mm / axis.step(), -farthest, farthest);
   whole = static_cast<float>(std::floor(bins));
   set_two_floats(bins - std::floor(bins), fraction, fraction_low);
 }
@@ -63,8 +66,10 @@ std::vector<shaders::Turn> touch_turns(const PoseLattice& lattice,
     const double theta = lattice.theta_rad.centre(t);
     for (int k = -steps; k <= steps; ++k) {
       const double turned = theta + k * lattice.theta_rad.step();
+      // Without a turn the place is the same, even one beyond float64.
       const glm::dvec2 shift_mm =
-          rotate(theta, sensor_from_pivot_mm) - rotate(turned, sensor_from_pivot_mm);
+          k == 0 ? glm::dvec2(0.0)
+                 : rotate(theta, sensor_from_pivot_mm) - rotate(turned, sensor_from_pivot_mm);
       shaders::Turn turn{};
       set_shift(shift_mm.x, lattice.x_mm, turn.whole_x, turn.fraction_x, turn.fraction_x_low);
       set_shift(shift_mm.y, lattice.y_mm, turn.whole_y, turn.fraction_y, turn.fraction_y_low);

@@ -29,6 +29,13 @@ std::vector<shaders::ObjectBox> boxes_of(std::span<const Hypothesis> hypotheses)
   return boxes;
 }
 
+/// A length or place as a float of which sums of a few stay finite. No region reaches so far.
+float within_floats(double mm) {
+  constexpr double far_mm = 1e30;
+  return std::isnan(mm) ? static_cast<float>(far_mm)
+                        : static_cast<float>(std::clamp(mm, -far_mm, far_mm));
+}
+
 std::vector<shaders::ArrayAtTheta> arrays_of(const Touch& touch, const PoseLattice& lattice,
                                              const glm::dvec2& pivot_mm) {
   const glm::dvec2 from_pivot =
@@ -38,7 +45,7 @@ std::vector<shaders::ArrayAtTheta> arrays_of(const Touch& touch, const PoseLatti
     const double theta = lattice.theta_rad.centre(t);
     const glm::dvec2 turned = rotate(theta, from_pivot);
     const double direction = theta + touch.T_robot_sensor.theta_rad;
-    arrays.push_back({static_cast<float>(turned.x), static_cast<float>(turned.y),
+    arrays.push_back({within_floats(turned.x), within_floats(turned.y),
                       static_cast<float>(std::cos(direction)),
                       static_cast<float>(std::sin(direction))});
   }
@@ -89,15 +96,14 @@ std::vector<OverlapSum> OverlapMean::sums(const DenseBelief& scratch, const Touc
   const glm::dvec2 half = bounding_box(touch.elements_mm).extent() / 2.0;
   std::uint32_t first = 0;
   for (const Slab& slab : scratch.slabs()) {
-    const shaders::OverlapPush push{
-        .slab = planes_of(slab, lattice_.theta_rad.count),
-        .partial_first = first,
-        .first_x_mm = static_cast<float>(lattice_.x_mm.centre(0)),
-        .first_y_mm = static_cast<float>(lattice_.y_mm.centre(0)),
-        .step_x_mm = static_cast<float>(lattice_.x_mm.step()),
-        .step_y_mm = static_cast<float>(lattice_.y_mm.step()),
-        .half_x_mm = everywhere ? unbounded : static_cast<float>(half.x),
-        .half_y_mm = everywhere ? unbounded : static_cast<float>(half.y)};
+    const shaders::OverlapPush push{.slab = planes_of(slab, lattice_.theta_rad.count),
+                                    .partial_first = first,
+                                    .first_x_mm = static_cast<float>(lattice_.x_mm.centre(0)),
+                                    .first_y_mm = static_cast<float>(lattice_.y_mm.centre(0)),
+                                    .step_x_mm = static_cast<float>(lattice_.x_mm.step()),
+                                    .step_y_mm = static_cast<float>(lattice_.y_mm.step()),
+                                    .half_x_mm = everywhere ? unbounded : within_floats(half.x),
+                                    .half_y_mm = everywhere ? unbounded : within_floats(half.y)};
     stream_.dispatch(kernel_, {&slab.log_likelihood, &arrays_, &boxes_, &partials_}, push,
                      {slab.theta_count, slab.object_count, 1});
     first += slab.theta_count * slab.object_count;

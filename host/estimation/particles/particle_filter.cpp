@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include <fmt/format.h>
 
@@ -131,24 +130,6 @@ struct ParticleFilter::Impl {
     summary = summarise(sums);
   }
 
-  /// Log-likelihood of the last touch by the particle of an object that explains it best.
-  /// -infinity where all are of "none of these".
-  double best_log_likelihood() {
-    if (!options.none_weight) {
-      return summary.log_largest;
-    }
-    // The largest may be of "none of these", which is as likely as the prior by definition.
-    std::vector<TwoFloat> logs;
-    const std::vector<shaders::Particle> states = download(logs);
-    double best = -std::numeric_limits<double>::infinity();
-    for (std::size_t i = 0; i < states.size(); ++i) {
-      if (states[i].object < objects) {
-        best = std::max(best, logs[i].value());
-      }
-    }
-    return best;
-  }
-
   void update(const ContactEvidence& evidence) {
     ++touch;
     // A touch that says nothing moves the particles and leaves their weights: drawing anew would
@@ -168,27 +149,19 @@ struct ParticleFilter::Impl {
     likelihood.weigh(evidence, particles, size(), log_weights);
     sum_weights();
     weighed = true;
-    if (const double best = best_log_likelihood(); std::isfinite(best)) {
-      prior_over_best += prior_log_likelihood(evidence.counts, options.contact) - best;
-    }
+    // The largest weight is the touch's log-likelihood by the particle that explains it best.
+    prior_over_best += prior_log_likelihood(evidence.counts, options.contact) - summary.log_largest;
     averages.add(summary.log_largest + std::log(summary.sum / static_cast<double>(size())),
                  evidence.from_pivot_mm.size());
   }
 
-  /// Particles as the device keeps them, about the region's centre, and their log-likelihoods.
-  std::vector<shaders::Particle> download(std::vector<TwoFloat>& logs) {
+  /// Particles as the device keeps them, about the region's centre, and weights that sum to 1.
+  std::vector<shaders::Particle> download(std::vector<double>& weights) {
     std::vector<shaders::Particle> states(size());
-    logs.resize(size());
+    std::vector<TwoFloat> logs(size());
     stream.download(particles, states);
     stream.download(log_weights, logs);
     stream.run();
-    return states;
-  }
-
-  /// The same with weights that sum to 1.
-  std::vector<shaders::Particle> download(std::vector<double>& weights) {
-    std::vector<TwoFloat> logs;
-    std::vector<shaders::Particle> states = download(logs);
     weights.clear();
     double total = 0.0;
     for (const TwoFloat& log_weight : logs) {
@@ -298,19 +271,13 @@ Estimate ParticleFilter::estimate() const {
   const std::vector<shaders::Particle> particles = filter.download(weights);
   Estimate estimate{.identity = std::vector<double>(filter.objects), .mode = {}};
   for (std::size_t i = 0; i < particles.size(); ++i) {
-    const std::size_t object = particles[i].object;
-    (object < filter.objects ? estimate.identity[object] : estimate.none) += weights[i];
+    estimate.identity[particles[i].object] += weights[i];
   }
-  const auto maximum =
-      filter.parzen.find(particles, weights, static_cast<std::uint32_t>(filter.objects));
-  estimate.mode.log_likelihood = -std::numeric_limits<double>::infinity();
-  estimate.mode.T_object_robot = filter.T_object_robot(0.0, 0.0, 0.0);
-  if (maximum) {
-    estimate.mode.object = static_cast<int>(maximum->object);
-    estimate.mode.T_object_robot =
-        filter.T_object_robot(maximum->x_mm, maximum->y_mm, maximum->theta_rad);
-    estimate.mode.log_likelihood = std::log(maximum->density);
-  }
+  const ParzenMaximum maximum = filter.parzen.find(particles, weights);
+  estimate.mode.object = static_cast<int>(maximum.object);
+  estimate.mode.T_object_robot =
+      filter.T_object_robot(maximum.x_mm, maximum.y_mm, maximum.theta_rad);
+  estimate.mode.log_likelihood = std::log(maximum.density);
   estimate.contradicted = filter.prior_over_best > contradiction_nats;
   return estimate;
 }

@@ -67,7 +67,7 @@ void require_room(const gpu::Context& context, std::span<const Hypothesis> hypot
   const std::uint64_t most = std::min<std::uint64_t>(
       limits.table_texels, std::min(limits.allocation, limits.memory) / sizeof(shaders::Corners));
   constexpr std::uint64_t border = 2 * shaders::MAP_BORDER;
-  std::uint64_t cells = border * border;  // of "none of these", which has only a border
+  std::uint64_t cells = 0;
   for (const Hypothesis& hypothesis : hypotheses) {
     const OccupancyGrid& map = hypothesis.map;
     cells += (map.nx + border) * (map.ny + border);
@@ -100,7 +100,8 @@ ParticleLikelihood::ParticleLikelihood(gpu::Context& context, gpu::CommandStream
   require_room(context, hypotheses);
   std::vector<shaders::Corners> cells;
   std::vector<shaders::ParticleMap> objects;
-  const auto append = [&](const OccupancyGrid& map, int first_table_node) {
+  for (std::size_t i = 0; i < hypotheses.size(); ++i) {
+    const OccupancyGrid& map = hypotheses[i].map;
     const double cells_per_mm = 1.0 / map.cell_mm;
     const auto high = static_cast<float>(cells_per_mm);
     objects.push_back(
@@ -110,20 +111,14 @@ ParticleLikelihood::ParticleLikelihood(gpu::Context& context, gpu::CommandStream
          .scale = static_cast<shaders::uint>(index_of(cell_sizes_mm_, map.cell_mm)),
          .cells_per_mm_high = high,
          .cells_per_mm_low = static_cast<float>(cells_per_mm - static_cast<double>(high)),
-         .first_table_node = first_table_node,
+         .first_table_node = contact_.first_node(i),
          .centre_x = split_axis((centre(region.x_mm) - map.origin_mm.x) / map.cell_mm +
                                 shaders::MAP_BORDER),
          .centre_y = split_axis((centre(region.y_mm) - map.origin_mm.y) / map.cell_mm +
                                 shaders::MAP_BORDER)});
     const std::vector<shaders::Corners> bordered = corners_with_border(map, *model.prior);
     cells.insert(cells.end(), bordered.begin(), bordered.end());
-  };
-  for (std::size_t i = 0; i < hypotheses.size(); ++i) {
-    append(hypotheses[i].map, contact_.first_node(i));
   }
-  OccupancyGrid none;
-  none.cell_mm = hypotheses.front().map.cell_mm;
-  append(none, contact_.first_node_of_none());
 
   maps_ = stream.uploaded(cells, "maps", VK_FORMAT_R32G32B32A32_SFLOAT);
   objects_ = stream.uploaded(objects, "maps");

@@ -15,8 +15,7 @@ namespace palpate {
 /// own. All maps stand in one table, so that one dispatch weighs all particles.
 class ParticleLikelihood {
  public:
-  /// Records the upload of the maps. A further object, after all others, is of the prior
-  /// everywhere.
+  /// Records the upload of the maps.
   /// @throws Error where the maps together are more than the device reads as a table
   ParticleLikelihood(gpu::Context& context, gpu::CommandStream& stream,
                      std::span<const Hypothesis> hypotheses, const PoseLattice& region,

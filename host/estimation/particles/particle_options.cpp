@@ -44,10 +44,6 @@ void validate(const ParticleOptions& options) {
   require(options.alpha_slow > 0.0 && options.alpha_slow < options.alpha_fast, "alpha_slow",
           options.alpha_slow, "give a rate above 0 and below alpha_fast");
   require(options.alpha_fast <= 1.0, "alpha_fast", options.alpha_fast, "give at most 1");
-  if (options.none_weight) {
-    require(*options.none_weight > 0.0 && std::isfinite(*options.none_weight), "none_weight",
-            *options.none_weight, "give a positive number");
-  }
 }
 
 void require_room(const ParticleOptions& options, const gpu::Context& context) {
@@ -69,9 +65,6 @@ std::vector<shaders::ObjectShare> object_shares(std::span<const Hypothesis> hypo
   std::vector<double> weights;
   for (const Hypothesis& hypothesis : hypotheses) {
     weights.push_back(hypothesis.weight);
-  }
-  if (options.none_weight) {
-    weights.push_back(*options.none_weight);
   }
   // Relative to the largest, for the sum of the weights themselves may be infinite.
   const double largest = *std::max_element(weights.begin(), weights.end());

@@ -20,7 +20,7 @@ void validate(const ParticleOptions& options);
 /// Throws Error where the device cannot hold so many particles, before any memory is taken.
 void require_room(const ParticleOptions& options, const gpu::Context& context);
 
-/// The parts of the objects, and of "none of these" after them, in the initial distribution.
+/// The parts of the objects in the initial distribution.
 std::vector<shaders::ObjectShare> object_shares(std::span<const Hypothesis> hypotheses,
                                                 const ParticleOptions& options);
 

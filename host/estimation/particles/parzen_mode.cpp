@@ -78,20 +78,16 @@ struct SortedParticles {
   double mass(const Range& range) const { return mass_before[range[1]] - mass_before[range[0]]; }
 };
 
-SortedParticles sort(std::span<const shaders::Particle> particles, std::span<const double> weights,
-                     std::uint32_t objects) {
+SortedParticles sort(std::span<const shaders::Particle> particles,
+                     std::span<const double> weights) {
   SortedParticles sorted;
-  for (std::size_t i = 0; i < particles.size(); ++i) {
-    if (particles[i].object < objects) {
-      sorted.largest = std::max(sorted.largest, weights[i]);
-    }
-  }
+  sorted.largest = *std::max_element(weights.begin(), weights.end());
   // All that are left out together change the maximum, at least half the largest weight, by 1e-9.
   const double least = sorted.largest * 1e-10 / static_cast<double>(particles.size());
   std::vector<std::pair<std::uint64_t, std::uint32_t>> order;
   for (std::size_t i = 0; i < particles.size(); ++i) {
     const auto& [object, x_mm, y_mm, theta_rad] = particles[i];
-    if (object < objects && weights[i] > least) {
+    if (weights[i] > least) {
       order.emplace_back(Key::pack(object, sector_of(theta_rad), cell_of(y_mm), cell_of(x_mm)),
                          static_cast<std::uint32_t>(i));
     }
@@ -223,16 +219,12 @@ ParzenMode::ParzenMode(gpu::Context& context, gpu::CommandStream& stream)
   // The driver compiles the kernel at its first run, and no estimate has to wait for that.
   const shaders::Particle particle{};
   const double weight = 1.0;
-  find({&particle, 1}, {&weight, 1}, 1);
+  find({&particle, 1}, {&weight, 1});
 }
 
-std::optional<ParzenMaximum> ParzenMode::find(std::span<const shaders::Particle> particles,
-                                              std::span<const double> weights,
-                                              std::uint32_t objects) {
-  const SortedParticles sorted = sort(particles, weights, objects);
-  if (sorted.key.empty()) {
-    return std::nullopt;
-  }
+ParzenMaximum ParzenMode::find(std::span<const shaders::Particle> particles,
+                               std::span<const double> weights) {
+  const SortedParticles sorted = sort(particles, weights);
   std::vector<Tile> tiles;
   for (const std::uint64_t key : reached_tiles(sorted)) {
     Tile tile = gather(sorted, key);

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <cstdint>
-#include <optional>
 #include <span>
 
 #include "command_stream.hpp"
@@ -29,11 +28,9 @@ class ParzenMode {
   /// Runs the stream.
   ParzenMode(gpu::Context& context, gpu::CommandStream& stream);
 
-  /// None where no particle of the first `objects` objects has any weight. Of points whose
-  /// densities differ by less than about 1e-5 of their value, any may be the answer; its density is
-  /// exact.
-  std::optional<ParzenMaximum> find(std::span<const shaders::Particle> particles,
-                                    std::span<const double> weights, std::uint32_t objects);
+  /// Some particle must have a weight above 0. Of points whose densities differ by less than about
+  /// 1e-5 of their value, any may be the answer; its density is exact.
+  ParzenMaximum find(std::span<const shaders::Particle> particles, std::span<const double> weights);
 
   /// The most device memory that a find() has held at once; it gives all of it back.
   std::uint64_t peak_bytes() const { return peak_bytes_; }

@@ -24,8 +24,7 @@ struct LikelihoodTable {
   /// level of contact, and one level higher for every edge that its pressure reaches.
   std::vector<double> level_edges;
   /// In nats: [level, node] for all objects together, or [object, level, node]. No Contact is the
-  /// first level. With numbers of their own for every object, "none of these" takes, for every
-  /// reading, the plain mean of the objects' likelihoods at the prior's log odds.
+  /// first level.
   std::vector<double> log_likelihood;
 
   /// Number of levels, No Contact included.

@@ -3,7 +3,6 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
-#include <optional>
 #include <span>
 #include <vector>
 
@@ -25,10 +24,9 @@ struct ParticleOptions {
   /// Particles start uniformly distributed over the ranges of this lattice, about its pivot; its
   /// bin counts are ignored.
   PoseLattice region;
-  ContactModel contact = {};               ///< what the sensor says about a place (Eq. 3, 7)
-  std::optional<double> none_weight = {};  ///< see HistogramOptions
-  double motion_mm = 1.0;   ///< standard deviation of the noise added to x and y at each touch
-  double motion_rad = 0.1;  ///< the same for theta
+  ContactModel contact = {};  ///< what the sensor says about a place (Eq. 3, 7)
+  double motion_mm = 1.0;     ///< standard deviation of the noise added to x and y at each touch
+  double motion_rad = 0.1;    ///< the same for theta
   Resampling resampling = Resampling::multinomial;
   /// Augmented MCL (Thrun, Burgard and Fox 2005, Table 8.3), the paper's second variant: each new
   /// particle is a random one with probability max(0, 1 - w_fast / w_slow). Both are running
@@ -77,12 +75,11 @@ class ParticleFilter {
   /// Identity by Eq. 9; the pose is the maximum of the Parzen estimate with a cone kernel (Eq.
   /// 10-12), rho = 1 mm and 1 rad, on a grid of 0.5 mm and 0.04 pi rad through the region's centre.
   /// The mode has no bin, and `mode.log_likelihood` is the log of the Parzen sum's value there, at
-  /// most 0; where all particles are of "none of these", it is -infinity and the mode says nothing.
+  /// most 0.
   ///
   /// `contradicted` uses the best particle of each touch in place of the best bin. It is a hint:
   /// too few particles may miss the pose that explains the touches, and motion noise may carry a
-  /// particle to another pose for each touch. A touch does not count while all particles are of
-  /// "none of these".
+  /// particle to another pose for each touch.
   /// @throws Error if the device fails
   Estimate estimate() const;
 
@@ -90,7 +87,7 @@ class ParticleFilter {
   double effective_sample_size() const;
 
   struct Particle {
-    int object = 0;  ///< index into the hypotheses; their number for "none of these"
+    int object = 0;  ///< index into the hypotheses
     Pose T_object_robot;
     double weight = 0.0;  ///< all together sum to 1
   };

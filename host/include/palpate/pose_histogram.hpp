@@ -25,9 +25,15 @@ struct HistogramOptions {
   /// elements that read something else. The result differs by rounding only. The filter takes twice
   /// the memory.
   bool still_array = false;
-  /// Prior weight of "none of these", relative to the hypotheses' weights: an object that was never
-  /// learned, whose map holds only the prior. Its likelihood is the same at every pose, so it takes
-  /// no bins. Positive; by default "none of these" is left out.
+  /// Prior weight W of "none of these", an object that was never learned, relative to the
+  /// hypotheses' weights. Positive; by default "none of these" is left out.
+  ///
+  /// Each touch of such an object is explained by a piece of some known object, and the pieces
+  /// share no pose: evidence = W s (product over the touches of the touch's mean likelihood). The
+  /// mean is over the hypotheses by weight and over the bins at which the touch's array overlaps
+  /// the box around the object's cells with log odds above 0; over all bins where there is no such
+  /// bin. s is the share of the bins over which the first touch's mean is. So the odds after one
+  /// touch are about those of the weights. "None of these" takes memory for one more belief.
   std::optional<double> none_weight = {};
   /// How far the sensor may really have been from T_robot_sensor, in its own frame, at each touch
   /// by itself. A touch's likelihood is its mean over these displacements. By default poses are

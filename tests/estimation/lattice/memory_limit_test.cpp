@@ -59,7 +59,8 @@ Outcome run(const HistogramOptions& options, std::span<const Touch> touches) {
   PoseHistogram histogram(device, objects, options);
   histogram.update(touches);
   Outcome outcome;
-  outcome.told.push_back(histogram.estimate().identity);
+  const Estimate estimate = histogram.estimate();
+  outcome.told = {estimate.identity, {estimate.none}};
   for (const int object : {0, 1}) {
     const Marginals marginals = histogram.marginals(object);
     outcome.told.insert(outcome.told.end(),
@@ -101,17 +102,18 @@ struct Size {
   int theta;
   std::size_t elements;
   bool still;
+  bool none = false;
 
   friend std::ostream& operator<<(std::ostream& out, const Size& size) {
     return out << size.x << " x " << size.y << " x " << size.theta << " bins, " << size.elements
-               << " elements" << (size.still ? " at rest" : "");
+               << " elements" << (size.still ? " at rest" : "") << (size.none ? ", or none" : "");
   }
 };
 
 class MemoryLimit : public testing::TestWithParam<Size> {};
 
 TEST_P(MemoryLimit, IsKeptAndChangesNoBit) {
-  const auto [x, y, theta, elements, still] = GetParam();
+  const auto [x, y, theta, elements, still, none] = GetParam();
   Recording recording = random_recording(3, elements, 153);
   if (still) {
     recording.T_robot_sensor.assign(3, {{0.7, -0.4}, 0.3});
@@ -121,9 +123,13 @@ TEST_P(MemoryLimit, IsKeptAndChangesNoBit) {
   }
   const std::vector<Touch> touches = all_touches(recording);
   HistogramOptions options = options_of(x, y, theta, still);
+  if (none) {
+    options.none_weight = 1.0;
+  }
   const Outcome unlimited = run(options, touches);
   const std::uint64_t least = least_limit(options);
-  EXPECT_GE(least, unlimited.told.back().size() * 2 * 8) << "two objects' bins";
+  EXPECT_GE(least, unlimited.told.back().size() * 2 * 8 * (none ? 2 : 1))
+      << "two objects' bins, and as many again for one touch by itself";
   for (const std::uint64_t limit : {least, least + least / 20, 2 * least}) {
     options.memory_limit_bytes = limit;
     const Outcome limited = run(options, touches);
@@ -136,7 +142,8 @@ TEST_P(MemoryLimit, IsKeptAndChangesNoBit) {
 INSTANTIATE_TEST_SUITE_P(Sizes, MemoryLimit,
                          testing::Values(Size{1, 1, 1, 36, false}, Size{25, 25, 16, 36, false},
                                          Size{9, 7, 1001, 300, false}, Size{60, 50, 40, 36, false},
-                                         Size{25, 25, 100, 400, true}));
+                                         Size{25, 25, 100, 400, true},
+                                         Size{25, 25, 16, 36, false, true}));
 
 TEST(MemoryLimit, ThatIsTooLowIsRefusedWithWhatIsNeeded) {
   HistogramOptions options = options_of(100, 100, 100, false);

@@ -174,59 +174,6 @@ TEST(ParticleFilter, TheSeedDecidesEveryBit) {
   }
 }
 
-TEST(ParticleFilter, NoneOfTheseCompetesByThePriorAlone) {
-  std::vector<Hypothesis> objects = three_objects();
-  ParticleOptions options{.particles = 40'000, .region = {}};
-  options.motion_mm = 0.0;
-  options.motion_rad = 0.0;
-  options.none_weight = 4.0;
-  Device device = Device::open();
-  ParticleFilter filter(device, objects, options);
-  EXPECT_NEAR(filter.estimate().none, 0.5, 1e-12) << "its weight against 1 + 2 + 1";
-  const Recording recording = random_recording(1, 5, 441);
-  const Touch touch = recording.touch(0);
-  filter.update(touch);
-
-  // Every other particle's weight against that of none must be the reference's ratio.
-  const ContactModel model{.gamma = 0.1, .prior = 0.2};
-  double none_likelihood = 0.0;
-  for (const ElementReading& element : known_readings(touch, {})) {
-    none_likelihood += model.log_likelihood(element.reading, {log_odds_from_probability(0.2)});
-  }
-  double none_weight = 0.0;
-  std::vector<reference::Particle> weighed;
-  const auto particles = filter.particles();
-  for (const auto& particle : particles) {
-    none_weight = particle.object == 3 ? particle.weight : none_weight;
-    weighed.push_back({particle.object, particle.T_object_robot, particle.weight});
-  }
-  for (const auto& particle : particles) {
-    if (particle.object == 3) {
-      EXPECT_EQ(particle.weight, none_weight);
-      continue;
-    }
-    const double expected = reference::log_likelihood(touch, particle.T_object_robot,
-                                                      objects[particle.object].map, model);
-    EXPECT_NEAR(std::log(particle.weight / none_weight), expected - none_likelihood, per_touch);
-  }
-  const Estimate estimate = filter.estimate();
-  std::vector<double> identity = reference::identity(weighed, 4);
-  EXPECT_NEAR(estimate.none, identity.back(), 1e-12) << "float64 sums";
-  identity.pop_back();
-  EXPECT_LT(largest_difference(estimate.identity, identity), 1e-12);
-  EXPECT_LT(estimate.mode.object, 3);
-}
-
-TEST(ParticleFilter, AModeThatNoParticleSupportsHasNoDensity) {
-  ParticleOptions options{.particles = 1, .region = {}};
-  options.none_weight = 1e9;
-  Device device = Device::open();
-  const Estimate estimate = ParticleFilter(device, three_objects(), options).estimate();
-  EXPECT_EQ(estimate.none, 1.0);
-  EXPECT_EQ(estimate.mode.object, 0);
-  EXPECT_EQ(estimate.mode.log_likelihood, -std::numeric_limits<double>::infinity());
-}
-
 TEST(ParticleFilter, RunsWithAMillionParticles) {
   const std::vector<Hypothesis> objects = three_objects();
   const ParticleOptions options{.particles = 1'000'000, .region = {}};
@@ -282,7 +229,6 @@ TEST(ParticleFilter, OptionsOutOfRangeAreRefused) {
     refuse([&](ParticleOptions& o) { o.alpha_slow = rate; }, "alpha_slow = ");
   }
   refuse([](ParticleOptions& o) { o.alpha_fast = 1.1; }, "alpha_fast = ");
-  refuse([](ParticleOptions& o) { o.none_weight = 0.0; }, "none_weight = ");
   refuse([](ParticleOptions& o) { o.contact.gamma = 1.0; }, "gamma = ");
   refuse([](ParticleOptions& o) { o.contact.prior = 0.0; }, "prior = ");
   refuse([](ParticleOptions& o) { o.region.y_mm = {0.0, 2e5, 1}; }, "region y_mm = ");
