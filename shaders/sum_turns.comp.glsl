@@ -76,8 +76,13 @@ Tap tap_at(const int k, const uint object, const uint theta, const int x, const 
   const int steps = int(push.steps);
   int from = int(theta) + k;
   tap.used = push.around != 0 || (from >= 0 && from < all);
-  from = push.around != 0 ? from - all * int(floor(float(from) / float(all)))
-                          : clamp(from, 0, all - 1);
+  if (push.around != 0) {
+    // A Gaussian as wide as the circle reaches four turns.
+    [[unroll]] for (int turn = 0; turn < 4; ++turn) {
+      from += from < 0 ? all : from >= all ? -all : 0;
+    }
+  }
+  from = clamp(from, 0, all - 1);
   const int here = int(push.slab.theta_first);
   int first_theta = here;
   tap.slab = 0;
@@ -107,9 +112,11 @@ Tap tap_at(const int k, const uint object, const uint theta, const int x, const 
 
 vec2 texel_words(const Tap tap, const int texel) {
   if (ONE_SLAB || tap.slab == 0) {
-    return texelFetch(source, texel).xz;
+    return texelFetch(source, min(texel, textureSize(source) - 1)).xz;
   }
-  return tap.slab == 1 ? texelFetch(source_before, texel).xz : texelFetch(source_after, texel).xz;
+  return tap.slab == 1
+             ? texelFetch(source_before, min(texel, textureSize(source_before) - 1)).xz
+             : texelFetch(source_after, min(texel, textureSize(source_after) - 1)).xz;
 }
 
 float word_at(const Tap tap, const int column, const int row) {
@@ -117,9 +124,10 @@ float word_at(const Tap tap, const int column, const int row) {
   return texel_words(tap, bin / 2)[bin % 2];
 }
 
-// Words of three neighbouring columns; of those outside the plane, any finite number.
-vec3 words_from(const Tap tap, const int column, const int row) {
-  const int bin = max(int(tap.first) + row * int(push.slab.nx) + column, -2);
+// Words of three neighbouring columns; of those outside the plane, any number.
+vec3 words_from(const Tap tap, const int row) {
+  const int nx = int(push.slab.nx);
+  const int bin = int(tap.first) + row * nx + clamp(tap.column, -2, nx - 1);
   const vec2 left = texel_words(tap, max(bin >> 1, 0));
   const vec2 right = texel_words(tap, (bin >> 1) + 1);
   return (bin & 1) == 0 ? vec3(left, right.x) : vec3(left.y, right);
@@ -162,32 +170,35 @@ void main() {
   }
   for (int k = -steps; k <= steps; ++k) {
     const Tap tap = tap_at(k, object, theta, x, y);
-    // Weights of the three columns that the bins' places lie between.
-    const float inside[3] = float[](tap.used && tap.column >= 0 && tap.column < nx ? 1.0 : 0.0,
-                                    tap.used && tap.column >= -1 && tap.column < nx - 1 ? 1.0 : 0.0,
-                                    tap.used && tap.column >= -2 && tap.column < nx - 2 ? 1.0 : 0.0);
-    const float plane =
-        tap.weight * (IN_LOGS ? 1.0 : exp(max(tap.largest - largest, BLUR_SMALLEST)));
+    // The three columns that the bins' places lie between.
+    const bvec3 inside = bvec3(tap.used && tap.column >= 0 && tap.column < nx,
+                               tap.used && tap.column >= -1 && tap.column < nx - 1,
+                               tap.used && tap.column >= -2 && tap.column < nx - 2);
+    const vec3 counts = vec3(inside);
+    // The plane's largest over the largest of all. Its root: a float holds it where the words' lift
+    // still makes the product too small to count.
+    const float root =
+        IN_LOGS ? 1.0 : exp(0.5 * max(tap.largest - largest, 2.0 * BLUR_SMALLEST));
     const float of_plane = IN_LOGS ? largest : 0.0;
     vec2 below = vec2(0.0);
     vec2 below_weight = vec2(0.0);
     [[unroll]] for (uint r = 0; r <= ROWS; ++r) {
       const int row = tap.row + int(r);
       const bool row_inside = row >= 0 && row < ny;
-      const vec3 words = words_from(tap, tap.column, row_inside ? row : 0);
-      const float left = inside[0] * lifted(words.x, of_plane);
-      const float middle = inside[1] * lifted(words.y, of_plane);
-      const float right = inside[2] * lifted(words.z, of_plane);
+      const vec3 words = words_from(tap, row_inside ? row : 0);
+      const float left = inside.x ? lifted(words.x, of_plane) : 0.0;
+      const float middle = inside.y ? lifted(words.y, of_plane) : 0.0;
+      const float right = inside.z ? lifted(words.z, of_plane) : 0.0;
       const vec2 above = row_inside ? vec2(tap.x.x * left + tap.x.y * middle,
                                            tap.x.x * middle + tap.x.y * right)
                                     : vec2(0.0);
-      const vec2 above_weight = row_inside ? vec2(tap.x.x * inside[0] + tap.x.y * inside[1],
-                                                  tap.x.x * inside[1] + tap.x.y * inside[2])
+      const vec2 above_weight = row_inside ? vec2(tap.x.x * counts.x + tap.x.y * counts.y,
+                                                  tap.x.x * counts.y + tap.x.y * counts.z)
                                            : vec2(0.0);
       if (r > 0) {
         [[unroll]] for (uint c = 0; c < COLUMNS; ++c) {
           const uint b = (r - 1) * COLUMNS + c;
-          sum[b] += plane * (tap.y.x * below[c] + tap.y.y * above[c]);
+          sum[b] += tap.weight * root * (root * (tap.y.x * below[c] + tap.y.y * above[c]));
           weight[b] +=
               tap.weight * (tap.y.x * below_weight[c] + tap.y.y * above_weight[c]);
         }

@@ -214,7 +214,9 @@ double none_log_evidence(std::span<const Touch> touches, const PoseLattice& latt
     total_weight += hypothesis.weight;
   }
   double evidence = 0.0;
+  bool felt = false;
   for (std::size_t i = 0; i < touches.size(); ++i) {
+    bool known = false;  // a touch without a known element is as likely everywhere: 1
     LogMean mean;
     LogMean mean_everywhere;
     double share = 0.0;
@@ -223,16 +225,21 @@ double none_log_evidence(std::span<const Touch> touches, const PoseLattice& latt
       for (std::int64_t bin = 0; bin < lattice.bins(); ++bin) {
         const double l = log_likelihood[i][object][static_cast<std::size_t>(bin)];
         mean_everywhere.add(weight, l);
+        known = known || l != 0.0;
         if (overlaps(touches[i], bin_pose(lattice, bin), map)) {
           mean.add(weight, l);
           share += weight / total_weight / static_cast<double>(lattice.bins());
         }
       }
     }
+    if (!known) {
+      continue;
+    }
     evidence += share > 0.0 ? mean.value() : mean_everywhere.value();
-    if (i == 0 && share > 0.0) {
+    if (!felt && share > 0.0) {
       evidence += std::log(share);
     }
+    felt = true;
   }
   return evidence;
 }

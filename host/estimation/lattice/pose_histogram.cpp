@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numeric>
 #include <optional>
 
 #include <fmt/format.h>
@@ -125,19 +124,25 @@ struct PoseHistogram::Impl {
     return by_touch ? by_touch->lost_mass()[object] : 0.0;
   }
 
-  /// Eq. 14: an object's prior weight times the summed likelihood of its bins, over the sum for all
-  /// objects and, where the options ask for it, "none of these", which stands last.
-  std::vector<double> identity() {
+  /// Log of every object's prior weight times the summed likelihood of its bins.
+  std::vector<double> log_evidence() {
     std::vector<double> log_evidence;
     for (std::size_t i = 0; i < log_weight.size(); ++i) {
       const BeliefSummary& summary = summaries()[i];
       log_evidence.push_back(log_weight[i] + lost_mass(i) + summary.max.value() +
                              std::log(summary.sum));
     }
+    return log_evidence;
+  }
+
+  /// Eq. 14: an object's evidence over the sum for all objects and, where the options ask for it,
+  /// "none of these", which stands last.
+  std::vector<double> identity() {
+    std::vector<double> evidence = log_evidence();
     if (none_log_weight) {
-      log_evidence.push_back(*none_log_weight + by_touch->none_log_evidence());
+      evidence.push_back(*none_log_weight + by_touch->none_log_evidence());
     }
-    return normalised(std::move(log_evidence));
+    return normalised(std::move(evidence));
   }
 
   /// Eq. 15-16: the bin of the largest posterior probability; of equal bins the first object's.
@@ -318,13 +323,11 @@ std::vector<double> PoseHistogram::log_likelihood(int object) const {
 
 double PoseHistogram::entropy() const {
   Impl& histogram = whole();
-  const std::vector<double> identity = histogram.identity();
-  const std::size_t objects = histogram.log_weight.size();
-  const double all = std::accumulate(identity.begin(), identity.begin() + objects, 0.0);
+  const std::vector<double> identity = normalised(histogram.log_evidence());
   double entropy = 0.0;
-  for (std::size_t i = 0; i < objects; ++i) {
+  for (std::size_t i = 0; i < identity.size(); ++i) {
     // So unlikely an object adds less than 1e-7 nats, however many bins it has.
-    if (const double p = identity[i] / all; p > 1e-9) {
+    if (const double p = identity[i]; p > 1e-9) {
       entropy += p * (histogram.belief.entropy(i, histogram.summaries()[i]) - std::log(p));
     }
   }
@@ -334,16 +337,14 @@ double PoseHistogram::entropy() const {
 std::vector<PoseSample> PoseHistogram::sample(std::size_t count, std::uint64_t seed) const {
   Impl& histogram = whole();
   Random random(seed, Stream::belief);
-  const std::vector<double> identity = histogram.identity();
-  const std::size_t objects = histogram.log_weight.size();
-  const double all = std::accumulate(identity.begin(), identity.begin() + objects, 0.0);
+  const std::vector<double> identity = normalised(histogram.log_evidence());
+  const std::size_t objects = identity.size();
   // One draw in each of `count` equal parts of the belief: less variance than independent draws.
   std::vector<std::vector<double>> parts(objects);
   double before = 0.0;
   std::size_t object = 0;
   for (std::size_t i = 0; i < count; ++i) {
-    const double at =
-        (static_cast<double>(i) + random.uniform()) / static_cast<double>(count) * all;
+    const double at = (static_cast<double>(i) + random.uniform()) / static_cast<double>(count);
     while (object + 1 < objects && before + identity[object] <= at) {
       before += identity[object++];
     }

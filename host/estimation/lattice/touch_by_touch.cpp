@@ -82,6 +82,7 @@ void TouchByTouch::reset() {
   std::fill(lost_mass_.begin(), lost_mass_.end(), 0.0);
   none_log_evidence_ = 0.0;
   touched_ = false;
+  felt_ = false;
 }
 
 void TouchByTouch::evaluate_planes(const std::function<void(const DenseBelief&)>& evaluate) {
@@ -116,7 +117,8 @@ void TouchByTouch::update(const Touch& touch, const ContactEvidence& evidence,
       touch_turns(options_.lattice, touch.T_robot_sensor.translation_mm - options_.lattice.pivot_mm,
                   touch_blur_.theta_steps());
   touch_blur_.sum_turns(scratch_, turns, belief);
-  if (overlap_) {
+  // A touch without a known element says nothing, not even where the array was.
+  if (overlap_ && !evidence.segments.empty()) {
     add_to_none(touch);
   }
   stream_.run();
@@ -148,8 +150,9 @@ void TouchByTouch::add_to_none(const Touch& touch) {
   }
   const double bins = weighted_bins(sums, log_weight_);
   none_log_evidence_ += weighted_log_sum(sums, log_weight_) - std::log(bins);
-  if (!touched_) {
+  if (!felt_) {
     none_log_evidence_ += std::log(bins / static_cast<double>(options_.lattice.bins()));
+    felt_ = true;
   }
 }
 

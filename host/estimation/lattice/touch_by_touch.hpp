@@ -70,6 +70,7 @@ class TouchByTouch {
   std::vector<double> lost_mass_;
   double none_log_evidence_ = 0.0;
   bool touched_ = false;
+  bool felt_ = false;  ///< by a touch with a known element
 };
 
 }  // namespace palpate

@@ -6,6 +6,7 @@
 #include <functional>
 #include <vector>
 
+#include <glm/geometric.hpp>
 #include <gtest/gtest.h>
 
 #include "palpate/error.hpp"
@@ -98,6 +99,10 @@ std::vector<Case> cases() {
   far.theta_rad = {0.7, 0.718, 9};
   const PoseLattice fine{
       .x_mm = {-1.8, 1.8, 37}, .y_mm = {-0.7, 0.7, 13}, .theta_rad = {0, 0.39, 7}};
+  const PoseLattice near{.x_mm = {-5.0, 5.0, 9},
+                         .y_mm = {-5.0, 5.0, 10},
+                         .theta_rad = {0, two_pi, 40},
+                         .pivot_mm = {3.0, -2.0}};
   const DisplacementSd sd{.mm = 1.0, .rad = 0.2};
   return {{"plain", plain, sd},
           {"part of the circle", part, sd},
@@ -109,7 +114,9 @@ std::vector<Case> cases() {
           {"as wide as the region", part, {.mm = 9.0, .rad = 1.5}},
           // Without a floor a single element may cost a thousand nats: neighbouring bins then lie
           // farther apart than a float's range.
-          {"no floor, fine", fine, {.mm = 0.4, .rad = 0.04}, 0.0}};
+          {"no floor, fine", fine, {.mm = 0.4, .rad = 0.04}, 0.0},
+          // Neighbouring planes lie farther apart than the range of a float, too.
+          {"no floor", near, sd, 0.0}};
 }
 
 class TouchByTouch : public testing::Test {
@@ -130,6 +137,24 @@ TEST_F(TouchByTouch, AveragesATouchAsTheReferenceDoes) {
     const std::span<const Touch> two = std::span(touches).first(2);
     histogram.update(two);
     EXPECT_LT(likelihood_error(histogram, expected_posterior(options, two)), 2 * per_mean);
+  }
+}
+
+TEST_F(TouchByTouch, AveragesALargeArray) {
+  // 900 elements tell planes apart by hundreds of nats, floor or not.
+  const Recording large = random_recording(1, 900, 74);
+  const Touch touch = large.touch(0);
+  for (const double gamma : {0.1, 1e-6}) {
+    HistogramOptions options{
+        .lattice = {.x_mm = {-3.0, 3.0, 9}, .y_mm = {-3.0, 3.0, 8}, .theta_rad = {0, two_pi, 30}},
+        .touch_sd = {.mm = 1.0, .rad = 0.2}};
+    options.contact.gamma = gamma;
+    options.contact.prior = 0.2;
+    PoseHistogram histogram(device, objects(), options);
+    histogram.update(touch);
+    // Rounding of a touch's own likelihood grows with its elements, 1e-4 nats for 36.
+    EXPECT_LT(likelihood_error(histogram, expected_posterior(options, std::span(&touch, 1))),
+              per_mean + 1e-4 * 900.0 / 36.0);
   }
 }
 
@@ -251,6 +276,47 @@ TEST_F(TouchByTouch, NoneIsTheProductOfMeanLikelihoods) {
       }
     }
   }
+}
+
+TEST_F(TouchByTouch, NoneIsDeafToATouchWithoutAKnownElement) {
+  const std::vector<std::uint8_t> dead(touches[0].elements_mm.size(), 0);
+  Touch silent = touches[0];
+  silent.T_robot_sensor.translation_mm += glm::dvec2(100.0, 0.0);
+  silent.valid = dead;
+  const HistogramOptions options{.lattice = cases().front().lattice, .none_weight = 3.0};
+  PoseHistogram histogram(device, objects(), options);
+  PoseHistogram without(device, objects(), options);
+  histogram.update(silent);
+  EXPECT_NEAR(histogram.estimate().none, 0.5, 1e-12);
+  for (const Touch& touch : touches) {
+    histogram.update(touch);
+    histogram.update(silent);
+    without.update(touch);
+  }
+  EXPECT_NEAR(histogram.estimate().none, without.estimate().none, 1e-9);
+}
+
+TEST_F(TouchByTouch, SamplesTheObjectsWhereNoneTakesAllOfTheMass) {
+  HistogramOptions options{.lattice = cases().front().lattice, .none_weight = 1e300};
+  PoseHistogram histogram(device, objects(), options);
+  options.none_weight.reset();
+  PoseHistogram without(device, objects(), options);
+  // Weights of 1e300 alone leave the objects 1e-300; touches that share no object do the rest.
+  for (int round = 0; round < 8; ++round) {
+    histogram.update(touches);
+    without.update(touches);
+  }
+  ASSERT_EQ(histogram.estimate().none, 1.0);
+  EXPECT_NEAR(histogram.entropy(), without.entropy(), 1e-2);
+  const std::vector<PoseSample> drawn = histogram.sample(64, 5);
+  const std::vector<PoseSample> expected = without.sample(64, 5);
+  ASSERT_EQ(drawn.size(), expected.size());
+  int other_object = 0;
+  for (std::size_t i = 0; i < drawn.size(); ++i) {
+    other_object += drawn[i].object != expected[i].object ? 1 : 0;
+    EXPECT_LT(glm::length(drawn[i].T_object_robot.translation_mm), 30.0);
+  }
+  EXPECT_LE(other_object, 1);
 }
 
 TEST_F(TouchByTouch, NoneTakesAllBinsWhereTheArrayMeetsNoObject) {
