@@ -36,6 +36,16 @@ void refuse_beside_fit(std::span<const OtherFlag> flags, const RecognitionTask& 
            "finds what --touch-sd-mm and --touch-sd-deg, or the scene's touch_sd, say already; "
            "leave those out");
   }
+  if (!histogram->slip_sd.none()) {
+    refuse("--fit-touch-sd",
+           "takes objects to rest between touches; leave out --slip-sd-mm and --slip-sd-deg, or "
+           "the scene's slip_sd");
+  }
+  if (histogram->none_weight) {
+    refuse("--fit-touch-sd",
+           "takes every unknown to be one of the maps' objects; leave out --none, or the scene's "
+           "none");
+  }
 }
 
 std::vector<TouchedObject> touched_objects(std::span<const Recording> recordings,

@@ -1,3 +1,5 @@
+#include <map>
+
 #include "program.hpp"
 #include "sample_files.hpp"
 
@@ -42,6 +44,34 @@ TEST_F(FitTouchSd, IsRefusedBesideFlagsOfOneResult) {
   }
   expect_refused({"recognize", "u.h5", "--maps", "maps", "--fit-touch-sd", "--each-frame"},
                  {"--each-frame", "--fit-touch-sd"});
+}
+
+TEST_F(FitTouchSd, IsRefusedBesideOtherUncertainties) {
+  const std::vector<std::pair<std::string, std::vector<std::string>>> refused{
+      {"--touch-sd-mm=1", {"--touch-sd-mm"}},    {"--touch-sd-deg=3", {"--touch-sd-deg"}},
+      {"--slip-sd-mm=0.5", {"--slip-sd-mm"}},    {"--slip-sd-deg=2", {"--slip-sd-deg"}},
+      {"--none=2", {"--none", "maps' objects"}},
+  };
+  for (const auto& [flag, named] : refused) {
+    std::vector<std::string> with_flag = fit_;
+    with_flag.push_back(flag);
+    std::vector<std::string> words = named;
+    words.emplace_back("--fit-touch-sd");
+    expect_refused(with_flag, words);
+  }
+}
+
+TEST_F(FitTouchSd, IsRefusedWhereTheSceneHasOtherUncertainties) {
+  for (const auto& [keys, named] : std::map<std::string, std::string>{
+           {"touch_sd: {mm: 1, deg: 3}\n", "scene's touch_sd"},
+           {"slip_sd: {mm: 0.5}\n", "scene's slip_sd"},
+           {"none: 2\n", "scene's none"},
+       }) {
+    put_bytes(folder_ / "scene.yaml", keys);
+    std::vector<std::string> with_scene = fit_;
+    with_scene.insert(with_scene.end(), {"--scene", "scene.yaml"});
+    expect_refused(with_scene, {"--fit-touch-sd", named});
+  }
 }
 
 }  // namespace
