@@ -75,12 +75,14 @@ Json measure(const BeliefInputs& inputs, const Misplacement& misplacement, Repor
 
 Json measure_touch_sd(const BeliefInputs& inputs, Report& report) {
   constexpr double rad_per_mm = 0.05;
-  constexpr std::array<double, 5> all_mm{1.0, 0.3, 0.5, 2.0, 0.0};
-  const std::size_t count = inputs.options.quick ? 1 : all_mm.size();
+  constexpr std::array<double, 5> all_mm{0.3, 0.5, 1.0, 2.0, 0.0};
+  constexpr double quick_mm = 1.0;
   Json records = Json::array();
-  for (std::size_t i = 0; i < count; ++i) {
-    records.push_back(
-        measure(inputs, {.sd = {all_mm[i], rad_per_mm * all_mm[i]}, .index = i}, report));
+  for (std::size_t i = 0; i < all_mm.size(); ++i) {
+    const double mm = all_mm[i];
+    if (!inputs.options.quick || mm == quick_mm) {
+      records.push_back(measure(inputs, {.sd = {mm, rad_per_mm * mm}, .index = i}, report));
+    }
   }
   return records;
 }

@@ -73,7 +73,10 @@ std::string touch_sd_text(const TouchSdFit& fit) {
                       number_of(fit.unknowns, "unknown", "unknowns"),
                       number_of(fit.touches, "touch", "touches"), fit.evidence_gain);
   if (fit.sd.mm == 0.0 || fit.sd.rad == 0.0) {
-    text += "exact: not distinguishable from 0, given the maps\n";
+    text += fmt::format(
+        "exact: below about {:.2g} mm, or {:.2g} deg, which cannot be told from 0 with these maps "
+        "and this array\n",
+        fit.resolution.mm, degrees(fit.resolution.rad));
   }
   for (const std::string& warning : fit.warnings) {
     text += "warning: " + warning + "\n";

@@ -32,6 +32,9 @@ TEST_F(FitTouchSd, ReportsTheDeviationsAndTheFlagsToPaste) {
   EXPECT_GE(fit["touch_sd"]["mm"], 0.0);
   EXPECT_GE(fit["touch_sd"]["deg"], 0.0);
   EXPECT_EQ(fit["exact"]["mm"], fit["touch_sd"]["mm"] == 0.0);
+  EXPECT_EQ(text.find("cannot be told from 0") != std::string::npos,
+            fit["exact"]["mm"] || fit["exact"]["deg"])
+      << text;
   EXPECT_NE(text.find("\n" + fit["flags"].get<std::string>() + "\n"), std::string::npos) << text;
   EXPECT_NE(text.find("fewer than 3 touches"), std::string::npos) << text;
 }
