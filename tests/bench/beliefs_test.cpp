@@ -67,7 +67,7 @@ TEST(Beliefs, TellHowFarTouchesAreMisplaced) {
   ASSERT_EQ(records.size(), 1U);
   const auto& fit = records.at(0);
   EXPECT_EQ(fit.at("true").at("mm"), 1.0);
-  // Ten unknowns of six touches leave standard errors of about 10 and 20 %; these are three.
+  // Ten unknowns of six touches leave standard errors of 8 and 25 %; these are more than two.
   EXPECT_NEAR(fit.at("fitted").at("mm"), 1.0, 0.3);
   EXPECT_NEAR(fit.at("fitted").at("rad"), 0.05, 0.03);
   EXPECT_GT(fit.at("gain_nats"), 0.0);
