@@ -14,8 +14,8 @@ namespace {
 constexpr const char* picture_name = "misplaced_unknown.png";
 
 Json measure(const std::string& part, const BeliefInputs& inputs, Report& report) {
-  constexpr decltype(&measure_misplaced) measures[] = {measure_misplaced, measure_none,
-                                                       measure_slip, measure_plan, measure_costs};
+  constexpr decltype(&measure_misplaced) measures[] = {
+      measure_misplaced, measure_touch_sd, measure_none, measure_slip, measure_plan, measure_costs};
   static_assert(std::size(measures) == std::size(belief_parts));
   const auto* const at = std::ranges::find(belief_parts, part);
   return measures[at - std::begin(belief_parts)](inputs, report);

@@ -162,7 +162,7 @@ std::vector<const char*> belief_figures(const std::string& part) {
   if (part == "misplaced") {
     return {"misplaced", "sureness"};
   }
-  if (part == "cost") {
+  if (part == "touch-sd" || part == "cost") {
     return {};
   }
   return {*std::ranges::find(belief_parts, part)};

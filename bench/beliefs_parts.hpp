@@ -27,6 +27,8 @@ struct BeliefInputs {
 
 /// Touches that lie beside the reported poses, as if exact and averaged.
 Json measure_misplaced(const BeliefInputs& inputs, Report& report);
+/// Standard deviations of misplaced touches, as the touches alone tell them.
+Json measure_touch_sd(const BeliefInputs& inputs, Report& report);
 /// "None of these", with exact and with misplaced touches.
 Json measure_none(const BeliefInputs& inputs, Report& report);
 /// Objects that move between touches.

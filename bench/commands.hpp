@@ -31,7 +31,8 @@ struct BeliefsOptions : RunOptions {
   std::optional<int> trials;  ///< per letter and shape; by default each part's own
 };
 /// Names of the parts, in order.
-inline constexpr const char* belief_parts[] = {"misplaced", "none", "slip", "plan", "cost"};
+inline constexpr const char* belief_parts[] = {"misplaced", "touch-sd", "none",
+                                               "slip",      "plan",     "cost"};
 
 struct SweepOptions : RunOptions {
   std::string html;                      ///< file for a page with charts and tables
@@ -62,8 +63,9 @@ void run_experiment(const ExperimentOptions& options, std::span<char* const> com
 void measure_fit(const FitOptions& options, std::span<char* const> command_line);
 
 /// How honest beliefs are: touches that are not quite where the robot says, with and without
-/// averaging over where they may have been; objects that nobody learned and "none of these";
-/// objects that slip; planned touches beside random ones; and the time and memory of all these.
+/// averaging over where they may have been; how well touches tell how far they are misplaced;
+/// objects that nobody learned and "none of these"; objects that slip; planned touches beside
+/// random ones; and the time and memory of all these.
 void measure_beliefs(const BeliefsOptions& options, std::span<char* const> command_line);
 
 /// Speed against error on simulated letters: every filter at counts from 100 to 10,000,000 bins per

@@ -67,9 +67,10 @@ int main(int argc, char** argv) try {
                       "Trials per letter and shape (default 20, or 2 with --quick)");
   BeliefsOptions beliefs;
   command = add_command(app, "beliefs",
-                        "Measure how honest beliefs are, in some 25 minutes on two CPU cores: "
-                        "misplaced touches, objects never learned, objects that slip, planned "
-                        "touches, and what each costs",
+                        "Measure how honest beliefs are, in some 40 minutes on two CPU cores: "
+                        "misplaced touches, how well touches tell how far they are misplaced, "
+                        "objects never learned, objects that slip, planned touches, and what each "
+                        "costs",
                         beliefs, measure_beliefs, command_line);
   command->add_option("--part", beliefs.part, "Measure only this part")
       ->check(CLI::IsMember(

@@ -36,6 +36,16 @@ void refuse_beside_fit(std::span<const OtherFlag> flags, const RecognitionTask& 
            "finds what --touch-sd-mm and --touch-sd-deg, or the scene's touch_sd, say already; "
            "leave those out");
   }
+  if (!histogram->slip_sd.none()) {
+    refuse("--fit-touch-sd",
+           "takes objects to rest between touches; leave out --slip-sd-mm and --slip-sd-deg, or "
+           "the scene's slip_sd");
+  }
+  if (histogram->none_weight) {
+    refuse("--fit-touch-sd",
+           "takes every unknown to be one of the maps' objects; leave out --none, or the scene's "
+           "none");
+  }
 }
 
 std::vector<TouchedObject> touched_objects(std::span<const Recording> recordings,
@@ -63,7 +73,10 @@ std::string touch_sd_text(const TouchSdFit& fit) {
                       number_of(fit.unknowns, "unknown", "unknowns"),
                       number_of(fit.touches, "touch", "touches"), fit.evidence_gain);
   if (fit.sd.mm == 0.0 || fit.sd.rad == 0.0) {
-    text += "exact: not distinguishable from 0, given the maps\n";
+    text += fmt::format(
+        "exact: below about {:.2g} mm, or {:.2g} deg, which cannot be told from 0 with these maps "
+        "and this array\n",
+        fit.resolution.mm, degrees(fit.resolution.rad));
   }
   for (const std::string& warning : fit.warnings) {
     text += "warning: " + warning + "\n";

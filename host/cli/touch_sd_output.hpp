@@ -18,7 +18,8 @@ struct OtherFlag {
   bool given = false;
 };
 
-/// Throws Error where one of the flags was given, or the task has particles or a touch-sd.
+/// Throws Error where one of the flags was given, or the task has particles, a touch-sd, a slip-sd
+/// or "none of these".
 void refuse_beside_fit(std::span<const OtherFlag> flags, const RecognitionTask& task);
 
 /// The unknowns as the fit takes them: a recording that names an object of the task has its label.

@@ -124,9 +124,9 @@ std::vector<Start> recognise_all(Device& device, const RecognitionTask& task,
   return starts;
 }
 
-/// Standard deviations that move elements by a tenth of a map's cell.
-DisplacementSd least_sd(const RecognitionTask& task, std::span<const TouchedObject> unknowns) {
-  constexpr double of_a_cell = 0.1;
+/// TouchSdFit::resolution.
+DisplacementSd resolution_of(const RecognitionTask& task, std::span<const TouchedObject> unknowns) {
+  constexpr double of_a_cell = 0.3;
   double cell_mm = task.hypotheses.front().map.cell_mm;
   for (const Hypothesis& hypothesis : task.hypotheses) {
     cell_mm = std::min(cell_mm, hypothesis.map.cell_mm);
@@ -173,7 +173,10 @@ std::vector<std::string> warnings_about(std::span<const TouchedObject> unknowns,
     warnings.emplace_back("the evidence has no clear maximum; give more touches");
   } else if (fit.standard_error.mm > much * fit.sd.mm ||
              fit.standard_error.rad > much * fit.sd.rad) {
-    warnings.emplace_back("the standard errors are large; give more unknowns");
+    warnings.emplace_back(
+        "the standard errors are large: where more unknowns do not mend that, an array of this "
+        "size "
+        "does not tell more");
   }
   return warnings;
 }
@@ -211,9 +214,11 @@ TouchSdFit fit_touch_sd(Device& device, const RecognitionTask& task,
     populations.emplace_back(touches[i], maps, readings, starts[i].region, starts[i].samples,
                              options.seed + i);
   }
+  fit.resolution = resolution_of(task, unknowns);
+  constexpr double least_part = 3.0;
+  const DisplacementSd least{fit.resolution.mm / least_part, fit.resolution.rad / least_part};
   const LargestEvidence found = find_largest_evidence(
-      populations, readings,
-      {.start = options.start, .least = least_sd(task, unknowns), .sweeps = options.sweeps},
+      populations, readings, {.start = options.start, .least = least, .sweeps = options.sweeps},
       [&](double fraction) {
         if (progress) {
           progress(recognising_share + (1.0 - recognising_share) * fraction);

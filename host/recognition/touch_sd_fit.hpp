@@ -32,9 +32,12 @@ struct TouchSdFitOptions {
 /// Standard deviations of the touches' poses about the poses that the robot reported.
 struct TouchSdFit {
   DisplacementSd sd;  ///< 0: not distinguishable from 0, given the maps
-  /// One standard error, from the scatter of the unknowns' scores about 0 and the evidence's
-  /// curvature; 0 where sd is 0.
+  /// One standard error, from the scatter of the unknowns' scores about 0, the evidence's curvature
+  /// and what a wrong width of the touches' likelihoods does; 0 where sd is 0.
   DisplacementSd standard_error;
+  /// Below about this, sd cannot be told from 0: it moves the outermost elements by less than 0.3
+  /// of a map's cell.
+  DisplacementSd resolution;
   /// By how much the log evidence at sd exceeds the log evidence of exact poses, in nats.
   double evidence_gain = 0.0;
   std::size_t unknowns = 0;

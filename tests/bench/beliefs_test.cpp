@@ -61,6 +61,18 @@ TEST(Beliefs, OfMisplacedTouchesAreLessSureOfThemselvesWhereAveraged) {
                         "misplaced_unknown.png"});
 }
 
+TEST(Beliefs, TellHowFarTouchesAreMisplaced) {
+  const ScratchFolder folder;
+  const auto records = quick_run(folder, "touch-sd").at("touch-sd");
+  ASSERT_EQ(records.size(), 1U);
+  const auto& fit = records.at(0);
+  EXPECT_EQ(fit.at("true").at("mm"), 1.0);
+  // Ten unknowns of six touches leave standard errors of 8 and 25 %; these are more than two.
+  EXPECT_NEAR(fit.at("fitted").at("mm"), 1.0, 0.3);
+  EXPECT_NEAR(fit.at("fitted").at("rad"), 0.05, 0.03);
+  EXPECT_GT(fit.at("gain_nats"), 0.0);
+}
+
 TEST(Beliefs, CallUnlearnedShapesNoneMoreOftenWithTouches) {
   const ScratchFolder folder;
   const auto records = quick_run(folder, "none").at("none");

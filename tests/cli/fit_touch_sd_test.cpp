@@ -1,3 +1,5 @@
+#include <map>
+
 #include "program.hpp"
 #include "sample_files.hpp"
 
@@ -30,6 +32,9 @@ TEST_F(FitTouchSd, ReportsTheDeviationsAndTheFlagsToPaste) {
   EXPECT_GE(fit["touch_sd"]["mm"], 0.0);
   EXPECT_GE(fit["touch_sd"]["deg"], 0.0);
   EXPECT_EQ(fit["exact"]["mm"], fit["touch_sd"]["mm"] == 0.0);
+  EXPECT_EQ(text.find("cannot be told from 0") != std::string::npos,
+            fit["exact"]["mm"] || fit["exact"]["deg"])
+      << text;
   EXPECT_NE(text.find("\n" + fit["flags"].get<std::string>() + "\n"), std::string::npos) << text;
   EXPECT_NE(text.find("fewer than 3 touches"), std::string::npos) << text;
 }
@@ -42,6 +47,34 @@ TEST_F(FitTouchSd, IsRefusedBesideFlagsOfOneResult) {
   }
   expect_refused({"recognize", "u.h5", "--maps", "maps", "--fit-touch-sd", "--each-frame"},
                  {"--each-frame", "--fit-touch-sd"});
+}
+
+TEST_F(FitTouchSd, IsRefusedBesideOtherUncertainties) {
+  const std::vector<std::pair<std::string, std::vector<std::string>>> refused{
+      {"--touch-sd-mm=1", {"--touch-sd-mm"}},    {"--touch-sd-deg=3", {"--touch-sd-deg"}},
+      {"--slip-sd-mm=0.5", {"--slip-sd-mm"}},    {"--slip-sd-deg=2", {"--slip-sd-deg"}},
+      {"--none=2", {"--none", "maps' objects"}},
+  };
+  for (const auto& [flag, named] : refused) {
+    std::vector<std::string> with_flag = fit_;
+    with_flag.push_back(flag);
+    std::vector<std::string> words = named;
+    words.emplace_back("--fit-touch-sd");
+    expect_refused(with_flag, words);
+  }
+}
+
+TEST_F(FitTouchSd, IsRefusedWhereTheSceneHasOtherUncertainties) {
+  for (const auto& [keys, named] : std::map<std::string, std::string>{
+           {"touch_sd: {mm: 1, deg: 3}\n", "scene's touch_sd"},
+           {"slip_sd: {mm: 0.5}\n", "scene's slip_sd"},
+           {"none: 2\n", "scene's none"},
+       }) {
+    put_bytes(folder_ / "scene.yaml", keys);
+    std::vector<std::string> with_scene = fit_;
+    with_scene.insert(with_scene.end(), {"--scene", "scene.yaml"});
+    expect_refused(with_scene, {"--fit-touch-sd", named});
+  }
 }
 
 }  // namespace

@@ -76,6 +76,8 @@ TEST(TouchSdFit, OfExactTouchesIsNextToNothing) {
       fit_touch_sd(device, letter_task(device), unknowns, {.samples = 16, .sweeps = 10});
   EXPECT_LT(fit.sd.mm, 0.2);  // the maps' cells have 0.5 mm
   EXPECT_LT(fit.sd.rad, 0.03);
+  EXPECT_DOUBLE_EQ(fit.resolution.mm, 0.15);  // of cells of 0.5 mm
+  EXPECT_DOUBLE_EQ(fit.resolution.rad, 0.15 / array_reach_mm(digitacts_array()));
 }
 
 TEST(TouchSdFit, SaysWhereTouchesAreTooFew) {
