@@ -165,4 +165,13 @@ std::string unresolved_words(const RecognitionTask& task, const PoseLattice& lat
   return fault.value_or("");
 }
 
+std::string unresolved_words(const RecognitionTask& task, const PoseLattice& lattice,
+                             std::span<const Touch> touches) {
+  std::vector<Pose> T_robot_sensor;
+  for (const Touch& touch : touches) {
+    T_robot_sensor.push_back(touch.T_robot_sensor);
+  }
+  return unresolved_words(task, lattice, T_robot_sensor);
+}
+
 }  // namespace palpate::cli

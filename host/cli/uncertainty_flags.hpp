@@ -45,5 +45,8 @@ void set_uncertainty(const UncertaintyFlags& flags, const Scene& scene,
 /// @param lattice the task's, about the pivot in use
 std::string unresolved_words(const RecognitionTask& task, const PoseLattice& lattice,
                              std::span<const Pose> T_robot_sensor);
+/// The same of these touches' poses.
+std::string unresolved_words(const RecognitionTask& task, const PoseLattice& lattice,
+                             std::span<const Touch> touches);
 
 }  // namespace palpate::cli

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cmath>
 #include <sstream>
 
@@ -23,9 +24,11 @@ class PlanCommand : public ProgramTest {
   }
 
   std::vector<std::string> command(const std::vector<std::string>& more) const {
-    std::vector<std::string> arguments{"plan",       "u.h5", "--maps", "maps", "--bins=15x15x24",
-                                       "--touches=2"};
+    std::vector<std::string> arguments{"plan", "u.h5", "--maps", "maps", "--bins=15x15x24"};
     arguments.insert(arguments.end(), more.begin(), more.end());
+    if (std::ranges::find(more, "--touches=1") == more.end()) {
+      arguments.emplace_back("--touches=2");
+    }
     return arguments;
   }
   json plan(std::vector<std::string> more) const {
@@ -97,6 +100,35 @@ TEST_F(PlanCommand, PrintsTheTenBestAndDrawsThem) {
   EXPECT_NE(out.find("\n  10  "), std::string::npos) << out;
   EXPECT_EQ(out.find("\n  11  "), std::string::npos) << out;
   EXPECT_TRUE(content_of(folder_.path())["p.png"].starts_with("\x89PNG"));
+}
+
+TEST_F(PlanCommand, SaysWhatRecognizeSaysOfTheTouches) {
+  const std::vector<std::string> few{"u.h5", "--maps", "maps", "--bins=6x6x4"};
+  const json record = this->record(few);
+  ASSERT_TRUE(record.contains("warnings"));
+  std::vector<std::string> with = few;
+  with.insert(with.begin(), "plan");
+  with.insert(with.end(), {"--candidates", "c.csv"});
+  const std::string out = done(with);
+  for (const json& warning : record["warnings"]) {
+    EXPECT_NE(out.find("u.h5: " + warning.get<std::string>()), std::string::npos) << out;
+  }
+  with.insert(with.end(), {"--json", "-"});
+  EXPECT_EQ(json::parse(done(with))["warnings"], record["warnings"]);
+}
+
+TEST_F(PlanCommand, SaysThatOneTouchCannotTell) {
+  const std::string note = "one touch cannot tell";
+  EXPECT_NE(done(command({"--candidates", "c.csv", "--none", "--touches=1"})).find(note),
+            std::string::npos);
+  EXPECT_EQ(done(command({"--candidates", "c.csv", "--none"})).find(note), std::string::npos);
+}
+
+TEST_F(PlanCommand, SaysOnceWhatTheLatticeDoesNotResolve) {
+  const std::string err = palpate(command({"--candidates", "c.csv", "--touch-sd-deg", "1"})).err;
+  EXPECT_NE(err.find("does not resolve touch-sd of 1 degrees"), std::string::npos) << err;
+  EXPECT_EQ(err.find("does not resolve"), err.rfind("does not resolve")) << err;
+  EXPECT_EQ(palpate(command({"--candidates", "c.csv"})).err, "");
 }
 
 TEST_F(PlanCommand, RefusesBadInputInOneLine) {
