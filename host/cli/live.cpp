@@ -130,7 +130,7 @@ void live(const Options& options) {
   }
   files.require_distinct();
   Device device = open_device(options.recognition, scene);
-  Recogniser recogniser = open_recogniser(device, task);
+  Recogniser recogniser = open_recogniser(options.recognition, scene, device, task);
   warm_up(recogniser, task, description, elements_mm);
   if (options.recognition.verbose) {
     print_engine(device, recogniser, task);

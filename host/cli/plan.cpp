@@ -184,7 +184,7 @@ void plan_touches(const Options& options) {
   }
   check_outputs(options, scene, task);
   Device device = open_device(options.recognition, scene);
-  Recogniser recogniser = open_recogniser(device, task);
+  Recogniser recogniser = open_recogniser(options.recognition, scene, device, task);
   const Unknown unknown{.recording = recording.path,
                         .frame = {},
                         .touches = touches,

@@ -211,7 +211,7 @@ void recognize(const Options& options) {
   }
   Device device = open_device(options.recognition, scene);
   std::string unresolved;
-  Recogniser recogniser = open_recogniser(device, task);
+  Recogniser recogniser = open_recogniser(options.recognition, scene, device, task);
   if (!options.png.empty()) {
     make_folder(options.png);
   }
