@@ -83,7 +83,7 @@ std::vector<Pose> read_candidates(const std::filesystem::path& path) {
   if (extension == ".h5" || extension == ".hdf5") {
     return read_touch_recordings({path.string()}).front().T_robot_sensor;
   }
-  const PoseTable table = read_poses(path, {}, false);
+  const PoseTable table = read_poses(path, {.may_name_poses = false}, false);
   if (table.assumed_units) {
     fmt::print(stderr,
                "palpate: {}: poses taken to be in mm and rad; name the columns x_mm, y_mm, "
