@@ -20,9 +20,11 @@ namespace palpate::cli {
 namespace {
 
 std::string believed_words(const Plan& plan) {
-  return fmt::format("after {} {}: {:.2f} nats unknown of the identity, {:.2f} of the pose",
-                     plan.record.touches, plan.record.touches == 1 ? "touch" : "touches",
-                     plan.identity_nats, std::max(plan.both_nats - plan.identity_nats, 0.0));
+  return fmt::format(
+      "after {} {}: {:.2f} nats unknown of the identity, {:.2f} of the pose, "
+      "counted in bins",
+      plan.record.touches, plan.record.touches == 1 ? "touch" : "touches", plan.identity_nats,
+      std::max(plan.both_nats - plan.identity_nats, 0.0));
 }
 
 std::string table_of(const Plan& plan, std::optional<int> columns) {
@@ -33,22 +35,52 @@ std::string table_of(const Plan& plan, std::optional<int> columns) {
        {"y mm", true},
        {"theta deg", true},
        {plan.goal == PlanGoal::both ? "gain nats" : goal_word(plan.goal) + " nats", true},
-       {plan.goal == PlanGoal::identity ? "" : "identity", true},
-       {plan.goal == PlanGoal::pose ? "" : "pose", true},
+       {"identity", true},
+       {"pose", true},
        {"candidate", true}});
   for (std::size_t i = 0; i < std::min(plan.ranked.size(), most_rows); ++i) {
     const PlannedTouch& touch = plan.ranked[i];
     const std::array<std::string, 3> pose = pose_text(touch.T_robot_sensor).value;
     table.add({std::to_string(i + 1), pose[0], pose[1], pose[2],
                fmt::format("{:.2f}", gain_for(touch.gain, plan.goal)),
-               fmt::format("{:.2f}", touch.gain.identity), fmt::format("{:.2f}", touch.gain.pose),
+               // The goal's gain stands in its own column; one without content is left out.
+               plan.goal == PlanGoal::identity ? "" : fmt::format("{:.2f}", touch.gain.identity),
+               plan.goal == PlanGoal::pose ? "" : fmt::format("{:.2f}", touch.gain.pose),
                std::to_string(touch.index)});
   }
   return table.text(columns);
 }
 
-/// What looks wrong with the touches.
-std::vector<std::string> warnings_of(const Plan& plan) { return plan.record.last().warnings; }
+/// What is unknown of the goal, nats.
+double unknown_nats(const Plan& plan) {
+  return plan.goal == PlanGoal::identity ? plan.identity_nats
+         : plan.goal == PlanGoal::pose   ? plan.both_nats - plan.identity_nats
+                                         : plan.both_nats;
+}
+
+/// Why the gains are no more exact; "" where nothing is to be said.
+std::string limit_words(const Plan& plan) {
+  constexpr double near_nats = 0.5;
+  const double gain = gain_for(plan.ranked.front().gain, plan.goal);
+  const auto samples = plan.samples.size();
+  const double most = std::log(static_cast<double>(samples));
+  if (gain > most - near_nats) {
+    return fmt::format(
+        "{} samples cannot show more than {:.2f} nats, and the best gain is near that: the first "
+        "candidates may not be in order; give more --samples",
+        samples, most);
+  }
+  if (gain <= unknown_nats(plan) + least_gain_nats) {
+    return "";
+  }
+  return plan.goal == PlanGoal::identity
+             ? fmt::format(
+                   "the best gain is above what is unknown: {} samples stand for the belief only "
+                   "roughly; give more --samples",
+                   samples)
+             : "the best gain is above what is unknown, which is counted in bins: the touch tells "
+               "also where in its bin the pose is";
+}
 
 }  // namespace
 
@@ -64,7 +96,11 @@ nlohmann::ordered_json to_json(const Plan& plan, const std::string& device) {
   for (const PlannedTouch& touch : plan.ranked) {
     json["candidates"].push_back(to_json(touch));
   }
-  if (const std::vector<std::string> warnings = warnings_of(plan); !warnings.empty()) {
+  std::vector<std::string> warnings = plan.record.last().warnings;
+  if (const std::string limit = limit_words(plan); !limit.empty()) {
+    warnings.push_back(limit);
+  }
+  if (!warnings.empty()) {
     json["warnings"] = warnings;
   }
   json["samples"] = plan.samples.size();
@@ -75,11 +111,12 @@ nlohmann::ordered_json to_json(const Plan& plan, const std::string& device) {
 }
 
 std::string plan_text(const Plan& plan, std::optional<int> columns) {
-  return fmt::format("{}\n{}\n\n{}{}\n{}, {} {} in {:.0f} ms\n",
-                     result_words(plan.record.last(), plan.task), believed_words(plan),
-                     table_of(plan, columns), complaints({plan.record}, plan.task),
-                     next_touch_words(plan.ranked.front(), plan.goal), plan.ranked.size(),
-                     plan.ranked.size() == 1 ? "candidate" : "candidates", 1e3 * plan.seconds);
+  const std::string limit = limit_words(plan);
+  return fmt::format(
+      "{}\n{}\n\n{}{}{}\n{}, {} {} in {:.0f} ms\n", result_words(plan.record.last(), plan.task),
+      believed_words(plan), table_of(plan, columns), complaints({plan.record}, plan.task),
+      limit.empty() ? "" : limit + "\n", next_touch_words(plan.ranked.front(), plan.goal),
+      plan.ranked.size(), plan.ranked.size() == 1 ? "candidate" : "candidates", 1e3 * plan.seconds);
 }
 
 PlanFigure figure_of(const Plan& plan) {
