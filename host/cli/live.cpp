@@ -130,7 +130,7 @@ void live(const Options& options) {
   }
   files.require_distinct();
   Device device = open_device(options.recognition, scene);
-  Recogniser recogniser = open_recogniser(device, task);
+  Recogniser recogniser = open_recogniser(options.recognition, scene, device, task);
   warm_up(recogniser, task, description, elements_mm);
   if (options.recognition.verbose) {
     print_engine(device, recogniser, task);
@@ -159,7 +159,17 @@ void live(const Options& options) {
       {.detector = detector,
        .tare_s = options.tare_s,
        .reset_after_s = options.reset_after_s,
-       .plan = goal},
+       .plan = goal,
+       .on_plan =
+           [&](const LiveTouch& touch) {
+             if (json) {
+               json->add(plan_line(touch));
+             }
+             if (!to_program && !on_terminal) {
+               fmt::print("         {}\n", next_touch_words(*touch.next, *goal));
+               std::fflush(stdout);
+             }
+           }},
       [&](const LiveTouch& touch) {
         // This thread alone uses the recogniser meanwhile.
         const auto unresolved = unresolved_words(task, recogniser.lattice(),
@@ -173,9 +183,6 @@ void live(const Options& options) {
         }
         if (!to_program && !on_terminal) {
           fmt::print("{}\n", table_line(touch, task));
-          if (touch.next) {
-            fmt::print("         {}\n", next_touch_words(*touch.next, *goal));
-          }
           std::fflush(stdout);
         }
       });
@@ -234,8 +241,10 @@ void add_live(CLI::App& app) {
       "After each estimate, plan the next touch by this goal, identity, pose or both: the best "
       "sensor pose of a grid about the places where the object may be (see 'palpate plan') "
       "[default: no plan]");
-  command->add_option("--json", options->json,
-                      "Write a line of JSON for each touch as it comes; - is standard output");
+  command->add_option(
+      "--json", options->json,
+      "Write a line of JSON for each touch as it comes, and with --plan a line with "
+      "\"next\" as soon as its plan is there; - is standard output");
   command->callback([options] { live(*options); });
 }
 

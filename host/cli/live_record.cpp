@@ -34,14 +34,17 @@ std::string json_line(const LiveTouch& touch, const RecognitionTask& task) {
   if (!touch.step.truth.label.empty()) {
     json["truth"] = truth_to_json(touch.step.truth);
   }
-  if (touch.next) {
-    json["next"] = to_json(*touch.next);
-    json["next"].erase("index");  // of a grid that nobody else knows
-  }
   json["latency_ms"] = touch.latency_ms;
   json["frames_lost"] = touch.frames_lost;
   // A label need not be UTF-8, as JSON must.
   return json.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
+}
+
+std::string plan_line(const LiveTouch& touch) {
+  nlohmann::ordered_json json{
+      {"unknown", touch.unknown}, {"touch", touch.index}, {"next", to_json(touch.next.value())}};
+  json["next"].erase("index");  // of a grid that nobody else knows
+  return json.dump();
 }
 
 // Lines are printed as touches come, so columns cannot be as wide as their content.

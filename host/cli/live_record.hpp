@@ -10,8 +10,10 @@ namespace palpate::cli {
 
 /// A line of JSON for one touch: time (the middle of the steady phase, seconds since the Unix
 /// epoch), unknown and touch (counted from 0), pose (T_robot_sensor), the fields that `recognize`
-/// writes of an estimate, next (the planned touch, where there is one), latency_ms and frames_lost.
+/// writes of an estimate, latency_ms and frames_lost.
 std::string json_line(const LiveTouch& touch, const RecognitionTask& task);
+/// A line of JSON for the plan that follows a touch: unknown and touch as above, and next.
+std::string plan_line(const LiveTouch& touch);
 
 /// Heading and lines of a table for people.
 std::string table_heading();

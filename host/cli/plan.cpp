@@ -11,21 +11,17 @@
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
-#include "bounding_box.hpp"
 #include "command_files.hpp"
 #include "commands.hpp"
 #include "options.hpp"
 #include "palpate/files.hpp"
-#include "plan_figure.hpp"
+#include "plan_output.hpp"
 #include "planned_touch.hpp"
 #include "pose_table.hpp"
 #include "recognition_flags.hpp"
 #include "record_output.hpp"
 #include "recordings.hpp"
-#include "sheet.hpp"
-#include "step_words.hpp"
 #include "terminal.hpp"
-#include "text_table.hpp"
 
 namespace palpate::cli {
 
@@ -45,21 +41,6 @@ struct Options {
 };
 
 constexpr const char* grid = "grid";
-
-/// What was planned, and what is believed before the touch.
-struct Plan {
-  const Options& options;
-  PlanGoal goal;
-  const RecognitionTask& task;
-  const RecognitionRecord& record;
-  const std::vector<Touch>& touches;
-  std::vector<glm::dvec2> elements_mm;  ///< of the array that touches next
-  std::vector<PoseSample> samples;      ///< of the belief
-  double identity_nats = 0.0;           ///< entropy of the labels
-  double both_nats = 0.0;               ///< entropy of objects and bins
-  std::vector<PlannedTouch> ranked;
-  double seconds = 0.0;
-};
 
 /// The touches of the recording that the flags select.
 std::vector<Touch> select_touches(const Options& options, const Recording& recording) {
@@ -102,7 +83,7 @@ std::vector<Pose> read_candidates(const std::filesystem::path& path) {
   if (extension == ".h5" || extension == ".hdf5") {
     return read_touch_recordings({path.string()}).front().T_robot_sensor;
   }
-  const PoseTable table = read_poses(path, {}, false);
+  const PoseTable table = read_poses(path, {.may_name_poses = false}, false);
   if (table.assumed_units) {
     fmt::print(stderr,
                "palpate: {}: poses taken to be in mm and rad; name the columns x_mm, y_mm, "
@@ -130,97 +111,6 @@ void check_candidates(const std::string& file, const std::vector<Pose>& candidat
   }
 }
 
-nlohmann::ordered_json plan_json(const Plan& plan, const std::string& device) {
-  nlohmann::ordered_json json{{"recording", plan.record.recording},
-                              {"touches", plan.record.touches},
-                              {"goal", goal_word(plan.goal)},
-                              {"believed", to_json(plan.record.last(), plan.task)}};
-  json["believed"]["entropy"] = {{"identity", plan.identity_nats},
-                                 {"pose", plan.both_nats - plan.identity_nats},
-                                 {"both", plan.both_nats}};
-  json["candidates"] = nlohmann::ordered_json::array();
-  for (const PlannedTouch& touch : plan.ranked) {
-    json["candidates"].push_back(to_json(touch));
-  }
-  json["samples"] = plan.options.samples;
-  json["seed"] = plan.options.seed;
-  json["seconds"] = plan.seconds;
-  json["device"] = device;
-  return json;
-}
-
-std::string believed_words(const Plan& plan) {
-  return fmt::format("after {} {}: {:.2f} nats unknown of the identity, {:.2f} of the pose",
-                     plan.record.touches, plan.record.touches == 1 ? "touch" : "touches",
-                     plan.identity_nats, std::max(plan.both_nats - plan.identity_nats, 0.0));
-}
-
-std::string table_of(const Plan& plan, std::optional<int> columns) {
-  constexpr std::size_t most_rows = 10;
-  TextTable table(
-      {{"rank", true},
-       {"x mm", true},
-       {"y mm", true},
-       {"theta deg", true},
-       {plan.goal == PlanGoal::both ? "gain nats" : goal_word(plan.goal) + " nats", true},
-       {plan.goal == PlanGoal::identity ? "" : "identity", true},
-       {plan.goal == PlanGoal::pose ? "" : "pose", true},
-       {"candidate", true}});
-  for (std::size_t i = 0; i < std::min(plan.ranked.size(), most_rows); ++i) {
-    const PlannedTouch& touch = plan.ranked[i];
-    const std::array<std::string, 3> pose = pose_text(touch.T_robot_sensor).value;
-    table.add({std::to_string(i + 1), pose[0], pose[1], pose[2],
-               fmt::format("{:.2f}", gain_for(touch.gain, plan.goal)),
-               fmt::format("{:.2f}", touch.gain.identity), fmt::format("{:.2f}", touch.gain.pose),
-               std::to_string(touch.index)});
-  }
-  return table.text(columns);
-}
-
-PlanFigure figure_of(const Plan& plan) {
-  PlanFigure figure;
-  const RecognitionStep& last = plan.record.last();
-  const auto printed = [](std::string words) {
-    const std::size_t at = words.find(" deg");
-    return at == words.npos ? words : words.replace(at, 4, "°");
-  };
-  const std::string name = std::filesystem::path(plan.record.recording).filename().string();
-  figure.result = fmt::format("{}: {}", name, identity_words(last, plan.task));
-  figure.captions = {
-      "object at " + printed(pose_words(pose_text(last.T_robot_object()))) + " in the robot frame",
-      believed_words(plan), printed(next_touch_words(plan.ranked.front(), plan.goal))};
-  figure.gain_caption =
-      plan.goal == PlanGoal::both
-          ? "expected information about object and pose, nats"
-          : fmt::format("expected information about the {}, nats", goal_word(plan.goal));
-  figure.elements_mm = plan.elements_mm;
-  figure.element_mm = element_edge_mm(plan.elements_mm);
-  BoundingBox area;
-  for (const PlannedTouch& touch : plan.ranked) {
-    figure.candidates.push_back({touch.T_robot_sensor, gain_for(touch.gain, plan.goal)});
-    area.take_in(touch.T_robot_sensor * array_centre_mm(plan.elements_mm));
-  }
-  const double margin_mm = array_reach_mm(plan.elements_mm) + figure.element_mm;
-  for (const Touch& touch : plan.touches) {
-    auto& elements = figure.touches_mm.emplace_back();
-    for (const glm::dvec2& element : touch.elements_mm) {
-      elements.push_back(touch.T_robot_sensor * element);
-    }
-    area.take_in(touch.T_robot_sensor * array_centre_mm(touch.elements_mm));
-  }
-  area.lower -= margin_mm;
-  area.upper += margin_mm;
-  constexpr int cells = 160;
-  const OccupancyField field =
-      expected_occupancy(plan.samples, plan.task, area.lower, area.upper, cells);
-  figure.lower_mm = field.lower_mm;
-  figure.cell_mm = field.cell_mm;
-  figure.nx = field.nx;
-  figure.ny = field.ny;
-  figure.occupied = field.probability;
-  return figure;
-}
-
 /// Throws Error where an output cannot be written, before any work is done.
 void check_outputs(const Options& options, const Scene& scene, const RecognitionTask& task) {
   CommandFiles files;
@@ -243,11 +133,10 @@ void check_outputs(const Options& options, const Scene& scene, const Recognition
   }
 }
 
-void write_results(const Plan& plan, const Device& device) {
-  const Options& options = plan.options;
+void write_results(const Options& options, const Plan& plan, const Device& device) {
   // The path of a recording need not be UTF-8, as JSON must.
   const std::string json =
-      plan_json(plan, device.name())
+      to_json(plan, device.name())
           .dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) +
       "\n";
   // Files come first: printing fails where the reader of standard output has ended.
@@ -261,15 +150,8 @@ void write_results(const Plan& plan, const Device& device) {
   if (!options.json.empty()) {
     write_file(options.json, json);
   }
-  const RecognitionStep& last = plan.record.last();
-  fmt::print("{}\n", result_words(last, plan.task));
-  if (const auto misfit = misfit_sentence(last, plan.record.touches, plan.task); !misfit.empty()) {
-    fmt::print("{}\n", misfit);
-  }
-  fmt::print("{}\n\n{}\n{}, {} candidates in {:.0f} ms\n{}\n", believed_words(plan),
-             table_of(plan, terminal_columns(STDOUT_FILENO)),
-             next_touch_words(plan.ranked.front(), plan.goal), plan.ranked.size(),
-             1e3 * plan.seconds, setup_words(device, plan.task));
+  fmt::print("{}{}\n", plan_text(plan, terminal_columns(STDOUT_FILENO)),
+             setup_words(device, plan.task));
 }
 
 void plan_touches(const Options& options) {
@@ -302,22 +184,25 @@ void plan_touches(const Options& options) {
   }
   check_outputs(options, scene, task);
   Device device = open_device(options.recognition, scene);
-  Recogniser recogniser = open_recogniser(device, task);
+  Recogniser recogniser = open_recogniser(options.recognition, scene, device, task);
   const Unknown unknown{.recording = recording.path,
                         .frame = {},
                         .touches = touches,
                         .truth = ground_truth(recording.object, recording.truth)};
   const RecognitionRecord record = recognise(recogniser, task, unknown, false);
   record.require_steps();
+  if (const auto words = unresolved_words(task, recogniser.lattice(), touches); !words.empty()) {
+    fmt::print(stderr, "palpate: {}\n", words);
+  }
 
   const auto start = std::chrono::steady_clock::now();
-  Plan plan{.options = options,
-            .goal = goal,
+  Plan plan{.goal = goal,
             .task = task,
             .record = record,
             .touches = touches,
             .elements_mm = elements_mm,
-            .samples = recogniser.sample(options.samples, options.seed)};
+            .samples = recogniser.sample(options.samples, options.seed),
+            .seed = options.seed};
   if (options.candidates == grid) {
     candidates =
         candidate_grid(plan.samples, task, elements_mm, touches.front().T_robot_sensor.theta_rad);
@@ -327,7 +212,7 @@ void plan_touches(const Options& options) {
   plan.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   plan.identity_nats = label_entropy(record.last().identity, task);
   plan.both_nats = recogniser.histogram()->entropy();
-  write_results(plan, device);
+  write_results(options, plan, device);
   if (options.recognition.verbose) {
     print_engine(device, recogniser, task);
   }

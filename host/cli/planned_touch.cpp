@@ -33,6 +33,10 @@ nlohmann::ordered_json to_json(const PlannedTouch& touch) {
 }
 
 std::string next_touch_words(const PlannedTouch& touch, PlanGoal goal) {
+  if (gain_for(touch.gain, goal) < least_gain_nats) {
+    return fmt::format("no candidate tells anything about the {}",
+                       goal == PlanGoal::both ? "object or its pose" : goal_word(goal));
+  }
   return fmt::format("touch next at {}: {:.2f} nats expected",
                      pose_words(pose_text(touch.T_robot_sensor)), gain_for(touch.gain, goal));
 }

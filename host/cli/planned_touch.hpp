@@ -16,7 +16,8 @@ std::string goal_word(PlanGoal goal);
 /// index, x_mm, y_mm, theta_rad, and the gain in nats: identity, pose, both.
 nlohmann::ordered_json to_json(const PlannedTouch& touch);
 
-/// "touch next at x 1.20 mm, y 3.40 mm, theta 45.00 deg: 2.31 nats expected"
+/// "touch next at x 1.20 mm, y 3.40 mm, theta 45.00 deg: 2.31 nats expected", or that even this
+/// touch, the best, tells nothing.
 std::string next_touch_words(const PlannedTouch& touch, PlanGoal goal);
 
 }  // namespace palpate::cli

@@ -63,7 +63,8 @@ Device open_device(const RecognitionFlags& flags, const Scene& scene);
 
 /// Makes the task's filter, after --bins auto or fine has chosen its bins. Says on standard error
 /// where the device's memory made bins wider than the maps resolve. Throws Error.
-Recogniser open_recogniser(Device& device, RecognitionTask& task);
+Recogniser open_recogniser(const RecognitionFlags& flags, const Scene& scene, Device& device,
+                           RecognitionTask& task);
 
 /// Adds the files that the task was read from: the scene, its array and the maps.
 void add_recognition_files(const RecognitionFlags& flags, const Scene& scene,

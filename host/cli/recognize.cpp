@@ -141,14 +141,6 @@ void export_posterior(const std::filesystem::path& path, const RecognitionTask& 
   });
 }
 
-std::vector<Pose> poses_of(const Unknown& unknown) {
-  std::vector<Pose> T_robot_sensor;
-  for (const Touch& touch : unknown.touches) {
-    T_robot_sensor.push_back(touch.T_robot_sensor);
-  }
-  return T_robot_sensor;
-}
-
 /// Writes posterior and JSON. The JSON appears only after the posterior.
 void write_results(const Options& options, const RecognitionTask& task,
                    const Recogniser& recogniser, const std::string& json) {
@@ -219,7 +211,7 @@ void recognize(const Options& options) {
   }
   Device device = open_device(options.recognition, scene);
   std::string unresolved;
-  Recogniser recogniser = open_recogniser(device, task);
+  Recogniser recogniser = open_recogniser(options.recognition, scene, device, task);
   if (!options.png.empty()) {
     make_folder(options.png);
   }
@@ -238,7 +230,7 @@ void recognize(const Options& options) {
       records.push_back(recognise(recogniser, task, unknown, trace, show));
       records.back().require_steps();
       if (unresolved.empty()) {
-        unresolved = unresolved_words(task, recogniser.lattice(), poses_of(unknown));
+        unresolved = unresolved_words(task, recogniser.lattice(), unknown.touches);
       }
       show(0.0);
       json.push_back(to_json(records.back(), task, device.name(), options.trace));

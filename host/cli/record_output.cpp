@@ -91,6 +91,9 @@ nlohmann::ordered_json to_json(const RecognitionStep& step, const RecognitionTas
   for (std::size_t i = 0; i < task.labels.size(); ++i) {
     json["identity"][task.labels[i]] = step.identity[i];
   }
+  if (task.labels.back() == none_label) {
+    json["none"] = step.identity.back();
+  }
   const Mode& mode = step.mode;
   json["mode"] = {{"object", task.labels[task.label_of[mode.object]]},
                   {"map", task.map_paths[mode.object]},

@@ -77,29 +77,6 @@ std::string warnings(const std::vector<RecognitionRecord>& records) {
   return text;
 }
 
-/// A line for each thing that is wrong with an unknown.
-std::string complaints(const std::vector<RecognitionRecord>& records, const RecognitionTask& task) {
-  std::string text;
-  for (const RecognitionRecord& record : records) {
-    if (record.last().contradicted) {
-      text += fmt::format(
-          "{}: contradicted: no map explains these touches at any pose tried; the object may be "
-          "unknown, its pose outside the region, or gamma too small\n",
-          printable_name(record));
-    }
-    if (const auto misfit = misfit_sentence(record.last(), record.touches, task); !misfit.empty()) {
-      text += fmt::format("{}: {}\n", printable_name(record), misfit);
-    }
-  }
-  text += warnings(records);
-  const bool any_single = std::ranges::any_of(
-      records, [](const RecognitionRecord& record) { return record.touches == 1; });
-  if (const auto words = single_touch_words(task, any_single ? 1 : 0); !words.empty()) {
-    text += words + "\n";
-  }
-  return text;
-}
-
 /// How many unknowns of a known truth are right, and their mean pose errors.
 std::string summary(const std::vector<RecognitionRecord>& records) {
   int known = 0;
@@ -161,6 +138,28 @@ std::string trace_table(const RecognitionRecord& record, const RecognitionTask& 
   const std::string truth = truth_words(record.last(), task);
   return printable_name(record) + "\n" + table.text(columns) +
          (truth.empty() ? "" : "  " + truth + "\n");
+}
+
+std::string complaints(const std::vector<RecognitionRecord>& records, const RecognitionTask& task) {
+  std::string text;
+  for (const RecognitionRecord& record : records) {
+    if (record.last().contradicted) {
+      text += fmt::format(
+          "{}: contradicted: no map explains these touches at any pose tried; the object may be "
+          "unknown, its pose outside the region, or gamma too small\n",
+          printable_name(record));
+    }
+    if (const auto misfit = misfit_sentence(record.last(), record.touches, task); !misfit.empty()) {
+      text += fmt::format("{}: {}\n", printable_name(record), misfit);
+    }
+  }
+  text += warnings(records);
+  const bool any_single = std::ranges::any_of(
+      records, [](const RecognitionRecord& record) { return record.touches == 1; });
+  if (const auto words = single_touch_words(task, any_single ? 1 : 0); !words.empty()) {
+    text += words + "\n";
+  }
+  return text;
 }
 
 std::string result_table(const std::vector<RecognitionRecord>& records, const RecognitionTask& task,

@@ -16,6 +16,10 @@ std::string name_of(const RecognitionRecord& record);
 std::string trace_table(const RecognitionRecord& record, const RecognitionTask& task,
                         std::optional<int> columns);
 
+/// A line for each thing that is wrong with an unknown: contradicted or unlike touches, each
+/// warning once, and that one touch cannot tell (none).
+std::string complaints(const std::vector<RecognitionRecord>& records, const RecognitionTask& task);
+
 /// For each unknown a line with its pose in the robot frame, below it a line with the mode where
 /// the pose is between the bins, and a line with the truth where it is known. Then what is wrong
 /// with which unknown and, where truths are known, how many are right, the mean pose errors and

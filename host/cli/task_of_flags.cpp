@@ -278,7 +278,10 @@ RecognitionTask task_of(const RecognitionFlags& flags, const Scene& scene,
   const WantedLattice wanted = lattice_of(flags, scene, hypotheses, reach_mm);
   histogram.lattice = wanted.lattice;
   if (!with_particles) {
-    set_uncertainty(flags.uncertainty, scene, flags.scene, hypotheses, histogram);
+    set_uncertainty(flags.uncertainty, scene, hypotheses, histogram);
+  }
+  if (!wanted.bin_width) {
+    require_within_region(flags.uncertainty, scene, flags.scene, wanted.lattice);
   }
   contact.prior = prior_of(objects, hypotheses, flags.prior ? flags.prior : scene.prior);
   RecognitionTask task(std::move(hypotheses),
@@ -296,9 +299,11 @@ Device open_device(const RecognitionFlags& flags, const Scene& scene) {
   return Device::open(flags.device.empty() ? scene.device.value_or("") : flags.device);
 }
 
-Recogniser open_recogniser(Device& device, RecognitionTask& task) {
+Recogniser open_recogniser(const RecognitionFlags& flags, const Scene& scene, Device& device,
+                           RecognitionTask& task) {
   const bool fine = task.bin_width == BinWidth::fine;
   const std::optional<CoarsenedBins> bins = settle_bins(device, task);
+  require_within_region(flags.uncertainty, scene, flags.scene, task.lattice());
   Recogniser recogniser(device, task);  // first: bins that do not fit deserve only their refusal
   if (bins) {
     fmt::print(

@@ -1,5 +1,6 @@
 #include "uncertainty_flags.hpp"
 
+#include <cmath>
 #include <limits>
 
 #include <fmt/format.h>
@@ -25,20 +26,27 @@ struct Given {
   bool any() const { return by_flag || by_key; }
 };
 
-/// The standard deviation; 0 where it is not given.
+/// The standard deviation; 0 where it is not given. Throws Error where it is none.
+double value_of(const Given& sd) {
+  if (sd.by_flag && !(*sd.by_flag >= 0.0 && std::isfinite(*sd.by_flag))) {
+    refuse_flag(sd.flag, *sd.by_flag, "give a finite number from 0");
+  }
+  return sd.by_flag ? *sd.by_flag : sd.by_key.value_or(0.0);
+}
+
+/// Throws Error where the standard deviation is wider than the region.
 /// @param widest in the flag's unit
-double checked(const Given& sd, const std::string& scene_file, double widest) {
-  const double value =
-      sd.by_flag ? require_above(sd.flag, *sd.by_flag, 0.0, true) : sd.by_key.value_or(0.0);
+void require_within(const Given& sd, const std::string& scene_file, double widest,
+                    const char* unit) {
+  const double value = value_of(sd);
   if (value > widest) {
     const std::string remedy =
-        fmt::format("wider than the region, {:g}; give less, or widen the region", widest);
+        fmt::format("wider than the region, {:g} {}; give less, or widen the region", widest, unit);
     if (sd.by_flag) {
       refuse_flag(sd.flag, value, "{}", remedy);
     }
     refuse(scene_file, "{} = {}: {}", sd.key, value, remedy);
   }
-  return value;
 }
 
 /// Throws Error where any of these is given.
@@ -117,12 +125,9 @@ void add_uncertainty_flags(CLI::App& command, UncertaintyFlags& flags) {
 }
 
 void set_uncertainty(const UncertaintyFlags& flags, const Scene& scene,
-                     const std::string& scene_file, std::span<const Hypothesis> hypotheses,
-                     HistogramOptions& histogram) {
-  const DisplacementSd widest = widest_displacement(histogram.lattice);
-  const auto sd_of = [&](const Given& mm, const Given& deg) {
-    return DisplacementSd{.mm = checked(mm, scene_file, widest.mm),
-                          .rad = radians(checked(deg, scene_file, degrees(widest.rad)))};
+                     std::span<const Hypothesis> hypotheses, HistogramOptions& histogram) {
+  const auto sd_of = [](const Given& mm, const Given& deg) {
+    return DisplacementSd{.mm = value_of(mm), .rad = radians(value_of(deg))};
   };
   histogram.touch_sd = sd_of(touch_mm(flags, scene), touch_deg(flags, scene));
   histogram.slip_sd = sd_of(slip_mm(flags, scene), slip_deg(flags, scene));
@@ -138,12 +143,22 @@ void set_uncertainty(const UncertaintyFlags& flags, const Scene& scene,
                  scene.none || scene.auto_none ? std::optional(none_given) : std::nullopt}},
                scene_file,
                "particles have no mean over all poses, which (none) needs; use --filter histogram");
-  const DisplacementSd widest = widest_displacement(particles.region);
   if (const Given mm = slip_mm(flags, scene); mm.any()) {
-    particles.motion_mm = checked(mm, scene_file, widest.mm);
+    particles.motion_mm = value_of(mm);
   }
   if (const Given deg = slip_deg(flags, scene); deg.any()) {
-    particles.motion_rad = radians(checked(deg, scene_file, degrees(widest.rad)));
+    particles.motion_rad = radians(value_of(deg));
+  }
+}
+
+void require_within_region(const UncertaintyFlags& flags, const Scene& scene,
+                           const std::string& scene_file, const PoseLattice& lattice) {
+  const DisplacementSd widest = widest_displacement(lattice);
+  for (const Given& sd : {touch_mm(flags, scene), slip_mm(flags, scene)}) {
+    require_within(sd, scene_file, widest.mm, "mm");
+  }
+  for (const Given& sd : {touch_deg(flags, scene), slip_deg(flags, scene)}) {
+    require_within(sd, scene_file, degrees(widest.rad), "deg");
   }
 }
 
@@ -163,6 +178,15 @@ std::string unresolved_words(const RecognitionTask& task, const PoseLattice& lat
     }
   }
   return fault.value_or("");
+}
+
+std::string unresolved_words(const RecognitionTask& task, const PoseLattice& lattice,
+                             std::span<const Touch> touches) {
+  std::vector<Pose> T_robot_sensor;
+  for (const Touch& touch : touches) {
+    T_robot_sensor.push_back(touch.T_robot_sensor);
+  }
+  return unresolved_words(task, lattice, T_robot_sensor);
 }
 
 }  // namespace palpate::cli

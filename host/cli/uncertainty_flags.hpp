@@ -30,20 +30,25 @@ void add_uncertainty_flags(CLI::App& command, UncertaintyFlags& flags);
 // its key, whose value cannot be meant.
 
 /// Sets touch_sd, slip_sd and none_weight.
-/// @param histogram has its lattice already
 void set_uncertainty(const UncertaintyFlags& flags, const Scene& scene,
-                     const std::string& scene_file, std::span<const Hypothesis> hypotheses,
-                     HistogramOptions& histogram);
+                     std::span<const Hypothesis> hypotheses, HistogramOptions& histogram);
 /// Sets the motion noise; what is not given keeps the paper's values. Refuses the flags and keys
 /// that a particle filter has no use for.
-/// @param particles have their region already
 void set_uncertainty(const UncertaintyFlags& flags, const Scene& scene,
                      const std::string& scene_file, ParticleOptions& particles);
+
+/// Refuses standard deviations wider than the region. An axis of one bin limits nothing.
+/// @param lattice with the counts that are used, or with one bin where these are not known yet
+void require_within_region(const UncertaintyFlags& flags, const Scene& scene,
+                           const std::string& scene_file, const PoseLattice& lattice);
 
 /// What to say where the lattice does not resolve the task's touch_sd or slip_sd at one of these
 /// poses of the sensor; else "".
 /// @param lattice the task's, about the pivot in use
 std::string unresolved_words(const RecognitionTask& task, const PoseLattice& lattice,
                              std::span<const Pose> T_robot_sensor);
+/// The same of these touches' poses.
+std::string unresolved_words(const RecognitionTask& task, const PoseLattice& lattice,
+                             std::span<const Touch> touches);
 
 }  // namespace palpate::cli

@@ -48,11 +48,10 @@ PoseColumns find_columns(const CsvTable& table, const TableOptions& options) {
     return columns_without_names(table, options);
   }
   const auto& [x, y, theta] = options.pose_columns;
-  table.refuse(
-      "has no columns '{}', '{}' and '{}'; rename its columns, or give --pose-columns "
-      "X,Y,THETA",
-      printable(x.empty() ? "x" : x), printable(y.empty() ? "y" : y),
-      printable(theta.empty() ? "theta" : theta));
+  table.refuse("has no columns '{}', '{}' and '{}'; rename its columns{}",
+               printable(x.empty() ? "x" : x), printable(y.empty() ? "y" : y),
+               printable(theta.empty() ? "theta" : theta),
+               options.may_name_poses ? ", or give --pose-columns X,Y,THETA" : "");
 }
 
 Pose pose_in(const CsvTable& table, const std::array<UnitColumn, 3>& columns) {

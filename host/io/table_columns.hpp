@@ -33,6 +33,7 @@ struct TableOptions {
   std::string time_column;                  ///< "": the usual names
   std::string pressure_columns;             ///< prefix or FIRST:LAST; "": all that are left
   std::array<std::string, 3> pose_columns;  ///< of x, y and theta; "": the usual names
+  bool may_name_poses = true;               ///< the command has --pose-columns
   std::optional<Unit> time_unit;            ///< none: by the column's name, else s
   std::optional<Unit> length_unit;          ///< none: by the column's name, else mm
   std::optional<Unit> angle_unit;           ///< none: by the column's name, else rad

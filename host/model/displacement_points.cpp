@@ -43,4 +43,10 @@ Pose random_displacement(const DisplacementSd& sd, Random& random) {
   return {{x, y}, sd.rad * random.normal()};
 }
 
+Pose slipped(const Pose& T_object_robot, const Pose& slip, const glm::dvec2& centroid_mm) {
+  const Pose moved{centroid_mm - rotate(slip.theta_rad, centroid_mm) + slip.translation_mm,
+                   slip.theta_rad};
+  return moved * T_object_robot;
+}
+
 }  // namespace palpate

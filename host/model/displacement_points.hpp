@@ -3,6 +3,8 @@
 #include <cstddef>
 #include <vector>
 
+#include <glm/vec2.hpp>
+
 #include "palpate/displacement.hpp"
 #include "palpate/pose.hpp"
 #include "random.hpp"
@@ -17,6 +19,11 @@ std::vector<Pose> displacement_points(const DisplacementSd& sd, std::size_t coun
 
 /// One displacement drawn from the distribution.
 Pose random_displacement(const DisplacementSd& sd, Random& random);
+
+/// T_object_robot of an object that has slipped: turned about its centroid, then moved, both in the
+/// object frame: p' = R (p - g) + g + t.
+/// @param centroid_mm g, in the object frame
+Pose slipped(const Pose& T_object_robot, const Pose& slip, const glm::dvec2& centroid_mm);
 
 /// The x below which a standard normal variable lies with this probability, within 1e-9.
 /// @param probability above 0 and below 1

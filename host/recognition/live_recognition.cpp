@@ -308,12 +308,18 @@ void LiveRecognition::use(const Job& job) {
     latencies_ms_.push_back(result.latency_ms);
     state_.last = result;
   }
-  if (options_.plan) {
-    result.next = plan(*job.touch);
+  on_touch_(result);
+  if (!options_.plan) {
+    return;
+  }
+  result.next = plan(*job.touch);
+  {
     const std::lock_guard lock(mutex_);
     state_.last->next = result.next;
   }
-  on_touch_(result);
+  if (options_.on_plan) {
+    options_.on_plan(result);
+  }
 }
 
 PlannedTouch LiveRecognition::plan(const DetectedTouch& touch) const {

@@ -53,9 +53,10 @@ struct LiveOptions {
   TouchDetectorOptions detector;
   double tare_s = 0.5;                  ///< where the sensor knows no baseline
   std::optional<double> reset_after_s;  ///< after so long without contact another unknown comes
-  /// Plans the next touch by this goal after each estimate, which state() shows before; on_touch is
-  /// called after planning. Not for particles.
+  /// Plans the next touch by this goal after each estimate and after on_touch. Not for particles.
   std::optional<PlanGoal> plan = {};
+  /// Called with a touch and its plan as soon as the plan is there, on the thread of on_touch.
+  std::function<void(const LiveTouch&)> on_plan = {};
 };
 
 /// Recognises what a sensor's stream touches, from construction on. One thread reads frames and
@@ -67,7 +68,8 @@ class LiveRecognition {
   /// Sensor, recogniser and task must outlive this object; nothing else may use sensor and
   /// recogniser meanwhile.
   /// @param elements_mm [e] in the sensor frame
-  /// @param on_touch called after each touch, on another thread than the constructor's
+  /// @param on_touch called after each estimate, before `next` is planned, on another thread than
+  /// the constructor's
   LiveRecognition(Sensor& sensor, std::vector<glm::dvec2> elements_mm, Recogniser& recogniser,
                   const RecognitionTask& task, const LiveOptions& options,
                   std::function<void(const LiveTouch&)> on_touch);

@@ -6,22 +6,15 @@
 
 #include "displacement_points.hpp"
 #include "interpolated_map.hpp"
-#include "palpate/pose_error.hpp"
 #include "predicted_readings.hpp"
 #include "reading_mixture.hpp"
+#include "refinement.hpp"
 
 namespace palpate {
 
 namespace {
 
 constexpr std::uint64_t seed = 0;
-
-/// About what an object turns when it slips: the centroid of its map's cells with log odds above 0.
-glm::dvec2 centroid_mm(const OccupancyGrid& map) {
-  const bool has_body =
-      std::any_of(map.log_odds.begin(), map.log_odds.end(), [](float l) { return l > 0.0F; });
-  return has_body ? body_of(map).centroid_mm : glm::dvec2(0.0, 0.0);
-}
 
 }  // namespace
 
@@ -57,16 +50,15 @@ std::optional<double> surprise_of(const Touch& touch, std::span<const PoseSample
   for (const Hypothesis& hypothesis : task.hypotheses) {
     maps.emplace_back(hypothesis.map, *contact.prior);
     centroids_mm.push_back(options->slip_sd.none() ? glm::dvec2(0.0, 0.0)
-                                                   : centroid_mm(hypothesis.map));
+                                                   : displaced_body(hypothesis.map).centroid_mm);
   }
   Random random(seed, Stream::readings);
   ReadingMixture mixture(samples.size(), readings.size(), reading_levels(contact));
   for (std::size_t i = 0; i < samples.size(); ++i) {
     const auto object = static_cast<std::size_t>(samples[i].object);
     const Pose slip = random_displacement(options->slip_sd, random);
-    const glm::dvec2& g = centroids_mm[object];
-    const Pose moved{g + slip.translation_mm - rotate(slip.theta_rad, g), slip.theta_rad};
-    const Pose T_object_sensor = moved * samples[i].T_object_robot * touch.T_robot_sensor *
+    const Pose T_object_sensor = slipped(samples[i].T_object_robot, slip, centroids_mm[object]) *
+                                 touch.T_robot_sensor *
                                  random_displacement(options->touch_sd, random);
     mixture.set(
         i, reading_log_likelihoods(elements_mm, T_object_sensor, maps[object], contact, object));

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <numbers>
+#include <utility>
 
 #include "bounding_box.hpp"
 #include "interpolated_map.hpp"
@@ -103,8 +104,10 @@ std::vector<PlannedTouch> rank_touches(const PoseHistogram& histogram, const Rec
   for (std::size_t i = 0; i < gains.size(); ++i) {
     ranked.push_back({i, T_robot_sensor[i], gains[i]});
   }
-  std::ranges::stable_sort(ranked, std::ranges::greater{},
-                           [&](const PlannedTouch& touch) { return gain_for(touch.gain, goal); });
+  std::ranges::stable_sort(ranked, std::ranges::greater{}, [&](const PlannedTouch& touch) {
+    const double gain = gain_for(touch.gain, goal);
+    return std::pair(gain < least_gain_nats ? 0.0 : gain, touch.gain.both());
+  });
   return ranked;
 }
 

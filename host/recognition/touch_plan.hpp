@@ -21,6 +21,9 @@ enum class PlanGoal { identity, pose, both };
 /// The part of a gain that the goal asks for, in nats.
 double gain_for(const TouchGain& gain, PlanGoal goal);
 
+/// A smaller gain is none, to two decimals: such a touch tells nothing.
+inline constexpr double least_gain_nats = 0.005;
+
 /// A touch that may come next.
 struct PlannedTouch {
   std::size_t index = 0;  ///< among the candidates
@@ -29,8 +32,9 @@ struct PlannedTouch {
 };
 
 /// Ranks candidate touches by what each is expected to tell; see PoseHistogram::expected_gain().
-/// Maps of one label count as one object. The largest gain comes first; of equal gains the lower
-/// index.
+/// Maps of one label count as one object. The largest gain comes first. Gains below least_gain_nats
+/// count as equal; of equal gains comes first the one that tells most about object and pose
+/// together, then the lower index.
 /// @param elements_mm [e] living elements, in the sensor frame
 std::vector<PlannedTouch> rank_touches(const PoseHistogram& histogram, const RecognitionTask& task,
                                        std::span<const Pose> T_robot_sensor,

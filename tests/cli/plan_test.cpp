@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cmath>
 #include <sstream>
 
@@ -23,9 +24,11 @@ class PlanCommand : public ProgramTest {
   }
 
   std::vector<std::string> command(const std::vector<std::string>& more) const {
-    std::vector<std::string> arguments{"plan",       "u.h5", "--maps", "maps", "--bins=15x15x24",
-                                       "--touches=2"};
+    std::vector<std::string> arguments{"plan", "u.h5", "--maps", "maps", "--bins=15x15x24"};
     arguments.insert(arguments.end(), more.begin(), more.end());
+    if (std::ranges::find(more, "--touches=1") == more.end()) {
+      arguments.emplace_back("--touches=2");
+    }
     return arguments;
   }
   json plan(std::vector<std::string> more) const {
@@ -99,6 +102,85 @@ TEST_F(PlanCommand, PrintsTheTenBestAndDrawsThem) {
   EXPECT_TRUE(content_of(folder_.path())["p.png"].starts_with("\x89PNG"));
 }
 
+TEST_F(PlanCommand, SaysWhatRecognizeSaysOfTheTouches) {
+  const std::vector<std::string> few{"u.h5", "--maps", "maps", "--bins=6x6x4"};
+  const json record = this->record(few);
+  ASSERT_TRUE(record.contains("warnings"));
+  std::vector<std::string> with = few;
+  with.insert(with.begin(), "plan");
+  with.insert(with.end(), {"--candidates", "c.csv"});
+  const std::string out = done(with);
+  for (const json& warning : record["warnings"]) {
+    EXPECT_NE(out.find("u.h5: " + warning.get<std::string>()), std::string::npos) << out;
+  }
+  with.insert(with.end(), {"--json", "-"});
+  const json all = json::parse(done(with))["warnings"];
+  for (const json& warning : record["warnings"]) {
+    EXPECT_NE(std::ranges::find(all, warning), all.end()) << all;
+  }
+}
+
+TEST_F(PlanCommand, SaysWhatLimitsTheGains) {
+  const std::string few = "2 samples cannot show more than 0.69 nats";
+  const std::string out = done(command({"--candidates", "c.csv", "--samples=2"}));
+  EXPECT_NE(out.find(few), std::string::npos) << out;
+  EXPECT_NE(plan({"--candidates", "c.csv", "--samples=2"})["warnings"].dump().find(few),
+            std::string::npos);
+  // Two touches leave few of these bins, which the next touch still divides.
+  const std::string coarse = done(command({"--candidates", "c.csv", "--samples=512"}));
+  EXPECT_NE(coarse.find("above what is unknown, which is counted in bins"), std::string::npos)
+      << coarse;
+  put_bytes(folder_ / "far.csv", "x_mm,y_mm,theta_deg\n400,400,0\n");
+  const std::string plain = done(command({"--candidates", "far.csv"}));
+  EXPECT_EQ(plain.find("the best gain"), std::string::npos) << plain;
+  EXPECT_NE(plain.find("of the pose, counted in bins"), std::string::npos) << plain;
+}
+
+TEST_F(PlanCommand, RecommendsNoTouchThatTellsNothing) {
+  const std::vector<std::string> one{
+      "plan",        "u.h5",         "--maps", "maps/A.map.h5",  "--bins=15x15x24",
+      "--touches=2", "--candidates", "c.csv",  "--goal=identity"};
+  const std::string out = done(one);
+  EXPECT_NE(out.find("no candidate tells anything about the identity"), std::string::npos) << out;
+  EXPECT_EQ(out.find("touch next"), std::string::npos) << out;
+  std::vector<std::string> to_json = one;
+  to_json.insert(to_json.end(), {"--json", "-"});
+  const json ranked = json::parse(done(to_json))["candidates"];
+  ASSERT_EQ(ranked.size(), 5U);
+  double before = 1e9;
+  for (const json& candidate : ranked) {
+    EXPECT_LE(candidate["gain"]["both"].get<double>(), before);
+    before = candidate["gain"]["both"];
+  }
+  EXPECT_EQ(ranked.back()["index"], 0) << "400 mm away";
+}
+
+TEST_F(PlanCommand, ShowsTheGoalsGainOnce) {
+  put_bytes(folder_ / "one.csv", "x_mm,y_mm,theta_deg\n3,-2,45\n");
+  for (const std::string goal : {"identity", "pose"}) {
+    const std::string out = done(command({"--candidates", "one.csv", "--goal", goal}));
+    const std::size_t begin = out.find("rank");
+    const std::string table = out.substr(begin, out.find("\n\n", begin) - begin);
+    EXPECT_EQ(table.find(goal + " nats"), table.find(goal)) << out;
+    EXPECT_EQ(table.find(goal), table.rfind(goal, table.find('\n'))) << out;
+    EXPECT_NE(out.find(", 1 candidate in "), std::string::npos) << out;
+  }
+}
+
+TEST_F(PlanCommand, SaysThatOneTouchCannotTell) {
+  const std::string note = "one touch cannot tell";
+  EXPECT_NE(done(command({"--candidates", "c.csv", "--none", "--touches=1"})).find(note),
+            std::string::npos);
+  EXPECT_EQ(done(command({"--candidates", "c.csv", "--none"})).find(note), std::string::npos);
+}
+
+TEST_F(PlanCommand, SaysOnceWhatTheLatticeDoesNotResolve) {
+  const std::string err = palpate(command({"--candidates", "c.csv", "--touch-sd-deg", "1"})).err;
+  EXPECT_NE(err.find("does not resolve touch-sd of 1 degrees"), std::string::npos) << err;
+  EXPECT_EQ(err.find("does not resolve"), err.rfind("does not resolve")) << err;
+  EXPECT_EQ(palpate(command({"--candidates", "c.csv"})).err, "");
+}
+
 TEST_F(PlanCommand, RefusesBadInputInOneLine) {
   const auto refuse = [&](const std::vector<std::string>& more,
                           const std::vector<std::string>& named) {
@@ -109,7 +191,10 @@ TEST_F(PlanCommand, RefusesBadInputInOneLine) {
   put_bytes(folder_ / "empty.csv", "x,y,theta\n");
   refuse({"--candidates", "empty.csv"}, {"empty.csv", "no row"});
   put_bytes(folder_ / "wrong.csv", "x,y,angle\n1,2,3\n");
-  refuse({"--candidates", "wrong.csv"}, {"wrong.csv", "'theta'"});
+  refuse({"--candidates", "wrong.csv"}, {"wrong.csv", "'theta'", "rename its columns"});
+  EXPECT_EQ(palpate(command({"--candidates", "wrong.csv"})).err.find("--pose-columns"),
+            std::string::npos)
+      << "a flag of import";
   put_bytes(folder_ / "nan.csv", "x_mm,y_mm,theta_rad\n1,2,3\nnan,nan,nan\n");
   refuse({"--candidates", "nan.csv"}, {"nan.csv", "pose 1", "unknown"});
   refuse({"--candidates", "grid", "--goal", "all"}, {"--goal all", "identity, pose or both"});
@@ -131,7 +216,14 @@ TEST_F(PlanCommand, LiveShowsTheNextTouch) {
   std::istringstream lines(content_of(folder_.path())["live.jsonl"]);
   int touches = 0;
   for (std::string line; std::getline(lines, line); ++touches) {
-    const json next = json::parse(line).at("next");
+    const json estimate = json::parse(line);
+    EXPECT_TRUE(estimate.contains("best")) << "the estimate does not wait for the plan";
+    EXPECT_FALSE(estimate.contains("next"));
+    ASSERT_TRUE(std::getline(lines, line));
+    const json planned = json::parse(line);
+    EXPECT_EQ(planned.at("unknown"), estimate.at("unknown"));
+    EXPECT_EQ(planned.at("touch"), estimate.at("touch"));
+    const json& next = planned.at("next");
     EXPECT_EQ(next.size(), 4U) << next;
     EXPECT_GT(next["gain"]["both"].get<double>(), 0.1);
     EXPECT_TRUE(next.contains("x_mm") && next.contains("y_mm") && next.contains("theta_rad"));

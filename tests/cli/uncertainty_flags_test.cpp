@@ -63,17 +63,32 @@ TEST_F(UncertaintyFlags, AreRefusedWhereTheyCannotBeMeant) {
   for (const std::string flag :
        {"--touch-sd-mm", "--touch-sd-deg", "--slip-sd-mm", "--slip-sd-deg"}) {
     for (const char* value : {"-1", "nan", "inf"}) {
-      expect_refused(with({flag + "=" + value}), {flag, "at least 0"});
+      expect_refused(with({flag + "=" + value}), {flag, value, "give a finite number from 0"});
     }
     expect_refused(with({flag, "x"}), {flag, "x", "give a number"});
     expect_refused(with({flag, ""}), {flag, "give a value"});
     const Arguments region{"--x-mm=-4:4", "--theta-deg=0:5", flag + "=9"};
-    expect_refused(with(region), {flag + " 9: wider than the region"});
+    expect_refused(with(region),
+                   {flag + " 9: wider than the region", flag.ends_with("mm") ? "8 mm;" : "5 deg;"});
   }
   expect_refused(with({"--filter", "particles", "--x-mm=-4:4", "--slip-sd-mm=9"}),
-                 {"--slip-sd-mm 9: wider than the region, 8"});
+                 {"--slip-sd-mm 9: wider than the region, 8 mm"});
   EXPECT_EQ(palpate(with({"--x-mm=2:2", "--touch-sd-mm=9"})).status, 0)
       << "an axis of one bin is not blurred; y is 20 mm long";
+}
+
+TEST_F(UncertaintyFlags, AreRefusedByNameWhereTheRegionIsAutomatic) {
+  for (const std::string flag : {"--touch-sd-mm", "--slip-sd-mm"}) {
+    expect_refused(with({flag + "=1000"}),
+                   {flag + " 1000: wider than the region", " mm; give less"});
+  }
+  for (const std::string flag : {"--touch-sd-deg", "--slip-sd-deg"}) {
+    expect_refused(with({flag + "=1000"}), {flag + " 1000: wider than the region, 360 deg"});
+  }
+  expect_refused({"plan", "u.h5", "--maps", "maps", "--candidates", "grid", "--touch-sd-mm=1000"},
+                 {"--touch-sd-mm 1000: wider than the region"});
+  expect_scene_refused("slip_sd: {mm: 1000}\n",
+                       {"scene.yaml", "slip_sd mm = 1000: wider than the region", " mm; give"});
 }
 
 TEST_F(UncertaintyFlags, SceneKeysAreRefusedByName) {
@@ -82,7 +97,7 @@ TEST_F(UncertaintyFlags, SceneKeysAreRefusedByName) {
   expect_scene_refused("touch_sd: {rad: 0.1}\n", {"scene.yaml", "'rad'", "unknown key", "deg"});
   expect_scene_refused("touch_sd: 1\n", {"scene.yaml", "touch_sd"});
   expect_scene_refused("bins: [5, 5, 5]\nslip_sd: {mm: 25}\n",
-                       {"scene.yaml", "slip_sd mm = 25: wider than the region, 20"});
+                       {"scene.yaml", "slip_sd mm = 25: wider than the region, 20 mm"});
 }
 
 TEST_F(UncertaintyFlags, ParticlesTakeTheSlipAsTheirMotion) {
@@ -132,6 +147,16 @@ TEST_F(UncertaintyFlags, NoneTakesNoFileForItsNumber) {
     expect_refused(with({std::string("--none=") + wrong}), {"--none", wrong, "above 0"});
   }
   expect_refused(with({"--none", ""}), {"--none", "give a"});
+}
+
+TEST_F(UncertaintyFlags, TheProbabilityOfNoneStandsBesideTheIdentity) {
+  const json r = record_with({"--none", "--trace"});
+  EXPECT_EQ(r["none"], r["identity"]["(none)"]);
+  ASSERT_EQ(r["trace"].size(), 6u);
+  for (const json& step : r["trace"]) {
+    EXPECT_EQ(step.at("none"), step["identity"].at("(none)"));
+  }
+  EXPECT_FALSE(record_with({}).contains("none"));
 }
 
 TEST_F(UncertaintyFlags, OneTouchCannotTell) {

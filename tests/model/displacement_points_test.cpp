@@ -50,5 +50,17 @@ TEST(DisplacementPoints, LeaveAnExactPartAlone) {
   }
 }
 
+TEST(Slipped, TurnsTheObjectAboutItsCentroidAndMovesIt) {
+  const Pose T_object_robot{{4.0, -7.0}, 0.8};
+  const glm::dvec2 centroid_mm{12.0, 5.0};
+  const Pose slip{{0.5, -0.25}, 0.3};
+  const Pose after = slipped(T_object_robot, slip, centroid_mm);
+  const glm::dvec2 q = inverse(T_object_robot) * centroid_mm;
+  const glm::dvec2 moved = after * q - centroid_mm;
+  EXPECT_NEAR(moved.x, 0.5, 1e-12) << "rounding of some 10 mm in float64";
+  EXPECT_NEAR(moved.y, -0.25, 1e-12);
+  EXPECT_NEAR(after.theta_rad, 1.1, 1e-12);
+}
+
 }  // namespace
 }  // namespace palpate

@@ -61,14 +61,12 @@ class ModelledTouches {
     ContactModel contact = options_.contact;
     contact.prior = map.prior;
     const Pose slip = random_displacement(slip_sd, random_);
-    const glm::dvec2 g = body_of(map).centroid_mm;
-    const Pose moved{g + slip.translation_mm - rotate(slip.theta_rad, g), slip.theta_rad};
     const std::vector<glm::dvec2> elements_mm = digitacts_array();
     ReadingMixture one(1, 36, 2);
-    one.set(0, reading_log_likelihoods(
-                   elements_mm,
-                   moved * T_object_robot * T_robot_sensor * random_displacement(touch_sd, random_),
-                   InterpolatedMap(map, map.prior), contact, object));
+    one.set(0, reading_log_likelihoods(elements_mm,
+                                       slipped(T_object_robot, slip, body_of(map).centroid_mm) *
+                                           T_robot_sensor * random_displacement(touch_sd, random_),
+                                       InterpolatedMap(map, map.prior), contact, object));
     // No Contact at -20 kPa also where no element is in contact.
     std::vector<double> pressure;
     for (const Reading reading : one.draw(0, random_).readings) {
@@ -118,6 +116,33 @@ TEST(Surprise, GrowsWithWhatTheBeliefDoesNotKnow) {
     EXPECT_GT(ModelledTouches({.lattice = {}}).spread(touch_sd, slip_sd).mean, 1.0)
         << touch_sd.mm << ' ' << slip_sd.mm;
   }
+}
+
+// The frame of a map is anywhere; where no cell is occupied, the object turns about the grid's
+// middle when it slips.
+TEST(Surprise, DoesNotDependOnTheFrameOfAMapWithoutCells) {
+  const auto surprise = [](const glm::dvec2& shift_mm) {
+    std::vector<Hypothesis> maps = shapes();
+    for (Hypothesis& hypothesis : maps) {
+      hypothesis.map.origin_mm += shift_mm;
+      for (float& cell : hypothesis.map.log_odds) {
+        cell = cell > 0.0F ? -0.1F : -3.0F;
+      }
+    }
+    const RecognitionTask task(std::move(maps),
+                               HistogramOptions{.lattice = {}, .slip_sd = {.mm = 0.0, .rad = 0.5}});
+    const std::vector<PoseSample> samples(128, {0, Pose{shift_mm, 0.0}});
+    const std::vector<glm::dvec2> elements_mm = digitacts_array();
+    std::vector<double> pressure(36, -20.0);
+    std::fill_n(pressure.begin(), 6, 10.0);
+    return surprise_of({.T_robot_sensor = {{3.0, 1.0}, 0.0},
+                        .elements_mm = elements_mm,
+                        .pressure = pressure},
+                       samples, task)
+        .value();
+  };
+  // The places of elements are rounded in float64, log odds between cells in float32.
+  EXPECT_NEAR(surprise({64.0, -32.0}), surprise({0.0, 0.0}), 1e-3);
 }
 
 TEST(Surprise, TakesFewerSamplesForLargeArrays) {

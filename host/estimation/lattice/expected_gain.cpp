@@ -293,11 +293,8 @@ void slip(std::span<PoseSample> samples, std::span<const Body> bodies, const Dis
   Random random(seed, Stream::slips);
   for (PoseSample& sample : samples) {
     const glm::dvec2 centroid_mm = bodies[static_cast<std::size_t>(sample.object)].centroid_mm;
-    const double x = sd.mm * random.normal();
-    const double y = sd.mm * random.normal();
-    const double turn = sd.rad * random.normal();
-    const Pose moved{centroid_mm - rotate(turn, centroid_mm) + glm::dvec2(x, y), turn};
-    sample.T_object_robot = moved * sample.T_object_robot;
+    sample.T_object_robot =
+        slipped(sample.T_object_robot, random_displacement(sd, random), centroid_mm);
   }
 }
 

@@ -1,0 +1,166 @@
+#include "plan_output.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <filesystem>
+
+#include <fmt/format.h>
+
+#include "bounding_box.hpp"
+#include "planned_touch.hpp"
+#include "record_output.hpp"
+#include "record_table.hpp"
+#include "sheet.hpp"
+#include "step_words.hpp"
+#include "text_table.hpp"
+
+namespace palpate::cli {
+
+namespace {
+
+std::string believed_words(const Plan& plan) {
+  return fmt::format(
+      "after {} {}: {:.2f} nats unknown of the identity, {:.2f} of the pose, "
+      "counted in bins",
+      plan.record.touches, plan.record.touches == 1 ? "touch" : "touches", plan.identity_nats,
+      std::max(plan.both_nats - plan.identity_nats, 0.0));
+}
+
+std::string table_of(const Plan& plan, std::optional<int> columns) {
+  constexpr std::size_t most_rows = 10;
+  TextTable table(
+      {{"rank", true},
+       {"x mm", true},
+       {"y mm", true},
+       {"theta deg", true},
+       {plan.goal == PlanGoal::both ? "gain nats" : goal_word(plan.goal) + " nats", true},
+       {"identity", true},
+       {"pose", true},
+       {"candidate", true}});
+  for (std::size_t i = 0; i < std::min(plan.ranked.size(), most_rows); ++i) {
+    const PlannedTouch& touch = plan.ranked[i];
+    const std::array<std::string, 3> pose = pose_text(touch.T_robot_sensor).value;
+    table.add({std::to_string(i + 1), pose[0], pose[1], pose[2],
+               fmt::format("{:.2f}", gain_for(touch.gain, plan.goal)),
+               // The goal's gain stands in its own column; one without content is left out.
+               plan.goal == PlanGoal::identity ? "" : fmt::format("{:.2f}", touch.gain.identity),
+               plan.goal == PlanGoal::pose ? "" : fmt::format("{:.2f}", touch.gain.pose),
+               std::to_string(touch.index)});
+  }
+  return table.text(columns);
+}
+
+/// What is unknown of the goal, nats.
+double unknown_nats(const Plan& plan) {
+  return plan.goal == PlanGoal::identity ? plan.identity_nats
+         : plan.goal == PlanGoal::pose   ? plan.both_nats - plan.identity_nats
+                                         : plan.both_nats;
+}
+
+/// Why the gains are no more exact; "" where nothing is to be said.
+std::string limit_words(const Plan& plan) {
+  constexpr double near_nats = 0.5;
+  const double gain = gain_for(plan.ranked.front().gain, plan.goal);
+  const auto samples = plan.samples.size();
+  const double most = std::log(static_cast<double>(samples));
+  if (gain > most - near_nats) {
+    return fmt::format(
+        "{} samples cannot show more than {:.2f} nats, and the best gain is near that: the first "
+        "candidates may not be in order; give more --samples",
+        samples, most);
+  }
+  if (gain <= unknown_nats(plan) + least_gain_nats) {
+    return "";
+  }
+  return plan.goal == PlanGoal::identity
+             ? fmt::format(
+                   "the best gain is above what is unknown: {} samples stand for the belief only "
+                   "roughly; give more --samples",
+                   samples)
+             : "the best gain is above what is unknown, which is counted in bins: the touch tells "
+               "also where in its bin the pose is";
+}
+
+}  // namespace
+
+nlohmann::ordered_json to_json(const Plan& plan, const std::string& device) {
+  nlohmann::ordered_json json{{"recording", plan.record.recording},
+                              {"touches", plan.record.touches},
+                              {"goal", goal_word(plan.goal)},
+                              {"believed", to_json(plan.record.last(), plan.task)}};
+  json["believed"]["entropy"] = {{"identity", plan.identity_nats},
+                                 {"pose", plan.both_nats - plan.identity_nats},
+                                 {"both", plan.both_nats}};
+  json["candidates"] = nlohmann::ordered_json::array();
+  for (const PlannedTouch& touch : plan.ranked) {
+    json["candidates"].push_back(to_json(touch));
+  }
+  std::vector<std::string> warnings = plan.record.last().warnings;
+  if (const std::string limit = limit_words(plan); !limit.empty()) {
+    warnings.push_back(limit);
+  }
+  if (!warnings.empty()) {
+    json["warnings"] = warnings;
+  }
+  json["samples"] = plan.samples.size();
+  json["seed"] = plan.seed;
+  json["seconds"] = plan.seconds;
+  json["device"] = device;
+  return json;
+}
+
+std::string plan_text(const Plan& plan, std::optional<int> columns) {
+  const std::string limit = limit_words(plan);
+  return fmt::format(
+      "{}\n{}\n\n{}{}{}\n{}, {} {} in {:.0f} ms\n", result_words(plan.record.last(), plan.task),
+      believed_words(plan), table_of(plan, columns), complaints({plan.record}, plan.task),
+      limit.empty() ? "" : limit + "\n", next_touch_words(plan.ranked.front(), plan.goal),
+      plan.ranked.size(), plan.ranked.size() == 1 ? "candidate" : "candidates", 1e3 * plan.seconds);
+}
+
+PlanFigure figure_of(const Plan& plan) {
+  PlanFigure figure;
+  const RecognitionStep& last = plan.record.last();
+  const auto printed = [](std::string words) {
+    const std::size_t at = words.find(" deg");
+    return at == words.npos ? words : words.replace(at, 4, "°");
+  };
+  const std::string name = std::filesystem::path(plan.record.recording).filename().string();
+  figure.result = fmt::format("{}: {}", name, identity_words(last, plan.task));
+  figure.captions = {
+      "object at " + printed(pose_words(pose_text(last.T_robot_object()))) + " in the robot frame",
+      believed_words(plan), printed(next_touch_words(plan.ranked.front(), plan.goal))};
+  figure.gain_caption =
+      plan.goal == PlanGoal::both
+          ? "expected information about object and pose, nats"
+          : fmt::format("expected information about the {}, nats", goal_word(plan.goal));
+  figure.elements_mm = plan.elements_mm;
+  figure.element_mm = element_edge_mm(plan.elements_mm);
+  BoundingBox area;
+  for (const PlannedTouch& touch : plan.ranked) {
+    figure.candidates.push_back({touch.T_robot_sensor, gain_for(touch.gain, plan.goal)});
+    area.take_in(touch.T_robot_sensor * array_centre_mm(plan.elements_mm));
+  }
+  const double margin_mm = array_reach_mm(plan.elements_mm) + figure.element_mm;
+  for (const Touch& touch : plan.touches) {
+    auto& elements = figure.touches_mm.emplace_back();
+    for (const glm::dvec2& element : touch.elements_mm) {
+      elements.push_back(touch.T_robot_sensor * element);
+    }
+    area.take_in(touch.T_robot_sensor * array_centre_mm(touch.elements_mm));
+  }
+  area.lower -= margin_mm;
+  area.upper += margin_mm;
+  constexpr int cells = 160;
+  const OccupancyField field =
+      expected_occupancy(plan.samples, plan.task, area.lower, area.upper, cells);
+  figure.lower_mm = field.lower_mm;
+  figure.cell_mm = field.cell_mm;
+  figure.nx = field.nx;
+  figure.ny = field.ny;
+  figure.occupied = field.probability;
+  return figure;
+}
+
+}  // namespace palpate::cli
