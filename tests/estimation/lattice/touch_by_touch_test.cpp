@@ -6,8 +6,8 @@
 #include <functional>
 #include <vector>
 
-#include <glm/geometric.hpp>
 #include <gtest/gtest.h>
+#include <glm/geometric.hpp>
 
 #include "palpate/error.hpp"
 #include "palpate/pose_error.hpp"
