@@ -31,21 +31,33 @@ const float LEAST = ALONG_X ? LEAST_ALONG_X : LEAST_ALONG_Y;
 const int BINS = int(ALONG_X ? BLUR_STRIP_X : BLUR_STRIP_Y);  // of a line
 const int LINES = ALONG_X ? 1 : 2;
 const int REACH = int(STEPS);
-// A read takes two neighbouring bins of a row.
+// A read takes two neighbouring bins of a row. Strips begin at even bins, and so do their reads: a
+// read that begins outside lies outside.
 const int STRIDE = ALONG_X ? 2 : 1;
 const int BEGIN = ALONG_X ? -REACH - REACH % 2 : -REACH;
 
 float weight_of(const int distance) {
   return STEPS <= BLUR_CONSTANT_STEPS ? weight_at[min(distance, int(BLUR_CONSTANT_STEPS))]
-                             : texelFetch(weights, distance).x;
+                                      : texelFetch(weights, distance).x;
 }
 
+// Of an invocation.
+int count;       // bins of its lines
+int begin;       // the strip's first bin
+uint first;      // the line's first bin in the slab
+uint step;       // from one bin of a line to the next
+vec2 reference;  // of the object
+float largest;   // of the plane
 float sum[BINS * LINES];
 
 // Adds what lies `j` bins behind the strip's first.
-void add(const int j, const vec2 words, const bvec2 inside, const float largest) {
-  const vec2 likelihood = vec2(inside.x ? lifted(words.x, largest) : 0.0,
-                               inside.y ? lifted(words.y, largest) : 0.0);
+void add(const int j) {
+  const int at = begin + j;
+  const bool inside = at >= 0 && at < count;
+  const bool next_inside = ALONG_X ? inside && at + 1 < count : inside;
+  const vec2 words = words_of(first + uint(inside ? at : 0) * step, reference, EVEN);
+  const vec2 likelihood = vec2(inside ? lifted(words.x, largest) : 0.0,
+                               next_inside ? lifted(words.y, largest) : 0.0);
   [[unroll]] for (int b = 0; b < BINS; ++b) {
     if (ALONG_X) {
       if (abs(j - b) <= REACH) {
@@ -63,7 +75,7 @@ void add(const int j, const vec2 words, const bvec2 inside, const float largest)
 
 void main() {
   const int nx = int(push.nx);
-  const int count = ALONG_X ? nx : int(push.ny);
+  count = ALONG_X ? nx : int(push.ny);
   const uint across = ALONG_X ? push.ny : (push.nx + 1) / 2;
   const uint strips = uint((count + BINS - 1) / BINS);
   const uint id = gl_GlobalInvocationID.x;
@@ -71,33 +83,21 @@ void main() {
     return;
   }
   const uint line = ALONG_X ? id / strips : id % across * 2;
-  const int begin = int(ALONG_X ? id % strips : id / across) * BINS;
+  begin = int(ALONG_X ? id % strips : id / across) * BINS;
   const uint object = push.object_first + gl_WorkGroupID.y;
   const uint theta = push.theta_first + gl_WorkGroupID.z;
-  const uint first = gl_WorkGroupID.y * push.stride + gl_WorkGroupID.z * push.nx * push.ny +
+  first = gl_WorkGroupID.y * push.stride + gl_WorkGroupID.z * push.nx * push.ny +
                      line * (ALONG_X ? push.nx : 1);
-  const uint step = ALONG_X ? 1 : push.nx;
-  const vec2 reference = texelFetch(references, int(object)).xy;
-  const float largest = texelFetch(plane_max, int(object * push.all_thetas + theta)).x;
+  step = ALONG_X ? 1 : push.nx;
+  reference = texelFetch(references, int(object)).xy;
+  largest = texelFetch(plane_max, int(object * push.all_thetas + theta)).x;
 
   fill_weights();
   [[unroll]] for (int b = 0; b < BINS * LINES; ++b) { sum[b] = 0.0; }
   if (STEPS <= BLUR_CONSTANT_STEPS) {
-    [[unroll]] for (int j = BEGIN; j < BINS + REACH; j += STRIDE) {
-      const int at = begin + j;
-      const bool inside = at >= 0 && at < count;
-      const bool next_inside = ALONG_X ? at + 1 >= 0 && at + 1 < count : inside;
-      const uint bin = first + uint(inside || next_inside ? at : 0) * step;
-      add(j, words_of(bin, reference, EVEN), bvec2(inside, next_inside), largest);
-    }
+    [[unroll]] for (int j = BEGIN; j < BINS + REACH; j += STRIDE) { add(j); }
   } else {
-    for (int j = BEGIN; j < BINS + REACH; j += STRIDE) {
-      const int at = begin + j;
-      const bool inside = at >= 0 && at < count;
-      const bool next_inside = ALONG_X ? at + 1 >= 0 && at + 1 < count : inside;
-      const uint bin = first + uint(inside || next_inside ? at : 0) * step;
-      add(j, words_of(bin, reference, EVEN), bvec2(inside, next_inside), largest);
-    }
+    for (int j = BEGIN; j < BINS + REACH; j += STRIDE) { add(j); }
   }
 
   const uint word = ALONG_X ? 0 : 1;

@@ -13,7 +13,8 @@ float word_in(const vec2 bin, const vec2 reference) {
 }
 
 float word_of(const uint bin, const vec2 reference) {
-  const vec4 texel = texelFetch(source, int(bin / 2));
+  // The bin after a slab's last may be asked for, and is not used.
+  const vec4 texel = texelFetch(source, min(int(bin / 2), textureSize(source) - 1));
   return word_in(bin % 2 == 0 ? texel.xy : texel.zw, reference);
 }
 

@@ -26,21 +26,11 @@ struct Sums {
     for (std::size_t level = 0; level < levels; ++level) {
       log_p[level] = model.log_likelihood(static_cast<Reading>(level), {log_odds}, object);
     }
-    const double most = *std::max_element(log_p.begin(), log_p.begin() + levels);
-    std::array<double, most_reading_levels> q{};
-    double total = 0.0;
+    const PredictedReading predicted = predicted_reading(std::span(log_p).first(levels));
+    deviation += log_p[static_cast<std::size_t>(reading)] - predicted.most - predicted.below_most;
     for (std::size_t level = 0; level < levels; ++level) {
-      total += q[level] = std::exp(log_p[level] - most);
-    }
-    double below_most = 0.0;  // the mean, relative to the largest: no cancellation
-    for (std::size_t level = 0; level < levels; ++level) {
-      q[level] /= total;
-      below_most += q[level] * (log_p[level] - most);
-    }
-    deviation += log_p[static_cast<std::size_t>(reading)] - most - below_most;
-    for (std::size_t level = 0; level < levels; ++level) {
-      const double from_mean = log_p[level] - most - below_most;
-      variance += q[level] * from_mean * from_mean;
+      const double from_mean = log_p[level] - predicted.most - predicted.below_most;
+      variance += predicted.probability[level] * from_mean * from_mean;
     }
   }
 };

@@ -1,5 +1,6 @@
 #include "predicted_readings.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 namespace palpate {
@@ -56,6 +57,21 @@ std::vector<double> reading_log_likelihoods(std::span<const glm::dvec2> elements
     }
   }
   return logs;
+}
+
+PredictedReading predicted_reading(std::span<const double> log_likelihood) {
+  PredictedReading predicted;
+  predicted.most = *std::max_element(log_likelihood.begin(), log_likelihood.end());
+  double total = 0.0;
+  for (std::size_t level = 0; level < log_likelihood.size(); ++level) {
+    total += predicted.probability[level] = std::exp(log_likelihood[level] - predicted.most);
+  }
+  // The mean relative to the largest: no cancellation.
+  for (std::size_t level = 0; level < log_likelihood.size(); ++level) {
+    predicted.probability[level] /= total;
+    predicted.below_most += predicted.probability[level] * (log_likelihood[level] - predicted.most);
+  }
+  return predicted;
 }
 
 }  // namespace palpate

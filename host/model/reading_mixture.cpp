@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "palpate/fit.hpp"
+#include "predicted_readings.hpp"
 
 namespace palpate {
 
@@ -48,27 +49,19 @@ ReadingMixture::DrawnTouch ReadingMixture::draw(std::size_t hypothesis, Random& 
     for (std::size_t level = 0; level < levels_; ++level) {
       log_p[level] = log_likelihood_[(e * levels_ + level) * hypotheses_ + hypothesis];
     }
-    const double most = *std::max_element(log_p.begin(), log_p.begin() + levels_);
-    std::array<double, most_reading_levels> q{};
-    double total = 0.0;
-    for (std::size_t level = 0; level < levels_; ++level) {
-      total += q[level] = std::exp(log_p[level] - most);
-    }
-    double below_most = 0.0;  // the mean, relative to the largest: no cancellation
-    double at = random.uniform() * total;
+    const PredictedReading predicted = predicted_reading(std::span(log_p).first(levels_));
+    double at = random.uniform();
     std::size_t drawn = levels_ - 1;  // also where rounding leads past the last
     for (std::size_t level = 0; level < levels_; ++level) {
-      below_most += q[level] / total * (log_p[level] - most);
-      if (at >= 0.0 && at < q[level]) {
+      const double q = predicted.probability[level];
+      if (at >= 0.0 && at < q) {
         drawn = level;
       }
-      at -= q[level];
+      at -= q;
+      const double from_mean = log_p[level] - predicted.most - predicted.below_most;
+      touch.variance += q * from_mean * from_mean;
     }
-    for (std::size_t level = 0; level < levels_; ++level) {
-      const double from_mean = log_p[level] - most - below_most;
-      touch.variance += q[level] / total * from_mean * from_mean;
-    }
-    touch.mean += most + below_most;
+    touch.mean += predicted.most + predicted.below_most;
     touch.log_likelihood += log_p[drawn];
     touch.readings.push_back(static_cast<Reading>(drawn));
   }
