@@ -36,6 +36,28 @@ struct ProbabilityInterval {
   double high = 1.0;
 };
 
+/// The bounds of a logarithm, in nats.
+struct LogInterval {
+  double low = 0.0;
+  double high = 0.0;
+};
+
+/// What a search by bounds proves of its estimate.
+struct Certificate {
+  /// Bound of the total variation distance between the estimate and the posterior over all bins:
+  /// the mass of the bins that were not evaluated, and the rounding of those that were.
+  double dropped_mass = 0.0;
+  /// Log of each hypothesis's prior weight times the summed likelihood of its bins, in nats,
+  /// [hypothesis]: bounds.
+  std::vector<LogInterval> log_evidence = {};
+  bool mode_certain = false;         ///< no bin that was not evaluated can exceed the mode
+  std::int64_t blocks_bounded = 0;   ///< blocks of bins whose bound was computed
+  std::int64_t bins_evaluated = 0;   ///< bins whose likelihood was computed
+  /// Standard error, in nats, of the log evidence of "none of these", which is estimated from a
+  /// sample of the bins; none where the options do not ask for "none of these".
+  std::optional<double> none_standard_error = {};
+};
+
 /// An object and its pose, drawn from a belief.
 struct PoseSample {
   int object = 0;  ///< index into the hypotheses
@@ -48,6 +70,7 @@ struct Estimate {
   /// Bounds of every probability in `identity`, from a filter that knows no more than the bounds;
   /// empty where `identity` is exact.
   std::vector<ProbabilityInterval> identity_bounds = {};
+  std::optional<Certificate> certificate = {};  ///< from a filter that knows bounds
   double none = 0.0;  ///< probability of "none of these", where the options ask for it
   Mode mode;
   /// True where a map that holds only the prior explains the touches better, by more than 700 nats,

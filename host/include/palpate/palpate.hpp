@@ -4,6 +4,7 @@
 
 #include "palpate/balanced_lattice.hpp"
 #include "palpate/baseline.hpp"
+#include "palpate/bounded_posterior.hpp"
 #include "palpate/contact.hpp"
 #include "palpate/contact_model.hpp"
 #include "palpate/device.hpp"

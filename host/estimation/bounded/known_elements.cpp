@@ -1,0 +1,65 @@
+#include "known_elements.hpp"
+
+#include <algorithm>
+#include <tuple>
+
+namespace palpate {
+
+namespace {
+
+struct KnownElement {
+  Reading reading;
+  glm::dvec2 from_pivot_mm;
+};
+
+KnownElements in_order(std::vector<KnownElement> elements) {
+  std::sort(elements.begin(), elements.end(), [](const KnownElement& a, const KnownElement& b) {
+    return std::tuple(a.reading, a.from_pivot_mm.x, a.from_pivot_mm.y) <
+           std::tuple(b.reading, b.from_pivot_mm.x, b.from_pivot_mm.y);
+  });
+  KnownElements known;
+  known.from_pivot_mm.reserve(elements.size());
+  for (const KnownElement& element : elements) {
+    if (known.runs.empty() || known.runs.back().reading != element.reading) {
+      known.runs.push_back(
+          {element.reading, known.from_pivot_mm.size(), known.from_pivot_mm.size()});
+    }
+    known.from_pivot_mm.push_back(element.from_pivot_mm);
+    ++known.runs.back().end;
+  }
+  return known;
+}
+
+void append(const KnownElements& known, std::vector<KnownElement>& elements) {
+  for (const ReadingRun& run : known.runs) {
+    for (std::size_t i = run.begin; i < run.end; ++i) {
+      elements.push_back({run.reading, known.from_pivot_mm[i]});
+    }
+  }
+}
+
+}  // namespace
+
+KnownElements gather_elements(std::span<const Touch> touches, const ContactModel& model,
+                              const glm::dvec2& pivot_mm) {
+  std::vector<KnownElement> elements;
+  for (const Touch& touch : touches) {
+    const std::vector<Reading> readings = model.classify(touch);
+    for (std::size_t i = 0; i < readings.size(); ++i) {
+      if (readings[i] != Reading::unknown) {
+        elements.push_back({readings[i], touch.T_robot_sensor * touch.elements_mm[i] - pivot_mm});
+      }
+    }
+  }
+  return in_order(std::move(elements));
+}
+
+KnownElements merged(const KnownElements& a, const KnownElements& b) {
+  std::vector<KnownElement> elements;
+  elements.reserve(a.from_pivot_mm.size() + b.from_pivot_mm.size());
+  append(a, elements);
+  append(b, elements);
+  return in_order(std::move(elements));
+}
+
+}  // namespace palpate

@@ -1,0 +1,38 @@
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <vector>
+
+#include <glm/vec2.hpp>
+
+#include "palpate/contact_model.hpp"
+
+namespace palpate {
+
+/// Elements of one reading: [begin, end) of a list.
+struct ReadingRun {
+  Reading reading{};
+  std::size_t begin = 0;
+  std::size_t end = 0;
+};
+
+/// The elements of some touches that are not Unknown, in the robot frame and relative to the
+/// lattice's pivot. Elements multiply (Eq. 13), so that neither touches nor their order count: equal
+/// readings stand together, by their places.
+struct KnownElements {
+  std::vector<glm::dvec2> from_pivot_mm;
+  std::vector<ReadingRun> runs;  ///< ascending by reading
+
+  bool empty() const { return from_pivot_mm.empty(); }
+};
+
+/// Classifies the touches' elements (Eq. 3) and gathers those that are not Unknown.
+/// @throws Error on a touch that is not sound
+KnownElements gather_elements(std::span<const Touch> touches, const ContactModel& model,
+                              const glm::dvec2& pivot_mm);
+
+/// The elements of both.
+KnownElements merged(const KnownElements& a, const KnownElements& b);
+
+}  // namespace palpate

@@ -1,0 +1,106 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "palpate/contact_model.hpp"
+#include "palpate/device.hpp"
+#include "palpate/estimate.hpp"
+#include "palpate/lattice.hpp"
+
+namespace palpate {
+
+struct BoundedOptions {
+  PoseLattice lattice;
+  ContactModel contact = {};  ///< what the sensor says about a place (Eq. 3, 7)
+  /// Largest total variation distance from the posterior over all bins, in (0, 1). Each estimate()
+  /// evaluates as many bins as the tolerance needs.
+  double tolerance = 1e-6;
+  /// Seconds after which estimate() stops and reports what it has proven by then, also where that
+  /// is less than the tolerance asks for. By default it takes the time that the tolerance needs.
+  std::optional<double> budget_s = {};
+  /// Also bounds each hypothesis's log evidence within this many nats, however unlikely the
+  /// hypothesis is: for a temperature that is applied later. By default only the tolerance counts.
+  std::optional<double> evidence_nats = {};
+  /// Prior weight W of "none of these", as HistogramOptions::none_weight. The mean likelihood of
+  /// each touch is estimated from a sample of the bins; Certificate says how exactly.
+  std::optional<double> none_weight = {};
+  /// Host threads; 0 takes as many as the machine has cores.
+  int threads = 0;
+};
+
+/// Histogram filter over object identity and planar pose that evaluates only the bins that matter
+/// and proves how little the others can. Its bins are those of PoseHistogram. Blocks of bins are
+/// bounded from above by tables of the smallest penalty within a window of the map; blocks that
+/// cannot matter are dropped, and the bins of the others are evaluated. Memory follows the maps,
+/// not the bins. The result does not depend on the order of touches, on the number of threads or on
+/// the processor's vector width, unless a budget ends the search. An object that was moved from
+/// throws Error on every call.
+class BoundedPosterior {
+ public:
+  /// Builds the window tables of the maps.
+  /// @throws Error on an empty list, a map that is not sound, maps of different priors where the
+  /// options give none, a weight that is not positive and finite, a lattice, contact model or option
+  /// out of range, or a table for another number of objects
+  BoundedPosterior(Device& device, std::span<const Hypothesis> hypotheses,
+                   const BoundedOptions& options);
+  ~BoundedPosterior();
+  BoundedPosterior(BoundedPosterior&&) noexcept;
+  BoundedPosterior& operator=(BoundedPosterior&&) noexcept;
+
+  /// Returns to the uniform belief, for the next unknown. Keeps the tables.
+  void reset();
+  /// Turns theta about another pivot, in the robot frame; see PoseHistogram::move_pivot().
+  /// @throws Error, and changes nothing, after an update() or on a pivot out of range
+  void move_pivot(const glm::dvec2& pivot_mm);
+
+  /// Multiplies the belief by the likelihood of these touches (Eq. 7, 13): adds their penalties to
+  /// the largest blocks. Calls `progress` with the fraction done from time to time. Takes in no
+  /// touch at all if one of them is not sound or if `progress` throws.
+  /// @throws Error on a touch that is not sound; what `progress` throws
+  void update(std::span<const Touch> touches, const std::function<void(double)>& progress = {});
+  void update(const Touch& touch) { update(std::span(&touch, 1)); }
+
+  /// Identity probabilities (Eq. 14) with their bounds, mode (Eq. 15-16) and certificate. Searches
+  /// once after each update(); further calls return the same.
+  Estimate estimate() const;
+
+  /// The pose between the bins near a mode, and its covariance; see PoseHistogram::refine().
+  /// Evaluates the bins of the window that it fits.
+  /// @throws Error if there is no such object or bin, or the pose is not finite
+  RefinedPose refine(const Mode& mode) const;
+
+  /// Marginal probabilities of one object's poses, on lattice(). The marginals of all objects and
+  /// `none` together sum to 1; bins that were dropped count as 0.
+  /// @throws Error if there is no such object
+  Marginals marginals(int object) const;
+  /// The same on another grid; a bin counts in the grid's nearest bin (PoseLattice::bin_of()).
+  Marginals marginals(int object, const PoseLattice& grid) const;
+  /// Log-likelihood of any pose of an object in nats, in float64, without prior weights.
+  /// @throws Error if there is no such object or the pose is not finite
+  double log_likelihood(int object, const Pose& T_object_robot) const;
+
+  /// Entropy of the belief over objects and evaluated bins in nats, "none of these" left out.
+  double entropy() const;
+  /// Draws objects and poses from the evaluated bins; see PoseHistogram::sample().
+  std::vector<PoseSample> sample(std::size_t count, std::uint64_t seed) const;
+
+  const PoseLattice& lattice() const;
+  /// How blocks are bounded and bins evaluated, and why: vector instructions, threads, device.
+  std::string path() const;
+  /// Host memory that tables, penalties and evaluated bins hold, in bytes.
+  std::uint64_t host_bytes() const;
+
+ private:
+  struct Impl;
+  Impl& impl() const;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace palpate
