@@ -11,13 +11,12 @@
 #include <type_traits>
 
 #include "bin_kernel.hpp"
+#include "patch_interpolation-inl.hpp"
 #include "vector_math-inl.hpp"
 
 HWY_BEFORE_NAMESPACE();
 namespace palpate {
 namespace HWY_NAMESPACE {
-
-// ---------------------------------------------------------------------------------- Elements
 
 template <class D>
 void place(D d, const double* xy_mm, double cos_by_cell, double sin_by_cell, double reach,
@@ -64,7 +63,8 @@ void store_as(D /*d*/, hn::Vec<D> v, float* to) {
 }
 
 /// Finds each element's patch. The index is clamped so that elements beyond the map see a patch of
-/// the border, whose nodes are all equal.
+/// the border, whose nodes are all equal. For float64, patches with nodes of the border have their
+/// index's bits flipped.
 template <typename Lane>
 void find_patches(const BinBlock<Lane>& block, const MapPatches& map, const PlacedElements& placed,
                   ElementPatches<Lane>& found) {
@@ -75,6 +75,7 @@ void find_patches(const BinBlock<Lane>& block, const MapPatches& map, const Plac
   const auto last_x = hn::Set(d, static_cast<double>(map.width() - MapPatches::side));
   const auto last_y = hn::Set(d, static_cast<double>(map.height() - MapPatches::side));
   const auto width = hn::Set(d, static_cast<double>(map.width()));
+  [[maybe_unused]] const auto border = hn::Set(d, static_cast<double>(MapPatches::border));
   for (std::size_t e = 0; e < found.patch.size(); e += hn::Lanes(d)) {
     const auto x = hn::Add(hn::LoadU(d, placed.x.data() + e), first_x);
     const auto y = hn::Add(hn::LoadU(d, placed.y.data() + e), first_y);
@@ -84,80 +85,16 @@ void find_patches(const BinBlock<Lane>& block, const MapPatches& map, const Plac
     store_as(d, hn::Sub(y, whole_y), found.y.data() + e);
     const auto column = hn::Max(hn::Zero(d), hn::Min(whole_x, last_x));
     const auto row = hn::Max(hn::Zero(d), hn::Min(whole_y, last_y));
-    hn::StoreU(hn::DemoteTo(di, hn::Add(hn::Mul(row, width), column)), di, found.patch.data() + e);
+    auto patch = hn::Add(hn::Mul(row, width), column);
+    if constexpr (sizeof(Lane) == 8) {
+      const auto x_off = hn::Or(hn::Lt(column, border), hn::Gt(column, hn::Sub(last_x, border)));
+      const auto y_off = hn::Or(hn::Lt(row, border), hn::Gt(row, hn::Sub(last_y, border)));
+      const auto flipped = hn::Sub(hn::Set(d, -1.0), patch);
+      patch = hn::IfThenElse(hn::Or(x_off, y_off), flipped, patch);
+    }
+    hn::StoreU(hn::DemoteTo(di, patch), di, found.patch.data() + e);
   }
 }
-
-// ------------------------------------------------------------------------------ Interpolation
-
-/// Reads one node of a patch for every lane. `from` is the patch, or the patch moved to another
-/// corner of the cells; `index`, below 11, is that of the cell's first node.
-template <class DF, class VI>
-HWY_INLINE hn::Vec<DF> look_up(DF df, const float* from, VI index) {
-#if HWY_TARGET == HWY_AVX3 || HWY_TARGET == HWY_AVX3_DL
-  // Gathers are several times slower than a permutation of the 16 nodes.
-  const hn::Full512<float> whole;
-  const auto nodes = hn::LoadU(whole, from);
-  if constexpr (hn::MaxLanes(DF()) == 16) {
-    return hn::TableLookupLanes(nodes, hn::IndicesFromVec(whole, index));
-  } else {
-    const hn::Full512<std::int32_t> whole_index;
-    const auto wide = hn::ZeroExtendVector(whole_index, index);
-    return hn::LowerHalf(df, hn::TableLookupLanes(nodes, hn::IndicesFromVec(whole, wide)));
-  }
-#elif HWY_TARGET == HWY_AVX2
-  const hn::Full256<float> whole;
-  const hn::Full256<std::int32_t> whole_index;
-  const auto low_nodes = hn::LoadU(whole, from);
-  const auto high_nodes = hn::LoadU(whole, from + 8);
-  const auto both = [&](auto wide) HWY_ATTR {
-    const auto lane = hn::IndicesFromVec(whole, hn::And(wide, hn::Set(whole_index, 7)));
-    const auto is_high = hn::BitCast(whole, hn::ShiftLeft<28>(wide));
-    return hn::IfNegativeThenElse(is_high, hn::TableLookupLanes(high_nodes, lane),
-                                  hn::TableLookupLanes(low_nodes, lane));
-  };
-  if constexpr (hn::MaxLanes(DF()) == 8) {
-    return both(index);
-  } else {
-    return hn::LowerHalf(df, both(hn::ZeroExtendVector(whole_index, index)));
-  }
-#else
-  return hn::GatherIndex(df, from, index);
-#endif
-}
-
-/// As look_up(), in the lanes' numbers. Float64 puts the exact prior in the place of its marker.
-template <class D, class VI>
-HWY_INLINE hn::Vec<D> node(D d, const MapPatches& map, const float* from, VI index) {
-  if constexpr (sizeof(hn::TFromD<D>) == 4) {
-    return look_up(d, from, index);
-  } else {
-    const auto stored = hn::PromoteTo(d, look_up(hn::Rebind<float, D>(), from, index));
-    const auto marker = hn::Set(d, static_cast<double>(map.marker()));
-    return hn::IfThenElse(hn::Eq(stored, marker), hn::Set(d, map.prior_log_odds()), stored);
-  }
-}
-
-/// Log odds at `x`, `y` of a patch, in cells from its first node, both in [0, 3).
-template <class D>
-HWY_INLINE hn::Vec<D> log_odds(D d, const MapPatches& map, const float* patch, hn::Vec<D> x,
-                               hn::Vec<D> y) {
-  const auto column = hn::Floor(x);
-  const auto row = hn::Floor(y);
-  const auto fx = hn::Sub(x, column);
-  const auto fy = hn::Sub(y, row);
-  const auto index =
-      small_integer(d, hn::Add(hn::Mul(column, hn::Set(d, hn::TFromD<D>{4})), row));
-  const auto v00 = node(d, map, patch, index);
-  const auto v01 = node(d, map, patch + 1, index);
-  const auto v10 = node(d, map, patch + MapPatches::side, index);
-  const auto v11 = node(d, map, patch + MapPatches::side + 1, index);
-  const auto left = hn::Add(v00, hn::Mul(hn::Sub(v01, v00), fy));
-  const auto right = hn::Add(v10, hn::Mul(hn::Sub(v11, v10), fy));
-  return hn::Add(left, hn::Mul(hn::Sub(right, left), fx));
-}
-
-// ------------------------------------------------------------------------------- Likelihoods
 
 /// The product of the likelihoods of some elements in every lane, see ReadingForm.
 template <class D>
@@ -187,9 +124,8 @@ HWY_INLINE void multiply(D d, hn::Vec<D> l, hn::Vec<D> at_negative, hn::Vec<D> a
   const auto one = hn::Set(d, hn::TFromD<D>{1});
   const auto e = exp_of_minus(d, hn::Abs(l));
   const auto negative = hn::Lt(l, hn::Zero(d));
-  const auto numerator =
-      hn::IfThenElse(negative, hn::Add(at_negative, hn::Mul(at_positive, e)),
-                     hn::Add(at_positive, hn::Mul(at_negative, e)));
+  const auto numerator = hn::IfThenElse(negative, hn::Add(at_negative, hn::Mul(at_positive, e)),
+                                        hn::Add(at_positive, hn::Mul(at_negative, e)));
   product.numerator = hn::Mul(product.numerator, numerator);
   product.denominator = hn::Mul(product.denominator, hn::Add(one, e));
 }
@@ -251,13 +187,14 @@ void store_logs(D d, const Products<D>& product, const double* sums, double cons
   for (std::size_t i = 0; i < hn::Lanes(d); ++i) {
     over[i] = static_cast<double>(numerator[i]);
     under[i] = static_cast<double>(denominator[i]);
-    power[i] = static_cast<double>(static_cast<std::make_signed_t<hn::TFromD<decltype(du)>>>(
-        exponent[i]));
+    power[i] =
+        static_cast<double>(static_cast<std::make_signed_t<hn::TFromD<decltype(du)>>>(exponent[i]));
   }
   for (std::size_t i = 0; i < hn::Lanes(d); i += hn::Lanes(dd)) {
     const auto x = hn::Div(hn::Load(dd, over + i), hn::Load(dd, under + i));
-    const auto logs = hn::Add(hn::Mul(hn::Load(dd, power + i), hn::Set(dd, VectorMath<double>::ln2)),
-                              log_near_one(dd, x));
+    const auto logs =
+        hn::Add(hn::Mul(hn::Load(dd, power + i), hn::Set(dd, VectorMath<double>::ln2)),
+                log_near_one(dd, x));
     const auto rest = hn::Add(hn::LoadU(dd, sums + i), hn::Set(dd, constant));
     hn::StoreU(hn::Add(logs, rest), dd, log_likelihood + i);
   }
@@ -273,7 +210,6 @@ void evaluate_lanes(D d, hn::Vec<D> x, hn::Vec<D> y, const MapPatches& map,
   const auto ratio = hn::Set(d, static_cast<Lane>(form.ratio));
   const auto log_ratio = hn::Set(d, static_cast<Lane>(form.log_ratio));
   const auto one = hn::Set(d, Lane{1});
-  const float* const nodes = map.nodes();
   Products<D> product(d);
   HWY_ALIGN double sums[most_lanes] = {};
   std::size_t count = 0;
@@ -284,9 +220,7 @@ void evaluate_lanes(D d, hn::Vec<D> x, hn::Vec<D> y, const MapPatches& map,
     const auto at_positive = contact ? one : ratio;
     count += run.end - run.begin;
     for (std::size_t e = run.begin; e < run.end; ++e) {
-      const float* patch = nodes + MapPatches::side * static_cast<std::size_t>(elements.patch[e]);
-      const auto l = log_odds(d, map, patch, hn::Add(hn::Set(d, elements.x[e]), x),
-                              hn::Add(hn::Set(d, elements.y[e]), y));
+      const auto l = log_odds(d, map, elements, e, x, y);
       if constexpr (in_sums) {
         multiply_and_add(d, contact ? l : hn::Neg(l), log_ratio, product);
       } else {
@@ -315,13 +249,11 @@ void look_up_lanes(D d, hn::Vec<D> x, hn::Vec<D> y, const MapPatches& map, std::
   for (const ReadingRun& run : runs) {
     const double* const row = form.row(object, run.reading);
     for (std::size_t e = run.begin; e < run.end; ++e) {
-      const float* patch =
-          map.nodes() + MapPatches::side * static_cast<std::size_t>(elements.patch[e]);
-      const auto l = log_odds(d, map, patch, hn::Add(hn::Set(d, elements.x[e]), x),
-                              hn::Add(hn::Set(d, elements.y[e]), y));
+      const auto l = log_odds(d, map, elements, e, x, y);
       const auto at = hn::Max(hn::Zero(d), hn::Min(hn::Mul(hn::Sub(l, first), scale), last));
       const auto segment = hn::Min(hn::Floor(at), last_segment);
-      const auto index = hn::BitCast(hn::RebindToSigned<D>(), whole_number(d, hn::Add(segment, segment)));
+      const auto index =
+          hn::BitCast(hn::RebindToSigned<D>(), whole_number(d, hn::Add(segment, segment)));
       const auto value = hn::GatherIndex(d, row, index);
       const auto difference = hn::GatherIndex(d, row + 1, index);
       sum = hn::Add(sum, hn::Add(value, hn::Mul(difference, hn::Sub(at, segment))));
@@ -414,9 +346,7 @@ template void evaluate_block(const BinBlock<double>&, const MapPatches&, std::si
                              const PlacedElements&, std::span<const ReadingRun>, const ReadingForm&,
                              ElementPatches<double>&);
 
-std::string vector_instructions() {
-  return hwy::TargetName(HWY_DYNAMIC_DISPATCH(Target)());
-}
+std::string vector_instructions() { return hwy::TargetName(HWY_DYNAMIC_DISPATCH(Target)()); }
 
 }  // namespace palpate
 
