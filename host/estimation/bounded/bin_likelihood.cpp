@@ -71,7 +71,9 @@ BinLikelihood::Placement BinLikelihood::placement_of(const OccupancyGrid& map, d
   const double reach =
       farthest + std::max(nodes.width(), nodes.height()) + 2.0 * MapPatches::border;
   // Places within a patch are below 4 cells: these steps leave them exact in 24 and 53 bits.
+  const MapExtent extent = extent_of(map, nodes.prior_log_odds(), lattice);
   return {.nodes = std::move(nodes),
+          .extent = extent,
           .cell_mm = map.cell_mm,
           .origin_mm = map.origin_mm,
           .reach_cells = reach,

@@ -8,6 +8,7 @@
 
 #include "bin_kernel.hpp"
 #include "known_elements.hpp"
+#include "map_extent.hpp"
 #include "map_patches.hpp"
 #include "palpate/contact_model.hpp"
 #include "palpate/estimate.hpp"
@@ -60,6 +61,7 @@ class BinLikelihood {
   /// A map, and how the lattice's bins lie on it.
   struct Placement {
     MapPatches nodes;
+    MapExtent extent;
     double cell_mm;
     glm::dvec2 origin_mm;
     double reach_cells;  ///< no bin's position is larger; from farther elements all bins are off

@@ -69,28 +69,6 @@ MapPatches::MapPatches(const OccupancyGrid& map, double prior)
     }
   }
   nodes_.resize(nodes_.size() + beyond, marker_);
-  measure(map);
-}
-
-void MapPatches::measure(const OccupancyGrid& map) {
-  double least = prior_log_odds_;
-  double most = prior_log_odds_;
-  for (const float cell : map.log_odds) {
-    least = std::min(least, double{cell});
-    most = std::max(most, double{cell});
-  }
-  largest_ = std::max(std::abs(least), std::abs(most));
-  range_ = most - least;
-  const auto cell = [&](int i, int j) {
-    return i >= 0 && i < map.nx && j >= 0 && j < map.ny ? double{map.at(i, j)} : prior_log_odds_;
-  };
-  for (int j = -1; j < map.ny; ++j) {
-    for (int i = -1; i < map.nx; ++i) {
-      const double here = cell(i, j);
-      steepest_ =
-          std::max({steepest_, std::abs(cell(i + 1, j) - here), std::abs(cell(i, j + 1) - here)});
-    }
-  }
 }
 
 }  // namespace palpate

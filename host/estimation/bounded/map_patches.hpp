@@ -30,22 +30,11 @@ class MapPatches {
   float marker() const { return marker_; }
   double prior_log_odds() const { return prior_log_odds_; }
 
-  /// Over all nodes and the prior: largest magnitude, largest less smallest, and the largest
-  /// difference between neighbours along an axis.
-  double largest() const { return largest_; }
-  double range() const { return range_; }
-  double steepest() const { return steepest_; }
-
  private:
-  void measure(const OccupancyGrid& map);
-
   int width_;
   int height_;
   double prior_log_odds_;
   float marker_;
-  double largest_ = 0.0;
-  double range_ = 0.0;
-  double steepest_ = 0.0;
   std::vector<float> nodes_;
 };
 

@@ -56,4 +56,18 @@ ReadingForm::ReadingForm(const ContactModel& contact) {
   }
 }
 
+TableExtent ReadingForm::table_extent(std::size_t object) const {
+  TableExtent extent{.width = static_cast<double>(nodes - 1) / nodes_per_nat};
+  const double* from = row(object, Reading::no_contact);
+  for (std::size_t i = 0; i < levels * nodes; ++i) {
+    extent.largest = std::max(extent.largest, std::abs(from[2 * i]));
+    extent.steepest = std::max(extent.steepest, std::abs(from[2 * i + 1]) * nodes_per_nat);
+  }
+  return extent;
+}
+
+double ReadingForm::largest_nats(double largest_log_odds) const {
+  return std::min(largest_log_odds, std::abs(log_ratio)) + 1.0 + std::abs(log_scale);
+}
+
 }  // namespace palpate

@@ -22,6 +22,17 @@ VkDeviceSize bytes_per_element(const PoseLattice& lattice) {
   return static_cast<VkDeviceSize>(lattice.theta_rad.count) * sizeof(shaders::RotatedElement);
 }
 
+/// Every object's first bin in its slab.
+std::vector<std::uint32_t> first_bins_of(const DenseBelief& belief, std::size_t objects) {
+  std::vector<std::uint32_t> bins;
+  for (std::size_t object = 0; object < objects; ++object) {
+    const auto slab = std::find_if(belief.slabs().begin(), belief.slabs().end(),
+                                   [&](const Slab& s) { return s.holds(object); });
+    bins.push_back(static_cast<std::uint32_t>(slab->first_bin(object)));
+  }
+  return bins;
+}
+
 }  // namespace
 
 std::size_t DenseLikelihood::batch_for(const gpu::Context& context, const PoseLattice& lattice,
@@ -73,10 +84,12 @@ DenseLikelihood::DenseLikelihood(gpu::Context& context, gpu::CommandStream& stre
       objects_(hypotheses.size()),
       contact_(context, stream, model),
       batch_elements_(std::min(batch_for(context, lattice, hypotheses.size()), most_elements)) {
+  const std::vector<std::uint32_t> first_bins = first_bins_of(belief, hypotheses.size());
   for (const MapGroup& group : group_maps(context, hypotheses, lattice)) {
     groups_.push_back(
         {group, choose_path(context, lattice, group.objects.size(), group.kind, model),
-         MapTable(context, stream, group, hypotheses, lattice, belief, *model.prior, contact_)});
+         MapTable(context, stream, group, hypotheses, lattice, first_bins, *model.prior,
+                  contact_)});
   }
   reserve(1);
   for (const Group& group : groups_) {

@@ -96,7 +96,8 @@ std::uint64_t MapTable::bytes_needed(const MapGroup& group, const PoseLattice& l
 
 MapTable::MapTable(gpu::Context& context, gpu::CommandStream& stream, const MapGroup& group,
                    std::span<const Hypothesis> hypotheses, const PoseLattice& lattice,
-                   const DenseBelief& belief, double prior, const ContactTable& contact) {
+                   std::span<const std::uint32_t> first_bins, double prior,
+                   const ContactTable& contact) {
   const gpu::Access access = group.kind.access;
   log_odds_ = gpu::Buffer(
       context, group.cells * cell_bytes(access), gpu::Memory::device,
@@ -107,13 +108,11 @@ MapTable::MapTable(gpu::Context& context, gpu::CommandStream& stream, const MapG
   std::uint64_t first_node = 0;
   for (const std::size_t object : group.objects) {
     const OccupancyGrid& map = hypotheses[object].map;
-    const auto slab = std::find_if(belief.slabs().begin(), belief.slabs().end(),
-                                   [&](const Slab& s) { return s.holds(object); });
     places.push_back({.first_node = static_cast<int>(first_node),
                       .map_width = bordered(map.nx),
                       .map_height = bordered(map.ny),
                       .first_axis = static_cast<shaders::uint>(axes.size()),
-                      .first_bin = static_cast<shaders::uint>(slab->first_bin(object)),
+                      .first_bin = first_bins[object],
                       .first_table_node = contact.first_node(object)});
     const std::vector<shaders::Split> own_axes = axes_in_cells(map, lattice);
     axes.insert(axes.end(), own_axes.begin(), own_axes.end());

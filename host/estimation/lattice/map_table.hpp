@@ -6,7 +6,6 @@
 
 #include "command_stream.hpp"
 #include "contact_kernel.hpp"
-#include "dense_belief.hpp"
 #include "likelihood_path.hpp"
 #include "palpate/estimate.hpp"
 #include "palpate/lattice.hpp"
@@ -34,9 +33,10 @@ class MapTable {
   static std::uint64_t bytes_needed(const MapGroup& group, const PoseLattice& lattice);
 
   /// Records the upload. Beyond each map lies the prior.
+  /// @param first_bins ObjectPlace::first_bin of every hypothesis
   MapTable(gpu::Context& context, gpu::CommandStream& stream, const MapGroup& group,
            std::span<const Hypothesis> hypotheses, const PoseLattice& lattice,
-           const DenseBelief& belief, double prior, const ContactTable& contact);
+           std::span<const std::uint32_t> first_bins, double prior, const ContactTable& contact);
 
   const gpu::Buffer& log_odds() const { return log_odds_; }
   /// The lattice's x centres, then its y centres, in cells of each map, [object].
