@@ -86,10 +86,10 @@ DenseLikelihood::DenseLikelihood(gpu::Context& context, gpu::CommandStream& stre
       batch_elements_(std::min(batch_for(context, lattice, hypotheses.size()), most_elements)) {
   const std::vector<std::uint32_t> first_bins = first_bins_of(belief, hypotheses.size());
   for (const MapGroup& group : group_maps(context, hypotheses, lattice)) {
-    groups_.push_back(
-        {group, choose_path(context, lattice, group.objects.size(), group.kind, model),
-         MapTable(context, stream, group, hypotheses, lattice, first_bins, *model.prior,
-                  contact_)});
+    groups_.push_back({group,
+                       choose_path(context, lattice, group.objects.size(), group.kind, model),
+                       MapTable(context, stream, group, hypotheses, lattice, first_bins,
+                                *model.prior, contact_)});
   }
   reserve(1);
   for (const Group& group : groups_) {
