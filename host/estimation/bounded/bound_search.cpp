@@ -1,6 +1,7 @@
 #include "bound_search.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <iterator>
 #include <limits>
 #include <numeric>
@@ -24,6 +25,8 @@ constexpr std::size_t beam_tiles = 64;
 constexpr std::size_t probed_tiles = 16;
 /// Largest tiles that are divided together: bounds the memory for their parts.
 constexpr std::size_t most_together = 16384;
+/// Batches of the largest tiles at one theta that make a region small.
+constexpr int few_batches = 16;
 /// Tiles of one theta that a task divides.
 constexpr std::size_t tiles_per_task = 64;
 
@@ -109,9 +112,8 @@ class SearchRun {
     seen_.resize(search_.bounds_.size() * thetas_);
     tbb::parallel_for(std::size_t{0}, seen_.size(), [&](std::size_t row) {
       const std::size_t object = row / thetas_;
-      seen_[row] =
-          seen_window(elements_, lattice_.theta_rad.centre(static_cast<int>(row % thetas_)),
-                      search_.maps_[object], search_.bounds_[object].levels().front());
+      seen_[row] = seen_window(elements_, search_.turns_[row % thetas_], search_.maps_[object],
+                               search_.bounds_[object].levels().front());
     });
     for (std::size_t row = 0; row < seen_.size(); ++row) {
       const std::size_t object = row / thetas_;
@@ -235,7 +237,7 @@ class SearchRun {
       const std::size_t end = task + 1 < begins.size() ? begins[task + 1] : tiles.size();
       const Tile& first = tiles[begins[task]];
       const TileBounds& bounds = search_.bounds_[first.object];
-      bounds.place(level + 1, lattice_.theta_rad.centre(first.theta), elements_, placed);
+      bounds.place(level + 1, search_.turns_[first.theta], elements_, placed);
       parts[task].reserve((end - begins[task]) * batch_tiles);
       for (std::size_t i = begins[task]; i < end; ++i) {
         std::uint32_t sums[batch_tiles] = {};
@@ -375,9 +377,18 @@ class SearchRun {
 BoundSearch::BoundSearch(std::span<const Hypothesis> hypotheses, const BoundedOptions& options,
                          const BinLikelihood& likelihood)
     : options_(options), likelihood_(likelihood), log_weight_(log_weights(hypotheses)) {
+  for (int theta = 0; theta < options.lattice.theta_rad.count; ++theta) {
+    const double theta_rad = options.lattice.theta_rad.centre(theta);
+    turns_.emplace_back(std::cos(theta_rad), std::sin(theta_rad));
+  }
+  double least_cell_mm = std::numeric_limits<double>::infinity();
+  for (const Hypothesis& hypothesis : hypotheses) {
+    least_cell_mm = std::min(least_cell_mm, hypothesis.map.cell_mm);
+  }
+  const std::vector<TileSize> sizes = tile_sizes(options.lattice, least_cell_mm, hypotheses.size());
   std::vector<std::optional<TileBounds>> bounds(hypotheses.size());
   tbb::parallel_for(std::size_t{0}, hypotheses.size(), [&](std::size_t i) {
-    bounds[i].emplace(hypotheses[i].map, options.contact, i, options.lattice);
+    bounds[i].emplace(hypotheses[i].map, options.contact, i, options.lattice, sizes);
   });
   for (std::optional<TileBounds>& of : bounds) {
     const TileLevel& level = of->levels().front();
@@ -398,6 +409,22 @@ void BoundSearch::reset() {
   }
 }
 
+void BoundSearch::add(std::span<const KnownElements> touches) {
+  const TileLevel& level = bounds_.front().levels().front();
+  // A single touch sees little of a large region; in a small one, fewer rounds are faster.
+  if (level.batches_x() * level.batches_y() > few_batches) {
+    for (const KnownElements& touch : touches) {
+      add(touch);
+    }
+    return;
+  }
+  KnownElements all;
+  for (const KnownElements& touch : touches) {
+    all = merged(all, touch);
+  }
+  add(all);
+}
+
 void BoundSearch::add(const KnownElements& added) {
   const auto thetas = static_cast<std::size_t>(options_.lattice.theta_rad.count);
   tbb::parallel_for(std::size_t{0}, bounds_.size() * thetas, [&](std::size_t row) {
@@ -406,13 +433,22 @@ void BoundSearch::add(const KnownElements& added) {
     const std::size_t theta = row % thetas;
     const TileBounds& bounds = bounds_[object];
     const TileLevel& level = bounds.levels().front();
-    bounds.place(0, options_.lattice.theta_rad.centre(static_cast<int>(theta)), added, placed);
+    const TileWindow seen = seen_window(added, turns_[theta], maps_[object], level);
+    const std::uint32_t beyond = bounds.penalty_beyond(0, added);
+    bounds.place(0, turns_[theta], added, placed);
     std::uint32_t* sums =
         largest_tiles_[object].data() +
         theta * static_cast<std::size_t>(level.batches_x()) * level.batches_y() * batch_tiles;
-    for (int by = 0; by < level.batches_y(); ++by) {
-      for (int bx = 0; bx < level.batches_x(); ++bx, sums += batch_tiles) {
-        bounds.add(0, added, placed, bx * batch_side, by * batch_side, sums);
+    for (int y = 0; y < level.y.tiles(); y += batch_side) {
+      for (int x = 0; x < level.x.tiles(); x += batch_side, sums += batch_tiles) {
+        if (x + batch_side > seen.x_first && x < seen.x_end && y + batch_side > seen.y_first &&
+            y < seen.y_end) {
+          bounds.add(0, added, placed, x, y, sums);
+          continue;
+        }
+        for (int i = 0; i < batch_tiles; ++i) {
+          sums[i] = std::min(sums[i] + beyond, largest_sum);
+        }
       }
     }
   });
