@@ -146,7 +146,7 @@ class SearchRun {
     const TileLevel& level = search_.bounds_[object].levels().front();
     const TileWindow& seen = seen_[row];
     const auto batches = static_cast<std::size_t>(level.batches_x()) * level.batches_y();
-    const std::uint32_t* sums =
+    const std::int32_t* sums =
         search_.largest_tiles_[object].data() + row % thetas_ * batches * batch_tiles;
     for (int y = seen.y_first; y < seen.y_end; ++y) {
       for (int x = seen.x_first; x < seen.x_end; ++x) {
@@ -154,9 +154,10 @@ class SearchRun {
         if (bins > 0) {
           const std::size_t batch =
               static_cast<std::size_t>(y / batch_side) * level.batches_x() + x / batch_side;
-          const std::uint32_t sum =
+          const std::int64_t sum =
+              search_.unseen_[object] +
               sums[batch * batch_tiles + x % batch_side * batch_side + y % batch_side];
-          visit(unpenalised_[object][0] - sum / penalties_per_nat, x, y, bins);
+          visit(unpenalised_[object][0] - static_cast<double>(sum) / penalties_per_nat, x, y, bins);
         }
       }
     }
@@ -386,6 +387,7 @@ BoundSearch::BoundSearch(std::span<const Hypothesis> hypotheses, const BoundedOp
     least_cell_mm = std::min(least_cell_mm, hypothesis.map.cell_mm);
   }
   const std::vector<TileSize> sizes = tile_sizes(options.lattice, least_cell_mm, hypotheses.size());
+  unseen_.resize(hypotheses.size());
   std::vector<std::optional<TileBounds>> bounds(hypotheses.size());
   tbb::parallel_for(std::size_t{0}, hypotheses.size(), [&](std::size_t i) {
     bounds[i].emplace(hypotheses[i].map, options.contact, i, options.lattice, sizes);
@@ -404,9 +406,10 @@ BoundSearch::BoundSearch(std::span<const Hypothesis> hypotheses, const BoundedOp
 }
 
 void BoundSearch::reset() {
-  for (std::vector<std::uint32_t>& sums : largest_tiles_) {
+  for (std::vector<std::int32_t>& sums : largest_tiles_) {
     std::fill(sums.begin(), sums.end(), 0);
   }
+  std::fill(unseen_.begin(), unseen_.end(), 0);
 }
 
 void BoundSearch::add(std::span<const KnownElements> touches) {
@@ -426,6 +429,12 @@ void BoundSearch::add(std::span<const KnownElements> touches) {
 }
 
 void BoundSearch::add(const KnownElements& added) {
+  // Most tiles of a large region do not see the map: sums count from what such a tile would have.
+  std::vector<std::int64_t> offsets;
+  for (std::size_t i = 0; i < bounds_.size(); ++i) {
+    offsets.push_back(
+        std::min<std::int64_t>(bounds_[i].penalty_beyond(0, added), largest_sum - unseen_[i]));
+  }
   const auto thetas = static_cast<std::size_t>(options_.lattice.theta_rad.count);
   tbb::parallel_for(std::size_t{0}, bounds_.size() * thetas, [&](std::size_t row) {
     thread_local WindowPlaces placed;
@@ -434,24 +443,28 @@ void BoundSearch::add(const KnownElements& added) {
     const TileBounds& bounds = bounds_[object];
     const TileLevel& level = bounds.levels().front();
     const TileWindow seen = seen_window(added, turns_[theta], maps_[object], level);
-    const std::uint32_t beyond = bounds.penalty_beyond(0, added);
     bounds.place(0, turns_[theta], added, placed);
-    std::uint32_t* sums =
+    std::int32_t* tiles =
         largest_tiles_[object].data() +
         theta * static_cast<std::size_t>(level.batches_x()) * level.batches_y() * batch_tiles;
-    for (int y = 0; y < level.y.tiles(); y += batch_side) {
-      for (int x = 0; x < level.x.tiles(); x += batch_side, sums += batch_tiles) {
-        if (x + batch_side > seen.x_first && x < seen.x_end && y + batch_side > seen.y_first &&
-            y < seen.y_end) {
-          bounds.add(0, added, placed, x, y, sums);
-          continue;
-        }
+    for (int y = seen.y_first / batch_side * batch_side; y < seen.y_end; y += batch_side) {
+      for (int x = seen.x_first / batch_side * batch_side; x < seen.x_end; x += batch_side) {
+        std::uint32_t sums[batch_tiles] = {};
+        bounds.add(0, added, placed, x, y, sums);
+        std::int32_t* of_batch =
+            tiles + (static_cast<std::size_t>(y / batch_side) * level.batches_x() +
+                     static_cast<std::size_t>(x / batch_side)) *
+                        batch_tiles;
         for (int i = 0; i < batch_tiles; ++i) {
-          sums[i] = std::min(sums[i] + beyond, largest_sum);
+          const std::int64_t sum = std::int64_t{of_batch[i]} + sums[i] - offsets[object];
+          of_batch[i] = static_cast<std::int32_t>(std::min<std::int64_t>(sum, largest_sum));
         }
       }
     }
   });
+  for (std::size_t i = 0; i < offsets.size(); ++i) {
+    unseen_[i] += offsets[i];
+  }
 }
 
 SearchResult BoundSearch::run(const KnownElements& elements, const BinVisitor& visit,
@@ -464,8 +477,8 @@ std::uint64_t BoundSearch::bytes() const {
   for (const TileBounds& bounds : bounds_) {
     bytes += bounds.bytes();
   }
-  for (const std::vector<std::uint32_t>& sums : largest_tiles_) {
-    bytes += sums.capacity() * sizeof(std::uint32_t);
+  for (const std::vector<std::int32_t>& sums : largest_tiles_) {
+    bytes += sums.capacity() * sizeof(std::int32_t);
   }
   return bytes;
 }

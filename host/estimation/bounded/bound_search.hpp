@@ -45,8 +45,10 @@ class BoundSearch {
   std::vector<glm::dvec2> turns_;    ///< [theta] cosine and sine
   std::vector<OccupancyGrid> maps_;  ///< [hypothesis] without their cells
   std::vector<TileBounds> bounds_;   ///< [hypothesis]
-  /// Sums of penalties of the largest tiles, [hypothesis][theta, batch y, batch x, tile].
-  std::vector<std::vector<std::uint32_t>> largest_tiles_;
+  /// Sums of penalties of the largest tiles, [hypothesis][theta, batch y, batch x, tile], less
+  /// those of a tile in which every element sees the prior.
+  std::vector<std::vector<std::int32_t>> largest_tiles_;
+  std::vector<std::int64_t> unseen_;  ///< [hypothesis] these
 };
 
 }  // namespace palpate
