@@ -81,15 +81,15 @@ TEST_P(BinsAlongAxes, AreWithinTheBounds) {
 
 INSTANTIATE_TEST_SUITE_P(Bins, BinsAlongAxes, testing::Values(1, 7, 63, 65, 1000));
 
-class Elements : public testing::TestWithParam<std::size_t> {};
+class ElementsOnTheHost : public testing::TestWithParam<std::size_t> {};
 
-TEST_P(Elements, AreWithinTheBounds) {
+TEST_P(ElementsOnTheHost, AreWithinTheBounds) {
   BinCase of = letter_case();
   of.elements = random_elements(GetParam(), 6.0, 2, GetParam());
   expect_within_bounds(of, {{.y_count = 5, .x_count = 5}}, "elements");
 }
 
-INSTANTIATE_TEST_SUITE_P(Bins, Elements, testing::Values(0, 1, 7, 63, 65, 1000));
+INSTANTIATE_TEST_SUITE_P(Numbers, ElementsOnTheHost, testing::Values(0, 1, 7, 63, 65, 1000));
 
 TEST(BinLikelihood, HasATightBoundOnALetter) {
   const BinCase of = letter_case();
