@@ -121,12 +121,9 @@ class SearchRun {
       const TileLevel& level = search_.bounds_[object].levels().front();
       const TileWindow& seen = seen_[row];
       const auto settle = [&](int x_first, int x_end, int y_first, int y_end) {
-        const BinBox box{.object = static_cast<std::int32_t>(object),
-                         .theta = static_cast<std::int32_t>(row % thetas_),
-                         .y_first = level.y.first_bin[y_first],
-                         .y_count = level.y.first_bin[y_end] - level.y.first_bin[y_first],
-                         .x_first = level.x.first_bin[x_first],
-                         .x_count = level.x.first_bin[x_end] - level.x.first_bin[x_first]};
+        const BinBox box = level.box_of(static_cast<std::int32_t>(object),
+                                        static_cast<std::int32_t>(row % thetas_),
+                                        {x_first, x_end, y_first, y_end});
         if (box.bins() > 0) {
           settle_unseen(box);
         }

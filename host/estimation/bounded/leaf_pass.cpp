@@ -3,18 +3,17 @@
 #include <algorithm>
 #include <limits>
 #include <numeric>
+#include <optional>
 #include <tuple>
 
 namespace palpate {
 
 namespace {
 
-/// Leaves that are evaluated before the total is looked at again: few at first, for the best ones
+/// Boxes that are evaluated before the total is looked at again: few at first, for the best ones
 /// raise it most.
-constexpr std::size_t first_batch = 512;
-constexpr std::size_t largest_batch = 8192;
-/// Neighbouring tiles in a row are evaluated as one box up to so many bins: fuller vectors.
-constexpr std::int64_t most_joined_bins = 16;
+constexpr std::size_t first_batch = 128;
+constexpr std::size_t largest_batch = 4096;
 
 }  // namespace
 
@@ -50,86 +49,121 @@ bool LeafPass::probed(const Tile& tile) const {
          std::binary_search(probed_.begin(), probed_.end(), tile, stands_before);
 }
 
-void LeafPass::evaluate_batch(std::span<const Tile> tiles) {
-  std::vector<BinBox> boxes;
-  boxes.reserve(tiles.size());
-  for (const Tile& tile : tiles) {
-    boxes.push_back(bounds_[tile.object].levels().back().box_of(tile));
-  }
+void LeafPass::evaluate_boxes(std::vector<BinBox> boxes) {
   std::sort(boxes.begin(), boxes.end(), [](const BinBox& a, const BinBox& b) {
     return std::tie(a.object, a.theta, a.y_first, a.x_first) <
            std::tie(b.object, b.theta, b.y_first, b.x_first);
   });
-  std::size_t last = 0;
-  for (std::size_t i = 1; i < boxes.size(); ++i) {
-    BinBox& a = boxes[last];
-    const BinBox& b = boxes[i];
-    if (a.object == b.object && a.theta == b.theta && a.y_first == b.y_first &&
-        a.y_count == b.y_count && a.x_first + a.x_count == b.x_first &&
-        a.bins() + b.bins() <= most_joined_bins) {
-      a.x_count += b.x_count;
-    } else {
-      boxes[++last] = b;
-    }
-  }
-  boxes.resize(std::min(boxes.size(), last + 1));
   evaluator_.add(boxes);
 }
 
 void LeafPass::probe(std::vector<Tile> tiles) {
   std::erase_if(tiles, [&](const Tile& tile) { return probed(tile); });
-  evaluate_batch(tiles);
+  std::vector<BinBox> boxes;
   for (const Tile& tile : tiles) {
+    boxes.push_back(bounds_[tile.object].levels().back().box_of(tile));
     probed_in_row_[static_cast<std::size_t>(tile.object) * thetas_ + tile.theta] = true;
   }
+  evaluate_boxes(std::move(boxes));
   probed_.insert(probed_.end(), tiles.begin(), tiles.end());
   std::sort(probed_.begin(), probed_.end(), stands_before);
+}
+
+std::vector<LeafPass::Family> LeafPass::families_of(std::span<const Tile> tiles) {
+  std::vector<Family> families;
+  for (std::size_t i = 0; i < tiles.size(); ++i) {
+    const Tile& tile = tiles[i];
+    if (i == 0 || tile.object != tiles[i - 1].object || tile.theta != tiles[i - 1].theta ||
+        tile.y / batch_side != tiles[i - 1].y / batch_side ||
+        tile.x / batch_side != tiles[i - 1].x / batch_side) {
+      families.push_back({.first = i, .end = i, .bound = tile.bound});
+    }
+    Family& family = families.back();
+    ++family.end;
+    family.bound = std::max(family.bound, tile.bound);
+  }
+  return families;
+}
+
+void LeafPass::take_family(std::span<const Tile> family, const std::vector<std::size_t>& from,
+                           UnsettledMass& left, std::vector<BinBox>& boxes) const {
+  const TileLevel& level = bounds_[family.front().object].levels().back();
+  const auto needed = [&](const Tile& tile) {
+    return left.slot(tile.bound) < from[tile.object] && !probed(tile);
+  };
+  if (std::any_of(family.begin(), family.end(), [&](const Tile& tile) { return probed(tile); })) {
+    // No bin may be settled twice.
+    for (const Tile& tile : family) {
+      if (needed(tile)) {
+        boxes.push_back(level.box_of(tile));
+        remove(tile, left);
+      }
+    }
+    return;
+  }
+  std::optional<TileWindow> window;
+  for (const Tile& tile : family) {
+    if (needed(tile)) {
+      window = window ? TileWindow{.x_first = std::min(window->x_first, tile.x),
+                                   .x_end = std::max(window->x_end, tile.x + 1),
+                                   .y_first = std::min(window->y_first, tile.y),
+                                   .y_end = std::max(window->y_end, tile.y + 1)}
+                      : TileWindow{tile.x, tile.x + 1, tile.y, tile.y + 1};
+    }
+  }
+  if (!window) {
+    return;
+  }
+  for (const Tile& tile : family) {
+    if (window->holds(tile)) {
+      remove(tile, left);
+    }
+  }
+  boxes.push_back(level.box_of(family.front().object, family.front().theta, *window));
+}
+
+void LeafPass::remove(const Tile& tile, UnsettledMass& left) const {
+  left.remove(static_cast<std::size_t>(tile.object), tile.bound,
+              bounds_[tile.object].bins(bounds_[tile.object].levels().size() - 1, tile));
 }
 
 void LeafPass::evaluate(std::span<const Tile> tiles, double tolerance) {
   if (tiles.empty()) {
     return;
   }
-  const std::size_t finest = bounds_.front().levels().size() - 1;
-  const auto remove = [&](const Tile& tile, UnsettledMass& mass) {
-    mass.remove(static_cast<std::size_t>(tile.object), tile.bound,
-                bounds_[tile.object].bins(finest, tile));
-  };
-  UnsettledMass left = unsettled(tiles, finest, bounds_);
-  if (!probed_.empty()) {
-    for (const Tile& tile : tiles) {
-      if (probed(tile)) {
-        remove(tile, left);
-      }
+  UnsettledMass left = unsettled(tiles, bounds_.front().levels().size() - 1, bounds_);
+  for (const Tile& tile : tiles) {
+    if (probed(tile)) {
+      remove(tile, left);
     }
   }
   std::vector<std::size_t> from = account_.droppable_from(left, tolerance);
-  // Tiles in the order of their slots, by counting.
+  // Families in the order of their best tiles' slots, by counting.
+  const std::vector<Family> families = families_of(tiles);
+  const auto needed = [&](const Family& family) {
+    return left.slot(family.bound) < from[tiles[family.first].object];
+  };
   std::vector<std::size_t> begins(UnsettledMass::slots + 1);
-  for (const Tile& tile : tiles) {
-    if (const std::size_t slot = left.slot(tile.bound); slot < from[tile.object]) {
-      ++begins[slot + 1];
+  for (const Family& family : families) {
+    if (needed(family)) {
+      ++begins[left.slot(family.bound) + 1];
     }
   }
   std::partial_sum(begins.begin(), begins.end(), begins.begin());
-  std::vector<Tile> ordered(begins.back());
-  for (const Tile& tile : tiles) {
-    if (const std::size_t slot = left.slot(tile.bound); slot < from[tile.object]) {
-      ordered[begins[slot]++] = tile;
+  std::vector<Family> ordered(begins.back());
+  for (const Family& family : families) {
+    if (needed(family)) {
+      ordered[begins[left.slot(family.bound)]++] = family;
     }
   }
-  std::vector<Tile> batch;
   std::size_t size = first_batch;
   for (std::size_t next = 0; next < ordered.size() && !deadline_.passed();) {
-    batch.clear();
-    for (; next < ordered.size() && batch.size() < size; ++next) {
-      const Tile& tile = ordered[next];
-      if (left.slot(tile.bound) < from[tile.object] && !probed(tile)) {
-        batch.push_back(tile);
-        remove(tile, left);
-      }
+    std::vector<BinBox> boxes;
+    for (; next < ordered.size() && boxes.size() < size; ++next) {
+      const Family& family = ordered[next];
+      take_family(tiles.subspan(family.first, family.end - family.first), from, left, boxes);
     }
-    evaluate_batch(batch);
+    evaluate_boxes(std::move(boxes));
     from = account_.droppable_from(left, tolerance);
     size = std::min(2 * size, largest_batch);
   }

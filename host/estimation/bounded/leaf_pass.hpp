@@ -28,8 +28,21 @@ class LeafPass {
   void evaluate(std::span<const Tile> tiles, double tolerance);
 
  private:
+  /// The parts of one tile, [first, end) of a list. Those that are needed are evaluated together,
+  /// as one box with those between them: fuller vectors.
+  struct Family {
+    std::size_t first = 0;
+    std::size_t end = 0;
+    double bound = 0.0;  ///< the largest
+  };
+
+  static std::vector<Family> families_of(std::span<const Tile> tiles);
   bool probed(const Tile& tile) const;
-  void evaluate_batch(std::span<const Tile> tiles);
+  void remove(const Tile& tile, UnsettledMass& left) const;
+  /// Takes a family's tiles before the slots `from` out of what is left, as boxes.
+  void take_family(std::span<const Tile> family, const std::vector<std::size_t>& from,
+                   UnsettledMass& left, std::vector<BinBox>& boxes) const;
+  void evaluate_boxes(std::vector<BinBox> boxes);
 
   std::span<const TileBounds> bounds_;
   std::size_t thetas_;

@@ -18,6 +18,18 @@ struct Tile {
   std::int32_t y = 0;
 };
 
+/// Tiles [first, end) along each axis.
+struct TileWindow {
+  int x_first = 0;
+  int x_end = 0;
+  int y_first = 0;
+  int y_end = 0;
+
+  bool holds(const Tile& tile) const {
+    return tile.x >= x_first && tile.x < x_end && tile.y >= y_first && tile.y < y_end;
+  }
+};
+
 /// The size of a level's tiles: `side` squares, of which a map's cell has `parts` along each axis.
 struct TileSize {
   int parts = 1;
@@ -45,13 +57,16 @@ struct TileLevel {
 
   int batches_x() const { return x.tiles() / 4; }
   int batches_y() const { return y.tiles() / 4; }
+  BinBox box_of(std::int32_t object, std::int32_t theta, const TileWindow& tiles) const {
+    return {.object = object,
+            .theta = theta,
+            .y_first = y.first_bin[tiles.y_first],
+            .y_count = y.first_bin[tiles.y_end] - y.first_bin[tiles.y_first],
+            .x_first = x.first_bin[tiles.x_first],
+            .x_count = x.first_bin[tiles.x_end] - x.first_bin[tiles.x_first]};
+  }
   BinBox box_of(const Tile& tile) const {
-    return {.object = tile.object,
-            .theta = tile.theta,
-            .y_first = y.first_bin[tile.y],
-            .y_count = y.bins(tile.y),
-            .x_first = x.first_bin[tile.x],
-            .x_count = x.bins(tile.x)};
+    return box_of(tile.object, tile.theta, {tile.x, tile.x + 1, tile.y, tile.y + 1});
   }
 };
 
