@@ -41,7 +41,11 @@ bool array_is_still(std::span<const Unknown> unknowns);
 /// What the filter believes after a touch.
 struct RecognitionStep {
   std::vector<double> identity;  ///< [label] probability, summed over the maps of the label
-  std::size_t best = 0;          ///< index of the label with the largest probability
+  /// [label] bounds of `identity`, proven but for "(none)", whose evidence counts as exact
+  /// (Certificate::none_standard_error). Empty where `identity` is exact, and for particles.
+  std::vector<ProbabilityInterval> identity_bounds = {};
+  std::optional<Certificate> certificate = {};  ///< from a bounded posterior
+  std::size_t best = 0;                         ///< index of the label with the largest probability
   Mode mode;
   std::optional<RefinedPose> refined;  ///< empty for particles
   bool contradicted = false;           ///< see Estimate
