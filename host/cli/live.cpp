@@ -85,7 +85,9 @@ void warm_up(Recogniser& recogniser, const RecognitionTask& task, const SensorDe
                     .valid = sensor.valid};
   recogniser.prepare(touch);
   recogniser.update(std::span(&touch, 1));
-  recogniser.refine(recogniser.estimate().mode);
+  if (recogniser.bounded() == nullptr) {  // whose search of one touch is long and compiles nothing
+    recogniser.refine(recogniser.estimate().mode);
+  }
   recogniser.reset();
 }
 

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <limits>
 #include <numeric>
 
 #include "recognition_record.hpp"
@@ -102,6 +103,16 @@ TEST(LabelBounds, OfEvidenceThatNothingIsKnownOf) {
   EXPECT_EQ(step.identity_bounds[1].low, 0.0);
   EXPECT_EQ(step.identity_bounds[1].high, 0.0) << "below every float64";
   EXPECT_EQ(step.identity_bounds[0].low, 1.0);
+  EXPECT_EQ(step.identity_bounds[0].high, 1.0);
+}
+
+TEST(LabelBounds, OfASearchThatEvaluatedNothing) {
+  constexpr double nothing = -std::numeric_limits<double>::infinity();
+  const RecognitionTask task({shapes()[0]}, BoundedOptions{});
+  const Estimate estimate{.identity = {1.0},
+                          .certificate = Certificate{.log_evidence = {{nothing, 0.0}}}};
+  const RecognitionStep step = judge(estimate, {}, task);
+  EXPECT_EQ(step.identity_bounds[0].low, 0.0) << "and no NaN";
   EXPECT_EQ(step.identity_bounds[0].high, 1.0);
 }
 
