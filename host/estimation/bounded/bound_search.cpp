@@ -1,0 +1,437 @@
+#include "bound_search.hpp"
+
+#include <algorithm>
+#include <iterator>
+#include <limits>
+#include <numeric>
+#include <optional>
+#include <tuple>
+
+#include <tbb/parallel_for.h>
+
+#include "hypotheses.hpp"
+#include "seen_window.hpp"
+#include "unsettled_mass.hpp"
+
+namespace palpate {
+
+namespace {
+
+constexpr double nothing = -std::numeric_limits<double>::infinity();
+/// Tiles that are followed down to the bins, to know early how much mass there is at least.
+constexpr std::size_t beam_tiles = 64;
+/// Of these, so many of the smallest have their bins evaluated.
+constexpr std::size_t probed_tiles = 16;
+/// Largest tiles that are divided together: bounds the memory for their parts.
+constexpr std::size_t most_together = 16384;
+/// Tiles of one theta that a task divides.
+constexpr std::size_t tiles_per_task = 64;
+
+bool before(const Tile& a, const Tile& b) {
+  if (a.bound != b.bound) {
+    return a.bound > b.bound;
+  }
+  return std::tie(a.object, a.theta, a.y, a.x) < std::tie(b.object, b.theta, b.y, b.x);
+}
+
+bool in_place(const Tile& a, const Tile& b) {
+  return std::tie(a.object, a.theta, a.y, a.x) < std::tie(b.object, b.theta, b.y, b.x);
+}
+
+/// Keeps the tiles of the largest bounds.
+void keep_best(std::vector<Tile>& tiles, std::size_t count) {
+  if (tiles.size() > count) {
+    std::nth_element(tiles.begin(), tiles.begin() + static_cast<std::ptrdiff_t>(count), tiles.end(),
+                     before);
+    tiles.resize(count);
+  }
+}
+
+/// The tile as a box of bins.
+BinBox box_of(const TileLevel& level, const Tile& tile) {
+  return {.object = tile.object,
+          .theta = tile.theta,
+          .y_first = level.y.first_bin[tile.y],
+          .y_count = level.y.bins(tile.y),
+          .x_first = level.x.first_bin[tile.x],
+          .x_count = level.x.bins(tile.x)};
+}
+
+}  // namespace
+
+/// One run of the search.
+class SearchRun {
+ public:
+  SearchRun(const BoundSearch& search, const KnownElements& elements, const BinVisitor& visit,
+            std::vector<PoseBlock>* refined)
+      : search_(search),
+        lattice_(search.options_.lattice),
+        elements_(elements),
+        refined_(refined),
+        thetas_(static_cast<std::size_t>(lattice_.theta_rad.count)),
+        finest_(search.bounds_.front().levels().size() - 1),
+        leaves_(search.likelihood_, search.bounds_, search.log_weight_, search.options_, elements,
+                visit) {
+    for (std::size_t i = 0; i < search_.bounds_.size(); ++i) {
+      std::vector<double> of_level;
+      for (std::size_t level = 0; level <= finest_; ++level) {
+        of_level.push_back(search_.log_weight_[i] + search_.bounds_[i].best(level, elements));
+      }
+      unpenalised_.push_back(std::move(of_level));
+    }
+  }
+
+  SearchResult result() {
+    settle_unseen();
+    std::vector<Tile> best = best_of_rows();
+    if (!best.empty()) {
+      UnsettledMass unsettled(search_.bounds_.size(),
+                              std::min_element(best.begin(), best.end(), before)->bound);
+      raise(std::move(best), 0);
+      count_largest(unsettled);
+      const double share = search_.options_.tolerance * search_share;
+      std::vector<Tile> kept = keep_largest(unsettled, share / static_cast<double>(finest_ + 1));
+      leaves_.drop(unsettled);
+      divide(std::move(kept), 0, share - leaves_.dropped_share());
+    }
+    SearchResult result = leaves_.result();
+    result.blocks_bounded = blocks_;
+    return result;
+  }
+
+ private:
+  /// Part of the tolerance that dropped tiles may use up; the rest is for rounding.
+  static constexpr double search_share = 0.75;
+
+  /// Finds the largest tiles where an element may see something else than the prior, and settles
+  /// all other bins, which have the likelihood of the prior.
+  void settle_unseen() {
+    seen_.resize(search_.bounds_.size() * thetas_);
+    tbb::parallel_for(std::size_t{0}, seen_.size(), [&](std::size_t row) {
+      const std::size_t object = row / thetas_;
+      seen_[row] =
+          seen_window(elements_, lattice_.theta_rad.centre(static_cast<int>(row % thetas_)),
+                      search_.maps_[object], search_.bounds_[object].levels().front());
+    });
+    for (std::size_t row = 0; row < seen_.size(); ++row) {
+      const std::size_t object = row / thetas_;
+      const TileLevel& level = search_.bounds_[object].levels().front();
+      const TileWindow& seen = seen_[row];
+      const auto settle = [&](int x_first, int x_end, int y_first, int y_end) {
+        const BinBox box{.object = static_cast<std::int32_t>(object),
+                         .theta = static_cast<std::int32_t>(row % thetas_),
+                         .y_first = level.y.first_bin[y_first],
+                         .y_count = level.y.first_bin[y_end] - level.y.first_bin[y_first],
+                         .x_first = level.x.first_bin[x_first],
+                         .x_count = level.x.first_bin[x_end] - level.x.first_bin[x_first]};
+        if (box.bins() > 0) {
+          leaves_.settle_unseen(box);
+        }
+      };
+      const int nx = level.x.tiles();
+      settle(0, nx, 0, seen.y_first);
+      settle(0, seen.x_first, seen.y_first, seen.y_end);
+      settle(seen.x_end, nx, seen.y_first, seen.y_end);
+      settle(0, nx, seen.y_end, level.y.tiles());
+    }
+  }
+
+  /// Calls visit(bound, x, y, bins) for the largest tiles of a row, a theta of an object, that hold
+  /// bins and see the map.
+  template <typename Visit>
+  void for_row(std::size_t row, const Visit& visit) const {
+    const std::size_t object = row / thetas_;
+    const TileLevel& level = search_.bounds_[object].levels().front();
+    const TileWindow& seen = seen_[row];
+    const auto batches = static_cast<std::size_t>(level.batches_x()) * level.batches_y();
+    const std::uint32_t* sums =
+        search_.largest_tiles_[object].data() + row % thetas_ * batches * batch_tiles;
+    for (int y = seen.y_first; y < seen.y_end; ++y) {
+      for (int x = seen.x_first; x < seen.x_end; ++x) {
+        const std::int64_t bins = std::int64_t{level.x.bins(x)} * level.y.bins(y);
+        if (bins > 0) {
+          const std::size_t batch =
+              static_cast<std::size_t>(y / batch_side) * level.batches_x() + x / batch_side;
+          const std::uint32_t sum =
+              sums[batch * batch_tiles + x % batch_side * batch_side + y % batch_side];
+          visit(unpenalised_[object][0] - sum / penalties_per_nat, x, y, bins);
+        }
+      }
+    }
+  }
+
+  /// The largest tile of the largest bound of every object and theta.
+  std::vector<Tile> best_of_rows() {
+    std::vector<Tile> best(seen_.size(), {.bound = nothing});
+    std::vector<std::int64_t> counts(seen_.size());
+    tbb::parallel_for(std::size_t{0}, best.size(), [&](std::size_t row) {
+      for_row(row, [&](double bound, int x, int y, std::int64_t /*bins*/) {
+        ++counts[row];
+        if (bound > best[row].bound) {
+          best[row] = {bound, static_cast<std::int32_t>(row / thetas_),
+                       static_cast<std::int32_t>(row % thetas_), x, y};
+        }
+      });
+    });
+    blocks_ += std::accumulate(counts.begin(), counts.end(), std::int64_t{0});
+    std::erase_if(best, [](const Tile& tile) { return tile.bound == nothing; });
+    return best;
+  }
+
+  void count_largest(UnsettledMass& unsettled) const {
+    tbb::parallel_for(std::size_t{0}, search_.bounds_.size(), [&](std::size_t object) {
+      for (std::size_t theta = 0; theta < thetas_; ++theta) {
+        for_row(object * thetas_ + theta,
+                [&](double bound, int /*x*/, int /*y*/, std::int64_t bins) {
+                  unsettled.add(object, bound, bins);
+                });
+      }
+    });
+  }
+
+  /// The largest tiles that must be divided, and takes them out of the unsettled ones.
+  std::vector<Tile> keep_largest(UnsettledMass& unsettled, double share) const {
+    const std::vector<std::size_t> from = leaves_.droppable_from(unsettled, share);
+    std::vector<std::vector<Tile>> kept(search_.bounds_.size());
+    tbb::parallel_for(std::size_t{0}, kept.size(), [&](std::size_t object) {
+      for (std::size_t theta = 0; theta < thetas_; ++theta) {
+        for_row(object * thetas_ + theta, [&](double bound, int x, int y, std::int64_t bins) {
+          if (unsettled.slot(bound) < from[object]) {
+            unsettled.remove(object, bound, bins);
+            kept[object].push_back(
+                {bound, static_cast<std::int32_t>(object), static_cast<std::int32_t>(theta), x, y});
+          }
+        });
+      }
+    });
+    return joined(kept);
+  }
+
+  static std::vector<Tile> joined(const std::vector<std::vector<Tile>>& lists) {
+    std::vector<Tile> all;
+    std::size_t count = 0;
+    for (const std::vector<Tile>& list : lists) {
+      count += list.size();
+    }
+    all.reserve(count);
+    for (const std::vector<Tile>& list : lists) {
+      all.insert(all.end(), list.begin(), list.end());
+    }
+    return all;
+  }
+
+  /// The parts, one level down, of tiles that are sorted by place.
+  std::vector<Tile> parts_of(std::span<const Tile> tiles, std::size_t level) {
+    std::vector<std::size_t> begins;  // of tasks: tiles of one object and theta
+    for (std::size_t i = 0; i < tiles.size(); ++i) {
+      if (i == 0 || tiles[i].object != tiles[i - 1].object ||
+          tiles[i].theta != tiles[i - 1].theta || i - begins.back() == tiles_per_task) {
+        begins.push_back(i);
+      }
+    }
+    std::vector<std::vector<Tile>> parts(begins.size());
+    tbb::parallel_for(std::size_t{0}, begins.size(), [&](std::size_t task) {
+      thread_local WindowPlaces placed;
+      const std::size_t end = task + 1 < begins.size() ? begins[task + 1] : tiles.size();
+      const Tile& first = tiles[begins[task]];
+      const TileBounds& bounds = search_.bounds_[first.object];
+      bounds.place(level + 1, lattice_.theta_rad.centre(first.theta), elements_, placed);
+      parts[task].reserve((end - begins[task]) * batch_tiles);
+      for (std::size_t i = begins[task]; i < end; ++i) {
+        std::uint32_t sums[batch_tiles] = {};
+        const int x = tiles[i].x * batch_side;
+        const int y = tiles[i].y * batch_side;
+        bounds.add(level + 1, elements_, placed, x, y, sums);
+        append_batch(first, level + 1, x, y, sums, parts[task]);
+      }
+    });
+    std::vector<Tile> all = joined(parts);
+    blocks_ += static_cast<std::int64_t>(all.size());
+    return all;
+  }
+
+  /// Appends the tiles of a batch, at the object and theta of `of`, that hold bins.
+  void append_batch(const Tile& of, std::size_t level, int first_x, int first_y,
+                    const std::uint32_t* sums, std::vector<Tile>& tiles) const {
+    const TileLevel& tiling = search_.bounds_[of.object].levels()[level];
+    for (int j = 0; j < batch_side; ++j) {
+      if (tiling.y.bins(first_y + j) == 0) {
+        continue;
+      }
+      for (int i = 0; i < batch_side; ++i) {
+        if (tiling.x.bins(first_x + i) > 0) {
+          const double bound =
+              unpenalised_[of.object][level] - sums[batch_side * i + j] / penalties_per_nat;
+          tiles.push_back({bound, of.object, of.theta, first_x + i, first_y + j});
+        }
+      }
+    }
+  }
+
+  /// Raises the lower bound of the total: follows the best tiles down to their bins.
+  void raise(std::vector<Tile> tiles, std::size_t level) {
+    if (search_.options_.evidence_nats) {
+      // Every hypothesis's own total is wanted, too.
+      for (std::size_t object = 0; object < search_.bounds_.size(); ++object) {
+        std::vector<Tile> own;
+        std::copy_if(tiles.begin(), tiles.end(), std::back_inserter(own), [&](const Tile& tile) {
+          return tile.object == static_cast<std::int32_t>(object);
+        });
+        raise_beam(std::move(own), level);
+      }
+      return;
+    }
+    raise_beam(std::move(tiles), level);
+  }
+
+  void raise_beam(std::vector<Tile> tiles, std::size_t level) {
+    for (; level < finest_; ++level) {
+      keep_best(tiles, beam_tiles);
+      std::sort(tiles.begin(), tiles.end(), in_place);
+      tiles = parts_of(tiles, level);
+    }
+    keep_best(tiles, probed_tiles);
+    leaves_.probe(tiles);
+  }
+
+  /// Divides tiles of a level until their bins are evaluated or dropped.
+  /// @param tolerance part of the total that may be dropped
+  void divide(std::vector<Tile> tiles, std::size_t level, double tolerance) {
+    note(tiles, level);
+    if (level == finest_) {
+      leaves_.evaluate(tiles, tolerance);
+      return;
+    }
+    std::sort(tiles.begin(), tiles.end(), tiles.size() > most_together ? before : in_place);
+    for (std::size_t begin = 0; begin < tiles.size(); begin += most_together) {
+      const std::size_t left = tiles.size() - begin;
+      const std::size_t count = std::min(most_together, left);
+      const auto first = tiles.begin() + static_cast<std::ptrdiff_t>(begin);
+      std::vector<Tile> some(first, first + static_cast<std::ptrdiff_t>(count));
+      const double dropped = leaves_.dropped_share();
+      if (leaves_.out_of_time()) {
+        some.assign(first, tiles.end());
+        leaves_.drop(unsettled_of(some, level));
+        return;
+      }
+      std::sort(some.begin(), some.end(), in_place);
+      some = parts_of(some, level);
+      if (level + 1 < finest_) {
+        raise(some, level + 1);
+      }
+      // What tiles do not use up is left for those after them.
+      const double part = tolerance * static_cast<double>(count) / static_cast<double>(left);
+      UnsettledMass unsettled = unsettled_of(some, level + 1);
+      if (level + 1 < finest_) {
+        const std::vector<std::size_t> from =
+            leaves_.droppable_from(unsettled, part / static_cast<double>(finest_ - level));
+        std::erase_if(some, [&](const Tile& tile) {
+          return unsettled.slot(tile.bound) >= from[tile.object];
+        });
+        for (const Tile& tile : some) {
+          unsettled.remove(static_cast<std::size_t>(tile.object), tile.bound,
+                           search_.bounds_[tile.object].bins(level + 1, tile));
+        }
+        leaves_.drop(unsettled);
+      }
+      const double used = leaves_.dropped_share() - dropped;
+      divide(std::move(some), level + 1, std::max(part - used, 0.0));
+      tolerance = std::max(tolerance - (leaves_.dropped_share() - dropped), 0.0);
+    }
+  }
+
+  UnsettledMass unsettled_of(std::span<const Tile> tiles, std::size_t level) const {
+    return leaves_.unsettled(tiles, level);
+  }
+
+  void note(std::span<const Tile> tiles, std::size_t level) const {
+    if (refined_ == nullptr) {
+      return;
+    }
+    for (const Tile& tile : tiles) {
+      const BinBox box = box_of(search_.bounds_[tile.object].levels()[level], tile);
+      refined_->push_back({.object = box.object,
+                           .level = static_cast<int>(level),
+                           .theta = box.theta,
+                           .x_first = box.x_first,
+                           .x_count = box.x_count,
+                           .y_first = box.y_first,
+                           .y_count = box.y_count});
+    }
+  }
+
+  const BoundSearch& search_;
+  const PoseLattice& lattice_;
+  const KnownElements& elements_;
+  std::vector<PoseBlock>* refined_;
+  std::size_t thetas_;
+  std::size_t finest_;                            ///< level
+  std::vector<std::vector<double>> unpenalised_;  ///< [object][level], with the prior weight
+  std::vector<TileWindow> seen_;                  ///< [object, theta], of the largest tiles
+  LeafPass leaves_;
+  std::int64_t blocks_ = 0;
+};
+
+BoundSearch::BoundSearch(std::span<const Hypothesis> hypotheses, const BoundedOptions& options,
+                         const BinLikelihood& likelihood)
+    : options_(options), likelihood_(likelihood), log_weight_(log_weights(hypotheses)) {
+  std::vector<std::optional<TileBounds>> bounds(hypotheses.size());
+  tbb::parallel_for(std::size_t{0}, hypotheses.size(), [&](std::size_t i) {
+    bounds[i].emplace(hypotheses[i].map, options.contact, i, options.lattice);
+  });
+  for (std::optional<TileBounds>& of : bounds) {
+    const TileLevel& level = of->levels().front();
+    largest_tiles_.emplace_back(static_cast<std::size_t>(options.lattice.theta_rad.count) *
+                                level.batches_x() * level.batches_y() * batch_tiles);
+    bounds_.push_back(*std::move(of));
+  }
+  for (const Hypothesis& hypothesis : hypotheses) {
+    OccupancyGrid shape = hypothesis.map;
+    shape.log_odds = {};
+    maps_.push_back(std::move(shape));
+  }
+}
+
+void BoundSearch::reset() {
+  for (std::vector<std::uint32_t>& sums : largest_tiles_) {
+    std::fill(sums.begin(), sums.end(), 0);
+  }
+}
+
+void BoundSearch::add(const KnownElements& added) {
+  const auto thetas = static_cast<std::size_t>(options_.lattice.theta_rad.count);
+  tbb::parallel_for(std::size_t{0}, bounds_.size() * thetas, [&](std::size_t row) {
+    thread_local WindowPlaces placed;
+    const std::size_t object = row / thetas;
+    const std::size_t theta = row % thetas;
+    const TileBounds& bounds = bounds_[object];
+    const TileLevel& level = bounds.levels().front();
+    bounds.place(0, options_.lattice.theta_rad.centre(static_cast<int>(theta)), added, placed);
+    std::uint32_t* sums =
+        largest_tiles_[object].data() +
+        theta * static_cast<std::size_t>(level.batches_x()) * level.batches_y() * batch_tiles;
+    for (int by = 0; by < level.batches_y(); ++by) {
+      for (int bx = 0; bx < level.batches_x(); ++bx, sums += batch_tiles) {
+        bounds.add(0, added, placed, bx * batch_side, by * batch_side, sums);
+      }
+    }
+  });
+}
+
+SearchResult BoundSearch::run(const KnownElements& elements, const BinVisitor& visit,
+                              std::vector<PoseBlock>* refined) const {
+  return SearchRun(*this, elements, visit, refined).result();
+}
+
+std::uint64_t BoundSearch::bytes() const {
+  std::uint64_t bytes = 0;
+  for (const TileBounds& bounds : bounds_) {
+    bytes += bounds.bytes();
+  }
+  for (const std::vector<std::uint32_t>& sums : largest_tiles_) {
+    bytes += sums.capacity() * sizeof(std::uint32_t);
+  }
+  return bytes;
+}
+
+}  // namespace palpate
