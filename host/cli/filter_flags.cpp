@@ -212,15 +212,24 @@ ChosenFilter choose_filter(const FilterWish& wish, const RecognitionFlags& flags
 
 Recogniser open_filter(Device& device, const RecognitionTask& task) {
   task.lattice().validate();
+  if (std::holds_alternative<BoundedOptions>(task.filter) &&
+      task.bins_in_all() > largest_bounded_bins) {
+    throw Error(
+        Fault::input,
+        fmt::format("{} pose bins in all: bounds take at most {}; use fewer bins or objects",
+                    task.bins_in_all(), largest_bounded_bins));
+  }
   try {
     return {device, task};
   } catch (const Error& error) {
     // Of a sound task nothing but the bins' memory can be refused.
     if (error.fault() == Fault::input && std::holds_alternative<HistogramOptions>(task.filter) &&
-        !task.filter_asked_for_by.empty()) {
+        (task.auto_filter || !task.filter_asked_for_by.empty()) &&
+        task.bins_in_all() <= largest_bounded_bins) {
       throw Error(Fault::input,
-                  fmt::format("{}, or leave out {}: --filter bounded needs no device memory",
-                              error.what(), task.filter_asked_for_by));
+                  fmt::format("{}, or {}: --filter bounded needs no device memory", error.what(),
+                              task.auto_filter ? std::string("ask for bounds")
+                                               : "leave out " + task.filter_asked_for_by));
     }
     throw;
   }

@@ -65,7 +65,8 @@ struct RecognitionStep {
   /// How much the last touch surprised the belief before it; see surprise_of(). Empty for
   /// particles, for a touch without a known element, and for an unknown's first touch (so for all
   /// of
-  /// `--each-frame`), before which there is no belief but the prior.
+  /// `--each-frame`), before which there is no belief but the prior. By bounds over more than
+  /// most_balanced_bins in all also where several touches come at once.
   std::optional<double> surprise;
   std::vector<std::string> warnings;  ///< what looks wrong with the touches, in whole sentences
   double seconds = 0.0;               ///< wall time from the touch to the estimate

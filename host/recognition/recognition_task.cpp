@@ -105,7 +105,8 @@ std::optional<CoarsenedBins> settle_bins(const Device& device, RecognitionTask& 
 
 void settle_filter(RecognitionTask& task) {
   const auto* histogram = std::get_if<HistogramOptions>(&task.filter);
-  if (!task.auto_filter || histogram == nullptr || task.bins_in_all() <= most_histogram_bins) {
+  if (!task.auto_filter || histogram == nullptr || task.bins_in_all() <= most_histogram_bins ||
+      task.bins_in_all() > most_bounded_bins) {
     return;
   }
   if (const std::optional<BoundedOptions> bounded = bounded_instead(*histogram)) {

@@ -58,9 +58,11 @@ struct RecognitionTask {
 /// answer sooner.
 inline constexpr std::int64_t most_histogram_bins = 100'000;
 
-/// Most bins, of all objects together, that settle_bins() gives to bounds. Their memory does not
-/// grow with the bins.
+/// Most bins, of all objects together, that settle_bins() and settle_filter() give to bounds.
 inline constexpr std::int64_t most_bounded_bins = 1'000'000'000;
+
+/// Most bins, of all objects together, for bounds that are asked for by name.
+inline constexpr std::int64_t largest_bounded_bins = 10'000'000'000;
 
 /// The options of a bounded posterior of the same bins; none where the histogram allows for
 /// something that bounds do not: touch_sd, slip_sd or a limit of its memory.
@@ -81,7 +83,8 @@ std::optional<CoarsenedBins> settle_bins(const Device& device, RecognitionTask& 
 
 /// Chooses the filter if the task leaves it to this rule (auto_filter): of more than
 /// most_histogram_bins bins in all, bounds take the place of the histogram, unless
-/// bounded_instead() has none. The counts are settled before.
+/// bounded_instead() has none or there are more than most_bounded_bins. The counts are settled
+/// before.
 void settle_filter(RecognitionTask& task);
 
 }  // namespace palpate

@@ -257,13 +257,19 @@ TEST_F(BoundedFilter, AutoNamesTheFlagThatKeepsALargeLatticeFromIt) {
     const std::string name = flags[0].starts_with("--filter")
                                  ? "--filter histogram"
                                  : flags[0].substr(0, flags[0].find('='));
-    Arguments call{"recognize", "u.h5", "--maps", "maps", "--bins=9999x9999x999"};
+    Arguments call{"recognize", "u.h5", "--maps", "maps", "--bins=4000x4000x300"};
     call.insert(call.end(), flags.begin(), flags.end());
     expect_refused(call, {"MiB", "or leave out " + name + ": --filter bounded"});
   }
-  expect_refused({"recognize", "u.h5", "--maps", "maps", "--bins=9999x9999x999",
+  expect_refused({"recognize", "u.h5", "--maps", "maps", "--bins=4000x4000x300",
                   "--filter=histogram", "--slip-sd-deg=2"},
                  {"leave out --slip-sd-deg and --filter histogram"});
+}
+
+TEST_F(BoundedFilter, HasALargestLattice) {
+  expect_refused(
+      {"recognize", "u.h5", "--maps", "maps", "--bins=100000x100000x2", "--filter", "bounded"},
+      {"40000000000 pose bins in all", "at most 10000000000", "fewer bins"});
 }
 
 TEST_F(BoundedFilter, PeopleReadTheCertificate) {

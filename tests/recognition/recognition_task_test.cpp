@@ -111,6 +111,8 @@ TEST(SettleFilter, TakesTheHistogramForWhatBoundsRefuse) {
   EXPECT_FALSE(kept([](Task&, HistogramOptions& options) { options.still_array = true; }))
       << "the rule is the same for a still array";
   EXPECT_TRUE(kept([](Task& task, HistogramOptions&) { task.auto_filter = false; }));
+  EXPECT_TRUE(kept([](Task&, HistogramOptions& options) { options.lattice.y_mm.count = 100'000; }))
+      << "too large for both; the histogram says so";
   EXPECT_TRUE(kept([](Task&, HistogramOptions& options) { options.touch_sd.rad = 0.1; }));
   EXPECT_TRUE(kept([](Task&, HistogramOptions& options) { options.slip_sd.mm = 0.1; }));
   EXPECT_TRUE(kept([](Task&, HistogramOptions& options) { options.memory_limit_bytes = 1; }));
