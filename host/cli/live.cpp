@@ -85,7 +85,9 @@ void warm_up(Recogniser& recogniser, const RecognitionTask& task, const SensorDe
                     .valid = sensor.valid};
   recogniser.prepare(touch);
   recogniser.update(std::span(&touch, 1));
-  recogniser.refine(recogniser.estimate().mode);
+  if (recogniser.bounded() == nullptr) {  // whose search of one touch is long and compiles nothing
+    recogniser.refine(recogniser.estimate().mode);
+  }
   recogniser.reset();
 }
 
@@ -117,10 +119,10 @@ void live(const Options& options) {
   const TouchDetectorOptions detector =
       detector_options(options.detector, description.pressure_unit, source);
   RecognitionTask task = task_of(options.recognition, scene, description.pressure_unit, source,
-                                 array_reach_mm(elements_mm));
+                                 array_reach_mm(elements_mm),
+                                 goal ? HistogramNeed{"--plan", plan_needs} : HistogramNeed{});
   if (goal && std::holds_alternative<ParticleOptions>(task.filter)) {
-    refuse_flag("--plan", options.plan,
-                "a plan needs the belief of all poses; use --filter histogram, or leave it out");
+    refuse_flag("--plan", options.plan, "{}; use --filter histogram, or leave it out", plan_needs);
   }
   CommandFiles files;
   add_sensor_files(options.sensor, options.poses, files);
@@ -149,7 +151,7 @@ void live(const Options& options) {
   const bool on_terminal =
       isatty(fileno(people)) != 0 && !(to_program && isatty(STDOUT_FILENO) != 0);
   if (!to_program && !on_terminal) {
-    fmt::print("{}\n", table_heading());
+    fmt::print("{}\n", table_heading(task));
     std::fflush(stdout);
   }
   bool resolved = true;  // nothing was said yet

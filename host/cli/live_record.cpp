@@ -19,6 +19,11 @@ namespace {
 
 double time_s(const LiveTouch& touch) { return 0.5 * (touch.touch.begin_s + touch.touch.end_s); }
 
+/// A cell of the column that only bounds have.
+std::string dropped_cell(const std::string& text, const RecognitionTask& task) {
+  return std::holds_alternative<BoundedOptions>(task.filter) ? fmt::format("  {:>7}", text) : "";
+}
+
 }  // namespace
 
 std::string json_line(const LiveTouch& touch, const RecognitionTask& task) {
@@ -48,10 +53,11 @@ std::string plan_line(const LiveTouch& touch) {
 }
 
 // Lines are printed as touches come, so columns cannot be as wide as their content.
-std::string table_heading() {
+std::string table_heading(const RecognitionTask& task) {
   return fmt::format(
-      "{:>7}  {:>5}  {:<10}  {:>5}  {:>14}  {:>14}  {:>15}  {:>8}  {:>10}  {:>8}  fit", "unknown",
-      "touch", "best", "prob.", "x mm", "y mm", "theta deg", "error mm", "latency ms", "surprise");
+      "{:>7}  {:>5}  {:<10}  {:>5}{}  {:>14}  {:>14}  {:>15}  {:>8}  {:>10}  {:>8}  fit", "unknown",
+      "touch", "best", "prob.", dropped_cell("dropped", task), "x mm", "y mm", "theta deg",
+      "error mm", "latency ms", "surprise");
 }
 
 std::string table_line(const LiveTouch& touch, const RecognitionTask& task) {
@@ -60,10 +66,11 @@ std::string table_line(const LiveTouch& touch, const RecognitionTask& task) {
   const std::string fit = fit_word(step);
   const std::string surprise = surprise_text(step);
   return fmt::format(
-      "{:>7}  {:>5}  {:<10}  {:>5.3f}  {:>14}  {:>14}  {:>15}  {:>8}  {:>10.2f}  {:>8}  {}",
-      touch.unknown + 1, touch.index + 1, object_words(step, task), step.confidence(), pose[0],
-      pose[1], pose[2], error_text(step.pose_error_mm()), touch.latency_ms,
-      surprise.empty() ? "-" : surprise, fit.empty() ? "-" : fit);
+      "{:>7}  {:>5}  {:<10}  {:>5.3f}{}  {:>14}  {:>14}  {:>15}  {:>8}  {:>10.2f}  {:>8}  {}",
+      touch.unknown + 1, touch.index + 1, object_words(step, task), step.confidence(),
+      dropped_cell(dropped_text(step), task), pose[0], pose[1], pose[2],
+      error_text(step.pose_error_mm()), touch.latency_ms, surprise.empty() ? "-" : surprise,
+      fit.empty() ? "-" : fit);
 }
 
 std::string summary(const LiveState& state, std::vector<double> latencies_ms,
@@ -72,7 +79,7 @@ std::string summary(const LiveState& state, std::vector<double> latencies_ms,
   if (state.last) {
     const RecognitionStep& step = state.last->step;
     text += result_words(step, task) + "\n";
-    std::vector<std::string> more{truth_words(step, task),
+    std::vector<std::string> more{truth_words(step, task), unproven_sentence(step, task),
                                   misfit_sentence(step, state.touches, task),
                                   single_touch_words(task, state.touches)};
     more.insert(more.end(), step.warnings.begin(), step.warnings.end());

@@ -16,7 +16,7 @@ std::string json_line(const LiveTouch& touch, const RecognitionTask& task);
 std::string plan_line(const LiveTouch& touch);
 
 /// Heading and lines of a table for people.
-std::string table_heading();
+std::string table_heading(const RecognitionTask& task);
 std::string table_line(const LiveTouch& touch, const RecognitionTask& task);
 
 /// The whole stream in a few lines.

@@ -100,6 +100,11 @@ void LiveScreen::describe(const LiveState& state) {
   if (plan_) {
     view_.next = state.last->next ? next_touch_words(*state.last->next, *plan_) : "planning";
   }
+  if (const auto unproven = unproven_sentence(step, task_); !unproven.empty()) {
+    view_.notes.push_back(unproven);
+  } else if (const std::string dropped = dropped_text(step); !dropped.empty()) {
+    view_.state += "; dropped " + dropped;
+  }
   if (const auto misfit = misfit_sentence(step, state.touches, task_); !misfit.empty()) {
     view_.notes.push_back(misfit);
   } else if (step.fit) {

@@ -176,11 +176,10 @@ void plan_touches(const Options& options) {
   for (const Touch& touch : touches) {  // the array may change between touches
     reach_mm = std::max(reach_mm, array_reach_mm(touch.elements_mm));
   }
-  RecognitionTask task =
-      task_of(options.recognition, scene, recording.pressure_unit, recording.path, reach_mm);
+  RecognitionTask task = task_of(options.recognition, scene, recording.pressure_unit,
+                                 recording.path, reach_mm, {.why = plan_needs});
   if (std::holds_alternative<ParticleOptions>(task.filter)) {
-    refuse("--filter particles",
-           "a plan needs the belief of all poses; use --filter histogram, or leave it out");
+    refuse("--filter particles", "{}; use --filter histogram, or leave it out", plan_needs);
   }
   check_outputs(options, scene, task);
   Device device = open_device(options.recognition, scene);

@@ -8,6 +8,9 @@
 
 namespace palpate::cli {
 
+/// Why a plan has no other filter than the histogram.
+inline constexpr const char* plan_needs = "a plan needs the belief of all poses";
+
 /// "identity", "pose" or "both". Throws Error naming the flag.
 PlanGoal parse_goal(const std::string& flag, const std::string& text);
 /// The goal's word.

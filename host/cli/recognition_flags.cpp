@@ -17,7 +17,8 @@ void add_recognition_flags(CLI::App& command, RecognitionFlags& flags) {
       "Pose bins per object along x, y and theta, as 25x25x16; auto: as many as the refined pose "
       "needs, in steps of 0.6 times the maps' cell or 1.2 times the sensor's spread, whichever is "
       "larger; fine: also as the mode needs, in steps of 0.6 times the larger of both. Auto and "
-      "fine take wider steps where the device's memory is short; the region about an automatic "
+      "fine take wider steps where the histogram's device memory is short; the region about an "
+      "automatic "
       "pivot "
       "fits the largest array of all RECORDINGs [default: auto, or 25x25x16 where "
       "a range or a pivot is given]");
@@ -45,24 +46,7 @@ void add_recognition_flags(CLI::App& command, RecognitionFlags& flags) {
       "pressure]");
   command.add_option("--ratio", flags.ratio,
                      "Threshold as a fraction of the touch's largest pressure [default: 0.3]");
-  command.add_option("--filter", flags.filter,
-                     "auto, histogram or particles; auto takes the histogram [default: auto]");
-  command
-      .add_option("--particles", flags.particles,
-                  "Number of particles of all objects together, up to 1,000,000 [default: 10000]")
-      ->check(require_whole_number);
-  command.add_option("--resampling", flags.resampling,
-                     "How particles are drawn: multinomial or systematic [default: multinomial]");
-  command.add_flag("--augmented", flags.augmented,
-                   "Augmented MCL: add random particles while the touches fit worse than before");
-  command.add_option("--seed", flags.seed, "Seed of the particles' random numbers [default: 0]")
-      ->check(require_whole_number);
-  command
-      .add_option(
-          "--memory-mib", flags.memory_mib,
-          "Limit of the histogram's device memory, MiB; less memory costs time, no accuracy "
-          "[default: none]")
-      ->check(require_whole_number);
+  add_filter_flags(command, flags.filter);
   command.add_option("--device", flags.device, "Vulkan device, by index or a part of its name");
   command.add_flag("--verbose", flags.verbose,
                    "Say on standard error how the device works: its memory, the likelihood's path, "

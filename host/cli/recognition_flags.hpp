@@ -1,11 +1,11 @@
 #pragma once
 
-#include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "command_files.hpp"
+#include "filter_flags.hpp"
 #include "palpate/scene.hpp"
 #include "recogniser.hpp"
 #include "uncertainty_flags.hpp"
@@ -30,12 +30,7 @@ struct RecognitionFlags {
   UncertaintyFlags uncertainty;
   std::optional<double> threshold;
   std::optional<double> ratio;
-  std::optional<int> memory_mib;
-  std::string filter;
-  std::optional<int> particles;
-  std::string resampling;
-  bool augmented = false;
-  std::optional<std::uint64_t> seed;
+  FilterFlags filter;
   std::string device;
   bool verbose = false;
 };
@@ -54,15 +49,17 @@ void replace_array(const Scene& scene, const std::string& scene_file, const std:
 /// maps. Throws Error.
 /// @param pressure_unit of the touches to come, which `source` gives
 /// @param reach_mm of the arrays that touch; see array_reach_mm()
+/// @param need why the command needs the histogram, if it does
 RecognitionTask task_of(const RecognitionFlags& flags, const Scene& scene,
                         const std::string& pressure_unit, const std::string& source,
-                        double reach_mm);
+                        double reach_mm, const HistogramNeed& need = {});
 
 /// Opens the device that the flags or the scene name. Throws Error.
 Device open_device(const RecognitionFlags& flags, const Scene& scene);
 
-/// Makes the task's filter, after --bins auto or fine has chosen its bins. Says on standard error
-/// where the device's memory made bins wider than the maps resolve. Throws Error.
+/// Makes the task's filter, after --bins auto or fine has chosen the bins and --filter auto the
+/// filter. Says on standard error where a limit made bins wider than the maps resolve. Throws
+/// Error.
 Recogniser open_recogniser(const RecognitionFlags& flags, const Scene& scene, Device& device,
                            RecognitionTask& task);
 

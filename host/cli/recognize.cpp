@@ -77,6 +77,16 @@ std::vector<Unknown> list_unknowns(const Options& options,
   return unknowns;
 }
 
+HistogramNeed histogram_need(const Options& options) {
+  if (options.fit_touch_sd) {
+    return {"--fit-touch-sd", "needs the belief of all poses"};
+  }
+  if (!options.posterior.empty()) {
+    return {"--posterior", "holds the log-likelihood of every bin, and bounds evaluate few"};
+  }
+  return {};
+}
+
 std::filesystem::path png_path(const Options& options, const Unknown& unknown) {
   const std::string stem = std::filesystem::path(unknown.recording).stem().string();
   return std::filesystem::path(options.png) /
@@ -192,8 +202,8 @@ void recognize(const Options& options) {
       reach_mm = std::max(reach_mm, array_reach_mm(recording.touch(i).elements_mm));
     }
   }
-  RecognitionTask task =
-      task_of(options.recognition, scene, first.pressure_unit, first.path, reach_mm);
+  RecognitionTask task = task_of(options.recognition, scene, first.pressure_unit, first.path,
+                                 reach_mm, histogram_need(options));
   if (auto* histogram = std::get_if<HistogramOptions>(&task.filter)) {
     histogram->still_array = array_is_still(unknowns);
   }

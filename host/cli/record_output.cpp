@@ -36,16 +36,47 @@ nlohmann::ordered_json to_json(std::optional<double> error_mm) {
   return error_mm ? nlohmann::ordered_json(*error_mm) : nullptr;
 }
 
+/// Why the task has its filter, as a line of its own; "" where there is no more to say.
+std::string reason_of_filter(const RecognitionTask& task) {
+  const std::int64_t bins = task.bins_in_all();
+  if (task.auto_filter) {
+    return fmt::format("\n        chosen by --filter auto: {} bins in all, {} {}", bins,
+                       bins > most_histogram_bins ? "more than" : "at most", most_histogram_bins);
+  }
+  return task.filter_asked_for_by.empty()
+             ? ""
+             : fmt::format("\n        asked for by {}", task.filter_asked_for_by);
+}
+
+/// Adds what a bounded posterior proves of its estimate.
+void add_certificate(nlohmann::ordered_json& json, const RecognitionStep& step,
+                     const RecognitionTask& task) {
+  const Certificate& certificate = *step.certificate;
+  json["dropped_mass"] = certificate.dropped_mass;
+  for (std::size_t i = 0; i < task.labels.size(); ++i) {
+    json["identity_bounds"][task.labels[i]] = {step.identity_bounds[i].low,
+                                               step.identity_bounds[i].high};
+  }
+  json["mode_certain"] = certificate.mode_certain;
+  json["bins_evaluated"] = certificate.bins_evaluated;
+  json["blocks_bounded"] = certificate.blocks_bounded;
+  if (certificate.none_standard_error) {
+    json["none_standard_error"] = *certificate.none_standard_error;
+  }
+}
+
 }  // namespace
 
 std::string setup_words(const Device& device, const RecognitionTask& task) {
   const auto* particles = std::get_if<ParticleOptions>(&task.filter);
   const PoseLattice& lattice = task.lattice();
+  const bool bounded = std::holds_alternative<BoundedOptions>(task.filter);
   return fmt::format(
       "{} map{}, {} on {}", task.hypotheses.size(), task.hypotheses.size() == 1 ? "" : "s",
-      particles != nullptr ? fmt::format("{} particles", particles->particles)
-                           : fmt::format("{} x {} x {} bins each,", lattice.x_mm.count,
-                                         lattice.y_mm.count, lattice.theta_rad.count),
+      particles != nullptr
+          ? fmt::format("{} particles", particles->particles)
+          : fmt::format("{} x {} x {} bins each{},", lattice.x_mm.count, lattice.y_mm.count,
+                        lattice.theta_rad.count, bounded ? " by bounds" : ""),
       device.name());
 }
 
@@ -61,9 +92,19 @@ void print_engine(const Device& device, const Recogniser& recogniser, const Reco
         fmt::format("{} particles, {} resampling{}, seed {}", particles->particles,
                     particles->resampling == Resampling::multinomial ? "multinomial" : "systematic",
                     particles->augmented ? ", random particles added" : "", particles->seed);
+  } else if (const auto* bounded = std::get_if<BoundedOptions>(&task.filter)) {
+    filter = fmt::format("bounded, {}; {:.1f} MiB of the host's memory\n        tolerance {:g}",
+                         recogniser.bounded()->path(),
+                         static_cast<double>(recogniser.bounded()->host_bytes()) / (1 << 20),
+                         bounded->tolerance);
+    filter += bounded->budget_s ? fmt::format(", budget {:g} ms", 1e3 * *bounded->budget_s) : "";
+    filter += bounded->evidence_nats
+                  ? fmt::format(", evidence within {:g} nats", *bounded->evidence_nats)
+                  : "";
   } else {
     filter = fmt::format("histogram in {}", fmt::join(recogniser.histogram()->paths(), "; "));
   }
+  filter += reason_of_filter(task);
   fmt::print(stderr,
              "device: {}, {:.1f} MiB of its memory\nfilter: {}\nlattice: {}\n         {}\n"
              "         {}\n         pivot {}\n",
@@ -114,6 +155,9 @@ nlohmann::ordered_json to_json(const RecognitionStep& step, const RecognitionTas
   }
   if (step.surprise) {
     json["surprise"] = *step.surprise;
+  }
+  if (step.certificate) {
+    add_certificate(json, step, task);
   }
   if (!step.warnings.empty()) {
     json["warnings"] = step.warnings;

@@ -118,6 +118,7 @@ std::string trace_table(const RecognitionRecord& record, const RecognitionTask& 
   TextTable table({{"  touch", true},
                    {"best", false, true},
                    {"prob.", true},
+                   {"dropped", true},
                    {"x mm", true},
                    {"y mm", true},
                    {"theta deg", true},
@@ -130,8 +131,8 @@ std::string trace_table(const RecognitionRecord& record, const RecognitionTask& 
     const std::array<std::string, 3> pose = pose_cells(pose_text(step));
     const auto& particles = step.effective_sample_size;
     table.add({fmt::format("{}", i + 1), object_words(step, task),
-               fmt::format("{:.3f}", step.confidence()), pose[0], pose[1], pose[2],
-               step.right ? error_text(step.pose_error_mm()) : "",
+               fmt::format("{:.3f}", step.confidence()), dropped_text(step), pose[0], pose[1],
+               pose[2], step.right ? error_text(step.pose_error_mm()) : "",
                particles ? fmt::format("{:.1f}", *particles) : "", surprise_text(step),
                fit_word(step)});
   }
@@ -148,6 +149,9 @@ std::string complaints(const std::vector<RecognitionRecord>& records, const Reco
           "{}: contradicted: no map explains these touches at any pose tried; the object may be "
           "unknown, its pose outside the region, or gamma too small\n",
           printable_name(record));
+    }
+    if (const auto unproven = unproven_sentence(record.last(), task); !unproven.empty()) {
+      text += fmt::format("{}: {}\n", printable_name(record), unproven);
     }
     if (const auto misfit = misfit_sentence(record.last(), record.touches, task); !misfit.empty()) {
       text += fmt::format("{}: {}\n", printable_name(record), misfit);
@@ -172,6 +176,7 @@ std::string result_table(const std::vector<RecognitionRecord>& records, const Re
                    {"touches", true},
                    {"best", false, true},
                    {"prob.", true},
+                   {"dropped", true},
                    {"x mm", true},
                    {"y mm", true},
                    {"theta deg", true},
@@ -180,15 +185,15 @@ std::string result_table(const std::vector<RecognitionRecord>& records, const Re
   const auto add_pose = [&](const char* what, const std::string& label, const Pose& T_robot_object,
                             std::optional<double> error_mm) {
     const PoseText pose = pose_text(T_robot_object);
-    table.add({what, "", label, "", pose.value[0], pose.value[1], pose.value[2],
+    table.add({what, "", label, "", "", pose.value[0], pose.value[1], pose.value[2],
                error_mm ? fmt::format("{:.2f} mm off", *error_mm) : ""});
   };
   for (const RecognitionRecord& record : records) {
     const RecognitionStep& step = record.last();
     const std::array<std::string, 3> pose = pose_cells(pose_text(step));
     table.add({name_of(record), fmt::format("{}", record.touches), object_words(step, task),
-               fmt::format("{:.3f}", step.confidence()), pose[0], pose[1], pose[2],
-               fit_word(step)});
+               fmt::format("{:.3f}", step.confidence()), dropped_text(step), pose[0], pose[1],
+               pose[2], fit_word(step)});
     if (step.refined) {
       add_pose("  mode", task.hypotheses[step.mode.object].map.label, step.mode_T_robot_object(),
                step.error_mm);
@@ -196,7 +201,7 @@ std::string result_table(const std::vector<RecognitionRecord>& records, const Re
     if (const std::optional<Pose> truth = step.true_T_robot_object(task)) {
       add_pose("  truth", step.truth.label, *truth, step.pose_error_mm());
     } else if (step.right == false) {
-      table.add({"  truth", "", step.truth.label, "", "", "", "", "wrong object"});
+      table.add({"  truth", "", step.truth.label, "", "", "", "", "", "wrong object"});
     }
   }
   return table.text(columns) + complaints(records, task) + summary(records) +

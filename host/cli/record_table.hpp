@@ -16,7 +16,8 @@ std::string name_of(const RecognitionRecord& record);
 std::string trace_table(const RecognitionRecord& record, const RecognitionTask& task,
                         std::optional<int> columns);
 
-/// A line for each thing that is wrong with an unknown: contradicted or unlike touches, each
+/// A line for each thing that is wrong with an unknown: contradicted or unlike touches, bounds that
+/// prove less than was asked for, each
 /// warning once, and that one touch cannot tell (none).
 std::string complaints(const std::vector<RecognitionRecord>& records, const RecognitionTask& task);
 

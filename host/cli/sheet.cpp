@@ -39,6 +39,7 @@ std::vector<RecognitionSheet::Caption> captions(const RecognitionRecord& record,
     mode += last.error_mm ? "; error " + error_text(last.error_mm) + " mm" : "";
     add(printed(mode), false);
   }
+  add(unproven_sentence(last, task), true);
   const std::string misfit = misfit_sentence(last, record.touches, task);
   if (last.contradicted) {
     add("contradicted: no map explains these touches at any pose tried", true);

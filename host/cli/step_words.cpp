@@ -1,5 +1,8 @@
 #include "step_words.hpp"
 
+#include <algorithm>
+#include <cmath>
+
 #include <fmt/format.h>
 
 #include "options.hpp"
@@ -117,6 +120,39 @@ std::string single_touch_words(const RecognitionTask& task, std::size_t touches)
   }
   return "one touch cannot tell whether the object is one of the maps': the odds of (none) are "
          "about the prior's";
+}
+
+std::string dropped_text(const RecognitionStep& step) {
+  if (!step.certificate) {
+    return "";
+  }
+  const double mass = step.certificate->dropped_mass;
+  if (!(mass > 0.0)) {
+    return "0";
+  }
+  const double digit = std::pow(10.0, std::floor(std::log10(mass)));
+  // A number that has one digit keeps it, whatever the division's rounding.
+  const double rounded = digit * std::ceil(mass / digit * (1.0 - 1e-12));
+  return fmt::format("{:.1g}", std::min(rounded, 1.0));
+}
+
+std::string unproven_sentence(const RecognitionStep& step, const RecognitionTask& task) {
+  const auto* bounded = std::get_if<BoundedOptions>(&task.filter);
+  if (bounded == nullptr || !step.certificate ||
+      step.certificate->dropped_mass <= bounded->tolerance) {
+    return "";
+  }
+  const auto [low, high] = step.identity_bounds[step.best];
+  const double unproven = 100.0 * step.certificate->dropped_mass;
+  // Bounds round outwards.
+  return fmt::format(
+      "{} {:.1f} % (at least {:.1f} %, at most {:.1f} %): {} left {} % of the belief "
+      "unproven",
+      object_words(step, task), 100.0 * step.confidence(), std::floor(1000.0 * low) / 10.0,
+      std::ceil(1000.0 * high) / 10.0,
+      bounded->budget_s ? fmt::format("the budget of {:g} ms", 1e3 * *bounded->budget_s)
+                        : fmt::format("rounding"),
+      unproven >= 9.95 ? fmt::format("{:.0f}", unproven) : fmt::format("{:.2g}", unproven));
 }
 
 std::string surprise_text(const RecognitionStep& step) {

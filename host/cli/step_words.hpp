@@ -47,6 +47,13 @@ std::string misfit_sentence(const RecognitionStep& step, std::size_t touches,
 /// What to say where "(none)" was asked for and an unknown was touched once only; else "".
 std::string single_touch_words(const RecognitionTask& task, std::size_t touches);
 
+/// Dropped mass of a bounded posterior, rounded up to one digit: "3e-07"; "" without a certificate.
+std::string dropped_text(const RecognitionStep& step);
+/// What to say where a bounded posterior proves less than its tolerance asks for: the bounds of the
+/// best label's probability, how much of the belief is unproven, and the budget that ended the
+/// search. "" where it proves enough.
+std::string unproven_sentence(const RecognitionStep& step, const RecognitionTask& task);
+
 /// The surprise of the last touch in standard deviations, with its sign: "+2.3"; "" where there is
 /// none.
 std::string surprise_text(const RecognitionStep& step);

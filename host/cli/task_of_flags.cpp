@@ -189,51 +189,6 @@ WantedLattice lattice_of(const RecognitionFlags& flags, const Scene& scene,
   return {lattice.collapse_fixed(), bin_width, auto_pivot};
 }
 
-/// Whether the particle filter is asked for. Throws Error on a filter that does not exist and on
-/// flags that only the other filter reads.
-bool wants_particles(const RecognitionFlags& flags, const Scene& scene) {
-  const std::string filter = !flags.filter.empty() ? flags.filter : scene.filter.value_or("auto");
-  if (filter == "bounded") {
-    refuse_flag("--filter", filter, "not in this version yet; use histogram");
-  }
-  if (filter != "auto" && filter != "histogram" && filter != "particles") {
-    refuse_flag("--filter", filter, "not known; use histogram or particles");
-  }
-  const bool particles = filter == "particles";
-  for (const auto& [flag, given] :
-       {std::pair{"--particles", flags.particles.has_value()},
-        std::pair{"--resampling", !flags.resampling.empty()},
-        std::pair{"--augmented", flags.augmented}, std::pair{"--seed", flags.seed.has_value()}}) {
-    if (given && !particles) {
-      refuse(flag, "has no effect on --filter {}; add --filter particles", filter);
-    }
-  }
-  if (flags.memory_mib && particles) {
-    refuse("--memory-mib",
-           "has no effect on --filter particles; use --filter histogram, or fewer --particles");
-  }
-  return particles;
-}
-
-/// The particle filter's options: those that it shares with the histogram, and its flags.
-ParticleOptions particle_options(const RecognitionFlags& flags, const Scene& scene,
-                                 const HistogramOptions& histogram) {
-  ParticleOptions particles{
-      .region = histogram.lattice, .contact = histogram.contact, .augmented = flags.augmented};
-  particles.particles = flags.particles.value_or(particles.particles);
-  if (particles.particles < 1 || particles.particles > 1'000'000) {
-    refuse_flag("--particles", particles.particles, "give 1 to 1,000,000");
-  }
-  if (flags.resampling == "systematic") {
-    particles.resampling = Resampling::systematic;
-  } else if (!flags.resampling.empty() && flags.resampling != "multinomial") {
-    refuse_flag("--resampling", flags.resampling, "not known; use multinomial or systematic");
-  }
-  particles.seed = flags.seed.value_or(particles.seed);
-  set_uncertainty(flags.uncertainty, scene, flags.scene, particles);
-  return particles;
-}
-
 }  // namespace
 
 Scene scene_of(const RecognitionFlags& flags) {
@@ -256,8 +211,8 @@ void replace_array(const Scene& scene, const std::string& scene_file, const std:
 
 RecognitionTask task_of(const RecognitionFlags& flags, const Scene& scene,
                         const std::string& pressure_unit, const std::string& source,
-                        double reach_mm) {
-  const bool with_particles = wants_particles(flags, scene);
+                        double reach_mm, const HistogramNeed& need) {
+  const FilterWish wish = filter_wish(flags, scene);
   HistogramOptions histogram;
   ContactModel& contact = histogram.contact;
   contact.gamma = flags.gamma ? *flags.gamma : scene.gamma.value_or(0.1);
@@ -267,30 +222,22 @@ RecognitionTask task_of(const RecognitionFlags& flags, const Scene& scene,
   contact.classifier =
       make_classifier(pressure_unit, source, flags.threshold ? flags.threshold : scene.threshold,
                       flags.ratio ? flags.ratio : scene.ratio);
-  if (flags.memory_mib) {
-    if (*flags.memory_mib < 1) {
-      refuse_flag("--memory-mib", *flags.memory_mib, "give at least 1");
-    }
-    histogram.memory_limit_bytes = static_cast<std::uint64_t>(*flags.memory_mib) << 20;
-  }
   const std::vector<Scene::Object> objects = objects_of(flags, scene);
   std::vector<Hypothesis> hypotheses = read_maps(objects);
   const WantedLattice wanted = lattice_of(flags, scene, hypotheses, reach_mm);
   histogram.lattice = wanted.lattice;
-  if (!with_particles) {
-    set_uncertainty(flags.uncertainty, scene, hypotheses, histogram);
-  }
+  contact.prior = prior_of(objects, hypotheses, flags.prior ? flags.prior : scene.prior);
+  const ChosenFilter filter = choose_filter(wish, flags, scene, need, hypotheses, histogram);
   if (!wanted.bin_width) {
     require_within_region(flags.uncertainty, scene, flags.scene, wanted.lattice);
   }
-  contact.prior = prior_of(objects, hypotheses, flags.prior ? flags.prior : scene.prior);
-  RecognitionTask task(std::move(hypotheses),
-                       with_particles ? FilterOptions(particle_options(flags, scene, histogram))
-                                      : FilterOptions(histogram));
+  RecognitionTask task(std::move(hypotheses), filter.options);
   for (const Scene::Object& object : objects) {
     task.map_paths.push_back(object.map.string());
   }
   task.bin_width = wanted.bin_width;
+  task.auto_filter = filter.automatic;
+  task.filter_asked_for_by = filter.asked_for_by;
   task.auto_pivot = wanted.auto_pivot;
   return task;
 }
@@ -303,8 +250,10 @@ Recogniser open_recogniser(const RecognitionFlags& flags, const Scene& scene, De
                            RecognitionTask& task) {
   const bool fine = task.bin_width == BinWidth::fine;
   const std::optional<CoarsenedBins> bins = settle_bins(device, task);
+  settle_filter(task);
   require_within_region(flags.uncertainty, scene, flags.scene, task.lattice());
-  Recogniser recogniser(device, task);  // first: bins that do not fit deserve only their refusal
+  Recogniser recogniser =
+      open_filter(device, task);  // first: bins that do not fit deserve only their refusal
   if (bins) {
     fmt::print(
         stderr,

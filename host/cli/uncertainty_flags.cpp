@@ -75,6 +75,16 @@ Given slip_deg(const UncertaintyFlags& flags, const Scene& scene) {
   return {"--slip-sd-deg", "slip_sd deg", flags.slip_sd_deg, scene.slip_sd.deg};
 }
 
+/// The first of these that is above 0: its flag, or its key and the scene file.
+std::string giver_of(std::initializer_list<Given> all, const std::string& scene_file) {
+  for (const Given& sd : all) {
+    if (value_of(sd) > 0.0) {
+      return sd.by_flag ? sd.flag : fmt::format("{} in {}", sd.key, scene_file);
+    }
+  }
+  return "";
+}
+
 std::optional<double> none_weight(const UncertaintyFlags& flags, const Scene& scene,
                                   std::span<const Hypothesis> hypotheses) {
   if (flags.none ? *flags.none == "auto" : scene.auto_none) {
@@ -149,6 +159,16 @@ void set_uncertainty(const UncertaintyFlags& flags, const Scene& scene,
   if (const Given deg = slip_deg(flags, scene); deg.any()) {
     particles.motion_rad = radians(value_of(deg));
   }
+}
+
+std::string touch_sd_giver(const UncertaintyFlags& flags, const Scene& scene,
+                           const std::string& scene_file) {
+  return giver_of({touch_mm(flags, scene), touch_deg(flags, scene)}, scene_file);
+}
+
+std::string slip_sd_giver(const UncertaintyFlags& flags, const Scene& scene,
+                          const std::string& scene_file) {
+  return giver_of({slip_mm(flags, scene), slip_deg(flags, scene)}, scene_file);
 }
 
 void require_within_region(const UncertaintyFlags& flags, const Scene& scene,

@@ -37,6 +37,14 @@ void set_uncertainty(const UncertaintyFlags& flags, const Scene& scene,
 void set_uncertainty(const UncertaintyFlags& flags, const Scene& scene,
                      const std::string& scene_file, ParticleOptions& particles);
 
+/// The flag, or the key with its file, that gives a touch's pose a standard deviation above 0; ""
+/// where nothing does.
+std::string touch_sd_giver(const UncertaintyFlags& flags, const Scene& scene,
+                           const std::string& scene_file);
+/// The same of the object's slip between two touches.
+std::string slip_sd_giver(const UncertaintyFlags& flags, const Scene& scene,
+                          const std::string& scene_file);
+
 /// Refuses standard deviations wider than the region. An axis of one bin limits nothing.
 /// @param lattice with the counts that are used, or with one bin where these are not known yet
 void require_within_region(const UncertaintyFlags& flags, const Scene& scene,

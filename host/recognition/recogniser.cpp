@@ -12,10 +12,14 @@ namespace palpate {
 
 namespace {
 
-std::variant<PoseHistogram, ParticleFilter> make_filter(Device& device,
-                                                        const RecognitionTask& task) {
+using Filter = std::variant<PoseHistogram, BoundedPosterior, ParticleFilter>;
+
+Filter make_filter(Device& device, const RecognitionTask& task) {
   if (const auto* particles = std::get_if<ParticleOptions>(&task.filter)) {
     return ParticleFilter(device, task.hypotheses, *particles);
+  }
+  if (const auto* bounded = std::get_if<BoundedOptions>(&task.filter)) {
+    return BoundedPosterior(device, task.hypotheses, *bounded);
   }
   return PoseHistogram(device, task.hypotheses, std::get<HistogramOptions>(task.filter));
 }
@@ -116,7 +120,15 @@ Estimate Recogniser::estimate() const {
 }
 
 std::optional<RefinedPose> Recogniser::refine(const Mode& mode) const {
-  return histogram() != nullptr ? std::optional(histogram()->refine(mode)) : std::nullopt;
+  return std::visit(
+      [&](const auto& filter) -> std::optional<RefinedPose> {
+        if constexpr (requires { filter.refine(mode); }) {
+          return filter.refine(mode);
+        } else {
+          return {};
+        }
+      },
+      filter_);
 }
 
 std::optional<double> Recogniser::effective_sample_size() const {
@@ -127,6 +139,9 @@ std::optional<double> Recogniser::effective_sample_size() const {
 Marginals Recogniser::marginals(int object) const {
   if (histogram() != nullptr) {
     return histogram()->marginals(object);
+  }
+  if (bounded() != nullptr) {
+    return bounded()->marginals(object);
   }
   Marginals sums{.grid = lattice_,
                  .xy = std::vector<double>(static_cast<std::size_t>(lattice_.plane())),
@@ -144,6 +159,9 @@ Marginals Recogniser::marginals(int object) const {
 std::vector<PoseSample> Recogniser::sample(std::size_t count, std::uint64_t seed) const {
   if (histogram() != nullptr) {
     return histogram()->sample(count, seed);
+  }
+  if (bounded() != nullptr) {
+    return bounded()->sample(count, seed);
   }
   const std::vector<ParticleFilter::Particle> particles =
       std::get<ParticleFilter>(filter_).particles();
@@ -167,7 +185,15 @@ std::vector<PoseSample> Recogniser::sample(std::size_t count, std::uint64_t seed
 }
 
 std::uint64_t Recogniser::device_bytes() const {
-  return std::visit([](const auto& filter) { return filter.device_bytes(); }, filter_);
+  return std::visit(
+      [](const auto& filter) -> std::uint64_t {
+        if constexpr (requires { filter.device_bytes(); }) {
+          return filter.device_bytes();
+        } else {
+          return 0;
+        }
+      },
+      filter_);
 }
 
 }  // namespace palpate

@@ -11,13 +11,14 @@
 
 namespace palpate {
 
-/// The filter that a task names. Functions throw Error as those of PoseHistogram and ParticleFilter
-/// do.
+/// The filter that a task names. Functions throw Error as those of PoseHistogram, BoundedPosterior
+/// and ParticleFilter do.
 class Recogniser {
  public:
   Recogniser(Device& device, const RecognitionTask& task);
 
-  /// Forgets all touches, for the next unknown. Particles start from the same places again. An
+  /// Forgets all touches, for the next unknown. Particles start from the same places again; bounds
+  /// keep their tables. An
   /// automatic pivot returns to the robot frame's origin until a touch places it.
   void reset();
   /// Updates the belief with these touches. The first touch since reset() that has an element In
@@ -26,15 +27,16 @@ class Recogniser {
   /// `progress` is called now and then with the fraction done.
   void update(std::span<const Touch> touches, const std::function<void(double)>& progress = {});
   /// Evaluates a touch that is likely to come next; see PoseHistogram::prepare(). Does nothing
-  /// with a touch that would wait for an automatic pivot, and nothing for particles: they cannot be
-  /// weighed ahead, since weighing follows resampling and noise.
+  /// with a touch that would wait for an automatic pivot, nothing for bounds, which search only
+  /// once they are asked, and nothing for particles: they cannot be weighed ahead, since weighing
+  /// follows resampling and noise.
   void prepare(const Touch& touch);
   Estimate estimate() const;
   /// The mode's pose between the bins; empty for particles.
   std::optional<RefinedPose> refine(const Mode& mode) const;
-  /// ParticleFilter::effective_sample_size(); empty for a histogram.
+  /// ParticleFilter::effective_sample_size(); empty without particles.
   std::optional<double> effective_sample_size() const;
-  /// PoseHistogram::sample(); for particles, draws by their weights.
+  /// sample() of the histogram or of the bounded posterior; for particles, draws by their weights.
   std::vector<PoseSample> sample(std::size_t count, std::uint64_t seed) const;
   /// Whether the belief has taken in a touch since reset(). Touches that wait for an automatic
   /// pivot do not count.
@@ -48,11 +50,13 @@ class Recogniser {
   Marginals marginals(int object) const;
   /// The task's lattice about the pivot in use.
   const PoseLattice& lattice() const { return lattice_; }
-  /// Device memory held, in bytes.
+  /// Device memory held, in bytes; none by bounds, which BoundedPosterior::host_bytes() tells of.
   std::uint64_t device_bytes() const;
 
-  /// The histogram; nullptr for particles.
+  /// The histogram; nullptr where the filter is another.
   const PoseHistogram* histogram() const { return std::get_if<PoseHistogram>(&filter_); }
+  /// The bounded posterior; nullptr where the filter is another.
+  const BoundedPosterior* bounded() const { return std::get_if<BoundedPosterior>(&filter_); }
 
  private:
   /// A copy of a touch that waits for the pivot.
@@ -78,7 +82,7 @@ class Recogniser {
   std::vector<WaitingTouch> waiting_;  ///< in order; empty once the pivot is placed
   bool touched_ = false;               ///< since reset()
   std::vector<double> surprises_;      ///< since reset()
-  std::variant<PoseHistogram, ParticleFilter> filter_;
+  std::variant<PoseHistogram, BoundedPosterior, ParticleFilter> filter_;
 };
 
 }  // namespace palpate

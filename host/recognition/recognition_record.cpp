@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "contradiction_warning.hpp"
+#include "label_bounds.hpp"
 #include "nearby_fit.hpp"
 #include "palpate/error.hpp"
 #include "palpate/pose_error.hpp"
@@ -37,6 +38,12 @@ double seconds_since(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
+/// Whether bounds search beliefs that nobody asks for, to measure surprises. In very many bins the
+/// search after the first touches takes long, while that after all of them is quick.
+bool searches_for_surprise(const RecognitionTask& task) {
+  return task.bins_in_all() <= most_balanced_bins;
+}
+
 struct Updated {
   std::optional<double> surprise;  ///< of the last touch
   double seconds = 0.0;            ///< wall time without that of the surprises
@@ -46,7 +53,9 @@ struct Updated {
 Updated update(Recogniser& recogniser, const RecognitionTask& task, std::span<const Touch> touches,
                const std::function<void(double)>& progress) {
   constexpr std::uint64_t seed = 0;
-  const bool measures = recogniser.histogram() != nullptr;
+  const bool measures = !std::holds_alternative<ParticleOptions>(task.filter) &&
+                        (recogniser.bounded() == nullptr || searches_for_surprise(task) ||
+                         (recogniser.touched() && touches.size() == 1));
   // Nothing but the prior comes before the first touch.
   const std::size_t before = recogniser.touched() ? 0 : 1;
   const std::size_t one_by_one =
@@ -160,6 +169,10 @@ RecognitionStep judge(const Estimate& estimate, const GroundTruth& truth,
   }
   if (labels.back() == none_label) {
     step.identity.back() = estimate.none;
+  }
+  if (estimate.certificate) {
+    step.identity_bounds = label_bounds(estimate, step.identity, task);
+    step.certificate = estimate.certificate;
   }
   step.best = static_cast<std::size_t>(
       std::max_element(step.identity.begin(), step.identity.end()) - step.identity.begin());

@@ -41,7 +41,11 @@ bool array_is_still(std::span<const Unknown> unknowns);
 /// What the filter believes after a touch.
 struct RecognitionStep {
   std::vector<double> identity;  ///< [label] probability, summed over the maps of the label
-  std::size_t best = 0;          ///< index of the label with the largest probability
+  /// [label] bounds of `identity`, proven but for "(none)", whose evidence counts as exact
+  /// (Certificate::none_standard_error). Empty where `identity` is exact, and for particles.
+  std::vector<ProbabilityInterval> identity_bounds = {};
+  std::optional<Certificate> certificate = {};  ///< from a bounded posterior
+  std::size_t best = 0;                         ///< index of the label with the largest probability
   Mode mode;
   std::optional<RefinedPose> refined;  ///< empty for particles
   bool contradicted = false;           ///< see Estimate
@@ -61,7 +65,8 @@ struct RecognitionStep {
   /// How much the last touch surprised the belief before it; see surprise_of(). Empty for
   /// particles, for a touch without a known element, and for an unknown's first touch (so for all
   /// of
-  /// `--each-frame`), before which there is no belief but the prior.
+  /// `--each-frame`), before which there is no belief but the prior. By bounds over more than
+  /// most_balanced_bins in all also where several touches come at once.
   std::optional<double> surprise;
   std::vector<std::string> warnings;  ///< what looks wrong with the touches, in whole sentences
   double seconds = 0.0;               ///< wall time from the touch to the estimate

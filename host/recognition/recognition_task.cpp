@@ -5,6 +5,20 @@
 
 namespace palpate {
 
+namespace {
+
+/// The lattice of a filter's options, or the region where it has no bins.
+template <typename Options>
+auto& lattice_in(Options& options) {
+  if constexpr (requires { options.lattice; }) {
+    return options.lattice;
+  } else {
+    return options.region;
+  }
+}
+
+}  // namespace
+
 RecognitionTask::RecognitionTask(std::vector<Hypothesis> objects, const FilterOptions& options)
     : hypotheses(std::move(objects)), filter(options) {
   for (const Hypothesis& hypothesis : hypotheses) {
@@ -15,15 +29,24 @@ RecognitionTask::RecognitionTask(std::vector<Hypothesis> objects, const FilterOp
       labels.push_back(label);
     }
   }
-  const auto* histogram = std::get_if<HistogramOptions>(&filter);
-  if (histogram != nullptr && histogram->none_weight) {
+  const auto has_none = [](const auto& one) {
+    if constexpr (requires { one.none_weight; }) {
+      return one.none_weight.has_value();
+    } else {
+      return false;
+    }
+  };
+  if (std::visit(has_none, filter)) {
     labels.emplace_back(none_label);
   }
 }
 
 const PoseLattice& RecognitionTask::lattice() const {
-  const auto* histogram = std::get_if<HistogramOptions>(&filter);
-  return histogram != nullptr ? histogram->lattice : std::get<ParticleOptions>(filter).region;
+  return std::visit([](const auto& one) -> const PoseLattice& { return lattice_in(one); }, filter);
+}
+
+PoseLattice& RecognitionTask::lattice() {
+  return std::visit([](auto& one) -> PoseLattice& { return lattice_in(one); }, filter);
 }
 
 const ContactModel& RecognitionTask::contact() const {
@@ -35,14 +58,40 @@ DisplacementSd RecognitionTask::touch_sd() const {
   return histogram != nullptr ? histogram->touch_sd : DisplacementSd{};
 }
 
+DisplacementSd RecognitionTask::slip_sd() const {
+  const auto* histogram = std::get_if<HistogramOptions>(&filter);
+  return histogram != nullptr ? histogram->slip_sd : DisplacementSd{};
+}
+
+std::int64_t RecognitionTask::bins_in_all() const {
+  // In float64, as counts of three axes may exceed an integer.
+  const PoseLattice& bins = lattice();
+  const double all = static_cast<double>(hypotheses.size()) * bins.x_mm.count * bins.y_mm.count *
+                     bins.theta_rad.count;
+  constexpr double most = 9e18;
+  return static_cast<std::int64_t>(std::min(all, most));
+}
+
+std::optional<BoundedOptions> bounded_instead(const HistogramOptions& histogram) {
+  if (!histogram.touch_sd.none() || !histogram.slip_sd.none() || histogram.memory_limit_bytes) {
+    return {};
+  }
+  return BoundedOptions{.lattice = histogram.lattice,
+                        .contact = histogram.contact,
+                        .none_weight = histogram.none_weight};
+}
+
 std::optional<CoarsenedBins> settle_bins(const Device& device, RecognitionTask& task) {
   const std::optional<BinWidth> width = std::exchange(task.bin_width, {});
   if (!width) {
     return {};
   }
-  auto* histogram = std::get_if<HistogramOptions>(&task.filter);
+  const auto* histogram = std::get_if<HistogramOptions>(&task.filter);
   std::int64_t most = most_bins_on(device, false);
-  if (histogram != nullptr) {
+  if (std::holds_alternative<BoundedOptions>(task.filter) ||
+      (histogram != nullptr && task.auto_filter && bounded_instead(*histogram))) {
+    most = most_bounded_bins;
+  } else if (histogram != nullptr) {
     most = most_bins_on(device, histogram->still_array, histogram->memory_limit_bytes);
     if (histogram->memory_limit_bytes) {
       // One bin an object may still exceed the limit: the histogram says how much memory it needs.
@@ -50,9 +99,19 @@ std::optional<CoarsenedBins> settle_bins(const Device& device, RecognitionTask& 
     }
   }
   const BalancedLattice chosen = balanced_lattice(task.lattice(), task.hypotheses, most, *width);
-  (histogram != nullptr ? histogram->lattice : std::get<ParticleOptions>(task.filter).region) =
-      chosen.lattice;
+  task.lattice() = chosen.lattice;
   return chosen.coarsened ? std::optional(CoarsenedBins{chosen.step_mm, most}) : std::nullopt;
+}
+
+void settle_filter(RecognitionTask& task) {
+  const auto* histogram = std::get_if<HistogramOptions>(&task.filter);
+  if (!task.auto_filter || histogram == nullptr || task.bins_in_all() <= most_histogram_bins ||
+      task.bins_in_all() > most_bounded_bins) {
+    return;
+  }
+  if (const std::optional<BoundedOptions> bounded = bounded_instead(*histogram)) {
+    task.filter = *bounded;
+  }
 }
 
 }  // namespace palpate

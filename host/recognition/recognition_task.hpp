@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "palpate/balanced_lattice.hpp"
+#include "palpate/bounded_posterior.hpp"
 #include "palpate/device.hpp"
 #include "palpate/particle_filter.hpp"
 #include "palpate/pose_histogram.hpp"
@@ -15,18 +16,25 @@
 namespace palpate {
 
 /// The filter that recognises, by its options.
-using FilterOptions = std::variant<HistogramOptions, ParticleOptions>;
+using FilterOptions = std::variant<HistogramOptions, BoundedOptions, ParticleOptions>;
 
 /// The objects that an unknown may be, and the filter that tells which. The constructor derives the
-/// labels; neither the hypotheses nor the histogram's none_weight may change afterwards.
+/// labels; neither the hypotheses nor the filter's none_weight may change afterwards.
 struct RecognitionTask {
   RecognitionTask(std::vector<Hypothesis> objects, const FilterOptions& options);
 
-  /// The histogram's lattice, or the particles' region, whose bins only marginals have.
+  /// The lattice of the histogram or of the bounded posterior, or the particles' region, whose bins
+  /// only marginals have.
   const PoseLattice& lattice() const;
+  PoseLattice& lattice();
   const ContactModel& contact() const;
-  /// How far a touch may be displaced; none for particles.
+  /// How far a touch may be displaced; only a histogram allows for it.
   DisplacementSd touch_sd() const;
+  /// How far the object may move between two touches; only a histogram allows for it (the motion
+  /// noise of particles is not meant).
+  DisplacementSd slip_sd() const;
+  /// Bins of all objects together.
+  std::int64_t bins_in_all() const;
   const ContactClassifier& classifier() const { return contact().classifier; }
 
   std::vector<Hypothesis> hypotheses;
@@ -38,19 +46,45 @@ struct RecognitionTask {
   std::vector<std::string> map_paths = {};  ///< [hypothesis] file of the map; empty without files
   /// By which settle_bins() chooses the lattice's counts; none where the counts are given.
   std::optional<BinWidth> bin_width = {};
+  /// settle_filter() chooses between the histogram and bounds.
+  bool auto_filter = false;
+  /// What asked for the filter, such as a flag; "" where nothing did.
+  std::string filter_asked_for_by = {};
   /// The pivot is the array's centre at the first touch of each unknown with an element In Contact.
   bool auto_pivot = false;
 };
 
-/// Bins that are wider than the maps resolve, since the device has no memory for more.
+/// Most bins, of all objects together, for which `auto` takes the histogram. Above it, bounds
+/// answer sooner.
+inline constexpr std::int64_t most_histogram_bins = 100'000;
+
+/// Most bins, of all objects together, that settle_bins() and settle_filter() give to bounds.
+inline constexpr std::int64_t most_bounded_bins = 1'000'000'000;
+
+/// Most bins, of all objects together, for bounds that are asked for by name.
+inline constexpr std::int64_t largest_bounded_bins = 10'000'000'000;
+
+/// The options of a bounded posterior of the same bins; none where the histogram allows for
+/// something that bounds do not: touch_sd, slip_sd or a limit of its memory.
+std::optional<BoundedOptions> bounded_instead(const HistogramOptions& histogram);
+
+/// Bins that are wider than the maps resolve, to keep their number within a limit.
 struct CoarsenedBins {
   double step_mm = 0.0;        ///< along x and y
   std::int64_t most_bins = 0;  ///< limit of all objects' bins together
 };
 
-/// Chooses the lattice's counts by balanced_lattice() if the task leaves them to it (bin_width).
+/// Chooses the lattice's counts by balanced_lattice() if the task leaves them to it (bin_width). As
+/// many as the device's memory holds, or most_bounded_bins where bounds are or may become the
+/// filter.
 /// @returns the bins if they had to be coarsened
 /// @throws Error as balanced_lattice() does
 std::optional<CoarsenedBins> settle_bins(const Device& device, RecognitionTask& task);
+
+/// Chooses the filter if the task leaves it to this rule (auto_filter): of more than
+/// most_histogram_bins bins in all, bounds take the place of the histogram, unless
+/// bounded_instead() has none or there are more than most_bounded_bins. The counts are settled
+/// before.
+void settle_filter(RecognitionTask& task);
 
 }  // namespace palpate

@@ -27,11 +27,12 @@ std::size_t surprise_samples(std::size_t elements) {
 
 std::optional<double> surprise_of(const Touch& touch, std::span<const PoseSample> samples,
                                   const RecognitionTask& task) {
-  const auto* options = std::get_if<HistogramOptions>(&task.filter);
-  if (options == nullptr) {
+  if (std::holds_alternative<ParticleOptions>(task.filter)) {
     return {};
   }
-  ContactModel contact = options->contact;
+  const DisplacementSd touch_sd = task.touch_sd();
+  const DisplacementSd slip_sd = task.slip_sd();
+  ContactModel contact = task.contact();
   contact.prior = contact.prior.value_or(task.hypotheses.front().map.prior);
   std::vector<glm::dvec2> elements_mm;
   std::vector<Reading> readings;
@@ -49,17 +50,16 @@ std::optional<double> surprise_of(const Touch& touch, std::span<const PoseSample
   std::vector<glm::dvec2> centroids_mm;
   for (const Hypothesis& hypothesis : task.hypotheses) {
     maps.emplace_back(hypothesis.map, *contact.prior);
-    centroids_mm.push_back(options->slip_sd.none() ? glm::dvec2(0.0, 0.0)
-                                                   : displaced_body(hypothesis.map).centroid_mm);
+    centroids_mm.push_back(slip_sd.none() ? glm::dvec2(0.0, 0.0)
+                                          : displaced_body(hypothesis.map).centroid_mm);
   }
   Random random(seed, Stream::readings);
   ReadingMixture mixture(samples.size(), readings.size(), reading_levels(contact));
   for (std::size_t i = 0; i < samples.size(); ++i) {
     const auto object = static_cast<std::size_t>(samples[i].object);
-    const Pose slip = random_displacement(options->slip_sd, random);
+    const Pose slip = random_displacement(slip_sd, random);
     const Pose T_object_sensor = slipped(samples[i].T_object_robot, slip, centroids_mm[object]) *
-                                 touch.T_robot_sensor *
-                                 random_displacement(options->touch_sd, random);
+                                 touch.T_robot_sensor * random_displacement(touch_sd, random);
     mixture.set(
         i, reading_log_likelihoods(elements_mm, T_object_sensor, maps[object], contact, object));
   }

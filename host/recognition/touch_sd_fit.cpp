@@ -29,7 +29,7 @@ HistogramOptions histogram_of(const RecognitionTask& task, const DisplacementSd&
   const auto* histogram = std::get_if<HistogramOptions>(&task.filter);
   if (histogram == nullptr) {
     throw Error(Fault::input,
-                "fit of touch-sd: particles have no samples of exact touches; use a histogram");
+                "fit of touch-sd: needs the belief of all poses; use a histogram");
   }
   HistogramOptions options = *histogram;
   options.none_weight.reset();

@@ -347,8 +347,8 @@ TEST_F(BadInput, UnknownFlag) {
 }
 
 TEST_F(BadInput, FilterThatIsNotThere) {
-  expect_refused(with(recognize, {"--filter", "kalman"}), {"--filter kalman", "use histogram"});
-  expect_refused(with(recognize, {"--filter", "bounded"}), {"--filter bounded", "use histogram"});
+  expect_refused(with(recognize, {"--filter", "kalman"}),
+                 {"--filter kalman", "histogram", "bounded"});
 }
 
 TEST_F(BadInput, FlagsOfTheOtherFilter) {

@@ -12,7 +12,7 @@ namespace {
 
 TEST(LiveRecognition, BelievesOfAStreamWhatRecogniseDoesOfItsTouches) {
   Device device = Device::open();
-  const RecognitionTask task(shapes(), both_filters()[0]);
+  const RecognitionTask task(shapes(), every_filter()[0]);
   Recogniser recogniser(device, task);
   const std::unique_ptr<Sensor> sensor =
       open_virtual_sensor("simulate:L,touches=4,speed=max,object=1:-2:40,seed=3");

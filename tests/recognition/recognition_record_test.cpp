@@ -43,7 +43,7 @@ TEST(Recognise, MakesABrokenUnknownARecordAndTheOthersAreRight) {
                                       unreadable,
                                       {.recording = "empty"},
                                       unknown_of(disc)};
-  for (const FilterOptions& filter : both_filters()) {
+  for (const FilterOptions& filter : every_filter()) {
     const RecognitionTask task(shapes(), filter);
     Recogniser recogniser(device, task);
     for (const bool trace : {false, true}) {
@@ -71,7 +71,7 @@ TEST(Recognise, MakesABrokenUnknownARecordAndTheOthersAreRight) {
 TEST(Recognise, EndsItsTraceWithTheSameBits) {
   Device device = Device::open();
   const Recording letter = touched_letter(7);
-  for (const FilterOptions& filter : both_filters()) {
+  for (const FilterOptions& filter : every_filter()) {
     const RecognitionTask task(shapes(), filter);
     Recogniser recogniser(device, task);
     expect_same(recognise(recogniser, task, unknown_of(letter), true),
@@ -81,7 +81,7 @@ TEST(Recognise, EndsItsTraceWithTheSameBits) {
 
 TEST(Recognise, SaysHowFarItIsAndCanBeLeft) {
   Device device = Device::open();
-  const RecognitionTask task(shapes(), both_filters()[1]);
+  const RecognitionTask task(shapes(), every_filter()[1]);
   Recogniser recogniser(device, task);
   const Recording recording = touched_letter(8);
   for (const bool trace : {false, true}) {
@@ -109,7 +109,7 @@ bool on_cross(const glm::dvec2& p_mm) {
 TEST(Recognise, SaysWhatFitsAndWhatDoesNot) {
   Device device = Device::open();
   Recording cross = touches_of(on_cross, {{1.0, -2.0}, 0.4}, 30, 21);
-  for (const FilterOptions& filter : both_filters()) {
+  for (const FilterOptions& filter : every_filter()) {
     const RecognitionTask task(shapes(), filter);
     Recogniser recogniser(device, task);
     for (const Recording& learned : {touched_letter(22), touched_disc(23)}) {
@@ -120,7 +120,7 @@ TEST(Recognise, SaysWhatFitsAndWhatDoesNot) {
     EXPECT_EQ(fit.verdict, Verdict::does_not_fit) << "z = " << fit.z;
   }
   std::fill(cross.pressure.begin(), cross.pressure.end(), 2.0);
-  const RecognitionTask task(shapes(), both_filters()[0]);
+  const RecognitionTask task(shapes(), every_filter()[0]);
   Recogniser recogniser(device, task);
   EXPECT_FALSE(recognise(recogniser, task, unknown_of(cross), false).last().fit)
       << "all at the threshold: nothing is known";
@@ -128,7 +128,7 @@ TEST(Recognise, SaysWhatFitsAndWhatDoesNot) {
 
 TEST(Recognise, SaysNothingOfTheFitWhereNothingWasTouched) {
   Device device = Device::open();
-  for (const FilterOptions& filter : both_filters()) {
+  for (const FilterOptions& filter : every_filter()) {
     const RecognitionTask task(shapes(), filter);
     Recogniser recogniser(device, task);
     Recording recording = touched_letter(25);
@@ -145,7 +145,7 @@ TEST(Recognise, SaysNothingOfTheFitWhereNothingWasTouched) {
 TEST(Recognise, FitsTheAveragedLikelihoodWhereTouchesMayBeDisplaced) {
   Device device = Device::open();
   const Recording recording = touched_letter(26);
-  HistogramOptions filter = std::get<HistogramOptions>(both_filters()[0]);
+  HistogramOptions filter = std::get<HistogramOptions>(every_filter()[0]);
   filter.touch_sd = {.mm = 1.0, .rad = 0.05};
   const RecognitionTask task(shapes(), filter);
   Recogniser recogniser(device, task);
@@ -159,7 +159,7 @@ TEST(Recognise, FitsTheAveragedLikelihoodWhereTouchesMayBeDisplaced) {
 TEST(Recognise, FitsTheBestLearnedObjectAtThePoseThatItReports) {
   Device device = Device::open();
   const Recording recording = touched_letter(24);
-  HistogramOptions filter = std::get<HistogramOptions>(both_filters()[0]);
+  HistogramOptions filter = std::get<HistogramOptions>(every_filter()[0]);
   filter.none_weight = 1e300;
   filter.contact.gamma = 0.2;
   const RecognitionTask task(shapes(), filter);
@@ -234,7 +234,7 @@ TEST(Judge, FindsNoErrorOfAnObjectWithoutABody) {
 
 TEST(TakeStep, JudgesTheRefinedPoseToo) {
   Device device = Device::open();
-  const RecognitionTask task(shapes(), both_filters()[0]);
+  const RecognitionTask task(shapes(), every_filter()[0]);
   Recogniser recogniser(device, task);
   const Recording letter = touched_letter(9);
   const Unknown unknown = unknown_of(letter);

@@ -28,9 +28,10 @@ std::vector<Hypothesis> shapes() {
   return hypotheses;
 }
 
-std::vector<FilterOptions> both_filters() {
+std::vector<FilterOptions> every_filter() {
   const PoseLattice lattice{.x_mm = {-5.0, 5.0, 20}, .y_mm = {-5.0, 5.0, 20}};
-  return {HistogramOptions{.lattice = lattice}, ParticleOptions{.region = lattice}};
+  return {HistogramOptions{.lattice = lattice}, ParticleOptions{.region = lattice},
+          BoundedOptions{.lattice = lattice}};
 }
 
 Recording touched_letter(std::uint64_t seed) { return touched(on_letter_l, "L", seed); }

@@ -1,0 +1,58 @@
+#include "label_bounds.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+namespace palpate {
+
+namespace {
+
+constexpr double log_zero = -std::numeric_limits<double>::infinity();
+
+/// log(exp(a) + exp(b))
+double log_sum(double a, double b) {
+  const double most = std::max(a, b);
+  return most == log_zero ? log_zero : most + std::log1p(std::exp(std::min(a, b) - most));
+}
+
+/// exp(a) / (exp(a) + exp(b)); 0 where both are 0
+double share(double a, double b) { return a == log_zero ? 0.0 : 1.0 / (1.0 + std::exp(b - a)); }
+
+}  // namespace
+
+std::vector<ProbabilityInterval> label_bounds(const Estimate& estimate,
+                                              std::span<const double> identity,
+                                              const RecognitionTask& task) {
+  const std::vector<LogInterval>& evidence = estimate.certificate->log_evidence;
+  std::vector<LogInterval> of_label(task.labels.size(), {log_zero, log_zero});
+  double known = log_zero;  // evidence that the probabilities are of: dropped bins count as 0
+  for (std::size_t h = 0; h < evidence.size(); ++h) {
+    LogInterval& sum = of_label[task.label_of[h]];
+    sum.low = log_sum(sum.low, evidence[h].low);
+    sum.high = log_sum(sum.high, evidence[h].high);
+    known = log_sum(known, evidence[h].low);
+  }
+  if (task.labels.back() == none_label) {
+    const double learned = std::accumulate(estimate.identity.begin(), estimate.identity.end(), 0.0);
+    const double none = known + std::log(estimate.none) - std::log(learned);
+    of_label.back() = {none, none};
+  }
+  std::vector<ProbabilityInterval> bounds;
+  for (std::size_t i = 0; i < of_label.size(); ++i) {
+    LogInterval others{log_zero, log_zero};
+    for (std::size_t j = 0; j < of_label.size(); ++j) {
+      if (j != i) {
+        others.low = log_sum(others.low, of_label[j].low);
+        others.high = log_sum(others.high, of_label[j].high);
+      }
+    }
+    // The probability itself is rounded, too.
+    bounds.push_back({std::min(share(of_label[i].low, others.high), identity[i]),
+                      std::max(share(of_label[i].high, others.low), identity[i])});
+  }
+  return bounds;
+}
+
+}  // namespace palpate

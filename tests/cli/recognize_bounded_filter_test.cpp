@@ -1,0 +1,326 @@
+// recognize and live by bounds: --filter bounded, its flags and refusals, and how --filter auto
+// chooses.
+
+#include <gmock/gmock.h>
+
+#include <cmath>
+#include <sstream>
+
+#include "program.hpp"
+#include "sample_files.hpp"
+
+namespace palpate {
+namespace {
+
+using nlohmann::json;
+using testing::HasSubstr;
+using testing::Not;
+using Arguments = std::vector<std::string>;
+
+class BoundedFilter : public ProgramTest {
+ protected:
+  BoundedFilter() {
+    std::filesystem::create_directory(folder_ / "maps");
+    write_map(folder_ / "maps/A.map.h5", sample_map("A"));
+    write_map(folder_ / "maps/I.map.h5", sample_map("I"));
+    write_recording(folder_ / "u.h5", sample_unknown("A", {{2.0, -3.0}, 1.0}, 6));
+  }
+
+  static Arguments with(Arguments flags) {
+    flags.insert(flags.begin(), {"u.h5", "--maps", "maps", "--bins=12x12x16"});
+    return flags;
+  }
+  /// The record of u.h5 on a small lattice.
+  json u(const Arguments& flags) const { return record(with(flags)); }
+  json bounded(Arguments flags = {}) const {
+    flags.insert(flags.end(), {"--filter", "bounded"});
+    return u(flags);
+  }
+  void refused(Arguments flags, const Arguments& named) const {
+    flags = with(flags);
+    flags.insert(flags.begin(), "recognize");
+    expect_refused(flags, named);
+  }
+  void scene(const std::string& yaml) const { put_bytes(folder_ / "scene.yaml", yaml); }
+  /// What --verbose says of u.h5.
+  std::string engine(Arguments flags) const {
+    flags.insert(flags.begin(), {"recognize", "u.h5", "--maps", "maps", "--verbose"});
+    const Outcome outcome = palpate(flags);
+    EXPECT_EQ(outcome.status, 0) << outcome.err;
+    return outcome.err;
+  }
+};
+
+/// The laws of what bounds say of a step.
+void expect_lawful(const json& step) {
+  const json& bounds = step.at("identity_bounds");
+  const double dropped = step.at("dropped_mass").get<double>();
+  EXPECT_GE(dropped, 0.0);
+  EXPECT_LE(dropped, 1.0);
+  ASSERT_EQ(bounds.size(), step.at("identity").size());
+  double low = 0.0;
+  double sum = 0.0;
+  double high = 0.0;
+  for (const auto& [label, probability] : step.at("identity").items()) {
+    const auto p = probability.get<double>();
+    ASSERT_EQ(bounds.at(label).size(), 2u);
+    EXPECT_GE(bounds[label][0].get<double>(), 0.0);
+    EXPECT_LE(bounds[label][0].get<double>(), p) << label;
+    EXPECT_GE(bounds[label][1].get<double>(), p) << label;
+    EXPECT_LE(bounds[label][1].get<double>(), 1.0);
+    low += bounds[label][0].get<double>();
+    sum += p;
+    high += bounds[label][1].get<double>();
+  }
+  EXPECT_NEAR(sum, 1.0, 1e-12) << "of a few float64";
+  EXPECT_LE(low, 1.0 + 1e-12);
+  EXPECT_GE(high, 1.0 - 1e-12);
+  EXPECT_GT(step.at("bins_evaluated").get<std::int64_t>(), 0);
+  EXPECT_GE(step.at("blocks_bounded").get<std::int64_t>(), 0);
+  EXPECT_TRUE(step.at("mode_certain").is_boolean());
+}
+
+TEST_F(BoundedFilter, AgreesWithTheHistogram) {
+  const json dense = u({"--filter", "histogram", "--trace"});
+  const json r = bounded({"--trace"});
+  ASSERT_EQ(r["trace"].size(), dense["trace"].size());
+  for (std::size_t i = 0; i < r["trace"].size(); ++i) {
+    const json& step = r["trace"][i];
+    const json& other = dense["trace"][i];
+    EXPECT_EQ(step["best"], other["best"]);
+    EXPECT_EQ(step["mode"]["object"], other["mode"]["object"]);
+    for (const char* field : {"x_mm", "y_mm", "theta_rad"}) {
+      // The same bin: the device's angles are in float32.
+      EXPECT_NEAR(step["mode"][field].get<double>(), other["mode"][field].get<double>(), 1e-6);
+      // Fitted to logs that differ by the histogram's rounding, some 1e-5 nats.
+      EXPECT_NEAR(step["refined"][field].get<double>(), other["refined"][field].get<double>(),
+                  1e-3);
+    }
+    for (const char* label : {"A", "I"}) {
+      // The tolerance, and the histogram's float32.
+      EXPECT_NEAR(step["identity"][label].get<double>(), other["identity"][label].get<double>(),
+                  3e-5);
+    }
+    EXPECT_EQ(step.contains("fit"), other.contains("fit"));
+    EXPECT_EQ(step.contains("surprise"), other.contains("surprise"));
+    EXPECT_FALSE(other.contains("dropped_mass")) << "exact";
+    EXPECT_FALSE(other.contains("identity_bounds"));
+  }
+  EXPECT_EQ(r["right"], true);
+  EXPECT_TRUE(r["device"].is_string());
+}
+
+TEST_F(BoundedFilter, SaysWhatItProves) {
+  const json r = bounded({"--trace"});
+  expect_lawful(r);
+  EXPECT_LE(r["dropped_mass"].get<double>(), 1e-6) << "the default tolerance";
+  for (const json& step : r["trace"]) {
+    expect_lawful(step);
+  }
+  EXPECT_FALSE(r.contains("none_standard_error"));
+  EXPECT_LE(bounded({"--tolerance", "1e-3"})["dropped_mass"].get<double>(), 1e-3);
+  const json with_evidence = bounded({"--evidence-nats", "0.01"});
+  expect_lawful(with_evidence);
+  for (const auto& [label, bounds] : with_evidence["identity_bounds"].items()) {
+    const auto log_odds = [](double p) { return std::log(p) - std::log1p(-p); };
+    if (bounds[0].get<double>() > 0.0 && bounds[1].get<double>() < 1.0) {
+      // Both the label's evidence and the others' lie within 0.01 nats.
+      EXPECT_LE(log_odds(bounds[1]) - log_odds(bounds[0]), 0.0201) << label;
+    }
+  }
+}
+
+TEST_F(BoundedFilter, IsRightWithinAnyBudget) {
+  // However little the budget buys, the answer's bounds hold the histogram's.
+  const json dense = u({"--filter", "histogram"});
+  const json r = bounded({"--budget-ms", "0.01"});
+  expect_lawful(r);
+  for (const char* label : {"A", "I"}) {
+    const auto p = dense["identity"][label].get<double>();
+    // The histogram rounds in float32.
+    EXPECT_LE(r["identity_bounds"][label][0].get<double>(), p + 3e-5);
+    EXPECT_GE(r["identity_bounds"][label][1].get<double>(), p - 3e-5);
+  }
+}
+
+TEST_F(BoundedFilter, TakesEachFrameByItself) {
+  const json frames = records(with({"--filter", "bounded", "--each-frame", "--frames=0:2"}));
+  ASSERT_EQ(frames.size(), 2u);
+  for (std::size_t i = 0; i < 2; ++i) {
+    expect_lawful(frames[i]);
+    const json alone = bounded({"--frames", std::to_string(i) + ":" + std::to_string(i + 1)});
+    EXPECT_EQ(frames[i]["identity"], alone["identity"]);
+    EXPECT_EQ(frames[i]["mode"], alone["mode"]);
+  }
+}
+
+TEST_F(BoundedFilter, IsAskedForByASceneToo) {
+  const auto comparable = [](json r) {
+    r.erase("seconds");
+    return r;
+  };
+  const json wanted = comparable(bounded());
+  scene("filter: bounded\n");
+  EXPECT_EQ(comparable(u({"--scene", "scene.yaml"})), wanted);
+  EXPECT_FALSE(u({"--scene", "scene.yaml", "--filter", "histogram"}).contains("dropped_mass"));
+  EXPECT_FALSE(u({"--scene", "scene.yaml", "--filter", "auto"}).contains("dropped_mass"));
+  scene("filter: auto\n");
+  EXPECT_FALSE(u({"--scene", "scene.yaml"}).contains("dropped_mass"));
+  scene("filter: bounded\ntouch_sd: {mm: 1}\n");
+  refused({"--scene", "scene.yaml"},
+          {"touch_sd mm in scene.yaml", "exact", "leave it out", "filter: bounded in scene.yaml"});
+  EXPECT_TRUE(u({"--scene", "scene.yaml", "--touch-sd-mm", "0"}).contains("dropped_mass"))
+      << "exact after all";
+  scene("filter: histogram\n");
+  refused({"--scene", "scene.yaml", "--tolerance", "0.1"}, {"--tolerance", "has no effect"});
+}
+
+TEST_F(BoundedFilter, RefusesWhatNeedsTheHistogram) {
+  for (const Arguments& asks : {Arguments{"--filter", "bounded"}, Arguments{"--tolerance", "1e-3"},
+                                Arguments{"--budget-ms", "9"}, Arguments{"--evidence-nats", "1"}}) {
+    const std::string by = asks.front() == "--filter" ? "--filter bounded" : asks.front();
+    for (const auto& [flag, value, why] : {std::tuple{"--slip-sd-mm", "0.5", "at rest"},
+                                           {"--slip-sd-deg", "3", "at rest"},
+                                           {"--touch-sd-mm", "0.5", "exact"},
+                                           {"--touch-sd-deg", "3", "exact"},
+                                           {"--posterior", "p.h5", "every bin"},
+                                           {"--memory-mib", "100", "has no effect"}}) {
+      Arguments flags = asks;
+      flags.insert(flags.end(), {flag, value});
+      refused(flags, {std::string(flag) + ": ", std::string(why) == "at rest" ? "rest" : why,
+                      "leave it out, or " + by});
+    }
+    Arguments fit = asks;
+    fit.emplace_back("--fit-touch-sd");
+    refused(fit, {"--fit-touch-sd", "leave it out, or " + by});
+    Arguments plan{"plan", "u.h5", "--maps", "maps", "--candidates", "grid"};
+    plan.insert(plan.end(), asks.begin(), asks.end());
+    expect_refused(plan, {by + ": ", "a plan needs the belief of all poses", "leave it out"});
+    Arguments live{"live", "--sensor", "simulate:A", "--maps", "maps", "--plan", "both"};
+    live.insert(live.end(), asks.begin(), asks.end());
+    expect_refused(live, {"--plan: ", "a plan needs the belief of all poses", by});
+  }
+  refused({"--filter", "bounded", "--particles", "9"}, {"--particles", "--filter particles"});
+}
+
+TEST_F(BoundedFilter, ItsFlagsAreRefusedBesideOtherFilters) {
+  for (const char* flag : {"--tolerance=0.1", "--budget-ms=5", "--evidence-nats=1"}) {
+    const std::string name = std::string(flag).substr(0, std::string(flag).find('='));
+    for (const char* filter : {"histogram", "particles"}) {
+      refused({flag, "--filter", filter}, {name + ": has no effect on --filter " + filter,
+                                           "use --filter bounded, or leave it out"});
+    }
+  }
+}
+
+TEST_F(BoundedFilter, RefusesValuesOutOfRange) {
+  for (const char* value : {"0", "1", "-1e-3", "2", "nan"}) {
+    refused({"--tolerance", value}, {"--tolerance", "between 0 and 1"});
+  }
+  for (const char* flag : {"--budget-ms", "--evidence-nats"}) {
+    for (const char* value : {"0", "-1", "nan", "inf"}) {
+      refused({std::string(flag) + "=" + value}, {flag, "above 0"});
+    }
+  }
+}
+
+// Two maps: 224 x 224 bins of each are 100,352, more than the rule's 100,000.
+TEST_F(BoundedFilter, AutoTakesItForManyBins) {
+  const Arguments many{"--bins=224x224x1"};
+  const Arguments few{"--bins=223x224x1"};
+  EXPECT_THAT(engine(many), HasSubstr("filter: bounded, "));
+  EXPECT_THAT(engine(many), HasSubstr("100352 bins in all, more than 100000"));
+  EXPECT_THAT(engine(few), HasSubstr("filter: histogram in "));
+  EXPECT_THAT(engine(few), HasSubstr("99904 bins in all, at most 100000"));
+  for (const Arguments& needs :
+       {Arguments{"--touch-sd-mm", "0.5"}, Arguments{"--slip-sd-mm", "0.5"},
+        Arguments{"--memory-mib", "500"}, Arguments{"--posterior", "p.h5"}}) {
+    Arguments flags = many;
+    flags.insert(flags.end(), needs.begin(), needs.end());
+    EXPECT_THAT(engine(flags), HasSubstr("filter: histogram in "));
+    EXPECT_THAT(engine(flags), HasSubstr("asked for by " + needs.front()));
+  }
+  Arguments explicitly = many;
+  explicitly.insert(explicitly.end(), {"--filter", "histogram"});
+  EXPECT_THAT(engine(explicitly), HasSubstr("filter: histogram in "));
+  Arguments proven = few;
+  proven.insert(proven.end(), {"--tolerance", "1e-3", "--budget-ms", "60000"});
+  EXPECT_THAT(engine(proven), HasSubstr("filter: bounded, "));
+  EXPECT_THAT(engine(proven), HasSubstr("tolerance 0.001, budget 60000 ms"));
+  EXPECT_THAT(engine(proven), HasSubstr("asked for by --tolerance"));
+}
+
+TEST_F(BoundedFilter, AutoNamesTheFlagThatKeepsALargeLatticeFromIt) {
+  for (const Arguments& flags :
+       {Arguments{"--touch-sd-mm=0.5"}, Arguments{"--slip-sd-deg=2"}, Arguments{"--memory-mib=9"},
+        Arguments{"--posterior=p.h5"}, Arguments{"--filter=histogram"}}) {
+    const std::string name = flags[0].starts_with("--filter")
+                                 ? "--filter histogram"
+                                 : flags[0].substr(0, flags[0].find('='));
+    Arguments call{"recognize", "u.h5", "--maps", "maps", "--bins=4000x4000x300"};
+    call.insert(call.end(), flags.begin(), flags.end());
+    expect_refused(call, {"MiB", "or leave out " + name + ": --filter bounded"});
+  }
+  expect_refused({"recognize", "u.h5", "--maps", "maps", "--bins=4000x4000x300",
+                  "--filter=histogram", "--slip-sd-deg=2"},
+                 {"leave out --slip-sd-deg and --filter histogram"});
+}
+
+TEST_F(BoundedFilter, HasALargestLattice) {
+  expect_refused(
+      {"recognize", "u.h5", "--maps", "maps", "--bins=100000x100000x2", "--filter", "bounded"},
+      {"40000000000 pose bins in all", "at most 10000000000", "fewer bins"});
+}
+
+TEST_F(BoundedFilter, PeopleReadTheCertificate) {
+  const Outcome outcome = palpate(
+      {"recognize", "u.h5", "--maps", "maps", "--bins=12x12x16", "--filter", "bounded", "--trace"});
+  EXPECT_EQ(outcome.status, 0) << outcome.err;
+  const std::size_t first = outcome.out.find("dropped");
+  ASSERT_NE(first, std::string::npos) << outcome.out;
+  EXPECT_NE(outcome.out.find("dropped", first + 1), std::string::npos)
+      << "in the trace and in the table";
+  EXPECT_THAT(outcome.out, HasSubstr("12 x 12 x 16 bins each by bounds, on "));
+  EXPECT_THAT(outcome.out, Not(HasSubstr("unproven")));
+  const Outcome dense =
+      palpate({"recognize", "u.h5", "--maps", "maps", "--bins=12x12x16", "--trace"});
+  EXPECT_THAT(dense.out, Not(HasSubstr("dropped")));
+  EXPECT_THAT(dense.out, Not(HasSubstr("by bounds")));
+}
+
+TEST_F(BoundedFilter, IsDrawn) {
+  bounded({"--png", "sheets"});
+  EXPECT_GT(std::filesystem::file_size(folder_ / "sheets/u.png"), 10'000U)
+      << "a picture of three panels";
+}
+
+TEST_F(BoundedFilter, RecognisesLive) {
+  done({"record", "--sensor", "simulate:A,rate=100,seed=3,object=random,touches=4,speed=max", "-o",
+        "frames.h5"});
+  const Arguments shared{"--maps", "maps", "--bins=12x12x16", "--filter", "bounded"};
+  Arguments live{"live", "--sensor", "replay:frames.h5,speed=max", "--json", "live.jsonl"};
+  live.insert(live.end(), shared.begin(), shared.end());
+  const Outcome outcome = palpate(live);
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_THAT(outcome.out, HasSubstr("prob.  dropped"));
+  done({"touches", "frames.h5", "-o", "touches.h5"});
+  Arguments recognize{"touches.h5", "--trace"};
+  recognize.insert(recognize.end(), shared.begin(), shared.end());
+  const json trace = record(recognize)["trace"];
+  std::istringstream lines(bytes_of(folder_ / "live.jsonl"));
+  for (const json& step : trace) {
+    std::string line;
+    ASSERT_TRUE(std::getline(lines, line));
+    const json touch = json::parse(line);
+    expect_lawful(touch);
+    // Nothing is evaluated ahead: the same numbers.
+    for (const char* field : {"identity", "mode", "refined", "dropped_mass", "identity_bounds",
+                              "bins_evaluated", "blocks_bounded"}) {
+      EXPECT_EQ(touch.at(field), step.at(field)) << field;
+    }
+  }
+  EXPECT_EQ(trace.size(), 4u);
+}
+
+}  // namespace
+}  // namespace palpate

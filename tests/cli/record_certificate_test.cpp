@@ -1,0 +1,124 @@
+// What people and programs read of a bounded posterior's certificate, from records filled by hand.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "live_record.hpp"
+#include "record_output.hpp"
+#include "record_table.hpp"
+#include "sample_files.hpp"
+#include "sheet.hpp"
+#include "step_words.hpp"
+
+namespace palpate::cli {
+namespace {
+
+using testing::HasSubstr;
+using testing::Not;
+
+RecognitionTask task_with(std::optional<double> budget_s) {
+  RecognitionTask task({{sample_map("A")}, {sample_map("I")}},
+                       BoundedOptions{.tolerance = 1e-4, .budget_s = budget_s});
+  task.map_paths = {"A.map.h5", "I.map.h5"};
+  return task;
+}
+
+/// A record whose bounds leave so much of the belief unproven.
+RecognitionRecord record_of(double dropped_mass, std::vector<ProbabilityInterval> bounds) {
+  RecognitionStep step{.identity = {0.62, 0.38},
+                       .identity_bounds = std::move(bounds),
+                       .certificate = Certificate{.dropped_mass = dropped_mass,
+                                                  .blocks_bounded = 70'000,
+                                                  .bins_evaluated = 1234},
+                       .mode = {.object = 0, .log_likelihood = -30.0}};
+  return {.recording = "/data/mug.h5", .frame = {}, .touches = 2, .trace = {step, step}};
+}
+
+TEST(DroppedText, RoundsUpToOneDigit) {
+  const auto text = [](double mass) { return dropped_text(record_of(mass, {{}, {}}).last()); };
+  EXPECT_EQ(text(0.0), "0");
+  EXPECT_EQ(text(1e-6), "1e-06");
+  EXPECT_EQ(text(2.01e-7), "3e-07");
+  EXPECT_EQ(text(9.3e-8), "1e-07");
+  EXPECT_EQ(text(0.05), "0.05");
+  EXPECT_EQ(text(0.97), "1");
+  EXPECT_EQ(text(1.0), "1");
+  for (double mass = 1e-9; mass <= 1.0; mass *= 1.37) {
+    EXPECT_GE(std::stod(text(mass)), mass * (1.0 - 1e-9));
+    EXPECT_LE(std::stod(text(mass)), 2.0 * mass);
+  }
+  EXPECT_EQ(dropped_text(RecognitionStep{}), "") << "of another filter";
+}
+
+TEST(UnprovenSentence, SaysTheBoundsAndWhatEndedTheSearch) {
+  const RecognitionRecord wide = record_of(0.9697, {{0.0313, 0.99997}, {0.00003, 0.9687}});
+  EXPECT_EQ(unproven_sentence(wide.last(), task_with(0.1)),
+            "A 62.0 % (at least 3.1 %, at most 100.0 %): the budget of 100 ms left 97 % of the "
+            "belief unproven");
+  EXPECT_EQ(unproven_sentence(record_of(0.0123, {{0.6, 0.65}, {0.35, 0.4}}).last(), task_with({})),
+            "A 62.0 % (at least 60.0 %, at most 65.0 %): rounding left 1.2 % of the belief "
+            "unproven");
+  EXPECT_EQ(unproven_sentence(record_of(1e-4, {{}, {}}).last(), task_with(0.1)), "")
+      << "the tolerance holds";
+  EXPECT_EQ(unproven_sentence(wide.last(), RecognitionTask({{sample_map("A")}, {sample_map("I")}},
+                                                           HistogramOptions{})),
+            "");
+}
+
+TEST(Certificate, IsSaidWhereProbabilitiesAre) {
+  const RecognitionTask task = task_with(0.1);
+  const RecognitionRecord wide = record_of(0.97, {{0.03, 1.0}, {0.0, 0.97}});
+  const std::string sentence = unproven_sentence(wide.last(), task);
+  const std::string table = result_table({wide}, task, {});
+  EXPECT_THAT(table, HasSubstr("prob.  dropped"));
+  EXPECT_THAT(table, HasSubstr("0.620        1"));
+  EXPECT_THAT(table, HasSubstr("mug.h5: " + sentence + "\n"));
+  EXPECT_THAT(trace_table(wide, task, {}), HasSubstr("0.620        1"));
+
+  LiveState state;
+  state.touches = 2;
+  LiveTouch& touch = state.last.emplace();
+  touch.touch.T_robot_sensor = Pose{};
+  touch.step = wide.last();
+  EXPECT_THAT(summary(state, {}, task), HasSubstr("\n" + sentence + "\n"));
+  EXPECT_THAT(table_heading(task), HasSubstr("prob.  dropped"));
+  EXPECT_THAT(table_line(*state.last, task), HasSubstr("0.620        1"));
+  const std::string heading = table_heading(task);
+  EXPECT_EQ(table_line(*state.last, task).find(" 0.00 "), heading.find("x mm") - 1)
+      << "columns stand below their names\n"
+      << heading;
+
+  const Recording touches = sample_unknown("A", {}, 2);
+  const RecognitionSheet sheet = sheet_of(wide, unknown_of(touches), task, {});
+  const auto caption =
+      std::ranges::find(sheet.captions, sentence, &RecognitionSheet::Caption::text);
+  ASSERT_NE(caption, sheet.captions.end());
+  EXPECT_TRUE(caption->alarm);
+
+  const RecognitionRecord narrow = record_of(2e-7, {{0.62, 0.62}, {0.38, 0.38}});
+  EXPECT_THAT(result_table({narrow}, task, {}), HasSubstr("0.620    2e-07"));
+  EXPECT_THAT(result_table({narrow}, task, {}), Not(HasSubstr("unproven")));
+  EXPECT_EQ(sheet_of(narrow, unknown_of(touches), task, {}).captions.size() + 1,
+            sheet.captions.size());
+}
+
+TEST(Certificate, IsInTheJson) {
+  const RecognitionTask task = task_with(0.1);
+  RecognitionRecord record = record_of(0.97, {{0.03, 1.0}, {0.0, 0.97}});
+  const nlohmann::json json = to_json(record, task, "a device", true);
+  for (const nlohmann::json& step : {json, json["trace"][0]}) {
+    EXPECT_EQ(step["dropped_mass"], 0.97);
+    EXPECT_EQ(step["identity_bounds"], nlohmann::json({{"A", {0.03, 1.0}}, {"I", {0.0, 0.97}}}));
+    EXPECT_EQ(step["bins_evaluated"], 1234);
+    EXPECT_EQ(step["blocks_bounded"], 70'000);
+    EXPECT_EQ(step["mode_certain"], false);
+    EXPECT_FALSE(step.contains("none_standard_error"));
+  }
+  record.trace.back().certificate->none_standard_error = 0.01;
+  EXPECT_EQ(to_json(record.last(), task)["none_standard_error"], 0.01);
+  record.trace.back().certificate.reset();
+  EXPECT_FALSE(to_json(record.last(), task).contains("dropped_mass"));
+}
+
+}  // namespace
+}  // namespace palpate::cli

@@ -1,0 +1,146 @@
+// The bounds of labels from the bounds of their hypotheses' evidence.
+
+#include "label_bounds.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+#include "recognition_record.hpp"
+#include "shapes.hpp"
+#include "synthetic.hpp"
+
+namespace palpate {
+namespace {
+
+/// Maps of L, disc and L again: labels L and disc, and with a weight "(none)".
+RecognitionTask three_maps(std::optional<double> none_weight) {
+  std::vector<Hypothesis> maps = shapes();
+  maps.push_back(maps[0]);
+  return {maps, BoundedOptions{.none_weight = none_weight}};
+}
+
+/// Evidence of three hypotheses and of none, as a filter that evaluated the lows tells it.
+Estimate estimate_of(const std::vector<LogInterval>& evidence, double none) {
+  Estimate estimate;
+  double total = none;
+  for (const LogInterval& one : evidence) {
+    total += std::exp(one.low);
+  }
+  for (const LogInterval& one : evidence) {
+    estimate.identity.push_back(std::exp(one.low) / total);
+  }
+  estimate.none = none / total;
+  estimate.certificate = Certificate{.log_evidence = evidence};
+  return estimate;
+}
+
+TEST(LabelBounds, AreTheProbabilitiesWhereTheEvidenceIsExact) {
+  const RecognitionTask task = three_maps({});
+  const RecognitionStep step =
+      judge(estimate_of({{-3.0, -3.0}, {-2.0, -2.0}, {-4.0, -4.0}}, 0.0), {}, task);
+  ASSERT_EQ(step.identity_bounds.size(), 2u);
+  for (std::size_t i = 0; i < 2; ++i) {
+    // Sums of three logs in float64.
+    EXPECT_NEAR(step.identity_bounds[i].low, step.identity[i], 1e-14);
+    EXPECT_NEAR(step.identity_bounds[i].high, step.identity[i], 1e-14);
+  }
+}
+
+TEST(LabelBounds, OfOneLabelAreCertain) {
+  RecognitionTask task({shapes()[0], shapes()[0]}, BoundedOptions{});
+  const Estimate estimate = estimate_of({{-9.0, 0.0}, {-8.0, -2.0}}, 0.0);
+  const RecognitionStep step = judge(estimate, {}, task);
+  ASSERT_EQ(step.identity_bounds.size(), 1u);
+  EXPECT_EQ(step.identity_bounds[0].low, 1.0) << "whichever of its maps it is";
+  EXPECT_EQ(step.identity_bounds[0].high, 1.0);
+}
+
+TEST(LabelBounds, HoldEveryEvidenceWithinItsBoundsAndAreReached) {
+  Uniform random(3);
+  for (int trial = 0; trial < 200; ++trial) {
+    const double none = trial % 2 == 0 ? 0.0 : std::exp(random(-8.0, 2.0));
+    const RecognitionTask task = three_maps(none > 0.0 ? std::optional(1.0) : std::nullopt);
+    std::vector<LogInterval> evidence;
+    for (int h = 0; h < 3; ++h) {
+      const double low = random(-6.0, 0.0);
+      evidence.push_back({low, low + random(0.0, 3.0)});
+    }
+    const RecognitionStep step = judge(estimate_of(evidence, none), {}, task);
+    std::vector<ProbabilityInterval> seen(task.labels.size(), {1.0, 0.0});
+    for (int corner = 0; corner < 8; ++corner) {
+      std::vector<double> sums(task.labels.size());
+      for (std::size_t h = 0; h < 3; ++h) {
+        const LogInterval& one = evidence[h];
+        sums[task.label_of[h]] += std::exp((corner >> h) % 2 == 0 ? one.low : one.high);
+      }
+      if (none > 0.0) {
+        sums.back() = none;
+      }
+      const double total = std::accumulate(sums.begin(), sums.end(), 0.0);
+      for (std::size_t i = 0; i < sums.size(); ++i) {
+        seen[i].low = std::min(seen[i].low, sums[i] / total);
+        seen[i].high = std::max(seen[i].high, sums[i] / total);
+      }
+    }
+    ASSERT_EQ(step.identity_bounds.size(), seen.size());
+    for (std::size_t i = 0; i < seen.size(); ++i) {
+      // A probability is monotone in each evidence, so that its extremes lie in the corners.
+      EXPECT_NEAR(step.identity_bounds[i].low, seen[i].low, 1e-12);
+      EXPECT_NEAR(step.identity_bounds[i].high, seen[i].high, 1e-12);
+      EXPECT_LE(step.identity_bounds[i].low, step.identity[i]);
+      EXPECT_GE(step.identity_bounds[i].high, step.identity[i]);
+    }
+  }
+}
+
+TEST(LabelBounds, OfEvidenceThatNothingIsKnownOf) {
+  constexpr double nothing = -std::numeric_limits<double>::infinity();
+  Estimate estimate = estimate_of({{0.0, 0.0}, {nothing, -2000.0}, {nothing, 1.0}}, 0.0);
+  const RecognitionStep step = judge(estimate, {}, three_maps({}));
+  EXPECT_EQ(step.identity_bounds[1].low, 0.0);
+  EXPECT_EQ(step.identity_bounds[1].high, 0.0) << "below every float64";
+  EXPECT_EQ(step.identity_bounds[0].low, 1.0);
+  EXPECT_EQ(step.identity_bounds[0].high, 1.0);
+}
+
+TEST(LabelBounds, OfASearchThatEvaluatedNothing) {
+  constexpr double nothing = -std::numeric_limits<double>::infinity();
+  const RecognitionTask task({shapes()[0]}, BoundedOptions{});
+  const Estimate estimate{.identity = {1.0},
+                          .certificate = Certificate{.log_evidence = {{nothing, 0.0}}}};
+  const RecognitionStep step = judge(estimate, {}, task);
+  EXPECT_EQ(step.identity_bounds[0].low, 0.0) << "and no NaN";
+  EXPECT_EQ(step.identity_bounds[0].high, 1.0);
+}
+
+TEST(LabelBounds, AreOfBoundsAlone) {
+  Device device = Device::open();
+  const Recording recording = touched_letter(1);
+  for (const FilterOptions& filter : every_filter()) {
+    const RecognitionTask task(shapes(), filter);
+    Recogniser recogniser(device, task);
+    const RecognitionRecord record = recognise(recogniser, task, unknown_of(recording), true);
+    for (const RecognitionStep& step : record.trace) {
+      if (!std::holds_alternative<BoundedOptions>(filter)) {
+        EXPECT_FALSE(step.certificate);
+        EXPECT_TRUE(step.identity_bounds.empty());
+        continue;
+      }
+      ASSERT_TRUE(step.certificate);
+      EXPECT_LE(step.certificate->dropped_mass, 1e-6) << "the tolerance";
+      ASSERT_EQ(step.identity_bounds.size(), 2u);
+      for (std::size_t i = 0; i < 2; ++i) {
+        EXPECT_LE(step.identity_bounds[i].low, step.identity[i]);
+        EXPECT_GE(step.identity_bounds[i].high, step.identity[i]);
+        // Of the mass that is dropped, all may be of one label.
+        EXPECT_LE(step.identity_bounds[i].high - step.identity_bounds[i].low, 2.1e-6);
+      }
+    }
+  }
+}
+
+}  // namespace
+}  // namespace palpate
