@@ -6,6 +6,7 @@
 #include <utility>
 
 #include <fmt/format.h>
+#include <tbb/task_arena.h>
 
 #include "bin_likelihood.hpp"
 #include "bound_search.hpp"
@@ -18,6 +19,7 @@
 #include "palpate/error.hpp"
 #include "random.hpp"
 #include "refinement.hpp"
+#include "sampled_touch_mean.hpp"
 
 namespace palpate {
 
@@ -30,6 +32,17 @@ struct BoundedPosterior::Impl {
     for (const Hypothesis& hypothesis : all) {
       bodies.push_back(displaced_body(hypothesis.map));
     }
+    if (options.none_weight) {
+      none.emplace(all, options.contact, options.lattice, log_weight, likelihood);
+      none_log_weight = std::log(*options.none_weight) - log_total_weight(all) +
+                        std::log(static_cast<double>(options.lattice.bins()));
+    }
+  }
+
+  /// Log evidence of "none of these" with its prior weight, as SearchResult::evidence has that of
+  /// the hypotheses.
+  std::optional<double> none_log_evidence() const {
+    return none ? std::optional(none_log_weight + none->log_evidence()) : std::nullopt;
   }
 
   const SearchResult& search() {
@@ -82,6 +95,8 @@ struct BoundedPosterior::Impl {
   bool touched = false;
   double prior_log_likelihood = 0.0;  ///< of all touches, by a map that holds only the prior
   std::optional<SearchResult> found;
+  std::optional<SampledTouchMeans> none;  ///< where the options ask for it
+  double none_log_weight = 0.0;           ///< log of its prior weight times the number of bins
 };
 
 BoundedPosterior::BoundedPosterior(Device& /*device*/, std::span<const Hypothesis> hypotheses,
@@ -90,6 +105,10 @@ BoundedPosterior::BoundedPosterior(Device& /*device*/, std::span<const Hypothesi
   BoundedOptions checked = options;
   checked.lattice.collapse_fixed().validate();
   checked.contact = resolve(options.contact, hypotheses);
+  if (checked.none_weight && !(*checked.none_weight > 0.0 && std::isfinite(*checked.none_weight))) {
+    throw Error(Fault::input, fmt::format("none_weight = {}: give a positive number, or none",
+                                          *checked.none_weight));
+  }
   impl_ = std::make_unique<Impl>(hypotheses, checked);
 }
 
@@ -107,6 +126,9 @@ void BoundedPosterior::reset() {
   posterior.touched = false;
   posterior.prior_log_likelihood = 0.0;
   posterior.found.reset();
+  if (posterior.none) {
+    posterior.none->reset();
+  }
 }
 
 void BoundedPosterior::move_pivot(const glm::dvec2& pivot_mm) {
@@ -114,6 +136,9 @@ void BoundedPosterior::move_pivot(const glm::dvec2& pivot_mm) {
   posterior.options.lattice =
       with_pivot(posterior.options.lattice, pivot_mm, "bounded posterior", posterior.touched);
   posterior.likelihood.move_pivot(pivot_mm);
+  if (posterior.none) {
+    posterior.none->move_pivot(pivot_mm);
+  }
   posterior.found.reset();
 }
 
@@ -122,10 +147,25 @@ void BoundedPosterior::update(std::span<const Touch> touches,
   Impl& posterior = impl();
   const KnownElements added = gather_elements(touches, posterior.options.contact,
                                               posterior.options.lattice.pivot_mm);
+  std::vector<TouchMean> means;
+  if (posterior.none) {
+    const int threads = posterior.options.threads;
+    tbb::task_arena(threads > 0 ? threads : tbb::task_arena::automatic).execute([&] {
+      means = posterior.none->evaluate(touches, [&](std::size_t done) {
+        if (progress) {
+          progress(static_cast<double>(done) / (static_cast<double>(touches.size()) + 1.0));
+        }
+      });
+    });
+  }
   if (progress) {
     progress(1.0);
   }
-  posterior.elements = merged(posterior.elements, added);
+  KnownElements elements = merged(posterior.elements, added);
+  if (posterior.none) {
+    posterior.none->add(means);
+  }
+  posterior.elements = std::move(elements);
   for (const ReadingRun& run : added.runs) {
     posterior.prior_log_likelihood +=
         static_cast<double>(run.end - run.begin) *
@@ -147,7 +187,15 @@ Estimate BoundedPosterior::estimate() const {
     logs.push_back(evidence.log_evaluated);
     certificate.log_evidence.push_back({evidence.log_evaluated, evidence.log_evaluated});
   }
+  if (const auto none = posterior.none_log_evidence()) {
+    logs.push_back(*none);
+    certificate.none_standard_error = posterior.none->standard_error();
+  }
   estimate.identity = normalised(logs);
+  if (posterior.none) {
+    estimate.none = estimate.identity.back();
+    estimate.identity.pop_back();
+  }
   for (const double p : estimate.identity) {
     estimate.identity_bounds.push_back({p, p});
   }
@@ -192,6 +240,9 @@ Marginals BoundedPosterior::marginals(int object, const PoseLattice& grid) const
     std::vector<double> logs;
     for (const HypothesisEvidence& evidence : found.evidence) {
       logs.push_back(evidence.log_evaluated);
+    }
+    if (const auto none = posterior.none_log_evidence()) {
+      logs.push_back(*none);
     }
     const double most = *std::max_element(logs.begin(), logs.end());
     double sum = 0.0;
