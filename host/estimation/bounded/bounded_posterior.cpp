@@ -99,16 +99,40 @@ struct BoundedPosterior::Impl {
   double none_log_weight = 0.0;           ///< log of its prior weight times the number of bins
 };
 
+namespace {
+
+/// @throws Error on an option out of range
+void validate(const BoundedOptions& options) {
+  const auto refuse = [](const char* field, double value, const char* remedy) {
+    throw Error(Fault::input, fmt::format("{} = {}: give {}", field, value, remedy));
+  };
+  const auto positive = [](double value) { return value > 0.0 && std::isfinite(value); };
+  if (!(options.tolerance > 0.0 && options.tolerance < 1.0)) {
+    refuse("tolerance", options.tolerance, "a share of the mass between 0 and 1, such as 1e-6");
+  }
+  if (options.budget_s && !positive(*options.budget_s)) {
+    refuse("budget_s", *options.budget_s, "a positive number of seconds, or none");
+  }
+  if (options.evidence_nats && !positive(*options.evidence_nats)) {
+    refuse("evidence_nats", *options.evidence_nats, "a positive number of nats, or none");
+  }
+  if (options.none_weight && !positive(*options.none_weight)) {
+    refuse("none_weight", *options.none_weight, "a positive number, or none");
+  }
+  if (options.threads < 0) {
+    refuse("threads", options.threads, "at least 1, or 0 for all cores");
+  }
+}
+
+}  // namespace
+
 BoundedPosterior::BoundedPosterior(Device& /*device*/, std::span<const Hypothesis> hypotheses,
                                    const BoundedOptions& options) {
   validate_hypotheses(hypotheses);
+  validate(options);
   BoundedOptions checked = options;
   checked.lattice.collapse_fixed().validate();
   checked.contact = resolve(options.contact, hypotheses);
-  if (checked.none_weight && !(*checked.none_weight > 0.0 && std::isfinite(*checked.none_weight))) {
-    throw Error(Fault::input, fmt::format("none_weight = {}: give a positive number, or none",
-                                          *checked.none_weight));
-  }
   impl_ = std::make_unique<Impl>(hypotheses, checked);
 }
 
