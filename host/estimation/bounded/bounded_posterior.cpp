@@ -228,8 +228,10 @@ Estimate BoundedPosterior::estimate() const {
                    .bin = found.best_bin,
                    .T_object_robot = lattice().T_object_robot(found.best_bin),
                    .log_likelihood = found.best_log_likelihood};
-  estimate.contradicted =
-      posterior.prior_log_likelihood - found.best_log_likelihood > contradiction_nats;
+  // The best bin of any object, which need not be the mode's where weights differ.
+  const double best = *std::max_element(found.bins.log_likelihood.begin(),
+                                        found.bins.log_likelihood.end());
+  estimate.contradicted = posterior.prior_log_likelihood - best > contradiction_nats;
   return estimate;
 }
 
@@ -301,6 +303,12 @@ Marginals BoundedPosterior::marginals(int object, const PoseLattice& grid) const
 double BoundedPosterior::log_likelihood(int object, const Pose& T_object_robot) const {
   Impl& posterior = impl();
   posterior.require_object(object);
+  const auto& [translation_mm, theta_rad] = T_object_robot;
+  if (!std::isfinite(translation_mm.x) || !std::isfinite(translation_mm.y) ||
+      !std::isfinite(theta_rad)) {
+    throw Error(Fault::input, fmt::format("pose {}, {}, {}: give finite numbers", translation_mm.x,
+                                          translation_mm.y, theta_rad));
+  }
   const ContactModel& contact = posterior.options.contact;
   const InterpolatedMap map(posterior.hypotheses[object].map, *contact.prior);
   double sum = 0.0;
@@ -315,7 +323,10 @@ double BoundedPosterior::log_likelihood(int object, const Pose& T_object_robot) 
   return sum;
 }
 
-double BoundedPosterior::entropy() const { return 0.0; }
+double BoundedPosterior::entropy() const {
+  impl();
+  return 0.0;
+}
 
 std::vector<PoseSample> BoundedPosterior::sample(std::size_t count, std::uint64_t seed) const {
   Impl& posterior = impl();
@@ -330,8 +341,14 @@ std::vector<PoseSample> BoundedPosterior::sample(std::size_t count, std::uint64_
 
 const PoseLattice& BoundedPosterior::lattice() const { return impl().options.lattice; }
 
-std::string BoundedPosterior::path() const { return "plain loop"; }
+std::string BoundedPosterior::path() const {
+  impl();
+  return "plain loop";
+}
 
-std::uint64_t BoundedPosterior::host_bytes() const { return 0; }
+std::uint64_t BoundedPosterior::host_bytes() const {
+  impl();
+  return 0;
+}
 
 }  // namespace palpate
