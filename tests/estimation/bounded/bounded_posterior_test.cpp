@@ -13,6 +13,7 @@
 #include <vector>
 
 #include <gtest/gtest.h>
+#include <tbb/global_control.h>
 
 #include "bounded/certified.hpp"
 #include "palpate/error.hpp"
@@ -281,6 +282,8 @@ TEST(BoundedPosterior, TakesInAllTouchesOrNone) {
 }
 
 TEST(BoundedPosterior, HasTheSameBitsOnAnyNumberOfThreads) {
+  // More threads than the machine may have cores.
+  const tbb::global_control allow(tbb::global_control::max_allowed_parallelism, 4);
   Device device = Device::open();
   const Recording recording = touches_of_l(3, 811);
   std::vector<std::vector<double>> one;

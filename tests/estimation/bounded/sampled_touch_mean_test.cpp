@@ -7,6 +7,7 @@
 #include <vector>
 
 #include <gtest/gtest.h>
+#include <tbb/global_control.h>
 #include <tbb/task_arena.h>
 
 #include "hypotheses.hpp"
@@ -223,6 +224,8 @@ TEST(SampledTouchMean, DoesNotDependOnTheOrderButForTheFirstShare) {
 }
 
 TEST(SampledTouchMean, HasTheSameBitsOnAnyNumberOfThreads) {
+  // More threads than the machine may have cores.
+  const tbb::global_control allow(tbb::global_control::max_allowed_parallelism, 4);
   const Recording recording = small_array(2, 710);
   std::vector<std::vector<double>> told;
   for (const int threads : {1, 2, 4}) {
