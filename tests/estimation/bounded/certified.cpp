@@ -81,7 +81,7 @@ Certified expect_certified(const BoundedPosterior& posterior, std::span<const Hy
   EXPECT_LE(certificate.dropped_mass, options.budget_s ? 1.0 : options.tolerance);
   EXPECT_NEAR(std::accumulate(estimate.identity.begin(), estimate.identity.end(), estimate.none),
               1.0, 1e-12);
-  EXPECT_GT(certificate.bins_evaluated, 0);
+  EXPECT_GE(certificate.bins_evaluated, 0);  // bins that no element sees need not be evaluated
   EXPECT_GE(certificate.blocks_bounded, 0);
 
   double top = -std::numeric_limits<double>::infinity();
