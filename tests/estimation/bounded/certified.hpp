@@ -24,8 +24,8 @@ struct Certified {
 /// Expects all that a certificate promises of a posterior after the touches that `truth` knows:
 ///   - log evidences and identities lie within their bounds,
 ///   - the total variation from `truth`, of identities and of marginals, and the mass of `truth`
-///     where the marginals are 0 are at most dropped_mass, which is at most the tolerance where
-///     there is no budget,
+///     where the marginals are 0 are at most dropped_mass, which is at most the tolerance and what
+///     rounding adds where there is no budget,
 ///   - the mode has its log-likelihood, and is the best of all bins where there is no budget or
 ///     the certificate says so,
 ///   - the log-likelihood of any pose is the reference's.
