@@ -1,6 +1,7 @@
 #include "bound_search.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <iterator>
 #include <limits>
 #include <numeric>
@@ -24,6 +25,8 @@ constexpr std::size_t beam_tiles = 64;
 constexpr std::size_t probed_tiles = 16;
 /// Largest tiles that are divided together: bounds the memory for their parts.
 constexpr std::size_t most_together = 16384;
+/// Batches of the largest tiles at one theta that make a region small.
+constexpr int few_batches = 16;
 /// Tiles of one theta that a task divides.
 constexpr std::size_t tiles_per_task = 64;
 
@@ -109,9 +112,8 @@ class SearchRun {
     seen_.resize(search_.bounds_.size() * thetas_);
     tbb::parallel_for(std::size_t{0}, seen_.size(), [&](std::size_t row) {
       const std::size_t object = row / thetas_;
-      seen_[row] =
-          seen_window(elements_, lattice_.theta_rad.centre(static_cast<int>(row % thetas_)),
-                      search_.maps_[object], search_.bounds_[object].levels().front());
+      seen_[row] = seen_window(elements_, search_.turns_[row % thetas_], search_.maps_[object],
+                               search_.bounds_[object].levels().front());
     });
     for (std::size_t row = 0; row < seen_.size(); ++row) {
       const std::size_t object = row / thetas_;
@@ -144,7 +146,7 @@ class SearchRun {
     const TileLevel& level = search_.bounds_[object].levels().front();
     const TileWindow& seen = seen_[row];
     const auto batches = static_cast<std::size_t>(level.batches_x()) * level.batches_y();
-    const std::uint32_t* sums =
+    const std::int32_t* sums =
         search_.largest_tiles_[object].data() + row % thetas_ * batches * batch_tiles;
     for (int y = seen.y_first; y < seen.y_end; ++y) {
       for (int x = seen.x_first; x < seen.x_end; ++x) {
@@ -152,9 +154,10 @@ class SearchRun {
         if (bins > 0) {
           const std::size_t batch =
               static_cast<std::size_t>(y / batch_side) * level.batches_x() + x / batch_side;
-          const std::uint32_t sum =
+          const std::int64_t sum =
+              search_.unseen_[object] +
               sums[batch * batch_tiles + x % batch_side * batch_side + y % batch_side];
-          visit(unpenalised_[object][0] - sum / penalties_per_nat, x, y, bins);
+          visit(unpenalised_[object][0] - static_cast<double>(sum) / penalties_per_nat, x, y, bins);
         }
       }
     }
@@ -235,7 +238,7 @@ class SearchRun {
       const std::size_t end = task + 1 < begins.size() ? begins[task + 1] : tiles.size();
       const Tile& first = tiles[begins[task]];
       const TileBounds& bounds = search_.bounds_[first.object];
-      bounds.place(level + 1, lattice_.theta_rad.centre(first.theta), elements_, placed);
+      bounds.place(level + 1, search_.turns_[first.theta], elements_, placed);
       parts[task].reserve((end - begins[task]) * batch_tiles);
       for (std::size_t i = begins[task]; i < end; ++i) {
         std::uint32_t sums[batch_tiles] = {};
@@ -375,9 +378,19 @@ class SearchRun {
 BoundSearch::BoundSearch(std::span<const Hypothesis> hypotheses, const BoundedOptions& options,
                          const BinLikelihood& likelihood)
     : options_(options), likelihood_(likelihood), log_weight_(log_weights(hypotheses)) {
+  for (int theta = 0; theta < options.lattice.theta_rad.count; ++theta) {
+    const double theta_rad = options.lattice.theta_rad.centre(theta);
+    turns_.emplace_back(std::cos(theta_rad), std::sin(theta_rad));
+  }
+  double least_cell_mm = std::numeric_limits<double>::infinity();
+  for (const Hypothesis& hypothesis : hypotheses) {
+    least_cell_mm = std::min(least_cell_mm, hypothesis.map.cell_mm);
+  }
+  const std::vector<TileSize> sizes = tile_sizes(options.lattice, least_cell_mm, hypotheses.size());
+  unseen_.resize(hypotheses.size());
   std::vector<std::optional<TileBounds>> bounds(hypotheses.size());
   tbb::parallel_for(std::size_t{0}, hypotheses.size(), [&](std::size_t i) {
-    bounds[i].emplace(hypotheses[i].map, options.contact, i, options.lattice);
+    bounds[i].emplace(hypotheses[i].map, options.contact, i, options.lattice, sizes);
   });
   for (std::optional<TileBounds>& of : bounds) {
     const TileLevel& level = of->levels().front();
@@ -393,12 +406,35 @@ BoundSearch::BoundSearch(std::span<const Hypothesis> hypotheses, const BoundedOp
 }
 
 void BoundSearch::reset() {
-  for (std::vector<std::uint32_t>& sums : largest_tiles_) {
+  for (std::vector<std::int32_t>& sums : largest_tiles_) {
     std::fill(sums.begin(), sums.end(), 0);
   }
+  std::fill(unseen_.begin(), unseen_.end(), 0);
+}
+
+void BoundSearch::add(std::span<const KnownElements> touches) {
+  const TileLevel& level = bounds_.front().levels().front();
+  // A single touch sees little of a large region; in a small one, fewer rounds are faster.
+  if (level.batches_x() * level.batches_y() > few_batches) {
+    for (const KnownElements& touch : touches) {
+      add(touch);
+    }
+    return;
+  }
+  KnownElements all;
+  for (const KnownElements& touch : touches) {
+    all = merged(all, touch);
+  }
+  add(all);
 }
 
 void BoundSearch::add(const KnownElements& added) {
+  // Most tiles of a large region do not see the map: sums count from what such a tile would have.
+  std::vector<std::int64_t> offsets;
+  for (std::size_t i = 0; i < bounds_.size(); ++i) {
+    offsets.push_back(
+        std::min<std::int64_t>(bounds_[i].penalty_beyond(0, added), largest_sum - unseen_[i]));
+  }
   const auto thetas = static_cast<std::size_t>(options_.lattice.theta_rad.count);
   tbb::parallel_for(std::size_t{0}, bounds_.size() * thetas, [&](std::size_t row) {
     thread_local WindowPlaces placed;
@@ -406,16 +442,29 @@ void BoundSearch::add(const KnownElements& added) {
     const std::size_t theta = row % thetas;
     const TileBounds& bounds = bounds_[object];
     const TileLevel& level = bounds.levels().front();
-    bounds.place(0, options_.lattice.theta_rad.centre(static_cast<int>(theta)), added, placed);
-    std::uint32_t* sums =
+    const TileWindow seen = seen_window(added, turns_[theta], maps_[object], level);
+    bounds.place(0, turns_[theta], added, placed);
+    std::int32_t* tiles =
         largest_tiles_[object].data() +
         theta * static_cast<std::size_t>(level.batches_x()) * level.batches_y() * batch_tiles;
-    for (int by = 0; by < level.batches_y(); ++by) {
-      for (int bx = 0; bx < level.batches_x(); ++bx, sums += batch_tiles) {
-        bounds.add(0, added, placed, bx * batch_side, by * batch_side, sums);
+    for (int y = seen.y_first / batch_side * batch_side; y < seen.y_end; y += batch_side) {
+      for (int x = seen.x_first / batch_side * batch_side; x < seen.x_end; x += batch_side) {
+        std::uint32_t sums[batch_tiles] = {};
+        bounds.add(0, added, placed, x, y, sums);
+        std::int32_t* of_batch =
+            tiles + (static_cast<std::size_t>(y / batch_side) * level.batches_x() +
+                     static_cast<std::size_t>(x / batch_side)) *
+                        batch_tiles;
+        for (int i = 0; i < batch_tiles; ++i) {
+          const std::int64_t sum = std::int64_t{of_batch[i]} + sums[i] - offsets[object];
+          of_batch[i] = static_cast<std::int32_t>(std::min<std::int64_t>(sum, largest_sum));
+        }
       }
     }
   });
+  for (std::size_t i = 0; i < offsets.size(); ++i) {
+    unseen_[i] += offsets[i];
+  }
 }
 
 SearchResult BoundSearch::run(const KnownElements& elements, const BinVisitor& visit,
@@ -428,8 +477,8 @@ std::uint64_t BoundSearch::bytes() const {
   for (const TileBounds& bounds : bounds_) {
     bytes += bounds.bytes();
   }
-  for (const std::vector<std::uint32_t>& sums : largest_tiles_) {
-    bytes += sums.capacity() * sizeof(std::uint32_t);
+  for (const std::vector<std::int32_t>& sums : largest_tiles_) {
+    bytes += sums.capacity() * sizeof(std::int32_t);
   }
   return bytes;
 }

@@ -22,6 +22,7 @@ constexpr double rounding_share = 0.2;
 constexpr std::size_t first_batch = 512;
 constexpr std::size_t largest_batch = 8192;
 constexpr std::size_t leaves_per_task = 16;
+constexpr std::int64_t most_joined_bins = 16;
 
 }  // namespace
 
@@ -86,6 +87,21 @@ std::vector<LeafPass::Leaf> LeafPass::leaves_of(std::span<const Tile> tiles) con
     return std::tie(a.box.object, a.box.theta, a.box.y_first, a.box.x_first) <
            std::tie(b.box.object, b.box.theta, b.box.y_first, b.box.x_first);
   });
+  // Small neighbours in a row make one leaf: fuller vectors.
+  const auto merges = [](const BinBox& a, const BinBox& b) {
+    return a.object == b.object && a.theta == b.theta && a.y_first == b.y_first &&
+           a.y_count == b.y_count && a.x_first + a.x_count == b.x_first &&
+           a.bins() + b.bins() <= most_joined_bins;
+  };
+  std::size_t joined = 0;
+  for (std::size_t i = 1; i < leaves.size(); ++i) {
+    if (merges(leaves[joined].box, leaves[i].box)) {
+      leaves[joined].box.x_count += leaves[i].box.x_count;
+    } else {
+      leaves[++joined] = leaves[i];
+    }
+  }
+  leaves.resize(std::min(leaves.size(), joined + 1));
   std::size_t first = 0;
   for (Leaf& leaf : leaves) {
     leaf.first = first;

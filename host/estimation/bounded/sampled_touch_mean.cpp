@@ -90,8 +90,7 @@ std::vector<TouchMean> SampledTouchMeans::evaluate(
     std::span<const Touch> touches, const std::function<void(std::size_t)>& progress) const {
   std::vector<TouchMean> means;
   for (std::size_t i = 0; i < touches.size(); ++i) {
-    const KnownElements elements =
-        gather_elements(touches.subspan(i, 1), contact_, lattice_.pivot_mm);
+    const KnownElements elements = gather_elements(touches[i], contact_, lattice_.pivot_mm);
     // A touch without a known element says nothing, not even where the array was.
     if (!elements.empty()) {
       const std::uint64_t fingerprint = fingerprint_of(elements);

@@ -30,7 +30,7 @@ class TileBounds {
  public:
   /// @param contact resolved: with its prior
   TileBounds(const OccupancyGrid& map, const ContactModel& contact, std::size_t object,
-             const PoseLattice& lattice);
+             const PoseLattice& lattice, const std::vector<TileSize>& sizes);
 
   std::span<const TileLevel> levels() const { return levels_; }
   std::int64_t bins(std::size_t level, const Tile& tile) const {
@@ -38,11 +38,14 @@ class TileBounds {
   }
 
   /// Places the elements for the tiles of a level at one theta.
-  void place(std::size_t level, double theta_rad, const KnownElements& elements,
+  /// @param turn cosine and sine of theta
+  void place(std::size_t level, const glm::dvec2& turn, const KnownElements& elements,
              WindowPlaces& placed) const;
   /// Adds the elements' penalties to the sums of the batch of tiles whose first tile this is.
   void add(std::size_t level, const KnownElements& elements, const WindowPlaces& placed,
            int first_x, int first_y, std::uint32_t* sums) const;
+  /// The sum of the elements' penalties where all of them see the prior.
+  std::uint32_t penalty_beyond(std::size_t level, const KnownElements& elements) const;
   /// Log-likelihood of the elements without any penalty, in nats.
   double best(std::size_t level, const KnownElements& elements) const;
 

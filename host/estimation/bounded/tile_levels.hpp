@@ -1,6 +1,6 @@
 #pragma once
 
-#include <cstdint>
+#include <cstddef>
 #include <vector>
 
 #include "palpate/lattice.hpp"
@@ -38,7 +38,9 @@ struct TileLevel {
 
 /// Sizes of the levels, the largest tiles first. Each level's tiles have a quarter of the side of
 /// the level before, so that a batch of 4 x 4 tiles makes up one tile.
-std::vector<TileSize> tile_sizes(const PoseLattice& lattice, double cell_mm);
+/// @param least_cell_mm of the maps
+std::vector<TileSize> tile_sizes(const PoseLattice& lattice, double least_cell_mm,
+                                 std::size_t maps);
 
 /// The levels of tiles over a lattice for a map of this cell.
 std::vector<TileLevel> tile_levels(const PoseLattice& lattice, double cell_mm,
