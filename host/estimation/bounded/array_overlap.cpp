@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 
 namespace palpate {
 
@@ -82,10 +83,12 @@ OverlapPlane::OverlapPlane(const ArrayRectangle& array, const BoundingBox& objec
               touching_mm;
   turned_reach_mm_ =
       array.half_mm + glm::dvec2(c * half.x + s * half.y, s * half.x + c * half.y) + touching_mm;
-  // The turned rectangle of offsets reaches as far along y; rounding must not lose a row.
+  // So far the turned rectangle of offsets reaches; rounding must not lose a bin.
   constexpr double rounding = 1.0 + 1e-9;
-  const double turned_y = rounding * (s * turned_reach_mm_.x + c * turned_reach_mm_.y);
-  rows_ = bins_within(y_mm_, within(1.0, apart_mm_.y, std::min(reach_mm_.y, turned_y)));
+  const glm::dvec2 turned = rounding * glm::dvec2(c * turned_reach_mm_.x + s * turned_reach_mm_.y,
+                                                  s * turned_reach_mm_.x + c * turned_reach_mm_.y);
+  columns_ = bins_within(x_mm_, within(1.0, apart_mm_.x, std::min(reach_mm_.x, turned.x)));
+  rows_ = bins_within(y_mm_, within(1.0, apart_mm_.y, std::min(reach_mm_.y, turned.y)));
 }
 
 OverlapPlane::Bins OverlapPlane::row(int y) const {
@@ -94,6 +97,30 @@ OverlapPlane::Bins OverlapPlane::row(int y) const {
   apart_x.cut(within(cos_, sin_ * apart_y, turned_reach_mm_.x));
   apart_x.cut(within(-sin_, cos_ * apart_y, turned_reach_mm_.y));
   return bins_within(x_mm_, {apart_x.low - apart_mm_.x, apart_x.high - apart_mm_.x});
+}
+
+bool OverlapPlane::may_overlap(const Bins& x, const Bins& y) const {
+  // The box of offsets, cut to what overlaps along the object's axes, against the turned rectangle.
+  const auto cut = [](const Axis& axis, const Bins& bins, const Bins& to) {
+    const int first = std::max(bins.first, to.first);
+    const int last = std::min(bins.first + bins.count, to.first + to.count) - 1;
+    return first <= last ? Interval{axis.centre(first), axis.centre(last)}
+                         : Interval{infinity, -infinity};
+  };
+  const Interval of_x = cut(x_mm_, x, columns_);
+  const Interval of_y = cut(y_mm_, y, rows_);
+  if (!(of_x.low <= of_x.high && of_y.low <= of_y.high)) {
+    return false;
+  }
+  const glm::dvec2 half(std::midpoint(-of_x.low, of_x.high), std::midpoint(-of_y.low, of_y.high));
+  const glm::dvec2 apart = apart_mm_ + glm::dvec2(std::midpoint(of_x.low, of_x.high),
+                                                  std::midpoint(of_y.low, of_y.high));
+  const double c = std::abs(cos_);
+  const double s = std::abs(sin_);
+  return std::abs(cos_ * apart.x + sin_ * apart.y) <=
+             turned_reach_mm_.x + c * half.x + s * half.y + touching_mm &&
+         std::abs(cos_ * apart.y - sin_ * apart.x) <=
+             turned_reach_mm_.y + s * half.x + c * half.y + touching_mm;
 }
 
 std::int64_t OverlapPlane::bins() const {

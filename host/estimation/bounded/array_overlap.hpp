@@ -33,12 +33,15 @@ class OverlapPlane {
   OverlapPlane(const ArrayRectangle& array, const BoundingBox& object, const PoseLattice& lattice,
                int theta);
 
-  /// The rows that may hold overlapping bins.
+  /// The rows and the columns that may hold overlapping bins.
   Bins rows() const { return rows_; }
+  Bins columns() const { return columns_; }
   /// The overlapping bins of a row.
   Bins row(int y) const;
   /// Number of overlapping bins.
   std::int64_t bins() const;
+  /// False only where none of the bins of these rows and columns overlaps.
+  bool may_overlap(const Bins& x, const Bins& y) const;
 
  private:
   Axis x_mm_;
@@ -49,6 +52,7 @@ class OverlapPlane {
   double cos_ = 1.0;              ///< of the array's direction in the object frame
   double sin_ = 0.0;
   Bins rows_;
+  Bins columns_;
 };
 
 }  // namespace palpate

@@ -72,7 +72,7 @@ struct BoundedPosterior::Impl {
       bodies.push_back(displaced_body(hypothesis.map));
     }
     if (options.none_weight) {
-      none.emplace(all, options.contact, options.lattice, log_weight, likelihood);
+      none.emplace(all, options.contact, options.lattice, log_weight, likelihood, search.bounds());
       none_log_weight = std::log(*options.none_weight) - log_total_weight(all) +
                         std::log(static_cast<double>(options.lattice.bins()));
     }

@@ -4,10 +4,12 @@
 #include <bit>
 #include <cmath>
 #include <limits>
+#include <numeric>
 
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
+#include "log_sum.hpp"
 #include "random.hpp"
 
 namespace palpate {
@@ -34,51 +36,32 @@ std::uint64_t fingerprint_of(const KnownElements& elements) {
   return print;
 }
 
-/// The bins of a plane over which a touch's mean is.
-class Plane {
- public:
-  Plane(const ArrayRectangle& array, const BoundingBox& object, const PoseLattice& lattice,
-        int theta, bool everywhere)
-      : overlap_(array, object, lattice, theta), lattice_(lattice), everywhere_(everywhere) {}
+/// Bins of a row that vector instructions evaluate at once.
+constexpr int longest_run = 8;
+/// Boxes that a task evaluates.
+constexpr std::size_t boxes_per_task = 256;
+constexpr double nothing = -std::numeric_limits<double>::infinity();
 
-  OverlapPlane::Bins rows() const {
-    return everywhere_ ? OverlapPlane::Bins{0, lattice_.y_mm.count} : overlap_.rows();
-  }
-  OverlapPlane::Bins row(int y) const {
-    return everywhere_ ? OverlapPlane::Bins{0, lattice_.x_mm.count} : overlap_.row(y);
-  }
-  std::int64_t bins() const { return everywhere_ ? lattice_.plane() : overlap_.bins(); }
-
- private:
-  OverlapPlane overlap_;
-  const PoseLattice& lattice_;
-  bool everywhere_;
-};
-
-/// An object's likelihood summed over its bins, by a sample.
-struct ObjectSum {
-  double log_scale = -std::numeric_limits<double>::infinity();  ///< of the largest likelihood drawn
-  double sum = 0.0;                                             ///< over exp(log_scale)
-  double variance = 0.0;                                        ///< of `sum`
-};
+int run_length(const BinBox& box) { return std::min(longest_run, box.x_count); }
 
 }  // namespace
-
-std::int64_t SampledTouchMeans::Strata::begin(std::int64_t stratum) const {
-  // In parts: bins * stratum may exceed 64 bits.
-  return bins / count * stratum + bins % count * stratum / count;
-}
 
 SampledTouchMeans::SampledTouchMeans(std::span<const Hypothesis> hypotheses,
                                      const ContactModel& contact, const PoseLattice& lattice,
                                      std::span<const double> log_weight,
-                                     const BinLikelihood& likelihood)
+                                     const BinLikelihood& likelihood,
+                                     std::span<const TileBounds> bounds)
     : contact_(contact),
       lattice_(lattice),
       log_weight_(log_weight.begin(), log_weight.end()),
-      likelihood_(likelihood) {
+      likelihood_(likelihood),
+      bounds_(bounds) {
   for (const Hypothesis& hypothesis : hypotheses) {
     boxes_.push_back(occupied_box(hypothesis.map));
+  }
+  for (int t = 0; t < lattice.theta_rad.count; ++t) {
+    const double theta_rad = lattice.theta_rad.centre(t);
+    turns_.emplace_back(std::cos(theta_rad), std::sin(theta_rad));
   }
 }
 
@@ -97,8 +80,17 @@ std::vector<TouchMean> SampledTouchMeans::evaluate(
       const auto same = [&](const TouchMean& mean) { return mean.fingerprint == fingerprint; };
       const auto times_before =
           std::ranges::count_if(means_, same) + std::ranges::count_if(means, same);
+      const Overlap overlap = overlap_of(touches[i]);
+      const WeightedSum sum =
+          overlap.bins <= bins_per_touch_mean
+              ? sum_of_all(overlap, elements)
+              : sum_by_draws(overlap, elements,
+                             mixed(fingerprint + static_cast<std::uint64_t>(times_before)));
       means.push_back(
-          mean_of(touches[i], elements, fingerprint, static_cast<std::uint64_t>(times_before)));
+          {.log_mean = sum.log_sum - std::log(overlap.weighted_bins),
+           .squared_error = sum.squared_error,
+           .log_share = std::log(overlap.weighted_bins / static_cast<double>(lattice_.bins())),
+           .fingerprint = fingerprint});
     }
     if (progress) {
       progress(i + 1);
@@ -141,207 +133,227 @@ double SampledTouchMeans::standard_error() const {
   return std::sqrt(sum);
 }
 
-TouchMean SampledTouchMeans::mean_of(const Touch& touch, const KnownElements& elements,
-                                     std::uint64_t fingerprint, std::uint64_t times_before) const {
+SampledTouchMeans::Overlap SampledTouchMeans::overlap_of(const Touch& touch) const {
   const ArrayRectangle array = array_rectangle(touch, lattice_.pivot_mm);
-  const Overlap overlap = overlap_of(array);
-  const std::vector<Strata> strata = strata_of(overlap);
-
-  Random random(mixed(fingerprint + times_before), Stream::touch_means);
-  const auto below = [&](std::int64_t bound) {
-    return std::min(static_cast<std::int64_t>(random.uniform() * static_cast<double>(bound)),
-                    bound - 1);
-  };
-  std::vector<std::int64_t> ordinals;
-  std::int64_t object_begin = 0;
-  for (const Strata& object : strata) {
-    for (std::int64_t i = 0; object.count == 0 && i < object.bins; ++i) {
-      ordinals.push_back(object_begin + i);
-    }
-    for (std::int64_t h = 0; h < object.count; ++h) {
-      const std::int64_t begin = object.begin(h);
-      const std::int64_t bins = object.begin(h + 1) - begin;
-      const std::int64_t one = below(bins);
-      const std::int64_t draw = below(bins - 1);
-      const std::int64_t other = draw + (draw >= one ? 1 : 0);
-      ordinals.push_back(object_begin + begin + std::min(one, other));
-      ordinals.push_back(object_begin + begin + std::max(one, other));
-    }
-    object_begin += object.bins;
-  }
-  const std::vector<double> logs = evaluated(places_of(ordinals, overlap, array), elements);
-
-  std::vector<ObjectSum> sums(strata.size());
-  double log_scale = -std::numeric_limits<double>::infinity();
-  const double* log = logs.data();
-  for (std::size_t object = 0; object < strata.size(); ++object) {
-    const Strata& of = strata[object];
-    if (of.bins == 0) {
-      continue;
-    }
-    ObjectSum& sum = sums[object];
-    sum.log_scale = *std::max_element(log, log + of.draws());
-    for (std::int64_t i = 0; of.count == 0 && i < of.bins; ++i) {
-      sum.sum += std::exp(*log++ - sum.log_scale);
-    }
-    for (std::int64_t h = 0; h < of.count; ++h) {
-      const auto bins = static_cast<double>(of.begin(h + 1) - of.begin(h));
-      const double one = std::exp(*log++ - sum.log_scale);
-      const double other = std::exp(*log++ - sum.log_scale);
-      sum.sum += bins * (one + other) / 2.0;
-      // N^2 (1 - n / N) s^2 / n for n = 2 draws of N bins, with s^2 = (one - other)^2 / 2.
-      sum.variance += bins * (bins - 2.0) * (one - other) * (one - other) / 4.0;
-    }
-    log_scale = std::max(log_scale, log_weight_[object] + sum.log_scale);
-  }
-  double total = 0.0;
-  double variance = 0.0;
-  for (std::size_t object = 0; object < sums.size(); ++object) {
-    const double scale = std::exp(log_weight_[object] + sums[object].log_scale - log_scale);
-    total += scale * sums[object].sum;
-    variance += scale * scale * sums[object].variance;
-  }
-  return {.log_mean = log_scale + std::log(total) - std::log(overlap.weighted_bins),
-          .squared_error = variance / (total * total),
-          .log_share = std::log(overlap.weighted_bins / static_cast<double>(lattice_.bins())),
-          .fingerprint = fingerprint};
-}
-
-SampledTouchMeans::Overlap SampledTouchMeans::overlap_of(const ArrayRectangle& array) const {
-  const auto thetas = static_cast<std::size_t>(lattice_.theta_rad.count);
+  const std::size_t thetas = turns_.size();
   Overlap overlap;
-  const auto count = [&] {
-    overlap.plane_end.assign(boxes_.size() * thetas, 0);
-    tbb::parallel_for(
-        tbb::blocked_range<std::size_t>(0, overlap.plane_end.size(), 8), [&](const auto& range) {
-          for (std::size_t i = range.begin(); i < range.end(); ++i) {
-            overlap.plane_end[i] = Plane(array, boxes_[i / thetas], lattice_,
-                                         static_cast<int>(i % thetas), overlap.everywhere)
-                                       .bins();
-          }
-        });
-    overlap.bins.assign(boxes_.size(), 0);
-    overlap.weighted_bins = 0.0;
-    std::int64_t end = 0;
-    for (std::size_t i = 0; i < overlap.plane_end.size(); ++i) {
-      overlap.bins[i / thetas] += overlap.plane_end[i];
-      overlap.plane_end[i] = end += overlap.plane_end[i];
+  overlap.planes.reserve(boxes_.size() * thetas);
+  for (const BoundingBox& box : boxes_) {
+    for (std::size_t theta = 0; theta < thetas; ++theta) {
+      overlap.planes.emplace_back(array, box, lattice_, static_cast<int>(theta));
     }
-    for (std::size_t object = 0; object < boxes_.size(); ++object) {
-      overlap.weighted_bins +=
-          std::exp(log_weight_[object]) * static_cast<double>(overlap.bins[object]);
+  }
+  std::vector<std::int64_t> bins(overlap.planes.size());
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, bins.size(), 8), [&](const auto& range) {
+    for (std::size_t i = range.begin(); i < range.end(); ++i) {
+      bins[i] = overlap.planes[i].bins();
     }
-  };
-  count();
+  });
+  for (std::size_t object = 0; object < boxes_.size(); ++object) {
+    const auto first = bins.begin() + static_cast<std::ptrdiff_t>(object * thetas);
+    const std::int64_t of_object =
+        std::accumulate(first, first + static_cast<std::ptrdiff_t>(thetas), std::int64_t{0});
+    overlap.bins += of_object;
+    overlap.weighted_bins += std::exp(log_weight_[object]) * static_cast<double>(of_object);
+  }
   if (overlap.weighted_bins == 0.0) {
     // No pose of the region brings the array to an object: all poses are alike.
     overlap.everywhere = true;
-    count();
+    overlap.bins = static_cast<std::int64_t>(boxes_.size()) * lattice_.bins();
+    for (const double log_weight : log_weight_) {
+      overlap.weighted_bins += std::exp(log_weight) * static_cast<double>(lattice_.bins());
+    }
   }
   return overlap;
 }
 
-std::vector<SampledTouchMeans::Strata> SampledTouchMeans::strata_of(const Overlap& overlap) const {
-  std::vector<Strata> strata;
-  std::int64_t bins = 0;
-  for (const std::int64_t n : overlap.bins) {
-    strata.push_back({.bins = n});
-    bins += n;
-  }
-  if (bins <= bins_per_touch_mean) {
-    return strata;
-  }
-  // Half of the draws by prior weight and bins; half in equal parts, because an unlikely object may
-  // be the one that explains the touch. Objects that have fewer bins than draws leave theirs to the
-  // others.
-  std::vector<double> draws(strata.size(), std::numeric_limits<double>::infinity());
-  const auto whole = [&](std::size_t object) {
-    return static_cast<double>(strata[object].bins) <= std::max(2.0, draws[object]);
-  };
-  for (bool settled = false; !settled;) {
-    double left = static_cast<double>(bins_per_touch_mean);
-    double weight = 0.0;
-    std::size_t others = 0;
-    for (std::size_t object = 0; object < strata.size(); ++object) {
-      const auto n = static_cast<double>(strata[object].bins);
-      if (std::isfinite(draws[object]) && whole(object)) {
-        left -= n;
-      } else {
-        weight += std::exp(log_weight_[object]) * n;
-        ++others;
-      }
-    }
-    settled = true;
-    for (std::size_t object = 0; object < strata.size(); ++object) {
-      const auto n = static_cast<double>(strata[object].bins);
-      if (std::isfinite(draws[object]) && whole(object)) {
-        continue;
-      }
-      const double by_weight = weight > 0.0 ? std::exp(log_weight_[object]) * n / weight : 0.0;
-      draws[object] = left * (by_weight + 1.0 / static_cast<double>(others)) / 2.0;
-      settled = settled && !whole(object);
-    }
-  }
-  for (std::size_t object = 0; object < strata.size(); ++object) {
-    if (!whole(object)) {
-      strata[object].count =
-          std::max(std::int64_t{1}, static_cast<std::int64_t>(draws[object] / 2));
-    }
-  }
-  return strata;
+const OverlapPlane& SampledTouchMeans::plane(const Overlap& overlap, const BinBox& box) const {
+  return overlap.planes[static_cast<std::size_t>(box.object) * turns_.size() +
+                        static_cast<std::size_t>(box.theta)];
 }
 
-std::vector<SampledTouchMeans::PlaceOfBin> SampledTouchMeans::places_of(
-    std::span<const std::int64_t> ordinals, const Overlap& overlap,
-    const ArrayRectangle& array) const {
-  std::vector<PlaceOfBin> places(ordinals.size());
-  const int thetas = lattice_.theta_rad.count;
-  tbb::parallel_for(
-      tbb::blocked_range<std::size_t>(0, overlap.plane_end.size(), 8), [&](const auto& range) {
-        for (std::size_t i = range.begin(); i < range.end(); ++i) {
-          std::int64_t row_begin = i == 0 ? 0 : overlap.plane_end[i - 1];
-          auto at = std::lower_bound(ordinals.begin(), ordinals.end(), row_begin);
-          if (at == ordinals.end() || *at >= overlap.plane_end[i]) {
-            continue;
-          }
-          const auto object = static_cast<std::int32_t>(i / static_cast<std::size_t>(thetas));
-          const auto theta = static_cast<std::int32_t>(i % static_cast<std::size_t>(thetas));
-          const Plane plane(array, boxes_[static_cast<std::size_t>(object)], lattice_, theta,
-                            overlap.everywhere);
-          for (int y = plane.rows().first; at != ordinals.end() && *at < overlap.plane_end[i];
-               ++y) {
-            const OverlapPlane::Bins row = plane.row(y);
-            for (; at != ordinals.end() && *at < row_begin + row.count; ++at) {
-              places[static_cast<std::size_t>(at - ordinals.begin())] = {
-                  object, theta, y, row.first + static_cast<std::int32_t>(*at - row_begin)};
-            }
-            row_begin += row.count;
-          }
-        }
-      });
-  return places;
+BinBox SampledTouchMeans::counted(const Overlap& overlap, const BinBox& row) const {
+  if (overlap.everywhere) {
+    return row;
+  }
+  const OverlapPlane::Bins in_row = plane(overlap, row).row(row.y_first);
+  const std::int32_t first = std::max(row.x_first, in_row.first);
+  const std::int32_t end = std::min(row.x_first + row.x_count, in_row.first + in_row.count);
+  BinBox part = row;
+  part.x_first = first;
+  part.x_count = std::max(0, end - first);
+  return part;
 }
 
-std::vector<double> SampledTouchMeans::evaluated(std::span<const PlaceOfBin> places,
-                                                 const KnownElements& elements) const {
-  std::vector<double> logs(places.size());
-  constexpr std::size_t at_once = 512;
-  tbb::parallel_for(std::size_t{0}, (places.size() + at_once - 1) / at_once, [&](std::size_t part) {
-    const std::size_t first = part * at_once;
-    const std::size_t count = std::min(at_once, places.size() - first);
+std::vector<double> SampledTouchMeans::log_sums(std::span<const BinBox> rows,
+                                                const Overlap& overlap,
+                                                const KnownElements& elements) const {
+  std::vector<double> sums(rows.size(), nothing);
+  const std::size_t tasks = (rows.size() + boxes_per_task - 1) / boxes_per_task;
+  tbb::parallel_for(std::size_t{0}, tasks, [&](std::size_t task) {
+    const std::size_t first = task * boxes_per_task;
+    const std::size_t count = std::min(boxes_per_task, rows.size() - first);
     std::vector<BinBox> boxes;
-    boxes.reserve(count);
-    for (const PlaceOfBin& at : places.subspan(first, count)) {
-      if (!boxes.empty() && boxes.back().object == at.object && boxes.back().theta == at.theta &&
-          boxes.back().y_first == at.y && boxes.back().x_first + boxes.back().x_count == at.x) {
-        ++boxes.back().x_count;
-      } else {
-        boxes.push_back({at.object, at.theta, at.y, 1, at.x, 1});
+    std::vector<std::size_t> of_box;
+    std::size_t bins = 0;
+    for (std::size_t i = first; i < first + count; ++i) {
+      const BinBox box = counted(overlap, rows[i]);
+      if (box.x_count > 0) {
+        boxes.push_back(box);
+        of_box.push_back(i);
+        bins += static_cast<std::size_t>(box.bins());
       }
     }
-    likelihood_.evaluate(boxes, elements, std::span(logs).subspan(first, count));
+    std::vector<double> logs(bins);
+    likelihood_.evaluate(boxes, elements, std::span(logs));
+    const double* log = logs.data();
+    for (std::size_t b = 0; b < boxes.size(); ++b) {
+      LogSum sum;
+      for (std::int64_t i = 0; i < boxes[b].bins(); ++i) {
+        sum.add(*log++);
+      }
+      sums[of_box[b]] = sum.log();
+    }
   });
-  return logs;
+  return sums;
+}
+
+SampledTouchMeans::WeightedSum SampledTouchMeans::sum_of_all(const Overlap& overlap,
+                                                             const KnownElements& elements) const {
+  std::vector<BinBox> rows;
+  for (std::size_t object = 0; object < boxes_.size(); ++object) {
+    for (int theta = 0; theta < lattice_.theta_rad.count; ++theta) {
+      BinBox row{.object = static_cast<std::int32_t>(object),
+                 .theta = theta,
+                 .y_count = 1,
+                 .x_count = lattice_.x_mm.count};
+      const OverlapPlane::Bins ys = overlap.everywhere ? OverlapPlane::Bins{0, lattice_.y_mm.count}
+                                                       : plane(overlap, row).rows();
+      for (row.y_first = ys.first; row.y_first < ys.first + ys.count; ++row.y_first) {
+        rows.push_back(row);
+      }
+    }
+  }
+  const std::vector<double> sums = log_sums(rows, overlap, elements);
+  LogSum total;
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    total.add(log_weight_[static_cast<std::size_t>(rows[i].object)] + sums[i]);
+  }
+  return {.log_sum = total.log()};
+}
+
+std::vector<TouchTile> SampledTouchMeans::tiles_of(const Overlap& overlap,
+                                                   const KnownElements& elements) const {
+  std::vector<BinBox> boxes;
+  for (std::size_t i = 0; i < overlap.planes.size(); ++i) {
+    const OverlapPlane::Bins x = overlap.everywhere ? OverlapPlane::Bins{0, lattice_.x_mm.count}
+                                                    : overlap.planes[i].columns();
+    const OverlapPlane::Bins y =
+        overlap.everywhere ? OverlapPlane::Bins{0, lattice_.y_mm.count} : overlap.planes[i].rows();
+    if (x.count > 0 && y.count > 0) {
+      boxes.push_back({static_cast<std::int32_t>(i / turns_.size()),
+                       static_cast<std::int32_t>(i % turns_.size()), y.first, y.count, x.first,
+                       x.count});
+    }
+  }
+  if (overlap.everywhere) {
+    // An array that meets no object sees the same nearly everywhere.
+    std::vector<TouchTile> tiles;
+    for (const BinBox& box : boxes) {
+      tiles.push_back({.log_weight = log_weight_[static_cast<std::size_t>(box.object)] +
+                                     std::log(static_cast<double>(box.bins())),
+                       .box = box});
+    }
+    return tiles;
+  }
+  return touch_tiles(boxes, bounds_, log_weight_, turns_, elements, [&](const BinBox& box) {
+    return plane(overlap, box).may_overlap({box.x_first, box.x_count}, {box.y_first, box.y_count});
+  });
+}
+
+std::vector<SampledTouchMeans::Draw> SampledTouchMeans::draws_from(std::span<const TouchTile> tiles,
+                                                                   std::uint64_t seed) const {
+  double largest = nothing;
+  for (const TouchTile& tile : tiles) {
+    largest = std::max(largest, tile.log_weight);
+  }
+  std::vector<double> ends;  // of the tiles on a line
+  ends.reserve(tiles.size());
+  double end = 0.0;
+  double runs = 0.0;  // weighted lengths
+  for (const TouchTile& tile : tiles) {
+    const double weight = std::exp(tile.log_weight - largest);
+    ends.push_back(end += weight);
+    runs += weight * run_length(tile.box);
+  }
+  const auto strata = std::max(
+      std::int64_t{1},
+      static_cast<std::int64_t>(static_cast<double>(bins_per_touch_mean) * end / (2.0 * runs)));
+  Random random(seed, Stream::touch_means);
+  const auto below = [&](int bound) {
+    return std::min(static_cast<int>(random.uniform() * bound), bound - 1);
+  };
+  std::vector<Draw> draws;
+  draws.reserve(static_cast<std::size_t>(2 * strata));
+  auto from = ends.begin();
+  for (std::int64_t h = 0; h < strata; ++h) {
+    const double length = end / static_cast<double>(strata);
+    const double begin = static_cast<double>(h) * length;
+    while (from + 1 != ends.end() && *from <= begin) {
+      ++from;
+    }
+    for (int k = 0; k < 2; ++k) {
+      const double at = begin + random.uniform() * length;
+      auto drawn = from;
+      while (drawn + 1 != ends.end() && *drawn <= at) {
+        ++drawn;
+      }
+      const TouchTile& tile = tiles[static_cast<std::size_t>(drawn - ends.begin())];
+      // The run that holds a bin drawn from all: a run's chance is its share of the row.
+      BinBox run = tile.box;
+      run.y_first += below(run.y_count);
+      run.y_count = 1;
+      const int first = below(run.x_count) / longest_run * longest_run;
+      run.x_count = std::min(longest_run, run.x_count - first);
+      run.x_first += first;
+      draws.push_back({run, -std::log(static_cast<double>(run.x_count)) - tile.bound});
+    }
+  }
+  return draws;
+}
+
+SampledTouchMeans::WeightedSum SampledTouchMeans::sum_by_draws(const Overlap& overlap,
+                                                               const KnownElements& elements,
+                                                               std::uint64_t seed) const {
+  const std::vector<TouchTile> tiles = tiles_of(overlap, elements);
+  LogSum line;
+  for (const TouchTile& tile : tiles) {
+    line.add(tile.log_weight);
+  }
+  const std::vector<Draw> draws = draws_from(tiles, seed);
+  std::vector<BinBox> rows;
+  rows.reserve(draws.size());
+  for (const Draw& draw : draws) {
+    rows.push_back(draw.bins);
+  }
+  std::vector<double> log_ratios = log_sums(rows, overlap, elements);
+  double largest = nothing;
+  for (std::size_t i = 0; i < draws.size(); ++i) {
+    log_ratios[i] += draws[i].log_scale;
+    largest = std::max(largest, log_ratios[i]);
+  }
+  double sum = 0.0;
+  double squares = 0.0;
+  for (std::size_t i = 0; i < draws.size(); i += 2) {
+    const double one = std::exp(log_ratios[i] - largest);
+    const double other = std::exp(log_ratios[i + 1] - largest);
+    sum += one + other;
+    squares += (one - other) * (one - other);
+  }
+  // Strata of equal length L, two draws in each: sum of L (one + other) / 2, whose variance is
+  // estimated by the sum of L^2 (one - other)^2 / 4.
+  return {.log_sum = line.log() + largest + std::log(sum / static_cast<double>(draws.size())),
+          .squared_error = squares / (sum * sum)};
 }
 
 }  // namespace palpate

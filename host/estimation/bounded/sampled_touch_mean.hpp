@@ -1,8 +1,8 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <functional>
-#include <optional>
 #include <span>
 #include <vector>
 
@@ -14,11 +14,12 @@
 #include "palpate/estimate.hpp"
 #include "palpate/lattice.hpp"
 #include "palpate/touch.hpp"
+#include "tile_bounds.hpp"
+#include "touch_tiles.hpp"
 
 namespace palpate {
 
-/// Bins at which a touch's likelihood is evaluated for its mean. An object that would get less than
-/// two of them gets two.
+/// Bins at which a touch's likelihood is evaluated for its mean, about.
 inline constexpr std::int64_t bins_per_touch_mean = 100'000;
 
 /// The mean likelihood of one touch, over the hypotheses by prior weight and over the bins at which
@@ -34,20 +35,25 @@ struct TouchMean {
 ///   log s + sum over the touches of log (mean of the touch's likelihood),
 /// where the mean is over the bins at which the array overlaps the object (over all bins where
 /// there is no such bin) and s is the share of such bins at the first touch with a known element.
-/// Counts the bins exactly, and takes the mean over a stratified sample of them.
+/// Counts the bins exactly. Evaluates all of them where they are few, and otherwise draws:
 ///
-/// The overlapping bins of an object, in the order of theta, y and x, are cut into strata of equal
-/// size; two different bins are drawn in each. The standard error follows from the strata's
-/// variances by the delta method. Draws depend on the touch and on how often it has come before, so
-/// that errors of touches are independent and the order of touches does not count, but for s.
+/// A touch is likely at few of its bins, so that bins are drawn where tiles' bounds say that it may
+/// be. Tiles on a line, each as long as its prior weight * bins * bound of the likelihood, are cut
+/// into strata of equal length; two points are drawn in each. A point's estimate is the likelihood
+/// over its bound, averaged over a run of neighbouring bins of its tile: at most 1, so that no rare
+/// draw decides the mean. The standard error follows from the strata's variances by the delta
+/// method. The bounds decide where bins are drawn, not what the mean is.
+///
+/// Draws depend on the touch and on how often it has come before, so that errors of touches are
+/// independent and the order of touches does not count, but for s.
 class SampledTouchMeans {
  public:
   /// @param contact resolved: with its prior
   /// @param log_weight of every hypothesis, over their sum
-  /// @param likelihood outlives this object and has the same pivot
+  /// @param bounds of every hypothesis; `likelihood` has the same pivot. Both outlive this object
   SampledTouchMeans(std::span<const Hypothesis> hypotheses, const ContactModel& contact,
                     const PoseLattice& lattice, std::span<const double> log_weight,
-                    const BinLikelihood& likelihood);
+                    const BinLikelihood& likelihood, std::span<const TileBounds> bounds);
 
   void reset();
   void move_pivot(const glm::dvec2& pivot_mm);
@@ -68,42 +74,44 @@ class SampledTouchMeans {
   double standard_error() const;
 
  private:
-  struct PlaceOfBin {
-    std::int32_t object = 0;
-    std::int32_t theta = 0;
-    std::int32_t y = 0;
-    std::int32_t x = 0;
-  };
-  /// The bins of every plane over which a mean is, [object, theta].
+  /// The bins over which a touch's mean is.
   struct Overlap {
-    std::vector<std::int64_t> plane_end;  ///< ordinal after the plane's last bin, among all objects
-    std::vector<std::int64_t> bins;       ///< [object]
-    double weighted_bins = 0.0;           ///< by prior weight
-    bool everywhere = false;              ///< whether all bins count, wherever the array is
-  };
-  /// Two draws from each stratum of an object's bins, or all of them once.
-  struct Strata {
+    std::vector<OverlapPlane> planes;  ///< [object, theta]
     std::int64_t bins = 0;
-    std::int64_t count = 0;  ///< 0: all bins are taken
-
-    std::int64_t draws() const { return count == 0 ? bins : 2 * count; }
-    std::int64_t begin(std::int64_t stratum) const;
+    double weighted_bins = 0.0;  ///< by prior weight
+    bool everywhere = false;     ///< whether all bins count, wherever the array is
+  };
+  /// A run of bins of a tile.
+  struct Draw {
+    BinBox bins;             ///< of one row
+    double log_scale = 0.0;  ///< log of one over (bins in the run * bound)
+  };
+  /// The sum of a touch's likelihood over bins, by prior weight.
+  struct WeightedSum {
+    double log_sum = 0.0;
+    double squared_error = 0.0;  ///< of log_sum
   };
 
-  TouchMean mean_of(const Touch& touch, const KnownElements& elements, std::uint64_t fingerprint,
-                    std::uint64_t times_before) const;
-  Overlap overlap_of(const ArrayRectangle& array) const;
-  std::vector<Strata> strata_of(const Overlap& overlap) const;
-  std::vector<PlaceOfBin> places_of(std::span<const std::int64_t> ordinals, const Overlap& overlap,
-                                    const ArrayRectangle& array) const;
-  std::vector<double> evaluated(std::span<const PlaceOfBin> places,
-                                const KnownElements& elements) const;
+  Overlap overlap_of(const Touch& touch) const;
+  const OverlapPlane& plane(const Overlap& overlap, const BinBox& box) const;
+  /// The bins of a box's only row that count.
+  BinBox counted(const Overlap& overlap, const BinBox& row) const;
+  WeightedSum sum_of_all(const Overlap& overlap, const KnownElements& elements) const;
+  WeightedSum sum_by_draws(const Overlap& overlap, const KnownElements& elements,
+                           std::uint64_t seed) const;
+  std::vector<TouchTile> tiles_of(const Overlap& overlap, const KnownElements& elements) const;
+  std::vector<Draw> draws_from(std::span<const TouchTile> tiles, std::uint64_t seed) const;
+  /// Log of the summed likelihood of each box of one row; -infinity where none of its bins counts.
+  std::vector<double> log_sums(std::span<const BinBox> rows, const Overlap& overlap,
+                               const KnownElements& elements) const;
 
   std::vector<BoundingBox> boxes_;  ///< around each object's occupied cells
   ContactModel contact_;
   PoseLattice lattice_;
+  std::vector<glm::dvec2> turns_;  ///< [theta] cosine and sine
   std::vector<double> log_weight_;
   const BinLikelihood& likelihood_;
+  std::span<const TileBounds> bounds_;
   std::vector<TouchMean> means_;
 };
 
