@@ -2,8 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
-#include <tuple>
+#include <utility>
 
 #include <tbb/parallel_for.h>
 
@@ -15,16 +16,11 @@ namespace palpate {
 namespace {
 
 /// Tiles of a level that are divided at most: bounds time and memory.
-constexpr std::size_t most_divided = std::size_t{1} << 16;
+constexpr std::size_t most_divided = std::size_t{1} << 12;
 /// Part of the weight whose tiles stay as they are.
 constexpr double undivided_share = 1e-3;
 /// Tiles of one object and theta that a task divides.
 constexpr std::size_t tiles_per_task = 64;
-
-bool in_place(const TouchTile& a, const TouchTile& b) {
-  return std::tie(a.box.object, a.box.theta, a.box.y_first, a.box.x_first) <
-         std::tie(b.box.object, b.box.theta, b.box.y_first, b.box.x_first);
-}
 
 /// Tiles [first, end) of an axis that may hold bins [begin, begin + count).
 struct TileRange {
@@ -104,22 +100,30 @@ std::vector<TouchTile> joined(const std::vector<std::vector<TouchTile>>& parts) 
   return all;
 }
 
-/// Moves the tiles that are not worth dividing to the end.
-/// @returns the number of the others
-std::size_t worth_dividing(std::vector<TouchTile>& tiles) {
-  std::sort(tiles.begin(), tiles.end(), [](const TouchTile& a, const TouchTile& b) {
-    return a.log_weight != b.log_weight ? a.log_weight > b.log_weight : in_place(a, b);
-  });
+/// The least weight of a tile that is worth dividing.
+double least_divided(std::span<const TouchTile> tiles) {
+  double largest = -std::numeric_limits<double>::infinity();
+  for (const TouchTile& tile : tiles) {
+    largest = std::max(largest, tile.log_weight);
+  }
+  std::vector<double> weights;  // relative to the largest
+  weights.reserve(tiles.size());
   double left = 0.0;
   for (const TouchTile& tile : tiles) {
-    left += std::exp(tile.log_weight - tiles.front().log_weight);
+    weights.push_back(std::exp(tile.log_weight - largest));
+    left += weights.back();
   }
   const double rest = undivided_share * left;
-  std::size_t count = 0;
-  for (; count < std::min(tiles.size(), most_divided) && left > rest; ++count) {
-    left -= std::exp(tiles[count].log_weight - tiles.front().log_weight);
+  const auto end =
+      weights.begin() + static_cast<std::ptrdiff_t>(std::min(most_divided, weights.size()));
+  std::nth_element(weights.begin(), end - 1, weights.end(), std::greater<>());
+  std::sort(weights.begin(), end, std::greater<>());
+  auto least = weights.begin();
+  for (left -= *least; least + 1 != end && left > rest; left -= *least) {
+    ++least;
   }
-  return count;
+  // Rounding may leave a tile out or take one more in.
+  return largest + std::log(*least);
 }
 
 }  // namespace
@@ -148,10 +152,12 @@ std::vector<TouchTile> touch_tiles(std::span<const BinBox> boxes,
   std::vector<TouchTile> tiles = joined(of_box);
   std::vector<TouchTile> settled;
   for (std::size_t level = 1; !tiles.empty() && level < bounds.front().levels().size(); ++level) {
-    const std::size_t count = worth_dividing(tiles);
-    settled.insert(settled.end(), tiles.begin() + static_cast<std::ptrdiff_t>(count), tiles.end());
-    tiles.resize(count);
-    std::sort(tiles.begin(), tiles.end(), in_place);
+    const double least = least_divided(tiles);
+    const auto rest = std::stable_partition(tiles.begin(), tiles.end(), [&](const TouchTile& tile) {
+      return tile.log_weight >= least;
+    });
+    settled.insert(settled.end(), rest, tiles.end());
+    tiles.erase(rest, tiles.end());
     std::vector<std::size_t> begins;  // of tasks: tiles of one object and theta
     for (std::size_t i = 0; i < tiles.size(); ++i) {
       if (i == 0 || tiles[i].box.object != tiles[i - 1].box.object ||
@@ -174,7 +180,6 @@ std::vector<TouchTile> touch_tiles(std::span<const BinBox> boxes,
     tiles = joined(parts);
   }
   tiles.insert(tiles.end(), settled.begin(), settled.end());
-  std::sort(tiles.begin(), tiles.end(), in_place);
   return tiles;
 }
 

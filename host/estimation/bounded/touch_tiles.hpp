@@ -28,7 +28,7 @@ struct TouchTile {
 /// @param boxes ascending by object and theta
 /// @param log_weight log of the objects' prior weights
 /// @param turns [theta] its cosine and sine
-/// @returns tiles in the order of object, theta, y and x
+/// @returns the smallest tiles first; those of one size in the order of object, theta and batch
 std::vector<TouchTile> touch_tiles(std::span<const BinBox> boxes,
                                    std::span<const TileBounds> bounds,
                                    std::span<const double> log_weight,
