@@ -11,6 +11,7 @@
 #include <tbb/parallel_for.h>
 
 #include "hypotheses.hpp"
+#include "leaf_pass.hpp"
 #include "seen_window.hpp"
 #include "unsettled_mass.hpp"
 
@@ -37,10 +38,6 @@ bool before(const Tile& a, const Tile& b) {
   return std::tie(a.object, a.theta, a.y, a.x) < std::tie(b.object, b.theta, b.y, b.x);
 }
 
-bool in_place(const Tile& a, const Tile& b) {
-  return std::tie(a.object, a.theta, a.y, a.x) < std::tie(b.object, b.theta, b.y, b.x);
-}
-
 /// Keeps the tiles of the largest bounds.
 void keep_best(std::vector<Tile>& tiles, std::size_t count) {
   if (tiles.size() > count) {
@@ -48,16 +45,6 @@ void keep_best(std::vector<Tile>& tiles, std::size_t count) {
                      before);
     tiles.resize(count);
   }
-}
-
-/// The tile as a box of bins.
-BinBox box_of(const TileLevel& level, const Tile& tile) {
-  return {.object = tile.object,
-          .theta = tile.theta,
-          .y_first = level.y.first_bin[tile.y],
-          .y_count = level.y.bins(tile.y),
-          .x_first = level.x.first_bin[tile.x],
-          .x_count = level.x.bins(tile.x)};
 }
 
 }  // namespace
@@ -73,14 +60,26 @@ class SearchRun {
         refined_(refined),
         thetas_(static_cast<std::size_t>(lattice_.theta_rad.count)),
         finest_(search.bounds_.front().levels().size() - 1),
-        leaves_(search.likelihood_, search.bounds_, search.log_weight_, search.options_, elements,
-                visit) {
+        deadline_(search.options_.budget_s),
+        account_(search.log_weight_, search.options_),
+        evaluator_(search.likelihood_, search.log_weight_, search.options_, elements, visit,
+                   deadline_, account_),
+        leaves_(search.bounds_, thetas_, deadline_, account_, evaluator_),
+        visit_(visit) {
     for (std::size_t i = 0; i < search_.bounds_.size(); ++i) {
       std::vector<double> of_level;
       for (std::size_t level = 0; level <= finest_; ++level) {
         of_level.push_back(search_.log_weight_[i] + search_.bounds_[i].best(level, elements));
       }
       unpenalised_.push_back(std::move(of_level));
+      double prior = 0.0;
+      for (const ReadingRun& run : elements.runs) {
+        const ContactModel& contact = search_.options_.contact;
+        prior +=
+            static_cast<double>(run.end - run.begin) *
+            contact.log_likelihood(run.reading, {log_odds_from_probability(*contact.prior)}, i);
+      }
+      prior_log_likelihoods_.push_back(prior);
     }
   }
 
@@ -94,11 +93,13 @@ class SearchRun {
       count_largest(unsettled);
       const double share = search_.options_.tolerance * search_share;
       std::vector<Tile> kept = keep_largest(unsettled, share / static_cast<double>(finest_ + 1));
-      leaves_.drop(unsettled);
-      divide(std::move(kept), 0, share - leaves_.dropped_share());
+      account_.drop(unsettled);
+      divide(std::move(kept), 0, share - account_.dropped_share());
     }
-    SearchResult result = leaves_.result();
+    evaluator_.flush();
+    SearchResult result = account_.result();
     result.blocks_bounded = blocks_;
+    result.bins_evaluated = evaluator_.bins();
     return result;
   }
 
@@ -127,7 +128,7 @@ class SearchRun {
                          .x_first = level.x.first_bin[x_first],
                          .x_count = level.x.first_bin[x_end] - level.x.first_bin[x_first]};
         if (box.bins() > 0) {
-          leaves_.settle_unseen(box);
+          settle_unseen(box);
         }
       };
       const int nx = level.x.tiles();
@@ -136,6 +137,17 @@ class SearchRun {
       settle(seen.x_end, nx, seen.y_first, seen.y_end);
       settle(0, nx, seen.y_end, level.y.tiles());
     }
+    account_.raise_totals(std::vector<LogSum>(search_.bounds_.size()));
+  }
+
+  /// Settles bins at which every element sees the prior.
+  void settle_unseen(const BinBox& box) {
+    const auto object = static_cast<std::size_t>(box.object);
+    const double value = prior_log_likelihoods_[object];
+    account_.settle(box.object, value + std::log(static_cast<double>(box.bins())), value,
+                    search_.likelihood_.float64_error(object, elements_));
+    account_.note_best(box, 0, value);
+    visit_(box, std::span(&value, 1));
   }
 
   /// Calls visit(bound, x, y, bins) for the largest tiles of a row, a theta of an object, that hold
@@ -194,7 +206,7 @@ class SearchRun {
 
   /// The largest tiles that must be divided, and takes them out of the unsettled ones.
   std::vector<Tile> keep_largest(UnsettledMass& unsettled, double share) const {
-    const std::vector<std::size_t> from = leaves_.droppable_from(unsettled, share);
+    const std::vector<std::size_t> from = account_.droppable_from(unsettled, share);
     std::vector<std::vector<Tile>> kept(search_.bounds_.size());
     tbb::parallel_for(std::size_t{0}, kept.size(), [&](std::size_t object) {
       for (std::size_t theta = 0; theta < thetas_; ++theta) {
@@ -290,11 +302,11 @@ class SearchRun {
   void raise_beam(std::vector<Tile> tiles, std::size_t level) {
     for (; level < finest_; ++level) {
       keep_best(tiles, beam_tiles);
-      std::sort(tiles.begin(), tiles.end(), in_place);
+      std::sort(tiles.begin(), tiles.end(), stands_before);
       tiles = parts_of(tiles, level);
     }
     keep_best(tiles, probed_tiles);
-    leaves_.probe(tiles);
+    leaves_.probe(std::move(tiles));
   }
 
   /// Divides tiles of a level until their bins are evaluated or dropped.
@@ -305,46 +317,42 @@ class SearchRun {
       leaves_.evaluate(tiles, tolerance);
       return;
     }
-    std::sort(tiles.begin(), tiles.end(), tiles.size() > most_together ? before : in_place);
+    std::sort(tiles.begin(), tiles.end(), tiles.size() > most_together ? before : stands_before);
     for (std::size_t begin = 0; begin < tiles.size(); begin += most_together) {
       const std::size_t left = tiles.size() - begin;
       const std::size_t count = std::min(most_together, left);
       const auto first = tiles.begin() + static_cast<std::ptrdiff_t>(begin);
       std::vector<Tile> some(first, first + static_cast<std::ptrdiff_t>(count));
-      const double dropped = leaves_.dropped_share();
-      if (leaves_.out_of_time()) {
+      const double dropped = account_.dropped_share();
+      if (deadline_.passed()) {
         some.assign(first, tiles.end());
-        leaves_.drop(unsettled_of(some, level));
+        account_.drop(unsettled(some, level, search_.bounds_));
         return;
       }
-      std::sort(some.begin(), some.end(), in_place);
+      std::sort(some.begin(), some.end(), stands_before);
       some = parts_of(some, level);
       if (level + 1 < finest_) {
         raise(some, level + 1);
       }
       // What tiles do not use up is left for those after them.
       const double part = tolerance * static_cast<double>(count) / static_cast<double>(left);
-      UnsettledMass unsettled = unsettled_of(some, level + 1);
+      UnsettledMass left_mass = unsettled(some, level + 1, search_.bounds_);
       if (level + 1 < finest_) {
         const std::vector<std::size_t> from =
-            leaves_.droppable_from(unsettled, part / static_cast<double>(finest_ - level));
+            account_.droppable_from(left_mass, part / static_cast<double>(finest_ - level));
         std::erase_if(some, [&](const Tile& tile) {
-          return unsettled.slot(tile.bound) >= from[tile.object];
+          return left_mass.slot(tile.bound) >= from[tile.object];
         });
         for (const Tile& tile : some) {
-          unsettled.remove(static_cast<std::size_t>(tile.object), tile.bound,
+          left_mass.remove(static_cast<std::size_t>(tile.object), tile.bound,
                            search_.bounds_[tile.object].bins(level + 1, tile));
         }
-        leaves_.drop(unsettled);
+        account_.drop(left_mass);
       }
-      const double used = leaves_.dropped_share() - dropped;
+      const double used = account_.dropped_share() - dropped;
       divide(std::move(some), level + 1, std::max(part - used, 0.0));
-      tolerance = std::max(tolerance - (leaves_.dropped_share() - dropped), 0.0);
+      tolerance = std::max(tolerance - (account_.dropped_share() - dropped), 0.0);
     }
-  }
-
-  UnsettledMass unsettled_of(std::span<const Tile> tiles, std::size_t level) const {
-    return leaves_.unsettled(tiles, level);
   }
 
   void note(std::span<const Tile> tiles, std::size_t level) const {
@@ -352,7 +360,7 @@ class SearchRun {
       return;
     }
     for (const Tile& tile : tiles) {
-      const BinBox box = box_of(search_.bounds_[tile.object].levels()[level], tile);
+      const BinBox box = search_.bounds_[tile.object].levels()[level].box_of(tile);
       refined_->push_back({.object = box.object,
                            .level = static_cast<int>(level),
                            .theta = box.theta,
@@ -370,8 +378,13 @@ class SearchRun {
   std::size_t thetas_;
   std::size_t finest_;                            ///< level
   std::vector<std::vector<double>> unpenalised_;  ///< [object][level], with the prior weight
+  std::vector<double> prior_log_likelihoods_;     ///< [object] of all elements
   std::vector<TileWindow> seen_;                  ///< [object, theta], of the largest tiles
+  Deadline deadline_;
+  MassAccount account_;
+  LeafEvaluator evaluator_;
   LeafPass leaves_;
+  const BinVisitor& visit_;
   std::int64_t blocks_ = 0;
 };
 

@@ -7,7 +7,7 @@
 
 #include "bin_likelihood.hpp"
 #include "known_elements.hpp"
-#include "leaf_pass.hpp"
+#include "leaf_evaluator.hpp"
 #include "palpate/bounded_posterior.hpp"
 #include "tile_bounds.hpp"
 

@@ -14,16 +14,6 @@
 
 namespace palpate {
 
-/// A tile of one object's poses, and the largest log-likelihood, with the prior weight, that a bin
-/// in it can have.
-struct Tile {
-  double bound = 0.0;
-  std::int32_t object = 0;
-  std::int32_t theta = 0;
-  std::int32_t x = 0;
-  std::int32_t y = 0;
-};
-
 /// What bounds the likelihood over the tiles of one object: the levels of tiles, and a window table
 /// of each level for every reading.
 class TileBounds {
