@@ -15,10 +15,6 @@ TEST(CertificateLaw, HoldsOverFiftyUnknownsOfAHundredBins) { expect_trials({7, 5
 TEST(CertificateLaw, HoldsOverFiftyUnknownsOfATwoThousandBins) {
   expect_trials({12, 12, 16}, 50, 902);
 }
-TEST(CertificateLaw, HoldsOverFiftyUnknownsOfTenThousandBins) {
-  expect_trials({25, 25, 16}, 50, 903);
-}
-
 TEST(CertificateLaw, HoldsWithinAnyBudget) {
   Device device = Device::open();
   Trial trial = make_trial({15, 14, 12}, 904);
