@@ -16,9 +16,10 @@ enum class Stream : std::uint32_t {
   touch_order,
   frames,
   pose_noise,
-  belief,    // draws from it
-  readings,  // of touches that are only imagined
-  slips,     // of objects between touches
+  belief,       // draws from it
+  readings,     // of touches that are only imagined
+  slips,        // of objects between touches
+  touch_means,  // bins over which a touch's mean likelihood is
 };
 
 /// Draws random numbers that are the same with every standard library: the engine and std::seed_seq

@@ -32,6 +32,8 @@ class BoundSearch {
   SearchResult run(const KnownElements& elements, const BinVisitor& visit,
                    std::vector<PoseBlock>* refined = nullptr) const;
 
+  /// [hypothesis]
+  std::span<const TileBounds> bounds() const { return bounds_; }
   std::uint64_t bytes() const;
 
  private:

@@ -22,6 +22,7 @@
 #include "palpate/error.hpp"
 #include "random.hpp"
 #include "refinement.hpp"
+#include "sampled_touch_mean.hpp"
 
 namespace palpate {
 
@@ -32,6 +33,29 @@ std::int64_t bin_in(const PoseLattice& lattice, const BinBox& box, std::int64_t 
   return (std::int64_t{box.theta} * lattice.y_mm.count + box.y_first + i / box.x_count) *
              lattice.x_mm.count +
          box.x_first + i % box.x_count;
+}
+
+/// @throws Error on an option out of range
+void validate(const BoundedOptions& options) {
+  const auto refuse = [](const char* field, double value, const char* remedy) {
+    throw Error(Fault::input, fmt::format("{} = {}: give {}", field, value, remedy));
+  };
+  const auto positive = [](double value) { return value > 0.0 && std::isfinite(value); };
+  if (!(options.tolerance > 0.0 && options.tolerance < 1.0)) {
+    refuse("tolerance", options.tolerance, "a share of the mass between 0 and 1, such as 1e-6");
+  }
+  if (options.budget_s && !positive(*options.budget_s)) {
+    refuse("budget_s", *options.budget_s, "a positive number of seconds, or none");
+  }
+  if (options.evidence_nats && !positive(*options.evidence_nats)) {
+    refuse("evidence_nats", *options.evidence_nats, "a positive number of nats, or none");
+  }
+  if (options.none_weight && !positive(*options.none_weight)) {
+    refuse("none_weight", *options.none_weight, "a positive number, or none");
+  }
+  if (options.threads < 0) {
+    refuse("threads", options.threads, "at least 1, or 0 for all cores");
+  }
 }
 
 }  // namespace
@@ -47,6 +71,17 @@ struct BoundedPosterior::Impl {
     for (const Hypothesis& hypothesis : all) {
       bodies.push_back(displaced_body(hypothesis.map));
     }
+    if (options.none_weight) {
+      none.emplace(all, options.contact, options.lattice, log_weight, likelihood, search.bounds());
+      none_log_weight = std::log(*options.none_weight) - log_total_weight(all) +
+                        std::log(static_cast<double>(options.lattice.bins()));
+    }
+  }
+
+  /// Log evidence of "none of these" with its prior weight, as SearchResult::evidence has that of
+  /// the hypotheses; -infinity where it is left out.
+  double none_log_evidence() const {
+    return none ? none_log_weight + none->log_evidence() : -std::numeric_limits<double>::infinity();
   }
 
   const SearchResult& found() {
@@ -101,11 +136,14 @@ struct BoundedPosterior::Impl {
   double prior_log_likelihood = 0.0;  ///< of all touches, by a map that holds only the prior
   std::optional<SearchResult> result;
   EvaluatedBins bins;
+  std::optional<SampledTouchMeans> none;  ///< where the options ask for it
+  double none_log_weight = 0.0;           ///< log of its prior weight times the number of bins
 };
 
 BoundedPosterior::BoundedPosterior(Device& /*device*/, std::span<const Hypothesis> hypotheses,
                                    const BoundedOptions& options) {
   validate_hypotheses(hypotheses);
+  validate(options);
   BoundedOptions checked = options;
   checked.lattice.collapse_fixed().validate();
   checked.contact = resolve(options.contact, hypotheses);
@@ -127,6 +165,9 @@ void BoundedPosterior::reset() {
   posterior.prior_log_likelihood = 0.0;
   posterior.search.reset();
   posterior.result.reset();
+  if (posterior.none) {
+    posterior.none->reset();
+  }
 }
 
 void BoundedPosterior::move_pivot(const glm::dvec2& pivot_mm) {
@@ -134,6 +175,9 @@ void BoundedPosterior::move_pivot(const glm::dvec2& pivot_mm) {
   posterior.options.lattice =
       with_pivot(posterior.options.lattice, pivot_mm, "bounded posterior", posterior.touched);
   posterior.likelihood.move_pivot(pivot_mm);
+  if (posterior.none) {
+    posterior.none->move_pivot(pivot_mm);
+  }
   posterior.result.reset();
 }
 
@@ -148,10 +192,24 @@ void BoundedPosterior::update(std::span<const Touch> touches,
         gather_elements(touch, posterior.options.contact, posterior.options.lattice.pivot_mm));
     added = merged(added, of_touches.back());
   }
+  std::vector<TouchMean> means;
+  if (posterior.none) {
+    posterior.arena.execute([&] {
+      means = posterior.none->evaluate(touches, [&](std::size_t done) {
+        if (progress) {
+          progress(static_cast<double>(done) / (static_cast<double>(touches.size()) + 1.0));
+        }
+      });
+    });
+  }
   if (progress) {
     progress(1.0);
   }
-  posterior.elements = merged(posterior.elements, added);
+  KnownElements elements = merged(posterior.elements, added);
+  if (posterior.none) {
+    posterior.none->add(means);
+  }
+  posterior.elements = std::move(elements);
   for (const ReadingRun& run : added.runs) {
     posterior.prior_log_likelihood +=
         static_cast<double>(run.end - run.begin) *
@@ -187,10 +245,21 @@ Estimate BoundedPosterior::estimate() const {
                           .mode_certain = found.mode_certain,
                           .blocks_bounded = found.blocks_bounded,
                           .bins_evaluated = found.bins_evaluated};
+  const double none = posterior.none_log_evidence();
+  if (posterior.none) {
+    logs.push_back(none);
+    certificate.none_standard_error = posterior.none->standard_error();
+  }
   estimate.identity = normalised(logs);
+  if (posterior.none) {
+    estimate.none = estimate.identity.back();
+    estimate.identity.pop_back();
+  }
   for (std::size_t i = 0; i < bounds.size(); ++i) {
     LogSum others_low;
     LogSum others_high;
+    others_low.add(none);
+    others_high.add(none);
     for (std::size_t other = 0; other < bounds.size(); ++other) {
       if (other != i) {
         others_low.add(bounds[other].low);
@@ -237,7 +306,8 @@ Marginals BoundedPosterior::marginals(int object, const PoseLattice& grid) const
   onto.collapse_fixed().validate();
   const PoseLattice& bins = lattice();
   const bool own = &grid == &bins;
-  const double log_total = posterior.log_total() - posterior.log_weight[object];
+  const double log_total =
+      log_add(posterior.log_total(), posterior.none_log_evidence()) - posterior.log_weight[object];
   Marginals sums{.grid = onto,
                  .xy = std::vector<double>(static_cast<std::size_t>(onto.plane())),
                  .theta = std::vector<double>(static_cast<std::size_t>(onto.theta_rad.count))};
@@ -259,6 +329,12 @@ Marginals BoundedPosterior::marginals(int object, const PoseLattice& grid) const
 double BoundedPosterior::log_likelihood(int object, const Pose& T_object_robot) const {
   Impl& posterior = impl();
   posterior.require_object(object);
+  const auto& [translation_mm, theta_rad] = T_object_robot;
+  if (!std::isfinite(translation_mm.x) || !std::isfinite(translation_mm.y) ||
+      !std::isfinite(theta_rad)) {
+    throw Error(Fault::input, fmt::format("pose {}, {}, {}: give finite numbers", translation_mm.x,
+                                          translation_mm.y, theta_rad));
+  }
   const ContactModel& contact = posterior.options.contact;
   const InterpolatedMap map(posterior.hypotheses[object].map, *contact.prior);
   double sum = 0.0;
@@ -357,7 +433,10 @@ std::vector<PoseBlock> BoundedPosterior::refined_blocks() const {
 
 const PoseLattice& BoundedPosterior::lattice() const { return impl().options.lattice; }
 
-std::string BoundedPosterior::path() const { return "plain loop"; }
+std::string BoundedPosterior::path() const {
+  impl();
+  return "plain loop";
+}
 
 std::uint64_t BoundedPosterior::host_bytes() const {
   const Impl& posterior = impl();

@@ -1,0 +1,154 @@
+// What a bounded posterior tells of its belief: entropy, draws, memory; and beliefs that are flat.
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "bounded/certified.hpp"
+#include "palpate/pose_histogram.hpp"
+#include "touched_shape.hpp"
+
+namespace palpate {
+namespace {
+
+const std::vector<Hypothesis>& two_shapes() {
+  static const std::vector<Hypothesis> two{{map_of(on_letter_l, "L"), 1.0},
+                                           {map_of(on_disc, "disc"), 2.0}};
+  return two;
+}
+
+BoundedOptions small_options() {
+  BoundedOptions options;
+  options.lattice = {.x_mm = {-6.0, 6.0, 13},
+                     .y_mm = {-5.0, 6.0, 12},
+                     .theta_rad = {0, two_pi, 16},
+                     .pivot_mm = {2.0, -1.0}};
+  return options;
+}
+
+Recording touches_of_l(std::size_t touches, std::uint64_t seed) {
+  return touches_of(on_letter_l, {{1.3, -0.8}, 0.7}, touches, seed);
+}
+
+double sum(std::span<const double> values) {
+  return std::accumulate(values.begin(), values.end(), 0.0);
+}
+
+TEST(BoundedBelief, HasTheEntropyOfTheDenseOne) {
+  Device device = Device::open();
+  for (const bool none : {false, true}) {
+    BoundedOptions options = small_options();
+    HistogramOptions dense_options{.lattice = options.lattice};
+    if (none) {
+      options.none_weight = dense_options.none_weight = 5.0;
+    }
+    BoundedPosterior bounded(device, two_shapes(), options);
+    PoseHistogram dense(device, two_shapes(), dense_options);
+    const Recording recording = touches_of_l(4, 821);
+    for (std::size_t n = 0; n <= recording.size(); ++n) {
+      if (n > 0) {
+        bounded.update(recording.touch(n - 1));
+        dense.update(recording.touch(n - 1));
+      }
+      // The dense one's own promise, and a millionth of the mass times the log of the bins.
+      EXPECT_NEAR(bounded.entropy(), dense.entropy(), 1e-3 + 1e-4) << n << " touches";
+    }
+  }
+}
+
+TEST(BoundedBelief, IsDrawnFromInProportion) {
+  Device device = Device::open();
+  for (const bool none : {false, true}) {
+    BoundedOptions options = small_options();
+    if (none) {
+      options.none_weight = 5.0;  // which draws leave out
+    }
+    BoundedPosterior posterior(device, two_shapes(), options);
+    for (const std::size_t touches : {0U, 1U, 3U}) {
+      SCOPED_TRACE(::testing::Message() << touches << " touches");
+      posterior.reset();
+      posterior.update(touches_of_l(3, 822).touches(0, touches));
+      const Estimate estimate = posterior.estimate();
+      constexpr std::size_t count = 4000;
+      const std::vector<PoseSample> draws = posterior.sample(count, 823);
+      ASSERT_EQ(draws.size(), count);
+      const auto plane = static_cast<std::size_t>(options.lattice.plane());
+      std::vector<std::vector<double>> xy(2, std::vector<double>(plane, 0.0));
+      std::vector<std::vector<double>> theta(2, std::vector<double>(16, 0.0));
+      for (const PoseSample& draw : draws) {
+        const auto bin = static_cast<std::size_t>(options.lattice.bin_of(draw.T_object_robot));
+        xy[static_cast<std::size_t>(draw.object)][bin % plane] += 1.0 / count;
+        theta[static_cast<std::size_t>(draw.object)][bin / plane] += 1.0 / count;
+      }
+      const double objects = sum(estimate.identity);
+      for (std::size_t i = 0; i < 2; ++i) {
+        // One draw in each of `count` equal parts of the belief.
+        EXPECT_NEAR(sum(xy[i]), estimate.identity[i] / objects, 1.0 / count + 1e-6);
+        const Marginals marginals = posterior.marginals(static_cast<int>(i));
+        const auto expect_drawn = [&](double drawn, double p) {
+          EXPECT_NEAR(drawn, p, 5.0 * std::sqrt(p / count) + 2.0 / count);
+        };
+        for (std::size_t k = 0; k < plane; ++k) {
+          expect_drawn(xy[i][k], marginals.xy[k] / objects);
+        }
+        for (std::size_t k = 0; k < 16; ++k) {
+          expect_drawn(theta[i][k], marginals.theta[k] / objects);
+        }
+      }
+      const std::vector<PoseSample> again = posterior.sample(count, 823);
+      const std::vector<PoseSample> other = posterior.sample(count, 824);
+      bool same = true;
+      bool other_same = true;
+      for (std::size_t i = 0; i < count; ++i) {
+        const auto equal = [&](const PoseSample& a, const PoseSample& b) {
+          return a.object == b.object &&
+                 a.T_object_robot.translation_mm == b.T_object_robot.translation_mm &&
+                 a.T_object_robot.theta_rad == b.T_object_robot.theta_rad;
+        };
+        same = same && equal(draws[i], again[i]);
+        other_same = other_same && equal(draws[i], other[i]);
+      }
+      EXPECT_TRUE(same);
+      EXPECT_FALSE(other_same);
+      EXPECT_TRUE(posterior.sample(0, 1).empty());
+    }
+  }
+}
+
+TEST(BoundedBelief, OfAHundredMillionBinsBeforeAnyTouchIsFlat) {
+  Device device = Device::open();
+  BoundedOptions options;
+  options.lattice = {
+      .x_mm = {-50.0, 50.0, 600}, .y_mm = {-50.0, 50.0, 500}, .theta_rad = {0, two_pi, 180}};
+  BoundedPosterior posterior(device, two_shapes(), options);
+  const Estimate estimate = posterior.estimate();
+  EXPECT_NEAR(estimate.identity[0], 1.0 / 3.0, 1e-6);
+  EXPECT_EQ(estimate.mode.log_likelihood, 0.0);
+  EXPECT_LE(estimate.certificate->dropped_mass, options.tolerance);
+  const PoseLattice grid{
+      .x_mm = {-50.0, 50.0, 2}, .y_mm = {-50.0, 50.0, 2}, .theta_rad = {0, two_pi, 3}};
+  const Marginals marginals = posterior.marginals(1, grid);
+  for (const double p : marginals.xy) {
+    EXPECT_NEAR(p, 2.0 / 3.0 / 4.0, 1e-6);
+  }
+  for (const double p : marginals.theta) {
+    EXPECT_NEAR(p, 2.0 / 3.0 / 3.0, 1e-6);
+  }
+  // What is promised for a thousand million bins.
+  EXPECT_LE(posterior.host_bytes(), std::uint64_t{256} << 20);
+}
+
+TEST(BoundedBelief, SaysHowItWasFound) {
+  Device device = Device::open();
+  BoundedPosterior posterior(device, two_shapes(), small_options());
+  EXPECT_FALSE(posterior.path().empty());
+  EXPECT_EQ(posterior.path().find('\n'), std::string::npos);
+  EXPECT_GT(posterior.host_bytes(), 0U);
+  EXPECT_EQ(posterior.lattice().bins(), small_options().lattice.bins());
+}
+
+}  // namespace
+}  // namespace palpate

@@ -1,0 +1,77 @@
+// The certificate against the posterior over all bins in float64, over many unknowns.
+
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "bounded/certificate_trials.hpp"
+
+namespace palpate {
+namespace {
+
+TEST(CertificateLaw, HoldsOverFiftyUnknownsOfAHundredBins) { expect_trials({7, 5, 3}, 50, 901); }
+TEST(CertificateLaw, HoldsOverFiftyUnknownsOfATwoThousandBins) {
+  expect_trials({12, 12, 16}, 50, 902);
+}
+TEST(CertificateLaw, HoldsWithinAnyBudget) {
+  Device device = Device::open();
+  Trial trial = make_trial({15, 14, 12}, 904);
+  const reference::Posterior truth =
+      reference_posterior(trial.objects, trial.options, all_touches(trial.recording));
+  for (const double budget_s : {1e-9, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 0.1, 10.0}) {
+    SCOPED_TRACE(::testing::Message() << budget_s << " s");
+    trial.options.budget_s = budget_s;
+    BoundedPosterior posterior(device, trial.objects, trial.options);
+    for (std::size_t i = 0; i < trial.recording.size(); ++i) {
+      posterior.update(trial.recording.touch(i));
+      posterior.estimate();
+    }
+    expect_certified(posterior, trial.objects, trial.options, truth);
+  }
+}
+
+TEST(CertificateLaw, HoldsWithinAnyBudgetAfterOneTouch) {
+  // Nearly every bin matters: the budget leaves most of them out.
+  Device device = Device::open();
+  for (const double budget_s : {1e-9, 1e-5, 1e-4, 1e-3}) {
+    for (std::uint64_t seed = 905; seed < 910; ++seed) {
+      SCOPED_TRACE(::testing::Message() << budget_s << " s, seed " << seed);
+      Trial trial = make_trial({15, 14, 12}, seed);
+      trial.recording = first_touches(trial.recording, 1);
+      trial.options.budget_s = budget_s;
+      expect_certified(device, trial.objects, trial.options, all_touches(trial.recording));
+    }
+  }
+}
+
+TEST(CertificateLaw, BoundsEveryLogEvidenceWithinTheNatsAskedFor) {
+  Device device = Device::open();
+  for (const double nats : {3.0, 0.3, 0.01}) {
+    for (const double tolerance : {1e-6, 0.3}) {
+      Trial trial = make_trial({15, 14, 12}, 911);
+      // Tens of nats below, so that the tolerance would drop it.
+      trial.objects[1].weight = 1e-30;
+      trial.options.tolerance = tolerance;
+      trial.options.evidence_nats = nats;
+      const Certified seen =
+          expect_certified(device, trial.objects, trial.options, all_touches(trial.recording));
+      EXPECT_LE(seen.widest_nats, nats);
+    }
+  }
+}
+
+TEST(CertificateLaw, KeepsEveryTolerance) {
+  // No sum of float64 is certain to 1e-15: such a tolerance is met as far as rounding lets it.
+  Device device = Device::open();
+  for (const double tolerance : {1e-15, 1e-12, 1e-9, 1e-3, 0.1, 0.9}) {
+    SCOPED_TRACE(::testing::Message() << tolerance);
+    Trial trial = make_trial({15, 14, 12}, 912);
+    trial.options.tolerance = tolerance;
+    expect_certified(device, trial.objects, trial.options, all_touches(trial.recording));
+  }
+}
+
+}  // namespace
+}  // namespace palpate

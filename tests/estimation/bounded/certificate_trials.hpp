@@ -1,0 +1,27 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "bounded/certified.hpp"
+
+namespace palpate {
+
+/// An unknown, its objects and its touches.
+struct Trial {
+  std::vector<Hypothesis> objects;
+  BoundedOptions options;
+  Recording recording;
+};
+
+/// A trial over a lattice of so many bins in x, y and theta: two to four objects, letters and
+/// made-up maps in turn, of unequal weights and cells, under 1 to 9 touches.
+Trial make_trial(const std::array<int, 3>& bins, std::uint64_t seed);
+
+Recording first_touches(const Recording& recording, std::size_t touches);
+
+/// Runs trials and expects their certificates to hold; prints the largest error and certificate.
+void expect_trials(const std::array<int, 3>& bins, int trials, std::uint64_t seed);
+
+}  // namespace palpate

@@ -1,0 +1,185 @@
+#include "bounded/certified.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+#include <gtest/gtest.h>
+
+namespace palpate {
+
+namespace {
+
+double log_sum(std::span<const double> logs) {
+  const double most = *std::max_element(logs.begin(), logs.end());
+  double sum = 0.0;
+  for (const double l : logs) {
+    sum += std::exp(l - most);
+  }
+  return most + std::log(sum);
+}
+
+/// log of every prior weight over their sum.
+std::vector<double> log_prior(const std::vector<double>& weights) {
+  const double largest = *std::max_element(weights.begin(), weights.end());
+  double sum = 0.0;
+  for (const double weight : weights) {
+    sum += weight / largest;
+  }
+  std::vector<double> logs;
+  for (const double weight : weights) {
+    logs.push_back(std::log(weight) - std::log(largest) - std::log(sum));
+  }
+  return logs;
+}
+
+double distance(std::span<const double> a, std::span<const double> b) {
+  EXPECT_EQ(a.size(), b.size());
+  double sum = 0.0;
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    sum += std::abs(a[i] - b[i]);
+  }
+  return sum / 2.0;
+}
+
+/// The mass of the places that `estimated` gives nothing.
+double mass_of_zeros(std::span<const double> truth, std::span<const double> estimated) {
+  double sum = 0.0;
+  for (std::size_t i = 0; i < truth.size(); ++i) {
+    sum += estimated[i] == 0.0 ? truth[i] : 0.0;
+  }
+  return sum;
+}
+
+}  // namespace
+
+reference::Posterior reference_posterior(std::span<const Hypothesis> objects,
+                                         const BoundedOptions& options,
+                                         std::span<const Touch> touches) {
+  return reference_posterior(
+      objects, HistogramOptions{.lattice = options.lattice, .contact = options.contact}, touches);
+}
+
+Certified expect_certified(const BoundedPosterior& posterior, std::span<const Hypothesis> objects,
+                           const BoundedOptions& options, const reference::Posterior& truth,
+                           double nats) {
+  Certified seen{.estimate = posterior.estimate()};
+  const Estimate& estimate = seen.estimate;
+  const std::vector<double> prior = log_prior(truth.weight);
+  const std::vector<double> identity = reference::identity(truth);
+  if (!estimate.certificate || estimate.identity.size() != objects.size() ||
+      estimate.identity_bounds.size() != objects.size() ||
+      estimate.certificate->log_evidence.size() != objects.size() || !estimate.mode.bin) {
+    ADD_FAILURE() << "no certificate, bounds or bin for every object";
+    return seen;
+  }
+  const Certificate& certificate = *estimate.certificate;
+  const double allowed = certificate.dropped_mass + 2.0 * nats + 1e-14;
+
+  EXPECT_GE(certificate.dropped_mass, 0.0);
+  EXPECT_LE(certificate.dropped_mass, options.budget_s ? 1.0 : options.tolerance + 2.0 * nats);
+  EXPECT_NEAR(std::accumulate(estimate.identity.begin(), estimate.identity.end(), estimate.none),
+              1.0, 1e-12);
+  EXPECT_GE(certificate.bins_evaluated, 0);  // bins that no element sees need not be evaluated
+  EXPECT_GE(certificate.blocks_bounded, 0);
+
+  double top = -std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < objects.size(); ++i) {
+    SCOPED_TRACE(::testing::Message() << "object " << i);
+    const std::vector<double>& logs = truth.log_likelihood[i];
+    top = std::max(top, prior[i] + *std::max_element(logs.begin(), logs.end()));
+    const double evidence = prior[i] + log_sum(logs);
+    const auto [low_nats, high_nats] = certificate.log_evidence[i];
+    EXPECT_LE(low_nats, evidence + nats);
+    EXPECT_GE(high_nats, evidence - nats);
+    seen.widest_nats = std::max(seen.widest_nats, high_nats - low_nats);
+    if (options.evidence_nats && !options.budget_s) {
+      EXPECT_LE(high_nats - low_nats, *options.evidence_nats);
+    }
+
+    const double p = estimate.identity[i];
+    const auto [low, high] = estimate.identity_bounds[i];
+    EXPECT_TRUE(0.0 <= low && low <= p && p <= high && high <= 1.0 + 1e-14)
+        << low << ", " << p << ", " << high;
+    const double slack = 2.0 * nats * identity[i] + 1e-15;
+    EXPECT_LE(low, identity[i] + slack);
+    EXPECT_GE(high, identity[i] - slack);
+    seen.identity_error = std::max(seen.identity_error, std::abs(p - identity[i]));
+  }
+  EXPECT_LE(seen.identity_error, allowed);
+  seen.total_variation = distance(estimate.identity, identity);
+
+  double by_xy = 0.0;
+  double by_theta = 0.0;
+  double left_out = 0.0;
+  for (std::size_t i = 0; i < objects.size(); ++i) {
+    const auto [grid, xy, theta] = posterior.marginals(static_cast<int>(i));
+    const std::vector<double> true_xy = reference::marginal_xy(truth, static_cast<int>(i));
+    by_xy += distance(xy, true_xy);
+    by_theta += distance(theta, reference::marginal_theta(truth, static_cast<int>(i)));
+    left_out += mass_of_zeros(true_xy, xy);
+    const double p = estimate.identity[i];
+    // Sums of float64, of logs that keep 16 digits.
+    const double rounding = 1e-12 + 1e-15 * std::abs(estimate.mode.log_likelihood);
+    EXPECT_NEAR(std::accumulate(xy.begin(), xy.end(), 0.0), p, rounding) << "object " << i;
+    EXPECT_NEAR(std::accumulate(theta.begin(), theta.end(), 0.0), p, rounding) << "object " << i;
+  }
+  EXPECT_LE(left_out, allowed);
+  seen.total_variation = std::max({seen.total_variation, by_xy, by_theta});
+  EXPECT_LE(seen.total_variation, allowed);
+
+  const auto object = static_cast<std::size_t>(estimate.mode.object);
+  const double at_mode = truth.log_likelihood[object][static_cast<std::size_t>(*estimate.mode.bin)];
+  EXPECT_NEAR(estimate.mode.log_likelihood, at_mode, nats);
+  if (!options.budget_s || certificate.mode_certain) {
+    EXPECT_GE(prior[object] + at_mode, top - 2.0 * nats) << "not the best bin";
+  }
+  Uniform random(17);
+  for (std::size_t i = 0; i < objects.size(); ++i) {
+    for (int k = 0; k < 3; ++k) {
+      const auto bin =
+          static_cast<std::size_t>(random(0.0, static_cast<double>(options.lattice.bins())));
+      const Pose pose = reference::bin_pose(options.lattice, static_cast<std::int64_t>(bin));
+      EXPECT_NEAR(posterior.log_likelihood(static_cast<int>(i), pose), truth.log_likelihood[i][bin],
+                  nats);
+    }
+  }
+  return seen;
+}
+
+Certified expect_certified(Device& device, std::span<const Hypothesis> objects,
+                           const BoundedOptions& options, std::span<const Touch> touches,
+                           double nats) {
+  BoundedPosterior posterior(device, objects, options);
+  posterior.update(touches);
+  return expect_certified(posterior, objects, options,
+                          reference_posterior(objects, options, touches), nats);
+}
+
+std::vector<std::vector<double>> told_by(const BoundedPosterior& posterior, std::size_t objects) {
+  const Estimate estimate = posterior.estimate();
+  const Certificate certificate = estimate.certificate.value();
+  const RefinedPose refined = posterior.refine(estimate.mode);
+  std::vector<std::vector<double>> told{
+      estimate.identity,
+      {estimate.none, certificate.none_standard_error.value_or(-1.0),
+       static_cast<double>(estimate.contradicted), certificate.dropped_mass,
+       static_cast<double>(certificate.mode_certain)},
+      {static_cast<double>(estimate.mode.object), static_cast<double>(estimate.mode.bin.value()),
+       estimate.mode.log_likelihood},
+      {refined.T_object_robot.translation_mm.x, refined.T_object_robot.translation_mm.y,
+       refined.T_object_robot.theta_rad},
+      {refined.covariance.begin(), refined.covariance.end()}};
+  for (std::size_t i = 0; i < objects; ++i) {
+    const auto [grid, xy, theta] = posterior.marginals(static_cast<int>(i));
+    told.push_back(xy);
+    told.push_back(theta);
+    told.push_back({estimate.identity_bounds[i].low, estimate.identity_bounds[i].high,
+                    certificate.log_evidence[i].low, certificate.log_evidence[i].high,
+                    posterior.log_likelihood(static_cast<int>(i), {{0.3, -0.7}, 1.1})});
+  }
+  return told;
+}
+
+}  // namespace palpate
