@@ -2,43 +2,44 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <optional>
 #include <span>
 #include <vector>
 
 #include "bin_likelihood.hpp"
 #include "known_elements.hpp"
+#include "leaf_pass.hpp"
 #include "palpate/bounded_posterior.hpp"
+#include "tile_bounds.hpp"
 
 namespace palpate {
 
-/// Bins whose log-likelihood a search evaluated.
-struct EvaluatedBins {
-  std::vector<BinBox> boxes;           ///< ascending by object, theta, y, x
-  std::vector<double> log_likelihood;  ///< boxes one after another, [y, x] in each, in nats
+/// Finds the bins that hold all but a tolerated part of the posterior, by branch and bound: tiles
+/// of poses are bounded by TileBounds, dropped where they hold too little, and divided otherwise,
+/// until the smallest tiles' bins are evaluated in the order of their bounds.
+class BoundSearch {
+ public:
+  /// @param options checked, with a resolved contact model; `likelihood` outlives the search
+  BoundSearch(std::span<const Hypothesis> hypotheses, const BoundedOptions& options,
+              const BinLikelihood& likelihood);
 
-  std::uint64_t bytes() const {
-    return boxes.capacity() * sizeof(BinBox) + log_likelihood.capacity() * sizeof(double);
-  }
-};
+  /// Forgets all touches.
+  void reset();
+  /// Adds the penalties of more elements to the sums of the largest tiles.
+  void add(const KnownElements& added);
+  /// @param elements all that were added since reset()
+  SearchResult run(const KnownElements& elements, const BinVisitor& visit) const;
 
-/// What a search found out about one hypothesis, as logs in nats with its prior weight.
-struct HypothesisEvidence {
-  double log_evaluated = 0.0;  ///< of the summed likelihood of the bins that were evaluated
-  double log_rounding = 0.0;   ///< of the bound of that sum's error
-  double log_dropped = 0.0;    ///< of the bound of the summed likelihood of all other bins
-};
+  std::uint64_t bytes() const;
 
-/// What a search by bounds returns.
-struct SearchResult {
-  std::vector<HypothesisEvidence> evidence;  ///< [hypothesis]
-  int best_object = 0;
-  std::int64_t best_bin = 0;
-  double best_log_likelihood = 0.0;  ///< of the best bin, without prior weights
-  bool mode_certain = false;
-  std::int64_t blocks_bounded = 0;
-  std::int64_t bins_evaluated = 0;
-  EvaluatedBins bins;
+ private:
+  friend class SearchRun;
+
+  const BoundedOptions& options_;
+  const BinLikelihood& likelihood_;
+  std::vector<double> log_weight_;
+  std::vector<TileBounds> bounds_;  ///< [hypothesis]
+  /// Sums of penalties of the largest tiles, [hypothesis][theta, batch y, batch x, tile].
+  std::vector<std::vector<std::uint32_t>> largest_tiles_;
 };
 
 }  // namespace palpate

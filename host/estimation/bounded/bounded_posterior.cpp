@@ -3,16 +3,20 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <tuple>
 #include <utility>
 
 #include <fmt/format.h>
+#include <tbb/task_arena.h>
 
 #include "bin_likelihood.hpp"
 #include "bound_search.hpp"
 #include "contradiction.hpp"
+#include "evaluated_bins.hpp"
 #include "hypotheses.hpp"
 #include "interpolated_map.hpp"
 #include "known_elements.hpp"
+#include "log_sum.hpp"
 #include "moved_from.hpp"
 #include "moved_pivot.hpp"
 #include "palpate/error.hpp"
@@ -21,49 +25,61 @@
 
 namespace palpate {
 
+namespace {
+
+/// Index in the lattice of the i-th bin of a box.
+std::int64_t bin_in(const PoseLattice& lattice, const BinBox& box, std::int64_t i) {
+  return (std::int64_t{box.theta} * lattice.y_mm.count + box.y_first + i / box.x_count) *
+             lattice.x_mm.count +
+         box.x_first + i % box.x_count;
+}
+
+}  // namespace
+
 struct BoundedPosterior::Impl {
   Impl(std::span<const Hypothesis> all, const BoundedOptions& wanted)
       : options(wanted),
         hypotheses(all.begin(), all.end()),
         likelihood(all, options.contact, options.lattice),
-        log_weight(log_weights(all)) {
+        search(all, options, likelihood),
+        log_weight(log_weights(all)),
+        arena(options.threads > 0 ? options.threads : tbb::task_arena::automatic) {
     for (const Hypothesis& hypothesis : all) {
       bodies.push_back(displaced_body(hypothesis.map));
     }
   }
 
-  const SearchResult& search() {
-    if (!found) {
-      SearchResult result;
-      const PoseLattice& in = options.lattice;
-      double best = -std::numeric_limits<double>::infinity();
-      for (std::size_t i = 0; i < hypotheses.size(); ++i) {
-        for (int t = 0; t < in.theta_rad.count; ++t) {
-          result.bins.boxes.push_back({static_cast<int>(i), t, 0, in.y_mm.count, 0, in.x_mm.count});
-        }
-      }
-      result.bins.log_likelihood.resize(hypotheses.size() * in.bins());
-      likelihood.evaluate(result.bins.boxes, elements, std::span(result.bins.log_likelihood));
-      for (std::size_t i = 0; i < hypotheses.size(); ++i) {
-        const auto logs = std::span(result.bins.log_likelihood).subspan(i * in.bins(), in.bins());
-        const auto at = std::max_element(logs.begin(), logs.end());
-        double sum = 0.0;
-        for (const double l : logs) {
-          sum += std::exp(l - *at);
-        }
-        result.evidence.push_back({log_weight[i] + *at + std::log(sum), -1e9, -1e9});
-        if (log_weight[i] + *at > best) {
-          best = log_weight[i] + *at;
-          result.best_object = static_cast<int>(i);
-          result.best_bin = at - logs.begin();
-          result.best_log_likelihood = *at;
-        }
-      }
-      result.mode_certain = true;
-      result.bins_evaluated = static_cast<std::int64_t>(result.bins.log_likelihood.size());
-      found = std::move(result);
+  const SearchResult& found() {
+    if (!result) {
+      bins.clear();
+      result = run([&](const BinBox& box, std::span<const double> log_likelihood) {
+        bins.add(box, log_likelihood);
+      });
     }
-    return *found;
+    return *result;
+  }
+
+  SearchResult run(const BinVisitor& visit) {
+    return arena.execute([&] { return search.run(elements, visit); });
+  }
+
+  /// Visits the evaluated bins; searches again where there was no room to keep them.
+  void visit(const BinVisitor& visitor) {
+    found();
+    if (bins.complete()) {
+      bins.visit(visitor);
+    } else {
+      run(visitor);
+    }
+  }
+
+  /// Probability of a bin, given the log-likelihood of it.
+  double log_total() {
+    LogSum total;
+    for (const HypothesisEvidence& evidence : found().evidence) {
+      total.add(evidence.evaluated);
+    }
+    return total.log();
   }
 
   void require_object(int object) const {
@@ -76,12 +92,15 @@ struct BoundedPosterior::Impl {
   BoundedOptions options;
   std::vector<Hypothesis> hypotheses;
   BinLikelihood likelihood;
+  BoundSearch search;
   std::vector<double> log_weight;
+  tbb::task_arena arena;
   std::vector<Body> bodies;
   KnownElements elements;
   bool touched = false;
   double prior_log_likelihood = 0.0;  ///< of all touches, by a map that holds only the prior
-  std::optional<SearchResult> found;
+  std::optional<SearchResult> result;
+  EvaluatedBins bins;
 };
 
 BoundedPosterior::BoundedPosterior(Device& /*device*/, std::span<const Hypothesis> hypotheses,
@@ -106,7 +125,8 @@ void BoundedPosterior::reset() {
   posterior.elements = {};
   posterior.touched = false;
   posterior.prior_log_likelihood = 0.0;
-  posterior.found.reset();
+  posterior.search.reset();
+  posterior.result.reset();
 }
 
 void BoundedPosterior::move_pivot(const glm::dvec2& pivot_mm) {
@@ -114,14 +134,14 @@ void BoundedPosterior::move_pivot(const glm::dvec2& pivot_mm) {
   posterior.options.lattice =
       with_pivot(posterior.options.lattice, pivot_mm, "bounded posterior", posterior.touched);
   posterior.likelihood.move_pivot(pivot_mm);
-  posterior.found.reset();
+  posterior.result.reset();
 }
 
 void BoundedPosterior::update(std::span<const Touch> touches,
                               const std::function<void(double)>& progress) {
   Impl& posterior = impl();
-  const KnownElements added = gather_elements(touches, posterior.options.contact,
-                                              posterior.options.lattice.pivot_mm);
+  const KnownElements added =
+      gather_elements(touches, posterior.options.contact, posterior.options.lattice.pivot_mm);
   if (progress) {
     progress(1.0);
   }
@@ -132,24 +152,47 @@ void BoundedPosterior::update(std::span<const Touch> touches,
         palpate::prior_log_likelihood(run.reading, posterior.options.contact);
   }
   posterior.touched = posterior.touched || !touches.empty();
-  posterior.found.reset();
+  posterior.arena.execute([&] { posterior.search.add(added); });
+  posterior.result.reset();
 }
 
 Estimate BoundedPosterior::estimate() const {
   Impl& posterior = impl();
-  const SearchResult& found = posterior.search();
+  const SearchResult& found = posterior.found();
   Estimate estimate;
+  LogSum evaluated;
+  LogSum uncertain;
   std::vector<double> logs;
-  Certificate certificate{.mode_certain = found.mode_certain,
+  std::vector<LogInterval> bounds;
+  LogSum all_low;
+  LogSum all_high;
+  for (const HypothesisEvidence& evidence : found.evidence) {
+    logs.push_back(evidence.evaluated);
+    evaluated.add(evidence.evaluated);
+    uncertain.add(evidence.rounding);
+    uncertain.add(evidence.dropped);
+    bounds.push_back({log_subtract(evidence.evaluated, evidence.rounding),
+                      log_add(log_add(evidence.evaluated, evidence.rounding), evidence.dropped)});
+  }
+  // Dropped and rounding mass over the whole that they are part of.
+  const double dropped = std::exp(uncertain.log() - evaluated.log());
+  Certificate certificate{.dropped_mass = std::isfinite(dropped) ? dropped / (1.0 + dropped) : 1.0,
+                          .log_evidence = bounds,
+                          .mode_certain = found.mode_certain,
                           .blocks_bounded = found.blocks_bounded,
                           .bins_evaluated = found.bins_evaluated};
-  for (const HypothesisEvidence& evidence : found.evidence) {
-    logs.push_back(evidence.log_evaluated);
-    certificate.log_evidence.push_back({evidence.log_evaluated, evidence.log_evaluated});
-  }
   estimate.identity = normalised(logs);
-  for (const double p : estimate.identity) {
-    estimate.identity_bounds.push_back({p, p});
+  for (std::size_t i = 0; i < bounds.size(); ++i) {
+    LogSum others_low;
+    LogSum others_high;
+    for (std::size_t other = 0; other < bounds.size(); ++other) {
+      if (other != i) {
+        others_low.add(bounds[other].low);
+        others_high.add(bounds[other].high);
+      }
+    }
+    estimate.identity_bounds.push_back({1.0 / (1.0 + std::exp(others_high.log() - bounds[i].low)),
+                                        1.0 / (1.0 + std::exp(others_low.log() - bounds[i].high))});
   }
   estimate.certificate = std::move(certificate);
   estimate.mode = {.object = found.best_object,
@@ -186,40 +229,24 @@ Marginals BoundedPosterior::marginals(int object, const PoseLattice& grid) const
   posterior.require_object(object);
   PoseLattice onto = grid;
   onto.collapse_fixed().validate();
-  const SearchResult& found = posterior.search();
-  double log_total = -std::numeric_limits<double>::infinity();
-  {
-    std::vector<double> logs;
-    for (const HypothesisEvidence& evidence : found.evidence) {
-      logs.push_back(evidence.log_evaluated);
-    }
-    const double most = *std::max_element(logs.begin(), logs.end());
-    double sum = 0.0;
-    for (const double l : logs) {
-      sum += std::exp(l - most);
-    }
-    log_total = most + std::log(sum);
-  }
+  const PoseLattice& bins = lattice();
+  const bool own = &grid == &bins;
+  const double log_total = posterior.log_total() - posterior.log_weight[object];
   Marginals sums{.grid = onto,
                  .xy = std::vector<double>(static_cast<std::size_t>(onto.plane())),
                  .theta = std::vector<double>(static_cast<std::size_t>(onto.theta_rad.count))};
-  std::size_t k = 0;
-  for (const BinBox& box : found.bins.boxes) {
-    for (std::int64_t i = 0; i < box.bins(); ++i, ++k) {
-      if (box.object != object) {
-        continue;
-      }
-      const double p =
-          std::exp(posterior.log_weight[object] + found.bins.log_likelihood[k] - log_total);
-      const std::int64_t bin =
-          (std::int64_t{box.theta} * lattice().y_mm.count + box.y_first + i / box.x_count) *
-              lattice().x_mm.count +
-          box.x_first + i % box.x_count;
-      const std::int64_t at = onto.bin_of(lattice().T_object_robot(bin));
+  posterior.visit([&](const BinBox& box, std::span<const double> log_likelihood) {
+    if (box.object != object) {
+      return;
+    }
+    for (std::int64_t i = 0; i < box.bins(); ++i) {
+      const double p = std::exp(log_likelihood[log_likelihood.size() == 1 ? 0 : i] - log_total);
+      const std::int64_t bin = bin_in(bins, box, i);
+      const std::int64_t at = own ? bin : onto.bin_of(bins.T_object_robot(bin));
       sums.xy[at % onto.plane()] += p;
       sums.theta[at / onto.plane()] += p;
     }
-  }
+  });
   return sums;
 }
 
@@ -240,15 +267,74 @@ double BoundedPosterior::log_likelihood(int object, const Pose& T_object_robot) 
   return sum;
 }
 
-double BoundedPosterior::entropy() const { return 0.0; }
+double BoundedPosterior::entropy() const {
+  Impl& posterior = impl();
+  const double log_total = posterior.log_total();
+  double entropy = 0.0;
+  posterior.visit([&](const BinBox& box, std::span<const double> log_likelihood) {
+    const double times = log_likelihood.size() == 1 ? static_cast<double>(box.bins()) : 1.0;
+    for (const double l : log_likelihood) {
+      const double log_p = posterior.log_weight[box.object] + l - log_total;
+      entropy -= times * std::exp(log_p) * log_p;
+    }
+  });
+  return entropy;
+}
 
 std::vector<PoseSample> BoundedPosterior::sample(std::size_t count, std::uint64_t seed) const {
   Impl& posterior = impl();
-  const SearchResult& found = posterior.search();
   Random random(seed, Stream::belief);
-  std::vector<PoseSample> samples;
+  // One draw in each of `count` equal parts of the belief: less variance than independent draws.
+  std::vector<double> targets;
+  targets.reserve(count);
   for (std::size_t i = 0; i < count; ++i) {
-    samples.push_back({found.best_object, lattice().T_object_robot(found.best_bin)});
+    targets.push_back((static_cast<double>(i) + random.uniform()) / static_cast<double>(count));
+  }
+  struct Draw {
+    std::int32_t object;
+    std::int64_t bin;
+  };
+  std::vector<Draw> draws;
+  draws.reserve(count);
+  const double log_total = posterior.log_total();
+  const PoseLattice& in = lattice();
+  double reached = 0.0;
+  Draw last{posterior.found().best_object, posterior.found().best_bin};
+  posterior.visit([&](const BinBox& box, std::span<const double> log_likelihood) {
+    const double weight = posterior.log_weight[box.object] - log_total;
+    if (log_likelihood.size() == 1) {
+      const double p = std::exp(weight + log_likelihood[0]);
+      const std::int64_t bins = box.bins();
+      while (draws.size() < count &&
+             targets[draws.size()] < reached + p * static_cast<double>(bins)) {
+        const auto i = static_cast<std::int64_t>((targets[draws.size()] - reached) / p);
+        draws.push_back({box.object, bin_in(in, box, std::min(i, bins - 1))});
+      }
+      reached += p * static_cast<double>(bins);
+      return;
+    }
+    for (std::size_t i = 0; i < log_likelihood.size(); ++i) {
+      reached += std::exp(weight + log_likelihood[i]);
+      last = {box.object, bin_in(in, box, static_cast<std::int64_t>(i))};
+      while (draws.size() < count && targets[draws.size()] < reached) {
+        draws.push_back(last);
+      }
+    }
+  });
+  draws.resize(count, last);  // rounding may leave the last draw out
+  std::sort(draws.begin(), draws.end(), [](const Draw& a, const Draw& b) {
+    return std::tie(a.object, a.bin) < std::tie(b.object, b.bin);
+  });
+  std::vector<PoseSample> samples;
+  samples.reserve(count);
+  const auto within = [&](const Axis& axis, std::int64_t bin) {
+    return axis.centre(static_cast<int>(bin)) + random.uniform(-0.5, 0.5) * axis.step();
+  };
+  for (const Draw& draw : draws) {
+    const double x = within(in.x_mm, draw.bin % in.x_mm.count);
+    const double y = within(in.y_mm, draw.bin % in.plane() / in.x_mm.count);
+    const double theta = within(in.theta_rad, draw.bin / in.plane());
+    samples.push_back({draw.object, in.T_object_robot(x, y, theta)});
   }
   return samples;
 }
@@ -257,6 +343,9 @@ const PoseLattice& BoundedPosterior::lattice() const { return impl().options.lat
 
 std::string BoundedPosterior::path() const { return "plain loop"; }
 
-std::uint64_t BoundedPosterior::host_bytes() const { return 0; }
+std::uint64_t BoundedPosterior::host_bytes() const {
+  const Impl& posterior = impl();
+  return posterior.search.bytes() + posterior.bins.bytes();
+}
 
 }  // namespace palpate

@@ -18,8 +18,8 @@ struct ReadingRun {
 };
 
 /// The elements of some touches that are not Unknown, in the robot frame and relative to the
-/// lattice's pivot. Elements multiply (Eq. 13), so that neither touches nor their order count: equal
-/// readings stand together, by their places.
+/// lattice's pivot. Elements multiply (Eq. 13), so that neither touches nor their order count:
+/// equal readings stand together, by their places.
 struct KnownElements {
   std::vector<glm::dvec2> from_pivot_mm;
   std::vector<ReadingRun> runs;  ///< ascending by reading

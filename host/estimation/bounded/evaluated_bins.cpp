@@ -1,0 +1,38 @@
+#include "evaluated_bins.hpp"
+
+namespace palpate {
+
+namespace {
+
+/// Together with the vectors' growth within some 100 MiB.
+constexpr std::uint64_t most_bytes = std::uint64_t{48} << 20;
+
+}  // namespace
+
+void EvaluatedBins::clear() { *this = {}; }
+
+void EvaluatedBins::add(const BinBox& box, std::span<const double> log_likelihood) {
+  if (!complete_) {
+    return;
+  }
+  if (boxes_.size() * (sizeof(BinBox) + sizeof(std::uint32_t)) +
+          (values_.size() + log_likelihood.size()) * sizeof(double) >
+      most_bytes) {
+    clear();
+    complete_ = false;
+    return;
+  }
+  boxes_.push_back(box);
+  value_counts_.push_back(static_cast<std::uint32_t>(log_likelihood.size()));
+  values_.insert(values_.end(), log_likelihood.begin(), log_likelihood.end());
+}
+
+void EvaluatedBins::visit(const BinVisitor& visit) const {
+  std::size_t first = 0;
+  for (std::size_t i = 0; i < boxes_.size(); ++i) {
+    visit(boxes_[i], std::span(values_).subspan(first, value_counts_[i]));
+    first += value_counts_[i];
+  }
+}
+
+}  // namespace palpate

@@ -1,0 +1,65 @@
+#include "tile_bounds.hpp"
+
+#include <tbb/parallel_for.h>
+
+#include "reading_penalties.hpp"
+
+namespace palpate {
+
+TileBounds::TileBounds(const OccupancyGrid& map, const ContactModel& contact, std::size_t object,
+                       const PoseLattice& lattice)
+    : levels_(tile_levels(lattice, map.cell_mm, tile_sizes(lattice, map.cell_mm))),
+      // Square 0 lies between the first node and the prior's node before it.
+      corner_mm_(glm::dvec2(lattice.x_mm.centre(0), lattice.y_mm.centre(0)) - map.origin_mm +
+                 map.cell_mm),
+      cell_mm_(map.cell_mm) {
+  const std::size_t readings = contact.table ? contact.table->levels() : 2;
+  tables_.assign(levels_.size(), std::vector<WindowTable>(readings));
+  tbb::parallel_for(std::size_t{0}, readings, [&](std::size_t reading) {
+    SquarePenalties penalties{.parts = 0, .least = {}};
+    for (std::size_t level = 0; level < levels_.size(); ++level) {
+      const TileSize& size = levels_[level].size;
+      if (penalties.parts != size.parts) {
+        penalties =
+            square_penalties(map, contact, static_cast<Reading>(reading), object, size.parts);
+      }
+      tables_[level][reading] = window_table(penalties, size.side);
+    }
+  });
+}
+
+void TileBounds::place(std::size_t level, double theta_rad, const KnownElements& elements,
+                       PlacedElements& placed) const {
+  place_elements(elements,
+                 {.theta_rad = theta_rad,
+                  .corner_mm = corner_mm_,
+                  .square_mm = cell_mm_ / levels_[level].size.parts},
+                 tables_[level].front(), placed);
+}
+
+void TileBounds::add(std::size_t level, const KnownElements& elements, const PlacedElements& placed,
+                     int first_x, int first_y, std::uint32_t* sums) const {
+  for (const ReadingRun& run : elements.runs) {
+    add_penalties(placed, run, table(level, run.reading), first_x, first_y, sums);
+  }
+}
+
+double TileBounds::best(std::size_t level, const KnownElements& elements) const {
+  double sum = 0.0;
+  for (const ReadingRun& run : elements.runs) {
+    sum += static_cast<double>(run.end - run.begin) * table(level, run.reading).best;
+  }
+  return sum;
+}
+
+std::size_t TileBounds::bytes() const {
+  std::size_t bytes = 0;
+  for (const std::vector<WindowTable>& level : tables_) {
+    for (const WindowTable& table : level) {
+      bytes += table.bytes();
+    }
+  }
+  return bytes;
+}
+
+}  // namespace palpate

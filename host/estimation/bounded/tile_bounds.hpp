@@ -1,0 +1,62 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "known_elements.hpp"
+#include "palpate/contact_model.hpp"
+#include "palpate/occupancy_grid.hpp"
+#include "tile_levels.hpp"
+#include "tile_penalties.hpp"
+#include "window_table.hpp"
+
+namespace palpate {
+
+/// A tile of one object's poses, and the largest log-likelihood, with the prior weight, that a bin
+/// in it can have.
+struct Tile {
+  double bound = 0.0;
+  std::int32_t object = 0;
+  std::int32_t theta = 0;
+  std::int32_t x = 0;
+  std::int32_t y = 0;
+};
+
+/// What bounds the likelihood over the tiles of one object: the levels of tiles, and a window table
+/// of each level for every reading.
+class TileBounds {
+ public:
+  /// @param contact resolved: with its prior
+  TileBounds(const OccupancyGrid& map, const ContactModel& contact, std::size_t object,
+             const PoseLattice& lattice);
+
+  std::span<const TileLevel> levels() const { return levels_; }
+  std::int64_t bins(std::size_t level, const Tile& tile) const {
+    return std::int64_t{levels_[level].x.bins(tile.x)} * levels_[level].y.bins(tile.y);
+  }
+
+  /// Places the elements for the tiles of a level at one theta.
+  void place(std::size_t level, double theta_rad, const KnownElements& elements,
+             PlacedElements& placed) const;
+  /// Adds the elements' penalties to the sums of the batch of tiles whose first tile this is.
+  void add(std::size_t level, const KnownElements& elements, const PlacedElements& placed,
+           int first_x, int first_y, std::uint32_t* sums) const;
+  /// Log-likelihood of the elements without any penalty, in nats.
+  double best(std::size_t level, const KnownElements& elements) const;
+
+  std::size_t bytes() const;
+
+ private:
+  const WindowTable& table(std::size_t level, Reading reading) const {
+    return tables_[level][static_cast<std::size_t>(reading)];
+  }
+
+  std::vector<TileLevel> levels_;
+  std::vector<std::vector<WindowTable>> tables_;  ///< [level][reading]
+  glm::dvec2 corner_mm_;                          ///< of the first tile, from the map's square 0
+  double cell_mm_;
+};
+
+}  // namespace palpate

@@ -1,0 +1,49 @@
+#include "tile_levels.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "window_table.hpp"
+
+namespace palpate {
+
+namespace {
+
+TileAxis tile_axis(const Axis& axis, double side_mm) {
+  TileAxis tiles{.first_mm = axis.centre(0), .side_mm = side_mm, .first_bin = {}};
+  const double step = axis.step();
+  const double extent_mm = step * (axis.count - 1);
+  // A whole number of batches.
+  const auto batches = static_cast<int>(std::floor(extent_mm / (batch_side * side_mm))) + 1;
+  const int count = batch_side * batches;
+  tiles.first_bin.reserve(static_cast<std::size_t>(count) + 1);
+  for (int tile = 0; tile < count; ++tile) {
+    // Tiles of all levels that begin at one place agree on the first bin: the product is exact
+    // alike, for sides differ by powers of two.
+    const double begin_mm = tile * side_mm;
+    const double first = begin_mm == 0.0 ? 0.0 : std::ceil(begin_mm / step);
+    tiles.first_bin.push_back(static_cast<int>(std::min<double>(first, axis.count)));
+  }
+  tiles.first_bin.push_back(axis.count);
+  return tiles;
+}
+
+}  // namespace
+
+std::vector<TileSize> tile_sizes(const PoseLattice& lattice, double cell_mm) {
+  (void)lattice;
+  (void)cell_mm;
+  return {{1, 16}, {1, 4}, {4, 4}};
+}
+
+std::vector<TileLevel> tile_levels(const PoseLattice& lattice, double cell_mm,
+                                   const std::vector<TileSize>& sizes) {
+  std::vector<TileLevel> levels;
+  for (const TileSize& size : sizes) {
+    const double side_mm = size.cells() * cell_mm;
+    levels.push_back({size, tile_axis(lattice.x_mm, side_mm), tile_axis(lattice.y_mm, side_mm)});
+  }
+  return levels;
+}
+
+}  // namespace palpate

@@ -1,0 +1,47 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "palpate/lattice.hpp"
+
+namespace palpate {
+
+/// The size of a level's tiles: `side` squares, of which a map's cell has `parts` along each axis.
+struct TileSize {
+  int parts = 1;
+  int side = 1;
+
+  double cells() const { return static_cast<double>(side) / parts; }
+};
+
+/// Tiles along one axis of the lattice. They begin at the first bin's centre; a tile holds the bins
+/// whose centres lie in it, which may be none.
+struct TileAxis {
+  double first_mm = 0.0;       ///< centre of the lattice's first bin
+  double side_mm = 0.0;        ///< of a tile
+  std::vector<int> first_bin;  ///< [tiles + 1]; tiles come in whole batches
+
+  int tiles() const { return static_cast<int>(first_bin.size()) - 1; }
+  int bins(int tile) const { return first_bin[tile + 1] - first_bin[tile]; }
+};
+
+/// One level of tiles over one object's poses, the same for every theta.
+struct TileLevel {
+  TileSize size;
+  TileAxis x;
+  TileAxis y;
+
+  int batches_x() const { return x.tiles() / 4; }
+  int batches_y() const { return y.tiles() / 4; }
+};
+
+/// Sizes of the levels, the largest tiles first. Each level's tiles have a quarter of the side of
+/// the level before, so that a batch of 4 x 4 tiles makes up one tile.
+std::vector<TileSize> tile_sizes(const PoseLattice& lattice, double cell_mm);
+
+/// The levels of tiles over a lattice for a map of this cell.
+std::vector<TileLevel> tile_levels(const PoseLattice& lattice, double cell_mm,
+                                   const std::vector<TileSize>& sizes);
+
+}  // namespace palpate

@@ -1,0 +1,146 @@
+#include "tile_penalties.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "bounded/tile_penalties.cpp"
+#include <hwy/foreach_target.h>  // IWYU pragma: keep
+#include <hwy/highway.h>
+
+HWY_BEFORE_NAMESPACE();
+namespace palpate::HWY_NAMESPACE {
+
+namespace hn = hwy::HWY_NAMESPACE;
+
+void PlaceElements(const glm::dvec2* from_pivot_mm, std::size_t count, const TilePlace& place,
+                   const WindowTable& shape, std::int32_t* plane, std::int32_t* column,
+                   std::int32_t* row) {
+  const hn::ScalableTag<double> d;
+  const hn::Rebind<std::int32_t, decltype(d)> di;
+  // Squares that are told apart; farther elements see only the prior as well.
+  const auto farthest = hn::Set(d, static_cast<double>(1 << 28));
+  const auto nearest = hn::Set(d, -static_cast<double>(1 << 28));
+  const auto c = hn::Set(d, std::cos(place.theta_rad) / place.square_mm);
+  const auto s = hn::Set(d, std::sin(place.theta_rad) / place.square_mm);
+  const auto x0 = hn::Set(d, place.corner_mm.x / place.square_mm);
+  const auto y0 = hn::Set(d, place.corner_mm.y / place.square_mm);
+  const auto mask = hn::Set(di, shape.side - 1);
+  const auto margin = hn::Set(di, WindowTable::margin);
+  const auto phases = hn::Set(di, shape.side);
+  const auto entries = hn::Set(di, shape.columns * shape.rows * batch_side);
+  HWY_ALIGN double x_mm[hn::MaxLanes(d)] = {};
+  HWY_ALIGN double y_mm[hn::MaxLanes(d)] = {};
+  const std::size_t step = hn::Lanes(d);
+  for (std::size_t i = 0; i < count; i += step) {
+    for (std::size_t lane = 0; lane < std::min(step, count - i); ++lane) {
+      x_mm[lane] = from_pivot_mm[i + lane].x;
+      y_mm[lane] = from_pivot_mm[i + lane].y;
+    }
+    const auto px = hn::Load(d, x_mm);
+    const auto py = hn::Load(d, y_mm);
+    const auto at = [&](auto coordinate) {
+      return hn::DemoteTo(di, hn::Min(hn::Max(hn::Floor(coordinate), nearest), farthest));
+    };
+    const auto kx = at(hn::Add(hn::Sub(hn::Mul(c, px), hn::Mul(s, py)), x0));
+    const auto ky = at(hn::Add(hn::Add(hn::Mul(s, px), hn::Mul(c, py)), y0));
+    const auto phase = hn::Add(hn::Mul(hn::And(ky, mask), phases), hn::And(kx, mask));
+    hn::StoreU(hn::Mul(phase, entries), di, plane + i);
+    hn::StoreU(hn::Add(hn::ShiftRightSame(kx, shape.side_log2), margin), di, column + i);
+    hn::StoreU(hn::Add(hn::ShiftRightSame(ky, shape.side_log2), margin), di, row + i);
+  }
+}
+
+/// Sums the penalties of one run.
+/// @param entry scratch of at least `count` rounded up to whole vectors
+void AddRun(const WindowTable& table, const std::int32_t* plane, const std::int32_t* column,
+            const std::int32_t* row, std::size_t count, int first_x, int first_y,
+            std::int32_t* entry, std::uint32_t* sums) {
+  const hn::ScalableTag<std::int32_t> di;
+  const auto zero = hn::Zero(di);
+  const auto x = hn::Set(di, first_x);
+  const auto y = hn::Set(di, first_y);
+  const auto last_column = hn::Set(di, table.columns - batch_side);
+  const auto last_row = hn::Set(di, table.rows - batch_side);
+  const auto columns = hn::Set(di, table.columns);
+  for (std::size_t i = 0; i < count; i += hn::Lanes(di)) {
+    const auto at_column =
+        hn::Min(hn::Max(hn::Add(hn::LoadU(di, column + i), x), zero), last_column);
+    const auto at_row = hn::Min(hn::Max(hn::Add(hn::LoadU(di, row + i), y), zero), last_row);
+    const auto of_plane = hn::Add(hn::Mul(at_row, columns), at_column);
+    hn::StoreU(hn::Add(hn::ShiftLeft<2>(of_plane), hn::LoadU(di, plane + i)), di, entry + i);
+  }
+  const hn::CappedTag<std::uint16_t, batch_tiles> d16;
+  const hn::CappedTag<std::uint32_t, batch_tiles> d32;
+  const hn::Rebind<std::uint16_t, decltype(d32)> narrow;
+  const auto most_sum = hn::Set(d32, std::uint32_t{1} << 31);
+  constexpr std::size_t lanes = hn::MaxLanes(d16);
+  constexpr std::size_t vectors = batch_tiles / lanes;
+  // As many penalties as 16 bits hold for certain.
+  const std::size_t most =
+      table.largest == 0 ? count : std::size_t{65535} / std::size_t{table.largest};
+  const std::uint16_t* entries = table.entries.data();
+  HWY_ALIGN std::uint16_t part[batch_tiles];
+  for (std::size_t begin = 0; begin < count; begin += most) {
+    const std::size_t end = std::min(begin + most, count);
+    for (std::size_t v = 0; v < vectors; ++v) {
+      auto sum = hn::Zero(d16);
+      auto other = hn::Zero(d16);
+      std::size_t i = begin;
+      for (; i + 2 <= end; i += 2) {
+        sum = hn::Add(sum, hn::LoadU(d16, entries + entry[i] + v * lanes));
+        other = hn::Add(other, hn::LoadU(d16, entries + entry[i + 1] + v * lanes));
+      }
+      if (i < end) {
+        sum = hn::Add(sum, hn::LoadU(d16, entries + entry[i] + v * lanes));
+      }
+      hn::Store(hn::Add(sum, other), d16, part + v * lanes);
+    }
+    for (std::size_t i = 0; i < batch_tiles; i += hn::MaxLanes(d32)) {
+      const auto wide = hn::PromoteTo(d32, hn::LoadU(narrow, part + i));
+      // So large a sum says all that there is to say, and never wraps.
+      const auto sum = hn::Min(hn::Add(wide, hn::LoadU(d32, sums + i)), most_sum);
+      hn::StoreU(sum, d32, sums + i);
+    }
+  }
+}
+
+}  // namespace palpate::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace palpate {
+
+HWY_EXPORT(PlaceElements);
+HWY_EXPORT(AddRun);
+
+namespace {
+
+/// Room for the last vector of a list.
+constexpr std::size_t slack = 64;
+
+}  // namespace
+
+void place_elements(const KnownElements& elements, const TilePlace& place, const WindowTable& shape,
+                    PlacedElements& placed) {
+  const std::size_t count = elements.from_pivot_mm.size();
+  for (std::vector<std::int32_t>* list : {&placed.plane, &placed.column, &placed.row}) {
+    list->resize(count + slack);
+  }
+  HWY_DYNAMIC_DISPATCH(PlaceElements)
+  (elements.from_pivot_mm.data(), count, place, shape, placed.plane.data(), placed.column.data(),
+   placed.row.data());
+}
+
+void add_penalties(const PlacedElements& placed, const ReadingRun& run, const WindowTable& table,
+                   int first_x, int first_y, std::uint32_t* sums) {
+  thread_local std::vector<std::int32_t> entry;
+  const std::size_t count = run.end - run.begin;
+  entry.resize(std::max(entry.size(), count + slack));
+  HWY_DYNAMIC_DISPATCH(AddRun)
+  (table, placed.plane.data() + run.begin, placed.column.data() + run.begin,
+   placed.row.data() + run.begin, count, first_x, first_y, entry.data(), sums);
+}
+
+}  // namespace palpate
+#endif  // HWY_ONCE
