@@ -1,17 +1,17 @@
 #include "bound_search.hpp"
 
 #include <algorithm>
-#include <cmath>
+#include <iterator>
 #include <limits>
-#include <memory>
+#include <numeric>
 #include <optional>
 #include <tuple>
 
 #include <tbb/parallel_for.h>
 
 #include "hypotheses.hpp"
-#include "log_sum.hpp"
-#include "mass_histogram.hpp"
+#include "seen_window.hpp"
+#include "unsettled_mass.hpp"
 
 namespace palpate {
 
@@ -20,8 +20,10 @@ namespace {
 constexpr double nothing = -std::numeric_limits<double>::infinity();
 /// Tiles that are followed down to the bins, to know early how much mass there is at least.
 constexpr std::size_t beam_tiles = 64;
+/// Of these, so many of the smallest have their bins evaluated.
+constexpr std::size_t probed_tiles = 16;
 /// Largest tiles that are divided together: bounds the memory for their parts.
-constexpr std::size_t most_together = 8192;
+constexpr std::size_t most_together = 16384;
 /// Tiles of one theta that a task divides.
 constexpr std::size_t tiles_per_task = 64;
 
@@ -45,39 +47,53 @@ void keep_best(std::vector<Tile>& tiles, std::size_t count) {
   }
 }
 
+/// The tile as a box of bins.
+BinBox box_of(const TileLevel& level, const Tile& tile) {
+  return {.object = tile.object,
+          .theta = tile.theta,
+          .y_first = level.y.first_bin[tile.y],
+          .y_count = level.y.bins(tile.y),
+          .x_first = level.x.first_bin[tile.x],
+          .x_count = level.x.bins(tile.x)};
+}
+
 }  // namespace
 
 /// One run of the search.
 class SearchRun {
  public:
-  SearchRun(const BoundSearch& search, const KnownElements& elements, const BinVisitor& visit)
+  SearchRun(const BoundSearch& search, const KnownElements& elements, const BinVisitor& visit,
+            std::vector<PoseBlock>* refined)
       : search_(search),
         lattice_(search.options_.lattice),
         elements_(elements),
+        refined_(refined),
+        thetas_(static_cast<std::size_t>(lattice_.theta_rad.count)),
+        finest_(search.bounds_.front().levels().size() - 1),
         leaves_(search.likelihood_, search.bounds_, search.log_weight_, search.options_, elements,
                 visit) {
     for (std::size_t i = 0; i < search_.bounds_.size(); ++i) {
       std::vector<double> of_level;
-      for (std::size_t level = 0; level < search_.bounds_[i].levels().size(); ++level) {
+      for (std::size_t level = 0; level <= finest_; ++level) {
         of_level.push_back(search_.log_weight_[i] + search_.bounds_[i].best(level, elements));
       }
       unpenalised_.push_back(std::move(of_level));
     }
-    finest_ = search_.bounds_.front().levels().size() - 1;
   }
 
   SearchResult result() {
-    std::vector<Tile> tiles = largest_tiles();
-    double largest = nothing;
-    for (const Tile& tile : tiles) {
-      largest = std::max(largest, tile.bound);
+    settle_unseen();
+    std::vector<Tile> best = best_of_rows();
+    if (!best.empty()) {
+      UnsettledMass unsettled(search_.bounds_.size(),
+                              std::min_element(best.begin(), best.end(), before)->bound);
+      raise(std::move(best), 0);
+      count_largest(unsettled);
+      const double share = search_.options_.tolerance * search_share;
+      std::vector<Tile> kept = keep_largest(unsettled, share / static_cast<double>(finest_ + 1));
+      leaves_.drop(unsettled);
+      divide(std::move(kept), 0, share - leaves_.dropped_share());
     }
-    {
-      std::vector<Tile> beam = tiles;
-      keep_best(beam, beam_tiles);
-      descend_beam(std::move(beam), 0);
-    }
-    divide(std::move(tiles), 0, search_.options_.tolerance * search_share);
     SearchResult result = leaves_.result();
     result.blocks_bounded = blocks_;
     return result;
@@ -87,52 +103,121 @@ class SearchRun {
   /// Part of the tolerance that dropped tiles may use up; the rest is for rounding.
   static constexpr double search_share = 0.75;
 
-  std::vector<Tile> largest_tiles() {
-    const auto thetas = static_cast<std::size_t>(lattice_.theta_rad.count);
-    const std::size_t objects = search_.bounds_.size();
-    std::vector<std::vector<Tile>> of_theta(objects * thetas);
-    tbb::parallel_for(std::size_t{0}, of_theta.size(), [&](std::size_t row) {
-      const std::size_t object = row / thetas;
-      const std::size_t theta = row % thetas;
-      const TileLevel& level = search_.bounds_[object].levels().front();
-      const std::size_t batches = static_cast<std::size_t>(level.batches_x()) * level.batches_y();
-      const std::uint32_t* sums =
-          search_.largest_tiles_[object].data() + theta * batches * batch_tiles;
-      std::vector<Tile>& tiles = of_theta[row];
-      for (int by = 0; by < level.batches_y(); ++by) {
-        for (int bx = 0; bx < level.batches_x(); ++bx, sums += batch_tiles) {
-          append_batch(object, static_cast<std::int32_t>(theta), 0, bx * batch_side,
-                       by * batch_side, sums, tiles);
-        }
-      }
+  /// Finds the largest tiles where an element may see something else than the prior, and settles
+  /// all other bins, which have the likelihood of the prior.
+  void settle_unseen() {
+    seen_.resize(search_.bounds_.size() * thetas_);
+    tbb::parallel_for(std::size_t{0}, seen_.size(), [&](std::size_t row) {
+      const std::size_t object = row / thetas_;
+      seen_[row] =
+          seen_window(elements_, lattice_.theta_rad.centre(static_cast<int>(row % thetas_)),
+                      search_.maps_[object], search_.bounds_[object].levels().front());
     });
-    std::vector<Tile> tiles;
-    for (const std::vector<Tile>& part : of_theta) {
-      tiles.insert(tiles.end(), part.begin(), part.end());
+    for (std::size_t row = 0; row < seen_.size(); ++row) {
+      const std::size_t object = row / thetas_;
+      const TileLevel& level = search_.bounds_[object].levels().front();
+      const TileWindow& seen = seen_[row];
+      const auto settle = [&](int x_first, int x_end, int y_first, int y_end) {
+        const BinBox box{.object = static_cast<std::int32_t>(object),
+                         .theta = static_cast<std::int32_t>(row % thetas_),
+                         .y_first = level.y.first_bin[y_first],
+                         .y_count = level.y.first_bin[y_end] - level.y.first_bin[y_first],
+                         .x_first = level.x.first_bin[x_first],
+                         .x_count = level.x.first_bin[x_end] - level.x.first_bin[x_first]};
+        if (box.bins() > 0) {
+          leaves_.settle_unseen(box);
+        }
+      };
+      const int nx = level.x.tiles();
+      settle(0, nx, 0, seen.y_first);
+      settle(0, seen.x_first, seen.y_first, seen.y_end);
+      settle(seen.x_end, nx, seen.y_first, seen.y_end);
+      settle(0, nx, seen.y_end, level.y.tiles());
     }
-    blocks_ += static_cast<std::int64_t>(tiles.size());
-    return tiles;
   }
 
-  /// Appends the tiles of a batch that hold bins.
-  void append_batch(std::size_t object, std::int32_t theta, std::size_t level, int first_x,
-                    int first_y, const std::uint32_t* sums, std::vector<Tile>& tiles) const {
-    const TileLevel& of = search_.bounds_[object].levels()[level];
-    for (int j = 0; j < batch_side; ++j) {
-      if (of.y.bins(first_y + j) == 0) {
-        continue;
-      }
-      for (int i = 0; i < batch_side; ++i) {
-        if (of.x.bins(first_x + i) > 0) {
-          tiles.push_back(
-              {.bound = unpenalised_[object][level] - sums[batch_side * i + j] / penalties_per_nat,
-               .object = static_cast<std::int32_t>(object),
-               .theta = theta,
-               .x = first_x + i,
-               .y = first_y + j});
+  /// Calls visit(bound, x, y, bins) for the largest tiles of a row, a theta of an object, that hold
+  /// bins and see the map.
+  template <typename Visit>
+  void for_row(std::size_t row, const Visit& visit) const {
+    const std::size_t object = row / thetas_;
+    const TileLevel& level = search_.bounds_[object].levels().front();
+    const TileWindow& seen = seen_[row];
+    const auto batches = static_cast<std::size_t>(level.batches_x()) * level.batches_y();
+    const std::uint32_t* sums =
+        search_.largest_tiles_[object].data() + row % thetas_ * batches * batch_tiles;
+    for (int y = seen.y_first; y < seen.y_end; ++y) {
+      for (int x = seen.x_first; x < seen.x_end; ++x) {
+        const std::int64_t bins = std::int64_t{level.x.bins(x)} * level.y.bins(y);
+        if (bins > 0) {
+          const std::size_t batch =
+              static_cast<std::size_t>(y / batch_side) * level.batches_x() + x / batch_side;
+          const std::uint32_t sum =
+              sums[batch * batch_tiles + x % batch_side * batch_side + y % batch_side];
+          visit(unpenalised_[object][0] - sum / penalties_per_nat, x, y, bins);
         }
       }
     }
+  }
+
+  /// The largest tile of the largest bound of every object and theta.
+  std::vector<Tile> best_of_rows() {
+    std::vector<Tile> best(seen_.size(), {.bound = nothing});
+    std::vector<std::int64_t> counts(seen_.size());
+    tbb::parallel_for(std::size_t{0}, best.size(), [&](std::size_t row) {
+      for_row(row, [&](double bound, int x, int y, std::int64_t /*bins*/) {
+        ++counts[row];
+        if (bound > best[row].bound) {
+          best[row] = {bound, static_cast<std::int32_t>(row / thetas_),
+                       static_cast<std::int32_t>(row % thetas_), x, y};
+        }
+      });
+    });
+    blocks_ += std::accumulate(counts.begin(), counts.end(), std::int64_t{0});
+    std::erase_if(best, [](const Tile& tile) { return tile.bound == nothing; });
+    return best;
+  }
+
+  void count_largest(UnsettledMass& unsettled) const {
+    tbb::parallel_for(std::size_t{0}, search_.bounds_.size(), [&](std::size_t object) {
+      for (std::size_t theta = 0; theta < thetas_; ++theta) {
+        for_row(object * thetas_ + theta,
+                [&](double bound, int /*x*/, int /*y*/, std::int64_t bins) {
+                  unsettled.add(object, bound, bins);
+                });
+      }
+    });
+  }
+
+  /// The largest tiles that must be divided, and takes them out of the unsettled ones.
+  std::vector<Tile> keep_largest(UnsettledMass& unsettled, double share) const {
+    const std::vector<std::size_t> from = leaves_.droppable_from(unsettled, share);
+    std::vector<std::vector<Tile>> kept(search_.bounds_.size());
+    tbb::parallel_for(std::size_t{0}, kept.size(), [&](std::size_t object) {
+      for (std::size_t theta = 0; theta < thetas_; ++theta) {
+        for_row(object * thetas_ + theta, [&](double bound, int x, int y, std::int64_t bins) {
+          if (unsettled.slot(bound) < from[object]) {
+            unsettled.remove(object, bound, bins);
+            kept[object].push_back(
+                {bound, static_cast<std::int32_t>(object), static_cast<std::int32_t>(theta), x, y});
+          }
+        });
+      }
+    });
+    return joined(kept);
+  }
+
+  static std::vector<Tile> joined(const std::vector<std::vector<Tile>>& lists) {
+    std::vector<Tile> all;
+    std::size_t count = 0;
+    for (const std::vector<Tile>& list : lists) {
+      count += list.size();
+    }
+    all.reserve(count);
+    for (const std::vector<Tile>& list : lists) {
+      all.insert(all.end(), list.begin(), list.end());
+    }
+    return all;
   }
 
   /// The parts, one level down, of tiles that are sorted by place.
@@ -157,98 +242,132 @@ class SearchRun {
         const int x = tiles[i].x * batch_side;
         const int y = tiles[i].y * batch_side;
         bounds.add(level + 1, elements_, placed, x, y, sums);
-        append_batch(static_cast<std::size_t>(first.object), first.theta, level + 1, x, y, sums,
-                     parts[task]);
+        append_batch(first, level + 1, x, y, sums, parts[task]);
       }
     });
-    std::vector<Tile> all;
-    std::size_t count = 0;
-    for (const std::vector<Tile>& part : parts) {
-      count += part.size();
-    }
-    all.reserve(count);
-    for (const std::vector<Tile>& part : parts) {
-      all.insert(all.end(), part.begin(), part.end());
-    }
+    std::vector<Tile> all = joined(parts);
     blocks_ += static_cast<std::int64_t>(all.size());
     return all;
   }
 
-  /// Follows the best tiles down to their bins.
-  void descend_beam(std::vector<Tile> tiles, std::size_t level) {
+  /// Appends the tiles of a batch, at the object and theta of `of`, that hold bins.
+  void append_batch(const Tile& of, std::size_t level, int first_x, int first_y,
+                    const std::uint32_t* sums, std::vector<Tile>& tiles) const {
+    const TileLevel& tiling = search_.bounds_[of.object].levels()[level];
+    for (int j = 0; j < batch_side; ++j) {
+      if (tiling.y.bins(first_y + j) == 0) {
+        continue;
+      }
+      for (int i = 0; i < batch_side; ++i) {
+        if (tiling.x.bins(first_x + i) > 0) {
+          const double bound =
+              unpenalised_[of.object][level] - sums[batch_side * i + j] / penalties_per_nat;
+          tiles.push_back({bound, of.object, of.theta, first_x + i, first_y + j});
+        }
+      }
+    }
+  }
+
+  /// Raises the lower bound of the total: follows the best tiles down to their bins.
+  void raise(std::vector<Tile> tiles, std::size_t level) {
+    if (search_.options_.evidence_nats) {
+      // Every hypothesis's own total is wanted, too.
+      for (std::size_t object = 0; object < search_.bounds_.size(); ++object) {
+        std::vector<Tile> own;
+        std::copy_if(tiles.begin(), tiles.end(), std::back_inserter(own), [&](const Tile& tile) {
+          return tile.object == static_cast<std::int32_t>(object);
+        });
+        raise_beam(std::move(own), level);
+      }
+      return;
+    }
+    raise_beam(std::move(tiles), level);
+  }
+
+  void raise_beam(std::vector<Tile> tiles, std::size_t level) {
     for (; level < finest_; ++level) {
+      keep_best(tiles, beam_tiles);
       std::sort(tiles.begin(), tiles.end(), in_place);
       tiles = parts_of(tiles, level);
-      keep_best(tiles, beam_tiles);
     }
-    leaves_.probe(std::move(tiles));
+    keep_best(tiles, probed_tiles);
+    leaves_.probe(tiles);
   }
 
-  /// Drops what may be dropped of the tiles, and divides the rest.
+  /// Divides tiles of a level until their bins are evaluated or dropped.
   /// @param tolerance part of the total that may be dropped
   void divide(std::vector<Tile> tiles, std::size_t level, double tolerance) {
+    note(tiles, level);
     if (level == finest_) {
-      leaves_.evaluate(std::move(tiles), tolerance);
+      leaves_.evaluate(tiles, tolerance);
       return;
     }
-    const double share = tolerance / static_cast<double>(finest_ - level + 1);
-    const double used = drop(tiles, level, share);
-    tolerance -= used;
-    if (tiles.size() <= most_together) {
-      std::sort(tiles.begin(), tiles.end(), in_place);
-      std::vector<Tile> parts = parts_of(tiles, level);
-      if (level + 1 < finest_) {
-        std::vector<Tile> beam = parts;
-        keep_best(beam, beam_tiles);
-        descend_beam(std::move(beam), level + 1);
+    std::sort(tiles.begin(), tiles.end(), tiles.size() > most_together ? before : in_place);
+    for (std::size_t begin = 0; begin < tiles.size(); begin += most_together) {
+      const std::size_t left = tiles.size() - begin;
+      const std::size_t count = std::min(most_together, left);
+      const auto first = tiles.begin() + static_cast<std::ptrdiff_t>(begin);
+      std::vector<Tile> some(first, first + static_cast<std::ptrdiff_t>(count));
+      const double dropped = leaves_.dropped_share();
+      if (leaves_.out_of_time()) {
+        some.assign(first, tiles.end());
+        leaves_.drop(unsettled_of(some, level));
+        return;
       }
-      divide(std::move(parts), level + 1, tolerance);
-      return;
-    }
-    std::sort(tiles.begin(), tiles.end(), before);
-    while (!tiles.empty()) {
-      const std::size_t chunks = (tiles.size() + most_together - 1) / most_together;
-      std::vector<Tile> chunk(tiles.begin(), tiles.begin() + std::min(most_together, tiles.size()));
-      tiles.erase(tiles.begin(), tiles.begin() + static_cast<std::ptrdiff_t>(chunk.size()));
-      std::sort(chunk.begin(), chunk.end(), in_place);
-      const double of_chunk = tolerance / static_cast<double>(chunks);
-      const double before_chunk = leaves_.dropped_share();
-      divide(parts_of(chunk, level), level + 1, of_chunk);
-      tolerance -= std::max(0.0, leaves_.dropped_share() - before_chunk);
-      tolerance = std::max(tolerance, 0.0);
-      tolerance -= drop(tiles, level, tolerance / 2.0);
+      std::sort(some.begin(), some.end(), in_place);
+      some = parts_of(some, level);
+      if (level + 1 < finest_) {
+        raise(some, level + 1);
+      }
+      // What tiles do not use up is left for those after them.
+      const double part = tolerance * static_cast<double>(count) / static_cast<double>(left);
+      UnsettledMass unsettled = unsettled_of(some, level + 1);
+      if (level + 1 < finest_) {
+        const std::vector<std::size_t> from =
+            leaves_.droppable_from(unsettled, part / static_cast<double>(finest_ - level));
+        std::erase_if(some, [&](const Tile& tile) {
+          return unsettled.slot(tile.bound) >= from[tile.object];
+        });
+        for (const Tile& tile : some) {
+          unsettled.remove(static_cast<std::size_t>(tile.object), tile.bound,
+                           search_.bounds_[tile.object].bins(level + 1, tile));
+        }
+        leaves_.drop(unsettled);
+      }
+      const double used = leaves_.dropped_share() - dropped;
+      divide(std::move(some), level + 1, std::max(part - used, 0.0));
+      tolerance = std::max(tolerance - (leaves_.dropped_share() - dropped), 0.0);
     }
   }
 
-  /// Drops the tiles of the least bounds that hold at most this part of the total.
-  /// @returns the part that was dropped
-  double drop(std::vector<Tile>& tiles, std::size_t level, double share) {
-    double largest = nothing;
-    for (const Tile& tile : tiles) {
-      largest = std::max(largest, tile.bound);
+  UnsettledMass unsettled_of(std::span<const Tile> tiles, std::size_t level) const {
+    return leaves_.unsettled(tiles, level);
+  }
+
+  void note(std::span<const Tile> tiles, std::size_t level) const {
+    if (refined_ == nullptr) {
+      return;
     }
-    const auto histogram = std::make_unique<MassHistogram>(largest);
     for (const Tile& tile : tiles) {
-      histogram->add(tile.bound, search_.bounds_[tile.object].bins(level, tile));
+      const BinBox box = box_of(search_.bounds_[tile.object].levels()[level], tile);
+      refined_->push_back({.object = box.object,
+                           .level = static_cast<int>(level),
+                           .theta = box.theta,
+                           .x_first = box.x_first,
+                           .x_count = box.x_count,
+                           .y_first = box.y_first,
+                           .y_count = box.y_count});
     }
-    std::size_t from = histogram->droppable_from(std::log(share) + leaves_.log_total());
-    from = std::max(from, histogram->slot(leaves_.best()) + 1);  // the mode must not be lost
-    const double before_drop = leaves_.dropped_share();
-    std::erase_if(tiles, [&](const Tile& tile) {
-      const bool drops = histogram->slot(tile.bound) >= from;
-      if (drops) {
-        leaves_.drop(tile, search_.bounds_[tile.object].bins(level, tile));
-      }
-      return drops;
-    });
-    return std::max(0.0, leaves_.dropped_share() - before_drop);
   }
 
   const BoundSearch& search_;
   const PoseLattice& lattice_;
   const KnownElements& elements_;
+  std::vector<PoseBlock>* refined_;
+  std::size_t thetas_;
+  std::size_t finest_;                            ///< level
   std::vector<std::vector<double>> unpenalised_;  ///< [object][level], with the prior weight
-  std::size_t finest_ = 0;
+  std::vector<TileWindow> seen_;                  ///< [object, theta], of the largest tiles
   LeafPass leaves_;
   std::int64_t blocks_ = 0;
 };
@@ -265,6 +384,11 @@ BoundSearch::BoundSearch(std::span<const Hypothesis> hypotheses, const BoundedOp
     largest_tiles_.emplace_back(static_cast<std::size_t>(options.lattice.theta_rad.count) *
                                 level.batches_x() * level.batches_y() * batch_tiles);
     bounds_.push_back(*std::move(of));
+  }
+  for (const Hypothesis& hypothesis : hypotheses) {
+    OccupancyGrid shape = hypothesis.map;
+    shape.log_odds = {};
+    maps_.push_back(std::move(shape));
   }
 }
 
@@ -294,8 +418,9 @@ void BoundSearch::add(const KnownElements& added) {
   });
 }
 
-SearchResult BoundSearch::run(const KnownElements& elements, const BinVisitor& visit) const {
-  return SearchRun(*this, elements, visit).result();
+SearchResult BoundSearch::run(const KnownElements& elements, const BinVisitor& visit,
+                              std::vector<PoseBlock>* refined) const {
+  return SearchRun(*this, elements, visit, refined).result();
 }
 
 std::uint64_t BoundSearch::bytes() const {

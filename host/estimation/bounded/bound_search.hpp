@@ -27,7 +27,9 @@ class BoundSearch {
   /// Adds the penalties of more elements to the sums of the largest tiles.
   void add(const KnownElements& added);
   /// @param elements all that were added since reset()
-  SearchResult run(const KnownElements& elements, const BinVisitor& visit) const;
+  /// @param refined where not null, takes the tiles that were divided or evaluated
+  SearchResult run(const KnownElements& elements, const BinVisitor& visit,
+                   std::vector<PoseBlock>* refined = nullptr) const;
 
   std::uint64_t bytes() const;
 
@@ -37,7 +39,8 @@ class BoundSearch {
   const BoundedOptions& options_;
   const BinLikelihood& likelihood_;
   std::vector<double> log_weight_;
-  std::vector<TileBounds> bounds_;  ///< [hypothesis]
+  std::vector<OccupancyGrid> maps_;  ///< [hypothesis] without their cells
+  std::vector<TileBounds> bounds_;   ///< [hypothesis]
   /// Sums of penalties of the largest tiles, [hypothesis][theta, batch y, batch x, tile].
   std::vector<std::vector<std::uint32_t>> largest_tiles_;
 };

@@ -339,6 +339,16 @@ std::vector<PoseSample> BoundedPosterior::sample(std::size_t count, std::uint64_
   return samples;
 }
 
+std::vector<PoseBlock> BoundedPosterior::refined_blocks() const {
+  Impl& posterior = impl();
+  std::vector<PoseBlock> blocks;
+  posterior.arena.execute([&] {
+    posterior.search.run(
+        posterior.elements, [](const BinBox&, std::span<const double>) {}, &blocks);
+  });
+  return blocks;
+}
+
 const PoseLattice& BoundedPosterior::lattice() const { return impl().options.lattice; }
 
 std::string BoundedPosterior::path() const { return "plain loop"; }

@@ -10,8 +10,6 @@
 
 #include <tbb/parallel_for.h>
 
-#include "mass_histogram.hpp"
-
 namespace palpate {
 
 namespace {
@@ -40,6 +38,7 @@ LeafPass::LeafPass(const BinLikelihood& likelihood, std::span<const TileBounds> 
       rounding_(bounds.size()),
       dropped_(bounds.size()),
       log_total_(nothing),
+      log_totals_(bounds.size(), nothing),
       best_(nothing),
       largest_dropped_(nothing),
       mode_value_(nothing) {
@@ -51,6 +50,13 @@ LeafPass::LeafPass(const BinLikelihood& likelihood, std::span<const TileBounds> 
   for (std::size_t i = 0; i < bounds.size(); ++i) {
     float32_error_.push_back(likelihood.float32_error(i, elements));
     float64_error_.push_back(likelihood.float64_error(i, elements));
+    double prior = 0.0;
+    for (const ReadingRun& run : elements.runs) {
+      prior += static_cast<double>(run.end - run.begin) *
+               options.contact.log_likelihood(
+                   run.reading, {log_odds_from_probability(*options.contact.prior)}, i);
+    }
+    prior_likelihood_.push_back(prior);
   }
 }
 
@@ -119,12 +125,16 @@ void LeafPass::evaluate_leaves(std::span<Leaf> leaves, std::span<double> values)
   });
 }
 
-void LeafPass::note_total() {
+void LeafPass::note_totals() {
   // What rounding may have added does not count.
   log_total_ = std::max(log_total_, log_subtract(all_evaluated_.log(), all_rounding_.log()));
+  for (std::size_t i = 0; i < evaluated_.size(); ++i) {
+    log_totals_[i] =
+        std::max(log_totals_[i], log_subtract(evaluated_[i].log(), rounding_[i].log()));
+  }
 }
 
-void LeafPass::probe(const std::vector<Tile>& tiles) {
+void LeafPass::probe(std::span<const Tile> tiles) {
   std::vector<Leaf> leaves = leaves_of(tiles);
   if (leaves.empty()) {
     return;
@@ -133,70 +143,97 @@ void LeafPass::probe(const std::vector<Tile>& tiles) {
                              static_cast<std::size_t>(leaves.back().box.bins()));
   evaluate_leaves<float>(leaves, values);
   LogSum total;
+  std::vector<LogSum> totals(log_totals_.size());
   for (const Leaf& leaf : leaves) {
     const double weight = log_weight_[leaf.box.object] - float32_error_[leaf.box.object];
     total.add(weight + leaf.log_mass);
+    totals[leaf.box.object].add(weight + leaf.log_mass);
     best_ = std::max(best_, weight + leaf.largest);
   }
   result_.bins_evaluated += static_cast<std::int64_t>(values.size());
   log_total_ = std::max(log_total_, total.log());
+  for (std::size_t i = 0; i < totals.size(); ++i) {
+    log_totals_[i] = std::max(log_totals_[i], totals[i].log());
+  }
 }
 
-void LeafPass::drop(const Tile& tile, std::int64_t bins) {
-  const double mass = tile.bound + std::log(static_cast<double>(bins));
-  dropped_[tile.object].add(mass);
-  all_dropped_.add(mass);
-  largest_dropped_ = std::max(largest_dropped_, tile.bound);
-}
-
-void LeafPass::evaluate(const std::vector<Tile>& tiles, double tolerance) {
-  const auto bins = [&](const Tile& tile) {
-    return bounds_[tile.object].bins(bounds_[tile.object].levels().size() - 1, tile);
-  };
+UnsettledMass LeafPass::unsettled(std::span<const Tile> tiles, std::size_t level) const {
   double largest = nothing;
   for (const Tile& tile : tiles) {
     largest = std::max(largest, tile.bound);
   }
-  const auto histogram = std::make_unique<MassHistogram>(largest);
+  UnsettledMass unsettled(bounds_.size(), largest);
   for (const Tile& tile : tiles) {
-    histogram->add(tile.bound, bins(tile));
+    unsettled.add(static_cast<std::size_t>(tile.object), tile.bound,
+                  bounds_[tile.object].bins(level, tile));
   }
-  const auto droppable_from = [&] {
-    // The mode must not be lost.
-    return std::max(histogram->droppable_from(std::log(tolerance) + log_total_),
-                    histogram->slot(best_) + 1);
-  };
-  std::size_t end = droppable_from();
+  return unsettled;
+}
+
+std::vector<std::size_t> LeafPass::droppable_from(const UnsettledMass& tiles,
+                                                  double tolerance) const {
+  const std::size_t of_all = std::max(tiles.droppable_from(std::log(tolerance) + log_total_),
+                                      tiles.slot(best_) + 1);  // the mode must not be lost
+  std::vector<std::size_t> from(bounds_.size(), of_all);
+  if (options_.evidence_nats) {
+    // Of each hypothesis's own mass, as large a part of what may be missing.
+    const double missing = std::expm1(*options_.evidence_nats) * tolerance / options_.tolerance;
+    for (std::size_t i = 0; i < from.size(); ++i) {
+      from[i] = std::max(of_all, tiles.droppable_from(i, std::log(missing) + log_totals_[i]));
+    }
+  }
+  return from;
+}
+
+void LeafPass::drop(const UnsettledMass& tiles) {
+  for (std::size_t i = 0; i < dropped_.size(); ++i) {
+    const double mass = tiles.log_mass(i);
+    dropped_[i].add(mass);
+    all_dropped_.add(mass);
+  }
+  largest_dropped_ = std::max(largest_dropped_, tiles.largest());
+}
+
+void LeafPass::evaluate(std::span<const Tile> tiles, double tolerance) {
+  if (tiles.empty()) {
+    return;
+  }
+  const std::size_t finest = bounds_.front().levels().size() - 1;
+  UnsettledMass left = unsettled(tiles, finest);
+  std::vector<std::size_t> from = droppable_from(left, tolerance);
   // Tiles in the order of their slots, by counting.
-  std::vector<std::size_t> begins(end + 1);
+  std::vector<std::size_t> begins(UnsettledMass::slots + 1);
   for (const Tile& tile : tiles) {
-    if (const std::size_t slot = histogram->slot(tile.bound); slot < end) {
+    if (const std::size_t slot = left.slot(tile.bound); slot < from[tile.object]) {
       ++begins[slot + 1];
-    } else {
-      drop(tile, bins(tile));
     }
   }
   std::partial_sum(begins.begin(), begins.end(), begins.begin());
   std::vector<Tile> ordered(begins.back());
-  {
-    std::vector<std::size_t> next = begins;
-    for (const Tile& tile : tiles) {
-      if (const std::size_t slot = histogram->slot(tile.bound); slot < end) {
-        ordered[next[slot]++] = tile;
-      }
+  for (const Tile& tile : tiles) {
+    if (const std::size_t slot = left.slot(tile.bound); slot < from[tile.object]) {
+      ordered[begins[slot]++] = tile;
     }
   }
-  std::size_t done = 0;
-  for (std::size_t batch = first_batch; done < begins[end] && !out_of_time();
-       batch = std::min(2 * batch, largest_batch)) {
-    const std::size_t count = std::min(batch, begins[end] - done);
-    evaluate_batch(std::span(ordered).subspan(done, count));
-    done += count;
-    end = std::min(end, droppable_from());
+  std::vector<Tile> batch;
+  std::size_t size = first_batch;
+  for (std::size_t next = 0; next < ordered.size() && !out_of_time();) {
+    batch.clear();
+    for (; next < ordered.size() && batch.size() < size; ++next) {
+      const Tile& tile = ordered[next];
+      if (left.slot(tile.bound) < from[tile.object]) {
+        batch.push_back(tile);
+        left.remove(static_cast<std::size_t>(tile.object), tile.bound,
+                    bounds_[tile.object].bins(finest, tile));
+      }
+    }
+    if (!batch.empty()) {
+      evaluate_batch(batch);
+      from = droppable_from(left, tolerance);
+    }
+    size = std::min(2 * size, largest_batch);
   }
-  for (const Tile& tile : std::span(ordered).subspan(done)) {
-    drop(tile, bins(tile));
-  }
+  drop(left);
 }
 
 std::vector<LeafPass::Leaf*> LeafPass::to_be_refined(std::span<Leaf> leaves) const {
@@ -233,22 +270,41 @@ void LeafPass::account(const Leaf& leaf, std::span<const double> values, double 
   rounding_[leaf.box.object].add(rounding);
   all_rounding_.add(rounding);
   best_ = std::max(best_, weight + leaf.largest - error);
-  if (weight + leaf.largest >= mode_value_) {
-    const auto at = std::max_element(values.begin(), values.end()) - values.begin();
-    const PoseLattice& in = options_.lattice;
-    const std::int64_t bin =
-        (std::int64_t{leaf.box.theta} * in.y_mm.count + leaf.box.y_first + at / leaf.box.x_count) *
-            in.x_mm.count +
-        leaf.box.x_first + at % leaf.box.x_count;
-    if (weight + leaf.largest > mode_value_ ||
-        std::tie(leaf.box.object, bin) < std::tie(result_.best_object, result_.best_bin)) {
-      mode_value_ = weight + leaf.largest;
-      result_.best_object = leaf.box.object;
-      result_.best_bin = bin;
-      result_.best_log_likelihood = leaf.largest;
-    }
-  }
+  note_best(leaf.box, std::max_element(values.begin(), values.end()) - values.begin(),
+            leaf.largest);
   visit_(leaf.box, values);
+}
+
+void LeafPass::note_best(const BinBox& box, std::int64_t bin_of_box, double log_likelihood) {
+  const PoseLattice& in = options_.lattice;
+  const std::int64_t bin =
+      (std::int64_t{box.theta} * in.y_mm.count + box.y_first + bin_of_box / box.x_count) *
+          in.x_mm.count +
+      box.x_first + bin_of_box % box.x_count;
+  const double value = log_weight_[box.object] + log_likelihood;
+  // Of equal bins the first one is the mode.
+  if (value > mode_value_ ||
+      (value == mode_value_ &&
+       std::tie(box.object, bin) < std::tie(result_.best_object, result_.best_bin))) {
+    mode_value_ = value;
+    result_.best_object = box.object;
+    result_.best_bin = bin;
+    result_.best_log_likelihood = log_likelihood;
+  }
+}
+
+void LeafPass::settle_unseen(const BinBox& box) {
+  const double value = prior_likelihood_[box.object];
+  const double mass = log_weight_[box.object] + value + std::log(static_cast<double>(box.bins()));
+  evaluated_[box.object].add(mass);
+  all_evaluated_.add(mass);
+  const double rounding = mass + std::log(std::expm1(float64_error_[box.object]));
+  rounding_[box.object].add(rounding);
+  all_rounding_.add(rounding);
+  best_ = std::max(best_, log_weight_[box.object] + value - float64_error_[box.object]);
+  note_best(box, 0, value);
+  note_totals();
+  visit_(box, std::span(&value, 1));
 }
 
 void LeafPass::evaluate_batch(std::span<const Tile> tiles) {
@@ -285,7 +341,7 @@ void LeafPass::evaluate_batch(std::span<const Tile> tiles) {
             std::span(values).subspan(known.first, static_cast<std::size_t>(known.box.bins())),
             is_exact ? float64_error_[leaf.box.object] : float32_error_[leaf.box.object]);
   }
-  note_total();
+  note_totals();
 }
 
 SearchResult LeafPass::result() const {

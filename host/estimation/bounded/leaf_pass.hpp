@@ -13,6 +13,7 @@
 #include "log_sum.hpp"
 #include "palpate/bounded_posterior.hpp"
 #include "tile_bounds.hpp"
+#include "unsettled_mass.hpp"
 
 namespace palpate {
 
@@ -48,17 +49,20 @@ class LeafPass {
 
   /// Evaluates the bins of some tiles only to learn how much mass there is at least. They may be
   /// evaluated again.
-  void probe(const std::vector<Tile>& tiles);
+  void probe(std::span<const Tile> tiles);
   /// Evaluates the bins of tiles of the finest level, until those left hold at most this part of
   /// the total; drops these.
-  void evaluate(const std::vector<Tile>& tiles, double tolerance);
-  /// Leaves a tile with so many bins out.
-  void drop(const Tile& tile, std::int64_t bins);
+  void evaluate(std::span<const Tile> tiles, double tolerance);
+  /// Counts the mass of the tiles that are left out.
+  void drop(const UnsettledMass& tiles);
+  /// Counts bins at which every element sees the prior.
+  void settle_unseen(const BinBox& box);
 
-  /// Lower bound of the log of the total mass, in nats.
-  double log_total() const { return log_total_; }
-  /// Log-likelihood, with the prior weight, that the best bin has at least, in nats.
-  double best() const { return best_; }
+  UnsettledMass unsettled(std::span<const Tile> tiles, std::size_t level) const;
+  /// For every hypothesis the slot from which on its tiles can be dropped, where they may hold this
+  /// part of the total.
+  std::vector<std::size_t> droppable_from(const UnsettledMass& tiles, double tolerance) const;
+
   /// What was dropped so far as a part of the total, at most.
   double dropped_share() const;
   bool out_of_time() const;
@@ -84,7 +88,9 @@ class LeafPass {
   /// tolerance.
   std::vector<Leaf*> to_be_refined(std::span<Leaf> leaves) const;
   void account(const Leaf& leaf, std::span<const double> values, double error);
-  void note_total();
+  /// Raises the lower bounds of the totals.
+  void note_totals();
+  void note_best(const BinBox& box, std::int64_t bin_of_box, double log_likelihood);
 
   const BinLikelihood& likelihood_;
   std::span<const TileBounds> bounds_;
@@ -101,8 +107,10 @@ class LeafPass {
   LogSum all_evaluated_;
   LogSum all_rounding_;
   LogSum all_dropped_;
-  double log_total_;
-  double best_;
+  double log_total_;                      ///< lower bound of the log of the total mass, in nats
+  std::vector<double> log_totals_;        ///< [hypothesis] the same of each
+  std::vector<double> prior_likelihood_;  ///< [hypothesis] log, of all elements
+  double best_;             ///< what the best bin has at least, with the prior weight, in nats
   double largest_dropped_;  ///< bound of a bin
   double mode_value_;       ///< of the best bin that was evaluated, with the prior weight
   SearchResult result_;

@@ -33,7 +33,7 @@ TileAxis tile_axis(const Axis& axis, double side_mm) {
 std::vector<TileSize> tile_sizes(const PoseLattice& lattice, double cell_mm) {
   (void)lattice;
   (void)cell_mm;
-  return {{1, 16}, {1, 4}, {4, 4}};
+  return {{1, 16}, {1, 4}, {2, 2}};
 }
 
 std::vector<TileLevel> tile_levels(const PoseLattice& lattice, double cell_mm,

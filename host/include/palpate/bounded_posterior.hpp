@@ -35,6 +35,18 @@ struct BoundedOptions {
   int threads = 0;
 };
 
+/// A block of bins of one hypothesis at one theta that a search divided into smaller ones or, at the
+/// last level, evaluated.
+struct PoseBlock {
+  int object = 0;  ///< index into the hypotheses
+  int level = 0;   ///< 0 for the largest blocks
+  int theta = 0;   ///< index of the lattice's theta
+  int x_first = 0;
+  int x_count = 0;
+  int y_first = 0;
+  int y_count = 0;
+};
+
 /// Histogram filter over object identity and planar pose that evaluates only the bins that matter
 /// and proves how little the others can. Its bins are those of PoseHistogram. Blocks of bins are
 /// bounded from above by tables of the smallest penalty within a window of the map; blocks that
@@ -90,6 +102,9 @@ class BoundedPosterior {
   double entropy() const;
   /// Draws objects and poses from the evaluated bins; see PoseHistogram::sample().
   std::vector<PoseSample> sample(std::size_t count, std::uint64_t seed) const;
+
+  /// The blocks that the search divides or evaluates, for a picture of it. Searches again.
+  std::vector<PoseBlock> refined_blocks() const;
 
   const PoseLattice& lattice() const;
   /// How blocks are bounded and bins evaluated, and why: vector instructions, threads, device.

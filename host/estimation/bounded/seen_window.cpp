@@ -1,0 +1,46 @@
+#include "seen_window.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "bounding_box.hpp"
+#include "palpate/pose.hpp"
+
+namespace palpate {
+
+namespace {
+
+/// The tiles of an axis that overlap [lower, upper] in mm.
+std::pair<int, int> overlapping(const TileAxis& axis, double lower_mm, double upper_mm) {
+  // Rounding must not leave a tile out.
+  const auto tiles = static_cast<double>(axis.tiles());
+  const double first = std::floor((lower_mm - axis.first_mm) / axis.side_mm - 1e-6);
+  const double last = std::floor((upper_mm - axis.first_mm) / axis.side_mm + 1e-6);
+  return {static_cast<int>(std::clamp(first, 0.0, tiles)),
+          static_cast<int>(std::clamp(last + 1.0, 0.0, tiles))};
+}
+
+}  // namespace
+
+TileWindow seen_window(const KnownElements& elements, double theta_rad, const OccupancyGrid& map,
+                       const TileLevel& level) {
+  BoundingBox reach;
+  const double c = std::cos(theta_rad);
+  const double s = std::sin(theta_rad);
+  for (const glm::dvec2& p : elements.from_pivot_mm) {
+    reach.take_in({c * p.x - s * p.y, s * p.x + c * p.y});
+  }
+  if (reach.empty()) {
+    return {};
+  }
+  // The map fades to the prior within a cell.
+  const glm::dvec2 lower_mm = map.origin_mm - map.cell_mm - reach.upper;
+  const glm::dvec2 upper_mm =
+      map.origin_mm + map.cell_mm * glm::dvec2(map.nx, map.ny) - reach.lower;
+  const auto [x_first, x_end] = overlapping(level.x, lower_mm.x, upper_mm.x);
+  const auto [y_first, y_end] = overlapping(level.y, lower_mm.y, upper_mm.y);
+  return {x_first, std::max(x_first, x_end), y_first, std::max(y_first, y_end)};
+}
+
+}  // namespace palpate

@@ -1,0 +1,46 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+namespace palpate {
+
+/// Bins whose tiles are neither evaluated nor dropped, counted by hypothesis and by their tile's
+/// bound in slots of 1/16 nat: finds which tiles can be dropped together without sorting them.
+class UnsettledMass {
+ public:
+  /// @param largest of all bounds, in nats
+  UnsettledMass(std::size_t hypotheses, double largest)
+      : largest_(largest), bins_(hypotheses * slots) {}
+
+  /// Slots ascend as bounds fall; the last holds all that lie far below.
+  std::size_t slot(double bound) const;
+  void add(std::size_t hypothesis, double bound, std::int64_t bins) {
+    bins_[hypothesis * slots + slot(bound)] += bins;
+  }
+  void remove(std::size_t hypothesis, double bound, std::int64_t bins) {
+    bins_[hypothesis * slots + slot(bound)] -= bins;
+  }
+
+  /// The first slot from which on all tiles together hold at most this mass, in nats.
+  std::size_t droppable_from(double log_allowance) const;
+  /// The same for one hypothesis's tiles.
+  std::size_t droppable_from(std::size_t hypothesis, double log_allowance) const;
+  /// Bound of the log of a hypothesis's summed likelihood, in nats.
+  double log_mass(std::size_t hypothesis) const;
+  /// The largest bound that a tile may have, in nats; -infinity without any.
+  double largest() const;
+
+  static constexpr std::size_t slots = 4096;
+
+ private:
+  /// The bound that no tile in a slot exceeds, in nats.
+  double upper_edge(std::size_t slot) const;
+  std::size_t droppable_from(const std::int64_t* bins, double log_allowance) const;
+
+  double largest_;
+  std::vector<std::int64_t> bins_;  ///< [hypothesis, slot]
+};
+
+}  // namespace palpate
