@@ -70,7 +70,8 @@ TEST(Bounded, IsCertainOfTheModeWithinTheTolerance) {
 
 TEST(Bounded, AnswersAfterEveryTouch) {
   const ScratchFolder folder;
-  const auto document = quick_run(folder, "streaming");
+  const auto document = quick_run(folder, "streaming", "--plots " + (folder / "plots").string());
+  EXPECT_GT(std::filesystem::file_size(folder / "plots/bounded_search.png"), 1000U);
   expect_sound_cases(document);
   ASSERT_EQ(document.at("streaming").size(), 9U);
   for (const auto& touch : document["streaming"]) {
