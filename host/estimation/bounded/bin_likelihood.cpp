@@ -1,53 +1,164 @@
 #include "bin_likelihood.hpp"
 
-#include "interpolated_map.hpp"
+#include <algorithm>
+#include <array>
+#include <cmath>
 
 namespace palpate {
 
+namespace {
+
+/// Most bins along an axis of a block, and most cells of a map that they span: an element then sees
+/// the 4 x 4 nodes of one patch.
+constexpr int most_block_bins = 16;
+constexpr double most_block_cells = 2.0;
+
+/// A bin's coordinate in cells of the bordered map.
+double in_cells(const Axis& axis_mm, int bin, double origin_mm, double cell_mm) {
+  return (axis_mm.centre(bin) - origin_mm) / cell_mm + MapPatches::border;
+}
+
+/// Positions along one axis of neighbouring bins: on the grid, and as offsets from the first.
+template <typename Lane>
+struct AxisRun {
+  double first = 0.0;
+  int count = 0;
+  std::array<Lane, most_block_bins> offset{};
+
+  /// Takes as many bins from `begin` on as a block may span, `most` at most.
+  AxisRun(const Axis& axis_mm, int begin, int most, double origin_mm, double cell_mm,
+          const PositionGrid& grid)
+      : first(grid.rounded(in_cells(axis_mm, begin, origin_mm, cell_mm))) {
+    for (; count < std::min(most, most_block_bins); ++count) {
+      const double place = grid.rounded(in_cells(axis_mm, begin + count, origin_mm, cell_mm));
+      if (place - first > most_block_cells) {
+        break;
+      }
+      offset[count] = static_cast<Lane>(place - first);
+    }
+  }
+};
+
+/// Bins along an axis for each of the fewest equal parts that fit a block.
+int bins_per_part(int count, double step_cells) {
+  const double fit = step_cells > 0.0 ? std::floor(most_block_cells / step_cells) + 1.0 : 1e9;
+  const int most = static_cast<int>(std::min<double>(most_block_bins, fit));
+  const int parts = (count + most - 1) / most;
+  return (count + parts - 1) / parts;
+}
+
+}  // namespace
+
 BinLikelihood::BinLikelihood(std::span<const Hypothesis> hypotheses, const ContactModel& contact,
                              const PoseLattice& lattice)
-    : hypotheses_(hypotheses.begin(), hypotheses.end()), contact_(contact), lattice_(lattice) {}
+    : form_(contact), lattice_(lattice) {
+  for (const Hypothesis& hypothesis : hypotheses) {
+    placements_.push_back(placement_of(hypothesis.map, *contact.prior, lattice));
+  }
+}
+
+BinLikelihood::Placement BinLikelihood::placement_of(const OccupancyGrid& map, double prior,
+                                                     const PoseLattice& lattice) {
+  MapPatches nodes(map, prior);
+  double farthest = 0.0;
+  const auto add = [&](const Axis& axis_mm, double origin_mm) {
+    for (const int bin : {0, axis_mm.count - 1}) {
+      farthest = std::max(farthest, std::abs(in_cells(axis_mm, bin, origin_mm, map.cell_mm)));
+    }
+  };
+  add(lattice.x_mm, map.origin_mm.x);
+  add(lattice.y_mm, map.origin_mm.y);
+  const double reach = farthest + std::max(nodes.width(), nodes.height()) + 2.0 * MapPatches::border;
+  // Places within a patch are below 4 cells: these steps leave them exact in 24 and 53 bits.
+  return {.nodes = std::move(nodes),
+          .cell_mm = map.cell_mm,
+          .origin_mm = map.origin_mm,
+          .reach_cells = reach,
+          .float_grid = PositionGrid(reach, 0x1p-22),
+          .double_grid = PositionGrid(reach, 0x1p-51)};
+}
 
 void BinLikelihood::move_pivot(const glm::dvec2& pivot_mm) { lattice_.pivot_mm = pivot_mm; }
 
-void BinLikelihood::evaluate(std::span<const BinBox> boxes, const KnownElements& elements,
-                             std::span<double> log_likelihood) const {
-  std::size_t bin = 0;
+template <typename Lane, typename Result>
+void BinLikelihood::evaluate_in(std::span<const BinBox> boxes, const KnownElements& elements,
+                                std::span<Result> log_likelihood) const {
+  constexpr std::size_t most_bins = std::size_t{most_block_bins} * most_block_bins;
+  std::array<Lane, most_bins> x_offset;
+  std::array<Lane, most_bins> y_offset;
+  std::array<double, most_bins> evaluated;
+  PlacedElements placed;
+  ElementPatches<Lane> scratch;
+  Result* out = log_likelihood.data();
+  const BinBox* last = nullptr;
   for (const BinBox& box : boxes) {
-    const InterpolatedMap map(hypotheses_[box.object].map, *contact_.prior);
-    const double theta_rad = lattice_.theta_rad.centre(box.theta);
-    for (int j = 0; j < box.y_count; ++j) {
-      for (int i = 0; i < box.x_count; ++i, ++bin) {
-        const glm::dvec2 at(lattice_.x_mm.centre(box.x_first + i),
-                            lattice_.y_mm.centre(box.y_first + j));
-        double sum = 0.0;
-        for (const ReadingRun& run : elements.runs) {
-          for (std::size_t e = run.begin; e < run.end; ++e) {
-            const glm::dvec2 p_mm = rotate(theta_rad, elements.from_pivot_mm[e]) + at;
-            sum += contact_.log_likelihood(run.reading, {map.log_odds(p_mm)}, box.object);
+    const Placement& at = placements_[box.object];
+    const PositionGrid& grid = sizeof(Lane) == 4 ? at.float_grid : at.double_grid;
+    if (last == nullptr || last->object != box.object || last->theta != box.theta) {
+      place_elements(elements.from_pivot_mm, lattice_.theta_rad.centre(box.theta), at.cell_mm,
+                     at.reach_cells, grid, placed);
+    }
+    last = &box;
+    const int width = bins_per_part(box.x_count, lattice_.x_mm.step() / at.cell_mm);
+    const int height = bins_per_part(box.y_count, lattice_.y_mm.step() / at.cell_mm);
+    for (int j = 0; j < box.y_count;) {
+      const AxisRun<Lane> rows(lattice_.y_mm, box.y_first + j, std::min(height, box.y_count - j),
+                               at.origin_mm.y, at.cell_mm, grid);
+      for (int i = 0; i < box.x_count;) {
+        const AxisRun<Lane> columns(lattice_.x_mm, box.x_first + i,
+                                    std::min(width, box.x_count - i), at.origin_mm.x, at.cell_mm,
+                                    grid);
+        const std::size_t bins = std::size_t(rows.count) * columns.count;
+        std::size_t k = 0;
+        for (int r = 0; r < rows.count; ++r) {
+          for (int c = 0; c < columns.count; ++c, ++k) {
+            x_offset[k] = columns.offset[c];
+            y_offset[k] = rows.offset[r];
           }
         }
-        log_likelihood[bin] = sum;
+        std::fill(x_offset.begin() + k, x_offset.begin() + padded(bins), Lane{0});
+        std::fill(y_offset.begin() + k, y_offset.begin() + padded(bins), Lane{0});
+        evaluate_block<Lane>({.x = columns.first,
+                              .y = rows.first,
+                              .bins = bins,
+                              .x_offset = x_offset.data(),
+                              .y_offset = y_offset.data(),
+                              .log_likelihood = evaluated.data()},
+                             at.nodes, box.object, placed, elements.runs, form_, scratch);
+        const double* from = evaluated.data();
+        for (int r = 0; r < rows.count; ++r, from += columns.count) {
+          std::transform(from, from + columns.count,
+                         out + std::ptrdiff_t{j + r} * box.x_count + i,
+                         [](double nats) { return static_cast<Result>(nats); });
+        }
+        i += columns.count;
       }
+      j += rows.count;
     }
+    out += box.bins();
   }
 }
 
 void BinLikelihood::evaluate(std::span<const BinBox> boxes, const KnownElements& elements,
                              std::span<float> log_likelihood) const {
-  std::vector<double> exact(log_likelihood.size());
-  evaluate(boxes, elements, std::span(exact));
-  for (std::size_t i = 0; i < exact.size(); ++i) {
-    log_likelihood[i] = static_cast<float>(exact[i]);
+  if (form_.kind == ReadingForm::Kind::table) {
+    evaluate_in<double>(boxes, elements, log_likelihood);
+  } else {
+    evaluate_in<float>(boxes, elements, log_likelihood);
   }
 }
 
-double BinLikelihood::float32_error(std::size_t /*object*/, const KnownElements& elements) const {
-  return 1e-5 * static_cast<double>(elements.from_pivot_mm.size());
+void BinLikelihood::evaluate(std::span<const BinBox> boxes, const KnownElements& elements,
+                             std::span<double> log_likelihood) const {
+  evaluate_in<double>(boxes, elements, log_likelihood);
 }
 
-double BinLikelihood::float64_error(std::size_t /*object*/, const KnownElements& elements) const {
-  return 1e-13 * static_cast<double>(elements.from_pivot_mm.size());
+std::uint64_t BinLikelihood::bytes() const {
+  std::uint64_t sum = form_.table.capacity() * sizeof(double);
+  for (const Placement& placement : placements_) {
+    sum += placement.nodes.bytes();
+  }
+  return sum;
 }
 
 }  // namespace palpate

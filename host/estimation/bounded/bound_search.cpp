@@ -231,7 +231,7 @@ class SearchRun {
     }
     std::vector<std::vector<Tile>> parts(begins.size());
     tbb::parallel_for(std::size_t{0}, begins.size(), [&](std::size_t task) {
-      thread_local PlacedElements placed;
+      thread_local WindowPlaces placed;
       const std::size_t end = task + 1 < begins.size() ? begins[task + 1] : tiles.size();
       const Tile& first = tiles[begins[task]];
       const TileBounds& bounds = search_.bounds_[first.object];
@@ -401,7 +401,7 @@ void BoundSearch::reset() {
 void BoundSearch::add(const KnownElements& added) {
   const auto thetas = static_cast<std::size_t>(options_.lattice.theta_rad.count);
   tbb::parallel_for(std::size_t{0}, bounds_.size() * thetas, [&](std::size_t row) {
-    thread_local PlacedElements placed;
+    thread_local WindowPlaces placed;
     const std::size_t object = row / thetas;
     const std::size_t theta = row % thetas;
     const TileBounds& bounds = bounds_[object];

@@ -29,7 +29,7 @@ TileBounds::TileBounds(const OccupancyGrid& map, const ContactModel& contact, st
 }
 
 void TileBounds::place(std::size_t level, double theta_rad, const KnownElements& elements,
-                       PlacedElements& placed) const {
+                       WindowPlaces& placed) const {
   place_elements(elements,
                  {.theta_rad = theta_rad,
                   .corner_mm = corner_mm_,
@@ -37,7 +37,7 @@ void TileBounds::place(std::size_t level, double theta_rad, const KnownElements&
                  tables_[level].front(), placed);
 }
 
-void TileBounds::add(std::size_t level, const KnownElements& elements, const PlacedElements& placed,
+void TileBounds::add(std::size_t level, const KnownElements& elements, const WindowPlaces& placed,
                      int first_x, int first_y, std::uint32_t* sums) const {
   for (const ReadingRun& run : elements.runs) {
     add_penalties(placed, run, table(level, run.reading), first_x, first_y, sums);

@@ -39,9 +39,9 @@ class TileBounds {
 
   /// Places the elements for the tiles of a level at one theta.
   void place(std::size_t level, double theta_rad, const KnownElements& elements,
-             PlacedElements& placed) const;
+             WindowPlaces& placed) const;
   /// Adds the elements' penalties to the sums of the batch of tiles whose first tile this is.
-  void add(std::size_t level, const KnownElements& elements, const PlacedElements& placed,
+  void add(std::size_t level, const KnownElements& elements, const WindowPlaces& placed,
            int first_x, int first_y, std::uint32_t* sums) const;
   /// Log-likelihood of the elements without any penalty, in nats.
   double best(std::size_t level, const KnownElements& elements) const;

@@ -122,7 +122,7 @@ constexpr std::size_t slack = 64;
 }  // namespace
 
 void place_elements(const KnownElements& elements, const TilePlace& place, const WindowTable& shape,
-                    PlacedElements& placed) {
+                    WindowPlaces& placed) {
   const std::size_t count = elements.from_pivot_mm.size();
   for (std::vector<std::int32_t>* list : {&placed.plane, &placed.column, &placed.row}) {
     list->resize(count + slack);
@@ -132,7 +132,7 @@ void place_elements(const KnownElements& elements, const TilePlace& place, const
    placed.row.data());
 }
 
-void add_penalties(const PlacedElements& placed, const ReadingRun& run, const WindowTable& table,
+void add_penalties(const WindowPlaces& placed, const ReadingRun& run, const WindowTable& table,
                    int first_x, int first_y, std::uint32_t* sums) {
   thread_local std::vector<std::int32_t> entry;
   const std::size_t count = run.end - run.begin;

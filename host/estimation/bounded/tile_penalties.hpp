@@ -14,7 +14,7 @@ namespace palpate {
 
 /// The elements of a level's tiles at one theta: for every element the plane of its phase and the
 /// place in it for the first tile.
-struct PlacedElements {
+struct WindowPlaces {
   std::vector<std::int32_t> plane;  ///< index of the plane's first entry
   std::vector<std::int32_t> column;
   std::vector<std::int32_t> row;
@@ -29,12 +29,12 @@ struct TilePlace {
 
 /// Rotates the elements and finds their places in tables of this shape.
 void place_elements(const KnownElements& elements, const TilePlace& place, const WindowTable& shape,
-                    PlacedElements& placed);
+                    WindowPlaces& placed);
 
 /// Sums the penalties of one run of elements over the 4 x 4 tiles of a batch, and adds them to
 /// `sums`, where the sum of tile (i, j) of the batch stands at 4 i + j.
 /// @param first_x, first_y tile at the batch's corner
-void add_penalties(const PlacedElements& placed, const ReadingRun& run, const WindowTable& table,
+void add_penalties(const WindowPlaces& placed, const ReadingRun& run, const WindowTable& table,
                    int first_x, int first_y, std::uint32_t* sums);
 
 }  // namespace palpate

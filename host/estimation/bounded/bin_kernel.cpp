@@ -1,0 +1,423 @@
+// Highway compiles this file once for every set of vector instructions. Products and sums are never
+// fused and lanes never mixed, so that every set gives the same bits.
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "bin_kernel.cpp"
+#define HWY_COMPILE_ALL_ATTAINABLE
+#define HWY_DISABLED_TARGETS (HWY_SVE | HWY_SVE2 | HWY_SVE_256 | HWY_SVE2_128 | HWY_RVV)
+#include <hwy/foreach_target.h>
+#include <hwy/highway.h>
+
+#include <algorithm>
+#include <type_traits>
+
+#include "bin_kernel.hpp"
+#include "vector_math-inl.hpp"
+
+HWY_BEFORE_NAMESPACE();
+namespace palpate {
+namespace HWY_NAMESPACE {
+
+// ---------------------------------------------------------------------------------- Elements
+
+template <class D>
+void place(D d, const double* xy_mm, double cos_by_cell, double sin_by_cell, double reach,
+           double rounder, double* x, double* y) {
+  hn::Vec<D> px;
+  hn::Vec<D> py;
+  hn::LoadInterleaved2(d, xy_mm, px, py);
+  const auto c = hn::Set(d, cos_by_cell);
+  const auto s = hn::Set(d, sin_by_cell);
+  const auto limit = hn::Set(d, reach);
+  const auto round = hn::Set(d, rounder);
+  const auto rounded = [&](auto v) HWY_ATTR {
+    const auto clamped = hn::Max(hn::Neg(limit), hn::Min(v, limit));
+    return hn::Sub(hn::Add(clamped, round), round);
+  };
+  hn::StoreU(rounded(hn::Sub(hn::Mul(c, px), hn::Mul(s, py))), d, x);
+  hn::StoreU(rounded(hn::Add(hn::Mul(s, px), hn::Mul(c, py))), d, y);
+}
+
+void PlaceElements(const double* xy_mm, std::size_t count, double cos_by_cell, double sin_by_cell,
+                   double reach, double rounder, double* x, double* y) {
+  const hn::ScalableTag<double> d;
+  const std::size_t lanes = hn::Lanes(d);
+  std::size_t e = 0;
+  for (; e + lanes <= count; e += lanes) {
+    place(d, xy_mm + 2 * e, cos_by_cell, sin_by_cell, reach, rounder, x + e, y + e);
+  }
+  if (e < count) {
+    double rest[2 * most_lanes] = {};
+    std::copy(xy_mm + 2 * e, xy_mm + 2 * count, rest);
+    place(d, rest, cos_by_cell, sin_by_cell, reach, rounder, x + e, y + e);
+  }
+}
+
+template <class D>
+void store_as(D d, hn::Vec<D> v, double* to) {
+  hn::StoreU(v, d, to);
+}
+
+template <class D>
+void store_as(D /*d*/, hn::Vec<D> v, float* to) {
+  const hn::Rebind<float, D> df;
+  hn::StoreU(hn::DemoteTo(df, v), df, to);
+}
+
+/// Finds each element's patch. The index is clamped so that elements beyond the map see a patch of
+/// the border, whose nodes are all equal.
+template <typename Lane>
+void find_patches(const BinBlock<Lane>& block, const MapPatches& map, const PlacedElements& placed,
+                  ElementPatches<Lane>& found) {
+  const hn::ScalableTag<double> d;
+  const hn::Rebind<std::int32_t, decltype(d)> di;
+  const auto first_x = hn::Set(d, block.x);
+  const auto first_y = hn::Set(d, block.y);
+  const auto last_x = hn::Set(d, static_cast<double>(map.width() - MapPatches::side));
+  const auto last_y = hn::Set(d, static_cast<double>(map.height() - MapPatches::side));
+  const auto width = hn::Set(d, static_cast<double>(map.width()));
+  for (std::size_t e = 0; e < found.patch.size(); e += hn::Lanes(d)) {
+    const auto x = hn::Add(hn::LoadU(d, placed.x.data() + e), first_x);
+    const auto y = hn::Add(hn::LoadU(d, placed.y.data() + e), first_y);
+    const auto whole_x = hn::Floor(x);
+    const auto whole_y = hn::Floor(y);
+    store_as(d, hn::Sub(x, whole_x), found.x.data() + e);
+    store_as(d, hn::Sub(y, whole_y), found.y.data() + e);
+    const auto column = hn::Max(hn::Zero(d), hn::Min(whole_x, last_x));
+    const auto row = hn::Max(hn::Zero(d), hn::Min(whole_y, last_y));
+    hn::StoreU(hn::DemoteTo(di, hn::Add(hn::Mul(row, width), column)), di, found.patch.data() + e);
+  }
+}
+
+// ------------------------------------------------------------------------------ Interpolation
+
+/// Reads one node of a patch for every lane. `from` is the patch, or the patch moved to another
+/// corner of the cells; `index`, below 11, is that of the cell's first node.
+template <class DF, class VI>
+HWY_INLINE hn::Vec<DF> look_up(DF df, const float* from, VI index) {
+#if HWY_TARGET == HWY_AVX3 || HWY_TARGET == HWY_AVX3_DL
+  // Gathers are several times slower than a permutation of the 16 nodes.
+  const hn::Full512<float> whole;
+  const auto nodes = hn::LoadU(whole, from);
+  if constexpr (hn::MaxLanes(DF()) == 16) {
+    return hn::TableLookupLanes(nodes, hn::IndicesFromVec(whole, index));
+  } else {
+    const hn::Full512<std::int32_t> whole_index;
+    const auto wide = hn::ZeroExtendVector(whole_index, index);
+    return hn::LowerHalf(df, hn::TableLookupLanes(nodes, hn::IndicesFromVec(whole, wide)));
+  }
+#elif HWY_TARGET == HWY_AVX2
+  const hn::Full256<float> whole;
+  const hn::Full256<std::int32_t> whole_index;
+  const auto low_nodes = hn::LoadU(whole, from);
+  const auto high_nodes = hn::LoadU(whole, from + 8);
+  const auto both = [&](auto wide) HWY_ATTR {
+    const auto lane = hn::IndicesFromVec(whole, hn::And(wide, hn::Set(whole_index, 7)));
+    const auto is_high = hn::BitCast(whole, hn::ShiftLeft<28>(wide));
+    return hn::IfNegativeThenElse(is_high, hn::TableLookupLanes(high_nodes, lane),
+                                  hn::TableLookupLanes(low_nodes, lane));
+  };
+  if constexpr (hn::MaxLanes(DF()) == 8) {
+    return both(index);
+  } else {
+    return hn::LowerHalf(df, both(hn::ZeroExtendVector(whole_index, index)));
+  }
+#else
+  return hn::GatherIndex(df, from, index);
+#endif
+}
+
+/// As look_up(), in the lanes' numbers. Float64 puts the exact prior in the place of its marker.
+template <class D, class VI>
+HWY_INLINE hn::Vec<D> node(D d, const MapPatches& map, const float* from, VI index) {
+  if constexpr (sizeof(hn::TFromD<D>) == 4) {
+    return look_up(d, from, index);
+  } else {
+    const auto stored = hn::PromoteTo(d, look_up(hn::Rebind<float, D>(), from, index));
+    const auto marker = hn::Set(d, static_cast<double>(map.marker()));
+    return hn::IfThenElse(hn::Eq(stored, marker), hn::Set(d, map.prior_log_odds()), stored);
+  }
+}
+
+/// Log odds at `x`, `y` of a patch, in cells from its first node, both in [0, 3).
+template <class D>
+HWY_INLINE hn::Vec<D> log_odds(D d, const MapPatches& map, const float* patch, hn::Vec<D> x,
+                               hn::Vec<D> y) {
+  const auto column = hn::Floor(x);
+  const auto row = hn::Floor(y);
+  const auto fx = hn::Sub(x, column);
+  const auto fy = hn::Sub(y, row);
+  const auto index =
+      small_integer(d, hn::Add(hn::Mul(column, hn::Set(d, hn::TFromD<D>{4})), row));
+  const auto v00 = node(d, map, patch, index);
+  const auto v01 = node(d, map, patch + 1, index);
+  const auto v10 = node(d, map, patch + MapPatches::side, index);
+  const auto v11 = node(d, map, patch + MapPatches::side + 1, index);
+  const auto left = hn::Add(v00, hn::Mul(hn::Sub(v01, v00), fy));
+  const auto right = hn::Add(v10, hn::Mul(hn::Sub(v11, v10), fy));
+  return hn::Add(left, hn::Mul(hn::Sub(right, left), fx));
+}
+
+// ------------------------------------------------------------------------------- Likelihoods
+
+/// The product of the likelihoods of some elements in every lane, see ReadingForm.
+template <class D>
+struct Products {
+  hn::Vec<D> numerator;
+  hn::Vec<D> denominator;
+  hn::Vec<hn::RebindToUnsigned<D>> exponent;  ///< taken out, modulo the lane's range
+  hn::Vec<D> sum;                             ///< of a, since it was last taken out
+
+  explicit Products(D d)
+      : numerator(hn::Set(d, hn::TFromD<D>{1})),
+        denominator(hn::Set(d, hn::TFromD<D>{1})),
+        exponent(hn::Zero(hn::RebindToUnsigned<D>())),
+        sum(hn::Zero(d)) {}
+};
+
+/// The number that a reading's likelihood tends to at large and at small log odds, over its scale.
+template <typename Lane>
+struct Limits {
+  Lane at_negative;
+  Lane at_positive;
+};
+
+template <class D>
+HWY_INLINE void multiply(D d, hn::Vec<D> l, hn::Vec<D> at_negative, hn::Vec<D> at_positive,
+                         Products<D>& product) {
+  const auto one = hn::Set(d, hn::TFromD<D>{1});
+  const auto e = exp_of_minus(d, hn::Abs(l));
+  const auto negative = hn::Lt(l, hn::Zero(d));
+  const auto numerator =
+      hn::IfThenElse(negative, hn::Add(at_negative, hn::Mul(at_positive, e)),
+                     hn::Add(at_positive, hn::Mul(at_negative, e)));
+  product.numerator = hn::Mul(product.numerator, numerator);
+  product.denominator = hn::Mul(product.denominator, hn::Add(one, e));
+}
+
+/// The same in the form of sums, for log odds `z` of the reading.
+template <class D>
+HWY_INLINE void multiply_and_add(D d, hn::Vec<D> z, hn::Vec<D> log_ratio, Products<D>& product) {
+  const auto one = hn::Set(d, hn::TFromD<D>{1});
+  const auto zero = hn::Zero(d);
+  const auto e = exp_of_minus(d, hn::Abs(z));
+  const auto a = hn::Max(hn::Min(z, zero), log_ratio);
+  const auto other = exp_of_minus(d, hn::Abs(hn::Sub(hn::Min(z, zero), log_ratio)));
+  const auto factor = hn::IfThenElse(hn::Lt(z, zero), one, e);
+  product.numerator = hn::Mul(product.numerator, hn::Add(one, hn::Mul(other, factor)));
+  product.denominator = hn::Mul(product.denominator, hn::Add(one, e));
+  product.sum = hn::Add(product.sum, a);
+}
+
+/// Takes powers of two, and the sum, out of the product.
+template <class D>
+HWY_INLINE void take_out(D d, Products<D>& product, double* sums) {
+  using Lane = hn::TFromD<D>;
+  const hn::RebindToUnsigned<D> du;
+  const auto mantissa = hn::Set(du, VectorMath<Lane>::mantissa_mask);
+  const auto one = hn::Set(du, VectorMath<Lane>::one_bits);
+  const auto n = hn::BitCast(du, product.numerator);
+  const auto m = hn::BitCast(du, product.denominator);
+  constexpr int shift = VectorMath<Lane>::mantissa_bits;
+  product.exponent =
+      hn::Add(product.exponent, hn::Sub(hn::ShiftRight<shift>(n), hn::ShiftRight<shift>(m)));
+  product.numerator = hn::BitCast(d, hn::Or(hn::And(n, mantissa), one));
+  product.denominator = hn::BitCast(d, hn::Or(hn::And(m, mantissa), one));
+  if (sums != nullptr) {
+    HWY_ALIGN Lane sum[most_lanes];
+    hn::Store(product.sum, d, sum);
+    for (std::size_t i = 0; i < hn::Lanes(d); ++i) {
+      sums[i] += static_cast<double>(sum[i]);
+    }
+    product.sum = hn::Zero(d);
+  }
+}
+
+/// Sum of the logarithms of all lanes' factors.
+template <class D>
+void store_logs(D d, const Products<D>& product, const double* sums, double constant,
+                double* log_likelihood) {
+  using Lane = hn::TFromD<D>;
+  const hn::RebindToUnsigned<D> du;
+  const hn::ScalableTag<double> dd;
+  HWY_ALIGN Lane numerator[most_lanes];
+  HWY_ALIGN Lane denominator[most_lanes];
+  HWY_ALIGN hn::TFromD<decltype(du)> exponent[most_lanes];
+  hn::Store(product.numerator, d, numerator);
+  hn::Store(product.denominator, d, denominator);
+  hn::Store(product.exponent, du, exponent);
+  HWY_ALIGN double over[most_lanes];
+  HWY_ALIGN double under[most_lanes];
+  HWY_ALIGN double power[most_lanes];
+  for (std::size_t i = 0; i < hn::Lanes(d); ++i) {
+    over[i] = static_cast<double>(numerator[i]);
+    under[i] = static_cast<double>(denominator[i]);
+    power[i] = static_cast<double>(static_cast<std::make_signed_t<hn::TFromD<decltype(du)>>>(
+        exponent[i]));
+  }
+  for (std::size_t i = 0; i < hn::Lanes(d); i += hn::Lanes(dd)) {
+    const auto x = hn::Div(hn::Load(dd, over + i), hn::Load(dd, under + i));
+    const auto logs = hn::Add(hn::Mul(hn::Load(dd, power + i), hn::Set(dd, VectorMath<double>::ln2)),
+                              log_near_one(dd, x));
+    const auto rest = hn::Add(hn::LoadU(dd, sums + i), hn::Set(dd, constant));
+    hn::StoreU(hn::Add(logs, rest), dd, log_likelihood + i);
+  }
+}
+
+/// The bins of one vector, by Eq. 7.
+template <ReadingForm::Kind kind, class D, typename Lane>
+void evaluate_lanes(D d, hn::Vec<D> x, hn::Vec<D> y, const MapPatches& map,
+                    const ElementPatches<Lane>& elements, std::span<const ReadingRun> runs,
+                    const ReadingForm& form, double* log_likelihood) {
+  constexpr bool in_sums = kind == ReadingForm::Kind::sums;
+  const int interval = sizeof(Lane) == 4 ? form.float_interval : form.double_interval;
+  const auto ratio = hn::Set(d, static_cast<Lane>(form.ratio));
+  const auto log_ratio = hn::Set(d, static_cast<Lane>(form.log_ratio));
+  const auto one = hn::Set(d, Lane{1});
+  const float* const nodes = map.nodes();
+  Products<D> product(d);
+  HWY_ALIGN double sums[most_lanes] = {};
+  std::size_t count = 0;
+  int since = 0;
+  for (const ReadingRun& run : runs) {
+    const bool contact = run.reading != Reading::no_contact;
+    const auto at_negative = contact ? ratio : one;
+    const auto at_positive = contact ? one : ratio;
+    count += run.end - run.begin;
+    for (std::size_t e = run.begin; e < run.end; ++e) {
+      const float* patch = nodes + MapPatches::side * static_cast<std::size_t>(elements.patch[e]);
+      const auto l = log_odds(d, map, patch, hn::Add(hn::Set(d, elements.x[e]), x),
+                              hn::Add(hn::Set(d, elements.y[e]), y));
+      if constexpr (in_sums) {
+        multiply_and_add(d, contact ? l : hn::Neg(l), log_ratio, product);
+      } else {
+        multiply(d, l, at_negative, at_positive, product);
+      }
+      if (++since == interval) {
+        take_out(d, product, in_sums ? sums : nullptr);
+        since = 0;
+      }
+    }
+  }
+  take_out(d, product, in_sums ? sums : nullptr);
+  store_logs(d, product, sums, static_cast<double>(count) * form.log_scale, log_likelihood);
+}
+
+/// The bins of one vector, by a table of log-likelihoods.
+template <class D>
+void look_up_lanes(D d, hn::Vec<D> x, hn::Vec<D> y, const MapPatches& map, std::size_t object,
+                   const ElementPatches<double>& elements, std::span<const ReadingRun> runs,
+                   const ReadingForm& form, double* log_likelihood) {
+  const auto first = hn::Set(d, form.first_log_odds);
+  const auto scale = hn::Set(d, form.nodes_per_nat);
+  const auto last = hn::Set(d, static_cast<double>(form.nodes - 1));
+  const auto last_segment = hn::Set(d, static_cast<double>(form.nodes - 2));
+  auto sum = hn::Zero(d);
+  for (const ReadingRun& run : runs) {
+    const double* const row = form.row(object, run.reading);
+    for (std::size_t e = run.begin; e < run.end; ++e) {
+      const float* patch =
+          map.nodes() + MapPatches::side * static_cast<std::size_t>(elements.patch[e]);
+      const auto l = log_odds(d, map, patch, hn::Add(hn::Set(d, elements.x[e]), x),
+                              hn::Add(hn::Set(d, elements.y[e]), y));
+      const auto at = hn::Max(hn::Zero(d), hn::Min(hn::Mul(hn::Sub(l, first), scale), last));
+      const auto segment = hn::Min(hn::Floor(at), last_segment);
+      const auto index = hn::BitCast(hn::RebindToSigned<D>(), whole_number(d, hn::Add(segment, segment)));
+      const auto value = hn::GatherIndex(d, row, index);
+      const auto difference = hn::GatherIndex(d, row + 1, index);
+      sum = hn::Add(sum, hn::Add(value, hn::Mul(difference, hn::Sub(at, segment))));
+    }
+  }
+  hn::StoreU(sum, d, log_likelihood);
+}
+
+template <typename Lane>
+void evaluate(const BinBlock<Lane>& block, const MapPatches& map, std::size_t object,
+              const PlacedElements& placed, std::span<const ReadingRun> runs,
+              const ReadingForm& form, ElementPatches<Lane>& scratch) {
+  find_patches(block, map, placed, scratch);
+  const hn::ScalableTag<Lane> d;
+  for (std::size_t i = 0; i < block.bins; i += hn::Lanes(d)) {
+    const auto x = hn::LoadU(d, block.x_offset + i);
+    const auto y = hn::LoadU(d, block.y_offset + i);
+    double* const out = block.log_likelihood + i;
+    if (form.kind == ReadingForm::Kind::products) {
+      evaluate_lanes<ReadingForm::Kind::products>(d, x, y, map, scratch, runs, form, out);
+    } else if (form.kind == ReadingForm::Kind::sums) {
+      evaluate_lanes<ReadingForm::Kind::sums>(d, x, y, map, scratch, runs, form, out);
+    } else if constexpr (sizeof(Lane) == 8) {
+      look_up_lanes(d, x, y, map, object, scratch, runs, form, out);
+    }
+  }
+}
+
+void EvaluateFloat(const BinBlock<float>& block, const MapPatches& map, std::size_t object,
+                   const PlacedElements& placed, std::span<const ReadingRun> runs,
+                   const ReadingForm& form, ElementPatches<float>& scratch) {
+  evaluate(block, map, object, placed, runs, form, scratch);
+}
+
+void EvaluateDouble(const BinBlock<double>& block, const MapPatches& map, std::size_t object,
+                    const PlacedElements& placed, std::span<const ReadingRun> runs,
+                    const ReadingForm& form, ElementPatches<double>& scratch) {
+  evaluate(block, map, object, placed, runs, form, scratch);
+}
+
+std::int64_t Target() { return HWY_TARGET; }
+
+}  // namespace HWY_NAMESPACE
+}  // namespace palpate
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+
+#include <cmath>
+
+namespace palpate {
+
+HWY_EXPORT(PlaceElements);
+HWY_EXPORT(EvaluateFloat);
+HWY_EXPORT(EvaluateDouble);
+HWY_EXPORT(Target);
+
+PositionGrid::PositionGrid(double reach_cells, double finest)
+    : step_(std::max(finest, std::exp2(std::ceil(std::log2(2.0 * reach_cells)) - 51.0))) {}
+
+void place_elements(std::span<const glm::dvec2> from_pivot_mm, double theta_rad, double cell_mm,
+                    double reach_cells, const PositionGrid& grid, PlacedElements& placed) {
+  placed.x.assign(padded(from_pivot_mm.size()), 0.0);
+  placed.y.assign(padded(from_pivot_mm.size()), 0.0);
+  if (!from_pivot_mm.empty()) {
+    HWY_DYNAMIC_DISPATCH(PlaceElements)
+    (&from_pivot_mm.front().x, from_pivot_mm.size(), std::cos(theta_rad) / cell_mm,
+     std::sin(theta_rad) / cell_mm, reach_cells, grid.rounder(), placed.x.data(), placed.y.data());
+  }
+}
+
+template <typename Lane>
+void evaluate_block(const BinBlock<Lane>& block, const MapPatches& map, std::size_t object,
+                    const PlacedElements& placed, std::span<const ReadingRun> runs,
+                    const ReadingForm& form, ElementPatches<Lane>& scratch) {
+  scratch.patch.resize(placed.x.size());
+  scratch.x.resize(placed.x.size());
+  scratch.y.resize(placed.x.size());
+  if constexpr (sizeof(Lane) == 4) {
+    HWY_DYNAMIC_DISPATCH(EvaluateFloat)(block, map, object, placed, runs, form, scratch);
+  } else {
+    HWY_DYNAMIC_DISPATCH(EvaluateDouble)(block, map, object, placed, runs, form, scratch);
+  }
+}
+
+template void evaluate_block(const BinBlock<float>&, const MapPatches&, std::size_t,
+                             const PlacedElements&, std::span<const ReadingRun>, const ReadingForm&,
+                             ElementPatches<float>&);
+template void evaluate_block(const BinBlock<double>&, const MapPatches&, std::size_t,
+                             const PlacedElements&, std::span<const ReadingRun>, const ReadingForm&,
+                             ElementPatches<double>&);
+
+std::string vector_instructions() {
+  return hwy::TargetName(HWY_DYNAMIC_DISPATCH(Target)());
+}
+
+}  // namespace palpate
+
+#endif  // HWY_ONCE
