@@ -27,10 +27,12 @@ class BoundSearch {
   /// Adds the penalties of more elements to the sums of the largest tiles.
   void add(const KnownElements& added);
   /// @param elements all that were added since reset()
-  /// @param refined where not null, takes the tiles that were divided or evaluated
+  /// @param refined where not null, takes the tiles that were divided
   SearchResult run(const KnownElements& elements, const BinVisitor& visit,
                    std::vector<PoseBlock>* refined = nullptr) const;
 
+  /// The level of the smallest tiles, 0 that of the largest.
+  int finest_level() const { return static_cast<int>(bounds_.front().levels().size()) - 1; }
   std::uint64_t bytes() const;
 
  private:
