@@ -22,11 +22,14 @@ constexpr double margin_px = 36.0;
 constexpr double side_px = 500.0;
 constexpr double axis_px = 84.0;
 constexpr double top_px = 104.0;
-constexpr double gap_px = 28.0;
+constexpr double gap_px = 68.0;  ///< between panels
 constexpr double legend_px = top_px + side_px + 108.0;
 constexpr double height_px = legend_px + 40.0;
 
 constexpr Colour occupied{0.72, 0.72, 0.72};
+// Opacity of blocks that the search went into at every theta.
+constexpr double divided_alpha = 0.26;
+constexpr double evaluated_alpha = 0.95;
 constexpr Pen truth_pen{.colour = {0.0, 0.0, 0.0}, .width_px = 3.5, .halo_px = 2.5};
 
 /// Blocks of one place and size, over all thetas.
@@ -100,23 +103,17 @@ void draw_occupancy(Canvas& canvas, const View& view, const OccupancyGrid& map) 
 }
 
 void draw_tiles(Canvas& canvas, const View& view, const std::vector<Tile>& tiles, int levels) {
-  constexpr double least_alpha = 0.16;
-  constexpr double most_alpha = 0.85;
   for (const Tile& tile : tiles) {
     const Box box = view.pixels(tile.lower_mm, tile.upper_mm);
     const Colour colour = level_colour(tile.level, levels);
-    const bool last = tile.level + 1 == levels;
     // Few thetas of hundreds are to be seen, too.
     const double fullness = std::sqrt(std::sqrt(tile.share));
-    canvas.fill(
-        corners_of(box),
-        with_alpha(colour, (last ? 1.0 : 0.3) * std::lerp(least_alpha, most_alpha, fullness)));
-    if (!last || box.width > 8.0) {
-      canvas.frame(box, {.colour = with_alpha(colour, last ? 0.5 : 0.8),
-                         .width_px = tile.level == 0 ? 1.6
-                                     : last          ? 0.6
-                                                     : 1.0});
+    if (tile.level + 1 == levels) {
+      canvas.fill(corners_of(box), with_alpha(colour, std::lerp(0.4, evaluated_alpha, fullness)));
+      continue;
     }
+    canvas.fill(corners_of(box), with_alpha(colour, std::lerp(0.05, divided_alpha, fullness)));
+    canvas.frame(box, {.colour = with_alpha(colour, 0.8), .width_px = tile.level == 0 ? 1.6 : 1.0});
   }
 }
 
@@ -146,7 +143,7 @@ void draw_legend(Canvas& canvas, int levels, double left_px) {
     const Box box{left_px, legend_px - 18.0, edge_px, edge_px};
     const Colour colour = level_colour(level, levels);
     const bool last = level + 1 == levels;
-    canvas.fill(corners_of(box), with_alpha(colour, last ? 0.85 : 0.3));
+    canvas.fill(corners_of(box), with_alpha(colour, last ? evaluated_alpha : divided_alpha));
     canvas.frame(box, {.colour = colour, .width_px = 1.6});
     canvas.text(words, {left_px + edge_px + 10.0, legend_px}, small);
     left_px += edge_px + 10.0 + canvas.text_width(words, small) + 40.0;
@@ -171,14 +168,13 @@ std::string draw_search(const std::vector<SearchPanel>& panels, int object,
     }
   }
   const auto count = static_cast<double>(panels.size());
-  const double width_px =
-      2.0 * margin_px + axis_px + count * side_px + (count - 1.0) * (gap_px + 40.0);
+  const double width_px = 2.0 * margin_px + axis_px + count * side_px + (count - 1.0) * gap_px;
   Canvas canvas(static_cast<int>(width_px), static_cast<int>(height_px));
   double left_px = margin_px + axis_px;
   for (const SearchPanel& panel : panels) {
     draw_panel(canvas, left_px, panel, tiles_of(panel.blocks, object, lattice), levels, map,
                lattice, place_mm);
-    left_px += side_px + gap_px + 40.0;
+    left_px += side_px + gap_px;
   }
   draw_legend(canvas, levels, margin_px + axis_px);
   return canvas.encode();
