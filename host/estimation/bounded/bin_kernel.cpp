@@ -146,8 +146,7 @@ HWY_INLINE hn::Vec<D> log_odds(D d, const MapPatches& map, const float* patch, h
   const auto row = hn::Floor(y);
   const auto fx = hn::Sub(x, column);
   const auto fy = hn::Sub(y, row);
-  const auto index =
-      small_integer(d, hn::Add(hn::Mul(column, hn::Set(d, hn::TFromD<D>{4})), row));
+  const auto index = small_integer(d, hn::Add(hn::Mul(column, hn::Set(d, hn::TFromD<D>{4})), row));
   const auto v00 = node(d, map, patch, index);
   const auto v01 = node(d, map, patch + 1, index);
   const auto v10 = node(d, map, patch + MapPatches::side, index);
@@ -187,9 +186,8 @@ HWY_INLINE void multiply(D d, hn::Vec<D> l, hn::Vec<D> at_negative, hn::Vec<D> a
   const auto one = hn::Set(d, hn::TFromD<D>{1});
   const auto e = exp_of_minus(d, hn::Abs(l));
   const auto negative = hn::Lt(l, hn::Zero(d));
-  const auto numerator =
-      hn::IfThenElse(negative, hn::Add(at_negative, hn::Mul(at_positive, e)),
-                     hn::Add(at_positive, hn::Mul(at_negative, e)));
+  const auto numerator = hn::IfThenElse(negative, hn::Add(at_negative, hn::Mul(at_positive, e)),
+                                        hn::Add(at_positive, hn::Mul(at_negative, e)));
   product.numerator = hn::Mul(product.numerator, numerator);
   product.denominator = hn::Mul(product.denominator, hn::Add(one, e));
 }
@@ -251,13 +249,14 @@ void store_logs(D d, const Products<D>& product, const double* sums, double cons
   for (std::size_t i = 0; i < hn::Lanes(d); ++i) {
     over[i] = static_cast<double>(numerator[i]);
     under[i] = static_cast<double>(denominator[i]);
-    power[i] = static_cast<double>(static_cast<std::make_signed_t<hn::TFromD<decltype(du)>>>(
-        exponent[i]));
+    power[i] =
+        static_cast<double>(static_cast<std::make_signed_t<hn::TFromD<decltype(du)>>>(exponent[i]));
   }
   for (std::size_t i = 0; i < hn::Lanes(d); i += hn::Lanes(dd)) {
     const auto x = hn::Div(hn::Load(dd, over + i), hn::Load(dd, under + i));
-    const auto logs = hn::Add(hn::Mul(hn::Load(dd, power + i), hn::Set(dd, VectorMath<double>::ln2)),
-                              log_near_one(dd, x));
+    const auto logs =
+        hn::Add(hn::Mul(hn::Load(dd, power + i), hn::Set(dd, VectorMath<double>::ln2)),
+                log_near_one(dd, x));
     const auto rest = hn::Add(hn::LoadU(dd, sums + i), hn::Set(dd, constant));
     hn::StoreU(hn::Add(logs, rest), dd, log_likelihood + i);
   }
@@ -321,7 +320,8 @@ void look_up_lanes(D d, hn::Vec<D> x, hn::Vec<D> y, const MapPatches& map, std::
                               hn::Add(hn::Set(d, elements.y[e]), y));
       const auto at = hn::Max(hn::Zero(d), hn::Min(hn::Mul(hn::Sub(l, first), scale), last));
       const auto segment = hn::Min(hn::Floor(at), last_segment);
-      const auto index = hn::BitCast(hn::RebindToSigned<D>(), whole_number(d, hn::Add(segment, segment)));
+      const auto index =
+          hn::BitCast(hn::RebindToSigned<D>(), whole_number(d, hn::Add(segment, segment)));
       const auto value = hn::GatherIndex(d, row, index);
       const auto difference = hn::GatherIndex(d, row + 1, index);
       sum = hn::Add(sum, hn::Add(value, hn::Mul(difference, hn::Sub(at, segment))));
@@ -414,9 +414,7 @@ template void evaluate_block(const BinBlock<double>&, const MapPatches&, std::si
                              const PlacedElements&, std::span<const ReadingRun>, const ReadingForm&,
                              ElementPatches<double>&);
 
-std::string vector_instructions() {
-  return hwy::TargetName(HWY_DYNAMIC_DISPATCH(Target)());
-}
+std::string vector_instructions() { return hwy::TargetName(HWY_DYNAMIC_DISPATCH(Target)()); }
 
 }  // namespace palpate
 

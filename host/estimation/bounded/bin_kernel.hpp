@@ -20,8 +20,8 @@ constexpr std::size_t padded(std::size_t count) {
   return (count + most_lanes - 1) / most_lanes * most_lanes;
 }
 
-/// The grid that positions in cells are rounded to: sums and differences of such positions are exact
-/// in float64, so that a bin's position is the same from whichever bin it is reached.
+/// The grid that positions in cells are rounded to: sums and differences of such positions are
+/// exact in float64, so that a bin's position is the same from whichever bin it is reached.
 class PositionGrid {
  public:
   /// @param reach_cells largest magnitude of a position
@@ -43,8 +43,8 @@ struct PlacedElements {
   std::vector<double> y;
 };
 
-/// Where an element stands about a block of bins: the patch, as an index of MapPatches, and the place
-/// of the block's first bin within the patch's first cell, [e], padded.
+/// Where an element stands about a block of bins: the patch, as an index of MapPatches, and the
+/// place of the block's first bin within the patch's first cell, [e], padded.
 template <typename Lane>
 struct ElementPatches {
   std::vector<std::int32_t> patch;

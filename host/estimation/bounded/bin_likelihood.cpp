@@ -68,7 +68,8 @@ BinLikelihood::Placement BinLikelihood::placement_of(const OccupancyGrid& map, d
   };
   add(lattice.x_mm, map.origin_mm.x);
   add(lattice.y_mm, map.origin_mm.y);
-  const double reach = farthest + std::max(nodes.width(), nodes.height()) + 2.0 * MapPatches::border;
+  const double reach =
+      farthest + std::max(nodes.width(), nodes.height()) + 2.0 * MapPatches::border;
   // Places within a patch are below 4 cells: these steps leave them exact in 24 and 53 bits.
   return {.nodes = std::move(nodes),
           .cell_mm = map.cell_mm,
@@ -127,8 +128,7 @@ void BinLikelihood::evaluate_in(std::span<const BinBox> boxes, const KnownElemen
                              at.nodes, box.object, placed, elements.runs, form_, scratch);
         const double* from = evaluated.data();
         for (int r = 0; r < rows.count; ++r, from += columns.count) {
-          std::transform(from, from + columns.count,
-                         out + std::ptrdiff_t{j + r} * box.x_count + i,
+          std::transform(from, from + columns.count, out + std::ptrdiff_t{j + r} * box.x_count + i,
                          [](double nats) { return static_cast<Result>(nats); });
         }
         i += columns.count;

@@ -3,9 +3,9 @@
 
 #include "bin_likelihood.hpp"
 
-// Bounds of BinLikelihood's rounding. A unit of roundoff is u for the lanes' numbers, v for float64:
-// every sum, product and quotient has a relative error of at most one unit. Terms of the second order
-// are covered by `second_order`.
+// Bounds of BinLikelihood's rounding. A unit of roundoff is u for the lanes' numbers, v for
+// float64: every sum, product and quotient has a relative error of at most one unit. Terms of the
+// second order are covered by `second_order`.
 
 namespace palpate {
 
@@ -54,21 +54,20 @@ double BinLikelihood::error(std::size_t object, const KnownElements& elements) c
   const auto count = static_cast<double>(elements.from_pivot_mm.size());
 
   // Where an element lies, in cells along one axis. Rotation: cosine, sine, their quotients by the
-  // cell, two products and a sum, of coordinates that sum to `norm` at most; elements beyond `reach`
-  // along an axis are off the map wherever they lie. Bins: a difference, a quotient and a sum. Both
-  // are rounded to the grid, half a step each.
+  // cell, two products and a sum, of coordinates that sum to `norm` at most; elements beyond
+  // `reach` along an axis are off the map wherever they lie. Bins: a difference, a quotient and a
+  // sum. Both are rounded to the grid, half a step each.
   double norm_cells = 0.0;
   for (const glm::dvec2& p_mm : elements.from_pivot_mm) {
     norm_cells = std::max(norm_cells, (std::abs(p_mm.x) + std::abs(p_mm.y)) / at.cell_mm);
   }
   norm_cells = std::min(norm_cells, 2.0 * at.reach_cells);
-  const double lattice_cells =
-      (std::max(farthest(lattice_.x_mm), farthest(lattice_.y_mm)) +
-       std::max(std::abs(at.origin_mm.x), std::abs(at.origin_mm.y))) /
-      at.cell_mm;
+  const double lattice_cells = (std::max(farthest(lattice_.x_mm), farthest(lattice_.y_mm)) +
+                                std::max(std::abs(at.origin_mm.x), std::abs(at.origin_mm.y))) /
+                               at.cell_mm;
   const PositionGrid& grid = sizeof(Lane) == 4 ? at.float_grid : at.double_grid;
-  const double place_cells = 6.0 * v * norm_cells + 4.0 * v * (lattice_cells + at.reach_cells) +
-                             grid.step();
+  const double place_cells =
+      6.0 * v * norm_cells + 4.0 * v * (lattice_cells + at.reach_cells) + grid.step();
 
   // Log odds change by at most `steepest` per cell along each axis. Interpolation along an axis
   // rounds a difference, a product and a sum, and does so along y and then along x. Float32 has the
@@ -87,20 +86,20 @@ double BinLikelihood::error(std::size_t object, const KnownElements& elements) c
     const double argument =
         log_odds + v * (map.largest() + std::abs(form_.first_log_odds) + 4.0 * width);
     const double slope = table.steepest * form_.nodes_per_nat;
-    const double each = std::min(slope * argument, 2.0 * table.largest) +
-                        8.0 * v * table.largest + v * count * table.largest;
+    const double each = std::min(slope * argument, 2.0 * table.largest) + 8.0 * v * table.largest +
+                        v * count * table.largest;
     return second_order * count * each;
   }
 
   // Eq. 7 changes by at most 1 nat per nat of log odds, so that a relative error of e = exp(-|z|)
   // changes it by no more than that error. e: the product by log2(e), itself rounded, and 2^f.
-  const double exponential = 2.0 * u * std::min(map.largest(), most_exponent<Lane>) +
-                             exp_error<Lane>;
+  const double exponential =
+      2.0 * u * std::min(map.largest(), most_exponent<Lane>) + exp_error<Lane>;
   // Numerator: r, a product, a sum; denominator: a sum; two products over the elements.
   double each = log_odds + exponential + 6.0 * u;
   if (form_.kind == ReadingForm::Kind::sums) {
-    // Sums over an interval of numbers that do not exceed `depth`; log r twice; its own exponential,
-    // of a difference, t exp(-t) of whose relative error counts.
+    // Sums over an interval of numbers that do not exceed `depth`; log r twice; its own
+    // exponential, of a difference, t exp(-t) of whose relative error counts.
     const double depth = std::min(map.largest(), std::abs(form_.log_ratio));
     const double interval = sizeof(Lane) == 4 ? form_.float_interval : form_.double_interval;
     each += u * depth * (interval + 2.0) + exp_error<Lane> + 3.0 * u;
@@ -123,9 +122,9 @@ double BinLikelihood::float32_error(std::size_t object, const KnownElements& ele
     return error<double>(object, elements) +
            second_order * unit<float> * count * extent_of(form_, object).largest;
   }
-  const double nats = std::min(placements_[object].nodes.largest() + 1.0,
-                               std::abs(form_.log_ratio) + 1.0) +
-                      std::abs(form_.log_scale);
+  const double nats =
+      std::min(placements_[object].nodes.largest() + 1.0, std::abs(form_.log_ratio) + 1.0) +
+      std::abs(form_.log_scale);
   return error<float>(object, elements) + second_order * unit<float> * count * nats;
 }
 

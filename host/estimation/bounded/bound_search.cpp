@@ -1,6 +1,7 @@
 #include "bound_search.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <iterator>
 #include <limits>
 #include <numeric>
@@ -10,6 +11,7 @@
 #include <tbb/parallel_for.h>
 
 #include "hypotheses.hpp"
+#include "leaf_pass.hpp"
 #include "seen_window.hpp"
 #include "unsettled_mass.hpp"
 
@@ -24,6 +26,8 @@ constexpr std::size_t beam_tiles = 64;
 constexpr std::size_t probed_tiles = 16;
 /// Largest tiles that are divided together: bounds the memory for their parts.
 constexpr std::size_t most_together = 16384;
+/// Batches of the largest tiles at one theta that make a region small.
+constexpr int few_batches = 16;
 /// Tiles of one theta that a task divides.
 constexpr std::size_t tiles_per_task = 64;
 
@@ -34,10 +38,6 @@ bool before(const Tile& a, const Tile& b) {
   return std::tie(a.object, a.theta, a.y, a.x) < std::tie(b.object, b.theta, b.y, b.x);
 }
 
-bool in_place(const Tile& a, const Tile& b) {
-  return std::tie(a.object, a.theta, a.y, a.x) < std::tie(b.object, b.theta, b.y, b.x);
-}
-
 /// Keeps the tiles of the largest bounds.
 void keep_best(std::vector<Tile>& tiles, std::size_t count) {
   if (tiles.size() > count) {
@@ -45,16 +45,6 @@ void keep_best(std::vector<Tile>& tiles, std::size_t count) {
                      before);
     tiles.resize(count);
   }
-}
-
-/// The tile as a box of bins.
-BinBox box_of(const TileLevel& level, const Tile& tile) {
-  return {.object = tile.object,
-          .theta = tile.theta,
-          .y_first = level.y.first_bin[tile.y],
-          .y_count = level.y.bins(tile.y),
-          .x_first = level.x.first_bin[tile.x],
-          .x_count = level.x.bins(tile.x)};
 }
 
 }  // namespace
@@ -70,14 +60,26 @@ class SearchRun {
         refined_(refined),
         thetas_(static_cast<std::size_t>(lattice_.theta_rad.count)),
         finest_(search.bounds_.front().levels().size() - 1),
-        leaves_(search.likelihood_, search.bounds_, search.log_weight_, search.options_, elements,
-                visit) {
+        deadline_(search.options_.budget_s),
+        account_(search.log_weight_, search.options_),
+        evaluator_(search.likelihood_, search.log_weight_, search.options_, elements, visit,
+                   deadline_, account_),
+        leaves_(search.bounds_, thetas_, deadline_, account_, evaluator_),
+        visit_(visit) {
     for (std::size_t i = 0; i < search_.bounds_.size(); ++i) {
       std::vector<double> of_level;
       for (std::size_t level = 0; level <= finest_; ++level) {
         of_level.push_back(search_.log_weight_[i] + search_.bounds_[i].best(level, elements));
       }
       unpenalised_.push_back(std::move(of_level));
+      double prior = 0.0;
+      for (const ReadingRun& run : elements.runs) {
+        const ContactModel& contact = search_.options_.contact;
+        prior +=
+            static_cast<double>(run.end - run.begin) *
+            contact.log_likelihood(run.reading, {log_odds_from_probability(*contact.prior)}, i);
+      }
+      prior_log_likelihoods_.push_back(prior);
     }
   }
 
@@ -91,11 +93,13 @@ class SearchRun {
       count_largest(unsettled);
       const double share = search_.options_.tolerance * search_share;
       std::vector<Tile> kept = keep_largest(unsettled, share / static_cast<double>(finest_ + 1));
-      leaves_.drop(unsettled);
-      divide(std::move(kept), 0, share - leaves_.dropped_share());
+      account_.drop(unsettled);
+      divide(std::move(kept), 0, share - account_.dropped_share());
     }
-    SearchResult result = leaves_.result();
+    evaluator_.flush();
+    SearchResult result = account_.result();
     result.blocks_bounded = blocks_;
+    result.bins_evaluated = evaluator_.bins();
     return result;
   }
 
@@ -109,9 +113,8 @@ class SearchRun {
     seen_.resize(search_.bounds_.size() * thetas_);
     tbb::parallel_for(std::size_t{0}, seen_.size(), [&](std::size_t row) {
       const std::size_t object = row / thetas_;
-      seen_[row] =
-          seen_window(elements_, lattice_.theta_rad.centre(static_cast<int>(row % thetas_)),
-                      search_.maps_[object], search_.bounds_[object].levels().front());
+      seen_[row] = seen_window(elements_, search_.turns_[row % thetas_], search_.maps_[object],
+                               search_.bounds_[object].levels().front());
     });
     for (std::size_t row = 0; row < seen_.size(); ++row) {
       const std::size_t object = row / thetas_;
@@ -125,7 +128,7 @@ class SearchRun {
                          .x_first = level.x.first_bin[x_first],
                          .x_count = level.x.first_bin[x_end] - level.x.first_bin[x_first]};
         if (box.bins() > 0) {
-          leaves_.settle_unseen(box);
+          settle_unseen(box);
         }
       };
       const int nx = level.x.tiles();
@@ -134,6 +137,17 @@ class SearchRun {
       settle(seen.x_end, nx, seen.y_first, seen.y_end);
       settle(0, nx, seen.y_end, level.y.tiles());
     }
+    account_.raise_totals(std::vector<LogSum>(search_.bounds_.size()));
+  }
+
+  /// Settles bins at which every element sees the prior.
+  void settle_unseen(const BinBox& box) {
+    const auto object = static_cast<std::size_t>(box.object);
+    const double value = prior_log_likelihoods_[object];
+    account_.settle(box.object, value + std::log(static_cast<double>(box.bins())), value,
+                    search_.likelihood_.float64_error(object, elements_));
+    account_.note_best(box, 0, value);
+    visit_(box, std::span(&value, 1));
   }
 
   /// Calls visit(bound, x, y, bins) for the largest tiles of a row, a theta of an object, that hold
@@ -144,7 +158,7 @@ class SearchRun {
     const TileLevel& level = search_.bounds_[object].levels().front();
     const TileWindow& seen = seen_[row];
     const auto batches = static_cast<std::size_t>(level.batches_x()) * level.batches_y();
-    const std::uint32_t* sums =
+    const std::int32_t* sums =
         search_.largest_tiles_[object].data() + row % thetas_ * batches * batch_tiles;
     for (int y = seen.y_first; y < seen.y_end; ++y) {
       for (int x = seen.x_first; x < seen.x_end; ++x) {
@@ -152,9 +166,10 @@ class SearchRun {
         if (bins > 0) {
           const std::size_t batch =
               static_cast<std::size_t>(y / batch_side) * level.batches_x() + x / batch_side;
-          const std::uint32_t sum =
+          const std::int64_t sum =
+              search_.unseen_[object] +
               sums[batch * batch_tiles + x % batch_side * batch_side + y % batch_side];
-          visit(unpenalised_[object][0] - sum / penalties_per_nat, x, y, bins);
+          visit(unpenalised_[object][0] - static_cast<double>(sum) / penalties_per_nat, x, y, bins);
         }
       }
     }
@@ -191,7 +206,7 @@ class SearchRun {
 
   /// The largest tiles that must be divided, and takes them out of the unsettled ones.
   std::vector<Tile> keep_largest(UnsettledMass& unsettled, double share) const {
-    const std::vector<std::size_t> from = leaves_.droppable_from(unsettled, share);
+    const std::vector<std::size_t> from = account_.droppable_from(unsettled, share);
     std::vector<std::vector<Tile>> kept(search_.bounds_.size());
     tbb::parallel_for(std::size_t{0}, kept.size(), [&](std::size_t object) {
       for (std::size_t theta = 0; theta < thetas_; ++theta) {
@@ -235,7 +250,7 @@ class SearchRun {
       const std::size_t end = task + 1 < begins.size() ? begins[task + 1] : tiles.size();
       const Tile& first = tiles[begins[task]];
       const TileBounds& bounds = search_.bounds_[first.object];
-      bounds.place(level + 1, lattice_.theta_rad.centre(first.theta), elements_, placed);
+      bounds.place(level + 1, search_.turns_[first.theta], elements_, placed);
       parts[task].reserve((end - begins[task]) * batch_tiles);
       for (std::size_t i = begins[task]; i < end; ++i) {
         std::uint32_t sums[batch_tiles] = {};
@@ -287,11 +302,11 @@ class SearchRun {
   void raise_beam(std::vector<Tile> tiles, std::size_t level) {
     for (; level < finest_; ++level) {
       keep_best(tiles, beam_tiles);
-      std::sort(tiles.begin(), tiles.end(), in_place);
+      std::sort(tiles.begin(), tiles.end(), stands_before);
       tiles = parts_of(tiles, level);
     }
     keep_best(tiles, probed_tiles);
-    leaves_.probe(tiles);
+    leaves_.probe(std::move(tiles));
   }
 
   /// Divides tiles of a level until their bins are evaluated or dropped.
@@ -302,46 +317,42 @@ class SearchRun {
       leaves_.evaluate(tiles, tolerance);
       return;
     }
-    std::sort(tiles.begin(), tiles.end(), tiles.size() > most_together ? before : in_place);
+    std::sort(tiles.begin(), tiles.end(), tiles.size() > most_together ? before : stands_before);
     for (std::size_t begin = 0; begin < tiles.size(); begin += most_together) {
       const std::size_t left = tiles.size() - begin;
       const std::size_t count = std::min(most_together, left);
       const auto first = tiles.begin() + static_cast<std::ptrdiff_t>(begin);
       std::vector<Tile> some(first, first + static_cast<std::ptrdiff_t>(count));
-      const double dropped = leaves_.dropped_share();
-      if (leaves_.out_of_time()) {
+      const double dropped = account_.dropped_share();
+      if (deadline_.passed()) {
         some.assign(first, tiles.end());
-        leaves_.drop(unsettled_of(some, level));
+        account_.drop(unsettled(some, level, search_.bounds_));
         return;
       }
-      std::sort(some.begin(), some.end(), in_place);
+      std::sort(some.begin(), some.end(), stands_before);
       some = parts_of(some, level);
       if (level + 1 < finest_) {
         raise(some, level + 1);
       }
       // What tiles do not use up is left for those after them.
       const double part = tolerance * static_cast<double>(count) / static_cast<double>(left);
-      UnsettledMass unsettled = unsettled_of(some, level + 1);
+      UnsettledMass left_mass = unsettled(some, level + 1, search_.bounds_);
       if (level + 1 < finest_) {
         const std::vector<std::size_t> from =
-            leaves_.droppable_from(unsettled, part / static_cast<double>(finest_ - level));
+            account_.droppable_from(left_mass, part / static_cast<double>(finest_ - level));
         std::erase_if(some, [&](const Tile& tile) {
-          return unsettled.slot(tile.bound) >= from[tile.object];
+          return left_mass.slot(tile.bound) >= from[tile.object];
         });
         for (const Tile& tile : some) {
-          unsettled.remove(static_cast<std::size_t>(tile.object), tile.bound,
+          left_mass.remove(static_cast<std::size_t>(tile.object), tile.bound,
                            search_.bounds_[tile.object].bins(level + 1, tile));
         }
-        leaves_.drop(unsettled);
+        account_.drop(left_mass);
       }
-      const double used = leaves_.dropped_share() - dropped;
+      const double used = account_.dropped_share() - dropped;
       divide(std::move(some), level + 1, std::max(part - used, 0.0));
-      tolerance = std::max(tolerance - (leaves_.dropped_share() - dropped), 0.0);
+      tolerance = std::max(tolerance - (account_.dropped_share() - dropped), 0.0);
     }
-  }
-
-  UnsettledMass unsettled_of(std::span<const Tile> tiles, std::size_t level) const {
-    return leaves_.unsettled(tiles, level);
   }
 
   void note(std::span<const Tile> tiles, std::size_t level) const {
@@ -349,7 +360,7 @@ class SearchRun {
       return;
     }
     for (const Tile& tile : tiles) {
-      const BinBox box = box_of(search_.bounds_[tile.object].levels()[level], tile);
+      const BinBox box = search_.bounds_[tile.object].levels()[level].box_of(tile);
       refined_->push_back({.object = box.object,
                            .level = static_cast<int>(level),
                            .theta = box.theta,
@@ -367,17 +378,32 @@ class SearchRun {
   std::size_t thetas_;
   std::size_t finest_;                            ///< level
   std::vector<std::vector<double>> unpenalised_;  ///< [object][level], with the prior weight
+  std::vector<double> prior_log_likelihoods_;     ///< [object] of all elements
   std::vector<TileWindow> seen_;                  ///< [object, theta], of the largest tiles
+  Deadline deadline_;
+  MassAccount account_;
+  LeafEvaluator evaluator_;
   LeafPass leaves_;
+  const BinVisitor& visit_;
   std::int64_t blocks_ = 0;
 };
 
 BoundSearch::BoundSearch(std::span<const Hypothesis> hypotheses, const BoundedOptions& options,
                          const BinLikelihood& likelihood)
     : options_(options), likelihood_(likelihood), log_weight_(log_weights(hypotheses)) {
+  for (int theta = 0; theta < options.lattice.theta_rad.count; ++theta) {
+    const double theta_rad = options.lattice.theta_rad.centre(theta);
+    turns_.emplace_back(std::cos(theta_rad), std::sin(theta_rad));
+  }
+  double least_cell_mm = std::numeric_limits<double>::infinity();
+  for (const Hypothesis& hypothesis : hypotheses) {
+    least_cell_mm = std::min(least_cell_mm, hypothesis.map.cell_mm);
+  }
+  const std::vector<TileSize> sizes = tile_sizes(options.lattice, least_cell_mm, hypotheses.size());
+  unseen_.resize(hypotheses.size());
   std::vector<std::optional<TileBounds>> bounds(hypotheses.size());
   tbb::parallel_for(std::size_t{0}, hypotheses.size(), [&](std::size_t i) {
-    bounds[i].emplace(hypotheses[i].map, options.contact, i, options.lattice);
+    bounds[i].emplace(hypotheses[i].map, options.contact, i, options.lattice, sizes);
   });
   for (std::optional<TileBounds>& of : bounds) {
     const TileLevel& level = of->levels().front();
@@ -393,12 +419,35 @@ BoundSearch::BoundSearch(std::span<const Hypothesis> hypotheses, const BoundedOp
 }
 
 void BoundSearch::reset() {
-  for (std::vector<std::uint32_t>& sums : largest_tiles_) {
+  for (std::vector<std::int32_t>& sums : largest_tiles_) {
     std::fill(sums.begin(), sums.end(), 0);
   }
+  std::fill(unseen_.begin(), unseen_.end(), 0);
+}
+
+void BoundSearch::add(std::span<const KnownElements> touches) {
+  const TileLevel& level = bounds_.front().levels().front();
+  // A single touch sees little of a large region; in a small one, fewer rounds are faster.
+  if (level.batches_x() * level.batches_y() > few_batches) {
+    for (const KnownElements& touch : touches) {
+      add(touch);
+    }
+    return;
+  }
+  KnownElements all;
+  for (const KnownElements& touch : touches) {
+    all = merged(all, touch);
+  }
+  add(all);
 }
 
 void BoundSearch::add(const KnownElements& added) {
+  // Most tiles of a large region do not see the map: sums count from what such a tile would have.
+  std::vector<std::int64_t> offsets;
+  for (std::size_t i = 0; i < bounds_.size(); ++i) {
+    offsets.push_back(
+        std::min<std::int64_t>(bounds_[i].penalty_beyond(0, added), largest_sum - unseen_[i]));
+  }
   const auto thetas = static_cast<std::size_t>(options_.lattice.theta_rad.count);
   tbb::parallel_for(std::size_t{0}, bounds_.size() * thetas, [&](std::size_t row) {
     thread_local WindowPlaces placed;
@@ -406,16 +455,29 @@ void BoundSearch::add(const KnownElements& added) {
     const std::size_t theta = row % thetas;
     const TileBounds& bounds = bounds_[object];
     const TileLevel& level = bounds.levels().front();
-    bounds.place(0, options_.lattice.theta_rad.centre(static_cast<int>(theta)), added, placed);
-    std::uint32_t* sums =
+    const TileWindow seen = seen_window(added, turns_[theta], maps_[object], level);
+    bounds.place(0, turns_[theta], added, placed);
+    std::int32_t* tiles =
         largest_tiles_[object].data() +
         theta * static_cast<std::size_t>(level.batches_x()) * level.batches_y() * batch_tiles;
-    for (int by = 0; by < level.batches_y(); ++by) {
-      for (int bx = 0; bx < level.batches_x(); ++bx, sums += batch_tiles) {
-        bounds.add(0, added, placed, bx * batch_side, by * batch_side, sums);
+    for (int y = seen.y_first / batch_side * batch_side; y < seen.y_end; y += batch_side) {
+      for (int x = seen.x_first / batch_side * batch_side; x < seen.x_end; x += batch_side) {
+        std::uint32_t sums[batch_tiles] = {};
+        bounds.add(0, added, placed, x, y, sums);
+        std::int32_t* of_batch =
+            tiles + (static_cast<std::size_t>(y / batch_side) * level.batches_x() +
+                     static_cast<std::size_t>(x / batch_side)) *
+                        batch_tiles;
+        for (int i = 0; i < batch_tiles; ++i) {
+          const std::int64_t sum = std::int64_t{of_batch[i]} + sums[i] - offsets[object];
+          of_batch[i] = static_cast<std::int32_t>(std::min<std::int64_t>(sum, largest_sum));
+        }
       }
     }
   });
+  for (std::size_t i = 0; i < offsets.size(); ++i) {
+    unseen_[i] += offsets[i];
+  }
 }
 
 SearchResult BoundSearch::run(const KnownElements& elements, const BinVisitor& visit,
@@ -428,8 +490,8 @@ std::uint64_t BoundSearch::bytes() const {
   for (const TileBounds& bounds : bounds_) {
     bytes += bounds.bytes();
   }
-  for (const std::vector<std::uint32_t>& sums : largest_tiles_) {
-    bytes += sums.capacity() * sizeof(std::uint32_t);
+  for (const std::vector<std::int32_t>& sums : largest_tiles_) {
+    bytes += sums.capacity() * sizeof(std::int32_t);
   }
   return bytes;
 }

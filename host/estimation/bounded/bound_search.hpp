@@ -7,7 +7,7 @@
 
 #include "bin_likelihood.hpp"
 #include "known_elements.hpp"
-#include "leaf_pass.hpp"
+#include "leaf_evaluator.hpp"
 #include "palpate/bounded_posterior.hpp"
 #include "tile_bounds.hpp"
 
@@ -24,8 +24,9 @@ class BoundSearch {
 
   /// Forgets all touches.
   void reset();
-  /// Adds the penalties of more elements to the sums of the largest tiles.
-  void add(const KnownElements& added);
+  /// Adds the penalties of more touches to the sums of the largest tiles.
+  /// @param touches [touch]
+  void add(std::span<const KnownElements> touches);
   /// @param elements all that were added since reset()
   /// @param refined where not null, takes the tiles that were divided
   SearchResult run(const KnownElements& elements, const BinVisitor& visit,
@@ -38,13 +39,18 @@ class BoundSearch {
  private:
   friend class SearchRun;
 
+  void add(const KnownElements& added);
+
   const BoundedOptions& options_;
   const BinLikelihood& likelihood_;
   std::vector<double> log_weight_;
+  std::vector<glm::dvec2> turns_;    ///< [theta] cosine and sine
   std::vector<OccupancyGrid> maps_;  ///< [hypothesis] without their cells
   std::vector<TileBounds> bounds_;   ///< [hypothesis]
-  /// Sums of penalties of the largest tiles, [hypothesis][theta, batch y, batch x, tile].
-  std::vector<std::vector<std::uint32_t>> largest_tiles_;
+  /// Sums of penalties of the largest tiles, [hypothesis][theta, batch y, batch x, tile], less
+  /// those of a tile in which every element sees the prior.
+  std::vector<std::vector<std::int32_t>> largest_tiles_;
+  std::vector<std::int64_t> unseen_;  ///< [hypothesis] these
 };
 
 }  // namespace palpate

@@ -140,8 +140,14 @@ void BoundedPosterior::move_pivot(const glm::dvec2& pivot_mm) {
 void BoundedPosterior::update(std::span<const Touch> touches,
                               const std::function<void(double)>& progress) {
   Impl& posterior = impl();
-  const KnownElements added =
-      gather_elements(touches, posterior.options.contact, posterior.options.lattice.pivot_mm);
+  // All touches are gathered before the first is added: one that is not sound refuses all.
+  std::vector<KnownElements> of_touches;
+  KnownElements added;
+  for (const Touch& touch : touches) {
+    of_touches.push_back(
+        gather_elements(touch, posterior.options.contact, posterior.options.lattice.pivot_mm));
+    added = merged(added, of_touches.back());
+  }
   if (progress) {
     progress(1.0);
   }
@@ -152,7 +158,7 @@ void BoundedPosterior::update(std::span<const Touch> touches,
         palpate::prior_log_likelihood(run.reading, posterior.options.contact);
   }
   posterior.touched = posterior.touched || !touches.empty();
-  posterior.arena.execute([&] { posterior.search.add(added); });
+  posterior.arena.execute([&] { posterior.search.add(of_touches); });
   posterior.result.reset();
 }
 

@@ -4,8 +4,8 @@ namespace palpate {
 
 namespace {
 
-/// Together with the vectors' growth within some 100 MiB.
-constexpr std::uint64_t most_bytes = std::uint64_t{48} << 20;
+/// Together with the vectors' growth within some 160 MiB.
+constexpr std::uint64_t most_bytes = std::uint64_t{80} << 20;
 
 }  // namespace
 

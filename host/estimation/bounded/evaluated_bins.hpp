@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "leaf_pass.hpp"
+#include "leaf_evaluator.hpp"
 
 namespace palpate {
 

@@ -40,15 +40,13 @@ void append(const KnownElements& known, std::vector<KnownElement>& elements) {
 
 }  // namespace
 
-KnownElements gather_elements(std::span<const Touch> touches, const ContactModel& model,
+KnownElements gather_elements(const Touch& touch, const ContactModel& model,
                               const glm::dvec2& pivot_mm) {
   std::vector<KnownElement> elements;
-  for (const Touch& touch : touches) {
-    const std::vector<Reading> readings = model.classify(touch);
-    for (std::size_t i = 0; i < readings.size(); ++i) {
-      if (readings[i] != Reading::unknown) {
-        elements.push_back({readings[i], touch.T_robot_sensor * touch.elements_mm[i] - pivot_mm});
-      }
+  const std::vector<Reading> readings = model.classify(touch);
+  for (std::size_t i = 0; i < readings.size(); ++i) {
+    if (readings[i] != Reading::unknown) {
+      elements.push_back({readings[i], touch.T_robot_sensor * touch.elements_mm[i] - pivot_mm});
     }
   }
   return in_order(std::move(elements));

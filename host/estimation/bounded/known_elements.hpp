@@ -1,7 +1,6 @@
 #pragma once
 
 #include <cstddef>
-#include <span>
 #include <vector>
 
 #include <glm/vec2.hpp>
@@ -27,9 +26,9 @@ struct KnownElements {
   bool empty() const { return from_pivot_mm.empty(); }
 };
 
-/// Classifies the touches' elements (Eq. 3) and gathers those that are not Unknown.
+/// Classifies the touch's elements (Eq. 3) and gathers those that are not Unknown.
 /// @throws Error on a touch that is not sound
-KnownElements gather_elements(std::span<const Touch> touches, const ContactModel& model,
+KnownElements gather_elements(const Touch& touch, const ContactModel& model,
                               const glm::dvec2& pivot_mm);
 
 /// The elements of both.

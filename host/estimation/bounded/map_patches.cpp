@@ -87,8 +87,8 @@ void MapPatches::measure(const OccupancyGrid& map) {
   for (int j = -1; j < map.ny; ++j) {
     for (int i = -1; i < map.nx; ++i) {
       const double here = cell(i, j);
-      steepest_ = std::max({steepest_, std::abs(cell(i + 1, j) - here),
-                            std::abs(cell(i, j + 1) - here)});
+      steepest_ =
+          std::max({steepest_, std::abs(cell(i + 1, j) - here), std::abs(cell(i, j + 1) - here)});
     }
   }
 }

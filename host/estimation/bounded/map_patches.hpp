@@ -9,8 +9,8 @@
 namespace palpate {
 
 /// A map's log odds for the kernels of bins: bordered by `border` nodes of the prior on every side,
-/// and stored so that the 16 floats from patch(x, y) on are the nodes of columns x to x + 3 and rows
-/// y to y + 3 of the bordered map, column by column. Every node is stored four times.
+/// and stored so that the 16 floats from patch(x, y) on are the nodes of columns x to x + 3 and
+/// rows y to y + 3 of the bordered map, column by column. Every node is stored four times.
 class MapPatches {
  public:
   static constexpr int border = 4;
@@ -25,8 +25,8 @@ class MapPatches {
   const float* nodes() const { return nodes_.data(); }
   std::uint64_t bytes() const { return nodes_.capacity() * sizeof(float); }
 
-  /// The number that stands for the prior in nodes(): a float near it that no cell of the map holds,
-  /// so that float64 kernels can put the exact prior in its place.
+  /// The number that stands for the prior in nodes(): a float near it that no cell of the map
+  /// holds, so that float64 kernels can put the exact prior in its place.
   float marker() const { return marker_; }
   double prior_log_odds() const { return prior_log_odds_; }
 

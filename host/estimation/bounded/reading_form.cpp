@@ -28,8 +28,7 @@ ReadingForm::ReadingForm(const ContactModel& contact) {
     levels = from.levels();
     sets = from.sets();
     first_log_odds = from.first_log_odds;
-    nodes_per_nat =
-        static_cast<double>(nodes - 1) / (from.last_log_odds - from.first_log_odds);
+    nodes_per_nat = static_cast<double>(nodes - 1) / (from.last_log_odds - from.first_log_odds);
     table.reserve(2 * from.log_likelihood.size());
     for (std::size_t i = 0; i < from.log_likelihood.size(); ++i) {
       const double value = from.log_likelihood[i];

@@ -27,8 +27,8 @@ struct ReadingForm {
 
   /// The numbers of an object's level: value and difference to the next, for each node.
   const double* row(std::size_t object, Reading level) const {
-    return table.data() + 2 * nodes * ((sets == 1 ? 0 : object) * levels +
-                                       static_cast<std::size_t>(level));
+    return table.data() +
+           2 * nodes * ((sets == 1 ? 0 : object) * levels + static_cast<std::size_t>(level));
   }
 
   Kind kind = Kind::products;

@@ -5,7 +5,6 @@
 #include <utility>
 
 #include "bounding_box.hpp"
-#include "palpate/pose.hpp"
 
 namespace palpate {
 
@@ -23,13 +22,11 @@ std::pair<int, int> overlapping(const TileAxis& axis, double lower_mm, double up
 
 }  // namespace
 
-TileWindow seen_window(const KnownElements& elements, double theta_rad, const OccupancyGrid& map,
-                       const TileLevel& level) {
+TileWindow seen_window(const KnownElements& elements, const glm::dvec2& turn,
+                       const OccupancyGrid& map, const TileLevel& level) {
   BoundingBox reach;
-  const double c = std::cos(theta_rad);
-  const double s = std::sin(theta_rad);
   for (const glm::dvec2& p : elements.from_pivot_mm) {
-    reach.take_in({c * p.x - s * p.y, s * p.x + c * p.y});
+    reach.take_in({turn.x * p.x - turn.y * p.y, turn.y * p.x + turn.x * p.y});
   }
   if (reach.empty()) {
     return {};

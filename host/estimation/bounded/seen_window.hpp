@@ -18,7 +18,8 @@ struct TileWindow {
 
 /// The tiles in which an element may see something else than the prior, at one theta; none without
 /// elements. In all others every bin has the same likelihood.
-TileWindow seen_window(const KnownElements& elements, double theta_rad, const OccupancyGrid& map,
-                       const TileLevel& level);
+/// @param turn cosine and sine of theta
+TileWindow seen_window(const KnownElements& elements, const glm::dvec2& turn,
+                       const OccupancyGrid& map, const TileLevel& level);
 
 }  // namespace palpate

@@ -1,5 +1,7 @@
 #include "tile_bounds.hpp"
 
+#include <algorithm>
+
 #include <tbb/parallel_for.h>
 
 #include "reading_penalties.hpp"
@@ -7,8 +9,8 @@
 namespace palpate {
 
 TileBounds::TileBounds(const OccupancyGrid& map, const ContactModel& contact, std::size_t object,
-                       const PoseLattice& lattice)
-    : levels_(tile_levels(lattice, map.cell_mm, tile_sizes(lattice, map.cell_mm))),
+                       const PoseLattice& lattice, const std::vector<TileSize>& sizes)
+    : levels_(tile_levels(lattice, map.cell_mm, sizes)),
       // Square 0 lies between the first node and the prior's node before it.
       corner_mm_(glm::dvec2(lattice.x_mm.centre(0), lattice.y_mm.centre(0)) - map.origin_mm +
                  map.cell_mm),
@@ -28,13 +30,12 @@ TileBounds::TileBounds(const OccupancyGrid& map, const ContactModel& contact, st
   });
 }
 
-void TileBounds::place(std::size_t level, double theta_rad, const KnownElements& elements,
+void TileBounds::place(std::size_t level, const glm::dvec2& turn, const KnownElements& elements,
                        WindowPlaces& placed) const {
-  place_elements(elements,
-                 {.theta_rad = theta_rad,
-                  .corner_mm = corner_mm_,
-                  .square_mm = cell_mm_ / levels_[level].size.parts},
-                 tables_[level].front(), placed);
+  place_elements(
+      elements,
+      {.turn = turn, .corner_mm = corner_mm_, .square_mm = cell_mm_ / levels_[level].size.parts},
+      tables_[level].front(), placed);
 }
 
 void TileBounds::add(std::size_t level, const KnownElements& elements, const WindowPlaces& placed,
@@ -42,6 +43,14 @@ void TileBounds::add(std::size_t level, const KnownElements& elements, const Win
   for (const ReadingRun& run : elements.runs) {
     add_penalties(placed, run, table(level, run.reading), first_x, first_y, sums);
   }
+}
+
+std::uint32_t TileBounds::penalty_beyond(std::size_t level, const KnownElements& elements) const {
+  std::uint64_t sum = 0;
+  for (const ReadingRun& run : elements.runs) {
+    sum += (run.end - run.begin) * std::uint64_t{table(level, run.reading).beyond};
+  }
+  return static_cast<std::uint32_t>(std::min<std::uint64_t>(sum, largest_sum));
 }
 
 double TileBounds::best(std::size_t level, const KnownElements& elements) const {

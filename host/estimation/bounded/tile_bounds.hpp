@@ -14,23 +14,13 @@
 
 namespace palpate {
 
-/// A tile of one object's poses, and the largest log-likelihood, with the prior weight, that a bin
-/// in it can have.
-struct Tile {
-  double bound = 0.0;
-  std::int32_t object = 0;
-  std::int32_t theta = 0;
-  std::int32_t x = 0;
-  std::int32_t y = 0;
-};
-
 /// What bounds the likelihood over the tiles of one object: the levels of tiles, and a window table
 /// of each level for every reading.
 class TileBounds {
  public:
   /// @param contact resolved: with its prior
   TileBounds(const OccupancyGrid& map, const ContactModel& contact, std::size_t object,
-             const PoseLattice& lattice);
+             const PoseLattice& lattice, const std::vector<TileSize>& sizes);
 
   std::span<const TileLevel> levels() const { return levels_; }
   std::int64_t bins(std::size_t level, const Tile& tile) const {
@@ -38,11 +28,14 @@ class TileBounds {
   }
 
   /// Places the elements for the tiles of a level at one theta.
-  void place(std::size_t level, double theta_rad, const KnownElements& elements,
+  /// @param turn cosine and sine of theta
+  void place(std::size_t level, const glm::dvec2& turn, const KnownElements& elements,
              WindowPlaces& placed) const;
   /// Adds the elements' penalties to the sums of the batch of tiles whose first tile this is.
   void add(std::size_t level, const KnownElements& elements, const WindowPlaces& placed,
            int first_x, int first_y, std::uint32_t* sums) const;
+  /// The sum of the elements' penalties where all of them see the prior.
+  std::uint32_t penalty_beyond(std::size_t level, const KnownElements& elements) const;
   /// Log-likelihood of the elements without any penalty, in nats.
   double best(std::size_t level, const KnownElements& elements) const;
 

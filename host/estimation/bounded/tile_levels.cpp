@@ -9,6 +9,13 @@ namespace palpate {
 
 namespace {
 
+/// Smallest tiles of more bins are divided once more: bounds of smaller tiles save more bins than
+/// they cost.
+constexpr double most_leaf_bins = 50.0;
+/// Largest tiles, of all maps, whose penalties are kept between touches, 4 bytes each.
+constexpr double most_largest_tiles = 1e7;
+constexpr int largest_side = 512;  ///< in cells; larger tables would cost more than they save
+
 TileAxis tile_axis(const Axis& axis, double side_mm) {
   TileAxis tiles{.first_mm = axis.centre(0), .side_mm = side_mm, .first_bin = {}};
   const double step = axis.step();
@@ -30,10 +37,30 @@ TileAxis tile_axis(const Axis& axis, double side_mm) {
 
 }  // namespace
 
-std::vector<TileSize> tile_sizes(const PoseLattice& lattice, double cell_mm) {
-  (void)lattice;
-  (void)cell_mm;
-  return {{1, 16}, {1, 4}, {2, 2}};
+std::vector<TileSize> tile_sizes(const PoseLattice& lattice, double least_cell_mm,
+                                 std::size_t maps) {
+  const auto bins_in = [&](double side_cells) {
+    const auto bins = [&](const Axis& axis) {
+      return axis.count == 1 ? 1.0 : side_cells * least_cell_mm / axis.step();
+    };
+    return bins(lattice.x_mm) * bins(lattice.y_mm);
+  };
+  const auto tiles = [&](const TileSize& size) {
+    const double side_mm = size.cells() * least_cell_mm;
+    const auto count = [&](const Axis& axis) {
+      return std::ceil((axis.upper - axis.lower) / side_mm) + 1.0;
+    };
+    return count(lattice.x_mm) * count(lattice.y_mm) * lattice.theta_rad.count *
+           static_cast<double>(maps);
+  };
+  std::vector<TileSize> sizes{{.parts = 1, .side = 8}, {.parts = 1, .side = 2}};
+  if (bins_in(sizes.back().cells()) > most_leaf_bins) {
+    sizes.push_back({.parts = 2, .side = 1});
+  }
+  while (tiles(sizes.front()) > most_largest_tiles && sizes.front().side < largest_side) {
+    sizes.insert(sizes.begin(), {.parts = 1, .side = 4 * sizes.front().side});
+  }
+  return sizes;
 }
 
 std::vector<TileLevel> tile_levels(const PoseLattice& lattice, double cell_mm,

@@ -1,11 +1,22 @@
 #pragma once
 
-#include <cstdint>
+#include <cstddef>
 #include <vector>
 
+#include "bin_likelihood.hpp"
 #include "palpate/lattice.hpp"
 
 namespace palpate {
+
+/// A tile of one object's poses, and the largest log-likelihood, with the prior weight, that a bin
+/// in it can have.
+struct Tile {
+  double bound = 0.0;
+  std::int32_t object = 0;
+  std::int32_t theta = 0;
+  std::int32_t x = 0;
+  std::int32_t y = 0;
+};
 
 /// The size of a level's tiles: `side` squares, of which a map's cell has `parts` along each axis.
 struct TileSize {
@@ -34,11 +45,21 @@ struct TileLevel {
 
   int batches_x() const { return x.tiles() / 4; }
   int batches_y() const { return y.tiles() / 4; }
+  BinBox box_of(const Tile& tile) const {
+    return {.object = tile.object,
+            .theta = tile.theta,
+            .y_first = y.first_bin[tile.y],
+            .y_count = y.bins(tile.y),
+            .x_first = x.first_bin[tile.x],
+            .x_count = x.bins(tile.x)};
+  }
 };
 
 /// Sizes of the levels, the largest tiles first. Each level's tiles have a quarter of the side of
 /// the level before, so that a batch of 4 x 4 tiles makes up one tile.
-std::vector<TileSize> tile_sizes(const PoseLattice& lattice, double cell_mm);
+/// @param least_cell_mm of the maps
+std::vector<TileSize> tile_sizes(const PoseLattice& lattice, double least_cell_mm,
+                                 std::size_t maps);
 
 /// The levels of tiles over a lattice for a map of this cell.
 std::vector<TileLevel> tile_levels(const PoseLattice& lattice, double cell_mm,

@@ -1,7 +1,6 @@
 #include "tile_penalties.hpp"
 
 #include <algorithm>
-#include <cmath>
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "bounded/tile_penalties.cpp"
@@ -21,8 +20,8 @@ void PlaceElements(const glm::dvec2* from_pivot_mm, std::size_t count, const Til
   // Squares that are told apart; farther elements see only the prior as well.
   const auto farthest = hn::Set(d, static_cast<double>(1 << 28));
   const auto nearest = hn::Set(d, -static_cast<double>(1 << 28));
-  const auto c = hn::Set(d, std::cos(place.theta_rad) / place.square_mm);
-  const auto s = hn::Set(d, std::sin(place.theta_rad) / place.square_mm);
+  const auto c = hn::Set(d, place.turn.x / place.square_mm);
+  const auto s = hn::Set(d, place.turn.y / place.square_mm);
   const auto x0 = hn::Set(d, place.corner_mm.x / place.square_mm);
   const auto y0 = hn::Set(d, place.corner_mm.y / place.square_mm);
   const auto mask = hn::Set(di, shape.side - 1);
@@ -73,7 +72,7 @@ void AddRun(const WindowTable& table, const std::int32_t* plane, const std::int3
   const hn::CappedTag<std::uint16_t, batch_tiles> d16;
   const hn::CappedTag<std::uint32_t, batch_tiles> d32;
   const hn::Rebind<std::uint16_t, decltype(d32)> narrow;
-  const auto most_sum = hn::Set(d32, std::uint32_t{1} << 31);
+  const auto most_sum = hn::Set(d32, largest_sum);
   constexpr std::size_t lanes = hn::MaxLanes(d16);
   constexpr std::size_t vectors = batch_tiles / lanes;
   // As many penalties as 16 bits hold for certain.
@@ -98,7 +97,6 @@ void AddRun(const WindowTable& table, const std::int32_t* plane, const std::int3
     }
     for (std::size_t i = 0; i < batch_tiles; i += hn::MaxLanes(d32)) {
       const auto wide = hn::PromoteTo(d32, hn::LoadU(narrow, part + i));
-      // So large a sum says all that there is to say, and never wraps.
       const auto sum = hn::Min(hn::Add(wide, hn::LoadU(d32, sums + i)), most_sum);
       hn::StoreU(sum, d32, sums + i);
     }

@@ -22,7 +22,7 @@ struct WindowPlaces {
 
 /// Where tiles lie on a map: the first tile's corner, in mm from the map's square 0.
 struct TilePlace {
-  double theta_rad = 0.0;
+  glm::dvec2 turn{1.0, 0.0};  ///< cosine and sine of theta
   glm::dvec2 corner_mm{0.0};
   double square_mm = 1.0;
 };
@@ -30,6 +30,9 @@ struct TilePlace {
 /// Rotates the elements and finds their places in tables of this shape.
 void place_elements(const KnownElements& elements, const TilePlace& place, const WindowTable& shape,
                     WindowPlaces& placed);
+
+/// Sums of penalties do not grow beyond: so large a sum says all that there is to say.
+inline constexpr std::uint32_t largest_sum = std::uint32_t{1} << 30;
 
 /// Sums the penalties of one run of elements over the 4 x 4 tiles of a batch, and adds them to
 /// `sums`, where the sum of tile (i, j) of the batch stands at 4 i + j.

@@ -48,16 +48,14 @@ struct VectorMath<double> {
   static constexpr double least_exponent = -1021.0;
   /// As above; 2^f is within 4.3e-17 of itself.
   static constexpr double exp2_terms[] = {
-      0.6931471805599457,     0.24022650695910097,    0.05550410866479039,
-      0.009618129107607003,   0.0013333558153439966,  0.0001540353044157213,
-      1.5252727385193868e-05, 1.3215442675329823e-06, 1.0180647659234139e-07,
-      7.072570412814423e-09,  4.078071929588337e-10};
+      0.6931471805599457,     0.24022650695910097,   0.05550410866479039,    0.009618129107607003,
+      0.0013333558153439966,  0.0001540353044157213, 1.5252727385193868e-05, 1.3215442675329823e-06,
+      1.0180647659234139e-07, 7.072570412814423e-09, 4.078071929588337e-10};
 };
 
 /// The integers that lanes hold, which are at least 0 and below 2^52.
 template <class D>
-HWY_INLINE hn::Vec<hn::RebindToSigned<D>> whole_number(
-    D d, hn::Vec<D> v) {
+HWY_INLINE hn::Vec<hn::RebindToSigned<D>> whole_number(D d, hn::Vec<D> v) {
   using Math = VectorMath<hn::TFromD<D>>;
   const hn::RebindToSigned<D> di;
   // Below the leading bit of 2^52 stands the integer.
@@ -81,8 +79,8 @@ template <class D>
 HWY_INLINE hn::Vec<D> exp_of_minus(D d, hn::Vec<D> v) {
   using Math = VectorMath<hn::TFromD<D>>;
   const hn::RebindToUnsigned<D> du;
-  const auto exponent = hn::Max(hn::Mul(v, hn::Set(d, -Math::log2_e)),
-                                hn::Set(d, Math::least_exponent));
+  const auto exponent =
+      hn::Max(hn::Mul(v, hn::Set(d, -Math::log2_e)), hn::Set(d, Math::least_exponent));
   // The nearest integer stands in the last bits of `rounded`.
   const auto rounded = hn::Add(exponent, hn::Set(d, Math::rounder));
   const auto f = hn::Sub(exponent, hn::Sub(rounded, hn::Set(d, Math::rounder)));

@@ -30,6 +30,7 @@ WindowTable window_table(const SquarePenalties& penalties, int side) {
                     .side_log2 = std::countr_zero(static_cast<unsigned>(side)),
                     .columns = 2 * WindowTable::margin + (penalties.nx + side - 1) / side,
                     .rows = 2 * WindowTable::margin + (penalties.ny + side - 1) / side,
+                    .beyond = penalties.beyond,
                     .entries = {}};
   // The squares, with what lies beyond on all sides: windows of the last rows' batches reach
   // batch_side tiles further.

@@ -27,6 +27,7 @@ struct WindowTable {
   int columns = 0;  ///< of a plane
   int rows = 0;
   std::uint16_t largest = 0;           ///< of all entries
+  std::uint16_t beyond = 0;            ///< where a window sees only the prior
   std::vector<std::uint16_t> entries;  ///< [phase y, phase x, row, column, 4]
 
   /// Entry of a plane at which a window stands that begins at square 0 of phase 0: smaller windows

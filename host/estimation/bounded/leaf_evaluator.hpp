@@ -1,0 +1,83 @@
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "bin_likelihood.hpp"
+#include "known_elements.hpp"
+#include "mass_account.hpp"
+
+namespace palpate {
+
+/// Takes bins that were evaluated, one box after another, with their log-likelihoods [y, x] in
+/// nats; a single number stands for all bins of its box.
+using BinVisitor = std::function<void(const BinBox&, std::span<const double>)>;
+
+/// When a search must end; never, where there is no budget.
+class Deadline {
+ public:
+  explicit Deadline(const std::optional<double>& budget_s) {
+    if (budget_s) {
+      at_ = Clock::now() +
+            std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(*budget_s));
+    }
+  }
+  bool passed() const { return at_ && Clock::now() >= *at_; }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+
+  std::optional<Clock::time_point> at_;
+};
+
+/// Evaluates the bins of boxes, the leaves of a search: all in float32, and those that hold most of
+/// the mass once more in float64, so that rounding stays within its part of the tolerance.
+class LeafEvaluator {
+ public:
+  LeafEvaluator(const BinLikelihood& likelihood, std::span<const double> log_weight,
+                const BoundedOptions& options, const KnownElements& elements,
+                const BinVisitor& visit, const Deadline& deadline, MassAccount& account);
+
+  /// Evaluates the bins of boxes that are sorted by place. They are settled by a later flush().
+  void add(std::span<const BinBox> boxes);
+  /// Settles all bins that were added.
+  void flush() { settle(1.0); }
+  std::int64_t bins() const { return bins_; }
+
+ private:
+  struct Leaf {
+    BinBox box;
+    std::size_t first = 0;  ///< of its values
+    double log_mass = 0.0;  ///< without the prior weight
+    double largest = 0.0;
+  };
+
+  template <typename Float, typename Value>
+  void evaluate(std::span<Leaf> leaves, std::span<Value> values) const;
+  /// Indices of the pending leaves that must be evaluated in float64: the heaviest.
+  std::vector<std::size_t> to_be_refined(double share) const;
+  /// @param share of the rounding that is left to be used up
+  void settle(double share);
+  void settle(const Leaf& leaf, std::span<const double> values, double error);
+
+  const BinLikelihood& likelihood_;
+  std::span<const double> log_weight_;
+  const BoundedOptions& options_;
+  const KnownElements& elements_;
+  const BinVisitor& visit_;
+  const Deadline& deadline_;
+  MassAccount& account_;
+  std::vector<double> float32_error_;  ///< [hypothesis]
+  std::vector<double> float64_error_;
+  std::vector<Leaf> pending_;
+  std::vector<float> values_;         ///< of the pending leaves
+  std::vector<LogSum> pending_mass_;  ///< [hypothesis] lower bounds, with the prior weight
+  std::int64_t bins_ = 0;
+};
+
+}  // namespace palpate

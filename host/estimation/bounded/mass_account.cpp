@@ -1,0 +1,109 @@
+#include "mass_account.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <tuple>
+
+namespace palpate {
+
+namespace {
+
+constexpr double nothing = -std::numeric_limits<double>::infinity();
+
+}  // namespace
+
+MassAccount::MassAccount(std::span<const double> log_weight, const BoundedOptions& options)
+    : log_weight_(log_weight),
+      options_(options),
+      evaluated_(log_weight.size()),
+      rounding_(log_weight.size()),
+      dropped_(log_weight.size()),
+      log_total_(nothing),
+      log_totals_(log_weight.size(), nothing),
+      best_(nothing),
+      largest_dropped_(nothing),
+      mode_value_(nothing) {}
+
+void MassAccount::settle(std::int32_t object, double log_mass, double largest, double error) {
+  const double mass = log_weight_[object] + log_mass;
+  evaluated_[object].add(mass);
+  const double rounding = mass + std::log(std::expm1(error));
+  rounding_[object].add(rounding);
+  all_rounding_.add(rounding);
+  raise_best(log_weight_[object] + largest - error);
+}
+
+void MassAccount::drop(const UnsettledMass& tiles) {
+  for (std::size_t i = 0; i < dropped_.size(); ++i) {
+    const double mass = tiles.log_mass(i);
+    dropped_[i].add(mass);
+    all_dropped_.add(mass);
+  }
+  largest_dropped_ = std::max(largest_dropped_, tiles.largest());
+}
+
+void MassAccount::note_best(const BinBox& box, std::int64_t bin_of_box, double log_likelihood) {
+  const PoseLattice& in = options_.lattice;
+  const std::int64_t bin =
+      (std::int64_t{box.theta} * in.y_mm.count + box.y_first + bin_of_box / box.x_count) *
+          in.x_mm.count +
+      box.x_first + bin_of_box % box.x_count;
+  const double value = log_weight_[box.object] + log_likelihood;
+  // Of equal bins the first one is the mode.
+  if (value > mode_value_ ||
+      (value == mode_value_ && std::tie(box.object, bin) < std::tie(mode_object_, mode_bin_))) {
+    mode_value_ = value;
+    mode_object_ = box.object;
+    mode_bin_ = bin;
+  }
+}
+
+void MassAccount::raise_totals(std::span<const LogSum> pending) {
+  LogSum total;
+  for (std::size_t i = 0; i < evaluated_.size(); ++i) {
+    // What rounding may have added does not count.
+    const double own =
+        log_add(log_subtract(evaluated_[i].log(), rounding_[i].log()), pending[i].log());
+    log_totals_[i] = std::max(log_totals_[i], own);
+    total.add(own);
+  }
+  log_total_ = std::max(log_total_, total.log());
+}
+
+void MassAccount::raise_best(double log_likelihood) { best_ = std::max(best_, log_likelihood); }
+
+std::vector<std::size_t> MassAccount::droppable_from(const UnsettledMass& tiles,
+                                                     double tolerance) const {
+  const std::size_t of_all = std::max(tiles.droppable_from(std::log(tolerance) + log_total_),
+                                      tiles.slot(best_) + 1);  // the mode must not be lost
+  std::vector<std::size_t> from(evaluated_.size(), of_all);
+  if (options_.evidence_nats) {
+    // Of each hypothesis's own mass, as large a part of what may be missing.
+    const double missing = std::expm1(*options_.evidence_nats) * tolerance / options_.tolerance;
+    for (std::size_t i = 0; i < from.size(); ++i) {
+      from[i] = std::max(of_all, tiles.droppable_from(i, std::log(missing) + log_totals_[i]));
+    }
+  }
+  return from;
+}
+
+double MassAccount::dropped_share() const { return std::exp(all_dropped_.log() - log_total_); }
+
+double MassAccount::rounding_share() const { return std::exp(all_rounding_.log() - log_total_); }
+
+SearchResult MassAccount::result() const {
+  SearchResult result{.evidence = {},
+                      .best_object = mode_object_,
+                      .best_bin = mode_bin_,
+                      .best_log_likelihood = mode_value_ - log_weight_[mode_object_],
+                      .mode_certain = largest_dropped_ < mode_value_};
+  for (std::size_t i = 0; i < evaluated_.size(); ++i) {
+    result.evidence.push_back({.evaluated = evaluated_[i].log(),
+                               .rounding = rounding_[i].log(),
+                               .dropped = dropped_[i].log()});
+  }
+  return result;
+}
+
+}  // namespace palpate

@@ -1,0 +1,85 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "bin_likelihood.hpp"
+#include "log_sum.hpp"
+#include "palpate/bounded_posterior.hpp"
+#include "unsettled_mass.hpp"
+
+namespace palpate {
+
+/// What a search found out about one hypothesis: logs in nats, with its prior weight.
+struct HypothesisEvidence {
+  double evaluated = 0.0;  ///< of the summed likelihood of the bins that were evaluated
+  double rounding = 0.0;   ///< of the bound of that sum's error
+  double dropped = 0.0;    ///< of the bound of the summed likelihood of all other bins
+};
+
+/// What a search by bounds returns.
+struct SearchResult {
+  std::vector<HypothesisEvidence> evidence;  ///< [hypothesis]
+  std::int32_t best_object = 0;
+  std::int64_t best_bin = 0;
+  double best_log_likelihood = 0.0;  ///< of the best bin, without prior weights
+  bool mode_certain = false;
+  std::int64_t blocks_bounded = 0;
+  std::int64_t bins_evaluated = 0;
+};
+
+/// Keeps account of a search: of the mass that was settled, by evaluating bins, with the error of
+/// rounding, and of the mass that was dropped. Says which tiles may be dropped.
+class MassAccount {
+ public:
+  MassAccount(std::span<const double> log_weight, const BoundedOptions& options);
+
+  /// Counts bins whose summed likelihood is exp(log_mass), each within exp(+-error).
+  /// @param largest log-likelihood of these bins; without the prior weight, as log_mass is
+  void settle(std::int32_t object, double log_mass, double largest, double error);
+  /// Counts the mass of all tiles that are left.
+  void drop(const UnsettledMass& tiles);
+  /// Notes the best of some settled bins.
+  /// @param bin_of_box index of the bin in the box, [y, x]
+  void note_best(const BinBox& box, std::int64_t bin_of_box, double log_likelihood);
+
+  /// Raises the lower bounds of the totals by what was settled, together with bins that are not yet
+  /// settled but known well enough.
+  /// @param pending [hypothesis] lower bounds of their mass, with the prior weight
+  void raise_totals(std::span<const LogSum> pending);
+  /// The best bin has at least this log-likelihood, with the prior weight.
+  void raise_best(double log_likelihood);
+
+  /// For every hypothesis the slot from which on its tiles can be dropped, where they may hold this
+  /// part of the total.
+  std::vector<std::size_t> droppable_from(const UnsettledMass& tiles, double tolerance) const;
+  /// What was dropped so far as a part of the total, at most.
+  double dropped_share() const;
+  /// The same of what rounding may have changed.
+  double rounding_share() const;
+  /// Lower bound of the log of the total mass, in nats.
+  double log_total() const { return log_total_; }
+
+  /// Without the counts of blocks and bins.
+  SearchResult result() const;
+
+ private:
+  std::span<const double> log_weight_;
+  const BoundedOptions& options_;
+  std::vector<LogSum> evaluated_;  ///< [hypothesis], with the prior weight
+  std::vector<LogSum> rounding_;
+  std::vector<LogSum> dropped_;
+  LogSum all_rounding_;
+  LogSum all_dropped_;
+  double log_total_;
+  std::vector<double> log_totals_;  ///< [hypothesis] the same of each
+  double best_;             ///< what the best bin has at least, with the prior weight, in nats
+  double largest_dropped_;  ///< bound of a bin
+  double mode_value_;       ///< of the best settled bin, with the prior weight
+  std::int32_t mode_object_ = 0;
+  std::int64_t mode_bin_ = 0;
+};
+
+}  // namespace palpate
