@@ -34,6 +34,16 @@ struct BeliefsOptions : RunOptions {
 inline constexpr const char* belief_parts[] = {"misplaced", "touch-sd", "none",
                                                "slip",      "plan",     "cost"};
 
+struct BoundedRunOptions : RunOptions {
+  std::string part;     ///< the only part to measure; empty for all
+  std::string plots;    ///< folder for charts
+  std::string presses;  ///< folder of recordings of everyday objects; without it, their part is not
+                        ///< measured
+};
+/// Names of the parts, in order.
+inline constexpr const char* bounded_parts[] = {"speed",  "mode",     "streaming", "large",
+                                                "growth", "accuracy", "presses"};
+
 struct SweepOptions : RunOptions {
   std::string html;                      ///< file for a page with charts and tables
   std::string plots;                     ///< folder for the page's charts
@@ -67,6 +77,10 @@ void measure_fit(const FitOptions& options, std::span<char* const> command_line)
 /// objects that nobody learned and "none of these"; objects that slip; planned touches beside
 /// random ones; and the time and memory of all these.
 void measure_beliefs(const BeliefsOptions& options, std::span<char* const> command_line);
+
+/// The posterior by bounds: its time for nine touches at rising numbers of bins, touch by touch and
+/// in large scenes, its memory, and its certificates beside the distance from the dense posterior.
+void measure_bounded(const BoundedRunOptions& options, std::span<char* const> command_line);
 
 /// Speed against error on simulated letters: every filter at counts from 100 to 10,000,000 bins per
 /// object, maps of several cell sizes, the engine's ways to evaluate the likelihood beside two

@@ -78,6 +78,18 @@ int main(int argc, char** argv) try {
   command->add_option("--trials", beliefs.trials,
                       "Unknowns per letter and shape (default: each part's own)");
   command->add_option("--plots", beliefs.plots, "Draw charts in this folder, as PNG and SVG");
+  BoundedRunOptions bounded;
+  command = add_command(app, "bounded",
+                        "Measure the posterior by bounds, in some 15 minutes on two CPU cores: its "
+                        "time and memory at 10,000 to 1,000,000,000 bins beside the dense engine, "
+                        "and its certificates beside the errors",
+                        bounded, measure_bounded, command_line);
+  command->add_option("--part", bounded.part, "Measure only this part")
+      ->check(CLI::IsMember(
+          std::vector<std::string>(std::begin(bounded_parts), std::end(bounded_parts))));
+  command->add_option("--plots", bounded.plots, "Draw the chart in this folder, as PNG and SVG");
+  command->add_option("--presses", bounded.presses,
+                      "Also measure the recordings of everyday objects in this folder");
   SweepOptions sweep;
   command = add_command(app, "sweep",
                         "Measure speed against error on simulated letters, in some 20 minutes on "

@@ -54,6 +54,10 @@ void sweep_cells(Device& device, const SweepPlan& plan, const CellPlan& cells, J
       document["precisions"].push_back(way);
     }
   }
+  for (const BinCounts& bins : cells.bounded) {
+    document["bounds"].push_back(
+        measure_bounds(device, letters, trials_of(plan.bounded_each(bins)), bins));
+  }
   if (!cells.lattices.empty()) {
     const PoseLattice balanced =
         balanced_lattice(lattice_with(goal_bins), letters, most_balanced_bins, BinWidth::fine)
@@ -94,6 +98,7 @@ Json measure(Device& device, const SweepOptions& options) {
   Json document{{"touches", touches_per_trial}, {"trials", trials},
                 {"points", Json::array()},      {"windows", ""},
                 {"precisions", Json::array()},  {"fronts", Json::object()},
+                {"bounds", Json::array()},      {"auto_rule", Json::object()},
                 {"knees", Json::array()},       {"limits", Json::array()},
                 {"verdicts", Json::array()}};
   print_head(Columns(run_columns()).first(printed_run_columns));
@@ -102,6 +107,7 @@ Json measure(Device& device, const SweepOptions& options) {
   }
   document["windows"] = window_sentence(document["points"]);
   document["fronts"] = fronts_of(document["points"], document["precisions"], trials);
+  document["auto_rule"] = auto_rule_of(document["bounds"]);
   document["limits"] = measure_limits(device, plan);
   document["verdicts"] = verdicts_of(document["points"]);
   return document;
@@ -110,6 +116,8 @@ Json measure(Device& device, const SweepOptions& options) {
 /// What follows the runs.
 void print(const Json& document) {
   print_table(precision_columns(), document.at("precisions"));
+  print_table(bounds_columns(), document.at("bounds"));
+  fmt::print("\n{}\n", plain_text(document.at("auto_rule").at("sentence")));
   print_table(limit_columns(), document.at("limits"));
   fmt::print("\n");
   for (const Json& knee : document.at("knees")) {

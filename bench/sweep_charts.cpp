@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <string_view>
+#include <tuple>
 
 #include <fmt/format.h>
 
@@ -116,6 +117,39 @@ Chart precision_chart(const Json& document) {
   return chart;
 }
 
+Chart bounds_chart(const Json& document) {
+  const Json& bounds = document.at("bounds");
+  Chart chart{.x = log_axis("bins in all", count_text),
+              .y = log_axis(
+                  fmt::format("time per unknown of {} touches", plain_text(document.at("touches"))),
+                  seconds_text),
+              .rules = {{.vertical = true,
+                         .at = document.at("auto_rule").at("rule"),
+                         .colour = comparison_grey,
+                         .label = "--filter auto"}}};
+  std::size_t colour = 0;
+  for (const auto& [filter, name] :
+       {std::pair("histogram", "histogram"), std::pair("bounded", "by bounds")}) {
+    for (const auto& [field, asked, once] :
+         {std::tuple("once", "asked once", true),
+          std::tuple("each_touch", "asked after each touch", false)}) {
+      ChartSeries series{.name = fmt::format("{}, {}", name, asked),
+                         .colour = palpate::series(colour),
+                         .mark = once ? Mark::circle : Mark::square,
+                         .fill = once ? MarkFill::solid : MarkFill::hollow,
+                         .line = once ? Line::solid : Line::dashed};
+      for (const Json& record : bounds) {
+        series.points.push_back({.x = record.at("bins_in_all"),
+                                 .y = record.at(filter).at(field),
+                                 .title = title_of(bounds_columns(), record)});
+      }
+      add(chart, std::move(series));
+    }
+    ++colour;
+  }
+  return chart;
+}
+
 Chart knee_chart(const Json& document) {
   Chart chart{.x = log_axis("bins per object", count_text), .y = log_axis("mean pose error (mm)")};
   ChartSeries nearest{
@@ -172,7 +206,8 @@ Chart knee_chart(const Json& document) {
 }  // namespace
 
 std::vector<Chart> charts_of(const Json& document) {
-  return {pose_chart(document), precision_chart(document), knee_chart(document)};
+  return {pose_chart(document), precision_chart(document), knee_chart(document),
+          bounds_chart(document)};
 }
 
 }  // namespace palpate::bench

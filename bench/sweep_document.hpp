@@ -26,6 +26,11 @@ Json difference_of(const PairedErrors& paired);
 /// and what more bins gain from step to step.
 Json knee_record(const Json& points, double cell_mm, const BinCounts& balanced);
 
+/// From how many bins on the bounded posterior is faster than the histogram, by the records of
+/// measure_bounds() in the order of their bins, beside the rule of --filter auto; null where one of
+/// the two is faster on every lattice.
+Json auto_rule_of(const Json& bounds);
+
 /// How well windows agree with the full posterior over the document's points.
 std::string window_sentence(const Json& points);
 

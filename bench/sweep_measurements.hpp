@@ -28,6 +28,16 @@ Json measure_histogram(Device& device, const std::vector<Hypothesis>& letters,
 Json measure_particles(Device& device, const std::vector<Hypothesis>& letters,
                        std::span<const Recording> trials, ParticleOptions options);
 
+/// Bins in all above which --filter auto takes the bounded posterior.
+inline constexpr std::int64_t most_histogram_bins = 100'000;
+
+/// Times the bounded posterior beside the histogram on one lattice, over all of the trials: asked
+/// once after all touches, and after every touch. Holds its certificates against the histogram's
+/// bins in float64, and says what --filter auto takes and whether it is the faster of the two where
+/// they are asked once.
+Json measure_bounds(Device& device, const std::vector<Hypothesis>& letters,
+                    std::span<const Recording> trials, const BinCounts& bins);
+
 /// Times the likelihood alone, without reductions, on one lattice, and its deviation from float64.
 /// Returns a record of each way to evaluate it: the product of Eq. 7, the same in logs (gamma = 0),
 /// an array at rest, the one-bin kernel, and the loop on the host's cores. The ways take turns.

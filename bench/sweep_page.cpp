@@ -112,7 +112,9 @@ std::string page_of(const Json& document) {
       {"steps", table(step_columns(), steps_of(document))},
       {"limits", table(limit_columns(), document.at("limits"))},
       {"runs", table(run_columns(), document.at("points"))},
-      {"precisions", table(precision_columns(), document.at("precisions"))}};
+      {"precisions", table(precision_columns(), document.at("precisions"))},
+      {"bounds", table(bounds_columns(), document.at("bounds"))},
+      {"auto rule", xml_escaped(plain_text(document.at("auto_rule").at("sentence")))}};
   for (const char* fact :
        {"device", "host threads", "compiler", "data", "date", "command line", "seconds in all"}) {
     parts["facts"] += fmt::format("<dt>{}</dt><dd>{}</dd>\n", fact, text(fact));

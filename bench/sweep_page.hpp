@@ -15,6 +15,7 @@ namespace palpate::bench {
 std::vector<Column> run_columns();
 inline constexpr std::size_t printed_run_columns = 20;  ///< the first; the page has more
 std::vector<Column> precision_columns();
+std::vector<Column> bounds_columns();
 std::vector<Column> limit_columns();
 std::vector<Column> step_columns();
 std::vector<Column> verdict_columns();
@@ -23,7 +24,8 @@ std::vector<Column> verdict_columns();
 Json steps_of(const Json& document);
 
 /// The files of the charts, without their endings, in the order of charts_of().
-inline constexpr std::array chart_names{"sweep_front", "sweep_precision", "sweep_bins"};
+inline constexpr std::array chart_names{"sweep_front", "sweep_precision", "sweep_bins",
+                                        "sweep_bounds"};
 std::vector<Chart> charts_of(const Json& document);
 
 /// The document as one self-contained page, by the template in sweep_page.html.

@@ -38,7 +38,8 @@ std::vector<CellPlan> quick_cells() {
           {.cell_mm = goal_cell_mm,
            .lattices = with_table_1(scaled({1e2, 1e3, 1e4, 1e5})),
            .particles = {1'000, 10'000},
-           .compared = {{25, 25, 4}, {100, 100, 2}}}};
+           .compared = {{25, 25, 4}, {100, 100, 2}},
+           .bounded = scaled({1e2, 1e3, 1e4, 1e5})}};
 }
 
 std::vector<CellPlan> full_cells() {
@@ -47,7 +48,8 @@ std::vector<CellPlan> full_cells() {
           {.cell_mm = goal_cell_mm,
            .lattices = with_table_1(scaled({1e2, 1e3, 1e4, 3e4, 1e5, 3e5, 1e6, 3e6, 1e7})),
            .particles = {100, 1'000, 10'000, 100'000, 1'000'000},
-           .compared = {{25, 25, 16}, {50, 50, 40}, {100, 100, 10}, {200, 200, 4}}},
+           .compared = {{25, 25, 16}, {50, 50, 40}, {100, 100, 10}, {200, 200, 4}},
+           .bounded = scaled({1e3, 3e3, 1e4, 2e4, 3e4, 1e5, 1e6, 1e7})},
           {.cell_mm = 0.25, .lattices = decades}};
 }
 
@@ -70,6 +72,10 @@ int SweepPlan::full_each(double cell_mm, const BinCounts& bins) const {
   return std::min(trials_each, count <= most_twice ? 2 : 1);
 }
 
+int SweepPlan::bounded_each(const BinCounts& bins) const {
+  return std::min(trials_each, quick || product(bins) > most_twice ? 1 : 4);
+}
+
 int SweepPlan::particle_trials_each(int particles) const {
   return particles > 300'000 ? 1 : trials_each;
 }
@@ -90,7 +96,9 @@ SweepPlan plan_of(const SweepOptions& options) {
   const std::int64_t most =
       options.max_bins.value_or(options.quick ? 100'000 : 10'000'000) * 11 / 10;
   for (CellPlan& cells : plan.cells) {
-    std::erase_if(cells.lattices, [&](const BinCounts& bins) { return product(bins) > most; });
+    for (std::vector<BinCounts>* lattices : {&cells.lattices, &cells.bounded}) {
+      std::erase_if(*lattices, [&](const BinCounts& bins) { return product(bins) > most; });
+    }
     std::stable_sort(cells.lattices.begin(), cells.lattices.end(),
                      [](const auto& a, const auto& b) { return product(a) < product(b); });
   }

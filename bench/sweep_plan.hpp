@@ -27,6 +27,7 @@ struct CellPlan {
   std::vector<BinCounts> lattices = {};  ///< by rising count
   std::vector<int> particles = {};
   std::vector<BinCounts> compared = {};  ///< lattices for compare_paths()
+  std::vector<BinCounts> bounded = {};   ///< lattices for measure_bounds(), by rising count
 };
 
 /// What is measured, in this order.
@@ -41,6 +42,8 @@ struct SweepPlan {
 
   /// Trials of every letter that get the full posterior: all of them on the goal's lattice.
   int full_each(double cell_mm, const BinCounts& bins) const;
+  /// Trials of every letter for measure_bounds().
+  int bounded_each(const BinCounts& bins) const;
   /// Trials of every letter for this many particles.
   int particle_trials_each(int particles) const;
 };

@@ -54,6 +54,25 @@ std::vector<Column> precision_columns() {
           {"RMS", "/deviation_nats/rms", nats}};
 }
 
+std::vector<Column> bounds_columns() {
+  return {{"bins per object", "/count", count_text},
+          {"bins in all", "/bins_in_all", count_text},
+          {"trials", "/trials"},
+          {"histogram, asked once", "/histogram/once", seconds_text},
+          {"bounded", "/bounded/once", seconds_text},
+          {"histogram, after each touch", "/histogram/each_touch", seconds_text},
+          {"bounded", "/bounded/each_touch", seconds_text},
+          {"bins evaluated", "/bins_evaluated", count_text},
+          {"of all, %", "/share_evaluated", number_text("{:.3g}", 100.0)},
+          {"certificate", "/certificate", number_text("{:.1e}")},
+          {"measured error", "/measured_error", number_text("{:.1e}")},
+          {"certificates that hold", "/certificates_hold"},
+          {"same mode", "/same_modes"},
+          {"host memory, MiB", "/host_bytes", number_text("{:.1f}", 1.0 / (1 << 20))},
+          {"--filter auto takes", "/auto"},
+          {"the faster one", "/auto_is_faster"}};
+}
+
 std::vector<Column> limit_columns() {
   return {{"what is changed", "/name"},
           {"elements", "/elements"},

@@ -152,6 +152,52 @@ void expect_histogram_ahead(const nlohmann::json& points) {
   }
 }
 
+/// The posterior by bounds keeps its certificates, however long it takes on this machine.
+void expect_bounds(const nlohmann::json& document) {
+  const nlohmann::json& bounds = document.at("bounds");
+  ASSERT_EQ(bounds.size(), 4U);
+  std::int64_t before = 0;
+  for (const auto& run : bounds) {
+    const std::string what = run.at("bins_in_all").dump() + " bins";
+    EXPECT_GT(run.at("bins_in_all"), before) << "in order";
+    before = run["bins_in_all"];
+    EXPECT_EQ(before, 5 * run.at("count").get<std::int64_t>());
+    EXPECT_EQ(run.at("trials"), 5) << what;
+    EXPECT_EQ(run.at("certificates_hold"), run["trials"]) << what;
+    EXPECT_EQ(run.at("same_modes"), run["trials"]) << what;
+    EXPECT_LE(run.at("certificate"), 1e-6) << what << ": the tolerance";
+    // Sums of float64 differ by 1e-11 at most.
+    EXPECT_LE(run.at("measured_error"), run["certificate"].get<double>() + 1e-11) << what;
+    EXPECT_GT(run.at("bins_evaluated"), 0) << what;
+    EXPECT_LE(run["bins_evaluated"], before) << what;
+    for (const char* filter : {"histogram", "bounded"}) {
+      EXPECT_GT(run.at(filter).at("once"), 0.0) << what;
+      EXPECT_GT(run.at(filter).at("each_touch"), 0.0) << what;
+    }
+    EXPECT_EQ(run.at("auto"), before > 100'000 ? "bounded" : "histogram") << what;
+    const bool faster = run["bounded"]["once"] < run["histogram"]["once"];
+    EXPECT_EQ(run.at("auto_is_faster"), (run["auto"] == "bounded") == faster) << what;
+  }
+  const nlohmann::json& rule = document.at("auto_rule");
+  EXPECT_EQ(rule.at("rule"), 100'000);
+  for (const char* asked : {"once", "each_touch"}) {
+    // Above the crossing the bounded posterior is faster; just below it is not.
+    const nlohmann::json& crossing = rule.at(asked);
+    bool faster_below = false;
+    for (const auto& run : bounds) {
+      const bool faster = run["bounded"][asked] < run["histogram"][asked];
+      if (!crossing.is_null() && run["bins_in_all"] > crossing) {
+        EXPECT_TRUE(faster) << asked;
+      } else {
+        faster_below = faster;
+      }
+    }
+    EXPECT_EQ(faster_below,
+              crossing.is_null() && bounds[0]["bounded"][asked] < bounds[0]["histogram"][asked])
+        << asked;
+  }
+}
+
 void expect_limits(const nlohmann::json& limits) {
   ASSERT_EQ(limits.size(), 2U);
   EXPECT_TRUE(limits[0].at("against").is_null());
@@ -207,12 +253,14 @@ void expect_page(const std::filesystem::path& file, const nlohmann::json& docume
     ++rows;
   }
   std::size_t expected = document.at("points").size() + document.at("precisions").size() +
-                         document.at("limits").size();
+                         document.at("bounds").size() + document.at("limits").size();
+  EXPECT_NE(page.find(document.at("auto_rule").at("sentence").get<std::string>()),
+            std::string::npos);
   for (const auto& knee : document.at("knees")) {
     expected += knee.at("steps").size();
     EXPECT_NE(page.find(knee.at("sentence").get<std::string>()), std::string::npos);
   }
-  EXPECT_EQ(rows, expected) << "four tables; there are no goals in a quick run";
+  EXPECT_EQ(rows, expected) << "five tables; there are no goals in a quick run";
 }
 
 TEST(Sweep, QuickRunKeepsTheOrderAndTheErrorBounds) {
@@ -233,6 +281,7 @@ TEST(Sweep, QuickRunKeepsTheOrderAndTheErrorBounds) {
   expect_windows(document);
   expect_order(document.at("points"));
   expect_histogram_ahead(document.at("points"));
+  expect_bounds(document);
   expect_limits(document.at("limits"));
   expect_fronts(document.at("fronts"), trials);
   std::map<std::string, int> paths;
@@ -254,7 +303,7 @@ TEST(Sweep, QuickRunKeepsTheOrderAndTheErrorBounds) {
     expect_steps(knee, document.at("points"));
   }
   expect_page(folder / "s.html", document);
-  for (const char* chart : {"front", "precision", "bins"}) {
+  for (const char* chart : {"front", "precision", "bins", "bounds"}) {
     const std::string name = "sweep_" + std::string(chart);
     expect_well_formed(folder / "plots" / (name + ".svg"));
     EXPECT_TRUE(bytes_of(folder / "plots" / (name + ".png")).starts_with("\x89PNG")) << chart;

@@ -353,7 +353,7 @@ class SearchRun {
   }
 
   void note(std::span<const Tile> tiles, std::size_t level) const {
-    if (refined_ == nullptr) {
+    if (refined_ == nullptr || level == finest_) {
       return;
     }
     for (const Tile& tile : tiles) {

@@ -28,12 +28,14 @@ class BoundSearch {
   /// @param touches [touch]
   void add(std::span<const KnownElements> touches);
   /// @param elements all that were added since reset()
-  /// @param refined where not null, takes the tiles that were divided or evaluated
+  /// @param refined where not null, takes the tiles that were divided
   SearchResult run(const KnownElements& elements, const BinVisitor& visit,
                    std::vector<PoseBlock>* refined = nullptr) const;
 
   /// [hypothesis]
   std::span<const TileBounds> bounds() const { return bounds_; }
+  /// The level of the smallest tiles, 0 that of the largest.
+  int finest_level() const { return static_cast<int>(bounds_.front().levels().size()) - 1; }
   std::uint64_t bytes() const;
 
  private:

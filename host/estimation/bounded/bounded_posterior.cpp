@@ -425,8 +425,20 @@ std::vector<PoseBlock> BoundedPosterior::refined_blocks() const {
   Impl& posterior = impl();
   std::vector<PoseBlock> blocks;
   posterior.arena.execute([&] {
-    posterior.search.run(
-        posterior.elements, [](const BinBox&, std::span<const double>) {}, &blocks);
+    std::vector<PoseBlock> evaluated;
+    const auto note = [&](const BinBox& box, std::span<const double> log_likelihoods) {
+      if (static_cast<std::int64_t>(log_likelihoods.size()) == box.bins()) {
+        evaluated.push_back({.object = box.object,
+                             .level = posterior.search.finest_level(),
+                             .theta = box.theta,
+                             .x_first = box.x_first,
+                             .x_count = box.x_count,
+                             .y_first = box.y_first,
+                             .y_count = box.y_count});
+      }
+    };
+    posterior.search.run(posterior.elements, note, &blocks);
+    blocks.insert(blocks.end(), evaluated.begin(), evaluated.end());
   });
   return blocks;
 }

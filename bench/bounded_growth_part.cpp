@@ -1,0 +1,167 @@
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <optional>
+
+#include <fmt/format.h>
+
+#include "bounded_answers.hpp"
+#include "bounded_parts.hpp"
+#include "chart_series.hpp"
+#include "command_run.hpp"
+#include "letters.hpp"
+
+namespace palpate::bench {
+
+namespace {
+
+constexpr std::uint64_t seed = 1'403'000'000;
+constexpr double most_growth = 10.0;       ///< in time, for a thousand times the bins
+constexpr double most_memory_mib = 256.0;  ///< of 10^9 bins
+
+/// A lattice of some number of bins, in the proportions of 200 x 200 x 250.
+PoseLattice lattice_of_bins(double count) {
+  const double factor = std::cbrt(count / (4.0 * 4.0 * 5.0));
+  const auto times = [factor](double n) {
+    return std::max(1, static_cast<int>(std::lround(n * factor)));
+  };
+  return lattice_of(times(4.0), times(4.0), times(5.0));
+}
+
+/// Unknowns that the dense engine can answer in the time of a benchmark.
+int dense_unknowns(double bins_in_all, int unknowns) {
+  return bins_in_all <= 2e6   ? unknowns
+         : bins_in_all <= 2e7 ? std::min(unknowns, 5)
+         : bins_in_all <= 2e8 ? 1
+                              : 0;
+}
+
+Json times_of(const std::vector<double>& seconds) {
+  return seconds.empty() ? Json(nullptr)
+                         : Json{{"median", median(seconds)},
+                                {"least", std::ranges::min(seconds)},
+                                {"most", std::ranges::max(seconds)},
+                                {"unknowns", seconds.size()}};
+}
+
+std::vector<double> seconds_of_all(const BoundedAnswers& answers) {
+  std::vector<double> seconds = answers.milliseconds();
+  for (double& value : seconds) {
+    value /= 1e3;
+  }
+  return seconds;
+}
+
+Json measure_bins(const BoundedInputs& inputs, double bins_in_all,
+                  const std::vector<Recording>& unknowns, Report& report) {
+  const PoseLattice lattice =
+      lattice_of_bins(bins_in_all / static_cast<double>(inputs.letters.size()));
+  const auto bins = lattice.bins() * static_cast<std::int64_t>(inputs.letters.size());
+  BoundedOptions options{.lattice = lattice};
+  restart_peak_memory();
+  const std::uint64_t before = resident_bytes();
+  std::optional<BoundedPosterior> posterior(std::in_place, inputs.device, inputs.letters, options);
+  const BoundedAnswers all = answer_each(*posterior, unknowns);
+  const std::uint64_t peak = peak_resident_bytes() - before;
+  const std::uint64_t held = posterior->host_bytes();
+  options.threads = 1;
+  posterior.emplace(inputs.device, inputs.letters, options);
+  const BoundedAnswers one = answer_each(*posterior, unknowns);
+  posterior.reset();
+  DenseAnswers dense;
+  if (const int count = dense_unknowns(bins_in_all, static_cast<int>(unknowns.size())); count > 0) {
+    PoseHistogram histogram(inputs.device, inputs.letters, {.lattice = lattice});
+    histogram.update(unknowns.front().touch(0));  // warms up
+    dense = answer_each(histogram, std::span(unknowns).first(static_cast<std::size_t>(count)));
+  }
+
+  const double peak_mib = static_cast<double>(peak) / (1 << 20);
+  const bool largest = bins_in_all > 5e8;
+  Case measured{.name = fmt::format("growth, {} bins in all", count_text(bins_in_all)),
+                .facts = {{"bins", size_of(lattice)},
+                          {"objects", inputs.letters.size()},
+                          {"touches", touches_per_unknown},
+                          {"unknowns", unknowns.size()}},
+                .measurements = measurements_of(all, "all threads", bins)};
+  measured.measurements.push_back({"one thread, median", median(one.milliseconds()), "ms"});
+  measured.measurements.push_back(
+      {"peak of the process above before", peak_mib, "MiB",
+       largest ? std::optional(at_most(most_memory_mib)) : std::nullopt});
+  if (!dense.seconds.empty()) {
+    measured.measurements.push_back(
+        {fmt::format("dense engine, median of {}", dense.seconds.size()),
+         1e3 * median(dense.seconds), "ms"});
+  }
+  report.add(measured);
+  return {{"bins_in_all", bins},
+          {"bins", size_of(lattice)},
+          {"bounded", times_of(seconds_of_all(all))},
+          {"one_thread", times_of(seconds_of_all(one))},
+          {"dense", times_of(dense.seconds)},
+          {"bins_evaluated", median(all.bins_evaluated())},
+          {"dropped_mass", std::ranges::max(all.dropped_masses())},
+          {"host_bytes", held},
+          {"peak_bytes", peak}};
+}
+
+/// Time for a thousand times the bins, from every lattice that has such a finer one.
+void add_growth(const Json& records, Report& report) {
+  Case measured{.name = "growth, a thousand times the bins"};
+  for (std::size_t i = 0; i + 3 < records.size(); ++i) {
+    const Json& few = records[i];
+    const Json& many = records[i + 3];
+    const auto ratio = [&](const char* threads) {
+      return many.at(threads).at("median").get<double>() /
+             few.at(threads).at("median").get<double>();
+    };
+    const std::string name = fmt::format("{} to {} bins", count_text(few.at("bins_in_all")),
+                                         count_text(many.at("bins_in_all")));
+    measured.measurements.push_back(
+        {name + ", all threads", ratio("bounded"), "times", at_most(most_growth)});
+    measured.measurements.push_back({name + ", one thread", ratio("one_thread"), "times"});
+  }
+  report.add(measured);
+}
+
+}  // namespace
+
+Json measure_bounded_growth(const BoundedInputs& inputs, Report& report) {
+  const std::vector<double> totals = inputs.options.quick
+                                         ? std::vector{10.0, 1e2, 1e3, 1e4}
+                                         : std::vector{1e4, 1e5, 1e6, 1e7, 1e8, 1e9};
+  const std::vector<Recording> unknowns =
+      unknown_recordings(inputs.unknowns(), touches_per_unknown, seed);
+  Json records = Json::array();
+  for (const double total : totals) {
+    records.push_back(measure_bins(inputs, total, unknowns, report));
+  }
+  add_growth(records, report);
+  return records;
+}
+
+void draw_growth(const Json& records, const std::filesystem::path& folder) {
+  Chart chart{
+      .x = {.label = "bins in all, five objects", .scale = Scale::logarithmic, .text = count_text},
+      .y = {.label = "time of nine touches, to the posterior",
+            .scale = Scale::logarithmic,
+            .text = seconds_text}};
+  for (const auto& [field, name] :
+       {std::pair("dense", "dense, every bin"), std::pair("bounded", "by bounds, proven to 1e-6"),
+        std::pair("one_thread", "by bounds, on one thread")}) {
+    ChartSeries series = series_like(chart.series.size(), name);
+    const std::string at = std::string("/") + field;
+    series.points = points_of(records, "/bins_in_all", (at + "/median").c_str());
+    const std::vector<ChartPoint> least =
+        points_of(records, "/bins_in_all", (at + "/least").c_str());
+    const std::vector<ChartPoint> most = points_of(records, "/bins_in_all", (at + "/most").c_str());
+    for (std::size_t i = 0; i < series.points.size(); ++i) {
+      series.points[i].low = least[i].y;
+      series.points[i].high = most[i].y;
+    }
+    series.line = Line::solid;
+    chart.series.push_back(std::move(series));
+  }
+  write_charts(std::span(&chart, 1), folder, std::array{growth_figure});
+}
+
+}  // namespace palpate::bench

@@ -1,0 +1,149 @@
+#include <cmath>
+#include <fstream>
+#include <map>
+#include <string>
+
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "bench_program.hpp"
+#include "io/scratch_folder.hpp"
+
+namespace palpate {
+namespace {
+
+nlohmann::json quick_run(const ScratchFolder& folder, const std::string& part,
+                         const std::string& flags = "") {
+  const std::string file = (folder / (part + ".json")).string();
+  EXPECT_EQ(run_bench("bounded --quick --part " + part + " --json " + file + " " + flags), 0);
+  return nlohmann::json::parse(std::ifstream(file));
+}
+
+/// Every case has measurements with a unit and a finite value.
+void expect_sound_cases(const nlohmann::json& document) {
+  EXPECT_FALSE(document.at("cases").empty());
+  std::map<std::string, int> names;
+  for (const auto& measured : document.at("cases")) {
+    const std::string name = measured.at("name");
+    EXPECT_EQ(++names[name], 1) << "two cases '" << name << "'";
+    EXPECT_FALSE(measured.at("measurements").empty()) << name;
+    for (const auto& m : measured.at("measurements")) {
+      EXPECT_TRUE(std::isfinite(m.at("value").get<double>())) << name << ": " << m.at("name");
+      EXPECT_FALSE(m.at("unit").get<std::string>().empty()) << name << ": " << m.at("name");
+    }
+  }
+}
+
+/// The certificates of answers that had the time they needed.
+void expect_within_tolerance(const nlohmann::json& answers, std::size_t count) {
+  EXPECT_EQ(answers.at("milliseconds").size(), count);
+  for (const auto& dropped : answers.at("dropped_mass")) {
+    EXPECT_LE(dropped, 1e-6);
+  }
+  for (const auto& bins : answers.at("bins_evaluated")) {
+    EXPECT_GT(bins, 0.0);
+  }
+}
+
+TEST(Bounded, AnswersOnAnyNumberOfThreadsWithinTheTolerance) {
+  const ScratchFolder folder;
+  const auto document = quick_run(folder, "speed");
+  expect_sound_cases(document);
+  ASSERT_EQ(document.at("speed").size(), 2U);
+  for (const auto& size : document["speed"]) {
+    expect_within_tolerance(size.at("all_threads"), 3);
+    expect_within_tolerance(size.at("one_thread"), 3);
+    EXPECT_EQ(size["all_threads"].at("bins_evaluated"), size["one_thread"].at("bins_evaluated"))
+        << "the search does not depend on the threads";
+    EXPECT_EQ(size.at("dense_seconds").size(), 3U);
+  }
+}
+
+TEST(Bounded, IsCertainOfTheModeWithinTheTolerance) {
+  const ScratchFolder folder;
+  const auto document = quick_run(folder, "mode");
+  expect_sound_cases(document);
+  ASSERT_EQ(document.at("mode").size(), 2U) << "two tolerances";
+  expect_within_tolerance(document["mode"][0].at("answers"), 3);
+  EXPECT_EQ(document["mode"][0]["answers"].at("mode_certain"), 3);
+}
+
+TEST(Bounded, AnswersAfterEveryTouch) {
+  const ScratchFolder folder;
+  const auto document = quick_run(folder, "streaming", "--plots " + (folder / "plots").string());
+  EXPECT_GT(std::filesystem::file_size(folder / "plots/bounded_search.png"), 1000U);
+  expect_sound_cases(document);
+  ASSERT_EQ(document.at("streaming").size(), 9U);
+  for (const auto& touch : document["streaming"]) {
+    EXPECT_EQ(touch.at("milliseconds").size(), 3U);
+    for (const auto& dropped : touch.at("dropped_mass")) {
+      EXPECT_GE(dropped, 0.0);
+      EXPECT_LE(dropped, 1.0) << "also where the budget ends the search";
+    }
+  }
+}
+
+TEST(Bounded, TakesMemoryThatIsMeasured) {
+  const ScratchFolder folder;
+  const auto document = quick_run(folder, "large");
+  expect_sound_cases(document);
+  ASSERT_EQ(document.at("large").size(), 2U) << "two pivots";
+  for (const auto& scene : document["large"]) {
+    expect_within_tolerance(scene.at("answers"), 3);
+    EXPECT_GT(scene.at("host_bytes"), 0);
+  }
+}
+
+TEST(Bounded, GrowthIsDrawn) {
+  const ScratchFolder folder;
+  const auto document = quick_run(folder, "growth", "--plots " + (folder / "plots").string());
+  expect_sound_cases(document);
+  const auto& growth = document.at("growth");
+  ASSERT_EQ(growth.size(), 4U);
+  for (std::size_t i = 0; i < growth.size(); ++i) {
+    EXPECT_LE(growth[i].at("dropped_mass"), 1e-6);
+    EXPECT_GT(growth[i].at("bounded").at("median"), 0.0);
+    EXPECT_LE(growth[i]["bounded"].at("least"), growth[i]["bounded"].at("median"));
+    EXPECT_LE(growth[i]["bounded"]["median"], growth[i]["bounded"].at("most"));
+    if (i > 0) {
+      EXPECT_GT(growth[i].at("bins_in_all"), growth[i - 1].at("bins_in_all"));
+    }
+  }
+  for (const char* name : {"bounded_growth.png", "bounded_growth.svg"}) {
+    EXPECT_GT(std::filesystem::file_size(folder / "plots" / name), 1000U) << name;
+  }
+  expect_no_file_written_twice("bounded --part growth --plots " + (folder / "plots").string(),
+                               folder / "plots");
+}
+
+TEST(Bounded, CertificatesHold) {
+  const ScratchFolder folder;
+  const auto document = quick_run(folder, "accuracy");
+  expect_sound_cases(document);
+  ASSERT_EQ(document.at("accuracy").size(), 4U) << "two lattices after 3 and 9 touches";
+  for (const auto& checks : document["accuracy"]) {
+    ASSERT_EQ(checks.at("promised").size(), 5U);
+    for (std::size_t i = 0; i < 5; ++i) {
+      EXPECT_TRUE(checks.at("holds")[i]);
+      EXPECT_TRUE(checks.at("same_mode")[i]);
+      // Sums of float64 differ by 1e-11 at most.
+      const double most = checks["promised"][i].get<double>() + 1e-11;
+      EXPECT_LE(checks.at("mass_outside")[i], most);
+      EXPECT_LE(checks.at("total_variation")[i], most);
+      EXPECT_LE(checks.at("identity_error")[i], most);
+      EXPECT_LE(checks["promised"][i], 1e-6);
+    }
+  }
+}
+
+TEST(Bounded, RefusesWhatCannotBe) {
+  const ScratchFolder folder;
+  EXPECT_EQ(run_bench("bounded --part nonsense 2>/dev/null"), 2);
+  EXPECT_EQ(run_bench("bounded --part presses 2>/dev/null"), 2) << "no folder";
+  EXPECT_EQ(run_bench("bounded --quick --part presses --presses " + (folder / "missing").string() +
+                      " 2>/dev/null"),
+            2);
+}
+
+}  // namespace
+}  // namespace palpate

@@ -1,0 +1,61 @@
+#include "glyph_scene.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <set>
+#include <string>
+
+#include <gtest/gtest.h>
+
+#include "palpate/error.hpp"
+
+namespace palpate::bench {
+namespace {
+
+double pressed(const Recording& recording) {
+  return std::accumulate(recording.pressure.begin(), recording.pressure.end(), 0.0);
+}
+
+TEST(GlyphScene, HasObjectsOfDifferentNamesAndSizes) {
+  const std::vector<Recording> objects = glyph_recordings(most_glyphs);
+  std::set<std::string> names;
+  for (const Recording& object : objects) {
+    names.insert(object.object);
+    EXPECT_EQ(object.size(), 192U);
+  }
+  EXPECT_EQ(names.size(), static_cast<std::size_t>(most_glyphs));
+  EXPECT_TRUE(names.contains("A"));
+  // Of an area of 0.64 and 1.44 times; parts of a large glyph lie beyond the touches.
+  constexpr std::size_t of_a_size = most_glyphs / 3;
+  EXPECT_LT(pressed(objects[of_a_size]), 0.8 * pressed(objects[0])) << "an A of 0.8 times the size";
+  EXPECT_GT(pressed(objects[2 * of_a_size]), 1.1 * pressed(objects[0])) << "of 1.2 times the size";
+}
+
+TEST(GlyphScene, UnknownsLieAnywhereInTheRegion) {
+  constexpr double extent_mm = 100.0;
+  double farthest_mm = 0.0;
+  for (const Recording& unknown : glyph_unknowns(4, 20, 3, extent_mm, 5)) {
+    EXPECT_EQ(unknown.size(), 3U);
+    const Pose& pose = unknown.truth->T_object_robot;
+    for (const double at_mm : {pose.translation_mm.x, pose.translation_mm.y}) {
+      EXPECT_LE(std::abs(at_mm), extent_mm);
+      farthest_mm = std::max(farthest_mm, std::abs(at_mm));
+    }
+    for (const Pose& T_robot_sensor : unknown.T_robot_sensor) {
+      // random_poses() are about the object: 1.5 times 6.8 mm along each axis.
+      const Pose T_object_sensor = pose * T_robot_sensor;
+      EXPECT_LE(std::abs(T_object_sensor.translation_mm.x), 10.3);
+      EXPECT_LE(std::abs(T_object_sensor.translation_mm.y), 10.3);
+    }
+  }
+  EXPECT_GT(farthest_mm, 0.8 * extent_mm);
+}
+
+TEST(GlyphScene, RefusesMoreObjectsThanThereAre) {
+  EXPECT_THROW(glyph_recordings(0), Error);
+  EXPECT_THROW(glyph_recordings(most_glyphs + 1), Error);
+}
+
+}  // namespace
+}  // namespace palpate::bench
