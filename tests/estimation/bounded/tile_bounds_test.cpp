@@ -188,7 +188,8 @@ void expect_children(const TileAxis& parents, const TileAxis& children) {
   }
 }
 
-void expect_partitions(const PoseLattice& lattice, double cell_mm, std::vector<TileSize> sizes) {
+void expect_partitions(const PoseLattice& lattice, double cell_mm,
+                       const std::vector<TileSize>& sizes) {
   const std::vector<TileLevel> levels = tile_levels(lattice, cell_mm, sizes);
   for (std::size_t l = 0; l < levels.size(); ++l) {
     expect_partition(levels[l].x, lattice.x_mm);

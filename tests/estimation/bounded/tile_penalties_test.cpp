@@ -46,14 +46,14 @@ BatchCase random_batch(std::size_t elements, int side, std::uint16_t largest, st
 /// Sums of the 4 x 4 tiles' penalties by definition, [x, y].
 std::vector<std::uint32_t> sums_by_definition(const BatchCase& of) {
   std::vector<std::uint64_t> sums(batch_tiles, of.before);
-  const auto& [turn, corner_mm, square_mm] = of.place;
+  const TilePlace& place = of.place;
   for (const glm::dvec2& p : of.elements.from_pivot_mm) {
     // Beyond 2^28 squares all is the prior; no batch here is as far.
     const auto square = [&](double mm) {
-      return static_cast<int>(std::clamp(std::floor(mm / square_mm), -1e6, 1e6));
+      return static_cast<int>(std::clamp(std::floor(mm / place.square_mm), -1e6, 1e6));
     };
-    const int x = square(turn.x * p.x - turn.y * p.y + corner_mm.x);
-    const int y = square(turn.y * p.x + turn.x * p.y + corner_mm.y);
+    const int x = square(place.turn.x * p.x - place.turn.y * p.y + place.corner_mm.x);
+    const int y = square(place.turn.y * p.x + place.turn.x * p.y + place.corner_mm.y);
     for (int i = 0; i < batch_side; ++i) {
       for (int j = 0; j < batch_side; ++j) {
         sums[batch_side * i + j] += least_penalty(
