@@ -16,17 +16,24 @@ constexpr double largest_cells = 1e6;  ///< side of a tile: larger than any map 
 TileAxis tile_axis(const Axis& axis, double side_mm) {
   TileAxis tiles{.first_mm = axis.centre(0), .side_mm = side_mm, .first_bin = {}};
   const double step = axis.step();
+  // Tiles of all levels that begin at one place agree on the first bin: the product is exact alike,
+  // for sides differ by powers of two.
+  const auto first_bin = [&](int tile) {
+    const double begin_mm = tile * side_mm;
+    const double first = begin_mm == 0.0 ? 0.0 : std::ceil(begin_mm / step);
+    return static_cast<int>(std::min<double>(first, axis.count));
+  };
+  // A whole number of batches, which ends where no bin is left by the same rounding: a tile with
+  // bins then has all of its parts.
   const double extent_mm = step * (axis.count - 1);
-  // A whole number of batches.
-  const auto batches = static_cast<int>(std::floor(extent_mm / (batch_side * side_mm))) + 1;
+  auto batches = static_cast<int>(std::floor(extent_mm / (batch_side * side_mm))) + 1;
+  while (first_bin(batch_side * batches) < axis.count) {
+    ++batches;
+  }
   const int count = batch_side * batches;
   tiles.first_bin.reserve(static_cast<std::size_t>(count) + 1);
   for (int tile = 0; tile < count; ++tile) {
-    // Tiles of all levels that begin at one place agree on the first bin: the product is exact
-    // alike, for sides differ by powers of two.
-    const double begin_mm = tile * side_mm;
-    const double first = begin_mm == 0.0 ? 0.0 : std::ceil(begin_mm / step);
-    tiles.first_bin.push_back(static_cast<int>(std::min<double>(first, axis.count)));
+    tiles.first_bin.push_back(first_bin(tile));
   }
   tiles.first_bin.push_back(axis.count);
   return tiles;

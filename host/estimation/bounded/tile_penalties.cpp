@@ -1,9 +1,13 @@
+// Highway compiles this file once for every set of vector instructions. Products and sums are never
+// fused, so that every set gives the same bits.
 #include "tile_penalties.hpp"
 
 #include <algorithm>
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "bounded/tile_penalties.cpp"
+#define HWY_COMPILE_ALL_ATTAINABLE
+#define HWY_DISABLED_TARGETS (HWY_SVE | HWY_SVE2 | HWY_SVE_256 | HWY_SVE2_128 | HWY_RVV)
 #include <hwy/foreach_target.h>  // IWYU pragma: keep
 #include <hwy/highway.h>
 

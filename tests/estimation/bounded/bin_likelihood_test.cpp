@@ -1,16 +1,16 @@
-#define HWY_COMPILE_ALL_ATTAINABLE
 #include "bin_likelihood.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <optional>
 #include <string>
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
-#include <hwy/highway.h>
 
 #include "bins_by_definition.hpp"
+#include "every_set_of_instructions.hpp"
 #include "interpolated_map.hpp"
 #include "palpate/error.hpp"
 #include "synthetic.hpp"
@@ -181,17 +181,6 @@ TEST(BinLikelihood, OfElementsOffTheMapIsThePriors) {
   }
 }
 
-/// A table that is not monotone, its last level steeper than any map.
-LikelihoodTable crooked_table() {
-  LikelihoodTable table{.first_log_odds = -7.0, .last_log_odds = 9.0, .nodes = 13};
-  table.level_edges = {5.0, 8.0};
-  Uniform random(77);
-  for (std::size_t i = 0; i < table.levels() * table.nodes; ++i) {
-    table.log_likelihood.push_back(i < 3 * table.nodes ? random(-4.0, 0.0) : random(-3e3, 3e3));
-  }
-  return table;
-}
-
 TEST(BinLikelihood, OfATableIsWithinItsBounds) {
   BinCase of = letter_case();
   of.contact.table = crooked_table();
@@ -218,16 +207,6 @@ TEST(BinLikelihood, TakesEachObjectsRowsOfATable) {
   EXPECT_LE(largest_error(got, by_definition(of, {box})), both.float64_error(1, of.elements));
 }
 
-/// Ends a test with the processor's own instructions.
-class EverySetOfInstructions : public testing::Test {
- protected:
-  ~EverySetOfInstructions() override { choose(0); }
-  static void choose(std::int64_t target) {
-    hwy::SetSupportedTargetsForTest(target);
-    hwy::GetChosenTarget().Update(hwy::SupportedTargets());
-  }
-};
-
 template <typename Result>
 std::vector<unsigned char> bits(const std::vector<Result>& logs) {
   std::vector<unsigned char> bytes(logs.size() * sizeof(Result));
@@ -235,7 +214,7 @@ std::vector<unsigned char> bits(const std::vector<Result>& logs) {
   return bytes;
 }
 
-TEST_F(EverySetOfInstructions, GivesTheSameBits) {
+TEST(BinLikelihood, HasTheSameBitsWithEverySetOfInstructions) {
   std::vector<BinCase> cases(4, letter_case());
   cases[1].contact.gamma = 0.0;
   cases[2].map = random_map(31, 27, 0.05, 1000.0, 80);
@@ -243,21 +222,17 @@ TEST_F(EverySetOfInstructions, GivesTheSameBits) {
   for (std::size_t c = 0; c < cases.size(); ++c) {
     const BinCase& of = cases[c];
     const BinLikelihood likelihood = likelihood_of(of);
-    choose(HWY_STATIC_TARGET);
-    const std::string plain = BinLikelihood::instructions();
-    const auto in_float32 = bits(evaluated<float>(likelihood, of, planes(of.lattice)));
-    const auto in_float64 = bits(evaluated<double>(likelihood, of, planes(of.lattice)));
-    choose(0);
-    std::int64_t left = hwy::SupportedTargets() & HWY_TARGETS;
-    for (; left != 0; left &= left - 1) {
-      choose(left & -left);
-      const std::string other = BinLikelihood::instructions();
-      EXPECT_EQ(bits(evaluated<float>(likelihood, of, planes(of.lattice))), in_float32)
-          << "case " << c << ", float32, " << other << " and " << plain;
-      EXPECT_EQ(bits(evaluated<double>(likelihood, of, planes(of.lattice))), in_float64)
-          << "case " << c << ", float64, " << other << " and " << plain;
-      choose(0);
-    }
+    std::optional<std::vector<unsigned char>> in_float32;
+    std::optional<std::vector<unsigned char>> in_float64;
+    with_every_set_of_instructions([&](const std::string& name) {
+      SCOPED_TRACE(fmt::format("case {}, {}", c, name));
+      const auto narrow = bits(evaluated<float>(likelihood, of, planes(of.lattice)));
+      const auto wide = bits(evaluated<double>(likelihood, of, planes(of.lattice)));
+      EXPECT_EQ(narrow, in_float32.value_or(narrow));
+      EXPECT_EQ(wide, in_float64.value_or(wide));
+      in_float32 = narrow;
+      in_float64 = wide;
+    });
   }
 }
 

@@ -84,6 +84,16 @@ KnownElements random_elements(std::size_t count, double half_mm, std::size_t lev
   return elements;
 }
 
+LikelihoodTable crooked_table() {
+  LikelihoodTable table{.first_log_odds = -7.0, .last_log_odds = 9.0, .nodes = 13};
+  table.level_edges = {5.0, 8.0};
+  Uniform random(77);
+  for (std::size_t i = 0; i < table.levels() * table.nodes; ++i) {
+    table.log_likelihood.push_back(i < 3 * table.nodes ? random(-4.0, 0.0) : random(-3e3, 3e3));
+  }
+  return table;
+}
+
 BinBox whole_plane(const PoseLattice& lattice, int theta) {
   return {.theta = theta, .y_count = lattice.y_mm.count, .x_count = lattice.x_mm.count};
 }

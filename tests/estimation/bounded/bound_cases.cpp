@@ -1,0 +1,106 @@
+#include "bound_cases.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <iterator>
+
+#include "touched_shape.hpp"
+
+namespace palpate {
+
+namespace {
+
+template <typename Choices>
+auto one_of(Uniform& random, const Choices& choices) {
+  return choices[static_cast<std::size_t>(random(0.0, static_cast<double>(std::size(choices))))];
+}
+
+/// Bins about a place of the map's, in mm.
+Axis random_axis(Uniform& random, double cell_mm, double middle_mm) {
+  const int count = one_of(random, std::array{1, 2, 9, 23, 40});
+  // A power of two puts bins on the cells' borders again and again.
+  const double step_mm =
+      cell_mm * (random(0.0, 2.0) < 1.0 ? one_of(random, std::array{0.125, 0.25, 0.5, 1.0, 2.0})
+                                        : std::exp(random(std::log(0.1), std::log(12.0))));
+  const double lower = middle_mm - 0.5 * count * step_mm;
+  if (count == 1 && random(0.0, 2.0) < 1.0) {
+    return {middle_mm, middle_mm, 1};
+  }
+  return {lower, lower + count * step_mm, count};
+}
+
+LikelihoodTable table_of_two() {
+  LikelihoodTable table = crooked_table();
+  const std::vector<double> first = table.log_likelihood;
+  table.log_likelihood.insert(table.log_likelihood.end(), first.rbegin(), first.rend());
+  return table;
+}
+
+}  // namespace
+
+OccupancyGrid random_bound_map(Uniform& random) {
+  const auto seed = static_cast<std::uint64_t>(random(1.0, 1e9));
+  switch (static_cast<int>(random(0.0, 8.0))) {
+    case 0:
+      return map_of(on_letter_l, "L");
+    case 1:
+      return random_map(31, 27, 0.5, 12.0, seed);
+    case 2:
+      return random_map(29, 33, 0.37, 1000.0, seed);
+    case 3:
+      return random_map(3, 2, 0.5, 12.0, seed);
+    case 4:
+      return random_map(41, 17, 0.02, 12.0, seed);
+    case 5:
+      return random_map(21, 30, 100.0, 12.0, seed);
+    case 6:
+      return random_map(1, 1, 2.0, 1000.0, seed);
+    default:
+      return random_map(64, 5, 0.5, 3.0, seed);
+  }
+}
+
+BinCase random_bound_case(Uniform& random) {
+  BinCase of{.map = random_bound_map(random), .contact = {}, .lattice = {}, .elements = {}};
+  const double cell_mm = of.map.cell_mm;
+  of.contact.gamma = one_of(random, std::array{0.0, 0.1});
+  of.contact.prior = one_of(random, std::array{0.2, 0.5, 1e-6});
+  if (random(0.0, 4.0) < 1.0) {
+    of.contact.table = table_of_two();
+  }
+  const auto near_the_map = [&] { return cell_mm * random(-12.0, 12.0); };
+  of.lattice.x_mm = random_axis(random, cell_mm, near_the_map());
+  of.lattice.y_mm = random_axis(random, cell_mm, near_the_map());
+  // Angles of which one is 0, but for the full circle.
+  of.lattice.theta_rad =
+      one_of(random, std::array{Axis{0.0, 0.0, 1}, Axis{-1.5, 1.5, 3}, Axis{0.0, two_pi, 4}});
+  const std::size_t levels = of.contact.table ? of.contact.table->levels() : 2;
+  of.elements = random_elements(one_of(random, std::array{1U, 7U, 36U}),
+                                cell_mm * one_of(random, std::array{2.0, 12.0, 40.0}), levels,
+                                static_cast<std::uint64_t>(random(1.0, 1e9)));
+  const glm::dvec2 first_mm(of.lattice.x_mm.centre(0), of.lattice.y_mm.centre(0));
+  for (glm::dvec2& p_mm : of.elements.from_pivot_mm) {
+    const double kind = random(0.0, 8.0);
+    if (kind < 2.0) {
+      // The first bin puts it on a node at theta 0.
+      const glm::dvec2 node(std::floor(random(-2.0, of.map.nx + 2.0)),
+                            std::floor(random(-2.0, of.map.ny + 2.0)));
+      p_mm = of.map.origin_mm + cell_mm * node - first_mm;
+    } else if (kind < 2.5) {
+      p_mm *= std::pow(10.0, random(0.0, 6.0));
+    }
+  }
+  return of;
+}
+
+std::size_t random_object(const BinCase& of, Uniform& random) {
+  return of.contact.table && random(0.0, 2.0) < 1.0 ? 1 : 0;
+}
+
+glm::dvec2 turn_of(const PoseLattice& lattice, int theta) {
+  const double theta_rad = lattice.theta_rad.centre(theta);
+  return {std::cos(theta_rad), std::sin(theta_rad)};
+}
+
+}  // namespace palpate

@@ -1,0 +1,142 @@
+#include "tile_penalties.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include <gtest/gtest.h>
+
+#include "bins_by_definition.hpp"
+#include "every_set_of_instructions.hpp"
+#include "random_penalties.hpp"
+#include "synthetic.hpp"
+
+namespace palpate {
+namespace {
+
+/// Elements over squares of a table, the tiles' batch and the sums before it.
+struct BatchCase {
+  SquarePenalties penalties;
+  int side = 1;
+  KnownElements elements;
+  TilePlace place;
+  int first_x = 0;
+  int first_y = 0;
+  std::uint32_t before = 0;
+};
+
+BatchCase random_batch(std::size_t elements, int side, std::uint16_t largest, std::uint64_t seed) {
+  Uniform random(seed);
+  const double theta = random(-4.0, 4.0);
+  BatchCase of{.penalties = random_penalties(23, 17, largest, seed + 1),
+               .side = side,
+               .elements = random_elements(elements, 9.0, 1, seed + 2),
+               .place = {.turn = {std::cos(theta), std::sin(theta)},
+                         .corner_mm = {random(-8.0, 8.0), random(-8.0, 8.0)},
+                         .square_mm = 0.37}};
+  of.first_x = static_cast<int>(random(0.0, 48.0 / side));
+  of.first_y = static_cast<int>(random(0.0, 48.0 / side));
+  // Some are so far off that their squares have no number.
+  for (std::size_t e = 0; e < elements; e += 11) {
+    of.elements.from_pivot_mm[e] *= std::pow(10.0, random(0.0, 9.0));
+  }
+  return of;
+}
+
+/// Sums of the 4 x 4 tiles' penalties by definition, [x, y].
+std::vector<std::uint32_t> sums_by_definition(const BatchCase& of) {
+  std::vector<std::uint64_t> sums(batch_tiles, of.before);
+  const TilePlace& place = of.place;
+  for (const glm::dvec2& p : of.elements.from_pivot_mm) {
+    // Beyond 2^28 squares all is the prior; no batch here is as far.
+    const auto square = [&](double mm) {
+      return static_cast<int>(std::clamp(std::floor(mm / place.square_mm), -1e6, 1e6));
+    };
+    const int x = square(place.turn.x * p.x - place.turn.y * p.y + place.corner_mm.x);
+    const int y = square(place.turn.y * p.x + place.turn.x * p.y + place.corner_mm.y);
+    for (int i = 0; i < batch_side; ++i) {
+      for (int j = 0; j < batch_side; ++j) {
+        sums[batch_side * i + j] += least_penalty(
+            of.penalties, of.side, x + of.side * (of.first_x + i), y + of.side * (of.first_y + j));
+      }
+    }
+  }
+  std::vector<std::uint32_t> capped;
+  for (const std::uint64_t sum : sums) {
+    capped.push_back(static_cast<std::uint32_t>(std::min<std::uint64_t>(sum, largest_sum)));
+  }
+  return capped;
+}
+
+/// @param split elements of the first of two runs
+std::vector<std::uint32_t> summed(const BatchCase& of, const WindowTable& table,
+                                  std::size_t split = 0) {
+  WindowPlaces placed;
+  place_elements(of.elements, of.place, table, placed);
+  std::vector<std::uint32_t> sums(batch_tiles, of.before);
+  for (const auto& [begin, end] :
+       {std::pair(std::size_t{0}, split), std::pair(split, of.elements.from_pivot_mm.size())}) {
+    add_penalties(placed, {Reading::in_contact, begin, end}, table, of.first_x, of.first_y,
+                  sums.data());
+  }
+  return sums;
+}
+
+void expect_sums(const BatchCase& of, std::size_t split = 0) {
+  const std::vector<std::uint32_t> expected = sums_by_definition(of);
+  const WindowTable table = window_table(of.penalties, of.side);
+  with_every_set_of_instructions([&](const std::string& name) {
+    EXPECT_EQ(summed(of, table, split), expected)
+        << name << ", " << of.elements.from_pivot_mm.size() << " elements, side " << of.side;
+  });
+}
+
+TEST(TilePenalties, AreTheSumsOfWindowsWithEverySetOfInstructions) {
+  for (std::size_t count = 0; count <= 70; ++count) {
+    for (const int side : {1, 2, 8}) {
+      expect_sums(random_batch(count, side, 900, 93 + 7 * count));
+    }
+  }
+}
+
+TEST(TilePenalties, OfARunThatBeginsAnywhereAreThose) {
+  for (std::size_t split = 0; split <= 35; ++split) {
+    expect_sums(random_batch(36, 2, 8192, 94 + split), split);
+  }
+}
+
+TEST(TilePenalties, AddToWhatIsThere) {
+  BatchCase of = random_batch(36, 2, 8192, 95);
+  of.before = 123456789;
+  expect_sums(of);
+  of.before = largest_sum;
+  expect_sums(of);
+}
+
+TEST(TilePenalties, OfAPressOfManyElementsDoNotWrap) {
+  // 16 bits hold 7 of the largest penalties.
+  for (const int side : {1, 8}) {
+    for (const std::uint16_t largest : {std::uint16_t{0}, std::uint16_t{1}, largest_penalty}) {
+      expect_sums(random_batch(1400, side, largest, 96));
+    }
+  }
+}
+
+TEST(TilePenalties, StopAtTheLargestSum) {
+  BatchCase of = random_batch(300000, 1, largest_penalty, 97);
+  std::fill(of.penalties.least.begin(), of.penalties.least.end(), largest_penalty);
+  const std::vector<std::uint32_t> all(batch_tiles, largest_sum);
+  ASSERT_EQ(sums_by_definition(of), all);
+  expect_sums(of);
+  // Just below it.
+  of.elements.from_pivot_mm.resize(largest_sum / largest_penalty - 1);
+  ASSERT_LT(sums_by_definition(of).front(), largest_sum);
+  expect_sums(of);
+}
+
+TEST(TilePenalties, OfVeryManyElementsAreTheirSum) {
+  expect_sums(random_batch(300000, 1, 4000, 98));
+}
+
+}  // namespace
+}  // namespace palpate

@@ -1,0 +1,74 @@
+#include "window_table.hpp"
+
+#include <algorithm>
+#include <limits>
+
+#include <gtest/gtest.h>
+
+#include "random_penalties.hpp"
+
+namespace palpate {
+namespace {
+
+TEST(WindowTable, HoldsTheLeastPenaltyOfEveryWindow) {
+  for (const glm::ivec2 squares : {glm::ivec2(2, 2), {7, 5}, {16, 9}, {33, 1}}) {
+    for (const int side : {1, 2, 4, 8}) {
+      SCOPED_TRACE(testing::Message() << squares.x << " x " << squares.y << ", side " << side);
+      const SquarePenalties penalties = random_penalties(squares.x, squares.y, 8192, 91);
+      const WindowTable table = window_table(penalties, side);
+      ASSERT_EQ(1 << table.side_log2, side);
+      ASSERT_EQ(table.best, penalties.best);
+      ASSERT_EQ(table.beyond, penalties.beyond);
+      ASSERT_EQ(table.entries.size(),
+                static_cast<std::size_t>(side) * side * table.rows * table.columns * batch_side);
+      std::uint16_t largest = 0;
+      auto entry = table.entries.begin();
+      for (int phase_y = 0; phase_y < side; ++phase_y) {
+        for (int phase_x = 0; phase_x < side; ++phase_x) {
+          for (int row = 0; row < table.rows; ++row) {
+            for (int column = 0; column < table.columns; ++column) {
+              for (int j = 0; j < batch_side; ++j, ++entry) {
+                const int x = (column - WindowTable::margin) * side + phase_x;
+                const int y = (row + j - WindowTable::margin) * side + phase_y;
+                ASSERT_EQ(*entry, least_penalty(penalties, side, x, y))
+                    << "window at square " << x << ", " << y;
+                largest = std::max(largest, *entry);
+              }
+            }
+          }
+        }
+      }
+      EXPECT_EQ(table.largest, largest);
+    }
+  }
+}
+
+TEST(WindowTable, EndsInBatchesThatSeeOnlyThePrior) {
+  // Farther batches take the entries of these.
+  for (const int side : {1, 2, 8}) {
+    SquarePenalties penalties = random_penalties(13, 11, 100, 92);
+    penalties.beyond = 200;
+    const WindowTable table = window_table(penalties, side);
+    const std::size_t plane = static_cast<std::size_t>(table.rows) * table.columns * batch_side;
+    for (std::size_t phase = 0; phase < static_cast<std::size_t>(side) * side; ++phase) {
+      for (int row = 0; row < table.rows; ++row) {
+        for (int column = 0; column < table.columns; ++column) {
+          const bool last_column = column < batch_side || column >= table.columns - batch_side;
+          const bool last_row = row < 1 || row >= table.rows - batch_side;
+          if (!last_column && !last_row) {
+            continue;
+          }
+          const std::size_t first =
+              phase * plane + (static_cast<std::size_t>(row) * table.columns + column) * batch_side;
+          for (std::size_t j = 0; j < batch_side; ++j) {
+            ASSERT_EQ(table.entries[first + j], 200)
+                << "side " << side << ", " << column << ", " << row << ", " << j;
+          }
+        }
+      }
+    }
+  }
+}
+
+}  // namespace
+}  // namespace palpate
