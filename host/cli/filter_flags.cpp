@@ -91,6 +91,18 @@ BoundedOptions bounded_options(const FilterFlags& flags, const HistogramOptions&
   return bounded;
 }
 
+/// Whether bounds have room for the bins that the histogram refuses.
+bool bounds_would_take(Device& device, const RecognitionTask& task) {
+  const auto& histogram = std::get<HistogramOptions>(task.filter);
+  try {
+    BoundedPosterior(device, task.hypotheses,
+                     {.lattice = histogram.lattice, .contact = histogram.contact});
+    return true;
+  } catch (const Error&) {
+    return false;
+  }
+}
+
 /// The particle filter's options: those that it shares with the histogram, and its flags.
 ParticleOptions particle_options(const RecognitionFlags& all, const Scene& scene,
                                  const HistogramOptions& histogram) {
@@ -148,6 +160,13 @@ void add_filter_flags(CLI::App& command, FilterFlags& flags) {
           "Limit of the histogram's device memory, MiB; less memory costs time, no accuracy "
           "[default: none]")
       ->check(require_whole_number);
+}
+
+void hide_other_filters(CLI::App& command) {
+  for (const char* flag : {"--filter", "--tolerance", "--budget-ms", "--evidence-nats",
+                           "--particles", "--resampling", "--augmented", "--seed"}) {
+    command.get_option(flag)->group("");
+  }
 }
 
 FilterWish filter_wish(const RecognitionFlags& all, const Scene& scene) {
@@ -211,21 +230,13 @@ ChosenFilter choose_filter(const FilterWish& wish, const RecognitionFlags& flags
 }
 
 Recogniser open_filter(Device& device, const RecognitionTask& task) {
-  task.lattice().validate();
-  if (std::holds_alternative<BoundedOptions>(task.filter) &&
-      task.bins_in_all() > largest_bounded_bins) {
-    throw Error(
-        Fault::input,
-        fmt::format("{} pose bins in all: bounds take at most {}; use fewer bins or objects",
-                    task.bins_in_all(), largest_bounded_bins));
-  }
   try {
     return {device, task};
   } catch (const Error& error) {
     // Of a sound task nothing but the bins' memory can be refused.
     if (error.fault() == Fault::input && std::holds_alternative<HistogramOptions>(task.filter) &&
         (task.auto_filter || !task.filter_asked_for_by.empty()) &&
-        task.bins_in_all() <= largest_bounded_bins) {
+        bounds_would_take(device, task)) {
       throw Error(Fault::input,
                   fmt::format("{}, or {}: --filter bounded needs no device memory", error.what(),
                               task.auto_filter ? std::string("ask for bounds")

@@ -59,7 +59,8 @@ class BoundedPosterior {
   /// Builds the window tables of the maps.
   /// @throws Error on an empty list, a map that is not sound, maps of different priors where the
   /// options give none, a weight that is not positive and finite, a lattice, contact model or option
-  /// out of range, or a table for another number of objects
+  /// out of range, a table for another number of objects, or a lattice whose tiles and tables would
+  /// take more than a quarter of the machine's memory
   BoundedPosterior(Device& device, std::span<const Hypothesis> hypotheses,
                    const BoundedOptions& options);
   ~BoundedPosterior();
