@@ -1,5 +1,9 @@
 #include "measurement.hpp"
 
+#ifdef __GLIBC__
+#include <malloc.h>
+#endif
+
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -122,7 +126,12 @@ std::uint64_t resident_bytes() { return status_bytes("VmRSS:"); }
 
 std::uint64_t peak_resident_bytes() { return status_bytes("VmHWM:"); }
 
-void restart_peak_memory() { std::ofstream("/proc/self/clear_refs") << '5'; }
+void restart_peak_memory() {
+#ifdef __GLIBC__
+  malloc_trim(0);
+#endif
+  std::ofstream("/proc/self/clear_refs") << '5';
+}
 
 void ErrorStatistics::add(double error) {
   const double size = std::abs(error);

@@ -45,7 +45,8 @@ double told_apart(std::span<const double> lower, std::span<const double> higher)
 Interval told_apart_interval(std::span<const double> lower, std::span<const double> higher);
 
 /// Resident memory of the process. The peak is since the last restart_peak_memory(), or since the
-/// process began where the kernel does not allow that.
+/// process began where the kernel does not allow that. restart_peak_memory() first gives memory
+/// that the process has freed back to the system: what is taken afterwards then shows.
 std::uint64_t resident_bytes();
 std::uint64_t peak_resident_bytes();
 void restart_peak_memory();

@@ -25,7 +25,8 @@ std::string plain_text(const Json& value) {
 }
 
 std::string count_text(double count) {
-  return count >= 0.9995e6   ? fmt::format("{:.3g} M", count / 1e6)
+  return count >= 0.9995e9   ? fmt::format("{:.3g} G", count / 1e9)
+         : count >= 0.9995e6 ? fmt::format("{:.3g} M", count / 1e6)
          : count >= 0.9995e3 ? fmt::format("{:.3g} k", count / 1e3)
                              : fmt::format("{:.3g}", count);
 }

@@ -10,6 +10,7 @@
 
 #include <tbb/parallel_for.h>
 
+#include "contradiction.hpp"
 #include "hypotheses.hpp"
 #include "leaf_pass.hpp"
 #include "seen_window.hpp"
@@ -22,6 +23,8 @@ namespace {
 constexpr double nothing = -std::numeric_limits<double>::infinity();
 /// Tiles that are followed down to the bins, to know early how much mass there is at least.
 constexpr std::size_t beam_tiles = 64;
+/// The same where all tiles of a level are looked at first.
+constexpr std::size_t surveyed_tiles = 1024;
 /// Of these, so many of the smallest have their bins evaluated.
 constexpr std::size_t probed_tiles = 16;
 /// Largest tiles that are divided together: bounds the memory for their parts.
@@ -62,8 +65,8 @@ class SearchRun {
         finest_(search.bounds_.front().levels().size() - 1),
         deadline_(search.options_.budget_s),
         account_(search.log_weight_, search.options_),
-        evaluator_(search.likelihood_, search.log_weight_, search.options_, elements, visit,
-                   deadline_, account_),
+        evaluator_(search.likelihood_, search.batches_, search.log_weight_, search.options_,
+                   elements, visit, deadline_, account_),
         leaves_(search.bounds_, thetas_, deadline_, account_, evaluator_),
         visit_(visit) {
     for (std::size_t i = 0; i < search_.bounds_.size(); ++i) {
@@ -85,19 +88,22 @@ class SearchRun {
 
   SearchResult result() {
     settle_unseen();
-    std::vector<Tile> best = best_of_rows();
+    const std::vector<Tile> best = best_of_rows();
     if (!best.empty()) {
       UnsettledMass unsettled(search_.bounds_.size(),
                               std::min_element(best.begin(), best.end(), before)->bound);
-      raise(std::move(best), 0);
+      raise(best, 0);
       count_largest(unsettled);
       const double share = search_.options_.tolerance * search_share;
-      std::vector<Tile> kept = keep_largest(unsettled, share / static_cast<double>(finest_ + 1));
+      const double part = share / static_cast<double>(finest_ + 1);
+      std::vector<Tile> kept = keep_largest(unsettled, part);
       account_.drop(unsettled);
-      divide(std::move(kept), 0, share - account_.dropped_share());
+      divide(std::move(kept), 0, share - used_of(part, 0.0));
     }
+    const bool contradicts = contradicted(best);
     evaluator_.flush();
     SearchResult result = account_.result();
+    result.contradicted = contradicts;
     result.blocks_bounded = blocks_;
     result.bins_evaluated = evaluator_.bins();
     return result;
@@ -106,6 +112,38 @@ class SearchRun {
  private:
   /// Part of the tolerance that dropped tiles may use up; the rest is for rounding.
   static constexpr double search_share = 0.75;
+
+  /// Whether the prior explains the elements far better than the best bin of every hypothesis.
+  /// @param best the largest tile of the largest bound of every object and theta
+  bool contradicted(const std::vector<Tile>& best) {
+    double prior = 0.0;
+    for (const ReadingRun& run : elements_.runs) {
+      prior += static_cast<double>(run.end - run.begin) *
+               prior_log_likelihood(run.reading, search_.options_.contact);
+    }
+    const double least = prior - contradiction_nats;
+    for (std::size_t i = 0; i < search_.bounds_.size(); ++i) {
+      if (account_.best_of(i) < least && account_.largest_dropped_of(i) >= least) {
+        // Too light a hypothesis to have been looked at.
+        for (const BinBox& box :
+             leaves_.boxes_of(best_of_beam(of_object(best, i), 0, beam_tiles))) {
+          evaluator_.look(box);
+        }
+      }
+      if (account_.best_of(i) >= least) {
+        return false;
+      }
+    }
+    return true;
+  }
+
+  static std::vector<Tile> of_object(const std::vector<Tile>& tiles, std::size_t object) {
+    std::vector<Tile> own;
+    std::copy_if(tiles.begin(), tiles.end(), std::back_inserter(own), [&](const Tile& tile) {
+      return tile.object == static_cast<std::int32_t>(object);
+    });
+    return own;
+  }
 
   /// Finds the largest tiles where an element may see something else than the prior, and settles
   /// all other bins, which have the likelihood of the prior.
@@ -281,75 +319,134 @@ class SearchRun {
   }
 
   /// Raises the lower bound of the total: follows the best tiles down to their bins.
-  void raise(std::vector<Tile> tiles, std::size_t level) {
-    if (search_.options_.evidence_nats) {
-      // Every hypothesis's own total is wanted, too.
-      for (std::size_t object = 0; object < search_.bounds_.size(); ++object) {
-        std::vector<Tile> own;
-        std::copy_if(tiles.begin(), tiles.end(), std::back_inserter(own), [&](const Tile& tile) {
-          return tile.object == static_cast<std::int32_t>(object);
-        });
-        raise_beam(std::move(own), level);
-      }
+  /// @param width so many tiles at first
+  void raise(std::vector<Tile> tiles, std::size_t level, std::size_t width = beam_tiles) {
+    if (!search_.options_.evidence_nats) {
+      leaves_.probe(best_of_beam(std::move(tiles), level, width));
       return;
     }
-    raise_beam(std::move(tiles), level);
+    // Every hypothesis's own total is wanted, too.
+    for (std::size_t object = 0; object < search_.bounds_.size(); ++object) {
+      leaves_.probe(best_of_beam(of_object(tiles, object), level, width));
+    }
   }
 
-  void raise_beam(std::vector<Tile> tiles, std::size_t level) {
+  /// Follows tiles down to the smallest ones, the best of each level.
+  std::vector<Tile> best_of_beam(std::vector<Tile> tiles, std::size_t level, std::size_t width) {
     for (; level < finest_; ++level) {
-      keep_best(tiles, beam_tiles);
+      keep_best(tiles, width);
       std::sort(tiles.begin(), tiles.end(), stands_before);
       tiles = parts_of(tiles, level);
+      width = beam_tiles;
     }
     keep_best(tiles, probed_tiles);
-    leaves_.probe(std::move(tiles));
+    return tiles;
   }
 
   /// Divides tiles of a level until their bins are evaluated or dropped.
   /// @param tolerance part of the total that may be dropped
   void divide(std::vector<Tile> tiles, std::size_t level, double tolerance) {
-    note(tiles, level);
     if (level == finest_) {
       leaves_.evaluate(tiles, tolerance);
       return;
     }
-    std::sort(tiles.begin(), tiles.end(), tiles.size() > most_together ? before : stands_before);
-    for (std::size_t begin = 0; begin < tiles.size(); begin += most_together) {
+    if (tiles.size() > most_together && !deadline_.passed()) {
+      // Tiles are divided one lot after another: the total must be known well before the first.
+      survey(tiles, level);
+      tolerance -= drop(tiles, level, tolerance / static_cast<double>(finest_ - level + 1));
+      std::sort(tiles.begin(), tiles.end(), before);
+    }
+    double known_total = account_.log_total();
+    for (std::size_t begin = 0; begin < tiles.size();) {
+      if (account_.log_total() > known_total + 1.0) {
+        tiles.erase(tiles.begin(), tiles.begin() + static_cast<std::ptrdiff_t>(begin));
+        begin = 0;
+        known_total = account_.log_total();
+        tolerance -= drop(tiles, level, tolerance / 2.0);
+        continue;
+      }
       const std::size_t left = tiles.size() - begin;
-      const std::size_t count = std::min(most_together, left);
+      const std::size_t count = deadline_.passed() ? left : std::min(most_together, left);
       const auto first = tiles.begin() + static_cast<std::ptrdiff_t>(begin);
-      std::vector<Tile> some(first, first + static_cast<std::ptrdiff_t>(count));
-      const double dropped = account_.dropped_share();
+      std::vector<Tile> lot(first, first + static_cast<std::ptrdiff_t>(count));
       if (deadline_.passed()) {
-        some.assign(first, tiles.end());
-        account_.drop(unsettled(some, level, search_.bounds_));
+        account_.drop(unsettled(lot, level, search_.bounds_));
         return;
       }
-      std::sort(some.begin(), some.end(), stands_before);
-      some = parts_of(some, level);
-      if (level + 1 < finest_) {
-        raise(some, level + 1);
-      }
       // What tiles do not use up is left for those after them.
-      const double part = tolerance * static_cast<double>(count) / static_cast<double>(left);
-      UnsettledMass left_mass = unsettled(some, level + 1, search_.bounds_);
-      if (level + 1 < finest_) {
-        const std::vector<std::size_t> from =
-            account_.droppable_from(left_mass, part / static_cast<double>(finest_ - level));
-        std::erase_if(some, [&](const Tile& tile) {
-          return left_mass.slot(tile.bound) >= from[tile.object];
-        });
-        for (const Tile& tile : some) {
-          left_mass.remove(static_cast<std::size_t>(tile.object), tile.bound,
-                           search_.bounds_[tile.object].bins(level + 1, tile));
-        }
-        account_.drop(left_mass);
-      }
-      const double used = account_.dropped_share() - dropped;
-      divide(std::move(some), level + 1, std::max(part - used, 0.0));
-      tolerance = std::max(tolerance - (account_.dropped_share() - dropped), 0.0);
+      tolerance -= divide_lot(std::move(lot), level,
+                              tolerance * static_cast<double>(count) / static_cast<double>(left));
+      begin += count;
     }
+  }
+
+  /// Divides so many tiles that their parts fit the memory for them.
+  /// @returns the part of the total that was dropped
+  double divide_lot(std::vector<Tile> tiles, std::size_t level, double tolerance) {
+    note(tiles, level);
+    std::sort(tiles.begin(), tiles.end(), stands_before);
+    std::vector<Tile> parts = parts_of(tiles, level);
+    const double dropped = account_.dropped_share();
+    double used = 0.0;
+    if (level + 1 < finest_) {
+      raise(parts, level + 1);
+      used = drop(parts, level + 1, tolerance / static_cast<double>(finest_ - level));
+    }
+    divide(std::move(parts), level + 1, std::max(tolerance - used, 0.0));
+    return used_of(tolerance, dropped);
+  }
+
+  /// Lowers the bounds of tiles to those of their parts, and follows the best parts down to their
+  /// bins.
+  void survey(std::vector<Tile>& tiles, std::size_t level) {
+    std::sort(tiles.begin(), tiles.end(), stands_before);
+    std::vector<Tile> best;
+    for (std::size_t begin = 0; begin < tiles.size(); begin += most_together) {
+      const auto lot =
+          std::span(tiles).subspan(begin, std::min(most_together, tiles.size() - begin));
+      std::vector<Tile> parts = parts_of(lot, level);
+      std::size_t next = 0;
+      for (Tile& tile : lot) {
+        double largest = nothing;
+        for (; next < parts.size() && is_part(parts[next], tile); ++next) {
+          largest = std::max(largest, parts[next].bound);
+        }
+        tile.bound = std::min(tile.bound, largest);
+      }
+      keep_best(parts, surveyed_tiles);
+      best.insert(best.end(), parts.begin(), parts.end());
+      keep_best(best, surveyed_tiles);
+    }
+    raise(std::move(best), level + 1, surveyed_tiles);
+  }
+
+  static bool is_part(const Tile& part, const Tile& of) {
+    return part.object == of.object && part.theta == of.theta && part.x / batch_side == of.x &&
+           part.y / batch_side == of.y;
+  }
+
+  /// Drops tiles that hold at most this part of the total together.
+  /// @returns the part of the total that was dropped
+  double drop(std::vector<Tile>& tiles, std::size_t level, double tolerance) {
+    const double dropped = account_.dropped_share();
+    UnsettledMass mass = unsettled(tiles, level, search_.bounds_);
+    const std::vector<std::size_t> from = account_.droppable_from(mass, tolerance);
+    std::erase_if(tiles,
+                  [&](const Tile& tile) { return mass.slot(tile.bound) >= from[tile.object]; });
+    for (const Tile& tile : tiles) {
+      mass.remove(static_cast<std::size_t>(tile.object), tile.bound,
+                  search_.bounds_[tile.object].bins(level, tile));
+    }
+    account_.drop(mass);
+    return used_of(tolerance, dropped);
+  }
+
+  /// What dropping tiles used up of a tolerance, given what was dropped before.
+  double used_of(double tolerance, double dropped_before) const {
+    // Where each hypothesis has its own share, a light one may have used it up.
+    return search_.options_.evidence_nats
+               ? tolerance
+               : std::clamp(account_.dropped_share() - dropped_before, 0.0, tolerance);
   }
 
   void note(std::span<const Tile> tiles, std::size_t level) const {
@@ -386,8 +483,11 @@ class SearchRun {
 };
 
 BoundSearch::BoundSearch(std::span<const Hypothesis> hypotheses, const BoundedOptions& options,
-                         const BinLikelihood& likelihood)
-    : options_(options), likelihood_(likelihood), log_weight_(log_weights(hypotheses)) {
+                         const BinLikelihood& likelihood, FasterBinLikelihood& batches)
+    : options_(options),
+      likelihood_(likelihood),
+      batches_(batches),
+      log_weight_(log_weights(hypotheses)) {
   for (int theta = 0; theta < options.lattice.theta_rad.count; ++theta) {
     const double theta_rad = options.lattice.theta_rad.centre(theta);
     turns_.emplace_back(std::cos(theta_rad), std::sin(theta_rad));

@@ -18,9 +18,10 @@ namespace palpate {
 /// until the smallest tiles' bins are evaluated in the order of their bounds.
 class BoundSearch {
  public:
-  /// @param options checked, with a resolved contact model; `likelihood` outlives the search
+  /// @param options checked, with a resolved contact model
+  /// @param likelihood,batches evaluate bins; they outlive the search
   BoundSearch(std::span<const Hypothesis> hypotheses, const BoundedOptions& options,
-              const BinLikelihood& likelihood);
+              const BinLikelihood& likelihood, FasterBinLikelihood& batches);
 
   /// Forgets all touches.
   void reset();
@@ -45,6 +46,7 @@ class BoundSearch {
 
   const BoundedOptions& options_;
   const BinLikelihood& likelihood_;
+  FasterBinLikelihood& batches_;
   std::vector<double> log_weight_;
   std::vector<glm::dvec2> turns_;    ///< [theta] cosine and sine
   std::vector<OccupancyGrid> maps_;  ///< [hypothesis] without their cells

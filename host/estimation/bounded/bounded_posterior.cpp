@@ -7,12 +7,14 @@
 #include <utility>
 
 #include <fmt/format.h>
+#include <tbb/info.h>
 #include <tbb/task_arena.h>
 
 #include "bin_likelihood.hpp"
 #include "bound_search.hpp"
-#include "contradiction.hpp"
 #include "evaluated_bins.hpp"
+#include "faster_bin_likelihood.hpp"
+#include "half_done.hpp"
 #include "hypotheses.hpp"
 #include "interpolated_map.hpp"
 #include "known_elements.hpp"
@@ -63,13 +65,17 @@ void validate(const BoundedOptions& options) {
 }  // namespace
 
 struct BoundedPosterior::Impl {
-  Impl(std::span<const Hypothesis> all, const BoundedOptions& wanted)
+  Impl(Device& device, std::span<const Hypothesis> all, const BoundedOptions& wanted)
       : options(wanted),
         hypotheses(all.begin(), all.end()),
+        // More threads than cores gain nothing.
+        threads(options.threads > 0 ? std::min(options.threads, tbb::info::default_concurrency())
+                                    : tbb::info::default_concurrency()),
+        arena(threads),
         likelihood(all, options.contact, options.lattice),
-        search(all, options, likelihood),
-        log_weight(log_weights(all)),
-        arena(options.threads > 0 ? options.threads : tbb::task_arena::automatic) {
+        batches(likelihood, device.context(), hypotheses, options.contact, options.lattice),
+        search(arena.execute([&] { return BoundSearch(all, options, likelihood, batches); })),
+        log_weight(log_weights(all)) {
     for (const Hypothesis& hypothesis : all) {
       bodies.push_back(displaced_body(hypothesis.map));
     }
@@ -128,21 +134,23 @@ struct BoundedPosterior::Impl {
 
   BoundedOptions options;
   std::vector<Hypothesis> hypotheses;
+  int threads;
+  tbb::task_arena arena;
   BinLikelihood likelihood;
+  FasterBinLikelihood batches;
   BoundSearch search;
   std::vector<double> log_weight;
-  tbb::task_arena arena;
   std::vector<Body> bodies;
   KnownElements elements;
   bool touched = false;
-  double prior_log_likelihood = 0.0;  ///< of all touches, by a map that holds only the prior
   std::optional<SearchResult> result;
   EvaluatedBins bins;
   std::optional<SampledTouchMeans> none;  ///< where the options ask for it
   double none_log_weight = 0.0;           ///< log of its prior weight times the number of bins
+  HalfDone half_done{"bounded posterior: an update was broken off half-way; call reset()"};
 };
 
-BoundedPosterior::BoundedPosterior(Device& /*device*/, std::span<const Hypothesis> hypotheses,
+BoundedPosterior::BoundedPosterior(Device& device, std::span<const Hypothesis> hypotheses,
                                    const BoundedOptions& options) {
   validate_hypotheses(hypotheses);
   validate(options);
@@ -150,7 +158,7 @@ BoundedPosterior::BoundedPosterior(Device& /*device*/, std::span<const Hypothesi
   checked.lattice.collapse_fixed().validate();
   checked.contact = resolve(options.contact, hypotheses);
   require_room(hypotheses, checked, memory_for_search());
-  impl_ = std::make_unique<Impl>(hypotheses, checked);
+  impl_ = std::make_unique<Impl>(device, hypotheses, checked);
 }
 
 BoundedPosterior::~BoundedPosterior() = default;
@@ -161,11 +169,17 @@ BoundedPosterior::Impl& BoundedPosterior::impl() const {
   return held_by(impl_, "bounded posterior");
 }
 
+BoundedPosterior::Impl& BoundedPosterior::whole() const {
+  Impl& held = impl();
+  held.half_done.refuse();
+  return held;
+}
+
 void BoundedPosterior::reset() {
   Impl& posterior = impl();
+  posterior.half_done.forget();
   posterior.elements = {};
   posterior.touched = false;
-  posterior.prior_log_likelihood = 0.0;
   posterior.search.reset();
   posterior.result.reset();
   if (posterior.none) {
@@ -174,10 +188,11 @@ void BoundedPosterior::reset() {
 }
 
 void BoundedPosterior::move_pivot(const glm::dvec2& pivot_mm) {
-  Impl& posterior = impl();
+  Impl& posterior = whole();
   posterior.options.lattice =
       with_pivot(posterior.options.lattice, pivot_mm, "bounded posterior", posterior.touched);
   posterior.likelihood.move_pivot(pivot_mm);
+  posterior.batches.move_pivot(pivot_mm);
   if (posterior.none) {
     posterior.none->move_pivot(pivot_mm);
   }
@@ -186,7 +201,7 @@ void BoundedPosterior::move_pivot(const glm::dvec2& pivot_mm) {
 
 void BoundedPosterior::update(std::span<const Touch> touches,
                               const std::function<void(double)>& progress) {
-  Impl& posterior = impl();
+  Impl& posterior = whole();
   // All touches are gathered before the first is added: one that is not sound refuses all.
   std::vector<KnownElements> of_touches;
   KnownElements added;
@@ -208,23 +223,19 @@ void BoundedPosterior::update(std::span<const Touch> touches,
   if (progress) {
     progress(1.0);
   }
-  KnownElements elements = merged(posterior.elements, added);
-  if (posterior.none) {
-    posterior.none->add(means);
-  }
-  posterior.elements = std::move(elements);
-  for (const ReadingRun& run : added.runs) {
-    posterior.prior_log_likelihood +=
-        static_cast<double>(run.end - run.begin) *
-        palpate::prior_log_likelihood(run.reading, posterior.options.contact);
-  }
-  posterior.touched = posterior.touched || !touches.empty();
-  posterior.arena.execute([&] { posterior.search.add(of_touches); });
-  posterior.result.reset();
+  posterior.half_done.change([&] {
+    posterior.result.reset();
+    posterior.touched = posterior.touched || !touches.empty();
+    posterior.elements = merged(posterior.elements, added);
+    if (posterior.none) {
+      posterior.none->add(means);
+    }
+    posterior.arena.execute([&] { posterior.search.add(of_touches); });
+  });
 }
 
 Estimate BoundedPosterior::estimate() const {
-  Impl& posterior = impl();
+  Impl& posterior = whole();
   const SearchResult& found = posterior.found();
   Estimate estimate;
   LogSum evaluated;
@@ -278,13 +289,12 @@ Estimate BoundedPosterior::estimate() const {
                    .bin = found.best_bin,
                    .T_object_robot = lattice().T_object_robot(found.best_bin),
                    .log_likelihood = found.best_log_likelihood};
-  estimate.contradicted =
-      posterior.prior_log_likelihood - found.best_log_likelihood > contradiction_nats;
+  estimate.contradicted = found.contradicted;
   return estimate;
 }
 
 RefinedPose BoundedPosterior::refine(const Mode& mode) const {
-  Impl& posterior = impl();
+  Impl& posterior = whole();
   posterior.require_object(mode.object);
   const auto log_likelihood = [&](const BinWindow& window) {
     std::vector<BinBox> boxes;
@@ -294,9 +304,10 @@ RefinedPose BoundedPosterior::refine(const Mode& mode) const {
                        window.row_first, window.row_count, window.column_first,
                        window.column_count});
     }
-    std::vector<double> logs(window.bins());
-    posterior.likelihood.evaluate(boxes, posterior.elements, std::span(logs));
-    return logs;
+    std::vector<float> logs(window.bins());
+    posterior.arena.execute(
+        [&] { posterior.batches.evaluate(boxes, posterior.elements, std::span(logs)); });
+    return std::vector<double>(logs.begin(), logs.end());
   };
   return palpate::refine(log_likelihood, lattice(), posterior.bodies[mode.object], mode);
 }
@@ -304,7 +315,7 @@ RefinedPose BoundedPosterior::refine(const Mode& mode) const {
 Marginals BoundedPosterior::marginals(int object) const { return marginals(object, lattice()); }
 
 Marginals BoundedPosterior::marginals(int object, const PoseLattice& grid) const {
-  Impl& posterior = impl();
+  Impl& posterior = whole();
   posterior.require_object(object);
   PoseLattice onto = grid;
   onto.collapse_fixed().validate();
@@ -320,7 +331,7 @@ Marginals BoundedPosterior::marginals(int object, const PoseLattice& grid) const
 }
 
 double BoundedPosterior::log_likelihood(int object, const Pose& T_object_robot) const {
-  Impl& posterior = impl();
+  Impl& posterior = whole();
   posterior.require_object(object);
   const auto& [translation_mm, theta_rad] = T_object_robot;
   if (!std::isfinite(translation_mm.x) || !std::isfinite(translation_mm.y) ||
@@ -343,7 +354,7 @@ double BoundedPosterior::log_likelihood(int object, const Pose& T_object_robot) 
 }
 
 double BoundedPosterior::entropy() const {
-  Impl& posterior = impl();
+  Impl& posterior = whole();
   const double log_total = posterior.log_total();
   double entropy = 0.0;
   posterior.visit([&](const BinBox& box, std::span<const double> log_likelihood) {
@@ -357,7 +368,7 @@ double BoundedPosterior::entropy() const {
 }
 
 std::vector<PoseSample> BoundedPosterior::sample(std::size_t count, std::uint64_t seed) const {
-  Impl& posterior = impl();
+  Impl& posterior = whole();
   Random random(seed, Stream::belief);
   // One draw in each of `count` equal parts of the belief: less variance than independent draws.
   std::vector<double> targets;
@@ -415,7 +426,7 @@ std::vector<PoseSample> BoundedPosterior::sample(std::size_t count, std::uint64_
 }
 
 std::vector<PoseBlock> BoundedPosterior::refined_blocks() const {
-  Impl& posterior = impl();
+  Impl& posterior = whole();
   std::vector<PoseBlock> blocks;
   posterior.arena.execute([&] {
     std::vector<PoseBlock> evaluated;
@@ -439,13 +450,15 @@ std::vector<PoseBlock> BoundedPosterior::refined_blocks() const {
 const PoseLattice& BoundedPosterior::lattice() const { return impl().options.lattice; }
 
 std::string BoundedPosterior::path() const {
-  impl();
-  return "plain loop";
+  const Impl& posterior = impl();
+  return fmt::format("{} on {} thread{}, {}", posterior.likelihood.instructions(),
+                     posterior.threads, posterior.threads == 1 ? "" : "s",
+                     posterior.batches.path());
 }
 
 std::uint64_t BoundedPosterior::host_bytes() const {
   const Impl& posterior = impl();
-  return posterior.search.bytes() + posterior.bins.bytes();
+  return posterior.likelihood.bytes() + posterior.search.bytes() + posterior.bins.bytes();
 }
 
 }  // namespace palpate

@@ -19,13 +19,39 @@ constexpr double rounding_part = 0.2;
 /// Leaves that are evaluated in float64 before the clock is looked at again.
 constexpr std::size_t refined_together = 2048;
 
+/// Calls run(part) for parts of the leaves, in parallel.
+template <typename Leaf, typename Run>
+void for_tasks(std::span<Leaf> leaves, const Run& run) {
+  const std::size_t tasks = (leaves.size() + leaves_per_task - 1) / leaves_per_task;
+  tbb::parallel_for(std::size_t{0}, tasks, [&](std::size_t task) {
+    const std::size_t first = task * leaves_per_task;
+    run(leaves.subspan(first, std::min(leaves_per_task, leaves.size() - first)));
+  });
+}
+
+/// Sums the leaves' values.
+template <typename Leaf, typename Value>
+void sum_up(std::span<Leaf> leaves, const Value* values) {
+  for (Leaf& leaf : leaves) {
+    const Value* from = values + leaf.first;
+    const auto bins = static_cast<std::size_t>(leaf.box.bins());
+    leaf.largest = *std::max_element(from, from + bins);
+    double sum = 0.0;
+    for (std::size_t i = 0; i < bins; ++i) {
+      sum += std::exp(static_cast<double>(from[i]) - leaf.largest);
+    }
+    leaf.log_mass = leaf.largest + std::log(sum);
+  }
+}
+
 }  // namespace
 
-LeafEvaluator::LeafEvaluator(const BinLikelihood& likelihood, std::span<const double> log_weight,
-                             const BoundedOptions& options, const KnownElements& elements,
-                             const BinVisitor& visit, const Deadline& deadline,
-                             MassAccount& account)
+LeafEvaluator::LeafEvaluator(const BinLikelihood& likelihood, FasterBinLikelihood& batches,
+                             std::span<const double> log_weight, const BoundedOptions& options,
+                             const KnownElements& elements, const BinVisitor& visit,
+                             const Deadline& deadline, MassAccount& account)
     : likelihood_(likelihood),
+      batches_(batches),
       log_weight_(log_weight),
       options_(options),
       elements_(elements),
@@ -34,39 +60,30 @@ LeafEvaluator::LeafEvaluator(const BinLikelihood& likelihood, std::span<const do
       account_(account),
       pending_mass_(log_weight.size()) {
   for (std::size_t i = 0; i < log_weight.size(); ++i) {
-    float32_error_.push_back(likelihood.float32_error(i, elements));
+    float32_error_.push_back(batches.float32_error(i, elements));
     float64_error_.push_back(likelihood.float64_error(i, elements));
   }
 }
 
-template <typename Float, typename Value>
-void LeafEvaluator::evaluate(std::span<Leaf> leaves, std::span<Value> values) const {
-  const std::size_t tasks = (leaves.size() + leaves_per_task - 1) / leaves_per_task;
-  tbb::parallel_for(std::size_t{0}, tasks, [&](std::size_t task) {
+void LeafEvaluator::look(const BinBox& box) {
+  std::vector<double> values(static_cast<std::size_t>(box.bins()));
+  likelihood_.evaluate(std::span(&box, 1), elements_, std::span(values));
+  bins_ += box.bins();
+  account_.raise_best(box.object,
+                      *std::max_element(values.begin(), values.end()) - float64_error_[box.object]);
+}
+
+void LeafEvaluator::evaluate_exactly(std::span<Leaf> leaves, std::span<double> values) const {
+  for_tasks(leaves, [&](std::span<Leaf> mine) {
     thread_local std::vector<BinBox> boxes;
-    thread_local std::vector<Float> logs;
-    const std::span<Leaf> mine = leaves.subspan(
-        task * leaves_per_task, std::min(leaves_per_task, leaves.size() - task * leaves_per_task));
     boxes.clear();
-    std::size_t count = 0;
     for (const Leaf& leaf : mine) {
       boxes.push_back(leaf.box);
-      count += static_cast<std::size_t>(leaf.box.bins());
     }
-    logs.resize(count);
-    likelihood_.evaluate(boxes, elements_, std::span<Float>(logs));
-    const Float* from = logs.data();
-    for (Leaf& leaf : mine) {
-      const auto bins = static_cast<std::size_t>(leaf.box.bins());
-      std::copy(from, from + bins, values.begin() + static_cast<std::ptrdiff_t>(leaf.first));
-      leaf.largest = *std::max_element(from, from + bins);
-      double sum = 0.0;
-      for (std::size_t i = 0; i < bins; ++i) {
-        sum += std::exp(static_cast<double>(from[i]) - leaf.largest);
-      }
-      leaf.log_mass = leaf.largest + std::log(sum);
-      from += bins;
-    }
+    const std::size_t end = mine.back().first + static_cast<std::size_t>(mine.back().box.bins());
+    likelihood_.evaluate(boxes, elements_,
+                         values.subspan(mine.front().first, end - mine.front().first));
+    sum_up(mine, values.data());
   });
 }
 
@@ -83,11 +100,12 @@ void LeafEvaluator::add(std::span<const BinBox> boxes) {
   bins_ += static_cast<std::int64_t>(value - values_.size());
   values_.resize(value);
   const std::span<Leaf> added = std::span(pending_).subspan(first);
-  evaluate<float>(added, std::span(values_));
+  batches_.evaluate(boxes, elements_, std::span(values_).subspan(added.front().first));
+  for_tasks(added, [&](std::span<Leaf> mine) { sum_up(mine, values_.data()); });
   for (const Leaf& leaf : added) {
     const double least = log_weight_[leaf.box.object] - float32_error_[leaf.box.object];
     pending_mass_[leaf.box.object].add(least + leaf.log_mass);
-    account_.raise_best(least + leaf.largest);
+    account_.raise_best(leaf.box.object, leaf.largest - float32_error_[leaf.box.object]);
   }
   account_.raise_totals(pending_mass_);
   if (pending_.size() * sizeof(Leaf) + values_.size() * sizeof(float) > most_pending_bytes) {
@@ -106,6 +124,14 @@ std::vector<std::size_t> LeafEvaluator::to_be_refined(double share) const {
     const double below = account_.log_total() - log_weight_[leaf.box.object] - leaf.log_mass;
     return static_cast<std::size_t>(std::clamp(below * per_nat, 0.0, slots - 1.0));
   };
+  const auto may_be_best = [&](const Leaf& leaf) {
+    return log_weight_[leaf.box.object] + leaf.largest + float32_error_[leaf.box.object] >=
+           account_.best();
+  };
+  const auto needs_evidence = [&](const Leaf& leaf) {
+    return options_.evidence_nats && 2.0 * std::expm1(float32_error_[leaf.box.object]) >
+                                         evidence_rounding_part * *options_.evidence_nats;
+  };
   std::vector<double> rounding(slots);
   for (const Leaf& leaf : pending_) {
     rounding[slot_of(leaf)] += std::expm1(float32_error_[leaf.box.object]) * share_of(leaf);
@@ -117,10 +143,13 @@ std::vector<std::size_t> LeafEvaluator::to_be_refined(double share) const {
   }
   std::vector<std::size_t> refined;
   for (std::size_t i = 0; i < pending_.size(); ++i) {
-    if (slot_of(pending_[i]) < from) {
+    if (slot_of(pending_[i]) < from || may_be_best(pending_[i]) || needs_evidence(pending_[i])) {
       refined.push_back(i);
     }
   }
+  // Those for the mode first: it is told in float64 whatever the budget.
+  std::stable_partition(refined.begin(), refined.end(),
+                        [&](std::size_t i) { return may_be_best(pending_[i]); });
   return refined;
 }
 
@@ -129,7 +158,7 @@ void LeafEvaluator::settle(double share) {
   std::vector<Leaf> exact;
   std::vector<double> values;
   std::size_t done = 0;
-  for (; done < refined.size() && !deadline_.passed();) {
+  while (done < refined.size() && (done == 0 || !deadline_.passed())) {
     const std::size_t end = std::min(done + refined_together, refined.size());
     exact.clear();
     std::size_t value = 0;
@@ -139,7 +168,7 @@ void LeafEvaluator::settle(double share) {
       value += static_cast<std::size_t>(exact.back().box.bins());
     }
     values.resize(value);
-    evaluate<double>(std::span(exact), std::span(values));
+    evaluate_exactly(exact, values);
     for (std::size_t i = done; i < end; ++i) {
       const Leaf& leaf = exact[i - done];
       settle(leaf, std::span(values).subspan(leaf.first, static_cast<std::size_t>(leaf.box.bins())),

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "bin_likelihood.hpp"
+#include "faster_bin_likelihood.hpp"
 #include "known_elements.hpp"
 #include "mass_account.hpp"
 
@@ -27,6 +28,7 @@ class Deadline {
             std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(*budget_s));
     }
   }
+  bool exists() const { return at_.has_value(); }
   bool passed() const { return at_ && Clock::now() >= *at_; }
 
  private:
@@ -39,12 +41,16 @@ class Deadline {
 /// the mass once more in float64, so that rounding stays within its part of the tolerance.
 class LeafEvaluator {
  public:
-  LeafEvaluator(const BinLikelihood& likelihood, std::span<const double> log_weight,
-                const BoundedOptions& options, const KnownElements& elements,
-                const BinVisitor& visit, const Deadline& deadline, MassAccount& account);
+  /// @param batches evaluates batches in float32, `likelihood` leaves in float64
+  LeafEvaluator(const BinLikelihood& likelihood, FasterBinLikelihood& batches,
+                std::span<const double> log_weight, const BoundedOptions& options,
+                const KnownElements& elements, const BinVisitor& visit, const Deadline& deadline,
+                MassAccount& account);
 
   /// Evaluates the bins of boxes that are sorted by place. They are settled by a later flush().
   void add(std::span<const BinBox> boxes);
+  /// Evaluates the bins of a box only to learn how likely its best one is.
+  void look(const BinBox& box);
   /// Settles all bins that were added.
   void flush() { settle(1.0); }
   std::int64_t bins() const { return bins_; }
@@ -57,8 +63,7 @@ class LeafEvaluator {
     double largest = 0.0;
   };
 
-  template <typename Float, typename Value>
-  void evaluate(std::span<Leaf> leaves, std::span<Value> values) const;
+  void evaluate_exactly(std::span<Leaf> leaves, std::span<double> values) const;
   /// Indices of the pending leaves that must be evaluated in float64: the heaviest.
   std::vector<std::size_t> to_be_refined(double share) const;
   /// @param share of the rounding that is left to be used up
@@ -66,6 +71,7 @@ class LeafEvaluator {
   void settle(const Leaf& leaf, std::span<const double> values, double error);
 
   const BinLikelihood& likelihood_;
+  FasterBinLikelihood& batches_;
   std::span<const double> log_weight_;
   const BoundedOptions& options_;
   const KnownElements& elements_;

@@ -13,7 +13,9 @@ namespace {
 /// Boxes that are evaluated before the total is looked at again: few at first, for the best ones
 /// raise it most.
 constexpr std::size_t first_batch = 128;
-constexpr std::size_t largest_batch = 4096;
+constexpr std::size_t largest_batch = 262'144;
+/// The same where a budget must not be overdrawn by much.
+constexpr std::size_t largest_budgeted_batch = 4096;
 
 }  // namespace
 
@@ -57,14 +59,21 @@ void LeafPass::evaluate_boxes(std::vector<BinBox> boxes) {
   evaluator_.add(boxes);
 }
 
-void LeafPass::probe(std::vector<Tile> tiles) {
-  std::erase_if(tiles, [&](const Tile& tile) { return probed(tile); });
+std::vector<BinBox> LeafPass::boxes_of(std::span<const Tile> tiles) const {
   std::vector<BinBox> boxes;
+  boxes.reserve(tiles.size());
   for (const Tile& tile : tiles) {
     boxes.push_back(bounds_[tile.object].levels().back().box_of(tile));
+  }
+  return boxes;
+}
+
+void LeafPass::probe(std::vector<Tile> tiles) {
+  std::erase_if(tiles, [&](const Tile& tile) { return probed(tile); });
+  evaluate_boxes(boxes_of(tiles));
+  for (const Tile& tile : tiles) {
     probed_in_row_[static_cast<std::size_t>(tile.object) * thetas_ + tile.theta] = true;
   }
-  evaluate_boxes(std::move(boxes));
   probed_.insert(probed_.end(), tiles.begin(), tiles.end());
   std::sort(probed_.begin(), probed_.end(), stands_before);
 }
@@ -165,7 +174,7 @@ void LeafPass::evaluate(std::span<const Tile> tiles, double tolerance) {
     }
     evaluate_boxes(std::move(boxes));
     from = account_.droppable_from(left, tolerance);
-    size = std::min(2 * size, largest_batch);
+    size = std::min(2 * size, deadline_.exists() ? largest_budgeted_batch : largest_batch);
   }
   account_.drop(left);
 }

@@ -26,6 +26,8 @@ class LeafPass {
   /// Evaluates the bins of tiles of the finest level, until those left hold at most this part of
   /// the total; drops these.
   void evaluate(std::span<const Tile> tiles, double tolerance);
+  /// Tiles of the finest level as boxes of bins.
+  std::vector<BinBox> boxes_of(std::span<const Tile> tiles) const;
 
  private:
   /// The parts of one tile, [first, end) of a list. Those that are needed are evaluated together,

@@ -22,7 +22,8 @@ MassAccount::MassAccount(std::span<const double> log_weight, const BoundedOption
       log_total_(nothing),
       log_totals_(log_weight.size(), nothing),
       best_(nothing),
-      largest_dropped_(nothing),
+      best_of_(log_weight.size(), nothing),
+      largest_dropped_of_(log_weight.size(), nothing),
       mode_value_(nothing) {}
 
 void MassAccount::settle(std::int32_t object, double log_mass, double largest, double error) {
@@ -31,7 +32,7 @@ void MassAccount::settle(std::int32_t object, double log_mass, double largest, d
   const double rounding = mass + std::log(std::expm1(error));
   rounding_[object].add(rounding);
   all_rounding_.add(rounding);
-  raise_best(log_weight_[object] + largest - error);
+  raise_best(object, largest - error);
 }
 
 void MassAccount::drop(const UnsettledMass& tiles) {
@@ -39,8 +40,8 @@ void MassAccount::drop(const UnsettledMass& tiles) {
     const double mass = tiles.log_mass(i);
     dropped_[i].add(mass);
     all_dropped_.add(mass);
+    largest_dropped_of_[i] = std::max(largest_dropped_of_[i], tiles.largest(i) - log_weight_[i]);
   }
-  largest_dropped_ = std::max(largest_dropped_, tiles.largest());
 }
 
 void MassAccount::note_best(const BinBox& box, std::int64_t bin_of_box, double log_likelihood) {
@@ -71,7 +72,10 @@ void MassAccount::raise_totals(std::span<const LogSum> pending) {
   log_total_ = std::max(log_total_, total.log());
 }
 
-void MassAccount::raise_best(double log_likelihood) { best_ = std::max(best_, log_likelihood); }
+void MassAccount::raise_best(std::int32_t object, double log_likelihood) {
+  best_ = std::max(best_, log_weight_[object] + log_likelihood);
+  best_of_[object] = std::max(best_of_[object], log_likelihood);
+}
 
 std::vector<std::size_t> MassAccount::droppable_from(const UnsettledMass& tiles,
                                                      double tolerance) const {
@@ -79,8 +83,10 @@ std::vector<std::size_t> MassAccount::droppable_from(const UnsettledMass& tiles,
                                       tiles.slot(best_) + 1);  // the mode must not be lost
   std::vector<std::size_t> from(evaluated_.size(), of_all);
   if (options_.evidence_nats) {
-    // Of each hypothesis's own mass, as large a part of what may be missing.
-    const double missing = std::expm1(*options_.evidence_nats) * tolerance / options_.tolerance;
+    // Of each hypothesis's own mass, as large a part of what may be missing; the rest of the nats
+    // is for rounding.
+    const double missing = std::expm1(*options_.evidence_nats * (1.0 - evidence_rounding_part)) *
+                           tolerance / options_.tolerance;
     for (std::size_t i = 0; i < from.size(); ++i) {
       from[i] = std::max(of_all, tiles.droppable_from(i, std::log(missing) + log_totals_[i]));
     }
@@ -97,8 +103,10 @@ SearchResult MassAccount::result() const {
                       .best_object = mode_object_,
                       .best_bin = mode_bin_,
                       .best_log_likelihood = mode_value_ - log_weight_[mode_object_],
-                      .mode_certain = largest_dropped_ < mode_value_};
+                      .mode_certain = true};
   for (std::size_t i = 0; i < evaluated_.size(); ++i) {
+    result.mode_certain =
+        result.mode_certain && log_weight_[i] + largest_dropped_of_[i] < mode_value_;
     result.evidence.push_back({.evaluated = evaluated_[i].log(),
                                .rounding = rounding_[i].log(),
                                .dropped = dropped_[i].log()});

@@ -12,6 +12,9 @@
 
 namespace palpate {
 
+/// Part of BoundedOptions::evidence_nats that rounding may use up.
+inline constexpr double evidence_rounding_part = 0.2;
+
 /// What a search found out about one hypothesis: logs in nats, with its prior weight.
 struct HypothesisEvidence {
   double evaluated = 0.0;  ///< of the summed likelihood of the bins that were evaluated
@@ -26,6 +29,8 @@ struct SearchResult {
   std::int64_t best_bin = 0;
   double best_log_likelihood = 0.0;  ///< of the best bin, without prior weights
   bool mode_certain = false;
+  /// The prior explains the elements far better than the best bin of any hypothesis.
+  bool contradicted = false;
   std::int64_t blocks_bounded = 0;
   std::int64_t bins_evaluated = 0;
 };
@@ -49,8 +54,8 @@ class MassAccount {
   /// settled but known well enough.
   /// @param pending [hypothesis] lower bounds of their mass, with the prior weight
   void raise_totals(std::span<const LogSum> pending);
-  /// The best bin has at least this log-likelihood, with the prior weight.
-  void raise_best(double log_likelihood);
+  /// A bin of the hypothesis has at least this log-likelihood, without the prior weight.
+  void raise_best(std::int32_t object, double log_likelihood);
 
   /// For every hypothesis the slot from which on its tiles can be dropped, where they may hold this
   /// part of the total.
@@ -61,6 +66,12 @@ class MassAccount {
   double rounding_share() const;
   /// Lower bound of the log of the total mass, in nats.
   double log_total() const { return log_total_; }
+  /// What the best bin has at least, with the prior weight, in nats.
+  double best() const { return best_; }
+  /// Log-likelihood, without the prior weight, that a hypothesis's best bin has at least, and that
+  /// a bin of it that was dropped has at most.
+  double best_of(std::size_t object) const { return best_of_[object]; }
+  double largest_dropped_of(std::size_t object) const { return largest_dropped_of_[object]; }
 
   /// Without the counts of blocks and bins.
   SearchResult result() const;
@@ -75,9 +86,10 @@ class MassAccount {
   LogSum all_dropped_;
   double log_total_;
   std::vector<double> log_totals_;  ///< [hypothesis] the same of each
-  double best_;             ///< what the best bin has at least, with the prior weight, in nats
-  double largest_dropped_;  ///< bound of a bin
-  double mode_value_;       ///< of the best settled bin, with the prior weight
+  double best_;                  ///< what the best bin has at least, with the prior weight, in nats
+  std::vector<double> best_of_;  ///< [hypothesis]
+  std::vector<double> largest_dropped_of_;  ///< [hypothesis]
+  double mode_value_;                       ///< of the best settled bin, with the prior weight
   std::int32_t mode_object_ = 0;
   std::int64_t mode_bin_ = 0;
 };

@@ -63,12 +63,10 @@ double UnsettledMass::log_mass(std::size_t hypothesis) const {
   return mass.log();
 }
 
-double UnsettledMass::largest() const {
-  for (std::size_t slot = 0; slot < slots; ++slot) {
-    for (std::size_t i = slot; i < bins_.size(); i += slots) {
-      if (bins_[i] > 0) {
-        return upper_edge(slot);
-      }
+double UnsettledMass::largest(std::size_t hypothesis) const {
+  for (std::size_t i = 0; i < slots; ++i) {
+    if (bins_[hypothesis * slots + i] > 0) {
+      return upper_edge(i);
     }
   }
   return -std::numeric_limits<double>::infinity();

@@ -29,8 +29,8 @@ class UnsettledMass {
   std::size_t droppable_from(std::size_t hypothesis, double log_allowance) const;
   /// Bound of the log of a hypothesis's summed likelihood, in nats.
   double log_mass(std::size_t hypothesis) const;
-  /// The largest bound that a tile may have, in nats; -infinity without any.
-  double largest() const;
+  /// The largest bound that a tile of a hypothesis may have, in nats; -infinity without any.
+  double largest(std::size_t hypothesis) const;
 
   static constexpr std::size_t slots = 4096;
 

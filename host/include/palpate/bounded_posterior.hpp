@@ -116,6 +116,8 @@ class BoundedPosterior {
  private:
   struct Impl;
   Impl& impl() const;
+  /// impl(), where no update has left the belief half-way. @throws Error where one has
+  Impl& whole() const;
   std::unique_ptr<Impl> impl_;
 };
 
