@@ -145,8 +145,8 @@ std::vector<EqualCount> equal_counts(const std::vector<FilterRun>& runs) {
   std::vector<EqualCount> pairs;
   for (const FilterRun& particles : runs) {
     for (const FilterRun& histogram : runs) {
-      if (particles.filter != "histogram" && particles.filter != "bounds" && histogram.filter == "histogram" &&
-          as_many(histogram.count, particles.count)) {
+      if (particles.filter != "histogram" && particles.filter != "bounds" &&
+          histogram.filter == "histogram" && as_many(histogram.count, particles.count)) {
         pairs.push_back({histogram, particles});
       }
     }

@@ -21,6 +21,10 @@ using testing::HasSubstr;
 
 constexpr double mib = 1 << 20;
 
+std::vector<Hypothesis> two_shapes() {
+  return {{map_of(on_letter_l, "L"), 1.0}, {map_of(on_disc, "disc"), 2.0}};
+}
+
 BoundedOptions options_of(const PoseLattice& lattice) {
   BoundedOptions options{.lattice = lattice};
   options.contact.prior = 0.2;
