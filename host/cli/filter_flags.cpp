@@ -131,9 +131,9 @@ void add_filter_flags(CLI::App& command, FilterFlags& flags) {
       fmt::format(
           "histogram: evaluates every pose bin; bounded: the same bins, but evaluates only those "
           "that matter and proves how little the others can; particles: the paper's particle "
-          "filter; auto: bounded for more than {} bins of all objects together, else histogram, "
-          "which it also takes for what bounded refuses: --touch-sd-*, --slip-sd-*, --posterior, "
-          "--memory-mib and plans [default: auto]",
+          "filter; auto: bounded for more than {} bins of all objects together, else histogram. "
+          "Bounded refuses --touch-sd-*, --slip-sd-*, --posterior, --memory-mib and plans; auto "
+          "then takes the histogram [default: auto]",
           most_histogram_bins));
   command.add_option("--tolerance", flags.tolerance,
                      "With --filter bounded: largest share of the belief that may be left "
