@@ -175,7 +175,7 @@ TEST_F(BoundedFilter, KnowsNoneOfThese) {
     }
     EXPECT_EQ(r["best"], dense["best"]);
   }
-  refused({"--filter", "bounded", "--none", "0"}, {"--none = 0", "above 0"});
+  refused({"--filter", "bounded", "--none", "0"}, {"--none 0", "above 0"});
 }
 
 TEST_F(BoundedFilter, AutoKeepsNoneOfThese) {
@@ -322,13 +322,15 @@ TEST_F(BoundedFilter, IsRefusedWhereTheMachineHasNoRoomForIt) {
   const Arguments fine{"--bins=2000000000x2000000000x1"};
   const Arguments turning{"--bins=4x4x2000000000"};
   const Arguments wide{"--bins=1000x1000x1000", "--x-mm=-1e9:1e9", "--y-mm=-1e9:1e9"};
+  const Arguments dense{"--bins=300000x300000x2"};
   const Arguments absurd{"--bins=2000000000x2000000000x2000000000"};
-  expect_refused(with_filter("bounded", fine), {"lattice", "MiB", "fewer bins along x and y"});
+  expect_refused(with_filter("bounded", fine), {"lattice", "too many", "use fewer bins"});
+  expect_refused(with_filter("bounded", dense), {"lattice", "MiB", "fewer bins along x and y"});
   expect_refused(with_filter("bounded", turning), {"lattice", "MiB", "fewer thetas"});
   expect_refused(with_filter("bounded", wide), {"lattice", "MiB", "narrow the region"});
   expect_refused(with_filter("bounded", absurd), {"lattice", "use fewer bins"});
   // Nothing to ask for: bounds would refuse as well.
-  for (const Arguments& flags : {fine, turning, absurd}) {
+  for (const Arguments& flags : {fine, turning, dense, absurd}) {
     const Outcome outcome = palpate(with_filter("histogram", flags));
     EXPECT_EQ(outcome.status, 2);
     EXPECT_THAT(outcome.err, Not(HasSubstr("bounded")));

@@ -104,8 +104,7 @@ void require_room(std::span<const Hypothesis> hypotheses, const BoundedOptions& 
       fmt::format("lattice: bounds of {} objects x {} x {} x {} bins", hypotheses.size(),
                   lattice.x_mm.count, lattice.y_mm.count, lattice.theta_rad.count);
   if (bins_in_all(hypotheses, lattice) > most_bins) {
-    throw Error(Fault::input, fmt::format("{} would number more than {:g} of them; use fewer bins",
-                                          what, most_bins));
+    throw Error(Fault::input, fmt::format("{} are too many to number; use fewer bins", what));
   }
   const SearchMemory memory = search_memory(hypotheses, options);
   if (memory.total() <= static_cast<double>(limit_bytes)) {
@@ -117,7 +116,7 @@ void require_room(std::span<const Hypothesis> hypotheses, const BoundedOptions& 
   };
   const std::array<Part, 4> parts{
       {{memory.tables, "use fewer maps, maps of fewer cells, or a narrower region"},
-       {memory.tiles, "narrow the region, or use fewer thetas or maps"},
+       {memory.tiles, "use fewer thetas or maps, or narrow the region"},
        {memory.thetas, "use fewer thetas or maps"},
        {memory.leaves, "use fewer bins along x and y"}}};
   const Part& largest = *std::max_element(
