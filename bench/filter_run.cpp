@@ -36,7 +36,8 @@ CurvePoint point_of(const FilterRun& run, std::size_t touch) {
 
 std::string filter_name(const FilterOptions& filter) {
   const auto* particles = std::get_if<ParticleOptions>(&filter);
-  return particles == nullptr                              ? "histogram"
+  return std::holds_alternative<HistogramOptions>(filter)  ? "histogram"
+         : particles == nullptr                            ? "bounds"
          : particles->augmented                            ? "augmented"
          : particles->resampling == Resampling::systematic ? "systematic"
                                                            : "particles";
@@ -54,9 +55,11 @@ FilterRun run_filter(Device& device, RecognitionTask task, std::span<const Recor
     run.name = fmt::format("{} {}", particles->augmented ? "augmented MCL" : run.filter, run.count);
   } else {
     const PoseLattice& lattice = task.lattice();
-    run.path = fmt::format("{}", fmt::join(recogniser.histogram()->paths(), "; "));
+    run.path = recogniser.bounded() != nullptr
+                   ? recogniser.bounded()->path()
+                   : fmt::format("{}", fmt::join(recogniser.histogram()->paths(), "; "));
     run.count = lattice.bins();
-    run.name = "histogram " + size_of(lattice);
+    run.name = run.filter + " " + size_of(lattice);
   }
   run.seconds = seconds_of([&] {
     for (const Recording& trial : trials) {
@@ -142,8 +145,8 @@ std::vector<EqualCount> equal_counts(const std::vector<FilterRun>& runs) {
   std::vector<EqualCount> pairs;
   for (const FilterRun& particles : runs) {
     for (const FilterRun& histogram : runs) {
-      if (particles.filter != "histogram" && histogram.filter == "histogram" &&
-          as_many(histogram.count, particles.count)) {
+      if (particles.filter != "histogram" && particles.filter != "bounds" &&
+          histogram.filter == "histogram" && as_many(histogram.count, particles.count)) {
         pairs.push_back({histogram, particles});
       }
     }

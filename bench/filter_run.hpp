@@ -14,7 +14,7 @@ namespace palpate::bench {
 
 /// What one filter made of all trials.
 struct FilterRun {
-  std::string filter;      ///< "histogram", "particles", "systematic" or "augmented"
+  std::string filter;      ///< "histogram", "bounds", "particles", "systematic" or "augmented"
   std::string name;        ///< with its size, such as "histogram 25x25x16"
   std::int64_t count = 0;  ///< bins per object, or particles in all
   std::vector<RecognitionRecord> records;  ///< [trial], with a step after every touch

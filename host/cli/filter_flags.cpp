@@ -91,6 +91,18 @@ BoundedOptions bounded_options(const FilterFlags& flags, const HistogramOptions&
   return bounded;
 }
 
+/// Whether bounds have room for the bins that the histogram refuses.
+bool bounds_would_take(Device& device, const RecognitionTask& task) {
+  const auto& histogram = std::get<HistogramOptions>(task.filter);
+  try {
+    BoundedPosterior(device, task.hypotheses,
+                     {.lattice = histogram.lattice, .contact = histogram.contact});
+    return true;
+  } catch (const Error&) {
+    return false;
+  }
+}
+
 /// The particle filter's options: those that it shares with the histogram, and its flags.
 ParticleOptions particle_options(const RecognitionFlags& all, const Scene& scene,
                                  const HistogramOptions& histogram) {
@@ -119,13 +131,14 @@ void add_filter_flags(CLI::App& command, FilterFlags& flags) {
       fmt::format(
           "histogram: evaluates every pose bin; bounded: the same bins, but evaluates only those "
           "that matter and proves how little the others can; particles: the paper's particle "
-          "filter; auto: bounded for more than {} bins of all objects together, else histogram, "
-          "which it also takes for what bounded refuses: --touch-sd-*, --slip-sd-*, --posterior, "
-          "--memory-mib and plans [default: auto]",
+          "filter; auto: bounded for more than {} bins of all objects together, else histogram. "
+          "Bounded refuses --touch-sd-*, --slip-sd-*, --posterior, --memory-mib and plans; auto "
+          "then takes the histogram [default: auto]",
           most_histogram_bins));
   command.add_option("--tolerance", flags.tolerance,
                      "With --filter bounded: largest share of the belief that may be left "
-                     "unproven; the search goes on until it is reached [default: 1e-6]");
+                     "unproven; the search goes on until it is reached. Rounding, which counts as "
+                     "unproven, may exceed a tolerance below about 1e-9 [default: 1e-6]");
   command.add_option("--budget-ms", flags.budget_ms,
                      "With --filter bounded: milliseconds after which each estimate's search ends "
                      "and reports what it has proven by then [default: none]");
@@ -148,6 +161,13 @@ void add_filter_flags(CLI::App& command, FilterFlags& flags) {
           "Limit of the histogram's device memory, MiB; less memory costs time, no accuracy "
           "[default: none]")
       ->check(require_whole_number);
+}
+
+void hide_other_filters(CLI::App& command) {
+  for (const char* flag : {"--filter", "--tolerance", "--budget-ms", "--evidence-nats",
+                           "--particles", "--resampling", "--augmented", "--seed"}) {
+    command.get_option(flag)->group("");
+  }
 }
 
 FilterWish filter_wish(const RecognitionFlags& all, const Scene& scene) {
@@ -211,21 +231,13 @@ ChosenFilter choose_filter(const FilterWish& wish, const RecognitionFlags& flags
 }
 
 Recogniser open_filter(Device& device, const RecognitionTask& task) {
-  task.lattice().validate();
-  if (std::holds_alternative<BoundedOptions>(task.filter) &&
-      task.bins_in_all() > largest_bounded_bins) {
-    throw Error(
-        Fault::input,
-        fmt::format("{} pose bins in all: bounds take at most {}; use fewer bins or objects",
-                    task.bins_in_all(), largest_bounded_bins));
-  }
   try {
     return {device, task};
   } catch (const Error& error) {
     // Of a sound task nothing but the bins' memory can be refused.
     if (error.fault() == Fault::input && std::holds_alternative<HistogramOptions>(task.filter) &&
         (task.auto_filter || !task.filter_asked_for_by.empty()) &&
-        task.bins_in_all() <= largest_bounded_bins) {
+        bounds_would_take(device, task)) {
       throw Error(Fault::input,
                   fmt::format("{}, or {}: --filter bounded needs no device memory", error.what(),
                               task.auto_filter ? std::string("ask for bounds")

@@ -31,6 +31,10 @@ struct FilterFlags {
 
 void add_filter_flags(CLI::App& command, FilterFlags& flags);
 
+/// Leaves the flags of other filters than the histogram out of the help of a command that needs the
+/// histogram. They are read still, so that the command refuses them with its reason.
+void hide_other_filters(CLI::App& command);
+
 /// Why a command needs the histogram, beside what flags and scene say of the task.
 struct HistogramNeed {
   std::string flag = {};  ///< that asks for what needs it; "" where the command always does

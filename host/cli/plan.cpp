@@ -229,6 +229,7 @@ void add_plan(CLI::App& app) {
   command->add_option("RECORDING", options->recording, "Recording of the touches so far (HDF5)")
       ->required();
   add_recognition_flags(*command, options->recognition);
+  hide_other_filters(*command);
   command
       ->add_option(
           "--candidates", options->candidates,

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numeric>
 
 namespace palpate {
 
@@ -25,19 +24,16 @@ double share(double a, double b) { return a == log_zero ? 0.0 : 1.0 / (1.0 + std
 std::vector<ProbabilityInterval> label_bounds(const Estimate& estimate,
                                               std::span<const double> identity,
                                               const RecognitionTask& task) {
-  const std::vector<LogInterval>& evidence = estimate.certificate->log_evidence;
+  const Certificate& certificate = *estimate.certificate;
+  const std::vector<LogInterval>& evidence = certificate.log_evidence;
   std::vector<LogInterval> of_label(task.labels.size(), {log_zero, log_zero});
-  double known = log_zero;  // evidence that the probabilities are of: dropped bins count as 0
   for (std::size_t h = 0; h < evidence.size(); ++h) {
     LogInterval& sum = of_label[task.label_of[h]];
     sum.low = log_sum(sum.low, evidence[h].low);
     sum.high = log_sum(sum.high, evidence[h].high);
-    known = log_sum(known, evidence[h].low);
   }
-  if (task.labels.back() == none_label) {
-    const double learned = std::accumulate(estimate.identity.begin(), estimate.identity.end(), 0.0);
-    const double none = known + std::log(estimate.none) - std::log(learned);
-    of_label.back() = {none, none};
+  if (certificate.none_log_evidence) {
+    of_label.back() = {*certificate.none_log_evidence, *certificate.none_log_evidence};
   }
   std::vector<ProbabilityInterval> bounds;
   for (std::size_t i = 0; i < of_label.size(); ++i) {

@@ -5,6 +5,7 @@
 
 #include <fmt/format.h>
 
+#include "marginal_grid.hpp"
 #include "palpate/error.hpp"
 #include "random.hpp"
 
@@ -140,17 +141,18 @@ Marginals Recogniser::marginals(int object) const {
   if (histogram() != nullptr) {
     return histogram()->marginals(object);
   }
+  const PoseLattice grid = marginal_grid(lattice_);
   if (bounded() != nullptr) {
-    return bounded()->marginals(object);
+    return bounded()->marginals(object, grid);
   }
-  Marginals sums{.grid = lattice_,
-                 .xy = std::vector<double>(static_cast<std::size_t>(lattice_.plane())),
-                 .theta = std::vector<double>(static_cast<std::size_t>(lattice_.theta_rad.count))};
+  Marginals sums{.grid = grid,
+                 .xy = std::vector<double>(static_cast<std::size_t>(grid.plane())),
+                 .theta = std::vector<double>(static_cast<std::size_t>(grid.theta_rad.count))};
   for (const ParticleFilter::Particle& particle : std::get<ParticleFilter>(filter_).particles()) {
     if (particle.object == object) {
-      const std::int64_t bin = lattice_.bin_of(particle.T_object_robot);
-      sums.xy[bin % lattice_.plane()] += particle.weight;
-      sums.theta[bin / lattice_.plane()] += particle.weight;
+      const std::int64_t bin = grid.bin_of(particle.T_object_robot);
+      sums.xy[bin % grid.plane()] += particle.weight;
+      sums.theta[bin / grid.plane()] += particle.weight;
     }
   }
   return sums;

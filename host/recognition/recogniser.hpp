@@ -18,8 +18,8 @@ class Recogniser {
   Recogniser(Device& device, const RecognitionTask& task);
 
   /// Forgets all touches, for the next unknown. Particles start from the same places again; bounds
-  /// keep their tables. An
-  /// automatic pivot returns to the robot frame's origin until a touch places it.
+  /// keep their tables. An automatic pivot returns to the robot frame's origin until a touch places
+  /// it.
   void reset();
   /// Updates the belief with these touches. The first touch since reset() that has an element In
   /// Contact (Eq. 3) places an automatic pivot. Copies of the touches before it wait, and join the
@@ -45,8 +45,8 @@ class Recogniser {
   void note_surprise(double surprise) { surprises_.push_back(surprise); }
   /// What note_surprise() was given since reset(), in order.
   std::span<const double> surprises() const { return surprises_; }
-  /// Marginal probabilities of one object's poses over the task's lattice. A particle counts in the
-  /// nearest bin.
+  /// Marginal probabilities of one object's poses: a histogram's over the task's lattice, those of
+  /// other filters over its marginal_grid(). A particle counts in the nearest bin.
   Marginals marginals(int object) const;
   /// The task's lattice about the pivot in use.
   const PoseLattice& lattice() const { return lattice_; }

@@ -61,9 +61,6 @@ inline constexpr std::int64_t most_histogram_bins = 100'000;
 /// Most bins, of all objects together, that settle_bins() and settle_filter() give to bounds.
 inline constexpr std::int64_t most_bounded_bins = 1'000'000'000;
 
-/// Most bins, of all objects together, for bounds that are asked for by name.
-inline constexpr std::int64_t largest_bounded_bins = 10'000'000'000;
-
 /// The options of a bounded posterior of the same bins; none where the histogram allows for
 /// something that bounds do not: touch_sd, slip_sd or a limit of its memory.
 std::optional<BoundedOptions> bounded_instead(const HistogramOptions& histogram);

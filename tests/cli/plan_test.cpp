@@ -37,6 +37,17 @@ class PlanCommand : public ProgramTest {
   }
 };
 
+TEST_F(PlanCommand, ItsHelpListsNoFlagThatItRefuses) {
+  const std::string help = done({"plan", "--help"});
+  for (const std::string flag : {"--tolerance", "--budget-ms", "--evidence-nats", "--particles",
+                                 "--resampling", "--augmented", "--seed"}) {
+    EXPECT_EQ(help.find("  " + flag + " "), std::string::npos) << flag;
+  }
+  EXPECT_NE(help.find("  --memory-mib "), std::string::npos) << "which a plan reads";
+  expect_refused(command({"--candidates", "c.csv", "--tolerance", "0.1"}),
+                 {"--tolerance: ", "a plan needs", "leave it out"});
+}
+
 TEST_F(PlanCommand, RanksTheRowsOfATable) {
   const json all = plan({"--candidates", "c.csv"});
   EXPECT_EQ(all["goal"], "both");

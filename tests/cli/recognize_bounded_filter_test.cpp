@@ -143,6 +143,54 @@ TEST_F(BoundedFilter, IsRightWithinAnyBudget) {
   }
 }
 
+TEST_F(BoundedFilter, KnowsNoneOfThese) {
+  const auto log_odds = [](const json& step) {
+    const auto none = step.at("none").get<double>();
+    return std::log(none) - std::log1p(-none);
+  };
+  // Weights below the maps', of the maps, and above; the last lattice has more bins than a sample.
+  for (const Arguments& weight : {Arguments{"--none", "0.01"}, Arguments{"--none"},
+                                  Arguments{"--bins=50x50x40", "--none", "100"}}) {
+    Arguments flags = weight;
+    flags.insert(flags.begin(), "--trace");
+    if (weight.size() < 3) {
+      flags.insert(flags.begin(), "--bins=12x12x16");
+    }
+    flags.insert(flags.begin(), {"u.h5", "--maps", "maps"});
+    Arguments by_bounds = flags;
+    by_bounds.insert(by_bounds.begin(), {"--filter", "bounded"});
+    flags.insert(flags.begin(), {"--filter", "histogram"});
+    const json dense = record(flags);
+    const json r = record(by_bounds);
+    ASSERT_EQ(r["trace"].size(), dense["trace"].size());
+    for (std::size_t i = 0; i < r["trace"].size(); ++i) {
+      const json& step = r["trace"][i];
+      expect_lawful(step);
+      EXPECT_EQ(step["identity"].at("(none)"), step["none"]);
+      const auto error = step.at("none_standard_error").get<double>();
+      EXPECT_GE(error, 0.0);
+      EXPECT_LE(error, 0.02) << "so that 0.1 nats are five of them";
+      EXPECT_NEAR(log_odds(step), log_odds(dense["trace"][i]), 0.1);
+      EXPECT_FALSE(dense["trace"][i].contains("none_standard_error"));
+    }
+    EXPECT_EQ(r["best"], dense["best"]);
+  }
+  refused({"--filter", "bounded", "--none", "0"}, {"--none 0", "above 0"});
+}
+
+TEST_F(BoundedFilter, AutoKeepsNoneOfThese) {
+  const json r = record({"u.h5", "--maps", "maps", "--bins=120x120x16", "--none"});
+  EXPECT_TRUE(r.contains("dropped_mass")) << "by bounds";
+  expect_lawful(r);
+  EXPECT_EQ(r["identity"].at("(none)"), r["none"]);
+  EXPECT_TRUE(r.contains("none_standard_error"));
+  const Outcome table = palpate({"recognize", "u.h5", "--maps", "maps", "--bins=12x12x16",
+                                 "--filter", "bounded", "--none", "1e300"});
+  EXPECT_EQ(table.status, 0) << table.err;
+  EXPECT_THAT(table.out, HasSubstr("(none), pose of "));
+  EXPECT_THAT(table.out, HasSubstr("dropped"));
+}
+
 TEST_F(BoundedFilter, TakesEachFrameByItself) {
   const json frames = records(with({"--filter", "bounded", "--each-frame", "--frames=0:2"}));
   ASSERT_EQ(frames.size(), 2u);
@@ -266,10 +314,27 @@ TEST_F(BoundedFilter, AutoNamesTheFlagThatKeepsALargeLatticeFromIt) {
                  {"leave out --slip-sd-deg and --filter histogram"});
 }
 
-TEST_F(BoundedFilter, HasALargestLattice) {
-  expect_refused(
-      {"recognize", "u.h5", "--maps", "maps", "--bins=100000x100000x2", "--filter", "bounded"},
-      {"40000000000 pose bins in all", "at most 10000000000", "fewer bins"});
+TEST_F(BoundedFilter, IsRefusedWhereTheMachineHasNoRoomForIt) {
+  const auto with_filter = [](const std::string& filter, Arguments flags) {
+    flags.insert(flags.begin(), {"recognize", "u.h5", "--maps", "maps", "--filter=" + filter});
+    return flags;
+  };
+  const Arguments fine{"--bins=2000000000x2000000000x1"};
+  const Arguments turning{"--bins=4x4x2000000000"};
+  const Arguments wide{"--bins=1000x1000x1000", "--x-mm=-1e9:1e9", "--y-mm=-1e9:1e9"};
+  const Arguments dense{"--bins=300000x300000x2"};
+  const Arguments absurd{"--bins=2000000000x2000000000x2000000000"};
+  expect_refused(with_filter("bounded", fine), {"lattice", "too many", "use fewer bins"});
+  expect_refused(with_filter("bounded", dense), {"lattice", "MiB", "fewer bins along x and y"});
+  expect_refused(with_filter("bounded", turning), {"lattice", "MiB", "fewer thetas"});
+  expect_refused(with_filter("bounded", wide), {"lattice", "MiB", "narrow the region"});
+  expect_refused(with_filter("bounded", absurd), {"lattice", "use fewer bins"});
+  // Nothing to ask for: bounds would refuse as well.
+  for (const Arguments& flags : {fine, turning, dense, absurd}) {
+    const Outcome outcome = palpate(with_filter("histogram", flags));
+    EXPECT_EQ(outcome.status, 2);
+    EXPECT_THAT(outcome.err, Not(HasSubstr("bounded")));
+  }
 }
 
 TEST_F(BoundedFilter, PeopleReadTheCertificate) {

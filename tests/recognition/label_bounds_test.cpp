@@ -34,6 +34,9 @@ Estimate estimate_of(const std::vector<LogInterval>& evidence, double none) {
   }
   estimate.none = none / total;
   estimate.certificate = Certificate{.log_evidence = evidence};
+  if (none > 0.0) {
+    estimate.certificate->none_log_evidence = std::log(none);
+  }
   return estimate;
 }
 

@@ -19,12 +19,14 @@
 #include "interpolated_map.hpp"
 #include "known_elements.hpp"
 #include "log_sum.hpp"
+#include "marginal_sums.hpp"
 #include "moved_from.hpp"
 #include "moved_pivot.hpp"
 #include "palpate/error.hpp"
 #include "random.hpp"
 #include "refinement.hpp"
 #include "sampled_touch_mean.hpp"
+#include "search_memory.hpp"
 
 namespace palpate {
 
@@ -155,6 +157,7 @@ BoundedPosterior::BoundedPosterior(Device& device, std::span<const Hypothesis> h
   BoundedOptions checked = options;
   checked.lattice.collapse_fixed().validate();
   checked.contact = resolve(options.contact, hypotheses);
+  require_room(hypotheses, checked, memory_for_search());
   impl_ = std::make_unique<Impl>(device, hypotheses, checked);
 }
 
@@ -259,6 +262,7 @@ Estimate BoundedPosterior::estimate() const {
   const double none = posterior.none_log_evidence();
   if (posterior.none) {
     logs.push_back(none);
+    certificate.none_log_evidence = none;
     certificate.none_standard_error = posterior.none->standard_error();
   }
   estimate.identity = normalised(logs);
@@ -315,26 +319,15 @@ Marginals BoundedPosterior::marginals(int object, const PoseLattice& grid) const
   posterior.require_object(object);
   PoseLattice onto = grid;
   onto.collapse_fixed().validate();
-  const PoseLattice& bins = lattice();
-  const bool own = &grid == &bins;
   const double log_total =
       log_add(posterior.log_total(), posterior.none_log_evidence()) - posterior.log_weight[object];
-  Marginals sums{.grid = onto,
-                 .xy = std::vector<double>(static_cast<std::size_t>(onto.plane())),
-                 .theta = std::vector<double>(static_cast<std::size_t>(onto.theta_rad.count))};
+  MarginalSums sums(lattice(), onto);
   posterior.visit([&](const BinBox& box, std::span<const double> log_likelihood) {
-    if (box.object != object) {
-      return;
-    }
-    for (std::int64_t i = 0; i < box.bins(); ++i) {
-      const double p = std::exp(log_likelihood[log_likelihood.size() == 1 ? 0 : i] - log_total);
-      const std::int64_t bin = bin_in(bins, box, i);
-      const std::int64_t at = own ? bin : onto.bin_of(bins.T_object_robot(bin));
-      sums.xy[at % onto.plane()] += p;
-      sums.theta[at / onto.plane()] += p;
+    if (box.object == object) {
+      sums.add(box, log_likelihood, -log_total);
     }
   });
-  return sums;
+  return sums.take();
 }
 
 double BoundedPosterior::log_likelihood(int object, const Pose& T_object_robot) const {

@@ -142,4 +142,25 @@ SquarePenalties square_penalties(const OccupancyGrid& map, const ContactModel& c
   return penalties;
 }
 
+SquarePenalties merged(const SquarePenalties& squares, int count) {
+  SquarePenalties large{.best = squares.best,
+                        .parts = squares.parts,
+                        .nx = (squares.nx + count - 1) / count,
+                        .ny = (squares.ny + count - 1) / count,
+                        .least = {},
+                        .beyond = squares.beyond};
+  const auto at = [&](int i, int j) -> std::uint16_t& {
+    return large.least[static_cast<std::size_t>(j / count) * large.nx + i / count];
+  };
+  const bool whole = squares.nx % count == 0 && squares.ny % count == 0;
+  large.least.assign(static_cast<std::size_t>(large.nx) * large.ny,
+                     whole ? largest_penalty : squares.beyond);
+  for (int j = 0; j < squares.ny; ++j) {
+    for (int i = 0; i < squares.nx; ++i) {
+      at(i, j) = std::min(at(i, j), squares.least[static_cast<std::size_t>(j) * squares.nx + i]);
+    }
+  }
+  return large;
+}
+
 }  // namespace palpate

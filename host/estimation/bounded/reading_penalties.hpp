@@ -20,7 +20,7 @@ inline constexpr std::uint16_t largest_penalty = 8192;
 /// of these areas where they are divided.
 struct SquarePenalties {
   double best = 0.0;  ///< log-likelihood of the reading at the most likely place, in nats
-  int parts = 1;      ///< squares per cell along each axis
+  int parts = 1;      ///< squares per cell along each axis, before any were merged
   int nx = 0;
   int ny = 0;
   std::vector<std::uint16_t> least;  ///< [ny, nx], rounded down
@@ -32,5 +32,8 @@ struct SquarePenalties {
 /// @param contact resolved: with its prior
 SquarePenalties square_penalties(const OccupancyGrid& map, const ContactModel& contact,
                                  Reading reading, std::size_t object, int parts);
+
+/// Squares of `count` x `count` squares each; the last of a row or column reach beyond the map.
+SquarePenalties merged(const SquarePenalties& squares, int count);
 
 }  // namespace palpate

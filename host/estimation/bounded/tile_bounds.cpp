@@ -25,17 +25,20 @@ TileBounds::TileBounds(const OccupancyGrid& map, const ContactModel& contact, st
         penalties =
             square_penalties(map, contact, static_cast<Reading>(reading), object, size.parts);
       }
-      tables_[level][reading] = window_table(penalties, size.side);
+      tables_[level][reading] = size.merged == 1
+                                    ? window_table(penalties, size.side)
+                                    : window_table(merged(penalties, size.merged), size.side);
     }
   });
 }
 
 void TileBounds::place(std::size_t level, const glm::dvec2& turn, const KnownElements& elements,
                        WindowPlaces& placed) const {
-  place_elements(
-      elements,
-      {.turn = turn, .corner_mm = corner_mm_, .square_mm = cell_mm_ / levels_[level].size.parts},
-      tables_[level].front(), placed);
+  place_elements(elements,
+                 {.turn = turn,
+                  .corner_mm = corner_mm_,
+                  .square_mm = cell_mm_ * levels_[level].size.square_cells()},
+                 tables_[level].front(), placed);
 }
 
 void TileBounds::add(std::size_t level, const KnownElements& elements, const WindowPlaces& placed,

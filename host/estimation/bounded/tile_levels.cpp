@@ -10,8 +10,8 @@ namespace palpate {
 namespace {
 
 /// Largest tiles, of all maps, whose penalties are kept between touches, 4 bytes each.
-constexpr double most_largest_tiles = 1e7;
-constexpr int largest_side = 512;  ///< in cells; larger tables would cost more than they save
+constexpr double most_largest_tiles = 4e6;
+constexpr double largest_cells = 1e6;  ///< side of a tile: larger than any map with its border
 
 TileAxis tile_axis(const Axis& axis, double side_mm) {
   TileAxis tiles{.first_mm = axis.centre(0), .side_mm = side_mm, .first_bin = {}};
@@ -51,10 +51,10 @@ std::vector<TileSize> tile_sizes(const PoseLattice& lattice, double least_cell_m
     return count(lattice.x_mm) * count(lattice.y_mm) * lattice.theta_rad.count *
            static_cast<double>(maps);
   };
-  std::vector<TileSize> sizes{
-      {.parts = 1, .side = 8}, {.parts = 1, .side = 2}, {.parts = 2, .side = 1}};
-  while (tiles(sizes.front()) > most_largest_tiles && sizes.front().side < largest_side) {
-    sizes.insert(sizes.begin(), {.parts = 1, .side = 4 * sizes.front().side});
+  std::vector<TileSize> sizes{{.side = 8}, {.side = 2}, {.parts = 2, .side = 1}};
+  while (tiles(sizes.front()) > most_largest_tiles && sizes.front().cells() < largest_cells) {
+    // As many squares, each of more cells: tables shrink, and windows widen by little.
+    sizes.insert(sizes.begin(), {.merged = 4 * sizes.front().merged, .side = 8});
   }
   return sizes;
 }

@@ -30,12 +30,15 @@ struct TileWindow {
   }
 };
 
-/// The size of a level's tiles: `side` squares, of which a map's cell has `parts` along each axis.
+/// The size of a level's tiles: `side` squares. A map's cell has `parts` squares along each axis,
+/// or a square holds `merged` cells.
 struct TileSize {
   int parts = 1;
+  int merged = 1;
   int side = 1;
 
-  double cells() const { return static_cast<double>(side) / parts; }
+  double square_cells() const { return static_cast<double>(merged) / parts; }
+  double cells() const { return side * square_cells(); }
 };
 
 /// Tiles along one axis of the lattice. They begin at the first bin's centre; a tile holds the bins

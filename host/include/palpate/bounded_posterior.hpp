@@ -20,7 +20,8 @@ struct BoundedOptions {
   PoseLattice lattice;
   ContactModel contact = {};  ///< what the sensor says about a place (Eq. 3, 7)
   /// Largest total variation distance from the posterior over all bins, in (0, 1). Each estimate()
-  /// evaluates as many bins as the tolerance needs.
+  /// evaluates as many bins as the tolerance needs. The rounding of float64, which the certificate
+  /// counts, may exceed a tolerance below about 1e-9.
   double tolerance = 1e-6;
   /// Seconds after which estimate() stops and reports what it has proven by then, also where that
   /// is less than the tolerance asks for. By default it takes the time that the tolerance needs.
@@ -59,7 +60,8 @@ class BoundedPosterior {
   /// Builds the window tables of the maps.
   /// @throws Error on an empty list, a map that is not sound, maps of different priors where the
   /// options give none, a weight that is not positive and finite, a lattice, contact model or option
-  /// out of range, or a table for another number of objects
+  /// out of range, a table for another number of objects, or a lattice whose tiles and tables would
+  /// take more than a quarter of the machine's memory
   BoundedPosterior(Device& device, std::span<const Hypothesis> hypotheses,
                    const BoundedOptions& options);
   ~BoundedPosterior();

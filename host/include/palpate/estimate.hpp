@@ -53,8 +53,10 @@ struct Certificate {
   bool mode_certain = false;         ///< no bin that was not evaluated can exceed the mode
   std::int64_t blocks_bounded = 0;   ///< blocks of bins whose bound was computed
   std::int64_t bins_evaluated = 0;   ///< bins whose likelihood was computed
-  /// Standard error, in nats, of the log evidence of "none of these", which is estimated from a
-  /// sample of the bins; none where the options do not ask for "none of these".
+  /// Log evidence of "none of these" with its prior weight, comparable to log_evidence, and its
+  /// standard error, in nats: it is estimated from a sample of the bins. None where the options do
+  /// not ask for "none of these".
+  std::optional<double> none_log_evidence = {};
   std::optional<double> none_standard_error = {};
 };
 

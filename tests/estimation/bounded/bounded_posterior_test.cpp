@@ -440,6 +440,11 @@ TEST(BoundedPosterior, KnowsNoneOfThese) {
     }
     EXPECT_NEAR(marginals, 1.0, 1e-12);
     EXPECT_EQ(ours.certificate->none_standard_error, 0.0) << "all bins were taken";
+    // Its odds against an object lie between those of the bounds of the object's evidence.
+    const auto [least, most] = ours.certificate->log_evidence[0];
+    const double against = std::log(ours.identity[0]) - std::log(ours.none);
+    EXPECT_GE(against, least - *ours.certificate->none_log_evidence - 1e-12);
+    EXPECT_LE(against, most - *ours.certificate->none_log_evidence + 1e-12);
   }
   options.none_weight.reset();
   BoundedPosterior without(device, two_shapes(), options);
@@ -447,6 +452,7 @@ TEST(BoundedPosterior, KnowsNoneOfThese) {
   const Estimate expected = without.estimate();
   const Estimate with = bounded.estimate();
   EXPECT_FALSE(expected.certificate->none_standard_error);
+  EXPECT_FALSE(expected.certificate->none_log_evidence);
   EXPECT_EQ(expected.none, 0.0);
   EXPECT_EQ(with.mode.bin, expected.mode.bin);
   EXPECT_NEAR(with.identity[0] / sum(with.identity), expected.identity[0], 2.0 * options.tolerance);

@@ -1,0 +1,141 @@
+#include "search_memory.hpp"
+
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+#include <fmt/format.h>
+
+#include "array_overlap.hpp"
+#include "map_patches.hpp"
+#include "palpate/error.hpp"
+#include "tile_levels.hpp"
+#include "window_table.hpp"
+
+namespace palpate {
+
+namespace {
+
+/// Families of 4 x 4 of the smallest tiles that LeafPass evaluates at a time.
+constexpr double families_together = 4096.0;
+/// Bins of all objects that 64 bits number, with room for sums.
+constexpr double most_bins = 4e18;
+
+/// Tiles along an axis, as tile_levels() counts them.
+double tiles_along(const Axis& axis, double side_mm) {
+  const double extent_mm = axis.step() * (axis.count - 1);
+  return batch_side * (std::floor(extent_mm / (batch_side * side_mm)) + 1.0);
+}
+
+/// Most bins along an axis within this many mm.
+double bins_within(const Axis& axis, double side_mm) {
+  const double bins = axis.count > 1 ? std::floor(side_mm / axis.step()) + 1.0 : 1.0;
+  return std::min<double>(bins, axis.count);
+}
+
+/// A window table's entries, as window_table() lays them out.
+double table_bytes(const OccupancyGrid& map, const TileSize& size) {
+  const auto windows = [&](int cells) {
+    return 2.0 * WindowTable::margin + std::ceil((cells + 1.0) * size.parts / size.side);
+  };
+  return windows(map.nx) * windows(map.ny) * batch_side * size.side * size.side *
+         sizeof(std::uint16_t);
+}
+
+double node_bytes(const OccupancyGrid& map) {
+  constexpr double border = 2.0 * MapPatches::border;
+  return (map.nx + border) * (map.ny + border) * MapPatches::side * sizeof(float);
+}
+
+double bins_in_all(std::span<const Hypothesis> hypotheses, const PoseLattice& lattice) {
+  return static_cast<double>(hypotheses.size()) * lattice.x_mm.count * lattice.y_mm.count *
+         lattice.theta_rad.count;
+}
+
+}  // namespace
+
+SearchMemory search_memory(std::span<const Hypothesis> hypotheses, const BoundedOptions& options) {
+  const PoseLattice& lattice = options.lattice;
+  const double thetas = lattice.theta_rad.count;
+  const std::size_t readings =
+      options.contact.table ? options.contact.table->levels() : std::size_t{2};
+  double least_cell_mm = std::numeric_limits<double>::infinity();
+  for (const Hypothesis& hypothesis : hypotheses) {
+    least_cell_mm = std::min(least_cell_mm, hypothesis.map.cell_mm);
+  }
+  const std::vector<TileSize> sizes = tile_sizes(lattice, least_cell_mm, hypotheses.size());
+  SearchMemory memory;
+  double largest_family = 0.0;  // in bins
+  for (const Hypothesis& hypothesis : hypotheses) {
+    const OccupancyGrid& map = hypothesis.map;
+    memory.tables += node_bytes(map);
+    for (const TileSize& size : sizes) {
+      const double side_mm = size.cells() * map.cell_mm;
+      memory.tables += static_cast<double>(readings) * table_bytes(map, size);
+      memory.tiles +=
+          sizeof(int) * (tiles_along(lattice.x_mm, side_mm) + tiles_along(lattice.y_mm, side_mm));
+    }
+    const double largest_mm = sizes.front().cells() * map.cell_mm;
+    memory.tiles += (sizeof(std::int32_t) + sizeof(Tile)) * thetas *
+                    tiles_along(lattice.x_mm, largest_mm) * tiles_along(lattice.y_mm, largest_mm);
+    const double family_mm = batch_side * sizes.back().cells() * map.cell_mm;
+    largest_family = std::max(largest_family, bins_within(lattice.x_mm, family_mm) *
+                                                  bins_within(lattice.y_mm, family_mm));
+  }
+  // A cosine and a sine; and of every object the tiles that see the map, and the best of them.
+  memory.thetas = thetas * (sizeof(glm::dvec2) + static_cast<double>(hypotheses.size()) *
+                                                     (sizeof(TileWindow) + sizeof(Tile)));
+  if (options.none_weight) {
+    memory.thetas += thetas * (sizeof(glm::dvec2) +
+                               static_cast<double>(hypotheses.size()) * sizeof(OverlapPlane));
+  }
+  memory.leaves = sizeof(float) *
+                  std::min(families_together * largest_family, bins_in_all(hypotheses, lattice));
+  return memory;
+}
+
+void require_room(std::span<const Hypothesis> hypotheses, const BoundedOptions& options,
+                  std::uint64_t limit_bytes) {
+  const PoseLattice& lattice = options.lattice;
+  const std::string what =
+      fmt::format("lattice: bounds of {} objects x {} x {} x {} bins", hypotheses.size(),
+                  lattice.x_mm.count, lattice.y_mm.count, lattice.theta_rad.count);
+  if (bins_in_all(hypotheses, lattice) > most_bins) {
+    throw Error(Fault::input, fmt::format("{} are too many to number; use fewer bins", what));
+  }
+  const SearchMemory memory = search_memory(hypotheses, options);
+  if (memory.total() <= static_cast<double>(limit_bytes)) {
+    return;
+  }
+  struct Part {
+    double bytes;
+    const char* remedy;
+  };
+  const std::array<Part, 4> parts{
+      {{memory.tables, "use fewer maps, maps of fewer cells, or a narrower region"},
+       {memory.tiles, "use fewer thetas or maps, or narrow the region"},
+       {memory.thetas, "use fewer thetas or maps"},
+       {memory.leaves, "use fewer bins along x and y"}}};
+  const Part& largest = *std::max_element(
+      parts.begin(), parts.end(), [](const Part& a, const Part& b) { return a.bytes < b.bytes; });
+  constexpr double mib = 1 << 20;
+  throw Error(Fault::input,
+              fmt::format("{} need {:.0f} MiB of the host's memory, a quarter of which are {:.0f} "
+                          "MiB; {}",
+                          what, std::ceil(memory.total() / mib),
+                          std::floor(static_cast<double>(limit_bytes) / mib), largest.remedy));
+}
+
+std::uint64_t memory_for_search() {
+  const long pages = ::sysconf(_SC_PHYS_PAGES);
+  const long page_bytes = ::sysconf(_SC_PAGESIZE);
+  constexpr std::uint64_t where_unknown = std::uint64_t{1} << 30;
+  return pages > 0 && page_bytes > 0
+             ? static_cast<std::uint64_t>(pages) / 4 * static_cast<std::uint64_t>(page_bytes)
+             : where_unknown;
+}
+
+}  // namespace palpate

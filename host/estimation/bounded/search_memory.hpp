@@ -1,0 +1,34 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+
+#include "palpate/bounded_posterior.hpp"
+
+namespace palpate {
+
+/// Host memory in bytes that a search by bounds takes. In float64, as absurd lattices exceed every
+/// integer.
+struct SearchMemory {
+  double tables = 0.0;  ///< of the maps: penalties of windows, nodes
+  double tiles = 0.0;   ///< the largest tiles: their sums, and their places in a search
+  double thetas = 0.0;  ///< what every theta of the lattice has
+  double leaves = 0.0;  ///< bins that are evaluated together
+
+  double total() const { return tables + tiles + thetas + leaves; }
+};
+
+/// Allocates nothing. What the search takes while it divides tiles is not foreseen.
+/// @param options checked, with a resolved contact model
+SearchMemory search_memory(std::span<const Hypothesis> hypotheses, const BoundedOptions& options);
+
+/// @throws Error where the bins are too many to number, or the search takes more memory than the
+/// limit; the message says which it is and what to change
+void require_room(std::span<const Hypothesis> hypotheses, const BoundedOptions& options,
+                  std::uint64_t limit_bytes);
+
+/// A quarter of the machine's memory: the rest is for its other programs, and for what the search
+/// takes while it divides tiles.
+std::uint64_t memory_for_search();
+
+}  // namespace palpate

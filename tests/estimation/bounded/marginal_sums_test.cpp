@@ -1,0 +1,83 @@
+// Sums of bins on a coarser grid, against their definition, bin by bin.
+
+#include "marginal_sums.hpp"
+
+#include <cmath>
+#include <numeric>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+namespace palpate {
+namespace {
+
+constexpr PoseLattice bins{.x_mm = {-10.0, 10.0, 23},
+                           .y_mm = {-7.0, 11.0, 17},
+                           .theta_rad = {0.0, 6.283185307179586, 9},
+                           .pivot_mm = {30.0, -4.0}};
+constexpr BinBox box{
+    .object = 0, .theta = 5, .y_first = 3, .y_count = 11, .x_first = 2, .x_count = 20};
+
+/// The marginals by PoseLattice::bin_of() of every bin's centre.
+Marginals by_definition(const PoseLattice& grid, const std::vector<double>& logs, double offset) {
+  Marginals sums{.grid = grid,
+                 .xy = std::vector<double>(static_cast<std::size_t>(grid.plane())),
+                 .theta = std::vector<double>(static_cast<std::size_t>(grid.theta_rad.count))};
+  for (int i = 0; i < box.bins(); ++i) {
+    const std::int64_t index =
+        (std::int64_t{box.theta} * bins.y_mm.count + box.y_first + i / box.x_count) *
+            bins.x_mm.count +
+        box.x_first + i % box.x_count;
+    const std::int64_t at = grid.bin_of(bins.T_object_robot(index));
+    const double p = std::exp(logs[logs.size() == 1 ? 0 : static_cast<std::size_t>(i)] + offset);
+    sums.xy[static_cast<std::size_t>(at % grid.plane())] += p;
+    sums.theta[static_cast<std::size_t>(at / grid.plane())] += p;
+  }
+  return sums;
+}
+
+void expect_near(const std::vector<double>& actual, const std::vector<double>& expected) {
+  ASSERT_EQ(actual.size(), expected.size());
+  for (std::size_t i = 0; i < actual.size(); ++i) {
+    EXPECT_NEAR(actual[i], expected[i], 1e-12 * box.bins()) << "sums of a few hundred float64";
+  }
+}
+
+TEST(MarginalSums, AreThoseOfTheirDefinition) {
+  std::vector<double> logs;
+  for (int i = 0; i < box.bins(); ++i) {
+    logs.push_back(-3.0 + std::sin(0.7 * i));
+  }
+  // Steps that share no border with the bins' centres. The last grid ends within the region.
+  for (const PoseLattice& grid :
+       {bins, PoseLattice{{-10.0, 10.0, 7}, {-7.0, 11.0, 5}, {0.0, 6.283185307179586, 4}, {30, -4}},
+        PoseLattice{{-10.0, 10.0, 7}, {-7.0, 11.0, 5}, {0.0, 6.283185307179586, 4}, {28, 3}},
+        PoseLattice{{-4.0, 3.1, 50}, {-2.0, 4.1, 1}, {1.0, 2.0, 3}, {30, -4}}}) {
+    for (const std::vector<double>& likelihoods : {logs, std::vector<double>{-2.0}}) {
+      MarginalSums sums(bins, grid);
+      sums.add(box, likelihoods, -1.5);
+      const Marginals actual = sums.take();
+      const Marginals expected = by_definition(grid, likelihoods, -1.5);
+      expect_near(actual.xy, expected.xy);
+      expect_near(actual.theta, expected.theta);
+    }
+  }
+}
+
+// 1.6e13 bins: one by one they would take days.
+TEST(MarginalSums, OfOneLikelihoodTakeTheTimeOfTheGrid) {
+  constexpr int count = 4'000'000;
+  const PoseLattice many{{-10.0, 10.0, count}, {-10.0, 10.0, count}, {0.0, 1.0, 1}, {}};
+  const PoseLattice grid{{-10.0, 10.0, 5}, {-10.0, 10.0, 4}, {0.0, 1.0, 1}, {}};
+  MarginalSums sums(many, grid);
+  sums.add({.y_count = count, .x_count = count}, std::vector{0.0},
+           -2.0 * std::log(static_cast<double>(count)));
+  const Marginals marginals = sums.take();
+  for (const double p : marginals.xy) {
+    EXPECT_NEAR(p, 1.0 / 20.0, 1e-12) << "float64";
+  }
+  EXPECT_NEAR(marginals.theta[0], 1.0, 1e-12);
+}
+
+}  // namespace
+}  // namespace palpate
