@@ -95,9 +95,9 @@ BoundedOptions bounded_options(const FilterFlags& flags, const HistogramOptions&
 bool bounds_would_take(Device& device, const RecognitionTask& task) {
   const auto& histogram = std::get<HistogramOptions>(task.filter);
   try {
-    BoundedPosterior(device, task.hypotheses,
-                     {.lattice = histogram.lattice, .contact = histogram.contact});
-    return true;
+    const BoundedPosterior bounded(device, task.hypotheses,
+                                   {.lattice = histogram.lattice, .contact = histogram.contact});
+    return bounded.lattice().bins() > 0;
   } catch (const Error&) {
     return false;
   }

@@ -172,6 +172,9 @@ std::string result_table(const std::vector<RecognitionRecord>& records, const Re
       records, [](const RecognitionRecord& record) { return !fit_word(record.last()).empty(); });
   const bool with_error = std::ranges::any_of(
       records, [](const RecognitionRecord& record) { return record.last().right.has_value(); });
+  // A narrower terminal has no room for the column; complaints() tell what matters of it.
+  constexpr int with_room = 90;
+  const bool with_dropped = !columns || *columns >= with_room;
   TextTable table({{"recording", false, true},
                    {"touches", true},
                    {"best", false, true},
@@ -192,8 +195,8 @@ std::string result_table(const std::vector<RecognitionRecord>& records, const Re
     const RecognitionStep& step = record.last();
     const std::array<std::string, 3> pose = pose_cells(pose_text(step));
     table.add({name_of(record), fmt::format("{}", record.touches), object_words(step, task),
-               fmt::format("{:.3f}", step.confidence()), dropped_text(step), pose[0], pose[1],
-               pose[2], fit_word(step)});
+               fmt::format("{:.3f}", step.confidence()), with_dropped ? dropped_text(step) : "",
+               pose[0], pose[1], pose[2], fit_word(step)});
     if (step.refined) {
       add_pose("  mode", task.hypotheses[step.mode.object].map.label, step.mode_T_robot_object(),
                step.error_mm);

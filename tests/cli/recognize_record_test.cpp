@@ -43,10 +43,14 @@ std::vector<std::string> keys_of(const json& object) {
 
 TEST_F(RecognizeRecord, HasTheDocumentedKeysAndTypes) {
   const json r = record({"u.h5", "--maps", "A.map.h5", "I.map.h5"});
-  EXPECT_EQ(keys_of(r), (std::vector<std::string>{"T_robot_object", "best", "device", "error_mm",
-                                                  "fit", "identity", "mode", "recording", "refined",
-                                                  "refined_error_mm", "right", "seconds",
-                                                  "surprise", "touches", "truth"}));
+  // By bounds, as the automatic bins are many.
+  EXPECT_EQ(keys_of(r), (std::vector<std::string>{"T_robot_object",  "best",    "bins_evaluated",
+                                                  "blocks_bounded",  "device",  "dropped_mass",
+                                                  "error_mm",        "fit",     "identity",
+                                                  "identity_bounds", "mode",    "mode_certain",
+                                                  "recording",       "refined", "refined_error_mm",
+                                                  "right",           "seconds", "surprise",
+                                                  "touches",         "truth"}));
   EXPECT_EQ(r["recording"], "u.h5");
   EXPECT_EQ(r["touches"], 6);
   EXPECT_TRUE(r["touches"].is_number_integer());
@@ -220,8 +224,19 @@ TEST_F(RecognizeRecord, TraceTellsTheSameAfterEveryTouch) {
   ASSERT_EQ(whole["trace"].size(), 6u);
   for (std::size_t i = 0; i < 6; ++i) {
     const json& step = whole["trace"][i];
-    std::vector<std::string> keys{"T_robot_object", "best", "error_mm", "fit",
-                                  "identity",       "mode", "refined",  "refined_error_mm",
+    std::vector<std::string> keys{"T_robot_object",
+                                  "best",
+                                  "bins_evaluated",
+                                  "blocks_bounded",
+                                  "dropped_mass",
+                                  "error_mm",
+                                  "fit",
+                                  "identity",
+                                  "identity_bounds",
+                                  "mode",
+                                  "mode_certain",
+                                  "refined",
+                                  "refined_error_mm",
                                   "right"};
     if (i > 0) {  // only the prior comes before the first touch
       keys.push_back("surprise");

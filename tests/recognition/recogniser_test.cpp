@@ -327,7 +327,11 @@ TEST(AutomaticPivot, ForgetsTouchesThatWaitForItOnlyByAReset) {
     recogniser.update(std::span(&beside.touch, 1));
     EXPECT_THROW(recogniser.update(std::vector{touches[0], unsound}), Error);
     recogniser.update(touches);
-    EXPECT_NE(recogniser.estimate().identity, plain.estimate().identity);
+    // Bounds may drop all but one object, whatever the touches.
+    const Estimate waited = recogniser.estimate();
+    const Estimate unwaited = plain.estimate();
+    EXPECT_TRUE(waited.identity != unwaited.identity ||
+                waited.mode.log_likelihood != unwaited.mode.log_likelihood);
 
     recogniser.reset();
     recogniser.update(std::span(&beside.touch, 1));
