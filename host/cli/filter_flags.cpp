@@ -55,6 +55,12 @@ std::vector<HistogramNeed> all_needs(const RecognitionFlags& flags, const Scene&
       !touch.empty()) {
     needs.push_back({touch, "bounds take every touch's pose to be exact"});
   }
+  const bool with_none =
+      flags.uncertainty.none.has_value() || scene.none.has_value() || scene.auto_none;
+  if (with_none && flags.gamma.value_or(scene.gamma.value_or(0.1)) == 0.0) {
+    needs.push_back({flags.gamma ? "--gamma 0" : flags.scene + ": gamma 0",
+                     "(none) is then the mean of a few bins that a sample misses"});
+  }
   if (flags.filter.memory_mib) {
     needs.push_back({"--memory-mib", "has no effect on bounds, whose memory is the host's"});
   }
@@ -132,8 +138,9 @@ void add_filter_flags(CLI::App& command, FilterFlags& flags) {
           "histogram: evaluates every pose bin; bounded: the same bins, but evaluates only those "
           "that matter and proves how little the others can; particles: the paper's particle "
           "filter; auto: bounded for more than {} bins of all objects together, else histogram. "
-          "Bounded refuses --touch-sd-*, --slip-sd-*, --posterior, --memory-mib and plans; auto "
-          "then takes the histogram [default: auto]",
+          "Bounded refuses --touch-sd-*, --slip-sd-*, --posterior, --memory-mib, --none with "
+          "--gamma "
+          "0, and plans; auto then takes the histogram [default: auto]",
           most_histogram_bins));
   command.add_option("--tolerance", flags.tolerance,
                      "With --filter bounded: largest share of the belief that may be left "

@@ -73,7 +73,10 @@ std::int64_t RecognitionTask::bins_in_all() const {
 }
 
 std::optional<BoundedOptions> bounded_instead(const HistogramOptions& histogram) {
-  if (!histogram.touch_sd.none() || !histogram.slip_sd.none() || histogram.memory_limit_bytes) {
+  const bool without_floor =
+      histogram.none_weight && !histogram.contact.table && histogram.contact.gamma == 0.0;
+  if (!histogram.touch_sd.none() || !histogram.slip_sd.none() || histogram.memory_limit_bytes ||
+      without_floor) {
     return {};
   }
   return BoundedOptions{.lattice = histogram.lattice,

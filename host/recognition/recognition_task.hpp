@@ -62,7 +62,8 @@ inline constexpr std::int64_t most_histogram_bins = 100'000;
 inline constexpr std::int64_t most_bounded_bins = 1'000'000'000;
 
 /// The options of a bounded posterior of the same bins; none where the histogram allows for
-/// something that bounds do not: touch_sd, slip_sd or a limit of its memory.
+/// something that bounds do not: touch_sd, slip_sd, a limit of its memory, or none_weight with
+/// gamma 0.
 std::optional<BoundedOptions> bounded_instead(const HistogramOptions& histogram);
 
 /// Bins that are wider than the maps resolve, to keep their number within a limit.

@@ -55,19 +55,21 @@ void keep_best(std::vector<Tile>& tiles, std::size_t count) {
 /// One run of the search.
 class SearchRun {
  public:
-  SearchRun(const BoundSearch& search, const KnownElements& elements, const BinVisitor& visit,
-            std::vector<PoseBlock>* refined)
+  SearchRun(const BoundSearch& search, const KnownElements& elements, const SearchGoal& goal,
+            const Deadline& deadline, const BinVisitor& visit, std::vector<PoseBlock>* refined)
       : search_(search),
         lattice_(search.options_.lattice),
         elements_(elements),
         refined_(refined),
         thetas_(static_cast<std::size_t>(lattice_.theta_rad.count)),
         finest_(search.bounds_.front().levels().size() - 1),
-        deadline_(search.options_.budget_s),
-        account_(search.log_weight_, search.options_),
-        evaluator_(search.likelihood_, search.batches_, search.log_weight_, search.options_,
-                   elements, visit, deadline_, account_),
-        leaves_(search.bounds_, thetas_, deadline_, account_, evaluator_),
+        goal_(goal),
+        deadline_(deadline),
+        account_(search.log_weight_, lattice_, goal_),
+        evaluator_(search.likelihood_, search.batches_, search.log_weight_, goal_, elements, visit,
+                   deadline_, account_),
+        leaves_(search.bounds_, thetas_, elements.from_pivot_mm.size(), deadline_, account_,
+                evaluator_),
         visit_(visit) {
     for (std::size_t i = 0; i < search_.bounds_.size(); ++i) {
       std::vector<double> of_level;
@@ -94,7 +96,7 @@ class SearchRun {
                               std::min_element(best.begin(), best.end(), before)->bound);
       raise(best, 0);
       count_largest(unsettled);
-      const double share = search_.options_.tolerance * search_share;
+      const double share = goal_.tolerance * search_share;
       const double part = share / static_cast<double>(finest_ + 1);
       std::vector<Tile> kept = keep_largest(unsettled, part);
       account_.drop(unsettled);
@@ -179,7 +181,7 @@ class SearchRun {
   void settle_unseen(const BinBox& box) {
     const auto object = static_cast<std::size_t>(box.object);
     const double value = prior_log_likelihoods_[object];
-    account_.settle(box.object, value + std::log(static_cast<double>(box.bins())), value,
+    account_.settle(box.object, 1, value + std::log(static_cast<double>(box.bins())), value,
                     search_.likelihood_.float64_error(object, elements_));
     account_.note_best(box, 0, value);
     visit_(box, std::span(&value, 1));
@@ -270,8 +272,11 @@ class SearchRun {
     return all;
   }
 
-  /// The parts, one level down, of tiles that are sorted by place.
-  std::vector<Tile> parts_of(std::span<const Tile> tiles, std::size_t level) {
+  /// The parts, one level down, of tiles that are sorted by place. Leaves out those in which every
+  /// element sees the prior.
+  /// @param unseen where not null, takes these
+  std::vector<Tile> parts_of(std::span<const Tile> tiles, std::size_t level,
+                             std::vector<Tile>* unseen = nullptr) {
     std::vector<std::size_t> begins;  // of tasks: tiles of one object and theta
     for (std::size_t i = 0; i < tiles.size(); ++i) {
       if (i == 0 || tiles[i].object != tiles[i - 1].object ||
@@ -280,11 +285,14 @@ class SearchRun {
       }
     }
     std::vector<std::vector<Tile>> parts(begins.size());
+    std::vector<std::vector<Tile>> rest(begins.size());
     tbb::parallel_for(std::size_t{0}, begins.size(), [&](std::size_t task) {
       thread_local WindowPlaces placed;
       const std::size_t end = task + 1 < begins.size() ? begins[task + 1] : tiles.size();
       const Tile& first = tiles[begins[task]];
       const TileBounds& bounds = search_.bounds_[first.object];
+      const TileWindow seen = seen_window(elements_, search_.turns_[first.theta],
+                                          search_.maps_[first.object], bounds.levels()[level + 1]);
       bounds.place(level + 1, search_.turns_[first.theta], elements_, placed);
       parts[task].reserve((end - begins[task]) * batch_tiles);
       for (std::size_t i = begins[task]; i < end; ++i) {
@@ -294,7 +302,17 @@ class SearchRun {
         bounds.add(level + 1, elements_, placed, x, y, sums);
         append_batch(first, level + 1, x, y, sums, parts[task]);
       }
+      const auto begin_unseen =
+          std::stable_partition(parts[task].begin(), parts[task].end(),
+                                [&](const Tile& tile) { return seen.holds(tile); });
+      if (unseen != nullptr) {
+        rest[task].assign(begin_unseen, parts[task].end());
+      }
+      parts[task].erase(begin_unseen, parts[task].end());
     });
+    if (unseen != nullptr) {
+      *unseen = joined(rest);
+    }
     std::vector<Tile> all = joined(parts);
     blocks_ += static_cast<std::int64_t>(all.size());
     return all;
@@ -321,14 +339,21 @@ class SearchRun {
   /// Raises the lower bound of the total: follows the best tiles down to their bins.
   /// @param width so many tiles at first
   void raise(std::vector<Tile> tiles, std::size_t level, std::size_t width = beam_tiles) {
-    if (!search_.options_.evidence_nats) {
+    if (!goal_.evidence_nats) {
       leaves_.probe(best_of_beam(std::move(tiles), level, width));
       return;
     }
     // Every hypothesis's own total is wanted, too.
-    for (std::size_t object = 0; object < search_.bounds_.size(); ++object) {
-      leaves_.probe(best_of_beam(of_object(tiles, object), level, width));
+    std::vector<std::vector<Tile>> own(search_.bounds_.size());
+    for (const Tile& tile : tiles) {
+      own[tile.object].push_back(tile);
     }
+    std::vector<Tile> best;
+    for (std::vector<Tile>& of_object : own) {
+      const std::vector<Tile> found = best_of_beam(std::move(of_object), level, width);
+      best.insert(best.end(), found.begin(), found.end());
+    }
+    leaves_.probe(std::move(best));
   }
 
   /// Follows tiles down to the smallest ones, the best of each level.
@@ -385,7 +410,11 @@ class SearchRun {
   double divide_lot(std::vector<Tile> tiles, std::size_t level, double tolerance) {
     note(tiles, level);
     std::sort(tiles.begin(), tiles.end(), stands_before);
-    std::vector<Tile> parts = parts_of(tiles, level);
+    std::vector<Tile> unseen;
+    std::vector<Tile> parts = parts_of(tiles, level, &unseen);
+    for (const Tile& tile : unseen) {
+      settle_unseen(search_.bounds_[tile.object].levels()[level + 1].box_of(tile));
+    }
     const double dropped = account_.dropped_share();
     double used = 0.0;
     if (level + 1 < finest_) {
@@ -407,7 +436,7 @@ class SearchRun {
       std::vector<Tile> parts = parts_of(lot, level);
       std::size_t next = 0;
       for (Tile& tile : lot) {
-        double largest = nothing;
+        double largest = search_.log_weight_[tile.object] + prior_log_likelihoods_[tile.object];
         for (; next < parts.size() && is_part(parts[next], tile); ++next) {
           largest = std::max(largest, parts[next].bound);
         }
@@ -444,7 +473,7 @@ class SearchRun {
   /// What dropping tiles used up of a tolerance, given what was dropped before.
   double used_of(double tolerance, double dropped_before) const {
     // Where each hypothesis has its own share, a light one may have used it up.
-    return search_.options_.evidence_nats
+    return goal_.evidence_nats
                ? tolerance
                : std::clamp(account_.dropped_share() - dropped_before, 0.0, tolerance);
   }
@@ -474,7 +503,8 @@ class SearchRun {
   std::vector<std::vector<double>> unpenalised_;  ///< [object][level], with the prior weight
   std::vector<double> prior_log_likelihoods_;     ///< [object] of all elements
   std::vector<TileWindow> seen_;                  ///< [object, theta], of the largest tiles
-  Deadline deadline_;
+  SearchGoal goal_;
+  const Deadline& deadline_;
   MassAccount account_;
   LeafEvaluator evaluator_;
   LeafPass leaves_;
@@ -531,11 +561,7 @@ void BoundSearch::add(std::span<const KnownElements> touches) {
     }
     return;
   }
-  KnownElements all;
-  for (const KnownElements& touch : touches) {
-    all = merged(all, touch);
-  }
-  add(all);
+  add(merged(touches));
 }
 
 void BoundSearch::add(const KnownElements& added) {
@@ -577,9 +603,17 @@ void BoundSearch::add(const KnownElements& added) {
   }
 }
 
-SearchResult BoundSearch::run(const KnownElements& elements, const BinVisitor& visit,
+SearchResult BoundSearch::run(const KnownElements& elements, const SearchGoal& goal,
+                              const Deadline& deadline, const BinVisitor& visit,
                               std::vector<PoseBlock>* refined) const {
-  return SearchRun(*this, elements, visit, refined).result();
+  // Evaluating all in float64 would leave so much rounding; the rest may be used up.
+  double least_error = 0.0;
+  for (std::size_t i = 0; i < bounds_.size(); ++i) {
+    least_error = std::max(least_error, likelihood_.float64_error(i, elements));
+  }
+  SearchGoal reachable = goal;
+  reachable.tolerance = std::max(goal.tolerance - 1.1 * least_error, goal.tolerance / 4.0);
+  return SearchRun(*this, elements, reachable, deadline, visit, refined).result();
 }
 
 std::uint64_t BoundSearch::bytes() const {

@@ -29,9 +29,10 @@ class BoundSearch {
   /// @param touches [touch]
   void add(std::span<const KnownElements> touches);
   /// @param elements all that were added since reset()
+  /// @param deadline after which tiles are dropped unseen
   /// @param refined where not null, takes the tiles that were divided
-  SearchResult run(const KnownElements& elements, const BinVisitor& visit,
-                   std::vector<PoseBlock>* refined = nullptr) const;
+  SearchResult run(const KnownElements& elements, const SearchGoal& goal, const Deadline& deadline,
+                   const BinVisitor& visit, std::vector<PoseBlock>* refined = nullptr) const;
 
   /// [hypothesis]
   std::span<const TileBounds> bounds() const { return bounds_; }

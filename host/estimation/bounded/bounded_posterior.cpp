@@ -8,6 +8,7 @@
 
 #include <fmt/format.h>
 #include <tbb/info.h>
+#include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 
 #include "bin_likelihood.hpp"
@@ -32,11 +33,30 @@ namespace palpate {
 
 namespace {
 
+/// Tolerance that a search with a budget reaches before it goes on.
+constexpr double soon = 1e-2;
+
 /// Index in the lattice of the i-th bin of a box.
 std::int64_t bin_in(const PoseLattice& lattice, const BinBox& box, std::int64_t i) {
   return (std::int64_t{box.theta} * lattice.y_mm.count + box.y_first + i / box.x_count) *
              lattice.x_mm.count +
          box.x_first + i % box.x_count;
+}
+
+/// The lattice with every few bins along x and y where they are much finer than a pose's fit needs.
+/// Its centres are centres of the lattice.
+PoseLattice thinned(PoseLattice lattice) {
+  constexpr double fine_mm = 0.1;
+  for (Axis* axis : {&lattice.x_mm, &lattice.y_mm}) {
+    const double step = axis->step();
+    if (axis->count > 1 && 3.0 * step <= fine_mm) {
+      // An odd number, so that the middle one is a centre.
+      const int every = static_cast<int>((fine_mm / step - 1.0) / 2.0) * 2 + 1;
+      axis->count = std::max(1, axis->count / every);
+      axis->upper = axis->lower + axis->count * every * step;
+    }
+  }
+  return lattice;
 }
 
 /// @throws Error on an option out of range
@@ -94,16 +114,39 @@ struct BoundedPosterior::Impl {
 
   const SearchResult& found() {
     if (!result) {
-      bins.clear();
-      result = run([&](const BinBox& box, std::span<const double> log_likelihood) {
-        bins.add(box, log_likelihood);
-      });
+      Deadline deadline(options.budget_s);
+      SearchGoal goal{options.tolerance, options.evidence_nats};
+      if (deadline.exists()) {
+        // What is proven soon comes first: a search that is cut short proves little.
+        goal.tolerance = std::max(goal.tolerance, soon);
+      }
+      result = run(goal, deadline, bins);
+      if (goal.tolerance > options.tolerance && !deadline.passed()) {
+        goal.tolerance = options.tolerance;
+        EvaluatedBins more(true);
+        SearchResult better = run(goal, deadline, more);
+        if (better.uncertain() < result->uncertain()) {
+          result = std::move(better);
+          bins = std::move(more);
+        }
+      }
     }
     return *result;
   }
 
-  SearchResult run(const BinVisitor& visit) {
-    return arena.execute([&] { return search.run(elements, visit); });
+  SearchResult run(const SearchGoal& goal, Deadline& deadline, EvaluatedBins& evaluated) {
+    evaluated.clear();
+    return arena.execute([&] {
+      return search.run(elements, goal, deadline,
+                        [&](const BinBox& box, std::span<const double> log_likelihood) {
+                          evaluated.add(box, log_likelihood);
+                          if (evaluated.full()) {
+                            // With a budget, bins are evaluated as long as there is room for them:
+                            // another search could not evaluate the same.
+                            deadline.end();
+                          }
+                        });
+    });
   }
 
   /// Visits the evaluated bins; searches again where there was no room to keep them.
@@ -112,7 +155,9 @@ struct BoundedPosterior::Impl {
     if (bins.complete()) {
       bins.visit(visitor);
     } else {
-      run(visitor);
+      arena.execute([&] {
+        search.run(elements, {options.tolerance, options.evidence_nats}, Deadline({}), visitor);
+      });
     }
   }
 
@@ -144,7 +189,7 @@ struct BoundedPosterior::Impl {
   KnownElements elements;
   bool touched = false;
   std::optional<SearchResult> result;
-  EvaluatedBins bins;
+  EvaluatedBins bins{options.budget_s.has_value()};
   std::optional<SampledTouchMeans> none;  ///< where the options ask for it
   double none_log_weight = 0.0;           ///< log of its prior weight times the number of bins
   HalfDone half_done{"bounded posterior: an update was broken off half-way; call reset()"};
@@ -157,6 +202,11 @@ BoundedPosterior::BoundedPosterior(Device& device, std::span<const Hypothesis> h
   BoundedOptions checked = options;
   checked.lattice.collapse_fixed().validate();
   checked.contact = resolve(options.contact, hypotheses);
+  if (checked.none_weight && !checked.contact.table && checked.contact.gamma == 0.0) {
+    throw Error(Fault::input,
+                "none_weight: with gamma = 0 the mean likelihood is that of a few bins, which a "
+                "sample misses; use a gamma above 0, or PoseHistogram");
+  }
   require_room(hypotheses, checked, memory_for_search());
   impl_ = std::make_unique<Impl>(device, hypotheses, checked);
 }
@@ -204,11 +254,9 @@ void BoundedPosterior::update(std::span<const Touch> touches,
   Impl& posterior = whole();
   // All touches are gathered before the first is added: one that is not sound refuses all.
   std::vector<KnownElements> of_touches;
-  KnownElements added;
   for (const Touch& touch : touches) {
     of_touches.push_back(
         gather_elements(touch, posterior.options.contact, posterior.options.lattice.pivot_mm));
-    added = merged(added, of_touches.back());
   }
   std::vector<TouchMean> means;
   if (posterior.none) {
@@ -226,7 +274,9 @@ void BoundedPosterior::update(std::span<const Touch> touches,
   posterior.half_done.change([&] {
     posterior.result.reset();
     posterior.touched = posterior.touched || !touches.empty();
-    posterior.elements = merged(posterior.elements, added);
+    std::vector<KnownElements> all = of_touches;
+    all.push_back(std::move(posterior.elements));
+    posterior.elements = merged(all);
     if (posterior.none) {
       posterior.none->add(means);
     }
@@ -270,6 +320,11 @@ Estimate BoundedPosterior::estimate() const {
     estimate.none = estimate.identity.back();
     estimate.identity.pop_back();
   }
+  // Where nothing is known, an interval ends at 0 or 1.
+  const auto probability = [](double own, double others) {
+    const double p = 1.0 / (1.0 + std::exp(others - own));
+    return std::isnan(p) ? std::optional<double>() : p;
+  };
   for (std::size_t i = 0; i < bounds.size(); ++i) {
     LogSum others_low;
     LogSum others_high;
@@ -281,8 +336,9 @@ Estimate BoundedPosterior::estimate() const {
         others_high.add(bounds[other].high);
       }
     }
-    estimate.identity_bounds.push_back({1.0 / (1.0 + std::exp(others_high.log() - bounds[i].low)),
-                                        1.0 / (1.0 + std::exp(others_low.log() - bounds[i].high))});
+    estimate.identity_bounds.push_back(
+        {probability(bounds[i].low, others_high.log()).value_or(0.0),
+         probability(bounds[i].high, others_low.log()).value_or(1.0)});
   }
   estimate.certificate = std::move(certificate);
   estimate.mode = {.object = found.best_object,
@@ -296,20 +352,34 @@ Estimate BoundedPosterior::estimate() const {
 RefinedPose BoundedPosterior::refine(const Mode& mode) const {
   Impl& posterior = whole();
   posterior.require_object(mode.object);
-  const auto log_likelihood = [&](const BinWindow& window) {
-    std::vector<BinBox> boxes;
-    const int thetas = lattice().theta_rad.count;
-    for (int t = 0; t < window.theta_count; ++t) {
-      boxes.push_back({mode.object, ((window.theta_first + t) % thetas + thetas) % thetas,
-                       window.row_first, window.row_count, window.column_first,
-                       window.column_count});
+  // Of very fine bins every few are enough, and all would take long.
+  const PoseLattice fit = thinned(lattice());
+  const bool thin = fit.plane() != lattice().plane();
+  std::optional<BinLikelihood> of_thin;
+  Mode start = mode;
+  if (thin) {
+    of_thin.emplace(posterior.hypotheses, posterior.options.contact, fit);
+    if (mode.bin && *mode.bin >= 0 && *mode.bin < lattice().bins()) {
+      start.bin = fit.bin_of(lattice().T_object_robot(*mode.bin));
     }
+  }
+  const BinLikelihood& likelihood = thin ? *of_thin : posterior.likelihood;
+  const auto log_likelihood = [&](const BinWindow& window) {
+    const int thetas = fit.theta_rad.count;
+    const std::size_t plane = static_cast<std::size_t>(window.row_count) * window.column_count;
     std::vector<float> logs(window.bins());
-    posterior.arena.execute(
-        [&] { posterior.batches.evaluate(boxes, posterior.elements, std::span(logs)); });
+    posterior.arena.execute([&] {
+      tbb::parallel_for(0, window.theta_count, [&](int t) {
+        const BinBox box{mode.object,         ((window.theta_first + t) % thetas + thetas) % thetas,
+                         window.row_first,    window.row_count,
+                         window.column_first, window.column_count};
+        likelihood.evaluate(std::span(&box, 1), posterior.elements,
+                            std::span(logs).subspan(static_cast<std::size_t>(t) * plane, plane));
+      });
+    });
     return std::vector<double>(logs.begin(), logs.end());
   };
-  return palpate::refine(log_likelihood, lattice(), posterior.bodies[mode.object], mode);
+  return palpate::refine(log_likelihood, fit, posterior.bodies[mode.object], start);
 }
 
 Marginals BoundedPosterior::marginals(int object) const { return marginals(object, lattice()); }
@@ -441,7 +511,9 @@ std::vector<PoseBlock> BoundedPosterior::refined_blocks() const {
                              .y_count = box.y_count});
       }
     };
-    posterior.search.run(posterior.elements, note, &blocks);
+    posterior.search.run(posterior.elements,
+                         {posterior.options.tolerance, posterior.options.evidence_nats},
+                         Deadline({}), note, &blocks);
     blocks.insert(blocks.end(), evaluated.begin(), evaluated.end());
   });
   return blocks;

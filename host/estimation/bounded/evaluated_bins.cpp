@@ -2,22 +2,13 @@
 
 namespace palpate {
 
-namespace {
-
-/// Together with the vectors' growth within some 160 MiB.
-constexpr std::uint64_t most_bytes = std::uint64_t{80} << 20;
-
-}  // namespace
-
-void EvaluatedBins::clear() { *this = {}; }
-
 void EvaluatedBins::add(const BinBox& box, std::span<const double> log_likelihood) {
   if (!complete_) {
     return;
   }
-  if (boxes_.size() * (sizeof(BinBox) + sizeof(std::uint32_t)) +
-          (values_.size() + log_likelihood.size()) * sizeof(double) >
-      most_bytes) {
+  if (!keeps_all_ && bytes_used() + sizeof(BinBox) + sizeof(std::uint32_t) +
+                             log_likelihood.size() * sizeof(double) >
+                         most_bytes) {
     clear();
     complete_ = false;
     return;

@@ -52,11 +52,11 @@ KnownElements gather_elements(const Touch& touch, const ContactModel& model,
   return in_order(std::move(elements));
 }
 
-KnownElements merged(const KnownElements& a, const KnownElements& b) {
+KnownElements merged(std::span<const KnownElements> lists) {
   std::vector<KnownElement> elements;
-  elements.reserve(a.from_pivot_mm.size() + b.from_pivot_mm.size());
-  append(a, elements);
-  append(b, elements);
+  for (const KnownElements& list : lists) {
+    append(list, elements);
+  }
   return in_order(std::move(elements));
 }
 

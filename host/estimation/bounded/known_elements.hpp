@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <span>
 #include <vector>
 
 #include <glm/vec2.hpp>
@@ -31,7 +32,7 @@ struct KnownElements {
 KnownElements gather_elements(const Touch& touch, const ContactModel& model,
                               const glm::dvec2& pivot_mm);
 
-/// The elements of both.
-KnownElements merged(const KnownElements& a, const KnownElements& b);
+/// The elements of all.
+KnownElements merged(std::span<const KnownElements> lists);
 
 }  // namespace palpate

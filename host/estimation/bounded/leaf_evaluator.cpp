@@ -16,8 +16,8 @@ constexpr std::size_t leaves_per_task = 16;
 constexpr std::size_t most_pending_bytes = std::size_t{32} << 20;
 /// Part of the tolerance that rounding may use up.
 constexpr double rounding_part = 0.2;
-/// Leaves that are evaluated in float64 before the clock is looked at again.
-constexpr std::size_t refined_together = 2048;
+/// Products of bins and elements that are evaluated in float64 before the clock is looked at again.
+constexpr double refined_together = 2e6;
 
 /// Calls run(part) for parts of the leaves, in parallel.
 template <typename Leaf, typename Run>
@@ -47,13 +47,13 @@ void sum_up(std::span<Leaf> leaves, const Value* values) {
 }  // namespace
 
 LeafEvaluator::LeafEvaluator(const BinLikelihood& likelihood, FasterBinLikelihood& batches,
-                             std::span<const double> log_weight, const BoundedOptions& options,
+                             std::span<const double> log_weight, const SearchGoal& goal,
                              const KnownElements& elements, const BinVisitor& visit,
                              const Deadline& deadline, MassAccount& account)
     : likelihood_(likelihood),
       batches_(batches),
       log_weight_(log_weight),
-      options_(options),
+      goal_(goal),
       elements_(elements),
       visit_(visit),
       deadline_(deadline),
@@ -63,6 +63,7 @@ LeafEvaluator::LeafEvaluator(const BinLikelihood& likelihood, FasterBinLikelihoo
     float32_error_.push_back(batches.float32_error(i, elements));
     float64_error_.push_back(likelihood.float64_error(i, elements));
   }
+  least_error_ = *std::max_element(float64_error_.begin(), float64_error_.end());
 }
 
 void LeafEvaluator::look(const BinBox& box) {
@@ -129,14 +130,16 @@ std::vector<std::size_t> LeafEvaluator::to_be_refined(double share) const {
            account_.best();
   };
   const auto needs_evidence = [&](const Leaf& leaf) {
-    return options_.evidence_nats && 2.0 * std::expm1(float32_error_[leaf.box.object]) >
-                                         evidence_rounding_part * *options_.evidence_nats;
+    return goal_.evidence_nats && 2.0 * std::expm1(float32_error_[leaf.box.object]) >
+                                      evidence_rounding_part * *goal_.evidence_nats;
   };
   std::vector<double> rounding(slots);
   for (const Leaf& leaf : pending_) {
     rounding[slot_of(leaf)] += std::expm1(float32_error_[leaf.box.object]) * share_of(leaf);
   }
-  double left = (options_.tolerance * rounding_part - account_.rounding_share()) * share;
+  const double left_part =
+      goal_.tolerance * rounding_part + least_error_ - account_.rounding_share();
+  double left = left_part * share;
   std::size_t from = slots;
   for (; from > 0 && left >= rounding[from - 1]; --from) {
     left -= rounding[from - 1];
@@ -157,13 +160,15 @@ void LeafEvaluator::settle(double share) {
   const std::vector<std::size_t> refined = to_be_refined(share);
   std::vector<Leaf> exact;
   std::vector<double> values;
+  const auto elements = static_cast<double>(elements_.from_pivot_mm.size() + 1);
   std::size_t done = 0;
   while (done < refined.size() && (done == 0 || !deadline_.passed())) {
-    const std::size_t end = std::min(done + refined_together, refined.size());
     exact.clear();
     std::size_t value = 0;
-    for (std::size_t i = done; i < end; ++i) {
-      exact.push_back(pending_[refined[i]]);
+    std::size_t end = done;
+    for (const auto most = static_cast<std::size_t>(refined_together / elements);
+         end < refined.size() && (end == done || value < most); ++end) {
+      exact.push_back(pending_[refined[end]]);
       exact.back().first = value;
       value += static_cast<std::size_t>(exact.back().box.bins());
     }
@@ -191,7 +196,7 @@ void LeafEvaluator::settle(double share) {
 }
 
 void LeafEvaluator::settle(const Leaf& leaf, std::span<const double> values, double error) {
-  account_.settle(leaf.box.object, leaf.log_mass, leaf.largest, error);
+  account_.settle(leaf.box.object, leaf.box.bins(), leaf.log_mass, leaf.largest, error);
   account_.note_best(leaf.box, std::max_element(values.begin(), values.end()) - values.begin(),
                      leaf.largest);
   visit_(leaf.box, values);

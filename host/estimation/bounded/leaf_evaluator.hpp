@@ -30,6 +30,12 @@ class Deadline {
   }
   bool exists() const { return at_.has_value(); }
   bool passed() const { return at_ && Clock::now() >= *at_; }
+  /// Lets it pass now, where there is a budget.
+  void end() {
+    if (at_) {
+      at_ = Clock::time_point::min();
+    }
+  }
 
  private:
   using Clock = std::chrono::steady_clock;
@@ -43,7 +49,7 @@ class LeafEvaluator {
  public:
   /// @param batches evaluates batches in float32, `likelihood` leaves in float64
   LeafEvaluator(const BinLikelihood& likelihood, FasterBinLikelihood& batches,
-                std::span<const double> log_weight, const BoundedOptions& options,
+                std::span<const double> log_weight, const SearchGoal& goal,
                 const KnownElements& elements, const BinVisitor& visit, const Deadline& deadline,
                 MassAccount& account);
 
@@ -73,13 +79,14 @@ class LeafEvaluator {
   const BinLikelihood& likelihood_;
   FasterBinLikelihood& batches_;
   std::span<const double> log_weight_;
-  const BoundedOptions& options_;
+  const SearchGoal& goal_;
   const KnownElements& elements_;
   const BinVisitor& visit_;
   const Deadline& deadline_;
   MassAccount& account_;
   std::vector<double> float32_error_;  ///< [hypothesis]
   std::vector<double> float64_error_;
+  double least_error_ = 0.0;  ///< that evaluating all in float64 would leave
   std::vector<Leaf> pending_;
   std::vector<float> values_;         ///< of the pending leaves
   std::vector<LogSum> pending_mass_;  ///< [hypothesis] lower bounds, with the prior weight

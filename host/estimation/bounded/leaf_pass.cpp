@@ -10,12 +10,11 @@ namespace palpate {
 
 namespace {
 
-/// Boxes that are evaluated before the total is looked at again: few at first, for the best ones
+/// Bins that are evaluated before the total is looked at again: few at first, for the best ones
 /// raise it most.
-constexpr std::size_t first_batch = 128;
-constexpr std::size_t largest_batch = 262'144;
-/// The same where a budget must not be overdrawn by much.
-constexpr std::size_t largest_budgeted_batch = 4096;
+constexpr std::int64_t first_batch = 1024;
+/// Products of bins and elements, where a budget must not be overdrawn by much: a few ms.
+constexpr std::int64_t budgeted_work = 5'000'000;
 
 }  // namespace
 
@@ -37,10 +36,11 @@ UnsettledMass unsettled(std::span<const Tile> tiles, std::size_t level,
   return mass;
 }
 
-LeafPass::LeafPass(std::span<const TileBounds> bounds, std::size_t thetas, const Deadline& deadline,
-                   MassAccount& account, LeafEvaluator& evaluator)
+LeafPass::LeafPass(std::span<const TileBounds> bounds, std::size_t thetas, std::size_t elements,
+                   const Deadline& deadline, MassAccount& account, LeafEvaluator& evaluator)
     : bounds_(bounds),
       thetas_(thetas),
+      elements_(static_cast<std::int64_t>(elements) + 1),
       deadline_(deadline),
       account_(account),
       evaluator_(evaluator),
@@ -165,16 +165,23 @@ void LeafPass::evaluate(std::span<const Tile> tiles, double tolerance) {
       ordered[begins[left.slot(family.bound)]++] = family;
     }
   }
-  std::size_t size = first_batch;
+  const std::int64_t most =
+      deadline_.exists() ? std::max(first_batch, budgeted_work / elements_) : largest_batch;
+  std::int64_t size = first_batch;
   for (std::size_t next = 0; next < ordered.size() && !deadline_.passed();) {
     std::vector<BinBox> boxes;
-    for (; next < ordered.size() && boxes.size() < size; ++next) {
+    std::int64_t bins = 0;
+    for (; next < ordered.size() && bins < size; ++next) {
       const Family& family = ordered[next];
+      const std::size_t before = boxes.size();
       take_family(tiles.subspan(family.first, family.end - family.first), from, left, boxes);
+      for (std::size_t i = before; i < boxes.size(); ++i) {
+        bins += boxes[i].bins();
+      }
     }
     evaluate_boxes(std::move(boxes));
     from = account_.droppable_from(left, tolerance);
-    size = std::min(2 * size, deadline_.exists() ? largest_budgeted_batch : largest_batch);
+    size = std::min(2 * size, most);
   }
   account_.drop(left);
 }

@@ -12,13 +12,16 @@
 
 namespace palpate {
 
+/// Bins that are evaluated together at most, but for the last tile's: limits the memory for them.
+inline constexpr std::int64_t largest_batch = 500'000;
+
 /// The last step of a search by bounds: evaluates the bins of the smallest tiles in the order of
 /// their bounds.
 class LeafPass {
  public:
   /// @param thetas of the lattice
-  LeafPass(std::span<const TileBounds> bounds, std::size_t thetas, const Deadline& deadline,
-           MassAccount& account, LeafEvaluator& evaluator);
+  LeafPass(std::span<const TileBounds> bounds, std::size_t thetas, std::size_t elements,
+           const Deadline& deadline, MassAccount& account, LeafEvaluator& evaluator);
 
   /// Evaluates the bins of a few tiles ahead of the others, to learn how much mass there is at
   /// least.
@@ -48,6 +51,7 @@ class LeafPass {
 
   std::span<const TileBounds> bounds_;
   std::size_t thetas_;
+  std::int64_t elements_;  ///< one more than there are
   const Deadline& deadline_;
   MassAccount& account_;
   LeafEvaluator& evaluator_;

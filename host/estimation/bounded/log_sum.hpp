@@ -5,14 +5,20 @@
 
 namespace palpate {
 
-/// The log of a sum of numbers that are given by their logs, in float64.
+/// The log of a sum of numbers that are given by their logs, in float64. Infinity and NaN stay.
 class LogSum {
  public:
   void add(double log_value) {
-    if (log_value > largest_) {
+    constexpr double infinity = std::numeric_limits<double>::infinity();
+    if (!(largest_ < infinity)) {
+      largest_ = std::isnan(log_value) ? log_value : largest_;
+    } else if (!(log_value < infinity)) {
+      largest_ = log_value;
+      sum_ = 1.0;
+    } else if (log_value > largest_) {
       sum_ = sum_ * std::exp(largest_ - log_value) + 1.0;
       largest_ = log_value;
-    } else if (log_value > -std::numeric_limits<double>::infinity()) {
+    } else if (log_value > -infinity) {
       sum_ += std::exp(log_value - largest_);
     }
   }

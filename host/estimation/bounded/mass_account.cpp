@@ -13,11 +13,14 @@ constexpr double nothing = -std::numeric_limits<double>::infinity();
 
 }  // namespace
 
-MassAccount::MassAccount(std::span<const double> log_weight, const BoundedOptions& options)
+MassAccount::MassAccount(std::span<const double> log_weight, const PoseLattice& lattice,
+                         const SearchGoal& goal)
     : log_weight_(log_weight),
-      options_(options),
+      lattice_(lattice),
+      goal_(goal),
       evaluated_(log_weight.size()),
       rounding_(log_weight.size()),
+      terms_(log_weight.size()),
       dropped_(log_weight.size()),
       log_total_(nothing),
       log_totals_(log_weight.size(), nothing),
@@ -26,10 +29,14 @@ MassAccount::MassAccount(std::span<const double> log_weight, const BoundedOption
       largest_dropped_of_(log_weight.size(), nothing),
       mode_value_(nothing) {}
 
-void MassAccount::settle(std::int32_t object, double log_mass, double largest, double error) {
+void MassAccount::settle(std::int32_t object, std::int64_t bins, double log_mass, double largest,
+                         double error) {
   const double mass = log_weight_[object] + log_mass;
   evaluated_[object].add(mass);
-  const double rounding = mass + std::log(std::expm1(error));
+  terms_[object] += static_cast<double>(bins);
+  // Beyond, expm1 is infinite, and the log of it is the error itself.
+  constexpr double most = 700.0;
+  const double rounding = mass + (error < most ? std::log(std::expm1(error)) : error);
   rounding_[object].add(rounding);
   all_rounding_.add(rounding);
   raise_best(object, largest - error);
@@ -45,7 +52,7 @@ void MassAccount::drop(const UnsettledMass& tiles) {
 }
 
 void MassAccount::note_best(const BinBox& box, std::int64_t bin_of_box, double log_likelihood) {
-  const PoseLattice& in = options_.lattice;
+  const PoseLattice& in = lattice_;
   const std::int64_t bin =
       (std::int64_t{box.theta} * in.y_mm.count + box.y_first + bin_of_box / box.x_count) *
           in.x_mm.count +
@@ -82,11 +89,11 @@ std::vector<std::size_t> MassAccount::droppable_from(const UnsettledMass& tiles,
   const std::size_t of_all = std::max(tiles.droppable_from(std::log(tolerance) + log_total_),
                                       tiles.slot(best_) + 1);  // the mode must not be lost
   std::vector<std::size_t> from(evaluated_.size(), of_all);
-  if (options_.evidence_nats) {
+  if (goal_.evidence_nats) {
     // Of each hypothesis's own mass, as large a part of what may be missing; the rest of the nats
     // is for rounding.
-    const double missing = std::expm1(*options_.evidence_nats * (1.0 - evidence_rounding_part)) *
-                           tolerance / options_.tolerance;
+    const double missing = std::expm1(*goal_.evidence_nats * (1.0 - evidence_rounding_part)) *
+                           tolerance / goal_.tolerance;
     for (std::size_t i = 0; i < from.size(); ++i) {
       from[i] = std::max(of_all, tiles.droppable_from(i, std::log(missing) + log_totals_[i]));
     }
@@ -107,9 +114,12 @@ SearchResult MassAccount::result() const {
   for (std::size_t i = 0; i < evaluated_.size(); ++i) {
     result.mode_certain =
         result.mode_certain && log_weight_[i] + largest_dropped_of_[i] < mode_value_;
-    result.evidence.push_back({.evaluated = evaluated_[i].log(),
-                               .rounding = rounding_[i].log(),
-                               .dropped = dropped_[i].log()});
+    // Each exponential and each addition of the sums rounds by a few units of 2^-53.
+    const double sum_error = 4.0 * (terms_[i] + 1.0) * 0x1p-53;
+    result.evidence.push_back(
+        {.evaluated = evaluated_[i].log(),
+         .rounding = log_add(rounding_[i].log(), evaluated_[i].log() + std::log(sum_error)),
+         .dropped = dropped_[i].log()});
   }
   return result;
 }

@@ -1,19 +1,27 @@
 #pragma once
 
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
 #include "bin_likelihood.hpp"
 #include "log_sum.hpp"
-#include "palpate/bounded_posterior.hpp"
+#include "palpate/lattice.hpp"
 #include "unsettled_mass.hpp"
 
 namespace palpate {
 
 /// Part of BoundedOptions::evidence_nats that rounding may use up.
 inline constexpr double evidence_rounding_part = 0.2;
+
+/// What a search is to reach; as BoundedOptions.
+struct SearchGoal {
+  double tolerance = 1e-6;
+  std::optional<double> evidence_nats = {};
+};
 
 /// What a search found out about one hypothesis: logs in nats, with its prior weight.
 struct HypothesisEvidence {
@@ -33,17 +41,31 @@ struct SearchResult {
   bool contradicted = false;
   std::int64_t blocks_bounded = 0;
   std::int64_t bins_evaluated = 0;
+
+  /// Bound of the mass that is not known, relative to that which is.
+  double uncertain() const {
+    LogSum evaluated;
+    LogSum unknown;
+    for (const HypothesisEvidence& of : evidence) {
+      evaluated.add(of.evaluated);
+      unknown.add(of.rounding);
+      unknown.add(of.dropped);
+    }
+    return std::exp(unknown.log() - evaluated.log());
+  }
 };
 
 /// Keeps account of a search: of the mass that was settled, by evaluating bins, with the error of
 /// rounding, and of the mass that was dropped. Says which tiles may be dropped.
 class MassAccount {
  public:
-  MassAccount(std::span<const double> log_weight, const BoundedOptions& options);
+  MassAccount(std::span<const double> log_weight, const PoseLattice& lattice,
+              const SearchGoal& goal);
 
-  /// Counts bins whose summed likelihood is exp(log_mass), each within exp(+-error).
+  /// Counts so many bins whose summed likelihood is exp(log_mass), each within exp(+-error).
   /// @param largest log-likelihood of these bins; without the prior weight, as log_mass is
-  void settle(std::int32_t object, double log_mass, double largest, double error);
+  void settle(std::int32_t object, std::int64_t bins, double log_mass, double largest,
+              double error);
   /// Counts the mass of all tiles that are left.
   void drop(const UnsettledMass& tiles);
   /// Notes the best of some settled bins.
@@ -78,9 +100,11 @@ class MassAccount {
 
  private:
   std::span<const double> log_weight_;
-  const BoundedOptions& options_;
+  const PoseLattice& lattice_;
+  const SearchGoal& goal_;
   std::vector<LogSum> evaluated_;  ///< [hypothesis], with the prior weight
   std::vector<LogSum> rounding_;
+  std::vector<double> terms_;  ///< [hypothesis] of the sums
   std::vector<LogSum> dropped_;
   LogSum all_rounding_;
   LogSum all_dropped_;

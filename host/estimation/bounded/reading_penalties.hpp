@@ -12,7 +12,7 @@ namespace palpate {
 /// Penalties are whole multiples of 1 / penalties_per_nat nats.
 inline constexpr double penalties_per_nat = 256.0;
 /// The largest penalty of an element; larger ones count as much, which leaves bounds true.
-inline constexpr std::uint16_t largest_penalty = 8192;
+inline constexpr std::uint16_t largest_penalty = 32767;
 
 /// The least penalty of one reading in every square of a map: how much less likely the reading is
 /// at least, at any place within the square, than at the map's most likely place. Squares are the

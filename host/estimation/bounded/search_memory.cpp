@@ -10,6 +10,7 @@
 #include <fmt/format.h>
 
 #include "array_overlap.hpp"
+#include "leaf_pass.hpp"
 #include "map_patches.hpp"
 #include "palpate/error.hpp"
 #include "tile_levels.hpp"
@@ -19,8 +20,6 @@ namespace palpate {
 
 namespace {
 
-/// Families of 4 x 4 of the smallest tiles that LeafPass evaluates at a time.
-constexpr double families_together = 4096.0;
 /// Bins of all objects that 64 bits number, with room for sums.
 constexpr double most_bins = 4e18;
 
@@ -39,7 +38,8 @@ double bins_within(const Axis& axis, double side_mm) {
 /// A window table's entries, as window_table() lays them out.
 double table_bytes(const OccupancyGrid& map, const TileSize& size) {
   const auto windows = [&](int cells) {
-    return 2.0 * WindowTable::margin + std::ceil((cells + 1.0) * size.parts / size.side);
+    const double squares = std::ceil((cells + 1.0) / size.square_cells());
+    return 2.0 * WindowTable::margin + std::ceil(squares / size.side);
   };
   return windows(map.nx) * windows(map.ny) * batch_side * size.side * size.side *
          sizeof(std::uint16_t);
@@ -92,8 +92,9 @@ SearchMemory search_memory(std::span<const Hypothesis> hypotheses, const Bounded
     memory.thetas += thetas * (sizeof(glm::dvec2) +
                                static_cast<double>(hypotheses.size()) * sizeof(OverlapPlane));
   }
-  memory.leaves = sizeof(float) *
-                  std::min(families_together * largest_family, bins_in_all(hypotheses, lattice));
+  // The last family of a batch may exceed the batch by all of its bins.
+  memory.leaves = sizeof(float) * std::min(static_cast<double>(largest_batch) + largest_family,
+                                           bins_in_all(hypotheses, lattice));
   return memory;
 }
 

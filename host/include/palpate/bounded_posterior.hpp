@@ -30,7 +30,8 @@ struct BoundedOptions {
   /// hypothesis is: for a temperature that is applied later. By default only the tolerance counts.
   std::optional<double> evidence_nats = {};
   /// Prior weight W of "none of these", as HistogramOptions::none_weight. The mean likelihood of
-  /// each touch is estimated from a sample of the bins; Certificate says how exactly.
+  /// each touch is estimated from a sample of the bins; Certificate says how exactly. Needs a
+  /// contact model with a floor: gamma above 0, or a table.
   std::optional<double> none_weight = {};
   /// Host threads; 0 takes as many as the machine has cores.
   int threads = 0;

@@ -198,8 +198,9 @@ std::int64_t expect_sound_search(Device& device, const BinCase& of, double toler
   Visited visited(of, 2);
   std::int64_t together = 0;
   bool once = true;
-  const SearchResult result =
-      search.run(of.elements, [&](const BinBox& box, std::span<const double> values) {
+  const SearchResult result = search.run(
+      of.elements, {.tolerance = tolerance}, Deadline({}),
+      [&](const BinBox& box, std::span<const double> values) {
         once = once && visited.take(box, values);
         if (values.size() == 1 && box.bins() > 1) {
           EXPECT_NEAR(values[0], prior_log_likelihood(of, static_cast<std::size_t>(box.object)),
