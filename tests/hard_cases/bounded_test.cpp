@@ -99,8 +99,9 @@ TEST(BoundedHard, LogOddsAtTheLargestThatAMapMayHold) {
       for (double& p : recording.pressure) {
         p = pressure;
       }
-      // 1e31 nats keep 16 digits.
-      expect_certificate(hard, objects, options, recording, gamma > 0.0 ? 1e-9 : 1e16);
+      // 1e31 nats keep 16 digits. With a floor the likelihood is near exact, but rounding that may
+      // move such log odds by more than the floor's depth proves nothing: all may be missing.
+      expect_certificate(hard, objects, options, recording, gamma > 0.0 ? 1.0 : 1e16);
     }
   }
 }

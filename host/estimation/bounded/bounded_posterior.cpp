@@ -161,7 +161,7 @@ struct BoundedPosterior::Impl {
     }
   }
 
-  /// Probability of a bin, given the log-likelihood of it.
+  /// Log of the summed likelihood of all evaluated bins, with prior weights.
   double log_total() {
     LogSum total;
     for (const HypothesisEvidence& evidence : found().evidence) {

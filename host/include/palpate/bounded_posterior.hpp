@@ -20,8 +20,9 @@ struct BoundedOptions {
   PoseLattice lattice;
   ContactModel contact = {};  ///< what the sensor says about a place (Eq. 3, 7)
   /// Largest total variation distance from the posterior over all bins, in (0, 1). Each estimate()
-  /// evaluates as many bins as the tolerance needs. The rounding of float64, which the certificate
-  /// counts, may exceed a tolerance below about 1e-9.
+  /// evaluates as many bins as the tolerance needs. The certificate counts the rounding of float64,
+  /// which alone may exceed a tolerance below about 1e-8, or any where there are many hundred
+  /// touches or the region lies more than 10 m away.
   double tolerance = 1e-6;
   /// Seconds after which estimate() stops and reports what it has proven by then, also where that
   /// is less than the tolerance asks for. By default it takes the time that the tolerance needs.
@@ -37,8 +38,8 @@ struct BoundedOptions {
   int threads = 0;
 };
 
-/// A block of bins of one hypothesis at one theta that a search divided into smaller ones or, at the
-/// last level, evaluated.
+/// A block of bins of one hypothesis at one theta that a search divided into smaller ones or, at
+/// the last level, evaluated.
 struct PoseBlock {
   int object = 0;  ///< index into the hypotheses
   int level = 0;   ///< 0 for the largest blocks
@@ -53,16 +54,17 @@ struct PoseBlock {
 /// and proves how little the others can. Its bins are those of PoseHistogram. Blocks of bins are
 /// bounded from above by tables of the smallest penalty within a window of the map; blocks that
 /// cannot matter are dropped, and the bins of the others are evaluated. Memory follows the maps,
-/// not the bins. The result does not depend on the order of touches, on the number of threads or on
-/// the processor's vector width, unless a budget ends the search. An object that was moved from
-/// throws Error on every call.
+/// not the bins. The result does not depend on the order of touches (but that "none of these"
+/// counts the first one's place), on the number of threads or on the processor's vector width,
+/// unless a budget ends the search or a GPU evaluates bins faster than the host. An object that was
+/// moved from throws Error on every call.
 class BoundedPosterior {
  public:
   /// Builds the window tables of the maps.
   /// @throws Error on an empty list, a map that is not sound, maps of different priors where the
-  /// options give none, a weight that is not positive and finite, a lattice, contact model or option
-  /// out of range, a table for another number of objects, or a lattice whose tiles and tables would
-  /// take more than a quarter of the machine's memory
+  /// options give none, a weight that is not positive and finite, a lattice, contact model or
+  /// option out of range, a table for another number of objects, or a lattice whose tiles and
+  /// tables would take more than a quarter of the machine's memory
   BoundedPosterior(Device& device, std::span<const Hypothesis> hypotheses,
                    const BoundedOptions& options);
   ~BoundedPosterior();
@@ -76,7 +78,7 @@ class BoundedPosterior {
   void move_pivot(const glm::dvec2& pivot_mm);
 
   /// Multiplies the belief by the likelihood of these touches (Eq. 7, 13): adds their penalties to
-  /// the largest blocks. Calls `progress` with the fraction done from time to time. Takes in no
+  /// the largest blocks. Calls `progress` with the fraction done before it does so. Takes in no
   /// touch at all if one of them is not sound or if `progress` throws.
   /// @throws Error on a touch that is not sound; what `progress` throws
   void update(std::span<const Touch> touches, const std::function<void(double)>& progress = {});

@@ -52,7 +52,9 @@ struct Certificate {
   std::vector<LogInterval> log_evidence = {};
   bool mode_certain = false;         ///< no bin that was not evaluated can exceed the mode
   std::int64_t blocks_bounded = 0;   ///< blocks of bins whose bound was computed
-  std::int64_t bins_evaluated = 0;   ///< bins whose likelihood was computed
+  /// Bins whose likelihood was computed. Those at which every element sees the prior are settled
+  /// without.
+  std::int64_t bins_evaluated = 0;
   /// Log evidence of "none of these" with its prior weight, comparable to log_evidence, and its
   /// standard error, in nats: it is estimated from a sample of the bins. None where the options do
   /// not ask for "none of these".
@@ -70,7 +72,8 @@ struct PoseSample {
 struct Estimate {
   std::vector<double> identity;  ///< probability of every hypothesis, Eq. 14; with `none` sums to 1
   /// Bounds of every probability in `identity`, from a filter that knows no more than the bounds;
-  /// empty where `identity` is exact.
+  /// empty where `identity` is exact. They take the evidence of "none of these" as exact, see
+  /// Certificate::none_standard_error.
   std::vector<ProbabilityInterval> identity_bounds = {};
   std::optional<Certificate> certificate = {};  ///< from a filter that knows bounds
   double none = 0.0;  ///< probability of "none of these", where the options ask for it
