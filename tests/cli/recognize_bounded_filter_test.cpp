@@ -325,7 +325,7 @@ TEST_F(BoundedFilter, IsRefusedWhereTheMachineHasNoRoomForIt) {
   const Arguments dense{"--bins=300000x300000x2"};
   const Arguments absurd{"--bins=2000000000x2000000000x2000000000"};
   expect_refused(with_filter("bounded", fine), {"lattice", "too many", "use fewer bins"});
-  expect_refused(with_filter("bounded", dense), {"lattice", "MiB", "fewer bins along x and y"});
+  expect_refused(with_filter("bounded", dense), {"lattice", "fewer bins along x and y"});
   expect_refused(with_filter("bounded", turning), {"lattice", "MiB", "fewer thetas"});
   expect_refused(with_filter("bounded", wide), {"lattice", "MiB", "narrow the region"});
   expect_refused(with_filter("bounded", absurd), {"lattice", "use fewer bins"});

@@ -20,6 +20,8 @@ namespace palpate {
 
 namespace {
 
+/// Bins that the parts of one tile may hold: they are evaluated together.
+constexpr double most_family_bins = 1e7;
 /// Bins of all objects that 64 bits number, with room for sums.
 constexpr double most_bins = 4e18;
 
@@ -68,7 +70,6 @@ SearchMemory search_memory(std::span<const Hypothesis> hypotheses, const Bounded
   }
   const std::vector<TileSize> sizes = tile_sizes(lattice, least_cell_mm, hypotheses.size());
   SearchMemory memory;
-  double largest_family = 0.0;  // in bins
   for (const Hypothesis& hypothesis : hypotheses) {
     const OccupancyGrid& map = hypothesis.map;
     memory.tables += node_bytes(map);
@@ -82,8 +83,9 @@ SearchMemory search_memory(std::span<const Hypothesis> hypotheses, const Bounded
     memory.tiles += (sizeof(std::int32_t) + sizeof(Tile)) * thetas *
                     tiles_along(lattice.x_mm, largest_mm) * tiles_along(lattice.y_mm, largest_mm);
     const double family_mm = batch_side * sizes.back().cells() * map.cell_mm;
-    largest_family = std::max(largest_family, bins_within(lattice.x_mm, family_mm) *
-                                                  bins_within(lattice.y_mm, family_mm));
+    memory.largest_family =
+        std::max(memory.largest_family,
+                 bins_within(lattice.x_mm, family_mm) * bins_within(lattice.y_mm, family_mm));
   }
   // A cosine and a sine; and of every object the tiles that see the map, and the best of them.
   memory.thetas = thetas * (sizeof(glm::dvec2) + static_cast<double>(hypotheses.size()) *
@@ -93,8 +95,11 @@ SearchMemory search_memory(std::span<const Hypothesis> hypotheses, const Bounded
                                static_cast<double>(hypotheses.size()) * sizeof(OverlapPlane));
   }
   // The last family of a batch may exceed the batch by all of its bins.
-  memory.leaves = sizeof(float) * std::min(static_cast<double>(largest_batch) + largest_family,
-                                           bins_in_all(hypotheses, lattice));
+  // Each bin's value as it is evaluated, settled and kept.
+  constexpr double bytes_per_bin = sizeof(float) + 2 * sizeof(double);
+  memory.leaves =
+      bytes_per_bin * std::min(static_cast<double>(largest_batch) + memory.largest_family,
+                               bins_in_all(hypotheses, lattice));
   return memory;
 }
 
@@ -108,6 +113,12 @@ void require_room(std::span<const Hypothesis> hypotheses, const BoundedOptions& 
     throw Error(Fault::input, fmt::format("{} are too many to number; use fewer bins", what));
   }
   const SearchMemory memory = search_memory(hypotheses, options);
+  if (memory.largest_family > most_family_bins) {
+    throw Error(Fault::input,
+                fmt::format("{}: {:.0f} bins within two cells of a map are more than a search "
+                            "evaluates together, {:.0f}; use fewer bins along x and y",
+                            what, memory.largest_family, most_family_bins));
+  }
   if (memory.total() <= static_cast<double>(limit_bytes)) {
     return;
   }

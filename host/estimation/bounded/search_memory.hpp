@@ -15,6 +15,7 @@ struct SearchMemory {
   double thetas = 0.0;  ///< what every theta of the lattice has
   double leaves = 0.0;  ///< bins that are evaluated together
 
+  double largest_family = 0.0;  ///< bins that the smallest tiles of one larger tile hold
   double total() const { return tables + tiles + thetas + leaves; }
 };
 
