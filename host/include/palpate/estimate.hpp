@@ -50,8 +50,8 @@ struct Certificate {
   /// Log of each hypothesis's prior weight times the summed likelihood of its bins, in nats,
   /// [hypothesis]: bounds.
   std::vector<LogInterval> log_evidence = {};
-  bool mode_certain = false;         ///< no bin that was not evaluated can exceed the mode
-  std::int64_t blocks_bounded = 0;   ///< blocks of bins whose bound was computed
+  bool mode_certain = false;        ///< no bin that was not evaluated can exceed the mode
+  std::int64_t blocks_bounded = 0;  ///< blocks of bins whose bound was computed
   /// Bins whose likelihood was computed. Those at which every element sees the prior are settled
   /// without.
   std::int64_t bins_evaluated = 0;
