@@ -28,8 +28,7 @@ struct Start {
 HistogramOptions histogram_of(const RecognitionTask& task, const DisplacementSd& start) {
   const auto* histogram = std::get_if<HistogramOptions>(&task.filter);
   if (histogram == nullptr) {
-    throw Error(Fault::input,
-                "fit of touch-sd: needs the belief of all poses; use a histogram");
+    throw Error(Fault::input, "fit of touch-sd: needs the belief of all poses; use a histogram");
   }
   HistogramOptions options = *histogram;
   options.none_weight.reset();

@@ -2,6 +2,11 @@
 
 #include <algorithm>
 #include <bit>
+#include <limits>
+
+#include <fmt/format.h>
+
+#include "palpate/error.hpp"
 
 namespace palpate {
 
@@ -32,6 +37,14 @@ WindowTable window_table(const SquarePenalties& penalties, int side) {
                     .rows = 2 * WindowTable::margin + (penalties.ny + side - 1) / side,
                     .beyond = penalties.beyond,
                     .entries = {}};
+  // Places in the table are counted in 32 bits.
+  const std::int64_t entries = std::int64_t{table.columns} * table.rows * batch_side * side * side;
+  if (entries > std::numeric_limits<std::int32_t>::max()) {
+    throw Error(Fault::input,
+                fmt::format("a map of {} x {} squares is too large for bounds; use PoseHistogram "
+                            "(--filter histogram), or larger cells",
+                            penalties.nx, penalties.ny));
+  }
   // The squares, with what lies beyond on all sides: windows of the last rows' batches reach
   // batch_side tiles further.
   const std::size_t width = static_cast<std::size_t>(table.columns) * side + side;
