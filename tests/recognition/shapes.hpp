@@ -11,8 +11,8 @@ namespace palpate {
 /// Maps of the letter L and of a disc of full symmetry.
 std::vector<Hypothesis> shapes();
 
-/// A histogram, particles and bounds: over a lattice on which few touches tell the shapes apart, and
-/// as many particles as it has bins.
+/// A histogram, particles and bounds: over a lattice on which few touches tell the shapes apart,
+/// and as many particles as it has bins.
 std::vector<FilterOptions> every_filter();
 
 /// Six touches of the letter at a pose within the lattice, with the truth.
