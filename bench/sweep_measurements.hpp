@@ -28,9 +28,6 @@ Json measure_histogram(Device& device, const std::vector<Hypothesis>& letters,
 Json measure_particles(Device& device, const std::vector<Hypothesis>& letters,
                        std::span<const Recording> trials, ParticleOptions options);
 
-/// Bins in all above which --filter auto takes the bounded posterior.
-inline constexpr std::int64_t most_histogram_bins = 100'000;
-
 /// Times the bounded posterior beside the histogram on one lattice, over all of the trials: asked
 /// once after all touches, and after every touch. Holds its certificates against the histogram's
 /// bins in float64, and says what --filter auto takes and whether it is the faster of the two where

@@ -14,6 +14,8 @@ namespace {
 
 /// Bins of a host thread's task: large beside the cost of a task, small beside a large batch.
 constexpr std::size_t task_bins = 2048;
+/// Of the work before both places are measured: the least batch that tells their rates.
+constexpr double measured_part = 0.01;
 
 template <typename Work>
 double seconds_of(const Work& work) {
@@ -45,7 +47,7 @@ FasterBinLikelihood::FasterBinLikelihood(const BinLikelihood& host, gpu::Context
     place_ = BinPlace::host;
     path_ = fmt::format("bins on the host: device '{}' is a CPU", context.name());
   } else {
-    path_ = "bins on the host: no batch was large enough to measure the device";
+    path_ = "bins on the host: too few so far to measure the device";
   }
 }
 
@@ -64,12 +66,16 @@ DeviceBinLikelihood& FasterBinLikelihood::device() {
 }
 
 void FasterBinLikelihood::evaluate(std::span<const BinBox> boxes, const KnownElements& elements,
-                                   std::span<float> log_likelihood) {
+                                   std::span<float> log_likelihood, bool may_measure) {
   const double work = static_cast<double>(log_likelihood.size()) *
                       static_cast<double>(elements.from_pivot_mm.size());
   if (place_ == BinPlace::device && work >= least_device_work_) {
     device().evaluate(boxes, elements, log_likelihood);
-  } else if (place_ == BinPlace::measured && work >= measured_work_) {
+    return;
+  }
+  host_work_ += work;
+  if (place_ == BinPlace::measured && may_measure && host_work_ >= measured_work_ &&
+      work >= measured_part * measured_work_) {
     measure(boxes, elements, log_likelihood, work);
   } else {
     evaluate_on_host(boxes, elements, log_likelihood);

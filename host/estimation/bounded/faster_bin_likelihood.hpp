@@ -17,7 +17,7 @@ namespace palpate {
 
 /// Where bins are evaluated.
 enum class BinPlace {
-  measured,  ///< where it was faster when both evaluated the first large batch
+  measured,  ///< where it was faster when both evaluated a batch, once the host has done enough
   host,
   device,
 };
@@ -27,9 +27,9 @@ enum class BinPlace {
 /// the TBB arena that calls it.
 class FasterBinLikelihood {
  public:
-  /// Least product of bins and elements of a batch from which both are measured, some 50 ms of the
-  /// host: a device's kernels compile no faster.
-  static constexpr double least_measured_work = 1e8;
+  /// Products of bins and elements that the host evaluates before both are measured: some 0.3 s on
+  /// two cores, as long as a device may take to compile its kernel and to take its maps.
+  static constexpr double least_measured_work = 1e9;
 
   /// @param host,hypotheses outlive this object
   /// @param contact resolved: with its prior
@@ -41,9 +41,10 @@ class FasterBinLikelihood {
   void move_pivot(const glm::dvec2& pivot_mm);
 
   /// Log-likelihood of the elements at every bin in nats, boxes one after another, [y, x] in each.
+  /// @param may_measure whether there is time to start the device and to evaluate a batch twice
   /// @throws Error where BinPlace::device was asked for and the device fails
   void evaluate(std::span<const BinBox> boxes, const KnownElements& elements,
-                std::span<float> log_likelihood);
+                std::span<float> log_likelihood, bool may_measure = true);
 
   /// Bound, in nats, of the error of evaluate() at any bin of an object, wherever it is evaluated.
   double float32_error(std::size_t object, const KnownElements& elements) const;
@@ -67,6 +68,7 @@ class FasterBinLikelihood {
   PoseLattice lattice_;
   BinPlace place_;
   double measured_work_;
+  double host_work_ = 0.0;          ///< done so far: products of bins and elements
   double least_device_work_ = 0.0;  ///< of a batch that the device takes
   DeviceBinError device_error_;
   std::unique_ptr<DeviceBinLikelihood> device_;

@@ -101,7 +101,8 @@ void LeafEvaluator::add(std::span<const BinBox> boxes) {
   bins_ += static_cast<std::int64_t>(value - values_.size());
   values_.resize(value);
   const std::span<Leaf> added = std::span(pending_).subspan(first);
-  batches_.evaluate(boxes, elements_, std::span(values_).subspan(added.front().first));
+  batches_.evaluate(boxes, elements_, std::span(values_).subspan(added.front().first),
+                    !deadline_.exists());
   for_tasks(added, [&](std::span<Leaf> mine) { sum_up(mine, values_.data()); });
   for (const Leaf& leaf : added) {
     const double least = log_weight_[leaf.box.object] - float32_error_[leaf.box.object];
