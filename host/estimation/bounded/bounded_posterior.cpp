@@ -33,7 +33,7 @@ namespace palpate {
 
 namespace {
 
-/// Tolerance that a search with a budget reaches before it goes on.
+/// Tolerance that a search with a budget reaches before it goes on, and enough to draw samples.
 constexpr double soon = 1e-2;
 
 /// Index in the lattice of the i-th bin of a box.
@@ -113,7 +113,8 @@ struct BoundedPosterior::Impl {
   }
 
   const SearchResult& found() {
-    if (!result) {
+    if (!result || rough) {
+      rough = false;
       Deadline deadline(options.budget_s);
       SearchGoal goal{options.tolerance, options.evidence_nats};
       if (deadline.exists()) {
@@ -134,6 +135,16 @@ struct BoundedPosterior::Impl {
     return *result;
   }
 
+  /// What the last search found, or a quick one: enough to draw samples from.
+  const SearchResult& found_roughly() {
+    if (!result) {
+      Deadline deadline(options.budget_s);
+      result = run({std::max(options.tolerance, soon), {}}, deadline, bins);
+      rough = true;
+    }
+    return *result;
+  }
+
   SearchResult run(const SearchGoal& goal, Deadline& deadline, EvaluatedBins& evaluated) {
     evaluated.clear();
     return arena.execute([&] {
@@ -149,22 +160,24 @@ struct BoundedPosterior::Impl {
     });
   }
 
-  /// Visits the evaluated bins; searches again where there was no room to keep them.
+  /// Visits the bins that the last search evaluated; searches again where there was no room to keep
+  /// them.
   void visit(const BinVisitor& visitor) {
-    found();
     if (bins.complete()) {
       bins.visit(visitor);
     } else {
-      arena.execute([&] {
-        search.run(elements, {options.tolerance, options.evidence_nats}, Deadline({}), visitor);
-      });
+      SearchGoal goal{options.tolerance, options.evidence_nats};
+      if (rough) {
+        goal = {std::max(options.tolerance, soon), {}};
+      }
+      arena.execute([&] { search.run(elements, goal, Deadline({}), visitor); });
     }
   }
 
-  /// Log of the summed likelihood of all evaluated bins, with prior weights.
-  double log_total() {
+  /// Log of the summed likelihood of all bins that the last search evaluated, with prior weights.
+  double log_total() const {
     LogSum total;
-    for (const HypothesisEvidence& evidence : found().evidence) {
+    for (const HypothesisEvidence& evidence : result->evidence) {
       total.add(evidence.evaluated);
     }
     return total.log();
@@ -189,6 +202,7 @@ struct BoundedPosterior::Impl {
   KnownElements elements;
   bool touched = false;
   std::optional<SearchResult> result;
+  bool rough = false;  ///< result is found_roughly()'s
   EvaluatedBins bins{options.budget_s.has_value()};
   std::optional<SampledTouchMeans> none;  ///< where the options ask for it
   double none_log_weight = 0.0;           ///< log of its prior weight times the number of bins
@@ -389,6 +403,7 @@ Marginals BoundedPosterior::marginals(int object, const PoseLattice& grid) const
   posterior.require_object(object);
   PoseLattice onto = grid;
   onto.collapse_fixed().validate();
+  posterior.found();
   const double log_total =
       log_add(posterior.log_total(), posterior.none_log_evidence()) - posterior.log_weight[object];
   MarginalSums sums(lattice(), onto);
@@ -425,6 +440,7 @@ double BoundedPosterior::log_likelihood(int object, const Pose& T_object_robot) 
 
 double BoundedPosterior::entropy() const {
   Impl& posterior = whole();
+  posterior.found();
   const double log_total = posterior.log_total();
   double entropy = 0.0;
   posterior.visit([&](const BinBox& box, std::span<const double> log_likelihood) {
@@ -452,10 +468,11 @@ std::vector<PoseSample> BoundedPosterior::sample(std::size_t count, std::uint64_
   };
   std::vector<Draw> draws;
   draws.reserve(count);
+  const SearchResult& found = posterior.found_roughly();
   const double log_total = posterior.log_total();
   const PoseLattice& in = lattice();
   double reached = 0.0;
-  Draw last{posterior.found().best_object, posterior.found().best_bin};
+  Draw last{found.best_object, found.best_bin};
   posterior.visit([&](const BinBox& box, std::span<const double> log_likelihood) {
     const double weight = posterior.log_weight[box.object] - log_total;
     if (log_likelihood.size() == 1) {

@@ -105,7 +105,8 @@ class BoundedPosterior {
 
   /// Entropy of the belief over objects and evaluated bins in nats, "none of these" left out.
   double entropy() const;
-  /// Draws objects and poses from the evaluated bins; see PoseHistogram::sample().
+  /// Draws objects and poses; see PoseHistogram::sample(). Before the first estimate() since an
+  /// update, bins that hold up to 1 % of the mass may stay out.
   std::vector<PoseSample> sample(std::size_t count, std::uint64_t seed) const;
 
   /// The blocks that the search divides or evaluates, for a picture of it. Searches again.
