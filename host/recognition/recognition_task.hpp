@@ -54,8 +54,9 @@ struct RecognitionTask {
   bool auto_pivot = false;
 };
 
-/// Most bins, of all objects together, for which `auto` takes the histogram. Above it, bounds
-/// answer sooner.
+/// Most bins, of all objects together, for which `auto` takes the histogram: up to here it answers
+/// quickly, and takes no longer where nothing fits. Above it, bounds answer much sooner where
+/// something does.
 inline constexpr std::int64_t most_histogram_bins = 100'000;
 
 /// Most bins, of all objects together, that settle_bins() and settle_filter() give to bounds.
