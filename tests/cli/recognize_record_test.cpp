@@ -216,7 +216,8 @@ TEST_F(RecognizeRecord, AMapWithoutAnOccupiedCellHasNoPoseError) {
   OccupancyGrid empty = sample_map("A");
   std::fill(empty.log_odds.begin(), empty.log_odds.end(), -1.0F);
   write_map(folder_ / "empty.map.h5", empty);
-  EXPECT_TRUE(record({"u.h5", "--maps", "empty.map.h5"})["error_mm"].is_null());
+  EXPECT_TRUE(
+      record({"u.h5", "--maps", "empty.map.h5", "--bins", "10x10x8"})["error_mm"].is_null());
 }
 
 TEST_F(RecognizeRecord, TraceTellsTheSameAfterEveryTouch) {
