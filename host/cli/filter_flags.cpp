@@ -145,7 +145,7 @@ void add_filter_flags(CLI::App& command, FilterFlags& flags) {
   command.add_option("--tolerance", flags.tolerance,
                      "With --filter bounded: largest share of the belief that may be left "
                      "unproven; the search goes on until it is reached. Rounding, which counts as "
-                     "unproven, may exceed a tolerance below about 1e-9 [default: 1e-6]");
+                     "unproven, may exceed a tolerance below about 1e-8 [default: 1e-6]");
   command.add_option("--budget-ms", flags.budget_ms,
                      "With --filter bounded: milliseconds after which each estimate's search ends "
                      "and reports what it has proven by then [default: none]");
