@@ -126,6 +126,7 @@ TEST(BoundedBelief, DrawnFromBeforeAnEstimateTellsTheSameAfterwards) {
     SCOPED_TRACE(what);
     asked.reset();
     asked.update(recording.touches(0, 2));
+    const Estimate exact = asked.estimate();
     BoundedPosterior drawn(device, two_shapes(), small_options());
     drawn.update(recording.touches(0, 2));
     constexpr std::size_t count = 4000;
@@ -134,7 +135,6 @@ TEST(BoundedBelief, DrawnFromBeforeAnEstimateTellsTheSameAfterwards) {
       of_the_first += draw.object == 0 ? 1.0 / count : 0.0;
     }
     if (what == 0) {
-      const Estimate exact = asked.estimate();
       const Estimate estimate = drawn.estimate();
       // Draws may leave out a hundredth of the mass.
       EXPECT_NEAR(of_the_first, exact.identity[0], 0.01 + 1.0 / count);

@@ -2,12 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <string>
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include "bins_by_definition.hpp"
+#include "bound_search.hpp"
 #include "contact_evidence.hpp"
 #include "device_bin_error.hpp"
 #include "faster_bin_likelihood.hpp"
@@ -285,6 +287,27 @@ TEST(FasterBinLikelihood, MeasuresOnceTheHostHasDoneEnough) {
   const std::string decided = faster.path();
   expect_sound(faster, host, maps, large);
   EXPECT_EQ(faster.path(), decided);
+}
+
+TEST(FasterBinLikelihood, IsNotMeasuredWithinABudget) {
+  Device device = Device::open();
+  gpu::Context& context = device.context();
+  gpu::Limits limits = context.limits();
+  limits.cpu = false;
+  context.lower_limits(limits);
+  const MapsCase maps(letter_case());
+  const BinLikelihood host(maps.hypotheses, maps.of.contact, maps.of.lattice);
+  const BoundedOptions options{.lattice = maps.of.lattice, .contact = maps.of.contact};
+  for (const std::optional<double> budget_s : {std::optional<double>(), std::optional(1e3)}) {
+    FasterBinLikelihood faster(host, context, maps.hypotheses, maps.of.contact, maps.of.lattice,
+                               BinPlace::measured, 1.0);
+    BoundSearch search(maps.hypotheses, options, host, faster);
+    search.add(std::span(&maps.of.elements, 1));
+    search.run(maps.of.elements, {.tolerance = 1e-6}, Deadline(budget_s),
+               [](const BinBox& /*box*/, std::span<const double> /*values*/) {});
+    EXPECT_EQ(faster.path().find("too few so far") != std::string::npos, budget_s.has_value())
+        << faster.path();
+  }
 }
 
 TEST(FasterBinLikelihood, StaysOnTheHostWhereTheDeviceFails) {
