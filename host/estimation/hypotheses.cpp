@@ -13,9 +13,13 @@ void validate_hypotheses(std::span<const Hypothesis> hypotheses) {
   if (hypotheses.empty()) {
     throw Error(Fault::input, "no objects: give at least one map");
   }
-  for (const auto& [map, weight] : hypotheses) {
-    if (const auto fault = fault_of(map)) {
-      throw Error(Fault::input, fmt::format("map '{}': {}", map.label, *fault));
+  for (const Hypothesis& hypothesis : hypotheses) {
+    const OccupancyGrid& map = hypothesis.map;
+    const double weight = hypothesis.weight;
+    for (const OccupancyGrid* grid : {&map, &hypothesis.compared()}) {
+      if (const auto fault = fault_of(*grid)) {
+        throw Error(Fault::input, fmt::format("map '{}': {}", map.label, *fault));
+      }
     }
     if (!(weight > 0.0) || !std::isfinite(weight)) {
       throw Error(Fault::input,
@@ -29,7 +33,7 @@ void validate_hypotheses(std::span<const Hypothesis> hypotheses) {
 std::optional<std::size_t> differing_prior(std::span<const Hypothesis> hypotheses) {
   for (std::size_t i = 1; i < hypotheses.size(); ++i) {
     // Readers may have rounded one of them.
-    if (std::abs(hypotheses[i].map.prior - hypotheses.front().map.prior) > 1e-6) {
+    if (std::abs(hypotheses[i].compared().prior - hypotheses.front().compared().prior) > 1e-6) {
       return i;
     }
   }
@@ -46,9 +50,9 @@ ContactModel resolve(const ContactModel& contact, std::span<const Hypothesis> hy
   }
   ContactModel resolved = contact;
   if (!contact.prior) {
-    const OccupancyGrid& first = hypotheses.front().map;
+    const OccupancyGrid& first = hypotheses.front().compared();
     if (const auto other = differing_prior(hypotheses)) {
-      const OccupancyGrid& map = hypotheses[*other].map;
+      const OccupancyGrid& map = hypotheses[*other].compared();
       throw Error(Fault::input,
                   fmt::format("map '{}': prior {} differs from {} of map '{}'; build the maps "
                               "together, or say which prior to use",

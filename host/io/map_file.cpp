@@ -24,15 +24,18 @@ void require_sound(const std::filesystem::path& path, const std::optional<std::s
   }
 }
 
-}  // namespace
+/// Opens a map file with what it says besides its cells.
+Hdf5Contents open_map(const std::filesystem::path& path) {
+  return {path,
+          {"format", "version", "label", "cell_mm", "origin_mm", "prior", "symmetry", "spread_mm",
+           "suggested_symmetry", "mirror"},
+          {"log_odds", "observations", "mean_level"}};
+}
 
-void scan_map(const std::filesystem::path& path,
-              const std::function<void(const OccupancyGrid&)>& head,
-              const std::function<void(std::span<const float>)>& cells) {
-  Hdf5Contents file(path,
-                    {"format", "version", "label", "cell_mm", "origin_mm", "prior", "symmetry",
-                     "spread_mm", "suggested_symmetry"},
-                    {"log_odds"});
+/// scan_map() of an open file.
+void scan(const std::filesystem::path& path, Hdf5Contents& file,
+          const std::function<void(const OccupancyGrid&)>& head,
+          const std::function<void(std::span<const float>)>& cells) {
   require_format(file, map_format);
   OccupancyGrid map;
   map.label = file.text("label");
@@ -47,6 +50,7 @@ void scan_map(const std::filesystem::path& path,
   if (file.has_attribute("suggested_symmetry")) {
     map.suggested_symmetry = file.integer("suggested_symmetry", 0);
   }
+  map.mirror = file.has_attribute("mirror") && file.integer("mirror", 0) != 0;
   const std::vector<std::uint64_t>& shape = file.shape("log_odds", 2);
   const auto [least, most] = std::minmax(shape[0], shape[1]);
   if (least < 1 || most > std::numeric_limits<int>::max()) {
@@ -65,10 +69,39 @@ void scan_map(const std::filesystem::path& path,
   });
 }
 
+/// Reads numbers that go with the cells, where the file has them.
+std::vector<float> read_layer(Hdf5Contents& file, const char* name, const OccupancyGrid& map) {
+  if (!file.has_dataset(name)) {
+    return {};
+  }
+  const std::vector<std::uint64_t> cells{static_cast<std::uint64_t>(map.ny),
+                                         static_cast<std::uint64_t>(map.nx)};
+  if (file.shape(name, 2) != cells) {
+    file.refuse("dataset '{}' has the shape {}, 'log_odds' {}; store one number for each cell",
+                name, file.shape(name, 2), cells);
+  }
+  std::vector<float> numbers;
+  numbers.reserve(map.log_odds.size());
+  file.read(name, [&](std::uint64_t, std::span<const double> part) {
+    numbers.insert(numbers.end(), part.begin(), part.end());
+  });
+  return numbers;
+}
+
+}  // namespace
+
+void scan_map(const std::filesystem::path& path,
+              const std::function<void(const OccupancyGrid&)>& head,
+              const std::function<void(std::span<const float>)>& cells) {
+  Hdf5Contents file = open_map(path);
+  scan(path, file, head, cells);
+}
+
 OccupancyGrid read_map(const std::filesystem::path& path) {
+  Hdf5Contents file = open_map(path);
   OccupancyGrid map;
-  scan_map(
-      path,
+  scan(
+      path, file,
       [&](const OccupancyGrid& head) {
         map = head;
         const auto count = static_cast<std::size_t>(map.nx) * static_cast<std::size_t>(map.ny);
@@ -79,6 +112,9 @@ OccupancyGrid read_map(const std::filesystem::path& path) {
       [&](std::span<const float> cells) {
         map.log_odds.insert(map.log_odds.end(), cells.begin(), cells.end());
       });
+  map.observations = read_layer(file, "observations", map);
+  map.mean_level = read_layer(file, "mean_level", map);
+  require_sound(path, fault_of(map));
   return map;
 }
 
@@ -96,11 +132,22 @@ void write_map(const std::filesystem::path& path, const OccupancyGrid& map) {
   if (map.spread_mm) {
     file.attribute("spread_mm", *map.spread_mm);
   }
+  if (map.mirror) {
+    file.attribute("mirror", 1);
+  }
   if (map.suggested_symmetry) {
     file.attribute("suggested_symmetry", *map.suggested_symmetry);
   }
   file.dataset("log_odds", {static_cast<std::size_t>(map.ny), static_cast<std::size_t>(map.nx)},
                map.log_odds);
+  const std::vector<std::size_t> shape{static_cast<std::size_t>(map.ny),
+                                       static_cast<std::size_t>(map.nx)};
+  for (const auto& [name, numbers] :
+       {std::pair{"observations", &map.observations}, std::pair{"mean_level", &map.mean_level}}) {
+    if (!numbers->empty()) {
+      file.dataset(name, shape, *numbers);
+    }
+  }
   file.save();
 }
 

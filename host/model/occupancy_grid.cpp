@@ -27,6 +27,28 @@ double probability_from_log_odds(double l) {
   return (l >= 0 ? 1.0 : z) / (1.0 + z);
 }
 
+namespace {
+
+/// Why numbers that go with the cells are not sound.
+std::optional<std::string> fault_of_layer(const OccupancyGrid& map, const char* name,
+                                          std::span<const float> numbers) {
+  const auto nx = static_cast<std::size_t>(map.nx);
+  const auto ny = static_cast<std::size_t>(map.ny);
+  if (numbers.size() != nx * ny) {
+    return fmt::format("'{}' has {} numbers for {} x {} cells; store one for each, or none", name,
+                       numbers.size(), ny, nx);
+  }
+  const auto wrong = std::find_if_not(numbers.begin(), numbers.end(),
+                                      [](float x) { return x >= 0.0F && std::isfinite(x); });
+  if (wrong == numbers.end()) {
+    return {};
+  }
+  const auto k = static_cast<std::size_t>(wrong - numbers.begin());
+  return fmt::format("'{}'[{}, {}] = {}; give finite numbers from 0", name, k / nx, k % nx, *wrong);
+}
+
+}  // namespace
+
 std::optional<std::string> fault_of(const OccupancyGrid& map) {
   if (auto fault = fault_without_cells(map)) {
     return fault;
@@ -34,6 +56,14 @@ std::optional<std::string> fault_of(const OccupancyGrid& map) {
   if (map.log_odds.size() != static_cast<std::size_t>(map.nx) * static_cast<std::size_t>(map.ny)) {
     return fmt::format("{} x {} cells but {} log odds; make them agree", map.nx, map.ny,
                        map.log_odds.size());
+  }
+  for (const auto& [name, numbers] :
+       {std::pair{"observations", &map.observations}, std::pair{"mean_level", &map.mean_level}}) {
+    if (!numbers->empty()) {
+      if (const auto fault = fault_of_layer(map, name, *numbers)) {
+        return fault;
+      }
+    }
   }
   return fault_of_cells(map, 0, map.log_odds);
 }

@@ -112,7 +112,7 @@ std::optional<std::string> touches_contradict(std::span<const Touch> touches,
     return {};
   }
   const auto object = static_cast<std::size_t>(step.mode.object);
-  const OccupancyGrid& map = task.hypotheses[object].map;
+  const OccupancyGrid& map = task.hypotheses[object].compared();
   ContactModel contact = task.contact();
   contact.prior = contact.prior.value_or(map.prior);
   const InterpolatedMap interpolated(map, *contact.prior);

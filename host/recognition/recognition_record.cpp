@@ -98,7 +98,7 @@ std::optional<Fit> fit_of(const RecognitionStep& step, std::span<const Touch> to
     return {};
   }
   const auto object = static_cast<std::size_t>(step.mode.object);
-  const OccupancyGrid& map = task.hypotheses[object].map;
+  const OccupancyGrid& map = task.hypotheses[object].compared();
   return step.refined
              ? palpate::fit_of(touches, step.pose(), map, task.contact(), task.touch_sd(), object)
              : best_fit_near(touches, step.pose(), map, task.contact(), object);

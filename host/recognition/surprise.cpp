@@ -49,7 +49,7 @@ std::optional<double> surprise_of(const Touch& touch, std::span<const PoseSample
   std::vector<InterpolatedMap> maps;
   std::vector<glm::dvec2> centroids_mm;
   for (const Hypothesis& hypothesis : task.hypotheses) {
-    maps.emplace_back(hypothesis.map, *contact.prior);
+    maps.emplace_back(hypothesis.compared(), *contact.prior);
     centroids_mm.push_back(slip_sd.none() ? glm::dvec2(0.0, 0.0)
                                           : displaced_body(hypothesis.map).centroid_mm);
   }

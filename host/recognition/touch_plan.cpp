@@ -169,8 +169,10 @@ OccupancyField expected_occupancy(std::span<const PoseSample> samples, const Rec
   field.ny = std::max(1, static_cast<int>(std::lround(extent.y / field.cell_mm)));
   field.probability.assign(static_cast<std::size_t>(field.nx) * field.ny, 0.0);
   for (const PoseSample& sample : samples) {
-    const OccupancyGrid& map = task.hypotheses[static_cast<std::size_t>(sample.object)].map;
-    const InterpolatedMap interpolated(map, task.contact().prior.value_or(map.prior));
+    const Hypothesis& hypothesis = task.hypotheses[static_cast<std::size_t>(sample.object)];
+    const OccupancyGrid& map = hypothesis.map;
+    const InterpolatedMap interpolated(
+        map, hypothesis.layer ? map.prior : task.contact().prior.value_or(map.prior));
     for (int j = 0; j < field.ny; ++j) {
       for (int i = 0; i < field.nx; ++i) {
         const glm::dvec2 place = lower_mm + field.cell_mm * glm::dvec2(i + 0.5, j + 0.5);

@@ -57,6 +57,24 @@ TEST_F(MapFile, ComesBackAsItWasWritten) {
   EXPECT_EQ(read.log_odds, written.log_odds);
 }
 
+TEST_F(MapFile, KeepsWhatGoesWithTheCells) {
+  OccupancyGrid written = small_map();
+  EXPECT_TRUE(read_map((write_map(path_, written), path_)).observations.empty());
+  written.mirror = true;
+  written.observations = {0.0F, 1.0F, 2.0F, 3.5F, 4.0F, 5.0F};
+  written.mean_level = {0.0F, 10.0F, 20.0F, 30.0F, 40.0F, 255.0F};
+  write_map(path_, written);
+  const OccupancyGrid read = read_map(path_);
+  EXPECT_TRUE(read.mirror);
+  EXPECT_EQ(read.observations, written.observations);
+  EXPECT_EQ(read.mean_level, written.mean_level);
+  written.observations.pop_back();
+  expect_named(input_error([&] { write_map(path_, written); }), {"observations"});
+  written.observations.clear();
+  written.mean_level[3] = -1.0F;
+  expect_named(input_error([&] { write_map(path_, written); }), {"mean_level", "[1, 0]"});
+}
+
 TEST_F(MapFile, MayNotKnowTheSpread) {
   map_parts().save(path_);
   OccupancyGrid map = read_map(path_);

@@ -53,7 +53,7 @@ BinLikelihood::BinLikelihood(std::span<const Hypothesis> hypotheses, const Conta
                              const PoseLattice& lattice)
     : form_(contact), lattice_(lattice) {
   for (const Hypothesis& hypothesis : hypotheses) {
-    placements_.push_back(placement_of(hypothesis.map, *contact.prior, lattice));
+    placements_.push_back(placement_of(hypothesis.compared(), *contact.prior, lattice));
   }
 }
 

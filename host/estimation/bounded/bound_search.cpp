@@ -31,13 +31,13 @@ BoundSearch::BoundSearch(std::span<const Hypothesis> hypotheses, const BoundedOp
   }
   double least_cell_mm = std::numeric_limits<double>::infinity();
   for (const Hypothesis& hypothesis : hypotheses) {
-    least_cell_mm = std::min(least_cell_mm, hypothesis.map.cell_mm);
+    least_cell_mm = std::min(least_cell_mm, hypothesis.compared().cell_mm);
   }
   const std::vector<TileSize> sizes = tile_sizes(options.lattice, least_cell_mm, hypotheses.size());
   unseen_.resize(hypotheses.size());
   std::vector<std::optional<TileBounds>> bounds(hypotheses.size());
   tbb::parallel_for(std::size_t{0}, hypotheses.size(), [&](std::size_t i) {
-    bounds[i].emplace(hypotheses[i].map, options.contact, i, options.lattice, sizes);
+    bounds[i].emplace(hypotheses[i].compared(), options.contact, i, options.lattice, sizes);
   });
   for (std::optional<TileBounds>& of : bounds) {
     const TileLevel& level = of->levels().front();
@@ -46,7 +46,7 @@ BoundSearch::BoundSearch(std::span<const Hypothesis> hypotheses, const BoundedOp
     bounds_.push_back(*std::move(of));
   }
   for (const Hypothesis& hypothesis : hypotheses) {
-    OccupancyGrid shape = hypothesis.map;
+    OccupancyGrid shape = hypothesis.compared();
     shape.log_odds = {};
     maps_.push_back(std::move(shape));
   }

@@ -425,7 +425,7 @@ double BoundedPosterior::log_likelihood(int object, const Pose& T_object_robot) 
                                           translation_mm.y, theta_rad));
   }
   const ContactModel& contact = posterior.options.contact;
-  const InterpolatedMap map(posterior.hypotheses[object].map, *contact.prior);
+  const InterpolatedMap map(posterior.hypotheses[object].compared(), *contact.prior);
   double sum = 0.0;
   for (const ReadingRun& run : posterior.elements.runs) {
     for (std::size_t e = run.begin; e < run.end; ++e) {

@@ -39,7 +39,7 @@ DeviceBinError::DeviceBinError(std::span<const Hypothesis> hypotheses, const Con
   const double prior = log_odds_from_probability(*contact.prior);
   prior_rounding_ = std::abs(static_cast<float>(prior) - prior);
   for (const Hypothesis& hypothesis : hypotheses) {
-    extents_.push_back(extent_of(hypothesis.map, prior, lattice));
+    extents_.push_back(extent_of(hypothesis.compared(), prior, lattice));
   }
 }
 

@@ -87,7 +87,7 @@ DeviceBinLikelihood::Group DeviceBinLikelihood::make_group(const MapGroup& group
   int first_node = 0;
   shaders::uint first_axis = 0;
   for (const std::size_t object : group.objects) {
-    const OccupancyGrid& map = hypotheses[object].map;
+    const OccupancyGrid& map = hypotheses[object].compared();
     const int width = map.nx + 2 * shaders::MAP_BORDER;
     const int height = map.ny + 2 * shaders::MAP_BORDER;
     places.push_back({.first_node = first_node,

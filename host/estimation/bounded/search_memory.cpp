@@ -66,12 +66,12 @@ SearchMemory search_memory(std::span<const Hypothesis> hypotheses, const Bounded
       options.contact.table ? options.contact.table->levels() : std::size_t{2};
   double least_cell_mm = std::numeric_limits<double>::infinity();
   for (const Hypothesis& hypothesis : hypotheses) {
-    least_cell_mm = std::min(least_cell_mm, hypothesis.map.cell_mm);
+    least_cell_mm = std::min(least_cell_mm, hypothesis.compared().cell_mm);
   }
   const std::vector<TileSize> sizes = tile_sizes(lattice, least_cell_mm, hypotheses.size());
   SearchMemory memory;
   for (const Hypothesis& hypothesis : hypotheses) {
-    const OccupancyGrid& map = hypothesis.map;
+    const OccupancyGrid& map = hypothesis.compared();
     memory.tables += node_bytes(map);
     for (const TileSize& size : sizes) {
       const double side_mm = size.cells() * map.cell_mm;

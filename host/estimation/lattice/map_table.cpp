@@ -71,7 +71,7 @@ std::vector<MapGroup> group_maps(const gpu::Context& context,
   }
   std::vector<MapGroup> groups;
   for (std::size_t object = 0; object < hypotheses.size(); ++object) {
-    const OccupancyGrid& map = hypotheses[object].map;
+    const OccupancyGrid& map = hypotheses[object].compared();
     const MapKind kind{map.cell_mm, access_of(context, map)};
     const std::uint64_t cells = cells_of(map);
     const std::uint64_t most = most_nodes(limits, kind.access);
@@ -107,7 +107,7 @@ MapTable::MapTable(gpu::Context& context, gpu::CommandStream& stream, const MapG
   std::vector<shaders::ObjectPlace> places;
   std::uint64_t first_node = 0;
   for (const std::size_t object : group.objects) {
-    const OccupancyGrid& map = hypotheses[object].map;
+    const OccupancyGrid& map = hypotheses[object].compared();
     places.push_back({.first_node = static_cast<int>(first_node),
                       .map_width = bordered(map.nx),
                       .map_height = bordered(map.ny),

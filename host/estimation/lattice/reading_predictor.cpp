@@ -26,7 +26,7 @@ ReadingPredictor::ReadingPredictor(std::span<const Hypothesis> hypotheses,
     : levels_(reading_levels(contact)), sets_(contact.table ? contact.table->sets() : 1) {
   constexpr int border = shaders::MAP_BORDER;
   for (const Hypothesis& hypothesis : hypotheses) {
-    const OccupancyGrid& map = hypothesis.map;
+    const OccupancyGrid& map = hypothesis.compared();
     maps_.push_back({.first_mm = map.centre_mm(-border, -border),
                      .cells_per_mm = 1.0 / map.cell_mm,
                      .width = map.nx + 2 * border,

@@ -69,7 +69,7 @@ void require_room(const gpu::Context& context, std::span<const Hypothesis> hypot
   constexpr std::uint64_t border = 2 * shaders::MAP_BORDER;
   std::uint64_t cells = 0;
   for (const Hypothesis& hypothesis : hypotheses) {
-    const OccupancyGrid& map = hypothesis.map;
+    const OccupancyGrid& map = hypothesis.compared();
     cells += (map.nx + border) * (map.ny + border);
     if (cells > most) {
       throw Error(Fault::input,
@@ -101,7 +101,7 @@ ParticleLikelihood::ParticleLikelihood(gpu::Context& context, gpu::CommandStream
   std::vector<shaders::Corners> cells;
   std::vector<shaders::ParticleMap> objects;
   for (std::size_t i = 0; i < hypotheses.size(); ++i) {
-    const OccupancyGrid& map = hypotheses[i].map;
+    const OccupancyGrid& map = hypotheses[i].compared();
     const double cells_per_mm = 1.0 / map.cell_mm;
     const auto high = static_cast<float>(cells_per_mm);
     objects.push_back(

@@ -16,6 +16,13 @@ namespace palpate {
 struct Hypothesis {
   OccupancyGrid map;
   double weight = 1.0;  ///< prior weight, relative to the other objects'
+  /// What readings are compared with in the place of the map: a grid of the same object frame whose
+  /// `log_odds` the contact model's table is over, see reading_layer(). The body and the extent of
+  /// the object remain the map's.
+  std::optional<OccupancyGrid> layer = {};
+  bool mirrored = false;  ///< the map is the mirror image (x to -x) of the one that was learned
+
+  const OccupancyGrid& compared() const { return layer ? *layer : map; }
 };
 
 /// Index of the first hypothesis whose map's prior differs from the first map's; none where all

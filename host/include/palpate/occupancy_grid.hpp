@@ -46,9 +46,17 @@ struct OccupancyGrid {
   /// The symmetry that the map itself shows, see measure_symmetry(); none where it is not measured.
   /// Pose errors and filters go by `symmetry` alone.
   std::optional<int> suggested_symmetry = {};
+  /// The object may lie on its other side: its mirror image, x to -x, is an object of its own under
+  /// the same label.
+  bool mirror = false;
   int nx = 0;
   int ny = 0;
   std::vector<float> log_odds;  ///< [ny, nx], row-major
+  /// Touches that sensed each cell, [ny, nx]; empty where they were not counted.
+  std::vector<float> observations = {};
+  /// Mean pressure at each cell, in the recordings' unit, [ny, nx]; 0 where nothing sensed it.
+  /// Empty where pressures were not averaged.
+  std::vector<float> mean_level = {};
 
   float at(int i, int j) const { return log_odds[static_cast<std::size_t>(j) * nx + i]; }
   glm::dvec2 centre_mm(int i, int j) const { return origin_mm + cell_mm * glm::dvec2(i, j); }
@@ -59,8 +67,8 @@ struct OccupancyGrid {
 /// remedy; none where the map is sound. A sound map has nx * ny log odds, at most `most_cells` of
 /// them, finite and within `most_log_odds`; a cell and a spread within the bounds above; centres
 /// within `farthest_mm`; a spread no larger than the grid; a prior between 0 and 1; a symmetry of
-/// at least 0; and a label other than `none_label`. Files, MapBuilder and both filters refuse any
-/// other map.
+/// at least 0; a label other than `none_label`; and as many observations and mean levels as cells
+/// or none, all finite and at least 0. Files, MapBuilder and all filters refuse any other map.
 std::optional<std::string> fault_of(const OccupancyGrid& map);
 /// Checks a map like fault_of(), except its log odds, which it need not hold yet.
 std::optional<std::string> fault_without_cells(const OccupancyGrid& map);

@@ -1,0 +1,94 @@
+#pragma once
+
+#include <array>
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "palpate/contact.hpp"
+#include "palpate/contact_model.hpp"
+#include "palpate/displacement.hpp"
+#include "palpate/reading_layer.hpp"
+#include "palpate/touch.hpp"
+
+namespace palpate {
+
+/// A likelihood table that was learned from touches, for all objects together and for each object
+/// that had touches enough.
+struct LearnedTable {
+  ReadingLayer layer;  ///< what of a map the table is over
+  /// Ascending pressures that part In Contact into levels; see LikelihoodTable::level_edges.
+  std::vector<double> level_edges;
+  /// log P(level | layer) in nats, [level, node], over ReadingLayer::nodes nodes.
+  std::vector<double> shared;
+  std::map<std::string, std::vector<double>> objects;  ///< the same by label
+
+  /// Number of levels, No Contact included.
+  std::size_t levels() const { return level_edges.size() + 2; }
+};
+/// The table of a contact model, with numbers of one or several objects, [(object,) level, node].
+LikelihoodTable table_of(const LearnedTable& table, std::vector<double> log_likelihood);
+
+/// What a press is like whatever its place: logarithms of its area, total force and peak.
+struct PressFeatures {
+  static constexpr std::size_t count = 3;
+  /// log(1 + elements In Contact), log(1 + sum of pressures / threshold) and
+  /// log(1 + largest pressure / threshold), over living elements; no pressure counts below 0.
+  std::array<double, count> values{};
+};
+/// @param classifier with a threshold above 0
+/// @throws Error on a touch that is not sound, or a threshold of 0
+PressFeatures press_features(const Touch& touch, const ContactClassifier& classifier);
+
+/// Independent normal distributions of the features of an object's presses.
+struct FeatureDistribution {
+  std::array<double, PressFeatures::count> mean{};
+  std::array<double, PressFeatures::count> sd{};
+
+  /// Log density in nats.
+  double log_density(const PressFeatures& features) const;
+};
+
+/// The features of every object's presses, as a term of each label's log evidence.
+struct LearnedFeatures {
+  double weight = 0.0;      ///< of a press's log density, after the temperature
+  FeatureDistribution any;  ///< of an object that is not listed
+  std::map<std::string, FeatureDistribution> objects;  ///< by label
+};
+
+/// How like the presses of known objects a single press is. Its score is the log-likelihood of its
+/// known elements at the best pose of the best map, by element; the probability that the object was
+/// learned is 1 / (1 + exp(-(offset + slope score))).
+struct Familiarity {
+  double offset = 0.0;
+  double slope = 0.0;
+};
+
+/// What `palpate calibrate` learned about a sensor and the objects that it touched.
+struct LearnedSensor {
+  std::string pressure_unit = "kPa";
+  double noise = 0.0;  ///< standard deviation of an untouched element, in the pressure unit
+  ContactClassifier classifier;
+  double gamma = 0.1;                 ///< of Eq. 7
+  double prior = 0.2;                 ///< of new maps
+  std::optional<double> psf_mm;       ///< standard deviation of the point spread
+  double spread_mm = 0.5;             ///< of new maps
+  DisplacementSd touch_sd;            ///< of the touches' poses
+  std::optional<LearnedTable> table;  ///< in the place of Eq. 7
+  /// A label's probability is its evidence to the power of 1 / temperature, normalised.
+  double temperature = 1.0;
+  std::optional<LearnedFeatures> features;
+  std::optional<Familiarity> familiarity;
+
+  /// Throws Error on a value out of range.
+  void validate() const;
+};
+
+/// Read or write a sensor model, a YAML file.
+/// @throws Error (Fault::input) naming the file, key and remedy; writing as write_map() does
+LearnedSensor read_sensor_model(const std::filesystem::path& path);
+void write_sensor_model(const std::filesystem::path& path, const LearnedSensor& sensor);
+
+}  // namespace palpate

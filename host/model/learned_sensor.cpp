@@ -1,0 +1,124 @@
+#include "palpate/learned_sensor.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "palpate/error.hpp"
+#include "palpate/sensor_model.hpp"
+
+namespace palpate {
+
+namespace {
+
+template <typename Value>
+[[noreturn]] void refuse(const char* field, const Value& value, const char* remedy) {
+  throw Error(Fault::input, fmt::format("sensor model: {} = {}: {}", field, value, remedy));
+}
+
+bool is_positive(double x) { return x > 0.0 && std::isfinite(x); }
+bool from_0(double x) { return x >= 0.0 && std::isfinite(x); }
+
+void require_sound(const FeatureDistribution& distribution) {
+  for (std::size_t i = 0; i < PressFeatures::count; ++i) {
+    if (!std::isfinite(distribution.mean[i])) {
+      refuse("features: mean", distribution.mean[i], "give a number");
+    }
+    if (!is_positive(distribution.sd[i])) {
+      refuse("features: sd", distribution.sd[i], "give a positive number");
+    }
+  }
+}
+
+}  // namespace
+
+LikelihoodTable table_of(const LearnedTable& table, std::vector<double> log_likelihood) {
+  return {.first_log_odds = ReadingLayer::first_node,
+          .last_log_odds = ReadingLayer::largest_value,
+          .nodes = ReadingLayer::nodes,
+          .level_edges = table.level_edges,
+          .log_likelihood = std::move(log_likelihood)};
+}
+
+PressFeatures press_features(const Touch& touch, const ContactClassifier& classifier) {
+  if (!(classifier.threshold > 0.0)) {
+    throw Error(Fault::input, "threshold = 0: press features need one above 0");
+  }
+  const std::vector<Reading> readings = classifier.classify(touch);
+  double area = 0.0;
+  double force = 0.0;
+  double peak = 0.0;
+  for (std::size_t e = 0; e < readings.size(); ++e) {
+    const bool living = touch.valid.empty() || touch.valid[e] != 0;
+    if (living && touch.pressure[e] > 0.0) {  // false for NaN
+      area += is_contact(readings[e]) ? 1.0 : 0.0;
+      force += touch.pressure[e] / classifier.threshold;
+      peak = std::max(peak, touch.pressure[e] / classifier.threshold);
+    }
+  }
+  return {{std::log1p(area), std::log1p(force), std::log1p(peak)}};
+}
+
+double FeatureDistribution::log_density(const PressFeatures& features) const {
+  double nats = 0.0;
+  for (std::size_t i = 0; i < PressFeatures::count; ++i) {
+    const double z = (features.values[i] - mean[i]) / sd[i];
+    nats -= 0.5 * z * z + std::log(sd[i]) + 0.5 * std::log(2.0 * std::numbers::pi);
+  }
+  return nats;
+}
+
+void LearnedSensor::validate() const {
+  if (pressure_unit != "kPa" && pressure_unit != "raw") {
+    refuse("pressure_unit", pressure_unit, "give kPa or raw");
+  }
+  classifier.validate();
+  if (!from_0(noise)) {
+    refuse("noise", noise, "give a number from 0");
+  }
+  if (!(gamma >= 0.0 && gamma < 1.0)) {
+    refuse("gamma", gamma, "give a number in [0, 1)");
+  }
+  if (!(prior >= least_prior && prior <= 1.0 - least_prior)) {
+    refuse("prior", prior, "give a probability from 1e-6 to 1 - 1e-6");
+  }
+  if (psf_mm && !is_positive(*psf_mm)) {
+    refuse("psf_mm", *psf_mm, "give a positive number");
+  }
+  if (!(spread_mm >= least_length_mm && spread_mm <= most_length_mm)) {
+    refuse("spread_mm", spread_mm, "give a length from 1e-6 to 1e6");
+  }
+  if (!from_0(touch_sd.mm) || !from_0(touch_sd.rad)) {
+    refuse("touch_sd", from_0(touch_sd.mm) ? touch_sd.rad : touch_sd.mm, "give numbers from 0");
+  }
+  if (!is_positive(temperature)) {
+    refuse("temperature", temperature, "give a positive number");
+  }
+  if (table) {
+    table->layer.validate();
+    table_of(*table, table->shared).validate();
+    for (const auto& [label, own] : table->objects) {
+      if (own.size() != table->shared.size()) {
+        refuse("table: numbers", own.size(), "give as many to every object as to all together");
+      }
+      table_of(*table, own).validate();
+    }
+  }
+  if (features) {
+    if (!from_0(features->weight)) {
+      refuse("features: weight", features->weight, "give a number from 0");
+    }
+    require_sound(features->any);
+    for (const auto& [label, own] : features->objects) {
+      require_sound(own);
+    }
+  }
+  if (familiarity && !(std::isfinite(familiarity->offset) && std::isfinite(familiarity->slope))) {
+    refuse("familiarity", familiarity->offset, "give an offset and a slope");
+  }
+}
+
+}  // namespace palpate
