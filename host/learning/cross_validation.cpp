@@ -10,6 +10,7 @@
 #include <tbb/parallel_for.h>
 
 #include "feature_learning.hpp"
+#include "host_progress.hpp"
 #include "palpate/error.hpp"
 
 namespace palpate {
@@ -92,7 +93,7 @@ void require_sound(const Folds& folds, const CrossValidationOptions& options) {
 
 }  // namespace
 
-CrossValidation cross_validate(Device& device, const std::vector<Press>& presses,
+CrossValidation cross_validate(const std::vector<Press>& presses,
                                const std::vector<OccupancyGrid>& maps, const TableLearning& how,
                                const PlacedPresses* placed, const CrossValidationOptions& options,
                                const std::function<void(double)>& progress) {
@@ -106,6 +107,7 @@ CrossValidation cross_validate(Device& device, const std::vector<Press>& presses
     result.labels.push_back(label);
   }
   const std::size_t label_count = result.labels.size();
+  HostProgress counter(options.folds * label_count, progress);
   for (std::size_t fold = 0; fold < options.folds; ++fold) {
     const std::vector<bool> outside = folds.outside(fold);
     std::vector<std::size_t> tried;
@@ -126,7 +128,7 @@ CrossValidation cross_validate(Device& device, const std::vector<Press>& presses
     }
     const LearnedFeatures features = learn_features(building);
     std::vector<std::vector<LabelScore>> scores(tried.size(), std::vector<LabelScore>(label_count));
-    for (std::size_t label = 0; label < label_count; ++label) {
+    tbb::parallel_for(std::size_t{0}, label_count, [&](std::size_t label) {
       const ContactModel contact =
           table ? contact_with(how.contact, *table, result.labels[label]) : how.contact;
       std::size_t used = 0;
@@ -139,16 +141,13 @@ CrossValidation cross_validate(Device& device, const std::vector<Press>& presses
         if (table) {
           hypothesis.layer = layers[map];
         }
-        PressPlacer placer(device, hypothesis, contact, how.lattice);
+        PressPlacer placer(hypothesis, contact, how.lattice);
         for (std::size_t i = 0; i < tried.size(); ++i) {
           scores[i][label].add(placer.place(presses[tried[i]]));
         }
       }
-      if (progress) {
-        const auto done = static_cast<double>(fold * label_count + label + 1);
-        progress(done / static_cast<double>(options.folds * label_count));
-      }
-    }
+      counter.add();
+    });
     for (std::size_t i = 0; i < tried.size(); ++i) {
       const Press& press = presses[tried[i]];
       const double elements = static_cast<double>(known_elements(press, how.contact.classifier));

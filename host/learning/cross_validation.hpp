@@ -31,10 +31,10 @@ struct CrossValidation {
 /// an object without a map in the other folds has none, -infinity.
 /// @param placed what learn_table() found for all presses: counts leave a fold's presses and maps
 /// out. None: Eq. 7 on the maps' log odds
-/// @param progress called with the fraction done
+/// @param progress called with the fraction done, by one thread at a time
 /// @throws Error where no object has two presses, on fewer than two folds or no map per object, and
 /// as PressPlacer does; what `progress` throws
-CrossValidation cross_validate(Device& device, const std::vector<Press>& presses,
+CrossValidation cross_validate(const std::vector<Press>& presses,
                                const std::vector<OccupancyGrid>& maps, const TableLearning& how,
                                const PlacedPresses* placed, const CrossValidationOptions& options,
                                const std::function<void(double)>& progress = {});

@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 #include <tbb/parallel_for.h>
 
+#include "host_progress.hpp"
 #include "observed_map.hpp"
 #include "palpate/error.hpp"
 
@@ -12,31 +13,31 @@ namespace palpate {
 
 namespace {
 
-/// Places every press on every map of another press of its object.
-std::vector<OwnPlacement> place_all(Device& device, const std::vector<Press>& presses,
+/// Places every press on every map of another press of its object. Takes all host threads.
+std::vector<OwnPlacement> place_all(const std::vector<Press>& presses,
                                     const std::vector<OccupancyGrid>& maps,
                                     const std::vector<OccupancyGrid>& layers,
                                     const TableLearning& how, const LearnedTable& table,
-                                    const std::function<void(double)>& progress) {
+                                    HostProgress& progress) {
   std::map<std::string, std::vector<std::size_t>> by_label;
   for (std::size_t i = 0; i < presses.size(); ++i) {
     by_label[presses[i].label].push_back(i);
   }
-  std::vector<OwnPlacement> placements;
-  std::size_t done = 0;
-  for (const auto& [label, own] : by_label) {
-    const ContactModel contact = contact_with(how.contact, table, label);
-    for (const std::size_t map : own) {
-      if (own.size() > 1) {
-        PressPlacer placer(device, {.map = maps[map], .layer = layers[map]}, contact, how.lattice);
-        for (const std::size_t press : own) {
-          if (press != map) {
-            placements.push_back({press, map, placer.place(presses[press])});
-          }
-        }
+  std::vector<std::vector<OwnPlacement>> on_map(maps.size());
+  tbb::parallel_for(std::size_t{0}, maps.size(), [&](std::size_t map) {
+    const std::string& label = presses[map].label;
+    const Hypothesis hypothesis{.map = maps[map], .layer = layers[map]};
+    PressPlacer placer(hypothesis, contact_with(how.contact, table, label), how.lattice);
+    for (const std::size_t press : by_label.at(label)) {
+      if (press != map) {
+        on_map[map].push_back({press, map, placer.place(presses[press])});
       }
-      progress(static_cast<double>(++done) / static_cast<double>(presses.size()));
     }
+    progress.add();
+  });
+  std::vector<OwnPlacement> placements;
+  for (const std::vector<OwnPlacement>& own : on_map) {
+    placements.insert(placements.end(), own.begin(), own.end());
   }
   return placements;
 }
@@ -78,9 +79,8 @@ ContactModel contact_with(const ContactModel& contact, const LearnedTable& table
   return model;
 }
 
-PlacedPresses learn_table(Device& device, const std::vector<Press>& presses,
-                          const std::vector<OccupancyGrid>& maps, const TableLearning& how,
-                          const std::function<void(double)>& progress) {
+PlacedPresses learn_table(const std::vector<Press>& presses, const std::vector<OccupancyGrid>& maps,
+                          const TableLearning& how, const std::function<void(double)>& progress) {
   std::map<std::string, int> presses_of;
   for (const Press& press : presses) {
     ++presses_of[press.label];
@@ -95,13 +95,9 @@ PlacedPresses learn_table(Device& device, const std::vector<Press>& presses,
   tbb::parallel_for(std::size_t{0}, maps.size(),
                     [&](std::size_t i) { layers[i] = reading_layer(maps[i], how.layer); });
   PlacedPresses placed{.placements = {}, .table = how.initial()};
+  HostProgress counter(maps.size() * static_cast<std::size_t>(how.rounds), progress);
   for (int round = 0; round < how.rounds; ++round) {
-    placed.placements =
-        place_all(device, presses, maps, layers, how, placed.table, [&](double fraction) {
-          if (progress) {
-            progress((round + fraction) / how.rounds);
-          }
-        });
+    placed.placements = place_all(presses, maps, layers, how, placed.table, counter);
     placed.table = table_of(count_placed(placed.placements, presses, layers, how), how);
   }
   return placed;

@@ -9,7 +9,6 @@
 #include <vector>
 
 #include "level_counts.hpp"
-#include "palpate/device.hpp"
 #include "palpate/learned_sensor.hpp"
 #include "press.hpp"
 #include "press_placement.hpp"
@@ -63,12 +62,12 @@ struct PlacedPresses {
 
 /// Learns a table from presses at unknown poses by alternation: places every press on the maps of
 /// the other presses of its object, counts its readings on the best of these maps, makes a table of
-/// all counts, and places again with it.
+/// all counts, and places again with it. Takes all host threads.
 /// @param maps of the presses, see press_maps()
-/// @param progress called with the fraction done
+/// @param progress called with the fraction done, by one thread at a time
 /// @throws Error where no object has two presses, or as PressPlacer does; what `progress` throws
-PlacedPresses learn_table(Device& device, const std::vector<Press>& presses,
-                          const std::vector<OccupancyGrid>& maps, const TableLearning& how,
+PlacedPresses learn_table(const std::vector<Press>& presses, const std::vector<OccupancyGrid>& maps,
+                          const TableLearning& how,
                           const std::function<void(double)>& progress = {});
 
 /// Counts the readings of the presses that `counted` marks, each on the best of the maps that it

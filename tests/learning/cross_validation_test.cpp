@@ -23,15 +23,13 @@ TableLearning learning(const std::vector<Press>& presses) {
 }
 
 TEST(CrossValidation, TriesEveryPressOnMapsOfOtherFolds) {
-  Device device = Device::open();
   SimulatedPresses simulated;
   simulated.add_shapes(3, 11);
   const std::vector<OccupancyGrid> maps = press_maps(simulated.presses, map_options());
   const TableLearning how = learning(simulated.presses);
-  const PlacedPresses placed = learn_table(device, simulated.presses, maps, how);
+  const PlacedPresses placed = learn_table(simulated.presses, maps, how);
   for (const PlacedPresses* with : {static_cast<const PlacedPresses*>(nullptr), &placed}) {
-    const CrossValidation found =
-        cross_validate(device, simulated.presses, maps, how, with, {.folds = 3});
+    const CrossValidation found = cross_validate(simulated.presses, maps, how, with, {.folds = 3});
     EXPECT_EQ(found.labels, (std::vector<std::string>{"L", "disc"}));
     ASSERT_EQ(found.presses.size(), 6U);
     EXPECT_EQ(found.known.size(), 6U);
@@ -48,14 +46,12 @@ TEST(CrossValidation, TriesEveryPressOnMapsOfOtherFolds) {
 }
 
 TEST(CrossValidation, LeavesOutAPressThatIsAloneOfItsObject) {
-  Device device = Device::open();
   SimulatedPresses simulated;
   simulated.add(on_letter_l, "L", 2, 12);
   simulated.add(on_disc, "disc", 1, 13);
   const std::vector<OccupancyGrid> maps = press_maps(simulated.presses, map_options());
   const TableLearning how = learning(simulated.presses);
-  const CrossValidation found =
-      cross_validate(device, simulated.presses, maps, how, nullptr, {.folds = 2});
+  const CrossValidation found = cross_validate(simulated.presses, maps, how, nullptr, {.folds = 2});
   ASSERT_EQ(found.presses.size(), 2U);
   // The disc's only press is in the first fold, so that it has no map for the L of that fold.
   EXPECT_EQ(found.presses[0].log_evidence[1], -INFINITY);
@@ -65,14 +61,13 @@ TEST(CrossValidation, LeavesOutAPressThatIsAloneOfItsObject) {
 }
 
 TEST(CrossValidation, RefusesWhatItCannotTry) {
-  Device device = Device::open();
   SimulatedPresses simulated;
   simulated.add_shapes(1, 14);
   const std::vector<OccupancyGrid> maps = press_maps(simulated.presses, map_options());
   const TableLearning how = learning(simulated.presses);
-  EXPECT_THROW(cross_validate(device, simulated.presses, maps, how, nullptr, {}), Error);
+  EXPECT_THROW(cross_validate(simulated.presses, maps, how, nullptr, {}), Error);
   simulated.add_shapes(1, 15);
-  EXPECT_THROW(cross_validate(device, simulated.presses, maps, how, nullptr, {.folds = 1}), Error);
+  EXPECT_THROW(cross_validate(simulated.presses, maps, how, nullptr, {.folds = 1}), Error);
 }
 
 }  // namespace

@@ -94,17 +94,15 @@ TEST(TableLearning, RecoversTheTableOfASimulatedSensor) {
 }
 
 TEST(TableLearning, FindsAtUnknownPosesWhatItWouldAtKnownOnes) {
-  Device device = Device::open();
   SimulatedPresses simulated;
   simulated.add_shapes(5, 3);
   const TableLearning how = learning(simulated.presses);
   const std::vector<OccupancyGrid> maps = press_maps(simulated.presses, map_options());
   double shown = 0.0;
-  const PlacedPresses placed =
-      learn_table(device, simulated.presses, maps, how, [&](double fraction) {
-        EXPECT_GE(fraction, shown);
-        shown = fraction;
-      });
+  const PlacedPresses placed = learn_table(simulated.presses, maps, how, [&](double fraction) {
+    EXPECT_GE(fraction, shown);
+    shown = fraction;
+  });
   EXPECT_EQ(shown, 1.0);
   EXPECT_EQ(placed.placements.size(), 40U);
   const LevelCounts counts = true_counts(simulated, how);
@@ -186,12 +184,11 @@ TEST(TableLearning, KeepsEquation7ForALevelThatNothingReached) {
 }
 
 TEST(TableLearning, OfNoPairOfPressesIsRefused) {
-  Device device = Device::open();
   SimulatedPresses simulated;
   simulated.add_shapes(1, 5);
   const TableLearning how = learning(simulated.presses);
   try {
-    learn_table(device, simulated.presses, press_maps(simulated.presses, map_options()), how);
+    learn_table(simulated.presses, press_maps(simulated.presses, map_options()), how);
     FAIL() << "a table of nothing was learned";
   } catch (const Error& error) {
     EXPECT_NE(std::string(error.what()).find("at least two presses of one object"),
