@@ -1,0 +1,33 @@
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <mutex>
+#include <utility>
+
+namespace palpate {
+
+/// Counts parts of a work that host threads do, and tells the fraction done, one thread at a time.
+class HostProgress {
+ public:
+  /// @param show may be empty
+  HostProgress(std::size_t parts, std::function<void(double)> show)
+      : parts_(parts), show_(std::move(show)) {}
+
+  /// One part more is done. Throws what `show` throws.
+  void add() {
+    const std::lock_guard lock(mutex_);
+    ++done_;
+    if (show_) {
+      show_(static_cast<double>(done_) / static_cast<double>(parts_));
+    }
+  }
+
+ private:
+  std::mutex mutex_;
+  std::size_t parts_;
+  std::size_t done_ = 0;
+  std::function<void(double)> show_;
+};
+
+}  // namespace palpate

@@ -1,0 +1,65 @@
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <vector>
+
+#include "palpate/contact_model.hpp"
+#include "palpate/occupancy_grid.hpp"
+#include "palpate/pose.hpp"
+#include "palpate/reading_layer.hpp"
+#include "palpate/touch.hpp"
+
+namespace palpate {
+
+/// How often elements read each level where a reading layer has each value: [level, node] over the
+/// nodes of ReadingLayer. Counts are fractions: a reading between two nodes counts in both, by
+/// nearness, as the table's interpolation weighs them.
+class LevelCounts {
+ public:
+  explicit LevelCounts(std::size_t levels);
+
+  /// Counts one reading; Unknown changes nothing.
+  /// @param value of the layer at the reading's place
+  void add(Reading reading, double value);
+  /// Counts every element of touches of an object that is at a pose.
+  /// @param classifier with the table's levels, see ContactModel::classify()
+  void add(std::span<const Touch> touches, const Pose& T_object_robot, const OccupancyGrid& layer,
+           const ContactModel& classifier);
+  LevelCounts& operator+=(const LevelCounts& other);
+
+  std::size_t levels() const { return counts_.size() / ReadingLayer::nodes; }
+  double at(std::size_t level, int node) const;
+  /// Readings of all levels at a node.
+  double at_node(int node) const;
+  /// All readings.
+  double total() const;
+
+ private:
+  std::vector<double> counts_;
+};
+
+/// The table of Eq. 7 as far as it holds for a layer, in nats, [level, node]; every node's
+/// probabilities sum to 1, and In Contact is as likely at each of its levels. Over log odds it is
+/// Eq. 7 at the node's value; over mean levels at the value's excess over the threshold's. At the
+/// values of cells that nothing sensed it is Eq. 7 of the prior.
+/// @param contact with its prior; its table is not used
+std::vector<double> initial_table(const ReadingLayer& layer, std::size_t levels,
+                                  const ContactModel& contact);
+
+/// The table that counts say, in nats, as if `pseudo_counts` readings at every node had been
+/// distributed as `towards` says: log((n_level + pseudo p_level) / (n + pseudo)), at least
+/// log(1e-6). A node without counts keeps what `towards` says.
+/// @param towards table in nats of the same size; its probabilities are normalised
+/// @param pseudo_counts above 0
+std::vector<double> shrunk_table(const LevelCounts& counts, std::span<const double> towards,
+                                 double pseudo_counts);
+
+/// A layer of mean levels whose value 0 is the threshold's, so that half of the nodes tell levels
+/// below it apart and half those above: unit_level = threshold^2 / (full - 2 threshold).
+/// @param full_level the largest pressure to tell apart, at least 3 thresholds; a lower one counts
+/// as 3 thresholds
+/// @throws Error on a threshold that is not positive
+ReadingLayer mean_level_layer(double threshold, double full_level);
+
+}  // namespace palpate

@@ -1,0 +1,228 @@
+#include "press_placement.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <numeric>
+
+#include <fmt/format.h>
+
+#include "bounding_box.hpp"
+#include "interpolated_map.hpp"
+#include "palpate/error.hpp"
+
+namespace palpate {
+
+namespace {
+
+/// Bins that are evaluated at the elements' own places.
+constexpr std::size_t evaluated_bins = 8;
+
+BoundingBox box_of(const Press& press) {
+  BoundingBox box;
+  for (const Touch& touch : press.touches) {
+    for (const glm::dvec2& element : touch.elements_mm) {
+      box.take_in(touch.T_robot_sensor * element);
+    }
+  }
+  return box;
+}
+
+}  // namespace
+
+int PressPlacer::Samples::nearest(double mm) const {
+  return static_cast<int>(std::lround((mm - first_mm) / step_mm));
+}
+
+PressPlacer::PressPlacer(const Hypothesis& hypothesis, const ContactModel& contact,
+                         const PoseLattice& lattice)
+    : layer_(hypothesis.compared()), contact_(contact), lattice_(lattice) {
+  lattice_.collapse_fixed().validate();
+  contact_.validate();
+  if (const auto fault = fault_of(layer_)) {
+    throw Error(Fault::input, fmt::format("map '{}': {}", layer_.label, *fault));
+  }
+}
+
+PressPlacement PressPlacer::place(const Press& press) {
+  const std::vector<Element> elements = elements_of(press);
+  double reach_mm = 0.0;
+  for (const Element& element : elements) {
+    reach_mm = std::max(reach_mm, std::hypot(element.from_pivot_mm.x, element.from_pivot_mm.y));
+  }
+  cover(reach_mm);
+  sum_rest(elements);
+
+  const auto plane = static_cast<std::size_t>(lattice_.plane());
+  std::vector<float> bins = rest_;
+  std::vector<float> of_theta(plane);
+  for (int theta = 0; theta < lattice_.theta_rad.count; ++theta) {
+    std::ranges::fill(of_theta, 0.0F);
+    std::vector<float> unknown(plane, 0.0F);
+    for (const Element& element : elements) {
+      if (is_contact(element.reading)) {
+        const auto level = static_cast<std::size_t>(element.reading) - 1;
+        add(of_theta, theta, element.from_pivot_mm, contact_excess_[level]);
+      } else if (element.reading == Reading::unknown) {
+        add(unknown, theta, element.from_pivot_mm, no_contact_);
+      }
+    }
+    for (std::size_t i = 0; i < plane; ++i) {
+      bins[static_cast<std::size_t>(theta) * plane + i] += of_theta[i] - unknown[i];
+    }
+  }
+
+  std::vector<std::uint32_t> order(bins.size());
+  std::iota(order.begin(), order.end(), 0U);
+  const std::size_t best_count = std::min(evaluated_bins, bins.size());
+  const auto better = [&](std::uint32_t a, std::uint32_t b) {
+    return bins[a] != bins[b] ? bins[a] > bins[b] : a < b;
+  };
+  std::partial_sort(order.begin(), order.begin() + static_cast<std::ptrdiff_t>(best_count),
+                    order.end(), better);
+  std::vector<double> evaluated;
+  for (std::size_t i = 0; i < best_count; ++i) {
+    evaluated.push_back(log_likelihood(elements, lattice_.T_object_robot(order[i])));
+  }
+  const auto best = std::ranges::max_element(evaluated);
+  double sum = 0.0;
+  for (std::size_t i = 0; i < order.size(); ++i) {
+    sum += std::exp((i < best_count ? evaluated[i] : double{bins[order[i]]}) - *best);
+  }
+  return {.T_object_robot =
+              lattice_.T_object_robot(order[static_cast<std::size_t>(best - evaluated.begin())]),
+          .log_likelihood = *best,
+          .log_evidence = *best + std::log(sum / static_cast<double>(bins.size()))};
+}
+
+std::vector<PressPlacer::Element> PressPlacer::elements_of(const Press& press) const {
+  std::vector<Element> elements;
+  for (const Touch& touch : press.touches) {
+    const std::vector<Reading> readings = contact_.classify(touch);
+    for (std::size_t e = 0; e < readings.size(); ++e) {
+      elements.push_back(
+          {touch.T_robot_sensor * touch.elements_mm[e] - lattice_.pivot_mm, readings[e]});
+    }
+  }
+  return elements;
+}
+
+void PressPlacer::cover(double reach_mm) {
+  if (reach_mm <= reach_mm_) {
+    return;
+  }
+  reach_mm_ = reach_mm;
+  resting_.clear();
+  const auto samples = [&](const Axis& axis) {
+    const double step = axis.count > 1 ? axis.step() : layer_.cell_mm;
+    const int per_step = std::max(1, static_cast<int>(std::ceil(step / layer_.cell_mm - 1e-9)));
+    Samples of{.step_mm = step / per_step, .per_step = per_step};
+    // One step more on either side is for rounding.
+    of.first_mm = axis.centre(0) - reach_mm - step;
+    of.columns = axis.count + 3 + static_cast<int>(std::min(1e9, std::ceil(2.0 * reach_mm / step)));
+    return of;
+  };
+  x_ = samples(lattice_.x_mm);
+  y_ = samples(lattice_.y_mm);
+  const double count = 1.0 * x_.columns * x_.per_step * y_.columns * y_.per_step;
+  if (!(count <= static_cast<double>(most_cells))) {
+    throw Error(Fault::input,
+                fmt::format("a press reaches {:g} mm from the pivot, {:.3g} samples of a map; move "
+                            "its touches near the pivot, or use larger cells",
+                            reach_mm, count));
+  }
+  const InterpolatedMap map(layer_, contact_.table ? layer_.prior : contact_.prior.value());
+  const std::size_t contacts = contact_.table ? contact_.table->levels() - 1 : 1;
+  no_contact_.assign(static_cast<std::size_t>(count), 0.0F);
+  contact_excess_.assign(contacts, no_contact_);
+  std::size_t at = 0;
+  for (int y_phase = 0; y_phase < y_.per_step; ++y_phase) {
+    for (int x_phase = 0; x_phase < x_.per_step; ++x_phase) {
+      for (int row = 0; row < y_.columns; ++row) {
+        for (int column = 0; column < x_.columns; ++column, ++at) {
+          const MapSample sample{
+              .log_odds = map.log_odds({x_.first_mm + x_.step_mm * (column * x_.per_step + x_phase),
+                                        y_.first_mm + y_.step_mm * (row * y_.per_step + y_phase)})};
+          const double none = contact_.log_likelihood(Reading::no_contact, sample);
+          no_contact_[at] = static_cast<float>(none);
+          for (std::size_t level = 0; level < contacts; ++level) {
+            contact_excess_[level][at] =
+                static_cast<float>(contact_.log_likelihood(contact_level(level), sample) - none);
+          }
+        }
+      }
+    }
+  }
+}
+
+void PressPlacer::sum_rest(const std::vector<Element>& elements) {
+  if (std::ranges::equal(elements, resting_, {}, &Element::from_pivot_mm)) {
+    return;
+  }
+  resting_.clear();
+  for (const Element& element : elements) {
+    resting_.push_back(element.from_pivot_mm);
+  }
+  const auto plane = static_cast<std::size_t>(lattice_.plane());
+  rest_.clear();
+  std::vector<float> of_theta(plane);
+  for (int theta = 0; theta < lattice_.theta_rad.count; ++theta) {
+    std::ranges::fill(of_theta, 0.0F);
+    for (const glm::dvec2& place : resting_) {
+      add(of_theta, theta, place, no_contact_);
+    }
+    rest_.insert(rest_.end(), of_theta.begin(), of_theta.end());
+  }
+}
+
+void PressPlacer::add(std::vector<float>& bins, int theta, const glm::dvec2& from_pivot_mm,
+                      const std::vector<float>& table) const {
+  const glm::dvec2 turned = rotate(lattice_.theta_rad.centre(theta), from_pivot_mm);
+  const int u = x_.nearest(lattice_.x_mm.centre(0) + turned.x);
+  const int v = y_.nearest(lattice_.y_mm.centre(0) + turned.y);
+  const auto width = static_cast<std::size_t>(x_.columns);
+  const std::size_t phase =
+      static_cast<std::size_t>(v % y_.per_step) * static_cast<std::size_t>(x_.per_step) +
+      static_cast<std::size_t>(u % x_.per_step);
+  const float* row = table.data() + phase * width * static_cast<std::size_t>(y_.columns) +
+                     static_cast<std::size_t>(v / y_.per_step) * width +
+                     static_cast<std::size_t>(u / x_.per_step);
+  float* bin = bins.data();
+  const int nx = lattice_.x_mm.count;
+  for (int j = 0; j < lattice_.y_mm.count; ++j, row += width, bin += nx) {
+    for (int i = 0; i < nx; ++i) {
+      bin[i] += row[i];
+    }
+  }
+}
+
+double PressPlacer::log_likelihood(const std::vector<Element>& elements,
+                                   const Pose& T_object_robot) const {
+  const InterpolatedMap map(layer_, contact_.table ? layer_.prior : contact_.prior.value());
+  double sum = 0.0;
+  for (const Element& element : elements) {
+    if (element.reading != Reading::unknown) {
+      const glm::dvec2 place = T_object_robot * (element.from_pivot_mm + lattice_.pivot_mm);
+      sum += contact_.log_likelihood(element.reading, {.log_odds = map.log_odds(place)});
+    }
+  }
+  return sum;
+}
+
+PoseLattice placing_lattice(std::span<const Press> presses, double step_mm, double step_rad) {
+  glm::dvec2 half_mm(0.0);
+  for (const Press& press : presses) {
+    if (const BoundingBox box = box_of(press); !box.empty()) {
+      half_mm = glm::max(half_mm, box.extent() / 2.0);
+    }
+  }
+  const auto axis = [](double half, double step) {
+    return Axis{-half, half, std::max(1, static_cast<int>(std::ceil(2.0 * half / step - 1e-9)))};
+  };
+  Axis theta = axis(std::numbers::pi, step_rad);
+  theta.lower = 0.0;
+  theta.upper = 2.0 * std::numbers::pi;
+  return {.x_mm = axis(half_mm.x, step_mm), .y_mm = axis(half_mm.y, step_mm), .theta_rad = theta};
+}
+
+}  // namespace palpate

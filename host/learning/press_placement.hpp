@@ -1,0 +1,85 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <span>
+#include <vector>
+
+#include "palpate/contact_model.hpp"
+#include "palpate/estimate.hpp"
+#include "palpate/lattice.hpp"
+#include "press.hpp"
+
+namespace palpate {
+
+/// Where a press lies on a map, and how well it does.
+struct PressPlacement {
+  Pose T_object_robot;          ///< of the largest likelihood: a bin of the lattice
+  double log_likelihood = 0.0;  ///< at that pose, in nats
+  double log_evidence = 0.0;    ///< log of the likelihood's mean over the lattice, in nats
+};
+
+/// Finds the places of presses on one map, over all bins of a lattice.
+///
+/// A table of each reading's log-likelihood stands at samples of the map that divide the lattice's
+/// steps, so that an element adds rows of the table to rows of bins. Elements are taken to the
+/// nearest sample, at most half a cell of the map away along each axis; the best bins by these sums
+/// are then evaluated without. No Contact everywhere is summed once for all presses of one array at
+/// one place. Not thread-safe; objects of their own may work side by side.
+class PressPlacer {
+ public:
+  /// @param hypothesis with a layer where the contact model has a table over one; its weight is
+  /// ignored. It outlives this object
+  /// @param contact with its prior; of one set of numbers where it has a table
+  /// @throws Error on a lattice, contact model or map that is not sound
+  PressPlacer(const Hypothesis& hypothesis, const ContactModel& contact,
+              const PoseLattice& lattice);
+
+  /// @throws Error on a touch that is not sound, or a press that lies so far from the pivot that
+  /// its samples are more than `most_cells`
+  PressPlacement place(const Press& press);
+
+ private:
+  /// One axis of the samples: `per_step` of them to a step of the lattice.
+  struct Samples {
+    double first_mm = 0.0;
+    double step_mm = 1.0;
+    int per_step = 1;
+    int columns = 0;  ///< steps that the samples cover
+
+    int nearest(double mm) const;
+  };
+  /// An element relative to the pivot, and what it reads.
+  struct Element {
+    glm::dvec2 from_pivot_mm;
+    Reading reading;
+  };
+
+  std::vector<Element> elements_of(const Press& press) const;
+  void cover(double reach_mm);
+  void sum_rest(const std::vector<Element>& elements);
+  /// Adds a table to the bins of one theta, at an element's places.
+  void add(std::vector<float>& bins, int theta, const glm::dvec2& from_pivot_mm,
+           const std::vector<float>& table) const;
+  double log_likelihood(const std::vector<Element>& elements, const Pose& T_object_robot) const;
+
+  const OccupancyGrid& layer_;
+  ContactModel contact_;
+  PoseLattice lattice_;
+  double reach_mm_ = -1.0;  ///< the tables cover elements so far from the pivot
+  Samples x_;
+  Samples y_;
+  /// [y phase, x phase, row, column] in nats: of No Contact, and by how much each level of contact
+  /// exceeds it.
+  std::vector<float> no_contact_;
+  std::vector<std::vector<float>> contact_excess_;
+  std::vector<glm::dvec2> resting_;  ///< elements of rest_, relative to the pivot
+  std::vector<float> rest_;          ///< log-likelihood of No Contact everywhere, [theta, y, x]
+};
+
+/// A lattice for placing presses on each other's maps: T_object_robot over half of the extent of
+/// the largest press to either side of the origin, at steps of at most `step_mm`, and all angles at
+/// steps of at most `step_rad`.
+PoseLattice placing_lattice(std::span<const Press> presses, double step_mm, double step_rad);
+
+}  // namespace palpate

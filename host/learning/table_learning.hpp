@@ -1,0 +1,89 @@
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <map>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "level_counts.hpp"
+#include "palpate/learned_sensor.hpp"
+#include "press.hpp"
+#include "press_placement.hpp"
+
+namespace palpate {
+
+/// How a likelihood table is learned.
+struct TableLearning {
+  ReadingLayer layer = {};
+  std::vector<double> level_edges = {};  ///< see LikelihoodTable
+  ContactModel contact = {};             ///< of Eq. 7, with its prior: where learning begins
+  PoseLattice lattice = {};              ///< for placing presses at unknown poses
+  int rounds = 3;                        ///< of placing and counting
+  std::size_t best_maps = 3;             ///< on which a press is counted
+  double shared_pseudo_counts = 20.0;    ///< of Eq. 7 in the shared table, at every node
+  double object_pseudo_counts = 200.0;   ///< of the shared table in an object's, at every node
+
+  /// Eq. 7 with the table's levels, for classifying readings and as the first table.
+  LearnedTable initial() const;
+};
+
+/// Counts of all objects' readings, by label.
+using ObjectCounts = std::map<std::string, LevelCounts>;
+
+/// The table that counts say: the shared one is drawn towards Eq. 7's, and each object's towards
+/// the shared one, see shrunk_table(). So a level or a node that was never seen keeps what Eq. 7
+/// says, and an object with few counts what all objects say together.
+LearnedTable table_of(const ObjectCounts& counts, const TableLearning& how);
+
+/// The shared table without one object's counts: what others' touches say about its readings.
+std::vector<double> table_without(const ObjectCounts& counts, const std::string& label,
+                                  const TableLearning& how);
+
+/// The contact model of Eq. 7's classifier with an object's numbers of a table, or the shared
+/// numbers where the object has none of its own.
+ContactModel contact_with(const ContactModel& contact, const LearnedTable& table,
+                          const std::string& label);
+
+/// A press on the map of another press of its object.
+struct OwnPlacement {
+  std::size_t press = 0;
+  std::size_t map = 0;
+  PressPlacement placement;
+};
+
+/// What presses at unknown poses say about readings.
+struct PlacedPresses {
+  std::vector<OwnPlacement> placements;  ///< of the last round: each press on all its object's maps
+  LearnedTable table;                    ///< after the last round
+};
+
+/// Learns a table from presses at unknown poses by alternation: places every press on the maps of
+/// the other presses of its object, counts its readings on the best of these maps, makes a table of
+/// all counts, and places again with it. Takes all host threads.
+/// @param maps of the presses, see press_maps()
+/// @param progress called with the fraction done, by one thread at a time
+/// @throws Error where no object has two presses, or as PressPlacer does; what `progress` throws
+PlacedPresses learn_table(const std::vector<Press>& presses, const std::vector<OccupancyGrid>& maps,
+                          const TableLearning& how,
+                          const std::function<void(double)>& progress = {});
+
+/// Counts the readings of the presses that `counted` marks, each on the best of the maps that it
+/// marks too: so what is learned from one part of the presses can be tried on another.
+/// @param layers of the maps
+/// @param counted [press]; empty: all are
+ObjectCounts count_placed(std::span<const OwnPlacement> placements,
+                          const std::vector<Press>& presses,
+                          const std::vector<OccupancyGrid>& layers, const TableLearning& how,
+                          const std::vector<bool>& counted = {});
+
+/// Counts the readings of touches at known poses. Touch i is in fold i % folds and is counted
+/// against the map of all touches of other folds.
+/// @param folds at least 2
+/// @throws Error where there are fewer touches than folds, or as observed_map() does
+LevelCounts count_posed(const Press& touches, const MapOptions& map_options,
+                        const TableLearning& how, std::size_t folds);
+
+}  // namespace palpate

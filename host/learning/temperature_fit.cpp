@@ -1,0 +1,185 @@
+#include "temperature_fit.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+#include <fmt/format.h>
+
+#include "palpate/error.hpp"
+
+namespace palpate {
+
+namespace {
+
+/// Logarithms of the labels' probabilities, before they are normalised.
+std::vector<double> scores(const ScoredPress& press, double temperature, double feature_weight) {
+  std::vector<double> nats = press.log_evidence;
+  for (std::size_t i = 0; i < nats.size(); ++i) {
+    nats[i] /= temperature;
+    nats[i] += press.log_density.empty() ? 0.0 : feature_weight * press.log_density[i];
+  }
+  return nats;
+}
+
+double log_sum_exp(std::span<const double> nats) {
+  const double largest = *std::ranges::max_element(nats);
+  double sum = 0.0;
+  for (const double x : nats) {
+    sum += std::exp(x - largest);
+  }
+  return largest + std::log(sum);
+}
+
+/// -log of the label's probability.
+double loss_of(const ScoredPress& press, double temperature, double feature_weight) {
+  const std::vector<double> nats = scores(press, temperature, feature_weight);
+  return log_sum_exp(nats) - nats[press.truth];
+}
+
+void require_sound(std::span<const ScoredPress> presses) {
+  if (presses.empty()) {
+    throw Error(Fault::input, "calibration: no presses to try the model on; give more presses");
+  }
+  const std::size_t labels = presses.front().log_evidence.size();
+  const auto finite = [](double x) { return std::isfinite(x); };
+  const auto below_infinity = [](double x) { return x < std::numeric_limits<double>::infinity(); };
+  for (std::size_t i = 0; i < presses.size(); ++i) {
+    const ScoredPress& press = presses[i];
+    if (press.log_evidence.size() != labels || press.truth >= labels ||
+        (!press.log_density.empty() && press.log_density.size() != labels) ||
+        !std::ranges::all_of(press.log_evidence, below_infinity) ||
+        !std::isfinite(press.log_evidence[press.truth]) ||
+        !std::ranges::all_of(press.log_density, finite)) {
+      throw Error(Fault::input, fmt::format("calibration: press {}: give it a log evidence for "
+                                            "each of {} labels, a finite one for its own",
+                                            i, labels));
+    }
+  }
+}
+
+/// By how much the label's log evidence exceeds the best other's.
+double margin_of(const ScoredPress& press) {
+  double other = -std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < press.log_evidence.size(); ++i) {
+    other = i == press.truth ? other : std::max(other, press.log_evidence[i]);
+  }
+  return press.log_evidence[press.truth] - other;
+}
+
+double median(std::vector<double> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+/// The place of the least value of a function with one minimum over [lower, upper], within a
+/// thousandth of the interval (golden section search).
+template <typename Function>
+double least_place(double lower, double upper, const Function& function) {
+  constexpr double golden = 0.6180339887498949;
+  const double width = upper - lower;
+  double a = upper - golden * (upper - lower);
+  double b = lower + golden * (upper - lower);
+  double at_a = function(a);
+  double at_b = function(b);
+  while (upper - lower > 1e-3 * width) {
+    if (at_a <= at_b) {
+      upper = b;
+      b = a;
+      at_b = at_a;
+      a = upper - golden * (upper - lower);
+      at_a = function(a);
+    } else {
+      lower = a;
+      a = b;
+      at_a = at_b;
+      b = lower + golden * (upper - lower);
+      at_b = function(b);
+    }
+  }
+  return (lower + upper) / 2.0;
+}
+
+}  // namespace
+
+std::vector<double> label_probabilities(const ScoredPress& press, double temperature,
+                                        double feature_weight) {
+  std::vector<double> p = scores(press, temperature, feature_weight);
+  const double sum = log_sum_exp(p);
+  for (double& x : p) {
+    x = std::exp(x - sum);
+  }
+  return p;
+}
+
+Calibration calibration_of(std::span<const ScoredPress> presses, double temperature,
+                           double feature_weight) {
+  require_sound(presses);
+  struct Bin {
+    double confidence = 0.0;
+    double right = 0.0;
+  };
+  constexpr int bin_count = 10;
+  std::array<Bin, bin_count> bins{};
+  Calibration result{.presses = presses.size()};
+  const double share = 1.0 / static_cast<double>(presses.size());
+  for (const ScoredPress& press : presses) {
+    const std::vector<double> p = label_probabilities(press, temperature, feature_weight);
+    const auto best = std::ranges::max_element(p);
+    const double right = static_cast<std::size_t>(best - p.begin()) == press.truth ? 1.0 : 0.0;
+    Bin& bin = bins.at(std::min(static_cast<std::size_t>(*best * bin_count), bins.size() - 1));
+    bin.confidence += share * *best;
+    bin.right += share * right;
+    result.accuracy += share * right;
+    result.log_loss += share * loss_of(press, temperature, feature_weight);
+  }
+  for (const Bin& bin : bins) {
+    result.calibration_error += std::abs(bin.confidence - bin.right);
+  }
+  return result;
+}
+
+TemperatureFit fit_temperature(std::span<const ScoredPress> presses) {
+  require_sound(presses);
+  std::vector<double> margins;
+  bool features = true;
+  for (const ScoredPress& press : presses) {
+    if (const double margin = std::abs(margin_of(press)); std::isfinite(margin)) {
+      margins.push_back(margin);
+    }
+    features = features && !press.log_density.empty();
+  }
+  if (margins.empty()) {
+    throw Error(Fault::input,
+                "temperature: presses of one object say nothing about confidence; give presses of "
+                "two objects or more");
+  }
+  const double margin = median(margins);
+  // The loss is convex in the temperature's inverse and the weight, so that it has one minimum
+  // along the logarithm of the temperature, and the least of these has one along the weight.
+  const auto loss = [&](double log_temperature, double weight) {
+    const double temperature = std::exp(log_temperature);
+    const double apart = margin / temperature;
+    double sum = apart / 2.0 + std::log1p(std::exp(-apart));
+    for (const ScoredPress& press : presses) {
+      sum += loss_of(press, temperature, weight);
+    }
+    return sum;
+  };
+  constexpr double least_temperature = 0.01;
+  constexpr double most_temperature = 1e6;
+  const auto best_temperature = [&](double weight) {
+    return least_place(std::log(least_temperature), std::log(most_temperature),
+                       [&](double log_temperature) { return loss(log_temperature, weight); });
+  };
+  constexpr double most_weight = 2.0;
+  const double weight =
+      features
+          ? least_place(0.0, most_weight, [&](double w) { return loss(best_temperature(w), w); })
+          : 0.0;
+  return {std::exp(best_temperature(weight)), weight};
+}
+
+}  // namespace palpate

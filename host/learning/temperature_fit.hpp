@@ -1,0 +1,47 @@
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <vector>
+
+namespace palpate {
+
+/// What a model that has not seen a press says of it, label by label.
+struct ScoredPress {
+  std::size_t truth = 0;             ///< index of the press's label
+  std::vector<double> log_evidence;  ///< of every label, in nats; -infinity: without a map
+  /// Log density of the press's features under every label, in nats; empty without features.
+  std::vector<double> log_density;
+};
+
+/// Probabilities of the labels: proportional to evidence^(1 / temperature) * density^weight.
+std::vector<double> label_probabilities(const ScoredPress& press, double temperature,
+                                        double feature_weight = 0.0);
+
+/// How good the probabilities of presses are.
+struct Calibration {
+  std::size_t presses = 0;
+  double accuracy = 0.0;  ///< share of the presses whose label has the largest probability
+  double log_loss = 0.0;  ///< mean of -log of the label's probability, in nats
+  /// Mean over ten bins of the largest probability, weighted by the bins' presses, of the
+  /// difference between the mean largest probability and the accuracy of the bin.
+  double calibration_error = 0.0;
+};
+/// @throws Error on no press, or a press without a log evidence for each of the same labels, finite
+/// for its own
+Calibration calibration_of(std::span<const ScoredPress> presses, double temperature,
+                           double feature_weight = 0.0);
+
+struct TemperatureFit {
+  double temperature = 1.0;
+  double feature_weight = 0.0;
+};
+/// The temperature of at least 0.01, and the weight in [0, 2] of the features where presses have
+/// them, of the least log-loss. Besides the presses, one more counts, of two labels whose log
+/// evidences differ by the median margin of the presses (label against the best other): it is
+/// right or wrong with equal weights, so that presses which are all told apart, however clearly, do
+/// not make the temperature 0.
+/// @throws Error as calibration_of(), and where no press has two labels to choose from
+TemperatureFit fit_temperature(std::span<const ScoredPress> presses);
+
+}  // namespace palpate

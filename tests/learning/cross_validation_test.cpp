@@ -1,0 +1,74 @@
+#include "cross_validation.hpp"
+
+#include <cmath>
+#include <numeric>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "palpate/error.hpp"
+#include "simulated_presses.hpp"
+#include "synthetic.hpp"
+
+namespace palpate {
+namespace {
+
+MapOptions map_options() { return {.cell_mm = 0.75, .sensor = {.spread_mm = 0.75, .prior = 0.2}}; }
+
+TableLearning learning(const std::vector<Press>& presses) {
+  return {.layer = {.near_mm = 3.0, .far_mm = 9.0},
+          .contact = {.prior = 0.2},
+          .lattice = placing_lattice(presses, 1.5, two_pi / 24.0),
+          .rounds = 1};
+}
+
+TEST(CrossValidation, TriesEveryPressOnMapsOfOtherFolds) {
+  SimulatedPresses simulated;
+  simulated.add_shapes(3, 11);
+  const std::vector<OccupancyGrid> maps = press_maps(simulated.presses, map_options());
+  const TableLearning how = learning(simulated.presses);
+  const PlacedPresses placed = learn_table(simulated.presses, maps, how);
+  for (const PlacedPresses* with : {static_cast<const PlacedPresses*>(nullptr), &placed}) {
+    const CrossValidation found = cross_validate(simulated.presses, maps, how, with, {.folds = 3});
+    EXPECT_EQ(found.labels, (std::vector<std::string>{"L", "disc"}));
+    ASSERT_EQ(found.presses.size(), 6U);
+    EXPECT_EQ(found.known.size(), 6U);
+    EXPECT_EQ(found.unknown.size(), 6U);
+    // The shapes differ by tens of elements: evidence tells them apart by tens of nats.
+    EXPECT_NEAR(calibration_of(found.presses, 1.0).accuracy, 1.0, 1e-9);
+    EXPECT_GT(area_under_curve({found.known, found.unknown}), 0.8);
+    for (std::size_t i = 0; i < 6; ++i) {
+      EXPECT_LE(found.unknown[i], found.known[i]);
+      EXPECT_LT(found.known[i], 0.0);
+      EXPECT_EQ(found.presses[i].log_density.size(), 2U);
+    }
+  }
+}
+
+TEST(CrossValidation, LeavesOutAPressThatIsAloneOfItsObject) {
+  SimulatedPresses simulated;
+  simulated.add(on_letter_l, "L", 2, 12);
+  simulated.add(on_disc, "disc", 1, 13);
+  const std::vector<OccupancyGrid> maps = press_maps(simulated.presses, map_options());
+  const TableLearning how = learning(simulated.presses);
+  const CrossValidation found = cross_validate(simulated.presses, maps, how, nullptr, {.folds = 2});
+  ASSERT_EQ(found.presses.size(), 2U);
+  // The disc's only press is in the first fold, so that it has no map for the L of that fold.
+  EXPECT_EQ(found.presses[0].log_evidence[1], -INFINITY);
+  EXPECT_TRUE(std::isfinite(found.presses[1].log_evidence[1]));
+  EXPECT_EQ(found.unknown.size(), 1U);
+  EXPECT_GT(fit_temperature(found.presses).temperature, 0.0);
+}
+
+TEST(CrossValidation, RefusesWhatItCannotTry) {
+  SimulatedPresses simulated;
+  simulated.add_shapes(1, 14);
+  const std::vector<OccupancyGrid> maps = press_maps(simulated.presses, map_options());
+  const TableLearning how = learning(simulated.presses);
+  EXPECT_THROW(cross_validate(simulated.presses, maps, how, nullptr, {}), Error);
+  simulated.add_shapes(1, 15);
+  EXPECT_THROW(cross_validate(simulated.presses, maps, how, nullptr, {.folds = 1}), Error);
+}
+
+}  // namespace
+}  // namespace palpate

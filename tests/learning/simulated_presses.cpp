@@ -1,0 +1,35 @@
+#include "simulated_presses.hpp"
+
+#include "synthetic.hpp"
+
+namespace palpate {
+
+void SimulatedPresses::add(const Silhouette& shape, const std::string& label, std::size_t count,
+                           std::uint64_t seed) {
+  Uniform random(seed);
+  for (std::size_t i = 0; i < count; ++i) {
+    const Pose pose{{random(-3.0, 3.0), random(-3.0, 3.0)}, random(0.0, two_pi)};
+    Recording recording;
+    recording.path = label + std::to_string(i) + ".h5";
+    recording.object = label;
+    recording.elements_mm = grid_array(14, 14, 1.5);
+    recording.T_robot_sensor = {Pose{}};
+    for (const glm::dvec2& element : recording.elements_mm) {
+      const double contact = shape(pose * element) ? 0.9 : 0.05;
+      recording.pressure.push_back(random(0.0, 1.0) < contact ? 10.0 : 0.0);
+    }
+    recordings.push_back(std::move(recording));
+    T_object_robot.push_back(pose);
+  }
+  presses.clear();
+  for (const Recording& recording : recordings) {
+    presses.push_back(single_press(recording, 0));
+  }
+}
+
+void SimulatedPresses::add_shapes(std::size_t count, std::uint64_t seed) {
+  add(on_letter_l, "L", count, seed);
+  add(on_disc, "disc", count, seed + 1);
+}
+
+}  // namespace palpate

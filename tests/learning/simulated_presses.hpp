@@ -1,0 +1,28 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "palpate/touch.hpp"
+#include "press.hpp"
+#include "touched_shape.hpp"
+
+namespace palpate {
+
+/// Presses by an array of 14 x 14 elements, 1.5 mm apart, on objects at unknown poses.
+struct SimulatedPresses {
+  std::vector<Recording> recordings;  ///< one press each
+  std::vector<Press> presses;         ///< of the recordings
+  std::vector<Pose> T_object_robot;   ///< the truth
+
+  /// Adds presses of an object. An element on the object reads 10 with probability 0.9, and one
+  /// beside it with probability 0.05; else 0.
+  void add(const Silhouette& shape, const std::string& label, std::size_t count,
+           std::uint64_t seed);
+  /// Adds presses of the letter L, and as many of the disc.
+  void add_shapes(std::size_t count, std::uint64_t seed);
+};
+
+}  // namespace palpate

@@ -1,0 +1,259 @@
+#include "table_learning.hpp"
+
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "palpate/error.hpp"
+#include "simulated_presses.hpp"
+#include "synthetic.hpp"
+
+namespace palpate {
+namespace {
+
+MapOptions map_options() { return {.cell_mm = 0.75, .sensor = {.spread_mm = 0.75, .prior = 0.2}}; }
+
+TableLearning learning(const std::vector<Press>& presses) {
+  return {.layer = {.near_mm = 3.0, .far_mm = 9.0},
+          .contact = {.prior = 0.2},
+          .lattice = placing_lattice(presses, 1.5, two_pi / 24.0)};
+}
+
+std::vector<OccupancyGrid> layers_of(const std::vector<OccupancyGrid>& maps,
+                                     const TableLearning& how) {
+  std::vector<OccupancyGrid> layers;
+  for (const OccupancyGrid& map : maps) {
+    layers.push_back(reading_layer(map, how.layer));
+  }
+  return layers;
+}
+
+/// Counts as count_placed() would with every press on every other map of its object, at its true
+/// place.
+LevelCounts true_counts(const SimulatedPresses& simulated, const TableLearning& how) {
+  const std::vector<OccupancyGrid> layers =
+      layers_of(press_maps(simulated.presses, map_options()), how);
+  const ContactModel classifier = contact_with(how.contact, how.initial(), "");
+  LevelCounts counts(2);
+  for (std::size_t i = 0; i < layers.size(); ++i) {
+    for (std::size_t j = 0; j < layers.size(); ++j) {
+      if (i != j && simulated.presses[i].label == simulated.presses[j].label) {
+        counts.add(simulated.presses[i].touches,
+                   inverse(simulated.T_object_robot[j]) * simulated.T_object_robot[i], layers[j],
+                   classifier);
+      }
+    }
+  }
+  return counts;
+}
+
+TEST(TableLearning, RecoversTheTableOfASimulatedSensor) {
+  // At known poses: readings are drawn from a table.
+  const std::vector<double> elements_of_level{0.0, 5.0, 15.0};
+  const OccupancyGrid layer = [] {
+    OccupancyGrid grid = random_map(60, 60, 2.0, 8.0, 1);
+    grid.prior = probability_from_log_odds(ReadingLayer::beyond);
+    return grid;
+  }();
+  const auto truth = [](std::size_t level, double value) {
+    const double contact = 0.05 + 0.9 / (1.0 + std::exp(-value));
+    return level == 0 ? 1.0 - contact : level == 1 ? 0.7 * contact : 0.3 * contact;
+  };
+  TableLearning how{.level_edges = {10.0}, .contact = {.prior = 0.2}};
+  how.contact.classifier = {.threshold = 2.0, .ratio = 0.1};
+  const ContactModel classifier = contact_with(how.contact, how.initial(), "");
+  Uniform random(2);
+  Recording recording;
+  recording.T_robot_sensor = {Pose{}};
+  for (int i = 0; i < 200000; ++i) {
+    recording.elements_mm.push_back(
+        layer.centre_mm(static_cast<int>(random(0.0, 60.0)), static_cast<int>(random(0.0, 60.0))));
+    const auto j = static_cast<std::size_t>(
+        std::lround((recording.elements_mm.back().y - layer.origin_mm.y) / layer.cell_mm));
+    const auto k = static_cast<std::size_t>(
+        std::lround((recording.elements_mm.back().x - layer.origin_mm.x) / layer.cell_mm));
+    const double value = layer.log_odds[j * 60 + k];
+    const double at = random(0.0, 1.0);
+    const std::size_t level = at < truth(0, value) ? 0 : at < 1.0 - truth(2, value) ? 1 : 2;
+    recording.pressure.push_back(elements_of_level[level]);
+  }
+  LevelCounts counts(3);
+  const std::vector<Touch> touches = all_touches(recording);
+  counts.add(touches, Pose{}, layer, classifier);
+  const LearnedTable table = table_of({{"A", counts}}, how);
+  for (std::size_t level = 0; level < 3; ++level) {
+    for (int node = 17; node < 48; ++node) {
+      const double value = -16.0 + 0.5 * node;
+      const double p = std::exp(table.shared[level * 49 + static_cast<std::size_t>(node)]);
+      // About 6000 readings a node.
+      EXPECT_NEAR(p, truth(level, value), 0.025) << level << " at " << value;
+    }
+  }
+}
+
+TEST(TableLearning, FindsAtUnknownPosesWhatItWouldAtKnownOnes) {
+  SimulatedPresses simulated;
+  simulated.add_shapes(5, 3);
+  const TableLearning how = learning(simulated.presses);
+  const std::vector<OccupancyGrid> maps = press_maps(simulated.presses, map_options());
+  double shown = 0.0;
+  const PlacedPresses placed = learn_table(simulated.presses, maps, how, [&](double fraction) {
+    EXPECT_GE(fraction, shown);
+    shown = fraction;
+  });
+  EXPECT_EQ(shown, 1.0);
+  EXPECT_EQ(placed.placements.size(), 40U);
+  const LevelCounts counts = true_counts(simulated, how);
+  const std::vector<double> truth = shrunk_table(counts, how.initial().shared, 20.0);
+  int compared = 0;
+  for (int node = 0; node < ReadingLayer::nodes; ++node) {
+    if (counts.at_node(node) > 150.0) {
+      const auto at = 49 + static_cast<std::size_t>(node);
+      EXPECT_NEAR(std::exp(placed.table.shared[at]), std::exp(truth[at]), 0.12) << node;
+      ++compared;
+    }
+  }
+  EXPECT_GT(compared, 5);
+  // Presses lie within a bin of where they were, all but few.
+  int right = 0;
+  for (const OwnPlacement& own : placed.placements) {
+    if (simulated.presses[own.press].label == "L") {
+      const Pose truth_pose =
+          inverse(simulated.T_object_robot[own.map]) * simulated.T_object_robot[own.press];
+      const glm::dvec2 off =
+          truth_pose.translation_mm - own.placement.T_object_robot.translation_mm;
+      right += std::hypot(off.x, off.y) < 2.0 ? 1 : 0;
+    }
+  }
+  EXPECT_GE(right, 16) << "of 20";
+}
+
+TEST(TableLearning, CountsAPressOnItsBestMapsOnly) {
+  SimulatedPresses simulated;
+  simulated.add(on_disc, "disc", 3, 4);
+  TableLearning how = learning(simulated.presses);
+  const std::vector<OccupancyGrid> layers =
+      layers_of(press_maps(simulated.presses, map_options()), how);
+  const Pose far{{1000.0, 0.0}, 0.0};
+  const std::vector<OwnPlacement> placements{{0, 1, {Pose{}, -5.0, 0.0}}, {0, 2, {far, -9.0, 0.0}}};
+  how.best_maps = 1;
+  ObjectCounts counts = count_placed(placements, simulated.presses, layers, how);
+  EXPECT_NEAR(counts.at("disc").total(), 196.0, 1e-9);
+  EXPECT_EQ(counts.at("disc").at_node(8), 0.0) << "no reading is beyond the map";
+  how.best_maps = 3;
+  counts = count_placed(placements, simulated.presses, layers, how);
+  EXPECT_NEAR(counts.at("disc").at_node(8), 196.0, 1e-9);
+  // Without map 1, what is left is map 2; without the press, nothing.
+  how.best_maps = 1;
+  counts = count_placed(placements, simulated.presses, layers, how, {true, false, true});
+  EXPECT_NEAR(counts.at("disc").at_node(8), 196.0, 1e-9);
+  EXPECT_TRUE(
+      count_placed(placements, simulated.presses, layers, how, {false, true, true}).empty());
+}
+
+TEST(TableLearning, ShrinksObjectsTowardsAllTogether) {
+  TableLearning how{.contact = {.prior = 0.2}};
+  ObjectCounts counts;
+  for (const char* label : {"A", "B"}) {
+    LevelCounts& own = counts.try_emplace(label, 2).first->second;
+    for (int i = 0; i < 100; ++i) {
+      own.add(*label == 'A' ? Reading::in_contact : Reading::no_contact, 0.0);
+    }
+  }
+  const LearnedTable table = table_of(counts, how);
+  const double eq7 = 0.5;  // at log odds 0 both readings are as likely
+  const double shared = (100.0 + 20.0 * eq7) / 220.0;
+  EXPECT_NEAR(std::exp(table.shared[49 + 32]), shared, 1e-12);
+  EXPECT_NEAR(std::exp(table.objects.at("A")[49 + 32]), (100.0 + 200.0 * shared) / 300.0, 1e-12);
+  EXPECT_NEAR(std::exp(table.objects.at("B")[49 + 32]), 200.0 * shared / 300.0, 1e-12);
+  EXPECT_NEAR(std::exp(table_without(counts, "A", how)[49 + 32]), 20.0 * eq7 / 120.0, 1e-12);
+  EXPECT_EQ(contact_with(how.contact, table, "C").table->log_likelihood, table.shared);
+  EXPECT_EQ(contact_with(how.contact, table, "A").table->log_likelihood, table.objects.at("A"));
+}
+
+TEST(TableLearning, KeepsEquation7ForALevelThatNothingReached) {
+  TableLearning how{.level_edges = {1000.0}, .contact = {.prior = 0.2}};
+  LevelCounts counts(3);
+  for (int i = 0; i < 80; ++i) {
+    counts.add(Reading::in_contact, 0.0);
+  }
+  const LearnedTable table = table_of({{"A", counts}}, how);
+  EXPECT_NEAR(std::exp(table.shared[2 * 49 + 32]), 20.0 * 0.25 / 100.0, 1e-12);
+}
+
+TEST(TableLearning, OfNoPairOfPressesIsRefused) {
+  SimulatedPresses simulated;
+  simulated.add_shapes(1, 5);
+  const TableLearning how = learning(simulated.presses);
+  try {
+    learn_table(simulated.presses, press_maps(simulated.presses, map_options()), how);
+    FAIL() << "a table of nothing was learned";
+  } catch (const Error& error) {
+    EXPECT_NE(std::string(error.what()).find("at least two presses of one object"),
+              std::string::npos);
+  }
+}
+
+TEST(TableLearning, CountsTouchesAtKnownPosesOnMapsOfTheOthers) {
+  const Recording recording = touches_of(on_letter_l, Pose{}, 40, 6);
+  const Press press = posed_press(recording);
+  const TableLearning how{.layer = {.near_mm = 3.0, .far_mm = 9.0}, .contact = {.prior = 0.2}};
+  const LevelCounts counts = count_posed(press, map_options(), how, 5);
+  EXPECT_NEAR(counts.total(), 40.0 * 36.0, 1e-6);
+  // The touches are without error: where maps of the others are sure, they are right.
+  double wrong = 0.0;
+  double sure = 0.0;
+  for (int node = 0; node < ReadingLayer::nodes; ++node) {
+    const double value = ReadingLayer::first_node + 0.5 * node;
+    if (std::abs(value) >= 6.0 && value >= -8.0) {
+      wrong += counts.at(value > 0.0 ? 0 : 1, node);
+      sure += counts.at_node(node);
+    }
+  }
+  EXPECT_GT(sure, 300.0);
+  EXPECT_LT(wrong, 0.08 * sure);
+  EXPECT_THROW(count_posed(press, map_options(), how, 1), Error);
+  EXPECT_THROW(count_posed(press, map_options(), how, 41), Error);
+}
+
+TEST(Presses, LieAboutTheOriginOfTheirFrame) {
+  Recording recording = random_recording(3, 12, 7);
+  recording.path = "file.h5";
+  const Press single = single_press(recording, 1);
+  EXPECT_EQ(single.name, "file.h5, touch 1");
+  ASSERT_EQ(single.touches.size(), 1U);
+  const glm::dvec2 middle =
+      single.touches[0].T_robot_sensor * array_centre_mm(recording.elements_mm);
+  EXPECT_NEAR(middle.x, 0.0, 1e-12);
+  EXPECT_NEAR(middle.y, 0.0, 1e-12);
+  const Press posed = posed_press(recording);
+  ASSERT_EQ(posed.touches.size(), 3U);
+  // The touches keep their places relative to each other.
+  const Pose apart = inverse(recording.T_robot_sensor[0]) * recording.T_robot_sensor[2];
+  const Pose still = inverse(posed.touches[0].T_robot_sensor) * posed.touches[2].T_robot_sensor;
+  EXPECT_NEAR(still.translation_mm.x, apart.translation_mm.x, 1e-12);
+  EXPECT_NEAR(still.theta_rad, apart.theta_rad, 1e-12);
+  const PoseLattice lattice = placing_lattice(std::vector{single}, 2.0, 0.3);
+  EXPECT_EQ(lattice.x_mm.lower, -lattice.x_mm.upper);
+  EXPECT_LE(lattice.x_mm.step(), 2.0);
+  EXPECT_LE(lattice.theta_rad.step(), 0.3);
+  EXPECT_TRUE(lattice.full_circle());
+}
+
+TEST(Presses, ThatSayNothingAreRefusedByName) {
+  SimulatedPresses simulated;
+  simulated.add(on_disc, "disc", 2, 8);
+  simulated.recordings[1].valid.assign(196, 0);
+  simulated.presses[1] = single_press(simulated.recordings[1], 0);
+  try {
+    press_maps(simulated.presses, map_options());
+    FAIL() << "a press of dead elements was mapped";
+  } catch (const Error& error) {
+    EXPECT_NE(std::string(error.what()).find("disc1.h5, touch 0"), std::string::npos);
+  }
+}
+
+}  // namespace
+}  // namespace palpate

@@ -1,0 +1,122 @@
+#include "temperature_fit.hpp"
+
+#include <cmath>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "palpate/error.hpp"
+#include "synthetic.hpp"
+
+namespace palpate {
+namespace {
+
+double normal(Uniform& random) {
+  return std::sqrt(-2.0 * std::log(random(1e-12, 1.0))) * std::cos(two_pi * random(0.0, 1.0));
+}
+
+/// Presses whose labels are drawn with the probabilities that their log evidences, divided by
+/// `temperature`, say together with `weight` times their log densities.
+std::vector<ScoredPress> drawn_presses(std::size_t count, double temperature, double weight,
+                                       std::uint64_t seed) {
+  Uniform random(seed);
+  std::vector<ScoredPress> presses;
+  for (std::size_t i = 0; i < count; ++i) {
+    ScoredPress press;
+    for (int label = 0; label < 5; ++label) {
+      press.log_evidence.push_back(-900.0 + 2.0 * temperature * normal(random));
+      press.log_density.push_back(3.0 * normal(random));
+    }
+    const std::vector<double> p = label_probabilities(press, temperature, weight);
+    double at = random(0.0, 1.0);
+    while (press.truth + 1 < p.size() && at >= p[press.truth]) {
+      at -= p[press.truth++];
+    }
+    presses.push_back(press);
+  }
+  return presses;
+}
+
+TEST(TemperatureFit, RecoversTheTemperatureOfAnOverconfidentModel) {
+  const std::vector<ScoredPress> presses = drawn_presses(2000, 30.0, 0.5, 1);
+  const TemperatureFit fit = fit_temperature(presses);
+  EXPECT_NEAR(fit.temperature, 30.0, 2.0);  // 2000 presses tell it within 3 %
+  EXPECT_NEAR(fit.feature_weight, 0.5, 0.05);
+  const Calibration before = calibration_of(presses, 1.0);
+  const Calibration after = calibration_of(presses, fit.temperature, fit.feature_weight);
+  EXPECT_GT(before.log_loss, 5.0);
+  EXPECT_GT(before.calibration_error, 0.2);
+  EXPECT_LT(after.log_loss, 0.8);
+  EXPECT_LT(after.calibration_error, 0.04);
+  EXPECT_EQ(after.presses, 2000U);
+}
+
+TEST(TemperatureFit, LeavesFeaturesOutWhereAPressHasNone) {
+  std::vector<ScoredPress> presses = drawn_presses(1000, 10.0, 0.0, 2);
+  presses[3].log_density.clear();
+  const TemperatureFit fit = fit_temperature(presses);
+  EXPECT_EQ(fit.feature_weight, 0.0);
+  EXPECT_NEAR(fit.temperature, 10.0, 1.0);
+}
+
+TEST(TemperatureFit, GivesFeaturesThatSayNothingNoWeight) {
+  const TemperatureFit fit = fit_temperature(drawn_presses(2000, 10.0, 0.0, 3));
+  EXPECT_NEAR(fit.feature_weight, 0.0, 0.05);
+}
+
+TEST(TemperatureFit, StaysFiniteWhereAllPressesAreToldApart) {
+  std::vector<ScoredPress> presses;
+  for (int i = 0; i < 20; ++i) {
+    presses.push_back({.truth = 0, .log_evidence = {-100.0, -300.0}, .log_density = {}});
+  }
+  const TemperatureFit fit = fit_temperature(presses);
+  // With b = 200 / T, 20 log(1 + e^-b) + b / 2 + log(1 + e^-b) is least where 21 / (1 + e^b) = 1/2.
+  EXPECT_NEAR(fit.temperature, 200.0 / std::log(41.0), 2.0);
+}
+
+TEST(TemperatureFit, IsLargeWhereEvidenceIsNoGuide) {
+  std::vector<ScoredPress> presses;
+  for (int i = 0; i < 40; ++i) {
+    presses.push_back(
+        {.truth = i % 2 == 0 ? 0U : 1U, .log_evidence = {-100.0, -300.0}, .log_density = {}});
+  }
+  EXPECT_GT(fit_temperature(presses).temperature, 1e4);
+}
+
+TEST(Calibration, CountsByHand) {
+  const double sure = std::log(0.85 / 0.15);
+  const std::vector<ScoredPress> presses{
+      {.truth = 0, .log_evidence = {sure, 0.0}, .log_density = {}},
+      {.truth = 0, .log_evidence = {sure, 0.0}, .log_density = {}},
+      {.truth = 1, .log_evidence = {sure, 0.0}, .log_density = {}},
+      {.truth = 1, .log_evidence = {0.0, std::log(0.65 / 0.35)}, .log_density = {}},
+  };
+  const Calibration found = calibration_of(presses, 1.0);
+  EXPECT_DOUBLE_EQ(found.accuracy, 0.75);
+  EXPECT_NEAR(found.log_loss, -(2.0 * std::log(0.85) + std::log(0.15) + std::log(0.65)) / 4.0,
+              1e-12);
+  EXPECT_NEAR(found.calibration_error, 0.75 * (0.85 - 2.0 / 3.0) + 0.25 * 0.35, 1e-12);
+}
+
+TEST(TemperatureFit, TakesLabelsWithoutAMap) {
+  std::vector<ScoredPress> presses(
+      20, {.truth = 0, .log_evidence = {-100.0, -300.0, -INFINITY}, .log_density = {}});
+  EXPECT_NEAR(fit_temperature(presses).temperature, 200.0 / std::log(41.0), 2.0);
+  EXPECT_EQ(label_probabilities(presses[0], 30.0)[2], 0.0);
+  EXPECT_LT(calibration_of(presses, 30.0).log_loss, 0.01);
+}
+
+TEST(Calibration, RefusesWhatCannotBeTried) {
+  EXPECT_THROW(calibration_of({}, 1.0), Error);
+  EXPECT_THROW(fit_temperature({}), Error);
+  const std::vector<ScoredPress> one_label{{.truth = 0, .log_evidence = {1.0}, .log_density = {}}};
+  EXPECT_THROW(fit_temperature(one_label), Error);
+  const std::vector<ScoredPress> wrong{{.truth = 2, .log_evidence = {1.0, 2.0}, .log_density = {}}};
+  EXPECT_THROW(calibration_of(wrong, 1.0), Error);
+  const std::vector<ScoredPress> infinite{
+      {.truth = 1, .log_evidence = {1.0, -INFINITY}, .log_density = {}}};
+  EXPECT_THROW(fit_temperature(infinite), Error);
+}
+
+}  // namespace
+}  // namespace palpate
