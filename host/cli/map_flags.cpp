@@ -99,11 +99,12 @@ void add_map_flags(CLI::App& command, MapFlags& flags) {
                    "and average what they say. For arrays large enough that a press shows the "
                    "object. Presses that fit nowhere are listed and left out");
   command
-      .add_option("--max-maps", flags.max_maps,
-                  "With --unposed, most maps of an object: presses that do not fit a map begin "
-                  "another, FOLDER/LABEL.2.map.h5. No more presses than maps are kept apart, a map "
-                  "each: few presses recognise better so. More maps recognise better and take "
-                  "longer [default: 4 into a FOLDER/, 1 into a MAP]")
+      .add_option(
+          "--max-maps", flags.max_maps,
+          "With --unposed, most maps of an object: presses that do not fit a map begin "
+          "another, FOLDER/LABEL.2.map.h5. More maps recognise better and take longer; where "
+          "there are no more presses than maps, each press keeps a map of its own [default: 4 into "
+          "a FOLDER/, 1 into a MAP]")
       ->check(require_whole_number);
   command.add_option("--png", flags.png,
                      "Picture to write (PNG): all maps side by side, with --unposed each with its "

@@ -52,9 +52,13 @@ PressFusion::PressFusion(std::span<const UnposedPress> presses, const UnposedOpt
       progress_(progress),
       search_(gains_of(options), step_mm, angles_for(presses, step_mm), options.temperature),
       own_gain_(presses.size()),
+      contact_gain_(presses.size()),
       homes_(presses.size()) {
   tbb::parallel_for(std::size_t{0}, presses.size(), [&](std::size_t p) {
-    own_gain_[p] = search_.gain(presses_[p].searched.sides.front(), compared(alone(p)), {});
+    const PressReadings& press = presses_[p].searched.sides.front();
+    const OccupancyGrid own = compared(alone(p));
+    own_gain_[p] = search_.gain(press, own, {});
+    contact_gain_[p] = search_.gain(press, own, {}, PressSearch::Elements::in_contact);
   });
 }
 
@@ -75,13 +79,12 @@ OccupancyGrid PressFusion::alone(std::size_t press) const {
   return map.map(no_label);
 }
 
-double PressFusion::fit_of(std::size_t press, const PressPlace& place) const {
-  // A gain that the best of so many places reaches by chance says nothing.
-  return place.gain > place.log_places ? place.gain / own_gain_[press] : 0.0;
+bool PressFusion::is_little(std::size_t press, const PressPlace& place) const {
+  return contact_gain_[press] <= place.log_places;
 }
 
-bool PressFusion::says_little(std::size_t press) const {
-  return own_gain_[press] <= homes_[press].place.log_places;
+double PressFusion::fit_of(std::size_t press, const PressPlace& place) const {
+  return is_little(press, place) ? 0.0 : std::max(0.0, place.gain / own_gain_[press]);
 }
 
 /// The pose that brings the middle of the contact to the origin.

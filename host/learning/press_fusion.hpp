@@ -46,8 +46,9 @@ class PressFusion {
   const std::vector<PressHome>& homes() const { return homes_; }  ///< [press]
   std::size_t maps() const { return maps_.size(); }               ///< some may be of no press
   bool settled() const { return settled_; }                       ///< the last round moved no press
-  /// Whether even on its own map the press would not stand out from all the places compared.
-  bool says_little(std::size_t press) const;
+  /// Whether a press's contact gains so little, even on the map of this press alone, that the best
+  /// of all the places compared may gain as much by chance.
+  bool says_little(std::size_t press) const { return is_little(press, homes_[press].place); }
 
  private:
   /// A map in the making.
@@ -59,6 +60,7 @@ class PressFusion {
   void report(double fraction) const;
   OccupancyGrid compared(const OccupancyGrid& map) const;
   OccupancyGrid alone(std::size_t press) const;
+  bool is_little(std::size_t press, const PressPlace& place) const;
   double fit_of(std::size_t press, const PressPlace& place) const;
   Pose first_pose(std::size_t press) const;
   std::size_t maps_in_use() const;
@@ -78,9 +80,10 @@ class PressFusion {
   double step_mm_;
   const std::function<void(double)>& progress_;
   PressSearch search_;
-  std::vector<double> own_gain_;  ///< [press] on the map of this press alone
-  std::vector<PressHome> homes_;  ///< [press]
-  std::vector<Group> maps_;       ///< those that all presses left keep their index
+  std::vector<double> own_gain_;      ///< [press] on the map of this press alone
+  std::vector<double> contact_gain_;  ///< [press] the part of its elements In Contact
+  std::vector<PressHome> homes_;      ///< [press]
+  std::vector<Group> maps_;           ///< those that all presses left keep their index
   FitTable fits_;
   std::vector<std::vector<PressPlace>> single_;  ///< [column][press] on the map of a single press
   std::vector<std::size_t> opened_;              ///< columns of the maps begun since the last round

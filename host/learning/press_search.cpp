@@ -63,12 +63,15 @@ PressSearch::PressSearch(ReadingGains gains, double step_mm, int angles, double 
 double PressSearch::theta(int angle) const { return 2.0 * std::numbers::pi * angle / angles_; }
 
 double PressSearch::gain(const PressReadings& press, const OccupancyGrid& compared,
-                         const Pose& T_object_sensor) const {
+                         const Pose& T_object_sensor, Elements of) const {
   const InterpolatedMap place(compared, compared.prior);
   const glm::dvec2 along = rotate(T_object_sensor.theta_rad, {1.0, 0.0});
   const glm::dvec2 across(-along.y, along.x);
   double sum = 0.0;
   for (std::size_t e = 0; e < press.elements_mm.size(); ++e) {
+    if (of == Elements::in_contact && !is_contact(static_cast<Reading>(press.levels[e]))) {
+      continue;
+    }
     const glm::dvec2& p = press.elements_mm[e];
     const double value =
         place.log_odds(T_object_sensor.translation_mm + p.x * along + p.y * across);
@@ -123,11 +126,10 @@ std::vector<PressSearch::Scores> PressSearch::scores_at(
       const int end = std::min(scores.nx, fitting);
       for (int j = std::max(0, turned.first_row() - run.y - scores.y);
            j < std::min(scores.ny, turned.last_row() - run.y - scores.y + 1); ++j) {
-        const float* from = turned.row(run.level, run.y + scores.y + j) + first;
-        const float* to = from + run.length;
+        const float* sums = turned.row(run.level, run.y + scores.y + j);
         float* gains = scores.gains.data() + static_cast<std::size_t>(j) * scores.nx;
         for (int i = skipped; i < end; ++i) {
-          gains[i] += to[i] - from[i];
+          gains[i] += sums[first + run.length + i] - sums[first + i];
         }
       }
     }
@@ -212,6 +214,7 @@ PressPlace PressSearch::best_of(const SearchedPress& press, std::span<const Scor
     }
   }
 
+  constexpr double negligible = 20.0;  // e^-20: a million such places weigh 2e-3
   double near = 0.0;
   double total = 0.0;
   for (const Scores& at : scores) {
@@ -219,11 +222,11 @@ PressPlace PressSearch::best_of(const SearchedPress& press, std::span<const Scor
     for (int j = 0; j < at.ny; ++j) {
       for (int i = 0; i < at.nx; ++i) {
         const auto index = static_cast<std::size_t>(j) * at.nx + static_cast<std::size_t>(i);
-        const double weight = std::exp((at.gains[index] - highest.gain) / temperature_);
-        constexpr double least = 1e-9;  // together below 1e-3 for a million places
-        if (weight < least) {
+        const double below = (highest.gain - double{at.gains[index]}) / temperature_;
+        if (below > negligible) {
           continue;
         }
+        const double weight = std::exp(-below);
         total += weight;
         const Pose pose = at.pose(side, step_mm_, theta(at.angle), i, j);
         if (at.side == best.side &&

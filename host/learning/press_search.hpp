@@ -58,9 +58,10 @@ class PressSearch {
     return best_places(std::span(&one, 1), map).front();
   }
 
-  /// The gain of a press at any pose, in nats.
+  enum class Elements { all, in_contact };
+  /// The gain of a press at any pose, or the share of its elements In Contact in it, in nats.
   double gain(const PressReadings& press, const OccupancyGrid& compared,
-              const Pose& T_object_sensor) const;
+              const Pose& T_object_sensor, Elements of = Elements::all) const;
 
  private:
   struct Scores;
