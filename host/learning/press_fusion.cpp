@@ -80,7 +80,7 @@ OccupancyGrid PressFusion::alone(std::size_t press) const {
 }
 
 bool PressFusion::is_little(std::size_t press, const PressPlace& place) const {
-  return contact_gain_[press] <= place.log_places;
+  return contact_gain_[press] <= place.log_places || own_gain_[press] <= 0.0;
 }
 
 double PressFusion::fit_of(std::size_t press, const PressPlace& place) const {
