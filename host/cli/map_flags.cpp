@@ -1,0 +1,268 @@
+#include "map_flags.hpp"
+
+#include <map>
+
+#include <CLI/CLI.hpp>
+
+#include "command_files.hpp"
+#include "number_text.hpp"
+#include "options.hpp"
+#include "printable.hpp"
+#include "recordings.hpp"
+
+namespace palpate::cli {
+
+namespace {
+
+/// The value of a flag that is a cell's edge or a spread.
+double require_length(const std::string& flag, double mm) {
+  require_above(flag, mm, 0.0);
+  if (!(mm >= least_length_mm && mm <= most_length_mm)) {
+    refuse_flag(flag, mm, "give {:g} to {:g} mm", least_length_mm, most_length_mm);
+  }
+  return mm;
+}
+
+void require_name(const std::string& path, const std::string& label) {
+  if (label.empty()) {
+    refuse(path, "attribute 'object' is empty; name the object with --label");
+  }
+  if (label == none_label) {
+    refuse(path,
+           "object '{}' stands for objects that were never learned; choose another name with "
+           "--label",
+           label);
+  }
+  if (label.find('/') != std::string::npos) {
+    refuse(path, "object '{}' holds a '/' and cannot name a file; choose another name with --label",
+           label);
+  }
+}
+
+}  // namespace
+
+bool MapFlags::to_folder() const {
+  std::error_code ignored;
+  return output.ends_with('/') || std::filesystem::is_directory(output, ignored);
+}
+
+void add_map_flags(CLI::App& command, MapFlags& flags) {
+  command.add_option("RECORDING", flags.recordings, "Recordings of touches (HDF5)")->required();
+  command
+      .add_option("-o,--output", flags.output,
+                  "Map to write (HDF5), or FOLDER/ for one map of each object, or several with "
+                  "--unposed")
+      ->required();
+  command
+      .add_option("--cell-mm", flags.cell_mm,
+                  "Edge of a cell, mm; with --unposed by default half the distance of neighbouring "
+                  "elements")
+      ->capture_default_str();
+  command.add_option("--psf-mm", flags.psf_mm, "Standard deviation of the point spread, mm")
+      ->capture_default_str();
+  command.add_option("--spread-mm", flags.spread_mm,
+                     "Standard deviation of the inverse sensor model, mm [default: half of "
+                     "--psf-mm; with --unposed 0.6 times the distance of neighbouring elements]");
+  command
+      .add_option("--peak", flags.peak, "Peak of the inverse sensor model, a probability below 1")
+      ->capture_default_str();
+  command
+      .add_option("--prior", flags.prior,
+                  "Probability that an unseen cell is occupied; auto: the area of all objects "
+                  "divided by the area that their maps cover, with --unposed the share of elements "
+                  "in contact")
+      ->capture_default_str();
+  command.add_option(
+      "--threshold", flags.threshold,
+      "Contact threshold, in the recording's pressure unit [default: 2 kPa; required for raw "
+      "pressure]");
+  command.add_option("--ratio", flags.ratio,
+                     "Threshold as a fraction of the touch's largest pressure [default: 0.3]");
+  command.add_option("--sensor-model", flags.sensor_model,
+                     "Sensor model (YAML) whose threshold, ratio, spread and prior are the "
+                     "defaults; the maps then also hold the number of touches and the mean "
+                     "pressure at each cell");
+  command.add_option("--frames", flags.frames,
+                     "Use the touches A to B - 1 of every recording, counted from 0, as A:B");
+  command
+      .add_option("--symmetry", flags.symmetry,
+                  "n-fold rotational symmetry of the object; 1: none, 0: any rotation")
+      ->check(require_whole_number)
+      ->capture_default_str();
+  command.add_flag("--mirror", flags.mirror,
+                   "The object is flat and may lie on its other side; with --unposed, presses of "
+                   "that side join the maps mirrored");
+  command.add_option("--label", flags.label,
+                     "Label of the map [default: the object that the recording names]");
+  command.add_flag("--unposed", flags.unposed,
+                   "The sensor's poses are unknown: find where each press lies beside the others, "
+                   "and average what they say. For arrays large enough that a press shows the "
+                   "object. Presses that fit nowhere are listed and left out");
+  command
+      .add_option(
+          "--max-maps", flags.max_maps,
+          "With --unposed, most maps of an object: presses that do not fit a map begin "
+          "another, FOLDER/LABEL.2.map.h5. More maps recognise better and take longer; where "
+          "there are no more presses than maps, each press keeps a map of its own [default: 4 into "
+          "a FOLDER/, 1 into a MAP]")
+      ->check(require_whole_number);
+  command.add_option("--png", flags.png,
+                     "Picture to write (PNG): all maps side by side, with --unposed each with its "
+                     "presses");
+  command.add_option("--ros", flags.ros,
+                     "Folder to write every map to as PGM and YAML, for ROS's map_server");
+  command.add_option("--device", flags.device,
+                     "Vulkan device, by index or a part of its name; --unposed uses none");
+}
+
+void finish_map_flags(const CLI::App& command, MapFlags& flags) {
+  flags.cell_given = command.count("--cell-mm") > 0;
+  flags.psf_given = command.count("--psf-mm") > 0;
+  flags.prior_given = command.count("--prior") > 0;
+  if (!is_printable(flags.label)) {
+    refuse("--label", "give printable text, in UTF-8");
+  }
+  if (flags.label == none_label) {
+    refuse_flag("--label", none_label,
+                "stands for objects that were never learned; choose another label");
+  }
+  if (flags.max_maps && !flags.unposed) {
+    refuse_flag("--max-maps", *flags.max_maps,
+                "only presses at unknown poses make several maps; give --unposed, or leave it out");
+  }
+}
+
+std::optional<LearnedSensor> sensor_of(const MapFlags& flags,
+                                       const std::vector<Recording>& recordings) {
+  if (flags.sensor_model.empty()) {
+    return {};
+  }
+  LearnedSensor sensor = read_sensor_model(flags.sensor_model);
+  const Recording& first = recordings.front();
+  if (sensor.pressure_unit != first.pressure_unit) {
+    refuse(flags.sensor_model,
+           "pressure_unit is {} but {} has {}; give a sensor model that was learned from such "
+           "recordings",
+           sensor.pressure_unit, first.path, first.pressure_unit);
+  }
+  return sensor;
+}
+
+MapOptions map_options(const MapFlags& flags, const std::vector<Recording>& recordings,
+                       const std::optional<LearnedSensor>& sensor) {
+  MapOptions result;
+  result.cell_mm = require_length("--cell-mm", flags.cell_mm);
+  result.sensor.spread_mm = require_length("--psf-mm", flags.psf_mm) / 2.0;
+  if (sensor && !flags.psf_given) {
+    result.sensor.spread_mm = sensor->spread_mm;
+  }
+  if (flags.spread_mm) {
+    result.sensor.spread_mm = require_length("--spread-mm", *flags.spread_mm);
+  }
+  result.sensor.peak = require_above("--peak", flags.peak, 0.0);
+  if (flags.peak >= 1.0) {
+    refuse_flag("--peak", flags.peak, "must be below 1, or one reading would make a cell certain");
+  }
+  std::optional<double> threshold = flags.threshold;
+  std::optional<double> ratio = flags.ratio;
+  if (sensor) {
+    threshold = threshold.value_or(sensor->classifier.threshold);
+    ratio = ratio.value_or(sensor->classifier.ratio);
+  }
+  const Recording& first = recordings.front();
+  result.classifier = make_classifier(first.pressure_unit, first.path, threshold, ratio);
+  return result;
+}
+
+std::optional<double> given_prior(const MapFlags& flags,
+                                  const std::optional<LearnedSensor>& sensor) {
+  if (sensor && !flags.prior_given) {
+    return sensor->prior;
+  }
+  if (flags.prior == "auto") {
+    return {};
+  }
+  const std::optional<double> prior = number_of(flags.prior);
+  if (!prior || !(*prior > 0.0 && *prior < 1.0)) {
+    refuse_flag("--prior", flags.prior, "give auto, or a probability between 0 and 1");
+  }
+  return prior;
+}
+
+GroupedTouches group_by_label(const MapFlags& flags, const std::vector<Recording>& recordings,
+                              const ContactClassifier& classifier) {
+  std::optional<Frames> frames;
+  if (!flags.frames.empty()) {
+    frames = parse_frames("--frames", flags.frames);
+  }
+  struct Group {
+    std::vector<Touch> touches;
+    std::vector<TouchSource> sources;
+  };
+  std::map<std::string, Group> groups;
+  for (const Recording& recording : recordings) {
+    const std::string& label = flags.label.empty() ? recording.object : flags.label;
+    require_name(recording.path, label);
+    const auto [begin, end] = select(recording, frames);
+    Group& group = groups[label];
+    for (std::size_t i = begin; i < end; ++i) {
+      Touch touch = recording.touch(i);
+      if (flags.unposed) {
+        touch.T_robot_sensor = {};
+      }
+      if (const auto fault = fault_of(known_readings(touch, classifier))) {
+        refuse(recording.path, "sensor_pose[{}]: {}", i, *fault);
+      }
+      group.touches.push_back(touch);
+      group.sources.push_back({recording.path, i});
+    }
+    if (!flags.to_folder() && groups.size() > 1) {
+      refuse(recording.path,
+             "object '{}' differs from '{}' of {}; write a map of each object with -o {}/, or one "
+             "map of all touches with --label",
+             label, recordings.front().object, recordings.front().path, flags.output);
+    }
+  }
+  GroupedTouches result;
+  for (auto& [label, group] : groups) {
+    result.objects.push_back({label, std::move(group.touches)});
+    result.sources.push_back(std::move(group.sources));
+  }
+  return result;
+}
+
+std::filesystem::path ros_path(const MapFlags& flags, const std::string& name) {
+  return std::filesystem::path(flags.ros) / (name + ".yaml");
+}
+
+void prepare_outputs(const MapFlags& flags, const std::vector<std::filesystem::path>& map_paths,
+                     const std::vector<std::string>& names) {
+  CommandFiles files;
+  for (const std::string& recording : flags.recordings) {
+    files.reads("RECORDING", recording);
+  }
+  if (!flags.sensor_model.empty()) {
+    files.reads("--sensor-model", flags.sensor_model);
+  }
+  for (const std::filesystem::path& path : map_paths) {
+    files.writes("-o", path);
+  }
+  if (!flags.png.empty()) {
+    files.writes("--png", flags.png);
+  }
+  if (!flags.ros.empty()) {
+    for (const std::string& name : names) {
+      files.writes("--ros", ros_path(flags, name));
+      files.writes("--ros", ros_path(flags, name).replace_extension(".pgm"));
+    }
+  }
+  files.require_distinct();
+  if (!flags.to_folder()) {
+    require_writable(flags.output);
+  }
+  if (!flags.png.empty()) {
+    require_writable(flags.png);
+  }
+}
+
+}  // namespace palpate::cli

@@ -1,0 +1,89 @@
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "palpate/learned_sensor.hpp"
+#include "palpate/map_builder.hpp"
+#include "palpate/touch.hpp"
+
+namespace CLI {
+class App;
+}
+
+namespace palpate::cli {
+
+/// The flags of `palpate map`.
+struct MapFlags {
+  std::vector<std::string> recordings;
+  std::string output;
+  double cell_mm = 0.5;
+  bool cell_given = false;
+  double psf_mm = 1.0;
+  bool psf_given = false;
+  std::optional<double> spread_mm;
+  double peak = 0.9;
+  std::string prior = "auto";
+  bool prior_given = false;
+  std::optional<double> threshold;
+  std::optional<double> ratio;
+  std::string sensor_model;
+  std::string frames;
+  int symmetry = 1;
+  bool mirror = false;
+  std::string label;
+  bool unposed = false;
+  std::optional<int> max_maps;
+  std::string png;
+  std::string ros;
+  std::string device;
+
+  /// Whether `output` is a folder, for one map of each object or more.
+  bool to_folder() const;
+};
+
+void add_map_flags(CLI::App& command, MapFlags& flags);
+/// Notes which flags were given. Throws Error on a label that no map can bear.
+void finish_map_flags(const CLI::App& command, MapFlags& flags);
+
+/// The file of --sensor-model, if given. Throws Error where its pressure unit is not the
+/// recordings'.
+std::optional<LearnedSensor> sensor_of(const MapFlags& flags,
+                                       const std::vector<Recording>& recordings);
+/// The map's options but for the prior. A flag overrides the sensor model.
+MapOptions map_options(const MapFlags& flags, const std::vector<Recording>& recordings,
+                       const std::optional<LearnedSensor>& sensor);
+/// The prior by --prior, or else the sensor model's; none where it is to be estimated.
+std::optional<double> given_prior(const MapFlags& flags,
+                                  const std::optional<LearnedSensor>& sensor);
+
+/// Where in the files a touch stands.
+struct TouchSource {
+  std::string path;
+  std::size_t index = 0;  ///< in the recording
+};
+
+/// The touches of all recordings by label, in the labels' order.
+struct GroupedTouches {
+  std::vector<ObjectTouches> objects;
+  std::vector<std::vector<TouchSource>> sources;  ///< [object][touch]
+};
+/// Throws Error on a label that no map can bear, and on several labels but for a folder. With
+/// --unposed all touches are at the origin.
+GroupedTouches group_by_label(const MapFlags& flags, const std::vector<Recording>& recordings,
+                              const ContactClassifier& classifier);
+
+/// The file for ROS beside the map of this name in the folder of --ros.
+std::filesystem::path ros_path(const MapFlags& flags, const std::string& name);
+/// Throws Error where an output cannot be written or would overwrite an input.
+/// @param names of the maps that may be written, as of ros_path()
+void prepare_outputs(const MapFlags& flags, const std::vector<std::filesystem::path>& map_paths,
+                     const std::vector<std::string>& names);
+
+/// Maps of objects from presses at unknown poses; `palpate map --unposed`.
+void build_unposed_maps(const MapFlags& flags);
+
+}  // namespace palpate::cli

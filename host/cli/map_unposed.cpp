@@ -1,0 +1,309 @@
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "map_flags.hpp"
+#include "options.hpp"
+#include "palpate/files.hpp"
+#include "palpate/rotational_symmetry.hpp"
+#include "presses_figure.hpp"
+#include "progress.hpp"
+#include "recordings.hpp"
+#include "unposed_maps.hpp"
+
+namespace palpate::cli {
+
+namespace {
+
+/// Where a folder is written, the maps that four times the cost in recognition buys.
+constexpr int usual_maps = 4;
+
+/// The maps of one object, with what is needed to tell about them.
+struct Object {
+  const ObjectTouches* presses = nullptr;
+  const std::vector<TouchSource>* sources = nullptr;
+  UnposedMaps maps;
+};
+
+int most_maps(const MapFlags& flags) {
+  const int most = flags.max_maps.value_or(flags.to_folder() ? usual_maps : 1);
+  if (most < 1) {
+    refuse_flag("--max-maps", most, "give 1 or more");
+  }
+  if (most > 1 && !flags.to_folder()) {
+    refuse_flag("--max-maps", most, "several maps need a folder; give -o {}/", flags.output);
+  }
+  return most;
+}
+
+/// The name of a map's files, of `count` maps of the label.
+std::string name_of(const std::string& label, std::size_t map, std::size_t count) {
+  return count == 1 ? label : fmt::format("{}.{}", label, map + 1);
+}
+
+std::filesystem::path path_of(const MapFlags& flags, const std::string& name) {
+  return flags.to_folder() ? std::filesystem::path(flags.output) / (name + ".map.h5")
+                           : std::filesystem::path(flags.output);
+}
+
+void prepare_unposed_outputs(const MapFlags& flags, const GroupedTouches& grouped,
+                             std::size_t most) {
+  std::vector<std::string> names;
+  for (const ObjectTouches& object : grouped.objects) {
+    names.push_back(object.label);
+    for (std::size_t map = 0; flags.to_folder() && map < most; ++map) {
+      names.push_back(name_of(object.label, map, most + 1));
+    }
+  }
+  std::vector<std::filesystem::path> paths;
+  for (const std::string& name : names) {
+    paths.push_back(path_of(flags, name));
+  }
+  prepare_outputs(flags, paths, names);
+}
+
+/// The share of elements In Contact among the known ones: the object's area over the area sensed.
+double share_in_contact(const std::vector<ObjectTouches>& objects,
+                        const ContactClassifier& classifier) {
+  double contacts = 0.0;
+  double known = 0.0;
+  for (const ObjectTouches& object : objects) {
+    for (const Touch& touch : object.touches) {
+      for (const ElementReading& element : known_readings(touch, classifier)) {
+        contacts += is_contact(element.reading) ? 1.0 : 0.0;
+        known += 1.0;
+      }
+    }
+  }
+  // No array, however it was pressed, says that the world is empty or full.
+  constexpr double least = 0.01;
+  constexpr double most = 0.5;
+  return std::clamp((contacts + 0.5) / (known + 1.0), least, most);
+}
+
+UnposedOptions unposed_options(const MapFlags& flags, const std::vector<Recording>& recordings,
+                               const std::optional<LearnedSensor>& sensor,
+                               const GroupedTouches& grouped) {
+  UnposedOptions result;
+  result.map = map_options(flags, recordings, sensor);
+  std::vector<Touch> all;
+  for (const ObjectTouches& object : grouped.objects) {
+    all.insert(all.end(), object.touches.begin(), object.touches.end());
+  }
+  double pitch_mm = 0.0;
+  try {
+    pitch_mm = element_pitch_mm(all);
+  } catch (const Error& error) {
+    refuse(recordings.front().path, "{}", error.what());
+  }
+  if (!flags.cell_given) {
+    result.map.cell_mm = 0.5 * pitch_mm;
+  }
+  if (!flags.spread_mm && !flags.psf_given && !sensor) {
+    constexpr double of_pitch = 0.6;  // leaves no gaps between the elements of a press
+    result.map.sensor.spread_mm = of_pitch * pitch_mm;
+  }
+  result.map.sensor.prior =
+      given_prior(flags, sensor).value_or(share_in_contact(grouped.objects, result.map.classifier));
+  result.contact.classifier = result.map.classifier;
+  result.contact.prior = result.map.sensor.prior;
+  result.most_maps = static_cast<std::size_t>(most_maps(flags));
+  result.mirror = flags.mirror;
+  if (sensor) {
+    result.contact.gamma = sensor->gamma;
+    result.temperature = sensor->temperature;
+  }
+  return result;
+}
+
+/// Sets the learned table of the object, or else that of all objects.
+void use_table(const std::optional<LearnedSensor>& sensor, const std::string& label,
+               UnposedOptions& options) {
+  if (sensor && sensor->table) {
+    const auto own = sensor->table->objects.find(label);
+    options.contact.table = table_of(
+        *sensor->table, own == sensor->table->objects.end() ? sensor->table->shared : own->second);
+    options.layer = sensor->table->layer;
+  }
+}
+
+std::string fit_words(const UnposedMap& map) {
+  double least = 1.0;
+  double sum = 0.0;
+  for (const PlacedPress& press : map.presses) {
+    if (!press.fit) {
+      return "a press that fits no other";
+    }
+    least = std::min(least, *press.fit);
+    sum += *press.fit;
+  }
+  return fmt::format("{} presses that fit by {:.2f} on average, {:.2f} at least",
+                     map.presses.size(), sum / static_cast<double>(map.presses.size()), least);
+}
+
+std::string words_of(const Misfit& misfit) {
+  switch (misfit.reason) {
+    case Misfit::Reason::no_contact:
+      return "nothing is in contact";
+    case Misfit::Reason::too_little:
+      return "too little is in contact to place it";
+    case Misfit::Reason::unlike:
+      break;
+  }
+  return fmt::format("fits no map, the best by {:.2f}", misfit.fit);
+}
+
+std::vector<glm::dvec2> contacts_of(const Touch& touch, const ContactClassifier& classifier,
+                                    const PlacedPress& place) {
+  std::vector<glm::dvec2> contacts;
+  const std::vector<Reading> readings = classifier.classify(touch);
+  for (std::size_t e = 0; e < readings.size(); ++e) {
+    if (is_contact(readings[e])) {
+      const glm::dvec2& p = touch.elements_mm[e];
+      contacts.push_back(place.T_object_sensor * glm::dvec2(place.mirrored ? -p.x : p.x, p.y));
+    }
+  }
+  return contacts;
+}
+
+std::string draw(const std::vector<Object>& objects, const UnposedOptions& options) {
+  std::vector<DrawnPresses> groups;
+  for (const Object& object : objects) {
+    const std::string& label = object.presses->label;
+    const double element_mm = 0.9 * element_pitch_mm(object.presses->touches);
+    const auto drawn = [&](std::size_t press, const PlacedPress& place, std::string caption) {
+      return DrawnPress{
+          .caption = fmt::format("{}: {}", (*object.sources)[press].index, caption),
+          .contacts_mm = contacts_of(object.presses->touches[press], options.map.classifier, place),
+          .theta_rad = place.T_object_sensor.theta_rad,
+          .element_mm = element_mm};
+    };
+    for (std::size_t m = 0; m < object.maps.maps.size(); ++m) {
+      const UnposedMap& map = object.maps.maps[m];
+      DrawnPresses group{.title = fmt::format("{}: {}", name_of(label, m, object.maps.maps.size()),
+                                              fit_words(map)),
+                         .map = map.map,
+                         .presses = {}};
+      for (const PlacedPress& press : map.presses) {
+        group.presses.push_back(
+            drawn(press.press, press,
+                  fmt::format("{}{}", press.fit ? fmt::format("fit {:.2f}", *press.fit) : "alone",
+                              press.mirrored ? ", mirrored" : "")));
+      }
+      groups.push_back(std::move(group));
+    }
+    DrawnPresses left_out{.title = label + ": left out", .presses = {}};
+    for (const Misfit& misfit : object.maps.misfits) {
+      left_out.presses.push_back(drawn(misfit.press, {}, words_of(misfit)));
+    }
+    if (!left_out.presses.empty()) {
+      groups.push_back(std::move(left_out));
+    }
+  }
+  return draw_presses(groups);
+}
+
+/// Says which older maps of the label `recognize` would read besides the new ones.
+void warn_of_older_maps(const MapFlags& flags, const std::string& label, std::size_t count) {
+  const auto warn = [&](const std::string& name) {
+    std::error_code ignored;
+    const std::filesystem::path path = path_of(flags, name);
+    if (std::filesystem::exists(path, ignored)) {
+      fmt::print(stderr,
+                 "palpate: {}: an older map of '{}'; remove it, or --maps {} reads it, too\n",
+                 path.string(), label, flags.output);
+      return true;
+    }
+    return false;
+  };
+  if (count > 1) {
+    warn(label);
+  }
+  for (std::size_t map = count == 1 ? 0 : count; warn(name_of(label, map, map + 2)); ++map) {
+  }
+}
+
+void write_object(const MapFlags& flags, const Object& object) {
+  const std::size_t count = object.maps.maps.size();
+  const std::string& label = object.presses->label;
+  for (std::size_t m = 0; m < count; ++m) {
+    const UnposedMap& one = object.maps.maps[m];
+    const std::filesystem::path path = path_of(flags, name_of(label, m, count));
+    write_map(path, one.map);
+    fmt::print("{}: {} from {}; {} x {} cells of {:.4g} mm, prior {:.3g}\n", path.string(), label,
+               fit_words(one), one.map.nx, one.map.ny, one.map.cell_mm, one.map.prior);
+    if (!flags.ros.empty()) {
+      const std::filesystem::path yaml = ros_path(flags, name_of(label, m, count));
+      write_map_server(yaml, one.map);
+      fmt::print("{}\n", yaml.string());
+    }
+  }
+  for (const Misfit& misfit : object.maps.misfits) {
+    const TouchSource& source = (*object.sources)[misfit.press];
+    fmt::print("{}: press {} left out: {}\n", source.path, source.index, words_of(misfit));
+  }
+  if (!object.maps.settled) {
+    fmt::print("{}: presses still moved after {} rounds; look at --png\n", label,
+               object.maps.rounds);
+  }
+  if (flags.to_folder()) {
+    warn_of_older_maps(flags, label, count);
+  }
+}
+
+}  // namespace
+
+void build_unposed_maps(const MapFlags& flags) {
+  const int most = most_maps(flags);
+  const std::vector<Recording> recordings = read_touch_recordings(flags.recordings);
+  const std::optional<LearnedSensor> sensor = sensor_of(flags, recordings);
+  const GroupedTouches grouped =
+      group_by_label(flags, recordings, map_options(flags, recordings, sensor).classifier);
+  UnposedOptions options = unposed_options(flags, recordings, sensor, grouped);
+  prepare_unposed_outputs(flags, grouped, static_cast<std::size_t>(most));
+
+  std::vector<Object> objects;
+  {
+    Progress progress("placing presses");
+    const auto count = static_cast<double>(grouped.objects.size());
+    for (std::size_t k = 0; k < grouped.objects.size(); ++k) {
+      const ObjectTouches& object = grouped.objects[k];
+      use_table(sensor, object.label, options);
+      const auto show = [&](double fraction) {
+        progress.show((static_cast<double>(k) + fraction) / count);
+      };
+      objects.push_back({&object, &grouped.sources[k],
+                         unposed_maps(object.touches, object.label, options, show)});
+      for (UnposedMap& map : objects.back().maps.maps) {
+        map.map.symmetry = flags.symmetry;
+        if (const auto measured = measure_symmetry(map.map)) {
+          map.map.suggested_symmetry = measured->suggested;
+        }
+      }
+    }
+  }
+  const std::string picture = flags.png.empty() ? "" : draw(objects, options);
+
+  // Nothing is written before all maps are built, so that a failure leaves nothing behind.
+  if (!flags.ros.empty()) {
+    make_folder(flags.ros);
+  }
+  if (flags.to_folder()) {
+    make_folder(flags.output);
+  }
+  for (const Object& object : objects) {
+    write_object(flags, object);
+  }
+  if (!flags.png.empty()) {
+    write_file(flags.png, picture);
+    fmt::print("{}\n", flags.png);
+  }
+}
+
+}  // namespace palpate::cli

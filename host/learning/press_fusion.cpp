@@ -1,0 +1,261 @@
+#include "press_fusion.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <string>
+
+#include <tbb/parallel_for.h>
+
+namespace palpate {
+
+namespace {
+
+constexpr int most_rounds = 8;
+/// Comparisons of a press with the map of a single press: bounds the time that many presses take.
+constexpr std::size_t most_comparisons = 1500;
+constexpr std::size_t fewest_columns = 8;
+/// The weight of a press whose place is anyone's guess.
+constexpr double least_weight = 0.01;
+/// Of maps in the making.
+const std::string no_label;
+
+/// Angles at which the lattice moves the ends of the presses' contact by about a step.
+int angles_for(std::span<const UnposedPress> presses, double step_mm) {
+  double reach_mm = 0.0;
+  for (const UnposedPress& press : presses) {
+    reach_mm = std::max(reach_mm, press.searched.sides.front().reach_mm);
+  }
+  constexpr int fewest = 24;
+  constexpr int most = 72;
+  return std::clamp(static_cast<int>(std::ceil(2.0 * std::numbers::pi * reach_mm / step_mm)),
+                    fewest, most);
+}
+
+ReadingGains gains_of(const UnposedOptions& options) {
+  const double beyond =
+      options.layer ? ReadingLayer::beyond : log_odds_from_probability(options.map.sensor.prior);
+  return {options.contact, beyond, 0};
+}
+
+}  // namespace
+
+ImagePlace PressHome::image_place() const {
+  return {place.T_object_sensor, place.mirrored, std::max(place.certainty, least_weight)};
+}
+
+PressFusion::PressFusion(std::span<const UnposedPress> presses, const UnposedOptions& options,
+                         double step_mm, const std::function<void(double)>& progress)
+    : presses_(presses),
+      options_(options),
+      step_mm_(step_mm),
+      progress_(progress),
+      search_(gains_of(options), step_mm, angles_for(presses, step_mm), options.temperature),
+      own_gain_(presses.size()),
+      contact_gain_(presses.size()),
+      homes_(presses.size()) {
+  tbb::parallel_for(std::size_t{0}, presses.size(), [&](std::size_t p) {
+    const PressReadings& press = presses_[p].searched.sides.front();
+    const OccupancyGrid own = compared(alone(p));
+    own_gain_[p] = search_.gain(press, own, {});
+    contact_gain_[p] = search_.gain(press, own, {}, PressSearch::Elements::in_contact);
+  });
+}
+
+void PressFusion::report(double fraction) const {
+  if (progress_) {
+    progress_(fraction);
+  }
+}
+
+OccupancyGrid PressFusion::compared(const OccupancyGrid& map) const {
+  return options_.layer ? reading_layer(map, *options_.layer) : map;
+}
+
+/// The map of one press, in the sensor frame.
+OccupancyGrid PressFusion::alone(std::size_t press) const {
+  FusedMap map(options_.map);
+  map.add(presses_[press].image, {});
+  return map.map(no_label);
+}
+
+bool PressFusion::is_little(std::size_t press, const PressPlace& place) const {
+  return contact_gain_[press] <= place.log_places || own_gain_[press] <= 0.0;
+}
+
+double PressFusion::fit_of(std::size_t press, const PressPlace& place) const {
+  return is_little(press, place) ? 0.0 : std::max(0.0, place.gain / own_gain_[press]);
+}
+
+/// The pose that brings the middle of the contact to the origin.
+Pose PressFusion::first_pose(std::size_t press) const {
+  return {-presses_[press].searched.sides.front().centre_mm, 0.0};
+}
+
+std::size_t PressFusion::maps_in_use() const {
+  return static_cast<std::size_t>(
+      std::ranges::count_if(maps_, [](const Group& map) { return map.presses > 0; }));
+}
+
+void PressFusion::begin_map(std::size_t press) {
+  homes_[press] = {.map = maps_.size(),
+                   .place = {.T_object_sensor = first_pose(press), .certainty = 1.0},
+                   .fit = 1.0};
+  maps_.push_back({FusedMap(options_.map), 0});
+  join(press);
+}
+
+void PressFusion::join(std::size_t press) {
+  const PressHome& home = homes_[press];
+  if (home.map) {
+    maps_[*home.map].sums.add(presses_[press].image, home.image_place());
+    ++maps_[*home.map].presses;
+  }
+}
+
+void PressFusion::leave(std::size_t press) {
+  PressHome& home = homes_[press];
+  if (home.map) {
+    maps_[*home.map].sums.remove(presses_[press].image, home.image_place());
+    --maps_[*home.map].presses;
+    home.map = {};
+  }
+}
+
+void PressFusion::keep_apart() {
+  for (std::size_t p = 0; p < presses_.size(); ++p) {
+    begin_map(p);
+  }
+}
+
+int PressFusion::fuse() {
+  compare_single_presses();
+  open_maps();
+  join_first_maps();
+  settled_ = false;
+  int round = 0;
+  while (!settled_ && round < most_rounds) {
+    settled_ = !place_all();
+    ++round;
+    report(0.5 + 0.5 * round / most_rounds);
+    // Later maps would leave their presses no time to settle.
+    if (round < most_rounds / 2 && open_maps()) {
+      settled_ = false;
+    }
+  }
+  return round;
+}
+
+void PressFusion::compare_single_presses() {
+  const std::size_t n = presses_.size();
+  const std::size_t columns = std::min(n, std::max(fewest_columns, most_comparisons / n));
+  std::vector<const SearchedPress*> all;
+  for (const UnposedPress& press : presses_) {
+    all.push_back(&press.searched);
+  }
+  fits_.fit.assign(n, std::vector<double>(columns, 0.0));
+  for (std::size_t c = 0; c < columns; ++c) {
+    const std::size_t of = c * n / columns;
+    fits_.columns.push_back(of);
+    const OccupancyGrid map = alone(of);
+    const OccupancyGrid layer = compared(map);
+    single_.push_back(search_.best_places(all, {map, layer}));
+    for (std::size_t p = 0; p < n; ++p) {
+      fits_.fit[p][c] = p == of ? 1.0 : fit_of(p, single_.back()[p]);
+    }
+    report(0.5 * static_cast<double>(c + 1) / static_cast<double>(columns));
+  }
+}
+
+/// Begins maps with presses that fit none, while there may be more. Returns whether it did.
+bool PressFusion::open_maps() {
+  bool opened = false;
+  while (maps_in_use() < options_.most_maps) {
+    std::vector<double> best;
+    for (std::size_t p = 0; p < presses_.size(); ++p) {
+      best.push_back(homes_[p].map ? homes_[p].fit : 0.0);
+      for (const std::size_t column : opened_) {
+        best.back() = std::max(best.back(), fits_.fit[p][column]);
+      }
+    }
+    const std::optional<std::size_t> next = next_map(fits_, best, good_fit);
+    if (!next) {
+      break;
+    }
+    leave(fits_.columns[*next]);
+    begin_map(fits_.columns[*next]);
+    opened_.push_back(*next);
+    opened = true;
+  }
+  return opened;
+}
+
+/// Places the presses that began no map where they fit the first press of one.
+void PressFusion::join_first_maps() {
+  for (std::size_t p = 0; p < presses_.size(); ++p) {
+    if (homes_[p].map) {
+      continue;
+    }
+    for (std::size_t map = 0; map < opened_.size(); ++map) {
+      const std::size_t column = opened_[map];
+      if (fits_.fit[p][column] >= std::max(homes_[p].fit, least_fit)) {
+        homes_[p] = {.map = map, .place = single_[column][p], .fit = fits_.fit[p][column]};
+        Pose& pose = homes_[p].place.T_object_sensor;
+        pose = first_pose(fits_.columns[column]) * pose;
+      }
+    }
+  }
+  for (std::size_t p = 0; p < presses_.size(); ++p) {
+    const bool began = std::ranges::any_of(
+        opened_, [&](std::size_t column) { return fits_.columns[column] == p; });
+    if (!began) {
+      join(p);
+    }
+  }
+}
+
+/// Where the press fits best, of all maps; without a map where it fits none well enough.
+PressHome PressFusion::best_home(std::size_t press) const {
+  PressHome best;
+  for (std::size_t map = 0; map < maps_.size(); ++map) {
+    if (maps_[map].presses == 0) {
+      continue;
+    }
+    const OccupancyGrid grid = maps_[map].sums.map(no_label);
+    const OccupancyGrid layer = compared(grid);
+    const PressPlace place = search_.best_place(presses_[press].searched, {grid, layer});
+    if (const double fit = fit_of(press, place); fit > best.fit || !best.map) {
+      best = {.map = map, .place = place, .fit = fit};
+    }
+  }
+  if (best.fit < least_fit) {
+    best.map = {};
+  }
+  return best;
+}
+
+/// Takes each press out of its map and places it anew. Returns whether any press changed its map or
+/// moved.
+bool PressFusion::place_all() {
+  opened_.clear();
+  bool changed = false;
+  for (std::size_t p = 0; p < presses_.size(); ++p) {
+    const PressHome before = homes_[p];
+    const bool alone_there = before.map && maps_[*before.map].presses == 1;
+    leave(p);
+    const PressHome best = best_home(p);
+    homes_[p] = alone_there && best.fit < good_fit ? before : best;
+    join(p);
+    const PressHome& now = homes_[p];
+    const PressReadings& side = presses_[p].searched.sides[now.place.mirrored ? 1 : 0];
+    const bool stayed =
+        now.map == before.map &&
+        (!now.map || (now.place.mirrored == before.place.mirrored &&
+                      displacement_mm(side, now.place.T_object_sensor,
+                                      before.place.T_object_sensor) <= step_mm_ / 4.0));
+    changed = changed || !stayed;
+  }
+  return changed;
+}
+
+}  // namespace palpate

@@ -1,0 +1,141 @@
+#include "unposed_maps.hpp"
+
+#include <algorithm>
+#include <utility>
+
+#include <fmt/format.h>
+#include <tbb/parallel_for.h>
+
+#include "element_spacing.hpp"
+#include "fused_map.hpp"
+#include "observed_map.hpp"
+#include "palpate/error.hpp"
+#include "press_fusion.hpp"
+
+namespace palpate {
+
+namespace {
+
+/// The final map: images are computed at their places.
+UnposedMap final_map(std::size_t map, std::span<const UnposedPress> presses,
+                     std::span<const PressHome> homes, const std::string& label,
+                     const UnposedOptions& options) {
+  UnposedMap result;
+  FusedMap sums(options.map);
+  for (std::size_t p = 0; p < presses.size(); ++p) {
+    const PressHome& home = homes[p];
+    if (home.map != map) {
+      continue;
+    }
+    Touch touch = presses[p].touch;
+    std::vector<glm::dvec2> mirrored;
+    if (home.place.mirrored) {
+      for (const glm::dvec2& element : touch.elements_mm) {
+        mirrored.emplace_back(-element.x, element.y);
+      }
+      touch.elements_mm = mirrored;
+    }
+    touch.T_robot_sensor = home.place.T_object_sensor;
+    const double weight = home.image_place().weight;
+    sums.add(observed_map(std::span(&touch, 1), options.map, label), {.weight = weight});
+    result.presses.push_back({.press = presses[p].index,
+                              .T_object_sensor = touch.T_robot_sensor,
+                              .mirrored = home.place.mirrored,
+                              .weight = weight,
+                              .fit = home.fit});
+  }
+  if (result.presses.empty()) {
+    return result;
+  }
+  if (result.presses.size() == 1) {
+    result.presses.front().fit = {};
+  }
+  result.map = sums.map(label);
+  result.map.mirror = options.mirror;
+  if (const auto fault = fault_of(result.map)) {
+    throw Error(Fault::input, fmt::format("map '{}': {}", label, *fault));
+  }
+  return result;
+}
+
+}  // namespace
+
+double element_pitch_mm(std::span<const Touch> presses) {
+  std::optional<double> least;
+  for (std::size_t i = 0; i < presses.size(); ++i) {
+    const bool same = i > 0 && presses[i].elements_mm.data() == presses[i - 1].elements_mm.data();
+    const auto spacing = same ? std::nullopt : spacing_of(presses[i].elements_mm);
+    if (spacing && spacing->nearest_mm.most > 0.0) {
+      least = std::min(least.value_or(spacing->nearest_mm.most), spacing->nearest_mm.most);
+    }
+  }
+  if (!least) {
+    throw Error(Fault::input, "presses at unknown poses need an array of several elements");
+  }
+  return *least;
+}
+
+UnposedMaps unposed_maps(std::span<const Touch> presses, const std::string& label,
+                         const UnposedOptions& given, const std::function<void(double)>& progress) {
+  UnposedOptions options = given;
+  if (options.most_maps < 1) {
+    throw Error(Fault::input, "most maps = 0: give at least 1");
+  }
+  if (!options.contact.prior) {
+    options.contact.prior = options.map.sensor.prior;
+  }
+  options.contact.validate();
+  const double step_mm = element_pitch_mm(presses);
+  UnposedMaps result;
+  std::vector<UnposedPress> placeable;
+  for (std::size_t i = 0; i < presses.size(); ++i) {
+    UnposedPress press{.index = i, .touch = presses[i], .searched = {}, .image = {}};
+    press.touch.T_robot_sensor = {};
+    press.searched.sides.emplace_back(press.touch, options.contact, false, step_mm);
+    if (options.mirror) {
+      press.searched.sides.emplace_back(press.touch, options.contact, true, step_mm);
+    }
+    if (press.searched.sides.front().contacts == 0) {
+      result.misfits.push_back({.press = i, .reason = Misfit::Reason::no_contact});
+      continue;
+    }
+    placeable.push_back(std::move(press));
+  }
+  if (placeable.empty()) {
+    throw Error(Fault::input, fmt::format("object '{}': no press has an element In Contact; check "
+                                          "the threshold and the pressure's unit",
+                                          label));
+  }
+  tbb::parallel_for(std::size_t{0}, placeable.size(), [&](std::size_t p) {
+    placeable[p].image = observed_map(std::span(&placeable[p].touch, 1), options.map, label);
+  });
+
+  PressFusion fusion(placeable, options, step_mm, progress);
+  if (placeable.size() <= options.most_maps) {
+    fusion.keep_apart();
+  } else {
+    result.rounds = fusion.fuse();
+    result.settled = fusion.settled();
+  }
+  for (std::size_t p = 0; p < placeable.size(); ++p) {
+    const PressHome& home = fusion.homes()[p];
+    if (!home.map) {
+      result.misfits.push_back(
+          {.press = placeable[p].index,
+           .reason = fusion.says_little(p) ? Misfit::Reason::too_little : Misfit::Reason::unlike,
+           .fit = home.fit});
+    }
+  }
+  std::ranges::sort(result.misfits, {}, &Misfit::press);
+  for (std::size_t map = 0; map < fusion.maps(); ++map) {
+    UnposedMap one = final_map(map, placeable, fusion.homes(), label, options);
+    if (!one.presses.empty()) {
+      result.maps.push_back(std::move(one));
+    }
+  }
+  std::ranges::stable_sort(result.maps, std::ranges::greater{},
+                           [](const UnposedMap& map) { return map.presses.size(); });
+  return result;
+}
+
+}  // namespace palpate

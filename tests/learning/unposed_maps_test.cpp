@@ -1,0 +1,252 @@
+#include "unposed_maps.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "palpate/error.hpp"
+#include "palpate/simulation.hpp"
+
+namespace palpate {
+namespace {
+
+/// Presses of an array of 16 x 16 elements, 2 mm apart, that sees a letter whole.
+Recording presses_of(const std::string& shape, int presses, std::uint64_t seed) {
+  std::vector<Pose> T_object_sensor = random_poses(presses, seed);
+  for (Pose& pose : T_object_sensor) {
+    pose.translation_mm *= 0.3;  // within 3 mm of the letter's middle
+  }
+  return Simulator(make_shape(shape), {}, grid_array(16, 16, 2.0), seed).touch(T_object_sensor, {});
+}
+
+UnposedOptions usual_options(std::size_t most_maps) {
+  UnposedOptions options;
+  options.map.cell_mm = 1.0;
+  options.map.sensor.spread_mm = 1.2;
+  options.most_maps = most_maps;
+  return options;
+}
+
+std::vector<Touch> touches_of(const Recording& recording) {
+  return recording.touches(0, recording.size());
+}
+
+std::vector<Touch> joined(std::vector<Touch> a, const std::vector<Touch>& b) {
+  a.insert(a.end(), b.begin(), b.end());
+  return a;
+}
+
+/// Intersection over union of the map's occupied cells and the shape, at the pose of the map's
+/// frame that one of its presses says, whichever agrees best.
+double overlap(const UnposedMap& map, const Recording& recording, const Shape& shape) {
+  double best = 0.0;
+  for (const PlacedPress& press : map.presses) {
+    const Pose T_shape_map = recording.T_robot_sensor[press.press] * inverse(press.T_object_sensor);
+    double both = 0.0;
+    double either = 0.0;
+    for (int j = 0; j < map.map.ny; ++j) {
+      for (int i = 0; i < map.map.nx; ++i) {
+        const bool occupied = map.map.at(i, j) > 0.0F;
+        const bool on_shape = shape.contains(T_shape_map * map.map.centre_mm(i, j));
+        both += occupied && on_shape ? 1.0 : 0.0;
+        either += occupied || on_shape ? 1.0 : 0.0;
+      }
+    }
+    best = std::max(best, both / either);
+  }
+  return best;
+}
+
+std::vector<std::size_t> presses_in(const UnposedMap& map) {
+  std::vector<std::size_t> presses;
+  for (const PlacedPress& press : map.presses) {
+    presses.push_back(press.press);
+  }
+  return presses;
+}
+
+TEST(UnposedMaps, PressesOfALetterFuseIntoItsShape) {
+  for (const std::string letter : {"A", "U", "E"}) {
+    const Recording recording = presses_of(letter, 10, 3);
+    const UnposedMaps result = unposed_maps(touches_of(recording), letter, usual_options(1));
+    ASSERT_EQ(result.maps.size(), 1u);
+    EXPECT_TRUE(result.misfits.empty()) << letter;
+    EXPECT_TRUE(result.settled) << letter;
+    EXPECT_EQ(result.maps[0].map.label, letter);
+    EXPECT_EQ(result.maps[0].presses.size(), 10u) << letter;
+    // Measured: 0.68 for the U, above 0.7 for the others.
+    EXPECT_GT(overlap(result.maps[0], recording, make_shape(letter)), 0.6) << letter;
+  }
+}
+
+TEST(UnposedMaps, HoldsMeansAndCounts) {
+  const Recording recording = presses_of("A", 6, 4);
+  const UnposedMaps result = unposed_maps(touches_of(recording), "A", usual_options(1));
+  const OccupancyGrid& map = result.maps.at(0).map;
+  EXPECT_FALSE(fault_of(map));
+  ASSERT_EQ(map.observations.size(), map.log_odds.size());
+  ASSERT_EQ(map.mean_level.size(), map.log_odds.size());
+  EXPECT_EQ(*std::ranges::max_element(map.observations), 6.0F) << "all presses, in the middle";
+  // Of one press alone.
+  const UnposedMaps one = unposed_maps(std::vector{recording.touch(0)}, "A", usual_options(1));
+  const auto largest = [](const std::vector<float>& values) {
+    return *std::ranges::max_element(values);
+  };
+  EXPECT_LT(largest(map.log_odds), 1.5F * largest(one.maps.at(0).map.log_odds)) << "not a sum";
+  EXPECT_LT(largest(map.mean_level), 1.5F * largest(one.maps.at(0).map.mean_level));
+  EXPECT_GT(largest(map.mean_level), 0.5F * largest(one.maps.at(0).map.mean_level));
+}
+
+TEST(UnposedMaps, TwoShapesUnderOneLabelNeedTwoMaps) {
+  const Recording a = presses_of("A", 6, 5);
+  const Recording o = presses_of("ring", 4, 6);
+  const UnposedMaps result =
+      unposed_maps(joined(touches_of(a), touches_of(o)), "x", usual_options(2));
+  ASSERT_EQ(result.maps.size(), 2u);
+  EXPECT_TRUE(result.misfits.empty());
+  EXPECT_EQ(presses_in(result.maps[0]), (std::vector<std::size_t>{0, 1, 2, 3, 4, 5}));
+  EXPECT_EQ(presses_in(result.maps[1]), (std::vector<std::size_t>{6, 7, 8, 9}));
+  // One map more is not taken just because it may be.
+  EXPECT_EQ(unposed_maps(joined(touches_of(a), touches_of(o)), "x", usual_options(3)).maps.size(),
+            2u);
+}
+
+TEST(UnposedMaps, ListsPressesThatFitNowhere) {
+  const Recording a = presses_of("A", 6, 7);
+  const Recording foreign = presses_of("ring", 1, 8);
+  Recording nothing = presses_of("A", 1, 9);
+  std::ranges::fill(nothing.pressure, 0.5);
+  std::vector<Touch> presses = joined(touches_of(a), touches_of(foreign));
+  presses = joined(std::move(presses), touches_of(nothing));
+  const UnposedMaps result = unposed_maps(presses, "A", usual_options(1));
+  ASSERT_EQ(result.maps.size(), 1u);
+  EXPECT_EQ(presses_in(result.maps[0]), (std::vector<std::size_t>{0, 1, 2, 3, 4, 5}));
+  ASSERT_EQ(result.misfits.size(), 2u);
+  EXPECT_EQ(result.misfits[0].press, 6u);
+  EXPECT_EQ(result.misfits[0].reason, Misfit::Reason::unlike);
+  EXPECT_LT(result.misfits[0].fit, least_fit);
+  EXPECT_EQ(result.misfits[1].press, 7u);
+  EXPECT_EQ(result.misfits[1].reason, Misfit::Reason::no_contact);
+}
+
+TEST(UnposedMaps, ContactThatFitsAnywhereIsLeftOut) {
+  const Recording a = presses_of("A", 6, 7);
+  Recording speck = presses_of("A", 1, 9);
+  std::ranges::fill(speck.pressure, 0.5);
+  speck.pressure[100] = 20.0;
+  const UnposedMaps result =
+      unposed_maps(joined(touches_of(a), touches_of(speck)), "A", usual_options(1));
+  ASSERT_EQ(result.misfits.size(), 1u);
+  EXPECT_EQ(result.misfits[0].press, 6u);
+  EXPECT_EQ(result.misfits[0].reason, Misfit::Reason::too_little);
+}
+
+TEST(UnposedMaps, OnePressMakesItsOwnMap) {
+  const Recording a = presses_of("A", 1, 10);
+  const UnposedMaps result = unposed_maps(touches_of(a), "A", usual_options(1));
+  ASSERT_EQ(result.maps.size(), 1u);
+  EXPECT_EQ(result.rounds, 0);
+  EXPECT_FALSE(result.maps[0].presses.at(0).fit);
+  EXPECT_EQ(result.maps[0].presses.at(0).weight, 1.0);
+  EXPECT_GT(overlap(result.maps[0], a, make_shape("A")), 0.5);
+}
+
+TEST(UnposedMaps, NoMorePressesThanMapsStayApart) {
+  const Recording a = presses_of("A", 3, 11);
+  const UnposedMaps result = unposed_maps(touches_of(a), "A", usual_options(4));
+  ASSERT_EQ(result.maps.size(), 3u);
+  for (const UnposedMap& map : result.maps) {
+    EXPECT_EQ(map.presses.size(), 1u);
+  }
+}
+
+TEST(UnposedMaps, MirroredPressesJoinWhereTheObjectMayLieOnItsOtherSide) {
+  // An F has no mirror image among its turns.
+  const Recording f = presses_of("F", 8, 12);
+  Recording mixed = f;
+  constexpr int side = 16;
+  for (std::size_t press = 4; press < 8; ++press) {
+    for (int row = 0; row < side; ++row) {
+      double* first = mixed.pressure.data() + (press * side + static_cast<std::size_t>(row)) * side;
+      std::reverse(first, first + side);
+    }
+  }
+  UnposedOptions options = usual_options(1);
+  options.mirror = true;
+  const UnposedMaps result = unposed_maps(touches_of(mixed), "F", options);
+  ASSERT_EQ(result.maps.size(), 1u);
+  EXPECT_TRUE(result.misfits.empty());
+  EXPECT_TRUE(result.maps[0].map.mirror);
+  ASSERT_EQ(result.maps[0].presses.size(), 8u);
+  for (const PlacedPress& press : result.maps[0].presses) {
+    EXPECT_EQ(press.mirrored, result.maps[0].presses[0].mirrored != (press.press >= 4))
+        << press.press;
+  }
+  const UnposedMaps straight = unposed_maps(touches_of(mixed), "F", usual_options(2));
+  ASSERT_EQ(straight.maps.size(), 2u) << "without a mirror, each side is an object of its own";
+  EXPECT_EQ(presses_in(straight.maps[0]), (std::vector<std::size_t>{0, 1, 2, 3}));
+}
+
+TEST(UnposedMaps, ThePressesOwnPosesDoNotCount) {
+  Recording a = presses_of("A", 5, 13);
+  const OccupancyGrid before = unposed_maps(touches_of(a), "A", usual_options(1)).maps[0].map;
+  for (Pose& pose : a.T_robot_sensor) {
+    pose = {{1000.0, -7.0}, 1.0};
+  }
+  EXPECT_EQ(unposed_maps(touches_of(a), "A", usual_options(1)).maps[0].map.log_odds,
+            before.log_odds);
+}
+
+TEST(UnposedMaps, TakesLearnedTablesOverTheirLayer) {
+  const Recording a = presses_of("A", 6, 14);
+  const Recording o = presses_of("ring", 1, 15);
+  UnposedOptions options = usual_options(1);
+  options.layer = ReadingLayer{.of = MapLayer::mean_level, .full_level = 40.0};
+  LikelihoodTable table{.first_log_odds = ReadingLayer::first_node,
+                        .last_log_odds = ReadingLayer::largest_value,
+                        .nodes = ReadingLayer::nodes,
+                        .level_edges = {},
+                        .log_likelihood = {}};
+  // In Contact with a probability of 0.95 from a third of the full level on, 0.05 below it and 0.2
+  // where nothing was sensed.
+  for (const bool contact : {false, true}) {
+    for (int node = 0; node < ReadingLayer::nodes; ++node) {
+      const double value = ReadingLayer::first_node + 0.5 * node;
+      const double p = value < -ReadingLayer::largest_value ? 0.2 : value < 2.0 ? 0.05 : 0.95;
+      table.log_likelihood.push_back(std::log(contact ? p : 1.0 - p));
+    }
+  }
+  options.contact.table = table;
+  const UnposedMaps result = unposed_maps(joined(touches_of(a), touches_of(o)), "A", options);
+  EXPECT_EQ(presses_in(result.maps.at(0)), (std::vector<std::size_t>{0, 1, 2, 3, 4, 5}));
+  EXPECT_GT(overlap(result.maps[0], a, make_shape("A")), 0.7);
+}
+
+TEST(UnposedMaps, RefusesWhatCannotBePlaced) {
+  const auto refusal = [](std::span<const Touch> presses, const UnposedOptions& options) {
+    try {
+      unposed_maps(presses, "A", options);
+    } catch (const Error& error) {
+      return std::string(error.what());
+    }
+    return std::string("no refusal");
+  };
+  const Recording a = presses_of("A", 2, 16);
+  Recording nothing = a;
+  std::ranges::fill(nothing.pressure, 0.0);
+  EXPECT_NE(refusal(touches_of(nothing), usual_options(1)).find("In Contact"), std::string::npos);
+  EXPECT_NE(refusal({}, usual_options(1)).find("several elements"), std::string::npos);
+  EXPECT_NE(refusal(touches_of(a), usual_options(0)).find("at least 1"), std::string::npos);
+  const std::vector<glm::dvec2> element{{0.0, 0.0}};
+  const std::vector<double> pressure{5.0};
+  const Touch single{.T_robot_sensor = {}, .elements_mm = element, .pressure = pressure};
+  EXPECT_NE(refusal(std::span(&single, 1), usual_options(1)).find("several elements"),
+            std::string::npos);
+}
+
+}  // namespace
+}  // namespace palpate
