@@ -221,7 +221,8 @@ double none_log_evidence(std::span<const Touch> touches, const PoseLattice& latt
     LogMean mean_everywhere;
     double share = 0.0;
     for (std::size_t object = 0; object < hypotheses.size(); ++object) {
-      const auto& [map, weight] = hypotheses[object];
+      const OccupancyGrid& map = hypotheses[object].map;
+      const double weight = hypotheses[object].weight;
       for (std::int64_t bin = 0; bin < lattice.bins(); ++bin) {
         const double l = log_likelihood[i][object][static_cast<std::size_t>(bin)];
         mean_everywhere.add(weight, l);
