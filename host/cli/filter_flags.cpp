@@ -9,6 +9,7 @@
 
 #include "options.hpp"
 #include "recognition_flags.hpp"
+#include "sensor_model_flag.hpp"
 
 namespace palpate::cli {
 
@@ -42,7 +43,8 @@ std::string bounds_flag(const FilterFlags& flags) {
 
 /// What bounds refuse and the histogram does not.
 std::vector<HistogramNeed> all_needs(const RecognitionFlags& flags, const Scene& scene,
-                                     const HistogramNeed& of_command) {
+                                     const HistogramNeed& of_command,
+                                     const HistogramOptions& histogram) {
   std::vector<HistogramNeed> needs;
   if (!of_command.why.empty()) {
     needs.push_back(of_command);
@@ -52,13 +54,15 @@ std::vector<HistogramNeed> all_needs(const RecognitionFlags& flags, const Scene&
     needs.push_back({slip, "bounds take the object to rest between touches"});
   }
   if (const std::string touch = touch_sd_giver(flags.uncertainty, scene, flags.scene);
-      !touch.empty()) {
-    needs.push_back({touch, "bounds take every touch's pose to be exact"});
+      !touch.empty() || !histogram.touch_sd.none()) {
+    needs.push_back({touch.empty() ? "touch_sd in " + sensor_model_file(flags, scene) : touch,
+                     "bounds take every touch's pose to be exact"});
   }
-  const bool with_none =
-      flags.uncertainty.none.has_value() || scene.none.has_value() || scene.auto_none;
-  if (with_none && flags.gamma.value_or(scene.gamma.value_or(0.1)) == 0.0) {
-    needs.push_back({flags.gamma ? "--gamma 0" : flags.scene + ": gamma 0",
+  const bool without_floor = !histogram.contact.table && histogram.contact.gamma == 0.0;
+  if (histogram.none_weight && without_floor) {
+    needs.push_back({flags.gamma   ? "--gamma 0"
+                     : scene.gamma ? flags.scene + ": gamma 0"
+                                   : "gamma 0 in " + sensor_model_file(flags, scene),
                      "(none) is then the mean of a few bins that a sample misses"});
   }
   if (flags.filter.memory_mib) {
@@ -221,7 +225,7 @@ ChosenFilter choose_filter(const FilterWish& wish, const RecognitionFlags& flags
     histogram.memory_limit_bytes = static_cast<std::uint64_t>(*mib) << 20;
   }
   set_uncertainty(flags.uncertainty, scene, hypotheses, histogram);
-  std::vector<HistogramNeed> needs = all_needs(flags, scene, of_command);
+  std::vector<HistogramNeed> needs = all_needs(flags, scene, of_command, histogram);
   if (wish.kind == Kind::bounded) {
     for (const auto& [flag, why] : needs) {
       if (flag.empty()) {

@@ -13,6 +13,7 @@
 
 #include "command_files.hpp"
 #include "commands.hpp"
+#include "label_probability.hpp"
 #include "options.hpp"
 #include "palpate/files.hpp"
 #include "plan_output.hpp"
@@ -209,7 +210,8 @@ void plan_touches(const Options& options) {
   plan.ranked = rank_touches(*recogniser.histogram(), task, candidates, elements_mm, goal,
                              {.samples = options.samples, .seed = options.seed});
   plan.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-  plan.identity_nats = label_entropy(record.last().identity, task);
+  // Gains are of the belief before temperature and features.
+  plan.identity_nats = label_entropy(sums_by_label(recogniser.estimate(), task), task);
   plan.both_nats = recogniser.histogram()->entropy();
   write_results(options, plan, device);
   if (options.recognition.verbose) {

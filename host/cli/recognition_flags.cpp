@@ -10,8 +10,17 @@ void add_recognition_flags(CLI::App& command, RecognitionFlags& flags) {
   command.add_option("--maps", flags.maps, "Maps of the known objects, or folders of maps");
   command.add_option(
       "--scene", flags.scene,
-      "Scene file (YAML); its keys are array, threshold, ratio, gamma, prior, touch_sd, slip_sd, "
-      "none, objects, region, bins, filter and device, and a flag overrides its key");
+      "Scene file (YAML); its keys are array, sensor_model, threshold, ratio, gamma, prior, "
+      "touch_sd, slip_sd, none, objects, region, bins, filter and device, and a flag overrides its "
+      "key");
+  command.add_option(
+      "--sensor-model", flags.sensor_model,
+      "What 'palpate calibrate' learned about the sensor (YAML): the threshold, the ratio, gamma "
+      "and the touches' standard deviations, which flags and scene keys override; a likelihood "
+      "table in the place of gamma and prior; and how sure to be: the temperature, press features, "
+      "and whether the object was learned at all. Without an own --filter, standard deviations "
+      "above 0 take the histogram; --filter bounded and particles leave them out "
+      "[default: no model]");
   command.add_option(
       "--bins", flags.bins,
       "Pose bins per object along x, y and theta, as 25x25x16; auto: as many as the refined pose "
@@ -36,16 +45,19 @@ void add_recognition_flags(CLI::App& command, RecognitionFlags& flags) {
       "each unknown with an element in contact [default: auto, or 0,0 where counts of --bins or a "
       "range is given]");
   command.add_option("--prior", flags.prior,
-                     "Probability that an unseen cell is occupied [default: the maps' own]");
+                     "Probability that an unseen cell is occupied; refused beside a sensor model "
+                     "with a table [default: the maps' own]");
   command.add_option("--gamma", flags.gamma,
-                     "Probability that an element's contact class is random [default: 0.1]");
+                     "Probability that an element's contact class is random; refused beside a "
+                     "sensor model with a table [default: the sensor model's, or 0.1]");
   add_uncertainty_flags(command, flags.uncertainty);
   command.add_option(
       "--threshold", flags.threshold,
-      "Contact threshold, in the recording's pressure unit [default: 2 kPa; required for raw "
-      "pressure]");
+      "Contact threshold, in the recording's pressure unit [default: the sensor model's, or 2 kPa; "
+      "required for raw pressure without a model]");
   command.add_option("--ratio", flags.ratio,
-                     "Threshold as a fraction of the touch's largest pressure [default: 0.3]");
+                     "Threshold as a fraction of the touch's largest pressure [default: the sensor "
+                     "model's, or 0.3]");
   add_filter_flags(command, flags.filter);
   command.add_option("--device", flags.device, "Vulkan device, by index or a part of its name");
   command.add_flag("--verbose", flags.verbose,

@@ -25,6 +25,7 @@ struct RecognitionFlags {
   std::string y_mm;
   std::string theta_deg;
   std::string pivot_mm;
+  std::string sensor_model;
   std::optional<double> prior;
   std::optional<double> gamma;
   UncertaintyFlags uncertainty;
@@ -63,7 +64,7 @@ Device open_device(const RecognitionFlags& flags, const Scene& scene);
 Recogniser open_recogniser(const RecognitionFlags& flags, const Scene& scene, Device& device,
                            RecognitionTask& task);
 
-/// Adds the files that the task was read from: the scene, its array and the maps.
+/// Adds the files that the task was read from: the scene, its array, the sensor model and the maps.
 void add_recognition_files(const RecognitionFlags& flags, const Scene& scene,
                            const RecognitionTask& task, CommandFiles& files);
 

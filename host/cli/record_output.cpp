@@ -1,5 +1,6 @@
 #include "record_output.hpp"
 
+#include <algorithm>
 #include <numbers>
 
 #include <fmt/format.h>
@@ -71,8 +72,12 @@ std::string setup_words(const Device& device, const RecognitionTask& task) {
   const auto* particles = std::get_if<ParticleOptions>(&task.filter);
   const PoseLattice& lattice = task.lattice();
   const bool bounded = std::holds_alternative<BoundedOptions>(task.filter);
+  const auto mirrored =
+      static_cast<std::size_t>(std::ranges::count_if(task.hypotheses, &Hypothesis::mirrored));
+  const std::size_t maps = task.hypotheses.size() - mirrored;
   return fmt::format(
-      "{} map{}, {} on {}", task.hypotheses.size(), task.hypotheses.size() == 1 ? "" : "s",
+      "{} map{}{}, {} on {}", maps, maps == 1 ? "" : "s",
+      mirrored > 0 ? fmt::format(" and {} mirrored", mirrored) : "",
       particles != nullptr
           ? fmt::format("{} particles", particles->particles)
           : fmt::format("{} x {} x {} bins each{},", lattice.x_mm.count, lattice.y_mm.count,
@@ -135,6 +140,9 @@ nlohmann::ordered_json to_json(const RecognitionStep& step, const RecognitionTas
   if (task.labels.back() == none_label) {
     json["none"] = step.identity.back();
   }
+  if (step.known) {
+    json["known"] = *step.known;
+  }
   const Mode& mode = step.mode;
   json["mode"] = {{"object", task.labels[task.label_of[mode.object]]},
                   {"map", task.map_paths[mode.object]},
@@ -142,6 +150,10 @@ nlohmann::ordered_json to_json(const RecognitionStep& step, const RecognitionTas
                   {"y_mm", mode.T_object_robot.translation_mm.y},
                   {"theta_rad", mode.T_object_robot.theta_rad},
                   {"log_likelihood", mode.log_likelihood}};
+  const Hypothesis& hypothesis = task.hypotheses[static_cast<std::size_t>(mode.object)];
+  if (hypothesis.map.mirror) {
+    json["mode"]["mirrored"] = hypothesis.mirrored;
+  }
   json["T_robot_object"] = to_json(step.mode_T_robot_object());
   if (step.right) {
     json["right"] = *step.right;

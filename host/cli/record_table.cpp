@@ -198,8 +198,7 @@ std::string result_table(const std::vector<RecognitionRecord>& records, const Re
                fmt::format("{:.3f}", step.confidence()), with_dropped ? dropped_text(step) : "",
                pose[0], pose[1], pose[2], fit_word(step)});
     if (step.refined) {
-      add_pose("  mode", task.hypotheses[step.mode.object].map.label, step.mode_T_robot_object(),
-               step.error_mm);
+      add_pose("  mode", mode_words(step, task), step.mode_T_robot_object(), step.error_mm);
     }
     if (const std::optional<Pose> truth = step.true_T_robot_object(task)) {
       add_pose("  truth", step.truth.label, *truth, step.pose_error_mm());

@@ -55,10 +55,16 @@ std::string pose_words(const PoseText& pose) {
   return fmt::format("x {} mm, y {} mm, theta {} deg", with_sd(0), with_sd(1), with_sd(2));
 }
 
+std::string mode_words(const RecognitionStep& step, const RecognitionTask& task) {
+  const bool mirrored = task.hypotheses[static_cast<std::size_t>(step.mode.object)].mirrored;
+  return posed_label(step, task) + (mirrored ? " mirrored" : "");
+}
+
 std::string object_words(const RecognitionStep& step, const RecognitionTask& task) {
   const std::string& best = task.labels[step.best];
   const std::string& posed = posed_label(step, task);
-  return printable(best == posed ? best : fmt::format("{}, pose of {}", best, posed));
+  return printable(best == posed ? mode_words(step, task)
+                                 : fmt::format("{}, pose of {}", best, mode_words(step, task)));
 }
 
 std::string identity_words(const RecognitionStep& step, const RecognitionTask& task) {

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <filesystem>
 #include <set>
+#include <tuple>
 #include <utility>
 
 #include <fmt/format.h>
@@ -13,6 +14,7 @@
 #include "palpate/balanced_lattice.hpp"
 #include "palpate/files.hpp"
 #include "recordings.hpp"
+#include "sensor_model_flag.hpp"
 
 namespace palpate::cli {
 
@@ -55,7 +57,7 @@ std::vector<Scene::Object> objects_of(const RecognitionFlags& flags, const Scene
   std::vector<Scene::Object> objects;
   for (const std::string& argument : flags.maps) {
     for (const std::filesystem::path& file : map_files(argument)) {
-      objects.push_back({.map = file, .label = {}, .symmetry = {}});
+      objects.push_back({.map = file, .label = {}, .symmetry = {}, .mirror = {}});
     }
   }
   return objects;
@@ -78,6 +80,7 @@ std::vector<Hypothesis> read_maps(const std::vector<Scene::Object>& objects) {
              none_label);
     }
     map.symmetry = object.symmetry.value_or(map.symmetry);
+    map.mirror = object.mirror.value_or(map.mirror);
     hypotheses.push_back({std::move(map), object.weight});
   }
   return hypotheses;
@@ -98,6 +101,42 @@ std::optional<double> prior_of(const std::vector<Scene::Object>& objects,
            objects.front().map.string());
   }
   return given;
+}
+
+/// The classifier of Eq. 3 and gamma of Eq. 7: a flag overrides the scene's key, and the key what
+/// the sensor model learned.
+std::pair<ContactClassifier, double> contact_rules(const RecognitionFlags& flags,
+                                                   const Scene& scene,
+                                                   const std::optional<LearnedSensor>& sensor,
+                                                   const std::string& pressure_unit,
+                                                   const std::string& source) {
+  constexpr double usual_gamma = 0.1;
+  const auto given = [](std::optional<double> flag, std::optional<double> key,
+                        std::optional<double> learned) {
+    return flag ? flag : key ? key : learned;
+  };
+  const auto learned = [&](double value) { return sensor ? std::optional(value) : std::nullopt; };
+  const LearnedSensor values = sensor.value_or(LearnedSensor{});
+  const double gamma = given(flags.gamma, scene.gamma, learned(values.gamma)).value_or(usual_gamma);
+  if (!(gamma >= 0.0 && gamma < 1.0)) {
+    refuse_flag("--gamma", gamma, "must be at least 0 and below 1");
+  }
+  return {
+      make_classifier(pressure_unit, source,
+                      given(flags.threshold, scene.threshold, learned(values.classifier.threshold)),
+                      given(flags.ratio, scene.ratio, learned(values.classifier.ratio))),
+      gamma};
+}
+
+/// The file of every hypothesis's map; a mirror image has that of the object before it.
+std::vector<std::string> paths_of(const std::vector<Scene::Object>& objects,
+                                  const std::vector<Hypothesis>& hypotheses) {
+  std::vector<std::string> paths;
+  auto object = objects.begin();
+  for (const Hypothesis& hypothesis : hypotheses) {
+    paths.push_back(hypothesis.mirrored ? paths.back() : (object++)->map.string());
+  }
+  return paths;
 }
 
 /// The lattice that the flags and the scene give, and what they leave to the maps and the touches.
@@ -213,27 +252,35 @@ RecognitionTask task_of(const RecognitionFlags& flags, const Scene& scene,
                         const std::string& pressure_unit, const std::string& source,
                         double reach_mm, const HistogramNeed& need) {
   const FilterWish wish = filter_wish(flags, scene);
+  const std::optional<LearnedSensor> sensor = sensor_model_of(flags, scene, pressure_unit, source);
   HistogramOptions histogram;
   ContactModel& contact = histogram.contact;
-  contact.gamma = flags.gamma ? *flags.gamma : scene.gamma.value_or(0.1);
-  if (!(contact.gamma >= 0.0 && contact.gamma < 1.0)) {
-    refuse_flag("--gamma", contact.gamma, "must be at least 0 and below 1");
-  }
-  contact.classifier =
-      make_classifier(pressure_unit, source, flags.threshold ? flags.threshold : scene.threshold,
-                      flags.ratio ? flags.ratio : scene.ratio);
+  const auto rules = contact_rules(flags, scene, sensor, pressure_unit, source);
   const std::vector<Scene::Object> objects = objects_of(flags, scene);
   std::vector<Hypothesis> hypotheses = read_maps(objects);
+  if (!sensor || !sensor->table) {
+    contact.prior = prior_of(objects, hypotheses, flags.prior ? flags.prior : scene.prior);
+  }
+  add_mirror_images(hypotheses);
+  if (sensor) {
+    apply(*sensor, hypotheses, contact);
+    const bool exact =
+        wish.kind == FilterWish::Kind::bounded || wish.kind == FilterWish::Kind::particles;
+    histogram.touch_sd = exact ? DisplacementSd{} : sensor->touch_sd;
+  }
+  std::tie(contact.classifier, contact.gamma) = rules;
   const WantedLattice wanted = lattice_of(flags, scene, hypotheses, reach_mm);
   histogram.lattice = wanted.lattice;
-  contact.prior = prior_of(objects, hypotheses, flags.prior ? flags.prior : scene.prior);
   const ChosenFilter filter = choose_filter(wish, flags, scene, need, hypotheses, histogram);
   if (!wanted.bin_width) {
     require_within_region(flags.uncertainty, scene, flags.scene, wanted.lattice);
   }
   RecognitionTask task(std::move(hypotheses), filter.options);
-  for (const Scene::Object& object : objects) {
-    task.map_paths.push_back(object.map.string());
+  task.map_paths = paths_of(objects, task.hypotheses);
+  if (sensor) {
+    task.temperature = sensor->temperature;
+    task.features = sensor->features;
+    task.familiarity = sensor->familiarity;
   }
   task.bin_width = wanted.bin_width;
   task.auto_filter = filter.automatic;
@@ -251,6 +298,7 @@ Recogniser open_recogniser(const RecognitionFlags& flags, const Scene& scene, De
   const bool fine = task.bin_width == BinWidth::fine;
   const std::optional<CoarsenedBins> bins = settle_bins(device, task);
   settle_filter(task);
+  settle_evidence(task);
   require_within_region(flags.uncertainty, scene, flags.scene, task.lattice());
   Recogniser recogniser =
       open_filter(device, task);  // first: bins that do not fit deserve only their refusal
@@ -271,6 +319,9 @@ void add_recognition_files(const RecognitionFlags& flags, const Scene& scene,
   }
   if (scene.array_file) {
     files.reads("--scene", *scene.array_file);
+  }
+  if (const std::string sensor_model = sensor_model_file(flags, scene); !sensor_model.empty()) {
+    files.reads(flags.sensor_model.empty() ? "--scene" : "--sensor-model", sensor_model);
   }
   for (const std::string& map : task.map_paths) {
     files.reads(flags.maps.empty() ? "--scene" : "--maps", map);

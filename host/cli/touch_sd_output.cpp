@@ -33,13 +33,16 @@ void refuse_beside_fit(std::span<const OtherFlag> flags, const RecognitionTask& 
   }
   if (!histogram->touch_sd.none()) {
     refuse("--fit-touch-sd",
-           "finds what --touch-sd-mm and --touch-sd-deg, or the scene's touch_sd, say already; "
-           "leave those out");
+           "finds what --touch-sd-mm and --touch-sd-deg, the scene's touch_sd or the sensor model "
+           "say already; leave those out");
   }
   if (!histogram->slip_sd.none()) {
     refuse("--fit-touch-sd",
            "takes objects to rest between touches; leave out --slip-sd-mm and --slip-sd-deg, or "
            "the scene's slip_sd");
+  }
+  if (histogram->contact.table) {
+    refuse("--fit-touch-sd", "learns a model of the sensor of its own; leave out the sensor model");
   }
   if (histogram->none_weight) {
     refuse("--fit-touch-sd",

@@ -111,9 +111,9 @@ void add_uncertainty_flags(CLI::App& command, UncertaintyFlags& flags) {
   command.add_option("--touch-sd-mm", flags.touch_sd_mm,
                      "The robot's repeatability: standard deviation of the sensor's true position "
                      "about the reported one, along x and along y, mm. Independent from touch to "
-                     "touch [default: 0, exact]");
+                     "touch [default: the sensor model's, with the histogram; else 0, exact]");
   command.add_option("--touch-sd-deg", flags.touch_sd_deg,
-                     "The same of the sensor's angle, degrees [default: 0, exact]");
+                     "The same of the sensor's angle, degrees [default: as for --touch-sd-mm]");
   command.add_option("--slip-sd-mm", flags.slip_sd_mm,
                      "Standard deviation of how far the object moves between two touches, along x "
                      "and along y, mm; the motion noise of particles [default: 0, at rest; "
@@ -136,11 +136,12 @@ void add_uncertainty_flags(CLI::App& command, UncertaintyFlags& flags) {
 
 void set_uncertainty(const UncertaintyFlags& flags, const Scene& scene,
                      std::span<const Hypothesis> hypotheses, HistogramOptions& histogram) {
-  const auto sd_of = [](const Given& mm, const Given& deg) {
-    return DisplacementSd{.mm = value_of(mm), .rad = radians(value_of(deg))};
+  const auto set = [](DisplacementSd& sd, const Given& mm, const Given& deg) {
+    sd.mm = mm.any() ? value_of(mm) : sd.mm;
+    sd.rad = deg.any() ? radians(value_of(deg)) : sd.rad;
   };
-  histogram.touch_sd = sd_of(touch_mm(flags, scene), touch_deg(flags, scene));
-  histogram.slip_sd = sd_of(slip_mm(flags, scene), slip_deg(flags, scene));
+  set(histogram.touch_sd, touch_mm(flags, scene), touch_deg(flags, scene));
+  set(histogram.slip_sd, slip_mm(flags, scene), slip_deg(flags, scene));
   histogram.none_weight = none_weight(flags, scene, hypotheses);
 }
 

@@ -29,7 +29,7 @@ void add_uncertainty_flags(CLI::App& command, UncertaintyFlags& flags);
 // A flag overrides its scene key. Each function throws Error naming the flag, or the scene file and
 // its key, whose value cannot be meant.
 
-/// Sets touch_sd, slip_sd and none_weight.
+/// Sets touch_sd, slip_sd and none_weight. A standard deviation that is not given stays as it is.
 void set_uncertainty(const UncertaintyFlags& flags, const Scene& scene,
                      std::span<const Hypothesis> hypotheses, HistogramOptions& histogram);
 /// Sets the motion noise; what is not given keeps the paper's values. Refuses the flags and keys

@@ -60,6 +60,10 @@ Scene::Object read_object(const Entry& entry) {
   read_keys(entry, {{"map", [&](const Entry& e) { object.map = e.file.parent_path() / e.text(); }},
                     {"label", [&](const Entry& e) { object.label = e.text(); }},
                     {"symmetry", [&](const Entry& e) { object.symmetry = e.integer(0); }},
+                    {"mirror",
+                     [&](const Entry& e) {
+                       object.mirror = e.one_of<bool>({{"true", true}, {"false", false}});
+                     }},
                     {"weight", [&](const Entry& e) {
                        object.weight =
                            e.number([](double w) { return w > 0; }, "give a number above 0");
@@ -140,25 +144,28 @@ Scene read_scene(const std::filesystem::path& path) {
     const auto at_least_0 = [](double value) { return value >= 0; };
     const auto rate = [](double value) { return value >= 0 && value < 1; };
     const auto inner = [](double value) { return value > 0 && value < 1; };
-    read_keys(root, {{"array", [&](const Entry& e) { read_array(e, scene); }},
-                     {"threshold", number(scene.threshold, at_least_0, "give a number from 0")},
-                     {"ratio", number(scene.ratio, rate, "give a number in [0, 1)")},
-                     {"gamma", number(scene.gamma, rate, "give a number in [0, 1)")},
-                     {"prior", number(scene.prior, inner, "give a number in (0, 1)")},
-                     {"objects", [&](const Entry& e) { scene.objects = read_objects(e); }},
-                     {"region", [&](const Entry& e) { scene.region = read_region(e); }},
-                     {"none", [&](const Entry& e) { read_none(e, scene); }},
-                     {"touch_sd", [&](const Entry& e) { scene.touch_sd = read_displacement(e); }},
-                     {"slip_sd", [&](const Entry& e) { scene.slip_sd = read_displacement(e); }},
-                     {"bins", [&](const Entry& e) { read_bins(e, scene); }},
-                     {"filter",
-                      [&](const Entry& e) {
-                        scene.filter = e.one_of<std::string>({{"auto", "auto"},
-                                                              {"histogram", "histogram"},
-                                                              {"bounded", "bounded"},
-                                                              {"particles", "particles"}});
-                      }},
-                     {"device", [&](const Entry& e) { scene.device = e.text(); }}});
+    read_keys(root,
+              {{"array", [&](const Entry& e) { read_array(e, scene); }},
+               {"sensor_model",
+                [&](const Entry& e) { scene.sensor_model = e.file.parent_path() / e.text(); }},
+               {"threshold", number(scene.threshold, at_least_0, "give a number from 0")},
+               {"ratio", number(scene.ratio, rate, "give a number in [0, 1)")},
+               {"gamma", number(scene.gamma, rate, "give a number in [0, 1)")},
+               {"prior", number(scene.prior, inner, "give a number in (0, 1)")},
+               {"objects", [&](const Entry& e) { scene.objects = read_objects(e); }},
+               {"region", [&](const Entry& e) { scene.region = read_region(e); }},
+               {"none", [&](const Entry& e) { read_none(e, scene); }},
+               {"touch_sd", [&](const Entry& e) { scene.touch_sd = read_displacement(e); }},
+               {"slip_sd", [&](const Entry& e) { scene.slip_sd = read_displacement(e); }},
+               {"bins", [&](const Entry& e) { read_bins(e, scene); }},
+               {"filter",
+                [&](const Entry& e) {
+                  scene.filter = e.one_of<std::string>({{"auto", "auto"},
+                                                        {"histogram", "histogram"},
+                                                        {"bounded", "bounded"},
+                                                        {"particles", "particles"}});
+                }},
+               {"device", [&](const Entry& e) { scene.device = e.text(); }}});
   } catch (const YAML::Exception& error) {
     refuse(path, "line {}: {}; correct the YAML", line_of(error.mark), error.msg);
   }

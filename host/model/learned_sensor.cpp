@@ -71,6 +71,38 @@ double FeatureDistribution::log_density(const PressFeatures& features) const {
   return nats;
 }
 
+double Familiarity::probability(double score) const {
+  return 1.0 / (1.0 + std::exp(-(offset + slope * score)));
+}
+
+void apply(const LearnedSensor& sensor, std::vector<Hypothesis>& hypotheses,
+           ContactModel& contact) {
+  sensor.validate();
+  std::vector<std::optional<OccupancyGrid>> layers(hypotheses.size());
+  std::optional<LikelihoodTable> numbers;
+  if (sensor.table) {
+    const LearnedTable& table = *sensor.table;
+    std::vector<double> of_each;
+    bool any_own = false;
+    for (std::size_t i = 0; i < hypotheses.size(); ++i) {
+      layers[i] = reading_layer(hypotheses[i].map, table.layer);
+      const auto own = table.objects.find(hypotheses[i].map.label);
+      const bool has_own = own != table.objects.end();
+      const std::vector<double>& set = has_own ? own->second : table.shared;
+      of_each.insert(of_each.end(), set.begin(), set.end());
+      any_own = any_own || has_own;
+    }
+    numbers = table_of(table, any_own ? std::move(of_each) : table.shared);
+    contact.prior.reset();
+  }
+  for (std::size_t i = 0; i < hypotheses.size(); ++i) {
+    hypotheses[i].layer = std::move(layers[i]);
+  }
+  contact.classifier = sensor.classifier;
+  contact.gamma = sensor.gamma;
+  contact.table = std::move(numbers);
+}
+
 void LearnedSensor::validate() const {
   if (pressure_unit != "kPa" && pressure_unit != "raw") {
     refuse("pressure_unit", pressure_unit, "give kPa or raw");

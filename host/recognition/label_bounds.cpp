@@ -4,17 +4,13 @@
 #include <cmath>
 #include <limits>
 
+#include "label_probability.hpp"
+
 namespace palpate {
 
 namespace {
 
 constexpr double log_zero = -std::numeric_limits<double>::infinity();
-
-/// log(exp(a) + exp(b))
-double log_sum(double a, double b) {
-  const double most = std::max(a, b);
-  return most == log_zero ? log_zero : most + std::log1p(std::exp(std::min(a, b) - most));
-}
 
 /// exp(a) / (exp(a) + exp(b)); 0 where both are 0
 double share(double a, double b) { return a == log_zero ? 0.0 : 1.0 / (1.0 + std::exp(b - a)); }
@@ -23,6 +19,7 @@ double share(double a, double b) { return a == log_zero ? 0.0 : 1.0 / (1.0 + std
 
 std::vector<ProbabilityInterval> label_bounds(const Estimate& estimate,
                                               std::span<const double> identity,
+                                              std::span<const double> features,
                                               const RecognitionTask& task) {
   const Certificate& certificate = *estimate.certificate;
   const std::vector<LogInterval>& evidence = certificate.log_evidence;
@@ -34,6 +31,10 @@ std::vector<ProbabilityInterval> label_bounds(const Estimate& estimate,
   }
   if (certificate.none_log_evidence) {
     of_label.back() = {*certificate.none_log_evidence, *certificate.none_log_evidence};
+  }
+  for (std::size_t i = 0; i < of_label.size(); ++i) {
+    of_label[i] = {tempered(of_label[i].low, features[i], task),
+                   tempered(of_label[i].high, features[i], task)};
   }
   std::vector<ProbabilityInterval> bounds;
   for (std::size_t i = 0; i < of_label.size(); ++i) {

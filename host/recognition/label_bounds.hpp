@@ -10,14 +10,16 @@ namespace palpate {
 
 /// The bounds of each label's probability, from the bounds of its hypotheses' log evidence
 /// (Certificate::log_evidence). A label is least probable where its own evidence is the lowest and
-/// all other evidence the highest:
-///   low = E_low(label) / (E_low(label) + E_high(others) + E(none)), high likewise.
-/// The evidence of "(none)" is taken as the estimate gives it.
+/// all other evidence the highest. With q of label_probabilities() for the label's evidence E:
+///   low = q(E_low) of the label / (q(E_low) of the label + q(E_high) of the others + q of none),
+/// high likewise. The evidence of "(none)" is taken as the estimate gives it.
 /// @param estimate with a certificate
 /// @param identity [label] of the estimate; lies within its bounds
+/// @param features [label] by feature_nats()
 /// @returns [label], none_label included where the task has it
 std::vector<ProbabilityInterval> label_bounds(const Estimate& estimate,
                                               std::span<const double> identity,
+                                              std::span<const double> features,
                                               const RecognitionTask& task);
 
 }  // namespace palpate

@@ -9,6 +9,7 @@
 
 #include "contradiction_warning.hpp"
 #include "label_bounds.hpp"
+#include "label_probability.hpp"
 #include "nearby_fit.hpp"
 #include "palpate/error.hpp"
 #include "palpate/pose_error.hpp"
@@ -24,6 +25,9 @@ namespace {
 std::optional<double> error_mm(const RecognitionTask& task, int object, const Pose& T_object_robot,
                                const GroundTruth& truth) {
   const OccupancyGrid& map = task.hypotheses[object].map;
+  if (task.hypotheses[object].mirrored) {
+    return {};
+  }
   const bool has_body =
       std::any_of(map.log_odds.begin(), map.log_odds.end(), [](float l) { return l > 0.0F; });
   if (!truth.T_object_robot || map.label != truth.label || !has_body) {
@@ -88,13 +92,31 @@ Updated update(Recogniser& recogniser, const RecognitionTask& task, std::span<co
   return updated;
 }
 
+/// Whether any element of any touch is In Contact.
+bool meet_an_object(std::span<const Touch> touches, const RecognitionTask& task) {
+  return std::any_of(touches.begin(), touches.end(), [&](const Touch& touch) {
+    const std::vector<Reading> readings = task.classifier().classify(touch);
+    return std::any_of(readings.begin(), readings.end(), is_contact);
+  });
+}
+
+/// RecognitionStep::known
+std::optional<double> known_of(const RecognitionStep& step, std::span<const Touch> touches,
+                               const RecognitionTask& task) {
+  if (!task.familiarity || touches.size() != 1 || !meet_an_object(touches, task) ||
+      std::holds_alternative<ParticleOptions>(task.filter)) {
+    return {};
+  }
+  const std::vector<Reading> readings = task.classifier().classify(touches.front());
+  const auto unknown = std::count(readings.begin(), readings.end(), Reading::unknown);
+  const auto known = static_cast<double>(readings.size() - static_cast<std::size_t>(unknown));
+  return task.familiarity->probability(step.mode.log_likelihood / known);
+}
+
 /// RecognitionStep::fit
 std::optional<Fit> fit_of(const RecognitionStep& step, std::span<const Touch> touches,
                           const RecognitionTask& task) {
-  if (std::none_of(touches.begin(), touches.end(), [&](const Touch& touch) {
-        const std::vector<Reading> readings = task.classifier().classify(touch);
-        return std::any_of(readings.begin(), readings.end(), is_contact);
-      })) {
+  if (!meet_an_object(touches, task)) {
     return {};
   }
   const auto object = static_cast<std::size_t>(step.mode.object);
@@ -157,21 +179,16 @@ void RecognitionRecord::require_steps() const {
 }
 
 RecognitionStep judge(const Estimate& estimate, const GroundTruth& truth,
-                      const RecognitionTask& task) {
+                      const RecognitionTask& task, std::span<const Touch> touches) {
   const std::vector<std::string>& labels = task.labels;
-  RecognitionStep step{.identity = std::vector<double>(labels.size()),
+  const std::vector<double> features = feature_nats(touches, task);
+  RecognitionStep step{.identity = label_probabilities(estimate, features, task),
                        .mode = estimate.mode,
                        .refined = {},
                        .contradicted = estimate.contradicted,
                        .truth = truth};
-  for (std::size_t i = 0; i < estimate.identity.size(); ++i) {
-    step.identity[task.label_of[i]] += estimate.identity[i];
-  }
-  if (labels.back() == none_label) {
-    step.identity.back() = estimate.none;
-  }
   if (estimate.certificate) {
-    step.identity_bounds = label_bounds(estimate, step.identity, task);
+    step.identity_bounds = label_bounds(estimate, step.identity, features, task);
     step.certificate = estimate.certificate;
   }
   step.best = static_cast<std::size_t>(
@@ -191,8 +208,9 @@ RecognitionStep take_step(Recogniser& recogniser, const RecognitionTask& task,
   const Clock::time_point start = Clock::now();
   const Estimate estimate = recogniser.estimate();
   const double seconds = updated.seconds + seconds_since(start);
-  RecognitionStep step = judge(estimate, truth, task);
+  RecognitionStep step = judge(estimate, truth, task, touches);
   step.surprise = updated.surprise;
+  step.known = recogniser.touched() ? known_of(step, touches, task) : std::nullopt;
   step.seconds = seconds;
   const Clock::time_point estimated = Clock::now();
   step.refined = recogniser.refine(step.mode);

@@ -40,7 +40,9 @@ bool array_is_still(std::span<const Unknown> unknowns);
 
 /// What the filter believes after a touch.
 struct RecognitionStep {
-  std::vector<double> identity;  ///< [label] probability, summed over the maps of the label
+  /// [label] probability, see label_probabilities(): the sum over the label's maps, after the
+  /// task's temperature and features.
+  std::vector<double> identity;
   /// [label] bounds of `identity`, proven but for "(none)", whose evidence counts as exact
   /// (Certificate::none_standard_error). Empty where `identity` is exact, and for particles.
   std::vector<ProbabilityInterval> identity_bounds = {};
@@ -54,7 +56,8 @@ struct RecognitionStep {
   /// has the true label.
   std::optional<bool> right;
   /// Pose error of the mode, mm; see pose_error_mm(). Only where the true pose is known and the
-  /// mode's map has the true label, as in Sec. IV.
+  /// mode's map has the true label, as in Sec. IV, and is no mirror image: the true pose is that of
+  /// the object as it was learned.
   std::optional<double> error_mm;
   std::optional<double> refined_error_mm;       ///< pose error of the refined pose, mm
   std::optional<double> effective_sample_size;  ///< of the particles; empty for a histogram
@@ -68,6 +71,10 @@ struct RecognitionStep {
   /// `--each-frame`), before which there is no belief but the prior. By bounds over more than
   /// most_balanced_bins in all also where several touches come at once.
   std::optional<double> surprise;
+  /// Probability that the object was learned, where the task has a Familiarity and the unknown is a
+  /// single touch with an element in contact. Empty for particles, whose mode has no
+  /// log-likelihood of the touch.
+  std::optional<double> known = {};
   std::vector<std::string> warnings;  ///< what looks wrong with the touches, in whole sentences
   double seconds = 0.0;               ///< wall time from the touch to the estimate
   double refine_seconds = 0.0;        ///< wall time of the refined pose
@@ -104,8 +111,9 @@ struct RecognitionRecord {
 };
 
 /// Sums an estimate by label and compares it with the truth, as far as the truth is known.
+/// @param touches of the unknown so far, for the task's features
 RecognitionStep judge(const Estimate& estimate, const GroundTruth& truth,
-                      const RecognitionTask& task);
+                      const RecognitionTask& task, std::span<const Touch> touches = {});
 
 /// Updates the belief with the touches from `used` on, then judges the estimate and its refined
 /// pose. Of these touches a histogram takes the last three one by one, to measure their surprise;

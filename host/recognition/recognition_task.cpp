@@ -106,6 +106,14 @@ std::optional<CoarsenedBins> settle_bins(const Device& device, RecognitionTask& 
   return chosen.coarsened ? std::optional(CoarsenedBins{chosen.step_mm, most}) : std::nullopt;
 }
 
+void settle_evidence(RecognitionTask& task) {
+  constexpr double share = 0.05;
+  auto* bounded = std::get_if<BoundedOptions>(&task.filter);
+  if (bounded != nullptr && task.temperature > 1.0 && !bounded->evidence_nats) {
+    bounded->evidence_nats = share * task.temperature;
+  }
+}
+
 void settle_filter(RecognitionTask& task) {
   const auto* histogram = std::get_if<HistogramOptions>(&task.filter);
   if (!task.auto_filter || histogram == nullptr || task.bins_in_all() <= most_histogram_bins ||

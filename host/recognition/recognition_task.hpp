@@ -10,6 +10,7 @@
 #include "palpate/balanced_lattice.hpp"
 #include "palpate/bounded_posterior.hpp"
 #include "palpate/device.hpp"
+#include "palpate/learned_sensor.hpp"
 #include "palpate/particle_filter.hpp"
 #include "palpate/pose_histogram.hpp"
 
@@ -52,6 +53,10 @@ struct RecognitionTask {
   std::string filter_asked_for_by = {};
   /// The pivot is the array's centre at the first touch of each unknown with an element In Contact.
   bool auto_pivot = false;
+  /// Of labels' probabilities, see label_probabilities(); poses are left as they are. Above 0.
+  double temperature = 1.0;
+  std::optional<LearnedFeatures> features = {};
+  std::optional<Familiarity> familiarity = {};
 };
 
 /// Most bins, of all objects together, for which `auto` takes the histogram: up to here it answers
@@ -79,6 +84,12 @@ struct CoarsenedBins {
 /// @returns the bins if they had to be coarsened
 /// @throws Error as balanced_lattice() does
 std::optional<CoarsenedBins> settle_bins(const Device& device, RecognitionTask& task);
+
+/// With a temperature above 1 also improbable labels get a share, which needs their evidence: has
+/// bounds find each log evidence within 0.05 times the temperature, so that no probability is off
+/// by more than about 10 %, unless BoundedOptions::evidence_nats says how closely. The filter is
+/// settled before.
+void settle_evidence(RecognitionTask& task);
 
 /// Chooses the filter if the task leaves it to this rule (auto_filter): of more than
 /// most_histogram_bins bins in all, bounds take the place of the histogram, unless

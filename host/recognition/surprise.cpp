@@ -33,7 +33,7 @@ std::optional<double> surprise_of(const Touch& touch, std::span<const PoseSample
   const DisplacementSd touch_sd = task.touch_sd();
   const DisplacementSd slip_sd = task.slip_sd();
   ContactModel contact = task.contact();
-  contact.prior = contact.prior.value_or(task.hypotheses.front().map.prior);
+  contact.prior = contact.prior.value_or(task.hypotheses.front().compared().prior);
   std::vector<glm::dvec2> elements_mm;
   std::vector<Reading> readings;
   const std::vector<Reading> classes = contact.classify(touch);

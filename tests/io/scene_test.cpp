@@ -28,12 +28,13 @@ class SceneFile : public testing::Test {
 TEST_F(SceneFile, SaysAllThatItCan) {
   const Scene scene = read(R"(
 array: digitacts
+sensor_model: s.yaml
 threshold: 2.5
 ratio: 0.25
 gamma: 0.05
 prior: 0.15
 objects:
-  - {map: A.map.h5, label: A, symmetry: 0, weight: 2}
+  - {map: A.map.h5, label: A, symmetry: 0, mirror: true, weight: 2}
   - {map: /maps/E.map.h5}
 region: {x_mm: [-10, 20], y_mm: [-1, 1], theta_deg: [0, 90], pivot_mm: [400, -5]}
 bins: [25, 24, 16]
@@ -44,6 +45,7 @@ slip_sd: {deg: 0.5}
 none: auto
 )");
   EXPECT_EQ(scene.array_mm, digitacts_array());
+  EXPECT_EQ(scene.sensor_model, folder_ / "s.yaml");
   EXPECT_EQ(scene.threshold, 2.5);
   EXPECT_EQ(scene.ratio, 0.25);
   EXPECT_EQ(scene.gamma, 0.05);
@@ -52,10 +54,12 @@ none: auto
   EXPECT_EQ(scene.objects[0].map, folder_ / "A.map.h5");
   EXPECT_EQ(scene.objects[0].label, "A");
   EXPECT_EQ(scene.objects[0].symmetry, 0);
+  EXPECT_EQ(scene.objects[0].mirror, true);
   EXPECT_EQ(scene.objects[0].weight, 2.0);
   EXPECT_EQ(scene.objects[1].map, "/maps/E.map.h5");
   EXPECT_FALSE(scene.objects[1].label);
   EXPECT_FALSE(scene.objects[1].symmetry);
+  EXPECT_FALSE(scene.objects[1].mirror);
   EXPECT_EQ(scene.objects[1].weight, 1.0);
   EXPECT_EQ(scene.region.x_mm, (std::array{-10.0, 20.0}));
   EXPECT_EQ(scene.region.y_mm, (std::array{-1.0, 1.0}));
@@ -156,6 +160,8 @@ TEST_F(SceneFile, NamesValuesThatItCannotTake) {
            {"objects: [{map: A.h5, symmetry: -1}]", "symmetry"},
            {"objects: [{map: A.h5, symmetry: 1.5}]", "symmetry"},
            {"objects: [{map: A.h5, weight: 0}]", "weight"},
+           {"objects: [{map: A.h5, mirror: 1}]", "mirror"},
+           {"sensor_model: [s.yaml]", "sensor_model"},
            {"objects: [{map: A.h5, label: ''}]", "label"},
            {"region: 10", "region"},
            {"region: {x_mm: [10, -10]}", "x_mm"},

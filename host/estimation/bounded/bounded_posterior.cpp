@@ -333,7 +333,10 @@ Estimate BoundedPosterior::estimate() const {
   if (posterior.none) {
     estimate.none = estimate.identity.back();
     estimate.identity.pop_back();
+    estimate.none_log_evidence = none;
+    logs.pop_back();
   }
+  estimate.log_evidence = std::move(logs);
   // Where nothing is known, an interval ends at 0 or 1.
   const auto probability = [](double own, double others) {
     const double p = 1.0 / (1.0 + std::exp(others - own));

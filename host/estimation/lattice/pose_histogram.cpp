@@ -135,12 +135,15 @@ struct PoseHistogram::Impl {
     return log_evidence;
   }
 
+  /// The same of "none of these", where the options ask for it.
+  double none_log_evidence() const { return *none_log_weight + by_touch->none_log_evidence(); }
+
   /// Eq. 14: an object's evidence over the sum for all objects and, where the options ask for it,
   /// "none of these", which stands last.
   std::vector<double> identity() {
     std::vector<double> evidence = log_evidence();
     if (none_log_weight) {
-      evidence.push_back(*none_log_weight + by_touch->none_log_evidence());
+      evidence.push_back(none_log_evidence());
     }
     return normalised(std::move(evidence));
   }
@@ -277,11 +280,13 @@ void PoseHistogram::prepare(const Touch& touch) {
 Estimate PoseHistogram::estimate() const {
   Impl& histogram = whole();
   Estimate estimate{.identity = histogram.identity(),
+                    .log_evidence = histogram.log_evidence(),
                     .mode = histogram.mode(),
                     .contradicted = histogram.contradicted()};
   if (histogram.none_log_weight) {
     estimate.none = estimate.identity.back();
     estimate.identity.pop_back();
+    estimate.none_log_evidence = histogram.none_log_evidence();
   }
   return estimate;
 }

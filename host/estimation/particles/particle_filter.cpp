@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include <fmt/format.h>
 
@@ -155,23 +156,48 @@ struct ParticleFilter::Impl {
                  evidence.from_pivot_mm.size());
   }
 
-  /// Particles as the device keeps them, about the region's centre, and weights that sum to 1.
-  std::vector<shaders::Particle> download(std::vector<double>& weights) {
-    std::vector<shaders::Particle> states(size());
+  struct Weighed {
+    std::vector<shaders::Particle> states;  ///< as the device keeps them, about the region's centre
+    std::vector<double> log_weights = {};   ///< relative to the largest, in nats
+    std::vector<double> weights = {};       ///< sum to 1
+  };
+
+  Weighed download() {
+    Weighed found{.states = std::vector<shaders::Particle>(size())};
     std::vector<TwoFloat> logs(size());
-    stream.download(particles, states);
+    stream.download(particles, found.states);
     stream.download(log_weights, logs);
     stream.run();
-    weights.clear();
     double total = 0.0;
     for (const TwoFloat& log_weight : logs) {
-      weights.push_back(std::exp(log_weight.value() - summary.log_largest));
-      total += weights.back();
+      found.log_weights.push_back(log_weight.value() - summary.log_largest);
+      found.weights.push_back(std::exp(found.log_weights.back()));
+      total += found.weights.back();
     }
-    for (double& weight : weights) {
+    for (double& weight : found.weights) {
       weight /= total;
     }
-    return states;
+    return found;
+  }
+
+  /// Log of the summed weights of every object's particles, which may be far below what exp() can
+  /// tell from 0; -infinity where an object has no particle.
+  std::vector<double> log_sums(const Weighed& found) const {
+    constexpr double nothing = -std::numeric_limits<double>::infinity();
+    std::vector<double> most(objects, nothing);
+    for (std::size_t i = 0; i < found.states.size(); ++i) {
+      double& of_object = most[found.states[i].object];
+      of_object = std::max(of_object, found.log_weights[i]);
+    }
+    std::vector<double> logs(objects);
+    for (std::size_t i = 0; i < found.states.size(); ++i) {
+      const shaders::uint object = found.states[i].object;
+      logs[object] += std::exp(found.log_weights[i] - most[object]);
+    }
+    for (std::size_t object = 0; object < objects; ++object) {
+      logs[object] = most[object] == nothing ? nothing : most[object] + std::log(logs[object]);
+    }
+    return logs;
   }
 
   Pose T_object_robot(double x_mm, double y_mm, double theta_rad) const {
@@ -267,13 +293,14 @@ void ParticleFilter::update(std::span<const Touch> touches,
 
 Estimate ParticleFilter::estimate() const {
   Impl& filter = whole();
-  std::vector<double> weights;
-  const std::vector<shaders::Particle> particles = filter.download(weights);
-  Estimate estimate{.identity = std::vector<double>(filter.objects), .mode = {}};
-  for (std::size_t i = 0; i < particles.size(); ++i) {
-    estimate.identity[particles[i].object] += weights[i];
+  const Impl::Weighed weighed = filter.download();
+  Estimate estimate{.identity = std::vector<double>(filter.objects),
+                    .log_evidence = filter.log_sums(weighed),
+                    .mode = {}};
+  for (std::size_t i = 0; i < weighed.states.size(); ++i) {
+    estimate.identity[weighed.states[i].object] += weighed.weights[i];
   }
-  const ParzenMaximum maximum = filter.parzen.find(particles, weights);
+  const ParzenMaximum maximum = filter.parzen.find(weighed.states, weighed.weights);
   estimate.mode.object = static_cast<int>(maximum.object);
   estimate.mode.T_object_robot =
       filter.T_object_robot(maximum.x_mm, maximum.y_mm, maximum.theta_rad);
@@ -291,14 +318,14 @@ double ParticleFilter::effective_sample_size() const {
 
 std::vector<ParticleFilter::Particle> ParticleFilter::particles() const {
   Impl& filter = whole();
-  std::vector<double> weights;
+  const Impl::Weighed weighed = filter.download();
   std::vector<Particle> particles;
-  const std::vector<shaders::Particle> states = filter.download(weights);
-  for (std::size_t i = 0; i < states.size(); ++i) {
-    particles.push_back({.object = static_cast<int>(states[i].object),
-                         .T_object_robot = filter.T_object_robot(states[i].x_mm, states[i].y_mm,
-                                                                 states[i].theta_rad),
-                         .weight = weights[i]});
+  for (std::size_t i = 0; i < weighed.states.size(); ++i) {
+    const shaders::Particle& state = weighed.states[i];
+    particles.push_back(
+        {.object = static_cast<int>(state.object),
+         .T_object_robot = filter.T_object_robot(state.x_mm, state.y_mm, state.theta_rad),
+         .weight = weighed.weights[i]});
   }
   return particles;
 }

@@ -25,6 +25,11 @@ struct Hypothesis {
   const OccupancyGrid& compared() const { return layer ? *layer : map; }
 };
 
+/// Puts behind every hypothesis whose map has `mirror` its mirror image, Hypothesis::mirrored, and
+/// gives each of the two half the weight. To be called once, before apply() of a sensor model: no
+/// filter looks at `mirror`.
+void add_mirror_images(std::vector<Hypothesis>& hypotheses);
+
 /// Index of the first hypothesis whose map's prior differs from the first map's; none where all
 /// agree. Maps recognised together share one prior, unless the contact model says which one to use.
 std::optional<std::size_t> differing_prior(std::span<const Hypothesis> hypotheses);
@@ -84,6 +89,13 @@ struct Estimate {
   std::vector<ProbabilityInterval> identity_bounds = {};
   std::optional<Certificate> certificate = {};  ///< from a filter that knows bounds
   double none = 0.0;  ///< probability of "none of these", where the options ask for it
+  /// Log of each hypothesis's prior weight times its summed likelihood, in nats, but for a constant
+  /// that all share: `identity` is their share. Exact where a probability is too small for a
+  /// number. By bounds the evidence of the evaluated bins. -infinity where a bounded search
+  /// evaluated no bin, or no particle is left of the hypothesis.
+  std::vector<double> log_evidence = {};
+  /// The same of "none of these", where the options ask for it.
+  std::optional<double> none_log_evidence = {};
   Mode mode;
   /// True where a map that holds only the prior explains the touches better, by more than 700 nats,
   /// than the best bin of any object (particle filter: than the best particle of each touch). The

@@ -10,6 +10,7 @@
 #include "palpate/contact.hpp"
 #include "palpate/contact_model.hpp"
 #include "palpate/displacement.hpp"
+#include "palpate/estimate.hpp"
 #include "palpate/reading_layer.hpp"
 #include "palpate/touch.hpp"
 
@@ -64,6 +65,9 @@ struct LearnedFeatures {
 struct Familiarity {
   double offset = 0.0;
   double slope = 0.0;
+
+  /// The probability that the object was learned, from a score in nats per known element.
+  double probability(double score) const;
 };
 
 /// What `palpate calibrate` learned about a sensor and the objects that it touched.
@@ -85,6 +89,14 @@ struct LearnedSensor {
   /// Throws Error on a value out of range.
   void validate() const;
 };
+
+/// Gives the contact model the sensor's classifier, gamma and table, and each hypothesis the layer
+/// that the table is over. The table has one set of numbers where no hypothesis's label has numbers
+/// of its own, or else a set for each hypothesis, so the hypotheses must keep their order. The
+/// prior of a contact model with a table is unset: it is that of the layers. Without a table,
+/// readings are compared with the maps by Eq. 7, and the prior stays as it is.
+/// @throws Error on a sensor out of range, or as reading_layer() does; nothing changes then
+void apply(const LearnedSensor& sensor, std::vector<Hypothesis>& hypotheses, ContactModel& contact);
 
 /// Read or write a sensor model, a YAML file.
 /// @throws Error (Fault::input) naming the file, key and remedy; writing as write_map() does

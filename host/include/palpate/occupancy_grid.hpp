@@ -47,7 +47,7 @@ struct OccupancyGrid {
   /// Pose errors and filters go by `symmetry` alone.
   std::optional<int> suggested_symmetry = {};
   /// The object may lie on its other side: its mirror image, x to -x, is an object of its own under
-  /// the same label.
+  /// the same label; see add_mirror_images().
   bool mirror = false;
   int nx = 0;
   int ny = 0;
@@ -62,6 +62,9 @@ struct OccupancyGrid {
   glm::dvec2 centre_mm(int i, int j) const { return origin_mm + cell_mm * glm::dvec2(i, j); }
   double prior_log_odds() const { return log_odds_from_probability(prior); }
 };
+
+/// The map's mirror image, x to -x, with its observations and mean levels.
+OccupancyGrid mirror_image(const OccupancyGrid& map);
 
 /// Returns why a map is not sound, as one line of text that names the field, its value and the
 /// remedy; none where the map is sound. A sound map has nx * ny log odds, at most `most_cells` of

@@ -13,11 +13,12 @@ namespace palpate {
 /// Contents of a scene file; a key that the file leaves out is empty here. A flag of the command
 /// line overrides its key.
 struct Scene {
-  /// An object to recognise. Its label and symmetry, where given, override the map's own.
+  /// An object to recognise. Its label, symmetry and mirror, where given, override the map's own.
   struct Object {
     std::filesystem::path map;
     std::optional<std::string> label;
     std::optional<int> symmetry;  ///< n-fold; 0 = full
+    std::optional<bool> mirror;   ///< OccupancyGrid::mirror
     double weight = 1.0;          ///< prior weight, relative to the other objects'
   };
 
@@ -36,12 +37,13 @@ struct Scene {
     std::optional<double> deg;
   };
 
-  std::optional<std::vector<glm::dvec2>> array_mm;  ///< element centres in the sensor frame
-  std::optional<std::filesystem::path> array_file;  ///< file of `array_mm`, if any
-  std::optional<double> threshold;                  ///< in the recording's pressure unit
-  std::optional<double> ratio;                      ///< of Eq. 3
-  std::optional<double> gamma;                      ///< of Eq. 7
-  std::optional<double> prior;                      ///< p(m) of Eq. 7
+  std::optional<std::vector<glm::dvec2>> array_mm;    ///< element centres in the sensor frame
+  std::optional<std::filesystem::path> array_file;    ///< file of `array_mm`, if any
+  std::optional<std::filesystem::path> sensor_model;  ///< file of a LearnedSensor
+  std::optional<double> threshold;                    ///< in the recording's pressure unit
+  std::optional<double> ratio;                        ///< of Eq. 3
+  std::optional<double> gamma;                        ///< of Eq. 7
+  std::optional<double> prior;                        ///< p(m) of Eq. 7
   std::vector<Object> objects;
   Region region;
   std::optional<double> none;              ///< prior weight of "none of these"

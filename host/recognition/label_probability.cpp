@@ -1,0 +1,80 @@
+#include "label_probability.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace palpate {
+
+namespace {
+
+constexpr double log_zero = -std::numeric_limits<double>::infinity();
+
+}  // namespace
+
+double log_sum(double a, double b) {
+  const double most = std::max(a, b);
+  return most == log_zero ? log_zero : most + std::log1p(std::exp(std::min(a, b) - most));
+}
+
+std::vector<double> feature_nats(std::span<const Touch> touches, const RecognitionTask& task) {
+  std::vector<double> nats(task.labels.size());
+  if (!task.features) {
+    return nats;
+  }
+  const LearnedFeatures& learned = *task.features;
+  for (const Touch& touch : touches) {
+    const PressFeatures features = press_features(touch, task.classifier());
+    if (features.values[0] == 0.0) {  // the log of 1 + no element
+      continue;
+    }
+    const double of_any = learned.any.log_density(features);
+    for (std::size_t i = 0; i < nats.size(); ++i) {
+      if (const auto own = learned.objects.find(task.labels[i]); own != learned.objects.end()) {
+        nats[i] += learned.weight * (own->second.log_density(features) - of_any);
+      }
+    }
+  }
+  return nats;
+}
+
+std::vector<double> sums_by_label(const Estimate& estimate, const RecognitionTask& task) {
+  std::vector<double> sums(task.labels.size());
+  for (std::size_t i = 0; i < estimate.identity.size(); ++i) {
+    sums[task.label_of[i]] += estimate.identity[i];
+  }
+  if (task.labels.back() == none_label) {
+    sums.back() = estimate.none;
+  }
+  return sums;
+}
+
+std::vector<double> label_probabilities(const Estimate& estimate, std::span<const double> features,
+                                        const RecognitionTask& task) {
+  if (task.temperature == 1.0 && !task.features) {
+    return sums_by_label(estimate, task);
+  }
+  std::vector<double> logs(task.labels.size(), log_zero);
+  for (std::size_t i = 0; i < estimate.log_evidence.size(); ++i) {
+    double& sum = logs[task.label_of[i]];
+    sum = log_sum(sum, estimate.log_evidence[i]);
+  }
+  if (estimate.none_log_evidence) {
+    logs.back() = *estimate.none_log_evidence;
+  }
+  for (std::size_t i = 0; i < logs.size(); ++i) {
+    logs[i] = tempered(logs[i], features[i], task);
+  }
+  const double most = *std::max_element(logs.begin(), logs.end());
+  double total = 0.0;
+  for (double& p : logs) {
+    p = std::exp(p - most);
+    total += p;
+  }
+  for (double& p : logs) {
+    p /= total;
+  }
+  return logs;
+}
+
+}  // namespace palpate

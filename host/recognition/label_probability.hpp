@@ -1,0 +1,38 @@
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "palpate/estimate.hpp"
+#include "palpate/touch.hpp"
+#include "recognition_task.hpp"
+
+namespace palpate {
+
+/// What the presses' features say for every label, in nats: the features' weight times the sum over
+/// the touches of the log density by the label's distribution above that by the distribution of any
+/// object. Only touches with an element In Contact count. 0 for none_label, whose presses are those
+/// of any object, and for all where the task has no features.
+/// @throws Error on a touch that is not sound, or features beside a threshold of 0
+std::vector<double> feature_nats(std::span<const Touch> touches, const RecognitionTask& task);
+
+/// log(E of the label)^(1 / temperature) times exp(features), but for a constant.
+/// @param log_evidence log E, E being the sum over the label's maps of weight times evidence
+inline double tempered(double log_evidence, double features, const RecognitionTask& task) {
+  return log_evidence / task.temperature + features;
+}
+
+/// The sums of Estimate::identity over the maps of every label, [label]: the probabilities at
+/// temperature 1 and without features.
+std::vector<double> sums_by_label(const Estimate& estimate, const RecognitionTask& task);
+
+/// The probability of every label: E^(1 / temperature) exp(features), normalised; by
+/// sums_by_label() where nothing changes them.
+/// @param features [label] by feature_nats()
+std::vector<double> label_probabilities(const Estimate& estimate, std::span<const double> features,
+                                        const RecognitionTask& task);
+
+/// log(exp(a) + exp(b))
+double log_sum(double a, double b);
+
+}  // namespace palpate

@@ -1,0 +1,173 @@
+// Temperature and press features, with numbers that were worked out by hand.
+
+#include "label_probability.hpp"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+
+#include "palpate/error.hpp"
+#include "recognition_record.hpp"
+#include "shapes.hpp"
+
+namespace palpate {
+namespace {
+
+/// Maps of L, disc and L again.
+RecognitionTask three_maps(const FilterOptions& filter = HistogramOptions{}) {
+  std::vector<Hypothesis> maps = shapes();
+  maps.push_back(maps[0]);
+  return {maps, filter};
+}
+
+/// Evidence of 3 and 1 of the maps of L, of 1 of the disc.
+Estimate four_to_one() {
+  return {.identity = {0.6, 0.2, 0.2}, .log_evidence = {std::log(3.0), 0.0, 0.0}};
+}
+
+/// A press of two elements in contact of three, with features log 3, log 8 and log 6.
+class Press {
+ public:
+  Touch touch() const {
+    return {.T_robot_sensor = {}, .elements_mm = elements_mm_, .pressure = pressure_};
+  }
+  static constexpr std::array<double, 3> of_one{3.0, 8.0, 6.0};
+
+ private:
+  std::vector<glm::dvec2> elements_mm_ = std::vector<glm::dvec2>(3);
+  std::vector<double> pressure_{10.0, 0.0, 4.0};
+};
+
+/// Any object's features are about 0, and the letter's about those of the press.
+LearnedFeatures features_of_the_letter() {
+  FeatureDistribution any{.mean = {0.0, 0.0, 0.0}, .sd = {1.0, 1.0, 1.0}};
+  FeatureDistribution letter = any;
+  for (std::size_t i = 0; i < 3; ++i) {
+    letter.mean[i] = std::log(Press::of_one[i]);
+  }
+  return {.weight = 0.5, .any = any, .objects = {{"L", letter}}};
+}
+
+/// What one press says for the letter: half of half the squared distance to any object's mean.
+double nats_of_one_press() {
+  double squares = 0.0;
+  for (const double one : Press::of_one) {
+    squares += std::log(one) * std::log(one);
+  }
+  return 0.5 * 0.5 * squares;
+}
+
+TEST(LabelProbability, IsTheSumOfTheMapsAtTemperatureOne) {
+  EXPECT_EQ(judge(four_to_one(), {}, three_maps()).identity, (std::vector<double>{0.8, 0.2}));
+}
+
+TEST(LabelProbability, IsTheRootOfTheEvidenceAtTemperatureTwo) {
+  RecognitionTask task = three_maps();
+  task.temperature = 2.0;
+  const RecognitionStep step = judge(four_to_one(), {}, task);
+  // Evidence 4 and 1.
+  EXPECT_NEAR(step.identity[0], 2.0 / 3.0, 1e-15);
+  EXPECT_NEAR(step.identity[1], 1.0 / 3.0, 1e-15);
+  EXPECT_EQ(step.best, 0u);
+}
+
+TEST(LabelProbability, TempersNoneOfTheseToo) {
+  RecognitionTask task = three_maps(HistogramOptions{.none_weight = 1.0});
+  task.temperature = 2.0;
+  Estimate estimate = four_to_one();
+  estimate.none_log_evidence = std::log(9.0);
+  const RecognitionStep step = judge(estimate, {}, task);
+  EXPECT_NEAR(step.identity[0], 2.0 / 6.0, 1e-15);
+  EXPECT_NEAR(step.identity[1], 1.0 / 6.0, 1e-15);
+  EXPECT_NEAR(step.identity[2], 3.0 / 6.0, 1e-15);
+  EXPECT_EQ(task.labels[step.best], none_label);
+}
+
+TEST(LabelProbability, ReachesEvidenceBelowEveryNumber) {
+  RecognitionTask task = three_maps();
+  task.temperature = 1000.0;
+  const Estimate estimate{.identity = {1.0, 0.0, 0.0}, .log_evidence = {0.0, -2000.0, -9000.0}};
+  const RecognitionStep step = judge(estimate, {}, task);
+  EXPECT_NEAR(step.identity[1] / step.identity[0], std::exp(-2.0), 1e-14);
+}
+
+TEST(LabelProbability, AddsWhatEveryPressSaysAfterTheTemperature) {
+  RecognitionTask task = three_maps(HistogramOptions{.none_weight = 1.0});
+  task.temperature = 2.0;
+  task.features = features_of_the_letter();
+  Estimate estimate = four_to_one();
+  estimate.none_log_evidence = 0.0;
+  const Press press;
+  const std::vector<Touch> two{press.touch(), press.touch()};
+  const RecognitionStep step = judge(estimate, {}, task, two);
+  const double of_letter = 2.0 * std::exp(2.0 * nats_of_one_press());
+  EXPECT_NEAR(step.identity[0], of_letter / (of_letter + 1.0 + 1.0), 1e-14);
+  EXPECT_NEAR(step.identity[1], 1.0 / (of_letter + 1.0 + 1.0), 1e-14) << "as any object";
+  EXPECT_NEAR(step.identity[2], step.identity[1], 1e-15) << "as any object";
+}
+
+TEST(LabelProbability, MayTurnTheMostProbableLabelAround) {
+  RecognitionTask task = three_maps();
+  task.features = features_of_the_letter();
+  const Estimate estimate{.identity = {0.1, 0.9, 0.0},
+                          .log_evidence = {std::log(0.1), std::log(0.9), -1e9}};
+  const Press press;
+  const std::vector<Touch> touches{press.touch()};
+  const RecognitionStep step = judge(estimate, {.label = "L"}, task, touches);
+  ASSERT_GT(std::exp(nats_of_one_press()), 9.0 / 2.0);
+  const double odds = std::exp(nats_of_one_press()) / 9.0;
+  EXPECT_NEAR(step.identity[0] / step.identity[1], odds, 1e-14);
+  EXPECT_EQ(step.best, odds > 1.0 ? 0u : 1u);
+}
+
+TEST(LabelProbability, PassesOverTouchesWithoutContact) {
+  RecognitionTask task = three_maps();
+  task.features = features_of_the_letter();
+  const std::vector<glm::dvec2> elements_mm(2);
+  const std::vector<double> pressure{0.0, 0.5};
+  const Touch touch{.T_robot_sensor = {}, .elements_mm = elements_mm, .pressure = pressure};
+  EXPECT_EQ(feature_nats(std::span(&touch, 1), task), std::vector<double>(2));
+}
+
+TEST(LabelBounds, FollowTheTemperatureAndTheFeatures) {
+  RecognitionTask task = three_maps(BoundedOptions{});
+  task.temperature = 2.0;
+  Estimate estimate = four_to_one();
+  // Evidence of L within 4 to 9, of the disc within 1 to 4.
+  estimate.certificate = Certificate{
+      .log_evidence = {{std::log(3.0), std::log(8.0)}, {0.0, std::log(4.0)}, {0.0, 0.0}}};
+  const RecognitionStep step = judge(estimate, {}, task);
+  ASSERT_EQ(step.identity_bounds.size(), 2u);
+  EXPECT_NEAR(step.identity_bounds[0].low, 2.0 / (2.0 + 2.0), 1e-15);
+  EXPECT_NEAR(step.identity_bounds[0].high, 3.0 / (3.0 + 1.0), 1e-15);
+  EXPECT_NEAR(step.identity_bounds[1].low, 1.0 / (1.0 + 3.0), 1e-15);
+  EXPECT_NEAR(step.identity_bounds[1].high, 2.0 / (2.0 + 2.0), 1e-15);
+
+  task.features = features_of_the_letter();
+  const Press press;
+  const std::vector<Touch> touches{press.touch()};
+  const RecognitionStep with = judge(estimate, {}, task, touches);
+  const double times = std::exp(nats_of_one_press());
+  EXPECT_NEAR(with.identity_bounds[0].low, 2.0 * times / (2.0 * times + 2.0), 1e-14);
+  EXPECT_NEAR(with.identity_bounds[1].high, 2.0 / (2.0 + 2.0 * times), 1e-14);
+}
+
+TEST(SettleEvidence, HasBoundsFindTheEvidenceThatATemperatureNeeds) {
+  RecognitionTask task = three_maps(BoundedOptions{});
+  settle_evidence(task);
+  EXPECT_FALSE(std::get<BoundedOptions>(task.filter).evidence_nats) << "at temperature 1";
+  task.temperature = 30.0;
+  settle_evidence(task);
+  EXPECT_EQ(std::get<BoundedOptions>(task.filter).evidence_nats, 0.05 * 30.0);
+  std::get<BoundedOptions>(task.filter).evidence_nats = 0.1;
+  settle_evidence(task);
+  EXPECT_EQ(std::get<BoundedOptions>(task.filter).evidence_nats, 0.1) << "as given";
+  RecognitionTask dense = three_maps();
+  dense.temperature = 30.0;
+  settle_evidence(dense);
+  EXPECT_TRUE(std::holds_alternative<HistogramOptions>(dense.filter));
+}
+
+}  // namespace
+}  // namespace palpate
