@@ -16,7 +16,7 @@ std::string draw_reliability(const ReliabilityFigure& figure) {
   Chart chart{.title = "confidence and accuracy; numbers count records, bars are 95 % intervals",
               .x = axis("mean probability of the best label"),
               .y = axis("share of records that are right")};
-  chart.series.push_back({.name = "as sure as right",
+  chart.series.push_back({.name = "confidence = accuracy",
                           .colour = comparison_grey,
                           .mark = Mark::none,
                           .line = Line::dotted,
@@ -25,8 +25,7 @@ std::string draw_reliability(const ReliabilityFigure& figure) {
   for (std::size_t k = 0; k < figure.curves.size(); ++k) {
     ChartSeries series{.name = figure.curves[k].name,
                        .colour = palpate::series(k),
-                       .mark = marks[k % marks.size()],
-                       .line = Line::solid};
+                       .mark = marks[k % marks.size()]};
     for (const ReliabilityFigure::Point& point : figure.curves[k].points) {
       series.points.push_back({.x = point.confidence,
                                .y = point.accuracy,
