@@ -74,18 +74,6 @@ double quantile(std::span<const double> values, double fraction) {
   return sorted[static_cast<std::size_t>(std::max(rank, 1.0)) - 1];
 }
 
-Interval wilson_interval(double successes, int trials) {
-  constexpr double z = z_975;
-  const double n = trials;
-  const double p = successes / n;
-  const double centre = (p + z * z / (2.0 * n)) / (1.0 + z * z / n);
-  const double half_width =
-      z / (1.0 + z * z / n) * std::sqrt(p * (1.0 - p) / n + z * z / (4.0 * n * n));
-  // Rounding must not leave the ends at 0 and 1 outside.
-  return {successes == 0 ? 0.0 : centre - half_width,
-          successes == trials ? 1.0 : centre + half_width};
-}
-
 double mean(std::span<const double> values) {
   return std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
 }
@@ -107,19 +95,9 @@ Interval mean_interval(std::span<const double> values) {
   return {centre - half_width, centre + half_width};
 }
 
-double told_apart(std::span<const double> lower, std::span<const double> higher) {
-  double apart = 0.0;
-  for (const double low : lower) {
-    for (const double high : higher) {
-      apart += low < high ? 1.0 : low == high ? 0.5 : 0.0;
-    }
-  }
-  return apart / static_cast<double>(lower.size() * higher.size());
-}
-
 Interval told_apart_interval(std::span<const double> lower, std::span<const double> higher) {
-  const auto rarer = static_cast<int>(std::min(lower.size(), higher.size()));
-  return wilson_interval(told_apart(lower, higher) * rarer, rarer);
+  const std::size_t rarer = std::min(lower.size(), higher.size());
+  return wilson_interval(told_apart(lower, higher) * static_cast<double>(rarer), rarer);
 }
 
 std::uint64_t resident_bytes() { return status_bytes("VmRSS:"); }

@@ -5,7 +5,13 @@
 #include <span>
 #include <vector>
 
+#include "proportion.hpp"
+
 namespace palpate::bench {
+
+using palpate::Interval;
+using palpate::told_apart;
+using palpate::wilson_interval;
 
 /// Seconds that the call takes.
 double seconds_of(const std::function<void()>& call);
@@ -22,14 +28,6 @@ double median(std::span<const double> values);
 /// The smallest value that at least this fraction of the values does not exceed.
 double quantile(std::span<const double> values, double fraction);
 
-struct Interval {
-  double low = 0.0;
-  double high = 0.0;
-};
-/// The 95 % score interval of a probability of which `successes` of `trials` are known (Wilson
-/// 1927). Unlike the normal approximation's it is not empty where all or none succeed.
-/// trials > 0; `successes` may be a fraction, of an estimate that varies no more than a binomial's.
-Interval wilson_interval(double successes, int trials);
 /// Of at least one value.
 double mean(std::span<const double> values);
 /// Of the mean of at least two values.
@@ -37,9 +35,6 @@ double standard_error(std::span<const double> values);
 /// The 95 % interval of the mean of what at least three values are drawn from, by Student's t.
 Interval mean_interval(std::span<const double> values);
 
-/// Of all pairs of a value of one kind and one of the other, the fraction in which the value of
-/// `lower` is the lower one (the area under the ROC curve); a tie counts half. Neither is empty.
-double told_apart(std::span<const double> lower, std::span<const double> higher);
 /// The 95 % interval of told_apart(): Wilson's, for as many trials as there are values of the rarer
 /// kind. The estimate varies no more than that (van Dantzig 1951).
 Interval told_apart_interval(std::span<const double> lower, std::span<const double> higher);

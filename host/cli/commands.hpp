@@ -16,6 +16,7 @@ void add_simulate(CLI::App& app);
 void add_map(CLI::App& app);
 void add_recognize(CLI::App& app);
 void add_plan(CLI::App& app);
+void add_evaluate(CLI::App& app);
 void add_export(CLI::App& app);
 void add_import(CLI::App& app);
 void add_info(CLI::App& app);

@@ -63,6 +63,7 @@ int run(int argc, char** argv) {
   palpate::cli::add_map(app);
   palpate::cli::add_recognize(app);
   palpate::cli::add_plan(app);
+  palpate::cli::add_evaluate(app);
   palpate::cli::add_info(app);
   palpate::cli::add_export(app);
   refuse_empty_values(app);

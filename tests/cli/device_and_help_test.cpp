@@ -78,6 +78,9 @@ INSTANTIATE_TEST_SUITE_P(
         Help{"plan",
              {"RECORDING", "--maps", "--candidates", "grid", "CSV", "mm", "rad", "--goal", "=both",
               "identity", "--samples", "=96", "--plan-seed", "=0", "--json", "--png", "nats"}},
+        Help{"evaluate",
+             {"RESULTS", "--json", "--png", "95 %", "confusion.png", "reliability.png",
+              "(none)"}},
         Help{"record",
              {"--sensor", "replay:FILE", "simulate:SHAPE", "-o,", "--seconds", "--poses", "FIFO",
               "--tare", "=0.5", "--object"}},
@@ -115,7 +118,7 @@ using ProgramHelp = ProgramTest;
 TEST_F(ProgramHelp, ListsTheCommands) {
   const std::string help = done({"--help"});
   for (const char* command : {"devices", "sensors", "record", "touches", "simulate", "map",
-                              "recognize", "live", "info", "import", "export"}) {
+                              "recognize", "live", "evaluate", "info", "import", "export"}) {
     EXPECT_NE(help.find(std::string("\n  ") + command), std::string::npos) << help;
   }
 }

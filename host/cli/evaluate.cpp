@@ -1,0 +1,120 @@
+#include "commands.hpp"
+
+#include <unistd.h>
+
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <fmt/format.h>
+#include <CLI/CLI.hpp>
+
+#include "command_files.hpp"
+#include "evaluate_output.hpp"
+#include "options.hpp"
+#include "results_file.hpp"
+#include "terminal.hpp"
+
+namespace palpate::cli {
+
+namespace {
+
+struct Options {
+  std::vector<std::string> results;
+  std::string json;
+  std::string png;
+};
+
+struct Pictures {
+  std::filesystem::path confusion;
+  std::filesystem::path reliability;
+};
+
+Pictures pictures_of(const Options& options) {
+  const std::filesystem::path folder = options.png;
+  return {folder / "confusion.png", folder / "reliability.png"};
+}
+
+/// Throws Error where an output cannot be written, before any file is.
+void check_outputs(const Options& options, const std::vector<std::filesystem::path>& read) {
+  CommandFiles files;
+  for (const std::filesystem::path& file : read) {
+    files.reads("RESULTS", file);
+  }
+  if (!options.json.empty()) {
+    files.writes("--json", options.json, CommandFiles::Dash::stream);
+  }
+  const auto [confusion, reliability] = pictures_of(options);
+  if (!options.png.empty()) {
+    files.writes("--png", confusion);
+    files.writes("--png", reliability);
+  }
+  files.require_distinct();
+  if (!options.json.empty() && options.json != "-") {
+    require_writable(options.json);
+  }
+  if (std::filesystem::is_directory(options.png)) {
+    require_writable(confusion);
+    require_writable(reliability);
+  }
+}
+
+void evaluate_results(const Options& options) {
+  const std::vector<std::filesystem::path> files = result_files(options.results);
+  check_outputs(options, files);
+  const JudgedResults results = read_results(files);
+  if (results.records.empty()) {
+    refuse(options.results.front(),
+           "none of {} record(s) has a true label ('truth'); name the object in the recordings "
+           "before palpate recognize, or give other results",
+           results.without_truth);
+  }
+  const Evaluation evaluation = evaluate(results.records);
+  // A label need not be UTF-8, as JSON must.
+  const std::string json =
+      to_json(evaluation, results.without_truth)
+          .dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) +
+      "\n";
+  // Files come first: printing fails where the reader of standard output has ended.
+  if (!options.png.empty()) {
+    make_folder(options.png);
+    const auto [confusion, reliability] = pictures_of(options);
+    write_file(confusion, draw_confusion(confusion_of(evaluation)));
+    write_file(reliability, draw_reliability(reliability_of(evaluation)));
+  }
+  if (options.json == "-") {
+    fmt::print("{}", json);
+    return;
+  }
+  if (!options.json.empty()) {
+    write_file(options.json, json);
+  }
+  fmt::print("{}",
+             evaluation_text(evaluation, results.without_truth, terminal_columns(STDOUT_FILENO)));
+}
+
+}  // namespace
+
+void add_evaluate(CLI::App& app) {
+  auto* command = app.add_subcommand(
+      "evaluate",
+      "Compare what palpate recognize --json wrote with the truth: accuracy and recall of every "
+      "class with 95 % intervals, what each class was taken for, log-loss, how far confidence is "
+      "from accuracy, and median pose errors. A class that no map has is an unknown class, whose "
+      "right answer is \"(none)\"; the area under the curve says how well unknown classes are told "
+      "from known ones");
+  const auto options = std::make_shared<Options>();
+  command
+      ->add_option("RESULTS", options->results,
+                   "JSON files of palpate recognize, files with one such record a line, or folders "
+                   "of *.json. Records without a true label are left out")
+      ->required();
+  command->add_option("--json", options->json, "Write all numbers as JSON; - is standard output");
+  command->add_option("--png", options->png,
+                      "Folder for pictures: confusion.png (true classes against best labels) and "
+                      "reliability.png (accuracy against the best label's probability)");
+  command->callback([options] { evaluate_results(*options); });
+}
+
+}  // namespace palpate::cli

@@ -1,0 +1,263 @@
+#include "evaluate_output.hpp"
+
+#include <algorithm>
+#include <utility>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "palpate/occupancy_grid.hpp"
+#include "text_table.hpp"
+
+namespace palpate::cli {
+
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+Json to_json(const Interval& interval) { return {interval.low, interval.high}; }
+
+Json to_json(const Scores& scores) {
+  Json json{{"records", scores.records},     {"right", scores.right},
+            {"accuracy", scores.accuracy()}, {"accuracy_interval", to_json(scores.interval())},
+            {"log_loss", scores.log_loss},   {"calibration_error", scores.calibration_error},
+            {"reliability", Json::array()}};
+  for (const ReliabilityBin& bin : scores.bins) {
+    Json row{{"lower", bin.lower}, {"upper", bin.upper}, {"records", bin.records}};
+    if (bin.records > 0) {
+      row["mean_confidence"] = bin.mean_confidence;
+      row["accuracy"] = bin.accuracy();
+      row["accuracy_interval"] = to_json(bin.interval());
+    }
+    json["reliability"].push_back(row);
+  }
+  return json;
+}
+
+const char* field_of(KnownScore score) {
+  switch (score) {
+    case KnownScore::known:
+      return "known";
+    case KnownScore::none:
+      return "1 - none";
+    case KnownScore::fit:
+      break;
+  }
+  return "fit.z";
+}
+
+Json unknown_to_json(const Evaluation& evaluation) {
+  const Scores& unknown = *evaluation.unknown;
+  Json json{{"records", unknown.records},
+            {"called_none", unknown.right},
+            {"share_called_none", unknown.accuracy()},
+            {"share_interval", to_json(unknown.interval())}};
+  if (const auto& against = evaluation.known_against_unknown) {
+    json["area_under_curve"] = {{"score", field_of(against->score)},
+                                {"known", against->known},
+                                {"unknown", against->unknown},
+                                {"area", against->area},
+                                {"standard_error", against->standard_error}};
+  }
+  return json;
+}
+
+Json to_json(const Median& median) { return {{"records", median.count}, {"median", median.value}}; }
+
+std::string percent(double share) { return fmt::format("{:.1f} %", 100.0 * share); }
+
+std::string percent(const Interval& interval) {
+  return fmt::format("{:.1f} to {:.1f} %", 100.0 * interval.low, 100.0 * interval.high);
+}
+
+std::string count_of(std::size_t count, const char* one, const char* more) {
+  return fmt::format("{} {}", count, count == 1 ? one : more);
+}
+
+std::string scores_table(const Evaluation& evaluation, std::optional<int> columns) {
+  // A column without content is left out.
+  TextTable table({{""}, {"all", true}, {"known classes", true}});
+  const auto add = [&](const char* name, auto text_of) {
+    table.add({name, text_of(evaluation.all),
+               evaluation.known ? std::string(text_of(*evaluation.known)) : ""});
+  };
+  add("records", [](const Scores& s) { return fmt::format("{}", s.records); });
+  add("right", [](const Scores& s) { return fmt::format("{}", s.right); });
+  add("accuracy", [](const Scores& s) { return percent(s.accuracy()); });
+  add("95 % interval", [](const Scores& s) { return percent(s.interval()); });
+  add("log-loss, nats", [](const Scores& s) { return fmt::format("{:.3f}", s.log_loss); });
+  add("calibration error",
+      [](const Scores& s) { return fmt::format("{:.3f}", s.calibration_error); });
+  return table.text(columns);
+}
+
+std::string reliability_table(const Scores& scores, std::optional<int> columns) {
+  TextTable table({{"confidence"},
+                   {"records", true},
+                   {"mean", true},
+                   {"accuracy", true},
+                   {"95 % interval", true}});
+  for (const ReliabilityBin& bin : scores.bins) {
+    if (bin.records > 0) {
+      table.add({fmt::format("{:.1f} to {:.1f}", bin.lower, bin.upper),
+                 fmt::format("{}", bin.records), percent(bin.mean_confidence),
+                 percent(bin.accuracy()), percent(bin.interval())});
+    }
+  }
+  return table.text(columns);
+}
+
+std::string class_name(const ClassScores& scores) {
+  return scores.label + (scores.known ? "" : " (unknown)");
+}
+
+/// The wrong answers, the most frequent first.
+std::string taken_for(const ClassScores& scores, const std::vector<std::string>& answers) {
+  const std::string_view right = scores.known ? std::string_view(scores.label) : none_label;
+  std::vector<std::pair<std::size_t, std::string>> wrong;
+  for (std::size_t k = 0; k < answers.size(); ++k) {
+    if (scores.taken[k] > 0 && answers[k] != right) {
+      wrong.emplace_back(scores.taken[k], answers[k]);
+    }
+  }
+  std::ranges::stable_sort(wrong, std::ranges::greater{},
+                           [](const auto& one) { return one.first; });
+  std::string list;
+  for (const auto& [count, answer] : wrong) {
+    list += fmt::format("{}{} {}", list.empty() ? "" : ", ", count, answer);
+  }
+  return list;
+}
+
+std::string class_table(const Evaluation& evaluation, std::optional<int> columns) {
+  TextTable table({{"class"},
+                   {"records", true},
+                   {"right", true},
+                   {"recall", true},
+                   {"95 % interval", true},
+                   {"taken for"}});
+  for (const ClassScores& scores : evaluation.classes) {
+    table.add({class_name(scores), fmt::format("{}", scores.records),
+               fmt::format("{}", scores.right), percent(scores.recall()),
+               percent(scores.interval()), taken_for(scores, evaluation.answers)});
+  }
+  return table.text(columns);
+}
+
+std::string unknown_words(const Evaluation& evaluation) {
+  if (!evaluation.unknown) {
+    return "";
+  }
+  const Scores& unknown = *evaluation.unknown;
+  std::string text = fmt::format(
+      "unknown classes: {} of {} called \"(none)\" ({}, 95 % interval {})\n", unknown.right,
+      unknown.records, percent(unknown.accuracy()), percent(unknown.interval()));
+  if (const auto& against = evaluation.known_against_unknown) {
+    text += fmt::format(
+        "area under the curve of known against unknown classes by {}: {:.3f} +- {:.3f} "
+        "({} known, {} unknown)\n",
+        field_of(against->score), against->area, against->standard_error, against->known,
+        against->unknown);
+  } else if (evaluation.known) {
+    text += "no area under the curve: records of both kinds need known, none or fit.z\n";
+  }
+  return text;
+}
+
+std::string error_words(const Evaluation& evaluation) {
+  std::string text;
+  const auto add = [&](const char* of, const std::optional<Median>& median) {
+    if (median) {
+      text += fmt::format("{}{} {:.2f} mm ({})", text.empty() ? "median error of " : ", of ", of,
+                          median->value, count_of(median->count, "record", "records"));
+    }
+  };
+  add("refined poses", evaluation.refined_error_mm);
+  add("modes", evaluation.error_mm);
+  return text.empty() ? "" : text + "\n";
+}
+
+ReliabilityFigure::Curve curve_of(const char* name, const Scores& scores) {
+  ReliabilityFigure::Curve curve{
+      .name = fmt::format("{} ({}, calibration error {:.3f})", name,
+                          count_of(scores.records, "record", "records"), scores.calibration_error),
+      .points = {}};
+  for (const ReliabilityBin& bin : scores.bins) {
+    if (bin.records > 0) {
+      const Interval interval = bin.interval();
+      curve.points.push_back(
+          {bin.mean_confidence, bin.accuracy(), interval.low, interval.high, bin.records});
+    }
+  }
+  return curve;
+}
+
+}  // namespace
+
+Json to_json(const Evaluation& evaluation, std::size_t without_truth) {
+  Json json = to_json(evaluation.all);
+  json["without_truth"] = without_truth;
+  if (evaluation.known) {
+    json["known_classes"] = to_json(*evaluation.known);
+  }
+  if (evaluation.unknown) {
+    json["unknown_classes"] = unknown_to_json(evaluation);
+  }
+  json["classes"] = Json::array();
+  json["confusion"] = {
+      {"rows", Json::array()}, {"columns", evaluation.answers}, {"counts", Json::array()}};
+  for (const ClassScores& scores : evaluation.classes) {
+    json["classes"].push_back({{"class", scores.label},
+                               {"known", scores.known},
+                               {"records", scores.records},
+                               {"right", scores.right},
+                               {"recall", scores.recall()},
+                               {"recall_interval", to_json(scores.interval())}});
+    json["confusion"]["rows"].push_back(scores.label);
+    json["confusion"]["counts"].push_back(scores.taken);
+  }
+  if (evaluation.error_mm) {
+    json["error_mm"] = to_json(*evaluation.error_mm);
+  }
+  if (evaluation.refined_error_mm) {
+    json["refined_error_mm"] = to_json(*evaluation.refined_error_mm);
+  }
+  return json;
+}
+
+std::string evaluation_text(const Evaluation& evaluation, std::size_t without_truth,
+                            std::optional<int> columns) {
+  std::string text = scores_table(evaluation, columns);
+  if (without_truth > 0) {
+    text += fmt::format("{} without a true label left out\n",
+                        count_of(without_truth, "record", "records"));
+  }
+  text += "\n" + reliability_table(evaluation.all, columns);
+  text += "\n" + class_table(evaluation, columns);
+  text += unknown_words(evaluation) + error_words(evaluation);
+  return text;
+}
+
+ConfusionFigure confusion_of(const Evaluation& evaluation) {
+  ConfusionFigure figure;
+  figure.title = fmt::format("{} of {} right ({}, 95 % interval {})", evaluation.all.right,
+                             evaluation.all.records, percent(evaluation.all.accuracy()),
+                             percent(evaluation.all.interval()));
+  figure.columns = evaluation.answers;
+  for (const ClassScores& scores : evaluation.classes) {
+    const std::string right = scores.known ? scores.label : std::string(none_label);
+    figure.rows.push_back({class_name(scores), right, scores.taken});
+  }
+  return figure;
+}
+
+ReliabilityFigure reliability_of(const Evaluation& evaluation) {
+  ReliabilityFigure figure;
+  figure.curves.push_back(curve_of("all", evaluation.all));
+  if (evaluation.known) {
+    figure.curves.push_back(curve_of("known classes", *evaluation.known));
+  }
+  return figure;
+}
+
+}  // namespace palpate::cli

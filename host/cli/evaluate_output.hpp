@@ -1,0 +1,30 @@
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <string>
+
+#include <nlohmann/json.hpp>
+
+#include "confusion_figure.hpp"
+#include "evaluation.hpp"
+#include "reliability_figure.hpp"
+
+namespace palpate::cli {
+
+/// The evaluation in the form that other programs rely on.
+/// @param without_truth number of records that were left out
+nlohmann::ordered_json to_json(const Evaluation& evaluation, std::size_t without_truth);
+
+/// The scores, the reliability bins that have records, a line for each class with what it was taken
+/// for, unknown classes and pose errors.
+/// @param columns see TextTable::text()
+std::string evaluation_text(const Evaluation& evaluation, std::size_t without_truth,
+                            std::optional<int> columns);
+
+/// How often each class was taken for each label.
+ConfusionFigure confusion_of(const Evaluation& evaluation);
+/// Accuracy over confidence, of known classes apart where there are others.
+ReliabilityFigure reliability_of(const Evaluation& evaluation);
+
+}  // namespace palpate::cli

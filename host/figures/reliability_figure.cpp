@@ -1,0 +1,41 @@
+#include "reliability_figure.hpp"
+
+#include <array>
+
+#include <fmt/format.h>
+
+#include "chart.hpp"
+
+namespace palpate {
+
+std::string draw_reliability(const ReliabilityFigure& figure) {
+  const auto axis = [](const char* label) {
+    // The ends leave room for the marks at 0 and 1.
+    return ChartAxis{.label = label, .lower = -0.02, .upper = 1.05};
+  };
+  Chart chart{.title = "confidence and accuracy; numbers count records, bars are 95 % intervals",
+              .x = axis("mean probability of the best label"),
+              .y = axis("share of records that are right")};
+  chart.series.push_back({.name = "confidence = accuracy",
+                          .colour = comparison_grey,
+                          .mark = Mark::none,
+                          .line = Line::dotted,
+                          .points = {{.x = 0.0, .y = 0.0}, {.x = 1.0, .y = 1.0}}});
+  constexpr std::array marks{Mark::circle, Mark::square, Mark::triangle, Mark::diamond};
+  for (std::size_t k = 0; k < figure.curves.size(); ++k) {
+    ChartSeries series{.name = figure.curves[k].name,
+                       .colour = palpate::series(k),
+                       .mark = marks[k % marks.size()]};
+    for (const ReliabilityFigure::Point& point : figure.curves[k].points) {
+      series.points.push_back({.x = point.confidence,
+                               .y = point.accuracy,
+                               .low = point.low,
+                               .high = point.high,
+                               .label = fmt::format("{}", point.records)});
+    }
+    chart.series.push_back(std::move(series));
+  }
+  return draw_chart(chart, PictureFormat::png).bytes;
+}
+
+}  // namespace palpate

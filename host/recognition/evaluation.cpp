@@ -1,0 +1,191 @@
+#include "evaluation.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+#include <utility>
+
+#include "palpate/occupancy_grid.hpp"
+
+namespace palpate {
+
+namespace {
+
+const std::string none_answer(none_label);
+
+/// Whether the record is counted.
+using Choice = bool (*)(const JudgedRecord&);
+
+bool of_unknown_class(const JudgedRecord& record) { return !record.of_known_class(); }
+
+/// None where no record is chosen.
+std::optional<Scores> scores_of(std::span<const JudgedRecord> records, Choice chosen) {
+  Scores scores;
+  const auto bins = static_cast<double>(scores.bins.size());
+  for (std::size_t k = 0; k < scores.bins.size(); ++k) {
+    scores.bins[k].lower = static_cast<double>(k) / bins;
+    scores.bins[k].upper = static_cast<double>(k + 1) / bins;
+  }
+  for (const JudgedRecord& record : records) {
+    if (!chosen(record)) {
+      continue;
+    }
+    const auto bin = static_cast<std::size_t>(std::max(bins * record.confidence(), 0.0));
+    ReliabilityBin& at = scores.bins[std::min(bin, scores.bins.size() - 1)];
+    ++at.records;
+    at.right += record.right() ? 1 : 0;
+    at.mean_confidence += record.confidence();
+    ++scores.records;
+    scores.right += record.right() ? 1 : 0;
+    scores.log_loss -= std::log(std::max(record.answer_probability(), least_answer_probability));
+  }
+  if (scores.records == 0) {
+    return {};
+  }
+  const auto n = static_cast<double>(scores.records);
+  scores.log_loss /= n;
+  for (ReliabilityBin& bin : scores.bins) {
+    if (bin.records > 0) {
+      const auto in_bin = static_cast<double>(bin.records);
+      bin.mean_confidence /= in_bin;
+      scores.calibration_error += in_bin / n * std::abs(bin.accuracy() - bin.mean_confidence);
+    }
+  }
+  return scores;
+}
+
+std::vector<std::string> answers_of(std::span<const JudgedRecord> records) {
+  std::set<std::string> labels;
+  for (const JudgedRecord& record : records) {
+    labels.insert(record.best);
+    if (record.of_known_class()) {
+      labels.insert(record.truth);
+    }
+    if (record.identity.contains(none_answer)) {
+      labels.insert(none_answer);
+    }
+  }
+  const bool none = labels.erase(none_answer) > 0;
+  std::vector<std::string> answers(labels.begin(), labels.end());
+  if (none) {
+    answers.push_back(none_answer);
+  }
+  return answers;
+}
+
+std::vector<ClassScores> classes_of(std::span<const JudgedRecord> records,
+                                    const std::vector<std::string>& answers) {
+  std::map<std::string, std::size_t> place;
+  for (std::size_t k = 0; k < answers.size(); ++k) {
+    place[answers[k]] = k;
+  }
+  std::map<std::pair<bool, std::string>, ClassScores> classes;  // known ones first
+  for (const JudgedRecord& record : records) {
+    const bool known = record.of_known_class();
+    ClassScores& of = classes[{!known, record.truth}];
+    of.label = record.truth;
+    of.known = known;
+    of.taken.resize(answers.size());
+    ++of.records;
+    of.right += record.right() ? 1 : 0;
+    ++of.taken[place.at(record.best)];
+  }
+  std::vector<ClassScores> result;
+  for (auto& [key, scores] : classes) {
+    result.push_back(std::move(scores));
+  }
+  return result;
+}
+
+std::optional<double> score_of(const JudgedRecord& record, KnownScore score) {
+  switch (score) {
+    case KnownScore::known:
+      return record.known;
+    case KnownScore::none:
+      return record.none ? std::optional(1.0 - *record.none) : std::nullopt;
+    case KnownScore::fit:
+      break;
+  }
+  return record.fit_z;
+}
+
+std::optional<KnownAgainstUnknown> compare_by(KnownScore score,
+                                              std::span<const JudgedRecord> records) {
+  std::vector<double> of_known;
+  std::vector<double> of_unknown;
+  for (const JudgedRecord& record : records) {
+    if (const auto value = score_of(record, score)) {
+      (record.of_known_class() ? of_known : of_unknown).push_back(*value);
+    }
+  }
+  if (of_known.empty() || of_unknown.empty()) {
+    return {};
+  }
+  const double area = told_apart(of_unknown, of_known);
+  return KnownAgainstUnknown{
+      .score = score,
+      .known = of_known.size(),
+      .unknown = of_unknown.size(),
+      .area = area,
+      .standard_error = told_apart_error(area, of_unknown.size(), of_known.size())};
+}
+
+std::optional<KnownAgainstUnknown> known_against_unknown(std::span<const JudgedRecord> records) {
+  for (const KnownScore score : {KnownScore::known, KnownScore::none}) {
+    if (std::ranges::all_of(records, [&](const JudgedRecord& record) {
+          return score_of(record, score).has_value();
+        })) {
+      return compare_by(score, records);
+    }
+  }
+  return compare_by(KnownScore::fit, records);
+}
+
+std::optional<Median> median_of(std::span<const JudgedRecord> records,
+                                std::optional<double> JudgedRecord::*error) {
+  std::vector<double> values;
+  for (const JudgedRecord& record : records) {
+    if (record.*error) {
+      values.push_back(*(record.*error));
+    }
+  }
+  if (values.empty()) {
+    return {};
+  }
+  std::sort(values.begin(), values.end());
+  const std::size_t half = values.size() / 2;
+  const double middle =
+      values.size() % 2 == 1 ? values[half] : 0.5 * (values[half - 1] + values[half]);
+  return Median{.count = values.size(), .value = middle};
+}
+
+}  // namespace
+
+bool JudgedRecord::of_known_class() const {
+  return truth != none_answer && identity.contains(truth);
+}
+
+std::string JudgedRecord::answer() const { return of_known_class() ? truth : none_answer; }
+
+double JudgedRecord::answer_probability() const {
+  const auto found = identity.find(answer());
+  return found == identity.end() ? 0.0 : found->second;
+}
+
+Evaluation evaluate(std::span<const JudgedRecord> records) {
+  Evaluation evaluation;
+  evaluation.all = scores_of(records, [](const JudgedRecord&) { return true; }).value();
+  evaluation.unknown = scores_of(records, of_unknown_class);
+  if (evaluation.unknown) {
+    evaluation.known =
+        scores_of(records, [](const JudgedRecord& record) { return record.of_known_class(); });
+    evaluation.known_against_unknown = known_against_unknown(records);
+  }
+  evaluation.answers = answers_of(records);
+  evaluation.classes = classes_of(records, evaluation.answers);
+  evaluation.error_mm = median_of(records, &JudgedRecord::error_mm);
+  evaluation.refined_error_mm = median_of(records, &JudgedRecord::refined_error_mm);
+  return evaluation;
+}
+
+}  // namespace palpate

@@ -1,0 +1,119 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <map>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "proportion.hpp"
+
+namespace palpate {
+
+/// What was believed of an unknown whose true label is known. Its class is known where some map had
+/// the label, and unknown where none had it; the right answer is then "(none)".
+struct JudgedRecord {
+  std::string truth;                       ///< label of the true object
+  std::string best;                        ///< label of the largest probability
+  std::map<std::string, double> identity;  ///< {label: probability}; has `best`, sums to 1
+  std::optional<double> known;             ///< probability that the object is one of the maps'
+  std::optional<double> none;              ///< probability of "(none)"
+  std::optional<double> fit_z;             ///< see Fit
+  std::optional<double> error_mm;          ///< pose error of the mode
+  std::optional<double> refined_error_mm;  ///< pose error of the refined pose
+
+  bool of_known_class() const;
+  /// The right answer: the true label, or "(none)".
+  std::string answer() const;
+  bool right() const { return best == answer(); }
+  /// Probability of `best`.
+  double confidence() const { return identity.at(best); }
+  /// Probability of the right answer; 0 where it was not among the answers.
+  double answer_probability() const;
+};
+
+/// The records whose best label has a probability in [lower, upper); the last bin includes 1.
+struct ReliabilityBin {
+  double lower = 0.0;
+  double upper = 0.0;
+  std::size_t records = 0;
+  std::size_t right = 0;
+  double mean_confidence = 0.0;  ///< of records > 0
+
+  double accuracy() const { return static_cast<double>(right) / static_cast<double>(records); }
+  Interval interval() const { return wilson_interval(static_cast<double>(right), records); }
+};
+
+/// The smallest probability of a right answer that log_loss counts with: an answer that was held
+/// impossible costs 27.6 nats, not infinitely many.
+inline constexpr double least_answer_probability = 1e-12;
+
+/// How right, and how honest, a set of records is.
+struct Scores {
+  std::size_t records = 0;
+  std::size_t right = 0;
+  double log_loss = 0.0;  ///< mean of -log(probability of the right answer), nats
+  /// Expected calibration error: the mean over the records of how far the accuracy of their bin is
+  /// from its mean confidence.
+  double calibration_error = 0.0;
+  std::array<ReliabilityBin, 10> bins;
+
+  double accuracy() const { return static_cast<double>(right) / static_cast<double>(records); }
+  Interval interval() const { return wilson_interval(static_cast<double>(right), records); }
+};
+
+/// The records of one true label, those where its class was known apart from those where not.
+struct ClassScores {
+  std::string label;
+  bool known = true;
+  std::size_t records = 0;
+  std::size_t right = 0;           ///< of an unknown class: called "(none)"
+  std::vector<std::size_t> taken;  ///< [answer] how often each was the best label
+
+  double recall() const { return static_cast<double>(right) / static_cast<double>(records); }
+  Interval interval() const { return wilson_interval(static_cast<double>(right), records); }
+};
+
+/// What tells known from unknown classes; larger for known ones.
+enum class KnownScore {
+  known,  ///< JudgedRecord::known
+  none,   ///< 1 - JudgedRecord::none
+  fit     ///< JudgedRecord::fit_z
+};
+
+/// Area under the curve (ROC) of records of known against those of unknown classes: the probability
+/// that the one of the known class has the larger score; a tie counts half.
+struct KnownAgainstUnknown {
+  KnownScore score = KnownScore::known;
+  std::size_t known = 0;  ///< records that have the score
+  std::size_t unknown = 0;
+  double area = 0.0;
+  double standard_error = 0.0;  ///< see told_apart_error()
+};
+
+struct Median {
+  std::size_t count = 0;
+  double value = 0.0;  ///< mean of the middle two of an even count
+};
+
+struct Evaluation {
+  Scores all;
+  std::optional<Scores> known;    ///< of known classes alone, where others are among the records
+  std::optional<Scores> unknown;  ///< of unknown classes; `right` counts those called "(none)"
+  /// Only where both kinds of classes have a score: `known` or `none` if every record has it,
+  /// otherwise the fit of those records that have one.
+  std::optional<KnownAgainstUnknown> known_against_unknown;
+  /// Labels of known classes among the records, and what else was some record's best; last
+  /// "(none)", where it was possible.
+  std::vector<std::string> answers;
+  std::vector<ClassScores> classes;  ///< known ones first, each kind by label
+  std::optional<Median> error_mm;    ///< over the records that have one
+  std::optional<Median> refined_error_mm;
+};
+
+/// Compares records with the truth. There must be at least one.
+Evaluation evaluate(std::span<const JudgedRecord> records);
+
+}  // namespace palpate

@@ -1,0 +1,164 @@
+// palpate evaluate on results written by hand, whose scores are worked out here, and on results of
+// palpate recognize.
+
+#include <cmath>
+
+#include <gmock/gmock.h>
+
+#include "program.hpp"
+#include "sample_files.hpp"
+
+namespace palpate {
+namespace {
+
+using nlohmann::json;
+using testing::HasSubstr;
+
+json record(const char* truth, const char* best, double a, double b, double none) {
+  json record{{"recording", "u.h5"},
+              {"best", best},
+              {"identity", {{"A", a}, {"B", b}, {"(none)", none}}},
+              {"none", none}};
+  if (*truth != '\0') {
+    record["truth"] = {{"object", truth}};
+  }
+  return record;
+}
+
+/// Two of A, of which one is right, one of M, which no map has, and one without a truth.
+json four() {
+  json records = json::array({record("A", "A", 0.9, 0.1, 0.0), record("A", "B", 0.25, 0.75, 0.0),
+                              record("M", "(none)", 0.2, 0.1, 0.7), record("", "A", 1, 0, 0)});
+  records[0]["error_mm"] = 0.5;
+  records[0]["refined_error_mm"] = 0.25;
+  records[1]["error_mm"] = nullptr;
+  return records;
+}
+
+class EvaluateCommand : public ProgramTest {
+ protected:
+  json evaluated(const std::vector<std::string>& results) const {
+    std::vector<std::string> arguments{"evaluate"};
+    arguments.insert(arguments.end(), results.begin(), results.end());
+    arguments.insert(arguments.end(), {"--json", "-"});
+    return json::parse(done(arguments));
+  }
+};
+
+TEST_F(EvaluateCommand, WritesAllNumbersAsJson) {
+  put_bytes(folder_ / "r.json", four().dump(2));
+  const json e = evaluated({"r.json"});
+  EXPECT_EQ(e["records"], 3);
+  EXPECT_EQ(e["without_truth"], 1);
+  EXPECT_EQ(e["right"], 2);
+  EXPECT_NEAR(e["accuracy"].get<double>(), 2.0 / 3.0, 1e-12);
+  EXPECT_NEAR(e["log_loss"].get<double>(), -std::log(0.9 * 0.25 * 0.7) / 3.0, 1e-12);
+  EXPECT_NEAR(e["calibration_error"].get<double>(), (0.1 + 2 * (0.725 - 0.5)) / 3.0, 1e-12)
+      << "0.75, which is wrong, and 0.7 share a bin";
+  ASSERT_EQ(e["reliability"].size(), 10u);
+  EXPECT_EQ(e["reliability"][7]["records"], 2);
+  EXPECT_EQ(e["reliability"][7]["accuracy"], 0.5);
+  EXPECT_FALSE(e["reliability"][0].contains("accuracy"));
+  EXPECT_EQ(e["known_classes"]["records"], 2);
+  EXPECT_EQ(e["unknown_classes"]["called_none"], 1);
+  const json& area = e["unknown_classes"]["area_under_curve"];
+  EXPECT_EQ(area["score"], "1 - none");
+  EXPECT_EQ(area["area"], 1.0);
+  EXPECT_EQ(area["known"], 2);
+  EXPECT_EQ(e["classes"].size(), 2u);
+  EXPECT_EQ(e["classes"][0]["recall"], 0.5);
+  EXPECT_EQ(e["classes"][1]["known"], false);
+  EXPECT_EQ(e["confusion"]["rows"], json({"A", "M"}));
+  EXPECT_EQ(e["confusion"]["columns"], json({"A", "B", "(none)"}));
+  EXPECT_EQ(e["confusion"]["counts"], json({{1, 1, 0}, {0, 0, 1}}));
+  EXPECT_EQ(e["error_mm"], json({{"records", 1}, {"median", 0.5}}));
+  EXPECT_EQ(e["refined_error_mm"]["median"], 0.25);
+}
+
+TEST_F(EvaluateCommand, SaysTheSameInWords) {
+  put_bytes(folder_ / "r.json", four().dump());
+  const std::string text = done({"evaluate", "r.json"});
+  for (const char* part :
+       {"66.7 %", "1 record without a true label left out", "0.7 to 0.8", "A", "1 B", "M (unknown)",
+        "unknown classes: 1 of 1 called \"(none)\"", "by 1 - none: 1.000 +- 0.000",
+        "median error of refined poses 0.25 mm (1 record), of modes 0.50 mm (1 record)"}) {
+    EXPECT_THAT(text, HasSubstr(part));
+  }
+  json known = json::array({four()[0]});
+  put_bytes(folder_ / "r.json", known.dump());
+  EXPECT_EQ(done({"evaluate", "r.json"}).find("nknown"), std::string::npos);
+}
+
+TEST_F(EvaluateCommand, ReadsLinesFoldersAndSingleRecords) {
+  put_bytes(folder_ / "all.json", four().dump());
+  const json expected = evaluated({"all.json"});
+  std::string lines;
+  std::filesystem::create_directory(folder_ / "results");
+  for (std::size_t i = 0; i < 4; ++i) {
+    lines += four()[i].dump() + "\n\n";
+    put_bytes(folder_ / "results" / (std::to_string(i) + ".json"), four()[i].dump(2));
+  }
+  put_bytes(folder_ / "lines.ndjson", lines);
+  put_bytes(folder_ / "results/notes.txt", "no results");
+  EXPECT_EQ(evaluated({"lines.ndjson"}), expected);
+  EXPECT_EQ(evaluated({"results"}), expected);
+  EXPECT_EQ(evaluated({"results/0.json", "results/1.json", "results/2.json", "results/3.json"}),
+            expected);
+}
+
+TEST_F(EvaluateCommand, PrefersTheScoreKnown) {
+  json records = four();
+  for (json& each : records) {
+    each["known"] = 0.5;
+  }
+  put_bytes(folder_ / "r.json", records.dump());
+  const json by_known = evaluated({"r.json"})["unknown_classes"]["area_under_curve"];
+  EXPECT_EQ(by_known["score"], "known");
+  EXPECT_EQ(by_known["area"], 0.5);
+  for (json& each : records) {
+    each.erase("known");
+    each.erase("none");
+    each["fit"] = {{"z", each["best"] == "(none)" ? -5.0 : 0.0}, {"verdict", "fits"}};
+  }
+  put_bytes(folder_ / "r.json", records.dump());
+  EXPECT_EQ(evaluated({"r.json"})["unknown_classes"]["area_under_curve"]["score"], "fit.z");
+}
+
+TEST_F(EvaluateCommand, WritesFiles) {
+  put_bytes(folder_ / "r.json", four().dump());
+  done({"evaluate", "r.json", "--json", "e.json", "--png", "pictures"});
+  EXPECT_EQ(json::parse(bytes_of(folder_ / "e.json")), evaluated({"r.json"}));
+  for (const char* name : {"pictures/confusion.png", "pictures/reliability.png"}) {
+    EXPECT_TRUE(bytes_of(folder_ / name).starts_with("\x89PNG")) << name;
+  }
+}
+
+TEST_F(EvaluateCommand, TakesWhatRecognizeWrites) {
+  write_map(folder_ / "A.map.h5", sample_map("A"));
+  write_map(folder_ / "I.map.h5", sample_map("I"));
+  const Pose pose{{2.0, -3.0}, 1.0};
+  write_recording(folder_ / "a.h5", sample_unknown("A", pose, 6));
+  write_recording(folder_ / "i.h5", sample_unknown("I", pose, 6));
+  write_recording(folder_ / "e.h5", sample_unknown("E", pose, 6));
+  Recording nameless = sample_unknown("A", pose, 6);
+  nameless.truth.reset();
+  nameless.object.clear();
+  write_recording(folder_ / "nameless.h5", nameless);
+  done({"recognize", "a.h5", "i.h5", "e.h5", "nameless.h5", "--maps", "A.map.h5", "I.map.h5",
+        "--none", "--bins", "25x25x16", "--json", "r.json"});
+  const json records = json::parse(bytes_of(folder_ / "r.json"));
+  const json e = evaluated({"r.json"});
+  int right = 0;
+  for (const json& each : records) {
+    right += each.value("right", false) ? 1 : 0;
+  }
+  EXPECT_EQ(e["records"], 3);
+  EXPECT_EQ(e["without_truth"], 1);
+  EXPECT_EQ(e["right"], right);
+  EXPECT_EQ(e["known_classes"]["records"], 2);
+  EXPECT_EQ(e["unknown_classes"]["records"], 1);
+  EXPECT_EQ(e["unknown_classes"]["area_under_curve"]["score"], "1 - none");
+}
+
+}  // namespace
+}  // namespace palpate

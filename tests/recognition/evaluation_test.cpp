@@ -1,0 +1,166 @@
+#include "evaluation.hpp"
+
+#include <cmath>
+
+#include <gmock/gmock.h>
+
+namespace palpate {
+namespace {
+
+using testing::ElementsAre;
+
+JudgedRecord record(const std::string& truth, const std::string& best, double a, double b,
+                    double none) {
+  return {.truth = truth,
+          .best = best,
+          .identity = {{"A", a}, {"B", b}, {"(none)", none}},
+          .known = {},
+          .none = none,
+          .fit_z = {},
+          .error_mm = {},
+          .refined_error_mm = {}};
+}
+
+/// Four records of known classes, of which two are right, and two of M, which no map has.
+std::vector<JudgedRecord> six() {
+  return {record("A", "A", 0.9, 0.1, 0.0),      record("A", "B", 0.2, 0.8, 0.0),
+          record("B", "B", 0.05, 0.95, 0.0),    record("B", "(none)", 0.1, 0.3, 0.6),
+          record("M", "(none)", 0.2, 0.1, 0.7), record("M", "A", 0.85, 0.1, 0.05)};
+}
+
+TEST(Evaluation, CountsWhatIsRight) {
+  const Evaluation e = evaluate(six());
+  EXPECT_EQ(e.all.records, 6u);
+  EXPECT_EQ(e.all.right, 3u) << "M is \"(none)\"";
+  EXPECT_DOUBLE_EQ(e.all.accuracy(), 0.5);
+  EXPECT_DOUBLE_EQ(e.all.interval().low, wilson_interval(3, 6).low);
+  EXPECT_EQ(e.known.value().records, 4u);
+  EXPECT_EQ(e.known->right, 2u);
+  EXPECT_EQ(e.unknown.value().records, 2u);
+  EXPECT_EQ(e.unknown->right, 1u);
+}
+
+TEST(Evaluation, LogLossIsOfTheRightAnswer) {
+  const Evaluation e = evaluate(six());
+  EXPECT_NEAR(e.all.log_loss, 1.0537453, 1e-6) << "-ln(0.9 0.2 0.95 0.3 0.7 0.05) / 6";
+  EXPECT_NEAR(e.known->log_loss, 0.7425161, 1e-6) << "-ln(0.9 0.2 0.95 0.3) / 4";
+}
+
+TEST(Evaluation, AnImpossibleAnswerCostsTheFloor) {
+  const std::vector wrong{record("A", "B", 0.0, 1.0, 0.0)};
+  EXPECT_NEAR(evaluate(wrong).all.log_loss, 27.631, 1e-3) << "-ln 1e-12";
+  std::vector without_none{record("M", "B", 0.0, 1.0, 0.0)};
+  without_none[0].identity.erase("(none)");
+  EXPECT_NEAR(evaluate(without_none).all.log_loss, 27.631, 1e-3);
+}
+
+TEST(Evaluation, CalibrationErrorWeighsTheBinsByTheirRecords) {
+  const Evaluation e = evaluate(six());
+  // 0.6: one, wrong; 0.7: one, right; 0.8 and 0.85: both wrong; 0.9 and 0.95: both right.
+  EXPECT_NEAR(e.all.calibration_error, (0.6 + 0.3 + 2 * 0.825 + 2 * 0.075) / 6, 1e-12);
+  EXPECT_NEAR(e.known->calibration_error, (0.6 + 0.8 + 2 * 0.075) / 4, 1e-12);
+  const ReliabilityBin& bin = e.all.bins[8];
+  EXPECT_DOUBLE_EQ(bin.lower, 0.8);
+  EXPECT_DOUBLE_EQ(bin.upper, 0.9);
+  EXPECT_EQ(bin.records, 2u);
+  EXPECT_EQ(bin.right, 0u);
+  EXPECT_DOUBLE_EQ(bin.mean_confidence, 0.825);
+  EXPECT_EQ(e.all.bins[0].records, 0u);
+}
+
+TEST(Evaluation, BinsHoldTheirLowerEndAndTheLastOneBoth) {
+  const std::vector records{record("A", "A", 0.5, 0.5, 0.0), record("A", "A", 1.0, 0.0, 0.0)};
+  const Evaluation e = evaluate(records);
+  EXPECT_EQ(e.all.bins[5].records, 1u);
+  EXPECT_EQ(e.all.bins[9].records, 1u);
+  EXPECT_EQ(e.all.calibration_error, 0.25);
+}
+
+TEST(Evaluation, ListsClassesAndWhatTheyWereTakenFor) {
+  const Evaluation e = evaluate(six());
+  EXPECT_THAT(e.answers, ElementsAre("A", "B", "(none)"));
+  ASSERT_EQ(e.classes.size(), 3u);
+  EXPECT_EQ(e.classes[0].label, "A");
+  EXPECT_EQ(e.classes[0].right, 1u);
+  EXPECT_DOUBLE_EQ(e.classes[0].recall(), 0.5);
+  EXPECT_THAT(e.classes[0].taken, ElementsAre(1, 1, 0));
+  EXPECT_THAT(e.classes[1].taken, ElementsAre(0, 1, 1));
+  EXPECT_EQ(e.classes[2].label, "M");
+  EXPECT_FALSE(e.classes[2].known);
+  EXPECT_EQ(e.classes[2].right, 1u);
+  EXPECT_THAT(e.classes[2].taken, ElementsAre(1, 0, 1));
+}
+
+TEST(Evaluation, AClassMayBeKnownInSomeRecordsOnly) {
+  std::vector<JudgedRecord> records = six();
+  records.push_back(record("B", "(none)", 0.1, 0.0, 0.9));
+  records.back().identity.erase("B");
+  const Evaluation e = evaluate(records);
+  ASSERT_EQ(e.classes.size(), 4u);
+  EXPECT_EQ(e.classes[1].label, "B");
+  EXPECT_EQ(e.classes[1].records, 2u);
+  EXPECT_EQ(e.classes[2].label, "B");
+  EXPECT_FALSE(e.classes[2].known);
+  EXPECT_EQ(e.classes[2].right, 1u);
+}
+
+TEST(Evaluation, WithoutUnknownClassesHasNothingToTellApart) {
+  std::vector<JudgedRecord> records = six();
+  records.resize(4);
+  const Evaluation e = evaluate(records);
+  EXPECT_FALSE(e.known || e.unknown || e.known_against_unknown);
+}
+
+TEST(KnownAgainstUnknown, PrefersKnownThenNoneThenFit) {
+  std::vector<JudgedRecord> records = six();
+  const auto by_none = evaluate(records).known_against_unknown.value();
+  EXPECT_EQ(by_none.score, KnownScore::none);
+  EXPECT_EQ(by_none.known, 4u);
+  EXPECT_EQ(by_none.unknown, 2u);
+  EXPECT_DOUBLE_EQ(by_none.area, 7.0 / 8.0) << "1, 1, 1, 0.4 against 0.3, 0.95";
+  EXPECT_DOUBLE_EQ(by_none.standard_error, told_apart_error(7.0 / 8.0, 2, 4));
+
+  for (JudgedRecord& each : records) {
+    each.known = each.of_known_class() ? 0.5 : 0.1;
+  }
+  EXPECT_EQ(evaluate(records).known_against_unknown->score, KnownScore::known);
+  EXPECT_EQ(evaluate(records).known_against_unknown->area, 1.0);
+  records[0].known.reset();
+  EXPECT_EQ(evaluate(records).known_against_unknown->score, KnownScore::none)
+      << "one record has no other score";
+}
+
+TEST(KnownAgainstUnknown, TakesTheFitOfTheRecordsThatHaveOne) {
+  std::vector<JudgedRecord> records = six();
+  for (JudgedRecord& each : records) {
+    each.none.reset();
+  }
+  EXPECT_FALSE(evaluate(records).known_against_unknown);
+  records[0].fit_z = -1.0;
+  EXPECT_FALSE(evaluate(records).known_against_unknown) << "of one kind alone";
+  records[1].fit_z = -4.0;
+  records[5].fit_z = -3.0;
+  const auto by_fit = evaluate(records).known_against_unknown.value();
+  EXPECT_EQ(by_fit.score, KnownScore::fit);
+  EXPECT_EQ(by_fit.known, 2u);
+  EXPECT_EQ(by_fit.unknown, 1u);
+  EXPECT_DOUBLE_EQ(by_fit.area, 0.5);
+}
+
+TEST(Evaluation, MediansAreOverTheRecordsThatHaveAnError) {
+  std::vector<JudgedRecord> records = six();
+  EXPECT_FALSE(evaluate(records).error_mm);
+  records[0].error_mm = 5.0;
+  records[1].error_mm = 1.0;
+  records[2].error_mm = 2.0;
+  records[3].error_mm = 3.0;
+  records[2].refined_error_mm = 0.25;
+  const Evaluation e = evaluate(records);
+  EXPECT_EQ(e.error_mm.value().count, 4u);
+  EXPECT_DOUBLE_EQ(e.error_mm->value, 2.5);
+  EXPECT_EQ(e.refined_error_mm.value().count, 1u);
+  EXPECT_DOUBLE_EQ(e.refined_error_mm->value, 0.25);
+}
+
+}  // namespace
+}  // namespace palpate
