@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "palpate/error.hpp"
+#include "palpate/reading_layer.hpp"
 #include "simulated_presses.hpp"
 #include "synthetic.hpp"
 
