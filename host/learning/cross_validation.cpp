@@ -5,6 +5,7 @@
 #include <limits>
 #include <map>
 #include <optional>
+#include <set>
 
 #include <fmt/format.h>
 #include <tbb/parallel_for.h>
@@ -37,12 +38,12 @@ struct LabelScore {
   }
 };
 
-std::size_t known_elements(const Press& press, const ContactClassifier& classifier) {
+double known_elements(const Press& press, const ContactClassifier& classifier) {
   std::size_t known = 0;
   for (const Touch& touch : press.touches) {
     known += known_readings(touch, classifier).size();
   }
-  return known;
+  return static_cast<double>(known);
 }
 
 /// The features of a press: of its first touch.
@@ -50,128 +51,165 @@ PressFeatures features_of(const Press& press, const ContactClassifier& classifie
   return press_features(press.touches.front(), classifier);
 }
 
-/// Presses by object and fold.
-class Folds {
+/// The presses, their maps and what was learned, as all folds share them.
+class Validation {
  public:
-  Folds(const std::vector<Press>& presses, std::size_t folds) : fold_(presses.size()) {
-    for (std::size_t i = 0; i < presses.size(); ++i) {
-      std::vector<std::size_t>& own = of_label_[presses[i].label];
-      fold_[i] = own.size() % folds;
-      own.push_back(i);
+  Validation(const std::vector<Press>& presses, const std::vector<TrainingMap>& maps,
+             const TableLearning& how, const PlacedPresses* placed,
+             const CrossValidationOptions& options)
+      : presses_(presses), maps_(maps), how_(how), placed_(placed), options_(options) {
+    fold_ = folds_of(presses, options.folds);
+    std::set<std::string> labels;
+    for (const TrainingMap& map : maps) {
+      labels.insert(map.map.label);
+    }
+    labels_.assign(labels.begin(), labels.end());
+    if (placed != nullptr) {
+      layers_ = layers_of(maps, how.layer);
     }
   }
 
-  const std::map<std::string, std::vector<std::size_t>>& of_label() const { return of_label_; }
-  std::size_t fold(std::size_t press) const { return fold_[press]; }
-  /// Whether a press is of an object with another press, of another fold.
-  bool tried(const Press& press) const { return of_label_.at(press.label).size() > 1; }
-  std::vector<bool> outside(std::size_t fold) const {
-    std::vector<bool> marks;
-    for (const std::size_t own : fold_) {
-      marks.push_back(own != fold);
+  const std::vector<std::string>& labels() const { return labels_; }
+
+  /// Adds what the presses of a fold get from the maps and presses of the others.
+  /// @param counter counts labels
+  void try_fold(std::size_t fold, HostProgress& counter, CrossValidation& result) const {
+    const std::vector<std::vector<std::size_t>> of_label = maps_outside(fold);
+    std::vector<std::size_t> tried;
+    std::vector<LabelledFeatures> building;
+    for (std::size_t i = 0; i < presses_.size(); ++i) {
+      if (fold_[i] != fold) {
+        building.push_back({presses_[i].label, features_of(presses_[i], how_.contact.classifier)});
+      } else if (const auto label = label_of(presses_[i]); label && !of_label[*label].empty()) {
+        tried.push_back(i);
+      }
     }
-    return marks;
+    if (tried.empty()) {
+      return;
+    }
+    const auto scores = score(fold, tried, of_label, counter);
+    const LearnedFeatures features = learn_features(building);
+    for (std::size_t i = 0; i < tried.size(); ++i) {
+      add(presses_[tried[i]], scores[i], features, result);
+    }
   }
 
  private:
-  std::map<std::string, std::vector<std::size_t>> of_label_;
+  /// The press's label by index; none where no map bears it.
+  std::optional<std::size_t> label_of(const Press& press) const {
+    const auto at = std::ranges::lower_bound(labels_, press.label);
+    if (at == labels_.end() || *at != press.label) {
+      return {};
+    }
+    return static_cast<std::size_t>(at - labels_.begin());
+  }
+
+  /// The maps that hold no press of a fold, [label].
+  std::vector<std::vector<std::size_t>> maps_outside(std::size_t fold) const {
+    std::vector<std::vector<std::size_t>> of_label(labels_.size());
+    for (std::size_t map = 0; map < maps_.size(); ++map) {
+      const auto label = static_cast<std::size_t>(
+          std::ranges::lower_bound(labels_, maps_[map].map.label) - labels_.begin());
+      const bool outside = std::ranges::none_of(
+          maps_[map].presses, [&](std::size_t press) { return fold_[press] == fold; });
+      if (outside && of_label[label].size() < options_.maps_per_object) {
+        of_label[label].push_back(map);
+      }
+    }
+    return of_label;
+  }
+
+  /// The scores of presses, [press][label].
+  std::vector<std::vector<LabelScore>> score(std::size_t fold,
+                                             const std::vector<std::size_t>& tried,
+                                             const std::vector<std::vector<std::size_t>>& of_label,
+                                             HostProgress& counter) const {
+    std::optional<LearnedTable> table;
+    if (placed_ != nullptr) {
+      std::vector<bool> outside;
+      for (const std::size_t own : fold_) {
+        outside.push_back(own != fold);
+      }
+      table =
+          table_of(count_placed(placed_->placements, presses_, maps_, layers_, how_, outside), how_);
+    }
+    std::vector<std::vector<LabelScore>> scores(tried.size(),
+                                                std::vector<LabelScore>(labels_.size()));
+    tbb::parallel_for(std::size_t{0}, labels_.size(), [&](std::size_t label) {
+      const ContactModel contact =
+          table ? contact_with(how_.contact, *table, labels_[label]) : how_.contact;
+      for (const std::size_t map : of_label[label]) {
+        Hypothesis hypothesis{.map = maps_[map].map};
+        if (table) {
+          hypothesis.layer = layers_[map];
+        }
+        PressPlacer placer(hypothesis, contact, how_.lattice);
+        for (std::size_t i = 0; i < tried.size(); ++i) {
+          scores[i][label].add(placer.place(presses_[tried[i]]));
+        }
+      }
+      counter.add();
+    });
+    return scores;
+  }
+
+  void add(const Press& press, const std::vector<LabelScore>& scores,
+           const LearnedFeatures& features, CrossValidation& result) const {
+    const double elements = known_elements(press, how_.contact.classifier);
+    const PressFeatures own = features_of(press, how_.contact.classifier);
+    ScoredPress scored{.truth = *label_of(press), .log_evidence = {}, .log_density = {}};
+    double best = nothing;
+    double best_other = nothing;
+    for (std::size_t label = 0; label < labels_.size(); ++label) {
+      scored.log_evidence.push_back(scores[label].log_evidence());
+      const auto known = features.objects.find(labels_[label]);
+      scored.log_density.push_back(
+          (known == features.objects.end() ? features.any : known->second).log_density(own));
+      best = std::max(best, scores[label].best_log_likelihood);
+      if (label != scored.truth) {
+        best_other = std::max(best_other, scores[label].best_log_likelihood);
+      }
+    }
+    result.presses.push_back(std::move(scored));
+    result.known.push_back(best / elements);
+    if (best_other != nothing) {
+      result.unknown.push_back(best_other / elements);
+    }
+  }
+
+  const std::vector<Press>& presses_;
+  const std::vector<TrainingMap>& maps_;
+  const TableLearning& how_;
+  const PlacedPresses* placed_;
+  const CrossValidationOptions& options_;
   std::vector<std::size_t> fold_;
+  std::vector<std::string> labels_;
+  std::vector<OccupancyGrid> layers_;
 };
 
-void require_sound(const Folds& folds, const CrossValidationOptions& options) {
+}  // namespace
+
+CrossValidation cross_validate(const std::vector<Press>& presses,
+                               const std::vector<TrainingMap>& maps, const TableLearning& how,
+                               const PlacedPresses* placed, const CrossValidationOptions& options,
+                               const std::function<void(double)>& progress) {
   if (options.folds < 2 || options.maps_per_object < 1) {
     throw Error(Fault::input,
                 fmt::format("cross-validation: {} folds and {} maps per object; give at least two "
                             "folds and a map",
                             options.folds, options.maps_per_object));
   }
-  if (std::ranges::none_of(folds.of_label(),
-                           [](const auto& object) { return object.second.size() > 1; })) {
-    throw Error(Fault::input, "cross-validation: no object has two presses; give more presses");
-  }
-}
-
-}  // namespace
-
-CrossValidation cross_validate(const std::vector<Press>& presses,
-                               const std::vector<OccupancyGrid>& maps, const TableLearning& how,
-                               const PlacedPresses* placed, const CrossValidationOptions& options,
-                               const std::function<void(double)>& progress) {
-  const Folds folds(presses, options.folds);
-  require_sound(folds, options);
-  std::vector<OccupancyGrid> layers(placed == nullptr ? 0 : maps.size());
-  tbb::parallel_for(std::size_t{0}, layers.size(),
-                    [&](std::size_t i) { layers[i] = reading_layer(maps[i], how.layer); });
+  const Validation validation(presses, maps, how, placed, options);
   CrossValidation result;
-  for (const auto& [label, own] : folds.of_label()) {
-    result.labels.push_back(label);
-  }
-  const std::size_t label_count = result.labels.size();
-  HostProgress counter(options.folds * label_count, progress);
+  result.labels = validation.labels();
+  HostProgress counter(options.folds * result.labels.size(), progress);
   for (std::size_t fold = 0; fold < options.folds; ++fold) {
-    const std::vector<bool> outside = folds.outside(fold);
-    std::vector<std::size_t> tried;
-    std::vector<LabelledFeatures> building;
-    for (std::size_t i = 0; i < presses.size(); ++i) {
-      if (outside[i]) {
-        building.push_back({presses[i].label, features_of(presses[i], how.contact.classifier)});
-      } else if (folds.tried(presses[i])) {
-        tried.push_back(i);
-      }
-    }
-    if (tried.empty()) {
-      continue;
-    }
-    std::optional<LearnedTable> table;
-    if (placed != nullptr) {
-      table = table_of(count_placed(placed->placements, presses, layers, how, outside), how);
-    }
-    const LearnedFeatures features = learn_features(building);
-    std::vector<std::vector<LabelScore>> scores(tried.size(), std::vector<LabelScore>(label_count));
-    tbb::parallel_for(std::size_t{0}, label_count, [&](std::size_t label) {
-      const ContactModel contact =
-          table ? contact_with(how.contact, *table, result.labels[label]) : how.contact;
-      std::size_t used = 0;
-      for (const std::size_t map : folds.of_label().at(result.labels[label])) {
-        if (!outside[map] || used == options.maps_per_object) {
-          continue;
-        }
-        ++used;
-        Hypothesis hypothesis{.map = maps[map]};
-        if (table) {
-          hypothesis.layer = layers[map];
-        }
-        PressPlacer placer(hypothesis, contact, how.lattice);
-        for (std::size_t i = 0; i < tried.size(); ++i) {
-          scores[i][label].add(placer.place(presses[tried[i]]));
-        }
-      }
-      counter.add();
-    });
-    for (std::size_t i = 0; i < tried.size(); ++i) {
-      const Press& press = presses[tried[i]];
-      const double elements = static_cast<double>(known_elements(press, how.contact.classifier));
-      const PressFeatures own = features_of(press, how.contact.classifier);
-      ScoredPress scored;
-      double best = nothing;
-      double best_other = nothing;
-      for (std::size_t label = 0; label < label_count; ++label) {
-        const bool truth = result.labels[label] == press.label;
-        scored.truth = truth ? label : scored.truth;
-        scored.log_evidence.push_back(scores[i][label].log_evidence());
-        const auto known = features.objects.find(result.labels[label]);
-        scored.log_density.push_back(
-            (known == features.objects.end() ? features.any : known->second).log_density(own));
-        best = std::max(best, scores[i][label].best_log_likelihood);
-        best_other =
-            truth ? best_other : std::max(best_other, scores[i][label].best_log_likelihood);
-      }
-      result.presses.push_back(std::move(scored));
-      result.known.push_back(best / elements);
-      if (best_other != nothing) {
-        result.unknown.push_back(best_other / elements);
-      }
-    }
+    validation.try_fold(fold, counter, result);
+  }
+  if (result.presses.empty()) {
+    throw Error(Fault::input,
+                "cross-validation: no touch has a map of its object that was built without it; "
+                "give more touches");
   }
   return result;
 }

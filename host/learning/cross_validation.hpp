@@ -2,13 +2,13 @@
 
 #include <cstddef>
 #include <functional>
-#include <span>
 #include <string>
 #include <vector>
 
 #include "familiarity_fit.hpp"
 #include "table_learning.hpp"
 #include "temperature_fit.hpp"
+#include "training_maps.hpp"
 
 namespace palpate {
 
@@ -19,23 +19,23 @@ struct CrossValidationOptions {
 
 /// What models that had not seen the presses said of them.
 struct CrossValidation {
-  std::vector<std::string> labels;   ///< of all objects
-  std::vector<ScoredPress> presses;  ///< those of objects with two presses or more
+  std::vector<std::string> labels;   ///< of all maps, ascending
+  std::vector<ScoredPress> presses;  ///< those that have a map of their object in the other folds
   /// See FamiliarityScores: with the maps of all objects, and without those of the press's own.
   std::vector<double> known;
   std::vector<double> unknown;
 };
 
-/// Recognises every press with maps and numbers of the presses of other folds alone. Press k of an
-/// object is in fold k % folds. The log evidence of a label is the log of the mean over its maps;
-/// an object without a map in the other folds has none, -infinity.
+/// Recognises every press, at an unknown pose, with maps and numbers of the presses of other folds
+/// alone, see folds_of(). The log evidence of a label is the log of the mean over its maps; an
+/// object without a map in the other folds has none, -infinity.
 /// @param placed what learn_table() found for all presses: counts leave a fold's presses and maps
 /// out. None: Eq. 7 on the maps' log odds
 /// @param progress called with the fraction done, by one thread at a time
-/// @throws Error where no object has two presses, on fewer than two folds or no map per object, and
-/// as PressPlacer does; what `progress` throws
+/// @throws Error where no press has a map of its object in the other folds, on fewer than two folds
+/// or no map per object, and as PressPlacer does; what `progress` throws
 CrossValidation cross_validate(const std::vector<Press>& presses,
-                               const std::vector<OccupancyGrid>& maps, const TableLearning& how,
+                               const std::vector<TrainingMap>& maps, const TableLearning& how,
                                const PlacedPresses* placed, const CrossValidationOptions& options,
                                const std::function<void(double)>& progress = {});
 

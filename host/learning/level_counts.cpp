@@ -14,11 +14,9 @@ namespace palpate {
 namespace {
 
 constexpr int nodes = ReadingLayer::nodes;
-constexpr double node_step = (ReadingLayer::largest_value - ReadingLayer::first_node) / (nodes - 1);
+constexpr double node_step = LevelCounts::node_step;
 /// Values below belong to cells that nothing sensed.
 constexpr double least_sensed = -ReadingLayer::largest_value;
-
-double node_value(int node) { return ReadingLayer::first_node + node_step * node; }
 
 /// The value that a reading layer gives to a pressure; see ReadingLayer.
 double value_of_level(double level, const ReadingLayer& layer) {
@@ -88,7 +86,7 @@ std::vector<double> initial_table(const ReadingLayer& layer, std::size_t levels,
   const double contacts = static_cast<double>(levels - 1);
   std::vector<double> table(levels * nodes);
   for (int node = 0; node < nodes; ++node) {
-    const double value = node_value(node);
+    const double value = LevelCounts::value_at(node);
     const MapSample sample{.log_odds = value < least_sensed
                                            ? log_odds_from_probability(eq7.prior.value())
                                            : value - threshold_value};

@@ -17,6 +17,11 @@ namespace palpate {
 /// nearness, as the table's interpolation weighs them.
 class LevelCounts {
  public:
+  static constexpr double node_step =
+      (ReadingLayer::largest_value - ReadingLayer::first_node) / (ReadingLayer::nodes - 1);
+  /// The layer's value at a node.
+  static double value_at(int node) { return ReadingLayer::first_node + node_step * node; }
+
   explicit LevelCounts(std::size_t levels);
 
   /// Counts one reading; Unknown changes nothing.

@@ -1,11 +1,11 @@
 #include "press.hpp"
 
+#include <algorithm>
+#include <map>
+
 #include <fmt/format.h>
-#include <tbb/parallel_for.h>
 
 #include "bounding_box.hpp"
-#include "observed_map.hpp"
-#include "palpate/error.hpp"
 
 namespace palpate {
 
@@ -16,33 +16,37 @@ Press single_press(const Recording& recording, std::size_t touch) {
   return press;
 }
 
-Press posed_press(const Recording& recording) {
-  Press press{recording.path, recording.object, recording.touches(0, recording.size())};
-  BoundingBox box;
-  for (const Touch& touch : press.touches) {
-    for (const glm::dvec2& element : touch.elements_mm) {
-      box.take_in(touch.T_robot_sensor * element);
-    }
-  }
-  if (!box.empty()) {
-    for (Touch& touch : press.touches) {
-      touch.T_robot_sensor.translation_mm -= box.middle();
-    }
-  }
+Press posed_press(const Recording& recording, std::size_t touch) {
+  Press press = single_press(recording, touch);
+  press.T_object_robot =
+      recording.touch(touch).T_robot_sensor * inverse(press.touches.front().T_robot_sensor);
   return press;
 }
 
-std::vector<OccupancyGrid> press_maps(const std::vector<Press>& presses,
-                                      const MapOptions& options) {
-  std::vector<OccupancyGrid> maps(presses.size());
-  tbb::parallel_for(std::size_t{0}, presses.size(), [&](std::size_t i) {
-    try {
-      maps[i] = observed_map(presses[i].touches, options, presses[i].label);
-    } catch (const Error& error) {
-      throw Error(error.fault(), fmt::format("{}: {}", presses[i].name, error.what()));
+std::vector<std::size_t> folds_of(const std::vector<Press>& presses, std::size_t folds) {
+  std::map<std::string, std::size_t> counted;
+  std::vector<std::size_t> fold;
+  for (const Press& press : presses) {
+    fold.push_back(counted[press.label]++ % folds);
+  }
+  return fold;
+}
+
+std::vector<double> contact_pressures(const std::vector<Press>& presses,
+                                      const ContactClassifier& classifier) {
+  std::vector<double> pressures;
+  for (const Press& press : presses) {
+    for (const Touch& touch : press.touches) {
+      const std::vector<Reading> readings = classifier.classify(touch);
+      for (std::size_t e = 0; e < readings.size(); ++e) {
+        if (is_contact(readings[e])) {
+          pressures.push_back(touch.pressure[e]);
+        }
+      }
     }
-  });
-  return maps;
+  }
+  std::ranges::sort(pressures);
+  return pressures;
 }
 
 }  // namespace palpate

@@ -1,33 +1,39 @@
 #pragma once
 
+#include <cstddef>
+#include <optional>
 #include <string>
 #include <vector>
 
-#include "palpate/map_builder.hpp"
-#include "palpate/occupancy_grid.hpp"
+#include "palpate/contact.hpp"
+#include "palpate/pose.hpp"
 #include "palpate/touch.hpp"
 
 namespace palpate {
 
-/// Touches of one object that share one unknown pose of the object: a single touch, or several at
-/// poses that are known relative to each other. Views into recordings that the caller keeps alive.
+/// A touch, or several at poses that are known relative to each other, of an object. Views into
+/// recordings that the caller keeps alive.
 struct Press {
   std::string name;   ///< for messages, such as "pen.h5, touch 3"
   std::string label;  ///< of the object
   std::vector<Touch> touches;
+  /// Where the robot knew the object's pose; maps that the press is compared with are in the object
+  /// frame of its recording then.
+  std::optional<Pose> T_object_robot = {};
 };
 
 /// One touch as a press: its pose is unknown, so the robot frame is put where the middle of the
 /// array's elements is the origin and theta is 0.
 Press single_press(const Recording& recording, std::size_t touch);
 
-/// A recording as one press. The robot frame is moved, not turned, so that the middle of all
-/// touches' elements is the origin.
-Press posed_press(const Recording& recording);
+/// The same of a touch at a known pose, in a recording whose robot frame is the object's frame.
+Press posed_press(const Recording& recording, std::size_t touch);
 
-/// The map that each press makes alone, see observed_map(), in the press's robot frame. Takes all
-/// host threads.
-/// @throws Error, naming the press, as observed_map() does
-std::vector<OccupancyGrid> press_maps(const std::vector<Press>& presses, const MapOptions& options);
+/// The fold of every press: press k of an object is in fold k % folds.
+std::vector<std::size_t> folds_of(const std::vector<Press>& presses, std::size_t folds);
+
+/// Pressures of all elements In Contact, ascending.
+std::vector<double> contact_pressures(const std::vector<Press>& presses,
+                                      const ContactClassifier& classifier);
 
 }  // namespace palpate

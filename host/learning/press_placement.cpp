@@ -18,16 +18,6 @@ namespace {
 /// Bins that are evaluated at the elements' own places.
 constexpr std::size_t evaluated_bins = 8;
 
-BoundingBox box_of(const Press& press) {
-  BoundingBox box;
-  for (const Touch& touch : press.touches) {
-    for (const glm::dvec2& element : touch.elements_mm) {
-      box.take_in(touch.T_robot_sensor * element);
-    }
-  }
-  return box;
-}
-
 }  // namespace
 
 int PressPlacer::Samples::nearest(double mm) const {
@@ -209,20 +199,19 @@ double PressPlacer::log_likelihood(const std::vector<Element>& elements,
   return sum;
 }
 
-PoseLattice placing_lattice(std::span<const Press> presses, double step_mm, double step_rad) {
-  glm::dvec2 half_mm(0.0);
-  for (const Press& press : presses) {
-    if (const BoundingBox box = box_of(press); !box.empty()) {
-      half_mm = glm::max(half_mm, box.extent() / 2.0);
-    }
+PoseLattice placing_lattice(std::span<const TrainingMap> maps, double step_mm, double step_rad) {
+  BoundingBox box;
+  for (const TrainingMap& map : maps) {
+    box.take_in(map.map.centre_mm(0, 0));
+    box.take_in(map.map.centre_mm(map.map.nx - 1, map.map.ny - 1));
   }
-  const auto axis = [](double half, double step) {
-    return Axis{-half, half, std::max(1, static_cast<int>(std::ceil(2.0 * half / step - 1e-9)))};
+  const auto axis = [](double lower, double upper, double step) {
+    return Axis{lower, upper,
+                std::max(1, static_cast<int>(std::ceil((upper - lower) / step - 1e-9)))};
   };
-  Axis theta = axis(std::numbers::pi, step_rad);
-  theta.lower = 0.0;
-  theta.upper = 2.0 * std::numbers::pi;
-  return {.x_mm = axis(half_mm.x, step_mm), .y_mm = axis(half_mm.y, step_mm), .theta_rad = theta};
+  return {.x_mm = axis(box.lower.x, box.upper.x, step_mm),
+          .y_mm = axis(box.lower.y, box.upper.y, step_mm),
+          .theta_rad = axis(0.0, 2.0 * std::numbers::pi, step_rad)};
 }
 
 }  // namespace palpate

@@ -9,6 +9,7 @@
 #include "palpate/estimate.hpp"
 #include "palpate/lattice.hpp"
 #include "press.hpp"
+#include "training_maps.hpp"
 
 namespace palpate {
 
@@ -77,9 +78,8 @@ class PressPlacer {
   std::vector<float> rest_;          ///< log-likelihood of No Contact everywhere, [theta, y, x]
 };
 
-/// A lattice for placing presses on each other's maps: T_object_robot over half of the extent of
-/// the largest press to either side of the origin, at steps of at most `step_mm`, and all angles at
-/// steps of at most `step_rad`.
-PoseLattice placing_lattice(std::span<const Press> presses, double step_mm, double step_rad);
+/// A lattice for placing presses on maps: T_object_robot within the box around all maps, at steps of
+/// at most `step_mm`, and all angles at steps of at most `step_rad`.
+PoseLattice placing_lattice(std::span<const TrainingMap> maps, double step_mm, double step_rad);
 
 }  // namespace palpate

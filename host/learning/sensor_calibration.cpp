@@ -2,14 +2,17 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <set>
 
 #include <fmt/format.h>
 
+#include "contact_learning.hpp"
 #include "cross_validation.hpp"
 #include "element_spacing.hpp"
 #include "feature_learning.hpp"
 #include "palpate/error.hpp"
+#include "point_spread.hpp"
 
 namespace palpate {
 
@@ -18,80 +21,184 @@ namespace {
 /// Shares of the time that a calibration takes.
 constexpr double table_share = 0.4;
 constexpr double validation_share = 0.3;  ///< of Eq. 7, and of the table
+constexpr double step_rad = std::numbers::pi / 18.0;  ///< of the poses at which presses are placed
 
-std::vector<double> contact_pressures(const std::vector<Press>& presses,
-                                      const ContactClassifier& classifier) {
-  std::vector<double> pressures;
-  for (const Press& press : presses) {
-    for (const Touch& touch : press.touches) {
-      const std::vector<Reading> readings = classifier.classify(touch);
-      for (std::size_t e = 0; e < readings.size(); ++e) {
-        if (is_contact(readings[e])) {
-          pressures.push_back(touch.pressure[e]);
+/// A calibration in the making.
+class SensorLearning {
+ public:
+  SensorLearning(const std::vector<Press>& presses, const SensorCalibrationOptions& options)
+      : presses_(presses), options_(options) {
+    if (options.levels < 2 || options.levels > most_reading_levels) {
+      throw Error(Fault::input, fmt::format("levels = {}: give 2 to {}", options.levels,
+                                            most_reading_levels));
+    }
+    known_poses_ = std::ranges::all_of(
+        presses, [](const Press& press) { return press.T_object_robot.has_value(); });
+    for (const Press& press : presses) {
+      if (const auto spacing = spacing_of(press.touches.front().elements_mm)) {
+        spacing_mm_ = std::max(spacing_mm_, spacing->nearest_mm.most);
+      }
+    }
+    if (!(spacing_mm_ > 0.0)) {
+      throw Error(Fault::input, "the arrays have one element each; a calibration needs several");
+    }
+    result_.sensor.pressure_unit = options.pressure_unit;
+  }
+
+  SensorCalibration run(const std::vector<OccupancyGrid>& given,
+                        const std::function<void(double)>& progress) {
+    const auto part = [&](double begin, double share) {
+      return [&progress, begin, share](double fraction) {
+        if (progress) {
+          progress(begin + share * fraction);
         }
+      };
+    };
+    learn_readings();
+    make_maps(given);
+    const TableLearning how = table_learning();
+    const PlacedPresses placed = learn_table(presses_, maps_, how, part(0.0, table_share));
+    result_.sensor.table = placed.table;
+    learn_gamma(placed, how);
+    std::set<std::string> labels;
+    for (const TrainingMap& map : maps_) {
+      labels.insert(map.map.label);
+    }
+    result_.objects = labels.size();
+    if (labels.size() < 2) {
+      result_.warnings.emplace_back(
+          "touches of one object say nothing about confidence: the temperature stays 1, and "
+          "neither features nor familiarity are learned; give touches of two objects or more");
+      return std::move(result_);
+    }
+    const CrossValidationOptions folds{.folds = options_.folds,
+                                       .maps_per_object = options_.most_maps};
+    const CrossValidation eq7 = cross_validate(presses_, maps_, how, nullptr, folds,
+                                               part(table_share, validation_share));
+    const CrossValidation learned =
+        cross_validate(presses_, maps_, how, &placed, folds,
+                       part(table_share + validation_share, 1.0 - table_share - validation_share));
+    learn_confidence(eq7, learned);
+    return std::move(result_);
+  }
+
+ private:
+  void learn_readings() {
+    LearnedSensor& sensor = result_.sensor;
+    if (options_.threshold && options_.ratio) {
+      sensor.classifier = {.threshold = *options_.threshold, .ratio = *options_.ratio};
+    } else {
+      sensor.classifier = learn_classifier(presses_);
+      sensor.classifier.ratio = options_.ratio.value_or(sensor.classifier.ratio);
+      sensor.classifier.threshold = options_.threshold.value_or(sensor.classifier.threshold);
+    }
+    sensor.noise = noise_floor(presses_, sensor.classifier);
+    // Noise alone is to make no contact.
+    constexpr double noise_sd = 3.0;
+    if (!options_.threshold) {
+      sensor.classifier.threshold =
+          std::max(sensor.classifier.threshold, noise_sd * sensor.noise);
+    }
+    sensor.classifier.validate();
+    std::vector<Touch> touches;
+    for (const Press& press : presses_) {
+      touches.insert(touches.end(), press.touches.begin(), press.touches.end());
+    }
+    sensor.prior = share_in_contact(touches, sensor.classifier);
+    // As for maps of presses at unknown poses: leaves no gaps between the elements of a press.
+    constexpr double of_spacing = 0.6;
+    sensor.spread_mm = of_spacing * spacing_mm_;
+    if (known_poses_) {
+      sensor.psf_mm = learn_point_spread(presses_, sensor.classifier);
+      if (sensor.psf_mm) {
+        sensor.spread_mm = *sensor.psf_mm / 2.0;
+      } else {
+        result_.warnings.emplace_back(
+            "the touches do not tell the point spread: too few of an object, or no edges; the "
+            "maps' spread is 0.6 element spacings");
       }
     }
   }
-  std::ranges::sort(pressures);
-  return pressures;
-}
 
-/// The largest spacing of the presses' arrays.
-double spacing_mm(const std::vector<Press>& presses, double without) {
-  double largest = 0.0;
-  for (const Press& press : presses) {
-    if (const auto spacing = spacing_of(press.touches.front().elements_mm)) {
-      largest = std::max(largest, spacing->nearest_mm.most);
-    }
-  }
-  return largest > 0.0 ? largest : without;
-}
-
-TableLearning learning_of(const std::vector<Press>& presses,
-                          const SensorCalibrationOptions& options) {
-  constexpr double near = 2.0;  // in spacings of the elements
-  constexpr double far = 6.0;
-  const double spacing = spacing_mm(presses, 2.0 * options.map.sensor.spread_mm);
-  const std::vector<double> pressures = contact_pressures(presses, options.map.classifier);
-  TableLearning how;
-  if (options.layer == MapLayer::mean_level) {
-    how.layer = mean_level_layer(options.map.classifier.threshold,
-                                 pressures.empty() ? 0.0 : pressures.back());
-  }
-  how.layer.near_mm = near * spacing;
-  how.layer.far_mm = far * spacing;
-  how.level_edges = level_edges_of(presses, options.map.classifier, options.levels);
-  how.contact = {.classifier = options.map.classifier,
-                 .gamma = options.gamma,
-                 .prior = options.map.sensor.prior};
-  how.lattice = placing_lattice(presses, options.step_mm, options.step_rad);
-  return how;
-}
-
-/// Calibration of presses whose temperature and weight come from the other half of them.
-Calibration validated(const std::vector<ScoredPress>& presses) {
-  std::vector<ScoredPress> tempered;
-  for (std::size_t half = 0; half < 2; ++half) {
-    std::vector<ScoredPress> others;
-    for (std::size_t i = 0; i < presses.size(); ++i) {
-      if (i % 2 != half) {
-        others.push_back(presses[i]);
+  void make_maps(const std::vector<OccupancyGrid>& given) {
+    result_.maps = {.cell_mm = 0.5 * spacing_mm_,
+                    .sensor = {.spread_mm = result_.sensor.spread_mm,
+                               .prior = result_.sensor.prior},
+                    .classifier = result_.sensor.classifier};
+    if (!given.empty()) {
+      for (const OccupancyGrid& map : given) {
+        maps_.push_back({map});
       }
-    }
-    if (others.empty()) {
-      others = presses;
-    }
-    const TemperatureFit fit = fit_temperature(others);
-    for (std::size_t i = half; i < presses.size(); i += 2) {
-      ScoredPress press{.truth = presses[i].truth, .log_evidence = {}, .log_density = {}};
-      for (const double p : label_probabilities(presses[i], fit.temperature, fit.feature_weight)) {
-        press.log_evidence.push_back(std::log(p));
-      }
-      tempered.push_back(std::move(press));
+    } else if (known_poses_) {
+      maps_ = maps_without_folds(presses_, result_.maps, options_.folds);
+    } else {
+      maps_ = maps_of_presses(presses_, result_.maps);
     }
   }
-  return calibration_of(tempered, 1.0);
-}
+
+  TableLearning table_learning() const {
+    constexpr double near = 2.0;  // in spacings of the elements
+    constexpr double far = 6.0;
+    const std::vector<double> pressures =
+        contact_pressures(presses_, result_.sensor.classifier);
+    TableLearning how;
+    if (options_.layer == MapLayer::mean_level) {
+      how.layer = mean_level_layer(result_.sensor.classifier.threshold,
+                                   pressures.empty() ? 0.0 : pressures.back());
+    }
+    how.layer.near_mm = near * spacing_mm_;
+    how.layer.far_mm = far * spacing_mm_;
+    how.level_edges = level_edges_of(presses_, result_.sensor.classifier, options_.levels);
+    how.contact = {.classifier = result_.sensor.classifier,
+                   .gamma = ContactModel{}.gamma,
+                   .prior = result_.sensor.prior};
+    how.lattice = placing_lattice(maps_, spacing_mm_, step_rad);
+    return how;
+  }
+
+  /// Counts the placed presses over log odds.
+  void learn_gamma(const PlacedPresses& placed, const TableLearning& table) {
+    TableLearning how = table;
+    how.layer = {.near_mm = table.layer.near_mm, .far_mm = table.layer.far_mm};
+    how.level_edges.clear();
+    LevelCounts all(2);
+    for (const auto& [label, counts] : count_placed(placed.placements, presses_, maps_,
+                                                    layers_of(maps_, how.layer), how)) {
+      all += counts;
+    }
+    result_.sensor.gamma = fit_gamma(all, result_.sensor.prior);
+  }
+
+  void learn_confidence(const CrossValidation& eq7, const CrossValidation& learned) {
+    result_.before = calibration_of(eq7.presses, 1.0);
+    result_.presses_before = eq7.presses;
+    result_.table = calibration_of(learned.presses, 1.0);
+    result_.presses_after = tempered_by_halves(learned.presses);
+    result_.after = calibration_of(result_.presses_after, 1.0);
+    const TemperatureFit fit = fit_temperature(learned.presses);
+    result_.sensor.temperature = fit.temperature;
+    std::vector<LabelledFeatures> features;
+    for (const Press& press : presses_) {
+      features.push_back(
+          {press.label, press_features(press.touches.front(), result_.sensor.classifier)});
+    }
+    result_.sensor.features = learn_features(features);
+    result_.sensor.features->weight = fit.feature_weight;
+    if (learned.unknown.empty()) {
+      return;
+    }
+    const FamiliarityScores scores{learned.known, learned.unknown};
+    result_.sensor.familiarity = fit_familiarity(scores);
+    result_.area_under_curve = area_under_curve(scores);
+  }
+
+  const std::vector<Press>& presses_;
+  const SensorCalibrationOptions& options_;
+  bool known_poses_ = false;
+  double spacing_mm_ = 0.0;
+  std::vector<TrainingMap> maps_;
+  SensorCalibration result_;
+};
 
 }  // namespace
 
@@ -109,61 +216,13 @@ std::vector<double> level_edges_of(const std::vector<Press>& presses,
 }
 
 SensorCalibration calibrate_sensor(const std::vector<Press>& presses,
+                                   const std::vector<OccupancyGrid>& given,
                                    const SensorCalibrationOptions& options,
                                    const std::function<void(double)>& progress) {
-  if (options.levels < 2 || options.levels > most_reading_levels) {
-    throw Error(Fault::input,
-                fmt::format("levels = {}: give 2 to {}", options.levels, most_reading_levels));
+  if (presses.empty()) {
+    throw Error(Fault::input, "no touches; give recordings with touches");
   }
-  const auto part = [&](double begin, double share) {
-    return [&progress, begin, share](double fraction) {
-      if (progress) {
-        progress(begin + share * fraction);
-      }
-    };
-  };
-  const std::vector<OccupancyGrid> maps = press_maps(presses, options.map);
-  const TableLearning how = learning_of(presses, options);
-  const PlacedPresses placed = learn_table(presses, maps, how, part(0.0, table_share));
-
-  SensorCalibration result;
-  std::set<std::string> labels;
-  std::vector<LabelledFeatures> features;
-  for (const Press& press : presses) {
-    labels.insert(press.label);
-    features.push_back(
-        {press.label, press_features(press.touches.front(), options.map.classifier)});
-  }
-  result.objects = labels.size();
-  result.sensor = {.pressure_unit = options.pressure_unit,
-                   .classifier = options.map.classifier,
-                   .gamma = options.gamma,
-                   .prior = options.map.sensor.prior,
-                   .spread_mm = options.map.sensor.spread_mm,
-                   .table = placed.table};
-  if (labels.size() < 2) {
-    result.warnings.emplace_back(
-        "presses of one object say nothing about confidence: the temperature stays 1, and neither "
-        "features nor familiarity are learned; give presses of two objects or more");
-    return result;
-  }
-  const CrossValidationOptions folds{.folds = options.folds, .maps_per_object = options.most_maps};
-  const CrossValidation eq7 =
-      cross_validate(presses, maps, how, nullptr, folds, part(table_share, validation_share));
-  const CrossValidation learned =
-      cross_validate(presses, maps, how, &placed, folds,
-                     part(table_share + validation_share, 1.0 - table_share - validation_share));
-  result.before = calibration_of(eq7.presses, 1.0);
-  result.table = calibration_of(learned.presses, 1.0);
-  result.after = validated(learned.presses);
-  const TemperatureFit fit = fit_temperature(learned.presses);
-  result.sensor.temperature = fit.temperature;
-  result.sensor.features = learn_features(features);
-  result.sensor.features->weight = fit.feature_weight;
-  const FamiliarityScores scores{learned.known, learned.unknown};
-  result.sensor.familiarity = fit_familiarity(scores);
-  result.area_under_curve = area_under_curve(scores);
-  return result;
+  return SensorLearning(presses, options).run(given, progress);
 }
 
 }  // namespace palpate

@@ -7,21 +7,20 @@
 #include <vector>
 
 #include "palpate/learned_sensor.hpp"
-#include "palpate/map_builder.hpp"
+#include "palpate/occupancy_grid.hpp"
 #include "press.hpp"
 #include "temperature_fit.hpp"
+#include "training_maps.hpp"
 
 namespace palpate {
 
-/// What a calibration from presses at unknown poses starts from.
+/// What a calibration starts from.
 struct SensorCalibrationOptions {
   std::string pressure_unit = "kPa";
-  MapOptions map;      ///< of each press; its classifier and its prior are those of Eq. 7
-  double gamma = 0.1;  ///< of Eq. 7
+  std::optional<double> threshold;  ///< learned where there is none
+  std::optional<double> ratio;      ///< the same
   MapLayer layer = MapLayer::mean_level;
   std::size_t levels = 7;     ///< of readings, No Contact included; at least 2
-  double step_mm = 2.0;       ///< of the poses at which presses are placed
-  double step_rad = 0.1745;   ///< 10 degrees
   std::size_t folds = 5;      ///< of the cross-validation
   std::size_t most_maps = 5;  ///< of an object, in the cross-validation
 };
@@ -29,23 +28,34 @@ struct SensorCalibrationOptions {
 /// A learned sensor and how good it is on presses that it has not seen.
 struct SensorCalibration {
   LearnedSensor sensor;
+  MapOptions maps;  ///< of the maps that presses were compared with
   std::size_t objects = 0;
-  Calibration before;  ///< Eq. 7, temperature 1
-  Calibration table;   ///< the table, temperature 1
-  Calibration after;   ///< the table, temperature and features
+  /// Of the cross-validation; none with one object.
+  std::optional<Calibration> before;  ///< Eq. 7 with gamma 0.1, temperature 1
+  std::optional<Calibration> table;   ///< the table, temperature 1
+  std::optional<Calibration> after;   ///< the table, temperature and features
+  std::vector<ScoredPress> presses_before;  ///< what `before` is of, log probabilities
+  std::vector<ScoredPress> presses_after;   ///< what `after` is of, log probabilities
   /// Area under the curve of presses whose object is known against those whose object is left out;
   /// none with one object.
   std::optional<double> area_under_curve;
   std::vector<std::string> warnings;  ///< what could not be learned, in whole sentences
 };
 
-/// Learns the table, the temperature, the features' distributions with their weight, and the
-/// familiarity. What one object cannot tell (temperature, weight, familiarity) keeps its default,
-/// with a warning. The numbers before and after are of cross-validation; `after` gives each half of
-/// the presses the temperature and weight of the other half. Takes all host threads.
-/// @throws Error where no object has two presses, on levels out of range, and as press_maps() and
-/// learn_table() do; what `progress` throws
+/// Learns from presses the contact threshold and ratio, the noise floor, gamma, the prior, the
+/// table, the temperature, the features' distributions with their weight, and the familiarity; from
+/// presses at known poses the point spread, too. What one object cannot tell (temperature, weight,
+/// familiarity) keeps its default, with a warning. The numbers before and after are of
+/// cross-validation; `after` gives each half of the presses the temperature and weight of the other
+/// half. Takes all host threads.
+/// @param presses all at known poses or all at unknown ones
+/// @param given maps to compare presses with, with their mean level where `options.layer` is that;
+/// without: maps of other presses
+/// @throws Error where no press has a map of its object that it is no part of, on levels out of
+/// range, where presses tell no threshold, and as observed_map() and learn_table() do; what
+/// `progress` throws
 SensorCalibration calibrate_sensor(const std::vector<Press>& presses,
+                                   const std::vector<OccupancyGrid>& given,
                                    const SensorCalibrationOptions& options,
                                    const std::function<void(double)>& progress = {});
 

@@ -1,37 +1,70 @@
 #include "table_learning.hpp"
 
 #include <algorithm>
+#include <optional>
 
 #include <fmt/format.h>
 #include <tbb/parallel_for.h>
 
 #include "host_progress.hpp"
-#include "observed_map.hpp"
 #include "palpate/error.hpp"
 
 namespace palpate {
 
 namespace {
 
-/// Places every press on every map of another press of its object. Takes all host threads.
+/// The maps on which each press is placed, [map][press]: those of its object that it is no part of,
+/// `most` at most, and all maps about equally often.
+std::vector<std::vector<std::size_t>> presses_by_map(const std::vector<Press>& presses,
+                                                     const std::vector<TrainingMap>& maps,
+                                                     std::size_t most) {
+  std::map<std::string, std::vector<std::size_t>> maps_of;
+  for (std::size_t map = 0; map < maps.size(); ++map) {
+    maps_of[maps[map].map.label].push_back(map);
+  }
+  std::vector<std::vector<std::size_t>> presses_of(maps.size());
+  std::map<std::string, std::size_t> placed_of;
+  for (std::size_t press = 0; press < presses.size(); ++press) {
+    const auto own = maps_of.find(presses[press].label);
+    if (own == maps_of.end()) {
+      continue;
+    }
+    const std::size_t first = placed_of[presses[press].label]++;
+    std::size_t used = 0;
+    for (std::size_t k = 1; k <= own->second.size() && used < most; ++k) {
+      const std::size_t map = own->second[(first + k) % own->second.size()];
+      if (!maps[map].holds(press)) {
+        presses_of[map].push_back(press);
+        ++used;
+      }
+    }
+  }
+  return presses_of;
+}
+
+/// Places presses on maps of their objects. Takes all host threads.
 std::vector<OwnPlacement> place_all(const std::vector<Press>& presses,
-                                    const std::vector<OccupancyGrid>& maps,
+                                    const std::vector<TrainingMap>& maps,
                                     const std::vector<OccupancyGrid>& layers,
                                     const TableLearning& how, const LearnedTable& table,
                                     HostProgress& progress) {
-  std::map<std::string, std::vector<std::size_t>> by_label;
-  for (std::size_t i = 0; i < presses.size(); ++i) {
-    by_label[presses[i].label].push_back(i);
-  }
+  const auto presses_of = presses_by_map(presses, maps, how.most_maps);
   std::vector<std::vector<OwnPlacement>> on_map(maps.size());
   tbb::parallel_for(std::size_t{0}, maps.size(), [&](std::size_t map) {
-    const std::string& label = presses[map].label;
-    const Hypothesis hypothesis{.map = maps[map], .layer = layers[map]};
-    PressPlacer placer(hypothesis, contact_with(how.contact, table, label), how.lattice);
-    for (const std::size_t press : by_label.at(label)) {
-      if (press != map) {
-        on_map[map].push_back({press, map, placer.place(presses[press])});
+    std::optional<PressPlacer> placer;
+    const Hypothesis hypothesis{.map = maps[map].map, .layer = layers[map]};
+    for (const std::size_t press : presses_of[map]) {
+      PressPlacement placement;
+      if (presses[press].T_object_robot) {
+        placement.T_object_robot = *presses[press].T_object_robot;
+      } else {
+        if (!placer) {
+          placer.emplace(hypothesis, contact_with(how.contact, table, hypothesis.map.label),
+                         how.lattice);
+        }
+        placement = placer->place(presses[press]);
       }
+      on_map[map].push_back({press, map, placement});
     }
     progress.add();
   });
@@ -79,37 +112,50 @@ ContactModel contact_with(const ContactModel& contact, const LearnedTable& table
   return model;
 }
 
-PlacedPresses learn_table(const std::vector<Press>& presses, const std::vector<OccupancyGrid>& maps,
-                          const TableLearning& how, const std::function<void(double)>& progress) {
-  std::map<std::string, int> presses_of;
-  for (const Press& press : presses) {
-    ++presses_of[press.label];
-  }
-  if (std::ranges::none_of(presses_of, [](const auto& of) { return of.second > 1; })) {
-    throw Error(Fault::input,
-                fmt::format("likelihood table: {} presses of {} objects; give at least two presses "
-                            "of one object",
-                            presses.size(), presses_of.size()));
-  }
+std::vector<OccupancyGrid> layers_of(const std::vector<TrainingMap>& maps,
+                                     const ReadingLayer& layer) {
   std::vector<OccupancyGrid> layers(maps.size());
   tbb::parallel_for(std::size_t{0}, maps.size(),
-                    [&](std::size_t i) { layers[i] = reading_layer(maps[i], how.layer); });
+                    [&](std::size_t i) { layers[i] = reading_layer(maps[i].map, layer); });
+  return layers;
+}
+
+PlacedPresses learn_table(const std::vector<Press>& presses, const std::vector<TrainingMap>& maps,
+                          const TableLearning& how, const std::function<void(double)>& progress) {
+  const std::vector<OccupancyGrid> layers = layers_of(maps, how.layer);
+  const bool known = std::ranges::all_of(
+      presses, [](const Press& press) { return press.T_object_robot.has_value(); });
+  const int rounds = known ? 1 : how.rounds;
   PlacedPresses placed{.placements = {}, .table = how.initial()};
-  HostProgress counter(maps.size() * static_cast<std::size_t>(how.rounds), progress);
-  for (int round = 0; round < how.rounds; ++round) {
+  HostProgress counter(maps.size() * static_cast<std::size_t>(rounds), progress);
+  for (int round = 0; round < rounds; ++round) {
     placed.placements = place_all(presses, maps, layers, how, placed.table, counter);
-    placed.table = table_of(count_placed(placed.placements, presses, layers, how), how);
+    if (placed.placements.empty()) {
+      throw Error(Fault::input,
+                  fmt::format("likelihood table: none of {} touches can be compared with other "
+                              "touches of its object; give at least two touches of one object",
+                              presses.size()));
+    }
+    placed.table = table_of(count_placed(placed.placements, presses, maps, layers, how), how);
   }
   return placed;
 }
 
 ObjectCounts count_placed(std::span<const OwnPlacement> placements,
-                          const std::vector<Press>& presses,
+                          const std::vector<Press>& presses, const std::vector<TrainingMap>& maps,
                           const std::vector<OccupancyGrid>& layers, const TableLearning& how,
                           const std::vector<bool>& counted) {
+  const auto counts_here = [&](const OwnPlacement& placement) {
+    if (counted.empty()) {
+      return true;
+    }
+    const std::vector<std::size_t>& of = maps[placement.map].presses;
+    return counted[placement.press] &&
+           (of.empty() || std::ranges::any_of(of, [&](std::size_t p) { return counted[p]; }));
+  };
   std::vector<std::vector<const OwnPlacement*>> of_press(presses.size());
   for (const OwnPlacement& placement : placements) {
-    if (counted.empty() || (counted[placement.press] && counted[placement.map])) {
+    if (counts_here(placement)) {
       of_press[placement.press].push_back(&placement);
     }
   }
@@ -129,35 +175,6 @@ ObjectCounts count_placed(std::span<const OwnPlacement> placements,
     }
   }
   return counts;
-}
-
-LevelCounts count_posed(const Press& touches, const MapOptions& map_options,
-                        const TableLearning& how, std::size_t folds) {
-  const std::vector<Touch>& all = touches.touches;
-  if (folds < 2 || all.size() < folds) {
-    throw Error(Fault::input,
-                fmt::format("{}: {} touches in {} folds; give at least two folds and as many "
-                            "touches as folds",
-                            touches.name, all.size(), folds));
-  }
-  const LearnedTable levels = how.initial();
-  const ContactModel classifier = contact_with(how.contact, levels, "");
-  std::vector<LevelCounts> of_fold(folds, LevelCounts(levels.levels()));
-  tbb::parallel_for(std::size_t{0}, folds, [&](std::size_t fold) {
-    std::vector<Touch> building;
-    std::vector<Touch> counted;
-    for (std::size_t i = 0; i < all.size(); ++i) {
-      (i % folds == fold ? counted : building).push_back(all[i]);
-    }
-    const OccupancyGrid layer =
-        reading_layer(observed_map(building, map_options, touches.label), how.layer);
-    of_fold[fold].add(counted, Pose{}, layer, classifier);
-  });
-  LevelCounts sum(levels.levels());
-  for (const LevelCounts& counts : of_fold) {
-    sum += counts;
-  }
-  return sum;
 }
 
 }  // namespace palpate

@@ -12,6 +12,7 @@
 #include "palpate/learned_sensor.hpp"
 #include "press.hpp"
 #include "press_placement.hpp"
+#include "training_maps.hpp"
 
 namespace palpate {
 
@@ -22,6 +23,7 @@ struct TableLearning {
   ContactModel contact = {};             ///< of Eq. 7, with its prior: where learning begins
   PoseLattice lattice = {};              ///< for placing presses at unknown poses
   int rounds = 3;                        ///< of placing and counting
+  std::size_t most_maps = 8;             ///< of its object, on which a press is placed
   std::size_t best_maps = 3;             ///< on which a press is counted
   double shared_pseudo_counts = 20.0;    ///< of Eq. 7 in the shared table, at every node
   double object_pseudo_counts = 200.0;   ///< of the shared table in an object's, at every node
@@ -47,43 +49,41 @@ std::vector<double> table_without(const ObjectCounts& counts, const std::string&
 ContactModel contact_with(const ContactModel& contact, const LearnedTable& table,
                           const std::string& label);
 
-/// A press on the map of another press of its object.
+/// A press on a map of its object.
 struct OwnPlacement {
   std::size_t press = 0;
   std::size_t map = 0;
-  PressPlacement placement;
+  PressPlacement placement;  ///< of a press at a known pose, no more than that pose
 };
 
-/// What presses at unknown poses say about readings.
+/// What presses say about readings.
 struct PlacedPresses {
-  std::vector<OwnPlacement> placements;  ///< of the last round: each press on all its object's maps
+  std::vector<OwnPlacement> placements;  ///< of the last round
   LearnedTable table;                    ///< after the last round
 };
 
-/// Learns a table from presses at unknown poses by alternation: places every press on the maps of
-/// the other presses of its object, counts its readings on the best of these maps, makes a table of
-/// all counts, and places again with it. Takes all host threads.
-/// @param maps of the presses, see press_maps()
+/// The layers of maps, [map]. Takes all host threads.
+std::vector<OccupancyGrid> layers_of(const std::vector<TrainingMap>& maps,
+                                     const ReadingLayer& layer);
+
+/// Learns a table by alternation: places every press on maps of its object that it is no part of,
+/// counts its readings on the best of them, makes a table of all counts, and places again with it.
+/// Presses at known poses are where they are; where all are, one round does. Takes all host threads.
 /// @param progress called with the fraction done, by one thread at a time
-/// @throws Error where no object has two presses, or as PressPlacer does; what `progress` throws
-PlacedPresses learn_table(const std::vector<Press>& presses, const std::vector<OccupancyGrid>& maps,
+/// @throws Error where no press has a map of its object that it is no part of, or as PressPlacer
+/// does; what `progress` throws
+PlacedPresses learn_table(const std::vector<Press>& presses, const std::vector<TrainingMap>& maps,
                           const TableLearning& how,
                           const std::function<void(double)>& progress = {});
 
-/// Counts the readings of the presses that `counted` marks, each on the best of the maps that it
-/// marks too: so what is learned from one part of the presses can be tried on another.
+/// Counts the readings of the presses that `counted` marks, each on the best of its maps: so what is
+/// learned from one part of the presses can be tried on another. Maps of unmarked presses alone are
+/// left out.
 /// @param layers of the maps
 /// @param counted [press]; empty: all are
 ObjectCounts count_placed(std::span<const OwnPlacement> placements,
-                          const std::vector<Press>& presses,
+                          const std::vector<Press>& presses, const std::vector<TrainingMap>& maps,
                           const std::vector<OccupancyGrid>& layers, const TableLearning& how,
                           const std::vector<bool>& counted = {});
-
-/// Counts the readings of touches at known poses. Touch i is in fold i % folds and is counted
-/// against the map of all touches of other folds.
-/// @param folds at least 2
-/// @throws Error where there are fewer touches than folds, or as observed_map() does
-LevelCounts count_posed(const Press& touches, const MapOptions& map_options,
-                        const TableLearning& how, std::size_t folds);
 
 }  // namespace palpate

@@ -182,4 +182,22 @@ TemperatureFit fit_temperature(std::span<const ScoredPress> presses) {
   return {std::exp(best_temperature(weight)), weight};
 }
 
+std::vector<ScoredPress> tempered_by_halves(std::span<const ScoredPress> presses) {
+  std::vector<ScoredPress> tempered(presses.size());
+  for (std::size_t half = 0; half < 2; ++half) {
+    std::vector<ScoredPress> others;
+    for (std::size_t i = 1 - half; i < presses.size(); i += 2) {
+      others.push_back(presses[i]);
+    }
+    const TemperatureFit fit = fit_temperature(others.empty() ? presses : others);
+    for (std::size_t i = half; i < presses.size(); i += 2) {
+      tempered[i].truth = presses[i].truth;
+      for (const double p : label_probabilities(presses[i], fit.temperature, fit.feature_weight)) {
+        tempered[i].log_evidence.push_back(std::log(p));
+      }
+    }
+  }
+  return tempered;
+}
+
 }  // namespace palpate

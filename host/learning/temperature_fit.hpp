@@ -44,4 +44,8 @@ struct TemperatureFit {
 /// @throws Error as calibration_of(), and where no press has two labels to choose from
 TemperatureFit fit_temperature(std::span<const ScoredPress> presses);
 
+/// The presses with the logarithms of their labels' probabilities in the place of the evidences:
+/// each half of the presses has the temperature and weight of the other half.
+std::vector<ScoredPress> tempered_by_halves(std::span<const ScoredPress> presses);
+
 }  // namespace palpate

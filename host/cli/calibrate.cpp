@@ -1,0 +1,237 @@
+#include "commands.hpp"
+
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <fmt/format.h>
+#include <CLI/CLI.hpp>
+
+#include "calibrate_output.hpp"
+#include "command_files.hpp"
+#include "map_files.hpp"
+#include "options.hpp"
+#include "palpate/files.hpp"
+#include "progress.hpp"
+#include "recordings.hpp"
+#include "sensor_calibration.hpp"
+#include "terminal.hpp"
+
+namespace palpate::cli {
+
+namespace {
+
+struct Options {
+  std::vector<std::string> recordings;
+  std::string output;
+  std::vector<std::string> maps;
+  bool unposed = false;
+  std::optional<double> threshold;
+  std::optional<double> ratio;
+  std::string layer = "mean_level";
+  int levels = 7;
+  std::string frames;
+  std::string png;
+};
+
+struct Pictures {
+  std::filesystem::path table;
+  std::filesystem::path reliability;
+};
+
+Pictures pictures_of(const Options& options) {
+  const std::filesystem::path folder = options.png;
+  return {folder / "table.png", folder / "reliability.png"};
+}
+
+void check_outputs(const Options& options, const std::vector<std::filesystem::path>& maps) {
+  CommandFiles files;
+  for (const std::string& recording : options.recordings) {
+    files.reads("RECORDING", recording);
+  }
+  for (const std::filesystem::path& map : maps) {
+    files.reads("--maps", map);
+  }
+  files.writes("-o", options.output);
+  const auto [table, reliability] = pictures_of(options);
+  if (!options.png.empty()) {
+    files.writes("--png", table);
+    files.writes("--png", reliability);
+  }
+  files.require_distinct();
+  require_writable(options.output);
+  if (std::filesystem::is_directory(options.png)) {
+    require_writable(table);
+    require_writable(reliability);
+  }
+}
+
+SensorCalibrationOptions calibration_options(const Options& options, const std::string& unit) {
+  SensorCalibrationOptions result{.pressure_unit = unit};
+  if (options.threshold) {
+    result.threshold = require_above("--threshold", *options.threshold, 0.0);
+  }
+  if (options.ratio) {
+    result.ratio = require_above("--ratio", *options.ratio, 0.0, true);
+    if (*options.ratio >= 1.0) {
+      refuse_flag("--ratio", *options.ratio, "must be below 1");
+    }
+  }
+  if (options.layer != "mean_level" && options.layer != "log_odds") {
+    refuse_flag("--layer", options.layer, "give mean_level or log_odds");
+  }
+  result.layer = options.layer == "log_odds" ? MapLayer::log_odds : MapLayer::mean_level;
+  constexpr auto most = static_cast<int>(most_reading_levels);
+  if (options.levels < 2 || options.levels > most) {
+    refuse_flag("--levels", options.levels, "give 2 to {}", most);
+  }
+  result.levels = static_cast<std::size_t>(options.levels);
+  return result;
+}
+
+/// Whether the robot knew where it touched: some touches of the recording are at different poses.
+bool has_poses(const Recording& recording) {
+  for (const Pose& pose : recording.T_robot_sensor) {
+    const Pose& first = recording.T_robot_sensor.front();
+    if (pose.translation_mm != first.translation_mm || pose.theta_rad != first.theta_rad) {
+      return true;
+    }
+  }
+  return false;
+}
+
+/// Throws Error where some recordings have poses and others have none.
+bool all_have_poses(const Options& options, const std::vector<Recording>& recordings) {
+  if (options.unposed) {
+    return false;
+  }
+  const bool first = has_poses(recordings.front());
+  for (const Recording& recording : recordings) {
+    if (has_poses(recording) != first) {
+      const Recording& without = first ? recording : recordings.front();
+      refuse(without.path,
+             "all touches are at one pose, so that their poses count as unknown, but other "
+             "recordings have poses; calibrate from one kind, or give --unposed");
+    }
+  }
+  return first;
+}
+
+std::vector<Press> presses_of(const Options& options, const std::vector<Recording>& recordings) {
+  std::optional<Frames> frames;
+  if (!options.frames.empty()) {
+    frames = parse_frames("--frames", options.frames);
+  }
+  const bool posed = all_have_poses(options, recordings);
+  std::vector<Press> presses;
+  for (const Recording& recording : recordings) {
+    if (recording.object.empty()) {
+      refuse(recording.path,
+             "attribute 'object' is empty; a calibration needs to know what was touched");
+    }
+    const auto [begin, end] = select(recording, frames);
+    for (std::size_t touch = begin; touch < end; ++touch) {
+      presses.push_back(posed ? posed_press(recording, touch) : single_press(recording, touch));
+    }
+  }
+  return presses;
+}
+
+std::vector<OccupancyGrid> read_maps(const Options& options,
+                                     const std::vector<std::filesystem::path>& files) {
+  std::vector<OccupancyGrid> maps;
+  for (const std::filesystem::path& file : files) {
+    maps.push_back(read_map(file));
+    if (options.layer == "mean_level" && maps.back().mean_level.empty()) {
+      refuse(file,
+             "has no mean_level; build the map with palpate map --unposed or --sensor-model, or "
+             "give --layer log_odds");
+    }
+  }
+  return maps;
+}
+
+void calibrate(const Options& options) {
+  const std::vector<std::filesystem::path> map_files = files_of_maps(options.maps);
+  check_outputs(options, map_files);
+  const std::vector<Recording> recordings = read_touch_recordings(options.recordings);
+  const std::vector<Press> presses = presses_of(options, recordings);
+  const SensorCalibrationOptions how =
+      calibration_options(options, recordings.front().pressure_unit);
+  const std::vector<OccupancyGrid> maps = read_maps(options, map_files);
+
+  SensorCalibration calibration;
+  {
+    Progress progress("calibrating");
+    calibration =
+        calibrate_sensor(presses, maps, how, [&](double fraction) { progress.show(fraction); });
+  }
+  const Pictures pictures = pictures_of(options);
+  std::string table;
+  std::string reliability;
+  if (!options.png.empty()) {
+    table = draw_table(calibration.sensor);
+    reliability = calibration.before ? draw_reliability(reliability_of(calibration)) : "";
+  }
+  write_sensor_model(options.output, calibration.sensor);
+  fmt::print("{}", calibration_text(calibration, presses.size(), terminal_columns(stdout)));
+  for (const std::string& warning : calibration.warnings) {
+    fmt::print(stderr, "palpate: {}\n", warning);
+  }
+  fmt::print("{}\n", options.output);
+  if (!options.png.empty()) {
+    make_folder(options.png);
+    write_file(pictures.table, table);
+    fmt::print("{}\n", pictures.table.string());
+    if (!reliability.empty()) {
+      write_file(pictures.reliability, reliability);
+      fmt::print("{}\n", pictures.reliability.string());
+    }
+  }
+}
+
+}  // namespace
+
+void add_calibrate(CLI::App& app) {
+  auto* command = app.add_subcommand(
+      "calibrate",
+      "Learn a sensor model from touches of known objects: contact threshold, noise, what the "
+      "elements read on and beside an object, and how sure to be. map, recognize, live and plan "
+      "take it as --sensor-model");
+  const auto options = std::make_shared<Options>();
+  command
+      ->add_option("RECORDING", options->recordings,
+                   "Recordings (HDF5) that name their object. Where all touches of a recording are "
+                   "at one pose, their poses count as unknown")
+      ->required();
+  command->add_option("-o,--output", options->output, "Sensor model to write (YAML)")->required();
+  command->add_option("--maps", options->maps,
+                      "Maps, or folders of maps, of the objects [default: maps of the touches "
+                      "themselves, each compared with maps that were built without it]");
+  command->add_flag("--unposed", options->unposed,
+                    "The sensor's poses are unknown: find where each touch lies");
+  command->add_option("--threshold", options->threshold,
+                      "Contact threshold, in the recordings' pressure unit [default: learned]");
+  command->add_option("--ratio", options->ratio,
+                      "Threshold as a fraction of the touch's largest pressure [default: learned]");
+  command
+      ->add_option("--layer", options->layer,
+                   "What of a map readings are compared with: mean_level, the mean pressure, or "
+                   "log_odds, of occupancy")
+      ->capture_default_str();
+  command
+      ->add_option("--levels", options->levels,
+                   "Levels of readings that are told apart, No Contact included")
+      ->check(require_whole_number)
+      ->capture_default_str();
+  command->add_option("--frames", options->frames,
+                      "Use the touches A to B - 1 of every recording, counted from 0, as A:B");
+  command->add_option("--png", options->png,
+                      "Folder for pictures: table.png, what elements read, and reliability.png, "
+                      "accuracy over confidence before and after");
+  command->callback([options] { calibrate(*options); });
+}
+
+}  // namespace palpate::cli

@@ -1,0 +1,175 @@
+#include "contact_learning.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <numeric>
+
+#include <fmt/format.h>
+
+#include "element_spacing.hpp"
+#include "palpate/error.hpp"
+#include "palpate/occupancy_grid.hpp"
+
+namespace palpate {
+
+namespace {
+
+/// Otsu's threshold of values in ascending order: the middle of the gap between the two classes.
+double otsu_threshold(const std::vector<double>& values) {
+  const double all = std::accumulate(values.begin(), values.end(), 0.0);
+  const auto n = static_cast<double>(values.size());
+  double below = 0.0;
+  double largest = -1.0;
+  double threshold = values.front();
+  for (std::size_t i = 0; i + 1 < values.size(); ++i) {
+    below += values[i];
+    if (values[i + 1] == values[i]) {
+      continue;
+    }
+    const double count = static_cast<double>(i) + 1.0;
+    const double apart = below / count - (all - below) / (n - count);
+    if (const double between = count * (n - count) * apart * apart; between > largest) {
+      largest = between;
+      threshold = (values[i] + values[i + 1]) / 2.0;
+    }
+  }
+  return threshold;
+}
+
+bool is_living(const Touch& touch, std::size_t element) {
+  return (touch.valid.empty() || touch.valid[element] != 0) && !std::isnan(touch.pressure[element]);
+}
+
+/// Largest pressure of the living elements; 0 where none is above.
+double peak_of(const Touch& touch) {
+  double peak = 0.0;
+  for (std::size_t e = 0; e < touch.pressure.size(); ++e) {
+    if (is_living(touch, e)) {
+      peak = std::max(peak, touch.pressure[e]);
+    }
+  }
+  return peak;
+}
+
+/// Marks the elements that lie within `near_mm` of an element In Contact.
+std::vector<bool> near_contact(const Touch& touch, const std::vector<Reading>& readings,
+                               double near_mm) {
+  std::vector<bool> near(readings.size(), false);
+  for (std::size_t c = 0; c < readings.size(); ++c) {
+    if (is_contact(readings[c])) {
+      for (std::size_t e = 0; e < near.size(); ++e) {
+        const glm::dvec2 apart = touch.elements_mm[e] - touch.elements_mm[c];
+        near[e] = near[e] || std::hypot(apart.x, apart.y) <= near_mm;
+      }
+    }
+  }
+  return near;
+}
+
+}  // namespace
+
+ContactClassifier learn_classifier(const std::vector<Press>& presses) {
+  std::vector<double> logs;
+  for (const Press& press : presses) {
+    for (const Touch& touch : press.touches) {
+      for (std::size_t e = 0; e < touch.pressure.size(); ++e) {
+        if (is_living(touch, e) && touch.pressure[e] > 0.0) {
+          logs.push_back(std::log(touch.pressure[e]));
+        }
+      }
+    }
+  }
+  std::ranges::sort(logs);
+  if (logs.empty() || logs.front() == logs.back()) {
+    throw Error(Fault::input,
+                logs.empty() ? "no pressure is above 0: no touch touched anything; check the "
+                               "pressure's unit and sign"
+                             : fmt::format("all pressures above 0 are {:g}, which tells no contact "
+                                           "threshold; give --threshold",
+                                           std::exp(logs.front())));
+  }
+  ContactClassifier classifier{.threshold = std::exp(otsu_threshold(logs)), .ratio = 0.0};
+  std::vector<double> shares;
+  for (const Press& press : presses) {
+    for (const Touch& touch : press.touches) {
+      const double peak = peak_of(touch);
+      for (std::size_t e = 0; e < touch.pressure.size(); ++e) {
+        if (is_living(touch, e) && touch.pressure[e] > classifier.threshold) {
+          shares.push_back(std::log(touch.pressure[e] / peak));
+        }
+      }
+    }
+  }
+  std::ranges::sort(shares);
+  // Where every touch has one pressure, any ratio does.
+  classifier.ratio =
+      shares.front() < shares.back() ? std::exp(otsu_threshold(shares)) : ContactClassifier{}.ratio;
+  return classifier;
+}
+
+double noise_floor(const std::vector<Press>& presses, const ContactClassifier& classifier) {
+  constexpr double far = 2.0;  // in spacings
+  double squares = 0.0;
+  double count = 0.0;
+  bool any_negative = false;
+  for (const Press& press : presses) {
+    for (const Touch& touch : press.touches) {
+      const auto spacing = spacing_of(touch.elements_mm);
+      const std::vector<bool> near = near_contact(touch, classifier.classify(touch),
+                                                  spacing ? far * spacing->nearest_mm.most : 0.0);
+      for (std::size_t e = 0; e < near.size(); ++e) {
+        if (!near[e] && is_living(touch, e)) {
+          squares += touch.pressure[e] * touch.pressure[e];
+          count += 1.0;
+          any_negative = any_negative || touch.pressure[e] < 0.0;
+        }
+      }
+    }
+  }
+  const double cut = any_negative ? 1.0 : 2.0;
+  return count > 0.0 ? std::sqrt(cut * squares / count) : 0.0;
+}
+
+double fit_gamma(const LevelCounts& counts, double prior) {
+  const auto log_likelihood = [&](double gamma) {
+    double nats = 0.0;
+    for (int node = 0; node < ReadingLayer::nodes; ++node) {
+      const double value = LevelCounts::value_at(node);
+      if (value >= -ReadingLayer::largest_value) {
+        const double p = probability_from_log_odds(value);
+        nats += counts.at(0, node) * std::log(gamma * prior + (1.0 - gamma) * (1.0 - p)) +
+                counts.at(1, node) * std::log(gamma * prior + (1.0 - gamma) * p);
+      }
+    }
+    return nats;
+  };
+  // Concave in gamma: a sum of logarithms of what is linear in it.
+  constexpr double golden = 0.6180339887498949;
+  double low = 1e-6;
+  double high = 0.99;
+  while (high - low > 1e-6) {
+    const double left = high - golden * (high - low);
+    const double right = low + golden * (high - low);
+    (log_likelihood(left) < log_likelihood(right) ? low : high) =
+        log_likelihood(left) < log_likelihood(right) ? left : right;
+  }
+  return (low + high) / 2.0;
+}
+
+double share_in_contact(std::span<const Touch> touches, const ContactClassifier& classifier) {
+  double contacts = 0.0;
+  double known = 0.0;
+  for (const Touch& touch : touches) {
+    for (const ElementReading& element : known_readings(touch, classifier)) {
+      contacts += is_contact(element.reading) ? 1.0 : 0.0;
+      known += 1.0;
+    }
+  }
+  // No array, however it was pressed, says that the world is empty or full.
+  constexpr double least = 0.01;
+  constexpr double most = 0.5;
+  return std::clamp((contacts + 0.5) / (known + 1.0), least, most);
+}
+
+}  // namespace palpate

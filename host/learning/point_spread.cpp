@@ -1,0 +1,294 @@
+#include "point_spread.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <string>
+
+#include <tbb/parallel_for.h>
+
+#include "bounding_box.hpp"
+#include "element_spacing.hpp"
+
+namespace palpate {
+
+namespace {
+
+/// A reading at its place in the object frame.
+struct Sample {
+  glm::dvec2 place_mm;
+  double pressure = 0.0;
+  std::size_t touch = 0;
+};
+
+/// The readings of an object's touches that touched it.
+struct Readings {
+  std::vector<Sample> samples;
+  std::size_t touches = 0;
+};
+
+/// Cells around all samples of an object.
+struct Field {
+  glm::dvec2 origin_mm{0.0};
+  double cell_mm = 1.0;
+  int nx = 0;
+  int ny = 0;
+  std::vector<double> values;  ///< [ny, nx]
+
+  double& at(int i, int j) { return values[static_cast<std::size_t>(j) * nx + i]; }
+  double at(int i, int j) const { return values[static_cast<std::size_t>(j) * nx + i]; }
+  /// Bilinear; 0 beyond the cells.
+  double sample(const glm::dvec2& place_mm) const {
+    const glm::dvec2 p = (place_mm - origin_mm) / cell_mm;
+    const int i = static_cast<int>(std::floor(p.x));
+    const int j = static_cast<int>(std::floor(p.y));
+    if (i < 0 || j < 0 || i + 1 >= nx || j + 1 >= ny) {
+      return 0.0;
+    }
+    const double fx = p.x - i;
+    const double fy = p.y - j;
+    return (1.0 - fy) * ((1.0 - fx) * at(i, j) + fx * at(i + 1, j)) +
+           fy * ((1.0 - fx) * at(i, j + 1) + fx * at(i + 1, j + 1));
+  }
+};
+
+/// Forces of touches under which a field explains their pressures best, [touch].
+std::vector<double> forces(const Readings& readings, const std::vector<double>& explained) {
+  std::vector<double> products(readings.touches, 0.0);
+  std::vector<double> squares(readings.touches, 0.0);
+  for (std::size_t i = 0; i < explained.size(); ++i) {
+    const Sample& sample = readings.samples[i];
+    products[sample.touch] += sample.pressure * explained[i];
+    squares[sample.touch] += explained[i] * explained[i];
+  }
+  for (std::size_t t = 0; t < products.size(); ++t) {
+    products[t] = squares[t] > 0.0 ? products[t] / squares[t] : 0.0;
+  }
+  return products;
+}
+
+std::vector<double> sampled(const Readings& readings, const Field& field) {
+  std::vector<double> values;
+  values.reserve(readings.samples.size());
+  for (const Sample& sample : readings.samples) {
+    values.push_back(field.sample(sample.place_mm));
+  }
+  return values;
+}
+
+/// Mean of the pressures relative to their touches' forces, smoothed over half a spacing.
+Field mean_field(const Readings& readings, const std::vector<double>& force, Field field,
+                 double spacing_mm) {
+  const double deviation = 0.4 * spacing_mm;
+  const int reach = static_cast<int>(std::ceil(3.0 * deviation / field.cell_mm));
+  std::vector<double> weights(field.values.size(), 1e-12);
+  std::ranges::fill(field.values, 0.0);
+  for (const Sample& sample : readings.samples) {
+    const double f = force[sample.touch];
+    if (!(f > 0.0)) {
+      continue;
+    }
+    const glm::dvec2 p = (sample.place_mm - field.origin_mm) / field.cell_mm;
+    const int i0 = static_cast<int>(std::lround(p.x));
+    const int j0 = static_cast<int>(std::lround(p.y));
+    for (int j = std::max(0, j0 - reach); j <= std::min(field.ny - 1, j0 + reach); ++j) {
+      for (int i = std::max(0, i0 - reach); i <= std::min(field.nx - 1, i0 + reach); ++i) {
+        const double d = std::hypot(i - p.x, j - p.y) * field.cell_mm / deviation;
+        // Strong touches say more about the face: their noise is a smaller share.
+        const double w = f * f * std::exp(-0.5 * d * d);
+        field.at(i, j) += w * sample.pressure / f;
+        weights[static_cast<std::size_t>(j) * field.nx + i] += w;
+      }
+    }
+  }
+  for (std::size_t k = 0; k < weights.size(); ++k) {
+    field.values[k] /= weights[k];
+  }
+  return field;
+}
+
+/// The face of the object: 1 where the mean pressure exceeds half of its plateau.
+Field face_of(const Readings& readings, double spacing_mm) {
+  constexpr double cells_per_spacing = 8.0;
+  constexpr double plateau_quantile = 0.9;  // of the cells above half of the largest
+  BoundingBox box;
+  for (const Sample& sample : readings.samples) {
+    box.take_in(sample.place_mm);
+  }
+  Field field{.cell_mm = spacing_mm / cells_per_spacing};
+  const double margin = 4.0 * spacing_mm;
+  field.origin_mm = box.lower - margin;
+  const glm::dvec2 count = glm::ceil((box.extent() + 2.0 * margin) / field.cell_mm) + 1.0;
+  field.nx = static_cast<int>(count.x);
+  field.ny = static_cast<int>(count.y);
+  field.values.assign(static_cast<std::size_t>(field.nx) * field.ny, 0.0);
+
+  std::vector<double> force(readings.touches, 0.0);
+  for (const Sample& sample : readings.samples) {
+    force[sample.touch] = std::max(force[sample.touch], sample.pressure);
+  }
+  constexpr int rounds = 3;
+  for (int round = 0; round < rounds; ++round) {
+    field = mean_field(readings, force, std::move(field), spacing_mm);
+    force = forces(readings, sampled(readings, field));
+  }
+  const double largest = *std::ranges::max_element(field.values);
+  std::vector<double> high;
+  std::ranges::copy_if(field.values, std::back_inserter(high),
+                       [&](double value) { return value > 0.5 * largest; });
+  std::ranges::sort(high);
+  const double plateau =
+      high.empty() ? largest
+                   : high[static_cast<std::size_t>(plateau_quantile *
+                                                   static_cast<double>(high.size() - 1))];
+  for (double& value : field.values) {
+    value = value > 0.5 * plateau ? 1.0 : 0.0;
+  }
+  return field;
+}
+
+/// The field blurred along both axes by a Gaussian and the mean over an element.
+Field blurred(const Field& field, double sigma_mm, double edge_mm) {
+  const double root = std::sqrt(2.0) * sigma_mm;
+  const auto weight = [&](double d) {
+    return std::erf((d + edge_mm / 2.0) / root) - std::erf((d - edge_mm / 2.0) / root);
+  };
+  const int reach =
+      static_cast<int>(std::ceil((4.0 * sigma_mm + edge_mm / 2.0) / field.cell_mm));
+  std::vector<double> kernel;
+  double sum = 0.0;
+  for (int k = -reach; k <= reach; ++k) {
+    kernel.push_back(weight(k * field.cell_mm));
+    sum += kernel.back();
+  }
+  Field along = field;
+  Field result = field;
+  for (int j = 0; j < field.ny; ++j) {
+    for (int i = 0; i < field.nx; ++i) {
+      double value = 0.0;
+      for (int k = std::max(-reach, -i); k <= std::min(reach, field.nx - 1 - i); ++k) {
+        value += kernel[static_cast<std::size_t>(k + reach)] * field.at(i + k, j);
+      }
+      along.at(i, j) = value / sum;
+    }
+  }
+  for (int j = 0; j < field.ny; ++j) {
+    for (int i = 0; i < field.nx; ++i) {
+      double value = 0.0;
+      for (int k = std::max(-reach, -j); k <= std::min(reach, field.ny - 1 - j); ++k) {
+        value += kernel[static_cast<std::size_t>(k + reach)] * along.at(i, j + k);
+      }
+      result.at(i, j) = value / sum;
+    }
+  }
+  return result;
+}
+
+double squared_error(const Readings& readings, const Field& field) {
+  const std::vector<double> explained = sampled(readings, field);
+  const std::vector<double> force = forces(readings, explained);
+  double sum = 0.0;
+  for (std::size_t i = 0; i < explained.size(); ++i) {
+    const Sample& sample = readings.samples[i];
+    const double error = sample.pressure - force[sample.touch] * explained[i];
+    sum += error * error;
+  }
+  return sum;
+}
+
+/// The readings of touches with contact, by object, and the largest element spacing.
+std::map<std::string, Readings> readings_of(const std::vector<Press>& presses,
+                                            const ContactClassifier& classifier,
+                                            double& spacing_mm) {
+  std::map<std::string, Readings> objects;
+  for (const Press& press : presses) {
+    for (const Touch& touch : press.touches) {
+      const std::vector<Reading> readings = classifier.classify(touch);
+      const auto spacing = spacing_of(touch.elements_mm);
+      if (!spacing || std::ranges::none_of(readings, is_contact)) {
+        continue;
+      }
+      spacing_mm = std::max(spacing_mm, spacing->nearest_mm.most);
+      Readings& own = objects[press.label];
+      const Pose T_object_sensor = *press.T_object_robot * touch.T_robot_sensor;
+      for (std::size_t e = 0; e < readings.size(); ++e) {
+        const bool living = touch.valid.empty() || touch.valid[e] != 0;
+        if (living && !std::isnan(touch.pressure[e])) {
+          own.samples.push_back(
+              {T_object_sensor * touch.elements_mm[e], touch.pressure[e], own.touches});
+        }
+      }
+      ++own.touches;
+    }
+  }
+  return objects;
+}
+
+}  // namespace
+
+std::optional<double> learn_point_spread(const std::vector<Press>& presses,
+                                         const ContactClassifier& classifier) {
+  constexpr std::size_t fewest_touches = 10;  // of an object: fewer leave gaps between elements
+  constexpr double of_spacing = 0.95;
+  double spacing_mm = 0.0;
+  std::vector<Readings> objects;
+  std::vector<Field> faces;
+  for (auto& [label, own] : readings_of(presses, classifier, spacing_mm)) {
+    if (own.touches >= fewest_touches) {
+      objects.push_back(std::move(own));
+    }
+  }
+  if (objects.empty()) {
+    return {};
+  }
+  for (const Readings& object : objects) {
+    faces.push_back(face_of(object, spacing_mm));
+  }
+  const auto error_at = [&](double sigma_mm) {
+    std::vector<double> errors(objects.size());
+    tbb::parallel_for(std::size_t{0}, objects.size(), [&](std::size_t i) {
+      errors[i] =
+          squared_error(objects[i], blurred(faces[i], sigma_mm, of_spacing * spacing_mm));
+    });
+    double sum = 0.0;
+    for (const double error : errors) {
+      sum += error;
+    }
+    return sum;
+  };
+  // Golden sections of the logarithm.
+  constexpr double golden = 0.6180339887498949;
+  constexpr double least = 0.05;  // of the spacing
+  constexpr double most = 3.0;
+  const double lowest = std::log(least * spacing_mm);
+  const double highest = std::log(most * spacing_mm);
+  double low = lowest;
+  double high = highest;
+  double left = high - golden * (high - low);
+  double right = low + golden * (high - low);
+  double at_left = error_at(std::exp(left));
+  double at_right = error_at(std::exp(right));
+  constexpr double tolerance = 0.005;
+  while (high - low > tolerance) {
+    if (at_left < at_right) {
+      high = right;
+      right = left;
+      at_right = at_left;
+      left = high - golden * (high - low);
+      at_left = error_at(std::exp(left));
+    } else {
+      low = left;
+      left = right;
+      at_left = at_right;
+      right = low + golden * (high - low);
+      at_right = error_at(std::exp(right));
+    }
+  }
+  const double found = (low + high) / 2.0;
+  if (found - lowest < 2.0 * tolerance || highest - found < 2.0 * tolerance) {
+    return {};
+  }
+  return std::exp(found);
+}
+
+}  // namespace palpate

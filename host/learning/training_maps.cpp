@@ -1,0 +1,61 @@
+#include "training_maps.hpp"
+
+#include <map>
+#include <set>
+#include <string>
+
+#include <fmt/format.h>
+#include <tbb/parallel_for.h>
+
+#include "observed_map.hpp"
+#include "palpate/error.hpp"
+
+namespace palpate {
+
+std::vector<TrainingMap> maps_of_presses(const std::vector<Press>& presses,
+                                         const MapOptions& options) {
+  std::vector<TrainingMap> maps(presses.size());
+  tbb::parallel_for(std::size_t{0}, presses.size(), [&](std::size_t i) {
+    try {
+      maps[i] = {observed_map(presses[i].touches, options, presses[i].label), {i}};
+    } catch (const Error& error) {
+      throw Error(error.fault(), fmt::format("{}: {}", presses[i].name, error.what()));
+    }
+  });
+  return maps;
+}
+
+std::vector<TrainingMap> maps_without_folds(const std::vector<Press>& presses,
+                                            const MapOptions& options, std::size_t folds) {
+  const std::vector<std::size_t> fold = folds_of(presses, folds);
+  std::map<std::string, std::vector<std::size_t>> of_label;
+  std::map<std::string, std::set<std::size_t>> folds_of_label;
+  for (std::size_t i = 0; i < presses.size(); ++i) {
+    of_label[presses[i].label].push_back(i);
+    folds_of_label[presses[i].label].insert(fold[i]);
+  }
+  std::vector<TrainingMap> maps;
+  for (const auto& [label, own] : of_label) {
+    for (const std::size_t without : folds_of_label.at(label)) {
+      TrainingMap map;
+      map.map.label = label;
+      std::ranges::copy_if(own, std::back_inserter(map.presses),
+                           [&](std::size_t press) { return fold[press] != without; });
+      if (!map.presses.empty()) {
+        maps.push_back(std::move(map));
+      }
+    }
+  }
+  tbb::parallel_for(std::size_t{0}, maps.size(), [&](std::size_t i) {
+    std::vector<Touch> touches;
+    for (const std::size_t press : maps[i].presses) {
+      touches.push_back(presses[press].touches.front());
+      touches.back().T_robot_sensor =
+          *presses[press].T_object_robot * touches.back().T_robot_sensor;
+    }
+    maps[i].map = observed_map(touches, options, maps[i].map.label);
+  });
+  return maps;
+}
+
+}  // namespace palpate
