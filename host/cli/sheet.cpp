@@ -45,7 +45,7 @@ std::vector<RecognitionSheet::Caption> captions(const RecognitionRecord& record,
     add("contradicted: no map explains these touches at any pose tried", true);
   } else if (misfit.empty()) {
     const bool doubtful = last.fit && last.fit->verdict == Verdict::doubtful;
-    add(last.fit ? fmt::format("fit: {} (z {:.1f})", fit_word(last), last.fit->z) : "", doubtful);
+    add(last.fit ? fmt::format("fit: {} (z {:.1f})", fit_words(last), last.fit->z) : "", doubtful);
   } else {
     add(misfit, true);
   }

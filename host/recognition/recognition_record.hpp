@@ -71,9 +71,8 @@ struct RecognitionStep {
   /// `--each-frame`), before which there is no belief but the prior. By bounds over more than
   /// most_balanced_bins in all also where several touches come at once.
   std::optional<double> surprise;
-  /// Probability that the object was learned, where the task has a Familiarity and the unknown is a
-  /// single touch with an element in contact. Empty for particles, whose mode has no
-  /// log-likelihood of the touch.
+  /// Probability that the object was learned, where tells_known() and the unknown is a single touch
+  /// with an element In Contact; "(none)" in `identity` then has the rest.
   std::optional<double> known = {};
   std::vector<std::string> warnings;  ///< what looks wrong with the touches, in whole sentences
   double seconds = 0.0;               ///< wall time from the touch to the estimate
