@@ -109,7 +109,7 @@ TEST_F(SensorModelFile, SaysWhatIsWrong) {
   expect_named(message("mean_level", "pressure"), {"layer", "log_odds, mean_level"});
   expect_named(message("[35, 60.5]", "[60.5, 35]"), {"level_edges"});
   expect_named(message("[35, 60.5]", "[35]"), {"log_likelihood"});
-  expect_named(message("[1, 2, 3]", "[1, 2]"), {"line 16", "mean", "area"});
+  expect_named(message("[1, 2, 3]", "[1, 2]"), {"line 17", "mean", "area"});
   expect_named(message("sd: 12.25", "sd: 0"), {"fit_scale: sd", "positive"});
   expect_named(message("raw", "psi"), {"pressure_unit", "kPa or raw"});
   put_bytes(path_, "threshold: 3\n");
