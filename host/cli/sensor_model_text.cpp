@@ -26,7 +26,8 @@ std::string sensor_model_text(const LearnedSensor& sensor) {
   add("noise", fmt::format("{:.4g}{}", sensor.noise, unit));
   add("threshold", fmt::format("{:.4g}{}, ratio {:.4g}", sensor.classifier.threshold, unit,
                                sensor.classifier.ratio));
-  add("gamma", fmt::format("{:.4g}{}", sensor.gamma, sensor.table ? ", beside the table" : ""));
+  add("gamma",
+      fmt::format("{:.4g}{}", sensor.gamma, sensor.table ? ", not used beside the table" : ""));
   add("maps",
       fmt::format("prior {:.4g}, spread {:.4g} mm{}", sensor.prior, sensor.spread_mm,
                   sensor.psf_mm ? fmt::format(", point spread {:.4g} mm", *sensor.psf_mm) : ""));
