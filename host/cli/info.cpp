@@ -1,6 +1,7 @@
 #include "commands.hpp"
 
 #include <algorithm>
+#include <filesystem>
 #include <memory>
 #include <string>
 
@@ -11,9 +12,11 @@
 #include "file_summary.hpp"
 #include "options.hpp"
 #include "palpate/files.hpp"
+#include "palpate/learned_sensor.hpp"
 #include "recording_state.hpp"
 #include "recording_survey.hpp"
 #include "recording_suspicions.hpp"
+#include "sensor_model_text.hpp"
 
 namespace palpate::cli {
 
@@ -161,6 +164,9 @@ void print_map(const std::string& path) {
              static_cast<double>(s.occupied) * m.cell_mm * m.cell_mm);
   const auto symmetry_text = [](int n) { return n == 0 ? "full" : fmt::format("{}", n); };
   fmt::print("  symmetry          {}\n", symmetry_text(m.symmetry));
+  if (m.mirror) {
+    fmt::print("  mirror            the object may lie on its other side\n");
+  }
   if (m.suggested_symmetry) {
     fmt::print("  suggested         {}, the symmetry that the map shows\n",
                symmetry_text(*m.suggested_symmetry));
@@ -188,7 +194,17 @@ void print_posterior(const std::string& path) {
   }
 }
 
+/// Sensor models are the only files in YAML.
+bool is_yaml(const std::filesystem::path& path) {
+  return path.extension() == ".yaml" || path.extension() == ".yml";
+}
+
 void print_info(const std::string& path, bool close) {
+  if (is_yaml(path) && !close) {
+    const LearnedSensor sensor = read_sensor_model(path);
+    fmt::print("{}: sensor model\n{}", path, sensor_model_text(sensor));
+    return;
+  }
   const std::string format = read_format(path);
   if (close) {
     if (format != "palpate.recording") {
@@ -211,15 +227,19 @@ void print_info(const std::string& path, bool close) {
 }  // namespace
 
 void add_info(CLI::App& app) {
-  auto* command = app.add_subcommand(
-      "info",
-      "Show what a recording, a map or a posterior holds, and what is suspicious in a recording");
+  auto* command = app.add_subcommand("info",
+                                     "Show what a recording, a map, a posterior or a sensor model "
+                                     "holds, and what is suspicious in "
+                                     "a recording");
   struct Options {
     std::string path;
     bool close = false;
   };
   const auto options = std::make_shared<Options>();
-  command->add_option("FILE", options->path, "Recording, map or posterior (HDF5)")->required();
+  command
+      ->add_option("FILE", options->path,
+                   "Recording, map or posterior (HDF5), or sensor model (YAML)")
+      ->required();
   command->add_flag(
       "--close", options->close,
       "First close a recording that was cut off, so that other programs open it too (before, h5py "

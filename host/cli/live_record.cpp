@@ -63,7 +63,7 @@ std::string table_heading(const RecognitionTask& task) {
 std::string table_line(const LiveTouch& touch, const RecognitionTask& task) {
   const RecognitionStep& step = touch.step;
   const std::array<std::string, 3> pose = pose_cells(pose_text(step));
-  const std::string fit = fit_word(step);
+  const std::string fit = fit_words(step);
   const std::string surprise = surprise_text(step);
   return fmt::format(
       "{:>7}  {:>5}  {:<10}  {:>5.3f}{}  {:>14}  {:>14}  {:>15}  {:>8}  {:>10.2f}  {:>8}  {}",

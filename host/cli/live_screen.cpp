@@ -107,8 +107,9 @@ void LiveScreen::describe(const LiveState& state) {
   }
   if (const auto misfit = misfit_sentence(step, state.touches, task_); !misfit.empty()) {
     view_.notes.push_back(misfit);
+    view_.state += step.known ? fmt::format("; known {:.2f}", *step.known) : "";
   } else if (step.fit) {
-    view_.state += "; " + fit_word(step);
+    view_.state += "; " + fit_words(step);
   }
   if (const std::string surprise = surprise_text(step); !surprise.empty()) {
     view_.state += "; surprise " + surprise;

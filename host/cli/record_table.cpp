@@ -134,7 +134,7 @@ std::string trace_table(const RecognitionRecord& record, const RecognitionTask& 
                fmt::format("{:.3f}", step.confidence()), dropped_text(step), pose[0], pose[1],
                pose[2], step.right ? error_text(step.pose_error_mm()) : "",
                particles ? fmt::format("{:.1f}", *particles) : "", surprise_text(step),
-               fit_word(step)});
+               fit_words(step)});
   }
   const std::string truth = truth_words(record.last(), task);
   return printable_name(record) + "\n" + table.text(columns) +
@@ -169,7 +169,7 @@ std::string complaints(const std::vector<RecognitionRecord>& records, const Reco
 std::string result_table(const std::vector<RecognitionRecord>& records, const RecognitionTask& task,
                          std::optional<int> columns) {
   const bool with_fit = std::ranges::any_of(
-      records, [](const RecognitionRecord& record) { return !fit_word(record.last()).empty(); });
+      records, [](const RecognitionRecord& record) { return !fit_words(record.last()).empty(); });
   const bool with_error = std::ranges::any_of(
       records, [](const RecognitionRecord& record) { return record.last().right.has_value(); });
   // A narrower terminal has no room for the column; complaints() tell what matters of it.
@@ -196,7 +196,7 @@ std::string result_table(const std::vector<RecognitionRecord>& records, const Re
     const std::array<std::string, 3> pose = pose_cells(pose_text(step));
     table.add({name_of(record), fmt::format("{}", record.touches), object_words(step, task),
                fmt::format("{:.3f}", step.confidence()), with_dropped ? dropped_text(step) : "",
-               pose[0], pose[1], pose[2], fit_word(step)});
+               pose[0], pose[1], pose[2], fit_words(step)});
     if (step.refined) {
       add_pose("  mode", mode_words(step, task), step.mode_T_robot_object(), step.error_mm);
     }

@@ -45,9 +45,15 @@ std::vector<RecognitionSheet::Caption> captions(const RecognitionRecord& record,
     add("contradicted: no map explains these touches at any pose tried", true);
   } else if (misfit.empty()) {
     const bool doubtful = last.fit && last.fit->verdict == Verdict::doubtful;
-    add(last.fit ? fmt::format("fit: {} (z {:.1f})", fit_word(last), last.fit->z) : "", doubtful);
+    add(last.fit ? fmt::format("fit: {} (z {:.1f})", verdict_text(last.fit->verdict), last.fit->z)
+                 : "",
+        doubtful);
   } else {
     add(misfit, true);
+  }
+  if (last.known) {
+    add(fmt::format("known {:.2f}: the probability that the object was learned", *last.known),
+        *last.known < 0.5);
   }
   if (!last.warnings.empty()) {
     const std::size_t more = last.warnings.size() - 1;

@@ -99,14 +99,15 @@ std::string verdict_text(Verdict verdict) {
   return "does not fit";
 }
 
-std::string fit_word(const RecognitionStep& step) {
-  if (step.contradicted) {
-    return "contradicted";
-  }
-  if (!step.fit) {
+std::string fit_words(const RecognitionStep& step) {
+  if (!step.contradicted && !step.fit) {
     return "";
   }
-  return step.fit->verdict == Verdict::does_not_fit ? "no fit" : verdict_text(step.fit->verdict);
+  const std::string word = step.contradicted ? "contradicted"
+                           : step.fit->verdict == Verdict::does_not_fit
+                               ? "no fit"
+                               : verdict_text(step.fit->verdict);
+  return word + (step.known ? fmt::format(", known {:.2f}", *step.known) : "");
 }
 
 std::string misfit_sentence(const RecognitionStep& step, std::size_t touches,
@@ -121,7 +122,7 @@ std::string misfit_sentence(const RecognitionStep& step, std::size_t touches,
 }
 
 std::string single_touch_words(const RecognitionTask& task, std::size_t touches) {
-  if (touches != 1 || task.labels.back() != none_label) {
+  if (touches != 1 || task.labels.back() != none_label || tells_known(task)) {
     return "";
   }
   return "one touch cannot tell whether the object is one of the maps': the odds of (none) are "

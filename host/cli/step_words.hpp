@@ -41,13 +41,16 @@ std::string truth_words(const RecognitionStep& step, const RecognitionTask& task
 
 /// "fits", "doubtful" or "does not fit".
 std::string verdict_text(Verdict verdict);
-/// What a table says of the fit in a word; "" where nothing is known.
-std::string fit_word(const RecognitionStep& step);
+/// What a table says of the fit: "fits", "doubtful", "no fit" or "contradicted", and the
+/// probability that the object was learned where a touch tells it: "fits, known 0.83"; "" without a
+/// fit.
+std::string fit_words(const RecognitionStep& step);
 /// A sentence on touches that do not fit; "" where they fit or are doubtful.
 std::string misfit_sentence(const RecognitionStep& step, std::size_t touches,
                             const RecognitionTask& task);
 
-/// What to say where "(none)" was asked for and an unknown was touched once only; else "".
+/// What to say where "(none)" was asked for, an unknown was touched once only, and no sensor model
+/// tells what one touch says of it; else "".
 std::string single_touch_words(const RecognitionTask& task, std::size_t touches);
 
 /// Dropped mass of a bounded posterior, rounded up to one digit: "3e-07"; "" without a certificate.

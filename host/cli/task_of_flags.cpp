@@ -281,6 +281,7 @@ RecognitionTask task_of(const RecognitionFlags& flags, const Scene& scene,
     task.temperature = sensor->temperature;
     task.features = sensor->features;
     task.familiarity = sensor->familiarity;
+    task.fit_scale = sensor->fit_scale.value_or(FitScale{});
   }
   task.bin_width = wanted.bin_width;
   task.auto_filter = filter.automatic;

@@ -128,7 +128,8 @@ void add_uncertainty_flags(CLI::App& command, UncertaintyFlags& flags) {
           "has the weight 1. Without W, (none) has the sum of the maps' weights: even odds "
           "before the first touch. (none) explains each touch by a piece of some known "
           "object; the pieces need not belong to one pose. One touch cannot tell: after it, "
-          "the odds are about the prior's [default: no (none)]")
+          "the odds are about the prior's, unless a sensor model has learned what a touch of no "
+          "known object is like [default: no (none)]")
       ->type_name("W")
       ->expected(0, 1)
       ->default_str("auto");

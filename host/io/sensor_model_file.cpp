@@ -110,6 +110,13 @@ Familiarity read_familiarity(const Entry& entry) {
   return familiarity;
 }
 
+FitScale read_fit_scale(const Entry& entry) {
+  FitScale scale;
+  read_keys(entry, {{"mean", [&](const Entry& e) { scale.mean = e.number(); }},
+                    {"sd", [&](const Entry& e) { scale.sd = e.number(); }}});
+  return scale;
+}
+
 DisplacementSd read_sd(const Entry& entry) {
   DisplacementSd sd;
   read_keys(entry, {{"mm", [&](const Entry& e) { sd.mm = e.number(); }},
@@ -223,7 +230,8 @@ LearnedSensor read_sensor_model(const std::filesystem::path& path) {
                {"temperature", number(sensor.temperature)},
                {"table", [&](const Entry& e) { sensor.table = read_table(e); }},
                {"features", [&](const Entry& e) { sensor.features = read_learned_features(e); }},
-               {"familiarity", [&](const Entry& e) { sensor.familiarity = read_familiarity(e); }}});
+               {"familiarity", [&](const Entry& e) { sensor.familiarity = read_familiarity(e); }},
+               {"fit_scale", [&](const Entry& e) { sensor.fit_scale = read_fit_scale(e); }}});
   } catch (const YAML::Exception& error) {
     refuse(path, "line {}: {}; correct the YAML", line_of(error.mark), error.msg);
   }
@@ -271,6 +279,12 @@ void write_sensor_model(const std::filesystem::path& path, const LearnedSensor& 
     key("familiarity") << YAML::Flow << YAML::BeginMap;
     number("offset", sensor.familiarity->offset);
     number("slope", sensor.familiarity->slope);
+    out << YAML::EndMap;
+  }
+  if (sensor.fit_scale) {
+    key("fit_scale") << YAML::Flow << YAML::BeginMap;
+    number("mean", sensor.fit_scale->mean);
+    number("sd", sensor.fit_scale->sd);
     out << YAML::EndMap;
   }
   if (sensor.features) {

@@ -55,6 +55,12 @@ ReadingMixture mixture_of(std::span<const glm::dvec2> elements_mm, const Pose& T
 
 }  // namespace
 
+Fit FitScale::of(const Fit& fit, std::size_t touches) const {
+  const double z = std::clamp((fit.z - mean * std::sqrt(static_cast<double>(touches))) / sd,
+                              -largest_fit_z, largest_fit_z);
+  return {.z = z, .verdict = verdict_on(z)};
+}
+
 std::optional<Fit> fit_of(std::span<const Touch> touches, const Pose& T_object_robot,
                           const OccupancyGrid& map, const ContactModel& contact,
                           const DisplacementSd& touch_sd, std::size_t object) {

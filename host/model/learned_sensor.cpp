@@ -151,6 +151,12 @@ void LearnedSensor::validate() const {
   if (familiarity && !(std::isfinite(familiarity->offset) && std::isfinite(familiarity->slope))) {
     refuse("familiarity", familiarity->offset, "give an offset and a slope");
   }
+  if (fit_scale && !std::isfinite(fit_scale->mean)) {
+    refuse("fit_scale: mean", fit_scale->mean, "give a number");
+  }
+  if (fit_scale && !is_positive(fit_scale->sd)) {
+    refuse("fit_scale: sd", fit_scale->sd, "give a positive number");
+  }
 }
 
 }  // namespace palpate

@@ -120,7 +120,7 @@ std::optional<std::string> touches_contradict(std::span<const Touch> touches,
   const double rad_per_mm = sd.mm > 0.0 && sd.rad > 0.0 ? sd.rad / sd.mm : usual_rad_per_mm;
   std::vector<Touch> displaced;
   double squares = 0.0;
-  int in_contact = 0;
+  std::size_t in_contact = 0;
   for (const Touch& touch : touches.last(std::min(touches.size(), most_touches))) {
     const DisplacedTouch displaced_touch(touch, step.pose(), interpolated, contact, object);
     displaced.push_back(touch);
@@ -131,14 +131,17 @@ std::optional<std::string> touches_contradict(std::span<const Touch> touches,
       ++in_contact;
     }
   }
-  const std::optional<Fit> fit = fit_of(displaced, step.pose(), map, contact, object);
-  if (in_contact < 2 || !fit || fit->verdict != Verdict::fits) {
+  if (in_contact < 2) {
+    return {};
+  }
+  const Fit fit = fit_of(displaced, step.pose(), map, contact, object).value();
+  if (task.fit_scale.of(fit, in_contact).verdict != Verdict::fits) {
     return {};
   }
   return fmt::format(
       "the touches contradict each other by {:.1f} mm: is touch-sd too small, or did the object "
       "move?",
-      std::sqrt(squares / in_contact));
+      std::sqrt(squares / static_cast<double>(in_contact)));
 }
 
 }  // namespace palpate

@@ -131,14 +131,14 @@ std::optional<KnownAgainstUnknown> compare_by(KnownScore score,
 }
 
 std::optional<KnownAgainstUnknown> known_against_unknown(std::span<const JudgedRecord> records) {
-  for (const KnownScore score : {KnownScore::known, KnownScore::none}) {
-    if (std::ranges::all_of(records, [&](const JudgedRecord& record) {
-          return score_of(record, score).has_value();
-        })) {
-      return compare_by(score, records);
+  std::optional<KnownAgainstUnknown> best;
+  for (const KnownScore score : {KnownScore::known, KnownScore::none, KnownScore::fit}) {
+    const auto by_score = compare_by(score, records);
+    if (by_score && (!best || by_score->records() > best->records())) {
+      best = by_score;
     }
   }
-  return compare_by(KnownScore::fit, records);
+  return best;
 }
 
 std::optional<Median> median_of(std::span<const JudgedRecord> records,

@@ -91,6 +91,8 @@ struct KnownAgainstUnknown {
   std::size_t unknown = 0;
   double area = 0.0;
   double standard_error = 0.0;  ///< see told_apart_error()
+
+  std::size_t records() const { return known + unknown; }
 };
 
 struct Median {
@@ -102,8 +104,8 @@ struct Evaluation {
   Scores all;
   std::optional<Scores> known;    ///< of known classes alone, where others are among the records
   std::optional<Scores> unknown;  ///< of unknown classes; `right` counts those called "(none)"
-  /// Only where both kinds of classes have a score: `known` or `none` if every record has it,
-  /// otherwise the fit of those records that have one.
+  /// By the score that most records have, in the order of KnownScore among equals; only where
+  /// records of both kinds of classes have one.
   std::optional<KnownAgainstUnknown> known_against_unknown;
   /// Labels of known classes among the records, and what else was some record's best; last
   /// "(none)", where it was possible.

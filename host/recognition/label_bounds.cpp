@@ -20,7 +20,10 @@ double share(double a, double b) { return a == log_zero ? 0.0 : 1.0 / (1.0 + std
 std::vector<ProbabilityInterval> label_bounds(const Estimate& estimate,
                                               std::span<const double> identity,
                                               std::span<const double> features,
-                                              const RecognitionTask& task) {
+                                              const RecognitionTask& task,
+                                              std::optional<double> known) {
+  const bool learned_none = known && task.labels.back() == none_label;
+  const double times = learned_none ? *known : 1.0;
   const Certificate& certificate = *estimate.certificate;
   const std::vector<LogInterval>& evidence = certificate.log_evidence;
   std::vector<LogInterval> of_label(task.labels.size(), {log_zero, log_zero});
@@ -29,7 +32,7 @@ std::vector<ProbabilityInterval> label_bounds(const Estimate& estimate,
     sum.low = log_sum(sum.low, evidence[h].low);
     sum.high = log_sum(sum.high, evidence[h].high);
   }
-  if (certificate.none_log_evidence) {
+  if (certificate.none_log_evidence && !learned_none) {
     of_label.back() = {*certificate.none_log_evidence, *certificate.none_log_evidence};
   }
   for (std::size_t i = 0; i < of_label.size(); ++i) {
@@ -46,8 +49,11 @@ std::vector<ProbabilityInterval> label_bounds(const Estimate& estimate,
       }
     }
     // The probability itself is rounded, too.
-    bounds.push_back({std::min(share(of_label[i].low, others.high), identity[i]),
-                      std::max(share(of_label[i].high, others.low), identity[i])});
+    bounds.push_back({std::min(times * share(of_label[i].low, others.high), identity[i]),
+                      std::max(times * share(of_label[i].high, others.low), identity[i])});
+  }
+  if (learned_none) {
+    bounds.back() = {identity.back(), identity.back()};
   }
   return bounds;
 }

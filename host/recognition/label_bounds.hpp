@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -12,7 +13,8 @@ namespace palpate {
 /// (Certificate::log_evidence). A label is least probable where its own evidence is the lowest and
 /// all other evidence the highest. With q of label_probabilities() for the label's evidence E:
 ///   low = q(E_low) of the label / (q(E_low) of the label + q(E_high) of the others + q of none),
-/// high likewise. The evidence of "(none)" is taken as the estimate gives it.
+/// high likewise. The evidence of "(none)" is taken as the estimate gives it, and so is `known` of
+/// label_probabilities(), which takes its place.
 /// @param estimate with a certificate
 /// @param identity [label] of the estimate; lies within its bounds
 /// @param features [label] by feature_nats()
@@ -20,6 +22,7 @@ namespace palpate {
 std::vector<ProbabilityInterval> label_bounds(const Estimate& estimate,
                                               std::span<const double> identity,
                                               std::span<const double> features,
-                                              const RecognitionTask& task);
+                                              const RecognitionTask& task,
+                                              std::optional<double> known = {});
 
 }  // namespace palpate

@@ -50,8 +50,9 @@ std::vector<double> sums_by_label(const Estimate& estimate, const RecognitionTas
 }
 
 std::vector<double> label_probabilities(const Estimate& estimate, std::span<const double> features,
-                                        const RecognitionTask& task) {
-  if (task.temperature == 1.0 && !task.features) {
+                                        const RecognitionTask& task, std::optional<double> known) {
+  const bool learned_none = known && task.labels.back() == none_label;
+  if (task.temperature == 1.0 && !task.features && !learned_none) {
     return sums_by_label(estimate, task);
   }
   std::vector<double> logs(task.labels.size(), log_zero);
@@ -59,7 +60,7 @@ std::vector<double> label_probabilities(const Estimate& estimate, std::span<cons
     double& sum = logs[task.label_of[i]];
     sum = log_sum(sum, estimate.log_evidence[i]);
   }
-  if (estimate.none_log_evidence) {
+  if (estimate.none_log_evidence && !learned_none) {
     logs.back() = *estimate.none_log_evidence;
   }
   for (std::size_t i = 0; i < logs.size(); ++i) {
@@ -72,7 +73,10 @@ std::vector<double> label_probabilities(const Estimate& estimate, std::span<cons
     total += p;
   }
   for (double& p : logs) {
-    p /= total;
+    p *= (learned_none ? *known : 1.0) / total;
+  }
+  if (learned_none) {
+    logs.back() = 1.0 - *known;
   }
   return logs;
 }

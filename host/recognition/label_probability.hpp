@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -27,10 +28,14 @@ inline double tempered(double log_evidence, double features, const RecognitionTa
 std::vector<double> sums_by_label(const Estimate& estimate, const RecognitionTask& task);
 
 /// The probability of every label: E^(1 / temperature) exp(features), normalised; by
-/// sums_by_label() where nothing changes them.
+/// sums_by_label() where nothing changes them. Where the task has none_label and `known` is given,
+/// the maps' labels share `known` among themselves and none_label has the rest: touches that
+/// disagree, of which the evidence of none_label is made, take at least two.
 /// @param features [label] by feature_nats()
+/// @param known probability that the object is one of the maps'; see RecognitionStep::known
 std::vector<double> label_probabilities(const Estimate& estimate, std::span<const double> features,
-                                        const RecognitionTask& task);
+                                        const RecognitionTask& task,
+                                        std::optional<double> known = {});
 
 /// log(exp(a) + exp(b))
 double log_sum(double a, double b);

@@ -92,38 +92,39 @@ Updated update(Recogniser& recogniser, const RecognitionTask& task, std::span<co
   return updated;
 }
 
-/// Whether any element of any touch is In Contact.
-bool meet_an_object(std::span<const Touch> touches, const RecognitionTask& task) {
-  return std::any_of(touches.begin(), touches.end(), [&](const Touch& touch) {
-    const std::vector<Reading> readings = task.classifier().classify(touch);
-    return std::any_of(readings.begin(), readings.end(), is_contact);
-  });
+bool meets_an_object(const Touch& touch, const RecognitionTask& task) {
+  const std::vector<Reading> readings = task.classifier().classify(touch);
+  return std::any_of(readings.begin(), readings.end(), is_contact);
 }
 
 /// RecognitionStep::known
-std::optional<double> known_of(const RecognitionStep& step, std::span<const Touch> touches,
+std::optional<double> known_of(const Mode& mode, std::span<const Touch> touches,
                                const RecognitionTask& task) {
-  if (!task.familiarity || touches.size() != 1 || !meet_an_object(touches, task) ||
-      std::holds_alternative<ParticleOptions>(task.filter)) {
+  if (!tells_known(task) || touches.size() != 1 || !meets_an_object(touches.front(), task)) {
     return {};
   }
   const std::vector<Reading> readings = task.classifier().classify(touches.front());
   const auto unknown = std::count(readings.begin(), readings.end(), Reading::unknown);
   const auto known = static_cast<double>(readings.size() - static_cast<std::size_t>(unknown));
-  return task.familiarity->probability(step.mode.log_likelihood / known);
+  return task.familiarity->probability(mode.log_likelihood / known);
 }
 
 /// RecognitionStep::fit
 std::optional<Fit> fit_of(const RecognitionStep& step, std::span<const Touch> touches,
                           const RecognitionTask& task) {
-  if (!meet_an_object(touches, task)) {
+  const auto in_contact = std::count_if(touches.begin(), touches.end(), [&](const Touch& touch) {
+    return meets_an_object(touch, task);
+  });
+  if (in_contact == 0) {
     return {};
   }
   const auto object = static_cast<std::size_t>(step.mode.object);
   const OccupancyGrid& map = task.hypotheses[object].compared();
-  return step.refined
-             ? palpate::fit_of(touches, step.pose(), map, task.contact(), task.touch_sd(), object)
-             : best_fit_near(touches, step.pose(), map, task.contact(), object);
+  const std::optional<Fit> fit =
+      step.refined
+          ? palpate::fit_of(touches, step.pose(), map, task.contact(), task.touch_sd(), object)
+          : best_fit_near(touches, step.pose(), map, task.contact(), object);
+  return task.fit_scale.of(fit.value(), static_cast<std::size_t>(in_contact));
 }
 
 /// T_robot_object from T_object_robot, theta in [-pi, pi).
@@ -182,13 +183,15 @@ RecognitionStep judge(const Estimate& estimate, const GroundTruth& truth,
                       const RecognitionTask& task, std::span<const Touch> touches) {
   const std::vector<std::string>& labels = task.labels;
   const std::vector<double> features = feature_nats(touches, task);
-  RecognitionStep step{.identity = label_probabilities(estimate, features, task),
+  const std::optional<double> known = known_of(estimate.mode, touches, task);
+  RecognitionStep step{.identity = label_probabilities(estimate, features, task, known),
                        .mode = estimate.mode,
                        .refined = {},
                        .contradicted = estimate.contradicted,
-                       .truth = truth};
+                       .truth = truth,
+                       .known = known};
   if (estimate.certificate) {
-    step.identity_bounds = label_bounds(estimate, step.identity, features, task);
+    step.identity_bounds = label_bounds(estimate, step.identity, features, task, known);
     step.certificate = estimate.certificate;
   }
   step.best = static_cast<std::size_t>(
@@ -210,7 +213,6 @@ RecognitionStep take_step(Recogniser& recogniser, const RecognitionTask& task,
   const double seconds = updated.seconds + seconds_since(start);
   RecognitionStep step = judge(estimate, truth, task, touches);
   step.surprise = updated.surprise;
-  step.known = recogniser.touched() ? known_of(step, touches, task) : std::nullopt;
   step.seconds = seconds;
   const Clock::time_point estimated = Clock::now();
   step.refined = recogniser.refine(step.mode);

@@ -62,18 +62,16 @@ struct RecognitionStep {
   std::optional<double> refined_error_mm;       ///< pose error of the refined pose, mm
   std::optional<double> effective_sample_size;  ///< of the particles; empty for a histogram
   /// How well `mode.object` at pose() explains all touches so far, also where `best` is "(none)";
-  /// averaged over displacements where the task has a touch_sd. Empty where no element of any touch
-  /// is in contact: an object out of reach explains them.
+  /// averaged over displacements where the task has a touch_sd, and on the task's fit_scale. Empty
+  /// where no element of any touch is in contact: an object out of reach explains them.
   std::optional<Fit> fit;
   /// How much the last touch surprised the belief before it; see surprise_of(). Empty for
   /// particles, for a touch without a known element, and for an unknown's first touch (so for all
-  /// of
-  /// `--each-frame`), before which there is no belief but the prior. By bounds over more than
+  /// of `--each-frame`), before which there is no belief but the prior. By bounds over more than
   /// most_balanced_bins in all also where several touches come at once.
   std::optional<double> surprise;
-  /// Probability that the object was learned, where the task has a Familiarity and the unknown is a
-  /// single touch with an element in contact. Empty for particles, whose mode has no
-  /// log-likelihood of the touch.
+  /// Probability that the object was learned, where tells_known() and the unknown is a single touch
+  /// with an element In Contact; "(none)" in `identity` then has the rest.
   std::optional<double> known = {};
   std::vector<std::string> warnings;  ///< what looks wrong with the touches, in whole sentences
   double seconds = 0.0;               ///< wall time from the touch to the estimate

@@ -106,10 +106,14 @@ std::optional<CoarsenedBins> settle_bins(const Device& device, RecognitionTask& 
   return chosen.coarsened ? std::optional(CoarsenedBins{chosen.step_mm, most}) : std::nullopt;
 }
 
+bool tells_known(const RecognitionTask& task) {
+  return task.familiarity && !std::holds_alternative<ParticleOptions>(task.filter);
+}
+
 void settle_evidence(RecognitionTask& task) {
   constexpr double share = 0.05;
   auto* bounded = std::get_if<BoundedOptions>(&task.filter);
-  if (bounded != nullptr && task.temperature > 1.0 && !bounded->evidence_nats) {
+  if (bounded != nullptr && (task.temperature > 1.0 || task.features) && !bounded->evidence_nats) {
     bounded->evidence_nats = share * task.temperature;
   }
 }

@@ -57,7 +57,12 @@ struct RecognitionTask {
   double temperature = 1.0;
   std::optional<LearnedFeatures> features = {};
   std::optional<Familiarity> familiarity = {};
+  FitScale fit_scale = {};  ///< of RecognitionStep::fit
 };
+
+/// Whether a single touch tells how probably its object was learned: the task has a Familiarity,
+/// and the filter a mode with the log-likelihood of the touch.
+bool tells_known(const RecognitionTask& task);
 
 /// Most bins, of all objects together, for which `auto` takes the histogram: up to here it answers
 /// quickly, and takes no longer where nothing fits. Above it, bounds answer much sooner where
@@ -85,10 +90,10 @@ struct CoarsenedBins {
 /// @throws Error as balanced_lattice() does
 std::optional<CoarsenedBins> settle_bins(const Device& device, RecognitionTask& task);
 
-/// With a temperature above 1 also improbable labels get a share, which needs their evidence: has
-/// bounds find each log evidence within 0.05 times the temperature, so that no probability is off
-/// by more than about 10 %, unless BoundedOptions::evidence_nats says how closely. The filter is
-/// settled before.
+/// A temperature above 1 and features give also improbable labels a share, which needs their
+/// evidence: has bounds find each log evidence within 0.05 times the temperature, so that no
+/// probability is off by more than about 10 %, unless BoundedOptions::evidence_nats says how
+/// closely. The filter is settled before.
 void settle_evidence(RecognitionTask& task);
 
 /// Chooses the filter if the task leaves it to this rule (auto_filter): of more than

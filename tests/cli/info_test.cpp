@@ -2,6 +2,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "palpate/learned_sensor.hpp"
 #include "program.hpp"
 #include "sample_files.hpp"
 
@@ -121,6 +122,21 @@ TEST_F(InfoCommand, Posterior) {
   write_posterior(folder_ / "p.h5", posterior);
   expect_info("p.h5", {"posterior over A, I", "2 x 1 x 1", "-5.000 nats at x -5.00 mm",
                        "-8.000 nats at x 5.00 mm"});
+}
+
+TEST_F(InfoCommand, SensorModel) {
+  LearnedSensor sensor{.pressure_unit = "raw",
+                       .classifier = {.threshold = 15.0, .ratio = 0.15},
+                       .table = LearnedTable{.level_edges = {40.0}},
+                       .temperature = 31.5,
+                       .familiarity = Familiarity{.offset = 6.0, .slope = 12.0},
+                       .fit_scale = FitScale{.mean = -4.5, .sd = 12.25}};
+  sensor.table->shared.assign(3 * ReadingLayer::nodes, -1.0);
+  sensor.table->objects["pen"] = sensor.table->shared;
+  write_sensor_model(folder_ / "s.yaml", sensor);
+  expect_info("s.yaml", {"s.yaml: sensor model", "threshold         15, ratio 0.15",
+                         "table of 3 levels over log odds; 1 object(s) with numbers of their own",
+                         "temperature       31.5", "z of learned objects -4.5 +- 12.25"});
 }
 
 }  // namespace

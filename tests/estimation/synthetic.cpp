@@ -81,7 +81,7 @@ reference::Posterior reference_posterior(std::span<const Hypothesis> hypotheses,
   for (std::size_t object = 0; object < hypotheses.size(); ++object) {
     const Hypothesis& hypothesis = hypotheses[object];
     posterior.log_likelihood.push_back(reference::log_likelihoods(
-        touches, options.lattice, hypothesis.map, options.contact, object));
+        touches, options.lattice, hypothesis.compared(), options.contact, object));
     posterior.weight.push_back(hypothesis.weight);
   }
   return posterior;

@@ -18,7 +18,8 @@ LearnedSensor full_sensor() {
                        .table = LearnedTable{},
                        .temperature = 31.5,
                        .features = LearnedFeatures{},
-                       .familiarity = Familiarity{.offset = -3.5, .slope = 20.25}};
+                       .familiarity = Familiarity{.offset = -3.5, .slope = 20.25},
+                       .fit_scale = FitScale{.mean = -4.5, .sd = 12.25}};
   LearnedTable& table = *sensor.table;
   table.layer = {.of = MapLayer::mean_level,
                  .near_mm = 3.5,
@@ -85,6 +86,9 @@ TEST_F(SensorModelFile, ComesBackAsItWasWritten) {
   EXPECT_EQ(read.features->objects.at("pen").sd, written.features->objects.at("pen").sd);
   EXPECT_EQ(read.familiarity->offset, written.familiarity->offset);
   EXPECT_EQ(read.familiarity->slope, written.familiarity->slope);
+  ASSERT_TRUE(read.fit_scale);
+  EXPECT_EQ(read.fit_scale->mean, written.fit_scale->mean);
+  EXPECT_EQ(read.fit_scale->sd, written.fit_scale->sd);
 }
 
 TEST_F(SensorModelFile, MayHoldLittle) {
@@ -92,7 +96,7 @@ TEST_F(SensorModelFile, MayHoldLittle) {
   const LearnedSensor read = read_sensor_model(path_);
   EXPECT_EQ(read.classifier.threshold, 3.0);
   EXPECT_EQ(read.temperature, 1.0);
-  EXPECT_FALSE(read.table || read.features || read.familiarity);
+  EXPECT_FALSE(read.table || read.features || read.familiarity || read.fit_scale);
 }
 
 TEST_F(SensorModelFile, SaysWhatIsWrong) {
@@ -105,7 +109,8 @@ TEST_F(SensorModelFile, SaysWhatIsWrong) {
   expect_named(message("mean_level", "pressure"), {"layer", "log_odds, mean_level"});
   expect_named(message("[35, 60.5]", "[60.5, 35]"), {"level_edges"});
   expect_named(message("[35, 60.5]", "[35]"), {"log_likelihood"});
-  expect_named(message("[1, 2, 3]", "[1, 2]"), {"any", "mean", "area"});
+  expect_named(message("[1, 2, 3]", "[1, 2]"), {"line 17", "mean", "area"});
+  expect_named(message("sd: 12.25", "sd: 0"), {"fit_scale: sd", "positive"});
   expect_named(message("raw", "psi"), {"pressure_unit", "kPa or raw"});
   put_bytes(path_, "threshold: 3\n");
   expect_named(input_error([&] { read_sensor_model(path_); }), {"format", "palpate calibrate"});

@@ -284,5 +284,16 @@ TEST(DisplacedFit, OfTouchesAsPredictedHasMeanZeroAndVarianceOne) {
   EXPECT_LT(plain_sum / draws, -1.0) << "as if exact, such touches fit worse";
 }
 
+TEST(FitScale, IsWhatTouchesOfTheirOwnObjectShow) {
+  const FitScale scale{.mean = -6.0, .sd = 4.0};
+  EXPECT_EQ(scale.of({.z = -6.0}, 1).z, 0.0);
+  EXPECT_EQ(scale.of({.z = -14.0}, 1).z, -2.0);
+  EXPECT_EQ(scale.of({.z = -14.0, .verdict = Verdict::does_not_fit}, 1).verdict, Verdict::fits);
+  EXPECT_EQ(scale.of({.z = -20.0}, 1).verdict, Verdict::doubtful);
+  EXPECT_EQ(scale.of({.z = -23.0}, 1).verdict, Verdict::does_not_fit);
+  EXPECT_EQ(scale.of({.z = -20.0}, 4).z, -2.0) << "four touches are 2 times 6 below 0";
+  EXPECT_EQ(FitScale{}.of({.z = -3.5}, 9).z, -3.5);
+}
+
 }  // namespace
 }  // namespace palpate

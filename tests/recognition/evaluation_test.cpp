@@ -130,6 +130,20 @@ TEST(KnownAgainstUnknown, PrefersKnownThenNoneThenFit) {
       << "one record has no other score";
 }
 
+TEST(KnownAgainstUnknown, TakesKnownWhereOneTouchMetNothing) {
+  std::vector<JudgedRecord> records = six();
+  for (JudgedRecord& each : records) {
+    each.none.reset();
+    each.known = each.of_known_class() ? 0.5 : 0.1;
+    each.fit_z = -1.0;
+  }
+  records[0].known.reset();
+  records[0].fit_z.reset();
+  const auto by_known = evaluate(records).known_against_unknown.value();
+  EXPECT_EQ(by_known.score, KnownScore::known);
+  EXPECT_EQ(by_known.known, 3u);
+}
+
 TEST(KnownAgainstUnknown, TakesTheFitOfTheRecordsThatHaveOne) {
   std::vector<JudgedRecord> records = six();
   for (JudgedRecord& each : records) {

@@ -130,6 +130,56 @@ TEST(LabelProbability, PassesOverTouchesWithoutContact) {
   EXPECT_EQ(feature_nats(std::span(&touch, 1), task), std::vector<double>(2));
 }
 
+/// A task in which a press at which nothing is held likely is of a learned object with probability
+/// 1 / (1 + e^2), that of no press below.
+RecognitionTask with_known(const FilterOptions& filter) {
+  RecognitionTask task = three_maps(filter);
+  task.temperature = 2.0;
+  task.familiarity = Familiarity{.offset = 0.0, .slope = 2.0};
+  return task;
+}
+const double of_known = 1.0 / (1.0 + std::exp(2.0));
+
+TEST(LabelProbability, GivesNoneOfTheseWhatASinglePressLeaves) {
+  const RecognitionTask task = with_known(HistogramOptions{.none_weight = 1.0});
+  Estimate estimate = four_to_one();
+  estimate.none_log_evidence = 1e4;     // which all else is 0 beside
+  estimate.mode.log_likelihood = -3.0;  // -1 for each of three elements
+  const Press press;
+  const std::vector<Touch> two{press.touch(), press.touch()};
+  const RecognitionStep step = judge(estimate, {}, task, std::span(two).first(1));
+  EXPECT_NEAR(step.known.value(), of_known, 1e-15);
+  EXPECT_NEAR(step.identity[0], of_known * 2.0 / 3.0, 1e-15);
+  EXPECT_NEAR(step.identity[1], of_known / 3.0, 1e-15);
+  EXPECT_NEAR(step.identity[2], 1.0 - of_known, 1e-15);
+  const RecognitionStep after_two = judge(estimate, {}, task, two);
+  EXPECT_FALSE(after_two.known) << "which may disagree";
+  EXPECT_EQ(after_two.identity[2], 1.0);
+  const RecognitionStep without =
+      judge(four_to_one(), {}, with_known(HistogramOptions{}), std::span(two).first(1));
+  EXPECT_NEAR(without.identity[0], 2.0 / 3.0, 1e-15) << "without (none), known stands aside";
+}
+
+TEST(LabelBounds, ShareWhatASinglePressLeaves) {
+  const RecognitionTask task = with_known(BoundedOptions{.none_weight = 1.0});
+  Estimate estimate = four_to_one();
+  estimate.mode.log_likelihood = -3.0;
+  estimate.none_log_evidence = 0.0;
+  // Evidence of L within 4 to 9, of the disc within 1 to 4.
+  estimate.certificate = Certificate{
+      .log_evidence = {{std::log(3.0), std::log(8.0)}, {0.0, std::log(4.0)}, {0.0, 0.0}},
+      .none_log_evidence = 0.0};
+  const Press press;
+  const std::vector<Touch> touches{press.touch()};
+  const RecognitionStep step = judge(estimate, {}, task, touches);
+  ASSERT_EQ(step.identity_bounds.size(), 3u);
+  EXPECT_NEAR(step.identity_bounds[0].low, of_known * 2.0 / (2.0 + 2.0), 1e-15);
+  EXPECT_NEAR(step.identity_bounds[0].high, of_known * 3.0 / (3.0 + 1.0), 1e-15);
+  EXPECT_NEAR(step.identity_bounds[1].high, of_known * 2.0 / (2.0 + 2.0), 1e-15);
+  EXPECT_NEAR(step.identity_bounds[2].low, 1.0 - of_known, 1e-15);
+  EXPECT_EQ(step.identity_bounds[2].high, step.identity_bounds[2].low);
+}
+
 TEST(LabelBounds, FollowTheTemperatureAndTheFeatures) {
   RecognitionTask task = three_maps(BoundedOptions{});
   task.temperature = 2.0;
@@ -163,6 +213,10 @@ TEST(SettleEvidence, HasBoundsFindTheEvidenceThatATemperatureNeeds) {
   std::get<BoundedOptions>(task.filter).evidence_nats = 0.1;
   settle_evidence(task);
   EXPECT_EQ(std::get<BoundedOptions>(task.filter).evidence_nats, 0.1) << "as given";
+  RecognitionTask featured = three_maps(BoundedOptions{});
+  featured.features = features_of_the_letter();
+  settle_evidence(featured);
+  EXPECT_EQ(std::get<BoundedOptions>(featured.filter).evidence_nats, 0.05);
   RecognitionTask dense = three_maps();
   dense.temperature = 30.0;
   settle_evidence(dense);

@@ -203,5 +203,49 @@ TEST(Temperature, LeavesPosesAndTellsTheSameByBoundsAsByTheHistogram) {
   }
 }
 
+TEST(LearnedSensor, TellsTheSameByBoundsAsByTheHistogram) {
+  Device device = Device::open();
+  LearnedSensor sensor = equation_7();
+  sensor.table->layer.near_mm = 1.0;
+  sensor.table->layer.far_mm = 3.0;
+  // The disc's own numbers leave more to chance.
+  for (const double l : sensor.table->shared) {
+    sensor.table->objects["disc"].push_back(0.8 * l);
+  }
+  LearnedFeatures features{.weight = 0.3, .any = {.mean = {2.0, 4.0, 1.5}, .sd = {1.0, 1.0, 1.0}}};
+  features.objects["disc"] = {.mean = {3.0, 5.0, 2.0}, .sd = {0.5, 0.5, 0.5}};
+  std::vector<Hypothesis> maps = shapes();
+  maps[0].map.mirror = true;
+  add_mirror_images(maps);
+  for (const std::uint64_t seed : {5, 6, 7}) {
+    const Recording recording = seed == 6 ? touched_disc(seed) : touched_letter(seed);
+    std::vector<RecognitionRecord> records;
+    for (const std::size_t filter : {0U, 2U}) {
+      FilterOptions options = every_filter()[filter];
+      std::vector<Hypothesis> learned = maps;
+      std::visit([&](auto& of) { apply(sensor, learned, of.contact); }, options);
+      RecognitionTask task(learned, options);
+      task.temperature = 4.0;
+      task.features = features;
+      settle_evidence(task);
+      Recogniser recogniser(device, task);
+      records.push_back(recognise(recogniser, task, unknown_of(recording), true));
+    }
+    for (std::size_t k = 0; k < recording.size(); ++k) {
+      const RecognitionStep& dense = records[0].trace[k];
+      const RecognitionStep& bounded = records[1].trace[k];
+      ASSERT_EQ(bounded.identity_bounds.size(), 2u);
+      for (std::size_t i = 0; i < 2; ++i) {
+        const auto [low, high] = bounded.identity_bounds[i];
+        // Two log evidences of the histogram, each within 1e-4 nats per touch, over 4.
+        const double rounding = 2e-4 * static_cast<double>(k + 1) / 4.0;
+        EXPECT_GE(dense.identity[i], low - rounding) << "touch " << k;
+        EXPECT_LE(dense.identity[i], high + rounding) << "touch " << k;
+        EXPECT_LT(high - low, 0.05);
+      }
+    }
+  }
+}
+
 }  // namespace
 }  // namespace palpate

@@ -30,6 +30,19 @@ inline constexpr double doubtful_from_z = -4.0;
 /// z is cut off here, for readings that the object holds to be impossible.
 inline constexpr double largest_fit_z = 1e6;
 
+/// What z is like for touches of an object at their best pose on a map that had not seen them.
+/// Neighbouring elements of a large array are far from independent, as z takes them to be, and maps
+/// are not perfect: z then has a mean below 0 and a standard deviation of many times 1.
+struct FitScale {
+  double mean = 0.0;  ///< of the z of single touches
+  double sd = 1.0;    ///< their standard deviation
+
+  /// The fit on this scale: (z - mean sqrt(n)) / sd, within +-`largest_fit_z`, with its verdict.
+  /// The deviations of n independent touches add up, and so do their variances.
+  /// @param touches n, those with an element In Contact
+  Fit of(const Fit& fit, std::size_t touches) const;
+};
+
 /// Compares the log-likelihood of the touches' known elements with what the object at this pose
 /// predicts for them. An element at log odds l of the map reads r with probability
 ///   q(r) = P(r | l) / sum over all r' of P(r' | l), P by Eq. 7 or the table,

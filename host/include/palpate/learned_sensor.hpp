@@ -11,6 +11,7 @@
 #include "palpate/contact_model.hpp"
 #include "palpate/displacement.hpp"
 #include "palpate/estimate.hpp"
+#include "palpate/fit.hpp"
 #include "palpate/reading_layer.hpp"
 #include "palpate/touch.hpp"
 
@@ -85,6 +86,7 @@ struct LearnedSensor {
   double temperature = 1.0;
   std::optional<LearnedFeatures> features;
   std::optional<Familiarity> familiarity;
+  std::optional<FitScale> fit_scale;  ///< of the z of Fit; without one, z stays as it is
 
   /// Throws Error on a value out of range.
   void validate() const;

@@ -26,9 +26,9 @@ double weight_error(const ParticleFilter& filter, const Touch& touch,
   const std::vector<ParticleFilter::Particle> particles = filter.particles();
   for (std::size_t i = 0; i < particles.size(); i += stride) {
     const ParticleFilter::Particle& particle = particles[i];
-    const double expected =
-        reference::log_likelihood(touch, particle.T_object_robot, objects[particle.object].map,
-                                  options.contact, particle.object);
+    const double expected = reference::log_likelihood(touch, particle.T_object_robot,
+                                                      objects[particle.object].compared(),
+                                                      options.contact, particle.object);
     differences.push_back(std::log(particle.weight) - expected);
     mean += differences.back();
   }
