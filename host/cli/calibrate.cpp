@@ -1,5 +1,7 @@
 #include "commands.hpp"
 
+#include <unistd.h>
+
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -154,13 +156,17 @@ std::vector<OccupancyGrid> read_maps(const Options& options,
 }
 
 void calibrate(const Options& options) {
-  const std::vector<std::filesystem::path> map_files = files_of_maps(options.maps);
-  check_outputs(options, map_files);
+  std::vector<std::filesystem::path> maps_read;
+  for (const std::string& argument : options.maps) {
+    const std::vector<std::filesystem::path> files = map_files(argument);
+    maps_read.insert(maps_read.end(), files.begin(), files.end());
+  }
+  check_outputs(options, maps_read);
   const std::vector<Recording> recordings = read_touch_recordings(options.recordings);
   const std::vector<Press> presses = presses_of(options, recordings);
   const SensorCalibrationOptions how =
       calibration_options(options, recordings.front().pressure_unit);
-  const std::vector<OccupancyGrid> maps = read_maps(options, map_files);
+  const std::vector<OccupancyGrid> maps = read_maps(options, maps_read);
 
   SensorCalibration calibration;
   {
@@ -176,7 +182,7 @@ void calibrate(const Options& options) {
     reliability = calibration.before ? draw_reliability(reliability_of(calibration)) : "";
   }
   write_sensor_model(options.output, calibration.sensor);
-  fmt::print("{}", calibration_text(calibration, presses.size(), terminal_columns(stdout)));
+  fmt::print("{}", calibration_text(calibration, presses.size(), terminal_columns(STDOUT_FILENO)));
   for (const std::string& warning : calibration.warnings) {
     fmt::print(stderr, "palpate: {}\n", warning);
   }

@@ -177,21 +177,6 @@ std::string error_words(const Evaluation& evaluation) {
   return text.empty() ? "" : text + "\n";
 }
 
-ReliabilityFigure::Curve curve_of(const char* name, const Scores& scores) {
-  ReliabilityFigure::Curve curve{
-      .name = fmt::format("{} ({}, calibration error {:.3f})", name,
-                          count_of(scores.records, "record", "records"), scores.calibration_error),
-      .points = {}};
-  for (const ReliabilityBin& bin : scores.bins) {
-    if (bin.records > 0) {
-      const Interval interval = bin.interval();
-      curve.points.push_back(
-          {bin.mean_confidence, bin.accuracy(), interval.low, interval.high, bin.records});
-    }
-  }
-  return curve;
-}
-
 }  // namespace
 
 Json to_json(const Evaluation& evaluation, std::size_t without_truth) {
@@ -249,6 +234,21 @@ ConfusionFigure confusion_of(const Evaluation& evaluation) {
     figure.rows.push_back({class_name(scores), right, scores.taken});
   }
   return figure;
+}
+
+ReliabilityFigure::Curve curve_of(const char* name, const Scores& scores) {
+  ReliabilityFigure::Curve curve{
+      .name = fmt::format("{} ({}, calibration error {:.3f})", name,
+                          count_of(scores.records, "record", "records"), scores.calibration_error),
+      .points = {}};
+  for (const ReliabilityBin& bin : scores.bins) {
+    if (bin.records > 0) {
+      const Interval interval = bin.interval();
+      curve.points.push_back(
+          {bin.mean_confidence, bin.accuracy(), interval.low, interval.high, bin.records});
+    }
+  }
+  return curve;
 }
 
 ReliabilityFigure reliability_of(const Evaluation& evaluation) {

@@ -24,6 +24,8 @@ std::string evaluation_text(const Evaluation& evaluation, std::size_t without_tr
 
 /// How often each class was taken for each label.
 ConfusionFigure confusion_of(const Evaluation& evaluation);
+/// Accuracy over confidence of some records.
+ReliabilityFigure::Curve curve_of(const char* name, const Scores& scores);
 /// Accuracy over confidence, of known classes apart where there are others.
 ReliabilityFigure reliability_of(const Evaluation& evaluation);
 

@@ -61,6 +61,7 @@ int run(int argc, char** argv) {
   palpate::cli::add_live(app);
   palpate::cli::add_simulate(app);
   palpate::cli::add_map(app);
+  palpate::cli::add_calibrate(app);
   palpate::cli::add_recognize(app);
   palpate::cli::add_plan(app);
   palpate::cli::add_evaluate(app);

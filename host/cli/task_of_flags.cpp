@@ -12,6 +12,7 @@
 #include "file_identity.hpp"
 #include "options.hpp"
 #include "palpate/balanced_lattice.hpp"
+#include "map_files.hpp"
 #include "palpate/files.hpp"
 #include "recordings.hpp"
 #include "sensor_model_flag.hpp"
@@ -19,30 +20,6 @@
 namespace palpate::cli {
 
 namespace {
-
-/// The map files that an argument of --maps stands for: itself, or the maps of a folder.
-std::vector<std::filesystem::path> map_files(const std::filesystem::path& argument) {
-  std::error_code error;
-  if (!std::filesystem::is_directory(argument, error)) {
-    return {argument};
-  }
-  std::vector<std::filesystem::path> files;
-  const std::filesystem::directory_iterator entries(argument, error);
-  if (error) {
-    refuse(argument, "cannot be read: {}; check its permissions", error.message());
-  }
-  for (const auto& entry : entries) {
-    if (entry.path().extension() == ".h5" && read_format(entry.path()) == "palpate.map") {
-      files.push_back(entry.path());
-    }
-  }
-  if (files.empty()) {
-    refuse(argument, "a folder without maps; build some with palpate map RECORDING... -o {}",
-           (argument / "").string());
-  }
-  std::sort(files.begin(), files.end());
-  return files;
-}
 
 std::vector<Scene::Object> objects_of(const RecognitionFlags& flags, const Scene& scene) {
   if (flags.maps.empty()) {

@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "element_spacing.hpp"
+#include "golden_section.hpp"
 #include "palpate/error.hpp"
 #include "palpate/occupancy_grid.hpp"
 
@@ -110,14 +111,16 @@ ContactClassifier learn_classifier(const std::vector<Press>& presses) {
 
 double noise_floor(const std::vector<Press>& presses, const ContactClassifier& classifier) {
   constexpr double far = 2.0;  // in spacings
+  const ContactClassifier any_contact{.threshold = classifier.threshold, .ratio = 0.0};
   double squares = 0.0;
   double count = 0.0;
   bool any_negative = false;
   for (const Press& press : presses) {
     for (const Touch& touch : press.touches) {
       const auto spacing = spacing_of(touch.elements_mm);
-      const std::vector<bool> near = near_contact(touch, classifier.classify(touch),
-                                                  spacing ? far * spacing->nearest_mm.most : 0.0);
+      const std::vector<bool> near =
+          near_contact(touch, any_contact.classify(touch),
+                       spacing ? far * spacing->nearest_mm.most : 0.0);
       for (std::size_t e = 0; e < near.size(); ++e) {
         if (!near[e] && is_living(touch, e)) {
           squares += touch.pressure[e] * touch.pressure[e];
@@ -138,23 +141,17 @@ double fit_gamma(const LevelCounts& counts, double prior) {
       const double value = LevelCounts::value_at(node);
       if (value >= -ReadingLayer::largest_value) {
         const double p = probability_from_log_odds(value);
+        // Eq. 7's two values sum to less than 1.
         nats += counts.at(0, node) * std::log(gamma * prior + (1.0 - gamma) * (1.0 - p)) +
-                counts.at(1, node) * std::log(gamma * prior + (1.0 - gamma) * p);
+                counts.at(1, node) * std::log(gamma * prior + (1.0 - gamma) * p) -
+                counts.at_node(node) * std::log(1.0 - gamma * (1.0 - 2.0 * prior));
       }
     }
     return nats;
   };
-  // Concave in gamma: a sum of logarithms of what is linear in it.
-  constexpr double golden = 0.6180339887498949;
-  double low = 1e-6;
-  double high = 0.99;
-  while (high - low > 1e-6) {
-    const double left = high - golden * (high - low);
-    const double right = low + golden * (high - low);
-    (log_likelihood(left) < log_likelihood(right) ? low : high) =
-        log_likelihood(left) < log_likelihood(right) ? left : right;
-  }
-  return (low + high) / 2.0;
+  constexpr double least = 1e-3;
+  constexpr double most = 0.9;
+  return largest_at(least, most, 1e-4, log_likelihood);
 }
 
 double share_in_contact(std::span<const Touch> touches, const ContactClassifier& classifier) {

@@ -9,6 +9,7 @@
 
 #include "bounding_box.hpp"
 #include "element_spacing.hpp"
+#include "golden_section.hpp"
 
 namespace palpate {
 
@@ -256,35 +257,15 @@ std::optional<double> learn_point_spread(const std::vector<Press>& presses,
     }
     return sum;
   };
-  // Golden sections of the logarithm.
-  constexpr double golden = 0.6180339887498949;
+  // Of its logarithm.
   constexpr double least = 0.05;  // of the spacing
   constexpr double most = 3.0;
+  constexpr double tolerance = 0.005;
   const double lowest = std::log(least * spacing_mm);
   const double highest = std::log(most * spacing_mm);
-  double low = lowest;
-  double high = highest;
-  double left = high - golden * (high - low);
-  double right = low + golden * (high - low);
-  double at_left = error_at(std::exp(left));
-  double at_right = error_at(std::exp(right));
-  constexpr double tolerance = 0.005;
-  while (high - low > tolerance) {
-    if (at_left < at_right) {
-      high = right;
-      right = left;
-      at_right = at_left;
-      left = high - golden * (high - low);
-      at_left = error_at(std::exp(left));
-    } else {
-      low = left;
-      left = right;
-      at_left = at_right;
-      right = low + golden * (high - low);
-      at_right = error_at(std::exp(right));
-    }
-  }
-  const double found = (low + high) / 2.0;
+  const double found = largest_at(lowest, highest, tolerance, [&](double log_sigma) {
+    return -error_at(std::exp(log_sigma));
+  });
   if (found - lowest < 2.0 * tolerance || highest - found < 2.0 * tolerance) {
     return {};
   }

@@ -205,12 +205,14 @@ PoseLattice placing_lattice(std::span<const TrainingMap> maps, double step_mm, d
     box.take_in(map.map.centre_mm(0, 0));
     box.take_in(map.map.centre_mm(map.map.nx - 1, map.map.ny - 1));
   }
+  const double half_mm = 0.5 * std::min(box.extent().x, box.extent().y);
   const auto axis = [](double lower, double upper, double step) {
     return Axis{lower, upper,
                 std::max(1, static_cast<int>(std::ceil((upper - lower) / step - 1e-9)))};
   };
-  return {.x_mm = axis(box.lower.x, box.upper.x, step_mm),
-          .y_mm = axis(box.lower.y, box.upper.y, step_mm),
+  const glm::dvec2 middle = box.middle();
+  return {.x_mm = axis(middle.x - half_mm, middle.x + half_mm, step_mm),
+          .y_mm = axis(middle.y - half_mm, middle.y + half_mm, step_mm),
           .theta_rad = axis(0.0, 2.0 * std::numbers::pi, step_rad)};
 }
 

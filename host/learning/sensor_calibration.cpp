@@ -170,11 +170,9 @@ class SensorLearning {
   }
 
   void learn_confidence(const CrossValidation& eq7, const CrossValidation& learned) {
-    result_.before = calibration_of(eq7.presses, 1.0);
-    result_.presses_before = eq7.presses;
-    result_.table = calibration_of(learned.presses, 1.0);
-    result_.presses_after = tempered_by_halves(learned.presses);
-    result_.after = calibration_of(result_.presses_after, 1.0);
+    result_.before = scores_of(eq7.presses, 1.0);
+    result_.table = scores_of(learned.presses, 1.0);
+    result_.after = scores_of(tempered_by_halves(learned.presses), 1.0);
     const TemperatureFit fit = fit_temperature(learned.presses);
     result_.sensor.temperature = fit.temperature;
     std::vector<LabelledFeatures> features;

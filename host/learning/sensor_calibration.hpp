@@ -31,11 +31,9 @@ struct SensorCalibration {
   MapOptions maps;  ///< of the maps that presses were compared with
   std::size_t objects = 0;
   /// Of the cross-validation; none with one object.
-  std::optional<Calibration> before;  ///< Eq. 7 with gamma 0.1, temperature 1
-  std::optional<Calibration> table;   ///< the table, temperature 1
-  std::optional<Calibration> after;   ///< the table, temperature and features
-  std::vector<ScoredPress> presses_before;  ///< what `before` is of, log probabilities
-  std::vector<ScoredPress> presses_after;   ///< what `after` is of, log probabilities
+  std::optional<Scores> before;  ///< Eq. 7 with gamma 0.1, temperature 1
+  std::optional<Scores> table;   ///< the table, temperature 1
+  std::optional<Scores> after;   ///< the table, temperature and features
   /// Area under the curve of presses whose object is known against those whose object is left out;
   /// none with one object.
   std::optional<double> area_under_curve;

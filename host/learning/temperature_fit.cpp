@@ -1,9 +1,10 @@
 #include "temperature_fit.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
+#include <string>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -114,31 +115,19 @@ std::vector<double> label_probabilities(const ScoredPress& press, double tempera
   return p;
 }
 
-Calibration calibration_of(std::span<const ScoredPress> presses, double temperature,
-                           double feature_weight) {
+Scores scores_of(std::span<const ScoredPress> presses, double temperature, double feature_weight) {
   require_sound(presses);
-  struct Bin {
-    double confidence = 0.0;
-    double right = 0.0;
-  };
-  constexpr int bin_count = 10;
-  std::array<Bin, bin_count> bins{};
-  Calibration result{.presses = presses.size()};
-  const double share = 1.0 / static_cast<double>(presses.size());
+  std::vector<JudgedRecord> records;
   for (const ScoredPress& press : presses) {
     const std::vector<double> p = label_probabilities(press, temperature, feature_weight);
-    const auto best = std::ranges::max_element(p);
-    const double right = static_cast<std::size_t>(best - p.begin()) == press.truth ? 1.0 : 0.0;
-    Bin& bin = bins.at(std::min(static_cast<std::size_t>(*best * bin_count), bins.size() - 1));
-    bin.confidence += share * *best;
-    bin.right += share * right;
-    result.accuracy += share * right;
-    result.log_loss += share * loss_of(press, temperature, feature_weight);
+    JudgedRecord record{.truth = std::to_string(press.truth)};
+    for (std::size_t label = 0; label < p.size(); ++label) {
+      record.identity[std::to_string(label)] = p[label];
+    }
+    record.best = std::to_string(std::ranges::max_element(p) - p.begin());
+    records.push_back(std::move(record));
   }
-  for (const Bin& bin : bins) {
-    result.calibration_error += std::abs(bin.confidence - bin.right);
-  }
-  return result;
+  return evaluate(records).all;
 }
 
 TemperatureFit fit_temperature(std::span<const ScoredPress> presses) {

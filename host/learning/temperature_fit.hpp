@@ -4,6 +4,8 @@
 #include <span>
 #include <vector>
 
+#include "evaluation.hpp"
+
 namespace palpate {
 
 /// What a model that has not seen a press says of it, label by label.
@@ -18,19 +20,10 @@ struct ScoredPress {
 std::vector<double> label_probabilities(const ScoredPress& press, double temperature,
                                         double feature_weight = 0.0);
 
-/// How good the probabilities of presses are.
-struct Calibration {
-  std::size_t presses = 0;
-  double accuracy = 0.0;  ///< share of the presses whose label has the largest probability
-  double log_loss = 0.0;  ///< mean of -log of the label's probability, in nats
-  /// Mean over ten bins of the largest probability, weighted by the bins' presses, of the
-  /// difference between the mean largest probability and the accuracy of the bin.
-  double calibration_error = 0.0;
-};
-/// @throws Error on no press, or a press without a log evidence for each of the same labels, finite
-/// for its own
-Calibration calibration_of(std::span<const ScoredPress> presses, double temperature,
-                           double feature_weight = 0.0);
+/// How right and how honest the probabilities of presses are; see evaluate().
+/// @throws Error as fit_temperature() on presses that are not sound
+Scores scores_of(std::span<const ScoredPress> presses, double temperature,
+                 double feature_weight = 0.0);
 
 struct TemperatureFit {
   double temperature = 1.0;
@@ -41,7 +34,8 @@ struct TemperatureFit {
 /// evidences differ by the median margin of the presses (label against the best other): it is
 /// right or wrong with equal weights, so that presses which are all told apart, however clearly, do
 /// not make the temperature 0.
-/// @throws Error as calibration_of(), and where no press has two labels to choose from
+/// @throws Error on no press, on a press without a log evidence for each of the same labels, finite
+/// for its own, and where no press has two labels to choose from
 TemperatureFit fit_temperature(std::span<const ScoredPress> presses);
 
 /// The presses with the logarithms of their labels' probabilities in the place of the evidences:

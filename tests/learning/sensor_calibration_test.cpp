@@ -28,7 +28,7 @@ TEST(SensorCalibration, LearnsWhatAFileHolds) {
   found.sensor.validate();
   EXPECT_EQ(found.objects, 2U);
   EXPECT_EQ(found.after.presses, 8U);
-  EXPECT_NEAR(found.after.accuracy, 1.0, 1e-9);
+  EXPECT_NEAR(found.after.accuracy(), 1.0, 1e-9);
   EXPECT_LT(found.after.log_loss, 0.7) << "a guess's";
   EXPECT_EQ(found.sensor.table->objects.size(), 2U);
   EXPECT_TRUE(found.sensor.features.has_value());

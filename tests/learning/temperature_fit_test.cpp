@@ -42,8 +42,8 @@ TEST(TemperatureFit, RecoversTheTemperatureOfAnOverconfidentModel) {
   const TemperatureFit fit = fit_temperature(presses);
   EXPECT_NEAR(fit.temperature, 30.0, 2.0);  // 2000 presses tell it within 3 %
   EXPECT_NEAR(fit.feature_weight, 0.5, 0.05);
-  const Calibration before = calibration_of(presses, 1.0);
-  const Calibration after = calibration_of(presses, fit.temperature, fit.feature_weight);
+  const Scores before = scores_of(presses, 1.0);
+  const Scores after = scores_of(presses, fit.temperature, fit.feature_weight);
   EXPECT_GT(before.log_loss, 5.0);
   EXPECT_GT(before.calibration_error, 0.2);
   EXPECT_LT(after.log_loss, 0.8);
@@ -83,7 +83,7 @@ TEST(TemperatureFit, IsLargeWhereEvidenceIsNoGuide) {
   EXPECT_GT(fit_temperature(presses).temperature, 1e4);
 }
 
-TEST(Calibration, CountsByHand) {
+TEST(ScoresOfPresses, CountsByHand) {
   const double sure = std::log(0.85 / 0.15);
   const std::vector<ScoredPress> presses{
       {.truth = 0, .log_evidence = {sure, 0.0}, .log_density = {}},
@@ -91,8 +91,8 @@ TEST(Calibration, CountsByHand) {
       {.truth = 1, .log_evidence = {sure, 0.0}, .log_density = {}},
       {.truth = 1, .log_evidence = {0.0, std::log(0.65 / 0.35)}, .log_density = {}},
   };
-  const Calibration found = calibration_of(presses, 1.0);
-  EXPECT_DOUBLE_EQ(found.accuracy, 0.75);
+  const Scores found = scores_of(presses, 1.0);
+  EXPECT_DOUBLE_EQ(found.accuracy(), 0.75);
   EXPECT_NEAR(found.log_loss, -(2.0 * std::log(0.85) + std::log(0.15) + std::log(0.65)) / 4.0,
               1e-12);
   EXPECT_NEAR(found.calibration_error, 0.75 * (0.85 - 2.0 / 3.0) + 0.25 * 0.35, 1e-12);
@@ -103,16 +103,16 @@ TEST(TemperatureFit, TakesLabelsWithoutAMap) {
       20, {.truth = 0, .log_evidence = {-100.0, -300.0, -INFINITY}, .log_density = {}});
   EXPECT_NEAR(fit_temperature(presses).temperature, 200.0 / std::log(41.0), 2.0);
   EXPECT_EQ(label_probabilities(presses[0], 30.0)[2], 0.0);
-  EXPECT_LT(calibration_of(presses, 30.0).log_loss, 0.01);
+  EXPECT_LT(scores_of(presses, 30.0).log_loss, 0.01);
 }
 
-TEST(Calibration, RefusesWhatCannotBeTried) {
-  EXPECT_THROW(calibration_of({}, 1.0), Error);
+TEST(ScoresOfPresses, RefusesWhatCannotBeTried) {
+  EXPECT_THROW(scores_of({}, 1.0), Error);
   EXPECT_THROW(fit_temperature({}), Error);
   const std::vector<ScoredPress> one_label{{.truth = 0, .log_evidence = {1.0}, .log_density = {}}};
   EXPECT_THROW(fit_temperature(one_label), Error);
   const std::vector<ScoredPress> wrong{{.truth = 2, .log_evidence = {1.0, 2.0}, .log_density = {}}};
-  EXPECT_THROW(calibration_of(wrong, 1.0), Error);
+  EXPECT_THROW(scores_of(wrong, 1.0), Error);
   const std::vector<ScoredPress> infinite{
       {.truth = 1, .log_evidence = {1.0, -INFINITY}, .log_density = {}}};
   EXPECT_THROW(fit_temperature(infinite), Error);

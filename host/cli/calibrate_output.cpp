@@ -1,0 +1,176 @@
+#include "calibrate_output.hpp"
+
+#include <cmath>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "chart.hpp"
+#include "evaluate_output.hpp"
+#include "level_counts.hpp"
+#include "options.hpp"
+#include "palette.hpp"
+#include "text_table.hpp"
+
+namespace palpate::cli {
+
+namespace {
+
+std::string short_number(double value) { return fmt::format("{:.3g}", value); }
+
+std::string values_table(const SensorCalibration& calibration, std::optional<int> columns) {
+  const LearnedSensor& sensor = calibration.sensor;
+  const LearnedSensor initial;
+  const bool raw = sensor.pressure_unit == "raw";
+  const std::string& unit = sensor.pressure_unit;
+  TextTable table({{"", false}, {"default", true}, {"learned", true}});
+  const auto add = [&](const std::string& name, const std::string& usual, double learned) {
+    table.add({name, usual, short_number(learned)});
+  };
+  add("noise floor, " + unit, "", sensor.noise);
+  add("contact threshold, " + unit, raw ? "" : short_number(initial.classifier.threshold),
+      sensor.classifier.threshold);
+  add("ratio", short_number(initial.classifier.ratio), sensor.classifier.ratio);
+  if (sensor.psf_mm) {
+    add("point spread, mm", "1", *sensor.psf_mm);
+  }
+  add("spread of maps, mm", short_number(initial.spread_mm), sensor.spread_mm);
+  add("gamma of Eq. 7", short_number(initial.gamma), sensor.gamma);
+  add("prior", "", sensor.prior);
+  if (!sensor.touch_sd.none()) {
+    add("touch-sd, mm", "0", sensor.touch_sd.mm);
+    add("touch-sd, degrees", "0", degrees(sensor.touch_sd.rad));
+  }
+  table.add({"levels of readings", "2", fmt::format("{}", sensor.table->levels())});
+  add("temperature", "1", sensor.temperature);
+  if (sensor.features) {
+    add("weight of area, force and peak", "0", sensor.features->weight);
+  }
+  return table.text(columns);
+}
+
+std::string percent(double share) { return fmt::format("{:.1f} %", 100.0 * share); }
+
+std::string scores_table(const SensorCalibration& calibration, std::optional<int> columns) {
+  TextTable table(
+      {{"cross-validation", false}, {"Eq. 7", true}, {"table", true}, {"table, tempered", true}});
+  const auto add = [&](const char* name, auto text_of) {
+    table.add({name, text_of(*calibration.before), text_of(*calibration.table),
+               text_of(*calibration.after)});
+  };
+  add("touches", [](const Scores& s) { return fmt::format("{}", s.records); });
+  add("accuracy", [](const Scores& s) { return percent(s.accuracy()); });
+  add("95 % interval", [](const Scores& s) {
+    const Interval interval = s.interval();
+    return fmt::format("{:.1f} to {}", 100.0 * interval.low, percent(interval.high));
+  });
+  add("log-loss, nats", [](const Scores& s) { return fmt::format("{:.3f}", s.log_loss); });
+  add("calibration error",
+      [](const Scores& s) { return fmt::format("{:.3f}", s.calibration_error); });
+  return table.text(columns);
+}
+
+/// The pressure of which a layer of mean levels has this value.
+double pressure_at(double value, const ReadingLayer& layer) {
+  const double share =
+      (value + ReadingLayer::largest_value) / (2.0 * ReadingLayer::largest_value);
+  return layer.unit_level * std::expm1(share * std::log1p(layer.full_level / layer.unit_level));
+}
+
+std::string level_name(std::size_t level, const LearnedTable& table, const std::string& unit) {
+  if (level == 0) {
+    return "No Contact";
+  }
+  const std::vector<double>& edges = table.level_edges;
+  if (edges.empty()) {
+    return "In Contact";
+  }
+  if (level == 1) {
+    return fmt::format("to {:.3g} {}", edges.front(), unit);
+  }
+  return level == edges.size() + 1
+             ? fmt::format("above {:.3g} {}", edges.back(), unit)
+             : fmt::format("{:.3g} to {:.3g} {}", edges[level - 2], edges[level - 1], unit);
+}
+
+/// Probabilities of a level over the nodes of cells that were sensed, and of those that were not.
+ChartSeries curve(const std::vector<double>& table, std::size_t level, bool sensed) {
+  ChartSeries series{.mark = sensed ? Mark::none : Mark::circle,
+                     .line = sensed ? Line::solid : Line::none};
+  for (int node = 0; node < ReadingLayer::nodes; ++node) {
+    const double value = LevelCounts::value_at(node);
+    const bool unsensed_value =
+        value == ReadingLayer::near_free || value == ReadingLayer::near_occupied ||
+        value == ReadingLayer::midway_free || value == ReadingLayer::midway_occupied ||
+        value == ReadingLayer::beyond;
+    if (sensed ? value >= -ReadingLayer::largest_value : unsensed_value) {
+      series.points.push_back(
+          {.x = value,
+           .y = std::exp(table[level * ReadingLayer::nodes + static_cast<std::size_t>(node)])});
+    }
+  }
+  return series;
+}
+
+}  // namespace
+
+std::string calibration_text(const SensorCalibration& calibration, std::size_t touches,
+                             std::optional<int> columns) {
+  std::string text = fmt::format("{} touches, {} {}\n\n", touches, calibration.objects,
+                                 calibration.objects == 1 ? "object" : "objects");
+  text += values_table(calibration, columns);
+  if (calibration.before) {
+    text += "\n" + scores_table(calibration, columns);
+  }
+  if (calibration.area_under_curve) {
+    text += fmt::format("area under the curve of touches of known against left-out objects: {:.3f}\n",
+                        *calibration.area_under_curve);
+  }
+  return text;
+}
+
+std::string draw_table(const LearnedSensor& sensor) {
+  const LearnedTable& table = *sensor.table;
+  const bool levels = table.layer.of == MapLayer::mean_level;
+  Chart chart{
+      .title = "what an element reads over what the map says; dots: beside and beyond what touches "
+               "sensed",
+      .x = {.label = levels ? fmt::format("mean pressure of the map, {}", sensor.pressure_unit)
+                            : "log odds of the map, nats",
+            .lower = ReadingLayer::first_node,
+            .upper = ReadingLayer::largest_value + 0.5,
+            .text =
+                [&](double value) {
+                  if (value < -ReadingLayer::largest_value - 1e-9) {
+                    return std::string();
+                  }
+                  return short_number(levels ? pressure_at(value, table.layer) : value);
+                }},
+      .y = {.label = "probability", .lower = 0.0, .upper = 1.02}};
+  for (std::size_t level = 0; level < table.levels(); ++level) {
+    for (const bool sensed : {true, false}) {
+      ChartSeries series = curve(table.shared, level, sensed);
+      series.colour = palpate::series(level);
+      if (sensed) {
+        series.name = level_name(level, table, sensor.pressure_unit);
+      }
+      chart.series.push_back(std::move(series));
+    }
+  }
+  const ContactModel eq7{
+      .classifier = sensor.classifier, .gamma = sensor.gamma, .prior = sensor.prior};
+  ChartSeries comparison = curve(initial_table(table.layer, table.levels(), eq7), 0, true);
+  comparison.name = "No Contact by Eq. 7";
+  comparison.colour = comparison_grey;
+  comparison.line = Line::dotted;
+  chart.series.push_back(std::move(comparison));
+  chart.rules.push_back({.vertical = true, .at = -9.0, .colour = comparison_grey, .label = ""});
+  return draw_chart(chart, PictureFormat::png).bytes;
+}
+
+ReliabilityFigure reliability_of(const SensorCalibration& calibration) {
+  return {.curves = {curve_of("Eq. 7", *calibration.before),
+                     curve_of("learned", *calibration.after)}};
+}
+
+}  // namespace palpate::cli

@@ -1,0 +1,34 @@
+#include "map_files.hpp"
+
+#include <algorithm>
+#include <system_error>
+
+#include "input_file.hpp"
+#include "palpate/files.hpp"
+
+namespace palpate::cli {
+
+std::vector<std::filesystem::path> map_files(const std::filesystem::path& argument) {
+  std::error_code error;
+  if (!std::filesystem::is_directory(argument, error)) {
+    return {argument};
+  }
+  std::vector<std::filesystem::path> files;
+  const std::filesystem::directory_iterator entries(argument, error);
+  if (error) {
+    refuse(argument, "cannot be read: {}; check its permissions", error.message());
+  }
+  for (const auto& entry : entries) {
+    if (entry.path().extension() == ".h5" && read_format(entry.path()) == "palpate.map") {
+      files.push_back(entry.path());
+    }
+  }
+  if (files.empty()) {
+    refuse(argument, "a folder without maps; build some with palpate map RECORDING... -o {}",
+           (argument / "").string());
+  }
+  std::sort(files.begin(), files.end());
+  return files;
+}
+
+}  // namespace palpate::cli
