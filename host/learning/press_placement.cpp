@@ -6,6 +6,7 @@
 #include <numeric>
 
 #include <fmt/format.h>
+#include <tbb/parallel_for.h>
 
 #include "bounding_box.hpp"
 #include "interpolated_map.hpp"
@@ -44,8 +45,15 @@ PressPlacer::PressPlacer(const Hypothesis& hypothesis, const ContactModel& conta
   }
 }
 
-PressPlacement PressPlacer::place(const Press& press) {
-  const std::vector<Element> elements = elements_of(press);
+std::vector<float> PressPlacer::log_likelihoods(const Press& press) {
+  return log_likelihoods(elements_of(press));
+}
+
+double PressPlacer::log_likelihood(const Press& press, const Pose& T_object_robot) const {
+  return log_likelihood(elements_of(press), T_object_robot);
+}
+
+std::vector<float> PressPlacer::log_likelihoods(const std::vector<Element>& elements) {
   double reach_mm = 0.0;
   for (const Element& element : elements) {
     reach_mm = std::max(reach_mm, std::hypot(element.from_pivot_mm.x, element.from_pivot_mm.y));
@@ -55,9 +63,8 @@ PressPlacement PressPlacer::place(const Press& press) {
 
   const auto plane = static_cast<std::size_t>(lattice_.plane());
   std::vector<float> bins = rest_;
-  std::vector<float> of_theta(plane);
-  for (int theta = 0; theta < lattice_.theta_rad.count; ++theta) {
-    std::ranges::fill(of_theta, 0.0F);
+  tbb::parallel_for(0, lattice_.theta_rad.count, [&](int theta) {
+    std::vector<float> of_theta(plane, 0.0F);
     std::vector<float> unknown(plane, 0.0F);
     for (const Element& element : elements) {
       if (is_contact(element.reading)) {
@@ -70,8 +77,13 @@ PressPlacement PressPlacer::place(const Press& press) {
     for (std::size_t i = 0; i < plane; ++i) {
       bins[static_cast<std::size_t>(theta) * plane + i] += of_theta[i] - unknown[i];
     }
-  }
+  });
+  return bins;
+}
 
+PressPlacement PressPlacer::place(const Press& press) {
+  const std::vector<Element> elements = elements_of(press);
+  const std::vector<float> bins = log_likelihoods(elements);
   std::vector<std::uint32_t> order(bins.size());
   std::iota(order.begin(), order.end(), 0U);
   const std::size_t best_count = std::min(evaluated_bins, bins.size());
@@ -164,15 +176,14 @@ void PressPlacer::sum_rest(const std::vector<Element>& elements) {
     resting_.push_back(element.from_pivot_mm);
   }
   const auto plane = static_cast<std::size_t>(lattice_.plane());
-  rest_.clear();
-  std::vector<float> of_theta(plane);
-  for (int theta = 0; theta < lattice_.theta_rad.count; ++theta) {
-    std::ranges::fill(of_theta, 0.0F);
+  rest_.assign(static_cast<std::size_t>(lattice_.bins()), 0.0F);
+  tbb::parallel_for(0, lattice_.theta_rad.count, [&](int theta) {
+    std::vector<float> of_theta(plane, 0.0F);
     for (const glm::dvec2& place : resting_) {
       add(of_theta, theta, place, no_contact_);
     }
-    rest_.insert(rest_.end(), of_theta.begin(), of_theta.end());
-  }
+    std::ranges::copy(of_theta, rest_.begin() + static_cast<std::ptrdiff_t>(plane) * theta);
+  });
 }
 
 void PressPlacer::add(std::vector<float>& bins, int theta, const glm::dvec2& from_pivot_mm,
