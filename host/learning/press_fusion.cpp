@@ -20,16 +20,18 @@ constexpr double least_weight = 0.01;
 /// Of maps in the making.
 const std::string no_label;
 
-/// Angles at which the lattice moves the ends of the presses' contact by about a step.
+/// Angles at which the lattice moves the presses' contact by about one and a half steps; the search
+/// climbs between them.
 int angles_for(std::span<const UnposedPress> presses, double step_mm) {
   double reach_mm = 0.0;
   for (const UnposedPress& press : presses) {
     reach_mm = std::max(reach_mm, press.sides.front().reach_mm());
   }
   constexpr int fewest = 24;
-  constexpr int most = 72;
-  return std::clamp(static_cast<int>(std::ceil(2.0 * std::numbers::pi * reach_mm / step_mm)),
-                    fewest, most);
+  constexpr int most = 48;
+  return std::clamp(
+      static_cast<int>(std::ceil(2.0 * std::numbers::pi * reach_mm / (1.5 * step_mm))), fewest,
+      most);
 }
 
 }  // namespace

@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 #include <tbb/parallel_for.h>
+#include <glm/mat2x2.hpp>
 
 #include "bounding_box.hpp"
 #include "interpolated_map.hpp"
@@ -27,6 +28,11 @@ BoundingBox box_of(const Press& press) {
     }
   }
   return box;
+}
+
+glm::dmat2 rotation(double theta_rad) {
+  const glm::dvec2 along = rotate(theta_rad, {1.0, 0.0});
+  return {along, {-along.y, along.x}};
 }
 
 }  // namespace
@@ -111,9 +117,10 @@ std::vector<PressPlacer::Element> PressPlacer::elements_of(const Press& press) c
   std::vector<Element> elements;
   for (const Touch& touch : press.touches) {
     const std::vector<Reading> readings = contact_.classify(touch);
+    const glm::dmat2 turn = rotation(touch.T_robot_sensor.theta_rad);
+    const glm::dvec2 sensor_mm = touch.T_robot_sensor.translation_mm - lattice_.pivot_mm;
     for (std::size_t e = 0; e < readings.size(); ++e) {
-      elements.push_back(
-          {touch.T_robot_sensor * touch.elements_mm[e] - lattice_.pivot_mm, readings[e]});
+      elements.push_back({sensor_mm + turn * touch.elements_mm[e], readings[e]});
     }
   }
   return elements;
@@ -210,10 +217,12 @@ void PressPlacer::add(std::vector<float>& bins, int theta, const glm::dvec2& fro
 double PressPlacer::log_likelihood(const std::vector<Element>& elements,
                                    const Pose& T_object_robot) const {
   const InterpolatedMap map(layer_, contact_.table ? layer_.prior : contact_.prior.value());
+  const glm::dmat2 turn = rotation(T_object_robot.theta_rad);
+  const glm::dvec2 pivot_mm = T_object_robot * lattice_.pivot_mm;
   double sum = 0.0;
   for (const Element& element : elements) {
     if (element.reading != Reading::unknown) {
-      const glm::dvec2 place = T_object_robot * (element.from_pivot_mm + lattice_.pivot_mm);
+      const glm::dvec2 place = pivot_mm + turn * element.from_pivot_mm;
       sum += contact_.log_likelihood(element.reading, {.log_odds = map.log_odds(place)});
     }
   }

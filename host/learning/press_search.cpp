@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <utility>
 
 #include "bounding_box.hpp"
 #include "press_placement.hpp"
@@ -31,6 +32,29 @@ namespace {
 /// So far beyond every map that it holds its prior there.
 constexpr Pose beyond{{2.0 * farthest_mm, 0.0}, 0.0};
 
+/// Eq. 7 as a table, which is read several times faster: within 1e-4 nats of it, for maps' log odds
+/// beyond the table within 1e-6 nats unless gamma is 0.
+ContactModel tabulated(ContactModel contact) {
+  if (contact.table) {
+    return contact;
+  }
+  LikelihoodTable table{.first_log_odds = -16.0,
+                        .last_log_odds = 16.0,
+                        .nodes = 1025,
+                        .level_edges = {},
+                        .log_likelihood = {}};
+  const double last = static_cast<double>(table.nodes - 1);
+  for (const Reading reading : {Reading::no_contact, Reading::in_contact}) {
+    for (std::size_t node = 0; node < table.nodes; ++node) {
+      const double value =
+          std::lerp(table.first_log_odds, table.last_log_odds, static_cast<double>(node) / last);
+      table.log_likelihood.push_back(contact.log_likelihood(reading, {.log_odds = value}));
+    }
+  }
+  contact.table = std::move(table);
+  return contact;
+}
+
 /// The best bin at each angle.
 std::vector<std::size_t> best_bins(const std::vector<float>& bins, const PoseLattice& lattice) {
   std::vector<std::size_t> best;
@@ -45,7 +69,8 @@ std::vector<std::size_t> best_bins(const std::vector<float>& bins, const PoseLat
 
 PressSearch::PressSearch(const ContactModel& contact, double step_mm, int angles,
                          double temperature)
-    : contact_(contact), step_mm_(step_mm), angles_(angles), temperature_(temperature) {}
+
+    : contact_(tabulated(contact)), step_mm_(step_mm), angles_(angles), temperature_(temperature) {}
 
 double PressSearch::gain(const Press& press, const Hypothesis& map,
                          const Pose& T_object_robot) const {
