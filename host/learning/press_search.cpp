@@ -93,7 +93,7 @@ PoseLattice PressSearch::lattice_for(const PressSide& side, const Hypothesis& ma
 }
 
 PressSearch::Summit PressSearch::climb(const Summit& start) const {
-  constexpr int halvings = 4;
+  constexpr int halvings = 3;
   const Press& press = start.of->side.press();
   const PressPlacer& placer = start.of->placer;
   double shift_mm = step_mm_ / 2.0;
@@ -169,7 +169,7 @@ PressPlace PressSearch::best_place(const std::vector<PressSide>& sides,
   }
   std::ranges::stable_sort(summits, std::ranges::greater{}, &Summit::log_likelihood);
 
-  constexpr std::size_t most_climbs = 4;
+  constexpr std::size_t most_climbs = 2;
   std::vector<Summit> starts;
   for (const Summit& summit : summits) {
     const bool near_another = std::ranges::any_of(starts, [&](const Summit& start) {
