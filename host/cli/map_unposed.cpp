@@ -243,6 +243,13 @@ void write_object(const MapFlags& flags, const Object& object) {
       write_map_server(yaml, one.map);
       fmt::print("{}\n", yaml.string());
     }
+    for (const PlacedPress& press : one.presses) {
+      if (press.fit && *press.fit < good_fit) {
+        const TouchSource& source = (*object.sources)[press.press];
+        fmt::print("{}: press {} fits {} by only {:.2f}\n", source.path, source.index,
+                   path.string(), *press.fit);
+      }
+    }
   }
   for (const Misfit& misfit : object.maps.misfits) {
     const TouchSource& source = (*object.sources)[misfit.press];

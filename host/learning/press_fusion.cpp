@@ -203,14 +203,27 @@ void PressFusion::join_first_maps() {
   }
 }
 
-/// Where the press fits best, of all maps; without a map where it fits none well enough.
-PressHome PressFusion::best_home(std::size_t press) const {
+/// Where the press fits best, of all maps; without a map where it fits none well enough. It stays
+/// where it was unless another place is clearly better, so that presses of an object that looks the
+/// same after a turn or a shift come to rest.
+PressHome PressFusion::best_home(std::size_t press, const PressHome& before) const {
+  const double clear_gain = 0.1 * options_.temperature;
+  const std::vector<PressSide>& sides = presses_[press].sides;
   PressHome best;
   for (std::size_t map = 0; map < maps_.size(); ++map) {
     if (maps_[map].presses == 0) {
       continue;
     }
-    const PressPlace place = search_.best_place(presses_[press].sides, compared(maps_[map].sums));
+    const Hypothesis hypothesis = compared(maps_[map].sums);
+    PressPlace place = search_.best_place(sides, hypothesis);
+    if (before.map == map && before.place.mirrored == place.mirrored) {
+      const Press& side = sides[place.mirrored ? 1 : 0].press();
+      const double gain = search_.gain(side, hypothesis, before.place.T_object_robot);
+      if (gain > place.gain - clear_gain) {
+        place.T_object_robot = before.place.T_object_robot;
+        place.gain = gain;
+      }
+    }
     if (const double fit = fit_of(press, place); fit > best.fit || !best.map) {
       best = {.map = map, .place = place, .fit = fit};
     }
@@ -230,7 +243,7 @@ bool PressFusion::place_all() {
     const PressHome before = homes_[p];
     const bool alone_there = before.map && maps_[*before.map].presses == 1;
     leave(p);
-    const PressHome best = best_home(p);
+    const PressHome best = best_home(p, before);
     homes_[p] = alone_there && best.fit < good_fit ? before : best;
     join(p);
     const PressHome& now = homes_[p];

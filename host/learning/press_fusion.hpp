@@ -71,7 +71,7 @@ class PressFusion {
   bool open_maps();
   void join_first_maps();
   bool place_all();
-  PressHome best_home(std::size_t press) const;
+  PressHome best_home(std::size_t press, const PressHome& before) const;
 
   std::span<const UnposedPress> presses_;
   const UnposedOptions& options_;
