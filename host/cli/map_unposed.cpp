@@ -244,7 +244,7 @@ void write_object(const MapFlags& flags, const Object& object) {
       fmt::print("{}\n", yaml.string());
     }
     for (const PlacedPress& press : one.presses) {
-      if (press.fit && *press.fit < good_fit) {
+      if (press.fit && *press.fit < doubtful_fit) {
         const TouchSource& source = (*object.sources)[press.press];
         fmt::print("{}: press {} fits {} by only {:.2f}\n", source.path, source.index,
                    path.string(), *press.fit);

@@ -67,7 +67,9 @@ struct UnposedMaps {
 /// Least fit (PlacedPress::fit) of a press that becomes part of a map.
 inline constexpr double least_fit = 0.25;
 /// Fit below which a press is given a map of its own where there may be more maps.
-inline constexpr double good_fit = 0.5;
+inline constexpr double good_fit = 0.7;
+/// Fit below which a press on a map may well lie at a wrong place, or be of another object.
+inline constexpr double doubtful_fit = 0.5;
 
 /// Maps of one object from presses at unknown poses; the presses' own poses are ignored. Where
 /// there are no more presses than maps, each press makes a map of its own: few presses recognise
