@@ -152,11 +152,11 @@ std::string words_of(const Misfit& misfit) {
     case Misfit::Reason::no_contact:
       return "nothing is in contact";
     case Misfit::Reason::too_little:
-      return "too little is in contact to place it";
+      return "too little is in contact";
     case Misfit::Reason::unlike:
       break;
   }
-  return fmt::format("fits no map, the best by {:.2f}", misfit.fit);
+  return fmt::format("fits no map ({:.2f})", misfit.fit);
 }
 
 std::vector<glm::dvec2> contacts_of(const Touch& touch, const ContactClassifier& classifier,

@@ -75,8 +75,8 @@ inline constexpr double doubtful_fit = 0.5;
 /// there are no more presses than maps, each press makes a map of its own: few presses recognise
 /// better apart. Else each press is compared with the maps of single presses, which begin the maps
 /// to which most presses fit; then each press in turn is taken out of its map, placed anew on the
-/// map that it fits best and added there, with the weight of how sure its place is; it stays where it
-/// was unless another place is clearly better. The rounds end when no press moves by more than a
+/// map that it fits best and added there, with the weight of how sure its place is; it stays where
+/// it was unless another place is clearly better. The rounds end when no press moves by more than a
 /// quarter of the elements' spacing, after eight at most. The maps hold weighted means over their
 /// presses: of log odds and of pressure.
 /// @param progress is called now and then with the fraction done
