@@ -32,8 +32,8 @@ namespace {
 /// So far beyond every map that it holds its prior there.
 constexpr Pose beyond{{2.0 * farthest_mm, 0.0}, 0.0};
 
-/// Eq. 7 as a table, which is read several times faster: within 1e-4 nats of it, for maps' log odds
-/// beyond the table within 1e-6 nats unless gamma is 0.
+/// Eq. 7 as a table, which is read several times faster: within 1e-4 nats of it, unless gamma is so
+/// small that log odds beyond the table matter.
 ContactModel tabulated(ContactModel contact) {
   if (contact.table) {
     return contact;
@@ -69,7 +69,6 @@ std::vector<std::size_t> best_bins(const std::vector<float>& bins, const PoseLat
 
 PressSearch::PressSearch(const ContactModel& contact, double step_mm, int angles,
                          double temperature)
-
     : contact_(tabulated(contact)), step_mm_(step_mm), angles_(angles), temperature_(temperature) {}
 
 double PressSearch::gain(const Press& press, const Hypothesis& map,
