@@ -95,16 +95,16 @@ void add_map_flags(CLI::App& command, MapFlags& flags) {
   command.add_option("--label", flags.label,
                      "Label of the map [default: the object that the recording names]");
   command.add_flag("--unposed", flags.unposed,
-                   "The sensor's poses are unknown: find where each press lies beside the others, "
-                   "and average what they say. For arrays large enough that a press shows the "
-                   "object. Presses that fit nowhere are listed and left out");
+                   "The sensor's poses are unknown: find how the presses of an object lie beside "
+                   "each other, and build its maps from their means. For arrays so large that a "
+                   "press shows much of the object. Lists presses that fit poorly, and leaves out "
+                   "those that fit nowhere");
   command
-      .add_option(
-          "--max-maps", flags.max_maps,
-          "With --unposed, most maps of an object: presses that do not fit a map begin "
-          "another, FOLDER/LABEL.2.map.h5. More maps recognise better and take longer; where "
-          "there are no more presses than maps, each press keeps a map of its own [default: 4 into "
-          "a FOLDER/, 1 into a MAP]")
+      .add_option("--max-maps", flags.max_maps,
+                  "With --unposed, most maps of an object: presses that do not fit a map begin "
+                  "another, FOLDER/LABEL.2.map.h5. More maps recognise better and take longer. "
+                  "Where there are no more presses than maps, each press keeps a map of its own "
+                  "[default: 4 into a FOLDER/, 1 into a MAP]")
       ->check(require_whole_number);
   command.add_option("--png", flags.png,
                      "Picture to write (PNG): all maps side by side, with --unposed each with its "

@@ -8,6 +8,7 @@
 
 #include <fmt/format.h>
 
+#include "contact_learning.hpp"
 #include "map_flags.hpp"
 #include "options.hpp"
 #include "palpate/files.hpp"
@@ -68,25 +69,6 @@ void prepare_unposed_outputs(const MapFlags& flags, const GroupedTouches& groupe
   prepare_outputs(flags, paths, names);
 }
 
-/// The share of elements In Contact among the known ones: the object's area over the area sensed.
-double share_in_contact(const std::vector<ObjectTouches>& objects,
-                        const ContactClassifier& classifier) {
-  double contacts = 0.0;
-  double known = 0.0;
-  for (const ObjectTouches& object : objects) {
-    for (const Touch& touch : object.touches) {
-      for (const ElementReading& element : known_readings(touch, classifier)) {
-        contacts += is_contact(element.reading) ? 1.0 : 0.0;
-        known += 1.0;
-      }
-    }
-  }
-  // No array, however it was pressed, says that the world is empty or full.
-  constexpr double least = 0.01;
-  constexpr double most = 0.5;
-  return std::clamp((contacts + 0.5) / (known + 1.0), least, most);
-}
-
 UnposedOptions unposed_options(const MapFlags& flags, const std::vector<Recording>& recordings,
                                const std::optional<LearnedSensor>& sensor,
                                const GroupedTouches& grouped) {
@@ -110,7 +92,7 @@ UnposedOptions unposed_options(const MapFlags& flags, const std::vector<Recordin
     result.map.sensor.spread_mm = of_pitch * pitch_mm;
   }
   result.map.sensor.prior =
-      given_prior(flags, sensor).value_or(share_in_contact(grouped.objects, result.map.classifier));
+      given_prior(flags, sensor).value_or(share_in_contact(all, result.map.classifier));
   result.contact.classifier = result.map.classifier;
   result.contact.prior = result.map.sensor.prior;
   result.most_maps = static_cast<std::size_t>(most_maps(flags));
@@ -152,11 +134,11 @@ std::string words_of(const Misfit& misfit) {
     case Misfit::Reason::no_contact:
       return "nothing is in contact";
     case Misfit::Reason::too_little:
-      return "too little is in contact to place it";
+      return "too little is in contact";
     case Misfit::Reason::unlike:
       break;
   }
-  return fmt::format("fits no map, the best by {:.2f}", misfit.fit);
+  return fmt::format("fits no map ({:.2f})", misfit.fit);
 }
 
 std::vector<glm::dvec2> contacts_of(const Touch& touch, const ContactClassifier& classifier,
@@ -242,6 +224,13 @@ void write_object(const MapFlags& flags, const Object& object) {
       const std::filesystem::path yaml = ros_path(flags, name_of(label, m, count));
       write_map_server(yaml, one.map);
       fmt::print("{}\n", yaml.string());
+    }
+    for (const PlacedPress& press : one.presses) {
+      if (press.fit && *press.fit < doubtful_fit) {
+        const TouchSource& source = (*object.sources)[press.press];
+        fmt::print("{}: press {} fits {} by only {:.2f}\n", source.path, source.index,
+                   path.string(), *press.fit);
+      }
     }
   }
   for (const Misfit& misfit : object.maps.misfits) {

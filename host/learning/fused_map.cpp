@@ -97,11 +97,13 @@ void FusedMap::change(const PressImage& image, const ImagePlace& place, int sign
   cover(x, y, nx, ny);
   const double prior = log_odds_from_probability(image.prior);
   const Pose T_image_object = inverse(place.T_object_image);
+  const glm::dvec2 along = rotate(T_image_object.theta_rad, {1.0, 0.0});
+  const glm::dvec2 across(-along.y, along.x);
   for (std::int64_t j = y; j < y + ny; ++j) {
     for (std::int64_t i = x; i < x + nx; ++i) {
       const glm::dvec2 centre =
           options_.cell_mm * glm::dvec2(static_cast<double>(i), static_cast<double>(j));
-      glm::dvec2 p = T_image_object * centre;
+      glm::dvec2 p = T_image_object.translation_mm + centre.x * along + centre.y * across;
       p.x *= side;
       const ImageSample here = sample(image, prior, (p - image.origin_mm) / image.cell_mm);
       if (here.share < 0.5) {

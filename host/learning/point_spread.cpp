@@ -15,6 +15,9 @@ namespace palpate {
 
 namespace {
 
+/// Of the mean pressure, in spacings: bridges the gaps between elements.
+constexpr double smoothing = 0.4;
+
 /// A reading at its place in the object frame.
 struct Sample {
   glm::dvec2 place_mm;
@@ -80,7 +83,7 @@ std::vector<double> sampled(const Readings& readings, const Field& field) {
 /// Mean of the pressures relative to their touches' forces, smoothed over half a spacing.
 Field mean_field(const Readings& readings, const std::vector<double>& force, Field field,
                  double spacing_mm) {
-  const double deviation = 0.4 * spacing_mm;
+  const double deviation = smoothing * spacing_mm;
   const int reach = static_cast<int>(std::ceil(3.0 * deviation / field.cell_mm));
   std::vector<double> weights(field.values.size(), 1e-12);
   std::ranges::fill(field.values, 0.0);
@@ -108,8 +111,8 @@ Field mean_field(const Readings& readings, const std::vector<double>& force, Fie
   return field;
 }
 
-/// The face of the object: 1 where the mean pressure exceeds half of its plateau.
-Field face_of(const Readings& readings, double spacing_mm) {
+/// Mean pressure relative to its plateau.
+Field relative_pressure(const Readings& readings, double spacing_mm) {
   constexpr double cells_per_spacing = 8.0;
   constexpr double plateau_quantile = 0.9;  // of the cells above half of the largest
   BoundingBox box;
@@ -143,7 +146,7 @@ Field face_of(const Readings& readings, double spacing_mm) {
                    : high[static_cast<std::size_t>(plateau_quantile *
                                                    static_cast<double>(high.size() - 1))];
   for (double& value : field.values) {
-    value = value > 0.5 * plateau ? 1.0 : 0.0;
+    value /= plateau;
   }
   return field;
 }
@@ -183,6 +186,32 @@ Field blurred(const Field& field, double sigma_mm, double edge_mm) {
     }
   }
   return result;
+}
+
+/// The face, 1 or 0, that blurred by a point spread resembles the mean pressure most: begins where
+/// the pressure exceeds half of the plateau, and moves its edges by what the blurred face lacks.
+Field face_of(const Field& pressure, double sigma_mm, double edge_mm, double spacing_mm) {
+  constexpr int rounds = 8;
+  const double smoothed_mm = std::hypot(sigma_mm, smoothing * spacing_mm);
+  Field level = pressure;
+  Field face = pressure;
+  for (int round = 0; round < rounds; ++round) {
+    for (std::size_t k = 0; k < face.values.size(); ++k) {
+      face.values[k] = level.values[k] > 0.5 ? 1.0 : 0.0;
+    }
+    const Field explained = blurred(face, smoothed_mm, edge_mm);
+    double product = 0.0;
+    double square = 1e-12;
+    for (std::size_t k = 0; k < face.values.size(); ++k) {
+      product += pressure.values[k] * explained.values[k];
+      square += explained.values[k] * explained.values[k];
+    }
+    const double scale = std::max(1e-3, product / square);
+    for (std::size_t k = 0; k < face.values.size(); ++k) {
+      level.values[k] += 0.5 * (pressure.values[k] / scale - explained.values[k]);
+    }
+  }
+  return face;
 }
 
 double squared_error(const Readings& readings, const Field& field) {
@@ -233,7 +262,7 @@ std::optional<double> learn_point_spread(const std::vector<Press>& presses,
   constexpr double of_spacing = 0.95;
   double spacing_mm = 0.0;
   std::vector<Readings> objects;
-  std::vector<Field> faces;
+  std::vector<Field> pressures;
   for (auto& [label, own] : readings_of(presses, classifier, spacing_mm)) {
     if (own.touches >= fewest_touches) {
       objects.push_back(std::move(own));
@@ -243,13 +272,14 @@ std::optional<double> learn_point_spread(const std::vector<Press>& presses,
     return {};
   }
   for (const Readings& object : objects) {
-    faces.push_back(face_of(object, spacing_mm));
+    pressures.push_back(relative_pressure(object, spacing_mm));
   }
+  const double edge_mm = of_spacing * spacing_mm;
   const auto error_at = [&](double sigma_mm) {
     std::vector<double> errors(objects.size());
     tbb::parallel_for(std::size_t{0}, objects.size(), [&](std::size_t i) {
-      errors[i] =
-          squared_error(objects[i], blurred(faces[i], sigma_mm, of_spacing * spacing_mm));
+      const Field face = face_of(pressures[i], sigma_mm, edge_mm, spacing_mm);
+      errors[i] = squared_error(objects[i], blurred(face, sigma_mm, edge_mm));
     });
     double sum = 0.0;
     for (const double error : errors) {

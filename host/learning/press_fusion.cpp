@@ -20,28 +20,24 @@ constexpr double least_weight = 0.01;
 /// Of maps in the making.
 const std::string no_label;
 
-/// Angles at which the lattice moves the ends of the presses' contact by about a step.
+/// Angles at which the lattice moves the presses' contact by about one and a half steps; the search
+/// climbs between them.
 int angles_for(std::span<const UnposedPress> presses, double step_mm) {
   double reach_mm = 0.0;
   for (const UnposedPress& press : presses) {
-    reach_mm = std::max(reach_mm, press.searched.sides.front().reach_mm);
+    reach_mm = std::max(reach_mm, press.sides.front().reach_mm());
   }
   constexpr int fewest = 24;
-  constexpr int most = 72;
-  return std::clamp(static_cast<int>(std::ceil(2.0 * std::numbers::pi * reach_mm / step_mm)),
-                    fewest, most);
-}
-
-ReadingGains gains_of(const UnposedOptions& options) {
-  const double beyond =
-      options.layer ? ReadingLayer::beyond : log_odds_from_probability(options.map.sensor.prior);
-  return {options.contact, beyond, 0};
+  constexpr int most = 48;
+  return std::clamp(
+      static_cast<int>(std::ceil(2.0 * std::numbers::pi * reach_mm / (1.5 * step_mm))), fewest,
+      most);
 }
 
 }  // namespace
 
 ImagePlace PressHome::image_place() const {
-  return {place.T_object_sensor, place.mirrored, std::max(place.certainty, least_weight)};
+  return {place.T_object_robot, place.mirrored, std::max(place.certainty, least_weight)};
 }
 
 PressFusion::PressFusion(std::span<const UnposedPress> presses, const UnposedOptions& options,
@@ -50,15 +46,15 @@ PressFusion::PressFusion(std::span<const UnposedPress> presses, const UnposedOpt
       options_(options),
       step_mm_(step_mm),
       progress_(progress),
-      search_(gains_of(options), step_mm, angles_for(presses, step_mm), options.temperature),
+      search_(options.contact, step_mm, angles_for(presses, step_mm), options.temperature),
       own_gain_(presses.size()),
       contact_gain_(presses.size()),
       homes_(presses.size()) {
   tbb::parallel_for(std::size_t{0}, presses.size(), [&](std::size_t p) {
-    const PressReadings& press = presses_[p].searched.sides.front();
-    const OccupancyGrid own = compared(alone(p));
-    own_gain_[p] = search_.gain(press, own, {});
-    contact_gain_[p] = search_.gain(press, own, {}, PressSearch::Elements::in_contact);
+    const PressSide& press = presses_[p].sides.front();
+    const Hypothesis own = alone(p);
+    own_gain_[p] = search_.gain(press.press(), own, {});
+    contact_gain_[p] = search_.gain(press.contact(), own, {});
   });
 }
 
@@ -68,15 +64,19 @@ void PressFusion::report(double fraction) const {
   }
 }
 
-OccupancyGrid PressFusion::compared(const OccupancyGrid& map) const {
-  return options_.layer ? reading_layer(map, *options_.layer) : map;
+Hypothesis PressFusion::compared(const FusedMap& map) const {
+  Hypothesis result{.map = map.map(no_label)};
+  if (options_.layer) {
+    result.layer = reading_layer(result.map, *options_.layer);
+  }
+  return result;
 }
 
-/// The map of one press, in the sensor frame.
-OccupancyGrid PressFusion::alone(std::size_t press) const {
+/// The map of one press, in the press's robot frame.
+Hypothesis PressFusion::alone(std::size_t press) const {
   FusedMap map(options_.map);
   map.add(presses_[press].image, {});
-  return map.map(no_label);
+  return compared(map);
 }
 
 bool PressFusion::is_little(std::size_t press, const PressPlace& place) const {
@@ -87,20 +87,13 @@ double PressFusion::fit_of(std::size_t press, const PressPlace& place) const {
   return is_little(press, place) ? 0.0 : std::max(0.0, place.gain / own_gain_[press]);
 }
 
-/// The pose that brings the middle of the contact to the origin.
-Pose PressFusion::first_pose(std::size_t press) const {
-  return {-presses_[press].searched.sides.front().centre_mm, 0.0};
-}
-
 std::size_t PressFusion::maps_in_use() const {
   return static_cast<std::size_t>(
       std::ranges::count_if(maps_, [](const Group& map) { return map.presses > 0; }));
 }
 
 void PressFusion::begin_map(std::size_t press) {
-  homes_[press] = {.map = maps_.size(),
-                   .place = {.T_object_sensor = first_pose(press), .certainty = 1.0},
-                   .fit = 1.0};
+  homes_[press] = {.map = maps_.size(), .place = {.certainty = 1.0}, .fit = 1.0};
   maps_.push_back({FusedMap(options_.map), 0});
   join(press);
 }
@@ -149,17 +142,15 @@ int PressFusion::fuse() {
 void PressFusion::compare_single_presses() {
   const std::size_t n = presses_.size();
   const std::size_t columns = std::min(n, std::max(fewest_columns, most_comparisons / n));
-  std::vector<const SearchedPress*> all;
-  for (const UnposedPress& press : presses_) {
-    all.push_back(&press.searched);
-  }
   fits_.fit.assign(n, std::vector<double>(columns, 0.0));
   for (std::size_t c = 0; c < columns; ++c) {
     const std::size_t of = c * n / columns;
     fits_.columns.push_back(of);
-    const OccupancyGrid map = alone(of);
-    const OccupancyGrid layer = compared(map);
-    single_.push_back(search_.best_places(all, {map, layer}));
+    const Hypothesis map = alone(of);
+    single_.emplace_back(n);
+    tbb::parallel_for(std::size_t{0}, n, [&](std::size_t p) {
+      single_.back()[p] = search_.best_place(presses_[p].sides, map);
+    });
     for (std::size_t p = 0; p < n; ++p) {
       fits_.fit[p][c] = p == of ? 1.0 : fit_of(p, single_.back()[p]);
     }
@@ -200,8 +191,6 @@ void PressFusion::join_first_maps() {
       const std::size_t column = opened_[map];
       if (fits_.fit[p][column] >= std::max(homes_[p].fit, least_fit)) {
         homes_[p] = {.map = map, .place = single_[column][p], .fit = fits_.fit[p][column]};
-        Pose& pose = homes_[p].place.T_object_sensor;
-        pose = first_pose(fits_.columns[column]) * pose;
       }
     }
   }
@@ -214,16 +203,27 @@ void PressFusion::join_first_maps() {
   }
 }
 
-/// Where the press fits best, of all maps; without a map where it fits none well enough.
-PressHome PressFusion::best_home(std::size_t press) const {
+/// Where the press fits best, of all maps; without a map where it fits none well enough. It stays
+/// where it was unless another place is clearly better, so that presses of an object that looks the
+/// same after a turn or a shift come to rest.
+PressHome PressFusion::best_home(std::size_t press, const PressHome& before) const {
+  const double clear_gain = 0.1 * options_.temperature;
+  const std::vector<PressSide>& sides = presses_[press].sides;
   PressHome best;
   for (std::size_t map = 0; map < maps_.size(); ++map) {
     if (maps_[map].presses == 0) {
       continue;
     }
-    const OccupancyGrid grid = maps_[map].sums.map(no_label);
-    const OccupancyGrid layer = compared(grid);
-    const PressPlace place = search_.best_place(presses_[press].searched, {grid, layer});
+    const Hypothesis hypothesis = compared(maps_[map].sums);
+    PressPlace place = search_.best_place(sides, hypothesis);
+    if (before.map == map && before.place.mirrored == place.mirrored) {
+      const Press& side = sides[place.mirrored ? 1 : 0].press();
+      const double gain = search_.gain(side, hypothesis, before.place.T_object_robot);
+      if (gain > place.gain - clear_gain) {
+        place.T_object_robot = before.place.T_object_robot;
+        place.gain = gain;
+      }
+    }
     if (const double fit = fit_of(press, place); fit > best.fit || !best.map) {
       best = {.map = map, .place = place, .fit = fit};
     }
@@ -243,16 +243,16 @@ bool PressFusion::place_all() {
     const PressHome before = homes_[p];
     const bool alone_there = before.map && maps_[*before.map].presses == 1;
     leave(p);
-    const PressHome best = best_home(p);
+    const PressHome best = best_home(p, before);
     homes_[p] = alone_there && best.fit < good_fit ? before : best;
     join(p);
     const PressHome& now = homes_[p];
-    const PressReadings& side = presses_[p].searched.sides[now.place.mirrored ? 1 : 0];
+    const PressSide& side = presses_[p].sides[now.place.mirrored ? 1 : 0];
     const bool stayed =
         now.map == before.map &&
         (!now.map || (now.place.mirrored == before.place.mirrored &&
-                      displacement_mm(side, now.place.T_object_sensor,
-                                      before.place.T_object_sensor) <= step_mm_ / 4.0));
+                      displacement_mm(side, now.place.T_object_robot,
+                                      before.place.T_object_robot) <= step_mm_ / 4.0));
     changed = changed || !stayed;
   }
   return changed;

@@ -15,10 +15,9 @@ namespace palpate {
 
 /// A press with all that does not depend on where it lies.
 struct UnposedPress {
-  std::size_t index = 0;  ///< into the presses given
-  Touch touch;            ///< at the origin
-  SearchedPress searched;
-  PressImage image;  ///< in the sensor frame
+  std::size_t index = 0;         ///< into the presses given
+  std::vector<PressSide> sides;  ///< as it is and, where asked for, mirrored
+  PressImage image;              ///< in the robot frame of the first side
 };
 
 /// The map that a press is a part of so far, and its place there.
@@ -58,11 +57,10 @@ class PressFusion {
   };
 
   void report(double fraction) const;
-  OccupancyGrid compared(const OccupancyGrid& map) const;
-  OccupancyGrid alone(std::size_t press) const;
+  Hypothesis compared(const FusedMap& map) const;
+  Hypothesis alone(std::size_t press) const;
   bool is_little(std::size_t press, const PressPlace& place) const;
   double fit_of(std::size_t press, const PressPlace& place) const;
-  Pose first_pose(std::size_t press) const;
   std::size_t maps_in_use() const;
 
   void begin_map(std::size_t press);
@@ -73,7 +71,7 @@ class PressFusion {
   bool open_maps();
   void join_first_maps();
   bool place_all();
-  PressHome best_home(std::size_t press) const;
+  PressHome best_home(std::size_t press, const PressHome& before) const;
 
   std::span<const UnposedPress> presses_;
   const UnposedOptions& options_;

@@ -6,6 +6,8 @@
 #include <numeric>
 
 #include <fmt/format.h>
+#include <tbb/parallel_for.h>
+#include <glm/mat2x2.hpp>
 
 #include "bounding_box.hpp"
 #include "interpolated_map.hpp"
@@ -17,6 +19,11 @@ namespace {
 
 /// Bins that are evaluated at the elements' own places.
 constexpr std::size_t evaluated_bins = 8;
+
+glm::dmat2 rotation(double theta_rad) {
+  const glm::dvec2 along = rotate(theta_rad, {1.0, 0.0});
+  return {along, {-along.y, along.x}};
+}
 
 }  // namespace
 
@@ -34,8 +41,15 @@ PressPlacer::PressPlacer(const Hypothesis& hypothesis, const ContactModel& conta
   }
 }
 
-PressPlacement PressPlacer::place(const Press& press) {
-  const std::vector<Element> elements = elements_of(press);
+std::vector<float> PressPlacer::log_likelihoods(const Press& press) {
+  return log_likelihoods(elements_of(press));
+}
+
+double PressPlacer::log_likelihood(const Press& press, const Pose& T_object_robot) const {
+  return log_likelihood(elements_of(press), T_object_robot);
+}
+
+std::vector<float> PressPlacer::log_likelihoods(const std::vector<Element>& elements) {
   double reach_mm = 0.0;
   for (const Element& element : elements) {
     reach_mm = std::max(reach_mm, std::hypot(element.from_pivot_mm.x, element.from_pivot_mm.y));
@@ -45,9 +59,8 @@ PressPlacement PressPlacer::place(const Press& press) {
 
   const auto plane = static_cast<std::size_t>(lattice_.plane());
   std::vector<float> bins = rest_;
-  std::vector<float> of_theta(plane);
-  for (int theta = 0; theta < lattice_.theta_rad.count; ++theta) {
-    std::ranges::fill(of_theta, 0.0F);
+  tbb::parallel_for(0, lattice_.theta_rad.count, [&](int theta) {
+    std::vector<float> of_theta(plane, 0.0F);
     std::vector<float> unknown(plane, 0.0F);
     for (const Element& element : elements) {
       if (is_contact(element.reading)) {
@@ -60,8 +73,13 @@ PressPlacement PressPlacer::place(const Press& press) {
     for (std::size_t i = 0; i < plane; ++i) {
       bins[static_cast<std::size_t>(theta) * plane + i] += of_theta[i] - unknown[i];
     }
-  }
+  });
+  return bins;
+}
 
+PressPlacement PressPlacer::place(const Press& press) {
+  const std::vector<Element> elements = elements_of(press);
+  const std::vector<float> bins = log_likelihoods(elements);
   std::vector<std::uint32_t> order(bins.size());
   std::iota(order.begin(), order.end(), 0U);
   const std::size_t best_count = std::min(evaluated_bins, bins.size());
@@ -89,9 +107,10 @@ std::vector<PressPlacer::Element> PressPlacer::elements_of(const Press& press) c
   std::vector<Element> elements;
   for (const Touch& touch : press.touches) {
     const std::vector<Reading> readings = contact_.classify(touch);
+    const glm::dmat2 turn = rotation(touch.T_robot_sensor.theta_rad);
+    const glm::dvec2 sensor_mm = touch.T_robot_sensor.translation_mm - lattice_.pivot_mm;
     for (std::size_t e = 0; e < readings.size(); ++e) {
-      elements.push_back(
-          {touch.T_robot_sensor * touch.elements_mm[e] - lattice_.pivot_mm, readings[e]});
+      elements.push_back({sensor_mm + turn * touch.elements_mm[e], readings[e]});
     }
   }
   return elements;
@@ -154,15 +173,14 @@ void PressPlacer::sum_rest(const std::vector<Element>& elements) {
     resting_.push_back(element.from_pivot_mm);
   }
   const auto plane = static_cast<std::size_t>(lattice_.plane());
-  rest_.clear();
-  std::vector<float> of_theta(plane);
-  for (int theta = 0; theta < lattice_.theta_rad.count; ++theta) {
-    std::ranges::fill(of_theta, 0.0F);
+  rest_.assign(static_cast<std::size_t>(lattice_.bins()), 0.0F);
+  tbb::parallel_for(0, lattice_.theta_rad.count, [&](int theta) {
+    std::vector<float> of_theta(plane, 0.0F);
     for (const glm::dvec2& place : resting_) {
       add(of_theta, theta, place, no_contact_);
     }
-    rest_.insert(rest_.end(), of_theta.begin(), of_theta.end());
-  }
+    std::ranges::copy(of_theta, rest_.begin() + static_cast<std::ptrdiff_t>(plane) * theta);
+  });
 }
 
 void PressPlacer::add(std::vector<float>& bins, int theta, const glm::dvec2& from_pivot_mm,
@@ -189,10 +207,12 @@ void PressPlacer::add(std::vector<float>& bins, int theta, const glm::dvec2& fro
 double PressPlacer::log_likelihood(const std::vector<Element>& elements,
                                    const Pose& T_object_robot) const {
   const InterpolatedMap map(layer_, contact_.table ? layer_.prior : contact_.prior.value());
+  const glm::dmat2 turn = rotation(T_object_robot.theta_rad);
+  const glm::dvec2 pivot_mm = T_object_robot * lattice_.pivot_mm;
   double sum = 0.0;
   for (const Element& element : elements) {
     if (element.reading != Reading::unknown) {
-      const glm::dvec2 place = T_object_robot * (element.from_pivot_mm + lattice_.pivot_mm);
+      const glm::dvec2 place = pivot_mm + turn * element.from_pivot_mm;
       sum += contact_.log_likelihood(element.reading, {.log_odds = map.log_odds(place)});
     }
   }

@@ -26,7 +26,8 @@ struct PressPlacement {
 /// steps, so that an element adds rows of the table to rows of bins. Elements are taken to the
 /// nearest sample, at most half a cell of the map away along each axis; the best bins by these sums
 /// are then evaluated without. No Contact everywhere is summed once for all presses of one array at
-/// one place. Not thread-safe; objects of their own may work side by side.
+/// one place. Takes all host threads; not thread-safe, but
+/// objects of their own may work side by side.
 class PressPlacer {
  public:
   /// @param hypothesis with a layer where the contact model has a table over one; its weight is
@@ -39,6 +40,11 @@ class PressPlacer {
   /// @throws Error on a touch that is not sound, or a press that lies so far from the pivot that
   /// its samples are more than `most_cells`
   PressPlacement place(const Press& press);
+  /// The log-likelihood at every bin, in nats, by the nearest samples.
+  /// @throws Error as place() does
+  std::vector<float> log_likelihoods(const Press& press);
+  /// The log-likelihood at any pose, in nats, at the elements' own places.
+  double log_likelihood(const Press& press, const Pose& T_object_robot) const;
 
  private:
   /// One axis of the samples: `per_step` of them to a step of the lattice.
@@ -57,6 +63,7 @@ class PressPlacer {
   };
 
   std::vector<Element> elements_of(const Press& press) const;
+  std::vector<float> log_likelihoods(const std::vector<Element>& elements);
   void cover(double reach_mm);
   void sum_rest(const std::vector<Element>& elements);
   /// Adds a table to the bins of one theta, at an element's places.

@@ -27,15 +27,8 @@ UnposedMap final_map(std::size_t map, std::span<const UnposedPress> presses,
     if (home.map != map) {
       continue;
     }
-    Touch touch = presses[p].touch;
-    std::vector<glm::dvec2> mirrored;
-    if (home.place.mirrored) {
-      for (const glm::dvec2& element : touch.elements_mm) {
-        mirrored.emplace_back(-element.x, element.y);
-      }
-      touch.elements_mm = mirrored;
-    }
-    touch.T_robot_sensor = home.place.T_object_sensor;
+    Touch touch = presses[p].sides[home.place.mirrored ? 1 : 0].touch();
+    touch.T_robot_sensor = home.place.T_object_robot * touch.T_robot_sensor;
     const double weight = home.image_place().weight;
     sums.add(observed_map(std::span(&touch, 1), options.map, label), {.weight = weight});
     result.presses.push_back({.press = presses[p].index,
@@ -89,13 +82,12 @@ UnposedMaps unposed_maps(std::span<const Touch> presses, const std::string& labe
   UnposedMaps result;
   std::vector<UnposedPress> placeable;
   for (std::size_t i = 0; i < presses.size(); ++i) {
-    UnposedPress press{.index = i, .touch = presses[i], .searched = {}, .image = {}};
-    press.touch.T_robot_sensor = {};
-    press.searched.sides.emplace_back(press.touch, options.contact, false, step_mm);
+    UnposedPress press{.index = i, .sides = {}, .image = {}};
+    press.sides.emplace_back(presses[i], options.contact, false);
     if (options.mirror) {
-      press.searched.sides.emplace_back(press.touch, options.contact, true, step_mm);
+      press.sides.emplace_back(presses[i], options.contact, true);
     }
-    if (press.searched.sides.front().contacts == 0) {
+    if (press.sides.front().contacts() == 0) {
       result.misfits.push_back({.press = i, .reason = Misfit::Reason::no_contact});
       continue;
     }
@@ -107,7 +99,8 @@ UnposedMaps unposed_maps(std::span<const Touch> presses, const std::string& labe
                                           label));
   }
   tbb::parallel_for(std::size_t{0}, placeable.size(), [&](std::size_t p) {
-    placeable[p].image = observed_map(std::span(&placeable[p].touch, 1), options.map, label);
+    placeable[p].image =
+        observed_map(placeable[p].sides.front().press().touches, options.map, label);
   });
 
   PressFusion fusion(placeable, options, step_mm, progress);

@@ -67,15 +67,18 @@ struct UnposedMaps {
 /// Least fit (PlacedPress::fit) of a press that becomes part of a map.
 inline constexpr double least_fit = 0.25;
 /// Fit below which a press is given a map of its own where there may be more maps.
-inline constexpr double good_fit = 0.5;
+inline constexpr double good_fit = 0.7;
+/// Fit below which a press on a map may well lie at a wrong place, or be of another object.
+inline constexpr double doubtful_fit = 0.5;
 
 /// Maps of one object from presses at unknown poses; the presses' own poses are ignored. Where
 /// there are no more presses than maps, each press makes a map of its own: few presses recognise
 /// better apart. Else each press is compared with the maps of single presses, which begin the maps
 /// to which most presses fit; then each press in turn is taken out of its map, placed anew on the
-/// map that it fits best and added there, with the weight of how sure its place is, until no press
-/// moves by more than a quarter of a step, or for eight rounds. The maps hold weighted means over
-/// their presses: of log odds and of pressure.
+/// map that it fits best and added there, with the weight of how sure its place is; it stays where
+/// it was unless another place is clearly better. The rounds end when no press moves by more than a
+/// quarter of the elements' spacing, after eight at most. The maps hold weighted means over their
+/// presses: of log odds and of pressure.
 /// @param progress is called now and then with the fraction done
 /// @throws Error on an option out of range, a touch that is not sound, arrays of one element, or
 /// where no press can be placed: none has an element In Contact
