@@ -42,8 +42,9 @@ std::string sensor_model_text(const LearnedSensor& sensor) {
                                       sensor.features->objects.size()));
   }
   if (sensor.familiarity) {
-    add("familiarity", fmt::format("1 / (1 + exp(-({:.4g} + {:.4g} s))) at s nats per element",
-                                   sensor.familiarity->offset, sensor.familiarity->slope));
+    add("familiarity", fmt::format("1 / (1 + exp(-({:.4g} + {:.4g} explained + {:.4g} lead)))",
+                                   sensor.familiarity->offset, sensor.familiarity->explained_slope,
+                                   sensor.familiarity->lead_slope));
   }
   if (sensor.fit_scale) {
     add("fit scale", fmt::format("z of learned objects {:.4g} +- {:.4g}", sensor.fit_scale->mean,

@@ -106,7 +106,9 @@ LearnedFeatures read_learned_features(const Entry& entry) {
 Familiarity read_familiarity(const Entry& entry) {
   Familiarity familiarity;
   read_keys(entry, {{"offset", [&](const Entry& e) { familiarity.offset = e.number(); }},
-                    {"slope", [&](const Entry& e) { familiarity.slope = e.number(); }}});
+                    {"explained_slope",
+                     [&](const Entry& e) { familiarity.explained_slope = e.number(); }},
+                    {"lead_slope", [&](const Entry& e) { familiarity.lead_slope = e.number(); }}});
   return familiarity;
 }
 
@@ -278,7 +280,8 @@ void write_sensor_model(const std::filesystem::path& path, const LearnedSensor& 
   if (sensor.familiarity) {
     key("familiarity") << YAML::Flow << YAML::BeginMap;
     number("offset", sensor.familiarity->offset);
-    number("slope", sensor.familiarity->slope);
+    number("explained_slope", sensor.familiarity->explained_slope);
+    number("lead_slope", sensor.familiarity->lead_slope);
     out << YAML::EndMap;
   }
   if (sensor.fit_scale) {

@@ -38,14 +38,6 @@ struct LabelScore {
   }
 };
 
-double known_elements(const Press& press, const ContactClassifier& classifier) {
-  std::size_t known = 0;
-  for (const Touch& touch : press.touches) {
-    known += known_readings(touch, classifier).size();
-  }
-  return static_cast<double>(known);
-}
-
 /// The features of a press: of its first touch.
 PressFeatures features_of(const Press& press, const ContactClassifier& classifier) {
   return press_features(press.touches.front(), classifier);
@@ -57,7 +49,12 @@ class Validation {
   Validation(const std::vector<Press>& presses, const std::vector<TrainingMap>& maps,
              const TableLearning& how, const PlacedPresses* placed,
              const CrossValidationOptions& options)
-      : presses_(presses), maps_(maps), how_(how), placed_(placed), options_(options) {
+      : presses_(presses),
+        maps_(maps),
+        how_(how),
+        placed_(placed),
+        options_(options),
+        classifier_(how.contact) {
     fold_ = folds_of(presses, options.folds);
     std::set<std::string> labels;
     for (const TrainingMap& map : maps) {
@@ -66,6 +63,7 @@ class Validation {
     labels_.assign(labels.begin(), labels.end());
     if (placed != nullptr) {
       layers_ = layers_of(maps, how.layer);
+      classifier_ = contact_with(how.contact, placed->table, "");
     }
   }
 
@@ -155,9 +153,9 @@ class Validation {
 
   void add(const Press& press, const std::vector<LabelScore>& scores,
            const LearnedFeatures& features, CrossValidation& result) const {
-    const double elements = known_elements(press, how_.contact.classifier);
     const PressFeatures own = features_of(press, how_.contact.classifier);
     ScoredPress scored{.truth = *label_of(press), .log_evidence = {}, .log_density = {}};
+    std::vector<double> of_others;
     double best = nothing;
     double best_other = nothing;
     for (std::size_t label = 0; label < labels_.size(); ++label) {
@@ -167,14 +165,19 @@ class Validation {
           (known == features.objects.end() ? features.any : known->second).log_density(own));
       best = std::max(best, scores[label].best_log_likelihood);
       if (label != scored.truth) {
+        of_others.push_back(scored.log_evidence.back());
         best_other = std::max(best_other, scores[label].best_log_likelihood);
       }
     }
-    result.presses.push_back(std::move(scored));
-    result.known.push_back(best / elements);
-    if (best_other != nothing) {
-      result.unknown.push_back(best_other / elements);
+    // A press of which nothing is In Contact says nothing of its object.
+    const std::vector<Reading> readings = classifier_.classify(press.touches.front());
+    if (std::ranges::any_of(readings, is_contact)) {
+      result.known.push_back(FamiliarityScore::of(readings, best, scored.log_evidence));
+      if (best_other != nothing) {
+        result.unknown.push_back(FamiliarityScore::of(readings, best_other, of_others));
+      }
     }
+    result.presses.push_back(std::move(scored));
   }
 
   const std::vector<Press>& presses_;
@@ -185,6 +188,7 @@ class Validation {
   std::vector<std::size_t> fold_;
   std::vector<std::string> labels_;
   std::vector<OccupancyGrid> layers_;
+  ContactModel classifier_;
 };
 
 }  // namespace

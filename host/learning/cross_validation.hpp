@@ -22,8 +22,8 @@ struct CrossValidation {
   std::vector<std::string> labels;   ///< of all maps, ascending
   std::vector<ScoredPress> presses;  ///< those that have a map of their object in the other folds
   /// See FamiliarityScores: with the maps of all objects, and without those of the press's own.
-  std::vector<double> known;
-  std::vector<double> unknown;
+  std::vector<FamiliarityScore> known;
+  std::vector<FamiliarityScore> unknown;
 };
 
 /// Recognises every press, at an unknown pose, with maps and numbers of the presses of other folds

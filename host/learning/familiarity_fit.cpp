@@ -1,10 +1,14 @@
 #include "familiarity_fit.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <vector>
 
 #include <fmt/format.h>
+#include <glm/mat3x3.hpp>
+#include <glm/matrix.hpp>
+#include <glm/vec3.hpp>
 
 #include "palpate/error.hpp"
 
@@ -13,7 +17,9 @@ namespace palpate {
 namespace {
 
 void require_sound(const FamiliarityScores& scores) {
-  const auto finite = [](double x) { return std::isfinite(x); };
+  const auto finite = [](const FamiliarityScore& score) {
+    return std::isfinite(score.explained) && std::isfinite(score.lead);
+  };
   if (scores.known.empty() || scores.unknown.empty() ||
       !std::ranges::all_of(scores.known, finite) || !std::ranges::all_of(scores.unknown, finite)) {
     throw Error(
@@ -24,107 +30,118 @@ void require_sound(const FamiliarityScores& scores) {
   }
 }
 
-/// A score and the probability with which it counts as known.
+/// A score, standardised, after a 1, and the probability with which it counts as known.
 struct Target {
-  double score;
-  double known;
+  glm::dvec3 score;
+  double known = 0.0;
 };
 
 /// log(1 + exp(x))
 double softplus(double x) { return std::max(x, 0.0) + std::log1p(std::exp(-std::abs(x))); }
 
-double loss(const std::vector<Target>& targets, double offset, double slope) {
+double loss(const std::vector<Target>& targets, const glm::dvec3& weights) {
   double sum = 0.0;
   for (const Target& target : targets) {
-    const double x = offset + slope * target.score;
+    const double x = glm::dot(weights, target.score);
     sum += softplus(x) - target.known * x;
   }
   return sum;
 }
 
-}  // namespace
-
-double familiar_probability(const Familiarity& familiarity, double score) {
-  return 1.0 / (1.0 + std::exp(-(familiarity.offset + familiarity.slope * score)));
+/// The weights of least loss, by Newton's method.
+/// @param used marks the scores that may have a weight
+glm::dvec3 least_loss(const std::vector<Target>& targets, const std::array<bool, 3>& used) {
+  glm::dvec3 weights(0.0);
+  double least = loss(targets, weights);
+  constexpr int most_steps = 100;
+  for (int step = 0; step < most_steps; ++step) {
+    glm::dvec3 gradient(0.0);
+    glm::dmat3 curvature(1e-9);
+    for (const Target& target : targets) {
+      const double p = 1.0 / (1.0 + std::exp(-glm::dot(weights, target.score)));
+      gradient += (p - target.known) * target.score;
+      curvature += p * (1.0 - p) * glm::outerProduct(target.score, target.score);
+    }
+    for (int i = 0; i < 3; ++i) {
+      if (!used.at(static_cast<std::size_t>(i))) {
+        gradient[i] = 0.0;
+        for (int j = 0; j < 3; ++j) {
+          curvature[i][j] = curvature[j][i] = i == j ? 1.0 : 0.0;
+        }
+      }
+    }
+    const glm::dvec3 direction = glm::inverse(curvature) * gradient;
+    double length = 1.0;
+    double next = loss(targets, weights - direction);
+    while (next > least && length > 1e-6) {
+      length /= 2.0;
+      next = loss(targets, weights - length * direction);
+    }
+    if (!(next < least)) {
+      break;
+    }
+    weights -= length * direction;
+    least = next;
+  }
+  return weights;
 }
+
+}  // namespace
 
 Familiarity fit_familiarity(const FamiliarityScores& scores) {
   require_sound(scores);
   const auto known = static_cast<double>(scores.known.size());
   const auto unknown = static_cast<double>(scores.unknown.size());
-  // Standardised scores keep Newton's steps well-conditioned.
-  double mean = 0.0;
-  double squares = 0.0;
-  for (const auto& part : {scores.known, scores.unknown}) {
-    for (const double score : part) {
-      mean += score / (known + unknown);
-    }
-  }
-  for (const auto& part : {scores.known, scores.unknown}) {
-    for (const double score : part) {
-      squares += (score - mean) * (score - mean) / (known + unknown);
-    }
-  }
-  const double sd = std::sqrt(squares);
-  const double log_odds = std::log((known + 1.0) / (unknown + 1.0));
-  if (!(sd > 1e-12 * std::max(1.0, std::abs(mean)))) {
-    return {log_odds, 0.0};
-  }
   std::vector<Target> targets;
-  for (const double score : scores.known) {
-    targets.push_back({(score - mean) / sd, (known + 1.0) / (known + 2.0)});
+  for (const FamiliarityScore& score : scores.known) {
+    targets.push_back({{1.0, score.explained, score.lead}, (known + 1.0) / (known + 2.0)});
   }
-  for (const double score : scores.unknown) {
-    targets.push_back({(score - mean) / sd, 1.0 / (unknown + 2.0)});
+  for (const FamiliarityScore& score : scores.unknown) {
+    targets.push_back({{1.0, score.explained, score.lead}, 1.0 / (unknown + 2.0)});
   }
-  double offset = 0.0;
-  double slope = 0.0;
-  double least = loss(targets, offset, slope);
-  constexpr int most_steps = 100;
-  for (int step = 0; step < most_steps; ++step) {
-    double g0 = 0.0;
-    double g1 = 0.0;
-    double h00 = 1e-9;
-    double h01 = 0.0;
-    double h11 = 1e-9;
-    for (const Target& target : targets) {
-      const double p = 1.0 / (1.0 + std::exp(-(offset + slope * target.score)));
-      const double w = p * (1.0 - p);
-      g0 += p - target.known;
-      g1 += (p - target.known) * target.score;
-      h00 += w;
-      h01 += w * target.score;
-      h11 += w * target.score * target.score;
+  // Standardised scores keep Newton's steps well-conditioned.
+  glm::dvec3 mean(0.0);
+  glm::dvec3 variance(0.0);
+  for (const Target& target : targets) {
+    mean += target.score / (known + unknown);
+  }
+  for (const Target& target : targets) {
+    variance += (target.score - mean) * (target.score - mean) / (known + unknown);
+  }
+  std::array<bool, 3> used{true, true, true};
+  glm::dvec3 sd(1.0);
+  for (int i = 1; i < 3; ++i) {
+    sd[i] = std::sqrt(variance[i]);
+    if (!(sd[i] > 1e-12 * std::max(1.0, std::abs(mean[i])))) {
+      used.at(static_cast<std::size_t>(i)) = false;
+      sd[i] = 1.0;
     }
-    const double determinant = h00 * h11 - h01 * h01;
-    const double d0 = (h11 * g0 - h01 * g1) / determinant;
-    const double d1 = (h00 * g1 - h01 * g0) / determinant;
-    double length = 1.0;
-    double next = loss(targets, offset - d0, slope - d1);
-    while (next > least && length > 1e-6) {
-      length /= 2.0;
-      next = loss(targets, offset - length * d0, slope - length * d1);
-    }
-    if (!(next < least)) {
-      break;
-    }
-    offset -= length * d0;
-    slope -= length * d1;
-    least = next;
   }
-  if (slope < 0.0) {
-    return {log_odds, 0.0};
+  mean[0] = 0.0;
+  for (Target& target : targets) {
+    target.score = (target.score - mean) / sd;
   }
-  return {offset - slope * mean / sd, slope / sd};
+  glm::dvec3 weights = least_loss(targets, used);
+  // What speaks for the unknown says nothing, the worse of two first.
+  while (std::min(weights[1], weights[2]) < 0.0) {
+    used.at(weights[1] < weights[2] ? 1 : 2) = false;
+    weights = least_loss(targets, used);
+  }
+  const glm::dvec3 slopes = weights / sd;
+  return {weights[0] - slopes[1] * mean[1] - slopes[2] * mean[2], slopes[1], slopes[2]};
 }
 
-double area_under_curve(const FamiliarityScores& scores) {
+double area_under_curve(const FamiliarityScores& scores, const Familiarity& familiarity) {
   require_sound(scores);
-  std::vector<double> unknown(scores.unknown.begin(), scores.unknown.end());
+  const auto log_odds = [&](const FamiliarityScore& score) {
+    return familiarity.explained_slope * score.explained + familiarity.lead_slope * score.lead;
+  };
+  std::vector<double> unknown;
+  std::ranges::transform(scores.unknown, std::back_inserter(unknown), log_odds);
   std::ranges::sort(unknown);
   double pairs = 0.0;
-  for (const double score : scores.known) {
-    const auto [first, last] = std::equal_range(unknown.begin(), unknown.end(), score);
+  for (const FamiliarityScore& known : scores.known) {
+    const auto [first, last] = std::equal_range(unknown.begin(), unknown.end(), log_odds(known));
     pairs += static_cast<double>(first - unknown.begin()) + 0.5 * static_cast<double>(last - first);
   }
   return pairs / (static_cast<double>(scores.known.size()) * static_cast<double>(unknown.size()));

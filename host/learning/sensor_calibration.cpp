@@ -182,12 +182,12 @@ class SensorLearning {
     }
     result_.sensor.features = learn_features(features);
     result_.sensor.features->weight = fit.feature_weight;
-    if (learned.unknown.empty()) {
+    if (learned.known.empty() || learned.unknown.empty()) {
       return;
     }
     const FamiliarityScores scores{learned.known, learned.unknown};
     result_.sensor.familiarity = fit_familiarity(scores);
-    result_.area_under_curve = area_under_curve(scores);
+    result_.area_under_curve = area_under_curve(scores, *result_.sensor.familiarity);
   }
 
   const std::vector<Press>& presses_;

@@ -49,17 +49,22 @@ std::vector<double> sums_by_label(const Estimate& estimate, const RecognitionTas
   return sums;
 }
 
+std::vector<double> label_log_evidence(const Estimate& estimate, const RecognitionTask& task) {
+  std::vector<double> logs(task.labels.size(), log_zero);
+  for (std::size_t i = 0; i < estimate.log_evidence.size(); ++i) {
+    double& sum = logs[task.label_of[i]];
+    sum = log_sum(sum, estimate.log_evidence[i]);
+  }
+  return logs;
+}
+
 std::vector<double> label_probabilities(const Estimate& estimate, std::span<const double> features,
                                         const RecognitionTask& task, std::optional<double> known) {
   const bool learned_none = known && task.labels.back() == none_label;
   if (task.temperature == 1.0 && !task.features && !learned_none) {
     return sums_by_label(estimate, task);
   }
-  std::vector<double> logs(task.labels.size(), log_zero);
-  for (std::size_t i = 0; i < estimate.log_evidence.size(); ++i) {
-    double& sum = logs[task.label_of[i]];
-    sum = log_sum(sum, estimate.log_evidence[i]);
-  }
+  std::vector<double> logs = label_log_evidence(estimate, task);
   if (estimate.none_log_evidence && !learned_none) {
     logs.back() = *estimate.none_log_evidence;
   }

@@ -27,6 +27,10 @@ inline double tempered(double log_evidence, double features, const RecognitionTa
 /// temperature 1 and without features.
 std::vector<double> sums_by_label(const Estimate& estimate, const RecognitionTask& task);
 
+/// Log evidence of every label, the sum over its maps of weight times evidence; -infinity for
+/// none_label.
+std::vector<double> label_log_evidence(const Estimate& estimate, const RecognitionTask& task);
+
 /// The probability of every label: E^(1 / temperature) exp(features), normalised; by
 /// sums_by_label() where nothing changes them. Where the task has none_label and `known` is given,
 /// the maps' labels share `known` among themselves and none_label has the rest: touches that

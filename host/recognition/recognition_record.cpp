@@ -98,15 +98,18 @@ bool meets_an_object(const Touch& touch, const RecognitionTask& task) {
 }
 
 /// RecognitionStep::known
-std::optional<double> known_of(const Mode& mode, std::span<const Touch> touches,
+std::optional<double> known_of(const Estimate& estimate, std::span<const Touch> touches,
                                const RecognitionTask& task) {
   if (!tells_known(task) || touches.size() != 1 || !meets_an_object(touches.front(), task)) {
     return {};
   }
-  const std::vector<Reading> readings = task.classifier().classify(touches.front());
-  const auto unknown = std::count(readings.begin(), readings.end(), Reading::unknown);
-  const auto known = static_cast<double>(readings.size() - static_cast<std::size_t>(unknown));
-  return task.familiarity->probability(mode.log_likelihood / known);
+  std::vector<double> evidence = label_log_evidence(estimate, task);
+  if (task.labels.back() == none_label) {
+    evidence.pop_back();
+  }
+  return task.familiarity->probability(
+      FamiliarityScore::of(task.contact().classify(touches.front()),
+                           estimate.mode.log_likelihood, evidence));
 }
 
 /// RecognitionStep::fit
@@ -183,7 +186,7 @@ RecognitionStep judge(const Estimate& estimate, const GroundTruth& truth,
                       const RecognitionTask& task, std::span<const Touch> touches) {
   const std::vector<std::string>& labels = task.labels;
   const std::vector<double> features = feature_nats(touches, task);
-  const std::optional<double> known = known_of(estimate.mode, touches, task);
+  const std::optional<double> known = known_of(estimate, touches, task);
   RecognitionStep step{.identity = label_probabilities(estimate, features, task, known),
                        .mode = estimate.mode,
                        .refined = {},

@@ -1,6 +1,7 @@
 #include "recognition_task.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 namespace palpate {
@@ -112,9 +113,13 @@ bool tells_known(const RecognitionTask& task) {
 
 void settle_evidence(RecognitionTask& task) {
   constexpr double share = 0.05;
+  constexpr double negligible = 1e-4;
   auto* bounded = std::get_if<BoundedOptions>(&task.filter);
-  if (bounded != nullptr && (task.temperature > 1.0 || task.features) && !bounded->evidence_nats) {
+  if (bounded != nullptr && (task.temperature > 1.0 || task.features || task.familiarity) && !bounded->evidence_nats) {
     bounded->evidence_nats = share * task.temperature;
+    bounded->evidence_range_nats =
+        std::max(-std::log(negligible) * task.temperature,
+                 task.familiarity ? FamiliarityScore::most_lead_nats : 0.0);
   }
 }
 

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <string>
+#include <map>
 #include <optional>
 
 #include <tbb/parallel_for.h>
@@ -35,6 +37,10 @@ BoundSearch::BoundSearch(std::span<const Hypothesis> hypotheses, const BoundedOp
   }
   const std::vector<TileSize> sizes = tile_sizes(options.lattice, least_cell_mm, hypotheses.size());
   unseen_.resize(hypotheses.size());
+  std::map<std::string, std::size_t> labels;
+  for (const Hypothesis& hypothesis : hypotheses) {
+    label_of_.push_back(labels.try_emplace(hypothesis.map.label, labels.size()).first->second);
+  }
   std::vector<std::optional<TileBounds>> bounds(hypotheses.size());
   tbb::parallel_for(std::size_t{0}, hypotheses.size(), [&](std::size_t i) {
     bounds[i].emplace(hypotheses[i].compared(), options.contact, i, options.lattice, sizes);

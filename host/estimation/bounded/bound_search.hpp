@@ -49,6 +49,7 @@ class BoundSearch {
   const BinLikelihood& likelihood_;
   FasterBinLikelihood& batches_;
   std::vector<double> log_weight_;
+  std::vector<std::size_t> label_of_;  ///< [hypothesis] index of its label
   std::vector<glm::dvec2> turns_;    ///< [theta] cosine and sine
   std::vector<OccupancyGrid> maps_;  ///< [hypothesis] without their cells
   std::vector<TileBounds> bounds_;   ///< [hypothesis]

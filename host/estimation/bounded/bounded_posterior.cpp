@@ -116,7 +116,7 @@ struct BoundedPosterior::Impl {
     if (!result || rough) {
       rough = false;
       Deadline deadline(options.budget_s);
-      SearchGoal goal{options.tolerance, options.evidence_nats};
+      SearchGoal goal{options.tolerance, options.evidence_nats, options.evidence_range_nats};
       if (deadline.exists()) {
         // What is proven soon comes first: a search that is cut short proves little.
         goal.tolerance = std::max(goal.tolerance, soon);
@@ -166,7 +166,7 @@ struct BoundedPosterior::Impl {
     if (bins.complete()) {
       bins.visit(visitor);
     } else {
-      SearchGoal goal{options.tolerance, options.evidence_nats};
+      SearchGoal goal{options.tolerance, options.evidence_nats, options.evidence_range_nats};
       if (rough) {
         goal = {std::max(options.tolerance, soon), {}};
       }
@@ -532,7 +532,8 @@ std::vector<PoseBlock> BoundedPosterior::refined_blocks() const {
       }
     };
     posterior.search.run(posterior.elements,
-                         {posterior.options.tolerance, posterior.options.evidence_nats},
+                         {posterior.options.tolerance, posterior.options.evidence_nats,
+                          posterior.options.evidence_range_nats},
                          Deadline({}), note, &blocks);
     blocks.insert(blocks.end(), evaluated.begin(), evaluated.end());
   });

@@ -23,12 +23,12 @@ bool stands_before(const Tile& a, const Tile& b) {
 }
 
 UnsettledMass unsettled(std::span<const Tile> tiles, std::size_t level,
-                        std::span<const TileBounds> bounds) {
+                        std::span<const TileBounds> bounds, double slot_nats) {
   double largest = -std::numeric_limits<double>::infinity();
   for (const Tile& tile : tiles) {
     largest = std::max(largest, tile.bound);
   }
-  UnsettledMass mass(bounds.size(), largest);
+  UnsettledMass mass(bounds.size(), largest, slot_nats);
   for (const Tile& tile : tiles) {
     mass.add(static_cast<std::size_t>(tile.object), tile.bound,
              bounds[tile.object].bins(level, tile));
@@ -140,7 +140,7 @@ void LeafPass::evaluate(std::span<const Tile> tiles, double tolerance) {
   if (tiles.empty()) {
     return;
   }
-  UnsettledMass left = unsettled(tiles, bounds_.front().levels().size() - 1, bounds_);
+  UnsettledMass left = unsettled(tiles, bounds_.front().levels().size() - 1, bounds_, account_.slot_nats());
   for (const Tile& tile : tiles) {
     if (probed(tile)) {
       remove(tile, left);

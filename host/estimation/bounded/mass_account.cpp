@@ -13,9 +13,10 @@ constexpr double nothing = -std::numeric_limits<double>::infinity();
 
 }  // namespace
 
-MassAccount::MassAccount(std::span<const double> log_weight, const PoseLattice& lattice,
-                         const SearchGoal& goal)
+MassAccount::MassAccount(std::span<const double> log_weight, std::span<const std::size_t> label_of,
+                         const PoseLattice& lattice, const SearchGoal& goal)
     : log_weight_(log_weight),
+      label_of_(label_of),
       lattice_(lattice),
       goal_(goal),
       evaluated_(log_weight.size()),
@@ -90,15 +91,43 @@ std::vector<std::size_t> MassAccount::droppable_from(const UnsettledMass& tiles,
                                       tiles.slot(best_) + 1);  // the mode must not be lost
   std::vector<std::size_t> from(evaluated_.size(), of_all);
   if (goal_.evidence_nats) {
-    // Of each hypothesis's own mass, as large a part of what may be missing; the rest of the nats
-    // is for rounding.
-    const double missing = std::expm1(*goal_.evidence_nats * (1.0 - evidence_rounding_part)) *
-                           tolerance / goal_.tolerance;
+    const std::vector<double> largest = droppable_evidence(tolerance);
     for (std::size_t i = 0; i < from.size(); ++i) {
-      from[i] = std::max(of_all, tiles.droppable_from(i, std::log(missing) + log_totals_[i]));
+      from[i] = std::max(of_all, tiles.droppable_from(i, largest[i]));
     }
   }
   return from;
+}
+
+double MassAccount::slot_nats() const {
+  constexpr double of_evidence = 0.25;
+  constexpr double widest = 1.0;
+  return goal_.evidence_nats
+             ? std::clamp(of_evidence * *goal_.evidence_nats, UnsettledMass::usual_slot_nats, widest)
+             : UnsettledMass::usual_slot_nats;
+}
+
+std::vector<double> MassAccount::droppable_evidence(double tolerance) const {
+  struct Label {
+    LogSum total;
+    double hypotheses = 0.0;
+  };
+  std::vector<Label> labels(*std::ranges::max_element(label_of_) + 1);
+  for (std::size_t i = 0; i < label_of_.size(); ++i) {
+    labels[label_of_[i]].total.add(log_totals_[i]);
+    labels[label_of_[i]].hypotheses += 1.0;
+  }
+  // As large a part of what may be missing as of the tolerance; the rest of the nats is for rounding.
+  const double part = tolerance / goal_.tolerance;
+  const double missing =
+      std::log(std::expm1(*goal_.evidence_nats * (1.0 - evidence_rounding_part)) * part);
+  const double far_below = log_total_ - goal_.evidence_range_nats + std::log(part);
+  std::vector<double> largest;
+  for (const std::size_t label : label_of_) {
+    largest.push_back(std::max(missing + labels[label].total.log(), far_below) -
+                      std::log(labels[label].hypotheses));
+  }
+  return largest;
 }
 
 double MassAccount::dropped_share() const { return std::exp(all_dropped_.log() - log_total_); }

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <span>
 #include <vector>
@@ -21,6 +22,7 @@ inline constexpr double evidence_rounding_part = 0.2;
 struct SearchGoal {
   double tolerance = 1e-6;
   std::optional<double> evidence_nats = {};
+  double evidence_range_nats = std::numeric_limits<double>::infinity();
 };
 
 /// What a search found out about one hypothesis: logs in nats, with its prior weight.
@@ -59,8 +61,9 @@ struct SearchResult {
 /// rounding, and of the mass that was dropped. Says which tiles may be dropped.
 class MassAccount {
  public:
-  MassAccount(std::span<const double> log_weight, const PoseLattice& lattice,
-              const SearchGoal& goal);
+  /// @param label_of [hypothesis] index of its label
+  MassAccount(std::span<const double> log_weight, std::span<const std::size_t> label_of,
+              const PoseLattice& lattice, const SearchGoal& goal);
 
   /// Counts so many bins whose summed likelihood is exp(log_mass), each within exp(+-error).
   /// @param largest log-likelihood of these bins; without the prior weight, as log_mass is
@@ -71,6 +74,10 @@ class MassAccount {
   /// Notes the best of some settled bins.
   /// @param bin_of_box index of the bin in the box, [y, x]
   void note_best(const BinBox& box, std::int64_t bin_of_box, double log_likelihood);
+
+  /// Width of the slots in which unsettled mass is counted: fine for a tolerance; where labels that
+  /// lie hundreds of nats apart count, as wide as these allow.
+  double slot_nats() const;
 
   /// Raises the lower bounds of the totals by what was settled, together with bins that are not yet
   /// settled but known well enough.
@@ -99,7 +106,11 @@ class MassAccount {
   SearchResult result() const;
 
  private:
+  /// Of each hypothesis, the largest log mass that may be dropped of it for evidence_nats.
+  std::vector<double> droppable_evidence(double tolerance) const;
+
   std::span<const double> log_weight_;
+  std::span<const std::size_t> label_of_;
   const PoseLattice& lattice_;
   const SearchGoal& goal_;
   std::vector<LogSum> evaluated_;  ///< [hypothesis], with the prior weight

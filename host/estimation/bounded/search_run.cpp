@@ -63,7 +63,7 @@ class SearchRun {
         finest_(search.bounds_.front().levels().size() - 1),
         goal_(goal),
         deadline_(deadline),
-        account_(search.log_weight_, lattice_, goal_),
+        account_(search.log_weight_, search.label_of_, lattice_, goal_),
         evaluator_(search.likelihood_, search.batches_, search.log_weight_, goal_, elements, visit,
                    deadline_, account_),
         leaves_(search.bounds_, thetas_, elements.from_pivot_mm.size(), deadline_, account_,
@@ -91,7 +91,8 @@ class SearchRun {
     const std::vector<Tile> best = best_of_rows();
     if (!best.empty()) {
       UnsettledMass unsettled(search_.bounds_.size(),
-                              std::min_element(best.begin(), best.end(), before)->bound);
+                              std::min_element(best.begin(), best.end(), before)->bound,
+                              account_.slot_nats());
       raise(best, 0);
       count_largest(unsettled);
       const double share = goal_.tolerance * search_share;
@@ -393,7 +394,7 @@ class SearchRun {
       const auto first = tiles.begin() + static_cast<std::ptrdiff_t>(begin);
       std::vector<Tile> lot(first, first + static_cast<std::ptrdiff_t>(count));
       if (deadline_.passed()) {
-        account_.drop(unsettled(lot, level, search_.bounds_));
+        account_.drop(unsettled(lot, level, search_.bounds_, account_.slot_nats()));
         return;
       }
       // What tiles do not use up is left for those after them.
@@ -456,7 +457,7 @@ class SearchRun {
   /// @returns the part of the total that was dropped
   double drop(std::vector<Tile>& tiles, std::size_t level, double tolerance) {
     const double dropped = account_.dropped_share();
-    UnsettledMass mass = unsettled(tiles, level, search_.bounds_);
+    UnsettledMass mass = unsettled(tiles, level, search_.bounds_, account_.slot_nats());
     const std::vector<std::size_t> from = account_.droppable_from(mass, tolerance);
     std::erase_if(tiles,
                   [&](const Tile& tile) { return mass.slot(tile.bound) >= from[tile.object]; });

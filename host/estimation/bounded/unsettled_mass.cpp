@@ -9,21 +9,15 @@
 
 namespace palpate {
 
-namespace {
-
-constexpr double per_nat = 16.0;
-
-}  // namespace
-
 std::size_t UnsettledMass::slot(double bound) const {
   // Rounded down, so that a bound never exceeds its slot's upper edge.
-  const double below = (largest_ - bound) * per_nat;
+  const double below = (largest_ - bound) / slot_nats_;
   return below >= static_cast<double>(slots - 1) ? slots - 1
                                                  : static_cast<std::size_t>(std::max(below, 0.0));
 }
 
 double UnsettledMass::upper_edge(std::size_t slot) const {
-  return largest_ - static_cast<double>(slot) / per_nat;
+  return largest_ - static_cast<double>(slot) * slot_nats_;
 }
 
 std::size_t UnsettledMass::droppable_from(const std::int64_t* bins, double log_allowance) const {

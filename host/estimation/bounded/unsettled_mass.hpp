@@ -7,12 +7,16 @@
 namespace palpate {
 
 /// Bins whose tiles are neither evaluated nor dropped, counted by hypothesis and by their tile's
-/// bound in slots of 1/16 nat: finds which tiles can be dropped together without sorting them.
+/// bound in slots of equal width: finds which tiles can be dropped together without sorting them.
 class UnsettledMass {
  public:
+  static constexpr double usual_slot_nats = 1.0 / 16.0;
+
   /// @param largest of all bounds, in nats
-  UnsettledMass(std::size_t hypotheses, double largest)
-      : largest_(largest), bins_(hypotheses * slots) {}
+  /// @param slot_nats width of a slot; all bounds that lie 4095 slots below the largest or deeper
+  /// count as if they lay there
+  UnsettledMass(std::size_t hypotheses, double largest, double slot_nats = usual_slot_nats)
+      : largest_(largest), slot_nats_(slot_nats), bins_(hypotheses * slots) {}
 
   /// Slots ascend as bounds fall; the last holds all that lie far below.
   std::size_t slot(double bound) const;
@@ -40,6 +44,7 @@ class UnsettledMass {
   std::size_t droppable_from(const std::int64_t* bins, double log_allowance) const;
 
   double largest_;
+  double slot_nats_;
   std::vector<std::int64_t> bins_;  ///< [hypothesis, slot]
 };
 

@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <span>
@@ -27,9 +28,13 @@ struct BoundedOptions {
   /// Seconds after which estimate() stops and reports what it has proven by then, also where that
   /// is less than the tolerance asks for. By default it takes the time that the tolerance needs.
   std::optional<double> budget_s = {};
-  /// Also bounds each hypothesis's log evidence within this many nats, however unlikely the
-  /// hypothesis is: for a temperature that is applied later. By default only the tolerance counts.
+  /// Also bounds each label's log evidence (of all hypotheses that bear it) within this many nats,
+  /// however unlikely the label is: for a temperature that is applied later. By default only the
+  /// tolerance counts.
   std::optional<double> evidence_nats = {};
+  /// With evidence_nats: labels whose log evidence lies more nats than this below the largest are
+  /// only known to lie there.
+  double evidence_range_nats = std::numeric_limits<double>::infinity();
   /// Prior weight W of "none of these", as HistogramOptions::none_weight. The mean likelihood of
   /// each touch is estimated from a sample of the bins; Certificate says how exactly. Needs a
   /// contact model with a floor: gamma above 0, or a table.

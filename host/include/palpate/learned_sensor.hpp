@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <map>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -60,15 +61,32 @@ struct LearnedFeatures {
   std::map<std::string, FeatureDistribution> objects;  ///< by label
 };
 
-/// How like the presses of known objects a single press is. Its score is the log-likelihood of its
-/// known elements at the best pose of the best map, by element; the probability that the object was
-/// learned is 1 / (1 + exp(-(offset + slope score))).
+/// What of a single touch tells whether its object was learned.
+struct FamiliarityScore {
+  /// Log-likelihood of its known elements at the best pose of the best map, over 1 nat more than
+  /// they cost a model that knows no more than how often each level occurs among them: about -1
+  /// where the map explains nothing, and the nearer to 0 the more it explains.
+  double explained = 0.0;
+  /// log(1 + m), where the log evidence of the best label exceeds that of the next by m nats, at
+  /// most most_lead_nats; 0 with one label.
+  double lead = 0.0;
+
+  static constexpr double most_lead_nats = 100.0;
+
+  /// @param readings of the touch, by the contact model that the log-likelihood is of
+  /// @param label_evidence log evidence of each label
+  static FamiliarityScore of(std::span<const Reading> readings, double log_likelihood,
+                             std::span<const double> label_evidence);
+};
+
+/// How probably a single touch is of an object that was learned: 1 / (1 + exp(-(offset +
+/// explained_slope explained + lead_slope lead))).
 struct Familiarity {
   double offset = 0.0;
-  double slope = 0.0;
+  double explained_slope = 0.0;
+  double lead_slope = 0.0;
 
-  /// The probability that the object was learned, from a score in nats per known element.
-  double probability(double score) const;
+  double probability(const FamiliarityScore& score) const;
 };
 
 /// What `palpate calibrate` learned about a sensor and the objects that it touched.
