@@ -20,6 +20,7 @@
 #include "recordings.hpp"
 #include "sensor_calibration.hpp"
 #include "terminal.hpp"
+#include "touch_sd_learning.hpp"
 
 namespace palpate::cli {
 
@@ -36,6 +37,7 @@ struct Options {
   int levels = 7;
   std::string frames;
   std::string png;
+  std::string device;
 };
 
 struct Pictures {
@@ -155,6 +157,19 @@ std::vector<OccupancyGrid> read_maps(const Options& options,
   return maps;
 }
 
+/// Learns how far touches lie from their poses.
+void add_touch_sd(const Options& options, const std::vector<Press>& presses,
+                  SensorCalibration& calibration) {
+  Device device = Device::open(options.device);
+  Progress progress("fitting the touches' poses");
+  const TouchSdFit fit =
+      learn_touch_sd(device, presses, calibration.sensor, calibration.maps,
+                     [&](double fraction) { progress.show(fraction); });
+  DisplacementSd& sd = calibration.sensor.touch_sd;
+  sd.mm = fit.sd.mm > fit.resolution.mm ? fit.sd.mm : 0.0;
+  sd.rad = fit.sd.rad > fit.resolution.rad ? fit.sd.rad : 0.0;
+}
+
 void calibrate(const Options& options) {
   std::vector<std::filesystem::path> maps_read;
   for (const std::string& argument : options.maps) {
@@ -173,6 +188,9 @@ void calibrate(const Options& options) {
     Progress progress("calibrating");
     calibration =
         calibrate_sensor(presses, maps, how, [&](double fraction) { progress.show(fraction); });
+  }
+  if (presses.front().T_object_robot) {
+    add_touch_sd(options, presses, calibration);
   }
   const Pictures pictures = pictures_of(options);
   std::string table;
@@ -237,6 +255,9 @@ void add_calibrate(CLI::App& app) {
   command->add_option("--png", options->png,
                       "Folder for pictures: table.png, what elements read, and reliability.png, "
                       "accuracy over confidence before and after");
+  command->add_option("--device", options->device,
+                      "Vulkan device, by index or a part of its name; touches at unknown poses use "
+                      "none");
   command->callback([options] { calibrate(*options); });
 }
 

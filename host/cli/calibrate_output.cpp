@@ -37,7 +37,7 @@ std::string values_table(const SensorCalibration& calibration, std::optional<int
   add("spread of maps, mm", short_number(initial.spread_mm), sensor.spread_mm);
   add("gamma of Eq. 7", short_number(initial.gamma), sensor.gamma);
   add("prior", "", sensor.prior);
-  if (!sensor.touch_sd.none()) {
+  if (calibration.known_poses) {
     add("touch-sd, mm", "0", sensor.touch_sd.mm);
     add("touch-sd, degrees", "0", degrees(sensor.touch_sd.rad));
   }
@@ -45,6 +45,10 @@ std::string values_table(const SensorCalibration& calibration, std::optional<int
   add("temperature", "1", sensor.temperature);
   if (sensor.features) {
     add("weight of area, force and peak", "0", sensor.features->weight);
+  }
+  if (sensor.fit_scale) {
+    table.add({"fit of learned objects, z", "0 +- 1",
+               fmt::format("{:.2g} +- {:.2g}", sensor.fit_scale->mean, sensor.fit_scale->sd)});
   }
   return table.text(columns);
 }

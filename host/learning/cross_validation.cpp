@@ -12,6 +12,7 @@
 
 #include "feature_learning.hpp"
 #include "host_progress.hpp"
+#include "nearby_fit.hpp"
 #include "palpate/error.hpp"
 
 namespace palpate {
@@ -24,13 +25,19 @@ constexpr double nothing = -std::numeric_limits<double>::infinity();
 struct LabelScore {
   double log_evidence_sum = nothing;     ///< log of the sum over the maps
   double best_log_likelihood = nothing;  ///< at the best pose of the best map
+  std::size_t best_map = 0;
+  Pose best_pose;
   std::size_t maps = 0;
 
-  void add(const PressPlacement& placement) {
+  void add(std::size_t map, const PressPlacement& placement) {
     const double larger = std::max(log_evidence_sum, placement.log_evidence);
     const double smaller = std::min(log_evidence_sum, placement.log_evidence);
     log_evidence_sum = larger + std::log1p(std::exp(smaller - larger));
-    best_log_likelihood = std::max(best_log_likelihood, placement.log_likelihood);
+    if (placement.log_likelihood > best_log_likelihood) {
+      best_log_likelihood = placement.log_likelihood;
+      best_map = map;
+      best_pose = placement.T_object_robot;
+    }
     ++maps;
   }
   double log_evidence() const {
@@ -85,10 +92,11 @@ class Validation {
     if (tried.empty()) {
       return;
     }
-    const auto scores = score(fold, tried, of_label, counter);
+    const std::optional<LearnedTable> table = table_without(fold);
+    const auto scores = score(tried, of_label, table, counter);
     const LearnedFeatures features = learn_features(building);
     for (std::size_t i = 0; i < tried.size(); ++i) {
-      add(presses_[tried[i]], scores[i], features, result);
+      add(presses_[tried[i]], scores[i], features, table, result);
     }
   }
 
@@ -117,25 +125,32 @@ class Validation {
     return of_label;
   }
 
-  /// The scores of presses, [press][label].
-  std::vector<std::vector<LabelScore>> score(std::size_t fold,
-                                             const std::vector<std::size_t>& tried,
-                                             const std::vector<std::vector<std::size_t>>& of_label,
-                                             HostProgress& counter) const {
-    std::optional<LearnedTable> table;
-    if (placed_ != nullptr) {
-      std::vector<bool> outside;
-      for (const std::size_t own : fold_) {
-        outside.push_back(own != fold);
-      }
-      table =
-          table_of(count_placed(placed_->placements, presses_, maps_, layers_, how_, outside), how_);
+  /// What the presses of the other folds say about readings; none by Eq. 7.
+  std::optional<LearnedTable> table_without(std::size_t fold) const {
+    if (placed_ == nullptr) {
+      return {};
     }
+    std::vector<bool> outside;
+    for (const std::size_t own : fold_) {
+      outside.push_back(own != fold);
+    }
+    return table_of(count_placed(placed_->placements, presses_, maps_, layers_, how_, outside),
+                    how_);
+  }
+
+  ContactModel contact_for(std::size_t label, const std::optional<LearnedTable>& table) const {
+    return table ? contact_with(how_.contact, *table, labels_[label]) : how_.contact;
+  }
+
+  /// The scores of presses, [press][label].
+  std::vector<std::vector<LabelScore>> score(const std::vector<std::size_t>& tried,
+                                             const std::vector<std::vector<std::size_t>>& of_label,
+                                             const std::optional<LearnedTable>& table,
+                                             HostProgress& counter) const {
     std::vector<std::vector<LabelScore>> scores(tried.size(),
                                                 std::vector<LabelScore>(labels_.size()));
     tbb::parallel_for(std::size_t{0}, labels_.size(), [&](std::size_t label) {
-      const ContactModel contact =
-          table ? contact_with(how_.contact, *table, labels_[label]) : how_.contact;
+      const ContactModel contact = contact_for(label, table);
       for (const std::size_t map : of_label[label]) {
         Hypothesis hypothesis{.map = maps_[map].map};
         if (table) {
@@ -143,7 +158,7 @@ class Validation {
         }
         PressPlacer placer(hypothesis, contact, how_.lattice);
         for (std::size_t i = 0; i < tried.size(); ++i) {
-          scores[i][label].add(placer.place(presses_[tried[i]]));
+          scores[i][label].add(map, placer.place(presses_[tried[i]]));
         }
       }
       counter.add();
@@ -152,10 +167,12 @@ class Validation {
   }
 
   void add(const Press& press, const std::vector<LabelScore>& scores,
-           const LearnedFeatures& features, CrossValidation& result) const {
+           const LearnedFeatures& features, const std::optional<LearnedTable>& table,
+           CrossValidation& result) const {
     const PressFeatures own = features_of(press, how_.contact.classifier);
     ScoredPress scored{.truth = *label_of(press), .log_evidence = {}, .log_density = {}};
     std::vector<double> of_others;
+    std::size_t best_label = 0;
     double best = nothing;
     double best_other = nothing;
     for (std::size_t label = 0; label < labels_.size(); ++label) {
@@ -163,7 +180,10 @@ class Validation {
       const auto known = features.objects.find(labels_[label]);
       scored.log_density.push_back(
           (known == features.objects.end() ? features.any : known->second).log_density(own));
-      best = std::max(best, scores[label].best_log_likelihood);
+      if (scores[label].best_log_likelihood > best) {
+        best = scores[label].best_log_likelihood;
+        best_label = label;
+      }
       if (label != scored.truth) {
         of_others.push_back(scored.log_evidence.back());
         best_other = std::max(best_other, scores[label].best_log_likelihood);
@@ -175,6 +195,12 @@ class Validation {
       result.known.push_back(FamiliarityScore::of(readings, best, scored.log_evidence));
       if (best_other != nothing) {
         result.unknown.push_back(FamiliarityScore::of(readings, best_other, of_others));
+      }
+      const LabelScore& at = scores[best_label];
+      const OccupancyGrid& map = table ? layers_[at.best_map] : maps_[at.best_map].map;
+      if (const auto fit = best_fit_near(press.touches, at.best_pose, map,
+                                         contact_for(best_label, table), 0)) {
+        result.fit_z.push_back(fit->z);
       }
     }
     result.presses.push_back(std::move(scored));

@@ -24,6 +24,8 @@ struct CrossValidation {
   /// See FamiliarityScores: with the maps of all objects, and without those of the press's own.
   std::vector<FamiliarityScore> known;
   std::vector<FamiliarityScore> unknown;
+  /// Fit::z of presses with an element In Contact, on the best map at about the best pose.
+  std::vector<double> fit_z;
 };
 
 /// Recognises every press, at an unknown pose, with maps and numbers of the presses of other folds

@@ -42,6 +42,7 @@ class SensorLearning {
     if (!(spacing_mm_ > 0.0)) {
       throw Error(Fault::input, "the arrays have one element each; a calibration needs several");
     }
+    result_.known_poses = known_poses_;
     result_.sensor.pressure_unit = options.pressure_unit;
   }
 
@@ -182,12 +183,32 @@ class SensorLearning {
     }
     result_.sensor.features = learn_features(features);
     result_.sensor.features->weight = fit.feature_weight;
+    learn_fit_scale(learned.fit_z);
     if (learned.known.empty() || learned.unknown.empty()) {
       return;
     }
     const FamiliarityScores scores{learned.known, learned.unknown};
     result_.sensor.familiarity = fit_familiarity(scores);
     result_.area_under_curve = area_under_curve(scores, *result_.sensor.familiarity);
+  }
+
+  /// Mean and standard deviation of the touches' z.
+  void learn_fit_scale(const std::vector<double>& z) {
+    if (z.size() < 2) {
+      return;
+    }
+    const auto n = static_cast<double>(z.size());
+    FitScale scale{.mean = 0.0, .sd = 0.0};
+    for (const double one : z) {
+      scale.mean += one / n;
+    }
+    for (const double one : z) {
+      scale.sd += (one - scale.mean) * (one - scale.mean) / (n - 1.0);
+    }
+    scale.sd = std::sqrt(scale.sd);
+    if (scale.sd > 0.0) {
+      result_.sensor.fit_scale = scale;
+    }
   }
 
   const std::vector<Press>& presses_;
