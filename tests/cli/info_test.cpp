@@ -129,7 +129,7 @@ TEST_F(InfoCommand, SensorModel) {
                        .classifier = {.threshold = 15.0, .ratio = 0.15},
                        .table = LearnedTable{.level_edges = {40.0}},
                        .temperature = 31.5,
-                       .familiarity = Familiarity{.offset = 6.0, .slope = 12.0},
+                       .familiarity = Familiarity{.offset = 6.0, .explained_slope = 12.0, .lead_slope = 0.5},
                        .fit_scale = FitScale{.mean = -4.5, .sd = 12.25}};
   sensor.table->shared.assign(3 * ReadingLayer::nodes, -1.0);
   sensor.table->objects["pen"] = sensor.table->shared;

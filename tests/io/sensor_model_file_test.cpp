@@ -18,7 +18,7 @@ LearnedSensor full_sensor() {
                        .table = LearnedTable{},
                        .temperature = 31.5,
                        .features = LearnedFeatures{},
-                       .familiarity = Familiarity{.offset = -3.5, .slope = 20.25},
+                       .familiarity = Familiarity{.offset = -3.5, .explained_slope = 20.25, .lead_slope = 0.5},
                        .fit_scale = FitScale{.mean = -4.5, .sd = 12.25}};
   LearnedTable& table = *sensor.table;
   table.layer = {.of = MapLayer::mean_level,
@@ -85,7 +85,8 @@ TEST_F(SensorModelFile, ComesBackAsItWasWritten) {
   ASSERT_TRUE(read.features->objects.contains("pen"));
   EXPECT_EQ(read.features->objects.at("pen").sd, written.features->objects.at("pen").sd);
   EXPECT_EQ(read.familiarity->offset, written.familiarity->offset);
-  EXPECT_EQ(read.familiarity->slope, written.familiarity->slope);
+  EXPECT_EQ(read.familiarity->explained_slope, written.familiarity->explained_slope);
+  EXPECT_EQ(read.familiarity->lead_slope, written.familiarity->lead_slope);
   ASSERT_TRUE(read.fit_scale);
   EXPECT_EQ(read.fit_scale->mean, written.fit_scale->mean);
   EXPECT_EQ(read.fit_scale->sd, written.fit_scale->sd);

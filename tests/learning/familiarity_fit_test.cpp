@@ -13,51 +13,57 @@ namespace {
 
 TEST(Familiarity, RecoversALogisticModel) {
   Uniform random(1);
-  std::vector<double> known;
-  std::vector<double> unknown;
+  std::vector<FamiliarityScore> known;
+  std::vector<FamiliarityScore> unknown;
+  const Familiarity truth{.offset = 5.0, .explained_slope = 20.0, .lead_slope = 1.0};
   for (int i = 0; i < 20000; ++i) {
-    const double score = random(-0.6, -0.1);
-    const double p = familiar_probability({.offset = 7.0, .slope = 20.0}, score);
-    (random(0.0, 1.0) < p ? known : unknown).push_back(score);
+    const FamiliarityScore score{.explained = random(-0.6, -0.1), .lead = random(0.0, 4.0)};
+    (random(0.0, 1.0) < truth.probability(score) ? known : unknown).push_back(score);
   }
   const Familiarity fit = fit_familiarity({known, unknown});
-  EXPECT_NEAR(fit.slope, 20.0, 0.8);  // within 2 standard errors
-  EXPECT_NEAR(fit.offset / fit.slope, 0.35, 0.005);
+  EXPECT_NEAR(fit.explained_slope, 20.0, 0.8);  // within about 2 standard errors
+  EXPECT_NEAR(fit.lead_slope, 1.0, 0.06);
+  EXPECT_NEAR(fit.offset, 5.0, 0.35);
 }
 
 TEST(Familiarity, StaysFiniteWhereScoresDoNotOverlap) {
-  const std::vector<double> known{-0.10, -0.12, -0.11};
-  const std::vector<double> unknown{-0.5, -0.4};
+  const std::vector<FamiliarityScore> known{{-0.10, 1.0}, {-0.12, 1.0}, {-0.11, 1.0}};
+  const std::vector<FamiliarityScore> unknown{{-0.5, 1.0}, {-0.4, 1.0}};
   const Familiarity fit = fit_familiarity({known, unknown});
-  EXPECT_GT(fit.slope, 0.0);
-  EXPECT_GT(familiar_probability(fit, -0.1), 0.7);
-  EXPECT_LT(familiar_probability(fit, -0.1), 0.95);
-  EXPECT_LT(familiar_probability(fit, -0.5), 0.35);
-  EXPECT_GT(familiar_probability(fit, -0.5), 0.05);
+  EXPECT_GT(fit.explained_slope, 0.0);
+  EXPECT_EQ(fit.lead_slope, 0.0) << "all leads are the same";
+  EXPECT_GT(fit.probability(known.front()), 0.7);
+  EXPECT_LT(fit.probability(known.front()), 0.95);
+  EXPECT_LT(fit.probability(unknown.front()), 0.35);
+  EXPECT_GT(fit.probability(unknown.front()), 0.05);
 }
 
-TEST(Familiarity, SaysNothingWhereScoresDoNot) {
-  const std::vector<double> same{-0.3, -0.3};
-  EXPECT_EQ(fit_familiarity({same, same}).slope, 0.0);
-  EXPECT_EQ(fit_familiarity({same, same}).offset, 0.0);
-  const std::vector<double> low{-0.9, -0.8};
-  EXPECT_EQ(fit_familiarity({low, same}).slope, 0.0) << "unknown presses score higher";
+TEST(Familiarity, TakesNoScoreThatSpeaksForTheUnknown) {
+  const std::vector<FamiliarityScore> same{{-0.3, 2.0}, {-0.3, 2.0}};
+  const Familiarity nothing = fit_familiarity({same, same});
+  EXPECT_EQ(nothing.explained_slope, 0.0);
+  EXPECT_EQ(nothing.lead_slope, 0.0);
+  EXPECT_NEAR(nothing.offset, 0.0, 1e-12);
+  const std::vector<FamiliarityScore> low{{-0.9, 3.0}, {-0.8, 3.1}};
+  const Familiarity lead_only = fit_familiarity({low, same});
+  EXPECT_EQ(lead_only.explained_slope, 0.0);
+  EXPECT_GT(lead_only.lead_slope, 0.0);
 }
 
 TEST(Familiarity, NeedsBothKinds) {
-  const std::vector<double> scores{-0.3};
+  const std::vector<FamiliarityScore> scores{{-0.3, 1.0}};
   EXPECT_THROW(fit_familiarity({scores, {}}), Error);
   EXPECT_THROW(fit_familiarity({{}, scores}), Error);
-  const std::vector<double> infinite{-INFINITY};
+  const std::vector<FamiliarityScore> infinite{{-INFINITY, 1.0}};
   EXPECT_THROW(fit_familiarity({scores, infinite}), Error);
-  EXPECT_THROW(area_under_curve({scores, {}}), Error);
+  EXPECT_THROW(area_under_curve({scores, {}}, {}), Error);
 }
 
 TEST(AreaUnderCurve, CountsPairs) {
-  const std::vector<double> known{1.0, 3.0};
-  const std::vector<double> unknown{0.0, 1.0, 2.0};
+  const std::vector<FamiliarityScore> known{{1.0, 0.0}, {3.0, 0.0}};
+  const std::vector<FamiliarityScore> unknown{{0.0, 0.0}, {1.0, 0.0}, {2.0, 0.0}};
   // Right: (1, 0), (3, 0), (3, 1), (3, 2); a tie: (1, 1).
-  EXPECT_DOUBLE_EQ(area_under_curve({known, unknown}), 4.5 / 6.0);
+  EXPECT_DOUBLE_EQ(area_under_curve({known, unknown}, {.explained_slope = 1.0}), 4.5 / 6.0);
 }
 
 }  // namespace

@@ -130,21 +130,23 @@ TEST(LabelProbability, PassesOverTouchesWithoutContact) {
   EXPECT_EQ(feature_nats(std::span(&touch, 1), task), std::vector<double>(2));
 }
 
-/// A task in which a press at which nothing is held likely is of a learned object with probability
-/// 1 / (1 + e^2), that of no press below.
+/// A task in which a press that costs its readings' frequencies and 1 nat is of a learned object with
+/// probability 1 / (1 + e^2).
 RecognitionTask with_known(const FilterOptions& filter) {
   RecognitionTask task = three_maps(filter);
   task.temperature = 2.0;
-  task.familiarity = Familiarity{.offset = 0.0, .slope = 2.0};
+  task.familiarity = Familiarity{.offset = 0.0, .explained_slope = 2.0};
   return task;
 }
 const double of_known = 1.0 / (1.0 + std::exp(2.0));
+/// Two of three elements are In Contact.
+double by_frequency_and_1() { return 2.0 * std::log(2.0 / 3.0) + std::log(1.0 / 3.0) - 1.0; }
 
 TEST(LabelProbability, GivesNoneOfTheseWhatASinglePressLeaves) {
   const RecognitionTask task = with_known(HistogramOptions{.none_weight = 1.0});
   Estimate estimate = four_to_one();
   estimate.none_log_evidence = 1e4;     // which all else is 0 beside
-  estimate.mode.log_likelihood = -3.0;  // -1 for each of three elements
+  estimate.mode.log_likelihood = by_frequency_and_1();
   const Press press;
   const std::vector<Touch> two{press.touch(), press.touch()};
   const RecognitionStep step = judge(estimate, {}, task, std::span(two).first(1));
@@ -163,7 +165,7 @@ TEST(LabelProbability, GivesNoneOfTheseWhatASinglePressLeaves) {
 TEST(LabelBounds, ShareWhatASinglePressLeaves) {
   const RecognitionTask task = with_known(BoundedOptions{.none_weight = 1.0});
   Estimate estimate = four_to_one();
-  estimate.mode.log_likelihood = -3.0;
+  estimate.mode.log_likelihood = by_frequency_and_1();
   estimate.none_log_evidence = 0.0;
   // Evidence of L within 4 to 9, of the disc within 1 to 4.
   estimate.certificate = Certificate{

@@ -152,7 +152,7 @@ TEST(Known, IsOfASingleTouchOfAnObject) {
   const Recording recording = touched_letter(3);
   for (const std::size_t filter : {0U, 1U, 2U}) {
     RecognitionTask task(shapes(), every_filter()[filter]);
-    task.familiarity = Familiarity{.offset = 1.0, .slope = 2.0};
+    task.familiarity = Familiarity{.offset = 1.0, .explained_slope = 2.0, .lead_slope = 0.3};
     Recogniser recogniser(device, task);
     const RecognitionRecord record = recognise(recogniser, task, unknown_of(recording), true);
     const RecognitionStep& first = record.trace.front();
@@ -160,11 +160,16 @@ TEST(Known, IsOfASingleTouchOfAnObject) {
       EXPECT_FALSE(first.known);
       continue;
     }
-    std::vector<Reading> readings = task.classifier().classify(recording.touch(0));
-    std::erase(readings, Reading::unknown);
-    const double score = first.mode.log_likelihood / static_cast<double>(readings.size());
+    const std::vector<Reading> readings = task.classifier().classify(recording.touch(0));
+    // At temperature 1 the ratio of two labels' probabilities is that of their evidence.
+    std::vector<double> evidence;
+    for (const double p : first.identity) {
+      evidence.push_back(std::log(p));
+    }
+    const FamiliarityScore score =
+        FamiliarityScore::of(readings, first.mode.log_likelihood, evidence);
     ASSERT_TRUE(first.known);
-    EXPECT_DOUBLE_EQ(*first.known, 1.0 / (1.0 + std::exp(-(1.0 + 2.0 * score))));
+    EXPECT_NEAR(*first.known, task.familiarity->probability(score), 0.003);
     EXPECT_FALSE(record.trace[1].known) << "two touches may disagree";
 
     Recording nothing = touched_letter(3);
