@@ -48,7 +48,7 @@ TEST(TemperatureFit, RecoversTheTemperatureOfAnOverconfidentModel) {
   EXPECT_GT(before.calibration_error, 0.2);
   EXPECT_LT(after.log_loss, 0.8);
   EXPECT_LT(after.calibration_error, 0.04);
-  EXPECT_EQ(after.presses, 2000U);
+  EXPECT_EQ(after.records, 2000U);
 }
 
 TEST(TemperatureFit, LeavesFeaturesOutWhereAPressHasNone) {
