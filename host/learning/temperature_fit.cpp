@@ -69,6 +69,9 @@ double margin_of(const ScoredPress& press) {
   return press.log_evidence[press.truth] - other;
 }
 
+/// Whether a press has two labels to choose from.
+bool has_choice(const ScoredPress& press) { return std::isfinite(margin_of(press)); }
+
 double median(std::vector<double> values) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
   std::nth_element(values.begin(), middle, values.end());
@@ -178,7 +181,8 @@ std::vector<ScoredPress> tempered_by_halves(std::span<const ScoredPress> presses
     for (std::size_t i = 1 - half; i < presses.size(); i += 2) {
       others.push_back(presses[i]);
     }
-    const TemperatureFit fit = fit_temperature(others.empty() ? presses : others);
+    const TemperatureFit fit =
+        fit_temperature(std::ranges::any_of(others, has_choice) ? others : presses);
     for (std::size_t i = half; i < presses.size(); i += 2) {
       tempered[i].truth = presses[i].truth;
       for (const double p : label_probabilities(presses[i], fit.temperature, fit.feature_weight)) {
