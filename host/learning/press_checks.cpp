@@ -10,7 +10,7 @@
 
 namespace palpate {
 
-void require_sound(const std::vector<Press>& presses) {
+void require_poses_of_one_kind(const std::vector<Press>& presses) {
   for (const Press& press : presses) {
     if (press.T_object_robot.has_value() != presses.front().T_object_robot.has_value()) {
       throw Error(Fault::input,
@@ -18,14 +18,31 @@ void require_sound(const std::vector<Press>& presses) {
                               "from one kind",
                               press.name, press.T_object_robot ? "" : "un", presses.front().name));
     }
-    if (std::ranges::none_of(press.touches, [](const Touch& touch) {
-          return !known_readings(touch, {.threshold = 0.0, .ratio = 0.0}).empty();
-        })) {
-      throw Error(Fault::input,
-                  fmt::format("{}: all elements are dead or without a number; leave the touch out",
-                              press.name));
-    }
   }
+}
+
+std::vector<std::string> leave_out_unknown(std::vector<Press>& presses,
+                                           const ContactClassifier& classifier) {
+  std::string first;
+  const std::size_t left_out = std::erase_if(presses, [&](const Press& press) {
+    const bool unknown = std::ranges::all_of(press.touches, [&](const Touch& touch) {
+      return known_readings(touch, classifier).empty();
+    });
+    first = unknown && first.empty() ? press.name : first;
+    return unknown;
+  });
+  if (presses.empty()) {
+    throw Error(Fault::input, fmt::format("{}: all elements are Unknown, as in all other touches: "
+                                          "dead, without a number, or of the same pressure",
+                                          first));
+  }
+  if (left_out == 0) {
+    return {};
+  }
+  return {fmt::format(
+      "{}: all elements are Unknown: dead, without a number, or of the same "
+      "pressure; left out{}",
+      first, left_out > 1 ? fmt::format(", with {} more such touches", left_out - 1) : "")};
 }
 
 std::vector<std::string> stuck_elements(const std::vector<Press>& presses,

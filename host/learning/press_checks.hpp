@@ -8,9 +8,13 @@
 
 namespace palpate {
 
-/// @throws Error where some presses are at known poses and others are not, or a press has no living
-/// element
-void require_sound(const std::vector<Press>& presses);
+/// @throws Error where some presses are at known poses and others are not
+void require_poses_of_one_kind(const std::vector<Press>& presses);
+
+/// Removes presses all of whose elements are Unknown, and warns of them in a sentence.
+/// @throws Error where no press is left
+std::vector<std::string> leave_out_unknown(std::vector<Press>& presses,
+                                           const ContactClassifier& classifier);
 
 /// Warns of elements that seem stuck: of arrays that touched five times or more, they read the very
 /// same pressure above the threshold each time, which hardly any other reading In Contact equals.

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <numbers>
 #include <set>
 
@@ -36,7 +37,7 @@ class SensorLearning {
     if (options.folds < 2) {
       throw Error(Fault::input, fmt::format("folds = {}: give at least 2", options.folds));
     }
-    require_sound(presses);
+    require_poses_of_one_kind(presses);
     known_poses_ = std::ranges::all_of(
         presses, [](const Press& press) { return press.T_object_robot.has_value(); });
     for (const Press& press : presses) {
@@ -109,7 +110,9 @@ class SensorLearning {
                               "--threshold",
                               sensor.classifier.threshold, options_.pressure_unit));
     }
-    result_.warnings = stuck_elements(presses_, sensor.classifier);
+    result_.warnings = leave_out_unknown(presses_, sensor.classifier);
+    std::ranges::copy(stuck_elements(presses_, sensor.classifier),
+                      std::back_inserter(result_.warnings));
     std::vector<Touch> touches;
     for (const Press& press : presses_) {
       touches.insert(touches.end(), press.touches.begin(), press.touches.end());
@@ -221,7 +224,7 @@ class SensorLearning {
     result_.area_under_curve = area_under_curve(scores);
   }
 
-  const std::vector<Press>& presses_;
+  std::vector<Press> presses_;
   const SensorCalibrationOptions& options_;
   bool known_poses_ = false;
   double spacing_mm_ = 0.0;

@@ -49,7 +49,8 @@ struct SensorCalibration {
 ///
 /// Data that say little:
 ///   one press: refused; so are presses none of which has a map of its object without it
-///   a press of dead elements alone: refused by name; a dead element is left out everywhere
+///   a press all of whose elements are Unknown: left out, with a warning; refused where all are
+///   a dead element: left out everywhere
 ///   a stuck element, the same high pressure in each touch: counts as In Contact, with a warning
 ///   levels that no reading reached, and nodes that no map had: what Eq. 7 says, see table_of();
 ///   levels of the same pressures are merged, see level_edges_of()
