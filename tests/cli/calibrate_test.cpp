@@ -1,8 +1,9 @@
 // palpate calibrate on simulated letters, and what takes its sensor model.
 
 #include <algorithm>
-#include <cmath>
+#include <map>
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 
 #include "palpate/learned_sensor.hpp"
@@ -146,10 +147,11 @@ TEST_F(CalibrateCommand, RefusesRecordingsThatSayTooLittle) {
 }
 
 TEST_F(CalibrateCommand, RefusesValuesOutOfRange) {
-  for (const char* levels : {"9", "1", "0", "-3"}) {
+  for (const char* levels : {"9", "1", "0"}) {
     expect_refused(with({"--levels", levels}), {"--levels", levels, "2 to 8"});
   }
-  expect_refused(with({"--levels", "2.5"}), {"--levels", "2.5"});
+  expect_refused(with({"--levels", "-3"}), {"--levels", "-3", "whole number"});
+  expect_refused(with({"--levels", "2.5"}), {"--levels", "2.5", "whole number"});
   expect_refused(with({"--layer", "other"}), {"--layer", "other", "mean_level or log_odds"});
   expect_refused(with({"--ratio", "1"}), {"--ratio", "below 1"});
   expect_refused(with({"--threshold", "0"}), {"--threshold", "0"});
@@ -170,7 +172,8 @@ TEST_F(CalibrateCommand, RefusesOutputsThatItCannotWrite) {
   expect_refused({"calibrate", "A.h5", "U.h5", "-o", "nowhere/s.yaml"}, {"nowhere", "not exist"});
   std::filesystem::create_directory(folder_ / "folder");
   expect_refused({"calibrate", "A.h5", "U.h5", "-o", "folder"}, {"folder"});
-  expect_refused(with({"--png", "A.h5"}), {"A.h5", "folder"});
+  expect_refused(with({"--png", "A.h5"}), {"A.h5: the folder cannot be made"});
+  expect_refused(with({"--png", "A.h5/new"}), {"A.h5/new: the folder cannot be made"});
 }
 
 TEST_F(CalibrateCommand, RefusesToOverwriteWhatItReads) {
@@ -182,8 +185,9 @@ TEST_F(CalibrateCommand, RefusesToOverwriteWhatItReads) {
   std::filesystem::create_directory(folder_ / "new");
   std::filesystem::create_hard_link(folder_ / "A.h5", folder_ / "new/table.png");
   expect_refused(with({"--png", "new"}), {"--png new/table.png", "RECORDING reads"});
+  std::filesystem::remove(folder_ / "new/table.png");
   expect_refused({"calibrate", "A.h5", "U.h5", "-o", "new/reliability.png", "--png", "new"},
-                 {"new/reliability.png"});
+                 {"new/reliability.png", "-o"});
 }
 
 }  // namespace
