@@ -66,7 +66,8 @@ void check_outputs(const Options& options, const std::vector<std::filesystem::pa
   }
   files.require_distinct();
   require_writable(options.output);
-  if (std::filesystem::is_directory(options.png)) {
+  if (std::filesystem::exists(options.png)) {
+    make_folder(options.png);
     require_writable(table);
     require_writable(reliability);
   }
@@ -198,6 +199,7 @@ void calibrate(const Options& options) {
   if (!options.png.empty()) {
     table = draw_table(calibration.sensor);
     reliability = calibration.before ? draw_reliability(reliability_of(calibration)) : "";
+    make_folder(options.png);
   }
   write_sensor_model(options.output, calibration.sensor);
   fmt::print("{}", calibration_text(calibration, presses.size(), terminal_columns(STDOUT_FILENO)));
@@ -206,7 +208,6 @@ void calibrate(const Options& options) {
   }
   fmt::print("{}\n", options.output);
   if (!options.png.empty()) {
-    make_folder(options.png);
     write_file(pictures.table, table);
     fmt::print("{}\n", pictures.table.string());
     if (!reliability.empty()) {

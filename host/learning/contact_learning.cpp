@@ -68,9 +68,8 @@ std::vector<bool> near_contact(const Touch& touch, const std::vector<Reading>& r
   return near;
 }
 
-}  // namespace
-
-ContactClassifier learn_classifier(const std::vector<Press>& presses) {
+/// Otsu's threshold of all pressures above 0, by their logarithms.
+double learned_threshold(const std::vector<Press>& presses) {
   std::vector<double> logs;
   for (const Press& press : presses) {
     for (const Touch& touch : press.touches) {
@@ -90,7 +89,14 @@ ContactClassifier learn_classifier(const std::vector<Press>& presses) {
                                            "threshold; give --threshold",
                                            std::exp(logs.front())));
   }
-  ContactClassifier classifier{.threshold = std::exp(otsu_threshold(logs)), .ratio = 0.0};
+  return std::exp(otsu_threshold(logs));
+}
+
+}  // namespace
+
+ContactClassifier learn_classifier(const std::vector<Press>& presses,
+                                   std::optional<double> threshold) {
+  ContactClassifier classifier{.threshold = threshold ? *threshold : learned_threshold(presses)};
   std::vector<double> shares;
   for (const Press& press : presses) {
     for (const Touch& touch : press.touches) {
@@ -104,8 +110,9 @@ ContactClassifier learn_classifier(const std::vector<Press>& presses) {
   }
   std::ranges::sort(shares);
   // Where every touch has one pressure, any ratio does.
-  classifier.ratio =
-      shares.front() < shares.back() ? std::exp(otsu_threshold(shares)) : ContactClassifier{}.ratio;
+  if (!shares.empty() && shares.front() < shares.back()) {
+    classifier.ratio = std::exp(otsu_threshold(shares));
+  }
   return classifier;
 }
 
@@ -118,9 +125,8 @@ double noise_floor(const std::vector<Press>& presses, const ContactClassifier& c
   for (const Press& press : presses) {
     for (const Touch& touch : press.touches) {
       const auto spacing = spacing_of(touch.elements_mm);
-      const std::vector<bool> near =
-          near_contact(touch, any_contact.classify(touch),
-                       spacing ? far * spacing->nearest_mm.most : 0.0);
+      const std::vector<bool> near = near_contact(touch, any_contact.classify(touch),
+                                                  spacing ? far * spacing->nearest_mm.most : 0.0);
       for (std::size_t e = 0; e < near.size(); ++e) {
         if (!near[e] && is_living(touch, e)) {
           squares += touch.pressure[e] * touch.pressure[e];

@@ -2,7 +2,8 @@
 
 namespace palpate {
 
-/// Where a function with one maximum in [low, high] is largest, by golden sections (Kiefer 1953).
+/// Where a function with one maximum in [low, high] is largest, by golden sections (Kiefer 1953), within
+/// half of `tolerance`; of places as good, the lowest.
 template <typename Function>
 double largest_at(double low, double high, double tolerance, const Function& function) {
   constexpr double golden = 0.6180339887498949;
@@ -11,7 +12,7 @@ double largest_at(double low, double high, double tolerance, const Function& fun
   double at_left = function(left);
   double at_right = function(right);
   while (high - low > tolerance) {
-    if (at_left > at_right) {
+    if (at_left >= at_right) {
       high = right;
       right = left;
       at_right = at_left;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <numbers>
 #include <set>
 
@@ -13,6 +14,7 @@
 #include "feature_learning.hpp"
 #include "palpate/error.hpp"
 #include "point_spread.hpp"
+#include "press_checks.hpp"
 
 namespace palpate {
 
@@ -20,7 +22,7 @@ namespace {
 
 /// Shares of the time that a calibration takes.
 constexpr double table_share = 0.4;
-constexpr double validation_share = 0.3;  ///< of Eq. 7, and of the table
+constexpr double validation_share = 0.3;              ///< of Eq. 7, and of the table
 constexpr double step_rad = std::numbers::pi / 18.0;  ///< of the poses at which presses are placed
 
 /// A calibration in the making.
@@ -29,9 +31,13 @@ class SensorLearning {
   SensorLearning(const std::vector<Press>& presses, const SensorCalibrationOptions& options)
       : presses_(presses), options_(options) {
     if (options.levels < 2 || options.levels > most_reading_levels) {
-      throw Error(Fault::input, fmt::format("levels = {}: give 2 to {}", options.levels,
-                                            most_reading_levels));
+      throw Error(Fault::input,
+                  fmt::format("levels = {}: give 2 to {}", options.levels, most_reading_levels));
     }
+    if (options.folds < 2) {
+      throw Error(Fault::input, fmt::format("folds = {}: give at least 2", options.folds));
+    }
+    require_poses_of_one_kind(presses);
     known_poses_ = std::ranges::all_of(
         presses, [](const Press& press) { return press.T_object_robot.has_value(); });
     for (const Press& press : presses) {
@@ -74,8 +80,8 @@ class SensorLearning {
     }
     const CrossValidationOptions folds{.folds = options_.folds,
                                        .maps_per_object = options_.most_maps};
-    const CrossValidation eq7 = cross_validate(presses_, maps_, how, nullptr, folds,
-                                               part(table_share, validation_share));
+    const CrossValidation eq7 =
+        cross_validate(presses_, maps_, how, nullptr, folds, part(table_share, validation_share));
     const CrossValidation learned =
         cross_validate(presses_, maps_, how, &placed, folds,
                        part(table_share + validation_share, 1.0 - table_share - validation_share));
@@ -89,18 +95,25 @@ class SensorLearning {
     if (options_.threshold && options_.ratio) {
       sensor.classifier = {.threshold = *options_.threshold, .ratio = *options_.ratio};
     } else {
-      sensor.classifier = learn_classifier(presses_);
+      sensor.classifier = learn_classifier(presses_, options_.threshold);
       sensor.classifier.ratio = options_.ratio.value_or(sensor.classifier.ratio);
-      sensor.classifier.threshold = options_.threshold.value_or(sensor.classifier.threshold);
     }
     sensor.noise = noise_floor(presses_, sensor.classifier);
     // Noise alone is to make no contact.
     constexpr double noise_sd = 3.0;
     if (!options_.threshold) {
-      sensor.classifier.threshold =
-          std::max(sensor.classifier.threshold, noise_sd * sensor.noise);
+      sensor.classifier.threshold = std::max(sensor.classifier.threshold, noise_sd * sensor.noise);
     }
     sensor.classifier.validate();
+    if (contact_pressures(presses_, sensor.classifier).empty()) {
+      throw Error(Fault::input,
+                  fmt::format("no pressure is above the contact threshold, {:g} {}; give a lower "
+                              "--threshold",
+                              sensor.classifier.threshold, options_.pressure_unit));
+    }
+    result_.warnings = leave_out_unknown(presses_, sensor.classifier);
+    std::ranges::copy(stuck_elements(presses_, sensor.classifier),
+                      std::back_inserter(result_.warnings));
     std::vector<Touch> touches;
     for (const Press& press : presses_) {
       touches.insert(touches.end(), press.touches.begin(), press.touches.end());
@@ -122,10 +135,10 @@ class SensorLearning {
   }
 
   void make_maps(const std::vector<OccupancyGrid>& given) {
-    result_.maps = {.cell_mm = 0.5 * spacing_mm_,
-                    .sensor = {.spread_mm = result_.sensor.spread_mm,
-                               .prior = result_.sensor.prior},
-                    .classifier = result_.sensor.classifier};
+    result_.maps = {
+        .cell_mm = 0.5 * spacing_mm_,
+        .sensor = {.spread_mm = result_.sensor.spread_mm, .prior = result_.sensor.prior},
+        .classifier = result_.sensor.classifier};
     if (!given.empty()) {
       for (const OccupancyGrid& map : given) {
         maps_.push_back({map});
@@ -135,13 +148,34 @@ class SensorLearning {
     } else {
       maps_ = maps_of_presses(presses_, result_.maps);
     }
+    warn_of_objects_without_maps();
+  }
+
+  void warn_of_objects_without_maps() {
+    std::set<std::string> compared;
+    std::set<std::string> labels;
+    for (std::size_t i = 0; i < presses_.size(); ++i) {
+      labels.insert(presses_[i].label);
+      if (std::ranges::any_of(maps_, [&](const TrainingMap& map) {
+            return map.map.label == presses_[i].label && !map.holds(i);
+          })) {
+        compared.insert(presses_[i].label);
+      }
+    }
+    for (const std::string& label : labels) {
+      if (!compared.contains(label)) {
+        result_.warnings.push_back(
+            fmt::format("'{}': no touch has a map of the object that it is no part of, so that "
+                        "nothing is learned of its readings; give it two touches or a map",
+                        label));
+      }
+    }
   }
 
   TableLearning table_learning() const {
     constexpr double near = 2.0;  // in spacings of the elements
     constexpr double far = 6.0;
-    const std::vector<double> pressures =
-        contact_pressures(presses_, result_.sensor.classifier);
+    const std::vector<double> pressures = contact_pressures(presses_, result_.sensor.classifier);
     TableLearning how;
     if (options_.layer == MapLayer::mean_level) {
       how.layer = mean_level_layer(result_.sensor.classifier.threshold,
@@ -163,8 +197,8 @@ class SensorLearning {
     how.layer = {.near_mm = table.layer.near_mm, .far_mm = table.layer.far_mm};
     how.level_edges.clear();
     LevelCounts all(2);
-    for (const auto& [label, counts] : count_placed(placed.placements, presses_, maps_,
-                                                    layers_of(maps_, how.layer), how)) {
+    for (const auto& [label, counts] :
+         count_placed(placed.placements, presses_, maps_, layers_of(maps_, how.layer), how)) {
       all += counts;
     }
     result_.sensor.gamma = fit_gamma(all, result_.sensor.prior);
@@ -211,7 +245,7 @@ class SensorLearning {
     }
   }
 
-  const std::vector<Press>& presses_;
+  std::vector<Press> presses_;
   const SensorCalibrationOptions& options_;
   bool known_poses_ = false;
   double spacing_mm_ = 0.0;

@@ -47,11 +47,23 @@ struct SensorCalibration {
 /// familiarity) keeps its default, with a warning. The numbers before and after are of
 /// cross-validation; `after` gives each half of the presses the temperature and weight of the other
 /// half. Takes all host threads.
+///
+/// Data that say little:
+///   one press: refused; so are presses none of which has a map of its object without it
+///   a press all of whose elements are Unknown: left out, with a warning; refused where all are
+///   a dead element: left out everywhere
+///   a stuck element, the same high pressure in each touch: counts as In Contact, with a warning
+///   levels that no reading reached, and nodes that no map had: what Eq. 7 says, see table_of();
+///   levels of the same pressures are merged, see level_edges_of()
+///   an object whose touches have no map without them: nothing but the threshold, noise, prior and
+///   its features is learned from it, with a warning
+///   two labels of the same object: the temperature grows until both are as likely; no warning
 /// @param presses all at known poses or all at unknown ones
 /// @param given maps to compare presses with, with their mean level where `options.layer` is that;
 /// without: maps of other presses
-/// @throws Error where no press has a map of its object that it is no part of, on levels out of
-/// range, where presses tell no threshold, and as observed_map() and learn_table() do; what
+/// @throws Error where no press has a map of its object that it is no part of, on levels
+/// or folds out of range, on poses some of which are known, where presses tell no threshold or have
+/// no pressure above it, and as observed_map() and learn_table() do; what
 /// `progress` throws
 SensorCalibration calibrate_sensor(const std::vector<Press>& presses,
                                    const std::vector<OccupancyGrid>& given,

@@ -133,7 +133,7 @@ PlacedPresses learn_table(const std::vector<Press>& presses, const std::vector<T
     if (placed.placements.empty()) {
       throw Error(Fault::input,
                   fmt::format("likelihood table: none of {} touches can be compared with other "
-                              "touches of its object; give at least two touches of one object",
+                              "touches of its object; give at least two touches of one object, or a map of it",
                               presses.size()));
     }
     placed.table = table_of(count_placed(placed.placements, presses, maps, layers, how), how);

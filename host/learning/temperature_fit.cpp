@@ -8,6 +8,7 @@
 
 #include <fmt/format.h>
 
+#include "golden_section.hpp"
 #include "palpate/error.hpp"
 
 namespace palpate {
@@ -69,48 +70,40 @@ double margin_of(const ScoredPress& press) {
   return press.log_evidence[press.truth] - other;
 }
 
+/// Whether a press has two labels to choose from.
+bool has_choice(const ScoredPress& press) { return std::isfinite(margin_of(press)); }
+
 double median(std::vector<double> values) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
   std::nth_element(values.begin(), middle, values.end());
   return *middle;
 }
 
+/// Logarithms of the labels' probabilities.
+std::vector<double> log_probabilities(const ScoredPress& press, double temperature,
+                                      double feature_weight) {
+  std::vector<double> nats = scores(press, temperature, feature_weight);
+  const double sum = log_sum_exp(nats);
+  for (double& x : nats) {
+    x -= sum;
+  }
+  return nats;
+}
+
 /// The place of the least value of a function with one minimum over [lower, upper], within a
-/// thousandth of the interval (golden section search).
+/// thousandth of the interval.
 template <typename Function>
 double least_place(double lower, double upper, const Function& function) {
-  constexpr double golden = 0.6180339887498949;
-  const double width = upper - lower;
-  double a = upper - golden * (upper - lower);
-  double b = lower + golden * (upper - lower);
-  double at_a = function(a);
-  double at_b = function(b);
-  while (upper - lower > 1e-3 * width) {
-    if (at_a <= at_b) {
-      upper = b;
-      b = a;
-      at_b = at_a;
-      a = upper - golden * (upper - lower);
-      at_a = function(a);
-    } else {
-      lower = a;
-      a = b;
-      at_a = at_b;
-      b = lower + golden * (upper - lower);
-      at_b = function(b);
-    }
-  }
-  return (lower + upper) / 2.0;
+  return largest_at(lower, upper, 1e-3 * (upper - lower), [&](double x) { return -function(x); });
 }
 
 }  // namespace
 
 std::vector<double> label_probabilities(const ScoredPress& press, double temperature,
                                         double feature_weight) {
-  std::vector<double> p = scores(press, temperature, feature_weight);
-  const double sum = log_sum_exp(p);
+  std::vector<double> p = log_probabilities(press, temperature, feature_weight);
   for (double& x : p) {
-    x = std::exp(x - sum);
+    x = std::exp(x);
   }
   return p;
 }
@@ -178,12 +171,11 @@ std::vector<ScoredPress> tempered_by_halves(std::span<const ScoredPress> presses
     for (std::size_t i = 1 - half; i < presses.size(); i += 2) {
       others.push_back(presses[i]);
     }
-    const TemperatureFit fit = fit_temperature(others.empty() ? presses : others);
+    const TemperatureFit fit =
+        fit_temperature(std::ranges::any_of(others, has_choice) ? others : presses);
     for (std::size_t i = half; i < presses.size(); i += 2) {
       tempered[i].truth = presses[i].truth;
-      for (const double p : label_probabilities(presses[i], fit.temperature, fit.feature_weight)) {
-        tempered[i].log_evidence.push_back(std::log(p));
-      }
+      tempered[i].log_evidence = log_probabilities(presses[i], fit.temperature, fit.feature_weight);
     }
   }
   return tempered;

@@ -39,7 +39,9 @@ struct TemperatureFit {
 TemperatureFit fit_temperature(std::span<const ScoredPress> presses);
 
 /// The presses with the logarithms of their labels' probabilities in the place of the evidences:
-/// each half of the presses has the temperature and weight of the other half.
+/// each half of the presses, every other one, has the temperature and weight of the other half, or
+/// of all where no press of the other half has two labels to choose from.
+/// @throws Error as fit_temperature()
 std::vector<ScoredPress> tempered_by_halves(std::span<const ScoredPress> presses);
 
 }  // namespace palpate

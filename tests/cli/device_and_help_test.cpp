@@ -79,8 +79,28 @@ INSTANTIATE_TEST_SUITE_P(
              {"RECORDING", "--maps", "--candidates", "grid", "CSV", "mm", "rad", "--goal", "=both",
               "identity", "--samples", "=96", "--plan-seed", "=0", "--json", "--png", "nats"}},
         Help{"evaluate",
-             {"RESULTS", "--json", "--png", "95 %", "confusion.png", "reliability.png",
-              "(none)"}},
+             {"RESULTS", "--json", "--png", "95 %", "confusion.png", "reliability.png", "(none)"}},
+        Help{"calibrate",
+             {"RECORDING",
+              "-o,",
+              "YAML",
+              "--maps",
+              "--unposed",
+              "--threshold",
+              "pressure unit",
+              "[default: learned]",
+              "--ratio",
+              "--layer",
+              "=mean_level",
+              "log_odds",
+              "--levels",
+              "=7",
+              "--frames",
+              "A:B",
+              "--png",
+              "table.png",
+              "reliability.png",
+              "--sensor-model"}},
         Help{"record",
              {"--sensor", "replay:FILE", "simulate:SHAPE", "-o,", "--seconds", "--poses", "FIFO",
               "--tare", "=0.5", "--object"}},
@@ -117,8 +137,9 @@ using ProgramHelp = ProgramTest;
 
 TEST_F(ProgramHelp, ListsTheCommands) {
   const std::string help = done({"--help"});
-  for (const char* command : {"devices", "sensors", "record", "touches", "simulate", "map",
-                              "recognize", "live", "evaluate", "info", "import", "export"}) {
+  for (const char* command :
+       {"devices", "sensors", "record", "touches", "simulate", "map", "recognize", "live",
+        "evaluate", "calibrate", "plan", "info", "import", "export"}) {
     EXPECT_NE(help.find(std::string("\n  ") + command), std::string::npos) << help;
   }
 }

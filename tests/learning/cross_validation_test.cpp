@@ -15,18 +15,18 @@ namespace {
 
 MapOptions map_options() { return {.cell_mm = 0.75, .sensor = {.spread_mm = 0.75, .prior = 0.2}}; }
 
-TableLearning learning(const std::vector<Press>& presses) {
+TableLearning learning(const std::vector<TrainingMap>& maps) {
   return {.layer = {.near_mm = 3.0, .far_mm = 9.0},
           .contact = {.prior = 0.2},
-          .lattice = placing_lattice(presses, 1.5, two_pi / 24.0),
+          .lattice = placing_lattice(maps, 1.5, two_pi / 24.0),
           .rounds = 1};
 }
 
 TEST(CrossValidation, TriesEveryPressOnMapsOfOtherFolds) {
   SimulatedPresses simulated;
   simulated.add_shapes(3, 11);
-  const std::vector<OccupancyGrid> maps = press_maps(simulated.presses, map_options());
-  const TableLearning how = learning(simulated.presses);
+  const std::vector<TrainingMap> maps = maps_of_presses(simulated.presses, map_options());
+  const TableLearning how = learning(maps);
   const PlacedPresses placed = learn_table(simulated.presses, maps, how);
   for (const PlacedPresses* with : {static_cast<const PlacedPresses*>(nullptr), &placed}) {
     const CrossValidation found = cross_validate(simulated.presses, maps, how, with, {.folds = 3});
@@ -49,8 +49,8 @@ TEST(CrossValidation, LeavesOutAPressThatIsAloneOfItsObject) {
   SimulatedPresses simulated;
   simulated.add(on_letter_l, "L", 2, 12);
   simulated.add(on_disc, "disc", 1, 13);
-  const std::vector<OccupancyGrid> maps = press_maps(simulated.presses, map_options());
-  const TableLearning how = learning(simulated.presses);
+  const std::vector<TrainingMap> maps = maps_of_presses(simulated.presses, map_options());
+  const TableLearning how = learning(maps);
   const CrossValidation found = cross_validate(simulated.presses, maps, how, nullptr, {.folds = 2});
   ASSERT_EQ(found.presses.size(), 2U);
   // The disc's only press is in the first fold, so that it has no map for the L of that fold.
@@ -63,8 +63,8 @@ TEST(CrossValidation, LeavesOutAPressThatIsAloneOfItsObject) {
 TEST(CrossValidation, RefusesWhatItCannotTry) {
   SimulatedPresses simulated;
   simulated.add_shapes(1, 14);
-  const std::vector<OccupancyGrid> maps = press_maps(simulated.presses, map_options());
-  const TableLearning how = learning(simulated.presses);
+  const std::vector<TrainingMap> maps = maps_of_presses(simulated.presses, map_options());
+  const TableLearning how = learning(maps);
   EXPECT_THROW(cross_validate(simulated.presses, maps, how, nullptr, {}), Error);
   simulated.add_shapes(1, 15);
   EXPECT_THROW(cross_validate(simulated.presses, maps, how, nullptr, {.folds = 1}), Error);

@@ -76,7 +76,7 @@ TEST(PressPlacer, TakesTouchesAtPosesAndATableOverALayer) {
       .x_mm = {-6.0, 6.0, 9}, .y_mm = {-6.0, 6.0, 9}, .theta_rad = {0.0, two_pi, 16}};
   PressPlacer placer(hypothesis, contact, lattice);
   for (const Recording* recording : {&first, &second, &first}) {
-    const Press press = posed_press(*recording);
+    const Press press{.name = "touches", .label = "L", .touches = all_touches(*recording)};
     const Exhaustive expected = over_all_bins(press, *hypothesis.layer, contact, lattice);
     const PressPlacement found = placer.place(press);
     EXPECT_NEAR(found.log_likelihood, expected.best, 1e-6);

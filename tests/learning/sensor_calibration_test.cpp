@@ -13,23 +13,19 @@ namespace palpate {
 namespace {
 
 SensorCalibrationOptions options() {
-  return {.map = {.cell_mm = 1.5, .sensor = {.spread_mm = 0.75}},
-          .layer = MapLayer::log_odds,
-          .levels = 2,
-          .step_mm = 1.5,
-          .step_rad = std::numbers::pi / 12.0,
-          .folds = 2};
+  return {.threshold = 2.0, .ratio = 0.3, .layer = MapLayer::log_odds, .levels = 2, .folds = 2};
 }
 
 TEST(SensorCalibration, LearnsWhatAFileHolds) {
   SimulatedPresses simulated;
   simulated.add_shapes(4, 31);
-  const SensorCalibration found = calibrate_sensor(simulated.presses, options());
+  const SensorCalibration found = calibrate_sensor(simulated.presses, {}, options());
   found.sensor.validate();
   EXPECT_EQ(found.objects, 2U);
-  EXPECT_EQ(found.after.presses, 8U);
-  EXPECT_NEAR(found.after.accuracy(), 1.0, 1e-9);
-  EXPECT_LT(found.after.log_loss, 0.7) << "a guess's";
+  ASSERT_TRUE(found.after.has_value());
+  EXPECT_EQ(found.after->records, 8U);
+  EXPECT_NEAR(found.after->accuracy(), 1.0, 1e-9);
+  EXPECT_LT(found.after->log_loss, 0.7) << "a guess's";
   EXPECT_EQ(found.sensor.table->objects.size(), 2U);
   EXPECT_TRUE(found.sensor.features.has_value());
   EXPECT_GE(found.sensor.familiarity->slope, 0.0);
@@ -40,23 +36,107 @@ TEST(SensorCalibration, LearnsWhatAFileHolds) {
 TEST(SensorCalibration, OfOneObjectLearnsTheTableAlone) {
   SimulatedPresses simulated;
   simulated.add(on_disc, "disc", 3, 32);
-  const SensorCalibration found = calibrate_sensor(simulated.presses, options());
+  const SensorCalibration found = calibrate_sensor(simulated.presses, {}, options());
   found.sensor.validate();
   EXPECT_TRUE(found.sensor.table.has_value());
   EXPECT_EQ(found.sensor.temperature, 1.0);
   EXPECT_FALSE(found.sensor.features.has_value());
   EXPECT_FALSE(found.sensor.familiarity.has_value());
+  EXPECT_FALSE(found.before || found.table || found.after || found.area_under_curve);
   ASSERT_EQ(found.warnings.size(), 1U);
 }
 
-TEST(SensorCalibration, RefusesWhatSaysNothing) {
-  SimulatedPresses simulated;
-  simulated.add_shapes(1, 33);
-  EXPECT_THROW(calibrate_sensor(simulated.presses, options()), Error);
-  simulated.add_shapes(1, 34);
-  SensorCalibrationOptions wrong = options();
-  wrong.levels = 9;
-  EXPECT_THROW(calibrate_sensor(simulated.presses, wrong), Error);
+/// What a calibration of letters has to have, at poses that are known or not.
+void expect_complete(const SensorCalibration& found, std::size_t touches) {
+  found.sensor.validate();
+  EXPECT_EQ(found.objects, 3U);
+  EXPECT_NEAR(found.sensor.classifier.threshold, 2.0, 0.7);
+  EXPECT_NEAR(found.sensor.noise, 0.7, 0.07);
+  EXPECT_EQ(found.sensor.table->levels(), 7U);
+  EXPECT_EQ(found.sensor.table->layer.of, MapLayer::mean_level);
+  for (const char* letter : {"A", "R", "U"}) {
+    EXPECT_TRUE(found.sensor.table->objects.contains(letter)) << letter;
+    EXPECT_TRUE(found.sensor.features->objects.contains(letter)) << letter;
+  }
+  for (const auto& scores : {found.before, found.table, found.after}) {
+    ASSERT_TRUE(scores.has_value());
+    EXPECT_EQ(scores->records, touches);
+  }
+  EXPECT_LE(found.after->log_loss, found.table->log_loss);
+  EXPECT_LE(found.after->calibration_error, 0.1);
+  EXPECT_GT(found.sensor.temperature, 1.0) << "elements are not independent";
+  EXPECT_TRUE(found.sensor.familiarity.has_value());
+  EXPECT_TRUE(found.area_under_curve.has_value());
+  EXPECT_TRUE(found.warnings.empty());
+}
+
+/// Every `stride`-th touch of the training grid on three letters.
+LetterPresses three_letters(std::size_t stride) {
+  std::vector<Pose> poses;
+  const std::vector<Pose> grid = training_grid();
+  for (std::size_t i = 0; i < grid.size(); i += stride) {
+    poses.push_back(grid[i]);
+  }
+  LetterPresses letters;
+  letters.add("A", poses, 35);
+  letters.add("R", poses, 36);
+  letters.add("U", poses, 37);
+  return letters;
+}
+
+TEST(SensorCalibration, OfLettersAtKnownPosesLearnsTheirSensor) {
+  const LetterPresses letters = three_letters(1);
+  double shown = 0.0;
+  const SensorCalibration found = calibrate_sensor(letters.presses, {}, {}, [&](double fraction) {
+    EXPECT_GE(fraction, shown);
+    shown = fraction;
+  });
+  EXPECT_NEAR(shown, 1.0, 1e-9);
+  expect_complete(found, 576);
+  // One touch, smaller than a letter, tells it better than chance.
+  EXPECT_GT(found.after->interval().low, 0.5);
+  ASSERT_TRUE(found.sensor.psf_mm.has_value());
+  EXPECT_NEAR(*found.sensor.psf_mm, 1.0, 0.1);
+  EXPECT_EQ(found.sensor.spread_mm, *found.sensor.psf_mm / 2.0);
+}
+
+TEST(SensorCalibration, OfLettersAtUnknownPosesLearnsAllButThePointSpread) {
+  LetterPresses letters = three_letters(3);
+  letters.make_presses(false);
+  const SensorCalibration found = calibrate_sensor(letters.presses, {}, {});
+  expect_complete(found, 192);
+  EXPECT_FALSE(found.sensor.psf_mm.has_value());
+  EXPECT_NEAR(found.sensor.spread_mm, 0.6 * 1.9, 0.1) << "of the spacing";
+}
+
+TEST(SensorCalibration, ComparesWithTheMapsGiven) {
+  const LetterPresses letters = three_letters(5);
+  const std::vector<TrainingMap> built = maps_without_folds(letters.presses, {}, 2);
+  std::vector<OccupancyGrid> maps;
+  for (const TrainingMap& map : built) {
+    if (map.map.label != "U") {
+      maps.push_back(map.map);
+    }
+  }
+  const SensorCalibration found = calibrate_sensor(letters.presses, maps, {});
+  EXPECT_EQ(found.objects, 2U);
+  EXPECT_EQ(found.after->records, 78U);
+  ASSERT_EQ(found.warnings.size(), 1U);
+  EXPECT_NE(found.warnings[0].find("'U'"), std::string::npos);
+}
+
+TEST(SensorCalibration, TakesTheThresholdAndRatioGiven) {
+  const LetterPresses letters = three_letters(5);
+  const auto classifier = [&](const SensorCalibrationOptions& given) {
+    return calibrate_sensor(letters.presses, {}, given).sensor.classifier;
+  };
+  const ContactClassifier both = classifier({.threshold = 1.0, .ratio = 0.2});
+  EXPECT_EQ(both.threshold, 1.0);
+  EXPECT_EQ(both.ratio, 0.2);
+  const ContactClassifier high = classifier({.threshold = 8.0});
+  EXPECT_EQ(high.threshold, 8.0);
+  EXPECT_GT(high.ratio, classifier({.threshold = 1.0}).ratio) << "of shares above the threshold";
+  EXPECT_EQ(classifier({.ratio = 0.2}).ratio, 0.2);
 }
 
 TEST(LevelEdges, PartContactsIntoEqualShares) {

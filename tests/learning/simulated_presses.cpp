@@ -32,4 +32,21 @@ void SimulatedPresses::add_shapes(std::size_t count, std::uint64_t seed) {
   add(on_disc, "disc", count, seed + 1);
 }
 
+void LetterPresses::add(const std::string& letter, const std::vector<Pose>& T_object_sensor,
+                        std::uint64_t seed, const SensorModel& model) {
+  recordings.push_back(
+      Simulator(make_shape(letter), model, digitacts_array(), seed).touch(T_object_sensor, {}));
+  recordings.back().path = letter + ".h5";
+  make_presses(true);
+}
+
+void LetterPresses::make_presses(bool posed) {
+  presses.clear();
+  for (const Recording& recording : recordings) {
+    for (std::size_t touch = 0; touch < recording.size(); ++touch) {
+      presses.push_back(posed ? posed_press(recording, touch) : single_press(recording, touch));
+    }
+  }
+}
+
 }  // namespace palpate

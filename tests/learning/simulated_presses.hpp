@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "palpate/simulation.hpp"
 #include "palpate/touch.hpp"
 #include "press.hpp"
 #include "touched_shape.hpp"
@@ -23,6 +24,22 @@ struct SimulatedPresses {
            std::uint64_t seed);
   /// Adds presses of the letter L, and as many of the disc.
   void add_shapes(std::size_t count, std::uint64_t seed);
+};
+
+/// Touches of simulated letters by the DigiTacts array.
+struct LetterPresses {
+  std::vector<Recording> recordings;  ///< one of each letter
+  std::vector<Press> presses;         ///< their touches
+
+  void add(const std::string& letter, const std::vector<Pose>& T_object_sensor, std::uint64_t seed,
+           const SensorModel& model = {});
+  /// Adds touches at random poses.
+  void add(const std::string& letter, int touches, std::uint64_t seed,
+           const SensorModel& model = {}) {
+    add(letter, random_poses(touches, seed), seed, model);
+  }
+  /// Makes presses of the recordings as they are now.
+  void make_presses(bool posed);
 };
 
 }  // namespace palpate

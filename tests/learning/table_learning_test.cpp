@@ -1,11 +1,15 @@
 #include "table_learning.hpp"
 
+#include <algorithm>
 #include <cmath>
+#include <iterator>
+#include <map>
 #include <string>
 #include <vector>
 
 #include <gtest/gtest.h>
 
+#include "observed_map.hpp"
 #include "palpate/error.hpp"
 #include "simulated_presses.hpp"
 #include "synthetic.hpp"
@@ -15,26 +19,17 @@ namespace {
 
 MapOptions map_options() { return {.cell_mm = 0.75, .sensor = {.spread_mm = 0.75, .prior = 0.2}}; }
 
-TableLearning learning(const std::vector<Press>& presses) {
+TableLearning learning(const std::vector<TrainingMap>& maps) {
   return {.layer = {.near_mm = 3.0, .far_mm = 9.0},
           .contact = {.prior = 0.2},
-          .lattice = placing_lattice(presses, 1.5, two_pi / 24.0)};
-}
-
-std::vector<OccupancyGrid> layers_of(const std::vector<OccupancyGrid>& maps,
-                                     const TableLearning& how) {
-  std::vector<OccupancyGrid> layers;
-  for (const OccupancyGrid& map : maps) {
-    layers.push_back(reading_layer(map, how.layer));
-  }
-  return layers;
+          .lattice = placing_lattice(maps, 1.5, two_pi / 24.0)};
 }
 
 /// Counts as count_placed() would with every press on every other map of its object, at its true
 /// place.
-LevelCounts true_counts(const SimulatedPresses& simulated, const TableLearning& how) {
-  const std::vector<OccupancyGrid> layers =
-      layers_of(press_maps(simulated.presses, map_options()), how);
+LevelCounts true_counts(const SimulatedPresses& simulated, const std::vector<TrainingMap>& maps,
+                        const TableLearning& how) {
+  const std::vector<OccupancyGrid> layers = layers_of(maps, how.layer);
   const ContactModel classifier = contact_with(how.contact, how.initial(), "");
   LevelCounts counts(2);
   for (std::size_t i = 0; i < layers.size(); ++i) {
@@ -96,8 +91,8 @@ TEST(TableLearning, RecoversTheTableOfASimulatedSensor) {
 TEST(TableLearning, FindsAtUnknownPosesWhatItWouldAtKnownOnes) {
   SimulatedPresses simulated;
   simulated.add_shapes(5, 3);
-  const TableLearning how = learning(simulated.presses);
-  const std::vector<OccupancyGrid> maps = press_maps(simulated.presses, map_options());
+  const std::vector<TrainingMap> maps = maps_of_presses(simulated.presses, map_options());
+  const TableLearning how = learning(maps);
   double shown = 0.0;
   const PlacedPresses placed = learn_table(simulated.presses, maps, how, [&](double fraction) {
     EXPECT_GE(fraction, shown);
@@ -105,7 +100,7 @@ TEST(TableLearning, FindsAtUnknownPosesWhatItWouldAtKnownOnes) {
   });
   EXPECT_EQ(shown, 1.0);
   EXPECT_EQ(placed.placements.size(), 40U);
-  const LevelCounts counts = true_counts(simulated, how);
+  const LevelCounts counts = true_counts(simulated, maps, how);
   const std::vector<double> truth = shrunk_table(counts, how.initial().shared, 20.0);
   int compared = 0;
   for (int node = 0; node < ReadingLayer::nodes; ++node) {
@@ -133,24 +128,24 @@ TEST(TableLearning, FindsAtUnknownPosesWhatItWouldAtKnownOnes) {
 TEST(TableLearning, CountsAPressOnItsBestMapsOnly) {
   SimulatedPresses simulated;
   simulated.add(on_disc, "disc", 3, 4);
-  TableLearning how = learning(simulated.presses);
-  const std::vector<OccupancyGrid> layers =
-      layers_of(press_maps(simulated.presses, map_options()), how);
+  const std::vector<TrainingMap> maps = maps_of_presses(simulated.presses, map_options());
+  TableLearning how = learning(maps);
+  const std::vector<OccupancyGrid> layers = layers_of(maps, how.layer);
   const Pose far{{1000.0, 0.0}, 0.0};
   const std::vector<OwnPlacement> placements{{0, 1, {Pose{}, -5.0, 0.0}}, {0, 2, {far, -9.0, 0.0}}};
   how.best_maps = 1;
-  ObjectCounts counts = count_placed(placements, simulated.presses, layers, how);
+  ObjectCounts counts = count_placed(placements, simulated.presses, maps, layers, how);
   EXPECT_NEAR(counts.at("disc").total(), 196.0, 1e-9);
   EXPECT_EQ(counts.at("disc").at_node(8), 0.0) << "no reading is beyond the map";
   how.best_maps = 3;
-  counts = count_placed(placements, simulated.presses, layers, how);
+  counts = count_placed(placements, simulated.presses, maps, layers, how);
   EXPECT_NEAR(counts.at("disc").at_node(8), 196.0, 1e-9);
   // Without map 1, what is left is map 2; without the press, nothing.
   how.best_maps = 1;
-  counts = count_placed(placements, simulated.presses, layers, how, {true, false, true});
+  counts = count_placed(placements, simulated.presses, maps, layers, how, {true, false, true});
   EXPECT_NEAR(counts.at("disc").at_node(8), 196.0, 1e-9);
   EXPECT_TRUE(
-      count_placed(placements, simulated.presses, layers, how, {false, true, true}).empty());
+      count_placed(placements, simulated.presses, maps, layers, how, {false, true, true}).empty());
 }
 
 TEST(TableLearning, ShrinksObjectsTowardsAllTogether) {
@@ -186,21 +181,42 @@ TEST(TableLearning, KeepsEquation7ForALevelThatNothingReached) {
 TEST(TableLearning, OfNoPairOfPressesIsRefused) {
   SimulatedPresses simulated;
   simulated.add_shapes(1, 5);
-  const TableLearning how = learning(simulated.presses);
+  const std::vector<TrainingMap> maps = maps_of_presses(simulated.presses, map_options());
   try {
-    learn_table(simulated.presses, press_maps(simulated.presses, map_options()), how);
+    learn_table(simulated.presses, maps, learning(maps));
     FAIL() << "a table of nothing was learned";
   } catch (const Error& error) {
-    EXPECT_NE(std::string(error.what()).find("at least two presses of one object"),
+    EXPECT_NE(std::string(error.what()).find("at least two touches of one object"),
               std::string::npos);
   }
 }
 
+/// Every touch of a recording as a press at a known pose.
+std::vector<Press> posed_presses(const Recording& recording) {
+  std::vector<Press> presses;
+  for (std::size_t touch = 0; touch < recording.size(); ++touch) {
+    presses.push_back(posed_press(recording, touch));
+  }
+  return presses;
+}
+
 TEST(TableLearning, CountsTouchesAtKnownPosesOnMapsOfTheOthers) {
-  const Recording recording = touches_of(on_letter_l, Pose{}, 40, 6);
-  const Press press = posed_press(recording);
+  Recording recording = touches_of(on_letter_l, Pose{}, 40, 6);
+  recording.object = "L";
+  const std::vector<Press> presses = posed_presses(recording);
+  const std::vector<TrainingMap> maps = maps_without_folds(presses, map_options(), 5);
+  ASSERT_EQ(maps.size(), 5U);
   const TableLearning how{.layer = {.near_mm = 3.0, .far_mm = 9.0}, .contact = {.prior = 0.2}};
-  const LevelCounts counts = count_posed(press, map_options(), how, 5);
+  const PlacedPresses placed = learn_table(presses, maps, how);
+  for (const OwnPlacement& own : placed.placements) {
+    EXPECT_FALSE(maps[own.map].holds(own.press));
+    const Pose T_object_sensor =
+        own.placement.T_object_robot * presses[own.press].touches[0].T_robot_sensor;
+    EXPECT_NEAR(T_object_sensor.translation_mm.x,
+                recording.T_robot_sensor[own.press].translation_mm.x, 1e-12);
+  }
+  const LevelCounts counts =
+      count_placed(placed.placements, presses, maps, layers_of(maps, how.layer), how).at("L");
   EXPECT_NEAR(counts.total(), 40.0 * 36.0, 1e-6);
   // The touches are without error: where maps of the others are sure, they are right.
   double wrong = 0.0;
@@ -214,8 +230,51 @@ TEST(TableLearning, CountsTouchesAtKnownPosesOnMapsOfTheOthers) {
   }
   EXPECT_GT(sure, 300.0);
   EXPECT_LT(wrong, 0.08 * sure);
-  EXPECT_THROW(count_posed(press, map_options(), how, 1), Error);
-  EXPECT_THROW(count_posed(press, map_options(), how, 41), Error);
+}
+
+TEST(TableLearning, OfOneFoldHasNoMapsOfOthers) {
+  Recording recording = touches_of(on_letter_l, Pose{}, 4, 6);
+  const std::vector<Press> presses = posed_presses(recording);
+  EXPECT_TRUE(maps_without_folds(presses, map_options(), 1).empty());
+  EXPECT_THROW(learn_table(presses, {}, {.contact = {.prior = 0.2}}), Error);
+}
+
+TEST(TrainingMaps, HoldThePressesOfTheOtherFolds) {
+  Recording l = touches_of(on_letter_l, Pose{}, 4, 8);
+  l.object = "L";
+  Recording disc = touches_of(on_disc, Pose{}, 3, 9);
+  disc.object = "disc";
+  std::vector<Press> presses = posed_presses(l);
+  std::ranges::copy(posed_presses(disc), std::back_inserter(presses));
+  const std::vector<TrainingMap> maps = maps_without_folds(presses, map_options(), 3);
+  std::map<std::string, std::vector<std::vector<std::size_t>>> held;
+  for (const TrainingMap& map : maps) {
+    held[map.map.label].push_back(map.presses);
+  }
+  EXPECT_EQ(held["L"], (std::vector<std::vector<std::size_t>>{{1, 2}, {0, 2, 3}, {0, 1, 3}}));
+  EXPECT_EQ(held["disc"], (std::vector<std::vector<std::size_t>>{{5, 6}, {4, 6}, {4, 5}}));
+  EXPECT_TRUE(maps[0].holds(1));
+  EXPECT_FALSE(maps[0].holds(3));
+  // In the object frame, whatever the frame of the presses.
+  const OccupancyGrid expected =
+      observed_map(std::vector<Touch>{l.touch(1), l.touch(2)}, map_options(), "L");
+  EXPECT_EQ(maps[0].map.origin_mm, expected.origin_mm);
+  ASSERT_EQ(maps[0].map.log_odds.size(), expected.log_odds.size());
+  for (std::size_t k = 0; k < expected.log_odds.size(); ++k) {
+    EXPECT_NEAR(maps[0].map.log_odds[k], expected.log_odds[k], 1e-4);
+  }
+}
+
+TEST(TrainingMaps, OfPressesAreOfOneEach) {
+  SimulatedPresses simulated;
+  simulated.add_shapes(2, 10);
+  const std::vector<TrainingMap> maps = maps_of_presses(simulated.presses, map_options());
+  ASSERT_EQ(maps.size(), 4U);
+  for (std::size_t i = 0; i < maps.size(); ++i) {
+    EXPECT_EQ(maps[i].presses, std::vector<std::size_t>{i});
+    EXPECT_EQ(maps[i].map.label, simulated.presses[i].label);
+  }
+  EXPECT_FALSE(TrainingMap{}.holds(0)) << "a map from elsewhere";
 }
 
 TEST(Presses, LieAboutTheOriginOfTheirFrame) {
@@ -228,15 +287,45 @@ TEST(Presses, LieAboutTheOriginOfTheirFrame) {
       single.touches[0].T_robot_sensor * array_centre_mm(recording.elements_mm);
   EXPECT_NEAR(middle.x, 0.0, 1e-12);
   EXPECT_NEAR(middle.y, 0.0, 1e-12);
-  const Press posed = posed_press(recording);
-  ASSERT_EQ(posed.touches.size(), 3U);
-  // The touches keep their places relative to each other.
-  const Pose apart = inverse(recording.T_robot_sensor[0]) * recording.T_robot_sensor[2];
-  const Pose still = inverse(posed.touches[0].T_robot_sensor) * posed.touches[2].T_robot_sensor;
-  EXPECT_NEAR(still.translation_mm.x, apart.translation_mm.x, 1e-12);
-  EXPECT_NEAR(still.theta_rad, apart.theta_rad, 1e-12);
-  const PoseLattice lattice = placing_lattice(std::vector{single}, 2.0, 0.3);
-  EXPECT_EQ(lattice.x_mm.lower, -lattice.x_mm.upper);
+  EXPECT_FALSE(single.T_object_robot.has_value());
+  EXPECT_EQ(single.touches[0].T_robot_sensor.theta_rad, 0.0);
+}
+
+TEST(Presses, AtKnownPosesAreWhereTheRecordingSays) {
+  const Recording recording = random_recording(3, 12, 7);
+  for (std::size_t touch = 0; touch < 3; ++touch) {
+    const Press posed = posed_press(recording, touch);
+    ASSERT_EQ(posed.touches.size(), 1U);
+    ASSERT_TRUE(posed.T_object_robot.has_value());
+    const Pose T_object_sensor = *posed.T_object_robot * posed.touches[0].T_robot_sensor;
+    const Pose& expected = recording.T_robot_sensor[touch];
+    for (const glm::dvec2 point : {glm::dvec2{0.0, 0.0}, glm::dvec2{3.0, 1.0}}) {
+      EXPECT_NEAR((T_object_sensor * point).x, (expected * point).x, 1e-12);
+      EXPECT_NEAR((T_object_sensor * point).y, (expected * point).y, 1e-12);
+    }
+  }
+}
+
+TEST(Presses, OfAnObjectTakeTurnsInFolds) {
+  SimulatedPresses simulated;
+  simulated.add_shapes(3, 11);
+  EXPECT_EQ(folds_of(simulated.presses, 2), (std::vector<std::size_t>{0, 1, 0, 0, 1, 0}));
+}
+
+TEST(PlacingLattice, IsAsWideAsTheShorterSideOfTheBoxAroundAllMaps) {
+  TrainingMap wide;
+  wide.map = {.cell_mm = 1.0, .origin_mm = {-10.0, 0.0}, .nx = 21, .ny = 5};
+  wide.map.log_odds.assign(105, 0.0F);
+  TrainingMap high;
+  high.map = {.cell_mm = 1.0, .origin_mm = {0.0, -6.0}, .nx = 3, .ny = 7};
+  high.map.log_odds.assign(21, 0.0F);
+  const PoseLattice lattice = placing_lattice(std::vector{wide, high}, 2.0, 0.3);
+  // Together x from -10 to 10, y from -6 to 4.
+  EXPECT_NEAR(lattice.x_mm.upper - lattice.x_mm.lower, 10.0, 2.0);
+  EXPECT_NEAR(lattice.x_mm.upper - lattice.x_mm.lower, lattice.y_mm.upper - lattice.y_mm.lower,
+              1e-12);
+  EXPECT_NEAR((lattice.x_mm.upper + lattice.x_mm.lower) / 2.0 + lattice.pivot_mm.x, 0.0, 1e-9);
+  EXPECT_NEAR((lattice.y_mm.upper + lattice.y_mm.lower) / 2.0 + lattice.pivot_mm.y, -1.0, 1e-9);
   EXPECT_LE(lattice.x_mm.step(), 2.0);
   EXPECT_LE(lattice.theta_rad.step(), 0.3);
   EXPECT_TRUE(lattice.full_circle());
@@ -248,7 +337,7 @@ TEST(Presses, ThatSayNothingAreRefusedByName) {
   simulated.recordings[1].valid.assign(196, 0);
   simulated.presses[1] = single_press(simulated.recordings[1], 0);
   try {
-    press_maps(simulated.presses, map_options());
+    maps_of_presses(simulated.presses, map_options());
     FAIL() << "a press of dead elements was mapped";
   } catch (const Error& error) {
     EXPECT_NE(std::string(error.what()).find("disc1.h5, touch 0"), std::string::npos);

@@ -48,7 +48,7 @@ TEST(TemperatureFit, RecoversTheTemperatureOfAnOverconfidentModel) {
   EXPECT_GT(before.calibration_error, 0.2);
   EXPECT_LT(after.log_loss, 0.8);
   EXPECT_LT(after.calibration_error, 0.04);
-  EXPECT_EQ(after.presses, 2000U);
+  EXPECT_EQ(after.records, 2000U);
 }
 
 TEST(TemperatureFit, LeavesFeaturesOutWhereAPressHasNone) {
@@ -104,6 +104,50 @@ TEST(TemperatureFit, TakesLabelsWithoutAMap) {
   EXPECT_NEAR(fit_temperature(presses).temperature, 200.0 / std::log(41.0), 2.0);
   EXPECT_EQ(label_probabilities(presses[0], 30.0)[2], 0.0);
   EXPECT_LT(scores_of(presses, 30.0).log_loss, 0.01);
+}
+
+TEST(TemperedByHalves, GivesEachHalfTheTemperatureOfTheOther) {
+  const std::vector<ScoredPress> sharp = drawn_presses(200, 4.0, 0.5, 5);
+  const std::vector<ScoredPress> blunt = drawn_presses(200, 40.0, 0.0, 6);
+  std::vector<ScoredPress> mixed;
+  for (std::size_t i = 0; i < sharp.size(); ++i) {
+    mixed.push_back(sharp[i]);
+    mixed.push_back(blunt[i]);
+  }
+  const std::vector<ScoredPress> tempered = tempered_by_halves(mixed);
+  ASSERT_EQ(tempered.size(), mixed.size());
+  const TemperatureFit of_sharp = fit_temperature(sharp);
+  const TemperatureFit of_blunt = fit_temperature(blunt);
+  for (std::size_t i = 0; i < mixed.size(); ++i) {
+    const TemperatureFit& other = i % 2 == 0 ? of_blunt : of_sharp;
+    const std::vector<double> p =
+        label_probabilities(mixed[i], other.temperature, other.feature_weight);
+    EXPECT_EQ(tempered[i].truth, mixed[i].truth);
+    EXPECT_TRUE(tempered[i].log_density.empty()) << "the weight counts already";
+    for (std::size_t label = 0; label < p.size(); ++label) {
+      EXPECT_NEAR(std::exp(tempered[i].log_evidence[label]), p[label], 1e-12);
+    }
+  }
+}
+
+TEST(TemperedByHalves, TakesAllPressesWhereTheOtherHalfHasNoChoice) {
+  const ScoredPress choice{.truth = 0, .log_evidence = {-100.0, -300.0}, .log_density = {}};
+  const ScoredPress none{.truth = 0, .log_evidence = {-100.0, -INFINITY}, .log_density = {}};
+  const double alone = fit_temperature(std::vector{choice}).temperature;
+  EXPECT_NEAR(tempered_by_halves(std::vector{choice}).front().log_evidence[1],
+              -200.0 / alone - std::log1p(std::exp(-200.0 / alone)), 1e-9);
+  const std::vector<ScoredPress> tempered = tempered_by_halves(std::vector{none, choice});
+  EXPECT_EQ(tempered[0].log_evidence[0], 0.0);
+  EXPECT_LT(tempered[1].log_evidence[1], -1.0);
+}
+
+TEST(TemperedByHalves, StaysFiniteWhereAPressIsSurelyWrong) {
+  std::vector<ScoredPress> presses(20,
+                                   {.truth = 0, .log_evidence = {0.0, -100.0}, .log_density = {}});
+  presses[4].log_evidence = {-1e6, 0.0};  // its probability is no number above 0
+  const std::vector<ScoredPress> tempered = tempered_by_halves(presses);
+  EXPECT_LT(tempered[4].log_evidence[0], -1e4);
+  EXPECT_TRUE(std::isfinite(scores_of(tempered, 1.0).log_loss));
 }
 
 TEST(ScoresOfPresses, RefusesWhatCannotBeTried) {

@@ -1,0 +1,233 @@
+#include "contact_learning.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "palpate/error.hpp"
+#include "synthetic.hpp"
+
+namespace palpate {
+namespace {
+
+double normal(Uniform& random) {
+  return std::sqrt(-2.0 * std::log(random(1e-12, 1.0))) * std::cos(two_pi * random(0.0, 1.0));
+}
+
+/// Touches [touch][element] of one row of elements, 1 mm apart, as a press.
+struct RowPress {
+  explicit RowPress(const std::vector<std::vector<double>>& pressures,
+                    std::vector<std::uint8_t> valid = {}) {
+    for (std::size_t e = 0; e < pressures.front().size(); ++e) {
+      recording.elements_mm.emplace_back(e, 0.0);
+    }
+    for (const std::vector<double>& touch : pressures) {
+      recording.T_robot_sensor.emplace_back();
+      recording.pressure.insert(recording.pressure.end(), touch.begin(), touch.end());
+    }
+    recording.valid = std::move(valid);
+    presses.push_back({.name = "row", .label = "L", .touches = all_touches(recording)});
+  }
+
+  Recording recording;
+  std::vector<Press> presses;
+};
+
+std::vector<double> exps(std::vector<double> logs) {
+  for (double& x : logs) {
+    x = std::exp(x);
+  }
+  return logs;
+}
+
+TEST(ContactClassifierOfPresses, PartsByOtsuOverLogarithms) {
+  // n1 n2 (m1 - m2)^2 is 3 * 1 * 8^2 = 192 where the gap to 9 is, 100 and 48 at the others.
+  EXPECT_NEAR(learn_classifier(RowPress({exps({0.0, 1.0, 2.0, 9.0})}).presses).threshold,
+              std::exp(5.5), 1e-9);
+  // Not always at the largest gap: 1 * 10 * 5.5^2 = 302.5 below 4, 6 * 5 * (11 / 3)^2 = 403 above.
+  EXPECT_NEAR(learn_classifier(
+                  RowPress({exps({0.0, 4.0, 4.0, 4.0, 4.0, 4.0, 7.0, 7.0, 7.0, 7.0, 7.0})}).presses)
+                  .threshold,
+              std::exp(5.5), 1e-9);
+}
+
+TEST(ContactClassifierOfPresses, LearnsTheRatioFromSharesOfThePeak) {
+  // Above the threshold, the middle between 0 and 8: shares of exp(0), exp(-2), 1 and 1.
+  const RowPress row({exps({0.0, 0.0, 10.0, 8.0}), exps({0.0, 0.0, 9.0, 9.0})});
+  const ContactClassifier found = learn_classifier(row.presses);
+  EXPECT_NEAR(found.threshold, std::exp(4.0), 1e-9);
+  EXPECT_NEAR(found.ratio, std::exp(-1.0), 1e-12);
+  // At a given threshold, it is the shares above that.
+  const ContactClassifier given = learn_classifier(row.presses, std::exp(8.5));
+  EXPECT_EQ(given.threshold, std::exp(8.5));
+  EXPECT_EQ(given.ratio, ContactClassifier{}.ratio) << "all shares are 1";
+  EXPECT_EQ(learn_classifier(row.presses, 1e9).ratio, ContactClassifier{}.ratio);
+}
+
+TEST(ContactClassifierOfPresses, LeavesOutWhatIsNoReading) {
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  std::vector<double> pressures = exps({0.0, 1.0, 2.0, 9.0});
+  for (const double none : {1e9, nan, -5.0, 0.0}) {
+    pressures.push_back(none);
+  }
+  const RowPress row({pressures}, {1, 1, 1, 1, 0, 1, 1, 1});
+  EXPECT_NEAR(learn_classifier(row.presses).threshold, std::exp(5.5), 1e-9);
+}
+
+TEST(ContactClassifierOfPresses, PartsTwoClusters) {
+  Uniform random(41);
+  std::vector<std::vector<double>> touches;
+  double highest_noise = 0.0;
+  double lowest_contact = 1e9;
+  for (int touch = 0; touch < 20; ++touch) {
+    touches.emplace_back();
+    for (int e = 0; e < 60; ++e) {
+      const bool contact = e % 3 == 0;
+      const double x =
+          contact ? 20.0 * std::exp(0.25 * normal(random)) : 0.5 * std::exp(0.4 * normal(random));
+      (contact ? lowest_contact : highest_noise) =
+          contact ? std::min(lowest_contact, x) : std::max(highest_noise, x);
+      touches.back().push_back(x);
+    }
+  }
+  const ContactClassifier found = learn_classifier(RowPress(touches).presses);
+  ASSERT_LT(highest_noise, lowest_contact);
+  EXPECT_NEAR(found.threshold, std::sqrt(highest_noise * lowest_contact), 1e-9);
+  EXPECT_GT(found.ratio, 0.2);
+  EXPECT_LT(found.ratio, 1.0);
+}
+
+TEST(ContactClassifierOfPresses, RefusesPressuresThatTellNothing) {
+  const auto refusal = [](const std::vector<double>& pressures) {
+    try {
+      learn_classifier(RowPress({pressures}).presses);
+    } catch (const Error& error) {
+      return std::string(error.what());
+    }
+    return std::string();
+  };
+  EXPECT_NE(refusal({7.0, 7.0, 0.0}).find("all pressures above 0 are 7"), std::string::npos);
+  EXPECT_NE(refusal({7.0, 0.0, 0.0}).find("give --threshold"), std::string::npos);
+  EXPECT_NE(refusal({0.0, 0.0, -1.0}).find("no pressure is above 0"), std::string::npos);
+}
+
+/// Touches of 30 x 30 elements, 1 mm apart: noise, and contact in the middle with crosstalk around.
+struct NoisyPresses {
+  NoisyPresses(double sd, bool clipped, double crosstalk) {
+    recording.elements_mm = grid_array(30, 30, 1.0);
+    Uniform random(43);
+    for (int touch = 0; touch < 6; ++touch) {
+      recording.T_robot_sensor.emplace_back();
+      for (const glm::dvec2& element : recording.elements_mm) {
+        const double least = std::min(std::abs(element.x), std::abs(element.y));
+        const double most = std::max(std::abs(element.x), std::abs(element.y));
+        const double noise = sd * normal(random);
+        // Two elements beside an edge of the contact, it is over.
+        const double pressure = most < 4.0                  ? 20.0
+                                : most < 6.0 && least < 4.0 ? crosstalk + noise
+                                                            : noise;
+        recording.pressure.push_back(clipped ? std::max(0.0, pressure) : pressure);
+      }
+    }
+    presses.push_back({.name = "noise", .label = "L", .touches = all_touches(recording)});
+  }
+
+  Recording recording;
+  std::vector<Press> presses;
+};
+
+TEST(NoiseFloor, IsTheDeviationOfUntouchedElements) {
+  // About 4700 readings tell it within 1 %, half of them cut off within 1.6 %.
+  const ContactClassifier classifier{.threshold = 6.0, .ratio = 0.5};
+  for (const bool clipped : {true, false}) {
+    for (const double crosstalk : {0.0, 5.0}) {
+      const NoisyPresses noisy(0.7, clipped, crosstalk);
+      EXPECT_NEAR(noise_floor(noisy.presses, classifier), 0.7, 0.035) << clipped << crosstalk;
+    }
+  }
+}
+
+TEST(NoiseFloor, CountsContactBelowTheRatio) {
+  // 8 is Unknown by the ratio beside 20, but no noise.
+  NoisyPresses noisy(0.7, false, 0.0);
+  for (std::size_t i = 0; i < noisy.recording.pressure.size(); ++i) {
+    const glm::dvec2& element = noisy.recording.elements_mm[i % 900];
+    if (std::max(std::abs(element.x - 10.0), std::abs(element.y - 10.0)) < 2.0) {
+      noisy.recording.pressure[i] = 8.0;
+    }
+  }
+  EXPECT_NEAR(noise_floor(noisy.presses, {.threshold = 6.0, .ratio = 0.5}), 0.7, 0.035);
+}
+
+TEST(NoiseFloor, LeavesOutDeadElements) {
+  NoisyPresses noisy(0.7, true, 0.0);
+  noisy.recording.valid.assign(900, 1);
+  noisy.recording.valid[0] = 0;
+  for (std::size_t touch = 0; touch < 6; ++touch) {
+    noisy.recording.pressure[900 * touch] = 500.0;
+  }
+  noisy.presses[0].touches = all_touches(noisy.recording);
+  EXPECT_NEAR(noise_floor(noisy.presses, {.threshold = 6.0, .ratio = 0.5}), 0.7, 0.035);
+}
+
+TEST(NoiseFloor, IsNoneWhereAllElementsAreTouched) {
+  EXPECT_EQ(noise_floor(RowPress({{20.0, 21.0, 0.5}}).presses, {}), 0.0);
+}
+
+/// Readings of a random map, drawn from Eq. 7 normalised.
+LevelCounts drawn_counts(double gamma, double prior, std::uint64_t seed) {
+  Uniform random(seed);
+  LevelCounts counts(2);
+  for (int i = 0; i < 40000; ++i) {
+    const double value = random(-8.0, 8.0);
+    const double p = probability_from_log_odds(value);
+    const double contact =
+        (gamma * prior + (1.0 - gamma) * p) / (1.0 - gamma * (1.0 - 2.0 * prior));
+    counts.add(random(0.0, 1.0) < contact ? Reading::in_contact : Reading::no_contact, value);
+  }
+  return counts;
+}
+
+TEST(GammaFit, RecoversWhatReadingsWereDrawnWith) {
+  for (const double gamma : {0.05, 0.1, 0.3}) {
+    for (const double prior : {0.1, 0.2, 0.5}) {
+      EXPECT_NEAR(fit_gamma(drawn_counts(gamma, prior, 45), prior), gamma, 0.02)
+          << gamma << " with prior " << prior;
+    }
+  }
+}
+
+TEST(GammaFit, LeavesOutCellsThatNothingSensed) {
+  LevelCounts counts = drawn_counts(0.1, 0.2, 46);
+  const double sensed = fit_gamma(counts, 0.2);
+  for (int i = 0; i < 40000; ++i) {
+    counts.add(Reading::in_contact, ReadingLayer::beyond);
+    counts.add(Reading::in_contact, ReadingLayer::near_free);
+  }
+  EXPECT_EQ(fit_gamma(counts, 0.2), sensed);
+}
+
+TEST(ShareInContact, CountsKnownElements) {
+  // Three In Contact, one Unknown (between the threshold and half of 20), two dead, four of none.
+  const RowPress row({{20.0, 20.0, 15.0, 5.0, 20.0, 20.0, 0.0, 0.0, 1.0, 0.5}},
+                     {1, 1, 1, 1, 0, 0, 1, 1, 1, 1});
+  const ContactClassifier classifier{.threshold = 2.0, .ratio = 0.5};
+  EXPECT_NEAR(share_in_contact(row.presses[0].touches, classifier), 3.5 / 8.0, 1e-12);
+}
+
+TEST(ShareInContact, StaysWithinBounds) {
+  std::vector<double> weak(200, 0.0);
+  weak.back() = 1.0;  // where all are the same, they are Unknown
+  const RowPress none({weak});
+  EXPECT_EQ(share_in_contact(none.presses[0].touches, {}), 0.01);
+  const RowPress all({std::vector<double>(200, 20.0)});
+  EXPECT_EQ(share_in_contact(all.presses[0].touches, {}), 0.5);
+}
+
+}  // namespace
+}  // namespace palpate
