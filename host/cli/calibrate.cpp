@@ -35,6 +35,7 @@ struct Options {
   std::optional<double> ratio;
   std::string layer = "mean_level";
   int levels = 7;
+  int max_maps = 5;
   std::string frames;
   std::string png;
   std::string device;
@@ -93,6 +94,10 @@ SensorCalibrationOptions calibration_options(const Options& options, const std::
     refuse_flag("--levels", options.levels, "give 2 to {}", most);
   }
   result.levels = static_cast<std::size_t>(options.levels);
+  if (options.max_maps < 1) {
+    refuse_flag("--max-maps", options.max_maps, "give 1 or more");
+  }
+  result.most_maps = static_cast<std::size_t>(options.max_maps);
   return result;
 }
 
@@ -163,9 +168,8 @@ void add_touch_sd(const Options& options, const std::vector<Press>& presses,
                   SensorCalibration& calibration) {
   Device device = Device::open(options.device);
   Progress progress("fitting the touches' poses");
-  const TouchSdFit fit =
-      learn_touch_sd(device, presses, calibration.sensor, calibration.maps,
-                     [&](double fraction) { progress.show(fraction); });
+  const TouchSdFit fit = learn_touch_sd(device, presses, calibration.sensor, calibration.maps,
+                                        [&](double fraction) { progress.show(fraction); });
   DisplacementSd& sd = calibration.sensor.touch_sd;
   sd.mm = fit.sd.mm > fit.resolution.mm ? fit.sd.mm : 0.0;
   sd.rad = fit.sd.rad > fit.resolution.rad ? fit.sd.rad : 0.0;
@@ -233,8 +237,9 @@ void add_calibrate(CLI::App& app) {
       ->required();
   command->add_option("-o,--output", options->output, "Sensor model to write (YAML)")->required();
   command->add_option("--maps", options->maps,
-                      "Maps, or folders of maps, of the objects [default: maps of the touches "
-                      "themselves, each compared with maps that were built without it]");
+                      "Maps, or folders of maps, of the objects, built from other touches than "
+                      "these [default: maps of the touches themselves, each compared with maps "
+                      "that were built without it]");
   command->add_flag("--unposed", options->unposed,
                     "The sensor's poses are unknown: find where each touch lies");
   command->add_option("--threshold", options->threshold,
@@ -249,6 +254,12 @@ void add_calibrate(CLI::App& app) {
   command
       ->add_option("--levels", options->levels,
                    "Levels of readings that are told apart, No Contact included")
+      ->check(require_whole_number)
+      ->capture_default_str();
+  command
+      ->add_option("--max-maps", options->max_maps,
+                   "Most maps of an object that a touch is compared with to learn how sure to be: "
+                   "about as many as you will recognize with. More take longer")
       ->check(require_whole_number)
       ->capture_default_str();
   command->add_option("--frames", options->frames,

@@ -10,9 +10,9 @@
 #include <fmt/format.h>
 
 #include "file_identity.hpp"
+#include "map_files.hpp"
 #include "options.hpp"
 #include "palpate/balanced_lattice.hpp"
-#include "map_files.hpp"
 #include "palpate/files.hpp"
 #include "recordings.hpp"
 #include "sensor_model_flag.hpp"

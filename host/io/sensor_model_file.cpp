@@ -105,10 +105,10 @@ LearnedFeatures read_learned_features(const Entry& entry) {
 
 Familiarity read_familiarity(const Entry& entry) {
   Familiarity familiarity;
-  read_keys(entry, {{"offset", [&](const Entry& e) { familiarity.offset = e.number(); }},
-                    {"explained_slope",
-                     [&](const Entry& e) { familiarity.explained_slope = e.number(); }},
-                    {"lead_slope", [&](const Entry& e) { familiarity.lead_slope = e.number(); }}});
+  read_keys(entry,
+            {{"offset", [&](const Entry& e) { familiarity.offset = e.number(); }},
+             {"explained_slope", [&](const Entry& e) { familiarity.explained_slope = e.number(); }},
+             {"lead_slope", [&](const Entry& e) { familiarity.lead_slope = e.number(); }}});
   return familiarity;
 }
 

@@ -198,8 +198,8 @@ class Validation {
       }
       const LabelScore& at = scores[best_label];
       const OccupancyGrid& map = table ? layers_[at.best_map] : maps_[at.best_map].map;
-      if (const auto fit = best_fit_near(press.touches, at.best_pose, map,
-                                         contact_for(best_label, table), 0)) {
+      if (const auto fit =
+              best_fit_near(press.touches, at.best_pose, map, contact_for(best_label, table), 0)) {
         result.fit_z.push_back(fit->z);
       }
     }

@@ -85,9 +85,9 @@ class PressPlacer {
   std::vector<float> rest_;          ///< log-likelihood of No Contact everywhere, [theta, y, x]
 };
 
-/// A lattice for placing presses on maps: T_object_robot within a square about the middle of the box
-/// around all maps, as wide as the box's shorter side, at steps of at most `step_mm`; all angles at
-/// steps of at most `step_rad`. A press that is farther off shows little of the map.
+/// A lattice for placing presses on maps: T_object_robot within a square about the middle of the
+/// box around all maps, as wide as the box's shorter side, at steps of at most `step_mm`; all
+/// angles at steps of at most `step_rad`. A press that is farther off shows little of the map.
 PoseLattice placing_lattice(std::span<const TrainingMap> maps, double step_mm, double step_rad);
 
 }  // namespace palpate

@@ -68,7 +68,8 @@ std::vector<OccupancyGrid> layers_of(const std::vector<TrainingMap>& maps,
 
 /// Learns a table by alternation: places every press on maps of its object that it is no part of,
 /// counts its readings on the best of them, makes a table of all counts, and places again with it.
-/// Presses at known poses are where they are; where all are, one round does. Takes all host threads.
+/// Presses at known poses are where they are; where all are, one round does. Takes all host
+/// threads.
 /// @param progress called with the fraction done, by one thread at a time
 /// @throws Error where no press has a map of its object that it is no part of, or as PressPlacer
 /// does; what `progress` throws
@@ -76,9 +77,9 @@ PlacedPresses learn_table(const std::vector<Press>& presses, const std::vector<T
                           const TableLearning& how,
                           const std::function<void(double)>& progress = {});
 
-/// Counts the readings of the presses that `counted` marks, each on the best of its maps: so what is
-/// learned from one part of the presses can be tried on another. Maps of unmarked presses alone are
-/// left out.
+/// Counts the readings of the presses that `counted` marks, each on the best of its maps: so what
+/// is learned from one part of the presses can be tried on another. Maps of unmarked presses alone
+/// are left out.
 /// @param layers of the maps
 /// @param counted [press]; empty: all are
 ObjectCounts count_placed(std::span<const OwnPlacement> placements,

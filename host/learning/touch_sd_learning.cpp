@@ -62,8 +62,8 @@ TouchSdFit learn_touch_sd(Device& device, const std::vector<Press>& presses,
   std::vector<TouchedObject> unknowns = unknowns_of(presses);
   const std::vector<std::size_t> fold = folds_of(presses, folds);
   for (TrainingMap& map : maps_without_folds(presses, maps, folds)) {
-    const bool without_first = std::ranges::none_of(
-        map.presses, [&](std::size_t press) { return fold[press] == 0; });
+    const bool without_first =
+        std::ranges::none_of(map.presses, [&](std::size_t press) { return fold[press] == 0; });
     if (without_first) {
       hypotheses.push_back({.map = std::move(map.map)});
     }
@@ -75,9 +75,8 @@ TouchSdFit learn_touch_sd(Device& device, const std::vector<Press>& presses,
   });
   const TouchSdFitOptions options;
   HistogramOptions histogram{.lattice = about_known_pose(options.start)};
-  histogram.contact = {.classifier = sensor.classifier,
-                       .gamma = ContactModel{}.gamma,
-                       .prior = sensor.prior};
+  histogram.contact = {
+      .classifier = sensor.classifier, .gamma = ContactModel{}.gamma, .prior = sensor.prior};
   const RecognitionTask task(std::move(hypotheses), histogram);
   return fit_touch_sd(device, task, unknowns, options, progress);
 }

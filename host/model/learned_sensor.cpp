@@ -98,8 +98,8 @@ FamiliarityScore FamiliarityScore::of(std::span<const Reading> readings, double 
 }
 
 double Familiarity::probability(const FamiliarityScore& score) const {
-  return 1.0 / (1.0 + std::exp(-(offset + explained_slope * score.explained +
-                                 lead_slope * score.lead)));
+  return 1.0 /
+         (1.0 + std::exp(-(offset + explained_slope * score.explained + lead_slope * score.lead)));
 }
 
 void apply(const LearnedSensor& sensor, std::vector<Hypothesis>& hypotheses,
@@ -175,9 +175,9 @@ void LearnedSensor::validate() const {
       require_sound(own);
     }
   }
-  if (familiarity && !(std::isfinite(familiarity->offset) &&
-                       std::isfinite(familiarity->explained_slope) &&
-                       std::isfinite(familiarity->lead_slope))) {
+  if (familiarity &&
+      !(std::isfinite(familiarity->offset) && std::isfinite(familiarity->explained_slope) &&
+        std::isfinite(familiarity->lead_slope))) {
     refuse("familiarity", familiarity->offset, "give an offset and two slopes");
   }
   if (fit_scale && !std::isfinite(fit_scale->mean)) {

@@ -107,9 +107,8 @@ std::optional<double> known_of(const Estimate& estimate, std::span<const Touch> 
   if (task.labels.back() == none_label) {
     evidence.pop_back();
   }
-  return task.familiarity->probability(
-      FamiliarityScore::of(task.contact().classify(touches.front()),
-                           estimate.mode.log_likelihood, evidence));
+  return task.familiarity->probability(FamiliarityScore::of(
+      task.contact().classify(touches.front()), estimate.mode.log_likelihood, evidence));
 }
 
 /// RecognitionStep::fit

@@ -115,7 +115,8 @@ void settle_evidence(RecognitionTask& task) {
   constexpr double share = 0.05;
   constexpr double negligible = 1e-4;
   auto* bounded = std::get_if<BoundedOptions>(&task.filter);
-  if (bounded != nullptr && (task.temperature > 1.0 || task.features || task.familiarity) && !bounded->evidence_nats) {
+  if (bounded != nullptr && (task.temperature > 1.0 || task.features || task.familiarity) &&
+      !bounded->evidence_nats) {
     bounded->evidence_nats = share * task.temperature;
     bounded->evidence_range_nats =
         std::max(-std::log(negligible) * task.temperature,

@@ -91,9 +91,9 @@ struct CoarsenedBins {
 std::optional<CoarsenedBins> settle_bins(const Device& device, RecognitionTask& task);
 
 /// A temperature above 1 and features give also improbable labels a share, and familiarity asks how
-/// far the best label leads, which needs their evidence: has bounds find each log evidence within 0.05 times the temperature, so that no
-/// probability is off by more than about 10 % or 1e-4, unless BoundedOptions::evidence_nats says
-/// how closely. The filter is settled before.
+/// far the best label leads, which needs their evidence: has bounds find each log evidence within
+/// 0.05 times the temperature, so that no probability is off by more than about 10 % or 1e-4,
+/// unless BoundedOptions::evidence_nats says how closely. The filter is settled before.
 void settle_evidence(RecognitionTask& task);
 
 /// Chooses the filter if the task leaves it to this rule (auto_filter): of more than

@@ -125,12 +125,13 @@ TEST_F(InfoCommand, Posterior) {
 }
 
 TEST_F(InfoCommand, SensorModel) {
-  LearnedSensor sensor{.pressure_unit = "raw",
-                       .classifier = {.threshold = 15.0, .ratio = 0.15},
-                       .table = LearnedTable{.level_edges = {40.0}},
-                       .temperature = 31.5,
-                       .familiarity = Familiarity{.offset = 6.0, .explained_slope = 12.0, .lead_slope = 0.5},
-                       .fit_scale = FitScale{.mean = -4.5, .sd = 12.25}};
+  LearnedSensor sensor{
+      .pressure_unit = "raw",
+      .classifier = {.threshold = 15.0, .ratio = 0.15},
+      .table = LearnedTable{.level_edges = {40.0}},
+      .temperature = 31.5,
+      .familiarity = Familiarity{.offset = 6.0, .explained_slope = 12.0, .lead_slope = 0.5},
+      .fit_scale = FitScale{.mean = -4.5, .sd = 12.25}};
   sensor.table->shared.assign(3 * ReadingLayer::nodes, -1.0);
   sensor.table->objects["pen"] = sensor.table->shared;
   write_sensor_model(folder_ / "s.yaml", sensor);

@@ -95,7 +95,8 @@ TEST_F(SensorModelFlag, LowersConfidenceByItsTemperature) {
 }
 
 TEST_F(SensorModelFlag, TakesATableInThePlaceOfEquation7) {
-  write({.table = table_of_equation_7(), .familiarity = Familiarity{.offset = 2.0, .explained_slope = 1.0}});
+  write({.table = table_of_equation_7(),
+         .familiarity = Familiarity{.offset = 2.0, .explained_slope = 1.0}});
   for (const char* filter : {"histogram", "bounded", "particles"}) {
     const json r = learned({"--filter", filter});
     EXPECT_EQ(r["best"], "R") << filter;

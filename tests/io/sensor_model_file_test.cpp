@@ -7,19 +7,20 @@ namespace palpate {
 namespace {
 
 LearnedSensor full_sensor() {
-  LearnedSensor sensor{.pressure_unit = "raw",
-                       .noise = 0.25,
-                       .classifier = {.threshold = 15.0, .ratio = 0.15},
-                       .gamma = 0.2,
-                       .prior = 0.1,
-                       .psf_mm = 1.25,
-                       .spread_mm = 1.14,
-                       .touch_sd = {.mm = 0.5, .rad = 0.0625},
-                       .table = LearnedTable{},
-                       .temperature = 31.5,
-                       .features = LearnedFeatures{},
-                       .familiarity = Familiarity{.offset = -3.5, .explained_slope = 20.25, .lead_slope = 0.5},
-                       .fit_scale = FitScale{.mean = -4.5, .sd = 12.25}};
+  LearnedSensor sensor{
+      .pressure_unit = "raw",
+      .noise = 0.25,
+      .classifier = {.threshold = 15.0, .ratio = 0.15},
+      .gamma = 0.2,
+      .prior = 0.1,
+      .psf_mm = 1.25,
+      .spread_mm = 1.14,
+      .touch_sd = {.mm = 0.5, .rad = 0.0625},
+      .table = LearnedTable{},
+      .temperature = 31.5,
+      .features = LearnedFeatures{},
+      .familiarity = Familiarity{.offset = -3.5, .explained_slope = 20.25, .lead_slope = 0.5},
+      .fit_scale = FitScale{.mean = -4.5, .sd = 12.25}};
   LearnedTable& table = *sensor.table;
   table.layer = {.of = MapLayer::mean_level,
                  .near_mm = 3.5,

@@ -28,7 +28,7 @@ TEST(SensorCalibration, LearnsWhatAFileHolds) {
   EXPECT_LT(found.after->log_loss, 0.7) << "a guess's";
   EXPECT_EQ(found.sensor.table->objects.size(), 2U);
   EXPECT_TRUE(found.sensor.features.has_value());
-  EXPECT_GE(found.sensor.familiarity->slope, 0.0);
+  EXPECT_GE(found.sensor.familiarity->explained_slope, 0.0);
   EXPECT_GT(*found.area_under_curve, 0.5);
   EXPECT_TRUE(found.warnings.empty());
 }

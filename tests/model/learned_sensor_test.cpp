@@ -136,8 +136,8 @@ TEST(Familiarity, IsALogisticFunctionOfTheScore) {
 }
 
 TEST(Familiarity, ScoresATouchBesideItsOwnFrequencies) {
-  const std::vector<Reading> readings{Reading::no_contact, Reading::no_contact,
-                                      Reading::in_contact, contact_level(1), Reading::unknown};
+  const std::vector<Reading> readings{Reading::no_contact, Reading::no_contact, Reading::in_contact,
+                                      contact_level(1), Reading::unknown};
   const double by_frequency = -2.0 * std::log(0.5) - 2.0 * std::log(0.25);
   const std::vector<double> evidence{-7.0, -3.0, -12.0};
   const FamiliarityScore score = FamiliarityScore::of(readings, -5.0, evidence);

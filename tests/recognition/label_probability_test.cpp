@@ -130,8 +130,8 @@ TEST(LabelProbability, PassesOverTouchesWithoutContact) {
   EXPECT_EQ(feature_nats(std::span(&touch, 1), task), std::vector<double>(2));
 }
 
-/// A task in which a press that costs its readings' frequencies and 1 nat is of a learned object with
-/// probability 1 / (1 + e^2).
+/// A task in which a press that costs its readings' frequencies and 1 nat is of a learned object
+/// with probability 1 / (1 + e^2).
 RecognitionTask with_known(const FilterOptions& filter) {
   RecognitionTask task = three_maps(filter);
   task.temperature = 2.0;
@@ -145,7 +145,7 @@ double by_frequency_and_1() { return 2.0 * std::log(2.0 / 3.0) + std::log(1.0 / 
 TEST(LabelProbability, GivesNoneOfTheseWhatASinglePressLeaves) {
   const RecognitionTask task = with_known(HistogramOptions{.none_weight = 1.0});
   Estimate estimate = four_to_one();
-  estimate.none_log_evidence = 1e4;     // which all else is 0 beside
+  estimate.none_log_evidence = 1e4;  // which all else is 0 beside
   estimate.mode.log_likelihood = by_frequency_and_1();
   const Press press;
   const std::vector<Touch> two{press.touch(), press.touch()};

@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <string>
 #include <map>
 #include <optional>
+#include <string>
 
 #include <tbb/parallel_for.h>
 

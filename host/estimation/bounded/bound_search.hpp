@@ -50,9 +50,9 @@ class BoundSearch {
   FasterBinLikelihood& batches_;
   std::vector<double> log_weight_;
   std::vector<std::size_t> label_of_;  ///< [hypothesis] index of its label
-  std::vector<glm::dvec2> turns_;    ///< [theta] cosine and sine
-  std::vector<OccupancyGrid> maps_;  ///< [hypothesis] without their cells
-  std::vector<TileBounds> bounds_;   ///< [hypothesis]
+  std::vector<glm::dvec2> turns_;      ///< [theta] cosine and sine
+  std::vector<OccupancyGrid> maps_;    ///< [hypothesis] without their cells
+  std::vector<TileBounds> bounds_;     ///< [hypothesis]
   /// Sums of penalties of the largest tiles, [hypothesis][theta, batch y, batch x, tile], less
   /// those of a tile in which every element sees the prior.
   std::vector<std::vector<std::int32_t>> largest_tiles_;

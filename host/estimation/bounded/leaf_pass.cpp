@@ -140,7 +140,8 @@ void LeafPass::evaluate(std::span<const Tile> tiles, double tolerance) {
   if (tiles.empty()) {
     return;
   }
-  UnsettledMass left = unsettled(tiles, bounds_.front().levels().size() - 1, bounds_, account_.slot_nats());
+  UnsettledMass left =
+      unsettled(tiles, bounds_.front().levels().size() - 1, bounds_, account_.slot_nats());
   for (const Tile& tile : tiles) {
     if (probed(tile)) {
       remove(tile, left);

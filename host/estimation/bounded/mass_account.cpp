@@ -102,9 +102,9 @@ std::vector<std::size_t> MassAccount::droppable_from(const UnsettledMass& tiles,
 double MassAccount::slot_nats() const {
   constexpr double of_evidence = 0.25;
   constexpr double widest = 1.0;
-  return goal_.evidence_nats
-             ? std::clamp(of_evidence * *goal_.evidence_nats, UnsettledMass::usual_slot_nats, widest)
-             : UnsettledMass::usual_slot_nats;
+  return goal_.evidence_nats ? std::clamp(of_evidence * *goal_.evidence_nats,
+                                          UnsettledMass::usual_slot_nats, widest)
+                             : UnsettledMass::usual_slot_nats;
 }
 
 std::vector<double> MassAccount::droppable_evidence(double tolerance) const {
@@ -117,7 +117,8 @@ std::vector<double> MassAccount::droppable_evidence(double tolerance) const {
     labels[label_of_[i]].total.add(log_totals_[i]);
     labels[label_of_[i]].hypotheses += 1.0;
   }
-  // As large a part of what may be missing as of the tolerance; the rest of the nats is for rounding.
+  // As large a part of what may be missing as of the tolerance; the rest of the nats is for
+  // rounding.
   const double part = tolerance / goal_.tolerance;
   const double missing =
       std::log(std::expm1(*goal_.evidence_nats * (1.0 - evidence_rounding_part)) * part);
