@@ -265,6 +265,18 @@ TEST(TrainingMaps, HoldThePressesOfTheOtherFolds) {
   }
 }
 
+TEST(TrainingMaps, OfTouchesThatSayNothingAreRefusedByObject) {
+  Recording recording = touches_of(on_disc, Pose{}, 4, 9);
+  recording.object = "disc";
+  recording.valid.assign(36, 0);
+  try {
+    maps_without_folds(posed_presses(recording), map_options(), 2);
+    FAIL() << "touches of dead elements were mapped";
+  } catch (const Error& error) {
+    EXPECT_TRUE(std::string(error.what()).starts_with("disc: ")) << error.what();
+  }
+}
+
 TEST(TrainingMaps, OfPressesAreOfOneEach) {
   SimulatedPresses simulated;
   simulated.add_shapes(2, 10);
