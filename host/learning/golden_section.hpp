@@ -2,8 +2,8 @@
 
 namespace palpate {
 
-/// Where a function with one maximum in [low, high] is largest, by golden sections (Kiefer 1953), within
-/// half of `tolerance`; of places as good, the lowest.
+/// Where a function with one maximum in [low, high] is largest, by golden sections (Kiefer 1953),
+/// within half of `tolerance`; of places as good, the lowest.
 template <typename Function>
 double largest_at(double low, double high, double tolerance, const Function& function) {
   constexpr double golden = 0.6180339887498949;

@@ -131,10 +131,12 @@ PlacedPresses learn_table(const std::vector<Press>& presses, const std::vector<T
   for (int round = 0; round < rounds; ++round) {
     placed.placements = place_all(presses, maps, layers, how, placed.table, counter);
     if (placed.placements.empty()) {
-      throw Error(Fault::input,
-                  fmt::format("likelihood table: none of {} touches can be compared with other "
-                              "touches of its object; give at least two touches of one object, or a map of it",
-                              presses.size()));
+      throw Error(
+          Fault::input,
+          fmt::format(
+              "likelihood table: none of {} touches can be compared with other "
+              "touches of its object; give at least two touches of one object, or a map of it",
+              presses.size()));
     }
     placed.table = table_of(count_placed(placed.placements, presses, maps, layers, how), how);
   }
