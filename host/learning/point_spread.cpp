@@ -292,11 +292,23 @@ std::optional<double> learn_point_spread(const std::vector<Press>& presses,
   constexpr double tolerance = 0.005;
   const double lowest = std::log(least * spacing_mm);
   const double highest = std::log(most * spacing_mm);
-  const double found = largest_at(lowest, highest, tolerance,
-                                  [&](double log_sigma) { return -error_at(std::exp(log_sigma)); });
-  if (found - lowest < 2.0 * tolerance || highest - found < 2.0 * tolerance) {
+  const auto quality = [&](double log_sigma) { return -error_at(std::exp(log_sigma)); };
+  // The face's edges move from cell to cell, so that the error has minima besides the least one.
+  constexpr int steps = 10;
+  const double step = (highest - lowest) / steps;
+  int best = 0;
+  double largest = quality(lowest);
+  for (int i = 1; i <= steps; ++i) {
+    if (const double here = quality(lowest + i * step); here > largest) {
+      largest = here;
+      best = i;
+    }
+  }
+  if (best == 0 || best == steps) {
     return {};
   }
+  const double found =
+      largest_at(lowest + (best - 1) * step, lowest + (best + 1) * step, tolerance, quality);
   return std::exp(found);
 }
 

@@ -61,10 +61,9 @@ struct SensorCalibration {
 /// @param presses all at known poses or all at unknown ones
 /// @param given maps to compare presses with, with their mean level where `options.layer` is that;
 /// without: maps of other presses
-/// @throws Error where no press has a map of its object that it is no part of, on levels
-/// or folds out of range, on poses some of which are known, where presses tell no threshold or have
-/// no pressure above it, and as observed_map() and learn_table() do; what
-/// `progress` throws
+/// @throws Error where no press has a map of its object that it is no part of, on levels or folds
+/// out of range, on poses some of which are known, where presses tell no threshold or have no
+/// pressure above it, and as observed_map() and learn_table() do; what `progress` throws
 SensorCalibration calibrate_sensor(const std::vector<Press>& presses,
                                    const std::vector<OccupancyGrid>& given,
                                    const SensorCalibrationOptions& options,

@@ -2,6 +2,7 @@
 
 #include <map>
 #include <set>
+#include <span>
 #include <string>
 
 #include <fmt/format.h>
@@ -12,15 +13,26 @@
 
 namespace palpate {
 
+namespace {
+
+/// observed_map(), whose errors name whose map it would have been.
+OccupancyGrid named_map(std::span<const Touch> touches, const MapOptions& options,
+                        const std::string& label, const std::string& name) {
+  try {
+    return observed_map(touches, options, label);
+  } catch (const Error& error) {
+    throw Error(error.fault(), fmt::format("{}: {}", name, error.what()));
+  }
+}
+
+}  // namespace
+
 std::vector<TrainingMap> maps_of_presses(const std::vector<Press>& presses,
                                          const MapOptions& options) {
   std::vector<TrainingMap> maps(presses.size());
   tbb::parallel_for(std::size_t{0}, presses.size(), [&](std::size_t i) {
-    try {
-      maps[i] = {observed_map(presses[i].touches, options, presses[i].label), {i}};
-    } catch (const Error& error) {
-      throw Error(error.fault(), fmt::format("{}: {}", presses[i].name, error.what()));
-    }
+    const Press& press = presses[i];
+    maps[i] = {named_map(press.touches, options, press.label, press.name), {i}};
   });
   return maps;
 }
@@ -53,7 +65,8 @@ std::vector<TrainingMap> maps_without_folds(const std::vector<Press>& presses,
       touches.back().T_robot_sensor =
           *presses[press].T_object_robot * touches.back().T_robot_sensor;
     }
-    maps[i].map = observed_map(touches, options, maps[i].map.label);
+    const std::string label = maps[i].map.label;
+    maps[i].map = named_map(touches, options, label, label);
   });
   return maps;
 }

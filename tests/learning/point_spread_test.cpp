@@ -25,6 +25,15 @@ TEST_P(PointSpreadOfLetters, IsRecovered) {
 
 INSTANTIATE_TEST_SUITE_P(All, PointSpreadOfLetters, testing::Values(0.7, 1.0, 1.5));
 
+TEST(PointSpread, IsTheLeastErrorOfSeveralMinima) {
+  LetterPresses letters;
+  letters.add("I", training_grid(), 3);
+  const auto found = learn_point_spread(letters.presses, {.threshold = 2.12, .ratio = 0.377});
+  ASSERT_TRUE(found.has_value());
+  // One object, of few edges.
+  EXPECT_NEAR(*found, 1.0, 0.15);
+}
+
 TEST(PointSpread, IgnoresDeadElements) {
   LetterPresses letters;
   letters.add("A", 80, 51);

@@ -32,6 +32,14 @@ void SimulatedPresses::add_shapes(std::size_t count, std::uint64_t seed) {
   add(on_disc, "disc", count, seed + 1);
 }
 
+std::vector<Press> posed_presses(const Recording& recording) {
+  std::vector<Press> presses;
+  for (std::size_t touch = 0; touch < recording.size(); ++touch) {
+    presses.push_back(posed_press(recording, touch));
+  }
+  return presses;
+}
+
 void LetterPresses::add(const std::string& letter, const std::vector<Pose>& T_object_sensor,
                         std::uint64_t seed, const SensorModel& model) {
   recordings.push_back(

@@ -26,6 +26,9 @@ struct SimulatedPresses {
   void add_shapes(std::size_t count, std::uint64_t seed);
 };
 
+/// Every touch of a recording as a press at a known pose.
+std::vector<Press> posed_presses(const Recording& recording);
+
 /// Touches of simulated letters by the DigiTacts array.
 struct LetterPresses {
   std::vector<Recording> recordings;  ///< one of each letter
