@@ -93,17 +93,6 @@ SensorCalibrationOptions calibration_options(const Options& options, const std::
   return result;
 }
 
-/// Whether the robot knew where it touched: some touches of the recording are at different poses.
-bool has_poses(const Recording& recording) {
-  for (const Pose& pose : recording.T_robot_sensor) {
-    const Pose& first = recording.T_robot_sensor.front();
-    if (pose.translation_mm != first.translation_mm || pose.theta_rad != first.theta_rad) {
-      return true;
-    }
-  }
-  return false;
-}
-
 /// Throws Error where some recordings have poses and others have none.
 bool all_have_poses(const Options& options, const std::vector<Recording>& recordings) {
   if (options.unposed) {
