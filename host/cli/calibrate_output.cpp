@@ -72,8 +72,7 @@ std::string scores_table(const SensorCalibration& calibration, std::optional<int
 
 /// The pressure of which a layer of mean levels has this value.
 double pressure_at(double value, const ReadingLayer& layer) {
-  const double share =
-      (value + ReadingLayer::largest_value) / (2.0 * ReadingLayer::largest_value);
+  const double share = (value + ReadingLayer::largest_value) / (2.0 * ReadingLayer::largest_value);
   return layer.unit_level * std::expm1(share * std::log1p(layer.full_level / layer.unit_level));
 }
 
@@ -123,8 +122,9 @@ std::string calibration_text(const SensorCalibration& calibration, std::size_t t
     text += "\n" + scores_table(calibration, columns);
   }
   if (calibration.area_under_curve) {
-    text += fmt::format("area under the curve of touches of known against left-out objects: {:.3f}\n",
-                        *calibration.area_under_curve);
+    text +=
+        fmt::format("area under the curve of touches of known against left-out objects: {:.3f}\n",
+                    *calibration.area_under_curve);
   }
   return text;
 }
@@ -133,8 +133,11 @@ std::string draw_table(const LearnedSensor& sensor) {
   const LearnedTable& table = *sensor.table;
   const bool levels = table.layer.of == MapLayer::mean_level;
   Chart chart{
-      .title = "what an element reads over what the map says; dots: beside and beyond what touches "
-               "sensed",
+      .title = levels
+                   ? "what elements read over the map's mean pressure; left of the line: where no "
+                     "touch sensed"
+                   : "what elements read over the map's log odds; left of the line: where no touch "
+                     "sensed",
       .x = {.label = levels ? fmt::format("mean pressure of the map, {}", sensor.pressure_unit)
                             : "log odds of the map, nats",
             .lower = ReadingLayer::first_node,
@@ -169,8 +172,8 @@ std::string draw_table(const LearnedSensor& sensor) {
 }
 
 ReliabilityFigure reliability_of(const SensorCalibration& calibration) {
-  return {.curves = {curve_of("Eq. 7", *calibration.before),
-                     curve_of("learned", *calibration.after)}};
+  return {
+      .curves = {curve_of("Eq. 7", *calibration.before), curve_of("learned", *calibration.after)}};
 }
 
 }  // namespace palpate::cli
