@@ -198,15 +198,17 @@ void add_calibrate(CLI::App& app) {
   const auto options = std::make_shared<Options>();
   command
       ->add_option("RECORDING", options->recordings,
-                   "Recordings (HDF5) that name their object. Where all touches of a recording are "
-                   "at one pose, their poses count as unknown")
+                   "Recordings (HDF5) that name their object, best with 12 touches or more of each "
+                   "object. Where all touches of a recording are at one pose, their poses count as "
+                   "unknown")
       ->required();
   command->add_option("-o,--output", options->output, "Sensor model to write (YAML)")->required();
   command->add_option("--maps", options->maps,
                       "Maps, or folders of maps, of the objects [default: maps of the touches "
                       "themselves, each compared with maps that were built without it]");
   command->add_flag("--unposed", options->unposed,
-                    "The sensor's poses are unknown: find where each touch lies");
+                    "The sensor's poses are unknown: find where each touch lies on the others. For "
+                    "arrays so large that a touch shows much of the object");
   command->add_option("--threshold", options->threshold,
                       "Contact threshold, in the recordings' pressure unit [default: learned]");
   command->add_option("--ratio", options->ratio,
