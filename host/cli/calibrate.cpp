@@ -101,17 +101,6 @@ SensorCalibrationOptions calibration_options(const Options& options, const std::
   return result;
 }
 
-/// Whether the robot knew where it touched: some touches of the recording are at different poses.
-bool has_poses(const Recording& recording) {
-  for (const Pose& pose : recording.T_robot_sensor) {
-    const Pose& first = recording.T_robot_sensor.front();
-    if (pose.translation_mm != first.translation_mm || pose.theta_rad != first.theta_rad) {
-      return true;
-    }
-  }
-  return false;
-}
-
 /// Throws Error where some recordings have poses and others have none.
 bool all_have_poses(const Options& options, const std::vector<Recording>& recordings) {
   if (options.unposed) {
@@ -232,8 +221,9 @@ void add_calibrate(CLI::App& app) {
   const auto options = std::make_shared<Options>();
   command
       ->add_option("RECORDING", options->recordings,
-                   "Recordings (HDF5) that name their object. Where all touches of a recording are "
-                   "at one pose, their poses count as unknown")
+                   "Recordings (HDF5) that name their object, best with 12 touches or more of each "
+                   "object. Where all touches of a recording are at one pose, their poses count as "
+                   "unknown")
       ->required();
   command->add_option("-o,--output", options->output, "Sensor model to write (YAML)")->required();
   command->add_option("--maps", options->maps,
@@ -241,7 +231,8 @@ void add_calibrate(CLI::App& app) {
                       "these [default: maps of the touches themselves, each compared with maps "
                       "that were built without it]");
   command->add_flag("--unposed", options->unposed,
-                    "The sensor's poses are unknown: find where each touch lies");
+                    "The sensor's poses are unknown: find where each touch lies on the others. For "
+                    "arrays so large that a touch shows much of the object");
   command->add_option("--threshold", options->threshold,
                       "Contact threshold, in the recordings' pressure unit [default: learned]");
   command->add_option("--ratio", options->ratio,

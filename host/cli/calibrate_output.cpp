@@ -137,9 +137,11 @@ std::string draw_table(const LearnedSensor& sensor) {
   const LearnedTable& table = *sensor.table;
   const bool levels = table.layer.of == MapLayer::mean_level;
   Chart chart{
-      .title =
-          "what an element reads over what the map says; dots: beside and beyond what touches "
-          "sensed",
+      .title = levels
+                   ? "what elements read over the map's mean pressure; left of the line: where no "
+                     "touch sensed"
+                   : "what elements read over the map's log odds; left of the line: where no touch "
+                     "sensed",
       .x = {.label = levels ? fmt::format("mean pressure of the map, {}", sensor.pressure_unit)
                             : "log odds of the map, nats",
             .lower = ReadingLayer::first_node,

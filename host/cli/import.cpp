@@ -120,19 +120,21 @@ Pose truth_pose(const std::string& text, const Pose& in_units, const std::array<
 /// The command that takes the recording.
 std::string next_command(const ImportOptions& options, const Recording& recording) {
   const bool raw = recording.pressure_unit == "raw";
+  const char* unposed = options.unposed ? " --unposed" : "";
   if (recording.rows == "frames") {
-    return std::ranges::none_of(recording.T_robot_sensor, is_finite)
+    return !options.unposed && std::ranges::none_of(recording.T_robot_sensor, is_finite)
                ? fmt::format(
                      "palpate live --sensor replay:{} --poses POSES --maps MAPS/, or import again "
-                     "with --poses",
+                     "with --poses, or with --unposed where they are unknown",
                      options.output)
-               : fmt::format("palpate touches {} -o TOUCHES.h5{}", options.output,
+               : fmt::format("palpate touches {} -o TOUCHES.h5{}{}", options.output, unposed,
                              raw ? " --onset P" : "");
   }
   const std::string threshold = raw ? " --threshold P" : "";
   return recording.object.empty()
-             ? fmt::format("palpate recognize {} --maps MAPS/{}", options.output, threshold)
-             : fmt::format("palpate map {} -o MAPS/{}", options.output, threshold);
+             ? fmt::format("palpate recognize {} --maps MAPS/{}{}", options.output,
+                           options.unposed ? " --each-frame" : "", threshold)
+             : fmt::format("palpate map {} -o MAPS/{}{}", options.output, unposed, threshold);
 }
 
 void print_summary(const ImportOptions& options, const ImportedRecording& imported) {
@@ -182,6 +184,9 @@ void import_tables(const ImportOptions& options) {
   if (options.pressure_unit != "kPa" && options.pressure_unit != "raw") {
     refuse_flag("--pressure-unit", options.pressure_unit, "give kPa or raw");
   }
+  if (options.unposed && !options.poses.empty()) {
+    refuse("--unposed", "{} holds the poses; leave one of the flags out", options.poses);
+  }
   CommandFiles files;
   files.reads("PRESSURES", options.pressures);
   if (!options.poses.empty()) {
@@ -228,6 +233,11 @@ void add_import(CLI::App& app) {
       "CSV with the poses T_robot_sensor: columns x, y, theta (or yaw) and time. Frames take the "
       "pose interpolated at their time; without a column time, rows are taken one by one. It may "
       "be PRESSURES itself [default: frames without poses]");
+  command->add_flag(
+      "--unposed", options->unposed,
+      "The sensor's poses are unknown: write rows that are touches at the pose 0, for "
+      "'palpate map --unposed', 'palpate calibrate --unposed' and 'palpate recognize "
+      "--each-frame'; frames stay without poses");
   command
       ->add_option("--array", options->array,
                    "COLUMNS:ROWS:PITCH, a grid with its pitch in mm, centred about the sensor's "
@@ -238,7 +248,7 @@ void add_import(CLI::App& app) {
   command->add_option(
       "--rows", options->rows,
       "What a row of the pressures is: frames (a stream, of which 'palpate touches' "
-      "finds the touches) or touches (single presses, each with a pose) [default: "
+      "finds the touches) or touches (single presses, each with a pose or --unposed) [default: "
       "frames where there are times, else touches]");
   command
       ->add_option("--pressure-unit", options->pressure_unit,

@@ -167,8 +167,8 @@ void require_touch_poses(const ImportOptions& options, const ImportedRecording& 
   const Recording& recording = imported.recording;
   if (options.poses.empty()) {
     refuse(options.pressures,
-           "its rows are touches, and each needs a pose; give --poses{}, or for a stream of frames "
-           "a column 'time' or --rate",
+           "its rows are touches, and each needs a pose; give --poses{}, or --unposed where the "
+           "poses are unknown, or for a stream of frames a column 'time' or --rate",
            imported.holds_poses ? " " + options.pressures : "");
   }
   for (std::size_t i = 0; i < recording.size(); ++i) {
@@ -249,10 +249,11 @@ ImportedRecording read_tables(const ImportOptions& options, const TableOptions& 
     imported.pose_units = poses->units;
     join(std::move(*poses), options, imported);
   } else {
+    const bool at_zero = options.unposed && recording.rows == "touches";
     recording.T_robot_sensor.assign(recording.pressure.size() / recording.elements_mm.size(),
-                                    unknown_pose);
+                                    at_zero ? Pose{} : unknown_pose);
   }
-  if (recording.rows == "touches") {
+  if (recording.rows == "touches" && !options.unposed) {
     require_touch_poses(options, imported);
   }
   return imported;

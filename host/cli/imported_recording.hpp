@@ -29,6 +29,7 @@ struct ImportOptions {
   std::string rows;
   std::string object;
   std::string truth;
+  bool unposed = false;  ///< touches without poses get the pose 0
 };
 
 /// The array of --array: a grid, or a file.

@@ -57,6 +57,18 @@ OccupancyGrid build_map(MapBuilder& builder, const ObjectTouches& object,
   return builder.build(object.label);
 }
 
+/// Says where poses are unknown: touches that are no touches of one place would make a blur.
+void warn_of_unknown_poses(const std::vector<Recording>& recordings) {
+  for (const Recording& recording : recordings) {
+    if (recording.size() > 1 && !has_poses(recording)) {
+      fmt::print(stderr,
+                 "palpate: {}: all {} touches are at one pose; if their poses are unknown, give "
+                 "--unposed\n",
+                 recording.path, recording.size());
+    }
+  }
+}
+
 void build_maps(const MapFlags& flags) {
   const bool folder = flags.to_folder();
   const std::vector<Recording> recordings = read_touch_recordings(flags.recordings);
@@ -74,6 +86,7 @@ void build_maps(const MapFlags& flags) {
                                : std::filesystem::path(flags.output));
   }
   prepare_outputs(flags, map_paths, names);
+  warn_of_unknown_poses(recordings);
 
   Device device = Device::open(flags.device);
   model.sensor.prior = prior ? *prior : estimate_prior(device, objects, model);

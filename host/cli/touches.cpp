@@ -33,6 +33,7 @@ struct Options {
   std::string output;
   DetectorFlags detector;
   std::optional<double> tare_s;
+  bool unposed = false;
 };
 
 /// Returns the baseline: by --tare, else as the recording holds it, else by a tare as of `palpate
@@ -64,13 +65,14 @@ std::vector<double> baseline_for(const Options& options, Sensor& stream,
   }
 }
 
-/// Appends the touch and a row of `valid` for it; returns false where the touch has no pose.
-bool append(const DetectedTouch& touch, Recording& recording) {
-  if (!touch.T_robot_sensor) {
+/// Appends the touch and a row of `valid` for it, `unposed` at the pose 0; returns false where the
+/// touch needs a pose and has none.
+bool append(const DetectedTouch& touch, bool unposed, Recording& recording) {
+  if (!unposed && !touch.T_robot_sensor) {
     return false;
   }
   recording.valid.insert(recording.valid.end(), touch.valid.begin(), touch.valid.end());
-  recording.T_robot_sensor.push_back(*touch.T_robot_sensor);
+  recording.T_robot_sensor.push_back(unposed ? Pose{} : *touch.T_robot_sensor);
   recording.pressure.insert(recording.pressure.end(), touch.pressure.begin(), touch.pressure.end());
   recording.time_s.push_back(0.5 * (touch.begin_s + touch.end_s));
   return true;
@@ -131,7 +133,7 @@ void find_touches(const Options& options) {
   std::uint64_t unreadable = 0;
   std::size_t without_pose = 0;
   const auto take = [&](const std::optional<DetectedTouch>& touch) {
-    without_pose += touch && !append(*touch, recording) ? 1 : 0;
+    without_pose += touch && !append(*touch, options.unposed, recording) ? 1 : 0;
   };
   stream->start();
   while (!stream->ended()) {
@@ -149,7 +151,9 @@ void find_touches(const Options& options) {
 
   if (recording.size() == 0) {
     if (without_pose > 0) {
-      refuse(options.frames, "none of its {} touches has a pose; record again with --poses",
+      refuse(options.frames,
+             "none of its {} touches has a pose; record again with --poses, or keep them for "
+             "'palpate map --unposed' with --unposed",
              without_pose);
     }
     if (!complaint.empty()) {
@@ -203,6 +207,10 @@ void add_touches(CLI::App& app) {
       "--tare", options->tare_s,
       "Seconds at the start in which nothing may touch the array and its baseline is read; 0: no "
       "baseline [default: the recording's baseline, or 0.5 where it has none]");
+  command->add_flag("--unposed", options->unposed,
+                    "The sensor's poses are unknown: write every touch at the pose 0, for 'palpate "
+                    "map --unposed', 'palpate calibrate --unposed' and 'palpate recognize "
+                    "--each-frame'");
   command->callback([options] { find_touches(*options); });
 }
 

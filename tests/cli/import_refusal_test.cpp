@@ -87,14 +87,15 @@ INSTANTIATE_TEST_SUITE_P(
              "log.csv",
              "T,p0,p1\n20,1,2\n",
              {"--pressure-columns", "p"},
-             "log.csv: its rows are touches, and each needs a pose; give --poses, or for a stream "
-             "of frames a column 'time' or --rate"},
+             "log.csv: its rows are touches, and each needs a pose; give --poses, or --unposed "
+             "where the poses are unknown, or for a stream of frames a column 'time' or --rate"},
         Case{"touches_without_their_poses",
              "log.csv",
              "x,y,theta,p0,p1\n0,0,0,1,2\n",
              {},
-             "log.csv: its rows are touches, and each needs a pose; give --poses log.csv, or for a "
-             "stream of frames a column 'time' or --rate"},
+             "log.csv: its rows are touches, and each needs a pose; give --poses log.csv, or "
+             "--unposed where the poses are unknown, or for a stream of frames a column 'time' or "
+             "--rate"},
         Case{"a_bad_cell_in_the_first_row",
              "log.csv",
              "0,1,NA\n1,2,3\n",
@@ -134,8 +135,8 @@ INSTANTIATE_TEST_SUITE_P(
              "log.csv",
              "p0,p1\n1,2\n",
              {},
-             "log.csv: its rows are touches, and each needs a pose; give --poses, or for a stream "
-             "of frames a column 'time' or --rate"},
+             "log.csv: its rows are touches, and each needs a pose; give --poses, or --unposed "
+             "where the poses are unknown, or for a stream of frames a column 'time' or --rate"},
         Case{"frames_without_times",
              "log.csv",
              "p0,p1\n1,2\n",

@@ -80,6 +80,22 @@ TEST_F(ImportCommand, TheLargestGapFollowsThePoses) {
                {"201 with a pose; next"});
 }
 
+TEST_F(ImportCommand, RowsMayBeTouchesAtUnknownPoses) {
+  expect_named(done(command({"--rows", "touches", "--unposed", "--object", "A"})),
+               {"3 touches", "next: palpate map o.h5 -o MAPS/ --unposed"});
+  const Recording r = read_recording(folder_ / "o.h5");
+  ASSERT_EQ(r.size(), 3u);
+  for (const Pose& pose : r.T_robot_sensor) {
+    expect_pose(pose, {});
+  }
+  expect_named(done(command({"--rows", "touches", "--unposed"})),
+               {"next: palpate recognize o.h5 --maps MAPS/ --each-frame"});
+  expect_named(done(command({"--unposed"})),
+               {"0 with a pose; next: palpate touches o.h5 -o TOUCHES.h5 --unposed"});
+  expect_said({"--unposed", "--poses", "poses.csv"},
+              "--unposed: poses.csv holds the poses; leave one of the flags out");
+}
+
 TEST_F(ImportCommand, FramesNeedNoPoses) {
   expect_named(done(command({})), {"3 frames", "0 with a pose", "--sensor replay:o.h5 --poses"});
   const std::string bytes = bytes_of(folder_ / "o.h5");

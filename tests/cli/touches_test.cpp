@@ -67,6 +67,23 @@ TEST_F(TouchesCommand, FindsTheTouchesThatWereMade) {
   }
 }
 
+TEST_F(TouchesCommand, TouchesAtUnknownPosesAreKeptAtThePoseZero) {
+  const Recording posed = touches_of("a", "simulate:A,touches=3");
+  done({"touches", "a.frames.h5", "-o", "b.h5", "--unposed"});
+  const Recording unposed = read_recording(folder_ / "b.h5");
+  EXPECT_EQ(unposed.pressure, posed.pressure);
+  ASSERT_EQ(unposed.size(), 3u);
+  for (const Pose& pose : unposed.T_robot_sensor) {
+    EXPECT_EQ(pose.translation_mm, glm::dvec2(0.0, 0.0));
+    EXPECT_EQ(pose.theta_rad, 0.0);
+  }
+  const Outcome blurred = palpate({"map", "b.h5", "-o", "b.map.h5"});
+  EXPECT_EQ(blurred.status, 0);
+  EXPECT_EQ(blurred.err,
+            "palpate: b.h5: all 3 touches are at one pose; if their poses are unknown, give "
+            "--unposed\n");
+}
+
 TEST_F(TouchesCommand, LettersAreRecognisedByWhatTheyFound) {
   for (const std::string letter : {"A", "E", "I"}) {
     EXPECT_EQ(touches_of(letter, "simulate:" + letter + ",touches=150").object, letter);
