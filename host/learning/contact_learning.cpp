@@ -101,8 +101,8 @@ ContactClassifier learn_classifier(const std::vector<Press>& presses,
   for (const Press& press : presses) {
     for (const Touch& touch : press.touches) {
       const double peak = peak_of(touch);
-      for (std::size_t e = 0; e < touch.pressure.size(); ++e) {
-        if (is_living(touch, e) && touch.pressure[e] > classifier.threshold) {
+      for (std::size_t e = 0; peak > classifier.threshold && e < touch.pressure.size(); ++e) {
+        if (is_living(touch, e) && touch.pressure[e] > 0.0) {
           shares.push_back(std::log(touch.pressure[e] / peak));
         }
       }

@@ -12,7 +12,7 @@ namespace palpate {
 
 /// The contact threshold T and ratio of touches, by Otsu's method (1979): the threshold parts the
 /// logarithms of all pressures above 0 into two classes of the largest variance between them, and
-/// the ratio likewise those of the pressures above T, relative to the largest of their touch; the
+/// the ratio likewise those relative to the largest of their touch, of touches that exceed T; the
 /// usual ratio where these are all the same.
 /// @param threshold the T to learn the ratio for, where it is known
 /// @throws Error where T is to be learned and no pressure is above 0, or all are the same

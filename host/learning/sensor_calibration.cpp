@@ -208,6 +208,16 @@ class SensorLearning {
     result_.before = scores_of(eq7.presses, 1.0);
     result_.table = scores_of(learned.presses, 1.0);
     result_.after = scores_of(tempered_by_halves(learned.presses), 1.0);
+    // What few presses could show by chance is no warning.
+    constexpr double worse_nats = 0.05;
+    const double without = scores_of(tempered_by_halves(eq7.presses), 1.0).log_loss;
+    if (result_.after->log_loss > without + worse_nats) {
+      result_.warnings.push_back(fmt::format(
+          "on touches that it has not seen, the learned table has a log-loss of {:.3f}, worse than "
+          "{:.3f} by Eq. 7 with a temperature: give more touches of each object, or recognize "
+          "without the sensor model",
+          result_.after->log_loss, without));
+    }
     const TemperatureFit fit = fit_temperature(learned.presses);
     result_.sensor.temperature = fit.temperature;
     std::vector<LabelledFeatures> features;
