@@ -6,6 +6,7 @@
 #include <map>
 #include <optional>
 #include <set>
+#include <span>
 
 #include <fmt/format.h>
 #include <tbb/parallel_for.h>
@@ -192,7 +193,10 @@ class Validation {
     // A press of which nothing is In Contact says nothing of its object.
     const std::vector<Reading> readings = classifier_.classify(press.touches.front());
     if (std::ranges::any_of(readings, is_contact)) {
-      result.known.push_back(FamiliarityScore::of(readings, best, scored.log_evidence));
+      // With two labels, leaving one out leaves no lead to compare with.
+      const std::span<const double> known(scored.log_evidence);
+      const bool leads = labels_.size() > 2;
+      result.known.push_back(FamiliarityScore::of(readings, best, leads ? known : known.first(1)));
       if (best_other != nothing) {
         result.unknown.push_back(FamiliarityScore::of(readings, best_other, of_others));
       }
