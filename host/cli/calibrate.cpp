@@ -157,11 +157,11 @@ void add_touch_sd(const Options& options, const std::vector<Press>& presses,
                   SensorCalibration& calibration) {
   Device device = Device::open(options.device);
   Progress progress("fitting the touches' poses");
-  const TouchSdFit fit = learn_touch_sd(device, presses, calibration.sensor, calibration.maps,
-                                        [&](double fraction) { progress.show(fraction); });
-  DisplacementSd& sd = calibration.sensor.touch_sd;
-  sd.mm = fit.sd.mm > fit.resolution.mm ? fit.sd.mm : 0.0;
-  sd.rad = fit.sd.rad > fit.resolution.rad ? fit.sd.rad : 0.0;
+  const std::optional<DisplacementSd> sd =
+      learn_touch_sd(device, presses, calibration.sensor, calibration.maps,
+                     [&](double fraction) { progress.show(fraction); });
+  calibration.touch_sd_fitted = sd.has_value();
+  calibration.sensor.touch_sd = sd.value_or(DisplacementSd{});
 }
 
 void calibrate(const Options& options) {

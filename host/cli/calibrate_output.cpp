@@ -37,7 +37,7 @@ std::string values_table(const SensorCalibration& calibration, std::optional<int
   add("spread of maps, mm", short_number(initial.spread_mm), sensor.spread_mm);
   add("gamma of Eq. 7", short_number(initial.gamma), sensor.gamma);
   add("prior", "", sensor.prior);
-  if (calibration.known_poses) {
+  if (calibration.touch_sd_fitted) {
     add("touch-sd, mm", "0", sensor.touch_sd.mm);
     add("touch-sd, degrees", "0", degrees(sensor.touch_sd.rad));
   }

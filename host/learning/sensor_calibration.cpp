@@ -48,7 +48,6 @@ class SensorLearning {
     if (!(spacing_mm_ > 0.0)) {
       throw Error(Fault::input, "the arrays have one element each; a calibration needs several");
     }
-    result_.known_poses = known_poses_;
     result_.sensor.pressure_unit = options.pressure_unit;
   }
 

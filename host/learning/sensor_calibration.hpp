@@ -29,7 +29,7 @@ struct SensorCalibrationOptions {
 struct SensorCalibration {
   LearnedSensor sensor;
   MapOptions maps;           ///< of the maps that presses were compared with
-  bool known_poses = false;  ///< of all touches
+  bool touch_sd_fitted = false;  ///< sensor.touch_sd is the result of a fit
   std::size_t objects = 0;
   /// Of the cross-validation; none with one object.
   std::optional<Scores> before;  ///< Eq. 7 with gamma 0.1, temperature 1

@@ -15,6 +15,8 @@ namespace {
 
 constexpr std::size_t folds = 5;
 constexpr std::size_t touches_of_unknown = 8;
+constexpr std::size_t fewest_touches = 5;  ///< of an unknown: one pose explains two touches
+constexpr std::size_t fewest_unknowns = 5;
 
 /// Poses so near to the known one, 0, that displacements of the search's start explain them.
 PoseLattice about_known_pose(const DisplacementSd& start) {
@@ -55,9 +57,9 @@ std::vector<TouchedObject> unknowns_of(const std::vector<Press>& presses) {
 
 }  // namespace
 
-TouchSdFit learn_touch_sd(Device& device, const std::vector<Press>& presses,
-                          const LearnedSensor& sensor, const MapOptions& maps,
-                          const std::function<void(double)>& progress) {
+std::optional<DisplacementSd> learn_touch_sd(Device& device, const std::vector<Press>& presses,
+                                             const LearnedSensor& sensor, const MapOptions& maps,
+                                             const std::function<void(double)>& progress) {
   std::vector<Hypothesis> hypotheses;
   std::vector<TouchedObject> unknowns = unknowns_of(presses);
   const std::vector<std::size_t> fold = folds_of(presses, folds);
@@ -69,16 +71,25 @@ TouchSdFit learn_touch_sd(Device& device, const std::vector<Press>& presses,
     }
   }
   std::erase_if(unknowns, [&](const TouchedObject& unknown) {
-    return std::ranges::none_of(hypotheses, [&](const Hypothesis& hypothesis) {
-      return hypothesis.map.label == unknown.label;
-    });
+    return unknown.touches.size() < fewest_touches ||
+           std::ranges::none_of(hypotheses, [&](const Hypothesis& hypothesis) {
+             return hypothesis.map.label == unknown.label;
+           });
   });
+  if (unknowns.size() < fewest_unknowns) {
+    return {};
+  }
   const TouchSdFitOptions options;
   HistogramOptions histogram{.lattice = about_known_pose(options.start)};
   histogram.contact = {
       .classifier = sensor.classifier, .gamma = ContactModel{}.gamma, .prior = sensor.prior};
   const RecognitionTask task(std::move(hypotheses), histogram);
-  return fit_touch_sd(device, task, unknowns, options, progress);
+  const TouchSdFit fit = fit_touch_sd(device, task, unknowns, options, progress);
+  const auto distinct = [](double sd, double error, double resolution) {
+    return sd > std::max(2.0 * error, resolution) ? sd : 0.0;
+  };
+  return DisplacementSd{distinct(fit.sd.mm, fit.standard_error.mm, fit.resolution.mm),
+                        distinct(fit.sd.rad, fit.standard_error.rad, fit.resolution.rad)};
 }
 
 }  // namespace palpate
