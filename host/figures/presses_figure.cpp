@@ -122,9 +122,10 @@ std::string draw_presses(std::span<const DrawnPresses> groups) {
     top += title_px;
     const BoundingBox part = shown(group);
     for (std::size_t tile = 0; tile < tiles_of(group); ++tile) {
+      const std::size_t row = tile / columns;
       const Box box{margin_px + static_cast<double>(tile % columns) * (tile_px + gap_px),
-                    top + static_cast<double>(tile / columns) * (tile_px + caption_px + gap_px),
-                    tile_px, tile_px};
+                    top + static_cast<double>(row) * (tile_px + caption_px + gap_px), tile_px,
+                    tile_px};
       const std::size_t first = group.map ? 1 : 0;
       draw_tile(canvas, box, part, group, tile < first ? nullptr : &group.presses[tile - first],
                 scale);

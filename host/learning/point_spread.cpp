@@ -164,13 +164,14 @@ Field blurred(const Field& field, double sigma_mm, double edge_mm) {
     kernel.push_back(weight(k * field.cell_mm));
     sum += kernel.back();
   }
+  const double* middle = kernel.data() + reach;
   Field along = field;
   Field result = field;
   for (int j = 0; j < field.ny; ++j) {
     for (int i = 0; i < field.nx; ++i) {
       double value = 0.0;
       for (int k = std::max(-reach, -i); k <= std::min(reach, field.nx - 1 - i); ++k) {
-        value += kernel[static_cast<std::size_t>(k + reach)] * field.at(i + k, j);
+        value += middle[k] * field.at(i + k, j);
       }
       along.at(i, j) = value / sum;
     }
@@ -179,7 +180,7 @@ Field blurred(const Field& field, double sigma_mm, double edge_mm) {
     for (int i = 0; i < field.nx; ++i) {
       double value = 0.0;
       for (int k = std::max(-reach, -j); k <= std::min(reach, field.ny - 1 - j); ++k) {
-        value += kernel[static_cast<std::size_t>(k + reach)] * along.at(i, j + k);
+        value += middle[k] * along.at(i, j + k);
       }
       result.at(i, j) = value / sum;
     }

@@ -67,8 +67,8 @@ std::vector<std::string> stuck_elements(const std::vector<Press>& presses,
       if (!same || !(pressure > classifier.threshold)) {
         continue;
       }
-      const auto equal = std::ranges::equal_range(contacts, pressure);
-      const double others = static_cast<double>(equal.size()) - static_cast<double>(touches.size());
+      const auto [first, last] = std::equal_range(contacts.begin(), contacts.end(), pressure);
+      const double others = static_cast<double>(last - first) - static_cast<double>(touches.size());
       if (others <= rare * static_cast<double>(contacts.size() - touches.size())) {
         stuck.push_back(e);
       }

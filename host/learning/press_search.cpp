@@ -157,8 +157,12 @@ PressPlace PressSearch::best_place(const std::vector<PressSide>& sides,
   std::size_t places = 0;
   for (const PressSide& side : sides) {
     const PoseLattice lattice = lattice_for(side, map);
-    SideScores& of = scores.emplace_back(side, !scores.empty(), lattice,
-                                         PressPlacer(map, contact_, lattice), std::vector<float>());
+    scores.push_back({.side = side,
+                      .mirrored = !scores.empty(),
+                      .lattice = lattice,
+                      .placer = PressPlacer(map, contact_, lattice),
+                      .bins = {}});
+    SideScores& of = scores.back();
     of.bins = of.placer.log_likelihoods(side.press());
     places += of.bins.size();
     for (const std::size_t bin : best_bins(of.bins, lattice)) {

@@ -119,7 +119,7 @@ void apply(const LearnedSensor& sensor, std::vector<Hypothesis>& hypotheses,
       of_each.insert(of_each.end(), set.begin(), set.end());
       any_own = any_own || has_own;
     }
-    numbers = table_of(table, any_own ? std::move(of_each) : table.shared);
+    numbers = table_of(table, any_own ? of_each : table.shared);
     contact.prior.reset();
   }
   for (std::size_t i = 0; i < hypotheses.size(); ++i) {

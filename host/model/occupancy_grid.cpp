@@ -60,7 +60,7 @@ std::optional<std::string> fault_of(const OccupancyGrid& map) {
   for (const auto& [name, numbers] :
        {std::pair{"observations", &map.observations}, std::pair{"mean_level", &map.mean_level}}) {
     if (!numbers->empty()) {
-      if (const auto fault = fault_of_layer(map, name, *numbers)) {
+      if (auto fault = fault_of_layer(map, name, *numbers)) {
         return fault;
       }
     }

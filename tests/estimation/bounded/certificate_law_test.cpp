@@ -51,6 +51,10 @@ TEST(CertificateLaw, BoundsEveryLogEvidenceWithinTheNatsAskedFor) {
   for (const double nats : {3.0, 0.3, 0.01}) {
     for (const double tolerance : {1e-6, 0.3}) {
       Trial trial = make_trial({15, 14, 12}, 911);
+      // The last two share a label, whose evidence counts together.
+      for (std::size_t i = 0; i < trial.objects.size(); ++i) {
+        trial.objects[i].map.label = i == 0 ? "A" : i == 1 ? "B" : "C";
+      }
       // Tens of nats below, so that the tolerance would drop it.
       trial.objects[1].weight = 1e-30;
       trial.options.tolerance = tolerance;
@@ -60,6 +64,27 @@ TEST(CertificateLaw, BoundsEveryLogEvidenceWithinTheNatsAskedFor) {
       EXPECT_LE(seen.widest_nats, nats);
     }
   }
+}
+
+TEST(CertificateLaw, BoundsLabelsBelowTheRangeNoCloserThanThat) {
+  Device device = Device::open();
+  Trial trial = make_trial({15, 14, 12}, 911);
+  for (std::size_t i = 0; i < trial.objects.size(); ++i) {
+    trial.objects[i].map.label = i == 1 ? "B" : "A";
+  }
+  trial.objects[1].weight = 1e-30;
+  trial.options.evidence_nats = 0.01;
+  const auto bins_evaluated = [&](double range_nats) {
+    trial.options.evidence_range_nats = range_nats;
+    const Certified seen =
+        expect_certified(device, trial.objects, trial.options, all_touches(trial.recording));
+    const Certificate& certificate = *seen.estimate.certificate;
+    const double largest =
+        std::max(certificate.log_evidence[0].low, certificate.log_evidence[2].low);
+    EXPECT_LE(certificate.log_evidence[1].high, std::max(largest - range_nats, largest - 60.0));
+    return certificate.bins_evaluated;
+  };
+  EXPECT_LT(bins_evaluated(20.0), bins_evaluated(200.0));
 }
 
 TEST(CertificateLaw, KeepsEveryTolerance) {

@@ -1,9 +1,12 @@
 #include "bounded/certified.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <numeric>
+#include <string>
 
 #include <gtest/gtest.h>
 
@@ -61,6 +64,25 @@ reference::Posterior reference_posterior(std::span<const Hypothesis> objects,
       objects, HistogramOptions{.lattice = options.lattice, .contact = options.contact}, touches);
 }
 
+namespace {
+
+/// Bounds of the log evidence of all hypotheses that bear a label.
+std::map<std::string, LogInterval> label_evidence(std::span<const Hypothesis> objects,
+                                                  const Certificate& certificate) {
+  std::map<std::string, LogInterval> labels;
+  for (std::size_t i = 0; i < objects.size(); ++i) {
+    const LogInterval& own = certificate.log_evidence[i];
+    const auto [at, first] = labels.try_emplace(objects[i].map.label, own);
+    if (!first) {
+      at->second = {log_sum(std::array{at->second.low, own.low}),
+                    log_sum(std::array{at->second.high, own.high})};
+    }
+  }
+  return labels;
+}
+
+}  // namespace
+
 Certified expect_certified(const BoundedPosterior& posterior, std::span<const Hypothesis> objects,
                            const BoundedOptions& options, const reference::Posterior& truth,
                            double nats) {
@@ -93,10 +115,6 @@ Certified expect_certified(const BoundedPosterior& posterior, std::span<const Hy
     const auto [low_nats, high_nats] = certificate.log_evidence[i];
     EXPECT_LE(low_nats, evidence + nats);
     EXPECT_GE(high_nats, evidence - nats);
-    seen.widest_nats = std::max(seen.widest_nats, high_nats - low_nats);
-    if (options.evidence_nats && !options.budget_s) {
-      EXPECT_LE(high_nats - low_nats, *options.evidence_nats);
-    }
 
     const double p = estimate.identity[i];
     const auto [low, high] = estimate.identity_bounds[i];
@@ -106,6 +124,14 @@ Certified expect_certified(const BoundedPosterior& posterior, std::span<const Hy
     EXPECT_LE(low, identity[i] + slack);
     EXPECT_GE(high, identity[i] - slack);
     seen.identity_error = std::max(seen.identity_error, std::abs(p - identity[i]));
+  }
+  for (const auto& [label, interval] : label_evidence(objects, certificate)) {
+    SCOPED_TRACE(::testing::Message() << "label '" << label << "'");
+    seen.widest_nats = std::max(seen.widest_nats, interval.high - interval.low);
+    if (options.evidence_nats && !options.budget_s &&
+        interval.high > top - options.evidence_range_nats) {
+      EXPECT_LE(interval.high - interval.low, *options.evidence_nats);
+    }
   }
   EXPECT_LE(seen.identity_error, allowed);
   seen.total_variation = distance(estimate.identity, identity);

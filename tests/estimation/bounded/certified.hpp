@@ -18,7 +18,7 @@ struct Certified {
   Estimate estimate;
   double identity_error = 0.0;   ///< largest, of a probability
   double total_variation = 0.0;  ///< largest of identities and of any object's marginals
-  double widest_nats = 0.0;      ///< widest interval of a hypothesis's log evidence
+  double widest_nats = 0.0;      ///< widest interval of a label's log evidence
 };
 
 /// Expects all that a certificate promises of a posterior after the touches that `truth` knows:
