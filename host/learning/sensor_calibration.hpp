@@ -28,7 +28,7 @@ struct SensorCalibrationOptions {
 /// A learned sensor and how good it is on presses that it has not seen.
 struct SensorCalibration {
   LearnedSensor sensor;
-  MapOptions maps;           ///< of the maps that presses were compared with
+  MapOptions maps;               ///< of the maps that presses were compared with
   bool touch_sd_fitted = false;  ///< sensor.touch_sd is the result of a fit
   std::size_t objects = 0;
   /// Of the cross-validation; none with one object.
