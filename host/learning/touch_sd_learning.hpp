@@ -19,7 +19,8 @@ namespace palpate {
 /// which the fit learns as what elements read there.
 /// @param presses at known poses, of one touch each
 /// @param progress called now and then with the fraction done
-/// @returns none where that makes fewer than five unknowns of at least five touches: too few to tell
+/// @returns none where that makes fewer than five unknowns of at least five touches: too few to
+/// tell
 /// @throws Error as fit_touch_sd() and observed_map(); what `progress` throws
 std::optional<DisplacementSd> learn_touch_sd(Device& device, const std::vector<Press>& presses,
                                              const LearnedSensor& sensor, const MapOptions& maps,
