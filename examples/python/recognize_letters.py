@@ -13,14 +13,18 @@ for letter in letters:  # each at the robot's origin, touched at known poses
     builder.add(touches[letter])
     maps.append(builder.build(letter))
 
-unknown = palpate.simulate(  # an E, somewhere
-    "E", palpate.random_poses(9, seed=2), T_object_robot=palpate.random_object_pose(seed=2)
-)
+poses, T_object_robot = palpate.random_poses(9, seed=5), palpate.random_object_pose(seed=5)
+unknown = palpate.simulate("E", poses, T_object_robot=T_object_robot)  # an E, somewhere
 [record] = palpate.recognize(unknown, maps, device=device, trace=True)
-print(f"{record}, {record.refined_error_mm:.2f} mm off; the touches {record.fit['verdict']}")
+print(f"{record}, {record.refined_error_mm:.2f} mm off; fit: {record.fit['verdict']}")
 
 figure, (left, right) = pyplot.subplots(1, 2, figsize=(9, 4), layout="constrained")
 maps[letters.index(record.best)].plot(left)
+estimate = [record.refined[key] for key in ("x_mm", "y_mm", "theta_rad")]  # T_object_robot
+for touch in unknown:
+    T_object_sensor = palpate.compose(estimate, touch.T_robot_sensor)
+    pressed = palpate.transform(T_object_sensor, touch.elements_mm)[touch.pressure > 2]
+    left.plot(*pressed.T, "w.", markersize=2)
 for letter in letters:
     right.plot(range(1, 10), [step["identity"][letter] for step in record.trace], label=letter)
 right.set(xlabel="touches", ylabel="probability")

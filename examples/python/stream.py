@@ -1,5 +1,7 @@
 """Recognises what a stream of frames touches, after every touch."""
 
+import math
+
 import palpate
 from matplotlib import pyplot
 
@@ -10,7 +12,8 @@ for letter in "AEIOU":
     builder.add(palpate.simulate(letter))
     maps.append(builder.build(letter))
 
-belief = palpate.PoseHistogram(device, maps)
+lattice = palpate.PoseLattice((-10, 10, 40), (-10, 10, 40), (0, 2 * math.pi, 90))
+belief = palpate.PoseHistogram(device, maps, lattice)
 # A board is opened by its name, such as "takktile"; this simulation runs as fast as it is read.
 with palpate.open_sensor("simulate:U,object=random,touches=9,seed=3,speed=max") as sensor:
     for number, touch in enumerate(palpate.touches(sensor), start=1):
