@@ -17,6 +17,9 @@ struct MapOptions {
   double cell_mm = 0.5;       ///< edge of a cell
   InverseSensorModel sensor;  ///< also holds the prior
   ContactClassifier classifier;
+
+  /// Throws Error on a cell size, spread, peak, prior, threshold or ratio out of range.
+  void validate() const;
 };
 
 /// Builds an object's occupancy grid from touches at known poses (Sec. II) by adding up the
@@ -24,7 +27,7 @@ struct MapOptions {
 /// touches. Every call on a moved-from builder throws Error.
 class MapBuilder {
  public:
-  /// @throws Error on a cell size, spread, peak, prior, threshold or ratio out of range.
+  /// @throws Error as MapOptions::validate()
   MapBuilder(Device& device, const MapOptions& options);
   ~MapBuilder();
   MapBuilder(MapBuilder&&) noexcept;
