@@ -4,6 +4,8 @@
 #   tests/packages/run.sh [FOLDER OF .deb FILES]
 # Needs debootstrap, the network, about 3 GB in $TMPDIR, and some minutes. Exits with 77 where the
 # test cannot run.
+# Commands of the new root stand in single quotes, so that this shell expands nothing in them.
+# shellcheck disable=SC2016
 set -euo pipefail
 
 source=$(cd "$(dirname "${BASH_SOURCE[0]}")/../.." && pwd)
@@ -34,8 +36,6 @@ debootstrap --variant=minbase bookworm "$root" "$mirror" >"$root.log" 2>&1 || {
 }
 rm "$root.log"
 mount -t proc proc "$root/proc" || skip "cannot mount /proc in the new root"
-# Its commands run in the new root: the quotes keep this shell from expanding them.
-# shellcheck disable=SC2016
 in_root() {
   chroot "$root" env DEBIAN_FRONTEND=noninteractive LC_ALL=C.UTF-8 PALPATE_DEVICE=llvmpipe "$@"
 }
