@@ -24,6 +24,7 @@ compgen -G "$packages/*.deb" >/dev/null || {
 }
 
 root=$(mktemp -d)
+chmod 755 "$root"  # apt downloads as a user of its own
 finish() {
   umount "$root/proc" 2>/dev/null || true
   rm -rf --one-file-system "$root"
@@ -45,6 +46,7 @@ for file in /etc/resolv.conf /etc/hosts; do
 done
 cp /etc/apt/apt.conf.d/*proxy* "$root/etc/apt/apt.conf.d/" 2>/dev/null || true
 
+echo 'Dpkg::Use-Pty "0";' >"$root/etc/apt/apt.conf.d/99no-terminal"
 mkdir "$root/packages"
 cp "$packages"/*.deb "$root/packages"
 cp -r "$source/tests/consumer/project" "$root/consumer"
