@@ -193,6 +193,8 @@ namespace {
 
 /// Room for the last vector of a list.
 constexpr std::size_t slack = 64;
+/// Batches from which on sums in memory are faster than a batch's after another's in registers.
+constexpr int least_strip = 4;
 
 }  // namespace
 
@@ -215,9 +217,12 @@ void add_penalties(const WindowPlaces& placed, const ReadingRun& run, const Wind
   const std::int32_t* plane = placed.plane.data() + run.begin;
   const std::int32_t* column = placed.column.data() + run.begin;
   const std::int32_t* row = placed.row.data() + run.begin;
-  if (batches == 1) {
-    HWY_DYNAMIC_DISPATCH(AddRun)
-    (table, plane, column, row, count, first_x, first_y, scratch.data(), sums);
+  if (batches < least_strip) {
+    for (int i = 0; i < batches; ++i) {
+      HWY_DYNAMIC_DISPATCH(AddRun)
+      (table, plane, column, row, count, first_x + i * batch_side, first_y, scratch.data(),
+       sums + std::ptrdiff_t{i} * batch_tiles);
+    }
   } else {
     HWY_DYNAMIC_DISPATCH(AddStrip)
     (table, plane, column, row, count, first_x, first_y, batches, scratch.data(), sums);
