@@ -52,29 +52,23 @@ ImageSample sample(const PressImage& image, double prior, const glm::dvec2& plac
 
 }  // namespace
 
-void FusedMap::cover(std::int64_t x, std::int64_t y, std::int64_t nx, std::int64_t ny) {
-  const std::int64_t left = nx_ == 0 ? x : std::min(x, x_);
-  const std::int64_t low = nx_ == 0 ? y : std::min(y, y_);
-  const std::int64_t width = std::max(x + nx, nx_ == 0 ? x + nx : x_ + nx_) - left;
-  const std::int64_t height = std::max(y + ny, nx_ == 0 ? y + ny : y_ + ny_) - low;
-  if (left == x_ && low == y_ && width == nx_ && height == ny_) {
+void FusedMap::make_room(const CellRange& needed) {
+  if (range_.contains(needed)) {
     return;
   }
-  if (width > most_cells / height) {
+  const CellRange larger = united(range_, needed);
+  if (larger.nx > most_cells / larger.ny) {
     throw Error(Fault::input, fmt::format("the map would have {} x {} cells of {} mm; use larger "
                                           "cells",
-                                          width, height, options_.cell_mm));
+                                          larger.nx, larger.ny, options_.cell_mm));
   }
-  std::vector<Cell> cells(static_cast<std::size_t>(width * height));
-  for (std::int64_t j = 0; j < ny_; ++j) {
-    std::copy_n(cells_.begin() + j * nx_, nx_,
-                cells.begin() + (j + y_ - low) * width + (x_ - left));
+  std::vector<Cell> cells(static_cast<std::size_t>(larger.nx * larger.ny));
+  for (std::int64_t j = 0; j < range_.ny; ++j) {
+    std::copy_n(cells_.begin() + j * range_.nx, range_.nx,
+                cells.begin() + static_cast<std::ptrdiff_t>(larger.index(range_.x, range_.y + j)));
   }
   cells_ = std::move(cells);
-  x_ = left;
-  y_ = low;
-  nx_ = width;
-  ny_ = height;
+  range_ = larger;
 }
 
 void FusedMap::change(const PressImage& image, const ImagePlace& place, int sign) {
@@ -90,17 +84,16 @@ void FusedMap::change(const PressImage& image, const ImagePlace& place, int sign
   constexpr double rounding = 1e-6;
   const glm::dvec2 from = glm::ceil(box.lower - rounding);
   const glm::dvec2 to = glm::floor(box.upper + rounding);
-  const auto x = static_cast<std::int64_t>(from.x);
-  const auto y = static_cast<std::int64_t>(from.y);
-  const auto nx = static_cast<std::int64_t>(to.x - from.x) + 1;
-  const auto ny = static_cast<std::int64_t>(to.y - from.y) + 1;
-  cover(x, y, nx, ny);
+  const CellRange covered{static_cast<std::int64_t>(from.x), static_cast<std::int64_t>(from.y),
+                          static_cast<std::int64_t>(to.x - from.x) + 1,
+                          static_cast<std::int64_t>(to.y - from.y) + 1};
+  make_room(covered);
   const double prior = log_odds_from_probability(image.prior);
   const Pose T_image_object = inverse(place.T_object_image);
   const glm::dvec2 along = rotate(T_image_object.theta_rad, {1.0, 0.0});
   const glm::dvec2 across(-along.y, along.x);
-  for (std::int64_t j = y; j < y + ny; ++j) {
-    for (std::int64_t i = x; i < x + nx; ++i) {
+  for (std::int64_t j = covered.y; j < covered.y + covered.ny; ++j) {
+    for (std::int64_t i = covered.x; i < covered.x + covered.nx; ++i) {
       const glm::dvec2 centre =
           options_.cell_mm * glm::dvec2(static_cast<double>(i), static_cast<double>(j));
       glm::dvec2 p = T_image_object.translation_mm + centre.x * along + centre.y * across;
@@ -109,7 +102,7 @@ void FusedMap::change(const PressImage& image, const ImagePlace& place, int sign
       if (here.share < 0.5) {
         continue;
       }
-      Cell& cell = cells_[static_cast<std::size_t>((j - y_) * nx_ + i - x_)];
+      Cell& cell = cells_[range_.index(i, j)];
       const double weight = sign * place.weight;
       cell.presses += sign;
       cell.weight += weight;
@@ -120,46 +113,32 @@ void FusedMap::change(const PressImage& image, const ImagePlace& place, int sign
 }
 
 OccupancyGrid FusedMap::map(const std::string& label) const {
-  std::int64_t left = nx_;
-  std::int64_t right = -1;
-  std::int64_t low = ny_;
-  std::int64_t high = -1;
-  for (std::int64_t j = 0; j < ny_; ++j) {
-    for (std::int64_t i = 0; i < nx_; ++i) {
-      if (cells_[static_cast<std::size_t>(j * nx_ + i)].presses > 0) {
-        left = std::min(left, i);
-        right = std::max(right, i);
-        low = std::min(low, j);
-        high = j;
+  CellRange observed;
+  for (std::int64_t j = range_.y; j < range_.y + range_.ny; ++j) {
+    for (std::int64_t i = range_.x; i < range_.x + range_.nx; ++i) {
+      if (cells_[range_.index(i, j)].presses > 0) {
+        observed = united(observed, {i, j, 1, 1});
       }
     }
   }
-  OccupancyGrid map;
-  map.label = label;
-  map.cell_mm = options_.cell_mm;
-  map.prior = options_.sensor.prior;
-  map.spread_mm = options_.sensor.spread_mm;
+  const bool nothing = observed.nx == 0;
+  OccupancyGrid map = map_frame(options_, label, nothing ? CellRange{0, 0, 1, 1} : observed);
   const double prior = map.prior_log_odds();
-  if (right < 0) {
-    map.nx = map.ny = 1;
+  if (nothing) {
     map.spread_mm = {};
     map.log_odds = {static_cast<float>(prior)};
     map.observations = map.mean_level = {0.0F};
     return map;
   }
-  map.origin_mm =
-      map.cell_mm * glm::dvec2(static_cast<double>(x_ + left), static_cast<double>(y_ + low));
-  map.nx = static_cast<int>(right - left + 1);
-  map.ny = static_cast<int>(high - low + 1);
-  for (std::int64_t j = low; j <= high; ++j) {
-    for (std::int64_t i = left; i <= right; ++i) {
-      const Cell& cell = cells_[static_cast<std::size_t>(j * nx_ + i)];
-      const bool observed = cell.presses > 0;
+  for (std::int64_t j = observed.y; j < observed.y + observed.ny; ++j) {
+    for (std::int64_t i = observed.x; i < observed.x + observed.nx; ++i) {
+      const Cell& cell = cells_[range_.index(i, j)];
+      const bool seen = cell.presses > 0;
       map.log_odds.push_back(
-          static_cast<float>(observed ? prior + cell.evidence / cell.weight : prior));
+          static_cast<float>(seen ? prior + cell.evidence / cell.weight : prior));
       map.observations.push_back(static_cast<float>(cell.presses));
       map.mean_level.push_back(
-          static_cast<float>(observed ? std::max(0.0, cell.level / cell.weight) : 0.0));
+          static_cast<float>(seen ? std::max(0.0, cell.level / cell.weight) : 0.0));
     }
   }
   return map;

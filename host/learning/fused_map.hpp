@@ -1,10 +1,9 @@
 #pragma once
 
-#include <cstddef>
-#include <cstdint>
 #include <string>
 #include <vector>
 
+#include "cell_range.hpp"
 #include "palpate/map_builder.hpp"
 #include "palpate/occupancy_grid.hpp"
 #include "palpate/pose.hpp"
@@ -46,15 +45,12 @@ class FusedMap {
   };
 
   void change(const PressImage& image, const ImagePlace& place, int sign);
-  /// Makes room for cells [x, x + nx) x [y, y + ny).
-  void cover(std::int64_t x, std::int64_t y, std::int64_t nx, std::int64_t ny);
+  /// Makes room for cells.
+  void make_room(const CellRange& needed);
 
   MapOptions options_;
-  std::int64_t x_ = 0;  ///< cell (0, 0) is centred at cell_mm (x, y)
-  std::int64_t y_ = 0;
-  std::int64_t nx_ = 0;
-  std::int64_t ny_ = 0;
-  std::vector<Cell> cells_;  ///< [ny, nx]
+  CellRange range_;
+  std::vector<Cell> cells_;  ///< of the range, [ny, nx]
 };
 
 }  // namespace palpate

@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "bounding_box.hpp"
+#include "cell_range.hpp"
 #include "element_spacing.hpp"
 #include "palpate/contact.hpp"
 #include "palpate/error.hpp"
@@ -16,52 +17,29 @@ namespace palpate {
 
 namespace {
 
-/// Cells [x, x + nx) x [y, y + ny), where cell (i, j) is centred at cell_mm * (i, j).
-struct Cells {
-  double cell_mm = 0.0;
-  std::int64_t x = 0;
-  std::int64_t y = 0;
-  std::int64_t nx = 0;
-  std::int64_t ny = 0;
-
-  std::size_t count() const { return static_cast<std::size_t>(nx * ny); }
-
-  /// Calls visit(index, squared distance in mm^2) for every cell whose centre lies within
-  /// `radius_mm` of a place.
-  template <typename Visit>
-  void visit_near(const glm::dvec2& place_mm, double radius_mm, const Visit& visit) const {
-    const auto from = [&](double mm, std::int64_t first) {
-      return std::max(first, static_cast<std::int64_t>(std::ceil((mm - radius_mm) / cell_mm)));
-    };
-    const auto to = [&](double mm, std::int64_t end) {
-      return std::min(end - 1, static_cast<std::int64_t>(std::floor((mm + radius_mm) / cell_mm)));
-    };
-    for (std::int64_t j = from(place_mm.y, y); j <= to(place_mm.y, y + ny); ++j) {
-      const double dy = cell_mm * static_cast<double>(j) - place_mm.y;
-      for (std::int64_t i = from(place_mm.x, x); i <= to(place_mm.x, x + nx); ++i) {
-        const double dx = cell_mm * static_cast<double>(i) - place_mm.x;
-        if (const double squared = dx * dx + dy * dy; squared <= radius_mm * radius_mm) {
-          visit(static_cast<std::size_t>((j - y) * nx + i - x), squared);
-        }
+/// Calls visit(index in the range, squared distance in mm^2) for every cell of a range whose centre
+/// lies within `radius_mm` of a place.
+template <typename Visit>
+void visit_near(const CellRange& cells, double cell_mm, const glm::dvec2& place_mm,
+                double radius_mm, const Visit& visit) {
+  const auto from = [&](double mm, std::int64_t first) {
+    return std::max(first, static_cast<std::int64_t>(std::ceil((mm - radius_mm) / cell_mm)));
+  };
+  const auto to = [&](double mm, std::int64_t end) {
+    return std::min(end - 1, static_cast<std::int64_t>(std::floor((mm + radius_mm) / cell_mm)));
+  };
+  for (std::int64_t j = from(place_mm.y, cells.y); j <= to(place_mm.y, cells.y + cells.ny); ++j) {
+    const double dy = cell_mm * static_cast<double>(j) - place_mm.y;
+    for (std::int64_t i = from(place_mm.x, cells.x); i <= to(place_mm.x, cells.x + cells.nx); ++i) {
+      const double dx = cell_mm * static_cast<double>(i) - place_mm.x;
+      if (const double squared = dx * dx + dy * dy; squared <= radius_mm * radius_mm) {
+        visit(cells.index(i, j), squared);
       }
     }
   }
-};
-
-/// The cells whose centres lie within `margin_mm` of a box; at least one.
-Cells cells_around(const BoundingBox& box, double margin_mm, double cell_mm) {
-  const glm::dvec2 first = glm::ceil((box.lower - margin_mm) / cell_mm);
-  const glm::dvec2 last = glm::floor((box.upper + margin_mm) / cell_mm);
-  const glm::dvec2 count = glm::max(glm::dvec2(1.0), last - first + 1.0);
-  if (!(count.x * count.y <= static_cast<double>(most_cells))) {
-    throw Error(Fault::input,
-                fmt::format("the map would have {:.3g} x {:.3g} cells of {} mm; use larger cells, "
-                            "or touches that lie closer together",
-                            count.x, count.y, cell_mm));
-  }
-  return {cell_mm, static_cast<std::int64_t>(first.x), static_cast<std::int64_t>(first.y),
-          static_cast<std::int64_t>(count.x), static_cast<std::int64_t>(count.y)};
 }
+
+std::size_t count(const CellRange& cells) { return static_cast<std::size_t>(cells.nx * cells.ny); }
 
 /// A touch's known elements, in the robot frame.
 struct KnownTouch {
@@ -72,18 +50,20 @@ struct KnownTouch {
 /// The sums over touches of all layers of a map.
 class Layers {
  public:
-  Layers(const Cells& cells, const InverseSensorModel& sensor)
+  Layers(const CellRange& cells, const MapOptions& options)
       : cells_(cells),
-        sensor_(sensor),
-        log_odds_(cells.count(), log_odds_from_probability(sensor.prior)),
-        observations_(cells.count(), 0.0),
-        level_(cells.count(), 0.0) {}
+        cell_mm_(options.cell_mm),
+        sensor_(options.sensor),
+        log_odds_(count(cells), log_odds_from_probability(sensor_.prior)),
+        observations_(count(cells), 0.0),
+        level_(count(cells), 0.0) {}
 
   void add_evidence(const KnownTouch& of, double radius_mm) {
     for (const ElementReading& reading : of.known) {
-      cells_.visit_near(reading.position_mm, radius_mm, [&](std::size_t cell, double squared) {
-        log_odds_[cell] += sensor_.increment(reading.reading, std::sqrt(squared));
-      });
+      visit_near(cells_, cell_mm_, reading.position_mm, radius_mm,
+                 [&](std::size_t cell, double squared) {
+                   log_odds_[cell] += sensor_.increment(reading.reading, std::sqrt(squared));
+                 });
     }
   }
 
@@ -101,34 +81,33 @@ class Layers {
     for (const ElementReading& reading : of.known) {
       box.take_in(reading.position_mm);
     }
-    const Cells around = cells_around(box, near_mm, cells_.cell_mm);
-    std::vector<std::uint8_t> seen(around.count(), 0);
+    const CellRange around = cover(box.lower, box.upper, near_mm, cell_mm_);
+    std::vector<std::uint8_t> seen(count(around), 0);
     for (const ElementReading& reading : of.known) {
-      around.visit_near(reading.position_mm, near_mm,
-                        [&](std::size_t cell, double) { seen[cell] = 1; });
+      visit_near(around, cell_mm_, reading.position_mm, near_mm,
+                 [&](std::size_t cell, double) { seen[cell] = 1; });
     }
-    std::vector<double> weight(around.count(), 0.0);
-    std::vector<double> weighted(around.count(), 0.0);
+    std::vector<double> weight(count(around), 0.0);
+    std::vector<double> weighted(count(around), 0.0);
     for (std::size_t e = 0; e < touch.pressure.size(); ++e) {
       const bool living = touch.valid.empty() || touch.valid[e] != 0;
       if (!living || std::isnan(touch.pressure[e])) {
         continue;
       }
       const double pressure = std::max(0.0, touch.pressure[e]);
-      around.visit_near(touch.T_robot_sensor * touch.elements_mm[e], radius_mm,
-                        [&](std::size_t cell, double squared) {
-                          const double w = std::exp(-squared / (2.0 * deviation_mm * deviation_mm));
-                          weight[cell] += w;
-                          weighted[cell] += w * pressure;
-                        });
+      visit_near(around, cell_mm_, touch.T_robot_sensor * touch.elements_mm[e], radius_mm,
+                 [&](std::size_t cell, double squared) {
+                   const double w = std::exp(-squared / (2.0 * deviation_mm * deviation_mm));
+                   weight[cell] += w;
+                   weighted[cell] += w * pressure;
+                 });
     }
-    for (std::int64_t j = std::max(around.y, cells_.y);
-         j < std::min(around.y + around.ny, cells_.y + cells_.ny); ++j) {
-      for (std::int64_t i = std::max(around.x, cells_.x);
-           i < std::min(around.x + around.nx, cells_.x + cells_.nx); ++i) {
-        const auto here = static_cast<std::size_t>((j - around.y) * around.nx + i - around.x);
+    const CellRange both = common(around, cells_);
+    for (std::int64_t j = both.y; j < both.y + both.ny; ++j) {
+      for (std::int64_t i = both.x; i < both.x + both.nx; ++i) {
+        const std::size_t here = around.index(i, j);
         if (seen[here] != 0) {
-          const auto cell = static_cast<std::size_t>((j - cells_.y) * cells_.nx + i - cells_.x);
+          const std::size_t cell = cells_.index(i, j);
           observations_[cell] += 1.0;
           level_[cell] += weighted[here] / weight[here];
         }
@@ -138,7 +117,7 @@ class Layers {
 
   /// The map's cells, in float32.
   void store(OccupancyGrid& map) const {
-    for (std::size_t cell = 0; cell < cells_.count(); ++cell) {
+    for (std::size_t cell = 0; cell < count(cells_); ++cell) {
       const double touches = observations_[cell];
       map.log_odds.push_back(static_cast<float>(log_odds_[cell]));
       map.observations.push_back(static_cast<float>(touches));
@@ -147,30 +126,19 @@ class Layers {
   }
 
  private:
-  Cells cells_;
+  CellRange cells_;
+  double cell_mm_;
   InverseSensorModel sensor_;
   std::vector<double> log_odds_;
   std::vector<double> observations_;
   std::vector<double> level_;  ///< sum over the touches that sensed the cell
 };
 
-void validate(const MapOptions& options) {
-  if (!(options.cell_mm >= least_length_mm && options.cell_mm <= most_length_mm)) {
-    throw Error(Fault::input, fmt::format("cell size = {} mm: give {:g} to {:g} mm",
-                                          options.cell_mm, least_length_mm, most_length_mm));
-  }
-  options.sensor.validate();
-  options.classifier.validate();
-}
-
 }  // namespace
 
 OccupancyGrid observed_map(std::span<const Touch> touches, const MapOptions& options,
                            const std::string& label) {
-  validate(options);
-  // The radius of MapBuilder, so that both make maps of the same cells.
-  constexpr std::size_t least_readings = 8192;
-  constexpr double cut_tolerance = 5e-4;
+  options.validate();
   std::vector<KnownTouch> all;
   std::size_t readings = 0;
   BoundingBox box;
@@ -190,23 +158,15 @@ OccupancyGrid observed_map(std::span<const Touch> touches, const MapOptions& opt
                             "Contact; check the threshold and the pressure's unit",
                             label));
   }
-  const double radius_mm =
-      options.sensor.support_radius_mm(16 * std::max(readings, least_readings), cut_tolerance);
-  const Cells cells = cells_around(box, radius_mm, options.cell_mm);
-  Layers layers(cells, options.sensor);
+  // The radius of MapBuilder, so that both make maps of the same cells.
+  const double radius_mm = support_radius_mm(options.sensor, readings);
+  const CellRange cells = cover(box.lower, box.upper, radius_mm, options.cell_mm);
+  Layers layers(cells, options);
   for (const KnownTouch& touch : all) {
     layers.add_evidence(touch, radius_mm);
     layers.add_observation(touch);
   }
-  OccupancyGrid map;
-  map.label = label;
-  map.prior = options.sensor.prior;
-  map.cell_mm = options.cell_mm;
-  map.spread_mm = options.sensor.spread_mm;
-  map.origin_mm =
-      options.cell_mm * glm::dvec2(static_cast<double>(cells.x), static_cast<double>(cells.y));
-  map.nx = static_cast<int>(cells.nx);
-  map.ny = static_cast<int>(cells.ny);
+  OccupancyGrid map = map_frame(options, label, cells);
   layers.store(map);
   if (const auto fault = fault_of(map)) {
     throw Error(Fault::input, fmt::format("map '{}': {}", label, *fault));

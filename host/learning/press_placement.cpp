@@ -62,12 +62,13 @@ std::vector<float> PressPlacer::log_likelihoods(const std::vector<Element>& elem
   tbb::parallel_for(0, lattice_.theta_rad.count, [&](int theta) {
     std::vector<float> of_theta(plane, 0.0F);
     std::vector<float> unknown(plane, 0.0F);
+    const glm::dmat2 turn = rotation(lattice_.theta_rad.centre(theta));
     for (const Element& element : elements) {
       if (is_contact(element.reading)) {
         const auto level = static_cast<std::size_t>(element.reading) - 1;
-        add(of_theta, theta, element.from_pivot_mm, contact_excess_[level]);
+        add(of_theta, turn * element.from_pivot_mm, contact_excess_[level]);
       } else if (element.reading == Reading::unknown) {
-        add(unknown, theta, element.from_pivot_mm, no_contact_);
+        add(unknown, turn * element.from_pivot_mm, no_contact_);
       }
     }
     for (std::size_t i = 0; i < plane; ++i) {
@@ -176,16 +177,16 @@ void PressPlacer::sum_rest(const std::vector<Element>& elements) {
   rest_.assign(static_cast<std::size_t>(lattice_.bins()), 0.0F);
   tbb::parallel_for(0, lattice_.theta_rad.count, [&](int theta) {
     std::vector<float> of_theta(plane, 0.0F);
+    const glm::dmat2 turn = rotation(lattice_.theta_rad.centre(theta));
     for (const glm::dvec2& place : resting_) {
-      add(of_theta, theta, place, no_contact_);
+      add(of_theta, turn * place, no_contact_);
     }
     std::ranges::copy(of_theta, rest_.begin() + static_cast<std::ptrdiff_t>(plane) * theta);
   });
 }
 
-void PressPlacer::add(std::vector<float>& bins, int theta, const glm::dvec2& from_pivot_mm,
+void PressPlacer::add(std::vector<float>& bins, const glm::dvec2& turned,
                       const std::vector<float>& table) const {
-  const glm::dvec2 turned = rotate(lattice_.theta_rad.centre(theta), from_pivot_mm);
   const int u = x_.nearest(lattice_.x_mm.centre(0) + turned.x);
   const int v = y_.nearest(lattice_.y_mm.centre(0) + turned.y);
   const auto width = static_cast<std::size_t>(x_.columns);

@@ -26,8 +26,8 @@ struct PressPlacement {
 /// steps, so that an element adds rows of the table to rows of bins. Elements are taken to the
 /// nearest sample, at most half a cell of the map away along each axis; the best bins by these sums
 /// are then evaluated without. No Contact everywhere is summed once for all presses of one array at
-/// one place. Takes all host threads; not thread-safe, but
-/// objects of their own may work side by side.
+/// one place. Takes all host threads; not thread-safe, but objects of their own may work side by
+/// side.
 class PressPlacer {
  public:
   /// @param hypothesis with a layer where the contact model has a table over one; its weight is
@@ -67,7 +67,8 @@ class PressPlacer {
   void cover(double reach_mm);
   void sum_rest(const std::vector<Element>& elements);
   /// Adds a table to the bins of one theta, at an element's places.
-  void add(std::vector<float>& bins, int theta, const glm::dvec2& from_pivot_mm,
+  /// @param turned the element relative to the pivot, in mm along the object frame's axes
+  void add(std::vector<float>& bins, const glm::dvec2& turned,
            const std::vector<float>& table) const;
   double log_likelihood(const std::vector<Element>& elements, const Pose& T_object_robot) const;
 

@@ -24,6 +24,10 @@ namespace {
 constexpr double table_share = 0.4;
 constexpr double validation_share = 0.3;              ///< of Eq. 7, and of the table
 constexpr double step_rad = std::numbers::pi / 18.0;  ///< of the poses at which presses are placed
+/// Readings times maps times bins of a cross-validation: some 15 s of one core.
+constexpr double most_additions = 2.5e10;
+/// Steps of bins that suffice for refined poses, over the spread of the maps.
+constexpr double of_spread = 1.2;
 
 /// A calibration in the making.
 class SensorLearning {
@@ -186,8 +190,32 @@ class SensorLearning {
     how.contact = {.classifier = result_.sensor.classifier,
                    .gamma = ContactModel{}.gamma,
                    .prior = result_.sensor.prior};
-    how.lattice = placing_lattice(maps_, spacing_mm_, step_rad);
+    how.lattice = compared_lattice();
     return how;
+  }
+
+  /// The poses at which touches are compared with maps. At known poses, bins are about as fine as
+  /// `palpate recognize` takes them: between wider ones a table looks less sure than it is.
+  PoseLattice compared_lattice() const {
+    const PoseLattice wide = placing_lattice(maps_, spacing_mm_, step_rad);
+    if (!known_poses_) {
+      return wide;
+    }
+    std::set<std::string> labels;
+    for (const TrainingMap& map : maps_) {
+      labels.insert(map.map.label);
+    }
+    double readings = 0.0;
+    for (const Press& press : presses_) {
+      for (const Touch& touch : press.touches) {
+        const std::vector<Reading> of = result_.sensor.classifier.classify(touch);
+        readings += static_cast<double>(of.size() - std::ranges::count(of, Reading::no_contact));
+      }
+    }
+    const double bins = most_additions / (readings * static_cast<double>(labels.size()));
+    const double finer = std::min(std::cbrt(bins / static_cast<double>(wide.bins())),
+                                  spacing_mm_ / (of_spread * result_.sensor.spread_mm));
+    return finer > 1.0 ? placing_lattice(maps_, spacing_mm_ / finer, step_rad / finer) : wide;
   }
 
   /// Counts the placed presses over log odds.

@@ -5,36 +5,12 @@
 #include <string>
 #include <vector>
 
+#include "cell_range.hpp"
 #include "command_stream.hpp"
 #include "palpate/contact.hpp"
 #include "palpate/sensor_model.hpp"
 
 namespace palpate {
-
-/// Cells [x, x + nx) x [y, y + ny), where cell (i, j) is centred at cell_mm * (i, j).
-struct CellRange {
-  std::int64_t x = 0;
-  std::int64_t y = 0;
-  std::int64_t nx = 0;
-  std::int64_t ny = 0;
-
-  bool contains(const CellRange& other) const;
-  /// Index of cell (i, j) in row-major order.
-  std::size_t index(std::int64_t i, std::int64_t j) const {
-    return static_cast<std::size_t>((j - y) * nx + i - x);
-  }
-};
-
-/// Returns the smallest range that holds both; an empty range adds nothing.
-CellRange united(const CellRange& a, const CellRange& b);
-/// Returns the cells that both hold; nx or ny is at most 0 where there are none.
-CellRange common(const CellRange& a, const CellRange& b);
-
-/// Returns the cells whose centres lie within `margin_mm` of the rectangle, whose corners must lie
-/// within `farthest_mm`.
-/// @throws Error where these are more than most_cells
-CellRange cover(const glm::dvec2& lowest_mm, const glm::dvec2& highest_mm, double margin_mm,
-                double cell_mm);
 
 /// Sums the log-odds increments of readings per cell on the device (Eq. 4-6), in two floats, so
 /// that each sum is exact to float32 for any number of readings. The grid grows with the readings.

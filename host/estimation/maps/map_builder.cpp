@@ -15,8 +15,6 @@ namespace palpate {
 
 namespace {
 
-// Half of the documented tolerance in nats; the other half is for float32 rounding.
-constexpr double cut_tolerance = 5e-4;
 // Most readings that wait on the host: bounds the memory that a long recording takes.
 constexpr std::size_t pending_readings = 1 << 18;
 
@@ -41,11 +39,8 @@ struct MapBuilder::Impl {
   Impl(Device& device, const MapOptions& wanted)
       : options(wanted), grid(device.context(), wanted.cell_mm, wanted.sensor) {}
 
-  /// Radius in mm at which the Gaussian of the next readings is cut off. Reading i may lose
-  /// tolerance / (16 max(i, 8192)) nats: together below the tolerance for up to 10^10 readings.
   double radius_mm(const Seen& all) const {
-    return options.sensor.support_radius_mm(16 * std::max<std::size_t>(all.readings, 8192),
-                                            cut_tolerance);
+    return support_radius_mm(options.sensor, all.readings);
   }
 
   /// Returns the cells of a map of all these readings. Throws Error where they are too many.
@@ -68,12 +63,7 @@ struct MapBuilder::Impl {
 };
 
 MapBuilder::MapBuilder(Device& device, const MapOptions& options) {
-  if (!(options.cell_mm >= least_length_mm && options.cell_mm <= most_length_mm)) {
-    throw Error(Fault::input, fmt::format("cell size = {} mm: give {:g} to {:g} mm",
-                                          options.cell_mm, least_length_mm, most_length_mm));
-  }
-  options.sensor.validate();
-  options.classifier.validate();
+  options.validate();
   impl_ = std::make_unique<Impl>(device, options);
 }
 
@@ -125,16 +115,7 @@ OccupancyGrid MapBuilder::build(const std::string& label) {
   all.half_done.change([&] { all.flush(); });
   const MapOptions& options = all.options;
   const CellRange range = all.range_of(all.seen);
-  OccupancyGrid map;
-  map.label = label;
-  map.prior = options.sensor.prior;
-  map.cell_mm = options.cell_mm;
-  map.spread_mm = options.sensor.spread_mm;
-  // Origins are whole multiples of the cell, so that maps can be compared cell by cell.
-  map.origin_mm =
-      options.cell_mm * glm::dvec2(static_cast<double>(range.x), static_cast<double>(range.y));
-  map.nx = static_cast<int>(range.nx);
-  map.ny = static_cast<int>(range.ny);
+  OccupancyGrid map = map_frame(options, label, range);
   const double prior = map.prior_log_odds();
   for (const double sum : all.grid.sums(range)) {
     map.log_odds.push_back(static_cast<float>(prior + sum));
@@ -156,7 +137,7 @@ void MapBuilder::clear() {
 double estimate_prior(Device& device, std::span<const ObjectTouches> objects, MapOptions options) {
   options.sensor.prior = 0.5;
   // Evidence below the map's own tolerance counts as none.
-  constexpr double no_evidence = 2.0 * cut_tolerance;
+  constexpr double no_evidence = 2.0 * map_cut_tolerance;
   std::size_t occupied = 0;
   std::size_t modelled = 0;
   MapBuilder builder(device, options);

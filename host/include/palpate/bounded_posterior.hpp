@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "palpate/api.hpp"
 #include "palpate/contact_model.hpp"
 #include "palpate/device.hpp"
 #include "palpate/estimate.hpp"
@@ -58,12 +59,14 @@ struct PoseBlock {
 /// Histogram filter over object identity and planar pose that evaluates only the bins that matter
 /// and proves how little the others can. Its bins are those of PoseHistogram. Blocks of bins are
 /// bounded from above by tables of the smallest penalty within a window of the map; blocks that
-/// cannot matter are dropped, and the bins of the others are evaluated. Memory follows the maps,
-/// not the bins. The result does not depend on the order of touches (but that "none of these"
-/// counts the first one's place), on the number of threads or on the processor's vector width,
-/// unless a budget ends the search or a GPU evaluates bins faster than the host. An object that was
-/// moved from throws Error on every call.
-class BoundedPosterior {
+/// cannot matter are dropped, and the bins of the others are evaluated. Memory follows the maps and
+/// the region, or, where bins lie two cells of a map or more apart, the bins. An array that stays
+/// at its place from touch to touch, also across reset(), costs less from the third touch on: only
+/// elements that are not in No Contact are looked up. The result does not depend on the order of
+/// touches (but that "none of these" counts the first one's place), on the number of threads or on
+/// the processor's vector width, unless a budget ends the search or a GPU evaluates bins faster
+/// than the host. An object that was moved from throws Error on every call.
+class PALPATE_API BoundedPosterior {
  public:
   /// Builds the window tables of the maps.
   /// @throws Error on an empty list, a map that is not sound, maps of different priors where the
@@ -124,10 +127,10 @@ class BoundedPosterior {
   std::uint64_t host_bytes() const;
 
  private:
-  struct Impl;
-  Impl& impl() const;
+  struct PALPATE_LOCAL Impl;
+  PALPATE_LOCAL Impl& impl() const;
   /// impl(), where no update has left the belief half-way. @throws Error where one has
-  Impl& whole() const;
+  PALPATE_LOCAL Impl& whole() const;
   std::unique_ptr<Impl> impl_;
 };
 

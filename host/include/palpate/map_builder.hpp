@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "palpate/api.hpp"
 #include "palpate/contact.hpp"
 #include "palpate/device.hpp"
 #include "palpate/occupancy_grid.hpp"
@@ -13,18 +14,21 @@
 namespace palpate {
 
 /// Resolution, sensor model and contact classifier of a map.
-struct MapOptions {
+struct PALPATE_API MapOptions {
   double cell_mm = 0.5;       ///< edge of a cell
   InverseSensorModel sensor;  ///< also holds the prior
   ContactClassifier classifier;
+
+  /// Throws Error on a cell size, spread, peak, prior, threshold or ratio out of range.
+  void validate() const;
 };
 
 /// Builds an object's occupancy grid from touches at known poses (Sec. II) by adding up the
 /// log-odds increments of Eq. 4-6, in any order. The object frame is the robot frame of the
 /// touches. Every call on a moved-from builder throws Error.
-class MapBuilder {
+class PALPATE_API MapBuilder {
  public:
-  /// @throws Error on a cell size, spread, peak, prior, threshold or ratio out of range.
+  /// @throws Error as MapOptions::validate()
   MapBuilder(Device& device, const MapOptions& options);
   ~MapBuilder();
   MapBuilder(MapBuilder&&) noexcept;
@@ -48,8 +52,8 @@ class MapBuilder {
   void clear();
 
  private:
-  struct Impl;
-  Impl& impl() const;
+  struct PALPATE_LOCAL Impl;
+  PALPATE_LOCAL Impl& impl() const;
   std::unique_ptr<Impl> impl_;
 };
 
@@ -63,6 +67,7 @@ struct ObjectTouches {
 /// areas are counted on maps built with a prior of 0.5: a cell is occupied where its log odds
 /// exceed 1e-3 nats, and modelled where |log odds| does.
 /// @throws Error as MapBuilder does
-double estimate_prior(Device& device, std::span<const ObjectTouches> objects, MapOptions options);
+PALPATE_API double estimate_prior(Device& device, std::span<const ObjectTouches> objects,
+                                  MapOptions options);
 
 }  // namespace palpate
