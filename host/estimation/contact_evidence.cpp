@@ -2,6 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
+
+#include "contact_readings.hpp"
 
 namespace palpate {
 
@@ -68,11 +71,28 @@ bool ContactEvidence::operator==(const ContactEvidence& other) const {
 
 ContactEvidence gather_evidence(std::span<const Touch> touches, const ContactModel& model,
                                 const glm::dvec2& pivot_mm, std::size_t segment_elements) {
-  ContactEvidence evidence;
+  return EvidenceGatherer().gather(touches, model, pivot_mm, segment_elements);
+}
+
+const ContactEvidence& EvidenceGatherer::gather(std::span<const Touch> touches,
+                                                const ContactModel& model,
+                                                const glm::dvec2& pivot_mm,
+                                                std::size_t segment_elements) {
+  std::size_t elements = 0;
   for (const Touch& touch : touches) {
-    append(evidence, touch, model.classify(touch), Reading::unknown, pivot_mm, segment_elements);
+    elements += touch.pressure.size();
   }
-  return evidence;
+  evidence_.from_pivot_mm.clear();
+  evidence_.from_pivot_mm.reserve(elements);
+  evidence_.segments.clear();
+  // A segment for every reading of a touch, and for every part of one that is too long.
+  evidence_.segments.reserve(touches.size() * most_reading_levels + elements / segment_elements);
+  evidence_.counts = {};
+  for (const Touch& touch : touches) {
+    readings_ = classify(touch, model, std::move(readings_));
+    append(evidence_, touch, readings_, Reading::unknown, pivot_mm, segment_elements);
+  }
+  return evidence_;
 }
 
 ContactEvidence gather_evidence(const Touch& touch, std::span<const Reading> readings,
@@ -88,8 +108,10 @@ shaders::Split split(double coordinate_cells) { return split(coordinate_cells, e
 shaders::Split split_axis(double coordinate_cells) { return split(coordinate_cells, axis_beyond); }
 
 std::vector<shaders::RotatedElement> rotate_evidence(std::span<const glm::dvec2> from_pivot_mm,
-                                                     const Axis& theta_rad, double cell_mm) {
-  std::vector<shaders::RotatedElement> rotated;
+                                                     const Axis& theta_rad, double cell_mm,
+                                                     std::vector<shaders::RotatedElement> reuse) {
+  std::vector<shaders::RotatedElement> rotated = std::move(reuse);
+  rotated.clear();
   rotated.reserve(from_pivot_mm.size() * static_cast<std::size_t>(theta_rad.count));
   for (int t = 0; t < theta_rad.count; ++t) {
     const double c = std::cos(theta_rad.centre(t)) / cell_mm;

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstdint>
+#include <numeric>
 #include <span>
 #include <vector>
 
@@ -22,12 +23,28 @@ struct ContactEvidence {
   ReadingCounts counts{};  ///< of the whole touches, elements that stand in no segment included
 
   bool operator==(const ContactEvidence& other) const;
+  /// Number of elements of the whole touches.
+  std::size_t elements() const { return std::reduce(counts.begin(), counts.end()); }
 };
 
 /// Classifies the touches' elements (Eq. 3) and gathers those that are not Unknown. No segment is
 /// longer than `segment_elements`, what one dispatch takes.
 ContactEvidence gather_evidence(std::span<const Touch> touches, const ContactModel& model,
                                 const glm::dvec2& pivot_mm, std::size_t segment_elements);
+
+/// Gathers evidence as gather_evidence() does, again and again in the same memory: touches of no
+/// more elements than before allocate nothing, whatever they read.
+class EvidenceGatherer {
+ public:
+  /// The evidence stays until the next call.
+  const ContactEvidence& gather(std::span<const Touch> touches, const ContactModel& model,
+                                const glm::dvec2& pivot_mm, std::size_t segment_elements);
+  const ContactEvidence& evidence() const { return evidence_; }
+
+ private:
+  std::vector<Reading> readings_;
+  ContactEvidence evidence_;
+};
 
 /// Gathers the elements of a classified touch that read something else than `instead`. Each adds
 /// log L(reading) - log L(instead), with log L(Unknown) = 0: with No Contact, what the touch says
@@ -44,7 +61,9 @@ shaders::Split split(double coordinate_cells);
 shaders::Split split_axis(double coordinate_cells);
 
 /// Every element rotated by every theta of the lattice, in cells, [theta, element].
-std::vector<shaders::RotatedElement> rotate_evidence(std::span<const glm::dvec2> from_pivot_mm,
-                                                     const Axis& theta_rad, double cell_mm);
+/// @param reuse memory for the result
+std::vector<shaders::RotatedElement> rotate_evidence(
+    std::span<const glm::dvec2> from_pivot_mm, const Axis& theta_rad, double cell_mm,
+    std::vector<shaders::RotatedElement> reuse = {});
 
 }  // namespace palpate

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <vector>
+#include <limits>
 
 #include "palpate/occupancy_grid.hpp"
 
@@ -11,14 +11,13 @@ namespace palpate {
 double prior_log_likelihood(Reading reading, const ContactModel& model) {
   const MapSample prior{.log_odds = log_odds_from_probability(model.prior.value())};
   const std::size_t sets = model.table ? model.table->sets() : 1;
-  std::vector<double> logs;
+  double most = -std::numeric_limits<double>::infinity();
   for (std::size_t set = 0; set < sets; ++set) {
-    logs.push_back(model.log_likelihood(reading, prior, set));
+    most = std::max(most, model.log_likelihood(reading, prior, set));
   }
-  const double most = *std::max_element(logs.begin(), logs.end());
   double sum = 0.0;
-  for (const double l : logs) {
-    sum += std::exp(l - most);
+  for (std::size_t set = 0; set < sets; ++set) {
+    sum += std::exp(model.log_likelihood(reading, prior, set) - most);
   }
   return most + std::log(sum / static_cast<double>(sets));
 }

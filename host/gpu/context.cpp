@@ -1,12 +1,14 @@
 #include "context.hpp"
 
 #include <algorithm>
-#include <cstdio>
 #include <cstdlib>
 #include <cstring>
+#include <exception>
+#include <utility>
 
 #include <fmt/format.h>
 
+#include "log_message.hpp"
 #include "palpate/error.hpp"
 #include "result.hpp"
 #include "selection.hpp"
@@ -90,24 +92,60 @@ Instance::~Instance() {
         instance_, "vkDestroyDebugUtilsMessengerEXT")(instance_, messenger_, nullptr);
   }
   vkDestroyInstance(instance_, nullptr);
-  // A destructor cannot throw, yet a message about a leaked or misused object must not get lost.
+  // A destructor cannot throw, yet a message about a leaked or misused object must not get lost:
+  // std::terminate() ends the program with it.
   try {
     validation_.throw_if_any();
   } catch (const Error& error) {
-    std::fputs(error.what(), stderr);
-    std::fputc('\n', stderr);
-    std::abort();
+    log_message(LogLevel::error, error.what());
+    std::terminate();
   }
 }
 
-Context::Context(std::string_view name_or_index) {
+Context::Context(std::string_view name_or_index) : instance_(std::in_place) {
   const std::string wish = wished(name_or_index);
-  const std::vector<Candidate> all = candidates(instance_.handle(), wish);
+  const std::vector<Candidate> all = candidates(instance_->handle(), wish);
   const Candidate& candidate = chosen(all, wish);
   physical_ = candidate.physical;
   queue_family_ = candidate.queue_family;
-  name_ = candidate.info.name;
+  inspect();
 
+  const float priority = 1.0F;
+  const VkDeviceQueueCreateInfo queue_info{.sType = VK_STRUCTURE_TYPE_DEVICE_QUEUE_CREATE_INFO,
+                                           .queueFamilyIndex = queue_family_,
+                                           .queueCount = 1,
+                                           .pQueuePriorities = &priority};
+  const VkDeviceCreateInfo info{.sType = VK_STRUCTURE_TYPE_DEVICE_CREATE_INFO,
+                                .queueCreateInfoCount = 1,
+                                .pQueueCreateInfos = &queue_info};
+  check(vkCreateDevice(physical_, &info, nullptr, &device_),
+        fmt::format("opening device '{}'", name_));
+  vkGetDeviceQueue(device_, queue_family_, 0, &queue_);
+  log_message(LogLevel::info, fmt::format("device '{}': {}", name_, candidate.info.reason));
+}
+
+Context::Context(const VulkanDevice& handed_in)
+    : physical_(handed_in.physical_device),
+      device_(handed_in.device),
+      queue_(handed_in.queue),
+      queue_family_(handed_in.queue_family) {
+  if (handed_in.instance == VK_NULL_HANDLE || physical_ == VK_NULL_HANDLE ||
+      device_ == VK_NULL_HANDLE || queue_ == VK_NULL_HANDLE) {
+    throw Error(Fault::input,
+                "VulkanDevice: a handle is null; give instance, physical_device, device and queue");
+  }
+  if (handed_in.queue_mutex != nullptr) {
+    queue_mutex_ = handed_in.queue_mutex;
+  }
+  const std::string fault = fault_of(physical_, queue_family_);
+  if (!fault.empty()) {
+    throw Error(Fault::input, fmt::format("VulkanDevice: {}", fault));
+  }
+  inspect();
+  log_message(LogLevel::info, fmt::format("device '{}': handed in by the program", name_));
+}
+
+void Context::inspect() {
   VkPhysicalDeviceSubgroupProperties subgroup{
       .sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_SUBGROUP_PROPERTIES};
   VkPhysicalDeviceMaintenance3Properties maintenance{
@@ -115,6 +153,7 @@ Context::Context(std::string_view name_or_index) {
   VkPhysicalDeviceProperties2 properties{.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_PROPERTIES_2,
                                          .pNext = &maintenance};
   vkGetPhysicalDeviceProperties2(physical_, &properties);
+  name_ = properties.properties.deviceName;
   const VkPhysicalDeviceLimits& limits = properties.properties.limits;
   limits_.group_invocations = limits.maxComputeWorkGroupInvocations;
   std::copy_n(limits.maxComputeWorkGroupSize, 3, limits_.group_size);
@@ -134,28 +173,34 @@ Context::Context(std::string_view name_or_index) {
   }
   vkGetPhysicalDeviceMemoryProperties(physical_, &memory_);
   limits_.memory = device_memory(memory_);
-
-  const float priority = 1.0F;
-  const VkDeviceQueueCreateInfo queue_info{.sType = VK_STRUCTURE_TYPE_DEVICE_QUEUE_CREATE_INFO,
-                                           .queueFamilyIndex = queue_family_,
-                                           .queueCount = 1,
-                                           .pQueuePriorities = &priority};
-  const VkDeviceCreateInfo info{.sType = VK_STRUCTURE_TYPE_DEVICE_CREATE_INFO,
-                                .queueCreateInfoCount = 1,
-                                .pQueueCreateInfos = &queue_info};
-  check(vkCreateDevice(physical_, &info, nullptr, &device_),
-        fmt::format("opening device '{}'", name_));
-  vkGetDeviceQueue(device_, queue_family_, 0, &queue_);
 }
 
 Context::~Context() {
-  vkDeviceWaitIdle(device_);
-  vkDestroyDevice(device_, nullptr);
+  // Every command stream has waited for its own commands; the program's are not ours to wait for.
+  if (instance_ && device_ != VK_NULL_HANDLE) {
+    vkDestroyDevice(device_, nullptr);
+  }
+}
+
+VkResult Context::submit(const VkSubmitInfo& info, VkFence fence) {
+  const std::scoped_lock lock(*queue_mutex_);
+  return vkQueueSubmit(queue_, 1, &info, fence);
+}
+
+MemoryUse Context::memory_use() const {
+  const std::scoped_lock lock(memory_use_mutex_);
+  return memory_use_;
 }
 
 void Context::take_memory(VkDeviceSize bytes) {
+  const std::scoped_lock lock(memory_use_mutex_);
   memory_use_.now += bytes;
   memory_use_.peak = std::max(memory_use_.peak, memory_use_.now);
+}
+
+void Context::give_memory(VkDeviceSize bytes) {
+  const std::scoped_lock lock(memory_use_mutex_);
+  memory_use_.now -= bytes;
 }
 
 std::uint32_t Context::memory_type(std::uint32_t type_bits, VkMemoryPropertyFlags flags,

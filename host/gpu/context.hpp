@@ -1,8 +1,8 @@
 #pragma once
 
 #include <cstdint>
-#include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -10,6 +10,7 @@
 #include <vulkan/vulkan.h>
 
 #include "palpate/device.hpp"
+#include "palpate/vulkan_device.hpp"
 
 namespace palpate::gpu {
 
@@ -69,28 +70,33 @@ struct MemoryUse {
   VkDeviceSize peak = 0;
 };
 
-/// A logical device with one compute queue, opened as Device::open() says.
+/// A logical device with one compute queue, opened as Device::open() says, or the program's own.
+/// Several threads may use it at the same time, but for lower_limits().
 class Context {
  public:
   explicit Context(std::string_view name_or_index);
+  /// @throws Error as Device::share() says
+  explicit Context(const VulkanDevice& handed_in);
   ~Context();
   Context(const Context&) = delete;
   Context& operator=(const Context&) = delete;
 
   VkDevice device() const { return device_; }
-  VkQueue queue() const { return queue_; }
+  /// Submits to the queue; the commands of several threads take turns.
+  VkResult submit(const VkSubmitInfo& info, VkFence fence);
   std::uint32_t queue_family() const { return queue_family_; }
   const std::string& name() const { return name_; }
   const Limits& limits() const { return limits_; }
-  ValidationLog& validation() { return instance_.validation(); }
+  /// Stays empty on a device that was handed in: the program gets the messages of its instance.
+  ValidationLog& validation() { return instance_ ? instance_->validation() : nothing_said_; }
   /// Lowers the limits, so that a test on any device reaches the cases of much smaller devices and
   /// much larger problems.
   void lower_limits(const Limits& limits) { limits_ = limits; }
 
-  const MemoryUse& memory_use() const { return memory_use_; }
+  MemoryUse memory_use() const;
   /// Counts memory; buffers call this pair when they allocate memory and when they free it.
   void take_memory(VkDeviceSize bytes);
-  void give_memory(VkDeviceSize bytes) { memory_use_.now -= bytes; }
+  void give_memory(VkDeviceSize bytes);
 
   /// The first memory type in `type_bits` that has all of `flags`, and if possible all of
   /// `preferred`. @throws Error if no type has all of `flags`
@@ -98,14 +104,21 @@ class Context {
                             VkMemoryPropertyFlags preferred) const;
 
  private:
-  Instance instance_;
+  /// Reads what `physical_` and its queue family can do.
+  void inspect();
+
+  std::optional<Instance> instance_;  ///< none where the device was handed in
+  ValidationLog nothing_said_;
   VkPhysicalDevice physical_ = VK_NULL_HANDLE;
   VkDevice device_ = VK_NULL_HANDLE;
   VkQueue queue_ = VK_NULL_HANDLE;
+  std::mutex own_queue_mutex_;
+  std::mutex* queue_mutex_ = &own_queue_mutex_;
   std::uint32_t queue_family_ = 0;
   std::string name_;
   Limits limits_;
   VkPhysicalDeviceMemoryProperties memory_{};
+  mutable std::mutex memory_use_mutex_;
   MemoryUse memory_use_;
 };
 

@@ -19,6 +19,10 @@ Device Device::open(std::string_view name_or_index) {
   return Device(std::make_unique<gpu::Context>(name_or_index));
 }
 
+Device Device::share(const VulkanDevice& device) {
+  return Device(std::make_unique<gpu::Context>(device));
+}
+
 Device::Device(std::unique_ptr<gpu::Context> context) : context_(std::move(context)) {}
 Device::Device(Device&&) noexcept = default;
 Device& Device::operator=(Device&&) noexcept = default;

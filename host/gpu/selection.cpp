@@ -40,6 +40,10 @@ std::string version_text(std::uint32_t version) {
                      VK_API_VERSION_PATCH(version));
 }
 
+std::string too_old(std::uint32_t version) {
+  return fmt::format("supports Vulkan {}, 1.1 is needed", version_text(version));
+}
+
 /// A compute queue family, if possible without graphics, so that it does not wait for a desktop.
 std::optional<std::uint32_t> compute_family(VkPhysicalDevice physical) {
   const std::vector<VkQueueFamilyProperties> families = queue_families(physical);
@@ -81,7 +85,7 @@ Candidate inspect(VkPhysicalDevice physical, int index) {
 
   const auto family = compute_family(physical);
   if (!has_version_1_1) {
-    info.reason = fmt::format("supports Vulkan {}, 1.1 is needed", info.api);
+    info.reason = too_old(properties.apiVersion);
   } else if (!family) {
     info.reason = "has no compute queue";
   } else {
@@ -121,6 +125,21 @@ std::vector<VkQueueFamilyProperties> queue_families(VkPhysicalDevice physical) {
   std::vector<VkQueueFamilyProperties> families(count);
   vkGetPhysicalDeviceQueueFamilyProperties(physical, &count, families.data());
   return families;
+}
+
+std::string fault_of(VkPhysicalDevice physical, std::uint32_t queue_family) {
+  VkPhysicalDeviceProperties properties;
+  vkGetPhysicalDeviceProperties(physical, &properties);
+  if (properties.apiVersion < VK_API_VERSION_1_1) {
+    return fmt::format("device '{}' {}", properties.deviceName, too_old(properties.apiVersion));
+  }
+  const std::vector<VkQueueFamilyProperties> families = queue_families(physical);
+  if (queue_family >= families.size() ||
+      (families[queue_family].queueFlags & VK_QUEUE_COMPUTE_BIT) == 0) {
+    return fmt::format("queue_family = {}: device '{}' has no such family that computes",
+                       queue_family, properties.deviceName);
+  }
+  return {};
 }
 
 VkDeviceSize device_memory(const VkPhysicalDeviceMemoryProperties& memory) {

@@ -31,6 +31,9 @@ std::vector<Candidate> candidates(VkInstance instance, std::string_view name_or_
 
 std::vector<VkQueueFamilyProperties> queue_families(VkPhysicalDevice physical);
 
+/// Why a device and its queue family cannot be used; "" where they can.
+std::string fault_of(VkPhysicalDevice physical, std::uint32_t queue_family);
+
 /// Bytes of the largest heap of device memory.
 VkDeviceSize device_memory(const VkPhysicalDeviceMemoryProperties& memory);
 

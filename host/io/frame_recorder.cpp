@@ -17,6 +17,7 @@
 #include "hdf5_failure.hpp"
 #include "hdf5_writer.hpp"
 #include "input_file.hpp"
+#include "log_message.hpp"
 #include "lost_count.hpp"
 #include "palpate/error.hpp"
 #include "printable.hpp"
@@ -284,8 +285,8 @@ FrameRecorder::~FrameRecorder() {
   }
   try {
     close();
-  } catch (const Error&) {
-    // Callers who want to know call close().
+  } catch (const Error& error) {
+    log_message(LogLevel::error, error.what());  // callers who want to know call close()
   }
 }
 

@@ -3,9 +3,11 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include <fmt/format.h>
 
+#include "contact_readings.hpp"
 #include "palpate/error.hpp"
 
 namespace palpate {
@@ -49,8 +51,15 @@ void ContactClassifier::validate() const {
 }
 
 std::vector<Reading> ContactClassifier::classify(const Touch& touch) const {
-  validate();
+  return palpate::classify(touch, *this, {});
+}
+
+std::vector<Reading> classify(const Touch& touch, const ContactClassifier& classifier,
+                              std::vector<Reading> reuse) {
+  classifier.validate();
   require_sound(touch);
+  const double threshold = classifier.threshold;
+  const double ratio = classifier.ratio;
   const std::size_t e = touch.pressure.size();
   const auto alive = [&](std::size_t i) { return touch.valid.empty() || touch.valid[i] != 0; };
 
@@ -61,7 +70,8 @@ std::vector<Reading> ContactClassifier::classify(const Touch& touch) const {
     }
   }
 
-  std::vector<Reading> readings(e, Reading::unknown);
+  std::vector<Reading> readings = std::move(reuse);
+  readings.assign(e, Reading::unknown);
   for (std::size_t i = 0; i < e; ++i) {
     if (!alive(i)) {
       continue;

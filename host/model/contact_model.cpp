@@ -3,9 +3,11 @@
 #include <algorithm>
 #include <cmath>
 #include <span>
+#include <utility>
 
 #include <fmt/format.h>
 
+#include "contact_readings.hpp"
 #include "palpate/error.hpp"
 #include "palpate/occupancy_grid.hpp"
 
@@ -93,9 +95,14 @@ void ContactModel::validate() const {
 }
 
 std::vector<Reading> ContactModel::classify(const Touch& touch) const {
-  std::vector<Reading> readings = classifier.classify(touch);
-  if (table) {
-    const std::vector<double>& edges = table->level_edges;
+  return palpate::classify(touch, *this, {});
+}
+
+std::vector<Reading> classify(const Touch& touch, const ContactModel& model,
+                              std::vector<Reading> reuse) {
+  std::vector<Reading> readings = classify(touch, model.classifier, std::move(reuse));
+  if (model.table) {
+    const std::vector<double>& edges = model.table->level_edges;
     for (std::size_t i = 0; i < readings.size(); ++i) {
       if (readings[i] == Reading::in_contact) {
         const auto reached = std::upper_bound(edges.begin(), edges.end(), touch.pressure[i]);

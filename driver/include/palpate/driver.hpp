@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "palpate/api.hpp"
 #include "palpate/sensor.hpp"
 
 namespace palpate {
@@ -32,11 +33,11 @@ struct BoardInfo {
 /// Lists every USB device except hubs, by bus and address. Reads the geometry of each known board
 /// that no program uses. Claims no interface, so that running streams are not disturbed.
 /// @throws Error (Fault::system) if the USB cannot be used
-std::vector<BoardInfo> list_boards();
+PALPATE_API std::vector<BoardInfo> list_boards();
 
 /// The profile file that open_board() would read for this name; none for "takktile".
 /// @throws Error (Fault::input) if the name is malformed
-std::optional<std::filesystem::path> board_file(const std::string& name);
+PALPATE_API std::optional<std::filesystem::path> board_file(const std::string& name);
 
 /// Opens a board and reads its geometry and calibration. Sensor::start() begins the stream.
 ///
@@ -52,6 +53,6 @@ std::optional<std::filesystem::path> board_file(const std::string& name);
 /// stop(), the sensor reads the USB in a thread of its own.
 /// @throws Error (Fault::input) if the name is wrong or no such board is plugged in,
 ///         (Fault::system) if the board cannot be opened: no permission, in use, or no answer
-std::unique_ptr<Sensor> open_board(const std::string& name);
+PALPATE_API std::unique_ptr<Sensor> open_board(const std::string& name);
 
 }  // namespace palpate

@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 #include <tbb/parallel_for.h>
 
+#include "log_message.hpp"
 #include "palpate/error.hpp"
 
 namespace palpate {
@@ -142,6 +143,7 @@ void FasterBinLikelihood::measure(std::span<const BinBox> boxes, const KnownElem
     device_.reset();
     place_ = BinPlace::host;
     path_ = fmt::format("bins on the host: {}", error.what());
+    log_message(LogLevel::warning, path_);
     return;
   }
   const double host_ns = 1e9 * host_s;

@@ -154,36 +154,40 @@ void DenseLikelihood::accumulate(const ContactEvidence& evidence, const DenseBel
   const double all_work = bins * static_cast<double>(evidence.from_pivot_mm.size());
   double done = 0.0;
   double pending = 0.0;
-  reserve(std::min(evidence.from_pivot_mm.size(), batch_elements_));
+  // For the whole touches, so that the next ones, of which more may be known, find room.
+  const std::size_t most = std::min(evidence.elements(), batch_elements_);
+  reserve(most);
+  batch_.reserve(segments.capacity());
+  rotated_.reserve(most * static_cast<std::size_t>(lattice_.theta_rad.count));
 
   for (std::size_t s = 0; s < segments.size();) {
     // As many whole segments as the table holds and as the kernel's loops take together: up to two
     // iterations for an element and eight for a segment.
     const std::size_t first = segments[s].begin;
-    std::vector<shaders::Segment> batch;
+    batch_.clear();
     const auto fits = [&](const shaders::Segment& next) {
       const std::size_t elements = next.end - first;
       return elements <= batch_elements_ &&
-             elements + 4 * (batch.size() + 1) <= gpu::most_iterations;
+             elements + 4 * (batch_.size() + 1) <= gpu::most_iterations;
     };
     for (; s < segments.size() && fits(segments[s]); ++s) {
-      batch.push_back(segments[s]);
-      batch.back().begin -= static_cast<shaders::uint>(first);
-      batch.back().end -= static_cast<shaders::uint>(first);
+      batch_.push_back(segments[s]);
+      batch_.back().begin -= static_cast<shaders::uint>(first);
+      batch_.back().end -= static_cast<shaders::uint>(first);
     }
-    const std::size_t elements = batch.back().end;
-    stream_.upload(segments_, batch);
+    const std::size_t elements = batch_.back().end;
+    stream_.upload(segments_, batch_);
 
     for (const Group& group : groups_) {
-      stream_.upload(elements_,
-                     rotate_evidence(std::span(evidence.from_pivot_mm).subspan(first, elements),
-                                     lattice_.theta_rad, group.kind.cell_mm));
+      rotated_ = rotate_evidence(std::span(evidence.from_pivot_mm).subspan(first, elements),
+                                 lattice_.theta_rad, group.kind.cell_mm, std::move(rotated_));
+      stream_.upload(elements_, rotated_);
       for (const Slab& slab : belief.slabs()) {
         const Range range = within(group, slab);
         if (range.count == 0) {
           continue;
         }
-        dispatch(group, range, slab, batch.size(), elements);
+        dispatch(group, range, slab, batch_.size(), elements);
         pending += static_cast<double>(range.count * slab.bins()) * static_cast<double>(elements);
         if (pending > work_per_run(context_.limits())) {
           stream_.run();

@@ -80,6 +80,8 @@ class DenseLikelihood {
   std::size_t batch_elements_ = 0;  ///< most elements in the tables
   gpu::Buffer elements_;
   gpu::Buffer segments_;
+  std::vector<shaders::Segment> batch_;           ///< what goes to segments_
+  std::vector<shaders::RotatedElement> rotated_;  ///< what goes to elements_
 };
 
 }  // namespace palpate

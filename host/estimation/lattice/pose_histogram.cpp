@@ -55,8 +55,8 @@ struct PoseHistogram::Impl {
     summaries();  // runs what was recorded, and the reductions a first time
   }
 
-  ContactEvidence gather(std::span<const Touch> touches) const {
-    return gather_evidence(touches, options.contact, options.lattice.pivot_mm,
+  const ContactEvidence& gather(std::span<const Touch> touches) {
+    return gatherer.gather(touches, options.contact, options.lattice.pivot_mm,
                            likelihood.segment_elements());
   }
 
@@ -64,12 +64,11 @@ struct PoseHistogram::Impl {
   void update(std::span<const Touch> touches, const std::function<void(double)>& progress) {
     // All touches are gathered before the first is added: one that is not sound refuses all.
     std::vector<StillTouch> still_touches;
-    ContactEvidence evidence;
     if (still) {
       still_touches = still->gather(touches, likelihood.segment_elements());
-    } else {
-      evidence = gather(touches);
     }
+    const ContactEvidence& evidence = gather(still ? std::span<const Touch>() : touches);
+    const ReadingCounts counts = evidence.counts;  // update_by_touch() gathers anew
     half_done.change([&] {
       touched = touched || !touches.empty();
       summarised.reset();
@@ -82,7 +81,7 @@ struct PoseHistogram::Impl {
       } else {
         likelihood.accumulate(evidence, belief, progress);
       }
-      prior_log_likelihood += palpate::prior_log_likelihood(evidence.counts, options.contact);
+      prior_log_likelihood += palpate::prior_log_likelihood(counts, options.contact);
       for (const StillTouch& touch : still_touches) {
         prior_log_likelihood +=
             palpate::prior_log_likelihood(touch.evidence.counts, options.contact);
@@ -94,7 +93,7 @@ struct PoseHistogram::Impl {
   void update_by_touch(std::span<const Touch> touches, std::span<const StillTouch> still_touches,
                        const std::function<void(double)>& progress) {
     for (std::size_t i = 0; i < touches.size(); ++i) {
-      const ContactEvidence evidence = gather(touches.subspan(i, 1));
+      const ContactEvidence& evidence = gather(touches.subspan(i, 1));
       by_touch->update(
           touches[i], evidence,
           [&](const DenseBelief& uniform) {
@@ -189,6 +188,7 @@ struct PoseHistogram::Impl {
   DenseBelief belief;
   DenseLikelihood likelihood;
   std::optional<StillArray> still;  ///< where the options say so
+  EvidenceGatherer gatherer;
   PreparedTouch prepared;
   ReadingPredictor predictor;  ///< of touches that are only imagined
   std::vector<double> log_weight;

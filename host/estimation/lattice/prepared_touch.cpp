@@ -2,6 +2,9 @@
 
 #include <utility>
 
+#include <fmt/format.h>
+
+#include "log_message.hpp"
 #include "palpate/error.hpp"
 
 namespace palpate {
@@ -10,8 +13,9 @@ bool PreparedTouch::make_room(const DenseBelief& belief) {
   if (!log_likelihood_) {
     try {
       log_likelihood_.emplace(belief.uniform());
-    } catch (const Error&) {
+    } catch (const Error& error) {
       // Others on the device have taken what the plan counted on.
+      log_message(LogLevel::warning, fmt::format("no touch is prepared: {}", error.what()));
       room_ = false;
     }
   }

@@ -3,10 +3,12 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include <fmt/format.h>
 
 #include "command_stream.hpp"
+#include "contact_evidence.hpp"
 #include "contradiction.hpp"
 #include "draw_particles.hpp"
 #include "half_done.hpp"
@@ -65,6 +67,7 @@ struct ParticleFilter::Impl {
     cumulative = gpu::Buffer(context, n * sizeof(float), gpu::Memory::device, "particle weights",
                              VK_FORMAT_R32_SFLOAT);
     sums.resize(groups_of(n, shaders::WEIGHT_BLOCK));
+    bounds.reserve(sums.size());
     block_sums =
         gpu::Buffer(context, std::span(sums).size_bytes(), gpu::Memory::device, "sums of weights");
     draw_blocks = gpu::Buffer(context, sums.size() * sizeof(shaders::DrawBlock),
@@ -94,12 +97,13 @@ struct ParticleFilter::Impl {
 
   /// Records the drawing of all particles; see shaders::DrawPush.
   void draw(shaders::uint how, double injected) {
-    std::vector<shaders::DrawBlock> bounds;
+    bounds.clear();
     if (how == shaders::DRAW_MULTINOMIAL) {
-      bounds = multinomial_blocks(sums, summary);
+      bounds = multinomial_blocks(sums, summary, std::move(bounds));
     } else if (how == shaders::DRAW_SYSTEMATIC) {
       const auto words = philox({0, touch, shaders::RANDOM_OFFSET, 0}, key());
-      bounds = systematic_blocks(sums, summary, options.particles, words[0] * 0x1p-32);
+      bounds = systematic_blocks(sums, summary, options.particles, words[0] * 0x1p-32,
+                                 std::move(bounds));
     }
     stream.upload(draw_blocks, bounds);
     const shaders::DrawPush push{
@@ -229,6 +233,8 @@ struct ParticleFilter::Impl {
   gpu::Buffer shares;
   shaders::uint share_count = 0;
   std::vector<shaders::WeightBlock> sums;
+  std::vector<shaders::DrawBlock> bounds;   ///< what goes to draw_blocks
+  std::vector<EvidenceGatherer> gatherers;  ///< one for every touch of an update
   WeightSummary summary;
   LikelihoodAverages averages;
   shaders::uint touch = 0;  ///< counts the touches since the start
@@ -275,17 +281,16 @@ void ParticleFilter::update(std::span<const Touch> touches,
   Impl& filter = whole();
   const ParticleOptions& options = filter.options;
   // All of them before the first is taken in, for one that is not sound refuses all.
-  std::vector<ContactEvidence> evidence;
-  for (const Touch& touch : touches) {
-    evidence.push_back(gather_evidence(std::span(&touch, 1), options.contact,
-                                       options.region.pivot_mm,
-                                       ParticleLikelihood::segment_elements()));
+  filter.gatherers.resize(std::max(filter.gatherers.size(), touches.size()));
+  for (std::size_t i = 0; i < touches.size(); ++i) {
+    filter.gatherers[i].gather(touches.subspan(i, 1), options.contact, options.region.pivot_mm,
+                               ParticleLikelihood::segment_elements());
   }
   filter.half_done.change([&] {
-    for (std::size_t i = 0; i < evidence.size(); ++i) {
-      filter.update(evidence[i]);
+    for (std::size_t i = 0; i < touches.size(); ++i) {
+      filter.update(filter.gatherers[i].evidence());
       if (progress) {
-        progress(static_cast<double>(i + 1) / static_cast<double>(evidence.size()));
+        progress(static_cast<double>(i + 1) / static_cast<double>(touches.size()));
       }
     }
   });

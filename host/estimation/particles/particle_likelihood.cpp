@@ -146,11 +146,15 @@ void ParticleLikelihood::reserve(std::size_t elements) {
 
 void ParticleLikelihood::weigh(const ContactEvidence& evidence, const gpu::Buffer& particles,
                                std::size_t count, const gpu::Buffer& log_weights) {
-  std::vector<glm::dvec2> turned_mm;
+  // Room for the whole touch: of the next one more elements may be known.
+  const std::size_t room = std::min(evidence.elements(), most_elements);
+  turned_mm_.clear();
+  turned_mm_.reserve(evidence.elements());
+  batch_.reserve(evidence.segments.capacity());
+  table_.reserve(room * cell_sizes_mm_.size());
   for (const glm::dvec2& p : evidence.from_pivot_mm) {
-    turned_mm.push_back(rotate(theta_centre_rad_, p));
+    turned_mm_.push_back(rotate(theta_centre_rad_, p));
   }
-  const std::size_t room = std::min(evidence.from_pivot_mm.size(), most_elements);
   if (room * sizeof(shaders::Segment) > segments_.bytes()) {
     stream_.run();  // what was recorded may use the tables that go
     reserve(room);
@@ -161,17 +165,17 @@ void ParticleLikelihood::weigh(const ContactEvidence& evidence, const gpu::Buffe
   do {
     const bool fresh = s == 0;
     const std::size_t first = segments.empty() ? 0 : segments[s].begin;
-    std::vector<shaders::Segment> batch;
+    batch_.clear();
     for (; s < segments.size() && segments[s].end - first <= room; ++s) {
-      batch.push_back(segments[s]);
-      batch.back().begin -= static_cast<shaders::uint>(first);
-      batch.back().end -= static_cast<shaders::uint>(first);
+      batch_.push_back(segments[s]);
+      batch_.back().begin -= static_cast<shaders::uint>(first);
+      batch_.back().end -= static_cast<shaders::uint>(first);
     }
-    const std::size_t elements = batch.empty() ? 0 : batch.back().end;
-    std::vector<shaders::CoarseAndFine> table;
+    const std::size_t elements = batch_.empty() ? 0 : batch_.back().end;
+    table_.clear();
     for (const double cell_mm : cell_sizes_mm_) {
       for (std::size_t k = 0; k < elements; ++k) {
-        table.push_back(element_in_cells(turned_mm[first + k], cell_mm));
+        table_.push_back(element_in_cells(turned_mm_[first + k], cell_mm));
       }
     }
     const double work = static_cast<double>(count) * static_cast<double>(elements);
@@ -180,11 +184,11 @@ void ParticleLikelihood::weigh(const ContactEvidence& evidence, const gpu::Buffe
       pending = 0.0;
     }
     pending += work;
-    stream_.upload(segments_, batch);
-    stream_.upload(turns_, table, shaders::HEADINGS * sizeof(shaders::CoarseAndFine));
+    stream_.upload(segments_, batch_);
+    stream_.upload(turns_, table_, shaders::HEADINGS * sizeof(shaders::CoarseAndFine));
     const auto invocations = static_cast<std::uint32_t>(count);
     const shaders::WeighPush push{.particles = invocations,
-                                  .segments = static_cast<shaders::uint>(batch.size()),
+                                  .segments = static_cast<shaders::uint>(batch_.size()),
                                   .elements = static_cast<shaders::uint>(elements),
                                   .fresh = fresh ? 1U : 0U};
     stream_.dispatch(

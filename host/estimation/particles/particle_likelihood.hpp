@@ -46,6 +46,9 @@ class ParticleLikelihood {
   gpu::Buffer objects_;
   gpu::Buffer turns_;  ///< headings, then the elements in cells, [cell size, element]
   gpu::Buffer segments_;
+  std::vector<glm::dvec2> turned_mm_;          ///< the elements, turned to the region's centre
+  std::vector<shaders::Segment> batch_;        ///< what goes to segments_
+  std::vector<shaders::CoarseAndFine> table_;  ///< what goes to turns_
 };
 
 }  // namespace palpate

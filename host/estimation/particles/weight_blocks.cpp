@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 namespace palpate {
 
@@ -33,9 +34,12 @@ WeightSummary summarise(std::span<const shaders::WeightBlock> blocks) {
 }
 
 std::vector<shaders::DrawBlock> multinomial_blocks(std::span<const shaders::WeightBlock> blocks,
-                                                   const WeightSummary& summary) {
+                                                   const WeightSummary& summary,
+                                                   std::vector<shaders::DrawBlock> reuse) {
   constexpr double words = 0x1p32;
-  std::vector<shaders::DrawBlock> draw;
+  std::vector<shaders::DrawBlock> draw = std::move(reuse);
+  draw.clear();
+  draw.reserve(blocks.size());
   double before = 0.0;
   for (const shaders::WeightBlock& block : blocks) {
     before += scale(block, summary) * block.sum;
@@ -52,10 +56,13 @@ std::vector<shaders::DrawBlock> multinomial_blocks(std::span<const shaders::Weig
 
 std::vector<shaders::DrawBlock> systematic_blocks(std::span<const shaders::WeightBlock> blocks,
                                                   const WeightSummary& summary, std::int64_t draws,
-                                                  double offset) {
+                                                  double offset,
+                                                  std::vector<shaders::DrawBlock> reuse) {
   const auto all = static_cast<double>(draws);
   const double step = summary.sum / all;
-  std::vector<shaders::DrawBlock> draw;
+  std::vector<shaders::DrawBlock> draw = std::move(reuse);
+  draw.clear();
+  draw.reserve(blocks.size());
   double before = 0.0;
   for (const shaders::WeightBlock& block : blocks) {
     const double unit = scale(block, summary);

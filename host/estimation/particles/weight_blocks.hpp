@@ -23,13 +23,16 @@ WeightSummary summarise(std::span<const shaders::WeightBlock> blocks);
 
 /// Bounds of the blocks for draw_particles, up to the last that weighs anything. Keys are uniform
 /// 32-bit words: every draw is independent.
+/// @param reuse memory for the result
 std::vector<shaders::DrawBlock> multinomial_blocks(std::span<const shaders::WeightBlock> blocks,
-                                                   const WeightSummary& summary);
+                                                   const WeightSummary& summary,
+                                                   std::vector<shaders::DrawBlock> reuse = {});
 /// The same, but keys are 0, 1, ..., draws - 1, which stand for (key + offset) / draws of the
 /// summed weights.
 /// @param offset in [0, 1)
 std::vector<shaders::DrawBlock> systematic_blocks(std::span<const shaders::WeightBlock> blocks,
                                                   const WeightSummary& summary, std::int64_t draws,
-                                                  double offset);
+                                                  double offset,
+                                                  std::vector<shaders::DrawBlock> reuse = {});
 
 }  // namespace palpate

@@ -4,6 +4,7 @@
 #include <optional>
 #include <span>
 
+#include "palpate/api.hpp"
 #include "palpate/device.hpp"
 #include "palpate/estimate.hpp"
 #include "palpate/lattice.hpp"
@@ -39,9 +40,10 @@ struct BalancedLattice {
 /// pivot may be. An axis of zero extent gets one bin. Where all objects together would have more
 /// than `most_bins` bins, the steps of all axes grow by one factor.
 /// @throws Error on an empty list, a map that is not sound or a region that is out of range
-BalancedLattice balanced_lattice(const PoseLattice& region, std::span<const Hypothesis> hypotheses,
-                                 std::int64_t most_bins = most_balanced_bins,
-                                 BinWidth width = BinWidth::automatic);
+PALPATE_API BalancedLattice balanced_lattice(const PoseLattice& region,
+                                             std::span<const Hypothesis> hypotheses,
+                                             std::int64_t most_bins = most_balanced_bins,
+                                             BinWidth width = BinWidth::automatic);
 
 /// The poses of an object that an array touches, about the array's centre.
 struct TouchRegion {
@@ -58,12 +60,12 @@ struct TouchRegion {
 /// @param reach_mm largest distance of an element from the array's centre; see array_reach_mm()
 /// @throws Error on an empty list, a map that is not sound, or a reach that is negative or out of
 /// range
-TouchRegion touch_region(std::span<const Hypothesis> hypotheses, double reach_mm);
+PALPATE_API TouchRegion touch_region(std::span<const Hypothesis> hypotheses, double reach_mm);
 
 /// The number of bins, of all objects together, that fill half of the device's memory, or half of
 /// the limit where there is a lower one; at most `most_balanced_bins`. A bin takes 8 bytes, or 16
 /// where `still_array` doubles the belief.
-std::int64_t most_bins_on(const Device& device, bool still_array,
-                          std::optional<std::uint64_t> memory_limit_bytes = {});
+PALPATE_API std::int64_t most_bins_on(const Device& device, bool still_array,
+                                      std::optional<std::uint64_t> memory_limit_bytes = {});
 
 }  // namespace palpate

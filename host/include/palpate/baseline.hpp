@@ -4,6 +4,7 @@
 #include <span>
 #include <vector>
 
+#include "palpate/api.hpp"
 #include "palpate/sensor.hpp"
 
 namespace palpate {
@@ -15,7 +16,8 @@ namespace palpate {
 /// misses a touch that lasts through all frames.
 /// @throws Error (Fault::input) on no frame, a frame of another size, an element without a known
 /// reading, or a touched array
-std::vector<double> baseline_of(std::span<const Frame> frames, const SensorDescription& sensor,
-                                std::optional<double> onset);
+PALPATE_API std::vector<double> baseline_of(std::span<const Frame> frames,
+                                            const SensorDescription& sensor,
+                                            std::optional<double> onset);
 
 }  // namespace palpate

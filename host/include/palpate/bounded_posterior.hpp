@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "palpate/api.hpp"
 #include "palpate/contact_model.hpp"
 #include "palpate/device.hpp"
 #include "palpate/estimate.hpp"
@@ -63,7 +64,7 @@ struct PoseBlock {
 /// counts the first one's place), on the number of threads or on the processor's vector width,
 /// unless a budget ends the search or a GPU evaluates bins faster than the host. An object that was
 /// moved from throws Error on every call.
-class BoundedPosterior {
+class PALPATE_API BoundedPosterior {
  public:
   /// Builds the window tables of the maps.
   /// @throws Error on an empty list, a map that is not sound, maps of different priors where the
@@ -124,10 +125,10 @@ class BoundedPosterior {
   std::uint64_t host_bytes() const;
 
  private:
-  struct Impl;
-  Impl& impl() const;
+  struct PALPATE_LOCAL Impl;
+  PALPATE_LOCAL Impl& impl() const;
   /// impl(), where no update has left the belief half-way. @throws Error where one has
-  Impl& whole() const;
+  PALPATE_LOCAL Impl& whole() const;
   std::unique_ptr<Impl> impl_;
 };
 

@@ -9,6 +9,7 @@
 
 #include <glm/vec2.hpp>
 
+#include "palpate/api.hpp"
 #include "palpate/touch.hpp"
 
 namespace palpate {
@@ -36,7 +37,7 @@ constexpr bool is_contact(Reading reading) {
 /// largest pressure, No Contact where it is below both, else Unknown (which includes equality).
 /// Dead elements, and those whose pressure is no number, are Unknown and do not take part in the
 /// maximum.
-struct ContactClassifier {
+struct PALPATE_API ContactClassifier {
   double threshold = 2.0;  ///< in the recording's pressure unit
   double ratio = 0.3;      ///< of the touch's largest pressure, in [0, 1)
 
@@ -55,10 +56,11 @@ struct ElementReading {
 };
 
 /// The elements of the touch that say something, in the array's order.
-std::vector<ElementReading> known_readings(const Touch& touch, const ContactClassifier& classifier);
+PALPATE_API std::vector<ElementReading> known_readings(const Touch& touch,
+                                                       const ContactClassifier& classifier);
 
 /// Returns why readings cannot be mapped, with the remedy, as one line of text: an element lies
 /// beyond `farthest_mm` of the robot frame's origin. None where all readings can be mapped.
-std::optional<std::string> fault_of(std::span<const ElementReading> readings);
+PALPATE_API std::optional<std::string> fault_of(std::span<const ElementReading> readings);
 
 }  // namespace palpate

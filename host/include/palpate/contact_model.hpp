@@ -4,6 +4,7 @@
 #include <optional>
 #include <vector>
 
+#include "palpate/api.hpp"
 #include "palpate/contact.hpp"
 
 namespace palpate {
@@ -16,7 +17,7 @@ struct MapSample {
 /// The log-likelihood of readings as numbers, in the place of Eq. 7: linear in the log odds between
 /// equally spaced nodes, constant beyond the first and the last. It tells up to
 /// `most_reading_levels` levels apart: No Contact, and In Contact by pressure.
-struct LikelihoodTable {
+struct PALPATE_API LikelihoodTable {
   double first_log_odds = -8.0;  ///< of the first node, in nats
   double last_log_odds = 8.0;    ///< of the last node, in nats
   std::size_t nodes = 0;
@@ -40,7 +41,7 @@ struct LikelihoodTable {
 
 /// What the sensor says about a place: the class of every reading (Eq. 3), and how likely a reading
 /// is, given what the map says there (Eq. 7, or a table).
-struct ContactModel {
+struct PALPATE_API ContactModel {
   ContactClassifier classifier = {};
   double gamma = 0.1;  ///< of Eq. 7: how often the classifier answers at random, in [0, 1)
   /// m: of Eq. 7, and of the space beyond the maps. By default the maps' own, which must then be

@@ -6,11 +6,15 @@
 #include <string_view>
 #include <vector>
 
+#include "palpate/api.hpp"
+
 namespace palpate {
 
 namespace gpu {
 class Context;
 }
+
+struct VulkanDevice;
 
 /// A Vulkan device as `palpate devices` lists it.
 struct DeviceInfo {
@@ -25,10 +29,13 @@ struct DeviceInfo {
   std::string reason;   ///< why the device is chosen or refused
 };
 
-/// An open Vulkan device for compute. It must outlive every object made on it. A device and the
-/// objects made on it are not thread-safe: use them from one thread at a time. Every call on a
+/// An open Vulkan device for compute. It must outlive every object made on it. Every call on a
 /// moved-from device throws Error.
-class Device {
+///
+/// Threads: several objects on one device may be used, made and destroyed at the same time, each by
+/// one thread at a time; their commands take turns on the device's queue. Only moving or destroying
+/// the device itself needs every other use to have ended.
+class PALPATE_API Device {
  public:
   /// Lists every device in Vulkan's order and marks the one that open(name_or_index) would take.
   static std::vector<DeviceInfo> list(std::string_view name_or_index = {});
@@ -39,6 +46,12 @@ class Device {
   /// environment, Vulkan's validation layer is on and each of its messages becomes an Error.
   /// @throws Error where no device fits; the message names every device and why it is refused
   static Device open(std::string_view name_or_index = {});
+
+  /// Computes on a device that the program has made itself (palpate/vulkan_device.hpp). The program
+  /// keeps the handles, which must outlive the Device; Palpate submits commands to the queue, waits
+  /// for these alone, and neither waits for nor destroys anything else.
+  /// @throws Error on a null handle, an older Vulkan, or a queue family that does not compute
+  static Device share(const VulkanDevice& device);
 
   Device(Device&&) noexcept;
   Device& operator=(Device&&) noexcept;

@@ -3,6 +3,8 @@
 #include <stdexcept>
 #include <string>
 
+#include "palpate/api.hpp"
+
 namespace palpate {
 
 /// What has to change for the call to succeed.
@@ -13,7 +15,7 @@ enum class Fault {
 
 /// The one exception type that Palpate throws, from construction and I/O. The message is a single
 /// line that names the file, the field, the value and the remedy as far as they are known.
-class Error : public std::runtime_error {
+class PALPATE_API Error : public std::runtime_error {
  public:
   Error(Fault fault, const std::string& message) : std::runtime_error(message), fault_(fault) {}
   Fault fault() const noexcept { return fault_; }

@@ -6,6 +6,7 @@
 #include <span>
 #include <vector>
 
+#include "palpate/api.hpp"
 #include "palpate/lattice.hpp"
 #include "palpate/occupancy_grid.hpp"
 #include "palpate/pose.hpp"
@@ -28,11 +29,11 @@ struct Hypothesis {
 /// Puts behind every hypothesis whose map has `mirror` its mirror image, Hypothesis::mirrored, and
 /// gives each of the two half the weight. To be called once, before apply() of a sensor model: no
 /// filter looks at `mirror`.
-void add_mirror_images(std::vector<Hypothesis>& hypotheses);
+PALPATE_API void add_mirror_images(std::vector<Hypothesis>& hypotheses);
 
 /// Index of the first hypothesis whose map's prior differs from the first map's; none where all
 /// agree. Maps recognised together share one prior, unless the contact model says which one to use.
-std::optional<std::size_t> differing_prior(std::span<const Hypothesis> hypotheses);
+PALPATE_API std::optional<std::size_t> differing_prior(std::span<const Hypothesis> hypotheses);
 
 /// The pose of the largest posterior probability (Eq. 15-16).
 struct Mode {
@@ -120,7 +121,7 @@ struct RefinedPose {
 };
 
 /// The same pose as a robot acts on it: the object's frame in the robot's.
-struct ObjectPose {
+struct PALPATE_API ObjectPose {
   Pose T_robot_object;
   /// Covariance of (x_mm, y_mm, theta_rad) of T_robot_object, row by row, in mm^2, mm rad and
   /// rad^2.
@@ -135,6 +136,6 @@ struct ObjectPose {
 /// vary by L times the deviation of theta, all but what their correlation with theta takes back;
 /// x and y of T_robot_object are those of the object frame's origin and have no such part. The
 /// difference of the two rounds to about 1e-16 L^2 times the variance of theta, in mm^2.
-ObjectPose inverse(const RefinedPose& refined);
+PALPATE_API ObjectPose inverse(const RefinedPose& refined);
 
 }  // namespace palpate

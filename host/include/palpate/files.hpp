@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "palpate/api.hpp"
 #include "palpate/lattice.hpp"
 #include "palpate/occupancy_grid.hpp"
 #include "palpate/touch.hpp"
@@ -19,23 +20,23 @@ namespace palpate {
 // and the remedy.
 
 /// Read or write a "palpate.recording" HDF5 file; of an unclosed file, the whole rows are read.
-Recording read_recording(const std::filesystem::path& path);
-void write_recording(const std::filesystem::path& path, const Recording& recording);
+PALPATE_API Recording read_recording(const std::filesystem::path& path);
+PALPATE_API void write_recording(const std::filesystem::path& path, const Recording& recording);
 /// Closes, in place, a recording whose FrameRecorder was killed or crashed. The complete rows stay,
 /// and programs other than Palpate can then open the file like any other.
 /// @returns false where the file is closed already
 /// @throws Error where the file is still being recorded, or cannot be read or written; it stays
 /// readable
-bool close_recording(const std::filesystem::path& path);
+PALPATE_API bool close_recording(const std::filesystem::path& path);
 
 /// Read or write a "palpate.map" HDF5 file.
-OccupancyGrid read_map(const std::filesystem::path& path);
-void write_map(const std::filesystem::path& path, const OccupancyGrid& map);
+PALPATE_API OccupancyGrid read_map(const std::filesystem::path& path);
+PALPATE_API void write_map(const std::filesystem::path& path, const OccupancyGrid& map);
 
 /// Writes a map in the map_server format of ROS: `yaml_path`, which ends in .yaml, and beside it
 /// the image, with the same stem and the ending .pgm. The mode is trinary; occupied cells are
 /// black; resolution and origin are in metres; the first image row has the largest y.
-void write_map_server(const std::filesystem::path& yaml_path, const OccupancyGrid& map);
+PALPATE_API void write_map_server(const std::filesystem::path& yaml_path, const OccupancyGrid& map);
 
 /// The posterior of one recording, the contents of a "palpate.posterior" HDF5 file.
 struct Posterior {
@@ -43,16 +44,17 @@ struct Posterior {
   PoseLattice lattice;
   std::vector<double> log_likelihood;  ///< [object, theta, y, x] in nats, without prior weights
 };
-Posterior read_posterior(const std::filesystem::path& path);
-void write_posterior(const std::filesystem::path& path, const Posterior& posterior);
+PALPATE_API Posterior read_posterior(const std::filesystem::path& path);
+PALPATE_API void write_posterior(const std::filesystem::path& path, const Posterior& posterior);
 /// Writes a posterior object by object, so that the bins of one object at a time are in memory.
 /// @param log_likelihood is called once for each object in order, and returns the log-likelihood of
 /// the object's bins, [theta, y, x] in nats, without prior weights
-void write_posterior(const std::filesystem::path& path, const std::vector<std::string>& objects,
-                     const PoseLattice& lattice,
-                     const std::function<std::vector<double>(std::size_t object)>& log_likelihood);
+PALPATE_API void write_posterior(
+    const std::filesystem::path& path, const std::vector<std::string>& objects,
+    const PoseLattice& lattice,
+    const std::function<std::vector<double>(std::size_t object)>& log_likelihood);
 
 /// Returns the `format` attribute of an HDF5 file, such as "palpate.map".
-std::string read_format(const std::filesystem::path& path);
+PALPATE_API std::string read_format(const std::filesystem::path& path);
 
 }  // namespace palpate

@@ -4,6 +4,7 @@
 #include <optional>
 #include <span>
 
+#include "palpate/api.hpp"
 #include "palpate/contact_model.hpp"
 #include "palpate/displacement.hpp"
 #include "palpate/occupancy_grid.hpp"
@@ -33,7 +34,7 @@ inline constexpr double largest_fit_z = 1e6;
 /// What z is like for touches of an object at their best pose on a map that had not seen them.
 /// Neighbouring elements of a large array are far from independent, as z takes them to be, and maps
 /// are not perfect: z then has a mean below 0 and a standard deviation of many times 1.
-struct FitScale {
+struct PALPATE_API FitScale {
   double mean = 0.0;  ///< of the z of single touches
   double sd = 1.0;    ///< their standard deviation
 
@@ -55,9 +56,9 @@ struct FitScale {
 /// @param object index of the object whose numbers of a table are used
 /// @returns none where no element is known
 /// @throws Error on a touch that is not sound, or a table without numbers for the object
-std::optional<Fit> fit_of(std::span<const Touch> touches, const Pose& T_object_robot,
-                          const OccupancyGrid& map, const ContactModel& contact,
-                          std::size_t object = 0);
+PALPATE_API std::optional<Fit> fit_of(std::span<const Touch> touches, const Pose& T_object_robot,
+                                      const OccupancyGrid& map, const ContactModel& contact,
+                                      std::size_t object = 0);
 
 /// The same where each touch by itself may have been displaced: where the sensor really was at
 /// T_robot_sensor * delta, delta normally distributed. L is then a touch's log-likelihood averaged
@@ -68,8 +69,8 @@ std::optional<Fit> fit_of(std::span<const Touch> touches, const Pose& T_object_r
 /// leaves z uncertain by about 0.1; the seed is fixed. Without a displacement the fit is that of
 /// the function above.
 /// @throws Error as the function above
-std::optional<Fit> fit_of(std::span<const Touch> touches, const Pose& T_object_robot,
-                          const OccupancyGrid& map, const ContactModel& contact,
-                          const DisplacementSd& touch_sd, std::size_t object = 0);
+PALPATE_API std::optional<Fit> fit_of(std::span<const Touch> touches, const Pose& T_object_robot,
+                                      const OccupancyGrid& map, const ContactModel& contact,
+                                      const DisplacementSd& touch_sd, std::size_t object = 0);
 
 }  // namespace palpate

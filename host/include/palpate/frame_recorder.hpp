@@ -5,6 +5,7 @@
 #include <memory>
 #include <vector>
 
+#include "palpate/api.hpp"
 #include "palpate/sensor.hpp"
 
 namespace palpate {
@@ -21,7 +22,7 @@ namespace palpate {
 /// Pressures are stored as float32, finer than any sensor resolves, and as NaN where is_known() is
 /// false. A pose or a device time that is not finite is stored as NaN (unknown). In the sensor's
 /// name and serial number, '?' replaces what is not printable UTF-8.
-class FrameRecorder {
+class PALPATE_API FrameRecorder {
  public:
   /// @param path file to write; an older file stays until the first frames are saved
   /// @param sensor name, elements, unit, baseline and truth to store
@@ -59,7 +60,7 @@ class FrameRecorder {
   std::uint64_t unknown_readings() const;  ///< total over frames()
 
  private:
-  struct Impl;
+  struct PALPATE_LOCAL Impl;
   std::unique_ptr<Impl> impl_;
 };
 

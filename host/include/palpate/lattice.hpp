@@ -4,6 +4,7 @@
 
 #include <glm/vec2.hpp>
 
+#include "palpate/api.hpp"
 #include "palpate/pose.hpp"
 
 namespace palpate {
@@ -21,7 +22,7 @@ struct Axis {
 /// Regular bins over the planar pose T_object_robot. x and y are the coordinates, in the object
 /// frame, of a pivot point that is given in the robot frame: p_o = R(theta) (p_r - pivot) + (x, y).
 /// A pivot near the touches keeps the object in the region at every theta.
-struct PoseLattice {
+struct PALPATE_API PoseLattice {
   Axis x_mm{-10.0, 10.0, 25};
   Axis y_mm{-10.0, 10.0, 25};
   Axis theta_rad{0.0, 6.283185307179586, 16};

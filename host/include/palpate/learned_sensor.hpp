@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "palpate/api.hpp"
 #include "palpate/contact.hpp"
 #include "palpate/contact_model.hpp"
 #include "palpate/displacement.hpp"
@@ -32,7 +33,7 @@ struct LearnedTable {
   std::size_t levels() const { return level_edges.size() + 2; }
 };
 /// The table of a contact model, with numbers of one or several objects, [(object,) level, node].
-LikelihoodTable table_of(const LearnedTable& table, std::vector<double> log_likelihood);
+PALPATE_API LikelihoodTable table_of(const LearnedTable& table, std::vector<double> log_likelihood);
 
 /// What a press is like whatever its place: logarithms of its area, total force and peak.
 struct PressFeatures {
@@ -43,10 +44,10 @@ struct PressFeatures {
 };
 /// @param classifier with a threshold above 0
 /// @throws Error on a touch that is not sound, or a threshold of 0
-PressFeatures press_features(const Touch& touch, const ContactClassifier& classifier);
+PALPATE_API PressFeatures press_features(const Touch& touch, const ContactClassifier& classifier);
 
 /// Independent normal distributions of the features of an object's presses.
-struct FeatureDistribution {
+struct PALPATE_API FeatureDistribution {
   std::array<double, PressFeatures::count> mean{};
   std::array<double, PressFeatures::count> sd{};
 
@@ -62,7 +63,7 @@ struct LearnedFeatures {
 };
 
 /// What of a single touch tells whether its object was learned.
-struct FamiliarityScore {
+struct PALPATE_API FamiliarityScore {
   /// Log-likelihood of its known elements at the best pose of the best map, over 1 nat more than
   /// they cost a model that knows no more than how often each level occurs among them: about -1
   /// where the map explains nothing, and the nearer to 0 the more it explains.
@@ -81,7 +82,7 @@ struct FamiliarityScore {
 
 /// How probably a single touch is of an object that was learned: 1 / (1 + exp(-(offset +
 /// explained_slope explained + lead_slope lead))).
-struct Familiarity {
+struct PALPATE_API Familiarity {
   double offset = 0.0;
   double explained_slope = 0.0;
   double lead_slope = 0.0;
@@ -90,7 +91,7 @@ struct Familiarity {
 };
 
 /// What `palpate calibrate` learned about a sensor and the objects that it touched.
-struct LearnedSensor {
+struct PALPATE_API LearnedSensor {
   std::string pressure_unit = "kPa";
   double noise = 0.0;  ///< standard deviation of an untouched element, in the pressure unit
   ContactClassifier classifier;
@@ -116,11 +117,12 @@ struct LearnedSensor {
 /// prior of a contact model with a table is unset: it is that of the layers. Without a table,
 /// readings are compared with the maps by Eq. 7, and the prior stays as it is.
 /// @throws Error on a sensor out of range, or as reading_layer() does; nothing changes then
-void apply(const LearnedSensor& sensor, std::vector<Hypothesis>& hypotheses, ContactModel& contact);
+PALPATE_API void apply(const LearnedSensor& sensor, std::vector<Hypothesis>& hypotheses,
+                       ContactModel& contact);
 
 /// Read or write a sensor model, a YAML file.
 /// @throws Error (Fault::input) naming the file, key and remedy; writing as write_map() does
-LearnedSensor read_sensor_model(const std::filesystem::path& path);
-void write_sensor_model(const std::filesystem::path& path, const LearnedSensor& sensor);
+PALPATE_API LearnedSensor read_sensor_model(const std::filesystem::path& path);
+PALPATE_API void write_sensor_model(const std::filesystem::path& path, const LearnedSensor& sensor);
 
 }  // namespace palpate

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "palpate/api.hpp"
 #include "palpate/contact.hpp"
 #include "palpate/device.hpp"
 #include "palpate/occupancy_grid.hpp"
@@ -25,7 +26,7 @@ struct MapOptions {
 /// Builds an object's occupancy grid from touches at known poses (Sec. II) by adding up the
 /// log-odds increments of Eq. 4-6, in any order. The object frame is the robot frame of the
 /// touches. Every call on a moved-from builder throws Error.
-class MapBuilder {
+class PALPATE_API MapBuilder {
  public:
   /// @throws Error as MapOptions::validate()
   MapBuilder(Device& device, const MapOptions& options);
@@ -51,8 +52,8 @@ class MapBuilder {
   void clear();
 
  private:
-  struct Impl;
-  Impl& impl() const;
+  struct PALPATE_LOCAL Impl;
+  PALPATE_LOCAL Impl& impl() const;
   std::unique_ptr<Impl> impl_;
 };
 
@@ -66,6 +67,7 @@ struct ObjectTouches {
 /// areas are counted on maps built with a prior of 0.5: a cell is occupied where its log odds
 /// exceed 1e-3 nats, and modelled where |log odds| does.
 /// @throws Error as MapBuilder does
-double estimate_prior(Device& device, std::span<const ObjectTouches> objects, MapOptions options);
+PALPATE_API double estimate_prior(Device& device, std::span<const ObjectTouches> objects,
+                                  MapOptions options);
 
 }  // namespace palpate

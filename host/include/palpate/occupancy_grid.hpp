@@ -9,12 +9,14 @@
 
 #include <glm/vec2.hpp>
 
+#include "palpate/api.hpp"
+
 namespace palpate {
 
 /// log(p / (1 - p)), Eq. 1.
-double log_odds_from_probability(double p);
+PALPATE_API double log_odds_from_probability(double p);
 /// 1 / (1 + exp(-l)), without overflow.
-double probability_from_log_odds(double l);
+PALPATE_API double probability_from_log_odds(double l);
 
 /// Label under which results report "none of these", an object that was never learned. No map may
 /// bear it: results could not tell its object from an unlearned one.
@@ -64,7 +66,7 @@ struct OccupancyGrid {
 };
 
 /// The map's mirror image, x to -x, with its observations and mean levels.
-OccupancyGrid mirror_image(const OccupancyGrid& map);
+PALPATE_API OccupancyGrid mirror_image(const OccupancyGrid& map);
 
 /// Returns why a map is not sound, as one line of text that names the field, its value and the
 /// remedy; none where the map is sound. A sound map has nx * ny log odds, at most `most_cells` of
@@ -72,12 +74,12 @@ OccupancyGrid mirror_image(const OccupancyGrid& map);
 /// within `farthest_mm`; a spread no larger than the grid; a prior between 0 and 1; a symmetry of
 /// at least 0; a label other than `none_label`; and as many observations and mean levels as cells
 /// or none, all finite and at least 0. Files, MapBuilder and all filters refuse any other map.
-std::optional<std::string> fault_of(const OccupancyGrid& map);
+PALPATE_API std::optional<std::string> fault_of(const OccupancyGrid& map);
 /// Checks a map like fault_of(), except its log odds, which it need not hold yet.
-std::optional<std::string> fault_without_cells(const OccupancyGrid& map);
+PALPATE_API std::optional<std::string> fault_without_cells(const OccupancyGrid& map);
 /// Checks a part of the map's log odds like fault_of(); `first` is the part's row-major index in
 /// the map.
-std::optional<std::string> fault_of_cells(const OccupancyGrid& map, std::size_t first,
-                                          std::span<const float> log_odds);
+PALPATE_API std::optional<std::string> fault_of_cells(const OccupancyGrid& map, std::size_t first,
+                                                      std::span<const float> log_odds);
 
 }  // namespace palpate

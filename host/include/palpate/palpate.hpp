@@ -1,7 +1,14 @@
 #pragma once
 
-// The whole public interface. Neither Vulkan nor HDF5 is needed to include it.
+// The whole public interface but palpate/vulkan_device.hpp. Neither Vulkan nor HDF5 is needed to
+// include it.
+//
+// Threads: different objects may be used at the same time, also where they share a Device or are
+// copies of each other; an object that is being changed is for one thread at a time. Functions may
+// be called from any thread, those that read and write files included: in HDF5 they take turns.
+// Programs that call HDF5 themselves need a libhdf5 that was built thread-safe, as Debian's is.
 
+#include "palpate/api.hpp"
 #include "palpate/balanced_lattice.hpp"
 #include "palpate/baseline.hpp"
 #include "palpate/bounded_posterior.hpp"
@@ -16,6 +23,7 @@
 #include "palpate/frame_recorder.hpp"
 #include "palpate/lattice.hpp"
 #include "palpate/learned_sensor.hpp"
+#include "palpate/log.hpp"
 #include "palpate/map_builder.hpp"
 #include "palpate/occupancy_grid.hpp"
 #include "palpate/particle_filter.hpp"

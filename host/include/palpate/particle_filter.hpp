@@ -6,6 +6,7 @@
 #include <span>
 #include <vector>
 
+#include "palpate/api.hpp"
 #include "palpate/contact_model.hpp"
 #include "palpate/device.hpp"
 #include "palpate/estimate.hpp"
@@ -46,7 +47,7 @@ struct ParticleOptions {
 ///
 /// Random numbers depend on the seed, the touch and the particle alone, not on the order of
 /// execution. Every call on a moved-from filter throws Error.
-class ParticleFilter {
+class PALPATE_API ParticleFilter {
  public:
   /// @throws Error as PoseHistogram does, and on a number of particles, a noise or a rate out of
   /// range.
@@ -98,10 +99,10 @@ class ParticleFilter {
   std::uint64_t device_bytes() const;
 
  private:
-  struct Impl;
-  Impl& impl() const;
+  struct PALPATE_LOCAL Impl;
+  PALPATE_LOCAL Impl& impl() const;
   /// Like impl(), but throws Error where a failed update left the particles half-way.
-  Impl& whole() const;
+  PALPATE_LOCAL Impl& whole() const;
   std::unique_ptr<Impl> impl_;
 };
 

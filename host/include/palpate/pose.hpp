@@ -2,6 +2,8 @@
 
 #include <glm/vec2.hpp>
 
+#include "palpate/api.hpp"
+
 namespace palpate {
 
 /// Largest |x| and |y| of a map or a lattice, in mm: 1,000 km, where float64 still resolves 1e-7 mm
@@ -16,18 +18,18 @@ struct Pose {
 };
 
 /// T_a_c = T_a_b * T_b_c. Angles add; they are not wrapped.
-Pose operator*(const Pose& T_a_b, const Pose& T_b_c);
+PALPATE_API Pose operator*(const Pose& T_a_b, const Pose& T_b_c);
 
 /// p_a = T_a_b * p_b, in mm.
-glm::dvec2 operator*(const Pose& T_a_b, const glm::dvec2& p_b);
+PALPATE_API glm::dvec2 operator*(const Pose& T_a_b, const glm::dvec2& p_b);
 
 /// T_b_a from T_a_b.
-Pose inverse(const Pose& T_a_b);
+PALPATE_API Pose inverse(const Pose& T_a_b);
 
 /// R(theta) v: rotates v counter-clockwise.
-glm::dvec2 rotate(double theta_rad, const glm::dvec2& v);
+PALPATE_API glm::dvec2 rotate(double theta_rad, const glm::dvec2& v);
 
 /// Returns the angle plus a whole number of periods, in [-period/2, period/2).
-double wrap_angle(double theta_rad, double period_rad);
+PALPATE_API double wrap_angle(double theta_rad, double period_rad);
 
 }  // namespace palpate

@@ -2,6 +2,7 @@
 
 #include <glm/vec2.hpp>
 
+#include "palpate/api.hpp"
 #include "palpate/occupancy_grid.hpp"
 #include "palpate/pose.hpp"
 
@@ -14,18 +15,20 @@ struct Body {
 };
 
 /// Returns the body of a map. @throws Error if no cell is occupied
-Body body_of(const OccupancyGrid& map);
+PALPATE_API Body body_of(const OccupancyGrid& map);
 
 /// Returns the root mean squared displacement of the body between the estimated and the true pose,
 /// in mm (Chirikjian and Zhou 1998; Eq. 17-20): sqrt(|dc|^2 + 2 J (1 - cos dtheta)), where dc is
 /// the difference of the centroids in the robot frame and J is `inertia_mm2`. Symmetry n wraps
 /// dtheta into [-pi/n, pi/n); n = 0, full symmetry, sets it to 0. A translation by 1 mm scores 1.
-double pose_error_mm(const Body& body, int symmetry, const Pose& T_object_robot_estimate,
-                     const Pose& T_object_robot_truth);
+PALPATE_API double pose_error_mm(const Body& body, int symmetry,
+                                 const Pose& T_object_robot_estimate,
+                                 const Pose& T_object_robot_truth);
 
 /// Returns the pose nearest in angle to the estimate among those that the symmetry makes equal to
 /// the truth: the pose that pose_error_mm() compares the estimate with.
-Pose nearest_equal_pose(const Body& body, int symmetry, const Pose& T_object_robot_estimate,
-                        const Pose& T_object_robot_truth);
+PALPATE_API Pose nearest_equal_pose(const Body& body, int symmetry,
+                                    const Pose& T_object_robot_estimate,
+                                    const Pose& T_object_robot_truth);
 
 }  // namespace palpate

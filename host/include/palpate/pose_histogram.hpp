@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "palpate/api.hpp"
 #include "palpate/contact_model.hpp"
 #include "palpate/device.hpp"
 #include "palpate/displacement.hpp"
@@ -51,7 +52,7 @@ struct HistogramOptions {
 /// a regular lattice of poses for every object, on the device. Two floats hold each bin, so that
 /// rounding does not grow with the number of touches. The same input gives the same bits on one
 /// device. A histogram that was moved from throws Error on every call.
-class PoseHistogram {
+class PALPATE_API PoseHistogram {
  public:
   /// Uploads the maps and starts with a uniform belief.
   /// @throws Error on an empty list, a map that is not sound (see fault_of()), maps of different
@@ -75,7 +76,7 @@ class PoseHistogram {
   /// Multiplies the belief by the likelihood of these touches (Eq. 7, 13). Calls `progress` with
   /// the fraction done from time to time. Takes in no touch at all if one of them is not sound. If
   /// the device fails or `progress` throws, the belief is left half-way: every call but reset()
-  /// then throws Error until reset() is called.
+  /// then throws Error until reset() is called. Allocates seldom: see docs/embedding.md.
   /// @throws Error on a touch that is not sound, or if the device fails; what `progress` throws
   void update(std::span<const Touch> touches, const std::function<void(double)>& progress = {});
   void update(const Touch& touch) { update(std::span(&touch, 1)); }
@@ -155,10 +156,10 @@ class PoseHistogram {
   std::uint64_t device_bytes() const;
 
  private:
-  struct Impl;
-  Impl& impl() const;
+  struct PALPATE_LOCAL Impl;
+  PALPATE_LOCAL Impl& impl() const;
   /// impl(), where no update has left the belief half-way. @throws Error where one has
-  Impl& whole() const;
+  PALPATE_LOCAL Impl& whole() const;
   std::unique_ptr<Impl> impl_;
 };
 

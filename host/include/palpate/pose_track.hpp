@@ -10,13 +10,14 @@
 #include <utility>
 #include <vector>
 
+#include "palpate/api.hpp"
 #include "palpate/pose.hpp"
 #include "palpate/sensor.hpp"
 
 namespace palpate {
 
 /// True for a pose that a robot can have: |x|, |y| <= 1e9 mm and |theta| <= 1e9 rad, no NaN.
-bool is_robot_pose(const Pose& T_robot_sensor);
+PALPATE_API bool is_robot_pose(const Pose& T_robot_sensor);
 
 /// The sensor's poses T_robot_sensor over time, interpolated linearly, angles the short way round.
 ///
@@ -24,7 +25,7 @@ bool is_robot_pose(const Pose& T_robot_sensor);
 /// may be stamped wrongly and is set aside. The next pose in order drops it. Three poses set aside
 /// in a row, each later than the one before, join the track instead: the robot paused, or its clock
 /// was set. Where the clock went back, they replace the track's poses from their first time on.
-class PoseTrack {
+class PALPATE_API PoseTrack {
  public:
   /// @param largest_gap_s poses further apart in time are not interpolated, in s
   explicit PoseTrack(double largest_gap_s = 0.1) : largest_gap_s_(largest_gap_s) {}
@@ -70,7 +71,7 @@ class PoseTrack {
 /// PoseTrack decides which poses count. A frame waits at most 0.2 s for the first pose after it. At
 /// most 65,536 poses are read ahead of the frames; while the sensor is unplugged, only the poses of
 /// the last second are kept.
-class PosedSensor : public Sensor {
+class PALPATE_API PosedSensor : public Sensor {
  public:
   static constexpr double usual_gap_s = 0.1;  ///< default of PoseTrack's `largest_gap_s`
 
@@ -105,7 +106,7 @@ class PosedSensor : public Sensor {
   Poses poses() const;  ///< counts so far
 
  private:
-  struct Impl;
+  struct PALPATE_LOCAL Impl;
   std::unique_ptr<Impl> impl_;
 };
 

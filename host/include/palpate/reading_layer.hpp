@@ -1,5 +1,6 @@
 #pragma once
 
+#include "palpate/api.hpp"
 #include "palpate/occupancy_grid.hpp"
 
 namespace palpate {
@@ -19,7 +20,7 @@ enum class MapLayer {
 ///   d <= near_mm: -10, or -15 beside an occupied cell; d <= far_mm: -11, or -14; beyond: -12.
 /// So a table tells apart what an array would read where nothing was sensed: beside a border that
 /// the object may cross, and far from it.
-struct ReadingLayer {
+struct PALPATE_API ReadingLayer {
   static constexpr double largest_value = 8.0;
   static constexpr double near_free = -10.0;
   static constexpr double near_occupied = -15.0;
@@ -45,6 +46,6 @@ struct ReadingLayer {
 /// above 0; without observations, where the log odds differ from the prior's.
 /// @throws Error where the map has no mean level but `how` asks for it, or the map's cells with
 /// what is around them exceed most_cells
-OccupancyGrid reading_layer(const OccupancyGrid& map, const ReadingLayer& how);
+PALPATE_API OccupancyGrid reading_layer(const OccupancyGrid& map, const ReadingLayer& how);
 
 }  // namespace palpate

@@ -3,12 +3,13 @@
 #include <array>
 #include <optional>
 
+#include "palpate/api.hpp"
 #include "palpate/occupancy_grid.hpp"
 
 namespace palpate {
 
 /// How far an object is from looking like itself turned.
-struct RotationalSymmetry {
+struct PALPATE_API RotationalSymmetry {
   /// [n], in mm: mean distance between the outline and the outline turned by k/n of a turn, where
   /// they lie best on each other; the largest over k. At n = 0 the largest over turns of many
   /// angles, at n = 1 zero.
@@ -28,6 +29,6 @@ struct RotationalSymmetry {
 /// quarter of them to unseen cells counts as wholly unlike. Takes milliseconds: of many cells, it
 /// samples some thousand.
 /// @returns none where fewer than 16 cells are occupied
-std::optional<RotationalSymmetry> measure_symmetry(const OccupancyGrid& map);
+PALPATE_API std::optional<RotationalSymmetry> measure_symmetry(const OccupancyGrid& map);
 
 }  // namespace palpate

@@ -8,6 +8,8 @@
 
 #include <glm/vec2.hpp>
 
+#include "palpate/api.hpp"
+
 namespace palpate {
 
 /// Contents of a scene file; a key that the file leaves out is empty here. A flag of the command
@@ -62,6 +64,6 @@ struct Scene {
 /// or a list of [x, y] in mm.
 /// @throws Error (Fault::input) naming the file, line, key, value and remedy, also on an unknown
 /// key or one given twice
-Scene read_scene(const std::filesystem::path& path);
+PALPATE_API Scene read_scene(const std::filesystem::path& path);
 
 }  // namespace palpate

@@ -12,6 +12,7 @@
 
 #include <glm/vec2.hpp>
 
+#include "palpate/api.hpp"
 #include "palpate/pose.hpp"
 #include "palpate/touch.hpp"
 
@@ -86,7 +87,7 @@ struct SensorCounters {
 
 /// A stream of frames from a board, a file or a simulation. All calls come from one thread; a
 /// sensor may read its hardware on threads of its own.
-class Sensor {
+class PALPATE_API Sensor {
  public:
   virtual ~Sensor() = default;
 

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 
+#include "palpate/api.hpp"
 #include "palpate/contact.hpp"
 
 namespace palpate {
@@ -18,7 +19,7 @@ inline constexpr double least_peak = 1e-6;
 ///   G'(d) = peak * exp(-d^2 / (2 spread^2)),
 ///   p = m + (1 - m) G' (In Contact), m - m G' (No Contact), m (Unknown),
 ///   increment = log(p / (1 - p)) - log(m / (1 - m)).
-struct InverseSensorModel {
+struct PALPATE_API InverseSensorModel {
   double spread_mm = 0.5;  ///< half the standard deviation of the sensor's point spread
   double peak = 0.9;       ///< at most 0.9999: at 1 a single reading would make a cell certain
   double prior = 0.2;      ///< m

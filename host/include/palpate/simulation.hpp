@@ -10,13 +10,14 @@
 
 #include <glm/vec2.hpp>
 
+#include "palpate/api.hpp"
 #include "palpate/pose.hpp"
 #include "palpate/touch.hpp"
 
 namespace palpate {
 
 /// A raised planar shape in its object frame, in mm: the union of its strokes and filled polygons.
-struct Shape {
+struct PALPATE_API Shape {
   struct Stroke {
     std::vector<glm::dvec2> points_mm;  ///< a polyline, with round caps and joints
     double width_mm = 0.0;
@@ -29,12 +30,12 @@ struct Shape {
 };
 
 /// Returns the shape that make_shape() knows by this name without a file; none for other names.
-std::optional<Shape> built_in_shape(const std::string& name);
+PALPATE_API std::optional<Shape> built_in_shape(const std::string& name);
 
 /// Makes a shape: a capital letter "A".."Z" or digit "0".."9" about 25 mm high, "ring", "bar", or
 /// the polygons of a file: lines "x y" in mm, an empty line between polygons, '#' starts a comment.
 /// @throws Error (Fault::input) naming the file and line, or the shapes that there are
-Shape make_shape(const std::string& name_or_file);
+PALPATE_API Shape make_shape(const std::string& name_or_file);
 
 /// The sensor of Pezzementi et al. (Haptics Symposium 2010), the paper's reference [19]: the
 /// shape's displacement map convolved with a Gaussian point spread and averaged over the element's
@@ -51,7 +52,7 @@ struct SensorModel {
 
 /// Simulates touches of one shape with one array. The same seed gives the same recording. touch()
 /// of a moved-from simulator throws Error.
-class Simulator {
+class PALPATE_API Simulator {
  public:
   /// @throws Error on a shape without area, an array without elements, or a value out of range
   Simulator(const Shape& shape, const SensorModel& model, std::vector<glm::dvec2> elements_mm,
@@ -65,16 +66,16 @@ class Simulator {
   Recording touch(const std::vector<Pose>& T_robot_sensor, const Pose& T_object_robot);
 
  private:
-  struct Impl;
+  struct PALPATE_LOCAL Impl;
   std::unique_ptr<Impl> impl_;
 };
 
 /// Returns the 192 training poses T_object_sensor of Sec. II: 4 x 4 positions 6.8 mm apart around
 /// the object's origin, 12 angles at each.
-std::vector<Pose> training_grid();
+PALPATE_API std::vector<Pose> training_grid();
 /// Returns n poses T_object_sensor, uniform over the training grid's extent and all angles.
-std::vector<Pose> random_poses(int n, std::uint64_t seed);
+PALPATE_API std::vector<Pose> random_poses(int n, std::uint64_t seed);
 /// Returns a T_object_robot, uniform over [-10, 10]^2 mm and all angles (Sec. IV).
-Pose random_object_pose(std::uint64_t seed);
+PALPATE_API Pose random_object_pose(std::uint64_t seed);
 
 }  // namespace palpate

@@ -9,20 +9,21 @@
 
 #include <glm/vec2.hpp>
 
+#include "palpate/api.hpp"
 #include "palpate/pose.hpp"
 
 namespace palpate {
 
 /// Returns the element centres, [36] in mm in the sensor frame, of the central 6 x 6 region of two
 /// PPS DigiTacts pads side by side: x = +-1.1, +-3.0, +-4.9, y = (k - 2.5) * 1.9; x varies fastest.
-std::vector<glm::dvec2> digitacts_array();
+PALPATE_API std::vector<glm::dvec2> digitacts_array();
 
 /// Edge length of a DigiTacts element, in mm.
 inline constexpr double digitacts_element_mm = 1.8;
 
 /// Returns the element centres of a grid, [columns * rows] in mm, centred about the sensor's
 /// origin; x varies fastest, along the columns.
-std::vector<glm::dvec2> grid_array(int columns, int rows, double pitch_mm);
+PALPATE_API std::vector<glm::dvec2> grid_array(int columns, int rows, double pitch_mm);
 
 /// Pose of a frame whose pose is unknown: all NaN.
 inline const Pose unknown_pose{
@@ -40,14 +41,14 @@ struct Touch {
 };
 
 /// True where both touches have exactly the same pose and element centres.
-bool same_placement(const Touch& a, const Touch& b);
+PALPATE_API bool same_placement(const Touch& a, const Touch& b);
 
 /// The centre of the box around the elements, in mm in the frame of the elements; (0, 0) without
 /// elements. The sensor frame's origin may lie elsewhere, such as at the robot's flange.
-glm::dvec2 array_centre_mm(std::span<const glm::dvec2> elements_mm);
+PALPATE_API glm::dvec2 array_centre_mm(std::span<const glm::dvec2> elements_mm);
 
 /// The largest distance of an element from the array's centre, in mm; 0 without elements.
-double array_reach_mm(std::span<const glm::dvec2> elements_mm);
+PALPATE_API double array_reach_mm(std::span<const glm::dvec2> elements_mm);
 
 /// The true identity and pose of an unknown object.
 struct Truth {
@@ -56,7 +57,7 @@ struct Truth {
 };
 
 /// A sequence of readings of one array pressed against one object.
-struct Recording {
+struct PALPATE_API Recording {
   std::string path;                     ///< the file it was read from, for messages
   std::string object;                   ///< label, "" when unknown
   std::string pressure_unit = "kPa";    ///< "kPa" or "raw"

@@ -6,6 +6,7 @@
 #include <optional>
 #include <vector>
 
+#include "palpate/api.hpp"
 #include "palpate/sensor.hpp"
 
 namespace palpate {
@@ -51,7 +52,7 @@ struct DetectedTouch {
 /// it. Lost frames only coarsen the times of a touch. A silence longer than `largest_gap_s`, or a
 /// clock that goes back, ends a touch and restarts detection. Memory is bounded: a long steady
 /// phase keeps frames evenly spread over it. Every call on a moved-from detector throws Error.
-class TouchDetector {
+class PALPATE_API TouchDetector {
  public:
   /// @param baseline [e] what the untouched array reads, subtracted from every frame; empty: zeros
   /// @param valid empty or [e]; 0 = dead element, which takes no part and reads 0 in every touch
@@ -84,8 +85,8 @@ class TouchDetector {
   const std::vector<double>& baseline() const;
 
  private:
-  struct Impl;
-  Impl& impl() const;
+  struct PALPATE_LOCAL Impl;
+  PALPATE_LOCAL Impl& impl() const;
   std::unique_ptr<Impl> impl_;
 };
 

@@ -6,21 +6,22 @@
 #include <string>
 #include <string_view>
 
+#include "palpate/api.hpp"
 #include "palpate/sensor.hpp"
 
 namespace palpate {
 
 /// True for the names that open_virtual_sensor() takes: "replay:..." and "simulate:...".
-bool is_virtual_sensor(std::string_view name);
+PALPATE_API bool is_virtual_sensor(std::string_view name);
 
 /// Returns the recording or polygon file that a virtual sensor of this name reads, if any.
 /// @throws Error (Fault::input) on an unknown option
-std::optional<std::filesystem::path> virtual_sensor_file(const std::string& name);
+PALPATE_API std::optional<std::filesystem::path> virtual_sensor_file(const std::string& name);
 
 /// True for a simulation without end that gives more than 10 MB of frames a second: a recording of
 /// it needs a limit.
 /// @throws Error (Fault::input) on an unknown or wrong option
-bool is_endless_flood(const std::string& name);
+PALPATE_API bool is_endless_flood(const std::string& name);
 
 /// Opens a sensor without a board. Its frames wait for a late reader; none is ever lost.
 ///
@@ -46,6 +47,6 @@ bool is_endless_flood(const std::string& name);
 ///
 /// @throws Error (Fault::input) on an unknown option or value, or a file that is no recording of
 /// frames with times and one array
-std::unique_ptr<Sensor> open_virtual_sensor(const std::string& name);
+PALPATE_API std::unique_ptr<Sensor> open_virtual_sensor(const std::string& name);
 
 }  // namespace palpate

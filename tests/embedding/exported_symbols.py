@@ -1,0 +1,80 @@
+#!/usr/bin/python3
+"""Compares the symbols that a shared library exports with the recorded ones and the headers.
+
+The recorded list is the library's ABI: a symbol that goes, or whose signature changes, breaks
+programs (docs/embedding.md says when that may happen). Prints every difference.
+"""
+
+import argparse
+import pathlib
+import re
+import subprocess
+import sys
+
+
+def symbols(nm, file, kinds, *flags):
+    """Demangled names of what a file defines, of these kinds as nm prints them."""
+    text = subprocess.run(
+        [nm, "--demangle", "--defined-only", *flags, file],
+        check=True, capture_output=True, text=True).stdout
+    found = re.findall(rf"^[0-9a-f]+ [{kinds}] (.+)$", text, re.MULTILINE)
+    return {re.sub(r"@@?PALPATE_\S+$", "", name) for name in found}
+
+
+def public_names(headers):
+    """Classes and functions that the headers declare outside of classes."""
+    names = set()
+    for header in headers:
+        text = header.read_text()
+        names.update(re.findall(r"^(?:class|struct) (?:PALPATE_API )?(\w+)[^;]*\{", text,
+                                re.MULTILINE))
+        names.update(re.findall(r"^(?!inline|constexpr|#|//)\S[^=;{}()]*?\b(\w+)\(", text,
+                                re.MULTILINE))
+    return names
+
+
+def hidden_members(headers):
+    """Members that the headers mark as the library's own."""
+    return {name for header in headers
+            for name in re.findall(r"PALPATE_LOCAL [\w& ]*?(\w+)(?:;|\()", header.read_text())}
+
+
+def missing(exported, archive, headers):
+    """Public functions that the archive has and the shared library keeps to itself."""
+    names = public_names(headers)
+    hidden = hidden_members(headers)
+    found = []
+    for symbol in archive - exported:
+        match = re.match(r"palpate::(\w+)(?:::~?(\w+))?[(\[]", symbol)
+        if match and match[1] in names and match[2] not in hidden:
+            found.append(symbol)
+    return found
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--nm", default="nm")
+    parser.add_argument("--shared", required=True)
+    parser.add_argument("--archive", required=True)
+    parser.add_argument("--list", required=True, type=pathlib.Path)
+    parser.add_argument("folders", nargs="+", type=pathlib.Path, help="of the public headers")
+    options = parser.parse_args()
+
+    # All but A, which is the version's own node.
+    exported = symbols(options.nm, options.shared, "B-Zu-w", "--dynamic")
+    recorded = set(options.list.read_text().splitlines())
+    headers = [header for folder in options.folders for header in folder.glob("*.hpp")]
+    # Of what weak symbols (W) define, every program has a copy.
+    archive = symbols(options.nm, options.archive, "T", "--extern-only")
+    faults = [f"new, add it to {options.list.name}: {s}" for s in exported - recorded]
+    faults += [f"gone: {s}" for s in recorded - exported]
+    faults += [f"public, but without PALPATE_API: {s}"
+               for s in missing(exported, archive, headers)]
+    if not recorded:
+        faults.append(f"{options.list} is empty")
+    print(*sorted(faults), sep="\n")
+    return 1 if faults else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,123 @@
+// What the headers allow several threads to do at the same time; the preset `threads` runs these
+// tests with ThreadSanitizer.
+#include <unistd.h>
+
+#include <atomic>
+#include <filesystem>
+#include <functional>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "letters.hpp"
+
+namespace palpate {
+namespace {
+
+constexpr int threads = 4;
+
+/// Calls `work(i)` on thread i, all at the same time.
+void on_threads(const std::function<void(int)>& work) {
+  std::atomic<int> ready = 0;
+  std::vector<std::thread> running;
+  for (int i = 0; i < threads; ++i) {
+    running.emplace_back([&, i] {
+      ++ready;
+      while (ready < threads) {
+      }
+      work(i);
+    });
+  }
+  for (std::thread& thread : running) {
+    thread.join();
+  }
+}
+
+std::vector<double> histogram_after(Device& device, const std::vector<Hypothesis>& maps,
+                                    const Recording& unknown, std::size_t first) {
+  PoseHistogram belief(device, maps, {.lattice = small_lattice()});
+  for (std::size_t i = first; i < unknown.size(); ++i) {
+    belief.update(unknown.touch(i));
+    belief.estimate();
+  }
+  return belief.log_likelihood(1);
+}
+
+class Threads : public testing::Test {
+ protected:
+  Device device_ = Device::open();
+  std::vector<Hypothesis> maps_ = letter_maps(device_);
+  Recording unknown_ = unknown_letter(6);
+};
+
+TEST_F(Threads, ShareADeviceWithTheResultsOfOneThread) {
+  std::vector<std::vector<double>> alone;
+  for (int i = 0; i < threads; ++i) {
+    alone.push_back(histogram_after(device_, maps_, unknown_, i));
+  }
+  std::vector<std::vector<double>> together(threads);
+  on_threads([&](int i) { together[i] = histogram_after(device_, maps_, unknown_, i); });
+  for (int i = 0; i < threads; ++i) {
+    EXPECT_EQ(together[i], alone[i]) << "thread " << i;
+  }
+}
+
+TEST_F(Threads, MakeDifferentEstimatorsOnADevice) {
+  const auto particles_after = [&] {
+    ParticleFilter filter(device_, maps_, {.particles = 500, .seed = 7});
+    filter.update(unknown_.touches(0, unknown_.size()));
+    return filter.estimate().identity;
+  };
+  const std::vector<double> particles = particles_after();
+  const std::vector<double> bins = histogram_after(device_, maps_, unknown_, 0);
+  on_threads([&](int i) {
+    switch (i) {
+      case 0:
+        EXPECT_EQ(particles_after(), particles);
+        break;
+      case 1:
+        EXPECT_EQ(histogram_after(device_, maps_, unknown_, 0), bins);
+        break;
+      default:
+        EXPECT_EQ(letter_maps(device_)[1].map.log_odds, maps_[1].map.log_odds);
+    }
+  });
+}
+
+TEST_F(Threads, OpenDevicesOfTheirOwn) {
+  on_threads([&](int i) {
+    Device device = Device::open();
+    EXPECT_EQ(histogram_after(device, maps_, unknown_, i),
+              histogram_after(device, maps_, unknown_, i));
+  });
+}
+
+TEST_F(Threads, ReadAndWriteFiles) {
+  const std::filesystem::path folder =
+      std::filesystem::temp_directory_path() / ("palpate_threads_test." + std::to_string(getpid()));
+  std::filesystem::create_directory(folder);
+  on_threads([&](int i) {
+    const auto path = folder / (std::to_string(i) + ".h5");
+    for (int round = 0; round < 3; ++round) {
+      write_recording(path, unknown_);
+      EXPECT_EQ(read_recording(path).pressure, unknown_.pressure);
+      write_map(path, maps_[0].map);
+      EXPECT_EQ(read_map(path).log_odds, maps_[0].map.log_odds);
+      EXPECT_THROW(read_map(folder / "missing.h5"), Error);
+    }
+  });
+  std::filesystem::remove_all(folder);
+}
+
+TEST(Log, TakesTheMessagesOfAllThreadsOneAtATime) {
+  int messages = 0;  // no atomic: the library calls one at a time
+  set_log([&](LogLevel, const std::string&) { ++messages; });
+  on_threads([](int) { Device::open(); });
+  set_log({});
+  EXPECT_EQ(messages, threads);
+}
+
+}  // namespace
+}  // namespace palpate

@@ -1,0 +1,131 @@
+#include "palpate/vulkan_device.hpp"
+
+#include <chrono>
+#include <limits>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "context.hpp"
+#include "letters.hpp"
+#include "selection.hpp"
+
+namespace palpate {
+namespace {
+
+/// A program's own Vulkan device, with the validation layer, whose messages end the test.
+class Program {
+ public:
+  Program() {
+    const std::vector<gpu::Candidate> all = gpu::candidates(instance_.handle(), gpu::wished({}));
+    const gpu::Candidate& candidate = gpu::chosen(all, gpu::wished({}));
+    const float priority = 1.0F;
+    const VkDeviceQueueCreateInfo queue{.sType = VK_STRUCTURE_TYPE_DEVICE_QUEUE_CREATE_INFO,
+                                        .queueFamilyIndex = candidate.queue_family,
+                                        .queueCount = 1,
+                                        .pQueuePriorities = &priority};
+    const VkDeviceCreateInfo info{.sType = VK_STRUCTURE_TYPE_DEVICE_CREATE_INFO,
+                                  .queueCreateInfoCount = 1,
+                                  .pQueueCreateInfos = &queue};
+    handles_ = {.instance = instance_.handle(),
+                .physical_device = candidate.physical,
+                .queue_family = candidate.queue_family,
+                .queue_mutex = &mutex_};
+    vkCreateDevice(candidate.physical, &info, nullptr, &handles_.device);
+    vkGetDeviceQueue(handles_.device, candidate.queue_family, 0, &handles_.queue);
+  }
+  ~Program() { vkDestroyDevice(handles_.device, nullptr); }
+  Program(const Program&) = delete;
+  Program& operator=(const Program&) = delete;
+
+  const VulkanDevice& handles() const { return handles_; }
+  VkResult submit_nothing() {
+    const std::scoped_lock lock(mutex_);
+    return vkQueueSubmit(handles_.queue, 0, nullptr, VK_NULL_HANDLE);
+  }
+  VkResult wait() {
+    const std::scoped_lock lock(mutex_);
+    return vkQueueWaitIdle(handles_.queue);
+  }
+
+ private:
+  gpu::Instance instance_;
+  std::mutex mutex_;
+  VulkanDevice handles_;
+};
+
+std::vector<double> identity_on(Device& device, const std::vector<Hypothesis>& maps) {
+  PoseHistogram belief(device, maps, {.lattice = small_lattice()});
+  const Recording unknown = unknown_letter(4);
+  belief.update(unknown.touches(0, unknown.size()));
+  return belief.estimate().identity;
+}
+
+TEST(SharedDevice, GivesTheSameResultAsOneThatPalpateOpens) {
+  Device own = Device::open();
+  const std::vector<Hypothesis> maps = letter_maps(own);
+  const std::vector<double> expected = identity_on(own, maps);
+  Program program;
+  for (int i = 0; i < 2; ++i) {  // the program's device outlives Palpate's use of it
+    Device shared = Device::share(program.handles());
+    EXPECT_EQ(shared.name(), own.name());
+    EXPECT_EQ(letter_maps(shared)[0].map.log_odds, maps[0].map.log_odds);
+    EXPECT_EQ(identity_on(shared, maps), expected);
+  }
+  EXPECT_EQ(program.submit_nothing(), VK_SUCCESS);
+  EXPECT_EQ(program.wait(), VK_SUCCESS);
+}
+
+TEST(SharedDevice, TakesTurnsWithTheProgramOnItsQueue) {
+  Program program;
+  Device shared = Device::share(program.handles());
+  const std::vector<Hypothesis> maps = letter_maps(shared);
+  bool done = false;
+  std::mutex done_mutex;
+  const auto is_done = [&] {
+    const std::scoped_lock lock(done_mutex);
+    return done;
+  };
+  int submissions = 0;
+  std::thread other([&] {  // the validation layer would report two threads in the queue
+    do {
+      EXPECT_EQ(program.submit_nothing(), VK_SUCCESS);
+      ++submissions;
+      std::this_thread::sleep_for(std::chrono::microseconds(50));  // lets Palpate have its turn
+    } while (!is_done());
+  });
+  for (int i = 0; i < 5; ++i) {
+    identity_on(shared, maps);
+  }
+  {
+    const std::scoped_lock lock(done_mutex);
+    done = true;
+  }
+  other.join();
+  EXPECT_GT(submissions, 0);
+}
+
+TEST(SharedDevice, RefusesHandlesThatCannotCompute) {
+  const Program program;
+  const auto expect_refused = [](const VulkanDevice& handles, const std::string& field) {
+    try {
+      Device::share(handles);
+      ADD_FAILURE() << "took it without " << field;
+    } catch (const Error& error) {
+      EXPECT_EQ(error.fault(), Fault::input);
+      EXPECT_NE(std::string(error.what()).find(field), std::string::npos) << error.what();
+    }
+  };
+  VulkanDevice handles = program.handles();
+  handles.queue = VK_NULL_HANDLE;
+  expect_refused(handles, "a handle is null");
+  handles = program.handles();
+  handles.queue_family = std::numeric_limits<std::uint32_t>::max();
+  expect_refused(handles, "queue_family = 4294967295");
+}
+
+}  // namespace
+}  // namespace palpate

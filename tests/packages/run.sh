@@ -1,0 +1,92 @@
+#!/usr/bin/env bash
+# Installs the Debian packages in a fresh Debian 12, builds the consumer project there against the
+# installed headers and libraries, and recognises a letter. Run by hand, as root, after `./dev deb`:
+#   tests/packages/run.sh [FOLDER OF .deb FILES]
+# Needs debootstrap, the network, about 3 GB in $TMPDIR, and some minutes. Exits with 77 where the
+# test cannot run.
+set -euo pipefail
+
+source=$(cd "$(dirname "${BASH_SOURCE[0]}")/../.." && pwd)
+packages=${1:-$source/build-deb}
+mirror=${MIRROR:-http://deb.debian.org/debian}
+
+skip() {
+  echo "skipped: $*" >&2
+  exit 77
+}
+[ "$(id -u)" -eq 0 ] || skip "debootstrap needs root"
+command -v debootstrap >/dev/null || skip "debootstrap is missing: apt-get install debootstrap"
+compgen -G "$packages/*.deb" >/dev/null || {
+  echo "$packages holds no packages: run ./dev deb" >&2
+  exit 2
+}
+
+root=$(mktemp -d)
+finish() {
+  umount "$root/proc" 2>/dev/null || true
+  rm -rf --one-file-system "$root"
+}
+trap finish EXIT
+debootstrap --variant=minbase bookworm "$root" "$mirror" >"$root.log" 2>&1 || {
+  tail -n 5 "$root.log" >&2
+  rm "$root.log"
+  skip "debootstrap cannot make a root of Debian 12 here"
+}
+rm "$root.log"
+mount -t proc proc "$root/proc" || skip "cannot mount /proc in the new root"
+# Its commands run in the new root: the quotes keep this shell from expanding them.
+# shellcheck disable=SC2016
+in_root() {
+  chroot "$root" env DEBIAN_FRONTEND=noninteractive LC_ALL=C.UTF-8 PALPATE_DEVICE=llvmpipe "$@"
+}
+# The machine's own way to the mirror: name servers, proxy, certificates.
+for file in /etc/resolv.conf /etc/hosts; do
+  cp -L "$file" "$root$file"
+done
+cp /etc/apt/apt.conf.d/*proxy* "$root/etc/apt/apt.conf.d/" 2>/dev/null || true
+
+mkdir "$root/packages"
+cp "$packages"/*.deb "$root/packages"
+cp -r "$source/tests/consumer/project" "$root/consumer"
+in_root apt-get update -qq
+
+echo "The command alone, with what it recommends:"
+in_root sh -c 'apt-get install -y -qq /packages/libpalpate-driver0_*.deb /packages/palpate-tools_*.deb' >/dev/null
+in_root palpate --version
+in_root palpate devices
+in_root sh -ec '
+  cd /tmp
+  for letter in A E; do palpate simulate $letter -o $letter.h5; done
+  palpate map A.h5 E.h5 -o maps/ --png maps.png
+  palpate simulate E -o unknown.h5 --object-pose random --touches 9 --seed 2
+  palpate recognize unknown.h5 --maps maps/ --json result.json
+  grep -q "\"best\": *\"E\"" result.json
+  test -f /usr/lib/udev/rules.d/70-palpate.rules
+  test -f /usr/share/man/man1/palpate-recognize.1.gz'
+
+echo "A program of the development files:"
+in_root sh -c 'apt-get install -y -qq --no-install-recommends /packages/libpalpate0_*.deb /packages/libpalpate-dev_*.deb \
+    g++ cmake make pkg-config' >/dev/null
+# Without the packages that only the archives need, COMPONENTS static must not be asked for.
+in_root sh -ec '
+  cd /consumer
+  g++ -std=c++20 main.cpp -o /tmp/consumer $(pkg-config --cflags --libs palpate)
+  g++ -std=c++20 board_reader.cpp -o /tmp/board_reader $(pkg-config --cflags --libs palpate-driver)
+  /tmp/consumer
+  /tmp/board_reader'
+in_root sh -ec '
+  apt-get install -y -qq --no-install-recommends libvulkan-dev libhdf5-dev libyaml-cpp-dev \
+    libfmt-dev libtbb-dev libhwy-dev libusb-1.0-0-dev >/dev/null
+  cmake -S /consumer -B /tmp/build -DCMAKE_BUILD_TYPE=Release >/dev/null
+  cmake --build /tmp/build >/dev/null
+  for program in consumer consumer_static board_reader board_reader_static; do
+    /tmp/build/$program
+  done'
+
+echo "What is installed can be removed:"
+in_root sh -c 'apt-get remove -y -qq libpalpate-driver0' >/dev/null
+if in_root palpate --version 2>/dev/null; then
+  echo "palpate runs without its library" >&2
+  exit 1
+fi
+echo "passed"
