@@ -39,9 +39,7 @@ def math_visitor(inline):
     """
 
     def visit(self, node):
-        tree = latex2mathml.parse_latex_math(node.astext(), inline=inline)
-        tag = "span" if inline else "div"
-        self.body.append(f'<{tag} class="math">{"".join(tree.xml())}</{tag}>')
+        self.body.append(latex2mathml.tex2mathml(node.astext(), inline=inline))
         raise SkipNode
 
     return visit
