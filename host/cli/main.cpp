@@ -9,6 +9,7 @@
 #include <CLI/CLI.hpp>
 
 #include "commands.hpp"
+#include "hdf5_process.hpp"
 #include "palpate/error.hpp"
 #include "standard_streams.hpp"
 
@@ -96,6 +97,7 @@ int run(int argc, char** argv) {
 
 int main(int argc, char** argv) {
   palpate::open_closed_streams();
+  palpate::read_hdf5_in_children(true);
   try {
     return run(argc, argv);
   } catch (const palpate::Error& error) {

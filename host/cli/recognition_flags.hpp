@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -16,9 +17,19 @@ class App;
 
 namespace palpate::cli {
 
+/// Says a sentence to the user, on standard error.
+void tell_on_stderr(const std::string& sentence);
+
+/// A map in memory, and its name for messages.
+struct GivenMap {
+  std::string name;
+  Hypothesis hypothesis;
+};
+
 /// The flags of a task, as given.
 struct RecognitionFlags {
   std::vector<std::string> maps;
+  std::vector<GivenMap> given_maps;  ///< of a program, in the place of `maps`
   std::string scene;
   std::string bins;
   std::string x_mm;
@@ -34,6 +45,7 @@ struct RecognitionFlags {
   FilterFlags filter;
   std::string device;
   bool verbose = false;
+  std::function<void(const std::string&)> tell = tell_on_stderr;
 };
 
 void add_recognition_flags(CLI::App& command, RecognitionFlags& flags);
@@ -59,8 +71,7 @@ RecognitionTask task_of(const RecognitionFlags& flags, const Scene& scene,
 Device open_device(const RecognitionFlags& flags, const Scene& scene);
 
 /// Makes the task's filter, after --bins auto or fine has chosen the bins and --filter auto the
-/// filter. Says on standard error where a limit made bins wider than the maps resolve. Throws
-/// Error.
+/// filter. Tells where a limit made bins wider than the maps resolve. Throws Error.
 Recogniser open_recogniser(const RecognitionFlags& flags, const Scene& scene, Device& device,
                            RecognitionTask& task);
 

@@ -26,6 +26,7 @@
 #include "sheet.hpp"
 #include "terminal.hpp"
 #include "touch_sd_output.hpp"
+#include "unknowns.hpp"
 
 namespace palpate::cli {
 
@@ -33,9 +34,7 @@ namespace {
 
 struct Options {
   std::vector<std::string> recordings;
-  std::string frames;
-  std::optional<int> touches;
-  bool each_frame = false;
+  UnknownFlags unknowns;
   RecognitionFlags recognition;
   bool trace = false;
   std::string json;
@@ -43,39 +42,6 @@ struct Options {
   std::string png;
   bool fit_touch_sd = false;
 };
-
-/// The unknowns that the flags select: views into the recordings' memory.
-std::vector<Unknown> list_unknowns(const Options& options,
-                                   const std::vector<Recording>& recordings) {
-  std::optional<Frames> frames;
-  if (!options.frames.empty()) {
-    frames = parse_frames("--frames", options.frames);
-  }
-  if (options.touches && *options.touches < 1) {
-    refuse_flag("--touches", *options.touches, "give at least 1");
-  }
-  if (options.touches && options.each_frame) {
-    refuse("--touches", "with --each-frame every unknown has one touch; leave one of them out");
-  }
-  std::vector<Unknown> unknowns;
-  for (const Recording& recording : recordings) {
-    auto [begin, end] = select(recording, frames);
-    if (options.touches && static_cast<std::size_t>(*options.touches) > end - begin) {
-      refuse(recording.path, "has {} touches; --touches {} is too many", end - begin,
-             *options.touches);
-    }
-    const GroundTruth truth = ground_truth(recording.object, recording.truth);
-    if (options.each_frame) {
-      for (std::size_t i = begin; i < end; ++i) {
-        unknowns.push_back({recording.path, i, {recording.touch(i)}, truth});
-      }
-    } else {
-      end = options.touches ? begin + static_cast<std::size_t>(*options.touches) : end;
-      unknowns.push_back({recording.path, {}, recording.touches(begin, end), truth});
-    }
-  }
-  return unknowns;
-}
 
 HistogramNeed histogram_need(const Options& options) {
   if (options.fit_touch_sd) {
@@ -194,21 +160,15 @@ void recognize(const Options& options) {
     replace_array(scene, options.recognition.scene, recording.path, recording.elements(),
                   recording.elements_mm);
   }
-  const std::vector<Unknown> unknowns = list_unknowns(options, recordings);
+  const std::vector<Unknown> unknowns = list_unknowns(options.unknowns, recordings);
   const Recording& first = recordings.front();
-  double reach_mm = 0.0;
-  for (const Recording& recording : recordings) {
-    for (std::size_t i = 0; i < recording.size(); ++i) {  // the array may change between touches
-      reach_mm = std::max(reach_mm, array_reach_mm(recording.touch(i).elements_mm));
-    }
-  }
   RecognitionTask task = task_of(options.recognition, scene, first.pressure_unit, first.path,
-                                 reach_mm, histogram_need(options));
+                                 reach_mm(recordings), histogram_need(options));
   if (auto* histogram = std::get_if<HistogramOptions>(&task.filter)) {
     histogram->still_array = array_is_still(unknowns);
   }
   if (options.fit_touch_sd) {
-    refuse_beside_fit(std::array<OtherFlag, 4>{{{"--each-frame", options.each_frame},
+    refuse_beside_fit(std::array<OtherFlag, 4>{{{"--each-frame", options.unknowns.each_frame},
                                                 {"--trace", options.trace},
                                                 {"--posterior", !options.posterior.empty()},
                                                 {"--png", !options.png.empty()}}},
@@ -254,7 +214,7 @@ void recognize(const Options& options) {
   }
 
   if (!unresolved.empty()) {
-    fmt::print(stderr, "palpate: {}\n", unresolved);
+    options.recognition.tell(unresolved);
   }
 
   // The path of a recording need not be UTF-8, as JSON must.
@@ -295,13 +255,13 @@ void add_recognize(CLI::App& app) {
   command->add_option("RECORDING", options->recordings, "Recordings of unknown objects (HDF5)")
       ->required();
   add_recognition_flags(*command, options->recognition);
-  command->add_option("--frames", options->frames,
+  command->add_option("--frames", options->unknowns.frames,
                       "Use the touches A to B - 1 of every recording, counted from 0, as A:B");
   command
-      ->add_option("--touches", options->touches,
+      ->add_option("--touches", options->unknowns.touches,
                    "Use the first N touches of every recording [default: all]")
       ->check(require_whole_number);
-  command->add_flag("--each-frame", options->each_frame,
+  command->add_flag("--each-frame", options->unknowns.each_frame,
                     "Recognise every touch by itself, as an unknown object of its own");
   command->add_flag("--trace", options->trace, "Show the estimate after every touch");
   command->add_option("--json", options->json, "Write the records as JSON; - is standard output");

@@ -16,20 +16,24 @@ std::vector<Recording> read_touch_recordings(const std::vector<std::string>& pat
     if (!seen.insert(identity_of(path)).second) {
       refuse(path, "given twice; leave one out");
     }
-    if (recording.rows == "frames") {
-      refuse(
-          path,
-          "rows = frames, a raw stream; find its touches first: palpate touches {} -o TOUCHES.h5",
-          path);
-    }
-    if (recording.pressure_unit != recordings.front().pressure_unit) {
-      refuse(
-          path,
-          "pressure_unit is {} but {} has {}; one threshold does not fit both, use a call for each",
-          recording.pressure_unit, paths.front(), recordings.front().pressure_unit);
-    }
+    require_touches(recording, recordings.front());
   }
   return recordings;
+}
+
+void require_touches(const Recording& recording, const Recording& first) {
+  const std::string& path = recording.path;
+  if (recording.rows == "frames") {
+    refuse(path,
+           "rows = frames, a raw stream; find its touches first: palpate touches {} -o TOUCHES.h5",
+           path);
+  }
+  if (recording.pressure_unit != first.pressure_unit) {
+    refuse(
+        path,
+        "pressure_unit is {} but {} has {}; one threshold does not fit both, use a call for each",
+        recording.pressure_unit, first.path, first.pressure_unit);
+  }
 }
 
 Frames select(const Recording& recording, const std::optional<Frames>& frames) {

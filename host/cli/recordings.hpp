@@ -15,6 +15,9 @@ namespace palpate::cli {
 /// recordings of different pressure units.
 std::vector<Recording> read_touch_recordings(const std::vector<std::string>& paths);
 
+/// Throws Error where a recording is a raw stream, or its pressure unit is not that of the first.
+void require_touches(const Recording& recording, const Recording& first);
+
 /// The selected touches of a recording, or all. Throws Error where it has fewer.
 Frames select(const Recording& recording, const std::optional<Frames>& frames);
 

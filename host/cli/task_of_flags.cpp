@@ -22,6 +22,13 @@ namespace palpate::cli {
 namespace {
 
 std::vector<Scene::Object> objects_of(const RecognitionFlags& flags, const Scene& scene) {
+  if (!flags.given_maps.empty()) {
+    std::vector<Scene::Object> objects;
+    for (const GivenMap& given : flags.given_maps) {
+      objects.push_back({.map = given.name, .label = {}, .symmetry = {}, .mirror = {}});
+    }
+    return objects;
+  }
   if (flags.maps.empty()) {
     if (scene.objects.empty()) {
       if (flags.scene.empty()) {
@@ -40,8 +47,15 @@ std::vector<Scene::Object> objects_of(const RecognitionFlags& flags, const Scene
   return objects;
 }
 
-std::vector<Hypothesis> read_maps(const std::vector<Scene::Object>& objects) {
+std::vector<Hypothesis> hypotheses_of(const RecognitionFlags& flags,
+                                      const std::vector<Scene::Object>& objects) {
   std::vector<Hypothesis> hypotheses;
+  if (!flags.given_maps.empty()) {
+    for (const GivenMap& given : flags.given_maps) {
+      hypotheses.push_back(given.hypothesis);
+    }
+    return hypotheses;
+  }
   std::set<std::optional<FileIdentity>> seen;
   for (const Scene::Object& object : objects) {
     OccupancyGrid map = read_map(object.map);
@@ -143,18 +157,17 @@ std::optional<BinWidth> bin_width_of(const RecognitionFlags& flags, const Scene&
 
 /// Where neither counts nor any part of a region is given, all of the lattice follows from the maps
 /// and the array, about the first touch in contact.
-WantedLattice automatic_lattice(std::optional<BinWidth> bin_width,
+WantedLattice automatic_lattice(const RecognitionFlags& flags, std::optional<BinWidth> bin_width,
                                 std::span<const Hypothesis> hypotheses, double reach_mm) {
   // As many times the bins that the objects themselves need.
   constexpr double much = 2.0;
   const TouchRegion region = touch_region(hypotheses, reach_mm);
   if (region.excess > much) {
-    fmt::print(
-        stderr,
-        "palpate: the objects lie far apart in the frames of their maps; the bins cover {:.0f}"
-        " times the area that the objects need. Learn each object near its frame's origin, "
-        "or give --x-mm and --y-mm\n",
-        region.excess);
+    flags.tell(fmt::format(
+        "the objects lie far apart in the frames of their maps; the bins cover {:.0f} times the "
+        "area that the objects need. Learn each object near its frame's origin, or give --x-mm "
+        "and --y-mm",
+        region.excess));
   }
   return {region.lattice, bin_width.value_or(BinWidth::automatic), true};
 }
@@ -172,7 +185,7 @@ WantedLattice lattice_of(const RecognitionFlags& flags, const Scene& scene,
   const bool has_range = !flags.x_mm.empty() || !flags.y_mm.empty() || !flags.theta_deg.empty() ||
                          scene.region.x_mm || scene.region.y_mm || scene.region.theta_deg;
   if (!counts && !pivot_mm && !has_range) {
-    return automatic_lattice(bin_width, hypotheses, reach_mm);
+    return automatic_lattice(flags, bin_width, hypotheses, reach_mm);
   }
   PoseLattice lattice;
   const auto range = [](const char* flag, const std::string& text,
@@ -207,6 +220,8 @@ WantedLattice lattice_of(const RecognitionFlags& flags, const Scene& scene,
 
 }  // namespace
 
+void tell_on_stderr(const std::string& sentence) { fmt::print(stderr, "palpate: {}\n", sentence); }
+
 Scene scene_of(const RecognitionFlags& flags) {
   return flags.scene.empty() ? Scene{} : read_scene(flags.scene);
 }
@@ -234,7 +249,7 @@ RecognitionTask task_of(const RecognitionFlags& flags, const Scene& scene,
   ContactModel& contact = histogram.contact;
   const auto rules = contact_rules(flags, scene, sensor, pressure_unit, source);
   const std::vector<Scene::Object> objects = objects_of(flags, scene);
-  std::vector<Hypothesis> hypotheses = read_maps(objects);
+  std::vector<Hypothesis> hypotheses = hypotheses_of(flags, objects);
   if (!sensor || !sensor->table) {
     contact.prior = prior_of(objects, hypotheses, flags.prior ? flags.prior : scene.prior);
   }
@@ -281,11 +296,10 @@ Recogniser open_recogniser(const RecognitionFlags& flags, const Scene& scene, De
   Recogniser recogniser =
       open_filter(device, task);  // first: bins that do not fit deserve only their refusal
   if (bins) {
-    fmt::print(
-        stderr,
-        "palpate: --bins {}: steps of {:.2f} mm, wider than the maps resolve, keep to {} bins "
-        "in all; narrow the region, or give --bins\n",
-        fine ? "fine" : "auto", bins->step_mm, bins->most_bins);
+    flags.tell(fmt::format(
+        "--bins {}: steps of {:.2f} mm, wider than the maps resolve, keep to {} bins in all; "
+        "narrow the region, or give --bins",
+        fine ? "fine" : "auto", bins->step_mm, bins->most_bins));
   }
   return recogniser;
 }

@@ -10,12 +10,6 @@ namespace palpate {
 /// Kinds of records in the first answer of serve_hdf5().
 enum class Hdf5Record : char { attribute = 'a', dataset = 'd', refused = 'r', end = 'e' };
 
-/// Largest compression ratio of HDF5's own filters: deflate turns at most 258 bytes into 2 bits.
-inline constexpr std::uint64_t largest_compression = 1032;
-
-/// Most numbers in one piece of an answer.
-inline constexpr std::uint64_t hdf5_piece = 1 << 17;
-
 /// Asks for rows [first, first + count) of a dataset.
 struct Hdf5Request {
   std::uint64_t dataset;  ///< its index among the names

@@ -1,6 +1,7 @@
 #include "hdf5_contents.hpp"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <limits>
 
@@ -24,6 +25,24 @@ constexpr std::uint64_t cpu_seconds = 2;
 constexpr std::uint64_t memory_bytes = 256 << 20;
 // Rate of the slowest disk that is worth waiting for.
 constexpr std::uint64_t bytes_per_second = 1 << 20;
+
+std::atomic<bool> in_children{false};
+
+// For HDF5 in this process: a file's filters must not load code.
+class ConfinedSession {
+ public:
+  ConfinedSession() {
+    H5PLget_loading_state(&plugins_);
+    H5PLset_loading_state(0);
+  }
+  ~ConfinedSession() { H5PLset_loading_state(plugins_); }
+  ConfinedSession(const ConfinedSession&) = delete;
+  ConfinedSession& operator=(const ConfinedSession&) = delete;
+
+ private:
+  Hdf5Session session_;
+  unsigned plugins_ = 0;
+};
 
 // Parses the first answer of serve_hdf5(). Nothing in the answer is trusted: a damaged file may
 // have corrupted the child's memory. Once a length does not fit, every further value is empty.
@@ -81,6 +100,9 @@ class Receiver {
 
 }  // namespace
 
+void read_hdf5_in_children(bool wanted) { in_children = wanted; }
+bool reads_hdf5_in_children() { return in_children; }
+
 Hdf5Contents::Hdf5Contents(const std::filesystem::path& path,
                            const std::vector<std::string>& attributes,
                            const std::vector<std::string>& datasets)
@@ -91,6 +113,10 @@ Hdf5Contents::Hdf5Contents(const std::filesystem::path& path,
   }
   // Checked before the file is opened: a file closed by now is read as a whole.
   closed_ = !is_marked_open(path);
+  if (!in_children) {
+    open_here(file_bytes, attributes, datasets);
+    return;
+  }
   child_.emplace(
       [&](int socket) { serve_hdf5(socket, path, file_bytes, attributes, datasets); },
       ForkedLimits{.cpu_seconds = cpu_seconds,
@@ -98,6 +124,34 @@ Hdf5Contents::Hdf5Contents(const std::filesystem::path& path,
                    .silence = 1min + std::chrono::seconds(file_bytes / bytes_per_second)},
       hdf5_mutex);
   receive(datasets);
+}
+
+Hdf5Contents::~Hdf5Contents() {
+  if (reader_) {
+    const ConfinedSession session;
+    reader_.reset();
+  }
+}
+
+void Hdf5Contents::open_here(std::uint64_t file_bytes, const std::vector<std::string>& attributes,
+                             const std::vector<std::string>& datasets) {
+  std::string problem;
+  {
+    const ConfinedSession session;
+    reader_ =
+        std::make_unique<Hdf5Reader>(path_, file_bytes, attributes, datasets, Hdf5Confinement{});
+    problem = reader_->problem();
+    attributes_ = reader_->attributes();
+    for (const auto& [name, value] : reader_->datasets()) {
+      datasets_[name] = {value};
+    }
+    if (!problem.empty()) {
+      reader_.reset();
+    }
+  }
+  if (!problem.empty()) {
+    refuse("{}", problem);
+  }
 }
 
 void Hdf5Contents::receive(const std::vector<std::string>& datasets) {
@@ -211,6 +265,27 @@ void Hdf5Contents::read(const std::string& name, const Take& take, std::uint64_t
     return;
   }
   const Hdf5Request request{found.index, 0, shape.empty() ? 1 : std::min(rows, shape[0])};
+  if (reader_) {
+    read_here(name, request.count, take);
+  } else {
+    read_from_child(request, name, total, take);
+  }
+}
+
+void Hdf5Contents::read_here(const std::string& name, std::uint64_t rows, const Take& take) {
+  std::uint64_t first = 0;
+  const ConfinedSession session;
+  const bool read = reader_->read(name, 0, rows, [&](std::span<const double> piece) {
+    take(first, piece);
+    first += piece.size();
+  });
+  if (!read) {
+    refuse("dataset '{}' {}", name, hdf5_damaged);
+  }
+}
+
+void Hdf5Contents::read_from_child(const Hdf5Request& request, const std::string& name,
+                                   std::uint64_t total, const Take& take) {
   std::vector<double> piece;
   bool intact = child_->write(&request, sizeof request);
   for (std::uint64_t first = 0; intact && first < total; first += piece.size()) {

@@ -4,37 +4,36 @@
 #include <filesystem>
 #include <functional>
 #include <map>
+#include <memory>
 #include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "forked_child.hpp"
+#include "hdf5_process.hpp"
+#include "hdf5_reader.hpp"
 #include "input_file.hpp"
 
 namespace palpate {
 
-/// Value of an attribute (numbers or strings in row-major order), or shape of a dataset.
-struct Hdf5Value {
-  std::vector<std::uint64_t> shape;  ///< empty for a scalar
-  std::vector<double> numbers;       ///< integers, floats and enumerations of any width
-  std::vector<std::string> strings;  ///< of fixed or variable length
-  std::string problem;               ///< why it cannot be read; "": it can
-};
+struct Hdf5Request;
 
 /// Those of the named attributes and datasets that exist in an HDF5 file's root group.
 ///
-/// A damaged file may crash libhdf5 or make it loop. libhdf5 therefore reads in a forked child,
-/// which hands plain values back, so that no file takes the program down; forking costs 2 ms, plus
-/// 25 ms for each GB that the process holds. Numbers of datasets come in pieces, so that neither
-/// process holds more of them than it wants. No other file is opened: external links, external
-/// storage and virtual datasets are refused.
+/// What a file claims is checked before memory is taken for it. Numbers of datasets come in pieces,
+/// so that no process holds more of them than it wants. No other file is opened: external links,
+/// external storage and virtual datasets are refused.
 ///
-/// Fork copies the calling thread only: where a program uses libhdf5 itself, none of its threads
-/// may be in a libhdf5 call while an object of this class is made.
+/// A damaged file may all the same crash libhdf5 or make it loop. With read_hdf5_in_children(),
+/// libhdf5 therefore reads in a forked child, which hands plain values back, so that no file takes
+/// the program down; forking costs 2 ms, plus 25 ms for each GB that the process holds. Fork copies
+/// the calling thread only: where such a program uses libhdf5 itself, none of its threads may be in
+/// a libhdf5 call while an object of this class is made. Without a child, soft links are refused.
 class Hdf5Contents {
  public:
   /// Takes a piece of a dataset's numbers in row-major order; `first` is the index of its first.
+  /// Must not use HDF5.
   using Take = std::function<void(std::uint64_t first, std::span<const double> numbers)>;
 
   /// @throws Error where the file is missing, unreadable, no HDF5 file, truncated or damaged.
@@ -45,6 +44,10 @@ class Hdf5Contents {
   bool closed() const { return closed_; }
   bool has_attribute(const std::string& name) const { return attributes_.contains(name); }
   bool has_dataset(const std::string& name) const { return datasets_.contains(name); }
+
+  ~Hdf5Contents();
+  Hdf5Contents(const Hdf5Contents&) = delete;
+  Hdf5Contents& operator=(const Hdf5Contents&) = delete;
 
   // The functions below throw Error, naming file and field, on a missing field or another type.
   std::string text(const std::string& attribute) const;
@@ -73,7 +76,12 @@ class Hdf5Contents {
     std::uint64_t index = 0;  ///< among the names
   };
 
+  void open_here(std::uint64_t file_bytes, const std::vector<std::string>& attributes,
+                 const std::vector<std::string>& datasets);
   void receive(const std::vector<std::string>& datasets);
+  void read_here(const std::string& dataset, std::uint64_t rows, const Take& take);
+  void read_from_child(const Hdf5Request& request, const std::string& dataset, std::uint64_t total,
+                       const Take& take);
   [[noreturn]] void refuse_damaged() const;
   const Hdf5Value& attribute(const std::string& name) const;
   const Dataset& dataset(const std::string& name) const;
@@ -85,7 +93,8 @@ class Hdf5Contents {
   bool closed_ = true;
   std::map<std::string, Hdf5Value> attributes_;
   std::map<std::string, Dataset> datasets_;
-  std::optional<ForkedChild> child_;
+  std::optional<ForkedChild> child_;  ///< that reads the file, or else:
+  std::unique_ptr<Hdf5Reader> reader_;
 };
 
 }  // namespace palpate

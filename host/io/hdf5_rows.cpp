@@ -8,8 +8,6 @@
 #include <fmt/ranges.h>
 
 #include "available_memory.hpp"
-#include "forked_child.hpp"
-#include "hdf5_child.hpp"
 
 namespace palpate {
 
@@ -23,6 +21,9 @@ constexpr std::uint64_t cpu_bytes_per_second = 20'000'000;
 constexpr std::uint64_t base_bytes = 256 << 20;
 // Copies of a chunk in memory: stored, inflated (which grows by doubling) and unshuffled.
 constexpr std::uint64_t copies_of_a_chunk = 5;
+
+// Largest compression ratio of HDF5's own filters: deflate turns at most 258 bytes into 2 bits.
+constexpr std::uint64_t largest_compression = 1032;
 
 // Returns the type of the dataset's link; H5L_TYPE_ERROR where the file is damaged.
 H5L_type_t link_type(hid_t file, const std::string& name) {
@@ -81,10 +82,16 @@ bool hdf5_shape(hid_t space, std::vector<std::uint64_t>& shape) {
   return true;
 }
 
-Hdf5Rows::Hdf5Rows(hid_t file, const std::string& name, std::uint64_t file_bytes) {
+Hdf5Rows::Hdf5Rows(hid_t file, const std::string& name, std::uint64_t file_bytes,
+                   const Hdf5Confinement& confinement)
+    : confinement_(confinement) {
   const H5L_type_t link = link_type(file, name);
   if (link != H5L_TYPE_HARD && link != H5L_TYPE_SOFT && link != H5L_TYPE_ERROR) {
     problem_ = "is a link to another file, which is not followed; copy the dataset into this file";
+    return;
+  }
+  if (link == H5L_TYPE_SOFT && !confinement_.follows_links) {
+    problem_ = "is a link, which may lead to another file; store the dataset itself";
     return;
   }
   dataset_ = Hdf5Handle(H5Dopen2(file, name.c_str(), H5P_DEFAULT), H5Dclose);
@@ -147,9 +154,10 @@ bool Hdf5Rows::reopen_with_cache(hid_t file, const std::string& name, hid_t crea
     return false;
   }
   const std::uint64_t needed = band_bytes_ + copies_of_a_chunk * chunk_bytes;
-  allow_memory_bytes(UINT64_MAX);  // or the child's limit would count as what is available
+  // Or a child's limit would count as what is available.
+  confinement_.memory_bytes(UINT64_MAX);
   const std::uint64_t available = available_memory_bytes();
-  allow_memory_bytes(base_bytes);
+  confinement_.memory_bytes(base_bytes);
   if (needed > available) {
     problem_ = fmt::format(
         "is stored in chunks of {}, of which {:.1f} GB have to be held at a time; {:.1f} GB of "
@@ -167,7 +175,7 @@ bool Hdf5Rows::reopen_with_cache(hid_t file, const std::string& name, hid_t crea
   return dataset_.valid();
 }
 
-void Hdf5Rows::send(int socket, std::uint64_t first, std::uint64_t count) {
+bool Hdf5Rows::read(std::uint64_t first, std::uint64_t count, const Take& take) {
   const std::size_t rank = shape_.size();
   std::vector<hsize_t> begin(rank, 0);
   std::vector<hsize_t> box(shape_.begin(), shape_.end());
@@ -180,7 +188,7 @@ void Hdf5Rows::send(int socket, std::uint64_t first, std::uint64_t count) {
   const std::uint64_t block =
       std::max<std::uint64_t>(1, hdf5_piece / std::max<std::uint64_t>(inner, 1));
   std::vector<double> values;
-  allow_memory_bytes(base_bytes + needed_bytes_);
+  confinement_.memory_bytes(base_bytes + needed_bytes_);
   const auto end = [&](std::size_t k) { return k == 0 ? first + count : shape_[k]; };
   if (rank > 0) {
     begin[0] = first;
@@ -191,13 +199,11 @@ void Hdf5Rows::send(int socket, std::uint64_t first, std::uint64_t count) {
     }
     values.resize((rank == 0 ? 1 : box[axis]) * inner);
     // The time limit follows what a piece reads: the chunks of a pass, at most.
-    allow_cpu_seconds(cpu_seconds + band_bytes_ / cpu_bytes_per_second);
-    const std::uint64_t size = read(begin, box, values) ? values.size() : 0;
-    forked_write(socket, &size, sizeof size);
-    if (size == 0) {
-      return;
+    confinement_.cpu_seconds(cpu_seconds + band_bytes_ / cpu_bytes_per_second);
+    if (values.empty() || !read_box(begin, box, values)) {
+      return false;
     }
-    forked_write(socket, values.data(), size * sizeof(double));
+    take(values);
     more = false;
     for (std::size_t k = rank == 0 ? 0 : axis + 1; k-- > 0 && !more;) {
       begin[k] += box[k];
@@ -207,10 +213,11 @@ void Hdf5Rows::send(int socket, std::uint64_t first, std::uint64_t count) {
       }
     }
   }
+  return true;
 }
 
-bool Hdf5Rows::read(const std::vector<hsize_t>& begin, const std::vector<hsize_t>& count,
-                    std::span<double> values) const {
+bool Hdf5Rows::read_box(const std::vector<hsize_t>& begin, const std::vector<hsize_t>& count,
+                        std::span<double> values) const {
   if (begin.empty()) {
     return H5Dread(dataset_.get(), H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT,
                    values.data()) >= 0;

@@ -7,6 +7,7 @@
 #include "forked_child.hpp"
 #include "hdf5_failure.hpp"
 #include "hdf5_handle.hpp"
+#include "hdf5_process.hpp"
 #include "hdf5_writer.hpp"
 #include "input_file.hpp"
 #include "palpate/error.hpp"
@@ -78,6 +79,30 @@ Descriptor lock(const std::filesystem::path& path) {
          "recorded; copy it to another disk first");
 }
 
+// Closes the file in a child; returns why that failed, or "".
+std::string failure_of_child(const std::filesystem::path& path, std::uint64_t rows) {
+  constexpr std::uint64_t memory_bytes = 256 << 20;
+  ForkedChild child(
+      [&](int socket) {
+        H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
+        H5PLset_loading_state(0);
+        const std::string failure = close_file(path, rows) ? "" : hdf5_failure();
+        const std::uint64_t size = failure.size();
+        forked_write(socket, &size, sizeof size);
+        forked_write(socket, failure.data(), size);
+      },
+      {.cpu_seconds = 10, .memory_bytes = memory_bytes, .silence = 1min}, hdf5_mutex);
+  std::uint64_t size = 0;
+  std::string reason = "HDF5 failed";
+  if (child.read(&size, sizeof size) && size < memory_bytes) {
+    reason.resize(size);
+    if (!child.read(reason.data(), size)) {
+      reason = "HDF5 failed";
+    }
+  }
+  return reason;
+}
+
 }  // namespace
 
 bool close_recording(const std::filesystem::path& path) {
@@ -92,25 +117,11 @@ bool close_recording(const std::filesystem::path& path) {
     if (!is_marked_open(path)) {
       return false;
     }
-    constexpr std::uint64_t memory_bytes = 256 << 20;
-    ForkedChild child(
-        [&](int socket) {
-          H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
-          H5PLset_loading_state(0);
-          const std::string failure = close_file(path, before.rows) ? "" : hdf5_failure();
-          const std::uint64_t size = failure.size();
-          forked_write(socket, &size, sizeof size);
-          forked_write(socket, failure.data(), size);
-        },
-        {.cpu_seconds = 10, .memory_bytes = memory_bytes, .silence = 1min}, hdf5_mutex);
-    std::uint64_t size = 0;
-    reason = "HDF5 failed";
-    if (child.read(&size, sizeof size) && size < memory_bytes) {
-      reason.resize(size);
-      if (!child.read(reason.data(), size)) {
-        reason = "HDF5 failed";
-      }
-    }
+    const auto failure_here = [&] {
+      const Hdf5Session session;
+      return close_file(path, before.rows) ? std::string() : hdf5_failure();
+    };
+    reason = reads_hdf5_in_children() ? failure_of_child(path, before.rows) : failure_here();
   }
   if (reason.empty()) {
     const RecordingHead after = survey_recording(path).head;

@@ -47,9 +47,11 @@ function(build source folder)
   run(${CMAKE_COMMAND} --build ${folder})
 endfunction()
 build(${PROJECT_DIR} ${SCRATCH_DIR}/build)
+# Programs of the archives find the data below their own prefix, so they are installed there.
 foreach(program IN ITEMS consumer board_reader)
   run(${SCRATCH_DIR}/build/${program})
-  run(${SCRATCH_DIR}/build/${program}_static)
+  file(COPY ${SCRATCH_DIR}/build/${program}_static DESTINATION ${prefix}/bin)
+  run(${CMAKE_COMMAND} -E env PATH=${prefix}/bin ${program}_static)
 endforeach()
 
 # By pkg-config, with the shared library and with the archive.

@@ -5,6 +5,7 @@
 #include <sys/stat.h>
 
 #include "file_parts.hpp"
+#include "hdf5_process.hpp"
 #include "palpate/files.hpp"
 #include "scratch_folder.hpp"
 
@@ -13,9 +14,11 @@ namespace {
 
 constexpr H5Z_filter_t filter_id = 40000;  // of nobody
 
-class OutsideFile : public testing::Test {
+/// Read in a child, as the command does, or in this process.
+class OutsideFile : public testing::TestWithParam<bool> {
  protected:
   OutsideFile() {
+    read_hdf5_in_children(GetParam());
     EXPECT_EQ(::mkfifo((folder_ / "fifo").c_str(), 0600), 0);
     // Something that could be taken for numbers, and a file with a dataset of the right shape.
     put_bytes(folder_ / "secret", std::string(24, 's'));
@@ -34,6 +37,8 @@ class OutsideFile : public testing::Test {
     expect_named(input_error([&] { read_recording(path_); }), {path_.c_str(), "'pressure'", word});
   }
 
+  ~OutsideFile() override { read_hdf5_in_children(true); }
+
   static void create(hid_t file, hid_t creation, const hsize_t* most = nullptr) {
     const hsize_t extents[] = {2, 3};
     const Hdf5Handle space(H5Screate_simple(2, extents, most), H5Sclose);
@@ -47,7 +52,7 @@ class OutsideFile : public testing::Test {
   std::filesystem::path path_ = folder_ / "recording.h5";
 };
 
-TEST_F(OutsideFile, ExternalStorageIsNotRead) {
+TEST_P(OutsideFile, ExternalStorageIsNotRead) {
   for (const char* name : {"fifo", "secret", "missing"}) {
     expect_refused(
         [&](hid_t file) {
@@ -59,7 +64,7 @@ TEST_F(OutsideFile, ExternalStorageIsNotRead) {
   }
 }
 
-TEST_F(OutsideFile, ExternalLinksAreNotFollowed) {
+TEST_P(OutsideFile, ExternalLinksAreNotFollowed) {
   for (const char* name : {"fifo", "other.h5", "missing"}) {
     expect_refused(
         [&](hid_t file) {
@@ -77,7 +82,7 @@ TEST_F(OutsideFile, ExternalLinksAreNotFollowed) {
   }
 }
 
-TEST_F(OutsideFile, LinksOfOtherKindsAreNotFollowed) {
+TEST_P(OutsideFile, LinksOfOtherKindsAreNotFollowed) {
   const auto traverse = [](const char*, hid_t, const void*, size_t, hid_t, hid_t) -> hid_t {
     return H5I_INVALID_HID;
   };
@@ -99,7 +104,7 @@ TEST_F(OutsideFile, LinksOfOtherKindsAreNotFollowed) {
   H5Lunregister(kind.id);
 }
 
-TEST_F(OutsideFile, VirtualDatasetsAreNotResolved) {
+TEST_P(OutsideFile, VirtualDatasetsAreNotResolved) {
   for (const char* name : {"fifo", "other.h5", "missing"}) {
     for (const bool unlimited : {false, true}) {
       expect_refused(
@@ -124,7 +129,7 @@ TEST_F(OutsideFile, VirtualDatasetsAreNotResolved) {
 }
 
 // A file must not choose which code is loaded.
-TEST_F(OutsideFile, FiltersAreNotLoaded) {
+TEST_P(OutsideFile, FiltersAreNotLoaded) {
   // A FIFO among the plugins: whoever opens it waits.
   ASSERT_EQ(::mkfifo((folder_ / "libfilter.so").c_str(), 0600), 0);
   H5PLprepend(folder_.path().c_str());
@@ -150,15 +155,35 @@ TEST_F(OutsideFile, FiltersAreNotLoaded) {
   H5PLremove(0);
 }
 
-// Within the file a link is as good as the dataset.
-TEST_F(OutsideFile, SoftLinksWithinTheFileAreFollowed) {
+// Within the file a link is as good as the dataset. In this process, no link is safe.
+TEST_P(OutsideFile, SoftLinksWithinTheFileAreFollowedInAChild) {
   recording_parts().save(path_);
   edit(path_, [](hid_t file) {
     H5Lmove(file, "pressure", file, "numbers", H5P_DEFAULT, H5P_DEFAULT);
     H5Lcreate_soft("/numbers", file, "pressure", H5P_DEFAULT, H5P_DEFAULT);
   });
-  EXPECT_EQ(read_recording(path_).pressure.size(), 6u);
+  if (GetParam()) {
+    EXPECT_EQ(read_recording(path_).pressure.size(), 6u);
+  } else {
+    expect_named(input_error([&] { read_recording(path_); }),
+                 {path_.c_str(), "'pressure'", "link"});
+  }
 }
+
+// What the caller has set up stays as it was.
+TEST_P(OutsideFile, ExternalLinksAndPluginsStayAllowedElsewhere) {
+  recording_parts().save(path_);
+  unsigned before = 0;
+  unsigned after = 0;
+  H5PLget_loading_state(&before);
+  EXPECT_EQ(read_recording(path_).pressure.size(), 6u);
+  H5PLget_loading_state(&after);
+  EXPECT_EQ(before, after);
+  EXPECT_GT(H5Lis_registered(H5L_TYPE_EXTERNAL), 0);
+}
+
+INSTANTIATE_TEST_SUITE_P(Read, OutsideFile, testing::Bool(),
+                         [](const auto& read) { return read.param ? "InAChild" : "Here"; });
 
 }  // namespace
 }  // namespace palpate

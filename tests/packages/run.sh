@@ -4,6 +4,8 @@
 #   tests/packages/run.sh [FOLDER OF .deb FILES]
 # Needs debootstrap, the network, about 3 GB in $TMPDIR, and some minutes. Exits with 77 where the
 # test cannot run.
+# Commands of the new root stand in single quotes, so that this shell expands nothing in them.
+# shellcheck disable=SC2016
 set -euo pipefail
 
 source=$(cd "$(dirname "${BASH_SOURCE[0]}")/../.." && pwd)
@@ -22,6 +24,7 @@ compgen -G "$packages/*.deb" >/dev/null || {
 }
 
 root=$(mktemp -d)
+chmod 755 "$root"  # apt downloads as a user of its own
 finish() {
   umount "$root/proc" 2>/dev/null || true
   rm -rf --one-file-system "$root"
@@ -34,8 +37,6 @@ debootstrap --variant=minbase bookworm "$root" "$mirror" >"$root.log" 2>&1 || {
 }
 rm "$root.log"
 mount -t proc proc "$root/proc" || skip "cannot mount /proc in the new root"
-# Its commands run in the new root: the quotes keep this shell from expanding them.
-# shellcheck disable=SC2016
 in_root() {
   chroot "$root" env DEBIAN_FRONTEND=noninteractive LC_ALL=C.UTF-8 PALPATE_DEVICE=llvmpipe "$@"
 }
@@ -45,6 +46,7 @@ for file in /etc/resolv.conf /etc/hosts; do
 done
 cp /etc/apt/apt.conf.d/*proxy* "$root/etc/apt/apt.conf.d/" 2>/dev/null || true
 
+echo 'Dpkg::Use-Pty "0";' >"$root/etc/apt/apt.conf.d/99no-terminal"
 mkdir "$root/packages"
 cp "$packages"/*.deb "$root/packages"
 cp -r "$source/tests/consumer/project" "$root/consumer"

@@ -12,6 +12,7 @@
 
 #include "bin_kernel.hpp"
 #include "patch_interpolation-inl.hpp"
+#include "table_look_up-inl.hpp"
 #include "vector_math-inl.hpp"
 
 HWY_BEFORE_NAMESPACE();
@@ -236,38 +237,18 @@ void evaluate_lanes(D d, hn::Vec<D> x, hn::Vec<D> y, const MapPatches& map,
   store_logs(d, product, sums, static_cast<double>(count) * form.log_scale, log_likelihood);
 }
 
-/// The bins of one vector, by a table of log-likelihoods.
-template <class D>
-void look_up_lanes(D d, hn::Vec<D> x, hn::Vec<D> y, const MapPatches& map, std::size_t object,
-                   const ElementPatches<double>& elements, std::span<const ReadingRun> runs,
-                   const ReadingForm& form, double* log_likelihood) {
-  const auto first = hn::Set(d, form.first_log_odds);
-  const auto scale = hn::Set(d, form.nodes_per_nat);
-  const auto last = hn::Set(d, static_cast<double>(form.nodes - 1));
-  const auto last_segment = hn::Set(d, static_cast<double>(form.nodes - 2));
-  auto sum = hn::Zero(d);
-  for (const ReadingRun& run : runs) {
-    const double* const row = form.row(object, run.reading);
-    for (std::size_t e = run.begin; e < run.end; ++e) {
-      const auto l = log_odds(d, map, elements, e, x, y);
-      const auto at = hn::Max(hn::Zero(d), hn::Min(hn::Mul(hn::Sub(l, first), scale), last));
-      const auto segment = hn::Min(hn::Floor(at), last_segment);
-      const auto index =
-          hn::BitCast(hn::RebindToSigned<D>(), whole_number(d, hn::Add(segment, segment)));
-      const auto value = hn::GatherIndex(d, row, index);
-      const auto difference = hn::GatherIndex(d, row + 1, index);
-      sum = hn::Add(sum, hn::Add(value, hn::Mul(difference, hn::Sub(at, segment))));
-    }
-  }
-  hn::StoreU(sum, d, log_likelihood);
-}
-
 template <typename Lane>
 void evaluate(const BinBlock<Lane>& block, const MapPatches& map, std::size_t object,
               const PlacedElements& placed, std::span<const ReadingRun> runs,
               const ReadingForm& form, ElementPatches<Lane>& scratch) {
   find_patches(block, map, placed, scratch);
   const hn::ScalableTag<Lane> d;
+  if constexpr (sizeof(Lane) == 8) {
+    if (block.bins == 1 && form.kind == ReadingForm::Kind::table) {
+      look_up_elements(d, map, object, scratch, runs, form, block.log_likelihood);
+      return;
+    }
+  }
   for (std::size_t i = 0; i < block.bins; i += hn::Lanes(d)) {
     const auto x = hn::LoadU(d, block.x_offset + i);
     const auto y = hn::LoadU(d, block.y_offset + i);

@@ -65,55 +65,121 @@ void BoundSearch::reset() {
   std::fill(unseen_.begin(), unseen_.end(), 0);
 }
 
-void BoundSearch::add(std::span<const KnownElements> touches) {
+void BoundSearch::add(std::span<const ArrayReadings> touches) {
   const TileLevel& level = bounds_.front().levels().front();
   // A single touch sees little of a large region; in a small one, fewer rounds are faster.
-  if (level.batches_x() * level.batches_y() > few_batches) {
-    for (const KnownElements& touch : touches) {
-      add(touch);
+  if (touches.size() == 1 || level.batches_x() * level.batches_y() > few_batches) {
+    for (const ArrayReadings& touch : touches) {
+      add_touch(touch);
     }
     return;
   }
-  add(merged(touches));
+  std::vector<KnownElements> known;
+  for (const ArrayReadings& touch : touches) {
+    known.push_back(known_elements(touch));
+  }
+  add_known(merged(known));
 }
 
-void BoundSearch::add(const KnownElements& added) {
+void BoundSearch::add_touch(const ArrayReadings& touch) {
+  const RestingArray::Seen seen = resting_.look(touch);
+  if (seen == RestingArray::Seen::moving) {
+    add_known(known_elements(touch));
+    return;
+  }
+  if (seen == RestingArray::Seen::came_rest) {
+    ArrayReadings at_rest = touch;
+    std::fill(at_rest.readings.begin(), at_rest.readings.end(), Reading::no_contact);
+    keep_rest(known_elements(at_rest));
+    resting_.keep();
+  }
+  const KnownElements changed = changed_elements(touch);
+  add_sums(known_elements(touch), changed, [&](const Strip& of, std::uint32_t* sums) {
+    const auto rest = rest_tiles_[of.object].begin() + static_cast<std::ptrdiff_t>(of.first);
+    std::copy(rest, rest + std::ptrdiff_t{batch_tiles} * of.batches, sums);
+    bounds_[of.object].add_changes(changed, of.placed, of.x, of.y, sums, of.batches);
+  });
+}
+
+void BoundSearch::add_known(const KnownElements& known) {
+  add_sums(known, known, [&](const Strip& of, std::uint32_t* sums) {
+    bounds_[of.object].add(0, known, of.placed, of.x, of.y, sums, of.batches);
+  });
+}
+
+void BoundSearch::keep_rest(const KnownElements& at_rest) {
+  rest_tiles_.resize(bounds_.size());
+  tbb::parallel_for(std::size_t{0}, bounds_.size(), [&](std::size_t i) {
+    bounds_[i].make_change_tables();
+    rest_tiles_[i].resize(largest_tiles_[i].size());
+  });
+  for_seen(at_rest, at_rest, [&](const Strip& of) {
+    std::uint32_t* sums = rest_tiles_[of.object].data() + of.first;
+    std::fill(sums, sums + std::ptrdiff_t{batch_tiles} * of.batches, 0);
+    bounds_[of.object].add(0, at_rest, of.placed, of.x, of.y, sums, of.batches);
+  });
+}
+
+template <typename Sum>
+void BoundSearch::add_sums(const KnownElements& known, const KnownElements& placed,
+                           const Sum& sum_of) {
   // Most tiles of a large region do not see the map: sums count from what such a tile would have.
   std::vector<std::int64_t> offsets;
   for (std::size_t i = 0; i < bounds_.size(); ++i) {
     offsets.push_back(
-        std::min<std::int64_t>(bounds_[i].penalty_beyond(0, added), largest_sum - unseen_[i]));
+        std::min<std::int64_t>(bounds_[i].penalty_beyond(0, known), largest_sum - unseen_[i]));
   }
-  const auto thetas = static_cast<std::size_t>(options_.lattice.theta_rad.count);
-  tbb::parallel_for(std::size_t{0}, bounds_.size() * thetas, [&](std::size_t row) {
-    thread_local WindowPlaces placed;
-    const std::size_t object = row / thetas;
-    const std::size_t theta = row % thetas;
-    const TileBounds& bounds = bounds_[object];
-    const TileLevel& level = bounds.levels().front();
-    const TileWindow seen = seen_window(added, turns_[theta], maps_[object], level);
-    bounds.place(0, turns_[theta], added, placed);
-    std::int32_t* tiles =
-        largest_tiles_[object].data() +
-        theta * static_cast<std::size_t>(level.batches_x()) * level.batches_y() * batch_tiles;
-    for (int y = seen.y_first / batch_side * batch_side; y < seen.y_end; y += batch_side) {
-      for (int x = seen.x_first / batch_side * batch_side; x < seen.x_end; x += batch_side) {
-        std::uint32_t sums[batch_tiles] = {};
-        bounds.add(0, added, placed, x, y, sums);
-        std::int32_t* of_batch =
-            tiles + (static_cast<std::size_t>(y / batch_side) * level.batches_x() +
-                     static_cast<std::size_t>(x / batch_side)) *
-                        batch_tiles;
-        for (int i = 0; i < batch_tiles; ++i) {
-          const std::int64_t sum = std::int64_t{of_batch[i]} + sums[i] - offsets[object];
-          of_batch[i] = static_cast<std::int32_t>(std::min<std::int64_t>(sum, largest_sum));
-        }
-      }
+  for_seen(known, placed, [&](const Strip& of) {
+    std::uint32_t sums[most_strip * batch_tiles] = {};
+    sum_of(of, sums);
+    std::int32_t* tiles = largest_tiles_[of.object].data() + of.first;
+    for (int i = 0; i < of.batches * batch_tiles; ++i) {
+      const std::int64_t sum = std::int64_t{tiles[i]} + sums[i] - offsets[of.object];
+      tiles[i] = static_cast<std::int32_t>(std::min<std::int64_t>(sum, largest_sum));
     }
   });
   for (std::size_t i = 0; i < offsets.size(); ++i) {
     unseen_[i] += offsets[i];
   }
+}
+
+template <typename Visit>
+void BoundSearch::for_seen(const KnownElements& known, const KnownElements& placed,
+                           const Visit& visit) const {
+  const std::vector<BoundingBox> reaches = reaches_of(known, turns_);
+  const std::size_t thetas = turns_.size();
+  tbb::parallel_for(std::size_t{0}, bounds_.size() * thetas, [&](std::size_t row) {
+    thread_local WindowPlaces places;
+    const std::size_t object = row / thetas;
+    const std::size_t theta = row % thetas;
+    const TileBounds& bounds = bounds_[object];
+    const TileLevel& level = bounds.levels().front();
+    const TileWindow seen = seen_window(reaches[theta], maps_[object], level);
+    bounds.place(0, turns_[theta], placed, places);
+    const std::size_t plane = theta * static_cast<std::size_t>(level.batches_y());
+    for (int y = seen.y_first / batch_side; y * batch_side < seen.y_end; ++y) {
+      const std::size_t first =
+          (plane + static_cast<std::size_t>(y)) * static_cast<std::size_t>(level.batches_x());
+      const int x_end = (seen.x_end + batch_side - 1) / batch_side;
+      for (int x = seen.x_first / batch_side; x < x_end; x += most_strip) {
+        visit({.object = object,
+               .first = (first + static_cast<std::size_t>(x)) * batch_tiles,
+               .x = x * batch_side,
+               .y = y * batch_side,
+               .batches = std::min(most_strip, x_end - x),
+               .placed = places});
+      }
+    }
+  });
+}
+
+std::vector<std::int64_t> BoundSearch::largest_sums(std::size_t hypothesis) const {
+  const std::vector<std::int32_t>& of = largest_tiles_[hypothesis];
+  std::vector<std::int64_t> sums(of.begin(), of.end());
+  for (std::int64_t& sum : sums) {
+    sum += unseen_[hypothesis];
+  }
+  return sums;
 }
 
 std::uint64_t BoundSearch::bytes() const {
@@ -123,6 +189,9 @@ std::uint64_t BoundSearch::bytes() const {
   }
   for (const std::vector<std::int32_t>& sums : largest_tiles_) {
     bytes += sums.capacity() * sizeof(std::int32_t);
+  }
+  for (const std::vector<std::uint32_t>& sums : rest_tiles_) {
+    bytes += sums.capacity() * sizeof(std::uint32_t);
   }
   return bytes;
 }

@@ -9,6 +9,7 @@
 #include "known_elements.hpp"
 #include "leaf_evaluator.hpp"
 #include "palpate/bounded_posterior.hpp"
+#include "resting_array.hpp"
 #include "tile_bounds.hpp"
 
 namespace palpate {
@@ -27,7 +28,7 @@ class BoundSearch {
   void reset();
   /// Adds the penalties of more touches to the sums of the largest tiles.
   /// @param touches [touch]
-  void add(std::span<const KnownElements> touches);
+  void add(std::span<const ArrayReadings> touches);
   /// @param elements all that were added since reset()
   /// @param deadline after which tiles are dropped unseen
   /// @param refined where not null, takes the tiles that were divided
@@ -36,6 +37,8 @@ class BoundSearch {
 
   /// [hypothesis]
   std::span<const TileBounds> bounds() const { return bounds_; }
+  /// Sums of the penalties of a hypothesis's largest tiles, [theta, batch y, batch x, tile].
+  std::vector<std::int64_t> largest_sums(std::size_t hypothesis) const;
   /// The level of the smallest tiles, 0 that of the largest.
   int finest_level() const { return static_cast<int>(bounds_.front().levels().size()) - 1; }
   std::uint64_t bytes() const;
@@ -43,7 +46,28 @@ class BoundSearch {
  private:
   friend class SearchRun;
 
-  void add(const KnownElements& added);
+  /// Neighbouring batches of the largest tiles along x, at one theta.
+  struct Strip {
+    std::size_t object = 0;
+    std::size_t first = 0;  ///< index of their sums
+    int x = 0;              ///< tile at their corner
+    int y = 0;
+    int batches = 0;
+    const WindowPlaces& placed;
+  };
+
+  void add_touch(const ArrayReadings& touch);
+  void add_known(const KnownElements& known);
+  /// Keeps the sums of an array at rest.
+  void keep_rest(const KnownElements& at_rest);
+  /// Adds what sum_of(strip, sums) finds for the batches that see the map.
+  /// @param known the touch's elements, `placed` those whose places a strip holds
+  template <typename Sum>
+  void add_sums(const KnownElements& known, const KnownElements& placed, const Sum& sum_of);
+  /// Calls visit(strip), in parallel, for the batches in which one of the `known` elements may see
+  /// the map.
+  template <typename Visit>
+  void for_seen(const KnownElements& known, const KnownElements& placed, const Visit& visit) const;
 
   const BoundedOptions& options_;
   const BinLikelihood& likelihood_;
@@ -57,6 +81,9 @@ class BoundSearch {
   /// those of a tile in which every element sees the prior.
   std::vector<std::vector<std::int32_t>> largest_tiles_;
   std::vector<std::int64_t> unseen_;  ///< [hypothesis] these
+  RestingArray resting_;
+  /// Sums of all elements of the array at rest in No Contact, whole.
+  std::vector<std::vector<std::uint32_t>> rest_tiles_;
 };
 
 }  // namespace palpate

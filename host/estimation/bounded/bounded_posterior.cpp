@@ -267,10 +267,10 @@ void BoundedPosterior::update(std::span<const Touch> touches,
                               const std::function<void(double)>& progress) {
   Impl& posterior = whole();
   // All touches are gathered before the first is added: one that is not sound refuses all.
-  std::vector<KnownElements> of_touches;
+  std::vector<ArrayReadings> of_touches;
   for (const Touch& touch : touches) {
     of_touches.push_back(
-        gather_elements(touch, posterior.options.contact, posterior.options.lattice.pivot_mm));
+        array_readings(touch, posterior.options.contact, posterior.options.lattice.pivot_mm));
   }
   std::vector<TouchMean> means;
   if (posterior.none) {
@@ -288,7 +288,10 @@ void BoundedPosterior::update(std::span<const Touch> touches,
   posterior.half_done.change([&] {
     posterior.result.reset();
     posterior.touched = posterior.touched || !touches.empty();
-    std::vector<KnownElements> all = of_touches;
+    std::vector<KnownElements> all;
+    for (const ArrayReadings& touch : of_touches) {
+      all.push_back(known_elements(touch));
+    }
     all.push_back(std::move(posterior.elements));
     posterior.elements = merged(all);
     if (posterior.none) {

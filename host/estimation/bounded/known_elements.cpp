@@ -38,18 +38,40 @@ void append(const KnownElements& known, std::vector<KnownElement>& elements) {
   }
 }
 
-}  // namespace
-
-KnownElements gather_elements(const Touch& touch, const ContactModel& model,
-                              const glm::dvec2& pivot_mm) {
+/// The elements that have any reading but this one.
+KnownElements all_but(Reading reading, const ArrayReadings& array) {
   std::vector<KnownElement> elements;
-  const std::vector<Reading> readings = model.classify(touch);
-  for (std::size_t i = 0; i < readings.size(); ++i) {
-    if (readings[i] != Reading::unknown) {
-      elements.push_back({readings[i], touch.T_robot_sensor * touch.elements_mm[i] - pivot_mm});
+  for (std::size_t i = 0; i < array.readings.size(); ++i) {
+    if (array.readings[i] != reading) {
+      elements.push_back({array.readings[i], array.from_pivot_mm[i]});
     }
   }
   return in_order(std::move(elements));
+}
+
+}  // namespace
+
+ArrayReadings array_readings(const Touch& touch, const ContactModel& model,
+                             const glm::dvec2& pivot_mm) {
+  ArrayReadings array{.from_pivot_mm = {}, .readings = model.classify(touch)};
+  array.from_pivot_mm.reserve(array.readings.size());
+  for (std::size_t i = 0; i < array.readings.size(); ++i) {
+    array.from_pivot_mm.push_back(touch.T_robot_sensor * touch.elements_mm[i] - pivot_mm);
+  }
+  return array;
+}
+
+KnownElements known_elements(const ArrayReadings& array) {
+  return all_but(Reading::unknown, array);
+}
+
+KnownElements changed_elements(const ArrayReadings& array) {
+  return all_but(Reading::no_contact, array);
+}
+
+KnownElements gather_elements(const Touch& touch, const ContactModel& model,
+                              const glm::dvec2& pivot_mm) {
+  return known_elements(array_readings(touch, model, pivot_mm));
 }
 
 KnownElements merged(std::span<const KnownElements> lists) {

@@ -27,8 +27,23 @@ struct KnownElements {
   bool empty() const { return from_pivot_mm.empty(); }
 };
 
-/// Classifies the touch's elements (Eq. 3) and gathers those that are not Unknown.
+/// All elements of a touch in the array's order, Unknown ones too: in the robot frame and relative
+/// to the lattice's pivot.
+struct ArrayReadings {
+  std::vector<glm::dvec2> from_pivot_mm;
+  std::vector<Reading> readings;
+};
+
+/// Classifies the touch's elements (Eq. 3).
 /// @throws Error on a touch that is not sound
+ArrayReadings array_readings(const Touch& touch, const ContactModel& model,
+                             const glm::dvec2& pivot_mm);
+
+/// The elements that are not Unknown.
+KnownElements known_elements(const ArrayReadings& array);
+/// The elements that are not in No Contact, Unknown ones as one more reading.
+KnownElements changed_elements(const ArrayReadings& array);
+/// known_elements() of a touch. @throws Error on a touch that is not sound
 KnownElements gather_elements(const Touch& touch, const ContactModel& model,
                               const glm::dvec2& pivot_mm);
 

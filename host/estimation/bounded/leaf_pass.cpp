@@ -78,13 +78,14 @@ void LeafPass::probe(std::vector<Tile> tiles) {
   std::sort(probed_.begin(), probed_.end(), stands_before);
 }
 
-std::vector<LeafPass::Family> LeafPass::families_of(std::span<const Tile> tiles) {
+std::vector<LeafPass::Family> LeafPass::families_of(std::span<const Tile> tiles) const {
   std::vector<Family> families;
+  // Single bins lie too far apart to be evaluated together.
+  const int side = bounds_.front().levels().back().size.single_bin ? 1 : batch_side;
   for (std::size_t i = 0; i < tiles.size(); ++i) {
     const Tile& tile = tiles[i];
     if (i == 0 || tile.object != tiles[i - 1].object || tile.theta != tiles[i - 1].theta ||
-        tile.y / batch_side != tiles[i - 1].y / batch_side ||
-        tile.x / batch_side != tiles[i - 1].x / batch_side) {
+        tile.y / side != tiles[i - 1].y / side || tile.x / side != tiles[i - 1].x / side) {
       families.push_back({.first = i, .end = i, .bound = tile.bound});
     }
     Family& family = families.back();

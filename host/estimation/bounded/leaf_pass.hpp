@@ -41,7 +41,7 @@ class LeafPass {
     double bound = 0.0;  ///< the largest
   };
 
-  static std::vector<Family> families_of(std::span<const Tile> tiles);
+  std::vector<Family> families_of(std::span<const Tile> tiles) const;
   bool probed(const Tile& tile) const;
   void remove(const Tile& tile, UnsettledMass& left) const;
   /// Takes a family's tiles before the slots `from` out of what is left, as boxes.

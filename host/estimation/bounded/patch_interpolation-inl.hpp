@@ -94,6 +94,14 @@ HWY_INLINE hn::Vec<D> node(D d, const MapPatches& map, const float* from, VI ind
   }
 }
 
+/// Between the nodes of a cell: the first of a name is its column, the second its row.
+template <class V>
+HWY_INLINE V bilinear(V v00, V v01, V v10, V v11, V fx, V fy) {
+  const auto left = hn::Add(v00, hn::Mul(hn::Sub(v01, v00), fy));
+  const auto right = hn::Add(v10, hn::Mul(hn::Sub(v11, v10), fy));
+  return hn::Add(left, hn::Mul(hn::Sub(right, left), fx));
+}
+
 template <bool with_border, class D>
 HWY_INLINE hn::Vec<D> interpolate(D d, const MapPatches& map, std::int32_t patch, hn::Vec<D> x,
                                   hn::Vec<D> y) {
@@ -107,9 +115,7 @@ HWY_INLINE hn::Vec<D> interpolate(D d, const MapPatches& map, std::int32_t patch
   const auto v01 = node<with_border>(d, map, from + 1, index);
   const auto v10 = node<with_border>(d, map, from + MapPatches::side, index);
   const auto v11 = node<with_border>(d, map, from + MapPatches::side + 1, index);
-  const auto left = hn::Add(v00, hn::Mul(hn::Sub(v01, v00), fy));
-  const auto right = hn::Add(v10, hn::Mul(hn::Sub(v11, v10), fy));
-  return hn::Add(left, hn::Mul(hn::Sub(right, left), fx));
+  return bilinear(v00, v01, v10, v11, fx, fy);
 }
 
 /// Log odds at an element, for bins that lie `x`, `y` cells from the block's first bin.

@@ -66,68 +66,39 @@ class InnerNodes {
   std::vector<double> tree_;
 };
 
-/// A map's nodes with one node of the prior around them, and between them the interpolated log odds
-/// where squares are divided.
-struct Nodes {
-  int nx = 0;
-  int ny = 0;
-  std::vector<double> log_odds;  ///< [ny, nx]
-
-  double at(int i, int j) const { return log_odds[static_cast<std::size_t>(j) * nx + i]; }
-};
-
-Nodes divided_nodes(const OccupancyGrid& map, double prior_log_odds, int parts) {
-  const auto cell = [&](int i, int j) -> double {
-    return i < 0 || j < 0 || i >= map.nx || j >= map.ny
-               ? prior_log_odds
-               : map.log_odds[static_cast<std::size_t>(j) * map.nx + i];
-  };
-  Nodes nodes{.nx = (map.nx + 1) * parts + 1, .ny = (map.ny + 1) * parts + 1, .log_odds = {}};
-  nodes.log_odds.resize(static_cast<std::size_t>(nodes.nx) * nodes.ny);
-  for (int j = 0; j < nodes.ny; ++j) {
-    const int row = j / parts - 1;
-    const double fy = static_cast<double>(j % parts) / parts;
-    for (int i = 0; i < nodes.nx; ++i) {
-      const int column = i / parts - 1;
-      const double fx = static_cast<double>(i % parts) / parts;
-      const double below = std::lerp(cell(column, row), cell(column + 1, row), fx);
-      nodes.log_odds[static_cast<std::size_t>(j) * nodes.nx + i] =
-          fy == 0.0
-              ? below
-              : std::lerp(below, std::lerp(cell(column, row + 1), cell(column + 1, row + 1), fx),
-                          fy);
-    }
-  }
-  return nodes;
-}
-
 }  // namespace
 
-SquarePenalties square_penalties(const OccupancyGrid& map, const ContactModel& contact,
-                                 Reading reading, std::size_t object, int parts) {
-  const double prior_log_odds = log_odds_from_probability(*contact.prior);
-  const Nodes nodes = divided_nodes(map, prior_log_odds, parts);
+SquarePenalties square_penalties(const MapSquares& squares, const ContactModel& contact,
+                                 Reading reading, std::size_t object) {
   const InnerNodes inner(contact, reading, object);
-  std::vector<double> at_node(nodes.log_odds.size());
-  std::transform(nodes.log_odds.begin(), nodes.log_odds.end(), at_node.begin(),
+  const std::vector<double>& log_odds = squares.log_odds;
+  std::vector<double> at_place(log_odds.size());
+  std::transform(log_odds.begin(), log_odds.end(), at_place.begin(),
                  [&](double l) { return contact.log_likelihood(reading, {l}, object); });
-  SquarePenalties penalties{.parts = parts, .nx = nodes.nx - 1, .ny = nodes.ny - 1, .least = {}};
-  const double prior = contact.log_likelihood(reading, {prior_log_odds}, object);
+  SquarePenalties penalties{.nx = squares.nx(), .ny = squares.ny(), .least = {}};
+  const double prior =
+      contact.log_likelihood(reading, {log_odds_from_probability(*contact.prior)}, object);
   penalties.best = prior;
-  std::vector<double> largest(static_cast<std::size_t>(penalties.nx) * penalties.ny);
+  std::vector<double> largest;
+  largest.reserve(static_cast<std::size_t>(penalties.nx) * penalties.ny);
   for (int j = 0; j < penalties.ny; ++j) {
     for (int i = 0; i < penalties.nx; ++i) {
-      // Bilinear log odds are extreme at a square's corners.
-      const std::size_t corner = static_cast<std::size_t>(j) * nodes.nx + i;
-      const std::size_t above = corner + static_cast<std::size_t>(nodes.nx);
-      double most = std::max(std::max(at_node[corner], at_node[corner + 1]),
-                             std::max(at_node[above], at_node[above + 1]));
+      double most = -std::numeric_limits<double>::infinity();
+      double low = std::numeric_limits<double>::infinity();
+      double high = -low;
+      for (int row = squares.first_y[j]; row <= squares.first_y[j + 1]; ++row) {
+        const std::size_t in_row = static_cast<std::size_t>(row) * squares.columns();
+        for (int column = squares.first_x[i]; column <= squares.first_x[i + 1]; ++column) {
+          const std::size_t place = in_row + static_cast<std::size_t>(column);
+          most = std::max(most, at_place[place]);
+          low = std::min(low, log_odds[place]);
+          high = std::max(high, log_odds[place]);
+        }
+      }
       if (contact.table) {
-        const auto [low, high] = std::minmax({nodes.log_odds[corner], nodes.log_odds[corner + 1],
-                                              nodes.log_odds[above], nodes.log_odds[above + 1]});
         most = std::max(most, inner.largest(low, high));
       }
-      largest[static_cast<std::size_t>(j) * penalties.nx + i] = most;
+      largest.push_back(most);
       penalties.best = std::max(penalties.best, most);
     }
   }
@@ -144,7 +115,6 @@ SquarePenalties square_penalties(const OccupancyGrid& map, const ContactModel& c
 
 SquarePenalties merged(const SquarePenalties& squares, int count) {
   SquarePenalties large{.best = squares.best,
-                        .parts = squares.parts,
                         .nx = (squares.nx + count - 1) / count,
                         .ny = (squares.ny + count - 1) / count,
                         .least = {},

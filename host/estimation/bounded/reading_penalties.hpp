@@ -4,8 +4,8 @@
 #include <cstdint>
 #include <vector>
 
+#include "map_squares.hpp"
 #include "palpate/contact_model.hpp"
-#include "palpate/occupancy_grid.hpp"
 
 namespace palpate {
 
@@ -15,12 +15,9 @@ inline constexpr double penalties_per_nat = 256.0;
 inline constexpr std::uint16_t largest_penalty = 32767;
 
 /// The least penalty of one reading in every square of a map: how much less likely the reading is
-/// at least, at any place within the square, than at the map's most likely place. Squares are the
-/// areas between neighbouring nodes of the map with one node of the prior around it, or the parts
-/// of these areas where they are divided.
+/// at least, at any place within the square, than at the map's most likely place.
 struct SquarePenalties {
   double best = 0.0;  ///< log-likelihood of the reading at the most likely place, in nats
-  int parts = 1;      ///< squares per cell along each axis, before any were merged
   int nx = 0;
   int ny = 0;
   std::vector<std::uint16_t> least;  ///< [ny, nx], rounded down
@@ -30,8 +27,8 @@ struct SquarePenalties {
 /// Any likelihood will do: its extremes over the range of a square's log odds are sought, and
 /// nothing is taken for monotone.
 /// @param contact resolved: with its prior
-SquarePenalties square_penalties(const OccupancyGrid& map, const ContactModel& contact,
-                                 Reading reading, std::size_t object, int parts);
+SquarePenalties square_penalties(const MapSquares& squares, const ContactModel& contact,
+                                 Reading reading, std::size_t object);
 
 /// Squares of `count` x `count` squares each; the last of a row or column reach beyond the map.
 SquarePenalties merged(const SquarePenalties& squares, int count);

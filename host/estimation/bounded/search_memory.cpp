@@ -26,9 +26,11 @@ constexpr double most_family_bins = 1e7;
 constexpr double most_bins = 4e18;
 
 /// Tiles along an axis, as tile_levels() counts them.
-double tiles_along(const Axis& axis, double side_mm) {
-  const double extent_mm = axis.step() * (axis.count - 1);
-  return batch_side * (std::floor(extent_mm / (batch_side * side_mm)) + 1.0);
+double tiles_along(const Axis& axis, const TileSize& size, double side_mm) {
+  const double batches =
+      size.single_bin ? std::ceil(static_cast<double>(axis.count) / batch_side)
+                      : std::floor(axis.step() * (axis.count - 1) / (batch_side * side_mm)) + 1.0;
+  return batch_side * batches;
 }
 
 /// Most bins along an axis within this many mm.
@@ -38,13 +40,13 @@ double bins_within(const Axis& axis, double side_mm) {
 }
 
 /// A window table's entries, as window_table() lays them out.
-double table_bytes(const OccupancyGrid& map, const TileSize& size) {
-  const auto windows = [&](int cells) {
-    const double squares = std::ceil((cells + 1.0) / size.square_cells());
+double table_bytes(const OccupancyGrid& map, const TileSize& size, const glm::dvec2& square_mm) {
+  const auto windows = [&](int cells, double mm) {
+    const double squares = std::ceil((cells + 1.0) / (mm / map.cell_mm));
     return 2.0 * WindowTable::margin + std::ceil(squares / size.side);
   };
-  return windows(map.nx) * windows(map.ny) * batch_side * size.side * size.side *
-         sizeof(std::uint16_t);
+  return windows(map.nx, square_mm.x) * windows(map.ny, square_mm.y) * batch_side * size.side *
+         size.side * sizeof(std::uint16_t);
 }
 
 double node_bytes(const OccupancyGrid& map) {
@@ -73,19 +75,27 @@ SearchMemory search_memory(std::span<const Hypothesis> hypotheses, const Bounded
   for (const Hypothesis& hypothesis : hypotheses) {
     const OccupancyGrid& map = hypothesis.compared();
     memory.tables += node_bytes(map);
-    for (const TileSize& size : sizes) {
+    const auto tables_of = [&](const TileSize& size) {
+      return static_cast<double>(readings) *
+             table_bytes(map, size, square_mm(size, lattice, map.cell_mm));
+    };
+    const auto along = [&](const TileSize& size) {
       const double side_mm = size.cells() * map.cell_mm;
-      memory.tables += static_cast<double>(readings) * table_bytes(map, size);
-      memory.tiles +=
-          sizeof(int) * (tiles_along(lattice.x_mm, side_mm) + tiles_along(lattice.y_mm, side_mm));
+      return glm::dvec2(tiles_along(lattice.x_mm, size, side_mm),
+                        tiles_along(lattice.y_mm, size, side_mm));
+    };
+    for (const TileSize& size : sizes) {
+      memory.tables += tables_of(size);
+      memory.tiles += sizeof(int) * (along(size).x + along(size).y);
     }
-    const double largest_mm = sizes.front().cells() * map.cell_mm;
-    memory.tiles += (sizeof(std::int32_t) + sizeof(Tile)) * thetas *
-                    tiles_along(lattice.x_mm, largest_mm) * tiles_along(lattice.y_mm, largest_mm);
+    const double largest_tiles = thetas * along(sizes.front()).x * along(sizes.front()).y;
+    memory.tiles += (sizeof(std::int32_t) + sizeof(Tile)) * largest_tiles;
+    memory.rest += tables_of(sizes.front()) + sizeof(std::uint32_t) * largest_tiles;
     const double family_mm = batch_side * sizes.back().cells() * map.cell_mm;
-    memory.largest_family =
-        std::max(memory.largest_family,
-                 bins_within(lattice.x_mm, family_mm) * bins_within(lattice.y_mm, family_mm));
+    memory.largest_family = std::max(
+        memory.largest_family, sizes.back().single_bin ? 1.0
+                                                       : bins_within(lattice.x_mm, family_mm) *
+                                                             bins_within(lattice.y_mm, family_mm));
   }
   // A cosine and a sine; and of every object the tiles that see the map, and the best of them.
   memory.thetas = thetas * (sizeof(glm::dvec2) + static_cast<double>(hypotheses.size()) *
@@ -128,7 +138,7 @@ void require_room(std::span<const Hypothesis> hypotheses, const BoundedOptions& 
   };
   const std::array<Part, 4> parts{
       {{memory.tables, "use fewer maps, maps of fewer cells, or a narrower region"},
-       {memory.tiles, "use fewer thetas or maps, or narrow the region"},
+       {memory.tiles + memory.rest, "use fewer thetas or maps, or narrow the region"},
        {memory.thetas, "use fewer thetas or maps"},
        {memory.leaves, "use fewer bins along x and y"}}};
   const Part& largest = *std::max_element(

@@ -58,6 +58,7 @@ class SearchRun {
       : search_(search),
         lattice_(search.options_.lattice),
         elements_(elements),
+        reaches_(reaches_of(elements, search.turns_)),
         refined_(refined),
         thetas_(static_cast<std::size_t>(lattice_.theta_rad.count)),
         finest_(search.bounds_.front().levels().size() - 1),
@@ -96,7 +97,8 @@ class SearchRun {
       raise(best, 0);
       count_largest(unsettled);
       const double share = goal_.tolerance * search_share;
-      const double part = share / static_cast<double>(finest_ + 1);
+      // One part for every level that drops tiles, and one for the bins.
+      const double part = share / static_cast<double>(std::max<std::size_t>(finest_, 1) + 1);
       std::vector<Tile> kept = keep_largest(unsettled, part);
       account_.drop(unsettled);
       divide(std::move(kept), 0, share - used_of(part, 0.0));
@@ -152,7 +154,7 @@ class SearchRun {
     seen_.resize(search_.bounds_.size() * thetas_);
     tbb::parallel_for(std::size_t{0}, seen_.size(), [&](std::size_t row) {
       const std::size_t object = row / thetas_;
-      seen_[row] = seen_window(elements_, search_.turns_[row % thetas_], search_.maps_[object],
+      seen_[row] = seen_window(reaches_[row % thetas_], search_.maps_[object],
                                search_.bounds_[object].levels().front());
     });
     for (std::size_t row = 0; row < seen_.size(); ++row) {
@@ -186,8 +188,8 @@ class SearchRun {
     visit_(box, std::span(&value, 1));
   }
 
-  /// Calls visit(bound, x, y, bins) for the largest tiles of a row, a theta of an object, that hold
-  /// bins and see the map.
+  /// Calls visit(sum, x, y, bins) for the largest tiles of a row, a theta of an object, that hold
+  /// bins and see the map, with the sums of their penalties as the search keeps them.
   template <typename Visit>
   void for_row(std::size_t row, const Visit& visit) const {
     const std::size_t object = row / thetas_;
@@ -197,18 +199,21 @@ class SearchRun {
     const std::int32_t* sums =
         search_.largest_tiles_[object].data() + row % thetas_ * batches * batch_tiles;
     for (int y = seen.y_first; y < seen.y_end; ++y) {
+      const std::int64_t rows = level.y.bins(y);
+      const std::int32_t* of_y =
+          sums + std::ptrdiff_t{y / batch_side} * level.batches_x() * batch_tiles + y % batch_side;
       for (int x = seen.x_first; x < seen.x_end; ++x) {
-        const std::int64_t bins = std::int64_t{level.x.bins(x)} * level.y.bins(y);
-        if (bins > 0) {
-          const std::size_t batch =
-              static_cast<std::size_t>(y / batch_side) * level.batches_x() + x / batch_side;
-          const std::int64_t sum =
-              search_.unseen_[object] +
-              sums[batch * batch_tiles + x % batch_side * batch_side + y % batch_side];
-          visit(unpenalised_[object][0] - static_cast<double>(sum) / penalties_per_nat, x, y, bins);
+        if (const std::int64_t bins = rows * level.x.bins(x); bins > 0) {
+          visit(of_y[std::ptrdiff_t{batch_side} * x], x, y, bins);
         }
       }
     }
+  }
+
+  /// The bound of a largest tile, from the sum that the search keeps.
+  double bound_of(std::size_t object, std::int32_t sum) const {
+    return unpenalised_[object][0] -
+           static_cast<double>(search_.unseen_[object] + sum) / penalties_per_nat;
   }
 
   /// The largest tile of the largest bound of every object and theta.
@@ -216,13 +221,22 @@ class SearchRun {
     std::vector<Tile> best(seen_.size(), {.bound = nothing});
     std::vector<std::int64_t> counts(seen_.size());
     tbb::parallel_for(std::size_t{0}, best.size(), [&](std::size_t row) {
-      for_row(row, [&](double bound, int x, int y, std::int64_t /*bins*/) {
-        ++counts[row];
-        if (bound > best[row].bound) {
-          best[row] = {bound, static_cast<std::int32_t>(row / thetas_),
-                       static_cast<std::int32_t>(row % thetas_), x, y};
+      std::int64_t count = 0;
+      std::int32_t least = std::numeric_limits<std::int32_t>::max();  // more than any sum
+      Tile at;
+      for_row(row, [&](std::int32_t sum, int x, int y, std::int64_t /*bins*/) {
+        ++count;
+        if (sum < least) {
+          least = sum;
+          at.x = x;
+          at.y = y;
         }
       });
+      counts[row] = count;
+      if (count > 0) {
+        best[row] = {bound_of(row / thetas_, least), static_cast<std::int32_t>(row / thetas_),
+                     static_cast<std::int32_t>(row % thetas_), at.x, at.y};
+      }
     });
     blocks_ += std::accumulate(counts.begin(), counts.end(), std::int64_t{0});
     std::erase_if(best, [](const Tile& tile) { return tile.bound == nothing; });
@@ -233,11 +247,27 @@ class SearchRun {
     tbb::parallel_for(std::size_t{0}, search_.bounds_.size(), [&](std::size_t object) {
       for (std::size_t theta = 0; theta < thetas_; ++theta) {
         for_row(object * thetas_ + theta,
-                [&](double bound, int /*x*/, int /*y*/, std::int64_t bins) {
-                  unsettled.add(object, bound, bins);
+                [&](std::int32_t sum, int /*x*/, int /*y*/, std::int64_t bins) {
+                  unsettled.add(object, bound_of(object, sum), bins);
                 });
       }
     });
+  }
+
+  /// The least sum of a largest tile whose slot is not before this one: slots ascend with sums.
+  std::int64_t least_sum(const UnsettledMass& unsettled, std::size_t object,
+                         std::size_t slot) const {
+    std::int64_t low = std::numeric_limits<std::int32_t>::min();
+    std::int64_t high = std::int64_t{std::numeric_limits<std::int32_t>::max()} + 1;
+    while (low < high) {
+      const std::int64_t middle = low + (high - low) / 2;
+      if (unsettled.slot(bound_of(object, static_cast<std::int32_t>(middle))) < slot) {
+        low = middle + 1;
+      } else {
+        high = middle;
+      }
+    }
+    return low;
   }
 
   /// The largest tiles that must be divided, and takes them out of the unsettled ones.
@@ -245,9 +275,11 @@ class SearchRun {
     const std::vector<std::size_t> from = account_.droppable_from(unsettled, share);
     std::vector<std::vector<Tile>> kept(search_.bounds_.size());
     tbb::parallel_for(std::size_t{0}, kept.size(), [&](std::size_t object) {
+      const std::int64_t end = least_sum(unsettled, object, from[object]);
       for (std::size_t theta = 0; theta < thetas_; ++theta) {
-        for_row(object * thetas_ + theta, [&](double bound, int x, int y, std::int64_t bins) {
-          if (unsettled.slot(bound) < from[object]) {
+        for_row(object * thetas_ + theta, [&](std::int32_t sum, int x, int y, std::int64_t bins) {
+          if (sum < end) {
+            const double bound = bound_of(object, sum);
             unsettled.remove(object, bound, bins);
             kept[object].push_back(
                 {bound, static_cast<std::int32_t>(object), static_cast<std::int32_t>(theta), x, y});
@@ -290,8 +322,8 @@ class SearchRun {
       const std::size_t end = task + 1 < begins.size() ? begins[task + 1] : tiles.size();
       const Tile& first = tiles[begins[task]];
       const TileBounds& bounds = search_.bounds_[first.object];
-      const TileWindow seen = seen_window(elements_, search_.turns_[first.theta],
-                                          search_.maps_[first.object], bounds.levels()[level + 1]);
+      const TileWindow seen = seen_window(reaches_[first.theta], search_.maps_[first.object],
+                                          bounds.levels()[level + 1]);
       bounds.place(level + 1, search_.turns_[first.theta], elements_, placed);
       parts[task].reserve((end - begins[task]) * batch_tiles);
       for (std::size_t i = begins[task]; i < end; ++i) {
@@ -342,14 +374,14 @@ class SearchRun {
       leaves_.probe(best_of_beam(std::move(tiles), level, width));
       return;
     }
-    // Every hypothesis's own total is wanted, too.
+    // Every label's own total is wanted, too.
     std::vector<std::vector<Tile>> own(search_.bounds_.size());
     for (const Tile& tile : tiles) {
-      own[tile.object].push_back(tile);
+      own[search_.label_of_[tile.object]].push_back(tile);
     }
     std::vector<Tile> best;
-    for (std::vector<Tile>& of_object : own) {
-      const std::vector<Tile> found = best_of_beam(std::move(of_object), level, width);
+    for (std::vector<Tile>& of_label : own) {
+      const std::vector<Tile> found = best_of_beam(std::move(of_label), level, width);
       best.insert(best.end(), found.begin(), found.end());
     }
     leaves_.probe(std::move(best));
@@ -496,6 +528,7 @@ class SearchRun {
   const BoundSearch& search_;
   const PoseLattice& lattice_;
   const KnownElements& elements_;
+  std::vector<BoundingBox> reaches_;  ///< [theta] of the elements
   std::vector<PoseBlock>* refined_;
   std::size_t thetas_;
   std::size_t finest_;                            ///< level

@@ -3,9 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <utility>
-
-#include "bounding_box.hpp"
-
 namespace palpate {
 
 namespace {
@@ -22,12 +19,19 @@ std::pair<int, int> overlapping(const TileAxis& axis, double lower_mm, double up
 
 }  // namespace
 
-TileWindow seen_window(const KnownElements& elements, const glm::dvec2& turn,
-                       const OccupancyGrid& map, const TileLevel& level) {
-  BoundingBox reach;
-  for (const glm::dvec2& p : elements.from_pivot_mm) {
-    reach.take_in({turn.x * p.x - turn.y * p.y, turn.y * p.x + turn.x * p.y});
+std::vector<BoundingBox> reaches_of(const KnownElements& elements,
+                                    std::span<const glm::dvec2> turns) {
+  std::vector<BoundingBox> reaches(turns.size());
+  for (std::size_t theta = 0; theta < turns.size(); ++theta) {
+    const glm::dvec2& turn = turns[theta];
+    for (const glm::dvec2& p : elements.from_pivot_mm) {
+      reaches[theta].take_in({turn.x * p.x - turn.y * p.y, turn.y * p.x + turn.x * p.y});
+    }
   }
+  return reaches;
+}
+
+TileWindow seen_window(const BoundingBox& reach, const OccupancyGrid& map, const TileLevel& level) {
   if (reach.empty()) {
     return {};
   }

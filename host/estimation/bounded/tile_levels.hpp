@@ -3,6 +3,8 @@
 #include <cstddef>
 #include <vector>
 
+#include <glm/vec2.hpp>
+
 #include "bin_likelihood.hpp"
 #include "palpate/lattice.hpp"
 
@@ -31,18 +33,22 @@ struct TileWindow {
 };
 
 /// The size of a level's tiles: `side` squares. A map's cell has `parts` squares along each axis,
-/// or a square holds `merged` cells.
+/// or a square holds `merged` cells. Or a tile is a single bin: squares then divide the lattice's
+/// steps, however large the map's cells are.
 struct TileSize {
   int parts = 1;
   int merged = 1;
   int side = 1;
+  bool single_bin = false;
 
+  /// Squares along an axis that an element can see while the pose is in one tile.
+  int window() const { return single_bin ? 1 : side + 1; }
   double square_cells() const { return static_cast<double>(merged) / parts; }
   double cells() const { return side * square_cells(); }
 };
 
 /// Tiles along one axis of the lattice. They begin at the first bin's centre; a tile holds the bins
-/// whose centres lie in it, which may be none.
+/// whose centres lie in it, which may be none. A tile of a single bin begins at its centre.
 struct TileAxis {
   double first_mm = 0.0;       ///< centre of the lattice's first bin
   double side_mm = 0.0;        ///< of a tile
@@ -55,6 +61,7 @@ struct TileAxis {
 /// One level of tiles over one object's poses, the same for every theta.
 struct TileLevel {
   TileSize size;
+  glm::dvec2 square_mm;
   TileAxis x;
   TileAxis y;
 
@@ -74,10 +81,15 @@ struct TileLevel {
 };
 
 /// Sizes of the levels, the largest tiles first. Each level's tiles have a quarter of the side of
-/// the level before, so that a batch of 4 x 4 tiles makes up one tile.
+/// the level before, so that a batch of 4 x 4 tiles makes up one tile. Where bins are few and lie
+/// cells apart, there is one level, of single bins: larger tiles would leave out few of them, and
+/// bound them loosely.
 /// @param least_cell_mm of the maps
 std::vector<TileSize> tile_sizes(const PoseLattice& lattice, double least_cell_mm,
                                  std::size_t maps);
+
+/// The squares of a level over a map of this cell.
+glm::dvec2 square_mm(const TileSize& size, const PoseLattice& lattice, double cell_mm);
 
 /// The levels of tiles over a lattice for a map of this cell.
 std::vector<TileLevel> tile_levels(const PoseLattice& lattice, double cell_mm,

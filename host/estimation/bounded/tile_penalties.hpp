@@ -24,7 +24,7 @@ struct WindowPlaces {
 struct TilePlace {
   glm::dvec2 turn{1.0, 0.0};  ///< cosine and sine of theta
   glm::dvec2 corner_mm{0.0};
-  double square_mm = 1.0;
+  glm::dvec2 square_mm{1.0};
 };
 
 /// Rotates the elements and finds their places in tables of this shape.
@@ -34,10 +34,15 @@ void place_elements(const KnownElements& elements, const TilePlace& place, const
 /// Sums of penalties do not grow beyond: so large a sum says all that there is to say.
 inline constexpr std::uint32_t largest_sum = std::uint32_t{1} << 30;
 
-/// Sums the penalties of one run of elements over the 4 x 4 tiles of a batch, and adds them to
-/// `sums`, where the sum of tile (i, j) of the batch stands at 4 i + j.
-/// @param first_x, first_y tile at the batch's corner
+/// Most batches whose sums add_penalties() finds together.
+inline constexpr int most_strip = 16;
+
+/// Sums the penalties of one run of elements over the 4 x 4 tiles of neighbouring batches along x,
+/// and adds them to `sums`, where the sum of tile (i, j) of a batch stands at 4 i + j.
+/// @param first_x, first_y tile at the first batch's corner
+/// @param batches up to most_strip
+/// @param sums [batch, tile]
 void add_penalties(const WindowPlaces& placed, const ReadingRun& run, const WindowTable& table,
-                   int first_x, int first_y, std::uint32_t* sums);
+                   int first_x, int first_y, int batches, std::uint32_t* sums);
 
 }  // namespace palpate

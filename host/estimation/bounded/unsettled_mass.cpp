@@ -5,8 +5,6 @@
 #include <cmath>
 #include <limits>
 
-#include "log_sum.hpp"
-
 namespace palpate {
 
 std::size_t UnsettledMass::slot(double bound) const {
@@ -21,13 +19,18 @@ double UnsettledMass::upper_edge(std::size_t slot) const {
 }
 
 std::size_t UnsettledMass::droppable_from(const std::int64_t* bins, double log_allowance) const {
-  LogSum mass;
+  // The log of any number of bins is less.
+  constexpr double most_log_bins = 44.0;
+  const double decay = std::exp(-slot_nats_);
+  double mass = 0.0;  // of the slots from i on, as so many bins at the upper edge of slot i
   std::size_t from = slots;
   for (; from > 0; --from) {
     const std::size_t i = from - 1;
+    mass *= decay;
     if (bins[i] > 0) {
-      mass.add(upper_edge(i) + std::log(static_cast<double>(bins[i])));
-      if (mass.log() > log_allowance) {
+      mass += static_cast<double>(bins[i]);
+      const double log_room = log_allowance - upper_edge(i);
+      if (log_room < most_log_bins && std::log(mass) > log_room) {
         break;
       }
     }
@@ -48,13 +51,20 @@ std::size_t UnsettledMass::droppable_from(std::size_t hypothesis, double log_all
 }
 
 double UnsettledMass::log_mass(std::size_t hypothesis) const {
-  LogSum mass;
-  for (std::size_t i = 0; i < slots; ++i) {
-    if (const std::int64_t bins = bins_[hypothesis * slots + i]; bins > 0) {
-      mass.add(upper_edge(i) + std::log(static_cast<double>(bins)));
-    }
+  const std::int64_t* bins = bins_.data() + hypothesis * slots;
+  std::size_t first = 0;
+  while (first < slots && bins[first] == 0) {
+    ++first;
   }
-  return mass.log();
+  if (first == slots) {
+    return -std::numeric_limits<double>::infinity();
+  }
+  const double decay = std::exp(-slot_nats_);
+  double mass = 0.0;  // of the slots from i on, as so many bins at the upper edge of slot i
+  for (std::size_t i = slots; i-- > first;) {
+    mass = mass * decay + static_cast<double>(bins[i]);
+  }
+  return upper_edge(first) + std::log(mass);
 }
 
 double UnsettledMass::largest(std::size_t hypothesis) const {

@@ -29,7 +29,7 @@ void slide_minimum(std::vector<std::uint16_t>& numbers, std::size_t stride, int 
 
 }  // namespace
 
-WindowTable window_table(const SquarePenalties& penalties, int side) {
+WindowTable window_table(const SquarePenalties& penalties, int side, int window) {
   WindowTable table{.best = penalties.best,
                     .side = side,
                     .side_log2 = std::countr_zero(static_cast<unsigned>(side)),
@@ -56,8 +56,8 @@ WindowTable window_table(const SquarePenalties& penalties, int side) {
     std::copy(row, row + penalties.nx,
               least.begin() + static_cast<std::ptrdiff_t>((before + j) * width + before));
   }
-  slide_minimum(least, 1, side + 1);
-  slide_minimum(least, width, side + 1);
+  slide_minimum(least, 1, window);
+  slide_minimum(least, width, window);
   const std::size_t plane = static_cast<std::size_t>(table.columns) * table.rows * batch_side;
   table.entries.resize(plane * side * side);
   auto* entry = table.entries.data();
@@ -76,6 +76,23 @@ WindowTable window_table(const SquarePenalties& penalties, int side) {
   }
   table.largest = *std::max_element(table.entries.begin(), table.entries.end());
   return table;
+}
+
+ChangeTable change_table(const WindowTable* to, const WindowTable& from) {
+  const auto penalty_at = [to](std::size_t i) { return to == nullptr ? 0 : int{to->entries[i]}; };
+  int offset = 0;
+  for (std::size_t i = 0; i < from.entries.size(); ++i) {
+    offset = std::max(offset, from.entries[i] - penalty_at(i));
+  }
+  ChangeTable change{.table = from, .offset = static_cast<std::uint16_t>(offset)};
+  for (std::size_t i = 0; i < from.entries.size(); ++i) {
+    change.table.entries[i] = static_cast<std::uint16_t>(penalty_at(i) - from.entries[i] + offset);
+  }
+  const int beyond = (to == nullptr ? 0 : int{to->beyond}) - from.beyond;
+  change.table.beyond = static_cast<std::uint16_t>(beyond + offset);
+  const auto& entries = change.table.entries;
+  change.table.largest = *std::max_element(entries.begin(), entries.end());
+  return change;
 }
 
 }  // namespace palpate

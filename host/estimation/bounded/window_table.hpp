@@ -13,8 +13,8 @@ inline constexpr int batch_side = 4;
 inline constexpr int batch_tiles = batch_side * batch_side;
 
 /// The least penalty of one reading within the window of squares that an element can see while the
-/// pose moves through a tile of `side` x `side` squares: `side + 1` squares along each axis, for
-/// every square at which the window may begin.
+/// pose moves through a tile of `side` x `side` squares, for every square at which the window may
+/// begin.
 ///
 /// Tiles of a row begin `side` squares apart, so that they need the same phase (the first square
 /// modulo the side). Each phase has a plane of its own, in which neighbouring entries belong to
@@ -37,6 +37,19 @@ struct WindowTable {
 };
 
 /// @param side a power of two
-WindowTable window_table(const SquarePenalties& penalties, int side);
+/// @param window squares along each axis that an element can see: side + 1, or 1 where the pose
+/// stays at the tile's corner
+WindowTable window_table(const SquarePenalties& penalties, int side, int window);
+
+/// What elements add to sums of penalties where they have one reading instead of another: the
+/// difference of the penalties, and the same `offset` at all entries, which makes it positive.
+struct ChangeTable {
+  WindowTable table;
+  std::uint16_t offset = 0;
+};
+
+/// @param to null for Unknown, which has no penalty
+/// @param from a table of the same shape
+ChangeTable change_table(const WindowTable* to, const WindowTable& from);
 
 }  // namespace palpate

@@ -14,7 +14,7 @@
 namespace palpate {
 
 /// Resolution, sensor model and contact classifier of a map.
-struct MapOptions {
+struct PALPATE_API MapOptions {
   double cell_mm = 0.5;       ///< edge of a cell
   InverseSensorModel sensor;  ///< also holds the prior
   ContactClassifier classifier;

@@ -293,6 +293,32 @@ TEST(BinLikelihood, HasTheSameBitsInEveryBox) {
   }
 }
 
+TEST(BinLikelihood, HasTheSameBitsInABoxOfItsOwn) {
+  for (const double cell_mm : {0.03, 0.5, 4.0}) {
+    for (const std::size_t elements : {1U, 7U, 63U, 1000U}) {
+      BinCase of = letter_case();
+      of.map = random_map(31, 27, cell_mm, 12.0, 82);
+      of.contact.table = crooked_table();
+      of.elements = random_elements(elements, 6.0, 4, 85);
+      const BinBox plane = whole_plane(of.lattice, 1);
+      std::vector<BinBox> bins;
+      for (std::int64_t i = 0; i < plane.bins(); ++i) {
+        bins.push_back({.theta = 1,
+                        .y_first = static_cast<std::int32_t>(i / plane.x_count),
+                        .y_count = 1,
+                        .x_first = static_cast<std::int32_t>(i % plane.x_count),
+                        .x_count = 1});
+      }
+      with_every_set_of_instructions([&](const std::string& name) {
+        const BinLikelihood likelihood = likelihood_of(of);
+        EXPECT_EQ(evaluated<double>(likelihood, of, bins),
+                  evaluated<double>(likelihood, of, {plane}))
+            << name << ", " << elements << " elements, cells of " << cell_mm << " mm";
+      });
+    }
+  }
+}
+
 TEST(BinLikelihood, KeepsObjectsAndThetasApart) {
   BinCase of = letter_case();
   const OccupancyGrid other = random_map(20, 40, 0.8, 5.0, 83);

@@ -12,6 +12,10 @@ namespace palpate {
 namespace {
 
 TEST(CertificateLaw, HoldsOverFiftyUnknownsOfAHundredBins) { expect_trials({7, 5, 3}, 50, 901); }
+TEST(CertificateLaw, HoldsOverFiftyUnknownsOfBinsCellsApart) {
+  // Steps of 1 to 7 mm, over cells of 0.37 to 4 mm: tiles of single bins.
+  expect_trials({7, 8, 6}, 50, 905);
+}
 TEST(CertificateLaw, HoldsOverFiftyUnknownsOfATwoThousandBins) {
   expect_trials({12, 12, 16}, 50, 902);
 }

@@ -302,7 +302,8 @@ TEST(FasterBinLikelihood, IsNotMeasuredWithinABudget) {
     FasterBinLikelihood faster(host, context, maps.hypotheses, maps.of.contact, maps.of.lattice,
                                BinPlace::measured, 1.0);
     BoundSearch search(maps.hypotheses, options, host, faster);
-    search.add(std::span(&maps.of.elements, 1));
+    const ArrayReadings touch = readings_of(maps.of.elements);
+    search.add(std::span(&touch, 1));
     search.run(maps.of.elements, {.tolerance = 1e-6}, Deadline(budget_s),
                [](const BinBox& /*box*/, std::span<const double> /*values*/) {});
     EXPECT_EQ(faster.path().find("too few so far") != std::string::npos, budget_s.has_value())

@@ -17,10 +17,10 @@ SquarePenalties random_penalties(int nx, int ny, std::uint16_t largest, std::uin
   return penalties;
 }
 
-std::uint16_t least_penalty(const SquarePenalties& penalties, int side, int x, int y) {
+std::uint16_t least_penalty(const SquarePenalties& penalties, int window, int x, int y) {
   std::uint16_t least = std::numeric_limits<std::uint16_t>::max();
-  for (int j = y; j <= y + side; ++j) {
-    for (int i = x; i <= x + side; ++i) {
+  for (int j = y; j < y + window; ++j) {
+    for (int i = x; i < x + window; ++i) {
       const bool inside = i >= 0 && j >= 0 && i < penalties.nx && j < penalties.ny;
       least =
           std::min(least, inside ? penalties.least[static_cast<std::size_t>(j) * penalties.nx + i]

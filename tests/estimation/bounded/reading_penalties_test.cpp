@@ -17,14 +17,13 @@ namespace {
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
 
-/// A square of a map's divided cells.
+/// A square of a map: a rectangle.
 struct Square {
   glm::dvec2 lower_mm;
-  double side_mm = 0.0;
+  glm::dvec2 side_mm;
 };
 
-Square square_at(const OccupancyGrid& map, int parts, int i, int j) {
-  const double side_mm = map.cell_mm / parts;
+Square square_at(const OccupancyGrid& map, const glm::dvec2& side_mm, int i, int j) {
   return {map.origin_mm - map.cell_mm + side_mm * glm::dvec2(i, j), side_mm};
 }
 
@@ -32,14 +31,29 @@ double log_odds_in(const InterpolatedMap& map, const Square& square, double fx, 
   return map.log_odds(square.lower_mm + square.side_mm * glm::dvec2(fx, fy));
 }
 
+/// The places of a square, from 0 to 1 along an axis, at its ends and at the map's nodes.
+std::vector<double> places_along(double lower_mm, double side_mm, double node_mm, double cell_mm) {
+  std::vector<double> places{0.0, 1.0};
+  const double first = std::ceil((lower_mm - node_mm) / cell_mm);
+  for (double at = node_mm + first * cell_mm; at < lower_mm + side_mm; at += cell_mm) {
+    places.push_back((at - lower_mm) / side_mm);
+  }
+  return places;
+}
+
 /// The largest log-likelihood in a square: bilinear log odds take all values between the least and
-/// the largest of the corners', and a table is largest at an end of this range or at a node.
-double largest_in(const InterpolatedMap& map, const ContactModel& contact, Reading reading,
-                  std::size_t object, const Square& square) {
+/// the largest of the corners' of its parts, and a table is largest at an end of this range or at a
+/// node.
+double largest_in(const OccupancyGrid& grid, const InterpolatedMap& map,
+                  const ContactModel& contact, Reading reading, std::size_t object,
+                  const Square& square) {
   double low = infinity;
   double high = -infinity;
-  for (const double fx : {0.0, 1.0}) {
-    for (const double fy : {0.0, 1.0}) {
+  const glm::dvec2& node_mm = grid.origin_mm;
+  for (const double fx :
+       places_along(square.lower_mm.x, square.side_mm.x, node_mm.x, grid.cell_mm)) {
+    for (const double fy :
+         places_along(square.lower_mm.y, square.side_mm.y, node_mm.y, grid.cell_mm)) {
       const double l = log_odds_in(map, square, fx, fy);
       low = std::min(low, l);
       high = std::max(high, l);
@@ -60,13 +74,26 @@ double largest_in(const InterpolatedMap& map, const ContactModel& contact, Readi
   return largest;
 }
 
+/// How a map is divided: a cell into parts, or, with no parts, the map into squares of any size.
+struct Division {
+  int parts = 0;
+  glm::dvec2 cells{0.0};
+};
+
 void expect_floors(const OccupancyGrid& grid, const ContactModel& contact, Reading reading,
-                   std::size_t object, int parts) {
+                   std::size_t object, const Division& division) {
   const InterpolatedMap map(grid, *contact.prior);
-  const SquarePenalties penalties = square_penalties(grid, contact, reading, object, parts);
-  ASSERT_EQ(penalties.parts, parts);
-  ASSERT_EQ(penalties.nx, (grid.nx + 1) * parts);
-  ASSERT_EQ(penalties.ny, (grid.ny + 1) * parts);
+  const double prior_log_odds = log_odds_from_probability(*contact.prior);
+  const glm::dvec2 side_mm = division.parts > 0 ? glm::dvec2(grid.cell_mm / division.parts)
+                                                : grid.cell_mm * division.cells;
+  const MapSquares squares = division.parts > 0
+                                 ? squares_of_cells(grid, prior_log_odds, division.parts)
+                                 : squares_of_size(grid, prior_log_odds, side_mm);
+  const SquarePenalties penalties = square_penalties(squares, contact, reading, object);
+  // No square lies beyond the map, and no part of the map beyond the squares.
+  const glm::dvec2 map_mm = grid.cell_mm * glm::dvec2(grid.nx + 1, grid.ny + 1);
+  const glm::dvec2 reached = glm::dvec2(penalties.nx, penalties.ny) - map_mm / side_mm;
+  ASSERT_TRUE(reached.x >= -1e-9 && reached.x < 1.0 && reached.y >= -1e-9 && reached.y < 1.0);
   ASSERT_EQ(penalties.least.size(), static_cast<std::size_t>(penalties.nx) * penalties.ny);
   // Rounding of places moves log odds of 1000 by 1e-9 nats at most, those of a table's steepest
   // level by as little: far below the hundredth of a penalty that rounding may take.
@@ -75,16 +102,15 @@ void expect_floors(const OccupancyGrid& grid, const ContactModel& contact, Readi
     return std::min((penalties.best - nats) * penalties_per_nat,
                     static_cast<double>(largest_penalty));
   };
-  const double prior =
-      contact.log_likelihood(reading, {log_odds_from_probability(*contact.prior)}, object);
+  const double prior = contact.log_likelihood(reading, {prior_log_odds}, object);
   EXPECT_LE(penalties.beyond, exact(prior));
   EXPECT_GE(penalties.beyond, exact(prior) - 1.0 - rounding);
   double best = prior;
   for (int j = 0; j < penalties.ny; ++j) {
     for (int i = 0; i < penalties.nx; ++i) {
-      const Square square = square_at(grid, parts, i, j);
+      const Square square = square_at(grid, side_mm, i, j);
       const double least = penalties.least[static_cast<std::size_t>(j) * penalties.nx + i];
-      const double largest = largest_in(map, contact, reading, object, square);
+      const double largest = largest_in(grid, map, contact, reading, object, square);
       best = std::max(best, largest);
       ASSERT_LE(least, largest_penalty);
       ASSERT_GE(least, exact(largest) - 1.0 - rounding) << "square " << i << ", " << j;
@@ -101,7 +127,7 @@ void expect_floors(const OccupancyGrid& grid, const ContactModel& contact, Readi
   EXPECT_NEAR(penalties.best, best, 1e-9 * (1.0 + std::abs(best))) << "rounding of places";
 }
 
-class PartsOfCells : public testing::TestWithParam<int> {};
+class PartsOfCells : public testing::TestWithParam<Division> {};
 
 TEST_P(PartsOfCells, HaveTheirLeastPenaltyByEquationSeven) {
   for (const double gamma : {0.1, 0.0}) {
@@ -149,7 +175,11 @@ TEST_P(PartsOfCells, OfMapsOfAnyShapeAndCellHaveTheirLeastPenalty) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Parts, PartsOfCells, testing::Values(1, 2, 4));
+INSTANTIATE_TEST_SUITE_P(Parts, PartsOfCells,
+                         testing::Values(Division{1}, Division{2}, Division{4},
+                                         Division{.cells = {0.83, 0.86}},
+                                         Division{.cells = {1.0, 2.5}},
+                                         Division{.cells = {0.31, 40.0}}));
 
 TEST(ReadingPenalties, StopAtTheLargestPenalty) {
   ContactModel contact;
@@ -158,7 +188,8 @@ TEST(ReadingPenalties, StopAtTheLargestPenalty) {
   OccupancyGrid map = random_map(6, 6, 0.5, 1.0, 204);
   std::fill(map.log_odds.begin(), map.log_odds.begin() + 18, 40.0F);
   std::fill(map.log_odds.begin() + 18, map.log_odds.end(), -1000.0F);
-  const SquarePenalties penalties = square_penalties(map, contact, Reading::in_contact, 0, 1);
+  const SquarePenalties penalties = square_penalties(
+      squares_of_cells(map, log_odds_from_probability(0.2), 1), contact, Reading::in_contact, 0);
   // The rows between the last two nodes cost some 1000 nats, the first ones nothing.
   EXPECT_EQ(penalties.least[5 * penalties.nx + 3], largest_penalty);
   EXPECT_EQ(penalties.least[2 * penalties.nx + 3], 0);
@@ -170,7 +201,8 @@ TEST(ReadingPenalties, OfAMapOfThePriorAreNone) {
   OccupancyGrid map = random_map(6, 6, 0.5, 1.0, 205);
   std::fill(map.log_odds.begin(), map.log_odds.end(),
             static_cast<float>(log_odds_from_probability(0.2)));
-  const SquarePenalties penalties = square_penalties(map, contact, Reading::no_contact, 0, 2);
+  const SquarePenalties penalties = square_penalties(
+      squares_of_cells(map, log_odds_from_probability(0.2), 2), contact, Reading::no_contact, 0);
   EXPECT_EQ(penalties.beyond, 0);
   EXPECT_EQ(std::count(penalties.least.begin(), penalties.least.end(), 0), 14 * 14);
 }

@@ -47,7 +47,7 @@ TEST(SearchMemory, IsWhatTheSearchHolds) {
   Device device = Device::open();
   const std::vector<Hypothesis> maps = two_shapes();
   for (const PoseLattice& lattice :
-       {square(10.0, 12, 16), square(10.0, 200, 250), square(300.0, 3000, 90),
+       {square(10.0, 12, 16), square(50.0, 60, 36), square(10.0, 200, 250), square(300.0, 3000, 90),
         square(3000.0, 3000, 360),
         PoseLattice{{0.0, 0.0, 1}, {-50.0, 9.0, 7}, {0.5, 0.5, 1}, {}}}) {
     const BoundedOptions options = options_of(lattice);
@@ -56,6 +56,26 @@ TEST(SearchMemory, IsWhatTheSearchHolds) {
     // Before a search: the sums of the largest tiles, 4 bytes of 28 a tile, and the tables.
     EXPECT_LE(held, memory.tables + memory.tiles);
     EXPECT_GE(1.01 * held + 0.1 * mib, memory.tables + memory.tiles / 7.0);
+  }
+}
+
+TEST(SearchMemory, IsWhatAnArrayAtRestHolds) {
+  Device device = Device::open();
+  const std::vector<Hypothesis> maps = two_shapes();
+  const std::vector<glm::dvec2> elements = grid_array(20, 20, 1.0);
+  std::vector<double> pressure(elements.size(), 0.1);
+  pressure[37] = 9.0;
+  const Touch touch{.T_robot_sensor = {}, .elements_mm = elements, .pressure = pressure};
+  for (const PoseLattice& lattice : {square(50.0, 60, 36), square(10.0, 200, 250)}) {
+    const BoundedOptions options = options_of(lattice);
+    BoundedPosterior posterior(device, maps, options);
+    const auto before = static_cast<double>(posterior.host_bytes());
+    posterior.update(touch);
+    posterior.update(touch);
+    const double held = static_cast<double>(posterior.host_bytes()) - before;
+    const double rest = search_memory(maps, options).rest;
+    EXPECT_LE(held, rest);
+    EXPECT_GE(1.01 * held + 0.1 * mib, rest);
   }
 }
 

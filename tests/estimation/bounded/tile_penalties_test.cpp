@@ -14,14 +14,16 @@
 namespace palpate {
 namespace {
 
-/// Elements over squares of a table, the tiles' batch and the sums before it.
+/// Elements over squares of a table, the batches of tiles and the sums before them.
 struct BatchCase {
   SquarePenalties penalties;
   int side = 1;
+  int window = 2;  ///< squares that an element sees
   KnownElements elements;
   TilePlace place;
   int first_x = 0;
   int first_y = 0;
+  int batches = 1;
   std::uint32_t before = 0;
 };
 
@@ -30,10 +32,11 @@ BatchCase random_batch(std::size_t elements, int side, std::uint16_t largest, st
   const double theta = random(-4.0, 4.0);
   BatchCase of{.penalties = random_penalties(23, 17, largest, seed + 1),
                .side = side,
+               .window = side + 1,
                .elements = random_elements(elements, 9.0, 1, seed + 2),
                .place = {.turn = {std::cos(theta), std::sin(theta)},
                          .corner_mm = {random(-8.0, 8.0), random(-8.0, 8.0)},
-                         .square_mm = 0.37}};
+                         .square_mm = {0.37, 0.29}}};
   of.first_x = static_cast<int>(random(0.0, 48.0 / side));
   of.first_y = static_cast<int>(random(0.0, 48.0 / side));
   // Some are so far off that their squares have no number.
@@ -43,21 +46,25 @@ BatchCase random_batch(std::size_t elements, int side, std::uint16_t largest, st
   return of;
 }
 
-/// Sums of the 4 x 4 tiles' penalties by definition, [x, y].
+/// Sums of the tiles' penalties by definition, [x, y].
 std::vector<std::uint32_t> sums_by_definition(const BatchCase& of) {
-  std::vector<std::uint64_t> sums(batch_tiles, of.before);
+  const int tiles_x = batch_side * of.batches;
+  std::vector<std::uint64_t> sums(static_cast<std::size_t>(tiles_x) * batch_side, of.before);
   const TilePlace& place = of.place;
   for (const glm::dvec2& p : of.elements.from_pivot_mm) {
     // Beyond 2^28 squares all is the prior; no batch here is as far.
-    const auto square = [&](double mm) {
-      return static_cast<int>(std::clamp(std::floor(mm / place.square_mm), -1e6, 1e6));
+    const auto square = [&](double mm, double square_mm) {
+      return static_cast<int>(std::clamp(std::floor(mm / square_mm), -1e6, 1e6));
     };
-    const int x = square(place.turn.x * p.x - place.turn.y * p.y + place.corner_mm.x);
-    const int y = square(place.turn.y * p.x + place.turn.x * p.y + place.corner_mm.y);
-    for (int i = 0; i < batch_side; ++i) {
+    const int x =
+        square(place.turn.x * p.x - place.turn.y * p.y + place.corner_mm.x, place.square_mm.x);
+    const int y =
+        square(place.turn.y * p.x + place.turn.x * p.y + place.corner_mm.y, place.square_mm.y);
+    for (int i = 0; i < tiles_x; ++i) {
       for (int j = 0; j < batch_side; ++j) {
-        sums[batch_side * i + j] += least_penalty(
-            of.penalties, of.side, x + of.side * (of.first_x + i), y + of.side * (of.first_y + j));
+        sums[batch_side * i + j] +=
+            least_penalty(of.penalties, of.window, x + of.side * (of.first_x + i),
+                          y + of.side * (of.first_y + j));
       }
     }
   }
@@ -73,18 +80,18 @@ std::vector<std::uint32_t> summed(const BatchCase& of, const WindowTable& table,
                                   std::size_t split = 0) {
   WindowPlaces placed;
   place_elements(of.elements, of.place, table, placed);
-  std::vector<std::uint32_t> sums(batch_tiles, of.before);
+  std::vector<std::uint32_t> sums(static_cast<std::size_t>(of.batches) * batch_tiles, of.before);
   for (const auto& [begin, end] :
        {std::pair(std::size_t{0}, split), std::pair(split, of.elements.from_pivot_mm.size())}) {
     add_penalties(placed, {Reading::in_contact, begin, end}, table, of.first_x, of.first_y,
-                  sums.data());
+                  of.batches, sums.data());
   }
   return sums;
 }
 
 void expect_sums(const BatchCase& of, std::size_t split = 0) {
   const std::vector<std::uint32_t> expected = sums_by_definition(of);
-  const WindowTable table = window_table(of.penalties, of.side);
+  const WindowTable table = window_table(of.penalties, of.side, of.window);
   with_every_set_of_instructions([&](const std::string& name) {
     EXPECT_EQ(summed(of, table, split), expected)
         << name << ", " << of.elements.from_pivot_mm.size() << " elements, side " << of.side;
@@ -96,6 +103,30 @@ TEST(TilePenalties, AreTheSumsOfWindowsWithEverySetOfInstructions) {
     for (const int side : {1, 2, 8}) {
       expect_sums(random_batch(count, side, 900, 93 + 7 * count));
     }
+  }
+}
+
+TEST(TilePenalties, OfSingleBinsAreThoseOfTheSquaresTheySee) {
+  for (std::size_t count = 0; count <= 70; count += 7) {
+    BatchCase of = random_batch(count, 4, 900, 99 + count);
+    of.window = 1;
+    expect_sums(of);
+  }
+}
+
+TEST(TilePenalties, OfNeighbouringBatchesAreThoseOfEach) {
+  // Elements of which some see the map from none of the batches, some from one and some from all.
+  Uniform random(100);
+  for (std::uint64_t trial = 0; trial < 300; ++trial) {
+    const int side = 1 << static_cast<int>(random(0.0, 4.0));
+    BatchCase of =
+        random_batch(static_cast<std::size_t>(random(0.0, 70.0)), side, 900, 1000 + trial);
+    of.batches = static_cast<int>(random(1.0, most_strip + 1.0));
+    of.first_x -= static_cast<int>(random(0.0, 40.0));
+    of.first_y -= static_cast<int>(random(0.0, 20.0));
+    of.penalties.beyond = static_cast<std::uint16_t>(random(0.0, 901.0));
+    of.before = trial % 2 == 0 ? 0 : 123456789;
+    expect_sums(of, of.elements.from_pivot_mm.size() / 3);
   }
 }
 
@@ -117,7 +148,11 @@ TEST(TilePenalties, OfAPressOfManyElementsDoNotWrap) {
   // 16 bits hold 7 of the largest penalties.
   for (const int side : {1, 8}) {
     for (const std::uint16_t largest : {std::uint16_t{0}, std::uint16_t{1}, largest_penalty}) {
-      expect_sums(random_batch(1400, side, largest, 96));
+      for (const int batches : {1, 5}) {
+        BatchCase of = random_batch(1400, side, largest, 96);
+        of.batches = batches;
+        expect_sums(of);
+      }
     }
   }
 }
@@ -127,6 +162,8 @@ TEST(TilePenalties, StopAtTheLargestSum) {
   std::fill(of.penalties.least.begin(), of.penalties.least.end(), largest_penalty);
   const std::vector<std::uint32_t> all(batch_tiles, largest_sum);
   ASSERT_EQ(sums_by_definition(of), all);
+  expect_sums(of);
+  of.batches = 2;
   expect_sums(of);
   // Just below it.
   of.elements.from_pivot_mm.resize(largest_sum / largest_penalty - 1);

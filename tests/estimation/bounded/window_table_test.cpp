@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <utility>
 
 #include <gtest/gtest.h>
 
@@ -12,10 +13,12 @@ namespace {
 
 TEST(WindowTable, HoldsTheLeastPenaltyOfEveryWindow) {
   for (const glm::ivec2 squares : {glm::ivec2(2, 2), {7, 5}, {16, 9}, {33, 1}}) {
-    for (const int side : {1, 2, 4, 8}) {
-      SCOPED_TRACE(testing::Message() << squares.x << " x " << squares.y << ", side " << side);
+    for (const auto& [side, window] :
+         {std::pair(1, 2), {2, 3}, {4, 5}, {8, 9}, {1, 1}, {2, 1}, {8, 1}}) {
+      SCOPED_TRACE(testing::Message() << squares.x << " x " << squares.y << ", side " << side
+                                      << ", window " << window);
       const SquarePenalties penalties = random_penalties(squares.x, squares.y, 8192, 91);
-      const WindowTable table = window_table(penalties, side);
+      const WindowTable table = window_table(penalties, side, window);
       ASSERT_EQ(1 << table.side_log2, side);
       ASSERT_EQ(table.best, penalties.best);
       ASSERT_EQ(table.beyond, penalties.beyond);
@@ -30,7 +33,7 @@ TEST(WindowTable, HoldsTheLeastPenaltyOfEveryWindow) {
               for (int j = 0; j < batch_side; ++j, ++entry) {
                 const int x = (column - WindowTable::margin) * side + phase_x;
                 const int y = (row + j - WindowTable::margin) * side + phase_y;
-                ASSERT_EQ(*entry, least_penalty(penalties, side, x, y))
+                ASSERT_EQ(*entry, least_penalty(penalties, window, x, y))
                     << "window at square " << x << ", " << y;
                 largest = std::max(largest, *entry);
               }
@@ -43,12 +46,41 @@ TEST(WindowTable, HoldsTheLeastPenaltyOfEveryWindow) {
   }
 }
 
+TEST(ChangeTable, HoldsTheDifferenceOfPenalties) {
+  const WindowTable from = window_table(random_penalties(13, 11, 8192, 93), 4, 1);
+  const WindowTable other = window_table(random_penalties(13, 11, 900, 94), 4, 1);
+  for (const WindowTable* to : {&other, static_cast<const WindowTable*>(nullptr)}) {
+    const ChangeTable change = change_table(to, from);
+    ASSERT_EQ(change.table.entries.size(), from.entries.size());
+    ASSERT_EQ(change.table.columns, from.columns);
+    for (std::size_t i = 0; i < from.entries.size(); ++i) {
+      const int difference = (to == nullptr ? 0 : to->entries[i]) - from.entries[i];
+      ASSERT_EQ(change.table.entries[i], difference + change.offset) << "entry " << i;
+      ASSERT_LE(change.table.entries[i], change.table.largest) << "entry " << i;
+    }
+  }
+}
+
+TEST(ChangeTable, HoldsTheLargestDifferences) {
+  SquarePenalties all = random_penalties(5, 5, largest_penalty, 95);
+  SquarePenalties none = all;
+  for (int i = 0; i < 25; ++i) {
+    all.least[i] = i % 2 == 0 ? largest_penalty : 0;
+    none.least[i] = i % 2 == 0 ? 0 : largest_penalty;
+  }
+  const WindowTable from = window_table(all, 1, 1);
+  const WindowTable to = window_table(none, 1, 1);
+  const ChangeTable change = change_table(&to, from);
+  EXPECT_EQ(change.offset, largest_penalty);
+  EXPECT_EQ(change.table.largest, 2 * largest_penalty);
+}
+
 TEST(WindowTable, EndsInBatchesThatSeeOnlyThePrior) {
   // Farther batches take the entries of these.
   for (const int side : {1, 2, 8}) {
     SquarePenalties penalties = random_penalties(13, 11, 100, 92);
     penalties.beyond = 200;
-    const WindowTable table = window_table(penalties, side);
+    const WindowTable table = window_table(penalties, side, side + 1);
     const std::size_t plane = static_cast<std::size_t>(table.rows) * table.columns * batch_side;
     for (std::size_t phase = 0; phase < static_cast<std::size_t>(side) * side; ++phase) {
       for (int row = 0; row < table.rows; ++row) {

@@ -1,0 +1,174 @@
+#include "arrays.hpp"
+
+#include <cctype>
+#include <cstring>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <nanobind/stl/string.h>
+
+#include "palpate/error.hpp"
+
+namespace palpate::python {
+
+namespace {
+
+[[noreturn]] void refuse(const char* name, const std::string& message) {
+  throw Error(Fault::input, fmt::format("{}: {}", name, message));
+}
+
+/// numpy.asarray(object); throws Error where it is no array of numbers of these kinds.
+nb::object as_array(nb::handle object, const char* name, const char* kinds, const char* wanted) {
+  nb::object array;
+  try {
+    array = nb::module_::import_("numpy").attr("asarray")(object);
+  } catch (nb::python_error& error) {
+    if (!error.matches(PyExc_ValueError) && !error.matches(PyExc_TypeError)) {
+      throw;
+    }
+    refuse(name, fmt::format("is no array of numbers; give {}", wanted));
+  }
+  const auto kind = nb::cast<std::string>(array.attr("dtype").attr("kind"));
+  const bool empty = nb::cast<std::size_t>(array.attr("size")) == 0;
+  if (!empty && std::strchr(kinds, kind[0]) == nullptr) {
+    const nb::object dtype = array.attr("dtype");
+    refuse(name, fmt::format("dtype {}; give {}", nb::str(dtype).c_str(), wanted));
+  }
+  return array;
+}
+
+/// The array itself, or a copy, with this dtype and C layout.
+nb::object with_layout(const nb::object& array, const char* dtype) {
+  return nb::module_::import_("numpy").attr("asarray")(array, nb::arg("dtype") = dtype,
+                                                       nb::arg("order") = "C");
+}
+
+std::string wanted_shape(ArrayReader::Shape shape) {
+  return fmt::format("({}{})", fmt::join(shape, ", "), shape.size() == 1 ? "," : "");
+}
+
+std::string given_shape(const std::vector<std::size_t>& shape) {
+  return fmt::format("({}{})", fmt::join(shape, ", "), shape.size() == 1 ? "," : "");
+}
+
+template <typename Row>
+std::span<const Row> rows(const Floats& array) {
+  return {reinterpret_cast<const Row*>(array.data), array.size() * sizeof(double) / sizeof(Row)};
+}
+
+template <std::size_t rank>
+Result<double, rank> copied(const double* values, const std::size_t (&shape)[rank]) {
+  std::size_t count = 1;
+  for (const std::size_t extent : shape) {
+    count *= extent;
+  }
+  return owned(std::vector<double>(values, values + count), shape);
+}
+
+}  // namespace
+
+std::span<const Pose> as_poses(const Floats& array) { return rows<Pose>(array); }
+std::span<const glm::dvec2> as_points(const Floats& array) { return rows<glm::dvec2>(array); }
+
+template <typename Value>
+Array<Value> ArrayReader::checked(const nb::object& array, const char* name, Shape shape) {
+  Array<Value> result;
+  result.object = array;
+  for (const nb::handle extent : array.attr("shape")) {
+    result.shape.push_back(nb::cast<std::size_t>(extent));
+  }
+  bool fits = result.shape.size() == shape.size();
+  std::string known;
+  std::map<std::string, Extent> extents = extents_;
+  for (std::size_t i = 0; i < shape.size(); ++i) {
+    const std::string extent = shape.begin()[i];
+    if (std::isdigit(static_cast<unsigned char>(extent[0])) != 0) {
+      fits = fits && result.shape[i] == std::stoul(extent);
+      continue;
+    }
+    if (const auto found = extents_.find(extent); found != extents_.end()) {
+      known += fmt::format("{} {} = {} of {}", known.empty() ? " with" : " and", extent,
+                           found->second.value, found->second.given_by);
+    }
+    if (fits) {
+      const auto [entry, is_new] = extents.try_emplace(extent, Extent{result.shape[i], name});
+      fits = is_new || entry->second.value == result.shape[i];
+    }
+  }
+  if (!fits) {
+    refuse(name, fmt::format("shape {}; give {}{}", given_shape(result.shape), wanted_shape(shape),
+                             known));
+  }
+  extents_ = std::move(extents);
+  Py_buffer buffer{};
+  if (PyObject_GetBuffer(array.ptr(), &buffer, PyBUF_C_CONTIGUOUS) != 0) {
+    throw nb::python_error();
+  }
+  result.data = static_cast<const Value*>(buffer.buf);
+  PyBuffer_Release(&buffer);  // the array keeps the memory
+  return result;
+}
+
+Floats ArrayReader::floats(nb::handle object, const char* name, Shape shape) {
+  const nb::object array = as_array(object, name, "fiu", "numbers (float64)");
+  return checked<double>(with_layout(array, "float64"), name, shape);
+}
+
+Bytes ArrayReader::flags(nb::handle object, const char* name, Shape shape) {
+  nb::object array = as_array(object, name, "biu", "booleans, False for a dead element");
+  const auto dtype = nb::cast<std::string>(array.attr("dtype").attr("name"));
+  if (dtype != "bool" && dtype != "uint8") {
+    array = array.attr("astype")("bool");
+  }
+  return checked<std::uint8_t>(
+      with_layout(array, dtype == "uint8" ? "uint8" : "bool").attr("view")("uint8"), name, shape);
+}
+
+Counts ArrayReader::counts(nb::handle object, const char* name, Shape shape) {
+  const nb::object array = as_array(object, name, "iu", "whole numbers (uint64)");
+  if (nb::cast<std::size_t>(array.attr("size")) > 0 && array.attr("min")() < nb::int_(0)) {
+    refuse(name, "has a count below 0; give whole numbers from 0");
+  }
+  return checked<std::uint64_t>(with_layout(array, "uint64"), name, shape);
+}
+
+Pose pose_of(nb::handle object, const char* name) {
+  return as_poses(ArrayReader().floats(object, name, {"3"})).front();
+}
+
+glm::dvec2 point_of(nb::handle object, const char* name) {
+  return as_points(ArrayReader().floats(object, name, {"2"})).front();
+}
+
+std::vector<Pose> poses_of(nb::handle object, const char* name) {
+  const Floats array = ArrayReader().floats(object, name, {"n", "3"});
+  const auto poses = as_poses(array);
+  return {poses.begin(), poses.end()};
+}
+
+std::vector<glm::dvec2> points_of(nb::handle object, const char* name) {
+  const Floats array = ArrayReader().floats(object, name, {"n", "2"});
+  const auto points = as_points(array);
+  return {points.begin(), points.end()};
+}
+
+Result<double, 1> to_array(const Pose& pose) {
+  return copied(reinterpret_cast<const double*>(&pose), {3});
+}
+Result<double, 1> to_array(const glm::dvec2& point) {
+  return copied(reinterpret_cast<const double*>(&point), {2});
+}
+Result<double, 2> to_array(std::span<const Pose> poses) {
+  return copied(reinterpret_cast<const double*>(poses.data()), {poses.size(), 3});
+}
+Result<double, 2> to_array(std::span<const glm::dvec2> points) {
+  return copied(reinterpret_cast<const double*>(points.data()), {points.size(), 2});
+}
+Result<double, 2> to_array(const std::array<double, 9>& covariance) {
+  return copied(covariance.data(), {3, 3});
+}
+Result<double, 1> to_array(const std::array<double, 3>& values) {
+  return copied(values.data(), {3});
+}
+
+}  // namespace palpate::python

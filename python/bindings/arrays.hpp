@@ -1,0 +1,119 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <initializer_list>
+#include <map>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <nanobind/ndarray.h>
+#include <glm/vec2.hpp>
+
+#include "palpate/pose.hpp"
+#include "types.hpp"
+
+namespace palpate::python {
+
+static_assert(sizeof(Pose) == 3 * sizeof(double) && sizeof(glm::dvec2) == 2 * sizeof(double),
+              "poses and points are rows of arrays of float64");
+
+/// A NumPy array with C layout, whose memory C++ reads in place.
+template <typename Value>
+struct Array {
+  nb::object object;  ///< keeps the memory alive
+  const Value* data = nullptr;
+  std::vector<std::size_t> shape;
+
+  std::size_t size() const {
+    std::size_t count = 1;
+    for (const std::size_t extent : shape) {
+      count *= extent;
+    }
+    return count;
+  }
+  std::span<const Value> values() const& { return {data, size()}; }
+  std::span<const Value> values() const&& = delete;  // the memory goes with the array
+};
+using Floats = Array<double>;
+using Bytes = Array<std::uint8_t>;
+using Counts = Array<std::uint64_t>;
+
+/// Poses [n, 3] as rows of x_mm, y_mm and theta_rad, and points [n, 2] in mm.
+std::span<const Pose> as_poses(const Floats& array);
+std::span<const glm::dvec2> as_points(const Floats& array);
+
+/// Takes the arrays of one call, whose extents have to agree. Each function returns the array of
+/// the argument itself where dtype and layout allow it, or else a copy.
+/// @param name of the argument, for messages
+/// @param shape of the array: numbers, or letters that stand for one number throughout
+/// @throws Error naming the argument, its shape and the shape that it needs
+class ArrayReader {
+ public:
+  using Shape = std::initializer_list<const char*>;
+
+  Floats floats(nb::handle object, const char* name, Shape shape);
+  /// Booleans, or integers that are 0 or not.
+  Bytes flags(nb::handle object, const char* name, Shape shape);
+  Counts counts(nb::handle object, const char* name, Shape shape);
+  /// What a letter stands for by now.
+  std::size_t extent(const std::string& letter) const { return extents_.at(letter).value; }
+
+ private:
+  struct Extent {
+    std::size_t value;
+    std::string given_by;
+  };
+  template <typename Value>
+  Array<Value> checked(const nb::object& array, const char* name, Shape shape);
+
+  std::map<std::string, Extent> extents_;
+};
+
+/// A pose (x_mm, y_mm, theta_rad), or a point (x_mm, y_mm).
+Pose pose_of(nb::handle object, const char* name);
+glm::dvec2 point_of(nb::handle object, const char* name);
+/// Poses [n, 3], points [n, 2].
+std::vector<Pose> poses_of(nb::handle object, const char* name);
+std::vector<glm::dvec2> points_of(nb::handle object, const char* name);
+
+/// A NumPy array as the result of a function. An object, so that no policy of nanobind's asks who
+/// owns the memory: `owner` does.
+template <typename Value, std::size_t rank>
+class Result : public nb::object {
+  using Array = nb::ndarray<nb::numpy, Value, nb::ndim<static_cast<nb::ssize_t>(rank)>>;
+
+ public:
+  static constexpr auto Name = nb::detail::make_caster<Array>::Name;
+  static bool check_(nb::handle object) { return object.is_valid(); }
+
+  Result(Value* data, const std::size_t (&shape)[rank], nb::handle owner)
+      : nb::object(nb::cast(Array(data, rank, shape, owner), nb::rv_policy::automatic)) {}
+};
+
+/// An array that takes over the vector's memory.
+template <typename Value, std::size_t rank>
+Result<Value, rank> owned(std::vector<Value> values, const std::size_t (&shape)[rank]) {
+  auto* kept = new std::vector<Value>(std::move(values));
+  const nb::capsule owner(kept, [](void* p) noexcept { delete static_cast<decltype(kept)>(p); });
+  return {kept->data(), shape, owner};
+}
+/// A read-only array over memory of an object of Python, which it keeps alive.
+template <typename Value, std::size_t rank>
+Result<const Value, rank> view(const Value* data, const std::size_t (&shape)[rank],
+                               nb::handle owner) {
+  return {data, shape, owner};
+}
+
+/// [3] or [n, 3] of x_mm, y_mm and theta_rad; [2] or [n, 2] in mm.
+Result<double, 1> to_array(const Pose& pose);
+Result<double, 1> to_array(const glm::dvec2& point);
+Result<double, 2> to_array(std::span<const Pose> poses);
+Result<double, 2> to_array(std::span<const glm::dvec2> points);
+/// [3, 3] of a covariance.
+Result<double, 2> to_array(const std::array<double, 9>& covariance);
+Result<double, 1> to_array(const std::array<double, 3>& values);
+
+}  // namespace palpate::python

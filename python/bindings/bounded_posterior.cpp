@@ -1,0 +1,142 @@
+#include <fmt/format.h>
+#include <nanobind/stl/optional.h>
+#include <nanobind/stl/shared_ptr.h>
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/vector.h>
+
+#include "bindings.hpp"
+#include "estimate.hpp"
+#include "palpate/bounded_posterior.hpp"
+#include "touches.hpp"
+
+namespace palpate::python {
+
+using namespace nb::literals;
+
+namespace {
+
+using Bounded = Named<BoundedPosterior>;
+
+Bounded make_bounded(const std::shared_ptr<Session>& session, nb::handle maps,
+                     BoundedOptions options) {
+  std::vector<Hypothesis> hypotheses = hypotheses_of(maps);
+  std::vector<std::string> labels = labels_of(hypotheses);
+  return {
+      make_owned<BoundedPosterior>({}, session,
+                                   [hypotheses = std::move(hypotheses), options](Device& device) {
+                                     return BoundedPosterior(device, hypotheses, options);
+                                   }),
+      std::move(labels)};
+}
+
+void update(const Bounded& self, const TouchesLike& touches, const Progress& progress) {
+  TouchViews views = views_of(touches);
+  self.use(std::move(views.kept), progress,
+           [all = std::move(views.touches)](BoundedPosterior& belief, Call& call) {
+             belief.update(all, call.progress());
+           });
+}
+
+}  // namespace
+
+void bind_bounded_posterior(nb::module_& module) {
+  nb::class_<Bounded>(
+      module, "BoundedPosterior",
+      "The belief of PoseHistogram over the same bins, of which it evaluates only those that "
+      "matter,\n"
+      "and proves how little the others can. Memory follows the maps, not the bins.")
+      .def(
+          "__init__",
+          [](Bounded* self, const std::shared_ptr<Session>& device, const MapsLike& maps,
+             const PoseLattice& lattice, const ContactModel& contact, double tolerance,
+             std::optional<double> budget_s, std::optional<double> evidence_nats,
+             std::optional<double> none_weight, int threads) {
+            new (self) Bounded(make_bounded(device, maps,
+                                            {.lattice = lattice,
+                                             .contact = contact,
+                                             .tolerance = tolerance,
+                                             .budget_s = budget_s,
+                                             .evidence_nats = evidence_nats,
+                                             .none_weight = none_weight,
+                                             .threads = threads}));
+          },
+          "device"_a, "maps"_a, "lattice"_a = PoseLattice{}, nb::kw_only(),
+          "contact"_a = ContactModel{}, "tolerance"_a = BoundedOptions{}.tolerance,
+          "budget_s"_a = nb::none(), "evidence_nats"_a = nb::none(), "none_weight"_a = nb::none(),
+          "threads"_a = 0,
+          "tolerance: largest total variation distance from the posterior over all bins; "
+          "budget_s:\n"
+          "seconds after which estimate() reports what it has proven by then; evidence_nats: "
+          "bounds\n"
+          "every map's log evidence, too; threads: 0 for as many as the machine has cores.\n\n"
+          "Raises Error as PoseHistogram does.")
+      .def(
+          "update", &update, "touches"_a, "progress"_a = nb::none(),
+          "Multiplies the belief by the likelihood of these touches (Eq. 7, 13); takes in none of\n"
+          "them after Ctrl-C or where progress(fraction) raises. Raises Error on a touch that is\n"
+          "not sound.")
+      .def(
+          "estimate",
+          [](const Bounded& self) {
+            return self.use([](BoundedPosterior& belief, Call&) { return belief.estimate(); });
+          },
+          "Identity with its bounds, mode and certificate. Searches once after each update(). A\n"
+          "search that Ctrl-C left goes on in the background; later calls wait for it.")
+      .def(
+          "refine",
+          [](const Bounded& self, const std::optional<Mode>& mode) {
+            return self.use([mode](BoundedPosterior& belief, Call&) {
+              return belief.refine(mode ? *mode : belief.estimate().mode);
+            });
+          },
+          "mode"_a = nb::none(), "The pose between the bins near a mode, and its covariance.")
+      .def(
+          "marginals",
+          [](const Bounded& self, int object, const std::optional<PoseLattice>& grid) {
+            return self.use([object, grid](BoundedPosterior& belief, Call&) {
+              return grid ? belief.marginals(object, *grid) : belief.marginals(object);
+            });
+          },
+          "object"_a, "grid"_a = nb::none(),
+          "Marginal probabilities of one object's poses, over the lattice or a coarser grid.")
+      .def(
+          "log_likelihood",
+          [](const Bounded& self, int object, const ArrayLike& T_object_robot) {
+            const Pose pose = pose_of(T_object_robot, "T_object_robot");
+            return self.use([object, pose](BoundedPosterior& belief, Call&) {
+              return belief.log_likelihood(object, pose);
+            });
+          },
+          "object"_a, "T_object_robot"_a,
+          "Log-likelihood of any pose [3] of an object in nats, in float64.")
+      .def(
+          "entropy",
+          [](const Bounded& self) {
+            return self.use([](BoundedPosterior& belief, Call&) { return belief.entropy(); });
+          },
+          "Entropy of the belief over objects and evaluated bins, in nats.")
+      .def(
+          "sample",
+          [](const Bounded& self, std::size_t count, std::uint64_t seed) {
+            return self.use([count, seed](BoundedPosterior& belief, Call&) {
+              return belief.sample(count, seed);
+            });
+          },
+          "count"_a, "seed"_a = 0, "Draws objects and poses from the belief.")
+      .def(
+          "reset",
+          [](const Bounded& self) {
+            self.use([](BoundedPosterior& belief, Call&) { belief.reset(); });
+          },
+          "Returns to the uniform belief, for the next unknown.")
+      .def_prop_ro(
+          "lattice",
+          [](const Bounded& self) {
+            return self.use([](BoundedPosterior& belief, Call&) { return belief.lattice(); });
+          })
+      .def("__repr__", [](const Bounded& self) {
+        return fmt::format("BoundedPosterior({})", text_of(self.labels, self.session()));
+      });
+}
+
+}  // namespace palpate::python

@@ -1,0 +1,204 @@
+#include "estimate.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <nanobind/stl/optional.h>
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/tuple.h>
+#include <nanobind/stl/vector.h>
+
+#include "bindings.hpp"
+#include "model.hpp"
+#include "palpate/error.hpp"
+#include "plots.hpp"
+
+namespace palpate::python {
+
+using namespace nb::literals;
+
+namespace {
+
+Result<const double, 1> values_view(const std::vector<double>& values, nb::handle owner) {
+  return view<double, 1>(values.data(), {values.size()}, owner);
+}
+
+void bind_mode(nb::module_& module) {
+  nb::class_<Mode>(module, "Mode", "The pose of the largest posterior probability (Eq. 15-16).")
+      .def_ro("object", &Mode::object, "Index into the maps.")
+      .def_ro("bin", &Mode::bin, "Index into the lattice, where the filter has bins.")
+      .def_prop_ro(
+          "T_object_robot", [](const Mode& self) { return to_array(self.T_object_robot); },
+          "[3] (x_mm, y_mm, theta_rad); the bin's centre, where there is a bin.")
+      .def_ro("log_likelihood", &Mode::log_likelihood,
+              "Of all touches, without prior weights, in nats.")
+      .def("__repr__", [](const Mode& self) {
+        return fmt::format("Mode(object {}, T_object_robot {})", self.object,
+                           text_of(self.T_object_robot));
+      });
+
+  nb::class_<RefinedPose>(module, "RefinedPose", "A pose between the bins, with its uncertainty.")
+      .def_prop_ro(
+          "T_object_robot", [](const RefinedPose& self) { return to_array(self.T_object_robot); },
+          "[3] (x_mm, y_mm, theta_rad).")
+      .def_prop_ro(
+          "covariance", [](const RefinedPose& self) { return to_array(self.covariance); },
+          "[3, 3] of (x_mm, y_mm, theta_rad) of T_object_robot.")
+      .def_prop_ro(
+          "T_robot_object",
+          [](const RefinedPose& self) { return to_array(inverse(self).T_robot_object); },
+          "[3], the object's frame in the robot's, for a robot to act on.")
+      .def_prop_ro(
+          "T_robot_object_covariance",
+          [](const RefinedPose& self) { return to_array(inverse(self).covariance); },
+          "[3, 3] of (x_mm, y_mm, theta_rad) of T_robot_object.")
+      .def_prop_ro(
+          "sd", [](const RefinedPose& self) { return to_array(inverse(self).sd()); },
+          "[3], standard deviations of T_robot_object in mm, mm and rad.")
+      .def("__repr__", [](const RefinedPose& self) {
+        const auto pose = inverse(self);
+        const auto sd = pose.sd();
+        return fmt::format(
+            "RefinedPose(T_robot_object x {:.2f} +-{:.2f} mm, y {:.2f} +-{:.2f} mm, theta {:.3f} "
+            "+-{:.3f} rad)",
+            pose.T_robot_object.translation_mm.x, sd[0], pose.T_robot_object.translation_mm.y,
+            sd[1], pose.T_robot_object.theta_rad, sd[2]);
+      });
+}
+
+void bind_certificate(nb::module_& module) {
+  nb::class_<Certificate>(module, "Certificate", "What a search by bounds proves of its estimate.")
+      .def_ro("dropped_mass", &Certificate::dropped_mass,
+              "Bound of the total variation distance from the posterior over all bins.")
+      .def_ro("mode_certain", &Certificate::mode_certain)
+      .def_ro("blocks_bounded", &Certificate::blocks_bounded)
+      .def_ro("bins_evaluated", &Certificate::bins_evaluated)
+      .def_prop_ro(
+          "log_evidence",
+          [](const Certificate& self) {
+            std::vector<std::tuple<double, double>> bounds;
+            for (const LogInterval& interval : self.log_evidence) {
+              bounds.emplace_back(interval.low, interval.high);
+            }
+            return bounds;
+          },
+          "(low, high) of every map's log evidence, in nats.")
+      .def("__repr__", [](const Certificate& self) {
+        return fmt::format("Certificate(dropped_mass={:.1e}, bins_evaluated={})", self.dropped_mass,
+                           self.bins_evaluated);
+      });
+}
+
+void bind_estimate_class(nb::module_& module) {
+  nb::class_<Estimate>(module, "Estimate", "What the belief says about the unknown object.")
+      .def_prop_ro(
+          "identity",
+          [](nb::handle_t<Estimate> self) {
+            return values_view(nb::cast<const Estimate&>(self).identity, self);
+          },
+          "Probability of every map (Eq. 14), [maps]; with `none` sums to 1.")
+      .def_prop_ro(
+          "log_evidence",
+          [](nb::handle_t<Estimate> self) {
+            return values_view(nb::cast<const Estimate&>(self).log_evidence, self);
+          },
+          "Log of every map's prior weight times its summed likelihood, in nats but for a "
+          "constant,\n"
+          "[maps].")
+      .def_prop_ro(
+          "identity_bounds",
+          [](const Estimate& self) {
+            std::vector<std::tuple<double, double>> bounds;
+            for (const ProbabilityInterval& interval : self.identity_bounds) {
+              bounds.emplace_back(interval.low, interval.high);
+            }
+            return bounds;
+          },
+          "(low, high) of every probability, by bounds; empty where `identity` is exact.")
+      .def_ro("certificate", &Estimate::certificate)
+      .def_ro("none", &Estimate::none, "Probability of \"none of these\", where it was asked for.")
+      .def_ro("mode", &Estimate::mode)
+      .def_ro("contradicted", &Estimate::contradicted,
+              "True where empty space explains the touches much better than every map.")
+      .def("__repr__", [](const Estimate& self) {
+        return fmt::format("Estimate(identity [{:.3f}], mode of object {}: {})",
+                           fmt::join(self.identity, ", "), self.mode.object,
+                           text_of(self.mode.T_object_robot));
+      });
+}
+
+void bind_marginals(nb::module_& module) {
+  nb::class_<Marginals>(module, "Marginals",
+                        "Probabilities of parts of one object's poses, over a grid.")
+      .def_ro("grid", &Marginals::grid)
+      .def_prop_ro(
+          "xy",
+          [](nb::handle_t<Marginals> self) {
+            const auto& marginals = nb::cast<const Marginals&>(self);
+            return view<double, 2>(marginals.xy.data(),
+                                   {static_cast<std::size_t>(marginals.grid.y_mm.count),
+                                    static_cast<std::size_t>(marginals.grid.x_mm.count)},
+                                   self);
+          },
+          "Of every (x, y), summed over theta, [ny, nx].")
+      .def_prop_ro(
+          "theta",
+          [](nb::handle_t<Marginals> self) {
+            return values_view(nb::cast<const Marginals&>(self).theta, self);
+          },
+          "Of every theta, summed over (x, y), [ntheta].")
+      .def("plot", plot_method, "ax"_a = nb::none(), plot_signature,
+           "Draws the belief over x and y, in mm, with Matplotlib. Returns the axes.")
+      .def("_repr_png_", png_method, png_signature)
+      .def("__repr__", [](const Marginals& self) {
+        return fmt::format("Marginals(over {})", text_of(self.grid));
+      });
+
+  nb::class_<PoseSample>(module, "PoseSample", "An object and its pose, drawn from a belief.")
+      .def_ro("object", &PoseSample::object, "Index into the maps.")
+      .def_prop_ro("T_object_robot",
+                   [](const PoseSample& self) { return to_array(self.T_object_robot); })
+      .def("__repr__", [](const PoseSample& self) {
+        return fmt::format("PoseSample(object {}, {})", self.object, text_of(self.T_object_robot));
+      });
+}
+
+}  // namespace
+
+std::vector<Hypothesis> hypotheses_of(nb::handle maps) {
+  std::vector<Hypothesis> hypotheses;
+  for (const nb::handle item : nb::iter(maps)) {
+    const OccupancyGrid* map = nullptr;
+    const Hypothesis* hypothesis = nullptr;
+    if (nb::try_cast(item, map) && map != nullptr) {
+      hypotheses.push_back({.map = *map});
+    } else if (nb::try_cast(item, hypothesis) && hypothesis != nullptr) {
+      hypotheses.push_back(*hypothesis);
+    } else {
+      throw Error(Fault::input, fmt::format("maps: item {} is a {}; give OccupancyGrid or "
+                                            "Hypothesis, such as of read_map()",
+                                            hypotheses.size(), nb::inst_name(item).c_str()));
+    }
+  }
+  return hypotheses;
+}
+
+std::vector<std::string> labels_of(const std::vector<Hypothesis>& hypotheses) {
+  std::vector<std::string> labels;
+  for (const Hypothesis& hypothesis : hypotheses) {
+    labels.push_back(hypothesis.map.label);
+  }
+  return labels;
+}
+
+std::string text_of(const std::vector<std::string>& labels, const Session& session) {
+  return fmt::format("{} on '{}'", fmt::join(labels, ", "), session.name());
+}
+
+void bind_estimate(nb::module_& module) {
+  bind_mode(module);
+  bind_certificate(module);
+  bind_estimate_class(module);
+  bind_marginals(module);
+}
+
+}  // namespace palpate::python

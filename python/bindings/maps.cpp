@@ -1,0 +1,191 @@
+#include <fmt/format.h>
+#include <nanobind/stl/array.h>
+#include <nanobind/stl/filesystem.h>
+#include <nanobind/stl/optional.h>
+#include <nanobind/stl/string.h>
+
+#include "arrays.hpp"
+#include "bindings.hpp"
+#include "call.hpp"
+#include "palpate/error.hpp"
+#include "palpate/estimate.hpp"
+#include "palpate/files.hpp"
+#include "palpate/occupancy_grid.hpp"
+#include "palpate/pose_error.hpp"
+#include "palpate/rotational_symmetry.hpp"
+#include "plots.hpp"
+
+namespace palpate::python {
+
+using namespace nb::literals;
+
+namespace {
+
+std::vector<float> cells_of(const ArrayLike& cells, const char* name, ArrayReader& reader) {
+  const Floats array = reader.floats(cells, name, {"ny", "nx"});
+  return {array.data, array.data + array.size()};
+}
+
+OccupancyGrid make_map(const std::string& label, const ArrayLike& log_odds, double cell_mm,
+                       const ArrayLike& origin_mm, double prior, int symmetry,
+                       std::optional<double> spread_mm, bool mirror,
+                       const std::optional<ArrayLike>& observations,
+                       const std::optional<ArrayLike>& mean_level) {
+  ArrayReader reader;
+  OccupancyGrid map{.label = label,
+                    .cell_mm = cell_mm,
+                    .origin_mm = point_of(origin_mm, "origin_mm"),
+                    .prior = prior,
+                    .symmetry = symmetry,
+                    .spread_mm = spread_mm,
+                    .mirror = mirror};
+  map.log_odds = cells_of(log_odds, "log_odds", reader);
+  map.ny = static_cast<int>(reader.extent("ny"));
+  map.nx = static_cast<int>(reader.extent("nx"));
+  if (observations) {
+    map.observations = cells_of(*observations, "observations", reader);
+  }
+  if (mean_level) {
+    map.mean_level = cells_of(*mean_level, "mean_level", reader);
+  }
+  if (const auto fault = fault_of(map)) {
+    throw Error(Fault::input, *fault);
+  }
+  return map;
+}
+
+/// A view of cells [ny, nx]; None where there are none.
+nb::object cells_view(const OccupancyGrid& map, const std::vector<float>& cells) {
+  if (cells.empty()) {
+    return nb::none();
+  }
+  return view<float, 2>(cells.data(),
+                        {static_cast<std::size_t>(map.ny), static_cast<std::size_t>(map.nx)},
+                        nb::find(map));
+}
+
+void bind_map(nb::module_& module) {
+  nb::class_<OccupancyGrid>(
+      module, "OccupancyGrid",
+      "The map of one object: log odds of occupancy, in nats, on a grid in the object frame. Cell\n"
+      "(j, i) is centred at origin_mm + cell_mm * (i, j). Beyond the grid everything holds the\n"
+      "prior.")
+      .def(
+          "__init__",
+          [](OccupancyGrid* self, const std::string& label, const ArrayLike& log_odds,
+             double cell_mm, const ArrayLike& origin_mm, double prior, int symmetry,
+             std::optional<double> spread_mm, bool mirror,
+             const std::optional<ArrayLike>& observations,
+             const std::optional<ArrayLike>& mean_level) {
+            new (self) OccupancyGrid(make_map(label, log_odds, cell_mm, origin_mm, prior, symmetry,
+                                              spread_mm, mirror, observations, mean_level));
+          },
+          "label"_a, "log_odds"_a, nb::kw_only(), "cell_mm"_a, "origin_mm"_a, "prior"_a = 0.2,
+          "symmetry"_a = 1, "spread_mm"_a = nb::none(), "mirror"_a = false,
+          "observations"_a = nb::none(), "mean_level"_a = nb::none(),
+          "log_odds [ny, nx] in nats, copied; origin_mm [2], the centre of cell (0, 0);\n"
+          "symmetry: n-fold rotational symmetry, 0 = full; spread_mm of the sensor model;\n"
+          "mirror: the object may lie on its other side; observations [ny, nx]: touches that "
+          "sensed\n"
+          "each cell; mean_level [ny, nx]: mean pressure.\n\nRaises Error on a map that is not "
+          "sound.")
+      .def_ro("label", &OccupancyGrid::label)
+      .def_ro("cell_mm", &OccupancyGrid::cell_mm)
+      .def_prop_ro("origin_mm", [](const OccupancyGrid& self) { return to_array(self.origin_mm); })
+      .def_ro("prior", &OccupancyGrid::prior)
+      .def_rw("symmetry", &OccupancyGrid::symmetry)
+      .def_ro("spread_mm", &OccupancyGrid::spread_mm)
+      .def_ro("suggested_symmetry", &OccupancyGrid::suggested_symmetry,
+              "The symmetry that the map itself shows; None where it was not measured.")
+      .def_rw("mirror", &OccupancyGrid::mirror)
+      .def_ro("nx", &OccupancyGrid::nx)
+      .def_ro("ny", &OccupancyGrid::ny)
+      .def_prop_ro(
+          "log_odds",
+          [](nb::handle_t<OccupancyGrid> self) {
+            const auto& map = nb::cast<const OccupancyGrid&>(self);
+            return view<float, 2>(
+                map.log_odds.data(),
+                {static_cast<std::size_t>(map.ny), static_cast<std::size_t>(map.nx)}, self);
+          },
+          "[ny, nx] in nats: a read-only view, not a copy.")
+      .def_prop_ro(
+          "observations",
+          [](const OccupancyGrid& self) { return cells_view(self, self.observations); },
+          nb::sig("def observations(self) -> numpy.typing.NDArray[numpy.float32] | None"),
+          "Touches that sensed each cell, [ny, nx], or None.")
+      .def_prop_ro(
+          "mean_level", [](const OccupancyGrid& self) { return cells_view(self, self.mean_level); },
+          nb::sig("def mean_level(self) -> numpy.typing.NDArray[numpy.float32] | None"),
+          "Mean pressure at each cell, [ny, nx], or None.")
+      .def(
+          "save",
+          [](const OccupancyGrid& self, const std::filesystem::path& path) {
+            run([self, path](Call&) { write_map(path, self); });
+          },
+          "path"_a, "Writes a map file (HDF5). Raises Error where it cannot be written.")
+      .def("plot", plot_method, "ax"_a = nb::none(), plot_signature,
+           "Draws occupied (red) and empty (blue) cells, in mm, with Matplotlib. Returns the axes.")
+      .def("_repr_png_", png_method, png_signature)
+      .def("__repr__", [](const OccupancyGrid& self) {
+        return fmt::format("OccupancyGrid('{}', {} x {} cells of {:g} mm, prior {:.3g})",
+                           self.label, self.nx, self.ny, self.cell_mm, self.prior);
+      });
+  module.def(
+      "read_map",
+      [](const std::filesystem::path& path) {
+        return run([path](Call&) { return read_map(path); });
+      },
+      "path"_a, "Reads a map file (HDF5). Raises Error naming file, field and remedy.");
+}
+
+void bind_hypothesis(nb::module_& module) {
+  nb::class_<Hypothesis>(module, "Hypothesis",
+                         "An object that the unknown may turn out to be. An OccupancyGrid stands "
+                         "for one of weight 1.")
+      .def(
+          "__init__",
+          [](Hypothesis* self, const OccupancyGrid& map, double weight) {
+            new (self) Hypothesis{.map = map, .weight = weight};
+          },
+          "map"_a, "weight"_a = 1.0, "weight: prior weight relative to the other objects.")
+      .def_ro("map", &Hypothesis::map)
+      .def_ro("weight", &Hypothesis::weight)
+      .def_ro("mirrored", &Hypothesis::mirrored, "The map is the mirror image of the learned one.")
+      .def("__repr__", [](const Hypothesis& self) {
+        return fmt::format("Hypothesis('{}', weight={:g})", self.map.label, self.weight);
+      });
+}
+
+void bind_metric(nb::module_& module) {
+  module.def(
+      "pose_error_mm",
+      [](const OccupancyGrid& map, const ArrayLike& estimate, const ArrayLike& truth) {
+        return pose_error_mm(body_of(map), map.symmetry, pose_of(estimate, "estimate"),
+                             pose_of(truth, "truth"));
+      },
+      "map"_a, "estimate"_a, "truth"_a,
+      "Root mean squared displacement, in mm, of the map's occupied cells between two poses\n"
+      "T_object_robot [3] (Eq. 17-20). The map's symmetry makes turned poses equal.\n\n"
+      "Raises Error where no cell is occupied.");
+  module.def(
+      "measure_symmetry",
+      [](const OccupancyGrid& map) -> std::optional<int> {
+        const auto measured = measure_symmetry(map);
+        return measured ? std::optional(measured->suggested) : std::nullopt;
+      },
+      "map"_a,
+      "The n-fold rotational symmetry that the map itself shows, 0 = full; None where fewer than "
+      "16\n"
+      "cells are occupied.");
+}
+
+}  // namespace
+
+void bind_maps(nb::module_& module) {
+  bind_map(module);
+  bind_hypothesis(module);
+  bind_metric(module);
+}
+
+}  // namespace palpate::python

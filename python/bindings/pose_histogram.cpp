@@ -1,0 +1,189 @@
+#include <fmt/format.h>
+#include <nanobind/stl/optional.h>
+#include <nanobind/stl/shared_ptr.h>
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/tuple.h>
+#include <nanobind/stl/vector.h>
+
+#include "bindings.hpp"
+#include "estimate.hpp"
+#include "model.hpp"
+#include "palpate/pose_histogram.hpp"
+#include "touches.hpp"
+
+namespace palpate::python {
+
+using namespace nb::literals;
+
+namespace {
+
+using Histogram = Named<PoseHistogram>;
+
+Histogram make_histogram(const std::shared_ptr<Session>& session, nb::handle maps,
+                         HistogramOptions options) {
+  std::vector<Hypothesis> hypotheses = hypotheses_of(maps);
+  std::vector<std::string> labels = labels_of(hypotheses);
+  return {make_owned<PoseHistogram>({}, session,
+                                    [hypotheses = std::move(hypotheses), options](Device& device) {
+                                      return PoseHistogram(device, hypotheses, options);
+                                    }),
+          std::move(labels)};
+}
+
+void update(const Histogram& self, const TouchesLike& touches, const Progress& progress) {
+  TouchViews views = views_of(touches);
+  self.use(std::move(views.kept), progress,
+           [all = std::move(views.touches)](PoseHistogram& belief, Call& call) {
+             belief.update(all, call.progress());
+           });
+}
+
+/// The bins of one object, [ntheta, ny, nx].
+Result<double, 3> log_likelihood(const Histogram& self, int object) {
+  auto bins =
+      self.use([object](PoseHistogram& belief, Call&) { return belief.log_likelihood(object); });
+  const PoseLattice& lattice = self.constant().lattice();
+  return owned(std::move(bins), {static_cast<std::size_t>(lattice.theta_rad.count),
+                                 static_cast<std::size_t>(lattice.y_mm.count),
+                                 static_cast<std::size_t>(lattice.x_mm.count)});
+}
+
+std::tuple<Result<double, 1>, Result<double, 1>> expected_gain(const Histogram& self,
+                                                               const ArrayLike& T_robot_sensor,
+                                                               const ArrayLike& elements_mm,
+                                                               std::size_t samples,
+                                                               std::uint64_t seed) {
+  const auto gains = self.use([poses = poses_of(T_robot_sensor, "T_robot_sensor"),
+                               elements = points_of(elements_mm, "elements_mm"), samples,
+                               seed](PoseHistogram& belief, Call&) {
+    return belief.expected_gain(poses, elements, {.samples = samples, .seed = seed});
+  });
+  std::vector<double> identity;
+  std::vector<double> pose;
+  for (const TouchGain& gain : gains) {
+    identity.push_back(gain.identity);
+    pose.push_back(gain.pose);
+  }
+  return {owned(std::move(identity), {gains.size()}), owned(std::move(pose), {gains.size()})};
+}
+
+void bind_beliefs(nb::class_<Histogram>& histogram) {
+  histogram
+      .def(
+          "estimate",
+          [](const Histogram& self) {
+            return self.use([](PoseHistogram& belief, Call&) { return belief.estimate(); });
+          },
+          "Identity probabilities (Eq. 14) and mode (Eq. 15-16).")
+      .def(
+          "refine",
+          [](const Histogram& self, const std::optional<Mode>& mode) {
+            return self.use([mode](PoseHistogram& belief, Call&) {
+              return belief.refine(mode ? *mode : belief.estimate().mode);
+            });
+          },
+          "mode"_a = nb::none(),
+          "The pose between the bins near a mode, by default that of estimate(), and its "
+          "covariance.")
+      .def(
+          "marginals",
+          [](const Histogram& self, int object) {
+            return self.use(
+                [object](PoseHistogram& belief, Call&) { return belief.marginals(object); });
+          },
+          "object"_a, "Marginal probabilities of one object's poses, over the lattice.")
+      .def("log_likelihood", &log_likelihood, "object"_a,
+           "Log-likelihood of every bin of one object in nats, [ntheta, ny, nx], without prior\n"
+           "weights.")
+      .def(
+          "entropy",
+          [](const Histogram& self) {
+            return self.use([](PoseHistogram& belief, Call&) { return belief.entropy(); });
+          },
+          "Entropy of the belief over objects and bins, in nats.")
+      .def(
+          "sample",
+          [](const Histogram& self, std::size_t count, std::uint64_t seed) {
+            return self.use(
+                [count, seed](PoseHistogram& belief, Call&) { return belief.sample(count, seed); });
+          },
+          "count"_a, "seed"_a = 0, "Draws objects and poses from the belief.")
+      .def("expected_gain", &expected_gain, "T_robot_sensor"_a, "elements_mm"_a, nb::kw_only(),
+           "samples"_a = PlanOptions{}.samples, "seed"_a = 0,
+           "What one more touch at each candidate pose [n, 3] is expected to tell, in nats: about\n"
+           "the object [n] and about the pose, given the object [n]. elements_mm [e, 2]: living\n"
+           "elements in the sensor frame.");
+}
+
+}  // namespace
+
+void bind_pose_histogram(nb::module_& module) {
+  nb::class_<Histogram> histogram(
+      module, "PoseHistogram",
+      "Histogram filter over object identity and planar pose (Sec. III-C, Eq. 13-16), on the\n"
+      "device. The same input gives the same bits as in C++.");
+  histogram
+      .def(
+          "__init__",
+          [](Histogram* self, const std::shared_ptr<Session>& device, const MapsLike& maps,
+             const PoseLattice& lattice, const ContactModel& contact, bool still_array,
+             std::optional<double> none_weight, const DisplacementSdLike& touch_sd,
+             const DisplacementSdLike& slip_sd, std::optional<std::uint64_t> memory_limit_bytes) {
+            new (self) Histogram(make_histogram(device, maps,
+                                                {.lattice = lattice,
+                                                 .contact = contact,
+                                                 .still_array = still_array,
+                                                 .none_weight = none_weight,
+                                                 .touch_sd = nb::cast<DisplacementSd>(touch_sd),
+                                                 .slip_sd = nb::cast<DisplacementSd>(slip_sd),
+                                                 .memory_limit_bytes = memory_limit_bytes}));
+          },
+          "device"_a, "maps"_a, "lattice"_a = PoseLattice{}, nb::kw_only(),
+          "contact"_a = ContactModel{}, "still_array"_a = false, "none_weight"_a = nb::none(),
+          "touch_sd"_a = DisplacementSd{}, "slip_sd"_a = DisplacementSd{},
+          "memory_limit_bytes"_a = nb::none(),
+          "Starts with a uniform belief. still_array: the array stays in one place; none_weight:\n"
+          "prior weight of \"none of these\"; touch_sd: how far the sensor may have been from "
+          "where\n"
+          "it was said to be; slip_sd: how far the object moves between touches.\n\n"
+          "Raises Error on maps that are not sound or differ in their prior, on options out of\n"
+          "range, and where the device has too little memory.")
+      .def(
+          "update", &update, "touches"_a, "progress"_a = nb::none(),
+          "Multiplies the belief by the likelihood of these touches (Eq. 7, 13).\n\n"
+          "progress(fraction) is called about 20 times a second. After Ctrl-C, or where progress\n"
+          "raises, the belief is left half-way: call reset(). Raises Error on a touch that is not\n"
+          "sound, of which none is taken in.")
+      .def(
+          "reset",
+          [](const Histogram& self) {
+            self.use([](PoseHistogram& belief, Call&) { belief.reset(); });
+          },
+          "Returns to the uniform belief, for the next unknown.")
+      .def(
+          "move_pivot",
+          [](const Histogram& self, const ArrayLike& pivot_mm) {
+            self.use([pivot = point_of(pivot_mm, "pivot_mm")](PoseHistogram& belief, Call&) {
+              belief.move_pivot(pivot);
+            });
+          },
+          "pivot_mm"_a,
+          "Turns theta about another pivot [2], in the robot frame, before any touch.");
+  bind_beliefs(histogram);
+  histogram
+      .def_prop_ro("lattice",
+                   [](const Histogram& self) {
+                     return self.use([](PoseHistogram& belief, Call&) { return belief.lattice(); });
+                   })
+      .def_prop_ro(
+          "device_bytes",
+          [](const Histogram& self) {
+            return self.use([](PoseHistogram& belief, Call&) { return belief.device_bytes(); });
+          },
+          "Device memory held.")
+      .def("__repr__", [](const Histogram& self) {
+        return fmt::format("PoseHistogram({})", text_of(self.labels, self.session()));
+      });
+}
+
+}  // namespace palpate::python

@@ -1,0 +1,287 @@
+#include <map>
+
+#include <nanobind/stl/optional.h>
+#include <nanobind/stl/shared_ptr.h>
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/tuple.h>
+#include <nanobind/stl/vector.h>
+#include <nlohmann/json.hpp>
+
+#include "bindings.hpp"
+#include "estimate.hpp"
+#include "map_files.hpp"
+#include "palpate/files.hpp"
+#include "recognition_flags.hpp"
+#include "record_output.hpp"
+#include "recordings.hpp"
+#include "session.hpp"
+#include "touches.hpp"
+#include "unknowns.hpp"
+
+namespace palpate::python {
+
+using namespace nb::literals;
+
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+nb::object to_python(const Json& json) {
+  switch (json.type()) {
+    case Json::value_t::object: {
+      nb::dict result;
+      for (const auto& [key, value] : json.items()) {
+        result[key.c_str()] = to_python(value);
+      }
+      return result;
+    }
+    case Json::value_t::array: {
+      nb::list result;
+      for (const Json& value : json) {
+        result.append(to_python(value));
+      }
+      return result;
+    }
+    case Json::value_t::string: {
+      const auto& text = json.get_ref<const std::string&>();
+      // The path of a recording need not be UTF-8.
+      return nb::steal(
+          PyUnicode_DecodeFSDefaultAndSize(text.data(), static_cast<Py_ssize_t>(text.size())));
+    }
+    case Json::value_t::boolean:
+      return nb::bool_(json.get<bool>());
+    case Json::value_t::number_integer:
+    case Json::value_t::number_unsigned:
+      return nb::int_(json.get<std::int64_t>());
+    case Json::value_t::number_float:
+      return nb::float_(json.get<double>());
+    default:
+      return nb::none();
+  }
+}
+
+/// What a call takes and what it flags.
+struct Request {
+  cli::RecognitionFlags flags;
+  cli::UnknownFlags unknowns;
+  bool trace = false;
+};
+
+/// Files, or recordings in memory, which `given` holds by their place among all.
+struct Recordings {
+  std::vector<std::string> files;
+  std::map<std::size_t, Recording> given;
+  std::size_t size = 0;
+};
+
+Recordings recordings_of(const nb::list& items) {
+  Recordings recordings;
+  for (const nb::handle item : items) {
+    const ArrayRecording* recording = nullptr;
+    if (nb::try_cast(item, recording) && recording != nullptr) {
+      Recording copy = recording->copied();
+      if (copy.path.empty()) {
+        copy.path = fmt::format("recordings[{}]", recordings.size);
+      }
+      recordings.given.emplace(recordings.size, std::move(copy));
+    } else {
+      recordings.files.push_back(nb::cast<std::string>(nb::str(item)));
+    }
+    ++recordings.size;
+  }
+  return recordings;
+}
+
+std::vector<Recording> read(const Recordings& wanted) {
+  std::vector<Recording> files = cli::read_touch_recordings(wanted.files);
+  std::vector<Recording> all;
+  auto file = files.begin();
+  for (std::size_t i = 0; i < wanted.size; ++i) {
+    const auto given = wanted.given.find(i);
+    all.push_back(given == wanted.given.end() ? std::move(*file++) : given->second);
+    cli::require_touches(all.back(), all.front());
+  }
+  return all;
+}
+
+/// Files and folders of maps become flags; beside maps in memory they are read here.
+void add_maps(const nb::list& items, cli::RecognitionFlags& flags) {
+  for (const nb::handle item : items) {
+    const OccupancyGrid* map = nullptr;
+    const Hypothesis* hypothesis = nullptr;
+    const bool is_map = nb::try_cast(item, map) && map != nullptr;
+    if (is_map || (nb::try_cast(item, hypothesis) && hypothesis != nullptr)) {
+      const Hypothesis given = is_map ? Hypothesis{.map = *map} : *hypothesis;
+      flags.given_maps.push_back({fmt::format("map '{}'", given.map.label), given});
+    } else {
+      flags.maps.push_back(nb::cast<std::string>(nb::str(item)));
+    }
+  }
+  if (flags.given_maps.empty()) {
+    return;
+  }
+  for (const std::string& argument : flags.maps) {
+    for (const std::filesystem::path& file : cli::map_files(argument)) {
+      flags.given_maps.push_back({file.string(), {.map = read_map(file)}});
+    }
+  }
+}
+
+struct Answer {
+  Json records = Json::array();
+  std::vector<std::string> sentences;  ///< what is worth a warning
+};
+
+Answer recognize(const Recordings& wanted, const Request& request, Device& device,
+                 const Scene& scene, const std::function<void(double)>& progress) {
+  Answer answer;
+  cli::RecognitionFlags flags = request.flags;
+  flags.tell = [&](const std::string& sentence) { answer.sentences.push_back(sentence); };
+  std::vector<Recording> recordings = read(wanted);
+  for (Recording& recording : recordings) {
+    cli::replace_array(scene, flags.scene, recording.path, recording.elements(),
+                       recording.elements_mm);
+  }
+  const std::vector<Unknown> unknowns = cli::list_unknowns(request.unknowns, recordings);
+  const Recording& first = recordings.front();
+  RecognitionTask task =
+      cli::task_of(flags, scene, first.pressure_unit, first.path, cli::reach_mm(recordings));
+  if (auto* histogram = std::get_if<HistogramOptions>(&task.filter)) {
+    histogram->still_array = array_is_still(unknowns);
+  }
+  Recogniser recogniser = cli::open_recogniser(flags, scene, device, task);
+  std::string unresolved;
+  for (std::size_t i = 0; i < unknowns.size(); ++i) {
+    const auto show = [&](double fraction) {
+      progress((static_cast<double>(i) + fraction) / static_cast<double>(unknowns.size()));
+    };
+    const RecognitionRecord record = recognise(recogniser, task, unknowns[i], request.trace, show);
+    record.require_steps();
+    if (unresolved.empty()) {
+      unresolved = cli::unresolved_words(task, recogniser.lattice(), unknowns[i].touches);
+    }
+    answer.records.push_back(cli::to_json(record, task, device.name(), request.trace));
+  }
+  if (!unresolved.empty()) {
+    answer.sentences.push_back(unresolved);
+  }
+  return answer;
+}
+
+std::tuple<nb::object, std::vector<std::string>> recognize_python(
+    const nb::list& recordings, const nb::list& maps, Request request,
+    const std::shared_ptr<Session>& session, const Progress& progress) {
+  Recordings wanted = recordings_of(recordings);
+  if (wanted.size == 0) {
+    throw Error(Fault::input, "recordings: none; give a Recording or a file");
+  }
+  add_maps(maps, request.flags);
+  const Answer answer =
+      run({}, progress, [wanted = std::move(wanted), request, session](Call& call) {
+        const Scene scene = cli::scene_of(request.flags);
+        // A device of its own is nobody else's.
+        const auto used =
+            session ? session : std::make_shared<Session>(cli::open_device(request.flags, scene));
+        auto lock = used->lock(call);
+        return recognize(wanted, request, lock.device(), scene, call.progress());
+      });
+  return {to_python(answer.records), answer.sentences};
+}
+
+/// Adds a flag, `get(request)`.
+template <typename Get>
+void add_flag(nb::class_<Request>& request, const char* name, Get get) {
+  using Value = std::remove_cvref_t<decltype(get(std::declval<Request&>()))>;
+  request.def_prop_rw(
+      name, [get](Request& self) -> Value { return get(self); },
+      [get](Request& self, const Value& value) { get(self) = value; });
+}
+
+void add_text_flags(nb::class_<Request>& request) {
+  add_flag(
+      request, "scene", [](Request & of) -> auto& { return of.flags.scene; });
+  add_flag(
+      request, "bins", [](Request & of) -> auto& { return of.flags.bins; });
+  add_flag(
+      request, "x_mm", [](Request & of) -> auto& { return of.flags.x_mm; });
+  add_flag(
+      request, "y_mm", [](Request & of) -> auto& { return of.flags.y_mm; });
+  add_flag(
+      request, "theta_deg", [](Request & of) -> auto& { return of.flags.theta_deg; });
+  add_flag(
+      request, "pivot_mm", [](Request & of) -> auto& { return of.flags.pivot_mm; });
+  add_flag(
+      request, "sensor_model", [](Request & of) -> auto& { return of.flags.sensor_model; });
+  add_flag(
+      request, "none", [](Request & of) -> auto& { return of.flags.uncertainty.none; });
+  add_flag(
+      request, "filter", [](Request & of) -> auto& { return of.flags.filter.filter; });
+  add_flag(
+      request, "resampling", [](Request & of) -> auto& { return of.flags.filter.resampling; });
+  add_flag(
+      request, "device", [](Request & of) -> auto& { return of.flags.device; });
+  add_flag(
+      request, "frames", [](Request & of) -> auto& { return of.unknowns.frames; });
+}
+
+void add_number_flags(nb::class_<Request>& request) {
+  add_flag(
+      request, "prior", [](Request & of) -> auto& { return of.flags.prior; });
+  add_flag(
+      request, "gamma", [](Request & of) -> auto& { return of.flags.gamma; });
+  add_flag(
+      request, "threshold", [](Request & of) -> auto& { return of.flags.threshold; });
+  add_flag(
+      request, "ratio", [](Request & of) -> auto& { return of.flags.ratio; });
+  add_flag(
+      request, "touch_sd_mm",
+      [](Request & of) -> auto& { return of.flags.uncertainty.touch_sd_mm; });
+  add_flag(
+      request, "touch_sd_deg",
+      [](Request & of) -> auto& { return of.flags.uncertainty.touch_sd_deg; });
+  add_flag(
+      request, "slip_sd_mm", [](Request & of) -> auto& { return of.flags.uncertainty.slip_sd_mm; });
+  add_flag(
+      request, "slip_sd_deg",
+      [](Request & of) -> auto& { return of.flags.uncertainty.slip_sd_deg; });
+  add_flag(
+      request, "tolerance", [](Request & of) -> auto& { return of.flags.filter.tolerance; });
+  add_flag(
+      request, "budget_ms", [](Request & of) -> auto& { return of.flags.filter.budget_ms; });
+  add_flag(
+      request, "evidence_nats",
+      [](Request & of) -> auto& { return of.flags.filter.evidence_nats; });
+  add_flag(
+      request, "particles", [](Request & of) -> auto& { return of.flags.filter.particles; });
+  add_flag(
+      request, "augmented", [](Request & of) -> auto& { return of.flags.filter.augmented; });
+  add_flag(
+      request, "seed", [](Request & of) -> auto& { return of.flags.filter.seed; });
+  add_flag(
+      request, "memory_mib", [](Request & of) -> auto& { return of.flags.filter.memory_mib; });
+  add_flag(
+      request, "touches", [](Request & of) -> auto& { return of.unknowns.touches; });
+  add_flag(
+      request, "each_frame", [](Request & of) -> auto& { return of.unknowns.each_frame; });
+  add_flag(
+      request, "trace", [](Request & of) -> auto& { return of.trace; });
+}
+
+}  // namespace
+
+void bind_recognition(nb::module_& module) {
+  nb::class_<Request> request(module, "RecognitionFlags",
+                              "The flags of `palpate recognize`, as texts and numbers.");
+  request.def(nb::init<>());
+  add_text_flags(request);
+  add_number_flags(request);
+  module.def("recognize_as_flagged", &recognize_python, "recordings"_a, "maps"_a, "flags"_a,
+             "device"_a = nb::none(), "progress"_a = nb::none(),
+             nb::sig("def recognize_as_flagged(recordings: list[Recording | str], maps: "
+                     "list[OccupancyGrid | Hypothesis | str], flags: RecognitionFlags, device: "
+                     "Device | None = None, progress: collections.abc.Callable[[float], object] | "
+                     "None = None) -> tuple[list[dict[str, typing.Any]], list[str]]"),
+             "Records as in the JSON of `palpate recognize`, and what is worth a warning.");
+}
+
+}  // namespace palpate::python

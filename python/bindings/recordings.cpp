@@ -1,0 +1,282 @@
+#include <fmt/format.h>
+#include <nanobind/stl/filesystem.h>
+#include <nanobind/stl/optional.h>
+#include <nanobind/stl/string.h>
+
+#include "bindings.hpp"
+#include "call.hpp"
+#include "model.hpp"
+#include "palpate/error.hpp"
+#include "palpate/files.hpp"
+#include "touches.hpp"
+
+namespace palpate::python {
+
+using namespace nb::literals;
+
+namespace {
+
+/// The array that C++ reads, as Python gave it or as a copy; None where there is none.
+template <typename Type, typename Value>
+std::optional<Type> object_of(const std::optional<Array<Value>>& array) {
+  return array ? std::optional(nb::borrow<Type>(array->object)) : std::nullopt;
+}
+FloatArray object_of(const Floats& array) { return nb::borrow<FloatArray>(array.object); }
+
+ArrayTouch make_touch(const ArrayLike& T_robot_sensor, const ArrayLike& elements_mm,
+                      const ArrayLike& pressure, const std::optional<ArrayLike>& valid) {
+  ArrayReader reader;
+  ArrayTouch touch{.T_robot_sensor = reader.floats(T_robot_sensor, "T_robot_sensor", {"3"}),
+                   .elements_mm = reader.floats(elements_mm, "elements_mm", {"e", "2"}),
+                   .pressure = reader.floats(pressure, "pressure", {"e"}),
+                   .valid = {}};
+  if (valid) {
+    touch.valid = reader.flags(*valid, "valid", {"e"});
+  }
+  return touch;
+}
+
+void bind_touch(nb::module_& module) {
+  nb::class_<ArrayTouch>(
+      module, "Touch",
+      "One reading of the tactile array at a known pose. Its arrays are those that were given,\n"
+      "where these are float64 with C layout: a change of them changes the touch.")
+      .def(
+          "__init__",
+          [](ArrayTouch* self, const ArrayLike& T_robot_sensor, const ArrayLike& elements_mm,
+             const ArrayLike& pressure, const std::optional<ArrayLike>& valid) {
+            new (self) ArrayTouch(make_touch(T_robot_sensor, elements_mm, pressure, valid));
+          },
+          "T_robot_sensor"_a, "elements_mm"_a, "pressure"_a, "valid"_a = nb::none(),
+          "T_robot_sensor [3] (x_mm, y_mm, theta_rad); elements_mm [e, 2], element centres in the\n"
+          "sensor frame; pressure [e] in the recording's unit; valid [e], False for a dead "
+          "element.\n"
+          "\nRaises Error on other shapes.")
+      .def_prop_ro("T_robot_sensor",
+                   [](const ArrayTouch& self) { return object_of(self.T_robot_sensor); })
+      .def_prop_ro("elements_mm",
+                   [](const ArrayTouch& self) { return object_of(self.elements_mm); })
+      .def_prop_ro("pressure", [](const ArrayTouch& self) { return object_of(self.pressure); })
+      .def_prop_ro("valid", [](const ArrayTouch& self) { return object_of<ByteArray>(self.valid); })
+      .def("__repr__", [](const ArrayTouch& self) {
+        return fmt::format("Touch({} elements at {})", self.pressure.size(),
+                           text_of(as_poses(self.T_robot_sensor).front()));
+      });
+}
+
+struct RecordingArguments {
+  ArrayLike pressure, poses, elements_mm;
+  std::optional<ArrayLike> valid, time_s, baseline, device_time_s, lost_before;
+};
+
+/// The array by its rank: constant, or with a row for each touch.
+bool changes(nb::handle array, long constant_rank) {
+  return nb::cast<long>(nb::module_::import_("numpy").attr("ndim")(array)) > constant_rank;
+}
+
+ArrayRecording make_recording(const RecordingArguments& given) {
+  ArrayReader reader;
+  ArrayRecording recording;
+  recording.pressure = reader.floats(given.pressure, "pressure", {"n", "e"});
+  recording.T_robot_sensor = reader.floats(given.poses, "poses", {"n", "3"});
+  recording.elements_mm = changes(given.elements_mm, 2)
+                              ? reader.floats(given.elements_mm, "elements_mm", {"n", "e", "2"})
+                              : reader.floats(given.elements_mm, "elements_mm", {"e", "2"});
+  if (given.valid) {
+    recording.valid = changes(*given.valid, 1) ? reader.flags(*given.valid, "valid", {"n", "e"})
+                                               : reader.flags(*given.valid, "valid", {"e"});
+  }
+  const auto floats = [&](const std::optional<ArrayLike>& array, const char* name,
+                          const char* letter) {
+    return array ? std::optional(reader.floats(*array, name, {letter})) : std::nullopt;
+  };
+  recording.time_s = floats(given.time_s, "time_s", "n");
+  recording.baseline = floats(given.baseline, "baseline", "e");
+  recording.device_time_s = floats(given.device_time_s, "device_time_s", "n");
+  if (given.lost_before) {
+    recording.lost_before = reader.counts(*given.lost_before, "lost_before", {"n"});
+  }
+  return recording;
+}
+
+template <typename Value>
+Array<Value> sliced(const Array<Value>& array, const nb::slice& slice) {
+  // A step makes another layout, and so a copy.
+  const nb::object rows =
+      nb::module_::import_("numpy").attr("ascontiguousarray")(array.object[slice]);
+  Array<Value> result{rows, nullptr, array.shape};
+  result.shape[0] = nb::len(rows);
+  Py_buffer buffer{};
+  if (PyObject_GetBuffer(rows.ptr(), &buffer, PyBUF_C_CONTIGUOUS) != 0) {
+    throw nb::python_error();
+  }
+  result.data = static_cast<const Value*>(buffer.buf);
+  PyBuffer_Release(&buffer);
+  return result;
+}
+
+ArrayRecording sliced(const ArrayRecording& all, const nb::slice& slice) {
+  ArrayRecording part = all;
+  part.pressure = sliced(all.pressure, slice);
+  part.T_robot_sensor = sliced(all.T_robot_sensor, slice);
+  const auto cut = [&](auto& array, std::size_t constant_rank) {
+    if (array && array->shape.size() > constant_rank) {
+      array = sliced(*array, slice);
+    }
+  };
+  if (all.elements_mm.shape.size() == 3) {
+    part.elements_mm = sliced(all.elements_mm, slice);
+  }
+  cut(part.valid, 1);
+  cut(part.time_s, 0);
+  cut(part.device_time_s, 0);
+  cut(part.lost_before, 0);
+  return part;
+}
+
+nb::object item(const ArrayRecording& recording, nb::handle index) {
+  if (nb::isinstance<nb::slice>(index)) {
+    return nb::cast(sliced(recording, nb::borrow<nb::slice>(index)));
+  }
+  const auto n = static_cast<std::int64_t>(recording.size());
+  const auto given = nb::cast<std::int64_t>(index);
+  const std::int64_t i = given < 0 ? given + n : given;
+  if (i < 0 || i >= n) {
+    throw nb::index_error(fmt::format("touch {} of {}", given, n).c_str());
+  }
+  return nb::cast(recording.array_touch(static_cast<std::size_t>(i)));
+}
+
+void bind_arrays(nb::class_<ArrayRecording>& recording) {
+  recording
+      .def_prop_ro(
+          "pressure", [](const ArrayRecording& self) { return object_of(self.pressure); },
+          "[n, e] in pressure_unit.")
+      .def_prop_ro(
+          "T_robot_sensor",
+          [](const ArrayRecording& self) { return object_of(self.T_robot_sensor); },
+          "[n, 3] (x_mm, y_mm, theta_rad).")
+      .def_prop_ro(
+          "elements_mm", [](const ArrayRecording& self) { return object_of(self.elements_mm); },
+          "Element centres in the sensor frame, [e, 2], or [n, e, 2] where the array changes.")
+      .def_prop_ro(
+          "valid", [](const ArrayRecording& self) { return object_of<ByteArray>(self.valid); },
+          "[e] or [n, e], 0 for a dead element; None: all are alive.")
+      .def_prop_ro(
+          "time_s", [](const ArrayRecording& self) { return object_of<FloatArray>(self.time_s); },
+          "[n] since the Unix epoch, or None.")
+      .def_prop_ro(
+          "baseline",
+          [](const ArrayRecording& self) { return object_of<FloatArray>(self.baseline); },
+          "[e] untouched readings, or None.")
+      .def_prop_ro(
+          "device_time_s",
+          [](const ArrayRecording& self) { return object_of<FloatArray>(self.device_time_s); },
+          "[n] by the sensor's own clock, or None.")
+      .def_prop_ro(
+          "lost_before",
+          [](const ArrayRecording& self) { return object_of<CountArray>(self.lost_before); },
+          "[n] frames lost since the last row, or None.");
+}
+
+void bind_recording(nb::module_& module) {
+  nb::class_<Truth>(module, "Truth", "The true identity and pose of an unknown object.")
+      .def(
+          "__init__",
+          [](Truth* self, const std::string& object, const ArrayLike& T_object_robot) {
+            new (self) Truth{object, pose_of(T_object_robot, "T_object_robot")};
+          },
+          "object"_a, "T_object_robot"_a, "T_object_robot [3] (x_mm, y_mm, theta_rad).")
+      .def_ro("object", &Truth::object)
+      .def_prop_ro("T_object_robot",
+                   [](const Truth& self) { return to_array(self.T_object_robot); })
+      .def("__repr__", [](const Truth& self) {
+        return fmt::format("Truth('{}', {})", self.object, text_of(self.T_object_robot));
+      });
+
+  nb::class_<ArrayRecording> recording(
+      module, "Recording",
+      "A sequence of readings of one array pressed against one object. Its arrays are those that\n"
+      "were given, where dtype and layout allow; recording[i] is a Touch, and recording[a:b] a\n"
+      "Recording over the same memory.");
+  recording.def(
+      "__init__",
+      [](ArrayRecording* self, const ArrayLike& pressure, const ArrayLike& poses,
+         const ArrayLike& elements_mm, const std::optional<ArrayLike>& valid,
+         const std::optional<ArrayLike>& time_s, const std::string& object,
+         const std::string& pressure_unit, const std::string& rows,
+         const std::optional<Truth>& truth, const std::string& sensor, const std::string& serial,
+         const std::optional<ArrayLike>& baseline, const std::optional<ArrayLike>& device_time_s,
+         const std::optional<ArrayLike>& lost_before) {
+        ArrayRecording made = make_recording(
+            {pressure, poses, elements_mm, valid, time_s, baseline, device_time_s, lost_before});
+        made.object = object;
+        made.pressure_unit = pressure_unit;
+        made.rows = rows;
+        made.truth = truth;
+        made.sensor = sensor;
+        made.serial = serial;
+        new (self) ArrayRecording(std::move(made));
+      },
+      "pressure"_a, "poses"_a, "elements_mm"_a, nb::kw_only(), "valid"_a = nb::none(),
+      "time_s"_a = nb::none(), "object"_a = "", "pressure_unit"_a = "kPa", "rows"_a = "touches",
+      "truth"_a = nb::none(), "sensor"_a = "", "serial"_a = "", "baseline"_a = nb::none(),
+      "device_time_s"_a = nb::none(), "lost_before"_a = nb::none(),
+      "pressure [n, e] in pressure_unit, \"kPa\" or \"raw\"; poses T_robot_sensor [n, 3] (x_mm, "
+      "y_mm,\n"
+      "theta_rad); elements_mm [e, 2] in the sensor frame, or [n, e, 2] where the array changes;\n"
+      "valid [e] or [n, e], False for a dead element; time_s [n] since the Unix epoch; object: "
+      "its\n"
+      "label, \"\" where unknown; rows: \"touches\", or \"frames\" of a raw stream, in which poses "
+      "and\n"
+      "pressures may be NaN (unknown).\n\nRaises Error naming the argument whose shape does not "
+      "fit.");
+  bind_arrays(recording);
+  recording.def_ro("path", &ArrayRecording::path, "The file that it was read from, or \"\".")
+      .def_rw("object", &ArrayRecording::object)
+      .def_ro("pressure_unit", &ArrayRecording::pressure_unit)
+      .def_ro("rows", &ArrayRecording::rows)
+      .def_rw("truth", &ArrayRecording::truth, nb::arg("truth").none())
+      .def_ro("sensor", &ArrayRecording::sensor)
+      .def_ro("serial", &ArrayRecording::serial)
+      .def_ro("closed", &ArrayRecording::closed, "False: cut off, or being recorded.")
+      .def("__len__", &ArrayRecording::size)
+      .def(
+          "__iter__",
+          [](nb::handle_t<ArrayRecording> self) { return nb::steal(PySeqIter_New(self.ptr())); },
+          nb::sig("def __iter__(self) -> collections.abc.Iterator[Touch]"))
+      .def("__getitem__", &item, "index"_a,
+           nb::sig("@overload\ndef __getitem__(self, index: int) -> Touch: ...\n"
+                   "@overload\ndef __getitem__(self, index: slice) -> Recording"))
+      .def(
+          "save",
+          [](const ArrayRecording& self, const std::filesystem::path& path) {
+            run([copy = self.copied(), path](Call&) { write_recording(path, copy); });
+          },
+          "path"_a,
+          "Writes a recording file (HDF5), whole or not at all. Raises Error where the content is "
+          "not sound\nor the file cannot be written.")
+      .def("__repr__", [](const ArrayRecording& self) {
+        return fmt::format("Recording({} {} of {} elements in {}{})", self.size(), self.rows,
+                           self.elements(), self.pressure_unit,
+                           self.object.empty() ? "" : ", of '" + self.object + "'");
+      });
+  module.def(
+      "read_recording",
+      [](const std::filesystem::path& path) {
+        return array_recording(run([path](Call&) { return read_recording(path); }));
+      },
+      "path"_a,
+      "Reads a recording file (HDF5); of an unclosed file, the whole rows. Raises Error naming "
+      "file,\n"
+      "field and remedy.");
+}
+
+}  // namespace
+
+void bind_touches(nb::module_& module) {
+  bind_touch(module);
+  bind_recording(module);
+}
+
+}  // namespace palpate::python

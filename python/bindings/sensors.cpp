@@ -1,0 +1,314 @@
+#include <chrono>
+#include <memory>
+#include <mutex>
+
+#include <fmt/format.h>
+#include <nanobind/stl/filesystem.h>
+#include <nanobind/stl/optional.h>
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/unique_ptr.h>
+#include <nanobind/stl/vector.h>
+
+#include "bindings.hpp"
+#include "call.hpp"
+#include "palpate/baseline.hpp"
+#include "palpate/driver.hpp"
+#include "palpate/pose_track.hpp"
+#include "palpate/sensor.hpp"
+#include "palpate/touch_detector.hpp"
+#include "palpate/virtual_sensor.hpp"
+#include "touches.hpp"
+
+namespace palpate::python {
+
+using namespace nb::literals;
+using namespace std::chrono_literals;
+
+namespace {
+
+/// A sensor that one thread at a time calls, without the GIL.
+class SharedSensor {
+ public:
+  explicit SharedSensor(std::unique_ptr<Sensor> sensor) : sensor_(std::move(sensor)) {}
+
+  template <typename F>
+  auto use(F work) {
+    const nb::gil_scoped_release release;
+    const std::lock_guard lock(mutex_);
+    return work(*sensor_);
+  }
+
+  /// The next frame; none where the stream has ended, or after the timeout. Ctrl-C ends the wait.
+  std::optional<Frame> next(std::optional<double> timeout_s) {
+    using Clock = std::chrono::steady_clock;
+    const auto end = Clock::now() + std::chrono::duration<double>(timeout_s.value_or(0.0));
+    for (;;) {
+      auto [frame, ended] = use([&](Sensor& sensor) {
+        auto wait = std::chrono::milliseconds(50);
+        if (timeout_s) {
+          const auto left = std::chrono::ceil<std::chrono::milliseconds>(end - Clock::now());
+          wait = std::clamp(left, 0ms, wait);
+        }
+        auto taken = sensor.next(wait);
+        const bool over = !taken && sensor.ended();
+        return std::pair(std::move(taken), over);
+      });
+      if (frame || ended || (timeout_s && Clock::now() >= end)) {
+        return std::move(frame);
+      }
+      if (PyErr_CheckSignals() != 0) {
+        throw nb::python_error();
+      }
+    }
+  }
+
+  SensorDescription description() {
+    return use([](const Sensor& sensor) { return sensor.description(); });
+  }
+
+ private:
+  std::unique_ptr<Sensor> sensor_;
+  std::mutex mutex_;
+};
+
+std::unique_ptr<SharedSensor> open_sensor(const std::string& name,
+                                          const std::optional<std::filesystem::path>& poses) {
+  auto sensor = run([name, poses](Call&) {
+    std::unique_ptr<Sensor> opened =
+        is_virtual_sensor(name) ? open_virtual_sensor(name) : open_board(name);
+    return poses ? std::make_unique<PosedSensor>(std::move(opened), poses->string())
+                 : std::move(opened);
+  });
+  return std::make_unique<SharedSensor>(std::move(sensor));
+}
+
+Result<const double, 1> values_view(const std::vector<double>& values, nb::handle owner) {
+  return view<double, 1>(values.data(), {values.size()}, owner);
+}
+
+template <typename Class>
+nb::object pose_or_none(const Class& of) {
+  return of.T_robot_sensor ? nb::object(to_array(*of.T_robot_sensor)) : nb::none();
+}
+const nb::sig pose_signature(
+    "def T_robot_sensor(self) -> numpy.typing.NDArray[numpy.float64] | None");
+
+void bind_frame(nb::module_& module) {
+  nb::class_<Frame>(module, "Frame", "One reading of a whole array, as a sensor delivers it.")
+      .def(
+          "__init__",
+          [](Frame* self, double host_time_s, const ArrayLike& values,
+             const std::optional<ArrayLike>& T_robot_sensor) {
+            const Floats readings = ArrayReader().floats(values, "values", {"e"});
+            std::optional<Pose> pose;
+            if (T_robot_sensor) {
+              pose = pose_of(*T_robot_sensor, "T_robot_sensor");
+            }
+            new (self) Frame{.host_time_s = host_time_s,
+                             .values = {readings.data, readings.data + readings.size()},
+                             .T_robot_sensor = pose};
+          },
+          "host_time_s"_a, "values"_a, "T_robot_sensor"_a = nb::none(),
+          "host_time_s since the Unix epoch; values [e] in the pressure unit, NaN: unknown;\n"
+          "T_robot_sensor [3] (x_mm, y_mm, theta_rad), where it is known.")
+      .def_ro("host_time_s", &Frame::host_time_s, "Time of arrival, since the Unix epoch.")
+      .def_ro("device_time_s", &Frame::device_time_s, "By the sensor's own clock, or None.")
+      .def_ro("lost_before", &Frame::lost_before, "Frames lost since the last frame.")
+      .def_prop_ro(
+          "values",
+          [](nb::handle_t<Frame> self) {
+            return values_view(nb::cast<const Frame&>(self).values, self);
+          },
+          "[e] in the sensor's pressure unit; NaN: unknown.")
+      .def_prop_ro("T_robot_sensor", &pose_or_none<Frame>, pose_signature,
+                   "[3] (x_mm, y_mm, theta_rad), or None.")
+      .def("__repr__", [](const Frame& self) {
+        return fmt::format("Frame({} elements at {:.3f} s{})", self.values.size(), self.host_time_s,
+                           self.T_robot_sensor ? ", posed" : "");
+      });
+}
+
+void bind_sensor(nb::module_& module) {
+  nb::class_<SharedSensor>(
+      module, "Sensor",
+      "A stream of frames from a board, a file or a simulation: a context manager that starts and\n"
+      "stops it, and an iterator over its frames, which ends with the stream.")
+      .def(
+          "start", [](SharedSensor& self) { self.use([](Sensor& sensor) { sensor.start(); }); },
+          "Starts the stream. Raises Error where the hardware refuses.")
+      .def("stop", [](SharedSensor& self) { self.use([](Sensor& sensor) { sensor.stop(); }); })
+      .def(
+          "__enter__",
+          [](nb::handle_t<SharedSensor> self) {
+            nb::cast<SharedSensor&>(self).use([](Sensor& sensor) { sensor.start(); });
+            return self;
+          },
+          nb::sig("def __enter__(self) -> Sensor"))
+      .def(
+          "__exit__",
+          [](SharedSensor& self, nb::handle, nb::handle, nb::handle) {
+            self.use([](Sensor& sensor) { sensor.stop(); });
+          },
+          "type"_a.none(), "value"_a.none(), "traceback"_a.none(),
+          nb::sig("def __exit__(self, type: object, value: object, traceback: object) -> None"))
+      .def(
+          "__iter__", [](nb::handle_t<SharedSensor> self) { return self; },
+          nb::sig("def __iter__(self) -> Sensor"))
+      .def("__next__",
+           [](SharedSensor& self) {
+             auto frame = self.next({});
+             if (!frame) {
+               throw nb::stop_iteration();
+             }
+             return *std::move(frame);
+           })
+      .def("next", &SharedSensor::next, "timeout_s"_a = nb::none(),
+           "The next frame; None where none comes within timeout_s, and after the stream's end.\n"
+           "Ctrl-C ends the wait.")
+      .def_prop_ro("ended",
+                   [](SharedSensor& self) {
+                     return self.use([](const Sensor& sensor) { return sensor.ended(); });
+                   })
+      .def_prop_ro(
+          "gone",
+          [](SharedSensor& self) {
+            return self.use([](const Sensor& sensor) { return sensor.gone(); });
+          },
+          "True while the board is unplugged.")
+      .def_prop_ro("name", [](SharedSensor& self) { return self.description().name; })
+      .def_prop_ro("pressure_unit",
+                   [](SharedSensor& self) { return self.description().pressure_unit; })
+      .def_prop_ro(
+          "rate_hz", [](SharedSensor& self) { return self.description().rate_hz; },
+          "Frames per second, 0 if unknown.")
+      .def_prop_ro("object", [](SharedSensor& self) { return self.description().object; })
+      .def_prop_ro("truth", [](SharedSensor& self) { return self.description().truth; })
+      .def_prop_ro(
+          "elements_mm",
+          [](SharedSensor& self) { return to_array(self.description().elements_mm); },
+          "[e, 2] in the sensor frame.")
+      .def_prop_ro(
+          "valid",
+          [](SharedSensor& self) -> nb::object {
+            auto valid = self.description().valid;
+            const std::size_t e = valid.size();
+            return e == 0 ? nb::none() : nb::object(owned(std::move(valid), {e}));
+          },
+          nb::sig("def valid(self) -> numpy.typing.NDArray[numpy.uint8] | None"),
+          "[e], 0 for a dead element; None: all are alive.")
+      .def_prop_ro(
+          "baseline",
+          [](SharedSensor& self) -> nb::object {
+            auto baseline = self.description().baseline;
+            const std::size_t e = baseline.size();
+            return e == 0 ? nb::none() : nb::object(owned(std::move(baseline), {e}));
+          },
+          nb::sig("def baseline(self) -> numpy.typing.NDArray[numpy.float64] | None"),
+          "[e] untouched readings, or None.")
+      .def_prop_ro(
+          "lost",
+          [](SharedSensor& self) {
+            return self.use([](const Sensor& sensor) { return sensor.counters().lost; });
+          },
+          "Frames lost since start().")
+      .def("__repr__", [](SharedSensor& self) {
+        const SensorDescription sensor = self.description();
+        return fmt::format("Sensor('{}', {} elements in {})", sensor.name,
+                           sensor.elements_mm.size(), sensor.pressure_unit);
+      });
+  module.def(
+      "open_sensor", &open_sensor, "name"_a, "poses"_a = nb::none(),
+      "Opens a sensor: a board such as \"takktile\" or the path of a board's YAML profile,\n"
+      "\"replay:FILE\", or \"simulate:SHAPE\", with options as in --sensor of `palpate live`. "
+      "poses: a\n"
+      "file or FIFO of the robot's poses, lines of JSON. Raises Error naming what is missing.");
+}
+
+void bind_detector(nb::module_& module) {
+  nb::class_<DetectedTouch>(module, "DetectedTouch",
+                            "One touch of a stream: robust means over its longest steady phase.")
+      .def_ro("begin_s", &DetectedTouch::begin_s)
+      .def_ro("end_s", &DetectedTouch::end_s)
+      .def_ro("frames", &DetectedTouch::frames, "Number of frames averaged.")
+      .def_prop_ro(
+          "pressure",
+          [](nb::handle_t<DetectedTouch> self) {
+            return values_view(nb::cast<const DetectedTouch&>(self).pressure, self);
+          },
+          "[e], above the baseline.")
+      .def_prop_ro(
+          "valid",
+          [](nb::handle_t<DetectedTouch> self) {
+            const auto& valid = nb::cast<const DetectedTouch&>(self).valid;
+            return view<std::uint8_t, 1>(valid.data(), {valid.size()}, self);
+          },
+          "[e], 0 for an element that is dead or was hardly known; empty: all are alive.")
+      .def_prop_ro("T_robot_sensor", &pose_or_none<DetectedTouch>, pose_signature,
+                   "[3] (x_mm, y_mm, theta_rad), or None.")
+      .def("__repr__", [](const DetectedTouch& self) {
+        return fmt::format("DetectedTouch({} frames from {:.3f} to {:.3f} s)", self.frames,
+                           self.begin_s, self.end_s);
+      });
+
+  nb::class_<TouchDetector>(module, "TouchDetector",
+                            "Finds touches in a stream of frames by onset, steady phase and "
+                            "release.\nPressures are in the sensor's unit, above the baseline.")
+      .def(
+          "__init__",
+          [](TouchDetector* self, double onset, double release, double min_steady_s, double steady,
+             double smooth_s, double drift_s, const std::optional<ArrayLike>& baseline,
+             const std::optional<ArrayLike>& valid) {
+            ArrayReader reader;
+            std::vector<double> zeros;
+            std::vector<std::uint8_t> alive;
+            if (baseline) {
+              const Floats values = reader.floats(*baseline, "baseline", {"e"});
+              zeros.assign(values.data, values.data + values.size());
+            }
+            if (valid) {
+              const Bytes flags = reader.flags(*valid, "valid", {"e"});
+              alive.assign(flags.data, flags.data + flags.size());
+            }
+            new (self) TouchDetector({.onset = onset,
+                                      .release = release,
+                                      .steady = steady,
+                                      .min_steady_s = min_steady_s,
+                                      .smooth_s = smooth_s,
+                                      .drift_s = drift_s},
+                                     std::move(zeros), std::move(alive));
+          },
+          nb::kw_only(), "onset"_a = TouchDetectorOptions{}.onset,
+          "release"_a = TouchDetectorOptions{}.release,
+          "min_steady_s"_a = TouchDetectorOptions{}.min_steady_s,
+          "steady"_a = TouchDetectorOptions{}.steady,
+          "smooth_s"_a = TouchDetectorOptions{}.smooth_s,
+          "drift_s"_a = TouchDetectorOptions{}.drift_s, "baseline"_a = nb::none(),
+          "valid"_a = nb::none(),
+          "A touch begins where the largest pressure exceeds onset and ends where it falls below\n"
+          "release. baseline [e]: what the untouched array reads; valid [e], False for a dead\n"
+          "element. Raises Error on options out of range.")
+      .def("add", &TouchDetector::add, "frame"_a,
+           "Takes a frame and returns the touch that ends with it, if any.")
+      .def("finish", &TouchDetector::finish,
+           "Ends the stream: returns the touch under way, if it was steady long enough.")
+      .def_prop_ro("touching", &TouchDetector::touching, "True between onset and release.");
+  module.def(
+      "baseline_of",
+      [](const std::vector<Frame>& frames, SharedSensor& sensor, std::optional<double> onset) {
+        return owned(baseline_of(frames, sensor.description(), onset),
+                     {frames.at(0).values.size()});
+      },
+      "frames"_a, "sensor"_a, "onset"_a = nb::none(),
+      "Takes a tare: what the untouched array reads, [e], as medians over the frames. With onset,\n"
+      "raises Error where the array was touched meanwhile.");
+}
+
+}  // namespace
+
+void bind_sensors(nb::module_& module) {
+  bind_frame(module);
+  bind_sensor(module);
+  bind_detector(module);
+}
+
+}  // namespace palpate::python

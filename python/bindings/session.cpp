@@ -1,0 +1,47 @@
+#include "session.hpp"
+
+namespace palpate::python {
+
+using namespace std::chrono_literals;
+
+Session::Lock::Lock(Session& session, const Call& call) : session_(session) {
+  while (!session_.working_.try_lock_for(20ms)) {
+    call.check();
+  }
+}
+
+Session::Lock::~Lock() {
+  session_.sweep();
+  session_.working_.unlock();
+  // What came after the sweep found the device locked.
+  while (!session_.swept() && session_.working_.try_lock()) {
+    session_.sweep();
+    session_.working_.unlock();
+  }
+}
+
+void Session::sweep() {
+  std::vector<std::shared_ptr<void>> unwanted;
+  {
+    const std::lock_guard lock(sweeping_);
+    unwanted.swap(unwanted_);
+  }
+}
+
+bool Session::swept() {
+  const std::lock_guard lock(sweeping_);
+  return unwanted_.empty();
+}
+
+void Session::destroy(std::shared_ptr<void> object) {
+  {
+    const std::lock_guard lock(sweeping_);
+    unwanted_.push_back(std::move(object));
+  }
+  while (!swept() && working_.try_lock()) {
+    sweep();
+    working_.unlock();
+  }
+}
+
+}  // namespace palpate::python

@@ -1,0 +1,101 @@
+#include <nanobind/stl/optional.h>
+#include <nanobind/stl/string.h>
+
+#include "bindings.hpp"
+#include "call.hpp"
+#include "palpate/simulation.hpp"
+#include "touches.hpp"
+
+namespace palpate::python {
+
+using namespace nb::literals;
+
+namespace {
+
+ArrayRecording simulate(const std::string& shape, const std::optional<ArrayLike>& T_object_sensor,
+                        const std::optional<ArrayLike>& T_object_robot,
+                        const std::optional<ArrayLike>& elements_mm, std::uint64_t seed,
+                        const SensorModel& model) {
+  const std::vector<Pose> poses =
+      T_object_sensor ? poses_of(*T_object_sensor, "T_object_sensor") : training_grid();
+  const std::vector<glm::dvec2> elements =
+      elements_mm ? points_of(*elements_mm, "elements_mm") : digitacts_array();
+  const std::optional<Pose> object =
+      T_object_robot ? std::optional(pose_of(*T_object_robot, "T_object_robot")) : std::nullopt;
+  return array_recording(run([=](Call&) {
+    const Shape made = make_shape(shape);
+    Simulator simulator(made, model, elements, seed);
+    std::vector<Pose> T_robot_sensor = poses;
+    for (Pose& pose : T_robot_sensor) {
+      pose = inverse(object.value_or(Pose{})) * pose;
+    }
+    Recording recording = simulator.touch(T_robot_sensor, object.value_or(Pose{}));
+    if (object) {
+      recording.object.clear();
+      recording.truth = {.object = made.label, .T_object_robot = *object};
+    }
+    return recording;
+  }));
+}
+
+}  // namespace
+
+void bind_simulation(nb::module_& module) {
+  nb::class_<SensorModel>(module, "SensorModel",
+                          "The simulated sensor, that of the paper's reference [19].")
+      .def(
+          "__init__",
+          [](SensorModel* self, double psf_mm, double element_mm, double pressure_kpa,
+             double force_spread, double gain_spread, double noise_kpa) {
+            new (self)
+                SensorModel{psf_mm, element_mm, pressure_kpa, force_spread, gain_spread, noise_kpa};
+          },
+          nb::kw_only(), "psf_mm"_a = SensorModel{}.psf_mm,
+          "element_mm"_a = SensorModel{}.element_mm, "pressure_kpa"_a = SensorModel{}.pressure_kpa,
+          "force_spread"_a = SensorModel{}.force_spread,
+          "gain_spread"_a = SensorModel{}.gain_spread, "noise_kpa"_a = SensorModel{}.noise_kpa,
+          "psf_mm: standard deviation of the point spread; element_mm: edge of an element;\n"
+          "pressure_kpa: mean reading of an element wholly on the shape; force_spread and\n"
+          "gain_spread: relative standard deviations of press force and element gain; noise_kpa:\n"
+          "standard deviation of the additive noise.")
+      .def_ro("psf_mm", &SensorModel::psf_mm)
+      .def_ro("element_mm", &SensorModel::element_mm)
+      .def_ro("pressure_kpa", &SensorModel::pressure_kpa)
+      .def_ro("force_spread", &SensorModel::force_spread)
+      .def_ro("gain_spread", &SensorModel::gain_spread)
+      .def_ro("noise_kpa", &SensorModel::noise_kpa);
+  module.def(
+      "simulate", &simulate, "shape"_a, "T_object_sensor"_a = nb::none(), nb::kw_only(),
+      "T_object_robot"_a = nb::none(), "elements_mm"_a = nb::none(), "seed"_a = 1,
+      "sensor"_a = SensorModel{},
+      "Simulates touches of a shape: A to Z, 0 to 9, ring, bar, or a polygon file.\n\n"
+      "T_object_sensor [n, 3]: poses of the array about the object, by default training_grid();\n"
+      "T_object_robot [3]: the pose of an unknown object, which the recording stores as its "
+      "truth;\n"
+      "by default the object is known and lies at the robot's origin. elements_mm [e, 2]: by "
+      "default\n"
+      "digitacts_array(). The same seed gives the same recording, as in C++.");
+  module.def(
+      "training_grid", [] { return to_array(training_grid()); },
+      "The 192 training poses T_object_sensor of Sec. II, [192, 3] (x_mm, y_mm, theta_rad).");
+  module.def(
+      "random_poses", [](int n, std::uint64_t seed) { return to_array(random_poses(n, seed)); },
+      "n"_a, "seed"_a = 1,
+      "n poses T_object_sensor [n, 3], uniform over the training grid's extent and all angles.");
+  module.def(
+      "random_object_pose", [](std::uint64_t seed) { return to_array(random_object_pose(seed)); },
+      "seed"_a = 1, "A T_object_robot [3], uniform over [-10, 10]^2 mm and all angles (Sec. IV).");
+  module.def(
+      "digitacts_array", [] { return to_array(digitacts_array()); },
+      "Element centres of the DigiTacts array, [36, 2] in mm in the sensor frame.");
+  module.def(
+      "grid_array",
+      [](int columns, int rows, double pitch_mm) {
+        return to_array(grid_array(columns, rows, pitch_mm));
+      },
+      "columns"_a, "rows"_a, "pitch_mm"_a,
+      "Element centres of a grid about the sensor's origin, [columns * rows, 2] in mm; x varies\n"
+      "fastest.");
+}
+
+}  // namespace palpate::python

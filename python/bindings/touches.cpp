@@ -1,0 +1,186 @@
+#include "touches.hpp"
+
+#include <fmt/format.h>
+
+#include "palpate/error.hpp"
+
+namespace palpate::python {
+
+namespace {
+
+/// Row i of an array [n, e...], where it has one more axis than `rank`; else all of it.
+template <typename Value>
+Array<Value> row(const Array<Value>& array, std::size_t rank, std::size_t i) {
+  if (array.shape.size() == rank) {
+    return array;
+  }
+  Array<Value> result{array.object[i], nullptr, {array.shape.begin() + 1, array.shape.end()}};
+  result.data = array.data + i * result.size();
+  return result;
+}
+
+template <typename Value>
+std::span<const Value> bytes_row(const std::optional<Array<Value>>& array, std::size_t i,
+                                 std::size_t elements) {
+  if (!array) {
+    return {};
+  }
+  return array->values().subspan(array->shape.size() == 1 ? 0 : i * elements, elements);
+}
+
+/// An array over a vector's memory, which it takes over.
+template <typename Value, std::size_t rank>
+Array<Value> taken(std::vector<Value> values, const std::size_t (&shape)[rank]) {
+  Array<Value> array;
+  array.data = values.data();
+  array.shape.assign(shape, shape + rank);
+  array.object = owned(std::move(values), shape);
+  return array;
+}
+
+/// The same of poses or points, as rows of numbers.
+template <typename Row, std::size_t rank>
+Floats taken_rows(std::vector<Row> rows, const std::size_t (&shape)[rank]) {
+  auto* kept = new std::vector<Row>(std::move(rows));
+  const nb::capsule owner(kept, [](void* p) noexcept { delete static_cast<decltype(kept)>(p); });
+  auto* data = reinterpret_cast<double*>(kept->data());
+  return {Result<double, rank>(data, shape, owner), data, {shape, shape + rank}};
+}
+
+template <typename Value>
+std::vector<Value> vector_of(const std::optional<Array<Value>>& array) {
+  return array ? std::vector<Value>(array->data, array->data + array->size())
+               : std::vector<Value>();
+}
+
+}  // namespace
+
+Touch ArrayTouch::touch() const {
+  return {.T_robot_sensor = as_poses(T_robot_sensor).front(),
+          .elements_mm = as_points(elements_mm),
+          .pressure = pressure.values(),
+          .valid = valid ? valid->values() : std::span<const std::uint8_t>()};
+}
+
+void ArrayTouch::keep(std::vector<nb::object>& kept) const {
+  kept.insert(kept.end(), {elements_mm.object, pressure.object});
+  if (valid) {
+    kept.push_back(valid->object);
+  }
+}
+
+Touch ArrayRecording::touch(std::size_t i) const {
+  const auto places = as_points(elements_mm);
+  return {.T_robot_sensor = as_poses(T_robot_sensor)[i],
+          .elements_mm =
+              elements_mm.shape.size() == 2 ? places : places.subspan(i * elements(), elements()),
+          .pressure = pressure.values().subspan(i * elements(), elements()),
+          .valid = bytes_row(valid, i, elements())};
+}
+
+ArrayTouch ArrayRecording::array_touch(std::size_t i) const {
+  return {.T_robot_sensor = row(T_robot_sensor, 1, i),
+          .elements_mm = row(elements_mm, 2, i),
+          .pressure = row(pressure, 1, i),
+          .valid = valid ? std::optional(row(*valid, 1, i)) : std::nullopt};
+}
+
+std::vector<Touch> ArrayRecording::touches(std::size_t begin, std::size_t end) const {
+  std::vector<Touch> touches;
+  for (std::size_t i = begin; i < end; ++i) {
+    touches.push_back(touch(i));
+  }
+  return touches;
+}
+
+void ArrayRecording::keep(std::vector<nb::object>& kept) const {
+  kept.insert(kept.end(), {T_robot_sensor.object, pressure.object, elements_mm.object});
+  if (valid) {
+    kept.push_back(valid->object);
+  }
+}
+
+Recording ArrayRecording::copied() const {
+  const auto poses = as_poses(T_robot_sensor);
+  const auto places = as_points(elements_mm);
+  return {.path = path,
+          .object = object,
+          .pressure_unit = pressure_unit,
+          .rows = rows,
+          .T_robot_sensor = {poses.begin(), poses.end()},
+          .pressure = vector_of(std::optional(pressure)),
+          .elements_mm = {places.begin(), places.end()},
+          .valid = vector_of(valid),
+          .time_s = vector_of(time_s),
+          .truth = truth,
+          .sensor = sensor,
+          .serial = serial,
+          .baseline = vector_of(baseline),
+          .device_time_s = vector_of(device_time_s),
+          .lost_before = vector_of(lost_before),
+          .closed = closed};
+}
+
+ArrayRecording array_recording(Recording recording) {
+  const std::size_t n = recording.size();
+  const std::size_t e = recording.elements();
+  const auto optional = [](auto values, const auto&... shape) {
+    using Value = typename decltype(values)::value_type;
+    return values.empty() ? std::nullopt
+                          : std::optional<Array<Value>>(taken(std::move(values), shape...));
+  };
+  const bool moving_array = recording.elements_mm.size() != e;
+  const bool moving_valid = recording.valid.size() > e;
+  const std::size_t frames[] = {n};
+  const std::size_t array[] = {e};
+  const std::size_t all[] = {n, e};
+  ArrayRecording result{.path = recording.path,
+                        .object = recording.object,
+                        .pressure_unit = recording.pressure_unit,
+                        .rows = recording.rows,
+                        .T_robot_sensor = taken_rows(std::move(recording.T_robot_sensor), {n, 3}),
+                        .pressure = taken(std::move(recording.pressure), {n, e}),
+                        .elements_mm = moving_array
+                                           ? taken_rows(std::move(recording.elements_mm), {n, e, 2})
+                                           : taken_rows(std::move(recording.elements_mm), {e, 2}),
+                        .valid = moving_valid ? optional(std::move(recording.valid), all)
+                                              : optional(std::move(recording.valid), array),
+                        .time_s = optional(std::move(recording.time_s), frames),
+                        .truth = recording.truth,
+                        .sensor = recording.sensor,
+                        .serial = recording.serial,
+                        .baseline = optional(std::move(recording.baseline), array),
+                        .device_time_s = optional(std::move(recording.device_time_s), frames),
+                        .lost_before = optional(std::move(recording.lost_before), frames),
+                        .closed = recording.closed};
+  return result;
+}
+
+TouchViews views_of(nb::handle touches) {
+  TouchViews views;
+  if (const ArrayTouch* touch = nullptr; nb::try_cast(touches, touch) && touch != nullptr) {
+    views.touches.push_back(touch->touch());
+    touch->keep(views.kept);
+    return views;
+  }
+  if (const ArrayRecording* recording = nullptr;
+      nb::try_cast(touches, recording) && recording != nullptr) {
+    views.touches = recording->touches(0, recording->size());
+    recording->keep(views.kept);
+    return views;
+  }
+  for (const nb::handle item : nb::iter(touches)) {
+    const ArrayTouch* touch = nullptr;
+    if (!nb::try_cast(item, touch) || touch == nullptr) {
+      throw Error(Fault::input,
+                  fmt::format("touches: item {} is a {}; give a Touch, a Recording or an iterable "
+                              "of Touch",
+                              views.touches.size(), nb::inst_name(item).c_str()));
+    }
+    views.touches.push_back(touch->touch());
+    touch->keep(views.kept);
+  }
+  return views;
+}
+
+}  // namespace palpate::python

@@ -1,0 +1,17 @@
+"""The exception, apart from the extension module, which raises it."""
+
+from typing import Literal
+
+
+class Error(RuntimeError):
+    """The one exception of Palpate.
+
+    Its text is one line, in the words of the command line, that names the file, the field, the
+    value and the remedy.
+    """
+
+    #: "input" where a file or value has to change, "system" where the machine failed.
+    fault: Literal["input", "system"] = "input"
+
+
+Error.__module__ = "palpate"

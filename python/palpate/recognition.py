@@ -1,0 +1,153 @@
+"""`palpate recognize` as a function, with the command's rules, defaults and words."""
+
+import os
+import warnings
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any, Literal, cast
+
+from . import _palpate
+from ._palpate import Device, Hypothesis, OccupancyGrid, Recording
+
+_Path = str | os.PathLike[str]
+_Pair = tuple[float, float]
+
+
+class Record(dict[str, Any]):
+    """What was recognised, as a record in the JSON of `palpate recognize`; keys are attributes, too.
+
+    `best` is the most probable label, `identity` {label: probability}, `mode` the most probable bin,
+    `refined` the pose between the bins with `T_robot_object` [x_mm, y_mm, theta_rad], `sd` and
+    `covariance`, `fit` how well the touches fit it: {"z", "verdict"}. docs/files.md lists all keys.
+    """
+
+    def __getattr__(self, name: str) -> Any:
+        try:
+            return self[name]
+        except KeyError:
+            raise AttributeError(f"the record has no '{name}'; it has {', '.join(self)}") from None
+
+    def __repr__(self) -> str:
+        probability = self["identity"][self["best"]]
+        pose = self.get("refined", self)["T_robot_object"]
+        return (
+            f"Record('{self['best']}' with probability {probability:.3f}, T_robot_object "
+            f"x {pose[0]:.2f} mm, y {pose[1]:.2f} mm, theta {pose[2]:.3f} rad)"
+        )
+
+
+def recognize(
+    recordings: Recording | _Path | Iterable[Recording | _Path],
+    maps: OccupancyGrid | Hypothesis | _Path | Iterable[OccupancyGrid | Hypothesis | _Path] = (),
+    *,
+    bins: tuple[int, int, int] | Literal["auto", "fine"] | None = None,
+    x_mm: _Pair | None = None,
+    y_mm: _Pair | None = None,
+    theta_deg: _Pair | None = None,
+    pivot_mm: _Pair | Literal["auto"] | None = None,
+    scene: _Path | None = None,
+    sensor_model: _Path | None = None,
+    prior: float | None = None,
+    gamma: float | None = None,
+    threshold: float | None = None,
+    ratio: float | None = None,
+    touch_sd_mm: float | None = None,
+    touch_sd_deg: float | None = None,
+    slip_sd_mm: float | None = None,
+    slip_sd_deg: float | None = None,
+    none: float | Literal["auto"] | None = None,
+    filter: Literal["auto", "histogram", "bounded", "particles"] | None = None,
+    tolerance: float | None = None,
+    budget_ms: float | None = None,
+    evidence_nats: float | None = None,
+    particles: int | None = None,
+    resampling: Literal["multinomial", "systematic"] | None = None,
+    augmented: bool = False,
+    seed: int | None = None,
+    memory_mib: int | None = None,
+    frames: tuple[int, int] | None = None,
+    touches: int | None = None,
+    each_frame: bool = False,
+    trace: bool = False,
+    device: Device | str | int | None = None,
+    progress: Callable[[float], object] | None = None,
+) -> list[Record]:
+    """Recognises the object of each recording among known maps and finds its pose.
+
+    Options are the flags of `palpate recognize`, with its defaults; `palpate recognize --help`
+    explains them. Records are those of its JSON, number for number.
+
+    recordings: Recording objects or files; maps: OccupancyGrid or Hypothesis objects, files, or
+    folders of maps; none where the scene has them. bins: counts of x, y and theta; x_mm, y_mm,
+    theta_deg: ranges (lower, upper); pivot_mm (x, y) in the robot frame; frames (a, b): the touches a
+    to b - 1; device: an open Device, or a name or index as for Device.open(). progress(fraction) is
+    called about 20 times a second.
+
+    Raises Error in the words of the command. What the command would say on standard error becomes a
+    UserWarning; what looks wrong with the touches is in the records' `warnings`.
+    """
+    flags = _palpate.RecognitionFlags()
+    texts = {
+        "scene": None if scene is None else os.fspath(scene),
+        "sensor_model": None if sensor_model is None else os.fspath(sensor_model),
+        "bins": _joined(bins, "x"),
+        "x_mm": _joined(x_mm, ":"),
+        "y_mm": _joined(y_mm, ":"),
+        "theta_deg": _joined(theta_deg, ":"),
+        "pivot_mm": _joined(pivot_mm, ","),
+        "none": None if none is None else _text(none),
+        "filter": filter,
+        "resampling": resampling,
+        "frames": _joined(frames, ":"),
+        "device": None if device is None or isinstance(device, Device) else str(device),
+    }
+    numbers = {
+        "prior": prior,
+        "gamma": gamma,
+        "threshold": threshold,
+        "ratio": ratio,
+        "touch_sd_mm": touch_sd_mm,
+        "touch_sd_deg": touch_sd_deg,
+        "slip_sd_mm": slip_sd_mm,
+        "slip_sd_deg": slip_sd_deg,
+        "tolerance": tolerance,
+        "budget_ms": budget_ms,
+        "evidence_nats": evidence_nats,
+        "particles": particles,
+        "augmented": augmented,
+        "seed": seed,
+        "memory_mib": memory_mib,
+        "touches": touches,
+        "each_frame": each_frame,
+        "trace": trace,
+    }
+    for name, value in (texts | numbers).items():
+        if value is not None:
+            setattr(flags, name, value)
+    given_maps = [maps] if isinstance(maps, (OccupancyGrid, Hypothesis, str, os.PathLike)) else maps
+    given = [recordings] if isinstance(recordings, (Recording, str, os.PathLike)) else recordings
+    records, sentences = _palpate.recognize_as_flagged(
+        [item if isinstance(item, Recording) else os.fspath(item) for item in given],
+        [
+            item if isinstance(item, (OccupancyGrid, Hypothesis)) else os.fspath(item)
+            for item in given_maps
+        ],
+        flags,
+        device if isinstance(device, Device) else None,
+        progress,
+    )
+    for sentence in sentences:
+        warnings.warn(sentence, stacklevel=2)
+    return [Record(record) for record in records]
+
+
+def _text(value: object) -> str:
+    """The value as a flag of the command would have it; a float keeps all its digits."""
+    return value if isinstance(value, str) else repr(float(cast(float, value)))
+
+
+def _joined(values: Sequence[float] | str | None, separator: str) -> str | None:
+    if values is None or isinstance(values, str):
+        return values
+    return separator.join(
+        str(value) if isinstance(value, int) else repr(float(value)) for value in values
+    )

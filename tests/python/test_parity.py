@@ -1,0 +1,104 @@
+"""The module gives the numbers of the command, bit for bit."""
+
+import pathlib
+from typing import Any
+
+import h5py
+import numpy
+import pytest
+from conftest import Files, command
+
+import palpate
+
+SMALL = ["--bins", "10x10x8"]
+
+
+def without_times(record: dict[str, Any]) -> dict[str, Any]:
+    return {key: value for key, value in record.items() if key != "seconds"}
+
+
+@pytest.mark.parametrize(
+    ("flags", "options"),
+    [
+        (SMALL, {"bins": (10, 10, 8)}),
+        ([*SMALL, "--trace"], {"bins": (10, 10, 8), "trace": True}),
+        ([*SMALL, "--each-frame", "--frames", "2:5"],
+         {"bins": (10, 10, 8), "each_frame": True, "frames": (2, 5)}),
+        (["--x-mm=-7.5:7.5", "--bins", "12x9x7", "--pivot-mm", "0.25,-1", "--theta-deg", "0:180"],
+         {"x_mm": (-7.5, 7.5), "bins": (12, 9, 7), "pivot_mm": (0.25, -1), "theta_deg": (0, 180)}),
+        (["--filter", "bounded", "--tolerance", "1e-3"], {"filter": "bounded", "tolerance": 1e-3}),
+        (["--filter", "particles", "--particles", "500", "--seed", "3"],
+         {"filter": "particles", "particles": 500, "seed": 3}),
+        ([*SMALL, "--touch-sd-mm", "1", "--touch-sd-deg", "3", "--none", "2"],
+         {"bins": (10, 10, 8), "touch_sd_mm": 1, "touch_sd_deg": 3, "none": 2}),
+    ],
+)  # fmt: skip
+def test_recognize_gives_the_records_of_the_command(
+    files: Files, flags: list[str], options: dict[str, Any]
+) -> None:
+    expected = files.recognized(*flags)
+    given = palpate.recognize(files.unknown, files.maps, **options)
+    assert [without_times(record) for record in given] == [without_times(r) for r in expected]
+    assert given[0].best == given[0]["best"] == expected[0]["best"]
+
+
+def test_recordings_and_maps_in_memory_give_the_same_record(files: Files) -> None:
+    expected = files.recognized(*SMALL)[0]
+    maps = [palpate.read_map(path) for path in sorted(files.maps.iterdir())]
+    [given] = palpate.recognize(palpate.read_recording(files.unknown), maps, bins=(10, 10, 8))
+    assert given.mode.pop("map") == "map 'E'"
+    expected["mode"].pop("map")
+    assert without_times(given) == without_times(expected)
+
+
+def test_a_map_has_the_cells_of_the_command(files: Files, device: palpate.Device) -> None:
+    builder = palpate.MapBuilder(device)
+    builder.add(palpate.read_recording(files.train[0]))
+    expected = palpate.read_map(files.maps / "A.map.h5")
+    assert numpy.array_equal(builder.build("A").log_odds, expected.log_odds)
+
+
+def test_a_simulation_has_the_readings_of_the_command(tmp_path: pathlib.Path) -> None:
+    command("simulate", "A", "-o", tmp_path / "a.h5", "--seed", 5)
+    expected = palpate.read_recording(tmp_path / "a.h5")
+    assert numpy.array_equal(palpate.simulate("A", seed=5).pressure, expected.pressure)
+
+
+def test_a_histogram_has_the_bins_of_the_command(
+    files: Files, device: palpate.Device, tmp_path: pathlib.Path
+) -> None:
+    record = files.recognized(*SMALL, "--posterior", tmp_path / "p.h5")[0]
+    maps = [palpate.read_map(path) for path in sorted(files.maps.iterdir())]
+    lattice = palpate.PoseLattice(x_mm=(-10, 10, 10), y_mm=(-10, 10, 10),
+                                  theta_rad=(0, 2 * numpy.pi, 8))  # fmt: skip
+    belief = palpate.PoseHistogram(device, maps, lattice)
+    recording = palpate.read_recording(files.unknown)
+    belief.update(recording[:6])
+    for touch in range(6, 9):  # the command takes the last three one by one
+        belief.update(recording[touch])
+    with h5py.File(tmp_path / "p.h5") as file:
+        expected = file["log_likelihood"][:]
+    assert numpy.array_equal(belief.log_likelihood(0), expected[0])
+    assert numpy.array_equal(belief.log_likelihood(1), expected[1])
+    estimate = belief.estimate()
+    assert list(estimate.identity) == list(record["identity"].values())
+    refined = belief.refine(estimate.mode)
+    assert list(refined.sd) == record["refined"]["sd"]
+    assert refined.covariance.tolist() == record["refined"]["covariance"]
+
+
+def test_errors_are_those_of_the_command(files: Files, tmp_path: pathlib.Path) -> None:
+    missing = tmp_path / "missing.h5"
+    for flags, options in [
+        (["--bins", "0x1x1"], {"bins": (0, 1, 1)}),
+        (["--gamma", "1.5"], {"gamma": 1.5}),
+        (["--filter", "bounded", "--slip-sd-mm", "1"], {"filter": "bounded", "slip_sd_mm": 1}),
+        (["--scene", str(missing)], {"scene": missing}),
+        (["--touches", "10"], {"touches": 10}),
+    ]:
+        with pytest.raises(RuntimeError) as expected:
+            files.recognized(*flags)
+        with pytest.raises(palpate.Error) as given:
+            palpate.recognize(files.unknown, files.maps, **options)  # type: ignore[arg-type]
+        assert str(given.value) == str(expected.value)
+        assert given.value.fault == "input"
