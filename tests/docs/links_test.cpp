@@ -1,5 +1,6 @@
 // Links and pictures of the Markdown pages lead to files and headings that exist. The site's build
-// knows its own pages only; README.md and bench/ are read elsewhere, too.
+// knows its own pages only; README.md and bench/ are read elsewhere, too. The C++ reference has
+// every public header.
 
 #include <cctype>
 #include <regex>
@@ -98,6 +99,24 @@ TEST(Links, LeadToFilesAndHeadings) {
     }
   }
   EXPECT_GT(count, 50) << "the pattern finds the links";
+}
+
+TEST(Reference, HasEveryPublicHeader) {
+  const fs::path root = PALPATE_SOURCE_DIR;
+  std::string reference;
+  for (const auto& page : fs::directory_iterator(root / "docs/api")) {
+    reference += bytes_of(page.path());
+  }
+  for (const char* folder : {"host/include/palpate", "driver/include/palpate"}) {
+    for (const auto& header : fs::directory_iterator(root / folder)) {
+      const std::string name = header.path().filename();
+      if (name == "palpate.hpp" || name == "api.hpp") {
+        continue;  // declare nothing of their own
+      }
+      EXPECT_NE(reference.find("```{doxygenfile} " + name + "\n"), reference.npos)
+          << name << " is on no page of docs/api";
+    }
+  }
 }
 
 }  // namespace
