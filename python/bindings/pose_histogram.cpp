@@ -151,7 +151,7 @@ void bind_pose_histogram(nb::module_& module) {
       .def(
           "update", &update, "touches"_a, "progress"_a = nb::none(),
           "Multiplies the belief by the likelihood of these touches (Eq. 7, 13).\n\n"
-          "progress(fraction) is called about 20 times a second. After Ctrl-C, or where progress\n"
+          "progress(fraction) is called up to 50 times a second. After Ctrl-C, or where progress\n"
           "raises, the belief is left half-way: call reset(). Raises Error on a touch that is not\n"
           "sound, of which none is taken in.")
       .def(

@@ -80,7 +80,7 @@ def recognize(
     folders of maps; none where the scene has them. bins: counts of x, y and theta; x_mm, y_mm,
     theta_deg: ranges (lower, upper); pivot_mm (x, y) in the robot frame; frames (a, b): the touches a
     to b - 1; device: an open Device, or a name or index as for Device.open(). progress(fraction) is
-    called about 20 times a second.
+    called up to 50 times a second.
 
     Raises Error in the words of the command. What the command would say on standard error becomes a
     UserWarning; what looks wrong with the touches is in the records' `warnings`.
