@@ -2,6 +2,7 @@
 // knows its own pages only; README.md and bench/ are read elsewhere, too. The C++ reference has
 // every public header.
 
+#include <algorithm>
 #include <cctype>
 #include <regex>
 #include <set>
