@@ -82,7 +82,7 @@ class PALPATE_API BoundedPosterior {
   /// Returns to the uniform belief, for the next unknown. Keeps the tables.
   void reset();
   /// Turns theta about another pivot, in the robot frame; see PoseHistogram::move_pivot().
-  /// @throws Error, and changes nothing, after an update() or on a pivot out of range
+  /// @throws Error after an update() or on a pivot out of range, and changes nothing
   void move_pivot(const glm::dvec2& pivot_mm);
 
   /// Multiplies the belief by the likelihood of these touches (Eq. 7, 13): adds their penalties to

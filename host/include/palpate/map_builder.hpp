@@ -36,9 +36,9 @@ class PALPATE_API MapBuilder {
 
   /// Adds the evidence of all these touches. Memory grows with the area that they cover, not with
   /// their number.
-  /// @throws Error, and adds none of them, on a touch that is not sound or lies beyond
-  /// `farthest_mm`, or where the area has more cells than the device holds; Error where the device
-  /// fails: the touches may then be added in part, and every call but clear() throws
+  /// @throws Error on a touch that is not sound or lies beyond `farthest_mm`, or where the area has
+  /// more cells than the device holds, and adds none of them; Error where the device fails: the
+  /// touches may then be added in part, and every call but clear() throws
   void add(std::span<const Touch> touches);
 
   /// Returns the map of all touches so far. It covers the known elements and the sensor model's

@@ -62,13 +62,13 @@ class PALPATE_API ParticleFilter {
   void reset();
 
   /// Moves the region to another pivot, in the robot frame, and the initial particles with it. The
-  /// pivot stays over reset(). @throws Error, and changes nothing, after an update() or on a pivot
-  /// out of range
+  /// pivot stays over reset(). @throws Error after an update() or on a pivot out of range, and
+  /// changes nothing
   void move_pivot(const glm::dvec2& pivot_mm);
 
   /// Resamples, moves and weighs the particles by each touch in turn (Eq. 7-8).
   /// @param progress called with the fraction done after each touch
-  /// @throws Error, and changes nothing, on a touch that is not sound; Error if the device fails:
+  /// @throws Error on a touch that is not sound, and changes nothing; Error if the device fails:
   /// the particles may then be updated in part, and every call but reset() throws
   void update(std::span<const Touch> touches, const std::function<void(double)>& progress = {});
   void update(const Touch& touch) { update(std::span(&touch, 1)); }

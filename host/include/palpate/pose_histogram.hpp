@@ -70,7 +70,7 @@ class PALPATE_API PoseHistogram {
 
   /// Turns theta about another pivot, in the robot frame. The belief must be the uniform one, so
   /// that the same bins serve the new poses and no memory changes. The pivot stays over reset().
-  /// @throws Error, and changes nothing, after an update() or on a pivot out of range
+  /// @throws Error after an update() or on a pivot out of range, and changes nothing
   void move_pivot(const glm::dvec2& pivot_mm);
 
   /// Multiplies the belief by the likelihood of these touches (Eq. 7, 13). Calls `progress` with

@@ -2,8 +2,8 @@
 
 #include <cstdlib>
 
+#include "document.hpp"
 #include "palpate/files.hpp"
-#include "program.hpp"
 
 namespace palpate {
 namespace {
@@ -11,7 +11,7 @@ namespace {
 using FilesDocument = ProgramTest;
 
 TEST_F(FilesDocument, ItsProgramWritesARecording) {
-  const std::string document = bytes_of(PALPATE_SOURCE_DIR "/docs/files.md");
+  const std::string document = source_text("docs/files.md");
   const std::string opening = "```python\n";
   const auto begin = document.find(opening);
   ASSERT_NE(begin, document.npos);

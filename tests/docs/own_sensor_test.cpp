@@ -3,63 +3,26 @@
 
 #include <array>
 #include <cmath>
-#include <cstdlib>
 #include <numbers>
 #include <sstream>
 
-#include "program.hpp"
+#include "document.hpp"
 
 namespace palpate {
 namespace {
 
-/// All blocks of shell commands of a document, in their order.
-std::string commands_in(const std::string& document) {
-  const std::string opening = "```sh\n";
-  std::string commands;
-  for (auto begin = document.find(opening); begin != document.npos;) {
-    begin += opening.size();
-    const auto end = document.find("```", begin);
-    commands += document.substr(begin, end - begin);
-    begin = document.find(opening, end);
-  }
-  return commands;
-}
-
-class OwnSensorDocument : public ProgramTest {
- protected:
-  // Runs all commands of a page and returns what they print.
-  std::string run(const std::string& page) const {
-    put_bytes(folder_ / "commands.sh", commands_in(bytes_of(PALPATE_SOURCE_DIR "/docs/" + page)));
-    const std::filesystem::path program = PALPATE_PROGRAM;
-    const std::string line = "cd '" + folder_.path().string() + "' && PATH='" +
-                             program.parent_path().string() +
-                             "':\"$PATH\" bash -euo pipefail commands.sh > said 2> complained";
-    EXPECT_EQ(std::system(line.c_str()), 0) << bytes_of(folder_ / "complained");
-    EXPECT_EQ(bytes_of(folder_ / "complained"), "") << "the logs of the page are in order";
-    return bytes_of(folder_ / "said");
-  }
-
-  // What `palpate evaluate` says about results.
-  nlohmann::json scores(const std::string& results) const {
-    return nlohmann::json::parse(done({"evaluate", results, "--json", "-"}));
-  }
-
-  void expect_pictures(const std::vector<std::string>& names) const {
-    for (const std::string& name : names) {
-      EXPECT_TRUE(std::filesystem::exists(folder_ / name)) << name;
-    }
-  }
-};
+using OwnSensorDocument = DocumentTest;
 
 TEST_F(OwnSensorDocument, ItsCommandsFindTheUnknown) {
-  const std::string said = run("own_sensor.md");
+  const auto [said, complained] = run("own_sensor.md");
+  EXPECT_EQ(complained, "") << "the logs of the page are in order";
   EXPECT_EQ(said.find("Suspicious"), said.npos);
   expect_named(said, {"with a pose       4161 frames", "E.h5: 40 touches in 4161 frames",
                       "A looks different after every turn"});  // as the page quotes
-  expect_pictures(
+  expect_written(
       {"maps.png", "sheets/unknown.png", "calibration/table.png", "calibration/reliability.png"});
 
-  const auto records = nlohmann::json::parse(bytes_of(folder_ / "result.json"));
+  const nlohmann::json records = json("result.json");
   ASSERT_EQ(records.size(), 1u);
   const nlohmann::json& record = records[0];
   EXPECT_EQ(record["best"], "A");
@@ -102,11 +65,12 @@ TEST_F(OwnSensorDocument, ItsCommandsFindTheUnknown) {
 
 // Without any pose: 4 letters and one that was never learned.
 TEST_F(OwnSensorDocument, PressesAtUnknownPosesMakeARecogniser) {
-  const std::string said = run("own_presses.md");
+  const auto [said, complained] = run("own_presses.md");
+  EXPECT_EQ(complained, "") << "the logs of the page are in order";
   expect_named(said, {"B.h5: 12 touches in 1361 frames of B.frames.h5", "48 touches, 4 objects",
                       "maps/B.map.h5: B from 12 presses"});  // as the page quotes
-  expect_pictures({"calibration/table.png", "calibration/reliability.png", "maps.png",
-                   "scores/confusion.png", "scores/reliability.png"});
+  expect_written({"calibration/table.png", "calibration/reliability.png", "maps.png",
+                  "scores/confusion.png", "scores/reliability.png"});
 
   const nlohmann::json found = scores("results.json");
   EXPECT_EQ(found["records"], 50);

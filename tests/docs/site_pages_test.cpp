@@ -1,0 +1,100 @@
+// Every command of the site's pages runs and ends in what the page tells. A page quotes numbers of
+// one machine; on another, float32 rounds elsewhere. So the tests compare what a reader concludes.
+
+#include "document.hpp"
+
+namespace palpate {
+namespace {
+
+using SitePages = DocumentTest;
+
+TEST_F(SitePages, StartRecognisesAnE) {
+  const auto [said, complained] = run("start.md");
+  EXPECT_EQ(complained, "");
+  expect_quoted("start.md", said, {"U, pose of E", "fits"});
+  expect_written({"maps.png", "sheets/unknown.png"});
+  const nlohmann::json record = json("result.json")[0];
+  EXPECT_EQ(record["best"], "E");
+  EXPECT_GT(record["identity"]["E"].get<double>(), 0.99);
+  // The page: the first touch decides nothing, the second one does, and the refined pose is nearer
+  // to the truth than the mode.
+  const nlohmann::json& trace = record["trace"];
+  EXPECT_LT(trace[0]["identity"][trace[0]["best"].get<std::string>()].get<double>(), 0.9);
+  EXPECT_GT(trace[1]["identity"]["E"].get<double>(), 0.99);
+  for (int axis = 0; axis < 3; ++axis) {
+    EXPECT_LT(trace[8]["refined"]["sd"][axis].get<double>(),
+              trace[0]["refined"]["sd"][axis].get<double>());
+  }
+  EXPECT_LT(record["refined_error_mm"].get<double>(), record["error_mm"].get<double>());
+}
+
+TEST_F(SitePages, HowSureTellsTheStranger) {
+  const auto [said, complained] = run("how_sure.md");
+  EXPECT_EQ(complained, "");
+  expect_written({"sheets/stranger.png", "plan.png"});
+  const nlohmann::json compared = json("result.json");
+  EXPECT_EQ(compared[0]["best"], "E");
+  EXPECT_FALSE(compared[0].contains("warnings"));
+  // The T passes as a letter that was learned, with a probability near 1 and a warning.
+  EXPECT_EQ(compared[1]["best"], "U");
+  EXPECT_GT(compared[1]["identity"]["U"].get<double>(), 0.9);
+  EXPECT_EQ(compared[1]["fit"]["verdict"], "fits");
+  expect_quoted("how_sure.md", compared[1]["warnings"].dump(),
+                {"the touches contradict each other"});
+  const nlohmann::json with_none = json("none.json");
+  EXPECT_EQ(with_none[0]["best"], "E");
+  EXPECT_EQ(with_none[1]["best"], "(none)");
+  expect_quoted("how_sure.md", said,
+                {"unknown.h5: E at 9.4", "stranger.h5: do not act: probably never learned"});
+  expect_named(said, {"% of the belief unproven"});  // the budget of 1 ms
+}
+
+TEST_F(SitePages, MisplacedTouchesAreNoticedMeasuredAndAveraged) {
+  const auto [said, complained] = run("misplaced.md");
+  expect_quoted("misplaced.md", said + complained,
+                {"the touches contradict each other by", "unknown.7.h5: unlike U",
+                 "12 unknowns, 96 touches", "the standard errors are large"});
+  const nlohmann::json exact = scores("exact.json");
+  const nlohmann::json averaged = scores("averaged.json");
+  EXPECT_EQ(exact["accuracy"], 1.0);
+  EXPECT_EQ(averaged["accuracy"], 1.0);
+  EXPECT_LT(averaged["refined_error_mm"]["median"].get<double>(),
+            exact["refined_error_mm"]["median"].get<double>());
+}
+
+TEST_F(SitePages, MoreBinsHelpTheModeOnly) {
+  const auto [said, complained] = run("bins.md");
+  EXPECT_EQ(complained, "");
+  expect_quoted("bins.md", said,
+                {"the pose's standard deviation is only the width of a bin",
+                 "give --bins 40x40x53 or more, or --bins auto"});
+  const auto mean = [this](const std::string& results, const char* field) {
+    double sum = 0.0;
+    const nlohmann::json records = json(results);
+    for (const nlohmann::json& record : records) {
+      sum += record[field].get<double>();
+    }
+    return sum / static_cast<double>(records.size());
+  };
+  // The page's table, with room for other rounding.
+  EXPECT_NEAR(mean("auto.json", "error_mm"), 0.40, 0.03);
+  EXPECT_NEAR(mean("fine.json", "error_mm"), 0.24, 0.03);
+  EXPECT_NEAR(mean("coarse.json", "error_mm"), 1.19, 0.06);
+  EXPECT_NEAR(mean("auto.json", "refined_error_mm"), 0.18, 0.02);
+  EXPECT_NEAR(mean("fine.json", "refined_error_mm"), 0.19, 0.02);
+  EXPECT_NEAR(mean("coarse.json", "refined_error_mm"), 0.96, 0.06);
+  expect_named(said, {"2 maps, 62 x 71 x 200 bins each", "2 maps, 124 x 141 x 400 bins each"});
+}
+
+TEST_F(SitePages, AProgramActsOnLinesOfTouches) {
+  const auto [said, complained] = run("programs.md");
+  expect_quoted("programs.md", said,
+                {"touch 0: E touch again\ntouch 1: E grasp it\n"
+                 "touch 2: E grasp it\ntouch 3: E grasp it\n"});
+  expect_written({"ros/A.yaml", "ros/E.yaml"});
+  EXPECT_EQ(json("result.json")[0]["best"], "E");
+  EXPECT_TRUE(json("result.json")[0].contains("none"));
+}
+
+}  // namespace
+}  // namespace palpate
