@@ -26,8 +26,11 @@ constexpr double validation_share = 0.3;              ///< of Eq. 7, and of the 
 constexpr double step_rad = std::numbers::pi / 18.0;  ///< of the poses at which presses are placed
 /// Readings times maps times bins of a cross-validation: some 15 s of one core.
 constexpr double most_additions = 2.5e10;
-/// Steps of bins that suffice for refined poses, over the spread of the maps.
-constexpr double of_spread = 1.2;
+/// What a press costs at a bin besides its readings, in readings.
+constexpr double readings_per_press = 16.0;
+/// How much finer the poses of touches at known poses are compared: half an element's spacing. Even
+/// finer ones change a temperature by a sixth.
+constexpr double most_finer = 2.0;
 
 /// A calibration in the making.
 class SensorLearning {
@@ -194,8 +197,8 @@ class SensorLearning {
     return how;
   }
 
-  /// The poses at which touches are compared with maps. At known poses, bins are about as fine as
-  /// `palpate recognize` takes them: between wider ones a table looks less sure than it is.
+  /// The poses at which touches are compared with maps. Touches at known poses show a small part of
+  /// an object, and between bins an element apart a table looks less sure than it is.
   PoseLattice compared_lattice() const {
     const PoseLattice wide = placing_lattice(maps_, spacing_mm_, step_rad);
     if (!known_poses_) {
@@ -205,7 +208,7 @@ class SensorLearning {
     for (const TrainingMap& map : maps_) {
       labels.insert(map.map.label);
     }
-    double readings = 0.0;
+    double readings = readings_per_press * static_cast<double>(presses_.size());
     for (const Press& press : presses_) {
       for (const Touch& touch : press.touches) {
         const std::vector<Reading> of = result_.sensor.classifier.classify(touch);
@@ -213,8 +216,7 @@ class SensorLearning {
       }
     }
     const double bins = most_additions / (readings * static_cast<double>(labels.size()));
-    const double finer = std::min(std::cbrt(bins / static_cast<double>(wide.bins())),
-                                  spacing_mm_ / (of_spread * result_.sensor.spread_mm));
+    const double finer = std::min(std::cbrt(bins / static_cast<double>(wide.bins())), most_finer);
     return finer > 1.0 ? placing_lattice(maps_, spacing_mm_ / finer, step_rad / finer) : wide;
   }
 
