@@ -33,8 +33,8 @@ struct Options {
   bool unposed = false;
   std::optional<double> threshold;
   std::optional<double> ratio;
-  std::string layer = "mean_level";
-  int levels = 7;
+  std::string layer = "auto";
+  std::optional<int> levels;
   int max_maps = 5;
   std::string frames;
   std::string png;
@@ -74,7 +74,11 @@ void check_outputs(const Options& options, const std::vector<std::filesystem::pa
   }
 }
 
-SensorCalibrationOptions calibration_options(const Options& options, const std::string& unit) {
+/// @param maps given to compare touches with; where one lacks its mean level, the layer auto is
+/// log_odds
+SensorCalibrationOptions calibration_options(const Options& options,
+                                             const std::vector<OccupancyGrid>& maps,
+                                             const std::string& unit) {
   SensorCalibrationOptions result{.pressure_unit = unit};
   if (options.threshold) {
     result.threshold = require_above("--threshold", *options.threshold, 0.0);
@@ -85,15 +89,24 @@ SensorCalibrationOptions calibration_options(const Options& options, const std::
       refuse_flag("--ratio", *options.ratio, "must be below 1");
     }
   }
-  if (options.layer != "mean_level" && options.layer != "log_odds") {
-    refuse_flag("--layer", options.layer, "give mean_level or log_odds");
-  }
-  result.layer = options.layer == "log_odds" ? MapLayer::log_odds : MapLayer::mean_level;
   constexpr auto most = static_cast<int>(most_reading_levels);
-  if (options.levels < 2 || options.levels > most) {
-    refuse_flag("--levels", options.levels, "give 2 to {}", most);
+  if (options.levels && (*options.levels < 2 || *options.levels > most)) {
+    refuse_flag("--levels", *options.levels, "give 2 to {}", most);
   }
-  result.levels = static_cast<std::size_t>(options.levels);
+  if (options.layer != "auto" && options.layer != "mean_level" && options.layer != "log_odds") {
+    refuse_flag("--layer", options.layer, "give auto, mean_level or log_odds");
+  }
+  const bool has_mean_levels =
+      std::ranges::none_of(maps, [](const OccupancyGrid& map) { return map.mean_level.empty(); });
+  std::erase_if(result.tables, [&](const TableKind& kind) {
+    return kind.layer == MapLayer::log_odds ? options.layer == "mean_level"
+                                            : options.layer == "log_odds" || !has_mean_levels;
+  });
+  if (options.levels) {
+    for (TableKind& kind : result.tables) {
+      kind.levels = static_cast<std::size_t>(*options.levels);
+    }
+  }
   if (options.max_maps < 1) {
     refuse_flag("--max-maps", options.max_maps, "give 1 or more");
   }
@@ -173,9 +186,9 @@ void calibrate(const Options& options) {
   check_outputs(options, maps_read);
   const std::vector<Recording> recordings = read_touch_recordings(options.recordings);
   const std::vector<Press> presses = presses_of(options, recordings);
-  const SensorCalibrationOptions how =
-      calibration_options(options, recordings.front().pressure_unit);
   const std::vector<OccupancyGrid> maps = read_maps(options, maps_read);
+  const SensorCalibrationOptions how =
+      calibration_options(options, maps, recordings.front().pressure_unit);
 
   SensorCalibration calibration;
   {
@@ -239,14 +252,15 @@ void add_calibrate(CLI::App& app) {
                       "Threshold as a fraction of the touch's largest pressure [default: learned]");
   command
       ->add_option("--layer", options->layer,
-                   "What of a map readings are compared with: mean_level, the mean pressure, or "
-                   "log_odds, of occupancy")
+                   "What of a map readings are compared with: mean_level, the mean pressure; "
+                   "log_odds, of occupancy; or auto: whichever is right more often about touches "
+                   "that it has not seen, which takes twice as long")
       ->capture_default_str();
   command
       ->add_option("--levels", options->levels,
-                   "Levels of readings that are told apart, No Contact included")
-      ->check(require_whole_number)
-      ->capture_default_str();
+                   "Levels of readings that are told apart, No Contact included [default: 7 over "
+                   "the mean pressure, 2 over log odds]")
+      ->check(require_whole_number);
   command
       ->add_option("--max-maps", options->max_maps,
                    "Most maps of an object that a touch is compared with to learn how sure to be: "

@@ -74,6 +74,11 @@ std::string scores_table(const SensorCalibration& calibration, std::optional<int
   return table.text(columns);
 }
 
+std::string kind_name(const TableKind& kind) {
+  return fmt::format("{} levels over {}", kind.levels,
+                     kind.layer == MapLayer::log_odds ? "log odds" : "the mean pressure");
+}
+
 /// The pressure of which a layer of mean levels has this value.
 double pressure_at(double value, const ReadingLayer& layer) {
   const double share = (value + ReadingLayer::largest_value) / (2.0 * ReadingLayer::largest_value);
@@ -124,6 +129,14 @@ std::string calibration_text(const SensorCalibration& calibration, std::size_t t
   text += values_table(calibration, columns);
   if (calibration.before) {
     text += "\n" + scores_table(calibration, columns);
+  }
+  if (calibration.tried.size() > 1) {
+    text += "tables tried, with their log-loss:";
+    for (const TriedTable& table : calibration.tried) {
+      text += fmt::format("{} {}, {:.3f}", &table == calibration.tried.data() ? "" : ";",
+                          kind_name(table.kind), table.log_loss);
+    }
+    text += "; the lowest is kept\n";
   }
   if (calibration.area_under_curve) {
     text +=

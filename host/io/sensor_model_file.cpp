@@ -26,10 +26,10 @@ std::vector<double> read_numbers(const Entry& entry) {
   return numbers;
 }
 
-std::array<double, PressFeatures::count> read_features(const Entry& entry) {
-  std::array<double, PressFeatures::count> numbers{};
-  const std::vector<Entry> entries =
-      entry.list(PressFeatures::count, "give the area's, the force's and the peak's number");
+template <std::size_t count>
+std::array<double, count> read_array(const Entry& entry, const char* remedy) {
+  std::array<double, count> numbers{};
+  const std::vector<Entry> entries = entry.list(count, remedy);
   for (std::size_t i = 0; i < numbers.size(); ++i) {
     numbers[i] = entries[i].number();
   }
@@ -87,9 +87,18 @@ LearnedTable read_table(const Entry& entry) {
 }
 
 FeatureDistribution read_distribution(const Entry& entry) {
+  constexpr const char* of_each = "give the area's, the force's and the peak's number";
   FeatureDistribution distribution;
-  read_keys(entry, {{"mean", [&](const Entry& e) { distribution.mean = read_features(e); }},
-                    {"sd", [&](const Entry& e) { distribution.sd = read_features(e); }}});
+  read_keys(
+      entry,
+      {{"mean",
+        [&](const Entry& e) { distribution.mean = read_array<PressFeatures::count>(e, of_each); }},
+       {"sd",
+        [&](const Entry& e) { distribution.sd = read_array<PressFeatures::count>(e, of_each); }},
+       {"correlation", [&](const Entry& e) {
+          distribution.correlation = read_array<FeatureDistribution::pairs>(
+              e, "give those of area and force, area and peak, force and peak");
+        }}});
   return distribution;
 }
 
@@ -148,6 +157,8 @@ void emit(YAML::Emitter& out, const FeatureDistribution& distribution) {
   emit(out, {distribution.mean.begin(), distribution.mean.end()});
   out << YAML::Key << "sd" << YAML::Value;
   emit(out, {distribution.sd.begin(), distribution.sd.end()});
+  out << YAML::Key << "correlation" << YAML::Value;
+  emit(out, {distribution.correlation.begin(), distribution.correlation.end()});
   out << YAML::EndMap;
 }
 

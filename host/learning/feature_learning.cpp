@@ -1,6 +1,7 @@
 #include "feature_learning.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "palpate/error.hpp"
@@ -10,26 +11,60 @@ namespace palpate {
 namespace {
 
 using Values = std::array<double, PressFeatures::count>;
+using Matrix = std::array<Values, PressFeatures::count>;
 
 constexpr double least_sd = 0.05;  // of logarithms: 5 %
 constexpr double pseudo_presses = 4.0;
+/// Of the correlations: a distribution stays one when its numbers are rounded in a file.
+constexpr double most_correlated = 0.999;
 
-struct Moments {
+/// The products of the differences from a mean, summed over presses.
+struct Scatter {
   double n = 0.0;
-  Values sum{};
-  Values squares{};
+  Values mean{};
+  Matrix products{};
 
+  /// Welford's update, which keeps its digits where presses are nearly alike.
   void add(const PressFeatures& features) {
     n += 1.0;
-    for (std::size_t i = 0; i < sum.size(); ++i) {
-      sum[i] += features.values[i];
-      squares[i] += features.values[i] * features.values[i];
+    Values before{};
+    for (std::size_t i = 0; i < mean.size(); ++i) {
+      before[i] = features.values[i] - mean[i];
+      mean[i] += before[i] / n;
+    }
+    for (std::size_t i = 0; i < mean.size(); ++i) {
+      for (std::size_t j = 0; j < mean.size(); ++j) {
+        products[i][j] += before[i] * (features.values[j] - mean[j]);
+      }
     }
   }
-  double mean(std::size_t i) const { return sum[i] / n; }
-  /// Sum of squared differences from the mean.
-  double scatter(std::size_t i) const { return std::max(0.0, squares[i] - sum[i] * sum[i] / n); }
 };
+
+/// a A + b B.
+Matrix combined(double a, const Matrix& of_a, double b, const Matrix& of_b) {
+  Matrix sum{};
+  for (std::size_t i = 0; i < sum.size(); ++i) {
+    for (std::size_t j = 0; j < sum.size(); ++j) {
+      sum[i][j] = a * of_a[i][j] + b * of_b[i][j];
+    }
+  }
+  return sum;
+}
+
+FeatureDistribution distribution_of(const Values& mean, const Matrix& covariance) {
+  FeatureDistribution distribution{.mean = mean};
+  for (std::size_t i = 0; i < mean.size(); ++i) {
+    distribution.sd[i] = std::sqrt(covariance[i][i] + least_sd * least_sd);
+  }
+  std::size_t pair = 0;
+  for (std::size_t i = 0; i < mean.size(); ++i) {
+    for (std::size_t j = i + 1; j < mean.size(); ++j) {
+      distribution.correlation[pair++] =
+          most_correlated * covariance[i][j] / (distribution.sd[i] * distribution.sd[j]);
+    }
+  }
+  return distribution;
+}
 
 }  // namespace
 
@@ -37,33 +72,27 @@ LearnedFeatures learn_features(std::span<const LabelledFeatures> presses) {
   if (presses.empty()) {
     throw Error(Fault::input, "press features: no presses; give at least one");
   }
-  Moments all;
-  std::map<std::string, Moments> objects;
+  Scatter all;
+  std::map<std::string, Scatter> objects;
   for (const LabelledFeatures& press : presses) {
     all.add(press.features);
     objects[press.label].add(press.features);
   }
-  LearnedFeatures learned;
-  Values pooled{};
+  const Matrix none{};
+  const Matrix of_all = combined(1.0 / std::max(1.0, all.n - 1.0), all.products, 0.0, none);
   const double freedoms = all.n - static_cast<double>(objects.size());
-  for (std::size_t i = 0; i < pooled.size(); ++i) {
-    const double variance = all.scatter(i) / std::max(1.0, all.n - 1.0);
-    double within = 0.0;
+  Matrix pooled = of_all;
+  if (freedoms > 0.0) {
+    pooled = none;
     for (const auto& [label, own] : objects) {
-      within += own.scatter(i);
+      pooled = combined(1.0, pooled, 1.0 / freedoms, own.products);
     }
-    pooled[i] = freedoms > 0.0 ? within / freedoms : variance;
-    learned.any.mean[i] = all.mean(i);
-    learned.any.sd[i] = std::max(least_sd, std::sqrt(variance));
   }
+  LearnedFeatures learned{.any = distribution_of(all.mean, of_all)};
   for (const auto& [label, own] : objects) {
-    FeatureDistribution& distribution = learned.objects[label];
-    for (std::size_t i = 0; i < pooled.size(); ++i) {
-      const double shrunk =
-          (own.scatter(i) + pseudo_presses * pooled[i]) / (own.n + pseudo_presses);
-      distribution.mean[i] = own.mean(i);
-      distribution.sd[i] = std::max(least_sd, std::sqrt(shrunk * (1.0 + 1.0 / own.n)));
-    }
+    const double share = (1.0 + 1.0 / own.n) / (own.n + pseudo_presses);
+    learned.objects[label] =
+        distribution_of(own.mean, combined(share, own.products, share * pseudo_presses, pooled));
   }
   return learned;
 }

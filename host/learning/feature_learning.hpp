@@ -13,12 +13,12 @@ struct LabelledFeatures {
   PressFeatures features;
 };
 
-/// The distribution of each object's features. An object's standard deviations are drawn towards
-/// those of all presses about the means of their objects, as if four presses more had varied so:
-/// sd^2 = (n sd_object^2 + 4 sd_pooled^2) / (n + 4) * (1 + 1 / n), where the last factor is what
-/// the mean of n presses misses. Where every object has one press, all presses' standard deviation
-/// stands for the pooled one. `any` has the mean and standard deviation of all presses. No
-/// deviation is below 0.05. The weight is left at 0.
+/// The distribution of each object's features. An object's covariance is drawn towards that of all
+/// presses about the means of their objects, as if four presses more had varied so:
+/// C = (n C_object + 4 C_pooled) / (n + 4) * (1 + 1 / n) + 0.05^2 I, where the factor is what the
+/// mean of n presses misses, and the last term keeps presses that were all alike from being
+/// demanded alike. Where every object has one press, all presses' covariance stands for the pooled
+/// one. `any` has the mean and covariance of all presses. The weight is left at 0.
 /// @throws Error on no press
 LearnedFeatures learn_features(std::span<const LabelledFeatures> presses);
 

@@ -24,10 +24,15 @@ Press posed_press(const Recording& recording, std::size_t touch) {
 }
 
 std::vector<std::size_t> folds_of(const std::vector<Press>& presses, std::size_t folds) {
+  std::map<std::string, std::size_t> of_label;
+  for (const Press& press : presses) {
+    ++of_label[press.label];
+  }
   std::map<std::string, std::size_t> counted;
   std::vector<std::size_t> fold;
   for (const Press& press : presses) {
-    fold.push_back(counted[press.label]++ % folds);
+    const std::size_t k = counted[press.label]++;
+    fold.push_back(press.T_object_robot ? k % folds : k * folds / of_label.at(press.label));
   }
   return fold;
 }

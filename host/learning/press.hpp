@@ -29,7 +29,10 @@ Press single_press(const Recording& recording, std::size_t touch);
 /// The same of a touch at a known pose, in a recording whose robot frame is the object's frame.
 Press posed_press(const Recording& recording, std::size_t touch);
 
-/// The fold of every press: press k of an object is in fold k % folds.
+/// The fold of every press. At known poses press k of an object is in fold k % folds: a scan's
+/// neighbours lie side by side, and a map without several in a row would have a hole. At unknown
+/// poses press k of an object's n is in fold floor(k folds / n): presses made one after another are
+/// more alike than those of another day.
 std::vector<std::size_t> folds_of(const std::vector<Press>& presses, std::size_t folds);
 
 /// Pressures of all elements In Contact, ascending.

@@ -4,7 +4,9 @@
 #include <cmath>
 #include <iterator>
 #include <numbers>
+#include <optional>
 #include <set>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -20,9 +22,8 @@ namespace palpate {
 
 namespace {
 
-/// Shares of the time that a calibration takes.
-constexpr double table_share = 0.4;
-constexpr double validation_share = 0.3;              ///< of Eq. 7, and of the table
+/// How long learning a table takes, in cross-validations.
+constexpr double table_cost = 4.0 / 3.0;
 constexpr double step_rad = std::numbers::pi / 18.0;  ///< of the poses at which presses are placed
 /// Readings times maps times bins of a cross-validation: some 15 s of one core.
 constexpr double most_additions = 2.5e10;
@@ -37,9 +38,14 @@ class SensorLearning {
  public:
   SensorLearning(const std::vector<Press>& presses, const SensorCalibrationOptions& options)
       : presses_(presses), options_(options) {
-    if (options.levels < 2 || options.levels > most_reading_levels) {
-      throw Error(Fault::input,
-                  fmt::format("levels = {}: give 2 to {}", options.levels, most_reading_levels));
+    if (options.tables.empty()) {
+      throw Error(Fault::input, "no table to learn; give at least one");
+    }
+    for (const TableKind& kind : options.tables) {
+      if (kind.levels < 2 || kind.levels > most_reading_levels) {
+        throw Error(Fault::input,
+                    fmt::format("levels = {}: give 2 to {}", kind.levels, most_reading_levels));
+      }
     }
     if (options.folds < 2) {
       throw Error(Fault::input, fmt::format("folds = {}: give at least 2", options.folds));
@@ -60,42 +66,69 @@ class SensorLearning {
 
   SensorCalibration run(const std::vector<OccupancyGrid>& given,
                         const std::function<void(double)>& progress) {
-    const auto part = [&](double begin, double share) {
-      return [&progress, begin, share](double fraction) {
-        if (progress) {
-          progress(begin + share * fraction);
-        }
-      };
-    };
     learn_readings();
     make_maps(given);
-    const TableLearning how = table_learning();
-    const PlacedPresses placed = learn_table(presses_, maps_, how, part(0.0, table_share));
-    result_.sensor.table = placed.table;
-    learn_gamma(placed, how);
     std::set<std::string> labels;
     for (const TrainingMap& map : maps_) {
       labels.insert(map.map.label);
     }
     result_.objects = labels.size();
     if (labels.size() < 2) {
+      const TableLearning how = table_learning(options_.tables.back());
+      const PlacedPresses placed = learn_table(presses_, maps_, how, progress);
+      result_.sensor.table = placed.table;
+      learn_gamma(placed, how);
       result_.warnings.emplace_back(
           "touches of one object say nothing about confidence: the temperature stays 1, and "
           "neither features nor familiarity are learned; give touches of two objects or more");
       return std::move(result_);
     }
-    const CrossValidationOptions folds{.folds = options_.folds,
-                                       .maps_per_object = options_.most_maps};
+    const double tables = static_cast<double>(options_.tables.size());
+    const double all = 1.0 + tables * (table_cost + 1.0);
+    double done = 0.0;
+    const auto part = [&](double cost) {
+      const double begin = std::exchange(done, done + cost);
+      return [&progress, begin, cost, all](double fraction) {
+        if (progress) {
+          progress((begin + cost * fraction) / all);
+        }
+      };
+    };
+    std::optional<LearnedFromTable> best;
+    for (const TableKind& kind : options_.tables) {
+      const TableLearning how = table_learning(kind);
+      LearnedFromTable one{.how = how,
+                           .placed = learn_table(presses_, maps_, how, part(table_cost)),
+                           .validation = {},
+                           .after = {}};
+      one.validation = cross_validate(presses_, maps_, how, &one.placed, folds(), part(1.0));
+      one.after = scores_of(tempered_by_halves(one.validation.presses), 1.0);
+      result_.tried.push_back({kind, one.after.log_loss});
+      if (!best || one.after.log_loss < best->after.log_loss) {
+        best = std::move(one);
+      }
+    }
+    result_.sensor.table = best->placed.table;
+    learn_gamma(best->placed, best->how);
     const CrossValidation eq7 =
-        cross_validate(presses_, maps_, how, nullptr, folds, part(table_share, validation_share));
-    const CrossValidation learned =
-        cross_validate(presses_, maps_, how, &placed, folds,
-                       part(table_share + validation_share, 1.0 - table_share - validation_share));
-    learn_confidence(eq7, learned);
+        cross_validate(presses_, maps_, best->how, nullptr, folds(), part(1.0));
+    learn_confidence(eq7, *best);
     return std::move(result_);
   }
 
  private:
+  /// What a table says of presses that it has not seen.
+  struct LearnedFromTable {
+    TableLearning how;
+    PlacedPresses placed;
+    CrossValidation validation;
+    Scores after;  ///< with temperature and features
+  };
+
+  CrossValidationOptions folds() const {
+    return {.folds = options_.folds, .maps_per_object = options_.most_maps};
+  }
+
   void learn_readings() {
     LearnedSensor& sensor = result_.sensor;
     if (options_.threshold && options_.ratio) {
@@ -178,18 +211,18 @@ class SensorLearning {
     }
   }
 
-  TableLearning table_learning() const {
+  TableLearning table_learning(const TableKind& kind) const {
     constexpr double near = 2.0;  // in spacings of the elements
     constexpr double far = 6.0;
     const std::vector<double> pressures = contact_pressures(presses_, result_.sensor.classifier);
     TableLearning how;
-    if (options_.layer == MapLayer::mean_level) {
+    if (kind.layer == MapLayer::mean_level) {
       how.layer = mean_level_layer(result_.sensor.classifier.threshold,
                                    pressures.empty() ? 0.0 : pressures.back());
     }
     how.layer.near_mm = near * spacing_mm_;
     how.layer.far_mm = far * spacing_mm_;
-    how.level_edges = level_edges_of(presses_, result_.sensor.classifier, options_.levels);
+    how.level_edges = level_edges_of(presses_, result_.sensor.classifier, kind.levels);
     how.contact = {.classifier = result_.sensor.classifier,
                    .gamma = ContactModel{}.gamma,
                    .prior = result_.sensor.prior};
@@ -233,10 +266,11 @@ class SensorLearning {
     result_.sensor.gamma = fit_gamma(all, result_.sensor.prior);
   }
 
-  void learn_confidence(const CrossValidation& eq7, const CrossValidation& learned) {
+  void learn_confidence(const CrossValidation& eq7, const LearnedFromTable& table) {
+    const CrossValidation& learned = table.validation;
     result_.before = scores_of(eq7.presses, 1.0);
     result_.table = scores_of(learned.presses, 1.0);
-    result_.after = scores_of(tempered_by_halves(learned.presses), 1.0);
+    result_.after = table.after;
     // What few presses could show by chance is no warning.
     constexpr double worse_nats = 0.05;
     const double without = scores_of(tempered_by_halves(eq7.presses), 1.0).log_loss;

@@ -14,15 +14,29 @@
 
 namespace palpate {
 
+/// A table that a calibration may learn: what of a map it is over, and how many levels of readings
+/// it tells apart, No Contact included, 2 to most_reading_levels.
+struct TableKind {
+  MapLayer layer = MapLayer::log_odds;
+  std::size_t levels = 2;
+};
+
 /// What a calibration starts from.
 struct SensorCalibrationOptions {
   std::string pressure_unit = "kPa";
   std::optional<double> threshold;  ///< learned where there is none
   std::optional<double> ratio;      ///< the same
-  MapLayer layer = MapLayer::mean_level;
-  std::size_t levels = 7;     ///< of readings, No Contact included; at least 2
+  /// Those to try. Pressures tell more, but change from day to day more than contact does. The last
+  /// is taken where there is one object, and nothing to compare by.
+  std::vector<TableKind> tables = {{MapLayer::log_odds, 2}, {MapLayer::mean_level, 7}};
   std::size_t folds = 5;      ///< of the cross-validation
   std::size_t most_maps = 5;  ///< of an object, in the cross-validation
+};
+
+/// A table that was tried: the cross-validation's log-loss with temperature and features, in nats.
+struct TriedTable {
+  TableKind kind;
+  double log_loss = 0.0;
 };
 
 /// A learned sensor and how good it is on presses that it has not seen.
@@ -31,6 +45,7 @@ struct SensorCalibration {
   MapOptions maps;               ///< of the maps that presses were compared with
   bool touch_sd_fitted = false;  ///< sensor.touch_sd is the result of a fit
   std::size_t objects = 0;
+  std::vector<TriedTable> tried;  ///< in the options' order; none with one object
   /// Of the cross-validation; none with one object.
   std::optional<Scores> before;  ///< Eq. 7 with gamma 0.1, temperature 1
   std::optional<Scores> table;   ///< the table, temperature 1
@@ -43,7 +58,8 @@ struct SensorCalibration {
 
 /// Learns from presses the contact threshold and ratio, the noise floor, gamma, the prior, the
 /// table, the temperature, the features' distributions with their weight, and the familiarity; from
-/// presses at known poses the point spread, too. What one object cannot tell (temperature, weight,
+/// presses at known poses the point spread, too. Of several tables it keeps that of the least
+/// log-loss in the cross-validation. What one object cannot tell (temperature, weight,
 /// familiarity) keeps its default, with a warning. The numbers before and after are of
 /// cross-validation; `after` gives each half of the presses the temperature and weight of the other
 /// half. Takes all host threads.
@@ -59,11 +75,12 @@ struct SensorCalibration {
 ///   its features is learned from it, with a warning
 ///   two labels of the same object: the temperature grows until both are as likely; no warning
 /// @param presses all at known poses or all at unknown ones
-/// @param given maps to compare presses with, with their mean level where `options.layer` is that;
+/// @param given maps to compare presses with, with their mean level where a table is over that;
 /// without: maps of other presses
-/// @throws Error where no press has a map of its object that it is no part of, on levels or folds
-/// out of range, on poses some of which are known, where presses tell no threshold or have no
-/// pressure above it, and as observed_map() and learn_table() do; what `progress` throws
+/// @throws Error where no press has a map of its object that it is no part of, on no table to try,
+/// on levels or folds out of range, on poses some of which are known, where presses tell no
+/// threshold or have no pressure above it, and as observed_map() and learn_table() do; what
+/// `progress` throws
 SensorCalibration calibrate_sensor(const std::vector<Press>& presses,
                                    const std::vector<OccupancyGrid>& given,
                                    const SensorCalibrationOptions& options,

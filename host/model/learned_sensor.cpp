@@ -5,9 +5,11 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <optional>
 #include <utility>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include "palpate/error.hpp"
 #include "palpate/sensor_model.hpp"
@@ -24,6 +26,36 @@ template <typename Value>
 bool is_positive(double x) { return x > 0.0 && std::isfinite(x); }
 bool from_0(double x) { return x >= 0.0 && std::isfinite(x); }
 
+using FeatureMatrix = std::array<std::array<double, PressFeatures::count>, PressFeatures::count>;
+
+/// The lower triangle L with L L^T = the matrix of correlations; none where these are not positive
+/// definite.
+std::optional<FeatureMatrix> cholesky_of(
+    const std::array<double, FeatureDistribution::pairs>& correlation) {
+  FeatureMatrix lower{};
+  std::size_t pair = 0;
+  FeatureMatrix all{};
+  for (std::size_t i = 0; i < PressFeatures::count; ++i) {
+    all[i][i] = 1.0;
+    for (std::size_t j = i + 1; j < PressFeatures::count; ++j) {
+      all[j][i] = correlation[pair++];
+    }
+  }
+  for (std::size_t i = 0; i < PressFeatures::count; ++i) {
+    for (std::size_t j = 0; j <= i; ++j) {
+      double rest = all[i][j];
+      for (std::size_t k = 0; k < j; ++k) {
+        rest -= lower[i][k] * lower[j][k];
+      }
+      if (i == j && !(rest > 0.0)) {
+        return {};
+      }
+      lower[i][j] = i == j ? std::sqrt(rest) : rest / lower[j][j];
+    }
+  }
+  return lower;
+}
+
 void require_sound(const FeatureDistribution& distribution) {
   for (std::size_t i = 0; i < PressFeatures::count; ++i) {
     if (!std::isfinite(distribution.mean[i])) {
@@ -32,6 +64,10 @@ void require_sound(const FeatureDistribution& distribution) {
     if (!is_positive(distribution.sd[i])) {
       refuse("features: sd", distribution.sd[i], "give a positive number");
     }
+  }
+  if (!cholesky_of(distribution.correlation)) {
+    refuse("features: correlation", fmt::format("[{}]", fmt::join(distribution.correlation, ", ")),
+           "give correlations that a distribution can have");
   }
 }
 
@@ -65,10 +101,20 @@ PressFeatures press_features(const Touch& touch, const ContactClassifier& classi
 }
 
 double FeatureDistribution::log_density(const PressFeatures& features) const {
+  const std::optional<FeatureMatrix> lower = cholesky_of(correlation);
+  if (!lower) {
+    return std::numeric_limits<double>::quiet_NaN();
+  }
   double nats = 0.0;
+  std::array<double, PressFeatures::count> z{};  // of unit variance, uncorrelated
   for (std::size_t i = 0; i < PressFeatures::count; ++i) {
-    const double z = (features.values[i] - mean[i]) / sd[i];
-    nats -= 0.5 * z * z + std::log(sd[i]) + 0.5 * std::log(2.0 * std::numbers::pi);
+    double rest = (features.values[i] - mean[i]) / sd[i];
+    for (std::size_t k = 0; k < i; ++k) {
+      rest -= (*lower)[i][k] * z[k];
+    }
+    z[i] = rest / (*lower)[i][i];
+    nats -= 0.5 * z[i] * z[i] + std::log(sd[i] * (*lower)[i][i]) +
+            0.5 * std::log(2.0 * std::numbers::pi);
   }
   return nats;
 }

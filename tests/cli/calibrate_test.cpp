@@ -152,7 +152,7 @@ TEST_F(CalibrateCommand, RefusesValuesOutOfRange) {
   }
   expect_refused(with({"--levels", "-3"}), {"--levels", "-3", "whole number"});
   expect_refused(with({"--levels", "2.5"}), {"--levels", "2.5", "whole number"});
-  expect_refused(with({"--layer", "other"}), {"--layer", "other", "mean_level or log_odds"});
+  expect_refused(with({"--layer", "other"}), {"--layer", "other", "auto, mean_level or log_odds"});
   expect_refused(with({"--ratio", "1"}), {"--ratio", "below 1"});
   expect_refused(with({"--threshold", "0"}), {"--threshold", "0"});
   expect_refused(with({"--threshold", "nan"}), {"--threshold", "nan"});

@@ -34,7 +34,8 @@ LearnedSensor full_sensor() {
   table.objects["pen: \"blue\""] = std::vector<double>(table.shared.size(), -1.5);
   sensor.features->weight = 0.25;
   sensor.features->any = {.mean = {1.0, 2.0, 3.0}, .sd = {0.5, 0.25, 2.0}};
-  sensor.features->objects["pen"] = {.mean = {4.0, 5.0, 6.0}, .sd = {1.0, 1.0, 0.75}};
+  sensor.features->objects["pen"] = {
+      .mean = {4.0, 5.0, 6.0}, .sd = {1.0, 1.0, 0.75}, .correlation = {0.5, -0.25, 0.125}};
   return sensor;
 }
 
@@ -85,6 +86,8 @@ TEST_F(SensorModelFile, ComesBackAsItWasWritten) {
   EXPECT_EQ(read.features->any.mean, written.features->any.mean);
   ASSERT_TRUE(read.features->objects.contains("pen"));
   EXPECT_EQ(read.features->objects.at("pen").sd, written.features->objects.at("pen").sd);
+  EXPECT_EQ(read.features->objects.at("pen").correlation,
+            written.features->objects.at("pen").correlation);
   EXPECT_EQ(read.familiarity->offset, written.familiarity->offset);
   EXPECT_EQ(read.familiarity->explained_slope, written.familiarity->explained_slope);
   EXPECT_EQ(read.familiarity->lead_slope, written.familiarity->lead_slope);
@@ -102,6 +105,9 @@ TEST_F(SensorModelFile, MayHoldLittle) {
 }
 
 TEST_F(SensorModelFile, SaysWhatIsWrong) {
+  expect_named(message("[0.5, -0.25, 0.125]", "[0.9, 0.9, -0.9]"),
+               {"features: correlation", "0.9, 0.9, -0.9"});
+  expect_named(message("[0.5, -0.25, 0.125]", "[0.5, 2]"), {"correlation", "area and force"});
   expect_named(message("format: palpate.sensor_model", "version: 1"), {"twice"});
   expect_named(message("palpate.sensor_model", "palpate.map"), {"format", "palpate calibrate"});
   expect_named(message("version: 1", "version: 2"), {"version", "update"});

@@ -189,8 +189,8 @@ TEST_P(DegeneratePresses, WithoutTheLevelsAskedForHaveFewer) {
   letters.make_presses(GetParam());
   const SensorCalibration found = learned(letters.presses, {.threshold = 2.0, .ratio = 0.3});
   EXPECT_EQ(found.sensor.table->level_edges, (std::vector<double>{20.0}));
-  const SensorCalibration two =
-      learned(letters.presses, {.threshold = 15.0, .ratio = 0.3, .levels = 8});
+  const SensorCalibration two = learned(
+      letters.presses, {.threshold = 15.0, .ratio = 0.3, .tables = {{MapLayer::mean_level, 8}}});
   EXPECT_EQ(two.sensor.table->levels(), 2U) << "one pressure In Contact is one level";
 }
 
@@ -206,8 +206,10 @@ TEST(DegenerateCalibration, OfNoPressesOrPosesOfBothKindsIsRefused) {
 
 TEST(DegenerateCalibration, OptionsOutOfRangeAreRefused) {
   const LetterPresses letters = two_letters();
-  EXPECT_NE(refusal(letters.presses, {.levels = 9}).find("levels = 9"), std::string::npos);
-  EXPECT_NE(refusal(letters.presses, {.levels = 1}).find("levels = 1"), std::string::npos);
+  EXPECT_NE(refusal(letters.presses, {.tables = {{MapLayer::log_odds, 9}}}).find("levels = 9"),
+            std::string::npos);
+  EXPECT_NE(refusal(letters.presses, {.tables = {{MapLayer::log_odds, 1}}}).find("levels = 1"),
+            std::string::npos);
   EXPECT_NE(refusal(letters.presses, {.folds = 0}).find("folds = 0"), std::string::npos);
   EXPECT_NE(refusal(letters.presses, {.folds = 1}).find("folds = 1"), std::string::npos);
   EXPECT_NE(refusal(letters.presses, {.threshold = 1000.0}).find("above the contact threshold"),

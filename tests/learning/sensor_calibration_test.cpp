@@ -1,5 +1,6 @@
 #include "sensor_calibration.hpp"
 
+#include <algorithm>
 #include <numbers>
 #include <string>
 #include <vector>
@@ -13,7 +14,7 @@ namespace palpate {
 namespace {
 
 SensorCalibrationOptions options() {
-  return {.threshold = 2.0, .ratio = 0.3, .layer = MapLayer::log_odds, .levels = 2, .folds = 2};
+  return {.threshold = 2.0, .ratio = 0.3, .tables = {{MapLayer::log_odds, 2}}, .folds = 2};
 }
 
 TEST(SensorCalibration, LearnsWhatAFileHolds) {
@@ -128,9 +129,28 @@ TEST(SensorCalibration, ComparesWithTheMapsGiven) {
   EXPECT_NE(found.warnings[0].find("'U'"), std::string::npos);
 }
 
+TEST(SensorCalibration, KeepsTheTableThatIsRightAboutOtherPresses) {
+  const LetterPresses letters = three_letters(5);
+  SensorCalibrationOptions both{.tables = {{MapLayer::mean_level, 4}, {MapLayer::log_odds, 3}}};
+  const SensorCalibration forth = calibrate_sensor(letters.presses, {}, both);
+  std::swap(both.tables[0], both.tables[1]);
+  const SensorCalibration back = calibrate_sensor(letters.presses, {}, both);
+  for (const SensorCalibration* found : {&forth, &back}) {
+    ASSERT_EQ(found->tried.size(), 2U);
+    const TriedTable& best = *std::ranges::min_element(found->tried, {}, &TriedTable::log_loss);
+    EXPECT_EQ(found->sensor.table->layer.of, best.kind.layer);
+    EXPECT_EQ(found->sensor.table->levels(), best.kind.levels);
+    EXPECT_EQ(found->after->log_loss, best.log_loss);
+  }
+  EXPECT_NE(forth.tried[0].log_loss, forth.tried[1].log_loss);
+  EXPECT_EQ(forth.tried[0].log_loss, back.tried[1].log_loss) << "whichever came first";
+  EXPECT_EQ(forth.sensor.temperature, back.sensor.temperature);
+}
+
 TEST(SensorCalibration, TakesTheThresholdAndRatioGiven) {
   const LetterPresses letters = three_letters(5);
-  const auto classifier = [&](const SensorCalibrationOptions& given) {
+  const auto classifier = [&](SensorCalibrationOptions given) {
+    given.tables = {{MapLayer::log_odds, 2}};
     return calibrate_sensor(letters.presses, {}, given).sensor.classifier;
   };
   const ContactClassifier both = classifier({.threshold = 1.0, .ratio = 0.2});

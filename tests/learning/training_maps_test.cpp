@@ -98,9 +98,14 @@ TEST(Presses, AtKnownPosesAreWhereTheRecordingSays) {
   }
 }
 
-TEST(Presses, OfAnObjectTakeTurnsInFolds) {
+TEST(Presses, AtKnownPosesTakeTurnsInFoldsAndOthersShareThemWithTheirNeighbours) {
   SimulatedPresses simulated;
   simulated.add_shapes(3, 11);
+  EXPECT_EQ(folds_of(simulated.presses, 2), (std::vector<std::size_t>{0, 0, 1, 0, 0, 1}));
+  EXPECT_EQ(folds_of(simulated.presses, 5), (std::vector<std::size_t>{0, 1, 3, 0, 1, 3}));
+  for (Press& press : simulated.presses) {
+    press.T_object_robot = Pose{};
+  }
   EXPECT_EQ(folds_of(simulated.presses, 2), (std::vector<std::size_t>{0, 1, 0, 0, 1, 0}));
 }
 

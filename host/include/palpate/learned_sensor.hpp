@@ -46,12 +46,16 @@ struct PressFeatures {
 /// @throws Error on a touch that is not sound, or a threshold of 0
 PALPATE_API PressFeatures press_features(const Touch& touch, const ContactClassifier& classifier);
 
-/// Independent normal distributions of the features of an object's presses.
+/// The normal distribution of the features of an object's presses.
 struct PALPATE_API FeatureDistribution {
+  /// Pairs of features: area and force, area and peak, force and peak.
+  static constexpr std::size_t pairs = 3;
+
   std::array<double, PressFeatures::count> mean{};
   std::array<double, PressFeatures::count> sd{};
+  std::array<double, pairs> correlation{};
 
-  /// Log density in nats.
+  /// Log density in nats; NaN where no distribution has these correlations.
   double log_density(const PressFeatures& features) const;
 };
 
