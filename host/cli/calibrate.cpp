@@ -253,8 +253,8 @@ void add_calibrate(CLI::App& app) {
   command
       ->add_option("--layer", options->layer,
                    "What of a map readings are compared with: mean_level, the mean pressure; "
-                   "log_odds, of occupancy; or auto: whichever is right more often about touches "
-                   "that it has not seen, which takes twice as long")
+                   "log_odds, of occupancy; or auto: mean_level where it is clearly better about "
+                   "touches that it has not seen, else log_odds. auto takes twice as long")
       ->capture_default_str();
   command
       ->add_option("--levels", options->levels,

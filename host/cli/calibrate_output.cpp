@@ -136,7 +136,8 @@ std::string calibration_text(const SensorCalibration& calibration, std::size_t t
       text += fmt::format("{} {}, {:.3f}", &table == calibration.tried.data() ? "" : ";",
                           kind_name(table.kind), table.log_loss);
     }
-    text += "; the lowest is kept\n";
+    text += fmt::format("; kept: {}\n", kind_name({calibration.sensor.table->layer.of,
+                                                   calibration.sensor.table->levels()}));
   }
   if (calibration.area_under_curve) {
     text +=

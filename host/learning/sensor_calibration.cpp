@@ -33,6 +33,22 @@ constexpr double readings_per_press = 16.0;
 /// finer ones change a temperature by a sixth.
 constexpr double most_finer = 2.0;
 
+/// Whether one of two models has less loss on the same presses beyond chance: by more than two
+/// standard errors of the differences.
+bool is_clearly_less(const std::vector<double>& losses, const std::vector<double>& others) {
+  const auto n = static_cast<double>(losses.size());
+  double mean = 0.0;
+  for (std::size_t i = 0; i < losses.size(); ++i) {
+    mean += (others[i] - losses[i]) / n;
+  }
+  double variance = 0.0;
+  for (std::size_t i = 0; i < losses.size(); ++i) {
+    const double apart = others[i] - losses[i] - mean;
+    variance += apart * apart / std::max(1.0, n - 1.0);
+  }
+  return mean > 2.0 * std::sqrt(variance / n);
+}
+
 /// A calibration in the making.
 class SensorLearning {
  public:
@@ -100,11 +116,16 @@ class SensorLearning {
       LearnedFromTable one{.how = how,
                            .placed = learn_table(presses_, maps_, how, part(table_cost)),
                            .validation = {},
-                           .after = {}};
+                           .after = {},
+                           .losses = {}};
       one.validation = cross_validate(presses_, maps_, how, &one.placed, folds(), part(1.0));
-      one.after = scores_of(tempered_by_halves(one.validation.presses), 1.0);
+      const std::vector<ScoredPress> tempered = tempered_by_halves(one.validation.presses);
+      one.after = scores_of(tempered, 1.0);
+      for (const ScoredPress& press : tempered) {
+        one.losses.push_back(-press.log_evidence[press.truth]);
+      }
       result_.tried.push_back({kind, one.after.log_loss});
-      if (!best || one.after.log_loss < best->after.log_loss) {
+      if (!best || is_clearly_less(one.losses, best->losses)) {
         best = std::move(one);
       }
     }
@@ -122,7 +143,8 @@ class SensorLearning {
     TableLearning how;
     PlacedPresses placed;
     CrossValidation validation;
-    Scores after;  ///< with temperature and features
+    Scores after;                ///< with temperature and features
+    std::vector<double> losses;  ///< the same, of each press, in nats
   };
 
   CrossValidationOptions folds() const {

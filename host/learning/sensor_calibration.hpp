@@ -26,8 +26,8 @@ struct SensorCalibrationOptions {
   std::string pressure_unit = "kPa";
   std::optional<double> threshold;  ///< learned where there is none
   std::optional<double> ratio;      ///< the same
-  /// Those to try. Pressures tell more, but change from day to day more than contact does. The last
-  /// is taken where there is one object, and nothing to compare by.
+  /// Those to try, the simplest first. Pressures tell more, but change from day to day more than
+  /// contact does. With one object there is nothing to compare by, and the last is taken.
   std::vector<TableKind> tables = {{MapLayer::log_odds, 2}, {MapLayer::mean_level, 7}};
   std::size_t folds = 5;      ///< of the cross-validation
   std::size_t most_maps = 5;  ///< of an object, in the cross-validation
@@ -58,11 +58,11 @@ struct SensorCalibration {
 
 /// Learns from presses the contact threshold and ratio, the noise floor, gamma, the prior, the
 /// table, the temperature, the features' distributions with their weight, and the familiarity; from
-/// presses at known poses the point spread, too. Of several tables it keeps that of the least
-/// log-loss in the cross-validation. What one object cannot tell (temperature, weight,
-/// familiarity) keeps its default, with a warning. The numbers before and after are of
-/// cross-validation; `after` gives each half of the presses the temperature and weight of the other
-/// half. Takes all host threads.
+/// presses at known poses the point spread, too. Of several tables it keeps the first,
+/// unless a later one has less log-loss in the cross-validation by more than two standard errors.
+/// What one object cannot tell (temperature, weight, familiarity) keeps its default, with a
+/// warning. The numbers before and after are of cross-validation; `after` gives each half of the
+/// presses the temperature and weight of the other half. Takes all host threads.
 ///
 /// Data that say little:
 ///   one press: refused; so are presses none of which has a map of its object without it
