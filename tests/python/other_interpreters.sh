@@ -25,9 +25,8 @@ for python in "$@"; do
   rm -rf "$folder"
   "$python" -m venv "$folder"
   "$folder/bin/python" -m pip install --quiet --disable-pip-version-check '.[test]'
-  # From the installed package: neither the sources nor a build folder is on the path.
-  # Tools of the environment first; the tests' configuration names their folder.
-  env -u PYTHONPATH PATH="$folder/bin:$PATH" PALPATE_VALIDATION=1 PALPATE_DEVICE=llvmpipe MPLBACKEND=agg \
-    PYTHONDONTWRITEBYTECODE=1 PALPATE_COMMAND="$folder/bin/palpate" \
+  # The module is the installed one. The tests send Ctrl-C, which a shell has its background ignore.
+  env --default-signal=INT -u PYTHONPATH PALPATE_VALIDATION=1 PALPATE_DEVICE=llvmpipe \
+    MPLBACKEND=agg PYTHONDONTWRITEBYTECODE=1 PALPATE_COMMAND="$folder/bin/palpate" \
     "$folder/bin/python" -m pytest -q -p no:cacheprovider
 done
