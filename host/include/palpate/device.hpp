@@ -45,8 +45,8 @@ class PALPATE_API Device {
   /// stands for the environment variable PALPATE_DEVICE. Without both, the best device is opened:
   /// discrete before integrated before virtual before CPU. With PALPATE_VALIDATION=1 in the
   /// environment, Vulkan's validation layer is on and each of its messages becomes an Error.
-  /// @throws Error where no device fits, whose message names every device and why it is refused, and
-  /// where Vulkan is missing, whose message names the Debian packages to install
+  /// @throws Error where no device fits, whose message names every device and why it is refused,
+  /// and where Vulkan is missing, whose message names the Debian packages to install
   static Device open(std::string_view name_or_index = {});
 
   /// Computes on a device that the program has made itself (palpate/vulkan_device.hpp). The program
