@@ -10,6 +10,7 @@
 
 #include "commands.hpp"
 #include "hdf5_process.hpp"
+#include "own_font.hpp"
 #include "palpate/error.hpp"
 #include "standard_streams.hpp"
 
@@ -98,6 +99,7 @@ int run(int argc, char** argv) {
 int main(int argc, char** argv) {
   palpate::open_closed_streams();
   palpate::read_hdf5_in_children(true);
+  palpate::use_own_font();
   try {
     return run(argc, argv);
   } catch (const palpate::Error& error) {

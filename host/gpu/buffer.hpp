@@ -42,9 +42,9 @@ class Buffer {
   };
 
   std::unique_ptr<Context, GiveBack> counted_;  ///< what the context counts of it
-  Owned<VkDeviceMemory, vkFreeMemory> memory_;
-  Owned<VkBuffer, vkDestroyBuffer> buffer_;
-  Owned<VkBufferView, vkDestroyBufferView> table_;
+  Owned<VkDeviceMemory> memory_;
+  Owned<VkBuffer> buffer_;
+  Owned<VkBufferView> table_;
   VkDeviceSize bytes_ = 0;
   std::byte* data_ = nullptr;
 };

@@ -8,6 +8,7 @@
 
 #include "palpate/error.hpp"
 #include "selection.hpp"
+#include "vulkan.hpp"
 
 namespace palpate::gpu {
 
@@ -25,8 +26,7 @@ CommandStream::CommandStream(Context& context) : context_(context) {
   const VkDevice device = context.device();
   const VkCommandPoolCreateInfo pool_info{.sType = VK_STRUCTURE_TYPE_COMMAND_POOL_CREATE_INFO,
                                           .queueFamilyIndex = context.queue_family()};
-  pool_ = make_owned<vkDestroyCommandPool>(vkCreateCommandPool, device, pool_info,
-                                           "creating a command pool");
+  pool_ = make_owned(vkCreateCommandPool, device, pool_info, "creating a command pool");
   const VkCommandBufferAllocateInfo buffer_info{
       .sType = VK_STRUCTURE_TYPE_COMMAND_BUFFER_ALLOCATE_INFO,
       .commandPool = pool_.get(),
@@ -34,13 +34,12 @@ CommandStream::CommandStream(Context& context) : context_(context) {
       .commandBufferCount = 1};
   check(vkAllocateCommandBuffers(device, &buffer_info, &commands_), "creating commands");
   const VkFenceCreateInfo fence_info{.sType = VK_STRUCTURE_TYPE_FENCE_CREATE_INFO};
-  fence_ = make_owned<vkDestroyFence>(vkCreateFence, device, fence_info, "creating a fence");
+  fence_ = make_owned(vkCreateFence, device, fence_info, "creating a fence");
   if (context.limits().timestamp_ns > 0.0F) {
     const VkQueryPoolCreateInfo query_info{.sType = VK_STRUCTURE_TYPE_QUERY_POOL_CREATE_INFO,
                                            .queryType = VK_QUERY_TYPE_TIMESTAMP,
                                            .queryCount = 2};
-    timestamps_ = make_owned<vkDestroyQueryPool>(vkCreateQueryPool, device, query_info,
-                                                 "creating timestamps");
+    timestamps_ = make_owned(vkCreateQueryPool, device, query_info, "creating timestamps");
   }
 }
 
@@ -151,8 +150,8 @@ VkDescriptorSet CommandStream::descriptor_set(const Kernel& kernel,
                                           .maxSets = sets_per_pool,
                                           .poolSizeCount = 2,
                                           .pPoolSizes = sizes};
-    descriptor_pools_.push_back(make_owned<vkDestroyDescriptorPool>(
-        vkCreateDescriptorPool, device, info, "creating a descriptor pool"));
+    descriptor_pools_.push_back(
+        make_owned(vkCreateDescriptorPool, device, info, "creating a descriptor pool"));
   }
   const VkDescriptorSetLayout layout = kernel.set_layout();
   const VkDescriptorSetAllocateInfo info{

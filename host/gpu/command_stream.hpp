@@ -92,11 +92,11 @@ class CommandStream {
   VkDescriptorSet descriptor_set(const Kernel& kernel, std::span<const Buffer* const> buffers);
 
   Context& context_;
-  Owned<VkCommandPool, vkDestroyCommandPool> pool_;
+  Owned<VkCommandPool> pool_;
   VkCommandBuffer commands_ = VK_NULL_HANDLE;
-  Owned<VkFence, vkDestroyFence> fence_;
-  Owned<VkQueryPool, vkDestroyQueryPool> timestamps_;  ///< none where the queue has none
-  std::vector<Owned<VkDescriptorPool, vkDestroyDescriptorPool>> descriptor_pools_;
+  Owned<VkFence> fence_;
+  Owned<VkQueryPool> timestamps_;  ///< none where the queue has none
+  std::vector<Owned<VkDescriptorPool>> descriptor_pools_;
   std::size_t sets_used_ = 0;
   Arena upload_{Memory::upload, {}, 0};
   Arena download_{Memory::download, {}, 0};

@@ -12,6 +12,7 @@
 #include "palpate/error.hpp"
 #include "result.hpp"
 #include "selection.hpp"
+#include "vulkan.hpp"
 
 namespace palpate::gpu {
 
@@ -52,6 +53,7 @@ void ValidationLog::throw_if_any() {
 }
 
 Instance::Instance() {
+  load_vulkan();
   const VkApplicationInfo application{.sType = VK_STRUCTURE_TYPE_APPLICATION_INFO,
                                       .pApplicationName = "palpate",
                                       .apiVersion = VK_API_VERSION_1_2};
@@ -137,6 +139,7 @@ Context::Context(const VulkanDevice& handed_in)
   if (handed_in.queue_mutex != nullptr) {
     queue_mutex_ = handed_in.queue_mutex;
   }
+  load_vulkan();
   const std::string fault = fault_of(physical_, queue_family_);
   if (!fault.empty()) {
     throw Error(Fault::input, fmt::format("VulkanDevice: {}", fault));

@@ -41,9 +41,9 @@ class Kernel {
   const char* name() const { return name_; }
 
  private:
-  Owned<VkDescriptorSetLayout, vkDestroyDescriptorSetLayout> set_layout_;
-  Owned<VkPipelineLayout, vkDestroyPipelineLayout> layout_;
-  Owned<VkPipeline, vkDestroyPipeline> pipeline_;
+  Owned<VkDescriptorSetLayout> set_layout_;
+  Owned<VkPipelineLayout> layout_;
+  Owned<VkPipeline> pipeline_;
   std::vector<Access> bindings_;
   std::uint32_t push_bytes_ = 0;
   const char* name_ = "";

@@ -8,27 +8,38 @@
 
 namespace palpate::gpu {
 
-template <auto destroy>
+void destroy(VkDevice device, VkBuffer object);
+void destroy(VkDevice device, VkBufferView object);
+void destroy(VkDevice device, VkCommandPool object);
+void destroy(VkDevice device, VkDescriptorPool object);
+void destroy(VkDevice device, VkDescriptorSetLayout object);
+void destroy(VkDevice device, VkDeviceMemory object);
+void destroy(VkDevice device, VkFence object);
+void destroy(VkDevice device, VkPipeline object);
+void destroy(VkDevice device, VkPipelineLayout object);
+void destroy(VkDevice device, VkQueryPool object);
+void destroy(VkDevice device, VkShaderModule object);
+
 struct Destroy {
   VkDevice device = VK_NULL_HANDLE;
 
   template <class Object>
   void operator()(Object* object) const {
-    destroy(device, object, nullptr);
+    destroy(device, object);
   }
 };
 
 /// Owns an object of a device. Vulkan's handles are pointers on 64-bit machines.
-template <class Handle, auto destroy>
-using Owned = std::unique_ptr<std::remove_pointer_t<Handle>, Destroy<destroy>>;
+template <class Handle>
+using Owned = std::unique_ptr<std::remove_pointer_t<Handle>, Destroy>;
 
-/// Calls vkCreate... or vkAllocate... for an object that `destroy` gives back.
+/// Calls vkCreate... or vkAllocate... for an object.
 /// @throws Error (Fault::system) where that fails; `doing` says what was tried
-template <auto destroy, class Info, class Handle>
-Owned<Handle, destroy> make_owned(VkResult (*make)(VkDevice, const Info*,
-                                                   const VkAllocationCallbacks*, Handle*),
-                                  VkDevice device, const std::type_identity_t<Info>& info,
-                                  std::string_view doing) {
+template <class Info, class Handle>
+Owned<Handle> make_owned(VkResult (*make)(VkDevice, const Info*, const VkAllocationCallbacks*,
+                                          Handle*),
+                         VkDevice device, const std::type_identity_t<Info>& info,
+                         std::string_view doing) {
   Handle handle = VK_NULL_HANDLE;
   check(make(device, &info, nullptr, &handle), doing);
   return {handle, {device}};

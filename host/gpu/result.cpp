@@ -20,7 +20,7 @@ std::string meaning(VkResult result) {
     case VK_ERROR_INITIALIZATION_FAILED:
       return "the driver could not be initialised";
     case VK_ERROR_INCOMPATIBLE_DRIVER:
-      return "no Vulkan driver was found; install one (on Debian mesa-vulkan-drivers)";
+      return "no Vulkan driver was found; on Debian, install libvulkan1 and mesa-vulkan-drivers";
     case VK_ERROR_LAYER_NOT_PRESENT:
       return "the validation layer is missing; install vulkan-validationlayers or unset "
              "PALPATE_VALIDATION";

@@ -2,7 +2,7 @@
 
 #include <string_view>
 
-#include <vulkan/vulkan.h>
+#include <vulkan/vulkan_core.h>
 
 namespace palpate::gpu {
 

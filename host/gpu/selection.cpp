@@ -10,6 +10,7 @@
 
 #include "palpate/error.hpp"
 #include "result.hpp"
+#include "vulkan.hpp"
 
 namespace palpate::gpu {
 
@@ -203,7 +204,7 @@ const Candidate& chosen(std::span<const Candidate> candidates, std::string_view 
   }
   if (candidates.empty()) {
     throw Error(Fault::system,
-                "no Vulkan device: install a driver (on Debian mesa-vulkan-drivers) and check "
+                "no Vulkan device; on Debian, install libvulkan1 and mesa-vulkan-drivers, and see "
                 "`palpate devices`");
   }
   std::string reasons;

@@ -5,7 +5,7 @@
 #include <string_view>
 #include <vector>
 
-#include <vulkan/vulkan.h>
+#include <vulkan/vulkan_core.h>
 
 #include "palpate/device.hpp"
 

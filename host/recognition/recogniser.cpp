@@ -20,7 +20,11 @@ Filter make_filter(Device& device, const RecognitionTask& task) {
     return ParticleFilter(device, task.hypotheses, *particles);
   }
   if (const auto* bounded = std::get_if<BoundedOptions>(&task.filter)) {
-    return BoundedPosterior(device, task.hypotheses, *bounded);
+    BoundedOptions options = *bounded;
+    if (task.cancel_point) {
+      options.cancel_point = task.cancel_point;
+    }
+    return BoundedPosterior(device, task.hypotheses, options);
   }
   return PoseHistogram(device, task.hypotheses, std::get<HistogramOptions>(task.filter));
 }

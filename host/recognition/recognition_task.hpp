@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <string>
 #include <variant>
@@ -57,7 +58,8 @@ struct RecognitionTask {
   double temperature = 1.0;
   std::optional<LearnedFeatures> features = {};
   std::optional<Familiarity> familiarity = {};
-  FitScale fit_scale = {};  ///< of RecognitionStep::fit
+  FitScale fit_scale = {};                  ///< of RecognitionStep::fit
+  std::function<void()> cancel_point = {};  ///< BoundedOptions::cancel_point, where bounds search
 };
 
 /// Whether a single touch tells how probably its object was learned: the task has a Familiarity,

@@ -15,18 +15,52 @@ using namespace nb::literals;
 
 namespace {
 
-using Bounded = Named<BoundedPosterior>;
+/// A belief whose searches ask the call that works on it whether to go on. One at a time does: the
+/// session sees to it.
+class Bounded : public Named<BoundedPosterior> {
+ public:
+  using Working = std::shared_ptr<const Call*>;
+
+  Bounded(Named<BoundedPosterior> belief, Working working)
+      : Named<BoundedPosterior>(std::move(belief)), working_(std::move(working)) {}
+
+  template <typename F>
+  auto use(std::vector<nb::object> kept, const Progress& progress, F work) const {
+    return Named<BoundedPosterior>::use(
+        std::move(kept), progress,
+        [working = working_, work = std::move(work)](BoundedPosterior& belief, Call& call) {
+          *working = &call;
+          const std::unique_ptr<const Call*, void (*)(const Call**)> end(
+              working.get(), [](const Call** of) { *of = nullptr; });
+          return work(belief, call);
+        });
+  }
+  template <typename F>
+  auto use(F work) const {
+    return use({}, Progress(), std::move(work));
+  }
+
+ private:
+  Working working_;
+};
 
 Bounded make_bounded(const std::shared_ptr<Session>& session, nb::handle maps,
                      BoundedOptions options) {
   std::vector<Hypothesis> hypotheses = hypotheses_of(maps);
   std::vector<std::string> labels = labels_of(hypotheses);
+  const auto working = std::make_shared<const Call*>(nullptr);
+  options.cancel_point = [working] {
+    if (*working != nullptr) {
+      (*working)->check();
+    }
+  };
   return {
-      make_owned<BoundedPosterior>({}, session,
-                                   [hypotheses = std::move(hypotheses), options](Device& device) {
-                                     return BoundedPosterior(device, hypotheses, options);
-                                   }),
-      std::move(labels)};
+      {make_owned<BoundedPosterior>({}, session,
+                                    [hypotheses = std::move(hypotheses), options](Device& device) {
+                                      return BoundedPosterior(device, hypotheses, options);
+                                    }),
+       std::move(labels)},
+      working};
 }
 
 void update(const Bounded& self, const TouchesLike& touches, const Progress& progress) {
@@ -80,8 +114,9 @@ void bind_bounded_posterior(nb::module_& module) {
           [](const Bounded& self) {
             return self.use([](BoundedPosterior& belief, Call&) { return belief.estimate(); });
           },
-          "Identity with its bounds, mode and certificate. Searches once after each update(). A\n"
-          "search that Ctrl-C left goes on in the background; later calls wait for it.")
+          "Identity with its bounds, mode and certificate. Searches once after each update(). "
+          "After\n"
+          "Ctrl-C the belief is as it was, and the next call searches anew.")
       .def(
           "refine",
           [](const Bounded& self, const std::optional<Mode>& mode) {

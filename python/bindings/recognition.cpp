@@ -133,7 +133,8 @@ struct Answer {
 };
 
 Answer recognize(const Recordings& wanted, const Request& request, Device& device,
-                 const Scene& scene, const std::function<void(double)>& progress) {
+                 const Scene& scene, Call& call) {
+  const std::function<void(double)> progress = call.progress();
   Answer answer;
   cli::RecognitionFlags flags = request.flags;
   flags.tell = [&](const std::string& sentence) { answer.sentences.push_back(sentence); };
@@ -146,6 +147,7 @@ Answer recognize(const Recordings& wanted, const Request& request, Device& devic
   const Recording& first = recordings.front();
   RecognitionTask task =
       cli::task_of(flags, scene, first.pressure_unit, first.path, cli::reach_mm(recordings));
+  task.cancel_point = [&call] { call.check(); };
   if (auto* histogram = std::get_if<HistogramOptions>(&task.filter)) {
     histogram->still_array = array_is_still(unknowns);
   }
@@ -183,7 +185,7 @@ std::tuple<nb::object, std::vector<std::string>> recognize_python(
         const auto used =
             session ? session : std::make_shared<Session>(cli::open_device(request.flags, scene));
         auto lock = used->lock(call);
-        return recognize(wanted, request, lock.device(), scene, call.progress());
+        return recognize(wanted, request, lock.device(), scene, call);
       });
   return {to_python(answer.records), answer.sentences};
 }

@@ -1,10 +1,13 @@
 """Touches of a stream, one by one."""
 
 from collections.abc import Iterator
-
-import numpy
+from typing import TYPE_CHECKING
 
 from ._palpate import DetectedTouch, Frame, Sensor, Touch, TouchDetector, baseline_of
+
+# The build writes the stubs by importing the package, where there is no NumPy.
+if TYPE_CHECKING:
+    import numpy
 
 
 def touches(
@@ -44,7 +47,7 @@ def _frames_of(sensor: Sensor, seconds: float) -> list[Frame]:
 
 
 def _posed(
-    found: DetectedTouch | None, elements_mm: numpy.typing.NDArray[numpy.float64]
+    found: DetectedTouch | None, elements_mm: "numpy.typing.NDArray[numpy.float64]"
 ) -> Touch | None:
     if found is None or found.T_robot_sensor is None:
         return None

@@ -1,3 +1,5 @@
+#include <algorithm>
+#include <cstdlib>
 #include <set>
 
 #include "program.hpp"
@@ -33,6 +35,23 @@ TEST_F(DevicesCommand, TextMarksTheChosenDevice) {
     EXPECT_NE(text.find(device["reason"].get<std::string>()), std::string::npos) << text;
   }
   EXPECT_TRUE(text.starts_with("*") || text.find("\n*") != std::string::npos) << text;
+}
+
+TEST_F(DevicesCommand, AMachineWithoutVulkanDoesAllThatNeedsNoDevice) {
+  setenv("PALPATE_VULKAN_LIBRARY", "/nonexistent/libvulkan.so.1", 1);
+  done({"simulate", "A", "-o", "A.h5", "--poses", "random:3"});
+  done({"info", "A.h5"});
+  done({"sensors", "--json"});
+  for (const std::vector<std::string>& arguments :
+       {std::vector<std::string>{"devices"}, {"map", "A.h5", "-o", "A.map.h5"}}) {
+    const Outcome outcome = palpate(arguments);
+    EXPECT_EQ(outcome.status, 1);
+    EXPECT_EQ(outcome.out, "");
+    EXPECT_TRUE(outcome.err.ends_with("install libvulkan1 and mesa-vulkan-drivers\n"))
+        << outcome.err;
+    EXPECT_EQ(std::ranges::count(outcome.err, '\n'), 1) << outcome.err;
+  }
+  unsetenv("PALPATE_VULKAN_LIBRARY");
 }
 
 struct Help {

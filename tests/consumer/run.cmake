@@ -75,9 +75,12 @@ file(GLOB_RECURSE main ${SCRATCH_DIR}/build/main.cpp.o)
 run(${COMPILER} ${flags} ${main} -o ${SCRATCH_DIR}/by_pkg_config_static ${static})
 run(${SCRATCH_DIR}/by_pkg_config_static)
 
-# What is linked and what not: the core does without libusb, the driver without Vulkan, and programs
-# of the archives without the shared libraries.
-foreach(program IN ITEMS build/consumer=libusb build/board_reader=libvulkan
+# What is linked and what not: the core does without libusb, the driver without the core's HDF5, and
+# programs of the archives without the shared libraries. Nothing links Vulkan, which is loaded at run
+# time.
+foreach(program IN ITEMS build/consumer=libusb build/consumer=libvulkan
+                         build/consumer_static=libvulkan prefix.moved/bin/palpate=libvulkan
+                         build/board_reader=libhdf5
                          build/consumer_static=libpalpate build/board_reader_static=libpalpate
                          by_pkg_config_static=libpalpate)
   string(REGEX MATCH "(.*)=(.*)" program ${program})

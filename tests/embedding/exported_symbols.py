@@ -70,6 +70,9 @@ def main():
     faults += [f"gone: {s}" for s in recorded - exported]
     faults += [f"public, but without PALPATE_API: {s}"
                for s in missing(exported, archive, headers)]
+    # A program may link the archive beside libvulkan or beside a volk of its own.
+    defined = symbols(options.nm, options.archive, "A-TV-Z", "--extern-only")
+    faults += [f"another library's name: {s}" for s in defined if re.match("vk[A-Z]|volk[A-Z]", s)]
     if not recorded:
         faults.append(f"{options.list} is empty")
     print(*sorted(faults), sep="\n")

@@ -77,8 +77,8 @@ in_root sh -ec '
   /tmp/consumer
   /tmp/board_reader'
 in_root sh -ec '
-  apt-get install -y -qq --no-install-recommends libvulkan-dev libhdf5-dev libyaml-cpp-dev \
-    libfmt-dev libtbb-dev libhwy-dev libusb-1.0-0-dev >/dev/null
+  apt-get install -y -qq --no-install-recommends libhdf5-dev libyaml-cpp-dev libfmt-dev libtbb-dev \
+    libhwy-dev libusb-1.0-0-dev >/dev/null
   cmake -S /consumer -B /tmp/build -DCMAKE_BUILD_TYPE=Release >/dev/null
   cmake --build /tmp/build >/dev/null
   for program in consumer consumer_static board_reader board_reader_static; do

@@ -7,6 +7,8 @@ import sys
 
 import pytest
 
+import palpate
+
 ROOT = pathlib.Path(__file__).parents[2]
 EXAMPLES = sorted((ROOT / "examples" / "python").glob("*.py"))
 
@@ -22,15 +24,15 @@ def test_an_example_runs_and_draws_its_picture(example: pathlib.Path, tmp_path: 
 
 
 def test_types_are_strict() -> None:
-    package = ROOT / "python" / "palpate"
-    stubs = pathlib.Path(os.environ["MYPYPATH"]) / "palpate" / "_palpate.pyi"
-    assert stubs.exists()
-    run = subprocess.run(
-        [sys.executable, "-m", "mypy", "--strict", "--cache-dir", os.devnull, *EXAMPLES,
-         stubs.parent / "__init__.py", stubs.parent / "recognition.py", stubs.parent / "streams.py",
-         stubs.parent / "plots.py"],
-        cwd=ROOT, capture_output=True, text=True, timeout=300,
-    )  # fmt: skip
-    assert run.returncode == 0, run.stdout
-    assert len(EXAMPLES) == 3
+    package = pathlib.Path(palpate.__file__).parent
+    assert (package / "_palpate.pyi").exists()
     assert (package / "py.typed").exists()
+    assert len(EXAMPLES) == 3
+    modules = ["palpate", "palpate.recognition", "palpate.streams", "palpate.plots"]
+    flags = [flag for module in modules for flag in ("-m", module)]
+    for checked in ([*EXAMPLES, ROOT / "python" / "palpate_command.py"], flags):
+        run = subprocess.run(
+            [sys.executable, "-m", "mypy", "--strict", "--cache-dir", os.devnull, *checked],
+            cwd=ROOT, capture_output=True, text=True, timeout=300,
+        )  # fmt: skip
+        assert run.returncode == 0, run.stdout

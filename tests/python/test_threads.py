@@ -151,9 +151,29 @@ if sys.argv[1] == "histogram":
     belief.reset()
     belief.update(training[0])
     assert belief.estimate().identity[0] == 1.0
+elif sys.argv[1].startswith("bounds"):
+    # One touch leaves most of a billion bins to look at: the search takes many seconds.
+    large = palpate.PoseLattice((-40, 40, 1600), (-40, 40, 1600), (0, 6.28, 400))
+    bounded = palpate.BoundedPosterior(device, [grid], large, tolerance=1e-7)
+    bounded.update(training[0])
+    if sys.argv[1] == "bounds":
+        timed(bounded.estimate)
+    else:
+        timed(lambda: bounded.marginals(0, lattice))
+    begin = time.monotonic()
+    bounded.reset()  # waits for the device, which the search has left
+    print(time.monotonic() - begin)
+    bounded.update(training[100:109])
+    assert bounded.estimate().identity[0] == 1.0
 elif sys.argv[1] == "recognize":
     timed(lambda: palpate.recognize(training, grid, bins=(200, 200, 60), filter="histogram",
                                     device=device))
+elif sys.argv[1] == "recognize bounds":
+    timed(lambda: palpate.recognize(training[:1], grid, bins=(1600, 1600, 390), filter="bounded",
+                                    x_mm=(-40, 40), y_mm=(-40, 40), device=device))
+    begin = time.monotonic()
+    belief.reset()
+    print(time.monotonic() - begin)
 elif sys.argv[1] == "map":
     many = [*training] * 50
     timed(lambda: builder.add(many))
@@ -163,7 +183,10 @@ elif sys.argv[1] == "sensor":
 """
 
 
-@pytest.mark.parametrize("call", ["histogram", "recognize", "map", "sensor"])
+@pytest.mark.parametrize(
+    "call",
+    ["histogram", "recognize", "map", "sensor", "bounds", "bounds' marginals", "recognize bounds"],
+)
 def test_ctrl_c_ends_a_call_at_once(call: str, tmp_path: pathlib.Path) -> None:
     script = tmp_path / "interrupted.py"
     script.write_text(INTERRUPTED)
@@ -174,6 +197,8 @@ def test_ctrl_c_ends_a_call_at_once(call: str, tmp_path: pathlib.Path) -> None:
     assert float(lines[0]) < 0.2
     if call == "histogram":
         assert "reset" in lines[1]
+    elif "bounds" in call:
+        assert float(lines[1]) < 0.5  # nothing goes on in the background
 
 
 def test_a_signal_handler_that_does_not_raise_ends_nothing(

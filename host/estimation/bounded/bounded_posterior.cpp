@@ -112,25 +112,31 @@ struct BoundedPosterior::Impl {
     return none ? none_log_weight + none->log_evidence() : -std::numeric_limits<double>::infinity();
   }
 
+  Deadline until(const std::optional<double>& budget_s) const {
+    return Deadline(budget_s, &options.cancel_point);
+  }
+
   const SearchResult& found() {
     if (!result || rough) {
+      result.reset();
       rough = false;
-      Deadline deadline(options.budget_s);
+      Deadline deadline = until(options.budget_s);
       SearchGoal goal{options.tolerance, options.evidence_nats, options.evidence_range_nats};
       if (deadline.exists()) {
         // What is proven soon comes first: a search that is cut short proves little.
         goal.tolerance = std::max(goal.tolerance, soon);
       }
-      result = run(goal, deadline, bins);
+      SearchResult best = run(goal, deadline, bins);
       if (goal.tolerance > options.tolerance && !deadline.passed()) {
         goal.tolerance = options.tolerance;
         EvaluatedBins more(true);
         SearchResult better = run(goal, deadline, more);
-        if (better.uncertain() < result->uncertain()) {
-          result = std::move(better);
+        if (better.uncertain() < best.uncertain()) {
+          best = std::move(better);
           bins = std::move(more);
         }
       }
+      result = std::move(best);
     }
     return *result;
   }
@@ -138,7 +144,7 @@ struct BoundedPosterior::Impl {
   /// What the last search found, or a quick one: enough to draw samples from.
   const SearchResult& found_roughly() {
     if (!result) {
-      Deadline deadline(options.budget_s);
+      Deadline deadline = until(options.budget_s);
       result = run({std::max(options.tolerance, soon), {}}, deadline, bins);
       rough = true;
     }
@@ -170,7 +176,7 @@ struct BoundedPosterior::Impl {
       if (rough) {
         goal = {std::max(options.tolerance, soon), {}};
       }
-      arena.execute([&] { search.run(elements, goal, Deadline({}), visitor); });
+      arena.execute([&] { search.run(elements, goal, until({}), visitor); });
     }
   }
 
@@ -537,7 +543,7 @@ std::vector<PoseBlock> BoundedPosterior::refined_blocks() const {
     posterior.search.run(posterior.elements,
                          {posterior.options.tolerance, posterior.options.evidence_nats,
                           posterior.options.evidence_range_nats},
-                         Deadline({}), note, &blocks);
+                         posterior.until({}), note, &blocks);
     blocks.insert(blocks.end(), evaluated.begin(), evaluated.end());
   });
   return blocks;

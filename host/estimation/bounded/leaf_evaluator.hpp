@@ -19,17 +19,31 @@ namespace palpate {
 /// nats; a single number stands for all bins of its box.
 using BinVisitor = std::function<void(const BinBox&, std::span<const double>)>;
 
-/// When a search must end; never, where there is no budget.
+/// When a search must end; never, where there is no budget. Whoever looks at it also gives the
+/// caller of the search an opportunity to cancel it.
 class Deadline {
  public:
-  explicit Deadline(const std::optional<double>& budget_s) {
+  /// @param cancel_point of BoundedOptions; outlives the deadline
+  explicit Deadline(const std::optional<double>& budget_s,
+                    const std::function<void()>* cancel_point = nullptr)
+      : cancel_point_(cancel_point) {
     if (budget_s) {
       at_ = Clock::now() +
             std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(*budget_s));
     }
   }
   bool exists() const { return at_.has_value(); }
-  bool passed() const { return at_ && Clock::now() >= *at_; }
+  /// @throws what the cancel point throws
+  bool passed() const {
+    cancel_point();
+    return at_ && Clock::now() >= *at_;
+  }
+  /// @throws what the cancel point throws
+  void cancel_point() const {
+    if (cancel_point_ != nullptr && *cancel_point_) {
+      (*cancel_point_)();
+    }
+  }
   /// Lets it pass now, where there is a budget.
   void end() {
     if (at_) {
@@ -41,6 +55,7 @@ class Deadline {
   using Clock = std::chrono::steady_clock;
 
   std::optional<Clock::time_point> at_;
+  const std::function<void()>* cancel_point_;
 };
 
 /// Evaluates the bins of boxes, the leaves of a search: all in float32, and those that hold most of

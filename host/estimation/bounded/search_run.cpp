@@ -390,6 +390,7 @@ class SearchRun {
   /// Follows tiles down to the smallest ones, the best of each level.
   std::vector<Tile> best_of_beam(std::vector<Tile> tiles, std::size_t level, std::size_t width) {
     for (; level < finest_; ++level) {
+      deadline_.cancel_point();
       keep_best(tiles, width);
       std::sort(tiles.begin(), tiles.end(), stands_before);
       tiles = parts_of(tiles, level);
@@ -464,6 +465,7 @@ class SearchRun {
     for (std::size_t begin = 0; begin < tiles.size(); begin += most_together) {
       const auto lot =
           std::span(tiles).subspan(begin, std::min(most_together, tiles.size() - begin));
+      deadline_.cancel_point();
       std::vector<Tile> parts = parts_of(lot, level);
       std::size_t next = 0;
       for (Tile& tile : lot) {

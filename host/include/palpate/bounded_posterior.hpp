@@ -42,6 +42,10 @@ struct BoundedOptions {
   std::optional<double> none_weight = {};
   /// Host threads; 0 takes as many as the machine has cores.
   int threads = 0;
+  /// Called between the steps of every search, on a thread of the search, one at a time. What it
+  /// throws ends the search, and the call that asked for it throws the same; the belief stays as it
+  /// was, and the next call searches anew.
+  std::function<void()> cancel_point = {};
 };
 
 /// A block of bins of one hypothesis at one theta that a search divided into smaller ones or, at

@@ -38,13 +38,15 @@ struct DeviceInfo {
 class PALPATE_API Device {
  public:
   /// Lists every device in Vulkan's order and marks the one that open(name_or_index) would take.
+  /// @throws Error where Vulkan or every driver is missing
   static std::vector<DeviceInfo> list(std::string_view name_or_index = {});
 
   /// Opens a device by its index or by a part of its name (case ignored). An empty `name_or_index`
   /// stands for the environment variable PALPATE_DEVICE. Without both, the best device is opened:
   /// discrete before integrated before virtual before CPU. With PALPATE_VALIDATION=1 in the
   /// environment, Vulkan's validation layer is on and each of its messages becomes an Error.
-  /// @throws Error where no device fits; the message names every device and why it is refused
+  /// @throws Error where no device fits, whose message names every device and why it is refused,
+  /// and where Vulkan is missing, whose message names the Debian packages to install
   static Device open(std::string_view name_or_index = {});
 
   /// Computes on a device that the program has made itself (palpate/vulkan_device.hpp). The program

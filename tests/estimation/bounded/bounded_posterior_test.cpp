@@ -7,6 +7,7 @@
 #include <functional>
 #include <limits>
 #include <numeric>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -301,6 +302,51 @@ TEST(BoundedPosterior, HasTheSameBitsOnAnyNumberOfThreads) {
       one = told;
     }
     EXPECT_EQ(told, one) << threads << " threads";
+  }
+}
+
+TEST(BoundedPosterior, GivesTheSameAfterACancelledSearchAsWithoutOne) {
+  Device device = Device::open();
+  const Recording recording = touches_of_l(2, 813);
+  struct Cancelled {};
+  for (const std::optional<double> budget_s : {std::optional<double>(), std::optional(1e3)}) {
+    BoundedOptions options = small_options();
+    options.budget_s = budget_s;
+    BoundedPosterior expected(device, two_shapes(), options);
+    expected.update(recording.touches(0, 2));
+    int left = -1;  // cancel points until one throws; never below 0
+    int passed = 0;
+    options.cancel_point = [&] {
+      ++passed;
+      if (left >= 0 && left-- == 0) {
+        throw Cancelled();
+      }
+    };
+    BoundedPosterior posterior(device, two_shapes(), options);
+    const auto cancelled_after = [&](int points, const auto& call) {
+      left = points;
+      EXPECT_THROW(call(), Cancelled) << points;
+      left = -1;
+    };
+    posterior.update(recording.touches(0, 2));
+    passed = 0;
+    posterior.estimate();
+    const int points = passed;
+    EXPECT_GT(points, 2);
+    for (int i = 0; i < points; ++i) {
+      posterior.reset();
+      posterior.update(recording.touches(0, 2));
+      cancelled_after(i, [&] { posterior.estimate(); });
+      EXPECT_EQ(told_by(posterior, 2), told_by(expected, 2)) << i;
+    }
+    // Every call that searches can be cancelled.
+    posterior.reset();
+    posterior.update(recording.touches(0, 2));
+    cancelled_after(0, [&] { posterior.marginals(0); });
+    cancelled_after(0, [&] { posterior.entropy(); });
+    cancelled_after(0, [&] { posterior.sample(3, 1); });
+    cancelled_after(0, [&] { posterior.refined_blocks(); });
+    EXPECT_EQ(posterior.entropy(), expected.entropy());
   }
 }
 

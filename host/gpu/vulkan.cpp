@@ -1,0 +1,65 @@
+#define VOLK_IMPLEMENTATION
+#include "vulkan.hpp"
+
+#include <cstdlib>
+#include <mutex>
+
+#include <dlfcn.h>
+#include <fmt/format.h>
+
+#include "palpate/error.hpp"
+
+namespace palpate::gpu {
+
+namespace {
+
+void* library = nullptr;  ///< stays loaded until the process ends: its functions are everywhere
+
+PFN_vkVoidFunction exported_function(VkInstance /*instance*/, const char* name) {
+  return reinterpret_cast<PFN_vkVoidFunction>(dlsym(library, name));
+}
+
+[[noreturn]] void refuse(std::string_view why) {
+  throw Error(Fault::system,
+              fmt::format("Vulkan cannot be loaded: {}; on Debian, install libvulkan1 "
+                          "and mesa-vulkan-drivers",
+                          why));
+}
+
+}  // namespace
+
+// The pointers are the functions that the loader exports, which a program that links the loader
+// calls, too. Each finds its instance or device by the handle that it is given. One set of pointers
+// therefore fits every device of the process, also one that the program hands in, and devices with
+// and without the validation layer; they are set once, before any use. What vkGetInstanceProcAddr()
+// returns is promised for one instance only, and volkLoadDevice() sets the same pointers to the
+// functions of one device. A table for each device (volkLoadDeviceTable()) would save a jump in
+// each call, which is nothing beside a dispatch.
+void load_vulkan() {
+  static std::mutex mutex;
+  const std::scoped_lock lock(mutex);
+  if (library != nullptr) {
+    return;
+  }
+  const char* name = std::getenv("PALPATE_VULKAN_LIBRARY");
+  if (name == nullptr || *name == '\0') {
+    name = "libvulkan.so.1";
+  }
+  void* opened = dlopen(name, RTLD_NOW | RTLD_LOCAL);
+  if (opened == nullptr) {
+    refuse(dlerror());
+  }
+  // vkGetPhysicalDeviceProperties2 came with Vulkan 1.1.
+  const auto of_instance =
+      reinterpret_cast<PFN_vkGetInstanceProcAddr>(dlsym(opened, "vkGetInstanceProcAddr"));
+  if (of_instance == nullptr || dlsym(opened, "vkGetPhysicalDeviceProperties2") == nullptr) {
+    dlclose(opened);
+    refuse(fmt::format("{} is no loader of Vulkan 1.1", name));
+  }
+  library = opened;
+  volkInitializeCustom(exported_function);
+  volkLoadInstance(VK_NULL_HANDLE);
+  vkGetInstanceProcAddr = of_instance;  // finds the functions of extensions
+}
+
+}  // namespace palpate::gpu

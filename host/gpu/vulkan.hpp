@@ -1,0 +1,16 @@
+#pragma once
+
+// Vulkan's functions for the code of this folder: volk's pointers, under names of Palpate's own, so
+// that a program may link the archive beside libvulkan or beside a volk of its own. The headers of
+// this folder show types alone.
+#include "renamed_volk.hpp"
+
+namespace palpate::gpu {
+
+/// Loads Vulkan's loader at its first call: the library that PALPATE_VULKAN_LIBRARY names in the
+/// environment, or libvulkan.so.1. Every function of Vulkan may be called afterwards, by any
+/// thread.
+/// @throws Error (Fault::system) where it is missing; a later call tries again
+void load_vulkan();
+
+}  // namespace palpate::gpu
