@@ -31,8 +31,9 @@ PALPATE_@PROJECT_VERSION_MAJOR@.@PROJECT_VERSION_MINOR@ {
 endfunction()
 
 # Installs an archive and its shared library, exported as <package>-targets and
-# <package>-static-targets, and the pkg-config file <package>.pc, which requires `requires_private`
-# of whoever links the archive.
+# <package>-static-targets, and the pkg-config file <package>.pc, which names the libraries of the
+# packages `requires_private` to whoever links the archive. Requires.private would have pkg-config ask
+# for these packages also where only the shared library is linked.
 function(palpate_install_library archive package description requires_private)
   set(folder ${CMAKE_INSTALL_LIBDIR}/cmake/palpate)
   get_target_property(component ${archive}_shared EXPORT_NAME)
@@ -46,6 +47,9 @@ function(palpate_install_library archive package description requires_private)
   get_target_property(name ${archive} OUTPUT_NAME)
   # Relative, so that a moved installation works.
   file(RELATIVE_PATH prefix_from_pkgconfig /prefix/${CMAKE_INSTALL_LIBDIR}/pkgconfig /prefix)
+  separate_arguments(private UNIX_COMMAND "${requires_private}")
+  execute_process(COMMAND ${PKG_CONFIG_EXECUTABLE} --libs ${private} OUTPUT_VARIABLE libs_private
+                  OUTPUT_STRIP_TRAILING_WHITESPACE COMMAND_ERROR_IS_FATAL ANY)
   configure_file(${PROJECT_SOURCE_DIR}/cmake/palpate.pc.in
                  ${CMAKE_CURRENT_BINARY_DIR}/${name}.pc @ONLY)
   install(FILES ${CMAKE_CURRENT_BINARY_DIR}/${name}.pc
