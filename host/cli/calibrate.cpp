@@ -74,9 +74,10 @@ void check_outputs(const Options& options, const std::vector<std::filesystem::pa
   }
 }
 
-/// @param maps given to compare touches with; where one lacks its mean level, the layer auto is
-/// log_odds
-SensorCalibrationOptions calibration_options(const Options& options,
+/// @param known_poses of the touches
+/// @param maps given to compare touches with; at unknown poses, where one lacks its mean level, the
+/// layer auto is log_odds
+SensorCalibrationOptions calibration_options(const Options& options, bool known_poses,
                                              const std::vector<OccupancyGrid>& maps,
                                              const std::string& unit) {
   SensorCalibrationOptions result{.pressure_unit = unit};
@@ -98,10 +99,14 @@ SensorCalibrationOptions calibration_options(const Options& options,
   }
   const bool has_mean_levels =
       std::ranges::none_of(maps, [](const OccupancyGrid& map) { return map.mean_level.empty(); });
-  std::erase_if(result.tables, [&](const TableKind& kind) {
-    return kind.layer == MapLayer::log_odds ? options.layer == "mean_level"
-                                            : options.layer == "log_odds" || !has_mean_levels;
-  });
+  for (const TableKind& kind : default_tables(false)) {
+    const bool of_pressure = kind.layer == MapLayer::mean_level;
+    const bool tried = options.layer == "auto" ? (of_pressure ? has_mean_levels : !known_poses)
+                                               : of_pressure == (options.layer == "mean_level");
+    if (tried) {
+      result.tables.push_back(kind);
+    }
+  }
   if (options.levels) {
     for (TableKind& kind : result.tables) {
       kind.levels = static_cast<std::size_t>(*options.levels);
@@ -151,12 +156,14 @@ std::vector<Press> presses_of(const Options& options, const std::vector<Recordin
   return presses;
 }
 
-std::vector<OccupancyGrid> read_maps(const Options& options,
+std::vector<OccupancyGrid> read_maps(const Options& options, bool known_poses,
                                      const std::vector<std::filesystem::path>& files) {
+  const bool needs_mean_level =
+      options.layer == "mean_level" || (options.layer == "auto" && known_poses);
   std::vector<OccupancyGrid> maps;
   for (const std::filesystem::path& file : files) {
     maps.push_back(read_map(file));
-    if (options.layer == "mean_level" && maps.back().mean_level.empty()) {
+    if (needs_mean_level && maps.back().mean_level.empty()) {
       refuse(file,
              "has no mean_level; build the map with palpate map --unposed or --sensor-model, or "
              "give --layer log_odds");
@@ -186,9 +193,10 @@ void calibrate(const Options& options) {
   check_outputs(options, maps_read);
   const std::vector<Recording> recordings = read_touch_recordings(options.recordings);
   const std::vector<Press> presses = presses_of(options, recordings);
-  const std::vector<OccupancyGrid> maps = read_maps(options, maps_read);
+  const bool known_poses = presses.front().T_object_robot.has_value();
+  const std::vector<OccupancyGrid> maps = read_maps(options, known_poses, maps_read);
   const SensorCalibrationOptions how =
-      calibration_options(options, maps, recordings.front().pressure_unit);
+      calibration_options(options, known_poses, maps, recordings.front().pressure_unit);
 
   SensorCalibration calibration;
   {
@@ -196,7 +204,7 @@ void calibrate(const Options& options) {
     calibration =
         calibrate_sensor(presses, maps, how, [&](double fraction) { progress.show(fraction); });
   }
-  if (presses.front().T_object_robot) {
+  if (known_poses) {
     add_touch_sd(options, presses, calibration);
   }
   const Pictures pictures = pictures_of(options);
@@ -253,8 +261,9 @@ void add_calibrate(CLI::App& app) {
   command
       ->add_option("--layer", options->layer,
                    "What of a map readings are compared with: mean_level, the mean pressure; "
-                   "log_odds, of occupancy; or auto: mean_level where it is clearly better about "
-                   "touches that it has not seen, else log_odds. auto takes twice as long")
+                   "log_odds, of occupancy; or auto: mean_level at known poses; at unknown poses "
+                   "both are tried, and log_odds is kept unless mean_level is clearly better about "
+                   "presses that it has not seen")
       ->capture_default_str();
   command
       ->add_option("--levels", options->levels,

@@ -33,30 +33,11 @@ constexpr double readings_per_press = 16.0;
 /// finer ones change a temperature by a sixth.
 constexpr double most_finer = 2.0;
 
-/// Whether one of two models has less loss on the same presses beyond chance: by more than two
-/// standard errors of the differences.
-bool is_clearly_less(const std::vector<double>& losses, const std::vector<double>& others) {
-  const auto n = static_cast<double>(losses.size());
-  double mean = 0.0;
-  for (std::size_t i = 0; i < losses.size(); ++i) {
-    mean += (others[i] - losses[i]) / n;
-  }
-  double variance = 0.0;
-  for (std::size_t i = 0; i < losses.size(); ++i) {
-    const double apart = others[i] - losses[i] - mean;
-    variance += apart * apart / std::max(1.0, n - 1.0);
-  }
-  return mean > 2.0 * std::sqrt(variance / n);
-}
-
 /// A calibration in the making.
 class SensorLearning {
  public:
   SensorLearning(const std::vector<Press>& presses, const SensorCalibrationOptions& options)
       : presses_(presses), options_(options) {
-    if (options.tables.empty()) {
-      throw Error(Fault::input, "no table to learn; give at least one");
-    }
     for (const TableKind& kind : options.tables) {
       if (kind.levels < 2 || kind.levels > most_reading_levels) {
         throw Error(Fault::input,
@@ -69,6 +50,7 @@ class SensorLearning {
     require_poses_of_one_kind(presses);
     known_poses_ = std::ranges::all_of(
         presses, [](const Press& press) { return press.T_object_robot.has_value(); });
+    tables_ = options.tables.empty() ? default_tables(known_poses_) : options.tables;
     for (const Press& press : presses) {
       if (const auto spacing = spacing_of(press.touches.front().elements_mm)) {
         spacing_mm_ = std::max(spacing_mm_, spacing->nearest_mm.most);
@@ -90,7 +72,7 @@ class SensorLearning {
     }
     result_.objects = labels.size();
     if (labels.size() < 2) {
-      const TableLearning how = table_learning(options_.tables.back());
+      const TableLearning how = table_learning(tables_.back());
       const PlacedPresses placed = learn_table(presses_, maps_, how, progress);
       result_.sensor.table = placed.table;
       learn_gamma(placed, how);
@@ -99,7 +81,7 @@ class SensorLearning {
           "neither features nor familiarity are learned; give touches of two objects or more");
       return std::move(result_);
     }
-    const double tables = static_cast<double>(options_.tables.size());
+    const double tables = static_cast<double>(tables_.size());
     const double all = 1.0 + tables * (table_cost + 1.0);
     double done = 0.0;
     const auto part = [&](double cost) {
@@ -111,7 +93,7 @@ class SensorLearning {
       };
     };
     std::optional<LearnedFromTable> best;
-    for (const TableKind& kind : options_.tables) {
+    for (const TableKind& kind : tables_) {
       const TableLearning how = table_learning(kind);
       LearnedFromTable one{.how = how,
                            .placed = learn_table(presses_, maps_, how, part(table_cost)),
@@ -343,12 +325,33 @@ class SensorLearning {
   std::vector<Press> presses_;
   const SensorCalibrationOptions& options_;
   bool known_poses_ = false;
+  std::vector<TableKind> tables_;
   double spacing_mm_ = 0.0;
   std::vector<TrainingMap> maps_;
   SensorCalibration result_;
 };
 
 }  // namespace
+
+std::vector<TableKind> default_tables(bool known_poses) {
+  constexpr TableKind of_contact{MapLayer::log_odds, 2};
+  constexpr TableKind of_pressure{MapLayer::mean_level, 7};
+  return known_poses ? std::vector{of_pressure} : std::vector{of_contact, of_pressure};
+}
+
+bool is_clearly_less(std::span<const double> losses, std::span<const double> others) {
+  const auto n = static_cast<double>(losses.size());
+  double mean = 0.0;
+  for (std::size_t i = 0; i < losses.size(); ++i) {
+    mean += (others[i] - losses[i]) / n;
+  }
+  double variance = 0.0;
+  for (std::size_t i = 0; i < losses.size(); ++i) {
+    const double apart = others[i] - losses[i] - mean;
+    variance += apart * apart / std::max(1.0, n - 1.0);
+  }
+  return mean > 2.0 * std::sqrt(variance / n);
+}
 
 std::vector<double> level_edges_of(const std::vector<Press>& presses,
                                    const ContactClassifier& classifier, std::size_t levels) {

@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <functional>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -26,12 +27,17 @@ struct SensorCalibrationOptions {
   std::string pressure_unit = "kPa";
   std::optional<double> threshold;  ///< learned where there is none
   std::optional<double> ratio;      ///< the same
-  /// Those to try, the simplest first. Pressures tell more, but change from day to day more than
-  /// contact does. With one object there is nothing to compare by, and the last is taken.
-  std::vector<TableKind> tables = {{MapLayer::log_odds, 2}, {MapLayer::mean_level, 7}};
+  /// Those to try, the simplest first; none stands for default_tables(). With one object there is
+  /// nothing to compare by, and the last is taken.
+  std::vector<TableKind> tables = {};
   std::size_t folds = 5;      ///< of the cross-validation
   std::size_t most_maps = 5;  ///< of an object, in the cross-validation
 };
+
+/// Touches at known poses: seven levels over the mean pressure, which also tells where between the
+/// elements an edge lies. Presses at unknown poses: contact over log odds, and these seven levels,
+/// since pressures tell more, but change from day to day more than contact does.
+std::vector<TableKind> default_tables(bool known_poses);
 
 /// A table that was tried: the cross-validation's log-loss with temperature and features, in nats.
 struct TriedTable {
@@ -77,14 +83,18 @@ struct SensorCalibration {
 /// @param presses all at known poses or all at unknown ones
 /// @param given maps to compare presses with, with their mean level where a table is over that;
 /// without: maps of other presses
-/// @throws Error where no press has a map of its object that it is no part of, on no table to try,
-/// on levels or folds out of range, on poses some of which are known, where presses tell no
+/// @throws Error where no press has a map of its object that it is no part of, on levels or folds
+/// out of range, on poses some of which are known, where presses tell no
 /// threshold or have no pressure above it, and as observed_map() and learn_table() do; what
 /// `progress` throws
 SensorCalibration calibrate_sensor(const std::vector<Press>& presses,
                                    const std::vector<OccupancyGrid>& given,
                                    const SensorCalibrationOptions& options,
                                    const std::function<void(double)>& progress = {});
+
+/// Whether one of two models has less loss on the same presses beyond chance: by more than two
+/// standard errors of the differences.
+bool is_clearly_less(std::span<const double> losses, std::span<const double> others);
 
 /// Pressures that part the elements In Contact of all presses into `levels` - 1 levels of about as
 /// many elements each; fewer where pressures are the same.

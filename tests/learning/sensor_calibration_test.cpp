@@ -53,8 +53,6 @@ void expect_complete(const SensorCalibration& found, std::size_t touches) {
   EXPECT_EQ(found.objects, 3U);
   EXPECT_NEAR(found.sensor.classifier.threshold, 2.0, 0.7);
   EXPECT_NEAR(found.sensor.noise, 0.7, 0.07);
-  EXPECT_EQ(found.sensor.table->levels(), 7U);
-  EXPECT_EQ(found.sensor.table->layer.of, MapLayer::mean_level);
   for (const char* letter : {"A", "R", "U"}) {
     EXPECT_TRUE(found.sensor.table->objects.contains(letter)) << letter;
     EXPECT_TRUE(found.sensor.features->objects.contains(letter)) << letter;
@@ -94,6 +92,8 @@ TEST(SensorCalibration, OfLettersAtKnownPosesLearnsTheirSensor) {
   });
   EXPECT_NEAR(shown, 1.0, 1e-9);
   expect_complete(found, 576);
+  EXPECT_EQ(found.sensor.table->levels(), 7U);
+  EXPECT_EQ(found.sensor.table->layer.of, MapLayer::mean_level);
   // One touch, smaller than a letter, tells it better than chance.
   EXPECT_GT(found.after->interval().low, 0.5);
   // Elements of the simulator are nearly independent. Bins an element apart would blame the table
@@ -131,19 +131,37 @@ TEST(SensorCalibration, ComparesWithTheMapsGiven) {
 
 TEST(SensorCalibration, KeepsTheFirstTableUnlessAnotherIsBetterBeyondChance) {
   const LetterPresses letters = three_letters(5);
-  const auto learned = [&](const std::vector<TableKind>& tables) {
-    return calibrate_sensor(letters.presses, {}, {.tables = tables});
+  // Five levels tell letters no better than four.
+  const SensorCalibration found = calibrate_sensor(
+      letters.presses, {}, {.tables = {{MapLayer::mean_level, 4}, {MapLayer::mean_level, 5}}});
+  ASSERT_EQ(found.tried.size(), 2U);
+  EXPECT_NE(found.tried[0].log_loss, found.tried[1].log_loss);
+  EXPECT_EQ(found.sensor.table->levels(), 4U);
+  EXPECT_EQ(found.after->log_loss, found.tried[0].log_loss);
+}
+
+TEST(ClearlyLess, IsByMoreThanTwoStandardErrors) {
+  // Differences one above and one below their mean in turn: a standard error of 1 / sqrt(n - 1).
+  const auto losses = [](double mean, int n) {
+    std::vector<double> of_each;
+    for (int i = 0; i < n; ++i) {
+      of_each.push_back(10.0 - mean + (i % 2 == 0 ? 1.0 : -1.0));
+    }
+    return of_each;
   };
-  // On letters pressures tell more than contact, and five levels no more than four.
-  const SensorCalibration better = learned({{MapLayer::log_odds, 2}, {MapLayer::mean_level, 7}});
-  ASSERT_EQ(better.tried.size(), 2U);
-  EXPECT_LT(better.tried[1].log_loss, better.tried[0].log_loss - 0.05);
-  EXPECT_EQ(better.sensor.table->layer.of, MapLayer::mean_level);
-  EXPECT_EQ(better.after->log_loss, better.tried[1].log_loss);
-  const SensorCalibration alike = learned({{MapLayer::mean_level, 4}, {MapLayer::mean_level, 5}});
-  EXPECT_NE(alike.tried[0].log_loss, alike.tried[1].log_loss);
-  EXPECT_EQ(alike.sensor.table->levels(), 4U);
-  EXPECT_EQ(alike.after->log_loss, alike.tried[0].log_loss);
+  const std::vector<double> same(100, 10.0);
+  EXPECT_TRUE(is_clearly_less(losses(2.0, 100), same));
+  EXPECT_TRUE(is_clearly_less(losses(0.21, 100), same));
+  EXPECT_FALSE(is_clearly_less(losses(0.19, 100), same)) << "within two standard errors of 0.1005";
+  EXPECT_FALSE(is_clearly_less(losses(-2.0, 100), same));
+  EXPECT_FALSE(is_clearly_less(same, same));
+}
+
+TEST(DefaultTables, OfKnownPosesAreOverThePressureAlone) {
+  ASSERT_EQ(default_tables(true).size(), 1U);
+  EXPECT_EQ(default_tables(true)[0].layer, MapLayer::mean_level);
+  ASSERT_EQ(default_tables(false).size(), 2U);
+  EXPECT_EQ(default_tables(false)[0].layer, MapLayer::log_odds);
 }
 
 TEST(SensorCalibration, TakesTheThresholdAndRatioGiven) {
