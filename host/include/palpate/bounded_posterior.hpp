@@ -42,6 +42,9 @@ struct BoundedOptions {
   std::optional<double> none_weight = {};
   /// Host threads; 0 takes as many as the machine has cores.
   int threads = 0;
+  /// Evaluates bins on the host only. Otherwise a GPU may take them once it was measured to be
+  /// faster, and its rounding then depends on when that was.
+  bool on_host = false;
 };
 
 /// A block of bins of one hypothesis at one theta that a search divided into smaller ones or, at
