@@ -194,6 +194,7 @@ void add_batch(CLI::App& app, int& status) {
                    "Folder of results; made where it is missing, completed where it is not")
       ->required();
   add_recognition_flags(*command, options->recognition);
+  command->get_option("--budget-ms")->group("");  // read still, to be refused with its reason
   add_unknown_flags(*command, options->unknowns);
   command->add_flag("--trace", options->trace, "Add the estimate after every touch");
   command->add_option("--shard", options->shard,
