@@ -16,6 +16,9 @@ void add_simulate(CLI::App& app);
 void add_map(CLI::App& app);
 void add_calibrate(CLI::App& app);
 void add_recognize(CLI::App& app);
+/// @param status becomes the exit status of a run that succeeds
+void add_batch(CLI::App& app, int& status);
+void add_merge(CLI::App& app);
 void add_plan(CLI::App& app);
 void add_evaluate(CLI::App& app);
 void add_export(CLI::App& app);

@@ -10,10 +10,13 @@
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
+#include "batch_task.hpp"
 #include "command_files.hpp"
 #include "evaluate_output.hpp"
 #include "options.hpp"
+#include "recognition_flags.hpp"
 #include "results_file.hpp"
+#include "results_folder.hpp"
 #include "terminal.hpp"
 
 namespace palpate::cli {
@@ -60,6 +63,23 @@ void check_outputs(const Options& options, const std::vector<std::filesystem::pa
   }
 }
 
+/// Says how much a folder of palpate batch still lacks.
+void tell_missing(const std::string& results) {
+  if (!is_results_folder(results)) {
+    return;
+  }
+  const ResultsFolder folder(results);
+  const BatchTask task = read_batch_task(folder.task());
+  std::size_t missing = 0;
+  for (std::size_t chunk = 0; chunk < task.chunks(); ++chunk) {
+    missing += folder.has_chunk(chunk) ? 0 : 1;
+  }
+  if (missing > 0) {
+    tell_on_stderr(fmt::format("{}: {} of {} chunks are missing; palpate batch completes them",
+                               results, missing, task.chunks()));
+  }
+}
+
 void evaluate_results(const Options& options) {
   const std::vector<std::filesystem::path> files = result_files(options.results);
   check_outputs(options, files);
@@ -69,6 +89,15 @@ void evaluate_results(const Options& options) {
            "none of {} record(s) has a true label ('truth'); name the object in the recordings "
            "before palpate recognize, or give other results",
            results.without_truth);
+  }
+  for (const std::string& folder : options.results) {
+    tell_missing(folder);
+  }
+  if (results.failed > 0) {
+    tell_on_stderr(
+        fmt::format("{} unknown{} could not be recognised, and left out; their records "
+                    "say why",
+                    results.failed, results.failed == 1 ? "" : "s"));
   }
   const Evaluation evaluation = evaluate(results.records);
   // A label need not be UTF-8, as JSON must.
@@ -99,7 +128,8 @@ void evaluate_results(const Options& options) {
 void add_evaluate(CLI::App& app) {
   auto* command = app.add_subcommand(
       "evaluate",
-      "Compare what palpate recognize --json wrote with the truth: accuracy and recall of every "
+      "Compare what palpate recognize --json or palpate batch wrote with the truth: accuracy and "
+      "recall of every "
       "class with 95 % intervals, what each class was taken for, log-loss, how far confidence is "
       "from accuracy, and median pose errors. A class that no map has is an unknown class, whose "
       "right answer is \"(none)\"; the area under the curve says how well unknown classes are told "
@@ -107,8 +137,8 @@ void add_evaluate(CLI::App& app) {
   const auto options = std::make_shared<Options>();
   command
       ->add_option("RESULTS", options->results,
-                   "JSON files of palpate recognize, files with one such record a line, or folders "
-                   "of *.json. Records without a true label are left out")
+                   "JSON files of palpate recognize, files with one such record a line, folders of "
+                   "palpate batch, or folders of *.json. Records without a true label are left out")
       ->required();
   command->add_option("--json", options->json, "Write all numbers as JSON; - is standard output");
   command->add_option("--png", options->png,

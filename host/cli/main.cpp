@@ -65,6 +65,9 @@ int run(int argc, char** argv) {
   palpate::cli::add_map(app);
   palpate::cli::add_calibrate(app);
   palpate::cli::add_recognize(app);
+  int status = 0;
+  palpate::cli::add_batch(app, status);
+  palpate::cli::add_merge(app);
   palpate::cli::add_plan(app);
   palpate::cli::add_evaluate(app);
   palpate::cli::add_info(app);
@@ -91,7 +94,8 @@ int run(int argc, char** argv) {
         fmt::format("{}{}; see palpate {}--help", error.what(), number ? ": give a number" : "",
                     commands.empty() ? "" : commands.front()->get_name() + " "));
   }
-  return finish();
+  const int finished = finish();
+  return finished != 0 ? finished : status;
 }
 
 }  // namespace

@@ -17,7 +17,7 @@ Progress::Progress(std::string what, std::FILE* output, std::function<Clock::tim
       start_(now_()),
       shown_(start_) {}
 
-void Progress::show(double fraction) {
+void Progress::show(double fraction, const std::string& more) {
   const auto now = now_();
   if (now - start_ < 2s || now - shown_ < 100ms || isatty(fileno(output_)) == 0) {
     return;
@@ -28,7 +28,8 @@ void Progress::show(double fraction) {
   const std::string left =
       fraction > 0.0 ? fmt::format(", {:.0f} s left", elapsed * (1.0 - fraction) / fraction) : "";
   // Carriage return, text, erase to the end of the line.
-  const std::string line = fmt::format("\r{} {:3.0f} %{}\033[K", what_, 100.0 * fraction, left);
+  const std::string line =
+      fmt::format("\r{} {:3.0f} %{}{}\033[K", what_, 100.0 * fraction, more, left);
   std::fputs(line.c_str(), output_);  // not fmt::print, which throws if the terminal is closed
   std::fflush(output_);
 }

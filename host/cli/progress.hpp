@@ -21,8 +21,8 @@ class Progress {
   Progress(const Progress&) = delete;
   Progress& operator=(const Progress&) = delete;
 
-  /// Shows the fraction of the work that is done, in [0, 1].
-  void show(double fraction);
+  /// Shows the fraction of the work that is done, in [0, 1], and what else is to be said of it.
+  void show(double fraction, const std::string& more = "");
 
  private:
   std::string what_;

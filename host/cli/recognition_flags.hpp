@@ -70,6 +70,16 @@ RecognitionTask task_of(const RecognitionFlags& flags, const Scene& scene,
 /// Opens the device that the flags or the scene name. Throws Error.
 Device open_device(const RecognitionFlags& flags, const Scene& scene);
 
+/// Whether neither bins nor any part of a region are given: the region then follows from the maps
+/// and the touches' arrays (reach_mm).
+bool infers_region(const RecognitionFlags& flags, const Scene& scene);
+
+/// Chooses what the task leaves open: the bins of --bins auto or fine, by the device's memory, and
+/// the filter of --filter auto. Returns the sentence that tells where a limit made bins wider than
+/// the maps resolve, or "". Throws Error.
+std::string settle_task(const RecognitionFlags& flags, const Scene& scene, const Device& device,
+                        RecognitionTask& task);
+
 /// Makes the task's filter, after --bins auto or fine has chosen the bins and --filter auto the
 /// filter. Tells where a limit made bins wider than the maps resolve. Throws Error.
 Recogniser open_recogniser(const RecognitionFlags& flags, const Scene& scene, Device& device,

@@ -143,10 +143,7 @@ void fit_touch_sd(const Options& options, const Scene& scene, const RecognitionT
     fit = palpate::fit_touch_sd(device, task, touched_objects(recordings, unknowns, task), {},
                                 [&](double fraction) { progress.show(fraction); });
   }
-  const std::string json =
-      to_json(fit, device.name())
-          .dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) +
-      "\n";
+  const std::string json = text_of(to_json(fit, device.name()), 2);
   if (!options.json.empty() && options.json != "-") {
     write_file(options.json, json);
   }
@@ -217,9 +214,7 @@ void recognize(const Options& options) {
     options.recognition.tell(unresolved);
   }
 
-  // The path of a recording need not be UTF-8, as JSON must.
-  const std::string json_text =
-      json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
+  const std::string json_text = text_of(json, 2);
   // Files come first: printing fails where the reader of standard output has ended.
   write_results(options, task, recogniser, json_text);
   if (options.json == "-") {
@@ -255,14 +250,7 @@ void add_recognize(CLI::App& app) {
   command->add_option("RECORDING", options->recordings, "Recordings of unknown objects (HDF5)")
       ->required();
   add_recognition_flags(*command, options->recognition);
-  command->add_option("--frames", options->unknowns.frames,
-                      "Use the touches A to B - 1 of every recording, counted from 0, as A:B");
-  command
-      ->add_option("--touches", options->unknowns.touches,
-                   "Use the first N touches of every recording [default: all]")
-      ->check(require_whole_number);
-  command->add_flag("--each-frame", options->unknowns.each_frame,
-                    "Recognise every touch by itself, as an unknown object of its own");
+  add_unknown_flags(*command, options->unknowns);
   command->add_flag("--trace", options->trace, "Show the estimate after every touch");
   command->add_option("--json", options->json, "Write the records as JSON; - is standard output");
   command->add_option("--posterior", options->posterior,

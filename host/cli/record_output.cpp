@@ -184,18 +184,27 @@ nlohmann::ordered_json to_json(const RecognitionStep& step, const RecognitionTas
 }
 
 nlohmann::ordered_json to_json(const RecognitionRecord& record, const RecognitionTask& task,
-                               const std::string& device, bool with_trace) {
+                               const std::optional<std::string>& device, bool with_trace) {
   nlohmann::ordered_json json{{"recording", record.recording}};
   if (record.frame) {
     json["frame"] = *record.frame;
   }
   json["touches"] = record.touches;
+  if (!record.error.empty()) {
+    if (!record.true_label.empty()) {
+      json["truth"] = truth_to_json({record.true_label, {}});
+    }
+    json["error"] = record.error;
+    return json;
+  }
   json.update(to_json(record.last(), task));
   if (!record.true_label.empty()) {
     json["truth"] = truth_to_json(record.last().truth);
   }
-  json["seconds"] = record.seconds;
-  json["device"] = device;
+  if (device) {
+    json["seconds"] = record.seconds;
+    json["device"] = *device;
+  }
   if (with_trace) {
     auto trace = nlohmann::ordered_json::array();
     for (const RecognitionStep& step : record.trace) {
@@ -204,6 +213,10 @@ nlohmann::ordered_json to_json(const RecognitionRecord& record, const Recognitio
     json["trace"] = trace;
   }
   return json;
+}
+
+std::string text_of(const nlohmann::ordered_json& json, int indent) {
+  return json.dump(indent, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
 }
 
 }  // namespace palpate::cli

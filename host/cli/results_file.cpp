@@ -14,6 +14,7 @@
 
 #include "file_identity.hpp"
 #include "input_file.hpp"
+#include "results_folder.hpp"
 
 namespace palpate::cli {
 
@@ -22,7 +23,7 @@ namespace {
 using Json = nlohmann::json;
 namespace fs = std::filesystem;
 
-constexpr const char* remedy = "give what palpate recognize --json wrote";
+constexpr const char* remedy = "give what palpate recognize --json or palpate batch wrote";
 
 /// One record, and the words that name it in a message.
 class RecordReader {
@@ -33,6 +34,9 @@ class RecordReader {
       refuse(file, "record {} is no JSON object but {}; {}", index, record.type_name(), remedy);
     }
   }
+
+  /// Whether the unknown could not be recognised, which palpate batch tells.
+  bool failed() const { return find(record_, "error") != nullptr && !record_.contains("best"); }
 
   /// None where the true label is not known. The other fields are checked all the same.
   std::optional<JudgedRecord> read() const {
@@ -201,8 +205,11 @@ std::string read_bytes(const fs::path& file) {
   return bytes;
 }
 
-/// The *.json of a folder, by name.
-std::vector<fs::path> files_of(const fs::path& folder) {
+/// The chunks of a folder of palpate batch, or the *.json of another one, by name.
+std::vector<fs::path> files_of(const fs::path& results) {
+  const bool batch = is_results_folder(results);
+  const fs::path folder = batch ? ResultsFolder(results).chunks() : results;
+  const char* const extension = batch ? ".ndjson" : ".json";
   std::error_code error;
   const fs::directory_iterator entries(folder, error);
   if (error) {
@@ -210,12 +217,12 @@ std::vector<fs::path> files_of(const fs::path& folder) {
   }
   std::vector<fs::path> files;
   for (const auto& entry : entries) {
-    if (entry.path().extension() == ".json" && !entry.is_directory(error)) {
+    if (entry.path().extension() == extension && !entry.is_directory(error)) {
       files.push_back(entry.path());
     }
   }
   if (files.empty()) {
-    refuse(folder, "a folder without *.json; {}", remedy);
+    refuse(folder, "a folder without *{}; {}", extension, remedy);
   }
   std::sort(files.begin(), files.end());
   return files;
@@ -246,7 +253,10 @@ JudgedResults read_results(std::span<const fs::path> files) {
   for (const fs::path& file : files) {
     const Json records = parse(file, read_bytes(file));
     for (std::size_t i = 0; i < records.size(); ++i) {
-      if (auto judged = RecordReader(file, i, records[i]).read()) {
+      const RecordReader reader(file, i, records[i]);
+      if (reader.failed()) {
+        ++results.failed;
+      } else if (auto judged = reader.read()) {
         results.records.push_back(std::move(*judged));
       } else {
         ++results.without_truth;

@@ -14,14 +14,16 @@ namespace palpate::cli {
 struct JudgedResults {
   std::vector<JudgedRecord> records;
   std::size_t without_truth = 0;  ///< records whose true label is not known
+  std::size_t failed = 0;         ///< records of palpate batch that hold an error
 };
 
-/// The files that the arguments stand for: an argument itself, or all *.json of a folder, by name.
-/// @throws Error (Fault::input) for a folder without *.json, and for a file that is given twice
+/// The files that the arguments stand for: an argument itself, the chunks of a folder of palpate
+/// batch, or all *.json of another folder, by name.
+/// @throws Error (Fault::input) for a folder without such files, and for a file that is given twice
 std::vector<std::filesystem::path> result_files(std::span<const std::string> arguments);
 
-/// Reads the records of `palpate recognize --json`: an array of records, one record, or one record
-/// a line.
+/// Reads the records of `palpate recognize --json` or `palpate batch`: an array of records, one
+/// record, or one record a line. Records that hold an error are counted, and no more.
 /// @throws Error (Fault::input), in a line naming the file, the record (counted from 0) and the
 /// field, where a file cannot be read, is not JSON or holds anything but records, where a value is
 /// of the wrong type or out of range, and where a record's probabilities do not sum to 1 +- 0.01

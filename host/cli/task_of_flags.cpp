@@ -182,9 +182,7 @@ WantedLattice lattice_of(const RecognitionFlags& flags, const Scene& scene,
       auto_pivot   ? std::nullopt
       : pivot_flag ? std::optional(parse_point("--pivot-mm", flags.pivot_mm))
                    : scene.region.pivot_mm;
-  const bool has_range = !flags.x_mm.empty() || !flags.y_mm.empty() || !flags.theta_deg.empty() ||
-                         scene.region.x_mm || scene.region.y_mm || scene.region.theta_deg;
-  if (!counts && !pivot_mm && !has_range) {
+  if (infers_region(flags, scene)) {
     return automatic_lattice(flags, bin_width, hypotheses, reach_mm);
   }
   PoseLattice lattice;
@@ -221,6 +219,16 @@ WantedLattice lattice_of(const RecognitionFlags& flags, const Scene& scene,
 }  // namespace
 
 void tell_on_stderr(const std::string& sentence) { fmt::print(stderr, "palpate: {}\n", sentence); }
+
+bool infers_region(const RecognitionFlags& flags, const Scene& scene) {
+  const bool has_range = !flags.x_mm.empty() || !flags.y_mm.empty() || !flags.theta_deg.empty() ||
+                         scene.region.x_mm || scene.region.y_mm || scene.region.theta_deg;
+  const bool has_pivot = flags.pivot_mm.empty() ? !scene.region.auto_pivot && scene.region.pivot_mm
+                                                : flags.pivot_mm != "auto";
+  const bool has_counts =
+      flags.bins.empty() ? scene.bins.has_value() : flags.bins != "auto" && flags.bins != "fine";
+  return !has_range && !has_pivot && !has_counts;
+}
 
 Scene scene_of(const RecognitionFlags& flags) {
   return flags.scene.empty() ? Scene{} : read_scene(flags.scene);
@@ -286,20 +294,27 @@ Device open_device(const RecognitionFlags& flags, const Scene& scene) {
   return Device::open(flags.device.empty() ? scene.device.value_or("") : flags.device);
 }
 
-Recogniser open_recogniser(const RecognitionFlags& flags, const Scene& scene, Device& device,
-                           RecognitionTask& task) {
+std::string settle_task(const RecognitionFlags& flags, const Scene& scene, const Device& device,
+                        RecognitionTask& task) {
   const bool fine = task.bin_width == BinWidth::fine;
   const std::optional<CoarsenedBins> bins = settle_bins(device, task);
   settle_filter(task);
   settle_evidence(task);
   require_within_region(flags.uncertainty, scene, flags.scene, task.lattice());
+  return bins ? fmt::format(
+                    "--bins {}: steps of {:.2f} mm, wider than the maps resolve, keep to {} bins "
+                    "in all; narrow the region, or give --bins",
+                    fine ? "fine" : "auto", bins->step_mm, bins->most_bins)
+              : "";
+}
+
+Recogniser open_recogniser(const RecognitionFlags& flags, const Scene& scene, Device& device,
+                           RecognitionTask& task) {
+  const std::string coarsened = settle_task(flags, scene, device, task);
   Recogniser recogniser =
       open_filter(device, task);  // first: bins that do not fit deserve only their refusal
-  if (bins) {
-    flags.tell(fmt::format(
-        "--bins {}: steps of {:.2f} mm, wider than the maps resolve, keep to {} bins in all; "
-        "narrow the region, or give --bins",
-        fine ? "fine" : "auto", bins->step_mm, bins->most_bins));
+  if (!coarsened.empty()) {
+    flags.tell(coarsened);
   }
   return recogniser;
 }

@@ -1,13 +1,26 @@
 #include "unknowns.hpp"
 
 #include <algorithm>
+#include <iterator>
+
+#include <CLI/CLI.hpp>
 
 #include "recordings.hpp"
 
 namespace palpate::cli {
 
-std::vector<Unknown> list_unknowns(const UnknownFlags& flags,
-                                   std::span<const Recording> recordings) {
+void add_unknown_flags(CLI::App& command, UnknownFlags& flags) {
+  command.add_option("--frames", flags.frames,
+                     "Use the touches A to B - 1 of every recording, counted from 0, as A:B");
+  command
+      .add_option("--touches", flags.touches,
+                  "Use the first N touches of every recording [default: all]")
+      ->check(require_whole_number);
+  command.add_flag("--each-frame", flags.each_frame,
+                   "Recognise every touch by itself, as an unknown object of its own");
+}
+
+std::optional<Frames> frames_of(const UnknownFlags& flags) {
   std::optional<Frames> frames;
   if (!flags.frames.empty()) {
     frames = parse_frames("--frames", flags.frames);
@@ -18,22 +31,33 @@ std::vector<Unknown> list_unknowns(const UnknownFlags& flags,
   if (flags.touches && flags.each_frame) {
     refuse("--touches", "with --each-frame every unknown has one touch; leave one of them out");
   }
+  return frames;
+}
+
+std::vector<Unknown> unknowns_in(const UnknownFlags& flags, const std::optional<Frames>& frames,
+                                 const Recording& recording) {
+  auto [begin, end] = select(recording, frames);
+  if (flags.touches && static_cast<std::size_t>(*flags.touches) > end - begin) {
+    refuse(recording.path, "has {} touches; --touches {} is too many", end - begin, *flags.touches);
+  }
+  const GroundTruth truth = ground_truth(recording.object, recording.truth);
+  if (!flags.each_frame) {
+    end = flags.touches ? begin + static_cast<std::size_t>(*flags.touches) : end;
+    return {{recording.path, {}, recording.touches(begin, end), truth}};
+  }
+  std::vector<Unknown> unknowns;
+  for (std::size_t i = begin; i < end; ++i) {
+    unknowns.push_back({recording.path, i, {recording.touch(i)}, truth});
+  }
+  return unknowns;
+}
+
+std::vector<Unknown> list_unknowns(const UnknownFlags& flags,
+                                   std::span<const Recording> recordings) {
+  const std::optional<Frames> frames = frames_of(flags);
   std::vector<Unknown> unknowns;
   for (const Recording& recording : recordings) {
-    auto [begin, end] = select(recording, frames);
-    if (flags.touches && static_cast<std::size_t>(*flags.touches) > end - begin) {
-      refuse(recording.path, "has {} touches; --touches {} is too many", end - begin,
-             *flags.touches);
-    }
-    const GroundTruth truth = ground_truth(recording.object, recording.truth);
-    if (flags.each_frame) {
-      for (std::size_t i = begin; i < end; ++i) {
-        unknowns.push_back({recording.path, i, {recording.touch(i)}, truth});
-      }
-    } else {
-      end = flags.touches ? begin + static_cast<std::size_t>(*flags.touches) : end;
-      unknowns.push_back({recording.path, {}, recording.touches(begin, end), truth});
-    }
+    std::ranges::move(unknowns_in(flags, frames, recording), std::back_inserter(unknowns));
   }
   return unknowns;
 }

@@ -5,7 +5,12 @@
 #include <string>
 #include <vector>
 
+#include "options.hpp"
 #include "recognition_record.hpp"
+
+namespace CLI {
+class App;
+}
 
 namespace palpate::cli {
 
@@ -15,6 +20,17 @@ struct UnknownFlags {
   std::optional<int> touches;
   bool each_frame = false;
 };
+
+void add_unknown_flags(CLI::App& command, UnknownFlags& flags);
+
+/// The flags' frames. Throws Error where the flags are no numbers of touches or contradict each
+/// other.
+std::optional<Frames> frames_of(const UnknownFlags& flags);
+
+/// The unknowns of one recording: views into its memory. Throws Error where it has fewer touches.
+/// @param frames the touches to use, or all
+std::vector<Unknown> unknowns_in(const UnknownFlags& flags, const std::optional<Frames>& frames,
+                                 const Recording& recording);
 
 /// The unknowns that the flags select: views into the recordings' memory. Throws Error.
 std::vector<Unknown> list_unknowns(const UnknownFlags& flags,

@@ -47,6 +47,9 @@ class CsvTable {
   /// As number(), for a cell that may not be empty.
   double require_number(std::size_t column) const;
 
+  /// Returns the text of a cell of the row, without the quotes around it; valid until next().
+  std::string_view text(std::size_t column) const { return cells_[column]; }
+
   /// Throws Error that names the row's line and the message, formatted as by fmt::format().
   template <typename... Parts>
   [[noreturn]] void refuse(fmt::format_string<const Parts&...> message,

@@ -94,6 +94,10 @@ INSTANTIATE_TEST_SUITE_P(
               "--json",         "--posterior", "--png",       "--device",    "T_object_robot",
               "bounded",        "100000",      "--tolerance", "1e-6",        "--budget-ms",
               "--evidence-nats"}},
+        Help{"batch",
+             {"INPUT", "-o,", "path, frames and label", "--maps", "--shard", "I/N", "Slurm",
+              "--update", "--chunk", "100", "--threads", "--each-frame", "--trace"}},
+        Help{"merge", {"RESULTS", "-o,", "NDJSON", "--partial"}},
         Help{"plan",
              {"RECORDING", "--maps", "--candidates", "grid", "CSV", "mm", "rad", "--goal", "=both",
               "identity", "--samples", "=96", "--plan-seed", "=0", "--json", "--png", "nats"}},
@@ -157,8 +161,8 @@ using ProgramHelp = ProgramTest;
 TEST_F(ProgramHelp, ListsTheCommands) {
   const std::string help = done({"--help"});
   for (const char* command :
-       {"devices", "sensors", "record", "touches", "simulate", "map", "recognize", "live",
-        "evaluate", "calibrate", "plan", "info", "import", "export"}) {
+       {"devices", "sensors", "record", "touches", "simulate", "map", "recognize", "live", "batch",
+        "merge", "evaluate", "calibrate", "plan", "info", "import", "export"}) {
     EXPECT_NE(help.find(std::string("\n  ") + command), std::string::npos) << help;
   }
 }

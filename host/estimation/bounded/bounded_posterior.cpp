@@ -93,7 +93,8 @@ struct BoundedPosterior::Impl {
                                     : tbb::info::default_concurrency()),
         arena(threads),
         likelihood(all, options.contact, options.lattice),
-        batches(likelihood, device.context(), hypotheses, options.contact, options.lattice),
+        batches(likelihood, device.context(), hypotheses, options.contact, options.lattice,
+                options.on_host ? BinPlace::host : BinPlace::measured),
         search(arena.execute([&] { return BoundSearch(all, options, likelihood, batches); })),
         log_weight(log_weights(all)) {
     for (const Hypothesis& hypothesis : all) {

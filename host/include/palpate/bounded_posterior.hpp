@@ -46,6 +46,9 @@ struct BoundedOptions {
   /// throws ends the search, and the call that asked for it throws the same; the belief stays as it
   /// was, and the next call searches anew.
   std::function<void()> cancel_point = {};
+  /// Evaluates bins on the host only. Otherwise a GPU may take them once it was measured to be
+  /// faster, and its rounding then depends on when that was.
+  bool on_host = false;
 };
 
 /// A block of bins of one hypothesis at one theta that a search divided into smaller ones or, at

@@ -1,0 +1,217 @@
+#include <sched.h>
+
+#include <algorithm>
+#include <chrono>
+#include <fstream>
+#include <iterator>
+#include <memory>
+#include <set>
+#include <thread>
+
+#include <fmt/format.h>
+#include <CLI/CLI.hpp>
+
+#include "batch_run.hpp"
+#include "batch_settling.hpp"
+#include "commands.hpp"
+#include "progress.hpp"
+
+namespace palpate::cli {
+
+namespace {
+
+struct Options {
+  std::vector<std::string> inputs;
+  std::string results;
+  UnknownFlags unknowns;
+  RecognitionFlags recognition;
+  bool trace = false;
+  bool update = false;
+  std::string shard;
+  int chunk = 100;
+  int threads = 0;
+};
+
+/// Exit status where all is done but some unknowns failed, which other programs rely on.
+constexpr int some_failed = 3;
+
+/// The cores that this process may use, as Slurm and taskset limit them.
+std::size_t cores() {
+  cpu_set_t set;
+  CPU_ZERO(&set);
+  const int count = ::sched_getaffinity(0, sizeof set, &set) == 0 ? CPU_COUNT(&set) : 0;
+  return count > 0 ? static_cast<std::size_t>(count)
+                   : std::max(1U, std::thread::hardware_concurrency());
+}
+
+/// The flags that change results, as given.
+std::map<std::string, std::vector<std::string>> flags_of(const CLI::App& command) {
+  const std::set<std::string> others{"--output", "--shard",   "--threads", "--device",
+                                     "--update", "--verbose", "--chunk"};
+  std::map<std::string, std::vector<std::string>> flags;
+  for (const CLI::Option* option : command.get_options()) {
+    if (option->count() > 0 && !option->get_positional() && !others.contains(option->get_name())) {
+      flags[option->get_name()] = option->results();
+    }
+  }
+  return flags;
+}
+
+/// The chunks of a shard.
+struct Chunks {
+  std::vector<bool> wanted;    ///< [chunk] of the shard and not there yet
+  std::size_t unknowns = 0;    ///< of the shard
+  std::size_t to_be_done = 0;  ///< unknowns of wanted chunks
+  BatchCounts finished;        ///< unknowns of its other chunks
+};
+
+Chunks chunks_of(const ResultsFolder& folder, const BatchTask& task, const Shard& shard) {
+  Chunks chunks{std::vector<bool>(task.chunks()), 0, 0, {}};
+  const std::size_t all = task.unknowns();
+  for (std::size_t chunk = shard.index; chunk < chunks.wanted.size(); chunk += shard.count) {
+    const std::size_t unknowns = std::min(task.chunk_unknowns, all - chunk * task.chunk_unknowns);
+    chunks.unknowns += unknowns;
+    chunks.wanted[chunk] = !folder.has_chunk(chunk);
+    if (chunks.wanted[chunk]) {
+      chunks.to_be_done += unknowns;
+      continue;
+    }
+    std::ifstream stream(folder.chunk(chunk), std::ios::binary);
+    const ChunkCounts counts =
+        count_records(std::string{std::istreambuf_iterator<char>(stream), {}});
+    if (counts.records != unknowns) {
+      refuse(folder.chunk(chunk), "has {} records instead of {}; remove it and begin again",
+             counts.records, unknowns);
+    }
+    chunks.finished.done += unknowns;
+    chunks.finished.failed += counts.failed;
+  }
+  return chunks;
+}
+
+double seconds_since(std::chrono::steady_clock::time_point begin) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+}
+
+/// Recognises what is missing of the shard. Returns the counts of this run.
+BatchCounts compute(const BatchRun& run, const Chunks& chunks, SettledBatch& settled,
+                    const Options& options) {
+  if (!settled.device) {
+    settled.device = open_device(options.recognition, run.rules.scene);
+  }
+  Progress progress("recognising");
+  const auto begin = std::chrono::steady_clock::now();
+  return run_batch(run, *settled.device, [&](const BatchCounts& counts) {
+    const double seconds = seconds_since(begin);
+    progress.show(static_cast<double>(counts.done) / static_cast<double>(chunks.to_be_done),
+                  fmt::format(", {:.0f} per second{}", static_cast<double>(counts.done) / seconds,
+                              counts.failed > 0 ? fmt::format(", {} failed", counts.failed) : ""));
+  });
+}
+
+std::string summary(const Options& options, const Shard& shard, const Chunks& chunks,
+                    const BatchCounts& now, double seconds) {
+  const std::size_t failed = chunks.finished.failed + now.failed;
+  std::string text = fmt::format("{}: {} unknown{}", options.results, chunks.unknowns,
+                                 chunks.unknowns == 1 ? "" : "s");
+  if (shard.count > 1) {
+    text += fmt::format(" of shard {}/{}", shard.index, shard.count);
+  }
+  if (chunks.finished.done > 0) {
+    text += fmt::format(", {} done before", chunks.finished.done);
+  }
+  if (now.done > 0) {
+    text += fmt::format(", {} now in {:.1f} s ({:.0f} per second)", now.done, seconds,
+                        static_cast<double>(now.done) / seconds);
+  }
+  return text + fmt::format("; {} failed\n", failed);
+}
+
+int batch(const Options& options, const CLI::App& command) {
+  if (options.recognition.filter.budget_ms) {
+    refuse_flag("--budget-ms", *options.recognition.filter.budget_ms,
+                "its results depend on the clock, and a batch's are the same on every run; leave "
+                "it out, or use palpate recognize");
+  }
+  if (options.chunk < 1) {
+    refuse_flag("--chunk", options.chunk, "give at least 1");
+  }
+  const Shard shard = shard_of(options.shard);
+  const InputRules rules{.flags = options.unknowns,
+                         .frames = frames_of(options.unknowns),
+                         .scene = scene_of(options.recognition),
+                         .scene_file = options.recognition.scene};
+  BatchTask asked{.program = PALPATE_VERSION,
+                  .chunk_unknowns = static_cast<std::size_t>(options.chunk),
+                  .each_frame = options.unknowns.each_frame,
+                  .flags = flags_of(command)};
+  for (BatchInput& input : list_inputs(options.inputs)) {
+    asked.inputs.push_back({std::move(input), {}, {}});
+  }
+  const ResultsFolder folder(options.results);
+  make_folder(folder.path());
+  const FolderLock lock(folder, shard);
+  const std::size_t threads =
+      options.threads > 0 ? static_cast<std::size_t>(options.threads) : cores();
+  SettledBatch settled = settle_batch(folder, lock, std::move(asked), options.recognition, rules,
+                                      options.update, threads);
+  const Chunks chunks = chunks_of(folder, settled.task, shard);
+  const auto begin = std::chrono::steady_clock::now();
+  BatchCounts now;
+  if (chunks.to_be_done > 0) {
+    now = compute({.folder = folder,
+                   .task = settled.task,
+                   .recognition = settled.recognition,
+                   .rules = rules,
+                   .wanted = chunks.wanted,
+                   .threads = threads,
+                   .trace = options.trace,
+                   .verbose = options.recognition.verbose,
+                   .tell = options.recognition.tell},
+                  chunks, settled, options);
+  }
+  fmt::print("{}", summary(options, shard, chunks, now, seconds_since(begin)));
+  return chunks.finished.failed + now.failed > 0 ? some_failed : 0;
+}
+
+}  // namespace
+
+void add_batch(CLI::App& app, int& status) {
+  auto* command = app.add_subcommand(
+      "batch",
+      "Recognise very many unknowns into a folder of results. Killed at any moment, the same "
+      "command goes on where it was, and its results are the same, byte for byte. A recording "
+      "that cannot be recognised becomes a record with its error, and the exit status is 3. "
+      "Several processes or machines share the work by --shard; palpate merge joins the results");
+  const auto options = std::make_shared<Options>();
+  command
+      ->add_option("INPUT", options->inputs,
+                   "Manifests (*.csv with the columns path, frames and label, of which path alone "
+                   "must be there), folders of recordings, recordings, or quoted patterns of them")
+      ->required();
+  command
+      ->add_option("-o,--output", options->results,
+                   "Folder of results; made where it is missing, completed where it is not")
+      ->required();
+  add_recognition_flags(*command, options->recognition);
+  command->get_option("--budget-ms")->group("");  // read still, to be refused with its reason
+  add_unknown_flags(*command, options->unknowns);
+  command->add_flag("--trace", options->trace, "Add the estimate after every touch");
+  command->add_option("--shard", options->shard,
+                      "Recognise only part I of N, from 0 to N - 1, as I/N [default: that of the "
+                      "Slurm job array's task, or all]");
+  command->add_flag("--update", options->update,
+                    "Where inputs, maps or flags differ from those of the results that are there: "
+                    "recognise again what differs, instead of refusing");
+  command
+      ->add_option("--chunk", options->chunk,
+                   "Unknowns of a chunk, which is what a killed process loses [default: 100]")
+      ->check(require_whole_number);
+  command
+      ->add_option("--threads", options->threads,
+                   "Host threads; results do not depend on them [default: the cores at hand]")
+      ->check(require_whole_number);
+  command->callback([options, command, &status] { status = batch(*options, *command); });
+}
+
+}  // namespace palpate::cli

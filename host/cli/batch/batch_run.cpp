@@ -1,0 +1,325 @@
+#include "batch_run.hpp"
+
+#include <unistd.h>
+
+#include <algorithm>
+#include <atomic>
+#include <climits>
+#include <exception>
+#include <map>
+#include <mutex>
+#include <thread>
+#include <utility>
+
+#include "bounded_queue.hpp"
+#include "filter_flags.hpp"
+#include "input_file.hpp"
+#include "palpate/error.hpp"
+#include "recognition_record.hpp"
+#include "record_output.hpp"
+#include "uncertainty_flags.hpp"
+
+namespace palpate::cli {
+
+namespace {
+
+using namespace std::chrono_literals;
+
+/// Unknowns that have been read, and lines that wait for the disk.
+constexpr std::size_t most_waiting_bytes = 64 << 20;
+/// How often progress is shown where nothing else happens.
+constexpr auto pause = 200ms;
+
+/// An unknown that has been read. `recording` keeps its touches alive.
+struct Job {
+  std::size_t index;  ///< among all unknowns
+  std::shared_ptr<const Recording> recording;
+  Unknown unknown;
+};
+
+/// A record as text.
+struct Line {
+  std::size_t index;
+  std::string text;
+  double seconds;
+  bool failed;
+};
+
+/// The lines of a chunk, some of which are still missing.
+struct OpenChunk {
+  std::vector<std::string> lines;
+  std::vector<double> seconds;
+  std::size_t missing = 0;
+  std::size_t failed = 0;
+};
+
+std::string host_name() {
+  char name[HOST_NAME_MAX + 1] = {};
+  return ::gethostname(name, sizeof name - 1) == 0 ? name : "";
+}
+
+std::size_t bytes_of(const Unknown& unknown) {
+  constexpr std::size_t least = 4096;
+  std::size_t bytes = least;
+  for (const Touch& touch : unknown.touches) {
+    bytes += sizeof(Touch) + touch.pressure.size() * (sizeof(double) + sizeof(glm::dvec2));
+  }
+  return bytes;
+}
+
+class Pipeline {
+ public:
+  Pipeline(const BatchRun& run, Device& device)
+      : run_(run),
+        device_(device),
+        task_(run.recognition),
+        unknowns_(run.task.unknowns()),
+        jobs_(most_waiting_bytes),
+        lines_(most_waiting_bytes) {
+    std::size_t at = 0;
+    for (const BatchEntry& entry : run.task.inputs) {
+      first_.push_back(at);
+      at += run.task.unknowns_of(entry);
+    }
+    const bool bounded = std::holds_alternative<BoundedOptions>(task_.filter);
+    recognisers_ = bounded ? std::min(run.threads, wanted_unknowns()) : 1;
+    if (bounded) {
+      auto& options = std::get<BoundedOptions>(task_.filter);
+      options.threads = static_cast<int>(std::max<std::size_t>(1, run.threads / recognisers_));
+      options.on_host = true;
+    }
+  }
+
+  BatchCounts run(const std::function<void(const BatchCounts&)>& progress) {
+    const std::size_t readers = (recognisers_ + 1) / 2;
+    readers_left_ = readers;
+    recognisers_left_ = recognisers_;
+    std::vector<std::jthread> threads;
+    for (std::size_t i = 0; i < readers; ++i) {
+      threads.emplace_back([this] { guard([this] { read(); }, readers_left_, jobs_); });
+    }
+    for (std::size_t i = 0; i < recognisers_; ++i) {
+      threads.emplace_back(
+          [this, i] { guard([this, i] { recognise_jobs(i == 0); }, recognisers_left_, lines_); });
+    }
+    try {
+      write(progress);
+    } catch (...) {
+      fail();
+    }
+    threads.clear();  // joins
+    if (failure_) {
+      std::rethrow_exception(failure_);
+    }
+    return counts_;
+  }
+
+ private:
+  std::size_t chunk_of(std::size_t unknown) const { return unknown / run_.task.chunk_unknowns; }
+
+  std::size_t wanted_unknowns() const {
+    std::size_t count = 0;
+    for (std::size_t chunk = 0; chunk < run_.wanted.size(); ++chunk) {
+      const std::size_t first = chunk * run_.task.chunk_unknowns;
+      count += run_.wanted[chunk] ? std::min(run_.task.chunk_unknowns, unknowns_ - first) : 0;
+    }
+    return count;
+  }
+
+  /// Remembers the exception at hand, if it is the first one, and ends all threads.
+  void fail() {
+    {
+      const std::lock_guard lock(mutex_);
+      failure_ = failure_ ? failure_ : std::current_exception();
+    }
+    failed_ = true;
+    jobs_.close();
+    lines_.close();
+  }
+
+  /// Runs a thread; the last one of its kind closes the queue that they fill.
+  template <typename Work, typename Queue>
+  void guard(const Work& work, std::atomic<std::size_t>& left, Queue& filled) {
+    try {
+      work();
+    } catch (...) {
+      fail();
+    }
+    if (--left == 0) {
+      filled.close();
+    }
+  }
+
+  bool is_wanted(std::size_t input) const {
+    const std::size_t first = first_[input];
+    const std::size_t count = run_.task.unknowns_of(run_.task.inputs[input]);
+    for (std::size_t chunk = chunk_of(first); count > 0 && chunk <= chunk_of(first + count - 1);
+         ++chunk) {
+      if (run_.wanted[chunk]) {
+        return true;
+      }
+    }
+    return false;
+  }
+
+  void read() {
+    RecordingReader reader;
+    for (std::size_t i = next_input_++; i < first_.size() && !failed_; i = next_input_++) {
+      if (is_wanted(i)) {
+        push_unknowns(i, read_unknowns(reader, run_.task.inputs[i]));
+      }
+    }
+  }
+
+  /// An unknown with an error where the input is at fault.
+  ReadInput read_unknowns(RecordingReader& reader, const BatchEntry& entry) const {
+    const auto require_unchanged = [&] {
+      if (stamp_of(entry.input.path) != entry.stamp) {
+        refuse(entry.input.path, "has changed since the batch began; begin again with --update");
+      }
+    };
+    require_unchanged();
+    try {
+      ReadInput read = read_input(reader, entry.input, run_.rules, &run_.task.inferred);
+      require_unchanged();
+      return read;
+    } catch (const Error& error) {
+      require_unchanged();
+      if (error.fault() != Fault::input) {
+        throw;
+      }
+      Unknown unknown{.recording = entry.input.path,
+                      .frame = {},
+                      .touches = {},
+                      .truth = {entry.input.label, {}},
+                      .error = error.what()};
+      return {nullptr, {std::move(unknown)}};
+    }
+  }
+
+  const std::optional<Frames>& frames_of(std::size_t input) const {
+    const std::optional<Frames>& own = run_.task.inputs[input].input.frames;
+    return own ? own : run_.rules.frames;
+  }
+
+  void push_unknowns(std::size_t input, ReadInput read) {
+    const std::size_t count = run_.task.unknowns_of(run_.task.inputs[input]);
+    if (read.recording && read.unknowns.size() != count) {
+      refuse(run_.task.inputs[input].input.path,
+             "has {} unknowns, but had {} when the batch began; begin again with --update",
+             read.unknowns.size(), count);
+    }
+    if (!read.recording && count > 1) {  // every press has the recording's error
+      read.unknowns.resize(count, read.unknowns.front());
+      const std::optional<Frames>& frames = frames_of(input);
+      for (std::size_t i = 0; i < count; ++i) {
+        read.unknowns[i].frame = (frames ? frames->begin : 0) + i;
+      }
+    }
+    for (std::size_t i = 0; i < count; ++i) {
+      const std::size_t index = first_[input] + i;
+      if (run_.wanted[chunk_of(index)]) {
+        const std::size_t bytes = bytes_of(read.unknowns[i]);
+        if (!jobs_.push({index, read.recording, std::move(read.unknowns[i])}, bytes)) {
+          return;
+        }
+      }
+    }
+  }
+
+  void recognise_jobs(bool first) {
+    Recogniser recogniser = open_filter(device_, task_);
+    if (first && run_.verbose) {
+      print_engine(device_, recogniser, task_);
+    }
+    while (const std::optional<Job> job = jobs_.pop()) {
+      const RecognitionRecord record = recognise(recogniser, task_, job->unknown, run_.trace);
+      if (record.error.empty()) {
+        tell_once(unresolved_words(task_, recogniser.lattice(), job->unknown.touches));
+      }
+      Line line{job->index, text_of(to_json(record, task_, std::nullopt, run_.trace)),
+                record.seconds, !record.error.empty()};
+      const std::size_t bytes = line.text.size();
+      if (!lines_.push(std::move(line), bytes)) {
+        return;
+      }
+    }
+  }
+
+  void tell_once(const std::string& sentence) {
+    if (!sentence.empty() && !told_.exchange(true)) {
+      run_.tell(sentence);
+    }
+  }
+
+  void write(const std::function<void(const BatchCounts&)>& progress) {
+    while (!lines_.ended()) {
+      if (std::optional<Line> line = lines_.pop_within(pause)) {
+        add(*std::move(line));
+      }
+      progress(counts_);
+    }
+  }
+
+  void add(Line line) {
+    const std::size_t chunk = chunk_of(line.index);
+    const std::size_t first = chunk * run_.task.chunk_unknowns;
+    OpenChunk& open = open_[chunk];
+    if (open.lines.empty()) {
+      open.missing = std::min(run_.task.chunk_unknowns, unknowns_ - first);
+      open.lines.resize(open.missing);
+      open.seconds.resize(open.missing);
+    }
+    open.lines[line.index - first] = std::move(line.text);
+    open.seconds[line.index - first] = line.seconds;
+    open.failed += line.failed ? 1 : 0;
+    counts_.failed += line.failed ? 1 : 0;
+    ++counts_.done;
+    if (--open.missing == 0) {
+      write(chunk, open);
+      open_.erase(chunk);
+    }
+  }
+
+  void write(std::size_t index, const OpenChunk& chunk) const {
+    // First: a chunk that is there has its run.
+    write_file(run_.folder.run(index), text_of({{"first", index * run_.task.chunk_unknowns},
+                                                {"unknowns", chunk.lines.size()},
+                                                {"failed", chunk.failed},
+                                                {"host", host_name()},
+                                                {"device", device_.name()},
+                                                {"seconds", chunk.seconds}}));
+    std::string text;
+    for (const std::string& line : chunk.lines) {
+      text += line;
+    }
+    write_file(run_.folder.chunk(index), text);
+  }
+
+  const BatchRun& run_;
+  Device& device_;
+  RecognitionTask task_;
+  std::size_t unknowns_;
+  std::vector<std::size_t> first_;  ///< [input] index of its first unknown
+  std::size_t recognisers_ = 1;
+  BoundedQueue<Job> jobs_;
+  BoundedQueue<Line> lines_;
+  std::atomic<std::size_t> next_input_ = 0;
+  std::atomic<std::size_t> readers_left_ = 0;
+  std::atomic<std::size_t> recognisers_left_ = 0;
+  std::atomic<bool> failed_ = false;
+  std::atomic<bool> told_ = false;
+  std::mutex mutex_;
+  std::exception_ptr failure_;  ///< the first one
+  std::map<std::size_t, OpenChunk> open_;
+  BatchCounts counts_;
+};
+
+}  // namespace
+
+BatchCounts run_batch(const BatchRun& run, Device& device,
+                      const std::function<void(const BatchCounts&)>& progress) {
+  return Pipeline(run, device).run(progress);
+}
+
+}  // namespace palpate::cli

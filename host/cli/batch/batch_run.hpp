@@ -1,0 +1,43 @@
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "batch_task.hpp"
+#include "input_reading.hpp"
+#include "recognition_task.hpp"
+#include "results_folder.hpp"
+
+namespace palpate::cli {
+
+/// Unknowns of a run so far.
+struct BatchCounts {
+  std::size_t done = 0;
+  std::size_t failed = 0;
+};
+
+/// A run that computes some chunks of a results folder.
+struct BatchRun {
+  const ResultsFolder& folder;
+  const BatchTask& task;
+  const RecognitionTask& recognition;  ///< settled
+  const InputRules& rules;
+  const std::vector<bool>& wanted;  ///< [chunk]
+  std::size_t threads = 1;
+  bool trace = false;
+  bool verbose = false;
+  std::function<void(const std::string&)> tell;  ///< says a sentence to the user
+};
+
+/// Recognises the unknowns of the wanted chunks and writes each chunk once it is whole. Recordings
+/// are read in child processes while others are recognised, so that memory does not follow their
+/// number. Bounds recognise several unknowns at once; a histogram and particles, whose work a
+/// device divides by itself, one. The chunks have the same bytes whatever the number of threads.
+/// Calls `progress` now and then.
+/// @throws Error where an input changes meanwhile, and on a full disk or a device that fails
+BatchCounts run_batch(const BatchRun& run, Device& device,
+                      const std::function<void(const BatchCounts&)>& progress);
+
+}  // namespace palpate::cli

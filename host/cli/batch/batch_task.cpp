@@ -1,0 +1,332 @@
+#include "batch_task.hpp"
+
+#include <sys/stat.h>
+
+#include <algorithm>
+#include <fstream>
+#include <iterator>
+#include <utility>
+
+#include <fmt/ranges.h>
+#include <nlohmann/json.hpp>
+
+#include "atomic_file.hpp"
+#include "input_file.hpp"
+
+namespace palpate::cli {
+
+namespace {
+
+using Json = nlohmann::ordered_json;
+namespace fs = std::filesystem;
+
+constexpr const char* format = "palpate.batch";
+constexpr int version = 1;
+
+/// The program's texts may hold any bytes, as paths may; JSON must be UTF-8. Each byte becomes the
+/// character of its number, so that the text comes back as it was.
+std::string to_utf8(std::string_view bytes) {
+  std::string text;
+  for (const char c : bytes) {
+    const auto byte = static_cast<unsigned char>(c);
+    if (byte < 0x80) {
+      text += c;
+    } else {
+      text += static_cast<char>(0xC0 | (byte >> 6));
+      text += static_cast<char>(0x80 | (byte & 0x3F));
+    }
+  }
+  return text;
+}
+
+std::string from_utf8(const std::string& text) {
+  std::string bytes;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    const auto lead = static_cast<unsigned char>(text[i]);
+    if (lead < 0x80 || i + 1 == text.size()) {
+      bytes += text[i];
+    } else {
+      const auto next = static_cast<unsigned char>(text[++i]);
+      bytes += static_cast<char>(((lead & 0x03) << 6) | (next & 0x3F));
+    }
+  }
+  return bytes;
+}
+
+Json to_json(const BatchEntry& entry) {
+  Json json{{"path", to_utf8(entry.input.path)}};
+  if (entry.input.frames) {
+    json["frames"] = Json::array({entry.input.frames->begin, entry.input.frames->end});
+  }
+  if (!entry.input.label.empty()) {
+    json["label"] = to_utf8(entry.input.label);
+  }
+  if (entry.stamp) {
+    json["bytes"] = entry.stamp->bytes;
+    json["modified_ns"] = entry.stamp->modified_ns;
+  }
+  if (const auto& survey = entry.survey) {
+    json["survey"] = {survey->touches, survey->reach_mm, survey->pressure_unit, survey->placement};
+  }
+  return json;
+}
+
+BatchEntry entry_of(const Json& json) {
+  BatchEntry entry;
+  entry.input.path = from_utf8(json.at("path"));
+  if (json.contains("frames")) {
+    entry.input.frames = Frames{json.at("frames").at(0), json.at("frames").at(1)};
+  }
+  entry.input.label = from_utf8(json.value("label", ""));
+  if (json.contains("bytes")) {
+    entry.stamp = FileStamp{json.at("bytes"), json.at("modified_ns")};
+  }
+  if (json.contains("survey")) {
+    const Json& survey = json.at("survey");
+    entry.survey = InputSurvey{survey.at(0), survey.at(1), survey.at(2), survey.at(3)};
+  }
+  return entry;
+}
+
+Json head_to_json(const BatchTask& task) {
+  Json flags = Json::object();
+  for (const auto& [flag, values] : task.flags) {
+    for (const std::string& value : values) {
+      flags[flag].push_back(to_utf8(value));
+    }
+  }
+  Json files = Json::object();
+  for (const auto& [file, hash] : task.files) {
+    files[to_utf8(file)] = hash;
+  }
+  const BatchInference& inferred = task.inferred;
+  return {{"format", format},
+          {"version", version},
+          {"program", task.program},
+          {"inputs", task.inputs.size()},
+          {"unknowns", task.unknowns()},
+          {"chunk_unknowns", task.chunk_unknowns},
+          {"each_frame", task.each_frame},
+          {"flags", flags},
+          {"files", files},
+          {"pressure_unit", inferred.pressure_unit},
+          {"unit_from", to_utf8(inferred.unit_from)},
+          {"reach_mm", inferred.reach_mm},
+          {"still_array", inferred.still_array},
+          {"bins", task.bins}};
+}
+
+BatchTask head_of(const Json& json) {
+  BatchTask task;
+  task.program = json.at("program");
+  task.chunk_unknowns = std::max<std::size_t>(json.at("chunk_unknowns").get<std::size_t>(), 1);
+  task.each_frame = json.at("each_frame");
+  for (const auto& [flag, values] : json.at("flags").items()) {
+    for (const Json& value : values) {
+      task.flags[flag].push_back(from_utf8(value));
+    }
+  }
+  for (const auto& [file, hash] : json.at("files").items()) {
+    task.files[from_utf8(file)] = hash;
+  }
+  task.inferred = {json.at("pressure_unit"), from_utf8(json.at("unit_from")), json.at("reach_mm"),
+                   json.at("still_array")};
+  json.at("bins").get_to(task.bins);
+  return task;
+}
+
+std::string values_of(const BatchTask& task, const std::string& flag) {
+  const auto found = task.flags.find(flag);
+  return found == task.flags.end() ? "not given"
+                                   : fmt::format("'{}'", fmt::join(found->second, " "));
+}
+
+/// The first key at which two maps differ; none where they are equal.
+template <typename Map>
+std::optional<std::string> first_difference(const Map& a, const Map& b) {
+  for (const auto& [key, value] : a) {
+    const auto found = b.find(key);
+    if (found == b.end() || found->second != value) {
+      return key;
+    }
+  }
+  for (const auto& [key, value] : b) {
+    if (!a.contains(key)) {
+      return key;
+    }
+  }
+  return {};
+}
+
+/// An input within a chunk, and where the chunk begins in it.
+struct Part {
+  const BatchEntry* entry;
+  std::size_t first;
+  std::size_t count;
+
+  friend bool operator==(const Part& a, const Part& b) {
+    return *a.entry == *b.entry && a.first == b.first && a.count == b.count;
+  }
+};
+
+std::vector<std::vector<Part>> parts_of_chunks(const BatchTask& task) {
+  std::vector<std::vector<Part>> chunks(task.chunks());
+  std::size_t at = 0;
+  for (const BatchEntry& entry : task.inputs) {
+    const std::size_t count = task.unknowns_of(entry);
+    for (std::size_t done = 0; done < count;) {
+      const std::size_t chunk = (at + done) / task.chunk_unknowns;
+      const std::size_t room = (chunk + 1) * task.chunk_unknowns - (at + done);
+      const std::size_t taken = std::min(room, count - done);
+      chunks[chunk].push_back({&entry, done, taken});
+      done += taken;
+    }
+    at += count;
+  }
+  return chunks;
+}
+
+}  // namespace
+
+std::optional<FileStamp> stamp_of(const std::string& path) {
+  struct stat status {};
+  if (::stat(path.c_str(), &status) != 0) {
+    return {};
+  }
+  constexpr std::int64_t ns = 1'000'000'000;
+  return FileStamp{static_cast<std::uintmax_t>(status.st_size),
+                   status.st_mtim.tv_sec * ns + status.st_mtim.tv_nsec};
+}
+
+std::size_t BatchTask::unknowns_of(const BatchEntry& entry) const {
+  return each_frame && entry.survey ? entry.survey->touches : 1;
+}
+
+std::size_t BatchTask::unknowns() const {
+  std::size_t sum = 0;
+  for (const BatchEntry& entry : inputs) {
+    sum += unknowns_of(entry);
+  }
+  return sum;
+}
+
+std::size_t BatchTask::chunks() const { return (unknowns() + chunk_unknowns - 1) / chunk_unknowns; }
+
+BatchTask read_batch_task(const fs::path& file) {
+  require_readable(file);
+  std::ifstream stream(file, std::ios::binary);
+  std::string line;
+  try {
+    std::getline(stream, line);
+    const Json head = Json::parse(line);
+    if (head.at("format") != format) {
+      refuse(file, "is no task of palpate batch; give another folder");
+    }
+    if (head.at("version") > version) {
+      refuse(file, "has version {}, this program reads {}; use a newer palpate",
+             head.at("version").get<int>(), version);
+    }
+    BatchTask task = head_of(head);
+    while (std::getline(stream, line)) {
+      task.inputs.push_back(entry_of(Json::parse(line)));
+    }
+    if (task.inputs.size() != head.at("inputs") || stream.bad()) {
+      refuse(file, "is cut off; remove the folder, or copy it again");
+    }
+    return task;
+  } catch (const Json::exception&) {
+    refuse(file, "is damaged; remove the folder, or copy it again");
+  }
+}
+
+void write_batch_task(const fs::path& file, const BatchTask& task) {
+  AtomicFile target(file);
+  std::string text = head_to_json(task).dump() + "\n";
+  constexpr std::size_t piece = 1 << 20;
+  for (const BatchEntry& entry : task.inputs) {
+    text += to_json(entry).dump() + "\n";
+    if (text.size() > piece) {
+      target.append(text);
+      text.clear();
+    }
+  }
+  target.append(text);
+  target.commit();
+}
+
+std::string difference_of_tasks(const BatchTask& before, const BatchTask& now) {
+  if (before.program != now.program) {
+    return fmt::format("palpate is {}, its results are of {}", now.program, before.program);
+  }
+  if (const auto flag = first_difference(before.flags, now.flags)) {
+    return fmt::format("{} is {}, its results are of {}", *flag, values_of(now, *flag),
+                       values_of(before, *flag));
+  }
+  if (before.chunk_unknowns != now.chunk_unknowns) {
+    return fmt::format("chunks of {} unknowns are asked for, its results have {}",
+                       now.chunk_unknowns, before.chunk_unknowns);
+  }
+  if (const auto file = first_difference(before.files, now.files)) {
+    return fmt::format("{} {}", *file,
+                       !now.files.contains(*file)      ? "is no longer used"
+                       : !before.files.contains(*file) ? "is new"
+                                                       : "has changed");
+  }
+  if (!(before.inferred == now.inferred)) {
+    return "the recordings' arrays or pressure unit have changed";
+  }
+  return "";
+}
+
+std::string difference_of_inputs(const BatchTask& before, const BatchTask& now) {
+  const std::size_t both = std::min(before.inputs.size(), now.inputs.size());
+  for (std::size_t i = 0; i < both; ++i) {
+    const BatchEntry& old = before.inputs[i];
+    const BatchEntry& entry = now.inputs[i];
+    if (!(old.input == entry.input)) {
+      return fmt::format("input {} is {}, its results are of {}{}", i, entry.input.path,
+                         old.input.path,
+                         old.input.path == entry.input.path ? " with other frames or label" : "");
+    }
+    if (old.stamp != entry.stamp) {
+      return fmt::format("{} {}", entry.input.path,
+                         !entry.stamp ? "is gone"
+                         : !old.stamp ? "is new"
+                                      : "has changed");
+    }
+  }
+  return before.inputs.size() == now.inputs.size()
+             ? ""
+             : fmt::format("{} inputs are given, its results are of {}", now.inputs.size(),
+                           before.inputs.size());
+}
+
+std::vector<bool> equal_chunks(const BatchTask& before, const BatchTask& now) {
+  const auto old = parts_of_chunks(before);
+  const auto parts = parts_of_chunks(now);
+  std::vector<bool> equal(parts.size());
+  for (std::size_t i = 0; i < std::min(old.size(), parts.size()); ++i) {
+    equal[i] = old[i] == parts[i];
+  }
+  return equal;
+}
+
+std::string hash_of(std::string_view bytes) {
+  std::uint64_t hash = 0xcbf29ce484222325;
+  for (const char c : bytes) {
+    hash = (hash ^ static_cast<unsigned char>(c)) * 0x100000001b3;
+  }
+  return fmt::format("{:016x}", hash);
+}
+
+std::string hash_of_file(const fs::path& file) {
+  require_readable(file);
+  std::ifstream stream(file, std::ios::binary);
+  const std::string bytes{std::istreambuf_iterator<char>(stream), {}};
+  if (!stream) {
+    refuse(file, "cannot be read; copy it again");
+  }
+  return hash_of(bytes);
+}
+
+}  // namespace palpate::cli

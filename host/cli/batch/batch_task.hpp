@@ -1,0 +1,90 @@
+#pragma once
+
+#include <sys/types.h>
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "batch_inputs.hpp"
+
+namespace palpate::cli {
+
+/// Size and time of modification, by which a changed file is noticed.
+struct FileStamp {
+  std::uintmax_t bytes = 0;
+  std::int64_t modified_ns = 0;  ///< since the Unix epoch
+
+  friend bool operator==(const FileStamp&, const FileStamp&) = default;
+};
+/// None where there is no such file.
+std::optional<FileStamp> stamp_of(const std::string& path);
+
+/// What is known of an input from reading it ahead of its recognition.
+struct InputSurvey {
+  std::size_t touches = 1;    ///< that are used; 1 where it cannot be read
+  double reach_mm = 0.0;      ///< the largest array_reach_mm() of its touches
+  std::string pressure_unit;  ///< "" where it cannot be read
+  std::string placement;      ///< hash of pose and array where all touches share them, or ""
+
+  friend bool operator==(const InputSurvey&, const InputSurvey&) = default;
+};
+
+struct BatchEntry {
+  BatchInput input;
+  std::optional<FileStamp> stamp;
+  std::optional<InputSurvey> survey;  ///< only where the task needs it
+
+  friend bool operator==(const BatchEntry&, const BatchEntry&) = default;
+};
+
+/// What follows from all inputs together.
+struct BatchInference {
+  std::string pressure_unit = "kPa";
+  std::string unit_from;  ///< the first input that can be read
+  double reach_mm = 0.0;
+  bool still_array = false;
+
+  friend bool operator==(const BatchInference&, const BatchInference&) = default;
+};
+
+/// What a results folder computes: the content of its task file, in whose absence nothing is
+/// computed. Two equal tasks have equal results.
+struct BatchTask {
+  std::string program;             ///< version
+  std::size_t chunk_unknowns = 0;  ///< in each chunk but the last
+  bool each_frame = false;
+  std::map<std::string, std::vector<std::string>> flags;  ///< that change results, as given
+  std::map<std::string, std::string> files;  ///< maps, sensor model, scene: hashes of their content
+  BatchInference inferred;
+  std::array<int, 3> bins{};  ///< of the lattice; those of --bins auto follow from the device
+  std::vector<BatchEntry> inputs;
+
+  std::size_t unknowns_of(const BatchEntry& entry) const;
+  std::size_t unknowns() const;
+  std::size_t chunks() const;
+};
+
+/// Reads and writes the task file. @throws Error
+BatchTask read_batch_task(const std::filesystem::path& file);
+void write_batch_task(const std::filesystem::path& file, const BatchTask& task);
+
+/// Why all results of `before` are no results of `now`, naming the flag or the file; "" where only
+/// inputs may differ.
+std::string difference_of_tasks(const BatchTask& before, const BatchTask& now);
+/// The first input that differs, in words; "" where none does.
+std::string difference_of_inputs(const BatchTask& before, const BatchTask& now);
+/// [chunk of `now`] whether it holds the same unknowns in `before`.
+std::vector<bool> equal_chunks(const BatchTask& before, const BatchTask& now);
+
+/// Hash of bytes, in hexadecimal (FNV-1a, 64 bits): tells files apart that nobody has forged.
+std::string hash_of(std::string_view bytes);
+/// Hash of a file's content. @throws Error
+std::string hash_of_file(const std::filesystem::path& file);
+
+}  // namespace palpate::cli

@@ -1,0 +1,156 @@
+#include "input_reading.hpp"
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <exception>
+#include <mutex>
+#include <thread>
+
+#include "palpate/error.hpp"
+#include "recognition_flags.hpp"
+#include "recordings.hpp"
+
+namespace palpate::cli {
+
+namespace {
+
+template <typename Value>
+std::string_view bytes_of(std::span<const Value> values) {
+  return {reinterpret_cast<const char*>(values.data()), values.size_bytes()};
+}
+
+/// The hash of the pose and the array that all touches share; "" where they differ.
+std::string placement_of(std::span<const Unknown> unknowns) {
+  const Touch& first = unknowns.front().touches.front();
+  for (const Unknown& unknown : unknowns) {
+    for (const Touch& touch : unknown.touches) {
+      if (!same_placement(touch, first)) {
+        return "";
+      }
+    }
+  }
+  return hash_of(std::string(bytes_of(std::span(&first.T_robot_sensor, 1))) +
+                 std::string(bytes_of(first.elements_mm)));
+}
+
+InputSurvey survey_of(RecordingReader& reader, const BatchEntry& entry, const InputRules& rules) {
+  try {
+    const ReadInput read = read_input(reader, entry.input, rules, nullptr);
+    InputSurvey survey{.touches = 0,
+                       .reach_mm = reach_mm(std::span(read.recording.get(), 1)),
+                       .pressure_unit = read.recording->pressure_unit,
+                       .placement = ""};
+    for (const Unknown& unknown : read.unknowns) {
+      survey.touches += unknown.touches.size();
+    }
+    // Only single presses of large arrays are at rest to any use; see array_is_still().
+    if (array_is_still(read.unknowns) || (rules.flags.each_frame && read.unknowns.size() == 1)) {
+      survey.placement = placement_of(read.unknowns);
+    }
+    return survey;
+  } catch (const Error& error) {
+    if (error.fault() != Fault::input) {
+      throw;
+    }
+    return {};
+  }
+}
+
+/// As array_is_still() of all unknowns together.
+bool is_still(std::span<const BatchEntry> inputs, const InputRules& rules,
+              const BatchInference& inferred) {
+  // A broken recording has no array that could move.
+  const auto broken = [](const BatchEntry& entry) { return entry.survey->pressure_unit.empty(); };
+  const auto first = std::ranges::find_if_not(inputs, broken);
+  if (!rules.flags.each_frame || first == inputs.end() || first->survey->placement.empty() ||
+      first->survey->pressure_unit != inferred.pressure_unit) {
+    return false;
+  }
+  std::size_t presses = 0;
+  for (const BatchEntry& entry : inputs) {
+    if (!broken(entry) && entry.survey->placement != first->survey->placement) {
+      return false;
+    }
+    presses += entry.survey->touches;
+  }
+  return presses > 1;
+}
+
+}  // namespace
+
+ReadInput read_input(RecordingReader& reader, const BatchInput& input, const InputRules& rules,
+                     const BatchInference* inferred) {
+  const auto recording = std::make_shared<Recording>(reader.read(input.path));
+  Recording like = inferred == nullptr ? Recording{} : Recording{.path = inferred->unit_from};
+  like.pressure_unit = inferred == nullptr ? recording->pressure_unit : inferred->pressure_unit;
+  require_touches(*recording, like);
+  replace_array(rules.scene, rules.scene_file, recording->path, recording->elements(),
+                recording->elements_mm);
+  ReadInput read{recording,
+                 unknowns_in(rules.flags, input.frames ? input.frames : rules.frames, *recording)};
+  for (Unknown& unknown : read.unknowns) {
+    if (!input.label.empty() && unknown.truth.label != input.label) {
+      unknown.truth = {input.label, {}};
+    }
+  }
+  return read;
+}
+
+void survey_inputs(std::span<BatchEntry> inputs, const InputRules& rules, std::size_t threads,
+                   const std::function<void(double)>& progress) {
+  std::atomic<std::size_t> next = 0;
+  std::exception_ptr failure;
+  std::mutex mutex;
+  const auto work = [&](bool shows) {
+    try {
+      RecordingReader reader;
+      for (std::size_t i = next++; i < inputs.size(); i = next++) {
+        if (!inputs[i].survey) {
+          inputs[i].survey = survey_of(reader, inputs[i], rules);
+        }
+        if (shows) {
+          progress(static_cast<double>(i) / static_cast<double>(inputs.size()));
+        }
+      }
+    } catch (...) {
+      next = inputs.size();
+      const std::lock_guard lock(mutex);
+      failure = std::current_exception();
+    }
+  };
+  {
+    std::vector<std::jthread> others;
+    for (std::size_t i = 1; i < threads; ++i) {
+      others.emplace_back(work, false);
+    }
+    work(true);
+  }
+  if (failure) {
+    std::rethrow_exception(failure);
+  }
+}
+
+BatchInference infer(std::span<const BatchEntry> inputs, const InputRules& rules) {
+  BatchInference inferred;
+  RecordingReader reader;
+  const auto surveyed = [&](const BatchEntry& entry) {
+    return entry.survey ? *entry.survey : survey_of(reader, entry, rules);
+  };
+  for (const BatchEntry& entry : inputs) {
+    if (const InputSurvey survey = surveyed(entry); !survey.pressure_unit.empty()) {
+      inferred.pressure_unit = survey.pressure_unit;
+      inferred.unit_from = entry.input.path;
+      break;
+    }
+  }
+  if (inputs.front().survey) {
+    for (const BatchEntry& entry : inputs) {
+      inferred.reach_mm = std::max(inferred.reach_mm, entry.survey->reach_mm);
+    }
+    inferred.still_array = is_still(inputs, rules, inferred);
+  }
+  return inferred;
+}
+
+}  // namespace palpate::cli

@@ -1,0 +1,66 @@
+#include "shard.hpp"
+
+#include <charconv>
+#include <cstdlib>
+#include <optional>
+#include <string_view>
+
+#include "options.hpp"
+
+namespace palpate::cli {
+
+namespace {
+
+std::optional<std::size_t> count_in(std::string_view text) {
+  std::size_t number = 0;
+  const char* const end = text.data() + text.size();
+  const auto [rest, error] = std::from_chars(text.data(), end, number);
+  return error == std::errc{} && rest == end ? std::optional(number) : std::nullopt;
+}
+
+/// The number in a variable that Slurm sets; none where it is not set.
+std::optional<std::size_t> from_slurm(const char* name) {
+  const char* const text = std::getenv(name);
+  if (text == nullptr || *text == '\0') {
+    return {};
+  }
+  const std::optional<std::size_t> number = count_in(text);
+  if (!number) {
+    refuse_flag(name, text, "is no whole number; unset it, or give --shard I/N");
+  }
+  return number;
+}
+
+}  // namespace
+
+Shard shard_of(const std::string& flag) {
+  if (!flag.empty()) {
+    const std::string_view text = flag;
+    const std::size_t slash = text.find('/');
+    const auto index = count_in(text.substr(0, slash));
+    const auto count = slash == text.npos ? std::nullopt : count_in(text.substr(slash + 1));
+    if (!index || !count || *index >= *count || *count > most_shards) {
+      refuse_flag("--shard", flag, "give it as I/N, with I from 0 to N - 1 and N up to {}",
+                  most_shards);
+    }
+    return {*index, *count};
+  }
+  const auto id = from_slurm("SLURM_ARRAY_TASK_ID");
+  const auto count = from_slurm("SLURM_ARRAY_TASK_COUNT");
+  if (!id || !count) {
+    return {};
+  }
+  const std::size_t first = from_slurm("SLURM_ARRAY_TASK_MIN").value_or(0);
+  const std::size_t step = from_slurm("SLURM_ARRAY_TASK_STEP").value_or(1);
+  const bool even = step > 0 && *id >= first && (*id - first) % step == 0;
+  const std::size_t index = even ? (*id - first) / step : *count;
+  if (index >= *count || *count > most_shards) {
+    refuse_flag("SLURM_ARRAY_TASK_ID", *id,
+                "is not one of {} evenly spaced numbers from {}; submit with --array=0-{}, or give "
+                "--shard I/N",
+                *count, first, *count - 1);
+  }
+  return {index, *count};
+}
+
+}  // namespace palpate::cli

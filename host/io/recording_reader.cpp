@@ -1,0 +1,169 @@
+#include "recording_reader.hpp"
+
+#include <string>
+#include <system_error>
+#include <type_traits>
+#include <vector>
+
+#include "forked_child.hpp"
+#include "hdf5_handle.hpp"
+#include "hdf5_process.hpp"
+#include "palpate/error.hpp"
+#include "palpate/files.hpp"
+#include "printable.hpp"
+
+namespace palpate {
+
+namespace {
+
+using namespace std::chrono_literals;
+
+/// Files beyond this have a child of their own: its cost is small beside theirs, and the limits
+/// below need not allow for them.
+constexpr std::uint64_t most_file_bytes = 16 << 20;
+constexpr std::uint64_t child_bytes = 512 << 20;
+/// Of a file: reading it takes milliseconds.
+constexpr std::uint64_t cpu_seconds = 5;
+/// At 1 MB/s, the rate of the slowest disk that is worth waiting for, the largest file takes 16 s.
+constexpr auto silence = 90s;
+/// A path, a label or a unit is shorter.
+constexpr std::uint64_t most_text_bytes = 1 << 20;
+
+static_assert(std::is_trivially_copyable_v<Pose> && std::is_trivially_copyable_v<glm::dvec2>);
+
+/// Sends lists as their length and their bytes.
+class Sender {
+ public:
+  explicit Sender(int socket) : socket_(socket) {}
+
+  template <class List>
+  void list(const List& values) {
+    const std::uint64_t count = values.size();
+    forked_write(socket_, &count, sizeof count);
+    forked_write(socket_, values.data(), count * sizeof(typename List::value_type));
+  }
+
+ private:
+  int socket_;
+};
+
+/// Receives them. Nothing is trusted: a damaged file may have corrupted the child's memory.
+class Receiver {
+ public:
+  explicit Receiver(ForkedChild& child) : child_(child) {}
+
+  template <class List>
+  bool list(List& values, std::uint64_t most_bytes = child_bytes) {
+    std::uint64_t count = 0;
+    if (!child_.read(&count, sizeof count) ||
+        count > most_bytes / sizeof(typename List::value_type)) {
+      return false;
+    }
+    values.resize(count);
+    return child_.read(values.data(), count * sizeof(typename List::value_type));
+  }
+
+ private:
+  ForkedChild& child_;
+};
+
+void send(int socket, const Recording& recording) {
+  Sender sender(socket);
+  const bool known = recording.truth.has_value();
+  sender.list(recording.object);
+  sender.list(recording.pressure_unit);
+  sender.list(recording.rows);
+  sender.list(recording.T_robot_sensor);
+  sender.list(recording.pressure);
+  sender.list(recording.elements_mm);
+  sender.list(recording.valid);
+  sender.list(known ? recording.truth->object : std::string());
+  sender.list(known ? std::vector{recording.truth->T_object_robot} : std::vector<Pose>{});
+}
+
+/// Whether the sizes are those of a recording, and its texts are texts.
+bool is_whole(const Recording& recording) {
+  const std::size_t all = recording.pressure.size();
+  const std::size_t e = recording.elements();
+  const auto fits = [&](std::size_t count) { return count == e || count == all; };
+  return all > 0 && all == e * recording.size() && fits(recording.elements_mm.size()) &&
+         (recording.valid.empty() || fits(recording.valid.size())) &&
+         is_printable(recording.object) &&
+         (!recording.truth || is_printable(recording.truth->object)) &&
+         (recording.pressure_unit == "kPa" || recording.pressure_unit == "raw") &&
+         (recording.rows == "touches" || recording.rows == "frames");
+}
+
+/// In the child: answers paths with recordings, or with a 0 where there is none.
+void serve(int socket) {
+  // The fork took place while its thread held this mutex, and that thread lives on as this one.
+  hdf5_mutex.unlock();
+  read_hdf5_in_children(false);
+  for (;;) {
+    std::uint64_t size = 0;
+    forked_read(socket, &size, sizeof size);  // ends the child after the last path
+    std::string path(size, '\0');
+    forked_read(socket, path.data(), size);
+    allow_cpu_seconds(cpu_seconds);
+    std::uint8_t answered = 0;
+    try {
+      const Recording recording = read_recording(path);
+      answered = 1;
+      forked_write(socket, &answered, sizeof answered);
+      send(socket, recording);
+    } catch (const Error&) {
+      forked_write(socket, &answered, sizeof answered);
+    }
+  }
+}
+
+}  // namespace
+
+RecordingReader::RecordingReader() = default;
+RecordingReader::~RecordingReader() = default;
+
+Recording RecordingReader::read(const std::filesystem::path& path) {
+  std::error_code error;
+  const std::uintmax_t bytes = std::filesystem::file_size(path, error);
+  Recording recording;
+  if (!error && bytes <= most_file_bytes && reads_hdf5_in_children() &&
+      read_in_child(path, recording)) {
+    return recording;
+  }
+  return read_recording(path);
+}
+
+bool RecordingReader::read_in_child(const std::filesystem::path& path, Recording& recording) {
+  if (!child_) {
+    child_ = std::make_unique<ForkedChild>(
+        serve,
+        ForkedLimits{.cpu_seconds = cpu_seconds, .memory_bytes = child_bytes, .silence = silence},
+        hdf5_mutex);
+  }
+  const std::string& name = path.native();
+  const std::uint64_t size = name.size();
+  std::uint8_t answered = 0;
+  Receiver receiver(*child_);
+  std::string true_object;
+  std::vector<Pose> true_pose;
+  const bool read = child_->write(&size, sizeof size) && child_->write(name.data(), size) &&
+                    child_->read(&answered, sizeof answered) && answered == 1 &&
+                    receiver.list(recording.object, most_text_bytes) &&
+                    receiver.list(recording.pressure_unit, most_text_bytes) &&
+                    receiver.list(recording.rows, most_text_bytes) &&
+                    receiver.list(recording.T_robot_sensor) && receiver.list(recording.pressure) &&
+                    receiver.list(recording.elements_mm) && receiver.list(recording.valid) &&
+                    receiver.list(true_object, most_text_bytes) && receiver.list(true_pose) &&
+                    true_pose.size() <= 1;
+  if (read && !true_pose.empty()) {
+    recording.truth = Truth{std::move(true_object), true_pose.front()};
+  }
+  if (!read || !is_whole(recording)) {
+    child_.reset();  // its memory may be damaged
+    return false;
+  }
+  recording.path = path.string();
+  return true;
+}
+
+}  // namespace palpate

@@ -1,0 +1,211 @@
+// palpate batch is killed, meets a full disk, other processes and other inputs.
+
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <csignal>
+#include <random>
+#include <stdexcept>
+
+#include "batch_folder.hpp"
+#include "results_folder.hpp"
+
+namespace palpate {
+namespace {
+
+using BatchResumption = BatchTest;
+
+TEST_F(BatchResumption, KilledAtAnyMomentItEndsInTheSameBytes) {
+  palpate(batch("undisturbed"));
+  const std::string expected = merged("undisturbed");
+  constexpr int kills = 20;
+  std::minstd_rand random(1);  // the moments differ from run to run all the same
+  std::uniform_int_distribution<useconds_t> moment(0, 300'000);
+  for (int i = 0; i < kills; ++i) {
+    if (i % 4 == 0) {
+      std::filesystem::remove_all(folder_ / "r");
+    }
+    const pid_t pid = start(batch("r", {"--threads", std::to_string(1 + i % 3)}));
+    ::usleep(moment(random));
+    ::kill(pid, SIGKILL);
+    ::waitpid(pid, nullptr, 0);
+    if (i % 4 == 3) {
+      EXPECT_EQ(palpate(batch("r")).status, 3) << i;
+      EXPECT_EQ(merged("r"), expected) << i;
+      for (const auto& [file, content] : content_of(folder_ / "r")) {
+        EXPECT_EQ(file.find(".part"), file.npos) << file;
+      }
+    }
+  }
+}
+
+TEST_F(BatchResumption, NothingIsDoneTwice) {
+  palpate(batch("r"));
+  const std::string expected = merged("r");
+  const auto before = times("r");
+  std::filesystem::remove(folder_ / "r/chunks/000002.ndjson");
+  const Outcome outcome = palpate(batch("r"));
+  EXPECT_NE(outcome.out.find("8 done before, 3 now"), outcome.out.npos) << outcome.out;
+  EXPECT_EQ(merged("r"), expected);
+  for (const auto& [file, time] : times("r")) {
+    EXPECT_EQ(time == before.at(file), file != "000002.ndjson") << file;
+  }
+}
+
+TEST_F(BatchResumption, AFullDiskKeepsFinishedChunks) {
+  palpate(batch("undisturbed"));
+  // The task file is smaller than a chunk of three records.
+  const std::uintmax_t task = std::filesystem::file_size(folder_ / "undisturbed/task.ndjson");
+  const std::uintmax_t chunk =
+      std::filesystem::file_size(folder_ / "undisturbed/chunks/000002.ndjson");
+  ASSERT_LT(task, chunk);
+  expect_failure(1, batch("r"), {"r/chunks/00000", "write"}, {.largest_file_bytes = task});
+  for (const auto& [file, content] : content_of(folder_ / "r")) {
+    EXPECT_EQ(file.find(".part"), file.npos) << file;
+  }
+  EXPECT_EQ(palpate(batch("r")).status, 3);
+  EXPECT_EQ(merged("r"), merged("undisturbed"));
+}
+
+/// Another process that works on a shard, while it lives.
+class Worker {
+ public:
+  Worker(const std::filesystem::path& folder, const cli::Shard& shard) {
+    int ends[2];
+    if (::pipe(ends) != 0) {
+      throw std::runtime_error("no pipe");
+    }
+    pid_ = ::fork();
+    if (pid_ == 0) {
+      const cli::FolderLock lock(cli::ResultsFolder(folder), shard);
+      ::close(ends[1]);  // tells that it is locked
+      ::pause();
+    }
+    ::close(ends[1]);
+    char byte = 0;
+    EXPECT_EQ(::read(ends[0], &byte, 1), 0);
+    ::close(ends[0]);
+  }
+  ~Worker() {
+    ::kill(pid_, SIGKILL);
+    ::waitpid(pid_, nullptr, 0);
+  }
+  Worker(const Worker&) = delete;
+  Worker& operator=(const Worker&) = delete;
+
+ private:
+  pid_t pid_ = -1;
+};
+
+TEST_F(BatchResumption, OfTwoProcessesOnOneShardTheSecondIsRefused) {
+  std::filesystem::create_directories(folder_ / "r");
+  {
+    const Worker worker(folder_ / "r", {1, 2});
+    expect_refused(batch("r", {"--shard", "1/2"}), {"r:", "shard 1/2", "wait"});
+    expect_refused(batch("r"), {"r:", "shard 1/2", "--shard I/2"});
+    expect_refused(batch("r", {"--shard", "2/3"}), {"r:", "shard 1/2"});
+    EXPECT_EQ(palpate(batch("r", {"--shard", "0/2"})).status, 0);
+    expect_refused(batch("r", {"--shard", "0/2", "--gamma", "0.2", "--update"}),
+                   {"r:", "--gamma", "other shards are at work"});
+  }
+  EXPECT_EQ(palpate(batch("r", {"--shard", "1/2"})).status, 3);  // it has the broken recording
+}
+
+TEST_F(BatchResumption, AFolderThatCannotBeWrittenIsRefusedAndRead) {
+  palpate(batch("r"));
+  const std::string expected = merged("r");
+  const auto all = std::filesystem::perms::owner_read | std::filesystem::perms::owner_exec;
+  std::filesystem::permissions(folder_ / "r/lock", std::filesystem::perms::owner_read);
+  std::filesystem::permissions(folder_ / "r", all);
+  expect_failure(2, batch("r"), {"r:", "cannot be written", "palpate merge"},
+                 {.obeys_permissions = true});
+  const Outcome outcome = palpate({"merge", "r"}, {.obeys_permissions = true});
+  std::filesystem::permissions(folder_ / "r", std::filesystem::perms::owner_all);
+  EXPECT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_EQ(outcome.out, expected);
+}
+
+TEST_F(BatchResumption, AChangedRecordingIsNoticedAndOnlyItsChunkDoneAgain) {
+  palpate(batch("r"));
+  const auto before = times("r");
+  write_recording(folder_ / name(7), sample_unknown("A", {}, 7));
+  expect_refused(batch("r"), {"r:", name(7) + " has changed", "--update"});
+  EXPECT_EQ(palpate(batch("r", {"--update"})).status, 3);
+  for (const auto& [file, time] : times("r")) {
+    EXPECT_EQ(time == before.at(file), file != "000002.ndjson") << file;
+  }
+  palpate(batch("fresh"));
+  EXPECT_EQ(merged("r"), merged("fresh"));
+}
+
+TEST_F(BatchResumption, MoreRecordingsKeepTheChunksBeforeThem) {
+  palpate(batch("r"));
+  const auto before = times("r");
+  write_recording(folder_ / name(11), sample_unknown("E", {}, 4));
+  write_recording(folder_ / name(12), sample_unknown("E", {}, 4));
+  expect_refused(batch("r"), {"r:", "13 inputs", "11"});
+  EXPECT_EQ(palpate(batch("r", {"--update"})).status, 3);
+  for (const char* const kept : {"000000.ndjson", "000001.ndjson", "000002.ndjson"}) {
+    EXPECT_TRUE(times("r").at(kept) == before.at(kept)) << kept;
+  }
+  palpate(batch("fresh"));
+  EXPECT_EQ(merged("r"), merged("fresh"));
+}
+
+TEST_F(BatchResumption, AChangedMapOrFlagIsNoticedAndAllDoneAgain) {
+  palpate(batch("r"));
+  expect_refused(batch("r", {"--gamma", "0.2"}),
+                 {"r:", "--gamma is '0.2'", "not given", "--update"});
+  EXPECT_EQ(palpate(batch("r", {"--gamma", "0.2", "--update"})).status, 3);
+  palpate(batch("fresh", {"--gamma", "0.2"}));
+  EXPECT_EQ(merged("r"), merged("fresh"));
+  OccupancyGrid map = sample_map("E");
+  map.log_odds[40] += 1.0F;
+  write_map(folder_ / "maps/E.map.h5", map);
+  expect_refused(batch("r", {"--gamma", "0.2"}), {"r:", "maps/E.map.h5 has changed", "--update"});
+  EXPECT_EQ(palpate(batch("r", {"--gamma", "0.2", "--update"})).status, 3);
+  palpate(batch("newest", {"--gamma", "0.2"}));
+  EXPECT_EQ(merged("r"), merged("newest"));
+}
+
+TEST_F(BatchResumption, ShardsShareTheFolderAndTheResultDoesNotDependOnThem) {
+  palpate(batch("whole"));
+  for (int shard = 2; shard >= 0; --shard) {
+    const Outcome outcome = palpate(batch("r", {"--shard", fmt::format("{}/3", shard)}));
+    EXPECT_EQ(outcome.status, shard == 1 ? 3 : 0) << outcome.err;  // the broken one is in chunk 1
+    if (shard > 0) {
+      expect_refused({"merge", "r"}, {"r:", "missing", "unknowns 0 to"});
+    }
+  }
+  EXPECT_EQ(merged("r"), merged("whole"));
+  EXPECT_EQ(bytes_of(folder_ / "r/task.ndjson"), bytes_of(folder_ / "whole/task.ndjson"));
+}
+
+TEST_F(BatchResumption, APartialMergeSaysWhatIsMissing) {
+  palpate(batch("r", {"--shard", "0/2"}));
+  const Outcome outcome = palpate({"merge", "r", "--partial"});
+  EXPECT_EQ(outcome.status, 0);
+  EXPECT_EQ(parse(outcome.out).size(), 6u);
+  EXPECT_NE(outcome.err.find("missing: 3 to 5, 9 to 10"), outcome.err.npos) << outcome.err;
+}
+
+TEST_F(BatchResumption, ATaskOfASlurmArrayIsAShard) {
+  palpate(batch("whole"));
+  const Variable count("SLURM_ARRAY_TASK_COUNT", "2");
+  const Variable least("SLURM_ARRAY_TASK_MIN", "5");
+  for (const char* const id : {"5", "6"}) {
+    const Variable task("SLURM_ARRAY_TASK_ID", id);
+    const Outcome outcome = palpate(batch("r"));
+    EXPECT_NE(outcome.out.find(*id == '5' ? "shard 0/2" : "shard 1/2"), outcome.out.npos)
+        << outcome.out << outcome.err;
+  }
+  EXPECT_EQ(merged("r"), merged("whole"));
+  const Variable task("SLURM_ARRAY_TASK_ID", "9");
+  expect_refused(batch("s"), {"SLURM_ARRAY_TASK_ID 9", "--array=0-1"});
+  for (const char* const wrong : {"2/2", "1", "a/2", "0/0", "-1/2"}) {
+    expect_refused(batch("s", {"--shard=" + std::string(wrong)}), {"--shard", wrong});
+  }
+}
+
+}  // namespace
+}  // namespace palpate
