@@ -38,7 +38,8 @@ debootstrap --variant=minbase bookworm "$root" "$mirror" >"$root.log" 2>&1 || {
 rm "$root.log"
 mount -t proc proc "$root/proc" || skip "cannot mount /proc in the new root"
 in_root() {
-  chroot "$root" env -u TMPDIR DEBIAN_FRONTEND=noninteractive LC_ALL=C.UTF-8 PALPATE_DEVICE=llvmpipe "$@"
+  chroot "$root" env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin HOME=/root DEBIAN_FRONTEND=noninteractive \
+    LC_ALL=C.UTF-8 PALPATE_DEVICE=llvmpipe "$@"
 }
 # The machine's own way to the mirror: name servers, proxy, certificates.
 for file in /etc/resolv.conf /etc/hosts; do
