@@ -31,10 +31,14 @@ constexpr std::uint64_t most_text_bytes = 1 << 20;
 
 static_assert(std::is_trivially_copyable_v<Pose> && std::is_trivially_copyable_v<glm::dvec2>);
 
+enum class Answer : std::uint8_t { recording, input_fault, system_fault };
+
 /// Sends lists as their length and their bytes.
 class Sender {
  public:
   explicit Sender(int socket) : socket_(socket) {}
+
+  void answer(Answer answer) { forked_write(socket_, &answer, sizeof answer); }
 
   template <class List>
   void list(const List& values) {
@@ -67,8 +71,7 @@ class Receiver {
   ForkedChild& child_;
 };
 
-void send(int socket, const Recording& recording) {
-  Sender sender(socket);
+void send(Sender& sender, const Recording& recording) {
   const bool known = recording.truth.has_value();
   sender.list(recording.object);
   sender.list(recording.pressure_unit);
@@ -94,76 +97,114 @@ bool is_whole(const Recording& recording) {
          (recording.rows == "touches" || recording.rows == "frames");
 }
 
-/// In the child: answers paths with recordings, or with a 0 where there is none.
+/// In the child: reads here, and once more as the command does where that fails, for its words.
+Recording read_twice(const std::string& path) {
+  try {
+    read_hdf5_in_children(false);
+    return read_recording(path);
+  } catch (const Error&) {
+    read_hdf5_in_children(true);
+    return read_recording(path);
+  }
+}
+
+/// In the child: answers paths with recordings or with what is wrong with them.
 void serve(int socket) {
   // The fork took place while its thread held this mutex, and that thread lives on as this one.
   hdf5_mutex.unlock();
-  read_hdf5_in_children(false);
   for (;;) {
     std::uint64_t size = 0;
     forked_read(socket, &size, sizeof size);  // ends the child after the last path
     std::string path(size, '\0');
     forked_read(socket, path.data(), size);
     allow_cpu_seconds(cpu_seconds);
-    std::uint8_t answered = 0;
+    Sender sender(socket);
     try {
-      const Recording recording = read_recording(path);
-      answered = 1;
-      forked_write(socket, &answered, sizeof answered);
-      send(socket, recording);
-    } catch (const Error&) {
-      forked_write(socket, &answered, sizeof answered);
+      const Recording recording = read_twice(path);
+      sender.answer(Answer::recording);
+      send(sender, recording);
+    } catch (const Error& error) {
+      const bool input = error.fault() == Fault::input;
+      sender.answer(input ? Answer::input_fault : Answer::system_fault);
+      sender.list(std::string(error.what()));
     }
   }
 }
 
+/// Receives a recording without its path; false where the child fails.
+bool receive(Receiver& receiver, Recording& recording) {
+  std::string true_object;
+  std::vector<Pose> true_pose;
+  const bool received =
+      receiver.list(recording.object, most_text_bytes) &&
+      receiver.list(recording.pressure_unit, most_text_bytes) &&
+      receiver.list(recording.rows, most_text_bytes) && receiver.list(recording.T_robot_sensor) &&
+      receiver.list(recording.pressure) && receiver.list(recording.elements_mm) &&
+      receiver.list(recording.valid) && receiver.list(true_object, most_text_bytes) &&
+      receiver.list(true_pose) && true_pose.size() <= 1;
+  if (received && !true_pose.empty()) {
+    recording.truth = Truth{std::move(true_object), true_pose.front()};
+  }
+  return received && is_whole(recording);
+}
+
 }  // namespace
 
-RecordingReader::RecordingReader() = default;
+RecordingReader::RecordingReader() {
+  if (reads_hdf5_in_children()) {
+    fork_child();
+  }
+}
+
 RecordingReader::~RecordingReader() = default;
+
+void RecordingReader::fork_child() {
+  child_ = std::make_unique<ForkedChild>(
+      serve,
+      ForkedLimits{.cpu_seconds = cpu_seconds, .memory_bytes = child_bytes, .silence = silence},
+      hdf5_mutex);
+}
 
 Recording RecordingReader::read(const std::filesystem::path& path) {
   std::error_code error;
   const std::uintmax_t bytes = std::filesystem::file_size(path, error);
-  Recording recording;
-  if (!error && bytes <= most_file_bytes && reads_hdf5_in_children() &&
-      read_in_child(path, recording)) {
-    return recording;
+  if (!error && bytes <= most_file_bytes && reads_hdf5_in_children()) {
+    if (std::optional<Recording> recording = read_in_child(path)) {
+      return *std::move(recording);
+    }
+    child_.reset();  // its memory may be damaged
   }
   return read_recording(path);
 }
 
-bool RecordingReader::read_in_child(const std::filesystem::path& path, Recording& recording) {
+std::optional<Recording> RecordingReader::read_in_child(const std::filesystem::path& path) {
   if (!child_) {
-    child_ = std::make_unique<ForkedChild>(
-        serve,
-        ForkedLimits{.cpu_seconds = cpu_seconds, .memory_bytes = child_bytes, .silence = silence},
-        hdf5_mutex);
+    fork_child();
   }
   const std::string& name = path.native();
   const std::uint64_t size = name.size();
-  std::uint8_t answered = 0;
+  Answer answer{};
+  if (!child_->write(&size, sizeof size) || !child_->write(name.data(), size) ||
+      !child_->read(&answer, sizeof answer)) {
+    return {};
+  }
   Receiver receiver(*child_);
-  std::string true_object;
-  std::vector<Pose> true_pose;
-  const bool read = child_->write(&size, sizeof size) && child_->write(name.data(), size) &&
-                    child_->read(&answered, sizeof answered) && answered == 1 &&
-                    receiver.list(recording.object, most_text_bytes) &&
-                    receiver.list(recording.pressure_unit, most_text_bytes) &&
-                    receiver.list(recording.rows, most_text_bytes) &&
-                    receiver.list(recording.T_robot_sensor) && receiver.list(recording.pressure) &&
-                    receiver.list(recording.elements_mm) && receiver.list(recording.valid) &&
-                    receiver.list(true_object, most_text_bytes) && receiver.list(true_pose) &&
-                    true_pose.size() <= 1;
-  if (read && !true_pose.empty()) {
-    recording.truth = Truth{std::move(true_object), true_pose.front()};
+  Recording recording;
+  std::string problem;
+  switch (answer) {
+    case Answer::recording:
+      if (receive(receiver, recording)) {
+        recording.path = path.string();
+        return recording;
+      }
+      break;
+    case Answer::input_fault:
+    case Answer::system_fault:
+      if (receiver.list(problem, most_text_bytes) && is_printable(problem)) {
+        throw Error(answer == Answer::input_fault ? Fault::input : Fault::system, problem);
+      }
   }
-  if (!read || !is_whole(recording)) {
-    child_.reset();  // its memory may be damaged
-    return false;
-  }
-  recording.path = path.string();
-  return true;
+  return {};
 }
 
 }  // namespace palpate

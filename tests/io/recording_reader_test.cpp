@@ -36,11 +36,11 @@ class RecordingReading : public testing::Test {
 
 TEST_F(RecordingReading, ReadsWhatReadRecordingDoesInOneChild) {
   ASSERT_EQ(counted, 0);
-  RecordingReader reader;
   for (int i = 0; i < 3; ++i) {
     write_recording(folder_ / std::to_string(i), recording(10.0 * i));
   }
   const int before = forks;
+  RecordingReader reader;
   for (int i = 0; i < 3; ++i) {
     const Recording read = reader.read(folder_ / std::to_string(i));
     EXPECT_EQ(forks, before + 1);
@@ -62,15 +62,17 @@ TEST_F(RecordingReading, ReadsWhatReadRecordingDoesInOneChild) {
 }
 
 TEST_F(RecordingReading, ABrokenFileIsRefusedInTheSameWordsAndTheNextIsRead) {
-  RecordingReader reader;
   write_recording(folder_ / "sound", recording(1.0));
   const std::string bytes = bytes_of(folder_ / "sound");
   put_bytes(folder_ / "cut", bytes.substr(0, bytes.size() / 2));
   put_bytes(folder_ / "text", "no HDF5");
+  RecordingReader reader;
   for (const char* const name : {"cut", "text", "missing"}) {
-    EXPECT_EQ(input_error([&] { reader.read(folder_ / name); }),
-              input_error([&] { read_recording(folder_ / name); }));
+    const std::string words = input_error([&] { read_recording(folder_ / name); });
+    const int before = forks;
+    EXPECT_EQ(input_error([&] { reader.read(folder_ / name); }), words);
     EXPECT_EQ(reader.read(folder_ / "sound").size(), 2u) << "after " << name;
+    EXPECT_EQ(forks, before) << "at or after " << name;
   }
 }
 

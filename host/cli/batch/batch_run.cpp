@@ -91,12 +91,12 @@ class Pipeline {
   }
 
   BatchCounts run(const std::function<void(const BatchCounts&)>& progress) {
-    const std::size_t readers = (recognisers_ + 1) / 2;
-    readers_left_ = readers;
+    std::vector<RecordingReader> readers((recognisers_ + 1) / 2);  // before the threads; see there
+    readers_left_ = readers.size();
     recognisers_left_ = recognisers_;
     std::vector<std::jthread> threads;
-    for (std::size_t i = 0; i < readers; ++i) {
-      threads.emplace_back([this] { guard([this] { read(); }, readers_left_, jobs_); });
+    for (RecordingReader& reader : readers) {
+      threads.emplace_back([&] { guard([&] { read(reader); }, readers_left_, jobs_); });
     }
     for (std::size_t i = 0; i < recognisers_; ++i) {
       threads.emplace_back(
@@ -162,8 +162,7 @@ class Pipeline {
     return false;
   }
 
-  void read() {
-    RecordingReader reader;
+  void read(RecordingReader& reader) {
     for (std::size_t i = next_input_++; i < first_.size() && !failed_; i = next_input_++) {
       if (is_wanted(i)) {
         push_unknowns(i, read_unknowns(reader, run_.task.inputs[i]));

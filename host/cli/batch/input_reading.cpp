@@ -4,8 +4,10 @@
 #include <atomic>
 #include <chrono>
 #include <exception>
+#include <functional>
 #include <mutex>
 #include <thread>
+#include <vector>
 
 #include "palpate/error.hpp"
 #include "recognition_flags.hpp"
@@ -102,9 +104,15 @@ void survey_inputs(std::span<BatchEntry> inputs, const InputRules& rules, std::s
   std::atomic<std::size_t> next = 0;
   std::exception_ptr failure;
   std::mutex mutex;
-  const auto work = [&](bool shows) {
+  const auto missing = static_cast<std::size_t>(std::ranges::count_if(
+      inputs, [](const BatchEntry& entry) { return !entry.survey.has_value(); }));
+  if (missing == 0) {
+    return;
+  }
+  threads = std::min(threads, missing);
+  std::vector<RecordingReader> readers(threads);  // before the threads; see there
+  const auto work = [&](RecordingReader& reader, bool shows) {
     try {
-      RecordingReader reader;
       for (std::size_t i = next++; i < inputs.size(); i = next++) {
         if (!inputs[i].survey) {
           inputs[i].survey = survey_of(reader, inputs[i], rules);
@@ -122,9 +130,9 @@ void survey_inputs(std::span<BatchEntry> inputs, const InputRules& rules, std::s
   {
     std::vector<std::jthread> others;
     for (std::size_t i = 1; i < threads; ++i) {
-      others.emplace_back(work, false);
+      others.emplace_back(work, std::ref(readers[i]), false);
     }
-    work(true);
+    work(readers[0], true);
   }
   if (failure) {
     std::rethrow_exception(failure);
