@@ -47,8 +47,9 @@ ReadingMixture mixture_of(std::span<const glm::dvec2> elements_mm, const Pose& T
                           const ContactModel& contact, std::size_t object) {
   ReadingMixture mixture(displacements.size(), elements_mm.size(), reading_levels(contact));
   for (std::size_t k = 0; k < displacements.size(); ++k) {
-    mixture.set(k, reading_log_likelihoods(elements_mm, T_object_sensor * displacements[k], map,
-                                           contact, object));
+    const std::vector<double> logs = reading_log_likelihoods(
+        elements_mm, T_object_sensor * displacements[k], map, contact, object);
+    mixture.set(k, std::span(logs));
   }
   return mixture;
 }

@@ -1,68 +1,65 @@
 #include "reading_mixture.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 
+#include "mixture_kernel.hpp"
 #include "palpate/fit.hpp"
-#include "predicted_readings.hpp"
 
 namespace palpate {
 
 ReadingMixture::ReadingMixture(std::size_t hypotheses, std::size_t elements, std::size_t levels)
     : hypotheses_(hypotheses),
+      stride_((hypotheses + mixture_lanes - 1) / mixture_lanes * mixture_lanes),
       elements_(elements),
       levels_(levels),
-      log_likelihood_(hypotheses * elements * levels) {}
-
-void ReadingMixture::set(std::size_t hypothesis, std::span<const double> log_likelihoods) {
-  for (std::size_t i = 0; i < log_likelihoods.size(); ++i) {
-    log_likelihood_[i * hypotheses_ + hypothesis] = log_likelihoods[i];
-  }
-}
+      log_likelihood_(stride_ * elements * levels) {}
 
 double ReadingMixture::log_mean(std::span<const Reading> readings, std::size_t left_out) const {
-  std::vector<double> logs(hypotheses_);
+  std::vector<const double*> rows;
+  rows.reserve(elements_);
   for (std::size_t e = 0; e < elements_; ++e) {
-    const double* row =
-        &log_likelihood_[(e * levels_ + static_cast<std::size_t>(readings[e])) * hypotheses_];
-    for (std::size_t h = 0; h < hypotheses_; ++h) {
-      logs[h] += row[h];
-    }
+    rows.push_back(row(e, static_cast<std::size_t>(readings[e])));
   }
+  std::vector<double> logs(stride_);
+  sum_rows(rows, logs);
+  constexpr double none = -std::numeric_limits<double>::infinity();
+  std::fill(logs.begin() + static_cast<std::ptrdiff_t>(hypotheses_), logs.end(), none);
+  std::size_t count = hypotheses_;
   if (left_out < hypotheses_) {
-    logs.erase(logs.begin() + static_cast<std::ptrdiff_t>(left_out));
+    logs[left_out] = none;
+    --count;
   }
-  const double most = *std::max_element(logs.begin(), logs.end());
-  double sum = 0.0;
-  for (const double l : logs) {
-    sum += std::exp(l - most);
-  }
-  return most + std::log(sum / static_cast<double>(logs.size()));
+  return log_sum_exp(logs) - std::log(static_cast<double>(count));
 }
 
-ReadingMixture::DrawnTouch ReadingMixture::draw(std::size_t hypothesis, Random& random) const {
-  DrawnTouch touch;
-  touch.readings.reserve(elements_);
-  for (std::size_t e = 0; e < elements_; ++e) {
-    std::array<double, most_reading_levels> log_p{};
-    for (std::size_t level = 0; level < levels_; ++level) {
-      log_p[level] = log_likelihood_[(e * levels_ + level) * hypotheses_ + hypothesis];
-    }
-    const PredictedReading predicted = predicted_reading(std::span(log_p).first(levels_));
+PredictedTouches::PredictedTouches(const ReadingMixture& mixture)
+    : mixture_(mixture),
+      probability_(mixture.log_likelihood_.size()),
+      mean_(mixture.stride_),
+      variance_(mixture.stride_) {
+  for (std::size_t e = 0; e < mixture.elements(); ++e) {
+    const std::size_t first = e * mixture.levels() * mixture.stride_;
+    predict_element({.log_likelihood = mixture.row(e, 0),
+                     .probability = probability_.data() + first,
+                     .levels = mixture.levels()},
+                    mean_, variance_);
+  }
+}
+
+PredictedTouches::DrawnTouch PredictedTouches::draw(std::size_t hypothesis, Random& random) const {
+  DrawnTouch touch{.readings = {}, .mean = mean_[hypothesis], .variance = variance_[hypothesis]};
+  touch.readings.reserve(mixture_.elements());
+  const std::size_t levels = mixture_.levels();
+  for (std::size_t e = 0; e < mixture_.elements(); ++e) {
+    const double* const q = probability_.data() + e * levels * mixture_.stride_ + hypothesis;
     double at = random.uniform();
-    std::size_t drawn = levels_ - 1;  // also where rounding leads past the last
-    for (std::size_t level = 0; level < levels_; ++level) {
-      const double q = predicted.probability[level];
-      if (at >= 0.0 && at < q) {
-        drawn = level;
-      }
-      at -= q;
-      const double from_mean = log_p[level] - predicted.most - predicted.below_most;
-      touch.variance += q * from_mean * from_mean;
+    std::size_t drawn = 0;
+    while (drawn + 1 < levels && at >= q[drawn * mixture_.stride_]) {
+      at -= q[drawn * mixture_.stride_];
+      ++drawn;  // to the last, also where rounding leads past it
     }
-    touch.mean += predicted.most + predicted.below_most;
-    touch.log_likelihood += log_p[drawn];
+    touch.log_likelihood += mixture_.row(e, drawn)[hypothesis];
     touch.readings.push_back(static_cast<Reading>(drawn));
   }
   return touch;
@@ -84,10 +81,11 @@ Moments predicted_log_mean(const ReadingMixture& judge, const ReadingMixture& so
     }
     return sum / static_cast<double>(n);
   };
-  std::vector<ReadingMixture::DrawnTouch> touches;
+  const PredictedTouches predicted(source);
+  std::vector<PredictedTouches::DrawnTouch> touches;
   std::vector<double> log_mean;
   for (std::size_t i = 0; i < n; ++i) {
-    touches.push_back(source.draw(i, random));
+    touches.push_back(predicted.draw(i, random));
     log_mean.push_back(
         judge.log_mean(touches[i].readings, &judge == &source ? i : ReadingMixture::all));
   }

@@ -17,18 +17,44 @@ class ReadingMixture {
   ReadingMixture(std::size_t hypotheses, std::size_t elements, std::size_t levels);
 
   std::size_t hypotheses() const { return hypotheses_; }
+  std::size_t elements() const { return elements_; }
+  std::size_t levels() const { return levels_; }
 
   /// What one hypothesis says: the log-likelihood of every reading, [element, level], in nats, as
   /// reading_log_likelihoods() gives it.
-  void set(std::size_t hypothesis, std::span<const double> log_likelihoods);
+  template <typename Number>
+  void set(std::size_t hypothesis, std::span<const Number> log_likelihoods) {
+    for (std::size_t i = 0; i < log_likelihoods.size(); ++i) {
+      log_likelihood_[i * stride_ + hypothesis] = log_likelihoods[i];
+    }
+  }
 
   /// log of the mean likelihood of the readings, [element], over all hypotheses but `left_out`, in
   /// nats.
   double log_mean(std::span<const Reading> readings, std::size_t left_out = all) const;
   static constexpr std::size_t all = std::numeric_limits<std::size_t>::max();
 
-  /// A touch as a hypothesis predicts it: it gives reading r of an element the probability
-  /// q(r) = P(r) / sum over all r' of P(r'), with P the likelihood.
+ private:
+  friend class PredictedTouches;
+
+  const double* row(std::size_t element, std::size_t level) const {
+    return log_likelihood_.data() + (element * levels_ + level) * stride_;
+  }
+
+  std::size_t hypotheses_;
+  std::size_t stride_;  ///< of rows: the hypotheses, padded
+  std::size_t elements_;
+  std::size_t levels_;
+  std::vector<double> log_likelihood_;  ///< [element, level, hypothesis]
+};
+
+/// Touches as the hypotheses of a mixture predict them: a hypothesis gives reading r of an element
+/// the probability q(r) = P(r) / sum over all r' of P(r'), with P the likelihood.
+class PredictedTouches {
+ public:
+  /// @param mixture outlives this object
+  explicit PredictedTouches(const ReadingMixture& mixture);
+
   struct DrawnTouch {
     std::vector<Reading> readings;
     double log_likelihood = 0.0;  ///< of the readings under the hypothesis, in nats
@@ -38,10 +64,10 @@ class ReadingMixture {
   DrawnTouch draw(std::size_t hypothesis, Random& random) const;
 
  private:
-  std::size_t hypotheses_;
-  std::size_t elements_;
-  std::size_t levels_;
-  std::vector<double> log_likelihood_;  ///< [element, level, hypothesis]
+  const ReadingMixture& mixture_;
+  std::vector<double> probability_;  ///< [element, level, hypothesis]
+  std::vector<double> mean_;         ///< [hypothesis]
+  std::vector<double> variance_;
 };
 
 /// Mean and variance of a log-likelihood.

@@ -18,7 +18,7 @@ namespace palpate {
 /// unlearned object may be warned of, too: its touches fit pieces of a known one.
 /// @param touches all touches of the unknown so far
 /// @param step what the filter believes after them; reads mode, pose and fit
-/// @param surprises of the touches so far; see surprise_of()
+/// @param surprises of the touches so far; see SurpriseJudge
 std::optional<std::string> touches_contradict(std::span<const Touch> touches,
                                               const RecognitionTask& task,
                                               const RecognitionStep& step,

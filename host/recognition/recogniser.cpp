@@ -136,6 +136,10 @@ std::optional<RefinedPose> Recogniser::refine(const Mode& mode) const {
       filter_);
 }
 
+const SurpriseJudge& Recogniser::surprise_judge(const RecognitionTask& task) {
+  return surprise_judge_ ? *surprise_judge_ : surprise_judge_.emplace(task);
+}
+
 std::optional<double> Recogniser::effective_sample_size() const {
   const auto* particles = std::get_if<ParticleFilter>(&filter_);
   return particles != nullptr ? std::optional(particles->effective_sample_size()) : std::nullopt;

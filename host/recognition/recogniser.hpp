@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "recognition_task.hpp"
+#include "surprise.hpp"
 
 namespace palpate {
 
@@ -41,6 +42,8 @@ class Recogniser {
   /// Whether the belief has taken in a touch since reset(). Touches that wait for an automatic
   /// pivot do not count.
   bool touched() const { return touched_; }
+  /// Judges touches by the recogniser's task; made at the first call. Not for particles.
+  const SurpriseJudge& surprise_judge(const RecognitionTask& task);
   /// Keeps the surprise of a touch until reset().
   void note_surprise(double surprise) { surprises_.push_back(surprise); }
   /// What note_surprise() was given since reset(), in order.
@@ -82,6 +85,7 @@ class Recogniser {
   std::vector<WaitingTouch> waiting_;  ///< in order; empty once the pivot is placed
   bool touched_ = false;               ///< since reset()
   std::vector<double> surprises_;      ///< since reset()
+  std::optional<SurpriseJudge> surprise_judge_;
   std::variant<PoseHistogram, BoundedPosterior, ParticleFilter> filter_;
 };
 

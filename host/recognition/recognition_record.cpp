@@ -84,7 +84,9 @@ Updated update(Recogniser& recogniser, const RecognitionTask& task, std::span<co
       samples = recogniser.sample(surprise_samples(touches[i].elements_mm.size()), seed);
     }
     take(i, i + 1);
-    updated.surprise = samples.empty() ? std::nullopt : surprise_of(touches[i], samples, task);
+    updated.surprise = samples.empty()
+                           ? std::nullopt
+                           : recogniser.surprise_judge(task).surprise_of(touches[i], samples);
     if (updated.surprise) {
       recogniser.note_surprise(*updated.surprise);
     }

@@ -5,8 +5,7 @@
 #include <vector>
 
 #include "displacement_points.hpp"
-#include "interpolated_map.hpp"
-#include "predicted_readings.hpp"
+#include "hypotheses.hpp"
 #include "reading_mixture.hpp"
 #include "refinement.hpp"
 
@@ -25,18 +24,22 @@ std::size_t surprise_samples(std::size_t elements) {
   return std::clamp(readings / std::max<std::size_t>(elements, 1), least, most);
 }
 
-std::optional<double> surprise_of(const Touch& touch, std::span<const PoseSample> samples,
-                                  const RecognitionTask& task) {
-  if (std::holds_alternative<ParticleOptions>(task.filter)) {
-    return {};
+SurpriseJudge::SurpriseJudge(const RecognitionTask& task)
+    : touch_sd_(task.touch_sd()),
+      slip_sd_(task.slip_sd()),
+      contact_(resolve(task.contact(), task.hypotheses)),
+      predictor_(task.hypotheses, contact_) {
+  for (const Hypothesis& hypothesis : task.hypotheses) {
+    centroids_mm_.push_back(slip_sd_.none() ? glm::dvec2(0.0, 0.0)
+                                            : displaced_body(hypothesis.map).centroid_mm);
   }
-  const DisplacementSd touch_sd = task.touch_sd();
-  const DisplacementSd slip_sd = task.slip_sd();
-  ContactModel contact = task.contact();
-  contact.prior = contact.prior.value_or(task.hypotheses.front().compared().prior);
+}
+
+std::optional<double> SurpriseJudge::surprise_of(const Touch& touch,
+                                                 std::span<const PoseSample> samples) const {
   std::vector<glm::dvec2> elements_mm;
   std::vector<Reading> readings;
-  const std::vector<Reading> classes = contact.classify(touch);
+  const std::vector<Reading> classes = contact_.classify(touch);
   for (std::size_t e = 0; e < classes.size(); ++e) {
     if (classes[e] != Reading::unknown) {
       elements_mm.push_back(touch.elements_mm[e]);
@@ -46,22 +49,16 @@ std::optional<double> surprise_of(const Touch& touch, std::span<const PoseSample
   if (readings.empty()) {
     return {};
   }
-  std::vector<InterpolatedMap> maps;
-  std::vector<glm::dvec2> centroids_mm;
-  for (const Hypothesis& hypothesis : task.hypotheses) {
-    maps.emplace_back(hypothesis.compared(), *contact.prior);
-    centroids_mm.push_back(slip_sd.none() ? glm::dvec2(0.0, 0.0)
-                                          : displaced_body(hypothesis.map).centroid_mm);
-  }
   Random random(seed, Stream::readings);
-  ReadingMixture mixture(samples.size(), readings.size(), reading_levels(contact));
+  ReadingMixture mixture(samples.size(), readings.size(), predictor_.levels());
+  std::vector<float> logs(readings.size() * predictor_.levels());
   for (std::size_t i = 0; i < samples.size(); ++i) {
     const auto object = static_cast<std::size_t>(samples[i].object);
-    const Pose slip = random_displacement(slip_sd, random);
-    const Pose T_object_sensor = slipped(samples[i].T_object_robot, slip, centroids_mm[object]) *
-                                 touch.T_robot_sensor * random_displacement(touch_sd, random);
-    mixture.set(
-        i, reading_log_likelihoods(elements_mm, T_object_sensor, maps[object], contact, object));
+    const Pose slip = random_displacement(slip_sd_, random);
+    const Pose T_object_sensor = slipped(samples[i].T_object_robot, slip, centroids_mm_[object]) *
+                                 touch.T_robot_sensor * random_displacement(touch_sd_, random);
+    predictor_.predict(object, T_object_sensor, elements_mm, logs, 1);
+    mixture.set(i, std::span<const float>(logs));
   }
   const Moments predicted = predicted_log_mean(mixture, mixture, random);
   return -predicted.deviations(mixture.log_mean(readings));

@@ -23,10 +23,14 @@ std::vector<double> logs_of(const std::vector<double>& contact) {
   return logs;
 }
 
+void set(ReadingMixture& mixture, std::size_t hypothesis, const std::vector<double>& logs) {
+  mixture.set(hypothesis, std::span(logs));
+}
+
 ReadingMixture two_hypotheses() {
   ReadingMixture mixture(2, 2, 2);
-  mixture.set(0, logs_of({0.9, 0.2}));
-  mixture.set(1, logs_of({0.5, 0.5}));
+  set(mixture, 0, logs_of({0.9, 0.2}));
+  set(mixture, 1, logs_of({0.5, 0.5}));
   return mixture;
 }
 
@@ -42,8 +46,8 @@ TEST(ReadingMixture, AveragesLikelihoods) {
 
 TEST(ReadingMixture, StaysInRange) {
   ReadingMixture mixture(2, 1, 2);
-  mixture.set(0, std::vector{-5000.0, -2000.0});
-  mixture.set(1, std::vector{-5001.0, -1e30});
+  set(mixture, 0, std::vector{-5000.0, -2000.0});
+  set(mixture, 1, std::vector{-5001.0, -1e30});
   EXPECT_NEAR(mixture.log_mean(std::vector{no}), -5000.0 + std::log((1.0 + std::exp(-1.0)) / 2.0),
               1e-9);
   EXPECT_NEAR(mixture.log_mean(std::vector{yes}), -2000.0 - std::log(2.0), 1e-9);
@@ -57,9 +61,10 @@ TEST(ReadingMixture, DrawsWhatAHypothesisPredicts) {
   int second = 0;
   double sum = 0.0;
   double squares = 0.0;
-  ReadingMixture::DrawnTouch touch;
+  const PredictedTouches predicted(mixture);
+  PredictedTouches::DrawnTouch touch;
   for (int i = 0; i < draws; ++i) {
-    touch = mixture.draw(0, random);
+    touch = predicted.draw(0, random);
     first += touch.readings[0] == yes ? 1 : 0;
     second += touch.readings[1] == yes ? 1 : 0;
     EXPECT_NEAR(touch.log_likelihood, mixture.log_mean(touch.readings, 1), rounding);
@@ -79,7 +84,7 @@ TEST(ReadingMixture, DrawsWhatAHypothesisPredicts) {
 TEST(ReadingMixture, PredictsExactlyWhereAllHypothesesAgree) {
   ReadingMixture mixture(8, 3, 2);
   for (std::size_t h = 0; h < 8; ++h) {
-    mixture.set(h, logs_of({0.7, 0.01, 1e-6}));
+    set(mixture, h, logs_of({0.7, 0.01, 1e-6}));
   }
   Random random(2, Stream::readings);
   const Moments predicted = predicted_log_mean(mixture, mixture, random);
@@ -103,15 +108,16 @@ TEST(ReadingMixture, PredictsTheMomentsOfItsOwnTouches) {
     for (int e = 0; e < 12; ++e) {
       contact.push_back(random.uniform(0.02, 0.98));
     }
-    mixture.set(h, logs_of(contact));
+    set(mixture, h, logs_of(contact));
   }
   const Moments predicted = predicted_log_mean(mixture, mixture, random);
+  const PredictedTouches touches(mixture);
   constexpr int draws = 6400;
   double sum = 0.0;
   double squares = 0.0;
   for (std::size_t i = 0; i < draws; ++i) {
     const double out =
-        predicted.deviations(mixture.log_mean(mixture.draw(i % 64, random).readings, i % 64));
+        predicted.deviations(mixture.log_mean(touches.draw(i % 64, random).readings, i % 64));
     sum += out;
     squares += out * out;
   }

@@ -63,18 +63,21 @@ class ModelledTouches {
     const Pose slip = random_displacement(slip_sd, random_);
     const std::vector<glm::dvec2> elements_mm = digitacts_array();
     ReadingMixture one(1, 36, 2);
-    one.set(0, reading_log_likelihoods(elements_mm,
-                                       slipped(T_object_robot, slip, body_of(map).centroid_mm) *
-                                           T_robot_sensor * random_displacement(touch_sd, random_),
-                                       InterpolatedMap(map, map.prior), contact, object));
+    const std::vector<double> logs =
+        reading_log_likelihoods(elements_mm,
+                                slipped(T_object_robot, slip, body_of(map).centroid_mm) *
+                                    T_robot_sensor * random_displacement(touch_sd, random_),
+                                InterpolatedMap(map, map.prior), contact, object);
+    one.set(0, std::span(logs));
     // No Contact at -20 kPa also where no element is in contact.
     std::vector<double> pressure;
-    for (const Reading reading : one.draw(0, random_).readings) {
+    for (const Reading reading : PredictedTouches(one).draw(0, random_).readings) {
       pressure.push_back(reading == Reading::in_contact ? 10.0 : -20.0);
     }
-    return surprise_of(
-               {.T_robot_sensor = T_robot_sensor, .elements_mm = elements_mm, .pressure = pressure},
-               samples, task_)
+    return SurpriseJudge(task_)
+        .surprise_of(
+            {.T_robot_sensor = T_robot_sensor, .elements_mm = elements_mm, .pressure = pressure},
+            samples)
         .value();
   }
 
@@ -135,10 +138,10 @@ TEST(Surprise, DoesNotDependOnTheFrameOfAMapWithoutCells) {
     const std::vector<glm::dvec2> elements_mm = digitacts_array();
     std::vector<double> pressure(36, -20.0);
     std::fill_n(pressure.begin(), 6, 10.0);
-    return surprise_of({.T_robot_sensor = {{3.0, 1.0}, 0.0},
-                        .elements_mm = elements_mm,
-                        .pressure = pressure},
-                       samples, task)
+    return SurpriseJudge(task)
+        .surprise_of(
+            {.T_robot_sensor = {{3.0, 1.0}, 0.0}, .elements_mm = elements_mm, .pressure = pressure},
+            samples)
         .value();
   };
   // The places of elements are rounded in float64, log odds between cells in float32.
@@ -158,7 +161,7 @@ TEST(Surprise, IsNotKnownOfATouchThatSaysNothing) {
   const std::vector<double> pressure(36, 2.0);  // at the threshold
   const Touch touch{.elements_mm = elements_mm, .pressure = pressure};
   const std::vector<PoseSample> samples(8);
-  EXPECT_FALSE(surprise_of(touch, samples, task));
+  EXPECT_FALSE(SurpriseJudge(task).surprise_of(touch, samples));
 }
 
 TEST(Surprise, OfLettersTellsMisplacedTouchesFromExactOnes) {

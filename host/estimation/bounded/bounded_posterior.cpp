@@ -15,6 +15,7 @@
 #include "bound_search.hpp"
 #include "evaluated_bins.hpp"
 #include "faster_bin_likelihood.hpp"
+#include "followed_bins.hpp"
 #include "half_done.hpp"
 #include "hypotheses.hpp"
 #include "interpolated_map.hpp"
@@ -35,6 +36,8 @@ namespace {
 
 /// Tolerance that a search with a budget reaches before it goes on, and enough to draw samples.
 constexpr double soon = 1e-2;
+/// Bins of all hypotheses together.
+constexpr double few_bins = 1e6;
 
 /// Index in the lattice of the i-th bin of a box.
 std::int64_t bin_in(const PoseLattice& lattice, const BinBox& box, std::int64_t i) {
@@ -142,14 +145,55 @@ struct BoundedPosterior::Impl {
     return *result;
   }
 
-  /// What the last search found, or a quick one: enough to draw samples from.
-  const SearchResult& found_roughly() {
+  /// Sees to it that there is a last search's result, of a quick search if need be: enough to draw
+  /// samples from.
+  void find_roughly() {
     if (!result) {
       Deadline deadline = until(options.budget_s);
-      result = run({std::max(options.tolerance, soon), {}}, deadline, bins);
+      result = run(rough_goal(), deadline, bins);
       rough = true;
     }
-    return *result;
+  }
+
+  /// Of few bins, most are dropped early whatever the tolerance, and a close one lets them be
+  /// followed through the next touches.
+  SearchGoal rough_goal() const {
+    const double all =
+        static_cast<double>(options.lattice.bins()) * static_cast<double>(hypotheses.size());
+    return {all <= few_bins ? options.tolerance : std::max(options.tolerance, soon), {}};
+  }
+
+  /// The touches are to be added: keeps what the last search found of the belief before them.
+  void follow(std::span<const ArrayReadings> touches) {
+    if (result && bins.complete() && bins.values() <= FollowedBins::most_bins) {
+      followed.emplace(bins, *result, log_weight);
+      not_followed.clear();
+    }
+    if (followed) {
+      for (const ArrayReadings& touch : touches) {
+        not_followed.push_back(known_elements(touch));
+      }
+    }
+    result.reset();
+  }
+
+  /// The followed bins after all touches; nullptr where they may not hold enough to draw samples.
+  const FollowedBins* followed_bins() {
+    if (result || !followed) {
+      return nullptr;
+    }
+    for (const KnownElements& touch : std::exchange(not_followed, {})) {
+      std::vector<double> most;
+      for (const TileBounds& bounds : search.bounds()) {
+        most.push_back(bounds.best(bounds.levels().size() - 1, touch));
+      }
+      followed->add(touch, likelihood, most);
+    }
+    if (!(followed->share_outside() <= soon)) {
+      followed.reset();
+      return nullptr;
+    }
+    return &*followed;
   }
 
   SearchResult run(const SearchGoal& goal, Deadline& deadline, EvaluatedBins& evaluated) {
@@ -175,7 +219,7 @@ struct BoundedPosterior::Impl {
     } else {
       SearchGoal goal{options.tolerance, options.evidence_nats, options.evidence_range_nats};
       if (rough) {
-        goal = {std::max(options.tolerance, soon), {}};
+        goal = rough_goal();
       }
       arena.execute([&] { search.run(elements, goal, until({}), visitor); });
     }
@@ -209,10 +253,12 @@ struct BoundedPosterior::Impl {
   KnownElements elements;
   bool touched = false;
   std::optional<SearchResult> result;
-  bool rough = false;  ///< result is found_roughly()'s
+  bool rough = false;  ///< result is find_roughly()'s
   EvaluatedBins bins{options.budget_s.has_value()};
-  std::optional<SampledTouchMeans> none;  ///< where the options ask for it
-  double none_log_weight = 0.0;           ///< log of its prior weight times the number of bins
+  std::optional<FollowedBins> followed;
+  std::vector<KnownElements> not_followed;  ///< touches that `followed` has not yet taken in
+  std::optional<SampledTouchMeans> none;    ///< where the options ask for it
+  double none_log_weight = 0.0;             ///< log of its prior weight times the number of bins
   HalfDone half_done{"bounded posterior: an update was broken off half-way; call reset()"};
 };
 
@@ -253,6 +299,7 @@ void BoundedPosterior::reset() {
   posterior.touched = false;
   posterior.search.reset();
   posterior.result.reset();
+  posterior.followed.reset();
   if (posterior.none) {
     posterior.none->reset();
   }
@@ -268,6 +315,7 @@ void BoundedPosterior::move_pivot(const glm::dvec2& pivot_mm) {
     posterior.none->move_pivot(pivot_mm);
   }
   posterior.result.reset();
+  posterior.followed.reset();
 }
 
 void BoundedPosterior::update(std::span<const Touch> touches,
@@ -293,7 +341,7 @@ void BoundedPosterior::update(std::span<const Touch> touches,
     progress(1.0);
   }
   posterior.half_done.change([&] {
-    posterior.result.reset();
+    posterior.follow(of_touches);
     posterior.touched = posterior.touched || !touches.empty();
     std::vector<KnownElements> all;
     for (const ArrayReadings& touch : of_touches) {
@@ -481,12 +529,15 @@ std::vector<PoseSample> BoundedPosterior::sample(std::size_t count, std::uint64_
   };
   std::vector<Draw> draws;
   draws.reserve(count);
-  const SearchResult& found = posterior.found_roughly();
-  const double log_total = posterior.log_total();
+  const FollowedBins* followed = posterior.followed_bins();
+  if (followed == nullptr) {
+    posterior.find_roughly();
+  }
+  const double log_total = followed != nullptr ? followed->log_total() : posterior.log_total();
   const PoseLattice& in = lattice();
   double reached = 0.0;
-  Draw last{found.best_object, found.best_bin};
-  posterior.visit([&](const BinBox& box, std::span<const double> log_likelihood) {
+  Draw last{};
+  const auto draw_from = [&](const BinBox& box, std::span<const double> log_likelihood) {
     const double weight = posterior.log_weight[box.object] - log_total;
     if (log_likelihood.size() == 1) {
       const double p = std::exp(weight + log_likelihood[0]);
@@ -497,6 +548,7 @@ std::vector<PoseSample> BoundedPosterior::sample(std::size_t count, std::uint64_
         draws.push_back({box.object, bin_in(in, box, std::min(i, bins - 1))});
       }
       reached += p * static_cast<double>(bins);
+      last = {box.object, bin_in(in, box, bins - 1)};
       return;
     }
     for (std::size_t i = 0; i < log_likelihood.size(); ++i) {
@@ -506,7 +558,12 @@ std::vector<PoseSample> BoundedPosterior::sample(std::size_t count, std::uint64_
         draws.push_back(last);
       }
     }
-  });
+  };
+  if (followed != nullptr) {
+    followed->visit(draw_from);
+  } else {
+    posterior.visit(draw_from);
+  }
   draws.resize(count, last);  // rounding may leave the last draw out
   std::sort(draws.begin(), draws.end(), [](const Draw& a, const Draw& b) {
     return std::tie(a.object, a.bin) < std::tie(b.object, b.bin);

@@ -22,6 +22,8 @@ class EvaluatedBins {
   /// There is no room for more.
   bool full() const { return bytes_used() > most_bytes; }
   void visit(const BinVisitor& visit) const;
+  /// Number of log-likelihoods that are kept.
+  std::size_t values() const { return values_.size(); }
 
   std::uint64_t bytes() const {
     return boxes_.capacity() * sizeof(BinBox) + values_.capacity() * sizeof(double) +

@@ -7,6 +7,7 @@
 #include <iterator>
 #include <limits>
 #include <numeric>
+#include <ranges>
 #include <tuple>
 
 #include <tbb/parallel_for.h>
@@ -125,15 +126,20 @@ class SearchRun {
                prior_log_likelihood(run.reading, search_.options_.contact);
     }
     const double least = prior - contradiction_nats;
-    for (std::size_t i = 0; i < search_.bounds_.size(); ++i) {
-      if (account_.best_of(i) < least && account_.largest_dropped_of(i) >= least) {
+    const std::size_t objects = search_.bounds_.size();
+    const auto explains = [&](std::size_t i) { return account_.best_of(i) >= least; };
+    if (std::ranges::any_of(std::views::iota(std::size_t{0}, objects), explains)) {
+      return false;
+    }
+    for (std::size_t i = 0; i < objects; ++i) {
+      if (account_.largest_dropped_of(i) >= least) {
         // Too light a hypothesis to have been looked at.
         for (const BinBox& box :
              leaves_.boxes_of(best_of_beam(of_object(best, i), 0, beam_tiles))) {
           evaluator_.look(box);
         }
       }
-      if (account_.best_of(i) >= least) {
+      if (explains(i)) {
         return false;
       }
     }

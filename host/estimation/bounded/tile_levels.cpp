@@ -14,6 +14,9 @@ namespace {
 constexpr double most_largest_tiles = 4e6;
 constexpr double largest_cells = 1e6;  ///< side of a tile: larger than any map with its border
 
+/// Bins of a tile that take no longer to evaluate than its 4 x 4 parts to bound.
+constexpr double few_bins = 3.0;
+
 /// Steps, in cells of the finest map, from which on tiles are single bins, and most bins of all
 /// maps.
 constexpr double sparse_cells = 2.0;
@@ -89,6 +92,16 @@ std::vector<TileSize> tile_sizes(const PoseLattice& lattice, double least_cell_m
            static_cast<double>(maps);
   };
   std::vector<TileSize> sizes{{.side = 8}, {.side = 2}, {.parts = 2, .side = 1}};
+  const auto bins = [&](const TileSize& size) {
+    const auto along = [&](const Axis& axis) {
+      return std::clamp(size.cells() * least_cell_mm / axis.step(), 1.0,
+                        static_cast<double>(axis.count));
+    };
+    return along(lattice.x_mm) * along(lattice.y_mm);
+  };
+  while (sizes.size() > 1 && bins(sizes[sizes.size() - 2]) < few_bins) {
+    sizes.pop_back();
+  }
   while (tiles(sizes.front()) > most_largest_tiles && sizes.front().cells() < largest_cells) {
     // As many squares, each of more cells: tables shrink, and windows widen by little.
     sizes.insert(sizes.begin(), {.merged = 4 * sizes.front().merged, .side = 8});

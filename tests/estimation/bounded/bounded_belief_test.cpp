@@ -118,6 +118,60 @@ TEST(BoundedBelief, IsDrawnFromInProportion) {
   }
 }
 
+// Draws after one more touch may come from the bins that were found before it. A touch of another
+// object, after which other bins count, must not be drawn from these.
+TEST(BoundedBelief, IsDrawnFromInProportionAfterFurtherTouches) {
+  Device device = Device::open();
+  const Recording of_l = touches_of_l(4, 826);
+  const Recording of_disc = touches_of(on_disc, {{-2.0, 1.5}, 0.0}, 4, 827);
+  for (const Recording* last : {&of_l, &of_disc}) {
+    SCOPED_TRACE(last == &of_l ? "a touch like the others" : "a touch of the other object");
+    BoundedPosterior posterior(device, two_shapes(), small_options());
+    posterior.update(of_l.touches(0, 2));
+    for (std::size_t next = 2; next < 4; ++next) {
+      posterior.sample(10, 1);
+      posterior.update(last->touch(next));
+      std::vector<Touch> all = of_l.touches(0, 2);
+      for (std::size_t i = 2; i <= next; ++i) {
+        all.push_back(last->touch(i));
+      }
+      BoundedPosterior fresh(device, two_shapes(), small_options());
+      fresh.update(all);
+      const Estimate exact = fresh.estimate();
+      constexpr std::size_t count = 4000;
+      constexpr double left_out = 0.01;  // of the belief, by draws
+      std::vector<std::vector<double>> xy(2, std::vector<double>(13 * 12));
+      for (const PoseSample& draw : posterior.sample(count, 828)) {
+        const std::int64_t bin = small_options().lattice.bin_of(draw.T_object_robot);
+        xy[static_cast<std::size_t>(draw.object)][static_cast<std::size_t>(bin % (13 * 12))] +=
+            1.0 / count;
+      }
+      for (const int object : {0, 1}) {
+        const auto i = static_cast<std::size_t>(object);
+        EXPECT_NEAR(sum(xy[i]), exact.identity[i], left_out + 1.0 / count);
+        const Marginals marginals = fresh.marginals(object);
+        for (std::size_t k = 0; k < xy[i].size(); ++k) {
+          const double p = marginals.xy[k];
+          EXPECT_NEAR(xy[i][k], p, left_out + 5.0 * std::sqrt(p / count) + 2.0 / count);
+        }
+      }
+    }
+    // What was drawn changes nothing of what is estimated.
+    posterior.update(of_l.touch(3));
+    BoundedPosterior fresh(device, two_shapes(), small_options());
+    fresh.update(of_l.touches(0, 2));
+    for (const Touch& touch : {last->touch(2), last->touch(3), of_l.touch(3)}) {
+      fresh.update(touch);
+    }
+    const Estimate told = posterior.estimate();
+    const Estimate exact = fresh.estimate();
+    for (std::size_t i = 0; i < 2; ++i) {
+      EXPECT_NEAR(told.identity[i], exact.identity[i], 1e-6);
+    }
+    EXPECT_EQ(told.mode.bin, exact.mode.bin);
+  }
+}
+
 TEST(BoundedBelief, DrawnFromBeforeAnEstimateTellsTheSameAfterwards) {
   Device device = Device::open();
   BoundedPosterior asked(device, two_shapes(), small_options());

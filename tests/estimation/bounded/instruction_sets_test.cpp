@@ -9,7 +9,7 @@
 
 #include "bin_likelihood.hpp"
 #include "bounded/certificate_trials.hpp"
-#include "bounded/every_set_of_instructions.hpp"
+#include "every_set_of_instructions.hpp"
 
 namespace palpate {
 namespace {

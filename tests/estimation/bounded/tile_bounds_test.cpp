@@ -252,6 +252,19 @@ TEST(TileLevels, AreOfSingleBinsWhereTheseAreSparseAndFew) {
   EXPECT_FALSE(sizes_of(3.33, 3.44, 50, 110).front().single_bin);
 }
 
+TEST(TileLevels, AreNotDividedWhereTheyHoldFewBins) {
+  const auto smallest_cells = [](double step_x_mm, double step_y_mm, int count_y) {
+    const PoseLattice lattice{.x_mm = {0.0, 40.0 * step_x_mm, 40},
+                              .y_mm = {0.0, count_y * step_y_mm, count_y},
+                              .theta_rad = {0.0, two_pi, 16}};
+    return tile_sizes(lattice, 0.5, 5).back().cells();
+  };
+  EXPECT_EQ(smallest_cells(0.5, 0.5, 40), 0.5) << "tiles of 2 cells hold 4 bins";
+  EXPECT_EQ(smallest_cells(0.8, 0.8, 40), 2.0) << "1.6";
+  EXPECT_EQ(smallest_cells(0.2, 0.8, 40), 0.5) << "6.25";
+  EXPECT_EQ(smallest_cells(0.5, 0.0, 1), 2.0) << "2, as y is fixed";
+}
+
 TEST(TileLevels, AreSoLargeThatTheLargestTilesFitMemory) {
   PoseLattice lattice;
   for (const double half_mm : {0.0, 10.0, 1e3, 1e5}) {
@@ -261,7 +274,6 @@ TEST(TileLevels, AreSoLargeThatTheLargestTilesFitMemory) {
     for (std::size_t l = 1; l < sizes.size(); ++l) {
       EXPECT_EQ(sizes[l - 1].cells(), batch_side * sizes[l].cells());
     }
-    EXPECT_EQ(sizes.back().cells(), 0.5);
     const double tiles = std::pow(2.0 * half_mm / (0.5 * sizes.front().cells()), 2.0) * 360 * 20;
     // 1e7 tiles of 4 bytes, unless the tiles are the largest that there are.
     EXPECT_TRUE(tiles <= 1e7 || sizes.front().side == 512) << tiles;
