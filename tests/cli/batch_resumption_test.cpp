@@ -9,6 +9,7 @@
 
 #include "batch_folder.hpp"
 #include "results_folder.hpp"
+#include "slurm.hpp"
 
 namespace palpate {
 namespace {
@@ -200,11 +201,58 @@ TEST_F(BatchResumption, ATaskOfASlurmArrayIsAShard) {
         << outcome.out << outcome.err;
   }
   EXPECT_EQ(merged("r"), merged("whole"));
-  const Variable task("SLURM_ARRAY_TASK_ID", "9");
-  expect_refused(batch("s"), {"SLURM_ARRAY_TASK_ID 9", "--array=0-1"});
+  {
+    const Variable task("SLURM_ARRAY_TASK_ID", "9");
+    expect_refused(batch("s"), {"SLURM_ARRAY_TASK_ID 9", "--array=0-1"});
+  }
   for (const char* const wrong : {"2/2", "1", "a/2", "0/0", "-1/2"}) {
     expect_refused(batch("s", {"--shard=" + std::string(wrong)}), {"--shard", wrong});
   }
+}
+
+TEST_F(BatchResumption, TheTasksOfAStepDivideTheirPart) {
+  palpate(batch("whole"));
+  const Variable tasks("SLURM_STEP_NUM_TASKS", "2");
+  const Variable rank("SLURM_LOCALID", "1");
+  const Variable count("SLURM_ARRAY_TASK_COUNT", "2");
+  for (const char* const id : {"0", "1"}) {
+    const Variable array("SLURM_ARRAY_TASK_ID", id);
+    for (const char* const of_step : {"0", "1"}) {
+      const Variable task("SLURM_PROCID", of_step);
+      const Outcome outcome = palpate(batch("r"));
+      const std::string shard = fmt::format("shard {}/4", 2 * (*id - '0') + (*of_step - '0'));
+      EXPECT_NE(outcome.out.find(shard), outcome.out.npos) << outcome.out << outcome.err;
+    }
+  }
+  EXPECT_EQ(merged("r"), merged("whole"));
+  const Variable task("SLURM_PROCID", "2");
+  expect_refused(batch("s"), {"SLURM_PROCID 2", "of 2 tasks"});
+}
+
+TEST(LocalDevice, TasksOfAComputerTakeItsEqualDevicesInTurn) {
+  const auto device = [](int index, const char* name, bool usable, bool chosen) {
+    return DeviceInfo{.index = index,
+                      .name = name,
+                      .type = "",
+                      .driver = "",
+                      .api = "",
+                      .usable = usable,
+                      .chosen = chosen,
+                      .reason = ""};
+  };
+  const std::vector<DeviceInfo> node{device(0, "llvmpipe", true, false),
+                                     device(1, "H200", true, true), device(2, "H200", true, false),
+                                     device(3, "H200", false, false),
+                                     device(4, "H200", true, false)};
+  for (const char* const wished : {"", "H2"}) {
+    EXPECT_EQ(cli::local_device(node, wished, 0), "1");
+    EXPECT_EQ(cli::local_device(node, wished, 1), "2");
+    EXPECT_EQ(cli::local_device(node, wished, 2), "4");
+    EXPECT_EQ(cli::local_device(node, wished, 3), "1");
+  }
+  EXPECT_EQ(cli::local_device(node, "1", 2), "1") << "an index is that of one device";
+  const std::vector<DeviceInfo> lone{device(0, "llvmpipe", true, true)};
+  EXPECT_EQ(cli::local_device(lone, "", 3), "");
 }
 
 }  // namespace

@@ -15,6 +15,7 @@
 #include "batch_settling.hpp"
 #include "commands.hpp"
 #include "progress.hpp"
+#include "slurm.hpp"
 
 namespace palpate::cli {
 
@@ -127,7 +128,14 @@ std::string summary(const Options& options, const Shard& shard, const Chunks& ch
   return text + fmt::format("; {} failed\n", failed);
 }
 
-int batch(const Options& options, const CLI::App& command) {
+/// The device of this task among those that Slurm started on this computer.
+std::string device_in_step(const RecognitionFlags& flags, const Scene& scene) {
+  const std::string wished = flags.device.empty() ? scene.device.value_or("") : flags.device;
+  const std::optional<std::size_t> rank = slurm_number("SLURM_LOCALID");
+  return rank ? local_device(Device::list(wished), wished, *rank) : wished;
+}
+
+int batch(Options options, const CLI::App& command) {
   if (options.recognition.filter.budget_ms) {
     refuse_flag("--budget-ms", *options.recognition.filter.budget_ms,
                 "its results depend on the clock, and a batch's are the same on every run; leave "
@@ -141,6 +149,7 @@ int batch(const Options& options, const CLI::App& command) {
                          .frames = frames_of(options.unknowns),
                          .scene = scene_of(options.recognition),
                          .scene_file = options.recognition.scene};
+  options.recognition.device = device_in_step(options.recognition, rules.scene);
   BatchTask asked{.program = PALPATE_VERSION,
                   .chunk_unknowns = static_cast<std::size_t>(options.chunk),
                   .each_frame = options.unknowns.each_frame,
@@ -199,7 +208,7 @@ void add_batch(CLI::App& app, int& status) {
   command->add_flag("--trace", options->trace, "Add the estimate after every touch");
   command->add_option("--shard", options->shard,
                       "Recognise only part I of N, from 0 to N - 1, as I/N [default: that of the "
-                      "Slurm job array's task, or all]");
+                      "Slurm task, or all]");
   command->add_flag("--update", options->update,
                     "Where inputs, maps or flags differ from those of the results that are there: "
                     "recognise again what differs, instead of refusing");

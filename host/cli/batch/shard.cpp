@@ -1,11 +1,11 @@
 #include "shard.hpp"
 
 #include <charconv>
-#include <cstdlib>
 #include <optional>
 #include <string_view>
 
 #include "options.hpp"
+#include "slurm.hpp"
 
 namespace palpate::cli {
 
@@ -18,17 +18,24 @@ std::optional<std::size_t> count_in(std::string_view text) {
   return error == std::errc{} && rest == end ? std::optional(number) : std::nullopt;
 }
 
-/// The number in a variable that Slurm sets; none where it is not set.
-std::optional<std::size_t> from_slurm(const char* name) {
-  const char* const text = std::getenv(name);
-  if (text == nullptr || *text == '\0') {
+/// That of a job array's task; the whole outside of one.
+Shard shard_of_array() {
+  const auto id = slurm_number("SLURM_ARRAY_TASK_ID");
+  const auto count = slurm_number("SLURM_ARRAY_TASK_COUNT");
+  if (!id || !count) {
     return {};
   }
-  const std::optional<std::size_t> number = count_in(text);
-  if (!number) {
-    refuse_flag(name, text, "is no whole number; unset it, or give --shard I/N");
+  const std::size_t first = slurm_number("SLURM_ARRAY_TASK_MIN").value_or(0);
+  const std::size_t step = slurm_number("SLURM_ARRAY_TASK_STEP").value_or(1);
+  const bool even = step > 0 && *id >= first && (*id - first) % step == 0;
+  const std::size_t index = even ? (*id - first) / step : *count;
+  if (index >= *count || *count > most_shards) {
+    refuse_flag("SLURM_ARRAY_TASK_ID", *id,
+                "is not one of {} evenly spaced numbers from {}; submit with --array=0-{}, or give "
+                "--shard I/N",
+                *count, first, *count - 1);
   }
-  return number;
+  return {index, *count};
 }
 
 }  // namespace
@@ -45,22 +52,16 @@ Shard shard_of(const std::string& flag) {
     }
     return {*index, *count};
   }
-  const auto id = from_slurm("SLURM_ARRAY_TASK_ID");
-  const auto count = from_slurm("SLURM_ARRAY_TASK_COUNT");
-  if (!id || !count) {
-    return {};
+  const Shard array = shard_of_array();
+  // Not SLURM_NTASKS, which a batch script has outside of its steps, too.
+  const std::size_t tasks = slurm_number("SLURM_STEP_NUM_TASKS").value_or(1);
+  const std::size_t task = slurm_number("SLURM_PROCID").value_or(0);
+  if (task >= tasks || tasks > most_shards / array.count) {
+    refuse_flag("SLURM_PROCID", task,
+                "of {} tasks is no shard among up to {}; unset it, or give --shard I/N", tasks,
+                most_shards);
   }
-  const std::size_t first = from_slurm("SLURM_ARRAY_TASK_MIN").value_or(0);
-  const std::size_t step = from_slurm("SLURM_ARRAY_TASK_STEP").value_or(1);
-  const bool even = step > 0 && *id >= first && (*id - first) % step == 0;
-  const std::size_t index = even ? (*id - first) / step : *count;
-  if (index >= *count || *count > most_shards) {
-    refuse_flag("SLURM_ARRAY_TASK_ID", *id,
-                "is not one of {} evenly spaced numbers from {}; submit with --array=0-{}, or give "
-                "--shard I/N",
-                *count, first, *count - 1);
-  }
-  return {index, *count};
+  return {array.index * tasks + task, array.count * tasks};
 }
 
 }  // namespace palpate::cli
