@@ -53,6 +53,19 @@ struct OpenChunk {
   std::size_t failed = 0;
 };
 
+/// How many unknowns are recognised at once.
+std::size_t most_at_once(const RecognitionTask& task, std::size_t threads) {
+  if (std::holds_alternative<BoundedOptions>(task.filter)) {
+    return threads;
+  }
+  // Few bins leave a device idle, and it waits for the host: other unknowns fill its time.
+  constexpr std::int64_t few_bins = 1'000'000;
+  constexpr std::size_t most = 4;
+  const bool few =
+      std::holds_alternative<HistogramOptions>(task.filter) && task.bins_in_all() <= few_bins;
+  return few ? std::min(threads, most) : 1;
+}
+
 std::string host_name() {
   char name[HOST_NAME_MAX + 1] = {};
   return ::gethostname(name, sizeof name - 1) == 0 ? name : "";
@@ -81,12 +94,10 @@ class Pipeline {
       first_.push_back(at);
       at += run.task.unknowns_of(entry);
     }
-    const bool bounded = std::holds_alternative<BoundedOptions>(task_.filter);
-    recognisers_ = bounded ? std::min(run.threads, wanted_unknowns()) : 1;
-    if (bounded) {
-      auto& options = std::get<BoundedOptions>(task_.filter);
-      options.threads = static_cast<int>(std::max<std::size_t>(1, run.threads / recognisers_));
-      options.on_host = true;
+    recognisers_ = std::min(most_at_once(task_, run.threads), wanted_unknowns());
+    if (auto* options = std::get_if<BoundedOptions>(&task_.filter)) {
+      options->threads = static_cast<int>(std::max<std::size_t>(1, run.threads / recognisers_));
+      options->on_host = true;
     }
   }
 
