@@ -7,7 +7,6 @@
 #include <iterator>
 #include <limits>
 #include <numeric>
-#include <ranges>
 #include <tuple>
 
 #include <tbb/parallel_for.h>
@@ -128,8 +127,10 @@ class SearchRun {
     const double least = prior - contradiction_nats;
     const std::size_t objects = search_.bounds_.size();
     const auto explains = [&](std::size_t i) { return account_.best_of(i) >= least; };
-    if (std::ranges::any_of(std::views::iota(std::size_t{0}, objects), explains)) {
-      return false;
+    for (std::size_t i = 0; i < objects; ++i) {
+      if (explains(i)) {
+        return false;
+      }
     }
     for (std::size_t i = 0; i < objects; ++i) {
       if (account_.largest_dropped_of(i) >= least) {
