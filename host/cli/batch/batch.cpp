@@ -15,6 +15,7 @@
 #include "batch_settling.hpp"
 #include "commands.hpp"
 #include "progress.hpp"
+#include "settled_task.hpp"
 
 namespace palpate::cli {
 
@@ -128,11 +129,7 @@ std::string summary(const Options& options, const Shard& shard, const Chunks& ch
 }
 
 int batch(const Options& options, const CLI::App& command) {
-  if (options.recognition.filter.budget_ms) {
-    refuse_flag("--budget-ms", *options.recognition.filter.budget_ms,
-                "its results depend on the clock, and a batch's are the same on every run; leave "
-                "it out, or use palpate recognize");
-  }
+  refuse_budget(options.recognition);
   if (options.chunk < 1) {
     refuse_flag("--chunk", options.chunk, "give at least 1");
   }
