@@ -248,7 +248,7 @@ def _there(
                 del left[future.key]
                 yield index, lines
         finally:
-            if cluster.status == "running":
+            if left and cluster.status == "running":
                 cluster.cancel([future for _, future in left.values()])
 
 
