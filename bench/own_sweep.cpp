@@ -33,7 +33,8 @@ std::vector<PoseLattice> lattices_of(const PoseLattice& fine, std::int64_t most)
   const auto free = std::ranges::count_if(counts, [](int count) { return count > 1; });
   const double power = 1.0 / static_cast<double>(std::max<std::ptrdiff_t>(1, free));
   std::vector<PoseLattice> lattices;
-  for (double count = finest; count >= std::min<double>(fewest_bins, finest);
+  constexpr double about = 0.9;  // counts of bins are near to what is asked for
+  for (double count = finest; count >= about * std::min<double>(fewest_bins, finest);
        count /= std::sqrt(10.0)) {
     const double factor = std::pow(count / all, power);
     PoseLattice lattice = fine;

@@ -72,9 +72,9 @@ TEST_F(SitePages, MoreBinsHelpTheModeOnly) {
                  "neither recognition nor the refined pose improves"});
   expect_written({"sweep/sweep_own_bins.png", "sweep/sweep_own_time.svg"});
   const nlohmann::json points = json("sweep.json").at("points");
-  ASSERT_EQ(points.size(), 6U);
-  EXPECT_NEAR(points.at(2).at("refined_error_mm").at("mean").get<double>(), 0.275, 0.02);
-  EXPECT_NEAR(points.at(5).at("refined_error_mm").at("mean").get<double>(), 0.189, 0.02);
+  ASSERT_EQ(points.size(), 7U);
+  EXPECT_NEAR(points.at(3).at("refined_error_mm").at("mean").get<double>(), 0.275, 0.02);
+  EXPECT_NEAR(points.at(6).at("refined_error_mm").at("mean").get<double>(), 0.189, 0.02);
   const auto mean = [this](const std::string& results, const char* field) {
     double sum = 0.0;
     const nlohmann::json records = json(results);
