@@ -22,7 +22,8 @@ namespace palpate::bench {
 
 namespace {
 
-constexpr std::int64_t fewest_bins = 1'000;
+/// Bins of the coarsest lattice; of a small region, a thirtieth of the finest one's.
+constexpr double fewest_bins = 1e3;
 
 /// Lattices of the region in the proportions of `fine`, by rising count, up to three times as many
 /// bins: each has about three times as many as the one before.
@@ -34,8 +35,8 @@ std::vector<PoseLattice> lattices_of(const PoseLattice& fine, std::int64_t most)
   const double power = 1.0 / static_cast<double>(std::max<std::ptrdiff_t>(1, free));
   std::vector<PoseLattice> lattices;
   constexpr double about = 0.9;  // counts of bins are near to what is asked for
-  for (double count = finest; count >= about * std::min<double>(fewest_bins, finest);
-       count /= std::sqrt(10.0)) {
+  const double coarsest = std::min(fewest_bins, finest / 30.0);
+  for (double count = finest; count >= about * coarsest; count /= std::sqrt(10.0)) {
     const double factor = std::pow(count / all, power);
     PoseLattice lattice = fine;
     for (Axis* axis : {&lattice.x_mm, &lattice.y_mm, &lattice.theta_rad}) {
