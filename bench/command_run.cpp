@@ -42,13 +42,13 @@ std::map<std::string, std::unique_ptr<AtomicFile>> open_outputs(std::vector<Outp
 }  // namespace
 
 CommandRun::CommandRun(const RunOptions& options, std::vector<Output> outputs,
-                       std::span<char* const> command_line)
+                       std::span<char* const> command_line, const std::string& data)
     : files_(open_outputs(std::move(outputs))), device_(Device::open(options.device)) {
   const auto now = std::chrono::floor<std::chrono::seconds>(std::chrono::system_clock::now());
   facts_ = {{"device", device_.name()},
             {"host threads", std::thread::hardware_concurrency()},
             {"compiler", PALPATE_COMPILER},
-            {"data", "simulated letters and sensor; the paper's recordings are not public"},
+            {"data", data},
             {"date", fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", now)},
             {"command line", fmt::format("{}", fmt::join(command_line, " "))}};
   for (const auto& [name, value] : facts_.items()) {

@@ -29,10 +29,13 @@ class CommandRun {
  public:
   /// Opens the outputs, then the device, and prints the facts: what cannot be opened is known
   /// before the minutes of work.
+  /// @param data what is measured, for the facts
   /// @throws Error where two outputs are one file, or a file, a folder or the device cannot be
   /// opened
   CommandRun(const RunOptions& options, std::vector<Output> outputs,
-             std::span<char* const> command_line);
+             std::span<char* const> command_line,
+             const std::string& data =
+                 "simulated letters and sensor; the paper's recordings are not public");
 
   Device& device() { return device_; }
   /// Device, host threads, compiler, data, date and command line.

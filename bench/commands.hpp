@@ -4,6 +4,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <vector>
 
 namespace palpate::bench {
 
@@ -44,11 +45,28 @@ struct BoundedRunOptions : RunOptions {
 inline constexpr const char* bounded_parts[] = {"speed",  "mode",     "streaming", "large",
                                                 "growth", "accuracy", "presses"};
 
+/// A user's own maps and recordings, with the flags of `palpate recognize`.
+struct OwnDataOptions {
+  std::vector<std::string> maps;        ///< files or folders
+  std::vector<std::string> recordings;  ///< files, folders, manifests or patterns
+  std::string scene;
+  std::string sensor_model;
+  std::string x_mm;
+  std::string y_mm;
+  std::string theta_deg;
+  std::string pivot_mm;
+  std::optional<double> threshold;
+  std::optional<double> ratio;
+
+  friend bool operator==(const OwnDataOptions&, const OwnDataOptions&) = default;
+};
+
 struct SweepOptions : RunOptions {
   std::string html;                      ///< file for a page with charts and tables
   std::string plots;                     ///< folder for the page's charts
   std::optional<std::int64_t> max_bins;  ///< per object; by default 10,000,000, or 100,000 if quick
   std::optional<int> trials;             ///< per letter; by default 10, or 4 if quick
+  OwnDataOptions own;                    ///< in the place of the letters, where it names any
 };
 
 struct BinStepsOptions : RunOptions {
@@ -86,6 +104,11 @@ void measure_bounded(const BoundedRunOptions& options, std::span<char* const> co
 /// object, maps of several cell sizes, the engine's ways to evaluate the likelihood beside two
 /// baselines, and the causes of the errors that more bins do not mend.
 void run_sweep(const SweepOptions& options, std::span<char* const> command_line);
+
+/// The same question of a user's own maps and recordings (options.own): over bin counts, accuracy,
+/// pose errors and standard deviations, and what the histogram and bounds cost; then from which
+/// count on nothing improves.
+void run_own_sweep(const SweepOptions& options, std::span<char* const> command_line);
 
 /// The error of the refined pose against the step of the bins, on the region that touch_region()
 /// gives about the first touch: what BinWidth::automatic was chosen by.

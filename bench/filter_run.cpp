@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstdlib>
+#include <utility>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -45,7 +46,8 @@ std::string filter_name(const FilterOptions& filter) {
 
 }  // namespace
 
-FilterRun run_filter(Device& device, RecognitionTask task, std::span<const Recording> trials) {
+FilterRun run_filter(Device& device, RecognitionTask task, std::span<const Unknown> unknowns,
+                     bool trace) {
   FilterRun run{.filter = filter_name(task.filter), .name = {}, .records = {}};
   Recogniser recogniser(device, task);
   auto* particles = std::get_if<ParticleOptions>(&task.filter);
@@ -62,18 +64,29 @@ FilterRun run_filter(Device& device, RecognitionTask task, std::span<const Recor
     run.name = run.filter + " " + size_of(lattice);
   }
   run.seconds = seconds_of([&] {
-    for (const Recording& trial : trials) {
+    for (const Unknown& unknown : unknowns) {
       if (particles != nullptr && !run.records.empty()) {
         // reset() would start from the same particles again.
         ++particles->seed;
         recogniser = Recogniser(device, task);
       }
-      run.records.push_back(recognise(recogniser, task, unknown_of(trial), true));
+      run.records.push_back(recognise(recogniser, task, unknown, trace));
       run.records.back().require_steps();
       run.device_bytes = std::max(run.device_bytes, recogniser.device_bytes());
+      if (const BoundedPosterior* bounded = recogniser.bounded()) {
+        run.host_bytes = std::max<std::uint64_t>(run.host_bytes, bounded->host_bytes());
+      }
     }
   });
   return run;
+}
+
+FilterRun run_filter(Device& device, RecognitionTask task, std::span<const Recording> trials) {
+  std::vector<Unknown> unknowns;
+  for (const Recording& trial : trials) {
+    unknowns.push_back(unknown_of(trial));
+  }
+  return run_filter(device, std::move(task), unknowns, true);
 }
 
 std::vector<CurvePoint> curve_of(const FilterRun& run) {

@@ -17,13 +17,18 @@ struct FilterRun {
   std::string filter;      ///< "histogram", "bounds", "particles", "systematic" or "augmented"
   std::string name;        ///< with its size, such as "histogram 25x25x16"
   std::int64_t count = 0;  ///< bins per object, or particles in all
-  std::vector<RecognitionRecord> records;  ///< [trial], with a step after every touch
+  std::vector<RecognitionRecord> records;  ///< [trial]
   double seconds = 0.0;                    ///< wall time of all trials
   std::string path;                        ///< how the likelihood is evaluated
   std::uint64_t device_bytes = 0;          ///< most device memory held
+  std::uint64_t host_bytes = 0;            ///< most memory that bounds held
 };
 
-/// All trials by the task's filter. Of particles, trial i has the task's seed + i.
+/// All unknowns by the task's filter. Of particles, unknown i has the task's seed + i.
+/// @param trace whether the records have a step after every touch, or only after the last one
+FilterRun run_filter(Device& device, RecognitionTask task, std::span<const Unknown> unknowns,
+                     bool trace);
+/// The same of trials, with a step after every touch.
 FilterRun run_filter(Device& device, RecognitionTask task, std::span<const Recording> trials);
 
 /// A run after some number of touches, over all trials.

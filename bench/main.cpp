@@ -28,6 +28,23 @@ CLI::App* add_command(CLI::App& app, const char* name, const char* description, 
   return command;
 }
 
+void add_own_data(CLI::App& command, OwnDataOptions& own) {
+  command.add_option("--maps", own.maps, "Maps of your objects, or folders of maps");
+  command.add_option("--recordings", own.recordings,
+                     "Recordings of unknowns, folders of them, or manifests as of palpate batch. "
+                     "Where they know the object or its pose, the sweep tells accuracy and errors");
+  command.add_option("--scene", own.scene, "Scene file (YAML), as of palpate recognize");
+  command.add_option("--sensor-model", own.sensor_model, "What palpate calibrate has learned");
+  command.add_option("--x-mm", own.x_mm,
+                     "Range of x, as of palpate recognize [default: every place of an array that "
+                     "touches an object of the maps]");
+  command.add_option("--y-mm", own.y_mm, "Range of y");
+  command.add_option("--theta-deg", own.theta_deg, "Range of theta, degrees [default: 0:360]");
+  command.add_option("--pivot-mm", own.pivot_mm, "Point about which theta turns, X,Y or auto");
+  command.add_option("--threshold", own.threshold, "Contact threshold, in the recordings' unit");
+  command.add_option("--ratio", own.ratio, "Threshold as a fraction of the largest pressure");
+}
+
 }  // namespace
 }  // namespace palpate::bench
 
@@ -94,7 +111,9 @@ int main(int argc, char** argv) try {
   command = add_command(app, "sweep",
                         "Measure speed against error on simulated letters, in some 20 minutes on "
                         "two CPU cores: every filter, from 100 to 10,000,000 bins per object, on "
-                        "maps of several cell sizes",
+                        "maps of several cell sizes. With --maps and --recordings, the same of "
+                        "your own objects: how many bins they need, and what bins cost on this "
+                        "device",
                         sweep, run_sweep, command_line);
   command->add_option("--html", sweep.html, "Write the results as a page with charts and tables");
   command->add_option("--plots", sweep.plots,
@@ -102,6 +121,7 @@ int main(int argc, char** argv) try {
   command->add_option("--max-bins", sweep.max_bins,
                       "Most bins per object (default 10,000,000, or 100,000 with --quick)");
   command->add_option("--trials", sweep.trials, trials);
+  add_own_data(*command, sweep.own);
   BinStepsOptions bin_steps;
   command = add_command(app, "bin-steps",
                         "Measure the refined pose's error against the step of the bins, after 3, 5 "

@@ -132,6 +132,9 @@ void print(const Json& document) {
 
 void run_sweep(const SweepOptions& options, std::span<char* const> command_line) {
   require_at_least("--max-bins", options.max_bins, 1'000);
+  if (options.own != OwnDataOptions{}) {
+    return run_own_sweep(options, command_line);
+  }
   require_at_least("--trials", options.trials, 1);
   CommandRun run(options,
                  {{"--json", options.json},

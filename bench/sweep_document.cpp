@@ -77,6 +77,19 @@ Json record_of(const std::optional<ErrorsOverTrials>& errors) {
                 : Json(nullptr);
 }
 
+void set_errors(Json& record, const PoseErrors& errors) {
+  record["trials"] = errors.mode_mm.size();
+  record["error_mm"] = record_of(errors_over(errors.mode_mm));
+  record["refined_error_mm"] = record_of(errors_over(errors.refined_mm));
+  for (const auto& [field, errors_mm] : {std::pair("errors_mm", &errors.mode_mm),
+                                         std::pair("refined_errors_mm", &errors.refined_mm)}) {
+    record[field] = Json::array();
+    for (const std::optional<double>& error_mm : *errors_mm) {
+      record[field].push_back(error_mm ? Json(*error_mm) : Json(nullptr));
+    }
+  }
+}
+
 Json difference_of(const PairedErrors& paired) {
   return {{"mean", paired.first_mm - paired.second_mm},
           {"standard_error", paired.standard_error_mm}};

@@ -18,6 +18,8 @@ Json record_of(const ErrorStatistics& deviation);
 /// Mean, standard error, median and 95th percentile, which is null for fewer than 20 trials; null
 /// where no trial has an error.
 Json record_of(const std::optional<ErrorsOverTrials>& errors);
+/// Puts pose errors into the record of a run: those of each trial, and what they are over all.
+void set_errors(Json& record, const PoseErrors& errors);
 /// By how much the first run's mean error exceeds the second's, with its standard error.
 Json difference_of(const PairedErrors& paired);
 

@@ -13,20 +13,6 @@ namespace palpate::bench {
 
 namespace {
 
-/// Puts pose errors into the record of a run.
-void set_errors(Json& record, const PoseErrors& errors) {
-  record["trials"] = errors.mode_mm.size();
-  record["error_mm"] = record_of(errors_over(errors.mode_mm));
-  record["refined_error_mm"] = record_of(errors_over(errors.refined_mm));
-  for (const auto& [field, errors_mm] : {std::pair("errors_mm", &errors.mode_mm),
-                                         std::pair("refined_errors_mm", &errors.refined_mm)}) {
-    record[field] = Json::array();
-    for (const std::optional<double>& error_mm : *errors_mm) {
-      record[field].push_back(error_mm ? Json(*error_mm) : Json(nullptr));
-    }
-  }
-}
-
 /// What a run cost, as medians, and what it is worth. What only some runs have is null.
 Json record_of(const FilterRun& run, double cell_mm) {
   std::vector<double> seconds_touch;    // from a touch to its estimate

@@ -67,7 +67,9 @@ RecognitionTask task_of(const RecognitionFlags& flags, const Scene& scene,
                         const std::string& pressure_unit, const std::string& source,
                         double reach_mm, const HistogramNeed& need = {});
 
-/// Opens the device that the flags or the scene name. Throws Error.
+/// The device that the flags or the scene name; "" where neither does.
+std::string device_of(const RecognitionFlags& flags, const Scene& scene);
+/// Opens it. Throws Error.
 Device open_device(const RecognitionFlags& flags, const Scene& scene);
 
 /// Whether neither bins nor any part of a region are given: the region then follows from the maps

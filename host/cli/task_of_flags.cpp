@@ -290,8 +290,12 @@ RecognitionTask task_of(const RecognitionFlags& flags, const Scene& scene,
   return task;
 }
 
+std::string device_of(const RecognitionFlags& flags, const Scene& scene) {
+  return flags.device.empty() ? scene.device.value_or("") : flags.device;
+}
+
 Device open_device(const RecognitionFlags& flags, const Scene& scene) {
-  return Device::open(flags.device.empty() ? scene.device.value_or("") : flags.device);
+  return Device::open(device_of(flags, scene));
 }
 
 std::string settle_task(const RecognitionFlags& flags, const Scene& scene, const Device& device,

@@ -16,6 +16,8 @@ void bind_bounded_posterior(nb::module_& module);
 void bind_particle_filter(nb::module_& module);
 void bind_simulation(nb::module_& module);
 void bind_sensors(nb::module_& module);
+void bind_request(nb::module_& module);
 void bind_recognition(nb::module_& module);
+void bind_batch(nb::module_& module);
 
 }  // namespace palpate::python

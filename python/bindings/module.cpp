@@ -45,7 +45,9 @@ NB_MODULE(_palpate, module) {
   bind_particle_filter(module);
   bind_simulation(module);
   bind_sensors(module);
+  bind_request(module);
   bind_recognition(module);
+  bind_batch(module);
   // Work that was given up uses libraries that the end of the process takes down.
   nb::module_::import_("atexit").attr("register")(nb::cpp_function(&Call::wait_for_given_up));
 }

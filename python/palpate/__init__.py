@@ -59,6 +59,7 @@ from ._palpate import (
     training_grid,
     transform,
 )
+from .many import Recognized, Task, recognize_many
 from .recognition import Record, recognize
 from .streams import touches
 
@@ -90,12 +91,14 @@ __all__ = [
     "PoseHistogram",
     "PoseLattice",
     "PoseSample",
+    "Recognized",
     "Record",
     "Recording",
     "RefinedPose",
     "Resampling",
     "Sensor",
     "SensorModel",
+    "Task",
     "Touch",
     "TouchDetector",
     "Truth",
@@ -113,6 +116,7 @@ __all__ = [
     "read_map",
     "read_recording",
     "recognize",
+    "recognize_many",
     "simulate",
     "touches",
     "training_grid",

@@ -2,7 +2,7 @@
 
 import os
 import warnings
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, Literal, cast
 
 from . import _palpate
@@ -17,7 +17,9 @@ class Record(dict[str, Any]):
 
     `best` is the most probable label, `identity` {label: probability}, `mode` the most probable bin,
     `refined` the pose between the bins with `T_robot_object` [x_mm, y_mm, theta_rad], `sd` and
-    `covariance`, `fit` how well the touches fit it: {"z", "verdict"}. docs/files.md lists all keys.
+    `covariance`, `fit` how well the touches fit it: {"z", "verdict"}. Of a recording that
+    recognize_many() could not recognise there are only its name, `touches` (0), `truth` and `error`.
+    docs/files.md lists all keys.
     """
 
     def __getattr__(self, name: str) -> Any:
@@ -27,6 +29,8 @@ class Record(dict[str, Any]):
             raise AttributeError(f"the record has no '{name}'; it has {', '.join(self)}") from None
 
     def __repr__(self) -> str:
+        if "error" in self:
+            return f"Record(error: {self['error']})"
         probability = self["identity"][self["best"]]
         pose = self.get("refined", self)["T_robot_object"]
         return (
@@ -85,44 +89,40 @@ def recognize(
     Raises Error in the words of the command. What the command would say on standard error becomes a
     UserWarning; what looks wrong with the touches is in the records' `warnings`.
     """
-    flags = _palpate.RecognitionFlags()
-    texts = {
-        "scene": None if scene is None else os.fspath(scene),
-        "sensor_model": None if sensor_model is None else os.fspath(sensor_model),
-        "bins": _joined(bins, "x"),
-        "x_mm": _joined(x_mm, ":"),
-        "y_mm": _joined(y_mm, ":"),
-        "theta_deg": _joined(theta_deg, ":"),
-        "pivot_mm": _joined(pivot_mm, ","),
-        "none": None if none is None else _text(none),
-        "filter": filter,
-        "resampling": resampling,
-        "frames": _joined(frames, ":"),
-        "device": None if device is None or isinstance(device, Device) else str(device),
-    }
-    numbers = {
-        "prior": prior,
-        "gamma": gamma,
-        "threshold": threshold,
-        "ratio": ratio,
-        "touch_sd_mm": touch_sd_mm,
-        "touch_sd_deg": touch_sd_deg,
-        "slip_sd_mm": slip_sd_mm,
-        "slip_sd_deg": slip_sd_deg,
-        "tolerance": tolerance,
-        "budget_ms": budget_ms,
-        "evidence_nats": evidence_nats,
-        "particles": particles,
-        "augmented": augmented,
-        "seed": seed,
-        "memory_mib": memory_mib,
-        "touches": touches,
-        "each_frame": each_frame,
-        "trace": trace,
-    }
-    for name, value in (texts | numbers).items():
-        if value is not None:
-            setattr(flags, name, value)
+    flags = flags_of(
+        {
+            "bins": bins,
+            "x_mm": x_mm,
+            "y_mm": y_mm,
+            "theta_deg": theta_deg,
+            "pivot_mm": pivot_mm,
+            "scene": scene,
+            "sensor_model": sensor_model,
+            "prior": prior,
+            "gamma": gamma,
+            "threshold": threshold,
+            "ratio": ratio,
+            "touch_sd_mm": touch_sd_mm,
+            "touch_sd_deg": touch_sd_deg,
+            "slip_sd_mm": slip_sd_mm,
+            "slip_sd_deg": slip_sd_deg,
+            "none": none,
+            "filter": filter,
+            "tolerance": tolerance,
+            "budget_ms": budget_ms,
+            "evidence_nats": evidence_nats,
+            "particles": particles,
+            "resampling": resampling,
+            "augmented": augmented,
+            "seed": seed,
+            "memory_mib": memory_mib,
+            "frames": frames,
+            "touches": touches,
+            "each_frame": each_frame,
+            "trace": trace,
+            "device": None if isinstance(device, Device) else device,
+        }
+    )
     given_maps = [maps] if isinstance(maps, (OccupancyGrid, Hypothesis, str, os.PathLike)) else maps
     given = [recordings] if isinstance(recordings, (Recording, str, os.PathLike)) else recordings
     records, sentences = _palpate.recognize_as_flagged(
@@ -140,13 +140,31 @@ def recognize(
     return [Record(record) for record in records]
 
 
-def _text(value: object) -> str:
-    """The value as a flag of the command would have it; a float keeps all its digits."""
-    return value if isinstance(value, str) else repr(float(cast(float, value)))
+def flags_of(options: Mapping[str, object]) -> _palpate.RecognitionFlags:
+    """The options of recognize() as the flags of the command; None leaves the default."""
+    flags = _palpate.RecognitionFlags()
+    for name, value in options.items():
+        if value is not None:
+            setattr(flags, name, _flag(name, value))
+    return flags
 
 
-def _joined(values: Sequence[float] | str | None, separator: str) -> str | None:
-    if values is None or isinstance(values, str):
+_SEPARATORS = {"bins": "x", "x_mm": ":", "y_mm": ":", "theta_deg": ":", "pivot_mm": ",", "frames": ":"}
+
+
+def _flag(name: str, value: object) -> object:
+    """The value as the flag of the command would have it; a float keeps all its digits."""
+    if name in _SEPARATORS:
+        return _joined(cast(Sequence[float] | str, value), _SEPARATORS[name])
+    if name == "none" and not isinstance(value, str):
+        return repr(float(cast(float, value)))
+    if name == "device":
+        return str(value)
+    return os.fspath(value) if isinstance(value, os.PathLike) else value
+
+
+def _joined(values: Sequence[float] | str, separator: str) -> str:
+    if isinstance(values, str):
         return values
     return separator.join(
         str(value) if isinstance(value, int) else repr(float(value)) for value in values

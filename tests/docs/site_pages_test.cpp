@@ -67,7 +67,14 @@ TEST_F(SitePages, MoreBinsHelpTheModeOnly) {
   EXPECT_EQ(complained, "");
   expect_quoted("bins.md", said,
                 {"the pose's standard deviation is only the width of a bin",
-                 "give --bins 40x40x53 or more, or --bins auto"});
+                 "give --bins 40x40x53 or more, or --bins auto",
+                 "Beyond 99 k bins per object (--bins 31x31x103 --x-mm=-15:15 --y-mm=-15:15) "
+                 "neither recognition nor the refined pose improves"});
+  expect_written({"sweep/sweep_own_bins.png", "sweep/sweep_own_time.svg"});
+  const nlohmann::json points = json("sweep.json").at("points");
+  ASSERT_EQ(points.size(), 7U);
+  EXPECT_NEAR(points.at(3).at("refined_error_mm").at("mean").get<double>(), 0.275, 0.02);
+  EXPECT_NEAR(points.at(6).at("refined_error_mm").at("mean").get<double>(), 0.189, 0.02);
   const auto mean = [this](const std::string& results, const char* field) {
     double sum = 0.0;
     const nlohmann::json records = json(results);

@@ -28,7 +28,7 @@ def test_types_are_strict() -> None:
     assert (package / "_palpate.pyi").exists()
     assert (package / "py.typed").exists()
     assert len(EXAMPLES) == 3
-    modules = ["palpate", "palpate.recognition", "palpate.streams", "palpate.plots"]
+    modules = ["palpate", "palpate.many", "palpate.recognition", "palpate.streams", "palpate.plots"]
     flags = [flag for module in modules for flag in ("-m", module)]
     for checked in ([*EXAMPLES, ROOT / "python" / "palpate_command.py"], flags):
         run = subprocess.run(

@@ -15,6 +15,7 @@
 #include "batch_settling.hpp"
 #include "commands.hpp"
 #include "progress.hpp"
+#include "settled_task.hpp"
 #include "slurm.hpp"
 
 namespace palpate::cli {
@@ -130,17 +131,13 @@ std::string summary(const Options& options, const Shard& shard, const Chunks& ch
 
 /// The device of this task among those that Slurm started on this computer.
 std::string device_in_step(const RecognitionFlags& flags, const Scene& scene) {
-  const std::string wished = flags.device.empty() ? scene.device.value_or("") : flags.device;
+  const std::string wished = device_of(flags, scene);
   const std::optional<std::size_t> rank = slurm_number("SLURM_LOCALID");
   return rank ? local_device(Device::list(wished), wished, *rank) : wished;
 }
 
 int batch(Options options, const CLI::App& command) {
-  if (options.recognition.filter.budget_ms) {
-    refuse_flag("--budget-ms", *options.recognition.filter.budget_ms,
-                "its results depend on the clock, and a batch's are the same on every run; leave "
-                "it out, or use palpate recognize");
-  }
+  refuse_budget(options.recognition);
   if (options.chunk < 1) {
     refuse_flag("--chunk", options.chunk, "give at least 1");
   }

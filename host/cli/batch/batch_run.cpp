@@ -17,6 +17,7 @@
 #include "palpate/error.hpp"
 #include "recognition_record.hpp"
 #include "record_output.hpp"
+#include "settled_task.hpp"
 #include "uncertainty_flags.hpp"
 
 namespace palpate::cli {
@@ -95,10 +96,7 @@ class Pipeline {
       at += run.task.unknowns_of(entry);
     }
     recognisers_ = std::min(most_at_once(task_, run.threads), wanted_unknowns());
-    if (auto* options = std::get_if<BoundedOptions>(&task_.filter)) {
-      options->threads = static_cast<int>(std::max<std::size_t>(1, run.threads / recognisers_));
-      options->on_host = true;
-    }
+    keep_on_host(task_, run.threads / recognisers_);
   }
 
   BatchCounts run(const std::function<void(const BatchCounts&)>& progress) {
@@ -176,57 +174,13 @@ class Pipeline {
   void read(RecordingReader& reader) {
     for (std::size_t i = next_input_++; i < first_.size() && !failed_; i = next_input_++) {
       if (is_wanted(i)) {
-        push_unknowns(i, read_unknowns(reader, run_.task.inputs[i]));
+        push_unknowns(i, read_entry(reader, run_.task, run_.task.inputs[i], run_.rules));
       }
     }
-  }
-
-  /// An unknown with an error where the input is at fault.
-  ReadInput read_unknowns(RecordingReader& reader, const BatchEntry& entry) const {
-    const auto require_unchanged = [&] {
-      if (stamp_of(entry.input.path) != entry.stamp) {
-        refuse(entry.input.path, "has changed since the batch began; begin again with --update");
-      }
-    };
-    require_unchanged();
-    try {
-      ReadInput read = read_input(reader, entry.input, run_.rules, &run_.task.inferred);
-      require_unchanged();
-      return read;
-    } catch (const Error& error) {
-      require_unchanged();
-      if (error.fault() != Fault::input) {
-        throw;
-      }
-      Unknown unknown{.recording = entry.input.path,
-                      .frame = {},
-                      .touches = {},
-                      .truth = {entry.input.label, {}},
-                      .error = error.what()};
-      return {nullptr, {std::move(unknown)}};
-    }
-  }
-
-  const std::optional<Frames>& frames_of(std::size_t input) const {
-    const std::optional<Frames>& own = run_.task.inputs[input].input.frames;
-    return own ? own : run_.rules.frames;
   }
 
   void push_unknowns(std::size_t input, ReadInput read) {
-    const std::size_t count = run_.task.unknowns_of(run_.task.inputs[input]);
-    if (read.recording && read.unknowns.size() != count) {
-      refuse(run_.task.inputs[input].input.path,
-             "has {} unknowns, but had {} when the batch began; begin again with --update",
-             read.unknowns.size(), count);
-    }
-    if (!read.recording && count > 1) {  // every press has the recording's error
-      read.unknowns.resize(count, read.unknowns.front());
-      const std::optional<Frames>& frames = frames_of(input);
-      for (std::size_t i = 0; i < count; ++i) {
-        read.unknowns[i].frame = (frames ? frames->begin : 0) + i;
-      }
-    }
-    for (std::size_t i = 0; i < count; ++i) {
+    for (std::size_t i = 0; i < read.unknowns.size(); ++i) {
       const std::size_t index = first_[input] + i;
       if (run_.wanted[chunk_of(index)]) {
         const std::size_t bytes = bytes_of(read.unknowns[i]);

@@ -6,7 +6,7 @@
 
 #include "palpate/error.hpp"
 #include "progress.hpp"
-#include "sensor_model_flag.hpp"
+#include "settled_task.hpp"
 
 namespace palpate::cli {
 
@@ -25,24 +25,6 @@ void keep_surveys(const BatchTask& before, BatchTask& now) {
       entry.survey = found->second->survey;
     }
   }
-}
-
-/// Hashes of the files that the recognition depends on.
-std::map<std::string, std::string> hashes_of(const RecognitionFlags& flags, const Scene& scene,
-                                             const RecognitionTask& recognition) {
-  std::map<std::string, std::string> hashes;
-  const auto add = [&](const std::string& file) {
-    if (!file.empty() && !hashes.contains(file)) {
-      hashes[file] = hash_of_file(file);
-    }
-  };
-  add(flags.scene);
-  add(scene.array_file ? scene.array_file->string() : "");
-  add(sensor_model_file(flags, scene));
-  for (const std::string& map : recognition.map_paths) {
-    add(map);
-  }
-  return hashes;
 }
 
 class Settling {
@@ -82,17 +64,6 @@ constexpr const char* recognise_all =
 constexpr const char* recognise_changed =
     "undo that, give another folder, or recognise what has changed with --update";
 
-RecognitionTask recognition_of(const BatchTask& task, const RecognitionFlags& flags,
-                               const InputRules& rules) {
-  const BatchInference& inferred = task.inferred;
-  RecognitionTask recognition =
-      task_of(flags, rules.scene, inferred.pressure_unit, inferred.unit_from, inferred.reach_mm);
-  if (auto* histogram = std::get_if<HistogramOptions>(&recognition.filter)) {
-    histogram->still_array = inferred.still_array;
-  }
-  return recognition;
-}
-
 }  // namespace
 
 SettledBatch settle_batch(const ResultsFolder& folder, const FolderLock& lock, BatchTask now,
@@ -110,16 +81,14 @@ SettledBatch settle_batch(const ResultsFolder& folder, const FolderLock& lock, B
             {.program = now.program, .chunk_unknowns = now.chunk_unknowns, .flags = now.flags}),
         update, recognise_all);
   }
-  for (BatchEntry& entry : now.inputs) {
-    entry.stamp = stamp_of(entry.input.path);
-  }
+  stamp_inputs(now);
   if (before) {
     settling.require_equal(difference_of_inputs(*before, now), update, recognise_changed);
     keep_surveys(*before, now);
   }
-  if (now.each_frame || infers_region(flags, rules.scene)) {
+  {
     Progress progress("looking through the recordings");
-    survey_inputs(now.inputs, rules, threads, [&](double done) { progress.show(done); });
+    survey(now, flags, rules, threads, [&](double done) { progress.show(done); });
   }
   const bool same_inputs = before && before->inputs == now.inputs;
   now.inferred = same_inputs ? before->inferred : infer(now.inputs, rules);
@@ -127,29 +96,18 @@ SettledBatch settle_batch(const ResultsFolder& folder, const FolderLock& lock, B
   SettledBatch settled{std::move(now), std::move(asked), {}};
   BatchTask& task = settled.task;
   RecognitionTask& recognition = settled.recognition;
-  task.files = hashes_of(flags, rules.scene, recognition);
   const std::string difference = before ? difference_of_tasks(*before, task) : "";
   settling.require_equal(difference, update, recognise_all);
   const bool same_task = before && difference.empty();
   if (same_task) {
     task.bins = before->bins;
-    recognition.lattice().x_mm.count = task.bins[0];
-    recognition.lattice().y_mm.count = task.bins[1];
-    recognition.lattice().theta_rad.count = task.bins[2];
-    recognition.bin_width.reset();
-  } else if (recognition.bin_width) {
-    settled.device = open_device(flags, rules.scene);
-  }
-  const std::string coarsened =
-      settled.device ? settle_task(flags, rules.scene, *settled.device, recognition) : "";
-  if (!settled.device) {
-    settle_filter(recognition);
-    settle_evidence(recognition);
-  }
-  task.bins = {recognition.lattice().x_mm.count, recognition.lattice().y_mm.count,
-               recognition.lattice().theta_rad.count};
-  if (!coarsened.empty()) {
-    flags.tell(coarsened);
+    settle_as_before(task, recognition);
+  } else {
+    if (recognition.bin_width) {
+      settled.device = open_device(flags, rules.scene);
+    }
+    settle_recognition(task, recognition, flags, rules,
+                       settled.device ? &*settled.device : nullptr);
   }
   if (same_task && same_inputs) {
     return settled;

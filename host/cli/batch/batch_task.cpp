@@ -212,6 +212,14 @@ std::size_t BatchTask::unknowns() const {
 
 std::size_t BatchTask::chunks() const { return (unknowns() + chunk_unknowns - 1) / chunk_unknowns; }
 
+std::string head_text(const BatchTask& task) { return head_to_json(task).dump() + "\n"; }
+
+std::string entry_text(const BatchEntry& entry) { return to_json(entry).dump() + "\n"; }
+
+BatchTask head_from(std::string_view text) { return head_of(Json::parse(text)); }
+
+BatchEntry entry_from(std::string_view text) { return entry_of(Json::parse(text)); }
+
 BatchTask read_batch_task(const fs::path& file) {
   require_readable(file);
   std::ifstream stream(file, std::ios::binary);
@@ -228,7 +236,7 @@ BatchTask read_batch_task(const fs::path& file) {
     }
     BatchTask task = head_of(head);
     while (std::getline(stream, line)) {
-      task.inputs.push_back(entry_of(Json::parse(line)));
+      task.inputs.push_back(entry_from(line));
     }
     if (task.inputs.size() != head.at("inputs") || stream.bad()) {
       refuse(file, "is cut off; remove the folder, or copy it again");
@@ -241,10 +249,10 @@ BatchTask read_batch_task(const fs::path& file) {
 
 void write_batch_task(const fs::path& file, const BatchTask& task) {
   AtomicFile target(file);
-  std::string text = head_to_json(task).dump() + "\n";
+  std::string text = head_text(task);
   constexpr std::size_t piece = 1 << 20;
   for (const BatchEntry& entry : task.inputs) {
-    text += to_json(entry).dump() + "\n";
+    text += entry_text(entry);
     if (text.size() > piece) {
       target.append(text);
       text.clear();

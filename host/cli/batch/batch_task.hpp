@@ -9,6 +9,7 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "batch_inputs.hpp"
@@ -69,6 +70,14 @@ struct BatchTask {
   std::size_t unknowns() const;
   std::size_t chunks() const;
 };
+
+// The lines of a task file: its head, which is the task without its inputs, and a line for each of
+// the inputs.
+std::string head_text(const BatchTask& task);
+std::string entry_text(const BatchEntry& entry);
+/// What head_text() and entry_text() have written.
+BatchTask head_from(std::string_view text);
+BatchEntry entry_from(std::string_view text);
 
 /// Reads and writes the task file. @throws Error
 BatchTask read_batch_task(const std::filesystem::path& file);

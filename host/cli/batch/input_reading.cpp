@@ -79,6 +79,24 @@ bool is_still(std::span<const BatchEntry> inputs, const InputRules& rules,
   return presses > 1;
 }
 
+constexpr const char* begin_again = "begin again, palpate batch with --update";
+
+/// Unknowns that have the error of their recording.
+ReadInput broken_input(const BatchInput& input, std::size_t count, const InputRules& rules,
+                       const std::string& error) {
+  const Unknown unknown{.recording = input.path,
+                        .frame = {},
+                        .touches = {},
+                        .truth = {input.label, {}},
+                        .error = error};
+  ReadInput broken{nullptr, std::vector(count, unknown)};
+  const std::optional<Frames>& frames = input.frames ? input.frames : rules.frames;
+  for (std::size_t i = 0; count > 1 && i < count; ++i) {
+    broken.unknowns[i].frame = (frames ? frames->begin : 0) + i;
+  }
+  return broken;
+}
+
 }  // namespace
 
 ReadInput read_input(RecordingReader& reader, const BatchInput& input, const InputRules& rules,
@@ -95,6 +113,34 @@ ReadInput read_input(RecordingReader& reader, const BatchInput& input, const Inp
     if (!input.label.empty() && unknown.truth.label != input.label) {
       unknown.truth = {input.label, {}};
     }
+  }
+  return read;
+}
+
+ReadInput read_entry(RecordingReader& reader, const BatchTask& task, const BatchEntry& entry,
+                     const InputRules& rules) {
+  const BatchInput& input = entry.input;
+  const std::size_t count = task.unknowns_of(entry);
+  const auto require_unchanged = [&] {
+    if (stamp_of(input.path) != entry.stamp) {
+      refuse(input.path, "has changed since the batch began; {}", begin_again);
+    }
+  };
+  require_unchanged();
+  ReadInput read;
+  try {
+    read = read_input(reader, input, rules, &task.inferred);
+  } catch (const Error& error) {
+    require_unchanged();
+    if (error.fault() != Fault::input) {
+      throw;
+    }
+    return broken_input(input, count, rules, error.what());
+  }
+  require_unchanged();
+  if (read.unknowns.size() != count) {
+    refuse(input.path, "has {} unknowns, but had {} when the batch began; {}", read.unknowns.size(),
+           count, begin_again);
   }
   return read;
 }

@@ -34,6 +34,12 @@ struct ReadInput {
 ReadInput read_input(RecordingReader& reader, const BatchInput& input, const InputRules& rules,
                      const BatchInference* inferred);
 
+/// Reads an input of a settled task: as many unknowns as the task counts, each with the error where
+/// the input is at fault.
+/// @throws Error where the file is not as it was when the task was settled, or the machine fails
+ReadInput read_entry(RecordingReader& reader, const BatchTask& task, const BatchEntry& entry,
+                     const InputRules& rules);
+
 /// Reads the inputs that lack a survey, on so many threads; one that cannot be read counts as one
 /// unknown without arrays. `progress` is called now and then by the calling thread.
 void survey_inputs(std::span<BatchEntry> inputs, const InputRules& rules, std::size_t threads,

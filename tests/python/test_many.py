@@ -1,0 +1,332 @@
+"""recognize_many() gives the bytes of `palpate batch`, whatever happens to its workers."""
+
+import json
+import os
+import pathlib
+import re
+import signal
+import subprocess
+import sys
+from collections.abc import Iterable, Iterator
+from typing import Any
+
+import pytest
+
+import palpate
+from palpate import many
+
+from conftest import Files, command
+
+TASK: palpate.Task = {"bins": (12, 12, 12), "x_mm": (-12, 12), "y_mm": (-12, 12), "filter": "bounded"}
+FLAGS = ["--bins", "12x12x12", "--x-mm=-12:12", "--y-mm=-12:12", "--filter", "bounded"]
+
+
+@pytest.fixture(scope="module")
+def recordings(files: Files, tmp_path_factory: pytest.TempPathFactory) -> pathlib.Path:
+    """A folder of eleven unknowns and a broken recording."""
+    folder = tmp_path_factory.mktemp("unknowns")
+    for seed in range(11):
+        palpate.simulate(
+            "AE"[seed % 2],
+            palpate.random_poses(3, seed=seed),
+            T_object_robot=palpate.random_object_pose(seed=seed),
+            seed=seed,
+        ).save(folder / f"{seed:02}.h5")
+    (folder / "05b.h5").write_bytes(b"no recording")
+    return folder
+
+
+def batch(folder: pathlib.Path, inputs: pathlib.Path, maps: pathlib.Path, *flags: str) -> list[bytes]:
+    """The lines of `palpate batch`."""
+    results = folder / "results"
+    run = subprocess.run(
+        [os.environ["PALPATE_COMMAND"], "batch", inputs, "-o", results, "--maps", maps, *flags],
+        capture_output=True, text=True, timeout=300,
+    )  # fmt: skip
+    assert run.returncode in (0, 3), run.stderr
+    command("merge", results, "-o", folder / "all.ndjson")
+    return (folder / "all.ndjson").read_bytes().splitlines(keepends=True)
+
+
+@pytest.fixture(scope="module")
+def expected(
+    files: Files, recordings: pathlib.Path, tmp_path_factory: pytest.TempPathFactory
+) -> list[bytes]:
+    lines = batch(tmp_path_factory.mktemp("batch"), recordings, files.maps, *FLAGS)
+    assert len(lines) == 12
+    return lines
+
+
+@pytest.fixture(scope="module")
+def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
+    distributed = pytest.importorskip("distributed", reason="dask.distributed is not installed")
+    with distributed.LocalCluster(
+        n_workers=2,
+        threads_per_worker=1,
+        dashboard_address=None,
+        local_directory=tmp_path_factory.mktemp("dask"),
+    ) as cluster:
+        yield cluster
+
+
+@pytest.fixture
+def client(cluster: Any) -> Iterator[Any]:
+    with cluster.get_client() as client:
+        yield client
+
+
+def lines_of(results: Iterable[palpate.Recognized]) -> list[bytes]:
+    return [result.line for result in sorted(results, key=lambda result: result.index)]
+
+
+def test_without_a_client_this_process_recognises(
+    files: Files, recordings: pathlib.Path, expected: list[bytes]
+) -> None:
+    task: palpate.Task = {**TASK, "maps": files.maps}
+    results = list(palpate.recognize_many(recordings, task, chunk=5))
+    assert [result.line for result in results] == expected
+    assert [result.index for result in results] == list(range(12))
+    assert all(result.record == json.loads(result.line) for result in results)
+    assert results[0].device and results[0].host and results[0].seconds > 0
+    [broken] = [result for result in results if "error" in result.record]
+    assert broken.record.recording == str(recordings / "05b.h5")
+    assert "05b.h5" in broken.record.error and "error" in repr(broken.record)
+
+
+def test_records_are_those_of_recognize(files: Files, recordings: pathlib.Path) -> None:
+    task: palpate.Task = {**TASK, "maps": [files.maps], "trace": True}
+    path = recordings / "03.h5"
+    [result] = palpate.recognize_many([path], task)
+    [record] = palpate.recognize(path, **task)
+    for key in ("seconds", "device"):
+        del record[key]
+    for step in record.get("trace", []):
+        step.pop("seconds", None)
+    assert dict(result.record) == dict(record)
+
+
+def test_what_all_recordings_tell_together_is_settled_once(
+    files: Files, recordings: pathlib.Path, tmp_path: pathlib.Path
+) -> None:
+    # The array of one recording reaches farther, which widens the region of all.
+    wide = palpate.simulate("A", palpate.random_poses(2, seed=7), seed=7)
+    palpate.Recording(
+        wide.pressure, wide.T_robot_sensor, wide.elements_mm * 1.5
+    ).save(tmp_path / "wide.h5")
+    maps = tmp_path / "maps"  # of large cells, for which few bins do
+    command("map", *files.train, "-o", f"{maps}/", "--prior", "0.2", "--cell-mm", 2)
+    table = tmp_path / "list.csv"
+    table.write_text(
+        f"path,frames,label\n{recordings}/00.h5,0:2,A\n{recordings}/01.h5,,E\n"
+        f"{recordings}/missing.h5,,E\nwide.h5,,\n"
+    )
+    for flag in ([], ["--each-frame"]):
+        task: palpate.Task = {"maps": maps, "each_frame": bool(flag), "filter": "bounded"}
+        lines = batch(tmp_path / f"batch{len(flag)}", table, maps, "--filter", "bounded", *flag)
+        results = list(palpate.recognize_many(table, task, chunk=1))
+        assert [result.line for result in results] == lines
+        assert len(lines) == (4 if not flag else 2 + 3 + 1 + 2)
+        alone = list(palpate.recognize_many(f"{recordings}/01.h5", task))
+        assert alone[0].line != results[1 if not flag else 2].line, "the list widens the region"
+
+
+def test_workers_give_the_bytes_of_batch(
+    client: Any, cluster: Any, files: Files, recordings: pathlib.Path, expected: list[bytes]
+) -> None:
+    task: palpate.Task = {**TASK, "maps": files.maps}
+    assert lines_of(palpate.recognize_many(recordings, task, client=client, chunk=1)) == expected
+    cluster.scale(4)
+    client.wait_for_workers(4, timeout=120)
+    in_order = palpate.recognize_many(recordings, task, client=client, chunk=2, ordered=True)
+    assert [result.line for result in in_order] == expected
+    by_address = palpate.recognize_many(
+        [recordings], task, client=cluster.scheduler_address, chunk=5
+    )
+    assert lines_of(by_address) == expected
+    # The histogram, too, which computes on the device.
+    task["filter"] = "histogram"
+    assert lines_of(palpate.recognize_many(recordings, task, client=client, chunk=3)) == [
+        result.line for result in palpate.recognize_many(recordings, task)
+    ]
+
+
+def test_a_worker_that_dies_in_the_middle_changes_nothing(
+    client: Any, files: Files, recordings: pathlib.Path, expected: list[bytes]
+) -> None:
+    results = palpate.recognize_many(
+        recordings, {**TASK, "maps": files.maps}, client=client, chunk=1
+    )
+    # Stopped, it keeps the chunks that it is handed; another one's first result is the event.
+    victim = next(iter(client.run(os.getpid).values()))
+    os.kill(victim, signal.SIGSTOP)
+    first = next(results)
+    os.kill(victim, signal.SIGKILL)
+    everything = [first, *results]
+    assert lines_of(everything) == expected
+    assert len(everything) == 12
+    assert victim not in client.run(os.getpid).values()
+
+
+def test_recordings_that_kill_their_workers_are_named(
+    client: Any, cluster: Any, files: Files, recordings: pathlib.Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(cluster.scheduler, "allowed_failures", 0)
+    results = palpate.recognize_many(
+        recordings, {**TASK, "maps": files.maps}, client=client, chunk=1
+    )
+    victim = next(iter(client.run(os.getpid).values()))
+    os.kill(victim, signal.SIGSTOP)
+    next(results)
+    os.kill(victim, signal.SIGKILL)
+    with pytest.raises(palpate.Error, match=r"\.h5: workers died again and again"):
+        list(results)
+
+
+def test_an_iteration_that_ends_early_leaves_nothing_behind(
+    client: Any, files: Files, recordings: pathlib.Path
+) -> None:
+    results = palpate.recognize_many(
+        recordings, {**TASK, "maps": files.maps}, client=client, chunk=1
+    )
+    next(results)
+    results.close()
+    assert not [state for state in client.futures.values() if state.status == "pending"]
+
+
+def test_errors_of_workers_arrive(
+    client: Any,
+    files: Files,
+    recordings: pathlib.Path,
+    tmp_path: pathlib.Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    with pytest.raises(palpate.Error, match="nowhere: no such file") as raised:
+        palpate.recognize_many(recordings, {"maps": "/nowhere"}, client=client)
+    assert raised.value.fault == "input"
+    changing = tmp_path / "changing.h5"
+    changing.write_bytes((recordings / "00.h5").read_bytes())
+    results = palpate.recognize_many(changing, {**TASK, "maps": files.maps}, client=client)
+    changing.write_bytes(b"")
+    with pytest.raises(palpate.Error, match="changing.h5: has changed since the batch began"):
+        list(results)
+    maps = tmp_path / "maps"
+    maps.mkdir()
+    for map in files.maps.iterdir():
+        (maps / map.name).write_bytes(map.read_bytes())
+    results = palpate.recognize_many(recordings, {**TASK, "maps": maps}, client=client)
+    command("map", *files.train, "-o", f"{maps}/", "--prior", "0.3")
+    with pytest.raises(palpate.Error, match="map.h5 has changed; give all workers the same"):
+        list(results)
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(palpate.Error, match="'?unknowns'?: is relative to .*give absolute paths"):
+        palpate.recognize_many("unknowns", {**TASK, "maps": files.maps}, client=client)
+
+
+@pytest.mark.parametrize(
+    ("task", "arguments", "message"),
+    [
+        ({"bin": 3}, {}, "task: 'bin' is not known; give maps, bins"),
+        ({"budget_ms": 3.0}, {}, "task: 'budget_ms' is not known"),
+        ({}, {"chunk": 0}, "chunk 0: give at least 1"),
+        ({}, {"paths": []}, "paths: none"),
+        ({}, {}, "--maps: missing"),
+    ],
+)
+def test_a_wrong_call_is_refused_at_once(
+    task: Any, arguments: dict[str, Any], message: str, recordings: pathlib.Path
+) -> None:
+    with pytest.raises(palpate.Error, match=re.escape(message)):
+        palpate.recognize_many(**{"paths": recordings, "task": task, **arguments})
+
+
+def test_without_dask_an_error_says_what_to_install(
+    files: Files, recordings: pathlib.Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    with pytest.raises(palpate.Error, match=r"pip install 'palpate\[dask\]'"):
+        palpate.recognize_many(recordings, {"maps": files.maps}, client="tcp://127.0.0.1:1")
+    assert list(palpate.recognize_many(recordings / "00.h5", {**TASK, "maps": files.maps}))
+
+
+class Info:
+    """A device as Device.list() has it."""
+
+    def __init__(self, index: int, name: str, chosen: bool = False, usable: bool = True) -> None:
+        self.index, self.name, self.chosen, self.usable = index, name, chosen, usable
+
+
+def test_workers_of_a_computer_take_different_devices_of_a_kind() -> None:
+    listed: Any = [
+        Info(0, "CPU"),
+        Info(1, "GPU", chosen=True),
+        Info(2, "GPU"),
+        Info(3, "GPU", usable=False),
+        Info(4, "GPU"),
+        Info(5, "other GPU"),
+    ]
+    taken = [many._index_of(listed, "", lambda place=place: place) for place in range(5)]
+    assert taken == [1, 2, 4, 1, 2]
+    unasked: Any = None  # no place is asked for
+    assert many._index_of(listed, "2", unasked) is None
+    assert many._index_of(listed[:2], "", unasked) is None
+    assert many._index_of(listed[:1], "missing", unasked) is None
+
+
+PLACE = "from palpate import many; print(many._place_on_host(), flush=True); input()"
+
+
+def test_a_dead_worker_gives_its_place_back() -> None:
+    def begin() -> tuple[subprocess.Popen[str], int]:
+        process = subprocess.Popen(
+            [sys.executable, "-c", PLACE], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+        )
+        assert process.stdout is not None
+        return process, int(process.stdout.readline())
+
+    first, place = begin()
+    second, other = begin()
+    try:
+        assert other != place
+        first.kill()
+        first.wait()
+        first, again = begin()
+        assert again == place
+    finally:
+        for process in (first, second):
+            process.kill()
+            process.communicate()
+
+
+def test_the_program_of_the_guide_runs(
+    client: Any,
+    cluster: Any,
+    files: Files,
+    recordings: pathlib.Path,
+    tmp_path: pathlib.Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    page = (pathlib.Path(__file__).parents[2] / "docs" / "batch.md").read_text()
+    [program] = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
+    (tmp_path / "unknowns").mkdir()
+    for name in ("00.h5", "01.h5", "02.h5"):
+        (tmp_path / "unknowns" / name).write_bytes((recordings / name).read_bytes())
+    command("map", *files.train, "-o", f"{tmp_path}/maps/", "--prior", "0.2", "--cell-mm", 2)
+
+    distributed_client = type(client)
+
+    def connect(*, n_workers: int, threads_per_worker: int) -> Any:
+        """The cluster that is there, for the sake of time."""
+        assert (n_workers, threads_per_worker) == (2, 1)
+        return distributed_client(cluster.scheduler_address, set_as_default=False)
+
+    here = os.getcwd()
+    monkeypatch.setattr("distributed.Client", connect)
+    monkeypatch.chdir(tmp_path)
+    client.run(os.chdir, tmp_path)
+    try:
+        exec(program, {"__name__": "__main__"})
+    finally:
+        client.run(os.chdir, here)
+    maps = pathlib.Path("maps")
+    lines = batch(tmp_path / "batch", pathlib.Path("unknowns"), maps, "--filter", "bounded")
+    assert (tmp_path / "dask.ndjson").read_bytes() == b"".join(lines)
