@@ -233,7 +233,7 @@ void bind_sensor(nb::module_& module) {
   module.def(
       "open_sensor", &open_sensor, "name"_a, "poses"_a = nb::none(),
       "Opens a sensor: a board such as \"takktile\" or the path of a board's YAML profile,\n"
-      "\"replay:FILE\", or \"simulate:SHAPE\", with options as in --sensor of `palpate live`. "
+      "\"replay:FILE\", or \"simulate:SHAPE\", with options as in `--sensor` of `palpate live`. "
       "poses: a\n"
       "file or FIFO of the robot's poses, lines of JSON. Raises Error naming what is missing.");
 }
