@@ -2,6 +2,7 @@
 
 import os
 import re
+import sys
 from pathlib import Path
 
 from breathe.renderer.sphinxrenderer import SphinxRenderer, WithContext
@@ -18,7 +19,8 @@ html_theme = "furo"
 html_show_copyright = False
 html_copy_source = False
 
-extensions = ["myst_parser", "breathe"]
+sys.path.insert(0, str(ROOT / "docs"))
+extensions = ["myst_parser", "breathe", "python_reference"]
 myst_enable_extensions = ["dollarmath"]
 myst_heading_anchors = 3
 highlight_language = "none"  # of blocks that name no language: what the commands print

@@ -1,14 +1,16 @@
 // Learns a map from a program's own arrays: what a tactile array read, and where it was.
-//   map_of_arrays MAP.h5
+//   map_of_arrays MAP.h5 PICTURE.svg
 #include <cmath>
 #include <iostream>
 #include <vector>
 
 #include <palpate/palpate.hpp>
 
+#include "picture.hpp"
+
 int main(int argc, char** argv) try {
-  if (argc != 2) {
-    std::cerr << "usage: map_of_arrays MAP.h5\n";
+  if (argc != 3) {
+    std::cerr << "usage: map_of_arrays MAP.h5 PICTURE.svg\n";
     return 2;
   }
   // An array of 4 x 4 elements, 2 mm apart, about the origin of the sensor frame.
@@ -42,6 +44,12 @@ int main(int argc, char** argv) try {
   const palpate::Body body = palpate::body_of(map);  // the cells that are probably occupied
   std::cout << "disc: radius " << std::sqrt(2.0 * body.inertia_mm2) << " mm about "
             << body.centroid_mm.x << ", " << body.centroid_mm.y << " mm\n";
+
+  Picture picture = picture_of(map);
+  const glm::dvec2 disc = -map.origin_mm / map.cell_mm;
+  picture.circle(disc.x, disc.y, 6.0 / map.cell_mm,
+                 R"(fill="none" stroke="#000" stroke-width=".3")");
+  picture.save(argv[2]);
 } catch (const palpate::Error& error) {
   std::cerr << error.what() << "\n";
   return 1;

@@ -30,6 +30,17 @@ shaders::Split split(double coordinate_cells, int beyond) {
   return {static_cast<int>(cell), static_cast<float>(coordinate_cells - cell)};
 }
 
+/// Empties the evidence, and makes room for all that touches of so many elements may add to it.
+void clear(ContactEvidence& evidence, std::size_t touches, std::size_t elements,
+           std::size_t segment_elements) {
+  evidence.from_pivot_mm.clear();
+  evidence.from_pivot_mm.reserve(elements);
+  evidence.segments.clear();
+  // A segment for every reading of a touch, and for every part of one that is too long.
+  evidence.segments.reserve(touches * most_reading_levels + elements / segment_elements);
+  evidence.counts = {};
+}
+
 /// Adds the touch's elements that do not read `instead`, as segments of one reading each.
 void append(ContactEvidence& evidence, const Touch& touch, std::span<const Reading> readings,
             Reading instead, const glm::dvec2& pivot_mm, std::size_t segment_elements) {
@@ -82,12 +93,7 @@ const ContactEvidence& EvidenceGatherer::gather(std::span<const Touch> touches,
   for (const Touch& touch : touches) {
     elements += touch.pressure.size();
   }
-  evidence_.from_pivot_mm.clear();
-  evidence_.from_pivot_mm.reserve(elements);
-  evidence_.segments.clear();
-  // A segment for every reading of a touch, and for every part of one that is too long.
-  evidence_.segments.reserve(touches.size() * most_reading_levels + elements / segment_elements);
-  evidence_.counts = {};
+  clear(evidence_, touches.size(), elements, segment_elements);
   for (const Touch& touch : touches) {
     readings_ = classify(touch, model, std::move(readings_));
     append(evidence_, touch, readings_, Reading::unknown, pivot_mm, segment_elements);
@@ -97,8 +103,9 @@ const ContactEvidence& EvidenceGatherer::gather(std::span<const Touch> touches,
 
 ContactEvidence gather_evidence(const Touch& touch, std::span<const Reading> readings,
                                 Reading instead, const glm::dvec2& pivot_mm,
-                                std::size_t segment_elements) {
-  ContactEvidence evidence;
+                                std::size_t segment_elements, ContactEvidence reuse) {
+  ContactEvidence evidence = std::move(reuse);
+  clear(evidence, 1, readings.size(), segment_elements);
   append(evidence, touch, readings, instead, pivot_mm, segment_elements);
   return evidence;
 }

@@ -49,9 +49,10 @@ class EvidenceGatherer {
 /// Gathers the elements of a classified touch that read something else than `instead`. Each adds
 /// log L(reading) - log L(instead), with log L(Unknown) = 0: with No Contact, what the touch says
 /// beyond an array that reads No Contact everywhere.
+/// @param reuse memory for the result
 ContactEvidence gather_evidence(const Touch& touch, std::span<const Reading> readings,
                                 Reading instead, const glm::dvec2& pivot_mm,
-                                std::size_t segment_elements);
+                                std::size_t segment_elements, ContactEvidence reuse = {});
 
 /// Splits an element's coordinate into whole cells and the rest. One beyond 2^29 cells, or that is
 /// no number, counts as off every map: its cell becomes so large that the sum with any cell of

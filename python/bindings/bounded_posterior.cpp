@@ -168,7 +168,8 @@ void bind_bounded_posterior(nb::module_& module) {
           "lattice",
           [](const Bounded& self) {
             return self.use([](BoundedPosterior& belief, Call&) { return belief.lattice(); });
-          })
+          },
+          "The bins.")
       .def("__repr__", [](const Bounded& self) {
         return fmt::format("BoundedPosterior({})", text_of(self.labels, self.session()));
       });

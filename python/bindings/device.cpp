@@ -24,14 +24,15 @@ std::string text_of(const Name& name) {
 
 void bind_device(nb::module_& module) {
   nb::class_<DeviceInfo>(module, "DeviceInfo", "A Vulkan device as `palpate devices` lists it.")
-      .def_ro("index", &DeviceInfo::index)
-      .def_ro("name", &DeviceInfo::name)
-      .def_ro("type", &DeviceInfo::type)
-      .def_ro("driver", &DeviceInfo::driver)
-      .def_ro("api", &DeviceInfo::api)
-      .def_ro("memory_gib", &DeviceInfo::memory_gib)
-      .def_ro("usable", &DeviceInfo::usable)
-      .def_ro("chosen", &DeviceInfo::chosen)
+      .def_ro("index", &DeviceInfo::index, "Place in Vulkan's order.")
+      .def_ro("name", &DeviceInfo::name, "As Vulkan reports it.")
+      .def_ro("type", &DeviceInfo::type,
+              "\"discrete\", \"integrated\", \"virtual\", \"CPU\" or \"other\".")
+      .def_ro("driver", &DeviceInfo::driver, "Name and version of the driver.")
+      .def_ro("api", &DeviceInfo::api, "Vulkan version, such as \"1.3.230\".")
+      .def_ro("memory_gib", &DeviceInfo::memory_gib, "Size of its memory in GiB.")
+      .def_ro("usable", &DeviceInfo::usable, "Palpate can compute on it.")
+      .def_ro("chosen", &DeviceInfo::chosen, "Device.open() takes this device.")
       .def_ro("reason", &DeviceInfo::reason, "Why the device is chosen or refused.")
       .def("__repr__", [](const DeviceInfo& self) {
         return fmt::format("DeviceInfo({}: '{}', {}{})", self.index, self.name, self.type,
@@ -60,7 +61,8 @@ void bind_device(nb::module_& module) {
           },
           "name_or_index"_a = "", "Every device, in Vulkan's order.")
       .def_prop_ro("name", &Session::name, "As Vulkan reports it.")
-      .def_prop_ro("memory_bytes", &Session::memory_bytes)
+      .def_prop_ro("memory_bytes", &Session::memory_bytes,
+                   "Size of the memory in which it computes; a CPU device shares the machine's.")
       .def("__repr__", [](const Session& self) {
         return fmt::format("Device('{}', {:.1f} GiB)", self.name(),
                            static_cast<double>(self.memory_bytes()) / (1 << 30));

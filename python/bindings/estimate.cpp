@@ -69,9 +69,11 @@ void bind_certificate(nb::module_& module) {
   nb::class_<Certificate>(module, "Certificate", "What a search by bounds proves of its estimate.")
       .def_ro("dropped_mass", &Certificate::dropped_mass,
               "Bound of the total variation distance from the posterior over all bins.")
-      .def_ro("mode_certain", &Certificate::mode_certain)
-      .def_ro("blocks_bounded", &Certificate::blocks_bounded)
-      .def_ro("bins_evaluated", &Certificate::bins_evaluated)
+      .def_ro("mode_certain", &Certificate::mode_certain,
+              "No bin that was not evaluated can exceed the mode.")
+      .def_ro("blocks_bounded", &Certificate::blocks_bounded,
+              "Blocks of bins whose bound was computed.")
+      .def_ro("bins_evaluated", &Certificate::bins_evaluated, "Bins whose likelihood was computed.")
       .def_prop_ro(
           "log_evidence",
           [](const Certificate& self) {
@@ -114,9 +116,10 @@ void bind_estimate_class(nb::module_& module) {
             return bounds;
           },
           "(low, high) of every probability, by bounds; empty where `identity` is exact.")
-      .def_ro("certificate", &Estimate::certificate)
+      .def_ro("certificate", &Estimate::certificate,
+              "Of a search by bounds; None of other filters.")
       .def_ro("none", &Estimate::none, "Probability of \"none of these\", where it was asked for.")
-      .def_ro("mode", &Estimate::mode)
+      .def_ro("mode", &Estimate::mode, "The pose of the largest posterior probability.")
       .def_ro("contradicted", &Estimate::contradicted,
               "True where empty space explains the touches much better than every map.")
       .def("__repr__", [](const Estimate& self) {
@@ -129,7 +132,7 @@ void bind_estimate_class(nb::module_& module) {
 void bind_marginals(nb::module_& module) {
   nb::class_<Marginals>(module, "Marginals",
                         "Probabilities of parts of one object's poses, over a grid.")
-      .def_ro("grid", &Marginals::grid)
+      .def_ro("grid", &Marginals::grid, "The bins, which may be coarser than those of the belief.")
       .def_prop_ro(
           "xy",
           [](nb::handle_t<Marginals> self) {
@@ -155,8 +158,9 @@ void bind_marginals(nb::module_& module) {
 
   nb::class_<PoseSample>(module, "PoseSample", "An object and its pose, drawn from a belief.")
       .def_ro("object", &PoseSample::object, "Index into the maps.")
-      .def_prop_ro("T_object_robot",
-                   [](const PoseSample& self) { return to_array(self.T_object_robot); })
+      .def_prop_ro(
+          "T_object_robot", [](const PoseSample& self) { return to_array(self.T_object_robot); },
+          "[3] (x_mm, y_mm, theta_rad).")
       .def("__repr__", [](const PoseSample& self) {
         return fmt::format("PoseSample(object {}, {})", self.object, text_of(self.T_object_robot));
       });

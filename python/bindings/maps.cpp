@@ -1,6 +1,5 @@
 #include <fmt/format.h>
 #include <nanobind/stl/array.h>
-#include <nanobind/stl/filesystem.h>
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/string.h>
 
@@ -89,17 +88,21 @@ void bind_map(nb::module_& module) {
           "sensed\n"
           "each cell; mean_level [ny, nx]: mean pressure.\n\nRaises Error on a map that is not "
           "sound.")
-      .def_ro("label", &OccupancyGrid::label)
-      .def_ro("cell_mm", &OccupancyGrid::cell_mm)
-      .def_prop_ro("origin_mm", [](const OccupancyGrid& self) { return to_array(self.origin_mm); })
-      .def_ro("prior", &OccupancyGrid::prior)
-      .def_rw("symmetry", &OccupancyGrid::symmetry)
-      .def_ro("spread_mm", &OccupancyGrid::spread_mm)
+      .def_ro("label", &OccupancyGrid::label, "Name of the object.")
+      .def_ro("cell_mm", &OccupancyGrid::cell_mm, "Edge of a cell.")
+      .def_prop_ro(
+          "origin_mm", [](const OccupancyGrid& self) { return to_array(self.origin_mm); },
+          "[2], the centre of cell (0, 0) in the object frame.")
+      .def_ro("prior", &OccupancyGrid::prior, "Probability that an unseen place is occupied.")
+      .def_rw("symmetry", &OccupancyGrid::symmetry,
+              "n-fold rotational symmetry; 0 = full, that of a disc.")
+      .def_ro("spread_mm", &OccupancyGrid::spread_mm,
+              "Of the sensor model that built the map, or None.")
       .def_ro("suggested_symmetry", &OccupancyGrid::suggested_symmetry,
               "The symmetry that the map itself shows; None where it was not measured.")
-      .def_rw("mirror", &OccupancyGrid::mirror)
-      .def_ro("nx", &OccupancyGrid::nx)
-      .def_ro("ny", &OccupancyGrid::ny)
+      .def_rw("mirror", &OccupancyGrid::mirror, "The object may lie on its other side.")
+      .def_ro("nx", &OccupancyGrid::nx, "Cells along x.")
+      .def_ro("ny", &OccupancyGrid::ny, "Cells along y.")
       .def_prop_ro(
           "log_odds",
           [](nb::handle_t<OccupancyGrid> self) {
@@ -120,8 +123,8 @@ void bind_map(nb::module_& module) {
           "Mean pressure at each cell, [ny, nx], or None.")
       .def(
           "save",
-          [](const OccupancyGrid& self, const std::filesystem::path& path) {
-            run([self, path](Call&) { write_map(path, self); });
+          [](const OccupancyGrid& self, const PathLike& file) {
+            run([self, path = file.path()](Call&) { write_map(path, self); });
           },
           "path"_a, "Writes a map file (HDF5). Raises Error where it cannot be written.")
       .def("plot", plot_method, "ax"_a = nb::none(), plot_signature,
@@ -133,8 +136,8 @@ void bind_map(nb::module_& module) {
       });
   module.def(
       "read_map",
-      [](const std::filesystem::path& path) {
-        return run([path](Call&) { return read_map(path); });
+      [](const PathLike& file) {
+        return run([path = file.path()](Call&) { return read_map(path); });
       },
       "path"_a, "Reads a map file (HDF5). Raises Error naming file, field and remedy.");
 }
@@ -149,8 +152,8 @@ void bind_hypothesis(nb::module_& module) {
             new (self) Hypothesis{.map = map, .weight = weight};
           },
           "map"_a, "weight"_a = 1.0, "weight: prior weight relative to the other objects.")
-      .def_ro("map", &Hypothesis::map)
-      .def_ro("weight", &Hypothesis::weight)
+      .def_ro("map", &Hypothesis::map, "The map of the object.")
+      .def_ro("weight", &Hypothesis::weight, "Prior weight relative to the other objects.")
       .def_ro("mirrored", &Hypothesis::mirrored, "The map is the mirror image of the learned one.")
       .def("__repr__", [](const Hypothesis& self) {
         return fmt::format("Hypothesis('{}', weight={:g})", self.map.label, self.weight);

@@ -40,9 +40,9 @@ void bind_lattice(nb::module_& module) {
             new (self) Axis{std::get<0>(axis), std::get<1>(axis), std::get<2>(axis)};
           },
           "axis"_a)
-      .def_rw("lower", &Axis::lower)
-      .def_rw("upper", &Axis::upper)
-      .def_rw("count", &Axis::count)
+      .def_rw("lower", &Axis::lower, "Lower edge of the first bin.")
+      .def_rw("upper", &Axis::upper, "Upper edge of the last bin.")
+      .def_rw("count", &Axis::count, "Number of bins.")
       .def_prop_ro("step", &Axis::step, "Width of a bin.")
       .def("centre", &Axis::centre, "i"_a, "Centre of bin i.")
       .def("__repr__", [](const Axis& self) { return "Axis" + text_of(self); });
@@ -66,9 +66,9 @@ void bind_lattice(nb::module_& module) {
           "theta_rad"_a = PoseLattice{}.theta_rad, "pivot_mm"_a = nb::make_tuple(0.0, 0.0),
           "Axes as Axis or (lower, upper, count); pivot_mm [2] in the robot frame.\n\n"
           "Raises Error on a count below 1 or a reversed range.")
-      .def_ro("x_mm", &PoseLattice::x_mm)
-      .def_ro("y_mm", &PoseLattice::y_mm)
-      .def_ro("theta_rad", &PoseLattice::theta_rad)
+      .def_ro("x_mm", &PoseLattice::x_mm, "In the object frame.")
+      .def_ro("y_mm", &PoseLattice::y_mm, "In the object frame.")
+      .def_ro("theta_rad", &PoseLattice::theta_rad, "Angle of T_object_robot.")
       .def_prop_ro(
           "pivot_mm", [](const PoseLattice& self) { return to_array(self.pivot_mm); },
           "[2] in the robot frame, mm.")
@@ -174,8 +174,8 @@ void bind_contact(nb::module_& module) {
             new (self) DisplacementSd{std::get<0>(sd), std::get<1>(sd)};
           },
           "sd"_a)
-      .def_rw("mm", &DisplacementSd::mm)
-      .def_rw("rad", &DisplacementSd::rad)
+      .def_rw("mm", &DisplacementSd::mm, "Of x and y, in mm.")
+      .def_rw("rad", &DisplacementSd::rad, "Of the angle, in radians.")
       .def("__repr__", [](const DisplacementSd& self) {
         return fmt::format("DisplacementSd(mm={:g}, rad={:g})", self.mm, self.rad);
       });

@@ -171,10 +171,12 @@ void bind_pose_histogram(nb::module_& module) {
           "Turns theta about another pivot [2], in the robot frame, before any touch.");
   bind_beliefs(histogram);
   histogram
-      .def_prop_ro("lattice",
-                   [](const Histogram& self) {
-                     return self.use([](PoseHistogram& belief, Call&) { return belief.lattice(); });
-                   })
+      .def_prop_ro(
+          "lattice",
+          [](const Histogram& self) {
+            return self.use([](PoseHistogram& belief, Call&) { return belief.lattice(); });
+          },
+          "The bins.")
       .def_prop_ro(
           "device_bytes",
           [](const Histogram& self) {

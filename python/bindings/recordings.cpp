@@ -1,5 +1,4 @@
 #include <fmt/format.h>
-#include <nanobind/stl/filesystem.h>
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/string.h>
 
@@ -52,12 +51,18 @@ void bind_touch(nb::module_& module) {
           "sensor frame; pressure [e] in the recording's unit; valid [e], False for a dead "
           "element.\n"
           "\nRaises Error on other shapes.")
-      .def_prop_ro("T_robot_sensor",
-                   [](const ArrayTouch& self) { return object_of(self.T_robot_sensor); })
-      .def_prop_ro("elements_mm",
-                   [](const ArrayTouch& self) { return object_of(self.elements_mm); })
-      .def_prop_ro("pressure", [](const ArrayTouch& self) { return object_of(self.pressure); })
-      .def_prop_ro("valid", [](const ArrayTouch& self) { return object_of<ByteArray>(self.valid); })
+      .def_prop_ro(
+          "T_robot_sensor", [](const ArrayTouch& self) { return object_of(self.T_robot_sensor); },
+          "[3] (x_mm, y_mm, theta_rad).")
+      .def_prop_ro(
+          "elements_mm", [](const ArrayTouch& self) { return object_of(self.elements_mm); },
+          "[e, 2], element centres in the sensor frame.")
+      .def_prop_ro(
+          "pressure", [](const ArrayTouch& self) { return object_of(self.pressure); },
+          "[e] in the recording's unit.")
+      .def_prop_ro(
+          "valid", [](const ArrayTouch& self) { return object_of<ByteArray>(self.valid); },
+          "[e], 0 for a dead element; None: all are alive.")
       .def("__repr__", [](const ArrayTouch& self) {
         return fmt::format("Touch({} elements at {})", self.pressure.size(),
                            text_of(as_poses(self.T_robot_sensor).front()));
@@ -187,9 +192,10 @@ void bind_recording(nb::module_& module) {
             new (self) Truth{object, pose_of(T_object_robot, "T_object_robot")};
           },
           "object"_a, "T_object_robot"_a, "T_object_robot [3] (x_mm, y_mm, theta_rad).")
-      .def_ro("object", &Truth::object)
-      .def_prop_ro("T_object_robot",
-                   [](const Truth& self) { return to_array(self.T_object_robot); })
+      .def_ro("object", &Truth::object, "The label of the object.")
+      .def_prop_ro(
+          "T_object_robot", [](const Truth& self) { return to_array(self.T_object_robot); },
+          "[3] (x_mm, y_mm, theta_rad).")
       .def("__repr__", [](const Truth& self) {
         return fmt::format("Truth('{}', {})", self.object, text_of(self.T_object_robot));
       });
@@ -233,12 +239,13 @@ void bind_recording(nb::module_& module) {
       "fit.");
   bind_arrays(recording);
   recording.def_ro("path", &ArrayRecording::path, "The file that it was read from, or \"\".")
-      .def_rw("object", &ArrayRecording::object)
-      .def_ro("pressure_unit", &ArrayRecording::pressure_unit)
-      .def_ro("rows", &ArrayRecording::rows)
-      .def_rw("truth", &ArrayRecording::truth, nb::arg("truth").none())
-      .def_ro("sensor", &ArrayRecording::sensor)
-      .def_ro("serial", &ArrayRecording::serial)
+      .def_rw("object", &ArrayRecording::object, "Label of the object; \"\" where it is unknown.")
+      .def_ro("pressure_unit", &ArrayRecording::pressure_unit, "\"kPa\" or \"raw\".")
+      .def_ro("rows", &ArrayRecording::rows, "\"touches\", or \"frames\" of a raw stream.")
+      .def_rw("truth", &ArrayRecording::truth, nb::arg("truth").none(),
+              "The true identity and pose of an unknown object, or None.")
+      .def_ro("sensor", &ArrayRecording::sensor, "Name of the sensor, or \"\".")
+      .def_ro("serial", &ArrayRecording::serial, "Serial number of the sensor, or \"\".")
       .def_ro("closed", &ArrayRecording::closed, "False: cut off, or being recorded.")
       .def("__len__", &ArrayRecording::size)
       .def(
@@ -250,8 +257,8 @@ void bind_recording(nb::module_& module) {
                    "@overload\ndef __getitem__(self, index: slice) -> Recording"))
       .def(
           "save",
-          [](const ArrayRecording& self, const std::filesystem::path& path) {
-            run([copy = self.copied(), path](Call&) { write_recording(path, copy); });
+          [](const ArrayRecording& self, const PathLike& file) {
+            run([copy = self.copied(), path = file.path()](Call&) { write_recording(path, copy); });
           },
           "path"_a,
           "Writes a recording file (HDF5), whole or not at all. Raises Error where the content is "
@@ -263,8 +270,8 @@ void bind_recording(nb::module_& module) {
       });
   module.def(
       "read_recording",
-      [](const std::filesystem::path& path) {
-        return array_recording(run([path](Call&) { return read_recording(path); }));
+      [](const PathLike& file) {
+        return array_recording(run([path = file.path()](Call&) { return read_recording(path); }));
       },
       "path"_a,
       "Reads a recording file (HDF5); of an unclosed file, the whole rows. Raises Error naming "

@@ -3,7 +3,6 @@
 #include <mutex>
 
 #include <fmt/format.h>
-#include <nanobind/stl/filesystem.h>
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/unique_ptr.h>
@@ -72,7 +71,11 @@ class SharedSensor {
 };
 
 std::unique_ptr<SharedSensor> open_sensor(const std::string& name,
-                                          const std::optional<std::filesystem::path>& poses) {
+                                          const std::optional<PathLike>& pose_source) {
+  std::optional<std::filesystem::path> poses;
+  if (pose_source) {
+    poses = pose_source->path();
+  }
   auto sensor = run([name, poses](Call&) {
     std::unique_ptr<Sensor> opened =
         is_virtual_sensor(name) ? open_virtual_sensor(name) : open_board(name);
@@ -136,7 +139,9 @@ void bind_sensor(nb::module_& module) {
       .def(
           "start", [](SharedSensor& self) { self.use([](Sensor& sensor) { sensor.start(); }); },
           "Starts the stream. Raises Error where the hardware refuses.")
-      .def("stop", [](SharedSensor& self) { self.use([](Sensor& sensor) { sensor.stop(); }); })
+      .def(
+          "stop", [](SharedSensor& self) { self.use([](Sensor& sensor) { sensor.stop(); }); },
+          "Stops the stream.")
       .def(
           "__enter__",
           [](nb::handle_t<SharedSensor> self) {
@@ -165,24 +170,33 @@ void bind_sensor(nb::module_& module) {
       .def("next", &SharedSensor::next, "timeout_s"_a = nb::none(),
            "The next frame; None where none comes within timeout_s, and after the stream's end.\n"
            "Ctrl-C ends the wait.")
-      .def_prop_ro("ended",
-                   [](SharedSensor& self) {
-                     return self.use([](const Sensor& sensor) { return sensor.ended(); });
-                   })
+      .def_prop_ro(
+          "ended",
+          [](SharedSensor& self) {
+            return self.use([](const Sensor& sensor) { return sensor.ended(); });
+          },
+          "True after the last frame of a stream that ends.")
       .def_prop_ro(
           "gone",
           [](SharedSensor& self) {
             return self.use([](const Sensor& sensor) { return sensor.gone(); });
           },
           "True while the board is unplugged.")
-      .def_prop_ro("name", [](SharedSensor& self) { return self.description().name; })
-      .def_prop_ro("pressure_unit",
-                   [](SharedSensor& self) { return self.description().pressure_unit; })
+      .def_prop_ro(
+          "name", [](SharedSensor& self) { return self.description().name; },
+          "For people, such as \"TakkTile\".")
+      .def_prop_ro(
+          "pressure_unit", [](SharedSensor& self) { return self.description().pressure_unit; },
+          "\"kPa\" or \"raw\".")
       .def_prop_ro(
           "rate_hz", [](SharedSensor& self) { return self.description().rate_hz; },
           "Frames per second, 0 if unknown.")
-      .def_prop_ro("object", [](SharedSensor& self) { return self.description().object; })
-      .def_prop_ro("truth", [](SharedSensor& self) { return self.description().truth; })
+      .def_prop_ro(
+          "object", [](SharedSensor& self) { return self.description().object; },
+          "Label of the object, where a replay or a simulation knows it, or \"\".")
+      .def_prop_ro(
+          "truth", [](SharedSensor& self) { return self.description().truth; },
+          "The true identity and pose, where a replay or a simulation knows them, or None.")
       .def_prop_ro(
           "elements_mm",
           [](SharedSensor& self) { return to_array(self.description().elements_mm); },
@@ -219,7 +233,7 @@ void bind_sensor(nb::module_& module) {
   module.def(
       "open_sensor", &open_sensor, "name"_a, "poses"_a = nb::none(),
       "Opens a sensor: a board such as \"takktile\" or the path of a board's YAML profile,\n"
-      "\"replay:FILE\", or \"simulate:SHAPE\", with options as in --sensor of `palpate live`. "
+      "\"replay:FILE\", or \"simulate:SHAPE\", with options as in `--sensor` of `palpate live`. "
       "poses: a\n"
       "file or FIFO of the robot's poses, lines of JSON. Raises Error naming what is missing.");
 }
@@ -227,8 +241,10 @@ void bind_sensor(nb::module_& module) {
 void bind_detector(nb::module_& module) {
   nb::class_<DetectedTouch>(module, "DetectedTouch",
                             "One touch of a stream: robust means over its longest steady phase.")
-      .def_ro("begin_s", &DetectedTouch::begin_s)
-      .def_ro("end_s", &DetectedTouch::end_s)
+      .def_ro("begin_s", &DetectedTouch::begin_s,
+              "Time of the first frame averaged, since the Unix epoch.")
+      .def_ro("end_s", &DetectedTouch::end_s,
+              "Time of the last frame averaged, since the Unix epoch.")
       .def_ro("frames", &DetectedTouch::frames, "Number of frames averaged.")
       .def_prop_ro(
           "pressure",

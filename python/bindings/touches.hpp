@@ -55,9 +55,12 @@ struct ArrayRecording {
 /// Takes over the recording's memory.
 ArrayRecording array_recording(Recording recording);
 
-/// A Touch, a Recording, or an iterable of touches.
+/// A Touch, a Recording, or an iterable of touches. Named with their module, which
+/// palpate.reference is not.
 struct TouchesLike : nb::object {
-  NB_OBJECT_DEFAULT(TouchesLike, nb::object, "Touch | Recording | collections.abc.Iterable[Touch]",
+  NB_OBJECT_DEFAULT(TouchesLike, nb::object,
+                    "palpate._palpate.Touch | palpate._palpate.Recording | "
+                    "collections.abc.Iterable[palpate._palpate.Touch]",
                     any_object)
 };
 

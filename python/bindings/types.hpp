@@ -1,12 +1,19 @@
 #pragma once
 
+#include <filesystem>
+
 #include <nanobind/nanobind.h>
+#include <nanobind/stl/filesystem.h>
 
 namespace palpate::python {
 
 namespace nb = nanobind;
 
 inline bool any_object(PyObject* object) { return object != nullptr; }
+inline bool is_path(PyObject* object) {
+  return PyUnicode_Check(object) || PyBytes_Check(object) ||
+         PyObject_HasAttrString(object, "__fspath__") != 0;
+}
 
 // Arguments and results whose types the stubs name, and which C++ takes as plain objects.
 
@@ -21,6 +28,12 @@ struct ByteArray : nb::object {
 };
 struct CountArray : nb::object {
   NB_OBJECT_DEFAULT(CountArray, nb::object, "numpy.typing.NDArray[numpy.uint64]", any_object)
+};
+/// The path of a file. nanobind's own name of the type lacks an argument that strict checks ask
+/// for.
+struct PathLike : nb::object {
+  NB_OBJECT_DEFAULT(PathLike, nb::object, "str | os.PathLike[str]", is_path)
+  std::filesystem::path path() const { return nb::cast<std::filesystem::path>(*this); }
 };
 /// A DisplacementSd, which may be given as a tuple.
 struct DisplacementSdLike : nb::object {

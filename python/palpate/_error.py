@@ -10,8 +10,8 @@ class Error(RuntimeError):
     value and the remedy.
     """
 
-    #: "input" where a file or value has to change, "system" where the machine failed.
     fault: Literal["input", "system"] = "input"
+    """"input" where a file or value has to change, "system" where the machine failed."""
 
 
 Error.__module__ = "palpate"

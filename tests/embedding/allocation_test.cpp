@@ -1,7 +1,9 @@
 // update() allocates no memory after the first one of a size: a control loop must not wait for the
 // allocator. What the Vulkan driver takes by malloc() is not counted.
+#include <algorithm>
 #include <cstdlib>
 #include <new>
+#include <optional>
 
 #include <gtest/gtest.h>
 
@@ -89,10 +91,68 @@ TEST_F(Updates, OfSeveralTouchesAllocateNothingAfterTheFirst) {
   EXPECT_EQ(allocations_of([&] { filter.update(second); }), 0U);
 }
 
+TEST_F(Updates, OfUncertainTouchesSlipAndNoneAllocateNothingAfterTheFirst) {
+  const DisplacementSd sd{.mm = 1.0, .rad = 0.1};
+  const HistogramOptions each{.lattice = small_lattice()};
+  HistogramOptions uncertain = each;
+  uncertain.touch_sd = sd;
+  HistogramOptions slipping = each;
+  slipping.slip_sd = sd;
+  HistogramOptions none = each;
+  none.none_weight = 1.0;
+  HistogramOptions all = uncertain;
+  all.slip_sd = sd;
+  all.none_weight = 1.0;
+  for (const HistogramOptions& options : {uncertain, slipping, none, all}) {
+    PoseHistogram filter(device_, maps_, options);
+    expect_none_after_the_first(filter);
+    filter.reset();
+    EXPECT_EQ(allocations_of([&] { filter.update(unknown_.touch(2)); }), 0U) << "after a reset";
+  }
+}
+
+TEST_F(Updates, OfAStillArrayAllocateNothingAfterTheFirst) {
+  HistogramOptions still{.lattice = small_lattice(), .still_array = true};
+  HistogramOptions with_none = still;
+  with_none.none_weight = 1.0;
+  for (const HistogramOptions& options : {still, with_none}) {
+    PoseHistogram filter(device_, maps_, options);
+    // The array moves from touch to touch: what is evaluated for its place is evaluated anew.
+    expect_none_after_the_first(filter);
+  }
+}
+
+TEST_F(Updates, ByATableAllocateNothingAfterTheFirst) {
+  const LikelihoodTable table{.nodes = 2,
+                              .level_edges = {10.0, 20.0},
+                              .log_likelihood = {-0.1, -3.0, -2.0, -1.5, -2.5, -1.2, -3.0, -0.9}};
+  PoseHistogram filter(device_, maps_, {.lattice = small_lattice(), .contact = {.table = table}});
+  expect_none_after_the_first(filter);
+}
+
 TEST_F(Updates, OfAParticleFilterAllocateNothingAfterTheFirst) {
   for (const Resampling resampling : {Resampling::multinomial, Resampling::systematic}) {
-    ParticleFilter filter(device_, maps_, {.particles = 2000, .resampling = resampling});
-    expect_none_after_the_first(filter);
+    for (const bool augmented : {false, true}) {
+      ParticleFilter filter(device_, maps_,
+                            {.particles = 2000, .resampling = resampling, .augmented = augmented});
+      expect_none_after_the_first(filter);
+    }
+  }
+}
+
+// A search by bounds keeps every touch until reset(), so its memory grows with the touches. The
+// limits are twice the numbers that docs/embedding.md tells.
+TEST_F(Updates, OfASearchByBoundsAllocateOnlySoOften) {
+  for (const std::optional<double> none_weight : {std::optional<double>(), std::optional(1.0)}) {
+    BoundedPosterior filter(device_, maps_,
+                            {.lattice = small_lattice(), .none_weight = none_weight, .threads = 1});
+    filter.update(unknown_.touch(0));
+    std::size_t most = 0;
+    for (std::size_t i = 1; i < unknown_.size(); ++i) {
+      const Touch touch = unknown_.touch(i);
+      most = std::max(most, allocations_of([&] { filter.update(touch); }));
+    }
+    EXPECT_LE(most, none_weight ? 2U * 117U : 2U * 43U);
   }
 }
 

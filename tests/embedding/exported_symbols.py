@@ -34,9 +34,15 @@ def public_names(headers):
 
 
 def hidden_members(headers):
-    """Members that the headers mark as the library's own."""
-    return {name for header in headers
-            for name in re.findall(r"PALPATE_LOCAL [\w& ]*?(\w+)(?:;|\()", header.read_text())}
+    """How members begin that the headers mark as the library's own: their name and, of a constructor
+    among others, the first type that they take."""
+    return tuple(name for header in headers for name in re.findall(
+        r"^ .*PALPATE_LOCAL [\w&: ]*?(\w+(?=;)|\w+\([\w:]*)", header.read_text(), re.MULTILINE))
+
+
+def is_hidden(symbol, hidden):
+    member = re.match(r"palpate::\w+::(.*)", symbol)
+    return member is not None and member[1].startswith(hidden)
 
 
 def missing(exported, archive, headers):
@@ -45,8 +51,22 @@ def missing(exported, archive, headers):
     hidden = hidden_members(headers)
     found = []
     for symbol in archive - exported:
-        match = re.match(r"palpate::(\w+)(?:::~?(\w+))?[(\[]", symbol)
-        if match and match[1] in names and match[2] not in hidden:
+        match = re.match(r"palpate::(\w+)(?:::~?\w+)?[(\[]", symbol)
+        if match and match[1] in names and not is_hidden(symbol, hidden):
+            found.append(symbol)
+    return found
+
+
+def undeclared(exported, headers):
+    """Exported symbols that no public header declares: internals, and other libraries' templates."""
+    names = public_names(headers)
+    hidden = hidden_members(headers)
+    found = []
+    for symbol in exported:
+        match = re.match(r"(?:vtable for |typeinfo (?:name )?for )?"
+                         r"palpate::(operator\W|\w+)", symbol)
+        declared = match and (match[1] in names or match[1].startswith("operator"))
+        if not declared or is_hidden(symbol, hidden):
             found.append(symbol)
     return found
 
@@ -70,6 +90,7 @@ def main():
     faults += [f"gone: {s}" for s in recorded - exported]
     faults += [f"public, but without PALPATE_API: {s}"
                for s in missing(exported, archive, headers)]
+    faults += [f"exported, but in no public header: {s}" for s in undeclared(exported, headers)]
     # A program may link the archive beside libvulkan or beside a volk of its own.
     defined = symbols(options.nm, options.archive, "A-TV-Z", "--extern-only")
     faults += [f"another library's name: {s}" for s in defined if re.match("vk[A-Z]|volk[A-Z]", s)]

@@ -2,6 +2,7 @@
 // tests with ThreadSanitizer.
 #include <unistd.h>
 
+#include <array>
 #include <atomic>
 #include <filesystem>
 #include <functional>
@@ -84,6 +85,24 @@ TEST_F(Threads, MakeDifferentEstimatorsOnADevice) {
         EXPECT_EQ(letter_maps(device_)[1].map.log_odds, maps_[1].map.log_odds);
     }
   });
+}
+
+// Planning divides the candidates among threads of its own.
+TEST_F(Threads, PlanTouchesOnADevice) {
+  const std::vector<Pose> candidates = random_poses(20, /*seed=*/4);
+  const std::vector<glm::dvec2> elements_mm = digitacts_array();
+  const auto gains_after = [&](std::size_t touches) {
+    PoseHistogram belief(device_, maps_, {.lattice = small_lattice()});
+    belief.update(unknown_.touches(0, touches));
+    std::vector<double> gains;
+    for (const TouchGain& gain :
+         belief.expected_gain(candidates, elements_mm, {.samples = 32, .seed = 5})) {
+      gains.push_back(gain.both());
+    }
+    return gains;
+  };
+  const std::array alone{gains_after(1), gains_after(2)};
+  on_threads([&](int i) { EXPECT_EQ(gains_after(1 + i % 2), alone[i % 2]) << "thread " << i; });
 }
 
 TEST_F(Threads, OpenDevicesOfTheirOwn) {

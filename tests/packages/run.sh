@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # Installs the Debian packages in a fresh Debian 12, builds the consumer project there against the
-# installed headers and libraries, and recognises a letter. Run by hand, as root, after `./dev deb`:
+# installed headers and libraries, and recognises a letter with the command and in Python. Run by hand,
+# as root, after `./dev deb`:
 #   tests/packages/run.sh [FOLDER OF .deb FILES]
 # Needs debootstrap, the network, about 3 GB in $TMPDIR, and some minutes. Exits with 77 where the
 # test cannot run.
@@ -65,7 +66,8 @@ in_root sh -ec '
   palpate recognize unknown.h5 --maps maps/ --json result.json
   grep -q "\"best\": *\"E\"" result.json
   test -f /usr/lib/udev/rules.d/70-palpate.rules
-  test -f /usr/share/man/man1/palpate-recognize.1.gz'
+  test -f /usr/share/man/man1/palpate-recognize.1.gz
+  test -f /usr/share/bash-completion/completions/palpate'
 
 echo "A program of the development files:"
 in_root sh -c 'apt-get install -y -qq --no-install-recommends /packages/libpalpate0_*.deb /packages/libpalpate-dev_*.deb \
@@ -86,10 +88,42 @@ in_root sh -ec '
     /tmp/build/$program
   done'
 
+echo "The Python module:"
+in_root sh -c 'apt-get install -y -qq --no-install-recommends /packages/python3-palpate_*.deb' >/dev/null
+in_root sh -ec '
+  cd /usr/lib/python3/dist-packages
+  test -f palpate/_palpate.pyi
+  test -f palpate/__pycache__/recognition.cpython-311.pyc
+  # The command is that of palpate-tools alone.
+  if dpkg -L python3-palpate | grep /bin/; then exit 1; fi'
+in_root /usr/bin/python3 -c '
+import importlib.metadata
+import palpate
+assert palpate.__version__ == importlib.metadata.version("palpate") != "0"
+print("palpate", palpate.__version__)
+[record] = palpate.recognize("/tmp/unknown.h5", "/tmp/maps/")
+print(record)
+assert record.best == "E"
+try:
+    palpate.open_sensor("tsf85:none").start()
+except palpate.Error as error:
+    print(error)
+    assert "not plugged in" in str(error)  # the profile of the board was found
+else:
+    raise SystemExit("a board that is not there was opened")'
+
 echo "What is installed can be removed:"
 in_root sh -c 'apt-get remove -y -qq libpalpate-driver0' >/dev/null
 if in_root palpate --version 2>/dev/null; then
   echo "palpate runs without its library" >&2
   exit 1
 fi
+in_root test ! -e /usr/lib/python3/dist-packages/palpate
+
+echo "All packages at once:"
+in_root sh -c 'apt-get install -y -qq --no-install-recommends /packages/*.deb' >/dev/null
+in_root sh -ec '
+  palpate --version
+  /tmp/consumer
+  /usr/bin/python3 -c "import palpate; print(palpate.Device.open())"'
 echo "passed"

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "palpate/pose.hpp"
 
@@ -60,8 +61,10 @@ std::vector<float> blur_norms(const std::vector<float>& weights, const Axis& axi
 }
 
 std::vector<shaders::Turn> touch_turns(const PoseLattice& lattice,
-                                       const glm::dvec2& sensor_from_pivot_mm, int steps) {
-  std::vector<shaders::Turn> turns;
+                                       const glm::dvec2& sensor_from_pivot_mm, int steps,
+                                       std::vector<shaders::Turn> reuse) {
+  std::vector<shaders::Turn> turns = std::move(reuse);
+  turns.clear();
   for (int t = 0; t < lattice.theta_rad.count; ++t) {
     const double theta = lattice.theta_rad.centre(t);
     for (int k = -steps; k <= steps; ++k) {

@@ -24,8 +24,10 @@ std::vector<float> blur_norms(const std::vector<float>& weights, const Axis& axi
 /// Where an uncertain touch takes the likelihood of a bin from as theta grows by k steps, |k| <=
 /// `steps`: t + (R(theta) - R(theta + alpha)) r, [theta, k].
 /// @param sensor_from_pivot_mm r: the sensor's origin relative to the pivot, in the robot frame
+/// @param reuse memory for the result
 std::vector<shaders::Turn> touch_turns(const PoseLattice& lattice,
-                                       const glm::dvec2& sensor_from_pivot_mm, int steps);
+                                       const glm::dvec2& sensor_from_pivot_mm, int steps,
+                                       std::vector<shaders::Turn> reuse = {});
 
 /// Where a slip takes the belief of a bin from as theta grows by k steps: g + R(alpha) (t - g),
 /// [object, k].

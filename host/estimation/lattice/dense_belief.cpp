@@ -143,7 +143,7 @@ std::uint64_t DenseBelief::device_bytes() const {
   return bytes;
 }
 
-std::vector<BeliefSummary> DenseBelief::summarise() const {
+std::vector<BeliefSummary> DenseBelief::summarise(std::vector<BeliefSummary> reuse) const {
   std::uint32_t first = 0;
   for (const Slab& slab : slabs_) {
     const shaders::ReducePush push{.bins = static_cast<shaders::uint>(slab.bins()),
@@ -154,13 +154,18 @@ std::vector<BeliefSummary> DenseBelief::summarise() const {
                      {groups, slab.object_count, 1});
     first += static_cast<std::uint32_t>(partials_of(slab, reduction_));
   }
-  std::vector<shaders::Partial> partials(partial_count_);
-  stream_.download(partials_, partials);
+  read_partials_.resize(partial_count_);
+  stream_.download(partials_, read_partials_);
   stream_.run();
 
-  std::vector<BeliefSummary> summaries(objects_, {.max = {least, 0.0F}});
+  std::vector<BeliefSummary> summaries = std::move(reuse);
+  summaries.resize(objects_);
+  for (BeliefSummary& summary : summaries) {
+    summary.blocks.clear();
+    summary = {.max = {least, 0.0F}, .blocks = std::move(summary.blocks)};
+  }
   const auto for_each_partial = [&](const auto& take) {
-    const shaders::Partial* partial = partials.data();
+    const shaders::Partial* partial = read_partials_.data();
     for (const Slab& slab : slabs_) {
       for (std::uint32_t i = 0; i < slab.object_count; ++i) {
         for (std::uint32_t g = groups_of(slab.bins(), reduction_.bins()); g > 0; --g, ++partial) {

@@ -56,7 +56,8 @@ class DenseBelief {
   std::uint64_t device_bytes() const;
 
   // These run the stream.
-  std::vector<BeliefSummary> summarise() const;
+  /// @param reuse memory for the result
+  std::vector<BeliefSummary> summarise(std::vector<BeliefSummary> reuse = {}) const;
   /// @param max the object's largest log-likelihood
   /// @param of_largest the probability of a bin of this log-likelihood
   Marginals marginals(std::size_t object, TwoFloat max, double of_largest) const;
@@ -83,6 +84,7 @@ class DenseBelief {
   gpu::Kernel add_;
   gpu::Buffer partials_;  ///< of all slabs in order
   std::size_t partial_count_ = 0;
+  mutable std::vector<shaders::Partial> read_partials_;  ///< memory that summarise() keeps
 };
 
 }  // namespace palpate

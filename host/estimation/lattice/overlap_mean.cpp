@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "kernel_sizes.hpp"
 #include "sum_overlap.hpp"
@@ -36,11 +37,14 @@ float within_floats(double mm) {
                         : static_cast<float>(std::clamp(mm, -far_mm, far_mm));
 }
 
+/// @param reuse memory for the result
 std::vector<shaders::ArrayAtTheta> arrays_of(const Touch& touch, const PoseLattice& lattice,
-                                             const glm::dvec2& pivot_mm) {
+                                             const glm::dvec2& pivot_mm,
+                                             std::vector<shaders::ArrayAtTheta> reuse) {
   const glm::dvec2 from_pivot =
       touch.T_robot_sensor * bounding_box(touch.elements_mm).middle() - pivot_mm;
-  std::vector<shaders::ArrayAtTheta> arrays;
+  std::vector<shaders::ArrayAtTheta> arrays = std::move(reuse);
+  arrays.clear();
   for (int t = 0; t < lattice.theta_rad.count; ++t) {
     const double theta = lattice.theta_rad.centre(t);
     const glm::dvec2 turned = rotate(theta, from_pivot);
@@ -71,7 +75,8 @@ OverlapMean::OverlapMean(gpu::Context& context, gpu::CommandStream& stream,
       boxes_(
           stream.uploaded(boxes_of(hypotheses), "boxes of objects", VK_FORMAT_R32G32B32A32_SFLOAT)),
       partials_(context, partials_of(lattice, objects_) * sizeof(shaders::OverlapPartial),
-                gpu::Memory::device, "sums of planes") {
+                gpu::Memory::device, "sums of planes"),
+      read_partials_(partials_of(lattice, objects_)) {
   // The first run, at which drivers compile the kernel.
   const std::vector<glm::dvec2> origin(1);
   sums(belief, {.elements_mm = origin, .pressure = {}}, {0.0, 0.0}, false);
@@ -88,9 +93,10 @@ std::uint64_t OverlapMean::device_bytes() const {
   return arrays_.bytes() + boxes_.bytes() + partials_.bytes();
 }
 
-std::vector<OverlapSum> OverlapMean::sums(const DenseBelief& scratch, const Touch& touch,
-                                          const glm::dvec2& pivot_mm, bool everywhere) {
-  stream_.upload(arrays_, arrays_of(touch, lattice_, pivot_mm));
+std::span<const OverlapSum> OverlapMean::sums(const DenseBelief& scratch, const Touch& touch,
+                                              const glm::dvec2& pivot_mm, bool everywhere) {
+  placed_ = arrays_of(touch, lattice_, pivot_mm, std::move(placed_));
+  stream_.upload(arrays_, placed_);
   // Half a float's largest: sums of two stay finite.
   constexpr float unbounded = std::numeric_limits<float>::max() / 8.0F;
   const glm::dvec2 half = bounding_box(touch.elements_mm).extent() / 2.0;
@@ -108,15 +114,14 @@ std::vector<OverlapSum> OverlapMean::sums(const DenseBelief& scratch, const Touc
                      {slab.theta_count, slab.object_count, 1});
     first += slab.theta_count * slab.object_count;
   }
-  std::vector<shaders::OverlapPartial> partials(partials_of(lattice_, objects_));
-  stream_.download(partials_, partials);
+  stream_.download(partials_, read_partials_);
   stream_.run();
 
-  std::vector<double> largest(objects_, -std::numeric_limits<double>::infinity());
-  std::vector<double> sum(objects_, 0.0);
-  std::vector<OverlapSum> sums(objects_);
+  largest_.assign(objects_, -std::numeric_limits<double>::infinity());
+  sum_.assign(objects_, 0.0);
+  sums_.assign(objects_, {});
   const auto for_each_partial = [&](const auto& take) {
-    const shaders::OverlapPartial* partial = partials.data();
+    const shaders::OverlapPartial* partial = read_partials_.data();
     for (const Slab& slab : scratch.slabs()) {
       for (std::uint32_t i = 0; i < slab.object_count; ++i) {
         for (std::uint32_t t = 0; t < slab.theta_count; ++t, ++partial) {
@@ -128,16 +133,16 @@ std::vector<OverlapSum> OverlapMean::sums(const DenseBelief& scratch, const Touc
     }
   };
   for_each_partial([&](std::size_t object, const shaders::OverlapPartial& partial) {
-    largest[object] = std::max<double>(largest[object], partial.max);
+    largest_[object] = std::max<double>(largest_[object], partial.max);
   });
   for_each_partial([&](std::size_t object, const shaders::OverlapPartial& partial) {
-    sum[object] += partial.sum * std::exp(partial.max - largest[object]);
-    sums[object].bins += partial.bins;
+    sum_[object] += partial.sum * std::exp(partial.max - largest_[object]);
+    sums_[object].bins += partial.bins;
   });
   for (std::size_t i = 0; i < objects_; ++i) {
-    sums[i].log_sum = largest[i] + std::log(sum[i]);
+    sums_[i].log_sum = largest_[i] + std::log(sum_[i]);
   }
-  return sums;
+  return sums_;
 }
 
 }  // namespace palpate

@@ -35,9 +35,9 @@ class OverlapMean {
   /// @param scratch with a touch's log-likelihood in the low words, as
   /// DisplacementBlur::sum_turns() leaves it
   /// @param everywhere whether all bins count, wherever the array is
-  /// @returns [object]
-  std::vector<OverlapSum> sums(const DenseBelief& scratch, const Touch& touch,
-                               const glm::dvec2& pivot_mm, bool everywhere);
+  /// @returns [object], until the next call
+  std::span<const OverlapSum> sums(const DenseBelief& scratch, const Touch& touch,
+                                   const glm::dvec2& pivot_mm, bool everywhere);
 
  private:
   gpu::CommandStream& stream_;
@@ -47,6 +47,12 @@ class OverlapMean {
   gpu::Buffer arrays_;
   gpu::Buffer boxes_;
   gpu::Buffer partials_;
+  // Memory that calls share.
+  std::vector<shaders::ArrayAtTheta> placed_;
+  std::vector<shaders::OverlapPartial> read_partials_;
+  std::vector<double> largest_;
+  std::vector<double> sum_;
+  std::vector<OverlapSum> sums_;
 };
 
 }  // namespace palpate

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <optional>
 
@@ -63,7 +64,7 @@ struct PoseHistogram::Impl {
   /// Eq. 13: the log-belief of a bin is the sum of the touches' log-likelihoods there (Eq. 7).
   void update(std::span<const Touch> touches, const std::function<void(double)>& progress) {
     // All touches are gathered before the first is added: one that is not sound refuses all.
-    std::vector<StillTouch> still_touches;
+    std::span<const StillTouch> still_touches;
     if (still) {
       still_touches = still->gather(touches, likelihood.segment_elements());
     }
@@ -94,16 +95,15 @@ struct PoseHistogram::Impl {
                        const std::function<void(double)>& progress) {
     for (std::size_t i = 0; i < touches.size(); ++i) {
       const ContactEvidence& evidence = gather(touches.subspan(i, 1));
-      by_touch->update(
-          touches[i], evidence,
-          [&](const DenseBelief& uniform) {
-            if (still) {
-              still->accumulate(still_touches.subspan(i, 1), likelihood, uniform, {});
-            } else {
-              likelihood.accumulate(evidence, uniform, {});
-            }
-          },
-          belief);
+      const auto evaluate = [&](const DenseBelief& uniform) {
+        if (still) {
+          still->accumulate(still_touches.subspan(i, 1), likelihood, uniform, {});
+        } else {
+          likelihood.accumulate(evidence, uniform, {});
+        }
+      };
+      // std::function would allocate a copy of it.
+      by_touch->update(touches[i], evidence, std::cref(evaluate), belief);
       if (progress) {
         progress(static_cast<double>(i + 1) / static_cast<double>(touches.size()));
       }

@@ -1,22 +1,26 @@
 #include "still_array.hpp"
 
 #include <algorithm>
+#include <utility>
+
+#include "contact_readings.hpp"
 
 namespace palpate {
 
-std::vector<StillTouch> StillArray::gather(std::span<const Touch> touches,
-                                           std::size_t segment_elements) const {
-  std::vector<StillTouch> gathered;
-  for (const Touch& touch : touches) {
-    const std::vector<Reading> readings = contact_.classify(touch);
-    const auto no_contact = std::count(readings.begin(), readings.end(), Reading::no_contact);
-    const bool by_differences = 2 * static_cast<std::size_t>(no_contact) >= readings.size();
-    gathered.push_back(
-        {touch, by_differences,
-         gather_evidence(touch, readings, by_differences ? Reading::no_contact : Reading::unknown,
-                         lattice_.pivot_mm, segment_elements)});
+std::span<const StillTouch> StillArray::gather(std::span<const Touch> touches,
+                                               std::size_t segment_elements) {
+  gathered_.resize(std::max(gathered_.size(), touches.size()));
+  for (std::size_t i = 0; i < touches.size(); ++i) {
+    StillTouch& still = gathered_[i];
+    still.touch = touches[i];
+    readings_ = classify(still.touch, contact_, std::move(readings_));
+    const auto no_contact = std::count(readings_.begin(), readings_.end(), Reading::no_contact);
+    still.by_differences = 2 * static_cast<std::size_t>(no_contact) >= readings_.size();
+    still.evidence = gather_evidence(
+        still.touch, readings_, still.by_differences ? Reading::no_contact : Reading::unknown,
+        lattice_.pivot_mm, segment_elements, std::move(still.evidence));
   }
-  return gathered;
+  return std::span(gathered_).first(touches.size());
 }
 
 void StillArray::accumulate(std::span<const StillTouch> touches, DenseLikelihood& likelihood,
@@ -24,8 +28,12 @@ void StillArray::accumulate(std::span<const StillTouch> touches, DenseLikelihood
                             const std::function<void(double)>& progress) {
   double done = 0.0;
   for (const StillTouch& still : touches) {
-    if (still.by_differences) {
-      belief.add(no_contact_at(still.touch, likelihood, belief));
+    // The first touch also makes the memory that a later one may need.
+    if (still.by_differences || !no_contact_) {
+      const DenseBelief& no_contact = no_contact_at(still.touch, likelihood, belief);
+      if (still.by_differences) {
+        belief.add(no_contact);
+      }
     }
     likelihood.accumulate(still.evidence, belief, {});
     if (progress) {
@@ -43,10 +51,10 @@ const DenseBelief& StillArray::no_contact_at(const Touch& touch, DenseLikelihood
       !same_placement(touch, {T_robot_sensor_, elements_mm_, {}})) {
     evaluated_ = false;  // a device that fails leaves it half-way
     no_contact_->clear();
-    const std::vector<Reading> readings(touch.elements_mm.size(), Reading::no_contact);
-    likelihood.accumulate(gather_evidence(touch, readings, Reading::unknown, lattice_.pivot_mm,
-                                          likelihood.segment_elements()),
-                          *no_contact_, {});
+    readings_.assign(touch.elements_mm.size(), Reading::no_contact);
+    everywhere_ = gather_evidence(touch, readings_, Reading::unknown, lattice_.pivot_mm,
+                                  likelihood.segment_elements(), std::move(everywhere_));
+    likelihood.accumulate(everywhere_, *no_contact_, {});
     T_robot_sensor_ = touch.T_robot_sensor;
     elements_mm_.assign(touch.elements_mm.begin(), touch.elements_mm.end());
     pivot_mm_ = lattice_.pivot_mm;

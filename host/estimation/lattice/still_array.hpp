@@ -32,9 +32,9 @@ class StillArray {
 
   /// Gathers every touch by its differences where at least half of its elements read No Contact,
   /// or else as a whole.
+  /// @returns what stays until the next call
   /// @throws Error on a touch that is not sound
-  std::vector<StillTouch> gather(std::span<const Touch> touches,
-                                 std::size_t segment_elements) const;
+  std::span<const StillTouch> gather(std::span<const Touch> touches, std::size_t segment_elements);
 
   /// Adds the touches to the belief one after the other, with the fraction done after each (Eq.
   /// 13).
@@ -55,6 +55,10 @@ class StillArray {
   Pose T_robot_sensor_;
   std::vector<glm::dvec2> elements_mm_;
   glm::dvec2 pivot_mm_{0.0, 0.0};
+  // Memory that updates share.
+  std::vector<StillTouch> gathered_;  ///< of the most touches so far
+  std::vector<Reading> readings_;
+  ContactEvidence everywhere_;
 };
 
 }  // namespace palpate

@@ -62,7 +62,8 @@ TouchByTouch::TouchByTouch(gpu::Context& context, gpu::CommandStream& stream,
       scratch_(belief.uniform()),
       touch_blur_(context, stream, options.lattice, objects_, options.touch_sd,
                   DisplacementBlur::Of::touch, options.none_weight.has_value()),
-      lost_mass_(objects_, 0.0) {
+      lost_mass_(objects_, 0.0),
+      references_(objects_) {
   for (const Hypothesis& hypothesis : hypotheses) {
     centroids_mm_.push_back(displaced_body(hypothesis.map).centroid_mm);
   }
@@ -71,6 +72,10 @@ TouchByTouch::TouchByTouch(gpu::Context& context, gpu::CommandStream& stream,
     slip_blur_.emplace(context, stream, options.lattice, objects_, options.slip_sd,
                        DisplacementBlur::Of::belief, false);
     slip_blur_->warm_up(scratch_, belief);
+    slip_turns_ = slip_turns(options.lattice, centroids_mm_, slip_blur_->theta_steps());
+    before_slip_ = belief.summarise();
+    after_slip_ = before_slip_;
+    largest_.reserve(objects_);
   }
   if (options.none_weight) {
     overlap_.emplace(context, stream, scratch_, hypotheses, options.lattice);
@@ -88,7 +93,7 @@ void TouchByTouch::reset() {
 void TouchByTouch::evaluate_planes(const std::function<void(const DenseBelief&)>& evaluate) {
   scratch_.clear();
   evaluate(scratch_);
-  touch_blur_.blur_planes(scratch_, scratch_, std::vector<TwoFloat>(objects_));
+  touch_blur_.blur_planes(scratch_, scratch_, references_);
 }
 
 void TouchByTouch::prepare(ContactEvidence evidence,
@@ -113,10 +118,10 @@ void TouchByTouch::update(const Touch& touch, const ContactEvidence& evidence,
   if (!is_prepared) {
     evaluate_planes(evaluate);
   }
-  const std::vector<shaders::Turn> turns =
+  touch_turns_ =
       touch_turns(options_.lattice, touch.T_robot_sensor.translation_mm - options_.lattice.pivot_mm,
-                  touch_blur_.theta_steps());
-  touch_blur_.sum_turns(scratch_, turns, belief);
+                  touch_blur_.theta_steps(), std::move(touch_turns_));
+  touch_blur_.sum_turns(scratch_, touch_turns_, belief);
   // A touch without a known element says nothing, not even where the array was.
   if (overlap_ && !evidence.segments.empty()) {
     add_to_none(touch);
@@ -126,24 +131,24 @@ void TouchByTouch::update(const Touch& touch, const ContactEvidence& evidence,
 }
 
 void TouchByTouch::slip(DenseBelief& belief) {
-  const std::vector<BeliefSummary> before = belief.summarise();
-  std::vector<TwoFloat> largest;
-  for (const BeliefSummary& summary : before) {
-    largest.push_back(summary.max);
+  before_slip_ = belief.summarise(std::move(before_slip_));
+  largest_.clear();
+  for (const BeliefSummary& summary : before_slip_) {
+    largest_.push_back(summary.max);
   }
-  slip_blur_->blur_planes(belief, scratch_, largest);
-  slip_blur_->sum_turns(
-      scratch_, slip_turns(options_.lattice, centroids_mm_, slip_blur_->theta_steps()), belief);
-  const std::vector<BeliefSummary> after = belief.summarise();
+  slip_blur_->blur_planes(belief, scratch_, largest_);
+  slip_blur_->sum_turns(scratch_, slip_turns_, belief);
+  after_slip_ = belief.summarise(std::move(after_slip_));
   for (std::size_t i = 0; i < objects_; ++i) {
-    lost_mass_[i] +=
-        before[i].max.value() - after[i].max.value() + std::log(before[i].sum / after[i].sum);
+    const BeliefSummary& before = before_slip_[i];
+    const BeliefSummary& after = after_slip_[i];
+    lost_mass_[i] += before.max.value() - after.max.value() + std::log(before.sum / after.sum);
   }
 }
 
 void TouchByTouch::add_to_none(const Touch& touch) {
   const glm::dvec2& pivot_mm = options_.lattice.pivot_mm;
-  std::vector<OverlapSum> sums = overlap_->sums(scratch_, touch, pivot_mm, false);
+  std::span<const OverlapSum> sums = overlap_->sums(scratch_, touch, pivot_mm, false);
   if (weighted_bins(sums, log_weight_) == 0.0) {
     // No pose of the region brings the array to an object: all poses are alike.
     sums = overlap_->sums(scratch_, touch, pivot_mm, true);

@@ -68,6 +68,13 @@ class TouchByTouch {
   std::optional<OverlapMean> overlap_;
   std::optional<ContactEvidence> prepared_;  ///< of what scratch_ holds, blurred along x and y
   std::vector<double> lost_mass_;
+  // Memory that updates share.
+  std::vector<TwoFloat> references_;  ///< all 0
+  std::vector<TwoFloat> largest_;
+  std::vector<shaders::Turn> touch_turns_;
+  std::vector<shaders::Turn> slip_turns_;  ///< the same for every slip
+  std::vector<BeliefSummary> before_slip_;
+  std::vector<BeliefSummary> after_slip_;
   double none_log_evidence_ = 0.0;
   bool touched_ = false;
   bool felt_ = false;  ///< by a touch with a known element

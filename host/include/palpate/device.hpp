@@ -62,10 +62,10 @@ class PALPATE_API Device {
   const std::string& name() const;  ///< as Vulkan reports it
   /// Size of the memory in which the device computes, in bytes; a CPU device shares the machine's.
   std::uint64_t memory_bytes() const;
-  gpu::Context& context();  ///< for the library's own classes
+  PALPATE_LOCAL gpu::Context& context();  ///< for the library's own classes
 
  private:
-  explicit Device(std::unique_ptr<gpu::Context> context);
+  PALPATE_LOCAL explicit Device(std::unique_ptr<gpu::Context> context);
   std::unique_ptr<gpu::Context> context_;
 };
 

@@ -51,8 +51,8 @@ class PALPATE_API PoseTrack {
  private:
   using TimedPose = std::pair<double, Pose>;  ///< time and T_robot_sensor
 
-  void join();
-  void drop_aside();
+  PALPATE_LOCAL void join();
+  PALPATE_LOCAL void drop_aside();
 
   double largest_gap_s_;
   std::deque<TimedPose> poses_;
