@@ -6,7 +6,7 @@
 
 #include <palpate/palpate.hpp>
 
-#include "picture.hpp"
+#include "drawings.hpp"
 
 int main(int argc, char** argv) try {
   if (argc != 3) {

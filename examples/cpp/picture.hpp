@@ -1,4 +1,4 @@
-// Draws the pictures of the examples, as SVG, which every browser shows.
+// Pictures as SVG, which every browser shows.
 #pragma once
 
 #include <algorithm>
@@ -7,8 +7,6 @@
 #include <map>
 #include <sstream>
 #include <string>
-
-#include <palpate/palpate.hpp>
 
 /// A picture of a grid of cells, with marks on it. Coordinates are in cells, from the middle of the
 /// lower left cell; y points up.
@@ -51,15 +49,3 @@ class Picture {
   std::map<int, std::string> cells_;
   std::ostringstream marks_;
 };
-
-/// What the touches say about each cell beyond the prior: red is occupied, blue is empty.
-inline Picture picture_of(const palpate::OccupancyGrid& map) {
-  Picture picture(map.nx, map.ny);
-  for (int y = 0; y < map.ny; ++y) {
-    for (int x = 0; x < map.nx; ++x) {
-      const double log_odds = map.log_odds[y * map.nx + x];
-      picture.cell(x, y, (log_odds - palpate::log_odds_from_probability(map.prior)) / 8.0);
-    }
-  }
-  return picture;
-}

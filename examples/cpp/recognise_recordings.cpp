@@ -1,32 +1,13 @@
 // Recognises the object of each recording among known maps, and finds its pose.
 //   recognise_recordings RECORDING.h5... --maps MAP.h5...
 // Draws the touches on the map of the object, in RECORDING.h5.svg.
-#include <cmath>
 #include <iostream>
 #include <string>
 #include <vector>
 
 #include <palpate/palpate.hpp>
 
-#include "picture.hpp"
-
-/// The elements in contact, on the map that they were recognised by.
-void draw(const std::vector<palpate::Touch>& touches, const palpate::OccupancyGrid& map,
-          const palpate::Pose& T_object_robot, const std::string& path) {
-  Picture picture = picture_of(map);
-  for (const palpate::Touch& touch : touches) {
-    const std::vector<palpate::Reading> readings = palpate::ContactClassifier{}.classify(touch);
-    for (std::size_t i = 0; i < readings.size(); ++i) {
-      if (readings[i] == palpate::Reading::in_contact) {
-        const palpate::Pose T_object_sensor = T_object_robot * touch.T_robot_sensor;
-        const glm::dvec2 at =
-            (T_object_sensor * touch.elements_mm[i] - map.origin_mm) / map.cell_mm;
-        picture.circle(at.x, at.y, 0.5, "");
-      }
-    }
-  }
-  picture.save(path);
-}
+#include "drawings.hpp"
 
 int main(int argc, char** argv) try {
   std::vector<std::string> recordings;
@@ -70,7 +51,7 @@ int main(int argc, char** argv) try {
               << " +- " << sd[0] << " mm, y = " << pose.T_robot_object.translation_mm.y << " +- "
               << sd[1] << " mm, theta = " << pose.T_robot_object.theta_rad << " +- " << sd[2]
               << " rad\n";
-    draw(touches, known[best].map, refined.T_object_robot, path + ".svg");
+    draw_touches(touches, known[best].map, refined.T_object_robot, path + ".svg");
   }
 } catch (const palpate::Error& error) {
   std::cerr << error.what() << "\n";

@@ -1,4 +1,4 @@
-"""Compares a picture of examples/cpp/picture.hpp with the one that stands next to its example.
+"""Compares a picture of examples/cpp with the one that stands next to its example.
 
 Devices round differently: the colours of cells may differ a little, and marks by half a cell.
 """
