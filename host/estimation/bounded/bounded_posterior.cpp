@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <tuple>
 #include <utility>
 
 #include <fmt/format.h>
@@ -11,6 +10,7 @@
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 
+#include "belief_draws.hpp"
 #include "bin_likelihood.hpp"
 #include "bound_search.hpp"
 #include "evaluated_bins.hpp"
@@ -25,7 +25,6 @@
 #include "moved_from.hpp"
 #include "moved_pivot.hpp"
 #include "palpate/error.hpp"
-#include "random.hpp"
 #include "refinement.hpp"
 #include "sampled_touch_mean.hpp"
 #include "search_memory.hpp"
@@ -36,15 +35,8 @@ namespace {
 
 /// Tolerance that a search with a budget reaches before it goes on, and enough to draw samples.
 constexpr double soon = 1e-2;
-/// Bins of all hypotheses together.
-constexpr double few_bins = 1e6;
-
-/// Index in the lattice of the i-th bin of a box.
-std::int64_t bin_in(const PoseLattice& lattice, const BinBox& box, std::int64_t i) {
-  return (std::int64_t{box.theta} * lattice.y_mm.count + box.y_first + i / box.x_count) *
-             lattice.x_mm.count +
-         box.x_first + i % box.x_count;
-}
+/// Bins of all hypotheses together up to which samples are drawn at the full tolerance.
+constexpr double closely_drawn_bins = 1e6;
 
 /// The lattice with every few bins along x and y where they are much finer than a pose's fit needs.
 /// Its centres are centres of the lattice.
@@ -155,12 +147,12 @@ struct BoundedPosterior::Impl {
     }
   }
 
-  /// Of few bins, most are dropped early whatever the tolerance, and a close one lets them be
-  /// followed through the next touches.
+  /// What a search for samples is to reach. Few bins take as long whatever the tolerance, and a
+  /// close one lets those that are found be followed through the next touches.
   SearchGoal rough_goal() const {
     const double all =
         static_cast<double>(options.lattice.bins()) * static_cast<double>(hypotheses.size());
-    return {all <= few_bins ? options.tolerance : std::max(options.tolerance, soon), {}};
+    return {all <= closely_drawn_bins ? options.tolerance : std::max(options.tolerance, soon), {}};
   }
 
   /// The touches are to be added: keeps what the last search found of the belief before them.
@@ -516,70 +508,21 @@ double BoundedPosterior::entropy() const {
 
 std::vector<PoseSample> BoundedPosterior::sample(std::size_t count, std::uint64_t seed) const {
   Impl& posterior = whole();
-  Random random(seed, Stream::belief);
-  // One draw in each of `count` equal parts of the belief: less variance than independent draws.
-  std::vector<double> targets;
-  targets.reserve(count);
-  for (std::size_t i = 0; i < count; ++i) {
-    targets.push_back((static_cast<double>(i) + random.uniform()) / static_cast<double>(count));
-  }
-  struct Draw {
-    std::int32_t object;
-    std::int64_t bin;
-  };
-  std::vector<Draw> draws;
-  draws.reserve(count);
   const FollowedBins* followed = posterior.followed_bins();
   if (followed == nullptr) {
     posterior.find_roughly();
   }
-  const double log_total = followed != nullptr ? followed->log_total() : posterior.log_total();
-  const PoseLattice& in = lattice();
-  double reached = 0.0;
-  Draw last{};
-  const auto draw_from = [&](const BinBox& box, std::span<const double> log_likelihood) {
-    const double weight = posterior.log_weight[box.object] - log_total;
-    if (log_likelihood.size() == 1) {
-      const double p = std::exp(weight + log_likelihood[0]);
-      const std::int64_t bins = box.bins();
-      while (draws.size() < count &&
-             targets[draws.size()] < reached + p * static_cast<double>(bins)) {
-        const auto i = static_cast<std::int64_t>((targets[draws.size()] - reached) / p);
-        draws.push_back({box.object, bin_in(in, box, std::min(i, bins - 1))});
-      }
-      reached += p * static_cast<double>(bins);
-      last = {box.object, bin_in(in, box, bins - 1)};
-      return;
-    }
-    for (std::size_t i = 0; i < log_likelihood.size(); ++i) {
-      reached += std::exp(weight + log_likelihood[i]);
-      last = {box.object, bin_in(in, box, static_cast<std::int64_t>(i))};
-      while (draws.size() < count && targets[draws.size()] < reached) {
-        draws.push_back(last);
-      }
-    }
+  BeliefDraws draws(count, seed, lattice(), posterior.log_weight,
+                    followed != nullptr ? followed->log_total() : posterior.log_total());
+  const auto add = [&](const BinBox& box, std::span<const double> log_likelihood) {
+    draws.add(box, log_likelihood);
   };
   if (followed != nullptr) {
-    followed->visit(draw_from);
+    followed->visit(add);
   } else {
-    posterior.visit(draw_from);
+    posterior.visit(add);
   }
-  draws.resize(count, last);  // rounding may leave the last draw out
-  std::sort(draws.begin(), draws.end(), [](const Draw& a, const Draw& b) {
-    return std::tie(a.object, a.bin) < std::tie(b.object, b.bin);
-  });
-  std::vector<PoseSample> samples;
-  samples.reserve(count);
-  const auto within = [&](const Axis& axis, std::int64_t bin) {
-    return axis.centre(static_cast<int>(bin)) + random.uniform(-0.5, 0.5) * axis.step();
-  };
-  for (const Draw& draw : draws) {
-    const double x = within(in.x_mm, draw.bin % in.x_mm.count);
-    const double y = within(in.y_mm, draw.bin % in.plane() / in.x_mm.count);
-    const double theta = within(in.theta_rad, draw.bin / in.plane());
-    samples.push_back({draw.object, in.T_object_robot(x, y, theta)});
-  }
-  return samples;
+  return draws.take();
 }
 
 std::vector<PoseBlock> BoundedPosterior::refined_blocks() const {

@@ -172,6 +172,30 @@ TEST(BoundedBelief, IsDrawnFromInProportionAfterFurtherTouches) {
   }
 }
 
+TEST(BoundedBelief, IsDrawnFromEverywhereWhereNoTouchSeesAMap) {
+  Device device = Device::open();
+  BoundedPosterior posterior(device, two_shapes(), small_options());
+  Recording recording = touches_of_l(3, 829);
+  for (Pose& pose : recording.T_robot_sensor) {
+    pose.translation_mm += glm::dvec2(1e3, 0.0);
+  }
+  constexpr std::size_t count = 3000;
+  for (std::size_t i = 0; i < recording.size(); ++i) {
+    posterior.update(recording.touch(i));
+    std::size_t of_the_first = 0;
+    std::vector<std::size_t> thetas(16);
+    for (const PoseSample& draw : posterior.sample(count, 830)) {
+      of_the_first += draw.object == 0 ? 1 : 0;
+      const std::int64_t bin = small_options().lattice.bin_of(draw.T_object_robot);
+      ++thetas[static_cast<std::size_t>(bin / (13 * 12))];
+    }
+    EXPECT_NEAR(of_the_first, count / 3.0, 1.0) << "the prior weights";
+    for (const std::size_t of_theta : thetas) {
+      EXPECT_NEAR(of_theta, count / 16.0, 3.0);
+    }
+  }
+}
+
 TEST(BoundedBelief, DrawnFromBeforeAnEstimateTellsTheSameAfterwards) {
   Device device = Device::open();
   BoundedPosterior asked(device, two_shapes(), small_options());
