@@ -426,33 +426,51 @@ TEST(BoundedPosterior, RefusesWhatItCannotDo) {
   expect_refused([&] { posterior.refine({.object = 0, .bin = 1'000'000}); }, "bin");
 }
 
+/// Elements in contact where all cells of a map have the same log odds.
+struct Contradiction {
+  int side = 0;           ///< of the square of elements
+  float heavy = 0.0F;     ///< log odds that contradict the touch by more than 700 nats
+  float light = 0.0F;     ///< log odds that contradict it by less
+  float as_heavy = 0.0F;  ///< log odds that contradict it by more than 700 nats, too
+};
+
 TEST(BoundedPosterior, IsContradictedWhereTheDenseOneIs) {
-  // The heavy object contradicts the touch by more than 700 nats, the light one by less.
-  std::vector<Hypothesis> objects{{random_map(61, 61, 0.5, 1.0, 814), 1.0},
-                                  {random_map(61, 61, 0.5, 1.0, 815), 1.0}};
-  std::fill(objects[0].map.log_odds.begin(), objects[0].map.log_odds.end(), -500.0F);
-  std::fill(objects[1].map.log_odds.begin(), objects[1].map.log_odds.end(), -300.0F);
-  Recording recording;
-  recording.elements_mm = {{-1, 0}, {1, 0}};
-  recording.T_robot_sensor = {{}};
-  recording.pressure = {9.0, 9.0};
-  BoundedOptions options = small_options();
-  options.contact.gamma = 0.0;
   Device device = Device::open();
-  for (const double light : {1.0, 1e-300}) {
-    objects[1].weight = light;
-    BoundedPosterior bounded(device, objects, options);
-    PoseHistogram dense(device, objects, {.lattice = options.lattice, .contact = options.contact});
-    bounded.update(all_touches(recording));
-    dense.update(all_touches(recording));
-    EXPECT_EQ(bounded.estimate().contradicted, dense.estimate().contradicted) << light;
-    EXPECT_FALSE(dense.estimate().contradicted);
-    EXPECT_EQ(bounded.estimate().mode.object, dense.estimate().mode.object);
-    objects[1].map.log_odds.assign(objects[1].map.log_odds.size(), -400.0F);
-    BoundedPosterior both(device, objects, options);
-    both.update(all_touches(recording));
-    EXPECT_TRUE(both.estimate().contradicted);
-    objects[1].map.log_odds.assign(objects[1].map.log_odds.size(), -300.0F);
+  // By few elements beyond what a tile's penalties hold, and by many within it.
+  for (const Contradiction& by :
+       {Contradiction{2, -500.0F, -150.0F, -400.0F}, Contradiction{9, -12.0F, -8.0F, -11.0F}}) {
+    std::vector<Hypothesis> objects{{random_map(61, 61, 0.5, 1.0, 814), 1.0},
+                                    {random_map(61, 61, 0.5, 1.0, 815), 1.0}};
+    const auto fill = [&](std::size_t object, float log_odds) {
+      std::vector<float>& cells = objects[object].map.log_odds;
+      std::fill(cells.begin(), cells.end(), log_odds);
+    };
+    Recording recording;
+    for (int i = 0; i < by.side * by.side; ++i) {
+      recording.elements_mm.emplace_back(0.2 * (i % by.side), 0.2 * (i / by.side));
+      recording.pressure.push_back(9.0);
+    }
+    recording.T_robot_sensor = {{}};
+    BoundedOptions options = small_options();
+    options.contact.gamma = 0.0;
+    for (const double weight : {1.0, 1e-300}) {
+      SCOPED_TRACE(::testing::Message() << by.side << " elements a side, weight " << weight);
+      objects[1].weight = weight;
+      const auto compare = [&](float light, bool contradicted) {
+        fill(0, by.heavy);
+        fill(1, light);
+        BoundedPosterior bounded(device, objects, options);
+        PoseHistogram dense(device, objects,
+                            {.lattice = options.lattice, .contact = options.contact});
+        bounded.update(all_touches(recording));
+        dense.update(all_touches(recording));
+        EXPECT_EQ(dense.estimate().contradicted, contradicted);
+        EXPECT_EQ(bounded.estimate().contradicted, contradicted);
+        EXPECT_EQ(bounded.estimate().mode.object, dense.estimate().mode.object);
+      };
+      compare(by.light, false);
+      compare(by.as_heavy, true);
+    }
   }
 }
 
