@@ -140,19 +140,13 @@ TEST_F(Updates, OfAParticleFilterAllocateNothingAfterTheFirst) {
   }
 }
 
-// A search by bounds keeps every touch until reset(), so its memory grows with the touches. The
-// limits are twice the numbers that docs/embedding.md tells.
-TEST_F(Updates, OfASearchByBoundsAllocateOnlySoOften) {
+TEST_F(Updates, OfASearchByBoundsAllocateNothingAfterTheFirst) {
   for (const std::optional<double> none_weight : {std::optional<double>(), std::optional(1.0)}) {
     BoundedPosterior filter(device_, maps_,
-                            {.lattice = small_lattice(), .none_weight = none_weight, .threads = 1});
-    filter.update(unknown_.touch(0));
-    std::size_t most = 0;
-    for (std::size_t i = 1; i < unknown_.size(); ++i) {
-      const Touch touch = unknown_.touch(i);
-      most = std::max(most, allocations_of([&] { filter.update(touch); }));
-    }
-    EXPECT_LE(most, none_weight ? 2U * 117U : 2U * 43U);
+                            {.lattice = small_lattice(), .none_weight = none_weight});
+    expect_none_after_the_first(filter);
+    filter.reset();
+    EXPECT_EQ(allocations_of([&] { filter.update(unknown_.touch(2)); }), 0U) << "after a reset";
   }
 }
 

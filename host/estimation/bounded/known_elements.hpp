@@ -6,6 +6,7 @@
 
 #include <glm/vec2.hpp>
 
+#include "array_overlap.hpp"
 #include "palpate/contact_model.hpp"
 
 namespace palpate {
@@ -32,6 +33,7 @@ struct KnownElements {
 struct ArrayReadings {
   std::vector<glm::dvec2> from_pivot_mm;
   std::vector<Reading> readings;
+  ArrayRectangle rectangle{};
 };
 
 /// Classifies the touch's elements (Eq. 3).

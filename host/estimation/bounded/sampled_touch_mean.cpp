@@ -47,12 +47,10 @@ int run_length(const BinBox& box) { return std::min(longest_run, box.x_count); }
 }  // namespace
 
 SampledTouchMeans::SampledTouchMeans(std::span<const Hypothesis> hypotheses,
-                                     const ContactModel& contact, const PoseLattice& lattice,
-                                     std::span<const double> log_weight,
+                                     const PoseLattice& lattice, std::span<const double> log_weight,
                                      const BinLikelihood& likelihood,
                                      std::span<const TileBounds> bounds)
-    : contact_(contact),
-      lattice_(lattice),
+    : lattice_(lattice),
       log_weight_(log_weight.begin(), log_weight.end()),
       likelihood_(likelihood),
       bounds_(bounds) {
@@ -70,17 +68,17 @@ void SampledTouchMeans::reset() { means_.clear(); }
 void SampledTouchMeans::move_pivot(const glm::dvec2& pivot_mm) { lattice_.pivot_mm = pivot_mm; }
 
 std::vector<TouchMean> SampledTouchMeans::evaluate(
-    std::span<const Touch> touches, const std::function<void(std::size_t)>& progress) const {
+    std::span<const ArrayReadings> touches, const std::function<void()>& cancel_point) const {
   std::vector<TouchMean> means;
-  for (std::size_t i = 0; i < touches.size(); ++i) {
-    const KnownElements elements = gather_elements(touches[i], contact_, lattice_.pivot_mm);
+  for (const ArrayReadings& touch : touches) {
+    const KnownElements elements = known_elements(touch);
     // A touch without a known element says nothing, not even where the array was.
     if (!elements.empty()) {
       const std::uint64_t fingerprint = fingerprint_of(elements);
       const auto same = [&](const TouchMean& mean) { return mean.fingerprint == fingerprint; };
       const auto times_before =
           std::ranges::count_if(means_, same) + std::ranges::count_if(means, same);
-      const Overlap overlap = overlap_of(touches[i]);
+      const Overlap overlap = overlap_of(touch.rectangle);
       const WeightedSum sum =
           overlap.bins <= bins_per_touch_mean
               ? sum_of_all(overlap, elements)
@@ -92,8 +90,8 @@ std::vector<TouchMean> SampledTouchMeans::evaluate(
            .log_share = std::log(overlap.weighted_bins / static_cast<double>(lattice_.bins())),
            .fingerprint = fingerprint});
     }
-    if (progress) {
-      progress(i + 1);
+    if (cancel_point) {
+      cancel_point();
     }
   }
   return means;
@@ -133,8 +131,7 @@ double SampledTouchMeans::standard_error() const {
   return std::sqrt(sum);
 }
 
-SampledTouchMeans::Overlap SampledTouchMeans::overlap_of(const Touch& touch) const {
-  const ArrayRectangle array = array_rectangle(touch, lattice_.pivot_mm);
+SampledTouchMeans::Overlap SampledTouchMeans::overlap_of(const ArrayRectangle& array) const {
   const std::size_t thetas = turns_.size();
   Overlap overlap;
   overlap.planes.reserve(boxes_.size() * thetas);

@@ -10,10 +10,8 @@
 #include "bin_likelihood.hpp"
 #include "bounding_box.hpp"
 #include "known_elements.hpp"
-#include "palpate/contact_model.hpp"
 #include "palpate/estimate.hpp"
 #include "palpate/lattice.hpp"
-#include "palpate/touch.hpp"
 #include "tile_bounds.hpp"
 #include "touch_tiles.hpp"
 
@@ -48,25 +46,23 @@ struct TouchMean {
 /// independent and the order of touches does not count, but for s.
 class SampledTouchMeans {
  public:
-  /// @param contact resolved: with its prior
   /// @param log_weight of every hypothesis, over their sum
   /// @param bounds of every hypothesis; `likelihood` has the same pivot. Both outlive this object
-  SampledTouchMeans(std::span<const Hypothesis> hypotheses, const ContactModel& contact,
-                    const PoseLattice& lattice, std::span<const double> log_weight,
-                    const BinLikelihood& likelihood, std::span<const TileBounds> bounds);
+  SampledTouchMeans(std::span<const Hypothesis> hypotheses, const PoseLattice& lattice,
+                    std::span<const double> log_weight, const BinLikelihood& likelihood,
+                    std::span<const TileBounds> bounds);
 
   void reset();
   void move_pivot(const glm::dvec2& pivot_mm);
 
   /// The means of touches that come after those added so far; touches without a known element have
   /// none. On the threads of the caller's arena; the bits do not depend on their number.
-  /// @param progress called after each touch with the number of touches done
-  /// @throws Error on a touch that is not sound; what `progress` throws
-  std::vector<TouchMean> evaluate(std::span<const Touch> touches,
-                                  const std::function<void(std::size_t)>& progress = {}) const;
+  /// @param cancel_point called after each touch
+  /// @throws what `cancel_point` throws
+  std::vector<TouchMean> evaluate(std::span<const ArrayReadings> touches,
+                                  const std::function<void()>& cancel_point = {}) const;
   /// Takes in what evaluate() returned; all of it, or nothing where memory ends.
   void add(std::span<const TouchMean> means);
-  void update(const Touch& touch) { add(evaluate(std::span(&touch, 1))); }
 
   /// Log of the product of s and the touches' mean likelihoods, in nats; 0 before any touch.
   double log_evidence() const;
@@ -92,7 +88,7 @@ class SampledTouchMeans {
     double squared_error = 0.0;  ///< of log_sum
   };
 
-  Overlap overlap_of(const Touch& touch) const;
+  Overlap overlap_of(const ArrayRectangle& array) const;
   const OverlapPlane& plane(const Overlap& overlap, const BinBox& box) const;
   /// The bins of a box's only row that count.
   BinBox counted(const Overlap& overlap, const BinBox& row) const;
@@ -106,7 +102,6 @@ class SampledTouchMeans {
                                const KnownElements& elements) const;
 
   std::vector<BoundingBox> boxes_;  ///< around each object's occupied cells
-  ContactModel contact_;
   PoseLattice lattice_;
   std::vector<glm::dvec2> turns_;  ///< [theta] cosine and sine
   std::vector<double> log_weight_;

@@ -92,9 +92,10 @@ class PALPATE_API BoundedPosterior {
   /// @throws Error after an update() or on a pivot out of range, and changes nothing
   void move_pivot(const glm::dvec2& pivot_mm);
 
-  /// Multiplies the belief by the likelihood of these touches (Eq. 7, 13): adds their penalties to
-  /// the largest blocks. Calls `progress` with the fraction done before it does so. Takes in no
-  /// touch at all if one of them is not sound or if `progress` throws.
+  /// Multiplies the belief by the likelihood of these touches (Eq. 7, 13). It only checks and keeps
+  /// them: the next call that asks about the belief takes them in. Calls `progress` once, with 1,
+  /// before it does so. Takes in no touch at all if one of them is not sound or if `progress`
+  /// throws.
   /// @throws Error on a touch that is not sound; what `progress` throws
   void update(std::span<const Touch> touches, const std::function<void(double)>& progress = {});
   void update(const Touch& touch) { update(std::span(&touch, 1)); }

@@ -11,7 +11,6 @@
 #include <tbb/task_arena.h>
 
 #include "hypotheses.hpp"
-#include "palpate/error.hpp"
 #include "synthetic.hpp"
 
 namespace palpate {
@@ -37,7 +36,16 @@ class SampledNone {
         contact(resolve({}, objects)),
         likelihood(objects, contact, lattice),
         bounds(bounds_of(objects, contact, lattice)),
-        means(objects, contact, lattice, log_weights(objects), likelihood, bounds) {}
+        means(objects, lattice, log_weights(objects), likelihood, bounds) {}
+
+  std::vector<TouchMean> evaluate(std::span<const Touch> touches) const {
+    std::vector<ArrayReadings> arrays;
+    for (const Touch& touch : touches) {
+      arrays.push_back(array_readings(touch, contact, lattice.pivot_mm));
+    }
+    return means.evaluate(arrays);
+  }
+  void update(const Touch& touch) { means.add(evaluate(std::span(&touch, 1))); }
 
   /// Its definition, by all bins.
   double expected(std::span<const Touch> touches) const {
@@ -94,11 +102,11 @@ TEST(SampledTouchMean, TakesAllBinsWhereTheyAreFew) {
   const Recording recording = small_array(5, 703);
   const std::vector<Touch> touches = all_touches(recording);
   for (std::size_t n = 1; n <= touches.size(); ++n) {
-    none.means.update(touches[n - 1]);
+    none.update(touches[n - 1]);
     EXPECT_NEAR(none.means.log_evidence(), none.expected(std::span(touches).first(n)), rounding);
     EXPECT_EQ(none.means.standard_error(), 0.0);
   }
-  const double share = std::exp(none.means.evaluate(std::span(touches).first(1)).front().log_share);
+  const double share = std::exp(none.evaluate(std::span(touches).first(1)).front().log_share);
   EXPECT_GT(share, 0.1) << "the array meets no object";
   EXPECT_LT(share, 0.9) << "all bins count anyway";
   none.means.reset();
@@ -118,17 +126,17 @@ TEST(SampledTouchMean, ErrsAsMuchAsItSays) {
     none.means.reset();
     for (int i = 0; i < draws; ++i) {
       // The same touch once more draws other bins.
-      const TouchMean mean = none.means.evaluate(std::span(&touch, 1)).front();
+      const TouchMean mean = none.evaluate(std::span(&touch, 1)).front();
       EXPECT_GT(mean.squared_error, 0.0);
       EXPECT_LT(mean.squared_error, 4e-4);
       const double z = (mean.log_share + mean.log_mean - expected) / std::sqrt(mean.squared_error);
       squares += z * z;
       sum += z;
       most = std::max(most, std::abs(z));
-      none.means.update(touch);
+      none.update(touch);
     }
-    const double all = draws * (expected - none.means.evaluate(std::span(&touch, 1))[0].log_share) +
-                       none.means.evaluate(std::span(&touch, 1))[0].log_share;
+    const double all = draws * (expected - none.evaluate(std::span(&touch, 1))[0].log_share) +
+                       none.evaluate(std::span(&touch, 1))[0].log_share;
     EXPECT_LT(std::abs(none.means.log_evidence() - all), 4.0 * none.means.standard_error())
         << "errors of one touch do not repeat";
   }
@@ -158,7 +166,7 @@ TEST(SampledTouchMean, HearsALightObjectThatAloneExplainsTheTouch) {
     recording.pressure[i] = 10.0;
   }
   const std::vector<Touch> touches = all_touches(recording);
-  none.means.update(touches[0]);
+  none.update(touches[0]);
   const double error = none.means.standard_error();
   EXPECT_GT(error, 0.0);
   EXPECT_LT(error, 0.02) << "drawn by weight, two bins would speak for the light object";
@@ -173,14 +181,14 @@ TEST(SampledTouchMean, CountsAllBinsWhereTheArrayMeetsNoObject) {
     for (Pose& pose : recording.T_robot_sensor) {
       pose.translation_mm += glm::dvec2(200.0, 0.0);
     }
-    none.means.update(recording.touch(0));
+    none.update(recording.touch(0));
     // Every bin sees nothing but the prior, and s is 1.
     const double expected = none.expected(std::vector{recording.touch(0)});
     EXPECT_NEAR(none.means.log_evidence(), expected, rounding);
     EXPECT_LT(none.means.standard_error(), 1e-12);
     // The share counts once, at the first touch.
     recording.T_robot_sensor[1] = near;
-    none.means.update(recording.touch(1));
+    none.update(recording.touch(1));
     EXPECT_NEAR(none.means.log_evidence(), none.expected(all_touches(recording)),
                 rounding + 4.5 * none.means.standard_error());
   }
@@ -192,12 +200,12 @@ TEST(SampledTouchMean, IsDeafToATouchWithoutAKnownElement) {
   const std::vector<std::uint8_t> dead(8, 0);
   Touch silent = recording.touch(1);
   silent.valid = dead;
-  none.means.update(silent);
+  none.update(silent);
   EXPECT_EQ(none.means.log_evidence(), 0.0);
-  none.means.update(recording.touch(0));
-  none.means.update(silent);
+  none.update(recording.touch(0));
+  none.update(silent);
   SampledNone other(two_objects(), small_lattice());
-  other.means.update(recording.touch(0));
+  other.update(recording.touch(0));
   EXPECT_EQ(none.means.log_evidence(), other.means.log_evidence());
 }
 
@@ -207,7 +215,7 @@ TEST(SampledTouchMean, OfOneBin) {
     SampledNone none(two_objects(), bin);
     const Recording recording = small_array(3, 708);
     for (const Touch& touch : all_touches(recording)) {
-      none.means.update(touch);
+      none.update(touch);
     }
     EXPECT_NEAR(none.means.log_evidence(), none.expected(all_touches(recording)), rounding);
   }
@@ -219,20 +227,20 @@ TEST(SampledTouchMean, DoesNotDependOnTheOrderButForTheFirstShare) {
   touches.push_back(touches[1]);  // one comes twice
   SampledNone forth(two_objects(), large_lattice());
   for (const Touch& touch : touches) {
-    forth.means.update(touch);
+    forth.update(touch);
   }
   SampledNone back(two_objects(), large_lattice());
   std::vector<Touch> reversed(touches.rbegin(), touches.rend());
   std::swap(reversed.back(), reversed.front());  // the first stays the first
-  back.means.add(back.means.evaluate(reversed));
+  back.means.add(back.evaluate(reversed));
   EXPECT_EQ(forth.means.log_evidence(), back.means.log_evidence());
   EXPECT_EQ(forth.means.standard_error(), back.means.standard_error());
   EXPECT_GT(forth.means.standard_error(), 0.0);
   const auto share = [&](const Touch& touch) {
-    return forth.means.evaluate(std::span(&touch, 1)).front().log_share;
+    return forth.evaluate(std::span(&touch, 1)).front().log_share;
   };
   back.means.reset();
-  back.means.add(back.means.evaluate(std::vector<Touch>(touches.rbegin(), touches.rend())));
+  back.means.add(back.evaluate(std::vector<Touch>(touches.rbegin(), touches.rend())));
   EXPECT_NEAR(forth.means.log_evidence() - share(touches.front()),
               back.means.log_evidence() - share(touches.back()), rounding);
 }
@@ -245,7 +253,7 @@ TEST(SampledTouchMean, HasTheSameBitsOnAnyNumberOfThreads) {
   for (const int threads : {1, 2, 4}) {
     SampledNone none(two_objects(), large_lattice());
     tbb::task_arena(threads).execute(
-        [&] { none.means.add(none.means.evaluate(all_touches(recording))); });
+        [&] { none.means.add(none.evaluate(all_touches(recording))); });
     told.push_back({none.means.log_evidence(), none.means.standard_error()});
   }
   EXPECT_EQ(told[0], told[1]);
@@ -263,23 +271,13 @@ TEST(SampledTouchMean, OfAHundredMillionBins) {
   SampledNone none(two_objects(), fine);
   SampledNone coarse(two_objects(), large_lattice());
   for (const Touch& touch : all_touches(recording)) {
-    none.means.update(touch);
-    coarse.means.update(touch);
+    none.update(touch);
+    coarse.update(touch);
     EXPECT_LT(none.means.standard_error(), 0.04);
     EXPECT_NEAR(none.means.log_evidence(), coarse.means.log_evidence(),
                 4.0 * std::hypot(none.means.standard_error(), coarse.means.standard_error()) +
                     0.02);  // 1 bin in 110 of the overlap's borders
   }
-}
-
-TEST(SampledTouchMean, RefusesATouchThatIsNotSound) {
-  SampledNone none(two_objects(), small_lattice());
-  Recording recording = small_array(2, 712);
-  none.means.update(recording.touch(0));
-  const double before = none.means.log_evidence();
-  recording.T_robot_sensor[1].translation_mm.x = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_THROW(none.means.evaluate(all_touches(recording)), Error);
-  EXPECT_EQ(none.means.log_evidence(), before);
 }
 
 }  // namespace

@@ -1,0 +1,281 @@
+#include "bounded_belief.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include <fmt/format.h>
+#include <tbb/info.h>
+
+#include "belief_draws.hpp"
+#include "hypotheses.hpp"
+#include "log_sum.hpp"
+#include "moved_pivot.hpp"
+
+namespace palpate {
+
+namespace {
+
+/// Tolerance that a search with a budget reaches before it goes on, and enough to draw samples.
+constexpr double soon = 1e-2;
+/// Bins of all hypotheses together up to which samples are drawn at the full tolerance.
+constexpr double closely_drawn_bins = 1e6;
+
+}  // namespace
+
+BoundedBelief::BoundedBelief(Device& device, std::span<const Hypothesis> hypotheses,
+                             const BoundedOptions& options)
+    : options_(options),
+      hypotheses_(hypotheses.begin(), hypotheses.end()),
+      // More threads than cores gain nothing.
+      threads_(options.threads > 0 ? std::min(options.threads, tbb::info::default_concurrency())
+                                   : tbb::info::default_concurrency()),
+      arena_(threads_),
+      likelihood_(hypotheses_, options_.contact, options_.lattice),
+      batches_(likelihood_, device.context(), hypotheses_, options_.contact, options_.lattice,
+               options_.on_host ? BinPlace::host : BinPlace::measured),
+      search_(arena_.execute(
+          [&] { return BoundSearch(hypotheses_, options_, likelihood_, batches_); })),
+      log_weight_(log_weights(hypotheses_)) {
+  if (options_.none_weight) {
+    none_.emplace(hypotheses_, options_.lattice, log_weight_, likelihood_, search_.bounds());
+    none_log_weight_ = std::log(*options_.none_weight) - log_total_weight(hypotheses_) +
+                       std::log(static_cast<double>(options_.lattice.bins()));
+  }
+}
+
+void BoundedBelief::reset() {
+  half_done_.forget();
+  kept_.clear();
+  elements_ = {};
+  touched_ = false;
+  not_added_.clear();
+  not_averaged_.clear();
+  search_.reset();
+  result_.reset();
+  followed_.reset();
+  if (none_) {
+    none_->reset();
+  }
+}
+
+void BoundedBelief::move_pivot(const glm::dvec2& pivot_mm) {
+  options_.lattice = with_pivot(options_.lattice, pivot_mm, "bounded posterior", touched_);
+  likelihood_.move_pivot(pivot_mm);
+  batches_.move_pivot(pivot_mm);
+  if (none_) {
+    none_->move_pivot(pivot_mm);
+  }
+  result_.reset();
+  followed_.reset();
+}
+
+void BoundedBelief::add(std::span<const Touch> touches) {
+  half_done_.refuse();
+  kept_.add(touches, options_.contact, options_.lattice.pivot_mm);
+  touched_ = touched_ || !touches.empty();
+}
+
+void BoundedBelief::take_in() {
+  half_done_.refuse();
+  if (kept_.empty()) {
+    return;
+  }
+  half_done_.change([&] {
+    const std::vector<ArrayReadings> touches = kept_.all();
+    std::vector<KnownElements> all;
+    for (const ArrayReadings& touch : touches) {
+      all.push_back(known_elements(touch));
+    }
+    follow(all);
+    all.push_back(std::move(elements_));
+    elements_ = merged(all);
+    not_added_.insert(not_added_.end(), touches.begin(), touches.end());
+    if (none_) {
+      not_averaged_.insert(not_averaged_.end(), touches.begin(), touches.end());
+    }
+    kept_.clear();
+  });
+}
+
+std::string BoundedBelief::path() const {
+  return fmt::format("{} on {} thread{}, {}", likelihood_.instructions(), threads_,
+                     threads_ == 1 ? "" : "s", batches_.path());
+}
+
+std::uint64_t BoundedBelief::bytes() const {
+  return likelihood_.bytes() + search_.bytes() + bins_.bytes();
+}
+
+Deadline BoundedBelief::until(const std::optional<double>& budget_s) const {
+  return Deadline(budget_s, &options_.cancel_point);
+}
+
+SearchGoal BoundedBelief::goal() const {
+  return {options_.tolerance, options_.evidence_nats, options_.evidence_range_nats};
+}
+
+SearchGoal BoundedBelief::rough_goal() const {
+  // Few bins take as long whatever the tolerance, and a close search lets those that are found be
+  // followed through the next touches.
+  const double all =
+      static_cast<double>(options_.lattice.bins()) * static_cast<double>(hypotheses_.size());
+  return {all <= closely_drawn_bins ? options_.tolerance : std::max(options_.tolerance, soon), {}};
+}
+
+const SearchResult& BoundedBelief::found() {
+  if (!result_ || rough_) {
+    result_.reset();
+    rough_ = false;
+    Deadline deadline = until(options_.budget_s);
+    SearchGoal first = goal();
+    if (deadline.exists()) {
+      // What is proven soon comes first: a search that is cut short proves little.
+      first.tolerance = std::max(first.tolerance, soon);
+    }
+    SearchResult best = run(first, deadline, bins_);
+    if (first.tolerance > options_.tolerance && !deadline.passed()) {
+      EvaluatedBins more(true);
+      SearchResult better = run(goal(), deadline, more);
+      if (better.uncertain() < best.uncertain()) {
+        best = std::move(better);
+        bins_ = std::move(more);
+      }
+    }
+    result_ = std::move(best);
+  }
+  return *result_;
+}
+
+void BoundedBelief::find_roughly() {
+  if (!result_) {
+    Deadline deadline = until(options_.budget_s);
+    result_ = run(rough_goal(), deadline, bins_);
+    rough_ = true;
+  }
+}
+
+SearchResult BoundedBelief::run(const SearchGoal& goal, Deadline& deadline,
+                                EvaluatedBins& evaluated) {
+  evaluated.clear();
+  add_to_search();
+  return arena_.execute([&] {
+    return search_.run(elements_, goal, deadline,
+                       [&](const BinBox& box, std::span<const double> log_likelihood) {
+                         evaluated.add(box, log_likelihood);
+                         if (evaluated.full()) {
+                           // With a budget, bins are evaluated as long as there is room for them:
+                           // another search could not evaluate the same.
+                           deadline.end();
+                         }
+                       });
+  });
+}
+
+void BoundedBelief::add_to_search() {
+  if (!not_added_.empty()) {
+    half_done_.change([&] { arena_.execute([&] { search_.add(not_added_); }); });
+    not_added_.clear();
+  }
+}
+
+void BoundedBelief::visit(const BinVisitor& visitor) {
+  if (bins_.complete()) {
+    bins_.visit(visitor);
+  } else {
+    arena_.execute(
+        [&] { search_.run(elements_, rough_ ? rough_goal() : goal(), until({}), visitor); });
+  }
+}
+
+double BoundedBelief::log_total() const {
+  LogSum total;
+  for (const HypothesisEvidence& evidence : result_->evidence) {
+    total.add(evidence.evaluated);
+  }
+  return total.log();
+}
+
+void BoundedBelief::follow(std::span<const KnownElements> touches) {
+  if (result_ && bins_.complete() && bins_.values() <= FollowedBins::most_bins) {
+    followed_.emplace(bins_, *result_, log_weight_);
+    not_followed_.clear();
+  }
+  if (followed_) {
+    not_followed_.insert(not_followed_.end(), touches.begin(), touches.end());
+  }
+  result_.reset();
+}
+
+const FollowedBins* BoundedBelief::followed_bins() {
+  if (result_ || !followed_) {
+    return nullptr;
+  }
+  for (const KnownElements& touch : std::exchange(not_followed_, {})) {
+    std::vector<double> most;
+    for (const TileBounds& bounds : search_.bounds()) {
+      most.push_back(bounds.best(bounds.levels().size() - 1, touch));
+    }
+    followed_->add(touch, likelihood_, most);
+  }
+  if (!(followed_->share_outside() <= soon)) {
+    followed_.reset();
+    return nullptr;
+  }
+  return &*followed_;
+}
+
+std::vector<PoseSample> BoundedBelief::sample(std::size_t count, std::uint64_t seed) {
+  const FollowedBins* followed = followed_bins();
+  if (followed == nullptr) {
+    find_roughly();
+  }
+  BeliefDraws draws(count, seed, options_.lattice, log_weight_,
+                    followed != nullptr ? followed->log_total() : log_total());
+  const auto add = [&](const BinBox& box, std::span<const double> log_likelihood) {
+    draws.add(box, log_likelihood);
+  };
+  if (followed != nullptr) {
+    followed->visit(add);
+  } else {
+    visit(add);
+  }
+  return draws.take();
+}
+
+std::vector<PoseBlock> BoundedBelief::refined_blocks() {
+  add_to_search();
+  std::vector<PoseBlock> blocks;
+  std::vector<PoseBlock> evaluated;
+  const auto note = [&](const BinBox& box, std::span<const double> log_likelihoods) {
+    if (static_cast<std::int64_t>(log_likelihoods.size()) == box.bins()) {
+      evaluated.push_back({.object = box.object,
+                           .level = search_.finest_level(),
+                           .theta = box.theta,
+                           .x_first = box.x_first,
+                           .x_count = box.x_count,
+                           .y_first = box.y_first,
+                           .y_count = box.y_count});
+    }
+  };
+  arena_.execute([&] { search_.run(elements_, goal(), until({}), note, &blocks); });
+  blocks.insert(blocks.end(), evaluated.begin(), evaluated.end());
+  return blocks;
+}
+
+void BoundedBelief::average() {
+  if (!not_averaged_.empty()) {
+    none_->add(
+        arena_.execute([&] { return none_->evaluate(not_averaged_, options_.cancel_point); }));
+    not_averaged_.clear();
+  }
+}
+
+double BoundedBelief::none_log_evidence() {
+  average();
+  return none_ ? none_log_weight_ + none_->log_evidence()
+               : -std::numeric_limits<double>::infinity();
+}
+
+}  // namespace palpate

@@ -1,0 +1,114 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include <tbb/task_arena.h>
+
+#include "bin_likelihood.hpp"
+#include "bound_search.hpp"
+#include "evaluated_bins.hpp"
+#include "faster_bin_likelihood.hpp"
+#include "followed_bins.hpp"
+#include "half_done.hpp"
+#include "kept_touches.hpp"
+#include "known_elements.hpp"
+#include "palpate/bounded_posterior.hpp"
+#include "sampled_touch_mean.hpp"
+
+namespace palpate {
+
+/// What a BoundedPosterior believes: the touches so far, and what the last search has found of
+/// them. Searches where it is asked for more than is known.
+class BoundedBelief {
+ public:
+  /// @param options checked, with a resolved contact model
+  BoundedBelief(Device& device, std::span<const Hypothesis> hypotheses,
+                const BoundedOptions& options);
+
+  void reset();
+  void move_pivot(const glm::dvec2& pivot_mm);
+  /// Keeps touches for take_in(): all, or none where one is not sound.
+  void add(std::span<const Touch> touches);
+  /// Takes in the touches that were kept. All below is about the touches that were taken in.
+  /// @throws Error where memory ended in the middle of it, until reset()
+  void take_in();
+
+  const KnownElements& elements() const { return elements_; }
+  const BoundedOptions& options() const { return options_; }
+  const std::vector<Hypothesis>& hypotheses() const { return hypotheses_; }
+  const BinLikelihood& likelihood() const { return likelihood_; }
+  /// [hypothesis] log of its prior weight.
+  const std::vector<double>& log_weight() const { return log_weight_; }
+  std::string path() const;
+  std::uint64_t bytes() const;
+  /// Runs work on the threads that the options ask for.
+  template <typename Work>
+  decltype(auto) on_threads(const Work& work) const {
+    return arena_.execute(work);
+  }
+
+  /// The result of a search to the options' tolerance, or as far as their budget reaches.
+  const SearchResult& found();
+  /// Visits the bins that the last search evaluated; searches again where there was no room to keep
+  /// them.
+  void visit(const BinVisitor& visitor);
+  /// Log of the summed likelihood of these bins, with prior weights.
+  double log_total() const;
+  /// Draws from bins that hold nearly all of the belief.
+  std::vector<PoseSample> sample(std::size_t count, std::uint64_t seed);
+  /// The blocks that a search divides or evaluates.
+  std::vector<PoseBlock> refined_blocks();
+
+  /// Whether the options ask for "none of these".
+  bool has_none() const { return none_.has_value(); }
+  /// Log evidence of "none of these" with its prior weight, as SearchResult::evidence has that of
+  /// the hypotheses; -infinity where it is left out.
+  double none_log_evidence();
+  double none_standard_error() const { return none_->standard_error(); }
+
+ private:
+  SearchGoal goal() const;
+  /// What a search for samples is to reach.
+  SearchGoal rough_goal() const;
+  /// Sees to it that there is a last search's result, of a quick search if need be.
+  void find_roughly();
+  SearchResult run(const SearchGoal& goal, Deadline& deadline, EvaluatedBins& evaluated);
+  /// The search takes in its touches.
+  void add_to_search();
+  /// "None of these" takes in its touches.
+  void average();
+  /// More touches come: keeps what the last search found of the belief before them.
+  void follow(std::span<const KnownElements> touches);
+  /// The followed bins after all touches; nullptr where they may not hold enough to draw samples.
+  const FollowedBins* followed_bins();
+  Deadline until(const std::optional<double>& budget_s) const;
+
+  BoundedOptions options_;
+  std::vector<Hypothesis> hypotheses_;
+  int threads_;
+  mutable tbb::task_arena arena_;
+  BinLikelihood likelihood_;
+  FasterBinLikelihood batches_;
+  BoundSearch search_;
+  std::vector<double> log_weight_;
+  KeptTouches kept_;
+  KnownElements elements_;
+  bool touched_ = false;
+  std::vector<ArrayReadings> not_added_;     ///< touches that the search has not yet taken in
+  std::vector<ArrayReadings> not_averaged_;  ///< nor "none of these"
+  std::optional<SearchResult> result_;
+  bool rough_ = false;  ///< result_ is find_roughly()'s
+  EvaluatedBins bins_{options_.budget_s.has_value()};
+  std::optional<FollowedBins> followed_;
+  std::vector<KnownElements> not_followed_;  ///< touches that followed_ has not yet taken in
+  std::optional<SampledTouchMeans> none_;    ///< where the options ask for it
+  double none_log_weight_ = 0.0;             ///< log of its prior weight times the number of bins
+  HalfDone half_done_{"bounded posterior: memory ended in the middle of an update; call reset()"};
+};
+
+}  // namespace palpate

@@ -1,0 +1,65 @@
+#include "kept_touches.hpp"
+
+#include <limits>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "palpate/error.hpp"
+#include "synthetic.hpp"
+
+namespace palpate {
+namespace {
+
+const glm::dvec2 pivot_mm{3.0, -2.0};
+
+void expect_equal(const std::vector<ArrayReadings>& kept, const std::vector<Touch>& touches) {
+  ASSERT_EQ(kept.size(), touches.size());
+  for (std::size_t i = 0; i < kept.size(); ++i) {
+    const ArrayReadings expected = array_readings(touches[i], {}, pivot_mm);
+    EXPECT_EQ(kept[i].readings, expected.readings);
+    EXPECT_EQ(kept[i].from_pivot_mm, expected.from_pivot_mm);
+    EXPECT_EQ(kept[i].rectangle.from_pivot_mm, expected.rectangle.from_pivot_mm);
+    EXPECT_EQ(kept[i].rectangle.half_mm, expected.rectangle.half_mm);
+    EXPECT_EQ(kept[i].rectangle.direction_rad, expected.rectangle.direction_rad);
+  }
+}
+
+TEST(KeptTouches, GivesThemBackInTheirOrder) {
+  const Recording recording = random_recording(100, 8, 720);
+  const std::vector<Touch> touches = all_touches(recording);
+  KeptTouches kept;
+  EXPECT_TRUE(kept.empty());
+  kept.add(std::span<const Touch>(), {}, pivot_mm);
+  EXPECT_TRUE(kept.empty());
+  kept.add(std::span(touches).first(1), {}, pivot_mm);
+  kept.add(std::span(touches).subspan(1), {}, pivot_mm);
+  expect_equal(kept.all(), touches);
+  kept.clear();
+  EXPECT_TRUE(kept.empty());
+  EXPECT_TRUE(kept.all().empty());
+  kept.add(std::span(touches).last(2), {}, pivot_mm);
+  expect_equal(kept.all(), {touches[98], touches[99]});
+}
+
+TEST(KeptTouches, KeepsArraysOfSeveralSizes) {
+  const Recording small = random_recording(2, 1, 721);
+  const Recording large = random_recording(2, 400'000, 722);  // beyond the room
+  KeptTouches kept;
+  const std::vector<Touch> touches{large.touch(0), small.touch(0), large.touch(1), small.touch(1)};
+  kept.add(touches, {}, pivot_mm);
+  expect_equal(kept.all(), touches);
+}
+
+TEST(KeptTouches, KeepsNoneWhereOneIsNotSound) {
+  Recording recording = random_recording(4, 8, 723);
+  KeptTouches kept;
+  const Touch sound = recording.touch(0);
+  kept.add(std::span(&sound, 1), {}, pivot_mm);
+  recording.T_robot_sensor[3].translation_mm.x = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_THROW(kept.add(all_touches(recording), {}, pivot_mm), Error);
+  expect_equal(kept.all(), {sound});
+}
+
+}  // namespace
+}  // namespace palpate
