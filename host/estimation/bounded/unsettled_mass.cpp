@@ -1,11 +1,29 @@
 #include "unsettled_mass.hpp"
 
 #include <algorithm>
-#include <array>
+#include <bit>
 #include <cmath>
 #include <limits>
 
 namespace palpate {
+
+namespace {
+
+/// Calls visit(slot) for the slots of a set, the last one first, until it returns false.
+template <typename Set, typename Visit>
+void for_slots(const Set& set, const Visit& visit) {
+  for (std::size_t word = set.size(); word-- > 0;) {
+    for (std::uint64_t left = set[word]; left != 0;) {
+      const std::size_t bit = 63 - static_cast<std::size_t>(std::countl_zero(left));
+      left ^= std::uint64_t{1} << bit;
+      if (!visit(64 * word + bit)) {
+        return;
+      }
+    }
+  }
+}
+
+}  // namespace
 
 std::size_t UnsettledMass::slot(double bound) const {
   // Rounded down, so that a bound never exceeds its slot's upper edge.
@@ -18,62 +36,76 @@ double UnsettledMass::upper_edge(std::size_t slot) const {
   return largest_ - static_cast<double>(slot) * slot_nats_;
 }
 
-std::size_t UnsettledMass::droppable_from(const std::int64_t* bins, double log_allowance) const {
+template <typename Bins>
+std::size_t UnsettledMass::droppable_from(const SlotSet& used, const Bins& bins_in,
+                                          double log_allowance) const {
   // The log of any number of bins is less.
   constexpr double most_log_bins = 44.0;
-  const double decay = std::exp(-slot_nats_);
-  double mass = 0.0;  // of the slots from i on, as so many bins at the upper edge of slot i
-  std::size_t from = slots;
-  for (; from > 0; --from) {
-    const std::size_t i = from - 1;
-    mass *= decay;
-    if (bins[i] > 0) {
-      mass += static_cast<double>(bins[i]);
+  double mass = 0.0;  // of the slots from `above` on, as so many bins at its upper edge
+  std::size_t above = slots;
+  std::size_t from = 0;
+  for_slots(used, [&](std::size_t i) {
+    if (const std::int64_t bins = bins_in(i); bins > 0) {
+      mass = mass * decay(above - i) + static_cast<double>(bins);
+      above = i;
       const double log_room = log_allowance - upper_edge(i);
       if (log_room < most_log_bins && std::log(mass) > log_room) {
-        break;
+        from = i + 1;
+        return false;
       }
     }
-  }
+    return true;
+  });
   return from;
 }
 
 std::size_t UnsettledMass::droppable_from(double log_allowance) const {
-  std::array<std::int64_t, slots> all{};
-  for (std::size_t i = 0; i < bins_.size(); ++i) {
-    all[i % slots] += bins_[i];
+  SlotSet used{};
+  for (const SlotSet& of : used_) {
+    for (std::size_t word = 0; word < used.size(); ++word) {
+      used[word] |= of[word];
+    }
   }
-  return droppable_from(all.data(), log_allowance);
+  return droppable_from(
+      used,
+      [&](std::size_t slot) {
+        std::int64_t bins = 0;
+        for (std::size_t i = slot; i < bins_.size(); i += slots) {
+          bins += bins_[i];
+        }
+        return bins;
+      },
+      log_allowance);
 }
 
 std::size_t UnsettledMass::droppable_from(std::size_t hypothesis, double log_allowance) const {
-  return droppable_from(bins_.data() + hypothesis * slots, log_allowance);
+  return droppable_from(
+      used_[hypothesis], [&](std::size_t slot) { return bins_[hypothesis * slots + slot]; },
+      log_allowance);
 }
 
 double UnsettledMass::log_mass(std::size_t hypothesis) const {
-  const std::int64_t* bins = bins_.data() + hypothesis * slots;
-  std::size_t first = 0;
-  while (first < slots && bins[first] == 0) {
-    ++first;
-  }
-  if (first == slots) {
-    return -std::numeric_limits<double>::infinity();
-  }
-  const double decay = std::exp(-slot_nats_);
-  double mass = 0.0;  // of the slots from i on, as so many bins at the upper edge of slot i
-  for (std::size_t i = slots; i-- > first;) {
-    mass = mass * decay + static_cast<double>(bins[i]);
-  }
-  return upper_edge(first) + std::log(mass);
+  double mass = 0.0;  // of the slots from `above` on, as so many bins at its upper edge
+  std::size_t above = slots;
+  for_slots(used_[hypothesis], [&](std::size_t i) {
+    if (const std::int64_t bins = bins_[hypothesis * slots + i]; bins > 0) {
+      mass = mass * decay(above - i) + static_cast<double>(bins);
+      above = i;
+    }
+    return true;
+  });
+  return upper_edge(above) + std::log(mass);
 }
 
 double UnsettledMass::largest(std::size_t hypothesis) const {
-  for (std::size_t i = 0; i < slots; ++i) {
+  double largest = -std::numeric_limits<double>::infinity();
+  for_slots(used_[hypothesis], [&](std::size_t i) {
     if (bins_[hypothesis * slots + i] > 0) {
-      return upper_edge(i);
+      largest = upper_edge(i);
     }
-  }
-  return -std::numeric_limits<double>::infinity();
+    return true;
+  });
+  return largest;
 }
 
 }  // namespace palpate

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <array>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
@@ -16,12 +18,14 @@ class UnsettledMass {
   /// @param slot_nats width of a slot; all bounds that lie 4095 slots below the largest or deeper
   /// count as if they lay there
   UnsettledMass(std::size_t hypotheses, double largest, double slot_nats = usual_slot_nats)
-      : largest_(largest), slot_nats_(slot_nats), bins_(hypotheses * slots) {}
+      : largest_(largest), slot_nats_(slot_nats), bins_(hypotheses * slots), used_(hypotheses) {}
 
   /// Slots ascend as bounds fall; the last holds all that lie far below.
   std::size_t slot(double bound) const;
   void add(std::size_t hypothesis, double bound, std::int64_t bins) {
-    bins_[hypothesis * slots + slot(bound)] += bins;
+    const std::size_t i = slot(bound);
+    bins_[hypothesis * slots + i] += bins;
+    used_[hypothesis][i / 64] |= std::uint64_t{1} << (i % 64);
   }
   void remove(std::size_t hypothesis, double bound, std::int64_t bins) {
     bins_[hypothesis * slots + slot(bound)] -= bins;
@@ -39,13 +43,24 @@ class UnsettledMass {
   static constexpr std::size_t slots = 4096;
 
  private:
+  /// A bit for every slot.
+  using SlotSet = std::array<std::uint64_t, slots / 64>;
+
   /// The bound that no tile in a slot exceeds, in nats.
   double upper_edge(std::size_t slot) const;
-  std::size_t droppable_from(const std::int64_t* bins, double log_allowance) const;
+  /// @param used slots that may hold bins
+  /// @param bins_in(slot) their number
+  template <typename Bins>
+  std::size_t droppable_from(const SlotSet& used, const Bins& bins_in, double log_allowance) const;
+  /// What a bin counts for, that many slots further up.
+  double decay(std::size_t slots_up) const {
+    return std::exp(-static_cast<double>(slots_up) * slot_nats_);
+  }
 
   double largest_;
   double slot_nats_;
   std::vector<std::int64_t> bins_;  ///< [hypothesis, slot]
+  std::vector<SlotSet> used_;       ///< [hypothesis] slots to which bins were added
 };
 
 }  // namespace palpate

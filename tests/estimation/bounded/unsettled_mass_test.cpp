@@ -128,6 +128,18 @@ TEST(UnsettledMass, BoundsTheMassOfEveryHypothesis) {
   EXPECT_NEAR(mass.log_mass(2), exact, slot_nats + rounding);
 }
 
+TEST(UnsettledMass, StaysWhereAllFarAboveItIsTakenOut) {
+  UnsettledMass mass(1, -3.0, 1.0);
+  mass.add(0, -3.0, 5);
+  mass.add(0, -2003.0, 7);
+  mass.remove(0, -3.0, 5);
+  EXPECT_NEAR(mass.log_mass(0), -2003.0 + std::log(7.0), rounding);
+  EXPECT_EQ(mass.largest(0), -2003.0);
+  const std::size_t slot = mass.slot(-2003.0);
+  EXPECT_EQ(mass.droppable_from(-2003.0 + 2.0), 0U);
+  EXPECT_EQ(mass.droppable_from(-2003.0 + 1.0), slot + 1);
+}
+
 TEST(UnsettledMass, OfNothingCanBeDropped) {
   const UnsettledMass mass(2, -3.0);
   for (const double allowance : {-infinity, -1e300, 0.0, infinity}) {
