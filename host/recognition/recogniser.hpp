@@ -33,7 +33,7 @@ class Recogniser {
   /// follows resampling and noise.
   void prepare(const Touch& touch);
   Estimate estimate() const;
-  /// The mode's pose between the bins; empty for particles.
+  /// The refined pose near the mode; empty for particles.
   std::optional<RefinedPose> refine(const Mode& mode) const;
   /// ParticleFilter::effective_sample_size(); empty without particles.
   std::optional<double> effective_sample_size() const;

@@ -124,7 +124,8 @@ void bind_bounded_posterior(nb::module_& module) {
               return belief.refine(mode ? *mode : belief.estimate().mode);
             });
           },
-          "mode"_a = nb::none(), "The pose between the bins near a mode, and its covariance.")
+          "mode"_a = nb::none(),
+          "The refined pose near a mode, and its covariance; see PoseHistogram.refine().")
       .def(
           "marginals",
           [](const Bounded& self, int object, const std::optional<PoseLattice>& grid) {

@@ -36,7 +36,10 @@ void bind_mode(nb::module_& module) {
                            text_of(self.T_object_robot));
       });
 
-  nb::class_<RefinedPose>(module, "RefinedPose", "A pose between the bins, with its uncertainty.")
+  nb::class_<RefinedPose>(
+      module, "RefinedPose",
+      "Where the posterior peaks near a mode, to a fraction of a bin, with its\n"
+      "uncertainty.")
       .def_prop_ro(
           "T_object_robot", [](const RefinedPose& self) { return to_array(self.T_object_robot); },
           "[3] (x_mm, y_mm, theta_rad).")

@@ -83,8 +83,9 @@ void bind_beliefs(nb::class_<Histogram>& histogram) {
             });
           },
           "mode"_a = nb::none(),
-          "The pose between the bins near a mode, by default that of estimate(), and its "
-          "covariance.")
+          "The refined pose near a mode, by default that of estimate(), and its covariance: where "
+          "the\n"
+          "posterior peaks, to a fraction of a bin.")
       .def(
           "marginals",
           [](const Histogram& self, int object) {

@@ -16,10 +16,10 @@ class Record(dict[str, Any]):
     """What was recognised, as a record in the JSON of `palpate recognize`; keys are attributes, too.
 
     `best` is the most probable label, `identity` {label: probability}, `mode` the most probable bin,
-    `refined` the pose between the bins with `T_robot_object` [x_mm, y_mm, theta_rad], `sd` and
-    `covariance`, `fit` how well the touches fit it: {"z", "verdict"}. Of a recording that
-    recognize_many() could not recognise there are only its name, `touches` (0), `truth` and `error`.
-    docs/files.md lists all keys.
+    `refined` the refined pose, where the posterior peaks to a fraction of a bin, with
+    `T_robot_object` [x_mm, y_mm, theta_rad], `sd` and `covariance`, `fit` how well the touches fit
+    it: {"z", "verdict"}. Of a recording that recognize_many() could not recognise there are only its
+    name, `touches` (0), `truth` and `error`. docs/files.md lists all keys.
     """
 
     def __getattr__(self, name: str) -> Any:

@@ -11,7 +11,7 @@ namespace palpate {
 /// the whole grid where no cell is occupied.
 Body displaced_body(const OccupancyGrid& map);
 
-/// The pose between the bins near the mode, and its covariance, as PoseHistogram::refine() says.
+/// The refined pose near the mode, and its covariance, as PoseHistogram::refine() says.
 /// @param log_likelihood of the mode's object
 /// @throws Error if there is no such bin or the pose is not finite; what `log_likelihood` throws
 RefinedPose refine(const WindowLogLikelihood& log_likelihood, const PoseLattice& lattice,

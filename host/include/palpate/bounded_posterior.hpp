@@ -104,7 +104,7 @@ class PALPATE_API BoundedPosterior {
   /// once after each update(); further calls return the same.
   Estimate estimate() const;
 
-  /// The pose between the bins near a mode, and its covariance; see PoseHistogram::refine().
+  /// The refined pose near a mode, and its covariance; see PoseHistogram::refine().
   /// Evaluates the bins of the window that it fits.
   /// @throws Error if there is no such object or bin, or the pose is not finite
   RefinedPose refine(const Mode& mode) const;

@@ -112,7 +112,7 @@ struct Marginals {
   std::vector<double> theta;  ///< of every theta of the grid, summed over (x, y), [ntheta]
 };
 
-/// A pose between the bins, with its uncertainty.
+/// Where the posterior peaks near a mode, to a fraction of a bin, with its uncertainty.
 struct RefinedPose {
   Pose T_object_robot;
   /// Covariance of (x_mm, y_mm, theta_rad) of T_object_robot, row by row, in mm^2, mm rad and

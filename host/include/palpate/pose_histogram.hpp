@@ -94,8 +94,9 @@ class PALPATE_API PoseHistogram {
   /// @throws Error if the device fails
   Estimate estimate() const;
 
-  /// The pose between the bins near a mode, and its covariance. Reads of the mode only `object` and
-  /// `bin`, or `T_object_robot` where the mode has no bin.
+  /// The refined pose near a mode, and its covariance: where the posterior peaks, which is seldom
+  /// the centre of a bin. Reads of the mode only `object` and `bin`, or `T_object_robot` where the
+  /// mode has no bin.
   ///
   /// Fits a quadratic to the log-belief around its mean under weights belief^(1/n), n >= 8, and
   /// returns the quadratic's peak. The window holds the poses that move the object by at most 2.5
