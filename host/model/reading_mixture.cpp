@@ -8,20 +8,33 @@
 
 namespace palpate {
 
+namespace {
+
+/// Rows a power of two apart would share the few lines of a cache that have such addresses: what is
+/// written and read column by column would not stay in it.
+std::size_t padded(std::size_t hypotheses) {
+  constexpr std::size_t few_lines = 64;
+  const std::size_t lanes = (hypotheses + mixture_lanes - 1) / mixture_lanes * mixture_lanes;
+  return lanes % few_lines == 0 ? lanes + mixture_lanes : lanes;
+}
+
+}  // namespace
+
 ReadingMixture::ReadingMixture(std::size_t hypotheses, std::size_t elements, std::size_t levels)
     : hypotheses_(hypotheses),
-      stride_((hypotheses + mixture_lanes - 1) / mixture_lanes * mixture_lanes),
+      stride_(padded(hypotheses)),
       elements_(elements),
       levels_(levels),
       log_likelihood_(stride_ * elements * levels) {}
 
 double ReadingMixture::log_mean(std::span<const Reading> readings, std::size_t left_out) const {
-  std::vector<const double*> rows;
-  rows.reserve(elements_);
+  thread_local std::vector<const double*> rows;
+  thread_local std::vector<double> logs;
+  rows.clear();
   for (std::size_t e = 0; e < elements_; ++e) {
     rows.push_back(row(e, static_cast<std::size_t>(readings[e])));
   }
-  std::vector<double> logs(stride_);
+  logs.resize(stride_);
   sum_rows(rows, logs);
   constexpr double none = -std::numeric_limits<double>::infinity();
   std::fill(logs.begin() + static_cast<std::ptrdiff_t>(hypotheses_), logs.end(), none);

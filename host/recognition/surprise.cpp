@@ -54,9 +54,15 @@ std::optional<double> SurpriseJudge::surprise_of(const Touch& touch,
   std::vector<float> logs(readings.size() * predictor_.levels());
   for (std::size_t i = 0; i < samples.size(); ++i) {
     const auto object = static_cast<std::size_t>(samples[i].object);
-    const Pose slip = random_displacement(slip_sd_, random);
-    const Pose T_object_sensor = slipped(samples[i].T_object_robot, slip, centroids_mm_[object]) *
-                                 touch.T_robot_sensor * random_displacement(touch_sd_, random);
+    Pose T_object_sensor = samples[i].T_object_robot;
+    if (!slip_sd_.none()) {
+      T_object_sensor =
+          slipped(T_object_sensor, random_displacement(slip_sd_, random), centroids_mm_[object]);
+    }
+    T_object_sensor = T_object_sensor * touch.T_robot_sensor;
+    if (!touch_sd_.none()) {
+      T_object_sensor = T_object_sensor * random_displacement(touch_sd_, random);
+    }
     predictor_.predict(object, T_object_sensor, elements_mm, logs, 1);
     mixture.set(i, std::span<const float>(logs));
   }

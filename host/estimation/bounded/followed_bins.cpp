@@ -25,6 +25,7 @@ FollowedBins::FollowedBins(const EvaluatedBins& bins, const SearchResult& found,
   for (const LogSum& of : outside) {
     outside_.push_back(of.log());
   }
+  add_up();
 }
 
 void FollowedBins::add(const KnownElements& elements, const BinLikelihood& likelihood,
@@ -37,6 +38,7 @@ void FollowedBins::add(const KnownElements& elements, const BinLikelihood& likel
   for (std::size_t i = 0; i < outside_.size(); ++i) {
     outside_[i] += most[i];
   }
+  add_up();
 }
 
 double FollowedBins::share_outside() const {
@@ -47,14 +49,14 @@ double FollowedBins::share_outside() const {
   return std::exp(outside.log() - log_total());
 }
 
-double FollowedBins::log_total() const {
+void FollowedBins::add_up() {
   LogSum total;
   visit([&](const BinBox& box, std::span<const double> log_likelihood) {
     for (const double l : log_likelihood) {
       total.add(log_weight_[box.object] + l);
     }
   });
-  return total.log();
+  log_total_ = total.log();
 }
 
 void FollowedBins::visit(const BinVisitor& visit) const {

@@ -30,14 +30,17 @@ class FollowedBins {
   /// Bound of the mass of all other bins, relative to that of these.
   double share_outside() const;
   /// Log of the summed likelihood of the bins, with prior weights.
-  double log_total() const;
+  double log_total() const { return log_total_; }
   void visit(const BinVisitor& visit) const;
 
  private:
+  void add_up();
+
   std::vector<double> log_weight_;
   std::vector<BinBox> boxes_;
   std::vector<double> values_;   ///< log-likelihoods, [box][bin]
   std::vector<double> outside_;  ///< [hypothesis] log of the bound, with the prior weight
+  double log_total_ = 0.0;
 };
 
 }  // namespace palpate

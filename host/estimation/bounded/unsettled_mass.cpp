@@ -25,6 +25,13 @@ void for_slots(const Set& set, const Visit& visit) {
 
 }  // namespace
 
+UnsettledMass::UnsettledMass(std::size_t hypotheses, double largest, double slot_nats)
+    : largest_(largest), slot_nats_(slot_nats), bins_(hypotheses * slots), used_(hypotheses) {
+  for (std::size_t i = 0; i < decay_.size(); ++i) {
+    decay_[i] = std::exp(-static_cast<double>(i) * slot_nats);
+  }
+}
+
 std::size_t UnsettledMass::slot(double bound) const {
   // Rounded down, so that a bound never exceeds its slot's upper edge.
   const double below = (largest_ - bound) / slot_nats_;

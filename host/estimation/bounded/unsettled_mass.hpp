@@ -17,8 +17,7 @@ class UnsettledMass {
   /// @param largest of all bounds, in nats
   /// @param slot_nats width of a slot; all bounds that lie 4095 slots below the largest or deeper
   /// count as if they lay there
-  UnsettledMass(std::size_t hypotheses, double largest, double slot_nats = usual_slot_nats)
-      : largest_(largest), slot_nats_(slot_nats), bins_(hypotheses * slots), used_(hypotheses) {}
+  UnsettledMass(std::size_t hypotheses, double largest, double slot_nats = usual_slot_nats);
 
   /// Slots ascend as bounds fall; the last holds all that lie far below.
   std::size_t slot(double bound) const;
@@ -54,11 +53,13 @@ class UnsettledMass {
   std::size_t droppable_from(const SlotSet& used, const Bins& bins_in, double log_allowance) const;
   /// What a bin counts for, that many slots further up.
   double decay(std::size_t slots_up) const {
-    return std::exp(-static_cast<double>(slots_up) * slot_nats_);
+    return slots_up < decay_.size() ? decay_[slots_up]
+                                    : std::exp(-static_cast<double>(slots_up) * slot_nats_);
   }
 
   double largest_;
   double slot_nats_;
+  std::array<double, 32> decay_{};  ///< [slots up] of neighbours
   std::vector<std::int64_t> bins_;  ///< [hypothesis, slot]
   std::vector<SlotSet> used_;       ///< [hypothesis] slots to which bins were added
 };
