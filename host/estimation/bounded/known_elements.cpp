@@ -51,29 +51,12 @@ KnownElements all_but(Reading reading, const ArrayReadings& array) {
 
 }  // namespace
 
-ArrayReadings array_readings(const Touch& touch, const ContactModel& model,
-                             const glm::dvec2& pivot_mm) {
-  ArrayReadings array{.from_pivot_mm = {},
-                      .readings = model.classify(touch),
-                      .rectangle = array_rectangle(touch, pivot_mm)};
-  array.from_pivot_mm.reserve(array.readings.size());
-  for (std::size_t i = 0; i < array.readings.size(); ++i) {
-    array.from_pivot_mm.push_back(touch.T_robot_sensor * touch.elements_mm[i] - pivot_mm);
-  }
-  return array;
-}
-
 KnownElements known_elements(const ArrayReadings& array) {
   return all_but(Reading::unknown, array);
 }
 
 KnownElements changed_elements(const ArrayReadings& array) {
   return all_but(Reading::no_contact, array);
-}
-
-KnownElements gather_elements(const Touch& touch, const ContactModel& model,
-                              const glm::dvec2& pivot_mm) {
-  return known_elements(array_readings(touch, model, pivot_mm));
 }
 
 KnownElements merged(std::span<const KnownElements> lists) {

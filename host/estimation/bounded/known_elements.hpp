@@ -36,18 +36,10 @@ struct ArrayReadings {
   ArrayRectangle rectangle{};
 };
 
-/// Classifies the touch's elements (Eq. 3).
-/// @throws Error on a touch that is not sound
-ArrayReadings array_readings(const Touch& touch, const ContactModel& model,
-                             const glm::dvec2& pivot_mm);
-
 /// The elements that are not Unknown.
 KnownElements known_elements(const ArrayReadings& array);
 /// The elements that are not in No Contact, Unknown ones as one more reading.
 KnownElements changed_elements(const ArrayReadings& array);
-/// known_elements() of a touch. @throws Error on a touch that is not sound
-KnownElements gather_elements(const Touch& touch, const ContactModel& model,
-                              const glm::dvec2& pivot_mm);
 
 /// The elements of all.
 KnownElements merged(std::span<const KnownElements> lists);

@@ -94,7 +94,7 @@ TEST(EvaluatedBins, BeyondTheirMemoryAreSearchedForAgain) {
 
   ContactModel contact;
   contact.prior = objects.front().map.prior;
-  const KnownElements elements = gather_elements(touch, contact, {});
+  const KnownElements elements = known_elements(array_readings(touch, contact, {}));
   const BinLikelihood likelihood(objects, contact, options.lattice);
   const auto plane_bins = static_cast<std::size_t>(options.lattice.plane());
   std::vector<double> xy(plane_bins);

@@ -5,6 +5,7 @@
 
 #include <gtest/gtest.h>
 
+#include "bins_by_definition.hpp"
 #include "palpate/error.hpp"
 #include "synthetic.hpp"
 

@@ -10,6 +10,7 @@
 #include <tbb/global_control.h>
 #include <tbb/task_arena.h>
 
+#include "bins_by_definition.hpp"
 #include "hypotheses.hpp"
 #include "synthetic.hpp"
 
