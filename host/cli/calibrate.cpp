@@ -17,6 +17,7 @@
 #include "options.hpp"
 #include "palpate/files.hpp"
 #include "progress.hpp"
+#include "recognition_flags.hpp"
 #include "recordings.hpp"
 #include "sensor_calibration.hpp"
 #include "terminal.hpp"
@@ -36,6 +37,7 @@ struct Options {
   std::string layer = "auto";
   std::optional<int> levels;
   int max_maps = 5;
+  RecognitionFlags recognition;  ///< bins and region alone
   std::string frames;
   std::string png;
   std::string device;
@@ -72,6 +74,26 @@ void check_outputs(const Options& options, const std::vector<std::filesystem::pa
     require_writable(table);
     require_writable(reliability);
   }
+}
+
+/// The bins on which unknowns will be recognised; none where no flag gives them.
+std::optional<RecognitionBins> bins_of(const Options& options, bool known_poses) {
+  const RecognitionFlags& flags = options.recognition;
+  if (flags.bins == "auto" || flags.bins == "fine") {
+    refuse_flag("--bins", flags.bins, "give counts, as 25x25x16, or leave it out");
+  }
+  if (infers_region(flags, {})) {
+    return {};
+  }
+  if (!known_poses) {
+    throw Error(
+        Fault::input,
+        "--bins, --x-mm, --y-mm, --theta-deg and --pivot-mm are for touches at known poses; "
+        "leave them out: where the others lie is found on bins one element wide");
+  }
+  RecognitionBins bins{given_lattice(flags, {}), has_auto_pivot(flags, {})};
+  bins.lattice.validate();
+  return bins;
 }
 
 /// @param known_poses of the touches
@@ -116,6 +138,7 @@ SensorCalibrationOptions calibration_options(const Options& options, bool known_
     refuse_flag("--max-maps", options.max_maps, "give 1 or more");
   }
   result.most_maps = static_cast<std::size_t>(options.max_maps);
+  result.bins = bins_of(options, known_poses);
   return result;
 }
 
@@ -276,6 +299,21 @@ void add_calibrate(CLI::App& app) {
                    "about as many as you will recognize with. More take longer")
       ->check(require_whole_number)
       ->capture_default_str();
+  command->add_option(
+      "--bins", options->recognition.bins,
+      "Bins that recognize will be given, as 25x25x16, for touches at known poses: "
+      "what lies between two bins makes probabilities too sure unless it is learned, "
+      "too [default: half the elements' spacing and 5 degrees wide]");
+  command->add_option("--x-mm", options->recognition.x_mm,
+                      "Region of these bins, as recognize will be given it [default: -10:10 beside "
+                      "--bins]");
+  command->add_option("--y-mm", options->recognition.y_mm, "The same of y");
+  command->add_option("--theta-deg", options->recognition.theta_deg,
+                      "The same of theta, degrees [default: 0:360]");
+  command->add_option(
+      "--pivot-mm", options->recognition.pivot_mm,
+      "Pivot of these bins, as recognize will be given it: X,Y or auto [default: 0,0 "
+      "beside --bins]");
   command->add_option("--frames", options->frames,
                       "Use the touches A to B - 1 of every recording, counted from 0, as A:B");
   command->add_option("--png", options->png,

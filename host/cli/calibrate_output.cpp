@@ -43,6 +43,9 @@ std::string values_table(const SensorCalibration& calibration, std::optional<int
   }
   table.add({"levels of readings", "2", fmt::format("{}", sensor.table->levels())});
   add("temperature", "1", sensor.temperature);
+  if (calibration.groups) {
+    add("temperature of every further touch", "0", sensor.temperature_growth);
+  }
   if (sensor.features) {
     add("weight of area, force and peak", "0", sensor.features->weight);
   }
@@ -55,14 +58,13 @@ std::string values_table(const SensorCalibration& calibration, std::optional<int
 
 std::string percent(double share) { return fmt::format("{:.1f} %", 100.0 * share); }
 
-std::string scores_table(const SensorCalibration& calibration, std::optional<int> columns) {
-  TextTable table(
-      {{"cross-validation", false}, {"Eq. 7", true}, {"table", true}, {"table, tempered", true}});
+std::string scores_table(const std::string& title, const char* records, const Scores& before,
+                         const Scores& learned, const Scores& after, std::optional<int> columns) {
+  TextTable table({{title, false}, {"Eq. 7", true}, {"table", true}, {"table, tempered", true}});
   const auto add = [&](const char* name, auto text_of) {
-    table.add({name, text_of(*calibration.before), text_of(*calibration.table),
-               text_of(*calibration.after)});
+    table.add({name, text_of(before), text_of(learned), text_of(after)});
   };
-  add("touches", [](const Scores& s) { return fmt::format("{}", s.records); });
+  add(records, [](const Scores& s) { return fmt::format("{}", s.records); });
   add("accuracy", [](const Scores& s) { return percent(s.accuracy()); });
   add("95 % interval", [](const Scores& s) {
     const Interval interval = s.interval();
@@ -72,6 +74,16 @@ std::string scores_table(const SensorCalibration& calibration, std::optional<int
   add("calibration error",
       [](const Scores& s) { return fmt::format("{:.3f}", s.calibration_error); });
   return table.text(columns);
+}
+
+std::string scores_tables(const SensorCalibration& calibration, std::optional<int> columns) {
+  std::string text = scores_table("cross-validation", "touches", *calibration.before,
+                                  *calibration.table, *calibration.after, columns);
+  if (const auto& groups = calibration.groups) {
+    text += "\n" + scores_table(fmt::format("{} touches together", groups->touches), "unknowns",
+                                groups->before, groups->table, groups->after, columns);
+  }
+  return text;
 }
 
 std::string kind_name(const TableKind& kind) {
@@ -128,7 +140,7 @@ std::string calibration_text(const SensorCalibration& calibration, std::size_t t
                                  calibration.objects == 1 ? "object" : "objects");
   text += values_table(calibration, columns);
   if (calibration.before) {
-    text += "\n" + scores_table(calibration, columns);
+    text += "\n" + scores_tables(calibration, columns);
   }
   if (calibration.tried.size() > 1) {
     text += "tables tried, with their log-loss:";

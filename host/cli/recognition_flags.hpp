@@ -76,14 +76,19 @@ Device open_device(const RecognitionFlags& flags, const Scene& scene);
 /// and the touches' arrays (reach_mm).
 bool infers_region(const RecognitionFlags& flags, const Scene& scene);
 
+/// The bins that flags or the scene give where they do not infer the region; what they leave open
+/// is PoseLattice's. The pivot is (0, 0) where it is automatic. Throws Error.
+PoseLattice given_lattice(const RecognitionFlags& flags, const Scene& scene);
+bool has_auto_pivot(const RecognitionFlags& flags, const Scene& scene);
+
 /// Chooses what the task leaves open: the bins of --bins auto or fine, by the device's memory, and
-/// the filter of --filter auto. Returns the sentence that tells where a limit made bins wider than
-/// the maps resolve, or "". Throws Error.
-std::string settle_task(const RecognitionFlags& flags, const Scene& scene, const Device& device,
-                        RecognitionTask& task);
+/// the filter of --filter auto. Returns the sentences that tell where a limit made bins wider than
+/// the maps resolve, and where they are wider than the sensor model's. Throws Error.
+std::vector<std::string> settle_task(const RecognitionFlags& flags, const Scene& scene,
+                                     const Device& device, RecognitionTask& task);
 
 /// Makes the task's filter, after --bins auto or fine has chosen the bins and --filter auto the
-/// filter. Tells where a limit made bins wider than the maps resolve. Throws Error.
+/// filter. Tells the sentences of settle_task(). Throws Error.
 Recogniser open_recogniser(const RecognitionFlags& flags, const Scene& scene, Device& device,
                            RecognitionTask& task);
 

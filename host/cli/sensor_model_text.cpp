@@ -16,6 +16,11 @@ std::string table_text(const LearnedTable& table) {
 
 }  // namespace
 
+std::string steps_text(const BinSteps& steps) {
+  return fmt::format("{:.3g} x {:.3g} mm x {:.3g} deg", steps.x_mm, steps.y_mm,
+                     degrees(steps.theta_rad));
+}
+
 std::string sensor_model_text(const LearnedSensor& sensor) {
   const std::string unit = sensor.pressure_unit == "kPa" ? " kPa" : "";
   std::string text;
@@ -36,7 +41,13 @@ std::string sensor_model_text(const LearnedSensor& sensor) {
         fmt::format("{:.4g} mm, {:.4g} deg", sensor.touch_sd.mm, degrees(sensor.touch_sd.rad)));
   }
   add("likelihood", sensor.table ? "table of " + table_text(*sensor.table) : "Eq. 7");
-  add("temperature", fmt::format("{:.4g}", sensor.temperature));
+  add("temperature", sensor.temperature_growth > 0.0
+                         ? fmt::format("{:.4g}, and {:.4g} more for every further touch",
+                                       sensor.temperature, sensor.temperature_growth)
+                         : fmt::format("{:.4g}", sensor.temperature));
+  if (sensor.bins) {
+    add("learned on bins", steps_text(*sensor.bins));
+  }
   if (sensor.features) {
     add("press features", fmt::format("weight {:.4g}, of {} object(s)", sensor.features->weight,
                                       sensor.features->objects.size()));

@@ -174,17 +174,32 @@ WantedLattice automatic_lattice(const RecognitionFlags& flags, std::optional<Bin
 
 WantedLattice lattice_of(const RecognitionFlags& flags, const Scene& scene,
                          std::span<const Hypothesis> hypotheses, double reach_mm) {
-  const std::optional<std::array<int, 3>> counts = counts_of(flags, scene);
   const std::optional<BinWidth> bin_width = bin_width_of(flags, scene);
-  const bool pivot_flag = !flags.pivot_mm.empty();
-  const bool auto_pivot = pivot_flag ? flags.pivot_mm == "auto" : scene.region.auto_pivot;
-  const std::optional<glm::dvec2> pivot_mm =
-      auto_pivot   ? std::nullopt
-      : pivot_flag ? std::optional(parse_point("--pivot-mm", flags.pivot_mm))
-                   : scene.region.pivot_mm;
   if (infers_region(flags, scene)) {
     return automatic_lattice(flags, bin_width, hypotheses, reach_mm);
   }
+  return {given_lattice(flags, scene), bin_width, has_auto_pivot(flags, scene)};
+}
+
+}  // namespace
+
+void tell_on_stderr(const std::string& sentence) { fmt::print(stderr, "palpate: {}\n", sentence); }
+
+bool infers_region(const RecognitionFlags& flags, const Scene& scene) {
+  const bool has_range = !flags.x_mm.empty() || !flags.y_mm.empty() || !flags.theta_deg.empty() ||
+                         scene.region.x_mm || scene.region.y_mm || scene.region.theta_deg;
+  const bool has_pivot = flags.pivot_mm.empty() ? !scene.region.auto_pivot && scene.region.pivot_mm
+                                                : flags.pivot_mm != "auto";
+  const bool has_counts =
+      flags.bins.empty() ? scene.bins.has_value() : flags.bins != "auto" && flags.bins != "fine";
+  return !has_range && !has_pivot && !has_counts;
+}
+
+bool has_auto_pivot(const RecognitionFlags& flags, const Scene& scene) {
+  return flags.pivot_mm.empty() ? scene.region.auto_pivot : flags.pivot_mm == "auto";
+}
+
+PoseLattice given_lattice(const RecognitionFlags& flags, const Scene& scene) {
   PoseLattice lattice;
   const auto range = [](const char* flag, const std::string& text,
                         const std::optional<std::array<double, 2>>& key, Axis& axis, double unit) {
@@ -202,32 +217,23 @@ WantedLattice lattice_of(const RecognitionFlags& flags, const Scene& scene,
   range("--x-mm", flags.x_mm, scene.region.x_mm, lattice.x_mm, 1.0);
   range("--y-mm", flags.y_mm, scene.region.y_mm, lattice.y_mm, 1.0);
   range("--theta-deg", flags.theta_deg, scene.region.theta_deg, lattice.theta_rad, radians(1.0));
-  if (counts) {
+  if (const std::optional<std::array<int, 3>> counts = counts_of(flags, scene)) {
     lattice.x_mm.count = (*counts)[0];
     lattice.y_mm.count = (*counts)[1];
     lattice.theta_rad.count = (*counts)[2];
   }
-  lattice.pivot_mm = pivot_mm.value_or(lattice.pivot_mm);
+  if (!has_auto_pivot(flags, scene)) {
+    const std::optional<glm::dvec2> pivot_mm =
+        flags.pivot_mm.empty() ? scene.region.pivot_mm
+                               : std::optional(parse_point("--pivot-mm", flags.pivot_mm));
+    lattice.pivot_mm = pivot_mm.value_or(lattice.pivot_mm);
+  }
   if (!(std::abs(lattice.pivot_mm.x) <= farthest_mm &&
         std::abs(lattice.pivot_mm.y) <= farthest_mm)) {
     refuse_flag("--pivot-mm", fmt::format("{},{}", lattice.pivot_mm.x, lattice.pivot_mm.y),
                 "give numbers within +-{:g}", farthest_mm);
   }
-  return {lattice.collapse_fixed(), bin_width, auto_pivot};
-}
-
-}  // namespace
-
-void tell_on_stderr(const std::string& sentence) { fmt::print(stderr, "palpate: {}\n", sentence); }
-
-bool infers_region(const RecognitionFlags& flags, const Scene& scene) {
-  const bool has_range = !flags.x_mm.empty() || !flags.y_mm.empty() || !flags.theta_deg.empty() ||
-                         scene.region.x_mm || scene.region.y_mm || scene.region.theta_deg;
-  const bool has_pivot = flags.pivot_mm.empty() ? !scene.region.auto_pivot && scene.region.pivot_mm
-                                                : flags.pivot_mm != "auto";
-  const bool has_counts =
-      flags.bins.empty() ? scene.bins.has_value() : flags.bins != "auto" && flags.bins != "fine";
-  return !has_range && !has_pivot && !has_counts;
+  return lattice.collapse_fixed();
 }
 
 Scene scene_of(const RecognitionFlags& flags) {
@@ -279,6 +285,8 @@ RecognitionTask task_of(const RecognitionFlags& flags, const Scene& scene,
   task.map_paths = paths_of(objects, task.hypotheses);
   if (sensor) {
     task.temperature = sensor->temperature;
+    task.temperature_growth = sensor->temperature_growth;
+    task.learned_bins = sensor->bins;
     task.features = sensor->features;
     task.familiarity = sensor->familiarity;
     task.fit_scale = sensor->fit_scale.value_or(FitScale{});
@@ -298,28 +306,32 @@ Device open_device(const RecognitionFlags& flags, const Scene& scene) {
   return Device::open(device_of(flags, scene));
 }
 
-std::string settle_task(const RecognitionFlags& flags, const Scene& scene, const Device& device,
-                        RecognitionTask& task) {
+std::vector<std::string> settle_task(const RecognitionFlags& flags, const Scene& scene,
+                                     const Device& device, RecognitionTask& task) {
   const bool fine = task.bin_width == BinWidth::fine;
   const std::optional<CoarsenedBins> bins = settle_bins(device, task);
   settle_filter(task);
   settle_evidence(task);
   require_within_region(flags.uncertainty, scene, flags.scene, task.lattice());
-  return bins ? fmt::format(
-                    "--bins {}: steps of {:.2f} mm, wider than the maps resolve, keep to {} bins "
+  std::vector<std::string> sentences;
+  if (bins) {
+    sentences.push_back(
+        fmt::format("--bins {}: steps of {:.2f} mm, wider than the maps resolve, keep to {} bins "
                     "in all; narrow the region, or give --bins",
-                    fine ? "fine" : "auto", bins->step_mm, bins->most_bins)
-              : "";
+                    fine ? "fine" : "auto", bins->step_mm, bins->most_bins));
+  }
+  if (const std::string wider = wider_bins_sentence(task); !wider.empty()) {
+    sentences.push_back(wider);
+  }
+  return sentences;
 }
 
 Recogniser open_recogniser(const RecognitionFlags& flags, const Scene& scene, Device& device,
                            RecognitionTask& task) {
-  const std::string coarsened = settle_task(flags, scene, device, task);
+  const std::vector<std::string> sentences = settle_task(flags, scene, device, task);
   Recogniser recogniser =
       open_filter(device, task);  // first: bins that do not fit deserve only their refusal
-  if (!coarsened.empty()) {
-    flags.tell(coarsened);
-  }
+  std::ranges::for_each(sentences, flags.tell);
   return recogniser;
 }
 

@@ -135,6 +135,14 @@ DisplacementSd read_sd(const Entry& entry) {
   return sd;
 }
 
+BinSteps read_steps(const Entry& entry) {
+  BinSteps steps;
+  read_keys(entry, {{"x_mm", [&](const Entry& e) { steps.x_mm = e.number(); }},
+                    {"y_mm", [&](const Entry& e) { steps.y_mm = e.number(); }},
+                    {"theta_rad", [&](const Entry& e) { steps.theta_rad = e.number(); }}});
+  return steps;
+}
+
 void emit(YAML::Emitter& out, const std::vector<double>& numbers) {
   out << YAML::Flow << YAML::BeginSeq;
   for (const double number : numbers) {
@@ -241,6 +249,8 @@ LearnedSensor read_sensor_model(const std::filesystem::path& path) {
                {"spread_mm", number(sensor.spread_mm)},
                {"touch_sd", [&](const Entry& e) { sensor.touch_sd = read_sd(e); }},
                {"temperature", number(sensor.temperature)},
+               {"temperature_growth", number(sensor.temperature_growth)},
+               {"bins", [&](const Entry& e) { sensor.bins = read_steps(e); }},
                {"table", [&](const Entry& e) { sensor.table = read_table(e); }},
                {"features", [&](const Entry& e) { sensor.features = read_learned_features(e); }},
                {"familiarity", [&](const Entry& e) { sensor.familiarity = read_familiarity(e); }},
@@ -288,6 +298,16 @@ void write_sensor_model(const std::filesystem::path& path, const LearnedSensor& 
     out << YAML::EndMap;
   }
   number("temperature", sensor.temperature);
+  if (sensor.temperature_growth > 0.0) {
+    number("temperature_growth", sensor.temperature_growth);
+  }
+  if (sensor.bins) {
+    key("bins") << YAML::Flow << YAML::BeginMap;
+    number("x_mm", sensor.bins->x_mm);
+    number("y_mm", sensor.bins->y_mm);
+    number("theta_rad", sensor.bins->theta_rad);
+    out << YAML::EndMap;
+  }
   if (sensor.familiarity) {
     key("familiarity") << YAML::Flow << YAML::BeginMap;
     number("offset", sensor.familiarity->offset);

@@ -94,14 +94,48 @@ class Validation {
       return;
     }
     const std::optional<LearnedTable> table = table_without(fold);
-    const auto scores = score(tried, of_label, table, counter);
+    const std::vector<Press> asked = unknowns(tried, fold);
+    const auto scores = score(asked, of_label, table, counter);
     const LearnedFeatures features = learn_features(building);
-    for (std::size_t i = 0; i < tried.size(); ++i) {
-      add(presses_[tried[i]], scores[i], features, table, result);
+    for (std::size_t i = 0; i < asked.size(); ++i) {
+      ScoredPress scored = scored_press(asked[i], scores[i], features);
+      if (i < tried.size()) {
+        add_known(asked[i], scores[i], scored, table, result);
+        result.presses.push_back(std::move(scored));
+      } else {
+        result.groups.push_back(std::move(scored));
+      }
     }
   }
 
  private:
+  /// What is to be recognised of a fold: its presses, and then groups of them.
+  std::vector<Press> unknowns(const std::vector<std::size_t>& tried, std::size_t fold) const {
+    std::vector<Press> asked;
+    std::map<std::string, std::vector<const Press*>> of_label;
+    for (const std::size_t press : tried) {
+      asked.push_back(presses_[press]);
+      of_label[presses_[press].label].push_back(&presses_[press]);
+    }
+    if (!options_.bins) {
+      return asked;
+    }
+    Random random(fold, Stream::unknowns);
+    for (auto& [label, own] : of_label) {
+      for (std::size_t i = own.size(); i > 1; --i) {
+        const auto place = static_cast<std::size_t>(random.uniform() * static_cast<double>(i));
+        std::swap(own[i - 1], own[place]);
+      }
+      for (std::size_t i = 0; i + presses_in_group <= own.size(); i += presses_in_group) {
+        asked.push_back(together(std::span(own).subspan(i, presses_in_group)));
+      }
+    }
+    for (Press& press : asked) {
+      press = as_unknown(press, *options_.bins, random);
+    }
+    return asked;
+  }
+
   /// The press's label by index; none where no map bears it.
   std::optional<std::size_t> label_of(const Press& press) const {
     const auto at = std::ranges::lower_bound(labels_, press.label);
@@ -144,11 +178,11 @@ class Validation {
   }
 
   /// The scores of presses, [press][label].
-  std::vector<std::vector<LabelScore>> score(const std::vector<std::size_t>& tried,
+  std::vector<std::vector<LabelScore>> score(const std::vector<Press>& asked,
                                              const std::vector<std::vector<std::size_t>>& of_label,
                                              const std::optional<LearnedTable>& table,
                                              HostProgress& counter) const {
-    std::vector<std::vector<LabelScore>> scores(tried.size(),
+    std::vector<std::vector<LabelScore>> scores(asked.size(),
                                                 std::vector<LabelScore>(labels_.size()));
     tbb::parallel_for(std::size_t{0}, labels_.size(), [&](std::size_t label) {
       const ContactModel contact = contact_for(label, table);
@@ -157,9 +191,10 @@ class Validation {
         if (table) {
           hypothesis.layer = layers_[map];
         }
-        PressPlacer placer(hypothesis, contact, how_.lattice);
-        for (std::size_t i = 0; i < tried.size(); ++i) {
-          scores[i][label].add(map, placer.place(presses_[tried[i]]));
+        PressPlacer placer(hypothesis, contact,
+                           options_.bins ? options_.bins->lattice : how_.lattice);
+        for (std::size_t i = 0; i < asked.size(); ++i) {
+          scores[i][label].add(map, placer.place(asked[i]));
         }
       }
       counter.add();
@@ -167,47 +202,63 @@ class Validation {
     return scores;
   }
 
-  void add(const Press& press, const std::vector<LabelScore>& scores,
-           const LearnedFeatures& features, const std::optional<LearnedTable>& table,
-           CrossValidation& result) const {
-    const PressFeatures own = features_of(press, how_.contact.classifier);
-    ScoredPress scored{.truth = *label_of(press), .log_evidence = {}, .log_density = {}};
+  ScoredPress scored_press(const Press& press, const std::vector<LabelScore>& scores,
+                           const LearnedFeatures& features) const {
+    ScoredPress scored{.truth = *label_of(press),
+                       .touches = press.touches.size(),
+                       .log_evidence = {},
+                       .log_density = {}};
+    for (const LabelScore& score : scores) {
+      scored.log_evidence.push_back(score.log_evidence());
+    }
+    // A touch at a known pose shows a part of an object: its features tell where that is.
+    if (!press.T_object_robot) {
+      const PressFeatures own = features_of(press, how_.contact.classifier);
+      for (const std::string& label : labels_) {
+        const auto known = features.objects.find(label);
+        scored.log_density.push_back(
+            (known == features.objects.end() ? features.any : known->second).log_density(own));
+      }
+    }
+    return scored;
+  }
+
+  /// Adds how a press fits the best object, and the best that is not its own.
+  void add_known(const Press& press, const std::vector<LabelScore>& scores,
+                 const ScoredPress& scored, const std::optional<LearnedTable>& table,
+                 CrossValidation& result) const {
     std::vector<double> of_others;
     std::size_t best_label = 0;
     double best = nothing;
     double best_other = nothing;
     for (std::size_t label = 0; label < labels_.size(); ++label) {
-      scored.log_evidence.push_back(scores[label].log_evidence());
-      const auto known = features.objects.find(labels_[label]);
-      scored.log_density.push_back(
-          (known == features.objects.end() ? features.any : known->second).log_density(own));
       if (scores[label].best_log_likelihood > best) {
         best = scores[label].best_log_likelihood;
         best_label = label;
       }
       if (label != scored.truth) {
-        of_others.push_back(scored.log_evidence.back());
+        of_others.push_back(scored.log_evidence[label]);
         best_other = std::max(best_other, scores[label].best_log_likelihood);
       }
     }
     // A press of which nothing is In Contact says nothing of its object.
     const std::vector<Reading> readings = classifier_.classify(press.touches.front());
-    if (std::ranges::any_of(readings, is_contact)) {
-      // With two labels, leaving one out leaves no lead to compare with.
-      const std::span<const double> known(scored.log_evidence);
-      const bool leads = labels_.size() > 2;
-      result.known.push_back(FamiliarityScore::of(readings, best, leads ? known : known.first(1)));
-      if (best_other != nothing) {
-        result.unknown.push_back(FamiliarityScore::of(readings, best_other, of_others));
-      }
-      const LabelScore& at = scores[best_label];
-      const OccupancyGrid& map = table ? layers_[at.best_map] : maps_[at.best_map].map;
-      if (const auto fit =
-              best_fit_near(press.touches, at.best_pose, map, contact_for(best_label, table), 0)) {
-        result.fit_z.push_back(fit->z);
-      }
+    if (std::ranges::none_of(readings, is_contact)) {
+      return;
     }
-    result.presses.push_back(std::move(scored));
+    // With two labels, leaving one out leaves no lead to compare with.
+    const std::span<const double> known(scored.log_evidence);
+    const bool leads = labels_.size() > 2;
+    result.known.push_back(FamiliarityScore::of(readings, best, leads ? known : known.first(1)));
+    if (best_other != nothing) {
+      result.unknown.push_back(FamiliarityScore::of(readings, best_other, of_others));
+    }
+    const LabelScore& at = scores[best_label];
+    const OccupancyGrid& map = table ? layers_[at.best_map] : maps_[at.best_map].map;
+    if (const auto fit =
+            best_fit_near(press.touches, at.best_pose, map, contact_for(best_label, table), 0)) {
+      result.fit_z.push_back(fit->z);
+    }
   }
 
   const std::vector<Press>& presses_;

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "drawn_poses.hpp"
 #include "familiarity_fit.hpp"
 #include "table_learning.hpp"
 #include "temperature_fit.hpp"
@@ -15,18 +16,27 @@ namespace palpate {
 struct CrossValidationOptions {
   std::size_t folds = 5;             ///< at least 2
   std::size_t maps_per_object = 20;  ///< most maps of an object that a press is placed on
+  /// For presses at known poses: they are looked for as_unknown() on these bins; none: all presses
+  /// are as they are, on TableLearning::lattice.
+  std::optional<RecognitionBins> bins = {};
 };
 
 /// What models that had not seen the presses said of them.
 struct CrossValidation {
   std::vector<std::string> labels;   ///< of all maps, ascending
   std::vector<ScoredPress> presses;  ///< those that have a map of their object in the other folds
+  /// Several presses at known poses of one object and fold together, each press once at most; none
+  /// where a fold has fewer of each object, or without CrossValidationOptions::bins.
+  std::vector<ScoredPress> groups;
   /// See FamiliarityScores: with the maps of all objects, and without those of the press's own.
   std::vector<FamiliarityScore> known;
   std::vector<FamiliarityScore> unknown;
   /// Fit::z of presses with an element In Contact, on the best map at about the best pose.
   std::vector<double> fit_z;
 };
+
+/// Presses in one of CrossValidation::groups.
+inline constexpr std::size_t presses_in_group = 3;
 
 /// Recognises every press, at an unknown pose, with maps and numbers of the presses of other folds
 /// alone, see folds_of(). The log evidence of a label is the log of the mean over its maps; an

@@ -29,7 +29,7 @@ double value_of_level(double level, const ReadingLayer& layer) {
 
 LevelCounts::LevelCounts(std::size_t levels) : counts_(levels * nodes, 0.0) {}
 
-void LevelCounts::add(Reading reading, double value) {
+void LevelCounts::add(Reading reading, double value, double weight) {
   if (reading == Reading::unknown) {
     return;
   }
@@ -38,19 +38,19 @@ void LevelCounts::add(Reading reading, double value) {
   const int node = std::min(static_cast<int>(place), nodes - 2);
   const double share = place - node;
   const std::size_t at = static_cast<std::size_t>(reading) * nodes + static_cast<std::size_t>(node);
-  counts_.at(at) += 1.0 - share;
-  counts_.at(at + 1) += share;
+  counts_.at(at) += (1.0 - share) * weight;
+  counts_.at(at + 1) += share * weight;
 }
 
 void LevelCounts::add(std::span<const Touch> touches, const Pose& T_object_robot,
-                      const OccupancyGrid& layer, const ContactModel& classifier) {
+                      const OccupancyGrid& layer, const ContactModel& classifier, double weight) {
   const InterpolatedMap values(layer, layer.prior);
   for (const Touch& touch : touches) {
     const Pose T_object_sensor = T_object_robot * touch.T_robot_sensor;
     const std::vector<Reading> readings = classifier.classify(touch);
     for (std::size_t e = 0; e < readings.size(); ++e) {
       if (readings[e] != Reading::unknown) {
-        add(readings[e], values.log_odds(T_object_sensor * touch.elements_mm[e]));
+        add(readings[e], values.log_odds(T_object_sensor * touch.elements_mm[e]), weight);
       }
     }
   }

@@ -26,11 +26,12 @@ class LevelCounts {
 
   /// Counts one reading; Unknown changes nothing.
   /// @param value of the layer at the reading's place
-  void add(Reading reading, double value);
+  /// @param weight by which the reading counts, above 0
+  void add(Reading reading, double value, double weight = 1.0);
   /// Counts every element of touches of an object that is at a pose.
   /// @param classifier with the table's levels, see ContactModel::classify()
   void add(std::span<const Touch> touches, const Pose& T_object_robot, const OccupancyGrid& layer,
-           const ContactModel& classifier);
+           const ContactModel& classifier, double weight = 1.0);
   LevelCounts& operator+=(const LevelCounts& other);
 
   std::size_t levels() const { return counts_.size() / ReadingLayer::nodes; }

@@ -10,6 +10,7 @@
 
 #include <fmt/format.h>
 
+#include "bounding_box.hpp"
 #include "contact_learning.hpp"
 #include "cross_validation.hpp"
 #include "element_spacing.hpp"
@@ -24,14 +25,15 @@ namespace {
 
 /// How long learning a table takes, in cross-validations.
 constexpr double table_cost = 4.0 / 3.0;
-constexpr double step_rad = std::numbers::pi / 18.0;  ///< of the poses at which presses are placed
+constexpr double step_rad = std::numbers::pi / 18.0;  ///< of poses at which presses are placed
 /// Readings times maps times bins of a cross-validation: some 15 s of one core.
 constexpr double most_additions = 2.5e10;
 /// What a press costs at a bin besides its readings, in readings.
 constexpr double readings_per_press = 16.0;
-/// How much finer the poses of touches at known poses are compared: half an element's spacing. Even
-/// finer ones change a temperature by a sixth.
-constexpr double most_finer = 2.0;
+/// The same where the bins are given: a million of them are worth a minute.
+constexpr double most_additions_at_bins = 1e11;
+/// A touch at a known pose is recognised alone, and together with others.
+constexpr double times_recognised = 2.0;
 
 /// A calibration in the making.
 class SensorLearning {
@@ -66,6 +68,9 @@ class SensorLearning {
                         const std::function<void(double)>& progress) {
     learn_readings();
     make_maps(given);
+    if (known_poses_) {
+      result_.sensor.bins = steps();
+    }
     std::set<std::string> labels;
     for (const TrainingMap& map : maps_) {
       labels.insert(map.map.label);
@@ -100,13 +105,12 @@ class SensorLearning {
                            .validation = {},
                            .after = {},
                            .losses = {}};
-      one.validation = cross_validate(presses_, maps_, how, &one.placed, folds(), part(1.0));
-      const std::vector<ScoredPress> tempered = tempered_by_halves(one.validation.presses);
-      one.after = scores_of(tempered, 1.0);
-      for (const ScoredPress& press : tempered) {
+      one.validation = cross_validate(presses_, maps_, how, &one.placed, validation(), part(1.0));
+      one.after = tempered_by_halves(one.validation.presses, one.validation.groups);
+      for (const ScoredPress& press : one.after.presses) {
         one.losses.push_back(-press.log_evidence[press.truth]);
       }
-      result_.tried.push_back({kind, one.after.log_loss});
+      result_.tried.push_back({kind, scores_of(one.after.presses, 1.0).log_loss});
       if (!best || is_clearly_less(one.losses, best->losses)) {
         best = std::move(one);
       }
@@ -114,7 +118,7 @@ class SensorLearning {
     result_.sensor.table = best->placed.table;
     learn_gamma(best->placed, best->how);
     const CrossValidation eq7 =
-        cross_validate(presses_, maps_, best->how, nullptr, folds(), part(1.0));
+        cross_validate(presses_, maps_, best->how, nullptr, validation(), part(1.0));
     learn_confidence(eq7, *best);
     return std::move(result_);
   }
@@ -125,12 +129,26 @@ class SensorLearning {
     TableLearning how;
     PlacedPresses placed;
     CrossValidation validation;
-    Scores after;                ///< with temperature and features
+    TemperedPresses after;       ///< with temperature and features
     std::vector<double> losses;  ///< the same, of each press, in nats
   };
 
-  CrossValidationOptions folds() const {
-    return {.folds = options_.folds, .maps_per_object = options_.most_maps};
+  CrossValidationOptions validation() const {
+    CrossValidationOptions how{.folds = options_.folds, .maps_per_object = options_.most_maps};
+    if (known_poses_) {
+      how.bins = {affordable(recognition_bins().lattice), recognition_bins().auto_pivot};
+    }
+    return how;
+  }
+
+  /// The bins on which unknowns are recognised; for touches at known poses.
+  RecognitionBins recognition_bins() const {
+    return options_.bins.value_or(RecognitionBins{fine_lattice()});
+  }
+
+  BinSteps steps() const {
+    const PoseLattice bins = recognition_bins().lattice;
+    return {bins.x_mm.step(), bins.y_mm.step(), bins.theta_rad.step()};
   }
 
   void learn_readings() {
@@ -230,31 +248,63 @@ class SensorLearning {
     how.contact = {.classifier = result_.sensor.classifier,
                    .gamma = ContactModel{}.gamma,
                    .prior = result_.sensor.prior};
-    how.lattice = compared_lattice();
+    if (known_poses_) {
+      how.counted_within = steps();
+    } else {
+      how.lattice = placing_lattice(maps_, spacing_mm_, step_rad);
+    }
     return how;
   }
 
-  /// The poses at which touches are compared with maps. Touches at known poses show a small part of
-  /// an object, and between bins an element apart a table looks less sure than it is.
-  PoseLattice compared_lattice() const {
-    const PoseLattice wide = placing_lattice(maps_, spacing_mm_, step_rad);
-    if (!known_poses_) {
-      return wide;
+  /// Bins half an element's spacing wide, over the places of the arrays' centres.
+  PoseLattice fine_lattice() const {
+    constexpr double finer = 2.0;
+    BoundingBox touched;
+    for (const Press& press : presses_) {
+      touched.take_in(press.T_object_robot->translation_mm);
     }
+    const double step_mm = spacing_mm_ / finer;
+    const auto axis = [&](double lower, double upper) {
+      const double bins = std::ceil((upper - lower) / step_mm) + 2.0;  // one more at either end
+      const double half_mm = bins * step_mm / 2.0;
+      const double middle_mm = (lower + upper) / 2.0;
+      return Axis{middle_mm - half_mm, middle_mm + half_mm, static_cast<int>(bins)};
+    };
+    constexpr double circle_rad = 2.0 * std::numbers::pi;
+    return {.x_mm = axis(touched.lower.x, touched.upper.x),
+            .y_mm = axis(touched.lower.y, touched.upper.y),
+            .theta_rad = {0.0, circle_rad,
+                          static_cast<int>(std::lround(finer * circle_rad / step_rad))}};
+  }
+
+  /// The lattice, or as fine a one of its region as touches can be recognised on in a short time;
+  /// not coarser than presses at unknown poses are placed.
+  PoseLattice affordable(PoseLattice lattice) const {
     std::set<std::string> labels;
     for (const TrainingMap& map : maps_) {
       labels.insert(map.map.label);
     }
-    double readings = readings_per_press * static_cast<double>(presses_.size());
+    double readings = 0.0;
     for (const Press& press : presses_) {
+      readings += readings_per_press;
       for (const Touch& touch : press.touches) {
         const std::vector<Reading> of = result_.sensor.classifier.classify(touch);
-        readings += static_cast<double>(of.size() - std::ranges::count(of, Reading::no_contact));
+        readings += 2.0 * static_cast<double>(of.size());
+        readings -= static_cast<double>(std::ranges::count(of, Reading::no_contact));
       }
     }
-    const double bins = most_additions / (readings * static_cast<double>(labels.size()));
-    const double finer = std::min(std::cbrt(bins / static_cast<double>(wide.bins())), most_finer);
-    return finer > 1.0 ? placing_lattice(maps_, spacing_mm_ / finer, step_rad / finer) : wide;
+    const double most = options_.bins ? most_additions_at_bins : most_additions;
+    const double bins = most / (times_recognised * readings * static_cast<double>(labels.size()));
+    const double wider = std::cbrt(static_cast<double>(lattice.bins()) / bins);
+    const auto widen = [&](Axis& axis, double widest) {
+      const double fewest = std::ceil((axis.upper - axis.lower) / widest);
+      axis.count =
+          std::min(axis.count, static_cast<int>(std::max({1.0, fewest, axis.count / wider})));
+    };
+    widen(lattice.x_mm, spacing_mm_);
+    widen(lattice.y_mm, spacing_mm_);
+    widen(lattice.theta_rad, step_rad);
+    return lattice;
   }
 
   /// Counts the placed presses over log odds.
@@ -262,6 +312,7 @@ class SensorLearning {
     TableLearning how = table;
     how.layer = {.near_mm = table.layer.near_mm, .far_mm = table.layer.far_mm};
     how.level_edges.clear();
+    how.counted_within = {};  // gamma is of the sensor, whatever the bins
     LevelCounts all(2);
     for (const auto& [label, counts] :
          count_placed(placed.placements, presses_, maps_, layers_of(maps_, how.layer), how)) {
@@ -274,10 +325,16 @@ class SensorLearning {
     const CrossValidation& learned = table.validation;
     result_.before = scores_of(eq7.presses, 1.0);
     result_.table = scores_of(learned.presses, 1.0);
-    result_.after = table.after;
+    result_.after = scores_of(table.after.presses, 1.0);
+    if (!learned.groups.empty()) {
+      result_.groups = GroupScores{.touches = presses_in_group,
+                                   .before = scores_of(eq7.groups, 1.0),
+                                   .table = scores_of(learned.groups, 1.0),
+                                   .after = scores_of(table.after.groups, 1.0)};
+    }
     // What few presses could show by chance is no warning.
     constexpr double worse_nats = 0.05;
-    const double without = scores_of(tempered_by_halves(eq7.presses), 1.0).log_loss;
+    const double without = scores_of(tempered_by_halves(eq7.presses).presses, 1.0).log_loss;
     if (result_.after->log_loss > without + worse_nats) {
       result_.warnings.push_back(fmt::format(
           "on touches that it has not seen, the learned table has a log-loss of {:.3f}, worse than "
@@ -285,15 +342,18 @@ class SensorLearning {
           "without the sensor model",
           result_.after->log_loss, without));
     }
-    const TemperatureFit fit = fit_temperature(learned.presses);
+    const TemperatureFit fit = fit_temperature(learned.presses, learned.groups);
     result_.sensor.temperature = fit.temperature;
-    std::vector<LabelledFeatures> features;
-    for (const Press& press : presses_) {
-      features.push_back(
-          {press.label, press_features(press.touches.front(), result_.sensor.classifier)});
+    result_.sensor.temperature_growth = fit.growth;
+    if (!known_poses_) {
+      std::vector<LabelledFeatures> features;
+      for (const Press& press : presses_) {
+        features.push_back(
+            {press.label, press_features(press.touches.front(), result_.sensor.classifier)});
+      }
+      result_.sensor.features = learn_features(features);
+      result_.sensor.features->weight = fit.feature_weight;
     }
-    result_.sensor.features = learn_features(features);
-    result_.sensor.features->weight = fit.feature_weight;
     learn_fit_scale(learned.fit_z);
     if (learned.known.empty() || learned.unknown.empty()) {
       return;

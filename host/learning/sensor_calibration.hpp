@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "drawn_poses.hpp"
 #include "palpate/learned_sensor.hpp"
 #include "palpate/occupancy_grid.hpp"
 #include "press.hpp"
@@ -32,6 +33,9 @@ struct SensorCalibrationOptions {
   std::vector<TableKind> tables = {};
   std::size_t folds = 5;      ///< of the cross-validation
   std::size_t most_maps = 5;  ///< of an object, in the cross-validation
+  /// Bins on which unknowns will be recognised, for touches at known poses; none stands for bins
+  /// half the elements' spacing and 5 degrees wide, about the array's centre.
+  std::optional<RecognitionBins> bins = {};
 };
 
 /// Touches at known poses: seven levels over the mean pressure, which also tells where between the
@@ -45,6 +49,14 @@ struct TriedTable {
   double log_loss = 0.0;
 };
 
+/// The same touches, several of one object at a time.
+struct GroupScores {
+  std::size_t touches = 0;  ///< of a group
+  Scores before;            ///< as SensorCalibration has them of single touches
+  Scores table;
+  Scores after;
+};
+
 /// A learned sensor and how good it is on presses that it has not seen.
 struct SensorCalibration {
   LearnedSensor sensor;
@@ -53,9 +65,10 @@ struct SensorCalibration {
   std::size_t objects = 0;
   std::vector<TriedTable> tried;  ///< in the options' order; none with one object
   /// Of the cross-validation; none with one object.
-  std::optional<Scores> before;  ///< Eq. 7 with gamma 0.1, temperature 1
-  std::optional<Scores> table;   ///< the table, temperature 1
-  std::optional<Scores> after;   ///< the table, temperature and features
+  std::optional<Scores> before;       ///< Eq. 7 with gamma 0.1, temperature 1
+  std::optional<Scores> table;        ///< the table, temperature 1
+  std::optional<Scores> after;        ///< the table, temperature and features
+  std::optional<GroupScores> groups;  ///< none for presses at unknown poses, or few touches
   /// Area under the curve of presses whose object is known against those whose object is left out;
   /// none with one object.
   std::optional<double> area_under_curve;
@@ -63,10 +76,12 @@ struct SensorCalibration {
 };
 
 /// Learns from presses the contact threshold and ratio, the noise floor, gamma, the prior, the
-/// table, the temperature, the features' distributions with their weight, and the familiarity; from
-/// presses at known poses the point spread, too. Of several tables it keeps the first,
-/// unless a later one has less log-loss in the cross-validation by more than two standard errors.
-/// What one object cannot tell (temperature, weight, familiarity) keeps its default, with a
+/// table, the temperature and the familiarity. From presses at known poses also the point spread,
+/// and how the temperature grows with their number; what they read is counted, and they are
+/// recognised, as far between the bins as unknowns are. From presses at unknown poses, which show
+/// much of an object, the features' distributions with their weight. Of several tables it keeps the
+/// first, unless a later one has less log-loss in the cross-validation by more than two standard
+/// errors. What one object cannot tell (temperature, weight, familiarity) keeps its default, with a
 /// warning. The numbers before and after are of cross-validation; `after` gives each half of the
 /// presses the temperature and weight of the other half. Takes all host threads.
 ///

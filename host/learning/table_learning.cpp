@@ -1,11 +1,13 @@
 #include "table_learning.hpp"
 
 #include <algorithm>
+#include <array>
 #include <optional>
 
 #include <fmt/format.h>
 #include <tbb/parallel_for.h>
 
+#include "bounding_box.hpp"
 #include "host_progress.hpp"
 #include "palpate/error.hpp"
 
@@ -73,6 +75,44 @@ std::vector<OwnPlacement> place_all(const std::vector<Press>& presses,
     placements.insert(placements.end(), own.begin(), own.end());
   }
   return placements;
+}
+
+/// The middle of the places of an object's arrays, by label.
+std::map<std::string, glm::dvec2> middles_of(const std::vector<Press>& presses) {
+  std::map<std::string, BoundingBox> boxes;
+  for (const Press& press : presses) {
+    if (press.T_object_robot) {
+      boxes[press.label].take_in(press.T_object_robot->translation_mm);
+    }
+  }
+  std::map<std::string, glm::dvec2> middles;
+  for (const auto& [label, box] : boxes) {
+    middles[label] = box.middle();
+  }
+  return middles;
+}
+
+/// Where a press at a known pose is counted: turned about a point and moved as far as a bin may be
+/// that is the nearest to the object's pose.
+std::vector<Pose> counted_at(const Pose& T_object_robot, const glm::dvec2& middle_mm,
+                             const BinSteps& steps) {
+  constexpr std::array<double, 3> thirds{-1.0 / 3.0, 0.0, 1.0 / 3.0};  // of a step
+  if (steps.x_mm == 0.0 && steps.y_mm == 0.0 && steps.theta_rad == 0.0) {
+    return {T_object_robot};
+  }
+  const glm::dvec2 from_middle_mm = T_object_robot.translation_mm - middle_mm;
+  std::vector<Pose> poses;
+  for (const double turn : thirds) {
+    const double turn_rad = turn * steps.theta_rad;
+    const glm::dvec2 turned_mm = middle_mm + rotate(turn_rad, from_middle_mm);
+    for (const double x : thirds) {
+      for (const double y : thirds) {
+        poses.push_back({turned_mm + glm::dvec2(x * steps.x_mm, y * steps.y_mm),
+                         T_object_robot.theta_rad + turn_rad});
+      }
+    }
+  }
+  return poses;
 }
 
 }  // namespace
@@ -163,6 +203,7 @@ ObjectCounts count_placed(std::span<const OwnPlacement> placements,
   }
   const LearnedTable levels = how.initial();
   const ContactModel classifier = contact_with(how.contact, levels, "");
+  const std::map<std::string, glm::dvec2> middles = middles_of(presses);
   ObjectCounts counts;
   for (std::size_t press = 0; press < presses.size(); ++press) {
     std::vector<const OwnPlacement*>& on = of_press[press];
@@ -171,9 +212,16 @@ ObjectCounts count_placed(std::span<const OwnPlacement> placements,
     });
     on.resize(std::min(on.size(), how.best_maps));
     for (const OwnPlacement* placement : on) {
-      counts.try_emplace(presses[press].label, levels.levels())
-          .first->second.add(presses[press].touches, placement->placement.T_object_robot,
-                             layers[placement->map], classifier);
+      LevelCounts& own = counts.try_emplace(presses[press].label, levels.levels()).first->second;
+      const std::vector<Pose> poses =
+          presses[press].T_object_robot
+              ? counted_at(*presses[press].T_object_robot, middles.at(presses[press].label),
+                           how.counted_within)
+              : std::vector{placement->placement.T_object_robot};
+      for (const Pose& T_object_robot : poses) {
+        own.add(presses[press].touches, T_object_robot, layers[placement->map], classifier,
+                1.0 / static_cast<double>(poses.size()));
+      }
     }
   }
   return counts;

@@ -22,11 +22,14 @@ struct TableLearning {
   std::vector<double> level_edges = {};  ///< see LikelihoodTable
   ContactModel contact = {};             ///< of Eq. 7, with its prior: where learning begins
   PoseLattice lattice = {};              ///< for placing presses at unknown poses
-  int rounds = 3;                        ///< of placing and counting
-  std::size_t most_maps = 8;             ///< of its object, on which a press is placed
-  std::size_t best_maps = 3;             ///< on which a press is counted
-  double shared_pseudo_counts = 20.0;    ///< of Eq. 7 in the shared table, at every node
-  double object_pseudo_counts = 200.0;   ///< of the shared table in an object's, at every node
+  /// What presses at known poses read is counted within half of these steps of where they are,
+  /// since recognition compares it at bins so far away.
+  BinSteps counted_within = {};
+  int rounds = 3;                       ///< of placing and counting
+  std::size_t most_maps = 8;            ///< of its object, on which a press is placed
+  std::size_t best_maps = 3;            ///< on which a press is counted
+  double shared_pseudo_counts = 20.0;   ///< of Eq. 7 in the shared table, at every node
+  double object_pseudo_counts = 200.0;  ///< of the shared table in an object's, at every node
 
   /// Eq. 7 with the table's levels, for classifying readings and as the first table.
   LearnedTable initial() const;

@@ -15,6 +15,8 @@ namespace palpate {
 
 namespace {
 
+constexpr double most_temperature = 1e6;
+
 /// Logarithms of the labels' probabilities, before they are normalised.
 std::vector<double> scores(const ScoredPress& press, double temperature, double feature_weight) {
   std::vector<double> nats = press.log_evidence;
@@ -97,6 +99,49 @@ double least_place(double lower, double upper, const Function& function) {
   return largest_at(lower, upper, 1e-3 * (upper - lower), [&](double x) { return -function(x); });
 }
 
+/// Every other press, from the first or the second on.
+std::vector<ScoredPress> half_of(std::span<const ScoredPress> presses, std::size_t half) {
+  std::vector<ScoredPress> some;
+  for (std::size_t i = half; i < presses.size(); i += 2) {
+    some.push_back(presses[i]);
+  }
+  return some;
+}
+
+double loss_of_groups(std::span<const ScoredPress> groups, TemperatureFit fit, double growth) {
+  fit.growth = growth;
+  double sum = 0.0;
+  for (const ScoredPress& group : groups) {
+    sum += loss_of(group, fit.temperature_after(group.touches), fit.feature_weight);
+  }
+  return sum;
+}
+
+/// The growth of the least loss, from 0, given the rest of the fit.
+double least_growth(std::span<const ScoredPress> groups, const TemperatureFit& fit) {
+  // As of the temperature, the loss has one minimum along the growth's logarithm.
+  const double growth = std::exp(least_place(
+      std::log(1e-3 * fit.temperature), std::log(most_temperature),
+      [&](double log_growth) { return loss_of_groups(groups, fit, std::exp(log_growth)); }));
+  return loss_of_groups(groups, fit, growth) < loss_of_groups(groups, fit, 0.0) ? growth : 0.0;
+}
+
+/// The growth that groups show, given the rest of the fit: 0 unless what each half of them shows
+/// helps the other. A single group that is surely wrong, by a touch like no other, is no growth.
+double fit_growth(std::span<const ScoredPress> groups, const TemperatureFit& fit) {
+  if (groups.empty()) {
+    return 0.0;
+  }
+  require_sound(groups);
+  double gain = 0.0;
+  for (std::size_t half = 0; half < 2; ++half) {
+    const std::vector<ScoredPress> other = half_of(groups, 1 - half);
+    gain += loss_of_groups(other, fit, 0.0) -
+            loss_of_groups(other, fit, least_growth(half_of(groups, half), fit));
+  }
+  return gain > 0.0 ? least_growth(groups, fit) : 0.0;
+}
+
 }  // namespace
 
 std::vector<double> label_probabilities(const ScoredPress& press, double temperature,
@@ -123,7 +168,8 @@ Scores scores_of(std::span<const ScoredPress> presses, double temperature, doubl
   return evaluate(records).all;
 }
 
-TemperatureFit fit_temperature(std::span<const ScoredPress> presses) {
+TemperatureFit fit_temperature(std::span<const ScoredPress> presses,
+                               std::span<const ScoredPress> groups) {
   require_sound(presses);
   std::vector<double> margins;
   bool features = true;
@@ -151,7 +197,6 @@ TemperatureFit fit_temperature(std::span<const ScoredPress> presses) {
     return sum;
   };
   constexpr double least_temperature = 0.01;
-  constexpr double most_temperature = 1e6;
   const auto best_temperature = [&](double weight) {
     return least_place(std::log(least_temperature), std::log(most_temperature),
                        [&](double log_temperature) { return loss(log_temperature, weight); });
@@ -161,22 +206,31 @@ TemperatureFit fit_temperature(std::span<const ScoredPress> presses) {
       features
           ? least_place(0.0, most_weight, [&](double w) { return loss(best_temperature(w), w); })
           : 0.0;
-  return {std::exp(best_temperature(weight)), weight};
+  TemperatureFit fit{.temperature = std::exp(best_temperature(weight)), .feature_weight = weight};
+  fit.growth = fit_growth(groups, fit);
+  return fit;
 }
 
-std::vector<ScoredPress> tempered_by_halves(std::span<const ScoredPress> presses) {
-  std::vector<ScoredPress> tempered(presses.size());
+TemperedPresses tempered_by_halves(std::span<const ScoredPress> presses,
+                                   std::span<const ScoredPress> groups) {
+  TemperedPresses tempered{std::vector<ScoredPress>(presses.size()),
+                           std::vector<ScoredPress>(groups.size())};
   for (std::size_t half = 0; half < 2; ++half) {
-    std::vector<ScoredPress> others;
-    for (std::size_t i = 1 - half; i < presses.size(); i += 2) {
-      others.push_back(presses[i]);
-    }
-    const TemperatureFit fit =
-        fit_temperature(std::ranges::any_of(others, has_choice) ? others : presses);
-    for (std::size_t i = half; i < presses.size(); i += 2) {
-      tempered[i].truth = presses[i].truth;
-      tempered[i].log_evidence = log_probabilities(presses[i], fit.temperature, fit.feature_weight);
-    }
+    const std::vector<ScoredPress> others = half_of(presses, 1 - half);
+    const std::vector<ScoredPress> other_groups = half_of(groups, 1 - half);
+    const TemperatureFit fit = std::ranges::any_of(others, has_choice)
+                                   ? fit_temperature(others, other_groups)
+                                   : fit_temperature(presses, groups);
+    const auto temper = [&](std::span<const ScoredPress> all, std::vector<ScoredPress>& result) {
+      for (std::size_t i = half; i < all.size(); i += 2) {
+        result[i].truth = all[i].truth;
+        result[i].touches = all[i].touches;
+        result[i].log_evidence =
+            log_probabilities(all[i], fit.temperature_after(all[i].touches), fit.feature_weight);
+      }
+    };
+    temper(presses, tempered.presses);
+    temper(groups, tempered.groups);
   }
   return tempered;
 }

@@ -11,6 +11,7 @@ namespace palpate {
 /// What a model that has not seen a press says of it, label by label.
 struct ScoredPress {
   std::size_t truth = 0;             ///< index of the press's label
+  std::size_t touches = 1;           ///< of one object, together
   std::vector<double> log_evidence;  ///< of every label, in nats; -infinity: without a map
   /// Log density of the press's features under every label, in nats; empty without features.
   std::vector<double> log_density;
@@ -25,23 +26,39 @@ std::vector<double> label_probabilities(const ScoredPress& press, double tempera
 Scores scores_of(std::span<const ScoredPress> presses, double temperature,
                  double feature_weight = 0.0);
 
+/// See LearnedSensor::temperature.
 struct TemperatureFit {
   double temperature = 1.0;
   double feature_weight = 0.0;
+  double growth = 0.0;
+
+  double temperature_after(std::size_t touches) const {
+    return temperature + growth * (static_cast<double>(touches) - 1.0);
+  }
 };
 /// The temperature of at least 0.01, and the weight in [0, 2] of the features where presses have
 /// them, of the least log-loss. Besides the presses, one more counts, of two labels whose log
 /// evidences differ by the median margin of the presses (label against the best other): it is
 /// right or wrong with equal weights, so that presses which are all told apart, however clearly, do
-/// not make the temperature 0.
+/// not make the temperature 0. The growth is that of the least log-loss
+/// of the groups where what each half of them shows helps the other, and else 0.
+/// @param presses of one touch each
+/// @param groups of several touches each
 /// @throws Error on no press, on a press without a log evidence for each of the same labels, finite
 /// for its own, and where no press has two labels to choose from
-TemperatureFit fit_temperature(std::span<const ScoredPress> presses);
+TemperatureFit fit_temperature(std::span<const ScoredPress> presses,
+                               std::span<const ScoredPress> groups = {});
 
-/// The presses with the logarithms of their labels' probabilities in the place of the evidences:
-/// each half of the presses, every other one, has the temperature and weight of the other half, or
-/// of all where no press of the other half has two labels to choose from.
+/// Presses and groups of them.
+struct TemperedPresses {
+  std::vector<ScoredPress> presses;
+  std::vector<ScoredPress> groups;
+};
+/// The presses and groups with the logarithms of their labels' probabilities in the place of the
+/// evidences: each half of them, every other one, has the numbers of the other half, or of all
+/// where no press of the other half has two labels to choose from.
 /// @throws Error as fit_temperature()
-std::vector<ScoredPress> tempered_by_halves(std::span<const ScoredPress> presses);
+TemperedPresses tempered_by_halves(std::span<const ScoredPress> presses,
+                                   std::span<const ScoredPress> groups = {});
 
 }  // namespace palpate

@@ -202,6 +202,16 @@ void LearnedSensor::validate() const {
   if (!is_positive(temperature)) {
     refuse("temperature", temperature, "give a positive number");
   }
+  if (!from_0(temperature_growth)) {
+    refuse("temperature_growth", temperature_growth, "give a number from 0");
+  }
+  if (bins) {
+    for (const double step : {bins->x_mm, bins->y_mm, bins->theta_rad}) {
+      if (!from_0(step)) {
+        refuse("bins", step, "give steps from 0");
+      }
+    }
+  }
   if (table) {
     table->layer.validate();
     table_of(*table, table->shared).validate();

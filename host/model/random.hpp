@@ -20,6 +20,7 @@ enum class Stream : std::uint32_t {
   readings,     // of touches that are only imagined
   slips,        // of objects between touches
   touch_means,  // bins over which a touch's mean likelihood is
+  unknowns,     // poses at which a calibration puts objects
 };
 
 /// Draws random numbers that are the same with every standard library: the engine and std::seed_seq

@@ -19,7 +19,7 @@ double share(double a, double b) { return a == log_zero ? 0.0 : 1.0 / (1.0 + std
 
 std::vector<ProbabilityInterval> label_bounds(const Estimate& estimate,
                                               std::span<const double> identity,
-                                              std::span<const double> features,
+                                              const Tempering& tempering,
                                               const RecognitionTask& task,
                                               std::optional<double> known) {
   const bool learned_none = known && task.labels.back() == none_label;
@@ -36,8 +36,7 @@ std::vector<ProbabilityInterval> label_bounds(const Estimate& estimate,
     of_label.back() = {*certificate.none_log_evidence, *certificate.none_log_evidence};
   }
   for (std::size_t i = 0; i < of_label.size(); ++i) {
-    of_label[i] = {tempered(of_label[i].low, features[i], task),
-                   tempered(of_label[i].high, features[i], task)};
+    of_label[i] = {tempering.tempered(of_label[i].low, i), tempering.tempered(of_label[i].high, i)};
   }
   std::vector<ProbabilityInterval> bounds;
   for (std::size_t i = 0; i < of_label.size(); ++i) {

@@ -4,6 +4,7 @@
 #include <span>
 #include <vector>
 
+#include "label_probability.hpp"
 #include "palpate/estimate.hpp"
 #include "recognition_task.hpp"
 
@@ -17,11 +18,10 @@ namespace palpate {
 /// label_probabilities(), which takes its place.
 /// @param estimate with a certificate
 /// @param identity [label] of the estimate; lies within its bounds
-/// @param features [label] by feature_nats()
 /// @returns [label], none_label included where the task has it
 std::vector<ProbabilityInterval> label_bounds(const Estimate& estimate,
                                               std::span<const double> identity,
-                                              std::span<const double> features,
+                                              const Tempering& tempering,
                                               const RecognitionTask& task,
                                               std::optional<double> known = {});
 

@@ -58,10 +58,15 @@ std::vector<double> label_log_evidence(const Estimate& estimate, const Recogniti
   return logs;
 }
 
-std::vector<double> label_probabilities(const Estimate& estimate, std::span<const double> features,
+Tempering tempering_of(std::span<const Touch> touches, const RecognitionTask& task) {
+  return {temperature_after(std::max<std::size_t>(touches.size(), 1), task),
+          feature_nats(touches, task)};
+}
+
+std::vector<double> label_probabilities(const Estimate& estimate, const Tempering& tempering,
                                         const RecognitionTask& task, std::optional<double> known) {
   const bool learned_none = known && task.labels.back() == none_label;
-  if (task.temperature == 1.0 && !task.features && !learned_none) {
+  if (tempering.temperature == 1.0 && !task.features && !learned_none) {
     return sums_by_label(estimate, task);
   }
   std::vector<double> logs = label_log_evidence(estimate, task);
@@ -69,7 +74,7 @@ std::vector<double> label_probabilities(const Estimate& estimate, std::span<cons
     logs.back() = *estimate.none_log_evidence;
   }
   for (std::size_t i = 0; i < logs.size(); ++i) {
-    logs[i] = tempered(logs[i], features[i], task);
+    logs[i] = tempering.tempered(logs[i], i);
   }
   const double most = *std::max_element(logs.begin(), logs.end());
   double total = 0.0;

@@ -17,12 +17,6 @@ namespace palpate {
 /// @throws Error on a touch that is not sound, or features beside a threshold of 0
 std::vector<double> feature_nats(std::span<const Touch> touches, const RecognitionTask& task);
 
-/// log(E of the label)^(1 / temperature) times exp(features), but for a constant.
-/// @param log_evidence log E, E being the sum over the label's maps of weight times evidence
-inline double tempered(double log_evidence, double features, const RecognitionTask& task) {
-  return log_evidence / task.temperature + features;
-}
-
 /// The sums of Estimate::identity over the maps of every label, [label]: the probabilities at
 /// temperature 1 and without features.
 std::vector<double> sums_by_label(const Estimate& estimate, const RecognitionTask& task);
@@ -31,13 +25,25 @@ std::vector<double> sums_by_label(const Estimate& estimate, const RecognitionTas
 /// none_label.
 std::vector<double> label_log_evidence(const Estimate& estimate, const RecognitionTask& task);
 
+/// What a touch's sensor model does to the evidence of labels.
+struct Tempering {
+  double temperature = 1.0;      ///< temperature_after() the touches
+  std::vector<double> features;  ///< [label] feature_nats() of the touches
+
+  /// log of E^(1 / temperature) exp(features), but for a constant.
+  /// @param log_evidence log E, E being the sum over the label's maps of weight times evidence
+  double tempered(double log_evidence, std::size_t label) const {
+    return log_evidence / temperature + features[label];
+  }
+};
+Tempering tempering_of(std::span<const Touch> touches, const RecognitionTask& task);
+
 /// The probability of every label: E^(1 / temperature) exp(features), normalised; by
 /// sums_by_label() where nothing changes them. Where the task has none_label and `known` is given,
 /// the maps' labels share `known` among themselves and none_label has the rest: touches that
 /// disagree, of which the evidence of none_label is made, take at least two.
-/// @param features [label] by feature_nats()
 /// @param known probability that the object is one of the maps'; see RecognitionStep::known
-std::vector<double> label_probabilities(const Estimate& estimate, std::span<const double> features,
+std::vector<double> label_probabilities(const Estimate& estimate, const Tempering& tempering,
                                         const RecognitionTask& task,
                                         std::optional<double> known = {});
 

@@ -186,16 +186,16 @@ void RecognitionRecord::require_steps() const {
 RecognitionStep judge(const Estimate& estimate, const GroundTruth& truth,
                       const RecognitionTask& task, std::span<const Touch> touches) {
   const std::vector<std::string>& labels = task.labels;
-  const std::vector<double> features = feature_nats(touches, task);
+  const Tempering tempering = tempering_of(touches, task);
   const std::optional<double> known = known_of(estimate, touches, task);
-  RecognitionStep step{.identity = label_probabilities(estimate, features, task, known),
+  RecognitionStep step{.identity = label_probabilities(estimate, tempering, task, known),
                        .mode = estimate.mode,
                        .refined = {},
                        .contradicted = estimate.contradicted,
                        .truth = truth,
                        .known = known};
   if (estimate.certificate) {
-    step.identity_bounds = label_bounds(estimate, step.identity, features, task, known);
+    step.identity_bounds = label_bounds(estimate, step.identity, tempering, task, known);
     step.certificate = estimate.certificate;
   }
   step.best = static_cast<std::size_t>(

@@ -2,7 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <utility>
+
+#include <fmt/format.h>
 
 namespace palpate {
 
@@ -107,6 +110,35 @@ std::optional<CoarsenedBins> settle_bins(const Device& device, RecognitionTask& 
   return chosen.coarsened ? std::optional(CoarsenedBins{chosen.step_mm, most}) : std::nullopt;
 }
 
+double temperature_after(std::size_t touches, const RecognitionTask& task) {
+  return task.temperature + task.temperature_growth * (static_cast<double>(touches) - 1.0);
+}
+
+std::string wider_bins_sentence(const RecognitionTask& task) {
+  if (!task.learned_bins || std::holds_alternative<ParticleOptions>(task.filter)) {
+    return "";
+  }
+  constexpr double much = 1.5;
+  const BinSteps& learned = *task.learned_bins;
+  const PoseLattice& lattice = task.lattice();
+  const auto wider = [&](const Axis& axis, double step) {
+    return step > 0.0 && axis.count > 1 && axis.step() > much * step;
+  };
+  if (!wider(lattice.x_mm, learned.x_mm) && !wider(lattice.y_mm, learned.y_mm) &&
+      !wider(lattice.theta_rad, learned.theta_rad)) {
+    return "";
+  }
+  constexpr double degrees = 180.0 / std::numbers::pi;
+  return fmt::format(
+      "bins {:.3g} x {:.3g} mm x {:.3g} degrees wide are wider than those of the sensor model, "
+      "{:.3g} "
+      "x {:.3g} mm x {:.3g} degrees: probabilities are too sure; calibrate with these --bins, or "
+      "take "
+      "more",
+      lattice.x_mm.step(), lattice.y_mm.step(), degrees * lattice.theta_rad.step(), learned.x_mm,
+      learned.y_mm, degrees * learned.theta_rad);
+}
+
 bool tells_known(const RecognitionTask& task) {
   return task.familiarity && !std::holds_alternative<ParticleOptions>(task.filter);
 }
@@ -115,12 +147,14 @@ void settle_evidence(RecognitionTask& task) {
   constexpr double share = 0.05;
   constexpr double negligible = 1e-4;
   auto* bounded = std::get_if<BoundedOptions>(&task.filter);
-  if (bounded != nullptr && (task.temperature > 1.0 || task.features || task.familiarity) &&
+  const bool tempered = task.temperature > 1.0 || task.temperature_growth > 0.0;
+  if (bounded != nullptr && (tempered || task.features || task.familiarity) &&
       !bounded->evidence_nats) {
     bounded->evidence_nats = share * task.temperature;
     bounded->evidence_range_nats =
         std::max(-std::log(negligible) * task.temperature,
                  task.familiarity ? FamiliarityScore::most_lead_nats : 0.0);
+    bounded->evidence_growth = task.temperature_growth / task.temperature;
   }
 }
 

@@ -54,13 +54,22 @@ struct RecognitionTask {
   std::string filter_asked_for_by = {};
   /// The pivot is the array's centre at the first touch of each unknown with an element In Contact.
   bool auto_pivot = false;
-  /// Of labels' probabilities, see label_probabilities(); poses are left as they are. Above 0.
+  /// Of labels' probabilities, see LearnedSensor; poses are left as they are.
   double temperature = 1.0;
+  double temperature_growth = 0.0;
+  std::optional<BinSteps> learned_bins = {};  ///< LearnedSensor::bins
   std::optional<LearnedFeatures> features = {};
   std::optional<Familiarity> familiarity = {};
   FitScale fit_scale = {};                  ///< of RecognitionStep::fit
   std::function<void()> cancel_point = {};  ///< BoundedOptions::cancel_point, where bounds search
 };
+
+/// The temperature after a number of touches, at least one.
+double temperature_after(std::size_t touches, const RecognitionTask& task);
+
+/// What to say where the sensor model was learned on narrower bins than the task's by more than a
+/// half; "" elsewhere. The bins are settled before.
+std::string wider_bins_sentence(const RecognitionTask& task);
 
 /// Whether a single touch tells how probably its object was learned: the task has a Familiarity,
 /// and the filter a mode with the log-likelihood of the touch.
@@ -94,8 +103,9 @@ std::optional<CoarsenedBins> settle_bins(const Device& device, RecognitionTask& 
 
 /// A temperature above 1 and features give also improbable labels a share, and familiarity asks how
 /// far the best label leads, which needs their evidence: has bounds find each log evidence within
-/// 0.05 times the temperature, so that no probability is off by more than about 10 % or 1e-4,
-/// unless BoundedOptions::evidence_nats says how closely. The filter is settled before.
+/// 0.05 times the temperature of the touches so far, so that no probability is off by more than
+/// about 10 % or 1e-4, unless BoundedOptions::evidence_nats says how closely. The filter is settled
+/// before.
 void settle_evidence(RecognitionTask& task);
 
 /// Chooses the filter if the task leaves it to this rule (auto_filter): of more than

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <map>
+#include <numbers>
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
@@ -51,7 +52,7 @@ TEST_F(CalibrateCommand, WritesASensorModelAndSaysWhatItLearned) {
   EXPECT_EQ(sensor.table->levels(), 7U);
   EXPECT_EQ(sensor.table->layer.of, MapLayer::mean_level);
   EXPECT_TRUE(sensor.table->objects.contains("A") && sensor.table->objects.contains("U"));
-  EXPECT_TRUE(sensor.psf_mm && sensor.features && sensor.familiarity);
+  EXPECT_TRUE(sensor.psf_mm && sensor.familiarity && sensor.bins);
   EXPECT_THAT(out, HasSubstr("48 touches, 2 objects"));
   for (const auto& [name, value] :
        std::map<std::string, double>{{"noise floor, kPa", sensor.noise},
@@ -75,7 +76,7 @@ TEST_F(CalibrateCommand, WritesASensorModelAndSaysWhatItLearned) {
 }
 
 TEST_F(CalibrateCommand, LearnsWhatRecognizeAndMapTake) {
-  const LearnedSensor sensor = learned();
+  const LearnedSensor sensor = learned({"--bins", "15x15x12"});
   done({"map", "A.h5", "-o", "maps/", "--sensor-model", "s.yaml"});
   done({"map", "U.h5", "-o", "maps/", "--sensor-model", "s.yaml"});
   const OccupancyGrid map = read_map(folder_ / "maps/A.map.h5");
@@ -106,6 +107,33 @@ TEST_F(CalibrateCommand, TakesItsFlags) {
   EXPECT_EQ(sensor.table->layer.of, MapLayer::log_odds);
   EXPECT_EQ(learned({"--levels", "2"}).table->levels(), 2U);
   EXPECT_THAT(done(with({"--frames", "2:20"})), HasSubstr("36 touches"));
+}
+
+TEST_F(CalibrateCommand, LearnsForTheBinsThatRecognizeWillHave) {
+  const std::string out = done(with({"--bins", "20x10x12", "--y-mm=-5:5", "--theta-deg", "0:180"}));
+  EXPECT_THAT(out, HasSubstr("3 touches together"));
+  const LearnedSensor sensor = read_sensor_model(folder_ / "s.yaml");
+  ASSERT_TRUE(sensor.bins.has_value());
+  EXPECT_NEAR(sensor.bins->x_mm, 1.0, 1e-9);
+  EXPECT_NEAR(sensor.bins->y_mm, 1.0, 1e-9);
+  EXPECT_NEAR(sensor.bins->theta_rad, std::numbers::pi / 12.0, 1e-9);
+  done({"map", "A.h5", "-o", "maps/", "--sensor-model", "s.yaml"});
+  write_recording(folder_ / "u.h5", sample_unknown("A", {{2.0, -3.0}, 1.0}, 1));
+  const auto said = [&](const char* bins) {
+    return palpate(
+               {"recognize", "u.h5", "--maps", "maps", "--bins", bins, "--sensor-model", "s.yaml"})
+        .err;
+  };
+  EXPECT_EQ(said("20x20x24"), "");
+  EXPECT_THAT(
+      said("10x10x24"),
+      HasSubstr("bins 2 x 2 mm x 15 degrees wide are wider than those of the sensor model"));
+}
+
+TEST_F(CalibrateCommand, RefusesBinsThatSayNothing) {
+  expect_refused(with({"--bins", "auto"}), {"--bins auto", "25x25x16"});
+  expect_refused(with({"--bins", "3x3"}), {"--bins"});
+  expect_refused(with({"--unposed", "--bins", "9x9x9"}), {"known poses"});
 }
 
 TEST_F(CalibrateCommand, AtUnknownPosesLearnsNoPointSpread) {

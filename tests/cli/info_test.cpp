@@ -130,14 +130,18 @@ TEST_F(InfoCommand, SensorModel) {
       .classifier = {.threshold = 15.0, .ratio = 0.15},
       .table = LearnedTable{.level_edges = {40.0}},
       .temperature = 31.5,
+      .temperature_growth = 0.75,
+      .bins = BinSteps{.x_mm = 0.8, .y_mm = 0.4, .theta_rad = std::numbers::pi / 8.0},
       .familiarity = Familiarity{.offset = 6.0, .explained_slope = 12.0, .lead_slope = 0.5},
       .fit_scale = FitScale{.mean = -4.5, .sd = 12.25}};
   sensor.table->shared.assign(3 * ReadingLayer::nodes, -1.0);
   sensor.table->objects["pen"] = sensor.table->shared;
   write_sensor_model(folder_ / "s.yaml", sensor);
-  expect_info("s.yaml", {"s.yaml: sensor model", "threshold         15, ratio 0.15",
-                         "table of 3 levels over log odds; 1 object(s) with numbers of their own",
-                         "temperature       31.5", "z of learned objects -4.5 +- 12.25"});
+  expect_info("s.yaml",
+              {"s.yaml: sensor model", "threshold         15, ratio 0.15",
+               "table of 3 levels over log odds; 1 object(s) with numbers of their own",
+               "temperature       31.5, and 0.75 more for every further touch",
+               "learned on bins   0.8 x 0.4 mm x 22.5 deg", "z of learned objects -4.5 +- 12.25"});
 }
 
 }  // namespace

@@ -92,6 +92,8 @@ TEST_F(SensorModelFlag, LowersConfidenceByItsTemperature) {
   EXPECT_NEAR(log_odds(tempered), log_odds(sure) / 4.0, 1e-9);
   EXPECT_EQ(tempered["mode"], sure["mode"]);
   EXPECT_EQ(tempered["refined"], sure["refined"]);
+  write({.temperature = 4.0, .temperature_growth = 1.0});
+  EXPECT_NEAR(log_odds(learned({"--touches=2"})), log_odds(plain({"--touches=2"})) / 5.0, 1e-9);
 }
 
 TEST_F(SensorModelFlag, TakesATableInThePlaceOfEquation7) {

@@ -18,6 +18,8 @@ LearnedSensor full_sensor() {
       .touch_sd = {.mm = 0.5, .rad = 0.0625},
       .table = LearnedTable{},
       .temperature = 31.5,
+      .temperature_growth = 2.25,
+      .bins = BinSteps{.x_mm = 0.5, .y_mm = 0.25, .theta_rad = 0.125},
       .features = LearnedFeatures{},
       .familiarity = Familiarity{.offset = -3.5, .explained_slope = 20.25, .lead_slope = 0.5},
       .fit_scale = FitScale{.mean = -4.5, .sd = 12.25}};
@@ -73,6 +75,11 @@ TEST_F(SensorModelFile, ComesBackAsItWasWritten) {
   EXPECT_EQ(read.touch_sd.mm, written.touch_sd.mm);
   EXPECT_EQ(read.touch_sd.rad, written.touch_sd.rad);
   EXPECT_EQ(read.temperature, written.temperature);
+  EXPECT_EQ(read.temperature_growth, written.temperature_growth);
+  ASSERT_TRUE(read.bins);
+  EXPECT_EQ(read.bins->x_mm, written.bins->x_mm);
+  EXPECT_EQ(read.bins->y_mm, written.bins->y_mm);
+  EXPECT_EQ(read.bins->theta_rad, written.bins->theta_rad);
   ASSERT_TRUE(read.table && read.features && read.familiarity);
   EXPECT_EQ(read.table->layer.of, written.table->layer.of);
   EXPECT_EQ(read.table->layer.near_mm, written.table->layer.near_mm);
@@ -101,7 +108,8 @@ TEST_F(SensorModelFile, MayHoldLittle) {
   const LearnedSensor read = read_sensor_model(path_);
   EXPECT_EQ(read.classifier.threshold, 3.0);
   EXPECT_EQ(read.temperature, 1.0);
-  EXPECT_FALSE(read.table || read.features || read.familiarity || read.fit_scale);
+  EXPECT_EQ(read.temperature_growth, 0.0);
+  EXPECT_FALSE(read.table || read.features || read.familiarity || read.fit_scale || read.bins);
 }
 
 TEST_F(SensorModelFile, SaysWhatIsWrong) {
@@ -114,10 +122,13 @@ TEST_F(SensorModelFile, SaysWhatIsWrong) {
   expect_named(message("threshold: 15", "treshold: 15"), {"treshold"});
   expect_named(message("threshold: 15", "threshold: -1"), {"threshold", "-1"});
   expect_named(message("temperature: 31.5", "temperature: 0"), {"temperature", "positive"});
+  expect_named(message("temperature_growth: 2.25", "temperature_growth: -1"),
+               {"temperature_growth", "from 0"});
+  expect_named(message("x_mm: 0.5", "x_mm: -0.5"), {"bins", "-0.5", "steps"});
   expect_named(message("mean_level", "pressure"), {"layer", "log_odds, mean_level"});
   expect_named(message("[35, 60.5]", "[60.5, 35]"), {"level_edges"});
   expect_named(message("[35, 60.5]", "[35]"), {"log_likelihood"});
-  expect_named(message("[1, 2, 3]", "[1, 2]"), {"line 17", "mean", "area"});
+  expect_named(message("[1, 2, 3]", "[1, 2]"), {"line 19", "mean", "area"});
   expect_named(message("sd: 12.25", "sd: 0"), {"fit_scale: sd", "positive"});
   expect_named(message("raw", "psi"), {"pressure_unit", "kPa or raw"});
   put_bytes(path_, "threshold: 3\n");

@@ -62,6 +62,37 @@ TEST(CrossValidation, LeavesOutAPressThatIsAloneOfItsObject) {
   EXPECT_GT(fit_temperature(found.presses).temperature, 0.0);
 }
 
+TEST(CrossValidation, LooksForPressesAtKnownPosesAsForUnknownsAloneAndInGroups) {
+  LetterPresses letters;
+  letters.add("A", 20, 16);
+  letters.add("U", 14, 17);
+  const std::vector<TrainingMap> maps = maps_without_folds(letters.presses, map_options(), 2);
+  TableLearning how = learning(maps);
+  how.lattice = {};  // not used
+  const CrossValidationOptions options{
+      .folds = 2,
+      .bins = RecognitionBins{.lattice = {.x_mm = {-12.0, 12.0, 24},
+                                          .y_mm = {-12.0, 12.0, 24},
+                                          .theta_rad = {0.0, two_pi, 48}},
+                              .auto_pivot = false}};
+  const CrossValidation found = cross_validate(letters.presses, maps, how, nullptr, options);
+  ASSERT_EQ(found.presses.size(), 34U);
+  // Of 10 and 7 presses of either fold.
+  ASSERT_EQ(found.groups.size(), 2U * (3U + 2U));
+  EXPECT_EQ(found.known.size(), found.unknown.size());
+  EXPECT_LE(found.known.size(), 34U) << "groups say nothing of familiarity";
+  for (const ScoredPress& press : found.presses) {
+    EXPECT_EQ(press.touches, 1U);
+    EXPECT_TRUE(press.log_density.empty()) << "features tell where a touch was";
+  }
+  for (const ScoredPress& group : found.groups) {
+    EXPECT_EQ(group.touches, presses_in_group);
+  }
+  EXPECT_GT(scores_of(found.groups, 1.0).accuracy(), scores_of(found.presses, 1.0).accuracy());
+  const CrossValidation again = cross_validate(letters.presses, maps, how, nullptr, options);
+  EXPECT_EQ(again.groups.back().log_evidence, found.groups.back().log_evidence);
+}
+
 TEST(CrossValidation, RefusesWhatItCannotTry) {
   SimulatedPresses simulated;
   simulated.add_shapes(1, 14);

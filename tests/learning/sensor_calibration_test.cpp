@@ -55,7 +55,6 @@ void expect_complete(const SensorCalibration& found, std::size_t touches) {
   EXPECT_NEAR(found.sensor.noise, 0.7, 0.07);
   for (const char* letter : {"A", "R", "U"}) {
     EXPECT_TRUE(found.sensor.table->objects.contains(letter)) << letter;
-    EXPECT_TRUE(found.sensor.features->objects.contains(letter)) << letter;
   }
   for (const auto& scores : {found.before, found.table, found.after}) {
     ASSERT_TRUE(scores.has_value());
@@ -92,6 +91,14 @@ TEST(SensorCalibration, OfLettersAtKnownPosesLearnsTheirSensor) {
   });
   EXPECT_NEAR(shown, 1.0, 1e-9);
   expect_complete(found, 576);
+  EXPECT_FALSE(found.sensor.features.has_value()) << "they tell where a touch was";
+  ASSERT_TRUE(found.groups.has_value());
+  EXPECT_EQ(found.groups->touches, 3U);
+  EXPECT_GT(found.groups->after.interval().low, found.after->interval().high);
+  EXPECT_LE(found.groups->after.log_loss, found.groups->table.log_loss);
+  ASSERT_TRUE(found.sensor.bins.has_value());
+  EXPECT_NEAR(found.sensor.bins->x_mm, 0.95, 1e-9);
+  EXPECT_NEAR(found.sensor.bins->theta_rad, std::numbers::pi / 36.0, 1e-9);
   EXPECT_EQ(found.sensor.table->levels(), 7U);
   EXPECT_EQ(found.sensor.table->layer.of, MapLayer::mean_level);
   // One touch, smaller than a letter, tells it better than chance.
@@ -109,8 +116,28 @@ TEST(SensorCalibration, OfLettersAtUnknownPosesLearnsAllButThePointSpread) {
   letters.make_presses(false);
   const SensorCalibration found = calibrate_sensor(letters.presses, {}, {});
   expect_complete(found, 192);
+  EXPECT_TRUE(found.sensor.features->objects.contains("R"));
+  EXPECT_FALSE(found.groups || found.sensor.bins);
+  EXPECT_EQ(found.sensor.temperature_growth, 0.0);
   EXPECT_FALSE(found.sensor.psf_mm.has_value());
   EXPECT_NEAR(found.sensor.spread_mm, 0.6 * 1.9, 0.1) << "of the spacing";
+}
+
+TEST(SensorCalibration, OnWideBinsIsLessSureTheMoreTouchesThereAre) {
+  const LetterPresses letters = three_letters(1);
+  const RecognitionBins wide{.lattice = {.x_mm = {-10.0, 10.0, 13},
+                                         .y_mm = {-10.0, 10.0, 13},
+                                         .theta_rad = {0.0, 2.0 * std::numbers::pi, 12}},
+                             .auto_pivot = false};
+  const SensorCalibration fine = calibrate_sensor(letters.presses, {}, {});
+  const SensorCalibration found = calibrate_sensor(letters.presses, {}, {.bins = wide});
+  EXPECT_NEAR(found.sensor.bins->x_mm, 20.0 / 13.0, 1e-9);
+  EXPECT_NEAR(found.sensor.bins->theta_rad, std::numbers::pi / 6.0, 1e-9);
+  // Three touches share the distance to the nearest bin.
+  EXPECT_GT(found.sensor.temperature_growth, fine.sensor.temperature_growth + 0.1);
+  EXPECT_GT(found.groups->table.log_loss, found.groups->after.log_loss);
+  EXPECT_LT(found.groups->after.calibration_error, found.groups->table.calibration_error);
+  EXPECT_EQ(found.sensor.gamma, fine.sensor.gamma) << "the sensor's, whatever the bins";
 }
 
 TEST(SensorCalibration, ComparesWithTheMapsGiven) {

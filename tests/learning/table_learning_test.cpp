@@ -7,6 +7,7 @@
 
 #include <gtest/gtest.h>
 
+#include "bounding_box.hpp"
 #include "palpate/error.hpp"
 #include "simulated_presses.hpp"
 #include "synthetic.hpp"
@@ -39,6 +40,43 @@ LevelCounts true_counts(const SimulatedPresses& simulated, const std::vector<Tra
     }
   }
   return counts;
+}
+
+TEST(TableLearning, CountsPressesAtKnownPosesWithinABinOfThem) {
+  LetterPresses letters;
+  letters.add("A", 6, 61);
+  const std::vector<TrainingMap> maps = maps_without_folds(letters.presses, map_options(), 3);
+  TableLearning how = learning(maps);
+  const std::vector<OccupancyGrid> layers = layers_of(maps, how.layer);
+  const PlacedPresses placed = learn_table(letters.presses, maps, how);
+  const auto counts = [&] {
+    return count_placed(placed.placements, letters.presses, maps, layers, how).at("A");
+  };
+  const LevelCounts exact = counts();
+  how.counted_within = {.x_mm = 1.5, .y_mm = 0.9, .theta_rad = 0.3};
+  const LevelCounts within = counts();
+  EXPECT_NEAR(within.total(), exact.total(), 1e-9 * exact.total());
+
+  // Anew, at the poses of the 27 bins about each press, turned about the middle of all presses.
+  BoundingBox box;
+  for (const Press& press : letters.presses) {
+    box.take_in(press.T_object_robot->translation_mm);
+  }
+  const ContactModel classifier = contact_with(how.contact, how.initial(), "");
+  LevelCounts expected(2);
+  for (const OwnPlacement& own : placed.placements) {
+    const Press& press = letters.presses[own.press];
+    for (int i = 0; i < 27; ++i) {
+      const Pose turned{{}, (i % 3 - 1) * 0.1};
+      const Pose moved{{(i / 3 % 3 - 1) * 0.5, (i / 9 - 1) * 0.3}, 0.0};
+      const Pose about{box.middle(), 0.0};
+      expected.add(press.touches, moved * about * turned * inverse(about) * *press.T_object_robot,
+                   layers[own.map], classifier, 1.0 / 27.0);
+    }
+  }
+  for (int node = 0; node < ReadingLayer::nodes; ++node) {
+    EXPECT_NEAR(within.at(1, node), expected.at(1, node), 1e-6) << node;
+  }
 }
 
 TEST(TableLearning, RecoversTheTableOfASimulatedSensor) {

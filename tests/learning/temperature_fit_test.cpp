@@ -83,6 +83,38 @@ TEST(TemperatureFit, IsLargeWhereEvidenceIsNoGuide) {
   EXPECT_GT(fit_temperature(presses).temperature, 1e4);
 }
 
+/// Groups of touches whose labels are drawn at a temperature of their number.
+std::vector<ScoredPress> drawn_groups(std::size_t count, std::size_t touches, double temperature,
+                                      std::uint64_t seed) {
+  std::vector<ScoredPress> groups = drawn_presses(count, temperature, 0.0, seed);
+  for (ScoredPress& group : groups) {
+    group.touches = touches;
+    group.log_density.clear();
+  }
+  return groups;
+}
+
+TEST(TemperatureFit, GrowsAsGroupsOfTouchesNeed) {
+  std::vector<ScoredPress> groups = drawn_groups(2000, 3, 24.0, 7);
+  const std::vector<ScoredPress> fours = drawn_groups(2000, 4, 31.0, 8);
+  groups.insert(groups.end(), fours.begin(), fours.end());
+  const TemperatureFit fit = fit_temperature(drawn_groups(2000, 1, 10.0, 9), groups);
+  EXPECT_NEAR(fit.temperature, 10.0, 0.7);
+  EXPECT_NEAR(fit.growth, 7.0, 0.7);
+  EXPECT_NEAR(fit.temperature_after(3), 24.0, 1.7);
+  EXPECT_EQ(fit.temperature_after(1), fit.temperature);
+}
+
+TEST(TemperatureFit, DoesNotGrowWhereTouchesAreIndependentOrAllToldApart) {
+  const std::vector<ScoredPress> presses = drawn_groups(2000, 1, 10.0, 9);
+  EXPECT_EQ(fit_temperature(presses, drawn_groups(500, 3, 5.0, 10)).growth, 0.0);
+  EXPECT_LT(fit_temperature(presses, drawn_groups(2000, 3, 10.0, 11)).growth, 0.4);
+  const std::vector<ScoredPress> apart(
+      40, {.truth = 0, .touches = 3, .log_evidence = {-100.0, -300.0}, .log_density = {}});
+  EXPECT_EQ(fit_temperature(presses, apart).growth, 0.0);
+  EXPECT_EQ(fit_temperature(presses).growth, 0.0);
+}
+
 TEST(ScoresOfPresses, CountsByHand) {
   const double sure = std::log(0.85 / 0.15);
   const std::vector<ScoredPress> presses{
@@ -114,7 +146,7 @@ TEST(TemperedByHalves, GivesEachHalfTheTemperatureOfTheOther) {
     mixed.push_back(sharp[i]);
     mixed.push_back(blunt[i]);
   }
-  const std::vector<ScoredPress> tempered = tempered_by_halves(mixed);
+  const std::vector<ScoredPress> tempered = tempered_by_halves(mixed).presses;
   ASSERT_EQ(tempered.size(), mixed.size());
   const TemperatureFit of_sharp = fit_temperature(sharp);
   const TemperatureFit of_blunt = fit_temperature(blunt);
@@ -130,13 +162,36 @@ TEST(TemperedByHalves, GivesEachHalfTheTemperatureOfTheOther) {
   }
 }
 
+TEST(TemperedByHalves, GivesGroupsTheGrowthOfTheOtherHalf) {
+  const std::vector<ScoredPress> presses = drawn_groups(400, 1, 4.0, 12);
+  std::vector<ScoredPress> groups = drawn_groups(400, 3, 20.0, 13);
+  for (std::size_t i = 0; i < groups.size(); i += 2) {
+    groups[i] = {.truth = 0,
+                 .touches = 3,
+                 .log_evidence = {0.0, -300.0, -300.0, -300.0, -300.0},
+                 .log_density = {}};
+  }
+  const TemperedPresses tempered = tempered_by_halves(presses, groups);
+  ASSERT_EQ(tempered.groups.size(), groups.size());
+  // Groups of the even half are told apart, so that those of the odd half keep a growth of 0.
+  std::vector<ScoredPress> even;
+  for (std::size_t i = 0; i < presses.size(); i += 2) {
+    even.push_back(presses[i]);
+  }
+  const double temperature = fit_temperature(even).temperature;
+  EXPECT_NEAR(tempered.groups[1].log_evidence[1],
+              std::log(label_probabilities(groups[1], temperature)[1]), 1e-9);
+  const double grown = -tempered.groups[0].log_evidence[1];
+  EXPECT_LT(grown, 300.0 / 10.0) << "at a temperature of about 20, not 4";
+}
+
 TEST(TemperedByHalves, TakesAllPressesWhereTheOtherHalfHasNoChoice) {
   const ScoredPress choice{.truth = 0, .log_evidence = {-100.0, -300.0}, .log_density = {}};
   const ScoredPress none{.truth = 0, .log_evidence = {-100.0, -INFINITY}, .log_density = {}};
   const double alone = fit_temperature(std::vector{choice}).temperature;
-  EXPECT_NEAR(tempered_by_halves(std::vector{choice}).front().log_evidence[1],
+  EXPECT_NEAR(tempered_by_halves(std::vector{choice}).presses.front().log_evidence[1],
               -200.0 / alone - std::log1p(std::exp(-200.0 / alone)), 1e-9);
-  const std::vector<ScoredPress> tempered = tempered_by_halves(std::vector{none, choice});
+  const std::vector<ScoredPress> tempered = tempered_by_halves(std::vector{none, choice}).presses;
   EXPECT_EQ(tempered[0].log_evidence[0], 0.0);
   EXPECT_LT(tempered[1].log_evidence[1], -1.0);
 }
@@ -145,7 +200,7 @@ TEST(TemperedByHalves, StaysFiniteWhereAPressIsSurelyWrong) {
   std::vector<ScoredPress> presses(20,
                                    {.truth = 0, .log_evidence = {0.0, -100.0}, .log_density = {}});
   presses[4].log_evidence = {-1e6, 0.0};  // its probability is no number above 0
-  const std::vector<ScoredPress> tempered = tempered_by_halves(presses);
+  const std::vector<ScoredPress> tempered = tempered_by_halves(presses).presses;
   EXPECT_LT(tempered[4].log_evidence[0], -1e4);
   EXPECT_TRUE(std::isfinite(scores_of(tempered, 1.0).log_loss));
 }

@@ -72,6 +72,19 @@ TEST(LabelProbability, IsTheRootOfTheEvidenceAtTemperatureTwo) {
   EXPECT_EQ(step.best, 0u);
 }
 
+TEST(LabelProbability, IsTemperedMoreWithEveryTouch) {
+  RecognitionTask task = three_maps();
+  task.temperature = 1.0;
+  task.temperature_growth = 0.5;
+  const Press press;
+  for (const std::size_t touches : {1U, 2U, 3U}) {
+    const std::vector<Touch> all(touches, press.touch());
+    const double times = std::pow(4.0, 1.0 / (0.5 + 0.5 * static_cast<double>(touches)));
+    const RecognitionStep step = judge(four_to_one(), {}, task, all);
+    EXPECT_NEAR(step.identity[0], times / (times + 1.0), 1e-15) << touches;
+  }
+}
+
 TEST(LabelProbability, TempersNoneOfTheseToo) {
   RecognitionTask task = three_maps(HistogramOptions{.none_weight = 1.0});
   task.temperature = 2.0;
@@ -215,6 +228,13 @@ TEST(SettleEvidence, HasBoundsFindTheEvidenceThatATemperatureNeeds) {
   std::get<BoundedOptions>(task.filter).evidence_nats = 0.1;
   settle_evidence(task);
   EXPECT_EQ(std::get<BoundedOptions>(task.filter).evidence_nats, 0.1) << "as given";
+  EXPECT_EQ(std::get<BoundedOptions>(task.filter).evidence_growth, 0.0);
+  RecognitionTask growing = three_maps(BoundedOptions{});
+  growing.temperature = 0.8;
+  growing.temperature_growth = 0.2;
+  settle_evidence(growing);
+  EXPECT_EQ(std::get<BoundedOptions>(growing.filter).evidence_nats, 0.05 * 0.8);
+  EXPECT_EQ(std::get<BoundedOptions>(growing.filter).evidence_growth, 0.25);
   RecognitionTask featured = three_maps(BoundedOptions{});
   featured.features = features_of_the_letter();
   settle_evidence(featured);
@@ -223,6 +243,25 @@ TEST(SettleEvidence, HasBoundsFindTheEvidenceThatATemperatureNeeds) {
   dense.temperature = 30.0;
   settle_evidence(dense);
   EXPECT_TRUE(std::holds_alternative<HistogramOptions>(dense.filter));
+}
+
+TEST(WiderBins, AreToldOfWhereTheSensorModelWasLearnedOnNarrowerOnes) {
+  RecognitionTask task = three_maps(BoundedOptions{.lattice = {.x_mm = {-10.0, 10.0, 20},
+                                                               .y_mm = {-10.0, 10.0, 20},
+                                                               .theta_rad = {0.0, 2.0, 20}}});
+  EXPECT_EQ(wider_bins_sentence(task), "") << "nothing is known of the sensor model's";
+  task.learned_bins = BinSteps{0.7, 0.7, 0.07};
+  EXPECT_EQ(wider_bins_sentence(task), "") << "by less than a half";
+  for (const BinSteps& steps :
+       {BinSteps{0.6, 1.0, 0.1}, BinSteps{1.0, 0.6, 0.1}, BinSteps{1.0, 1.0, 0.06}}) {
+    task.learned_bins = steps;
+    EXPECT_NE(wider_bins_sentence(task).find("too sure"), std::string::npos);
+  }
+  task.lattice().theta_rad = {1.0, 1.0, 1};
+  EXPECT_EQ(wider_bins_sentence(task), "") << "a fixed angle has no bins";
+  task.learned_bins = BinSteps{0.6, 0.6, 0.0};
+  task.filter = ParticleOptions{};
+  EXPECT_EQ(wider_bins_sentence(task), "") << "particles have none";
 }
 
 }  // namespace

@@ -69,13 +69,15 @@ void settle_recognition(BatchTask& task, RecognitionTask& recognition,
                         const RecognitionFlags& flags, const InputRules& rules,
                         const Device* device) {
   if (device != nullptr) {
-    if (const std::string coarsened = settle_task(flags, rules.scene, *device, recognition);
-        !coarsened.empty()) {
-      flags.tell(coarsened);
+    for (const std::string& sentence : settle_task(flags, rules.scene, *device, recognition)) {
+      flags.tell(sentence);
     }
   } else {
     settle_filter(recognition);
     settle_evidence(recognition);
+    if (const std::string wider = wider_bins_sentence(recognition); !wider.empty()) {
+      flags.tell(wider);
+    }
   }
   const PoseLattice& lattice = recognition.lattice();
   task.bins = {lattice.x_mm.count, lattice.y_mm.count, lattice.theta_rad.count};

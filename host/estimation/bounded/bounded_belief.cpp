@@ -49,7 +49,7 @@ void BoundedBelief::reset() {
   half_done_.forget();
   kept_.clear();
   elements_ = {};
-  touched_ = false;
+  touches_ = 0;
   not_added_.clear();
   not_averaged_.clear();
   search_.reset();
@@ -61,7 +61,7 @@ void BoundedBelief::reset() {
 }
 
 void BoundedBelief::move_pivot(const glm::dvec2& pivot_mm) {
-  options_.lattice = with_pivot(options_.lattice, pivot_mm, "bounded posterior", touched_);
+  options_.lattice = with_pivot(options_.lattice, pivot_mm, "bounded posterior", touches_ > 0);
   likelihood_.move_pivot(pivot_mm);
   batches_.move_pivot(pivot_mm);
   if (none_) {
@@ -74,7 +74,7 @@ void BoundedBelief::move_pivot(const glm::dvec2& pivot_mm) {
 void BoundedBelief::add(std::span<const Touch> touches) {
   half_done_.refuse();
   kept_.add(touches, options_.contact, options_.lattice.pivot_mm);
-  touched_ = touched_ || !touches.empty();
+  touches_ += touches.size();
 }
 
 void BoundedBelief::take_in() {
@@ -113,7 +113,13 @@ Deadline BoundedBelief::until(const std::optional<double>& budget_s) const {
 }
 
 SearchGoal BoundedBelief::goal() const {
-  return {options_.tolerance, options_.evidence_nats, options_.evidence_range_nats};
+  SearchGoal goal{options_.tolerance, options_.evidence_nats, options_.evidence_range_nats};
+  if (goal.evidence_nats && touches_ > 1) {
+    const double grown = 1.0 + options_.evidence_growth * static_cast<double>(touches_ - 1);
+    *goal.evidence_nats *= grown;
+    goal.evidence_range_nats *= grown;
+  }
+  return goal;
 }
 
 SearchGoal BoundedBelief::rough_goal() const {

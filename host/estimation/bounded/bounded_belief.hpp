@@ -98,7 +98,7 @@ class BoundedBelief {
   std::vector<double> log_weight_;
   KeptTouches kept_;
   KnownElements elements_;
-  bool touched_ = false;
+  std::size_t touches_ = 0;
   std::vector<ArrayReadings> not_added_;     ///< touches that the search has not yet taken in
   std::vector<ArrayReadings> not_averaged_;  ///< nor "none of these"
   std::optional<SearchResult> result_;

@@ -53,6 +53,9 @@ void validate(const BoundedOptions& options) {
   if (options.evidence_nats && !positive(*options.evidence_nats)) {
     refuse("evidence_nats", *options.evidence_nats, "a positive number of nats, or none");
   }
+  if (!(options.evidence_growth >= 0.0 && std::isfinite(options.evidence_growth))) {
+    refuse("evidence_growth", options.evidence_growth, "a number from 0");
+  }
   if (options.none_weight && !positive(*options.none_weight)) {
     refuse("none_weight", *options.none_weight, "a positive number, or none");
   }

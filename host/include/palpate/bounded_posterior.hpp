@@ -36,6 +36,9 @@ struct BoundedOptions {
   /// With evidence_nats: labels whose log evidence lies more nats than this below the largest are
   /// only known to lie there.
   double evidence_range_nats = std::numeric_limits<double>::infinity();
+  /// Both grow by this part of themselves with every touch after the first, as a temperature does
+  /// that suits several touches. From 0.
+  double evidence_growth = 0.0;
   /// Prior weight W of "none of these", as HistogramOptions::none_weight. The mean likelihood of
   /// each touch is estimated from a sample of the bins; Certificate says how exactly. Needs a
   /// contact model with a floor: gamma above 0, or a table.

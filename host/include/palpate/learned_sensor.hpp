@@ -94,6 +94,13 @@ struct PALPATE_API Familiarity {
   double probability(const FamiliarityScore& score) const;
 };
 
+/// Steps of a lattice's bins; 0 along an axis that is fixed.
+struct BinSteps {
+  double x_mm = 0.0;
+  double y_mm = 0.0;
+  double theta_rad = 0.0;
+};
+
 /// What `palpate calibrate` learned about a sensor and the objects that it touched.
 struct PALPATE_API LearnedSensor {
   std::string pressure_unit = "kPa";
@@ -105,8 +112,14 @@ struct PALPATE_API LearnedSensor {
   double spread_mm = 0.5;             ///< of new maps
   DisplacementSd touch_sd;            ///< of the touches' poses
   std::optional<LearnedTable> table;  ///< in the place of Eq. 7
-  /// A label's probability is its evidence to the power of 1 / temperature, normalised.
+  /// After one touch a label's probability is its evidence to the power of 1 / temperature,
+  /// normalised; the temperature of n touches is temperature + (n - 1) temperature_growth. What all
+  /// touches share, such as the distance from the pose to the nearest bin, makes several too sure.
   double temperature = 1.0;
+  double temperature_growth = 0.0;
+  /// Of the bins for which touches at known poses were taken: on wider ones, probabilities are too
+  /// sure.
+  std::optional<BinSteps> bins;
   std::optional<LearnedFeatures> features;
   std::optional<Familiarity> familiarity;
   std::optional<FitScale> fit_scale;  ///< of the z of Fit; without one, z stays as it is

@@ -411,6 +411,9 @@ TEST(BoundedPosterior, RefusesWhatItCannotDo) {
     refuse([&](BoundedOptions& o) { o.evidence_nats = number; }, "evidence_nats");
     refuse([&](BoundedOptions& o) { o.none_weight = number; }, "none_weight");
   }
+  for (const double number : {-0.1, nan, infinity}) {
+    refuse([&](BoundedOptions& o) { o.evidence_growth = number; }, "evidence_growth");
+  }
   refuse([&](BoundedOptions& o) { o.threads = -1; }, "threads");
   refuse([&](BoundedOptions& o) { o.lattice.x_mm.count = 0; }, "bins x_mm");
   refuse([&](BoundedOptions& o) { o.contact.gamma = 1.0; }, "gamma");

@@ -91,6 +91,27 @@ TEST(CertificateLaw, BoundsLabelsBelowTheRangeNoCloserThanThat) {
   EXPECT_LT(bins_evaluated(20.0), bins_evaluated(200.0));
 }
 
+TEST(CertificateLaw, BoundsEvidenceLessCloselyWithEveryTouchWhereAskedTo) {
+  Device device = Device::open();
+  Trial trial = make_trial({15, 14, 12}, 911);
+  for (std::size_t i = 0; i < trial.objects.size(); ++i) {
+    trial.objects[i].map.label = i == 1 ? "B" : "A";
+  }
+  trial.options.tolerance = 0.3;
+  trial.options.evidence_nats = 0.001;
+  const std::vector<Touch> touches = all_touches(trial.recording);
+  ASSERT_GT(touches.size(), 1U);
+  const auto seen_with = [&](double growth) {
+    trial.options.evidence_growth = growth;
+    return expect_certified(device, trial.objects, trial.options, touches);
+  };
+  const Certified same = seen_with(0.0);
+  const Certified grown = seen_with(500.0);
+  EXPECT_LE(same.widest_nats, 0.001);
+  EXPECT_LE(grown.widest_nats, 0.001 * (1.0 + 500.0 * static_cast<double>(touches.size() - 1)));
+  EXPECT_LT(grown.estimate.certificate->bins_evaluated, same.estimate.certificate->bins_evaluated);
+}
+
 TEST(CertificateLaw, KeepsEveryTolerance) {
   // No sum of float64 is certain to 1e-15: such a tolerance is met as far as rounding lets it.
   Device device = Device::open();

@@ -179,8 +179,14 @@ Certified expect_certified(Device& device, std::span<const Hypothesis> objects,
                            double nats) {
   BoundedPosterior posterior(device, objects, options);
   posterior.update(touches);
-  return expect_certified(posterior, objects, options,
-                          reference_posterior(objects, options, touches), nats);
+  BoundedOptions grown = options;  // what the options ask for after these touches
+  if (options.evidence_nats && touches.size() > 1) {
+    const double times = 1.0 + options.evidence_growth * static_cast<double>(touches.size() - 1);
+    *grown.evidence_nats *= times;
+    grown.evidence_range_nats *= times;
+  }
+  return expect_certified(posterior, objects, grown, reference_posterior(objects, options, touches),
+                          nats);
 }
 
 std::vector<std::vector<double>> told_by(const BoundedPosterior& posterior, std::size_t objects) {

@@ -1,0 +1,30 @@
+#pragma once
+
+#include <span>
+
+#include "palpate/lattice.hpp"
+#include "palpate/pose.hpp"
+#include "press.hpp"
+#include "random.hpp"
+
+namespace palpate {
+
+/// The bins on which unknown objects are recognised.
+struct RecognitionBins {
+  PoseLattice lattice;
+  /// The pivot is the array's centre at the first touch of each unknown; else it is the lattice's.
+  bool auto_pivot = true;
+};
+
+/// Touches of an object at a known pose, as if the robot did not know it: the object's pose is
+/// drawn from those that the bins are for, and lies between them as often as that of an unknown
+/// does. At an automatic pivot, x and y are where the press is, but for where between the bins.
+/// @param bins with the pivot (0, 0) where it is automatic
+/// @param press at a known pose; T_object_robot of the returned one is the drawn pose
+Press as_unknown(const Press& press, const RecognitionBins& bins, Random& random);
+
+/// Touches of one object at known poses as one press, in the robot frame of the first.
+/// @param presses at known poses, at least one
+Press together(std::span<const Press* const> presses);
+
+}  // namespace palpate
