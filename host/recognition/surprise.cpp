@@ -18,9 +18,9 @@ constexpr std::uint64_t seed = 0;
 }  // namespace
 
 std::size_t surprise_samples(std::size_t elements) {
-  constexpr std::size_t most = 128;
+  constexpr std::size_t most = 64;
   constexpr std::size_t least = 32;
-  constexpr std::size_t readings = most * 288;  // as many as take about 1 ms
+  constexpr std::size_t readings = most * 576;  // as many as take about half a millisecond
   return std::clamp(readings / std::max<std::size_t>(elements, 1), least, most);
 }
 

@@ -17,8 +17,8 @@ namespace palpate {
 /// by chance, and more would take long to notice an object that has moved.
 inline constexpr std::size_t surprises_judged = 3;
 
-/// Number of samples of the belief from which SurpriseJudge judges a touch of so many elements: 128
-/// of up to 288 elements, fewer of larger arrays, and at least 32.
+/// Number of samples of the belief from which SurpriseJudge judges a touch of so many elements: 64
+/// of up to 576 elements, fewer of larger arrays, and at least 32.
 std::size_t surprise_samples(std::size_t elements);
 
 /// Judges how much touches surprise beliefs over a task's hypotheses.
