@@ -82,14 +82,16 @@ std::optional<RecognitionBins> bins_of(const Options& options, bool known_poses)
   if (flags.bins == "auto" || flags.bins == "fine") {
     refuse_flag("--bins", flags.bins, "give counts, as 25x25x16, or leave it out");
   }
-  if (infers_region(flags, {})) {
-    return {};
-  }
-  if (!known_poses) {
+  const bool given = !flags.bins.empty() || !flags.x_mm.empty() || !flags.y_mm.empty() ||
+                     !flags.theta_deg.empty() || !flags.pivot_mm.empty();
+  if (given && !known_poses) {
     throw Error(
         Fault::input,
         "--bins, --x-mm, --y-mm, --theta-deg and --pivot-mm are for touches at known poses; "
         "leave them out: where the others lie is found on bins one element wide");
+  }
+  if (infers_region(flags, {})) {
+    return {};
   }
   RecognitionBins bins{given_lattice(flags, {}), has_auto_pivot(flags, {})};
   bins.lattice.validate();
@@ -265,7 +267,7 @@ void add_calibrate(CLI::App& app) {
   const auto options = std::make_shared<Options>();
   command
       ->add_option("RECORDING", options->recordings,
-                   "Recordings (HDF5) that name their object, best with 12 touches or more of each "
+                   "Recordings (HDF5) that name their object, best with 15 touches or more of each "
                    "object. Where all touches of a recording are at one pose, their poses count as "
                    "unknown")
       ->required();
@@ -299,21 +301,24 @@ void add_calibrate(CLI::App& app) {
                    "about as many as you will recognize with. More take longer")
       ->check(require_whole_number)
       ->capture_default_str();
-  command->add_option(
-      "--bins", options->recognition.bins,
-      "Bins that recognize will be given, as 25x25x16, for touches at known poses: "
-      "what lies between two bins makes probabilities too sure unless it is learned, "
-      "too [default: half the elements' spacing and 5 degrees wide]");
+  command->add_option("--bins", options->recognition.bins,
+                      "Pose bins that recognize will be given, as 25x25x16; for touches at known "
+                      "poses. Unknowns lie "
+                      "between bins, and fit the wider ones worse: how much, is learned, too "
+                      "[default: bins half the "
+                      "elements' spacing and 5 degrees wide where the touches are; 25x25x16 where "
+                      "a range or X,Y is "
+                      "given]");
   command->add_option("--x-mm", options->recognition.x_mm,
-                      "Region of these bins, as recognize will be given it [default: -10:10 beside "
-                      "--bins]");
-  command->add_option("--y-mm", options->recognition.y_mm, "The same of y");
+                      "Range of these bins, mm, as recognize will be given it [default: -10:10 "
+                      "beside --bins]");
+  command->add_option("--y-mm", options->recognition.y_mm, "The same along y, mm");
   command->add_option("--theta-deg", options->recognition.theta_deg,
                       "The same of theta, degrees [default: 0:360]");
   command->add_option(
       "--pivot-mm", options->recognition.pivot_mm,
-      "Pivot of these bins, as recognize will be given it: X,Y or auto [default: 0,0 "
-      "beside --bins]");
+      "Pivot of these bins, mm, as recognize will be given it: X,Y or auto [default: "
+      "0,0 beside --bins]");
   command->add_option("--frames", options->frames,
                       "Use the touches A to B - 1 of every recording, counted from 0, as A:B");
   command->add_option("--png", options->png,

@@ -44,7 +44,7 @@ std::string values_table(const SensorCalibration& calibration, std::optional<int
   table.add({"levels of readings", "2", fmt::format("{}", sensor.table->levels())});
   add("temperature", "1", sensor.temperature);
   if (calibration.groups) {
-    add("temperature of every further touch", "0", sensor.temperature_growth);
+    add("more for every further touch", "0", sensor.temperature_growth);
   }
   if (sensor.features) {
     add("weight of area, force and peak", "0", sensor.features->weight);

@@ -103,9 +103,13 @@ void print_engine(const Device& device, const Recogniser& recogniser, const Reco
                          static_cast<double>(recogniser.bounded()->host_bytes()) / (1 << 20),
                          bounded->tolerance);
     filter += bounded->budget_s ? fmt::format(", budget {:g} ms", 1e3 * *bounded->budget_s) : "";
-    filter += bounded->evidence_nats
-                  ? fmt::format(", evidence within {:g} nats", *bounded->evidence_nats)
-                  : "";
+    if (bounded->evidence_nats) {
+      filter += fmt::format(", evidence within {:g} nats", *bounded->evidence_nats);
+      filter += bounded->evidence_growth > 0.0
+                    ? fmt::format(", {:g} more with every further touch",
+                                  *bounded->evidence_nats * bounded->evidence_growth)
+                    : "";
+    }
   } else {
     filter = fmt::format("histogram in {}", fmt::join(recogniser.histogram()->paths(), "; "));
   }

@@ -14,12 +14,13 @@ std::string table_text(const LearnedTable& table) {
                      table.objects.size());
 }
 
-}  // namespace
-
+/// "0.8 x 0.8 mm x 22.5 deg"
 std::string steps_text(const BinSteps& steps) {
   return fmt::format("{:.3g} x {:.3g} mm x {:.3g} deg", steps.x_mm, steps.y_mm,
                      degrees(steps.theta_rad));
 }
+
+}  // namespace
 
 std::string sensor_model_text(const LearnedSensor& sensor) {
   const std::string unit = sensor.pressure_unit == "kPa" ? " kPa" : "";

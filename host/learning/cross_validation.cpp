@@ -7,6 +7,7 @@
 #include <optional>
 #include <set>
 #include <span>
+#include <utility>
 
 #include <fmt/format.h>
 #include <tbb/parallel_for.h>
@@ -85,7 +86,10 @@ class Validation {
     std::vector<LabelledFeatures> building;
     for (std::size_t i = 0; i < presses_.size(); ++i) {
       if (fold_[i] != fold) {
-        building.push_back({presses_[i].label, features_of(presses_[i], how_.contact.classifier)});
+        if (!presses_[i].T_object_robot) {
+          building.push_back(
+              {presses_[i].label, features_of(presses_[i], how_.contact.classifier)});
+        }
       } else if (const auto label = label_of(presses_[i]); label && !of_label[*label].empty()) {
         tried.push_back(i);
       }
@@ -94,46 +98,71 @@ class Validation {
       return;
     }
     const std::optional<LearnedTable> table = table_without(fold);
-    const std::vector<Press> asked = unknowns(tried, fold);
-    const auto scores = score(asked, of_label, table, counter);
-    const LearnedFeatures features = learn_features(building);
-    for (std::size_t i = 0; i < asked.size(); ++i) {
-      ScoredPress scored = scored_press(asked[i], scores[i], features);
+    const Unknowns asked = unknowns(tried, fold);
+    const auto scores = score(asked.presses, of_label, table, counter);
+    const LearnedFeatures features =
+        building.empty() ? LearnedFeatures{} : learn_features(building);
+    for (std::size_t i = 0; i < asked.presses.size(); ++i) {
+      ScoredPress scored = scored_press(asked.presses[i], scores[i], features);
       if (i < tried.size()) {
-        add_known(asked[i], scores[i], scored, table, result);
+        add_known(asked.presses[i], scores[i], scored, table, result);
         result.presses.push_back(std::move(scored));
       } else {
-        result.groups.push_back(std::move(scored));
+        result.groups[asked.half_of_group[i - tried.size()]].push_back(std::move(scored));
       }
     }
   }
 
  private:
-  /// What is to be recognised of a fold: its presses, and then groups of them.
-  std::vector<Press> unknowns(const std::vector<std::size_t>& tried, std::size_t fold) const {
-    std::vector<Press> asked;
+  /// What is to be recognised of a fold.
+  struct Unknowns {
+    std::vector<Press> presses;  ///< of the fold, and then groups of them
+    std::vector<std::size_t> half_of_group = {};
+  };
+  Unknowns unknowns(const std::vector<std::size_t>& tried, std::size_t fold) const {
+    Unknowns asked;
     std::map<std::string, std::vector<const Press*>> of_label;
     for (const std::size_t press : tried) {
-      asked.push_back(presses_[press]);
+      asked.presses.push_back(presses_[press]);
       of_label[presses_[press].label].push_back(&presses_[press]);
     }
     if (!options_.bins) {
       return asked;
     }
     Random random(fold, Stream::unknowns);
+    std::size_t half = fold % 2;
     for (auto& [label, own] : of_label) {
-      for (std::size_t i = own.size(); i > 1; --i) {
-        const auto place = static_cast<std::size_t>(random.uniform() * static_cast<double>(i));
-        std::swap(own[i - 1], own[place]);
-      }
-      for (std::size_t i = 0; i + presses_in_group <= own.size(); i += presses_in_group) {
-        asked.push_back(together(std::span(own).subspan(i, presses_in_group)));
-      }
+      // Too few for two halves are all of one.
+      shuffle(own, random);
+      const bool divided = own.size() >= 2 * presses_in_group;
+      const std::size_t middle = divided ? own.size() / 2 : own.size();
+      add_groups(std::span(own).first(middle), half, random, asked);
+      half = 1 - half;
+      add_groups(std::span(own).subspan(middle), half, random, asked);
     }
-    for (Press& press : asked) {
+    for (Press& press : asked.presses) {
       press = as_unknown(press, *options_.bins, random);
     }
     return asked;
+  }
+
+  static void shuffle(std::span<const Press*> presses, Random& random) {
+    for (std::size_t i = presses.size(); i > 1; --i) {
+      const auto place = static_cast<std::size_t>(random.uniform() * static_cast<double>(i));
+      std::swap(presses[i - 1], presses[place]);
+    }
+  }
+
+  static void add_groups(std::span<const Press*> presses, std::size_t half, Random& random,
+                         Unknowns& asked) {
+    const std::size_t times = presses.size() < 2 * presses_in_group ? 1 : groups_of_press;
+    for (std::size_t time = 0; time < times; ++time) {
+      shuffle(presses, random);
+      for (std::size_t i = 0; i + presses_in_group <= presses.size(); i += presses_in_group) {
+        asked.presses.push_back(together(presses.subspan(i, presses_in_group)));
+        asked.half_of_group.push_back(half);
+      }
+    }
   }
 
   /// The press's label by index; none where no map bears it.
@@ -255,8 +284,12 @@ class Validation {
     }
     const LabelScore& at = scores[best_label];
     const OccupancyGrid& map = table ? layers_[at.best_map] : maps_[at.best_map].map;
+    // Recognition judges the fit at a refined pose, which lies near the true one, whatever the
+    // bins.
+    const Pose& near =
+        press.T_object_robot && best_label == scored.truth ? *press.T_object_robot : at.best_pose;
     if (const auto fit =
-            best_fit_near(press.touches, at.best_pose, map, contact_for(best_label, table), 0)) {
+            best_fit_near(press.touches, near, map, contact_for(best_label, table), 0)) {
       result.fit_z.push_back(fit->z);
     }
   }
@@ -283,6 +316,14 @@ CrossValidation cross_validate(const std::vector<Press>& presses,
                 fmt::format("cross-validation: {} folds and {} maps per object; give at least two "
                             "folds and a map",
                             options.folds, options.maps_per_object));
+  }
+  if (options.bins && std::ranges::any_of(presses, [](const Press& press) {
+        return !press.T_object_robot.has_value();
+      })) {
+    throw Error(
+        Fault::input,
+        "cross-validation: bins are for presses at known poses; leave them out, or give the "
+        "poses");
   }
   const Validation validation(presses, maps, how, placed, options);
   CrossValidation result;

@@ -25,9 +25,10 @@ struct CrossValidationOptions {
 struct CrossValidation {
   std::vector<std::string> labels;   ///< of all maps, ascending
   std::vector<ScoredPress> presses;  ///< those that have a map of their object in the other folds
-  /// Several presses at known poses of one object and fold together, each press once at most; none
-  /// where a fold has fewer of each object, or without CrossValidationOptions::bins.
-  std::vector<ScoredPress> groups;
+  /// Several presses at known poses of one object and fold together, with
+  /// CrossValidationOptions::bins. A press is in groups of one half only. None where a fold has
+  /// fewer presses of each object.
+  GroupHalves groups;
   /// See FamiliarityScores: with the maps of all objects, and without those of the press's own.
   std::vector<FamiliarityScore> known;
   std::vector<FamiliarityScore> unknown;
@@ -35,8 +36,9 @@ struct CrossValidation {
   std::vector<double> fit_z;
 };
 
-/// Presses in one of CrossValidation::groups.
+/// Presses in one of CrossValidation::groups, and groups that a press is in.
 inline constexpr std::size_t presses_in_group = 3;
+inline constexpr std::size_t groups_of_press = 3;
 
 /// Recognises every press, at an unknown pose, with maps and numbers of the presses of other folds
 /// alone, see folds_of(). The log evidence of a label is the log of the mean over its maps; an
@@ -45,7 +47,8 @@ inline constexpr std::size_t presses_in_group = 3;
 /// out. None: Eq. 7 on the maps' log odds
 /// @param progress called with the fraction done, by one thread at a time
 /// @throws Error where no press has a map of its object in the other folds, on fewer than two folds
-/// or no map per object, and as PressPlacer does; what `progress` throws
+/// or no map per object, on bins for presses at unknown poses, and as PressPlacer does; what
+/// `progress` throws
 CrossValidation cross_validate(const std::vector<Press>& presses,
                                const std::vector<TrainingMap>& maps, const TableLearning& how,
                                const PlacedPresses* placed, const CrossValidationOptions& options,

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <map>
 #include <numbers>
 #include <optional>
 #include <set>
@@ -28,12 +29,12 @@ constexpr double table_cost = 4.0 / 3.0;
 constexpr double step_rad = std::numbers::pi / 18.0;  ///< of poses at which presses are placed
 /// Readings times maps times bins of a cross-validation: some 15 s of one core.
 constexpr double most_additions = 2.5e10;
+/// The same where the bins are given: up to a minute, to try touches on bins no wider than these.
+constexpr double most_additions_at_bins = 1e11;
 /// What a press costs at a bin besides its readings, in readings.
 constexpr double readings_per_press = 16.0;
-/// The same where the bins are given: a million of them are worth a minute.
-constexpr double most_additions_at_bins = 1e11;
-/// A touch at a known pose is recognised alone, and together with others.
-constexpr double times_recognised = 2.0;
+/// A touch at a known pose is tried alone, and in some groups.
+constexpr double times_recognised = 1.0 + groups_of_press;
 
 /// A calibration in the making.
 class SensorLearning {
@@ -69,7 +70,7 @@ class SensorLearning {
     learn_readings();
     make_maps(given);
     if (known_poses_) {
-      result_.sensor.bins = steps();
+      settle_bins();
     }
     std::set<std::string> labels;
     for (const TrainingMap& map : maps_) {
@@ -134,21 +135,7 @@ class SensorLearning {
   };
 
   CrossValidationOptions validation() const {
-    CrossValidationOptions how{.folds = options_.folds, .maps_per_object = options_.most_maps};
-    if (known_poses_) {
-      how.bins = {affordable(recognition_bins().lattice), recognition_bins().auto_pivot};
-    }
-    return how;
-  }
-
-  /// The bins on which unknowns are recognised; for touches at known poses.
-  RecognitionBins recognition_bins() const {
-    return options_.bins.value_or(RecognitionBins{fine_lattice()});
-  }
-
-  BinSteps steps() const {
-    const PoseLattice bins = recognition_bins().lattice;
-    return {bins.x_mm.step(), bins.y_mm.step(), bins.theta_rad.step()};
+    return {.folds = options_.folds, .maps_per_object = options_.most_maps, .bins = tried_bins_};
   }
 
   void learn_readings() {
@@ -249,11 +236,43 @@ class SensorLearning {
                    .gamma = ContactModel{}.gamma,
                    .prior = result_.sensor.prior};
     if (known_poses_) {
-      how.counted_within = steps();
+      how.counted_within = *result_.sensor.bins;
     } else {
       how.lattice = placing_lattice(maps_, spacing_mm_, step_rad);
     }
     return how;
+  }
+
+  /// The bins for which readings are counted, and those on which touches are tried.
+  void settle_bins() {
+    const RecognitionBins bins = options_.bins.value_or(RecognitionBins{fine_lattice()});
+    const PoseLattice& lattice = bins.lattice;
+    lattice.validate();
+    if (bins.auto_pivot) {
+      for (const Press& press : presses_) {
+        require_within(press, lattice);
+      }
+    }
+    result_.sensor.bins =
+        BinSteps{lattice.x_mm.step(), lattice.y_mm.step(), lattice.theta_rad.step()};
+    tried_bins_ = RecognitionBins{affordable(lattice), bins.auto_pivot};
+  }
+
+  static void require_within(const Press& press, const PoseLattice& lattice) {
+    const glm::dvec2 centre_mm = press.T_object_robot->translation_mm;
+    const auto within = [](const Axis& axis, double place) {
+      return place >= axis.lower - axis.step() && place <= axis.upper + axis.step();
+    };
+    if (!within(lattice.x_mm, centre_mm.x) || !within(lattice.y_mm, centre_mm.y)) {
+      throw Error(
+          Fault::input,
+          fmt::format(
+              "{}: the array's centre is at {:g}, {:g} mm, beyond the bins' {:g}:{:g} and "
+              "{:g}:{:g} mm; with an automatic pivot, widen --x-mm and --y-mm to all places "
+              "that are touched",
+              press.name, centre_mm.x, centre_mm.y, lattice.x_mm.lower, lattice.x_mm.upper,
+              lattice.y_mm.lower, lattice.y_mm.upper));
+    }
   }
 
   /// Bins half an element's spacing wide, over the places of the arrays' centres.
@@ -277,33 +296,52 @@ class SensorLearning {
                           static_cast<int>(std::lround(finer * circle_rad / step_rad))}};
   }
 
-  /// The lattice, or as fine a one of its region as touches can be recognised on in a short time;
-  /// not coarser than presses at unknown poses are placed.
+  /// The lattice, or as fine a one of its region as touches can be tried on in a short time; not
+  /// coarser than presses at unknown poses are placed.
   PoseLattice affordable(PoseLattice lattice) const {
-    std::set<std::string> labels;
-    for (const TrainingMap& map : maps_) {
-      labels.insert(map.map.label);
-    }
     double readings = 0.0;
     for (const Press& press : presses_) {
       readings += readings_per_press;
       for (const Touch& touch : press.touches) {
+        // All elements for No Contact everywhere, and again those that are not in No Contact.
         const std::vector<Reading> of = result_.sensor.classifier.classify(touch);
-        readings += 2.0 * static_cast<double>(of.size());
-        readings -= static_cast<double>(std::ranges::count(of, Reading::no_contact));
+        readings += 2.0 * static_cast<double>(of.size()) -
+                    static_cast<double>(std::ranges::count(of, Reading::no_contact));
       }
     }
+    // Of the maps of folds, a touch is tried on the one without its own.
+    std::map<std::string, std::size_t> maps_of;
+    for (const TrainingMap& map : maps_) {
+      std::size_t& count = maps_of[map.map.label];
+      count = map.presses.empty() ? std::min(count + 1, options_.most_maps) : 1;
+    }
+    double maps = 0.0;
+    for (const auto& [label, count] : maps_of) {
+      maps += static_cast<double>(count);
+    }
+    const double per_bin = times_recognised * readings * maps;
     const double most = options_.bins ? most_additions_at_bins : most_additions;
-    const double bins = most / (times_recognised * readings * static_cast<double>(labels.size()));
-    const double wider = std::cbrt(static_cast<double>(lattice.bins()) / bins);
+    const auto bins_of = [](const PoseLattice& of) {
+      return 1.0 * of.x_mm.count * of.y_mm.count * of.theta_rad.count;
+    };
+    const double wider = std::cbrt(bins_of(lattice) * per_bin / most);
     const auto widen = [&](Axis& axis, double widest) {
       const double fewest = std::ceil((axis.upper - axis.lower) / widest);
-      axis.count =
-          std::min(axis.count, static_cast<int>(std::max({1.0, fewest, axis.count / wider})));
+      const double count = std::max({1.0, fewest, axis.count / wider});
+      axis.count = static_cast<int>(std::min<double>(axis.count, count));
     };
     widen(lattice.x_mm, spacing_mm_);
     widen(lattice.y_mm, spacing_mm_);
     widen(lattice.theta_rad, step_rad);
+    constexpr double patience = 20.0;
+    if (bins_of(lattice) * per_bin > patience * most_additions_at_bins) {
+      throw Error(
+          Fault::input,
+          fmt::format("to try {} touches on bins over {:g} x {:g} mm would take hours; give --bins "
+                      "with the --x-mm and --y-mm where an unknown may lie, or fewer --frames",
+                      presses_.size(), lattice.x_mm.upper - lattice.x_mm.lower,
+                      lattice.y_mm.upper - lattice.y_mm.lower));
+    }
     return lattice;
   }
 
@@ -326,11 +364,18 @@ class SensorLearning {
     result_.before = scores_of(eq7.presses, 1.0);
     result_.table = scores_of(learned.presses, 1.0);
     result_.after = scores_of(table.after.presses, 1.0);
-    if (!learned.groups.empty()) {
+    const std::vector<ScoredPress>& groups = table.after.groups;
+    if (!groups.empty()) {
       result_.groups = GroupScores{.touches = presses_in_group,
-                                   .before = scores_of(eq7.groups, 1.0),
-                                   .table = scores_of(learned.groups, 1.0),
-                                   .after = scores_of(table.after.groups, 1.0)};
+                                   .before = scores_of(both(eq7.groups), 1.0),
+                                   .table = scores_of(both(learned.groups), 1.0),
+                                   .after = scores_of(groups, 1.0)};
+    } else if (known_poses_) {
+      result_.warnings.push_back(
+          fmt::format("too few touches to try {} of an object together on maps without them, so "
+                      "that how sure to "
+                      "be after several touches is not learned; give {} or more of each object",
+                      presses_in_group, presses_in_group * options_.folds));
     }
     // What few presses could show by chance is no warning.
     constexpr double worse_nats = 0.05;
@@ -388,6 +433,7 @@ class SensorLearning {
   std::vector<TableKind> tables_;
   double spacing_mm_ = 0.0;
   std::vector<TrainingMap> maps_;
+  std::optional<RecognitionBins> tried_bins_;  ///< for touches at known poses
   SensorCalibration result_;
 };
 

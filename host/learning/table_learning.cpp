@@ -1,7 +1,6 @@
 #include "table_learning.hpp"
 
 #include <algorithm>
-#include <array>
 #include <optional>
 
 #include <fmt/format.h>
@@ -92,23 +91,21 @@ std::map<std::string, glm::dvec2> middles_of(const std::vector<Press>& presses) 
   return middles;
 }
 
-/// Where a press at a known pose is counted: turned about a point and moved as far as a bin may be
-/// that is the nearest to the object's pose.
+/// Where a press at a known pose is counted: at poses as far from it as the nearest bin may be. The
+/// bin that is nearest in theta turns all touches of an object at once, and its x and y make up for
+/// the turn in their middle: so it is about that point.
 std::vector<Pose> counted_at(const Pose& T_object_robot, const glm::dvec2& middle_mm,
                              const BinSteps& steps) {
-  constexpr std::array<double, 3> thirds{-1.0 / 3.0, 0.0, 1.0 / 3.0};  // of a step
-  if (steps.x_mm == 0.0 && steps.y_mm == 0.0 && steps.theta_rad == 0.0) {
-    return {T_object_robot};
-  }
+  const auto offsets = [](double step) {
+    return step > 0.0 ? std::vector{-step / 3.0, 0.0, step / 3.0} : std::vector{0.0};
+  };
   const glm::dvec2 from_middle_mm = T_object_robot.translation_mm - middle_mm;
   std::vector<Pose> poses;
-  for (const double turn : thirds) {
-    const double turn_rad = turn * steps.theta_rad;
+  for (const double turn_rad : offsets(steps.theta_rad)) {
     const glm::dvec2 turned_mm = middle_mm + rotate(turn_rad, from_middle_mm);
-    for (const double x : thirds) {
-      for (const double y : thirds) {
-        poses.push_back({turned_mm + glm::dvec2(x * steps.x_mm, y * steps.y_mm),
-                         T_object_robot.theta_rad + turn_rad});
+    for (const double x_mm : offsets(steps.x_mm)) {
+      for (const double y_mm : offsets(steps.y_mm)) {
+        poses.push_back({turned_mm + glm::dvec2(x_mm, y_mm), T_object_robot.theta_rad + turn_rad});
       }
     }
   }

@@ -119,7 +119,8 @@ double loss_of_groups(std::span<const ScoredPress> groups, TemperatureFit fit, d
 
 /// The growth of the least loss, from 0, given the rest of the fit.
 double least_growth(std::span<const ScoredPress> groups, const TemperatureFit& fit) {
-  // As of the temperature, the loss has one minimum along the growth's logarithm.
+  // Of groups of one size, the loss has one minimum along the growth's logarithm, as along the
+  // temperature's.
   const double growth = std::exp(least_place(
       std::log(1e-3 * fit.temperature), std::log(most_temperature),
       [&](double log_growth) { return loss_of_groups(groups, fit, std::exp(log_growth)); }));
@@ -127,22 +128,25 @@ double least_growth(std::span<const ScoredPress> groups, const TemperatureFit& f
 }
 
 /// The growth that groups show, given the rest of the fit: 0 unless what each half of them shows
-/// helps the other. A single group that is surely wrong, by a touch like no other, is no growth.
-double fit_growth(std::span<const ScoredPress> groups, const TemperatureFit& fit) {
-  if (groups.empty()) {
-    return 0.0;
-  }
-  require_sound(groups);
+/// helps the other half, both taken together. A single group that is surely wrong, by a touch like
+/// no other, is no growth.
+double fit_growth(const GroupHalves& groups, const TemperatureFit& fit) {
   double gain = 0.0;
   for (std::size_t half = 0; half < 2; ++half) {
-    const std::vector<ScoredPress> other = half_of(groups, 1 - half);
+    const std::vector<ScoredPress>& other = groups[1 - half];
     gain += loss_of_groups(other, fit, 0.0) -
-            loss_of_groups(other, fit, least_growth(half_of(groups, half), fit));
+            loss_of_groups(other, fit, least_growth(groups[half], fit));
   }
-  return gain > 0.0 ? least_growth(groups, fit) : 0.0;
+  return gain > 0.0 ? least_growth(both(groups), fit) : 0.0;
 }
 
 }  // namespace
+
+std::vector<ScoredPress> both(const GroupHalves& groups) {
+  std::vector<ScoredPress> all = groups[0];
+  all.insert(all.end(), groups[1].begin(), groups[1].end());
+  return all;
+}
 
 std::vector<double> label_probabilities(const ScoredPress& press, double temperature,
                                         double feature_weight) {
@@ -168,9 +172,13 @@ Scores scores_of(std::span<const ScoredPress> presses, double temperature, doubl
   return evaluate(records).all;
 }
 
-TemperatureFit fit_temperature(std::span<const ScoredPress> presses,
-                               std::span<const ScoredPress> groups) {
+TemperatureFit fit_temperature(std::span<const ScoredPress> presses, const GroupHalves& groups) {
   require_sound(presses);
+  for (const std::vector<ScoredPress>& half : groups) {
+    if (!half.empty()) {
+      require_sound(half);
+    }
+  }
   std::vector<double> margins;
   bool features = true;
   for (const ScoredPress& press : presses) {
@@ -212,25 +220,26 @@ TemperatureFit fit_temperature(std::span<const ScoredPress> presses,
 }
 
 TemperedPresses tempered_by_halves(std::span<const ScoredPress> presses,
-                                   std::span<const ScoredPress> groups) {
-  TemperedPresses tempered{std::vector<ScoredPress>(presses.size()),
-                           std::vector<ScoredPress>(groups.size())};
+                                   const GroupHalves& groups) {
+  TemperedPresses tempered{std::vector<ScoredPress>(presses.size()), {}};
+  const auto with = [](const ScoredPress& press, const TemperatureFit& fit) {
+    ScoredPress result{
+        .truth = press.truth, .touches = press.touches, .log_evidence = {}, .log_density = {}};
+    result.log_evidence =
+        log_probabilities(press, fit.temperature_after(press.touches), fit.feature_weight);
+    return result;
+  };
   for (std::size_t half = 0; half < 2; ++half) {
     const std::vector<ScoredPress> others = half_of(presses, 1 - half);
-    const std::vector<ScoredPress> other_groups = half_of(groups, 1 - half);
-    const TemperatureFit fit = std::ranges::any_of(others, has_choice)
-                                   ? fit_temperature(others, other_groups)
-                                   : fit_temperature(presses, groups);
-    const auto temper = [&](std::span<const ScoredPress> all, std::vector<ScoredPress>& result) {
-      for (std::size_t i = half; i < all.size(); i += 2) {
-        result[i].truth = all[i].truth;
-        result[i].touches = all[i].touches;
-        result[i].log_evidence =
-            log_probabilities(all[i], fit.temperature_after(all[i].touches), fit.feature_weight);
-      }
-    };
-    temper(presses, tempered.presses);
-    temper(groups, tempered.groups);
+    TemperatureFit fit = fit_temperature(
+        std::ranges::any_of(others, has_choice) ? std::span<const ScoredPress>(others) : presses);
+    for (std::size_t i = half; i < presses.size(); i += 2) {
+      tempered.presses[i] = with(presses[i], fit);
+    }
+    fit.growth = least_growth(groups[1 - half], fit);
+    for (const ScoredPress& group : groups[half]) {
+      tempered.groups.push_back(with(group, fit));
+    }
   }
   return tempered;
 }

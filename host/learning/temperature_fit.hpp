@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <span>
 #include <vector>
@@ -26,6 +27,10 @@ std::vector<double> label_probabilities(const ScoredPress& press, double tempera
 Scores scores_of(std::span<const ScoredPress> presses, double temperature,
                  double feature_weight = 0.0);
 
+/// Groups of several touches each, in two halves that share no touch.
+using GroupHalves = std::array<std::vector<ScoredPress>, 2>;
+std::vector<ScoredPress> both(const GroupHalves& groups);
+
 /// See LearnedSensor::temperature.
 struct TemperatureFit {
   double temperature = 1.0;
@@ -40,14 +45,13 @@ struct TemperatureFit {
 /// them, of the least log-loss. Besides the presses, one more counts, of two labels whose log
 /// evidences differ by the median margin of the presses (label against the best other): it is
 /// right or wrong with equal weights, so that presses which are all told apart, however clearly, do
-/// not make the temperature 0. The growth is that of the least log-loss
-/// of the groups where what each half of them shows helps the other, and else 0.
+/// not make the temperature 0. The growth is that of the least log-loss of
+/// the groups; 0 unless what each half of them shows helps the other half, both taken together.
 /// @param presses of one touch each
-/// @param groups of several touches each
 /// @throws Error on no press, on a press without a log evidence for each of the same labels, finite
 /// for its own, and where no press has two labels to choose from
 TemperatureFit fit_temperature(std::span<const ScoredPress> presses,
-                               std::span<const ScoredPress> groups = {});
+                               const GroupHalves& groups = {});
 
 /// Presses and groups of them.
 struct TemperedPresses {
@@ -55,10 +59,11 @@ struct TemperedPresses {
   std::vector<ScoredPress> groups;
 };
 /// The presses and groups with the logarithms of their labels' probabilities in the place of the
-/// evidences: each half of them, every other one, has the numbers of the other half, or of all
-/// where no press of the other half has two labels to choose from.
+/// evidences. Every other press has the numbers of the others, or of all where none of these has
+/// two labels to choose from. Each half of the groups has the temperature of every other press, and
+/// the growth of the other half.
 /// @throws Error as fit_temperature()
 TemperedPresses tempered_by_halves(std::span<const ScoredPress> presses,
-                                   std::span<const ScoredPress> groups = {});
+                                   const GroupHalves& groups = {});
 
 }  // namespace palpate

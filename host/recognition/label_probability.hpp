@@ -25,7 +25,7 @@ std::vector<double> sums_by_label(const Estimate& estimate, const RecognitionTas
 /// none_label.
 std::vector<double> label_log_evidence(const Estimate& estimate, const RecognitionTask& task);
 
-/// What a touch's sensor model does to the evidence of labels.
+/// What the task's sensor model makes of the evidence of labels after some touches.
 struct Tempering {
   double temperature = 1.0;      ///< temperature_after() the touches
   std::vector<double> features;  ///< [label] feature_nats() of the touches
@@ -36,6 +36,7 @@ struct Tempering {
     return log_evidence / temperature + features[label];
   }
 };
+/// @throws Error as feature_nats()
 Tempering tempering_of(std::span<const Touch> touches, const RecognitionTask& task);
 
 /// The probability of every label: E^(1 / temperature) exp(features), normalised; by

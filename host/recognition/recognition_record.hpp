@@ -109,7 +109,8 @@ struct RecognitionRecord {
 };
 
 /// Sums an estimate by label and compares it with the truth, as far as the truth is known.
-/// @param touches of the unknown so far, for the task's features
+/// @param touches of the unknown so far, for the task's features and temperature, which is that of
+/// one touch where none are given
 RecognitionStep judge(const Estimate& estimate, const GroundTruth& truth,
                       const RecognitionTask& task, std::span<const Touch> touches = {});
 

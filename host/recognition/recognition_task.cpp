@@ -121,22 +121,22 @@ std::string wider_bins_sentence(const RecognitionTask& task) {
   constexpr double much = 1.5;
   const BinSteps& learned = *task.learned_bins;
   const PoseLattice& lattice = task.lattice();
-  const auto wider = [&](const Axis& axis, double step) {
-    return step > 0.0 && axis.count > 1 && axis.step() > much * step;
-  };
-  if (!wider(lattice.x_mm, learned.x_mm) && !wider(lattice.y_mm, learned.y_mm) &&
-      !wider(lattice.theta_rad, learned.theta_rad)) {
+  // A fixed axis has a step of 0, and is no wider than any.
+  const double x_mm = lattice.x_mm.step();
+  const double y_mm = lattice.y_mm.step();
+  const double theta_rad = lattice.theta_rad.step();
+  if (!(x_mm > much * learned.x_mm || y_mm > much * learned.y_mm ||
+        theta_rad > much * learned.theta_rad)) {
     return "";
   }
   constexpr double degrees = 180.0 / std::numbers::pi;
   return fmt::format(
-      "bins {:.3g} x {:.3g} mm x {:.3g} degrees wide are wider than those of the sensor model, "
+      "bins are {:.3g} x {:.3g} mm x {:.3g} degrees wide, wider than the {:.3g} x {:.3g} mm x "
       "{:.3g} "
-      "x {:.3g} mm x {:.3g} degrees: probabilities are too sure; calibrate with these --bins, or "
-      "take "
-      "more",
-      lattice.x_mm.step(), lattice.y_mm.step(), degrees * lattice.theta_rad.step(), learned.x_mm,
-      learned.y_mm, degrees * learned.theta_rad);
+      "degrees that the sensor model is for: probabilities are too sure; calibrate with --bins "
+      "{}x{}x{} and this region, or take more bins",
+      x_mm, y_mm, degrees * theta_rad, learned.x_mm, learned.y_mm, degrees * learned.theta_rad,
+      lattice.x_mm.count, lattice.y_mm.count, lattice.theta_rad.count);
 }
 
 bool tells_known(const RecognitionTask& task) {

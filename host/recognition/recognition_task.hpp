@@ -67,8 +67,8 @@ struct RecognitionTask {
 /// The temperature after a number of touches, at least one.
 double temperature_after(std::size_t touches, const RecognitionTask& task);
 
-/// What to say where the sensor model was learned on narrower bins than the task's by more than a
-/// half; "" elsewhere. The bins are settled before.
+/// What to say where the task's bins are wider than those of the sensor model by more than a half;
+/// "" elsewhere. The bins are settled before.
 std::string wider_bins_sentence(const RecognitionTask& task);
 
 /// Whether a single touch tells how probably its object was learned: the task has a Familiarity,

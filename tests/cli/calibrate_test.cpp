@@ -127,13 +127,14 @@ TEST_F(CalibrateCommand, LearnsForTheBinsThatRecognizeWillHave) {
   EXPECT_EQ(said("20x20x24"), "");
   EXPECT_THAT(
       said("10x10x24"),
-      HasSubstr("bins 2 x 2 mm x 15 degrees wide are wider than those of the sensor model"));
+      HasSubstr("bins are 2 x 2 mm x 15 degrees wide, wider than the 1 x 1 mm x 15 degrees"));
 }
 
 TEST_F(CalibrateCommand, RefusesBinsThatSayNothing) {
   expect_refused(with({"--bins", "auto"}), {"--bins auto", "25x25x16"});
   expect_refused(with({"--bins", "3x3"}), {"--bins"});
   expect_refused(with({"--unposed", "--bins", "9x9x9"}), {"known poses"});
+  expect_refused(with({"--unposed", "--pivot-mm", "auto"}), {"known poses"});
 }
 
 TEST_F(CalibrateCommand, AtUnknownPosesLearnsNoPointSpread) {

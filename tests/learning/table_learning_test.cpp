@@ -75,6 +75,7 @@ TEST(TableLearning, CountsPressesAtKnownPosesWithinABinOfThem) {
     }
   }
   for (int node = 0; node < ReadingLayer::nodes; ++node) {
+    EXPECT_NEAR(within.at(0, node), expected.at(0, node), 1e-6) << node;
     EXPECT_NEAR(within.at(1, node), expected.at(1, node), 1e-6) << node;
   }
 }

@@ -95,9 +95,7 @@ std::vector<ScoredPress> drawn_groups(std::size_t count, std::size_t touches, do
 }
 
 TEST(TemperatureFit, GrowsAsGroupsOfTouchesNeed) {
-  std::vector<ScoredPress> groups = drawn_groups(2000, 3, 24.0, 7);
-  const std::vector<ScoredPress> fours = drawn_groups(2000, 4, 31.0, 8);
-  groups.insert(groups.end(), fours.begin(), fours.end());
+  const GroupHalves groups{drawn_groups(2000, 3, 24.0, 7), drawn_groups(2000, 4, 31.0, 8)};
   const TemperatureFit fit = fit_temperature(drawn_groups(2000, 1, 10.0, 9), groups);
   EXPECT_NEAR(fit.temperature, 10.0, 0.7);
   EXPECT_NEAR(fit.growth, 7.0, 0.7);
@@ -107,12 +105,24 @@ TEST(TemperatureFit, GrowsAsGroupsOfTouchesNeed) {
 
 TEST(TemperatureFit, DoesNotGrowWhereTouchesAreIndependentOrAllToldApart) {
   const std::vector<ScoredPress> presses = drawn_groups(2000, 1, 10.0, 9);
-  EXPECT_EQ(fit_temperature(presses, drawn_groups(500, 3, 5.0, 10)).growth, 0.0);
-  EXPECT_LT(fit_temperature(presses, drawn_groups(2000, 3, 10.0, 11)).growth, 0.4);
-  const std::vector<ScoredPress> apart(
-      40, {.truth = 0, .touches = 3, .log_evidence = {-100.0, -300.0}, .log_density = {}});
-  EXPECT_EQ(fit_temperature(presses, apart).growth, 0.0);
-  EXPECT_EQ(fit_temperature(presses).growth, 0.0);
+  const auto growth = [&](const std::vector<ScoredPress>& a, const std::vector<ScoredPress>& b) {
+    return fit_temperature(presses, {a, b}).growth;
+  };
+  EXPECT_EQ(growth(drawn_groups(500, 3, 5.0, 10), drawn_groups(500, 3, 5.0, 14)), 0.0);
+  EXPECT_LT(growth(drawn_groups(2000, 3, 10.0, 11), drawn_groups(2000, 3, 10.0, 15)), 0.4);
+  std::vector<ScoredPress> apart(40, {.truth = 0,
+                                      .touches = 3,
+                                      .log_evidence = {-100.0, -300.0, -300.0, -300.0, -300.0},
+                                      .log_density = {}});
+  EXPECT_EQ(growth(apart, apart), 0.0);
+  EXPECT_EQ(growth({}, {}), 0.0);
+  // A group that is surely wrong would like a growth of 20, which the other half does not.
+  const std::vector<ScoredPress> right = apart;
+  apart[3].truth = 1;
+  EXPECT_EQ(growth(apart, right), 0.0);
+  std::vector<ScoredPress> as_wrong = right;
+  as_wrong[5].truth = 1;
+  EXPECT_GT(growth(apart, as_wrong), 5.0) << "both halves show it";
 }
 
 TEST(ScoresOfPresses, CountsByHand) {
@@ -164,25 +174,23 @@ TEST(TemperedByHalves, GivesEachHalfTheTemperatureOfTheOther) {
 
 TEST(TemperedByHalves, GivesGroupsTheGrowthOfTheOtherHalf) {
   const std::vector<ScoredPress> presses = drawn_groups(400, 1, 4.0, 12);
-  std::vector<ScoredPress> groups = drawn_groups(400, 3, 20.0, 13);
-  for (std::size_t i = 0; i < groups.size(); i += 2) {
-    groups[i] = {.truth = 0,
-                 .touches = 3,
-                 .log_evidence = {0.0, -300.0, -300.0, -300.0, -300.0},
-                 .log_density = {}};
-  }
+  const GroupHalves groups{
+      drawn_groups(400, 3, 20.0, 13),
+      std::vector<ScoredPress>(400, {.truth = 0,
+                                     .touches = 3,
+                                     .log_evidence = {0.0, -300.0, -300.0, -300.0, -300.0},
+                                     .log_density = {}})};
   const TemperedPresses tempered = tempered_by_halves(presses, groups);
-  ASSERT_EQ(tempered.groups.size(), groups.size());
-  // Groups of the even half are told apart, so that those of the odd half keep a growth of 0.
-  std::vector<ScoredPress> even;
-  for (std::size_t i = 0; i < presses.size(); i += 2) {
-    even.push_back(presses[i]);
+  ASSERT_EQ(tempered.groups.size(), 800U);
+  std::vector<ScoredPress> odd;
+  for (std::size_t i = 1; i < presses.size(); i += 2) {
+    odd.push_back(presses[i]);
   }
-  const double temperature = fit_temperature(even).temperature;
-  EXPECT_NEAR(tempered.groups[1].log_evidence[1],
-              std::log(label_probabilities(groups[1], temperature)[1]), 1e-9);
-  const double grown = -tempered.groups[0].log_evidence[1];
-  EXPECT_LT(grown, 300.0 / 10.0) << "at a temperature of about 20, not 4";
+  // The second half is told apart and shows no growth; the first half's temperature is about 20.
+  const double temperature = fit_temperature(odd).temperature;
+  EXPECT_NEAR(tempered.groups[7].log_evidence[1],
+              std::log(label_probabilities(groups[0][7], temperature)[1]), 1e-9);
+  EXPECT_NEAR(tempered.groups[400].log_evidence[1], -300.0 / 20.0, 2.0);
 }
 
 TEST(TemperedByHalves, TakesAllPressesWhereTheOtherHalfHasNoChoice) {

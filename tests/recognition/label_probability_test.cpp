@@ -257,6 +257,12 @@ TEST(WiderBins, AreToldOfWhereTheSensorModelWasLearnedOnNarrowerOnes) {
     task.learned_bins = steps;
     EXPECT_NE(wider_bins_sentence(task).find("too sure"), std::string::npos);
   }
+  task.learned_bins = BinSteps{1.0, 1.0, 0.0};
+  EXPECT_NE(wider_bins_sentence(task), "") << "learned at a fixed angle";
+  task.learned_bins = BinSteps{1.0, 1.0, 0.5};
+  task.lattice().theta_rad = {0.0, 6.0, 1};
+  EXPECT_NE(wider_bins_sentence(task), "") << "one bin is as wide as the region";
+  task.learned_bins = BinSteps{1.0, 1.0, 0.06};
   task.lattice().theta_rad = {1.0, 1.0, 1};
   EXPECT_EQ(wider_bins_sentence(task), "") << "a fixed angle has no bins";
   task.learned_bins = BinSteps{0.6, 0.6, 0.0};

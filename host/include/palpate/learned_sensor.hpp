@@ -117,8 +117,8 @@ struct PALPATE_API LearnedSensor {
   /// touches share, such as the distance from the pose to the nearest bin, makes several too sure.
   double temperature = 1.0;
   double temperature_growth = 0.0;
-  /// Of the bins for which touches at known poses were taken: on wider ones, probabilities are too
-  /// sure.
+  /// How wide the bins are that it was learned for, from touches at known poses: on wider ones,
+  /// probabilities are too sure.
   std::optional<BinSteps> bins;
   std::optional<LearnedFeatures> features;
   std::optional<Familiarity> familiarity;

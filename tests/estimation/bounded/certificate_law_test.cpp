@@ -110,6 +110,21 @@ TEST(CertificateLaw, BoundsEvidenceLessCloselyWithEveryTouchWhereAskedTo) {
   EXPECT_LE(same.widest_nats, 0.001);
   EXPECT_LE(grown.widest_nats, 0.001 * (1.0 + 500.0 * static_cast<double>(touches.size() - 1)));
   EXPECT_LT(grown.estimate.certificate->bins_evaluated, same.estimate.certificate->bins_evaluated);
+
+  // Touches count one by one, and no more after a reset.
+  BoundedPosterior posterior(device, trial.objects, trial.options);
+  for (const Touch& touch : touches) {
+    posterior.update(std::span(&touch, 1));
+  }
+  EXPECT_EQ(posterior.estimate().certificate->bins_evaluated,
+            grown.estimate.certificate->bins_evaluated);
+  posterior.reset();
+  posterior.update(std::span(touches).first(1));
+  EXPECT_LE(expect_certified(
+                posterior, trial.objects, trial.options,
+                reference_posterior(trial.objects, trial.options, std::span(touches).first(1)))
+                .widest_nats,
+            0.001);
 }
 
 TEST(CertificateLaw, KeepsEveryTolerance) {
