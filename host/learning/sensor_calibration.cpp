@@ -4,14 +4,12 @@
 #include <cmath>
 #include <iterator>
 #include <map>
-#include <numbers>
 #include <optional>
 #include <set>
 #include <utility>
 
 #include <fmt/format.h>
 
-#include "bounding_box.hpp"
 #include "contact_learning.hpp"
 #include "cross_validation.hpp"
 #include "element_spacing.hpp"
@@ -19,6 +17,7 @@
 #include "palpate/error.hpp"
 #include "point_spread.hpp"
 #include "press_checks.hpp"
+#include "tried_bins.hpp"
 
 namespace palpate {
 
@@ -26,15 +25,8 @@ namespace {
 
 /// How long learning a table takes, in cross-validations.
 constexpr double table_cost = 4.0 / 3.0;
-constexpr double step_rad = std::numbers::pi / 18.0;  ///< of poses at which presses are placed
-/// Readings times maps times bins of a cross-validation: some 15 s of one core.
-constexpr double most_additions = 2.5e10;
-/// The same where the bins are given: up to a minute, to try touches on bins no wider than these.
-constexpr double most_additions_at_bins = 1e11;
-/// What a press costs at a bin besides its readings, in readings.
-constexpr double readings_per_press = 16.0;
-/// A touch at a known pose is tried alone, and in some groups.
-constexpr double times_recognised = 1.0 + groups_of_press;
+constexpr double minutes = 0.25;  ///< of one core, to try touches on bins that nobody asked for
+constexpr double minutes_at_bins = 1.0;
 
 /// A calibration in the making.
 class SensorLearning {
@@ -238,111 +230,38 @@ class SensorLearning {
     if (known_poses_) {
       how.counted_within = *result_.sensor.bins;
     } else {
-      how.lattice = placing_lattice(maps_, spacing_mm_, step_rad);
+      how.lattice = placing_lattice(maps_, spacing_mm_, placing_step_rad);
     }
     return how;
   }
 
   /// The bins for which readings are counted, and those on which touches are tried.
   void settle_bins() {
-    const RecognitionBins bins = options_.bins.value_or(RecognitionBins{fine_lattice()});
+    const RecognitionBins bins =
+        options_.bins.value_or(RecognitionBins{fine_lattice(presses_, spacing_mm_)});
     const PoseLattice& lattice = bins.lattice;
     lattice.validate();
     if (bins.auto_pivot) {
-      for (const Press& press : presses_) {
-        require_within(press, lattice);
-      }
+      require_within(presses_, lattice);
     }
     result_.sensor.bins =
         BinSteps{lattice.x_mm.step(), lattice.y_mm.step(), lattice.theta_rad.step()};
-    tried_bins_ = RecognitionBins{affordable(lattice), bins.auto_pivot};
-  }
-
-  static void require_within(const Press& press, const PoseLattice& lattice) {
-    const glm::dvec2 centre_mm = press.T_object_robot->translation_mm;
-    const auto within = [](const Axis& axis, double place) {
-      return place >= axis.lower - axis.step() && place <= axis.upper + axis.step();
-    };
-    if (!within(lattice.x_mm, centre_mm.x) || !within(lattice.y_mm, centre_mm.y)) {
-      throw Error(
-          Fault::input,
-          fmt::format(
-              "{}: the array's centre is at {:g}, {:g} mm, beyond the bins' {:g}:{:g} and "
-              "{:g}:{:g} mm; with an automatic pivot, widen --x-mm and --y-mm to all places "
-              "that are touched",
-              press.name, centre_mm.x, centre_mm.y, lattice.x_mm.lower, lattice.x_mm.upper,
-              lattice.y_mm.lower, lattice.y_mm.upper));
-    }
-  }
-
-  /// Bins half an element's spacing wide, over the places of the arrays' centres.
-  PoseLattice fine_lattice() const {
-    constexpr double finer = 2.0;
-    BoundingBox touched;
-    for (const Press& press : presses_) {
-      touched.take_in(press.T_object_robot->translation_mm);
-    }
-    const double step_mm = spacing_mm_ / finer;
-    const auto axis = [&](double lower, double upper) {
-      const double bins = std::ceil((upper - lower) / step_mm) + 2.0;  // one more at either end
-      const double half_mm = bins * step_mm / 2.0;
-      const double middle_mm = (lower + upper) / 2.0;
-      return Axis{middle_mm - half_mm, middle_mm + half_mm, static_cast<int>(bins)};
-    };
-    constexpr double circle_rad = 2.0 * std::numbers::pi;
-    return {.x_mm = axis(touched.lower.x, touched.upper.x),
-            .y_mm = axis(touched.lower.y, touched.upper.y),
-            .theta_rad = {0.0, circle_rad,
-                          static_cast<int>(std::lround(finer * circle_rad / step_rad))}};
-  }
-
-  /// The lattice, or as fine a one of its region as touches can be tried on in a short time; not
-  /// coarser than presses at unknown poses are placed.
-  PoseLattice affordable(PoseLattice lattice) const {
-    double readings = 0.0;
-    for (const Press& press : presses_) {
-      readings += readings_per_press;
-      for (const Touch& touch : press.touches) {
-        // All elements for No Contact everywhere, and again those that are not in No Contact.
-        const std::vector<Reading> of = result_.sensor.classifier.classify(touch);
-        readings += 2.0 * static_cast<double>(of.size()) -
-                    static_cast<double>(std::ranges::count(of, Reading::no_contact));
-      }
-    }
     // Of the maps of folds, a touch is tried on the one without its own.
     std::map<std::string, std::size_t> maps_of;
     for (const TrainingMap& map : maps_) {
       std::size_t& count = maps_of[map.map.label];
       count = map.presses.empty() ? std::min(count + 1, options_.most_maps) : 1;
     }
-    double maps = 0.0;
+    std::size_t maps = 0;
     for (const auto& [label, count] : maps_of) {
-      maps += static_cast<double>(count);
+      maps += count;
     }
-    const double per_bin = times_recognised * readings * maps;
-    const double most = options_.bins ? most_additions_at_bins : most_additions;
-    const auto bins_of = [](const PoseLattice& of) {
-      return 1.0 * of.x_mm.count * of.y_mm.count * of.theta_rad.count;
-    };
-    const double wider = std::cbrt(bins_of(lattice) * per_bin / most);
-    const auto widen = [&](Axis& axis, double widest) {
-      const double fewest = std::ceil((axis.upper - axis.lower) / widest);
-      const double count = std::max({1.0, fewest, axis.count / wider});
-      axis.count = static_cast<int>(std::min<double>(axis.count, count));
-    };
-    widen(lattice.x_mm, spacing_mm_);
-    widen(lattice.y_mm, spacing_mm_);
-    widen(lattice.theta_rad, step_rad);
-    constexpr double patience = 20.0;
-    if (bins_of(lattice) * per_bin > patience * most_additions_at_bins) {
-      throw Error(
-          Fault::input,
-          fmt::format("to try {} touches on bins over {:g} x {:g} mm would take hours; give --bins "
-                      "with the --x-mm and --y-mm where an unknown may lie, or fewer --frames",
-                      presses_.size(), lattice.x_mm.upper - lattice.x_mm.lower,
-                      lattice.y_mm.upper - lattice.y_mm.lower));
-    }
-    return lattice;
+    tried_bins_ =
+        RecognitionBins{affordable_lattice(lattice, presses_, result_.sensor.classifier,
+                                           {.maps = maps,
+                                            .spacing_mm = spacing_mm_,
+                                            .minutes = options_.bins ? minutes_at_bins : minutes}),
+                        bins.auto_pivot};
   }
 
   /// Counts the placed presses over log odds.

@@ -17,6 +17,14 @@ SensorCalibrationOptions options() {
   return {.threshold = 2.0, .ratio = 0.3, .tables = {{MapLayer::log_odds, 2}}, .folds = 2};
 }
 
+/// Bins over +-10 mm and the full circle.
+RecognitionBins bins(int nx, int ny, int ntheta) {
+  return {.lattice = {.x_mm = {-10.0, 10.0, nx},
+                      .y_mm = {-10.0, 10.0, ny},
+                      .theta_rad = {0.0, 2.0 * std::numbers::pi, ntheta}},
+          .auto_pivot = false};
+}
+
 TEST(SensorCalibration, LearnsWhatAFileHolds) {
   SimulatedPresses simulated;
   simulated.add_shapes(4, 31);
@@ -125,19 +133,16 @@ TEST(SensorCalibration, OfLettersAtUnknownPosesLearnsAllButThePointSpread) {
 
 TEST(SensorCalibration, OnWideBinsIsLessSureTheMoreTouchesThereAre) {
   const LetterPresses letters = three_letters(1);
-  const RecognitionBins wide{.lattice = {.x_mm = {-10.0, 10.0, 13},
-                                         .y_mm = {-10.0, 10.0, 13},
-                                         .theta_rad = {0.0, 2.0 * std::numbers::pi, 12}},
-                             .auto_pivot = false};
-  const SensorCalibration fine = calibrate_sensor(letters.presses, {}, {});
-  const SensorCalibration found = calibrate_sensor(letters.presses, {}, {.bins = wide});
+  const SensorCalibration found = calibrate_sensor(letters.presses, {}, {.bins = bins(13, 13, 12)});
   EXPECT_NEAR(found.sensor.bins->x_mm, 20.0 / 13.0, 1e-9);
   EXPECT_NEAR(found.sensor.bins->theta_rad, std::numbers::pi / 6.0, 1e-9);
   // Three touches share the distance to the nearest bin.
   EXPECT_GT(found.sensor.temperature_growth, 0.1);
   EXPECT_GT(found.groups->table.log_loss, found.groups->after.log_loss);
   EXPECT_LT(found.groups->after.calibration_error, found.groups->table.calibration_error);
-  EXPECT_EQ(found.sensor.gamma, fine.sensor.gamma) << "the sensor's, whatever the bins";
+  EXPECT_EQ(found.sensor.gamma,
+            calibrate_sensor(letters.presses, {}, {.bins = bins(3, 4, 5)}).sensor.gamma)
+      << "the sensor's, whatever the bins";
 }
 
 TEST(SensorCalibration, RefusesBinsThatTouchesDoNotReachOrThatAreTooMany) {
@@ -153,7 +158,7 @@ TEST(SensorCalibration, RefusesBinsThatTouchesDoNotReachOrThatAreTooMany) {
     return std::string("no error");
   };
   EXPECT_NE(message({-5.0, 5.0, 10}, true).find("beyond the bins' -5:5"), std::string::npos);
-  EXPECT_NE(message({-1e5, 1e5, 2'000'000'000}, false).find("hours"), std::string::npos);
+  EXPECT_NE(message({-1e5, 1e5, 2'000'000'000}, false).find("too long"), std::string::npos);
 }
 
 TEST(SensorCalibration, OfFewTouchesAtKnownPosesSaysThatGroupsAreMissing) {
@@ -177,7 +182,8 @@ TEST(SensorCalibration, ComparesWithTheMapsGiven) {
       maps.push_back(map.map);
     }
   }
-  const SensorCalibration found = calibrate_sensor(letters.presses, maps, {});
+  const SensorCalibration found =
+      calibrate_sensor(letters.presses, maps, {.bins = bins(13, 13, 12)});
   EXPECT_EQ(found.objects, 2U);
   EXPECT_EQ(found.after->records, 78U);
   ASSERT_EQ(found.warnings.size(), 1U);
@@ -188,7 +194,8 @@ TEST(SensorCalibration, KeepsTheFirstTableUnlessAnotherIsBetterBeyondChance) {
   const LetterPresses letters = three_letters(5);
   // Five levels tell letters no better than four.
   const SensorCalibration found = calibrate_sensor(
-      letters.presses, {}, {.tables = {{MapLayer::mean_level, 4}, {MapLayer::mean_level, 5}}});
+      letters.presses, {},
+      {.tables = {{MapLayer::mean_level, 4}, {MapLayer::mean_level, 5}}, .bins = bins(13, 13, 12)});
   ASSERT_EQ(found.tried.size(), 2U);
   EXPECT_NE(found.tried[0].log_loss, found.tried[1].log_loss);
   EXPECT_EQ(found.sensor.table->levels(), 4U);
@@ -223,6 +230,7 @@ TEST(SensorCalibration, TakesTheThresholdAndRatioGiven) {
   const LetterPresses letters = three_letters(5);
   const auto classifier = [&](SensorCalibrationOptions given) {
     given.tables = {{MapLayer::log_odds, 2}};
+    given.bins = bins(5, 5, 6);
     return calibrate_sensor(letters.presses, {}, given).sensor.classifier;
   };
   const ContactClassifier both = classifier({.threshold = 1.0, .ratio = 0.2});

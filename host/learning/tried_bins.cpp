@@ -1,0 +1,111 @@
+#include "tried_bins.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include <fmt/format.h>
+
+#include "bounding_box.hpp"
+#include "cross_validation.hpp"
+#include "palpate/error.hpp"
+
+namespace palpate {
+
+namespace {
+
+constexpr double additions_per_minute = 1e11;  ///< of one core
+/// What a press costs at a bin besides its readings, in readings.
+constexpr double readings_per_press = 16.0;
+/// A press is tried alone, and in some groups.
+constexpr double times_tried = 1.0 + groups_of_press;
+/// Beyond, even a patient user would take something for broken; and 1 GiB for each core.
+constexpr double most_minutes = 20.0;
+constexpr double most_bins = 5e7;
+
+double bins_of(const PoseLattice& lattice) {
+  return 1.0 * lattice.x_mm.count * lattice.y_mm.count * lattice.theta_rad.count;
+}
+
+/// Additions to try all presses on a bin.
+double additions_per_bin(const std::vector<Press>& presses, const ContactClassifier& classifier,
+                         std::size_t maps) {
+  double readings = 0.0;
+  for (const Press& press : presses) {
+    readings += readings_per_press;
+    for (const Touch& touch : press.touches) {
+      // All elements for No Contact everywhere, and again those that are not in No Contact.
+      const std::vector<Reading> of = classifier.classify(touch);
+      readings += 2.0 * static_cast<double>(of.size()) -
+                  static_cast<double>(std::ranges::count(of, Reading::no_contact));
+    }
+  }
+  return times_tried * readings * static_cast<double>(maps);
+}
+
+}  // namespace
+
+PoseLattice fine_lattice(const std::vector<Press>& presses, double spacing_mm) {
+  constexpr double finer = 2.0;
+  BoundingBox touched;
+  for (const Press& press : presses) {
+    touched.take_in(press.T_object_robot->translation_mm);
+  }
+  const double step_mm = spacing_mm / finer;
+  const auto axis = [&](double lower, double upper) {
+    const double bins = std::ceil((upper - lower) / step_mm) + 2.0;  // one more at either end
+    const double half_mm = bins * step_mm / 2.0;
+    const double middle_mm = (lower + upper) / 2.0;
+    return Axis{middle_mm - half_mm, middle_mm + half_mm, static_cast<int>(bins)};
+  };
+  constexpr double circle_rad = 2.0 * std::numbers::pi;
+  return {.x_mm = axis(touched.lower.x, touched.upper.x),
+          .y_mm = axis(touched.lower.y, touched.upper.y),
+          .theta_rad = {0.0, circle_rad,
+                        static_cast<int>(std::lround(finer * circle_rad / placing_step_rad))}};
+}
+
+void require_within(const std::vector<Press>& presses, const PoseLattice& lattice) {
+  const auto within = [](const Axis& axis, double place) {
+    return place >= axis.lower - axis.step() && place <= axis.upper + axis.step();
+  };
+  for (const Press& press : presses) {
+    const glm::dvec2 centre_mm = press.T_object_robot->translation_mm;
+    if (!within(lattice.x_mm, centre_mm.x) || !within(lattice.y_mm, centre_mm.y)) {
+      throw Error(
+          Fault::input,
+          fmt::format(
+              "{}: the array's centre is at {:g}, {:g} mm, beyond the bins' {:g}:{:g} and "
+              "{:g}:{:g} mm; with an automatic pivot, widen --x-mm and --y-mm to all places "
+              "that are touched",
+              press.name, centre_mm.x, centre_mm.y, lattice.x_mm.lower, lattice.x_mm.upper,
+              lattice.y_mm.lower, lattice.y_mm.upper));
+    }
+  }
+}
+
+PoseLattice affordable_lattice(PoseLattice lattice, const std::vector<Press>& presses,
+                               const ContactClassifier& classifier, const TrialCost& cost) {
+  const double per_bin = additions_per_bin(presses, classifier, cost.maps);
+  const double bins = std::min(most_bins, cost.minutes * additions_per_minute / per_bin);
+  const double wider = std::cbrt(bins_of(lattice) / bins);
+  const auto widen = [&](Axis& axis, double widest) {
+    const double fewest = std::ceil((axis.upper - axis.lower) / widest);
+    const double count = std::max({1.0, fewest, axis.count / wider});
+    axis.count = static_cast<int>(std::min<double>(axis.count, count));
+  };
+  widen(lattice.x_mm, cost.spacing_mm);
+  widen(lattice.y_mm, cost.spacing_mm);
+  widen(lattice.theta_rad, placing_step_rad);
+  if (bins_of(lattice) > std::min(most_bins, most_minutes * additions_per_minute / per_bin)) {
+    throw Error(
+        Fault::input,
+        fmt::format("to try {} touches on bins over {:g} x {:g} mm would take too long; give "
+                    "--bins with the --x-mm and --y-mm where an unknown may lie, or fewer "
+                    "--frames",
+                    presses.size(), lattice.x_mm.upper - lattice.x_mm.lower,
+                    lattice.y_mm.upper - lattice.y_mm.lower));
+  }
+  return lattice;
+}
+
+}  // namespace palpate
