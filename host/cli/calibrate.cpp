@@ -304,11 +304,11 @@ void add_calibrate(CLI::App& app) {
   command->add_option("--bins", options->recognition.bins,
                       "Pose bins that recognize will be given, as 25x25x16; for touches at known "
                       "poses. Unknowns lie "
-                      "between bins, and fit the wider ones worse: how much, is learned, too "
-                      "[default: bins half the "
-                      "elements' spacing and 5 degrees wide where the touches are; 25x25x16 where "
-                      "a range or X,Y is "
-                      "given]");
+                      "between bins, and fit the worse the wider bins are: calibrate learns by how "
+                      "much [default: bins "
+                      "half the elements' spacing and 5 degrees wide where the touches are; "
+                      "25x25x16 where a range or "
+                      "X,Y is given]");
   command->add_option("--x-mm", options->recognition.x_mm,
                       "Range of these bins, mm, as recognize will be given it [default: -10:10 "
                       "beside --bins]");
