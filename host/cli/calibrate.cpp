@@ -93,9 +93,7 @@ std::optional<RecognitionBins> bins_of(const Options& options, bool known_poses)
   if (infers_region(flags, {})) {
     return {};
   }
-  RecognitionBins bins{given_lattice(flags, {}), has_auto_pivot(flags, {})};
-  bins.lattice.validate();
-  return bins;
+  return RecognitionBins{given_lattice(flags, {}), has_auto_pivot(flags, {})};
 }
 
 /// @param known_poses of the touches
@@ -301,24 +299,21 @@ void add_calibrate(CLI::App& app) {
                    "about as many as you will recognize with. More take longer")
       ->check(require_whole_number)
       ->capture_default_str();
-  command->add_option("--bins", options->recognition.bins,
-                      "Pose bins that recognize will be given, as 25x25x16; for touches at known "
-                      "poses. Unknowns lie "
-                      "between bins, and fit the worse the wider bins are: calibrate learns by how "
-                      "much [default: bins "
-                      "half the elements' spacing and 5 degrees wide where the touches are; "
-                      "25x25x16 where a range or "
-                      "X,Y is given]");
+  command->add_option(
+      "--bins", options->recognition.bins,
+      "Pose bins that recognize will be given, as 25x25x16; for touches at known poses. Unknowns "
+      "lie between bins, and fit the worse the wider bins are: calibrate learns by how much "
+      "[default: bins half the elements' spacing and 5 degrees wide where the touches are; "
+      "25x25x16 where a range or X,Y is given]");
   command->add_option("--x-mm", options->recognition.x_mm,
                       "Range of these bins, mm, as recognize will be given it [default: -10:10 "
                       "beside --bins]");
   command->add_option("--y-mm", options->recognition.y_mm, "The same along y, mm");
   command->add_option("--theta-deg", options->recognition.theta_deg,
                       "The same of theta, degrees [default: 0:360]");
-  command->add_option(
-      "--pivot-mm", options->recognition.pivot_mm,
-      "Pivot of these bins, mm, as recognize will be given it: X,Y or auto [default: "
-      "0,0 beside --bins]");
+  command->add_option("--pivot-mm", options->recognition.pivot_mm,
+                      "Pivot of these bins, mm, as recognize will be given it: X,Y or auto "
+                      "[default: 0,0 beside --bins]");
   command->add_option("--frames", options->frames,
                       "Use the touches A to B - 1 of every recording, counted from 0, as A:B");
   command->add_option("--png", options->png,

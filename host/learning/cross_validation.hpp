@@ -36,7 +36,7 @@ struct CrossValidation {
   std::vector<double> fit_z;
 };
 
-/// Presses in one of CrossValidation::groups, and groups that a press is in.
+/// Presses in one of CrossValidation::groups, and most groups that a press is in.
 inline constexpr std::size_t presses_in_group = 3;
 inline constexpr std::size_t groups_of_press = 3;
 

@@ -4,17 +4,14 @@ namespace palpate {
 
 Press as_unknown(const Press& press, const RecognitionBins& bins, Random& random) {
   const PoseLattice& lattice = bins.lattice;
-  const auto anywhere = [&](const Axis& axis) { return random.uniform(axis.lower, axis.upper); };
-  const auto between_bins = [&](const Axis& axis) {
-    return random.uniform(-0.5, 0.5) * axis.step();
+  const auto drawn = [&](const Axis& axis, double here_mm) {
+    return bins.auto_pivot ? here_mm + random.uniform(-0.5, 0.5) * axis.step()
+                           : random.uniform(axis.lower, axis.upper);
   };
-  const glm::dvec2 here_mm = press.T_object_robot->translation_mm;
   // One draw per statement: within a statement the compiler chooses the order of evaluation.
-  const double x_mm = bins.auto_pivot ? here_mm.x + between_bins(lattice.x_mm)  //
-                                      : anywhere(lattice.x_mm);
-  const double y_mm = bins.auto_pivot ? here_mm.y + between_bins(lattice.y_mm)  //
-                                      : anywhere(lattice.y_mm);
-  const double theta_rad = anywhere(lattice.theta_rad);
+  const double x_mm = drawn(lattice.x_mm, press.T_object_robot->translation_mm.x);
+  const double y_mm = drawn(lattice.y_mm, press.T_object_robot->translation_mm.y);
+  const double theta_rad = random.uniform(lattice.theta_rad.lower, lattice.theta_rad.upper);
 
   Press unknown = press;
   unknown.T_object_robot = lattice.T_object_robot(x_mm, y_mm, theta_rad);

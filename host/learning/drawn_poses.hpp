@@ -16,9 +16,9 @@ struct RecognitionBins {
   bool auto_pivot = true;
 };
 
-/// Touches of an object at a known pose, as if the robot did not know it: the object's pose is
-/// drawn from those that the bins are for, and lies between them as often as that of an unknown
-/// does. At an automatic pivot, x and y are where the press is, but for where between the bins.
+/// A press as if the robot did not know the object's pose. Its robot frame is put so that the pose
+/// is anywhere in the bins' region, and as far from the nearest bin as an unknown's may be. With an
+/// automatic pivot, x and y stay within half a bin of where they are.
 /// @param bins with the pivot (0, 0) where it is automatic
 /// @param press at a known pose; T_object_robot of the returned one is the drawn pose
 Press as_unknown(const Press& press, const RecognitionBins& bins, Random& random);

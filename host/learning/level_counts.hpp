@@ -28,10 +28,12 @@ class LevelCounts {
   /// @param value of the layer at the reading's place
   /// @param weight by which the reading counts, above 0
   void add(Reading reading, double value, double weight = 1.0);
-  /// Counts every element of touches of an object that is at a pose.
+  /// Counts every element of touches of an object that is at one of some poses, each of them as
+  /// likely: a reading counts once in all.
+  /// @param T_object_robot the poses, at least one
   /// @param classifier with the table's levels, see ContactModel::classify()
-  void add(std::span<const Touch> touches, const Pose& T_object_robot, const OccupancyGrid& layer,
-           const ContactModel& classifier, double weight = 1.0);
+  void add(std::span<const Touch> touches, std::span<const Pose> T_object_robot,
+           const OccupancyGrid& layer, const ContactModel& classifier);
   LevelCounts& operator+=(const LevelCounts& other);
 
   std::size_t levels() const { return counts_.size() / ReadingLayer::nodes; }

@@ -25,7 +25,8 @@ namespace {
 
 /// How long learning a table takes, in cross-validations.
 constexpr double table_cost = 4.0 / 3.0;
-constexpr double minutes = 0.25;  ///< of one core, to try touches on bins that nobody asked for
+/// To try touches at known poses, of one core; and on bins that are given.
+constexpr double minutes = 0.25;
 constexpr double minutes_at_bins = 1.0;
 
 /// A calibration in the making.
@@ -79,6 +80,9 @@ class SensorLearning {
           "neither features nor familiarity are learned; give touches of two objects or more");
       return std::move(result_);
     }
+    if (known_poses_) {
+      settle_tried_bins();
+    }
     const double tables = static_cast<double>(tables_.size());
     const double all = 1.0 + tables * (table_cost + 1.0);
     double done = 0.0;
@@ -127,7 +131,7 @@ class SensorLearning {
   };
 
   CrossValidationOptions validation() const {
-    return {.folds = options_.folds, .maps_per_object = options_.most_maps, .bins = tried_bins_};
+    return {.folds = options_.folds, .maps_per_object = options_.most_maps, .bins = bins_};
   }
 
   void learn_readings() {
@@ -235,17 +239,20 @@ class SensorLearning {
     return how;
   }
 
-  /// The bins for which readings are counted, and those on which touches are tried.
+  /// The bins for which touches at known poses are learned.
   void settle_bins() {
-    const RecognitionBins bins =
-        options_.bins.value_or(RecognitionBins{fine_lattice(presses_, spacing_mm_)});
-    const PoseLattice& lattice = bins.lattice;
+    bins_ = options_.bins.value_or(RecognitionBins{fine_lattice(presses_, spacing_mm_)});
+    const PoseLattice& lattice = bins_->lattice;
     lattice.validate();
-    if (bins.auto_pivot) {
+    if (bins_->auto_pivot) {
       require_within(presses_, lattice);
     }
     result_.sensor.bins =
         BinSteps{lattice.x_mm.step(), lattice.y_mm.step(), lattice.theta_rad.step()};
+  }
+
+  /// Leaves no more of these bins than touches are tried on in a short time.
+  void settle_tried_bins() {
     // Of the maps of folds, a touch is tried on the one without its own.
     std::map<std::string, std::size_t> maps_of;
     for (const TrainingMap& map : maps_) {
@@ -256,12 +263,10 @@ class SensorLearning {
     for (const auto& [label, count] : maps_of) {
       maps += count;
     }
-    tried_bins_ =
-        RecognitionBins{affordable_lattice(lattice, presses_, result_.sensor.classifier,
-                                           {.maps = maps,
-                                            .spacing_mm = spacing_mm_,
-                                            .minutes = options_.bins ? minutes_at_bins : minutes}),
-                        bins.auto_pivot};
+    bins_->lattice = affordable_lattice(bins_->lattice, presses_, result_.sensor.classifier,
+                                        {.maps = maps,
+                                         .spacing_mm = spacing_mm_,
+                                         .minutes = options_.bins ? minutes_at_bins : minutes});
   }
 
   /// Counts the placed presses over log odds.
@@ -292,8 +297,8 @@ class SensorLearning {
     } else if (known_poses_) {
       result_.warnings.push_back(
           fmt::format("too few touches to try {} of an object together on maps without them, so "
-                      "that how sure to "
-                      "be after several touches is not learned; give {} or more of each object",
+                      "that how sure to be after several touches is not learned; give {} or more "
+                      "of each object",
                       presses_in_group, presses_in_group * options_.folds));
     }
     // What few presses could show by chance is no warning.
@@ -352,7 +357,7 @@ class SensorLearning {
   std::vector<TableKind> tables_;
   double spacing_mm_ = 0.0;
   std::vector<TrainingMap> maps_;
-  std::optional<RecognitionBins> tried_bins_;  ///< for touches at known poses
+  std::optional<RecognitionBins> bins_;  ///< for touches at known poses
   SensorCalibration result_;
 };
 

@@ -76,14 +76,16 @@ struct SensorCalibration {
 };
 
 /// Learns from presses the contact threshold and ratio, the noise floor, gamma, the prior, the
-/// table, the temperature and the familiarity. From presses at known poses also the point spread,
-/// and how the temperature grows with their number; what they read is counted, and they are
-/// recognised, as far between the bins as unknowns are. From presses at unknown poses, which show
-/// much of an object, the features' distributions with their weight. Of several tables it keeps the
-/// first, unless a later one has less log-loss in the cross-validation by more than two standard
-/// errors. What one object cannot tell (temperature, weight, familiarity) keeps its default, with a
-/// warning. The numbers before and after are of cross-validation; `after` gives each half of the
-/// presses the temperature and weight of the other half. Takes all host threads.
+/// table, the temperature and the familiarity.
+///   Presses at known poses are counted, and recognised alone and in groups, as far from the
+///   nearest bin as unknowns are. They also give the point spread, and by how much the temperature
+///   grows with every further touch. Presses at unknown poses show much of an object. They also
+///   give the features' distributions with their weight.
+/// Of several tables it keeps the first, unless a later one has less log-loss in the
+/// cross-validation by more than two standard errors. What one object cannot tell (temperature,
+/// weight, familiarity) keeps its default, with a warning. The numbers before and after are of
+/// cross-validation; `after` gives each half of the presses the temperature and weight of the other
+/// half. Takes all host threads.
 ///
 /// Data that say little:
 ///   one press: refused; so are presses none of which has a map of its object without it

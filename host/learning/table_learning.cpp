@@ -209,16 +209,13 @@ ObjectCounts count_placed(std::span<const OwnPlacement> placements,
     });
     on.resize(std::min(on.size(), how.best_maps));
     for (const OwnPlacement* placement : on) {
-      LevelCounts& own = counts.try_emplace(presses[press].label, levels.levels()).first->second;
       const std::vector<Pose> poses =
           presses[press].T_object_robot
               ? counted_at(*presses[press].T_object_robot, middles.at(presses[press].label),
                            how.counted_within)
               : std::vector{placement->placement.T_object_robot};
-      for (const Pose& T_object_robot : poses) {
-        own.add(presses[press].touches, T_object_robot, layers[placement->map], classifier,
-                1.0 / static_cast<double>(poses.size()));
-      }
+      counts.try_emplace(presses[press].label, levels.levels())
+          .first->second.add(presses[press].touches, poses, layers[placement->map], classifier);
     }
   }
   return counts;

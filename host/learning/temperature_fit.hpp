@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "evaluation.hpp"
+#include "palpate/learned_sensor.hpp"
 
 namespace palpate {
 
@@ -38,15 +39,15 @@ struct TemperatureFit {
   double growth = 0.0;
 
   double temperature_after(std::size_t touches) const {
-    return temperature + growth * (static_cast<double>(touches) - 1.0);
+    return temperature_of(touches, temperature, growth);
   }
 };
 /// The temperature of at least 0.01, and the weight in [0, 2] of the features where presses have
 /// them, of the least log-loss. Besides the presses, one more counts, of two labels whose log
 /// evidences differ by the median margin of the presses (label against the best other): it is
 /// right or wrong with equal weights, so that presses which are all told apart, however clearly, do
-/// not make the temperature 0. The growth is that of the least log-loss of
-/// the groups; 0 unless what each half of them shows helps the other half, both taken together.
+/// not make the temperature 0. The growth is that of the least log-loss of the groups; it is 0
+/// unless what each half of them shows helps the other half, both taken together.
 /// @param presses of one touch each
 /// @throws Error on no press, on a press without a log evidence for each of the same labels, finite
 /// for its own, and where no press has two labels to choose from

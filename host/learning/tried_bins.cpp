@@ -18,8 +18,9 @@ constexpr double additions_per_minute = 1e11;  ///< of one core
 constexpr double readings_per_press = 16.0;
 /// A press is tried alone, and in some groups.
 constexpr double times_tried = 1.0 + groups_of_press;
-/// Beyond, even a patient user would take something for broken; and 1 GiB for each core.
+/// What takes longer looks broken.
 constexpr double most_minutes = 20.0;
+/// A core needs 12 B for each.
 constexpr double most_bins = 5e7;
 
 double bins_of(const PoseLattice& lattice) {

@@ -59,7 +59,8 @@ std::vector<double> label_log_evidence(const Estimate& estimate, const Recogniti
 }
 
 Tempering tempering_of(std::span<const Touch> touches, const RecognitionTask& task) {
-  return {temperature_after(std::max<std::size_t>(touches.size(), 1), task),
+  return {temperature_of(std::max<std::size_t>(touches.size(), 1), task.temperature,
+                         task.temperature_growth),
           feature_nats(touches, task)};
 }
 

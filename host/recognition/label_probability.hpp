@@ -27,7 +27,7 @@ std::vector<double> label_log_evidence(const Estimate& estimate, const Recogniti
 
 /// What the task's sensor model makes of the evidence of labels after some touches.
 struct Tempering {
-  double temperature = 1.0;      ///< temperature_after() the touches
+  double temperature = 1.0;      ///< of so many touches
   std::vector<double> features;  ///< [label] feature_nats() of the touches
 
   /// log of E^(1 / temperature) exp(features), but for a constant.

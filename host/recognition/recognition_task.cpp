@@ -110,10 +110,6 @@ std::optional<CoarsenedBins> settle_bins(const Device& device, RecognitionTask& 
   return chosen.coarsened ? std::optional(CoarsenedBins{chosen.step_mm, most}) : std::nullopt;
 }
 
-double temperature_after(std::size_t touches, const RecognitionTask& task) {
-  return task.temperature + task.temperature_growth * (static_cast<double>(touches) - 1.0);
-}
-
 std::string wider_bins_sentence(const RecognitionTask& task) {
   if (!task.learned_bins || std::holds_alternative<ParticleOptions>(task.filter)) {
     return "";
@@ -132,9 +128,8 @@ std::string wider_bins_sentence(const RecognitionTask& task) {
   constexpr double degrees = 180.0 / std::numbers::pi;
   return fmt::format(
       "bins are {:.3g} x {:.3g} mm x {:.3g} degrees wide, wider than the {:.3g} x {:.3g} mm x "
-      "{:.3g} "
-      "degrees that the sensor model is for: probabilities are too sure; calibrate with --bins "
-      "{}x{}x{} and this region, or take more bins",
+      "{:.3g} degrees that the sensor model is for: probabilities are too sure; calibrate with "
+      "--bins {}x{}x{} and this region, or take more bins",
       x_mm, y_mm, degrees * theta_rad, learned.x_mm, learned.y_mm, degrees * learned.theta_rad,
       lattice.x_mm.count, lattice.y_mm.count, lattice.theta_rad.count);
 }

@@ -64,10 +64,7 @@ struct RecognitionTask {
   std::function<void()> cancel_point = {};  ///< BoundedOptions::cancel_point, where bounds search
 };
 
-/// The temperature after a number of touches, at least one.
-double temperature_after(std::size_t touches, const RecognitionTask& task);
-
-/// What to say where the task's bins are wider than those of the sensor model by more than a half;
+/// What to say where the task's bins are more than 1.5 times as wide as those of the sensor model;
 /// "" elsewhere. The bins are settled before.
 std::string wider_bins_sentence(const RecognitionTask& task);
 

@@ -133,6 +133,8 @@ TEST_F(CalibrateCommand, LearnsForTheBinsThatRecognizeWillHave) {
 TEST_F(CalibrateCommand, RefusesBinsThatSayNothing) {
   expect_refused(with({"--bins", "auto"}), {"--bins auto", "25x25x16"});
   expect_refused(with({"--bins", "3x3"}), {"--bins"});
+  expect_refused(with({"--bins=2000000000x2000000000x360", "--x-mm=-1e6:1e6", "--y-mm=-1e6:1e6"}),
+                 {"48 touches", "too long", "--x-mm"});
   expect_refused(with({"--unposed", "--bins", "9x9x9"}), {"known poses"});
   expect_refused(with({"--unposed", "--pivot-mm", "auto"}), {"known poses"});
 }

@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include <fmt/ranges.h>
+
 #include "palpate/learned_sensor.hpp"
 #include "program.hpp"
 #include "sample_files.hpp"
@@ -114,6 +116,30 @@ TEST_F(SensorModelFlag, TakesATableInThePlaceOfEquation7) {
                      "maps", "--bins=9x9x8", "--sensor-model", "s.yaml"})
                 .status,
             0);
+}
+
+TEST_F(SensorModelFlag, SaysWhereBinsAreWiderThanItsOwn) {
+  const auto said = [&](const Arguments& command, const std::string& bins) {
+    Arguments arguments = command;
+    arguments.insert(arguments.end(), {"--maps=maps", "--sensor-model=s.yaml", "--bins=" + bins});
+    const Outcome outcome = palpate(arguments);
+    EXPECT_EQ(outcome.status, 0) << outcome.err;
+    return outcome.err;
+  };
+  const Arguments recognize{"recognize", "u.h5"};
+  const Arguments with_device{"batch", "u.h5", "-o", "d", "--filter=histogram"};
+  const Arguments on_host{"batch", "u.h5", "-o", "h", "--filter=bounded"};
+  write({.bins = BinSteps{1.0, 1.0, 0.5}});
+  for (const Arguments& command : {recognize, with_device, on_host}) {
+    SCOPED_TRACE(fmt::format("{}", fmt::join(command, " ")));
+    EXPECT_NE(said(command, "10x10x15").find("calibrate with --bins 10x10x15"), std::string::npos);
+  }
+  std::filesystem::remove_all(folder_ / "d");
+  std::filesystem::remove_all(folder_ / "h");
+  for (const Arguments& command : {recognize, with_device, on_host}) {
+    SCOPED_TRACE(fmt::format("{}", fmt::join(command, " ")));
+    EXPECT_EQ(said(command, "20x20x15"), "");
+  }
 }
 
 TEST_F(SensorModelFlag, IsRefusedInOneLine) {

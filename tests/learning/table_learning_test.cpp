@@ -8,6 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "bounding_box.hpp"
+#include "interpolated_map.hpp"
 #include "palpate/error.hpp"
 #include "simulated_presses.hpp"
 #include "synthetic.hpp"
@@ -33,8 +34,9 @@ LevelCounts true_counts(const SimulatedPresses& simulated, const std::vector<Tra
   for (std::size_t i = 0; i < layers.size(); ++i) {
     for (std::size_t j = 0; j < layers.size(); ++j) {
       if (i != j && simulated.presses[i].label == simulated.presses[j].label) {
-        counts.add(simulated.presses[i].touches,
-                   inverse(simulated.T_object_robot[j]) * simulated.T_object_robot[i], layers[j],
+        const Pose T_object_robot =
+            inverse(simulated.T_object_robot[j]) * simulated.T_object_robot[i];
+        counts.add(simulated.presses[i].touches, std::span(&T_object_robot, 1), layers[j],
                    classifier);
       }
     }
@@ -66,12 +68,19 @@ TEST(TableLearning, CountsPressesAtKnownPosesWithinABinOfThem) {
   LevelCounts expected(2);
   for (const OwnPlacement& own : placed.placements) {
     const Press& press = letters.presses[own.press];
+    const InterpolatedMap values(layers[own.map], layers[own.map].prior);
+    const std::vector<Reading> readings = classifier.classify(press.touches.front());
     for (int i = 0; i < 27; ++i) {
       const Pose turned{{}, (i % 3 - 1) * 0.1};
       const Pose moved{{(i / 3 % 3 - 1) * 0.5, (i / 9 - 1) * 0.3}, 0.0};
       const Pose about{box.middle(), 0.0};
-      expected.add(press.touches, moved * about * turned * inverse(about) * *press.T_object_robot,
-                   layers[own.map], classifier, 1.0 / 27.0);
+      const Pose T_object_sensor = moved * about * turned * inverse(about) * *press.T_object_robot *
+                                   press.touches.front().T_robot_sensor;
+      for (std::size_t e = 0; e < readings.size(); ++e) {
+        expected.add(readings[e],
+                     values.log_odds(T_object_sensor * press.touches.front().elements_mm[e]),
+                     1.0 / 27.0);
+      }
     }
   }
   for (int node = 0; node < ReadingLayer::nodes; ++node) {
@@ -112,7 +121,7 @@ TEST(TableLearning, RecoversTheTableOfASimulatedSensor) {
   }
   LevelCounts counts(3);
   const std::vector<Touch> touches = all_touches(recording);
-  counts.add(touches, Pose{}, layer, classifier);
+  counts.add(touches, std::vector{Pose{}}, layer, classifier);
   const LearnedTable table = table_of({{"A", counts}}, how);
   for (std::size_t level = 0; level < 3; ++level) {
     for (int node = 17; node < 48; ++node) {

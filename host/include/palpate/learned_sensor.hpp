@@ -128,6 +128,11 @@ struct PALPATE_API LearnedSensor {
   void validate() const;
 };
 
+/// The temperature of a number of touches of one object, at least one; see LearnedSensor.
+inline double temperature_of(std::size_t touches, double temperature, double growth) {
+  return temperature + growth * (static_cast<double>(touches) - 1.0);
+}
+
 /// Gives the contact model the sensor's classifier, gamma and table, and each hypothesis the layer
 /// that the table is over. The table has one set of numbers where no hypothesis's label has numbers
 /// of its own, or else a set for each hypothesis, so the hypotheses must keep their order. The
