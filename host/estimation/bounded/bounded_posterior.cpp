@@ -214,17 +214,23 @@ RefinedPose BoundedPosterior::refine(const Mode& mode) const {
     }
   }
   const BinLikelihood& likelihood = thin ? *of_thin : belief.likelihood();
-  const auto log_likelihood = [&](const BinWindow& window) {
+  const auto log_likelihood = [&](std::span<const BinWindow> windows) {
     const int thetas = fit.theta_rad.count;
-    const std::size_t plane = static_cast<std::size_t>(window.row_count) * window.column_count;
-    std::vector<float> logs(window.bins());
+    std::vector<BinBox> boxes;
+    std::vector<std::size_t> firsts{0};  // each box's first bin, and the end
+    for (const BinWindow& window : windows) {
+      for (int t = 0; t < window.theta_count; ++t) {
+        boxes.push_back({mode.object, ((window.theta_first + t) % thetas + thetas) % thetas,
+                         window.row_first, window.row_count, window.column_first,
+                         window.column_count});
+        firsts.push_back(firsts.back() + static_cast<std::size_t>(boxes.back().bins()));
+      }
+    }
+    std::vector<float> logs(firsts.back());
     belief.on_threads([&] {
-      tbb::parallel_for(0, window.theta_count, [&](int t) {
-        const BinBox box{mode.object,         ((window.theta_first + t) % thetas + thetas) % thetas,
-                         window.row_first,    window.row_count,
-                         window.column_first, window.column_count};
-        likelihood.evaluate(std::span(&box, 1), belief.elements(),
-                            std::span(logs).subspan(static_cast<std::size_t>(t) * plane, plane));
+      tbb::parallel_for(std::size_t{0}, boxes.size(), [&](std::size_t i) {
+        likelihood.evaluate(std::span(&boxes[i], 1), belief.elements(),
+                            std::span(logs).subspan(firsts[i], firsts[i + 1] - firsts[i]));
       });
     });
     return std::vector<double>(logs.begin(), logs.end());

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <functional>
+#include <span>
 #include <vector>
 
 namespace palpate {
@@ -16,13 +17,12 @@ struct BinWindow {
   int column_first = 0;
   int column_count = 0;
 
-  std::size_t bins() const {
-    return static_cast<std::size_t>(theta_count) * row_count * column_count;
-  }
+  std::size_t rows() const { return static_cast<std::size_t>(theta_count) * row_count; }
+  std::size_t bins() const { return rows() * column_count; }
 };
 
-/// The log-likelihoods of one object's bins in a window, [theta, y, x], in nats: read from a dense
-/// belief or evaluated on demand.
-using WindowLogLikelihood = std::function<std::vector<double>(const BinWindow&)>;
+/// The log-likelihoods of one object's bins in windows, one window after another, each [theta, y,
+/// x], in nats: read from a dense belief or evaluated on demand.
+using WindowLogLikelihood = std::function<std::vector<double>(std::span<const BinWindow>)>;
 
 }  // namespace palpate

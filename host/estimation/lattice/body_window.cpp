@@ -25,9 +25,9 @@ int steps_within(double reach, const Axis& axis) {
              : std::max(1, static_cast<int>(std::min<double>(axis.count, reach / axis.step())));
 }
 
-Range clipped(int centre, int steps, const Axis& axis) {
-  const int first = std::max(0, centre - steps);
-  return {first, std::min(axis.count - 1, centre + steps) - first + 1};
+Range clipped(int first, int last, const Axis& axis) {
+  first = std::max(0, first);
+  return {first, std::min(axis.count - 1, last) - first + 1};
 }
 
 /// As many bins to either side, but no bin of the circle twice.
@@ -43,19 +43,51 @@ glm::dvec2 lever_mm(const Body& body, const glm::dvec3& place) {
   return body.centroid_mm - glm::dvec2(place);
 }
 
-/// A block of bins that holds the window.
-BinWindow block_around(const PoseLattice& lattice, const Body& body, const BinIndex& centre,
-                       const glm::dvec3& place, double radius_mm) {
-  const int theta_steps = steps_within(radius_mm / spin_mm(body), lattice.theta_rad);
-  const Range theta = lattice.full_circle()
-                          ? around_circle(centre.theta, theta_steps, lattice.theta_rad)
-                          : clipped(centre.theta, theta_steps, lattice.theta_rad);
-  const double turn_rad = std::min(theta_steps * lattice.theta_rad.step(), std::numbers::pi);
-  const double reach_mm =
-      radius_mm + 2.0 * std::sin(turn_rad / 2.0) * glm::length(lever_mm(body, place));
-  const Range y = clipped(centre.y, steps_within(reach_mm, lattice.y_mm), lattice.y_mm);
-  const Range x = clipped(centre.x, steps_within(reach_mm, lattice.x_mm), lattice.x_mm);
-  return {theta.first, theta.count, y.first, y.count, x.first, x.count};
+/// Bins whose distance from the centre bin is within [first, last].
+Range bins_within(int centre, double first, double last, const Axis& axis) {
+  if (axis.count == 1) {
+    return {0, 1};
+  }
+  constexpr double rounding = 1e-6;
+  const double most = axis.count;
+  const auto steps = [&](double distance) { return std::clamp(distance, -most, most); };
+  return clipped(centre + static_cast<int>(std::ceil(steps(first / axis.step()) - rounding)),
+                 centre + static_cast<int>(std::floor(steps(last / axis.step()) + rounding)), axis);
+}
+
+/// For each theta, a block that holds the window's bins.
+std::vector<BinWindow> blocks_around(const PoseLattice& lattice, const Body& body,
+                                     const BinIndex& centre, const BodyMotion& motion,
+                                     double radius_mm) {
+  const int most_steps = steps_within(radius_mm / spin_mm(body), lattice.theta_rad);
+  const Range thetas =
+      lattice.full_circle()
+          ? around_circle(centre.theta, most_steps, lattice.theta_rad)
+          : clipped(centre.theta - most_steps, centre.theta + most_steps, lattice.theta_rad);
+  std::vector<BinWindow> blocks;
+  for (int theta = thetas.first; theta < thetas.first + thetas.count; ++theta) {
+    const int steps = theta - centre.theta;
+    const glm::dvec3 turned_mm = motion.by({0.0, 0.0, steps * lattice.theta_rad.step()});
+    const double left_mm2 = radius_mm * radius_mm - turned_mm.z * turned_mm.z;
+    const double reach_mm = std::sqrt(std::max(left_mm2, 0.0));
+    const bool neighbours = std::abs(steps) <= 1;
+    const auto range = [&](int bin, double swing_mm, const Axis& axis) {
+      // Shifted against the swing, the body stays where it is.
+      double first = -swing_mm - reach_mm;
+      double last = -swing_mm + reach_mm;
+      if (neighbours) {
+        first = left_mm2 < 0.0 ? -axis.step() : std::min(first, -axis.step());
+        last = left_mm2 < 0.0 ? axis.step() : std::max(last, axis.step());
+      }
+      return bins_within(bin, first, last, axis);
+    };
+    const Range y = range(centre.y, turned_mm.y, lattice.y_mm);
+    const Range x = range(centre.x, turned_mm.x, lattice.x_mm);
+    if (y.count > 0 && x.count > 0) {
+      blocks.push_back({theta, 1, y.first, y.count, x.first, x.count});
+    }
+  }
+  return blocks;
 }
 
 }  // namespace
@@ -82,12 +114,12 @@ BodyWindow body_window(const WindowLogLikelihood& log_likelihood, const PoseLatt
                                lattice.theta_rad.centre(centre.theta)},
                     .bins = {},
                     .largest = -std::numeric_limits<double>::infinity()};
-  const BinWindow block = block_around(lattice, body, centre, window.centre, radius_mm);
-  const std::vector<double> logs = log_likelihood(block);
   const BodyMotion motion(body, window.centre);
+  const std::vector<BinWindow> blocks = blocks_around(lattice, body, centre, motion, radius_mm);
+  const std::vector<double> logs = log_likelihood(blocks);
   std::size_t k = 0;
-  for (int t = 0; t < block.theta_count; ++t) {
-    const int theta_steps = block.theta_first + t - centre.theta;
+  for (const BinWindow& block : blocks) {
+    const int theta_steps = block.theta_first - centre.theta;
     const glm::dvec3 turn(0.0, 0.0, theta_steps * lattice.theta_rad.step());
     const glm::dvec3 turned_mm = motion.by(turn);
     for (int j = 0; j < block.row_count; ++j) {

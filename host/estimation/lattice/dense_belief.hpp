@@ -68,8 +68,8 @@ class DenseBelief {
   /// Entropy of one object's bins by themselves, in nats, within 1e-4. Reads only the blocks that
   /// hold a part of it.
   double entropy(std::size_t object, const BeliefSummary& summary) const;
-  /// One object's log-likelihoods in a window, [theta, y, x].
-  std::vector<double> download(std::size_t object, const BinWindow& window) const;
+  /// One object's log-likelihoods in windows, one after another, each [theta, y, x].
+  std::vector<double> download(std::size_t object, std::span<const BinWindow> windows) const;
 
  private:
   gpu::Context& context_;

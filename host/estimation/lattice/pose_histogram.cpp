@@ -294,8 +294,8 @@ Estimate PoseHistogram::estimate() const {
 RefinedPose PoseHistogram::refine(const Mode& mode) const {
   Impl& histogram = whole();
   histogram.require_object(mode.object);
-  const auto log_likelihood = [&](const BinWindow& window) {
-    return histogram.belief.download(static_cast<std::size_t>(mode.object), window);
+  const auto log_likelihood = [&](std::span<const BinWindow> windows) {
+    return histogram.belief.download(static_cast<std::size_t>(mode.object), windows);
   };
   return palpate::refine(log_likelihood, lattice(), histogram.bodies[mode.object], mode);
 }
@@ -314,10 +314,11 @@ Marginals PoseHistogram::marginals(int object) const {
 std::vector<double> PoseHistogram::log_likelihood(int object) const {
   Impl& histogram = whole();
   histogram.require_object(object);
-  std::vector<double> logs = histogram.belief.download(static_cast<std::size_t>(object),
-                                                       {.theta_count = lattice().theta_rad.count,
-                                                        .row_count = lattice().y_mm.count,
-                                                        .column_count = lattice().x_mm.count});
+  const BinWindow all{.theta_count = lattice().theta_rad.count,
+                      .row_count = lattice().y_mm.count,
+                      .column_count = lattice().x_mm.count};
+  std::vector<double> logs =
+      histogram.belief.download(static_cast<std::size_t>(object), std::span(&all, 1));
   if (const double lost = histogram.lost_mass(static_cast<std::size_t>(object)); lost != 0.0) {
     for (double& log_likelihood : logs) {
       log_likelihood += lost;

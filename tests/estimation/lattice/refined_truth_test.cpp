@@ -29,14 +29,16 @@ RefinedPose refined(const PoseLattice& lattice, const glm::dvec2& centroid_mm,
     const Pose pose = lattice.T_object_robot(bin);
     return log_belief({pose * lattice.pivot_mm, pose.theta_rad});
   };
-  const auto in_window = [&](const BinWindow& window) {
+  const auto in_windows = [&](std::span<const BinWindow> windows) {
     const int thetas = lattice.theta_rad.count;
     std::vector<double> values;
-    for (int t = 0; t < window.theta_count; ++t) {
-      const std::int64_t theta = (window.theta_first + t + thetas) % thetas;
-      for (int j = window.row_first; j < window.row_first + window.row_count; ++j) {
-        for (int i = window.column_first; i < window.column_first + window.column_count; ++i) {
-          values.push_back(at_bin((theta * lattice.y_mm.count + j) * lattice.x_mm.count + i));
+    for (const BinWindow& window : windows) {
+      for (int t = 0; t < window.theta_count; ++t) {
+        const std::int64_t theta = (window.theta_first + t + thetas) % thetas;
+        for (int j = window.row_first; j < window.row_first + window.row_count; ++j) {
+          for (int i = window.column_first; i < window.column_first + window.column_count; ++i) {
+            values.push_back(at_bin((theta * lattice.y_mm.count + j) * lattice.x_mm.count + i));
+          }
         }
       }
     }
@@ -46,7 +48,7 @@ RefinedPose refined(const PoseLattice& lattice, const glm::dvec2& centroid_mm,
   for (std::int64_t bin = 1; bin < lattice.bins(); ++bin) {
     best = at_bin(bin) > at_bin(best) ? bin : best;
   }
-  return refine(in_window, lattice, {.centroid_mm = centroid_mm, .inertia_mm2 = spin_mm * spin_mm},
+  return refine(in_windows, lattice, {.centroid_mm = centroid_mm, .inertia_mm2 = spin_mm * spin_mm},
                 {.bin = best});
 }
 

@@ -34,17 +34,19 @@ void expect_near(const RefinedPose& a, const RefinedPose& b, double lever_mm = 0
   }
 }
 
-/// A window of one object's bins, as a belief gives it.
+/// Windows of one object's bins, as a belief gives them.
 std::vector<double> bins_of(const std::vector<double>& logs, const PoseLattice& lattice,
-                            const BinWindow& window) {
+                            std::span<const BinWindow> windows) {
   const int thetas = lattice.theta_rad.count;
   std::vector<double> values;
-  for (int t = 0; t < window.theta_count; ++t) {
-    const int theta = (window.theta_first + t + thetas) % thetas;
-    for (int j = window.row_first; j < window.row_first + window.row_count; ++j) {
-      const std::int64_t row = theta * lattice.plane() + std::int64_t{j} * lattice.x_mm.count;
-      const auto first = logs.begin() + row + window.column_first;
-      values.insert(values.end(), first, first + window.column_count);
+  for (const BinWindow& window : windows) {
+    for (int t = 0; t < window.theta_count; ++t) {
+      const int theta = (window.theta_first + t + thetas) % thetas;
+      for (int j = window.row_first; j < window.row_first + window.row_count; ++j) {
+        const std::int64_t row = theta * lattice.plane() + std::int64_t{j} * lattice.x_mm.count;
+        const auto first = logs.begin() + row + window.column_first;
+        values.insert(values.end(), first, first + window.column_count);
+      }
     }
   }
   return values;
@@ -71,8 +73,8 @@ TEST_P(Refinement, IsThePlainPeakAndCovarianceOfTheReferencesBelief) {
   const reference::Posterior expected =
       reference_posterior(std::span(&object, 1), {.lattice = lattice}, all_touches(recording));
   // The reference's belief refines as the device's does.
-  const auto reference_window = [&](const BinWindow& window) {
-    return bins_of(expected.log_likelihood[0], lattice, window);
+  const auto reference_windows = [&](std::span<const BinWindow> windows) {
+    return bins_of(expected.log_likelihood[0], lattice, windows);
   };
   Mode mode = histogram.estimate().mode;
   const std::int64_t n = lattice.bins();
@@ -84,7 +86,7 @@ TEST_P(Refinement, IsThePlainPeakAndCovarianceOfTheReferencesBelief) {
     const RefinedPose plain =
         plain_refinement(expected.log_likelihood[0], lattice, object.map, bin);
     expect_near(histogram.refine(mode), plain, lever_mm);
-    expect_near(refine(reference_window, lattice, displaced_body(object.map), mode), plain,
+    expect_near(refine(reference_windows, lattice, displaced_body(object.map), mode), plain,
                 lever_mm);
     const RefinedPose from_pose =
         histogram.refine({.bin = {}, .T_object_robot = lattice.T_object_robot(bin)});
