@@ -67,7 +67,7 @@ void store_as(D /*d*/, hn::Vec<D> v, float* to) {
 /// the border, whose nodes are all equal. For float64, patches with nodes of the border have their
 /// index's bits flipped.
 template <typename Lane>
-void find_patches(const BinBlock<Lane>& block, const MapPatches& map, const PlacedElements& placed,
+void find_patches(const BinBlock& block, const MapPatches& map, const PlacedElements& placed,
                   ElementPatches<Lane>& found) {
   const hn::ScalableTag<double> d;
   const hn::Rebind<std::int32_t, decltype(d)> di;
@@ -202,10 +202,11 @@ void store_logs(D d, const Products<D>& product, const double* sums, double cons
 }
 
 /// The bins of one vector, by Eq. 7.
-template <ReadingForm::Kind kind, class D, typename Lane>
-void evaluate_lanes(D d, hn::Vec<D> x, hn::Vec<D> y, const MapPatches& map,
-                    const ElementPatches<Lane>& elements, std::span<const ReadingRun> runs,
+/// @param log_odds_at (element): in every lane
+template <ReadingForm::Kind kind, class D, class LogOddsAt>
+void evaluate_lanes(D d, const LogOddsAt& log_odds_at, std::span<const ReadingRun> runs,
                     const ReadingForm& form, double* log_likelihood) {
+  using Lane = hn::TFromD<D>;
   constexpr bool in_sums = kind == ReadingForm::Kind::sums;
   const int interval = sizeof(Lane) == 4 ? form.float_interval : form.double_interval;
   const auto ratio = hn::Set(d, static_cast<Lane>(form.ratio));
@@ -221,7 +222,7 @@ void evaluate_lanes(D d, hn::Vec<D> x, hn::Vec<D> y, const MapPatches& map,
     const auto at_positive = contact ? one : ratio;
     count += run.end - run.begin;
     for (std::size_t e = run.begin; e < run.end; ++e) {
-      const auto l = log_odds(d, map, elements, e, x, y);
+      const auto l = log_odds_at(e);
       if constexpr (in_sums) {
         multiply_and_add(d, contact ? l : hn::Neg(l), log_ratio, product);
       } else {
@@ -237,42 +238,90 @@ void evaluate_lanes(D d, hn::Vec<D> x, hn::Vec<D> y, const MapPatches& map,
   store_logs(d, product, sums, static_cast<double>(count) * form.log_scale, log_likelihood);
 }
 
+/// The bins of one vector, by the model's form.
+template <class D, class LogOddsAt>
+void evaluate_vector(D d, const LogOddsAt& log_odds_at, std::size_t object,
+                     std::span<const ReadingRun> runs, const ReadingForm& form,
+                     double* log_likelihood) {
+  if (form.kind == ReadingForm::Kind::products) {
+    evaluate_lanes<ReadingForm::Kind::products>(d, log_odds_at, runs, form, log_likelihood);
+  } else if (form.kind == ReadingForm::Kind::sums) {
+    evaluate_lanes<ReadingForm::Kind::sums>(d, log_odds_at, runs, form, log_likelihood);
+  } else if constexpr (sizeof(hn::TFromD<D>) == 8) {
+    look_up_lanes(d, log_odds_at, object, runs, form, log_likelihood);
+  }
+}
+
 template <typename Lane>
-void evaluate(const BinBlock<Lane>& block, const MapPatches& map, std::size_t object,
+void evaluate(const BinList<Lane>& bins, const MapPatches& map, std::size_t object,
               const PlacedElements& placed, std::span<const ReadingRun> runs,
-              const ReadingForm& form, ElementPatches<Lane>& scratch) {
-  find_patches(block, map, placed, scratch);
-  const hn::ScalableTag<Lane> d;
+              const ReadingForm& form, double* log_likelihood,
+              std::vector<ElementPatches<Lane>>& scratch) {
+  const std::vector<BinBlock>& blocks = bins.blocks;
+  for (std::size_t i = 0; i < blocks.size(); ++i) {
+    find_patches(blocks[i], map, placed, scratch[i]);
+  }
+  using D = hn::ScalableTag<Lane>;
+  const D d;
+  const std::size_t lanes = hn::Lanes(d);
   if constexpr (sizeof(Lane) == 8) {
-    if (block.bins == 1 && form.kind == ReadingForm::Kind::table) {
-      look_up_elements(d, map, object, scratch, runs, form, block.log_likelihood);
+    if (form.kind == ReadingForm::Kind::table && blocks.size() == bins.bins()) {
+      for (std::size_t i = 0; i < blocks.size(); ++i) {
+        look_up_elements(d, map, object, scratch[i], runs, form, log_likelihood + i);
+      }
       return;
     }
   }
-  for (std::size_t i = 0; i < block.bins; i += hn::Lanes(d)) {
-    const auto x = hn::LoadU(d, block.x_offset + i);
-    const auto y = hn::LoadU(d, block.y_offset + i);
-    double* const out = block.log_likelihood + i;
-    if (form.kind == ReadingForm::Kind::products) {
-      evaluate_lanes<ReadingForm::Kind::products>(d, x, y, map, scratch, runs, form, out);
-    } else if (form.kind == ReadingForm::Kind::sums) {
-      evaluate_lanes<ReadingForm::Kind::sums>(d, x, y, map, scratch, runs, form, out);
-    } else if constexpr (sizeof(Lane) == 8) {
-      look_up_lanes(d, x, y, map, object, scratch, runs, form, out);
+  HWY_ALIGN Lane x_offset[most_lanes] = {};
+  HWY_ALIGN Lane y_offset[most_lanes] = {};
+  HWY_ALIGN double out[most_lanes];
+  LanesOfBlock<D> parts[most_lanes];
+  std::size_t block = 0;
+  for (std::size_t first = 0, end = 0; first < bins.bins(); first = end) {
+    std::size_t count = 0;
+    // As many blocks as fit wholly, or a part of one.
+    for (end = first; block < blocks.size() && (count == 0 || blocks[block].end <= first + lanes);
+         ++block) {
+      // All lanes from here on: the next block takes its own back.
+      const std::size_t before = end - first;
+      parts[count++] = {&scratch[block], hn::Not(hn::FirstN(d, before)),
+                        hn::Not(hn::FirstN(hn::Rebind<float, D>(), before))};
+      end = std::min(blocks[block].end, first + lanes);
+      if (end < blocks[block].end) {
+        break;
+      }
     }
+    std::copy(bins.x_offset.begin() + first, bins.x_offset.begin() + end, x_offset);
+    std::copy(bins.y_offset.begin() + first, bins.y_offset.begin() + end, y_offset);
+    const auto x = hn::Load(d, x_offset);
+    const auto y = hn::Load(d, y_offset);
+    if (count == 1) {
+      const ElementPatches<Lane>& elements = *parts[0].elements;
+      evaluate_vector(
+          d, [&](std::size_t e) HWY_ATTR { return log_odds(d, map, elements, e, x, y); }, object,
+          runs, form, out);
+    } else {
+      const std::span<const LanesOfBlock<D>> of(parts, count);
+      evaluate_vector(
+          d, [&](std::size_t e) HWY_ATTR { return log_odds(d, map, of, e, x, y); }, object, runs,
+          form, out);
+    }
+    std::copy(out, out + (end - first), log_likelihood + first);
   }
 }
 
-void EvaluateFloat(const BinBlock<float>& block, const MapPatches& map, std::size_t object,
+void EvaluateFloat(const BinList<float>& bins, const MapPatches& map, std::size_t object,
                    const PlacedElements& placed, std::span<const ReadingRun> runs,
-                   const ReadingForm& form, ElementPatches<float>& scratch) {
-  evaluate(block, map, object, placed, runs, form, scratch);
+                   const ReadingForm& form, double* log_likelihood,
+                   std::vector<ElementPatches<float>>& scratch) {
+  evaluate(bins, map, object, placed, runs, form, log_likelihood, scratch);
 }
 
-void EvaluateDouble(const BinBlock<double>& block, const MapPatches& map, std::size_t object,
+void EvaluateDouble(const BinList<double>& bins, const MapPatches& map, std::size_t object,
                     const PlacedElements& placed, std::span<const ReadingRun> runs,
-                    const ReadingForm& form, ElementPatches<double>& scratch) {
-  evaluate(block, map, object, placed, runs, form, scratch);
+                    const ReadingForm& form, double* log_likelihood,
+                    std::vector<ElementPatches<double>>& scratch) {
+  evaluate(bins, map, object, placed, runs, form, log_likelihood, scratch);
 }
 
 std::int64_t Target() { return HWY_TARGET; }
@@ -307,25 +356,31 @@ void place_elements(std::span<const glm::dvec2> from_pivot_mm, double theta_rad,
 }
 
 template <typename Lane>
-void evaluate_block(const BinBlock<Lane>& block, const MapPatches& map, std::size_t object,
-                    const PlacedElements& placed, std::span<const ReadingRun> runs,
-                    const ReadingForm& form, ElementPatches<Lane>& scratch) {
-  scratch.patch.resize(placed.x.size());
-  scratch.x.resize(placed.x.size());
-  scratch.y.resize(placed.x.size());
+void evaluate_bins(const BinList<Lane>& bins, const MapPatches& map, std::size_t object,
+                   const PlacedElements& placed, std::span<const ReadingRun> runs,
+                   const ReadingForm& form, std::span<double> log_likelihood,
+                   std::vector<ElementPatches<Lane>>& scratch) {
+  scratch.resize(std::max(scratch.size(), bins.blocks.size()));
+  for (ElementPatches<Lane>& patches : scratch) {
+    patches.patch.resize(placed.x.size());
+    patches.x.resize(placed.x.size());
+    patches.y.resize(placed.x.size());
+  }
   if constexpr (sizeof(Lane) == 4) {
-    HWY_DYNAMIC_DISPATCH(EvaluateFloat)(block, map, object, placed, runs, form, scratch);
+    HWY_DYNAMIC_DISPATCH(EvaluateFloat)
+    (bins, map, object, placed, runs, form, log_likelihood.data(), scratch);
   } else {
-    HWY_DYNAMIC_DISPATCH(EvaluateDouble)(block, map, object, placed, runs, form, scratch);
+    HWY_DYNAMIC_DISPATCH(EvaluateDouble)
+    (bins, map, object, placed, runs, form, log_likelihood.data(), scratch);
   }
 }
 
-template void evaluate_block(const BinBlock<float>&, const MapPatches&, std::size_t,
-                             const PlacedElements&, std::span<const ReadingRun>, const ReadingForm&,
-                             ElementPatches<float>&);
-template void evaluate_block(const BinBlock<double>&, const MapPatches&, std::size_t,
-                             const PlacedElements&, std::span<const ReadingRun>, const ReadingForm&,
-                             ElementPatches<double>&);
+template void evaluate_bins(const BinList<float>&, const MapPatches&, std::size_t,
+                            const PlacedElements&, std::span<const ReadingRun>, const ReadingForm&,
+                            std::span<double>, std::vector<ElementPatches<float>>&);
+template void evaluate_bins(const BinList<double>&, const MapPatches&, std::size_t,
+                            const PlacedElements&, std::span<const ReadingRun>, const ReadingForm&,
+                            std::span<double>, std::vector<ElementPatches<double>>&);
 
 std::string vector_instructions() { return hwy::TargetName(HWY_DYNAMIC_DISPATCH(Target)()); }
 

@@ -52,29 +52,42 @@ struct ElementPatches {
   std::vector<Lane> y;
 };
 
-/// Bins that lie within two cells of a map along each axis. Positions are in cells of the bordered
-/// map and on its PositionGrid.
-template <typename Lane>
+/// Bins of one object and theta that lie within two cells of the map along each axis.
 struct BinBlock {
-  double x = 0.0;  ///< of the first bin's pivot
+  double x = 0.0;  ///< of the first bin's pivot, in cells of the bordered map, on the PositionGrid
   double y = 0.0;
-  std::size_t bins = 0;
-  const Lane* x_offset = nullptr;  ///< of every bin from the first, in [0, 2], padded
-  const Lane* y_offset = nullptr;
-  double* log_likelihood = nullptr;  ///< out: [bin] in nats, padded
+  std::size_t end = 0;  ///< of its bins in a list; they begin where those of the last block end
+};
+
+/// The bins of some blocks, one block after another.
+template <typename Lane>
+struct BinList {
+  std::vector<BinBlock> blocks;
+  std::vector<Lane> x_offset;  ///< [bin] from the first of its block, in [0, 2] cells
+  std::vector<Lane> y_offset;
+
+  std::size_t bins() const { return x_offset.size(); }
+  void clear() {
+    blocks.clear();
+    x_offset.clear();
+    y_offset.clear();
+  }
 };
 
 /// Rotates elements by theta and rounds them to the grid, clamped to +-`reach_cells`.
 void place_elements(std::span<const glm::dvec2> from_pivot_mm, double theta_rad, double cell_mm,
                     double reach_cells, const PositionGrid& grid, PlacedElements& placed);
 
-/// Log-likelihood of the elements at the block's bins, with vectors of `Lane`. Each bin's bits
-/// depend neither on the block nor on the processor. With a table only for Lane = double.
-/// @param scratch overwritten
+/// Log-likelihood of the elements at bins, with vectors of `Lane`. Vectors are filled with bins of
+/// several blocks. Each bin's bits depend neither on the others nor on the processor. With a table
+/// only for Lane = double.
+/// @param log_likelihood out: [bin] in nats
+/// @param scratch memory to be used again
 template <typename Lane>
-void evaluate_block(const BinBlock<Lane>& block, const MapPatches& map, std::size_t object,
-                    const PlacedElements& placed, std::span<const ReadingRun> runs,
-                    const ReadingForm& form, ElementPatches<Lane>& scratch);
+void evaluate_bins(const BinList<Lane>& bins, const MapPatches& map, std::size_t object,
+                   const PlacedElements& placed, std::span<const ReadingRun> runs,
+                   const ReadingForm& form, std::span<double> log_likelihood,
+                   std::vector<ElementPatches<Lane>>& scratch);
 
 /// The vector instructions that kernels use on this processor, such as "AVX3".
 std::string vector_instructions();

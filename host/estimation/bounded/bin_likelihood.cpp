@@ -12,6 +12,8 @@ namespace {
 /// the 4 x 4 nodes of one patch.
 constexpr int most_block_bins = 16;
 constexpr double most_block_cells = 2.0;
+/// Blocks that are evaluated together, to fill vectors.
+constexpr std::size_t blocks_together = 16;
 
 /// A bin's coordinate in cells of the bordered map.
 double in_cells(const Axis& axis_mm, int bin, double origin_mm, double cell_mm) {
@@ -36,6 +38,24 @@ struct AxisRun {
       }
       offset[count] = static_cast<Lane>(place - first);
     }
+  }
+};
+
+/// Where the results of a block's bins go: rows of a larger box.
+template <typename Result>
+struct BlockResults {
+  Result* out = nullptr;
+  std::ptrdiff_t row_stride = 0;
+  int rows = 0;
+  int columns = 0;
+
+  /// Returns the end of what it took, [row, column].
+  const double* take(const double* from) const {
+    for (int r = 0; r < rows; ++r, from += columns) {
+      std::transform(from, from + columns, out + r * row_stride,
+                     [](double nats) { return static_cast<Result>(nats); });
+    }
+    return from;
   }
 };
 
@@ -86,18 +106,31 @@ void BinLikelihood::move_pivot(const glm::dvec2& pivot_mm) { lattice_.pivot_mm =
 template <typename Lane, typename Result>
 void BinLikelihood::evaluate_in(std::span<const BinBox> boxes, const KnownElements& elements,
                                 std::span<Result> log_likelihood) const {
-  constexpr std::size_t most_bins = std::size_t{most_block_bins} * most_block_bins;
-  std::array<Lane, most_bins> x_offset;
-  std::array<Lane, most_bins> y_offset;
-  std::array<double, most_bins> evaluated;
   PlacedElements placed;
-  ElementPatches<Lane> scratch;
+  BinList<Lane> bins;
+  std::vector<BlockResults<Result>> results;  // [block]
+  std::vector<double> evaluated;
+  std::vector<ElementPatches<Lane>> scratch;
   Result* out = log_likelihood.data();
   const BinBox* last = nullptr;
+  const auto evaluate_list = [&] {
+    evaluated.resize(bins.bins());
+    evaluate_bins<Lane>(bins, placements_[last->object].nodes, last->object, placed, elements.runs,
+                        form_, evaluated, scratch);
+    const double* from = evaluated.data();
+    for (const BlockResults<Result>& block : results) {
+      from = block.take(from);
+    }
+    bins.clear();
+    results.clear();
+  };
   for (const BinBox& box : boxes) {
     const Placement& at = placements_[box.object];
     const PositionGrid& grid = sizeof(Lane) == 4 ? at.float_grid : at.double_grid;
     if (last == nullptr || last->object != box.object || last->theta != box.theta) {
+      if (!results.empty()) {
+        evaluate_list();
+      }
       place_elements(elements.from_pivot_mm, lattice_.theta_rad.centre(box.theta), at.cell_mm,
                      at.reach_cells, grid, placed);
     }
@@ -111,33 +144,26 @@ void BinLikelihood::evaluate_in(std::span<const BinBox> boxes, const KnownElemen
         const AxisRun<Lane> columns(lattice_.x_mm, box.x_first + i,
                                     std::min(width, box.x_count - i), at.origin_mm.x, at.cell_mm,
                                     grid);
-        const std::size_t bins = std::size_t(rows.count) * columns.count;
-        std::size_t k = 0;
         for (int r = 0; r < rows.count; ++r) {
-          for (int c = 0; c < columns.count; ++c, ++k) {
-            x_offset[k] = columns.offset[c];
-            y_offset[k] = rows.offset[r];
+          for (int c = 0; c < columns.count; ++c) {
+            bins.x_offset.push_back(columns.offset[c]);
+            bins.y_offset.push_back(rows.offset[r]);
           }
         }
-        std::fill(x_offset.begin() + k, x_offset.begin() + padded(bins), Lane{0});
-        std::fill(y_offset.begin() + k, y_offset.begin() + padded(bins), Lane{0});
-        evaluate_block<Lane>({.x = columns.first,
-                              .y = rows.first,
-                              .bins = bins,
-                              .x_offset = x_offset.data(),
-                              .y_offset = y_offset.data(),
-                              .log_likelihood = evaluated.data()},
-                             at.nodes, box.object, placed, elements.runs, form_, scratch);
-        const double* from = evaluated.data();
-        for (int r = 0; r < rows.count; ++r, from += columns.count) {
-          std::transform(from, from + columns.count, out + std::ptrdiff_t{j + r} * box.x_count + i,
-                         [](double nats) { return static_cast<Result>(nats); });
+        bins.blocks.push_back({columns.first, rows.first, bins.bins()});
+        results.push_back(
+            {out + std::ptrdiff_t{j} * box.x_count + i, box.x_count, rows.count, columns.count});
+        if (results.size() == blocks_together) {
+          evaluate_list();
         }
         i += columns.count;
       }
       j += rows.count;
     }
     out += box.bins();
+  }
+  if (!results.empty()) {
+    evaluate_list();
   }
 }
 

@@ -10,6 +10,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <span>
 
 #include <hwy/highway.h>
 
@@ -78,21 +79,13 @@ HWY_INLINE hn::Vec<DF> look_up(DF df, const float* from, VI index) {
 #endif
 }
 
-/// As look_up(), in the lanes' numbers. In float64, where nodes of the border are among the
-/// patch's, puts the exact prior in the place of its marker.
-template <bool with_border, class D, class VI>
-HWY_INLINE hn::Vec<D> node(D d, const MapPatches& map, const float* from, VI index) {
-  if constexpr (sizeof(hn::TFromD<D>) == 4) {
-    return look_up(d, from, index);
-  } else {
-    const auto stored = hn::PromoteTo(d, look_up(hn::Rebind<float, D>(), from, index));
-    if constexpr (!with_border) {
-      return stored;
-    }
-    const auto marker = hn::Set(d, static_cast<double>(map.marker()));
-    return hn::IfThenElse(hn::Eq(stored, marker), hn::Set(d, map.prior_log_odds()), stored);
-  }
-}
+/// The lanes of a vector whose bins belong to one block, and the elements about this block.
+template <class D>
+struct LanesOfBlock {
+  const ElementPatches<hn::TFromD<D>>* elements;
+  hn::Mask<D> lanes;
+  hn::Mask<hn::Rebind<float, D>> float_lanes;
+};
 
 /// Between the nodes of a cell: the first of a name is its column, the second its row.
 template <class V>
@@ -102,34 +95,85 @@ HWY_INLINE V bilinear(V v00, V v01, V v10, V v11, V fx, V fy) {
   return hn::Add(left, hn::Mul(hn::Sub(right, left), fx));
 }
 
-template <bool with_border, class D>
-HWY_INLINE hn::Vec<D> interpolate(D d, const MapPatches& map, std::int32_t patch, hn::Vec<D> x,
-                                  hn::Vec<D> y) {
-  const float* const from = map.nodes() + MapPatches::side * static_cast<std::size_t>(patch);
+/// Interpolates between nodes that look_up(offset, index) reads, the nodes of a patch being
+/// numbered from its first corner column by column. In float64, where nodes of the border are among
+/// the patch's, puts the exact prior in the place of its marker.
+/// @param x, y places within the patch
+template <class D, class LookUp>
+HWY_INLINE hn::Vec<D> interpolate(D d, const MapPatches& map, hn::Vec<D> x, hn::Vec<D> y,
+                                  bool with_border, const LookUp& look_up) {
   const auto column = hn::Floor(x);
   const auto row = hn::Floor(y);
   const auto fx = hn::Sub(x, column);
   const auto fy = hn::Sub(y, row);
   const auto index = small_integer(d, hn::Add(hn::Mul(column, hn::Set(d, hn::TFromD<D>{4})), row));
-  const auto v00 = node<with_border>(d, map, from, index);
-  const auto v01 = node<with_border>(d, map, from + 1, index);
-  const auto v10 = node<with_border>(d, map, from + MapPatches::side, index);
-  const auto v11 = node<with_border>(d, map, from + MapPatches::side + 1, index);
-  return bilinear(v00, v01, v10, v11, fx, fy);
+  const auto v00 = look_up(0, index);
+  const auto v01 = look_up(1, index);
+  const auto v10 = look_up(MapPatches::side, index);
+  const auto v11 = look_up(MapPatches::side + 1, index);
+  if constexpr (sizeof(hn::TFromD<D>) == 4) {
+    return bilinear(v00, v01, v10, v11, fx, fy);
+  } else {
+    const auto w00 = hn::PromoteTo(d, v00);
+    const auto w01 = hn::PromoteTo(d, v01);
+    const auto w10 = hn::PromoteTo(d, v10);
+    const auto w11 = hn::PromoteTo(d, v11);
+    // Few patches have nodes of the border: seldom is the branch mispredicted.
+    if (!with_border) {
+      return bilinear(w00, w01, w10, w11, fx, fy);
+    }
+    const auto marker = hn::Set(d, static_cast<double>(map.marker()));
+    const auto prior = hn::Set(d, map.prior_log_odds());
+    const auto unmarked = [&](hn::Vec<D> v)
+                              HWY_ATTR { return hn::IfThenElse(hn::Eq(v, marker), prior, v); };
+    return bilinear(unmarked(w00), unmarked(w01), unmarked(w10), unmarked(w11), fx, fy);
+  }
 }
 
-/// Log odds at an element, for bins that lie `x`, `y` cells from the block's first bin.
+/// The first node of a patch, see ElementPatches::patch.
+inline const float* nodes_of(const MapPatches& map, std::int32_t patch) {
+  return map.nodes() + MapPatches::side * static_cast<std::size_t>(patch >= 0 ? patch : ~patch);
+}
+
+/// Log odds at an element, for bins of one block that lie `x`, `y` cells from its first bin.
 template <class D, typename Lane>
 HWY_INLINE hn::Vec<D> log_odds(D d, const MapPatches& map, const ElementPatches<Lane>& elements,
                                std::size_t e, hn::Vec<D> x, hn::Vec<D> y) {
   const std::int32_t patch = elements.patch[e];
-  const auto in_patch_x = hn::Add(hn::Set(d, elements.x[e]), x);
-  const auto in_patch_y = hn::Add(hn::Set(d, elements.y[e]), y);
-  // Few patches have nodes of the border: seldom is the branch mispredicted.
-  if (sizeof(Lane) == 4 || patch >= 0) {
-    return interpolate<false>(d, map, patch, in_patch_x, in_patch_y);
+  const float* const nodes = nodes_of(map, patch);
+  return interpolate(d, map, hn::Add(hn::Set(d, elements.x[e]), x),
+                     hn::Add(hn::Set(d, elements.y[e]), y), patch < 0,
+                     [&](int offset, auto index) HWY_ATTR {
+                       return look_up(hn::Rebind<float, D>(), nodes + offset, index);
+                     });
+}
+
+/// The same for bins of several blocks.
+/// @param parts those of all lanes
+template <class D>
+HWY_INLINE hn::Vec<D> log_odds(D d, const MapPatches& map, std::span<const LanesOfBlock<D>> parts,
+                               std::size_t e, hn::Vec<D> x, hn::Vec<D> y) {
+  const hn::Rebind<float, D> df;
+  const float* nodes[most_lanes];
+  bool with_border = false;
+  auto from_x = hn::Zero(d);
+  auto from_y = hn::Zero(d);
+  for (std::size_t p = 0; p < parts.size(); ++p) {
+    const std::int32_t patch = parts[p].elements->patch[e];
+    nodes[p] = nodes_of(map, patch);
+    with_border = with_border || patch < 0;
+    from_x = hn::IfThenElse(parts[p].lanes, hn::Set(d, parts[p].elements->x[e]), from_x);
+    from_y = hn::IfThenElse(parts[p].lanes, hn::Set(d, parts[p].elements->y[e]), from_y);
   }
-  return interpolate<true>(d, map, ~patch, in_patch_x, in_patch_y);
+  return interpolate(d, map, hn::Add(from_x, x), hn::Add(from_y, y), with_border,
+                     [&](int offset, auto index) HWY_ATTR {
+                       auto found = look_up(df, nodes[0] + offset, index);
+                       for (std::size_t p = 1; p < parts.size(); ++p) {
+                         found = hn::IfThenElse(parts[p].float_lanes,
+                                                look_up(df, nodes[p] + offset, index), found);
+                       }
+                       return found;
+                     });
 }
 
 }  // namespace HWY_NAMESPACE

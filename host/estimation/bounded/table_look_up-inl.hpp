@@ -56,15 +56,16 @@ class TableRow {
 };
 
 /// The bins of one vector, by a table of log-likelihoods.
-template <class D>
-void look_up_lanes(D d, hn::Vec<D> x, hn::Vec<D> y, const MapPatches& map, std::size_t object,
-                   const ElementPatches<double>& elements, std::span<const ReadingRun> runs,
-                   const ReadingForm& form, double* log_likelihood) {
+/// @param log_odds_at (element): in every lane
+template <class D, class LogOddsAt>
+void look_up_lanes(D d, const LogOddsAt& log_odds_at, std::size_t object,
+                   std::span<const ReadingRun> runs, const ReadingForm& form,
+                   double* log_likelihood) {
   auto sum = hn::Zero(d);
   for (const ReadingRun& run : runs) {
     const TableRow table(d, form, object, run.reading);
     for (std::size_t e = run.begin; e < run.end; ++e) {
-      sum = hn::Add(sum, table.at(d, log_odds(d, map, elements, e, x, y)));
+      sum = hn::Add(sum, table.at(d, log_odds_at(e)));
     }
   }
   hn::StoreU(sum, d, log_likelihood);

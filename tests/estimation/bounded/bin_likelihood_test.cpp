@@ -290,6 +290,9 @@ TEST(BinLikelihood, HasTheSameBitsInEveryBox) {
     of.map = random_map(31, 27, cell_mm, 12.0, 82);
     expect_same_in_parts<float>(of, whole_plane(of.lattice, 1), random);
     expect_same_in_parts<double>(of, whole_plane(of.lattice, 1), random);
+    of.contact.table = crooked_table();
+    of.elements = random_elements(41, 6.0, of.contact.table->levels(), 86);
+    expect_same_in_parts<double>(of, whole_plane(of.lattice, 1), random);
   }
 }
 
