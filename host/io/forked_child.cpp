@@ -105,23 +105,14 @@ bool wait_for_answer(int socket, std::chrono::milliseconds silence) {
   return false;
 }
 
-/// Reads exactly so many bytes, each once `ready` says that it may; false where that fails.
-template <class Ready>
-bool read_all(int socket, void* data, std::size_t bytes, const Ready& ready) {
-  char* rest = static_cast<char*>(data);
-  while (bytes > 0) {
-    if (!ready()) {
-      return false;
-    }
-    const ssize_t got = ::read(socket, rest, bytes);
-    if (got > 0) {
-      rest += got;
-      bytes -= static_cast<std::size_t>(got);
-    } else if (got == 0 || errno != EINTR) {
-      return false;
+/// Reads what has come, at most so many bytes; 0 where the other end is gone.
+std::size_t read_some(int socket, void* data, std::size_t most) {
+  for (;;) {
+    const ssize_t got = ::read(socket, data, most);
+    if (got >= 0 || errno != EINTR) {
+      return static_cast<std::size_t>(std::max<ssize_t>(got, 0));
     }
   }
-  return true;
 }
 
 /// Writes all bytes; false where the other end is gone.
@@ -179,11 +170,38 @@ ForkedChild::~ForkedChild() {
   }
 }
 
+std::size_t ForkedChild::receive(char* data, std::size_t most) {
+  fell_silent_ = !wait_for_answer(socket_.get(), silence_);
+  return fell_silent_ ? 0 : read_some(socket_.get(), data, most);
+}
+
 bool ForkedChild::read(void* data, std::size_t bytes) {
-  return read_all(socket_.get(), data, bytes, [this] {
-    fell_silent_ = !wait_for_answer(socket_.get(), silence_);
-    return !fell_silent_;
-  });
+  // An answer comes in many small parts: together they cost a system call, not one each.
+  constexpr std::size_t together = 1 << 14;
+  char* rest = static_cast<char*>(data);
+  while (bytes > 0) {
+    const std::size_t here = std::min(bytes, received_.size() - next_);
+    std::copy_n(received_.data() + next_, here, rest);
+    next_ += here;
+    rest += here;
+    bytes -= here;
+    if (bytes >= together) {
+      const std::size_t got = receive(rest, bytes);
+      rest += got;
+      bytes -= got;
+      if (got == 0) {
+        return false;
+      }
+    } else if (bytes > 0) {
+      received_.resize(together);
+      received_.resize(receive(received_.data(), together));
+      next_ = 0;
+      if (received_.empty()) {
+        return false;
+      }
+    }
+  }
+  return true;
 }
 
 bool ForkedChild::write(const void* data, std::size_t bytes) {
@@ -191,8 +209,14 @@ bool ForkedChild::write(const void* data, std::size_t bytes) {
 }
 
 void forked_read(int socket, void* data, std::size_t bytes) {
-  if (!read_all(socket, data, bytes, [] { return true; })) {
-    ::_exit(0);
+  char* rest = static_cast<char*>(data);
+  while (bytes > 0) {
+    const std::size_t got = read_some(socket, rest, bytes);
+    if (got == 0) {
+      ::_exit(0);
+    }
+    rest += got;
+    bytes -= got;
   }
 }
 

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <functional>
 #include <mutex>
+#include <vector>
 
 #include "descriptor.hpp"
 
@@ -44,8 +45,13 @@ class ForkedChild {
   bool write(const void* data, std::size_t bytes);
 
  private:
+  /// Reads what the child has sent so far, at most so many bytes; 0 where that fails.
+  std::size_t receive(char* data, std::size_t most);
+
   pid_t pid_ = -1;
   Descriptor socket_;
+  std::vector<char> received_;  ///< what was received together with what was asked for
+  std::size_t next_ = 0;        ///< of these, the first that was not asked for yet
   std::chrono::milliseconds silence_;
   bool fell_silent_ = false;
 };

@@ -1,5 +1,7 @@
 #include "recording_reader.hpp"
 
+#include <algorithm>
+#include <cstring>
 #include <string>
 #include <system_error>
 #include <type_traits>
@@ -33,22 +35,42 @@ static_assert(std::is_trivially_copyable_v<Pose> && std::is_trivially_copyable_v
 
 enum class Answer : std::uint8_t { recording, input_fault, system_fault };
 
-/// Sends lists as their length and their bytes.
+/// Sends an answer: lists as their length and their bytes. Small parts go together.
 class Sender {
  public:
   explicit Sender(int socket) : socket_(socket) {}
 
-  void answer(Answer answer) { forked_write(socket_, &answer, sizeof answer); }
+  void answer(Answer answer) { put(&answer, sizeof answer); }
 
   template <class List>
   void list(const List& values) {
     const std::uint64_t count = values.size();
-    forked_write(socket_, &count, sizeof count);
-    forked_write(socket_, values.data(), count * sizeof(typename List::value_type));
+    put(&count, sizeof count);
+    put(values.data(), count * sizeof(typename List::value_type));
+  }
+
+  void flush() {
+    forked_write(socket_, waiting_.data(), waiting_.size());
+    waiting_.clear();
   }
 
  private:
+  static constexpr std::size_t together = 1 << 14;
+
+  void put(const void* data, std::size_t bytes) {
+    if (waiting_.size() + bytes > together) {
+      flush();
+    }
+    if (bytes > together) {
+      forked_write(socket_, data, bytes);
+    } else {
+      const char* const from = static_cast<const char*>(data);
+      waiting_.insert(waiting_.end(), from, from + bytes);
+    }
+  }
+
   int socket_;
+  std::vector<char> waiting_;
 };
 
 /// Receives them. Nothing is trusted: a damaged file may have corrupted the child's memory.
@@ -128,6 +150,7 @@ void serve(int socket) {
       sender.answer(input ? Answer::input_fault : Answer::system_fault);
       sender.list(std::string(error.what()));
     }
+    sender.flush();
   }
 }
 
@@ -183,9 +206,11 @@ std::optional<Recording> RecordingReader::read_in_child(const std::filesystem::p
   }
   const std::string& name = path.native();
   const std::uint64_t size = name.size();
+  std::vector<char> request(sizeof size + size);
+  std::memcpy(request.data(), &size, sizeof size);
+  std::copy(name.begin(), name.end(), request.begin() + sizeof size);
   Answer answer{};
-  if (!child_->write(&size, sizeof size) || !child_->write(name.data(), size) ||
-      !child_->read(&answer, sizeof answer)) {
+  if (!child_->write(request.data(), request.size()) || !child_->read(&answer, sizeof answer)) {
     return {};
   }
   Receiver receiver(*child_);
