@@ -25,15 +25,12 @@ namespace {
 std::optional<double> error_mm(const RecognitionTask& task, int object, const Pose& T_object_robot,
                                const GroundTruth& truth) {
   const OccupancyGrid& map = task.hypotheses[object].map;
-  if (task.hypotheses[object].mirrored) {
+  const std::optional<Body>& body = task.bodies[object];
+  if (task.hypotheses[object].mirrored || !truth.T_object_robot || map.label != truth.label ||
+      !body) {
     return {};
   }
-  const bool has_body =
-      std::any_of(map.log_odds.begin(), map.log_odds.end(), [](float l) { return l > 0.0F; });
-  if (!truth.T_object_robot || map.label != truth.label || !has_body) {
-    return {};
-  }
-  return pose_error_mm(body_of(map), map.symmetry, T_object_robot, *truth.T_object_robot);
+  return pose_error_mm(*body, map.symmetry, T_object_robot, *truth.T_object_robot);
 }
 
 using Clock = std::chrono::steady_clock;
@@ -153,7 +150,8 @@ std::optional<Pose> RecognitionStep::true_T_robot_object(const RecognitionTask& 
     return {};
   }
   const OccupancyGrid& map = task.hypotheses[mode.object].map;
-  return robot_pose(nearest_equal_pose(body_of(map), map.symmetry, pose(), *truth.T_object_robot));
+  return robot_pose(nearest_equal_pose(task.bodies[mode.object].value(), map.symmetry, pose(),
+                                       *truth.T_object_robot));
 }
 
 GroundTruth ground_truth(const std::string& object, const std::optional<Truth>& truth) {

@@ -29,6 +29,9 @@ RecognitionTask::RecognitionTask(std::vector<Hypothesis> objects, const FilterOp
     const std::string& label = hypothesis.map.label;
     const auto known = std::find(labels.begin(), labels.end(), label);
     label_of.push_back(static_cast<std::size_t>(known - labels.begin()));
+    const bool occupied =
+        std::ranges::any_of(hypothesis.map.log_odds, [](float l) { return l > 0.0F; });
+    bodies.push_back(occupied ? std::optional(body_of(hypothesis.map)) : std::nullopt);
     if (known == labels.end()) {
       labels.push_back(label);
     }

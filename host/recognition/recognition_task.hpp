@@ -13,6 +13,7 @@
 #include "palpate/device.hpp"
 #include "palpate/learned_sensor.hpp"
 #include "palpate/particle_filter.hpp"
+#include "palpate/pose_error.hpp"
 #include "palpate/pose_histogram.hpp"
 
 namespace palpate {
@@ -21,7 +22,7 @@ namespace palpate {
 using FilterOptions = std::variant<HistogramOptions, BoundedOptions, ParticleOptions>;
 
 /// The objects that an unknown may be, and the filter that tells which. The constructor derives the
-/// labels; neither the hypotheses nor the filter's none_weight may change afterwards.
+/// labels and bodies; neither the hypotheses nor the filter's none_weight may change afterwards.
 struct RecognitionTask {
   RecognitionTask(std::vector<Hypothesis> objects, const FilterOptions& options);
 
@@ -44,7 +45,9 @@ struct RecognitionTask {
   /// Each label once, in the order of the maps; none_label comes last where "none of these" has a
   /// weight.
   std::vector<std::string> labels;
-  std::vector<std::size_t> label_of;        ///< [hypothesis] index into labels
+  std::vector<std::size_t> label_of;  ///< [hypothesis] index into labels
+  /// [hypothesis] the occupied cells of its map; none where no cell is.
+  std::vector<std::optional<Body>> bodies;
   std::vector<std::string> map_paths = {};  ///< [hypothesis] file of the map; empty without files
   /// By which settle_bins() chooses the lattice's counts; none where the counts are given.
   std::optional<BinWidth> bin_width = {};

@@ -43,7 +43,8 @@ std::optional<std::string> turned_alike(const Recogniser& recogniser, const Reco
   }
   std::string evidence;
   if (const std::optional<double> error_mm = step.pose_error_mm()) {
-    const double ignored_mm = pose_error_mm(body_of(map), n, step.pose(), *truth.T_object_robot);
+    const double ignored_mm =
+        pose_error_mm(task.bodies[step.mode.object].value(), n, step.pose(), *truth.T_object_robot);
     if (*error_mm - ignored_mm > least_error_mm) {
       evidence =
           fmt::format("the pose error of {:.2f} mm is {:.2f} mm where such turns do not count",

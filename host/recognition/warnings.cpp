@@ -69,14 +69,13 @@ std::optional<std::string> coarse_bins(const RecognitionTask& task, const PoseLa
   constexpr double widest_bin_mm3 = 4.0 / 3.0 * std::numbers::pi * 2.5 * 2.5 * 2.5 / 20.0;
   constexpr double widest_step_mm = 1.5;
   constexpr double own_share = 1.1;  // the belief adds less than a tenth to the bin's variance
-  const OccupancyGrid& map = task.hypotheses[step.mode.object].map;
-  if (!step.refined ||
-      std::none_of(map.log_odds.begin(), map.log_odds.end(), [](float l) { return l > 0.0F; })) {
+  const std::optional<Body>& body = task.bodies[step.mode.object];
+  if (!step.refined || !body) {
     return {};
   }
   const Place variances = variances_of(*step.refined, lattice);
   // How far the object moves, root mean square, where the pose moves by 1 mm or 1 rad.
-  const Place lever_mm{1.0, 1.0, std::sqrt(body_of(map).inertia_mm2)};
+  const Place lever_mm{1.0, 1.0, std::sqrt(body->inertia_mm2)};
   constexpr std::array names{"x", "y", "theta"};
   std::vector<std::string> coarse;
   std::array<int, 3> counts{};

@@ -127,7 +127,9 @@ SearchGoal BoundedBelief::rough_goal() const {
   // followed through the next touches.
   const double all =
       static_cast<double>(options_.lattice.bins()) * static_cast<double>(hypotheses_.size());
-  return {all <= closely_drawn_bins ? options_.tolerance : std::max(options_.tolerance, soon), {}};
+  return {.tolerance =
+              all <= closely_drawn_bins ? options_.tolerance : std::max(options_.tolerance, soon),
+          .exact = false};
 }
 
 const SearchResult& BoundedBelief::found() {

@@ -12,11 +12,13 @@ struct KnownElement {
   glm::dvec2 from_pivot_mm;
 };
 
-KnownElements in_order(std::vector<KnownElement> elements) {
-  std::sort(elements.begin(), elements.end(), [](const KnownElement& a, const KnownElement& b) {
-    return std::tuple(a.reading, a.from_pivot_mm.x, a.from_pivot_mm.y) <
-           std::tuple(b.reading, b.from_pivot_mm.x, b.from_pivot_mm.y);
-  });
+bool before(const KnownElement& a, const KnownElement& b) {
+  return std::tie(a.reading, a.from_pivot_mm.x, a.from_pivot_mm.y) <
+         std::tie(b.reading, b.from_pivot_mm.x, b.from_pivot_mm.y);
+}
+
+/// @param elements in order
+KnownElements in_runs(std::span<const KnownElement> elements) {
   KnownElements known;
   known.from_pivot_mm.reserve(elements.size());
   for (const KnownElement& element : elements) {
@@ -46,7 +48,8 @@ KnownElements all_but(Reading reading, const ArrayReadings& array) {
       elements.push_back({array.readings[i], array.from_pivot_mm[i]});
     }
   }
-  return in_order(std::move(elements));
+  std::sort(elements.begin(), elements.end(), before);
+  return in_runs(elements);
 }
 
 }  // namespace
@@ -62,9 +65,11 @@ KnownElements changed_elements(const ArrayReadings& array) {
 KnownElements merged(std::span<const KnownElements> lists) {
   std::vector<KnownElement> elements;
   for (const KnownElements& list : lists) {
+    const auto merged = static_cast<std::ptrdiff_t>(elements.size());
     append(list, elements);
+    std::inplace_merge(elements.begin(), elements.begin() + merged, elements.end(), before);
   }
-  return in_order(std::move(elements));
+  return in_runs(elements);
 }
 
 }  // namespace palpate

@@ -158,7 +158,8 @@ std::vector<std::size_t> LeafEvaluator::to_be_refined(double share) const {
 }
 
 void LeafEvaluator::settle(double share) {
-  const std::vector<std::size_t> refined = to_be_refined(share);
+  const std::vector<std::size_t> refined =
+      goal_.exact ? to_be_refined(share) : std::vector<std::size_t>();
   std::vector<Leaf> exact;
   std::vector<double> values;
   const auto elements = static_cast<double>(elements_.from_pivot_mm.size() + 1);

@@ -1,6 +1,7 @@
 #include "leaf_pass.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <limits>
 #include <numeric>
 #include <optional>
@@ -81,11 +82,12 @@ void LeafPass::probe(std::vector<Tile> tiles) {
 std::vector<LeafPass::Family> LeafPass::families_of(std::span<const Tile> tiles) const {
   std::vector<Family> families;
   // Single bins lie too far apart to be evaluated together.
-  const int side = bounds_.front().levels().back().size.single_bin ? 1 : batch_side;
+  const int shift =
+      bounds_.front().levels().back().size.single_bin ? 0 : std::countr_zero(unsigned{batch_side});
   for (std::size_t i = 0; i < tiles.size(); ++i) {
     const Tile& tile = tiles[i];
     if (i == 0 || tile.object != tiles[i - 1].object || tile.theta != tiles[i - 1].theta ||
-        tile.y / side != tiles[i - 1].y / side || tile.x / side != tiles[i - 1].x / side) {
+        tile.y >> shift != tiles[i - 1].y >> shift || tile.x >> shift != tiles[i - 1].x >> shift) {
       families.push_back({.first = i, .end = i, .bound = tile.bound});
     }
     Family& family = families.back();

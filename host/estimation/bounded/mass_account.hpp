@@ -23,6 +23,8 @@ struct SearchGoal {
   double tolerance = 1e-6;
   std::optional<double> evidence_nats = {};
   double evidence_range_nats = std::numeric_limits<double>::infinity();
+  /// Bins that hold much of the mass are evaluated once more in float64.
+  bool exact = true;
 };
 
 /// What a search found out about one hypothesis: logs in nats, with its prior weight.

@@ -105,14 +105,16 @@ double UnsettledMass::log_mass(std::size_t hypothesis) const {
 }
 
 double UnsettledMass::largest(std::size_t hypothesis) const {
-  double largest = -std::numeric_limits<double>::infinity();
-  for_slots(used_[hypothesis], [&](std::size_t i) {
-    if (bins_[hypothesis * slots + i] > 0) {
-      largest = upper_edge(i);
+  const SlotSet& used = used_[hypothesis];
+  for (std::size_t word = 0; word < used.size(); ++word) {
+    for (std::uint64_t left = used[word]; left != 0; left &= left - 1) {
+      const std::size_t i = 64 * word + static_cast<std::size_t>(std::countr_zero(left));
+      if (bins_[hypothesis * slots + i] > 0) {
+        return upper_edge(i);
+      }
     }
-    return true;
-  });
-  return largest;
+  }
+  return -std::numeric_limits<double>::infinity();
 }
 
 }  // namespace palpate
