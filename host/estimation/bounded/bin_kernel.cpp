@@ -282,7 +282,7 @@ void evaluate(const BinList<Lane>& bins, const MapPatches& map, std::size_t obje
     // As many blocks as fit wholly, or a part of one.
     for (end = first; block < blocks.size() && (count == 0 || blocks[block].end <= first + lanes);
          ++block) {
-      // All lanes from here on: the next block takes its own back.
+      // All lanes from here on: the next block takes its own.
       const std::size_t before = end - first;
       parts[count++] = {&scratch[block], hn::Not(hn::FirstN(d, before)),
                         hn::Not(hn::FirstN(hn::Rebind<float, D>(), before))};

@@ -149,21 +149,24 @@ HWY_INLINE hn::Vec<D> log_odds(D d, const MapPatches& map, const ElementPatches<
 }
 
 /// The same for bins of several blocks.
-/// @param parts those of all lanes
+/// @param parts at least one; the first has all lanes, and each later one takes its own from those
+/// before it
 template <class D>
 HWY_INLINE hn::Vec<D> log_odds(D d, const MapPatches& map, std::span<const LanesOfBlock<D>> parts,
                                std::size_t e, hn::Vec<D> x, hn::Vec<D> y) {
   const hn::Rebind<float, D> df;
+  const ElementPatches<hn::TFromD<D>>& first = *parts.front().elements;
   const float* nodes[most_lanes];
-  bool with_border = false;
-  auto from_x = hn::Zero(d);
-  auto from_y = hn::Zero(d);
-  for (std::size_t p = 0; p < parts.size(); ++p) {
-    const std::int32_t patch = parts[p].elements->patch[e];
-    nodes[p] = nodes_of(map, patch);
-    with_border = with_border || patch < 0;
-    from_x = hn::IfThenElse(parts[p].lanes, hn::Set(d, parts[p].elements->x[e]), from_x);
-    from_y = hn::IfThenElse(parts[p].lanes, hn::Set(d, parts[p].elements->y[e]), from_y);
+  nodes[0] = nodes_of(map, first.patch[e]);
+  bool with_border = first.patch[e] < 0;
+  auto from_x = hn::Set(d, first.x[e]);
+  auto from_y = hn::Set(d, first.y[e]);
+  for (std::size_t p = 1; p < parts.size(); ++p) {
+    const ElementPatches<hn::TFromD<D>>& elements = *parts[p].elements;
+    nodes[p] = nodes_of(map, elements.patch[e]);
+    with_border = with_border || elements.patch[e] < 0;
+    from_x = hn::IfThenElse(parts[p].lanes, hn::Set(d, elements.x[e]), from_x);
+    from_y = hn::IfThenElse(parts[p].lanes, hn::Set(d, elements.y[e]), from_y);
   }
   return interpolate(d, map, hn::Add(from_x, x), hn::Add(from_y, y), with_border,
                      [&](int offset, auto index) HWY_ATTR {
