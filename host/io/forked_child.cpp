@@ -31,6 +31,9 @@ using namespace std::chrono_literals;
                           action, std::strerror(errno)));
 }
 
+/// An answer has many small parts: together so many bytes cost one system call.
+constexpr std::size_t together = 1 << 14;
+
 /// Returns the private writable memory of this process, as RLIMIT_DATA counts it; none where the
 /// system does not tell.
 std::optional<std::uint64_t> data_bytes() {
@@ -176,8 +179,6 @@ std::size_t ForkedChild::receive(char* data, std::size_t most) {
 }
 
 bool ForkedChild::read(void* data, std::size_t bytes) {
-  // An answer comes in many small parts: together they cost a system call, not one each.
-  constexpr std::size_t together = 1 << 14;
   char* rest = static_cast<char*>(data);
   while (bytes > 0) {
     const std::size_t here = std::min(bytes, received_.size() - next_);
@@ -224,6 +225,23 @@ void forked_write(int socket, const void* data, std::size_t bytes) {
   if (!write_all(socket, data, bytes)) {
     ::_exit(1);
   }
+}
+
+void ForkedSender::put(const void* data, std::size_t bytes) {
+  if (waiting_.size() + bytes > together) {
+    flush();
+  }
+  if (bytes > together) {
+    forked_write(socket_, data, bytes);
+  } else {
+    const char* const from = static_cast<const char*>(data);
+    waiting_.insert(waiting_.end(), from, from + bytes);
+  }
+}
+
+void ForkedSender::flush() {
+  forked_write(socket_, waiting_.data(), waiting_.size());
+  waiting_.clear();
 }
 
 void allow_cpu_seconds(std::uint64_t seconds) {

@@ -56,12 +56,38 @@ class ForkedChild {
   bool fell_silent_ = false;
 };
 
-// The functions below are for `work`, in the child.
+// What follows is for `work`, in the child.
 
 /// Reads exactly this many bytes; ends the child where the parent sends no more.
 void forked_read(int socket, void* data, std::size_t bytes);
 /// Writes all bytes; ends the child where that fails.
 void forked_write(int socket, const void* data, std::size_t bytes);
+
+/// Writes an answer as forked_write() does, small parts of it together.
+class ForkedSender {
+ public:
+  explicit ForkedSender(int socket) : socket_(socket) {}
+
+  template <class Value>
+  void value(const Value& value) {
+    put(&value, sizeof value);
+  }
+  /// Sends values or a text: their number as a 64-bit integer, then their bytes.
+  template <class List>
+  void list(const List& values) {
+    value(std::uint64_t{values.size()});
+    put(values.data(), values.size() * sizeof(typename List::value_type));
+  }
+  /// Writes what has waited for more.
+  void flush();
+
+ private:
+  void put(const void* data, std::size_t bytes);
+
+  int socket_;
+  std::vector<char> waiting_;
+};
+
 /// Allows the child this much more processor time, or up to a second less.
 void allow_cpu_seconds(std::uint64_t seconds);
 /// Allows the child this much memory beyond what it holds now.

@@ -117,6 +117,7 @@ Hdf5Contents::Hdf5Contents(const std::filesystem::path& path,
     open_here(file_bytes, attributes, datasets);
     return;
   }
+  initialise_hdf5();
   child_.emplace(
       [&](int socket) { serve_hdf5(socket, path, file_bytes, attributes, datasets); },
       ForkedLimits{.cpu_seconds = cpu_seconds,

@@ -87,9 +87,9 @@ std::string failure_of_child(const std::filesystem::path& path, std::uint64_t ro
         H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
         H5PLset_loading_state(0);
         const std::string failure = close_file(path, rows) ? "" : hdf5_failure();
-        const std::uint64_t size = failure.size();
-        forked_write(socket, &size, sizeof size);
-        forked_write(socket, failure.data(), size);
+        ForkedSender sender(socket);
+        sender.list(failure);
+        sender.flush();
       },
       {.cpu_seconds = 10, .memory_bytes = memory_bytes, .silence = 1min}, hdf5_mutex);
   std::uint64_t size = 0;

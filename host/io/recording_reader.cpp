@@ -35,45 +35,7 @@ static_assert(std::is_trivially_copyable_v<Pose> && std::is_trivially_copyable_v
 
 enum class Answer : std::uint8_t { recording, input_fault, system_fault };
 
-/// Sends an answer: lists as their length and their bytes. Small parts go together.
-class Sender {
- public:
-  explicit Sender(int socket) : socket_(socket) {}
-
-  void answer(Answer answer) { put(&answer, sizeof answer); }
-
-  template <class List>
-  void list(const List& values) {
-    const std::uint64_t count = values.size();
-    put(&count, sizeof count);
-    put(values.data(), count * sizeof(typename List::value_type));
-  }
-
-  void flush() {
-    forked_write(socket_, waiting_.data(), waiting_.size());
-    waiting_.clear();
-  }
-
- private:
-  static constexpr std::size_t together = 1 << 14;
-
-  void put(const void* data, std::size_t bytes) {
-    if (waiting_.size() + bytes > together) {
-      flush();
-    }
-    if (bytes > together) {
-      forked_write(socket_, data, bytes);
-    } else {
-      const char* const from = static_cast<const char*>(data);
-      waiting_.insert(waiting_.end(), from, from + bytes);
-    }
-  }
-
-  int socket_;
-  std::vector<char> waiting_;
-};
-
-/// Receives them. Nothing is trusted: a damaged file may have corrupted the child's memory.
+/// Receives lists. Nothing is trusted: a damaged file may have corrupted the child's memory.
 class Receiver {
  public:
   explicit Receiver(ForkedChild& child) : child_(child) {}
@@ -93,7 +55,7 @@ class Receiver {
   ForkedChild& child_;
 };
 
-void send(Sender& sender, const Recording& recording) {
+void send(ForkedSender& sender, const Recording& recording) {
   const bool known = recording.truth.has_value();
   sender.list(recording.object);
   sender.list(recording.pressure_unit);
@@ -140,14 +102,14 @@ void serve(int socket) {
     std::string path(size, '\0');
     forked_read(socket, path.data(), size);
     allow_cpu_seconds(cpu_seconds);
-    Sender sender(socket);
+    ForkedSender sender(socket);
     try {
       const Recording recording = read_twice(path);
-      sender.answer(Answer::recording);
+      sender.value(Answer::recording);
       send(sender, recording);
     } catch (const Error& error) {
       const bool input = error.fault() == Fault::input;
-      sender.answer(input ? Answer::input_fault : Answer::system_fault);
+      sender.value(input ? Answer::input_fault : Answer::system_fault);
       sender.list(std::string(error.what()));
     }
     sender.flush();
@@ -182,6 +144,7 @@ RecordingReader::RecordingReader() {
 RecordingReader::~RecordingReader() = default;
 
 void RecordingReader::fork_child() {
+  initialise_hdf5();
   child_ = std::make_unique<ForkedChild>(
       serve,
       ForkedLimits{.cpu_seconds = cpu_seconds, .memory_bytes = child_bytes, .silence = silence},
