@@ -1,7 +1,6 @@
 #include "palpate/fit.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <vector>
 
@@ -20,15 +19,11 @@ struct Sums {
   double deviation = 0.0;  ///< of the log-likelihood from its predicted mean, in nats
   double variance = 0.0;   ///< predicted
 
-  void add(Reading reading, double log_odds, const ContactModel& model, std::size_t object) {
-    const std::size_t levels = reading_levels(model);
-    std::array<double, most_reading_levels> log_p{};
-    for (std::size_t level = 0; level < levels; ++level) {
-      log_p[level] = model.log_likelihood(static_cast<Reading>(level), {log_odds}, object);
-    }
-    const PredictedReading predicted = predicted_reading(std::span(log_p).first(levels));
+  /// @param log_p [level] log-likelihood of each reading, in nats
+  void add(Reading reading, std::span<const double> log_p) {
+    const PredictedReading predicted = predicted_reading(log_p);
     deviation += log_p[static_cast<std::size_t>(reading)] - predicted.most - predicted.below_most;
-    for (std::size_t level = 0; level < levels; ++level) {
+    for (std::size_t level = 0; level < log_p.size(); ++level) {
       const double from_mean = log_p[level] - predicted.most - predicted.below_most;
       variance += predicted.probability[level] * from_mean * from_mean;
     }
@@ -120,15 +115,16 @@ std::optional<Fit> fit_of(std::span<const Touch> touches, const Pose& T_object_r
   ContactModel model = contact;
   model.prior = contact.prior.value_or(map.prior);
   const InterpolatedMap interpolated(map, *model.prior);
+  const std::size_t levels = reading_levels(model);
   Sums sums;
   bool any_known = false;
   for (const Touch& touch : touches) {
     const std::vector<Reading> readings = model.classify(touch);
-    const Pose T_object_sensor = T_object_robot * touch.T_robot_sensor;
+    const std::vector<double> logs = reading_log_likelihoods(
+        touch.elements_mm, T_object_robot * touch.T_robot_sensor, interpolated, model, object);
     for (std::size_t e = 0; e < readings.size(); ++e) {
       if (readings[e] != Reading::unknown) {
-        sums.add(readings[e], interpolated.log_odds(T_object_sensor * touch.elements_mm[e]), model,
-                 object);
+        sums.add(readings[e], std::span(logs).subspan(e * levels, levels));
         any_known = true;
       }
     }

@@ -7,9 +7,8 @@
 #include <optional>
 #include <string>
 
-#include <tbb/parallel_for.h>
-
 #include "hypotheses.hpp"
+#include "parallel_for.hpp"
 #include "seen_window.hpp"
 
 namespace palpate {
@@ -42,7 +41,7 @@ BoundSearch::BoundSearch(std::span<const Hypothesis> hypotheses, const BoundedOp
     label_of_.push_back(labels.try_emplace(hypothesis.map.label, labels.size()).first->second);
   }
   std::vector<std::optional<TileBounds>> bounds(hypotheses.size());
-  tbb::parallel_for(std::size_t{0}, hypotheses.size(), [&](std::size_t i) {
+  parallel_for(hypotheses.size(), [&](std::size_t i) {
     bounds[i].emplace(hypotheses[i].compared(), options.contact, i, options.lattice, sizes);
   });
   for (std::optional<TileBounds>& of : bounds) {
@@ -109,7 +108,7 @@ void BoundSearch::add_known(const KnownElements& known) {
 
 void BoundSearch::keep_rest(const KnownElements& at_rest) {
   rest_tiles_.resize(bounds_.size());
-  tbb::parallel_for(std::size_t{0}, bounds_.size(), [&](std::size_t i) {
+  parallel_for(bounds_.size(), [&](std::size_t i) {
     bounds_[i].make_change_tables();
     rest_tiles_[i].resize(largest_tiles_[i].size());
   });
@@ -148,7 +147,7 @@ void BoundSearch::for_seen(const KnownElements& known, const KnownElements& plac
                            const Visit& visit) const {
   const std::vector<BoundingBox> reaches = reaches_of(known, turns_);
   const std::size_t thetas = turns_.size();
-  tbb::parallel_for(std::size_t{0}, bounds_.size() * thetas, [&](std::size_t row) {
+  parallel_for(bounds_.size() * thetas, [&](std::size_t row) {
     thread_local WindowPlaces places;
     const std::size_t object = row / thetas;
     const std::size_t theta = row % thetas;

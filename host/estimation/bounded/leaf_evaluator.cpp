@@ -5,7 +5,7 @@
 #include <limits>
 #include <numeric>
 
-#include <tbb/parallel_for.h>
+#include "parallel_for.hpp"
 
 namespace palpate {
 
@@ -23,7 +23,7 @@ constexpr double refined_together = 2e6;
 template <typename Leaf, typename Run>
 void for_tasks(std::span<Leaf> leaves, const Run& run) {
   const std::size_t tasks = (leaves.size() + leaves_per_task - 1) / leaves_per_task;
-  tbb::parallel_for(std::size_t{0}, tasks, [&](std::size_t task) {
+  parallel_for(tasks, [&](std::size_t task) {
     const std::size_t first = task * leaves_per_task;
     run(leaves.subspan(first, std::min(leaves_per_task, leaves.size() - first)));
   });

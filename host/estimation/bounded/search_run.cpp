@@ -9,10 +9,9 @@
 #include <numeric>
 #include <tuple>
 
-#include <tbb/parallel_for.h>
-
 #include "contradiction.hpp"
 #include "leaf_pass.hpp"
+#include "parallel_for.hpp"
 #include "seen_window.hpp"
 #include "unsettled_mass.hpp"
 
@@ -159,7 +158,7 @@ class SearchRun {
   /// all other bins, which have the likelihood of the prior.
   void settle_unseen() {
     seen_.resize(search_.bounds_.size() * thetas_);
-    tbb::parallel_for(std::size_t{0}, seen_.size(), [&](std::size_t row) {
+    parallel_for(seen_.size(), [&](std::size_t row) {
       const std::size_t object = row / thetas_;
       seen_[row] = seen_window(reaches_[row % thetas_], search_.maps_[object],
                                search_.bounds_[object].levels().front());
@@ -227,7 +226,7 @@ class SearchRun {
   std::vector<Tile> best_of_rows() {
     std::vector<Tile> best(seen_.size(), {.bound = nothing});
     std::vector<std::int64_t> counts(seen_.size());
-    tbb::parallel_for(std::size_t{0}, best.size(), [&](std::size_t row) {
+    parallel_for(best.size(), [&](std::size_t row) {
       std::int64_t count = 0;
       std::int32_t least = std::numeric_limits<std::int32_t>::max();  // more than any sum
       Tile at;
@@ -251,7 +250,7 @@ class SearchRun {
   }
 
   void count_largest(UnsettledMass& unsettled) const {
-    tbb::parallel_for(std::size_t{0}, search_.bounds_.size(), [&](std::size_t object) {
+    parallel_for(search_.bounds_.size(), [&](std::size_t object) {
       for (std::size_t theta = 0; theta < thetas_; ++theta) {
         for_row(object * thetas_ + theta,
                 [&](std::int32_t sum, int /*x*/, int /*y*/, std::int64_t bins) {
@@ -281,7 +280,7 @@ class SearchRun {
   std::vector<Tile> keep_largest(UnsettledMass& unsettled, double share) const {
     const std::vector<std::size_t> from = account_.droppable_from(unsettled, share);
     std::vector<std::vector<Tile>> kept(search_.bounds_.size());
-    tbb::parallel_for(std::size_t{0}, kept.size(), [&](std::size_t object) {
+    parallel_for(kept.size(), [&](std::size_t object) {
       const std::int64_t end = least_sum(unsettled, object, from[object]);
       for (std::size_t theta = 0; theta < thetas_; ++theta) {
         for_row(object * thetas_ + theta, [&](std::int32_t sum, int x, int y, std::int64_t bins) {
@@ -324,7 +323,7 @@ class SearchRun {
     }
     std::vector<std::vector<Tile>> parts(begins.size());
     std::vector<std::vector<Tile>> rest(begins.size());
-    tbb::parallel_for(std::size_t{0}, begins.size(), [&](std::size_t task) {
+    parallel_for(begins.size(), [&](std::size_t task) {
       thread_local WindowPlaces placed;
       const std::size_t end = task + 1 < begins.size() ? begins[task + 1] : tiles.size();
       const Tile& first = tiles[begins[task]];

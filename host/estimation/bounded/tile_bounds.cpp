@@ -2,8 +2,7 @@
 
 #include <algorithm>
 
-#include <tbb/parallel_for.h>
-
+#include "parallel_for.hpp"
 #include "reading_penalties.hpp"
 
 namespace palpate {
@@ -28,7 +27,7 @@ TileBounds::TileBounds(const OccupancyGrid& map, const ContactModel& contact, st
   }
   const std::size_t readings = contact.table ? contact.table->levels() : 2;
   tables_.assign(levels_.size(), std::vector<WindowTable>(readings));
-  tbb::parallel_for(std::size_t{0}, readings, [&](std::size_t reading) {
+  parallel_for(readings, [&](std::size_t reading) {
     SquarePenalties penalties;
     for (std::size_t level = 0; level < levels_.size(); ++level) {
       const TileSize& size = levels_[level].size;

@@ -6,8 +6,7 @@
 #include <limits>
 #include <utility>
 
-#include <tbb/parallel_for.h>
-
+#include "parallel_for.hpp"
 #include "reading_penalties.hpp"
 #include "window_table.hpp"
 
@@ -134,7 +133,7 @@ std::vector<TouchTile> touch_tiles(std::span<const BinBox> boxes,
                                    std::span<const glm::dvec2> turns, const KnownElements& elements,
                                    const std::function<bool(const BinBox&)>& counts) {
   std::vector<std::vector<TouchTile>> of_box(boxes.size());
-  tbb::parallel_for(std::size_t{0}, boxes.size(), [&](std::size_t i) {
+  parallel_for(boxes.size(), [&](std::size_t i) {
     thread_local WindowPlaces placed;
     const BinBox& box = boxes[i];
     const TileBounds& of = bounds[box.object];
@@ -166,7 +165,7 @@ std::vector<TouchTile> touch_tiles(std::span<const BinBox> boxes,
       }
     }
     std::vector<std::vector<TouchTile>> parts(begins.size());
-    tbb::parallel_for(std::size_t{0}, begins.size(), [&](std::size_t task) {
+    parallel_for(begins.size(), [&](std::size_t task) {
       thread_local WindowPlaces placed;
       const BinBox& first = tiles[begins[task]].box;
       const std::size_t end = task + 1 < begins.size() ? begins[task + 1] : tiles.size();
