@@ -135,7 +135,7 @@ void live(const Options& options) {
   Recogniser recogniser = open_recogniser(options.recognition, scene, device, task);
   warm_up(recogniser, task, description, elements_mm);
   if (options.recognition.verbose) {
-    print_engine(device, recogniser, task);
+    print_engine(&device, recogniser, task);
   }
   std::optional<LineFile> json;
   if (!options.json.empty()) {

@@ -215,7 +215,7 @@ void plan_touches(const Options& options) {
   plan.both_nats = recogniser.histogram()->entropy();
   write_results(options, plan, device);
   if (options.recognition.verbose) {
-    print_engine(device, recogniser, task);
+    print_engine(&device, recogniser, task);
   }
 }
 

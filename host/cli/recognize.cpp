@@ -233,7 +233,7 @@ void recognize(const Options& options) {
     for (const RecognitionRecord& record : records) {
       seconds += record.seconds;
     }
-    print_engine(device, recogniser, task);
+    print_engine(&device, recogniser, task);
     fmt::print(stderr, "seconds: {:.3f} to recognise\n", seconds);
   }
 }

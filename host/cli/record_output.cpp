@@ -85,7 +85,7 @@ std::string setup_words(const Device& device, const RecognitionTask& task) {
       device.name());
 }
 
-void print_engine(const Device& device, const Recogniser& recogniser, const RecognitionTask& task) {
+void print_engine(const Device* device, const Recogniser& recogniser, const RecognitionTask& task) {
   const PoseLattice& lattice = task.lattice();
   const auto words = [](const char* name, const Axis& axis, double unit, const char* unit_name) {
     return fmt::format("{} {:g} to {:g} {}, {} bins in steps of {:.4g}", name, axis.lower * unit,
@@ -115,10 +115,13 @@ void print_engine(const Device& device, const Recogniser& recogniser, const Reco
   }
   filter += reason_of_filter(task);
   fmt::print(stderr,
-             "device: {}, {:.1f} MiB of its memory\nfilter: {}\nlattice: {}\n         {}\n"
+             "device: {}\nfilter: {}\nlattice: {}\n         {}\n"
              "         {}\n         pivot {}\n",
-             device.name(), static_cast<double>(recogniser.device_bytes()) / (1 << 20), filter,
-             words("x", lattice.x_mm, 1.0, "mm"), words("y", lattice.y_mm, 1.0, "mm"),
+             device == nullptr
+                 ? "none"
+                 : fmt::format("{}, {:.1f} MiB of its memory", device->name(),
+                               static_cast<double>(recogniser.device_bytes()) / (1 << 20)),
+             filter, words("x", lattice.x_mm, 1.0, "mm"), words("y", lattice.y_mm, 1.0, "mm"),
              words("theta", lattice.theta_rad, degrees(1.0), "deg"),
              task.auto_pivot ? "at the array's centre at the first touch in contact"
                              : fmt::format("{:g}, {:g} mm in the robot frame", lattice.pivot_mm.x,

@@ -13,7 +13,8 @@ namespace palpate::cli {
 std::string setup_words(const Device& device, const RecognitionTask& task);
 /// Prints on standard error how the device works: its memory, the filter with its paths through the
 /// likelihood, the lattice.
-void print_engine(const Device& device, const Recogniser& recogniser, const RecognitionTask& task);
+/// @param device null where none is used
+void print_engine(const Device* device, const Recogniser& recogniser, const RecognitionTask& task);
 
 /// The truth as it was given: the object and, where it is known, T_robot_object [x, y, theta].
 nlohmann::ordered_json truth_to_json(const GroundTruth& truth);

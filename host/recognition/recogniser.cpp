@@ -15,16 +15,20 @@ namespace {
 
 using Filter = std::variant<PoseHistogram, BoundedPosterior, ParticleFilter>;
 
+BoundedOptions bounded_options(const RecognitionTask& task) {
+  auto options = std::get<BoundedOptions>(task.filter);
+  if (task.cancel_point) {
+    options.cancel_point = task.cancel_point;
+  }
+  return options;
+}
+
 Filter make_filter(Device& device, const RecognitionTask& task) {
   if (const auto* particles = std::get_if<ParticleOptions>(&task.filter)) {
     return ParticleFilter(device, task.hypotheses, *particles);
   }
-  if (const auto* bounded = std::get_if<BoundedOptions>(&task.filter)) {
-    BoundedOptions options = *bounded;
-    if (task.cancel_point) {
-      options.cancel_point = task.cancel_point;
-    }
-    return BoundedPosterior(device, task.hypotheses, options);
+  if (std::holds_alternative<BoundedOptions>(task.filter)) {
+    return BoundedPosterior(device, task.hypotheses, bounded_options(task));
   }
   return PoseHistogram(device, task.hypotheses, std::get<HistogramOptions>(task.filter));
 }
@@ -36,6 +40,12 @@ Recogniser::Recogniser(Device& device, const RecognitionTask& task)
       classifier_(task.classifier()),
       auto_pivot_(task.auto_pivot),
       filter_(make_filter(device, task)) {}
+
+Recogniser::Recogniser(const RecognitionTask& task)
+    : lattice_(task.lattice()),
+      classifier_(task.classifier()),
+      auto_pivot_(task.auto_pivot),
+      filter_(BoundedPosterior(task.hypotheses, bounded_options(task))) {}
 
 void Recogniser::reset() {
   std::visit([](auto& filter) { filter.reset(); }, filter_);

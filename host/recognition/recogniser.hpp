@@ -17,6 +17,8 @@ namespace palpate {
 class Recogniser {
  public:
   Recogniser(Device& device, const RecognitionTask& task);
+  /// By bounds on the host, without a device.
+  explicit Recogniser(const RecognitionTask& task);
 
   /// Forgets all touches, for the next unknown. Particles start from the same places again; bounds
   /// keep their tables. An automatic pivot returns to the robot frame's origin until a touch places

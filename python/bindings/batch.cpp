@@ -106,14 +106,14 @@ OpenBatch open_batch(const std::string& head, const Request& request, Device& de
                             difference));
   }
   cli::settle_as_before(task, recognition);
-  cli::keep_on_host(recognition, threads);
+  cli::take_threads(recognition, threads);
   const auto current = std::make_shared<const Call*>(nullptr);
   recognition.cancel_point = [current] {
     if (*current != nullptr) {
       (*current)->check();
     }
   };
-  Recogniser recogniser = cli::open_filter(device, recognition);
+  Recogniser recogniser = cli::open_batch_filter(&device, recognition);
   return {task,          std::move(rules), std::move(recognition),
           request.trace, current,          std::move(recogniser)};
 }
@@ -204,7 +204,7 @@ void bind_batch(nb::module_& module) {
       .def_prop_ro(
           "on_host",
           [](const Owned<OpenBatch>& self) {
-            return std::holds_alternative<BoundedOptions>(self.constant().recognition.filter);
+            return !cli::uses_device(self.constant().recognition);
           },
           "Whether bounds recognise, which compute on the host alone.")
       .def("recognize", &recognise_python, "entries"_a,

@@ -36,8 +36,29 @@ TEST_F(Batch, TimesAndDevicesStandBeside) {
   EXPECT_EQ(run["first"], 3);
   EXPECT_EQ(run["failed"], 1);
   EXPECT_EQ(run["seconds"].size(), 3u);
-  EXPECT_FALSE(run["device"].get<std::string>().empty());
+  EXPECT_EQ(run["device"], "none");
   EXPECT_EQ(bytes_of(folder_ / "r/chunks/000001.ndjson").find("seconds"), std::string::npos);
+}
+
+TEST_F(Batch, BoundsNeedNoDevice) {
+  const auto batch_of_one = [](const std::string& results, const std::vector<std::string>& more) {
+    std::vector<std::string> arguments{"batch", "u/00.h5", "-o", results, "--maps", "maps"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return arguments;
+  };
+  const std::vector<std::string> histogram{"--filter", "histogram", "--bins", "10x10x10"};
+  palpate(batch("r"));
+  ASSERT_EQ(palpate(batch_of_one("h", histogram)).status, 0);
+  const nlohmann::json run = nlohmann::json::parse(bytes_of(folder_ / "h/runs/000000.json"));
+  EXPECT_NE(done({"devices"}).find(run["device"].get<std::string>()), std::string::npos);
+
+  const Variable vulkan("PALPATE_VULKAN_LIBRARY", "/nonexistent/libvulkan.so.1");
+  const Variable rank("SLURM_LOCALID", "0");
+  EXPECT_EQ(palpate(batch("without")).status, 3) << "one recording is broken";
+  EXPECT_EQ(merged("without"), merged("r"));
+  expect_failure(1, batch_of_one("d", histogram), {"install libvulkan1"});
+  expect_failure(1, batch_of_one("e", {"--filter", "bounded", "--bins", "auto"}),
+                 {"install libvulkan1"});
 }
 
 TEST_F(Batch, FinishedResultsStay) {

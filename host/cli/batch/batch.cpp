@@ -97,18 +97,20 @@ double seconds_since(std::chrono::steady_clock::time_point begin) {
 
 /// Recognises what is missing of the shard. Returns the counts of this run.
 BatchCounts compute(const BatchRun& run, const Chunks& chunks, SettledBatch& settled,
-                    const Options& options) {
-  if (!settled.device) {
-    settled.device = open_device(options.recognition, run.rules.scene);
+                    const std::function<Device()>& open) {
+  if (!settled.device && uses_device(settled.recognition)) {
+    settled.device = open();
   }
   Progress progress("recognising");
   const auto begin = std::chrono::steady_clock::now();
-  return run_batch(run, *settled.device, [&](const BatchCounts& counts) {
-    const double seconds = seconds_since(begin);
-    progress.show(static_cast<double>(counts.done) / static_cast<double>(chunks.to_be_done),
-                  fmt::format(", {:.0f} per second{}", static_cast<double>(counts.done) / seconds,
-                              counts.failed > 0 ? fmt::format(", {} failed", counts.failed) : ""));
-  });
+  return run_batch(
+      run, settled.device ? &*settled.device : nullptr, [&](const BatchCounts& counts) {
+        const double seconds = seconds_since(begin);
+        progress.show(
+            static_cast<double>(counts.done) / static_cast<double>(chunks.to_be_done),
+            fmt::format(", {:.0f} per second{}", static_cast<double>(counts.done) / seconds,
+                        counts.failed > 0 ? fmt::format(", {} failed", counts.failed) : ""));
+      });
 }
 
 std::string summary(const Options& options, const Shard& shard, const Chunks& chunks,
@@ -130,13 +132,15 @@ std::string summary(const Options& options, const Shard& shard, const Chunks& ch
 }
 
 /// The device of this task among those that Slurm started on this computer.
-std::string device_in_step(const RecognitionFlags& flags, const Scene& scene) {
-  const std::string wished = device_of(flags, scene);
-  const std::optional<std::size_t> rank = slurm_number("SLURM_LOCALID");
-  return rank ? local_device(Device::list(wished), wished, *rank) : wished;
+Device open_device_in_step(RecognitionFlags flags, const Scene& scene) {
+  if (const std::optional<std::size_t> rank = slurm_number("SLURM_LOCALID")) {
+    const std::string wished = device_of(flags, scene);
+    flags.device = local_device(Device::list(wished), wished, *rank);
+  }
+  return open_device(flags, scene);
 }
 
-int batch(Options options, const CLI::App& command) {
+int batch(const Options& options, const CLI::App& command) {
   refuse_budget(options.recognition);
   if (options.chunk < 1) {
     refuse_flag("--chunk", options.chunk, "give at least 1");
@@ -146,7 +150,6 @@ int batch(Options options, const CLI::App& command) {
                          .frames = frames_of(options.unknowns),
                          .scene = scene_of(options.recognition),
                          .scene_file = options.recognition.scene};
-  options.recognition.device = device_in_step(options.recognition, rules.scene);
   BatchTask asked{.program = PALPATE_VERSION,
                   .chunk_unknowns = static_cast<std::size_t>(options.chunk),
                   .each_frame = options.unknowns.each_frame,
@@ -159,8 +162,9 @@ int batch(Options options, const CLI::App& command) {
   const FolderLock lock(folder, shard);
   const std::size_t threads =
       options.threads > 0 ? static_cast<std::size_t>(options.threads) : cores();
+  const auto open = [&] { return open_device_in_step(options.recognition, rules.scene); };
   SettledBatch settled = settle_batch(folder, lock, std::move(asked), options.recognition, rules,
-                                      options.update, threads);
+                                      open, options.update, threads);
   const Chunks chunks = chunks_of(folder, settled.task, shard);
   const auto begin = std::chrono::steady_clock::now();
   BatchCounts now;
@@ -174,7 +178,7 @@ int batch(Options options, const CLI::App& command) {
                    .trace = options.trace,
                    .verbose = options.recognition.verbose,
                    .tell = options.recognition.tell},
-                  chunks, settled, options);
+                  chunks, settled, open);
   }
   fmt::print("{}", summary(options, shard, chunks, now, seconds_since(begin)));
   return chunks.finished.failed + now.failed > 0 ? some_failed : 0;

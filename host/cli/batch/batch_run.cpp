@@ -12,7 +12,6 @@
 #include <utility>
 
 #include "bounded_queue.hpp"
-#include "filter_flags.hpp"
 #include "input_file.hpp"
 #include "palpate/error.hpp"
 #include "recognition_record.hpp"
@@ -83,9 +82,9 @@ std::size_t bytes_of(const Unknown& unknown) {
 
 class Pipeline {
  public:
-  Pipeline(const BatchRun& run, Device& device)
+  Pipeline(const BatchRun& run, Device* device)
       : run_(run),
-        device_(device),
+        device_(uses_device(run.recognition) ? device : nullptr),
         task_(run.recognition),
         unknowns_(run.task.unknowns()),
         jobs_(most_waiting_bytes),
@@ -96,7 +95,7 @@ class Pipeline {
       at += run.task.unknowns_of(entry);
     }
     recognisers_ = std::min(most_at_once(task_, run.threads), wanted_unknowns());
-    keep_on_host(task_, run.threads / recognisers_);
+    take_threads(task_, run.threads / recognisers_);
   }
 
   BatchCounts run(const std::function<void(const BatchCounts&)>& progress) {
@@ -192,7 +191,7 @@ class Pipeline {
   }
 
   void recognise_jobs(bool first) {
-    Recogniser recogniser = open_filter(device_, task_);
+    Recogniser recogniser = open_batch_filter(device_, task_);
     if (first && run_.verbose) {
       print_engine(device_, recogniser, task_);
     }
@@ -247,12 +246,13 @@ class Pipeline {
 
   void write(std::size_t index, const OpenChunk& chunk) const {
     // First: a chunk that is there has its run.
-    write_file(run_.folder.run(index), text_of({{"first", index * run_.task.chunk_unknowns},
-                                                {"unknowns", chunk.lines.size()},
-                                                {"failed", chunk.failed},
-                                                {"host", host_name()},
-                                                {"device", device_.name()},
-                                                {"seconds", chunk.seconds}}));
+    write_file(run_.folder.run(index),
+               text_of({{"first", index * run_.task.chunk_unknowns},
+                        {"unknowns", chunk.lines.size()},
+                        {"failed", chunk.failed},
+                        {"host", host_name()},
+                        {"device", device_ != nullptr ? device_->name() : "none"},
+                        {"seconds", chunk.seconds}}));
     std::string text;
     for (const std::string& line : chunk.lines) {
       text += line;
@@ -261,7 +261,7 @@ class Pipeline {
   }
 
   const BatchRun& run_;
-  Device& device_;
+  Device* device_;  ///< null where none is used
   RecognitionTask task_;
   std::size_t unknowns_;
   std::vector<std::size_t> first_;  ///< [input] index of its first unknown
@@ -281,7 +281,7 @@ class Pipeline {
 
 }  // namespace
 
-BatchCounts run_batch(const BatchRun& run, Device& device,
+BatchCounts run_batch(const BatchRun& run, Device* device,
                       const std::function<void(const BatchCounts&)>& progress) {
   return Pipeline(run, device).run(progress);
 }

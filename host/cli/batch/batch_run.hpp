@@ -36,8 +36,9 @@ struct BatchRun {
 /// number. Bounds recognise several unknowns at once; a histogram and particles, whose work a
 /// device divides by itself, one. The chunks have the same bytes whatever the number of threads.
 /// Calls `progress` now and then.
+/// @param device may be null where uses_device() is false
 /// @throws Error where an input changes meanwhile, and on a full disk or a device that fails
-BatchCounts run_batch(const BatchRun& run, Device& device,
+BatchCounts run_batch(const BatchRun& run, Device* device,
                       const std::function<void(const BatchCounts&)>& progress);
 
 }  // namespace palpate::cli

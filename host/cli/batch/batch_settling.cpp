@@ -67,8 +67,8 @@ constexpr const char* recognise_changed =
 }  // namespace
 
 SettledBatch settle_batch(const ResultsFolder& folder, const FolderLock& lock, BatchTask now,
-                          const RecognitionFlags& flags, const InputRules& rules, bool update,
-                          std::size_t threads) {
+                          const RecognitionFlags& flags, const InputRules& rules,
+                          const std::function<Device()>& open, bool update, std::size_t threads) {
   const Settling settling(folder, lock);
   std::optional<BatchTask> before;
   if (folder.has_task()) {
@@ -104,7 +104,7 @@ SettledBatch settle_batch(const ResultsFolder& folder, const FolderLock& lock, B
     settle_as_before(task, recognition);
   } else {
     if (recognition.bin_width) {
-      settled.device = open_device(flags, rules.scene);
+      settled.device = open();
     }
     settle_recognition(task, recognition, flags, rules,
                        settled.device ? &*settled.device : nullptr);

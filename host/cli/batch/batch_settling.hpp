@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <optional>
 #include <string>
 
@@ -22,10 +23,11 @@ struct SettledBatch {
 /// the device at hand, is settled here, so that no chunk depends on who computes it.
 /// @param now what is asked for: program, chunk_unknowns, each_frame, flags, and inputs without
 /// stamps
+/// @param open opens the device, where the bins follow from its memory
 /// @param update whether results of another task may be dropped, as far as they differ
 /// @throws Error (Fault::input) where the folder has results of another task
 SettledBatch settle_batch(const ResultsFolder& folder, const FolderLock& lock, BatchTask now,
-                          const RecognitionFlags& flags, const InputRules& rules, bool update,
-                          std::size_t threads);
+                          const RecognitionFlags& flags, const InputRules& rules,
+                          const std::function<Device()>& open, bool update, std::size_t threads);
 
 }  // namespace palpate::cli

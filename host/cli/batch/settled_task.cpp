@@ -5,6 +5,7 @@
 #include <string>
 #include <utility>
 
+#include "filter_flags.hpp"
 #include "options.hpp"
 #include "sensor_model_flag.hpp"
 
@@ -93,11 +94,18 @@ void settle_as_before(const BatchTask& task, RecognitionTask& recognition) {
   settle_evidence(recognition);
 }
 
-void keep_on_host(RecognitionTask& recognition, std::size_t threads) {
+bool uses_device(const RecognitionTask& recognition) {
+  return !std::holds_alternative<BoundedOptions>(recognition.filter);
+}
+
+void take_threads(RecognitionTask& recognition, std::size_t threads) {
   if (auto* bounded = std::get_if<BoundedOptions>(&recognition.filter)) {
     bounded->threads = static_cast<int>(std::max<std::size_t>(1, threads));
-    bounded->on_host = true;
   }
+}
+
+Recogniser open_batch_filter(Device* device, const RecognitionTask& recognition) {
+  return uses_device(recognition) ? open_filter(*device, recognition) : Recogniser(recognition);
 }
 
 }  // namespace palpate::cli

@@ -5,6 +5,7 @@
 
 #include "batch_task.hpp"
 #include "input_reading.hpp"
+#include "recogniser.hpp"
 #include "recognition_flags.hpp"
 
 namespace palpate::cli {
@@ -37,8 +38,14 @@ void settle_recognition(BatchTask& task, RecognitionTask& recognition,
 /// The same with the bins that the task has been settled with.
 void settle_as_before(const BatchTask& task, RecognitionTask& recognition);
 
-/// Has bounds evaluate their bins on the host, on so many threads: a GPU would take them over at a
+/// Whether the filter computes on a device. Bounds do not: a GPU would take their bins over at a
 /// moment that depends on the clock.
-void keep_on_host(RecognitionTask& recognition, std::size_t threads);
+bool uses_device(const RecognitionTask& recognition);
+
+/// Has bounds take so many host threads.
+void take_threads(RecognitionTask& recognition, std::size_t threads);
+
+/// Opens the filter. @param device may be null where uses_device() is false
+Recogniser open_batch_filter(Device* device, const RecognitionTask& recognition);
 
 }  // namespace palpate::cli

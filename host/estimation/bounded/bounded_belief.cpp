@@ -24,7 +24,7 @@ constexpr double closely_drawn_bins = 1e6;
 
 }  // namespace
 
-BoundedBelief::BoundedBelief(Device& device, std::span<const Hypothesis> hypotheses,
+BoundedBelief::BoundedBelief(Device* device, std::span<const Hypothesis> hypotheses,
                              const BoundedOptions& options)
     : options_(options),
       hypotheses_(hypotheses.begin(), hypotheses.end()),
@@ -33,8 +33,9 @@ BoundedBelief::BoundedBelief(Device& device, std::span<const Hypothesis> hypothe
                                    : tbb::info::default_concurrency()),
       arena_(threads_),
       likelihood_(hypotheses_, options_.contact, options_.lattice),
-      batches_(likelihood_, device.context(), hypotheses_, options_.contact, options_.lattice,
-               options_.on_host ? BinPlace::host : BinPlace::measured),
+      batches_(likelihood_, device != nullptr ? &device->context() : nullptr, hypotheses_,
+               options_.contact, options_.lattice,
+               device != nullptr ? BinPlace::measured : BinPlace::host),
       search_(arena_.execute(
           [&] { return BoundSearch(hypotheses_, options_, likelihood_, batches_); })),
       log_weight_(log_weights(hypotheses_)) {

@@ -26,8 +26,9 @@ namespace palpate {
 /// them. Searches where it is asked for more than is known.
 class BoundedBelief {
  public:
+  /// @param device that may evaluate bins; null leaves them to the host
   /// @param options checked, with a resolved contact model
-  BoundedBelief(Device& device, std::span<const Hypothesis> hypotheses,
+  BoundedBelief(Device* device, std::span<const Hypothesis> hypotheses,
                 const BoundedOptions& options);
 
   void reset();

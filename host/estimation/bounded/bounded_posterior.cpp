@@ -6,8 +6,6 @@
 #include <utility>
 
 #include <fmt/format.h>
-#include <tbb/parallel_for.h>
-
 #include "bounded_belief.hpp"
 #include "hypotheses.hpp"
 #include "interpolated_map.hpp"
@@ -15,6 +13,7 @@
 #include "marginal_sums.hpp"
 #include "moved_from.hpp"
 #include "palpate/error.hpp"
+#include "parallel_for.hpp"
 #include "refinement.hpp"
 #include "search_memory.hpp"
 
@@ -67,7 +66,7 @@ void validate(const BoundedOptions& options) {
 }  // namespace
 
 struct BoundedPosterior::Impl {
-  Impl(Device& device, std::span<const Hypothesis> hypotheses, const BoundedOptions& options)
+  Impl(Device* device, std::span<const Hypothesis> hypotheses, const BoundedOptions& options)
       : belief(device, hypotheses, options) {
     for (const Hypothesis& hypothesis : hypotheses) {
       bodies.push_back(displaced_body(hypothesis.map));
@@ -85,7 +84,15 @@ struct BoundedPosterior::Impl {
   std::vector<Body> bodies;  ///< [hypothesis]
 };
 
+BoundedPosterior::BoundedPosterior(std::span<const Hypothesis> hypotheses,
+                                   const BoundedOptions& options)
+    : BoundedPosterior(nullptr, hypotheses, options) {}
+
 BoundedPosterior::BoundedPosterior(Device& device, std::span<const Hypothesis> hypotheses,
+                                   const BoundedOptions& options)
+    : BoundedPosterior(&device, hypotheses, options) {}
+
+BoundedPosterior::BoundedPosterior(Device* device, std::span<const Hypothesis> hypotheses,
                                    const BoundedOptions& options) {
   validate_hypotheses(hypotheses);
   validate(options);
@@ -228,7 +235,7 @@ RefinedPose BoundedPosterior::refine(const Mode& mode) const {
     }
     std::vector<float> logs(firsts.back());
     belief.on_threads([&] {
-      tbb::parallel_for(std::size_t{0}, boxes.size(), [&](std::size_t i) {
+      parallel_for(boxes.size(), [&](std::size_t i) {
         likelihood.evaluate(std::span(&boxes[i], 1), belief.elements(),
                             std::span(logs).subspan(firsts[i], firsts[i + 1] - firsts[i]));
       });

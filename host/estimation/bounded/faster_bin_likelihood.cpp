@@ -4,10 +4,9 @@
 #include <chrono>
 
 #include <fmt/format.h>
-#include <tbb/parallel_for.h>
-
 #include "log_message.hpp"
 #include "palpate/error.hpp"
+#include "parallel_for.hpp"
 
 namespace palpate {
 
@@ -27,7 +26,7 @@ double seconds_of(const Work& work) {
 
 }  // namespace
 
-FasterBinLikelihood::FasterBinLikelihood(const BinLikelihood& host, gpu::Context& context,
+FasterBinLikelihood::FasterBinLikelihood(const BinLikelihood& host, gpu::Context* context,
                                          std::span<const Hypothesis> hypotheses,
                                          const ContactModel& contact, const PoseLattice& lattice,
                                          BinPlace place, double measured_work)
@@ -40,13 +39,13 @@ FasterBinLikelihood::FasterBinLikelihood(const BinLikelihood& host, gpu::Context
       measured_work_(measured_work),
       device_error_(hypotheses, contact, lattice) {
   if (place == BinPlace::device) {
-    path_ = fmt::format("bins on device '{}', as told", context.name());
+    path_ = fmt::format("bins on device '{}', as told", context->name());
   } else if (place == BinPlace::host) {
     path_ = "bins on the host, as told";
-  } else if (context.limits().cpu) {
+  } else if (context->limits().cpu) {
     // It has the same cores, and a kernel that is not made for their vectors.
     place_ = BinPlace::host;
-    path_ = fmt::format("bins on the host: device '{}' is a CPU", context.name());
+    path_ = fmt::format("bins on the host: device '{}' is a CPU", context->name());
   } else {
     path_ = "bins on the host: too few so far to measure the device";
   }
@@ -61,7 +60,7 @@ void FasterBinLikelihood::move_pivot(const glm::dvec2& pivot_mm) {
 
 DeviceBinLikelihood& FasterBinLikelihood::device() {
   if (!device_) {
-    device_ = std::make_unique<DeviceBinLikelihood>(context_, hypotheses_, contact_, lattice_);
+    device_ = std::make_unique<DeviceBinLikelihood>(*context_, hypotheses_, contact_, lattice_);
   }
   return *device_;
 }
@@ -116,7 +115,7 @@ void FasterBinLikelihood::evaluate_on_host(std::span<const BinBox> boxes,
     task.end_box = parts.size();
     tasks.push_back(task);
   }
-  tbb::parallel_for(std::size_t{0}, tasks.size(), [&](std::size_t i) {
+  parallel_for(tasks.size(), [&](std::size_t i) {
     const Task& of = tasks[i];
     host_.evaluate(std::span(parts).subspan(of.first_box, of.end_box - of.first_box), elements,
                    log_likelihood.subspan(of.first_bin, of.bins));

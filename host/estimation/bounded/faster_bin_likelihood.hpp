@@ -32,8 +32,9 @@ class FasterBinLikelihood {
   static constexpr double least_measured_work = 1e9;
 
   /// @param host,hypotheses outlive this object
+  /// @param context of the device; null for BinPlace::host
   /// @param contact resolved: with its prior
-  FasterBinLikelihood(const BinLikelihood& host, gpu::Context& context,
+  FasterBinLikelihood(const BinLikelihood& host, gpu::Context* context,
                       std::span<const Hypothesis> hypotheses, const ContactModel& contact,
                       const PoseLattice& lattice, BinPlace place = BinPlace::measured,
                       double measured_work = least_measured_work);
@@ -62,7 +63,7 @@ class FasterBinLikelihood {
                std::span<float> log_likelihood, double work);
 
   const BinLikelihood& host_;
-  gpu::Context& context_;
+  gpu::Context* context_;
   std::span<const Hypothesis> hypotheses_;
   ContactModel contact_;
   PoseLattice lattice_;

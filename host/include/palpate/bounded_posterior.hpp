@@ -49,9 +49,6 @@ struct BoundedOptions {
   /// throws ends the search, and the call that asked for it throws the same; the belief stays as it
   /// was, and the next call searches anew.
   std::function<void()> cancel_point = {};
-  /// Evaluates bins on the host only. Otherwise a GPU may take them once it was measured to be
-  /// faster, and its rounding then depends on when that was.
-  bool on_host = false;
 };
 
 /// A block of bins of one hypothesis at one theta that a search divided into smaller ones or, at
@@ -78,11 +75,15 @@ struct PoseBlock {
 /// than the host. An object that was moved from throws Error on every call.
 class PALPATE_API BoundedPosterior {
  public:
-  /// Builds the window tables of the maps.
+  /// Builds the window tables of the maps. Evaluates bins on the host, with equal bits on every
+  /// run.
   /// @throws Error on an empty list, a map that is not sound, maps of different priors where the
   /// options give none, a weight that is not positive and finite, a lattice, contact model or
   /// option out of range, a table for another number of objects, or a lattice whose tiles and
   /// tables would take more than a quarter of the machine's memory
+  BoundedPosterior(std::span<const Hypothesis> hypotheses, const BoundedOptions& options);
+  /// The same with a device. A GPU takes the bins once it was measured to be faster than the host,
+  /// and its rounding then depends on when that was.
   BoundedPosterior(Device& device, std::span<const Hypothesis> hypotheses,
                    const BoundedOptions& options);
   ~BoundedPosterior();
@@ -138,6 +139,8 @@ class PALPATE_API BoundedPosterior {
   std::uint64_t host_bytes() const;
 
  private:
+  PALPATE_LOCAL BoundedPosterior(Device* device, std::span<const Hypothesis> hypotheses,
+                                 const BoundedOptions& options);
   struct PALPATE_LOCAL Impl;
   PALPATE_LOCAL Impl& impl() const;
   /// impl(), where no update has left the belief half-way. @throws Error where one has

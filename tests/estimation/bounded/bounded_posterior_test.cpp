@@ -282,6 +282,17 @@ TEST(BoundedPosterior, TakesInAllTouchesOrNone) {
   EXPECT_EQ(told_by(posterior, 2), told_by(other, 2)) << "as if nothing had been refused";
 }
 
+TEST(BoundedPosterior, HasTheSameBitsWithoutADevice) {
+  Device device = Device::open();
+  const std::vector<Touch> touches = all_touches(touches_of_l(3, 811));
+  BoundedPosterior with(device, two_shapes(), small_options());
+  BoundedPosterior without(two_shapes(), small_options());
+  with.update(touches);
+  without.update(touches);
+  EXPECT_EQ(told_by(without, 2), told_by(with, 2));
+  EXPECT_NE(without.path().find("on the host"), std::string::npos) << without.path();
+}
+
 TEST(BoundedPosterior, HasTheSameBitsOnAnyNumberOfThreads) {
   // More threads than the machine may have cores.
   const tbb::global_control allow(tbb::global_control::max_allowed_parallelism, 4);

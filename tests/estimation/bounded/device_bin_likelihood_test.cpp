@@ -242,12 +242,12 @@ TEST(FasterBinLikelihood, GoesWhereItIsTold) {
   std::vector<BinBox> boxes = random_boxes(300, maps.of.lattice, 1, 105);
   boxes.push_back(whole_plane(maps.of.lattice, 0));
   for (const BinPlace place : {BinPlace::host, BinPlace::device}) {
-    FasterBinLikelihood faster(host, device.context(), maps.hypotheses, maps.of.contact,
+    FasterBinLikelihood faster(host, &device.context(), maps.hypotheses, maps.of.contact,
                                maps.of.lattice, place);
     EXPECT_NE(faster.path().find(place == BinPlace::host ? "host" : "device"), std::string::npos);
     expect_sound(faster, host, maps, boxes);
   }
-  FasterBinLikelihood on_host(host, device.context(), maps.hypotheses, maps.of.contact,
+  FasterBinLikelihood on_host(host, &device.context(), maps.hypotheses, maps.of.contact,
                               maps.of.lattice, BinPlace::host);
   std::vector<float> plain(bins_of(boxes));
   std::vector<float> in_threads(plain.size());
@@ -267,14 +267,14 @@ TEST(FasterBinLikelihood, MeasuresOnceTheHostHasDoneEnough) {
 
   limits.cpu = true;
   context.lower_limits(limits);
-  FasterBinLikelihood beside_a_cpu(host, context, maps.hypotheses, maps.of.contact, maps.of.lattice,
-                                   BinPlace::measured, 1e4);
+  FasterBinLikelihood beside_a_cpu(host, &context, maps.hypotheses, maps.of.contact,
+                                   maps.of.lattice, BinPlace::measured, 1e4);
   expect_sound(beside_a_cpu, host, maps, large);
   EXPECT_NE(beside_a_cpu.path().find("is a CPU"), std::string::npos);
 
   limits.cpu = false;
   context.lower_limits(limits);
-  FasterBinLikelihood faster(host, context, maps.hypotheses, maps.of.contact, maps.of.lattice,
+  FasterBinLikelihood faster(host, &context, maps.hypotheses, maps.of.contact, maps.of.lattice,
                              BinPlace::measured, 7e4);
   expect_sound(faster, host, maps, small);
   EXPECT_NE(faster.path().find("too few so far"), std::string::npos);
@@ -299,7 +299,7 @@ TEST(FasterBinLikelihood, IsNotMeasuredWithinABudget) {
   const BinLikelihood host(maps.hypotheses, maps.of.contact, maps.of.lattice);
   const BoundedOptions options{.lattice = maps.of.lattice, .contact = maps.of.contact};
   for (const std::optional<double> budget_s : {std::optional<double>(), std::optional(1e3)}) {
-    FasterBinLikelihood faster(host, context, maps.hypotheses, maps.of.contact, maps.of.lattice,
+    FasterBinLikelihood faster(host, &context, maps.hypotheses, maps.of.contact, maps.of.lattice,
                                BinPlace::measured, 1.0);
     BoundSearch search(maps.hypotheses, options, host, faster);
     const ArrayReadings touch = readings_of(maps.of.elements);
@@ -322,7 +322,7 @@ TEST(FasterBinLikelihood, StaysOnTheHostWhereTheDeviceFails) {
   limits.storage_range = 1024;
   limits.table_texels = 16;
   context.lower_limits(limits);
-  FasterBinLikelihood faster(host, context, maps.hypotheses, maps.of.contact, maps.of.lattice,
+  FasterBinLikelihood faster(host, &context, maps.hypotheses, maps.of.contact, maps.of.lattice,
                              BinPlace::measured, 1.0);
   expect_sound(faster, host, maps, {whole_plane(maps.of.lattice, 0)});
   EXPECT_NE(faster.path().find("bins on the host: map"), std::string::npos) << faster.path();

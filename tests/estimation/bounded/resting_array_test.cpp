@@ -94,7 +94,7 @@ class Search {
       options_.contact.table = crooked_table();
     }
     likelihood_.emplace(hypotheses_, options_.contact, lattice);
-    batches_.emplace(*likelihood_, device_.context(), hypotheses_, options_.contact, lattice,
+    batches_.emplace(*likelihood_, nullptr, hypotheses_, options_.contact, lattice,
                      BinPlace::host);
     search_.emplace(hypotheses_, options_, *likelihood_, *batches_);
   }
@@ -104,7 +104,6 @@ class Search {
   void add(const ArrayReadings& touch) { search_->add(std::span(&touch, 1)); }
 
  private:
-  Device device_ = Device::open();
   std::vector<Hypothesis> hypotheses_;
   BoundedOptions options_;
   std::optional<BinLikelihood> likelihood_;
