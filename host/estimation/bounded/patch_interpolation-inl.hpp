@@ -22,44 +22,86 @@ HWY_BEFORE_NAMESPACE();
 namespace palpate {
 namespace HWY_NAMESPACE {
 
-/// Reads one node of a patch for every lane. `from` is the patch, or the patch moved to another
-/// corner of the cells; `index`, below 11, is that of the cell's first node.
-template <class DF, class VI>
-HWY_INLINE hn::Vec<DF> look_up(DF df, const float* from, VI index) {
+/// The nodes of a patch, in registers where these hold them: gathers are several times slower than
+/// permutations.
+class PatchNodes {
+ public:
+  explicit HWY_INLINE PatchNodes(const float* patch);
+
+  /// The node `offset`, of the corners of a cell, after that of `index` in every lane. `index`,
+  /// below 11, is that of the cell's first node.
+  template <class DF, class VI>
+  HWY_INLINE hn::Vec<DF> at(DF df, VI index, int offset) const;
+
+ private:
 #if HWY_TARGET == HWY_AVX3 || HWY_TARGET == HWY_AVX3_DL
-  // Gathers are several times slower than a permutation of the 16 nodes.
-  const hn::Full512<float> whole;
-  const auto nodes = hn::LoadU(whole, from);
-  if constexpr (hn::MaxLanes(DF()) == 16) {
-    return hn::TableLookupLanes(nodes, hn::IndicesFromVec(whole, index));
-  } else {
-    const hn::Full512<std::int32_t> whole_index;
-    const auto wide = hn::ZeroExtendVector(whole_index, index);
-    return hn::LowerHalf(df, hn::TableLookupLanes(nodes, hn::IndicesFromVec(whole, wide)));
-  }
+  hn::Vec<hn::Full512<float>> nodes_;
 #elif HWY_TARGET == HWY_AVX2
+  hn::Vec<hn::Full256<float>> low_;
+  hn::Vec<hn::Full256<float>> high_;
+#else
+  const float* patch_;
+#endif
+};
+
+#if HWY_TARGET == HWY_AVX3 || HWY_TARGET == HWY_AVX3_DL
+
+HWY_INLINE PatchNodes::PatchNodes(const float* patch)
+    : nodes_(hn::LoadU(hn::Full512<float>(), patch)) {}
+
+template <class DF, class VI>
+HWY_INLINE hn::Vec<DF> PatchNodes::at(DF df, VI index, int offset) const {
+  const hn::Full512<float> whole;
+  const hn::Full512<std::int32_t> whole_index;
+  const auto of_all = [&](auto wide) HWY_ATTR {
+    const auto lane = hn::Add(wide, hn::Set(whole_index, offset));
+    return hn::TableLookupLanes(nodes_, hn::IndicesFromVec(whole, lane));
+  };
+  if constexpr (hn::MaxLanes(DF()) == 16) {
+    return of_all(index);
+  } else {
+    return hn::LowerHalf(df, of_all(hn::ZeroExtendVector(whole_index, index)));
+  }
+}
+
+#elif HWY_TARGET == HWY_AVX2
+
+HWY_INLINE PatchNodes::PatchNodes(const float* patch)
+    : low_(hn::LoadU(hn::Full256<float>(), patch)),
+      high_(hn::LoadU(hn::Full256<float>(), patch + 8)) {}
+
+template <class DF, class VI>
+HWY_INLINE hn::Vec<DF> PatchNodes::at(DF df, VI index, int offset) const {
   const hn::Full256<float> whole;
   const hn::Full256<std::int32_t> whole_index;
-  const auto low_nodes = hn::LoadU(whole, from);
-  const auto high_nodes = hn::LoadU(whole, from + 8);
-  const auto both = [&](auto wide) HWY_ATTR {
-    const auto lane = hn::IndicesFromVec(whole, hn::And(wide, hn::Set(whole_index, 7)));
-    const auto is_high = hn::BitCast(whole, hn::ShiftLeft<28>(wide));
-    return hn::IfNegativeThenElse(is_high, hn::TableLookupLanes(high_nodes, lane),
-                                  hn::TableLookupLanes(low_nodes, lane));
+  const auto of_all = [&](auto wide) HWY_ATTR {
+    const auto node = hn::Add(wide, hn::Set(whole_index, offset));
+    const auto lane = hn::IndicesFromVec(whole, hn::And(node, hn::Set(whole_index, 7)));
+    const auto is_high = hn::BitCast(whole, hn::ShiftLeft<28>(node));
+    return hn::IfNegativeThenElse(is_high, hn::TableLookupLanes(high_, lane),
+                                  hn::TableLookupLanes(low_, lane));
   };
   if constexpr (hn::MaxLanes(DF()) == 8) {
-    return both(index);
+    return of_all(index);
   } else {
-    return hn::LowerHalf(df, both(hn::ZeroExtendVector(whole_index, index)));
+    return hn::LowerHalf(df, of_all(hn::ZeroExtendVector(whole_index, index)));
   }
-#elif HWY_TARGET == HWY_SCALAR
+}
+
+#else
+
+HWY_INLINE PatchNodes::PatchNodes(const float* patch) : patch_(patch) {}
+
+template <class DF, class VI>
+HWY_INLINE hn::Vec<DF> PatchNodes::at(DF df, VI index, int offset) const {
+  const float* const from = patch_ + offset;
+#if HWY_TARGET == HWY_SCALAR
   return hn::GatherIndex(df, from, index);
 #else
   // A vector holds a column's nodes; an index is that of one of the first three columns.
   const hn::Full128<float> whole;
   const hn::Full128<std::int32_t> whole_index;
-  const auto all = [&](auto wide) HWY_ATTR {
+  const auto of_all = [&](auto wide) HWY_ATTR {
     const auto lane = hn::IndicesFromVec(whole, hn::And(wide, hn::Set(whole_index, 3)));
     const auto in_column = [&](int column) HWY_ATTR {
       return hn::TableLookupLanes(hn::LoadU(whole, from + MapPatches::side * column), lane);
@@ -72,12 +114,14 @@ HWY_INLINE hn::Vec<DF> look_up(DF df, const float* from, VI index) {
     return hn::IfThenElse(third, in_column(2), hn::IfThenElse(second, in_column(1), in_column(0)));
   };
   if constexpr (hn::MaxLanes(DF()) == 4) {
-    return all(index);
+    return of_all(index);
   } else {
-    return hn::LowerHalf(df, all(hn::Combine(whole_index, index, index)));
+    return hn::LowerHalf(df, of_all(hn::Combine(whole_index, index, index)));
   }
 #endif
 }
+
+#endif
 
 /// The lanes of a vector whose bins belong to one block, and the elements about this block.
 template <class D>
@@ -95,29 +139,45 @@ HWY_INLINE V bilinear(V v00, V v01, V v10, V v11, V fx, V fy) {
   return hn::Add(left, hn::Mul(hn::Sub(right, left), fx));
 }
 
-/// Interpolates between nodes that look_up(offset, index) reads, the nodes of a patch being
+/// The nodes at the corners of a cell in every lane, named as those of bilinear().
+template <class V>
+struct Corners {
+  V v00;
+  V v01;
+  V v10;
+  V v11;
+};
+
+/// Reads the corners of a patch's cells.
+/// @param index of each cell's first node
+template <class DF, class VI>
+HWY_INLINE Corners<hn::Vec<DF>> corners_of(DF df, const float* patch, VI index) {
+  constexpr int side = MapPatches::side;
+  const PatchNodes nodes(patch);
+  return {nodes.at(df, index, 0), nodes.at(df, index, 1), nodes.at(df, index, side),
+          nodes.at(df, index, side + 1)};
+}
+
+/// Interpolates between the corners that corners_at(index) reads, the nodes of a patch being
 /// numbered from its first corner column by column. In float64, where nodes of the border are among
 /// the patch's, puts the exact prior in the place of its marker.
 /// @param x, y places within the patch
-template <class D, class LookUp>
+template <class D, class CornersAt>
 HWY_INLINE hn::Vec<D> interpolate(D d, const MapPatches& map, hn::Vec<D> x, hn::Vec<D> y,
-                                  bool with_border, const LookUp& look_up) {
+                                  bool with_border, const CornersAt& corners_at) {
   const auto column = hn::Floor(x);
   const auto row = hn::Floor(y);
   const auto fx = hn::Sub(x, column);
   const auto fy = hn::Sub(y, row);
   const auto index = small_integer(d, hn::Add(hn::Mul(column, hn::Set(d, hn::TFromD<D>{4})), row));
-  const auto v00 = look_up(0, index);
-  const auto v01 = look_up(1, index);
-  const auto v10 = look_up(MapPatches::side, index);
-  const auto v11 = look_up(MapPatches::side + 1, index);
+  const auto c = corners_at(index);
   if constexpr (sizeof(hn::TFromD<D>) == 4) {
-    return bilinear(v00, v01, v10, v11, fx, fy);
+    return bilinear(c.v00, c.v01, c.v10, c.v11, fx, fy);
   } else {
-    const auto w00 = hn::PromoteTo(d, v00);
-    const auto w01 = hn::PromoteTo(d, v01);
-    const auto w10 = hn::PromoteTo(d, v10);
-    const auto w11 = hn::PromoteTo(d, v11);
+    const auto w00 = hn::PromoteTo(d, c.v00);
+    const auto w01 = hn::PromoteTo(d, c.v01);
+    const auto w10 = hn::PromoteTo(d, c.v10);
+    const auto w11 = hn::PromoteTo(d, c.v11);
     // Few patches have nodes of the border: seldom is the branch mispredicted.
     if (!with_border) {
       return bilinear(w00, w01, w10, w11, fx, fy);
@@ -142,9 +202,8 @@ HWY_INLINE hn::Vec<D> log_odds(D d, const MapPatches& map, const ElementPatches<
   const std::int32_t patch = elements.patch[e];
   const float* const nodes = nodes_of(map, patch);
   return interpolate(d, map, hn::Add(hn::Set(d, elements.x[e]), x),
-                     hn::Add(hn::Set(d, elements.y[e]), y), patch < 0,
-                     [&](int offset, auto index) HWY_ATTR {
-                       return look_up(hn::Rebind<float, D>(), nodes + offset, index);
+                     hn::Add(hn::Set(d, elements.y[e]), y), patch < 0, [&](auto index) HWY_ATTR {
+                       return corners_of(hn::Rebind<float, D>(), nodes, index);
                      });
 }
 
@@ -169,11 +228,15 @@ HWY_INLINE hn::Vec<D> log_odds(D d, const MapPatches& map, std::span<const Lanes
     from_y = hn::IfThenElse(parts[p].lanes, hn::Set(d, elements.y[e]), from_y);
   }
   return interpolate(d, map, hn::Add(from_x, x), hn::Add(from_y, y), with_border,
-                     [&](int offset, auto index) HWY_ATTR {
-                       auto found = look_up(df, nodes[0] + offset, index);
+                     [&](auto index) HWY_ATTR {
+                       auto found = corners_of(df, nodes[0], index);
                        for (std::size_t p = 1; p < parts.size(); ++p) {
-                         found = hn::IfThenElse(parts[p].float_lanes,
-                                                look_up(df, nodes[p] + offset, index), found);
+                         const auto own = corners_of(df, nodes[p], index);
+                         const auto& lanes = parts[p].float_lanes;
+                         found.v00 = hn::IfThenElse(lanes, own.v00, found.v00);
+                         found.v01 = hn::IfThenElse(lanes, own.v01, found.v01);
+                         found.v10 = hn::IfThenElse(lanes, own.v10, found.v10);
+                         found.v11 = hn::IfThenElse(lanes, own.v11, found.v11);
                        }
                        return found;
                      });
