@@ -94,8 +94,7 @@ class Search {
       options_.contact.table = crooked_table();
     }
     likelihood_.emplace(hypotheses_, options_.contact, lattice);
-    batches_.emplace(*likelihood_, nullptr, hypotheses_, options_.contact, lattice,
-                     BinPlace::host);
+    batches_.emplace(*likelihood_, nullptr, hypotheses_, options_.contact, lattice, BinPlace::host);
     search_.emplace(hypotheses_, options_, *likelihood_, *batches_);
   }
 
