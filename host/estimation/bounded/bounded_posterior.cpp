@@ -63,6 +63,23 @@ void validate(const BoundedOptions& options) {
   }
 }
 
+/// The options, with what follows from them and the hypotheses. @throws Error where they are not
+/// sound
+BoundedOptions checked(const BoundedOptions& options, std::span<const Hypothesis> hypotheses) {
+  validate_hypotheses(hypotheses);
+  validate(options);
+  BoundedOptions all = options;
+  all.lattice.collapse_fixed().validate();
+  all.contact = resolve(options.contact, hypotheses);
+  if (all.none_weight && !all.contact.table && all.contact.gamma == 0.0) {
+    throw Error(Fault::input,
+                "none_weight: with gamma = 0 the mean likelihood is that of a few bins, which a "
+                "sample misses; use a gamma above 0, or PoseHistogram");
+  }
+  require_room(hypotheses, all, memory_for_search());
+  return all;
+}
+
 }  // namespace
 
 struct BoundedPosterior::Impl {
@@ -86,27 +103,11 @@ struct BoundedPosterior::Impl {
 
 BoundedPosterior::BoundedPosterior(std::span<const Hypothesis> hypotheses,
                                    const BoundedOptions& options)
-    : BoundedPosterior(nullptr, hypotheses, options) {}
+    : impl_(std::make_unique<Impl>(nullptr, hypotheses, checked(options, hypotheses))) {}
 
 BoundedPosterior::BoundedPosterior(Device& device, std::span<const Hypothesis> hypotheses,
                                    const BoundedOptions& options)
-    : BoundedPosterior(&device, hypotheses, options) {}
-
-BoundedPosterior::BoundedPosterior(Device* device, std::span<const Hypothesis> hypotheses,
-                                   const BoundedOptions& options) {
-  validate_hypotheses(hypotheses);
-  validate(options);
-  BoundedOptions checked = options;
-  checked.lattice.collapse_fixed().validate();
-  checked.contact = resolve(options.contact, hypotheses);
-  if (checked.none_weight && !checked.contact.table && checked.contact.gamma == 0.0) {
-    throw Error(Fault::input,
-                "none_weight: with gamma = 0 the mean likelihood is that of a few bins, which a "
-                "sample misses; use a gamma above 0, or PoseHistogram");
-  }
-  require_room(hypotheses, checked, memory_for_search());
-  impl_ = std::make_unique<Impl>(device, hypotheses, checked);
-}
+    : impl_(std::make_unique<Impl>(&device, hypotheses, checked(options, hypotheses))) {}
 
 BoundedPosterior::~BoundedPosterior() = default;
 BoundedPosterior::BoundedPosterior(BoundedPosterior&&) noexcept = default;

@@ -139,8 +139,6 @@ class PALPATE_API BoundedPosterior {
   std::uint64_t host_bytes() const;
 
  private:
-  PALPATE_LOCAL BoundedPosterior(Device* device, std::span<const Hypothesis> hypotheses,
-                                 const BoundedOptions& options);
   struct PALPATE_LOCAL Impl;
   PALPATE_LOCAL Impl& impl() const;
   /// impl(), where no update has left the belief half-way. @throws Error where one has
