@@ -1,8 +1,6 @@
 #include "command_stream.hpp"
 
 #include <algorithm>
-#include <chrono>
-#include <limits>
 
 #include <fmt/format.h>
 
@@ -22,61 +20,16 @@ VkDeviceSize staged(VkDeviceSize bytes) { return (bytes + 15) / 16 * 16; }
 
 }  // namespace
 
-CommandStream::CommandStream(Context& context) : context_(context) {
-  const VkDevice device = context.device();
-  const VkCommandPoolCreateInfo pool_info{.sType = VK_STRUCTURE_TYPE_COMMAND_POOL_CREATE_INFO,
-                                          .queueFamilyIndex = context.queue_family()};
-  pool_ = make_owned(vkCreateCommandPool, device, pool_info, "creating a command pool");
-  const VkCommandBufferAllocateInfo buffer_info{
-      .sType = VK_STRUCTURE_TYPE_COMMAND_BUFFER_ALLOCATE_INFO,
-      .commandPool = pool_.get(),
-      .level = VK_COMMAND_BUFFER_LEVEL_PRIMARY,
-      .commandBufferCount = 1};
-  check(vkAllocateCommandBuffers(device, &buffer_info, &commands_), "creating commands");
-  const VkFenceCreateInfo fence_info{.sType = VK_STRUCTURE_TYPE_FENCE_CREATE_INFO};
-  fence_ = make_owned(vkCreateFence, device, fence_info, "creating a fence");
-  if (context.limits().timestamp_ns > 0.0F) {
-    const VkQueryPoolCreateInfo query_info{.sType = VK_STRUCTURE_TYPE_QUERY_POOL_CREATE_INFO,
-                                           .queryType = VK_QUERY_TYPE_TIMESTAMP,
-                                           .queryCount = 2};
-    timestamps_ = make_owned(vkCreateQueryPool, device, query_info, "creating timestamps");
-  }
-}
+CommandStream::CommandStream(Context& context) : context_(context), submitter_(context) {}
 
 template <typename Commands>
 void CommandStream::record(const Commands& commands) {
   try {
-    begin();
     commands();
   } catch (...) {
     drop();
     throw;
   }
-}
-
-void CommandStream::begin() {
-  if (recording_) {
-    return;
-  }
-  const VkCommandBufferBeginInfo info{.sType = VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO,
-                                      .flags = VK_COMMAND_BUFFER_USAGE_ONE_TIME_SUBMIT_BIT};
-  check(vkBeginCommandBuffer(commands_, &info), "recording commands");
-  if (timestamps_) {
-    vkCmdResetQueryPool(commands_, timestamps_.get(), 0, 2);
-    vkCmdWriteTimestamp(commands_, VK_PIPELINE_STAGE_TOP_OF_PIPE_BIT, timestamps_.get(), 0);
-  }
-  recording_ = true;
-}
-
-void CommandStream::barrier() {
-  constexpr VkPipelineStageFlags stages =
-      VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT | VK_PIPELINE_STAGE_TRANSFER_BIT;
-  const VkMemoryBarrier memory{
-      .sType = VK_STRUCTURE_TYPE_MEMORY_BARRIER,
-      .srcAccessMask = VK_ACCESS_SHADER_WRITE_BIT | VK_ACCESS_TRANSFER_WRITE_BIT,
-      .dstAccessMask = VK_ACCESS_SHADER_READ_BIT | VK_ACCESS_SHADER_WRITE_BIT |
-                       VK_ACCESS_TRANSFER_READ_BIT | VK_ACCESS_TRANSFER_WRITE_BIT};
-  vkCmdPipelineBarrier(commands_, stages, stages, 0, 1, &memory, 0, nullptr, 0, nullptr);
 }
 
 std::size_t CommandStream::stage(Arena& arena, std::size_t bytes) {
@@ -87,7 +40,6 @@ std::size_t CommandStream::stage(Arena& arena, std::size_t bytes) {
   const VkDeviceSize room = staging_block - arena.used;
   if (room < std::min<VkDeviceSize>(bytes, staging_block / 4)) {
     run_recorded();
-    begin();
   }
   return std::min<std::size_t>(bytes, staging_block - arena.used);
 }
@@ -106,9 +58,7 @@ void CommandStream::upload_bytes(const Buffer& target, std::span<const std::byte
     record([&] {
       const std::size_t count = stage(upload_, bytes.size());
       std::memcpy(upload_.block.data() + upload_.used, bytes.data(), count);
-      const VkBufferCopy copy{upload_.used, offset, count};
-      barrier();
-      vkCmdCopyBuffer(commands_, upload_.block.handle(), target.handle(), 1, &copy);
+      recording_.copy(upload_.block.handle(), target.handle(), {upload_.used, offset, count});
       upload_.used += staged(count);
       bytes = bytes.subspan(count);
       offset += count;
@@ -121,9 +71,7 @@ void CommandStream::download_bytes(const Buffer& source, std::span<std::byte> by
   while (!bytes.empty()) {
     record([&] {
       const std::size_t count = stage(download_, bytes.size());
-      const VkBufferCopy copy{offset, download_.used, count};
-      barrier();
-      vkCmdCopyBuffer(commands_, source.handle(), download_.block.handle(), 1, &copy);
+      recording_.copy(source.handle(), download_.block.handle(), {offset, download_.used, count});
       downloads_.push_back({bytes.data(), download_.block.data() + download_.used, count});
       download_.used += staged(count);
       bytes = bytes.subspan(count);
@@ -133,10 +81,7 @@ void CommandStream::download_bytes(const Buffer& source, std::span<std::byte> by
 }
 
 void CommandStream::fill(const Buffer& target, std::uint32_t word) {
-  record([&] {
-    barrier();
-    vkCmdFillBuffer(commands_, target.handle(), 0, VK_WHOLE_SIZE, word);
-  });
+  record([&] { recording_.fill(target.handle(), word); });
 }
 
 VkDescriptorSet CommandStream::descriptor_set(const Kernel& kernel,
@@ -202,19 +147,12 @@ void CommandStream::dispatch_bytes(const Kernel& kernel, std::span<const Buffer*
                       "do not fit it or the device",
                       kernel.name(), buffers.size(), push.size(), groups[0], groups[1], groups[2]));
     }
-    const VkDescriptorSet set = descriptor_set(kernel, buffers);
-    barrier();
-    vkCmdBindPipeline(commands_, VK_PIPELINE_BIND_POINT_COMPUTE, kernel.pipeline());
-    vkCmdBindDescriptorSets(commands_, VK_PIPELINE_BIND_POINT_COMPUTE, kernel.layout(), 0, 1, &set,
-                            0, nullptr);
-    vkCmdPushConstants(commands_, kernel.layout(), VK_SHADER_STAGE_COMPUTE_BIT, 0,
-                       static_cast<std::uint32_t>(push.size()), push.data());
-    vkCmdDispatch(commands_, groups[0], groups[1], groups[2]);
+    recording_.dispatch(kernel, descriptor_set(kernel, buffers), push, groups);
   });
 }
 
 void CommandStream::run() {
-  if (!recording_) {
+  if (recording_.empty()) {
     return;
   }
   run_recorded();
@@ -234,39 +172,12 @@ void CommandStream::run_recorded() {
 }
 
 void CommandStream::submit() {
-  // Makes the device's writes to staging memory visible to the host after the fence.
-  const VkMemoryBarrier to_host{.sType = VK_STRUCTURE_TYPE_MEMORY_BARRIER,
-                                .srcAccessMask = VK_ACCESS_TRANSFER_WRITE_BIT,
-                                .dstAccessMask = VK_ACCESS_HOST_READ_BIT};
-  vkCmdPipelineBarrier(commands_, VK_PIPELINE_STAGE_TRANSFER_BIT, VK_PIPELINE_STAGE_HOST_BIT, 0, 1,
-                       &to_host, 0, nullptr, 0, nullptr);
-  if (timestamps_) {
-    vkCmdWriteTimestamp(commands_, VK_PIPELINE_STAGE_BOTTOM_OF_PIPE_BIT, timestamps_.get(), 1);
+  const RunOutcome outcome = context_.runs().run(recording_, submitter_);
+  if (outcome.result !=
+      VK_SUCCESS) {  // no message is made, and no memory taken, while all goes well
+    check(outcome.result, fmt::format("running on device '{}'", context_.name()));
   }
-  check(vkEndCommandBuffer(commands_), "recording commands");
-  const VkSubmitInfo submit{.sType = VK_STRUCTURE_TYPE_SUBMIT_INFO,
-                            .commandBufferCount = 1,
-                            .pCommandBuffers = &commands_};
-  const VkDevice device = context_.device();
-  const VkFence fence = fence_.get();
-  const auto check_run = [&](VkResult result) {
-    if (result != VK_SUCCESS) {  // no message is made, and no memory taken, while all goes well
-      check(result, fmt::format("running on device '{}'", context_.name()));
-    }
-  };
-  const auto start = std::chrono::steady_clock::now();
-  check_run(context_.submit(submit, fence));
-  check_run(vkWaitForFences(device, 1, &fence, VK_TRUE, std::numeric_limits<std::uint64_t>::max()));
-  double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-  if (timestamps_) {
-    std::array<std::uint64_t, 2> ticks{};
-    check_run(vkGetQueryPoolResults(device, timestamps_.get(), 0, 2, sizeof ticks, ticks.data(),
-                                    sizeof ticks[0],
-                                    VK_QUERY_RESULT_64_BIT | VK_QUERY_RESULT_WAIT_BIT));
-    seconds = static_cast<double>((ticks[1] - ticks[0]) & context_.limits().timestamp_mask) *
-              context_.limits().timestamp_ns * 1e-9;
-  }
-  seconds_before_run_ += seconds;
+  seconds_before_run_ += outcome.seconds;
   for (const Download& download : downloads_) {
     std::memcpy(download.target, download.source, download.bytes);
   }
@@ -279,11 +190,8 @@ void CommandStream::drop() {
 
 void CommandStream::rewind() {
   const VkDevice device = context_.device();
-  const VkFence fence = fence_.get();
-  recording_ = false;
+  recording_.clear();
   downloads_.clear();
-  check(vkResetFences(device, 1, &fence), "resetting a fence");
-  check(vkResetCommandPool(device, pool_.get(), 0), "resetting commands");
   for (const auto& pool : descriptor_pools_) {
     check(vkResetDescriptorPool(device, pool.get(), 0), "resetting a descriptor pool");
   }

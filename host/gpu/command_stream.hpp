@@ -9,13 +9,16 @@
 
 #include "buffer.hpp"
 #include "kernel.hpp"
+#include "recording.hpp"
+#include "submitter.hpp"
 
 namespace palpate::gpu {
 
 /// Records copies and dispatches, then runs them in order. A barrier stands between any two
-/// commands, so that each sees the results of all before it. Staging memory has a fixed size: a
-/// copy that finds it full first runs the recorded commands. A call that throws drops all recorded
-/// commands, so that no later run uses a buffer that the caller has freed meanwhile.
+/// commands, so that each sees the results of all before it. Streams of several threads run side by
+/// side (RunQueue): they must share no buffer that one of them writes. Staging memory has a fixed
+/// size: a copy that finds it full first runs the recorded commands. A call that throws drops all
+/// recorded commands, so that no later run uses a buffer that the caller has freed meanwhile.
 class CommandStream {
  public:
   /// Size of the staging memory, both directions together, in bytes.
@@ -57,7 +60,8 @@ class CommandStream {
   /// Submits everything recorded, waits for it and delivers the downloads.
   void run();
 
-  /// Time that the device took for all commands of the last run(), in seconds.
+  /// Time that the device took for all commands of the last run(), in seconds, with those of other
+  /// threads that ran beside them.
   double device_seconds() const { return device_seconds_; }
 
  private:
@@ -83,8 +87,6 @@ class CommandStream {
   /// Calls `commands`, which add to the recording. Drops the recording if they throw.
   template <typename Commands>
   void record(const Commands& commands);
-  void begin();
-  void barrier();
   void run_recorded();
   void submit();
   void rewind();
@@ -92,16 +94,13 @@ class CommandStream {
   VkDescriptorSet descriptor_set(const Kernel& kernel, std::span<const Buffer* const> buffers);
 
   Context& context_;
-  Owned<VkCommandPool> pool_;
-  VkCommandBuffer commands_ = VK_NULL_HANDLE;
-  Owned<VkFence> fence_;
-  Owned<VkQueryPool> timestamps_;  ///< none where the queue has none
+  Submitter submitter_;
+  Recording recording_;
   std::vector<Owned<VkDescriptorPool>> descriptor_pools_;
   std::size_t sets_used_ = 0;
   Arena upload_{Memory::upload, {}, 0};
   Arena download_{Memory::download, {}, 0};
   std::vector<Download> downloads_;
-  bool recording_ = false;
   double device_seconds_ = 0.0;
   double seconds_before_run_ = 0.0;  ///< device time since the last run()
 };

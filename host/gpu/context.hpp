@@ -11,6 +11,7 @@
 
 #include "palpate/device.hpp"
 #include "palpate/vulkan_device.hpp"
+#include "run_queue.hpp"
 
 namespace palpate::gpu {
 
@@ -84,6 +85,8 @@ class Context {
   VkDevice device() const { return device_; }
   /// Submits to the queue; the commands of several threads take turns.
   VkResult submit(const VkSubmitInfo& info, VkFence fence);
+  /// Where command streams queue up for the device.
+  RunQueue& runs() { return runs_; }
   std::uint32_t queue_family() const { return queue_family_; }
   const std::string& name() const { return name_; }
   const Limits& limits() const { return limits_; }
@@ -114,6 +117,7 @@ class Context {
   VkQueue queue_ = VK_NULL_HANDLE;
   std::mutex own_queue_mutex_;
   std::mutex* queue_mutex_ = &own_queue_mutex_;
+  RunQueue runs_;
   std::uint32_t queue_family_ = 0;
   std::string name_;
   Limits limits_;

@@ -58,12 +58,15 @@ std::size_t most_at_once(const RecognitionTask& task, std::size_t threads) {
   if (std::holds_alternative<BoundedOptions>(task.filter)) {
     return threads;
   }
-  // Few bins leave a device idle, and it waits for the host: other unknowns fill its time.
-  constexpr std::int64_t few_bins = 1'000'000;
-  constexpr std::size_t most = 4;
-  const bool few =
-      std::holds_alternative<HistogramOptions>(task.filter) && task.bins_in_all() <= few_bins;
-  return few ? std::min(threads, most) : 1;
+  if (!std::holds_alternative<HistogramOptions>(task.filter)) {
+    return 1;
+  }
+  // Few bins leave a device idle, and it waits for the host. What the threads submit meanwhile runs
+  // side by side.
+  constexpr std::int64_t filling_bins = 4'000'000;
+  constexpr std::int64_t most = 16;
+  return std::min(threads, static_cast<std::size_t>(
+                               std::clamp<std::int64_t>(filling_bins / task.bins_in_all(), 1, most)));
 }
 
 std::string host_name() {
