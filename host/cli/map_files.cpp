@@ -19,7 +19,9 @@ std::vector<std::filesystem::path> map_files(const std::filesystem::path& argume
     refuse(argument, "cannot be read: {}; check its permissions", error.message());
   }
   for (const auto& entry : entries) {
-    if (entry.path().extension() == ".h5" && read_format(entry.path()) == "palpate.map") {
+    // A look into each file would take as long as reading it.
+    if (entry.path().filename().string().ends_with(".map.h5") ||
+        (entry.path().extension() == ".h5" && read_format(entry.path()) == "palpate.map")) {
       files.push_back(entry.path());
     }
   }

@@ -5,7 +5,8 @@
 
 namespace palpate::cli {
 
-/// The map files that an argument of --maps stands for: itself, or the maps of a folder.
+/// The map files that an argument of --maps stands for: itself or, of a folder, its *.map.h5 and
+/// what else is a map among its *.h5. @throws Error where a folder has none
 std::vector<std::filesystem::path> map_files(const std::filesystem::path& argument);
 
 }  // namespace palpate::cli
