@@ -24,12 +24,12 @@ bool stands_before(const Tile& a, const Tile& b) {
 }
 
 UnsettledMass unsettled(std::span<const Tile> tiles, std::size_t level,
-                        std::span<const TileBounds> bounds, double slot_nats) {
+                        std::span<const TileBounds> bounds, const MassAccount& account) {
   double largest = -std::numeric_limits<double>::infinity();
   for (const Tile& tile : tiles) {
     largest = std::max(largest, tile.bound);
   }
-  UnsettledMass mass(bounds.size(), largest, slot_nats);
+  UnsettledMass mass(bounds.size(), largest, account.slot_nats(largest));
   for (const Tile& tile : tiles) {
     mass.add(static_cast<std::size_t>(tile.object), tile.bound,
              bounds[tile.object].bins(level, tile));
@@ -143,8 +143,7 @@ void LeafPass::evaluate(std::span<const Tile> tiles, double tolerance) {
   if (tiles.empty()) {
     return;
   }
-  UnsettledMass left =
-      unsettled(tiles, bounds_.front().levels().size() - 1, bounds_, account_.slot_nats());
+  UnsettledMass left = unsettled(tiles, bounds_.front().levels().size() - 1, bounds_, account_);
   for (const Tile& tile : tiles) {
     if (probed(tile)) {
       remove(tile, left);

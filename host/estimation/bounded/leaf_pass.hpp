@@ -64,6 +64,6 @@ bool stands_before(const Tile& a, const Tile& b);
 
 /// The bins of tiles, by the tiles' bounds.
 UnsettledMass unsettled(std::span<const Tile> tiles, std::size_t level,
-                        std::span<const TileBounds> bounds, double slot_nats);
+                        std::span<const TileBounds> bounds, const MassAccount& account);
 
 }  // namespace palpate

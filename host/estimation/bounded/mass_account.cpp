@@ -99,12 +99,15 @@ std::vector<std::size_t> MassAccount::droppable_from(const UnsettledMass& tiles,
   return from;
 }
 
-double MassAccount::slot_nats() const {
+double MassAccount::slot_nats(double largest) const {
   constexpr double of_evidence = 0.25;
   constexpr double widest = 1.0;
-  return goal_.evidence_nats ? std::clamp(of_evidence * *goal_.evidence_nats,
-                                          UnsettledMass::usual_slot_nats, widest)
-                             : UnsettledMass::usual_slot_nats;
+  constexpr double negligible = 64.0;  // so far below the total, 1e15 bins hold 1e-12 of it
+  const double fine = goal_.evidence_nats ? std::clamp(of_evidence * *goal_.evidence_nats,
+                                                       UnsettledMass::usual_slot_nats, widest)
+                                          : UnsettledMass::usual_slot_nats;
+  const double reach = largest - log_total_ + negligible;
+  return std::isfinite(reach) ? std::max(fine, reach / (UnsettledMass::slots - 1)) : fine;
 }
 
 std::vector<double> MassAccount::droppable_evidence(double tolerance) const {

@@ -90,10 +90,9 @@ class SearchRun {
     settle_unseen();
     const std::vector<Tile> best = best_of_rows();
     if (!best.empty()) {
-      UnsettledMass unsettled(search_.bounds_.size(),
-                              std::min_element(best.begin(), best.end(), before)->bound,
-                              account_.slot_nats());
       raise(best, 0);
+      const double largest = std::min_element(best.begin(), best.end(), before)->bound;
+      UnsettledMass unsettled(search_.bounds_.size(), largest, account_.slot_nats(largest));
       count_largest(unsettled);
       const double share = goal_.tolerance * search_share;
       // One part for every level that drops tiles, and one for the bins.
@@ -433,7 +432,7 @@ class SearchRun {
       const auto first = tiles.begin() + static_cast<std::ptrdiff_t>(begin);
       std::vector<Tile> lot(first, first + static_cast<std::ptrdiff_t>(count));
       if (deadline_.passed()) {
-        account_.drop(unsettled(lot, level, search_.bounds_, account_.slot_nats()));
+        account_.drop(unsettled(lot, level, search_.bounds_, account_));
         return;
       }
       // What tiles do not use up is left for those after them.
@@ -497,7 +496,7 @@ class SearchRun {
   /// @returns the part of the total that was dropped
   double drop(std::vector<Tile>& tiles, std::size_t level, double tolerance) {
     const double dropped = account_.dropped_share();
-    UnsettledMass mass = unsettled(tiles, level, search_.bounds_, account_.slot_nats());
+    UnsettledMass mass = unsettled(tiles, level, search_.bounds_, account_);
     const std::vector<std::size_t> from = account_.droppable_from(mass, tolerance);
     std::erase_if(tiles,
                   [&](const Tile& tile) { return mass.slot(tile.bound) >= from[tile.object]; });

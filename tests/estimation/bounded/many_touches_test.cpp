@@ -1,0 +1,33 @@
+// A belief that very many touches have made sharp.
+
+#include <gtest/gtest.h>
+
+#include "bounded/certified.hpp"
+#include "touched_shape.hpp"
+
+namespace palpate {
+namespace {
+
+TEST(ManyTouches, AreAnsweredByFewBins) {
+  Device device = Device::open();
+  const std::vector<Hypothesis> shapes{{map_of(on_letter_l, "L"), 1.0},
+                                       {map_of(on_disc, "disc"), 2.0}};
+  BoundedOptions options;
+  options.lattice = {.x_mm = {-6.0, 6.0, 13},
+                     .y_mm = {-5.0, 6.0, 12},
+                     .theta_rad = {0, two_pi, 16},
+                     .pivot_mm = {2.0, -1.0}};
+  // The mode's log-likelihood falls with each touch, and the bounds of large tiles lie above it by
+  // ever more nats.
+  constexpr std::size_t most = 100;
+  const Recording recording = touches_of(on_letter_l, {{1.3, -0.8}, 0.7}, most, 811);
+  for (const std::size_t touches : {std::size_t{9}, most}) {
+    SCOPED_TRACE(touches);
+    const Certified certified =
+        expect_certified(device, shapes, options, recording.touches(0, touches), 1e-8);
+    EXPECT_LT(certified.estimate.certificate->bins_evaluated, options.lattice.bins() / 10);
+  }
+}
+
+}  // namespace
+}  // namespace palpate
