@@ -75,6 +75,7 @@ TEST(PalpateBench, QuickRunFillsTheDocumentAndKeepsTheErrorBounds) {
   // Nine touches tell the letters apart, by the paper; a seed may be unlucky.
   EXPECT_GT(value_of(unknowns, "letter of the mode is right"), 90.0);
   EXPECT_GT(value_of(unknowns, "a process per unknown"), 0.0);
+  EXPECT_GT(value_of(unknowns, "palpate batch by bounds"), 0.0);
   EXPECT_GT(value_of(cases.at("latency 25x25x16"), "device, by its clock"), 0.0);
 }
 
