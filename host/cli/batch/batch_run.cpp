@@ -65,8 +65,8 @@ std::size_t most_at_once(const RecognitionTask& task, std::size_t threads) {
   // side by side.
   constexpr std::int64_t filling_bins = 4'000'000;
   constexpr std::int64_t most = 16;
-  return std::min(threads, static_cast<std::size_t>(
-                               std::clamp<std::int64_t>(filling_bins / task.bins_in_all(), 1, most)));
+  const auto together = std::clamp<std::int64_t>(filling_bins / task.bins_in_all(), 1, most);
+  return std::min(threads, static_cast<std::size_t>(together));
 }
 
 std::string host_name() {
