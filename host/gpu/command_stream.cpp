@@ -136,7 +136,7 @@ VkDescriptorSet CommandStream::descriptor_set(const Kernel& kernel,
 
 void CommandStream::dispatch_bytes(const Kernel& kernel, std::span<const Buffer* const> buffers,
                                    std::span<const std::byte> push,
-                                   std::array<std::uint32_t, 3> groups) {
+                                   std::array<std::uint32_t, 3> groups, double work) {
   record([&] {
     const auto& most = context_.limits().group_count;
     if (buffers.size() != kernel.bindings().size() || push.size() != kernel.push_bytes() ||
@@ -147,7 +147,7 @@ void CommandStream::dispatch_bytes(const Kernel& kernel, std::span<const Buffer*
                       "do not fit it or the device",
                       kernel.name(), buffers.size(), push.size(), groups[0], groups[1], groups[2]));
     }
-    recording_.dispatch(kernel, descriptor_set(kernel, buffers), push, groups);
+    recording_.dispatch(kernel, descriptor_set(kernel, buffers), push, groups, work);
   });
 }
 

@@ -3,6 +3,7 @@
 #include <array>
 #include <cstring>
 #include <initializer_list>
+#include <limits>
 #include <ranges>
 #include <span>
 #include <vector>
@@ -49,12 +50,15 @@ class CommandStream {
 
   /// Runs a kernel, with a buffer for each of its bindings, on groups[0] x groups[1] x groups[2]
   /// workgroups.
+  /// @param work Recording::work(), where it is known: only then other threads' commands may run
+  /// beside it
   template <typename Push>
   void dispatch(const Kernel& kernel, std::initializer_list<const Buffer*> buffers,
-                const Push& push, std::array<std::uint32_t, 3> groups) {
+                const Push& push, std::array<std::uint32_t, 3> groups,
+                double work = std::numeric_limits<double>::infinity()) {
     static_assert(std::is_trivially_copyable_v<Push>);
     dispatch_bytes(kernel, std::span(buffers.begin(), buffers.size()),
-                   std::as_bytes(std::span(&push, 1)), groups);
+                   std::as_bytes(std::span(&push, 1)), groups, work);
   }
 
   /// Submits everything recorded, waits for it and delivers the downloads.
@@ -83,7 +87,8 @@ class CommandStream {
   void upload_bytes(const Buffer& target, std::span<const std::byte> bytes, VkDeviceSize offset);
   void download_bytes(const Buffer& source, std::span<std::byte> bytes, VkDeviceSize offset);
   void dispatch_bytes(const Kernel& kernel, std::span<const Buffer* const> buffers,
-                      std::span<const std::byte> push, std::array<std::uint32_t, 3> groups);
+                      std::span<const std::byte> push, std::array<std::uint32_t, 3> groups,
+                      double work);
   /// Calls `commands`, which add to the recording. Drops the recording if they throw.
   template <typename Commands>
   void record(const Commands& commands);

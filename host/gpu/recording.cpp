@@ -1,25 +1,23 @@
 #include "recording.hpp"
 
-#include <algorithm>
-
 #include "vulkan.hpp"
 
 namespace palpate::gpu {
 
 void Recording::dispatch(const Kernel& kernel, VkDescriptorSet buffers,
                          std::span<const std::byte> push,
-                         const std::array<std::uint32_t, 3>& groups) {
+                         const std::array<std::uint32_t, 3>& groups, double work) {
   const std::size_t push_first = push_.size();
   push_.insert(push_.end(), push.begin(), push.end());
   commands_.emplace_back(Dispatch{kernel.pipeline(), kernel.layout(), buffers, push_first,
                                   static_cast<std::uint32_t>(push.size()), groups});
-  most_groups_ = std::max(most_groups_, std::uint64_t{groups[0]} * groups[1] * groups[2]);
+  work_ += work;
 }
 
 void Recording::clear() {
   commands_.clear();
   push_.clear();
-  most_groups_ = 0;
+  work_ = 0.0;
 }
 
 void Recording::encode(std::size_t command, VkCommandBuffer to) const {

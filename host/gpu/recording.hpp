@@ -20,15 +20,16 @@ class Recording {
   }
   /// Sets every 32-bit word of the buffer to `word`.
   void fill(VkBuffer target, std::uint32_t word) { commands_.emplace_back(Fill{target, word}); }
+  /// @param work see work()
   void dispatch(const Kernel& kernel, VkDescriptorSet buffers, std::span<const std::byte> push,
-                const std::array<std::uint32_t, 3>& groups);
+                const std::array<std::uint32_t, 3>& groups, double work);
   /// Forgets all commands; keeps their memory.
   void clear();
 
   bool empty() const { return commands_.empty(); }
   std::size_t commands() const { return commands_.size(); }
-  /// Workgroups of the largest dispatch.
-  std::uint64_t most_groups() const { return most_groups_; }
+  /// Bins, particles or their like times the loop iterations for each, of all dispatches.
+  double work() const { return work_; }
 
   /// Adds one command to a command buffer.
   void encode(std::size_t command, VkCommandBuffer to) const;
@@ -58,7 +59,7 @@ class Recording {
 
   std::vector<std::variant<Copy, Fill, Dispatch>> commands_;
   std::vector<std::byte> push_;  ///< constants of all dispatches
-  std::uint64_t most_groups_ = 0;
+  double work_ = 0.0;
 };
 
 }  // namespace palpate::gpu

@@ -1,7 +1,6 @@
 #include "run_queue.hpp"
 
 #include <cstddef>
-#include <cstdint>
 
 #include "recording.hpp"
 #include "submitter.hpp"
@@ -10,15 +9,12 @@ namespace palpate::gpu {
 
 namespace {
 
-/// Workgroups of a dispatch that fills a device by itself: the largest GPUs hold about so many
-/// workgroups of 64 lanes at once.
-constexpr std::uint64_t filling_groups = 4096;
-/// Bounds how long a submission keeps the device from others.
+/// Work of recordings that are submitted together, see Recording::work(): about as much as a small
+/// GPU does in 25 ms, and two cores in 400 ms, so that none waits long for the others.
+constexpr double most_work = 5e8;
 constexpr std::size_t most_together = 16;
 /// The next submission is ready when the device finishes one.
 constexpr int most_submitted = 2;
-
-bool is_small(const WaitingRun& run) { return run.recording->most_groups() < filling_groups; }
 
 }  // namespace
 
@@ -36,10 +32,12 @@ WaitingRun* WaitingLine::take() {
   first->next = nullptr;
   WaitingRun* last = first;
   std::size_t together = 1;
+  double work = first->recording->work();
   while (rest != nullptr) {
     WaitingRun& run = *rest;
     rest = run.next;
-    if (is_small(*first) && is_small(run) && together < most_together) {
+    if (together < most_together && work + run.recording->work() <= most_work) {
+      work += run.recording->work();
       run.next = nullptr;
       last->next = &run;
       last = &run;
@@ -69,10 +67,8 @@ RunOutcome RunQueue::run(const Recording& recording, Submitter& own) {
   const RunOutcome outcome = own.run(*together);
   lock.lock();
   --submitted_;
-  for (WaitingRun* run = together; run != nullptr;) {
-    WaitingRun* const next = run->next;  // its thread may end it once it has its outcome
+  for (WaitingRun* run = together; run != nullptr; run = run->next) {
     run->outcome = outcome;
-    run = next;
   }
   changed_.notify_all();
   return outcome;

@@ -29,9 +29,8 @@ class WaitingLine {
  public:
   void add(WaitingRun& last);
   const WaitingRun* front() const { return front_; }
-  /// Takes the front out and, where its dispatches are small, other recordings of small dispatches:
-  /// together they fill a device that one of them would leave idle. Returns the front, with the
-  /// others behind it.
+  /// Takes the front out, and with it others, as far as all together are little work: they fill a
+  /// device that one of them would leave idle. Returns the front, with the others behind it.
   WaitingRun* take();
 
  private:
@@ -40,8 +39,9 @@ class WaitingLine {
 };
 
 /// Runs the recordings of several threads on one device. Those that come while the device is busy
-/// wait, and are then submitted together, side by side: the device works at the dispatches of all
-/// of them at once. A recording of large dispatches is submitted by itself.
+/// wait. Where they are little work, they are then submitted together, side by side, so that a GPU
+/// can work at the dispatches of all of them at once. A recording of much work is submitted by
+/// itself.
 class RunQueue {
  public:
   /// Runs a recording and waits for it.

@@ -1,5 +1,7 @@
 #include "run_queue.hpp"
 
+#include <cstring>
+#include <limits>
 #include <thread>
 #include <vector>
 
@@ -19,9 +21,9 @@ Buffer words_buffer(Context& context, std::size_t n) {
 }
 
 /// A recording with one dispatch, which is never run.
-Recording with_groups(std::uint32_t x, std::uint32_t y = 1, std::uint32_t z = 1) {
+Recording with_work(double work) {
   Recording recording;
-  recording.dispatch(Kernel(), VK_NULL_HANDLE, {}, {x, y, z});
+  recording.dispatch(Kernel(), VK_NULL_HANDLE, {}, {1, 1, 1}, work);
   return recording;
 }
 
@@ -34,29 +36,32 @@ std::vector<std::size_t> taken(WaitingLine& line, const std::vector<WaitingRun>&
   return numbers;
 }
 
-TEST(WaitingLine, SmallRecordingsGoTogetherAndLargeOnesAlone) {
+TEST(WaitingLine, LittleWorkGoesTogetherAndMuchAlone) {
   using Numbers = std::vector<std::size_t>;
-  const Recording small = with_groups(4, 5, 16);
-  const Recording large = with_groups(16, 16, 16);
+  const Recording little = with_work(2e8);
+  const Recording much = with_work(4e8);
+  const Recording unknown = with_work(std::numeric_limits<double>::infinity());
   std::vector<WaitingRun> runs;
-  for (const Recording* recording : {&small, &small, &large, &small, &large, &small}) {
+  for (const Recording* recording :
+       {&little, &much, &little, &little, &unknown, &unknown, &little}) {
     runs.push_back({.recording = recording});
   }
   WaitingLine line;
   EXPECT_EQ(line.front(), nullptr);
-  for (std::size_t i : {0U, 1U, 2U, 3U, 4U}) {
+  for (std::size_t i : {0U, 1U, 2U, 3U, 4U, 5U}) {
     line.add(runs[i]);
   }
-  EXPECT_EQ(taken(line, runs), (Numbers{0, 1, 3}));
-  EXPECT_EQ(line.front(), &runs[2]);
-  line.add(runs[5]);
-  EXPECT_EQ(taken(line, runs), Numbers{2});
+  EXPECT_EQ(taken(line, runs), (Numbers{0, 2}));  // three are above 5e8
+  EXPECT_EQ(line.front(), &runs[1]);
+  line.add(runs[6]);
+  EXPECT_EQ(taken(line, runs), Numbers{1});
+  EXPECT_EQ(taken(line, runs), (Numbers{3, 6}));
   EXPECT_EQ(taken(line, runs), Numbers{4});
   EXPECT_EQ(taken(line, runs), Numbers{5});
   EXPECT_EQ(line.front(), nullptr);
 }
 
-TEST(WaitingLine, RecordingsWithoutDispatchesAreSmall) {
+TEST(WaitingLine, RecordingsWithoutDispatchesAreLittleWork) {
   const Recording copies;
   std::vector<WaitingRun> runs(2, {.recording = &copies});
   WaitingLine line;
@@ -66,8 +71,8 @@ TEST(WaitingLine, RecordingsWithoutDispatchesAreSmall) {
 }
 
 TEST(WaitingLine, NoMoreGoTogetherThanASubmissionTakes) {
-  const Recording small = with_groups(1);
-  std::vector<WaitingRun> runs(20, {.recording = &small});
+  const Recording little = with_work(1.0);
+  std::vector<WaitingRun> runs(20, {.recording = &little});
   WaitingLine line;
   for (WaitingRun& run : runs) {
     line.add(run);
@@ -132,8 +137,9 @@ TEST(RunQueue, EveryThreadGetsItsOwnResults) {
       running.emplace_back([&context, thread, &wrong = wrong[thread]] {
         CommandStream stream(context);
         const ScaleAndAdd triple(context, 3);
-        // The last two dispatch 4,096 workgroups and more, which are submitted alone.
-        const std::size_t n = thread < threads - 2 ? 65 : (4095 + thread) * ScaleAndAdd::workgroup;
+        // The last two are much work, which is submitted alone.
+        const std::size_t n = thread < threads - 2 ? 65 : 100'000;
+        const double work = thread < threads - 2 ? 65.0 : 1e9;
         const Buffer a = words_buffer(context, n);
         const Buffer b = words_buffer(context, n);
         for (std::uint32_t repetition = 0; repetition < repetitions; ++repetition) {
@@ -141,8 +147,8 @@ TEST(RunQueue, EveryThreadGetsItsOwnResults) {
           Words words(n);
           stream.fill(a, value);
           for (std::uint32_t i = 0; i <= 2 * thread; ++i) {
-            triple.dispatch(stream, a, b, i);
-            triple.dispatch(stream, b, a, thread);
+            triple.dispatch(stream, a, b, i, work);
+            triple.dispatch(stream, b, a, thread, work);
             value = 3 * (3 * value + i) + thread;
           }
           stream.download(a, std::span(words));

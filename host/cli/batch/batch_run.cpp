@@ -58,8 +58,9 @@ std::size_t most_at_once(const RecognitionTask& task, std::size_t threads) {
   if (std::holds_alternative<BoundedOptions>(task.filter)) {
     return threads;
   }
-  if (!std::holds_alternative<HistogramOptions>(task.filter)) {
-    return 1;
+  const auto* histogram = std::get_if<HistogramOptions>(&task.filter);
+  if (histogram == nullptr || histogram->memory_limit_bytes) {
+    return 1;  // the limit is that of all histograms
   }
   // Few bins leave a device idle, and it waits for the host. What the threads submit meanwhile runs
   // side by side.

@@ -131,8 +131,8 @@ void DenseLikelihood::dispatch(const Group& group, const Range& range, const Sla
        in_table ? &maps.axes() : &maps.log_odds(), &maps.axes(), &maps.places(),
        &slab.log_likelihood},
       push,
-      {groups_of(invocations, independent_lanes(context_.limits())), range.count,
-       slab.theta_count});
+      {groups_of(invocations, independent_lanes(context_.limits())), range.count, slab.theta_count},
+      work_of(range, slab, elements));
 }
 
 void DenseLikelihood::reserve(std::size_t elements) {
@@ -188,7 +188,7 @@ void DenseLikelihood::accumulate(const ContactEvidence& evidence, const DenseBel
           continue;
         }
         dispatch(group, range, slab, batch_.size(), elements);
-        pending += static_cast<double>(range.count * slab.bins()) * static_cast<double>(elements);
+        pending += work_of(range, slab, elements);
         if (pending > work_per_run(context_.limits())) {
           stream_.run();
           done += pending;

@@ -65,6 +65,10 @@ class DenseLikelihood {
   };
 
   static Range within(const Group& group, const Slab& slab);
+  /// Products of bins and elements.
+  static double work_of(const Range& range, const Slab& slab, std::size_t elements) {
+    return static_cast<double>(range.count * slab.bins()) * static_cast<double>(elements);
+  }
   /// Records one run of the group's kernel over its objects in a slab.
   void dispatch(const Group& group, const Range& range, const Slab& slab, std::size_t segments,
                 std::size_t elements);

@@ -42,6 +42,11 @@ int plane_steps(double sd_mm, const Axis& axis) {
   return std::min(blur_steps(sd_mm, axis), axis.count - 1);
 }
 
+/// See gpu::Recording::work().
+double work_of(const Slab& slab, std::size_t steps) {
+  return static_cast<double>(slab.object_count * slab.bins()) * static_cast<double>(steps);
+}
+
 /// Whether no object's bins are cut into parts.
 bool objects_in_one_slab(const gpu::Context& context, const PoseLattice& lattice,
                          std::size_t objects) {
@@ -186,7 +191,8 @@ void DisplacementBlur::run_pass(const Pass& pass, const DenseBelief& from,
                      {&from.slabs()[i].log_likelihood, &references_, &plane_max_, &pass.weights,
                       &slab.log_likelihood},
                      planes_of(slab, lattice_.theta_rad.count),
-                     few_groups ? std::array<std::uint32_t, 3>{1, 1, 1} : groups);
+                     few_groups ? std::array<std::uint32_t, 3>{1, 1, 1} : groups,
+                     work_of(slab, pass.weights.bytes() / sizeof(float)));
   }
 }
 
@@ -199,7 +205,8 @@ void DisplacementBlur::record_planes(const DenseBelief& from, const DenseBelief&
                      planes_of(slab, lattice_.theta_rad.count),
                      few_groups
                          ? std::array<std::uint32_t, 3>{1, 1, 1}
-                         : std::array<std::uint32_t, 3>{slab.theta_count, slab.object_count, 1});
+                         : std::array<std::uint32_t, 3>{slab.theta_count, slab.object_count, 1},
+                     work_of(slab, 1));
   }
   if (blurs_planes()) {
     run_pass(along_y_, from, scratch, few_groups);
@@ -235,7 +242,8 @@ void DisplacementBlur::record_turns(const DenseBelief& scratch,
         push,
         few_groups ? std::array<std::uint32_t, 3>{1, 1, 1}
                    : std::array<std::uint32_t, 3>{groups_of(invocations, lanes_), slab.object_count,
-                                                  slab.theta_count});
+                                                  slab.theta_count},
+        work_of(slab, 1 + 2 * static_cast<std::size_t>(theta_steps_)));
   }
 }
 

@@ -111,7 +111,8 @@ std::span<const OverlapSum> OverlapMean::sums(const DenseBelief& scratch, const 
                                     .half_x_mm = everywhere ? unbounded : within_floats(half.x),
                                     .half_y_mm = everywhere ? unbounded : within_floats(half.y)};
     stream_.dispatch(kernel_, {&slab.log_likelihood, &arrays_, &boxes_, &partials_}, push,
-                     {slab.theta_count, slab.object_count, 1});
+                     {slab.theta_count, slab.object_count, 1},
+                     static_cast<double>(slab.object_count * slab.bins()));
     first += slab.theta_count * slab.object_count;
   }
   stream_.download(partials_, read_partials_);
