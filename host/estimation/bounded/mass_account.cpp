@@ -102,11 +102,22 @@ std::vector<std::size_t> MassAccount::droppable_from(const UnsettledMass& tiles,
 double MassAccount::slot_nats(double largest) const {
   constexpr double of_evidence = 0.25;
   constexpr double widest = 1.0;
-  constexpr double negligible = 64.0;  // so far below the total, 1e15 bins hold 1e-12 of it
   const double fine = goal_.evidence_nats ? std::clamp(of_evidence * *goal_.evidence_nats,
                                                        UnsettledMass::usual_slot_nats, widest)
                                           : UnsettledMass::usual_slot_nats;
-  const double reach = largest - log_total_ + negligible;
+  // The lowest mass that matters: a part of the total or, of a label that lies far below, of its
+  // own.
+  double floor = log_total_;
+  if (goal_.evidence_nats) {
+    for (const double own : log_totals_) {
+      floor = std::min(floor, own == nothing ? floor : own);
+    }
+    floor = std::max(floor, log_total_ - goal_.evidence_range_nats);
+  }
+  const auto bins = static_cast<double>(lattice_.bins()) * static_cast<double>(evaluated_.size());
+  const double part = std::min(goal_.tolerance, goal_.evidence_nats.value_or(1.0));
+  constexpr double parts_of_it = 8.0;  // a level of tiles may use up a part of what may be dropped
+  const double reach = largest - floor + std::log(bins / part) + parts_of_it;
   return std::isfinite(reach) ? std::max(fine, reach / (UnsettledMass::slots - 1)) : fine;
 }
 

@@ -77,10 +77,10 @@ class MassAccount {
   /// @param bin_of_box index of the bin in the box, [y, x]
   void note_best(const BinBox& box, std::int64_t bin_of_box, double log_likelihood);
 
-  /// Width of the slots in which unsettled mass is counted whose largest bound this is: fine for a
-  /// tolerance; where labels that lie hundreds of nats apart count, as wide as these allow; and
-  /// wide enough that the slots reach below what matters to the total. After many touches the
-  /// bounds of large tiles lie hundreds of nats above it.
+  /// Width of the slots in which unsettled mass is counted, given the largest bound. The slots
+  /// reach from there to below all that matters: after many touches, the bounds of large tiles lie
+  /// hundreds of nats above the total. They are fine where only a tolerance is asked for. Where
+  /// labels that lie hundreds of nats apart count, they are as wide as the evidence's nats allow.
   double slot_nats(double largest) const;
 
   /// Raises the lower bounds of the totals by what was settled, together with bins that are not yet

@@ -33,7 +33,7 @@ UnsettledMass::UnsettledMass(std::size_t hypotheses, double largest, double slot
 }
 
 std::size_t UnsettledMass::slot(double bound) const {
-  // Rounded down, so that a bound never exceeds its slot's upper edge.
+  // Rounded down, so that a bound does not exceed its slot's upper edge, but for rounding.
   const double below = (largest_ - bound) / slot_nats_;
   return below >= static_cast<double>(slots - 1) ? slots - 1
                                                  : static_cast<std::size_t>(std::max(below, 0.0));

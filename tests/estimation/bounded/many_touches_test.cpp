@@ -21,10 +21,17 @@ TEST(ManyTouches, AreAnsweredByFewBins) {
   // ever more nats.
   constexpr std::size_t most = 100;
   const Recording recording = touches_of(on_letter_l, {{1.3, -0.8}, 0.7}, most, 811);
-  for (const std::size_t touches : {std::size_t{9}, most}) {
-    SCOPED_TRACE(touches);
-    const Certified certified =
-        expect_certified(device, shapes, options, recording.touches(0, touches), 1e-8);
+  const reference::Posterior truth =
+      reference_posterior(shapes, options, recording.touches(0, most));
+  for (const bool evidence : {false, true}) {
+    SCOPED_TRACE(evidence);
+    if (evidence) {
+      options.evidence_nats = 0.05;
+      options.evidence_range_nats = 100.0;
+    }
+    BoundedPosterior posterior(device, shapes, options);
+    posterior.update(recording.touches(0, most));
+    const Certified certified = expect_certified(posterior, shapes, options, truth, 1e-8);
     EXPECT_LT(certified.estimate.certificate->bins_evaluated, options.lattice.bins() / 10);
   }
 }
