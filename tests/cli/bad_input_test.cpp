@@ -173,6 +173,12 @@ INSTANTIATE_TEST_SUITE_P(
         BadFile{"a_recording",
                 [](const auto& path) { recording_parts().save(path); },
                 {"this is a recording", "give a map"}},
+        BadFile{"folder_with_a_recording_named_as_a_map",
+                [](const auto& path) {
+                  std::filesystem::create_directory(path);
+                  recording_parts().save(path / "bad.map.h5");
+                },
+                {"this is a recording", "give a map"}},
         BadFile{"folder_without_maps",
                 [](const auto& path) { std::filesystem::create_directory(path); },
                 {"a folder without maps", "build some"}},

@@ -14,7 +14,12 @@ skip() {
   exit 77
 }
 
-for tool in slurmctld slurmd sbatch srun munged; do
+fail() {
+  echo "failed: $*"
+  exit 1
+}
+
+for tool in slurmctld slurmd sbatch srun munged python3; do
   PATH=$PATH:/usr/sbin command -v "$tool" >/dev/null ||
     skip "$tool is not installed; install slurm-wlm and munge"
 done
@@ -24,6 +29,7 @@ rm -rf "$1"
 mkdir -p "$1"/{bin,state,n1,n2}
 scratch=$(cd "$1" && pwd)
 batch_script=$(realpath "$3")
+short=$(mktemp -d) # the path of a socket has at most 107 bytes
 ln -s "$(realpath "$2")" "$scratch/bin/palpate"
 export PATH=$scratch/bin:$PATH:/usr/sbin
 export SLURM_CONF=$scratch/slurm.conf
@@ -61,6 +67,7 @@ end() {
   fi
   mapfile -t pids < <(with "SLURM_CONF=$SLURM_CONF")
   kill_all "${pids[@]}"
+  rm -rf "$short"
   exit "$status"
 }
 trap end EXIT
@@ -71,10 +78,7 @@ until_true() {
   shift 2
   until "$@"; do
     left=$((left - 1))
-    [ "$left" -gt 0 ] || {
-      echo "failed: waited in vain until $what"
-      exit 1
-    }
+    [ "$left" -gt 0 ] || fail "waited in vain until $what"
     sleep 0.2
   done
 }
@@ -91,7 +95,7 @@ SlurmctldHost=$(hostname)(127.0.0.1)
 SlurmctldPort=$controller
 SlurmUser=root
 AuthType=auth/munge
-AuthInfo=socket=$scratch/munge.socket
+AuthInfo=socket=$short/munge.socket
 CredType=cred/munge
 StateSaveLocation=$scratch/state
 SlurmctldPidFile=$scratch/slurmctld.pid
@@ -122,9 +126,9 @@ start_node() {
   disown # its death is no news
 }
 node_is() { sinfo -h -n "$1" -o %T | grep -Eq "$2"; }
-munged --foreground --force --key-file munge.key --socket "$scratch/munge.socket" \
+munged --foreground --force --key-file munge.key --socket "$short/munge.socket" \
   --pid-file munge.pid --seed-file munge.seed --log-file munge.log > munged.log 2>&1 &
-until_true 10 "munged listens" test -S munge.socket
+until_true 10 "munged listens" test -S "$short/munge.socket"
 slurmctld -D > slurmctld.log 2>&1 &
 start_node n1
 start_node n2
@@ -165,21 +169,24 @@ computes() { # NODE
   return 1
 }
 chunks() { [ "$(find results/chunks -name '*.ndjson' 2>/dev/null | wc -l)" -ge "$1" ]; }
-ended() { [ -z "$(squeue -h -j "$job")" ]; }
-restarted() { scontrol show job "$job" | grep -q 'Restarts=[1-9]'; }
+ended() {
+  local left
+  left=$(squeue -h -t all -j "$job" -o %T) && ! grep -Evq '^(COMPLETED|FAILED|NODE_FAIL)$' <<< "$left"
+}
+restarted() { grep -q 'Restarts=[1-9]' <<< "$(scontrol show job "$job")"; }
 
 job=$(submit)
 until_true 60 "node 1 computes" computes n1
 until_true 60 "node 2 computes" computes n2
 until_true 60 "some chunks are finished" chunks 8
 echo "A task on node 1 is killed"
-read -r task < <(squeue -h -r -j "$job" -w n1 -o %K)
+read -r task < <(squeue -h -r -j "$job" -w n1 -o %K) || fail "node 1 has no task left to kill"
 mapfile -t pids < <(with "SLURM_ARRAY_TASK_ID=$task")
 for pid in "${pids[@]}"; do
   if [ "$(cat "/proc/$pid/comm" 2>/dev/null)" = palpate ]; then kill -KILL "$pid" || true; fi
 done
 echo "Node 2 is killed, with its daemon and its tasks"
-computes n2
+computes n2 || fail "node 2 has no task left to kill"
 mapfile -t pids < <(of_node n2)
 kill_all "${pids[@]}"
 until_true 60 "node 2 is down" node_is n2 '^down'
@@ -190,9 +197,13 @@ for task in $(squeue -h -r -t PENDING -j "$job" -o %i); do
 done
 until_true 200 "the tasks have ended" ended
 
+for chunk in $(seq 0 99); do
+  if [ $((chunk % 4)) -ne "$task" ] && [ ! -f "results/chunks/$(printf %06d "$chunk").ndjson" ]; then
+    fail "chunk $chunk is missing, whose task was not the killed one"
+  fi
+done
 if palpate merge results/ -o results.ndjson 2> merge.err; then
-  echo "failed: the killed task has left nothing undone"
-  exit 1
+  fail "the killed task has left nothing undone"
 fi
 cat merge.err
 echo "The array is submitted again, for what the killed task has left"
