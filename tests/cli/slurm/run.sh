@@ -123,13 +123,15 @@ chmod 400 munge.key
 
 start_node() {
   TEST_NODE=$1 slurmd -D -N "$1" >> "$1.log" 2>&1 &
-  disown # its death is no news
+  disown
 }
 node_is() { sinfo -h -n "$1" -o %T | grep -Eq "$2"; }
 munged --foreground --force --key-file munge.key --socket "$short/munge.socket" \
   --pid-file munge.pid --seed-file munge.seed --log-file munge.log > munged.log 2>&1 &
+disown # its death is no news
 until_true 10 "munged listens" test -S "$short/munge.socket"
 slurmctld -D > slurmctld.log 2>&1 &
+disown
 start_node n1
 start_node n2
 until_true 30 "node 1 is idle" node_is n1 '^idle'
@@ -180,8 +182,8 @@ until_true 60 "node 1 computes" computes n1
 until_true 60 "node 2 computes" computes n2
 until_true 60 "some chunks are finished" chunks 8
 echo "A task on node 1 is killed"
-read -r task < <(squeue -h -r -j "$job" -w n1 -o %K) || fail "node 1 has no task left to kill"
-mapfile -t pids < <(with "SLURM_ARRAY_TASK_ID=$task")
+read -r killed < <(squeue -h -r -j "$job" -w n1 -o %K) || fail "node 1 has no task left to kill"
+mapfile -t pids < <(with "SLURM_ARRAY_TASK_ID=$killed")
 for pid in "${pids[@]}"; do
   if [ "$(cat "/proc/$pid/comm" 2>/dev/null)" = palpate ]; then kill -KILL "$pid" || true; fi
 done
@@ -198,7 +200,7 @@ done
 until_true 200 "the tasks have ended" ended
 
 for chunk in $(seq 0 99); do
-  if [ $((chunk % 4)) -ne "$task" ] && [ ! -f "results/chunks/$(printf %06d "$chunk").ndjson" ]; then
+  if [ $((chunk % 4)) -ne "$killed" ] && [ ! -f "results/chunks/$(printf %06d "$chunk").ndjson" ]; then
     fail "chunk $chunk is missing, whose task was not the killed one"
   fi
 done
