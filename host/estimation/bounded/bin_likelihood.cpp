@@ -112,11 +112,12 @@ void BinLikelihood::evaluate_in(std::span<const BinBox> boxes, const KnownElemen
   std::vector<double> evaluated;
   std::vector<ElementPatches<Lane>> scratch;
   Result* out = log_likelihood.data();
-  const BinBox* last = nullptr;
+  std::int32_t object = -1;  // of the bins in the list
+  std::int32_t theta = -1;
   const auto evaluate_list = [&] {
     evaluated.resize(bins.bins());
-    evaluate_bins<Lane>(bins, placements_[last->object].nodes, last->object, placed, elements.runs,
-                        form_, evaluated, scratch);
+    evaluate_bins<Lane>(bins, placements_[object].nodes, object, placed, elements.runs, form_,
+                        evaluated, scratch);
     const double* from = evaluated.data();
     for (const BlockResults<Result>& block : results) {
       from = block.take(from);
@@ -127,14 +128,15 @@ void BinLikelihood::evaluate_in(std::span<const BinBox> boxes, const KnownElemen
   for (const BinBox& box : boxes) {
     const Placement& at = placements_[box.object];
     const PositionGrid& grid = sizeof(Lane) == 4 ? at.float_grid : at.double_grid;
-    if (last == nullptr || last->object != box.object || last->theta != box.theta) {
+    if (object != box.object || theta != box.theta) {
       if (!results.empty()) {
         evaluate_list();
       }
       place_elements(elements.from_pivot_mm, lattice_.theta_rad.centre(box.theta), at.cell_mm,
                      at.reach_cells, grid, placed);
     }
-    last = &box;
+    object = box.object;
+    theta = box.theta;
     const int width = bins_per_part(box.x_count, lattice_.x_mm.step() / at.cell_mm);
     const int height = bins_per_part(box.y_count, lattice_.y_mm.step() / at.cell_mm);
     for (int j = 0; j < box.y_count;) {
