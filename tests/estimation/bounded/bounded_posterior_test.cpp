@@ -284,7 +284,8 @@ TEST(BoundedPosterior, TakesInAllTouchesOrNone) {
 
 TEST(BoundedPosterior, HasTheSameBitsWithoutADevice) {
   Device device = Device::open();
-  const std::vector<Touch> touches = all_touches(touches_of_l(3, 811));
+  const Recording recording = touches_of_l(3, 811);
+  const std::vector<Touch> touches = all_touches(recording);
   BoundedPosterior with(device, two_shapes(), small_options());
   BoundedPosterior without(two_shapes(), small_options());
   with.update(touches);
