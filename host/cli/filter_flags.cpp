@@ -58,13 +58,6 @@ std::vector<HistogramNeed> all_needs(const RecognitionFlags& flags, const Scene&
     needs.push_back({touch.empty() ? "touch_sd in " + sensor_model_file(flags, scene) : touch,
                      "bounds take every touch's pose to be exact"});
   }
-  const bool without_floor = !histogram.contact.table && histogram.contact.gamma == 0.0;
-  if (histogram.none_weight && without_floor) {
-    needs.push_back({flags.gamma   ? "--gamma 0"
-                     : scene.gamma ? flags.scene + ": gamma 0"
-                                   : "gamma 0 in " + sensor_model_file(flags, scene),
-                     "(none) is then the mean of a few bins that a sample misses"});
-  }
   if (flags.filter.memory_mib) {
     needs.push_back({"--memory-mib", "has no effect on bounds, whose memory is the host's"});
   }

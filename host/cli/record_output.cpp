@@ -61,9 +61,6 @@ void add_certificate(nlohmann::ordered_json& json, const RecognitionStep& step,
   json["mode_certain"] = certificate.mode_certain;
   json["bins_evaluated"] = certificate.bins_evaluated;
   json["blocks_bounded"] = certificate.blocks_bounded;
-  if (certificate.none_standard_error) {
-    json["none_standard_error"] = *certificate.none_standard_error;
-  }
 }
 
 }  // namespace

@@ -33,7 +33,7 @@ std::vector<ProbabilityInterval> label_bounds(const Estimate& estimate,
     sum.high = log_sum(sum.high, evidence[h].high);
   }
   if (certificate.none_log_evidence && !learned_none) {
-    of_label.back() = {*certificate.none_log_evidence, *certificate.none_log_evidence};
+    of_label.back() = *certificate.none_log_evidence;
   }
   for (std::size_t i = 0; i < of_label.size(); ++i) {
     of_label[i] = {tempering.tempered(of_label[i].low, i), tempering.tempered(of_label[i].high, i)};

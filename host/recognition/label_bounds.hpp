@@ -13,9 +13,9 @@ namespace palpate {
 /// The bounds of each label's probability, from the bounds of its hypotheses' log evidence
 /// (Certificate::log_evidence). A label is least probable where its own evidence is the lowest and
 /// all other evidence the highest. With q of label_probabilities() for the label's evidence E:
-///   low = q(E_low) of the label / (q(E_low) of the label + q(E_high) of the others + q of none),
-/// high likewise. The evidence of "(none)" is taken as the estimate gives it, and so is `known` of
-/// label_probabilities(), which takes its place.
+///   low = q(E_low) of the label / (q(E_low) of the label + q(E_high) of the others),
+/// high likewise. "(none)" has the bounds of its own evidence, or where `known` of
+/// label_probabilities() takes its place, that probability.
 /// @param estimate with a certificate
 /// @param identity [label] of the estimate; lies within its bounds
 /// @returns [label], none_label included where the task has it

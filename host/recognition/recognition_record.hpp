@@ -43,8 +43,7 @@ struct RecognitionStep {
   /// [label] probability, see label_probabilities(): the sum over the label's maps, after the
   /// task's temperature and features.
   std::vector<double> identity;
-  /// [label] bounds of `identity`, proven but for "(none)", whose evidence counts as exact
-  /// (Certificate::none_standard_error). Empty where `identity` is exact, and for particles.
+  /// [label] bounds of `identity`. Empty where `identity` is exact, and for particles.
   std::vector<ProbabilityInterval> identity_bounds = {};
   std::optional<Certificate> certificate = {};  ///< from a bounded posterior
   std::size_t best = 0;                         ///< index of the label with the largest probability

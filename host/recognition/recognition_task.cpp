@@ -80,10 +80,7 @@ std::int64_t RecognitionTask::bins_in_all() const {
 }
 
 std::optional<BoundedOptions> bounded_instead(const HistogramOptions& histogram) {
-  const bool without_floor =
-      histogram.none_weight && !histogram.contact.table && histogram.contact.gamma == 0.0;
-  if (!histogram.touch_sd.none() || !histogram.slip_sd.none() || histogram.memory_limit_bytes ||
-      without_floor) {
+  if (!histogram.touch_sd.none() || !histogram.slip_sd.none() || histogram.memory_limit_bytes) {
     return {};
   }
   return BoundedOptions{.lattice = histogram.lattice,

@@ -22,8 +22,10 @@ RecognitionTask three_maps(std::optional<double> none_weight) {
   return {maps, BoundedOptions{.none_weight = none_weight}};
 }
 
-/// Evidence of three hypotheses and of none, as a filter that evaluated the lows tells it.
-Estimate estimate_of(const std::vector<LogInterval>& evidence, double none) {
+/// Evidence of three hypotheses and of none, as a filter that evaluated the lows tells it; none's
+/// is at most so many times as large.
+Estimate estimate_of(const std::vector<LogInterval>& evidence, double none,
+                     double none_at_most = 1.0) {
   Estimate estimate;
   double total = none;
   for (const LogInterval& one : evidence) {
@@ -35,7 +37,8 @@ Estimate estimate_of(const std::vector<LogInterval>& evidence, double none) {
   estimate.none = none / total;
   estimate.certificate = Certificate{.log_evidence = evidence};
   if (none > 0.0) {
-    estimate.certificate->none_log_evidence = std::log(none);
+    estimate.certificate->none_log_evidence =
+        LogInterval{std::log(none), std::log(none_at_most * none)};
   }
   return estimate;
 }
@@ -71,16 +74,17 @@ TEST(LabelBounds, HoldEveryEvidenceWithinItsBoundsAndAreReached) {
       const double low = random(-6.0, 0.0);
       evidence.push_back({low, low + random(0.0, 3.0)});
     }
-    const RecognitionStep step = judge(estimate_of(evidence, none), {}, task);
+    const double none_at_most = random(1.0, 3.0);
+    const RecognitionStep step = judge(estimate_of(evidence, none, none_at_most), {}, task);
     std::vector<ProbabilityInterval> seen(task.labels.size(), {1.0, 0.0});
-    for (int corner = 0; corner < 8; ++corner) {
+    for (int corner = 0; corner < 16; ++corner) {
       std::vector<double> sums(task.labels.size());
       for (std::size_t h = 0; h < 3; ++h) {
         const LogInterval& one = evidence[h];
         sums[task.label_of[h]] += std::exp((corner >> h) % 2 == 0 ? one.low : one.high);
       }
       if (none > 0.0) {
-        sums.back() = none;
+        sums.back() = corner < 8 ? none : none_at_most * none;
       }
       const double total = std::accumulate(sums.begin(), sums.end(), 0.0);
       for (std::size_t i = 0; i < sums.size(); ++i) {

@@ -183,7 +183,7 @@ TEST(LabelBounds, ShareWhatASinglePressLeaves) {
   // Evidence of L within 4 to 9, of the disc within 1 to 4.
   estimate.certificate = Certificate{
       .log_evidence = {{std::log(3.0), std::log(8.0)}, {0.0, std::log(4.0)}, {0.0, 0.0}},
-      .none_log_evidence = 0.0};
+      .none_log_evidence = LogInterval{-1.0, 1.0}};
   const Press press;
   const std::vector<Touch> touches{press.touch()};
   const RecognitionStep step = judge(estimate, {}, task, touches);

@@ -92,6 +92,9 @@ OverlapPlane::OverlapPlane(const ArrayRectangle& array, const BoundingBox& objec
 }
 
 OverlapPlane::Bins OverlapPlane::row(int y) const {
+  if (y < rows_.first || y >= rows_.first + rows_.count) {
+    return {};
+  }
   const double apart_y = apart_mm_.y + y_mm_.centre(y);
   Interval apart_x{-reach_mm_.x, reach_mm_.x};
   apart_x.cut(within(cos_, sin_ * apart_y, turned_reach_mm_.x));

@@ -36,7 +36,7 @@ class OverlapPlane {
   /// The rows and the columns that may hold overlapping bins.
   Bins rows() const { return rows_; }
   Bins columns() const { return columns_; }
-  /// The overlapping bins of a row.
+  /// The overlapping bins of any row.
   Bins row(int y) const;
   /// Number of overlapping bins.
   std::int64_t bins() const;

@@ -1,13 +1,7 @@
 #include "bound_search.hpp"
 
 #include <algorithm>
-#include <cmath>
-#include <limits>
-#include <map>
-#include <optional>
-#include <string>
 
-#include "hypotheses.hpp"
 #include "parallel_for.hpp"
 #include "seen_window.hpp"
 
@@ -20,40 +14,17 @@ constexpr int few_batches = 16;
 
 }  // namespace
 
-BoundSearch::BoundSearch(std::span<const Hypothesis> hypotheses, const BoundedOptions& options,
+BoundSearch::BoundSearch(SearchSpace& space, const BoundedOptions& options,
                          const BinLikelihood& likelihood, FasterBinLikelihood& batches)
-    : options_(options),
+    : space_(space),
+      options_(options),
       likelihood_(likelihood),
       batches_(batches),
-      log_weight_(log_weights(hypotheses)) {
-  for (int theta = 0; theta < options.lattice.theta_rad.count; ++theta) {
-    const double theta_rad = options.lattice.theta_rad.centre(theta);
-    turns_.emplace_back(std::cos(theta_rad), std::sin(theta_rad));
-  }
-  double least_cell_mm = std::numeric_limits<double>::infinity();
-  for (const Hypothesis& hypothesis : hypotheses) {
-    least_cell_mm = std::min(least_cell_mm, hypothesis.compared().cell_mm);
-  }
-  const std::vector<TileSize> sizes = tile_sizes(options.lattice, least_cell_mm, hypotheses.size());
-  unseen_.resize(hypotheses.size());
-  std::map<std::string, std::size_t> labels;
-  for (const Hypothesis& hypothesis : hypotheses) {
-    label_of_.push_back(labels.try_emplace(hypothesis.map.label, labels.size()).first->second);
-  }
-  std::vector<std::optional<TileBounds>> bounds(hypotheses.size());
-  parallel_for(hypotheses.size(), [&](std::size_t i) {
-    bounds[i].emplace(hypotheses[i].compared(), options.contact, i, options.lattice, sizes);
-  });
-  for (std::optional<TileBounds>& of : bounds) {
-    const TileLevel& level = of->levels().front();
+      unseen_(space.bounds.size()) {
+  for (const TileBounds& of : space.bounds) {
+    const TileLevel& level = of.levels().front();
     largest_tiles_.emplace_back(static_cast<std::size_t>(options.lattice.theta_rad.count) *
                                 level.batches_x() * level.batches_y() * batch_tiles);
-    bounds_.push_back(*std::move(of));
-  }
-  for (const Hypothesis& hypothesis : hypotheses) {
-    OccupancyGrid shape = hypothesis.compared();
-    shape.log_odds = {};
-    maps_.push_back(std::move(shape));
   }
 }
 
@@ -65,7 +36,7 @@ void BoundSearch::reset() {
 }
 
 void BoundSearch::add(std::span<const ArrayReadings> touches) {
-  const TileLevel& level = bounds_.front().levels().front();
+  const TileLevel& level = space_.bounds.front().levels().front();
   // A single touch sees little of a large region; in a small one, fewer rounds are faster.
   if (touches.size() == 1 || level.batches_x() * level.batches_y() > few_batches) {
     for (const ArrayReadings& touch : touches) {
@@ -77,13 +48,13 @@ void BoundSearch::add(std::span<const ArrayReadings> touches) {
   for (const ArrayReadings& touch : touches) {
     known.push_back(known_elements(touch));
   }
-  add_known(merged(known));
+  add(merged(known));
 }
 
 void BoundSearch::add_touch(const ArrayReadings& touch) {
   const RestingArray::Seen seen = resting_.look(touch);
   if (seen == RestingArray::Seen::moving) {
-    add_known(known_elements(touch));
+    add(known_elements(touch));
     return;
   }
   if (seen == RestingArray::Seen::came_rest) {
@@ -96,26 +67,26 @@ void BoundSearch::add_touch(const ArrayReadings& touch) {
   add_sums(known_elements(touch), changed, [&](const Strip& of, std::uint32_t* sums) {
     const auto rest = rest_tiles_[of.object].begin() + static_cast<std::ptrdiff_t>(of.first);
     std::copy(rest, rest + std::ptrdiff_t{batch_tiles} * of.batches, sums);
-    bounds_[of.object].add_changes(changed, of.placed, of.x, of.y, sums, of.batches);
+    space_.bounds[of.object].add_changes(changed, of.placed, of.x, of.y, sums, of.batches);
   });
 }
 
-void BoundSearch::add_known(const KnownElements& known) {
+void BoundSearch::add(const KnownElements& known) {
   add_sums(known, known, [&](const Strip& of, std::uint32_t* sums) {
-    bounds_[of.object].add(0, known, of.placed, of.x, of.y, sums, of.batches);
+    space_.bounds[of.object].add(0, known, of.placed, of.x, of.y, sums, of.batches);
   });
 }
 
 void BoundSearch::keep_rest(const KnownElements& at_rest) {
-  rest_tiles_.resize(bounds_.size());
-  parallel_for(bounds_.size(), [&](std::size_t i) {
-    bounds_[i].make_change_tables();
+  rest_tiles_.resize(space_.bounds.size());
+  parallel_for(space_.bounds.size(), [&](std::size_t i) {
+    space_.bounds[i].make_change_tables();
     rest_tiles_[i].resize(largest_tiles_[i].size());
   });
   for_seen(at_rest, at_rest, [&](const Strip& of) {
     std::uint32_t* sums = rest_tiles_[of.object].data() + of.first;
     std::fill(sums, sums + std::ptrdiff_t{batch_tiles} * of.batches, 0);
-    bounds_[of.object].add(0, at_rest, of.placed, of.x, of.y, sums, of.batches);
+    space_.bounds[of.object].add(0, at_rest, of.placed, of.x, of.y, sums, of.batches);
   });
 }
 
@@ -124,9 +95,9 @@ void BoundSearch::add_sums(const KnownElements& known, const KnownElements& plac
                            const Sum& sum_of) {
   // Most tiles of a large region do not see the map: sums count from what such a tile would have.
   std::vector<std::int64_t> offsets;
-  for (std::size_t i = 0; i < bounds_.size(); ++i) {
-    offsets.push_back(
-        std::min<std::int64_t>(bounds_[i].penalty_beyond(0, known), largest_sum - unseen_[i]));
+  for (std::size_t i = 0; i < space_.bounds.size(); ++i) {
+    offsets.push_back(std::min<std::int64_t>(space_.bounds[i].penalty_beyond(0, known),
+                                             largest_sum - unseen_[i]));
   }
   for_seen(known, placed, [&](const Strip& of) {
     std::uint32_t sums[most_strip * batch_tiles] = {};
@@ -145,16 +116,16 @@ void BoundSearch::add_sums(const KnownElements& known, const KnownElements& plac
 template <typename Visit>
 void BoundSearch::for_seen(const KnownElements& known, const KnownElements& placed,
                            const Visit& visit) const {
-  const std::vector<BoundingBox> reaches = reaches_of(known, turns_);
-  const std::size_t thetas = turns_.size();
-  parallel_for(bounds_.size() * thetas, [&](std::size_t row) {
+  const std::vector<BoundingBox> reaches = reaches_of(known, space_.turns);
+  const std::size_t thetas = space_.turns.size();
+  parallel_for(space_.bounds.size() * thetas, [&](std::size_t row) {
     thread_local WindowPlaces places;
     const std::size_t object = row / thetas;
     const std::size_t theta = row % thetas;
-    const TileBounds& bounds = bounds_[object];
+    const TileBounds& bounds = space_.bounds[object];
     const TileLevel& level = bounds.levels().front();
-    const TileWindow seen = seen_window(reaches[theta], maps_[object], level);
-    bounds.place(0, turns_[theta], placed, places);
+    const TileWindow seen = seen_window(reaches[theta], space_.maps[object], level);
+    bounds.place(0, space_.turns[theta], placed, places);
     const std::size_t plane = theta * static_cast<std::size_t>(level.batches_y());
     for (int y = seen.y_first / batch_side; y * batch_side < seen.y_end; ++y) {
       const std::size_t first =
@@ -183,9 +154,6 @@ std::vector<std::int64_t> BoundSearch::largest_sums(std::size_t hypothesis) cons
 
 std::uint64_t BoundSearch::bytes() const {
   std::uint64_t bytes = 0;
-  for (const TileBounds& bounds : bounds_) {
-    bytes += bounds.bytes();
-  }
   for (const std::vector<std::int32_t>& sums : largest_tiles_) {
     bytes += sums.capacity() * sizeof(std::int32_t);
   }

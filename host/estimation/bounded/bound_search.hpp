@@ -10,7 +10,7 @@
 #include "leaf_evaluator.hpp"
 #include "palpate/bounded_posterior.hpp"
 #include "resting_array.hpp"
-#include "tile_bounds.hpp"
+#include "search_space.hpp"
 
 namespace palpate {
 
@@ -20,27 +20,28 @@ namespace palpate {
 class BoundSearch {
  public:
   /// @param options checked, with a resolved contact model
-  /// @param likelihood,batches evaluate bins; they outlive the search
-  BoundSearch(std::span<const Hypothesis> hypotheses, const BoundedOptions& options,
-              const BinLikelihood& likelihood, FasterBinLikelihood& batches);
+  /// @param likelihood,batches evaluate bins; all of these outlive the search
+  BoundSearch(SearchSpace& space, const BoundedOptions& options, const BinLikelihood& likelihood,
+              FasterBinLikelihood& batches);
 
   /// Forgets all touches.
   void reset();
   /// Adds the penalties of more touches to the sums of the largest tiles.
   /// @param touches [touch]
   void add(std::span<const ArrayReadings> touches);
+  /// The same of elements that may be of any touches.
+  void add(const KnownElements& elements);
   /// @param elements all that were added since reset()
   /// @param deadline after which tiles are dropped unseen
   /// @param refined where not null, takes the tiles that were divided
   SearchResult run(const KnownElements& elements, const SearchGoal& goal, const Deadline& deadline,
                    const BinVisitor& visit, std::vector<PoseBlock>* refined = nullptr) const;
 
-  /// [hypothesis]
-  std::span<const TileBounds> bounds() const { return bounds_; }
   /// Sums of the penalties of a hypothesis's largest tiles, [theta, batch y, batch x, tile].
   std::vector<std::int64_t> largest_sums(std::size_t hypothesis) const;
   /// The level of the smallest tiles, 0 that of the largest.
-  int finest_level() const { return static_cast<int>(bounds_.front().levels().size()) - 1; }
+  int finest_level() const { return static_cast<int>(space_.bounds.front().levels().size()) - 1; }
+  /// Host memory of its own sums, in bytes.
   std::uint64_t bytes() const;
 
  private:
@@ -57,7 +58,6 @@ class BoundSearch {
   };
 
   void add_touch(const ArrayReadings& touch);
-  void add_known(const KnownElements& known);
   /// Keeps the sums of an array at rest.
   void keep_rest(const KnownElements& at_rest);
   /// Adds what sum_of(strip, sums) finds for the batches that see the map.
@@ -69,14 +69,10 @@ class BoundSearch {
   template <typename Visit>
   void for_seen(const KnownElements& known, const KnownElements& placed, const Visit& visit) const;
 
+  SearchSpace& space_;
   const BoundedOptions& options_;
   const BinLikelihood& likelihood_;
   FasterBinLikelihood& batches_;
-  std::vector<double> log_weight_;
-  std::vector<std::size_t> label_of_;  ///< [hypothesis] index of its label
-  std::vector<glm::dvec2> turns_;      ///< [theta] cosine and sine
-  std::vector<OccupancyGrid> maps_;    ///< [hypothesis] without their cells
-  std::vector<TileBounds> bounds_;     ///< [hypothesis]
   /// Sums of penalties of the largest tiles, [hypothesis][theta, batch y, batch x, tile], less
   /// those of a tile in which every element sees the prior.
   std::vector<std::vector<std::int32_t>> largest_tiles_;

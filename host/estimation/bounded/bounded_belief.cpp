@@ -21,6 +21,9 @@ namespace {
 constexpr double soon = 1e-2;
 /// Bins of all hypotheses together up to which samples are drawn at the full tolerance.
 constexpr double closely_drawn_bins = 1e6;
+/// Bounds of "none of these" need not be so close that identities move by less.
+constexpr double least_identity_change = 1e-6;
+constexpr double infinity = std::numeric_limits<double>::infinity();
 
 }  // namespace
 
@@ -36,11 +39,10 @@ BoundedBelief::BoundedBelief(Device* device, std::span<const Hypothesis> hypothe
       batches_(likelihood_, device != nullptr ? &device->context() : nullptr, hypotheses_,
                options_.contact, options_.lattice,
                device != nullptr ? BinPlace::measured : BinPlace::host),
-      search_(arena_.execute(
-          [&] { return BoundSearch(hypotheses_, options_, likelihood_, batches_); })),
-      log_weight_(log_weights(hypotheses_)) {
+      space_(arena_.execute([&] { return SearchSpace(hypotheses_, options_); })),
+      search_(space_, options_, likelihood_, batches_) {
   if (options_.none_weight) {
-    none_.emplace(hypotheses_, options_.lattice, log_weight_, likelihood_, search_.bounds());
+    none_.emplace(space_, options_, likelihood_, batches_);
     none_log_weight_ = std::log(*options_.none_weight) - log_total_weight(hypotheses_) +
                        std::log(static_cast<double>(options_.lattice.bins()));
   }
@@ -52,7 +54,6 @@ void BoundedBelief::reset() {
   elements_ = {};
   touches_ = 0;
   not_added_.clear();
-  not_averaged_.clear();
   search_.reset();
   result_.reset();
   followed_.reset();
@@ -65,9 +66,6 @@ void BoundedBelief::move_pivot(const glm::dvec2& pivot_mm) {
   options_.lattice = with_pivot(options_.lattice, pivot_mm, "bounded posterior", touches_ > 0);
   likelihood_.move_pivot(pivot_mm);
   batches_.move_pivot(pivot_mm);
-  if (none_) {
-    none_->move_pivot(pivot_mm);
-  }
   result_.reset();
   followed_.reset();
 }
@@ -94,7 +92,7 @@ void BoundedBelief::take_in() {
     elements_ = merged(all);
     not_added_.insert(not_added_.end(), touches.begin(), touches.end());
     if (none_) {
-      not_averaged_.insert(not_averaged_.end(), touches.begin(), touches.end());
+      none_->add(touches);
     }
     kept_.clear();
   });
@@ -106,7 +104,8 @@ std::string BoundedBelief::path() const {
 }
 
 std::uint64_t BoundedBelief::bytes() const {
-  return likelihood_.bytes() + search_.bytes() + bins_.bytes();
+  std::uint64_t bytes = likelihood_.bytes() + space_.bytes() + search_.bytes() + bins_.bytes();
+  return none_ ? bytes + none_->bytes() : bytes;
 }
 
 Deadline BoundedBelief::until(const std::optional<double>& budget_s) const {
@@ -134,27 +133,39 @@ SearchGoal BoundedBelief::rough_goal() const {
 }
 
 const SearchResult& BoundedBelief::found() {
+  const Deadline deadline = until(options_.budget_s);
   if (!result_ || rough_) {
     result_.reset();
     rough_ = false;
-    Deadline deadline = until(options_.budget_s);
-    SearchGoal first = goal();
-    if (deadline.exists()) {
-      // What is proven soon comes first: a search that is cut short proves little.
-      first.tolerance = std::max(first.tolerance, soon);
-    }
-    SearchResult best = run(first, deadline, bins_);
-    if (first.tolerance > options_.tolerance && !deadline.passed()) {
-      EvaluatedBins more(true);
-      SearchResult better = run(goal(), deadline, more);
-      if (better.uncertain() < best.uncertain()) {
-        best = std::move(better);
-        bins_ = std::move(more);
-      }
-    }
-    result_ = std::move(best);
+    none_log_evidence_.reset();
+    result_ = search();
   }
+  bound_none(deadline);
   return *result_;
+}
+
+SearchResult BoundedBelief::search() {
+  // "None of these" has the rest of a budget, which is half of it at least.
+  std::optional<double> budget_s = options_.budget_s;
+  if (none_ && budget_s) {
+    *budget_s /= 2.0;
+  }
+  Deadline deadline = until(budget_s);
+  SearchGoal first = goal();
+  if (deadline.exists()) {
+    // What is proven soon comes first: a search that is cut short proves little.
+    first.tolerance = std::max(first.tolerance, soon);
+  }
+  SearchResult best = run(first, deadline, bins_);
+  if (first.tolerance > options_.tolerance && !deadline.passed()) {
+    EvaluatedBins more(true);
+    SearchResult better = run(goal(), deadline, more);
+    if (better.uncertain() < best.uncertain()) {
+      best = std::move(better);
+      bins_ = std::move(more);
+    }
+  }
+  return best;
 }
 
 void BoundedBelief::find_roughly() {
@@ -208,7 +219,7 @@ double BoundedBelief::log_total() const {
 
 void BoundedBelief::follow(std::span<const KnownElements> touches) {
   if (result_ && bins_.complete() && bins_.values() <= FollowedBins::most_bins) {
-    followed_.emplace(bins_, *result_, log_weight_);
+    followed_.emplace(bins_, *result_, space_.log_weight);
     not_followed_.clear();
   }
   if (followed_) {
@@ -223,7 +234,7 @@ const FollowedBins* BoundedBelief::followed_bins() {
   }
   for (const KnownElements& touch : std::exchange(not_followed_, {})) {
     std::vector<double> most;
-    for (const TileBounds& bounds : search_.bounds()) {
+    for (const TileBounds& bounds : space_.bounds) {
       most.push_back(bounds.best(bounds.levels().size() - 1, touch));
     }
     followed_->add(touch, likelihood_, most);
@@ -240,7 +251,7 @@ std::vector<PoseSample> BoundedBelief::sample(std::size_t count, std::uint64_t s
   if (followed == nullptr) {
     find_roughly();
   }
-  BeliefDraws draws(count, seed, options_.lattice, log_weight_,
+  BeliefDraws draws(count, seed, options_.lattice, space_.log_weight,
                     followed != nullptr ? followed->log_total() : log_total());
   const auto add = [&](const BinBox& box, std::span<const double> log_likelihood) {
     draws.add(box, log_likelihood);
@@ -273,18 +284,42 @@ std::vector<PoseBlock> BoundedBelief::refined_blocks() {
   return blocks;
 }
 
-void BoundedBelief::average() {
-  if (!not_averaged_.empty()) {
-    none_->add(
-        arena_.execute([&] { return none_->evaluate(not_averaged_, options_.cancel_point); }));
-    not_averaged_.clear();
+double BoundedBelief::allowed_none_width(const LogInterval& none) const {
+  const double objects = log_total();
+  const auto probability = [&](double log_evidence) {
+    return 1.0 / (1.0 + std::exp(objects - log_evidence));
+  };
+  const double allowed = std::max(options_.tolerance, least_identity_change);
+  const double low = probability(none.low);
+  const double high = probability(none.high);
+  if (high - low <= allowed) {
+    return infinity;
+  }
+  // The probability changes by at most so much a nat.
+  const double p = std::clamp(0.5, low, high);
+  return allowed / (p * (1.0 - p));
+}
+
+void BoundedBelief::bound_none(const Deadline& deadline) {
+  if (!none_ || none_log_evidence_) {
+    return;
+  }
+  double width = goal().evidence_nats.value_or(infinity);
+  for (LogInterval last{-infinity, infinity};;) {
+    const LogInterval bounds = arena_.execute([&] { return none_->bounds(width, deadline); });
+    const LogInterval weighted{none_log_weight_ + bounds.low, none_log_weight_ + bounds.high};
+    width = std::min(width, allowed_none_width(weighted));
+    const bool narrowed = bounds.high - bounds.low < last.high - last.low;
+    last = bounds;
+    if (bounds.high - bounds.low <= width || !narrowed || deadline.passed()) {
+      none_log_evidence_ = weighted;
+      return;
+    }
   }
 }
 
-double BoundedBelief::none_log_evidence() {
-  average();
-  return none_ ? none_log_weight_ + none_->log_evidence()
-               : -std::numeric_limits<double>::infinity();
+LogInterval BoundedBelief::none_log_evidence() const {
+  return none_log_evidence_.value_or(LogInterval{-infinity, -infinity});
 }
 
 }  // namespace palpate

@@ -17,8 +17,9 @@
 #include "half_done.hpp"
 #include "kept_touches.hpp"
 #include "known_elements.hpp"
+#include "none_evidence.hpp"
 #include "palpate/bounded_posterior.hpp"
-#include "sampled_touch_mean.hpp"
+#include "search_space.hpp"
 
 namespace palpate {
 
@@ -44,7 +45,7 @@ class BoundedBelief {
   const std::vector<Hypothesis>& hypotheses() const { return hypotheses_; }
   const BinLikelihood& likelihood() const { return likelihood_; }
   /// [hypothesis] log of its prior weight.
-  const std::vector<double>& log_weight() const { return log_weight_; }
+  const std::vector<double>& log_weight() const { return space_.log_weight; }
   std::string path() const;
   std::uint64_t bytes() const;
   /// Runs work on the threads that the options ask for.
@@ -53,7 +54,8 @@ class BoundedBelief {
     return arena_.execute(work);
   }
 
-  /// The result of a search to the options' tolerance, or as far as their budget reaches.
+  /// The result of a search to the options' tolerance, or as far as their budget reaches. Bounds
+  /// "none of these" beside it.
   const SearchResult& found();
   /// Visits the bins that the last search evaluated; searches again where there was no room to keep
   /// them.
@@ -67,10 +69,11 @@ class BoundedBelief {
 
   /// Whether the options ask for "none of these".
   bool has_none() const { return none_.has_value(); }
-  /// Log evidence of "none of these" with its prior weight, as SearchResult::evidence has that of
-  /// the hypotheses; -infinity where it is left out.
-  double none_log_evidence();
-  double none_standard_error() const { return none_->standard_error(); }
+  /// Bounds of the log evidence of "none of these" with its prior weight, as SearchResult::evidence
+  /// has that of the hypotheses: so close that no identity can move by more than the tolerance or
+  /// 1e-6, whichever is larger, or as far as the budget reaches. -infinity where it is left out.
+  /// To be asked for after found().
+  LogInterval none_log_evidence() const;
 
  private:
   SearchGoal goal() const;
@@ -78,11 +81,15 @@ class BoundedBelief {
   SearchGoal rough_goal() const;
   /// Sees to it that there is a last search's result, of a quick search if need be.
   void find_roughly();
+  /// What found() returns.
+  SearchResult search();
   SearchResult run(const SearchGoal& goal, Deadline& deadline, EvaluatedBins& evaluated);
   /// The search takes in its touches.
   void add_to_search();
-  /// "None of these" takes in its touches.
-  void average();
+  /// Narrows the bounds of "none of these" as far as needed beside what was found.
+  void bound_none(const Deadline& deadline);
+  /// How wide these may be, given what they are.
+  double allowed_none_width(const LogInterval& none) const;
   /// More touches come: keeps what the last search found of the belief before them.
   void follow(std::span<const KnownElements> touches);
   /// The followed bins after all touches; nullptr where they may not hold enough to draw samples.
@@ -95,20 +102,20 @@ class BoundedBelief {
   mutable tbb::task_arena arena_;
   BinLikelihood likelihood_;
   FasterBinLikelihood batches_;
+  SearchSpace space_;
   BoundSearch search_;
-  std::vector<double> log_weight_;
   KeptTouches kept_;
   KnownElements elements_;
   std::size_t touches_ = 0;
-  std::vector<ArrayReadings> not_added_;     ///< touches that the search has not yet taken in
-  std::vector<ArrayReadings> not_averaged_;  ///< nor "none of these"
+  std::vector<ArrayReadings> not_added_;  ///< touches that the search has not yet taken in
   std::optional<SearchResult> result_;
   bool rough_ = false;  ///< result_ is find_roughly()'s
   EvaluatedBins bins_{options_.budget_s.has_value()};
   std::optional<FollowedBins> followed_;
   std::vector<KnownElements> not_followed_;  ///< touches that followed_ has not yet taken in
-  std::optional<SampledTouchMeans> none_;    ///< where the options ask for it
+  std::optional<NoneEvidence> none_;         ///< where the options ask for it
   double none_log_weight_ = 0.0;             ///< log of its prior weight times the number of bins
+  std::optional<LogInterval> none_log_evidence_;  ///< bounded beside result_
   HalfDone half_done_{"bounded posterior: memory ended in the middle of an update; call reset()"};
 };
 

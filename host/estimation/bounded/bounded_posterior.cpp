@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <utility>
 
 #include <fmt/format.h>
@@ -35,6 +36,11 @@ PoseLattice thinned(PoseLattice lattice) {
     }
   }
   return lattice;
+}
+
+/// The log of what is known only by its bounds, as an estimate takes it.
+double middle(const LogInterval& log) {
+  return std::isfinite(log.low) ? std::midpoint(log.low, log.high) : log.high;
 }
 
 /// @throws Error on an option out of range
@@ -71,11 +77,6 @@ BoundedOptions checked(const BoundedOptions& options, std::span<const Hypothesis
   BoundedOptions all = options;
   all.lattice.collapse_fixed().validate();
   all.contact = resolve(options.contact, hypotheses);
-  if (all.none_weight && !all.contact.table && all.contact.gamma == 0.0) {
-    throw Error(Fault::input,
-                "none_weight: with gamma = 0 the mean likelihood is that of a few bins, which a "
-                "sample misses; use a gamma above 0, or PoseHistogram");
-  }
   require_room(hypotheses, all, memory_for_search());
   return all;
 }
@@ -163,17 +164,16 @@ Estimate BoundedPosterior::estimate() const {
                           .mode_certain = found.mode_certain,
                           .blocks_bounded = found.blocks_bounded,
                           .bins_evaluated = found.bins_evaluated};
-  const double none = belief.none_log_evidence();
+  const LogInterval none = belief.none_log_evidence();
   if (belief.has_none()) {
-    logs.push_back(none);
+    logs.push_back(middle(none));
     certificate.none_log_evidence = none;
-    certificate.none_standard_error = belief.none_standard_error();
   }
   estimate.identity = normalised(logs);
   if (belief.has_none()) {
     estimate.none = estimate.identity.back();
     estimate.identity.pop_back();
-    estimate.none_log_evidence = none;
+    estimate.none_log_evidence = middle(none);
     logs.pop_back();
   }
   estimate.log_evidence = std::move(logs);
@@ -185,8 +185,8 @@ Estimate BoundedPosterior::estimate() const {
   for (std::size_t i = 0; i < bounds.size(); ++i) {
     LogSum others_low;
     LogSum others_high;
-    others_low.add(none);
-    others_high.add(none);
+    others_low.add(none.low);
+    others_high.add(none.high);
     for (std::size_t other = 0; other < bounds.size(); ++other) {
       if (other != i) {
         others_low.add(bounds[other].low);
@@ -256,7 +256,7 @@ Marginals BoundedPosterior::marginals(int object, const PoseLattice& grid) const
   BoundedBelief& belief = posterior.belief;
   belief.found();
   const double log_total =
-      log_add(belief.log_total(), belief.none_log_evidence()) - belief.log_weight()[object];
+      log_add(belief.log_total(), middle(belief.none_log_evidence())) - belief.log_weight()[object];
   MarginalSums sums(lattice(), onto);
   belief.visit([&](const BinBox& box, std::span<const double> log_likelihood) {
     if (box.object == object) {

@@ -6,6 +6,7 @@
 #include <numeric>
 
 #include "parallel_for.hpp"
+#include "touch_overlap.hpp"
 
 namespace palpate {
 
@@ -27,21 +28,6 @@ void for_tasks(std::span<Leaf> leaves, const Run& run) {
     const std::size_t first = task * leaves_per_task;
     run(leaves.subspan(first, std::min(leaves_per_task, leaves.size() - first)));
   });
-}
-
-/// Sums the leaves' values.
-template <typename Leaf, typename Value>
-void sum_up(std::span<Leaf> leaves, const Value* values) {
-  for (Leaf& leaf : leaves) {
-    const Value* from = values + leaf.first;
-    const auto bins = static_cast<std::size_t>(leaf.box.bins());
-    leaf.largest = *std::max_element(from, from + bins);
-    double sum = 0.0;
-    for (std::size_t i = 0; i < bins; ++i) {
-      sum += std::exp(static_cast<double>(from[i]) - leaf.largest);
-    }
-    leaf.log_mass = leaf.largest + std::log(sum);
-  }
 }
 
 }  // namespace
@@ -66,6 +52,23 @@ LeafEvaluator::LeafEvaluator(const BinLikelihood& likelihood, FasterBinLikelihoo
   least_error_ = *std::max_element(float64_error_.begin(), float64_error_.end());
 }
 
+template <typename Value>
+void LeafEvaluator::sum_up(std::span<Leaf> leaves, Value* values) const {
+  for (Leaf& leaf : leaves) {
+    Value* from = values + leaf.first;
+    const auto bins = static_cast<std::size_t>(leaf.box.bins());
+    if (goal_.counted != nullptr) {
+      goal_.counted->leave_out_others(leaf.box, from);
+    }
+    leaf.largest = *std::max_element(from, from + bins);
+    double sum = 0.0;
+    for (std::size_t i = 0; i < bins; ++i) {
+      sum += std::exp(static_cast<double>(from[i]) - leaf.largest);
+    }
+    leaf.log_mass = leaf.largest + std::log(sum);
+  }
+}
+
 void LeafEvaluator::look(const BinBox& box) {
   std::vector<double> values(static_cast<std::size_t>(box.bins()));
   likelihood_.evaluate(std::span(&box, 1), elements_, std::span(values));
@@ -88,7 +91,13 @@ void LeafEvaluator::evaluate_exactly(std::span<Leaf> leaves, std::span<double> v
   });
 }
 
-void LeafEvaluator::add(std::span<const BinBox> boxes) {
+void LeafEvaluator::add(std::vector<BinBox> boxes) {
+  if (goal_.counted != nullptr) {
+    for (BinBox& box : boxes) {
+      box = goal_.counted->cut(box);
+    }
+    std::erase_if(boxes, [](const BinBox& box) { return box.bins() == 0; });
+  }
   if (boxes.empty()) {
     return;
   }
@@ -127,8 +136,9 @@ std::vector<std::size_t> LeafEvaluator::to_be_refined(double share) const {
     return static_cast<std::size_t>(std::clamp(below * per_nat, 0.0, slots - 1.0));
   };
   const auto may_be_best = [&](const Leaf& leaf) {
-    return log_weight_[leaf.box.object] + leaf.largest + float32_error_[leaf.box.object] >=
-           account_.best();
+    return goal_.mode &&
+           log_weight_[leaf.box.object] + leaf.largest + float32_error_[leaf.box.object] >=
+               account_.best();
   };
   const auto needs_evidence = [&](const Leaf& leaf) {
     return goal_.evidence_nats && 2.0 * std::expm1(float32_error_[leaf.box.object]) >

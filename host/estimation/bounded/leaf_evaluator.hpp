@@ -69,7 +69,7 @@ class LeafEvaluator {
                 MassAccount& account);
 
   /// Evaluates the bins of boxes that are sorted by place. They are settled by a later flush().
-  void add(std::span<const BinBox> boxes);
+  void add(std::vector<BinBox> boxes);
   /// Evaluates the bins of a box only to learn how likely its best one is.
   void look(const BinBox& box);
   /// Settles all bins that were added.
@@ -84,6 +84,9 @@ class LeafEvaluator {
     double largest = 0.0;
   };
 
+  /// Sums the values of the leaves' bins that count.
+  template <typename Value>
+  void sum_up(std::span<Leaf> leaves, Value* values) const;
   void evaluate_exactly(std::span<Leaf> leaves, std::span<double> values) const;
   /// Indices of the pending leaves that must be evaluated in float64: the heaviest.
   std::vector<std::size_t> to_be_refined(double share) const;

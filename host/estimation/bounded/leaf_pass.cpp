@@ -6,6 +6,7 @@
 #include <numeric>
 #include <optional>
 #include <tuple>
+#include <utility>
 
 namespace palpate {
 
@@ -57,7 +58,7 @@ void LeafPass::evaluate_boxes(std::vector<BinBox> boxes) {
     return std::tie(a.object, a.theta, a.y_first, a.x_first) <
            std::tie(b.object, b.theta, b.y_first, b.x_first);
   });
-  evaluator_.add(boxes);
+  evaluator_.add(std::move(boxes));
 }
 
 std::vector<BinBox> LeafPass::boxes_of(std::span<const Tile> tiles) const {

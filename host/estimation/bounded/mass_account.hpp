@@ -18,6 +18,8 @@ namespace palpate {
 /// Part of BoundedOptions::evidence_nats that rounding may use up.
 inline constexpr double evidence_rounding_part = 0.2;
 
+class TouchOverlap;
+
 /// What a search is to reach; as BoundedOptions.
 struct SearchGoal {
   double tolerance = 1e-6;
@@ -25,6 +27,10 @@ struct SearchGoal {
   double evidence_range_nats = std::numeric_limits<double>::infinity();
   /// Bins that hold much of the mass are evaluated once more in float64.
   bool exact = true;
+  /// The most probable bin is evaluated, whatever the tolerance.
+  bool mode = true;
+  /// The bins that count; null where all do.
+  const TouchOverlap* counted = nullptr;
 };
 
 /// What a search found out about one hypothesis: logs in nats, with its prior weight.

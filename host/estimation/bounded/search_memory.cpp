@@ -89,7 +89,9 @@ SearchMemory search_memory(std::span<const Hypothesis> hypotheses, const Bounded
       memory.tiles += sizeof(int) * (along(size).x + along(size).y);
     }
     const double largest_tiles = thetas * along(sizes.front()).x * along(sizes.front()).y;
-    memory.tiles += (sizeof(std::int32_t) + sizeof(Tile)) * largest_tiles;
+    // "None of these" searches on sums of its own.
+    const double sums = options.none_weight ? 2.0 : 1.0;
+    memory.tiles += (sums * sizeof(std::int32_t) + sizeof(Tile)) * largest_tiles;
     memory.rest += tables_of(sizes.front()) + sizeof(std::uint32_t) * largest_tiles;
     const double family_mm = batch_side * sizes.back().cells() * map.cell_mm;
     memory.largest_family = std::max(
@@ -101,8 +103,7 @@ SearchMemory search_memory(std::span<const Hypothesis> hypotheses, const Bounded
   memory.thetas = thetas * (sizeof(glm::dvec2) + static_cast<double>(hypotheses.size()) *
                                                      (sizeof(TileWindow) + sizeof(Tile)));
   if (options.none_weight) {
-    memory.thetas += thetas * (sizeof(glm::dvec2) +
-                               static_cast<double>(hypotheses.size()) * sizeof(OverlapPlane));
+    memory.thetas += thetas * static_cast<double>(hypotheses.size()) * sizeof(OverlapPlane);
   }
   // The last family of a batch may exceed the batch by all of its bins.
   // Each bin's value as it is evaluated, settled and kept.

@@ -13,6 +13,7 @@
 #include "leaf_pass.hpp"
 #include "parallel_for.hpp"
 #include "seen_window.hpp"
+#include "touch_overlap.hpp"
 #include "unsettled_mass.hpp"
 
 namespace palpate {
@@ -55,24 +56,25 @@ class SearchRun {
   SearchRun(const BoundSearch& search, const KnownElements& elements, const SearchGoal& goal,
             const Deadline& deadline, const BinVisitor& visit, std::vector<PoseBlock>* refined)
       : search_(search),
+        space_(search.space_),
         lattice_(search.options_.lattice),
         elements_(elements),
-        reaches_(reaches_of(elements, search.turns_)),
+        reaches_(reaches_of(elements, search.space_.turns)),
         refined_(refined),
         thetas_(static_cast<std::size_t>(lattice_.theta_rad.count)),
-        finest_(search.bounds_.front().levels().size() - 1),
+        finest_(search.space_.bounds.front().levels().size() - 1),
         goal_(goal),
         deadline_(deadline),
-        account_(search.log_weight_, search.label_of_, lattice_, goal_),
-        evaluator_(search.likelihood_, search.batches_, search.log_weight_, goal_, elements, visit,
-                   deadline_, account_),
-        leaves_(search.bounds_, thetas_, elements.from_pivot_mm.size(), deadline_, account_,
+        account_(search.space_.log_weight, search.space_.label_of, lattice_, goal_),
+        evaluator_(search.likelihood_, search.batches_, search.space_.log_weight, goal_, elements,
+                   visit, deadline_, account_),
+        leaves_(search.space_.bounds, thetas_, elements.from_pivot_mm.size(), deadline_, account_,
                 evaluator_),
         visit_(visit) {
-    for (std::size_t i = 0; i < search_.bounds_.size(); ++i) {
+    for (std::size_t i = 0; i < space_.bounds.size(); ++i) {
       std::vector<double> of_level;
       for (std::size_t level = 0; level <= finest_; ++level) {
-        of_level.push_back(search_.log_weight_[i] + search_.bounds_[i].best(level, elements));
+        of_level.push_back(space_.log_weight[i] + space_.bounds[i].best(level, elements));
       }
       unpenalised_.push_back(std::move(of_level));
       double prior = 0.0;
@@ -92,7 +94,7 @@ class SearchRun {
     if (!best.empty()) {
       raise(best, 0);
       const double largest = std::min_element(best.begin(), best.end(), before)->bound;
-      UnsettledMass unsettled(search_.bounds_.size(), largest, account_.slot_nats(largest));
+      UnsettledMass unsettled(space_.bounds.size(), largest, account_.slot_nats(largest));
       count_largest(unsettled);
       const double share = goal_.tolerance * search_share;
       // One part for every level that drops tiles, and one for the bins.
@@ -101,7 +103,7 @@ class SearchRun {
       account_.drop(unsettled);
       divide(std::move(kept), 0, share - used_of(part, 0.0));
     }
-    const bool contradicts = contradicted(best);
+    const bool contradicts = goal_.mode && contradicted(best);
     evaluator_.flush();
     SearchResult result = account_.result();
     result.contradicted = contradicts;
@@ -123,7 +125,7 @@ class SearchRun {
                prior_log_likelihood(run.reading, search_.options_.contact);
     }
     const double least = prior - contradiction_nats;
-    const std::size_t objects = search_.bounds_.size();
+    const std::size_t objects = space_.bounds.size();
     const auto explains = [&](std::size_t i) { return account_.best_of(i) >= least; };
     for (std::size_t i = 0; i < objects; ++i) {
       if (explains(i)) {
@@ -156,23 +158,21 @@ class SearchRun {
   /// Finds the largest tiles where an element may see something else than the prior, and settles
   /// all other bins, which have the likelihood of the prior.
   void settle_unseen() {
-    seen_.resize(search_.bounds_.size() * thetas_);
+    seen_.resize(space_.bounds.size() * thetas_);
     parallel_for(seen_.size(), [&](std::size_t row) {
       const std::size_t object = row / thetas_;
-      seen_[row] = seen_window(reaches_[row % thetas_], search_.maps_[object],
-                               search_.bounds_[object].levels().front());
+      seen_[row] = seen_window(reaches_[row % thetas_], space_.maps[object],
+                               space_.bounds[object].levels().front());
     });
     for (std::size_t row = 0; row < seen_.size(); ++row) {
       const std::size_t object = row / thetas_;
-      const TileLevel& level = search_.bounds_[object].levels().front();
+      const TileLevel& level = space_.bounds[object].levels().front();
       const TileWindow& seen = seen_[row];
       const auto settle = [&](int x_first, int x_end, int y_first, int y_end) {
         const BinBox box = level.box_of(static_cast<std::int32_t>(object),
                                         static_cast<std::int32_t>(row % thetas_),
                                         {x_first, x_end, y_first, y_end});
-        if (box.bins() > 0) {
-          settle_unseen(box);
-        }
+        settle_unseen(box);
       };
       const int nx = level.x.tiles();
       settle(0, nx, 0, seen.y_first);
@@ -180,17 +180,26 @@ class SearchRun {
       settle(seen.x_end, nx, seen.y_first, seen.y_end);
       settle(0, nx, seen.y_end, level.y.tiles());
     }
-    account_.raise_totals(std::vector<LogSum>(search_.bounds_.size()));
+    account_.raise_totals(std::vector<LogSum>(space_.bounds.size()));
   }
 
   /// Settles bins at which every element sees the prior.
   void settle_unseen(const BinBox& box) {
+    const std::int64_t bins = goal_.counted != nullptr ? goal_.counted->bins(box) : box.bins();
+    if (bins == 0) {
+      return;
+    }
     const auto object = static_cast<std::size_t>(box.object);
     const double value = prior_log_likelihoods_[object];
-    account_.settle(box.object, 1, value + std::log(static_cast<double>(box.bins())), value,
+    account_.settle(box.object, 1, value + std::log(static_cast<double>(bins)), value,
                     search_.likelihood_.float64_error(object, elements_));
     account_.note_best(box, 0, value);
     visit_(box, std::span(&value, 1));
+  }
+
+  /// Whether any bin of a tile may count.
+  bool may_count(const TileLevel& level, const Tile& tile) const {
+    return goal_.counted == nullptr || goal_.counted->may_hold(level.box_of(tile));
   }
 
   /// Calls visit(sum, x, y, bins) for the largest tiles of a row, a theta of an object, that hold
@@ -198,7 +207,7 @@ class SearchRun {
   template <typename Visit>
   void for_row(std::size_t row, const Visit& visit) const {
     const std::size_t object = row / thetas_;
-    const TileLevel& level = search_.bounds_[object].levels().front();
+    const TileLevel& level = space_.bounds[object].levels().front();
     const TileWindow& seen = seen_[row];
     const auto batches = static_cast<std::size_t>(level.batches_x()) * level.batches_y();
     const std::int32_t* sums =
@@ -208,7 +217,11 @@ class SearchRun {
       const std::int32_t* of_y =
           sums + std::ptrdiff_t{y / batch_side} * level.batches_x() * batch_tiles + y % batch_side;
       for (int x = seen.x_first; x < seen.x_end; ++x) {
-        if (const std::int64_t bins = rows * level.x.bins(x); bins > 0) {
+        const std::int64_t bins = rows * level.x.bins(x);
+        if (bins > 0 && may_count(level, {.object = static_cast<std::int32_t>(object),
+                                          .theta = static_cast<std::int32_t>(row % thetas_),
+                                          .x = x,
+                                          .y = y})) {
           visit(of_y[std::ptrdiff_t{batch_side} * x], x, y, bins);
         }
       }
@@ -249,7 +262,7 @@ class SearchRun {
   }
 
   void count_largest(UnsettledMass& unsettled) const {
-    parallel_for(search_.bounds_.size(), [&](std::size_t object) {
+    parallel_for(space_.bounds.size(), [&](std::size_t object) {
       for (std::size_t theta = 0; theta < thetas_; ++theta) {
         for_row(object * thetas_ + theta,
                 [&](std::int32_t sum, int /*x*/, int /*y*/, std::int64_t bins) {
@@ -278,7 +291,7 @@ class SearchRun {
   /// The largest tiles that must be divided, and takes them out of the unsettled ones.
   std::vector<Tile> keep_largest(UnsettledMass& unsettled, double share) const {
     const std::vector<std::size_t> from = account_.droppable_from(unsettled, share);
-    std::vector<std::vector<Tile>> kept(search_.bounds_.size());
+    std::vector<std::vector<Tile>> kept(space_.bounds.size());
     parallel_for(kept.size(), [&](std::size_t object) {
       const std::int64_t end = least_sum(unsettled, object, from[object]);
       for (std::size_t theta = 0; theta < thetas_; ++theta) {
@@ -326,10 +339,10 @@ class SearchRun {
       thread_local WindowPlaces placed;
       const std::size_t end = task + 1 < begins.size() ? begins[task + 1] : tiles.size();
       const Tile& first = tiles[begins[task]];
-      const TileBounds& bounds = search_.bounds_[first.object];
-      const TileWindow seen = seen_window(reaches_[first.theta], search_.maps_[first.object],
-                                          bounds.levels()[level + 1]);
-      bounds.place(level + 1, search_.turns_[first.theta], elements_, placed);
+      const TileBounds& bounds = space_.bounds[first.object];
+      const TileWindow seen =
+          seen_window(reaches_[first.theta], space_.maps[first.object], bounds.levels()[level + 1]);
+      bounds.place(level + 1, space_.turns[first.theta], elements_, placed);
       parts[task].reserve((end - begins[task]) * batch_tiles);
       for (std::size_t i = begins[task]; i < end; ++i) {
         std::uint32_t sums[batch_tiles] = {};
@@ -357,16 +370,17 @@ class SearchRun {
   /// Appends the tiles of a batch, at the object and theta of `of`, that hold bins.
   void append_batch(const Tile& of, std::size_t level, int first_x, int first_y,
                     const std::uint32_t* sums, std::vector<Tile>& tiles) const {
-    const TileLevel& tiling = search_.bounds_[of.object].levels()[level];
+    const TileLevel& tiling = space_.bounds[of.object].levels()[level];
     for (int j = 0; j < batch_side; ++j) {
       if (tiling.y.bins(first_y + j) == 0) {
         continue;
       }
       for (int i = 0; i < batch_side; ++i) {
-        if (tiling.x.bins(first_x + i) > 0) {
-          const double bound =
-              unpenalised_[of.object][level] - sums[batch_side * i + j] / penalties_per_nat;
-          tiles.push_back({bound, of.object, of.theta, first_x + i, first_y + j});
+        const Tile tile{
+            unpenalised_[of.object][level] - sums[batch_side * i + j] / penalties_per_nat,
+            of.object, of.theta, first_x + i, first_y + j};
+        if (tiling.x.bins(tile.x) > 0 && may_count(tiling, tile)) {
+          tiles.push_back(tile);
         }
       }
     }
@@ -380,9 +394,9 @@ class SearchRun {
       return;
     }
     // Every label's own total is wanted, too.
-    std::vector<std::vector<Tile>> own(search_.bounds_.size());
+    std::vector<std::vector<Tile>> own(space_.bounds.size());
     for (const Tile& tile : tiles) {
-      own[search_.label_of_[tile.object]].push_back(tile);
+      own[space_.label_of[tile.object]].push_back(tile);
     }
     std::vector<Tile> best;
     for (std::vector<Tile>& of_label : own) {
@@ -432,7 +446,7 @@ class SearchRun {
       const auto first = tiles.begin() + static_cast<std::ptrdiff_t>(begin);
       std::vector<Tile> lot(first, first + static_cast<std::ptrdiff_t>(count));
       if (deadline_.passed()) {
-        account_.drop(unsettled(lot, level, search_.bounds_, account_));
+        account_.drop(unsettled(lot, level, space_.bounds, account_));
         return;
       }
       // What tiles do not use up is left for those after them.
@@ -450,7 +464,7 @@ class SearchRun {
     std::vector<Tile> unseen;
     std::vector<Tile> parts = parts_of(tiles, level, &unseen);
     for (const Tile& tile : unseen) {
-      settle_unseen(search_.bounds_[tile.object].levels()[level + 1].box_of(tile));
+      settle_unseen(space_.bounds[tile.object].levels()[level + 1].box_of(tile));
     }
     const double dropped = account_.dropped_share();
     double used = 0.0;
@@ -474,7 +488,7 @@ class SearchRun {
       std::vector<Tile> parts = parts_of(lot, level);
       std::size_t next = 0;
       for (Tile& tile : lot) {
-        double largest = search_.log_weight_[tile.object] + prior_log_likelihoods_[tile.object];
+        double largest = space_.log_weight[tile.object] + prior_log_likelihoods_[tile.object];
         for (; next < parts.size() && is_part(parts[next], tile); ++next) {
           largest = std::max(largest, parts[next].bound);
         }
@@ -496,13 +510,13 @@ class SearchRun {
   /// @returns the part of the total that was dropped
   double drop(std::vector<Tile>& tiles, std::size_t level, double tolerance) {
     const double dropped = account_.dropped_share();
-    UnsettledMass mass = unsettled(tiles, level, search_.bounds_, account_);
+    UnsettledMass mass = unsettled(tiles, level, space_.bounds, account_);
     const std::vector<std::size_t> from = account_.droppable_from(mass, tolerance);
     std::erase_if(tiles,
                   [&](const Tile& tile) { return mass.slot(tile.bound) >= from[tile.object]; });
     for (const Tile& tile : tiles) {
       mass.remove(static_cast<std::size_t>(tile.object), tile.bound,
-                  search_.bounds_[tile.object].bins(level, tile));
+                  space_.bounds[tile.object].bins(level, tile));
     }
     account_.drop(mass);
     return used_of(tolerance, dropped);
@@ -521,7 +535,7 @@ class SearchRun {
       return;
     }
     for (const Tile& tile : tiles) {
-      const BinBox box = search_.bounds_[tile.object].levels()[level].box_of(tile);
+      const BinBox box = space_.bounds[tile.object].levels()[level].box_of(tile);
       refined_->push_back({.object = box.object,
                            .level = static_cast<int>(level),
                            .theta = box.theta,
@@ -533,6 +547,7 @@ class SearchRun {
   }
 
   const BoundSearch& search_;
+  const SearchSpace& space_;
   const PoseLattice& lattice_;
   const KnownElements& elements_;
   std::vector<BoundingBox> reaches_;  ///< [theta] of the elements
@@ -556,7 +571,7 @@ SearchResult BoundSearch::run(const KnownElements& elements, const SearchGoal& g
                               std::vector<PoseBlock>* refined) const {
   // Evaluating all in float64 would leave so much rounding; the rest may be used up.
   double least_error = 0.0;
-  for (std::size_t i = 0; i < bounds_.size(); ++i) {
+  for (std::size_t i = 0; i < space_.bounds.size(); ++i) {
     least_error = std::max(least_error, likelihood_.float64_error(i, elements));
   }
   SearchGoal reachable = goal;

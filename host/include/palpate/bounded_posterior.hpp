@@ -39,9 +39,10 @@ struct BoundedOptions {
   /// Both grow by this part of themselves with every touch after the first, as a temperature does
   /// that suits several touches. From 0.
   double evidence_growth = 0.0;
-  /// Prior weight W of "none of these", as HistogramOptions::none_weight. The mean likelihood of
-  /// each touch is estimated from a sample of the bins; Certificate says how exactly. Needs a
-  /// contact model with a floor: gamma above 0, or a table.
+  /// Prior weight W of "none of these", as HistogramOptions::none_weight. Each touch's mean
+  /// likelihood is bounded by a search of its own, so closely that no identity can move by more
+  /// than the tolerance or 1e-6, whichever is larger. Where "none of these" is neither nearly certain
+  /// nor nearly impossible, this evaluates most bins at which the touch's array meets an object.
   std::optional<double> none_weight = {};
   /// Host threads; 0 takes as many as the machine has cores.
   int threads = 0;

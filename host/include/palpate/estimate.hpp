@@ -68,11 +68,9 @@ struct Certificate {
   /// Bins whose likelihood was computed. Those at which every element sees the prior are settled
   /// without.
   std::int64_t bins_evaluated = 0;
-  /// Log evidence of "none of these" with its prior weight, comparable to log_evidence, and its
-  /// standard error, in nats: it is estimated from a sample of the bins. None where the options do
-  /// not ask for "none of these".
-  std::optional<double> none_log_evidence = {};
-  std::optional<double> none_standard_error = {};
+  /// Bounds of the log evidence of "none of these" with its prior weight, in nats, comparable to
+  /// log_evidence. None where the options do not ask for "none of these".
+  std::optional<LogInterval> none_log_evidence = {};
 };
 
 /// An object and its pose, drawn from a belief.
@@ -85,8 +83,7 @@ struct PoseSample {
 struct Estimate {
   std::vector<double> identity;  ///< probability of every hypothesis, Eq. 14; with `none` sums to 1
   /// Bounds of every probability in `identity`, from a filter that knows no more than the bounds;
-  /// empty where `identity` is exact. They take the evidence of "none of these" as exact, see
-  /// Certificate::none_standard_error.
+  /// empty where `identity` is exact.
   std::vector<ProbabilityInterval> identity_bounds = {};
   std::optional<Certificate> certificate = {};  ///< from a filter that knows bounds
   double none = 0.0;  ///< probability of "none of these", where the options ask for it

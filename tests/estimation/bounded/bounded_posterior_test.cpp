@@ -518,23 +518,79 @@ TEST(BoundedPosterior, KnowsNoneOfThese) {
       EXPECT_GE(high, ours.identity[static_cast<std::size_t>(i)]);
     }
     EXPECT_NEAR(marginals, 1.0, 1e-12);
-    EXPECT_EQ(ours.certificate->none_standard_error, 0.0) << "all bins were taken";
-    // Its odds against an object lie between those of the bounds of the object's evidence.
+    // Its odds against an object lie between those of the bounds of both their evidence.
     const auto [least, most] = ours.certificate->log_evidence[0];
+    const auto [none_least, none_most] = ours.certificate->none_log_evidence.value();
     const double against = std::log(ours.identity[0]) - std::log(ours.none);
-    EXPECT_GE(against, least - *ours.certificate->none_log_evidence - 1e-12);
-    EXPECT_LE(against, most - *ours.certificate->none_log_evidence + 1e-12);
+    EXPECT_GE(against, least - none_most - 1e-12);
+    EXPECT_LE(against, most - none_least + 1e-12);
   }
   options.none_weight.reset();
   BoundedPosterior without(device, two_shapes(), options);
   without.update(all_touches(recording));
   const Estimate expected = without.estimate();
   const Estimate with = bounded.estimate();
-  EXPECT_FALSE(expected.certificate->none_standard_error);
   EXPECT_FALSE(expected.certificate->none_log_evidence);
   EXPECT_EQ(expected.none, 0.0);
   EXPECT_EQ(with.mode.bin, expected.mode.bin);
   EXPECT_NEAR(with.identity[0] / sum(with.identity), expected.identity[0], 2.0 * options.tolerance);
+}
+
+TEST(BoundedPosterior, BoundsNoneOfTheseBeyondAHundredThousandBins) {
+  Device device = Device::open();
+  BoundedOptions options = small_options();
+  options.lattice.x_mm.count = 90;
+  options.lattice.y_mm.count = 90;
+  options.lattice.theta_rad.count = 20;
+  options.none_weight = 3.0;
+  for (const std::size_t elements : {36, 200}) {
+    const Recording recording = random_recording(3, elements, 818);
+    BoundedPosterior bounded(device, two_made_up(), options);
+    PoseHistogram dense(device, two_made_up(), {.lattice = options.lattice, .none_weight = 3.0});
+    for (std::size_t n = 1; n <= recording.size(); ++n) {
+      SCOPED_TRACE(testing::Message() << elements << " elements, touch " << n);
+      bounded.update(recording.touch(n - 1));
+      dense.update(recording.touch(n - 1));
+      const Estimate ours = bounded.estimate();
+      const Estimate theirs = dense.estimate();
+      // Shares of "none of these" that are near 1 leave the objects' digits.
+      const double share = *ours.none_log_evidence - ours.log_evidence[0];
+      const double expected = *theirs.none_log_evidence - theirs.log_evidence[0];
+      // Its first bounds are 0.01 nats wide; float32 allows 1e-3.
+      EXPECT_NEAR(share, expected, 0.008 * static_cast<double>(n));
+      const auto [low, high] = ours.certificate->none_log_evidence.value();
+      EXPECT_LE(low, *ours.none_log_evidence);
+      EXPECT_GE(high, *ours.none_log_evidence);
+      for (std::size_t i = 0; i < 2; ++i) {
+        const ProbabilityInterval& p = ours.identity_bounds[i];
+        EXPECT_LE(p.high - p.low, 4.0 * options.tolerance)
+            << "of none, of this one and of the other";
+      }
+    }
+  }
+}
+
+TEST(BoundedPosterior, ShowsInTheIdentitiesWhereABudgetLeftNoneOfThese) {
+  Device device = Device::open();
+  BoundedOptions options = small_options();
+  options.lattice.x_mm.count = 90;
+  options.lattice.y_mm.count = 90;
+  options.lattice.theta_rad.count = 20;
+  options.none_weight = 3.0;
+  BoundedPosterior sharp(device, two_made_up(), options);
+  options.budget_s = 1e-9;
+  BoundedPosterior ended(device, two_made_up(), options);
+  const Recording recording = random_recording(1, 36, 819);
+  sharp.update(all_touches(recording));
+  ended.update(all_touches(recording));
+  const Estimate all = sharp.estimate();
+  const Estimate some = ended.estimate();
+  EXPECT_GT(some.certificate->none_log_evidence->high - some.certificate->none_log_evidence->low,
+            1e-3);
+  for (std::size_t i = 0; i < 2; ++i) {
+    EXPECT_LE(some.identity_bounds[i].low, all.identity[i]);
+    EXPECT_GE(some.identity_bounds[i].high, all.identity[i]);
+  }
 }
 
 TEST(BoundedPosterior, LeavesObjectsWhereNoneTakesAllOfTheMass) {

@@ -195,7 +195,8 @@ std::vector<std::vector<double>> told_by(const BoundedPosterior& posterior, std:
   const RefinedPose refined = posterior.refine(estimate.mode);
   std::vector<std::vector<double>> told{
       estimate.identity,
-      {estimate.none, certificate.none_standard_error.value_or(-1.0),
+      {estimate.none, certificate.none_log_evidence.value_or(LogInterval{}).low,
+       certificate.none_log_evidence.value_or(LogInterval{}).high,
        static_cast<double>(estimate.contradicted), certificate.dropped_mass,
        static_cast<double>(certificate.mode_certain)},
       {static_cast<double>(estimate.mode.object), static_cast<double>(estimate.mode.bin.value()),

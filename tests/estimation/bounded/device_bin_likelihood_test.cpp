@@ -301,7 +301,8 @@ TEST(FasterBinLikelihood, IsNotMeasuredWithinABudget) {
   for (const std::optional<double> budget_s : {std::optional<double>(), std::optional(1e3)}) {
     FasterBinLikelihood faster(host, &context, maps.hypotheses, maps.of.contact, maps.of.lattice,
                                BinPlace::measured, 1.0);
-    BoundSearch search(maps.hypotheses, options, host, faster);
+    SearchSpace space(maps.hypotheses, options);
+    BoundSearch search(space, options, host, faster);
     const ArrayReadings touch = readings_of(maps.of.elements);
     search.add(std::span(&touch, 1));
     search.run(maps.of.elements, {.tolerance = 1e-6}, Deadline(budget_s),

@@ -95,7 +95,8 @@ class Search {
     }
     likelihood_.emplace(hypotheses_, options_.contact, lattice);
     batches_.emplace(*likelihood_, nullptr, hypotheses_, options_.contact, lattice, BinPlace::host);
-    search_.emplace(hypotheses_, options_, *likelihood_, *batches_);
+    space_.emplace(hypotheses_, options_);
+    search_.emplace(*space_, options_, *likelihood_, *batches_);
   }
 
   BoundSearch& operator*() { return *search_; }
@@ -107,6 +108,7 @@ class Search {
   BoundedOptions options_;
   std::optional<BinLikelihood> likelihood_;
   std::optional<FasterBinLikelihood> batches_;
+  std::optional<SearchSpace> space_;
   std::optional<BoundSearch> search_;
 };
 

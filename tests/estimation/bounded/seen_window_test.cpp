@@ -201,7 +201,8 @@ std::int64_t expect_sound_search(const BinCase& of, double tolerance) {
   const BinLikelihood likelihood(hypotheses, of.contact, of.lattice);
   FasterBinLikelihood batches(likelihood, nullptr, hypotheses, of.contact, of.lattice,
                               BinPlace::host);
-  BoundSearch search(hypotheses, options, likelihood, batches);
+  SearchSpace space(hypotheses, options);
+  BoundSearch search(space, options, likelihood, batches);
   const ArrayReadings touch = readings_of(of.elements);
   search.add(std::span(&touch, 1));
   Visited visited(of, 2);
