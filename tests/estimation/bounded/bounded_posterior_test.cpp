@@ -570,6 +570,24 @@ TEST(BoundedPosterior, BoundsNoneOfTheseBeyondAHundredThousandBins) {
   }
 }
 
+TEST(BoundedPosterior, BoundsNoneOfTheseAsCloselyAsTheEvidenceIsAskedFor) {
+  Device device = Device::open();
+  BoundedOptions options = small_options();
+  options.none_weight = 1e-12;  // which no identity would ask for
+  BoundedPosterior plain(device, two_made_up(), options);
+  options.evidence_nats = 1e-4;
+  BoundedPosterior close(device, two_made_up(), options);
+  const auto width_of = [](const BoundedPosterior& posterior) {
+    const LogInterval none = posterior.estimate().certificate->none_log_evidence.value();
+    return none.high - none.low;
+  };
+  const Recording recording = random_recording(1, 36, 820);
+  plain.update(all_touches(recording));
+  close.update(all_touches(recording));
+  EXPECT_GT(width_of(plain), 1e-4);
+  EXPECT_LE(width_of(close), 1e-4);
+}
+
 TEST(BoundedPosterior, ShowsInTheIdentitiesWhereABudgetLeftNoneOfThese) {
   Device device = Device::open();
   BoundedOptions options = small_options();

@@ -108,12 +108,12 @@ TEST(NoneEvidence, HoldsItsDefinition) {
          {small_lattice(), lattice_of(60, 3, 20), lattice_of(9, 150, 7)}) {
       NoneByBounds none(two_objects(), lattice, contact);
       EXPECT_EQ(none.bounds().high, 0.0);
-      for (const std::size_t elements : {8, 36, 150, 400}) {
+      for (const std::size_t elements : {8, 36, 400}) {
         SCOPED_TRACE(fmt::format("{} elements, seed {}", elements, ++seed));
-        const Recording recording = random_recording(2, elements, seed);
+        const Recording recording = random_recording(1, elements, seed);
         const std::vector<Touch> touches = all_touches(recording);
         const double expected = none.expected(touches);
-        expect_holds(none.bounds_of(touches), expected, 2.0 * first_width);
+        expect_holds(none.bounds_of(touches), expected, first_width);
         // The table is so steep that its float64 rounding may be more.
         double error = 0.0;
         for (const Touch& touch : touches) {
