@@ -18,10 +18,11 @@ layout(constant_id = 3) const bool EVEN = false;  // rows have an even number of
 
 layout(binding = 0) uniform samplerBuffer source;      // two bins a texel
 layout(binding = 1) uniform samplerBuffer references;  // [object] log-likelihood in two floats
-layout(binding = 2) uniform samplerBuffer plane_max;   // [object, theta]
-// By distance in bins; then, for each bin of the axis, 1 over the sum of the weights that lie inside.
-layout(binding = 3) uniform samplerBuffer weights;
-layout(std430, binding = 4) writeonly buffer Result { float result[]; };  // two words a bin
+layout(std430, binding = 2) readonly buffer PlaneMax { float plane_max[]; };  // [object, theta]
+layout(binding = 3) uniform samplerBuffer weights;  // by distance in bins
+// For each bin of the axis, 1 over the sum of the weights that lie inside.
+layout(std430, binding = 4) readonly buffer Norms { float norms[]; };
+layout(std430, binding = 5) writeonly buffer Result { float result[]; };  // two words a bin
 layout(push_constant) uniform Push { PlanesPush push; };
 
 #include "blurred_bin.glsl"
@@ -90,7 +91,7 @@ void main() {
                      line * (ALONG_X ? push.nx : 1);
   step = ALONG_X ? 1 : push.nx;
   reference = texelFetch(references, int(object)).xy;
-  largest = texelFetch(plane_max, int(object * push.all_thetas + theta)).x;
+  largest = plane_max[object * push.all_thetas + theta];
 
   fill_weights();
   [[unroll]] for (int b = 0; b < BINS * LINES; ++b) { sum[b] = 0.0; }
@@ -106,7 +107,7 @@ void main() {
     const int at = begin + b / LINES;
     const uint beside = ALONG_X ? 0 : uint(b % 2);
     if (at < count && line + beside < (ALONG_X ? push.ny : push.nx)) {
-      const float mean = sum[b] * texelFetch(weights, REACH + 1 + at).x;
+      const float mean = sum[b] * norms[at];
       poor |= mean < LEAST ? 1u << b : 0;
       result[2 * (first + beside + uint(at) * step) + word] = mean;
     }
@@ -125,7 +126,7 @@ void main() {
     }
     if (wanted) {
       result[2 * (from + uint(at) * step) + word] =
-          min(logs.x + log(logs.y * texelFetch(weights, REACH + 1 + at).x), log(LEAST));
+          min(logs.x + log(logs.y * norms[at]), log(LEAST));
     }
   }
 }

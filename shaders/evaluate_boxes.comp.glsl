@@ -8,34 +8,24 @@
 #include "interface.h"
 
 layout(local_size_x_id = 0) in;
-layout(constant_id = 8) const bool MAP_IN_TABLE = true;
 layout(constant_id = 9) const uint RUN = 5;
 
 const uint BINS = RUN;
 const uint FACTORS_PER_DIVISION = 1;
 
 layout(binding = 2) uniform isamplerBuffer elements;  // RotatedElement, [theta, element]
-layout(binding = 3) uniform samplerBuffer map_table;  // Corners of nodes, with a border of prior
-layout(std430, binding = 4) readonly buffer MapStorage { float map_storage[]; };  // nodes alone
 layout(std430, binding = 5) readonly buffer Axes { Split axis[]; };
 layout(std430, binding = 6) readonly buffer Boxes { BoxPlace boxes[]; };
 layout(std430, binding = 7) writeonly buffer Results { float result[]; };  // in nats
 layout(push_constant) uniform Push { BoxPush push; };
 
+#include "map_corners.glsl"
 #include "segment_sum.glsl"
 
 BoxPlace box;
 int bin_cell[BINS];  // along x, in cells of the map
 float bin_fraction[BINS];
 Split bin_y;
-
-// Log odds at a node, its right neighbour, the one above and the one above that neighbour.
-vec4 corners(const int node) {
-  return MAP_IN_TABLE ? texelFetch(map_table, node)
-                      : vec4(map_storage[node], map_storage[node + 1],
-                             map_storage[node + box.map_width],
-                             map_storage[node + box.map_width + 1]);
-}
 
 // Bilinear in log odds. Outside the map both nodes are of the border and hold the prior.
 void interpolate(const int element_index) {
@@ -50,7 +40,7 @@ void interpolate(const int element_index) {
     const float whole_x = floor(x);
     const float fx = x - whole_x;
     const int column = clamp(bin_cell[b] + element.x + int(whole_x), 0, box.map_width - 2);
-    const vec4 corner = corners(row_node + column);
+    const vec4 corner = corners(row_node + column, box.map_width);
     const float low = corner.x + (corner.y - corner.x) * fx;
     const float high = corner.z + (corner.w - corner.z) * fx;
     log_odds_of[b] = low + (high - low) * fy;

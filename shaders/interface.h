@@ -301,7 +301,7 @@ const uint RANDOM_OFFSET = 3;
 const int PARZEN_EDGE = 4;
 const int PARZEN_THETAS = 10;
 
-// A particle; its pose is relative to the region's centre. Kernels read it as an ivec4.
+// A particle; its pose is relative to the region's centre. A table of them is one of ivec4.
 struct Particle {
   uint object;
   float x_mm;

@@ -9,10 +9,13 @@
 
 layout(local_size_x = PARZEN_EDGE * PARZEN_THETAS) in;
 
-layout(binding = 0) uniform samplerBuffer particles;   // x_mm, y_mm, theta_rad, weight
-layout(std430, binding = 1) readonly buffer Ranges { uvec2 ranges[]; };
-layout(std430, binding = 2) readonly buffer Units { ConeUnit units[]; };
-layout(std430, binding = 3) writeonly buffer Densities { vec4 densities[]; };  // [unit, theta, y]
+layout(constant_id = 0) const bool PARTICLES_IN_TABLE = true;  // else in storage
+
+layout(binding = 0) uniform samplerBuffer particle_table;  // x_mm, y_mm, theta_rad, weight
+layout(std430, binding = 1) readonly buffer Particles { vec4 particle_storage[]; };
+layout(std430, binding = 2) readonly buffer Ranges { uvec2 ranges[]; };
+layout(std430, binding = 3) readonly buffer Units { ConeUnit units[]; };
+layout(std430, binding = 4) writeonly buffer Densities { vec4 densities[]; };  // [unit, theta, y]
 layout(push_constant) uniform Push { ConePush push; };
 
 const float TWO_PI = 6.28318530717959;
@@ -29,7 +32,8 @@ void main() {
     const uvec2 range = ranges[r];
     vec4 part = vec4(0.0);  // one sum per range rounds less than one sum for all
     for (uint i = range.x; i < range.y; ++i) {
-      const vec4 particle = texelFetch(particles, int(i));
+      const vec4 particle =
+          PARTICLES_IN_TABLE ? texelFetch(particle_table, int(i)) : particle_storage[i];
       const vec4 dx = particle.x - x_mm;
       const float dy = particle.y - y_mm;
       const float turn = particle.z - theta_rad;

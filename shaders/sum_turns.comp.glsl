@@ -14,15 +14,19 @@ layout(constant_id = 2) const uint ROWS = 4;  // bins along y of an invocation; 
 layout(constant_id = 3) const bool KEEP = false;   // leaves a touch's result in the second words
 layout(constant_id = 4) const uint SOURCE = BLUR_ALONG_X;  // or BLUR_TOUCH, not blurred along x, y
 layout(constant_id = 5) const bool ONE_SLAB = true;        // every slab holds all thetas
+layout(constant_id = 6) const bool TURNS_IN_TABLE = true;  // else in storage
+layout(constant_id = 7) const bool MAXIMA_IN_TABLE = true;
 
 layout(binding = 0) uniform samplerBuffer source;  // two bins a texel
 layout(binding = 1) uniform samplerBuffer source_before;  // of the thetas before the slab's
 layout(binding = 2) uniform samplerBuffer source_after;   // and after them
 layout(binding = 3) uniform samplerBuffer references;  // [object] log-likelihood in two floats
-layout(binding = 4) uniform samplerBuffer plane_max;   // [object, theta], then weights by steps
-layout(binding = 5) uniform samplerBuffer turns;       // Turn, [theta or object, step]
-layout(std430, binding = 6) buffer Belief { vec2 belief[]; };
-layout(std430, binding = 7) writeonly buffer Kept { float kept[]; };  // two words a bin
+layout(binding = 4) uniform samplerBuffer turn_table;  // Turn, [theta or object, step]
+layout(std430, binding = 5) readonly buffer TurnStorage { vec4 turn_storage[]; };
+layout(binding = 6) uniform samplerBuffer max_table;  // [object, theta], then weights by steps
+layout(std430, binding = 7) readonly buffer MaxStorage { float max_storage[]; };
+layout(std430, binding = 8) buffer Belief { vec2 belief[]; };
+layout(std430, binding = 9) writeonly buffer Kept { float kept[]; };  // two words a bin
 layout(push_constant) uniform Push { TurnPush push; };
 
 #include "two_float.glsl"
@@ -70,6 +74,15 @@ vec2 split_distance(const vec2 fraction, const vec2 a, const vec2 b, const vec2 
   return vec2(near, behind);
 }
 
+// One of a turn's four vec4.
+vec4 turn_part(const int at) {
+  return TURNS_IN_TABLE ? texelFetch(turn_table, at) : turn_storage[at];
+}
+
+float plane_max(const int at) {
+  return MAXIMA_IN_TABLE ? texelFetch(max_table, at).x : max_storage[at];
+}
+
 Tap tap_at(const int k, const uint object, const uint theta, const int x, const int y) {
   Tap tap;
   const int all = int(push.slab.all_thetas);
@@ -94,13 +107,13 @@ Tap tap_at(const int k, const uint object, const uint theta, const int x, const 
   }
   tap.first = (object - push.slab.object_first) * push.slab.stride +
               uint(from - first_theta) * push.slab.nx * push.slab.ny;
-  tap.largest = texelFetch(plane_max, int(object) * all + from).x;
-  tap.weight = texelFetch(plane_max, int(push.first_weight) + abs(k)).x;
+  tap.largest = plane_max(int(object) * all + from);
+  tap.weight = plane_max(int(push.first_weight) + abs(k));
   const int entry = 4 * (int(SLIP ? object : theta) * (2 * steps + 1) + k + steps);
-  const vec2 whole = texelFetch(turns, entry).xy;
-  const vec4 fraction = texelFetch(turns, entry + 1);
-  const vec4 to_x = SLIP ? texelFetch(turns, entry + 2) : vec4(0.0);
-  const vec4 to_y = SLIP ? texelFetch(turns, entry + 3) : vec4(0.0);
+  const vec2 whole = turn_part(entry).xy;
+  const vec4 fraction = turn_part(entry + 1);
+  const vec4 to_x = SLIP ? turn_part(entry + 2) : vec4(0.0);
+  const vec4 to_y = SLIP ? turn_part(entry + 3) : vec4(0.0);
   int more_columns;
   int more_rows;
   tap.x = split_distance(fraction.xy, to_x.xy, to_x.zw, vec2(x, y), more_columns);

@@ -12,9 +12,12 @@
 
 layout(local_size_x = WEIGHT_LANES) in;
 
-layout(binding = 0) uniform samplerBuffer log_weights;  // two floats
-layout(std430, binding = 1) writeonly buffer Cumulative { float cumulative[]; };
-layout(std430, binding = 2) writeonly buffer Blocks { WeightBlock blocks[]; };
+layout(constant_id = 0) const bool WEIGHTS_IN_TABLE = true;  // else in storage
+
+layout(binding = 0) uniform samplerBuffer log_weight_table;  // two floats
+layout(std430, binding = 1) readonly buffer LogWeights { vec2 log_weight_storage[]; };
+layout(std430, binding = 2) writeonly buffer Cumulative { float cumulative[]; };
+layout(std430, binding = 3) writeonly buffer Blocks { WeightBlock blocks[]; };
 layout(push_constant) uniform Push { uint particles; } push;
 
 const uint RUN = WEIGHT_BLOCK / WEIGHT_LANES;
@@ -32,7 +35,9 @@ void main() {
   vec2 most = vec2(0.0);
   [[unroll]] for (uint i = 0; i < RUN; ++i) {
     // A lane past the end repeats the last particle without counting it.
-    value[i] = texelFetch(log_weights, int(min(first + i, push.particles - 1))).xy;
+    const uint at = min(first + i, push.particles - 1);
+    value[i] =
+        WEIGHTS_IN_TABLE ? texelFetch(log_weight_table, int(at)).xy : log_weight_storage[at];
     most = i == 0 || exceeds(value[i], most) ? value[i] : most;
   }
   largest[lane] = most;

@@ -16,13 +16,13 @@ layout(local_size_x_id = 0) in;
 const uint BINS = 1;
 const uint FACTORS_PER_DIVISION = 1;
 
+#include "map_corners.glsl"
 #include "segment_sum.glsl"
 
-layout(binding = 2) uniform samplerBuffer turns;       // CoarseAndFine: headings, then elements
-layout(binding = 3) uniform samplerBuffer maps;        // Corners of nodes, with a border of prior
-layout(std430, binding = 4) readonly buffer Objects { ParticleMap objects[]; };
-layout(binding = 5) uniform isamplerBuffer particles;  // Particle
-layout(std430, binding = 6) buffer LogWeights { vec2 log_weights[]; };  // two floats
+layout(binding = 2) uniform samplerBuffer turns;  // CoarseAndFine: headings, then elements
+layout(std430, binding = 5) readonly buffer Objects { ParticleMap objects[]; };
+layout(std430, binding = 6) readonly buffer Particles { Particle particles[]; };
+layout(std430, binding = 7) buffer LogWeights { vec2 log_weights[]; };  // two floats
 layout(push_constant) uniform Push { WeighPush push; };
 
 // 2 pi / HEADINGS as a number of few bits, of which multiples are exact, and the rest.
@@ -78,7 +78,7 @@ void interpolate(const int element_index) {
   const int column = clamp(cell.x, 0, object.width - 2);
   const int row = clamp(cell.y, 0, object.height - 2);
   const int node = object.first + row * object.width + column;
-  const vec4 corner = texelFetch(maps, node);
+  const vec4 corner = corners(node, object.width);
   const float low = corner.x + (corner.y - corner.x) * f.x;
   const float high = corner.z + (corner.w - corner.z) * f.x;
   log_odds_of[0] = low + (high - low) * f.y;
@@ -89,11 +89,11 @@ void main() {
   if (particle >= push.particles) {
     return;
   }
-  const ivec4 state = texelFetch(particles, int(particle));
-  object = objects[state.x];
-  x = in_cells(intBitsToFloat(state.y), object.centre_x);
-  y = in_cells(intBitsToFloat(state.z), object.centre_y);
-  turn = direction(intBitsToFloat(state.w));
+  const Particle state = particles[particle];
+  object = objects[state.object];
+  x = in_cells(state.x_mm, object.centre_x);
+  y = in_cells(state.y_mm, object.centre_y);
+  turn = direction(state.theta_rad);
   table = int(HEADINGS + object.scale * push.elements);
 
   sum[0] = push.fresh != 0 ? vec2(0.0) : log_weights[particle];

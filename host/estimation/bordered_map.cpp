@@ -7,6 +7,14 @@
 
 namespace palpate {
 
+namespace {
+
+std::uint64_t cell_bytes(gpu::Access access) {
+  return access == gpu::Access::table ? sizeof(shaders::Corners) : sizeof(float);
+}
+
+}  // namespace
+
 std::vector<float> with_border(const OccupancyGrid& map, double prior) {
   constexpr int border = shaders::MAP_BORDER;
   const int width = map.nx + 2 * border;
@@ -31,6 +39,47 @@ std::vector<shaders::Corners> corners_with_border(const OccupancyGrid& map, doub
     corners.push_back({nodes[i], node(i + 1), node(i + width), node(i + width + 1)});
   }
   return corners;
+}
+
+std::uint64_t bordered_cells(const OccupancyGrid& map) {
+  constexpr std::uint64_t border = 2 * shaders::MAP_BORDER;
+  return (map.nx + border) * (map.ny + border);
+}
+
+std::uint64_t most_map_cells(const gpu::Limits& limits, gpu::Access access) {
+  const std::uint64_t most = std::min(limits.allocation, limits.memory);
+  return access == gpu::Access::table
+             ? std::min<std::uint64_t>(limits.table_texels, most / cell_bytes(access))
+             : std::min(limits.storage_range, most) / cell_bytes(access);
+}
+
+std::optional<gpu::Access> map_access(const gpu::Limits& limits, std::uint64_t cells) {
+  for (const gpu::Access access : {gpu::Access::table, gpu::Access::storage}) {
+    if (cells <= most_map_cells(limits, access)) {
+      return access;
+    }
+  }
+  return {};
+}
+
+std::uint64_t BorderedMaps::bytes_needed(gpu::Access access, std::uint64_t cells) {
+  return cells * cell_bytes(access);
+}
+
+BorderedMaps::BorderedMaps(gpu::Context& context, gpu::Access access, std::uint64_t cells,
+                           std::string_view purpose)
+    : nodes_(context, bytes_needed(access, cells), gpu::Memory::device, purpose,
+             access == gpu::Access::table ? VK_FORMAT_R32G32B32A32_SFLOAT : VK_FORMAT_UNDEFINED) {}
+
+int BorderedMaps::add(gpu::CommandStream& stream, const OccupancyGrid& map, double prior) {
+  const std::uint64_t first = added_;
+  if (nodes_.is_table()) {
+    stream.upload(nodes_, corners_with_border(map, prior), first * sizeof(shaders::Corners));
+  } else {
+    stream.upload(nodes_, with_border(map, prior), first * sizeof(float));
+  }
+  added_ += bordered_cells(map);
+  return static_cast<int>(first);
 }
 
 std::vector<shaders::Split> axes_in_cells(const OccupancyGrid& map, const PoseLattice& lattice) {

@@ -1,7 +1,11 @@
 #pragma once
 
+#include <cstdint>
+#include <optional>
+#include <string_view>
 #include <vector>
 
+#include "command_stream.hpp"
 #include "interface.h"
 #include "palpate/lattice.hpp"
 #include "palpate/occupancy_grid.hpp"
@@ -15,6 +19,36 @@ std::vector<float> with_border(const OccupancyGrid& map, double prior);
 /// The same nodes, each with the three above and to its right: a kernel interpolates from one.
 /// Beyond the border lies the prior.
 std::vector<shaders::Corners> corners_with_border(const OccupancyGrid& map, double prior);
+
+/// Cells of the map with its border.
+std::uint64_t bordered_cells(const OccupancyGrid& map);
+
+/// Most cells that one buffer of the device holds.
+std::uint64_t most_map_cells(const gpu::Limits& limits, gpu::Access access);
+
+/// The fastest way in which kernels can read this many cells; nothing where no buffer holds them.
+std::optional<gpu::Access> map_access(const gpu::Limits& limits, std::uint64_t cells);
+
+/// Maps on the device, one after the other in a buffer: as with_border() has them in storage, as
+/// corners_with_border() has them in a table.
+class BorderedMaps {
+ public:
+  /// Device memory that this many cells take, in bytes.
+  static std::uint64_t bytes_needed(gpu::Access access, std::uint64_t cells);
+
+  BorderedMaps(gpu::Context& context, gpu::Access access, std::uint64_t cells,
+               std::string_view purpose);
+
+  /// Records the upload of the next map. Beyond it lies the prior.
+  /// @returns the index of its first node
+  int add(gpu::CommandStream& stream, const OccupancyGrid& map, double prior);
+
+  const gpu::Buffer& nodes() const { return nodes_; }
+
+ private:
+  gpu::Buffer nodes_;
+  std::uint64_t added_ = 0;  ///< cells
+};
 
 /// The lattice's x, then its y, in cells of the map with its border, [nx + ny].
 std::vector<shaders::Split> axes_in_cells(const OccupancyGrid& map, const PoseLattice& lattice);

@@ -7,6 +7,32 @@
 
 namespace palpate::gpu {
 
+namespace {
+
+VkDeviceSize bytes_per_texel(VkFormat texel) {
+  switch (texel) {
+    case VK_FORMAT_R32_SFLOAT:
+      return 4;
+    case VK_FORMAT_R32G32_SFLOAT:
+      return 8;
+    case VK_FORMAT_R32G32B32A32_SFLOAT:
+    case VK_FORMAT_R32G32B32A32_SINT:
+      return 16;
+    default:  // no texel is smaller
+      return 1;
+  }
+}
+
+VkDeviceSize texels_of(VkDeviceSize bytes, VkFormat texel) {
+  return bytes / bytes_per_texel(texel);
+}
+
+}  // namespace
+
+VkFormat table_where_it_fits(const Limits& limits, VkDeviceSize bytes, VkFormat texel) {
+  return texels_of(bytes, texel) <= limits.table_texels ? texel : VK_FORMAT_UNDEFINED;
+}
+
 Buffer::Buffer(Context& context, VkDeviceSize bytes, Memory memory, std::string_view purpose,
                VkFormat texel)
     : bytes_(bytes) {
@@ -18,6 +44,13 @@ Buffer::Buffer(Context& context, VkDeviceSize bytes, Memory memory, std::string_
                 fmt::format("{}: more than the {:.1f} MiB it allocates at once; use fewer bins, "
                             "objects or cells",
                             doing, static_cast<double>(context.limits().allocation) / (1 << 20)));
+  }
+  // A larger view is undefined behaviour.
+  if (table_where_it_fits(context.limits(), bytes, texel) != texel) {
+    throw Error(Fault::input,
+                fmt::format("{}: {} texels, more than the {} it reads as a table; use "
+                            "fewer bins, objects or cells",
+                            doing, texels_of(bytes, texel), context.limits().table_texels));
   }
   const VkBufferCreateInfo info{
       .sType = VK_STRUCTURE_TYPE_BUFFER_CREATE_INFO,

@@ -3,6 +3,7 @@
 #include <string_view>
 
 #include "context.hpp"
+#include "kernel.hpp"
 #include "owned.hpp"
 
 namespace palpate::gpu {
@@ -18,19 +19,29 @@ enum class Memory {
 /// Device memory that a buffer of this size takes, in bytes, rounded up as drivers do.
 constexpr VkDeviceSize allocated(VkDeviceSize bytes) { return (bytes + 255) / 256 * 256; }
 
+/// The texel's format for a buffer of this size that kernels read as a table where the device reads
+/// so many texels, and VK_FORMAT_UNDEFINED where they read it from storage instead.
+VkFormat table_where_it_fits(const Limits& limits, VkDeviceSize bytes, VkFormat texel);
+
 /// A Vulkan buffer with memory of its own. Move-only.
 class Buffer {
  public:
   Buffer() = default;
   /// @param purpose what the buffer holds, for the message when memory runs out
   /// @param texel format of the buffer as a table (Access::table); only for Memory::device
-  /// @throws Error if the device does not have the memory
+  /// @throws Error if the device does not have the memory, or reads no table of so many texels
   Buffer(Context& context, VkDeviceSize bytes, Memory memory, std::string_view purpose,
          VkFormat texel = VK_FORMAT_UNDEFINED);
 
   VkBuffer handle() const { return buffer_.get(); }
   /// The view that binds the buffer as a table; null without a texel format.
   VkBufferView table() const { return table_.get(); }
+  bool is_table() const { return table_.get() != VK_NULL_HANDLE; }
+  /// For the two bindings of a kernel that reads a buffer as a table or, as a constant of its tells
+  /// it, from storage: the buffer for the binding that is read, null for the other.
+  const Buffer* read_as(Access access) const {
+    return is_table() == (access == Access::table) ? this : nullptr;
+  }
   VkDeviceSize bytes() const { return bytes_; }
   /// Start of the mapped memory; null for Memory::device.
   std::byte* data() const { return data_; }

@@ -112,8 +112,9 @@ VkDescriptorSet CommandStream::descriptor_set(const Kernel& kernel,
   std::array<VkBufferView, max_bindings> tables{};
   std::array<VkWriteDescriptorSet, max_bindings> writes{};
   for (std::size_t i = 0; i < buffers.size(); ++i) {
-    ranges[i] = {buffers[i]->handle(), 0, VK_WHOLE_SIZE};
-    tables[i] = buffers[i]->table();
+    const Buffer& buffer = buffers[i] != nullptr ? *buffers[i] : unread();
+    ranges[i] = {buffer.handle(), 0, VK_WHOLE_SIZE};
+    tables[i] = buffer.table();
     writes[i] = {.sType = VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET,
                  .dstSet = set,
                  .dstBinding = static_cast<std::uint32_t>(i),
@@ -122,16 +123,22 @@ VkDescriptorSet CommandStream::descriptor_set(const Kernel& kernel,
                  .pBufferInfo = &ranges[i],
                  .pTexelBufferView = &tables[i]};
     if (kernel.bindings()[i] == Access::storage &&
-        buffers[i]->bytes() > context_.limits().storage_range) {
-      throw Error(
-          Fault::system,
-          fmt::format("kernel {}: binding {} of {} B exceeds the device's {} B", kernel.name(), i,
-                      buffers[i]->bytes(), context_.limits().storage_range));
+        buffer.bytes() > context_.limits().storage_range) {
+      throw Error(Fault::system,
+                  fmt::format("kernel {}: binding {} of {} B exceeds the device's {} B",
+                              kernel.name(), i, buffer.bytes(), context_.limits().storage_range));
     }
   }
   vkUpdateDescriptorSets(device, static_cast<std::uint32_t>(buffers.size()), writes.data(), 0,
                          nullptr);
   return set;
+}
+
+const Buffer& CommandStream::unread() {
+  if (unread_.bytes() == 0) {
+    unread_ = Buffer(context_, 16, Memory::device, "a binding", VK_FORMAT_R32G32B32A32_SFLOAT);
+  }
+  return unread_;
 }
 
 void CommandStream::dispatch_bytes(const Kernel& kernel, std::span<const Buffer* const> buffers,

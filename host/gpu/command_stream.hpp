@@ -48,8 +48,8 @@ class CommandStream {
   /// Sets every 32-bit word of the buffer to `word`.
   void fill(const Buffer& target, std::uint32_t word);
 
-  /// Runs a kernel, with a buffer for each of its bindings, on groups[0] x groups[1] x groups[2]
-  /// workgroups.
+  /// Runs a kernel on groups[0] x groups[1] x groups[2] workgroups, with a buffer for each of its
+  /// bindings: null for storage, or a table of floats, that its constants keep it from reading.
   /// @param work Recording::work(), where it is known: only then other threads' commands may run
   /// beside it
   template <typename Push>
@@ -97,12 +97,15 @@ class CommandStream {
   void rewind();
   void drop();
   VkDescriptorSet descriptor_set(const Kernel& kernel, std::span<const Buffer* const> buffers);
+  /// What is bound where no buffer is read, because Vulkan wants one.
+  const Buffer& unread();
 
   Context& context_;
   Submitter submitter_;
   Recording recording_;
   std::vector<Owned<VkDescriptorPool>> descriptor_pools_;
   std::size_t sets_used_ = 0;
+  Buffer unread_;
   Arena upload_{Memory::upload, {}, 0};
   Arena download_{Memory::download, {}, 0};
   std::vector<Download> downloads_;

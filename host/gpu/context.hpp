@@ -92,9 +92,9 @@ class Context {
   const Limits& limits() const { return limits_; }
   /// Stays empty on a device that was handed in: the program gets the messages of its instance.
   ValidationLog& validation() { return instance_ ? instance_->validation() : nothing_said_; }
-  /// Lowers the limits, so that a test on any device reaches the cases of much smaller devices and
-  /// much larger problems.
-  void lower_limits(const Limits& limits) { limits_ = limits; }
+  /// Lowers the device's own limits to these, where they are lower, so that a test on any device
+  /// reaches the cases of much smaller devices and much larger problems.
+  void lower_limits(const Limits& limits);
 
   MemoryUse memory_use() const;
   /// Counts memory; buffers call this pair when they allocate memory and when they free it.

@@ -12,7 +12,7 @@
 namespace palpate::gpu {
 
 /// Most buffers that one kernel binds. Vulkan guarantees 4 storage buffers and 16 texel buffers.
-inline constexpr std::uint32_t max_bindings = 8;
+inline constexpr std::uint32_t max_bindings = 10;
 
 /// A physical device, how good it is, and why it is chosen or not.
 struct Candidate {

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <ostream>
 
-#include "context.hpp"
+#include "gpu/least_limits.hpp"
 
 namespace palpate {
 
@@ -14,9 +14,13 @@ struct MadeUpDevice {
   std::uint32_t subgroup;
   std::uint32_t group_invocations;
   std::uint32_t shared_kib;
+  bool least = false;  ///< all that is not said here is the least that Vulkan promises
 
   /// These in the place of `real`'s, but no more than it has.
   gpu::Limits limits(gpu::Limits real) const {
+    if (least) {
+      real = gpu::least_limits(real);
+    }
     real.cpu = cpu;
     real.subgroup = subgroup;
     real.group_invocations = std::min(real.group_invocations, group_invocations);
@@ -32,13 +36,10 @@ struct MadeUpDevice {
   }
 };
 
-/// The last two have the least that Vulkan allows.
-inline constexpr MadeUpDevice made_up_devices[] = {{"CPU of 256-bit vectors", true, 8, 1024, 32},
-                                                   {"CPU of 512-bit vectors", true, 16, 1024, 32},
-                                                   {"GPU of 32 lanes", false, 32, 1024, 48},
-                                                   {"GPU of 64 lanes", false, 64, 1024, 64},
-                                                   {"GPU of 128 lanes", false, 128, 1024, 32},
-                                                   {"small GPU", false, 4, 128, 16},
-                                                   {"small CPU", true, 1, 128, 16}};
+inline constexpr MadeUpDevice made_up_devices[] = {
+    {"CPU of 256-bit vectors", true, 8, 1024, 32}, {"CPU of 512-bit vectors", true, 16, 1024, 32},
+    {"GPU of 32 lanes", false, 32, 1024, 48},      {"GPU of 64 lanes", false, 64, 1024, 64},
+    {"GPU of 128 lanes", false, 128, 1024, 32},    {"small GPU", false, 4, 128, 16, true},
+    {"small CPU", true, 1, 128, 16, true}};
 
 }  // namespace palpate

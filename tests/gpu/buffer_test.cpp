@@ -58,6 +58,42 @@ TEST(Buffer, TheDevicesOwnAllocationLimitHolds) {
   EXPECT_THROW(Buffer(context, context.limits().allocation + 1, Memory::device, "a test"), Error);
 }
 
+TEST(Buffer, AsALargerTableThanTheDeviceReadsIsRefusedBeforeItTakesMemory) {
+  Context context("");
+  Limits small = context.limits();
+  small.table_texels = 1000;
+  context.lower_limits(small);
+  for (const auto& [format, bytes] :
+       {std::pair(VK_FORMAT_R32_SFLOAT, 4U), std::pair(VK_FORMAT_R32G32_SFLOAT, 8U),
+        std::pair(VK_FORMAT_R32G32B32A32_SFLOAT, 16U)}) {
+    EXPECT_NE(Buffer(context, 1000 * bytes, Memory::device, "a test", format).table(), nullptr);
+    const VkDeviceSize before = context.memory_use().peak;
+    try {
+      const Buffer buffer(context, 1001 * bytes, Memory::device, "a test", format);
+      ADD_FAILURE() << "made";
+    } catch (const Error& error) {
+      EXPECT_EQ(error.fault(), Fault::input);
+      EXPECT_NE(std::string(error.what()).find("for a test: 1001 texels, more than the 1000"),
+                std::string::npos)
+          << error.what();
+    }
+    EXPECT_EQ(context.memory_use().peak, before);
+  }
+}
+
+TEST(Context, LimitsAreLoweredNeverRaised) {
+  Context context("");
+  const Limits own = context.limits();
+  Limits other = own;
+  other.table_texels = ~0U;
+  other.storage_range = 1024;
+  context.lower_limits(other);
+  EXPECT_EQ(context.limits().table_texels, own.table_texels);
+  EXPECT_EQ(context.limits().storage_range, 1024U);
+  context.lower_limits(own);
+  EXPECT_EQ(context.limits().storage_range, own.storage_range);
+}
+
 /// Sizes around the staging block of 4 MiB, and odd sizes.
 class RoundTrip : public testing::TestWithParam<std::size_t> {};
 

@@ -226,13 +226,11 @@ void DeviceBinLikelihood::dispatch(const Group& group, const Batch& batch, const
   const shaders::BoxPush push{.runs = batch.runs,
                               .boxes = static_cast<shaders::uint>(batch.places.size()),
                               .segments = static_cast<shaders::uint>(portion.segments.size())};
-  // A kernel that reads maps in one way is given any buffer for the other.
-  const bool in_table = group.kind.access == Access::table;
-  const gpu::Buffer& map = group.maps.log_odds();
+  const MapTable& maps = group.maps;
   stream_.dispatch(
-      kernels_[in_table ? 1 : 0],
-      {&segments_, &contact_table_.nodes(), &rotated_, in_table ? &map : &contact_table_.nodes(),
-       in_table ? &group.maps.axes() : &map, &group.maps.axes(), &boxes_, &results_},
+      kernels_[group.kind.access == Access::table ? 1 : 0],
+      {&segments_, &contact_table_.nodes(), &rotated_, maps.nodes().read_as(Access::table),
+       maps.nodes().read_as(Access::storage), &maps.axes(), &boxes_, &results_},
       push, {groups_of(batch.runs, independent_lanes(context_.limits())), 1, 1});
 }
 

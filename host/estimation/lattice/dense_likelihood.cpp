@@ -123,12 +123,10 @@ void DenseLikelihood::dispatch(const Group& group, const Range& range, const Sla
   const MapTable& maps = group.maps;
   const std::uint32_t invocations =
       groups_of(slab.nx, path.bins_x) * groups_of(slab.row_count, path.bins_y);
-  // A kernel that reads maps in one way is given any buffer for the other.
-  const bool in_table = group.kind.access == gpu::Access::table;
   stream_.dispatch(
       path.kernel,
-      {&segments_, &contact_.nodes(), &elements_, in_table ? &maps.log_odds() : &contact_.nodes(),
-       in_table ? &maps.axes() : &maps.log_odds(), &maps.axes(), &maps.places(),
+      {&segments_, &contact_.nodes(), &elements_, maps.nodes().read_as(gpu::Access::table),
+       maps.nodes().read_as(gpu::Access::storage), &maps.axes(), &maps.places(),
        &slab.log_likelihood},
       push,
       {groups_of(invocations, independent_lanes(context_.limits())), range.count, slab.theta_count},

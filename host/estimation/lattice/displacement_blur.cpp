@@ -36,6 +36,28 @@ std::uint64_t turns_of(const PoseLattice& lattice, std::size_t objects, int step
          (2 * static_cast<std::uint64_t>(steps) + 1);
 }
 
+/// Throws Error where no buffer holds as many turns.
+gpu::Buffer turn_buffer(gpu::Context& context, std::uint64_t turns) {
+  const gpu::Limits& limits = context.limits();
+  const std::uint64_t bytes = turns * sizeof(shaders::Turn);
+  const VkFormat texel = gpu::table_where_it_fits(limits, bytes, VK_FORMAT_R32G32B32A32_SFLOAT);
+  if (texel == VK_FORMAT_UNDEFINED && bytes > limits.storage_range) {
+    throw Error(
+        Fault::input,
+        fmt::format("a standard deviation of theta asks for {} turns, more than the {} that "
+                    "device '{}' reads in one buffer; use fewer bins",
+                    turns, limits.storage_range / sizeof(shaders::Turn), context.name()));
+  }
+  return {context, bytes, gpu::Memory::device, "turns of a blur", texel};
+}
+
+/// The largest likelihood of every plane, then the weights of theta.
+gpu::Buffer maxima_buffer(gpu::Context& context, std::uint64_t count) {
+  const std::uint64_t bytes = count * sizeof(float);
+  return {context, bytes, gpu::Memory::device, "maxima of planes",
+          gpu::table_where_it_fits(context.limits(), bytes, VK_FORMAT_R32_SFLOAT)};
+}
+
 /// Bins that a Gaussian along x or y reaches. Farther than the axis is long there is nothing to
 /// weigh.
 int plane_steps(double sd_mm, const Axis& axis) {
@@ -106,10 +128,8 @@ DisplacementBlur::DisplacementBlur(gpu::Context& context, gpu::CommandStream& st
       // A slip takes each bin from a place of its own: neighbours share no reads.
       turn_rows_(of == Of::belief ? 1 : rows_of_a_turn),
       turn_columns_(of == Of::belief ? 1 : 2),
-      turns_(context, turns_of(lattice, objects, theta_steps_) * sizeof(shaders::Turn),
-             gpu::Memory::device, "turns of a blur", VK_FORMAT_R32G32B32A32_SFLOAT),
-      plane_max_(context, (planes() + static_cast<std::size_t>(theta_steps_) + 1) * sizeof(float),
-                 gpu::Memory::device, "maxima of planes", VK_FORMAT_R32_SFLOAT),
+      turns_(turn_buffer(context, turns_of(lattice, objects, theta_steps_))),
+      plane_max_(maxima_buffer(context, planes() + static_cast<std::size_t>(theta_steps_) + 1)),
       references_(context, objects * sizeof(TwoFloat), gpu::Memory::device, "maxima of objects",
                   VK_FORMAT_R32G32_SFLOAT) {
   require_whole_planes(context, lattice, objects, lanes_, theta_steps_);
@@ -126,36 +146,38 @@ DisplacementBlur::DisplacementBlur(gpu::Context& context, gpu::CommandStream& st
       context, {.name = "sum_turns",
                 .spirv = shaders::sum_turns,
                 .bindings = {Access::table, Access::table, Access::table, Access::table,
-                             Access::table, Access::table, Access::storage, Access::storage},
+                             Access::table, Access::storage, Access::table, Access::storage,
+                             Access::storage, Access::storage},
                 .push_bytes = sizeof(shaders::TurnPush),
                 .constants = {lanes_, of == Of::belief ? 1U : 0U, turn_rows_, keep_touch ? 1U : 0U,
                               blurs_planes() ? shaders::BLUR_ALONG_X : shaders::BLUR_TOUCH,
-                              objects_in_one_slab(context, lattice, objects) ? 1U : 0U}});
+                              objects_in_one_slab(context, lattice, objects) ? 1U : 0U,
+                              turns_.is_table() ? 1U : 0U, plane_max_.is_table() ? 1U : 0U}});
   stream.upload(plane_max_, blur_weights(sd.rad, lattice.theta_rad, theta_steps_),
                 planes() * sizeof(float));
 }
 
 DisplacementBlur::Pass DisplacementBlur::make_pass(const Axis& axis, bool along_x) {
   const int steps = plane_steps(sd_.mm, axis);
-  std::vector<float> table = blur_weights(sd_.mm, axis, steps);
+  const std::vector<float> table = blur_weights(sd_.mm, axis, steps);
   std::vector<std::uint32_t> constants{lanes_, along_x ? shaders::BLUR_ALONG_Y : source_of(of_),
                                        static_cast<std::uint32_t>(steps),
                                        lattice_.x_mm.count % 2 == 0 ? 1U : 0U};
   for (std::size_t k = 0; k <= shaders::BLUR_CONSTANT_STEPS; ++k) {
     constants.push_back(std::bit_cast<std::uint32_t>(k < table.size() ? table[k] : 0.0F));
   }
-  const std::vector<float> norms = blur_norms(table, axis);
-  table.insert(table.end(), norms.begin(), norms.end());
   const std::int64_t strips =
       groups_of(axis.count, along_x ? shaders::BLUR_STRIP_X : shaders::BLUR_STRIP_Y);
   return {
-      .kernel = gpu::Kernel(context_, {.name = "blur_axis",
-                                       .spirv = shaders::blur_axis,
-                                       .bindings = {Access::table, Access::table, Access::table,
-                                                    Access::table, Access::storage},
-                                       .push_bytes = sizeof(shaders::PlanesPush),
-                                       .constants = constants}),
+      .kernel =
+          gpu::Kernel(context_, {.name = "blur_axis",
+                                 .spirv = shaders::blur_axis,
+                                 .bindings = {Access::table, Access::table, Access::storage,
+                                              Access::table, Access::storage, Access::storage},
+                                 .push_bytes = sizeof(shaders::PlanesPush),
+                                 .constants = constants}),
       .weights = stream_.uploaded(table, "weights of a blur", VK_FORMAT_R32_SFLOAT),
+      .norms = stream_.uploaded(blur_norms(table, axis), "weights of a blur"),
       .invocations = strips * (along_x ? lattice_.y_mm.count : groups_of(lattice_.x_mm.count, 2))};
 }
 
@@ -165,9 +187,8 @@ std::uint64_t DisplacementBlur::bytes_needed(const PoseLattice& lattice, std::si
   const auto thetas = static_cast<std::uint64_t>(lattice.theta_rad.count);
   const auto pass_bytes = [&](const Axis& axis) {
     const int reach = plane_steps(sd.mm, axis);
-    return gpu::allocated(
-        (static_cast<std::uint64_t>(reach) + 1 + static_cast<std::uint64_t>(axis.count)) *
-        sizeof(float));
+    return gpu::allocated((static_cast<std::uint64_t>(reach) + 1) * sizeof(float)) +
+           gpu::allocated(static_cast<std::uint64_t>(axis.count) * sizeof(float));
   };
   return pass_bytes(lattice.x_mm) + pass_bytes(lattice.y_mm) +
          gpu::allocated(turns_of(lattice, objects, steps) * sizeof(shaders::Turn)) +
@@ -177,8 +198,8 @@ std::uint64_t DisplacementBlur::bytes_needed(const PoseLattice& lattice, std::si
 }
 
 std::uint64_t DisplacementBlur::device_bytes() const {
-  return along_x_.weights.bytes() + along_y_.weights.bytes() + turns_.bytes() + plane_max_.bytes() +
-         references_.bytes();
+  return along_x_.weights.bytes() + along_x_.norms.bytes() + along_y_.weights.bytes() +
+         along_y_.norms.bytes() + turns_.bytes() + plane_max_.bytes() + references_.bytes();
 }
 
 void DisplacementBlur::run_pass(const Pass& pass, const DenseBelief& from,
@@ -189,10 +210,10 @@ void DisplacementBlur::run_pass(const Pass& pass, const DenseBelief& from,
                                               slab.object_count, slab.theta_count};
     stream_.dispatch(pass.kernel,
                      {&from.slabs()[i].log_likelihood, &references_, &plane_max_, &pass.weights,
-                      &slab.log_likelihood},
+                      &pass.norms, &slab.log_likelihood},
                      planes_of(slab, lattice_.theta_rad.count),
                      few_groups ? std::array<std::uint32_t, 3>{1, 1, 1} : groups,
-                     work_of(slab, pass.weights.bytes() / sizeof(float)));
+                     work_of(slab, (pass.weights.bytes() + pass.norms.bytes()) / sizeof(float)));
   }
 }
 
@@ -235,15 +256,16 @@ void DisplacementBlur::record_turns(const DenseBelief& scratch,
                                  .first_weight = static_cast<shaders::uint>(planes())};
     const std::int64_t invocations =
         std::int64_t{groups_of(slab.nx, turn_columns_)} * groups_of(slab.row_count, turn_rows_);
-    stream_.dispatch(
-        sum_turns_,
-        {&slab.log_likelihood, &before.log_likelihood, &after.log_likelihood, &references_,
-         &plane_max_, &turns_, &belief.slabs()[i].log_likelihood, &slab.log_likelihood},
-        push,
-        few_groups ? std::array<std::uint32_t, 3>{1, 1, 1}
-                   : std::array<std::uint32_t, 3>{groups_of(invocations, lanes_), slab.object_count,
-                                                  slab.theta_count},
-        work_of(slab, 1 + 2 * static_cast<std::size_t>(theta_steps_)));
+    stream_.dispatch(sum_turns_,
+                     {&slab.log_likelihood, &before.log_likelihood, &after.log_likelihood,
+                      &references_, turns_.read_as(Access::table), turns_.read_as(Access::storage),
+                      plane_max_.read_as(Access::table), plane_max_.read_as(Access::storage),
+                      &belief.slabs()[i].log_likelihood, &slab.log_likelihood},
+                     push,
+                     few_groups ? std::array<std::uint32_t, 3>{1, 1, 1}
+                                : std::array<std::uint32_t, 3>{groups_of(invocations, lanes_),
+                                                               slab.object_count, slab.theta_count},
+                     work_of(slab, 1 + 2 * static_cast<std::size_t>(theta_steps_)));
   }
 }
 

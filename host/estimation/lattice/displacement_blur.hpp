@@ -57,6 +57,7 @@ class DisplacementBlur {
   struct Pass {
     gpu::Kernel kernel;
     gpu::Buffer weights;
+    gpu::Buffer norms;
     std::int64_t invocations = 0;  ///< of a plane
   };
 

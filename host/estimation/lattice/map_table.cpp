@@ -14,29 +14,14 @@ namespace {
 
 int bordered(int cells) { return cells + 2 * shaders::MAP_BORDER; }
 
-/// Cells of the map with its border.
-std::uint64_t cells_of(const OccupancyGrid& map) {
-  return static_cast<std::uint64_t>(bordered(map.nx)) * bordered(map.ny);
-}
-
-/// Most cells that kernels read at once.
-std::uint64_t most_nodes(const gpu::Limits& limits, gpu::Access access) {
-  if (access == gpu::Access::table) {
-    return std::min<std::uint64_t>(limits.table_texels,
-                                   limits.allocation / sizeof(shaders::Corners));
-  }
-  return std::min(limits.storage_range, limits.allocation) / sizeof(float);
-}
-
 /// How kernels read the map. Throws Error where the device has no way.
 gpu::Access access_of(const gpu::Context& context, const OccupancyGrid& map) {
-  std::uint64_t most = 0;
-  for (const gpu::Access access : {gpu::Access::table, gpu::Access::storage}) {
-    most = std::max(most, most_nodes(context.limits(), access));
-    if (cells_of(map) <= most) {
-      return access;
-    }
+  const gpu::Limits& limits = context.limits();
+  if (const auto access = map_access(limits, bordered_cells(map))) {
+    return *access;
   }
+  const std::uint64_t most = std::max(most_map_cells(limits, gpu::Access::table),
+                                      most_map_cells(limits, gpu::Access::storage));
   throw Error(
       Fault::input,
       fmt::format("map '{}': {} x {} cells exceed the {} that kernels of device '{}' read in one "
@@ -46,10 +31,6 @@ gpu::Access access_of(const gpu::Context& context, const OccupancyGrid& map) {
 
 std::size_t axis_bins(const PoseLattice& lattice) {
   return static_cast<std::size_t>(lattice.x_mm.count) + lattice.y_mm.count;
-}
-
-std::uint64_t cell_bytes(gpu::Access access) {
-  return access == gpu::Access::table ? sizeof(shaders::Corners) : sizeof(float);
 }
 
 }  // namespace
@@ -73,8 +54,8 @@ std::vector<MapGroup> group_maps(const gpu::Context& context,
   for (std::size_t object = 0; object < hypotheses.size(); ++object) {
     const OccupancyGrid& map = hypotheses[object].compared();
     const MapKind kind{map.cell_mm, access_of(context, map)};
-    const std::uint64_t cells = cells_of(map);
-    const std::uint64_t most = most_nodes(limits, kind.access);
+    const std::uint64_t cells = bordered_cells(map);
+    const std::uint64_t most = most_map_cells(limits, kind.access);
     const auto group = std::find_if(groups.begin(), groups.end(), [&](const MapGroup& g) {
       return g.kind == kind && g.cells + cells <= most && g.objects.size() < most_objects;
     });
@@ -89,7 +70,7 @@ std::vector<MapGroup> group_maps(const gpu::Context& context,
 }
 
 std::uint64_t MapTable::bytes_needed(const MapGroup& group, const PoseLattice& lattice) {
-  return gpu::allocated(group.cells * cell_bytes(group.kind.access)) +
+  return gpu::allocated(BorderedMaps::bytes_needed(group.kind.access, group.cells)) +
          gpu::allocated(group.objects.size() * axis_bins(lattice) * sizeof(shaders::Split)) +
          gpu::allocated(group.objects.size() * sizeof(shaders::ObjectPlace));
 }
@@ -97,18 +78,14 @@ std::uint64_t MapTable::bytes_needed(const MapGroup& group, const PoseLattice& l
 MapTable::MapTable(gpu::Context& context, gpu::CommandStream& stream, const MapGroup& group,
                    std::span<const Hypothesis> hypotheses, const PoseLattice& lattice,
                    std::span<const std::uint32_t> first_bins, double prior,
-                   const ContactTable& contact) {
-  const gpu::Access access = group.kind.access;
-  log_odds_ = gpu::Buffer(
-      context, group.cells * cell_bytes(access), gpu::Memory::device,
-      fmt::format("map '{}'", hypotheses[group.objects.front()].map.label),
-      access == gpu::Access::table ? VK_FORMAT_R32G32B32A32_SFLOAT : VK_FORMAT_UNDEFINED);
+                   const ContactTable& contact)
+    : maps_(context, group.kind.access, group.cells,
+            fmt::format("map '{}'", hypotheses[group.objects.front()].map.label)) {
   std::vector<shaders::Split> axes;
   std::vector<shaders::ObjectPlace> places;
-  std::uint64_t first_node = 0;
   for (const std::size_t object : group.objects) {
     const OccupancyGrid& map = hypotheses[object].compared();
-    places.push_back({.first_node = static_cast<int>(first_node),
+    places.push_back({.first_node = maps_.add(stream, map, prior),
                       .map_width = bordered(map.nx),
                       .map_height = bordered(map.ny),
                       .first_axis = static_cast<shaders::uint>(axes.size()),
@@ -116,13 +93,6 @@ MapTable::MapTable(gpu::Context& context, gpu::CommandStream& stream, const MapG
                       .first_table_node = contact.first_node(object)});
     const std::vector<shaders::Split> own_axes = axes_in_cells(map, lattice);
     axes.insert(axes.end(), own_axes.begin(), own_axes.end());
-    const VkDeviceSize offset = first_node * cell_bytes(access);
-    if (access == gpu::Access::table) {
-      stream.upload(log_odds_, corners_with_border(map, prior), offset);
-    } else {
-      stream.upload(log_odds_, with_border(map, prior), offset);
-    }
-    first_node += cells_of(map);
   }
   axes_ = stream.uploaded(axes, "the lattice's axes");
   places_ = stream.uploaded(places, "the objects' places");

@@ -4,6 +4,7 @@
 #include <span>
 #include <vector>
 
+#include "bordered_map.hpp"
 #include "command_stream.hpp"
 #include "contact_kernel.hpp"
 #include "likelihood_path.hpp"
@@ -38,16 +39,16 @@ class MapTable {
            std::span<const Hypothesis> hypotheses, const PoseLattice& lattice,
            std::span<const std::uint32_t> first_bins, double prior, const ContactTable& contact);
 
-  const gpu::Buffer& log_odds() const { return log_odds_; }
+  const gpu::Buffer& nodes() const { return maps_.nodes(); }
   /// The lattice's x centres, then its y centres, in cells of each map, [object].
   const gpu::Buffer& axes() const { return axes_; }
   /// shaders::ObjectPlace, [object].
   const gpu::Buffer& places() const { return places_; }
 
-  std::uint64_t device_bytes() const { return log_odds_.bytes() + axes_.bytes() + places_.bytes(); }
+  std::uint64_t device_bytes() const { return nodes().bytes() + axes_.bytes() + places_.bytes(); }
 
  private:
-  gpu::Buffer log_odds_;
+  BorderedMaps maps_;
   gpu::Buffer axes_;
   gpu::Buffer places_;
 };

@@ -44,29 +44,28 @@ struct ParticleFilter::Impl {
         context(device.context()),
         stream(context),
         likelihood(context, stream, hypotheses, options.region, options.contact),
-        parzen(context, stream),
+        parzen(context, stream, size()),
         lanes(independent_lanes(context.limits())),
-        draw_kernel(context, {.name = "draw_particles",
-                              .spirv = shaders::draw_particles,
-                              .bindings = {Access::table, Access::table, Access::table,
-                                           Access::storage, Access::storage},
-                              .push_bytes = sizeof(shaders::DrawPush),
-                              .constants = {lanes}}),
-        sum_kernel(context, {.name = "sum_weights",
-                             .spirv = shaders::sum_weights,
-                             .bindings = {Access::table, Access::storage, Access::storage},
-                             .push_bytes = sizeof(shaders::uint)}),
+        particles(buffer_for<shaders::Particle>("particles", VK_FORMAT_R32G32B32A32_SINT)),
+        drawn(buffer_for<shaders::Particle>("particles", VK_FORMAT_R32G32B32A32_SINT)),
+        log_weights(buffer_for<TwoFloat>("particle weights", VK_FORMAT_R32G32_SFLOAT)),
+        cumulative(buffer_for<float>("particle weights", VK_FORMAT_R32_SFLOAT)),
+        draw_kernel(context,
+                    {.name = "draw_particles",
+                     .spirv = shaders::draw_particles,
+                     .bindings = {Access::table, Access::storage, Access::table, Access::storage,
+                                  Access::table, Access::storage, Access::storage},
+                     .push_bytes = sizeof(shaders::DrawPush),
+                     .constants = {lanes, particles.is_table() ? 1U : 0U,
+                                   cumulative.is_table() ? 1U : 0U}}),
+        sum_kernel(context,
+                   {.name = "sum_weights",
+                    .spirv = shaders::sum_weights,
+                    .bindings = {Access::table, Access::storage, Access::storage, Access::storage},
+                    .push_bytes = sizeof(shaders::uint),
+                    .constants = {log_weights.is_table() ? 1U : 0U}}),
         averages(options.alpha_slow, options.alpha_fast) {
-    const std::size_t n = size();
-    for (gpu::Buffer* buffer : {&particles, &drawn}) {
-      *buffer = gpu::Buffer(context, n * sizeof(shaders::Particle), gpu::Memory::device,
-                            "particles", VK_FORMAT_R32G32B32A32_SINT);
-    }
-    log_weights = gpu::Buffer(context, n * sizeof(TwoFloat), gpu::Memory::device,
-                              "particle weights", VK_FORMAT_R32G32_SFLOAT);
-    cumulative = gpu::Buffer(context, n * sizeof(float), gpu::Memory::device, "particle weights",
-                             VK_FORMAT_R32_SFLOAT);
-    sums.resize(groups_of(n, shaders::WEIGHT_BLOCK));
+    sums.resize(groups_of(size(), shaders::WEIGHT_BLOCK));
     bounds.reserve(sums.size());
     block_sums =
         gpu::Buffer(context, std::span(sums).size_bytes(), gpu::Memory::device, "sums of weights");
@@ -76,6 +75,14 @@ struct ParticleFilter::Impl {
     share_count = static_cast<shaders::uint>(all_shares.size());
     shares = stream.uploaded(all_shares, "prior weights");
     start();
+  }
+
+  /// A value of every particle, as a table where so many fit one.
+  template <typename Value>
+  gpu::Buffer buffer_for(std::string_view purpose, VkFormat texel) {
+    const std::size_t bytes = size() * sizeof(Value);
+    return {context, bytes, gpu::Memory::device, purpose,
+            gpu::table_where_it_fits(context.limits(), bytes, texel)};
   }
 
   std::size_t size() const { return static_cast<std::size_t>(options.particles); }
@@ -120,14 +127,20 @@ struct ParticleFilter::Impl {
         .half_theta_rad = static_cast<float>(half(options.region.theta_rad)),
         .motion_mm = static_cast<float>(options.motion_mm),
         .motion_rad = static_cast<float>(options.motion_rad)};
-    stream.dispatch(draw_kernel, {&particles, &cumulative, &draw_blocks, &shares, &drawn}, push,
-                    {groups_of(size(), lanes), 1, 1});
+    // A table of integers stands in for one.
+    stream.dispatch(draw_kernel,
+                    {particles.is_table() ? &particles : &draw_blocks,
+                     particles.read_as(Access::storage), cumulative.read_as(Access::table),
+                     cumulative.read_as(Access::storage), &draw_blocks, &shares, &drawn},
+                    push, {groups_of(size(), lanes), 1, 1});
     std::swap(particles, drawn);
   }
 
   /// Sums the weights for the next drawing and for what is said of them.
   void sum_weights() {
-    stream.dispatch(sum_kernel, {&log_weights, &cumulative, &block_sums},
+    stream.dispatch(sum_kernel,
+                    {log_weights.read_as(Access::table), log_weights.read_as(Access::storage),
+                     &cumulative, &block_sums},
                     static_cast<shaders::uint>(size()),
                     {static_cast<std::uint32_t>(sums.size()), 1, 1});
     stream.download(block_sums, sums);
@@ -222,12 +235,12 @@ struct ParticleFilter::Impl {
   ParticleLikelihood likelihood;
   ParzenMode parzen;
   std::uint32_t lanes;  ///< of a workgroup of draw_kernel
-  gpu::Kernel draw_kernel;
-  gpu::Kernel sum_kernel;
   gpu::Buffer particles;
   gpu::Buffer drawn;  ///< those of the touch before, and the place for the next
   gpu::Buffer log_weights;
   gpu::Buffer cumulative;
+  gpu::Kernel draw_kernel;
+  gpu::Kernel sum_kernel;
   gpu::Buffer block_sums;
   gpu::Buffer draw_blocks;
   gpu::Buffer shares;

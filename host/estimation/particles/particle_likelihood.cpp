@@ -60,24 +60,29 @@ std::size_t index_of(std::vector<double>& values, double value) {
   return index;
 }
 
-/// Throws Error where the maps together are more than the device reads as a table, before any is
-/// copied.
-void require_room(const gpu::Context& context, std::span<const Hypothesis> hypotheses) {
+/// Throws Error where no buffer holds the maps together, before any is copied.
+BorderedMaps room_for(gpu::Context& context, std::span<const Hypothesis> hypotheses) {
   const gpu::Limits& limits = context.limits();
-  const std::uint64_t most = std::min<std::uint64_t>(
-      limits.table_texels, std::min(limits.allocation, limits.memory) / sizeof(shaders::Corners));
-  constexpr std::uint64_t border = 2 * shaders::MAP_BORDER;
   std::uint64_t cells = 0;
   for (const Hypothesis& hypothesis : hypotheses) {
     const OccupancyGrid& map = hypothesis.compared();
-    cells += (map.nx + border) * (map.ny + border);
-    if (cells > most) {
-      throw Error(Fault::input,
-                  fmt::format("maps up to '{}': {} cells together exceed the {} that device '{}' "
-                              "reads as a table; build them with larger cells",
-                              map.label, cells, most, context.name()));
+    cells += bordered_cells(map);
+    if (!map_access(limits, cells)) {
+      throw Error(
+          Fault::input,
+          fmt::format("maps up to '{}': {} cells together exceed the {} that device '{}' "
+                      "reads in one buffer; build them with larger cells",
+                      map.label, cells, most_map_cells(limits, Access::storage), context.name()));
     }
   }
+  return {context, *map_access(limits, cells), cells, "maps"};
+}
+
+std::vector<std::uint32_t> constants_of(const gpu::Limits& limits, const ContactModel& model,
+                                        const BorderedMaps& maps) {
+  std::vector<std::uint32_t> constants = contact_constants(limits, model);
+  constants.push_back(maps.nodes().is_table() ? 1U : 0U);
+  return constants;
 }
 
 double centre(const Axis& axis) { return axis.lower + (axis.upper - axis.lower) / 2.0; }
@@ -90,22 +95,22 @@ ParticleLikelihood::ParticleLikelihood(gpu::Context& context, gpu::CommandStream
     : context_(context),
       stream_(stream),
       theta_centre_rad_(centre(region.theta_rad)),
-      kernel_(context, {.name = "weigh_particles",
-                        .spirv = shaders::weigh_particles,
-                        .bindings = {Access::table, Access::table, Access::table, Access::table,
-                                     Access::storage, Access::table, Access::storage},
-                        .push_bytes = sizeof(shaders::WeighPush),
-                        .constants = contact_constants(context.limits(), model)}),
+      maps_(room_for(context, hypotheses)),
+      kernel_(context,
+              {.name = "weigh_particles",
+               .spirv = shaders::weigh_particles,
+               .bindings = {Access::table, Access::table, Access::table, Access::table,
+                            Access::storage, Access::storage, Access::storage, Access::storage},
+               .push_bytes = sizeof(shaders::WeighPush),
+               .constants = constants_of(context.limits(), model, maps_)}),
       contact_(context, stream, model) {
-  require_room(context, hypotheses);
-  std::vector<shaders::Corners> cells;
   std::vector<shaders::ParticleMap> objects;
   for (std::size_t i = 0; i < hypotheses.size(); ++i) {
     const OccupancyGrid& map = hypotheses[i].compared();
     const double cells_per_mm = 1.0 / map.cell_mm;
     const auto high = static_cast<float>(cells_per_mm);
     objects.push_back(
-        {.first = static_cast<int>(cells.size()),
+        {.first = maps_.add(stream, map, *model.prior),
          .width = map.nx + 2 * shaders::MAP_BORDER,
          .height = map.ny + 2 * shaders::MAP_BORDER,
          .scale = static_cast<shaders::uint>(index_of(cell_sizes_mm_, map.cell_mm)),
@@ -116,11 +121,7 @@ ParticleLikelihood::ParticleLikelihood(gpu::Context& context, gpu::CommandStream
                                 shaders::MAP_BORDER),
          .centre_y = split_axis((centre(region.y_mm) - map.origin_mm.y) / map.cell_mm +
                                 shaders::MAP_BORDER)});
-    const std::vector<shaders::Corners> bordered = corners_with_border(map, *model.prior);
-    cells.insert(cells.end(), bordered.begin(), bordered.end());
   }
-
-  maps_ = stream.uploaded(cells, "maps", VK_FORMAT_R32G32B32A32_SFLOAT);
   objects_ = stream.uploaded(objects, "maps");
   reserve(64);
 }
@@ -191,15 +192,15 @@ void ParticleLikelihood::weigh(const ContactEvidence& evidence, const gpu::Buffe
                                   .segments = static_cast<shaders::uint>(batch_.size()),
                                   .elements = static_cast<shaders::uint>(elements),
                                   .fresh = fresh ? 1U : 0U};
-    stream_.dispatch(
-        kernel_,
-        {&segments_, &contact_.nodes(), &turns_, &maps_, &objects_, &particles, &log_weights}, push,
-        {groups_of(invocations, independent_lanes(context_.limits())), 1, 1});
+    stream_.dispatch(kernel_,
+                     {&segments_, &contact_.nodes(), &turns_, maps_.nodes().read_as(Access::table),
+                      maps_.nodes().read_as(Access::storage), &objects_, &particles, &log_weights},
+                     push, {groups_of(invocations, independent_lanes(context_.limits())), 1, 1});
   } while (s < segments.size());
 }
 
 std::uint64_t ParticleLikelihood::device_bytes() const {
-  return maps_.bytes() + objects_.bytes() + turns_.bytes() + segments_.bytes() +
+  return maps_.nodes().bytes() + objects_.bytes() + turns_.bytes() + segments_.bytes() +
          contact_.nodes().bytes();
 }
 

@@ -3,6 +3,7 @@
 #include <span>
 #include <vector>
 
+#include "bordered_map.hpp"
 #include "command_stream.hpp"
 #include "contact_evidence.hpp"
 #include "contact_kernel.hpp"
@@ -12,11 +13,11 @@
 namespace palpate {
 
 /// The log-likelihood of a touch (Eq. 7) at particles that each have an object and a pose of their
-/// own. All maps stand in one table, so that one dispatch weighs all particles.
+/// own. All maps stand in one buffer, so that one dispatch weighs all particles.
 class ParticleLikelihood {
  public:
   /// Records the upload of the maps.
-  /// @throws Error where the maps together are more than the device reads as a table
+  /// @throws Error where the maps together are more than one buffer of the device holds
   ParticleLikelihood(gpu::Context& context, gpu::CommandStream& stream,
                      std::span<const Hypothesis> hypotheses, const PoseLattice& region,
                      const ContactModel& model);
@@ -40,9 +41,9 @@ class ParticleLikelihood {
   gpu::CommandStream& stream_;
   double theta_centre_rad_ = 0.0;
   std::vector<double> cell_sizes_mm_;  ///< of the maps, each once
+  BorderedMaps maps_;
   gpu::Kernel kernel_;
   ContactTable contact_;
-  gpu::Buffer maps_;
   gpu::Buffer objects_;
   gpu::Buffer turns_;  ///< headings, then the elements in cells, [cell size, element]
   gpu::Buffer segments_;

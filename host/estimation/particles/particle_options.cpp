@@ -51,7 +51,7 @@ void require_room(const ParticleOptions& options, const gpu::Context& context) {
   constexpr VkDeviceSize bytes = 2 * sizeof(shaders::Particle) + sizeof(TwoFloat) + sizeof(float);
   const gpu::Limits& limits = context.limits();
   const VkDeviceSize most =
-      std::min({VkDeviceSize{limits.table_texels},
+      std::min({VkDeviceSize{limits.table_texels} * shaders::WEIGHT_BLOCK,  // sums of blocks
                 std::min(limits.storage_range, limits.allocation) / sizeof(shaders::Particle),
                 limits.memory / bytes});
   if (static_cast<VkDeviceSize>(options.particles) > most) {

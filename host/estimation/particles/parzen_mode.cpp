@@ -208,14 +208,19 @@ double density_at(const SortedParticles& sorted, const Tile& tile, const ParzenM
 
 }  // namespace
 
-ParzenMode::ParzenMode(gpu::Context& context, gpu::CommandStream& stream)
+ParzenMode::ParzenMode(gpu::Context& context, gpu::CommandStream& stream,
+                       std::size_t most_particles)
     : context_(context),
       stream_(stream),
-      sum_cones_(context, {.name = "sum_cones",
-                           .spirv = shaders::sum_cones,
-                           .bindings = {gpu::Access::table, gpu::Access::storage,
-                                        gpu::Access::storage, gpu::Access::storage},
-                           .push_bytes = sizeof(shaders::ConePush)}) {
+      texel_(gpu::table_where_it_fits(context.limits(), most_particles * sizeof(glm::vec4),
+                                      VK_FORMAT_R32G32B32A32_SFLOAT)),
+      sum_cones_(context,
+                 {.name = "sum_cones",
+                  .spirv = shaders::sum_cones,
+                  .bindings = {gpu::Access::table, gpu::Access::storage, gpu::Access::storage,
+                               gpu::Access::storage, gpu::Access::storage},
+                  .push_bytes = sizeof(shaders::ConePush),
+                  .constants = {texel_ != VK_FORMAT_UNDEFINED ? 1U : 0U}}) {
   // The driver compiles the kernel at its first run, and no estimate has to wait for that.
   const shaders::Particle particle{};
   const double weight = 1.0;
@@ -235,8 +240,7 @@ ParzenMaximum ParzenMode::find(std::span<const shaders::Particle> particles,
   std::stable_sort(tiles.begin(), tiles.end(),
                    [](const Tile& a, const Tile& b) { return a.mass > b.mass; });
 
-  const gpu::Buffer table =
-      stream_.uploaded(sorted.particle, "particles", VK_FORMAT_R32G32B32A32_SFLOAT);
+  const gpu::Buffer sources = stream_.uploaded(sorted.particle, "particles", texel_);
   double best = 0.0;
   std::size_t best_tile = 0;
   int best_point = 0;
@@ -258,8 +262,10 @@ ParzenMaximum ParzenMode::find(std::span<const shaders::Particle> particles,
     const gpu::Buffer range_table = stream_.uploaded(ranges, "ranges of particles");
     const gpu::Buffer unit_table = stream_.uploaded(units, "tiles of the Parzen estimate");
     peak_bytes_ = std::max<std::uint64_t>(
-        peak_bytes_, table.bytes() + range_table.bytes() + unit_table.bytes() + sums.bytes());
-    stream_.dispatch(sum_cones_, {&table, &range_table, &unit_table, &sums},
+        peak_bytes_, sources.bytes() + range_table.bytes() + unit_table.bytes() + sums.bytes());
+    stream_.dispatch(sum_cones_,
+                     {sources.read_as(gpu::Access::table), sources.read_as(gpu::Access::storage),
+                      &range_table, &unit_table, &sums},
                      shaders::ConePush{static_cast<float>(step_mm), static_cast<float>(step_rad)},
                      {static_cast<std::uint32_t>(units.size()), 1, 1});
     stream_.download(sums, densities);

@@ -26,7 +26,8 @@ struct ParzenMaximum {
 class ParzenMode {
  public:
   /// Runs the stream.
-  ParzenMode(gpu::Context& context, gpu::CommandStream& stream);
+  /// @param most_particles that find() is given
+  ParzenMode(gpu::Context& context, gpu::CommandStream& stream, std::size_t most_particles);
 
   /// Some particle must have a weight above 0. Of points whose densities differ by less than about
   /// 1e-5 of their value, any may be the answer; its density is exact.
@@ -38,6 +39,7 @@ class ParzenMode {
  private:
   gpu::Context& context_;
   gpu::CommandStream& stream_;
+  VkFormat texel_;  ///< of the particles as a table, or undefined where they are in storage
   gpu::Kernel sum_cones_;
   std::uint64_t peak_bytes_ = 0;
 };

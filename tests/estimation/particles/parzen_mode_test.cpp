@@ -55,7 +55,8 @@ double largest_density(const Cloud& cloud, int objects, double extent) {
 ParzenMaximum find(const Cloud& cloud) {
   Device device = Device::open();
   gpu::CommandStream stream(device.context());
-  return ParzenMode(device.context(), stream).find(cloud.particles, cloud.weights);
+  ParzenMode mode(device.context(), stream, cloud.particles.size());
+  return mode.find(cloud.particles, cloud.weights);
 }
 
 void expect_on_grid(double value, double step) {
