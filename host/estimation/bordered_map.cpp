@@ -53,6 +53,11 @@ std::uint64_t most_map_cells(const gpu::Limits& limits, gpu::Access access) {
              : std::min(limits.storage_range, most) / cell_bytes(access);
 }
 
+std::uint64_t most_map_cells(const gpu::Limits& limits) {
+  return std::max(most_map_cells(limits, gpu::Access::table),
+                  most_map_cells(limits, gpu::Access::storage));
+}
+
 std::optional<gpu::Access> map_access(const gpu::Limits& limits, std::uint64_t cells) {
   for (const gpu::Access access : {gpu::Access::table, gpu::Access::storage}) {
     if (cells <= most_map_cells(limits, access)) {

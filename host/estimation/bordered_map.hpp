@@ -25,6 +25,8 @@ std::uint64_t bordered_cells(const OccupancyGrid& map);
 
 /// Most cells that one buffer of the device holds.
 std::uint64_t most_map_cells(const gpu::Limits& limits, gpu::Access access);
+/// The same in whichever way the device reads more.
+std::uint64_t most_map_cells(const gpu::Limits& limits);
 
 /// The fastest way in which kernels can read this many cells; nothing where no buffer holds them.
 std::optional<gpu::Access> map_access(const gpu::Limits& limits, std::uint64_t cells);

@@ -20,13 +20,11 @@ gpu::Access access_of(const gpu::Context& context, const OccupancyGrid& map) {
   if (const auto access = map_access(limits, bordered_cells(map))) {
     return *access;
   }
-  const std::uint64_t most = std::max(most_map_cells(limits, gpu::Access::table),
-                                      most_map_cells(limits, gpu::Access::storage));
   throw Error(
       Fault::input,
       fmt::format("map '{}': {} x {} cells exceed the {} that kernels of device '{}' read in one "
                   "buffer; build it with larger cells",
-                  map.label, map.nx, map.ny, most, context.name()));
+                  map.label, map.nx, map.ny, most_map_cells(limits), context.name()));
 }
 
 std::size_t axis_bins(const PoseLattice& lattice) {

@@ -68,11 +68,10 @@ BorderedMaps room_for(gpu::Context& context, std::span<const Hypothesis> hypothe
     const OccupancyGrid& map = hypothesis.compared();
     cells += bordered_cells(map);
     if (!map_access(limits, cells)) {
-      throw Error(
-          Fault::input,
-          fmt::format("maps up to '{}': {} cells together exceed the {} that device '{}' "
-                      "reads in one buffer; build them with larger cells",
-                      map.label, cells, most_map_cells(limits, Access::storage), context.name()));
+      throw Error(Fault::input,
+                  fmt::format("maps up to '{}': {} cells together exceed the {} that device '{}' "
+                              "reads in one buffer; build them with larger cells",
+                              map.label, cells, most_map_cells(limits), context.name()));
     }
   }
   return {context, *map_access(limits, cells), cells, "maps"};
