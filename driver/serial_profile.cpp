@@ -4,6 +4,7 @@
 #include <fstream>
 #include <iterator>
 #include <optional>
+#include <sstream>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -207,7 +208,7 @@ SerialProfile read_serial_profile(const std::string& name_or_path) {
 
 SerialProfile parse_serial_profile(const std::string& yaml, const std::filesystem::path& path) {
   try {
-    return read_root({path, "the profile", YAML::Load(yaml)});
+    return read_root({path, "the profile", only_document(std::istringstream(yaml), path)});
   } catch (const YAML::Exception& error) {
     refuse(path, fmt::format("line {}: {}; correct the YAML", line_of(error.mark), error.msg));
   }

@@ -1,6 +1,7 @@
 #include "palpate/scene.hpp"
 
 #include <array>
+#include <fstream>
 #include <utility>
 
 #include <fmt/format.h>
@@ -134,7 +135,7 @@ Scene read_scene(const std::filesystem::path& path) {
   require_readable(path);
   Scene scene;
   try {
-    const Entry root{path, "the scene", YAML::LoadFile(path.string())};
+    const Entry root{path, "the scene", only_document(std::ifstream(path), path)};
     if (root.node.IsNull()) {
       return scene;  // comments alone: everything is left out
     }

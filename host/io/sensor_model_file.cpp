@@ -1,4 +1,5 @@
 #include <cmath>
+#include <fstream>
 #include <utility>
 
 #include <fmt/format.h>
@@ -221,7 +222,7 @@ LearnedSensor read_sensor_model(const std::filesystem::path& path) {
   LearnedSensor sensor;
   bool has_format = false;
   try {
-    const Entry root{path, "the sensor model", YAML::LoadFile(path.string())};
+    const Entry root{path, "the sensor model", only_document(std::ifstream(path), path)};
     const auto number = [](double& value) {
       return [&value](const Entry& e) { value = e.number(); };
     };

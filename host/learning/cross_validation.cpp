@@ -5,8 +5,8 @@
 #include <limits>
 #include <map>
 #include <optional>
-#include <set>
 #include <span>
+#include <string>
 #include <utility>
 
 #include <fmt/format.h>
@@ -47,65 +47,56 @@ struct LabelScore {
   }
 };
 
-/// The features of a press: of its first touch.
-PressFeatures features_of(const Press& press, const ContactClassifier& classifier) {
-  return press_features(press.touches.front(), classifier);
-}
-
-/// The presses, their maps and what was learned, as all folds share them.
-class Validation {
+/// A fold's presses before what the others say.
+class FoldTrial {
  public:
-  Validation(const std::vector<Press>& presses, const std::vector<TrainingMap>& maps,
-             const TableLearning& how, const PlacedPresses* placed,
-             const CrossValidationOptions& options)
+  FoldTrial(const std::vector<Press>& presses, const std::vector<std::size_t>& fold_of,
+            std::size_t fold, const std::vector<std::string>& labels, const FoldModel& model,
+            const CrossValidationOptions& options)
       : presses_(presses),
-        maps_(maps),
-        how_(how),
-        placed_(placed),
+        fold_of_(fold_of),
+        fold_(fold),
+        labels_(labels),
+        model_(model),
         options_(options),
-        classifier_(how.contact) {
-    fold_ = folds_of(presses, options.folds);
-    std::set<std::string> labels;
-    for (const TrainingMap& map : maps) {
-      labels.insert(map.map.label);
+        maps_of_(labels.size()),
+        classifier_(model.how.contact) {
+    for (std::size_t map = 0; map < model.maps.size(); ++map) {
+      const std::optional<std::size_t> label = label_of(model.maps[map].map.label);
+      if (label && maps_of_[*label].size() < options.maps_per_object) {
+        maps_of_[*label].push_back(map);
+      }
     }
-    labels_.assign(labels.begin(), labels.end());
-    if (placed != nullptr) {
-      layers_ = layers_of(maps, how.layer);
-      classifier_ = contact_with(how.contact, placed->table, "");
+    if (model.table) {
+      layers_ = layers_of(model.maps, model.how.layer);
+      classifier_ = contact_with(model.how.contact, *model.table, "");
     }
   }
 
-  const std::vector<std::string>& labels() const { return labels_; }
-
-  /// Adds what the presses of a fold get from the maps and presses of the others.
-  /// @param counter counts labels
-  void try_fold(std::size_t fold, HostProgress& counter, CrossValidation& result) const {
-    const std::vector<std::vector<std::size_t>> of_label = maps_outside(fold);
+  void run(const std::function<void(double)>& progress, CrossValidation& result) const {
     std::vector<std::size_t> tried;
     std::vector<LabelledFeatures> building;
     for (std::size_t i = 0; i < presses_.size(); ++i) {
-      if (fold_[i] != fold) {
+      if (fold_of_[i] != fold_) {
         if (!presses_[i].T_object_robot) {
-          building.push_back(
-              {presses_[i].label, features_of(presses_[i], how_.contact.classifier)});
+          building.push_back({presses_[i].label, features_of(presses_[i])});
         }
-      } else if (const auto label = label_of(presses_[i]); label && !of_label[*label].empty()) {
+      } else if (const auto label = label_of(presses_[i].label);
+                 label && !maps_of_[*label].empty()) {
         tried.push_back(i);
       }
     }
     if (tried.empty()) {
       return;
     }
-    const std::optional<LearnedTable> table = table_without(fold);
-    const Unknowns asked = unknowns(tried, fold);
-    const auto scores = score(asked.presses, of_label, table, counter);
+    const Unknowns asked = unknowns(tried);
+    const auto scores = score(asked.presses, progress);
     const LearnedFeatures features =
         building.empty() ? LearnedFeatures{} : learn_features(building);
     for (std::size_t i = 0; i < asked.presses.size(); ++i) {
       ScoredPress scored = scored_press(asked.presses[i], scores[i], features);
       if (i < tried.size()) {
-        add_known(asked.presses[i], scores[i], scored, table, result);
+        add_fit(asked.presses[i], scores[i], scored, result);
         result.presses.push_back(std::move(scored));
       } else {
         result.groups[asked.half_of_group[i - tried.size()]].push_back(std::move(scored));
@@ -119,7 +110,7 @@ class Validation {
     std::vector<Press> presses;  ///< of the fold, and then groups of them
     std::vector<std::size_t> half_of_group = {};
   };
-  Unknowns unknowns(const std::vector<std::size_t>& tried, std::size_t fold) const {
+  Unknowns unknowns(const std::vector<std::size_t>& tried) const {
     Unknowns asked;
     std::map<std::string, std::vector<const Press*>> of_label;
     for (const std::size_t press : tried) {
@@ -129,8 +120,8 @@ class Validation {
     if (!options_.bins) {
       return asked;
     }
-    Random random(fold, Stream::unknowns);
-    std::size_t half = fold % 2;
+    Random random(fold_, Stream::unknowns);
+    std::size_t half = fold_ % 2;
     for (auto& [label, own] : of_label) {
       // Too few for two halves are all of one.
       shuffle(own, random);
@@ -165,63 +156,40 @@ class Validation {
     }
   }
 
-  /// The press's label by index; none where no map bears it.
-  std::optional<std::size_t> label_of(const Press& press) const {
-    const auto at = std::ranges::lower_bound(labels_, press.label);
-    if (at == labels_.end() || *at != press.label) {
+  /// The label's index; none where it is not to be recognised.
+  std::optional<std::size_t> label_of(const std::string& label) const {
+    const auto at = std::ranges::lower_bound(labels_, label);
+    if (at == labels_.end() || *at != label) {
       return {};
     }
     return static_cast<std::size_t>(at - labels_.begin());
   }
 
-  /// The maps that hold no press of a fold, [label].
-  std::vector<std::vector<std::size_t>> maps_outside(std::size_t fold) const {
-    std::vector<std::vector<std::size_t>> of_label(labels_.size());
-    for (std::size_t map = 0; map < maps_.size(); ++map) {
-      const auto label = static_cast<std::size_t>(
-          std::ranges::lower_bound(labels_, maps_[map].map.label) - labels_.begin());
-      const bool outside = std::ranges::none_of(
-          maps_[map].presses, [&](std::size_t press) { return fold_[press] == fold; });
-      if (outside && of_label[label].size() < options_.maps_per_object) {
-        of_label[label].push_back(map);
-      }
-    }
-    return of_label;
+  /// The features of a press: of its first touch.
+  PressFeatures features_of(const Press& press) const {
+    return press_features(press.touches.front(), model_.how.contact.classifier);
   }
 
-  /// What the presses of the other folds say about readings; none by Eq. 7.
-  std::optional<LearnedTable> table_without(std::size_t fold) const {
-    if (placed_ == nullptr) {
-      return {};
-    }
-    std::vector<bool> outside;
-    for (const std::size_t own : fold_) {
-      outside.push_back(own != fold);
-    }
-    return table_of(count_placed(placed_->placements, presses_, maps_, layers_, how_, outside),
-                    how_);
-  }
-
-  ContactModel contact_for(std::size_t label, const std::optional<LearnedTable>& table) const {
-    return table ? contact_with(how_.contact, *table, labels_[label]) : how_.contact;
+  ContactModel contact_for(std::size_t label) const {
+    return model_.table ? contact_with(model_.how.contact, *model_.table, labels_[label])
+                        : model_.how.contact;
   }
 
   /// The scores of presses, [press][label].
   std::vector<std::vector<LabelScore>> score(const std::vector<Press>& asked,
-                                             const std::vector<std::vector<std::size_t>>& of_label,
-                                             const std::optional<LearnedTable>& table,
-                                             HostProgress& counter) const {
+                                             const std::function<void(double)>& progress) const {
     std::vector<std::vector<LabelScore>> scores(asked.size(),
                                                 std::vector<LabelScore>(labels_.size()));
+    HostProgress counter(labels_.size(), progress);
     tbb::parallel_for(std::size_t{0}, labels_.size(), [&](std::size_t label) {
-      const ContactModel contact = contact_for(label, table);
-      for (const std::size_t map : of_label[label]) {
-        Hypothesis hypothesis{.map = maps_[map].map};
-        if (table) {
+      const ContactModel contact = contact_for(label);
+      for (const std::size_t map : maps_of_[label]) {
+        Hypothesis hypothesis{.map = model_.maps[map].map};
+        if (model_.table) {
           hypothesis.layer = layers_[map];
         }
         PressPlacer placer(hypothesis, contact,
-                           options_.bins ? options_.bins->lattice : how_.lattice);
+                           options_.bins ? options_.bins->lattice : model_.how.lattice);
         for (std::size_t i = 0; i < asked.size(); ++i) {
           scores[i][label].add(map, placer.place(asked[i]));
         }
@@ -233,7 +201,8 @@ class Validation {
 
   ScoredPress scored_press(const Press& press, const std::vector<LabelScore>& scores,
                            const LearnedFeatures& features) const {
-    ScoredPress scored{.truth = *label_of(press),
+    ScoredPress scored{.truth = *label_of(press.label),
+                       .fold = fold_,
                        .touches = press.touches.size(),
                        .log_evidence = {},
                        .log_density = {}};
@@ -242,7 +211,7 @@ class Validation {
     }
     // A touch at a known pose shows a part of an object: its features tell where that is.
     if (!press.T_object_robot) {
-      const PressFeatures own = features_of(press, how_.contact.classifier);
+      const PressFeatures own = features_of(press);
       for (const std::string& label : labels_) {
         const auto known = features.objects.find(label);
         scored.log_density.push_back(
@@ -252,65 +221,68 @@ class Validation {
     return scored;
   }
 
-  /// Adds how a press fits the best object, and the best that is not its own.
-  void add_known(const Press& press, const std::vector<LabelScore>& scores,
-                 const ScoredPress& scored, const std::optional<LearnedTable>& table,
-                 CrossValidation& result) const {
-    std::vector<double> of_others;
-    std::size_t best_label = 0;
-    double best = nothing;
-    double best_other = nothing;
-    for (std::size_t label = 0; label < labels_.size(); ++label) {
-      if (scores[label].best_log_likelihood > best) {
-        best = scores[label].best_log_likelihood;
-        best_label = label;
-      }
-      if (label != scored.truth) {
-        of_others.push_back(scored.log_evidence[label]);
-        best_other = std::max(best_other, scores[label].best_log_likelihood);
-      }
-    }
+  /// Adds how a press fits the best object, and what tells whether its own was learned.
+  void add_fit(const Press& press, const std::vector<LabelScore>& scores, const ScoredPress& scored,
+               CrossValidation& result) const {
     // A press of which nothing is In Contact says nothing of its object.
     const std::vector<Reading> readings = classifier_.classify(press.touches.front());
     if (std::ranges::none_of(readings, is_contact)) {
       return;
     }
-    // With two labels, leaving one out leaves no lead to compare with.
-    const std::span<const double> known(scored.log_evidence);
-    const bool leads = labels_.size() > 2;
-    result.known.push_back(FamiliarityScore::of(readings, best, leads ? known : known.first(1)));
-    if (best_other != nothing) {
-      result.unknown.push_back(FamiliarityScore::of(readings, best_other, of_others));
+    std::vector<std::size_t> others;
+    std::size_t best_label = scored.truth;
+    for (std::size_t label = 0; label < labels_.size(); ++label) {
+      if (label != scored.truth && scores[label].maps > 0) {
+        others.push_back(label);
+      }
+      if (scores[label].best_log_likelihood > scores[best_label].best_log_likelihood) {
+        best_label = label;
+      }
+    }
+    if (!others.empty()) {
+      FamiliarityScores& familiarity = result.familiarity[fold_];
+      const auto score_without = [&](std::size_t left_out) {
+        double best = nothing;
+        std::vector<double> log_evidence;
+        for (std::size_t label = 0; label < labels_.size(); ++label) {
+          if (label != left_out) {
+            best = std::max(best, scores[label].best_log_likelihood);
+            log_evidence.push_back(scored.log_evidence[label]);
+          }
+        }
+        return FamiliarityScore::of(readings, best, log_evidence);
+      };
+      const std::size_t turn = familiarity.known.size() % others.size();
+      familiarity.known.push_back(score_without(others[turn]));
+      familiarity.unknown.push_back(score_without(scored.truth));
     }
     const LabelScore& at = scores[best_label];
-    const OccupancyGrid& map = table ? layers_[at.best_map] : maps_[at.best_map].map;
+    const OccupancyGrid& map = model_.table ? layers_[at.best_map] : model_.maps[at.best_map].map;
     // Recognition judges the fit at a refined pose, which lies near the true one, whatever the
     // bins.
     const Pose& near =
         press.T_object_robot && best_label == scored.truth ? *press.T_object_robot : at.best_pose;
-    if (const auto fit =
-            best_fit_near(press.touches, near, map, contact_for(best_label, table), 0)) {
+    if (const auto fit = best_fit_near(press.touches, near, map, contact_for(best_label), 0)) {
       result.fit_z.push_back(fit->z);
     }
   }
 
   const std::vector<Press>& presses_;
-  const std::vector<TrainingMap>& maps_;
-  const TableLearning& how_;
-  const PlacedPresses* placed_;
+  const std::vector<std::size_t>& fold_of_;
+  std::size_t fold_;
+  const std::vector<std::string>& labels_;
+  const FoldModel& model_;
   const CrossValidationOptions& options_;
-  std::vector<std::size_t> fold_;
-  std::vector<std::string> labels_;
+  std::vector<std::vector<std::size_t>> maps_of_;  ///< [label]
   std::vector<OccupancyGrid> layers_;
   ContactModel classifier_;
 };
 
 }  // namespace
 
-CrossValidation cross_validate(const std::vector<Press>& presses,
-                               const std::vector<TrainingMap>& maps, const TableLearning& how,
-                               const PlacedPresses* placed, const CrossValidationOptions& options,
-                               const std::function<void(double)>& progress) {
+CrossValidator::CrossValidator(const std::vector<Press>& presses, std::vector<std::string> labels,
+                               const CrossValidationOptions& options)
+    : presses_(presses), labels_(std::move(labels)), options_(options) {
   if (options.folds < 2 || options.maps_per_object < 1) {
     throw Error(Fault::input,
                 fmt::format("cross-validation: {} folds and {} maps per object; give at least two "
@@ -325,19 +297,23 @@ CrossValidation cross_validate(const std::vector<Press>& presses,
         "cross-validation: bins are for presses at known poses; leave them out, or give the "
         "poses");
   }
-  const Validation validation(presses, maps, how, placed, options);
-  CrossValidation result;
-  result.labels = validation.labels();
-  HostProgress counter(options.folds * result.labels.size(), progress);
-  for (std::size_t fold = 0; fold < options.folds; ++fold) {
-    validation.try_fold(fold, counter, result);
+  fold_ = folds_of(presses, options.folds);
+}
+
+std::vector<Press> CrossValidator::presses_without(std::size_t fold) const {
+  std::vector<Press> others;
+  for (std::size_t i = 0; i < presses_.size(); ++i) {
+    if (fold_[i] != fold) {
+      others.push_back(presses_[i]);
+    }
   }
-  if (result.presses.empty()) {
-    throw Error(Fault::input,
-                "cross-validation: no touch has a map of its object that was built without it; "
-                "give more touches");
-  }
-  return result;
+  return others;
+}
+
+void CrossValidator::try_fold(std::size_t fold, const FoldModel& model, CrossValidation& result,
+                              const std::function<void(double)>& progress) const {
+  result.familiarity.resize(options_.folds);
+  FoldTrial(presses_, fold_, fold, labels_, model, options_).run(progress, result);
 }
 
 }  // namespace palpate

@@ -21,17 +21,23 @@ struct CrossValidationOptions {
   std::optional<RecognitionBins> bins = {};
 };
 
+/// What the presses of all folds but one say; see FoldLearning.
+struct FoldModel {
+  std::vector<TrainingMap> maps;
+  TableLearning how;
+  std::optional<LearnedTable> table = {};  ///< none: Eq. 7 on the maps' log odds
+};
+
 /// What models that had not seen the presses said of them.
 struct CrossValidation {
-  std::vector<std::string> labels;   ///< of all maps, ascending
   std::vector<ScoredPress> presses;  ///< those that have a map of their object in the other folds
   /// Several presses at known poses of one object and fold together, with
   /// CrossValidationOptions::bins. A press is in groups of one half only. None where a fold has
   /// fewer presses of each object.
   GroupHalves groups;
-  /// See FamiliarityScores: with the maps of all objects, and without those of the press's own.
-  std::vector<FamiliarityScore> known;
-  std::vector<FamiliarityScore> unknown;
+  /// [fold], of presses with an element In Contact: known with the maps of their own object and all
+  /// others but one, each left out in turn; unknown with those of all others.
+  std::vector<FamiliarityScores> familiarity;
   /// Fit::z of presses with an element In Contact, on the best map at about the best pose.
   std::vector<double> fit_z;
 };
@@ -40,18 +46,31 @@ struct CrossValidation {
 inline constexpr std::size_t presses_in_group = 3;
 inline constexpr std::size_t groups_of_press = 3;
 
-/// Recognises every press, at an unknown pose, with maps and numbers of the presses of other folds
-/// alone, see folds_of(). The log evidence of a label is the log of the mean over its maps; an
-/// object without a map in the other folds has none, -infinity.
-/// @param placed what learn_table() found for all presses: counts leave a fold's presses and maps
-/// out. None: Eq. 7 on the maps' log odds
-/// @param progress called with the fraction done, by one thread at a time
-/// @throws Error where no press has a map of its object in the other folds, on fewer than two folds
-/// or no map per object, on bins for presses at unknown poses, and as PressPlacer does; what
-/// `progress` throws
-CrossValidation cross_validate(const std::vector<Press>& presses,
-                               const std::vector<TrainingMap>& maps, const TableLearning& how,
-                               const PlacedPresses* placed, const CrossValidationOptions& options,
-                               const std::function<void(double)>& progress = {});
+/// Recognises every press, at an unknown pose, with what the presses of other folds say, fold by
+/// fold, see folds_of(). The log evidence of a label is the log of the mean over its maps; an
+/// object without a map in the other folds has none, -infinity. Views into the presses.
+class CrossValidator {
+ public:
+  /// @param labels to recognise, ascending
+  /// @throws Error on fewer than two folds or no map per object, and on bins for presses at unknown
+  /// poses
+  CrossValidator(const std::vector<Press>& presses, std::vector<std::string> labels,
+                 const CrossValidationOptions& options);
+
+  /// The presses of all folds but one.
+  std::vector<Press> presses_without(std::size_t fold) const;
+
+  /// Adds what a fold's presses get from the model. Takes all host threads.
+  /// @param progress called with the fraction done, by one thread at a time
+  /// @throws Error as PressPlacer does; what `progress` throws
+  void try_fold(std::size_t fold, const FoldModel& model, CrossValidation& result,
+                const std::function<void(double)>& progress = {}) const;
+
+ private:
+  const std::vector<Press>& presses_;
+  std::vector<std::string> labels_;
+  CrossValidationOptions options_;
+  std::vector<std::size_t> fold_;
+};
 
 }  // namespace palpate

@@ -88,6 +88,15 @@ glm::dvec3 least_loss(const std::vector<Target>& targets, const std::array<bool,
 
 }  // namespace
 
+FamiliarityScores all_of(std::span<const FamiliarityScores> folds) {
+  FamiliarityScores all;
+  for (const FamiliarityScores& fold : folds) {
+    all.known.insert(all.known.end(), fold.known.begin(), fold.known.end());
+    all.unknown.insert(all.unknown.end(), fold.unknown.begin(), fold.unknown.end());
+  }
+  return all;
+}
+
 Familiarity fit_familiarity(const FamiliarityScores& scores) {
   require_sound(scores);
   const auto known = static_cast<double>(scores.known.size());
@@ -145,6 +154,18 @@ double area_under_curve(const FamiliarityScores& scores, const Familiarity& fami
     pairs += static_cast<double>(first - unknown.begin()) + 0.5 * static_cast<double>(last - first);
   }
   return pairs / (static_cast<double>(scores.known.size()) * static_cast<double>(unknown.size()));
+}
+
+std::optional<double> area_under_curve(std::span<const FamiliarityScores> folds, std::size_t fold) {
+  std::vector<FamiliarityScores> rest(folds.begin(), folds.end());
+  rest.erase(rest.begin() + static_cast<std::ptrdiff_t>(fold));
+  const FamiliarityScores others = all_of(rest);
+  for (const FamiliarityScores& scores : {folds[fold], others}) {
+    if (scores.known.empty() || scores.unknown.empty()) {
+      return {};
+    }
+  }
+  return area_under_curve(folds[fold], fit_familiarity(others));
 }
 
 }  // namespace palpate

@@ -1,15 +1,20 @@
 #pragma once
 
+#include <optional>
 #include <span>
+#include <vector>
 
 #include "palpate/learned_sensor.hpp"
 
 namespace palpate {
 
+/// Both kinds of scores are of as many objects, since the best of more fits better by chance.
 struct FamiliarityScores {
-  std::span<const FamiliarityScore> known;    ///< of presses whose object has maps
-  std::span<const FamiliarityScore> unknown;  ///< of presses whose object's maps were left out
+  std::vector<FamiliarityScore> known;    ///< of presses whose object has maps; another has none
+  std::vector<FamiliarityScore> unknown;  ///< of presses whose object's maps were left out
 };
+/// The scores of all folds together.
+FamiliarityScores all_of(std::span<const FamiliarityScores> folds);
 
 /// Logistic regression of known against unknown scores. As in Platt (1999) a known press counts as
 /// known with probability (n + 1) / (n + 2), n of them, and likewise an unknown one, so that scores
@@ -22,5 +27,11 @@ Familiarity fit_familiarity(const FamiliarityScores& scores);
 /// is more probably known; ties count half.
 /// @throws Error as fit_familiarity()
 double area_under_curve(const FamiliarityScores& scores, const Familiarity& familiarity);
+
+/// Area under the curve of a fold's presses by the regression of the other folds': one half on
+/// average where scores say nothing.
+/// @returns none where the fold or the others lack a kind of scores
+/// @throws Error on a score that is not finite
+std::optional<double> area_under_curve(std::span<const FamiliarityScores> folds, std::size_t fold);
 
 }  // namespace palpate

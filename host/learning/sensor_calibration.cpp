@@ -4,6 +4,7 @@
 #include <cmath>
 #include <iterator>
 #include <map>
+#include <numeric>
 #include <optional>
 #include <set>
 #include <utility>
@@ -15,8 +16,8 @@
 #include "element_spacing.hpp"
 #include "feature_learning.hpp"
 #include "palpate/error.hpp"
-#include "point_spread.hpp"
 #include "press_checks.hpp"
+#include "reading_learning.hpp"
 #include "tried_bins.hpp"
 
 namespace palpate {
@@ -33,7 +34,7 @@ constexpr double minutes_at_bins = 1.0;
 class SensorLearning {
  public:
   SensorLearning(const std::vector<Press>& presses, const SensorCalibrationOptions& options)
-      : presses_(presses), options_(options) {
+      : all_{.presses = presses}, options_(options) {
     for (const TableKind& kind : options.tables) {
       if (kind.levels < 2 || kind.levels > most_reading_levels) {
         throw Error(Fault::input,
@@ -56,23 +57,32 @@ class SensorLearning {
       throw Error(Fault::input, "the arrays have one element each; a calibration needs several");
     }
     result_.sensor.pressure_unit = options.pressure_unit;
+    learning_.readings = {.pressure_unit = options.pressure_unit,
+                          .threshold = options.threshold,
+                          .ratio = options.ratio,
+                          .spacing_mm = spacing_mm_};
+    learning_.folds = options.folds;
   }
 
   SensorCalibration run(const std::vector<OccupancyGrid>& given,
                         const std::function<void(double)>& progress) {
+    for (const OccupancyGrid& map : given) {
+      learning_.given.push_back({map});
+    }
     learn_readings();
-    make_maps(given);
     if (known_poses_) {
       settle_bins();
     }
+    all_.maps = maps_to_learn_on(all_, learning_);
+    warn_of_objects_without_maps();
     std::set<std::string> labels;
-    for (const TrainingMap& map : maps_) {
+    for (const TrainingMap& map : all_.maps) {
       labels.insert(map.map.label);
     }
     result_.objects = labels.size();
     if (labels.size() < 2) {
-      const TableLearning how = table_learning(tables_.back());
-      const PlacedPresses placed = learn_table(presses_, maps_, how, progress);
+      const TableLearning how = table_learning(tables_.back(), all_, learning_);
+      const PlacedPresses placed = learn_table(all_.presses, all_.maps, how, progress);
       result_.sensor.table = placed.table;
       learn_gamma(placed, how);
       result_.warnings.emplace_back(
@@ -83,10 +93,12 @@ class SensorLearning {
     if (known_poses_) {
       settle_tried_bins();
     }
-    const double tables = static_cast<double>(tables_.size());
-    const double all = 1.0 + tables * (table_cost + 1.0);
+    const auto tables = static_cast<double>(tables_.size());
+    const auto folds = static_cast<double>(options_.folds);
+    // In cross-validations: the tables of all presses, those of the folds, and the trials.
+    const double all = tables * table_cost + folds * tables * table_cost + tables + 1.0;
     double done = 0.0;
-    const auto part = [&](double cost) {
+    const Part part = [&](double cost) {
       const double begin = std::exchange(done, done + cost);
       return [&progress, begin, cost, all](double fraction) {
         if (progress) {
@@ -94,116 +106,109 @@ class SensorLearning {
         }
       };
     };
-    std::optional<LearnedFromTable> best;
+    std::vector<TriedModel> tried;
     for (const TableKind& kind : tables_) {
-      const TableLearning how = table_learning(kind);
-      LearnedFromTable one{.how = how,
-                           .placed = learn_table(presses_, maps_, how, part(table_cost)),
-                           .validation = {},
-                           .after = {},
-                           .losses = {}};
-      one.validation = cross_validate(presses_, maps_, how, &one.placed, validation(), part(1.0));
-      one.after = tempered_by_halves(one.validation.presses, one.validation.groups);
-      for (const ScoredPress& press : one.after.presses) {
-        one.losses.push_back(-press.log_evidence[press.truth]);
-      }
-      result_.tried.push_back({kind, scores_of(one.after.presses, 1.0).log_loss});
-      if (!best || is_clearly_less(one.losses, best->losses)) {
-        best = std::move(one);
-      }
+      TriedModel& one = tried.emplace_back();
+      one.how = table_learning(kind, all_, learning_);
+      one.placed = learn_table(all_.presses, all_.maps, one.how, part(table_cost));
     }
-    result_.sensor.table = best->placed.table;
-    learn_gamma(best->placed, best->how);
-    const CrossValidation eq7 =
-        cross_validate(presses_, maps_, best->how, nullptr, validation(), part(1.0));
-    learn_confidence(eq7, *best);
+    const CrossValidation eq7 = cross_validate({labels.begin(), labels.end()}, tried, part);
+    for (std::size_t i = 0; i < tried.size(); ++i) {
+      TriedModel& one = tried[i];
+      one.after = tempered_by_folds(one.validation.presses, one.validation.groups);
+      result_.tried.push_back({tables_[i], scores_of(one.after.presses, 1.0).log_loss});
+    }
+    const TriedModel& best = kept(tried);
+    result_.sensor.table = best.placed.table;
+    learn_gamma(best.placed, best.how);
+    judge(eq7, tried);
+    learn_confidence(best.validation);
     return std::move(result_);
   }
 
  private:
-  /// What a table says of presses that it has not seen.
-  struct LearnedFromTable {
+  /// A table, and what it says of presses that it has not seen.
+  struct TriedModel {
     TableLearning how;
     PlacedPresses placed;
     CrossValidation validation;
-    TemperedPresses after;       ///< with temperature and features
-    std::vector<double> losses;  ///< the same, of each press, in nats
+    TemperedPresses after;  ///< with temperature and features
   };
-
-  CrossValidationOptions validation() const {
-    return {.folds = options_.folds, .maps_per_object = options_.most_maps, .bins = bins_};
-  }
+  /// Shows the progress of the next part, of a given cost.
+  using Part = std::function<std::function<void(double)>(double cost)>;
 
   void learn_readings() {
+    all_.readings = palpate::learn_readings(all_.presses, learning_.readings);
+    const LearnedReadings& readings = all_.readings;
     LearnedSensor& sensor = result_.sensor;
-    if (options_.threshold && options_.ratio) {
-      sensor.classifier = {.threshold = *options_.threshold, .ratio = *options_.ratio};
-    } else {
-      sensor.classifier = learn_classifier(presses_, options_.threshold);
-      sensor.classifier.ratio = options_.ratio.value_or(sensor.classifier.ratio);
-    }
-    sensor.noise = noise_floor(presses_, sensor.classifier);
-    // Noise alone is to make no contact.
-    constexpr double noise_sd = 3.0;
-    if (!options_.threshold) {
-      sensor.classifier.threshold = std::max(sensor.classifier.threshold, noise_sd * sensor.noise);
-    }
-    sensor.classifier.validate();
-    if (contact_pressures(presses_, sensor.classifier).empty()) {
-      throw Error(Fault::input,
-                  fmt::format("no pressure is above the contact threshold, {:g} {}; give a lower "
-                              "--threshold",
-                              sensor.classifier.threshold, options_.pressure_unit));
-    }
-    result_.warnings = leave_out_unknown(presses_, sensor.classifier);
-    std::ranges::copy(stuck_elements(presses_, sensor.classifier),
+    sensor.classifier = readings.classifier;
+    sensor.noise = readings.noise;
+    sensor.prior = readings.prior;
+    sensor.psf_mm = readings.psf_mm;
+    sensor.spread_mm = readings.spread_mm;
+    result_.maps = readings.maps(spacing_mm_);
+    result_.warnings = leave_out_unknown(all_.presses, sensor.classifier);
+    std::ranges::copy(stuck_elements(all_.presses, sensor.classifier),
                       std::back_inserter(result_.warnings));
-    std::vector<Touch> touches;
-    for (const Press& press : presses_) {
-      touches.insert(touches.end(), press.touches.begin(), press.touches.end());
-    }
-    sensor.prior = share_in_contact(touches, sensor.classifier);
-    // As for maps of presses at unknown poses: leaves no gaps between the elements of a press.
-    constexpr double of_spacing = 0.6;
-    sensor.spread_mm = of_spacing * spacing_mm_;
-    if (known_poses_) {
-      sensor.psf_mm = learn_point_spread(presses_, sensor.classifier);
-      if (sensor.psf_mm) {
-        sensor.spread_mm = *sensor.psf_mm / 2.0;
-      } else {
-        result_.warnings.emplace_back(
-            "the touches do not tell the point spread: too few of an object, or no edges; the "
-            "maps' spread is 0.6 element spacings");
-      }
+    if (known_poses_ && !sensor.psf_mm) {
+      result_.warnings.emplace_back(
+          "the touches do not tell the point spread: too few of an object, or no edges; the "
+          "maps' spread is 0.6 element spacings");
     }
   }
 
-  void make_maps(const std::vector<OccupancyGrid>& given) {
-    result_.maps = {
-        .cell_mm = 0.5 * spacing_mm_,
-        .sensor = {.spread_mm = result_.sensor.spread_mm, .prior = result_.sensor.prior},
-        .classifier = result_.sensor.classifier};
-    if (!given.empty()) {
-      for (const OccupancyGrid& map : given) {
-        maps_.push_back({map});
+  /// Tries every fold's presses on what the others say, by each of the tables; returns what Eq. 7
+  /// says.
+  CrossValidation cross_validate(const std::vector<std::string>& labels,
+                                 std::vector<TriedModel>& tried, const Part& part) const {
+    const CrossValidator validator(
+        all_.presses, labels,
+        {.folds = options_.folds, .maps_per_object = options_.most_maps, .bins = bins_});
+    const double share = 1.0 / static_cast<double>(options_.folds);
+    CrossValidation eq7;
+    for (std::size_t fold = 0; fold < options_.folds; ++fold) {
+      std::optional<FoldLearning> learning;
+      try {
+        learning.emplace(validator.presses_without(fold), learning_);
+      } catch (const Error&) {
+        continue;  // these few presses tell no threshold: nothing can be tried on them
       }
-    } else if (known_poses_) {
-      maps_ = maps_without_folds(presses_, result_.maps, options_.folds);
-    } else {
-      maps_ = maps_of_presses(presses_, result_.maps);
+      for (std::size_t i = 0; i < tried.size(); ++i) {
+        const FoldModel& model = learning->learn(tables_[i], part(table_cost));
+        validator.try_fold(fold, model, tried[i].validation, part(share));
+      }
+      validator.try_fold(fold, learning->by_eq7(), eq7, part(share));
     }
-    warn_of_objects_without_maps();
+    return eq7;
+  }
+
+  /// The first table, unless a later one is clearly better about presses, without those of a fold.
+  static const TriedModel& kept(const std::vector<TriedModel>& tried,
+                                std::optional<std::size_t> without = {}) {
+    const auto losses = [&](const TriedModel& one) {
+      std::vector<double> of_each;
+      for (const ScoredPress& press : one.after.presses) {
+        if (press.fold != without) {
+          of_each.push_back(-press.log_evidence[press.truth]);
+        }
+      }
+      return of_each;
+    };
+    const TriedModel* best = &tried.front();
+    for (const TriedModel& one : tried) {
+      best = is_clearly_less(losses(one), losses(*best)) ? &one : best;
+    }
+    return *best;
   }
 
   void warn_of_objects_without_maps() {
     std::set<std::string> compared;
     std::set<std::string> labels;
-    for (std::size_t i = 0; i < presses_.size(); ++i) {
-      labels.insert(presses_[i].label);
-      if (std::ranges::any_of(maps_, [&](const TrainingMap& map) {
-            return map.map.label == presses_[i].label && !map.holds(i);
-          })) {
-        compared.insert(presses_[i].label);
+    for (std::size_t i = 0; i < all_.presses.size(); ++i) {
+      const std::string& label = all_.presses[i].label;
+      labels.insert(label);
+      if (has_map_without(i, label, all_.maps)) {
+        compared.insert(label);
       }
     }
     for (const std::string& label : labels) {
@@ -216,38 +221,15 @@ class SensorLearning {
     }
   }
 
-  TableLearning table_learning(const TableKind& kind) const {
-    constexpr double near = 2.0;  // in spacings of the elements
-    constexpr double far = 6.0;
-    const std::vector<double> pressures = contact_pressures(presses_, result_.sensor.classifier);
-    TableLearning how;
-    if (kind.layer == MapLayer::mean_level) {
-      how.layer = mean_level_layer(result_.sensor.classifier.threshold,
-                                   pressures.empty() ? 0.0 : pressures.back());
-    }
-    how.layer.near_mm = near * spacing_mm_;
-    how.layer.far_mm = far * spacing_mm_;
-    how.level_edges = level_edges_of(presses_, result_.sensor.classifier, kind.levels);
-    how.contact = {.classifier = result_.sensor.classifier,
-                   .gamma = ContactModel{}.gamma,
-                   .prior = result_.sensor.prior};
-    if (known_poses_) {
-      how.counted_within = *result_.sensor.bins;
-    } else {
-      how.lattice = placing_lattice(maps_, spacing_mm_, placing_step_rad);
-    }
-    return how;
-  }
-
   /// The bins for which touches at known poses are learned.
   void settle_bins() {
-    bins_ = options_.bins.value_or(RecognitionBins{fine_lattice(presses_, spacing_mm_)});
+    bins_ = options_.bins.value_or(RecognitionBins{fine_lattice(all_.presses, spacing_mm_)});
     const PoseLattice& lattice = bins_->lattice;
     lattice.validate();
     if (bins_->auto_pivot) {
-      require_within(presses_, lattice);
+      require_within(all_.presses, lattice);
     }
-    result_.sensor.bins =
+    result_.sensor.bins = learning_.bins =
         BinSteps{lattice.x_mm.step(), lattice.y_mm.step(), lattice.theta_rad.step()};
   }
 
@@ -255,7 +237,7 @@ class SensorLearning {
   void settle_tried_bins() {
     // Of the maps of folds, a touch is tried on the one without its own.
     std::map<std::string, std::size_t> maps_of;
-    for (const TrainingMap& map : maps_) {
+    for (const TrainingMap& map : all_.maps) {
       std::size_t& count = maps_of[map.map.label];
       count = map.presses.empty() ? std::min(count + 1, options_.most_maps) : 1;
     }
@@ -263,7 +245,7 @@ class SensorLearning {
     for (const auto& [label, count] : maps_of) {
       maps += count;
     }
-    bins_->lattice = affordable_lattice(bins_->lattice, presses_, result_.sensor.classifier,
+    bins_->lattice = affordable_lattice(bins_->lattice, all_.presses, result_.sensor.classifier,
                                         {.maps = maps,
                                          .spacing_mm = spacing_mm_,
                                          .minutes = options_.bins ? minutes_at_bins : minutes});
@@ -277,23 +259,43 @@ class SensorLearning {
     how.counted_within = {};  // gamma is of the sensor, whatever the bins
     LevelCounts all(2);
     for (const auto& [label, counts] :
-         count_placed(placed.placements, presses_, maps_, layers_of(maps_, how.layer), how)) {
+         count_placed(placed.placements, all_.presses, layers_of(all_.maps, how.layer), how)) {
       all += counts;
     }
     result_.sensor.gamma = fit_gamma(all, result_.sensor.prior);
   }
 
-  void learn_confidence(const CrossValidation& eq7, const LearnedFromTable& table) {
-    const CrossValidation& learned = table.validation;
+  /// How right the cross-validation is, each fold's presses by the table that the others keep.
+  void judge(const CrossValidation& eq7, const std::vector<TriedModel>& tried) {
+    CrossValidation table;
+    TemperedPresses after;
+    std::vector<double> areas;
+    for (std::size_t fold = 0; fold < options_.folds; ++fold) {
+      const TriedModel& model = kept(tried, fold);
+      const auto append = [&](const std::vector<ScoredPress>& from, std::vector<ScoredPress>& to) {
+        std::ranges::copy_if(from, std::back_inserter(to),
+                             [&](const ScoredPress& press) { return press.fold == fold; });
+      };
+      append(model.validation.presses, table.presses);
+      append(both(model.validation.groups), table.groups[0]);
+      append(model.after.presses, after.presses);
+      append(model.after.groups, after.groups);
+      if (const auto area = area_under_curve(model.validation.familiarity, fold)) {
+        areas.push_back(*area);
+      }
+    }
     result_.before = scores_of(eq7.presses, 1.0);
-    result_.table = scores_of(learned.presses, 1.0);
-    result_.after = scores_of(table.after.presses, 1.0);
-    const std::vector<ScoredPress>& groups = table.after.groups;
-    if (!groups.empty()) {
+    result_.table = scores_of(table.presses, 1.0);
+    result_.after = scores_of(after.presses, 1.0);
+    if (!areas.empty()) {
+      result_.area_under_curve =
+          std::accumulate(areas.begin(), areas.end(), 0.0) / static_cast<double>(areas.size());
+    }
+    if (!after.groups.empty()) {
       result_.groups = GroupScores{.touches = presses_in_group,
                                    .before = scores_of(both(eq7.groups), 1.0),
-                                   .table = scores_of(both(learned.groups), 1.0),
-                                   .after = scores_of(groups, 1.0)};
+                                   .table = scores_of(both(table.groups), 1.0),
+                                   .after = scores_of(after.groups, 1.0)};
     } else if (known_poses_) {
       result_.warnings.push_back(
           fmt::format("too few touches to try {} of an object together on maps without them, so "
@@ -303,7 +305,7 @@ class SensorLearning {
     }
     // What few presses could show by chance is no warning.
     constexpr double worse_nats = 0.05;
-    const double without = scores_of(tempered_by_halves(eq7.presses).presses, 1.0).log_loss;
+    const double without = scores_of(tempered_by_folds(eq7.presses).presses, 1.0).log_loss;
     if (result_.after->log_loss > without + worse_nats) {
       result_.warnings.push_back(fmt::format(
           "on touches that it has not seen, the learned table has a log-loss of {:.3f}, worse than "
@@ -311,12 +313,15 @@ class SensorLearning {
           "without the sensor model",
           result_.after->log_loss, without));
     }
+  }
+
+  void learn_confidence(const CrossValidation& learned) {
     const TemperatureFit fit = fit_temperature(learned.presses, learned.groups);
     result_.sensor.temperature = fit.temperature;
     result_.sensor.temperature_growth = fit.growth;
     if (!known_poses_) {
       std::vector<LabelledFeatures> features;
-      for (const Press& press : presses_) {
+      for (const Press& press : all_.presses) {
         features.push_back(
             {press.label, press_features(press.touches.front(), result_.sensor.classifier)});
       }
@@ -324,12 +329,10 @@ class SensorLearning {
       result_.sensor.features->weight = fit.feature_weight;
     }
     learn_fit_scale(learned.fit_z);
-    if (learned.known.empty() || learned.unknown.empty()) {
-      return;
+    const FamiliarityScores scores = all_of(learned.familiarity);
+    if (!scores.known.empty()) {
+      result_.sensor.familiarity = fit_familiarity(scores);
     }
-    const FamiliarityScores scores{learned.known, learned.unknown};
-    result_.sensor.familiarity = fit_familiarity(scores);
-    result_.area_under_curve = area_under_curve(scores, *result_.sensor.familiarity);
   }
 
   /// Mean and standard deviation of the touches' z.
@@ -351,12 +354,12 @@ class SensorLearning {
     }
   }
 
-  std::vector<Press> presses_;
+  LearnedPresses all_;
   const SensorCalibrationOptions& options_;
   bool known_poses_ = false;
   std::vector<TableKind> tables_;
   double spacing_mm_ = 0.0;
-  std::vector<TrainingMap> maps_;
+  ModelLearning learning_;               ///< but for the presses
   std::optional<RecognitionBins> bins_;  ///< for touches at known poses
   SensorCalibration result_;
 };
@@ -367,33 +370,6 @@ std::vector<TableKind> default_tables(bool known_poses) {
   constexpr TableKind of_contact{MapLayer::log_odds, 2};
   constexpr TableKind of_pressure{MapLayer::mean_level, 7};
   return known_poses ? std::vector{of_pressure} : std::vector{of_contact, of_pressure};
-}
-
-bool is_clearly_less(std::span<const double> losses, std::span<const double> others) {
-  const auto n = static_cast<double>(losses.size());
-  double mean = 0.0;
-  for (std::size_t i = 0; i < losses.size(); ++i) {
-    mean += (others[i] - losses[i]) / n;
-  }
-  double variance = 0.0;
-  for (std::size_t i = 0; i < losses.size(); ++i) {
-    const double apart = others[i] - losses[i] - mean;
-    variance += apart * apart / std::max(1.0, n - 1.0);
-  }
-  return mean > 2.0 * std::sqrt(variance / n);
-}
-
-std::vector<double> level_edges_of(const std::vector<Press>& presses,
-                                   const ContactClassifier& classifier, std::size_t levels) {
-  const std::vector<double> pressures = contact_pressures(presses, classifier);
-  std::vector<double> edges;
-  for (std::size_t level = 2; level < levels && !pressures.empty(); ++level) {
-    const double edge = pressures[(level - 1) * pressures.size() / (levels - 1)];
-    if (edge > (edges.empty() ? pressures.front() : edges.back())) {
-      edges.push_back(edge);
-    }
-  }
-  return edges;
 }
 
 SensorCalibration calibrate_sensor(const std::vector<Press>& presses,

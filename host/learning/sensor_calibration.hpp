@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "drawn_poses.hpp"
+#include "fold_model.hpp"
 #include "palpate/learned_sensor.hpp"
 #include "palpate/occupancy_grid.hpp"
 #include "press.hpp"
@@ -15,13 +16,6 @@
 #include "training_maps.hpp"
 
 namespace palpate {
-
-/// A table that a calibration may learn: what of a map it is over, and how many levels of readings
-/// it tells apart, No Contact included, 2 to most_reading_levels.
-struct TableKind {
-  MapLayer layer = MapLayer::log_odds;
-  std::size_t levels = 2;
-};
 
 /// What a calibration starts from.
 struct SensorCalibrationOptions {
@@ -69,7 +63,8 @@ struct SensorCalibration {
   std::optional<Scores> table;        ///< the table, temperature 1
   std::optional<Scores> after;        ///< the table, temperature and features
   std::optional<GroupScores> groups;  ///< none for presses at unknown poses, or few touches
-  /// Area under the curve of presses whose object is known against those whose object is left out;
+  /// Mean over the folds of the area under the curve of presses whose object is known against those
+  /// whose object is left out, see FamiliarityScores: about one half where presses say nothing;
   /// none with one object.
   std::optional<double> area_under_curve;
   std::vector<std::string> warnings;  ///< what could not be learned, in whole sentences
@@ -83,15 +78,18 @@ struct SensorCalibration {
 ///   give the features' distributions with their weight.
 /// Of several tables it keeps the first, unless a later one has less log-loss in the
 /// cross-validation by more than two standard errors. What one object cannot tell (temperature,
-/// weight, familiarity) keeps its default, with a warning. The numbers before and after are of
-/// cross-validation; `after` gives each half of the presses the temperature and weight of the other
-/// half. Takes all host threads.
+/// weight, familiarity) keeps its default, with a warning. Takes all host threads.
+///   The numbers before and after are of cross-validation. All that a fold's presses are judged by
+/// is learned again from the other folds' alone, from the contact threshold on: noise, prior, point
+/// spread, levels, maps, tables and features. Which table is kept, temperature, weight and
+/// familiarity come from the scores of the other folds' presses.
 ///
 /// Data that say little:
 ///   one press: refused; so are presses none of which has a map of its object without it
 ///   a press all of whose elements are Unknown: left out, with a warning; refused where all are
 ///   a dead element: left out everywhere
 ///   a stuck element, the same high pressure in each touch: counts as In Contact, with a warning
+///   presses whose other folds tell no threshold: not judged
 ///   levels that no reading reached, and nodes that no map had: what Eq. 7 says, see table_of();
 ///   levels of the same pressures are merged, see level_edges_of()
 ///   an object whose touches have no map without them: nothing but the threshold, noise, prior and
@@ -108,14 +106,5 @@ SensorCalibration calibrate_sensor(const std::vector<Press>& presses,
                                    const std::vector<OccupancyGrid>& given,
                                    const SensorCalibrationOptions& options,
                                    const std::function<void(double)>& progress = {});
-
-/// Whether one of two models has less loss on the same presses beyond chance: by more than two
-/// standard errors of the differences.
-bool is_clearly_less(std::span<const double> losses, std::span<const double> others);
-
-/// Pressures that part the elements In Contact of all presses into `levels` - 1 levels of about as
-/// many elements each; fewer where pressures are the same.
-std::vector<double> level_edges_of(const std::vector<Press>& presses,
-                                   const ContactClassifier& classifier, std::size_t levels);
 
 }  // namespace palpate

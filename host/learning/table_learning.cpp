@@ -133,13 +133,6 @@ LearnedTable table_of(const ObjectCounts& counts, const TableLearning& how) {
   return table;
 }
 
-std::vector<double> table_without(const ObjectCounts& counts, const std::string& label,
-                                  const TableLearning& how) {
-  ObjectCounts others = counts;
-  others.erase(label);
-  return table_of(others, how).shared;
-}
-
 ContactModel contact_with(const ContactModel& contact, const LearnedTable& table,
                           const std::string& label) {
   const auto own = table.objects.find(label);
@@ -175,28 +168,17 @@ PlacedPresses learn_table(const std::vector<Press>& presses, const std::vector<T
               "touches of its object; give at least two touches of one object, or a map of it",
               presses.size()));
     }
-    placed.table = table_of(count_placed(placed.placements, presses, maps, layers, how), how);
+    placed.table = table_of(count_placed(placed.placements, presses, layers, how), how);
   }
   return placed;
 }
 
 ObjectCounts count_placed(std::span<const OwnPlacement> placements,
-                          const std::vector<Press>& presses, const std::vector<TrainingMap>& maps,
-                          const std::vector<OccupancyGrid>& layers, const TableLearning& how,
-                          const std::vector<bool>& counted) {
-  const auto counts_here = [&](const OwnPlacement& placement) {
-    if (counted.empty()) {
-      return true;
-    }
-    const std::vector<std::size_t>& of = maps[placement.map].presses;
-    return counted[placement.press] &&
-           (of.empty() || std::ranges::any_of(of, [&](std::size_t p) { return counted[p]; }));
-  };
+                          const std::vector<Press>& presses,
+                          const std::vector<OccupancyGrid>& layers, const TableLearning& how) {
   std::vector<std::vector<const OwnPlacement*>> of_press(presses.size());
   for (const OwnPlacement& placement : placements) {
-    if (counts_here(placement)) {
-      of_press[placement.press].push_back(&placement);
-    }
+    of_press[placement.press].push_back(&placement);
   }
   const LearnedTable levels = how.initial();
   const ContactModel classifier = contact_with(how.contact, levels, "");

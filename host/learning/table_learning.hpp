@@ -43,10 +43,6 @@ using ObjectCounts = std::map<std::string, LevelCounts>;
 /// says, and an object with few counts what all objects say together.
 LearnedTable table_of(const ObjectCounts& counts, const TableLearning& how);
 
-/// The shared table without one object's counts: what others' touches say about its readings.
-std::vector<double> table_without(const ObjectCounts& counts, const std::string& label,
-                                  const TableLearning& how);
-
 /// The contact model of Eq. 7's classifier with an object's numbers of a table, or the shared
 /// numbers where the object has none of its own.
 ContactModel contact_with(const ContactModel& contact, const LearnedTable& table,
@@ -80,14 +76,10 @@ PlacedPresses learn_table(const std::vector<Press>& presses, const std::vector<T
                           const TableLearning& how,
                           const std::function<void(double)>& progress = {});
 
-/// Counts the readings of the presses that `counted` marks, each on the best of its maps: so what
-/// is learned from one part of the presses can be tried on another. Maps of unmarked presses alone
-/// are left out.
+/// Counts the readings of placed presses, each on the best of its maps.
 /// @param layers of the maps
-/// @param counted [press]; empty: all are
 ObjectCounts count_placed(std::span<const OwnPlacement> placements,
-                          const std::vector<Press>& presses, const std::vector<TrainingMap>& maps,
-                          const std::vector<OccupancyGrid>& layers, const TableLearning& how,
-                          const std::vector<bool>& counted = {});
+                          const std::vector<Press>& presses,
+                          const std::vector<OccupancyGrid>& layers, const TableLearning& how);
 
 }  // namespace palpate

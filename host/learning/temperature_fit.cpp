@@ -2,7 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
+#include <optional>
+#include <set>
 #include <string>
 #include <utility>
 
@@ -63,17 +66,19 @@ void require_sound(std::span<const ScoredPress> presses) {
   }
 }
 
-/// By how much the label's log evidence exceeds the best other's.
-double margin_of(const ScoredPress& press) {
+/// By how much one label's number exceeds the best other's.
+double margin_of(std::span<const double> of_labels, std::size_t label) {
   double other = -std::numeric_limits<double>::infinity();
-  for (std::size_t i = 0; i < press.log_evidence.size(); ++i) {
-    other = i == press.truth ? other : std::max(other, press.log_evidence[i]);
+  for (std::size_t i = 0; i < of_labels.size(); ++i) {
+    other = i == label ? other : std::max(other, of_labels[i]);
   }
-  return press.log_evidence[press.truth] - other;
+  return of_labels[label] - other;
 }
 
 /// Whether a press has two labels to choose from.
-bool has_choice(const ScoredPress& press) { return std::isfinite(margin_of(press)); }
+bool has_choice(const ScoredPress& press) {
+  return std::isfinite(margin_of(press.log_evidence, press.truth));
+}
 
 double median(std::vector<double> values) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
@@ -99,13 +104,112 @@ double least_place(double lower, double upper, const Function& function) {
   return largest_at(lower, upper, 1e-3 * (upper - lower), [&](double x) { return -function(x); });
 }
 
-/// Every other press, from the first or the second on.
-std::vector<ScoredPress> half_of(std::span<const ScoredPress> presses, std::size_t half) {
+/// The presses whose fold is `fold`, or all others.
+std::vector<ScoredPress> of_fold(std::span<const ScoredPress> presses, std::size_t fold,
+                                 bool inside) {
   std::vector<ScoredPress> some;
-  for (std::size_t i = half; i < presses.size(); i += 2) {
-    some.push_back(presses[i]);
-  }
+  std::ranges::copy_if(presses, std::back_inserter(some),
+                       [&](const ScoredPress& press) { return (press.fold == fold) == inside; });
   return some;
+}
+
+std::set<std::size_t> folds_in(std::span<const ScoredPress> presses) {
+  std::set<std::size_t> folds;
+  for (const ScoredPress& press : presses) {
+    folds.insert(press.fold);
+  }
+  return folds;
+}
+
+/// The loss of presses, over the inverse of the temperature and the weight of the features, in
+/// which it is convex.
+class PressLoss {
+ public:
+  explicit PressLoss(std::span<const ScoredPress> presses) : presses_(presses) {
+    std::vector<double> margins;
+    std::vector<double> of_features;
+    for (const ScoredPress& press : presses) {
+      if (!has_choice(press)) {
+        continue;
+      }
+      margins.push_back(std::abs(margin_of(press.log_evidence, press.truth)));
+      if (!press.log_density.empty()) {
+        of_features.push_back(std::abs(margin_of(press.log_density, press.truth)));
+      }
+    }
+    if (margins.empty()) {
+      throw Error(Fault::input,
+                  "temperature: presses of one object say nothing about confidence; give presses "
+                  "of two objects or more");
+    }
+    margin_ = median(std::move(margins));
+    if (std::ranges::none_of(presses,
+                             [](const ScoredPress& press) { return press.log_density.empty(); })) {
+      feature_margin_ = median(std::move(of_features));
+    }
+  }
+
+  bool has_features() const { return feature_margin_.has_value(); }
+
+  /// By the evidence alone.
+  TemperatureFit of_evidence() const { return {.temperature = best_temperature(0.0, hottest)}; }
+
+  /// By the evidence and the features.
+  TemperatureFit of_both() const {
+    const double alone = of_evidence().temperature;
+    // The least loss at each weight has one minimum along it.
+    constexpr double most_weight = 2.0;
+    const double weight = least_place(
+        0.0, most_weight, [&](double w) { return loss(best_temperature(w, alone), w); });
+    return {.temperature = best_temperature(weight, alone), .feature_weight = weight};
+  }
+
+ private:
+  static constexpr double coldest = 0.01;
+  static constexpr double hottest = most_temperature;
+
+  double loss(double temperature, double weight) const {
+    double sum = of_even_press(margin_ / temperature);
+    if (feature_margin_) {
+      sum += of_even_press(weight * *feature_margin_);
+    }
+    for (const ScoredPress& press : presses_) {
+      sum += loss_of(press, temperature, weight);
+    }
+    return sum;
+  }
+
+  /// Of a press of two labels that is right or wrong with equal weights.
+  static double of_even_press(double apart) { return apart / 2.0 + std::log1p(std::exp(-apart)); }
+
+  double best_temperature(double weight, double most) const {
+    return std::exp(least_place(std::log(coldest), std::log(most), [&](double log_temperature) {
+      return loss(std::exp(log_temperature), weight);
+    }));
+  }
+
+  std::span<const ScoredPress> presses_;
+  double margin_ = 0.0;
+  std::optional<double> feature_margin_;
+};
+
+/// Whether the features' weight that the other folds show helps each fold's presses, all together.
+bool features_help(std::span<const ScoredPress> presses) {
+  double gain = 0.0;
+  for (const std::size_t fold : folds_in(presses)) {
+    const std::vector<ScoredPress> others = of_fold(presses, fold, false);
+    if (!std::ranges::any_of(others, has_choice)) {
+      continue;
+    }
+    const PressLoss loss(others);
+    const TemperatureFit both = loss.of_both();
+    const TemperatureFit evidence = loss.of_evidence();
+    for (const ScoredPress& press : of_fold(presses, fold, true)) {
+      gain += loss_of(press, evidence.temperature, 0.0) -
+              loss_of(press, both.temperature, both.feature_weight);
+    }
+  }
+  return gain > 0.0;
 }
 
 double loss_of_groups(std::span<const ScoredPress> groups, TemperatureFit fit, double growth) {
@@ -179,69 +283,56 @@ TemperatureFit fit_temperature(std::span<const ScoredPress> presses, const Group
       require_sound(half);
     }
   }
-  std::vector<double> margins;
-  bool features = true;
-  for (const ScoredPress& press : presses) {
-    if (const double margin = std::abs(margin_of(press)); std::isfinite(margin)) {
-      margins.push_back(margin);
-    }
-    features = features && !press.log_density.empty();
-  }
-  if (margins.empty()) {
-    throw Error(Fault::input,
-                "temperature: presses of one object say nothing about confidence; give presses of "
-                "two objects or more");
-  }
-  const double margin = median(margins);
-  // The loss is convex in the temperature's inverse and the weight, so that it has one minimum
-  // along the logarithm of the temperature, and the least of these has one along the weight.
-  const auto loss = [&](double log_temperature, double weight) {
-    const double temperature = std::exp(log_temperature);
-    const double apart = margin / temperature;
-    double sum = apart / 2.0 + std::log1p(std::exp(-apart));
-    for (const ScoredPress& press : presses) {
-      sum += loss_of(press, temperature, weight);
-    }
-    return sum;
-  };
-  constexpr double least_temperature = 0.01;
-  const auto best_temperature = [&](double weight) {
-    return least_place(std::log(least_temperature), std::log(most_temperature),
-                       [&](double log_temperature) { return loss(log_temperature, weight); });
-  };
-  constexpr double most_weight = 2.0;
-  const double weight =
-      features
-          ? least_place(0.0, most_weight, [&](double w) { return loss(best_temperature(w), w); })
-          : 0.0;
-  TemperatureFit fit{.temperature = std::exp(best_temperature(weight)), .feature_weight = weight};
+  const PressLoss loss(presses);
+  TemperatureFit fit =
+      loss.has_features() && features_help(presses) ? loss.of_both() : loss.of_evidence();
   fit.growth = fit_growth(groups, fit);
   return fit;
 }
 
-TemperedPresses tempered_by_halves(std::span<const ScoredPress> presses,
-                                   const GroupHalves& groups) {
+TemperedPresses tempered_by_folds(std::span<const ScoredPress> presses, const GroupHalves& groups) {
   TemperedPresses tempered{std::vector<ScoredPress>(presses.size()), {}};
   const auto with = [](const ScoredPress& press, const TemperatureFit& fit) {
-    ScoredPress result{
-        .truth = press.truth, .touches = press.touches, .log_evidence = {}, .log_density = {}};
+    ScoredPress result{.truth = press.truth,
+                       .fold = press.fold,
+                       .touches = press.touches,
+                       .log_evidence = {},
+                       .log_density = {}};
     result.log_evidence =
         log_probabilities(press, fit.temperature_after(press.touches), fit.feature_weight);
     return result;
   };
-  for (std::size_t half = 0; half < 2; ++half) {
-    const std::vector<ScoredPress> others = half_of(presses, 1 - half);
+  for (const std::size_t fold : folds_in(presses)) {
+    const std::vector<ScoredPress> others = of_fold(presses, fold, false);
     TemperatureFit fit = fit_temperature(
         std::ranges::any_of(others, has_choice) ? std::span<const ScoredPress>(others) : presses);
-    for (std::size_t i = half; i < presses.size(); i += 2) {
-      tempered.presses[i] = with(presses[i], fit);
+    for (std::size_t i = 0; i < presses.size(); ++i) {
+      if (presses[i].fold == fold) {
+        tempered.presses[i] = with(presses[i], fit);
+      }
     }
-    fit.growth = least_growth(groups[1 - half], fit);
-    for (const ScoredPress& group : groups[half]) {
-      tempered.groups.push_back(with(group, fit));
+    for (std::size_t half = 0; half < 2; ++half) {
+      fit.growth = least_growth(groups[1 - half], fit);
+      for (const ScoredPress& group : of_fold(groups[half], fold, true)) {
+        tempered.groups.push_back(with(group, fit));
+      }
     }
   }
   return tempered;
+}
+
+bool is_clearly_less(std::span<const double> losses, std::span<const double> others) {
+  const auto n = static_cast<double>(losses.size());
+  double mean = 0.0;
+  for (std::size_t i = 0; i < losses.size(); ++i) {
+    mean += (others[i] - losses[i]) / n;
+  }
+  double variance = 0.0;
+  for (std::size_t i = 0; i < losses.size(); ++i) {
+    const double apart = others[i] - losses[i] - mean;
+    variance += apart * apart / std::max(1.0, n - 1.0);
+  }
+  return mean > 2.0 * std::sqrt(variance / n);
 }
 
 }  // namespace palpate

@@ -13,6 +13,7 @@ namespace palpate {
 /// What a model that has not seen a press says of it, label by label.
 struct ScoredPress {
   std::size_t truth = 0;             ///< index of the press's label
+  std::size_t fold = 0;              ///< of the cross-validation
   std::size_t touches = 1;           ///< of one object, together
   std::vector<double> log_evidence;  ///< of every label, in nats; -infinity: without a map
   /// Log density of the press's features under every label, in nats; empty without features.
@@ -46,8 +47,15 @@ struct TemperatureFit {
 /// them, of the least log-loss. Besides the presses, one more counts, of two labels whose log
 /// evidences differ by the median margin of the presses (label against the best other): it is
 /// right or wrong with equal weights, so that presses which are all told apart, however clearly, do
-/// not make the temperature 0. The growth is that of the least log-loss of the groups; it is 0
-/// unless what each half of them shows helps the other half, both taken together.
+/// not make the temperature 0. One more is such a press for the features, whose log densities
+/// differ by their median margin.
+///   The evidence has at least the say that it has alone: features lower the temperature, but do
+/// not raise it. Where they tell all presses apart, the log-loss would leave the evidence none, and
+/// a day of lighter presses would be taken for other objects.
+///   The weight is 0 unless what the other folds show helps each fold's presses, all together: the
+/// presses of a fold were made at another time than the others, see folds_of().
+///   The growth is that of the least log-loss of the groups; it is 0 unless what each half of them
+/// shows helps the other half, both taken together.
 /// @param presses of one touch each
 /// @throws Error on no press, on a press without a log evidence for each of the same labels, finite
 /// for its own, and where no press has two labels to choose from
@@ -60,11 +68,15 @@ struct TemperedPresses {
   std::vector<ScoredPress> groups;
 };
 /// The presses and groups with the logarithms of their labels' probabilities in the place of the
-/// evidences. Every other press has the numbers of the others, or of all where none of these has
-/// two labels to choose from. Each half of the groups has the temperature of every other press, and
-/// the growth of the other half.
+/// evidences. The presses and groups of a fold have the numbers of the other folds' presses, or of
+/// all where none of these has two labels to choose from; the groups have the growth of the other
+/// half.
 /// @throws Error as fit_temperature()
-TemperedPresses tempered_by_halves(std::span<const ScoredPress> presses,
-                                   const GroupHalves& groups = {});
+TemperedPresses tempered_by_folds(std::span<const ScoredPress> presses,
+                                  const GroupHalves& groups = {});
+
+/// Whether one of two models has less loss on the same presses beyond chance: by more than two
+/// standard errors of the differences.
+bool is_clearly_less(std::span<const double> losses, std::span<const double> others);
 
 }  // namespace palpate

@@ -31,4 +31,8 @@ std::vector<TrainingMap> maps_of_presses(const std::vector<Press>& presses,
 std::vector<TrainingMap> maps_without_folds(const std::vector<Press>& presses,
                                             const MapOptions& options, std::size_t folds);
 
+/// For every object the map of all its presses; else as maps_without_folds().
+std::vector<TrainingMap> maps_of_objects(const std::vector<Press>& presses,
+                                         const MapOptions& options);
+
 }  // namespace palpate

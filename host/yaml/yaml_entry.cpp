@@ -15,6 +15,18 @@ namespace palpate {
 
 int line_of(const YAML::Mark& mark) { return std::max(mark.line, 0) + 1; }
 
+YAML::Node only_document(std::istream&& yaml, const std::filesystem::path& file) {
+  const std::vector<YAML::Node> documents = YAML::LoadAll(yaml);
+  if (documents.size() > 1) {
+    throw Error(
+        Fault::input,
+        fmt::format("{}: line {}: a second document, of which nothing would be read; leave one, "
+                    "without --- after it",
+                    file.string(), line_of(documents[1].Mark())));
+  }
+  return documents.empty() ? YAML::Node() : documents.front();
+}
+
 void YamlEntry::refuse(std::string_view remedy) const {
   // A message stays one short line whatever the file holds.
   const bool shown = node.IsScalar() && node.Scalar().size() <= 60 && is_printable(node.Scalar());

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <istream>
 #include <limits>
 #include <string>
 #include <string_view>
@@ -16,6 +17,11 @@ namespace palpate {
 
 /// Counted from 1, also where there is no mark, as in an empty file.
 int line_of(const YAML::Mark& mark);
+
+/// The document of a YAML file; null where the file has none.
+/// @throws Error (Fault::input) on a second document, naming its line; YAML::Exception on text that
+/// is no YAML
+YAML::Node only_document(std::istream&& yaml, const std::filesystem::path& file);
 
 /// A node of a YAML file with what a message about it has to name. What reads its value throws
 /// Error (Fault::input): file, line, key, value, remedy.

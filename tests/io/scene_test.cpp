@@ -178,6 +178,11 @@ TEST_F(SceneFile, NamesValuesThatItCannotTake) {
   }
 }
 
+TEST_F(SceneFile, HoldsOneDocument) {
+  expect_named(message("ratio: 0.3\n---\nbins: auto"), {"line 3", "second document", "leave one"});
+  EXPECT_EQ(read("---\nratio: 0.3\n...\n").ratio, 0.3);
+}
+
 TEST_F(SceneFile, NamesTheLineThatIsNoYaml) {
   expect_named(message("ratio: 0.3\nobjects: [1, 2\nbins: 3"), {"line", "YAML"});
   expect_named(input_error([&] { read_scene(folder_ / "no.yaml"); }), {"no.yaml", "no such file"});

@@ -22,43 +22,75 @@ TableLearning learning(const std::vector<TrainingMap>& maps) {
           .rounds = 1};
 }
 
+/// Tries all folds on the maps of the others' presses, by Eq. 7 or a table that they learned.
+CrossValidation tried(const std::vector<Press>& presses, const std::vector<std::string>& labels,
+                      const CrossValidationOptions& options, bool with_table = false) {
+  const CrossValidator validator(presses, labels, options);
+  CrossValidation result;
+  for (std::size_t fold = 0; fold < options.folds; ++fold) {
+    const std::vector<Press> others = validator.presses_without(fold);
+    FoldModel model;
+    model.maps = options.bins ? maps_of_objects(others, map_options())
+                              : maps_of_presses(others, map_options());
+    model.how = learning(model.maps);
+    if (with_table) {
+      model.table = learn_table(others, model.maps, model.how).table;
+    }
+    validator.try_fold(fold, model, result);
+  }
+  return result;
+}
+
 TEST(CrossValidation, TriesEveryPressOnMapsOfOtherFolds) {
   SimulatedPresses simulated;
   simulated.add_shapes(3, 11);
-  const std::vector<TrainingMap> maps = maps_of_presses(simulated.presses, map_options());
-  const TableLearning how = learning(maps);
-  const PlacedPresses placed = learn_table(simulated.presses, maps, how);
-  for (const PlacedPresses* with : {static_cast<const PlacedPresses*>(nullptr), &placed}) {
-    const CrossValidation found = cross_validate(simulated.presses, maps, how, with, {.folds = 3});
-    EXPECT_EQ(found.labels, (std::vector<std::string>{"L", "disc"}));
+  for (const bool with_table : {false, true}) {
+    const CrossValidation found = tried(simulated.presses, {"L", "disc"}, {.folds = 3}, with_table);
     ASSERT_EQ(found.presses.size(), 6U);
-    EXPECT_EQ(found.known.size(), 6U);
-    EXPECT_EQ(found.unknown.size(), 6U);
+    const FamiliarityScores scores = all_of(found.familiarity);
+    ASSERT_EQ(scores.known.size(), 6U);
+    ASSERT_EQ(scores.unknown.size(), 6U);
     // The shapes differ by tens of elements: evidence tells them apart by tens of nats.
     EXPECT_NEAR(scores_of(found.presses, 1.0).accuracy(), 1.0, 1e-9);
-    EXPECT_GT(area_under_curve({found.known, found.unknown},
-                               fit_familiarity({found.known, found.unknown})),
-              0.8);
+    EXPECT_GT(area_under_curve(scores, fit_familiarity(scores)), 0.8);
     for (std::size_t i = 0; i < 6; ++i) {
-      EXPECT_LE(found.unknown[i].explained, found.known[i].explained);
-      EXPECT_LT(found.known[i].explained, 0.0);
+      EXPECT_EQ(found.presses[i].fold, i / 2);
+      EXPECT_LE(scores.unknown[i].explained, scores.known[i].explained);
+      EXPECT_LT(scores.known[i].explained, 0.0);
       EXPECT_EQ(found.presses[i].log_density.size(), 2U);
     }
   }
+}
+
+TEST(CrossValidation, LeavesOutTheOtherObjectsInTurnForKnownScores) {
+  SimulatedPresses simulated;
+  simulated.add_shapes(4, 20);
+  simulated.add(on_letter_l, "M", 4, 22);
+  simulated.presses[1] = simulated.presses[0];  // of L, as M is
+  const CrossValidation found = tried(simulated.presses, {"L", "M", "disc"}, {.folds = 2});
+  ASSERT_EQ(found.familiarity[0].known.size(), 6U);
+  // Once without M, and once without the disc: L leads the other.
+  const std::vector<double>& of = found.presses[0].log_evidence;
+  EXPECT_EQ(found.presses[1].log_evidence, of);
+  const auto lead = [&](std::size_t other) { return std::log1p(std::abs(of[0] - of[other])); };
+  EXPECT_NEAR(found.familiarity[0].known[0].lead, lead(2), 1e-9);
+  EXPECT_NEAR(found.familiarity[0].known[1].lead, lead(1), 1e-9);
+  EXPECT_EQ(found.familiarity[0].unknown[0].lead, found.familiarity[0].unknown[1].lead);
 }
 
 TEST(CrossValidation, LeavesOutAPressThatIsAloneOfItsObject) {
   SimulatedPresses simulated;
   simulated.add(on_letter_l, "L", 2, 12);
   simulated.add(on_disc, "disc", 1, 13);
-  const std::vector<TrainingMap> maps = maps_of_presses(simulated.presses, map_options());
-  const TableLearning how = learning(maps);
-  const CrossValidation found = cross_validate(simulated.presses, maps, how, nullptr, {.folds = 2});
+  const CrossValidation found = tried(simulated.presses, {"L", "disc"}, {.folds = 2});
   ASSERT_EQ(found.presses.size(), 2U);
   // The disc's only press is in the first fold, so that it has no map for the L of that fold.
   EXPECT_EQ(found.presses[0].log_evidence[1], -INFINITY);
   EXPECT_TRUE(std::isfinite(found.presses[1].log_evidence[1]));
-  EXPECT_EQ(found.unknown.size(), 1U);
+  for (const FamiliarityScores& scores : found.familiarity) {
+    EXPECT_EQ(scores.known.size(), scores.unknown.size());
+  }
+  EXPECT_EQ(all_of(found.familiarity).unknown.size(), 1U);
   EXPECT_GT(fit_temperature(found.presses).temperature, 0.0);
 }
 
@@ -66,9 +98,6 @@ TEST(CrossValidation, LooksForPressesAtKnownPosesAsForUnknownsAloneAndInGroups) 
   LetterPresses letters;
   letters.add("A", 24, 16);
   letters.add("U", 14, 17);
-  const std::vector<TrainingMap> maps = maps_without_folds(letters.presses, map_options(), 2);
-  TableLearning how = learning(maps);
-  how.lattice = {};  // not used
   // A place that the presses do not have: only as unknowns do they come there.
   const CrossValidationOptions options{
       .folds = 2,
@@ -76,14 +105,14 @@ TEST(CrossValidation, LooksForPressesAtKnownPosesAsForUnknownsAloneAndInGroups) 
                                           .y_mm = {-12.0, 12.0, 24},
                                           .theta_rad = {0.0, two_pi, 48}},
                               .auto_pivot = false}};
-  const CrossValidation found = cross_validate(letters.presses, maps, how, nullptr, options);
+  const CrossValidation found = tried(letters.presses, {"A", "U"}, options);
   ASSERT_EQ(found.presses.size(), 38U);
   // Of either fold's 12 presses of A, 6 in each half make two groups three times over; of 7 of U, 3
   // and 4 make one group each.
   const std::vector<ScoredPress> groups = both(found.groups);
   EXPECT_EQ(groups.size(), 2U * (2U * 3U * 2U + 2U));
   EXPECT_FALSE(found.groups[0].empty() || found.groups[1].empty());
-  EXPECT_LE(found.known.size(), 38U) << "groups say nothing of familiarity";
+  EXPECT_LE(all_of(found.familiarity).known.size(), 38U) << "groups say nothing of familiarity";
   for (const ScoredPress& press : found.presses) {
     EXPECT_EQ(press.touches, 1U);
     EXPECT_TRUE(press.log_density.empty()) << "features tell where a touch was";
@@ -93,22 +122,21 @@ TEST(CrossValidation, LooksForPressesAtKnownPosesAsForUnknownsAloneAndInGroups) 
   }
   EXPECT_GT(scores_of(groups, 1.0).accuracy(), 0.95) << "24 of 28 are of A";
   EXPECT_GT(scores_of(found.presses, 1.0).accuracy(), 0.85) << "24 of 38 are of A";
-  const CrossValidation again = cross_validate(letters.presses, maps, how, nullptr, options);
+  const CrossValidation again = tried(letters.presses, {"A", "U"}, options);
   EXPECT_EQ(both(again.groups).back().log_evidence, groups.back().log_evidence);
 }
 
 TEST(CrossValidation, JudgesTheFitOfPressesAtKnownPosesWhereTheyAre) {
   LetterPresses letters;
   letters.add("A", 20, 19);
-  const std::vector<TrainingMap> maps = maps_without_folds(letters.presses, map_options(), 2);
   const auto mean_z = [&](int bins, int theta_bins) {
     const CrossValidation found =
-        cross_validate(letters.presses, maps, learning(maps), nullptr,
-                       {.folds = 2,
-                        .bins = RecognitionBins{.lattice = {.x_mm = {-12.0, 12.0, bins},
-                                                            .y_mm = {-12.0, 12.0, bins},
-                                                            .theta_rad = {0.0, two_pi, theta_bins}},
-                                                .auto_pivot = false}});
+        tried(letters.presses, {"A"},
+              {.folds = 2,
+               .bins = RecognitionBins{.lattice = {.x_mm = {-12.0, 12.0, bins},
+                                                   .y_mm = {-12.0, 12.0, bins},
+                                                   .theta_rad = {0.0, two_pi, theta_bins}},
+                                       .auto_pivot = false}});
     return std::accumulate(found.fit_z.begin(), found.fit_z.end(), 0.0) /
            static_cast<double>(found.fit_z.size());
   };
@@ -119,20 +147,17 @@ TEST(CrossValidation, JudgesTheFitOfPressesAtKnownPosesWhereTheyAre) {
 TEST(CrossValidation, RefusesBinsForPressesAtUnknownPoses) {
   SimulatedPresses simulated;
   simulated.add_shapes(3, 18);
-  const std::vector<TrainingMap> maps = maps_of_presses(simulated.presses, map_options());
-  EXPECT_THROW(cross_validate(simulated.presses, maps, learning(maps), nullptr,
-                              {.folds = 3, .bins = RecognitionBins{}}),
+  EXPECT_THROW(tried(simulated.presses, {"L", "disc"}, {.folds = 3, .bins = RecognitionBins{}}),
                Error);
 }
 
 TEST(CrossValidation, RefusesWhatItCannotTry) {
   SimulatedPresses simulated;
   simulated.add_shapes(1, 14);
-  const std::vector<TrainingMap> maps = maps_of_presses(simulated.presses, map_options());
-  const TableLearning how = learning(maps);
-  EXPECT_THROW(cross_validate(simulated.presses, maps, how, nullptr, {}), Error);
+  EXPECT_TRUE(tried(simulated.presses, {"L", "disc"}, {}).presses.empty());
   simulated.add_shapes(1, 15);
-  EXPECT_THROW(cross_validate(simulated.presses, maps, how, nullptr, {.folds = 1}), Error);
+  EXPECT_THROW(tried(simulated.presses, {"L", "disc"}, {.folds = 1}), Error);
+  EXPECT_THROW(tried(simulated.presses, {"L", "disc"}, {.maps_per_object = 0}), Error);
 }
 
 }  // namespace

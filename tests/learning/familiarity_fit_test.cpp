@@ -52,8 +52,8 @@ TEST(Familiarity, TakesNoScoreThatSpeaksForTheUnknown) {
 
 TEST(Familiarity, NeedsBothKinds) {
   const std::vector<FamiliarityScore> scores{{-0.3, 1.0}};
-  EXPECT_THROW(fit_familiarity({scores, {}}), Error);
-  EXPECT_THROW(fit_familiarity({{}, scores}), Error);
+  EXPECT_THROW(fit_familiarity({.known = scores, .unknown = {}}), Error);
+  EXPECT_THROW(fit_familiarity({.known = {}, .unknown = scores}), Error);
   const std::vector<FamiliarityScore> infinite{{-INFINITY, 1.0}};
   EXPECT_THROW(fit_familiarity({scores, infinite}), Error);
   EXPECT_THROW(area_under_curve({scores, {}}, {}), Error);
@@ -64,6 +64,18 @@ TEST(AreaUnderCurve, CountsPairs) {
   const std::vector<FamiliarityScore> unknown{{0.0, 0.0}, {1.0, 0.0}, {2.0, 0.0}};
   // Right: (1, 0), (3, 0), (3, 1), (3, 2); a tie: (1, 1).
   EXPECT_DOUBLE_EQ(area_under_curve({known, unknown}, {.explained_slope = 1.0}), 4.5 / 6.0);
+}
+
+TEST(AreaUnderCurve, OfAFoldIsByTheRegressionOfTheOthers) {
+  const std::vector<FamiliarityScore> high{{-0.1, 0.0}, {-0.2, 0.0}};
+  const std::vector<FamiliarityScore> low{{-0.8, 0.0}, {-0.9, 0.0}};
+  const std::vector<FamiliarityScores> folds{{high, low}, {high, low}, {low, high}};
+  // Two of three folds say that known presses score higher; the third's own would not.
+  EXPECT_EQ(area_under_curve(folds, 2), 0.0);
+  EXPECT_EQ(area_under_curve(std::vector<FamiliarityScores>{{high, low}, {low, low}}, 0), 0.5)
+      << "the other says nothing";
+  EXPECT_FALSE(area_under_curve(std::vector<FamiliarityScores>{{high, low}}, 0).has_value());
+  EXPECT_FALSE(area_under_curve(std::vector<FamiliarityScores>{{high, {}}, {high, low}}, 0));
 }
 
 }  // namespace

@@ -1,5 +1,6 @@
 #include "temperature_fit.hpp"
 
+#include <array>
 #include <cmath>
 #include <vector>
 
@@ -22,7 +23,7 @@ std::vector<ScoredPress> drawn_presses(std::size_t count, double temperature, do
   Uniform random(seed);
   std::vector<ScoredPress> presses;
   for (std::size_t i = 0; i < count; ++i) {
-    ScoredPress press;
+    ScoredPress press{.fold = i % 5};
     for (int label = 0; label < 5; ++label) {
       press.log_evidence.push_back(-900.0 + 2.0 * temperature * normal(random));
       press.log_density.push_back(3.0 * normal(random));
@@ -62,6 +63,45 @@ TEST(TemperatureFit, LeavesFeaturesOutWhereAPressHasNone) {
 TEST(TemperatureFit, GivesFeaturesThatSayNothingNoWeight) {
   const TemperatureFit fit = fit_temperature(drawn_presses(2000, 10.0, 0.0, 3));
   EXPECT_NEAR(fit.feature_weight, 0.0, 0.05);
+}
+
+/// Presses of folds that both the evidence, by 200 nats, and the features, by 50 nats, tell apart.
+std::vector<ScoredPress> presses_told_apart_by_both() {
+  std::vector<ScoredPress> presses;
+  for (std::size_t i = 0; i < 20; ++i) {
+    presses.push_back({.truth = 0,
+                       .fold = i % 5,
+                       .log_evidence = {-100.0, -300.0},
+                       .log_density = {-4.0, -54.0}});
+  }
+  return presses;
+}
+
+TEST(TemperatureFit, LeavesTheEvidenceItsSayWhereFeaturesTellAllPressesApart) {
+  const TemperatureFit fit = fit_temperature(presses_told_apart_by_both());
+  EXPECT_NEAR(fit.temperature, 200.0 / std::log(41.0), 2.0) << "as by the evidence alone";
+  EXPECT_GT(fit.feature_weight, 0.0);
+  // With x nats from 50 w, 20 / (1 + 41 e^x) = 1 / (1 + e^-x) - 1 / 2.
+  EXPECT_NEAR(50.0 * fit.feature_weight, 0.93, 0.1);
+  // Lighter presses turn the features round twice as far; the shape still tells.
+  const ScoredPress lighter{
+      .truth = 0, .log_evidence = {-100.0, -300.0}, .log_density = {-154.0, -54.0}};
+  EXPECT_GT(label_probabilities(lighter, fit.temperature, fit.feature_weight)[0], 0.5);
+}
+
+TEST(TemperatureFit, GivesFeaturesNoWeightThatOtherTimesDoNotBearOut) {
+  std::vector<ScoredPress> presses = presses_told_apart_by_both();
+  for (ScoredPress& press : presses) {
+    press.fold = 0;
+  }
+  EXPECT_EQ(fit_temperature(presses).feature_weight, 0.0) << "there is one time alone";
+  // Features that tell four folds apart by little, and mislead by far in the fifth.
+  presses = presses_told_apart_by_both();
+  for (ScoredPress& press : presses) {
+    press.log_evidence = {0.0, -2.0};
+    press.log_density = press.fold == 4 ? std::vector{-60.0, 0.0} : std::vector{0.0, -3.0};
+  }
+  EXPECT_EQ(fit_temperature(presses).feature_weight, 0.0);
 }
 
 TEST(TemperatureFit, StaysFiniteWhereAllPressesAreToldApart) {
@@ -148,23 +188,35 @@ TEST(TemperatureFit, TakesLabelsWithoutAMap) {
   EXPECT_LT(scores_of(presses, 30.0).log_loss, 0.01);
 }
 
-TEST(TemperedByHalves, GivesEachHalfTheTemperatureOfTheOther) {
-  const std::vector<ScoredPress> sharp = drawn_presses(200, 4.0, 0.5, 5);
-  const std::vector<ScoredPress> blunt = drawn_presses(200, 40.0, 0.0, 6);
-  std::vector<ScoredPress> mixed;
-  for (std::size_t i = 0; i < sharp.size(); ++i) {
-    mixed.push_back(sharp[i]);
-    mixed.push_back(blunt[i]);
+TEST(TemperedByFolds, GivesEachFoldTheTemperatureOfTheOthers) {
+  // Folds 0 to 2, of which the first differs from the others.
+  std::vector<ScoredPress> presses = drawn_presses(300, 4.0, 0.5, 5);
+  const std::vector<ScoredPress> blunt = drawn_presses(300, 40.0, 0.0, 6);
+  std::array<std::vector<ScoredPress>, 3> without;
+  for (std::size_t i = 0; i < presses.size(); ++i) {
+    const std::size_t fold = i % 3;
+    presses[i] = fold == 0 ? blunt[i] : presses[i];
+    presses[i].fold = fold;
+    for (std::size_t other = 0; other < 3; ++other) {
+      if (other != fold) {
+        without.at(other).push_back(presses[i]);
+      }
+    }
   }
-  const std::vector<ScoredPress> tempered = tempered_by_halves(mixed).presses;
-  ASSERT_EQ(tempered.size(), mixed.size());
-  const TemperatureFit of_sharp = fit_temperature(sharp);
-  const TemperatureFit of_blunt = fit_temperature(blunt);
-  for (std::size_t i = 0; i < mixed.size(); ++i) {
-    const TemperatureFit& other = i % 2 == 0 ? of_blunt : of_sharp;
+  const std::vector<ScoredPress> tempered = tempered_by_folds(presses).presses;
+  ASSERT_EQ(tempered.size(), presses.size());
+  std::vector<TemperatureFit> fits;
+  for (const std::vector<ScoredPress>& others : without) {
+    fits.push_back(fit_temperature(others));
+  }
+  EXPECT_GT(fits[0].feature_weight, 0.2);
+  EXPECT_GT(fits[1].temperature, 2.0 * fits[0].temperature);
+  for (std::size_t i = 0; i < presses.size(); ++i) {
+    const TemperatureFit& other = fits[i % 3];
     const std::vector<double> p =
-        label_probabilities(mixed[i], other.temperature, other.feature_weight);
-    EXPECT_EQ(tempered[i].truth, mixed[i].truth);
+        label_probabilities(presses[i], other.temperature, other.feature_weight);
+    EXPECT_EQ(tempered[i].truth, presses[i].truth);
+    EXPECT_EQ(tempered[i].fold, presses[i].fold);
     EXPECT_TRUE(tempered[i].log_density.empty()) << "the weight counts already";
     for (std::size_t label = 0; label < p.size(); ++label) {
       EXPECT_NEAR(std::exp(tempered[i].log_evidence[label]), p[label], 1e-12);
@@ -172,15 +224,21 @@ TEST(TemperedByHalves, GivesEachHalfTheTemperatureOfTheOther) {
   }
 }
 
-TEST(TemperedByHalves, GivesGroupsTheGrowthOfTheOtherHalf) {
-  const std::vector<ScoredPress> presses = drawn_groups(400, 1, 4.0, 12);
-  const GroupHalves groups{
+TEST(TemperedByFolds, GivesGroupsTheGrowthOfTheOtherHalf) {
+  std::vector<ScoredPress> presses = drawn_groups(400, 1, 4.0, 12);
+  for (std::size_t i = 0; i < presses.size(); ++i) {
+    presses[i].fold = i % 2;
+  }
+  GroupHalves groups{
       drawn_groups(400, 3, 20.0, 13),
       std::vector<ScoredPress>(400, {.truth = 0,
                                      .touches = 3,
                                      .log_evidence = {0.0, -300.0, -300.0, -300.0, -300.0},
                                      .log_density = {}})};
-  const TemperedPresses tempered = tempered_by_halves(presses, groups);
+  for (ScoredPress& group : groups[0]) {
+    group.fold = 0;
+  }
+  const TemperedPresses tempered = tempered_by_folds(presses, groups);
   ASSERT_EQ(tempered.groups.size(), 800U);
   std::vector<ScoredPress> odd;
   for (std::size_t i = 1; i < presses.size(); i += 2) {
@@ -193,22 +251,26 @@ TEST(TemperedByHalves, GivesGroupsTheGrowthOfTheOtherHalf) {
   EXPECT_NEAR(tempered.groups[400].log_evidence[1], -300.0 / 20.0, 2.0);
 }
 
-TEST(TemperedByHalves, TakesAllPressesWhereTheOtherHalfHasNoChoice) {
+TEST(TemperedByFolds, TakesAllPressesWhereTheOtherHalfHasNoChoice) {
   const ScoredPress choice{.truth = 0, .log_evidence = {-100.0, -300.0}, .log_density = {}};
-  const ScoredPress none{.truth = 0, .log_evidence = {-100.0, -INFINITY}, .log_density = {}};
+  const ScoredPress none{
+      .truth = 0, .fold = 1, .log_evidence = {-100.0, -INFINITY}, .log_density = {}};
   const double alone = fit_temperature(std::vector{choice}).temperature;
-  EXPECT_NEAR(tempered_by_halves(std::vector{choice}).presses.front().log_evidence[1],
+  EXPECT_NEAR(tempered_by_folds(std::vector{choice}).presses.front().log_evidence[1],
               -200.0 / alone - std::log1p(std::exp(-200.0 / alone)), 1e-9);
-  const std::vector<ScoredPress> tempered = tempered_by_halves(std::vector{none, choice}).presses;
+  const std::vector<ScoredPress> tempered = tempered_by_folds(std::vector{none, choice}).presses;
   EXPECT_EQ(tempered[0].log_evidence[0], 0.0);
   EXPECT_LT(tempered[1].log_evidence[1], -1.0);
 }
 
-TEST(TemperedByHalves, StaysFiniteWhereAPressIsSurelyWrong) {
+TEST(TemperedByFolds, StaysFiniteWhereAPressIsSurelyWrong) {
   std::vector<ScoredPress> presses(20,
                                    {.truth = 0, .log_evidence = {0.0, -100.0}, .log_density = {}});
+  for (std::size_t i = 0; i < presses.size(); ++i) {
+    presses[i].fold = i % 2;
+  }
   presses[4].log_evidence = {-1e6, 0.0};  // its probability is no number above 0
-  const std::vector<ScoredPress> tempered = tempered_by_halves(presses).presses;
+  const std::vector<ScoredPress> tempered = tempered_by_folds(presses).presses;
   EXPECT_LT(tempered[4].log_evidence[0], -1e4);
   EXPECT_TRUE(std::isfinite(scores_of(tempered, 1.0).log_loss));
 }
@@ -223,6 +285,23 @@ TEST(ScoresOfPresses, RefusesWhatCannotBeTried) {
   const std::vector<ScoredPress> infinite{
       {.truth = 1, .log_evidence = {1.0, -INFINITY}, .log_density = {}}};
   EXPECT_THROW(fit_temperature(infinite), Error);
+}
+
+TEST(ClearlyLess, IsByMoreThanTwoStandardErrors) {
+  // Differences one above and one below their mean in turn: a standard error of 1 / sqrt(n - 1).
+  const auto losses = [](double mean, int n) {
+    std::vector<double> of_each;
+    for (int i = 0; i < n; ++i) {
+      of_each.push_back(10.0 - mean + (i % 2 == 0 ? 1.0 : -1.0));
+    }
+    return of_each;
+  };
+  const std::vector<double> same(100, 10.0);
+  EXPECT_TRUE(is_clearly_less(losses(2.0, 100), same));
+  EXPECT_TRUE(is_clearly_less(losses(0.21, 100), same));
+  EXPECT_FALSE(is_clearly_less(losses(0.19, 100), same)) << "within two standard errors of 0.1005";
+  EXPECT_FALSE(is_clearly_less(losses(-2.0, 100), same));
+  EXPECT_FALSE(is_clearly_less(same, same));
 }
 
 }  // namespace

@@ -113,6 +113,8 @@ TEST_F(ProfileFile, IsRefusedWhereItIsNone) {
   expect_refused("", {"line 1", "give a map with keys out of name"});
   expect_refused("just text", {"line 1", "just text", "give a map"});
   expect_refused("name: [", {"correct the YAML"});
+  expect_refused(std::string(head) + packet + "---\nname: other\n",
+                 {"line 5", "second document", "leave one"});
   expect_refused("name: own\n", {"'elements' is missing"});
   expect_refused(head, {"'packet' is missing"});
 }

@@ -1,0 +1,125 @@
+// What judges a calibration has not seen what it judges: noise has an area under the curve of one
+// half, and a press is judged alike whatever the others of its fold are.
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "sensor_calibration.hpp"
+#include "simulated_presses.hpp"
+#include "synthetic.hpp"
+
+namespace palpate {
+namespace {
+
+/// Presses of random pressures, of labels that say nothing of them.
+struct Noise {
+  std::vector<Recording> recordings;
+  std::vector<Press> presses;
+
+  Noise(bool known_poses, std::uint64_t seed) {
+    Uniform random(seed);
+    for (const char* label : {"A", "B", "C"}) {
+      Recording recording;
+      recording.path = label;
+      recording.object = label;
+      recording.elements_mm = grid_array(3, 3, 2.0);
+      for (int touch = 0; touch < 8; ++touch) {
+        recording.T_robot_sensor.push_back(
+            {{random(-3.0, 3.0), random(-3.0, 3.0)}, random(0.0, two_pi)});
+        for (std::size_t e = 0; e < recording.elements_mm.size(); ++e) {
+          recording.pressure.push_back(std::exp(random(-3.0, 3.0)));
+        }
+      }
+      recordings.push_back(std::move(recording));
+    }
+    for (const Recording& recording : recordings) {
+      for (std::size_t touch = 0; touch < recording.size(); ++touch) {
+        presses.push_back(known_poses ? posed_press(recording, touch)
+                                      : single_press(recording, touch));
+      }
+    }
+  }
+};
+
+class NoiseCalibration : public testing::TestWithParam<bool> {};
+
+TEST_P(NoiseCalibration, HasAnAreaUnderTheCurveOfOneHalf) {
+  constexpr int sets = 24;
+  const SensorCalibrationOptions options{.tables = {{MapLayer::log_odds, 2}}, .folds = 3};
+  std::vector<double> areas;
+  for (int set = 0; set < sets; ++set) {
+    const Noise noise(GetParam(), 100 + static_cast<std::uint64_t>(set));
+    areas.push_back(*calibrate_sensor(noise.presses, {}, options).area_under_curve);
+  }
+  double mean = 0.0;
+  for (const double area : areas) {
+    mean += area / sets;
+  }
+  double variance = 0.0;
+  for (const double area : areas) {
+    variance += (area - mean) * (area - mean) / (sets - 1.0);
+  }
+  const double standard_error = std::sqrt(variance / sets);
+  EXPECT_LT(standard_error, 0.02);
+  EXPECT_NEAR(mean, 0.5, 2.5 * standard_error);
+}
+
+TEST_P(NoiseCalibration, JudgesAFoldByWhatTheOtherFoldsSayAlone) {
+  const bool known_poses = GetParam();
+  constexpr std::size_t touches = 15;
+  constexpr std::size_t elements = 36;
+  constexpr std::size_t judged = 2;  // the fold
+  LetterPresses letters;
+  letters.add("A", touches, 61);
+  letters.add("U", touches, 62);
+  letters.make_presses(known_poses);
+  const std::vector<std::size_t> fold = folds_of(letters.presses, 5);
+  const ModelLearning how{
+      .readings = {.spacing_mm = 1.9},
+      .bins = known_poses ? std::optional(BinSteps{1.0, 1.0, 0.5}) : std::nullopt};
+  const auto model = [&] {
+    letters.make_presses(known_poses);
+    const CrossValidator validator(letters.presses, {"A", "U"}, {});
+    return FoldLearning(validator.presses_without(judged), how).learn({MapLayer::mean_level, 4});
+  };
+  const auto press_harder = [&](bool judged_ones) {
+    for (std::size_t i = 0; i < fold.size(); ++i) {
+      if ((fold[i] == judged) == judged_ones) {
+        std::vector<double>& pressure = letters.recordings[i / touches].pressure;
+        for (std::size_t e = 0; e < elements; ++e) {
+          double& of_element = pressure[(i % touches) * elements + e];
+          of_element = 3.0 + 2.0 * of_element * of_element;
+        }
+      }
+    }
+  };
+  const FoldModel before = model();
+  press_harder(true);
+  const FoldModel same = model();
+  press_harder(false);
+  const FoldModel other = model();
+  const auto spread_mm = [](const FoldModel& of) { return *of.maps[0].map.spread_mm; };
+  EXPECT_EQ(same.how.contact.classifier.threshold, before.how.contact.classifier.threshold);
+  EXPECT_NE(other.how.contact.classifier.threshold, before.how.contact.classifier.threshold);
+  EXPECT_EQ(same.how.contact.classifier.ratio, before.how.contact.classifier.ratio);
+  EXPECT_NE(other.how.contact.classifier.ratio, before.how.contact.classifier.ratio);
+  EXPECT_EQ(same.how.contact.prior, before.how.contact.prior);
+  EXPECT_EQ(same.how.level_edges, before.how.level_edges);
+  EXPECT_NE(other.how.level_edges, before.how.level_edges);
+  EXPECT_EQ(same.how.layer.full_level, before.how.layer.full_level);
+  EXPECT_EQ(spread_mm(same), spread_mm(before));
+  EXPECT_EQ(spread_mm(other) != spread_mm(before), known_poses) << "else of the spacing";
+  EXPECT_EQ(same.maps[0].map.log_odds, before.maps[0].map.log_odds);
+  EXPECT_EQ(same.table->shared, before.table->shared);
+}
+
+INSTANTIATE_TEST_SUITE_P(AtPoses, NoiseCalibration, testing::Bool(),
+                         [](const auto& test) { return test.param ? "Known" : "Unknown"; });
+
+}  // namespace
+}  // namespace palpate
