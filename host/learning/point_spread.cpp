@@ -165,25 +165,35 @@ Field blurred(const Field& field, double sigma_mm, double edge_mm) {
     sum += kernel.back();
   }
   const double* middle = kernel.data() + reach;
+  // Row by row: the cells of the innermost loop lie side by side.
+  const auto add = [](double factor, const double* from, double* to, int cells) {
+    for (int i = 0; i < cells; ++i) {
+      to[i] += factor * from[i];
+    }
+  };
+  const auto row = [&](auto& of, int j) {
+    return of.values.data() + static_cast<std::size_t>(j) * of.nx;
+  };
   Field along = field;
   Field result = field;
+  std::ranges::fill(along.values, 0.0);
+  std::ranges::fill(result.values, 0.0);
   for (int j = 0; j < field.ny; ++j) {
-    for (int i = 0; i < field.nx; ++i) {
-      double value = 0.0;
-      for (int k = std::max(-reach, -i); k <= std::min(reach, field.nx - 1 - i); ++k) {
-        value += middle[k] * field.at(i + k, j);
-      }
-      along.at(i, j) = value / sum;
+    for (int k = std::max(-reach, 1 - field.nx); k <= std::min(reach, field.nx - 1); ++k) {
+      add(middle[k], row(field, j) + std::max(0, k), row(along, j) + std::max(0, -k),
+          field.nx - std::abs(k));
     }
   }
+  for (double& value : along.values) {
+    value /= sum;
+  }
   for (int j = 0; j < field.ny; ++j) {
-    for (int i = 0; i < field.nx; ++i) {
-      double value = 0.0;
-      for (int k = std::max(-reach, -j); k <= std::min(reach, field.ny - 1 - j); ++k) {
-        value += middle[k] * along.at(i, j + k);
-      }
-      result.at(i, j) = value / sum;
+    for (int k = std::max(-reach, -j); k <= std::min(reach, field.ny - 1 - j); ++k) {
+      add(middle[k], row(along, j + k), row(result, j), field.nx);
     }
+  }
+  for (double& value : result.values) {
+    value /= sum;
   }
   return result;
 }
