@@ -12,7 +12,6 @@
 #include <fmt/format.h>
 #include <tbb/parallel_for.h>
 
-#include "feature_learning.hpp"
 #include "host_progress.hpp"
 #include "nearby_fit.hpp"
 #include "palpate/error.hpp"
@@ -75,14 +74,9 @@ class FoldTrial {
 
   void run(const std::function<void(double)>& progress, CrossValidation& result) const {
     std::vector<std::size_t> tried;
-    std::vector<LabelledFeatures> building;
     for (std::size_t i = 0; i < presses_.size(); ++i) {
-      if (fold_of_[i] != fold_) {
-        if (!presses_[i].T_object_robot) {
-          building.push_back({presses_[i].label, features_of(presses_[i])});
-        }
-      } else if (const auto label = label_of(presses_[i].label);
-                 label && !maps_of_[*label].empty()) {
+      const std::optional<std::size_t> label = label_of(presses_[i].label);
+      if (fold_of_[i] == fold_ && label && !maps_of_[*label].empty()) {
         tried.push_back(i);
       }
     }
@@ -91,10 +85,8 @@ class FoldTrial {
     }
     const Unknowns asked = unknowns(tried);
     const auto scores = score(asked.presses, progress);
-    const LearnedFeatures features =
-        building.empty() ? LearnedFeatures{} : learn_features(building);
     for (std::size_t i = 0; i < asked.presses.size(); ++i) {
-      ScoredPress scored = scored_press(asked.presses[i], scores[i], features);
+      ScoredPress scored = scored_press(asked.presses[i], scores[i]);
       if (i < tried.size()) {
         add_fit(asked.presses[i], scores[i], scored, result);
         result.presses.push_back(std::move(scored));
@@ -165,11 +157,6 @@ class FoldTrial {
     return static_cast<std::size_t>(at - labels_.begin());
   }
 
-  /// The features of a press: of its first touch.
-  PressFeatures features_of(const Press& press) const {
-    return press_features(press.touches.front(), model_.how.contact.classifier);
-  }
-
   ContactModel contact_for(std::size_t label) const {
     return model_.table ? contact_with(model_.how.contact, *model_.table, labels_[label])
                         : model_.how.contact;
@@ -199,8 +186,7 @@ class FoldTrial {
     return scores;
   }
 
-  ScoredPress scored_press(const Press& press, const std::vector<LabelScore>& scores,
-                           const LearnedFeatures& features) const {
+  ScoredPress scored_press(const Press& press, const std::vector<LabelScore>& scores) const {
     ScoredPress scored{.truth = *label_of(press.label),
                        .fold = fold_,
                        .touches = press.touches.size(),
@@ -209,13 +195,14 @@ class FoldTrial {
     for (const LabelScore& score : scores) {
       scored.log_evidence.push_back(score.log_evidence());
     }
-    // A touch at a known pose shows a part of an object: its features tell where that is.
-    if (!press.T_object_robot) {
-      const PressFeatures own = features_of(press);
+    if (model_.features) {
+      const PressFeatures own =
+          press_features(press.touches.front(), model_.how.contact.classifier);
       for (const std::string& label : labels_) {
-        const auto known = features.objects.find(label);
-        scored.log_density.push_back(
-            (known == features.objects.end() ? features.any : known->second).log_density(own));
+        const auto known = model_.features->objects.find(label);
+        const FeatureDistribution& of_label =
+            known == model_.features->objects.end() ? model_.features->any : known->second;
+        scored.log_density.push_back(of_label.log_density(own));
       }
     }
     return scored;

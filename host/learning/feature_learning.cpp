@@ -97,4 +97,13 @@ LearnedFeatures learn_features(std::span<const LabelledFeatures> presses) {
   return learned;
 }
 
+LearnedFeatures learn_features(const std::vector<Press>& presses,
+                               const ContactClassifier& classifier) {
+  std::vector<LabelledFeatures> features;
+  for (const Press& press : presses) {
+    features.push_back({press.label, press_features(press.touches.front(), classifier)});
+  }
+  return learn_features(features);
+}
+
 }  // namespace palpate

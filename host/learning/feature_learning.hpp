@@ -2,8 +2,10 @@
 
 #include <span>
 #include <string>
+#include <vector>
 
 #include "palpate/learned_sensor.hpp"
+#include "press.hpp"
 
 namespace palpate {
 
@@ -21,5 +23,8 @@ struct LabelledFeatures {
 /// one. `any` has the mean and covariance of all presses. The weight is left at 0.
 /// @throws Error on no press
 LearnedFeatures learn_features(std::span<const LabelledFeatures> presses);
+/// The same of presses, each by its first touch.
+LearnedFeatures learn_features(const std::vector<Press>& presses,
+                               const ContactClassifier& classifier);
 
 }  // namespace palpate

@@ -4,6 +4,7 @@
 #include <string>
 #include <utility>
 
+#include "feature_learning.hpp"
 #include "tried_bins.hpp"
 
 namespace palpate {
@@ -55,6 +56,9 @@ FoldLearning::FoldLearning(std::vector<Press> others, const ModelLearning& how)
       how.bins && how.given.empty()
           ? maps_of_objects(learned_.presses, learned_.readings.maps(how.readings.spacing_mm))
           : learned_.maps;
+  if (!how.bins) {
+    model_.features = learn_features(learned_.presses, learned_.readings.classifier);
+  }
 }
 
 const FoldModel& FoldLearning::learn(const TableKind& kind,

@@ -320,12 +320,7 @@ class SensorLearning {
     result_.sensor.temperature = fit.temperature;
     result_.sensor.temperature_growth = fit.growth;
     if (!known_poses_) {
-      std::vector<LabelledFeatures> features;
-      for (const Press& press : all_.presses) {
-        features.push_back(
-            {press.label, press_features(press.touches.front(), result_.sensor.classifier)});
-      }
-      result_.sensor.features = learn_features(features);
+      result_.sensor.features = learn_features(all_.presses, result_.sensor.classifier);
       result_.sensor.features->weight = fit.feature_weight;
     }
     learn_fit_scale(learned.fit_z);

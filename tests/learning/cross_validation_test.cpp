@@ -6,6 +6,7 @@
 
 #include <gtest/gtest.h>
 
+#include "feature_learning.hpp"
 #include "palpate/error.hpp"
 #include "simulated_presses.hpp"
 #include "synthetic.hpp"
@@ -33,6 +34,9 @@ CrossValidation tried(const std::vector<Press>& presses, const std::vector<std::
     model.maps = options.bins ? maps_of_objects(others, map_options())
                               : maps_of_presses(others, map_options());
     model.how = learning(model.maps);
+    if (!options.bins && !others.empty()) {
+      model.features = learn_features(others, model.how.contact.classifier);
+    }
     if (with_table) {
       model.table = learn_table(others, model.maps, model.how).table;
     }
@@ -124,6 +128,38 @@ TEST(CrossValidation, LooksForPressesAtKnownPosesAsForUnknownsAloneAndInGroups) 
   EXPECT_GT(scores_of(found.presses, 1.0).accuracy(), 0.85) << "24 of 38 are of A";
   const CrossValidation again = tried(letters.presses, {"A", "U"}, options);
   EXPECT_EQ(both(again.groups).back().log_evidence, groups.back().log_evidence);
+}
+
+TEST(CrossValidation, TakesNoMoreMapsOfAnObjectThanItMay) {
+  SimulatedPresses simulated;
+  simulated.add_shapes(4, 21);
+  const auto evidence = [&](std::size_t most) {
+    return tried(simulated.presses, {"L", "disc"}, {.folds = 2, .maps_per_object = most})
+        .presses.front()
+        .log_evidence[0];
+  };
+  // The other fold has two presses of each: the mean over both is at least half of the first's.
+  EXPECT_NE(evidence(2), evidence(1));
+  EXPECT_GT(evidence(2), evidence(1) - std::log(2.0) - 1e-9);
+  EXPECT_EQ(evidence(3), evidence(2));
+}
+
+TEST(CrossValidation, SharesTheGroupsOfFewPressesBetweenTheHalves) {
+  LetterPresses letters;
+  letters.add("A", 8, 16);
+  letters.add("U", 8, 17);
+  const CrossValidation found =
+      tried(letters.presses, {"A", "U"},
+            {.folds = 2,
+             .bins = RecognitionBins{.lattice = {.x_mm = {-9.0, 9.0, 6},
+                                                 .y_mm = {-9.0, 9.0, 6},
+                                                 .theta_rad = {0.0, two_pi, 8}}}});
+  // One of each letter in each fold.
+  for (const std::vector<ScoredPress>& half : found.groups) {
+    ASSERT_EQ(half.size(), 2U);
+    EXPECT_NE(half[0].fold, half[1].fold);
+    EXPECT_NE(half[0].truth, half[1].truth);
+  }
 }
 
 TEST(CrossValidation, JudgesTheFitOfPressesAtKnownPosesWhereTheyAre) {

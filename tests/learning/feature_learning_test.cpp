@@ -33,6 +33,11 @@ TEST(FeatureLearning, DrawsDeviationsTowardsThePooledOnes) {
   EXPECT_EQ(learned.weight, 0.0);
 }
 
+TEST(FeatureLearning, NoCorrelationIsSoHighThatRoundingInAFileBreaksIt) {
+  const std::vector<LabelledFeatures> presses{press("A", 1.0), press("A", 1e6)};
+  EXPECT_NEAR(learn_features(presses).any.correlation[0], 0.999, 1e-6);
+}
+
 TEST(FeatureLearning, FeaturesThatGoTogetherAreExpectedToGoTogether) {
   // The force is the area's double or so, and the peak goes its own way.
   const std::vector<LabelledFeatures> presses{{"A", {{1.0, 2.1, 5.0}}}, {"A", {{2.0, 3.9, 5.2}}},

@@ -111,11 +111,18 @@ TEST_P(NoiseCalibration, JudgesAFoldByWhatTheOtherFoldsSayAlone) {
   EXPECT_EQ(same.how.contact.prior, before.how.contact.prior);
   EXPECT_EQ(same.how.level_edges, before.how.level_edges);
   EXPECT_NE(other.how.level_edges, before.how.level_edges);
+  EXPECT_EQ(before.how.layer.near_mm, 2.0 * how.readings.spacing_mm);
+  EXPECT_EQ(before.how.layer.far_mm, 6.0 * how.readings.spacing_mm);
   EXPECT_EQ(same.how.layer.full_level, before.how.layer.full_level);
   EXPECT_EQ(spread_mm(same), spread_mm(before));
   EXPECT_EQ(spread_mm(other) != spread_mm(before), known_poses) << "else of the spacing";
   EXPECT_EQ(same.maps[0].map.log_odds, before.maps[0].map.log_odds);
   EXPECT_EQ(same.table->shared, before.table->shared);
+  ASSERT_EQ(same.features.has_value(), !known_poses);
+  if (!known_poses) {
+    EXPECT_EQ(same.features->any.mean, before.features->any.mean);
+    EXPECT_NE(other.features->any.mean, before.features->any.mean);
+  }
 }
 
 INSTANTIATE_TEST_SUITE_P(AtPoses, NoiseCalibration, testing::Bool(),

@@ -52,6 +52,10 @@ TEST(TemperatureFit, RecoversTheTemperatureOfAnOverconfidentModel) {
   EXPECT_EQ(after.records, 2000U);
 }
 
+TEST(TemperatureFit, GivesFeaturesAWeightOfTwoAtMost) {
+  EXPECT_NEAR(fit_temperature(drawn_presses(500, 1.0, 5.0, 4)).feature_weight, 2.0, 0.01);
+}
+
 TEST(TemperatureFit, LeavesFeaturesOutWhereAPressHasNone) {
   std::vector<ScoredPress> presses = drawn_presses(1000, 10.0, 0.0, 2);
   presses[3].log_density.clear();

@@ -82,6 +82,20 @@ TEST_F(TriedBins, AreRefusedWhereEvenWideOnesAreTooMany) {
   EXPECT_NE(refusal(square(1e5, 2'000'000'000, 2'000'000'000)).find("20 touches"),
             std::string::npos);
   EXPECT_EQ(refusal(square(1e5, 10, 10)), "") << "few bins, however wide";
+  const auto takes_too_long = [&](const PoseLattice& lattice, std::size_t maps) {
+    try {
+      affordable_lattice(lattice, letters_.presses, classifier,
+                         {.maps = maps, .spacing_mm = spacing_mm, .minutes = 1.0});
+    } catch (const Error&) {
+      return true;
+    }
+    return false;
+  };
+  // At least 36 bins of 16 + 36 to 72 readings of 20 touches, four times for each map: 1e11
+  // additions a minute.
+  const double minutes_per_map = 36.0 * 4.0 * 20.0 * (16.0 + 36.0) / 1e11;
+  EXPECT_TRUE(takes_too_long(square(0.5, 1, 360), static_cast<std::size_t>(40 / minutes_per_map)));
+  EXPECT_FALSE(takes_too_long(square(0.5, 1, 360), static_cast<std::size_t>(5 / minutes_per_map)));
 }
 
 }  // namespace

@@ -83,84 +83,12 @@ TEST(UnposedMaps, PressesOfALetterFuseIntoItsShape) {
   }
 }
 
-TEST(UnposedMaps, HoldsMeansAndCounts) {
-  const Recording recording = presses_of("A", 6, 4);
-  const UnposedMaps result = unposed_maps(touches_of(recording), "A", usual_options(1));
-  const OccupancyGrid& map = result.maps.at(0).map;
-  EXPECT_FALSE(fault_of(map));
-  ASSERT_EQ(map.observations.size(), map.log_odds.size());
-  ASSERT_EQ(map.mean_level.size(), map.log_odds.size());
-  EXPECT_EQ(*std::ranges::max_element(map.observations), 6.0F) << "all presses, in the middle";
-  // Of one press alone.
-  const UnposedMaps one = unposed_maps(std::vector{recording.touch(0)}, "A", usual_options(1));
-  const auto largest = [](const std::vector<float>& values) {
-    return *std::ranges::max_element(values);
-  };
-  EXPECT_LT(largest(map.log_odds), 1.5F * largest(one.maps.at(0).map.log_odds)) << "not a sum";
-  EXPECT_LT(largest(map.mean_level), 1.5F * largest(one.maps.at(0).map.mean_level));
-  EXPECT_GT(largest(map.mean_level), 0.5F * largest(one.maps.at(0).map.mean_level));
-}
-
-TEST(UnposedMaps, TwoShapesUnderOneLabelNeedTwoMaps) {
-  const Recording a = presses_of("A", 6, 5);
-  const Recording o = presses_of("ring", 4, 6);
-  const UnposedMaps result =
-      unposed_maps(joined(touches_of(a), touches_of(o)), "x", usual_options(2));
-  ASSERT_EQ(result.maps.size(), 2u);
-  EXPECT_TRUE(result.misfits.empty());
-  EXPECT_EQ(presses_in(result.maps[0]), (std::vector<std::size_t>{0, 1, 2, 3, 4, 5}));
-  EXPECT_EQ(presses_in(result.maps[1]), (std::vector<std::size_t>{6, 7, 8, 9}));
-  // One map more is not taken just because it may be.
-  EXPECT_EQ(unposed_maps(joined(touches_of(a), touches_of(o)), "x", usual_options(3)).maps.size(),
-            2u);
-}
-
-TEST(UnposedMaps, ListsPressesThatFitNowhere) {
-  const Recording a = presses_of("A", 6, 7);
-  const Recording foreign = presses_of("ring", 1, 8);
-  Recording nothing = presses_of("A", 1, 9);
-  std::ranges::fill(nothing.pressure, 0.5);
-  std::vector<Touch> presses = joined(touches_of(a), touches_of(foreign));
-  presses = joined(std::move(presses), touches_of(nothing));
-  const UnposedMaps result = unposed_maps(presses, "A", usual_options(1));
-  ASSERT_EQ(result.maps.size(), 1u);
-  EXPECT_EQ(presses_in(result.maps[0]), (std::vector<std::size_t>{0, 1, 2, 3, 4, 5}));
-  ASSERT_EQ(result.misfits.size(), 2u);
-  EXPECT_EQ(result.misfits[0].press, 6u);
-  EXPECT_EQ(result.misfits[0].reason, Misfit::Reason::unlike);
-  EXPECT_LT(result.misfits[0].fit, least_fit);
-  EXPECT_EQ(result.misfits[1].press, 7u);
-  EXPECT_EQ(result.misfits[1].reason, Misfit::Reason::no_contact);
-}
-
-TEST(UnposedMaps, ContactThatFitsAnywhereIsLeftOut) {
-  const Recording a = presses_of("A", 6, 7);
-  Recording speck = presses_of("A", 1, 9);
-  std::ranges::fill(speck.pressure, 0.5);
-  speck.pressure[100] = 20.0;
-  const UnposedMaps result =
-      unposed_maps(joined(touches_of(a), touches_of(speck)), "A", usual_options(1));
-  ASSERT_EQ(result.misfits.size(), 1u);
-  EXPECT_EQ(result.misfits[0].press, 6u);
-  EXPECT_EQ(result.misfits[0].reason, Misfit::Reason::too_little);
-}
-
-TEST(UnposedMaps, OnePressMakesItsOwnMap) {
-  const Recording a = presses_of("A", 1, 10);
-  const UnposedMaps result = unposed_maps(touches_of(a), "A", usual_options(1));
-  ASSERT_EQ(result.maps.size(), 1u);
-  EXPECT_EQ(result.rounds, 0);
-  EXPECT_FALSE(result.maps[0].presses.at(0).fit);
-  EXPECT_EQ(result.maps[0].presses.at(0).weight, 1.0);
-  EXPECT_GT(overlap(result.maps[0], a, make_shape("A")), 0.5);
-}
-
-TEST(UnposedMaps, NoMorePressesThanMapsStayApart) {
-  const Recording a = presses_of("A", 3, 11);
-  const UnposedMaps result = unposed_maps(touches_of(a), "A", usual_options(4));
-  ASSERT_EQ(result.maps.size(), 3u);
-  for (const UnposedMap& map : result.maps) {
-    EXPECT_EQ(map.presses.size(), 1u);
+TEST(UnposedMaps, PressesThatFitAtEveryAngleCountLess) {
+  const Recording recording = presses_of("ring", 6, 8);
+  const UnposedMaps result = unposed_maps(touches_of(recording), "ring", usual_options(1));
+  for (const PlacedPress& press : result.maps.at(0).presses) {
+    EXPECT_LT(press.weight, 0.4);
+    EXPECT_GT(press.weight, 0.05);
   }
 }
 
