@@ -33,10 +33,11 @@ void* grow(void* memory, std::size_t size, H5FD_file_image_op_t, void* user) {
 
 herr_t take(void* memory, H5FD_file_image_op_t operation, void* user) {
   auto& image = *static_cast<Hdf5Image*>(user);
-  if (operation == H5FD_FILE_IMAGE_OP_FILE_CLOSE && memory != nullptr) {
-    image.bytes.assign(static_cast<const char*>(memory), image.capacity);
+  if (operation == H5FD_FILE_IMAGE_OP_FILE_CLOSE) {
+    image.bytes.reset(static_cast<char*>(memory));
+  } else {
+    std::free(memory);
   }
-  std::free(memory);
   return 0;
 }
 

@@ -1,7 +1,8 @@
 #pragma once
 
 #include <cstddef>
-#include <string>
+#include <cstdlib>
+#include <memory>
 
 #include "hdf5_handle.hpp"
 
@@ -10,11 +11,14 @@ namespace palpate {
 /// The bytes of an HDF5 file made in memory. H5Fget_file_image() would not do: HDF5 1.10 spoils a
 /// checksum in the image of a file with SWMR.
 struct Hdf5Image {
-  std::string bytes;         ///< complete once the file is closed; free space follows its end
-  std::size_t capacity = 0;  ///< of HDF5's memory for it
+  struct Free {
+    void operator()(char* memory) const { std::free(memory); }
+  };
+  std::unique_ptr<char, Free> bytes;  ///< HDF5's own, once the file is closed
+  std::size_t capacity = 0;           ///< in bytes; free space follows the file's end
 };
 
-/// Makes a file of this access property list live in memory; closing it writes its bytes to
+/// Makes a file of this access property list live in memory; closing it leaves its bytes to
 /// `image`, which must live as long as the file.
 void set_in_memory(hid_t access, Hdf5Image& image);
 

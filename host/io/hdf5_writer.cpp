@@ -125,8 +125,8 @@ void Hdf5Writer::save(const std::function<void(const std::filesystem::path&)>& f
   require(H5Fflush(file_.get(), H5F_SCOPE_GLOBAL) >= 0, "the file");
   const ssize_t size = H5Fget_file_image(file_.get(), nullptr, 0);
   file_ = Hdf5Handle(H5I_INVALID_HID, H5Fclose);
-  require(size > 0 && image_.bytes.size() >= static_cast<std::size_t>(size), "the file");
-  target.write(std::string_view(image_.bytes).substr(0, static_cast<std::size_t>(size)));
+  require(size > 0 && image_.capacity >= static_cast<std::size_t>(size), "the file");
+  target.write({image_.bytes.get(), static_cast<std::size_t>(size)});
   if (finished) {
     finished(target.path());
   }
@@ -137,6 +137,14 @@ void Hdf5Writer::add_attribute(const char* name, hid_t type, hid_t space, const 
   const Hdf5Handle attribute(H5Acreate2(file_.get(), name, type, space, H5P_DEFAULT, H5P_DEFAULT),
                              H5Aclose);
   require(attribute.valid() && H5Awrite(attribute.get(), type, values) >= 0, name);
+}
+
+void Hdf5Writer::narrow_dataset(const char* name, const Shape& shape,
+                                const std::vector<double>& values) {
+  const Hdf5Handle dataset = create_dataset(name, shape, H5T_NATIVE_FLOAT, Storage::plain);
+  require(
+      H5Dwrite(dataset.get(), H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, values.data()) >= 0,
+      name);
 }
 
 void Hdf5Writer::add_dataset(const char* name, const Shape& shape, hid_t type, const void* values,

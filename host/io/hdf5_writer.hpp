@@ -44,6 +44,8 @@ class Hdf5Writer {
                Storage storage = Storage::plain) {
     add_dataset(name, shape, native_type(Value{}), values.data(), storage);
   }
+  /// Writes the values as float32, without a copy of them.
+  void narrow_dataset(const char* name, const Shape& shape, const std::vector<double>& values);
   /// Writes a dataset in parts, each one step along the first axis, in order.
   void dataset(const char* name, const Shape& shape,
                const std::function<std::vector<double>(std::size_t)>& part, Storage storage);

@@ -7,6 +7,7 @@
 #include "available_memory.hpp"
 #include "lost_count.hpp"
 #include "number_text.hpp"
+#include "palpate/pose.hpp"
 #include "printable.hpp"
 
 namespace palpate {
@@ -36,15 +37,21 @@ std::uint64_t count_in(const CsvTable& table, std::size_t column, std::uint64_t 
   return static_cast<std::uint64_t>(number);
 }
 
-void reserve(const CsvTable& table, std::uint64_t rows, std::size_t elements,
+/// Reserves memory for so many frames. Requires as well what a recording of them takes, and its
+/// file, which is made in memory: whether each reading is valid and its float32, and three times
+/// the pose and twice the time of each frame.
+/// @param frames in words
+void reserve(const CsvTable& table, const char* frames, std::uint64_t count, std::size_t elements,
              PressureTable& pressures) {
-  std::uint64_t readings = 0;
-  if (__builtin_mul_overflow(rows, elements, &readings)) {
-    readings = UINT64_MAX / sizeof(double);
+  constexpr std::size_t of_reading = sizeof(double) + sizeof(std::uint8_t) + sizeof(float);
+  constexpr std::size_t of_frame = 3 * sizeof(Pose) + 2 * sizeof(double);
+  std::uint64_t bytes = 0;
+  if (__builtin_mul_overflow(count, elements * of_reading + of_frame, &bytes)) {
+    bytes = UINT64_MAX;
   }
-  require_memory(table.path(), fmt::format("a table of {} rows by {} elements", rows, elements),
-                 readings * sizeof(double));
-  pressures.pressure.reserve(readings);
+  require_memory(table.path(),
+                 fmt::format("a table of {} {} by {} elements", count, frames, elements), bytes);
+  pressures.pressure.reserve(count * elements);
 }
 
 // Columns in the order in which they were named: p1 and p10 side by side come from names that were
@@ -137,7 +144,7 @@ class WideTable {
   PressureTable read() {
     PressureTable all;
     all.holds_poses = pose_.has_value();
-    reserve(table_, table_.count_lines(), columns_.size(), all);
+    reserve(table_, "rows", table_.count_lines(), columns_.size(), all);
     double last_s = before_all;
     while (table_.next()) {
       for (const std::size_t column : columns_) {
@@ -222,7 +229,8 @@ class LongTable {
           "or name it by --time-column");
     }
     PressureTable all;
-    reserve(table_, table_.count_lines() / elements_ + 1, elements_, all);
+    reserve(table_, time_ ? "frames, one for each time," : "frames", count_frames(), elements_,
+            all);
     double last = before_all;
     std::vector<bool> read(elements_);
     while (table_.next()) {
@@ -250,6 +258,21 @@ class LongTable {
   }
 
  private:
+  /// At least the number of frames: a number may be written in two ways.
+  std::uint64_t count_frames() const {
+    const std::size_t key = time_ ? time_->index : *frame_;
+    CsvTable rows(table_.path());
+    std::string last;
+    std::uint64_t frames = 0;
+    for (bool first = true; rows.next(); first = false) {
+      if (first || rows.text(key) != last) {
+        last = rows.text(key);
+        ++frames;
+      }
+    }
+    return frames;
+  }
+
   double frame_in(double last) const {
     const double frame = table_.require_number(*frame_);
     if (frame < last) {

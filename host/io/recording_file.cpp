@@ -112,6 +112,11 @@ void write_recording(const std::filesystem::path& path, const Recording& recordi
   require_device_times(path, 0, recording.device_time_s);
   require_lost_counts(path, 0, recording.lost_before);
 
+  const bool narrow =
+      std::all_of(recording.pressure.begin(), recording.pressure.end(),
+                  [](double p) { return static_cast<float>(p) == p || std::isnan(p); });
+  require_memory(path, fmt::format("the file of {} rows by {} elements", n, e),
+                 n * e * (narrow ? sizeof(float) : sizeof(double)));
   Hdf5Writer file(path);
   file.attribute("format", recording_format);
   file.attribute("version", format_version);
@@ -125,18 +130,15 @@ void write_recording(const std::filesystem::path& path, const Recording& recordi
     file.attribute("true_T_object_robot",
                    {pose.translation_mm.x, pose.translation_mm.y, pose.theta_rad});
   }
-  const std::vector<float> narrow(recording.pressure.begin(), recording.pressure.end());
-  const bool exact =
-      std::equal(narrow.begin(), narrow.end(), recording.pressure.begin(),
-                 [](float a, double b) { return a == b || (std::isnan(a) && std::isnan(b)); });
-  if (exact) {
-    file.dataset("pressure", {n, e}, narrow);
+  if (narrow) {
+    file.narrow_dataset("pressure", {n, e}, recording.pressure);
   } else {
     file.dataset("pressure", {n, e}, recording.pressure);
   }
   if (recording.rows != "frames" ||
       std::any_of(recording.T_robot_sensor.begin(), recording.T_robot_sensor.end(), is_finite)) {
     std::vector<double> poses;
+    poses.reserve(3 * n);
     for (const Pose& pose : recording.T_robot_sensor) {
       poses.insert(poses.end(), {pose.translation_mm.x, pose.translation_mm.y, pose.theta_rad});
     }

@@ -213,16 +213,18 @@ TEST_F(ImportCommand, AGridCountsRowByRow) {
                 {-2.5, -1.25}, {0, -1.25}, {2.5, -1.25}, {-2.5, 1.25}, {0, 1.25}, {2.5, 1.25}}));
 }
 
+/// The largest memory of a command so far.
+long largest_kib() {
+  rusage usage{};
+  ::getrusage(RUSAGE_CHILDREN, &usage);
+  return usage.ru_maxrss;
+}
+
 // 200,000 frames: 7 MB of text and 6 MB of pressures.
 TEST_F(ImportCommand, LongLogsTakeLittleMemory) {
 #ifdef __SANITIZE_ADDRESS__
   GTEST_SKIP() << "the sanitizer holds memory of its own";
 #endif
-  const auto largest_kib = [] {
-    rusage usage{};
-    ::getrusage(RUSAGE_CHILDREN, &usage);
-    return usage.ru_maxrss;
-  };
   done(command({}));
   const long before = largest_kib();
   {
@@ -237,6 +239,23 @@ TEST_F(ImportCommand, LongLogsTakeLittleMemory) {
   // twice; every row of text would be 40 bytes more.
   EXPECT_LT(largest_kib() - before, 64 * 1024);
   EXPECT_EQ(read_recording(folder_ / "o.h5").size(), 200'000u);
+}
+
+// 2,000 readings at as many times: frames of 4,096 elements each.
+TEST_F(ImportCommand, ALongTableTakesTheMemoryThatIsChecked) {
+#ifdef __SANITIZE_ADDRESS__
+  GTEST_SKIP() << "the sanitizer holds memory of its own";
+#endif
+  done(command({}));
+  const long before = largest_kib();
+  std::string log = "time,element,pressure\n";
+  for (int i = 0; i < 2000; ++i) {
+    log += std::to_string(i) + "," + std::to_string(i) + ",0.5\n";
+  }
+  put("log.csv", log);
+  done({"import", "log.csv", "--array", "64:64:2", "-o", "o.h5"});
+  constexpr long checked_kib = 2000 * (4096 * (8 + 1 + 4) + 88) / 1024;
+  EXPECT_LT(largest_kib() - before, checked_kib);
 }
 
 }  // namespace

@@ -12,6 +12,7 @@
 #include "file_summary.hpp"
 #include "hdf5_rows.hpp"
 #include "palpate/files.hpp"
+#include "pressure_table.hpp"
 #include "recording_suspicions.hpp"
 #include "scratch_folder.hpp"
 
@@ -170,6 +171,18 @@ TEST_F(LargeFile, RecordingIsSurveyedInPieces) {
   });
   EXPECT_EQ(message, "");
   EXPECT_NE(with_memory(20 * mib, [&] { read_recording(path_); }), "") << "the limit holds";
+}
+
+// Each of 20,000 readings has its own time, and so a frame of 1,000 elements.
+TEST_F(LargeFile, LongTableIsRefusedBeforeItTakesMoreThanThereIs) {
+  std::string text = "time,element,pressure\n";
+  for (int i = 0; i < 20'000; ++i) {
+    text += fmt::format("{},0,1\n", i);
+  }
+  put_bytes(path_, text);
+  expect_named(with_memory(128 * mib, [&] { read_pressures(path_, 1000, {}); }),
+               {path_.c_str(), "20000 frames, one for each time, by 1000 elements", "needs 0.3 GB",
+                "0.1 GB are available"});
 }
 
 // What compresses by a factor of 1000 takes its time to read; the limit is for what is read.
