@@ -227,8 +227,11 @@ NpyArray read_npy(const std::filesystem::path& path) {
            file_bytes - begin, fmt::format("{}", fmt::join(header.shape(), ", ")), bytes);
   }
   const std::size_t count = bytes / type.width;
-  require_memory(path, fmt::format("an array of {} numbers", count),
-                 (header.fortran_order() ? 2 : 1) * count * sizeof(double));
+  std::uint64_t needed = 0;  // a sparse file's count may be any
+  if (__builtin_mul_overflow(count, (header.fortran_order() ? 2 : 1) * sizeof(double), &needed)) {
+    needed = UINT64_MAX;
+  }
+  require_memory(path, fmt::format("an array of {} numbers", count), needed);
   NpyArray array{.shape = header.shape(), .values = std::vector<double>(count)};
   constexpr std::size_t piece = 1 << 16;
   std::vector<char> stored(piece * type.width);

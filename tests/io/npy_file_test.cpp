@@ -1,12 +1,20 @@
 #include "npy_file.hpp"
 
 #include <gtest/gtest.h>
+#include <sys/mman.h>
+#include <unistd.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <cstring>
+#include <functional>
 #include <numeric>
+#include <random>
 
+#include <fmt/format.h>
+
+#include "descriptor.hpp"
 #include "scratch_folder.hpp"
 
 namespace palpate {
@@ -112,6 +120,164 @@ TEST_F(Npy, NamesWhatIsWrong) {
   expect_named(input_error([&] { read_npy(path_); }), {"cut off"});
   put_bytes(path_, "\x93NUMPY");
   expect_named(input_error([&] { read_npy(path_); }), {"cut off"});
+}
+
+/// A file in memory, which may be sparse and is quick to write.
+class NpyInMemory : public testing::Test {
+ protected:
+  void put(const std::string& bytes, off_t size) const {
+    ASSERT_EQ(::ftruncate(file_.get(), 0), 0);
+    ASSERT_EQ(::pwrite(file_.get(), bytes.data(), bytes.size(), 0),
+              static_cast<ssize_t>(bytes.size()));
+    ASSERT_EQ(::ftruncate(file_.get(), size), 0);
+  }
+
+  Descriptor file_{::memfd_create("p.npy", MFD_CLOEXEC)};
+  std::filesystem::path path_ = fmt::format("/proc/self/fd/{}", file_.get());
+};
+
+// 4 EiB of numbers, which take more bytes as doubles than 64 bits count.
+TEST_F(NpyInMemory, MoreNumbersThanMemoryAreRefused) {
+  for (const char* order : {"False", "True"}) {
+    const std::string dictionary = fmt::format(
+        "{{'descr': '|u1', 'fortran_order': {}, 'shape': (4611686018427387904,), }}", order);
+    const std::string header = std::string("\x93NUMPY\x01\x00", 8) +
+                               static_cast<char>(dictionary.size()) + '\0' + dictionary;
+    put(header, static_cast<off_t>(header.size() + (1ULL << 62)));
+    try {
+      read_npy(path_);
+      ADD_FAILURE() << "nothing was thrown";
+    } catch (const Error& error) {
+      expect_named(error.what(), {path_.c_str(), "4611686018427387904 numbers", "of memory"});
+    }
+  }
+}
+
+/// Writes what numpy.save or a forger may have written: arrays of few numbers, most of which lie or
+/// are damaged somewhere.
+class Forger {
+ public:
+  std::string file() {
+    const std::string size_of_header = below(2) == 0 ? "\x01" : below(2) == 0 ? "\x02" : "\x03";
+    const auto [descr, width] = type();
+    std::size_t count = 1;
+    const std::string dictionary =
+        fmt::format("{{'descr': {}, 'fortran_order': {}, 'shape': {}, }}{}\n", descr,
+                    one_of({"False", "True"}), shape(count), std::string(below(64), ' '));
+    std::string all = "\x93NUMPY" + size_of_header + '\0';
+    const auto size = static_cast<std::uint32_t>(dictionary.size());
+    all.append(reinterpret_cast<const char*>(&size), size_of_header == "\x01" ? 2 : 4);
+    all += dictionary + numbers(width * count);
+    for (std::size_t damages = below(2) * below(4); damages > 0; --damages) {
+      damage(all, magic_bytes + below(all.size() - magic_bytes));
+    }
+    return all;
+  }
+
+ private:
+  static constexpr std::size_t magic_bytes = 6;
+
+  std::size_t below(std::size_t bound) { return random_() % bound; }
+  template <typename Value>
+  Value one_of(std::initializer_list<Value> values) {
+    return *(values.begin() + below(values.size()));
+  }
+
+  std::pair<const char*, std::size_t> type() {
+    using Type = std::pair<const char*, std::size_t>;
+    return below(4) > 0
+               ? one_of<Type>(
+                     {{"'<f4'", 4}, {"'<f8'", 8}, {"'|u1'", 1}, {"'<i2'", 2}, {"'<u8'", 8}})
+               : one_of<Type>({{"'|O'", 8},
+                               {"'>f8'", 8},
+                               {"'>i4'", 4},
+                               {"'<c16'", 16},
+                               {"'|b1'", 1},
+                               {"'<U7'", 28},
+                               {"'|V8'", 8},
+                               {"'<M8[ns]'", 8},
+                               {"''", 1},
+                               {"'", 1},
+                               {"[('x', '<f4')]", 4},
+                               {"None", 4},
+                               {"'<f99999999999999999999'", 8}});
+  }
+
+  std::string shape(std::size_t& count) {
+    std::string text = "(";
+    for (std::size_t axes = below(5); axes > 0; --axes) {
+      if (below(8) > 0) {
+        const std::size_t extent = below(5);
+        text += fmt::format("{}, ", extent);
+        count *= extent;
+      } else {
+        text += one_of({"-1, ", "4294967296, ", "18446744073709551615, ", "9223372036854775807,",
+                        "99999999999999999999, ", "1e3, ", "0x2, ", "2L, ", "2 ", ",", "(2,), "});
+      }
+    }
+    return text + one_of({")", ")", ")", "", "))"});
+  }
+
+  std::string numbers(std::size_t bytes) {
+    if (below(8) == 0) {
+      return "\x80\x02"
+             "cposix\nsystem\n(S'true'\ntR.";  // a pickle, which would run a command
+    }
+    std::string all(below(4) > 0 ? bytes : below(300), '\0');
+    std::generate(all.begin(), all.end(), [this] { return static_cast<char>(random_()); });
+    return all;
+  }
+
+  void damage(std::string& all, std::size_t place) {
+    const std::size_t some = std::min(below(20), all.size() - place);
+    switch (below(5)) {
+      case 0:
+        all[place] = static_cast<char>(all[place] ^ (1 << below(8)));
+        break;
+      case 1:
+        all.erase(place, some);
+        break;
+      case 2:
+        all.insert(place, all.substr(place, some));
+        break;
+      case 3:
+        all[place] = static_cast<char>(random_());
+        break;
+      default:
+        all.resize(place);
+    }
+    all.resize(std::max(all.size(), magic_bytes + 1));
+  }
+
+  std::mt19937 random_{20110509};
+};
+
+TEST_F(NpyInMemory, ForgedHeadersAreReadOrRefused) {
+  constexpr int files = 20'000;
+  Forger forger;
+  int read = 0;
+  for (int k = 0; k < files; ++k) {
+    const std::string file = forger.file();
+    put(file, static_cast<off_t>(file.size()));
+    ASSERT_TRUE(is_npy(path_));
+    try {
+      const NpyArray array = read_npy(path_);
+      const std::size_t count = std::accumulate(array.shape.begin(), array.shape.end(),
+                                                std::size_t{1}, std::multiplies<>());
+      ASSERT_EQ(array.values.size(), count) << testing::PrintToString(file);
+      ASSERT_LT(count, file.size()) << testing::PrintToString(file);
+      // None of these is among the types that are read.
+      for (const char* other : {"'|O'", "'>", "'<c", "'|b", "'<U", "'|V", "'<M", "["}) {
+        ASSERT_EQ(file.find(std::string("'descr': ") + other), file.npos)
+            << testing::PrintToString(file);
+      }
+      ++read;
+    } catch (const Error& error) {
+      ASSERT_EQ(error.fault(), Fault::input) << error.what();
+      ASSERT_TRUE(std::string(error.what()).starts_with(path_.string() + ": ")) << error.what();
+    }
+  }
+  EXPECT_GT(read, files / 10) << "few files get past the header";
 }
 
 }  // namespace
