@@ -26,7 +26,8 @@ void Progress::show(double fraction, const std::string& more) {
   visible_ = true;
   const double elapsed = std::chrono::duration<double>(now - start_).count();
   const std::string left =
-      fraction > 0.0 ? fmt::format(", {:.0f} s left", elapsed * (1.0 - fraction) / fraction) : "";
+      fraction > 0.0 ? fmt::format(", {:.0f} s left", elapsed * (1.0 - fraction) / fraction)
+                     : fmt::format(", {:.0f} s so far", elapsed);
   // Carriage return, text, erase to the end of the line.
   const std::string line =
       fmt::format("\r{} {:3.0f} %{}{}\033[K", what_, 100.0 * fraction, more, left);

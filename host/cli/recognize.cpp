@@ -150,6 +150,36 @@ void fit_touch_sd(const Options& options, const Scene& scene, const RecognitionT
   fmt::print("{}", options.json == "-" ? json : touch_sd_text(fit));
 }
 
+/// The line that shows how far the recognition of several unknowns is.
+class UnknownsProgress {
+ public:
+  explicit UnknownsProgress(std::size_t unknowns) : unknowns_(unknowns) {}
+
+  /// Shows the fraction of the present unknown that is done.
+  void show(double fraction) {
+    done_ = fraction;
+    show();
+  }
+  /// Shows the same fraction some time later.
+  void show() {
+    const std::string present = unknowns_ == 1 ? ""
+                                               : fmt::format(", {:.0f} % of unknown {} of {}",
+                                                             100.0 * done_, before_ + 1, unknowns_);
+    line_.show((static_cast<double>(before_) + done_) / static_cast<double>(unknowns_), present);
+  }
+  /// The next unknown begins.
+  void next() {
+    ++before_;
+    done_ = 0.0;
+  }
+
+ private:
+  std::size_t unknowns_;
+  std::size_t before_ = 0;  ///< unknowns that are recognised
+  double done_ = 0.0;       ///< of the present one
+  Progress line_{"recognising"};
+};
+
 void recognize(const Options& options) {
   const Scene scene = scene_of(options.recognition);
   std::vector<Recording> recordings = read_touch_recordings(options.recordings);
@@ -178,6 +208,13 @@ void recognize(const Options& options) {
   }
   Device device = open_device(options.recognition, scene);
   std::string unresolved;
+  std::optional<UnknownsProgress> progress(unknowns.size());
+  // Bounds call it between the steps of their searches, which may take minutes.
+  task.cancel_point = [&] {
+    if (progress) {
+      progress->show();
+    }
+  };
   Recogniser recogniser = open_recogniser(options.recognition, scene, device, task);
   if (!options.png.empty()) {
     make_folder(options.png);
@@ -187,28 +224,23 @@ void recognize(const Options& options) {
   const bool trace = options.trace || !options.png.empty();
   std::vector<RecognitionRecord> records;
   auto json = nlohmann::ordered_json::array();
-  {
-    Progress progress("recognising");
-    for (const Unknown& unknown : unknowns) {
-      const auto show = [&](double fraction) {
-        progress.show((static_cast<double>(records.size()) + fraction) /
-                      static_cast<double>(unknowns.size()));
-      };
-      records.push_back(recognise(recogniser, task, unknown, trace, show));
-      records.back().require_steps();
-      if (unresolved.empty()) {
-        unresolved = unresolved_words(task, recogniser.lattice(), unknown.touches);
-      }
-      show(0.0);
-      json.push_back(to_json(records.back(), task, device.name(), options.trace));
-      if (!options.png.empty()) {
-        write_file(
-            png_path(options, unknown),
-            draw_recognition(sheet_of(records.back(), unknown, task,
-                                      recogniser.marginals(records.back().last().mode.object))));
-      }
+  for (const Unknown& unknown : unknowns) {
+    records.push_back(recognise(recogniser, task, unknown, trace,
+                                [&](double fraction) { progress->show(fraction); }));
+    records.back().require_steps();
+    if (unresolved.empty()) {
+      unresolved = unresolved_words(task, recogniser.lattice(), unknown.touches);
     }
+    json.push_back(to_json(records.back(), task, device.name(), options.trace));
+    if (!options.png.empty()) {
+      write_file(
+          png_path(options, unknown),
+          draw_recognition(sheet_of(records.back(), unknown, task,
+                                    recogniser.marginals(records.back().last().mode.object))));
+    }
+    progress->next();
   }
+  progress.reset();
 
   if (!unresolved.empty()) {
     options.recognition.tell(unresolved);

@@ -65,7 +65,9 @@ Updated update(Recogniser& recogniser, const RecognitionTask& task, std::span<co
   const auto take = [&](std::size_t begin, std::size_t end) {
     const Clock::time_point start = Clock::now();
     const auto show = [&, n = static_cast<double>(touches.size())](double fraction) {
-      progress((static_cast<double>(begin) + fraction * static_cast<double>(end - begin)) / n);
+      // Bounds have only kept the touches, and search when they are asked about the belief.
+      const double taken = recogniser.bounded() == nullptr ? fraction : 0.0;
+      progress((static_cast<double>(begin) + taken * static_cast<double>(end - begin)) / n);
     };
     recogniser.update(touches.subspan(begin, end - begin),
                       progress ? std::function<void(double)>(show) : progress);
@@ -267,6 +269,9 @@ RecognitionRecord recognise(Recogniser& recogniser, const RecognitionTask& task,
       record.trace.push_back(
           take_step(recogniser, task, touches.first(done + together), done, unknown.truth,
                     progress ? std::function<void(double)>(show) : std::function<void(double)>()));
+      if (progress && recogniser.bounded() != nullptr) {
+        show(1.0);
+      }
     }
   } catch (const Error& error) {
     if (progress_threw || error.fault() != Fault::input) {

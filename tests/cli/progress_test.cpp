@@ -7,6 +7,7 @@
 #include <unistd.h>
 
 #include <cerrno>
+#include <csignal>
 #include <memory>
 #include <system_error>
 
@@ -104,7 +105,7 @@ TEST_F(ProgressLine, KnowsNoEndBeforeItHasBegun) {
   const auto progress = begin(terminal);
   now_ += 3s;
   progress->show(0.0);
-  EXPECT_EQ(terminal.printed(), "\rworking   0 %\033[K");
+  EXPECT_EQ(terminal.printed(), "\rworking   0 %, 3 s so far\033[K");
 }
 
 TEST_F(ProgressLine, IsNotShownForShortWork) {
@@ -132,6 +133,22 @@ TEST_F(ProgressOfTheProgram, LeavesStandardErrorEmpty) {
   write_map(folder_ / "A.map.h5", sample_map("A"));
   write_recording(folder_ / "u.h5", sample_unknown("A", {}, 3));
   done({"recognize", "u.h5", "--maps", "A.map.h5", "--bins", "5x5x4", "--each-frame"});
+}
+
+// A touch says next to nothing with this gamma, so that bounds evaluate nearly all of 2.6e10 bins.
+TEST_F(ProgressOfTheProgram, ShowsAnUnknownThatIsSearchedUntilCtrlC) {
+  write_map(folder_ / "A.map.h5", sample_map("A"));
+  write_recording(folder_ / "u.h5", sample_unknown("A", {}, 3));
+  ProgramOnTerminal program(
+      folder_.path(),
+      {"recognize", "u.h5", "--maps", "A.map.h5", "--each-frame", "--filter", "bounded", "--gamma",
+       "0.45", "--x-mm=-60:60", "--y-mm=-60:60", "--bins", "6000x6000x720", "--json", "-"});
+  EXPECT_TRUE(program.shows("\rrecognising   0 %, 0 % of unknown 1 of 3, "));
+  EXPECT_TRUE(program.shows(" s so far"));
+  program.type("\x03");
+  const Outcome outcome = program.finish();
+  EXPECT_EQ(outcome.status, -SIGINT);
+  EXPECT_EQ(outcome.out.find('{'), std::string::npos) << "JSON comes whole or not at all";
 }
 
 }  // namespace

@@ -99,6 +99,20 @@ TEST(Recognise, SaysHowFarItIsAndCanBeLeft) {
   }
 }
 
+TEST(Recognise, CountsTouchesOnceBoundsHaveSearched) {
+  Device device = Device::open();
+  const RecognitionTask task(shapes(), every_filter()[2]);
+  Recogniser recogniser(device, task);
+  for (const bool trace : {false, true}) {
+    std::vector<double> touches;
+    recognise(recogniser, task, unknown_of(touched_letter(8)), trace,
+              [&](double fraction) { touches.push_back(std::round(6.0 * fraction)); });
+    // The three last touches are taken in one by one.
+    EXPECT_EQ(touches, trace ? std::vector<double>({0, 1, 1, 2, 2, 3, 3, 4, 4, 5, 5, 6})
+                             : std::vector<double>({0, 3, 4, 5, 6}));
+  }
+}
+
 /// A cross as large as the learned shapes.
 bool on_cross(const glm::dvec2& p_mm) {
   const double x = std::abs(p_mm.x);
