@@ -45,6 +45,11 @@ void check_outputs(const Options& options, const std::vector<std::filesystem::pa
   for (const std::filesystem::path& file : read) {
     files.reads("RESULTS", file);
   }
+  for (const std::string& results : options.results) {
+    if (is_results_folder(results)) {
+      files.reads("RESULTS", ResultsFolder(results).task());
+    }
+  }
   if (!options.json.empty()) {
     files.writes("--json", options.json, CommandFiles::Dash::stream);
   }
@@ -70,13 +75,11 @@ void tell_missing(const std::string& results) {
   }
   const ResultsFolder folder(results);
   const BatchTask task = read_batch_task(folder.task());
-  std::size_t missing = 0;
-  for (std::size_t chunk = 0; chunk < task.chunks(); ++chunk) {
-    missing += folder.has_chunk(chunk) ? 0 : 1;
-  }
+  const std::size_t chunks = task.chunks();
+  const std::size_t missing = chunks - folder.finished_chunks(chunks).size();
   if (missing > 0) {
     tell_on_stderr(fmt::format("{}: {} of {} chunks are missing; palpate batch completes them",
-                               results, missing, task.chunks()));
+                               results, missing, chunks));
   }
 }
 

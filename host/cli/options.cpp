@@ -6,8 +6,6 @@
 #include <numbers>
 #include <system_error>
 
-#include "atomic_file.hpp"
-
 namespace palpate::cli {
 
 namespace {
@@ -86,8 +84,9 @@ std::string require_whole_number(const std::string& text) {
 
 void require_writable(const std::filesystem::path& file) { const AtomicFile probe(file); }
 
-void write_file(const std::filesystem::path& file, std::string_view bytes) {
-  AtomicFile target(file);
+void write_file(const std::filesystem::path& file, std::string_view bytes,
+                AtomicFile::Links links) {
+  AtomicFile target(file, links);
   target.write(bytes);
   target.commit();
 }

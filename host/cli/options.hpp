@@ -6,6 +6,7 @@
 #include <string>
 #include <string_view>
 
+#include "atomic_file.hpp"
 #include "input_file.hpp"
 #include "palpate/pose.hpp"
 
@@ -47,7 +48,8 @@ std::string require_whole_number(const std::string& text);
 /// Throws Error unless the file can be written. A command checks so before its work begins.
 void require_writable(const std::filesystem::path& file);
 /// Writes a file that appears whole or not at all. Throws Error.
-void write_file(const std::filesystem::path& file, std::string_view bytes);
+void write_file(const std::filesystem::path& file, std::string_view bytes,
+                AtomicFile::Links links = AtomicFile::Links::followed);
 /// Makes the folder if it does not exist. Throws Error.
 void make_folder(const std::filesystem::path& folder);
 

@@ -54,13 +54,16 @@ std::filesystem::path make_beside(const std::filesystem::path& target, const cha
 
 }  // namespace
 
-AtomicFile::AtomicFile(const std::filesystem::path& target) : target_(file_behind(target)) {
+AtomicFile::AtomicFile(const std::filesystem::path& target, Links links)
+    : target_(links == Links::followed ? file_behind(target) : target) {
   std::error_code ignored;
-  const auto type = std::filesystem::status(target, ignored).type();
+  const auto status = links == Links::followed ? std::filesystem::status(target, ignored)
+                                               : std::filesystem::symlink_status(target, ignored);
+  const auto type = status.type();
   if (type == std::filesystem::file_type::directory || !target.has_filename()) {
     refuse(target, "is a folder; give the name of a file");
   }
-  if (type != std::filesystem::file_type::regular &&
+  if (type != std::filesystem::file_type::regular && type != std::filesystem::file_type::symlink &&
       type != std::filesystem::file_type::not_found && type != std::filesystem::file_type::none) {
     refuse(target, "is not a regular file; give the name of a file");
   }

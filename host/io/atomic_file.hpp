@@ -10,9 +10,13 @@ namespace palpate {
 /// file at the target stays.
 class AtomicFile {
  public:
+  /// What becomes of a link under the target's name: the file that it points to is replaced, or
+  /// the link itself.
+  enum class Links { followed, replaced };
+
   /// Creates the empty temporary file.
   /// @throws Error where the folder is missing or refuses, or the target is not a regular file.
-  explicit AtomicFile(const std::filesystem::path& target);
+  explicit AtomicFile(const std::filesystem::path& target, Links links = Links::followed);
   ~AtomicFile();
   AtomicFile(const AtomicFile&) = delete;
   AtomicFile& operator=(const AtomicFile&) = delete;

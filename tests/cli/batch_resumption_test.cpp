@@ -87,12 +87,17 @@ class Worker {
     EXPECT_EQ(::read(ends[0], &byte, 1), 0);
     ::close(ends[0]);
   }
-  ~Worker() {
-    ::kill(pid_, SIGKILL);
-    ::waitpid(pid_, nullptr, 0);
-  }
+  ~Worker() { end(); }
   Worker(const Worker&) = delete;
   Worker& operator=(const Worker&) = delete;
+
+  void end() {
+    if (pid_ > 0) {
+      ::kill(pid_, SIGKILL);
+      ::waitpid(pid_, nullptr, 0);
+    }
+    pid_ = -1;
+  }
 
  private:
   pid_t pid_ = -1;
@@ -103,13 +108,34 @@ TEST_F(BatchResumption, OfTwoProcessesOnOneShardTheSecondIsRefused) {
   {
     const Worker worker(folder_ / "r", {1, 2});
     expect_refused(batch("r", {"--shard", "1/2"}), {"r:", "shard 1/2", "wait"});
-    expect_refused(batch("r"), {"r:", "shard 1/2", "--shard I/2"});
-    expect_refused(batch("r", {"--shard", "2/3"}), {"r:", "shard 1/2"});
+    const auto refusal_of = [&](const cli::Shard& shard) {
+      return input_error([&] {
+        const cli::FolderLock lock(cli::ResultsFolder(folder_ / "r"), shard, [] { return false; });
+      });
+    };
+    expect_named(refusal_of({0, 1}), {"r:", "shard 1/2", "--shard I/2"});
+    expect_named(refusal_of({2, 3}), {"r:", "shard 1/2"});
     EXPECT_EQ(palpate(batch("r", {"--shard", "0/2"})).status, 0);
     expect_refused(batch("r", {"--shard", "0/2", "--gamma", "0.2", "--update"}),
                    {"r:", "--gamma", "other shards are at work"});
   }
   EXPECT_EQ(palpate(batch("r", {"--shard", "1/2"})).status, 3);  // it has the broken recording
+}
+
+// A process that was killed is gone only a moment later.
+TEST_F(BatchResumption, AProcessThatEndsIsWaitedFor) {
+  std::filesystem::create_directories(folder_ / "r");
+  for (const cli::Shard& shard : {cli::Shard{1, 2}, cli::Shard{0, 3}}) {
+    Worker worker(folder_ / "r", {1, 2});
+    int waits = 0;
+    const cli::FolderLock lock(cli::ResultsFolder(folder_ / "r"), shard, [&] {
+      if (++waits == 3) {
+        worker.end();
+      }
+      return true;
+    });
+    EXPECT_EQ(waits, 3);
+  }
 }
 
 TEST_F(BatchResumption, AFolderThatCannotBeWrittenIsRefusedAndRead) {

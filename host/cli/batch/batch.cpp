@@ -69,11 +69,12 @@ struct Chunks {
 
 Chunks chunks_of(const ResultsFolder& folder, const BatchTask& task, const Shard& shard) {
   Chunks chunks{std::vector<bool>(task.chunks()), 0, 0, {}};
+  const std::vector<std::size_t> finished = folder.finished_chunks();
   const std::size_t all = task.unknowns();
   for (std::size_t chunk = shard.index; chunk < chunks.wanted.size(); chunk += shard.count) {
     const std::size_t unknowns = std::min(task.chunk_unknowns, all - chunk * task.chunk_unknowns);
     chunks.unknowns += unknowns;
-    chunks.wanted[chunk] = !folder.has_chunk(chunk);
+    chunks.wanted[chunk] = !std::ranges::binary_search(finished, chunk);
     if (chunks.wanted[chunk]) {
       chunks.to_be_done += unknowns;
       continue;
@@ -158,6 +159,10 @@ int batch(const Options& options, const CLI::App& command) {
     asked.inputs.push_back({std::move(input), {}, {}});
   }
   const ResultsFolder folder(options.results);
+  folder.require_own();
+  if (folder.has_task()) {
+    require_batch_task(folder.task());
+  }
   make_folder(folder.path());
   const FolderLock lock(folder, shard);
   const std::size_t threads =

@@ -256,12 +256,13 @@ class Pipeline {
                         {"failed", chunk.failed},
                         {"host", host_name()},
                         {"device", device_ != nullptr ? device_->name() : "none"},
-                        {"seconds", chunk.seconds}}));
+                        {"seconds", chunk.seconds}}),
+               AtomicFile::Links::replaced);
     std::string text;
     for (const std::string& line : chunk.lines) {
       text += line;
     }
-    write_file(run_.folder.chunk(index), text);
+    write_file(run_.folder.chunk(index), text, AtomicFile::Links::replaced);
   }
 
   const BatchRun& run_;

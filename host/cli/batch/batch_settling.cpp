@@ -114,14 +114,12 @@ SettledBatch settle_batch(const ResultsFolder& folder, const FolderLock& lock, B
   }
   // Results go before the task that they belong to: a process that is killed in between leaves the
   // older task, and less of it.
-  const std::vector<bool> kept =
-      same_task ? equal_chunks(*before, task) : std::vector<bool>(task.chunks());
-  for (std::size_t chunk = 0; chunk < kept.size(); ++chunk) {
-    if (!kept[chunk]) {
+  const std::vector<bool> kept = same_task ? equal_chunks(*before, task) : std::vector<bool>();
+  for (const std::size_t chunk : folder.finished_chunks()) {
+    if (chunk >= kept.size() || !kept[chunk]) {
       folder.remove_chunk(chunk);
     }
   }
-  folder.remove_chunks_from(task.chunks());
   write_batch_task(folder.task(), task);
   return settled;
 }

@@ -22,6 +22,8 @@ namespace fs = std::filesystem;
 
 constexpr const char* format = "palpate.batch";
 constexpr int version = 1;
+/// Far more than anyone recognises, and few enough to count and to keep a bit for each.
+constexpr std::size_t most_unknowns = 1'000'000'000;
 
 /// The program's texts may hold any bytes, as paths may; JSON must be UTF-8. Each byte becomes the
 /// character of its number, so that the text comes back as it was.
@@ -53,6 +55,9 @@ std::string from_utf8(const std::string& text) {
   return bytes;
 }
 
+/// A whole number from 0. @throws Json::exception where it is none
+std::size_t count_of(const Json& json) { return json.get_ref<const Json::number_unsigned_t&>(); }
+
 Json to_json(const BatchEntry& entry) {
   Json json{{"path", to_utf8(entry.input.path)}};
   if (entry.input.frames) {
@@ -75,15 +80,16 @@ BatchEntry entry_of(const Json& json) {
   BatchEntry entry;
   entry.input.path = from_utf8(json.at("path"));
   if (json.contains("frames")) {
-    entry.input.frames = Frames{json.at("frames").at(0), json.at("frames").at(1)};
+    entry.input.frames =
+        Frames{count_of(json.at("frames").at(0)), count_of(json.at("frames").at(1))};
   }
   entry.input.label = from_utf8(json.value("label", ""));
   if (json.contains("bytes")) {
-    entry.stamp = FileStamp{json.at("bytes"), json.at("modified_ns")};
+    entry.stamp = FileStamp{count_of(json.at("bytes")), json.at("modified_ns")};
   }
   if (json.contains("survey")) {
     const Json& survey = json.at("survey");
-    entry.survey = InputSurvey{survey.at(0), survey.at(1), survey.at(2), survey.at(3)};
+    entry.survey = InputSurvey{count_of(survey.at(0)), survey.at(1), survey.at(2), survey.at(3)};
   }
   return entry;
 }
@@ -119,7 +125,7 @@ Json head_to_json(const BatchTask& task) {
 BatchTask head_of(const Json& json) {
   BatchTask task;
   task.program = json.at("program");
-  task.chunk_unknowns = std::max<std::size_t>(json.at("chunk_unknowns").get<std::size_t>(), 1);
+  task.chunk_unknowns = std::max<std::size_t>(count_of(json.at("chunk_unknowns")), 1);
   task.each_frame = json.at("each_frame");
   for (const auto& [flag, values] : json.at("flags").items()) {
     for (const Json& value : values) {
@@ -186,6 +192,34 @@ std::vector<std::vector<Part>> parts_of_chunks(const BatchTask& task) {
   return chunks;
 }
 
+/// Reads the first line of a task file. @throws Error where it is of no task, or of a newer one
+Json read_head(const fs::path& file, std::istream& stream) {
+  std::string line;
+  std::getline(stream, line);
+  const Json head = Json::parse(line, nullptr, false);
+  if (!head.is_object() || head.value("format", Json()) != format) {
+    refuse(file, "is no task of palpate batch; give another folder");
+  }
+  if (head.value("version", version) > version) {
+    refuse(file, "has version {}, this program reads {}; use a newer palpate",
+           head.at("version").get<int>(), version);
+  }
+  return head;
+}
+
+/// Adding up all touches might overflow.
+void require_countable(const fs::path& file, const BatchTask& task) {
+  std::size_t left = most_unknowns;
+  for (const BatchEntry& entry : task.inputs) {
+    const std::size_t unknowns = task.unknowns_of(entry);
+    if (unknowns > left) {
+      refuse(file, "has more than {} unknowns at {}; give fewer recordings, or another folder",
+             most_unknowns, entry.input.path);
+    }
+    left -= unknowns;
+  }
+}
+
 }  // namespace
 
 std::optional<FileStamp> stamp_of(const std::string& path) {
@@ -210,7 +244,10 @@ std::size_t BatchTask::unknowns() const {
   return sum;
 }
 
-std::size_t BatchTask::chunks() const { return (unknowns() + chunk_unknowns - 1) / chunk_unknowns; }
+std::size_t BatchTask::chunks() const {
+  const std::size_t all = unknowns();
+  return all / chunk_unknowns + (all % chunk_unknowns != 0 ? 1 : 0);
+}
 
 std::string head_text(const BatchTask& task) { return head_to_json(task).dump() + "\n"; }
 
@@ -225,15 +262,7 @@ BatchTask read_batch_task(const fs::path& file) {
   std::ifstream stream(file, std::ios::binary);
   std::string line;
   try {
-    std::getline(stream, line);
-    const Json head = Json::parse(line);
-    if (head.at("format") != format) {
-      refuse(file, "is no task of palpate batch; give another folder");
-    }
-    if (head.at("version") > version) {
-      refuse(file, "has version {}, this program reads {}; use a newer palpate",
-             head.at("version").get<int>(), version);
-    }
+    const Json head = read_head(file, stream);
     BatchTask task = head_of(head);
     while (std::getline(stream, line)) {
       task.inputs.push_back(entry_from(line));
@@ -241,14 +270,22 @@ BatchTask read_batch_task(const fs::path& file) {
     if (task.inputs.size() != head.at("inputs") || stream.bad()) {
       refuse(file, "is cut off; remove the folder, or copy it again");
     }
+    require_countable(file, task);
     return task;
   } catch (const Json::exception&) {
     refuse(file, "is damaged; remove the folder, or copy it again");
   }
 }
 
+void require_batch_task(const fs::path& file) {
+  require_readable(file);
+  std::ifstream stream(file, std::ios::binary);
+  read_head(file, stream);
+}
+
 void write_batch_task(const fs::path& file, const BatchTask& task) {
-  AtomicFile target(file);
+  require_countable(file, task);
+  AtomicFile target(file, AtomicFile::Links::replaced);
   std::string text = head_text(task);
   constexpr std::size_t piece = 1 << 20;
   for (const BatchEntry& entry : task.inputs) {

@@ -79,8 +79,10 @@ std::string entry_text(const BatchEntry& entry);
 BatchTask head_from(std::string_view text);
 BatchEntry entry_from(std::string_view text);
 
-/// Reads and writes the task file. @throws Error
+/// Reads and writes the task file. @throws Error, also for a task of more than 1e9 unknowns
 BatchTask read_batch_task(const std::filesystem::path& file);
+/// Looks only at the first line. @throws Error where this is no task file
+void require_batch_task(const std::filesystem::path& file);
 void write_batch_task(const std::filesystem::path& file, const BatchTask& task);
 
 /// Why all results of `before` are no results of `now`, naming the flag or the file; "" where only

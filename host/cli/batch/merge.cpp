@@ -11,6 +11,7 @@
 #include "batch_task.hpp"
 #include "command_files.hpp"
 #include "commands.hpp"
+#include "file_identity.hpp"
 #include "input_file.hpp"
 #include "options.hpp"
 #include "results_folder.hpp"
@@ -25,24 +26,40 @@ struct Options {
   bool partial = false;
 };
 
-/// "100 to 199, 300 to 349", shortened.
-std::string ranges_of(const std::vector<std::size_t>& chunks, const BatchTask& task) {
+/// The unknowns of the chunks that are not there: "100 to 199, 300 to 349", shortened.
+std::string missing_unknowns(const std::vector<std::size_t>& there, const BatchTask& task) {
   constexpr std::size_t most = 3;
   std::string text;
   std::size_t ranges = 0;
-  for (std::size_t i = 0; i < chunks.size();) {
-    std::size_t end = i + 1;
-    while (end < chunks.size() && chunks[end] == chunks[end - 1] + 1) {
-      ++end;
+  std::size_t begin = 0;
+  for (std::size_t i = 0; i <= there.size(); ++i) {
+    const std::size_t end = i < there.size() ? there[i] : task.chunks();
+    if (begin < end) {
+      if (ranges++ == most) {
+        return text + ", and more";
+      }
+      text += fmt::format("{}{} to {}", text.empty() ? "" : ", ", begin * task.chunk_unknowns,
+                          std::min(end * task.chunk_unknowns, task.unknowns()) - 1);
     }
-    if (ranges++ == most) {
-      return text + ", and more";
-    }
-    text += fmt::format("{}{} to {}", text.empty() ? "" : ", ", chunks[i] * task.chunk_unknowns,
-                        std::min((chunks[end - 1] + 1) * task.chunk_unknowns, task.unknowns()) - 1);
-    i = end;
+    begin = end + 1;
   }
   return text;
+}
+
+/// Refuses to write over what is merged, or beside the chunks, where evaluate would read it too.
+void require_distinct(const Options& options, const ResultsFolder& folder,
+                      const std::vector<std::size_t>& there) {
+  CommandFiles files;
+  files.reads("RESULTS", folder.task());
+  for (const std::size_t chunk : there) {
+    files.reads("RESULTS", folder.chunk(chunk));
+  }
+  files.writes("-o", options.output, CommandFiles::Dash::stream);
+  files.require_distinct();
+  const auto place = identity_of(std::filesystem::absolute(options.output).parent_path());
+  if (options.output != "-" && place && place == identity_of(folder.chunks())) {
+    refuse_flag("-o", options.output, "lies among the chunks that are merged; choose another name");
+  }
 }
 
 void merge(const Options& options) {
@@ -50,33 +67,27 @@ void merge(const Options& options) {
   if (!folder.has_task()) {
     refuse(folder.path(), "is no folder of results; give the one that palpate batch -o names");
   }
-  if (options.output != "-") {
-    require_writable(options.output);
-  }
   const BatchTask task = read_batch_task(folder.task());
   const std::size_t chunks = task.chunks();
   const std::size_t unknowns = task.unknowns();
-  std::vector<std::size_t> missing;
-  for (std::size_t chunk = 0; chunk < chunks; ++chunk) {
-    if (!folder.has_chunk(chunk)) {
-      missing.push_back(chunk);
-    }
+  const std::vector<std::size_t> there = folder.finished_chunks(chunks);
+  require_distinct(options, folder, there);
+  if (options.output != "-") {
+    require_writable(options.output);
   }
+  const std::string missing = missing_unknowns(there, task);
   if (!missing.empty() && !options.partial) {
     refuse(folder.path(),
            "{} of {} chunks are missing (unknowns {}); call palpate batch again to complete them, "
            "or give --partial",
-           missing.size(), chunks, ranges_of(missing, task));
+           chunks - there.size(), chunks, missing);
   }
   std::optional<AtomicFile> file;
   if (options.output != "-") {
     file.emplace(options.output);
   }
   ChunkCounts all;
-  for (std::size_t chunk = 0; chunk < chunks; ++chunk) {
-    if (std::ranges::binary_search(missing, chunk)) {
-      continue;
-    }
+  for (const std::size_t chunk : there) {
     std::ifstream stream(folder.chunk(chunk), std::ios::binary);
     const std::string text{std::istreambuf_iterator<char>(stream), {}};
     const ChunkCounts counts = count_records(text);
@@ -99,8 +110,7 @@ void merge(const Options& options) {
     file->commit();
   }
   fmt::print(stderr, "{}: {} of {} unknowns, {} failed{}\n", options.results, all.records, unknowns,
-             all.failed,
-             missing.empty() ? "" : fmt::format("; missing: {}", ranges_of(missing, task)));
+             all.failed, missing.empty() ? "" : "; missing: " + missing);
 }
 
 }  // namespace

@@ -6,8 +6,10 @@
 #include <array>
 #include <cerrno>
 #include <charconv>
+#include <chrono>
 #include <cstring>
 #include <system_error>
+#include <thread>
 #include <utility>
 #include <vector>
 
@@ -32,6 +34,26 @@ void remove_file(const fs::path& file) {
   }
 }
 
+/// What the folder holds; nothing where there is no such folder.
+std::vector<fs::path> paths_in(const fs::path& folder) {
+  std::error_code error;
+  std::vector<fs::path> paths;
+  for (const auto& entry : fs::directory_iterator(folder, error)) {
+    paths.push_back(entry.path());
+  }
+  if (error && error != std::errc::no_such_file_or_directory &&
+      error != std::errc::not_a_directory) {
+    refuse(folder, "cannot be read: {}; check its permissions", error.message());
+  }
+  return paths;
+}
+
+/// Whether a process that was killed has left this half-written.
+bool is_part(const fs::path& path) {
+  const std::string name = path.filename().string();
+  return name.starts_with(".palpate-") && name.ends_with(".part");
+}
+
 }  // namespace
 
 fs::path ResultsFolder::chunk(std::size_t index) const {
@@ -45,9 +67,45 @@ bool ResultsFolder::has_task() const {
   return fs::is_regular_file(task(), ignored);
 }
 
-bool ResultsFolder::has_chunk(std::size_t index) const {
-  std::error_code ignored;
-  return fs::is_regular_file(chunk(index), ignored);
+void ResultsFolder::require_own() const {
+  for (const fs::path& path : {chunks(), runs(), lock()}) {
+    std::error_code ignored;
+    if (fs::is_symlink(path, ignored)) {
+      refuse(path, "is a link, and palpate batch writes through none; give another folder");
+    }
+  }
+  const std::optional<fs::path> foreign = foreign_file();
+  // Asked last: another shard may have written the task, and chunks after it, meanwhile.
+  if (foreign && !has_task()) {
+    refuse(folder_, "holds '{}' and no task of palpate batch; give an empty or a new folder",
+           foreign->lexically_relative(folder_).string());
+  }
+}
+
+std::optional<fs::path> ResultsFolder::foreign_file() const {
+  for (const fs::path& folder : {folder_, chunks(), runs()}) {
+    for (const fs::path& path : paths_in(folder)) {
+      if (!is_part(path) && path != chunks() && path != runs() && path != lock()) {
+        return path;
+      }
+    }
+  }
+  return {};
+}
+
+std::vector<std::size_t> ResultsFolder::finished_chunks(std::size_t end) const {
+  std::vector<std::size_t> found;
+  for (const fs::path& path : paths_in(chunks())) {
+    const std::string stem = path.stem().string();
+    std::size_t index = 0;
+    std::from_chars(stem.data(), stem.data() + stem.size(), index);
+    std::error_code ignored;
+    if (index < end && path == chunk(index) && fs::is_regular_file(path, ignored)) {
+      found.push_back(index);
+    }
+  }
+  std::ranges::sort(found);
+  return found;
 }
 
 void ResultsFolder::make() const {
@@ -60,32 +118,13 @@ void ResultsFolder::remove_chunk(std::size_t index) const {
   remove_file(run(index));
 }
 
-void ResultsFolder::remove_chunks_from(std::size_t first) const {
-  std::error_code error;
-  std::vector<std::size_t> found;
-  for (const auto& entry : fs::directory_iterator(chunks(), error)) {
-    const std::string stem = entry.path().stem().string();
-    std::size_t index = 0;
-    const auto [rest, bad] = std::from_chars(stem.data(), stem.data() + stem.size(), index);
-    if (bad == std::errc{} && rest == stem.data() + stem.size() && index >= first) {
-      found.push_back(index);
-    }
-  }
-  std::ranges::for_each(found, [this](std::size_t index) { remove_chunk(index); });
-}
-
 void ResultsFolder::remove_parts() const {
   for (const fs::path& folder : {folder_, chunks(), runs()}) {
-    std::error_code error;
-    std::vector<fs::path> parts;
-    for (const auto& entry : fs::directory_iterator(folder, error)) {
-      const std::string name = entry.path().filename().string();
-      if (name.starts_with(".palpate-") && name.ends_with(".part")) {
-        parts.push_back(entry.path());
+    for (const fs::path& path : paths_in(folder)) {
+      if (is_part(path)) {
+        std::error_code ignored;
+        fs::remove(path, ignored);
       }
-    }
-    for (const fs::path& part : parts) {
-      fs::remove(part, error);
     }
   }
 }
@@ -140,35 +179,62 @@ off_t held_by_others(int descriptor, off_t start, off_t length) {
 
 }  // namespace
 
-FolderLock::FolderLock(const ResultsFolder& folder, const Shard& shard)
-    : file_(folder.path() / "lock"), shard_(shard), descriptor_(file_, O_RDWR | O_CREAT, 0666) {
+FolderLock::FolderLock(const ResultsFolder& folder, const Shard& shard,
+                       const std::function<bool()>& wait)
+    : file_(folder.lock()), shard_(shard), descriptor_(file_, O_RDWR | O_CREAT | O_NOFOLLOW, 0666) {
   if (!descriptor_.valid()) {
     refuse(folder.path(),
            "cannot be written: {}; choose another folder (palpate merge and evaluate only read it)",
            std::strerror(errno));
   }
-  struct flock lock = lock_of(F_WRLCK, place_of(shard), 1);
-  if (::fcntl(descriptor_.get(), F_SETLK, &lock) != 0) {
-    if (errno != EACCES && errno != EAGAIN) {
-      fail_to_lock(file_);
-    }
+  std::optional<Shard> other = take();
+  while (other && wait()) {
+    other = take();
+  }
+  if (other && other->count == shard.count) {
     refuse(folder.path(),
            "another process works on shard {}/{}; wait until it has ended, or give another --shard",
            shard.index, shard.count);
   }
+  if (other) {
+    refuse(folder.path(),
+           "another process works on shard {}/{} of it; wait until it has ended, or give --shard "
+           "I/{}",
+           other->index, other->count, other->count);
+  }
+}
+
+std::function<bool()> FolderLock::wait_for_a_second() {
+  constexpr int times = 20;
+  return [left = times]() mutable {
+    std::this_thread::sleep_for(std::chrono::milliseconds(1000 / times));
+    return --left >= 0;
+  };
+}
+
+std::optional<Shard> FolderLock::take() const {
+  struct flock lock = lock_of(F_WRLCK, place_of(shard_), 1);
+  if (::fcntl(descriptor_.get(), F_SETLK, &lock) != 0) {
+    if (errno != EACCES && errno != EAGAIN) {
+      fail_to_lock(file_);
+    }
+    return shard_;
+  }
   const auto range = static_cast<off_t>(most_shards);
-  const off_t own = place_of({0, shard.count});
+  const off_t own = place_of({0, shard_.count});
   for (const auto& [start, length] : {std::pair{range, own - range}, {own + range, off_t{0}}}) {
     if (length == 0 && start <= own) {
       continue;  // no count is smaller
     }
     if (const off_t other = held_by_others(descriptor_.get(), start, length); other >= 0) {
-      refuse(folder.path(),
-             "another process works on shard {}/{} of it; wait until it has ended, or give --shard "
-             "I/{}",
-             other % range, other / range, other / range);
+      // Two that wait for each other shall not both find the other's lock.
+      lock.l_type = F_UNLCK;
+      ::fcntl(descriptor_.get(), F_SETLK, &lock);
+      return Shard{static_cast<std::size_t>(other % range),
+                   static_cast<std::size_t>(other / range)};
     }
   }
+  return {};
 }
 
 void FolderLock::begin_settling() const {

@@ -1,9 +1,13 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <filesystem>
+#include <functional>
+#include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "descriptor.hpp"
 #include "shard.hpp"
@@ -20,22 +24,32 @@ class ResultsFolder {
   std::filesystem::path task() const { return folder_ / "task.ndjson"; }
   std::filesystem::path chunks() const { return folder_ / "chunks"; }
   std::filesystem::path runs() const { return folder_ / "runs"; }
+  std::filesystem::path lock() const { return folder_ / "lock"; }
   std::filesystem::path chunk(std::size_t index) const;
   std::filesystem::path run(std::size_t index) const;
 
   bool has_task() const;
-  /// Chunk files appear whole, so that one that is there is finished.
-  bool has_chunk(std::size_t index) const;
+  /// Requires that a batch may write here: the folder has a task, or is missing or empty but for
+  /// what a batch leaves that is killed before it writes its task; and no link leads a batch's
+  /// files out of it.
+  /// @throws Error (Fault::input)
+  void require_own() const;
+  /// The chunks whose files are there, in order. Chunk files appear whole, so that these are
+  /// finished.
+  /// @param end the first chunk that is not looked for
+  /// @throws Error (Fault::input) where the folder cannot be read
+  std::vector<std::size_t> finished_chunks(std::size_t end = SIZE_MAX) const;
   /// Makes the folders that are missing. @throws Error where that is impossible
   void make() const;
   /// Removes a chunk that is to be computed again. @throws Error (Fault::system)
   void remove_chunk(std::size_t index) const;
-  /// Removes the chunks from `first` on. @throws Error (Fault::system)
-  void remove_chunks_from(std::size_t first) const;
   /// Removes what killed processes have left half-written.
   void remove_parts() const;
 
  private:
+  /// Something that no batch has made; none where there is none.
+  std::optional<std::filesystem::path> foreign_file() const;
+
   std::filesystem::path folder_;
 };
 
@@ -55,9 +69,13 @@ ChunkCounts count_records(std::string_view chunk);
 class FolderLock {
  public:
   /// Takes the lock of this shard.
-  /// @throws Error (Fault::input) where another process works on this shard, or on a shard of
-  /// another count, and where the folder cannot be written
-  FolderLock(const ResultsFolder& folder, const Shard& shard);
+  /// @param wait called where another process works on this shard, or on a shard of another count;
+  /// looks again where it returns true. By default it waits for a second in all: a process that was
+  /// killed keeps its locks until the kernel has taken it apart.
+  /// @throws Error (Fault::input) where the other process still works on it, and where the folder
+  /// cannot be written
+  FolderLock(const ResultsFolder& folder, const Shard& shard,
+             const std::function<bool()>& wait = wait_for_a_second());
 
   /// Waits until no other process settles the folder's task, and keeps others waiting.
   void begin_settling() const;
@@ -66,6 +84,10 @@ class FolderLock {
   bool is_alone() const;
 
  private:
+  static std::function<bool()> wait_for_a_second();
+  /// Takes the lock, or returns the shard that another process works on.
+  std::optional<Shard> take() const;
+
   std::filesystem::path file_;
   Shard shard_;
   Descriptor descriptor_;
