@@ -1,5 +1,11 @@
 // Every command of the site's pages runs and ends in what the page tells. A page quotes numbers of
-// one machine; on another, float32 rounds elsewhere. So the tests compare what a reader concludes.
+// one machine; on another, float32 rounds elsewhere. So the tests compare what a reader concludes,
+// and the numbers of the first page but for their last digit.
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+#include <sstream>
 
 #include "document.hpp"
 
@@ -7,10 +13,58 @@ namespace palpate {
 namespace {
 
 using SitePages = DocumentTest;
+using Words = std::vector<std::string>;
+
+/// The words of each line; a coordinate and its standard deviation are two.
+std::vector<Words> words_of(std::string text) {
+  for (auto at = text.find("+-"); at != text.npos; at = text.find("+-", at)) {
+    text.replace(at, 2, " ");
+  }
+  std::vector<Words> lines;
+  std::istringstream stream(text);
+  for (std::string line; std::getline(stream, line);) {
+    std::istringstream of_line(line);
+    lines.emplace_back(std::istream_iterator<std::string>(of_line),
+                       std::istream_iterator<std::string>());
+  }
+  return lines;
+}
+
+/// Equal words, but that the last digit of numbers with a point may be one off.
+bool agree(const Words& quoted, const Words& printed) {
+  return std::equal(quoted.begin(), quoted.end(), printed.begin(), printed.end(),
+                    [](const std::string& a, const std::string& b) {
+                      const std::size_t point = a.find('.');
+                      return a == b ||
+                             (point != a.npos && b.find('.') != b.npos &&
+                              std::abs(std::stod(a) - std::stod(b)) <
+                                  1.5 * std::pow(10.0, -static_cast<double>(a.size() - point - 1)));
+                    });
+}
+
+/// The lines of a page's tables are printed, but for the column `dropped`.
+void expect_tables(const std::string& page, const std::string& said,
+                   std::initializer_list<const char*> titles) {
+  std::vector<Words> printed = words_of(said);
+  for (Words& words : printed) {
+    std::erase_if(words,
+                  [](const std::string& w) { return w == "dropped" || w.ends_with("e-07"); });
+  }
+  const std::string text = source_text("docs/" + page);
+  for (const char* title : titles) {
+    const std::size_t begin = text.find(title);
+    ASSERT_NE(begin, text.npos) << title;
+    for (const Words& line : words_of(text.substr(begin, text.find("```", begin) - begin))) {
+      EXPECT_TRUE(std::ranges::any_of(printed, [&](const Words& p) { return agree(line, p); }))
+          << testing::PrintToString(line);
+    }
+  }
+}
 
 TEST_F(SitePages, StartRecognisesAnE) {
   const auto [said, complained] = run("start.md");
   EXPECT_EQ(complained, "");
+  expect_tables("start.md", said, {"  touch  best", "recording   touches"});
   expect_quoted("start.md", said, {"U, pose of E", "fits"});
   expect_written({"maps.png", "sheets/unknown.png"});
   const nlohmann::json record = json("result.json")[0];
