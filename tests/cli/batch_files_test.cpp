@@ -46,6 +46,15 @@ TEST_F(BatchFiles, WhatABatchLeavesThatIsKilledEarlyIsItsOwn) {
   EXPECT_FALSE(fs::exists(folder_ / "r/.palpate-1-0.part"));
 }
 
+TEST_F(BatchFiles, OnlyNumberedFilesAreChunks) {
+  palpate(batch("r"));
+  const std::string expected = merged("r");
+  for (const char* name : {"notes.ndjson", "1.ndjson", "000001.ndjson.old", "000001"}) {
+    put_bytes(folder_ / "r/chunks" / name, "{}\n");
+  }
+  EXPECT_EQ(merged("r"), expected);
+}
+
 TEST_F(BatchFiles, NoLinkLeadsOutOfTheFolder) {
   palpate(batch("r"));
   const std::string expected = merged("r");

@@ -3,7 +3,9 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <chrono>
 #include <csignal>
+#include <optional>
 #include <random>
 #include <stdexcept>
 
@@ -138,6 +140,20 @@ TEST_F(BatchResumption, AProcessThatEndsIsWaitedFor) {
   }
 }
 
+TEST_F(BatchResumption, AProcessThatWaitsKeepsNobodyOut) {
+  std::filesystem::create_directories(folder_ / "r");
+  std::optional<Worker> other(std::in_place, folder_ / "r", cli::Shard{1, 2});
+  int waits = 0;
+  const cli::FolderLock lock(cli::ResultsFolder(folder_ / "r"), {0, 3}, [&] {
+    other.reset();
+    if (++waits == 1) {
+      other.emplace(folder_ / "r", cli::Shard{0, 3});  // what is waited for
+    }
+    return true;
+  });
+  EXPECT_EQ(waits, 2);
+}
+
 TEST_F(BatchResumption, AFolderThatCannotBeWrittenIsRefusedAndRead) {
   palpate(batch("r"));
   const std::string expected = merged("r");
@@ -163,6 +179,13 @@ TEST_F(BatchResumption, AChangedRecordingIsNoticedAndOnlyItsChunkDoneAgain) {
   }
   palpate(batch("fresh"));
   EXPECT_EQ(merged("r"), merged("fresh"));
+}
+
+TEST_F(BatchResumption, OtherFramesOfARecordingAreNoticed) {
+  put_bytes(folder_ / "u/list.csv", "path,frames\n00.h5,0:2\n");
+  palpate(batch("r", {}, "u/list.csv"));
+  put_bytes(folder_ / "u/list.csv", "path,frames\n00.h5,0:3\n");
+  expect_refused(batch("r", {}, "u/list.csv"), {"of u/00.h5 with other frames or label"});
 }
 
 TEST_F(BatchResumption, MoreRecordingsKeepTheChunksBeforeThem) {
@@ -214,6 +237,68 @@ TEST_F(BatchResumption, APartialMergeSaysWhatIsMissing) {
   EXPECT_EQ(outcome.status, 0);
   EXPECT_EQ(parse(outcome.out).size(), 6u);
   EXPECT_NE(outcome.err.find("missing: 3 to 5, 9 to 10"), outcome.err.npos) << outcome.err;
+  palpate({"batch", "u", "--chunk", "1", "--shard", "1/2", "-o", "s", "--maps", "maps", "--bins",
+           "10x10x10", "--filter", "bounded"});
+  expect_refused({"merge", "s"}, {"(unknowns 0 to 0, 2 to 2, 4 to 4, and more)"});
+}
+
+TEST_F(BatchResumption, TouchesAsUnknownsMoveFromChunkToChunk) {
+  write_recording(folder_ / "two.h5", sample_unknown("A", {}, 2));
+  const auto batch_of = [](const std::string& results, std::vector<std::string> inputs) {
+    inputs.insert(inputs.begin(), "batch");
+    for (const char* more : {"--maps", "maps", "--bins", "10x10x10", "--filter", "bounded",
+                             "--each-frame", "--chunk", "2", "--update", "-o"}) {
+      inputs.emplace_back(more);
+    }
+    inputs.push_back(results);
+    return inputs;
+  };
+  const auto expect_as_fresh = [&](const std::vector<std::string>& inputs, const char* why) {
+    std::filesystem::remove_all(folder_ / "fresh");
+    EXPECT_EQ(palpate(batch_of("r", inputs)).status, 0);
+    EXPECT_EQ(palpate(batch_of("fresh", inputs)).status, 0);
+    EXPECT_EQ(merged("r"), merged("fresh")) << why;
+  };
+  palpate(batch_of("r", {name(1)}));
+  expect_as_fresh({"two.h5", name(1)}, "each chunk of u/01.h5 begins two touches earlier");
+  write_recording(folder_ / "two.h5", sample_unknown("A", {}, 7));
+  expect_as_fresh({"two.h5", name(1)}, "the first recording has more touches");
+}
+
+// A chunk of another shard may hold some of a recording's touches.
+TEST_F(BatchResumption, AShardRecognisesItsOwnUnknownsAlone) {
+  const Outcome outcome =
+      palpate({"batch", name(1), name(3), "--each-frame", "--chunk", "3", "--shard", "0/2", "-o",
+               "r", "--maps", "maps", "--bins", "10x10x10", "--filter", "bounded"});
+  EXPECT_NE(outcome.out.find("6 unknowns of shard 0/2, 6 now"), outcome.out.npos) << outcome.out;
+}
+
+TEST_F(BatchResumption, AnotherShardsPartsAreLeftAlone) {
+  palpate(batch("r", {"--shard", "0/2"}));
+  put_bytes(folder_ / "r/chunks/.palpate-1-0.part", "{");
+  {
+    const Worker worker(folder_ / "r", {1, 2});
+    palpate(batch("r", {"--shard", "0/2"}));
+    EXPECT_TRUE(std::filesystem::exists(folder_ / "r/chunks/.palpate-1-0.part"));
+  }
+  palpate(batch("r", {"--shard", "0/2"}));
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "r/chunks/.palpate-1-0.part"));
+}
+
+// Seconds are too coarse for a file that is made again at once.
+TEST_F(BatchResumption, ARecordingOfTheSameSizeIsNoticedByItsTime) {
+  palpate(batch("r"));
+  const auto written = std::filesystem::last_write_time(folder_ / name(7));
+  std::filesystem::last_write_time(folder_ / name(7), written + std::chrono::microseconds(1));
+  const Outcome outcome = palpate(batch("r"));
+  EXPECT_NE(outcome.err.find(name(7) + " has changed"), outcome.err.npos) << outcome.err;
+}
+
+TEST_F(BatchResumption, AnyBytesMayBeAPath) {
+  std::filesystem::rename(folder_ / name(0), folder_ / "u/\xc3\xbc \x80\xff.h5");
+  palpate(batch("r"));
+  const Outcome again = palpate(batch("r"));
+  EXPECT_NE(again.out.find("11 done before"), again.out.npos) << again.err;
 }
 
 TEST_F(BatchResumption, ATaskOfASlurmArrayIsAShard) {
@@ -253,6 +338,10 @@ TEST_F(BatchResumption, TheTasksOfAStepDivideTheirPart) {
   EXPECT_EQ(merged("r"), merged("whole"));
   const Variable task("SLURM_PROCID", "2");
   expect_refused(batch("s"), {"SLURM_PROCID 2", "of 2 tasks"});
+  const Variable many("SLURM_ARRAY_TASK_COUNT", "1000000");
+  const Variable first("SLURM_ARRAY_TASK_ID", "0");
+  const Variable zeroth("SLURM_PROCID", "0");
+  expect_refused(batch("s"), {"SLURM_PROCID 0", "of 2 tasks", "1000000"});
 }
 
 TEST(LocalDevice, TasksOfAComputerTakeItsEqualDevicesInTurn) {

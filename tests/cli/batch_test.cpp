@@ -169,7 +169,7 @@ TEST_F(Batch, ABudgetIsRefused) {
 }
 
 TEST_F(Batch, ARecordingOfAnotherUnitIsARecordWithItsError) {
-  Recording raw = sample_unknown("A", {}, 2);
+  Recording raw = sample_unknown("A", {}, 3);
   raw.pressure_unit = "raw";
   write_recording(folder_ / name(1), raw);
   Recording stream = sample_unknown("A", {}, 2);
@@ -180,6 +180,13 @@ TEST_F(Batch, ARecordingOfAnotherUnitIsARecordWithItsError) {
   EXPECT_NE(records[1]["error"].get<std::string>().find("pressure_unit"), std::string::npos);
   EXPECT_NE(records[2]["error"].get<std::string>().find("palpate touches"), std::string::npos);
   EXPECT_TRUE(records[3].contains("best"));
+  // Each touch has the error, and is called by its number.
+  EXPECT_EQ(palpate(batch("s", {"--each-frame", "--frames", "1:3"})).status, 3);
+  const std::vector<nlohmann::json> touches = parse(merged("s"));
+  for (int i : {2, 3}) {
+    EXPECT_TRUE(touches[i].contains("error"));
+    EXPECT_EQ(touches[i]["frame"], i - 1);
+  }
 }
 
 TEST_F(Batch, EvaluateReadsTheFolderAndTheMergedFile) {

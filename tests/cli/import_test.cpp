@@ -80,6 +80,12 @@ TEST_F(ImportCommand, TheLargestGapFollowsThePoses) {
                {"201 with a pose; next"});
 }
 
+TEST_F(ImportCommand, FramesAfterTheLastPoseLieInNoGap) {
+  put("poses.csv", "time,x,y,theta_rad\n0,0,5,-1\n0.05,10,7,1\n");
+  expect_named(done(command({"--poses", "poses.csv"})),
+               {"3 frames", "2 with a pose, poses taken to be in mm and rad; next"});
+}
+
 TEST_F(ImportCommand, RowsMayBeTouchesAtUnknownPoses) {
   expect_named(done(command({"--rows", "touches", "--unposed", "--object", "A"})),
                {"3 touches", "next: palpate map o.h5 -o MAPS/ --unposed"});

@@ -73,6 +73,22 @@ TEST(AtomicFile, LeavesLinksInPlace) {
   EXPECT_EQ(bytes_of(folder / "a.txt"), "new");
 }
 
+TEST(AtomicFile, ReplacesLinksWhereAsked) {
+  const ScratchFolder folder;
+  std::filesystem::create_directory(folder / "folder");
+  put_bytes(folder / "a.txt", "old");
+  for (const char* behind : {"a.txt", "folder", "missing"}) {
+    std::filesystem::create_symlink(behind, folder / "link");
+    AtomicFile file(folder / "link", AtomicFile::Links::replaced);
+    file.write("new");
+    file.commit();
+    EXPECT_TRUE(std::filesystem::is_regular_file(std::filesystem::symlink_status(folder / "link")));
+    std::filesystem::remove(folder / "link");
+  }
+  EXPECT_EQ(bytes_of(folder / "a.txt"), "old");
+  EXPECT_FALSE(std::filesystem::exists(folder / "missing"));
+}
+
 TEST(AtomicFile, IsAsReadableAsAnyOther) {
   const ScratchFolder folder;
   put_bytes(folder / "plain", "");

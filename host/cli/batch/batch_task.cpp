@@ -196,7 +196,7 @@ std::vector<std::vector<Part>> parts_of_chunks(const BatchTask& task) {
 Json read_head(const fs::path& file, std::istream& stream) {
   std::string line;
   std::getline(stream, line);
-  const Json head = Json::parse(line, nullptr, false);
+  Json head = Json::parse(line, nullptr, false);
   if (!head.is_object() || head.value("format", Json()) != format) {
     refuse(file, "is no task of palpate batch; give another folder");
   }
