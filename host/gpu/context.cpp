@@ -31,6 +31,17 @@ bool validation_wanted() {
   return value != nullptr && std::strcmp(value, "1") == 0;
 }
 
+struct VulkanUses {
+  std::mutex mutex;
+  int count = 0;
+  OwnProcess process;  ///< that they are of, where there are any
+};
+
+VulkanUses& vulkan_uses() {
+  static VulkanUses uses;
+  return uses;
+}
+
 template <typename Function>
 Function instance_function(VkInstance instance, const char* name) {
   return reinterpret_cast<Function>(vkGetInstanceProcAddr(instance, name));
@@ -52,8 +63,25 @@ void ValidationLog::throw_if_any() {
   }
 }
 
-Instance::Instance() {
+VulkanUse::VulkanUse() {
+  VulkanUses& uses = vulkan_uses();
+  const std::scoped_lock lock(uses.mutex);
+  if (uses.count > 0) {
+    uses.process.require("Vulkan");
+  } else {
+    uses.process = OwnProcess();
+  }
   load_vulkan();
+  ++uses.count;
+}
+
+VulkanUse::~VulkanUse() {
+  VulkanUses& uses = vulkan_uses();
+  const std::scoped_lock lock(uses.mutex);
+  --uses.count;
+}
+
+Instance::Instance() {
   const VkApplicationInfo application{.sType = VK_STRUCTURE_TYPE_APPLICATION_INFO,
                                       .pApplicationName = "palpate",
                                       .apiVersion = VK_API_VERSION_1_2};
@@ -139,7 +167,6 @@ Context::Context(const VulkanDevice& handed_in)
   if (handed_in.queue_mutex != nullptr) {
     queue_mutex_ = handed_in.queue_mutex;
   }
-  load_vulkan();
   const std::string fault = fault_of(physical_, queue_family_);
   if (!fault.empty()) {
     throw Error(Fault::input, fmt::format("VulkanDevice: {}", fault));

@@ -9,6 +9,7 @@
 
 #include <vulkan/vulkan_core.h>
 
+#include "own_process.hpp"
 #include "palpate/device.hpp"
 #include "palpate/vulkan_device.hpp"
 #include "run_queue.hpp"
@@ -27,6 +28,17 @@ class ValidationLog {
   std::vector<std::string> messages_;
 };
 
+/// That Vulkan is in use. Drivers keep threads, for which even the end of a child of fork() would
+/// wait once it has started others: where the parent used Vulkan at the fork, its child cannot.
+class VulkanUse {
+ public:
+  /// @throws Error in such a child, and where Vulkan is missing
+  VulkanUse();
+  ~VulkanUse();
+  VulkanUse(const VulkanUse&) = delete;
+  VulkanUse& operator=(const VulkanUse&) = delete;
+};
+
 /// A Vulkan instance. PALPATE_VALIDATION=1 in the environment turns the validation layer on.
 class Instance {
  public:
@@ -39,6 +51,7 @@ class Instance {
   ValidationLog& validation() { return validation_; }
 
  private:
+  VulkanUse use_;
   VkInstance instance_ = VK_NULL_HANDLE;
   VkDebugUtilsMessengerEXT messenger_ = VK_NULL_HANDLE;
   ValidationLog validation_;
@@ -82,6 +95,8 @@ class Context {
   Context(const Context&) = delete;
   Context& operator=(const Context&) = delete;
 
+  const OwnProcess process;
+
   VkDevice device() const { return device_; }
   /// Submits to the queue; the commands of several threads take turns.
   VkResult submit(const VkSubmitInfo& info, VkFence fence);
@@ -110,6 +125,7 @@ class Context {
   /// Reads what `physical_` and its queue family can do.
   void inspect();
 
+  VulkanUse use_;
   std::optional<Instance> instance_;  ///< none where the device was handed in
   ValidationLog nothing_said_;
   VkPhysicalDevice physical_ = VK_NULL_HANDLE;

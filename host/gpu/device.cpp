@@ -1,7 +1,8 @@
 #include "palpate/device.hpp"
 
+#include <utility>
+
 #include "context.hpp"
-#include "moved_from.hpp"
 #include "selection.hpp"
 
 namespace palpate {
@@ -25,11 +26,14 @@ Device Device::share(const VulkanDevice& device) {
 
 Device::Device(std::unique_ptr<gpu::Context> context) : context_(std::move(context)) {}
 Device::Device(Device&&) noexcept = default;
-Device& Device::operator=(Device&&) noexcept = default;
-Device::~Device() = default;
+Device& Device::operator=(Device&& other) noexcept {
+  replace_held(context_, std::move(other.context_));
+  return *this;
+}
+Device::~Device() { replace_held(context_); }
 
 const std::string& Device::name() const { return held_by(context_, "device").name(); }
 std::uint64_t Device::memory_bytes() const { return held_by(context_, "device").limits().memory; }
-gpu::Context& Device::context() { return held_by(context_, "device"); }
+gpu::Context& Device::context() { return held_here(context_, "device"); }
 
 }  // namespace palpate

@@ -5,7 +5,6 @@
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
-#include <nanobind/stl/string.h>
 
 #include "palpate/error.hpp"
 
@@ -17,11 +16,32 @@ namespace {
   throw Error(Fault::input, fmt::format("{}: {}", name, message));
 }
 
+/// The array with its mask where some of its values are masked, or else a null object. A list may
+/// hold masked rows or values.
+nb::object masked_array(nb::handle object) {
+  return with_python([&]() -> nb::object {
+    const nb::module_ ma = nb::module_::import_("numpy.ma");
+    nb::object array = nb::borrow(object);
+    if (nb::isinstance<nb::list>(object) || nb::isinstance<nb::tuple>(object)) {
+      const nb::object masked = ma.attr("MaskedArray");
+      bool any = false;
+      for (const nb::handle item : object) {
+        any = any || nb::isinstance(item, masked);
+      }
+      if (!any) {
+        return {};
+      }
+      array = ma.attr("asarray")(object);
+    }
+    return nb::cast<bool>(ma.attr("is_masked")(array)) ? array : nb::object();
+  });
+}
+
 /// numpy.asarray(object); throws Error where it is no array of numbers of these kinds.
 nb::object as_array(nb::handle object, const char* name, const char* kinds, const char* wanted) {
   nb::object array;
   try {
-    array = nb::module_::import_("numpy").attr("asarray")(object);
+    array = call("numpy", "asarray", object);
   } catch (nb::python_error& error) {
     if (!error.matches(PyExc_ValueError) && !error.matches(PyExc_TypeError)) {
       throw;
@@ -39,8 +59,13 @@ nb::object as_array(nb::handle object, const char* name, const char* kinds, cons
 
 /// The array itself, or a copy, with this dtype and C layout.
 nb::object with_layout(const nb::object& array, const char* dtype) {
-  return nb::module_::import_("numpy").attr("asarray")(array, nb::arg("dtype") = dtype,
-                                                       nb::arg("order") = "C");
+  return call("numpy", "asarray", array, nb::arg("dtype") = dtype, nb::arg("order") = "C");
+}
+
+void refuse_masked(nb::handle object, const char* name) {
+  if (masked_array(object).is_valid()) {
+    refuse(name, "has masked values, which only readings may have; give all of them");
+  }
 }
 
 std::string wanted_shape(ArrayReader::Shape shape) {
@@ -110,11 +135,27 @@ Array<Value> ArrayReader::checked(const nb::object& array, const char* name, Sha
 }
 
 Floats ArrayReader::floats(nb::handle object, const char* name, Shape shape) {
+  refuse_masked(object, name);
+  return readings(object, name, shape);
+}
+
+Floats ArrayReader::readings(nb::handle object, const char* name, Shape shape) {
   const nb::object array = as_array(object, name, "fiu", "numbers (float64)");
   return checked<double>(with_layout(array, "float64"), name, shape);
 }
 
+std::optional<Bytes> ArrayReader::unmasked(nb::handle readings, const std::optional<Bytes>& valid,
+                                           Shape shape) {
+  const nb::object masked = masked_array(readings);
+  if (!masked.is_valid()) {
+    return valid;
+  }
+  const nb::object known = call("numpy", "logical_not", call("numpy.ma", "getmaskarray", masked));
+  return flags(valid ? call("numpy", "logical_and", valid->object, known) : known, "valid", shape);
+}
+
 Bytes ArrayReader::flags(nb::handle object, const char* name, Shape shape) {
+  refuse_masked(object, name);
   nb::object array = as_array(object, name, "biu", "booleans, False for a dead element");
   const auto dtype = nb::cast<std::string>(array.attr("dtype").attr("name"));
   if (dtype != "bool" && dtype != "uint8") {
@@ -125,8 +166,9 @@ Bytes ArrayReader::flags(nb::handle object, const char* name, Shape shape) {
 }
 
 Counts ArrayReader::counts(nb::handle object, const char* name, Shape shape) {
+  refuse_masked(object, name);
   const nb::object array = as_array(object, name, "iu", "whole numbers (uint64)");
-  if (nb::cast<std::size_t>(array.attr("size")) > 0 && array.attr("min")() < nb::int_(0)) {
+  if (nb::cast<std::size_t>(array.attr("size")) > 0 && call("numpy", "min", array) < nb::int_(0)) {
     refuse(name, "has a count below 0; give whole numbers from 0");
   }
   return checked<std::uint64_t>(with_layout(array, "uint64"), name, shape);

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <initializer_list>
 #include <map>
+#include <optional>
 #include <span>
 #include <string>
 #include <utility>
@@ -55,6 +56,11 @@ class ArrayReader {
   using Shape = std::initializer_list<const char*>;
 
   Floats floats(nb::handle object, const char* name, Shape shape);
+  /// Readings, the only arrays that may have masked values (numpy.ma).
+  Floats readings(nb::handle object, const char* name, Shape shape);
+  /// The flags, 0 also where a reading is masked.
+  std::optional<Bytes> unmasked(nb::handle readings, const std::optional<Bytes>& valid,
+                                Shape shape);
   /// Booleans, or integers that are 0 or not.
   Bytes flags(nb::handle object, const char* name, Shape shape);
   Counts counts(nb::handle object, const char* name, Shape shape);

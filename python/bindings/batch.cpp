@@ -8,7 +8,6 @@
 
 #include <fmt/format.h>
 #include <nanobind/stl/shared_ptr.h>
-#include <nanobind/stl/string.h>
 #include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
 
@@ -154,7 +153,7 @@ Chunk recognise_entries(OpenBatch& batch, const std::vector<std::string>& entrie
 nb::tuple recognise_python(const Owned<OpenBatch>& batch, const nb::list& entries) {
   std::vector<std::string> texts;
   for (const nb::handle entry : entries) {
-    texts.push_back(text_in(nb::cast<nb::bytes>(entry)));
+    texts.push_back(text_in(value_of<nb::bytes>(entry, "entries: give bytes of settle_batch()")));
   }
   const Chunk chunk = batch.use([texts = std::move(texts)](OpenBatch& open, Call& call) {
     return recognise_entries(open, texts, call);

@@ -15,13 +15,15 @@
 
 #include <nanobind/nanobind.h>
 
+#include "own_process.hpp"
 #include "types.hpp"
 
 namespace palpate::python {
 
 /// Work that runs on a thread of its own while the thread that called it from Python waits without
 /// the GIL: other threads of Python go on, and Ctrl-C ends the wait at once. Work that was given up
-/// stops where it next reports its progress, in the background; what it uses lives until then.
+/// stops where it next reports its progress, in the background; what it uses lives until then. In a
+/// child of fork(), the parent's calls are neither waited for nor destroyed.
 class Call {
  public:
   using Work = std::function<void(Call&)>;
@@ -45,16 +47,20 @@ class Call {
   /// Waits for the work, then throws what the work threw.
   /// @param progress called on this thread with the fraction done, about 20 times a second
   /// @throws nb::python_error on Ctrl-C, or what `progress` throws; the work is then given up
-  static void wait(std::unique_ptr<Call> call, const Progress& progress);
-  /// Waits for all work that was given up; for the end of the interpreter.
-  static void wait_for_given_up();
+  static void wait(const std::shared_ptr<Call>& call, const Progress& progress);
+  /// Has the end of the interpreter give up the work of all threads and wait for it, since work
+  /// uses libraries that the end of the process takes down. The threads stay where they are.
+  static void end_all_at_exit();
 
   struct Interrupted {};
 
  private:
+  static void end_all();
+  bool is_done();
   bool wait_for(std::chrono::milliseconds time);
-  static void give_up(std::unique_ptr<Call> call);
+  void watch(const Progress& progress);
 
+  OwnProcess process_;
   Work work_;
   std::vector<nb::object> kept_;
   std::atomic<double> fraction_{0.0};
@@ -72,11 +78,11 @@ template <typename F>
 auto run(std::vector<nb::object> kept, const Progress& progress, F work) {
   using Result = std::invoke_result_t<F&, Call&>;
   if constexpr (std::is_void_v<Result>) {
-    Call::wait(std::make_unique<Call>(std::move(work), std::move(kept)), progress);
+    Call::wait(std::make_shared<Call>(std::move(work), std::move(kept)), progress);
   } else {
     const auto result = std::make_shared<std::optional<Result>>();
     const auto shared = std::make_shared<F>(std::move(work));  // std::function copies
-    Call::wait(std::make_unique<Call>([result, shared](Call& call) { *result = (*shared)(call); },
+    Call::wait(std::make_shared<Call>([result, shared](Call& call) { *result = (*shared)(call); },
                                       std::move(kept)),
                progress);
     return std::move(**result);

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <nanobind/stl/optional.h>
-#include <nanobind/stl/string.h>
 #include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
 
@@ -173,7 +172,8 @@ void bind_marginals(nb::module_& module) {
 
 std::vector<Hypothesis> hypotheses_of(nb::handle maps) {
   std::vector<Hypothesis> hypotheses;
-  for (const nb::handle item : nb::iter(maps)) {
+  const nb::object all = call("builtins", "list", maps);
+  for (const nb::handle item : all) {
     const OccupancyGrid* map = nullptr;
     const Hypothesis* hypothesis = nullptr;
     if (nb::try_cast(item, map) && map != nullptr) {

@@ -1,7 +1,6 @@
 #include <fmt/format.h>
 #include <nanobind/stl/map.h>
 #include <nanobind/stl/shared_ptr.h>
-#include <nanobind/stl/string.h>
 
 #include "bindings.hpp"
 #include "palpate/map_builder.hpp"

@@ -1,7 +1,6 @@
 #include <fmt/format.h>
 #include <nanobind/stl/array.h>
 #include <nanobind/stl/optional.h>
-#include <nanobind/stl/string.h>
 
 #include "arrays.hpp"
 #include "bindings.hpp"

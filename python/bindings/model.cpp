@@ -4,7 +4,6 @@
 
 #include <fmt/format.h>
 #include <nanobind/stl/optional.h>
-#include <nanobind/stl/string.h>
 #include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
 
@@ -24,6 +23,12 @@ namespace {
 struct AxisLike : nb::object {
   NB_OBJECT_DEFAULT(AxisLike, nb::object, "Axis | tuple[float, float, int]", any_object)
 };
+
+Axis axis_of(const AxisLike& axis, const char* name) {
+  return value_of<Axis>(axis, fmt::format("{}: give an Axis or (lower, upper, count), such as "
+                                          "(-10.0, 10.0, 25)",
+                                          name));
+}
 
 std::string text_of(const Axis& axis) {
   return fmt::format("({:g}, {:g}, {})", axis.lower, axis.upper, axis.count);
@@ -57,8 +62,9 @@ void bind_lattice(nb::module_& module) {
           "__init__",
           [](PoseLattice* self, const AxisLike& x_mm, const AxisLike& y_mm,
              const AxisLike& theta_rad, const ArrayLike& pivot_mm) {
-            const PoseLattice lattice{nb::cast<Axis>(x_mm), nb::cast<Axis>(y_mm),
-                                      nb::cast<Axis>(theta_rad), point_of(pivot_mm, "pivot_mm")};
+            const PoseLattice lattice{axis_of(x_mm, "x_mm"), axis_of(y_mm, "y_mm"),
+                                      axis_of(theta_rad, "theta_rad"),
+                                      point_of(pivot_mm, "pivot_mm")};
             lattice.validate();
             new (self) PoseLattice(lattice);
           },

@@ -15,10 +15,13 @@ void add_error() {
   error_class = nb::object(nb::module_::import_("palpate._error").attr("Error")).release().ptr();
   nb::register_exception_translator(
       [](const std::exception_ptr& thrown, void*) {
+        if (!thrown) {
+          stay();  // CPython ends the thread, from where with_python() does not see it
+        }
         try {
           std::rethrow_exception(thrown);
         } catch (const Error& error) {
-          const nb::object value = nb::borrow(error_class)(error.what());
+          const nb::object value = nb::borrow(error_class)(std::string(error.what()));
           value.attr("fault") = error.fault() == Fault::input ? "input" : "system";
           PyErr_SetObject(error_class, value.ptr());
         }
@@ -48,6 +51,5 @@ NB_MODULE(_palpate, module) {
   bind_request(module);
   bind_recognition(module);
   bind_batch(module);
-  // Work that was given up uses libraries that the end of the process takes down.
-  nb::module_::import_("atexit").attr("register")(nb::cpp_function(&Call::wait_for_given_up));
+  Call::end_all_at_exit();
 }

@@ -1,6 +1,5 @@
 #include <fmt/format.h>
 #include <nanobind/stl/shared_ptr.h>
-#include <nanobind/stl/string.h>
 #include <nanobind/stl/tuple.h>
 
 #include "bindings.hpp"

@@ -1,7 +1,6 @@
 #include <fmt/format.h>
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/shared_ptr.h>
-#include <nanobind/stl/string.h>
 #include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
 
@@ -18,6 +17,11 @@ using namespace nb::literals;
 namespace {
 
 using Histogram = Named<PoseHistogram>;
+
+DisplacementSd sd_of(const DisplacementSdLike& sd, const char* name) {
+  return value_of<DisplacementSd>(
+      sd, fmt::format("{}: give a DisplacementSd or (mm, rad), such as (0.5, 0.02)", name));
+}
 
 Histogram make_histogram(const std::shared_ptr<Session>& session, nb::handle maps,
                          HistogramOptions options) {
@@ -135,8 +139,8 @@ void bind_pose_histogram(nb::module_& module) {
                                                  .contact = contact,
                                                  .still_array = still_array,
                                                  .none_weight = none_weight,
-                                                 .touch_sd = nb::cast<DisplacementSd>(touch_sd),
-                                                 .slip_sd = nb::cast<DisplacementSd>(slip_sd),
+                                                 .touch_sd = sd_of(touch_sd, "touch_sd"),
+                                                 .slip_sd = sd_of(slip_sd, "slip_sd"),
                                                  .memory_limit_bytes = memory_limit_bytes}));
           },
           "device"_a, "maps"_a, "lattice"_a = PoseLattice{}, nb::kw_only(),

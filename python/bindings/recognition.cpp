@@ -1,7 +1,6 @@
 #include <map>
 
 #include <nanobind/stl/shared_ptr.h>
-#include <nanobind/stl/string.h>
 #include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
 #include <nlohmann/json.hpp>
@@ -76,7 +75,7 @@ Recordings recordings_of(const nb::list& items) {
       }
       recordings.given.emplace(recordings.size, std::move(copy));
     } else {
-      recordings.files.push_back(nb::cast<std::string>(nb::str(item)));
+      recordings.files.push_back(nb::borrow<PathLike>(item).text());
     }
     ++recordings.size;
   }

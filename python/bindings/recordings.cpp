@@ -1,6 +1,5 @@
 #include <fmt/format.h>
 #include <nanobind/stl/optional.h>
-#include <nanobind/stl/string.h>
 
 #include "bindings.hpp"
 #include "call.hpp"
@@ -27,11 +26,12 @@ ArrayTouch make_touch(const ArrayLike& T_robot_sensor, const ArrayLike& elements
   ArrayReader reader;
   ArrayTouch touch{.T_robot_sensor = reader.floats(T_robot_sensor, "T_robot_sensor", {"3"}),
                    .elements_mm = reader.floats(elements_mm, "elements_mm", {"e", "2"}),
-                   .pressure = reader.floats(pressure, "pressure", {"e"}),
+                   .pressure = reader.readings(pressure, "pressure", {"e"}),
                    .valid = {}};
   if (valid) {
     touch.valid = reader.flags(*valid, "valid", {"e"});
   }
+  touch.valid = reader.unmasked(pressure, touch.valid, {"e"});
   return touch;
 }
 
@@ -76,13 +76,20 @@ struct RecordingArguments {
 
 /// The array by its rank: constant, or with a row for each touch.
 bool changes(nb::handle array, long constant_rank) {
-  return nb::cast<long>(nb::module_::import_("numpy").attr("ndim")(array)) > constant_rank;
+  try {
+    return nb::cast<long>(call("numpy", "ndim", array)) > constant_rank;
+  } catch (const nb::python_error& error) {
+    if (!error.matches(PyExc_ValueError)) {
+      throw;
+    }
+    return false;  // no array: the reader refuses it by name
+  }
 }
 
 ArrayRecording make_recording(const RecordingArguments& given) {
   ArrayReader reader;
   ArrayRecording recording;
-  recording.pressure = reader.floats(given.pressure, "pressure", {"n", "e"});
+  recording.pressure = reader.readings(given.pressure, "pressure", {"n", "e"});
   recording.T_robot_sensor = reader.floats(given.poses, "poses", {"n", "3"});
   recording.elements_mm = changes(given.elements_mm, 2)
                               ? reader.floats(given.elements_mm, "elements_mm", {"n", "e", "2"})
@@ -91,6 +98,7 @@ ArrayRecording make_recording(const RecordingArguments& given) {
     recording.valid = changes(*given.valid, 1) ? reader.flags(*given.valid, "valid", {"n", "e"})
                                                : reader.flags(*given.valid, "valid", {"e"});
   }
+  recording.valid = reader.unmasked(given.pressure, recording.valid, {"n", "e"});
   const auto floats = [&](const std::optional<ArrayLike>& array, const char* name,
                           const char* letter) {
     return array ? std::optional(reader.floats(*array, name, {letter})) : std::nullopt;
@@ -107,8 +115,8 @@ ArrayRecording make_recording(const RecordingArguments& given) {
 template <typename Value>
 Array<Value> sliced(const Array<Value>& array, const nb::slice& slice) {
   // A step makes another layout, and so a copy.
-  const nb::object rows =
-      nb::module_::import_("numpy").attr("ascontiguousarray")(array.object[slice]);
+  const nb::object cut = array.object[slice];
+  const nb::object rows = call("numpy", "ascontiguousarray", cut);
   Array<Value> result{rows, nullptr, array.shape};
   result.shape[0] = nb::len(rows);
   Py_buffer buffer{};
@@ -141,11 +149,26 @@ ArrayRecording sliced(const ArrayRecording& all, const nb::slice& slice) {
 
 nb::object item(const ArrayRecording& recording, nb::handle index) {
   if (nb::isinstance<nb::slice>(index)) {
-    return nb::cast(sliced(recording, nb::borrow<nb::slice>(index)));
+    Py_ssize_t start = 0;
+    Py_ssize_t stop = 0;
+    Py_ssize_t step = 0;
+    if (with_python([&] { return PySlice_Unpack(index.ptr(), &start, &stop, &step); }) != 0) {
+      throw nb::python_error();
+    }
+    return nb::cast(sliced(recording, nb::slice(start, stop, step)));
   }
-  const auto n = static_cast<std::int64_t>(recording.size());
-  const auto given = nb::cast<std::int64_t>(index);
-  const std::int64_t i = given < 0 ? given + n : given;
+  if (PyIndex_Check(index.ptr()) == 0) {
+    throw nb::type_error(
+        fmt::format("index: is a {}; give a whole number or a slice", nb::inst_name(index).c_str())
+            .c_str());
+  }
+  const auto n = static_cast<Py_ssize_t>(recording.size());
+  const Py_ssize_t given =
+      with_python([&] { return PyNumber_AsSsize_t(index.ptr(), PyExc_IndexError); });
+  if (given == -1 && PyErr_Occurred() != nullptr) {
+    throw nb::python_error();
+  }
+  const Py_ssize_t i = given < 0 ? given + n : given;
   if (i < 0 || i >= n) {
     throw nb::index_error(fmt::format("touch {} of {}", given, n).c_str());
   }

@@ -1,7 +1,6 @@
 #include "reference.hpp"
 
 #include <nanobind/stl/optional.h>
-#include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
 #include "call.hpp"
@@ -104,5 +103,5 @@ NB_MODULE(reference, module) {
                                         pose_of(truth, "truth"));
       },
       "map"_a, "estimate"_a, "truth"_a, "Eq. 17-20, in mm; poses T_object_robot [3].");
-  nb::module_::import_("atexit").attr("register")(nb::cpp_function(&Call::wait_for_given_up));
+  Call::end_all_at_exit();
 }

@@ -6,7 +6,6 @@
 
 #include <fmt/format.h>
 #include <nanobind/stl/optional.h>
-#include <nanobind/stl/string.h>
 
 #include "bindings.hpp"
 #include "map_files.hpp"
@@ -106,7 +105,7 @@ void add_maps(const nb::list& items, cli::RecognitionFlags& flags) {
       const Hypothesis given = is_map ? Hypothesis{.map = *map} : *hypothesis;
       flags.given_maps.push_back({fmt::format("map '{}'", given.map.label), given});
     } else {
-      flags.maps.push_back(nb::cast<std::string>(nb::str(item)));
+      flags.maps.push_back(nb::borrow<PathLike>(item).text());
     }
   }
   if (flags.given_maps.empty()) {

@@ -1,10 +1,10 @@
 #include <chrono>
+#include <cmath>
 #include <memory>
 #include <mutex>
 
 #include <fmt/format.h>
 #include <nanobind/stl/optional.h>
-#include <nanobind/stl/string.h>
 #include <nanobind/stl/unique_ptr.h>
 #include <nanobind/stl/vector.h>
 
@@ -29,10 +29,18 @@ namespace {
 class SharedSensor {
  public:
   explicit SharedSensor(std::unique_ptr<Sensor> sensor) : sensor_(std::move(sensor)) {}
+  ~SharedSensor() {
+    if (!process_.is_here()) {
+      static_cast<void>(sensor_.release());  // whose threads are the parent's
+    }
+  }
+  SharedSensor(const SharedSensor&) = delete;
+  SharedSensor& operator=(const SharedSensor&) = delete;
 
   template <typename F>
   auto use(F work) {
-    const nb::gil_scoped_release release;
+    process_.require("sensor");
+    const WithoutGil released;
     const std::lock_guard lock(mutex_);
     return work(*sensor_);
   }
@@ -40,7 +48,13 @@ class SharedSensor {
   /// The next frame; none where the stream has ended, or after the timeout. Ctrl-C ends the wait.
   std::optional<Frame> next(std::optional<double> timeout_s) {
     using Clock = std::chrono::steady_clock;
-    const auto end = Clock::now() + std::chrono::duration<double>(timeout_s.value_or(0.0));
+    constexpr double longest_s = 1e8;  // that the clock can count
+    if (timeout_s && std::isnan(*timeout_s)) {
+      throw nb::value_error(
+          "timeout_s: is not a number; give seconds, or None to wait for a frame");
+    }
+    const auto end = Clock::now() + std::chrono::duration<double>(
+                                        std::clamp(timeout_s.value_or(0.0), 0.0, longest_s));
     for (;;) {
       auto [frame, ended] = use([&](Sensor& sensor) {
         auto wait = std::chrono::milliseconds(50);
@@ -66,17 +80,18 @@ class SharedSensor {
   }
 
  private:
+  OwnProcess process_;
   std::unique_ptr<Sensor> sensor_;
   std::mutex mutex_;
 };
 
-std::unique_ptr<SharedSensor> open_sensor(const std::string& name,
+std::unique_ptr<SharedSensor> open_sensor(const PathLike& board_or_file,
                                           const std::optional<PathLike>& pose_source) {
   std::optional<std::filesystem::path> poses;
   if (pose_source) {
     poses = pose_source->path();
   }
-  auto sensor = run([name, poses](Call&) {
+  auto sensor = run([name = board_or_file.text(), poses](Call&) {
     std::unique_ptr<Sensor> opened =
         is_virtual_sensor(name) ? open_virtual_sensor(name) : open_board(name);
     return poses ? std::make_unique<PosedSensor>(std::move(opened), poses->string())
@@ -102,14 +117,20 @@ void bind_frame(nb::module_& module) {
           "__init__",
           [](Frame* self, double host_time_s, const ArrayLike& values,
              const std::optional<ArrayLike>& T_robot_sensor) {
-            const Floats readings = ArrayReader().floats(values, "values", {"e"});
+            ArrayReader reader;
+            const Floats readings = reader.readings(values, "values", {"e"});
+            std::vector<double> known(readings.data, readings.data + readings.size());
+            if (const auto flags = reader.unmasked(values, {}, {"e"})) {
+              for (std::size_t k = 0; k < known.size(); ++k) {
+                known[k] = flags->data[k] != 0 ? known[k] : std::nan("");
+              }
+            }
             std::optional<Pose> pose;
             if (T_robot_sensor) {
               pose = pose_of(*T_robot_sensor, "T_robot_sensor");
             }
-            new (self) Frame{.host_time_s = host_time_s,
-                             .values = {readings.data, readings.data + readings.size()},
-                             .T_robot_sensor = pose};
+            new (self) Frame{
+                .host_time_s = host_time_s, .values = std::move(known), .T_robot_sensor = pose};
           },
           "host_time_s"_a, "values"_a, "T_robot_sensor"_a = nb::none(),
           "host_time_s since the Unix epoch; values [e] in the pressure unit, NaN: unknown;\n"
@@ -311,8 +332,9 @@ void bind_detector(nb::module_& module) {
   module.def(
       "baseline_of",
       [](const std::vector<Frame>& frames, SharedSensor& sensor, std::optional<double> onset) {
-        return owned(baseline_of(frames, sensor.description(), onset),
-                     {frames.at(0).values.size()});
+        std::vector<double> baseline = baseline_of(frames, sensor.description(), onset);
+        const std::size_t e = baseline.size();
+        return owned(std::move(baseline), {e});
       },
       "frames"_a, "sensor"_a, "onset"_a = nb::none(),
       "Takes a tare: what the untouched array reads, [e], as medians over the frames. With onset,\n"

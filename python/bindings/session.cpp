@@ -5,6 +5,7 @@ namespace palpate::python {
 using namespace std::chrono_literals;
 
 Session::Lock::Lock(Session& session, const Call& call) : session_(session) {
+  session.device_.context();  // throws in a child of fork(), where no thread may unlock it
   while (!session_.working_.try_lock_for(20ms)) {
     call.check();
   }
@@ -34,6 +35,9 @@ bool Session::swept() {
 }
 
 void Session::destroy(std::shared_ptr<void> object) {
+  if (!process_.is_here()) {
+    return;  // the object's destructor leaves all to the parent, whose threads hold locks
+  }
   {
     const std::lock_guard lock(sweeping_);
     unwanted_.push_back(std::move(object));

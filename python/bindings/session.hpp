@@ -42,6 +42,7 @@ class Session {
   void sweep();
   bool swept();
 
+  OwnProcess process_;
   Device device_;
   std::timed_mutex working_;
   std::mutex sweeping_;

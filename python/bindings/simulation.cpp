@@ -1,5 +1,4 @@
 #include <nanobind/stl/optional.h>
-#include <nanobind/stl/string.h>
 
 #include "bindings.hpp"
 #include "call.hpp"
@@ -12,7 +11,8 @@ using namespace nb::literals;
 
 namespace {
 
-ArrayRecording simulate(const std::string& shape, const std::optional<ArrayLike>& T_object_sensor,
+ArrayRecording simulate(const PathLike& letter_or_file,
+                        const std::optional<ArrayLike>& T_object_sensor,
                         const std::optional<ArrayLike>& T_object_robot,
                         const std::optional<ArrayLike>& elements_mm, std::uint64_t seed,
                         const SensorModel& model) {
@@ -22,7 +22,7 @@ ArrayRecording simulate(const std::string& shape, const std::optional<ArrayLike>
       elements_mm ? points_of(*elements_mm, "elements_mm") : digitacts_array();
   const std::optional<Pose> object =
       T_object_robot ? std::optional(pose_of(*T_object_robot, "T_object_robot")) : std::nullopt;
-  return array_recording(run([=](Call&) {
+  return array_recording(run([=, shape = letter_or_file.text()](Call&) {
     const Shape made = make_shape(shape);
     Simulator simulator(made, model, elements, seed);
     std::vector<Pose> T_robot_sensor = poses;

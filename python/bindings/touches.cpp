@@ -169,7 +169,8 @@ TouchViews views_of(nb::handle touches) {
     recording->keep(views.kept);
     return views;
   }
-  for (const nb::handle item : nb::iter(touches)) {
+  const nb::object all = call("builtins", "list", touches);
+  for (const nb::handle item : all) {
     const ArrayTouch* touch = nullptr;
     if (!nb::try_cast(item, touch) || touch == nullptr) {
       throw Error(Fault::input,

@@ -1,18 +1,33 @@
 #pragma once
 
 #include <filesystem>
+#include <string>
+#include <utility>
 
 #include <nanobind/nanobind.h>
-#include <nanobind/stl/filesystem.h>
+
+#include "gil.hpp"
+#include "text.hpp"
 
 namespace palpate::python {
 
 namespace nb = nanobind;
 
+/// Calls a function of a module of Python.
+template <typename... Arguments>
+nb::object call(const char* module, const char* function, Arguments&&... arguments) {
+  return with_python([&] {
+    return nb::module_::import_(module).attr(function)(std::forward<Arguments>(arguments)...);
+  });
+}
+
 inline bool any_object(PyObject* object) { return object != nullptr; }
 inline bool is_path(PyObject* object) {
   return PyUnicode_Check(object) || PyBytes_Check(object) ||
          PyObject_HasAttrString(object, "__fspath__") != 0;
+}
+inline bool is_callable_or_none(PyObject* object) {
+  return object == Py_None || PyCallable_Check(object) != 0;
 }
 
 // Arguments and results whose types the stubs name, and which C++ takes as plain objects.
@@ -29,20 +44,39 @@ struct ByteArray : nb::object {
 struct CountArray : nb::object {
   NB_OBJECT_DEFAULT(CountArray, nb::object, "numpy.typing.NDArray[numpy.uint64]", any_object)
 };
-/// The path of a file. nanobind's own name of the type lacks an argument that strict checks ask
-/// for.
+/// The path of a file.
 struct PathLike : nb::object {
-  NB_OBJECT_DEFAULT(PathLike, nb::object, "str | os.PathLike[str]", is_path)
-  std::filesystem::path path() const { return nb::cast<std::filesystem::path>(*this); }
+  NB_OBJECT_DEFAULT(PathLike, nb::object, "str | bytes | os.PathLike[str] | os.PathLike[bytes]",
+                    is_path)
+  /// The path's bytes. Throws what __fspath__ raises, and ValueError where the path holds a null.
+  std::string text() const {
+    PyObject* converted = nullptr;
+    if (with_python([&] { return PyUnicode_FSConverter(m_ptr, &converted); }) == 0) {
+      throw nb::python_error();
+    }
+    const nb::object bytes = nb::steal(converted);
+    return {PyBytes_AS_STRING(converted), static_cast<std::size_t>(PyBytes_GET_SIZE(converted))};
+  }
+  std::filesystem::path path() const { return text(); }
 };
 /// A DisplacementSd, which may be given as a tuple.
 struct DisplacementSdLike : nb::object {
   NB_OBJECT_DEFAULT(DisplacementSdLike, nb::object, "DisplacementSd | tuple[float, float]",
                     any_object)
 };
+/// The object as C++ has it. Throws TypeError with the message where it is none.
+template <typename Value>
+Value value_of(nb::handle object, const std::string& message) {
+  Value value;
+  if (!nb::try_cast(object, value)) {
+    throw nb::type_error(message.c_str());
+  }
+  return value;
+}
 /// Called with the fraction done; null or None: nobody asks.
 struct Progress : nb::object {
-  NB_OBJECT_DEFAULT(Progress, nb::object, "collections.abc.Callable[[float], object]", any_object)
+  NB_OBJECT_DEFAULT(Progress, nb::object, "collections.abc.Callable[[float], object]",
+                    is_callable_or_none)
 };
 
 }  // namespace palpate::python

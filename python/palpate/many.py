@@ -27,7 +27,7 @@ from .recognition import Record, flags_of
 if TYPE_CHECKING:
     from distributed import Client
 
-_Path = str | os.PathLike[str]
+_Path = str | bytes | os.PathLike[str] | os.PathLike[bytes]
 _Pair = tuple[float, float]
 
 
@@ -123,8 +123,7 @@ def recognize_many(
     """
     if chunk < 1:
         raise Error(f"chunk {chunk}: give at least 1")
-    given = [paths] if isinstance(paths, (str, os.PathLike)) else paths
-    recordings = [os.fspath(path) for path in given]
+    recordings = _paths(paths)
     asked = _asked(recordings, task)
     asked.flags()  # refuses here what no worker could read
     if client is None:
@@ -170,13 +169,14 @@ def _asked(recordings: list[str], task: Task) -> _Asked:
         if name not in Task.__annotations__:
             raise Error(f"task: '{name}' is not known; give {', '.join(Task.__annotations__)}")
     files = [*recordings, *_paths(options.get("maps", ()))]
-    files += [os.fspath(options[name]) for name in ("scene", "sensor_model") if options.get(name)]
+    files += [os.fsdecode(options[name]) for name in ("scene", "sensor_model") if options.get(name)]
     relative = [path for path in files if not os.path.isabs(path)]
     return _Asked(options, os.getcwd(), relative[0] if relative else "")
 
 
 def _paths(given: _Path | Iterable[_Path]) -> list[str]:
-    return [os.fspath(path) for path in ([given] if isinstance(given, (str, os.PathLike)) else given)]
+    one = isinstance(given, (str, bytes, os.PathLike))
+    return [os.fsdecode(path) for path in ([given] if one else given)]
 
 
 @dataclass(frozen=True)

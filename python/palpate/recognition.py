@@ -1,5 +1,6 @@
 """`palpate recognize` as a function, with the command's rules, defaults and words."""
 
+import inspect
 import os
 import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -8,7 +9,8 @@ from typing import Any, Literal, cast
 from . import _palpate
 from ._palpate import Device, Hypothesis, OccupancyGrid, Recording
 
-_Path = str | os.PathLike[str]
+_Path = str | bytes | os.PathLike[str] | os.PathLike[bytes]
+_PATHS = (str, bytes, os.PathLike)
 _Pair = tuple[float, float]
 
 
@@ -123,8 +125,8 @@ def recognize(
             "device": None if isinstance(device, Device) else device,
         }
     )
-    given_maps = [maps] if isinstance(maps, (OccupancyGrid, Hypothesis, str, os.PathLike)) else maps
-    given = [recordings] if isinstance(recordings, (Recording, str, os.PathLike)) else recordings
+    given_maps = [maps] if isinstance(maps, (OccupancyGrid, Hypothesis, *_PATHS)) else maps
+    given = [recordings] if isinstance(recordings, (Recording, *_PATHS)) else recordings
     records, sentences = _palpate.recognize_as_flagged(
         [item if isinstance(item, Recording) else os.fspath(item) for item in given],
         [
@@ -145,7 +147,11 @@ def flags_of(options: Mapping[str, object]) -> _palpate.RecognitionFlags:
     flags = _palpate.RecognitionFlags()
     for name, value in options.items():
         if value is not None:
-            setattr(flags, name, _flag(name, value))
+            try:
+                setattr(flags, name, _flag(name, value))
+            except TypeError:
+                wanted = inspect.formatannotation(recognize.__annotations__[name])
+                raise TypeError(f"{name}: {value!r}; give {wanted}") from None
     return flags
 
 
@@ -160,7 +166,7 @@ def _flag(name: str, value: object) -> object:
         return repr(float(cast(float, value)))
     if name == "device":
         return str(value)
-    return os.fspath(value) if isinstance(value, os.PathLike) else value
+    return os.fsdecode(value) if isinstance(value, (bytes, os.PathLike)) else value
 
 
 def _joined(values: Sequence[float] | str, separator: str) -> str:

@@ -99,6 +99,8 @@ def test_read_only_arrays_are_read(device: palpate.Device,
          "pressure: dtype complex128; give numbers (float64)"),
         ({"pressure": [["a"] * 6] * 4}, "pressure: dtype <U1; give numbers (float64)"),
         ({"pressure": [[1.0], [2.0, 3.0]]}, "pressure: is no array of numbers; give numbers (float64)"),
+        ({"elements_mm": [[1.0], [2.0, 3.0]]},
+         "elements_mm: is no array of numbers; give numbers (float64)"),
         ({"lost_before": [0, 0, 0, -1]},
          "lost_before: has a count below 0; give whole numbers from 0"),
         ({"valid": numpy.zeros(6)},
@@ -110,6 +112,51 @@ def test_what_does_not_fit_is_refused_by_name(changed: dict[str, object], messag
         palpate.Recording(**(arrays() | changed))  # type: ignore[arg-type]
     assert str(refused.value) == message
     assert refused.value.fault == "input"
+
+
+def test_masked_readings_are_unknown(device: palpate.Device,
+                                     maps: list[palpate.OccupancyGrid],
+                                     unknown: palpate.Recording) -> None:  # fmt: skip
+    dead = numpy.zeros(unknown.pressure.shape, bool)
+    dead[:, 3] = dead[2, 17] = True
+    junk = numpy.where(dead, numpy.inf, unknown.pressure)
+    masked = numpy.ma.masked_array(junk, mask=dead)
+    rest = (unknown.T_robot_sensor, unknown.elements_mm)
+
+    def believed(touches: palpate.Recording | list[palpate.Touch]) -> bytes:
+        belief = palpate.PoseHistogram(device, maps)
+        belief.update(touches)
+        return belief.log_likelihood(1).tobytes()
+
+    expected = believed(palpate.Recording(unknown.pressure, *rest, valid=~dead))
+    recording = palpate.Recording(masked, *rest)
+    assert address(recording.pressure) == address(junk)  # in place
+    assert believed(recording) == expected
+    assert believed(palpate.Recording(list(masked), *rest)) == expected
+    assert believed([palpate.Touch(pose, unknown.elements_mm, pressure)
+                     for pose, pressure in zip(unknown.T_robot_sensor, masked, strict=True)]
+                    ) == expected  # fmt: skip
+    for valid in (~dead[0], ~dead):
+        both = palpate.Recording(numpy.ma.masked_array(junk, mask=dead & ~dead[0]), *rest, valid=valid)
+        assert believed(both) == expected
+    assert palpate.Recording(numpy.ma.masked_array(junk, mask=False), *rest).valid is None
+    values = palpate.Frame(0.0, masked[2]).values
+    assert numpy.flatnonzero(numpy.isnan(values)).tolist() == [3, 17]
+    assert numpy.array_equal(values[~dead[2]], unknown.pressure[2][~dead[2]])
+
+
+def test_only_readings_may_be_masked(maps: list[palpate.OccupancyGrid]) -> None:
+    for name, value in {**arrays(), "valid": numpy.ones(6, int), "time_s": numpy.zeros(4),
+                        "lost_before": numpy.zeros(4, int)}.items():  # fmt: skip
+        masked = numpy.ma.masked_array(value, mask=False)
+        palpate.Recording(**(arrays() | {name: masked}))
+        masked[0] = numpy.ma.masked
+        if name != "pressure":
+            with pytest.raises(palpate.Error, match=f"^{name}: has masked values"):
+                palpate.Recording(**(arrays() | {name: masked}))
+    grid = numpy.ma.masked_less(maps[0].log_odds, 0.0)
+    with pytest.raises(palpate.Error, match="^log_odds: has masked values"):
+        palpate.OccupancyGrid("A", grid, cell_mm=0.5, origin_mm=(0, 0))
 
 
 def test_results_are_views_that_keep_their_memory(maps: list[palpate.OccupancyGrid],

@@ -1,7 +1,10 @@
 """Files, beside h5py and in threads."""
 
+import os
 import pathlib
 import threading
+from collections.abc import Callable
+from typing import Any
 
 import h5py
 import numpy
@@ -59,6 +62,33 @@ def test_files_are_refused_in_the_words_of_the_command(tmp_path: pathlib.Path) -
     with pytest.raises(palpate.Error) as refused:
         palpate.simulate("A").save(tmp_path / "no_folder" / "a.h5")
     assert refused.value.fault == "input"
+
+
+@pytest.mark.parametrize("form", [str, os.fsencode, pathlib.Path])
+def test_names_of_files_need_not_be_utf8(
+    form: Callable[[str], Any], tmp_path: pathlib.Path, device: palpate.Device,
+    maps: list[palpate.OccupancyGrid], unknown: palpate.Recording,
+) -> None:  # fmt: skip
+    name = os.fsdecode(os.fsencode(tmp_path) + b"/\xff")
+    recording, grid, scene = (form(f"{name}.{end}") for end in ("h5", "map.h5", "yaml"))
+    unknown.save(recording)
+    maps[0].save(grid)
+    pathlib.Path(f"{name}.yaml").write_bytes(b'objects: [{map: "' + os.fsencode(grid) + b'"}]')
+    back = palpate.read_recording(recording)
+    assert back.path == f"{name}.h5"
+    assert palpate.read_map(grid).label == "A"
+    for given in (recording, [recording], back):
+        [record] = palpate.recognize(given, grid, bins=(5, 5, 4), device=device)
+        assert (record.best, record.recording) == ("A", f"{name}.h5")
+    [done] = palpate.recognize_many(recording, {"maps": grid, "bins": (5, 5, 4), "device": device.name})
+    assert done.record.best == "A"
+    missing = form(f"{name}.none")
+    for read in (palpate.read_recording, palpate.simulate, palpate.open_sensor,
+                 lambda path: palpate.recognize(back, grid, scene=path),
+                 lambda path: palpate.recognize(back, path)):  # fmt: skip
+        with pytest.raises(palpate.Error) as refused:
+            read(missing)
+        assert f"{name}.none" in str(refused.value)
 
 
 def test_h5py_and_palpate_share_a_process_and_its_threads(tmp_path: pathlib.Path) -> None:

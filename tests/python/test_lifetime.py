@@ -92,3 +92,72 @@ except KeyboardInterrupt:
 """
     run = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=120)
     assert (run.returncode, run.stdout, run.stderr) == (0, "interrupted\n", "")
+
+
+# What a daemon thread does over and over, by name.
+DAEMON = """
+import os, sys, threading, time
+import numpy, palpate
+from palpate import reference
+device = palpate.Device.open(os.environ.get("PALPATE_DEVICE", "llvmpipe"))
+touches = palpate.simulate("E", seed=1)
+builder = palpate.MapBuilder(device)
+builder.add(touches)
+grid = builder.build("E")
+lattice = palpate.PoseLattice((-20, 20, 40), (-20, 20, 40), (0, 6.28, 30))
+belief = palpate.PoseHistogram(device, [grid], lattice)
+# One touch leaves most of a billion bins to look at: the search takes many seconds.
+bounded = palpate.BoundedPosterior(device, [grid], palpate.PoseLattice(
+    (-40, 40, 1600), (-40, 40, 1600), (0, 6.28, 400)), tolerance=1e-7)
+bounded.update(touches[0])
+sensor = palpate.open_sensor("simulate:E,rate=1")
+pressure = numpy.ma.masked_array(touches.pressure[0], mask=False)
+
+def busy(fraction):
+    end = time.monotonic() + 5
+    while time.monotonic() < end:
+        sum(range(100))
+
+def made_in_python():
+    while True:
+        sum(range(1000))
+        yield touches[0]
+
+work = {
+    "update": lambda: belief.update(touches),
+    "short updates": lambda: belief.update(touches[0]),
+    "busy progress": lambda: belief.update(touches, progress=busy),
+    "sleeping progress": lambda: belief.update(touches, progress=lambda fraction: time.sleep(100)),
+    "search": bounded.estimate,
+    "recognize": lambda: palpate.recognize(touches, grid, bins=(40, 40, 30), device=device,
+                                           filter="histogram"),
+    "sensor": sensor.next,
+    "touches of Python": lambda: belief.update(made_in_python()),
+    "arrays": lambda: palpate.Touch((0, 0, 0), touches.elements_mm, pressure),
+    "reference": lambda: reference.log_likelihoods(touches[:2], palpate.PoseLattice(), grid),
+}[sys.argv[1]]
+begun = threading.Semaphore(0)
+
+def work_on():
+    begun.release()
+    while True:
+        work()
+
+sensor.start()
+for _ in range(2):
+    threading.Thread(target=work_on, daemon=True).start()
+    begun.acquire()
+time.sleep(0.1)
+"""
+
+
+@pytest.mark.parametrize(
+    "work",
+    ["update", "short updates", "busy progress", "sleeping progress", "search", "recognize", "sensor",
+     "touches of Python", "arrays", "reference"],
+)  # fmt: skip
+def test_the_interpreter_ends_while_daemon_threads_are_in_calls(work: str) -> None:
+    run = subprocess.run(
+        [sys.executable, "-c", DAEMON, work], capture_output=True, text=True, timeout=120
+    )
+    assert (run.returncode, run.stderr) == (0, "")

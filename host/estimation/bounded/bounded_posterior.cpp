@@ -12,7 +12,7 @@
 #include "interpolated_map.hpp"
 #include "log_sum.hpp"
 #include "marginal_sums.hpp"
-#include "moved_from.hpp"
+#include "own_process.hpp"
 #include "palpate/error.hpp"
 #include "parallel_for.hpp"
 #include "refinement.hpp"
@@ -100,6 +100,7 @@ struct BoundedPosterior::Impl {
 
   BoundedBelief belief;
   std::vector<Body> bodies;  ///< [hypothesis]
+  OwnProcess process;
 };
 
 BoundedPosterior::BoundedPosterior(std::span<const Hypothesis> hypotheses,
@@ -110,12 +111,15 @@ BoundedPosterior::BoundedPosterior(Device& device, std::span<const Hypothesis> h
                                    const BoundedOptions& options)
     : impl_(std::make_unique<Impl>(&device, hypotheses, checked(options, hypotheses))) {}
 
-BoundedPosterior::~BoundedPosterior() = default;
+BoundedPosterior::~BoundedPosterior() { replace_held(impl_); }
 BoundedPosterior::BoundedPosterior(BoundedPosterior&&) noexcept = default;
-BoundedPosterior& BoundedPosterior::operator=(BoundedPosterior&&) noexcept = default;
+BoundedPosterior& BoundedPosterior::operator=(BoundedPosterior&& other) noexcept {
+  replace_held(impl_, std::move(other.impl_));
+  return *this;
+}
 
 BoundedPosterior::Impl& BoundedPosterior::impl() const {
-  return held_by(impl_, "bounded posterior");
+  return held_here(impl_, "bounded posterior");
 }
 
 BoundedPosterior::Impl& BoundedPosterior::whole() const {

@@ -17,8 +17,8 @@
 #include "half_done.hpp"
 #include "hypotheses.hpp"
 #include "memory_plan.hpp"
-#include "moved_from.hpp"
 #include "moved_pivot.hpp"
+#include "own_process.hpp"
 #include "palpate/error.hpp"
 #include "prepared_touch.hpp"
 #include "random.hpp"
@@ -200,6 +200,7 @@ struct PoseHistogram::Impl {
   std::optional<std::vector<BeliefSummary>> summarised;
   HalfDone half_done{
       "histogram: an update or a prepared touch was broken off half-way; call reset()"};
+  OwnProcess process;
 };
 
 PoseHistogram::PoseHistogram(Device& device, std::span<const Hypothesis> hypotheses,
@@ -217,11 +218,14 @@ PoseHistogram::PoseHistogram(Device& device, std::span<const Hypothesis> hypothe
   impl_ = std::make_unique<Impl>(device, hypotheses, checked);
 }
 
-PoseHistogram::~PoseHistogram() = default;
+PoseHistogram::~PoseHistogram() { replace_held(impl_); }
 PoseHistogram::PoseHistogram(PoseHistogram&&) noexcept = default;
-PoseHistogram& PoseHistogram::operator=(PoseHistogram&&) noexcept = default;
+PoseHistogram& PoseHistogram::operator=(PoseHistogram&& other) noexcept {
+  replace_held(impl_, std::move(other.impl_));
+  return *this;
+}
 
-PoseHistogram::Impl& PoseHistogram::impl() const { return held_by(impl_, "histogram"); }
+PoseHistogram::Impl& PoseHistogram::impl() const { return held_here(impl_, "histogram"); }
 
 PoseHistogram::Impl& PoseHistogram::whole() const {
   Impl& held = impl();

@@ -8,7 +8,7 @@
 
 #include "evidence_grid.hpp"
 #include "half_done.hpp"
-#include "moved_from.hpp"
+#include "own_process.hpp"
 #include "palpate/error.hpp"
 
 namespace palpate {
@@ -60,6 +60,7 @@ struct MapBuilder::Impl {
   std::vector<ElementReading> pending;  ///< robot frame = object frame
   Seen seen;                            ///< all readings so far, pending ones too
   HalfDone half_done{"map: adding touches failed half-way; clear() the builder"};
+  OwnProcess process;
 };
 
 MapBuilder::MapBuilder(Device& device, const MapOptions& options) {
@@ -67,11 +68,14 @@ MapBuilder::MapBuilder(Device& device, const MapOptions& options) {
   impl_ = std::make_unique<Impl>(device, options);
 }
 
-MapBuilder::~MapBuilder() = default;
+MapBuilder::~MapBuilder() { replace_held(impl_); }
 MapBuilder::MapBuilder(MapBuilder&&) noexcept = default;
-MapBuilder& MapBuilder::operator=(MapBuilder&&) noexcept = default;
+MapBuilder& MapBuilder::operator=(MapBuilder&& other) noexcept {
+  replace_held(impl_, std::move(other.impl_));
+  return *this;
+}
 
-MapBuilder::Impl& MapBuilder::impl() const { return held_by(impl_, "map builder"); }
+MapBuilder::Impl& MapBuilder::impl() const { return held_here(impl_, "map builder"); }
 
 void MapBuilder::add(std::span<const Touch> touches) {
   Impl& map = impl();

@@ -15,8 +15,8 @@
 #include "hypotheses.hpp"
 #include "kernel_sizes.hpp"
 #include "likelihood_averages.hpp"
-#include "moved_from.hpp"
 #include "moved_pivot.hpp"
+#include "own_process.hpp"
 #include "palpate/error.hpp"
 #include "particle_likelihood.hpp"
 #include "particle_options.hpp"
@@ -255,6 +255,7 @@ struct ParticleFilter::Impl {
   /// Of all touches since the start, the prior's log-likelihood over the best particle's.
   double prior_over_best = 0.0;
   HalfDone half_done{"particle filter: an update failed half-way; reset() the filter"};
+  OwnProcess process;
 };
 
 ParticleFilter::ParticleFilter(Device& device, std::span<const Hypothesis> hypotheses,
@@ -268,11 +269,14 @@ ParticleFilter::ParticleFilter(Device& device, std::span<const Hypothesis> hypot
   impl_ = std::make_unique<Impl>(device, hypotheses, checked);
 }
 
-ParticleFilter::~ParticleFilter() = default;
+ParticleFilter::~ParticleFilter() { replace_held(impl_); }
 ParticleFilter::ParticleFilter(ParticleFilter&&) noexcept = default;
-ParticleFilter& ParticleFilter::operator=(ParticleFilter&&) noexcept = default;
+ParticleFilter& ParticleFilter::operator=(ParticleFilter&& other) noexcept {
+  replace_held(impl_, std::move(other.impl_));
+  return *this;
+}
 
-ParticleFilter::Impl& ParticleFilter::impl() const { return held_by(impl_, "particle filter"); }
+ParticleFilter::Impl& ParticleFilter::impl() const { return held_here(impl_, "particle filter"); }
 
 ParticleFilter::Impl& ParticleFilter::whole() const {
   Impl& held = impl();

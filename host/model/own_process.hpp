@@ -1,0 +1,43 @@
+#pragma once
+
+#include <memory>
+#include <utility>
+
+#include "moved_from.hpp"
+
+namespace palpate {
+
+/// The process that an object was made in. A child of fork() has a copy of the object, but not the
+/// threads that work for it, and cannot use the device that its parent has opened.
+class OwnProcess {
+ public:
+  OwnProcess();
+
+  /// False in a child of the process, and in the child's children.
+  bool is_here() const;
+  /// @throws Error in such a child, naming the object
+  void require(const char* name) const;
+
+ private:
+  unsigned forks_;
+};
+
+/// As held_by(), of an object with a `process`. Throws Error in a child of it, too.
+template <typename T>
+T& held_here(const std::unique_ptr<T>& held, const char* name) {
+  T& object = held_by(held, name);
+  object.process.require(name);
+  return object;
+}
+
+/// Destroys what is held, and holds `next` instead. A child of its process leaves it as it is: its
+/// destructors would wait for the parent's threads.
+template <typename T>
+void replace_held(std::unique_ptr<T>& held, std::unique_ptr<T> next = {}) {
+  if (held && !held->process.is_here()) {
+    static_cast<void>(held.release());
+  }
+  held = std::move(next);
+}
+
+}  // namespace palpate

@@ -1,0 +1,98 @@
+"""What is misused raises the exception that Python has for it, and no call ends the process."""
+
+import pathlib
+
+import numpy
+import pytest
+
+import palpate
+
+
+class Raising:
+    """Raises where Python asks it what it stands for."""
+
+    def __fspath__(self) -> str:
+        raise ZeroDivisionError
+
+    def __index__(self) -> int:
+        raise ZeroDivisionError
+
+
+RECORDING = palpate.simulate("E", palpate.random_poses(4, seed=2))
+
+
+@pytest.mark.parametrize(
+    ("index", "error", "message"),
+    [
+        (slice(0, 1.5), TypeError, "slice indices must be integers"),
+        (slice(None, None, 0), ValueError, "slice step cannot be zero"),
+        (slice("a", None), TypeError, "slice indices must be integers"),
+        (slice(Raising(), None), ZeroDivisionError, None),
+        ("a", TypeError, "index: is a str; give a whole number or a slice"),
+        (1.0, TypeError, "index: is a float; give a whole number or a slice"),
+        (None, TypeError, "incompatible function arguments"),
+        (10**30, IndexError, None),
+        (-5, IndexError, "touch -5 of 4"),
+        (4, IndexError, "touch 4 of 4"),
+        (Raising(), ZeroDivisionError, None),
+    ],
+)
+def test_an_index_that_is_none_is_refused(
+    index: int, error: type[Exception], message: str | None
+) -> None:
+    with pytest.raises(error, match=message):
+        RECORDING[index]
+
+
+def test_indices_and_slices_are_those_of_lists() -> None:
+    all_poses = RECORDING.T_robot_sensor
+    for part in (slice(None), slice(-10**30, 10**30), slice(3, None, -1), slice(3, 0, -2),
+                 slice(None, -1), slice(2, 2)):  # fmt: skip
+        assert numpy.array_equal(RECORDING[part].T_robot_sensor, all_poses[part]), part
+        assert len(RECORDING[part]) == len(range(4)[part])
+    assert numpy.array_equal(RECORDING[numpy.int8(-4)].T_robot_sensor, all_poses[0])
+
+
+def test_an_axis_or_a_displacement_of_another_form_is_refused_by_name(
+    device: palpate.Device, maps: list[palpate.OccupancyGrid]
+) -> None:
+    for axis in ((0, 1), (0, 1, 2.5), "abc", (0, 1, 10**30)):
+        for name in ("x_mm", "y_mm", "theta_rad"):
+            with pytest.raises(TypeError, match=rf"^{name}: give an Axis or \(lower, upper, count\)"):
+                palpate.PoseLattice(**{name: axis})
+    for name in ("touch_sd", "slip_sd"):
+        with pytest.raises(TypeError, match=rf"^{name}: give a DisplacementSd or \(mm, rad\)"):
+            palpate.PoseHistogram(device, maps, **{name: (1,)})
+
+
+def test_what_a_path_raises_is_raised(tmp_path: pathlib.Path) -> None:
+    for use in (palpate.read_map, palpate.read_recording, RECORDING.save, palpate.open_sensor,
+                palpate.simulate, lambda path: palpate.recognize(RECORDING, path)):  # fmt: skip
+        with pytest.raises(ZeroDivisionError):
+            use(Raising())
+        with pytest.raises(ValueError, match="null byte"):
+            use(f"{tmp_path}/a\0b")
+        with pytest.raises(TypeError):
+            use(3)
+
+
+def test_a_flag_of_another_type_is_refused_by_name() -> None:
+    for name, value, wanted in (("seed", -1, "int"), ("prior", "a", "float"), ("touches", 1.5, "int"),
+                                ("bins", 3, "tuple"), ("sensor_model", 3, "str")):  # fmt: skip
+        with pytest.raises(TypeError, match=f"^{name}: {value!r}; give .*{wanted}"):
+            palpate.recognize(RECORDING, (), **{name: value})
+
+
+def test_progress_and_timeouts_are_checked_before_the_work(
+    device: palpate.Device, maps: list[palpate.OccupancyGrid]
+) -> None:
+    belief = palpate.PoseHistogram(device, maps)
+    with pytest.raises(TypeError):
+        belief.update(RECORDING, progress=3)  # type: ignore[arg-type]
+    assert belief.estimate().identity.max() == pytest.approx(1 / 3)  # nothing was taken in
+    sensor = palpate.open_sensor("simulate:E")
+    with pytest.raises(ValueError, match="timeout_s: is not a number"):
+        sensor.next(numpy.nan)
+    assert sensor.next(1e300) is not None
+    with pytest.raises(palpate.Error, match="no frame came"):
+        palpate.baseline_of([], sensor)
