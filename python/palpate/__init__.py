@@ -2,7 +2,8 @@
 
 Poses are arrays (x_mm, y_mm, theta_rad); T_a_b maps coordinates in frame b to frame a. Lengths are in
 mm, angles in rad, times in s, log quantities in nats; pressures are in kPa or the sensor's raw unit.
-Frames: robot, sensor, object. Every failure raises `Error`.
+Frames: robot, sensor, object. What is wrong with data, files or the machine raises `Error`; misuse
+raises TypeError, ValueError or IndexError.
 
 Arrays of float64 with C layout are read in place and results are views of the memory that C++ filled,
 where nothing else is said. Long calls release the GIL, call `progress(fraction)` where they take it,

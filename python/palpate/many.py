@@ -175,8 +175,9 @@ def _asked(recordings: list[str], task: Task) -> _Asked:
 
 
 def _paths(given: _Path | Iterable[_Path]) -> list[str]:
-    one = isinstance(given, (str, bytes, os.PathLike))
-    return [os.fsdecode(path) for path in ([given] if one else given)]
+    if isinstance(given, (str, bytes, os.PathLike)):
+        given = [given]
+    return [os.fsdecode(path) for path in given]
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,6 @@ from . import _palpate
 from ._palpate import Device, Hypothesis, OccupancyGrid, Recording
 
 _Path = str | bytes | os.PathLike[str] | os.PathLike[bytes]
-_PATHS = (str, bytes, os.PathLike)
 _Pair = tuple[float, float]
 
 
@@ -125,13 +124,15 @@ def recognize(
             "device": None if isinstance(device, Device) else device,
         }
     )
-    given_maps = [maps] if isinstance(maps, (OccupancyGrid, Hypothesis, *_PATHS)) else maps
-    given = [recordings] if isinstance(recordings, (Recording, *_PATHS)) else recordings
+    if isinstance(maps, (OccupancyGrid, Hypothesis, str, bytes, os.PathLike)):
+        maps = [maps]
+    if isinstance(recordings, (Recording, str, bytes, os.PathLike)):
+        recordings = [recordings]
     records, sentences = _palpate.recognize_as_flagged(
-        [item if isinstance(item, Recording) else os.fspath(item) for item in given],
+        [item if isinstance(item, Recording) else os.fsdecode(item) for item in recordings],
         [
-            item if isinstance(item, (OccupancyGrid, Hypothesis)) else os.fspath(item)
-            for item in given_maps
+            item if isinstance(item, (OccupancyGrid, Hypothesis)) else os.fsdecode(item)
+            for item in maps
         ],
         flags,
         device if isinstance(device, Device) else None,
