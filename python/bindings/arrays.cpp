@@ -156,13 +156,10 @@ std::optional<Bytes> ArrayReader::unmasked(nb::handle readings, const std::optio
 
 Bytes ArrayReader::flags(nb::handle object, const char* name, Shape shape) {
   refuse_masked(object, name);
-  nb::object array = as_array(object, name, "biu", "booleans, False for a dead element");
-  const auto dtype = nb::cast<std::string>(array.attr("dtype").attr("name"));
-  if (dtype != "bool" && dtype != "uint8") {
-    array = array.attr("astype")("bool");
-  }
-  return checked<std::uint8_t>(
-      with_layout(array, dtype == "uint8" ? "uint8" : "bool").attr("view")("uint8"), name, shape);
+  const nb::object array = as_array(object, name, "biu", "booleans, False for a dead element");
+  const bool bytes = nb::cast<std::string>(array.attr("dtype").attr("name")) == "uint8";
+  return checked<std::uint8_t>(with_layout(array, bytes ? "uint8" : "bool").attr("view")("uint8"),
+                               name, shape);
 }
 
 Counts ArrayReader::counts(nb::handle object, const char* name, Shape shape) {

@@ -49,6 +49,16 @@ def test_a_moving_array_has_a_row_for_each_touch() -> None:
     assert recording[1:].elements_mm.shape == (3, 6, 2)
 
 
+def test_a_slice_has_the_rows_of_every_array() -> None:
+    rows = {"valid": numpy.eye(4, 6, dtype=bool), "time_s": numpy.arange(4.0),
+            "device_time_s": numpy.arange(4.0) * 2, "lost_before": numpy.arange(4)}  # fmt: skip
+    part = palpate.Recording(**arrays(), **rows, baseline=numpy.arange(6.0))[1:3]
+    for name, values in rows.items():
+        assert numpy.array_equal(getattr(part, name), values[1:3]), name
+    assert part.baseline is not None
+    assert len(part.baseline) == 6
+
+
 def test_a_touch_reads_other_layouts_as_copies() -> None:
     elements = palpate.grid_array(2, 1, 2.0)
     pressure = numpy.array([[1.0, 2.0], [3.0, 4.0]])
@@ -65,7 +75,9 @@ def test_valid_flags_are_booleans_or_bytes_in_place() -> None:
     assert touch.valid is not None
     assert address(touch.valid) == address(flags)
     assert touch.valid.tolist() == [1, 0, 1]
-    assert palpate.Touch((0, 0, 0), elements, numpy.zeros(3), [0, 256, 1]).valid is not None
+    counts = palpate.Touch((0, 0, 0), elements, numpy.zeros(3), [0, 256, 1])  # 256 is 0 as a byte
+    assert counts.valid is not None
+    assert counts.valid.tolist() == [0, 1, 1]
 
 
 def test_read_only_arrays_are_read(device: palpate.Device,

@@ -46,6 +46,12 @@ def test_a_map_comes_back_as_it_was(tmp_path: pathlib.Path,
     assert back.origin_mm.tolist() == maps[0].origin_mm.tolist()
     own = palpate.OccupancyGrid("A", maps[0].log_odds, cell_mm=0.5, origin_mm=maps[0].origin_mm)
     assert numpy.array_equal(own.log_odds, maps[0].log_odds)
+    assert own.observations is None and own.mean_level is None
+    layers = {"observations": maps[0].log_odds * 0 + 3, "mean_level": maps[0].log_odds * 0 + 0.5}
+    for name, cells in layers.items():
+        one = palpate.OccupancyGrid("A", maps[0].log_odds, cell_mm=0.5, origin_mm=(0, 0),
+                                    **{name: cells})  # fmt: skip
+        assert numpy.array_equal(getattr(one, name), cells), name
     with pytest.raises(palpate.Error, match="prior"):
         palpate.OccupancyGrid("A", maps[0].log_odds, cell_mm=0.5, origin_mm=(0, 0), prior=1.5)
 

@@ -72,8 +72,6 @@ def use_all():
 if sys.argv[1] == "open":
     in_a_child(use_all)
 elif sys.argv[1] == "at work":
-    large = palpate.PoseHistogram(device, [grid], palpate.PoseLattice(
-        (-20, 20, 40), (-20, 20, 40), (0, 6.28, 30)))
     at_work = threading.Event()
     over = threading.Event()
 
@@ -82,7 +80,7 @@ elif sys.argv[1] == "at work":
         if over.is_set():
             raise SystemExit
 
-    thread = threading.Thread(target=lambda: large.update(touches, progress=show))
+    thread = threading.Thread(target=lambda: builder.add([*touches] * 1000, progress=show))
     thread.start()
     at_work.wait()
     in_a_child(use_all)

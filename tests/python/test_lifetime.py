@@ -75,6 +75,35 @@ def test_a_thousand_constructions_take_no_memory(
     assert resident_kib() - before < 2000
 
 
+def test_a_call_keeps_what_it_reads_and_frees_what_was_dropped_meanwhile(
+    device: palpate.Device, maps: list[palpate.OccupancyGrid]
+) -> None:
+    touches = palpate.simulate("E", seed=1)
+    pressure = numpy.tile(touches.pressure, (100, 1))
+    recording = palpate.Recording(pressure, numpy.tile(touches.T_robot_sensor, (100, 1)),
+                                  touches.elements_mm, valid=pressure > -1)  # fmt: skip
+    read = [recording.pressure, recording.T_robot_sensor, recording.elements_mm, recording.valid]
+    before = [sys.getrefcount(array) for array in read]
+    # 100 MiB, which nobody can free while the device works for another.
+    large = [palpate.PoseHistogram(device, maps[:1], palpate.PoseLattice(
+        (-5, 5, 512), (-5, 5, 512), (0, 6.28, 100)))]  # fmt: skip
+    during: list[int] = []
+
+    def drop(fraction: float) -> None:
+        during.extend(sys.getrefcount(array) for array in read)
+        large.clear()
+        during.append(resident_kib())
+        raise StopIteration
+
+    builder = palpate.MapBuilder(device)
+    with pytest.raises(StopIteration):
+        builder.add(recording, progress=drop)
+    builder.clear()  # waits for the end of the work
+    held = during.pop()
+    assert all(now > then for now, then in zip(during, before, strict=True))
+    assert held - resident_kib() > 70_000
+
+
 def test_the_interpreter_ends_during_work_and_with_live_objects() -> None:
     script = """
 import _thread, os, threading, time

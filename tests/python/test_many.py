@@ -1,5 +1,6 @@
 """recognize_many() gives the bytes of `palpate batch`, whatever happens to its workers."""
 
+import dataclasses
 import json
 import os
 import pathlib
@@ -237,6 +238,41 @@ def test_a_wrong_call_is_refused_at_once(
 ) -> None:
     with pytest.raises(palpate.Error, match=re.escape(message)):
         palpate.recognize_many(**{"paths": recordings, "task": task, **arguments})
+
+
+def test_what_every_recording_tells_is_told_once(files: Files, recordings: pathlib.Path) -> None:
+    task: palpate.Task = {"maps": files.maps, "bins": (8, 8, 8), "x_mm": (-12, 12),
+                          "y_mm": (-12, 12), "filter": "histogram", "touch_sd_deg": 3}  # fmt: skip
+    paths = [recordings / "00.h5", recordings / "01.h5"]
+    with pytest.warns(UserWarning) as told:
+        assert len(list(palpate.recognize_many(paths, task, chunk=1))) == 2
+    assert len([each for each in told if "does not resolve" in str(each.message)]) == 1
+
+
+@pytest.mark.parametrize("filter", ["bounded", "histogram"])
+def test_another_device_is_refused_where_results_depend_on_it(
+    filter: str, files: Files, recordings: pathlib.Path
+) -> None:
+    asked = many._asked([], {**TASK, "maps": files.maps, "filter": filter})  # type: ignore[typeddict-item]
+    batch, entries, _ = many._settle([str(recordings / "00.h5")], asked, 1)
+    elsewhere = dataclasses.replace(batch, device="another device")
+    lines = [entry for entry, _ in entries]
+    if filter == "bounded":
+        assert len(many._recognize(lines, elsewhere, 1)[0]) == 1
+    else:
+        with pytest.raises(palpate.Error, match="the batch was settled on another device"):
+            many._recognize(lines, elsewhere, 1)
+
+
+def test_a_folder_is_the_same_under_another_name(
+    tmp_path: pathlib.Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "real").mkdir()
+    (tmp_path / "link").symlink_to("real")
+    monkeypatch.chdir(tmp_path / "real")
+    many._Asked({}, str(tmp_path / "link"), "a.h5").require_folder()
+    with pytest.raises(palpate.Error, match="a.h5: is relative to"):
+        many._Asked({}, str(tmp_path), "a.h5").require_folder()
 
 
 def test_without_dask_an_error_says_what_to_install(

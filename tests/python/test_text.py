@@ -48,6 +48,10 @@ def test_pictures_are_of_maps_and_beliefs(
     from matplotlib.figure import Figure
 
     ax = Figure().add_subplot()
+    wide = palpate.OccupancyGrid("A", maps[0].log_odds[:40], cell_mm=0.5, origin_mm=(0, 0))
+    assert wide.plot(ax) is ax
+    assert ax.get_images()[0].get_extent() == pytest.approx((-0.25, wide.nx / 2 - 0.25, -0.25, 19.75))
+    ax = Figure().add_subplot()
     assert maps[0].plot(ax) is ax
     left, right, bottom, top = ax.get_images()[0].get_extent()
     assert right - left == pytest.approx(maps[0].nx * maps[0].cell_mm)

@@ -77,6 +77,30 @@ def test_threads_share_a_device_and_a_belief(
     assert numpy.array_equal(shared.log_likelihood(0), twenty.log_likelihood(0))
 
 
+def test_signals_are_for_the_threads_of_python(device: palpate.Device) -> None:
+    """No system call of the work is interrupted."""
+
+    def tasks() -> set[str]:
+        return set(os.listdir("/proc/self/task"))
+
+    def blocks_interrupts(task: str) -> bool:
+        status = pathlib.Path(f"/proc/self/task/{task}/status").read_text()
+        [mask] = [line.split()[1] for line in status.splitlines() if line.startswith("SigBlk:")]
+        return bool(int(mask, 16) >> (signal.SIGINT - 1) & 1)
+
+    builder = palpate.MapBuilder(device)
+    before = tasks()
+    seen: list[bool] = []
+
+    def look(fraction: float) -> None:
+        seen.extend(blocks_interrupts(task) for task in tasks() - before)
+        raise StopIteration  # it has seen the work, and need not wait for it
+
+    with pytest.raises(StopIteration):
+        builder.add([*palpate.simulate("E")] * 100, progress=look)
+    assert seen and all(seen)
+
+
 def test_progress_comes_on_the_calling_thread(
     device: palpate.Device, maps: list[palpate.OccupancyGrid], unknown: palpate.Recording
 ) -> None:

@@ -1,0 +1,69 @@
+"""Options and results of the estimators reach C++ and come back as they are named."""
+
+import numpy
+import pytest
+
+import palpate
+
+
+def test_a_pose_is_refined_near_the_mode_that_is_given(
+    device: palpate.Device, maps: list[palpate.OccupancyGrid], unknown: palpate.Recording
+) -> None:
+    a, e, i = maps
+    belief = palpate.PoseHistogram(device, [a, e, i])
+    rotated = palpate.PoseHistogram(device, [e, i, a])
+    for each in (belief, rotated):
+        each.update(unknown)
+    mode = belief.estimate().mode
+    assert (mode.object, rotated.estimate().mode.object) == (1, 0)
+    refined = belief.refine()
+    assert numpy.array_equal(belief.refine(mode).T_object_robot, refined.T_object_robot)
+    of_a = belief.refine(rotated.estimate().mode)  # an A where the E is
+    assert not numpy.array_equal(of_a.T_object_robot, refined.T_object_robot)
+    inverse = palpate.inverse(refined.T_object_robot)
+    assert refined.T_robot_object == pytest.approx(inverse, abs=1e-12)
+    variances = refined.T_robot_object_covariance.diagonal()
+    assert refined.sd**2 == pytest.approx(variances)
+    assert not numpy.allclose(variances[:2], refined.covariance.diagonal()[:2], rtol=1e-3)
+
+
+def test_marginals_are_over_the_grid_that_is_given(
+    device: palpate.Device, maps: list[palpate.OccupancyGrid], unknown: palpate.Recording
+) -> None:
+    belief = palpate.BoundedPosterior(device, maps)
+    belief.update(unknown)
+    coarse = palpate.PoseLattice((-10, 10, 5), (-10, 10, 3), (0, 2 * numpy.pi, 4))
+    marginals = belief.marginals(1, coarse)
+    assert (marginals.xy.shape, marginals.theta.shape) == ((3, 5), (4,))
+    assert belief.marginals(1).xy.shape == (25, 25)
+    assert marginals.xy.sum() == pytest.approx(belief.marginals(1).xy.sum())
+
+
+def test_a_map_is_built_by_the_classifier_that_is_given(device: palpate.Device) -> None:
+    touches = palpate.simulate("E", seed=1)
+    built = []
+    for classifier in (palpate.ContactClassifier(), palpate.ContactClassifier(threshold=8.0)):
+        builder = palpate.MapBuilder(device, classifier=classifier)
+        builder.add(touches)
+        built.append(int((builder.build("E").log_odds > 0).sum()))
+    assert built[1] < built[0]
+
+
+def test_bins_and_seeds_are_the_ones_that_are_given() -> None:
+    lattice = palpate.PoseLattice((-1, 1, 2), (-1, 1, 2), (0, 1, 2))
+    assert lattice.T_object_robot(7).tolist() == [0.5, 0.5, 0.75]
+    for bin in (-1, 8):
+        with pytest.raises(IndexError, match=f"bin {bin} of 8"):
+            lattice.T_object_robot(bin)
+    poses = [palpate.random_object_pose(seed).tolist() for seed in (1, 2, 1)]
+    assert poses[0] == poses[2] != poses[1]
+
+
+def test_recordings_of_different_units_are_not_recognised_together(
+    device: palpate.Device, maps: list[palpate.OccupancyGrid], unknown: palpate.Recording
+) -> None:
+    raw = palpate.Recording(
+        unknown.pressure, unknown.T_robot_sensor, unknown.elements_mm, pressure_unit="raw"
+    )
+    with pytest.raises(palpate.Error, match="raw"):
+        palpate.recognize([unknown, raw], maps, bins=(5, 5, 4), device=device)
