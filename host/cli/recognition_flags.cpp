@@ -36,8 +36,9 @@ void add_recognition_flags(CLI::App& command, RecognitionFlags& flags) {
                      "every place of an array that touches an object of the maps, or -10:10 where "
                      "counts of --bins, another range or a pivot X,Y is given]");
   command.add_option("--y-mm", flags.y_mm, "Range of the pivot's y [default: as for --x-mm]");
-  command.add_option("--theta-deg", flags.theta_deg,
-                     "Range of theta, degrees [default: 0:360]; 30:30 fixes theta at 30");
+  command.add_option(
+      "--theta-deg", flags.theta_deg,
+      "Range of theta, degrees, at most 360 wide [default: 0:360]; 30:30 fixes theta at 30");
   command.add_option(
       "--pivot-mm", flags.pivot_mm,
       "Point X,Y in the robot frame, mm, about which theta turns; the bins' x and y are the "

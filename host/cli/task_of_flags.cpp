@@ -217,6 +217,11 @@ PoseLattice given_lattice(const RecognitionFlags& flags, const Scene& scene) {
   range("--x-mm", flags.x_mm, scene.region.x_mm, lattice.x_mm, 1.0);
   range("--y-mm", flags.y_mm, scene.region.y_mm, lattice.y_mm, 1.0);
   range("--theta-deg", flags.theta_deg, scene.region.theta_deg, lattice.theta_rad, radians(1.0));
+  if (lattice.exceeds_circle()) {
+    refuse_flag("--theta-deg", flags.theta_deg,
+                "wider than the full circle, poses would count twice; give a range of at most 360 "
+                "degrees");
+  }
   if (const std::optional<std::array<int, 3>> counts = counts_of(flags, scene)) {
     lattice.x_mm.count = (*counts)[0];
     lattice.y_mm.count = (*counts)[1];

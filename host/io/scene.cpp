@@ -2,12 +2,14 @@
 
 #include <array>
 #include <fstream>
+#include <numbers>
 #include <utility>
 
 #include <fmt/format.h>
 
 #include "element_file.hpp"
 #include "input_file.hpp"
+#include "palpate/lattice.hpp"
 #include "palpate/touch.hpp"
 #include "yaml_entry.hpp"
 
@@ -26,6 +28,18 @@ std::array<double, 2> read_range(const Entry& entry) {
   const std::array<double, 2> ends = read_pair(entry, "give [lower, upper]");
   if (ends[0] > ends[1]) {
     entry.refuse(fmt::format("[{}, {}] is reversed; write the lower end first", ends[0], ends[1]));
+  }
+  return ends;
+}
+
+std::array<double, 2> read_angles_deg(const Entry& entry) {
+  const std::array<double, 2> ends = read_range(entry);
+  constexpr double degree = std::numbers::pi / 180.0;
+  if (PoseLattice{.theta_rad = {ends[0] * degree, ends[1] * degree, 1}}.exceeds_circle()) {
+    entry.refuse(
+        fmt::format("[{}, {}] is wider than the full circle, poses would count twice; give a range "
+                    "of at most 360 degrees",
+                    ends[0], ends[1]));
   }
   return ends;
 }
@@ -96,7 +110,7 @@ Scene::Region read_region(const Entry& entry) {
   Scene::Region region;
   read_keys(entry, {{"x_mm", [&](const Entry& e) { region.x_mm = read_range(e); }},
                     {"y_mm", [&](const Entry& e) { region.y_mm = read_range(e); }},
-                    {"theta_deg", [&](const Entry& e) { region.theta_deg = read_range(e); }},
+                    {"theta_deg", [&](const Entry& e) { region.theta_deg = read_angles_deg(e); }},
                     {"pivot_mm", [&](const Entry& e) { read_pivot(e, region); }}});
   return region;
 }

@@ -29,6 +29,16 @@ void validate_axis(const char* name, const Axis& axis) {
   }
 }
 
+/// How much wider than the full circle a range of theta is, rad; 0 within rounding of its ends.
+double beyond_circle_rad(const Axis& theta_rad) {
+  constexpr double circle_rad = 2.0 * std::numbers::pi;
+  // Ends given in degrees are rounded, and far ones keep few digits.
+  const double farthest_rad = std::max(std::abs(theta_rad.lower), std::abs(theta_rad.upper));
+  const double rounding = std::max(1e-9, 4.0 * farthest_rad * 0x1p-53);
+  const double beyond = theta_rad.upper - theta_rad.lower - circle_rad;
+  return std::abs(beyond) <= rounding ? 0.0 : beyond;
+}
+
 std::int64_t nearest_index(const Axis& axis, double value) {
   const double index = axis.step() > 0.0 ? std::floor((value - axis.lower) / axis.step()) : 0.0;
   return static_cast<std::int64_t>(std::clamp(index, 0.0, axis.count - 1.0));
@@ -49,17 +59,20 @@ void PoseLattice::validate() const {
   validate_axis("x_mm", x_mm);
   validate_axis("y_mm", y_mm);
   validate_axis("theta_rad", theta_rad);
+  if (exceeds_circle()) {
+    throw Error(Fault::input, fmt::format("range theta_rad = {}:{}: wider than the full circle, "
+                                          "poses would count twice; give a range of at most 2 pi",
+                                          theta_rad.lower, theta_rad.upper));
+  }
   if (!is_near(pivot_mm.x) || !is_near(pivot_mm.y)) {
     throw Error(Fault::input, fmt::format("pivot_mm = {},{}: give numbers within +-{:g}",
                                           pivot_mm.x, pivot_mm.y, farthest_mm));
   }
 }
 
-bool PoseLattice::full_circle() const {
-  constexpr double circle_rad = 2.0 * std::numbers::pi;
-  constexpr double rounding = 1e-9;  // ends given in degrees are rounded
-  return std::abs(theta_rad.upper - theta_rad.lower - circle_rad) < rounding;
-}
+bool PoseLattice::exceeds_circle() const { return beyond_circle_rad(theta_rad) > 0.0; }
+
+bool PoseLattice::full_circle() const { return beyond_circle_rad(theta_rad) == 0.0; }
 
 Pose PoseLattice::T_object_robot(std::int64_t index) const {
   const std::int64_t in_plane = index % plane();

@@ -1,5 +1,6 @@
 #include "palpate/lattice.hpp"
 
+#include <cmath>
 #include <limits>
 #include <numbers>
 #include <string>
@@ -100,6 +101,21 @@ TEST(PoseLattice, RefusesWhatIsNoLattice) {
   expect_refused({.pivot_mm = {0.0, nan}}, "pivot_mm");
 }
 
+TEST(PoseLattice, RefusesAnglesThatWouldCountTwice) {
+  constexpr double circle = 2.0 * std::numbers::pi;
+  for (const double lower : {0.0, -1.0, 1e4, -1e9}) {
+    const PoseLattice full{.theta_rad = {lower, lower + circle, 4}};
+    full.validate();
+    EXPECT_TRUE(full.full_circle()) << lower;
+    expect_refused({.theta_rad = {lower, lower + circle + 1e-6 + 1e-15 * std::abs(lower), 4}},
+                   "theta_rad");
+    expect_refused({.theta_rad = {lower, lower + 2.0 * circle, 4}}, "at most 2 pi");
+    const PoseLattice part{.theta_rad = {lower, lower + 6.0, 4}};
+    part.validate();
+    EXPECT_FALSE(part.full_circle()) << lower;
+  }
+}
+
 TEST(PoseLattice, BinOfAPoseIsTheBinThatHoldsIt) {
   const PoseLattice full{.x_mm = {-5.0, 5.0, 4},
                          .y_mm = {-3.0, 9.0, 3},
@@ -142,7 +158,7 @@ TEST(PoseLattice, BinOfAPoseOutsideIsTheNearest) {
 }
 
 TEST(PoseLattice, RefusesPlacesOfWhichFloat64KeepsNoDigits) {
-  PoseLattice{.x_mm = {-1e9, 1e9, 5}, .theta_rad = {0.0, 1e9, 5}, .pivot_mm = {1e9, -1e9}}
+  PoseLattice{.x_mm = {-1e9, 1e9, 5}, .theta_rad = {1e9 - 1.0, 1e9, 5}, .pivot_mm = {1e9, -1e9}}
       .validate();
   for (const double far : {1.1e9, 1e154, 1e300}) {
     expect_refused({.x_mm = {-far, 1.0, 4}}, "x_mm");

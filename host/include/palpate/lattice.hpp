@@ -30,10 +30,12 @@ struct PALPATE_API PoseLattice {
 
   /// Gives every axis of zero extent one bin.
   PoseLattice& collapse_fixed();
-  /// @throws Error on a count below 1, a reversed range, or a range or pivot that reaches beyond
-  /// `farthest_mm`, for theta as many radians
+  /// @throws Error on a count below 1, a reversed range, a range of theta that exceeds_circle(), or
+  /// a range or pivot that reaches beyond `farthest_mm`, for theta as many radians
   void validate() const;
 
+  /// True where theta covers more than the full circle: poses would count twice.
+  bool exceeds_circle() const;
   /// True where theta covers the full circle once: its last bin then neighbours its first.
   bool full_circle() const;
   std::int64_t plane() const { return std::int64_t{x_mm.count} * y_mm.count; }

@@ -163,7 +163,7 @@ TEST(BalancedLattice, OfAnEndlessRegionIsBounded) {
   PoseLattice region;
   region.x_mm = {-farthest_mm, farthest_mm, 1};
   region.y_mm = {-farthest_mm, farthest_mm, 1};
-  region.theta_rad = {-1e9, 1e9, 1};
+  region.theta_rad = {1e9 - 6.0, 1e9, 1};
   const BalancedLattice balanced = fine_lattice(region, letters());
   EXPECT_TRUE(balanced.coarsened);
   EXPECT_LE(5 * balanced.lattice.bins(), most_balanced_bins);
