@@ -72,6 +72,31 @@ TEST_F(Batch, FinishedResultsStay) {
   EXPECT_TRUE(times("r") == written);
 }
 
+TEST_F(Batch, AnObjectNamedErrorIsNoFailure) {
+  OccupancyGrid map = sample_map("A");
+  map.label = "error";
+  write_map(folder_ / "maps/error.map.h5", map);
+  EXPECT_NE(palpate(batch("r")).out.find("1 failed"), std::string::npos);
+  const Outcome again = palpate(batch("r"));
+  EXPECT_NE(again.out.find("1 failed"), std::string::npos) << again.out;
+  const Outcome joined = palpate({"merge", "r"});
+  EXPECT_NE(joined.out.find("\"error\":0."), std::string::npos) << "of the identity";
+  EXPECT_NE(joined.err.find("11 of 11 unknowns, 1 failed"), std::string::npos) << joined.err;
+}
+
+TEST_F(Batch, ALineThatIsNoRecordIsRefused) {
+  palpate(batch("r"));
+  const std::filesystem::path chunk = folder_ / "r/chunks/000002.ndjson";
+  const std::string whole = bytes_of(chunk);
+  const std::string first = whole.substr(0, whole.find('\n') + 1);
+  for (const char* line : {"{\"recording\": \"u/07.h5\", \"touc\n", "\n", "7\n"}) {
+    put_bytes(chunk, first + line + first);
+    expect_failure(2, {"merge", "r"}, {"000002.ndjson", "line 2", "no record", "remove it"});
+  }
+  put_bytes(chunk, first + first);
+  expect_failure(2, batch("r"), {"000002.ndjson", "2 records instead of 3", "remove it"});
+}
+
 TEST_F(Batch, ResultsDoNotDependOnThreads) {
   palpate(batch("r", {"--threads", "1"}));
   palpate(batch("s", {"--threads", "5"}));

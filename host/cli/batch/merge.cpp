@@ -1,6 +1,4 @@
 #include <algorithm>
-#include <fstream>
-#include <iterator>
 #include <memory>
 #include <optional>
 
@@ -86,31 +84,25 @@ void merge(const Options& options) {
   if (options.output != "-") {
     file.emplace(options.output);
   }
-  ChunkCounts all;
+  std::size_t done = 0;
+  std::size_t failed = 0;
   for (const std::size_t chunk : there) {
-    std::ifstream stream(folder.chunk(chunk), std::ios::binary);
-    const std::string text{std::istreambuf_iterator<char>(stream), {}};
-    const ChunkCounts counts = count_records(text);
-    const std::size_t expected =
+    const std::size_t records =
         std::min(task.chunk_unknowns, unknowns - chunk * task.chunk_unknowns);
-    if (counts.records != expected) {
-      refuse(folder.chunk(chunk),
-             "has {} records instead of {}; remove it and call palpate batch again", counts.records,
-             expected);
-    }
-    all.records += counts.records;
-    all.failed += counts.failed;
+    const Chunk read = read_chunk(folder.chunk(chunk), records);
+    done += records;
+    failed += read.failed;
     if (file) {
-      file->append(text);
+      file->append(read.text);
     } else {
-      fmt::print("{}", text);
+      fmt::print("{}", read.text);
     }
   }
   if (file) {
     file->commit();
   }
-  fmt::print(stderr, "{}: {} of {} unknowns, {} failed{}\n", options.results, all.records, unknowns,
-             all.failed, missing.empty() ? "" : "; missing: " + missing);
+  fmt::print(stderr, "{}: {} of {} unknowns, {} failed{}\n", options.results, done, unknowns,
+             failed, missing.empty() ? "" : "; missing: " + missing);
 }
 
 }  // namespace

@@ -8,10 +8,14 @@
 #include <charconv>
 #include <chrono>
 #include <cstring>
+#include <fstream>
+#include <iterator>
 #include <system_error>
 #include <thread>
 #include <utility>
 #include <vector>
+
+#include <nlohmann/json.hpp>
 
 #include "input_file.hpp"
 #include "options.hpp"
@@ -131,14 +135,31 @@ void ResultsFolder::remove_parts() const {
 
 bool is_results_folder(const fs::path& folder) { return ResultsFolder(folder).has_task(); }
 
-ChunkCounts count_records(std::string_view chunk) {
-  // Quotes within a text are escaped: this is a key, and only failed records have it.
-  constexpr std::string_view key = ",\"error\":";
-  ChunkCounts counts{static_cast<std::size_t>(std::ranges::count(chunk, '\n')), 0};
-  for (std::size_t at = chunk.find(key); at != chunk.npos; at = chunk.find(key, at + key.size())) {
-    ++counts.failed;
+Chunk read_chunk(const fs::path& file, std::size_t unknowns) {
+  using Json = nlohmann::json;
+  std::ifstream stream(file, std::ios::binary);
+  Chunk chunk{.text = {std::istreambuf_iterator<char>(stream), {}}};
+  std::size_t records = 0;
+  for (std::string_view left = chunk.text; !left.empty(); ++records) {
+    const std::string_view line = left.substr(0, left.find('\n'));
+    left.remove_prefix(std::min(line.size() + 1, left.size()));
+    bool failed = false;
+    // Keeps no value: only the record's own keys count, not those of its identity.
+    const auto note = [&](int depth, Json::parse_event_t event, const Json& parsed) {
+      const bool is_key = event == Json::parse_event_t::key;
+      failed = failed || (is_key && depth == 1 && parsed == "error");
+      return !is_key;
+    };
+    if (!Json::parse(line, note, false).is_object()) {
+      refuse(file, "line {} is no record; remove it and call palpate batch again", records + 1);
+    }
+    chunk.failed += failed ? 1 : 0;
   }
-  return counts;
+  if (records != unknowns) {
+    refuse(file, "has {} records instead of {}; remove it and call palpate batch again", records,
+           unknowns);
+  }
+  return chunk;
 }
 
 // The lock file holds no bytes; its locks are of single bytes beyond its end: the first one is of

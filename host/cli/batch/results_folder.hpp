@@ -6,7 +6,6 @@
 #include <functional>
 #include <optional>
 #include <string>
-#include <string_view>
 #include <vector>
 
 #include "descriptor.hpp"
@@ -56,12 +55,13 @@ class ResultsFolder {
 /// Whether an argument is a results folder.
 bool is_results_folder(const std::filesystem::path& folder);
 
-/// What the text of a chunk file holds.
-struct ChunkCounts {
-  std::size_t records = 0;
+/// The records of a chunk file.
+struct Chunk {
+  std::string text;        ///< a record a line
   std::size_t failed = 0;  ///< records with an error
 };
-ChunkCounts count_records(std::string_view chunk);
+/// @throws Error on a line that is no record, and where there are not as many as unknowns
+Chunk read_chunk(const std::filesystem::path& file, std::size_t unknowns);
 
 /// Keeps processes apart that work on one results folder. The locks are the kernel's (fcntl), so
 /// that they end with their process however it ends, also over NFS, and forked children do not
