@@ -17,26 +17,11 @@
 #include "parallel_for.hpp"
 #include "refinement.hpp"
 #include "search_memory.hpp"
+#include "thinned_lattice.hpp"
 
 namespace palpate {
 
 namespace {
-
-/// The lattice with every few bins along x and y where they are much finer than a pose's fit needs.
-/// Its centres are centres of the lattice.
-PoseLattice thinned(PoseLattice lattice) {
-  constexpr double fine_mm = 0.1;
-  for (Axis* axis : {&lattice.x_mm, &lattice.y_mm}) {
-    const double step = axis->step();
-    if (axis->count > 1 && 3.0 * step <= fine_mm) {
-      // An odd number, so that the middle one is a centre.
-      const int every = static_cast<int>((fine_mm / step - 1.0) / 2.0) * 2 + 1;
-      axis->count = std::max(1, axis->count / every);
-      axis->upper = axis->lower + axis->count * every * step;
-    }
-  }
-  return lattice;
-}
 
 /// The log of what is known only by its bounds, as an estimate takes it.
 double middle(const LogInterval& log) {

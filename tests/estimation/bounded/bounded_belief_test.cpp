@@ -2,12 +2,15 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <numeric>
 #include <vector>
 
 #include <gtest/gtest.h>
 
 #include "bounded/certified.hpp"
+#include "bounded_belief.hpp"
+#include "hypotheses.hpp"
 #include "palpate/pose_histogram.hpp"
 #include "touched_shape.hpp"
 
@@ -225,6 +228,28 @@ TEST(BoundedBelief, DrawnFromBeforeAnEstimateTellsTheSameAfterwards) {
       EXPECT_EQ(drawn.entropy(), asked.entropy());
     }
   }
+}
+
+TEST(BoundedBelief, DrawsOfManyBinsLeaveOutAHundredthAtMost) {
+  BoundedOptions options;
+  options.lattice = {
+      .x_mm = {-16.0, 16.0, 120}, .y_mm = {-16.0, 16.0, 120}, .theta_rad = {0, two_pi, 40}};
+  options.contact = resolve(options.contact, two_shapes());
+  BoundedBelief belief(nullptr, two_shapes(), options);
+  const Recording recording = touches_of_l(1, 826);
+  Touch touch = recording.touch(0);
+  std::vector<std::uint8_t> valid(touch.elements_mm.size());
+  for (const std::size_t element : {0U, 5U, 21U, 26U}) {  // few leave a wide belief
+    valid[element] = 1;
+  }
+  touch.valid = valid;
+  belief.add(std::span(&touch, 1));
+  belief.take_in();
+  belief.sample(1, 0);
+  const double drawn_from = belief.log_total();
+  belief.found();
+  EXPECT_GE(std::exp(drawn_from - belief.log_total()), 0.99);
+  EXPECT_LT(drawn_from, belief.log_total() - 1e-5) << "or the test sees nothing";
 }
 
 TEST(BoundedBelief, OfAHundredMillionBinsBeforeAnyTouchIsFlat) {
