@@ -94,18 +94,6 @@ BoundedOptions bounded_options(const FilterFlags& flags, const HistogramOptions&
   return bounded;
 }
 
-/// Whether bounds have room for the bins that the histogram refuses.
-bool bounds_would_take(Device& device, const RecognitionTask& task) {
-  const auto& histogram = std::get<HistogramOptions>(task.filter);
-  try {
-    const BoundedPosterior bounded(device, task.hypotheses,
-                                   {.lattice = histogram.lattice, .contact = histogram.contact});
-    return bounded.lattice().bins() > 0;
-  } catch (const Error&) {
-    return false;
-  }
-}
-
 /// The particle filter's options: those that it shares with the histogram, and its flags.
 ParticleOptions particle_options(const RecognitionFlags& all, const Scene& scene,
                                  const HistogramOptions& histogram) {
@@ -240,12 +228,10 @@ Recogniser open_filter(Device& device, const RecognitionTask& task) {
   } catch (const Error& error) {
     // Of a sound task nothing but the bins' memory can be refused.
     if (error.fault() == Fault::input && std::holds_alternative<HistogramOptions>(task.filter) &&
-        (task.auto_filter || !task.filter_asked_for_by.empty()) &&
-        bounds_would_take(device, task)) {
+        !task.filter_asked_for_by.empty() && bounds_have_room(task)) {
       throw Error(Fault::input,
-                  fmt::format("{}, or {}: --filter bounded needs no device memory", error.what(),
-                              task.auto_filter ? std::string("ask for bounds")
-                                               : "leave out " + task.filter_asked_for_by));
+                  fmt::format("{}, or leave out {}: --filter bounded needs no device memory",
+                              error.what(), task.filter_asked_for_by));
     }
     throw;
   }

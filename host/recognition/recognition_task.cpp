@@ -7,6 +7,8 @@
 
 #include <fmt/format.h>
 
+#include "search_memory.hpp"
+
 namespace palpate {
 
 namespace {
@@ -155,13 +157,19 @@ void settle_evidence(RecognitionTask& task) {
 
 void settle_filter(RecognitionTask& task) {
   const auto* histogram = std::get_if<HistogramOptions>(&task.filter);
-  if (!task.auto_filter || histogram == nullptr || task.bins_in_all() <= most_histogram_bins ||
-      task.bins_in_all() > most_bounded_bins) {
+  if (!task.auto_filter || histogram == nullptr || task.bins_in_all() <= most_histogram_bins) {
     return;
   }
-  if (const std::optional<BoundedOptions> bounded = bounded_instead(*histogram)) {
+  const std::optional<BoundedOptions> bounded = bounded_instead(*histogram);
+  if (bounded && bounds_have_room(task)) {
     task.filter = *bounded;
   }
+}
+
+bool bounds_have_room(const RecognitionTask& task) {
+  BoundedOptions options{.lattice = task.lattice(), .contact = task.contact()};
+  options.lattice.collapse_fixed().validate();
+  return why_no_room(task.hypotheses, options, memory_for_search()).empty();
 }
 
 }  // namespace palpate

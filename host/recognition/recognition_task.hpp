@@ -80,7 +80,7 @@ bool tells_known(const RecognitionTask& task);
 /// something does.
 inline constexpr std::int64_t most_histogram_bins = 100'000;
 
-/// Most bins, of all objects together, that settle_bins() and settle_filter() give to bounds.
+/// Most bins, of all objects together, that settle_bins() gives to bounds.
 inline constexpr std::int64_t most_bounded_bins = 1'000'000'000;
 
 /// The options of a bounded posterior of the same bins; none where the histogram allows for
@@ -110,8 +110,12 @@ void settle_evidence(RecognitionTask& task);
 
 /// Chooses the filter if the task leaves it to this rule (auto_filter): of more than
 /// most_histogram_bins bins in all, bounds take the place of the histogram, unless
-/// bounded_instead() has none or there are more than most_bounded_bins. The counts are settled
-/// before.
+/// bounded_instead() has none or bounds have no room. The counts are settled before.
+/// @throws Error on a lattice out of range
 void settle_filter(RecognitionTask& task);
+
+/// Whether the machine has room for the task's bins by bounds, whatever its filter.
+/// @throws Error on a lattice out of range
+bool bounds_have_room(const RecognitionTask& task);
 
 }  // namespace palpate

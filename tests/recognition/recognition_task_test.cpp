@@ -99,6 +99,16 @@ TEST(SettleFilter, TakesBoundsForManyBins) {
   EXPECT_FALSE(bounded->budget_s);
 }
 
+TEST(SettleFilter, TakesBoundsForMoreBinsThanAnyHistogramHolds) {
+  RecognitionTask task = automatic_task(1000);
+  task.lattice().y_mm.count = 1000;
+  task.lattice().theta_rad.count = 540;
+  ASSERT_GT(task.bins_in_all(), most_bounded_bins) << "which bounds have room for";
+  EXPECT_TRUE(bounds_have_room(task));
+  settle_filter(task);
+  EXPECT_TRUE(std::holds_alternative<BoundedOptions>(task.filter));
+}
+
 TEST(SettleFilter, TakesTheHistogramForWhatBoundsRefuse) {
   const auto kept = [](const auto& change) {
     RecognitionTask task = automatic_task(most_histogram_bins);

@@ -114,24 +114,24 @@ SearchMemory search_memory(std::span<const Hypothesis> hypotheses, const Bounded
   return memory;
 }
 
-void require_room(std::span<const Hypothesis> hypotheses, const BoundedOptions& options,
-                  std::uint64_t limit_bytes) {
+std::string why_no_room(std::span<const Hypothesis> hypotheses, const BoundedOptions& options,
+                        std::uint64_t limit_bytes) {
   const PoseLattice& lattice = options.lattice;
   const std::string what =
       fmt::format("lattice: bounds of {} objects x {} x {} x {} bins", hypotheses.size(),
                   lattice.x_mm.count, lattice.y_mm.count, lattice.theta_rad.count);
   if (bins_in_all(hypotheses, lattice) > most_bins) {
-    throw Error(Fault::input, fmt::format("{} are too many to number; use fewer bins", what));
+    return fmt::format("{} are too many to number; use fewer bins", what);
   }
   const SearchMemory memory = search_memory(hypotheses, options);
   if (memory.largest_family > most_family_bins) {
-    throw Error(Fault::input,
-                fmt::format("{}: {:.0f} bins within two cells of a map are more than a search "
-                            "evaluates together, {:.0f}; use fewer bins along x and y",
-                            what, memory.largest_family, most_family_bins));
+    return fmt::format(
+        "{}: {:.0f} bins within two cells of a map are more than a search evaluates together, "
+        "{:.0f}; use fewer bins along x and y",
+        what, memory.largest_family, most_family_bins);
   }
   if (memory.total() <= static_cast<double>(limit_bytes)) {
-    return;
+    return "";
   }
   struct Part {
     double bytes;
@@ -145,11 +145,17 @@ void require_room(std::span<const Hypothesis> hypotheses, const BoundedOptions& 
   const Part& largest = *std::max_element(
       parts.begin(), parts.end(), [](const Part& a, const Part& b) { return a.bytes < b.bytes; });
   constexpr double mib = 1 << 20;
-  throw Error(Fault::input,
-              fmt::format("{} need {:.0f} MiB of the host's memory, a quarter of which are {:.0f} "
-                          "MiB; {}",
-                          what, std::ceil(memory.total() / mib),
-                          std::floor(static_cast<double>(limit_bytes) / mib), largest.remedy));
+  return fmt::format(
+      "{} need {:.0f} MiB of the host's memory, a quarter of which are {:.0f} MiB; {}", what,
+      std::ceil(memory.total() / mib), std::floor(static_cast<double>(limit_bytes) / mib),
+      largest.remedy);
+}
+
+void require_room(std::span<const Hypothesis> hypotheses, const BoundedOptions& options,
+                  std::uint64_t limit_bytes) {
+  if (const std::string why = why_no_room(hypotheses, options, limit_bytes); !why.empty()) {
+    throw Error(Fault::input, why);
+  }
 }
 
 std::uint64_t memory_for_search() {

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <span>
+#include <string>
 
 #include "palpate/bounded_posterior.hpp"
 
@@ -24,8 +25,12 @@ struct SearchMemory {
 /// @param options checked, with a resolved contact model
 SearchMemory search_memory(std::span<const Hypothesis> hypotheses, const BoundedOptions& options);
 
-/// @throws Error where the bins are too many to number, or the search takes more memory than the
-/// limit; the message says which it is and what to change
+/// Why a search cannot take the bins, and what to change: they are too many to number or to be
+/// evaluated together, or it takes more memory than the limit. "" where it can.
+/// @param options with a sound lattice
+std::string why_no_room(std::span<const Hypothesis> hypotheses, const BoundedOptions& options,
+                        std::uint64_t limit_bytes);
+/// @throws Error with these words
 void require_room(std::span<const Hypothesis> hypotheses, const BoundedOptions& options,
                   std::uint64_t limit_bytes);
 
