@@ -41,8 +41,7 @@ std::string table_of(const Plan& plan, std::optional<int> columns) {
   for (std::size_t i = 0; i < std::min(plan.ranked.size(), most_rows); ++i) {
     const PlannedTouch& touch = plan.ranked[i];
     const std::array<std::string, 3> pose = pose_text(touch.T_robot_sensor).value;
-    table.add({std::to_string(i + 1), pose[0], pose[1], pose[2],
-               fmt::format("{:.2f}", gain_for(touch.gain, plan.goal)),
+    table.add({std::to_string(i + 1), pose[0], pose[1], pose[2], gain_text(touch.gain, plan.goal),
                // The goal's gain stands in its own column; one without content is left out.
                plan.goal == PlanGoal::identity ? "" : fmt::format("{:.2f}", touch.gain.identity),
                plan.goal == PlanGoal::pose ? "" : fmt::format("{:.2f}", touch.gain.pose),

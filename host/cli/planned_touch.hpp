@@ -16,11 +16,15 @@ PlanGoal parse_goal(const std::string& flag, const std::string& text);
 /// The goal's word.
 std::string goal_word(PlanGoal goal);
 
-/// index, x_mm, y_mm, theta_rad, and the gain in nats: identity, pose, both.
+/// index, x_mm, y_mm, theta_rad, and the gain in nats: identity, pose, both, and the standard_error
+/// of each.
 nlohmann::ordered_json to_json(const PlannedTouch& touch);
 
-/// "touch next at x 1.20 mm, y 3.40 mm, theta 45.00 deg: 2.31 nats expected", or that even this
-/// touch, the best, tells nothing.
+/// The part of a gain that the goal asks for, with its standard error: "2.31+-0.07".
+std::string gain_text(const TouchGain& gain, PlanGoal goal);
+
+/// "touch next at x 1.20 mm, y 3.40 mm, theta 45.00 deg: 2.31+-0.07 nats expected", or that even
+/// this touch, the best, tells nothing.
 std::string next_touch_words(const PlannedTouch& touch, PlanGoal goal);
 
 }  // namespace palpate::cli

@@ -52,23 +52,78 @@ Result<double, 3> log_likelihood(const Histogram& self, int object) {
                                  static_cast<std::size_t>(lattice.x_mm.count)});
 }
 
-std::tuple<Result<double, 1>, Result<double, 1>> expected_gain(const Histogram& self,
-                                                               const ArrayLike& T_robot_sensor,
-                                                               const ArrayLike& elements_mm,
-                                                               std::size_t samples,
-                                                               std::uint64_t seed) {
-  const auto gains = self.use([poses = poses_of(T_robot_sensor, "T_robot_sensor"),
-                               elements = points_of(elements_mm, "elements_mm"), samples,
-                               seed](PoseHistogram& belief, Call&) {
-    return belief.expected_gain(poses, elements, {.samples = samples, .seed = seed});
-  });
-  std::vector<double> identity;
-  std::vector<double> pose;
+/// A number of every candidate, [n].
+template <typename Number>
+Result<double, 1> of_each(const std::vector<TouchGain>& gains, const Number& number) {
+  std::vector<double> numbers;
   for (const TouchGain& gain : gains) {
-    identity.push_back(gain.identity);
-    pose.push_back(gain.pose);
+    numbers.push_back(number(gain));
   }
-  return {owned(std::move(identity), {gains.size()}), owned(std::move(pose), {gains.size()})};
+  return owned(std::move(numbers), {gains.size()});
+}
+
+/// Gains of every candidate.
+struct TouchGains {
+  std::vector<TouchGain> each;
+
+  auto identity() const {
+    return of_each(each, [](const TouchGain& gain) { return gain.identity; });
+  }
+  auto pose() const {
+    return of_each(each, [](const TouchGain& gain) { return gain.pose; });
+  }
+};
+
+TouchGains expected_gain(const Histogram& self, const ArrayLike& T_robot_sensor,
+                         const ArrayLike& elements_mm, std::size_t samples, std::uint64_t seed) {
+  return {self.use([poses = poses_of(T_robot_sensor, "T_robot_sensor"),
+                    elements = points_of(elements_mm, "elements_mm"), samples,
+                    seed](PoseHistogram& belief, Call&) {
+    return belief.expected_gain(poses, elements, {.samples = samples, .seed = seed});
+  })};
+}
+
+void bind_gains(nb::module_& module) {
+  nb::class_<TouchGains>(
+      module, "TouchGains",
+      "What a touch at each of n candidate poses is expected to tell, in nats: estimates, none of\n"
+      "them below 0, with standard errors. Unpacks into (identity, pose).")
+      .def_prop_ro("identity", &TouchGains::identity, "[n] about which object it is.")
+      .def_prop_ro("pose", &TouchGains::pose, "[n] about the pose, given the object.")
+      .def_prop_ro(
+          "both",
+          [](const TouchGains& self) {
+            return of_each(self.each, [](const TouchGain& gain) { return gain.both(); });
+          },
+          "[n] about object and pose together.")
+      .def_prop_ro(
+          "identity_error",
+          [](const TouchGains& self) {
+            return of_each(self.each,
+                           [](const TouchGain& gain) { return gain.standard_error.identity; });
+          },
+          "[n] standard error of identity.")
+      .def_prop_ro(
+          "pose_error",
+          [](const TouchGains& self) {
+            return of_each(self.each,
+                           [](const TouchGain& gain) { return gain.standard_error.pose; });
+          },
+          "[n] standard error of pose.")
+      .def_prop_ro(
+          "both_error",
+          [](const TouchGains& self) {
+            return of_each(self.each,
+                           [](const TouchGain& gain) { return gain.standard_error.both; });
+          },
+          "[n] standard error of both.")
+      .def("__len__", [](const TouchGains&) { return 2; })
+      .def("__getitem__", [](const TouchGains& self, int part) {
+        if (part < -2 || part > 1) {
+          throw nb::index_error("gains unpack into identity and pose");
+        }
+        return part % 2 == 0 ? self.identity() : self.pose();
+      });
 }
 
 void bind_beliefs(nb::class_<Histogram>& histogram) {
@@ -115,14 +170,14 @@ void bind_beliefs(nb::class_<Histogram>& histogram) {
           "count"_a, "seed"_a = 0, "Draws objects and poses from the belief.")
       .def("expected_gain", &expected_gain, "T_robot_sensor"_a, "elements_mm"_a, nb::kw_only(),
            "samples"_a = PlanOptions{}.samples, "seed"_a = 0,
-           "What one more touch at each candidate pose [n, 3] is expected to tell, in nats: about\n"
-           "the object [n] and about the pose, given the object [n]. elements_mm [e, 2]: living\n"
-           "elements in the sensor frame.");
+           "What one more touch at each candidate pose [n, 3] is expected to tell, in nats.\n"
+           "elements_mm [e, 2]: living elements in the sensor frame.");
 }
 
 }  // namespace
 
 void bind_pose_histogram(nb::module_& module) {
+  bind_gains(module);
   nb::class_<Histogram> histogram(
       module, "PoseHistogram",
       "Histogram filter over object identity and planar pose (Sec. III-C, Eq. 13-16), on the\n"

@@ -64,6 +64,11 @@ TEST_F(PlanCommand, RanksTheRowsOfATable) {
     EXPECT_LE(gain["both"].get<double>(), before);
     before = gain["both"];
     EXPECT_NEAR(gain["identity"].get<double>() + gain["pose"].get<double>(), before, 1e-12);
+    for (const char* part : {"identity", "pose", "both"}) {
+      EXPECT_GE(gain[part].get<double>(), 0.0);
+      EXPECT_GE(gain["standard_error"][part].get<double>(), 0.0);
+      EXPECT_LT(gain["standard_error"][part].get<double>(), 0.3);
+    }
   }
   // The touch 400 mm away tells nothing.
   EXPECT_EQ(ranked.back()["index"], 0);
@@ -108,6 +113,8 @@ TEST_F(PlanCommand, PrintsTheTenBestAndDrawsThem) {
   const std::string out = done(command({"--candidates", "grid", "--png", "p.png"}));
   EXPECT_NE(out.find("touch next at x "), std::string::npos) << out;
   EXPECT_NE(out.find("gain nats"), std::string::npos) << out;
+  EXPECT_EQ(std::ranges::count(out.substr(out.find("rank")), '+'), 11) << "standard errors\n"
+                                                                       << out;
   EXPECT_NE(out.find("\n  10  "), std::string::npos) << out;
   EXPECT_EQ(out.find("\n  11  "), std::string::npos) << out;
   EXPECT_TRUE(content_of(folder_.path())["p.png"].starts_with("\x89PNG"));

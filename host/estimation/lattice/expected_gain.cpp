@@ -6,6 +6,7 @@
 #include <bit>
 #include <cmath>
 #include <future>
+#include <numbers>
 #include <numeric>
 #include <thread>
 
@@ -22,24 +23,33 @@ namespace {
 /// Columns that are summed at once: their sums stay in registers.
 constexpr std::size_t lanes = 32;
 
-/// Where touches are uncertain, so many displacements of each sample stand for all. The readings
-/// come from one of them; their likelihood by the sample they came from is the mean over all of
-/// them. Of every other sample the first counts alone: the mean over samples averages displacements
-/// too, and its error is that of a mean over as many displacements as samples matter.
-constexpr std::size_t displaced_copies = 8;
+/// The displacements that stand for all where touches are uncertain: means over them are those over
+/// the distribution, of polynomials up to the third degree (Stroud 1957). They are the same for
+/// every sample, so that what tells displacements apart tells no samples apart.
+std::vector<Pose> few_displacements(const DisplacementSd& sd) {
+  if (sd.none()) {
+    return {Pose{}};
+  }
+  std::vector<Pose> few;
+  for (const double at : {-std::numbers::sqrt3, std::numbers::sqrt3}) {
+    few.insert(few.end(), {{{at * sd.mm, 0.0}, 0.0}, {{0.0, at * sd.mm}, 0.0}, {{}, at * sd.rad}});
+  }
+  return few;
+}
 
-/// exp(x) within a part in 3e5, clamped to [exp(-87), exp(80)]; the compiler vectorises it.
+/// exp(x) within a part in 3e5, clamped to about [exp(-87), exp(88)]. Without comparisons of
+/// floats, which may trap, the compiler vectorises it.
 float fast_exp(float x) {
   constexpr float per_octave = 1.44269504F;
-  constexpr int offset = 200;  // makes a positive number, which conversion rounds down
-  const float octaves = std::min(std::max(x, -87.0F), 80.0F) * per_octave;
+  constexpr int offset = 1 << 16;  // makes a positive number, which conversion rounds down
+  const float octaves = x * per_octave;
   const int whole = static_cast<int>(octaves + (offset + 0.5F)) - offset;
   const float part = octaves - static_cast<float>(whole);
   const float mantissa =
       1.0F + part * (0.69314718F +
                      part * (0.24022651F +
                              part * (0.05550411F + part * (0.00961813F + part * 0.00133336F))));
-  return mantissa * std::bit_cast<float>((whole + 127) << 23);
+  return mantissa * std::bit_cast<float>((std::clamp(whole, -126, 127) + 127) << 23);
 }
 
 /// Samples of one label, which stand together.
@@ -52,7 +62,7 @@ struct LabelBlock {
 struct SampledBelief {
   SampledBelief(std::span<const PoseSample> drawn, std::size_t elements,
                 const DisplacementSd& touch_sd, const PlanOptions& options)
-      : samples(drawn.begin(), drawn.end()), copies(touch_sd.none() ? 1 : displaced_copies) {
+      : samples(drawn.begin(), drawn.end()), displacements(few_displacements(touch_sd)) {
     const auto label = [&](const PoseSample& sample) {
       const auto object = static_cast<std::size_t>(sample.object);
       return options.label_of.empty() ? object : options.label_of[object];
@@ -63,12 +73,6 @@ struct SampledBelief {
         blocks.push_back({i, i});
       }
       blocks.back().end = i + 1;
-      block_of.push_back(blocks.size() - 1);
-    }
-    if (touch_sd.none()) {
-      displacements.resize(samples.size());
-    } else {
-      displacements = displacement_points(touch_sd, copies * samples.size());
     }
     Random random(options.seed, Stream::readings);
     draw_uniforms(elements, random);
@@ -96,10 +100,27 @@ struct SampledBelief {
 
   std::vector<PoseSample> samples;  ///< ordered by label
   std::vector<LabelBlock> blocks;
-  std::vector<std::size_t> block_of;  ///< [sample]
-  std::size_t copies;                 ///< of each sample
-  std::vector<Pose> displacements;    ///< [copy, sample]
-  std::vector<float> uniforms;        ///< [sample, element] that decide the readings
+  std::vector<Pose> displacements;  ///< of equal probability
+  std::vector<float> uniforms;      ///< [sample, element] that decide the readings
+};
+
+/// The mean of terms, and its standard error.
+class Mean {
+ public:
+  void add(double term) {
+    sum_ += term;
+    squares_ += term * term;
+    ++count_;
+  }
+  double mean() const { return sum_ / count_; }
+  double standard_error() const {
+    return std::sqrt(std::max(squares_ - sum_ * mean(), 0.0) / (count_ - 1.0) / count_);
+  }
+
+ private:
+  double sum_ = 0.0;
+  double squares_ = 0.0;
+  double count_ = 0.0;
 };
 
 /// One thread's work on candidates, with its memory.
@@ -111,90 +132,67 @@ class GainEstimator {
         belief_(belief),
         elements_mm_(elements_mm),
         columns_((belief.samples.size() + lanes - 1) / lanes * lanes),
-        logs_(elements_mm.size() * predictor.levels() * columns_),
-        copy_rows_(elements_mm.size() * predictor.levels()),
-        copy_logs_(belief.copies * copy_rows_),
+        copies_(belief.displacements.size()),
+        copy_size_(elements_mm.size() * predictor.levels() * columns_),
+        logs_(copies_ * copy_size_),
         rows_(elements_mm.size()),
-        sums_(columns_),
-        relative_(columns_) {}
+        sums_(copies_ * columns_),
+        likelihoods_(columns_),
+        log_likelihoods_(columns_) {}
 
   TouchGain gain(const Pose& T_robot_sensor) {
     predict(T_robot_sensor);
+    Mean identity;
+    Mean pose;
+    Mean both;
     const std::size_t n = belief_.samples.size();
-    double both = 0.0;
-    double identity = 0.0;
-    for (std::size_t i = 0; i < n; ++i) {
-      predict_copies(i, T_robot_sensor);
-      read(i);
+    // Where every sample has several copies, half of the readings are enough.
+    const std::size_t step = copies_ > 1 && n >= 4 ? 2 : 1;
+    for (std::size_t i = 0, copy = 0; i < n; i += step, copy = (copy + 1) % copies_) {
+      read(i, copy);
       sum_columns();
-      const Own own = own_likelihood(i);
-      for (std::size_t j = 0; j < sums_.size(); ++j) {
-        relative_[j] = fast_exp(sums_[j] - own.scale);
-      }
-      relative_[i] = static_cast<float>(own.mean);
-      double all = 0.0;
-      double alike = 0.0;
-      for (std::size_t b = 0; b < belief_.blocks.size(); ++b) {
-        const auto& [first, end] = belief_.blocks[b];
-        const double sum =
-            std::accumulate(relative_.begin() + static_cast<std::ptrdiff_t>(first),
-                            relative_.begin() + static_cast<std::ptrdiff_t>(end), 0.0);
-        all += sum;
-        if (b == belief_.block_of[i]) {
-          alike = sum / static_cast<double>(end - first);
-        }
-      }
-      const double log_all = std::log(all / static_cast<double>(n));
-      both += std::log(own.mean) - log_all;
-      identity += std::log(alike) - log_all;
+      weigh(sums_[copy * columns_ + i]);
+      const Divergence told = divergence();
+      identity.add(told.identity);
+      pose.add(told.pose);
+      both.add(told.identity + told.pose);
     }
-    both /= static_cast<double>(n);
-    identity /= static_cast<double>(n);
-    return {.identity = identity, .pose = both - identity};
+    return {.identity = identity.mean(),
+            .pose = pose.mean(),
+            .standard_error = {identity.standard_error(), pose.standard_error(),
+                               both.standard_error()}};
   }
 
  private:
-  /// The likelihood of a reading by the sample it came from: mean * exp(scale).
-  struct Own {
-    float scale = 0.0F;
-    double mean = 1.0;
+  /// Kullback-Leibler divergence of the belief after a reading from the belief before it, nats.
+  struct Divergence {
+    double identity = 0.0;  ///< of the labels
+    double pose = 0.0;      ///< of the samples of each label, on average
   };
 
-  Pose T_object_sensor(std::size_t copy, std::size_t i, const Pose& T_robot_sensor) const {
-    return belief_.samples[i].T_object_robot * T_robot_sensor *
-           belief_.displacements[copy * belief_.samples.size() + i];
-  }
-
-  /// Log-probabilities of all readings by the first copy of every sample.
+  /// Log-probabilities of all readings by every sample.
   void predict(const Pose& T_robot_sensor) {
-    for (std::size_t i = 0; i < belief_.samples.size(); ++i) {
-      predictor_.predict(static_cast<std::size_t>(belief_.samples[i].object),
-                         T_object_sensor(0, i, T_robot_sensor), elements_mm_,
-                         std::span(logs_).subspan(i), columns_);
+    for (std::size_t copy = 0; copy < copies_; ++copy) {
+      const Pose displaced = T_robot_sensor * belief_.displacements[copy];
+      for (std::size_t i = 0; i < belief_.samples.size(); ++i) {
+        const PoseSample& sample = belief_.samples[i];
+        predictor_.predict(static_cast<std::size_t>(sample.object),
+                           sample.T_object_robot * displaced, elements_mm_,
+                           std::span(logs_).subspan(copy * copy_size_ + i), columns_);
+      }
     }
   }
 
-  /// The same by sample i's other copies.
-  void predict_copies(std::size_t i, const Pose& T_robot_sensor) {
-    for (std::size_t copy = 1; copy < belief_.copies; ++copy) {
-      predictor_.predict(static_cast<std::size_t>(belief_.samples[i].object),
-                         T_object_sensor(copy, i, T_robot_sensor), elements_mm_,
-                         std::span(copy_logs_).subspan(copy * copy_rows_), 1);
-    }
-  }
-
-  /// Simulates the readings by one of sample i's copies: the row of logs_ of each.
-  void read(std::size_t i) {
-    const std::size_t copy = i % belief_.copies;
-    const float* const logs = copy == 0 ? logs_.data() + i : copy_logs_.data() + copy * copy_rows_;
-    const std::size_t stride = copy == 0 ? columns_ : 1;
+  /// Simulates the readings by a copy of sample i: the row of logs_ of each.
+  void read(std::size_t i, std::size_t copy) {
+    const float* const logs = logs_.data() + copy * copy_size_ + i;
     const std::size_t levels = predictor_.levels();
     for (std::size_t e = 0; e < rows_.size(); ++e) {
       float left = belief_.uniforms[i * rows_.size() + e];
       std::size_t row = e * levels;
       const std::size_t last = row + levels - 1;
       for (; row < last; ++row) {
-        left -= std::exp(logs[row * stride]);
+        left -= std::exp(logs[row * columns_]);
         if (left < 0.0F) {
           break;
         }
@@ -203,47 +201,70 @@ class GainEstimator {
     }
   }
 
-  /// The readings' log-likelihoods by the first copy of every sample.
+  /// The readings' log-likelihoods by every copy of every sample.
   void sum_columns() {
-    for (std::size_t first = 0; first < sums_.size(); first += lanes) {
-      std::array<float, lanes> sum{};
-      for (const std::size_t row : rows_) {
-        const float* const logs = logs_.data() + row * columns_ + first;
-        for (std::size_t k = 0; k < lanes; ++k) {
-          sum[k] += logs[k];
+    float* out = sums_.data();
+    for (std::size_t copy = 0; copy < copies_; ++copy) {
+      for (std::size_t first = 0; first < columns_; first += lanes) {
+        std::array<float, lanes> sum{};
+        for (const std::size_t row : rows_) {
+          const float* const logs = logs_.data() + copy * copy_size_ + row * columns_ + first;
+          for (std::size_t k = 0; k < lanes; ++k) {
+            sum[k] += logs[k];
+          }
         }
+        out = std::copy(sum.begin(), sum.end(), out);
       }
-      std::copy(sum.begin(), sum.end(), sums_.begin() + static_cast<std::ptrdiff_t>(first));
     }
   }
 
-  /// The readings' likelihood by the mean over sample i's copies.
-  Own own_likelihood(std::size_t i) {
-    std::array<float, displaced_copies> sums{};
-    const std::span<float> by_copy(sums.data(), belief_.copies);
-    by_copy[0] = sums_[i];
-    for (std::size_t copy = 1; copy < by_copy.size(); ++copy) {
-      for (const std::size_t row : rows_) {
-        by_copy[copy] += copy_logs_[copy * copy_rows_ + row];
+  /// The readings' likelihoods by every sample, summed over its copies, relative to exp(scale).
+  void weigh(float scale) {
+    std::ranges::fill(likelihoods_, 0.0F);
+    for (std::size_t first = 0; first < sums_.size(); first += columns_) {
+      for (std::size_t j = 0; j < columns_; ++j) {
+        likelihoods_[j] += fast_exp(sums_[first + j] - scale);
       }
     }
-    Own own{.scale = *std::ranges::max_element(by_copy), .mean = 0.0};
-    for (const float log_likelihood : by_copy) {
-      own.mean += std::exp(log_likelihood - own.scale) / static_cast<double>(by_copy.size());
+    for (std::size_t j = 0; j < columns_; ++j) {
+      log_likelihoods_[j] = copies_ == 1 ? sums_[j] - scale : std::log(likelihoods_[j]);
     }
-    return own;
+  }
+
+  /// What the weighed readings tell.
+  Divergence divergence() const {
+    double all = 0.0;
+    double identity = 0.0;
+    double pose = 0.0;
+    for (const auto& [first, end] : belief_.blocks) {
+      double sum = 0.0;
+      double logs = 0.0;
+      for (std::size_t j = first; j < end; ++j) {
+        const double likelihood = likelihoods_[j];
+        sum += likelihood;
+        logs += likelihood * log_likelihoods_[j];
+      }
+      const double log_mean = std::log(sum / static_cast<double>(end - first));
+      all += sum;
+      identity += sum * log_mean;
+      pose += logs - sum * log_mean;
+    }
+    const double log_all = std::log(all / static_cast<double>(belief_.samples.size()));
+    // Only rounding makes a divergence negative.
+    return {.identity = std::max(identity / all - log_all, 0.0), .pose = std::max(pose / all, 0.0)};
   }
 
   const ReadingPredictor& predictor_;
   const SampledBelief& belief_;
   std::span<const glm::dvec2> elements_mm_;
   std::size_t columns_;
-  std::vector<float> logs_;  ///< [element, level, sample], of first copies
-  std::size_t copy_rows_;
-  std::vector<float> copy_logs_;   ///< [copy, element, level], of one sample; not of its first copy
-  std::vector<std::size_t> rows_;  ///< [element] of the simulated reading
-  std::vector<float> sums_;        ///< [sample]
-  std::vector<float> relative_;    ///< [sample] likelihoods over the own sample's
+  std::size_t copies_;                  ///< of every sample: displacements
+  std::size_t copy_size_;               ///< numbers of one copy in logs_
+  std::vector<float> logs_;             ///< [copy, element, level, sample]
+  std::vector<std::size_t> rows_;       ///< [element] of the simulated reading
+  std::vector<float> sums_;             ///< [copy, sample]
+  std::vector<float> likelihoods_;      ///< [sample] relative to that of the copy that was read
+  std::vector<float> log_likelihoods_;  ///< [sample]
 };
 
 }  // namespace

@@ -9,9 +9,19 @@ namespace palpate {
 /// What one touch is expected to tell, in nats: the mutual information between its readings and the
 /// unknown, given the touches so far. By the chain rule, information about (object, pose) is that
 /// about the object plus that about the pose once the object is known.
+/// Estimates, none of them below 0.
 struct TouchGain {
+  /// Of the estimates, by the spread over simulated readings; what too few samples cannot show is
+  /// not in it.
+  struct StandardError {
+    double identity = 0.0;
+    double pose = 0.0;
+    double both = 0.0;
+  };
+
   double identity = 0.0;  ///< about which object it is
   double pose = 0.0;      ///< about the pose, given the object
+  StandardError standard_error = {};
   /// About object and pose together.
   double both() const { return identity + pose; }
 };

@@ -122,7 +122,7 @@ TEST(ExpectedGain, AveragesOverWhereTheSensorMayHaveBeen) {
   }
   const double exact = exact_gain(samples, objects, {}, candidate, touch_sd).both;
   EXPECT_LT(exact, exact_gain(samples, objects, {}, candidate).both - 0.1);
-  // Eight displacements of each sample stand for all: they tell a little more than all would.
+  // Six displacements stand for all: they tell a little more than all would.
   EXPECT_NEAR(estimated(both).mean, exact, 0.08);
 }
 
@@ -174,6 +174,64 @@ TEST(ExpectedGain, OfAHistogramIsThatOfItsBins) {
   EXPECT_NEAR(estimated(by_identity).mean, exact.identity, 0.02);
   EXPECT_NEAR(estimated(both).mean, exact.both, 0.02);
   EXPECT_GT(exact.both, 0.2);
+}
+
+TEST(ExpectedGain, IsNeverBelowZero) {
+  const std::vector<Hypothesis> objects = three_objects();
+  const ReadingPredictor predictor(objects, contact);
+  std::vector<Pose> candidates;
+  for (int i = 0; i < 20; ++i) {
+    candidates.push_back({{4.0 * i, 0.5 * i}, 0.3 * i});  // the later, the less they touch
+  }
+  for (const std::size_t count : {2U, 3U, 16U}) {
+    const std::vector<PoseSample> samples = random_samples(count);
+    for (const DisplacementSd& touch_sd : {DisplacementSd{}, DisplacementSd{1.0, 0.1}}) {
+      for (std::uint64_t seed = 0; seed < 20; ++seed) {
+        for (const TouchGain& gain :
+             expected_gain(predictor, samples, candidates, elements, touch_sd, {.seed = seed})) {
+          EXPECT_GE(gain.identity, 0.0);
+          EXPECT_GE(gain.pose, 0.0);
+          EXPECT_LE(gain.both(), std::log(static_cast<double>(count)) + 1e-5);
+          EXPECT_GE(gain.standard_error.both, 0.0) << "and is a number";
+        }
+      }
+    }
+  }
+}
+
+TEST(ExpectedGain, KnowsItsErrorAboutALongRun) {
+  const Touched touched;
+  const std::vector<glm::dvec2> array = digitacts_array();
+  for (const Pose& candidate : {Pose{{1.0, 0.5}, 0.4}, Pose{{7.0, -3.0}, 2.0}}) {
+    const auto gain = [&](std::size_t samples, std::uint64_t seed) {
+      return touched.histogram
+          ->expected_gain(std::span(&candidate, 1), array, {.samples = samples, .seed = seed})
+          .front();
+    };
+    const TouchGain long_run = gain(2048, 1000);
+    std::vector<double> identity;
+    std::vector<double> both;
+    TouchGain::StandardError stated;
+    constexpr int seeds = 60;
+    for (int seed = 0; seed < seeds; ++seed) {
+      const TouchGain one = gain(96, static_cast<std::uint64_t>(seed));
+      identity.push_back(one.identity);
+      both.push_back(one.both());
+      stated.identity += one.standard_error.identity / seeds;
+      stated.both += one.standard_error.both / seeds;
+    }
+    // A fourteenth of a bin's poses lies in a sample: gains come out too small.
+    EXPECT_NEAR(estimated(identity).mean, long_run.identity, 0.03);
+    EXPECT_NEAR(estimated(both).mean, long_run.both(), 0.15);
+    // Drawn samples err a little more than simulated readings show.
+    const double root = std::sqrt(static_cast<double>(seeds));
+    const double of_identity = root * estimated(identity).error;
+    const double of_both = root * estimated(both).error;
+    EXPECT_GT(stated.identity, 0.5 * of_identity);
+    EXPECT_LT(stated.identity, 2.0 * of_identity);
+    EXPECT_GT(stated.both, 0.5 * of_both);
+    EXPECT_LT(stated.both, 2.0 * of_both);
+  }
 }
 
 TEST(ExpectedGain, IsReproducibleAndTheSameAmongOtherCandidates) {
