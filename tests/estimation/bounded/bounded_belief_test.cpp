@@ -7,6 +7,8 @@
 #include <vector>
 
 #include <gtest/gtest.h>
+#include <glm/common.hpp>
+#include <glm/vec3.hpp>
 
 #include "bounded/certified.hpp"
 #include "bounded_belief.hpp"
@@ -196,6 +198,27 @@ TEST(BoundedBelief, IsDrawnFromEverywhereWhereNoTouchSeesAMap) {
     for (const std::size_t of_theta : thetas) {
       EXPECT_NEAR(of_theta, count / 16.0, 3.0);
     }
+  }
+}
+
+TEST(BoundedBelief, IsDrawnFromAllOverTheBins) {
+  BoundedPosterior posterior(two_shapes(), small_options());
+  const PoseLattice& lattice = posterior.lattice();
+  posterior.update(touches_of_l(2, 826).touches(0, 2));
+  glm::dvec3 least(1.0);
+  glm::dvec3 most(-1.0);
+  for (const PoseSample& draw : posterior.sample(500, 827)) {
+    const Pose centre = lattice.T_object_robot(lattice.bin_of(draw.T_object_robot));
+    const glm::dvec2 off_mm = draw.T_object_robot * lattice.pivot_mm - centre * lattice.pivot_mm;
+    const glm::dvec3 off(
+        off_mm.x / lattice.x_mm.step(), off_mm.y / lattice.y_mm.step(),
+        (draw.T_object_robot.theta_rad - centre.theta_rad) / lattice.theta_rad.step());
+    least = glm::min(least, off);
+    most = glm::max(most, off);
+  }
+  for (int axis = 0; axis < 3; ++axis) {
+    EXPECT_LT(least[axis], -0.45) << "of half a step";
+    EXPECT_GT(most[axis], 0.45);
   }
 }
 

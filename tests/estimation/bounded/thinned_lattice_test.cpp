@@ -53,7 +53,8 @@ TEST(ThinnedLattice, ItsCentresAreCentresOfTheLattice) {
 TEST(ThinnedLattice, RefinedPosesLieInTheRegion) {
   const std::vector<Hypothesis> objects{{map_of(on_letter_l, "L"), 1.0}};
   const Pose truth{{1.3, -0.8}, 0.7};
-  const std::vector<Touch> touches = all_touches(touches_of(on_letter_l, truth, 5, 832));
+  const Recording recording = touches_of(on_letter_l, truth, 5, 832);
+  const std::vector<Touch> touches = all_touches(recording);
   Device device = Device::open();
   Uniform uniform(833);
   const auto axis = [&](double middle, double widest) {
