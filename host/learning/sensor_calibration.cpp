@@ -30,6 +30,15 @@ constexpr double table_cost = 4.0 / 3.0;
 constexpr double minutes = 0.25;
 constexpr double minutes_at_bins = 1.0;
 
+/// The losses of presses with their labels' log probabilities, in nats.
+std::vector<double> losses_of(const std::vector<ScoredPress>& presses) {
+  std::vector<double> of_each;
+  for (const ScoredPress& press : presses) {
+    of_each.push_back(-press.log_evidence[press.truth]);
+  }
+  return of_each;
+}
+
 /// A calibration in the making.
 class SensorLearning {
  public:
@@ -186,13 +195,9 @@ class SensorLearning {
   static const TriedModel& kept(const std::vector<TriedModel>& tried,
                                 std::optional<std::size_t> without = {}) {
     const auto losses = [&](const TriedModel& one) {
-      std::vector<double> of_each;
-      for (const ScoredPress& press : one.after.presses) {
-        if (press.fold != without) {
-          of_each.push_back(-press.log_evidence[press.truth]);
-        }
-      }
-      return of_each;
+      std::vector<ScoredPress> some = one.after.presses;
+      std::erase_if(some, [&](const ScoredPress& press) { return press.fold == without; });
+      return losses_of(some);
     };
     const TriedModel* best = &tried.front();
     for (const TriedModel& one : tried) {
@@ -303,15 +308,14 @@ class SensorLearning {
                       "of each object",
                       presses_in_group, presses_in_group * options_.folds));
     }
+    const std::vector<ScoredPress> without = tempered_by_folds(eq7.presses).presses;
     // What few presses could show by chance is no warning.
-    constexpr double worse_nats = 0.05;
-    const double without = scores_of(tempered_by_folds(eq7.presses).presses, 1.0).log_loss;
-    if (result_.after->log_loss > without + worse_nats) {
+    if (is_clearly_less(losses_of(without), losses_of(after.presses))) {
       result_.warnings.push_back(fmt::format(
           "on touches that it has not seen, the learned table has a log-loss of {:.3f}, worse than "
           "{:.3f} by Eq. 7 with a temperature: give more touches of each object, or recognize "
           "without the sensor model",
-          result_.after->log_loss, without));
+          result_.after->log_loss, scores_of(without, 1.0).log_loss));
     }
   }
 
