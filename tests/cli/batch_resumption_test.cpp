@@ -259,10 +259,10 @@ TEST_F(BatchResumption, TouchesAsUnknownsMoveFromChunkToChunk) {
     EXPECT_EQ(palpate(batch_of("fresh", inputs)).status, 0);
     EXPECT_EQ(merged("r"), merged("fresh")) << why;
   };
-  palpate(batch_of("r", {name(1)}));
-  expect_as_fresh({"two.h5", name(1)}, "each chunk of u/01.h5 begins two touches earlier");
+  palpate(batch_of("r", {name(3), name(1)}));
+  expect_as_fresh({name(3), "two.h5", name(1)}, "chunks of u/01.h5 begin two touches earlier");
   write_recording(folder_ / "two.h5", sample_unknown("A", {}, 7));
-  expect_as_fresh({"two.h5", name(1)}, "the first recording has more touches");
+  expect_as_fresh({name(3), "two.h5", name(1)}, "a recording has more touches");
 }
 
 // A chunk of another shard may hold some of a recording's touches.
