@@ -117,12 +117,8 @@ void bind_gains(nb::module_& module) {
                            [](const TouchGain& gain) { return gain.standard_error.both; });
           },
           "[n] standard error of both.")
-      .def("__len__", [](const TouchGains&) { return 2; })
-      .def("__getitem__", [](const TouchGains& self, int part) {
-        if (part < -2 || part > 1) {
-          throw nb::index_error("gains unpack into identity and pose");
-        }
-        return part % 2 == 0 ? self.identity() : self.pose();
+      .def("__iter__", [](const TouchGains& self) -> nb::typed<nb::iterator, Result<double, 1>> {
+        return nb::iter(nb::make_tuple(self.identity(), self.pose()));
       });
 }
 

@@ -35,3 +35,24 @@ def test_the_reference_has_the_belief_of_the_histogram(
         palpate.pose_error_mm(maps[0], pose, (1, 2, 3)), abs=1e-9
     )
     assert set(reference.classify(unknown[0]).tolist()) <= {0, 1, 8}
+
+
+def test_gains_are_never_below_zero_and_have_standard_errors(
+    device: palpate.Device, maps: list[palpate.OccupancyGrid], unknown: palpate.Recording
+) -> None:
+    belief = palpate.PoseHistogram(device, maps, palpate.PoseLattice((-5, 5, 8), (-5, 5, 8)))
+    belief.update(unknown[0])
+    poses = [[0, 0, 0], [3, -2, 1], [500, 0, 0]]
+    gains = belief.expected_gain(poses, palpate.digitacts_array(), samples=16)
+    identity, pose = gains
+    assert numpy.all(identity >= 0) and numpy.all(pose >= 0)
+    assert numpy.array_equal(gains.both, identity + pose)
+    for error in (gains.identity_error, gains.pose_error, gains.both_error):
+        assert error.shape == (3,)
+        assert numpy.all((error >= 0) & (error < 1))
+    assert gains.both[2] == pytest.approx(0, abs=1e-5)  # far from every object
+
+
+def test_angles_that_would_count_twice_are_refused() -> None:
+    with pytest.raises(palpate.Error, match="theta_rad = 0:7: wider than the full circle"):
+        palpate.PoseLattice((-1, 1, 3), (-1, 1, 3), (0, 7, 4))

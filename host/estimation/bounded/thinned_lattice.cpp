@@ -9,9 +9,10 @@ PoseLattice thinned(PoseLattice lattice) {
   constexpr int least_bins = 3;  // of fewer, the middle ones say little of a narrow region's ends
   for (Axis* axis : {&lattice.x_mm, &lattice.y_mm}) {
     const double step = axis->step();
-    const double most = std::min(fine_mm / step, static_cast<double>(axis->count / least_bins));
+    const int widest = axis->count / least_bins;
+    const double wanted = std::min<double>(fine_mm / step, widest);
     // An odd number, so that the middle one is a centre.
-    const int every = static_cast<int>((most - 1.0) / 2.0) * 2 + 1;
+    const int every = static_cast<int>((wanted - 1.0) / 2.0) * 2 + 1;
     if (every > 1) {
       axis->count /= every;
       axis->upper = axis->lower + axis->count * every * step;
