@@ -71,7 +71,8 @@ void bind_lattice(nb::module_& module) {
           "x_mm"_a = PoseLattice{}.x_mm, "y_mm"_a = PoseLattice{}.y_mm,
           "theta_rad"_a = PoseLattice{}.theta_rad, "pivot_mm"_a = nb::make_tuple(0.0, 0.0),
           "Axes as Axis or (lower, upper, count); pivot_mm [2] in the robot frame.\n\n"
-          "Raises Error on a count below 1, a reversed range, or a theta range wider than the circle.")
+          "Raises Error on a count below 1, a reversed range, or a theta range wider than the "
+          "circle.")
       .def_ro("x_mm", &PoseLattice::x_mm, "In the object frame.")
       .def_ro("y_mm", &PoseLattice::y_mm, "In the object frame.")
       .def_ro("theta_rad", &PoseLattice::theta_rad, "Angle of T_object_robot.")

@@ -34,7 +34,8 @@ class TouchOverlap {
 
  private:
   const OverlapPlane& plane(const BinBox& box) const {
-    return planes_[static_cast<std::size_t>(box.object * thetas_ + box.theta)];
+    return planes_[static_cast<std::size_t>(box.object) * static_cast<std::size_t>(thetas_) +
+                   static_cast<std::size_t>(box.theta)];
   }
 
   int thetas_;

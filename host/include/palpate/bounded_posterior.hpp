@@ -41,8 +41,9 @@ struct BoundedOptions {
   double evidence_growth = 0.0;
   /// Prior weight W of "none of these", as HistogramOptions::none_weight. Each touch's mean
   /// likelihood is bounded by a search of its own, so closely that no identity can move by more
-  /// than the tolerance or 1e-6, whichever is larger. Where "none of these" is neither nearly certain
-  /// nor nearly impossible, this evaluates most bins at which the touch's array meets an object.
+  /// than the tolerance or 1e-6, whichever is larger. Where "none of these" is neither nearly
+  /// certain nor nearly impossible, this evaluates most bins at which the touch's array meets an
+  /// object.
   std::optional<double> none_weight = {};
   /// Host threads; 0 takes as many as the machine has cores.
   int threads = 0;

@@ -30,8 +30,8 @@ struct DeviceInfo {
 };
 
 /// An open Vulkan device for compute. It must outlive every object made on it. Every call on a
-/// moved-from device throws Error, and so does every use of a device, and of the objects on it, in a
-/// child of fork().
+/// moved-from device throws Error, and so does every use of a device, and of the objects on it, in
+/// a child of fork().
 ///
 /// Threads: several objects on one device may be used, made and destroyed at the same time, each by
 /// one thread at a time; their commands take turns on the device's queue. Only moving or destroying
