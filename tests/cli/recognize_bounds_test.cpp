@@ -24,7 +24,7 @@ TEST_F(RecognizeBounds, BinsBeyondTheDeviceAreTheUsersNumber) {
   refuse({"--bins", "2000000000x1x1"}, {"bins", "use fewer"});
   refuse({"--bins", "1x2000000000x1"}, {"bins", "use fewer"});
   refuse({"--bins", "1x1x2000000000"}, {"bins", "use fewer"});
-  refuse({"--bins", "40000x40000x1000"}, {"40000 x 40000 x 1000 pose bins", "use fewer"});
+  refuse({"--bins", "80000x80000x1000"}, {"80000 x 80000 x 1000 pose bins", "use fewer"});
   refuse({"--bins", "2000000000x2000000000x2000000000"}, {"pose bins", "use fewer"});
 }
 

@@ -66,7 +66,7 @@ TEST(Bounds, OfMapsLatticesAndTouchesLeaveNumbers) {
       }
       for (const PoseLattice& lattice :
            {PoseLattice{{-3, 3, 4}, {-3, 3, 3}, {0, 6, 3}, {}},
-            PoseLattice{{-1e9, 1e9, 5}, {-1e9, 1e9, 3}, {-1e9, 1e9, 3}, {1e9, -1e9}}}) {
+            PoseLattice{{-1e9, 1e9, 5}, {-1e9, 1e9, 3}, {1e9 - 6.0, 1e9, 3}, {1e9, -1e9}}}) {
         expect_numbers(device, objects, lattice, all_touches(usual));
         expect_numbers(device, objects, lattice, all_touches(far));
       }
