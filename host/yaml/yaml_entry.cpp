@@ -4,8 +4,10 @@
 #include <charconv>
 #include <optional>
 #include <set>
+#include <sstream>
 
 #include <fmt/format.h>
+#include <yaml-cpp/eventhandler.h>
 
 #include "number_text.hpp"
 #include "palpate/error.hpp"
@@ -15,16 +17,43 @@ namespace palpate {
 
 int line_of(const YAML::Mark& mark) { return std::max(mark.line, 0) + 1; }
 
+namespace {
+
+/// Notes where a document begins.
+struct DocumentStart : YAML::EventHandler {
+  void OnDocumentStart(const YAML::Mark& mark) override { at = mark; }
+  void OnDocumentEnd() override {}
+  void OnNull(const YAML::Mark&, YAML::anchor_t) override {}
+  void OnAlias(const YAML::Mark&, YAML::anchor_t) override {}
+  void OnScalar(const YAML::Mark&, const std::string&, YAML::anchor_t,
+                const std::string&) override {}
+  void OnSequenceStart(const YAML::Mark&, const std::string&, YAML::anchor_t,
+                       YAML::EmitterStyle::value) override {}
+  void OnSequenceEnd() override {}
+  void OnMapStart(const YAML::Mark&, const std::string&, YAML::anchor_t,
+                  YAML::EmitterStyle::value) override {}
+  void OnMapEnd() override {}
+
+  YAML::Mark at;
+};
+
+}  // namespace
+
 YAML::Node only_document(std::istream&& yaml, const std::filesystem::path& file) {
-  const std::vector<YAML::Node> documents = YAML::LoadAll(yaml);
-  if (documents.size() > 1) {
+  std::stringstream text;
+  text << yaml.rdbuf();
+  const YAML::Node document = YAML::Load(text.str());
+  // YAML::LoadAll() finds documents without end in some text that is no YAML.
+  DocumentStart second;
+  YAML::Parser parser(text);
+  if (parser.HandleNextDocument(second) && parser.HandleNextDocument(second)) {
     throw Error(
         Fault::input,
         fmt::format("{}: line {}: a second document, of which nothing would be read; leave one, "
                     "without --- after it",
-                    file.string(), line_of(documents[1].Mark())));
+                    file.string(), line_of(second.at)));
   }
-  return documents.empty() ? YAML::Node() : documents.front();
+  return document;
 }
 
 void YamlEntry::refuse(std::string_view remedy) const {

@@ -179,7 +179,7 @@ TEST_F(SceneFile, NamesValuesThatItCannotTake) {
 }
 
 TEST_F(SceneFile, HoldsOneDocument) {
-  expect_named(message("ratio: 0.3\n---\nbins: auto"), {"line 3", "second document", "leave one"});
+  expect_named(message("ratio: 0.3\n---\nbins: auto"), {"line 2", "second document", "leave one"});
   EXPECT_EQ(read("---\nratio: 0.3\n...\n").ratio, 0.3);
 }
 

@@ -135,7 +135,7 @@ TEST_F(SensorModelFile, SaysWhatIsWrong) {
   expect_named(input_error([&] { read_sensor_model(path_); }), {"format", "palpate calibrate"});
   put_bytes(path_, "format: palpate.sensor_model\n---\nthreshold: 3\n");
   expect_named(input_error([&] { read_sensor_model(path_); }),
-               {path_.c_str(), "line 3", "second document", "leave one"});
+               {path_.c_str(), "line 2", "second document", "leave one"});
   put_bytes(path_, "a: [\n");
   expect_named(input_error([&] { read_sensor_model(path_); }), {"line", "YAML"});
 }

@@ -114,7 +114,7 @@ TEST_F(ProfileFile, IsRefusedWhereItIsNone) {
   expect_refused("just text", {"line 1", "just text", "give a map"});
   expect_refused("name: [", {"correct the YAML"});
   expect_refused(std::string(head) + packet + "---\nname: other\n",
-                 {"line 5", "second document", "leave one"});
+                 {"line 4", "second document", "leave one"});
   expect_refused("name: own\n", {"'elements' is missing"});
   expect_refused(head, {"'packet' is missing"});
 }
