@@ -8,6 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "palpate/error.hpp"
+#include "reading_learning.hpp"
 #include "simulated_presses.hpp"
 
 namespace palpate {
@@ -217,18 +218,22 @@ TEST(DefaultTables, OfKnownPosesAreOverThePressureAlone) {
 
 TEST(SensorCalibration, TakesTheThresholdAndRatioGiven) {
   const LetterPresses letters = three_letters(5);
-  const auto classifier = [&](SensorCalibrationOptions given) {
-    given.tables = {{MapLayer::log_odds, 2}};
-    given.bins = bins(5, 5, 6);
-    return calibrate_sensor(letters.presses, {}, given).sensor.classifier;
-  };
-  const ContactClassifier both = classifier({.threshold = 1.0, .ratio = 0.2});
+  const ContactClassifier both = calibrate_sensor(letters.presses, {},
+                                                  {.threshold = 1.0,
+                                                   .ratio = 0.2,
+                                                   .tables = {{MapLayer::log_odds, 2}},
+                                                   .bins = bins(5, 5, 6)})
+                                     .sensor.classifier;
   EXPECT_EQ(both.threshold, 1.0);
   EXPECT_EQ(both.ratio, 0.2);
-  const ContactClassifier high = classifier({.threshold = 20.0});
+  const auto classifier = [&](const ReadingOptions& given) {
+    return learn_readings(letters.presses, given).classifier;
+  };
+  const ContactClassifier high = classifier({.threshold = 20.0, .spacing_mm = 1.9});
   EXPECT_EQ(high.threshold, 20.0);
-  EXPECT_NE(high.ratio, classifier({.threshold = 1.0}).ratio) << "of touches that exceed it";
-  EXPECT_EQ(classifier({.ratio = 0.2}).ratio, 0.2);
+  EXPECT_NE(high.ratio, classifier({.threshold = 1.0, .spacing_mm = 1.9}).ratio)
+      << "of touches that exceed it";
+  EXPECT_EQ(classifier({.ratio = 0.2, .spacing_mm = 1.9}).ratio, 0.2);
 }
 
 }  // namespace
