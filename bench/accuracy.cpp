@@ -6,7 +6,7 @@
 
 #include "cases.hpp"
 #include "letters.hpp"
-#include "reference.hpp"
+#include "reference/reference.hpp"
 
 namespace palpate::bench {
 

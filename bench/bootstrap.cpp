@@ -2,7 +2,7 @@
 
 #include <vector>
 
-#include "random.hpp"
+#include "model/random.hpp"
 
 namespace palpate::bench {
 

@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "chart.hpp"
+#include "figures/chart.hpp"
 #include "table.hpp"
 
 namespace palpate::bench {

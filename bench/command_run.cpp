@@ -7,7 +7,7 @@
 #include <fmt/chrono.h>
 #include <fmt/format.h>
 
-#include "command_files.hpp"
+#include "io/command_files.hpp"
 #include "palpate/error.hpp"
 
 namespace palpate::bench {

@@ -9,9 +9,9 @@
 #include <string>
 #include <vector>
 
-#include "atomic_file.hpp"
-#include "chart.hpp"
 #include "commands.hpp"
+#include "figures/chart.hpp"
+#include "io/atomic_file.hpp"
 #include "palpate/device.hpp"
 #include "table.hpp"
 

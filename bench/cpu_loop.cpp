@@ -5,7 +5,7 @@
 #include <cmath>
 #include <thread>
 
-#include "bordered_map.hpp"
+#include "estimation/bordered_map.hpp"
 
 namespace palpate::bench {
 

@@ -3,7 +3,7 @@
 #include <span>
 #include <vector>
 
-#include "contact_evidence.hpp"
+#include "estimation/contact_evidence.hpp"
 #include "palpate/contact_model.hpp"
 #include "palpate/pose_histogram.hpp"
 

@@ -5,7 +5,7 @@
 #include <numeric>
 
 #include "palpate/error.hpp"
-#include "reference.hpp"
+#include "reference/reference.hpp"
 
 namespace palpate::bench {
 

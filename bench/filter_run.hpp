@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "measurement.hpp"
-#include "recognition_record.hpp"
+#include "recognition/recognition_record.hpp"
 #include "trial_errors.hpp"
 
 namespace palpate::bench {

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "palpate/pose_histogram.hpp"
-#include "recognition_record.hpp"
+#include "recognition/recognition_record.hpp"
 
 namespace palpate::bench {
 

@@ -1,6 +1,6 @@
 #include "cases.hpp"
-#include "dense_belief.hpp"
-#include "dense_likelihood.hpp"
+#include "estimation/lattice/dense_belief.hpp"
+#include "estimation/lattice/dense_likelihood.hpp"
 #include "letters.hpp"
 #include "measurement.hpp"
 

@@ -9,8 +9,8 @@
 #include <CLI/CLI.hpp>
 
 #include "commands.hpp"
+#include "io/standard_streams.hpp"
 #include "palpate/error.hpp"
-#include "standard_streams.hpp"
 
 namespace palpate::bench {
 namespace {

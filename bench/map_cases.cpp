@@ -7,7 +7,7 @@
 #include "cases.hpp"
 #include "letters.hpp"
 #include "measurement.hpp"
-#include "reference.hpp"
+#include "reference/reference.hpp"
 
 namespace palpate::bench {
 

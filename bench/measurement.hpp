@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "proportion.hpp"
+#include "recognition/proportion.hpp"
 
 namespace palpate::bench {
 

@@ -2,9 +2,9 @@
 
 #include <benchmark/benchmark.h>
 
-#include "dense_belief.hpp"
-#include "dense_likelihood.hpp"
-#include "evidence_grid.hpp"
+#include "estimation/lattice/dense_belief.hpp"
+#include "estimation/lattice/dense_likelihood.hpp"
+#include "estimation/maps/evidence_grid.hpp"
 #include "letters.hpp"
 
 namespace palpate::bench {

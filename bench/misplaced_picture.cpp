@@ -8,7 +8,7 @@
 #include <fmt/format.h>
 #include <glm/mat2x2.hpp>
 
-#include "axes.hpp"
+#include "figures/axes.hpp"
 #include "judged_belief.hpp"
 #include "letters.hpp"
 #include "palpate/pose_error.hpp"

@@ -2,11 +2,11 @@
 
 #include <bit>
 
-#include "bordered_map.hpp"
-#include "contact_evidence.hpp"
+#include "estimation/bordered_map.hpp"
+#include "estimation/contact_evidence.hpp"
+#include "estimation/two_float.hpp"
 #include "one_bin.hpp"
 #include "one_bin_push.h"
-#include "two_float.hpp"
 
 namespace palpate::bench {
 

@@ -3,7 +3,7 @@
 #include <span>
 #include <vector>
 
-#include "command_stream.hpp"
+#include "gpu/command_stream.hpp"
 #include "palpate/contact_model.hpp"
 #include "palpate/pose_histogram.hpp"
 

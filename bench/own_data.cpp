@@ -5,12 +5,12 @@
 
 #include <fmt/format.h>
 
-#include "input_file.hpp"
-#include "input_reading.hpp"
+#include "cli/batch/input_reading.hpp"
+#include "cli/recognition_flags.hpp"
+#include "cli/recordings.hpp"
+#include "io/input_file.hpp"
 #include "letters.hpp"
 #include "palpate/balanced_lattice.hpp"
-#include "recognition_flags.hpp"
-#include "recordings.hpp"
 
 namespace palpate::bench {
 

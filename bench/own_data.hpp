@@ -6,7 +6,7 @@
 
 #include "commands.hpp"
 #include "palpate/device.hpp"
-#include "recognition_record.hpp"
+#include "recognition/recognition_record.hpp"
 
 namespace palpate::bench {
 

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "chart.hpp"
+#include "figures/chart.hpp"
 #include "own_data.hpp"
 #include "table.hpp"
 #include "trial_errors.hpp"

@@ -8,7 +8,7 @@
 #include "palpate/lattice.hpp"
 #include "palpate/pose_error.hpp"
 #include "palpate/touch.hpp"
-#include "recognition_record.hpp"
+#include "recognition/recognition_record.hpp"
 
 namespace palpate::bench {
 

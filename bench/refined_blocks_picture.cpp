@@ -9,9 +9,9 @@
 
 #include <fmt/format.h>
 
-#include "axes.hpp"
+#include "figures/axes.hpp"
+#include "figures/map_layer.hpp"
 #include "letters.hpp"
-#include "map_layer.hpp"
 #include "table.hpp"
 
 namespace palpate::bench {

@@ -1,7 +1,7 @@
 #include "slip_run.hpp"
 
+#include "model/random.hpp"
 #include "palpate/pose_error.hpp"
-#include "random.hpp"
 
 namespace palpate::bench {
 

@@ -6,7 +6,7 @@
 #include "bounded_answers.hpp"
 #include "dense_posterior.hpp"
 #include "letters.hpp"
-#include "recognition_task.hpp"
+#include "recognition/recognition_task.hpp"
 #include "sweep_document.hpp"
 #include "sweep_measurements.hpp"
 

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "chart.hpp"
+#include "figures/chart.hpp"
 #include "table.hpp"
 
 namespace palpate::bench {

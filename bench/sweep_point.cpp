@@ -5,7 +5,7 @@
 #include "accuracy.hpp"
 #include "filter_run.hpp"
 #include "pose_window.hpp"
-#include "reference.hpp"
+#include "reference/reference.hpp"
 #include "sweep_document.hpp"
 #include "sweep_measurements.hpp"
 

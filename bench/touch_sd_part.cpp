@@ -6,7 +6,7 @@
 
 #include "beliefs_parts.hpp"
 #include "measurement.hpp"
-#include "touch_sd_fit.hpp"
+#include "recognition/touch_sd_fit.hpp"
 #include "trials.hpp"
 
 namespace palpate::bench {

@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "recognition_record.hpp"
+#include "recognition/recognition_record.hpp"
 
 namespace palpate::bench {
 

@@ -5,9 +5,9 @@
 
 #include <fmt/format.h>
 
+#include "model/random.hpp"
 #include "palpate/error.hpp"
 #include "palpate/simulation.hpp"
-#include "random.hpp"
 
 namespace palpate::bench {
 

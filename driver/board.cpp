@@ -1,12 +1,12 @@
-#include "board.hpp"
+#include "driver/board.hpp"
 
 #include <algorithm>
 
 #include <fmt/format.h>
 
+#include "driver/serial_board.hpp"
+#include "driver/takktile_board.hpp"
 #include "palpate/error.hpp"
-#include "serial_board.hpp"
-#include "takktile_board.hpp"
 
 namespace palpate {
 

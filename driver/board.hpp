@@ -6,10 +6,10 @@
 #include <string>
 #include <vector>
 
-#include "deframer.hpp"
+#include "driver/deframer.hpp"
+#include "driver/transfer_ring.hpp"
+#include "driver/usb_handle.hpp"
 #include "palpate/sensor.hpp"
-#include "transfer_ring.hpp"
-#include "usb_handle.hpp"
 
 namespace palpate {
 

@@ -1,4 +1,4 @@
-#include "board_choice.hpp"
+#include "driver/board_choice.hpp"
 
 #include <algorithm>
 #include <iterator>

@@ -3,8 +3,8 @@
 #include <string>
 #include <vector>
 
-#include "board.hpp"
-#include "usb_device.hpp"
+#include "driver/board.hpp"
+#include "driver/usb_device.hpp"
 
 namespace palpate {
 

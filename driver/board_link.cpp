@@ -1,4 +1,4 @@
-#include "board_link.hpp"
+#include "driver/board_link.hpp"
 
 #include <utility>
 

@@ -2,11 +2,11 @@
 
 #include <optional>
 
-#include "board.hpp"
+#include "driver/board.hpp"
+#include "driver/transfer_ring.hpp"
+#include "driver/usb_device.hpp"
+#include "driver/usb_handle.hpp"
 #include "palpate/sensor.hpp"
-#include "transfer_ring.hpp"
-#include "usb_device.hpp"
-#include "usb_handle.hpp"
 
 namespace palpate {
 

@@ -1,4 +1,4 @@
-#include "data_folder.hpp"
+#include "driver/data_folder.hpp"
 
 #include <dlfcn.h>
 #include <link.h>

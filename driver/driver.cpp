@@ -2,15 +2,15 @@
 
 #include <algorithm>
 
-#include "board.hpp"
-#include "board_choice.hpp"
+#include "driver/board.hpp"
+#include "driver/board_choice.hpp"
+#include "driver/serial_profile.hpp"
+#include "driver/takktile_board.hpp"
+#include "driver/usb_device.hpp"
+#include "driver/usb_fault.hpp"
+#include "driver/usb_handle.hpp"
+#include "driver/usb_sensor.hpp"
 #include "palpate/error.hpp"
-#include "serial_profile.hpp"
-#include "takktile_board.hpp"
-#include "usb_device.hpp"
-#include "usb_fault.hpp"
-#include "usb_handle.hpp"
-#include "usb_sensor.hpp"
 
 namespace palpate {
 

@@ -1,4 +1,4 @@
-#include "frame_queue.hpp"
+#include "driver/frame_queue.hpp"
 
 #include <algorithm>
 #include <utility>

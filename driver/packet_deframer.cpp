@@ -1,4 +1,4 @@
-#include "packet_deframer.hpp"
+#include "driver/packet_deframer.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -6,8 +6,8 @@
 #include <span>
 #include <vector>
 
-#include "deframer.hpp"
-#include "packet_format.hpp"
+#include "driver/deframer.hpp"
+#include "driver/packet_format.hpp"
 
 namespace palpate {
 

@@ -1,4 +1,4 @@
-#include "packet_format.hpp"
+#include "driver/packet_format.hpp"
 
 #include <bit>
 #include <type_traits>

@@ -7,7 +7,7 @@
 #include <variant>
 #include <vector>
 
-#include "checksum.hpp"
+#include "driver/checksum.hpp"
 
 namespace palpate {
 

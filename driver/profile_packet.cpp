@@ -1,4 +1,4 @@
-#include "profile_packet.hpp"
+#include "driver/profile_packet.hpp"
 
 #include <algorithm>
 #include <charconv>

@@ -7,8 +7,8 @@
 #include <string_view>
 #include <vector>
 
-#include "packet_format.hpp"
-#include "yaml_entry.hpp"
+#include "driver/packet_format.hpp"
+#include "yaml/yaml_entry.hpp"
 
 namespace palpate {
 

@@ -1,4 +1,4 @@
-#include "serial_board.hpp"
+#include "driver/serial_board.hpp"
 
 #include <algorithm>
 #include <array>
@@ -7,8 +7,8 @@
 
 #include <fmt/format.h>
 
+#include "driver/usb_interfaces.hpp"
 #include "palpate/error.hpp"
-#include "usb_interfaces.hpp"
 
 namespace palpate {
 

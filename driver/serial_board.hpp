@@ -4,8 +4,8 @@
 #include <optional>
 #include <string>
 
-#include "board.hpp"
-#include "serial_profile.hpp"
+#include "driver/board.hpp"
+#include "driver/serial_profile.hpp"
 
 namespace palpate {
 

@@ -1,4 +1,4 @@
-#include "serial_profile.hpp"
+#include "driver/serial_profile.hpp"
 
 #include <algorithm>
 #include <fstream>
@@ -9,10 +9,10 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include "data_folder.hpp"
-#include "packet_deframer.hpp"
+#include "driver/data_folder.hpp"
+#include "driver/packet_deframer.hpp"
+#include "driver/profile_packet.hpp"
 #include "palpate/error.hpp"
-#include "profile_packet.hpp"
 
 namespace palpate {
 

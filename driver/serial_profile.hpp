@@ -8,8 +8,8 @@
 
 #include <glm/vec2.hpp>
 
-#include "deframer.hpp"
-#include "packet_format.hpp"
+#include "driver/deframer.hpp"
+#include "driver/packet_format.hpp"
 
 namespace palpate {
 

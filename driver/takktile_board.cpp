@@ -1,9 +1,9 @@
-#include "takktile_board.hpp"
+#include "driver/takktile_board.hpp"
 
 #include <algorithm>
 #include <span>
 
-#include "usb_interfaces.hpp"
+#include "driver/usb_interfaces.hpp"
 
 namespace palpate {
 

@@ -4,8 +4,8 @@
 #include <string>
 #include <vector>
 
-#include "board.hpp"
-#include "takktile_protocol.hpp"
+#include "driver/board.hpp"
+#include "driver/takktile_protocol.hpp"
 
 namespace palpate {
 

@@ -1,4 +1,4 @@
-#include "takktile_protocol.hpp"
+#include "driver/takktile_protocol.hpp"
 
 #include <algorithm>
 #include <utility>

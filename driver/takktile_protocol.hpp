@@ -8,7 +8,7 @@
 
 #include <glm/vec2.hpp>
 
-#include "deframer.hpp"
+#include "driver/deframer.hpp"
 
 namespace palpate::takktile {
 

@@ -1,11 +1,11 @@
-#include "transfer_ring.hpp"
+#include "driver/transfer_ring.hpp"
 
 #include <algorithm>
 #include <chrono>
 #include <new>
 #include <utility>
 
-#include "usb_fault.hpp"
+#include "driver/usb_fault.hpp"
 
 namespace palpate {
 

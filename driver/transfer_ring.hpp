@@ -5,7 +5,7 @@
 #include <memory>
 #include <vector>
 
-#include "usb_handle.hpp"
+#include "driver/usb_handle.hpp"
 
 namespace palpate {
 

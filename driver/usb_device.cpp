@@ -1,4 +1,4 @@
-#include "usb_device.hpp"
+#include "driver/usb_device.hpp"
 
 #include <algorithm>
 #include <array>

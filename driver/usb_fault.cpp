@@ -1,4 +1,4 @@
-#include "usb_fault.hpp"
+#include "driver/usb_fault.hpp"
 
 #include <unistd.h>
 
@@ -9,7 +9,7 @@
 
 #include <fmt/format.h>
 
-#include "data_folder.hpp"
+#include "driver/data_folder.hpp"
 
 namespace palpate {
 

@@ -2,8 +2,8 @@
 
 #include <string>
 
+#include "driver/usb_device.hpp"
 #include "palpate/error.hpp"
-#include "usb_device.hpp"
 
 namespace palpate {
 

@@ -1,10 +1,10 @@
-#include "usb_handle.hpp"
+#include "driver/usb_handle.hpp"
 
 #include <utility>
 
 #include <fmt/format.h>
 
-#include "usb_fault.hpp"
+#include "driver/usb_fault.hpp"
 
 namespace palpate {
 

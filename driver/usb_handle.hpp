@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "usb_device.hpp"
+#include "driver/usb_device.hpp"
 
 namespace palpate {
 

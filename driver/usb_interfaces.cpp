@@ -1,4 +1,4 @@
-#include "usb_interfaces.hpp"
+#include "driver/usb_interfaces.hpp"
 
 #include <algorithm>
 #include <memory>
@@ -7,7 +7,7 @@
 
 #include <fmt/format.h>
 
-#include "usb_fault.hpp"
+#include "driver/usb_fault.hpp"
 
 namespace palpate {
 

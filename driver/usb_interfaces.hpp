@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <optional>
 
-#include "usb_device.hpp"
+#include "driver/usb_device.hpp"
 
 namespace palpate {
 

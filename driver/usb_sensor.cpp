@@ -1,4 +1,4 @@
-#include "usb_sensor.hpp"
+#include "driver/usb_sensor.hpp"
 
 #include <algorithm>
 #include <exception>
@@ -6,7 +6,7 @@
 
 #include <fmt/format.h>
 
-#include "board_choice.hpp"
+#include "driver/board_choice.hpp"
 #include "palpate/error.hpp"
 
 namespace palpate {

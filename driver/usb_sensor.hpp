@@ -10,12 +10,12 @@
 #include <thread>
 #include <vector>
 
-#include "board.hpp"
-#include "board_link.hpp"
-#include "frame_queue.hpp"
+#include "driver/board.hpp"
+#include "driver/board_link.hpp"
+#include "driver/frame_queue.hpp"
+#include "driver/transfer_ring.hpp"
+#include "driver/usb_device.hpp"
 #include "palpate/sensor.hpp"
-#include "transfer_ring.hpp"
-#include "usb_device.hpp"
 
 namespace palpate {
 

@@ -1,4 +1,4 @@
-#include "array_picture.hpp"
+#include "cli/array_picture.hpp"
 
 #include <algorithm>
 #include <cmath>

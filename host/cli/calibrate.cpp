@@ -1,4 +1,4 @@
-#include "commands.hpp"
+#include "cli/commands.hpp"
 
 #include <unistd.h>
 
@@ -11,17 +11,17 @@
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
-#include "calibrate_output.hpp"
-#include "command_files.hpp"
-#include "map_files.hpp"
-#include "options.hpp"
+#include "cli/calibrate_output.hpp"
+#include "cli/map_files.hpp"
+#include "cli/options.hpp"
+#include "cli/progress.hpp"
+#include "cli/recognition_flags.hpp"
+#include "cli/recordings.hpp"
+#include "cli/terminal.hpp"
+#include "io/command_files.hpp"
+#include "learning/sensor_calibration.hpp"
+#include "learning/touch_sd_learning.hpp"
 #include "palpate/files.hpp"
-#include "progress.hpp"
-#include "recognition_flags.hpp"
-#include "recordings.hpp"
-#include "sensor_calibration.hpp"
-#include "terminal.hpp"
-#include "touch_sd_learning.hpp"
 
 namespace palpate::cli {
 

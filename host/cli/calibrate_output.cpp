@@ -1,16 +1,16 @@
-#include "calibrate_output.hpp"
+#include "cli/calibrate_output.hpp"
 
 #include <cmath>
 #include <vector>
 
 #include <fmt/format.h>
 
-#include "chart.hpp"
-#include "evaluate_output.hpp"
-#include "level_counts.hpp"
-#include "options.hpp"
-#include "palette.hpp"
-#include "text_table.hpp"
+#include "cli/evaluate_output.hpp"
+#include "cli/options.hpp"
+#include "cli/text_table.hpp"
+#include "figures/chart.hpp"
+#include "figures/palette.hpp"
+#include "learning/level_counts.hpp"
 
 namespace palpate::cli {
 

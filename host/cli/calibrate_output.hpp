@@ -4,8 +4,8 @@
 #include <optional>
 #include <string>
 
-#include "reliability_figure.hpp"
-#include "sensor_calibration.hpp"
+#include "figures/reliability_figure.hpp"
+#include "learning/sensor_calibration.hpp"
 
 namespace palpate::cli {
 

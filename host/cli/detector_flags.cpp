@@ -1,8 +1,8 @@
-#include "detector_flags.hpp"
+#include "cli/detector_flags.hpp"
 
 #include <CLI/CLI.hpp>
 
-#include "input_file.hpp"
+#include "io/input_file.hpp"
 
 namespace palpate::cli {
 

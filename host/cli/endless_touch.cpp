@@ -1,8 +1,8 @@
-#include "endless_touch.hpp"
+#include "cli/endless_touch.hpp"
 
 #include <fmt/format.h>
 
-#include "elements_that.hpp"
+#include "model/elements_that.hpp"
 
 namespace palpate::cli {
 

@@ -4,8 +4,8 @@
 #include <string>
 #include <vector>
 
+#include "model/stream_time.hpp"
 #include "palpate/touch_detector.hpp"
-#include "stream_time.hpp"
 
 namespace palpate::cli {
 

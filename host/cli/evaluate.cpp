@@ -1,4 +1,4 @@
-#include "commands.hpp"
+#include "cli/commands.hpp"
 
 #include <unistd.h>
 
@@ -10,14 +10,14 @@
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
-#include "batch_task.hpp"
-#include "command_files.hpp"
-#include "evaluate_output.hpp"
-#include "options.hpp"
-#include "recognition_flags.hpp"
-#include "results_file.hpp"
-#include "results_folder.hpp"
-#include "terminal.hpp"
+#include "cli/batch/batch_task.hpp"
+#include "cli/batch/results_folder.hpp"
+#include "cli/evaluate_output.hpp"
+#include "cli/options.hpp"
+#include "cli/recognition_flags.hpp"
+#include "cli/results_file.hpp"
+#include "cli/terminal.hpp"
+#include "io/command_files.hpp"
 
 namespace palpate::cli {
 

@@ -1,4 +1,4 @@
-#include "evaluate_output.hpp"
+#include "cli/evaluate_output.hpp"
 
 #include <algorithm>
 #include <utility>
@@ -6,8 +6,8 @@
 
 #include <fmt/format.h>
 
+#include "cli/text_table.hpp"
 #include "palpate/occupancy_grid.hpp"
-#include "text_table.hpp"
 
 namespace palpate::cli {
 

@@ -6,9 +6,9 @@
 
 #include <nlohmann/json.hpp>
 
-#include "confusion_figure.hpp"
-#include "evaluation.hpp"
-#include "reliability_figure.hpp"
+#include "figures/confusion_figure.hpp"
+#include "figures/reliability_figure.hpp"
+#include "recognition/evaluation.hpp"
 
 namespace palpate::cli {
 

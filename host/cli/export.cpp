@@ -7,11 +7,11 @@
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
-#include "command_files.hpp"
-#include "commands.hpp"
-#include "options.hpp"
+#include "cli/commands.hpp"
+#include "cli/options.hpp"
+#include "io/command_files.hpp"
+#include "io/recording_tables.hpp"
 #include "palpate/files.hpp"
-#include "recording_tables.hpp"
 
 namespace palpate::cli {
 

@@ -1,4 +1,4 @@
-#include "filter_flags.hpp"
+#include "cli/filter_flags.hpp"
 
 #include <utility>
 #include <vector>
@@ -7,9 +7,9 @@
 #include <fmt/ranges.h>
 #include <CLI/CLI.hpp>
 
-#include "options.hpp"
-#include "recognition_flags.hpp"
-#include "sensor_model_flag.hpp"
+#include "cli/options.hpp"
+#include "cli/recognition_flags.hpp"
+#include "cli/sensor_model_flag.hpp"
 
 namespace palpate::cli {
 

@@ -6,7 +6,7 @@
 #include <string>
 
 #include "palpate/scene.hpp"
-#include "recogniser.hpp"
+#include "recognition/recogniser.hpp"
 
 namespace CLI {
 class App;

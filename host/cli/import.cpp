@@ -7,15 +7,15 @@
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
-#include "array_table.hpp"
-#include "command_files.hpp"
-#include "commands.hpp"
-#include "imported_recording.hpp"
-#include "number_text.hpp"
-#include "options.hpp"
+#include "cli/commands.hpp"
+#include "cli/imported_recording.hpp"
+#include "cli/options.hpp"
+#include "io/array_table.hpp"
+#include "io/command_files.hpp"
+#include "io/recording_rules.hpp"
+#include "model/number_text.hpp"
 #include "palpate/files.hpp"
 #include "palpate/pose_track.hpp"
-#include "recording_rules.hpp"
 
 namespace palpate::cli {
 

@@ -1,4 +1,4 @@
-#include "imported_recording.hpp"
+#include "cli/imported_recording.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -9,12 +9,12 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include "file_identity.hpp"
-#include "npy_file.hpp"
-#include "options.hpp"
-#include "pose_table.hpp"
-#include "pressure_table.hpp"
-#include "recording_rules.hpp"
+#include "cli/options.hpp"
+#include "io/file_identity.hpp"
+#include "io/npy_file.hpp"
+#include "io/pose_table.hpp"
+#include "io/pressure_table.hpp"
+#include "io/recording_rules.hpp"
 
 namespace palpate::cli {
 

@@ -5,10 +5,10 @@
 #include <optional>
 #include <string>
 
-#include "array_table.hpp"
+#include "io/array_table.hpp"
+#include "io/table_columns.hpp"
 #include "palpate/pose_track.hpp"
 #include "palpate/touch.hpp"
-#include "table_columns.hpp"
 
 namespace palpate::cli {
 

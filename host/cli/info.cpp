@@ -1,4 +1,4 @@
-#include "commands.hpp"
+#include "cli/commands.hpp"
 
 #include <algorithm>
 #include <filesystem>
@@ -9,14 +9,14 @@
 #include <fmt/ranges.h>
 #include <CLI/CLI.hpp>
 
-#include "file_summary.hpp"
-#include "options.hpp"
+#include "cli/options.hpp"
+#include "cli/sensor_model_text.hpp"
+#include "io/file_summary.hpp"
+#include "io/recording_state.hpp"
+#include "io/recording_survey.hpp"
+#include "io/recording_suspicions.hpp"
 #include "palpate/files.hpp"
 #include "palpate/learned_sensor.hpp"
-#include "recording_state.hpp"
-#include "recording_survey.hpp"
-#include "recording_suspicions.hpp"
-#include "sensor_model_text.hpp"
 
 namespace palpate::cli {
 

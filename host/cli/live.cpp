@@ -11,20 +11,20 @@
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
-#include "command_files.hpp"
-#include "commands.hpp"
-#include "detector_flags.hpp"
-#include "interruption.hpp"
-#include "live_recognition.hpp"
-#include "live_record.hpp"
-#include "live_screen.hpp"
-#include "options.hpp"
+#include "cli/commands.hpp"
+#include "cli/detector_flags.hpp"
+#include "cli/interruption.hpp"
+#include "cli/live_record.hpp"
+#include "cli/live_screen.hpp"
+#include "cli/options.hpp"
+#include "cli/planned_touch.hpp"
+#include "cli/recognition_flags.hpp"
+#include "cli/record_output.hpp"
+#include "cli/sensor_option.hpp"
+#include "io/command_files.hpp"
 #include "palpate/pose_track.hpp"
 #include "palpate/virtual_sensor.hpp"
-#include "planned_touch.hpp"
-#include "recognition_flags.hpp"
-#include "record_output.hpp"
-#include "sensor_option.hpp"
+#include "recognition/live_recognition.hpp"
 
 namespace palpate::cli {
 

@@ -1,4 +1,4 @@
-#include "live_record.hpp"
+#include "cli/live_record.hpp"
 
 #include <algorithm>
 #include <cerrno>
@@ -6,12 +6,12 @@
 
 #include <fmt/format.h>
 
-#include "options.hpp"
+#include "cli/options.hpp"
+#include "cli/planned_touch.hpp"
+#include "cli/record_output.hpp"
+#include "cli/step_words.hpp"
+#include "model/printable.hpp"
 #include "palpate/error.hpp"
-#include "planned_touch.hpp"
-#include "printable.hpp"
-#include "record_output.hpp"
-#include "step_words.hpp"
 
 namespace palpate::cli {
 

@@ -4,7 +4,7 @@
 #include <memory>
 #include <string>
 
-#include "live_recognition.hpp"
+#include "recognition/live_recognition.hpp"
 
 namespace palpate::cli {
 

@@ -1,4 +1,4 @@
-#include "live_screen.hpp"
+#include "cli/live_screen.hpp"
 
 #include <unistd.h>
 
@@ -7,9 +7,9 @@
 
 #include <fmt/format.h>
 
-#include "evidence_scale.hpp"
-#include "planned_touch.hpp"
-#include "step_words.hpp"
+#include "cli/planned_touch.hpp"
+#include "cli/step_words.hpp"
+#include "figures/evidence_scale.hpp"
 
 namespace palpate::cli {
 

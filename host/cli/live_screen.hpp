@@ -5,9 +5,9 @@
 #include <optional>
 #include <vector>
 
-#include "live_recognition.hpp"
-#include "live_view.hpp"
-#include "terminal.hpp"
+#include "cli/live_view.hpp"
+#include "cli/terminal.hpp"
+#include "recognition/live_recognition.hpp"
 
 namespace palpate::cli {
 

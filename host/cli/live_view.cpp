@@ -1,4 +1,4 @@
-#include "live_view.hpp"
+#include "cli/live_view.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -6,9 +6,9 @@
 
 #include <fmt/format.h>
 
-#include "array_picture.hpp"
-#include "evidence_scale.hpp"
-#include "text_table.hpp"
+#include "cli/array_picture.hpp"
+#include "cli/text_table.hpp"
+#include "figures/evidence_scale.hpp"
 
 namespace palpate::cli {
 

@@ -7,10 +7,10 @@
 
 #include <glm/vec2.hpp>
 
+#include "cli/terminal_canvas.hpp"
 #include "palpate/contact.hpp"
 #include "palpate/occupancy_grid.hpp"
 #include "palpate/pose.hpp"
-#include "terminal_canvas.hpp"
 
 namespace palpate::cli {
 

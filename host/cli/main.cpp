@@ -8,11 +8,11 @@
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
-#include "commands.hpp"
-#include "hdf5_process.hpp"
-#include "own_font.hpp"
+#include "cli/commands.hpp"
+#include "cli/own_font.hpp"
+#include "io/hdf5_process.hpp"
+#include "io/standard_streams.hpp"
 #include "palpate/error.hpp"
-#include "standard_streams.hpp"
 
 namespace {
 

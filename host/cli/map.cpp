@@ -1,4 +1,4 @@
-#include "commands.hpp"
+#include "cli/commands.hpp"
 
 #include <algorithm>
 #include <filesystem>
@@ -11,15 +11,15 @@
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
-#include "figures.hpp"
-#include "map_flags.hpp"
-#include "observed_map.hpp"
-#include "options.hpp"
+#include "cli/map_flags.hpp"
+#include "cli/options.hpp"
+#include "cli/progress.hpp"
+#include "cli/recordings.hpp"
+#include "figures/figures.hpp"
+#include "learning/observed_map.hpp"
 #include "palpate/files.hpp"
 #include "palpate/map_builder.hpp"
 #include "palpate/rotational_symmetry.hpp"
-#include "progress.hpp"
-#include "recordings.hpp"
 
 namespace palpate::cli {
 

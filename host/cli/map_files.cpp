@@ -1,9 +1,9 @@
-#include "map_files.hpp"
+#include "cli/map_files.hpp"
 
 #include <algorithm>
 #include <system_error>
 
-#include "input_file.hpp"
+#include "io/input_file.hpp"
 #include "palpate/files.hpp"
 
 namespace palpate::cli {

@@ -1,14 +1,14 @@
-#include "map_flags.hpp"
+#include "cli/map_flags.hpp"
 
 #include <map>
 
 #include <CLI/CLI.hpp>
 
-#include "command_files.hpp"
-#include "number_text.hpp"
-#include "options.hpp"
-#include "printable.hpp"
-#include "recordings.hpp"
+#include "cli/options.hpp"
+#include "cli/recordings.hpp"
+#include "io/command_files.hpp"
+#include "model/number_text.hpp"
+#include "model/printable.hpp"
 
 namespace palpate::cli {
 

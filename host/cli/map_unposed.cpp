@@ -8,15 +8,15 @@
 
 #include <fmt/format.h>
 
-#include "contact_learning.hpp"
-#include "map_flags.hpp"
-#include "options.hpp"
+#include "cli/map_flags.hpp"
+#include "cli/options.hpp"
+#include "cli/progress.hpp"
+#include "cli/recordings.hpp"
+#include "figures/presses_figure.hpp"
+#include "learning/contact_learning.hpp"
+#include "learning/unposed_maps.hpp"
 #include "palpate/files.hpp"
 #include "palpate/rotational_symmetry.hpp"
-#include "presses_figure.hpp"
-#include "progress.hpp"
-#include "recordings.hpp"
-#include "unposed_maps.hpp"
 
 namespace palpate::cli {
 

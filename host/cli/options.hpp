@@ -6,8 +6,8 @@
 #include <string>
 #include <string_view>
 
-#include "atomic_file.hpp"
-#include "input_file.hpp"
+#include "io/atomic_file.hpp"
+#include "io/input_file.hpp"
 #include "palpate/pose.hpp"
 
 namespace palpate::cli {

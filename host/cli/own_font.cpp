@@ -1,4 +1,4 @@
-#include "own_font.hpp"
+#include "cli/own_font.hpp"
 
 #include <cstdlib>
 #include <filesystem>

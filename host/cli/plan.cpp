@@ -11,18 +11,18 @@
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
-#include "command_files.hpp"
-#include "commands.hpp"
-#include "label_probability.hpp"
-#include "options.hpp"
+#include "cli/commands.hpp"
+#include "cli/options.hpp"
+#include "cli/plan_output.hpp"
+#include "cli/planned_touch.hpp"
+#include "cli/recognition_flags.hpp"
+#include "cli/record_output.hpp"
+#include "cli/recordings.hpp"
+#include "cli/terminal.hpp"
+#include "io/command_files.hpp"
+#include "io/pose_table.hpp"
 #include "palpate/files.hpp"
-#include "plan_output.hpp"
-#include "planned_touch.hpp"
-#include "pose_table.hpp"
-#include "recognition_flags.hpp"
-#include "record_output.hpp"
-#include "recordings.hpp"
-#include "terminal.hpp"
+#include "recognition/label_probability.hpp"
 
 namespace palpate::cli {
 

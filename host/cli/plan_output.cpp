@@ -1,4 +1,4 @@
-#include "plan_output.hpp"
+#include "cli/plan_output.hpp"
 
 #include <algorithm>
 #include <array>
@@ -7,13 +7,13 @@
 
 #include <fmt/format.h>
 
-#include "bounding_box.hpp"
-#include "planned_touch.hpp"
-#include "record_output.hpp"
-#include "record_table.hpp"
-#include "sheet.hpp"
-#include "step_words.hpp"
-#include "text_table.hpp"
+#include "cli/planned_touch.hpp"
+#include "cli/record_output.hpp"
+#include "cli/record_table.hpp"
+#include "cli/sheet.hpp"
+#include "cli/step_words.hpp"
+#include "cli/text_table.hpp"
+#include "model/bounding_box.hpp"
 
 namespace palpate::cli {
 

@@ -8,9 +8,9 @@
 #include <glm/vec2.hpp>
 #include <nlohmann/json.hpp>
 
-#include "plan_figure.hpp"
-#include "recognition_record.hpp"
-#include "touch_plan.hpp"
+#include "figures/plan_figure.hpp"
+#include "recognition/recognition_record.hpp"
+#include "recognition/touch_plan.hpp"
 
 namespace palpate::cli {
 

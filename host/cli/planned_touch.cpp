@@ -1,9 +1,9 @@
-#include "planned_touch.hpp"
+#include "cli/planned_touch.hpp"
 
 #include <fmt/format.h>
 
-#include "options.hpp"
-#include "step_words.hpp"
+#include "cli/options.hpp"
+#include "cli/step_words.hpp"
 
 namespace palpate::cli {
 

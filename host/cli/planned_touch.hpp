@@ -4,7 +4,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "touch_plan.hpp"
+#include "recognition/touch_plan.hpp"
 
 namespace palpate::cli {
 

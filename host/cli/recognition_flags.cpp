@@ -1,8 +1,8 @@
-#include "recognition_flags.hpp"
+#include "cli/recognition_flags.hpp"
 
 #include <CLI/CLI.hpp>
 
-#include "options.hpp"
+#include "cli/options.hpp"
 
 namespace palpate::cli {
 

@@ -5,11 +5,11 @@
 #include <string>
 #include <vector>
 
-#include "command_files.hpp"
-#include "filter_flags.hpp"
+#include "cli/filter_flags.hpp"
+#include "cli/uncertainty_flags.hpp"
+#include "io/command_files.hpp"
 #include "palpate/scene.hpp"
-#include "recogniser.hpp"
-#include "uncertainty_flags.hpp"
+#include "recognition/recogniser.hpp"
 
 namespace CLI {
 class App;

@@ -1,4 +1,4 @@
-#include "commands.hpp"
+#include "cli/commands.hpp"
 
 #include <unistd.h>
 
@@ -14,19 +14,19 @@
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
-#include "atomic_file.hpp"
-#include "command_files.hpp"
-#include "options.hpp"
+#include "cli/options.hpp"
+#include "cli/progress.hpp"
+#include "cli/recognition_flags.hpp"
+#include "cli/record_output.hpp"
+#include "cli/record_table.hpp"
+#include "cli/recordings.hpp"
+#include "cli/sheet.hpp"
+#include "cli/terminal.hpp"
+#include "cli/touch_sd_output.hpp"
+#include "cli/unknowns.hpp"
+#include "io/atomic_file.hpp"
+#include "io/command_files.hpp"
 #include "palpate/files.hpp"
-#include "progress.hpp"
-#include "recognition_flags.hpp"
-#include "record_output.hpp"
-#include "record_table.hpp"
-#include "recordings.hpp"
-#include "sheet.hpp"
-#include "terminal.hpp"
-#include "touch_sd_output.hpp"
-#include "unknowns.hpp"
 
 namespace palpate::cli {
 

@@ -7,20 +7,20 @@
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
-#include "atomic_file.hpp"
-#include "command_files.hpp"
-#include "commands.hpp"
-#include "interruption.hpp"
-#include "options.hpp"
+#include "cli/commands.hpp"
+#include "cli/interruption.hpp"
+#include "cli/options.hpp"
+#include "cli/sensor_option.hpp"
+#include "io/atomic_file.hpp"
+#include "io/command_files.hpp"
+#include "model/printable.hpp"
+#include "model/stream_time.hpp"
 #include "palpate/baseline.hpp"
 #include "palpate/error.hpp"
 #include "palpate/frame_recorder.hpp"
 #include "palpate/pose_track.hpp"
 #include "palpate/touch_detector.hpp"
 #include "palpate/virtual_sensor.hpp"
-#include "printable.hpp"
-#include "sensor_option.hpp"
-#include "stream_time.hpp"
 
 namespace palpate::cli {
 

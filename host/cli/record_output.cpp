@@ -1,4 +1,4 @@
-#include "record_output.hpp"
+#include "cli/record_output.hpp"
 
 #include <algorithm>
 #include <numbers>
@@ -6,8 +6,8 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include "options.hpp"
-#include "step_words.hpp"
+#include "cli/options.hpp"
+#include "cli/step_words.hpp"
 
 namespace palpate::cli {
 

@@ -5,7 +5,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "recognition_record.hpp"
+#include "recognition/recognition_record.hpp"
 
 namespace palpate::cli {
 

@@ -1,4 +1,4 @@
-#include "record_table.hpp"
+#include "cli/record_table.hpp"
 
 #include <algorithm>
 #include <filesystem>
@@ -7,9 +7,9 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include "printable.hpp"
-#include "step_words.hpp"
-#include "text_table.hpp"
+#include "cli/step_words.hpp"
+#include "cli/text_table.hpp"
+#include "model/printable.hpp"
 
 namespace palpate::cli {
 

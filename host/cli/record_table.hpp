@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "recognition_record.hpp"
+#include "recognition/recognition_record.hpp"
 
 namespace palpate::cli {
 

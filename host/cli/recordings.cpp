@@ -1,8 +1,8 @@
-#include "recordings.hpp"
+#include "cli/recordings.hpp"
 
 #include <set>
 
-#include "file_identity.hpp"
+#include "io/file_identity.hpp"
 #include "palpate/files.hpp"
 
 namespace palpate::cli {

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "options.hpp"
+#include "cli/options.hpp"
 #include "palpate/contact.hpp"
 #include "palpate/touch.hpp"
 

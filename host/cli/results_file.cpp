@@ -1,4 +1,4 @@
-#include "results_file.hpp"
+#include "cli/results_file.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -12,9 +12,9 @@
 
 #include <nlohmann/json.hpp>
 
-#include "file_identity.hpp"
-#include "input_file.hpp"
-#include "results_folder.hpp"
+#include "cli/batch/results_folder.hpp"
+#include "io/file_identity.hpp"
+#include "io/input_file.hpp"
 
 namespace palpate::cli {
 

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "evaluation.hpp"
+#include "recognition/evaluation.hpp"
 
 namespace palpate::cli {
 

@@ -1,9 +1,9 @@
-#include "sensor_model_flag.hpp"
+#include "cli/sensor_model_flag.hpp"
 
 #include <utility>
 
-#include "input_file.hpp"
-#include "recognition_flags.hpp"
+#include "cli/recognition_flags.hpp"
+#include "io/input_file.hpp"
 
 namespace palpate::cli {
 

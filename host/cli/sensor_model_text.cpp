@@ -1,8 +1,8 @@
-#include "sensor_model_text.hpp"
+#include "cli/sensor_model_text.hpp"
 
 #include <fmt/format.h>
 
-#include "options.hpp"
+#include "cli/options.hpp"
 
 namespace palpate::cli {
 

@@ -1,4 +1,4 @@
-#include "sensor_option.hpp"
+#include "cli/sensor_option.hpp"
 
 #include <utility>
 

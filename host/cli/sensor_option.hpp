@@ -3,7 +3,7 @@
 #include <memory>
 #include <string>
 
-#include "command_files.hpp"
+#include "io/command_files.hpp"
 #include "palpate/pose_track.hpp"
 #include "palpate/sensor.hpp"
 

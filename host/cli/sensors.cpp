@@ -6,9 +6,9 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
-#include "commands.hpp"
+#include "cli/commands.hpp"
+#include "model/printable.hpp"
 #include "palpate/driver.hpp"
-#include "printable.hpp"
 
 namespace palpate::cli {
 

@@ -1,4 +1,4 @@
-#include "sheet.hpp"
+#include "cli/sheet.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -6,9 +6,9 @@
 
 #include <fmt/format.h>
 
-#include "record_table.hpp"
-#include "step_words.hpp"
-#include "text_table.hpp"
+#include "cli/record_table.hpp"
+#include "cli/step_words.hpp"
+#include "cli/text_table.hpp"
 
 namespace palpate::cli {
 

@@ -2,8 +2,8 @@
 
 #include <span>
 
-#include "figures.hpp"
-#include "recognition_record.hpp"
+#include "figures/figures.hpp"
+#include "recognition/recognition_record.hpp"
 
 namespace palpate::cli {
 

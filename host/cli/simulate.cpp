@@ -1,4 +1,4 @@
-#include "commands.hpp"
+#include "cli/commands.hpp"
 
 #include <algorithm>
 #include <charconv>
@@ -10,8 +10,8 @@
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
-#include "command_files.hpp"
-#include "options.hpp"
+#include "cli/options.hpp"
+#include "io/command_files.hpp"
 #include "palpate/files.hpp"
 #include "palpate/simulation.hpp"
 

@@ -1,12 +1,12 @@
-#include "step_words.hpp"
+#include "cli/step_words.hpp"
 
 #include <algorithm>
 #include <cmath>
 
 #include <fmt/format.h>
 
-#include "options.hpp"
-#include "printable.hpp"
+#include "cli/options.hpp"
+#include "model/printable.hpp"
 
 namespace palpate::cli {
 

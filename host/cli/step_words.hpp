@@ -5,7 +5,7 @@
 #include <span>
 #include <string>
 
-#include "recognition_record.hpp"
+#include "recognition/recognition_record.hpp"
 
 // What a step says, in the words and digits that the tables, `live` and the recognition sheet
 // share.

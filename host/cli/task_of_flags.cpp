@@ -1,4 +1,4 @@
-#include "recognition_flags.hpp"
+#include "cli/recognition_flags.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -9,13 +9,13 @@
 
 #include <fmt/format.h>
 
-#include "file_identity.hpp"
-#include "map_files.hpp"
-#include "options.hpp"
+#include "cli/map_files.hpp"
+#include "cli/options.hpp"
+#include "cli/recordings.hpp"
+#include "cli/sensor_model_flag.hpp"
+#include "io/file_identity.hpp"
 #include "palpate/balanced_lattice.hpp"
 #include "palpate/files.hpp"
-#include "recordings.hpp"
-#include "sensor_model_flag.hpp"
 
 namespace palpate::cli {
 

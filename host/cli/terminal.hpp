@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "terminal_canvas.hpp"
+#include "cli/terminal_canvas.hpp"
 
 namespace palpate::cli {
 

@@ -1,4 +1,4 @@
-#include "terminal_canvas.hpp"
+#include "cli/terminal_canvas.hpp"
 
 #include <algorithm>
 #include <array>
@@ -7,7 +7,7 @@
 
 #include <fmt/format.h>
 
-#include "printable.hpp"
+#include "model/printable.hpp"
 
 namespace palpate::cli {
 

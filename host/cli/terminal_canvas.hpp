@@ -4,7 +4,7 @@
 #include <string_view>
 #include <vector>
 
-#include "palette.hpp"
+#include "figures/palette.hpp"
 
 namespace palpate::cli {
 

@@ -1,10 +1,10 @@
-#include "text_table.hpp"
+#include "cli/text_table.hpp"
 
 #include <algorithm>
 #include <numeric>
 #include <utility>
 
-#include "printable.hpp"
+#include "model/printable.hpp"
 
 namespace palpate::cli {
 

@@ -1,11 +1,11 @@
-#include "touch_sd_output.hpp"
+#include "cli/touch_sd_output.hpp"
 
 #include <algorithm>
 
 #include <fmt/format.h>
 
-#include "options.hpp"
-#include "text_table.hpp"
+#include "cli/options.hpp"
+#include "cli/text_table.hpp"
 
 namespace palpate::cli {
 

@@ -7,8 +7,8 @@
 #include <nlohmann/json.hpp>
 
 #include "palpate/touch.hpp"
-#include "recognition_record.hpp"
-#include "touch_sd_fit.hpp"
+#include "recognition/recognition_record.hpp"
+#include "recognition/touch_sd_fit.hpp"
 
 namespace palpate::cli {
 

@@ -8,18 +8,18 @@
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
-#include "command_files.hpp"
-#include "commands.hpp"
-#include "detector_flags.hpp"
-#include "endless_touch.hpp"
-#include "lost_count.hpp"
-#include "options.hpp"
+#include "cli/commands.hpp"
+#include "cli/detector_flags.hpp"
+#include "cli/endless_touch.hpp"
+#include "cli/options.hpp"
+#include "io/command_files.hpp"
+#include "io/recording_state.hpp"
+#include "model/lost_count.hpp"
+#include "model/stream_time.hpp"
 #include "palpate/baseline.hpp"
 #include "palpate/error.hpp"
 #include "palpate/files.hpp"
 #include "palpate/virtual_sensor.hpp"
-#include "recording_state.hpp"
-#include "stream_time.hpp"
 
 namespace palpate::cli {
 

@@ -1,4 +1,4 @@
-#include "uncertainty_flags.hpp"
+#include "cli/uncertainty_flags.hpp"
 
 #include <cmath>
 #include <limits>
@@ -6,9 +6,9 @@
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
-#include "displacement_check.hpp"
-#include "number_text.hpp"
-#include "options.hpp"
+#include "cli/options.hpp"
+#include "estimation/displacement_check.hpp"
+#include "model/number_text.hpp"
 
 namespace palpate::cli {
 

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "palpate/scene.hpp"
-#include "recognition_task.hpp"
+#include "recognition/recognition_task.hpp"
 
 namespace CLI {
 class App;

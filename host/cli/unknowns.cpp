@@ -1,11 +1,11 @@
-#include "unknowns.hpp"
+#include "cli/unknowns.hpp"
 
 #include <algorithm>
 #include <iterator>
 
 #include <CLI/CLI.hpp>
 
-#include "recordings.hpp"
+#include "cli/recordings.hpp"
 
 namespace palpate::cli {
 

@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "options.hpp"
-#include "recognition_record.hpp"
+#include "cli/options.hpp"
+#include "recognition/recognition_record.hpp"
 
 namespace CLI {
 class App;

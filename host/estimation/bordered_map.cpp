@@ -1,9 +1,9 @@
-#include "bordered_map.hpp"
+#include "estimation/bordered_map.hpp"
 
 #include <algorithm>
 #include <cstddef>
 
-#include "contact_evidence.hpp"
+#include "estimation/contact_evidence.hpp"
 
 namespace palpate {
 

@@ -5,10 +5,10 @@
 #include <string_view>
 #include <vector>
 
-#include "command_stream.hpp"
-#include "interface.h"
+#include "gpu/command_stream.hpp"
 #include "palpate/lattice.hpp"
 #include "palpate/occupancy_grid.hpp"
+#include "shaders/interface.h"
 
 namespace palpate {
 

@@ -1,10 +1,10 @@
-#include "contact_evidence.hpp"
+#include "estimation/contact_evidence.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <utility>
 
-#include "contact_readings.hpp"
+#include "model/contact_readings.hpp"
 
 namespace palpate {
 

@@ -6,9 +6,9 @@
 #include <span>
 #include <vector>
 
-#include "interface.h"
 #include "palpate/contact_model.hpp"
 #include "palpate/lattice.hpp"
+#include "shaders/interface.h"
 
 namespace palpate {
 

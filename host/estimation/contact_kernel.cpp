@@ -1,4 +1,4 @@
-#include "contact_kernel.hpp"
+#include "estimation/contact_kernel.hpp"
 
 #include <algorithm>
 #include <bit>
@@ -7,9 +7,9 @@
 
 #include <fmt/format.h>
 
-#include "interface.h"
-#include "kernel_sizes.hpp"
+#include "estimation/kernel_sizes.hpp"
 #include "palpate/error.hpp"
+#include "shaders/interface.h"
 
 namespace palpate {
 

@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "command_stream.hpp"
+#include "gpu/command_stream.hpp"
 #include "palpate/contact_model.hpp"
 
 namespace palpate {

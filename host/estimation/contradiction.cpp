@@ -1,4 +1,4 @@
-#include "contradiction.hpp"
+#include "estimation/contradiction.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "contact_evidence.hpp"
+#include "estimation/contact_evidence.hpp"
 #include "palpate/contact_model.hpp"
 
 namespace palpate {

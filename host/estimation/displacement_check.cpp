@@ -1,4 +1,4 @@
-#include "displacement_check.hpp"
+#include "estimation/displacement_check.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "hypotheses.hpp"
+#include "estimation/hypotheses.hpp"
 
 #include <algorithm>
 #include <cmath>

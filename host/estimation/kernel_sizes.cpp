@@ -1,9 +1,9 @@
-#include "kernel_sizes.hpp"
+#include "estimation/kernel_sizes.hpp"
 
 #include <algorithm>
 #include <bit>
 
-#include "interface.h"
+#include "shaders/interface.h"
 
 namespace palpate {
 

@@ -2,7 +2,7 @@
 
 #include <cstdint>
 
-#include "context.hpp"
+#include "gpu/context.hpp"
 
 namespace palpate {
 

@@ -7,7 +7,7 @@
 
 #include <glm/vec2.hpp>
 
-#include "canvas.hpp"
+#include "figures/canvas.hpp"
 
 namespace palpate {
 

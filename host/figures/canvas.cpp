@@ -1,4 +1,4 @@
-#include "canvas.hpp"
+#include "figures/canvas.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -10,8 +10,8 @@
 #include <cairo-svg.h>
 #include <fmt/format.h>
 
+#include "model/printable.hpp"
 #include "palpate/error.hpp"
-#include "printable.hpp"
 
 namespace palpate {
 

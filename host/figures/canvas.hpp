@@ -9,8 +9,8 @@
 #include <cairo.h>
 #include <glm/vec2.hpp>
 
-#include "palette.hpp"
-#include "picture_format.hpp"
+#include "figures/palette.hpp"
+#include "figures/picture_format.hpp"
 
 namespace palpate {
 

@@ -1,12 +1,12 @@
-#include "chart.hpp"
+#include "figures/chart.hpp"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 
-#include "axes.hpp"
-#include "canvas.hpp"
-#include "chart_axis.hpp"
+#include "figures/axes.hpp"
+#include "figures/canvas.hpp"
+#include "figures/chart_axis.hpp"
 
 namespace palpate {
 

@@ -8,8 +8,8 @@
 
 #include <glm/vec2.hpp>
 
-#include "palette.hpp"
-#include "picture_format.hpp"
+#include "figures/palette.hpp"
+#include "figures/picture_format.hpp"
 
 namespace palpate {
 

@@ -3,8 +3,8 @@
 #include <span>
 #include <vector>
 
-#include "axes.hpp"
-#include "chart.hpp"
+#include "figures/axes.hpp"
+#include "figures/chart.hpp"
 
 namespace palpate {
 

@@ -1,4 +1,4 @@
-#include "confusion_figure.hpp"
+#include "figures/confusion_figure.hpp"
 
 #include <algorithm>
 #include <array>
@@ -7,7 +7,7 @@
 
 #include <fmt/format.h>
 
-#include "axes.hpp"
+#include "figures/axes.hpp"
 #include "palpate/error.hpp"
 
 namespace palpate {

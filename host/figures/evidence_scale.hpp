@@ -4,7 +4,7 @@
 
 #include <glm/vec2.hpp>
 
-#include "palette.hpp"
+#include "figures/palette.hpp"
 #include "palpate/occupancy_grid.hpp"
 
 namespace palpate {

@@ -1,4 +1,4 @@
-#include "footprint.hpp"
+#include "figures/footprint.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "identity_panel.hpp"
+#include "figures/identity_panel.hpp"
 
 #include <algorithm>
 #include <array>
@@ -7,7 +7,7 @@
 
 #include <fmt/format.h>
 
-#include "axes.hpp"
+#include "figures/axes.hpp"
 
 namespace palpate {
 

@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "canvas.hpp"
+#include "figures/canvas.hpp"
 
 namespace palpate {
 

@@ -5,8 +5,8 @@
 
 #include <glm/common.hpp>
 
-#include "figures.hpp"
-#include "map_layer.hpp"
+#include "figures/figures.hpp"
+#include "figures/map_layer.hpp"
 #include "palpate/error.hpp"
 
 namespace palpate {

@@ -1,4 +1,4 @@
-#include "map_layer.hpp"
+#include "figures/map_layer.hpp"
 
 #include <fmt/format.h>
 

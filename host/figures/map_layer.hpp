@@ -1,7 +1,7 @@
 #pragma once
 
-#include "axes.hpp"
-#include "evidence_scale.hpp"
+#include "figures/axes.hpp"
+#include "figures/evidence_scale.hpp"
 #include "palpate/occupancy_grid.hpp"
 
 namespace palpate {

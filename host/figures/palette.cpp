@@ -1,4 +1,4 @@
-#include "palette.hpp"
+#include "figures/palette.hpp"
 
 #include <algorithm>
 #include <array>

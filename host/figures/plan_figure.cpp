@@ -1,4 +1,4 @@
-#include "plan_figure.hpp"
+#include "figures/plan_figure.hpp"
 
 #include <algorithm>
 #include <array>
@@ -8,8 +8,8 @@
 #include <fmt/format.h>
 #include <glm/common.hpp>
 
-#include "axes.hpp"
-#include "footprint.hpp"
+#include "figures/axes.hpp"
+#include "figures/footprint.hpp"
 #include "palpate/error.hpp"
 #include "palpate/touch.hpp"
 

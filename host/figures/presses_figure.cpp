@@ -1,4 +1,4 @@
-#include "presses_figure.hpp"
+#include "figures/presses_figure.hpp"
 
 #include <algorithm>
 #include <array>
@@ -6,8 +6,8 @@
 
 #include <glm/common.hpp>
 
-#include "bounding_box.hpp"
-#include "map_layer.hpp"
+#include "figures/map_layer.hpp"
+#include "model/bounding_box.hpp"
 #include "palpate/error.hpp"
 #include "palpate/pose.hpp"
 

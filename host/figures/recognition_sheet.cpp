@@ -14,10 +14,10 @@
 #include <fmt/format.h>
 #include <glm/common.hpp>
 
-#include "figures.hpp"
-#include "footprint.hpp"
-#include "identity_panel.hpp"
-#include "map_layer.hpp"
+#include "figures/figures.hpp"
+#include "figures/footprint.hpp"
+#include "figures/identity_panel.hpp"
+#include "figures/map_layer.hpp"
 #include "palpate/error.hpp"
 #include "palpate/pose_error.hpp"
 

@@ -1,10 +1,10 @@
-#include "reliability_figure.hpp"
+#include "figures/reliability_figure.hpp"
 
 #include <array>
 
 #include <fmt/format.h>
 
-#include "chart.hpp"
+#include "figures/chart.hpp"
 
 namespace palpate {
 

@@ -1,9 +1,9 @@
-#include "buffer.hpp"
+#include "gpu/buffer.hpp"
 
 #include <fmt/format.h>
 
+#include "gpu/vulkan.hpp"
 #include "palpate/error.hpp"
-#include "vulkan.hpp"
 
 namespace palpate::gpu {
 

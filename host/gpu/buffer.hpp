@@ -2,9 +2,9 @@
 
 #include <string_view>
 
-#include "context.hpp"
-#include "kernel.hpp"
-#include "owned.hpp"
+#include "gpu/context.hpp"
+#include "gpu/kernel.hpp"
+#include "gpu/owned.hpp"
 
 namespace palpate::gpu {
 

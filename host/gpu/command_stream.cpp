@@ -1,12 +1,12 @@
-#include "command_stream.hpp"
+#include "gpu/command_stream.hpp"
 
 #include <algorithm>
 
 #include <fmt/format.h>
 
+#include "gpu/selection.hpp"
+#include "gpu/vulkan.hpp"
 #include "palpate/error.hpp"
-#include "selection.hpp"
-#include "vulkan.hpp"
 
 namespace palpate::gpu {
 

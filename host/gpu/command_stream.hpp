@@ -8,10 +8,10 @@
 #include <span>
 #include <vector>
 
-#include "buffer.hpp"
-#include "kernel.hpp"
-#include "recording.hpp"
-#include "submitter.hpp"
+#include "gpu/buffer.hpp"
+#include "gpu/kernel.hpp"
+#include "gpu/recording.hpp"
+#include "gpu/submitter.hpp"
 
 namespace palpate::gpu {
 

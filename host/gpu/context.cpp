@@ -1,4 +1,4 @@
-#include "context.hpp"
+#include "gpu/context.hpp"
 
 #include <algorithm>
 #include <cstdlib>
@@ -8,11 +8,11 @@
 
 #include <fmt/format.h>
 
-#include "log_message.hpp"
+#include "gpu/result.hpp"
+#include "gpu/selection.hpp"
+#include "gpu/vulkan.hpp"
+#include "model/log_message.hpp"
 #include "palpate/error.hpp"
-#include "result.hpp"
-#include "selection.hpp"
-#include "vulkan.hpp"
 
 namespace palpate::gpu {
 

@@ -9,10 +9,10 @@
 
 #include <vulkan/vulkan_core.h>
 
-#include "own_process.hpp"
+#include "gpu/run_queue.hpp"
+#include "model/own_process.hpp"
 #include "palpate/device.hpp"
 #include "palpate/vulkan_device.hpp"
-#include "run_queue.hpp"
 
 namespace palpate::gpu {
 

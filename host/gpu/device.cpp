@@ -2,8 +2,8 @@
 
 #include <utility>
 
-#include "context.hpp"
-#include "selection.hpp"
+#include "gpu/context.hpp"
+#include "gpu/selection.hpp"
 
 namespace palpate {
 

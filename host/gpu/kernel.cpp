@@ -1,10 +1,10 @@
-#include "kernel.hpp"
+#include "gpu/kernel.hpp"
 
 #include <fmt/format.h>
 
+#include "gpu/selection.hpp"
+#include "gpu/vulkan.hpp"
 #include "palpate/error.hpp"
-#include "selection.hpp"
-#include "vulkan.hpp"
 
 namespace palpate::gpu {
 

@@ -4,8 +4,8 @@
 #include <span>
 #include <vector>
 
-#include "context.hpp"
-#include "owned.hpp"
+#include "gpu/context.hpp"
+#include "gpu/owned.hpp"
 
 namespace palpate::gpu {
 

@@ -1,6 +1,6 @@
-#include "owned.hpp"
+#include "gpu/owned.hpp"
 
-#include "vulkan.hpp"
+#include "gpu/vulkan.hpp"
 
 namespace palpate::gpu {
 

@@ -4,7 +4,7 @@
 #include <string_view>
 #include <type_traits>
 
-#include "result.hpp"
+#include "gpu/result.hpp"
 
 namespace palpate::gpu {
 

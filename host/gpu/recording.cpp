@@ -1,6 +1,6 @@
-#include "recording.hpp"
+#include "gpu/recording.hpp"
 
-#include "vulkan.hpp"
+#include "gpu/vulkan.hpp"
 
 namespace palpate::gpu {
 

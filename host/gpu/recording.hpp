@@ -7,7 +7,7 @@
 #include <variant>
 #include <vector>
 
-#include "kernel.hpp"
+#include "gpu/kernel.hpp"
 
 namespace palpate::gpu {
 

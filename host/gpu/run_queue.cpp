@@ -1,9 +1,9 @@
-#include "run_queue.hpp"
+#include "gpu/run_queue.hpp"
 
 #include <cstddef>
 
-#include "recording.hpp"
-#include "submitter.hpp"
+#include "gpu/recording.hpp"
+#include "gpu/submitter.hpp"
 
 namespace palpate::gpu {
 

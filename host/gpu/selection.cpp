@@ -1,4 +1,4 @@
-#include "selection.hpp"
+#include "gpu/selection.hpp"
 
 #include <algorithm>
 #include <cctype>
@@ -8,9 +8,9 @@
 
 #include <fmt/format.h>
 
+#include "gpu/result.hpp"
+#include "gpu/vulkan.hpp"
 #include "palpate/error.hpp"
-#include "result.hpp"
-#include "vulkan.hpp"
 
 namespace palpate::gpu {
 

@@ -1,12 +1,12 @@
-#include "submitter.hpp"
+#include "gpu/submitter.hpp"
 
 #include <algorithm>
 #include <array>
 #include <chrono>
 #include <limits>
 
-#include "recording.hpp"
-#include "vulkan.hpp"
+#include "gpu/recording.hpp"
+#include "gpu/vulkan.hpp"
 
 namespace palpate::gpu {
 

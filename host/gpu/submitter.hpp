@@ -1,8 +1,8 @@
 #pragma once
 
-#include "context.hpp"
-#include "owned.hpp"
-#include "run_queue.hpp"
+#include "gpu/context.hpp"
+#include "gpu/owned.hpp"
+#include "gpu/run_queue.hpp"
 
 namespace palpate::gpu {
 

@@ -1,5 +1,5 @@
 #define VOLK_IMPLEMENTATION
-#include "vulkan.hpp"
+#include "gpu/vulkan.hpp"
 
 #include <cstdlib>
 #include <mutex>

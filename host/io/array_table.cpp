@@ -1,11 +1,11 @@
-#include "array_table.hpp"
+#include "io/array_table.hpp"
 
 #include <cmath>
 #include <limits>
 
+#include "io/table_columns.hpp"
+#include "model/printable.hpp"
 #include "palpate/pose.hpp"
-#include "printable.hpp"
-#include "table_columns.hpp"
 
 namespace palpate {
 

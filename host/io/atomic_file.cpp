@@ -1,4 +1,4 @@
-#include "atomic_file.hpp"
+#include "io/atomic_file.hpp"
 
 #include <fmt/format.h>
 #include <unistd.h>
@@ -9,8 +9,8 @@
 #include <system_error>
 #include <utility>
 
-#include "descriptor.hpp"
-#include "input_file.hpp"
+#include "io/descriptor.hpp"
+#include "io/input_file.hpp"
 #include "palpate/error.hpp"
 
 namespace palpate {

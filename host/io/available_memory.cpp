@@ -1,4 +1,4 @@
-#include "available_memory.hpp"
+#include "io/available_memory.hpp"
 
 #include <fmt/format.h>
 #include <sys/resource.h>
@@ -9,7 +9,7 @@
 #include <optional>
 #include <string>
 
-#include "descriptor.hpp"
+#include "io/descriptor.hpp"
 #include "palpate/error.hpp"
 
 namespace palpate {

@@ -1,4 +1,4 @@
-#include "command_files.hpp"
+#include "io/command_files.hpp"
 
 #include <fmt/format.h>
 #include <unistd.h>
@@ -8,10 +8,10 @@
 #include <system_error>
 #include <utility>
 
-#include "file_identity.hpp"
-#include "input_file.hpp"
+#include "io/file_identity.hpp"
+#include "io/input_file.hpp"
+#include "io/standard_streams.hpp"
 #include "palpate/error.hpp"
-#include "standard_streams.hpp"
 
 namespace palpate {
 

@@ -1,4 +1,4 @@
-#include "csv_table.hpp"
+#include "io/csv_table.hpp"
 
 #include <fcntl.h>
 #include <unistd.h>
@@ -10,8 +10,8 @@
 #include <cstring>
 #include <set>
 
-#include "number_text.hpp"
-#include "printable.hpp"
+#include "model/number_text.hpp"
+#include "model/printable.hpp"
 
 namespace palpate {
 

@@ -9,8 +9,8 @@
 #include <string_view>
 #include <vector>
 
-#include "descriptor.hpp"
-#include "input_file.hpp"
+#include "io/descriptor.hpp"
+#include "io/input_file.hpp"
 
 namespace palpate {
 

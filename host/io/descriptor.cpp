@@ -1,4 +1,4 @@
-#include "descriptor.hpp"
+#include "io/descriptor.hpp"
 
 #include <unistd.h>
 

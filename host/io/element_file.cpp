@@ -1,11 +1,11 @@
-#include "element_file.hpp"
+#include "io/element_file.hpp"
 
 #include <algorithm>
 #include <fstream>
 #include <string>
 
-#include "input_file.hpp"
-#include "number_text.hpp"
+#include "io/input_file.hpp"
+#include "model/number_text.hpp"
 
 namespace palpate {
 

@@ -1,4 +1,4 @@
-#include "element_spacing.hpp"
+#include "io/element_spacing.hpp"
 
 #include <algorithm>
 #include <cmath>

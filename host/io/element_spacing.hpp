@@ -7,7 +7,7 @@
 
 #include <glm/vec2.hpp>
 
-#include "extremes.hpp"
+#include "io/extremes.hpp"
 
 namespace palpate {
 

@@ -1,4 +1,4 @@
-#include "file_format.hpp"
+#include "io/file_format.hpp"
 
 #include "palpate/files.hpp"
 

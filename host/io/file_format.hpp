@@ -2,7 +2,7 @@
 
 #include <string_view>
 
-#include "hdf5_contents.hpp"
+#include "io/hdf5_contents.hpp"
 
 namespace palpate {
 

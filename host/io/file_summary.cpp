@@ -1,10 +1,10 @@
-#include "file_summary.hpp"
+#include "io/file_summary.hpp"
 
 #include <limits>
 #include <optional>
 
-#include "map_file.hpp"
-#include "posterior_file.hpp"
+#include "io/map_file.hpp"
+#include "io/posterior_file.hpp"
 
 namespace palpate {
 

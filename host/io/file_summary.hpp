@@ -4,7 +4,7 @@
 #include <filesystem>
 #include <vector>
 
-#include "extremes.hpp"
+#include "io/extremes.hpp"
 #include "palpate/files.hpp"
 
 namespace palpate {

@@ -1,4 +1,4 @@
-#include "forked_child.hpp"
+#include "io/forked_child.hpp"
 
 #include <fmt/format.h>
 #include <poll.h>

@@ -9,7 +9,7 @@
 #include <mutex>
 #include <vector>
 
-#include "descriptor.hpp"
+#include "io/descriptor.hpp"
 
 namespace palpate {
 

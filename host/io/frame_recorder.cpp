@@ -12,17 +12,17 @@
 #include <utility>
 #include <vector>
 
-#include "descriptor.hpp"
-#include "file_format.hpp"
-#include "hdf5_failure.hpp"
-#include "hdf5_writer.hpp"
-#include "input_file.hpp"
-#include "log_message.hpp"
-#include "lost_count.hpp"
+#include "io/descriptor.hpp"
+#include "io/file_format.hpp"
+#include "io/hdf5_failure.hpp"
+#include "io/hdf5_writer.hpp"
+#include "io/input_file.hpp"
+#include "io/recording_rules.hpp"
+#include "io/recording_state.hpp"
+#include "model/log_message.hpp"
+#include "model/lost_count.hpp"
+#include "model/printable.hpp"
 #include "palpate/error.hpp"
-#include "printable.hpp"
-#include "recording_rules.hpp"
-#include "recording_state.hpp"
 
 namespace palpate {
 

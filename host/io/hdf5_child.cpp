@@ -1,8 +1,8 @@
-#include "hdf5_child.hpp"
+#include "io/hdf5_child.hpp"
 
-#include "forked_child.hpp"
-#include "hdf5_contents.hpp"
-#include "hdf5_reader.hpp"
+#include "io/forked_child.hpp"
+#include "io/hdf5_contents.hpp"
+#include "io/hdf5_reader.hpp"
 
 namespace palpate {
 

@@ -1,4 +1,4 @@
-#include "hdf5_contents.hpp"
+#include "io/hdf5_contents.hpp"
 
 #include <algorithm>
 #include <atomic>
@@ -7,11 +7,11 @@
 
 #include <fmt/format.h>
 
-#include "hdf5_child.hpp"
-#include "hdf5_handle.hpp"
-#include "hdf5_rows.hpp"
-#include "printable.hpp"
-#include "recording_state.hpp"
+#include "io/hdf5_child.hpp"
+#include "io/hdf5_handle.hpp"
+#include "io/hdf5_rows.hpp"
+#include "io/recording_state.hpp"
+#include "model/printable.hpp"
 
 namespace palpate {
 

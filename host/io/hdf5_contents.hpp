@@ -10,10 +10,10 @@
 #include <string>
 #include <vector>
 
-#include "forked_child.hpp"
-#include "hdf5_process.hpp"
-#include "hdf5_reader.hpp"
-#include "input_file.hpp"
+#include "io/forked_child.hpp"
+#include "io/hdf5_process.hpp"
+#include "io/hdf5_reader.hpp"
+#include "io/input_file.hpp"
 
 namespace palpate {
 

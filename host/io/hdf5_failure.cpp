@@ -1,10 +1,10 @@
-#include "hdf5_failure.hpp"
+#include "io/hdf5_failure.hpp"
 
 #include <unistd.h>
 
 #include <string_view>
 
-#include "descriptor.hpp"
+#include "io/descriptor.hpp"
 
 namespace palpate {
 

@@ -1,4 +1,4 @@
-#include "hdf5_image.hpp"
+#include "io/hdf5_image.hpp"
 
 #include <cstdlib>
 #include <cstring>

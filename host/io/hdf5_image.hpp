@@ -4,7 +4,7 @@
 #include <cstdlib>
 #include <memory>
 
-#include "hdf5_handle.hpp"
+#include "io/hdf5_handle.hpp"
 
 namespace palpate {
 

@@ -1,8 +1,8 @@
-#include "hdf5_reader.hpp"
+#include "io/hdf5_reader.hpp"
 
 #include <algorithm>
 
-#include "hdf5_handle.hpp"
+#include "io/hdf5_handle.hpp"
 
 namespace palpate {
 

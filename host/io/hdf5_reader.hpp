@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "hdf5_handle.hpp"
-#include "hdf5_rows.hpp"
+#include "io/hdf5_handle.hpp"
+#include "io/hdf5_rows.hpp"
 
 namespace palpate {
 

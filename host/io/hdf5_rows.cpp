@@ -1,4 +1,4 @@
-#include "hdf5_rows.hpp"
+#include "io/hdf5_rows.hpp"
 
 #include <algorithm>
 #include <functional>
@@ -7,7 +7,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include "available_memory.hpp"
+#include "io/available_memory.hpp"
 
 namespace palpate {
 

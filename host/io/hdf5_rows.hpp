@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "hdf5_handle.hpp"
+#include "io/hdf5_handle.hpp"
 
 namespace palpate {
 

@@ -1,11 +1,11 @@
-#include "hdf5_writer.hpp"
+#include "io/hdf5_writer.hpp"
 
 #include <algorithm>
 #include <limits>
 
 #include <fmt/format.h>
 
-#include "atomic_file.hpp"
+#include "io/atomic_file.hpp"
 #include "palpate/error.hpp"
 
 namespace palpate {

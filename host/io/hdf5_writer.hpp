@@ -8,8 +8,8 @@
 #include <string_view>
 #include <vector>
 
-#include "hdf5_handle.hpp"
-#include "hdf5_image.hpp"
+#include "io/hdf5_handle.hpp"
+#include "io/hdf5_image.hpp"
 
 namespace palpate {
 

@@ -1,10 +1,10 @@
-#include "input_file.hpp"
+#include "io/input_file.hpp"
 
 #include <cerrno>
 #include <cstring>
 #include <system_error>
 
-#include "descriptor.hpp"
+#include "io/descriptor.hpp"
 
 namespace palpate {
 

@@ -1,4 +1,4 @@
-#include "map_file.hpp"
+#include "io/map_file.hpp"
 
 #include <algorithm>
 #include <limits>
@@ -6,13 +6,13 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include "available_memory.hpp"
-#include "file_format.hpp"
-#include "hdf5_contents.hpp"
-#include "hdf5_writer.hpp"
-#include "input_file.hpp"
+#include "io/available_memory.hpp"
+#include "io/file_format.hpp"
+#include "io/hdf5_contents.hpp"
+#include "io/hdf5_writer.hpp"
+#include "io/input_file.hpp"
+#include "io/recording_rules.hpp"
 #include "palpate/files.hpp"
-#include "recording_rules.hpp"
 
 namespace palpate {
 

@@ -2,8 +2,8 @@
 
 #include <fmt/format.h>
 
-#include "atomic_file.hpp"
-#include "input_file.hpp"
+#include "io/atomic_file.hpp"
+#include "io/input_file.hpp"
 #include "palpate/files.hpp"
 
 namespace palpate {

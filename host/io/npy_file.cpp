@@ -1,4 +1,4 @@
-#include "npy_file.hpp"
+#include "io/npy_file.hpp"
 
 #include <algorithm>
 #include <bit>
@@ -14,10 +14,10 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include "available_memory.hpp"
-#include "input_file.hpp"
-#include "number_text.hpp"
-#include "printable.hpp"
+#include "io/available_memory.hpp"
+#include "io/input_file.hpp"
+#include "model/number_text.hpp"
+#include "model/printable.hpp"
 
 namespace palpate {
 

@@ -1,10 +1,10 @@
-#include "pose_table.hpp"
+#include "io/pose_table.hpp"
 
 #include <cmath>
 #include <limits>
 
+#include "model/printable.hpp"
 #include "palpate/touch.hpp"
-#include "printable.hpp"
 
 namespace palpate {
 

@@ -4,8 +4,8 @@
 #include <filesystem>
 #include <vector>
 
+#include "io/table_columns.hpp"
 #include "palpate/pose.hpp"
-#include "table_columns.hpp"
 
 namespace palpate {
 

@@ -1,4 +1,4 @@
-#include "posterior_file.hpp"
+#include "io/posterior_file.hpp"
 
 #include <cmath>
 #include <limits>
@@ -6,14 +6,14 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include "available_memory.hpp"
-#include "file_format.hpp"
-#include "hdf5_contents.hpp"
-#include "hdf5_rows.hpp"
-#include "hdf5_writer.hpp"
-#include "input_file.hpp"
+#include "io/available_memory.hpp"
+#include "io/file_format.hpp"
+#include "io/hdf5_contents.hpp"
+#include "io/hdf5_rows.hpp"
+#include "io/hdf5_writer.hpp"
+#include "io/input_file.hpp"
+#include "io/recording_rules.hpp"
 #include "palpate/error.hpp"
-#include "recording_rules.hpp"
 
 namespace palpate {
 

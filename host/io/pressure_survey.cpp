@@ -1,4 +1,4 @@
-#include "pressure_survey.hpp"
+#include "io/pressure_survey.hpp"
 
 #include <cmath>
 

@@ -5,9 +5,9 @@
 #include <span>
 #include <vector>
 
-#include "extremes.hpp"
+#include "io/extremes.hpp"
+#include "io/reading_histogram.hpp"
 #include "palpate/touch.hpp"
-#include "reading_histogram.hpp"
 
 namespace palpate {
 

@@ -1,14 +1,14 @@
-#include "pressure_table.hpp"
+#include "io/pressure_table.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
-#include "available_memory.hpp"
-#include "lost_count.hpp"
-#include "number_text.hpp"
+#include "io/available_memory.hpp"
+#include "model/lost_count.hpp"
+#include "model/number_text.hpp"
+#include "model/printable.hpp"
 #include "palpate/pose.hpp"
-#include "printable.hpp"
 
 namespace palpate {
 

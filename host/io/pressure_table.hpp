@@ -4,7 +4,7 @@
 #include <filesystem>
 #include <vector>
 
-#include "table_columns.hpp"
+#include "io/table_columns.hpp"
 
 namespace palpate {
 

@@ -1,4 +1,4 @@
-#include "reading_histogram.hpp"
+#include "io/reading_histogram.hpp"
 
 #include <algorithm>
 #include <bit>

@@ -4,16 +4,16 @@
 #include <cerrno>
 #include <cstring>
 
-#include "forked_child.hpp"
-#include "hdf5_failure.hpp"
-#include "hdf5_handle.hpp"
-#include "hdf5_process.hpp"
-#include "hdf5_writer.hpp"
-#include "input_file.hpp"
+#include "io/forked_child.hpp"
+#include "io/hdf5_failure.hpp"
+#include "io/hdf5_handle.hpp"
+#include "io/hdf5_process.hpp"
+#include "io/hdf5_writer.hpp"
+#include "io/input_file.hpp"
+#include "io/recording_state.hpp"
+#include "io/recording_survey.hpp"
 #include "palpate/error.hpp"
 #include "palpate/files.hpp"
-#include "recording_state.hpp"
-#include "recording_survey.hpp"
 
 namespace palpate {
 

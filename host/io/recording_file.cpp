@@ -3,14 +3,14 @@
 
 #include <fmt/format.h>
 
-#include "available_memory.hpp"
-#include "file_format.hpp"
-#include "hdf5_rows.hpp"
-#include "hdf5_writer.hpp"
-#include "input_file.hpp"
+#include "io/available_memory.hpp"
+#include "io/file_format.hpp"
+#include "io/hdf5_rows.hpp"
+#include "io/hdf5_writer.hpp"
+#include "io/input_file.hpp"
+#include "io/recording_rules.hpp"
+#include "io/recording_scan.hpp"
 #include "palpate/files.hpp"
-#include "recording_rules.hpp"
-#include "recording_scan.hpp"
 
 namespace palpate {
 

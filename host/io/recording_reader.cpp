@@ -1,4 +1,4 @@
-#include "recording_reader.hpp"
+#include "io/recording_reader.hpp"
 
 #include <algorithm>
 #include <cstring>
@@ -7,12 +7,12 @@
 #include <type_traits>
 #include <vector>
 
-#include "forked_child.hpp"
-#include "hdf5_handle.hpp"
-#include "hdf5_process.hpp"
+#include "io/forked_child.hpp"
+#include "io/hdf5_handle.hpp"
+#include "io/hdf5_process.hpp"
+#include "model/printable.hpp"
 #include "palpate/error.hpp"
 #include "palpate/files.hpp"
-#include "printable.hpp"
 
 namespace palpate {
 

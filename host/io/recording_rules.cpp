@@ -1,12 +1,12 @@
-#include "recording_rules.hpp"
+#include "io/recording_rules.hpp"
 
 #include <cmath>
 
 #include <fmt/format.h>
 
-#include "input_file.hpp"
-#include "lost_count.hpp"
-#include "printable.hpp"
+#include "io/input_file.hpp"
+#include "model/lost_count.hpp"
+#include "model/printable.hpp"
 
 namespace palpate {
 

@@ -1,4 +1,4 @@
-#include "recording_scan.hpp"
+#include "io/recording_scan.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -6,11 +6,11 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include "available_memory.hpp"
-#include "file_format.hpp"
-#include "hdf5_contents.hpp"
-#include "lost_count.hpp"
-#include "recording_rules.hpp"
+#include "io/available_memory.hpp"
+#include "io/file_format.hpp"
+#include "io/hdf5_contents.hpp"
+#include "io/recording_rules.hpp"
+#include "model/lost_count.hpp"
 
 namespace palpate {
 

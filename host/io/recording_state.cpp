@@ -1,4 +1,4 @@
-#include "recording_state.hpp"
+#include "io/recording_state.hpp"
 
 #include <sys/file.h>
 #include <unistd.h>
@@ -6,7 +6,7 @@
 #include <cerrno>
 #include <cstring>
 
-#include "descriptor.hpp"
+#include "io/descriptor.hpp"
 
 namespace palpate {
 

@@ -1,4 +1,4 @@
-#include "recording_survey.hpp"
+#include "io/recording_survey.hpp"
 
 #include <cmath>
 #include <utility>
@@ -6,11 +6,11 @@
 
 #include <fmt/format.h>
 
-#include "available_memory.hpp"
-#include "lost_count.hpp"
+#include "io/available_memory.hpp"
+#include "model/lost_count.hpp"
+#include "model/stream_time.hpp"
 #include "palpate/contact.hpp"
 #include "palpate/touch_detector.hpp"
-#include "stream_time.hpp"
 
 namespace palpate {
 

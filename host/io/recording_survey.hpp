@@ -4,10 +4,10 @@
 #include <filesystem>
 #include <optional>
 
-#include "element_spacing.hpp"
-#include "extremes.hpp"
-#include "pressure_survey.hpp"
-#include "recording_scan.hpp"
+#include "io/element_spacing.hpp"
+#include "io/extremes.hpp"
+#include "io/pressure_survey.hpp"
+#include "io/recording_scan.hpp"
 
 namespace palpate {
 

@@ -1,4 +1,4 @@
-#include "recording_suspicions.hpp"
+#include "io/recording_suspicions.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -7,8 +7,8 @@
 
 #include <fmt/format.h>
 
-#include "angle_unit.hpp"
-#include "elements_that.hpp"
+#include "model/angle_unit.hpp"
+#include "model/elements_that.hpp"
 
 namespace palpate {
 

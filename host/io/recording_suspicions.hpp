@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "recording_survey.hpp"
+#include "io/recording_survey.hpp"
 
 namespace palpate {
 

@@ -1,4 +1,4 @@
-#include "recording_tables.hpp"
+#include "io/recording_tables.hpp"
 
 #include <cmath>
 #include <iterator>
@@ -6,8 +6,8 @@
 
 #include <fmt/format.h>
 
-#include "atomic_file.hpp"
-#include "input_file.hpp"
+#include "io/atomic_file.hpp"
+#include "io/input_file.hpp"
 
 namespace palpate {
 

@@ -7,11 +7,11 @@
 
 #include <fmt/format.h>
 
-#include "element_file.hpp"
-#include "input_file.hpp"
+#include "io/element_file.hpp"
+#include "io/input_file.hpp"
 #include "palpate/lattice.hpp"
 #include "palpate/touch.hpp"
-#include "yaml_entry.hpp"
+#include "yaml/yaml_entry.hpp"
 
 namespace palpate {
 

@@ -6,10 +6,10 @@
 #include <fmt/ranges.h>
 #include <yaml-cpp/yaml.h>
 
-#include "atomic_file.hpp"
-#include "input_file.hpp"
+#include "io/atomic_file.hpp"
+#include "io/input_file.hpp"
 #include "palpate/learned_sensor.hpp"
-#include "yaml_entry.hpp"
+#include "yaml/yaml_entry.hpp"
 
 namespace palpate {
 

@@ -1,4 +1,4 @@
-#include "standard_streams.hpp"
+#include "io/standard_streams.hpp"
 
 #include <fcntl.h>
 #include <unistd.h>

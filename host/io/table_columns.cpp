@@ -1,10 +1,10 @@
-#include "table_columns.hpp"
+#include "io/table_columns.hpp"
 
 #include <algorithm>
 #include <cctype>
 #include <cmath>
 
-#include "printable.hpp"
+#include "model/printable.hpp"
 
 namespace palpate {
 

@@ -8,7 +8,7 @@
 #include <string>
 #include <string_view>
 
-#include "csv_table.hpp"
+#include "io/csv_table.hpp"
 
 namespace palpate {
 

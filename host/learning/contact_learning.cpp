@@ -1,4 +1,4 @@
-#include "contact_learning.hpp"
+#include "learning/contact_learning.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -7,8 +7,8 @@
 
 #include <fmt/format.h>
 
-#include "element_spacing.hpp"
-#include "golden_section.hpp"
+#include "io/element_spacing.hpp"
+#include "learning/golden_section.hpp"
 #include "palpate/error.hpp"
 #include "palpate/occupancy_grid.hpp"
 

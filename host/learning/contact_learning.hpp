@@ -4,9 +4,9 @@
 #include <span>
 #include <vector>
 
-#include "level_counts.hpp"
+#include "learning/level_counts.hpp"
+#include "learning/press.hpp"
 #include "palpate/contact.hpp"
-#include "press.hpp"
 
 namespace palpate {
 

@@ -1,4 +1,4 @@
-#include "cross_validation.hpp"
+#include "learning/cross_validation.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -12,9 +12,9 @@
 #include <fmt/format.h>
 #include <tbb/parallel_for.h>
 
-#include "host_progress.hpp"
-#include "nearby_fit.hpp"
+#include "learning/host_progress.hpp"
 #include "palpate/error.hpp"
+#include "recognition/nearby_fit.hpp"
 
 namespace palpate {
 

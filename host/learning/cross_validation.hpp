@@ -5,11 +5,11 @@
 #include <string>
 #include <vector>
 
-#include "drawn_poses.hpp"
-#include "familiarity_fit.hpp"
-#include "table_learning.hpp"
-#include "temperature_fit.hpp"
-#include "training_maps.hpp"
+#include "learning/drawn_poses.hpp"
+#include "learning/familiarity_fit.hpp"
+#include "learning/table_learning.hpp"
+#include "learning/temperature_fit.hpp"
+#include "learning/training_maps.hpp"
 
 namespace palpate {
 

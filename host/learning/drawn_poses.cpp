@@ -1,4 +1,4 @@
-#include "drawn_poses.hpp"
+#include "learning/drawn_poses.hpp"
 
 namespace palpate {
 

@@ -2,10 +2,10 @@
 
 #include <span>
 
+#include "learning/press.hpp"
+#include "model/random.hpp"
 #include "palpate/lattice.hpp"
 #include "palpate/pose.hpp"
-#include "press.hpp"
-#include "random.hpp"
 
 namespace palpate {
 

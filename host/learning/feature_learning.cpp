@@ -1,4 +1,4 @@
-#include "feature_learning.hpp"
+#include "learning/feature_learning.hpp"
 
 #include <algorithm>
 #include <array>

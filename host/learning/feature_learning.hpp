@@ -4,8 +4,8 @@
 #include <string>
 #include <vector>
 
+#include "learning/press.hpp"
 #include "palpate/learned_sensor.hpp"
-#include "press.hpp"
 
 namespace palpate {
 

@@ -1,11 +1,11 @@
-#include "fold_model.hpp"
+#include "learning/fold_model.hpp"
 
 #include <algorithm>
 #include <string>
 #include <utility>
 
-#include "feature_learning.hpp"
-#include "tried_bins.hpp"
+#include "learning/feature_learning.hpp"
+#include "learning/tried_bins.hpp"
 
 namespace palpate {
 

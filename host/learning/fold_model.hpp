@@ -5,12 +5,12 @@
 #include <optional>
 #include <vector>
 
-#include "cross_validation.hpp"
+#include "learning/cross_validation.hpp"
+#include "learning/press.hpp"
+#include "learning/reading_learning.hpp"
+#include "learning/table_learning.hpp"
+#include "learning/training_maps.hpp"
 #include "palpate/learned_sensor.hpp"
-#include "press.hpp"
-#include "reading_learning.hpp"
-#include "table_learning.hpp"
-#include "training_maps.hpp"
 
 namespace palpate {
 

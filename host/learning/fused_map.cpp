@@ -1,4 +1,4 @@
-#include "fused_map.hpp"
+#include "learning/fused_map.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -6,7 +6,7 @@
 #include <fmt/format.h>
 #include <glm/common.hpp>
 
-#include "bounding_box.hpp"
+#include "model/bounding_box.hpp"
 #include "palpate/error.hpp"
 
 namespace palpate {

@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "cell_range.hpp"
+#include "model/cell_range.hpp"
 #include "palpate/map_builder.hpp"
 #include "palpate/occupancy_grid.hpp"
 #include "palpate/pose.hpp"

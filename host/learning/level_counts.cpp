@@ -1,4 +1,4 @@
-#include "level_counts.hpp"
+#include "learning/level_counts.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -6,7 +6,7 @@
 
 #include <fmt/format.h>
 
-#include "interpolated_map.hpp"
+#include "model/interpolated_map.hpp"
 #include "palpate/error.hpp"
 
 namespace palpate {

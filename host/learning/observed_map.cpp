@@ -1,4 +1,4 @@
-#include "observed_map.hpp"
+#include "learning/observed_map.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -7,9 +7,9 @@
 
 #include <fmt/format.h>
 
-#include "bounding_box.hpp"
-#include "cell_range.hpp"
-#include "element_spacing.hpp"
+#include "io/element_spacing.hpp"
+#include "model/bounding_box.hpp"
+#include "model/cell_range.hpp"
 #include "palpate/contact.hpp"
 #include "palpate/error.hpp"
 

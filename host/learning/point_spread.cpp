@@ -1,4 +1,4 @@
-#include "point_spread.hpp"
+#include "learning/point_spread.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -7,9 +7,9 @@
 
 #include <tbb/parallel_for.h>
 
-#include "bounding_box.hpp"
-#include "element_spacing.hpp"
-#include "golden_section.hpp"
+#include "io/element_spacing.hpp"
+#include "learning/golden_section.hpp"
+#include "model/bounding_box.hpp"
 
 namespace palpate {
 

@@ -3,8 +3,8 @@
 #include <optional>
 #include <vector>
 
+#include "learning/press.hpp"
 #include "palpate/contact.hpp"
-#include "press.hpp"
 
 namespace palpate {
 

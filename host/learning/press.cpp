@@ -1,11 +1,11 @@
-#include "press.hpp"
+#include "learning/press.hpp"
 
 #include <algorithm>
 #include <map>
 
 #include <fmt/format.h>
 
-#include "bounding_box.hpp"
+#include "model/bounding_box.hpp"
 
 namespace palpate {
 

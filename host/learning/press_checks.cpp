@@ -1,11 +1,11 @@
-#include "press_checks.hpp"
+#include "learning/press_checks.hpp"
 
 #include <algorithm>
 #include <map>
 
 #include <fmt/format.h>
 
-#include "elements_that.hpp"
+#include "model/elements_that.hpp"
 #include "palpate/error.hpp"
 
 namespace palpate {

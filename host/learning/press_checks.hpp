@@ -3,8 +3,8 @@
 #include <string>
 #include <vector>
 
+#include "learning/press.hpp"
 #include "palpate/contact.hpp"
-#include "press.hpp"
 
 namespace palpate {
 

@@ -1,4 +1,4 @@
-#include "press_fusion.hpp"
+#include "learning/press_fusion.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -6,10 +6,10 @@
 #include <span>
 #include <vector>
 
-#include "fused_map.hpp"
-#include "press_groups.hpp"
-#include "press_search.hpp"
-#include "unposed_maps.hpp"
+#include "learning/fused_map.hpp"
+#include "learning/press_groups.hpp"
+#include "learning/press_search.hpp"
+#include "learning/unposed_maps.hpp"
 
 namespace palpate {
 

@@ -1,4 +1,4 @@
-#include "press_groups.hpp"
+#include "learning/press_groups.hpp"
 
 #include <algorithm>
 

@@ -1,4 +1,4 @@
-#include "press_placement.hpp"
+#include "learning/press_placement.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -9,8 +9,8 @@
 #include <tbb/parallel_for.h>
 #include <glm/mat2x2.hpp>
 
-#include "bounding_box.hpp"
-#include "interpolated_map.hpp"
+#include "model/bounding_box.hpp"
+#include "model/interpolated_map.hpp"
 #include "palpate/error.hpp"
 
 namespace palpate {

@@ -5,11 +5,11 @@
 #include <span>
 #include <vector>
 
+#include "learning/press.hpp"
+#include "learning/training_maps.hpp"
 #include "palpate/contact_model.hpp"
 #include "palpate/estimate.hpp"
 #include "palpate/lattice.hpp"
-#include "press.hpp"
-#include "training_maps.hpp"
 
 namespace palpate {
 

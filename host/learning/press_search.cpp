@@ -1,4 +1,4 @@
-#include "press_search.hpp"
+#include "learning/press_search.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -6,8 +6,8 @@
 #include <numbers>
 #include <utility>
 
-#include "bounding_box.hpp"
-#include "press_placement.hpp"
+#include "learning/press_placement.hpp"
+#include "model/bounding_box.hpp"
 
 namespace palpate {
 

@@ -2,11 +2,11 @@
 
 #include <vector>
 
+#include "learning/press_side.hpp"
 #include "palpate/contact_model.hpp"
 #include "palpate/estimate.hpp"
 #include "palpate/lattice.hpp"
 #include "palpate/pose.hpp"
-#include "press_side.hpp"
 
 namespace palpate {
 

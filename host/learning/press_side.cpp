@@ -1,4 +1,4 @@
-#include "press_side.hpp"
+#include "learning/press_side.hpp"
 
 #include <cmath>
 

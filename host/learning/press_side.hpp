@@ -5,9 +5,9 @@
 
 #include <glm/vec2.hpp>
 
+#include "learning/press.hpp"
 #include "palpate/contact_model.hpp"
 #include "palpate/touch.hpp"
-#include "press.hpp"
 
 namespace palpate {
 

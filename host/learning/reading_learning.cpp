@@ -1,12 +1,12 @@
-#include "reading_learning.hpp"
+#include "learning/reading_learning.hpp"
 
 #include <algorithm>
 
 #include <fmt/format.h>
 
-#include "contact_learning.hpp"
+#include "learning/contact_learning.hpp"
+#include "learning/point_spread.hpp"
 #include "palpate/error.hpp"
-#include "point_spread.hpp"
 
 namespace palpate {
 

@@ -5,9 +5,9 @@
 #include <string>
 #include <vector>
 
+#include "learning/press.hpp"
 #include "palpate/contact.hpp"
 #include "palpate/map_builder.hpp"
-#include "press.hpp"
 
 namespace palpate {
 

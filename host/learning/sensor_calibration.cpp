@@ -1,4 +1,4 @@
-#include "sensor_calibration.hpp"
+#include "learning/sensor_calibration.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -11,14 +11,14 @@
 
 #include <fmt/format.h>
 
-#include "contact_learning.hpp"
-#include "cross_validation.hpp"
-#include "element_spacing.hpp"
-#include "feature_learning.hpp"
+#include "io/element_spacing.hpp"
+#include "learning/contact_learning.hpp"
+#include "learning/cross_validation.hpp"
+#include "learning/feature_learning.hpp"
+#include "learning/press_checks.hpp"
+#include "learning/reading_learning.hpp"
+#include "learning/tried_bins.hpp"
 #include "palpate/error.hpp"
-#include "press_checks.hpp"
-#include "reading_learning.hpp"
-#include "tried_bins.hpp"
 
 namespace palpate {
 

@@ -7,13 +7,13 @@
 #include <string>
 #include <vector>
 
-#include "drawn_poses.hpp"
-#include "fold_model.hpp"
+#include "learning/drawn_poses.hpp"
+#include "learning/fold_model.hpp"
+#include "learning/press.hpp"
+#include "learning/temperature_fit.hpp"
+#include "learning/training_maps.hpp"
 #include "palpate/learned_sensor.hpp"
 #include "palpate/occupancy_grid.hpp"
-#include "press.hpp"
-#include "temperature_fit.hpp"
-#include "training_maps.hpp"
 
 namespace palpate {
 

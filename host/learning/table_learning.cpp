@@ -1,4 +1,4 @@
-#include "table_learning.hpp"
+#include "learning/table_learning.hpp"
 
 #include <algorithm>
 #include <optional>
@@ -6,8 +6,8 @@
 #include <fmt/format.h>
 #include <tbb/parallel_for.h>
 
-#include "bounding_box.hpp"
-#include "host_progress.hpp"
+#include "learning/host_progress.hpp"
+#include "model/bounding_box.hpp"
 #include "palpate/error.hpp"
 
 namespace palpate {

@@ -8,11 +8,11 @@
 #include <string>
 #include <vector>
 
-#include "level_counts.hpp"
+#include "learning/level_counts.hpp"
+#include "learning/press.hpp"
+#include "learning/press_placement.hpp"
+#include "learning/training_maps.hpp"
 #include "palpate/learned_sensor.hpp"
-#include "press.hpp"
-#include "press_placement.hpp"
-#include "training_maps.hpp"
 
 namespace palpate {
 

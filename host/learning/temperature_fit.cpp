@@ -1,4 +1,4 @@
-#include "temperature_fit.hpp"
+#include "learning/temperature_fit.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -11,7 +11,7 @@
 
 #include <fmt/format.h>
 
-#include "golden_section.hpp"
+#include "learning/golden_section.hpp"
 #include "palpate/error.hpp"
 
 namespace palpate {

@@ -5,8 +5,8 @@
 #include <span>
 #include <vector>
 
-#include "evaluation.hpp"
 #include "palpate/learned_sensor.hpp"
+#include "recognition/evaluation.hpp"
 
 namespace palpate {
 

@@ -1,4 +1,4 @@
-#include "touch_sd_learning.hpp"
+#include "learning/touch_sd_learning.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -7,7 +7,7 @@
 #include <string>
 #include <utility>
 
-#include "training_maps.hpp"
+#include "learning/training_maps.hpp"
 
 namespace palpate {
 

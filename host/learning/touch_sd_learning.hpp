@@ -4,11 +4,11 @@
 #include <optional>
 #include <vector>
 
+#include "learning/press.hpp"
 #include "palpate/device.hpp"
 #include "palpate/learned_sensor.hpp"
 #include "palpate/map_builder.hpp"
-#include "press.hpp"
-#include "touch_sd_fit.hpp"
+#include "recognition/touch_sd_fit.hpp"
 
 namespace palpate {
 

@@ -1,4 +1,4 @@
-#include "training_maps.hpp"
+#include "learning/training_maps.hpp"
 
 #include <map>
 #include <set>
@@ -9,7 +9,7 @@
 #include <fmt/format.h>
 #include <tbb/parallel_for.h>
 
-#include "observed_map.hpp"
+#include "learning/observed_map.hpp"
 #include "palpate/error.hpp"
 
 namespace palpate {

@@ -4,9 +4,9 @@
 #include <cstddef>
 #include <vector>
 
+#include "learning/press.hpp"
 #include "palpate/map_builder.hpp"
 #include "palpate/occupancy_grid.hpp"
-#include "press.hpp"
 
 namespace palpate {
 

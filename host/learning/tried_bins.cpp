@@ -1,12 +1,12 @@
-#include "tried_bins.hpp"
+#include "learning/tried_bins.hpp"
 
 #include <algorithm>
 #include <cmath>
 
 #include <fmt/format.h>
 
-#include "bounding_box.hpp"
-#include "cross_validation.hpp"
+#include "learning/cross_validation.hpp"
+#include "model/bounding_box.hpp"
 #include "palpate/error.hpp"
 
 namespace palpate {

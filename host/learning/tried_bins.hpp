@@ -4,9 +4,9 @@
 #include <numbers>
 #include <vector>
 
+#include "learning/press.hpp"
 #include "palpate/contact.hpp"
 #include "palpate/lattice.hpp"
-#include "press.hpp"
 
 namespace palpate {
 

@@ -1,4 +1,4 @@
-#include "unposed_maps.hpp"
+#include "learning/unposed_maps.hpp"
 
 #include <algorithm>
 #include <utility>
@@ -6,11 +6,11 @@
 #include <fmt/format.h>
 #include <tbb/parallel_for.h>
 
-#include "element_spacing.hpp"
-#include "fused_map.hpp"
-#include "observed_map.hpp"
+#include "io/element_spacing.hpp"
+#include "learning/fused_map.hpp"
+#include "learning/observed_map.hpp"
+#include "learning/press_fusion.hpp"
 #include "palpate/error.hpp"
-#include "press_fusion.hpp"
 
 namespace palpate {
 

@@ -1,4 +1,4 @@
-#include "bounding_box.hpp"
+#include "model/bounding_box.hpp"
 
 namespace palpate {
 

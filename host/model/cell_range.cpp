@@ -1,4 +1,4 @@
-#include "cell_range.hpp"
+#include "model/cell_range.hpp"
 
 #include <algorithm>
 #include <cmath>

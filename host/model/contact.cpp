@@ -7,7 +7,7 @@
 
 #include <fmt/format.h>
 
-#include "contact_readings.hpp"
+#include "model/contact_readings.hpp"
 #include "palpate/error.hpp"
 
 namespace palpate {

@@ -5,9 +5,9 @@
 
 #include <glm/vec2.hpp>
 
+#include "model/random.hpp"
 #include "palpate/displacement.hpp"
 #include "palpate/pose.hpp"
-#include "random.hpp"
 
 namespace palpate {
 

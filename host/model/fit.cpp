@@ -4,11 +4,11 @@
 #include <cmath>
 #include <vector>
 
-#include "displacement_points.hpp"
-#include "interpolated_map.hpp"
-#include "predicted_readings.hpp"
-#include "random.hpp"
-#include "reading_mixture.hpp"
+#include "model/displacement_points.hpp"
+#include "model/interpolated_map.hpp"
+#include "model/predicted_readings.hpp"
+#include "model/random.hpp"
+#include "model/reading_mixture.hpp"
 
 namespace palpate {
 

@@ -1,4 +1,4 @@
-#include "interpolated_map.hpp"
+#include "model/interpolated_map.hpp"
 
 #include <cmath>
 

@@ -3,7 +3,7 @@
 #include <mutex>
 #include <utility>
 
-#include "log_message.hpp"
+#include "model/log_message.hpp"
 
 namespace palpate {
 

@@ -7,8 +7,8 @@
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
-#include "mixture_kernel.hpp"
-#include "vector_math-inl.hpp"
+#include "model/mixture_kernel.hpp"
+#include "model/vector_math-inl.hpp"
 
 HWY_BEFORE_NAMESPACE();
 namespace palpate {

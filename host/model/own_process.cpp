@@ -1,4 +1,4 @@
-#include "own_process.hpp"
+#include "model/own_process.hpp"
 
 #include <pthread.h>
 

@@ -3,7 +3,7 @@
 #include <memory>
 #include <utility>
 
-#include "moved_from.hpp"
+#include "model/moved_from.hpp"
 
 namespace palpate {
 

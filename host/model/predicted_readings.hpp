@@ -7,7 +7,7 @@
 
 #include <glm/vec2.hpp>
 
-#include "interpolated_map.hpp"
+#include "model/interpolated_map.hpp"
 #include "palpate/contact_model.hpp"
 #include "palpate/pose.hpp"
 

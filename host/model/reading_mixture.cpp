@@ -1,9 +1,9 @@
-#include "reading_mixture.hpp"
+#include "model/reading_mixture.hpp"
 
 #include <algorithm>
 #include <cmath>
 
-#include "mixture_kernel.hpp"
+#include "model/mixture_kernel.hpp"
 #include "palpate/fit.hpp"
 
 namespace palpate {

@@ -5,8 +5,8 @@
 #include <span>
 #include <vector>
 
+#include "model/random.hpp"
 #include "palpate/contact.hpp"
-#include "random.hpp"
 
 namespace palpate {
 

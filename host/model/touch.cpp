@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "bounding_box.hpp"
+#include "model/bounding_box.hpp"
 
 namespace palpate {
 

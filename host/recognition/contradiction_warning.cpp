@@ -1,4 +1,4 @@
-#include "contradiction_warning.hpp"
+#include "recognition/contradiction_warning.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -8,9 +8,9 @@
 #include <fmt/format.h>
 #include <glm/geometric.hpp>
 
-#include "interpolated_map.hpp"
-#include "predicted_readings.hpp"
-#include "surprise.hpp"
+#include "model/interpolated_map.hpp"
+#include "model/predicted_readings.hpp"
+#include "recognition/surprise.hpp"
 
 namespace palpate {
 

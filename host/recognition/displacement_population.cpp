@@ -1,4 +1,4 @@
-#include "displacement_population.hpp"
+#include "recognition/displacement_population.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -6,13 +6,13 @@
 #include <span>
 #include <vector>
 
-#include "living_elements.hpp"
+#include "model/random.hpp"
 #include "palpate/displacement.hpp"
 #include "palpate/estimate.hpp"
 #include "palpate/lattice.hpp"
-#include "random.hpp"
-#include "reading_model.hpp"
-#include "smooth_occupancy.hpp"
+#include "recognition/living_elements.hpp"
+#include "recognition/reading_model.hpp"
+#include "recognition/smooth_occupancy.hpp"
 
 namespace palpate {
 

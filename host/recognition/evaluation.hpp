@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "proportion.hpp"
+#include "recognition/proportion.hpp"
 
 namespace palpate {
 

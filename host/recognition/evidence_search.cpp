@@ -1,4 +1,4 @@
-#include "evidence_search.hpp"
+#include "recognition/evidence_search.hpp"
 
 #include <algorithm>
 #include <array>

@@ -3,7 +3,7 @@
 #include <functional>
 #include <vector>
 
-#include "displacement_population.hpp"
+#include "recognition/displacement_population.hpp"
 
 namespace palpate {
 

@@ -1,10 +1,10 @@
-#include "label_bounds.hpp"
+#include "recognition/label_bounds.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
-#include "label_probability.hpp"
+#include "recognition/label_probability.hpp"
 
 namespace palpate {
 

@@ -4,9 +4,9 @@
 #include <span>
 #include <vector>
 
-#include "label_probability.hpp"
 #include "palpate/estimate.hpp"
-#include "recognition_task.hpp"
+#include "recognition/label_probability.hpp"
+#include "recognition/recognition_task.hpp"
 
 namespace palpate {
 

@@ -1,4 +1,4 @@
-#include "label_probability.hpp"
+#include "recognition/label_probability.hpp"
 
 #include <algorithm>
 #include <cmath>

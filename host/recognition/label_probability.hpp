@@ -6,7 +6,7 @@
 
 #include "palpate/estimate.hpp"
 #include "palpate/touch.hpp"
-#include "recognition_task.hpp"
+#include "recognition/recognition_task.hpp"
 
 namespace palpate {
 

@@ -1,11 +1,11 @@
-#include "live_recognition.hpp"
+#include "recognition/live_recognition.hpp"
 
 #include <algorithm>
 #include <csignal>
 #include <limits>
 #include <utility>
 
-#include "lost_count.hpp"
+#include "model/lost_count.hpp"
 #include "palpate/baseline.hpp"
 #include "palpate/pose_track.hpp"
 

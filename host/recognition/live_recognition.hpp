@@ -11,12 +11,12 @@
 #include <thread>
 #include <vector>
 
+#include "model/stream_time.hpp"
 #include "palpate/sensor.hpp"
 #include "palpate/touch_detector.hpp"
-#include "recogniser.hpp"
-#include "recognition_record.hpp"
-#include "stream_time.hpp"
-#include "touch_plan.hpp"
+#include "recognition/recogniser.hpp"
+#include "recognition/recognition_record.hpp"
+#include "recognition/touch_plan.hpp"
 
 namespace palpate {
 

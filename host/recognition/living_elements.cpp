@@ -1,8 +1,8 @@
-#include "living_elements.hpp"
+#include "recognition/living_elements.hpp"
 
 #include <cmath>
 
-#include "predicted_readings.hpp"
+#include "model/predicted_readings.hpp"
 
 namespace palpate {
 

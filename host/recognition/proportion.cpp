@@ -1,4 +1,4 @@
-#include "proportion.hpp"
+#include "recognition/proportion.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,10 +1,10 @@
-#include "reading_model.hpp"
+#include "recognition/reading_model.hpp"
 
 #include <algorithm>
 #include <cmath>
 
-#include "predicted_readings.hpp"
-#include "smooth_occupancy.hpp"
+#include "model/predicted_readings.hpp"
+#include "recognition/smooth_occupancy.hpp"
 
 namespace palpate {
 

@@ -1,13 +1,13 @@
-#include "recogniser.hpp"
+#include "recognition/recogniser.hpp"
 
 #include <algorithm>
 #include <cmath>
 
 #include <fmt/format.h>
 
-#include "marginal_grid.hpp"
+#include "model/random.hpp"
 #include "palpate/error.hpp"
-#include "random.hpp"
+#include "recognition/marginal_grid.hpp"
 
 namespace palpate {
 

@@ -7,8 +7,8 @@
 #include <variant>
 #include <vector>
 
-#include "recognition_task.hpp"
-#include "surprise.hpp"
+#include "recognition/recognition_task.hpp"
+#include "recognition/surprise.hpp"
 
 namespace palpate {
 

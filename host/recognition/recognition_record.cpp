@@ -1,4 +1,4 @@
-#include "recognition_record.hpp"
+#include "recognition/recognition_record.hpp"
 
 #include <algorithm>
 #include <chrono>
@@ -7,15 +7,15 @@
 
 #include <fmt/format.h>
 
-#include "contradiction_warning.hpp"
-#include "label_bounds.hpp"
-#include "label_probability.hpp"
-#include "nearby_fit.hpp"
 #include "palpate/error.hpp"
 #include "palpate/pose_error.hpp"
-#include "surprise.hpp"
-#include "turn_warning.hpp"
-#include "warnings.hpp"
+#include "recognition/contradiction_warning.hpp"
+#include "recognition/label_bounds.hpp"
+#include "recognition/label_probability.hpp"
+#include "recognition/nearby_fit.hpp"
+#include "recognition/surprise.hpp"
+#include "recognition/turn_warning.hpp"
+#include "recognition/warnings.hpp"
 
 namespace palpate {
 

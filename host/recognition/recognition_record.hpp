@@ -10,8 +10,8 @@
 
 #include "palpate/fit.hpp"
 #include "palpate/touch.hpp"
-#include "recogniser.hpp"
-#include "recognition_task.hpp"
+#include "recognition/recogniser.hpp"
+#include "recognition/recognition_task.hpp"
 
 namespace palpate {
 

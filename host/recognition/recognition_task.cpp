@@ -1,4 +1,4 @@
-#include "recognition_task.hpp"
+#include "recognition/recognition_task.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -7,7 +7,7 @@
 
 #include <fmt/format.h>
 
-#include "search_memory.hpp"
+#include "estimation/bounded/search_memory.hpp"
 
 namespace palpate {
 

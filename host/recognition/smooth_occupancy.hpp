@@ -5,10 +5,10 @@
 
 #include <glm/vec2.hpp>
 
-#include "living_elements.hpp"
 #include "palpate/contact_model.hpp"
 #include "palpate/occupancy_grid.hpp"
 #include "palpate/pose.hpp"
+#include "recognition/living_elements.hpp"
 
 namespace palpate {
 

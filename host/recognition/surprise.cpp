@@ -1,13 +1,13 @@
-#include "surprise.hpp"
+#include "recognition/surprise.hpp"
 
 #include <algorithm>
 #include <cstdint>
 #include <vector>
 
-#include "displacement_points.hpp"
-#include "hypotheses.hpp"
-#include "reading_mixture.hpp"
-#include "refinement.hpp"
+#include "estimation/hypotheses.hpp"
+#include "estimation/lattice/refinement.hpp"
+#include "model/displacement_points.hpp"
+#include "model/reading_mixture.hpp"
 
 namespace palpate {
 

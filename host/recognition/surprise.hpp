@@ -5,11 +5,11 @@
 #include <span>
 #include <vector>
 
+#include "estimation/lattice/reading_predictor.hpp"
 #include "palpate/contact_model.hpp"
 #include "palpate/estimate.hpp"
 #include "palpate/touch.hpp"
-#include "reading_predictor.hpp"
-#include "recognition_task.hpp"
+#include "recognition/recognition_task.hpp"
 
 namespace palpate {
 

@@ -1,4 +1,4 @@
-#include "touch_plan.hpp"
+#include "recognition/touch_plan.hpp"
 
 #include <algorithm>
 #include <array>
@@ -6,8 +6,8 @@
 #include <numbers>
 #include <utility>
 
-#include "bounding_box.hpp"
-#include "interpolated_map.hpp"
+#include "model/bounding_box.hpp"
+#include "model/interpolated_map.hpp"
 #include "palpate/occupancy_grid.hpp"
 #include "palpate/touch.hpp"
 

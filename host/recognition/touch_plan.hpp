@@ -11,7 +11,7 @@
 #include "palpate/plan.hpp"
 #include "palpate/pose.hpp"
 #include "palpate/pose_histogram.hpp"
-#include "recognition_task.hpp"
+#include "recognition/recognition_task.hpp"
 
 namespace palpate {
 

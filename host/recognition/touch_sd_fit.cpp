@@ -1,4 +1,4 @@
-#include "touch_sd_fit.hpp"
+#include "recognition/touch_sd_fit.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -7,10 +7,10 @@
 #include <fmt/format.h>
 #include <glm/geometric.hpp>
 
-#include "bounding_box.hpp"
-#include "evidence_search.hpp"
+#include "model/bounding_box.hpp"
 #include "palpate/error.hpp"
-#include "recogniser.hpp"
+#include "recognition/evidence_search.hpp"
+#include "recognition/recogniser.hpp"
 
 namespace palpate {
 

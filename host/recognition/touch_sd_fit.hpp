@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "palpate/displacement.hpp"
-#include "recognition_task.hpp"
+#include "recognition/recognition_task.hpp"
 
 namespace palpate {
 

@@ -1,4 +1,4 @@
-#include "touch_warnings.hpp"
+#include "recognition/touch_warnings.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -9,9 +9,9 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
-#include "angle_unit.hpp"
-#include "bounding_box.hpp"
-#include "element_spacing.hpp"
+#include "io/element_spacing.hpp"
+#include "model/angle_unit.hpp"
+#include "model/bounding_box.hpp"
 
 namespace palpate {
 

@@ -5,7 +5,7 @@
 #include <string>
 
 #include "palpate/touch.hpp"
-#include "recognition_task.hpp"
+#include "recognition/recognition_task.hpp"
 
 namespace palpate {
 

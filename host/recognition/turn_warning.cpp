@@ -1,4 +1,4 @@
-#include "turn_warning.hpp"
+#include "recognition/turn_warning.hpp"
 
 #include <cmath>
 #include <cstddef>

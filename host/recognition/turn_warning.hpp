@@ -3,9 +3,9 @@
 #include <optional>
 #include <string>
 
-#include "recogniser.hpp"
-#include "recognition_record.hpp"
-#include "recognition_task.hpp"
+#include "recognition/recogniser.hpp"
+#include "recognition/recognition_record.hpp"
+#include "recognition/recognition_task.hpp"
 
 namespace palpate {
 

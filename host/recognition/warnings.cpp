@@ -1,4 +1,4 @@
-#include "warnings.hpp"
+#include "recognition/warnings.hpp"
 
 #include <algorithm>
 #include <array>
@@ -11,7 +11,7 @@
 #include <glm/matrix.hpp>
 
 #include "palpate/pose_error.hpp"
-#include "touch_warnings.hpp"
+#include "recognition/touch_warnings.hpp"
 
 namespace palpate {
 

@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "palpate/touch.hpp"
-#include "recognition_record.hpp"
-#include "recognition_task.hpp"
+#include "recognition/recognition_record.hpp"
+#include "recognition/recognition_task.hpp"
 
 namespace palpate {
 

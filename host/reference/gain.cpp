@@ -2,7 +2,7 @@
 #include <map>
 #include <vector>
 
-#include "reference.hpp"
+#include "reference/reference.hpp"
 
 namespace palpate::reference {
 

@@ -1,4 +1,4 @@
-#include "displacement_field.hpp"
+#include "simulation/displacement_field.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -8,9 +8,9 @@
 #include <fmt/format.h>
 #include <glm/common.hpp>
 
-#include "bounding_box.hpp"
+#include "model/bounding_box.hpp"
 #include "palpate/error.hpp"
-#include "spans.hpp"
+#include "simulation/spans.hpp"
 
 namespace palpate {
 

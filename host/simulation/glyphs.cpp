@@ -1,4 +1,4 @@
-#include "glyphs.hpp"
+#include "simulation/glyphs.hpp"
 
 #include <algorithm>
 #include <cmath>

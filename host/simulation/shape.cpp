@@ -8,12 +8,12 @@
 
 #include <fmt/format.h>
 
-#include "glyphs.hpp"
-#include "number_text.hpp"
+#include "model/number_text.hpp"
+#include "model/printable.hpp"
 #include "palpate/error.hpp"
 #include "palpate/simulation.hpp"
-#include "printable.hpp"
-#include "spans.hpp"
+#include "simulation/glyphs.hpp"
+#include "simulation/spans.hpp"
 
 namespace palpate {
 

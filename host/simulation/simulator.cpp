@@ -4,11 +4,11 @@
 
 #include <fmt/format.h>
 
-#include "displacement_field.hpp"
-#include "moved_from.hpp"
+#include "model/moved_from.hpp"
+#include "model/random.hpp"
 #include "palpate/error.hpp"
 #include "palpate/simulation.hpp"
-#include "random.hpp"
+#include "simulation/displacement_field.hpp"
 
 namespace palpate {
 

@@ -1,4 +1,4 @@
-#include "spans.hpp"
+#include "simulation/spans.hpp"
 
 #include <algorithm>
 #include <cmath>

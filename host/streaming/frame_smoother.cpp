@@ -1,4 +1,4 @@
-#include "frame_smoother.hpp"
+#include "streaming/frame_smoother.hpp"
 
 #include <algorithm>
 #include <cmath>

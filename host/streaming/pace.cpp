@@ -1,4 +1,4 @@
-#include "pace.hpp"
+#include "streaming/pace.hpp"
 
 #include <algorithm>
 #include <thread>

@@ -1,4 +1,4 @@
-#include "pose_reader.hpp"
+#include "streaming/pose_reader.hpp"
 
 #include <fmt/format.h>
 #include <poll.h>

@@ -5,7 +5,7 @@
 #include <string>
 #include <string_view>
 
-#include "descriptor.hpp"
+#include "io/descriptor.hpp"
 #include "palpate/pose_track.hpp"
 
 namespace palpate {

@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "palpate/pose_track.hpp"
-#include "pose_reader.hpp"
+#include "streaming/pose_reader.hpp"
 
 namespace palpate {
 

@@ -1,4 +1,4 @@
-#include "replayed_sensor.hpp"
+#include "streaming/replayed_sensor.hpp"
 
 #include <cmath>
 #include <limits>
@@ -6,10 +6,10 @@
 
 #include <fmt/format.h>
 
-#include "lost_count.hpp"
+#include "model/lost_count.hpp"
+#include "model/stream_time.hpp"
 #include "palpate/error.hpp"
 #include "palpate/files.hpp"
-#include "stream_time.hpp"
 
 namespace palpate {
 

@@ -3,9 +3,9 @@
 #include <optional>
 #include <string>
 
-#include "pace.hpp"
 #include "palpate/sensor.hpp"
 #include "palpate/touch.hpp"
+#include "streaming/pace.hpp"
 
 namespace palpate {
 

@@ -1,4 +1,4 @@
-#include "simulated_sensor.hpp"
+#include "streaming/simulated_sensor.hpp"
 
 #include <algorithm>
 #include <chrono>

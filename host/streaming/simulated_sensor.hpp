@@ -5,10 +5,10 @@
 #include <string>
 #include <vector>
 
-#include "pace.hpp"
+#include "model/random.hpp"
 #include "palpate/sensor.hpp"
 #include "palpate/simulation.hpp"
-#include "random.hpp"
+#include "streaming/pace.hpp"
 
 namespace palpate {
 

@@ -1,4 +1,4 @@
-#include "steady_phase.hpp"
+#include "streaming/steady_phase.hpp"
 
 #include <algorithm>
 #include <cmath>

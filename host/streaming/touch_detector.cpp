@@ -7,11 +7,11 @@
 
 #include <fmt/format.h>
 
-#include "frame_smoother.hpp"
-#include "moved_from.hpp"
+#include "model/moved_from.hpp"
 #include "palpate/error.hpp"
 #include "palpate/pose_track.hpp"
-#include "steady_phase.hpp"
+#include "streaming/frame_smoother.hpp"
+#include "streaming/steady_phase.hpp"
 
 namespace palpate {
 

@@ -14,8 +14,8 @@
 
 #include "palpate/error.hpp"
 #include "palpate/simulation.hpp"
-#include "replayed_sensor.hpp"
-#include "simulated_sensor.hpp"
+#include "streaming/replayed_sensor.hpp"
+#include "streaming/simulated_sensor.hpp"
 
 namespace palpate {
 

@@ -1,4 +1,4 @@
-#include "yaml_entry.hpp"
+#include "yaml/yaml_entry.hpp"
 
 #include <algorithm>
 #include <charconv>
@@ -9,9 +9,9 @@
 #include <fmt/format.h>
 #include <yaml-cpp/eventhandler.h>
 
-#include "number_text.hpp"
+#include "model/number_text.hpp"
+#include "model/printable.hpp"
 #include "palpate/error.hpp"
-#include "printable.hpp"
 
 namespace palpate {
 

@@ -12,12 +12,12 @@
 #include <nanobind/stl/vector.h>
 
 #include "bindings.hpp"
-#include "filter_flags.hpp"
+#include "cli/batch/settled_task.hpp"
+#include "cli/filter_flags.hpp"
+#include "cli/record_output.hpp"
 #include "palpate/error.hpp"
-#include "record_output.hpp"
 #include "request.hpp"
 #include "session.hpp"
-#include "settled_task.hpp"
 
 namespace palpate::python {
 

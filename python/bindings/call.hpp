@@ -15,7 +15,7 @@
 
 #include <nanobind/nanobind.h>
 
-#include "own_process.hpp"
+#include "model/own_process.hpp"
 #include "types.hpp"
 
 namespace palpate::python {

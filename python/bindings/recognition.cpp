@@ -6,14 +6,14 @@
 #include <nlohmann/json.hpp>
 
 #include "bindings.hpp"
+#include "cli/recognition_flags.hpp"
+#include "cli/record_output.hpp"
+#include "cli/recordings.hpp"
+#include "cli/unknowns.hpp"
 #include "estimate.hpp"
-#include "recognition_flags.hpp"
-#include "record_output.hpp"
-#include "recordings.hpp"
 #include "request.hpp"
 #include "session.hpp"
 #include "touches.hpp"
-#include "unknowns.hpp"
 
 namespace palpate::python {
 

@@ -1,4 +1,4 @@
-#include "reference.hpp"
+#include "reference/reference.hpp"
 
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/vector.h>

@@ -8,7 +8,7 @@
 #include <nanobind/stl/optional.h>
 
 #include "bindings.hpp"
-#include "map_files.hpp"
+#include "cli/map_files.hpp"
 #include "palpate/files.hpp"
 
 namespace palpate::python {

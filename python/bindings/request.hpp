@@ -1,8 +1,8 @@
 #pragma once
 
-#include "recognition_flags.hpp"
+#include "cli/recognition_flags.hpp"
+#include "cli/unknowns.hpp"
 #include "types.hpp"
-#include "unknowns.hpp"
 
 namespace palpate::python {
 

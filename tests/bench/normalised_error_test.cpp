@@ -5,7 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "measurement.hpp"
-#include "random.hpp"
+#include "model/random.hpp"
 
 namespace palpate::bench {
 namespace {

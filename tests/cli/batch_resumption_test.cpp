@@ -10,8 +10,8 @@
 #include <stdexcept>
 
 #include "batch_folder.hpp"
-#include "results_folder.hpp"
-#include "slurm.hpp"
+#include "cli/batch/results_folder.hpp"
+#include "cli/batch/slurm.hpp"
 
 namespace palpate {
 namespace {

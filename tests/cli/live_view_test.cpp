@@ -1,6 +1,6 @@
 // What `palpate live` draws, as text.
 
-#include "live_view.hpp"
+#include "cli/live_view.hpp"
 
 #include <gtest/gtest.h>
 

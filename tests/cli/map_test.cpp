@@ -1,7 +1,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "hdf5_contents.hpp"
+#include "io/hdf5_contents.hpp"
 #include "program.hpp"
 #include "sample_files.hpp"
 

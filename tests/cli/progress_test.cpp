@@ -1,6 +1,6 @@
 // The line that shows how far long work is, by a clock that the tests turn.
 
-#include "progress.hpp"
+#include "cli/progress.hpp"
 
 #include <fcntl.h>
 #include <pty.h>

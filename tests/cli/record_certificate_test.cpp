@@ -3,12 +3,12 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "live_record.hpp"
-#include "record_output.hpp"
-#include "record_table.hpp"
+#include "cli/live_record.hpp"
+#include "cli/record_output.hpp"
+#include "cli/record_table.hpp"
+#include "cli/sheet.hpp"
+#include "cli/step_words.hpp"
 #include "sample_files.hpp"
-#include "sheet.hpp"
-#include "step_words.hpp"
 
 namespace palpate::cli {
 namespace {

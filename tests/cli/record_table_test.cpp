@@ -1,19 +1,19 @@
 // What people read of records, from records filled by hand: tables, sentences, the sheet and
 // `live`, which all say the same numbers.
 
-#include "record_table.hpp"
+#include "cli/record_table.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <numbers>
 
-#include "live_record.hpp"
+#include "cli/live_record.hpp"
+#include "cli/record_output.hpp"
+#include "cli/sheet.hpp"
+#include "cli/step_words.hpp"
 #include "palpate/pose_error.hpp"
-#include "record_output.hpp"
 #include "sample_files.hpp"
-#include "sheet.hpp"
-#include "step_words.hpp"
 
 namespace palpate::cli {
 namespace {

@@ -2,7 +2,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "hdf5_contents.hpp"
+#include "io/hdf5_contents.hpp"
 #include "palpate/files.hpp"
 #include "palpate/simulation.hpp"
 #include "program.hpp"

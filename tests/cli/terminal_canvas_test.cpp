@@ -1,4 +1,4 @@
-#include "terminal_canvas.hpp"
+#include "cli/terminal_canvas.hpp"
 
 #include <gtest/gtest.h>
 

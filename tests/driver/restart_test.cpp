@@ -5,13 +5,13 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "driver/transfer_ring.hpp"
 #include "fake_serial_board.hpp"
 #include "fake_takktile.hpp"
 #include "palpate/driver.hpp"
 #include "palpate/error.hpp"
 #include "parsing/sent_frame.hpp"
 #include "streamed.hpp"
-#include "transfer_ring.hpp"
 
 namespace palpate {
 namespace {

@@ -6,15 +6,15 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "data_folder.hpp"
+#include "driver/data_folder.hpp"
+#include "driver/usb_device.hpp"
+#include "driver/usb_interfaces.hpp"
 #include "fake_serial_board.hpp"
 #include "io/scratch_folder.hpp"
 #include "palpate/driver.hpp"
 #include "palpate/error.hpp"
 #include "parsing/sent_frame.hpp"
 #include "streamed.hpp"
-#include "usb_device.hpp"
-#include "usb_interfaces.hpp"
 
 namespace palpate {
 namespace {

@@ -1,9 +1,9 @@
 #include <gtest/gtest.h>
 
+#include "driver/transfer_ring.hpp"
 #include "fake_takktile.hpp"
 #include "palpate/driver.hpp"
 #include "streamed.hpp"
-#include "transfer_ring.hpp"
 
 namespace palpate {
 namespace {

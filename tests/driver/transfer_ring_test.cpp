@@ -1,14 +1,14 @@
-#include "transfer_ring.hpp"
+#include "driver/transfer_ring.hpp"
 
 #include <gtest/gtest.h>
 
 #include <optional>
 
+#include "driver/usb_device.hpp"
+#include "driver/usb_handle.hpp"
 #include "fake_takktile.hpp"
 #include "palpate/error.hpp"
 #include "streamed.hpp"
-#include "usb_device.hpp"
-#include "usb_handle.hpp"
 #include "without_memory.hpp"
 
 namespace palpate {

@@ -8,9 +8,9 @@
 
 #include <gtest/gtest.h>
 
-#include "context.hpp"
+#include "gpu/context.hpp"
 #include "letters.hpp"
-#include "log_message.hpp"
+#include "model/log_message.hpp"
 
 namespace palpate {
 namespace {

@@ -9,9 +9,9 @@
 
 #include <gtest/gtest.h>
 
-#include "context.hpp"
+#include "gpu/context.hpp"
+#include "gpu/selection.hpp"
 #include "letters.hpp"
-#include "selection.hpp"
 
 namespace palpate {
 namespace {

@@ -9,7 +9,7 @@
 
 #include <gtest/gtest.h>
 
-#include "context.hpp"
+#include "gpu/context.hpp"
 #include "palpate/error.hpp"
 #include "palpate/map_builder.hpp"
 #include "palpate/particle_filter.hpp"

@@ -1,4 +1,4 @@
-#include "contact_evidence.hpp"
+#include "estimation/contact_evidence.hpp"
 
 #include <algorithm>
 #include <cmath>

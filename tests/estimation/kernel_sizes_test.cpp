@@ -1,11 +1,11 @@
-#include "kernel_sizes.hpp"
+#include "estimation/kernel_sizes.hpp"
 
 #include <bit>
 
 #include <gtest/gtest.h>
 
-#include "interface.h"
 #include "made_up_devices.hpp"
+#include "shaders/interface.h"
 
 namespace palpate {
 namespace {

@@ -7,7 +7,7 @@
 
 #include <gtest/gtest.h>
 
-#include "context.hpp"
+#include "gpu/context.hpp"
 #include "palpate/error.hpp"
 #include "palpate/particle_filter.hpp"
 #include "palpate/pose_histogram.hpp"

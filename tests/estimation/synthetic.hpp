@@ -9,7 +9,7 @@
 #include "palpate/map_builder.hpp"
 #include "palpate/pose_histogram.hpp"
 #include "palpate/touch.hpp"
-#include "reference.hpp"
+#include "reference/reference.hpp"
 
 namespace palpate {
 

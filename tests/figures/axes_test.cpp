@@ -1,4 +1,4 @@
-#include "axes.hpp"
+#include "figures/axes.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "canvas.hpp"
+#include "figures/canvas.hpp"
 
 #include <array>
 #include <string>

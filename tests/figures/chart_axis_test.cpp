@@ -1,4 +1,4 @@
-#include "chart_axis.hpp"
+#include "figures/chart_axis.hpp"
 
 #include <cmath>
 #include <string>

@@ -1,4 +1,4 @@
-#include "chart.hpp"
+#include "figures/chart.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,10 +1,10 @@
-#include "confusion_figure.hpp"
+#include "figures/confusion_figure.hpp"
 
 #include <algorithm>
 
 #include <gtest/gtest.h>
 
-#include "palette.hpp"
+#include "figures/palette.hpp"
 #include "palpate/error.hpp"
 #include "picture.hpp"
 

@@ -1,4 +1,4 @@
-#include "evidence_scale.hpp"
+#include "figures/evidence_scale.hpp"
 
 #include <gtest/gtest.h>
 

@@ -5,8 +5,8 @@
 
 #include <gtest/gtest.h>
 
-#include "figures.hpp"
-#include "map_layer.hpp"
+#include "figures/figures.hpp"
+#include "figures/map_layer.hpp"
 #include "palpate/error.hpp"
 #include "picture.hpp"
 

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "palette.hpp"
+#include "figures/palette.hpp"
 
 namespace palpate {
 

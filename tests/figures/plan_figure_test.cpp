@@ -1,10 +1,10 @@
-#include "plan_figure.hpp"
+#include "figures/plan_figure.hpp"
 
 #include <algorithm>
 
 #include <gtest/gtest.h>
 
-#include "palette.hpp"
+#include "figures/palette.hpp"
 #include "palpate/error.hpp"
 #include "palpate/touch.hpp"
 #include "picture.hpp"

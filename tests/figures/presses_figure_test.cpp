@@ -1,4 +1,4 @@
-#include "presses_figure.hpp"
+#include "figures/presses_figure.hpp"
 
 #include <vector>
 

@@ -5,7 +5,7 @@
 
 #include <gtest/gtest.h>
 
-#include "figures.hpp"
+#include "figures/figures.hpp"
 #include "palpate/error.hpp"
 #include "palpate/pose_error.hpp"
 #include "palpate/touch.hpp"

@@ -1,10 +1,10 @@
-#include "reliability_figure.hpp"
+#include "figures/reliability_figure.hpp"
 
 #include <algorithm>
 
 #include <gtest/gtest.h>
 
-#include "palette.hpp"
+#include "figures/palette.hpp"
 #include "picture.hpp"
 
 namespace palpate {

@@ -1,5 +1,5 @@
 // A profile's text, up to a zero byte, and what its deframer is to make of the bytes behind it.
-#include "serial_profile.hpp"
+#include "driver/serial_profile.hpp"
 
 #include <algorithm>
 #include <cstdlib>

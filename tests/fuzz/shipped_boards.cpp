@@ -3,7 +3,7 @@
 #include <cmath>
 #include <cstdlib>
 
-#include "serial_profile.hpp"
+#include "driver/serial_profile.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   static const std::vector<palpate::SerialProfile> profiles = [] {

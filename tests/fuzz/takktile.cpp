@@ -1,5 +1,5 @@
 // Replies of a TakkTile board, and packets of any length: a length byte, then as many bytes.
-#include "takktile_protocol.hpp"
+#include "driver/takktile_protocol.hpp"
 
 #include <algorithm>
 #include <cstdlib>

@@ -12,7 +12,7 @@
 #include "palpate/particle_filter.hpp"
 #include "palpate/pose_error.hpp"
 #include "palpate/pose_histogram.hpp"
-#include "reference.hpp"
+#include "reference/reference.hpp"
 
 namespace palpate {
 namespace {

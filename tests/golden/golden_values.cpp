@@ -7,7 +7,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include "reference.hpp"
+#include "reference/reference.hpp"
 
 namespace palpate {
 

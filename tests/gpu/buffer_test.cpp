@@ -1,4 +1,4 @@
-#include "buffer.hpp"
+#include "gpu/buffer.hpp"
 
 #include <algorithm>
 #include <type_traits>
@@ -6,7 +6,7 @@
 
 #include <gtest/gtest.h>
 
-#include "command_stream.hpp"
+#include "gpu/command_stream.hpp"
 #include "palpate/error.hpp"
 #include "scale_and_add_kernel.hpp"
 

@@ -1,4 +1,4 @@
-#include "command_stream.hpp"
+#include "gpu/command_stream.hpp"
 
 #include <chrono>
 #include <functional>

@@ -8,7 +8,7 @@
 
 #include <gtest/gtest.h>
 
-#include "context.hpp"
+#include "gpu/context.hpp"
 #include "palpate/error.hpp"
 
 namespace palpate {

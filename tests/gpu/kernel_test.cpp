@@ -1,4 +1,4 @@
-#include "kernel.hpp"
+#include "gpu/kernel.hpp"
 
 #include <type_traits>
 

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <iterator>
 
-#include "context.hpp"
+#include "gpu/context.hpp"
 
 namespace palpate::gpu {
 

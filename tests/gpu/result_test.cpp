@@ -1,4 +1,4 @@
-#include "result.hpp"
+#include "gpu/result.hpp"
 
 #include <string>
 

@@ -1,4 +1,4 @@
-#include "run_queue.hpp"
+#include "gpu/run_queue.hpp"
 
 #include <cstring>
 #include <limits>
@@ -7,9 +7,9 @@
 
 #include <gtest/gtest.h>
 
-#include "recording.hpp"
+#include "gpu/recording.hpp"
+#include "gpu/submitter.hpp"
 #include "scale_and_add_kernel.hpp"
-#include "submitter.hpp"
 
 namespace palpate::gpu {
 namespace {

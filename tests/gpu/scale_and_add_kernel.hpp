@@ -4,8 +4,8 @@
 #include <span>
 #include <vector>
 
-#include "command_stream.hpp"
-#include "kernel.hpp"
+#include "gpu/command_stream.hpp"
+#include "gpu/kernel.hpp"
 #include "scale_and_add.hpp"
 
 namespace palpate::gpu {

@@ -1,4 +1,4 @@
-#include "selection.hpp"
+#include "gpu/selection.hpp"
 
 #include <algorithm>
 #include <random>

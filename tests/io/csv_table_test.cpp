@@ -1,4 +1,4 @@
-#include "csv_table.hpp"
+#include "io/csv_table.hpp"
 
 #include <gtest/gtest.h>
 

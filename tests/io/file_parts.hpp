@@ -7,7 +7,7 @@
 #include <string>
 #include <utility>
 
-#include "hdf5_writer.hpp"
+#include "io/hdf5_writer.hpp"
 
 namespace palpate {
 

@@ -1,4 +1,4 @@
-#include "forked_child.hpp"
+#include "io/forked_child.hpp"
 
 #include <gtest/gtest.h>
 #include <sched.h>

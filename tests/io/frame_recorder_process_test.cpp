@@ -14,10 +14,10 @@
 #include <random>
 #include <thread>
 
+#include "io/recording_state.hpp"
 #include "numbered_frames.hpp"
 #include "palpate/files.hpp"
 #include "palpate/frame_recorder.hpp"
-#include "recording_state.hpp"
 #include "scratch_folder.hpp"
 
 namespace palpate {

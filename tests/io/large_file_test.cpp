@@ -9,11 +9,11 @@
 #include <functional>
 
 #include "file_parts.hpp"
-#include "file_summary.hpp"
-#include "hdf5_rows.hpp"
+#include "io/file_summary.hpp"
+#include "io/hdf5_rows.hpp"
+#include "io/pressure_table.hpp"
+#include "io/recording_suspicions.hpp"
 #include "palpate/files.hpp"
-#include "pressure_table.hpp"
-#include "recording_suspicions.hpp"
 #include "scratch_folder.hpp"
 
 namespace palpate {

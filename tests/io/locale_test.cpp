@@ -2,8 +2,8 @@
 
 #include <gtest/gtest.h>
 
-#include "element_file.hpp"
 #include "host_locale.hpp"
+#include "io/element_file.hpp"
 #include "palpate/files.hpp"
 #include "palpate/scene.hpp"
 #include "palpate/simulation.hpp"

@@ -1,4 +1,4 @@
-#include "npy_file.hpp"
+#include "io/npy_file.hpp"
 
 #include <gtest/gtest.h>
 #include <sys/mman.h>
@@ -14,7 +14,7 @@
 
 #include <fmt/format.h>
 
-#include "descriptor.hpp"
+#include "io/descriptor.hpp"
 #include "scratch_folder.hpp"
 
 namespace palpate {

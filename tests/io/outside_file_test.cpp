@@ -5,7 +5,7 @@
 #include <sys/stat.h>
 
 #include "file_parts.hpp"
-#include "hdf5_process.hpp"
+#include "io/hdf5_process.hpp"
 #include "palpate/files.hpp"
 #include "scratch_folder.hpp"
 

@@ -6,8 +6,8 @@
 #include <atomic>
 
 #include "file_parts.hpp"
-#include "hdf5_process.hpp"
-#include "hdf5_rows.hpp"
+#include "io/hdf5_process.hpp"
+#include "io/hdf5_rows.hpp"
 #include "palpate/files.hpp"
 #include "scratch_folder.hpp"
 

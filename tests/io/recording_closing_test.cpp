@@ -13,10 +13,10 @@
 #include <functional>
 
 #include "file_parts.hpp"
+#include "io/recording_state.hpp"
 #include "numbered_frames.hpp"
 #include "palpate/files.hpp"
 #include "palpate/frame_recorder.hpp"
-#include "recording_state.hpp"
 #include "scratch_folder.hpp"
 
 namespace palpate {

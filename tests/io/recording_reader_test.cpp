@@ -1,11 +1,11 @@
-#include "recording_reader.hpp"
+#include "io/recording_reader.hpp"
 
 #include <gtest/gtest.h>
 #include <pthread.h>
 
 #include <atomic>
 
-#include "hdf5_process.hpp"
+#include "io/hdf5_process.hpp"
 #include "palpate/files.hpp"
 #include "scratch_folder.hpp"
 

@@ -1,6 +1,6 @@
 // What a survey finds in a recording, and what it suspects: each rule on a file made to show it.
 
-#include "recording_survey.hpp"
+#include "io/recording_survey.hpp"
 
 #include <gtest/gtest.h>
 
@@ -8,9 +8,9 @@
 #include <numbers>
 
 #include "file_parts.hpp"
+#include "io/recording_suspicions.hpp"
 #include "palpate/files.hpp"
 #include "palpate/simulation.hpp"
-#include "recording_suspicions.hpp"
 #include "scratch_folder.hpp"
 
 namespace palpate {

@@ -8,10 +8,10 @@
 #include <limits>
 #include <random>
 
-#include "lost_count.hpp"
+#include "io/recording_rules.hpp"
+#include "model/lost_count.hpp"
 #include "palpate/files.hpp"
 #include "palpate/frame_recorder.hpp"
-#include "recording_rules.hpp"
 #include "scratch_folder.hpp"
 
 namespace palpate {

@@ -1,4 +1,4 @@
-#include "contact_learning.hpp"
+#include "learning/contact_learning.hpp"
 
 #include <algorithm>
 #include <cmath>

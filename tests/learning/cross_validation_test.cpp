@@ -1,4 +1,4 @@
-#include "cross_validation.hpp"
+#include "learning/cross_validation.hpp"
 
 #include <cmath>
 #include <numeric>
@@ -6,7 +6,7 @@
 
 #include <gtest/gtest.h>
 
-#include "feature_learning.hpp"
+#include "learning/feature_learning.hpp"
 #include "palpate/error.hpp"
 #include "simulated_presses.hpp"
 #include "synthetic.hpp"

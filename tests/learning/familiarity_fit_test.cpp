@@ -1,4 +1,4 @@
-#include "familiarity_fit.hpp"
+#include "learning/familiarity_fit.hpp"
 
 #include <cmath>
 #include <vector>

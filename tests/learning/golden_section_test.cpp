@@ -1,4 +1,4 @@
-#include "golden_section.hpp"
+#include "learning/golden_section.hpp"
 
 #include <cmath>
 

@@ -9,7 +9,7 @@
 
 #include <gtest/gtest.h>
 
-#include "sensor_calibration.hpp"
+#include "learning/sensor_calibration.hpp"
 #include "simulated_presses.hpp"
 #include "synthetic.hpp"
 

@@ -1,4 +1,4 @@
-#include "level_counts.hpp"
+#include "learning/level_counts.hpp"
 
 #include <cmath>
 #include <vector>

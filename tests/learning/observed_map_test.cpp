@@ -1,4 +1,4 @@
-#include "observed_map.hpp"
+#include "learning/observed_map.hpp"
 
 #include <cmath>
 #include <limits>

@@ -1,4 +1,4 @@
-#include "point_spread.hpp"
+#include "learning/point_spread.hpp"
 
 #include <vector>
 

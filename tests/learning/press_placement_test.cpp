@@ -1,4 +1,4 @@
-#include "press_placement.hpp"
+#include "learning/press_placement.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "reading_learning.hpp"
+#include "learning/reading_learning.hpp"
 
 #include <cmath>
 #include <vector>

@@ -8,8 +8,8 @@
 
 #include <gtest/gtest.h>
 
+#include "learning/sensor_calibration.hpp"
 #include "palpate/error.hpp"
-#include "sensor_calibration.hpp"
 #include "simulated_presses.hpp"
 
 namespace palpate {

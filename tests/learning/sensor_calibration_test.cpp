@@ -1,4 +1,4 @@
-#include "sensor_calibration.hpp"
+#include "learning/sensor_calibration.hpp"
 
 #include <algorithm>
 #include <numbers>
@@ -7,8 +7,8 @@
 
 #include <gtest/gtest.h>
 
+#include "learning/reading_learning.hpp"
 #include "palpate/error.hpp"
-#include "reading_learning.hpp"
 #include "simulated_presses.hpp"
 
 namespace palpate {

@@ -5,9 +5,9 @@
 #include <string>
 #include <vector>
 
+#include "learning/press.hpp"
 #include "palpate/simulation.hpp"
 #include "palpate/touch.hpp"
-#include "press.hpp"
 #include "touched_shape.hpp"
 
 namespace palpate {

@@ -1,4 +1,4 @@
-#include "table_learning.hpp"
+#include "learning/table_learning.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -7,8 +7,8 @@
 
 #include <gtest/gtest.h>
 
-#include "bounding_box.hpp"
-#include "interpolated_map.hpp"
+#include "model/bounding_box.hpp"
+#include "model/interpolated_map.hpp"
 #include "palpate/error.hpp"
 #include "simulated_presses.hpp"
 #include "synthetic.hpp"

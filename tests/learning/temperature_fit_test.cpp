@@ -1,4 +1,4 @@
-#include "temperature_fit.hpp"
+#include "learning/temperature_fit.hpp"
 
 #include <array>
 #include <cmath>

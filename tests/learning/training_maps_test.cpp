@@ -1,4 +1,4 @@
-#include "training_maps.hpp"
+#include "learning/training_maps.hpp"
 
 #include <algorithm>
 #include <iterator>
@@ -8,9 +8,9 @@
 
 #include <gtest/gtest.h>
 
-#include "observed_map.hpp"
+#include "learning/observed_map.hpp"
+#include "learning/press_placement.hpp"
 #include "palpate/error.hpp"
-#include "press_placement.hpp"
 #include "simulated_presses.hpp"
 #include "synthetic.hpp"
 

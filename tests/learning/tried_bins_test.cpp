@@ -1,4 +1,4 @@
-#include "tried_bins.hpp"
+#include "learning/tried_bins.hpp"
 
 #include <string>
 

@@ -1,4 +1,4 @@
-#include "unposed_maps.hpp"
+#include "learning/unposed_maps.hpp"
 
 #include <algorithm>
 #include <cmath>

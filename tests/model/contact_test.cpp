@@ -7,7 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "palpate/error.hpp"
-#include "reference.hpp"
+#include "reference/reference.hpp"
 
 namespace palpate {
 namespace {

@@ -1,4 +1,4 @@
-#include "displacement_points.hpp"
+#include "model/displacement_points.hpp"
 
 #include <cmath>
 

@@ -7,9 +7,9 @@
 
 #include <gtest/gtest.h>
 
-#include "displacement_points.hpp"
+#include "model/displacement_points.hpp"
 #include "palpate/error.hpp"
-#include "reference.hpp"
+#include "reference/reference.hpp"
 #include "synthetic.hpp"
 #include "touched_shape.hpp"
 

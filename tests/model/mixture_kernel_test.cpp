@@ -1,4 +1,4 @@
-#include "mixture_kernel.hpp"
+#include "model/mixture_kernel.hpp"
 
 #include <cmath>
 #include <limits>

@@ -1,4 +1,4 @@
-#include "predicted_readings.hpp"
+#include "model/predicted_readings.hpp"
 
 #include <algorithm>
 #include <cmath>

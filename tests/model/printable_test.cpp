@@ -1,4 +1,4 @@
-#include "printable.hpp"
+#include "model/printable.hpp"
 
 #include <gtest/gtest.h>
 

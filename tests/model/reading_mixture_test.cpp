@@ -1,4 +1,4 @@
-#include "reading_mixture.hpp"
+#include "model/reading_mixture.hpp"
 
 #include <cmath>
 #include <vector>

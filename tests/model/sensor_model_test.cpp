@@ -8,7 +8,7 @@
 
 #include "palpate/error.hpp"
 #include "palpate/occupancy_grid.hpp"
-#include "reference.hpp"
+#include "reference/reference.hpp"
 
 namespace palpate {
 namespace {

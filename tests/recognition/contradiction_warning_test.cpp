@@ -1,4 +1,4 @@
-#include "contradiction_warning.hpp"
+#include "recognition/contradiction_warning.hpp"
 
 #include <cstdlib>
 #include <string>
@@ -6,8 +6,8 @@
 
 #include <gmock/gmock.h>
 
-#include "displacement_points.hpp"
 #include "letters.hpp"
+#include "model/displacement_points.hpp"
 
 namespace palpate {
 namespace {

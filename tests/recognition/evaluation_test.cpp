@@ -1,4 +1,4 @@
-#include "evaluation.hpp"
+#include "recognition/evaluation.hpp"
 
 #include <cmath>
 

@@ -1,6 +1,6 @@
 // The bounds of labels from the bounds of their hypotheses' evidence.
 
-#include "label_bounds.hpp"
+#include "recognition/label_bounds.hpp"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 #include <limits>
 #include <numeric>
 
-#include "recognition_record.hpp"
+#include "recognition/recognition_record.hpp"
 #include "shapes.hpp"
 #include "synthetic.hpp"
 

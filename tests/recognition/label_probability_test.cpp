@@ -1,6 +1,6 @@
 // Temperature and press features, with numbers that were worked out by hand.
 
-#include "label_probability.hpp"
+#include "recognition/label_probability.hpp"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 #include <cmath>
 
 #include "palpate/error.hpp"
-#include "recognition_record.hpp"
+#include "recognition/recognition_record.hpp"
 #include "shapes.hpp"
 
 namespace palpate {

@@ -7,8 +7,8 @@
 #include <cmath>
 
 #include "palpate/learned_sensor.hpp"
-#include "recogniser.hpp"
-#include "recognition_record.hpp"
+#include "recognition/recogniser.hpp"
+#include "recognition/recognition_record.hpp"
 #include "shapes.hpp"
 #include "synthetic.hpp"
 #include "touched_shape.hpp"

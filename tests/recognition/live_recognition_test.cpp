@@ -1,4 +1,4 @@
-#include "live_recognition.hpp"
+#include "recognition/live_recognition.hpp"
 
 #include <memory>
 

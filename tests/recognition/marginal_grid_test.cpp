@@ -1,4 +1,4 @@
-#include "marginal_grid.hpp"
+#include "recognition/marginal_grid.hpp"
 
 #include <cmath>
 

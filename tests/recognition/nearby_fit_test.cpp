@@ -1,4 +1,4 @@
-#include "nearby_fit.hpp"
+#include "recognition/nearby_fit.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "recogniser.hpp"
+#include "recognition/recogniser.hpp"
 
 #include <algorithm>
 #include <numeric>

@@ -1,4 +1,4 @@
-#include "recognition_record.hpp"
+#include "recognition/recognition_record.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -8,7 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "palpate/error.hpp"
-#include "reference.hpp"
+#include "reference/reference.hpp"
 #include "shapes.hpp"
 #include "synthetic.hpp"
 #include "touched_shape.hpp"

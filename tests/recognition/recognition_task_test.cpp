@@ -1,4 +1,4 @@
-#include "recognition_task.hpp"
+#include "recognition/recognition_task.hpp"
 
 #include <gtest/gtest.h>
 

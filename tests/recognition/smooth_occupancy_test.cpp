@@ -1,4 +1,4 @@
-#include "smooth_occupancy.hpp"
+#include "recognition/smooth_occupancy.hpp"
 
 #include <cmath>
 

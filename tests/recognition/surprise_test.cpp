@@ -1,4 +1,4 @@
-#include "surprise.hpp"
+#include "recognition/surprise.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -6,13 +6,13 @@
 
 #include <gtest/gtest.h>
 
-#include "displacement_points.hpp"
-#include "interpolated_map.hpp"
 #include "letters.hpp"
+#include "model/displacement_points.hpp"
+#include "model/interpolated_map.hpp"
+#include "model/predicted_readings.hpp"
+#include "model/reading_mixture.hpp"
 #include "palpate/pose_error.hpp"
-#include "predicted_readings.hpp"
-#include "reading_mixture.hpp"
-#include "recognition_record.hpp"
+#include "recognition/recognition_record.hpp"
 #include "shapes.hpp"
 
 namespace palpate {

@@ -1,4 +1,4 @@
-#include "touch_plan.hpp"
+#include "recognition/touch_plan.hpp"
 
 #include <algorithm>
 

@@ -1,4 +1,4 @@
-#include "touch_sd_fit.hpp"
+#include "recognition/touch_sd_fit.hpp"
 
 #include <array>
 #include <cmath>
@@ -6,11 +6,11 @@
 
 #include <gtest/gtest.h>
 
-#include "displacement_population.hpp"
 #include "letters.hpp"
+#include "model/random.hpp"
 #include "palpate/error.hpp"
 #include "palpate/simulation.hpp"
-#include "random.hpp"
+#include "recognition/displacement_population.hpp"
 
 namespace palpate {
 namespace {

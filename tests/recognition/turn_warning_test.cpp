@@ -2,7 +2,7 @@
 
 #include "letters.hpp"
 #include "palpate/rotational_symmetry.hpp"
-#include "recognition_record.hpp"
+#include "recognition/recognition_record.hpp"
 
 namespace palpate {
 namespace {

@@ -1,6 +1,6 @@
 // Each warning is provoked on purpose, end to end through recognise(), and good touches give none.
 
-#include "warnings.hpp"
+#include "recognition/warnings.hpp"
 
 #include <cstdio>
 #include <numbers>
@@ -10,7 +10,7 @@
 #include <gmock/gmock.h>
 
 #include "letters.hpp"
-#include "recognition_record.hpp"
+#include "recognition/recognition_record.hpp"
 
 namespace palpate {
 namespace {

@@ -14,7 +14,7 @@ if(called)
 endif()
 
 file(GLOB sources ${SOURCES}/*.cpp)
-execute_process(COMMAND ${COMPILER} -std=c++20 -M -I${SOURCES} -I${HEADERS} ${sources}
+execute_process(COMMAND ${COMPILER} -std=c++20 -M -I${SOURCES}/.. -I${HEADERS} ${sources}
                 OUTPUT_VARIABLE included COMMAND_ERROR_IS_FATAL ANY)
 if(NOT included MATCHES "reference\\.hpp")
   message(FATAL_ERROR "${COMPILER} -M lists no headers")

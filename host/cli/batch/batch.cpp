@@ -9,12 +9,12 @@
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
-#include "batch_run.hpp"
-#include "batch_settling.hpp"
-#include "commands.hpp"
-#include "progress.hpp"
-#include "settled_task.hpp"
-#include "slurm.hpp"
+#include "cli/batch/batch_run.hpp"
+#include "cli/batch/batch_settling.hpp"
+#include "cli/batch/settled_task.hpp"
+#include "cli/batch/slurm.hpp"
+#include "cli/commands.hpp"
+#include "cli/progress.hpp"
 
 namespace palpate::cli {
 

@@ -1,4 +1,4 @@
-#include "batch_inputs.hpp"
+#include "cli/batch/batch_inputs.hpp"
 
 #include <glob.h>
 
@@ -6,8 +6,8 @@
 #include <filesystem>
 #include <system_error>
 
-#include "csv_table.hpp"
-#include "printable.hpp"
+#include "io/csv_table.hpp"
+#include "model/printable.hpp"
 
 namespace palpate::cli {
 

@@ -1,4 +1,4 @@
-#include "batch_run.hpp"
+#include "cli/batch/batch_run.hpp"
 
 #include <unistd.h>
 
@@ -11,13 +11,13 @@
 #include <thread>
 #include <utility>
 
-#include "bounded_queue.hpp"
-#include "input_file.hpp"
+#include "cli/batch/bounded_queue.hpp"
+#include "cli/batch/settled_task.hpp"
+#include "cli/record_output.hpp"
+#include "cli/uncertainty_flags.hpp"
+#include "io/input_file.hpp"
 #include "palpate/error.hpp"
-#include "recognition_record.hpp"
-#include "record_output.hpp"
-#include "settled_task.hpp"
-#include "uncertainty_flags.hpp"
+#include "recognition/recognition_record.hpp"
 
 namespace palpate::cli {
 

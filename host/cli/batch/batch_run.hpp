@@ -5,10 +5,10 @@
 #include <string>
 #include <vector>
 
-#include "batch_task.hpp"
-#include "input_reading.hpp"
-#include "recognition_task.hpp"
-#include "results_folder.hpp"
+#include "cli/batch/batch_task.hpp"
+#include "cli/batch/input_reading.hpp"
+#include "cli/batch/results_folder.hpp"
+#include "recognition/recognition_task.hpp"
 
 namespace palpate::cli {
 

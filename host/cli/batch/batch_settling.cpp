@@ -1,12 +1,12 @@
-#include "batch_settling.hpp"
+#include "cli/batch/batch_settling.hpp"
 
 #include <filesystem>
 #include <unordered_map>
 #include <utility>
 
+#include "cli/batch/settled_task.hpp"
+#include "cli/progress.hpp"
 #include "palpate/error.hpp"
-#include "progress.hpp"
-#include "settled_task.hpp"
 
 namespace palpate::cli {
 

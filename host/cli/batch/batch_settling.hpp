@@ -4,10 +4,10 @@
 #include <optional>
 #include <string>
 
-#include "batch_task.hpp"
-#include "input_reading.hpp"
-#include "recognition_flags.hpp"
-#include "results_folder.hpp"
+#include "cli/batch/batch_task.hpp"
+#include "cli/batch/input_reading.hpp"
+#include "cli/batch/results_folder.hpp"
+#include "cli/recognition_flags.hpp"
 
 namespace palpate::cli {
 

@@ -1,4 +1,4 @@
-#include "batch_task.hpp"
+#include "cli/batch/batch_task.hpp"
 
 #include <sys/stat.h>
 
@@ -10,8 +10,8 @@
 #include <fmt/ranges.h>
 #include <nlohmann/json.hpp>
 
-#include "atomic_file.hpp"
-#include "input_file.hpp"
+#include "io/atomic_file.hpp"
+#include "io/input_file.hpp"
 
 namespace palpate::cli {
 

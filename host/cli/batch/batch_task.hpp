@@ -12,7 +12,7 @@
 #include <string_view>
 #include <vector>
 
-#include "batch_inputs.hpp"
+#include "cli/batch/batch_inputs.hpp"
 
 namespace palpate::cli {
 

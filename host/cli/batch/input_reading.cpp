@@ -1,4 +1,4 @@
-#include "input_reading.hpp"
+#include "cli/batch/input_reading.hpp"
 
 #include <algorithm>
 #include <atomic>
@@ -9,9 +9,9 @@
 #include <thread>
 #include <vector>
 
+#include "cli/recognition_flags.hpp"
+#include "cli/recordings.hpp"
 #include "palpate/error.hpp"
-#include "recognition_flags.hpp"
-#include "recordings.hpp"
 
 namespace palpate::cli {
 

@@ -7,10 +7,10 @@
 #include <string>
 #include <vector>
 
-#include "batch_task.hpp"
+#include "cli/batch/batch_task.hpp"
+#include "cli/unknowns.hpp"
+#include "io/recording_reader.hpp"
 #include "palpate/scene.hpp"
-#include "recording_reader.hpp"
-#include "unknowns.hpp"
 
 namespace palpate::cli {
 

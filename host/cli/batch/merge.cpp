@@ -5,14 +5,14 @@
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
-#include "atomic_file.hpp"
-#include "batch_task.hpp"
-#include "command_files.hpp"
-#include "commands.hpp"
-#include "file_identity.hpp"
-#include "input_file.hpp"
-#include "options.hpp"
-#include "results_folder.hpp"
+#include "cli/batch/batch_task.hpp"
+#include "cli/batch/results_folder.hpp"
+#include "cli/commands.hpp"
+#include "cli/options.hpp"
+#include "io/atomic_file.hpp"
+#include "io/command_files.hpp"
+#include "io/file_identity.hpp"
+#include "io/input_file.hpp"
 
 namespace palpate::cli {
 

@@ -1,4 +1,4 @@
-#include "results_folder.hpp"
+#include "cli/batch/results_folder.hpp"
 
 #include <fcntl.h>
 
@@ -17,8 +17,8 @@
 
 #include <nlohmann/json.hpp>
 
-#include "input_file.hpp"
-#include "options.hpp"
+#include "cli/options.hpp"
+#include "io/input_file.hpp"
 
 namespace palpate::cli {
 

@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "descriptor.hpp"
-#include "shard.hpp"
+#include "cli/batch/shard.hpp"
+#include "io/descriptor.hpp"
 
 namespace palpate::cli {
 

@@ -1,13 +1,13 @@
-#include "settled_task.hpp"
+#include "cli/batch/settled_task.hpp"
 
 #include <algorithm>
 #include <map>
 #include <string>
 #include <utility>
 
-#include "filter_flags.hpp"
-#include "options.hpp"
-#include "sensor_model_flag.hpp"
+#include "cli/filter_flags.hpp"
+#include "cli/options.hpp"
+#include "cli/sensor_model_flag.hpp"
 
 namespace palpate::cli {
 

@@ -3,10 +3,10 @@
 #include <cstddef>
 #include <functional>
 
-#include "batch_task.hpp"
-#include "input_reading.hpp"
-#include "recogniser.hpp"
-#include "recognition_flags.hpp"
+#include "cli/batch/batch_task.hpp"
+#include "cli/batch/input_reading.hpp"
+#include "cli/recognition_flags.hpp"
+#include "recognition/recogniser.hpp"
 
 namespace palpate::cli {
 

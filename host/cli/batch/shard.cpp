@@ -1,11 +1,11 @@
-#include "shard.hpp"
+#include "cli/batch/shard.hpp"
 
 #include <charconv>
 #include <optional>
 #include <string_view>
 
-#include "options.hpp"
-#include "slurm.hpp"
+#include "cli/batch/slurm.hpp"
+#include "cli/options.hpp"
 
 namespace palpate::cli {
 

@@ -1,4 +1,4 @@
-#include "slurm.hpp"
+#include "cli/batch/slurm.hpp"
 
 #include <algorithm>
 #include <charconv>
@@ -6,7 +6,7 @@
 #include <string_view>
 #include <vector>
 
-#include "options.hpp"
+#include "cli/options.hpp"
 
 namespace palpate::cli {
 

@@ -1,4 +1,4 @@
-#include "array_overlap.hpp"
+#include "estimation/bounded/array_overlap.hpp"
 
 #include <algorithm>
 #include <cmath>

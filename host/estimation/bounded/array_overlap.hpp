@@ -2,7 +2,7 @@
 
 #include <cstdint>
 
-#include "bounding_box.hpp"
+#include "model/bounding_box.hpp"
 #include "palpate/lattice.hpp"
 #include "palpate/touch.hpp"
 

@@ -1,4 +1,4 @@
-#include "belief_draws.hpp"
+#include "estimation/bounded/belief_draws.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -5,10 +5,10 @@
 #include <span>
 #include <vector>
 
-#include "bin_likelihood.hpp"
+#include "estimation/bounded/bin_likelihood.hpp"
+#include "model/random.hpp"
 #include "palpate/estimate.hpp"
 #include "palpate/lattice.hpp"
-#include "random.hpp"
 
 namespace palpate {
 

@@ -10,10 +10,10 @@
 #include <algorithm>
 #include <type_traits>
 
-#include "bin_kernel.hpp"
-#include "patch_interpolation-inl.hpp"
-#include "table_look_up-inl.hpp"
-#include "vector_math-inl.hpp"
+#include "estimation/bounded/bin_kernel.hpp"
+#include "estimation/bounded/patch_interpolation-inl.hpp"
+#include "estimation/bounded/table_look_up-inl.hpp"
+#include "model/vector_math-inl.hpp"
 
 HWY_BEFORE_NAMESPACE();
 namespace palpate {

@@ -8,9 +8,9 @@
 
 #include <glm/vec2.hpp>
 
-#include "known_elements.hpp"
-#include "map_patches.hpp"
-#include "reading_form.hpp"
+#include "estimation/bounded/known_elements.hpp"
+#include "estimation/bounded/map_patches.hpp"
+#include "estimation/bounded/reading_form.hpp"
 
 namespace palpate {
 

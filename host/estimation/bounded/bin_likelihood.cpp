@@ -1,4 +1,4 @@
-#include "bin_likelihood.hpp"
+#include "estimation/bounded/bin_likelihood.hpp"
 
 #include <algorithm>
 #include <array>

@@ -6,14 +6,14 @@
 #include <string>
 #include <vector>
 
-#include "bin_kernel.hpp"
-#include "known_elements.hpp"
-#include "map_extent.hpp"
-#include "map_patches.hpp"
+#include "estimation/bounded/bin_kernel.hpp"
+#include "estimation/bounded/known_elements.hpp"
+#include "estimation/bounded/map_extent.hpp"
+#include "estimation/bounded/map_patches.hpp"
+#include "estimation/bounded/reading_form.hpp"
 #include "palpate/contact_model.hpp"
 #include "palpate/estimate.hpp"
 #include "palpate/lattice.hpp"
-#include "reading_form.hpp"
 
 namespace palpate {
 

@@ -1,7 +1,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "bin_likelihood.hpp"
+#include "estimation/bounded/bin_likelihood.hpp"
 
 // Bounds of BinLikelihood's rounding. A unit of roundoff is u for the lanes' numbers, v for
 // float64: every sum, product and quotient has a relative error of at most one unit. Terms of the

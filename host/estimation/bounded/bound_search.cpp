@@ -1,9 +1,9 @@
-#include "bound_search.hpp"
+#include "estimation/bounded/bound_search.hpp"
 
 #include <algorithm>
 
-#include "parallel_for.hpp"
-#include "seen_window.hpp"
+#include "estimation/bounded/parallel_for.hpp"
+#include "estimation/bounded/seen_window.hpp"
 
 namespace palpate {
 

@@ -5,12 +5,12 @@
 #include <span>
 #include <vector>
 
-#include "bin_likelihood.hpp"
-#include "known_elements.hpp"
-#include "leaf_evaluator.hpp"
+#include "estimation/bounded/bin_likelihood.hpp"
+#include "estimation/bounded/known_elements.hpp"
+#include "estimation/bounded/leaf_evaluator.hpp"
+#include "estimation/bounded/resting_array.hpp"
+#include "estimation/bounded/search_space.hpp"
 #include "palpate/bounded_posterior.hpp"
-#include "resting_array.hpp"
-#include "search_space.hpp"
 
 namespace palpate {
 

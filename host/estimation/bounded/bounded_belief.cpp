@@ -1,4 +1,4 @@
-#include "bounded_belief.hpp"
+#include "estimation/bounded/bounded_belief.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -8,10 +8,10 @@
 #include <fmt/format.h>
 #include <tbb/info.h>
 
-#include "belief_draws.hpp"
-#include "hypotheses.hpp"
-#include "log_sum.hpp"
-#include "moved_pivot.hpp"
+#include "estimation/bounded/belief_draws.hpp"
+#include "estimation/bounded/log_sum.hpp"
+#include "estimation/hypotheses.hpp"
+#include "estimation/moved_pivot.hpp"
 
 namespace palpate {
 

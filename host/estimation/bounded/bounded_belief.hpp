@@ -9,17 +9,17 @@
 
 #include <tbb/task_arena.h>
 
-#include "bin_likelihood.hpp"
-#include "bound_search.hpp"
-#include "evaluated_bins.hpp"
-#include "faster_bin_likelihood.hpp"
-#include "followed_bins.hpp"
-#include "half_done.hpp"
-#include "kept_touches.hpp"
-#include "known_elements.hpp"
-#include "none_evidence.hpp"
+#include "estimation/bounded/bin_likelihood.hpp"
+#include "estimation/bounded/bound_search.hpp"
+#include "estimation/bounded/evaluated_bins.hpp"
+#include "estimation/bounded/faster_bin_likelihood.hpp"
+#include "estimation/bounded/followed_bins.hpp"
+#include "estimation/bounded/kept_touches.hpp"
+#include "estimation/bounded/known_elements.hpp"
+#include "estimation/bounded/none_evidence.hpp"
+#include "estimation/bounded/search_space.hpp"
+#include "estimation/half_done.hpp"
 #include "palpate/bounded_posterior.hpp"
-#include "search_space.hpp"
 
 namespace palpate {
 

@@ -7,17 +7,17 @@
 #include <utility>
 
 #include <fmt/format.h>
-#include "bounded_belief.hpp"
-#include "hypotheses.hpp"
-#include "interpolated_map.hpp"
-#include "log_sum.hpp"
-#include "marginal_sums.hpp"
-#include "own_process.hpp"
+#include "estimation/bounded/bounded_belief.hpp"
+#include "estimation/bounded/log_sum.hpp"
+#include "estimation/bounded/marginal_sums.hpp"
+#include "estimation/bounded/parallel_for.hpp"
+#include "estimation/bounded/search_memory.hpp"
+#include "estimation/bounded/thinned_lattice.hpp"
+#include "estimation/hypotheses.hpp"
+#include "estimation/lattice/refinement.hpp"
+#include "model/interpolated_map.hpp"
+#include "model/own_process.hpp"
 #include "palpate/error.hpp"
-#include "parallel_for.hpp"
-#include "refinement.hpp"
-#include "search_memory.hpp"
-#include "thinned_lattice.hpp"
 
 namespace palpate {
 

@@ -1,10 +1,10 @@
-#include "device_bin_error.hpp"
+#include "estimation/bounded/device_bin_error.hpp"
 
 #include <algorithm>
 #include <cmath>
 
-#include "contact_kernel.hpp"
-#include "interface.h"
+#include "estimation/contact_kernel.hpp"
+#include "shaders/interface.h"
 
 // A bound of the rounding of evaluate_boxes, by the precision that Vulkan asks of float32: sums,
 // products, floor and comparisons are rounded correctly (a fused product is closer still),

@@ -4,12 +4,12 @@
 #include <span>
 #include <vector>
 
-#include "known_elements.hpp"
-#include "map_extent.hpp"
+#include "estimation/bounded/known_elements.hpp"
+#include "estimation/bounded/map_extent.hpp"
+#include "estimation/bounded/reading_form.hpp"
 #include "palpate/contact_model.hpp"
 #include "palpate/estimate.hpp"
 #include "palpate/lattice.hpp"
-#include "reading_form.hpp"
 
 namespace palpate {
 

@@ -1,12 +1,12 @@
-#include "device_bin_likelihood.hpp"
+#include "estimation/bounded/device_bin_likelihood.hpp"
 
 #include <algorithm>
 #include <cmath>
 
-#include "contact_evidence.hpp"
-#include "evaluate_boxes.hpp"
-#include "interface.h"
-#include "kernel_sizes.hpp"
+#include "estimation/contact_evidence.hpp"
+#include "estimation/kernel_sizes.hpp"
+#include "shaders/evaluate_boxes.hpp"
+#include "shaders/interface.h"
 
 namespace palpate {
 

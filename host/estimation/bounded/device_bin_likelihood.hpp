@@ -5,14 +5,14 @@
 #include <string>
 #include <vector>
 
-#include "bin_likelihood.hpp"
-#include "command_stream.hpp"
-#include "contact_kernel.hpp"
-#include "interface.h"
-#include "known_elements.hpp"
-#include "map_table.hpp"
+#include "estimation/bounded/bin_likelihood.hpp"
+#include "estimation/bounded/known_elements.hpp"
+#include "estimation/contact_kernel.hpp"
+#include "estimation/lattice/map_table.hpp"
+#include "gpu/command_stream.hpp"
 #include "palpate/contact_model.hpp"
 #include "palpate/lattice.hpp"
+#include "shaders/interface.h"
 
 namespace palpate {
 

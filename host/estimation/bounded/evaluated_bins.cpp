@@ -1,4 +1,4 @@
-#include "evaluated_bins.hpp"
+#include "estimation/bounded/evaluated_bins.hpp"
 
 namespace palpate {
 

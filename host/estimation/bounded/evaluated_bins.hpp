@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "leaf_evaluator.hpp"
+#include "estimation/bounded/leaf_evaluator.hpp"
 
 namespace palpate {
 

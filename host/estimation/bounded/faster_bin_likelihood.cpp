@@ -1,12 +1,12 @@
-#include "faster_bin_likelihood.hpp"
+#include "estimation/bounded/faster_bin_likelihood.hpp"
 
 #include <algorithm>
 #include <chrono>
 
 #include <fmt/format.h>
-#include "log_message.hpp"
+#include "estimation/bounded/parallel_for.hpp"
+#include "model/log_message.hpp"
 #include "palpate/error.hpp"
-#include "parallel_for.hpp"
 
 namespace palpate {
 

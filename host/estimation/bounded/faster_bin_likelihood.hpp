@@ -7,11 +7,11 @@
 #include <string>
 #include <vector>
 
-#include "bin_likelihood.hpp"
-#include "context.hpp"
-#include "device_bin_error.hpp"
-#include "device_bin_likelihood.hpp"
-#include "known_elements.hpp"
+#include "estimation/bounded/bin_likelihood.hpp"
+#include "estimation/bounded/device_bin_error.hpp"
+#include "estimation/bounded/device_bin_likelihood.hpp"
+#include "estimation/bounded/known_elements.hpp"
+#include "gpu/context.hpp"
 
 namespace palpate {
 

@@ -1,4 +1,4 @@
-#include "followed_bins.hpp"
+#include "estimation/bounded/followed_bins.hpp"
 
 #include <cmath>
 

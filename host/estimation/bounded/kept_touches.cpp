@@ -1,9 +1,9 @@
-#include "kept_touches.hpp"
+#include "estimation/bounded/kept_touches.hpp"
 
 #include <algorithm>
 #include <utility>
 
-#include "contact_readings.hpp"
+#include "model/contact_readings.hpp"
 
 namespace palpate {
 

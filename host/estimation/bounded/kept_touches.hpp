@@ -4,7 +4,7 @@
 #include <span>
 #include <vector>
 
-#include "known_elements.hpp"
+#include "estimation/bounded/known_elements.hpp"
 
 namespace palpate {
 

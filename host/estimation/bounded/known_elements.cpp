@@ -1,4 +1,4 @@
-#include "known_elements.hpp"
+#include "estimation/bounded/known_elements.hpp"
 
 #include <algorithm>
 #include <tuple>

@@ -1,12 +1,12 @@
-#include "leaf_evaluator.hpp"
+#include "estimation/bounded/leaf_evaluator.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <numeric>
 
-#include "parallel_for.hpp"
-#include "touch_overlap.hpp"
+#include "estimation/bounded/parallel_for.hpp"
+#include "estimation/bounded/touch_overlap.hpp"
 
 namespace palpate {
 

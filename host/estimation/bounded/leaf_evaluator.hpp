@@ -8,10 +8,10 @@
 #include <span>
 #include <vector>
 
-#include "bin_likelihood.hpp"
-#include "faster_bin_likelihood.hpp"
-#include "known_elements.hpp"
-#include "mass_account.hpp"
+#include "estimation/bounded/bin_likelihood.hpp"
+#include "estimation/bounded/faster_bin_likelihood.hpp"
+#include "estimation/bounded/known_elements.hpp"
+#include "estimation/bounded/mass_account.hpp"
 
 namespace palpate {
 

@@ -1,4 +1,4 @@
-#include "leaf_pass.hpp"
+#include "estimation/bounded/leaf_pass.hpp"
 
 #include <algorithm>
 #include <bit>

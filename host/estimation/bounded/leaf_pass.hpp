@@ -5,10 +5,10 @@
 #include <span>
 #include <vector>
 
-#include "leaf_evaluator.hpp"
-#include "mass_account.hpp"
-#include "tile_bounds.hpp"
-#include "unsettled_mass.hpp"
+#include "estimation/bounded/leaf_evaluator.hpp"
+#include "estimation/bounded/mass_account.hpp"
+#include "estimation/bounded/tile_bounds.hpp"
+#include "estimation/bounded/unsettled_mass.hpp"
 
 namespace palpate {
 

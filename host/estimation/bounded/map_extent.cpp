@@ -1,4 +1,4 @@
-#include "map_extent.hpp"
+#include "estimation/bounded/map_extent.hpp"
 
 #include <algorithm>
 #include <cmath>

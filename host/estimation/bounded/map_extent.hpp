@@ -1,6 +1,6 @@
 #pragma once
 
-#include "known_elements.hpp"
+#include "estimation/bounded/known_elements.hpp"
 #include "palpate/lattice.hpp"
 #include "palpate/occupancy_grid.hpp"
 

@@ -1,4 +1,4 @@
-#include "map_patches.hpp"
+#include "estimation/bounded/map_patches.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "map_squares.hpp"
+#include "estimation/bounded/map_squares.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "marginal_sums.hpp"
+#include "estimation/bounded/marginal_sums.hpp"
 
 #include <cmath>
 #include <cstddef>

@@ -8,10 +8,10 @@
 #include <span>
 #include <vector>
 
-#include "bin_likelihood.hpp"
-#include "log_sum.hpp"
+#include "estimation/bounded/bin_likelihood.hpp"
+#include "estimation/bounded/log_sum.hpp"
+#include "estimation/bounded/unsettled_mass.hpp"
 #include "palpate/lattice.hpp"
-#include "unsettled_mass.hpp"
 
 namespace palpate {
 

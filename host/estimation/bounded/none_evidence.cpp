@@ -1,11 +1,11 @@
-#include "none_evidence.hpp"
+#include "estimation/bounded/none_evidence.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
-#include "log_sum.hpp"
-#include "touch_overlap.hpp"
+#include "estimation/bounded/log_sum.hpp"
+#include "estimation/bounded/touch_overlap.hpp"
 
 namespace palpate {
 

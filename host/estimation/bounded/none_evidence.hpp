@@ -8,10 +8,10 @@
 #include <span>
 #include <vector>
 
-#include "bound_search.hpp"
-#include "known_elements.hpp"
+#include "estimation/bounded/bound_search.hpp"
+#include "estimation/bounded/known_elements.hpp"
+#include "estimation/bounded/search_space.hpp"
 #include "palpate/estimate.hpp"
-#include "search_space.hpp"
 
 namespace palpate {
 

@@ -14,9 +14,9 @@
 
 #include <hwy/highway.h>
 
-#include "bin_kernel.hpp"
-#include "map_patches.hpp"
-#include "vector_math-inl.hpp"
+#include "estimation/bounded/bin_kernel.hpp"
+#include "estimation/bounded/map_patches.hpp"
+#include "model/vector_math-inl.hpp"
 
 HWY_BEFORE_NAMESPACE();
 namespace palpate {

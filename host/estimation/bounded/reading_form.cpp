@@ -1,4 +1,4 @@
-#include "reading_form.hpp"
+#include "estimation/bounded/reading_form.hpp"
 
 #include <algorithm>
 #include <cmath>

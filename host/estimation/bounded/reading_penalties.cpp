@@ -1,4 +1,4 @@
-#include "reading_penalties.hpp"
+#include "estimation/bounded/reading_penalties.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "map_squares.hpp"
+#include "estimation/bounded/map_squares.hpp"
 #include "palpate/contact_model.hpp"
 
 namespace palpate {

@@ -1,9 +1,9 @@
-#include "resting_array.hpp"
+#include "estimation/bounded/resting_array.hpp"
 
 #include <algorithm>
 
-#include "reading_penalties.hpp"
-#include "tile_penalties.hpp"
+#include "estimation/bounded/reading_penalties.hpp"
+#include "estimation/bounded/tile_penalties.hpp"
 
 namespace palpate {
 

@@ -4,7 +4,7 @@
 
 #include <glm/vec2.hpp>
 
-#include "known_elements.hpp"
+#include "estimation/bounded/known_elements.hpp"
 
 namespace palpate {
 

@@ -1,4 +1,4 @@
-#include "search_memory.hpp"
+#include "estimation/bounded/search_memory.hpp"
 
 #include <unistd.h>
 
@@ -9,12 +9,12 @@
 
 #include <fmt/format.h>
 
-#include "array_overlap.hpp"
-#include "leaf_pass.hpp"
-#include "map_patches.hpp"
+#include "estimation/bounded/array_overlap.hpp"
+#include "estimation/bounded/leaf_pass.hpp"
+#include "estimation/bounded/map_patches.hpp"
+#include "estimation/bounded/tile_levels.hpp"
+#include "estimation/bounded/window_table.hpp"
 #include "palpate/error.hpp"
-#include "tile_levels.hpp"
-#include "window_table.hpp"
 
 namespace palpate {
 

@@ -1,6 +1,6 @@
 // One run of a BoundSearch, from the largest tiles to their bins.
 
-#include "bound_search.hpp"
+#include "estimation/bounded/bound_search.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -9,12 +9,12 @@
 #include <numeric>
 #include <tuple>
 
-#include "contradiction.hpp"
-#include "leaf_pass.hpp"
-#include "parallel_for.hpp"
-#include "seen_window.hpp"
-#include "touch_overlap.hpp"
-#include "unsettled_mass.hpp"
+#include "estimation/bounded/leaf_pass.hpp"
+#include "estimation/bounded/parallel_for.hpp"
+#include "estimation/bounded/seen_window.hpp"
+#include "estimation/bounded/touch_overlap.hpp"
+#include "estimation/bounded/unsettled_mass.hpp"
+#include "estimation/contradiction.hpp"
 
 namespace palpate {
 

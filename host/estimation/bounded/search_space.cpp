@@ -1,4 +1,4 @@
-#include "search_space.hpp"
+#include "estimation/bounded/search_space.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -7,8 +7,8 @@
 #include <optional>
 #include <string>
 
-#include "hypotheses.hpp"
-#include "parallel_for.hpp"
+#include "estimation/bounded/parallel_for.hpp"
+#include "estimation/hypotheses.hpp"
 
 namespace palpate {
 

@@ -7,11 +7,11 @@
 
 #include <glm/vec2.hpp>
 
-#include "bounding_box.hpp"
+#include "estimation/bounded/tile_bounds.hpp"
+#include "model/bounding_box.hpp"
 #include "palpate/bounded_posterior.hpp"
 #include "palpate/estimate.hpp"
 #include "palpate/occupancy_grid.hpp"
-#include "tile_bounds.hpp"
 
 namespace palpate {
 

@@ -1,4 +1,4 @@
-#include "seen_window.hpp"
+#include "estimation/bounded/seen_window.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -3,10 +3,10 @@
 #include <span>
 #include <vector>
 
-#include "bounding_box.hpp"
-#include "known_elements.hpp"
+#include "estimation/bounded/known_elements.hpp"
+#include "estimation/bounded/tile_levels.hpp"
+#include "model/bounding_box.hpp"
 #include "palpate/occupancy_grid.hpp"
-#include "tile_levels.hpp"
 
 namespace palpate {
 

@@ -16,11 +16,11 @@
 
 #include <hwy/highway.h>
 
-#include "bin_kernel.hpp"
-#include "map_patches.hpp"
-#include "patch_interpolation-inl.hpp"
-#include "reading_form.hpp"
-#include "vector_math-inl.hpp"
+#include "estimation/bounded/bin_kernel.hpp"
+#include "estimation/bounded/map_patches.hpp"
+#include "estimation/bounded/patch_interpolation-inl.hpp"
+#include "estimation/bounded/reading_form.hpp"
+#include "model/vector_math-inl.hpp"
 
 HWY_BEFORE_NAMESPACE();
 namespace palpate {

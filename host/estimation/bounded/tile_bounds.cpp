@@ -1,9 +1,9 @@
-#include "tile_bounds.hpp"
+#include "estimation/bounded/tile_bounds.hpp"
 
 #include <algorithm>
 
-#include "parallel_for.hpp"
-#include "reading_penalties.hpp"
+#include "estimation/bounded/parallel_for.hpp"
+#include "estimation/bounded/reading_penalties.hpp"
 
 namespace palpate {
 

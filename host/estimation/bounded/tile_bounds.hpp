@@ -5,12 +5,12 @@
 #include <span>
 #include <vector>
 
-#include "known_elements.hpp"
+#include "estimation/bounded/known_elements.hpp"
+#include "estimation/bounded/tile_levels.hpp"
+#include "estimation/bounded/tile_penalties.hpp"
+#include "estimation/bounded/window_table.hpp"
 #include "palpate/contact_model.hpp"
 #include "palpate/occupancy_grid.hpp"
-#include "tile_levels.hpp"
-#include "tile_penalties.hpp"
-#include "window_table.hpp"
 
 namespace palpate {
 

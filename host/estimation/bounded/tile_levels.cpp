@@ -1,10 +1,10 @@
-#include "tile_levels.hpp"
+#include "estimation/bounded/tile_levels.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <optional>
 
-#include "window_table.hpp"
+#include "estimation/bounded/window_table.hpp"
 
 namespace palpate {
 

@@ -5,7 +5,7 @@
 
 #include <glm/vec2.hpp>
 
-#include "bin_likelihood.hpp"
+#include "estimation/bounded/bin_likelihood.hpp"
 #include "palpate/lattice.hpp"
 
 namespace palpate {

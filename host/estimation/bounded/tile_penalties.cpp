@@ -1,6 +1,6 @@
 // Highway compiles this file once for every set of vector instructions. Products and sums are never
 // fused, so that every set gives the same bits.
-#include "tile_penalties.hpp"
+#include "estimation/bounded/tile_penalties.hpp"
 
 #include <algorithm>
 

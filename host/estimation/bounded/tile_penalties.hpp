@@ -6,9 +6,9 @@
 #include <span>
 #include <vector>
 
-#include "known_elements.hpp"
+#include "estimation/bounded/known_elements.hpp"
+#include "estimation/bounded/window_table.hpp"
 #include "palpate/pose.hpp"
-#include "window_table.hpp"
 
 namespace palpate {
 

@@ -1,10 +1,10 @@
-#include "touch_overlap.hpp"
+#include "estimation/bounded/touch_overlap.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
-#include "parallel_for.hpp"
+#include "estimation/bounded/parallel_for.hpp"
 
 namespace palpate {
 

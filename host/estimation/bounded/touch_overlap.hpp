@@ -4,9 +4,9 @@
 #include <span>
 #include <vector>
 
-#include "array_overlap.hpp"
-#include "bin_likelihood.hpp"
-#include "bounding_box.hpp"
+#include "estimation/bounded/array_overlap.hpp"
+#include "estimation/bounded/bin_likelihood.hpp"
+#include "model/bounding_box.hpp"
 #include "palpate/lattice.hpp"
 
 namespace palpate {

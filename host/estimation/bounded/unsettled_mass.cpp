@@ -1,4 +1,4 @@
-#include "unsettled_mass.hpp"
+#include "estimation/bounded/unsettled_mass.hpp"
 
 #include <algorithm>
 #include <bit>

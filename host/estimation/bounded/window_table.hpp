@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "reading_penalties.hpp"
+#include "estimation/bounded/reading_penalties.hpp"
 
 namespace palpate {
 

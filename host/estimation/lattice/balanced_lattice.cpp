@@ -9,11 +9,11 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
-#include "bounding_box.hpp"
-#include "command_stream.hpp"
-#include "hypotheses.hpp"
+#include "estimation/hypotheses.hpp"
+#include "estimation/lattice/refinement.hpp"
+#include "gpu/command_stream.hpp"
+#include "model/bounding_box.hpp"
 #include "palpate/error.hpp"
-#include "refinement.hpp"
 
 namespace palpate {
 

@@ -1,4 +1,4 @@
-#include "blur_tables.hpp"
+#include "estimation/lattice/blur_tables.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -5,9 +5,9 @@
 
 #include <glm/vec2.hpp>
 
-#include "interface.h"
 #include "palpate/displacement.hpp"
 #include "palpate/lattice.hpp"
+#include "shaders/interface.h"
 
 namespace palpate {
 

@@ -1,4 +1,4 @@
-#include "body_window.hpp"
+#include "estimation/lattice/body_window.hpp"
 
 #include <algorithm>
 #include <cmath>

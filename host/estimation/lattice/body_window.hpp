@@ -5,7 +5,7 @@
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 
-#include "bin_window.hpp"
+#include "estimation/lattice/bin_window.hpp"
 #include "palpate/lattice.hpp"
 #include "palpate/pose_error.hpp"
 

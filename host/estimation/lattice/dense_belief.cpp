@@ -1,4 +1,4 @@
-#include "dense_belief.hpp"
+#include "estimation/lattice/dense_belief.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -6,10 +6,10 @@
 
 #include <fmt/format.h>
 
-#include "add_belief.hpp"
-#include "interface.h"
-#include "reduce_belief.hpp"
-#include "sum_marginals.hpp"
+#include "shaders/add_belief.hpp"
+#include "shaders/interface.h"
+#include "shaders/reduce_belief.hpp"
+#include "shaders/sum_marginals.hpp"
 
 namespace palpate {
 

@@ -4,13 +4,13 @@
 #include <span>
 #include <vector>
 
-#include "bin_window.hpp"
-#include "command_stream.hpp"
-#include "kernel_sizes.hpp"
+#include "estimation/kernel_sizes.hpp"
+#include "estimation/lattice/bin_window.hpp"
+#include "estimation/lattice/slab.hpp"
+#include "estimation/two_float.hpp"
+#include "gpu/command_stream.hpp"
 #include "palpate/estimate.hpp"
 #include "palpate/lattice.hpp"
-#include "slab.hpp"
-#include "two_float.hpp"
 
 namespace palpate {
 

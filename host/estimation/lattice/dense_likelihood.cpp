@@ -1,13 +1,13 @@
-#include "dense_likelihood.hpp"
+#include "estimation/lattice/dense_likelihood.hpp"
 
 #include <algorithm>
 #include <cmath>
 
 #include <fmt/format.h>
 
-#include "interface.h"
-#include "kernel_sizes.hpp"
+#include "estimation/kernel_sizes.hpp"
 #include "palpate/error.hpp"
+#include "shaders/interface.h"
 
 namespace palpate {
 

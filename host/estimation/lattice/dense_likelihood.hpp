@@ -5,11 +5,11 @@
 #include <span>
 #include <vector>
 
-#include "command_stream.hpp"
-#include "contact_evidence.hpp"
-#include "contact_kernel.hpp"
-#include "dense_belief.hpp"
-#include "map_table.hpp"
+#include "estimation/contact_evidence.hpp"
+#include "estimation/contact_kernel.hpp"
+#include "estimation/lattice/dense_belief.hpp"
+#include "estimation/lattice/map_table.hpp"
+#include "gpu/command_stream.hpp"
 #include "palpate/lattice.hpp"
 #include "palpate/pose_histogram.hpp"
 

@@ -1,16 +1,16 @@
-#include "displacement_blur.hpp"
+#include "estimation/lattice/displacement_blur.hpp"
 
 #include <algorithm>
 #include <bit>
 
 #include <fmt/format.h>
 
-#include "blur_axis.hpp"
-#include "blur_tables.hpp"
-#include "kernel_sizes.hpp"
-#include "max_planes.hpp"
+#include "estimation/kernel_sizes.hpp"
+#include "estimation/lattice/blur_tables.hpp"
 #include "palpate/error.hpp"
-#include "sum_turns.hpp"
+#include "shaders/blur_axis.hpp"
+#include "shaders/max_planes.hpp"
+#include "shaders/sum_turns.hpp"
 
 namespace palpate {
 

@@ -5,12 +5,12 @@
 #include <span>
 #include <vector>
 
-#include "command_stream.hpp"
-#include "dense_belief.hpp"
-#include "interface.h"
+#include "estimation/lattice/dense_belief.hpp"
+#include "estimation/two_float.hpp"
+#include "gpu/command_stream.hpp"
 #include "palpate/displacement.hpp"
 #include "palpate/lattice.hpp"
-#include "two_float.hpp"
+#include "shaders/interface.h"
 
 namespace palpate {
 

@@ -1,4 +1,4 @@
-#include "expected_gain.hpp"
+#include "estimation/lattice/expected_gain.hpp"
 
 #include <algorithm>
 #include <array>
@@ -12,9 +12,9 @@
 
 #include <fmt/format.h>
 
-#include "displacement_points.hpp"
+#include "model/displacement_points.hpp"
+#include "model/random.hpp"
 #include "palpate/error.hpp"
-#include "random.hpp"
 
 namespace palpate {
 

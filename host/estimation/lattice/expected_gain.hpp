@@ -5,12 +5,12 @@
 
 #include <glm/vec2.hpp>
 
+#include "estimation/lattice/reading_predictor.hpp"
 #include "palpate/displacement.hpp"
 #include "palpate/estimate.hpp"
 #include "palpate/plan.hpp"
 #include "palpate/pose.hpp"
 #include "palpate/pose_error.hpp"
-#include "reading_predictor.hpp"
 
 namespace palpate {
 

@@ -1,4 +1,4 @@
-#include "flattening.hpp"
+#include "estimation/lattice/flattening.hpp"
 
 #include <algorithm>
 #include <cmath>

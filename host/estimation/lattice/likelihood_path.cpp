@@ -1,4 +1,4 @@
-#include "likelihood_path.hpp"
+#include "estimation/lattice/likelihood_path.hpp"
 
 #include <algorithm>
 #include <bit>
@@ -9,11 +9,11 @@
 #include <fmt/format.h>
 #include <glm/vec2.hpp>
 
-#include "accumulate_rows.hpp"
-#include "accumulate_tiles.hpp"
-#include "contact_kernel.hpp"
-#include "interface.h"
-#include "kernel_sizes.hpp"
+#include "estimation/contact_kernel.hpp"
+#include "estimation/kernel_sizes.hpp"
+#include "shaders/accumulate_rows.hpp"
+#include "shaders/accumulate_tiles.hpp"
+#include "shaders/interface.h"
 
 namespace palpate {
 

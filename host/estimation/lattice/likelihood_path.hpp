@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <string>
 
-#include "kernel.hpp"
+#include "gpu/kernel.hpp"
 #include "palpate/contact_model.hpp"
 #include "palpate/lattice.hpp"
 

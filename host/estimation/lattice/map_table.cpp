@@ -1,12 +1,12 @@
-#include "map_table.hpp"
+#include "estimation/lattice/map_table.hpp"
 
 #include <algorithm>
 
 #include <fmt/format.h>
 
-#include "bordered_map.hpp"
-#include "interface.h"
+#include "estimation/bordered_map.hpp"
 #include "palpate/error.hpp"
+#include "shaders/interface.h"
 
 namespace palpate {
 

@@ -4,10 +4,10 @@
 #include <span>
 #include <vector>
 
-#include "bordered_map.hpp"
-#include "command_stream.hpp"
-#include "contact_kernel.hpp"
-#include "likelihood_path.hpp"
+#include "estimation/bordered_map.hpp"
+#include "estimation/contact_kernel.hpp"
+#include "estimation/lattice/likelihood_path.hpp"
+#include "gpu/command_stream.hpp"
 #include "palpate/estimate.hpp"
 #include "palpate/lattice.hpp"
 

@@ -1,16 +1,16 @@
-#include "memory_plan.hpp"
+#include "estimation/lattice/memory_plan.hpp"
 
 #include <algorithm>
 #include <cmath>
 
 #include <fmt/format.h>
 
-#include "command_stream.hpp"
-#include "dense_belief.hpp"
-#include "dense_likelihood.hpp"
-#include "interface.h"
+#include "estimation/lattice/dense_belief.hpp"
+#include "estimation/lattice/dense_likelihood.hpp"
+#include "estimation/lattice/touch_by_touch.hpp"
+#include "gpu/command_stream.hpp"
 #include "palpate/error.hpp"
-#include "touch_by_touch.hpp"
+#include "shaders/interface.h"
 
 namespace palpate {
 

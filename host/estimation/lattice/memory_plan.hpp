@@ -3,7 +3,7 @@
 #include <cstddef>
 #include <span>
 
-#include "context.hpp"
+#include "gpu/context.hpp"
 #include "palpate/pose_histogram.hpp"
 
 namespace palpate {

@@ -1,12 +1,12 @@
-#include "overlap_mean.hpp"
+#include "estimation/lattice/overlap_mean.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <utility>
 
-#include "kernel_sizes.hpp"
-#include "sum_overlap.hpp"
+#include "estimation/kernel_sizes.hpp"
+#include "shaders/sum_overlap.hpp"
 
 namespace palpate {
 

@@ -4,13 +4,13 @@
 #include <span>
 #include <vector>
 
-#include "bounding_box.hpp"
-#include "command_stream.hpp"
-#include "dense_belief.hpp"
-#include "interface.h"
+#include "estimation/lattice/dense_belief.hpp"
+#include "gpu/command_stream.hpp"
+#include "model/bounding_box.hpp"
 #include "palpate/estimate.hpp"
 #include "palpate/lattice.hpp"
 #include "palpate/touch.hpp"
+#include "shaders/interface.h"
 
 namespace palpate {
 

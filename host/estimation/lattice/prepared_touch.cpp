@@ -1,10 +1,10 @@
-#include "prepared_touch.hpp"
+#include "estimation/lattice/prepared_touch.hpp"
 
 #include <utility>
 
 #include <fmt/format.h>
 
-#include "log_message.hpp"
+#include "model/log_message.hpp"
 #include "palpate/error.hpp"
 
 namespace palpate {

@@ -4,9 +4,9 @@
 #include <functional>
 #include <optional>
 
-#include "contact_evidence.hpp"
-#include "dense_belief.hpp"
-#include "dense_likelihood.hpp"
+#include "estimation/contact_evidence.hpp"
+#include "estimation/lattice/dense_belief.hpp"
+#include "estimation/lattice/dense_likelihood.hpp"
 
 namespace palpate {
 

@@ -1,4 +1,4 @@
-#include "quadratic_peak.hpp"
+#include "estimation/lattice/quadratic_peak.hpp"
 
 #include <cstddef>
 #include <utility>

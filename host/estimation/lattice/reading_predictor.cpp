@@ -1,12 +1,12 @@
-#include "reading_predictor.hpp"
+#include "estimation/lattice/reading_predictor.hpp"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 
-#include "bordered_map.hpp"
-#include "interface.h"
-#include "predicted_readings.hpp"
+#include "estimation/bordered_map.hpp"
+#include "model/predicted_readings.hpp"
+#include "shaders/interface.h"
 
 namespace palpate {
 

@@ -1,4 +1,4 @@
-#include "refinement.hpp"
+#include "estimation/lattice/refinement.hpp"
 
 #include <algorithm>
 #include <array>
@@ -11,10 +11,10 @@
 #include <glm/mat3x3.hpp>
 #include <glm/matrix.hpp>
 
-#include "body_window.hpp"
-#include "flattening.hpp"
+#include "estimation/lattice/body_window.hpp"
+#include "estimation/lattice/flattening.hpp"
+#include "estimation/lattice/quadratic_peak.hpp"
 #include "palpate/error.hpp"
-#include "quadratic_peak.hpp"
 
 namespace palpate {
 

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "bin_window.hpp"
+#include "estimation/lattice/bin_window.hpp"
 #include "palpate/estimate.hpp"
 #include "palpate/lattice.hpp"
 #include "palpate/pose_error.hpp"

@@ -1,12 +1,12 @@
-#include "slab.hpp"
+#include "estimation/lattice/slab.hpp"
 
 #include <algorithm>
 
 #include <fmt/format.h>
 
-#include "kernel_sizes.hpp"
+#include "estimation/kernel_sizes.hpp"
+#include "estimation/two_float.hpp"
 #include "palpate/error.hpp"
-#include "two_float.hpp"
 
 namespace palpate {
 

@@ -3,9 +3,9 @@
 #include <cstdint>
 #include <vector>
 
-#include "buffer.hpp"
-#include "interface.h"
+#include "gpu/buffer.hpp"
 #include "palpate/lattice.hpp"
+#include "shaders/interface.h"
 
 namespace palpate {
 

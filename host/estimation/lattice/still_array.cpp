@@ -1,9 +1,9 @@
-#include "still_array.hpp"
+#include "estimation/lattice/still_array.hpp"
 
 #include <algorithm>
 #include <utility>
 
-#include "contact_readings.hpp"
+#include "model/contact_readings.hpp"
 
 namespace palpate {
 

@@ -6,9 +6,9 @@
 #include <span>
 #include <vector>
 
-#include "contact_evidence.hpp"
-#include "dense_belief.hpp"
-#include "dense_likelihood.hpp"
+#include "estimation/contact_evidence.hpp"
+#include "estimation/lattice/dense_belief.hpp"
+#include "estimation/lattice/dense_likelihood.hpp"
 #include "palpate/contact_model.hpp"
 #include "palpate/lattice.hpp"
 

@@ -1,4 +1,4 @@
-#include "touch_by_touch.hpp"
+#include "estimation/lattice/touch_by_touch.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -6,8 +6,8 @@
 #include <numeric>
 #include <utility>
 
-#include "blur_tables.hpp"
-#include "refinement.hpp"
+#include "estimation/lattice/blur_tables.hpp"
+#include "estimation/lattice/refinement.hpp"
 
 namespace palpate {
 

@@ -6,13 +6,13 @@
 #include <span>
 #include <vector>
 
-#include "contact_evidence.hpp"
-#include "dense_belief.hpp"
-#include "dense_likelihood.hpp"
-#include "displacement_blur.hpp"
-#include "overlap_mean.hpp"
+#include "estimation/contact_evidence.hpp"
+#include "estimation/lattice/dense_belief.hpp"
+#include "estimation/lattice/dense_likelihood.hpp"
+#include "estimation/lattice/displacement_blur.hpp"
+#include "estimation/lattice/overlap_mean.hpp"
+#include "estimation/lattice/still_array.hpp"
 #include "palpate/pose_histogram.hpp"
-#include "still_array.hpp"
 
 namespace palpate {
 

@@ -1,4 +1,4 @@
-#include "evidence_grid.hpp"
+#include "estimation/maps/evidence_grid.hpp"
 
 #include <algorithm>
 #include <bit>
@@ -7,12 +7,12 @@
 #include <fmt/format.h>
 #include <glm/common.hpp>
 
-#include "accumulate_evidence.hpp"
-#include "interface.h"
-#include "kernel_sizes.hpp"
+#include "estimation/kernel_sizes.hpp"
+#include "estimation/two_float.hpp"
 #include "palpate/error.hpp"
 #include "palpate/occupancy_grid.hpp"
-#include "two_float.hpp"
+#include "shaders/accumulate_evidence.hpp"
+#include "shaders/interface.h"
 
 namespace palpate {
 

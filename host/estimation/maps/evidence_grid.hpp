@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "cell_range.hpp"
-#include "command_stream.hpp"
+#include "gpu/command_stream.hpp"
+#include "model/cell_range.hpp"
 #include "palpate/contact.hpp"
 #include "palpate/sensor_model.hpp"
 

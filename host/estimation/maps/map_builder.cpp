@@ -6,9 +6,9 @@
 #include <fmt/format.h>
 #include <glm/common.hpp>
 
-#include "evidence_grid.hpp"
-#include "half_done.hpp"
-#include "own_process.hpp"
+#include "estimation/half_done.hpp"
+#include "estimation/maps/evidence_grid.hpp"
+#include "model/own_process.hpp"
 #include "palpate/error.hpp"
 
 namespace palpate {

@@ -1,4 +1,4 @@
-#include "particle_likelihood.hpp"
+#include "estimation/particles/particle_likelihood.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -6,11 +6,11 @@
 
 #include <fmt/format.h>
 
-#include "bordered_map.hpp"
-#include "interface.h"
-#include "kernel_sizes.hpp"
+#include "estimation/bordered_map.hpp"
+#include "estimation/kernel_sizes.hpp"
 #include "palpate/error.hpp"
-#include "weigh_particles.hpp"
+#include "shaders/interface.h"
+#include "shaders/weigh_particles.hpp"
 
 namespace palpate {
 

@@ -3,10 +3,10 @@
 #include <span>
 #include <vector>
 
-#include "bordered_map.hpp"
-#include "command_stream.hpp"
-#include "contact_evidence.hpp"
-#include "contact_kernel.hpp"
+#include "estimation/bordered_map.hpp"
+#include "estimation/contact_evidence.hpp"
+#include "estimation/contact_kernel.hpp"
+#include "gpu/command_stream.hpp"
 #include "palpate/estimate.hpp"
 #include "palpate/lattice.hpp"
 

@@ -1,4 +1,4 @@
-#include "particle_options.hpp"
+#include "estimation/particles/particle_options.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -6,8 +6,8 @@
 
 #include <fmt/format.h>
 
+#include "estimation/two_float.hpp"
 #include "palpate/error.hpp"
-#include "two_float.hpp"
 
 namespace palpate {
 

@@ -4,10 +4,10 @@
 #include <span>
 #include <vector>
 
-#include "context.hpp"
-#include "interface.h"
+#include "gpu/context.hpp"
 #include "palpate/estimate.hpp"
 #include "palpate/particle_filter.hpp"
+#include "shaders/interface.h"
 
 namespace palpate {
 

@@ -1,4 +1,4 @@
-#include "parzen_mode.hpp"
+#include "estimation/particles/parzen_mode.hpp"
 
 #include <algorithm>
 #include <array>
@@ -9,7 +9,7 @@
 #include <glm/vec4.hpp>
 
 #include "palpate/pose.hpp"
-#include "sum_cones.hpp"
+#include "shaders/sum_cones.hpp"
 
 namespace palpate {
 

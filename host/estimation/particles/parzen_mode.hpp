@@ -3,8 +3,8 @@
 #include <cstdint>
 #include <span>
 
-#include "command_stream.hpp"
-#include "interface.h"
+#include "gpu/command_stream.hpp"
+#include "shaders/interface.h"
 
 namespace palpate {
 

@@ -1,4 +1,4 @@
-#include "weight_blocks.hpp"
+#include "estimation/particles/weight_blocks.hpp"
 
 #include <algorithm>
 #include <cmath>

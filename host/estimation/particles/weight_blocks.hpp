@@ -4,7 +4,7 @@
 #include <span>
 #include <vector>
 
-#include "interface.h"
+#include "shaders/interface.h"
 
 namespace palpate {
 

@@ -4,12 +4,12 @@
 #include <cmath>
 #include <random>
 
+#include "driver/packet_deframer.hpp"
+#include "driver/serial_profile.hpp"
 #include "io/scratch_folder.hpp"
-#include "packet_deframer.hpp"
 #include "palpate/error.hpp"
 #include "receiver.hpp"
 #include "sent_frame.hpp"
-#include "serial_profile.hpp"
 
 namespace palpate {
 namespace {

@@ -1,4 +1,4 @@
-#include "checksum.hpp"
+#include "driver/checksum.hpp"
 
 #include <gtest/gtest.h>
 

@@ -4,10 +4,10 @@
 
 #include <string>
 
-#include "checksum.hpp"
+#include "driver/checksum.hpp"
+#include "driver/serial_profile.hpp"
 #include "driver/without_memory.hpp"
 #include "receiver.hpp"
-#include "serial_profile.hpp"
 
 namespace palpate {
 namespace {

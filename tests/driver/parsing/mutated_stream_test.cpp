@@ -6,11 +6,11 @@
 #include <cmath>
 #include <deque>
 
+#include "driver/serial_profile.hpp"
+#include "driver/takktile_protocol.hpp"
 #include "io/scratch_folder.hpp"
 #include "palpate/error.hpp"
 #include "sent_frame.hpp"
-#include "serial_profile.hpp"
-#include "takktile_protocol.hpp"
 
 namespace palpate {
 namespace {

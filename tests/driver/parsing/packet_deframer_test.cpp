@@ -1,12 +1,12 @@
-#include "packet_deframer.hpp"
+#include "driver/packet_deframer.hpp"
 
 #include <gtest/gtest.h>
 
 #include <random>
 
+#include "driver/serial_profile.hpp"
 #include "receiver.hpp"
 #include "sent_frame.hpp"
-#include "serial_profile.hpp"
 
 namespace palpate {
 namespace {

@@ -7,9 +7,9 @@
 #include <memory>
 #include <vector>
 
-#include "packet_deframer.hpp"
+#include "driver/packet_deframer.hpp"
+#include "driver/serial_profile.hpp"
 #include "sent_frame.hpp"
-#include "serial_profile.hpp"
 
 namespace palpate {
 

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "deframer.hpp"
+#include "driver/deframer.hpp"
 
 namespace palpate {
 

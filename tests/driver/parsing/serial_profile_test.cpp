@@ -1,4 +1,4 @@
-#include "serial_profile.hpp"
+#include "driver/serial_profile.hpp"
 
 #include <gtest/gtest.h>
 

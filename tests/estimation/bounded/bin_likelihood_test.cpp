@@ -1,4 +1,4 @@
-#include "bin_likelihood.hpp"
+#include "estimation/bounded/bin_likelihood.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -11,7 +11,7 @@
 
 #include "bins_by_definition.hpp"
 #include "every_set_of_instructions.hpp"
-#include "interpolated_map.hpp"
+#include "model/interpolated_map.hpp"
 #include "palpate/error.hpp"
 #include "synthetic.hpp"
 

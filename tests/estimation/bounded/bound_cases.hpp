@@ -3,8 +3,8 @@
 #include <vector>
 
 #include "bins_by_definition.hpp"
+#include "estimation/bounded/tile_bounds.hpp"
 #include "synthetic.hpp"
-#include "tile_bounds.hpp"
 
 namespace palpate {
 

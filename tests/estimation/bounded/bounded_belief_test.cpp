@@ -11,8 +11,8 @@
 #include <glm/vec3.hpp>
 
 #include "bounded/certified.hpp"
-#include "bounded_belief.hpp"
-#include "hypotheses.hpp"
+#include "estimation/bounded/bounded_belief.hpp"
+#include "estimation/hypotheses.hpp"
 #include "palpate/pose_histogram.hpp"
 #include "touched_shape.hpp"
 

@@ -1,4 +1,4 @@
-#include "device_bin_likelihood.hpp"
+#include "estimation/bounded/device_bin_likelihood.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -9,10 +9,10 @@
 #include <gtest/gtest.h>
 
 #include "bins_by_definition.hpp"
-#include "bound_search.hpp"
-#include "contact_evidence.hpp"
-#include "device_bin_error.hpp"
-#include "faster_bin_likelihood.hpp"
+#include "estimation/bounded/bound_search.hpp"
+#include "estimation/bounded/device_bin_error.hpp"
+#include "estimation/bounded/faster_bin_likelihood.hpp"
+#include "estimation/contact_evidence.hpp"
 #include "made_up_devices.hpp"
 #include "synthetic.hpp"
 

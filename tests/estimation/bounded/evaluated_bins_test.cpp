@@ -1,6 +1,6 @@
 // More evaluated bins than are kept: a posterior searches again for what needs them all.
 
-#include "evaluated_bins.hpp"
+#include "estimation/bounded/evaluated_bins.hpp"
 
 #include <algorithm>
 #include <cmath>

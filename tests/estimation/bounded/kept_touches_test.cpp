@@ -1,4 +1,4 @@
-#include "kept_touches.hpp"
+#include "estimation/bounded/kept_touches.hpp"
 
 #include <limits>
 #include <vector>

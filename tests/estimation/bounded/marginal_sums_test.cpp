@@ -1,6 +1,6 @@
 // Sums of bins on a coarser grid, against their definition, bin by bin.
 
-#include "marginal_sums.hpp"
+#include "estimation/bounded/marginal_sums.hpp"
 
 #include <cmath>
 #include <numeric>

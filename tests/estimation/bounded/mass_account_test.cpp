@@ -1,4 +1,4 @@
-#include "mass_account.hpp"
+#include "estimation/bounded/mass_account.hpp"
 
 #include <array>
 #include <cmath>

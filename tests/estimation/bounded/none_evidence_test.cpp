@@ -1,6 +1,6 @@
 // "None of these" by bounds, against its definition over all bins in float64.
 
-#include "none_evidence.hpp"
+#include "estimation/bounded/none_evidence.hpp"
 
 #include <cmath>
 #include <vector>
@@ -11,7 +11,7 @@
 #include <tbb/task_arena.h>
 
 #include "bins_by_definition.hpp"
-#include "hypotheses.hpp"
+#include "estimation/hypotheses.hpp"
 #include "synthetic.hpp"
 
 namespace palpate {

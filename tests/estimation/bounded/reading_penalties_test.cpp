@@ -1,4 +1,4 @@
-#include "reading_penalties.hpp"
+#include "estimation/bounded/reading_penalties.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -9,7 +9,7 @@
 #include <gtest/gtest.h>
 
 #include "bins_by_definition.hpp"
-#include "interpolated_map.hpp"
+#include "model/interpolated_map.hpp"
 #include "synthetic.hpp"
 
 namespace palpate {

@@ -1,6 +1,6 @@
 // An array that stays at its place: sums of penalties that only the elements in contact change.
 
-#include "resting_array.hpp"
+#include "estimation/bounded/resting_array.hpp"
 
 #include <algorithm>
 #include <optional>
@@ -9,9 +9,9 @@
 #include <gtest/gtest.h>
 
 #include "bins_by_definition.hpp"
-#include "bound_search.hpp"
 #include "bounded/certified.hpp"
-#include "faster_bin_likelihood.hpp"
+#include "estimation/bounded/bound_search.hpp"
+#include "estimation/bounded/faster_bin_likelihood.hpp"
 #include "synthetic.hpp"
 
 namespace palpate {

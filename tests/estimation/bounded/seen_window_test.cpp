@@ -1,7 +1,7 @@
 // Tiles in which every element sees the prior: none may be taken for one, and their bins have the
 // likelihood of the prior.
 
-#include "seen_window.hpp"
+#include "estimation/bounded/seen_window.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -10,11 +10,11 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
-#include "bin_likelihood.hpp"
 #include "bound_cases.hpp"
-#include "bound_search.hpp"
-#include "faster_bin_likelihood.hpp"
-#include "reading_penalties.hpp"
+#include "estimation/bounded/bin_likelihood.hpp"
+#include "estimation/bounded/bound_search.hpp"
+#include "estimation/bounded/faster_bin_likelihood.hpp"
+#include "estimation/bounded/reading_penalties.hpp"
 
 namespace palpate {
 namespace {

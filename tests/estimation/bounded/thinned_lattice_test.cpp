@@ -1,4 +1,4 @@
-#include "thinned_lattice.hpp"
+#include "estimation/bounded/thinned_lattice.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,6 +1,6 @@
 // The bounds of tiles against the likelihood of every bin in them: what a certificate rests on.
 
-#include "tile_bounds.hpp"
+#include "estimation/bounded/tile_bounds.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -11,9 +11,9 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
-#include "bin_likelihood.hpp"
 #include "bound_cases.hpp"
-#include "reading_penalties.hpp"
+#include "estimation/bounded/bin_likelihood.hpp"
+#include "estimation/bounded/reading_penalties.hpp"
 
 namespace palpate {
 namespace {

@@ -1,4 +1,4 @@
-#include "tile_penalties.hpp"
+#include "estimation/bounded/tile_penalties.hpp"
 
 #include <algorithm>
 #include <cmath>

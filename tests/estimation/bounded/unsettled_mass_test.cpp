@@ -1,4 +1,4 @@
-#include "unsettled_mass.hpp"
+#include "estimation/bounded/unsettled_mass.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -7,7 +7,7 @@
 
 #include <gtest/gtest.h>
 
-#include "log_sum.hpp"
+#include "estimation/bounded/log_sum.hpp"
 #include "synthetic.hpp"
 
 namespace palpate {

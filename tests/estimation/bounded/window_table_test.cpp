@@ -1,4 +1,4 @@
-#include "window_table.hpp"
+#include "estimation/bounded/window_table.hpp"
 
 #include <algorithm>
 #include <limits>

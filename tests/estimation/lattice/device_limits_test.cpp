@@ -5,10 +5,10 @@
 
 #include <gtest/gtest.h>
 
-#include "interface.h"
 #include "made_up_devices.hpp"
 #include "palpate/error.hpp"
 #include "palpate/pose_histogram.hpp"
+#include "shaders/interface.h"
 #include "synthetic.hpp"
 
 namespace palpate {

@@ -1,4 +1,4 @@
-#include "expected_gain.hpp"
+#include "estimation/lattice/expected_gain.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -7,7 +7,7 @@
 #include <gtest/gtest.h>
 #include <glm/geometric.hpp>
 
-#include "displacement_points.hpp"
+#include "model/displacement_points.hpp"
 #include "palpate/error.hpp"
 #include "palpate/pose_histogram.hpp"
 #include "synthetic.hpp"

@@ -3,10 +3,10 @@
 
 #include <gtest/gtest.h>
 
-#include "context.hpp"
-#include "dense_belief.hpp"
-#include "dense_likelihood.hpp"
-#include "kernel_sizes.hpp"
+#include "estimation/kernel_sizes.hpp"
+#include "estimation/lattice/dense_belief.hpp"
+#include "estimation/lattice/dense_likelihood.hpp"
+#include "gpu/context.hpp"
 #include "palpate/error.hpp"
 #include "palpate/pose_histogram.hpp"
 #include "synthetic.hpp"

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "reference.hpp"
+#include "reference/reference.hpp"
 
 namespace palpate {
 

@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-#include "context.hpp"
+#include "gpu/context.hpp"
 #include "palpate/pose_histogram.hpp"
 #include "synthetic.hpp"
 

@@ -1,11 +1,11 @@
-#include "reading_predictor.hpp"
+#include "estimation/lattice/reading_predictor.hpp"
 
 #include <cmath>
 
 #include <gtest/gtest.h>
 
-#include "interpolated_map.hpp"
-#include "predicted_readings.hpp"
+#include "model/interpolated_map.hpp"
+#include "model/predicted_readings.hpp"
 #include "synthetic.hpp"
 
 namespace palpate {

@@ -10,8 +10,8 @@
 #include <glm/mat3x3.hpp>
 #include <glm/matrix.hpp>
 
+#include "estimation/lattice/refinement.hpp"
 #include "palpate/pose.hpp"
-#include "refinement.hpp"
 #include "synthetic.hpp"
 
 namespace palpate {

@@ -9,12 +9,12 @@
 #include <glm/mat3x3.hpp>
 #include <glm/matrix.hpp>
 
+#include "estimation/lattice/refinement.hpp"
 #include "palpate/error.hpp"
 #include "palpate/pose_error.hpp"
 #include "palpate/pose_histogram.hpp"
 #include "palpate/simulation.hpp"
 #include "plain_refinement.hpp"
-#include "refinement.hpp"
 #include "synthetic.hpp"
 
 namespace palpate {

@@ -1,4 +1,4 @@
-#include "likelihood_averages.hpp"
+#include "estimation/particles/likelihood_averages.hpp"
 
 #include <cmath>
 

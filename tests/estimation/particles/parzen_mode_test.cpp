@@ -1,4 +1,4 @@
-#include "parzen_mode.hpp"
+#include "estimation/particles/parzen_mode.hpp"
 
 #include <cmath>
 #include <numbers>

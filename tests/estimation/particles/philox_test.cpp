@@ -1,10 +1,10 @@
-#include "philox.hpp"
+#include "estimation/particles/philox.hpp"
 
 #include <vector>
 
 #include <gtest/gtest.h>
 
-#include "command_stream.hpp"
+#include "gpu/command_stream.hpp"
 #include "philox_words.hpp"
 #include "synthetic.hpp"
 
