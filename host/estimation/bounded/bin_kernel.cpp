@@ -1,7 +1,7 @@
 // Highway compiles this file once for every set of vector instructions. Products and sums are never
 // fused and lanes never mixed, so that every set gives the same bits.
 #undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "bin_kernel.cpp"
+#define HWY_TARGET_INCLUDE "estimation/bounded/bin_kernel.cpp"
 #define HWY_COMPILE_ALL_ATTAINABLE
 #define HWY_DISABLED_TARGETS (HWY_SVE | HWY_SVE2 | HWY_SVE_256 | HWY_SVE2_128 | HWY_RVV)
 #include <hwy/foreach_target.h>
