@@ -42,7 +42,7 @@ float weight_of(const int distance) {
                                       : texelFetch(weights, distance).x;
 }
 
-// Of an invocation.
+// What an invocation works on.
 int count;       // bins of its lines
 int begin;       // the strip's first bin
 uint first;      // the line's first bin in the slab

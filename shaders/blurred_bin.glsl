@@ -18,7 +18,7 @@ float word_of(const uint bin, const vec2 reference) {
   return word_in(bin % 2 == 0 ? texel.xy : texel.zw, reference);
 }
 
-// Of a bin and the next one.
+// The words of a bin and the next one.
 vec2 words_of(const uint bin, const vec2 reference, const bool even) {
   if (even) {
     const vec4 texel = texelFetch(source, int(bin / 2));

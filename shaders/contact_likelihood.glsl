@@ -3,10 +3,10 @@
 
 // How the kernel evaluates it: AS_PRODUCTS or AS_LOGS (Eq. 7), or AS_TABLE.
 layout(constant_id = 1) const uint FORM = AS_PRODUCTS;
-// Of Eq. 7: gamma m; AS_LOGS its logarithm or NO_FLOOR, because float32 does not hold every floor.
+// Floor of Eq. 7: gamma m; AS_LOGS its logarithm or NO_FLOOR, because float32 does not hold every floor.
 layout(constant_id = 2) const float RANDOM_FLOOR = 0.02;
 layout(constant_id = 3) const float TRUST = 0.9;  // 1 - gamma
-// Of a table: the log odds of its first node, nodes per nat of log odds, nodes of a row, and levels.
+// Shape of a table: the log odds of its first node, nodes per nat of log odds, nodes of a row, and levels.
 layout(constant_id = 4) const float FIRST_LOG_ODDS = -1.0;
 layout(constant_id = 5) const float NODES_PER_NAT = 1.0;
 layout(constant_id = 6) const uint TABLE_NODES = 2;

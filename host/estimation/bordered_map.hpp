@@ -16,7 +16,8 @@ namespace palpate {
 /// on every side, so that a clamped index finds the prior.
 std::vector<float> with_border(const OccupancyGrid& map, double prior);
 
-/// The same nodes, each with the three above and to its right: a kernel interpolates from one.
+/// The nodes of with_border(), each with the three above and to its right: a kernel interpolates
+/// from one.
 /// Beyond the border lies the prior.
 std::vector<shaders::Corners> corners_with_border(const OccupancyGrid& map, double prior);
 
@@ -25,7 +26,7 @@ std::uint64_t bordered_cells(const OccupancyGrid& map);
 
 /// Most cells that one buffer of the device holds.
 std::uint64_t most_map_cells(const gpu::Limits& limits, gpu::Access access);
-/// The same in whichever way the device reads more.
+/// Most cells that one buffer holds in whichever way the device reads more.
 std::uint64_t most_map_cells(const gpu::Limits& limits);
 
 /// The fastest way in which kernels can read this many cells; nothing where no buffer holds them.

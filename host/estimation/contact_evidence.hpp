@@ -58,7 +58,7 @@ ContactEvidence gather_evidence(const Touch& touch, std::span<const Reading> rea
 /// no number, counts as off every map: its cell becomes so large that the sum with any cell of
 /// split_axis() is outside, yet within int32.
 shaders::Split split(double coordinate_cells);
-/// The same for what an element's coordinate is added to: a place of the lattice.
+/// Splits the coordinate of a place of the lattice, to which an element's is added.
 shaders::Split split_axis(double coordinate_cells);
 
 /// Every element rotated by every theta of the lattice, in cells, [theta, element].

@@ -19,7 +19,7 @@ namespace palpate {
 
 struct Hdf5Request;
 
-/// Those of the named attributes and datasets that exist in an HDF5 file's root group.
+/// The named attributes and datasets that exist in an HDF5 file's root group.
 ///
 /// What a file claims is checked before memory is taken for it. Numbers of datasets come in pieces,
 /// so that no process holds more of them than it wants. No other file is opened: external links,

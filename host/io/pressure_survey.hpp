@@ -38,7 +38,7 @@ class PressureSurvey {
 
   const std::vector<ElementSurvey>& elements() const { return elements_; }  ///< [e]
   const ReadingHistogram& readings() const { return readings_; }
-  /// Of the known readings of living elements; none where there are no such readings.
+  /// Extremes of the known readings of living elements; none where there are no such readings.
   const std::optional<Extremes>& range() const { return range_; }
   std::uint64_t unknown() const { return unknown_; }        ///< NaN readings of living elements
   std::uint64_t in_contact() const { return in_contact_; }  ///< rows

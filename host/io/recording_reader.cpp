@@ -24,7 +24,7 @@ using namespace std::chrono_literals;
 /// below need not allow for them.
 constexpr std::uint64_t most_file_bytes = 16 << 20;
 constexpr std::uint64_t child_bytes = 512 << 20;
-/// Of a file: reading it takes milliseconds.
+/// CPU time for one file, whose reading takes milliseconds.
 constexpr std::uint64_t cpu_seconds = 5;
 /// At 1 MB/s, the rate of the slowest disk that is worth waiting for, the largest file takes 16 s.
 constexpr auto silence = 90s;

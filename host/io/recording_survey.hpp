@@ -32,7 +32,7 @@ struct RecordingSurvey {
   std::uint64_t with_pose = 0;  ///< rows with a known pose
   std::optional<Poses> poses;   ///< none where no pose is known
   std::optional<Array> array;   ///< none where all elements are dead
-  /// Of the array's elements, without the dead elements; of the first row where the array changes.
+  /// Spacing of the living elements; that of the first row where the array changes.
   std::optional<ElementSpacing> spacing;
   std::optional<double> elapsed_s;         ///< from the first row to the last, see StreamTime
   std::uint64_t times_back = 0;            ///< rows whose time is before the time of the row before

@@ -26,8 +26,8 @@ struct FoldModel {
   std::vector<TrainingMap> maps;
   TableLearning how;
   std::optional<LearnedTable> table = {};  ///< none: Eq. 7 on the maps' log odds
-  /// Of presses at unknown poses. A touch at a known pose shows a part of an object: its features
-  /// would tell where it is.
+  /// Only from presses at unknown poses: a touch at a known pose shows a part of an object, and its
+  /// features would tell where it is.
   std::optional<LearnedFeatures> features = {};
 };
 

@@ -15,7 +15,7 @@ using Matrix = std::array<Values, PressFeatures::count>;
 
 constexpr double least_sd = 0.05;  // of logarithms: 5 %
 constexpr double pseudo_presses = 4.0;
-/// Of the correlations: a distribution stays one when its numbers are rounded in a file.
+/// Largest correlation: with it a distribution stays one when its numbers are rounded in a file.
 constexpr double most_correlated = 0.999;
 
 /// The products of the differences from a mean, summed over presses.

@@ -23,7 +23,7 @@ struct LabelledFeatures {
 /// one. `any` has the mean and covariance of all presses. The weight is left at 0.
 /// @throws Error on no press
 LearnedFeatures learn_features(std::span<const LabelledFeatures> presses);
-/// The same of presses, each by its first touch.
+/// The distributions of presses' features, each press by its first touch.
 LearnedFeatures learn_features(const std::vector<Press>& presses,
                                const ContactClassifier& classifier);
 

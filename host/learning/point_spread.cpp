@@ -15,7 +15,7 @@ namespace palpate {
 
 namespace {
 
-/// Of the mean pressure, in spacings: bridges the gaps between elements.
+/// Radius over which the mean pressure is smoothed, in spacings: bridges gaps between elements.
 constexpr double smoothing = 0.4;
 
 /// A reading at its place in the object frame.
@@ -297,7 +297,7 @@ std::optional<double> learn_point_spread(const std::vector<Press>& presses,
     }
     return sum;
   };
-  // Of its logarithm.
+  // The search is along the spread's logarithm.
   constexpr double least = 0.05;  // of the spacing
   constexpr double most = 3.0;
   constexpr double tolerance = 0.005;

@@ -26,7 +26,7 @@ struct Press {
 /// array's elements is the origin and theta is 0.
 Press single_press(const Recording& recording, std::size_t touch);
 
-/// The same of a touch at a known pose, in a recording whose robot frame is the object's frame.
+/// One touch at a known pose as a press; the recording's robot frame is the object's frame.
 Press posed_press(const Recording& recording, std::size_t touch);
 
 /// The fold of every press. At known poses press k of an object is in fold k % folds: a scan's

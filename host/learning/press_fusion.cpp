@@ -17,7 +17,7 @@ constexpr std::size_t most_comparisons = 1500;
 constexpr std::size_t fewest_columns = 8;
 /// The weight of a press whose place is anyone's guess.
 constexpr double least_weight = 0.01;
-/// Of maps in the making.
+/// Label of unfinished maps.
 const std::string no_label;
 
 /// Angles at which the lattice moves the presses' contact by about one and a half steps; the search

@@ -24,10 +24,10 @@ struct LearnedReadings {
   ContactClassifier classifier;
   double noise = 0.0;            ///< see noise_floor()
   double prior = 0.2;            ///< see share_in_contact()
-  std::optional<double> psf_mm;  ///< of presses at known poses that tell the point spread
+  std::optional<double> psf_mm;  ///< where presses at known poses tell the point spread
   double spread_mm = 0.5;        ///< of maps
 
-  /// Of maps with cells of half a spacing.
+  /// Options of maps with cells of half a spacing.
   MapOptions maps(double spacing_mm) const;
 };
 

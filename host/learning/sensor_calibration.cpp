@@ -240,7 +240,7 @@ class SensorLearning {
 
   /// Leaves no more of these bins than touches are tried on in a short time.
   void settle_tried_bins() {
-    // Of the maps of folds, a touch is tried on the one without its own.
+    // Among the maps of folds, a touch is tried on the one that was built without it.
     std::map<std::string, std::size_t> maps_of;
     for (const TrainingMap& map : all_.maps) {
       std::size_t& count = maps_of[map.map.label];

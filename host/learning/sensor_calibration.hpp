@@ -21,8 +21,8 @@ namespace palpate {
 struct SensorCalibrationOptions {
   std::string pressure_unit = "kPa";
   std::optional<double> threshold;  ///< learned where there is none
-  std::optional<double> ratio;      ///< the same
-  /// Those to try, the simplest first; none stands for default_tables(). With one object there is
+  std::optional<double> ratio;      ///< learned where there is none
+  /// Tables to try, the simplest first; none stands for default_tables(). With one object there is
   /// nothing to compare by, and the last is taken.
   std::vector<TableKind> tables = {};
   std::size_t folds = 5;      ///< of the cross-validation
@@ -43,7 +43,7 @@ struct TriedTable {
   double log_loss = 0.0;
 };
 
-/// The same touches, several of one object at a time.
+/// Scores of the touches, several of one object at a time.
 struct GroupScores {
   std::size_t touches = 0;  ///< of a group
   Scores before;            ///< as SensorCalibration has them of single touches
@@ -58,7 +58,7 @@ struct SensorCalibration {
   bool touch_sd_fitted = false;  ///< sensor.touch_sd is the result of a fit
   std::size_t objects = 0;
   std::vector<TriedTable> tried;  ///< in the options' order; none with one object
-  /// Of the cross-validation; none with one object.
+  /// Scores of the cross-validation; none with one object.
   std::optional<Scores> before;       ///< Eq. 7 with gamma 0.1, temperature 1
   std::optional<Scores> table;        ///< the table, temperature 1
   std::optional<Scores> after;        ///< the table, temperature and features
@@ -76,7 +76,7 @@ struct SensorCalibration {
 ///   nearest bin as unknowns are. They also give the point spread, and by how much the temperature
 ///   grows with every further touch. Presses at unknown poses show much of an object. They also
 ///   give the features' distributions with their weight.
-/// Of several tables it keeps the first, unless a later one has less log-loss in the
+/// Among several tables it keeps the first, unless a later one has less log-loss in the
 /// cross-validation by more than two standard errors. What one object cannot tell (temperature,
 /// weight, familiarity) keeps its default, with a warning. Takes all host threads.
 ///   The numbers before and after are of cross-validation. All that a fold's presses are judged by

@@ -179,7 +179,7 @@ class PressLoss {
     return sum;
   }
 
-  /// Of a press of two labels that is right or wrong with equal weights.
+  /// Log-loss of a press of two labels that is right or wrong with equal weights.
   static double of_even_press(double apart) { return apart / 2.0 + std::log1p(std::exp(-apart)); }
 
   double best_temperature(double weight, double most) const {
@@ -223,8 +223,8 @@ double loss_of_groups(std::span<const ScoredPress> groups, TemperatureFit fit, d
 
 /// The growth of the least loss, from 0, given the rest of the fit.
 double least_growth(std::span<const ScoredPress> groups, const TemperatureFit& fit) {
-  // Of groups of one size, the loss has one minimum along the growth's logarithm, as along the
-  // temperature's.
+  // Where all groups have one size, the loss has one minimum along the growth's logarithm, as along
+  // the temperature's.
   const double growth = std::exp(least_place(
       std::log(1e-3 * fit.temperature), std::log(most_temperature),
       [&](double log_growth) { return loss_of_groups(groups, fit, std::exp(log_growth)); }));

@@ -156,7 +156,7 @@ int RotationalSymmetry::nearest() const {
 
 std::optional<RotationalSymmetry> measure_symmetry(const OccupancyGrid& map) {
   constexpr double least_cells = 16.0;
-  // Of 47 simulated shapes, symmetric ones stay below 0.45 of the detail, others above 0.65.
+  // Among 47 simulated shapes, symmetric ones stay below 0.45 of the detail, others above 0.65.
   constexpr double tolerance = 0.5;
   constexpr double circle_rad = 2.0 * std::numbers::pi;
   constexpr int angles = 8;  // over half a circle, as a turn by -a likens like one by a

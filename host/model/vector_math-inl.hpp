@@ -64,7 +64,7 @@ HWY_INLINE hn::Vec<hn::RebindToSigned<D>> whole_number(D d, hn::Vec<D> v) {
   return hn::And(bits, hn::Set(di, static_cast<hn::TFromD<decltype(di)>>(Math::mantissa_mask)));
 }
 
-/// The same in 32 bits, for integers below 2^23.
+/// The integers below 2^23 that lanes hold, in 32 bits.
 template <class D>
 HWY_INLINE auto small_integer(D d, hn::Vec<D> v) {
   if constexpr (sizeof(hn::TFromD<D>) == 4) {

@@ -45,7 +45,7 @@ glm::dvec2 transform_back(const Pose& T_a_b, const glm::dvec2& p_a);
 
 /// Eq. 3: the class of every element, [e].
 std::vector<Reading> classify(const Touch& touch, const ContactClassifier& classifier);
-/// The same, with In Contact at the levels of the model's table.
+/// The class of every element, with In Contact at the levels of the model's table, [e].
 std::vector<Reading> classify(const Touch& touch, const ContactModel& model);
 
 // --- map.cpp: Eq. 1, 2, 4-6 ---
@@ -91,7 +91,7 @@ std::optional<Fit> fit_of(std::span<const Touch> touches, const Pose& T_object_r
                           const OccupancyGrid& map, const ContactModel& model,
                           std::size_t object = 0);
 
-/// The same where each touch by itself may have been displaced by delta, normally distributed. Per
+/// The fit where each touch by itself may have been displaced by delta, normally distributed. Per
 /// touch: L(readings) = log E_delta prod P(reading), and M and V are mean and variance of L under
 /// Q(readings) = E_delta prod q(reading). E_delta is a sum over a grid of displacements, M and V
 /// are sums over all readings that the known elements could have had: for few elements.

@@ -14,7 +14,7 @@ namespace {
 constexpr double turn_rad = 2.0 * std::numbers::pi;
 // Beyond this many frames, the sensor's own error exceeds the mean's noise.
 constexpr std::size_t most_kept = 512;
-// Of fewer frames, a single wrong one would decide.
+// With fewer frames, a single wrong one would decide.
 constexpr std::size_t least_frames = 3;
 
 // Returns the mean of the middle half; values at its borders count in part. Reorders the values. It

@@ -17,7 +17,7 @@ constexpr VkDeviceSize table_bytes = 16 << 20;
 // A batch of whole products, so that it does not matter which elements share one.
 constexpr std::size_t factors = shaders::FACTORS_PER_LOG;
 
-/// Of an element rotated by every theta.
+/// Memory of an element rotated by every theta.
 VkDeviceSize bytes_per_element(const PoseLattice& lattice) {
   return static_cast<VkDeviceSize>(lattice.theta_rad.count) * sizeof(shaders::RotatedElement);
 }

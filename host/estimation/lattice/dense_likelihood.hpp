@@ -58,7 +58,7 @@ class DenseLikelihood {
     LikelihoodPath path;
     MapTable maps;
   };
-  /// Those of a group that a slab holds: a range of group.objects.
+  /// The objects of a group that a slab holds: a range of group.objects.
   struct Range {
     std::uint32_t first = 0;
     std::uint32_t count = 0;

@@ -96,7 +96,7 @@ void require_whole_planes(const gpu::Context& context, const PoseLattice& lattic
                             "touches, slips and \"none of these\"; use fewer",
                             lattice.plane(), context.name(), most_bins));
   }
-  // Of two parts, one is always the other's neighbour on both sides.
+  // Where there are two parts, one is the other's neighbour on both sides.
   if (parts_of_first > 2 && static_cast<std::uint32_t>(theta_steps) > shortest) {
     throw Error(Fault::input,
                 fmt::format("a standard deviation of theta reaches {} bins, more than the {} of a "

@@ -252,7 +252,8 @@ struct ParticleFilter::Impl {
   LikelihoodAverages averages;
   shaders::uint touch = 0;  ///< counts the touches since the start
   bool weighed = false;     ///< by any touch since the start
-  /// Of all touches since the start, the prior's log-likelihood over the best particle's.
+  /// How much more likely a map of the prior alone makes all touches since the start than the best
+  /// particle does, in nats.
   double prior_over_best = 0.0;
   HalfDone half_done{"particle filter: an update failed half-way; reset() the filter"};
   OwnProcess process;

@@ -27,8 +27,8 @@ WeightSummary summarise(std::span<const shaders::WeightBlock> blocks);
 std::vector<shaders::DrawBlock> multinomial_blocks(std::span<const shaders::WeightBlock> blocks,
                                                    const WeightSummary& summary,
                                                    std::vector<shaders::DrawBlock> reuse = {});
-/// The same, but keys are 0, 1, ..., draws - 1, which stand for (key + offset) / draws of the
-/// summed weights.
+/// Bounds of the blocks for draw_particles where keys are 0, 1, ..., draws - 1: key k draws at the
+/// share (k + offset) / draws of the summed weights.
 /// @param offset in [0, 1)
 std::vector<shaders::DrawBlock> systematic_blocks(std::span<const shaders::WeightBlock> blocks,
                                                   const WeightSummary& summary, std::int64_t draws,

@@ -92,7 +92,7 @@ struct Estimate {
   /// number. By bounds the evidence of the evaluated bins. -infinity where a bounded search
   /// evaluated no bin, or no particle is left of the hypothesis.
   std::vector<double> log_evidence = {};
-  /// The same of "none of these", where the options ask for it.
+  /// Log evidence of "none of these", on the scale of log_evidence, where the options ask for it.
   std::optional<double> none_log_evidence = {};
   Mode mode;
   /// True where a map that holds only the prior explains the touches better, by more than 700 nats,
@@ -117,7 +117,7 @@ struct RefinedPose {
   std::array<double, 9> covariance{};
 };
 
-/// The same pose as a robot acts on it: the object's frame in the robot's.
+/// A refined pose as a robot acts on it: the object's frame in the robot's.
 struct PALPATE_API ObjectPose {
   Pose T_robot_object;
   /// Covariance of (x_mm, y_mm, theta_rad) of T_robot_object, row by row, in mm^2, mm rad and

@@ -60,10 +60,11 @@ PALPATE_API std::optional<Fit> fit_of(std::span<const Touch> touches, const Pose
                                       const OccupancyGrid& map, const ContactModel& contact,
                                       std::size_t object = 0);
 
-/// The same where each touch by itself may have been displaced: where the sensor really was at
-/// T_robot_sensor * delta, delta normally distributed. L is then a touch's log-likelihood averaged
-/// over delta, log E P(readings), and M and V are its mean and variance over touches of the object:
-/// delta drawn first, then each element's reading from q at that place. With sums over the touches,
+/// The fit of touches each of which may have been displaced by itself: where the sensor really was
+/// at T_robot_sensor * delta, delta normally distributed. L is then a touch's log-likelihood
+/// averaged over delta, log E P(readings), and M and V are its mean and variance over touches of
+/// the object: delta drawn first, then each element's reading from q at that place. With sums over
+/// the touches,
 ///   z = sum (L - M) / sqrt(sum V).
 /// E is a mean over 128 displacements, M and V are estimated from 64 drawn touches each, which
 /// leaves z uncertain by about 0.1; the seed is fixed. Without a displacement the fit is that of

@@ -11,8 +11,8 @@ namespace palpate {
 /// about the object plus that about the pose once the object is known.
 /// Estimates, none of them below 0.
 struct TouchGain {
-  /// Of the estimates, by the spread over simulated readings; what too few samples cannot show is
-  /// not in it.
+  /// Standard errors of the estimates, from the spread over simulated readings; what too few
+  /// samples cannot show is not in them.
   struct StandardError {
     double identity = 0.0;
     double pose = 0.0;
