@@ -54,9 +54,9 @@ struct Updated {
 Updated update(Recogniser& recogniser, const RecognitionTask& task, std::span<const Touch> touches,
                const std::function<void(double)>& progress) {
   constexpr std::uint64_t seed = 0;
-  const bool measures = !std::holds_alternative<ParticleOptions>(task.filter) &&
-                        (recogniser.bounded() == nullptr || searches_for_surprise(task) ||
-                         (recogniser.touched() && touches.size() == 1));
+  const FilterTraits traits = traits_of(task.filter);
+  const bool measures = traits.bins && (traits.every_bin || searches_for_surprise(task) ||
+                                        (recogniser.touched() && touches.size() == 1));
   // Nothing but the prior comes before the first touch.
   const std::size_t before = recogniser.touched() ? 0 : 1;
   const std::size_t one_by_one =
@@ -66,7 +66,7 @@ Updated update(Recogniser& recogniser, const RecognitionTask& task, std::span<co
     const Clock::time_point start = Clock::now();
     const auto show = [&, n = static_cast<double>(touches.size())](double fraction) {
       // Bounds have only kept the touches, and search when they are asked about the belief.
-      const double taken = recogniser.bounded() == nullptr ? fraction : 0.0;
+      const double taken = traits.certificate ? 0.0 : fraction;
       progress((static_cast<double>(begin) + taken * static_cast<double>(end - begin)) / n);
     };
     recogniser.update(touches.subspan(begin, end - begin),
@@ -269,7 +269,7 @@ RecognitionRecord recognise(Recogniser& recogniser, const RecognitionTask& task,
       record.trace.push_back(
           take_step(recogniser, task, touches.first(done + together), done, unknown.truth,
                     progress ? std::function<void(double)>(show) : std::function<void(double)>()));
-      if (progress && recogniser.bounded() != nullptr) {
+      if (progress && traits_of(task.filter).certificate) {
         show(1.0);
       }
     }
