@@ -249,7 +249,9 @@ class FoldTrial {
     // bins.
     const Pose& near =
         press.T_object_robot && best_label == scored.truth ? *press.T_object_robot : at.best_pose;
-    if (const auto fit = best_fit_near(press.touches, near, map, contact_for(best_label), 0)) {
+    const ContactModel contact = contact_for(best_label);
+    if (const auto fit =
+            best_fit_near(evidence_of(press.touches, contact), near, map, contact, 0)) {
       result.fit_z.push_back(fit->z);
     }
   }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <variant>
 
 #include <fmt/format.h>
@@ -26,12 +27,13 @@ FilterOptions with_cancel_point(const RecognitionTask& task) {
 Recogniser::Recogniser(Device* device, const RecognitionTask& task)
     : traits_(traits_of(task.filter)),
       lattice_(task.lattice()),
-      classifier_(task.classifier()),
+      contact_(task.contact()),
       auto_pivot_(task.auto_pivot),
       filter_(make_filter(device, task.hypotheses, with_cancel_point(task))) {}
 
 void Recogniser::reset() {
   filter_->reset();
+  evidence_.clear();
   waiting_.clear();
   surprises_.clear();
   pivot_placed_ = false;
@@ -46,13 +48,8 @@ void Recogniser::move_pivot(const glm::dvec2& pivot_mm) {
   lattice_.pivot_mm = pivot_mm;
 }
 
-bool Recogniser::meets_object(const Touch& touch) const {
-  const std::vector<Reading> readings = classifier_.classify(touch);
-  return std::any_of(readings.begin(), readings.end(), is_contact);
-}
-
-void Recogniser::place_pivot(const Touch& touch) {
-  const glm::dvec2 centre_mm = touch.T_robot_sensor * array_centre_mm(touch.elements_mm);
+void Recogniser::place_pivot(const TouchEvidence& touch) {
+  const glm::dvec2 centre_mm = touch.middle_mm();
   if (!(std::abs(centre_mm.x) <= farthest_mm && std::abs(centre_mm.y) <= farthest_mm)) {
     throw Error(Fault::input,
                 fmt::format("the first touch in contact has its array at [{}, {}] mm; keep touches "
@@ -64,28 +61,27 @@ void Recogniser::place_pivot(const Touch& touch) {
 
 void Recogniser::update(std::span<const Touch> touches,
                         const std::function<void(double)>& progress) {
+  // Looks at all touches, so that a bad touch is refused before the pivot moves.
+  std::vector<TouchEvidence> more = evidence_of(touches, contact_);
+  const auto keep = [&] { std::ranges::move(more, std::back_inserter(evidence_)); };
   if (!lacks_pivot()) {
     filter_->update(touches, progress);
     touched_ = touched_ || !touches.empty();
+    keep();
     return;
   }
-  std::optional<std::size_t> first;  // that meets an object
-  for (std::size_t i = 0; i < touches.size(); ++i) {
-    // Looks at all touches, so that a bad touch is refused before the pivot moves.
-    if (meets_object(touches[i]) && !first) {
-      first = i;
-    }
-  }
-  if (!first) {
+  const auto first = std::ranges::find_if(more, &TouchEvidence::in_contact);
+  if (first == more.end()) {
     for (const Touch& touch : touches) {
       waiting_.push_back({touch.T_robot_sensor,
                           {touch.elements_mm.begin(), touch.elements_mm.end()},
                           {touch.pressure.begin(), touch.pressure.end()},
                           {touch.valid.begin(), touch.valid.end()}});
     }
+    keep();
     return;
   }
-  place_pivot(touches[*first]);
+  place_pivot(*first);
   std::vector<Touch> all;
   all.reserve(waiting_.size() + touches.size());
   for (const WaitingTouch& touch : waiting_) {
@@ -96,6 +92,7 @@ void Recogniser::update(std::span<const Touch> touches,
   waiting_.clear();
   pivot_placed_ = true;
   touched_ = true;
+  keep();
 }
 
 void Recogniser::prepare(const Touch& touch) {
@@ -104,10 +101,11 @@ void Recogniser::prepare(const Touch& touch) {
   }
   if (lacks_pivot()) {
     // A touch that comes after waiting touches is taken in together with them, not by itself.
-    if (!waiting_.empty() || !meets_object(touch)) {
+    const TouchEvidence evidence(touch, contact_);
+    if (!waiting_.empty() || !evidence.in_contact()) {
       return;
     }
-    place_pivot(touch);
+    place_pivot(evidence);
   }
   filter_->prepare(touch);
 }

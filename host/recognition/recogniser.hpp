@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "model/touch_evidence.hpp"
 #include "recognition/filter.hpp"
 #include "recognition/recognition_task.hpp"
 #include "recognition/surprise.hpp"
@@ -46,6 +47,8 @@ class Recogniser {
   /// Whether the belief has taken in a touch since reset(). Touches that wait for an automatic
   /// pivot do not count.
   bool touched() const { return touched_; }
+  /// All touches since reset(), in order, those that wait for an automatic pivot included.
+  std::span<const TouchEvidence> evidence() const { return evidence_; }
   /// Judges touches by the recogniser's task; made at the first call. Not for particles.
   const SurpriseJudge& surprise_judge(const RecognitionTask& task);
   /// Keeps the surprise of a touch until reset().
@@ -73,19 +76,18 @@ class Recogniser {
 
   /// Whether an automatic pivot has yet to be placed.
   bool lacks_pivot() const { return auto_pivot_ && !pivot_placed_; }
-  /// Whether the touch has an element In Contact.
-  bool meets_object(const Touch& touch) const;
   /// Moves the pivot to the array's centre.
-  void place_pivot(const Touch& touch);
+  void place_pivot(const TouchEvidence& touch);
   void move_pivot(const glm::dvec2& pivot_mm);
 
   Recogniser(Device* device, const RecognitionTask& task);
 
   FilterTraits traits_;
   PoseLattice lattice_;
-  ContactClassifier classifier_;
+  ContactModel contact_;
   bool auto_pivot_;
-  bool pivot_placed_ = false;          ///< by a touch since reset(); only where it is automatic
+  bool pivot_placed_ = false;  ///< by a touch since reset(); only where it is automatic
+  std::vector<TouchEvidence> evidence_;
   std::vector<WaitingTouch> waiting_;  ///< in order; empty once the pivot is placed
   bool touched_ = false;               ///< since reset()
   std::vector<double> surprises_;      ///< since reset()
