@@ -28,7 +28,7 @@ Filter make_filter(Device& device, const RecognitionTask& task) {
     return ParticleFilter(device, task.hypotheses, *particles);
   }
   if (std::holds_alternative<BoundedOptions>(task.filter)) {
-    return BoundedPosterior(device, task.hypotheses, bounded_options(task));
+    return BoundedPosterior(task.hypotheses, bounded_options(task));
   }
   return PoseHistogram(device, task.hypotheses, std::get<HistogramOptions>(task.filter));
 }

@@ -56,7 +56,7 @@ Bounded make_bounded(const std::shared_ptr<Session>& session, nb::handle maps,
   return {
       {make_owned<BoundedPosterior>({}, session,
                                     [hypotheses = std::move(hypotheses), options](Device& device) {
-                                      return BoundedPosterior(device, hypotheses, options);
+                                      return BoundedPosterior(hypotheses, options);
                                     }),
        std::move(labels)},
       working};

@@ -29,8 +29,7 @@ std::vector<Hypothesis> two_objects(double steepness, std::uint64_t seed) {
 Certified expect_certificate(HardCase& hard, const std::vector<Hypothesis>& objects,
                              const BoundedOptions& options, const Recording& recording,
                              double nats = 1e-9) {
-  Device device = Device::open();
-  BoundedPosterior posterior(device, objects, options);
+  BoundedPosterior posterior(objects, options);
   Certified seen;
   for (std::size_t n = 0; n <= recording.size(); ++n) {
     SCOPED_TRACE(::testing::Message() << n << " touches");
@@ -421,8 +420,7 @@ TEST(BoundedHard, AThousandTouchesOfOneSpot) {
       l *= 1000.0;
     }
   }
-  Device device = Device::open();
-  BoundedPosterior posterior(device, objects, options);
+  BoundedPosterior posterior(objects, options);
   posterior.update(std::vector(1000, recording.touch(0)));
   // 24,000 elements of 1e-15 and some 1e4 nats of 16 digits.
   const Certified seen = expect_certified(posterior, objects, options, truth, 1e-6);

@@ -4,6 +4,8 @@
 #include <array>
 #include <cmath>
 
+#include "estimation/bounded/parallel_for.hpp"
+
 namespace palpate {
 
 namespace {
@@ -14,6 +16,8 @@ constexpr int most_block_bins = 16;
 constexpr double most_block_cells = 2.0;
 /// Blocks that are evaluated together, to fill vectors.
 constexpr std::size_t blocks_together = 16;
+/// Bins of a thread's task: large beside the cost of a task, small beside many boxes.
+constexpr std::size_t task_bins = 2048;
 
 /// A bin's coordinate in cells of the bordered map.
 double in_cells(const Axis& axis_mm, int bin, double origin_mm, double cell_mm) {
@@ -181,6 +185,46 @@ void BinLikelihood::evaluate(std::span<const BinBox> boxes, const KnownElements&
 void BinLikelihood::evaluate(std::span<const BinBox> boxes, const KnownElements& elements,
                              std::span<double> log_likelihood) const {
   evaluate_in<double>(boxes, elements, log_likelihood);
+}
+
+void BinLikelihood::evaluate_on_threads(std::span<const BinBox> boxes,
+                                        const KnownElements& elements,
+                                        std::span<float> log_likelihood) const {
+  struct Task {
+    std::size_t first_box;
+    std::size_t end_box;
+    std::size_t first_bin;
+    std::size_t bins;
+  };
+  // Large boxes are cut between rows: the bins of each part stand together.
+  std::vector<BinBox> parts;
+  std::vector<Task> tasks;
+  Task task{};
+  for (const BinBox& box : boxes) {
+    const auto rows = static_cast<std::int32_t>(
+        std::clamp<std::int64_t>(std::int64_t{task_bins} / box.x_count, 1, box.y_count));
+    for (std::int32_t row = 0; row < box.y_count; row += rows) {
+      BinBox part = box;
+      part.y_first += row;
+      part.y_count = std::min(rows, box.y_count - row);
+      parts.push_back(part);
+      task.bins += static_cast<std::size_t>(part.bins());
+      if (task.bins >= task_bins) {
+        task.end_box = parts.size();
+        tasks.push_back(task);
+        task = {task.end_box, 0, task.first_bin + task.bins, 0};
+      }
+    }
+  }
+  if (task.bins > 0) {
+    task.end_box = parts.size();
+    tasks.push_back(task);
+  }
+  parallel_for(tasks.size(), [&](std::size_t i) {
+    const Task& of = tasks[i];
+    evaluate(std::span(parts).subspan(of.first_box, of.end_box - of.first_box), elements,
+             log_likelihood.subspan(of.first_bin, of.bins));
+  });
 }
 
 std::uint64_t BinLikelihood::bytes() const {

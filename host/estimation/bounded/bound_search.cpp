@@ -15,12 +15,8 @@ constexpr int few_batches = 16;
 }  // namespace
 
 BoundSearch::BoundSearch(SearchSpace& space, const BoundedOptions& options,
-                         const BinLikelihood& likelihood, FasterBinLikelihood& batches)
-    : space_(space),
-      options_(options),
-      likelihood_(likelihood),
-      batches_(batches),
-      unseen_(space.bounds.size()) {
+                         const BinLikelihood& likelihood)
+    : space_(space), options_(options), likelihood_(likelihood), unseen_(space.bounds.size()) {
   for (const TileBounds& of : space.bounds) {
     const TileLevel& level = of.levels().front();
     largest_tiles_.emplace_back(static_cast<std::size_t>(options.lattice.theta_rad.count) *

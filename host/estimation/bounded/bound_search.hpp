@@ -20,9 +20,8 @@ namespace palpate {
 class BoundSearch {
  public:
   /// @param options checked, with a resolved contact model
-  /// @param likelihood,batches evaluate bins; all of these outlive the search
-  BoundSearch(SearchSpace& space, const BoundedOptions& options, const BinLikelihood& likelihood,
-              FasterBinLikelihood& batches);
+  /// @param likelihood evaluates bins; all of these outlive the search
+  BoundSearch(SearchSpace& space, const BoundedOptions& options, const BinLikelihood& likelihood);
 
   /// Forgets all touches.
   void reset();
@@ -72,7 +71,6 @@ class BoundSearch {
   SearchSpace& space_;
   const BoundedOptions& options_;
   const BinLikelihood& likelihood_;
-  FasterBinLikelihood& batches_;
   /// Sums of penalties of the largest tiles, [hypothesis][theta, batch y, batch x, tile], less
   /// those of a tile in which every element sees the prior.
   std::vector<std::vector<std::int32_t>> largest_tiles_;

@@ -27,8 +27,7 @@ constexpr double infinity = std::numeric_limits<double>::infinity();
 
 }  // namespace
 
-BoundedBelief::BoundedBelief(Device* device, std::span<const Hypothesis> hypotheses,
-                             const BoundedOptions& options)
+BoundedBelief::BoundedBelief(std::span<const Hypothesis> hypotheses, const BoundedOptions& options)
     : options_(options),
       hypotheses_(hypotheses.begin(), hypotheses.end()),
       // More threads than cores gain nothing.
@@ -36,13 +35,10 @@ BoundedBelief::BoundedBelief(Device* device, std::span<const Hypothesis> hypothe
                                    : tbb::info::default_concurrency()),
       arena_(threads_),
       likelihood_(hypotheses_, options_.contact, options_.lattice),
-      batches_(likelihood_, device != nullptr ? &device->context() : nullptr, hypotheses_,
-               options_.contact, options_.lattice,
-               device != nullptr ? BinPlace::measured : BinPlace::host),
       space_(arena_.execute([&] { return SearchSpace(hypotheses_, options_); })),
-      search_(space_, options_, likelihood_, batches_) {
+      search_(space_, options_, likelihood_) {
   if (options_.none_weight) {
-    none_.emplace(space_, options_, likelihood_, batches_);
+    none_.emplace(space_, options_, likelihood_);
     none_log_weight_ = std::log(*options_.none_weight) - log_total_weight(hypotheses_) +
                        std::log(static_cast<double>(options_.lattice.bins()));
   }
@@ -65,7 +61,6 @@ void BoundedBelief::reset() {
 void BoundedBelief::move_pivot(const glm::dvec2& pivot_mm) {
   options_.lattice = with_pivot(options_.lattice, pivot_mm, "bounded posterior", touches_ > 0);
   likelihood_.move_pivot(pivot_mm);
-  batches_.move_pivot(pivot_mm);
   result_.reset();
   followed_.reset();
 }
@@ -99,8 +94,8 @@ void BoundedBelief::take_in() {
 }
 
 std::string BoundedBelief::path() const {
-  return fmt::format("{} on {} thread{}, {}", likelihood_.instructions(), threads_,
-                     threads_ == 1 ? "" : "s", batches_.path());
+  return fmt::format("{} on {} thread{}", likelihood_.instructions(), threads_,
+                     threads_ == 1 ? "" : "s");
 }
 
 std::uint64_t BoundedBelief::bytes() const {

@@ -12,7 +12,6 @@
 #include "estimation/bounded/bin_likelihood.hpp"
 #include "estimation/bounded/bound_search.hpp"
 #include "estimation/bounded/evaluated_bins.hpp"
-#include "estimation/bounded/faster_bin_likelihood.hpp"
 #include "estimation/bounded/followed_bins.hpp"
 #include "estimation/bounded/kept_touches.hpp"
 #include "estimation/bounded/known_elements.hpp"
@@ -27,10 +26,8 @@ namespace palpate {
 /// them. Searches where it is asked for more than is known.
 class BoundedBelief {
  public:
-  /// @param device that may evaluate bins; null leaves them to the host
   /// @param options checked, with a resolved contact model
-  BoundedBelief(Device* device, std::span<const Hypothesis> hypotheses,
-                const BoundedOptions& options);
+  BoundedBelief(std::span<const Hypothesis> hypotheses, const BoundedOptions& options);
 
   void reset();
   void move_pivot(const glm::dvec2& pivot_mm);
@@ -101,7 +98,6 @@ class BoundedBelief {
   int threads_;
   mutable tbb::task_arena arena_;
   BinLikelihood likelihood_;
-  FasterBinLikelihood batches_;
   SearchSpace space_;
   BoundSearch search_;
   KeptTouches kept_;

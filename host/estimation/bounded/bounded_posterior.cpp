@@ -69,8 +69,8 @@ BoundedOptions checked(const BoundedOptions& options, std::span<const Hypothesis
 }  // namespace
 
 struct BoundedPosterior::Impl {
-  Impl(Device* device, std::span<const Hypothesis> hypotheses, const BoundedOptions& options)
-      : belief(device, hypotheses, options) {
+  Impl(std::span<const Hypothesis> hypotheses, const BoundedOptions& options)
+      : belief(hypotheses, options) {
     for (const Hypothesis& hypothesis : hypotheses) {
       bodies.push_back(displaced_body(hypothesis.map));
     }
@@ -90,11 +90,7 @@ struct BoundedPosterior::Impl {
 
 BoundedPosterior::BoundedPosterior(std::span<const Hypothesis> hypotheses,
                                    const BoundedOptions& options)
-    : impl_(std::make_unique<Impl>(nullptr, hypotheses, checked(options, hypotheses))) {}
-
-BoundedPosterior::BoundedPosterior(Device& device, std::span<const Hypothesis> hypotheses,
-                                   const BoundedOptions& options)
-    : impl_(std::make_unique<Impl>(&device, hypotheses, checked(options, hypotheses))) {}
+    : impl_(std::make_unique<Impl>(hypotheses, checked(options, hypotheses))) {}
 
 BoundedPosterior::~BoundedPosterior() { replace_held(impl_); }
 BoundedPosterior::BoundedPosterior(BoundedPosterior&&) noexcept = default;

@@ -32,12 +32,11 @@ void for_tasks(std::span<Leaf> leaves, const Run& run) {
 
 }  // namespace
 
-LeafEvaluator::LeafEvaluator(const BinLikelihood& likelihood, FasterBinLikelihood& batches,
-                             std::span<const double> log_weight, const SearchGoal& goal,
-                             const KnownElements& elements, const BinVisitor& visit,
-                             const Deadline& deadline, MassAccount& account)
+LeafEvaluator::LeafEvaluator(const BinLikelihood& likelihood, std::span<const double> log_weight,
+                             const SearchGoal& goal, const KnownElements& elements,
+                             const BinVisitor& visit, const Deadline& deadline,
+                             MassAccount& account)
     : likelihood_(likelihood),
-      batches_(batches),
       log_weight_(log_weight),
       goal_(goal),
       elements_(elements),
@@ -46,7 +45,7 @@ LeafEvaluator::LeafEvaluator(const BinLikelihood& likelihood, FasterBinLikelihoo
       account_(account),
       pending_mass_(log_weight.size()) {
   for (std::size_t i = 0; i < log_weight.size(); ++i) {
-    float32_error_.push_back(batches.float32_error(i, elements));
+    float32_error_.push_back(likelihood.float32_error(i, elements));
     float64_error_.push_back(likelihood.float64_error(i, elements));
   }
   least_error_ = *std::max_element(float64_error_.begin(), float64_error_.end());
@@ -110,8 +109,8 @@ void LeafEvaluator::add(std::vector<BinBox> boxes) {
   bins_ += static_cast<std::int64_t>(value - values_.size());
   values_.resize(value);
   const std::span<Leaf> added = std::span(pending_).subspan(first);
-  batches_.evaluate(boxes, elements_, std::span(values_).subspan(added.front().first),
-                    !deadline_.exists());
+  likelihood_.evaluate_on_threads(boxes, elements_,
+                                  std::span(values_).subspan(added.front().first));
   for_tasks(added, [&](std::span<Leaf> mine) { sum_up(mine, values_.data()); });
   for (const Leaf& leaf : added) {
     const double least = log_weight_[leaf.box.object] - float32_error_[leaf.box.object];

@@ -9,7 +9,6 @@
 #include <vector>
 
 #include "estimation/bounded/bin_likelihood.hpp"
-#include "estimation/bounded/faster_bin_likelihood.hpp"
 #include "estimation/bounded/known_elements.hpp"
 #include "estimation/bounded/mass_account.hpp"
 
@@ -62,11 +61,9 @@ class Deadline {
 /// the mass once more in float64, so that rounding stays within its part of the tolerance.
 class LeafEvaluator {
  public:
-  /// @param batches evaluates batches in float32, `likelihood` leaves in float64
-  LeafEvaluator(const BinLikelihood& likelihood, FasterBinLikelihood& batches,
-                std::span<const double> log_weight, const SearchGoal& goal,
-                const KnownElements& elements, const BinVisitor& visit, const Deadline& deadline,
-                MassAccount& account);
+  LeafEvaluator(const BinLikelihood& likelihood, std::span<const double> log_weight,
+                const SearchGoal& goal, const KnownElements& elements, const BinVisitor& visit,
+                const Deadline& deadline, MassAccount& account);
 
   /// Evaluates the bins of boxes that are sorted by place. They are settled by a later flush().
   void add(std::vector<BinBox> boxes);
@@ -95,7 +92,6 @@ class LeafEvaluator {
   void settle(const Leaf& leaf, std::span<const double> values, double error);
 
   const BinLikelihood& likelihood_;
-  FasterBinLikelihood& batches_;
   std::span<const double> log_weight_;
   const SearchGoal& goal_;
   const KnownElements& elements_;

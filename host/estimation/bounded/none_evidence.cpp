@@ -21,8 +21,8 @@ double width(const LogInterval& of) { return of.high - of.low; }
 }  // namespace
 
 NoneEvidence::NoneEvidence(SearchSpace& space, const BoundedOptions& options,
-                           const BinLikelihood& likelihood, FasterBinLikelihood& batches)
-    : space_(space), options_(options), search_(space, options, likelihood, batches) {}
+                           const BinLikelihood& likelihood)
+    : space_(space), options_(options), search_(space, options, likelihood) {}
 
 void NoneEvidence::add(std::span<const ArrayReadings> touches) {
   std::vector<TouchMean> added;

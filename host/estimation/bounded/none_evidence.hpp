@@ -26,9 +26,8 @@ namespace palpate {
 class NoneEvidence {
  public:
   /// @param options checked, with a resolved contact model
-  /// @param likelihood,batches evaluate bins; all of these outlive this object
-  NoneEvidence(SearchSpace& space, const BoundedOptions& options, const BinLikelihood& likelihood,
-               FasterBinLikelihood& batches);
+  /// @param likelihood evaluates bins; all of these outlive this object
+  NoneEvidence(SearchSpace& space, const BoundedOptions& options, const BinLikelihood& likelihood);
 
   void reset() { means_.clear(); }
   /// Takes in touches; those without a known element say nothing. All of them, or none where memory

@@ -66,8 +66,8 @@ class SearchRun {
         goal_(goal),
         deadline_(deadline),
         account_(search.space_.log_weight, search.space_.label_of, lattice_, goal_),
-        evaluator_(search.likelihood_, search.batches_, search.space_.log_weight, goal_, elements,
-                   visit, deadline_, account_),
+        evaluator_(search.likelihood_, search.space_.log_weight, goal_, elements, visit, deadline_,
+                   account_),
         leaves_(search.space_.bounds, thetas_, elements.from_pivot_mm.size(), deadline_, account_,
                 evaluator_),
         visit_(visit) {

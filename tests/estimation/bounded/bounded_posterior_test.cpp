@@ -72,7 +72,7 @@ TEST(BoundedPosterior, AgreesWithTheDenseHistogram) {
       SCOPED_TRACE(::testing::Message() << touches << " touches, gamma " << gamma);
       BoundedOptions options = small_options();
       options.contact.gamma = gamma;
-      BoundedPosterior bounded(device, two_shapes(), options);
+      BoundedPosterior bounded(two_shapes(), options);
       PoseHistogram dense(device, two_shapes(),
                           {.lattice = options.lattice, .contact = options.contact});
       bounded.update(recording.touches(0, touches));
@@ -112,20 +112,18 @@ TEST(BoundedPosterior, AgreesWithTheDenseHistogram) {
 }
 
 TEST(BoundedPosterior, BeforeAnyTouchKnowsTheWeights) {
-  Device device = Device::open();
-  BoundedPosterior posterior(device, two_made_up(), small_options());
+  BoundedPosterior posterior(two_made_up(), small_options());
   const Estimate estimate = posterior.estimate();
   EXPECT_NEAR(estimate.identity[0], 0.25, 1e-12);
   EXPECT_NEAR(estimate.identity[1], 0.75, 1e-12);
   EXPECT_EQ(estimate.mode.log_likelihood, 0.0);
   EXPECT_FALSE(estimate.contradicted);
-  expect_certified(device, two_made_up(), small_options(), {});
+  expect_certified(two_made_up(), small_options(), {});
 }
 
 TEST(BoundedPosterior, TellsTheLogLikelihoodOfPosesOffTheLattice) {
-  Device device = Device::open();
   const Recording recording = random_recording(4, 36, 804);
-  BoundedPosterior posterior(device, two_made_up(), small_options());
+  BoundedPosterior posterior(two_made_up(), small_options());
   posterior.update(all_touches(recording));
   Uniform random(805);
   for (int i = 0; i < 100; ++i) {
@@ -143,10 +141,9 @@ TEST(BoundedPosterior, TellsTheLogLikelihoodOfPosesOffTheLattice) {
 }
 
 TEST(BoundedPosterior, TellsMarginalsOnAnyGrid) {
-  Device device = Device::open();
   const Recording recording = touches_of_l(2, 806);
   const BoundedOptions options = small_options();
-  BoundedPosterior posterior(device, two_shapes(), options);
+  BoundedPosterior posterior(two_shapes(), options);
   posterior.update(all_touches(recording));
   const reference::Posterior truth =
       reference_posterior(two_shapes(), options, all_touches(recording));
@@ -189,7 +186,6 @@ TEST(BoundedPosterior, TellsMarginalsOnAnyGrid) {
 }
 
 TEST(BoundedPosterior, DoesNotDependOnTheOrderOfTouchesNorOnWhenOneAsked) {
-  Device device = Device::open();
   for (const bool none : {false, true}) {
     BoundedOptions options = small_options();
     if (none) {
@@ -197,12 +193,12 @@ TEST(BoundedPosterior, DoesNotDependOnTheOrderOfTouchesNorOnWhenOneAsked) {
     }
     const Recording recording = touches_of_l(5, 807);
     const std::vector<Touch> touches = all_touches(recording);
-    BoundedPosterior at_once(device, two_shapes(), options);
+    BoundedPosterior at_once(two_shapes(), options);
     at_once.update(touches);
     const auto expected = told_by(at_once, 2);
     EXPECT_EQ(told_by(at_once, 2), expected) << "asked again";
 
-    BoundedPosterior one_by_one(device, two_shapes(), options);
+    BoundedPosterior one_by_one(two_shapes(), options);
     for (const Touch& touch : touches) {
       one_by_one.estimate();
       one_by_one.update(touch);
@@ -213,7 +209,7 @@ TEST(BoundedPosterior, DoesNotDependOnTheOrderOfTouchesNorOnWhenOneAsked) {
     // The first touch stays the first: the share of "none of these" is the first one's.
     for (const std::vector<std::size_t>& order :
          {std::vector<std::size_t>{0, 4, 3, 2, 1}, {0, 2, 4, 1, 3}}) {
-      BoundedPosterior other(device, two_shapes(), options);
+      BoundedPosterior other(two_shapes(), options);
       other.update(touches[order[0]]);
       other.update(std::vector{touches[order[1]], touches[order[2]]});
       other.estimate();
@@ -224,15 +220,14 @@ TEST(BoundedPosterior, DoesNotDependOnTheOrderOfTouchesNorOnWhenOneAsked) {
 }
 
 TEST(BoundedPosterior, AfterAResetIsANewOne) {
-  Device device = Device::open();
   BoundedOptions options = small_options();
   options.none_weight = 0.5;
   const Recording before = random_recording(3, 20, 808);
   const Recording recording = touches_of_l(3, 809);
-  BoundedPosterior fresh(device, two_shapes(), options);
+  BoundedPosterior fresh(two_shapes(), options);
   const auto untouched = told_by(fresh, 2);
   fresh.update(all_touches(recording));
-  BoundedPosterior used(device, two_shapes(), options);
+  BoundedPosterior used(two_shapes(), options);
   used.update(all_touches(before));
   used.estimate();
   used.reset();
@@ -245,21 +240,20 @@ TEST(BoundedPosterior, AfterAResetIsANewOne) {
 }
 
 TEST(BoundedPosterior, TakesInAllTouchesOrNone) {
-  Device device = Device::open();
   BoundedOptions options = small_options();
   options.none_weight = 0.5;
   Recording recording = touches_of_l(4, 810);
   const std::vector<Touch> sound = recording.touches(0, 3);
   recording.T_robot_sensor[3].translation_mm.x = nan;
   const std::vector<Touch> touches = all_touches(recording);
-  BoundedPosterior posterior(device, two_shapes(), options);
+  BoundedPosterior posterior(two_shapes(), options);
   posterior.update(touches[0]);
   const auto before = told_by(posterior, 2);
   expect_refused([&] { posterior.update(touches); }, "T_robot_sensor is not finite");
   EXPECT_EQ(told_by(posterior, 2), before);
   // Broken off at the first call of `progress`, and at the last one.
   int calls = 0;
-  BoundedPosterior(device, two_shapes(), options).update(sound, [&](double done) {
+  BoundedPosterior(two_shapes(), options).update(sound, [&](double done) {
     EXPECT_GT(done, 0.0);
     EXPECT_LE(done, 1.0);
     ++calls;
@@ -277,34 +271,21 @@ TEST(BoundedPosterior, TakesInAllTouchesOrNone) {
     EXPECT_EQ(told_by(posterior, 2), before);
   }
   posterior.update(std::span(sound).subspan(1));
-  BoundedPosterior other(device, two_shapes(), options);
+  BoundedPosterior other(two_shapes(), options);
   other.update(sound);
   EXPECT_EQ(told_by(posterior, 2), told_by(other, 2)) << "as if nothing had been refused";
-}
-
-TEST(BoundedPosterior, HasTheSameBitsWithoutADevice) {
-  Device device = Device::open();
-  const Recording recording = touches_of_l(3, 811);
-  const std::vector<Touch> touches = all_touches(recording);
-  BoundedPosterior with(device, two_shapes(), small_options());
-  BoundedPosterior without(two_shapes(), small_options());
-  with.update(touches);
-  without.update(touches);
-  EXPECT_EQ(told_by(without, 2), told_by(with, 2));
-  EXPECT_NE(without.path().find("on the host"), std::string::npos) << without.path();
 }
 
 TEST(BoundedPosterior, HasTheSameBitsOnAnyNumberOfThreads) {
   // More threads than the machine may have cores.
   const tbb::global_control allow(tbb::global_control::max_allowed_parallelism, 4);
-  Device device = Device::open();
   const Recording recording = touches_of_l(3, 811);
   std::vector<std::vector<double>> one;
   for (const int threads : {1, 4, 0, 3}) {
     BoundedOptions options = small_options();
     options.none_weight = 0.5;
     options.threads = threads;
-    BoundedPosterior posterior(device, two_shapes(), options);
+    BoundedPosterior posterior(two_shapes(), options);
     for (const Touch& touch : all_touches(recording)) {
       posterior.update(touch);
       posterior.estimate();
@@ -318,13 +299,12 @@ TEST(BoundedPosterior, HasTheSameBitsOnAnyNumberOfThreads) {
 }
 
 TEST(BoundedPosterior, GivesTheSameAfterACancelledSearchAsWithoutOne) {
-  Device device = Device::open();
   const Recording recording = touches_of_l(2, 813);
   struct Cancelled {};
   for (const std::optional<double> budget_s : {std::optional<double>(), std::optional(1e3)}) {
     BoundedOptions options = small_options();
     options.budget_s = budget_s;
-    BoundedPosterior expected(device, two_shapes(), options);
+    BoundedPosterior expected(two_shapes(), options);
     expected.update(recording.touches(0, 2));
     int left = -1;  // cancel points until one throws; never below 0
     int passed = 0;
@@ -334,7 +314,7 @@ TEST(BoundedPosterior, GivesTheSameAfterACancelledSearchAsWithoutOne) {
         throw Cancelled();
       }
     };
-    BoundedPosterior posterior(device, two_shapes(), options);
+    BoundedPosterior posterior(two_shapes(), options);
     const auto cancelled_after = [&](int points, const auto& call) {
       left = points;
       EXPECT_THROW(call(), Cancelled) << points;
@@ -363,15 +343,14 @@ TEST(BoundedPosterior, GivesTheSameAfterACancelledSearchAsWithoutOne) {
 }
 
 TEST(BoundedPosterior, MovesItsPivotOnlyBeforeATouch) {
-  Device device = Device::open();
   const Recording recording = touches_of_l(2, 812);
   BoundedOptions options = small_options();
   options.none_weight = 0.5;
-  BoundedPosterior moved(device, two_shapes(), options);
+  BoundedPosterior moved(two_shapes(), options);
   moved.estimate();
   moved.move_pivot({-3.0, 4.0});
   options.lattice.pivot_mm = {-3.0, 4.0};
-  BoundedPosterior made(device, two_shapes(), options);
+  BoundedPosterior made(two_shapes(), options);
   EXPECT_EQ(told_by(moved, 2), told_by(made, 2));
   moved.update(all_touches(recording));
   made.update(all_touches(recording));
@@ -387,9 +366,8 @@ TEST(BoundedPosterior, MovesItsPivotOnlyBeforeATouch) {
 
 // Asked on purpose, each of them. NOLINTBEGIN(bugprone-use-after-move)
 TEST(BoundedPosterior, SaysThatItWasMovedFrom) {
-  Device device = Device::open();
   const Recording recording = random_recording(1, 36, 813);
-  BoundedPosterior first(device, two_made_up(), small_options());
+  BoundedPosterior first(two_made_up(), small_options());
   BoundedPosterior second(std::move(first));
   second.update(recording.touch(0));
   for (const auto& call : std::vector<std::function<void()>>{
@@ -408,12 +386,11 @@ TEST(BoundedPosterior, SaysThatItWasMovedFrom) {
 // NOLINTEND(bugprone-use-after-move)
 
 TEST(BoundedPosterior, RefusesWhatItCannotDo) {
-  Device device = Device::open();
   const auto refuse = [&](const std::function<void(BoundedOptions&)>& change,
                           const std::string& says) {
     BoundedOptions options = small_options();
     change(options);
-    expect_refused([&] { BoundedPosterior(device, two_made_up(), options); }, says);
+    expect_refused([&] { BoundedPosterior(two_made_up(), options); }, says);
   };
   for (const double tolerance : {0.0, -1e-6, 1.0, 2.0, nan, infinity}) {
     refuse([&](BoundedOptions& o) { o.tolerance = tolerance; }, "tolerance");
@@ -429,14 +406,14 @@ TEST(BoundedPosterior, RefusesWhatItCannotDo) {
   refuse([&](BoundedOptions& o) { o.threads = -1; }, "threads");
   refuse([&](BoundedOptions& o) { o.lattice.x_mm.count = 0; }, "bins x_mm");
   refuse([&](BoundedOptions& o) { o.contact.gamma = 1.0; }, "gamma");
-  expect_refused([&] { BoundedPosterior(device, {}, small_options()); }, "give at least one map");
+  expect_refused([&] { BoundedPosterior({}, small_options()); }, "give at least one map");
   std::vector<Hypothesis> objects = two_made_up();
   objects[1].weight = 0.0;
-  expect_refused([&] { BoundedPosterior(device, objects, small_options()); }, "weight");
+  expect_refused([&] { BoundedPosterior(objects, small_options()); }, "weight");
   objects = two_made_up();
   objects[1].map.prior = 0.4;
-  expect_refused([&] { BoundedPosterior(device, objects, small_options()); }, "prior");
-  BoundedPosterior posterior(device, two_made_up(), small_options());
+  expect_refused([&] { BoundedPosterior(objects, small_options()); }, "prior");
+  BoundedPosterior posterior(two_made_up(), small_options());
   expect_refused([&] { posterior.refine({.object = 2}); }, "object 2");
   expect_refused([&] { posterior.refine({.object = 0, .bin = 1'000'000}); }, "bin");
 }
@@ -474,7 +451,7 @@ TEST(BoundedPosterior, IsContradictedWhereTheDenseOneIs) {
       const auto compare = [&](float light, bool contradicted) {
         fill(0, by.heavy);
         fill(1, light);
-        BoundedPosterior bounded(device, objects, options);
+        BoundedPosterior bounded(objects, options);
         PoseHistogram dense(device, objects,
                             {.lattice = options.lattice, .contact = options.contact});
         bounded.update(all_touches(recording));
@@ -498,7 +475,7 @@ TEST(BoundedPosterior, KnowsNoneOfThese) {
   const Recording recording = touches_of_l(4, 816);
   BoundedOptions options = small_options();
   options.none_weight = 2.0;
-  BoundedPosterior bounded(device, two_shapes(), options);
+  BoundedPosterior bounded(two_shapes(), options);
   PoseHistogram dense(device, two_shapes(), {.lattice = options.lattice, .none_weight = 2.0});
   EXPECT_NEAR(bounded.estimate().none, 0.4, 1e-12) << "2 of 1 + 2 + 2";
   for (std::size_t n = 1; n <= recording.size(); ++n) {
@@ -526,7 +503,7 @@ TEST(BoundedPosterior, KnowsNoneOfThese) {
     EXPECT_LE(against, most - none_least + 1e-12);
   }
   options.none_weight.reset();
-  BoundedPosterior without(device, two_shapes(), options);
+  BoundedPosterior without(two_shapes(), options);
   without.update(all_touches(recording));
   const Estimate expected = without.estimate();
   const Estimate with = bounded.estimate();
@@ -545,7 +522,7 @@ TEST(BoundedPosterior, BoundsNoneOfTheseBeyondAHundredThousandBins) {
   options.none_weight = 3.0;
   for (const std::size_t elements : {36, 200}) {
     const Recording recording = random_recording(3, elements, 818);
-    BoundedPosterior bounded(device, two_made_up(), options);
+    BoundedPosterior bounded(two_made_up(), options);
     PoseHistogram dense(device, two_made_up(), {.lattice = options.lattice, .none_weight = 3.0});
     for (std::size_t n = 1; n <= recording.size(); ++n) {
       SCOPED_TRACE(testing::Message() << elements << " elements, touch " << n);
@@ -571,12 +548,11 @@ TEST(BoundedPosterior, BoundsNoneOfTheseBeyondAHundredThousandBins) {
 }
 
 TEST(BoundedPosterior, BoundsNoneOfTheseAsCloselyAsTheEvidenceIsAskedFor) {
-  Device device = Device::open();
   BoundedOptions options = small_options();
   options.none_weight = 1e-12;  // which no identity would ask for
-  BoundedPosterior plain(device, two_made_up(), options);
+  BoundedPosterior plain(two_made_up(), options);
   options.evidence_nats = 1e-4;
-  BoundedPosterior close(device, two_made_up(), options);
+  BoundedPosterior close(two_made_up(), options);
   const auto width_of = [](const BoundedPosterior& posterior) {
     const LogInterval none = posterior.estimate().certificate->none_log_evidence.value();
     return none.high - none.low;
@@ -589,15 +565,14 @@ TEST(BoundedPosterior, BoundsNoneOfTheseAsCloselyAsTheEvidenceIsAskedFor) {
 }
 
 TEST(BoundedPosterior, ShowsInTheIdentitiesWhereABudgetLeftNoneOfThese) {
-  Device device = Device::open();
   BoundedOptions options = small_options();
   options.lattice.x_mm.count = 90;
   options.lattice.y_mm.count = 90;
   options.lattice.theta_rad.count = 20;
   options.none_weight = 3.0;
-  BoundedPosterior sharp(device, two_made_up(), options);
+  BoundedPosterior sharp(two_made_up(), options);
   options.budget_s = 1e-9;
-  BoundedPosterior ended(device, two_made_up(), options);
+  BoundedPosterior ended(two_made_up(), options);
   const Recording recording = random_recording(1, 36, 819);
   sharp.update(all_touches(recording));
   ended.update(all_touches(recording));
@@ -612,11 +587,10 @@ TEST(BoundedPosterior, ShowsInTheIdentitiesWhereABudgetLeftNoneOfThese) {
 }
 
 TEST(BoundedPosterior, LeavesObjectsWhereNoneTakesAllOfTheMass) {
-  Device device = Device::open();
   const Recording recording = random_recording(4, 36, 817);
   BoundedOptions options = small_options();
   options.none_weight = 1e300;
-  BoundedPosterior posterior(device, two_made_up(), options);
+  BoundedPosterior posterior(two_made_up(), options);
   posterior.update(all_touches(recording));
   const Estimate estimate = posterior.estimate();
   EXPECT_EQ(estimate.none, 1.0);

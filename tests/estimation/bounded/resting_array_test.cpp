@@ -11,7 +11,6 @@
 #include "bins_by_definition.hpp"
 #include "bounded/certified.hpp"
 #include "estimation/bounded/bound_search.hpp"
-#include "estimation/bounded/faster_bin_likelihood.hpp"
 #include "synthetic.hpp"
 
 namespace palpate {
@@ -94,9 +93,8 @@ class Search {
       options_.contact.table = crooked_table();
     }
     likelihood_.emplace(hypotheses_, options_.contact, lattice);
-    batches_.emplace(*likelihood_, nullptr, hypotheses_, options_.contact, lattice, BinPlace::host);
     space_.emplace(hypotheses_, options_);
-    search_.emplace(*space_, options_, *likelihood_, *batches_);
+    search_.emplace(*space_, options_, *likelihood_);
   }
 
   BoundSearch& operator*() { return *search_; }
@@ -107,7 +105,6 @@ class Search {
   std::vector<Hypothesis> hypotheses_;
   BoundedOptions options_;
   std::optional<BinLikelihood> likelihood_;
-  std::optional<FasterBinLikelihood> batches_;
   std::optional<SearchSpace> space_;
   std::optional<BoundSearch> search_;
 };
@@ -174,7 +171,6 @@ TEST(BoundSearch, AddsTouchesOfAnArrayAtRestTogether) {
 }
 
 TEST(BoundedPosterior, IsCertifiedForEveryFrameOfAnArrayAtRest) {
-  Device device = Device::open();
   std::vector<Hypothesis> objects;
   for (std::uint64_t i = 0; i < 3; ++i) {
     objects.push_back({random_map(31, 27, 0.5, 2.0, 640 + i), 1.0});
@@ -184,7 +180,7 @@ TEST(BoundedPosterior, IsCertifiedForEveryFrameOfAnArrayAtRest) {
   BoundedOptions options{.lattice = sparse_lattice()};
   options.contact.prior = 0.2;
   options.evidence_nats = 0.05;
-  BoundedPosterior posterior(device, objects, options);
+  BoundedPosterior posterior(objects, options);
   Uniform random(650);
   for (int frame = 0; frame < 6; ++frame) {
     SCOPED_TRACE(testing::Message() << "frame " << frame);

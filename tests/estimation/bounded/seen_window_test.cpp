@@ -13,7 +13,6 @@
 #include "bound_cases.hpp"
 #include "estimation/bounded/bin_likelihood.hpp"
 #include "estimation/bounded/bound_search.hpp"
-#include "estimation/bounded/faster_bin_likelihood.hpp"
 #include "estimation/bounded/reading_penalties.hpp"
 
 namespace palpate {
@@ -199,10 +198,8 @@ std::int64_t expect_sound_search(const BinCase& of, double tolerance) {
   const BoundedOptions options{
       .lattice = of.lattice, .contact = of.contact, .tolerance = tolerance};
   const BinLikelihood likelihood(hypotheses, of.contact, of.lattice);
-  FasterBinLikelihood batches(likelihood, nullptr, hypotheses, of.contact, of.lattice,
-                              BinPlace::host);
   SearchSpace space(hypotheses, options);
-  BoundSearch search(space, options, likelihood, batches);
+  BoundSearch search(space, options, likelihood);
   const ArrayReadings touch = readings_of(of.elements);
   search.add(std::span(&touch, 1));
   Visited visited(of, 2);
