@@ -9,14 +9,14 @@
 
 #include <tbb/task_arena.h>
 
-#include "estimation/bounded/bin_likelihood.hpp"
-#include "estimation/bounded/bound_search.hpp"
 #include "estimation/bounded/evaluated_bins.hpp"
 #include "estimation/bounded/followed_bins.hpp"
 #include "estimation/bounded/kept_touches.hpp"
 #include "estimation/bounded/known_elements.hpp"
+#include "estimation/bounded/leaves/bin_likelihood.hpp"
 #include "estimation/bounded/none_evidence.hpp"
-#include "estimation/bounded/search_space.hpp"
+#include "estimation/bounded/search/bound_search.hpp"
+#include "estimation/bounded/search/search_space.hpp"
 #include "estimation/half_done.hpp"
 #include "palpate/bounded_posterior.hpp"
 

@@ -11,7 +11,7 @@
 #include "estimation/bounded/log_sum.hpp"
 #include "estimation/bounded/marginal_sums.hpp"
 #include "estimation/bounded/parallel_for.hpp"
-#include "estimation/bounded/search_memory.hpp"
+#include "estimation/bounded/search/search_memory.hpp"
 #include "estimation/bounded/thinned_lattice.hpp"
 #include "estimation/hypotheses.hpp"
 #include "estimation/lattice/refinement.hpp"

@@ -4,9 +4,9 @@
 #include <span>
 #include <vector>
 
-#include "estimation/bounded/bin_likelihood.hpp"
 #include "estimation/bounded/evaluated_bins.hpp"
-#include "estimation/bounded/mass_account.hpp"
+#include "estimation/bounded/leaves/bin_likelihood.hpp"
+#include "estimation/bounded/search/mass_account.hpp"
 
 namespace palpate {
 

@@ -8,9 +8,9 @@
 #include <span>
 #include <vector>
 
-#include "estimation/bounded/bound_search.hpp"
 #include "estimation/bounded/known_elements.hpp"
-#include "estimation/bounded/search_space.hpp"
+#include "estimation/bounded/search/bound_search.hpp"
+#include "estimation/bounded/search/search_space.hpp"
 #include "palpate/estimate.hpp"
 
 namespace palpate {

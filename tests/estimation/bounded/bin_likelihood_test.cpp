@@ -1,4 +1,4 @@
-#include "estimation/bounded/bin_likelihood.hpp"
+#include "estimation/bounded/leaves/bin_likelihood.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -2,7 +2,7 @@
 
 #include <vector>
 
-#include "estimation/bounded/bin_likelihood.hpp"
+#include "estimation/bounded/leaves/bin_likelihood.hpp"
 #include "palpate/contact_model.hpp"
 #include "palpate/occupancy_grid.hpp"
 

@@ -8,7 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "bounded/certificate_trials.hpp"
-#include "estimation/bounded/bin_likelihood.hpp"
+#include "estimation/bounded/leaves/bin_likelihood.hpp"
 #include "every_set_of_instructions.hpp"
 
 namespace palpate {

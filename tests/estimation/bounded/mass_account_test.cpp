@@ -1,4 +1,4 @@
-#include "estimation/bounded/mass_account.hpp"
+#include "estimation/bounded/search/mass_account.hpp"
 
 #include <array>
 #include <cmath>

@@ -1,6 +1,6 @@
 // An array that stays at its place: sums of penalties that only the elements in contact change.
 
-#include "estimation/bounded/resting_array.hpp"
+#include "estimation/bounded/search/resting_array.hpp"
 
 #include <algorithm>
 #include <optional>
@@ -10,7 +10,7 @@
 
 #include "bins_by_definition.hpp"
 #include "bounded/certified.hpp"
-#include "estimation/bounded/bound_search.hpp"
+#include "estimation/bounded/search/bound_search.hpp"
 #include "synthetic.hpp"
 
 namespace palpate {

@@ -1,7 +1,7 @@
 // Tiles in which every element sees the prior: none may be taken for one, and their bins have the
 // likelihood of the prior.
 
-#include "estimation/bounded/seen_window.hpp"
+#include "estimation/bounded/search/seen_window.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -11,9 +11,9 @@
 #include <gtest/gtest.h>
 
 #include "bound_cases.hpp"
-#include "estimation/bounded/bin_likelihood.hpp"
-#include "estimation/bounded/bound_search.hpp"
-#include "estimation/bounded/reading_penalties.hpp"
+#include "estimation/bounded/leaves/bin_likelihood.hpp"
+#include "estimation/bounded/search/bound_search.hpp"
+#include "estimation/bounded/tables/reading_penalties.hpp"
 
 namespace palpate {
 namespace {

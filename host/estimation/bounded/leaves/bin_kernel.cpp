@@ -1,0 +1,389 @@
+// Highway compiles this file once for every set of vector instructions. Products and sums are never
+// fused and lanes never mixed, so that every set gives the same bits.
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "estimation/bounded/leaves/bin_kernel.cpp"
+#define HWY_COMPILE_ALL_ATTAINABLE
+#define HWY_DISABLED_TARGETS (HWY_SVE | HWY_SVE2 | HWY_SVE_256 | HWY_SVE2_128 | HWY_RVV)
+#include <hwy/foreach_target.h>
+#include <hwy/highway.h>
+
+#include <algorithm>
+#include <type_traits>
+
+#include "estimation/bounded/leaves/bin_kernel.hpp"
+#include "estimation/bounded/leaves/patch_interpolation-inl.hpp"
+#include "estimation/bounded/leaves/table_look_up-inl.hpp"
+#include "model/vector_math-inl.hpp"
+
+HWY_BEFORE_NAMESPACE();
+namespace palpate {
+namespace HWY_NAMESPACE {
+
+template <class D>
+void place(D d, const double* xy_mm, double cos_by_cell, double sin_by_cell, double reach,
+           double rounder, double* x, double* y) {
+  hn::Vec<D> px;
+  hn::Vec<D> py;
+  hn::LoadInterleaved2(d, xy_mm, px, py);
+  const auto c = hn::Set(d, cos_by_cell);
+  const auto s = hn::Set(d, sin_by_cell);
+  const auto limit = hn::Set(d, reach);
+  const auto round = hn::Set(d, rounder);
+  const auto rounded = [&](auto v) HWY_ATTR {
+    const auto clamped = hn::Max(hn::Neg(limit), hn::Min(v, limit));
+    return hn::Sub(hn::Add(clamped, round), round);
+  };
+  hn::StoreU(rounded(hn::Sub(hn::Mul(c, px), hn::Mul(s, py))), d, x);
+  hn::StoreU(rounded(hn::Add(hn::Mul(s, px), hn::Mul(c, py))), d, y);
+}
+
+void PlaceElements(const double* xy_mm, std::size_t count, double cos_by_cell, double sin_by_cell,
+                   double reach, double rounder, double* x, double* y) {
+  const hn::ScalableTag<double> d;
+  const std::size_t lanes = hn::Lanes(d);
+  std::size_t e = 0;
+  for (; e + lanes <= count; e += lanes) {
+    place(d, xy_mm + 2 * e, cos_by_cell, sin_by_cell, reach, rounder, x + e, y + e);
+  }
+  if (e < count) {
+    double rest[2 * most_lanes] = {};
+    std::copy(xy_mm + 2 * e, xy_mm + 2 * count, rest);
+    place(d, rest, cos_by_cell, sin_by_cell, reach, rounder, x + e, y + e);
+  }
+}
+
+template <class D>
+void store_as(D d, hn::Vec<D> v, double* to) {
+  hn::StoreU(v, d, to);
+}
+
+template <class D>
+void store_as(D /*d*/, hn::Vec<D> v, float* to) {
+  const hn::Rebind<float, D> df;
+  hn::StoreU(hn::DemoteTo(df, v), df, to);
+}
+
+/// Finds each element's patch. The index is clamped so that elements beyond the map see a patch of
+/// the border, whose nodes are all equal. For float64, patches with nodes of the border have their
+/// index's bits flipped.
+template <typename Lane>
+void find_patches(const BinBlock& block, const MapPatches& map, const PlacedElements& placed,
+                  ElementPatches<Lane>& found) {
+  const hn::ScalableTag<double> d;
+  const hn::Rebind<std::int32_t, decltype(d)> di;
+  const auto first_x = hn::Set(d, block.x);
+  const auto first_y = hn::Set(d, block.y);
+  const auto last_x = hn::Set(d, static_cast<double>(map.width() - MapPatches::side));
+  const auto last_y = hn::Set(d, static_cast<double>(map.height() - MapPatches::side));
+  const auto width = hn::Set(d, static_cast<double>(map.width()));
+  [[maybe_unused]] const auto border = hn::Set(d, static_cast<double>(MapPatches::border));
+  for (std::size_t e = 0; e < found.patch.size(); e += hn::Lanes(d)) {
+    const auto x = hn::Add(hn::LoadU(d, placed.x.data() + e), first_x);
+    const auto y = hn::Add(hn::LoadU(d, placed.y.data() + e), first_y);
+    const auto whole_x = hn::Floor(x);
+    const auto whole_y = hn::Floor(y);
+    store_as(d, hn::Sub(x, whole_x), found.x.data() + e);
+    store_as(d, hn::Sub(y, whole_y), found.y.data() + e);
+    const auto column = hn::Max(hn::Zero(d), hn::Min(whole_x, last_x));
+    const auto row = hn::Max(hn::Zero(d), hn::Min(whole_y, last_y));
+    auto patch = hn::Add(hn::Mul(row, width), column);
+    if constexpr (sizeof(Lane) == 8) {
+      const auto x_off = hn::Or(hn::Lt(column, border), hn::Gt(column, hn::Sub(last_x, border)));
+      const auto y_off = hn::Or(hn::Lt(row, border), hn::Gt(row, hn::Sub(last_y, border)));
+      const auto flipped = hn::Sub(hn::Set(d, -1.0), patch);
+      patch = hn::IfThenElse(hn::Or(x_off, y_off), flipped, patch);
+    }
+    hn::StoreU(hn::DemoteTo(di, patch), di, found.patch.data() + e);
+  }
+}
+
+/// The product of the likelihoods of some elements in every lane, see ReadingForm.
+template <class D>
+struct Products {
+  hn::Vec<D> numerator;
+  hn::Vec<D> denominator;
+  hn::Vec<hn::RebindToUnsigned<D>> exponent;  ///< taken out, modulo the lane's range
+  hn::Vec<D> sum;                             ///< of a, since it was last taken out
+
+  explicit Products(D d)
+      : numerator(hn::Set(d, hn::TFromD<D>{1})),
+        denominator(hn::Set(d, hn::TFromD<D>{1})),
+        exponent(hn::Zero(hn::RebindToUnsigned<D>())),
+        sum(hn::Zero(d)) {}
+};
+
+/// The number that a reading's likelihood tends to at large and at small log odds, over its scale.
+template <typename Lane>
+struct Limits {
+  Lane at_negative;
+  Lane at_positive;
+};
+
+template <class D>
+HWY_INLINE void multiply(D d, hn::Vec<D> l, hn::Vec<D> at_negative, hn::Vec<D> at_positive,
+                         Products<D>& product) {
+  const auto one = hn::Set(d, hn::TFromD<D>{1});
+  const auto e = exp_of_minus(d, hn::Abs(l));
+  const auto negative = hn::Lt(l, hn::Zero(d));
+  const auto numerator = hn::IfThenElse(negative, hn::Add(at_negative, hn::Mul(at_positive, e)),
+                                        hn::Add(at_positive, hn::Mul(at_negative, e)));
+  product.numerator = hn::Mul(product.numerator, numerator);
+  product.denominator = hn::Mul(product.denominator, hn::Add(one, e));
+}
+
+/// The same in the form of sums, for log odds `z` of the reading.
+template <class D>
+HWY_INLINE void multiply_and_add(D d, hn::Vec<D> z, hn::Vec<D> log_ratio, Products<D>& product) {
+  const auto one = hn::Set(d, hn::TFromD<D>{1});
+  const auto zero = hn::Zero(d);
+  const auto e = exp_of_minus(d, hn::Abs(z));
+  const auto a = hn::Max(hn::Min(z, zero), log_ratio);
+  const auto other = exp_of_minus(d, hn::Abs(hn::Sub(hn::Min(z, zero), log_ratio)));
+  const auto factor = hn::IfThenElse(hn::Lt(z, zero), one, e);
+  product.numerator = hn::Mul(product.numerator, hn::Add(one, hn::Mul(other, factor)));
+  product.denominator = hn::Mul(product.denominator, hn::Add(one, e));
+  product.sum = hn::Add(product.sum, a);
+}
+
+/// Takes powers of two, and the sum, out of the product.
+template <class D>
+HWY_INLINE void take_out(D d, Products<D>& product, double* sums) {
+  using Lane = hn::TFromD<D>;
+  const hn::RebindToUnsigned<D> du;
+  const auto mantissa = hn::Set(du, VectorMath<Lane>::mantissa_mask);
+  const auto one = hn::Set(du, VectorMath<Lane>::one_bits);
+  const auto n = hn::BitCast(du, product.numerator);
+  const auto m = hn::BitCast(du, product.denominator);
+  constexpr int shift = VectorMath<Lane>::mantissa_bits;
+  product.exponent =
+      hn::Add(product.exponent, hn::Sub(hn::ShiftRight<shift>(n), hn::ShiftRight<shift>(m)));
+  product.numerator = hn::BitCast(d, hn::Or(hn::And(n, mantissa), one));
+  product.denominator = hn::BitCast(d, hn::Or(hn::And(m, mantissa), one));
+  if (sums != nullptr) {
+    HWY_ALIGN Lane sum[most_lanes];
+    hn::Store(product.sum, d, sum);
+    for (std::size_t i = 0; i < hn::Lanes(d); ++i) {
+      sums[i] += static_cast<double>(sum[i]);
+    }
+    product.sum = hn::Zero(d);
+  }
+}
+
+/// Sum of the logarithms of all lanes' factors.
+template <class D>
+void store_logs(D d, const Products<D>& product, const double* sums, double constant,
+                double* log_likelihood) {
+  using Lane = hn::TFromD<D>;
+  const hn::RebindToUnsigned<D> du;
+  const hn::ScalableTag<double> dd;
+  HWY_ALIGN Lane numerator[most_lanes];
+  HWY_ALIGN Lane denominator[most_lanes];
+  HWY_ALIGN hn::TFromD<decltype(du)> exponent[most_lanes];
+  hn::Store(product.numerator, d, numerator);
+  hn::Store(product.denominator, d, denominator);
+  hn::Store(product.exponent, du, exponent);
+  HWY_ALIGN double over[most_lanes];
+  HWY_ALIGN double under[most_lanes];
+  HWY_ALIGN double power[most_lanes];
+  for (std::size_t i = 0; i < hn::Lanes(d); ++i) {
+    over[i] = static_cast<double>(numerator[i]);
+    under[i] = static_cast<double>(denominator[i]);
+    power[i] =
+        static_cast<double>(static_cast<std::make_signed_t<hn::TFromD<decltype(du)>>>(exponent[i]));
+  }
+  for (std::size_t i = 0; i < hn::Lanes(d); i += hn::Lanes(dd)) {
+    const auto x = hn::Div(hn::Load(dd, over + i), hn::Load(dd, under + i));
+    const auto logs =
+        hn::Add(hn::Mul(hn::Load(dd, power + i), hn::Set(dd, VectorMath<double>::ln2)),
+                log_near_one(dd, x));
+    const auto rest = hn::Add(hn::LoadU(dd, sums + i), hn::Set(dd, constant));
+    hn::StoreU(hn::Add(logs, rest), dd, log_likelihood + i);
+  }
+}
+
+/// The bins of one vector, by Eq. 7.
+/// @param log_odds_at (element): in every lane
+template <ReadingForm::Kind kind, class D, class LogOddsAt>
+void evaluate_lanes(D d, const LogOddsAt& log_odds_at, std::span<const ReadingRun> runs,
+                    const ReadingForm& form, double* log_likelihood) {
+  using Lane = hn::TFromD<D>;
+  constexpr bool in_sums = kind == ReadingForm::Kind::sums;
+  const int interval = sizeof(Lane) == 4 ? form.float_interval : form.double_interval;
+  const auto ratio = hn::Set(d, static_cast<Lane>(form.ratio));
+  const auto log_ratio = hn::Set(d, static_cast<Lane>(form.log_ratio));
+  const auto one = hn::Set(d, Lane{1});
+  Products<D> product(d);
+  HWY_ALIGN double sums[most_lanes] = {};
+  std::size_t count = 0;
+  int since = 0;
+  for (const ReadingRun& run : runs) {
+    const bool contact = run.reading != Reading::no_contact;
+    const auto at_negative = contact ? ratio : one;
+    const auto at_positive = contact ? one : ratio;
+    count += run.end - run.begin;
+    for (std::size_t e = run.begin; e < run.end; ++e) {
+      const auto l = log_odds_at(e);
+      if constexpr (in_sums) {
+        multiply_and_add(d, contact ? l : hn::Neg(l), log_ratio, product);
+      } else {
+        multiply(d, l, at_negative, at_positive, product);
+      }
+      if (++since == interval) {
+        take_out(d, product, in_sums ? sums : nullptr);
+        since = 0;
+      }
+    }
+  }
+  take_out(d, product, in_sums ? sums : nullptr);
+  store_logs(d, product, sums, static_cast<double>(count) * form.log_scale, log_likelihood);
+}
+
+/// The bins of one vector, by the model's form.
+template <class D, class LogOddsAt>
+void evaluate_vector(D d, const LogOddsAt& log_odds_at, std::size_t object,
+                     std::span<const ReadingRun> runs, const ReadingForm& form,
+                     double* log_likelihood) {
+  if (form.kind == ReadingForm::Kind::products) {
+    evaluate_lanes<ReadingForm::Kind::products>(d, log_odds_at, runs, form, log_likelihood);
+  } else if (form.kind == ReadingForm::Kind::sums) {
+    evaluate_lanes<ReadingForm::Kind::sums>(d, log_odds_at, runs, form, log_likelihood);
+  } else if constexpr (sizeof(hn::TFromD<D>) == 8) {
+    look_up_lanes(d, log_odds_at, object, runs, form, log_likelihood);
+  }
+}
+
+template <typename Lane>
+void evaluate(const BinList<Lane>& bins, const MapPatches& map, std::size_t object,
+              const PlacedElements& placed, std::span<const ReadingRun> runs,
+              const ReadingForm& form, double* log_likelihood,
+              std::vector<ElementPatches<Lane>>& scratch) {
+  const std::vector<BinBlock>& blocks = bins.blocks;
+  for (std::size_t i = 0; i < blocks.size(); ++i) {
+    find_patches(blocks[i], map, placed, scratch[i]);
+  }
+  using D = hn::ScalableTag<Lane>;
+  const D d;
+  const std::size_t lanes = hn::Lanes(d);
+  if constexpr (sizeof(Lane) == 8) {
+    if (form.kind == ReadingForm::Kind::table && blocks.size() == bins.bins()) {
+      for (std::size_t i = 0; i < blocks.size(); ++i) {
+        look_up_elements(d, map, object, scratch[i], runs, form, log_likelihood + i);
+      }
+      return;
+    }
+  }
+  HWY_ALIGN Lane x_offset[most_lanes] = {};
+  HWY_ALIGN Lane y_offset[most_lanes] = {};
+  HWY_ALIGN double out[most_lanes];
+  LanesOfBlock<D> parts[most_lanes];
+  std::size_t block = 0;
+  for (std::size_t first = 0, end = 0; first < bins.bins(); first = end) {
+    std::size_t count = 0;
+    // As many blocks as fit wholly, or a part of one.
+    for (end = first; block < blocks.size() && (count == 0 || blocks[block].end <= first + lanes);
+         ++block) {
+      // All lanes from here on: the next block takes its own.
+      const std::size_t before = end - first;
+      parts[count++] = {&scratch[block], hn::Not(hn::FirstN(d, before)),
+                        hn::Not(hn::FirstN(hn::Rebind<float, D>(), before))};
+      end = std::min(blocks[block].end, first + lanes);
+      if (end < blocks[block].end) {
+        break;
+      }
+    }
+    std::copy(bins.x_offset.begin() + first, bins.x_offset.begin() + end, x_offset);
+    std::copy(bins.y_offset.begin() + first, bins.y_offset.begin() + end, y_offset);
+    const auto x = hn::Load(d, x_offset);
+    const auto y = hn::Load(d, y_offset);
+    if (count == 1) {
+      const ElementPatches<Lane>& elements = *parts[0].elements;
+      evaluate_vector(
+          d, [&](std::size_t e) HWY_ATTR { return log_odds(d, map, elements, e, x, y); }, object,
+          runs, form, out);
+    } else {
+      const std::span<const LanesOfBlock<D>> of(parts, count);
+      evaluate_vector(
+          d, [&](std::size_t e) HWY_ATTR { return log_odds(d, map, of, e, x, y); }, object, runs,
+          form, out);
+    }
+    std::copy(out, out + (end - first), log_likelihood + first);
+  }
+}
+
+void EvaluateFloat(const BinList<float>& bins, const MapPatches& map, std::size_t object,
+                   const PlacedElements& placed, std::span<const ReadingRun> runs,
+                   const ReadingForm& form, double* log_likelihood,
+                   std::vector<ElementPatches<float>>& scratch) {
+  evaluate(bins, map, object, placed, runs, form, log_likelihood, scratch);
+}
+
+void EvaluateDouble(const BinList<double>& bins, const MapPatches& map, std::size_t object,
+                    const PlacedElements& placed, std::span<const ReadingRun> runs,
+                    const ReadingForm& form, double* log_likelihood,
+                    std::vector<ElementPatches<double>>& scratch) {
+  evaluate(bins, map, object, placed, runs, form, log_likelihood, scratch);
+}
+
+std::int64_t Target() { return HWY_TARGET; }
+
+}  // namespace HWY_NAMESPACE
+}  // namespace palpate
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+
+#include <cmath>
+
+namespace palpate {
+
+HWY_EXPORT(PlaceElements);
+HWY_EXPORT(EvaluateFloat);
+HWY_EXPORT(EvaluateDouble);
+HWY_EXPORT(Target);
+
+PositionGrid::PositionGrid(double reach_cells, double finest)
+    : step_(std::max(finest, std::exp2(std::ceil(std::log2(2.0 * reach_cells)) - 51.0))) {}
+
+void place_elements(std::span<const glm::dvec2> from_pivot_mm, double theta_rad, double cell_mm,
+                    double reach_cells, const PositionGrid& grid, PlacedElements& placed) {
+  placed.x.assign(padded(from_pivot_mm.size()), 0.0);
+  placed.y.assign(padded(from_pivot_mm.size()), 0.0);
+  if (!from_pivot_mm.empty()) {
+    HWY_DYNAMIC_DISPATCH(PlaceElements)
+    (&from_pivot_mm.front().x, from_pivot_mm.size(), std::cos(theta_rad) / cell_mm,
+     std::sin(theta_rad) / cell_mm, reach_cells, grid.rounder(), placed.x.data(), placed.y.data());
+  }
+}
+
+template <typename Lane>
+void evaluate_bins(const BinList<Lane>& bins, const MapPatches& map, std::size_t object,
+                   const PlacedElements& placed, std::span<const ReadingRun> runs,
+                   const ReadingForm& form, std::span<double> log_likelihood,
+                   std::vector<ElementPatches<Lane>>& scratch) {
+  scratch.resize(std::max(scratch.size(), bins.blocks.size()));
+  for (ElementPatches<Lane>& patches : scratch) {
+    patches.patch.resize(placed.x.size());
+    patches.x.resize(placed.x.size());
+    patches.y.resize(placed.x.size());
+  }
+  if constexpr (sizeof(Lane) == 4) {
+    HWY_DYNAMIC_DISPATCH(EvaluateFloat)
+    (bins, map, object, placed, runs, form, log_likelihood.data(), scratch);
+  } else {
+    HWY_DYNAMIC_DISPATCH(EvaluateDouble)
+    (bins, map, object, placed, runs, form, log_likelihood.data(), scratch);
+  }
+}
+
+template void evaluate_bins(const BinList<float>&, const MapPatches&, std::size_t,
+                            const PlacedElements&, std::span<const ReadingRun>, const ReadingForm&,
+                            std::span<double>, std::vector<ElementPatches<float>>&);
+template void evaluate_bins(const BinList<double>&, const MapPatches&, std::size_t,
+                            const PlacedElements&, std::span<const ReadingRun>, const ReadingForm&,
+                            std::span<double>, std::vector<ElementPatches<double>>&);
+
+std::string vector_instructions() { return hwy::TargetName(HWY_DYNAMIC_DISPATCH(Target)()); }
+
+}  // namespace palpate
+
+#endif  // HWY_ONCE
