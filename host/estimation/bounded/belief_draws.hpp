@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "estimation/bounded/leaves/bin_likelihood.hpp"
+#include "estimation/bounded/bin_box.hpp"
 #include "model/random.hpp"
 #include "palpate/estimate.hpp"
 #include "palpate/lattice.hpp"

@@ -128,22 +128,15 @@ Estimate BoundedPosterior::estimate() const {
   BoundedBelief& belief = whole().belief;
   const SearchResult& found = belief.found();
   Estimate estimate;
-  LogSum evaluated;
-  LogSum uncertain;
   std::vector<double> logs;
   std::vector<LogInterval> bounds;
-  LogSum all_low;
-  LogSum all_high;
-  for (const HypothesisEvidence& evidence : found.evidence) {
-    logs.push_back(evidence.evaluated);
-    evaluated.add(evidence.evaluated);
-    uncertain.add(evidence.rounding);
-    uncertain.add(evidence.dropped);
-    bounds.push_back({log_subtract(evidence.evaluated, evidence.rounding),
-                      log_add(log_add(evidence.evaluated, evidence.rounding), evidence.dropped)});
+  for (const HypothesisMass& mass : found.mass) {
+    logs.push_back(mass.evaluated);
+    bounds.push_back({log_subtract(mass.evaluated, mass.rounding),
+                      log_add(log_add(mass.evaluated, mass.rounding), mass.dropped)});
   }
   // Dropped and rounding mass over the whole that they are part of.
-  const double dropped = std::exp(uncertain.log() - evaluated.log());
+  const double dropped = found.uncertain();
   Certificate certificate{.dropped_mass = std::isfinite(dropped) ? dropped / (1.0 + dropped) : 1.0,
                           .log_evidence = bounds,
                           .mode_certain = found.mode_certain,

@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "estimation/bounded/search/leaf_evaluator.hpp"
+#include "estimation/bounded/search/search_goal.hpp"
 
 namespace palpate {
 

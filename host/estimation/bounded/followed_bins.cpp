@@ -9,7 +9,7 @@ FollowedBins::FollowedBins(const EvaluatedBins& bins, const SearchResult& found,
     : log_weight_(log_weight.begin(), log_weight.end()) {
   std::vector<LogSum> outside(log_weight.size());
   for (std::size_t i = 0; i < outside.size(); ++i) {
-    outside[i].add(found.evidence[i].dropped);
+    outside[i].add(found.mass[i].dropped);
   }
   bins.visit([&](const BinBox& box, std::span<const double> log_likelihood) {
     if (static_cast<std::int64_t>(log_likelihood.size()) == box.bins()) {

@@ -43,7 +43,7 @@ class NoneEvidence {
   LogInterval bounds(double width_nats, const Deadline& deadline);
 
   /// Host memory, in bytes.
-  std::uint64_t bytes() const { return search_.bytes(); }
+  std::uint64_t bytes() const { return search_.largest().bytes(); }
 
  private:
   static constexpr double infinity = std::numeric_limits<double>::infinity();

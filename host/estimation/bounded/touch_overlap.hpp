@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "estimation/bounded/array_overlap.hpp"
-#include "estimation/bounded/leaves/bin_likelihood.hpp"
+#include "estimation/bounded/bin_box.hpp"
 #include "model/bounding_box.hpp"
 #include "palpate/lattice.hpp"
 

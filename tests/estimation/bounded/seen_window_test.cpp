@@ -69,7 +69,7 @@ TEST(SeenWindow, LeavesOutNoTileInWhichAnElementSeesTheMap) {
          tile_levels(of.lattice, of.map.cell_mm, tile_sizes(of.lattice, of.map.cell_mm, 1))) {
       for (int theta = 0; theta < of.lattice.theta_rad.count; ++theta) {
         const glm::dvec2 turn = turn_of(of.lattice, theta);
-        const TileWindow window = seen_window(reach_of(of.elements, turn), of.map, level);
+        const TileRange window = seen_window(reach_of(of.elements, turn), of.map, level);
         ASSERT_LE(0, window.x_first);
         ASSERT_LE(window.x_first, window.x_end);
         ASSERT_LE(window.x_end, level.x.tiles());
@@ -102,7 +102,7 @@ TEST(SeenWindow, LeavesOutNoTileInWhichAnElementSeesTheMap) {
 TEST(SeenWindow, HoldsNothingWithoutElements) {
   const BinCase of = letter_case();
   const std::vector<TileLevel> levels = tile_levels(of.lattice, 0.5, {{.side = 2}});
-  const TileWindow window = seen_window({}, of.map, levels.front());
+  const TileRange window = seen_window({}, of.map, levels.front());
   EXPECT_EQ(window.x_first, window.x_end);
   EXPECT_EQ(window.y_first, window.y_end);
 }
@@ -130,7 +130,7 @@ TEST(TileBounds, AreThePriorsWhereNoElementSeesTheMap) {
       }
       for (int theta = 0; theta < of.lattice.theta_rad.count; ++theta) {
         const glm::dvec2 turn = turn_of(of.lattice, theta);
-        const TileWindow window = seen_window(reach_of(of.elements, turn), of.map, level);
+        const TileRange window = seen_window(reach_of(of.elements, turn), of.map, level);
         bounds.place(l, turn, of.elements, placed);
         for_batches(level, [&](int first_x, int first_y) {
           std::uint32_t sums[batch_tiles] = {};
@@ -201,7 +201,7 @@ std::int64_t expect_sound_search(const BinCase& of, double tolerance) {
   SearchSpace space(hypotheses, options);
   BoundSearch search(space, options, likelihood);
   const ArrayReadings touch = readings_of(of.elements);
-  search.add(std::span(&touch, 1));
+  search.largest().add(std::span(&touch, 1));
   Visited visited(of, 2);
   std::int64_t together = 0;
   bool once = true;
@@ -234,7 +234,7 @@ std::int64_t expect_sound_search(const BinCase& of, double tolerance) {
         }
       }
     }
-    EXPECT_LE(dropped.log(), result.evidence[object].dropped + 1e-9) << "object " << object;
+    EXPECT_LE(dropped.log(), result.mass[object].dropped + 1e-9) << "object " << object;
   }
   return together;
 }

@@ -1,6 +1,6 @@
 // An array that stays at its place: sums of penalties that only the elements in contact change.
 
-#include "estimation/bounded/search/resting_array.hpp"
+#include "estimation/bounded/search/still_place.hpp"
 
 #include <algorithm>
 #include <optional>
@@ -10,13 +10,13 @@
 
 #include "bins_by_definition.hpp"
 #include "bounded/certified.hpp"
-#include "estimation/bounded/search/bound_search.hpp"
+#include "estimation/bounded/search/largest_tiles.hpp"
 #include "synthetic.hpp"
 
 namespace palpate {
 namespace {
 
-using Seen = RestingArray::Seen;
+using Seen = StillPlace::Seen;
 
 constexpr int side = 20;  ///< elements along each side of the array
 
@@ -43,37 +43,37 @@ ArrayReadings pressed(ArrayReadings array, std::size_t levels, std::uint64_t see
   return array;
 }
 
-TEST(RestingArray, RestsFromTheSecondTouchAtAPlaceOn) {
-  RestingArray array;
+TEST(StillPlace, IsKeptFromTheSecondTouchOn) {
+  StillPlace array;
   const ArrayReadings here = array_at({1.0, 2.0});
   const ArrayReadings there = array_at({1.0, 2.5});
   EXPECT_EQ(array.look(here), Seen::moving);
-  EXPECT_EQ(array.look(here), Seen::came_rest);
-  EXPECT_EQ(array.look(here), Seen::came_rest) << "nothing was kept";
+  EXPECT_EQ(array.look(here), Seen::stopped);
+  EXPECT_EQ(array.look(here), Seen::stopped) << "nothing was kept";
   array.keep();
-  EXPECT_EQ(array.look(here), Seen::resting);
+  EXPECT_EQ(array.look(here), Seen::still);
   EXPECT_EQ(array.look(there), Seen::moving);
-  EXPECT_EQ(array.look(here), Seen::resting) << "its sums are kept";
+  EXPECT_EQ(array.look(here), Seen::still) << "its sums are kept";
   EXPECT_EQ(array.look(there), Seen::moving);
-  EXPECT_EQ(array.look(there), Seen::came_rest);
+  EXPECT_EQ(array.look(there), Seen::stopped);
   array.keep();
   EXPECT_EQ(array.look(here), Seen::moving);
   EXPECT_EQ(array.look({}), Seen::moving);
   EXPECT_EQ(array.look({}), Seen::moving);
 }
 
-TEST(RestingArray, MustBeMostlyInNoContact) {
-  RestingArray array;
+TEST(StillPlace, MustBeMostlyInNoContact) {
+  StillPlace array;
   ArrayReadings press = array_at({});
   array.look(press);
   std::fill_n(press.readings.begin(), side * side / 2, Reading::unknown);
   EXPECT_EQ(array.look(press), Seen::moving);
   press.readings[0] = Reading::no_contact;
-  EXPECT_EQ(array.look(press), Seen::came_rest);
+  EXPECT_EQ(array.look(press), Seen::stopped);
 }
 
-TEST(RestingArray, MustNotSaturateSums) {
-  RestingArray array;
+TEST(StillPlace, MustNotSaturateSums) {
+  StillPlace array;
   ArrayReadings large;
   large.from_pivot_mm.resize(40'000);
   large.readings.resize(40'000, Reading::no_contact);
@@ -81,10 +81,10 @@ TEST(RestingArray, MustNotSaturateSums) {
   EXPECT_EQ(array.look(large), Seen::moving);
 }
 
-/// A search over two maps by a table of four levels, or by Eq. 7.
-class Search {
+/// The largest tiles over two maps, by a table of four levels or by Eq. 7.
+class Sums {
  public:
-  Search(const PoseLattice& lattice, bool with_table)
+  Sums(const PoseLattice& lattice, bool with_table)
       : hypotheses_{{random_map(31, 27, 0.5, 4.0, 601), 1.0},
                     {random_map(25, 40, 0.6, 4.0, 602), 1.0}} {
     options_.lattice = lattice;
@@ -92,45 +92,41 @@ class Search {
     if (with_table) {
       options_.contact.table = crooked_table();
     }
-    likelihood_.emplace(hypotheses_, options_.contact, lattice);
     space_.emplace(hypotheses_, options_);
-    search_.emplace(*space_, options_, *likelihood_);
+    tiles_.emplace(*space_);
   }
 
-  BoundSearch& operator*() { return *search_; }
-  BoundSearch* operator->() { return &*search_; }
-  void add(const ArrayReadings& touch) { search_->add(std::span(&touch, 1)); }
+  LargestTiles* operator->() { return &*tiles_; }
+  void add(const ArrayReadings& touch) { tiles_->add(std::span(&touch, 1)); }
+  std::vector<std::vector<std::int64_t>> all() const {
+    return {tiles_->whole_sums(0), tiles_->whole_sums(1)};
+  }
 
  private:
   std::vector<Hypothesis> hypotheses_;
   BoundedOptions options_;
-  std::optional<BinLikelihood> likelihood_;
   std::optional<SearchSpace> space_;
-  std::optional<BoundSearch> search_;
+  std::optional<LargestTiles> tiles_;
 };
-
-std::vector<std::vector<std::int64_t>> sums_of(const BoundSearch& search) {
-  return {search.largest_sums(0), search.largest_sums(1)};
-}
 
 void expect_fresh_sums(const PoseLattice& lattice, bool with_table) {
   const std::size_t levels = with_table ? crooked_table().levels() : 2;
-  Search kept(lattice, with_table);
+  Sums kept(lattice, with_table);
   const std::vector<ArrayReadings> places{array_at({1.0, -2.0}), array_at({7.3, 0.4})};
   // Frames at the first place, some at the second in between: an array that moved, or a pivot.
   const std::vector<std::size_t> place_of{0, 0, 0, 0, 1, 0, 1, 1, 1, 0, 0, 0};
-  int rested = 0;
+  int still = 0;
   for (std::size_t frame = 0; frame < place_of.size(); ++frame) {
     SCOPED_TRACE(testing::Message() << "frame " << frame);
     const ArrayReadings touch = pressed(places[place_of[frame]], levels, 610 + frame);
-    Search fresh(lattice, with_table);
+    Sums fresh(lattice, with_table);
     kept->reset();
     kept.add(touch);
     fresh.add(touch);
-    ASSERT_EQ(sums_of(*kept), sums_of(*fresh));
-    rested += kept->bytes() > fresh->bytes() ? 1 : 0;
+    ASSERT_EQ(kept.all(), fresh.all());
+    still += kept->bytes() > fresh->bytes() ? 1 : 0;
   }
-  EXPECT_EQ(rested, 11) << "frames with sums of an array at rest";
+  EXPECT_EQ(still, 11) << "frames with sums of a still array";
 }
 
 PoseLattice sparse_lattice() {
@@ -141,7 +137,7 @@ PoseLattice fine_lattice() {
   return {.x_mm = {-20.0, 20.0, 160}, .y_mm = {-3.0, 30.0, 131}, .theta_rad = {0.0, two_pi, 3}};
 }
 
-TEST(BoundSearch, AddsAnArrayAtRestBitForBit) {
+TEST(LargestTiles, AddAStillArrayBitForBit) {
   for (const bool with_table : {false, true}) {
     SCOPED_TRACE(with_table ? "table" : "Eq. 7");
     expect_fresh_sums(sparse_lattice(), with_table);
@@ -149,14 +145,14 @@ TEST(BoundSearch, AddsAnArrayAtRestBitForBit) {
   }
 }
 
-TEST(BoundSearch, AddsTouchesOfAnArrayAtRestTogether) {
+TEST(LargestTiles, AddTouchesOfAStillArrayTogether) {
   for (const PoseLattice& lattice : {sparse_lattice(), fine_lattice()}) {
-    Search kept(lattice, true);
+    Sums kept(lattice, true);
     const ArrayReadings place = array_at({-3.0, 1.5});
     kept.add(place);
     kept.add(place);
     kept->reset();
-    Search fresh(lattice, true);
+    Sums fresh(lattice, true);
     for (std::uint64_t frame = 0; frame < 3; ++frame) {
       const ArrayReadings touch = pressed(place, 4, 630 + frame);
       kept.add(touch);
@@ -166,11 +162,11 @@ TEST(BoundSearch, AddsTouchesOfAnArrayAtRestTogether) {
       std::reverse(reversed.readings.begin(), reversed.readings.end());
       fresh.add(frame % 2 == 0 ? touch : reversed);
     }
-    EXPECT_EQ(sums_of(*kept), sums_of(*fresh));
+    EXPECT_EQ(kept.all(), fresh.all());
   }
 }
 
-TEST(BoundedPosterior, IsCertifiedForEveryFrameOfAnArrayAtRest) {
+TEST(BoundedPosterior, IsCertifiedForEveryFrameOfAStillArray) {
   std::vector<Hypothesis> objects;
   for (std::uint64_t i = 0; i < 3; ++i) {
     objects.push_back({random_map(31, 27, 0.5, 2.0, 640 + i), 1.0});

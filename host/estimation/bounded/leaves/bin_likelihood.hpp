@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "estimation/bounded/bin_box.hpp"
 #include "estimation/bounded/known_elements.hpp"
 #include "estimation/bounded/leaves/bin_kernel.hpp"
 #include "estimation/bounded/leaves/map_extent.hpp"
@@ -16,18 +17,6 @@
 #include "palpate/lattice.hpp"
 
 namespace palpate {
-
-/// Neighbouring bins of one object and theta.
-struct BinBox {
-  std::int32_t object = 0;
-  std::int32_t theta = 0;
-  std::int32_t y_first = 0;
-  std::int32_t y_count = 0;
-  std::int32_t x_first = 0;
-  std::int32_t x_count = 0;
-
-  std::int64_t bins() const { return std::int64_t{y_count} * x_count; }
-};
 
 /// Evaluates the log-likelihood (Eq. 7, 13) of bins on the host, by vector instructions chosen at
 /// run time. A bin has the same bits with every set of instructions and in every box. Calls from

@@ -1,10 +1,7 @@
 #pragma once
 
-#include <chrono>
 #include <cstddef>
 #include <cstdint>
-#include <functional>
-#include <optional>
 #include <span>
 #include <vector>
 
@@ -13,49 +10,6 @@
 #include "estimation/bounded/search/mass_account.hpp"
 
 namespace palpate {
-
-/// Takes bins that were evaluated, one box after another, with their log-likelihoods [y, x] in
-/// nats; a single number stands for all bins of its box.
-using BinVisitor = std::function<void(const BinBox&, std::span<const double>)>;
-
-/// When a search must end; never, where there is no budget. Whoever looks at it also gives the
-/// caller of the search an opportunity to cancel it.
-class Deadline {
- public:
-  /// @param cancel_point of BoundedOptions; outlives the deadline
-  explicit Deadline(const std::optional<double>& budget_s,
-                    const std::function<void()>* cancel_point = nullptr)
-      : cancel_point_(cancel_point) {
-    if (budget_s) {
-      at_ = Clock::now() +
-            std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(*budget_s));
-    }
-  }
-  bool exists() const { return at_.has_value(); }
-  /// @throws what the cancel point throws
-  bool passed() const {
-    cancel_point();
-    return at_ && Clock::now() >= *at_;
-  }
-  /// @throws what the cancel point throws
-  void cancel_point() const {
-    if (cancel_point_ != nullptr && *cancel_point_) {
-      (*cancel_point_)();
-    }
-  }
-  /// Lets it pass now, where there is a budget.
-  void end() {
-    if (at_) {
-      at_ = Clock::time_point::min();
-    }
-  }
-
- private:
-  using Clock = std::chrono::steady_clock;
-
-  std::optional<Clock::time_point> at_;
-  const std::function<void()>* cancel_point_;
-};
 
 /// Evaluates the bins of boxes, the leaves of a search: all in float32, and those that hold most of
 /// the mass once more in float64, so that rounding stays within its part of the tolerance.

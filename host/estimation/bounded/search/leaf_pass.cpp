@@ -114,14 +114,14 @@ void LeafPass::take_family(std::span<const Tile> family, const std::vector<std::
     }
     return;
   }
-  std::optional<TileWindow> window;
+  std::optional<TileRange> window;
   for (const Tile& tile : family) {
     if (needed(tile)) {
-      window = window ? TileWindow{.x_first = std::min(window->x_first, tile.x),
-                                   .x_end = std::max(window->x_end, tile.x + 1),
-                                   .y_first = std::min(window->y_first, tile.y),
-                                   .y_end = std::max(window->y_end, tile.y + 1)}
-                      : TileWindow{tile.x, tile.x + 1, tile.y, tile.y + 1};
+      window = window ? TileRange{.x_first = std::min(window->x_first, tile.x),
+                                  .x_end = std::max(window->x_end, tile.x + 1),
+                                  .y_first = std::min(window->y_first, tile.y),
+                                  .y_end = std::max(window->y_end, tile.y + 1)}
+                      : TileRange{tile.x, tile.x + 1, tile.y, tile.y + 1};
     }
   }
   if (!window) {

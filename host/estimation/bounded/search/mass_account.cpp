@@ -53,11 +53,7 @@ void MassAccount::drop(const UnsettledMass& tiles) {
 }
 
 void MassAccount::note_best(const BinBox& box, std::int64_t bin_of_box, double log_likelihood) {
-  const PoseLattice& in = lattice_;
-  const std::int64_t bin =
-      (std::int64_t{box.theta} * in.y_mm.count + box.y_first + bin_of_box / box.x_count) *
-          in.x_mm.count +
-      box.x_first + bin_of_box % box.x_count;
+  const std::int64_t bin = box.bin(bin_of_box, lattice_);
   const double value = log_weight_[box.object] + log_likelihood;
   // Of equal bins the first one is the mode.
   if (value > mode_value_ ||
@@ -152,7 +148,7 @@ double MassAccount::dropped_share() const { return std::exp(all_dropped_.log() -
 double MassAccount::rounding_share() const { return std::exp(all_rounding_.log() - log_total_); }
 
 SearchResult MassAccount::result() const {
-  SearchResult result{.evidence = {},
+  SearchResult result{.mass = {},
                       .best_object = mode_object_,
                       .best_bin = mode_bin_,
                       .best_log_likelihood = mode_value_ - log_weight_[mode_object_],
@@ -162,7 +158,7 @@ SearchResult MassAccount::result() const {
         result.mode_certain && log_weight_[i] + largest_dropped_of_[i] < mode_value_;
     // Each exponential and each addition of the sums rounds by a few units of 2^-53.
     const double sum_error = 4.0 * (terms_[i] + 1.0) * 0x1p-53;
-    result.evidence.push_back(
+    result.mass.push_back(
         {.evaluated = evaluated_[i].log(),
          .rounding = log_add(rounding_[i].log(), evaluated_[i].log() + std::log(sum_error)),
          .dropped = dropped_[i].log()});

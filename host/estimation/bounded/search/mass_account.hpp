@@ -8,8 +8,9 @@
 #include <span>
 #include <vector>
 
-#include "estimation/bounded/leaves/bin_likelihood.hpp"
+#include "estimation/bounded/bin_box.hpp"
 #include "estimation/bounded/log_sum.hpp"
+#include "estimation/bounded/search/search_goal.hpp"
 #include "estimation/bounded/search/unsettled_mass.hpp"
 #include "palpate/lattice.hpp"
 
@@ -17,53 +18,6 @@ namespace palpate {
 
 /// Part of BoundedOptions::evidence_nats that rounding may use up.
 inline constexpr double evidence_rounding_part = 0.2;
-
-class TouchOverlap;
-
-/// What a search is to reach; as BoundedOptions.
-struct SearchGoal {
-  double tolerance = 1e-6;
-  std::optional<double> evidence_nats = {};
-  double evidence_range_nats = std::numeric_limits<double>::infinity();
-  /// Bins that hold much of the mass are evaluated once more in float64.
-  bool exact = true;
-  /// The most probable bin is evaluated, whatever the tolerance.
-  bool mode = true;
-  /// The bins that count; null where all do.
-  const TouchOverlap* counted = nullptr;
-};
-
-/// What a search found out about one hypothesis: logs in nats, with its prior weight.
-struct HypothesisEvidence {
-  double evaluated = 0.0;  ///< of the summed likelihood of the bins that were evaluated
-  double rounding = 0.0;   ///< of the bound of that sum's error
-  double dropped = 0.0;    ///< of the bound of the summed likelihood of all other bins
-};
-
-/// What a search by bounds returns.
-struct SearchResult {
-  std::vector<HypothesisEvidence> evidence;  ///< [hypothesis]
-  std::int32_t best_object = 0;
-  std::int64_t best_bin = 0;
-  double best_log_likelihood = 0.0;  ///< of the best bin, without prior weights
-  bool mode_certain = false;
-  /// The prior explains the elements far better than the best bin of any hypothesis.
-  bool contradicted = false;
-  std::int64_t blocks_bounded = 0;
-  std::int64_t bins_evaluated = 0;
-
-  /// Bound of the mass that is not known, relative to that which is.
-  double uncertain() const {
-    LogSum evaluated;
-    LogSum unknown;
-    for (const HypothesisEvidence& of : evidence) {
-      evaluated.add(of.evaluated);
-      unknown.add(of.rounding);
-      unknown.add(of.dropped);
-    }
-    return std::exp(unknown.log() - evaluated.log());
-  }
-};
 
 /// Keeps account of a search: of the mass that was settled, by evaluating bins, with the error of
 /// rounding, and of the mass that was dropped. Says which tiles may be dropped.

@@ -101,7 +101,7 @@ SearchMemory search_memory(std::span<const Hypothesis> hypotheses, const Bounded
   }
   // A cosine and a sine; and of every object the tiles that see the map, and the best of them.
   memory.thetas = thetas * (sizeof(glm::dvec2) + static_cast<double>(hypotheses.size()) *
-                                                     (sizeof(TileWindow) + sizeof(Tile)));
+                                                     (sizeof(TileRange) + sizeof(Tile)));
   if (options.none_weight) {
     memory.thetas += thetas * static_cast<double>(hypotheses.size()) * sizeof(OverlapPlane);
   }

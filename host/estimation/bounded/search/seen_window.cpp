@@ -31,7 +31,7 @@ std::vector<BoundingBox> reaches_of(const KnownElements& elements,
   return reaches;
 }
 
-TileWindow seen_window(const BoundingBox& reach, const OccupancyGrid& map, const TileLevel& level) {
+TileRange seen_window(const BoundingBox& reach, const OccupancyGrid& map, const TileLevel& level) {
   if (reach.empty()) {
     return {};
   }

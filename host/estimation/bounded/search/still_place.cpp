@@ -1,4 +1,4 @@
-#include "estimation/bounded/search/resting_array.hpp"
+#include "estimation/bounded/search/still_place.hpp"
 
 #include <algorithm>
 
@@ -22,7 +22,7 @@ bool mostly_no_contact(const ArrayReadings& touch) {
 
 }  // namespace
 
-RestingArray::Seen RestingArray::look(const ArrayReadings& touch) {
+StillPlace::Seen StillPlace::look(const ArrayReadings& touch) {
   const bool stays = touch.from_pivot_mm == last_;
   if (!stays) {
     last_ = touch.from_pivot_mm;
@@ -30,14 +30,14 @@ RestingArray::Seen RestingArray::look(const ArrayReadings& touch) {
   if (touch.readings.size() > most_elements || !mostly_no_contact(touch)) {
     return Seen::moving;
   }
-  if (touch.from_pivot_mm == at_rest_) {
-    return Seen::resting;
+  if (touch.from_pivot_mm == kept_) {
+    return Seen::still;
   }
   if (!stays) {
     return Seen::moving;
   }
-  at_rest_.clear();
-  return Seen::came_rest;
+  kept_.clear();
+  return Seen::stopped;
 }
 
 }  // namespace palpate

@@ -5,7 +5,7 @@
 
 #include <glm/vec2.hpp>
 
-#include "estimation/bounded/leaves/bin_likelihood.hpp"
+#include "estimation/bounded/bin_box.hpp"
 #include "palpate/lattice.hpp"
 
 namespace palpate {
@@ -21,7 +21,7 @@ struct Tile {
 };
 
 /// Tiles [first, end) along each axis.
-struct TileWindow {
+struct TileRange {
   int x_first = 0;
   int x_end = 0;
   int y_first = 0;
@@ -67,7 +67,7 @@ struct TileLevel {
 
   int batches_x() const { return x.tiles() / 4; }
   int batches_y() const { return y.tiles() / 4; }
-  BinBox box_of(std::int32_t object, std::int32_t theta, const TileWindow& tiles) const {
+  BinBox box_of(std::int32_t object, std::int32_t theta, const TileRange& tiles) const {
     return {.object = object,
             .theta = theta,
             .y_first = y.first_bin[tiles.y_first],
