@@ -76,7 +76,8 @@ void BoundedBelief::take_in() {
     return;
   }
   half_done_.change([&] {
-    if (found_ && found_->bins.complete() && found_->bins.values() <= FollowedBins::most_bins) {
+    if (found_ && found_->bins.complete() &&
+        found_->bins.values().size() <= FollowedBins::most_bins) {
       followed_.emplace(found_->bins, found_->result, space_.log_weight);
       followed_touches_ = touches_.size();
     }

@@ -10,7 +10,6 @@
 #include <tbb/task_arena.h>
 
 #include "estimation/bounded/evaluated_bins.hpp"
-#include "estimation/bounded/followed_bins.hpp"
 #include "estimation/bounded/kept_touches.hpp"
 #include "estimation/bounded/known_elements.hpp"
 #include "estimation/bounded/leaves/bin_likelihood.hpp"

@@ -200,17 +200,10 @@ RefinedPose BoundedPosterior::refine(const Mode& mode) const {
     }
   }
   const BinLikelihood& likelihood = thin ? *of_thin : belief.likelihood();
-  const auto log_likelihood = [&](std::span<const BinWindow> windows) {
-    const int thetas = fit.theta_rad.count;
-    std::vector<BinBox> boxes;
+  const auto log_likelihood = [&](std::span<const BinBox> boxes) {
     std::vector<std::size_t> firsts{0};  // each box's first bin, and the end
-    for (const BinWindow& window : windows) {
-      for (int t = 0; t < window.theta_count; ++t) {
-        boxes.push_back({mode.object, ((window.theta_first + t) % thetas + thetas) % thetas,
-                         window.row_first, window.row_count, window.column_first,
-                         window.column_count});
-        firsts.push_back(firsts.back() + static_cast<std::size_t>(boxes.back().bins()));
-      }
+    for (const BinBox& box : boxes) {
+      firsts.push_back(firsts.back() + static_cast<std::size_t>(box.bins()));
     }
     std::vector<float> logs(firsts.back());
     belief.on_threads([&] {

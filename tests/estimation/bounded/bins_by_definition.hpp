@@ -30,9 +30,6 @@ ArrayReadings readings_of(const KnownElements& elements);
 /// A table of four levels that is not monotone, the last level steeper than any map.
 LikelihoodTable crooked_table();
 
-/// All bins of a theta.
-BinBox whole_plane(const PoseLattice& lattice, int theta);
-
 /// Log-likelihood of the elements at every bin of the boxes, in nats: the definition in long
 /// double.
 std::vector<long double> by_definition(const BinCase& of, const std::vector<BinBox>& boxes);

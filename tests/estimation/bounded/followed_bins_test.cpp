@@ -1,4 +1,4 @@
-#include "estimation/bounded/followed_bins.hpp"
+#include "estimation/bounded/evaluated_bins.hpp"
 
 #include <array>
 #include <cmath>

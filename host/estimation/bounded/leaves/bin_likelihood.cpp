@@ -95,7 +95,7 @@ BinLikelihood::Placement BinLikelihood::placement_of(const OccupancyGrid& map, d
   const double reach =
       farthest + std::max(nodes.width(), nodes.height()) + 2.0 * MapPatches::border;
   // Places within a patch are below 4 cells: these steps leave them exact in 24 and 53 bits.
-  const MapExtent extent = extent_of(map, nodes.prior_log_odds(), lattice);
+  const MapExtent extent(map, nodes.prior_log_odds(), lattice);
   return {.nodes = std::move(nodes),
           .extent = extent,
           .cell_mm = map.cell_mm,

@@ -6,10 +6,9 @@
 #include <string>
 #include <vector>
 
-#include "estimation/bounded/bin_box.hpp"
+#include "estimation/bin_box.hpp"
 #include "estimation/bounded/known_elements.hpp"
 #include "estimation/bounded/leaves/bin_kernel.hpp"
-#include "estimation/bounded/leaves/map_extent.hpp"
 #include "estimation/bounded/leaves/map_patches.hpp"
 #include "estimation/bounded/leaves/reading_form.hpp"
 #include "palpate/contact_model.hpp"
@@ -17,6 +16,25 @@
 #include "palpate/lattice.hpp"
 
 namespace palpate {
+
+/// What bounds the rounding of log odds that are interpolated on a map under a lattice's bins.
+struct MapExtent {
+  MapExtent(const OccupancyGrid& map, double prior_log_odds, const PoseLattice& lattice);
+
+  // Over all nodes of the map and the prior beyond.
+  double largest = 0.0;   ///< magnitude
+  double range = 0.0;     ///< largest less smallest
+  double steepest = 0.0;  ///< difference between neighbours along an axis
+
+  double cell_mm = 0.0;
+  double lattice_cells = 0.0;  ///< no bin nor node is farther from the frames' origins
+  double reach_cells = 0.0;    ///< elements farther from the pivot are off the map at every bin
+
+  /// Bound, in cells along an axis, of the float64 rounding of an element's place at a bin.
+  double place_error(const KnownElements& elements) const;
+  /// Bound of the change of log odds where a place is wrong by so many cells along both axes.
+  double change(double place_cells) const;
+};
 
 /// Evaluates the log-likelihood (Eq. 7, 13) of bins on the host, by vector instructions chosen at
 /// run time. A bin has the same bits with every set of instructions and in every box. Calls from

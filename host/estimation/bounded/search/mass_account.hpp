@@ -8,7 +8,7 @@
 #include <span>
 #include <vector>
 
-#include "estimation/bounded/bin_box.hpp"
+#include "estimation/bin_box.hpp"
 #include "estimation/bounded/log_sum.hpp"
 #include "estimation/bounded/search/search_goal.hpp"
 #include "estimation/bounded/search/unsettled_mass.hpp"

@@ -9,7 +9,7 @@
 #include <span>
 #include <vector>
 
-#include "estimation/bounded/bin_box.hpp"
+#include "estimation/bin_box.hpp"
 #include "estimation/bounded/log_sum.hpp"
 
 namespace palpate {

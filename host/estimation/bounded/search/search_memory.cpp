@@ -9,7 +9,7 @@
 
 #include <fmt/format.h>
 
-#include "estimation/bounded/array_overlap.hpp"
+#include "estimation/bounded/touch_overlap.hpp"
 #include "estimation/bounded/leaves/map_patches.hpp"
 #include "estimation/bounded/search/leaf_pass.hpp"
 #include "estimation/bounded/tables/tile_levels.hpp"

@@ -5,7 +5,7 @@
 
 #include <glm/vec2.hpp>
 
-#include "estimation/bounded/bin_box.hpp"
+#include "estimation/bin_box.hpp"
 #include "palpate/lattice.hpp"
 
 namespace palpate {

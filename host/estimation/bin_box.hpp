@@ -1,6 +1,9 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
+#include <span>
+#include <vector>
 
 #include "palpate/lattice.hpp"
 
@@ -22,5 +25,17 @@ struct BinBox {
     return row * lattice.x_mm.count + x_first + i % x_count;
   }
 };
+
+/// All bins of an object at one theta.
+inline BinBox whole_plane(const PoseLattice& lattice, int theta, int object = 0) {
+  return {.object = object,
+          .theta = theta,
+          .y_count = lattice.y_mm.count,
+          .x_count = lattice.x_mm.count};
+}
+
+/// The log-likelihoods of bins in nats, box after box, each [y, x]: read from a dense belief or
+/// evaluated on demand.
+using BoxLogLikelihood = std::function<std::vector<double>(std::span<const BinBox>)>;
 
 }  // namespace palpate
