@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <numeric>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -11,6 +10,7 @@
 #include <glm/vec3.hpp>
 
 #include "bounded/certified.hpp"
+#include "bounded_set_up.hpp"
 #include "estimation/bounded/bounded_belief.hpp"
 #include "estimation/hypotheses.hpp"
 #include "palpate/pose_histogram.hpp"
@@ -18,29 +18,6 @@
 
 namespace palpate {
 namespace {
-
-const std::vector<Hypothesis>& two_shapes() {
-  static const std::vector<Hypothesis> two{{map_of(on_letter_l, "L"), 1.0},
-                                           {map_of(on_disc, "disc"), 2.0}};
-  return two;
-}
-
-BoundedOptions small_options() {
-  BoundedOptions options;
-  options.lattice = {.x_mm = {-6.0, 6.0, 13},
-                     .y_mm = {-5.0, 6.0, 12},
-                     .theta_rad = {0, two_pi, 16},
-                     .pivot_mm = {2.0, -1.0}};
-  return options;
-}
-
-Recording touches_of_l(std::size_t touches, std::uint64_t seed) {
-  return touches_of(on_letter_l, {{1.3, -0.8}, 0.7}, touches, seed);
-}
-
-double sum(std::span<const double> values) {
-  return std::accumulate(values.begin(), values.end(), 0.0);
-}
 
 TEST(BoundedBelief, HasTheEntropyOfTheDenseOne) {
   Device device = Device::open();

@@ -7,8 +7,8 @@
 
 #include <functional>
 
+#include "bounded_set_up.hpp"
 #include "palpate/error.hpp"
-#include "touched_shape.hpp"
 
 namespace palpate {
 namespace {
@@ -17,10 +17,6 @@ using testing::AllOf;
 using testing::HasSubstr;
 
 constexpr double mib = 1 << 20;
-
-std::vector<Hypothesis> two_shapes() {
-  return {{map_of(on_letter_l, "L"), 1.0}, {map_of(on_disc, "disc"), 2.0}};
-}
 
 BoundedOptions options_of(const PoseLattice& lattice) {
   BoundedOptions options{.lattice = lattice};
