@@ -1,6 +1,6 @@
 // An array that stays at its place: sums of penalties that only the elements in contact change.
 
-#include "estimation/bounded/search/still_place.hpp"
+#include "estimation/bounded/search/largest_tiles.hpp"
 
 #include <algorithm>
 #include <optional>
@@ -10,7 +10,6 @@
 
 #include "bins_by_definition.hpp"
 #include "bounded/certified.hpp"
-#include "estimation/bounded/search/largest_tiles.hpp"
 #include "synthetic.hpp"
 
 namespace palpate {

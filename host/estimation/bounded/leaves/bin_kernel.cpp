@@ -98,35 +98,39 @@ void find_patches(const BinBlock& block, const MapPatches& map, const PlacedElem
 }
 
 /// The bins of one vector, by the model's form.
+/// @param log_odds_at (element): in every lane
 template <class D, class LogOddsAt>
-void evaluate_vector(D d, const LogOddsAt& log_odds_at, std::size_t object,
-                     std::span<const ReadingRun> runs, const ReadingForm& form,
+void evaluate_vector(D d, const LogOddsAt& log_odds_at, const BinTask<hn::TFromD<D>>& task,
                      double* log_likelihood) {
+  const ReadingForm& form = task.form;
   if (form.kind == ReadingForm::Kind::products) {
-    evaluate_lanes<ReadingForm::Kind::products>(d, log_odds_at, runs, form, log_likelihood);
+    evaluate_lanes<ReadingForm::Kind::products>(d, log_odds_at, task.runs, form, log_likelihood);
   } else if (form.kind == ReadingForm::Kind::sums) {
-    evaluate_lanes<ReadingForm::Kind::sums>(d, log_odds_at, runs, form, log_likelihood);
+    evaluate_lanes<ReadingForm::Kind::sums>(d, log_odds_at, task.runs, form, log_likelihood);
   } else if constexpr (sizeof(hn::TFromD<D>) == 8) {
-    look_up_lanes(d, log_odds_at, object, runs, form, log_likelihood);
+    look_up_lanes(d, log_odds_at, task.object, task.runs, form, log_likelihood);
   }
 }
 
+/// Fills vectors with the bins of as many blocks as fit wholly, or with a part of one block's.
+/// @param patches [block] memory
 template <typename Lane>
-void evaluate(const BinList<Lane>& bins, const MapPatches& map, std::size_t object,
-              const PlacedElements& placed, std::span<const ReadingRun> runs,
-              const ReadingForm& form, double* log_likelihood,
-              std::vector<ElementPatches<Lane>>& scratch) {
+void evaluate(const BinTask<Lane>& task, std::vector<ElementPatches<Lane>>& patches,
+              double* log_likelihood) {
+  const BinList<Lane>& bins = task.bins;
   const std::vector<BinBlock>& blocks = bins.blocks;
   for (std::size_t i = 0; i < blocks.size(); ++i) {
-    find_patches(blocks[i], map, placed, scratch[i]);
+    find_patches(blocks[i], task.map, task.placed, patches[i]);
   }
   using D = hn::ScalableTag<Lane>;
   const D d;
   const std::size_t lanes = hn::Lanes(d);
   if constexpr (sizeof(Lane) == 8) {
-    if (form.kind == ReadingForm::Kind::table && blocks.size() == bins.bins()) {
+    // Bins that stand alone share no element's patch: vectors hold the elements of each.
+    if (task.form.kind == ReadingForm::Kind::table && blocks.size() == bins.bins()) {
       for (std::size_t i = 0; i < blocks.size(); ++i) {
-        look_up_elements(d, map, object, scratch[i], runs, form, log_likelihood + i);
+        look_up_elements(d, task.map, task.object, patches[i], task.runs, task.form,
+                         log_likelihood + i);
       }
       return;
     }
@@ -137,13 +141,12 @@ void evaluate(const BinList<Lane>& bins, const MapPatches& map, std::size_t obje
   LanesOfBlock<D> parts[most_lanes];
   std::size_t block = 0;
   for (std::size_t first = 0, end = 0; first < bins.bins(); first = end) {
-    std::size_t count = 0;
-    // As many blocks as fit wholly, or a part of one.
+    std::size_t count = 0;  // of parts: blocks in this vector
     for (end = first; block < blocks.size() && (count == 0 || blocks[block].end <= first + lanes);
          ++block) {
       // All lanes from here on: the next block takes its own.
       const std::size_t before = end - first;
-      parts[count++] = {&scratch[block], hn::Not(hn::FirstN(d, before)),
+      parts[count++] = {&patches[block], hn::Not(hn::FirstN(d, before)),
                         hn::Not(hn::FirstN(hn::Rebind<float, D>(), before))};
       end = std::min(blocks[block].end, first + lanes);
       if (end < blocks[block].end) {
@@ -155,32 +158,28 @@ void evaluate(const BinList<Lane>& bins, const MapPatches& map, std::size_t obje
     const auto x = hn::Load(d, x_offset);
     const auto y = hn::Load(d, y_offset);
     if (count == 1) {
-      const ElementPatches<Lane>& elements = *parts[0].elements;
+      const ElementPatches<Lane>& of_block = *parts[0].elements;
       evaluate_vector(
-          d, [&](std::size_t e) HWY_ATTR { return log_odds(d, map, elements, e, x, y); }, object,
-          runs, form, out);
+          d, [&](std::size_t e) HWY_ATTR { return log_odds(d, task.map, of_block, e, x, y); }, task,
+          out);
     } else {
-      const std::span<const LanesOfBlock<D>> of(parts, count);
+      const std::span<const LanesOfBlock<D>> of_blocks(parts, count);
       evaluate_vector(
-          d, [&](std::size_t e) HWY_ATTR { return log_odds(d, map, of, e, x, y); }, object, runs,
-          form, out);
+          d, [&](std::size_t e) HWY_ATTR { return log_odds(d, task.map, of_blocks, e, x, y); },
+          task, out);
     }
     std::copy(out, out + (end - first), log_likelihood + first);
   }
 }
 
-void EvaluateFloat(const BinList<float>& bins, const MapPatches& map, std::size_t object,
-                   const PlacedElements& placed, std::span<const ReadingRun> runs,
-                   const ReadingForm& form, double* log_likelihood,
-                   std::vector<ElementPatches<float>>& scratch) {
-  evaluate(bins, map, object, placed, runs, form, log_likelihood, scratch);
+void EvaluateFloat(const BinTask<float>& task, std::vector<ElementPatches<float>>& patches,
+                   double* log_likelihood) {
+  evaluate(task, patches, log_likelihood);
 }
 
-void EvaluateDouble(const BinList<double>& bins, const MapPatches& map, std::size_t object,
-                    const PlacedElements& placed, std::span<const ReadingRun> runs,
-                    const ReadingForm& form, double* log_likelihood,
-                    std::vector<ElementPatches<double>>& scratch) {
-  evaluate(bins, map, object, placed, runs, form, log_likelihood, scratch);
+void EvaluateDouble(const BinTask<double>& task, std::vector<ElementPatches<double>>& patches,
+                    double* log_likelihood) {
+  evaluate(task, patches, log_likelihood);
 }
 
 std::int64_t Target() { return HWY_TARGET; }
@@ -215,31 +214,26 @@ void place_elements(std::span<const glm::dvec2> from_pivot_mm, double theta_rad,
 }
 
 template <typename Lane>
-void evaluate_bins(const BinList<Lane>& bins, const MapPatches& map, std::size_t object,
-                   const PlacedElements& placed, std::span<const ReadingRun> runs,
-                   const ReadingForm& form, std::span<double> log_likelihood,
-                   std::vector<ElementPatches<Lane>>& scratch) {
-  scratch.resize(std::max(scratch.size(), bins.blocks.size()));
+void evaluate_bins(const BinTask<Lane>& task, std::vector<ElementPatches<Lane>>& scratch,
+                   std::span<double> log_likelihood) {
+  const std::size_t elements = task.placed.x.size();
+  scratch.resize(std::max(scratch.size(), task.bins.blocks.size()));
   for (ElementPatches<Lane>& patches : scratch) {
-    patches.patch.resize(placed.x.size());
-    patches.x.resize(placed.x.size());
-    patches.y.resize(placed.x.size());
+    patches.patch.resize(elements);
+    patches.x.resize(elements);
+    patches.y.resize(elements);
   }
   if constexpr (sizeof(Lane) == 4) {
-    HWY_DYNAMIC_DISPATCH(EvaluateFloat)
-    (bins, map, object, placed, runs, form, log_likelihood.data(), scratch);
+    HWY_DYNAMIC_DISPATCH(EvaluateFloat)(task, scratch, log_likelihood.data());
   } else {
-    HWY_DYNAMIC_DISPATCH(EvaluateDouble)
-    (bins, map, object, placed, runs, form, log_likelihood.data(), scratch);
+    HWY_DYNAMIC_DISPATCH(EvaluateDouble)(task, scratch, log_likelihood.data());
   }
 }
 
-template void evaluate_bins(const BinList<float>&, const MapPatches&, std::size_t,
-                            const PlacedElements&, std::span<const ReadingRun>, const ReadingForm&,
-                            std::span<double>, std::vector<ElementPatches<float>>&);
-template void evaluate_bins(const BinList<double>&, const MapPatches&, std::size_t,
-                            const PlacedElements&, std::span<const ReadingRun>, const ReadingForm&,
-                            std::span<double>, std::vector<ElementPatches<double>>&);
+template void evaluate_bins(const BinTask<float>&, std::vector<ElementPatches<float>>&,
+                            std::span<double>);
+template void evaluate_bins(const BinTask<double>&, std::vector<ElementPatches<double>>&,
+                            std::span<double>);
 
 std::string vector_instructions() { return hwy::TargetName(HWY_DYNAMIC_DISPATCH(Target)()); }
 

@@ -78,16 +78,24 @@ struct BinList {
 void place_elements(std::span<const glm::dvec2> from_pivot_mm, double theta_rad, double cell_mm,
                     double reach_cells, const PositionGrid& grid, PlacedElements& placed);
 
-/// Log-likelihood of the elements at bins, with vectors of `Lane`. Vectors are filled with bins of
-/// several blocks. Each bin's bits depend neither on the others nor on the processor. With a table
-/// only for Lane = double.
-/// @param log_likelihood out: [bin] in nats
-/// @param scratch memory to be used again
+/// Bins of one object and theta, and what their log-likelihood follows from.
 template <typename Lane>
-void evaluate_bins(const BinList<Lane>& bins, const MapPatches& map, std::size_t object,
-                   const PlacedElements& placed, std::span<const ReadingRun> runs,
-                   const ReadingForm& form, std::span<double> log_likelihood,
-                   std::vector<ElementPatches<Lane>>& scratch);
+struct BinTask {
+  const BinList<Lane>& bins;
+  const MapPatches& map;
+  std::size_t object = 0;
+  const PlacedElements& placed;
+  std::span<const ReadingRun> runs;  ///< of the placed elements
+  const ReadingForm& form;           ///< a table only for Lane = double
+};
+
+/// Log-likelihood of the elements at bins, with vectors of `Lane`. Vectors are filled with bins of
+/// several blocks. Each bin's bits depend neither on the others nor on the processor.
+/// @param scratch memory to be used again
+/// @param log_likelihood out: [bin] in nats
+template <typename Lane>
+void evaluate_bins(const BinTask<Lane>& task, std::vector<ElementPatches<Lane>>& scratch,
+                   std::span<double> log_likelihood);
 
 /// The vector instructions that kernels use on this processor, such as "AVX3".
 std::string vector_instructions();

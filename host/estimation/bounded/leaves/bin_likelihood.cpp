@@ -120,8 +120,9 @@ void BinLikelihood::evaluate_in(std::span<const BinBox> boxes, const KnownElemen
   std::int32_t theta = -1;
   const auto evaluate_list = [&] {
     evaluated.resize(bins.bins());
-    evaluate_bins<Lane>(bins, placements_[object].nodes, object, placed, elements.runs, form_,
-                        evaluated, scratch);
+    const auto of = static_cast<std::size_t>(object);
+    evaluate_bins<Lane>({bins, placements_[of].nodes, of, placed, elements.runs, form_}, scratch,
+                        evaluated);
     const double* from = evaluated.data();
     for (const BlockResults<Result>& block : results) {
       from = block.take(from);
