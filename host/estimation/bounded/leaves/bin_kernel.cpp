@@ -8,6 +8,7 @@
 #include <hwy/highway.h>
 
 #include <algorithm>
+#include <type_traits>
 
 #include "estimation/bounded/leaves/bin_kernel.hpp"
 #include "estimation/bounded/leaves/patch_interpolation-inl.hpp"
@@ -157,16 +158,16 @@ void evaluate(const BinTask<Lane>& task, std::vector<ElementPatches<Lane>>& patc
     std::copy(bins.y_offset.begin() + first, bins.y_offset.begin() + end, y_offset);
     const auto x = hn::Load(d, x_offset);
     const auto y = hn::Load(d, y_offset);
-    if (count == 1) {
-      const ElementPatches<Lane>& of_block = *parts[0].elements;
+    const auto fill = [&](auto of_parts) HWY_ATTR {
       evaluate_vector(
-          d, [&](std::size_t e) HWY_ATTR { return log_odds(d, task.map, of_block, e, x, y); }, task,
-          out);
-    } else {
-      const std::span<const LanesOfBlock<D>> of_blocks(parts, count);
-      evaluate_vector(
-          d, [&](std::size_t e) HWY_ATTR { return log_odds(d, task.map, of_blocks, e, x, y); },
+          d,
+          [&](std::size_t e) HWY_ATTR { return log_odds(d, task.map, parts, of_parts, e, x, y); },
           task, out);
+    };
+    if (count == 1) {
+      fill(std::integral_constant<std::size_t, 1>());
+    } else {
+      fill(count);
     }
     std::copy(out, out + (end - first), log_likelihood + first);
   }

@@ -195,32 +195,22 @@ inline const float* nodes_of(const MapPatches& map, std::int32_t patch) {
   return map.nodes() + MapPatches::side * static_cast<std::size_t>(patch >= 0 ? patch : ~patch);
 }
 
-/// Log odds at an element, for bins of one block that lie `x`, `y` cells from its first bin.
-template <class D, typename Lane>
-HWY_INLINE hn::Vec<D> log_odds(D d, const MapPatches& map, const ElementPatches<Lane>& elements,
-                               std::size_t e, hn::Vec<D> x, hn::Vec<D> y) {
-  const std::int32_t patch = elements.patch[e];
-  const float* const nodes = nodes_of(map, patch);
-  return interpolate(d, map, hn::Add(hn::Set(d, elements.x[e]), x),
-                     hn::Add(hn::Set(d, elements.y[e]), y), patch < 0, [&](auto index) HWY_ATTR {
-                       return corners_of(hn::Rebind<float, D>(), nodes, index);
-                     });
-}
-
-/// The same for bins of several blocks.
+/// Log odds at an element, for bins of some blocks that lie `x`, `y` cells from their block's first
+/// bin.
 /// @param parts at least one; the first has all lanes, and each later one takes its own from those
 /// before it
-template <class D>
-HWY_INLINE hn::Vec<D> log_odds(D d, const MapPatches& map, std::span<const LanesOfBlock<D>> parts,
-                               std::size_t e, hn::Vec<D> x, hn::Vec<D> y) {
+/// @param count of parts; of a single one a constant, so that the loops over parts vanish
+template <class D, class Count>
+HWY_INLINE hn::Vec<D> log_odds(D d, const MapPatches& map, const LanesOfBlock<D>* parts,
+                               Count count, std::size_t e, hn::Vec<D> x, hn::Vec<D> y) {
   const hn::Rebind<float, D> df;
-  const ElementPatches<hn::TFromD<D>>& first = *parts.front().elements;
+  const ElementPatches<hn::TFromD<D>>& first = *parts[0].elements;
   const float* nodes[most_lanes];
   nodes[0] = nodes_of(map, first.patch[e]);
   bool with_border = first.patch[e] < 0;
   auto from_x = hn::Set(d, first.x[e]);
   auto from_y = hn::Set(d, first.y[e]);
-  for (std::size_t p = 1; p < parts.size(); ++p) {
+  for (std::size_t p = 1; p < count; ++p) {
     const ElementPatches<hn::TFromD<D>>& elements = *parts[p].elements;
     nodes[p] = nodes_of(map, elements.patch[e]);
     with_border = with_border || elements.patch[e] < 0;
@@ -230,7 +220,7 @@ HWY_INLINE hn::Vec<D> log_odds(D d, const MapPatches& map, std::span<const Lanes
   return interpolate(d, map, hn::Add(from_x, x), hn::Add(from_y, y), with_border,
                      [&](auto index) HWY_ATTR {
                        auto found = corners_of(df, nodes[0], index);
-                       for (std::size_t p = 1; p < parts.size(); ++p) {
+                       for (std::size_t p = 1; p < count; ++p) {
                          const auto own = corners_of(df, nodes[p], index);
                          const auto& lanes = parts[p].float_lanes;
                          found.v00 = hn::IfThenElse(lanes, own.v00, found.v00);

@@ -12,12 +12,14 @@ namespace {
 /// In penalties: rounding in float64 of log odds and log-likelihoods never matters as much.
 constexpr double margin = 0.01;
 
-/// The largest log-likelihood at the inner nodes of a likelihood table, over intervals of log odds.
+/// The largest log-likelihood at the nodes of a likelihood table within an interval of log odds;
+/// -infinity where no node lies inside. Eq. 7 has no nodes: it rises or falls with the log odds,
+/// and is largest at an interval's end.
 class InnerNodes {
  public:
   InnerNodes(const ContactModel& contact, Reading reading, std::size_t object) {
     if (!contact.table) {
-      return;  // Eq. 7 rises or falls with the log odds: it is largest at an interval's end
+      return;
     }
     const LikelihoodTable& table = *contact.table;
     const std::size_t set = table.sets() == 1 ? 0 : object;
@@ -26,35 +28,16 @@ class InnerNodes {
                           table.nodes);
     first_ = table.first_log_odds;
     step_ = (table.last_log_odds - table.first_log_odds) / static_cast<double>(table.nodes - 1);
-    // A tree of maxima: leaf i stands at n + i, its parent at half the index.
-    tree_.resize(2 * nodes_.size());
-    std::copy(nodes_.begin(), nodes_.end(),
-              tree_.begin() + static_cast<std::ptrdiff_t>(nodes_.size()));
-    for (std::size_t i = nodes_.size() - 1; i > 0; --i) {
-      tree_[i] = std::max(tree_[2 * i], tree_[2 * i + 1]);
-    }
   }
 
-  /// -infinity where no node lies inside.
   double largest(double low, double high) const {
     double most = -std::numeric_limits<double>::infinity();
-    if (nodes_.empty()) {
-      return most;
-    }
     // A node too many on either side leaves bounds true.
-    const auto last = static_cast<double>(nodes_.size());
-    std::size_t begin = nodes_.size() + static_cast<std::size_t>(std::clamp(
-                                            std::ceil((low - first_) / step_ - 1e-6), 0.0, last));
-    std::size_t end =
-        nodes_.size() + static_cast<std::size_t>(std::clamp(
-                            std::floor((high - first_) / step_ + 1e-6) + 1.0, 0.0, last));
-    for (; begin < end; begin /= 2, end /= 2) {
-      if (begin % 2 == 1) {
-        most = std::max(most, tree_[begin++]);
-      }
-      if (end % 2 == 1) {
-        most = std::max(most, tree_[--end]);
-      }
+    const auto nodes = static_cast<double>(nodes_.size());
+    const double begin = std::clamp(std::ceil((low - first_) / step_ - 1e-6), 0.0, nodes);
+    const double end = std::clamp(std::floor((high - first_) / step_ + 1e-6) + 1.0, 0.0, nodes);
+    for (auto i = static_cast<std::size_t>(begin); i < static_cast<std::size_t>(end); ++i) {
+      most = std::max(most, nodes_[i]);
     }
     return most;
   }
@@ -63,7 +46,6 @@ class InnerNodes {
   std::span<const double> nodes_;
   double first_ = 0.0;
   double step_ = 1.0;
-  std::vector<double> tree_;
 };
 
 }  // namespace
