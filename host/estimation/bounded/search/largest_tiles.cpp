@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "estimation/bounded/parallel_for.hpp"
-#include "estimation/bounded/search/seen_window.hpp"
+#include "estimation/bounded/search/seen_tiles.hpp"
 
 namespace palpate {
 
@@ -146,7 +146,7 @@ void LargestTiles::for_seen(const KnownElements& known, const KnownElements& pla
     const std::size_t theta = row % thetas;
     const TileBounds& bounds = space_.bounds[object];
     const TileLevel& level = bounds.levels().front();
-    const TileRange seen = seen_window(reaches[theta], space_.maps[object], level);
+    const TileRange seen = seen_tiles(reaches[theta], space_.maps[object], level);
     bounds.place(0, space_.turns[theta], placed, places);
     const std::size_t plane = theta * static_cast<std::size_t>(level.batches_y());
     for (int y = seen.y_first / batch_side; y * batch_side < seen.y_end; ++y) {

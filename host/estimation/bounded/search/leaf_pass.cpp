@@ -114,25 +114,25 @@ void LeafPass::take_family(std::span<const Tile> family, const std::vector<std::
     }
     return;
   }
-  std::optional<TileRange> window;
+  std::optional<TileRange> range;
   for (const Tile& tile : family) {
     if (needed(tile)) {
-      window = window ? TileRange{.x_first = std::min(window->x_first, tile.x),
-                                  .x_end = std::max(window->x_end, tile.x + 1),
-                                  .y_first = std::min(window->y_first, tile.y),
-                                  .y_end = std::max(window->y_end, tile.y + 1)}
-                      : TileRange{tile.x, tile.x + 1, tile.y, tile.y + 1};
+      range = range ? TileRange{.x_first = std::min(range->x_first, tile.x),
+                                .x_end = std::max(range->x_end, tile.x + 1),
+                                .y_first = std::min(range->y_first, tile.y),
+                                .y_end = std::max(range->y_end, tile.y + 1)}
+                    : TileRange{tile.x, tile.x + 1, tile.y, tile.y + 1};
     }
   }
-  if (!window) {
+  if (!range) {
     return;
   }
   for (const Tile& tile : family) {
-    if (window->holds(tile)) {
+    if (range->holds(tile)) {
       remove(tile, left);
     }
   }
-  boxes.push_back(level.box_of(family.front().object, family.front().theta, *window));
+  boxes.push_back(level.box_of(family.front().object, family.front().theta, *range));
 }
 
 void LeafPass::remove(const Tile& tile, UnsettledMass& left) const {

@@ -5,7 +5,7 @@
 #include <numeric>
 
 #include "estimation/bounded/parallel_for.hpp"
-#include "estimation/bounded/search/seen_window.hpp"
+#include "estimation/bounded/search/seen_tiles.hpp"
 
 namespace palpate {
 
@@ -40,8 +40,8 @@ TileDivision::TileDivision(const SearchSpace& space, const LargestTiles& largest
       seen_(space.bounds.size() * thetas_) {
   parallel_for(seen_.size(), [&](std::size_t row) {
     const std::size_t object = row / thetas_;
-    seen_[row] = seen_window(reaches_[row % thetas_], space_.maps[object],
-                             space_.bounds[object].levels().front());
+    seen_[row] = seen_tiles(reaches_[row % thetas_], space_.maps[object],
+                            space_.bounds[object].levels().front());
   });
   for (std::size_t i = 0; i < space_.bounds.size(); ++i) {
     std::vector<double>& of_level = unpenalised_.emplace_back();
@@ -169,7 +169,7 @@ std::vector<Tile> TileDivision::parts_of(std::span<const Tile> tiles, std::size_
     const Tile& first = tiles[begins[task]];
     const TileBounds& bounds = space_.bounds[first.object];
     const TileRange seen =
-        seen_window(reaches_[first.theta], space_.maps[first.object], bounds.levels()[level + 1]);
+        seen_tiles(reaches_[first.theta], space_.maps[first.object], bounds.levels()[level + 1]);
     bounds.place(level + 1, space_.turns[first.theta], elements_, placed);
     parts[task].reserve((end - begins[task]) * batch_tiles);
     for (std::size_t i = begins[task]; i < end; ++i) {

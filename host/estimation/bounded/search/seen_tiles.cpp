@@ -1,4 +1,4 @@
-#include "estimation/bounded/search/seen_window.hpp"
+#include "estimation/bounded/search/seen_tiles.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -31,7 +31,7 @@ std::vector<BoundingBox> reaches_of(const KnownElements& elements,
   return reaches;
 }
 
-TileRange seen_window(const BoundingBox& reach, const OccupancyGrid& map, const TileLevel& level) {
+TileRange seen_tiles(const BoundingBox& reach, const OccupancyGrid& map, const TileLevel& level) {
   if (reach.empty()) {
     return {};
   }

@@ -18,6 +18,6 @@ std::vector<BoundingBox> reaches_of(const KnownElements& elements,
 /// The tiles in which an element may see something else than the prior, at one theta; none without
 /// elements. In all others every bin has the same likelihood.
 /// @param reach of the elements at this theta
-TileRange seen_window(const BoundingBox& reach, const OccupancyGrid& map, const TileLevel& level);
+TileRange seen_tiles(const BoundingBox& reach, const OccupancyGrid& map, const TileLevel& level);
 
 }  // namespace palpate

@@ -1,7 +1,7 @@
 // Tiles in which every element sees the prior: none may be taken for one, and their bins have the
 // likelihood of the prior.
 
-#include "estimation/bounded/search/seen_window.hpp"
+#include "estimation/bounded/search/seen_tiles.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -58,7 +58,7 @@ BoundingBox reach_of(const KnownElements& elements, const glm::dvec2& turn) {
   return reaches_of(elements, std::span(&turn, 1)).front();
 }
 
-TEST(SeenWindow, LeavesOutNoTileInWhichAnElementSeesTheMap) {
+TEST(SeenTiles, LeavesOutNoTileInWhichAnElementSeesTheMap) {
   Uniform random(501);
   std::int64_t seen_bins = 0;
   std::int64_t left_out = 0;
@@ -69,13 +69,13 @@ TEST(SeenWindow, LeavesOutNoTileInWhichAnElementSeesTheMap) {
          tile_levels(of.lattice, of.map.cell_mm, tile_sizes(of.lattice, of.map.cell_mm, 1))) {
       for (int theta = 0; theta < of.lattice.theta_rad.count; ++theta) {
         const glm::dvec2 turn = turn_of(of.lattice, theta);
-        const TileRange window = seen_window(reach_of(of.elements, turn), of.map, level);
-        ASSERT_LE(0, window.x_first);
-        ASSERT_LE(window.x_first, window.x_end);
-        ASSERT_LE(window.x_end, level.x.tiles());
-        ASSERT_LE(0, window.y_first);
-        ASSERT_LE(window.y_first, window.y_end);
-        ASSERT_LE(window.y_end, level.y.tiles());
+        const TileRange seen = seen_tiles(reach_of(of.elements, turn), of.map, level);
+        ASSERT_LE(0, seen.x_first);
+        ASSERT_LE(seen.x_first, seen.x_end);
+        ASSERT_LE(seen.x_end, level.x.tiles());
+        ASSERT_LE(0, seen.y_first);
+        ASSERT_LE(seen.y_first, seen.y_end);
+        ASSERT_LE(seen.y_end, level.y.tiles());
         for (int k = 0; k < 40; ++k) {
           const auto x = static_cast<int>(random(0.0, of.lattice.x_mm.count));
           const auto y = static_cast<int>(random(0.0, of.lattice.y_mm.count));
@@ -84,7 +84,7 @@ TEST(SeenWindow, LeavesOutNoTileInWhichAnElementSeesTheMap) {
                 std::upper_bound(axis.first_bin.begin(), axis.first_bin.end() - 1, bin) -
                 axis.first_bin.begin() - 1);
           };
-          const bool held = window.holds({.x = tile_of(level.x, x), .y = tile_of(level.y, y)});
+          const bool held = seen.holds({.x = tile_of(level.x, x), .y = tile_of(level.y, y)});
           if (sees(of, turn, {of.lattice.x_mm.centre(x), of.lattice.y_mm.centre(y)})) {
             ASSERT_TRUE(held) << "bin " << x << ", " << y << " at theta " << theta;
             ++seen_bins;
@@ -99,12 +99,12 @@ TEST(SeenWindow, LeavesOutNoTileInWhichAnElementSeesTheMap) {
   EXPECT_GT(left_out, 10'000);
 }
 
-TEST(SeenWindow, HoldsNothingWithoutElements) {
+TEST(SeenTiles, HoldsNothingWithoutElements) {
   const BinCase of = letter_case();
   const std::vector<TileLevel> levels = tile_levels(of.lattice, 0.5, {{.side = 2}});
-  const TileRange window = seen_window({}, of.map, levels.front());
-  EXPECT_EQ(window.x_first, window.x_end);
-  EXPECT_EQ(window.y_first, window.y_end);
+  const TileRange seen = seen_tiles({}, of.map, levels.front());
+  EXPECT_EQ(seen.x_first, seen.x_end);
+  EXPECT_EQ(seen.y_first, seen.y_end);
 }
 
 TEST(TileBounds, AreThePriorsWhereNoElementSeesTheMap) {
@@ -130,14 +130,14 @@ TEST(TileBounds, AreThePriorsWhereNoElementSeesTheMap) {
       }
       for (int theta = 0; theta < of.lattice.theta_rad.count; ++theta) {
         const glm::dvec2 turn = turn_of(of.lattice, theta);
-        const TileRange window = seen_window(reach_of(of.elements, turn), of.map, level);
+        const TileRange seen = seen_tiles(reach_of(of.elements, turn), of.map, level);
         bounds.place(l, turn, of.elements, placed);
         for_batches(level, [&](int first_x, int first_y) {
           std::uint32_t sums[batch_tiles] = {};
           bounds.add(l, of.elements, placed, first_x, first_y, sums);
           for (int i = 0; i < batch_tiles; ++i) {
             const Tile tile{.x = first_x + i / batch_side, .y = first_y + i % batch_side};
-            if (!window.holds(tile)) {
+            if (!seen.holds(tile)) {
               SCOPED_TRACE(fmt::format("level {}, tile {}, {}", l, tile.x, tile.y));
               if (level.size.single_bin) {
                 ASSERT_LE(sums[i], beyond) << "its last squares reach beyond the map";
