@@ -57,9 +57,7 @@ FilterRun run_filter(Device& device, RecognitionTask task, std::span<const Unkno
     run.name = fmt::format("{} {}", particles->augmented ? "augmented MCL" : run.filter, run.count);
   } else {
     const PoseLattice& lattice = task.lattice();
-    run.path = recogniser.bounded() != nullptr
-                   ? recogniser.bounded()->path()
-                   : fmt::format("{}", fmt::join(recogniser.histogram()->paths(), "; "));
+    run.path = recogniser.path();
     run.count = lattice.bins();
     run.name = run.filter + " " + size_of(lattice);
   }
@@ -73,9 +71,7 @@ FilterRun run_filter(Device& device, RecognitionTask task, std::span<const Unkno
       run.records.push_back(recognise(recogniser, task, unknown, trace));
       run.records.back().require_steps();
       run.device_bytes = std::max(run.device_bytes, recogniser.device_bytes());
-      if (const BoundedPosterior* bounded = recogniser.bounded()) {
-        run.host_bytes = std::max<std::uint64_t>(run.host_bytes, bounded->host_bytes());
-      }
+      run.host_bytes = std::max<std::uint64_t>(run.host_bytes, recogniser.host_bytes());
     }
   });
   return run;

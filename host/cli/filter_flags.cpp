@@ -227,7 +227,7 @@ Recogniser open_filter(Device& device, const RecognitionTask& task) {
     return {device, task};
   } catch (const Error& error) {
     // Of a sound task nothing but the bins' memory can be refused.
-    if (error.fault() == Fault::input && std::holds_alternative<HistogramOptions>(task.filter) &&
+    if (error.fault() == Fault::input && traits_of(task.filter).every_bin &&
         !task.filter_asked_for_by.empty() && bounds_have_room(task)) {
       throw Error(Fault::input,
                   fmt::format("{}, or leave out {}: --filter bounded needs no device memory",

@@ -85,7 +85,7 @@ void warm_up(Recogniser& recogniser, const RecognitionTask& task, const SensorDe
                     .valid = sensor.valid};
   recogniser.prepare(touch);
   recogniser.update(std::span(&touch, 1));
-  if (recogniser.bounded() == nullptr) {  // whose search of one touch is long and compiles nothing
+  if (!traits_of(task.filter).certificate) {  // a search of one touch is long, compiles nothing
     recogniser.refine(recogniser.estimate().mode);
   }
   recogniser.reset();
@@ -121,7 +121,7 @@ void live(const Options& options) {
   RecognitionTask task = task_of(options.recognition, scene, description.pressure_unit, source,
                                  array_reach_mm(elements_mm),
                                  goal ? HistogramNeed{"--plan", plan_needs} : HistogramNeed{});
-  if (goal && std::holds_alternative<ParticleOptions>(task.filter)) {
+  if (goal && !traits_of(task.filter).every_bin) {
     refuse_flag("--plan", options.plan, "{}; use --filter histogram, or leave it out", plan_needs);
   }
   CommandFiles files;

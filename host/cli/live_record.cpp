@@ -21,7 +21,7 @@ double time_s(const LiveTouch& touch) { return 0.5 * (touch.touch.begin_s + touc
 
 /// A cell of the column that only bounds have.
 std::string dropped_cell(const std::string& text, const RecognitionTask& task) {
-  return std::holds_alternative<BoundedOptions>(task.filter) ? fmt::format("  {:>7}", text) : "";
+  return traits_of(task.filter).certificate ? fmt::format("  {:>7}", text) : "";
 }
 
 }  // namespace

@@ -179,7 +179,7 @@ void plan_touches(const Options& options) {
   }
   RecognitionTask task = task_of(options.recognition, scene, recording.pressure_unit,
                                  recording.path, reach_mm, {.why = plan_needs});
-  if (std::holds_alternative<ParticleOptions>(task.filter)) {
+  if (!traits_of(task.filter).every_bin) {
     refuse("--filter particles", "{}; use --filter histogram, or leave it out", plan_needs);
   }
   check_outputs(options, scene, task);

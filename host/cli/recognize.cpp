@@ -68,7 +68,7 @@ void check_outputs(const Options& options, const Scene& scene, const Recognition
   }
   add_recognition_files(options.recognition, scene, task, files);
   if (!options.posterior.empty()) {
-    if (std::holds_alternative<ParticleOptions>(task.filter)) {
+    if (!traits_of(task.filter).every_bin) {
       refuse_flag("--posterior", options.posterior,
                   "particles have no bins; use --filter histogram");
     }
@@ -231,7 +231,9 @@ void recognize(const Options& options) {
     if (unresolved.empty()) {
       unresolved = unresolved_words(task, recogniser.lattice(), unknown.touches);
     }
-    json.push_back(to_json(records.back(), task, device.name(), options.trace));
+    if (!options.json.empty()) {
+      json.push_back(to_json(records.back(), task, device.name(), options.trace));
+    }
     if (!options.png.empty()) {
       write_file(
           png_path(options, unknown),

@@ -68,18 +68,17 @@ void add_certificate(nlohmann::ordered_json& json, const RecognitionStep& step,
 std::string setup_words(const Device& device, const RecognitionTask& task) {
   const auto* particles = std::get_if<ParticleOptions>(&task.filter);
   const PoseLattice& lattice = task.lattice();
-  const bool bounded = std::holds_alternative<BoundedOptions>(task.filter);
   const auto mirrored =
       static_cast<std::size_t>(std::ranges::count_if(task.hypotheses, &Hypothesis::mirrored));
   const std::size_t maps = task.hypotheses.size() - mirrored;
-  return fmt::format(
-      "{} map{}{}, {} on {}", maps, maps == 1 ? "" : "s",
-      mirrored > 0 ? fmt::format(" and {} mirrored", mirrored) : "",
-      particles != nullptr
-          ? fmt::format("{} particles", particles->particles)
-          : fmt::format("{} x {} x {} bins each{},", lattice.x_mm.count, lattice.y_mm.count,
-                        lattice.theta_rad.count, bounded ? " by bounds" : ""),
-      device.name());
+  return fmt::format("{} map{}{}, {} on {}", maps, maps == 1 ? "" : "s",
+                     mirrored > 0 ? fmt::format(" and {} mirrored", mirrored) : "",
+                     particles != nullptr
+                         ? fmt::format("{} particles", particles->particles)
+                         : fmt::format("{} x {} x {} bins each{},", lattice.x_mm.count,
+                                       lattice.y_mm.count, lattice.theta_rad.count,
+                                       traits_of(task.filter).certificate ? " by bounds" : ""),
+                     device.name());
 }
 
 void print_engine(const Device* device, const Recogniser& recogniser, const RecognitionTask& task) {
@@ -95,10 +94,9 @@ void print_engine(const Device* device, const Recogniser& recogniser, const Reco
                     particles->resampling == Resampling::multinomial ? "multinomial" : "systematic",
                     particles->augmented ? ", random particles added" : "", particles->seed);
   } else if (const auto* bounded = std::get_if<BoundedOptions>(&task.filter)) {
-    filter = fmt::format("bounded, {}; {:.1f} MiB of the host's memory\n        tolerance {:g}",
-                         recogniser.bounded()->path(),
-                         static_cast<double>(recogniser.bounded()->host_bytes()) / (1 << 20),
-                         bounded->tolerance);
+    filter = fmt::format(
+        "bounded, {}; {:.1f} MiB of the host's memory\n        tolerance {:g}", recogniser.path(),
+        static_cast<double>(recogniser.host_bytes()) / (1 << 20), bounded->tolerance);
     filter += bounded->budget_s ? fmt::format(", budget {:g} ms", 1e3 * *bounded->budget_s) : "";
     if (bounded->evidence_nats) {
       filter += fmt::format(", evidence within {:g} nats", *bounded->evidence_nats);
@@ -108,7 +106,7 @@ void print_engine(const Device* device, const Recogniser& recogniser, const Reco
                     : "";
     }
   } else {
-    filter = fmt::format("histogram in {}", fmt::join(recogniser.histogram()->paths(), "; "));
+    filter = "histogram in " + recogniser.path();
   }
   filter += reason_of_filter(task);
   fmt::print(stderr,

@@ -27,24 +27,23 @@ void refuse_beside_fit(std::span<const OtherFlag> flags, const RecognitionTask& 
       refuse(flag.name, "has no meaning with --fit-touch-sd; leave one of them out");
     }
   }
-  const auto* histogram = std::get_if<HistogramOptions>(&task.filter);
-  if (histogram == nullptr) {
+  if (!traits_of(task.filter).every_bin) {
     refuse("--fit-touch-sd", "particles cannot fit it; use --filter histogram");
   }
-  if (!histogram->touch_sd.none()) {
+  if (!task.touch_sd().none()) {
     refuse("--fit-touch-sd",
            "finds what --touch-sd-mm and --touch-sd-deg, the scene's touch_sd or the sensor model "
            "say already; leave those out");
   }
-  if (!histogram->slip_sd.none()) {
+  if (!task.slip_sd().none()) {
     refuse("--fit-touch-sd",
            "takes objects to rest between touches; leave out --slip-sd-mm and --slip-sd-deg, or "
            "the scene's slip_sd");
   }
-  if (histogram->contact.table) {
+  if (task.contact().table) {
     refuse("--fit-touch-sd", "learns a model of the sensor of its own; leave out the sensor model");
   }
-  if (histogram->none_weight) {
+  if (task.labels.back() == none_label) {
     refuse("--fit-touch-sd",
            "takes every unknown to be one of the maps' objects; leave out --none, or the scene's "
            "none");

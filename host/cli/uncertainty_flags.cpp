@@ -186,17 +186,13 @@ void require_within_region(const UncertaintyFlags& flags, const Scene& scene,
 
 std::string unresolved_words(const RecognitionTask& task, const PoseLattice& lattice,
                              std::span<const Pose> T_robot_sensor) {
-  const auto* histogram = std::get_if<HistogramOptions>(&task.filter);
-  if (histogram == nullptr) {
-    return "";
-  }
-  std::optional<std::string> fault = unresolved_by_steps(histogram->touch_sd, lattice, "touch-sd");
+  std::optional<std::string> fault = unresolved_by_steps(task.touch_sd(), lattice, "touch-sd");
   if (!fault) {
-    fault = unresolved_by_steps(histogram->slip_sd, lattice, "slip-sd");
+    fault = unresolved_by_steps(task.slip_sd(), lattice, "slip-sd");
   }
   for (const Pose& pose : T_robot_sensor) {
     if (!fault) {
-      fault = unresolved_at(pose, histogram->touch_sd, lattice, "touch-sd");
+      fault = unresolved_at(pose, task.touch_sd(), lattice, "touch-sd");
     }
   }
   return fault.value_or("");

@@ -212,8 +212,8 @@ class FoldTrial {
   void add_fit(const Press& press, const std::vector<LabelScore>& scores, const ScoredPress& scored,
                CrossValidation& result) const {
     // A press of which nothing is In Contact says nothing of its object.
-    const std::vector<Reading> readings = classifier_.classify(press.touches.front());
-    if (std::ranges::none_of(readings, is_contact)) {
+    const std::vector<TouchEvidence> touches = evidence_of(press.touches, classifier_);
+    if (!touches.front().in_contact()) {
       return;
     }
     std::vector<std::size_t> others;
@@ -237,7 +237,7 @@ class FoldTrial {
             log_evidence.push_back(scored.log_evidence[label]);
           }
         }
-        return FamiliarityScore::of(readings, best, log_evidence);
+        return FamiliarityScore::of(touches.front().readings, best, log_evidence);
       };
       const std::size_t turn = familiarity.known.size() % others.size();
       familiarity.known.push_back(score_without(others[turn]));
@@ -249,7 +249,7 @@ class FoldTrial {
     // bins.
     const Pose& near =
         press.T_object_robot && best_label == scored.truth ? *press.T_object_robot : at.best_pose;
-    if (const auto fit = best_fit_near(press.touches, near, map, contact_for(best_label), 0)) {
+    if (const auto fit = best_fit_near(touches, near, map, contact_for(best_label), 0)) {
       result.fit_z.push_back(fit->z);
     }
   }

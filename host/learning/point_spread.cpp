@@ -10,6 +10,7 @@
 #include "io/element_spacing.hpp"
 #include "learning/golden_section.hpp"
 #include "model/bounding_box.hpp"
+#include "model/touch_evidence.hpp"
 
 namespace palpate {
 
@@ -243,17 +244,16 @@ std::map<std::string, Readings> readings_of(const std::vector<Press>& presses,
   std::map<std::string, Readings> objects;
   for (const Press& press : presses) {
     for (const Touch& touch : press.touches) {
-      const std::vector<Reading> readings = classifier.classify(touch);
+      const TouchEvidence evidence(touch, {.classifier = classifier});
       const auto spacing = spacing_of(touch.elements_mm);
-      if (!spacing || std::ranges::none_of(readings, is_contact)) {
+      if (!spacing || !evidence.in_contact()) {
         continue;
       }
       spacing_mm = std::max(spacing_mm, spacing->nearest_mm.most);
       Readings& own = objects[press.label];
       const Pose T_object_sensor = *press.T_object_robot * touch.T_robot_sensor;
-      for (std::size_t e = 0; e < readings.size(); ++e) {
-        const bool living = touch.valid.empty() || touch.valid[e] != 0;
-        if (living && !std::isnan(touch.pressure[e])) {
+      for (std::size_t e = 0; e < evidence.lives.size(); ++e) {
+        if (evidence.lives[e] != 0) {
           own.samples.push_back(
               {T_object_sensor * touch.elements_mm[e], touch.pressure[e], own.touches});
         }

@@ -9,6 +9,7 @@
 #include "model/predicted_readings.hpp"
 #include "model/random.hpp"
 #include "model/reading_mixture.hpp"
+#include "model/touch_evidence.hpp"
 
 namespace palpate {
 
@@ -59,9 +60,22 @@ Fit FitScale::of(const Fit& fit, std::size_t touches) const {
 
 std::optional<Fit> fit_of(std::span<const Touch> touches, const Pose& T_object_robot,
                           const OccupancyGrid& map, const ContactModel& contact,
+                          std::size_t object) {
+  return evidence_fit(evidence_of(touches, contact), T_object_robot, map, contact, object);
+}
+
+std::optional<Fit> fit_of(std::span<const Touch> touches, const Pose& T_object_robot,
+                          const OccupancyGrid& map, const ContactModel& contact,
                           const DisplacementSd& touch_sd, std::size_t object) {
+  return evidence_fit(evidence_of(touches, contact), T_object_robot, map, contact, touch_sd,
+                      object);
+}
+
+std::optional<Fit> evidence_fit(std::span<const TouchEvidence> touches, const Pose& T_object_robot,
+                                const OccupancyGrid& map, const ContactModel& contact,
+                                const DisplacementSd& touch_sd, std::size_t object) {
   if (touch_sd.none()) {
-    return fit_of(touches, T_object_robot, map, contact, object);
+    return evidence_fit(touches, T_object_robot, map, contact, object);
   }
   constexpr std::size_t points = 128;  // log means of letters within 0.1 nats, sd 1 mm and 0.05 rad
   constexpr std::size_t draws = 64;    // the mean of z is out by 1 / sqrt(draws) at most
@@ -74,17 +88,9 @@ std::optional<Fit> fit_of(std::span<const Touch> touches, const Pose& T_object_r
   Moments all;
   double judged = 0.0;
   bool any_known = false;
-  for (const Touch& touch : touches) {
-    std::vector<glm::dvec2> elements_mm;
-    std::vector<Reading> readings;
-    const std::vector<Reading> classes = model.classify(touch);
-    for (std::size_t e = 0; e < classes.size(); ++e) {
-      if (classes[e] != Reading::unknown) {
-        elements_mm.push_back(touch.elements_mm[e]);
-        readings.push_back(classes[e]);
-      }
-    }
-    if (readings.empty()) {
+  for (const TouchEvidence& touch : touches) {
+    const TouchEvidence known = touch.known();
+    if (known.readings.empty()) {
       continue;
     }
     any_known = true;
@@ -94,11 +100,11 @@ std::optional<Fit> fit_of(std::span<const Touch> touches, const Pose& T_object_r
     }
     const Pose T_object_sensor = T_object_robot * touch.T_robot_sensor;
     const ReadingMixture judge =
-        mixture_of(elements_mm, T_object_sensor, displacements, interpolated, model, object);
+        mixture_of(known.elements_mm, T_object_sensor, displacements, interpolated, model, object);
     const ReadingMixture source =
-        mixture_of(elements_mm, T_object_sensor, drawn, interpolated, model, object);
+        mixture_of(known.elements_mm, T_object_sensor, drawn, interpolated, model, object);
     const Moments predicted = predicted_log_mean(judge, source, random);
-    judged += judge.log_mean(readings);
+    judged += judge.log_mean(known.readings);
     all.mean += predicted.mean;
     all.variance += predicted.variance;
   }
@@ -109,22 +115,21 @@ std::optional<Fit> fit_of(std::span<const Touch> touches, const Pose& T_object_r
   return Fit{.z = z, .verdict = verdict_on(z)};
 }
 
-std::optional<Fit> fit_of(std::span<const Touch> touches, const Pose& T_object_robot,
-                          const OccupancyGrid& map, const ContactModel& contact,
-                          std::size_t object) {
+std::optional<Fit> evidence_fit(std::span<const TouchEvidence> touches, const Pose& T_object_robot,
+                                const OccupancyGrid& map, const ContactModel& contact,
+                                std::size_t object) {
   ContactModel model = contact;
   model.prior = contact.prior.value_or(map.prior);
   const InterpolatedMap interpolated(map, *model.prior);
   const std::size_t levels = reading_levels(model);
   Sums sums;
   bool any_known = false;
-  for (const Touch& touch : touches) {
-    const std::vector<Reading> readings = model.classify(touch);
+  for (const TouchEvidence& touch : touches) {
     const std::vector<double> logs = reading_log_likelihoods(
         touch.elements_mm, T_object_robot * touch.T_robot_sensor, interpolated, model, object);
-    for (std::size_t e = 0; e < readings.size(); ++e) {
-      if (readings[e] != Reading::unknown) {
-        sums.add(readings[e], std::span(logs).subspan(e * levels, levels));
+    for (std::size_t e = 0; e < touch.readings.size(); ++e) {
+      if (touch.readings[e] != Reading::unknown) {
+        sums.add(touch.readings[e], std::span(logs).subspan(e * levels, levels));
         any_known = true;
       }
     }

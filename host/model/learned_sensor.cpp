@@ -11,6 +11,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include "model/touch_evidence.hpp"
 #include "palpate/error.hpp"
 #include "palpate/sensor_model.hpp"
 
@@ -82,22 +83,16 @@ LikelihoodTable table_of(const LearnedTable& table, std::vector<double> log_like
 }
 
 PressFeatures press_features(const Touch& touch, const ContactClassifier& classifier) {
-  if (!(classifier.threshold > 0.0)) {
+  return press_features(TouchEvidence(touch, {.classifier = classifier}), classifier.threshold);
+}
+
+PressFeatures press_features(const TouchEvidence& touch, double threshold) {
+  if (!(threshold > 0.0)) {
     throw Error(Fault::input, "threshold = 0: press features need one above 0");
   }
-  const std::vector<Reading> readings = classifier.classify(touch);
-  double area = 0.0;
-  double force = 0.0;
-  double peak = 0.0;
-  for (std::size_t e = 0; e < readings.size(); ++e) {
-    const bool living = touch.valid.empty() || touch.valid[e] != 0;
-    if (living && touch.pressure[e] > 0.0) {  // false for NaN
-      area += is_contact(readings[e]) ? 1.0 : 0.0;
-      force += touch.pressure[e] / classifier.threshold;
-      peak = std::max(peak, touch.pressure[e] / classifier.threshold);
-    }
-  }
-  return {{std::log1p(area), std::log1p(force), std::log1p(peak)}};
+  const double peak = std::max(0.0, touch.largest_pressure / threshold);
+  return {
+      {std::log1p(static_cast<double>(touch.contacts)), std::log1p(touch.force), std::log1p(peak)}};
 }
 
 double FeatureDistribution::log_density(const PressFeatures& features) const {

@@ -28,16 +28,14 @@ bool are_surprising(std::span<const double> surprises) {
 /// Log-likelihood of one touch where its sensor is displaced.
 class DisplacedTouch {
  public:
-  DisplacedTouch(const Touch& touch, const Pose& T_object_robot, const InterpolatedMap& map,
+  DisplacedTouch(const TouchEvidence& touch, const Pose& T_object_robot, const InterpolatedMap& map,
                  const ContactModel& contact, std::size_t object)
       : T_object_sensor_(T_object_robot * touch.T_robot_sensor),
         map_(map),
         contact_(contact),
         object_(object),
-        readings_(contact.classify(touch)),
+        readings_(touch.readings),
         elements_mm_(touch.elements_mm) {}
-
-  bool in_contact() const { return std::any_of(readings_.begin(), readings_.end(), is_contact); }
 
   /// The displacement of largest likelihood, of the smaller ones where several are about as likely:
   /// a touch that feels little stays in its place.
@@ -94,13 +92,13 @@ class DisplacedTouch {
   const InterpolatedMap& map_;
   const ContactModel& contact_;
   std::size_t object_;
-  std::vector<Reading> readings_;
+  std::span<const Reading> readings_;
   std::span<const glm::dvec2> elements_mm_;
 };
 
 }  // namespace
 
-std::optional<std::string> touches_contradict(std::span<const Touch> touches,
+std::optional<std::string> touches_contradict(std::span<const TouchEvidence> touches,
                                               const RecognitionTask& task,
                                               const RecognitionStep& step,
                                               std::span<const double> surprises) {
@@ -118,14 +116,14 @@ std::optional<std::string> touches_contradict(std::span<const Touch> touches,
   const InterpolatedMap interpolated(map, *contact.prior);
   const DisplacementSd sd = task.touch_sd();
   const double rad_per_mm = sd.mm > 0.0 && sd.rad > 0.0 ? sd.rad / sd.mm : usual_rad_per_mm;
-  std::vector<Touch> displaced;
+  std::vector<TouchEvidence> displaced;
   double squares = 0.0;
   std::size_t in_contact = 0;
-  for (const Touch& touch : touches.last(std::min(touches.size(), most_touches))) {
-    const DisplacedTouch displaced_touch(touch, step.pose(), interpolated, contact, object);
+  for (const TouchEvidence& touch : touches.last(std::min(touches.size(), most_touches))) {
     displaced.push_back(touch);
-    if (displaced_touch.in_contact()) {
-      const Pose displacement = displaced_touch.best(rad_per_mm);
+    if (touch.in_contact()) {
+      const Pose displacement =
+          DisplacedTouch(touch, step.pose(), interpolated, contact, object).best(rad_per_mm);
       displaced.back().T_robot_sensor = touch.T_robot_sensor * displacement;
       squares += glm::dot(displacement.translation_mm, displacement.translation_mm);
       ++in_contact;
@@ -134,7 +132,7 @@ std::optional<std::string> touches_contradict(std::span<const Touch> touches,
   if (in_contact < 2) {
     return {};
   }
-  const Fit fit = fit_of(displaced, step.pose(), map, contact, object).value();
+  const Fit fit = evidence_fit(displaced, step.pose(), map, contact, object).value();
   if (task.fit_scale.of(fit, in_contact).verdict != Verdict::fits) {
     return {};
   }

@@ -4,7 +4,7 @@
 #include <span>
 #include <string>
 
-#include "palpate/touch.hpp"
+#include "model/touch_evidence.hpp"
 #include "recognition/recognition_record.hpp"
 #include "recognition/recognition_task.hpp"
 
@@ -19,7 +19,7 @@ namespace palpate {
 /// @param touches all touches of the unknown so far
 /// @param step what the filter believes after them; reads mode, pose and fit
 /// @param surprises of the touches so far; see SurpriseJudge
-std::optional<std::string> touches_contradict(std::span<const Touch> touches,
+std::optional<std::string> touches_contradict(std::span<const TouchEvidence> touches,
                                               const RecognitionTask& task,
                                               const RecognitionStep& step,
                                               std::span<const double> surprises);

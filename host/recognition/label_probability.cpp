@@ -17,14 +17,15 @@ double log_sum(double a, double b) {
   return most == log_zero ? log_zero : most + std::log1p(std::exp(std::min(a, b) - most));
 }
 
-std::vector<double> feature_nats(std::span<const Touch> touches, const RecognitionTask& task) {
+std::vector<double> feature_nats(std::span<const TouchEvidence> touches,
+                                 const RecognitionTask& task) {
   std::vector<double> nats(task.labels.size());
   if (!task.features) {
     return nats;
   }
   const LearnedFeatures& learned = *task.features;
-  for (const Touch& touch : touches) {
-    const PressFeatures features = press_features(touch, task.classifier());
+  for (const TouchEvidence& touch : touches) {
+    const PressFeatures features = press_features(touch, task.classifier().threshold);
     if (features.values[0] == 0.0) {  // the log of 1 + no element
       continue;
     }
@@ -58,7 +59,7 @@ std::vector<double> label_log_evidence(const Estimate& estimate, const Recogniti
   return logs;
 }
 
-Tempering tempering_of(std::span<const Touch> touches, const RecognitionTask& task) {
+Tempering tempering_of(std::span<const TouchEvidence> touches, const RecognitionTask& task) {
   return {temperature_of(std::max<std::size_t>(touches.size(), 1), task.temperature,
                          task.temperature_growth),
           feature_nats(touches, task)};

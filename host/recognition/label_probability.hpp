@@ -4,8 +4,8 @@
 #include <span>
 #include <vector>
 
+#include "model/touch_evidence.hpp"
 #include "palpate/estimate.hpp"
-#include "palpate/touch.hpp"
 #include "recognition/recognition_task.hpp"
 
 namespace palpate {
@@ -14,8 +14,9 @@ namespace palpate {
 /// the touches of the log density by the label's distribution above that by the distribution of any
 /// object. Only touches with an element In Contact count. 0 for none_label, whose presses are those
 /// of any object, and for all where the task has no features.
-/// @throws Error on a touch that is not sound, or features beside a threshold of 0
-std::vector<double> feature_nats(std::span<const Touch> touches, const RecognitionTask& task);
+/// @throws Error on features beside a threshold of 0
+std::vector<double> feature_nats(std::span<const TouchEvidence> touches,
+                                 const RecognitionTask& task);
 
 /// The sums of Estimate::identity over the maps of every label, [label]: the probabilities at
 /// temperature 1 and without features.
@@ -37,7 +38,7 @@ struct Tempering {
   }
 };
 /// @throws Error as feature_nats()
-Tempering tempering_of(std::span<const Touch> touches, const RecognitionTask& task);
+Tempering tempering_of(std::span<const TouchEvidence> touches, const RecognitionTask& task);
 
 /// The probability of every label: E^(1 / temperature) exp(features), normalised; by
 /// sums_by_label() where nothing changes them. Where the task has none_label and `known` is given,

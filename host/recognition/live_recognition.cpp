@@ -275,7 +275,6 @@ Touch LiveRecognition::view_of(const DetectedTouch& touch) const {
 void LiveRecognition::use(const Job& job) {
   if (!job.touch) {
     recogniser_.reset();
-    used_.clear();
     const std::lock_guard lock(mutex_);
     if (state_.touches > 0) {  // one that was never touched is the same still
       ++state_.unknown;
@@ -288,15 +287,10 @@ void LiveRecognition::use(const Job& job) {
     recogniser_.prepare(view_of(*job.touch));
     return;
   }
-  const std::size_t before = used_.size();
-  used_.push_back(*job.touch);
-  std::vector<Touch> touches;
-  for (const DetectedTouch& touch : used_) {
-    touches.push_back(view_of(touch));
-  }
+  const Touch touch = view_of(*job.touch);
   const GroundTruth truth = ground_truth(description_.object, description_.truth);
   LiveTouch result{.touch = *job.touch,
-                   .step = take_step(recogniser_, task_, touches, before, truth),
+                   .step = take_step(recogniser_, task_, std::span(&touch, 1), truth),
                    .frames_lost = job.frames_lost};
   result.latency_ms = std::chrono::duration<double, std::milli>(Clock::now() - job.taken).count();
   {

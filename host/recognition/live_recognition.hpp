@@ -144,8 +144,6 @@ class LiveRecognition {
   bool was_touching_ = false;
   std::optional<double> candidate_begin_s_;
 
-  std::deque<DetectedTouch> used_;  ///< the touches of this unknown; of the believing thread alone
-
   std::thread reader_;
   std::thread believer_;
 };

@@ -2,11 +2,14 @@
 
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <span>
-#include <variant>
+#include <string>
 #include <vector>
 
+#include "model/touch_evidence.hpp"
+#include "recognition/filter.hpp"
 #include "recognition/recognition_task.hpp"
 #include "recognition/surprise.hpp"
 
@@ -16,9 +19,9 @@ namespace palpate {
 /// and ParticleFilter do.
 class Recogniser {
  public:
-  Recogniser(Device& device, const RecognitionTask& task);
-  /// By bounds on the host, without a device.
-  explicit Recogniser(const RecognitionTask& task);
+  Recogniser(Device& device, const RecognitionTask& task) : Recogniser(&device, task) {}
+  /// By bounds, which need no device.
+  explicit Recogniser(const RecognitionTask& task) : Recogniser(nullptr, task) {}
 
   /// Forgets all touches, for the next unknown. Particles start from the same places again; bounds
   /// keep their tables. An automatic pivot returns to the robot frame's origin until a touch places
@@ -30,38 +33,37 @@ class Recogniser {
   /// `progress` is called now and then with the fraction done.
   void update(std::span<const Touch> touches, const std::function<void(double)>& progress = {});
   /// Evaluates a touch that is likely to come next; see PoseHistogram::prepare(). Does nothing
-  /// with a touch that would wait for an automatic pivot, nothing for bounds, which search only
-  /// once they are asked, and nothing for particles: they cannot be weighed ahead, since weighing
-  /// follows resampling and noise.
+  /// with a touch that would wait for an automatic pivot, and nothing where Filter::prepare() does
+  /// not.
   void prepare(const Touch& touch);
-  Estimate estimate() const;
+  Estimate estimate() const { return filter_->estimate(); }
   /// The refined pose near the mode; empty for particles.
-  std::optional<RefinedPose> refine(const Mode& mode) const;
+  std::optional<RefinedPose> refine(const Mode& mode) const { return filter_->refine(mode); }
   /// ParticleFilter::effective_sample_size(); empty without particles.
-  std::optional<double> effective_sample_size() const;
-  /// sample() of the histogram or of the bounded posterior; for particles, draws by their weights.
-  std::vector<PoseSample> sample(std::size_t count, std::uint64_t seed) const;
+  std::optional<double> effective_sample_size() const { return filter_->effective_sample_size(); }
+  std::vector<PoseSample> sample(std::size_t count, std::uint64_t seed) const {
+    return filter_->sample(count, seed);
+  }
   /// Whether the belief has taken in a touch since reset(). Touches that wait for an automatic
   /// pivot do not count.
   bool touched() const { return touched_; }
+  /// All touches since reset(), in order, those that wait for an automatic pivot included.
+  std::span<const TouchEvidence> evidence() const { return evidence_; }
   /// Judges touches by the recogniser's task; made at the first call. Not for particles.
   const SurpriseJudge& surprise_judge(const RecognitionTask& task);
   /// Keeps the surprise of a touch until reset().
   void note_surprise(double surprise) { surprises_.push_back(surprise); }
   /// What note_surprise() was given since reset(), in order.
   std::span<const double> surprises() const { return surprises_; }
-  /// Marginal probabilities of one object's poses: a histogram's over the task's lattice, those of
-  /// other filters over its marginal_grid(). A particle counts in the nearest bin.
-  Marginals marginals(int object) const;
+  /// See Filter::marginals().
+  Marginals marginals(int object) const { return filter_->marginals(object, lattice_); }
   /// The task's lattice about the pivot in use.
   const PoseLattice& lattice() const { return lattice_; }
-  /// Device memory held, in bytes; none by bounds, which BoundedPosterior::host_bytes() tells of.
-  std::uint64_t device_bytes() const;
-
-  /// The histogram; nullptr where the filter is another.
-  const PoseHistogram* histogram() const { return std::get_if<PoseHistogram>(&filter_); }
-  /// The bounded posterior; nullptr where the filter is another.
-  const BoundedPosterior* bounded() const { return std::get_if<BoundedPosterior>(&filter_); }
+  std::string path() const { return filter_->path(); }
+  std::uint64_t device_bytes() const { return filter_->device_bytes(); }
+  std::uint64_t host_bytes() const { return filter_->host_bytes(); }
+  /// See Filter::histogram().
+  const PoseHistogram* histogram() const { return filter_->histogram(); }
 
  private:
   /// A copy of a touch that waits for the pivot.
@@ -74,21 +76,23 @@ class Recogniser {
 
   /// Whether an automatic pivot has yet to be placed.
   bool lacks_pivot() const { return auto_pivot_ && !pivot_placed_; }
-  /// Whether the touch has an element In Contact.
-  bool meets_object(const Touch& touch) const;
   /// Moves the pivot to the array's centre.
-  void place_pivot(const Touch& touch);
+  void place_pivot(const TouchEvidence& touch);
   void move_pivot(const glm::dvec2& pivot_mm);
 
+  Recogniser(Device* device, const RecognitionTask& task);
+
+  FilterTraits traits_;
   PoseLattice lattice_;
-  ContactClassifier classifier_;
+  ContactModel contact_;
   bool auto_pivot_;
-  bool pivot_placed_ = false;          ///< by a touch since reset(); only where it is automatic
+  bool pivot_placed_ = false;  ///< by a touch since reset(); only where it is automatic
+  std::vector<TouchEvidence> evidence_;
   std::vector<WaitingTouch> waiting_;  ///< in order; empty once the pivot is placed
   bool touched_ = false;               ///< since reset()
   std::vector<double> surprises_;      ///< since reset()
   std::optional<SurpriseJudge> surprise_judge_;
-  std::variant<PoseHistogram, BoundedPosterior, ParticleFilter> filter_;
+  std::unique_ptr<Filter> filter_;
 };
 
 }  // namespace palpate

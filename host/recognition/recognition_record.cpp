@@ -54,9 +54,9 @@ struct Updated {
 Updated update(Recogniser& recogniser, const RecognitionTask& task, std::span<const Touch> touches,
                const std::function<void(double)>& progress) {
   constexpr std::uint64_t seed = 0;
-  const bool measures = !std::holds_alternative<ParticleOptions>(task.filter) &&
-                        (recogniser.bounded() == nullptr || searches_for_surprise(task) ||
-                         (recogniser.touched() && touches.size() == 1));
+  const FilterTraits traits = traits_of(task.filter);
+  const bool measures = traits.bins && (traits.every_bin || searches_for_surprise(task) ||
+                                        (recogniser.touched() && touches.size() == 1));
   // Nothing but the prior comes before the first touch.
   const std::size_t before = recogniser.touched() ? 0 : 1;
   const std::size_t one_by_one =
@@ -66,7 +66,7 @@ Updated update(Recogniser& recogniser, const RecognitionTask& task, std::span<co
     const Clock::time_point start = Clock::now();
     const auto show = [&, n = static_cast<double>(touches.size())](double fraction) {
       // Bounds have only kept the touches, and search when they are asked about the belief.
-      const double taken = recogniser.bounded() == nullptr ? fraction : 0.0;
+      const double taken = traits.certificate ? 0.0 : fraction;
       progress((static_cast<double>(begin) + taken * static_cast<double>(end - begin)) / n);
     };
     recogniser.update(touches.subspan(begin, end - begin),
@@ -83,9 +83,9 @@ Updated update(Recogniser& recogniser, const RecognitionTask& task, std::span<co
       samples = recogniser.sample(surprise_samples(touches[i].elements_mm.size()), seed);
     }
     take(i, i + 1);
-    updated.surprise = samples.empty()
-                           ? std::nullopt
-                           : recogniser.surprise_judge(task).surprise_of(touches[i], samples);
+    updated.surprise = samples.empty() ? std::nullopt
+                                       : recogniser.surprise_judge(task).surprise_of(
+                                             recogniser.evidence().back(), samples);
     if (updated.surprise) {
       recogniser.note_surprise(*updated.surprise);
     }
@@ -93,31 +93,24 @@ Updated update(Recogniser& recogniser, const RecognitionTask& task, std::span<co
   return updated;
 }
 
-bool meets_an_object(const Touch& touch, const RecognitionTask& task) {
-  const std::vector<Reading> readings = task.classifier().classify(touch);
-  return std::any_of(readings.begin(), readings.end(), is_contact);
-}
-
 /// RecognitionStep::known
-std::optional<double> known_of(const Estimate& estimate, std::span<const Touch> touches,
+std::optional<double> known_of(const Estimate& estimate, std::span<const TouchEvidence> touches,
                                const RecognitionTask& task) {
-  if (!tells_known(task) || touches.size() != 1 || !meets_an_object(touches.front(), task)) {
+  if (!tells_known(task) || touches.size() != 1 || !touches.front().in_contact()) {
     return {};
   }
   std::vector<double> evidence = label_log_evidence(estimate, task);
   if (task.labels.back() == none_label) {
     evidence.pop_back();
   }
-  return task.familiarity->probability(FamiliarityScore::of(
-      task.contact().classify(touches.front()), estimate.mode.log_likelihood, evidence));
+  return task.familiarity->probability(
+      FamiliarityScore::of(touches.front().readings, estimate.mode.log_likelihood, evidence));
 }
 
 /// RecognitionStep::fit
-std::optional<Fit> fit_of(const RecognitionStep& step, std::span<const Touch> touches,
+std::optional<Fit> fit_of(const RecognitionStep& step, std::span<const TouchEvidence> touches,
                           const RecognitionTask& task) {
-  const auto in_contact = std::count_if(touches.begin(), touches.end(), [&](const Touch& touch) {
-    return meets_an_object(touch, task);
-  });
+  const auto in_contact = std::ranges::count_if(touches, &TouchEvidence::in_contact);
   if (in_contact == 0) {
     return {};
   }
@@ -125,7 +118,7 @@ std::optional<Fit> fit_of(const RecognitionStep& step, std::span<const Touch> to
   const OccupancyGrid& map = task.hypotheses[object].compared();
   const std::optional<Fit> fit =
       step.refined
-          ? palpate::fit_of(touches, step.pose(), map, task.contact(), task.touch_sd(), object)
+          ? evidence_fit(touches, step.pose(), map, task.contact(), task.touch_sd(), object)
           : best_fit_near(touches, step.pose(), map, task.contact(), object);
   return task.fit_scale.of(fit.value(), static_cast<std::size_t>(in_contact));
 }
@@ -184,7 +177,7 @@ void RecognitionRecord::require_steps() const {
 }
 
 RecognitionStep judge(const Estimate& estimate, const GroundTruth& truth,
-                      const RecognitionTask& task, std::span<const Touch> touches) {
+                      const RecognitionTask& task, std::span<const TouchEvidence> touches) {
   const std::vector<std::string>& labels = task.labels;
   const Tempering tempering = tempering_of(touches, task);
   const std::optional<double> known = known_of(estimate, touches, task);
@@ -209,13 +202,14 @@ RecognitionStep judge(const Estimate& estimate, const GroundTruth& truth,
 }
 
 RecognitionStep take_step(Recogniser& recogniser, const RecognitionTask& task,
-                          std::span<const Touch> touches, std::size_t used,
-                          const GroundTruth& truth, const std::function<void(double)>& progress) {
-  const Updated updated = update(recogniser, task, touches.subspan(used), progress);
+                          std::span<const Touch> touches, const GroundTruth& truth,
+                          const std::function<void(double)>& progress) {
+  const Updated updated = update(recogniser, task, touches, progress);
   const Clock::time_point start = Clock::now();
   const Estimate estimate = recogniser.estimate();
   const double seconds = updated.seconds + seconds_since(start);
-  RecognitionStep step = judge(estimate, truth, task, touches);
+  const std::span<const TouchEvidence> evidence = recogniser.evidence();
+  RecognitionStep step = judge(estimate, truth, task, evidence);
   step.surprise = updated.surprise;
   step.seconds = seconds;
   const Clock::time_point estimated = Clock::now();
@@ -225,11 +219,11 @@ RecognitionStep take_step(Recogniser& recogniser, const RecognitionTask& task,
     step.refined_error_mm = error_mm(task, step.mode.object, step.refined->T_object_robot, truth);
   }
   step.effective_sample_size = recogniser.effective_sample_size();
-  step.fit = fit_of(step, touches, task);
-  step.warnings = warnings_about(touches, task, recogniser.lattice(), step);
+  step.fit = fit_of(step, evidence, task);
+  step.warnings = warnings_about(evidence, task, recogniser.lattice(), step);
   if (step.warnings.empty()) {
     for (auto warning : {turned_alike(recogniser, task, step, truth),
-                         touches_contradict(touches, task, step, recogniser.surprises())}) {
+                         touches_contradict(evidence, task, step, recogniser.surprises())}) {
       if (warning) {
         step.warnings.push_back(*std::move(warning));
       }
@@ -267,9 +261,9 @@ RecognitionRecord recognise(Recogniser& recogniser, const RecognitionTask& task,
         progress_threw = false;
       };
       record.trace.push_back(
-          take_step(recogniser, task, touches.first(done + together), done, unknown.truth,
+          take_step(recogniser, task, touches.subspan(done, together), unknown.truth,
                     progress ? std::function<void(double)>(show) : std::function<void(double)>()));
-      if (progress && recogniser.bounded() != nullptr) {
+      if (progress && traits_of(task.filter).certificate) {
         show(1.0);
       }
     }

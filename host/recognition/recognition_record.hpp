@@ -111,17 +111,15 @@ struct RecognitionRecord {
 /// @param touches of the unknown so far, for the task's features and temperature, which is that of
 /// one touch where none are given
 RecognitionStep judge(const Estimate& estimate, const GroundTruth& truth,
-                      const RecognitionTask& task, std::span<const Touch> touches = {});
+                      const RecognitionTask& task, std::span<const TouchEvidence> touches = {});
 
-/// Updates the belief with the touches from `used` on, then judges the estimate and its refined
+/// Updates the belief with more touches of the unknown, then judges the estimate and its refined
 /// pose. Of these touches a histogram takes the last three one by one, to measure their surprise;
 /// the belief is the same, bit for bit.
-/// @param touches all touches of the unknown so far
-/// @param used the number of those that the recogniser has already
+/// @param touches those that the recogniser has not yet taken
 /// @throws Error as Recogniser::update() does
 RecognitionStep take_step(Recogniser& recogniser, const RecognitionTask& task,
-                          std::span<const Touch> touches, std::size_t used,
-                          const GroundTruth& truth,
+                          std::span<const Touch> touches, const GroundTruth& truth,
                           const std::function<void(double)>& progress = {});
 
 /// Recognises one unknown; what the recogniser believed before is forgotten. Where the unknown is

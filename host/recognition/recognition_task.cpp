@@ -7,7 +7,7 @@
 
 #include <fmt/format.h>
 
-#include "estimation/bounded/search_memory.hpp"
+#include "estimation/bounded/search/search_memory.hpp"
 
 namespace palpate {
 
@@ -97,7 +97,7 @@ std::optional<CoarsenedBins> settle_bins(const Device& device, RecognitionTask& 
   }
   const auto* histogram = std::get_if<HistogramOptions>(&task.filter);
   std::int64_t most = most_bins_on(device, false);
-  if (std::holds_alternative<BoundedOptions>(task.filter) ||
+  if (traits_of(task.filter).certificate ||
       (histogram != nullptr && task.auto_filter && bounded_instead(*histogram))) {
     most = most_bounded_bins;
   } else if (histogram != nullptr) {
@@ -113,7 +113,7 @@ std::optional<CoarsenedBins> settle_bins(const Device& device, RecognitionTask& 
 }
 
 std::string wider_bins_sentence(const RecognitionTask& task) {
-  if (!task.learned_bins || std::holds_alternative<ParticleOptions>(task.filter)) {
+  if (!task.learned_bins || !traits_of(task.filter).bins) {
     return "";
   }
   constexpr double much = 1.5;
@@ -137,7 +137,7 @@ std::string wider_bins_sentence(const RecognitionTask& task) {
 }
 
 bool tells_known(const RecognitionTask& task) {
-  return task.familiarity && !std::holds_alternative<ParticleOptions>(task.filter);
+  return task.familiarity && traits_of(task.filter).bins;
 }
 
 void settle_evidence(RecognitionTask& task) {

@@ -5,21 +5,15 @@
 #include <functional>
 #include <optional>
 #include <string>
-#include <variant>
 #include <vector>
 
 #include "palpate/balanced_lattice.hpp"
-#include "palpate/bounded_posterior.hpp"
 #include "palpate/device.hpp"
 #include "palpate/learned_sensor.hpp"
-#include "palpate/particle_filter.hpp"
 #include "palpate/pose_error.hpp"
-#include "palpate/pose_histogram.hpp"
+#include "recognition/filter.hpp"
 
 namespace palpate {
-
-/// The filter that recognises, by its options.
-using FilterOptions = std::variant<HistogramOptions, BoundedOptions, ParticleOptions>;
 
 /// The objects that an unknown may be, and the filter that tells which. The constructor derives the
 /// labels and bodies; neither the hypotheses nor the filter's none_weight may change afterwards.

@@ -35,17 +35,10 @@ SurpriseJudge::SurpriseJudge(const RecognitionTask& task)
   }
 }
 
-std::optional<double> SurpriseJudge::surprise_of(const Touch& touch,
+std::optional<double> SurpriseJudge::surprise_of(const TouchEvidence& touch,
                                                  std::span<const PoseSample> samples) const {
-  std::vector<glm::dvec2> elements_mm;
-  std::vector<Reading> readings;
-  const std::vector<Reading> classes = contact_.classify(touch);
-  for (std::size_t e = 0; e < classes.size(); ++e) {
-    if (classes[e] != Reading::unknown) {
-      elements_mm.push_back(touch.elements_mm[e]);
-      readings.push_back(classes[e]);
-    }
-  }
+  const TouchEvidence known = touch.known();
+  const std::vector<Reading>& readings = known.readings;
   if (readings.empty()) {
     return {};
   }
@@ -63,7 +56,7 @@ std::optional<double> SurpriseJudge::surprise_of(const Touch& touch,
     if (!touch_sd_.none()) {
       T_object_sensor = T_object_sensor * random_displacement(touch_sd_, random);
     }
-    predictor_.predict(object, T_object_sensor, elements_mm, logs, 1);
+    predictor_.predict(object, T_object_sensor, known.elements_mm, logs, 1);
     mixture.set(i, std::span<const float>(logs));
   }
   const Moments predicted = predicted_log_mean(mixture, mixture, random);

@@ -6,9 +6,9 @@
 #include <vector>
 
 #include "estimation/lattice/reading_predictor.hpp"
+#include "model/touch_evidence.hpp"
 #include "palpate/contact_model.hpp"
 #include "palpate/estimate.hpp"
-#include "palpate/touch.hpp"
 #include "recognition/recognition_task.hpp"
 
 namespace palpate {
@@ -39,8 +39,8 @@ class SurpriseJudge {
   /// and the chance that is left is about 1 / sqrt(samples).
   /// @param samples of the belief before the touch, at least 2
   /// @returns none where no element is known
-  /// @throws Error on a touch that is not sound
-  std::optional<double> surprise_of(const Touch& touch, std::span<const PoseSample> samples) const;
+  std::optional<double> surprise_of(const TouchEvidence& touch,
+                                    std::span<const PoseSample> samples) const;
 
  private:
   DisplacementSd touch_sd_;

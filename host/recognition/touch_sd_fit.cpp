@@ -26,11 +26,10 @@ struct Start {
 
 /// The task's histogram, with displacements as the search begins and bins that resolve them.
 HistogramOptions histogram_of(const RecognitionTask& task, const DisplacementSd& start) {
-  const auto* histogram = std::get_if<HistogramOptions>(&task.filter);
-  if (histogram == nullptr) {
+  if (!traits_of(task.filter).every_bin) {
     throw Error(Fault::input, "fit of touch-sd: needs the belief of all poses; use a histogram");
   }
-  HistogramOptions options = *histogram;
+  auto options = std::get<HistogramOptions>(task.filter);
   options.none_weight.reset();
   options.slip_sd = {};
   options.touch_sd = start;

@@ -33,27 +33,16 @@ std::string touches_in_words(std::size_t touches) {
 
 /// Whether two touches felt something else: whether more than a tenth of the elements that both
 /// know read differently.
-bool differ(const std::vector<Reading>& a, const std::vector<Reading>& b) {
+bool differ(const TouchEvidence& a, const TouchEvidence& b) {
   std::size_t known = 0;
   std::size_t different = 0;
-  for (std::size_t i = 0; i < std::min(a.size(), b.size()); ++i) {
-    if (a[i] != Reading::unknown && b[i] != Reading::unknown) {
+  for (std::size_t i = 0; i < std::min(a.readings.size(), b.readings.size()); ++i) {
+    if (a.readings[i] != Reading::unknown && b.readings[i] != Reading::unknown) {
       ++known;
-      different += a[i] != b[i] ? 1 : 0;
+      different += is_contact(a.readings[i]) != is_contact(b.readings[i]) ? 1 : 0;
     }
   }
   return 10 * different > known;
-}
-
-/// Place of the array's middle in the robot frame.
-glm::dvec2 middle_of(const Touch& touch) {
-  return touch.T_robot_sensor * array_centre_mm(touch.elements_mm);
-}
-
-/// Whether the touch has an element In Contact.
-bool in_contact(const Touch& touch, const ContactClassifier& classifier) {
-  const std::vector<Reading> readings = classifier.classify(touch);
-  return std::any_of(readings.begin(), readings.end(), is_contact);
 }
 
 /// Distance by which the poses of a region keep an array from a map, or 0 or less where some pose
@@ -74,8 +63,7 @@ double gap_mm(const glm::dvec2& from_pivot_mm, double array_mm, const BoundingBo
 
 }  // namespace
 
-std::optional<std::string> positions_in_metres(std::span<const Touch> touches,
-                                               const ContactClassifier& classifier) {
+std::optional<std::string> positions_in_metres(std::span<const TouchEvidence> touches) {
   // Arms reach 2 m, and touches of one object lie within 1 m. Presses in one place differ by less
   // than 0.001 mm where they are copies of one number. In mm, presses within 1 mm and 2 mm from the
   // origin would all feel alike.
@@ -87,7 +75,7 @@ std::optional<std::string> positions_in_metres(std::span<const Touch> touches,
     return {};
   }
   BoundingBox positions;
-  for (const Touch& touch : touches) {
+  for (const TouchEvidence& touch : touches) {
     positions.take_in(touch.T_robot_sensor.translation_mm);
   }
   const double span = positions.diagonal();
@@ -95,12 +83,11 @@ std::optional<std::string> positions_in_metres(std::span<const Touch> touches,
   if (!(std::max(farthest.x, farthest.y) < reach && span < widest && span > narrowest)) {
     return {};
   }
-  const std::vector<Reading> first = classifier.classify(touches.front());
-  const bool alike = std::all_of(touches.begin(), touches.end(), [&](const Touch& touch) {
+  const bool alike = std::all_of(touches.begin(), touches.end(), [&](const TouchEvidence& touch) {
     const double turn_rad =
         wrap_angle(touch.T_robot_sensor.theta_rad - touches.front().T_robot_sensor.theta_rad,
                    2.0 * std::numbers::pi);
-    return std::abs(turn_rad) < same_angle_rad && !differ(classifier.classify(touch), first);
+    return std::abs(turn_rad) < same_angle_rad && !differ(touch, touches.front());
   });
   if (alike) {
     return {};
@@ -112,9 +99,9 @@ std::optional<std::string> positions_in_metres(std::span<const Touch> touches,
       span, touches_in_words(touches.size()));
 }
 
-std::optional<std::string> angles_in_degrees(std::span<const Touch> touches) {
-  const auto [least, most] =
-      std::minmax_element(touches.begin(), touches.end(), [](const Touch& a, const Touch& b) {
+std::optional<std::string> angles_in_degrees(std::span<const TouchEvidence> touches) {
+  const auto [least, most] = std::minmax_element(
+      touches.begin(), touches.end(), [](const TouchEvidence& a, const TouchEvidence& b) {
         return a.T_robot_sensor.theta_rad < b.T_robot_sensor.theta_rad;
       });
   const double least_rad = least->T_robot_sensor.theta_rad;
@@ -130,7 +117,7 @@ std::optional<std::string> angles_in_degrees(std::span<const Touch> touches) {
       largest->T_robot_sensor.theta_rad, largest - touches.begin() + 1);
 }
 
-std::optional<std::string> other_scale(std::span<const Touch> touches,
+std::optional<std::string> other_scale(std::span<const TouchEvidence> touches,
                                        const RecognitionTask& task) {
   const std::span<const glm::dvec2> elements_mm = touches.front().elements_mm;
   if (elements_mm.size() < 2) {
@@ -158,25 +145,19 @@ std::optional<std::string> other_scale(std::span<const Touch> touches,
   return {};
 }
 
-std::optional<std::string> nothing_felt(std::span<const Touch> touches,
-                                        const ContactClassifier& classifier) {
+std::optional<std::string> nothing_felt(std::span<const TouchEvidence> touches, double threshold) {
   constexpr std::size_t few = 3;  // a touch or two may well miss the object, or lie wholly on it
   bool contact = false;
   bool none = false;
   double largest = -std::numeric_limits<double>::infinity();
   double least = std::numeric_limits<double>::infinity();
-  for (const Touch& touch : touches) {
-    const std::vector<Reading> readings = classifier.classify(touch);
-    for (std::size_t i = 0; i < readings.size(); ++i) {
-      contact = contact || is_contact(readings[i]);
-      none = none || readings[i] == Reading::no_contact;
-      if ((touch.valid.empty() || touch.valid[i] != 0) && !std::isnan(touch.pressure[i])) {
-        largest = std::max(largest, touch.pressure[i]);
-        least = std::min(least, touch.pressure[i]);
-      }
-    }
+  for (const TouchEvidence& touch : touches) {
+    contact = contact || touch.in_contact();
+    none = none || std::ranges::count(touch.readings, Reading::no_contact) > 0;
+    largest = std::max(largest, touch.largest_pressure);
+    least = std::min(least, touch.least_pressure);
     // Eq. 3 compares a single element with itself, and so never finds it out of contact.
-    if (contact && (none || readings.size() == 1)) {
+    if (contact && (none || touch.readings.size() == 1)) {
       return {};
     }
   }
@@ -190,7 +171,7 @@ std::optional<std::string> nothing_felt(std::span<const Touch> touches,
   const std::string evidence = fmt::format(
       "pressures range from {:.3g} to {:.3g}, and the contact threshold is {:.3g}, in the "
       "recording's unit",
-      least, largest, classifier.threshold);
+      least, largest, threshold);
   if (touches.size() < few) {
     return {};
   }
@@ -210,20 +191,20 @@ std::optional<std::string> nothing_felt(std::span<const Touch> touches,
                        over, evidence);
 }
 
-std::optional<std::string> out_of_reach(std::span<const Touch> touches, const RecognitionTask& task,
-                                        const PoseLattice& region) {
+std::optional<std::string> out_of_reach(std::span<const TouchEvidence> touches,
+                                        const RecognitionTask& task, const PoseLattice& region) {
   std::size_t contacts = 0;
   std::size_t beyond = 0;
   double nearest_mm = std::numeric_limits<double>::infinity();
   BoundingBox cells;           // of the nearest map
   double array_mm = 0.0;       // of a touch out of reach
   glm::dvec2 middles_mm{0.0};  // sum over the touches out of reach
-  for (const Touch& touch : touches) {
-    if (!in_contact(touch, task.classifier())) {
+  for (const TouchEvidence& touch : touches) {
+    if (!touch.in_contact()) {
       continue;
     }
     ++contacts;
-    const glm::dvec2 middle_mm = middle_of(touch);
+    const glm::dvec2 middle_mm = touch.middle_mm();
     const double diagonal_mm = bounding_box(touch.elements_mm).diagonal();
     double gap = std::numeric_limits<double>::infinity();
     BoundingBox nearest;

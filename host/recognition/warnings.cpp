@@ -48,17 +48,13 @@ Place variances_of(const RefinedPose& refined, const PoseLattice& lattice) {
 
 /// Whether enough elements were in contact to tell one place from another. After fewer, the best
 /// pose lies anywhere in the region, its edges included.
-bool felt_enough(std::span<const Touch> touches, const ContactClassifier& classifier) {
-  constexpr std::ptrdiff_t enough = 24;  // two to three touches of a letter by the 6 x 6 array
-  std::ptrdiff_t contacts = 0;
-  for (const Touch& touch : touches) {
-    const std::vector<Reading> readings = classifier.classify(touch);
-    contacts += std::count_if(readings.begin(), readings.end(), is_contact);
-    if (contacts >= enough) {
-      return true;
-    }
+bool felt_enough(std::span<const TouchEvidence> touches) {
+  constexpr std::size_t enough = 24;  // two to three touches of a letter by the 6 x 6 array
+  std::size_t contacts = 0;
+  for (const TouchEvidence& touch : touches) {
+    contacts += touch.contacts;
   }
-  return false;
+  return contacts >= enough;
 }
 
 /// The refined pose's standard deviations are those of a bin, since the bins are too wide for the
@@ -107,8 +103,9 @@ std::optional<std::string> coarse_bins(const RecognitionTask& task, const PoseLa
 }
 
 /// The best pose lies at an end of an axis.
-std::optional<std::string> at_the_edge(std::span<const Touch> touches, const RecognitionTask& task,
-                                       const PoseLattice& lattice, const RecognitionStep& step) {
+std::optional<std::string> at_the_edge(std::span<const TouchEvidence> touches,
+                                       const RecognitionTask& task, const PoseLattice& lattice,
+                                       const RecognitionStep& step) {
   if (!step.refined || !step.mode.bin) {
     return {};
   }
@@ -131,8 +128,7 @@ std::optional<std::string> at_the_edge(std::span<const Touch> touches, const Rec
     }
     // Between the bins the pose may lie well inside, as that of an object within the region does.
     const double inside = first ? place[i] - axis.lower : axis.upper - place[i];
-    if (inside > std::max(axis.step(), std::sqrt(variances[i])) ||
-        !felt_enough(touches, task.classifier())) {
+    if (inside > std::max(axis.step(), std::sqrt(variances[i])) || !felt_enough(touches)) {
       continue;
     }
     const double unit = i < 2 ? 1.0 : degrees_per_rad;
@@ -154,17 +150,18 @@ std::optional<std::string> at_the_edge(std::span<const Touch> touches, const Rec
 
 }  // namespace
 
-std::vector<std::string> warnings_about(std::span<const Touch> touches, const RecognitionTask& task,
-                                        const PoseLattice& lattice, const RecognitionStep& step) {
+std::vector<std::string> warnings_about(std::span<const TouchEvidence> touches,
+                                        const RecognitionTask& task, const PoseLattice& lattice,
+                                        const RecognitionStep& step) {
   std::vector<std::string> warnings;
   const auto add = [&](std::optional<std::string> warning) {
     if (warning) {
       warnings.push_back(*std::move(warning));
     }
   };
-  add(positions_in_metres(touches, task.classifier()));
+  add(positions_in_metres(touches));
   add(other_scale(touches, task));
-  add(nothing_felt(touches, task.classifier()));
+  add(nothing_felt(touches, task.classifier().threshold));
   add(out_of_reach(touches, task, lattice));
   const std::optional<std::string> degrees = angles_in_degrees(touches);
   // Touches at wrong angles do not fit; where the touches fit, the estimate deserves its warnings.

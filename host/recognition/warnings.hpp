@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "palpate/touch.hpp"
+#include "model/touch_evidence.hpp"
 #include "recognition/recognition_record.hpp"
 #include "recognition/recognition_task.hpp"
 
@@ -13,10 +13,11 @@ namespace palpate {
 /// What looks wrong with an unknown's touches, or else with the lattice on which they were
 /// evaluated. Each warning is a sentence that names the evidence and the remedy. Touches that look
 /// right and lie well within the region give none.
-/// @param touches all touches of the unknown so far, each of them sound
+/// @param touches all touches of the unknown so far
 /// @param lattice the task's, about the pivot in use
 /// @param step what the filter believes after them; its own warnings are not read
-std::vector<std::string> warnings_about(std::span<const Touch> touches, const RecognitionTask& task,
-                                        const PoseLattice& lattice, const RecognitionStep& step);
+std::vector<std::string> warnings_about(std::span<const TouchEvidence> touches,
+                                        const RecognitionTask& task, const PoseLattice& lattice,
+                                        const RecognitionStep& step);
 
 }  // namespace palpate

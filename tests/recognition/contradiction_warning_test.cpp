@@ -25,7 +25,8 @@ class ContradictionWarning : public testing::Test {
   /// The warning, given these surprises.
   std::optional<std::string> said(const Recording& recording, const RecognitionStep& step,
                                   const std::vector<double>& surprises) {
-    return touches_contradict(recording.touches(0, recording.size()), task_, step, surprises);
+    return touches_contradict(evidence_of(recording.touches(0, recording.size()), task_.contact()),
+                              task_, step, surprises);
   }
 
   Device device_ = Device::open();

@@ -80,7 +80,7 @@ TEST(LabelProbability, IsTemperedMoreWithEveryTouch) {
   for (const std::size_t touches : {1U, 2U, 3U}) {
     const std::vector<Touch> all(touches, press.touch());
     const double times = std::pow(4.0, 1.0 / (0.5 + 0.5 * static_cast<double>(touches)));
-    const RecognitionStep step = judge(four_to_one(), {}, task, all);
+    const RecognitionStep step = judge(four_to_one(), {}, task, evidence_of(all, task.contact()));
     EXPECT_NEAR(step.identity[0], times / (times + 1.0), 1e-15) << touches;
   }
 }
@@ -113,7 +113,7 @@ TEST(LabelProbability, AddsWhatEveryPressSaysAfterTheTemperature) {
   estimate.none_log_evidence = 0.0;
   const Press press;
   const std::vector<Touch> two{press.touch(), press.touch()};
-  const RecognitionStep step = judge(estimate, {}, task, two);
+  const RecognitionStep step = judge(estimate, {}, task, evidence_of(two, task.contact()));
   const double of_letter = 2.0 * std::exp(2.0 * nats_of_one_press());
   EXPECT_NEAR(step.identity[0], of_letter / (of_letter + 1.0 + 1.0), 1e-14);
   EXPECT_NEAR(step.identity[1], 1.0 / (of_letter + 1.0 + 1.0), 1e-14) << "as any object";
@@ -127,7 +127,8 @@ TEST(LabelProbability, MayTurnTheMostProbableLabelAround) {
                           .log_evidence = {std::log(0.1), std::log(0.9), -1e9}};
   const Press press;
   const std::vector<Touch> touches{press.touch()};
-  const RecognitionStep step = judge(estimate, {.label = "L"}, task, touches);
+  const RecognitionStep step =
+      judge(estimate, {.label = "L"}, task, evidence_of(touches, task.contact()));
   ASSERT_GT(std::exp(nats_of_one_press()), 9.0 / 2.0);
   const double odds = std::exp(nats_of_one_press()) / 9.0;
   EXPECT_NEAR(step.identity[0] / step.identity[1], odds, 1e-14);
@@ -140,7 +141,8 @@ TEST(LabelProbability, PassesOverTouchesWithoutContact) {
   const std::vector<glm::dvec2> elements_mm(2);
   const std::vector<double> pressure{0.0, 0.5};
   const Touch touch{.T_robot_sensor = {}, .elements_mm = elements_mm, .pressure = pressure};
-  EXPECT_EQ(feature_nats(std::span(&touch, 1), task), std::vector<double>(2));
+  EXPECT_EQ(feature_nats(evidence_of(std::span(&touch, 1), task.contact()), task),
+            std::vector<double>(2));
 }
 
 /// A task in which a press that costs its readings' frequencies and 1 nat is of a learned object
@@ -162,16 +164,17 @@ TEST(LabelProbability, GivesNoneOfTheseWhatASinglePressLeaves) {
   estimate.mode.log_likelihood = by_frequency_and_1();
   const Press press;
   const std::vector<Touch> two{press.touch(), press.touch()};
-  const RecognitionStep step = judge(estimate, {}, task, std::span(two).first(1));
+  const RecognitionStep step =
+      judge(estimate, {}, task, evidence_of(std::span(two).first(1), task.contact()));
   EXPECT_NEAR(step.known.value(), of_known, 1e-15);
   EXPECT_NEAR(step.identity[0], of_known * 2.0 / 3.0, 1e-15);
   EXPECT_NEAR(step.identity[1], of_known / 3.0, 1e-15);
   EXPECT_NEAR(step.identity[2], 1.0 - of_known, 1e-15);
-  const RecognitionStep after_two = judge(estimate, {}, task, two);
+  const RecognitionStep after_two = judge(estimate, {}, task, evidence_of(two, task.contact()));
   EXPECT_FALSE(after_two.known) << "which may disagree";
   EXPECT_EQ(after_two.identity[2], 1.0);
-  const RecognitionStep without =
-      judge(four_to_one(), {}, with_known(HistogramOptions{}), std::span(two).first(1));
+  const RecognitionStep without = judge(four_to_one(), {}, with_known(HistogramOptions{}),
+                                        evidence_of(std::span(two).first(1), task.contact()));
   EXPECT_NEAR(without.identity[0], 2.0 / 3.0, 1e-15) << "without (none), known stands aside";
 }
 
@@ -186,7 +189,7 @@ TEST(LabelBounds, ShareWhatASinglePressLeaves) {
       .none_log_evidence = LogInterval{-1.0, 1.0}};
   const Press press;
   const std::vector<Touch> touches{press.touch()};
-  const RecognitionStep step = judge(estimate, {}, task, touches);
+  const RecognitionStep step = judge(estimate, {}, task, evidence_of(touches, task.contact()));
   ASSERT_EQ(step.identity_bounds.size(), 3u);
   EXPECT_NEAR(step.identity_bounds[0].low, of_known * 2.0 / (2.0 + 2.0), 1e-15);
   EXPECT_NEAR(step.identity_bounds[0].high, of_known * 3.0 / (3.0 + 1.0), 1e-15);
@@ -212,7 +215,7 @@ TEST(LabelBounds, FollowTheTemperatureAndTheFeatures) {
   task.features = features_of_the_letter();
   const Press press;
   const std::vector<Touch> touches{press.touch()};
-  const RecognitionStep with = judge(estimate, {}, task, touches);
+  const RecognitionStep with = judge(estimate, {}, task, evidence_of(touches, task.contact()));
   const double times = std::exp(nats_of_one_press());
   EXPECT_NEAR(with.identity_bounds[0].low, 2.0 * times / (2.0 * times + 2.0), 1e-14);
   EXPECT_NEAR(with.identity_bounds[1].high, 2.0 / (2.0 + 2.0 * times), 1e-14);

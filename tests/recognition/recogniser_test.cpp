@@ -82,7 +82,7 @@ TEST(Recogniser, OfBoundsTellsWhatTheBoundedPosteriorTells) {
   Recogniser recogniser(device, task);
   recogniser.prepare(recording.touch(0));
   recogniser.update(all_touches(recording));
-  BoundedPosterior bounded(device, task.hypotheses, options);
+  BoundedPosterior bounded(task.hypotheses, options);
   bounded.update(all_touches(recording));
 
   const Estimate estimate = bounded.estimate();
@@ -93,7 +93,7 @@ TEST(Recogniser, OfBoundsTellsWhatTheBoundedPosteriorTells) {
             bounded.sample(3, 1)[2].T_object_robot.translation_mm);
   EXPECT_FALSE(recogniser.effective_sample_size());
   EXPECT_EQ(recogniser.histogram(), nullptr);
-  EXPECT_EQ(recogniser.bounded()->lattice().bins(), options.lattice.bins());
+  EXPECT_EQ(recogniser.path(), bounded.path());
   EXPECT_EQ(recogniser.device_bytes(), 0u);
 }
 
@@ -377,7 +377,7 @@ TEST(AutomaticPivot, WaitsForAResetAfterAnUpdateWasBrokenOff) {
                         [](double) { throw std::runtime_error("broken off"); });
     };
     EXPECT_THROW(update(), std::runtime_error);
-    if (recogniser.bounded() == nullptr) {  // bounds take in no touch of a broken update
+    if (!traits_of(task.filter).certificate) {  // bounds take in no touch of a broken update
       EXPECT_THROW(recogniser.update(all_touches(recording)), Error);
     }
     recogniser.reset();

@@ -252,7 +252,7 @@ TEST(TakeStep, JudgesTheRefinedPoseToo) {
   Recogniser recogniser(device, task);
   const Recording letter = touched_letter(9);
   const Unknown unknown = unknown_of(letter);
-  const RecognitionStep step = take_step(recogniser, task, unknown.touches, 0, unknown.truth);
+  const RecognitionStep step = take_step(recogniser, task, unknown.touches, unknown.truth);
   ASSERT_EQ(step.mode.object, 0);
   const OccupancyGrid& map = task.hypotheses[0].map;
   const Pose& truth = letter.truth->T_object_robot;

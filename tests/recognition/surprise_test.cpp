@@ -75,9 +75,11 @@ class ModelledTouches {
       pressure.push_back(reading == Reading::in_contact ? 10.0 : -20.0);
     }
     return SurpriseJudge(task_)
-        .surprise_of(
-            {.T_robot_sensor = T_robot_sensor, .elements_mm = elements_mm, .pressure = pressure},
-            samples)
+        .surprise_of(TouchEvidence({.T_robot_sensor = T_robot_sensor,
+                                    .elements_mm = elements_mm,
+                                    .pressure = pressure},
+                                   task_.contact()),
+                     samples)
         .value();
   }
 
@@ -139,9 +141,11 @@ TEST(Surprise, DoesNotDependOnTheFrameOfAMapWithoutCells) {
     std::vector<double> pressure(36, -20.0);
     std::fill_n(pressure.begin(), 6, 10.0);
     return SurpriseJudge(task)
-        .surprise_of(
-            {.T_robot_sensor = {{3.0, 1.0}, 0.0}, .elements_mm = elements_mm, .pressure = pressure},
-            samples)
+        .surprise_of(TouchEvidence({.T_robot_sensor = {{3.0, 1.0}, 0.0},
+                                    .elements_mm = elements_mm,
+                                    .pressure = pressure},
+                                   task.contact()),
+                     samples)
         .value();
   };
   // The places of elements are rounded in float64, log odds between cells in float32.
@@ -161,7 +165,7 @@ TEST(Surprise, IsNotKnownOfATouchThatSaysNothing) {
   const std::vector<double> pressure(36, 2.0);  // at the threshold
   const Touch touch{.elements_mm = elements_mm, .pressure = pressure};
   const std::vector<PoseSample> samples(8);
-  EXPECT_FALSE(SurpriseJudge(task).surprise_of(touch, samples));
+  EXPECT_FALSE(SurpriseJudge(task).surprise_of(TouchEvidence(touch, task.contact()), samples));
 }
 
 TEST(Surprise, OfLettersTellsMisplacedTouchesFromExactOnes) {
@@ -251,10 +255,10 @@ TEST(Surprise, InVeryManyBinsIsOnlyOfBeliefsThatAreSearchedAnyway) {
   }
   ASSERT_GE(last, 2u);
   const std::span<const Touch> all = touches;
-  EXPECT_FALSE(take_step(recogniser, task, all.first(last + 1), 0, {}, {}).surprise);
+  EXPECT_FALSE(take_step(recogniser, task, all.first(last + 1), {}).surprise);
   recogniser.reset();
-  take_step(recogniser, task, all.first(last), 0, {}, {});
-  EXPECT_TRUE(take_step(recogniser, task, all.first(last + 1), last, {}, {}).surprise);
+  take_step(recogniser, task, all.first(last), {});
+  EXPECT_TRUE(take_step(recogniser, task, all.subspan(last, 1), {}).surprise);
 }
 
 TEST(Surprise, OfTheFirstTouchInContactIsNotKnownEitherAboutAnAutomaticPivot) {

@@ -55,7 +55,7 @@ struct OpenChunk {
 
 /// How many unknowns are recognised at once.
 std::size_t most_at_once(const RecognitionTask& task, std::size_t threads) {
-  if (std::holds_alternative<BoundedOptions>(task.filter)) {
+  if (traits_of(task.filter).certificate) {
     return threads;
   }
   const auto* histogram = std::get_if<HistogramOptions>(&task.filter);

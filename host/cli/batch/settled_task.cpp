@@ -95,7 +95,7 @@ void settle_as_before(const BatchTask& task, RecognitionTask& recognition) {
 }
 
 bool uses_device(const RecognitionTask& recognition) {
-  return !std::holds_alternative<BoundedOptions>(recognition.filter);
+  return !traits_of(recognition.filter).certificate;
 }
 
 void take_threads(RecognitionTask& recognition, std::size_t threads) {

@@ -1,0 +1,58 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include <glm/vec2.hpp>
+
+#include "palpate/contact_model.hpp"
+#include "palpate/displacement.hpp"
+#include "palpate/fit.hpp"
+#include "palpate/learned_sensor.hpp"
+#include "palpate/occupancy_grid.hpp"
+#include "palpate/touch.hpp"
+
+namespace palpate {
+
+/// What a touch says (Eq. 3), classified once. It holds copies: the touch's memory may go. Elements
+/// stay in the sensor frame, since an uncertain touch is displaced with its sensor.
+struct TouchEvidence {
+  /// @throws Error on a touch that is not sound, or a classifier out of range
+  TouchEvidence(const Touch& touch, const ContactModel& contact);
+
+  bool in_contact() const { return contacts > 0; }
+  /// Place of the array's middle in the robot frame.
+  glm::dvec2 middle_mm() const { return T_robot_sensor * array_centre_mm(elements_mm); }
+  /// The evidence without the elements that are Unknown.
+  TouchEvidence known() const;
+
+  Pose T_robot_sensor;
+  std::vector<glm::dvec2> elements_mm;  ///< [e] in the sensor frame
+  std::vector<Reading> readings;        ///< [e]
+  std::vector<std::uint8_t> lives;      ///< [e] 0: dead, or without a number for its pressure
+  std::size_t contacts = 0;             ///< elements In Contact
+  /// Of the elements that live, in the recording's unit; least above largest where none does.
+  double least_pressure = std::numeric_limits<double>::infinity();
+  double largest_pressure = -std::numeric_limits<double>::infinity();
+  double force = 0.0;  ///< sum of the pressures above 0, in contact thresholds
+};
+
+std::vector<TouchEvidence> evidence_of(std::span<const Touch> touches, const ContactModel& contact);
+
+/// press_features() of a touch that is classified.
+/// @param threshold of the classifier
+PressFeatures press_features(const TouchEvidence& touch, double threshold);
+
+/// fit_of() of touches that are classified by `contact`.
+std::optional<Fit> evidence_fit(std::span<const TouchEvidence> touches, const Pose& T_object_robot,
+                                const OccupancyGrid& map, const ContactModel& contact,
+                                std::size_t object);
+std::optional<Fit> evidence_fit(std::span<const TouchEvidence> touches, const Pose& T_object_robot,
+                                const OccupancyGrid& map, const ContactModel& contact,
+                                const DisplacementSd& touch_sd, std::size_t object);
+
+}  // namespace palpate

@@ -1,0 +1,152 @@
+#include "recognition/filter.hpp"
+
+#include <utility>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "model/random.hpp"
+#include "recognition/marginal_grid.hpp"
+
+namespace palpate {
+
+namespace {
+
+/// What all filters have under the same names.
+template <typename Own>
+class FilterOf : public Filter {
+ public:
+  explicit FilterOf(Own own) : own_(std::move(own)) {}
+
+  void reset() override { own_.reset(); }
+  void move_pivot(const glm::dvec2& pivot_mm) override { own_.move_pivot(pivot_mm); }
+  void update(std::span<const Touch> touches,
+              const std::function<void(double)>& progress) override {
+    own_.update(touches, progress);
+  }
+  Estimate estimate() const override { return own_.estimate(); }
+
+ protected:
+  Own own_;
+};
+
+/// What filters with bins have besides.
+template <typename Own>
+class FilterInBins : public FilterOf<Own> {
+ public:
+  using FilterOf<Own>::FilterOf;
+
+  std::optional<RefinedPose> refine(const Mode& mode) const override {
+    return this->own_.refine(mode);
+  }
+  std::vector<PoseSample> sample(std::size_t count, std::uint64_t seed) const override {
+    return this->own_.sample(count, seed);
+  }
+};
+
+class HistogramFilter final : public FilterInBins<PoseHistogram> {
+ public:
+  using FilterInBins::FilterInBins;
+
+  void prepare(const Touch& touch) override { own_.prepare(touch); }
+  Marginals marginals(int object, const PoseLattice& /*lattice*/) const override {
+    return own_.marginals(object);
+  }
+  std::string path() const override { return fmt::format("{}", fmt::join(own_.paths(), "; ")); }
+  std::uint64_t device_bytes() const override { return own_.device_bytes(); }
+  const PoseHistogram* histogram() const override { return &own_; }
+};
+
+class BoundedFilter final : public FilterInBins<BoundedPosterior> {
+ public:
+  using FilterInBins::FilterInBins;
+
+  Marginals marginals(int object, const PoseLattice& lattice) const override {
+    return own_.marginals(object, marginal_grid(lattice));
+  }
+  std::string path() const override { return own_.path(); }
+  std::uint64_t host_bytes() const override { return own_.host_bytes(); }
+};
+
+class Particles final : public FilterOf<ParticleFilter> {
+ public:
+  using FilterOf::FilterOf;
+
+  std::vector<PoseSample> sample(std::size_t count, std::uint64_t seed) const override {
+    const std::vector<ParticleFilter::Particle> particles = own_.particles();
+    double all = 0.0;
+    for (const ParticleFilter::Particle& particle : particles) {
+      all += particle.weight;
+    }
+    Random random(seed, Stream::belief);
+    std::vector<PoseSample> samples;
+    auto particle = particles.begin();
+    double reached = particle->weight;
+    for (std::size_t i = 0; i < count; ++i) {
+      const double at =
+          (static_cast<double>(i) + random.uniform()) / static_cast<double>(count) * all;
+      while (particle + 1 != particles.end() && reached <= at) {
+        reached += (++particle)->weight;
+      }
+      samples.push_back({particle->object, particle->T_object_robot});
+    }
+    return samples;
+  }
+
+  Marginals marginals(int object, const PoseLattice& lattice) const override {
+    const PoseLattice grid = marginal_grid(lattice);
+    Marginals sums{.grid = grid,
+                   .xy = std::vector<double>(static_cast<std::size_t>(grid.plane())),
+                   .theta = std::vector<double>(static_cast<std::size_t>(grid.theta_rad.count))};
+    for (const ParticleFilter::Particle& particle : own_.particles()) {
+      if (particle.object == object) {
+        const std::int64_t bin = grid.bin_of(particle.T_object_robot);
+        sums.xy[bin % grid.plane()] += particle.weight;
+        sums.theta[bin / grid.plane()] += particle.weight;
+      }
+    }
+    return sums;
+  }
+
+  std::optional<double> effective_sample_size() const override {
+    return own_.effective_sample_size();
+  }
+  std::string path() const override { return "particles"; }
+  std::uint64_t device_bytes() const override { return own_.device_bytes(); }
+};
+
+/// By which kind of options, one function for each.
+template <typename... Functions>
+struct Each : Functions... {
+  using Functions::operator()...;
+};
+
+}  // namespace
+
+FilterTraits traits_of(const FilterOptions& options) {
+  return std::visit(
+      Each{[](const HistogramOptions&) { return FilterTraits{.bins = true, .every_bin = true}; },
+           [](const BoundedOptions&) { return FilterTraits{.bins = true, .certificate = true}; },
+           [](const ParticleOptions&) { return FilterTraits{}; }},
+      options);
+}
+
+std::unique_ptr<Filter> make_filter(Device* device, std::span<const Hypothesis> hypotheses,
+                                    const FilterOptions& options) {
+  using Made = std::unique_ptr<Filter>;
+  return std::visit(
+      Each{[&](const HistogramOptions& one) -> Made {
+             return std::make_unique<HistogramFilter>(PoseHistogram(*device, hypotheses, one));
+           },
+           [&](const BoundedOptions& one) -> Made {
+             return std::make_unique<BoundedFilter>(device != nullptr
+                                                        ? BoundedPosterior(*device, hypotheses, one)
+                                                        : BoundedPosterior(hypotheses, one));
+           },
+           [&](const ParticleOptions& one) -> Made {
+             return std::make_unique<Particles>(ParticleFilter(*device, hypotheses, one));
+           }},
+      options);
+}
+
+}  // namespace palpate

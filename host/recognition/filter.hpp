@@ -1,0 +1,72 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "palpate/bounded_posterior.hpp"
+#include "palpate/device.hpp"
+#include "palpate/particle_filter.hpp"
+#include "palpate/pose_histogram.hpp"
+
+namespace palpate {
+
+/// The filter that recognises, by its options.
+using FilterOptions = std::variant<HistogramOptions, BoundedOptions, ParticleOptions>;
+
+/// What a filter can tell, whatever its options' numbers.
+struct FilterTraits {
+  /// Believes in bins of a lattice, and so has a refined pose, a log-likelihood of the mode, and
+  /// beliefs that a touch may surprise. Particles have none: motion noise comes between.
+  bool bins = false;
+  /// Evaluates every bin, in the device's memory, as soon as a touch comes. Plans, posteriors and
+  /// displacements that are to be fitted need it.
+  bool every_bin = false;
+  /// Keeps touches, searches on the host once it is asked about the belief, and proves what it left
+  /// out (Certificate).
+  bool certificate = false;
+};
+FilterTraits traits_of(const FilterOptions& options);
+
+/// A Bayes filter over object identity and pose. Functions do and throw what those of
+/// PoseHistogram, BoundedPosterior and ParticleFilter do; what a filter lacks is empty.
+class Filter {
+ public:
+  virtual ~Filter() = default;
+
+  virtual void reset() = 0;
+  virtual void move_pivot(const glm::dvec2& pivot_mm) = 0;
+  virtual void update(std::span<const Touch> touches,
+                      const std::function<void(double)>& progress) = 0;
+  /// Does nothing where FilterTraits::every_bin is false: bounds search only once they are asked,
+  /// and particles cannot be weighed ahead, since weighing follows resampling and noise.
+  virtual void prepare(const Touch& /*touch*/) {}
+
+  virtual Estimate estimate() const = 0;
+  virtual std::optional<RefinedPose> refine(const Mode& /*mode*/) const { return {}; }
+  /// Draws from the belief; of particles by their weights.
+  virtual std::vector<PoseSample> sample(std::size_t count, std::uint64_t seed) const = 0;
+  /// Marginal probabilities of one object's poses: a histogram's on its lattice, which is
+  /// `lattice`; those of others on marginal_grid(lattice). A particle counts in the nearest bin.
+  virtual Marginals marginals(int object, const PoseLattice& lattice) const = 0;
+  virtual std::optional<double> effective_sample_size() const { return {}; }
+
+  /// How the filter computes, and why.
+  virtual std::string path() const = 0;
+  virtual std::uint64_t device_bytes() const { return 0; }
+  virtual std::uint64_t host_bytes() const { return 0; }
+  /// The belief over every bin; nullptr where FilterTraits::every_bin is false.
+  virtual const PoseHistogram* histogram() const { return nullptr; }
+};
+
+/// The filter that the options name.
+/// @param device may be null where FilterTraits::certificate is true
+std::unique_ptr<Filter> make_filter(Device* device, std::span<const Hypothesis> hypotheses,
+                                    const FilterOptions& options);
+
+}  // namespace palpate
