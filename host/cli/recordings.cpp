@@ -43,16 +43,6 @@ Frames select(const Recording& recording, const std::optional<Frames>& frames) {
   return *frames;
 }
 
-bool has_poses(const Recording& recording) {
-  for (const Pose& pose : recording.T_robot_sensor) {
-    const Pose& first = recording.T_robot_sensor.front();
-    if (pose.translation_mm != first.translation_mm || pose.theta_rad != first.theta_rad) {
-      return true;
-    }
-  }
-  return false;
-}
-
 ContactClassifier make_classifier(const std::string& pressure_unit, const std::string& source,
                                   std::optional<double> threshold, std::optional<double> ratio) {
   ContactClassifier classifier;
