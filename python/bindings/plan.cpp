@@ -79,9 +79,6 @@ nb::tuple plan_python(const nb::list& recordings, const nb::list& maps, Request 
                       std::uint64_t seed, const std::shared_ptr<Session>& session,
                       const Progress& progress) {
   const GivenRecordings given = given_recordings(recordings);
-  if (given.size != 1) {
-    throw Error(Fault::input, fmt::format("recording: {} were given; give one", given.size));
-  }
   add_maps(maps, request.flags);
   PlanWish wish{goal, candidate_grid_word, {}, samples, seed};
   if (nb::isinstance<nb::str>(candidates)) {
@@ -120,15 +117,12 @@ nb::tuple plan_python(const nb::list& recordings, const nb::list& maps, Request 
   return nb::make_tuple(result, planned.told);
 }
 
-struct Fitted {
-  TouchSdFit fit;
-  Told told;
-};
+using Fitted = std::tuple<TouchSdFit, Told>;
 
 Fitted fit_recordings(const GivenRecordings& given, Request request,
                       std::shared_ptr<Session> session, Call& call) {
-  Fitted fitted;
-  request.flags.tell = [&](const std::string& sentence) { fitted.told.push_back(sentence); };
+  Told told;
+  request.flags.tell = [&](const std::string& sentence) { told.push_back(sentence); };
   const Subject subject = subject_of(given, request);
   const Recording& first = subject.recordings.front();
   RecognitionTask task =
@@ -142,20 +136,18 @@ Fitted fit_recordings(const GivenRecordings& given, Request request,
     session = std::make_shared<Session>(cli::open_device(request.flags, subject.scene));
   }
   auto lock = session->lock(call);
-  fitted.fit =
+  TouchSdFit fit =
       fit_touch_sd(lock.device(), task, touched_objects(subject.recordings, subject.unknowns, task),
                    {}, call.progress());
-  return fitted;
+  return {std::move(fit), std::move(told)};
 }
 
-std::tuple<TouchSdFit, Told> fit_python(const nb::list& recordings, const nb::list& maps,
-                                        Request request, const std::shared_ptr<Session>& session,
-                                        const Progress& progress) {
+Fitted fit_python(const nb::list& recordings, const nb::list& maps, Request request,
+                  const std::shared_ptr<Session>& session, const Progress& progress) {
   const GivenRecordings given = given_recordings(recordings);
   add_maps(maps, request.flags);
-  Fitted fitted =
-      run({}, progress, [=](Call& call) { return fit_recordings(given, request, session, call); });
-  return {std::move(fitted.fit), std::move(fitted.told)};
+  return run({}, progress,
+             [=](Call& call) { return fit_recordings(given, request, session, call); });
 }
 
 void bind_touch_sd_fit(nb::module_& module) {
