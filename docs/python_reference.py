@@ -17,7 +17,7 @@ from sphinx.util.docutils import SphinxDirective
 PACKAGE = Path(os.environ["PALPATE_PYTHON_PACKAGE"])
 # Later files override earlier ones.
 FILES = {
-    "palpate": ["_palpate.pyi", "_error.py", "recognition.py", "many.py", "streams.py"],
+    "palpate": ["_palpate.pyi", "_error.py", "recognition.py", "many.py", "commands.py", "streams.py"],
     "palpate.reference": ["reference.pyi"],
 }
 
@@ -48,7 +48,11 @@ def public_names():
 class Simpler(ast.NodeTransformer):
     """Types as a reader says them: NDArray[float64] without modules and stub-only annotations."""
 
-    names = {"_Path": "str | PathLike[str]", "_Pair": "tuple[float, float]"}
+    names = {
+        "_Path": "str | PathLike[str]",
+        "_Pair": "tuple[float, float]",
+        "_Maps": "OccupancyGrid | Hypothesis | str | Iterable[OccupancyGrid | Hypothesis | str]",
+    }
 
     def visit_Attribute(self, node):
         return ast.Name(node.attr)

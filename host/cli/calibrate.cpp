@@ -2,6 +2,7 @@
 
 #include <unistd.h>
 
+#include <array>
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -19,8 +20,7 @@
 #include "cli/recordings.hpp"
 #include "cli/terminal.hpp"
 #include "io/command_files.hpp"
-#include "learning/sensor_calibration.hpp"
-#include "learning/touch_sd_learning.hpp"
+#include "learning/calibration_task.hpp"
 #include "palpate/files.hpp"
 
 namespace palpate::cli {
@@ -31,12 +31,7 @@ struct Options {
   std::vector<std::string> recordings;
   std::string output;
   std::vector<std::string> maps;
-  bool unposed = false;
-  std::optional<double> threshold;
-  std::optional<double> ratio;
-  std::string layer = "auto";
-  std::optional<int> levels;
-  int max_maps = 5;
+  CalibrationRequest request;
   RecognitionFlags recognition;  ///< bins and region alone
   std::string frames;
   std::string png;
@@ -76,135 +71,19 @@ void check_outputs(const Options& options, const std::vector<std::filesystem::pa
   }
 }
 
-/// The bins on which unknowns will be recognised; none where no flag gives them.
-std::optional<RecognitionBins> bins_of(const Options& options, bool known_poses) {
+/// What the flags ask for, with the bins on which unknowns will be recognised.
+CalibrationRequest request_of(const Options& options) {
   const RecognitionFlags& flags = options.recognition;
   if (flags.bins == "auto" || flags.bins == "fine") {
     refuse_flag("--bins", flags.bins, "give counts, as 25x25x16, or leave it out");
   }
-  const bool given = !flags.bins.empty() || !flags.x_mm.empty() || !flags.y_mm.empty() ||
-                     !flags.theta_deg.empty() || !flags.pivot_mm.empty();
-  if (given && !known_poses) {
-    throw Error(
-        Fault::input,
-        "--bins, --x-mm, --y-mm, --theta-deg and --pivot-mm are for touches at known poses; "
-        "leave them out: where the others lie is found on bins one element wide");
+  CalibrationRequest request = options.request;
+  request.gives_bins = !flags.bins.empty() || !flags.x_mm.empty() || !flags.y_mm.empty() ||
+                       !flags.theta_deg.empty() || !flags.pivot_mm.empty();
+  if (!infers_region(flags, {})) {
+    request.bins = {given_lattice(flags, {}), has_auto_pivot(flags, {})};
   }
-  if (infers_region(flags, {})) {
-    return {};
-  }
-  return RecognitionBins{given_lattice(flags, {}), has_auto_pivot(flags, {})};
-}
-
-/// @param known_poses of the touches
-/// @param maps given to compare touches with; at unknown poses, where one lacks its mean level, the
-/// layer auto is log_odds
-SensorCalibrationOptions calibration_options(const Options& options, bool known_poses,
-                                             const std::vector<OccupancyGrid>& maps,
-                                             const std::string& unit) {
-  SensorCalibrationOptions result{.pressure_unit = unit};
-  if (options.threshold) {
-    result.threshold = require_above("--threshold", *options.threshold, 0.0);
-  }
-  if (options.ratio) {
-    result.ratio = require_above("--ratio", *options.ratio, 0.0, true);
-    if (*options.ratio >= 1.0) {
-      refuse_flag("--ratio", *options.ratio, "must be below 1");
-    }
-  }
-  constexpr auto most = static_cast<int>(most_reading_levels);
-  if (options.levels && (*options.levels < 2 || *options.levels > most)) {
-    refuse_flag("--levels", *options.levels, "give 2 to {}", most);
-  }
-  if (options.layer != "auto" && options.layer != "mean_level" && options.layer != "log_odds") {
-    refuse_flag("--layer", options.layer, "give auto, mean_level or log_odds");
-  }
-  const bool has_mean_levels =
-      std::ranges::none_of(maps, [](const OccupancyGrid& map) { return map.mean_level.empty(); });
-  for (const TableKind& kind : default_tables(false)) {
-    const bool of_pressure = kind.layer == MapLayer::mean_level;
-    const bool tried = options.layer == "auto" ? (of_pressure ? has_mean_levels : !known_poses)
-                                               : of_pressure == (options.layer == "mean_level");
-    if (tried) {
-      result.tables.push_back(kind);
-    }
-  }
-  if (options.levels) {
-    for (TableKind& kind : result.tables) {
-      kind.levels = static_cast<std::size_t>(*options.levels);
-    }
-  }
-  if (options.max_maps < 1) {
-    refuse_flag("--max-maps", options.max_maps, "give 1 or more");
-  }
-  result.most_maps = static_cast<std::size_t>(options.max_maps);
-  result.bins = bins_of(options, known_poses);
-  return result;
-}
-
-/// Throws Error where some recordings have poses and others have none.
-bool all_have_poses(const Options& options, const std::vector<Recording>& recordings) {
-  if (options.unposed) {
-    return false;
-  }
-  const bool first = has_poses(recordings.front());
-  for (const Recording& recording : recordings) {
-    if (has_poses(recording) != first) {
-      const Recording& without = first ? recording : recordings.front();
-      refuse(without.path,
-             "all touches are at one pose, so that their poses count as unknown, but other "
-             "recordings have poses; calibrate from one kind, or give --unposed");
-    }
-  }
-  return first;
-}
-
-std::vector<Press> presses_of(const Options& options, const std::vector<Recording>& recordings) {
-  std::optional<Frames> frames;
-  if (!options.frames.empty()) {
-    frames = parse_frames("--frames", options.frames);
-  }
-  const bool posed = all_have_poses(options, recordings);
-  std::vector<Press> presses;
-  for (const Recording& recording : recordings) {
-    if (recording.object.empty()) {
-      refuse(recording.path,
-             "attribute 'object' is empty; a calibration needs to know what was touched");
-    }
-    const auto [begin, end] = select(recording, frames);
-    for (std::size_t touch = begin; touch < end; ++touch) {
-      presses.push_back(posed ? posed_press(recording, touch) : single_press(recording, touch));
-    }
-  }
-  return presses;
-}
-
-std::vector<OccupancyGrid> read_maps(const Options& options, bool known_poses,
-                                     const std::vector<std::filesystem::path>& files) {
-  const bool needs_mean_level =
-      options.layer == "mean_level" || (options.layer == "auto" && known_poses);
-  std::vector<OccupancyGrid> maps;
-  for (const std::filesystem::path& file : files) {
-    maps.push_back(read_map(file));
-    if (needs_mean_level && maps.back().mean_level.empty()) {
-      refuse(file,
-             "has no mean_level; build the map with palpate map --unposed or --sensor-model, or "
-             "give --layer log_odds");
-    }
-  }
-  return maps;
-}
-
-/// Learns how far touches lie from their poses.
-void add_touch_sd(const Options& options, const std::vector<Press>& presses,
-                  SensorCalibration& calibration) {
-  Device device = Device::open(options.device);
-  Progress progress("fitting the touches' poses");
-  const std::optional<DisplacementSd> sd =
-      learn_touch_sd(device, presses, calibration.sensor, calibration.maps,
-                     [&](double fraction) { progress.show(fraction); });
-  calibration.touch_sd_fitted = sd.has_value();
-  calibration.sensor.touch_sd = sd.value_or(DisplacementSd{});
+  return request;
 }
 
 void calibrate(const Options& options) {
@@ -215,20 +94,31 @@ void calibrate(const Options& options) {
   }
   check_outputs(options, maps_read);
   const std::vector<Recording> recordings = read_touch_recordings(options.recordings);
-  const std::vector<Press> presses = presses_of(options, recordings);
-  const bool known_poses = presses.front().T_object_robot.has_value();
-  const std::vector<OccupancyGrid> maps = read_maps(options, known_poses, maps_read);
-  const SensorCalibrationOptions how =
-      calibration_options(options, known_poses, maps, recordings.front().pressure_unit);
+  std::optional<Frames> frames;
+  if (!options.frames.empty()) {
+    frames = parse_frames("--frames", options.frames);
+  }
+  std::vector<std::array<std::size_t, 2>> touches;
+  for (const Recording& recording : recordings) {
+    const auto [begin, end] = select(recording, frames);
+    touches.push_back({begin, end});
+  }
+  std::vector<NamedMap> maps;
+  for (const std::filesystem::path& file : maps_read) {
+    maps.push_back({file.string(), read_map(file)});
+  }
+  const CalibrationTask task = calibration_task(request_of(options), recordings, touches, maps);
 
   SensorCalibration calibration;
   {
     Progress progress("calibrating");
-    calibration =
-        calibrate_sensor(presses, maps, how, [&](double fraction) { progress.show(fraction); });
+    calibration = calibrate_sensor(task.presses, task.maps, task.options,
+                                   [&](double fraction) { progress.show(fraction); });
   }
-  if (known_poses) {
-    add_touch_sd(options, presses, calibration);
+  if (task.known_poses()) {
+    Device device = Device::open(options.device);
+    Progress progress("fitting the touches' poses");
+    add_touch_sd(device, task, calibration, [&](double fraction) { progress.show(fraction); });
   }
   const Pictures pictures = pictures_of(options);
   std::string table;
@@ -239,7 +129,8 @@ void calibrate(const Options& options) {
     make_folder(options.png);
   }
   write_sensor_model(options.output, calibration.sensor);
-  fmt::print("{}", calibration_text(calibration, presses.size(), terminal_columns(STDOUT_FILENO)));
+  fmt::print("{}",
+             calibration_text(calibration, task.presses.size(), terminal_columns(STDOUT_FILENO)));
   for (const std::string& warning : calibration.warnings) {
     fmt::print(stderr, "palpate: {}\n", warning);
   }
@@ -274,27 +165,27 @@ void add_calibrate(CLI::App& app) {
                       "Maps, or folders of maps, of the objects, built from other touches than "
                       "these [default: maps of the touches themselves, each compared with maps "
                       "that were built without it]");
-  command->add_flag("--unposed", options->unposed,
+  command->add_flag("--unposed", options->request.unposed,
                     "The sensor's poses are unknown: find where each touch lies on the others. For "
                     "arrays so large that a touch shows much of the object");
-  command->add_option("--threshold", options->threshold,
+  command->add_option("--threshold", options->request.threshold,
                       "Contact threshold, in the recordings' pressure unit [default: learned]");
-  command->add_option("--ratio", options->ratio,
+  command->add_option("--ratio", options->request.ratio,
                       "Threshold as a fraction of the touch's largest pressure [default: learned]");
   command
-      ->add_option("--layer", options->layer,
+      ->add_option("--layer", options->request.layer,
                    "What of a map readings are compared with: mean_level, the mean pressure; "
                    "log_odds, of occupancy; or auto: mean_level at known poses; at unknown poses "
                    "both are tried, and log_odds is kept unless mean_level is clearly better about "
                    "presses that it has not seen")
       ->capture_default_str();
   command
-      ->add_option("--levels", options->levels,
+      ->add_option("--levels", options->request.levels,
                    "Levels of readings that are told apart, No Contact included [default: 7 over "
                    "the mean pressure, 2 over log odds]")
       ->check(require_whole_number);
   command
-      ->add_option("--max-maps", options->max_maps,
+      ->add_option("--max-maps", options->request.max_maps,
                    "Most maps of an object that a touch is compared with to learn how sure to be: "
                    "about as many as you will recognize with. More take longer")
       ->check(require_whole_number)

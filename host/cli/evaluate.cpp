@@ -15,9 +15,9 @@
 #include "cli/evaluate_output.hpp"
 #include "cli/options.hpp"
 #include "cli/recognition_flags.hpp"
-#include "cli/results_file.hpp"
 #include "cli/terminal.hpp"
 #include "io/command_files.hpp"
+#include "recognition/judged_results.hpp"
 
 namespace palpate::cli {
 
@@ -87,22 +87,13 @@ void evaluate_results(const Options& options) {
   const std::vector<std::filesystem::path> files = result_files(options.results);
   check_outputs(options, files);
   const JudgedResults results = read_results(files);
-  if (results.records.empty()) {
-    refuse(options.results.front(),
-           "none of {} record(s) has a true label ('truth'); name the object in the recordings "
-           "before palpate recognize, or give other results",
-           results.without_truth);
-  }
+  const Evaluation evaluation = evaluate(results, options.results.front());
   for (const std::string& folder : options.results) {
     tell_missing(folder);
   }
-  if (results.failed > 0) {
-    tell_on_stderr(
-        fmt::format("{} unknown{} could not be recognised, and left out; their records "
-                    "say why",
-                    results.failed, results.failed == 1 ? "" : "s"));
+  if (const std::string failed = failed_words(results); !failed.empty()) {
+    tell_on_stderr(failed);
   }
-  const Evaluation evaluation = evaluate(results.records);
   // A label need not be UTF-8, as JSON must.
   const std::string json =
       to_json(evaluation, results.without_truth)

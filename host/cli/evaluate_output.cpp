@@ -34,18 +34,6 @@ Json to_json(const Scores& scores) {
   return json;
 }
 
-const char* field_of(KnownScore score) {
-  switch (score) {
-    case KnownScore::known:
-      return "known";
-    case KnownScore::none:
-      return "1 - none";
-    case KnownScore::fit:
-      break;
-  }
-  return "fit.z";
-}
-
 Json unknown_to_json(const Evaluation& evaluation) {
   const Scores& unknown = *evaluation.unknown;
   Json json{{"records", unknown.records},
@@ -53,7 +41,7 @@ Json unknown_to_json(const Evaluation& evaluation) {
             {"share_called_none", unknown.accuracy()},
             {"share_interval", to_json(unknown.interval())}};
   if (const auto& against = evaluation.known_against_unknown) {
-    json["area_under_curve"] = {{"score", field_of(against->score)},
+    json["area_under_curve"] = {{"score", name_of(against->score)},
                                 {"known", against->known},
                                 {"unknown", against->unknown},
                                 {"area", against->area},
@@ -156,7 +144,7 @@ std::string unknown_words(const Evaluation& evaluation) {
     text += fmt::format(
         "area under the curve of known against unknown classes by {}: {:.3f} +- {:.3f} "
         "({} known, {} unknown)\n",
-        field_of(against->score), against->area, against->standard_error, against->known,
+        name_of(against->score), against->area, against->standard_error, against->known,
         against->unknown);
   } else if (evaluation.known) {
     text += "no area under the curve: records of both kinds need known, none or fit.z\n";

@@ -8,117 +8,22 @@
 #include <CLI/CLI.hpp>
 
 #include "cli/commands.hpp"
-#include "cli/imported_recording.hpp"
 #include "cli/options.hpp"
-#include "io/array_table.hpp"
 #include "io/command_files.hpp"
 #include "io/recording_rules.hpp"
-#include "model/number_text.hpp"
 #include "palpate/files.hpp"
-#include "palpate/pose_track.hpp"
+#include "streaming/table_import.hpp"
 
 namespace palpate::cli {
 
 namespace {
 
-/// Splits the text into `count` parts, the first of which may hold the separator itself.
-std::vector<std::string> split_last(std::string text, char separator, std::size_t count) {
-  std::vector<std::string> parts;
-  for (std::size_t at = text.npos; parts.size() + 1 < count; text.resize(at)) {
-    at = text.rfind(separator);
-    if (at == text.npos) {
-      return {};
-    }
-    parts.insert(parts.begin(), text.substr(at + 1));
-  }
-  parts.insert(parts.begin(), text);
-  return parts;
-}
-
-std::optional<Unit> unit_named(std::span<const Unit> units, const std::string& name) {
-  const auto found = std::ranges::find(units, name, &Unit::name);
-  return found == units.end() ? std::nullopt : std::optional(*found);
-}
-
-TableOptions table_options(const ImportOptions& options) {
-  TableOptions table{.time_column = options.time_column,
-                     .pressure_columns = options.pressure_columns};
-  if (!options.time_unit.empty()) {
-    table.time_unit = unit_named(time_units, options.time_unit);
-    if (!table.time_unit) {
-      refuse_flag("--time-unit", options.time_unit, "give s, ms, us or ns");
-    }
-  }
-  if (!options.pose_unit.empty()) {
-    const auto names = split_last(options.pose_unit, ',', 2);
-    table.length_unit = names.empty() ? std::nullopt : unit_named(length_units, names[0]);
-    table.angle_unit = names.empty() ? std::nullopt : unit_named(angle_units, names[1]);
-    if (!table.length_unit || !table.angle_unit) {
-      refuse_flag("--pose-unit", options.pose_unit, "give mm,rad or mm,deg or m,rad or m,deg");
-    }
-  }
-  if (!options.pose_columns.empty()) {
-    const auto names = split_last(options.pose_columns, ',', 3);
-    if (names.empty()) {
-      refuse_flag("--pose-columns", options.pose_columns, "give three names, X,Y,THETA");
-    }
-    std::ranges::copy(names, table.pose_columns.begin());
-  }
-  return table;
-}
-
-Array array_of(const std::string& text) {
-  const auto parts = split_last(text, ':', 3);
-  const auto columns = parts.empty() ? std::nullopt : whole_number_of(parts[0]);
-  if (!columns) {
-    return {read_array(text)};
-  }
-  constexpr std::int64_t most = 1024;
-  const auto rows = whole_number_of(parts[1]);
-  const auto pitch_mm = number_of(parts[2]);
-  if (*columns < 1 || *columns > most || !rows || *rows < 1 || *rows > most || !pitch_mm ||
-      *pitch_mm < 1e-3 || *pitch_mm > 1e3) {
-    refuse_flag("--array", text,
-                "give COLUMNS:ROWS:PITCH, with 1 to {} columns and rows and a pitch of 0.001 to "
-                "1000 mm, or a file",
-                most);
-  }
-  Array array;
-  array.columns = static_cast<std::size_t>(*columns);
-  array.rows = static_cast<std::size_t>(*rows);
-  array.elements_mm = grid_array(static_cast<int>(*columns), static_cast<int>(*rows), *pitch_mm);
-  return array;
-}
-
-/// The label and the pose of --truth, whose numbers are still in the units of the tables.
-Truth truth_of(const std::string& text) {
-  const auto parts = split_last(text, ',', 4);
-  std::array<std::optional<double>, 3> pose;
-  for (std::size_t i = 0; i < 3; ++i) {
-    pose[i] = parts.empty() || parts[0].empty() ? std::nullopt : number_of(parts[i + 1]);
-    if (!pose[i]) {
-      refuse_flag("--truth", text, "give LABEL,X,Y,THETA, in the units of the poses");
-    }
-  }
-  return {parts[0], {{*pose[0], *pose[1]}, *pose[2]}};
-}
-
-/// The pose of --truth in mm and rad.
-Pose truth_pose(const std::string& text, const Pose& in_units, const std::array<Unit, 3>& units) {
-  const Pose pose{
-      {units[0].convert(in_units.translation_mm.x), units[1].convert(in_units.translation_mm.y)},
-      units[2].convert(in_units.theta_rad)};
-  if (!is_robot_pose(pose)) {
-    refuse_flag("--truth", text,
-                "is further than {:g} mm or turned by more than 1e9 rad; check the numbers and "
-                "their units, {}, {} and {}",
-                farthest_mm, units[0].name, units[1].name, units[2].name);
-  }
-  return pose;
-}
+struct Options : ImportOptions {
+  std::string output;
+};
 
 /// The command that takes the recording.
-std::string next_command(const ImportOptions& options, const Recording& recording) {
+std::string next_command(const Options& options, const Recording& recording) {
   const bool raw = recording.pressure_unit == "raw";
   const char* unposed = options.unposed ? " --unposed" : "";
   if (recording.rows == "frames") {
@@ -137,7 +42,7 @@ std::string next_command(const ImportOptions& options, const Recording& recordin
              : fmt::format("palpate map {} -o MAPS/{}{}", options.output, unposed, threshold);
 }
 
-void print_summary(const ImportOptions& options, const ImportedRecording& imported) {
+void print_summary(const Options& options, const ImportedRecording& imported) {
   const Recording& r = imported.recording;
   fmt::print("{}: {} {} of {} elements", options.output, r.size(), r.rows, r.elements());
   if (!r.time_s.empty()) {
@@ -171,22 +76,7 @@ void print_summary(const ImportOptions& options, const ImportedRecording& import
   fmt::print("; next: {}\n", next_command(options, r));
 }
 
-void import_tables(const ImportOptions& options) {
-  const TableOptions tables = table_options(options);
-  if (options.largest_gap_s) {
-    require_above("--largest-gap-s", *options.largest_gap_s, 0.0);
-  }
-  constexpr double slowest_hz = 1e-3;
-  constexpr double fastest_hz = 1e6;
-  if (options.rate_hz && !(*options.rate_hz >= slowest_hz && *options.rate_hz <= fastest_hz)) {
-    refuse_flag("--rate", *options.rate_hz, "give {} to {} Hz", slowest_hz, fastest_hz);
-  }
-  if (options.pressure_unit != "kPa" && options.pressure_unit != "raw") {
-    refuse_flag("--pressure-unit", options.pressure_unit, "give kPa or raw");
-  }
-  if (options.unposed && !options.poses.empty()) {
-    refuse("--unposed", "{} holds the poses; leave one of the flags out", options.poses);
-  }
+void import_tables(const Options& options) {
   CommandFiles files;
   files.reads("PRESSURES", options.pressures);
   if (!options.poses.empty()) {
@@ -197,16 +87,7 @@ void import_tables(const ImportOptions& options) {
   files.require_distinct();
   require_writable(options.output);
 
-  std::optional<Truth> truth;
-  if (!options.truth.empty()) {
-    truth = truth_of(options.truth);
-  }
-  ImportedRecording imported = read_tables(options, tables, array_of(options.array));
-  imported.recording.object = options.object;
-  if (truth) {
-    truth->T_object_robot = truth_pose(options.truth, truth->T_object_robot, imported.pose_units);
-    imported.recording.truth = truth;
-  }
+  const ImportedRecording imported = palpate::import_tables(options);
   write_recording(options.output, imported.recording);
   print_summary(options, imported);
 }
@@ -219,7 +100,7 @@ void add_import(CLI::App& app) {
       "Write a recording (HDF5) from tables: pressures, poses and the positions of the elements. "
       "Tables are CSV files, with commas, semicolons, tabs or blanks between the cells; the "
       "pressures may also be an array of numpy.save. docs/files.md describes them");
-  const auto options = std::make_shared<ImportOptions>();
+  const auto options = std::make_shared<Options>();
   command
       ->add_option("PRESSURES", options->pressures,
                    "CSV: a row for each frame or touch, with a column for each element (and time, "

@@ -17,6 +17,7 @@
 #include "cli/recordings.hpp"
 #include "figures/figures.hpp"
 #include "learning/observed_map.hpp"
+#include "learning/press.hpp"
 #include "palpate/files.hpp"
 #include "palpate/map_builder.hpp"
 #include "palpate/rotational_symmetry.hpp"

@@ -1,8 +1,5 @@
 #include <unistd.h>
 
-#include <algorithm>
-#include <chrono>
-#include <cmath>
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -14,15 +11,12 @@
 #include "cli/commands.hpp"
 #include "cli/options.hpp"
 #include "cli/plan_output.hpp"
-#include "cli/planned_touch.hpp"
 #include "cli/recognition_flags.hpp"
 #include "cli/record_output.hpp"
 #include "cli/recordings.hpp"
 #include "cli/terminal.hpp"
+#include "cli/unknowns.hpp"
 #include "io/command_files.hpp"
-#include "io/pose_table.hpp"
-#include "palpate/files.hpp"
-#include "recognition/label_probability.hpp"
 
 namespace palpate::cli {
 
@@ -32,8 +26,7 @@ struct Options {
   std::string recording;
   std::string candidates;
   std::string goal = "both";
-  std::string frames;
-  std::optional<int> touches;
+  UnknownFlags touches;
   std::size_t samples = PlanOptions{}.samples;
   std::uint64_t seed = 0;
   RecognitionFlags recognition;
@@ -41,82 +34,11 @@ struct Options {
   std::string png;
 };
 
-constexpr const char* grid = "grid";
-
-/// The touches of the recording that the flags select.
-std::vector<Touch> select_touches(const Options& options, const Recording& recording) {
-  std::optional<Frames> frames;
-  if (!options.frames.empty()) {
-    frames = parse_frames("--frames", options.frames);
-  }
-  if (options.touches && *options.touches < 1) {
-    refuse_flag("--touches", *options.touches, "give at least 1");
-  }
-  auto [begin, end] = select(recording, frames);
-  if (options.touches && static_cast<std::size_t>(*options.touches) > end - begin) {
-    refuse(recording.path, "has {} touches; --touches {} is too many", end - begin,
-           *options.touches);
-  }
-  end = options.touches ? begin + static_cast<std::size_t>(*options.touches) : end;
-  if (begin == end) {
-    refuse(recording.path, "has no touches; give a recording with at least one");
-  }
-  return recording.touches(begin, end);
-}
-
-/// The elements of a touch that are alive.
-std::vector<glm::dvec2> living_elements(const Touch& touch, const std::string& recording) {
-  std::vector<glm::dvec2> living;
-  for (std::size_t e = 0; e < touch.elements_mm.size(); ++e) {
-    if (touch.valid.empty() || touch.valid[e] != 0) {
-      living.push_back(touch.elements_mm[e]);
-    }
-  }
-  if (living.empty()) {
-    refuse(recording, "valid: every element is dead; a touch would tell nothing");
-  }
-  return living;
-}
-
-/// The poses of a file: of a recording's touches, or the rows of a table.
-std::vector<Pose> read_candidates(const std::filesystem::path& path) {
-  const std::string extension = path.extension().string();
-  if (extension == ".h5" || extension == ".hdf5") {
-    return read_touch_recordings({path.string()}).front().T_robot_sensor;
-  }
-  const PoseTable table = read_poses(path, {.may_name_poses = false}, false);
-  if (table.assumed_units) {
-    fmt::print(stderr,
-               "palpate: {}: poses taken to be in mm and rad; name the columns x_mm, y_mm, "
-               "theta_deg for others\n",
-               path.string());
-  }
-  return table.T_robot_sensor;
-}
-
-/// Throws Error on a candidate that no robot reaches.
-void check_candidates(const std::string& file, const std::vector<Pose>& candidates) {
-  constexpr std::size_t most = 1'000'000;
-  if (candidates.empty()) {
-    refuse(file, "holds no pose; write one for each candidate touch");
-  }
-  if (candidates.size() > most) {
-    refuse(file, "holds {} poses; give at most {}", candidates.size(), most);
-  }
-  for (std::size_t i = 0; i < candidates.size(); ++i) {
-    const Pose& pose = candidates[i];
-    if (!(std::abs(pose.translation_mm.x) <= farthest_mm &&
-          std::abs(pose.translation_mm.y) <= farthest_mm && std::isfinite(pose.theta_rad))) {
-      refuse(file, "pose {} (counted from 0) is unknown or out of reach; give x, y and theta", i);
-    }
-  }
-}
-
 /// Throws Error where an output cannot be written, before any work is done.
 void check_outputs(const Options& options, const Scene& scene, const RecognitionTask& task) {
   CommandFiles files;
   files.reads("RECORDING", options.recording);
-  if (options.candidates != grid && options.candidates != options.recording) {
+  if (options.candidates != candidate_grid_word && options.candidates != options.recording) {
     files.reads("--candidates", options.candidates);
   }
   add_recognition_files(options.recognition, scene, task, files);
@@ -134,15 +56,12 @@ void check_outputs(const Options& options, const Scene& scene, const Recognition
   }
 }
 
-void write_results(const Options& options, const Plan& plan, const Device& device) {
-  // The path of a recording need not be UTF-8, as JSON must.
-  const std::string json =
-      to_json(plan, device.name())
-          .dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) +
-      "\n";
+void write_results(const Options& options, const Plan& plan, const RecognitionTask& task,
+                   std::span<const Touch> touches, const Device& device) {
+  const std::string json = text_of(to_json(plan, task, device.name()), 2);
   // Files come first: printing fails where the reader of standard output has ended.
   if (!options.png.empty()) {
-    write_file(options.png, draw_plan(figure_of(plan)));
+    write_file(options.png, draw_plan(figure_of(plan, task, touches)));
   }
   if (options.json == "-") {
     fmt::print("{}", json);
@@ -151,69 +70,31 @@ void write_results(const Options& options, const Plan& plan, const Device& devic
   if (!options.json.empty()) {
     write_file(options.json, json);
   }
-  fmt::print("{}{}\n", plan_text(plan, terminal_columns(STDOUT_FILENO)),
-             setup_words(device, plan.task));
+  fmt::print("{}{}\n", plan_text(plan, task, terminal_columns(STDOUT_FILENO)),
+             setup_words(device, task));
 }
 
 void plan_touches(const Options& options) {
-  const PlanGoal goal = parse_goal("--goal", options.goal);
-  constexpr std::size_t most_samples = 4096;
-  if (options.samples < 2 || options.samples > most_samples) {
-    refuse_flag("--samples", options.samples, "give 2 to {}", most_samples);
-  }
+  const PlanRequest request = plan_request(options.goal, options.candidates, options.samples,
+                                           options.seed, options.recognition.tell);
   const Scene scene = scene_of(options.recognition);
   std::vector<Recording> recordings = read_touch_recordings({options.recording});
   Recording& recording = recordings.front();
   replace_array(scene, options.recognition.scene, recording.path, recording.elements(),
                 recording.elements_mm);
-  const std::vector<Touch> touches = select_touches(options, recording);
-  const std::vector<glm::dvec2> elements_mm = living_elements(touches.front(), recording.path);
-  std::vector<Pose> candidates;
-  if (options.candidates != grid) {
-    candidates = read_candidates(options.candidates);
-    check_candidates(options.candidates, candidates);
-  }
-  double reach_mm = 0.0;
-  for (const Touch& touch : touches) {  // the array may change between touches
-    reach_mm = std::max(reach_mm, array_reach_mm(touch.elements_mm));
-  }
+  const Unknown unknown = list_unknowns(options.touches, recordings).front();
   RecognitionTask task = task_of(options.recognition, scene, recording.pressure_unit,
-                                 recording.path, reach_mm, {.why = plan_needs});
-  if (!traits_of(task.filter).every_bin) {
-    refuse("--filter particles", "{}; use --filter histogram, or leave it out", plan_needs);
-  }
+                                 recording.path, reach_mm(unknown.touches), {.why = plan_needs});
+  require_histogram(task);
   check_outputs(options, scene, task);
   Device device = open_device(options.recognition, scene);
   Recogniser recogniser = open_recogniser(options.recognition, scene, device, task);
-  const Unknown unknown{.recording = recording.path,
-                        .frame = {},
-                        .touches = touches,
-                        .truth = ground_truth(recording.object, recording.truth)};
-  const RecognitionRecord record = recognise(recogniser, task, unknown, false);
-  record.require_steps();
-  if (const auto words = unresolved_words(task, recogniser.lattice(), touches); !words.empty()) {
+  const Plan plan = plan_touch(recogniser, task, unknown, request);
+  if (const auto words = unresolved_words(task, recogniser.lattice(), unknown.touches);
+      !words.empty()) {
     fmt::print(stderr, "palpate: {}\n", words);
   }
-
-  const auto start = std::chrono::steady_clock::now();
-  Plan plan{.goal = goal,
-            .task = task,
-            .record = record,
-            .touches = touches,
-            .elements_mm = elements_mm,
-            .samples = recogniser.sample(options.samples, options.seed),
-            .seed = options.seed};
-  if (options.candidates == grid) {
-    candidates =
-        candidate_grid(plan.samples, task, elements_mm, touches.front().T_robot_sensor.theta_rad);
-  }
-  plan.ranked = rank_touches(*recogniser.histogram(), task, candidates, elements_mm, goal,
-                             {.samples = options.samples, .seed = options.seed});
-  plan.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-  // Gains are of the belief before temperature and features.
-  plan.identity_nats = label_entropy(sums_by_label(recogniser.estimate(), task), task);
-  plan.both_nats = recogniser.histogram()->entropy();
-  write_results(options, plan, device);
+  write_results(options, plan, task, unknown.touches, device);
   if (options.recognition.verbose) {
     print_engine(&device, recogniser, task);
   }
@@ -244,10 +125,10 @@ void add_plan(CLI::App& app) {
       ->add_option("--goal", options->goal,
                    "What the touch shall tell: identity, pose (once the object is known) or both")
       ->capture_default_str();
-  command->add_option("--frames", options->frames,
+  command->add_option("--frames", options->touches.frames,
                       "Use the touches A to B - 1 of the recording, counted from 0, as A:B");
   command
-      ->add_option("--touches", options->touches,
+      ->add_option("--touches", options->touches.touches,
                    "Use the first N touches of the recording [default: all]")
       ->check(require_whole_number);
   command

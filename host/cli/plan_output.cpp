@@ -50,44 +50,14 @@ std::string table_of(const Plan& plan, std::optional<int> columns) {
   return table.text(columns);
 }
 
-/// What is unknown of the goal, nats.
-double unknown_nats(const Plan& plan) {
-  return plan.goal == PlanGoal::identity ? plan.identity_nats
-         : plan.goal == PlanGoal::pose   ? plan.both_nats - plan.identity_nats
-                                         : plan.both_nats;
-}
-
-/// Why the gains are no more exact; "" where nothing is to be said.
-std::string limit_words(const Plan& plan) {
-  constexpr double near_nats = 0.5;
-  const double gain = gain_for(plan.ranked.front().gain, plan.goal);
-  const auto samples = plan.samples.size();
-  const double most = std::log(static_cast<double>(samples));
-  if (gain > most - near_nats) {
-    return fmt::format(
-        "{} samples cannot show more than {:.2f} nats, and the best gain is near that: the first "
-        "candidates may not be in order; give more --samples",
-        samples, most);
-  }
-  if (gain <= unknown_nats(plan) + least_gain_nats) {
-    return "";
-  }
-  return plan.goal == PlanGoal::identity
-             ? fmt::format(
-                   "the best gain is above what is unknown: {} samples stand for the belief only "
-                   "roughly; give more --samples",
-                   samples)
-             : "the best gain is above what is unknown, which is counted in bins: the touch tells "
-               "also where in its bin the pose is";
-}
-
 }  // namespace
 
-nlohmann::ordered_json to_json(const Plan& plan, const std::string& device) {
+nlohmann::ordered_json to_json(const Plan& plan, const RecognitionTask& task,
+                               const std::string& device) {
   nlohmann::ordered_json json{{"recording", plan.record.recording},
                               {"touches", plan.record.touches},
                               {"goal", goal_word(plan.goal)},
-                              {"believed", to_json(plan.record.last(), plan.task)}};
+                              {"believed", to_json(plan.record.last(), task)}};
   json["believed"]["entropy"] = {{"identity", plan.identity_nats},
                                  {"pose", plan.both_nats - plan.identity_nats},
                                  {"both", plan.both_nats}};
@@ -95,10 +65,7 @@ nlohmann::ordered_json to_json(const Plan& plan, const std::string& device) {
   for (const PlannedTouch& touch : plan.ranked) {
     json["candidates"].push_back(to_json(touch));
   }
-  std::vector<std::string> warnings = plan.record.last().warnings;
-  if (const std::string limit = limit_words(plan); !limit.empty()) {
-    warnings.push_back(limit);
-  }
+  const std::vector<std::string> warnings = warnings_of(plan);
   if (!warnings.empty()) {
     json["warnings"] = warnings;
   }
@@ -109,16 +76,17 @@ nlohmann::ordered_json to_json(const Plan& plan, const std::string& device) {
   return json;
 }
 
-std::string plan_text(const Plan& plan, std::optional<int> columns) {
+std::string plan_text(const Plan& plan, const RecognitionTask& task, std::optional<int> columns) {
   const std::string limit = limit_words(plan);
   return fmt::format(
-      "{}\n{}\n\n{}{}{}\n{}, {} {} in {:.0f} ms\n", result_words(plan.record.last(), plan.task),
-      believed_words(plan), table_of(plan, columns), complaints({plan.record}, plan.task),
+      "{}\n{}\n\n{}{}{}\n{}, {} {} in {:.0f} ms\n", result_words(plan.record.last(), task),
+      believed_words(plan), table_of(plan, columns), complaints({plan.record}, task),
       limit.empty() ? "" : limit + "\n", next_touch_words(plan.ranked.front(), plan.goal),
       plan.ranked.size(), plan.ranked.size() == 1 ? "candidate" : "candidates", 1e3 * plan.seconds);
 }
 
-PlanFigure figure_of(const Plan& plan) {
+PlanFigure figure_of(const Plan& plan, const RecognitionTask& task,
+                     std::span<const Touch> touches) {
   PlanFigure figure;
   const RecognitionStep& last = plan.record.last();
   const auto printed = [](std::string words) {
@@ -126,7 +94,7 @@ PlanFigure figure_of(const Plan& plan) {
     return at == words.npos ? words : words.replace(at, 4, "°");
   };
   const std::string name = std::filesystem::path(plan.record.recording).filename().string();
-  figure.result = fmt::format("{}: {}", name, identity_words(last, plan.task));
+  figure.result = fmt::format("{}: {}", name, identity_words(last, task));
   figure.captions = {
       "object at " + printed(pose_words(pose_text(last.T_robot_object()))) + " in the robot frame",
       believed_words(plan), printed(next_touch_words(plan.ranked.front(), plan.goal))};
@@ -142,7 +110,7 @@ PlanFigure figure_of(const Plan& plan) {
     area.take_in(touch.T_robot_sensor * array_centre_mm(plan.elements_mm));
   }
   const double margin_mm = array_reach_mm(plan.elements_mm) + figure.element_mm;
-  for (const Touch& touch : plan.touches) {
+  for (const Touch& touch : touches) {
     auto& elements = figure.touches_mm.emplace_back();
     for (const glm::dvec2& element : touch.elements_mm) {
       elements.push_back(touch.T_robot_sensor * element);
@@ -153,7 +121,7 @@ PlanFigure figure_of(const Plan& plan) {
   area.upper += margin_mm;
   constexpr int cells = 160;
   const OccupancyField field =
-      expected_occupancy(plan.samples, plan.task, area.lower, area.upper, cells);
+      expected_occupancy(plan.samples, task, area.lower, area.upper, cells);
   figure.lower_mm = field.lower_mm;
   figure.cell_mm = field.cell_mm;
   figure.nx = field.nx;

@@ -2,23 +2,9 @@
 
 #include <fmt/format.h>
 
-#include "cli/options.hpp"
 #include "cli/step_words.hpp"
 
 namespace palpate::cli {
-
-PlanGoal parse_goal(const std::string& flag, const std::string& text) {
-  for (const PlanGoal goal : {PlanGoal::identity, PlanGoal::pose, PlanGoal::both}) {
-    if (text == goal_word(goal)) {
-      return goal;
-    }
-  }
-  refuse_flag(flag, text, "not known; use identity, pose or both");
-}
-
-std::string goal_word(PlanGoal goal) {
-  return goal == PlanGoal::identity ? "identity" : goal == PlanGoal::pose ? "pose" : "both";
-}
 
 nlohmann::ordered_json to_json(const PlannedTouch& touch) {
   const Pose& pose = touch.T_robot_sensor;

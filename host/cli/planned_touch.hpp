@@ -8,14 +8,6 @@
 
 namespace palpate::cli {
 
-/// Why a plan has no other filter than the histogram.
-inline constexpr const char* plan_needs = "a plan needs the belief of all poses";
-
-/// "identity", "pose" or "both". Throws Error naming the flag.
-PlanGoal parse_goal(const std::string& flag, const std::string& text);
-/// The goal's word.
-std::string goal_word(PlanGoal goal);
-
 /// index, x_mm, y_mm, theta_rad, and the gain in nats: identity, pose, both, and the standard_error
 /// of each.
 nlohmann::ordered_json to_json(const PlannedTouch& touch);

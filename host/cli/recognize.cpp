@@ -45,7 +45,7 @@ struct Options {
 
 HistogramNeed histogram_need(const Options& options) {
   if (options.fit_touch_sd) {
-    return {"--fit-touch-sd", "needs the belief of all poses"};
+    return {"--fit-touch-sd", touch_sd_fit_needs};
   }
   if (!options.posterior.empty()) {
     return {"--posterior", "holds the log-likelihood of every bin, and bounds evaluate few"};

@@ -3,6 +3,7 @@
 #include <set>
 
 #include "io/file_identity.hpp"
+#include "io/recording_rules.hpp"
 #include "palpate/files.hpp"
 
 namespace palpate::cli {
@@ -22,15 +23,10 @@ std::vector<Recording> read_touch_recordings(const std::vector<std::string>& pat
 }
 
 void require_touches(const Recording& recording, const Recording& first) {
-  const std::string& path = recording.path;
-  if (recording.rows == "frames") {
-    refuse(path,
-           "rows = frames, a raw stream; find its touches first: palpate touches {} -o TOUCHES.h5",
-           path);
-  }
+  require_rows_of_touches(recording);
   if (recording.pressure_unit != first.pressure_unit) {
     refuse(
-        path,
+        recording.path,
         "pressure_unit is {} but {} has {}; one threshold does not fit both, use a call for each",
         recording.pressure_unit, first.path, first.pressure_unit);
   }
@@ -45,16 +41,6 @@ Frames select(const Recording& recording, const std::optional<Frames>& frames) {
            recording.size(), frames->begin, frames->end, recording.size());
   }
   return *frames;
-}
-
-bool has_poses(const Recording& recording) {
-  for (const Pose& pose : recording.T_robot_sensor) {
-    const Pose& first = recording.T_robot_sensor.front();
-    if (pose.translation_mm != first.translation_mm || pose.theta_rad != first.theta_rad) {
-      return true;
-    }
-  }
-  return false;
 }
 
 ContactClassifier make_classifier(const std::string& pressure_unit, const std::string& source,

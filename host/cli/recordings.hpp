@@ -21,9 +21,6 @@ void require_touches(const Recording& recording, const Recording& first);
 /// The selected touches of a recording, or all. Throws Error where it has fewer.
 Frames select(const Recording& recording, const std::optional<Frames>& frames);
 
-/// Whether the robot knew where it touched: some touches of the recording are at different poses.
-bool has_poses(const Recording& recording);
-
 /// The classifier of Eq. 3 for pressures of this unit: raw ones have no default threshold. `source`
 /// is named where it is missing.
 ContactClassifier make_classifier(const std::string& pressure_unit, const std::string& source,

@@ -1,7 +1,5 @@
 #include "cli/touch_sd_output.hpp"
 
-#include <algorithm>
-
 #include <fmt/format.h>
 
 #include "cli/options.hpp"
@@ -27,39 +25,7 @@ void refuse_beside_fit(std::span<const OtherFlag> flags, const RecognitionTask& 
       refuse(flag.name, "has no meaning with --fit-touch-sd; leave one of them out");
     }
   }
-  if (!traits_of(task.filter).every_bin) {
-    refuse("--fit-touch-sd", "particles cannot fit it; use --filter histogram");
-  }
-  if (!task.touch_sd().none()) {
-    refuse("--fit-touch-sd",
-           "finds what --touch-sd-mm and --touch-sd-deg, the scene's touch_sd or the sensor model "
-           "say already; leave those out");
-  }
-  if (!task.slip_sd().none()) {
-    refuse("--fit-touch-sd",
-           "takes objects to rest between touches; leave out --slip-sd-mm and --slip-sd-deg, or "
-           "the scene's slip_sd");
-  }
-  if (task.contact().table) {
-    refuse("--fit-touch-sd", "learns a model of the sensor of its own; leave out the sensor model");
-  }
-  if (task.labels.back() == none_label) {
-    refuse("--fit-touch-sd",
-           "takes every unknown to be one of the maps' objects; leave out --none, or the scene's "
-           "none");
-  }
-}
-
-std::vector<TouchedObject> touched_objects(std::span<const Recording> recordings,
-                                           std::span<const Unknown> unknowns,
-                                           const RecognitionTask& task) {
-  std::vector<TouchedObject> objects;
-  for (std::size_t i = 0; i < unknowns.size(); ++i) {
-    const std::string& label = recordings[i].object;
-    const bool known = std::ranges::find(task.labels, label) != task.labels.end();
-    objects.push_back({unknowns[i].recording, unknowns[i].touches, known ? label : ""});
-  }
-  return objects;
+  require_fittable(task);
 }
 
 std::string touch_sd_text(const TouchSdFit& fit) {

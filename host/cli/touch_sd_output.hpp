@@ -2,12 +2,9 @@
 
 #include <span>
 #include <string>
-#include <vector>
 
 #include <nlohmann/json.hpp>
 
-#include "palpate/touch.hpp"
-#include "recognition/recognition_record.hpp"
 #include "recognition/touch_sd_fit.hpp"
 
 namespace palpate::cli {
@@ -18,15 +15,8 @@ struct OtherFlag {
   bool given = false;
 };
 
-/// Throws Error where one of the flags was given, or the task has particles, a touch-sd, a slip-sd
-/// or "none of these".
+/// Throws Error where one of the flags was given, and as require_fittable().
 void refuse_beside_fit(std::span<const OtherFlag> flags, const RecognitionTask& task);
-
-/// The unknowns as the fit takes them: a recording that names an object of the task has its label.
-/// @param recordings of which each is one of the unknowns
-std::vector<TouchedObject> touched_objects(std::span<const Recording> recordings,
-                                           std::span<const Unknown> unknowns,
-                                           const RecognitionTask& task);
 
 /// The result as a table and the flags to paste.
 std::string touch_sd_text(const TouchSdFit& fit);

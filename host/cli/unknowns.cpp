@@ -62,12 +62,18 @@ std::vector<Unknown> list_unknowns(const UnknownFlags& flags,
   return unknowns;
 }
 
+double reach_mm(std::span<const Touch> touches) {
+  double reach = 0.0;
+  for (const Touch& touch : touches) {
+    reach = std::max(reach, array_reach_mm(touch.elements_mm));
+  }
+  return reach;
+}
+
 double reach_mm(std::span<const Recording> recordings) {
   double reach = 0.0;
   for (const Recording& recording : recordings) {
-    for (std::size_t i = 0; i < recording.size(); ++i) {
-      reach = std::max(reach, array_reach_mm(recording.touch(i).elements_mm));
-    }
+    reach = std::max(reach, reach_mm(recording.touches(0, recording.size())));
   }
   return reach;
 }

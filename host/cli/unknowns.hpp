@@ -38,6 +38,7 @@ std::vector<Unknown> list_unknowns(const UnknownFlags& flags,
 
 /// The largest reach of any touch's array, which may change from touch to touch; see
 /// array_reach_mm().
+double reach_mm(std::span<const Touch> touches);
 double reach_mm(std::span<const Recording> recordings);
 
 }  // namespace palpate::cli

@@ -22,6 +22,14 @@ void require_one_of(const std::filesystem::path& path, const char* attribute,
 
 }  // namespace
 
+void require_rows_of_touches(const Recording& recording) {
+  if (recording.rows == "frames") {
+    refuse(recording.path,
+           "rows = frames, a raw stream; find its touches first: palpate touches {} -o TOUCHES.h5",
+           recording.path);
+  }
+}
+
 bool is_finite(const Pose& pose) {
   return std::isfinite(pose.translation_mm.x) && std::isfinite(pose.translation_mm.y) &&
          std::isfinite(pose.theta_rad);

@@ -38,6 +38,9 @@ void require_device_times(const std::filesystem::path& path, std::size_t first,
 void require_lost_counts(const std::filesystem::path& path, std::size_t first,
                          std::span<const std::uint64_t> lost_before);
 
+/// Refuses a raw stream, whose rows are frames.
+void require_rows_of_touches(const Recording& recording);
+
 bool is_finite(const Pose& pose);
 
 }  // namespace palpate

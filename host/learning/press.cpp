@@ -9,6 +9,16 @@
 
 namespace palpate {
 
+bool has_poses(const Recording& recording) {
+  for (const Pose& pose : recording.T_robot_sensor) {
+    const Pose& first = recording.T_robot_sensor.front();
+    if (pose.translation_mm != first.translation_mm || pose.theta_rad != first.theta_rad) {
+      return true;
+    }
+  }
+  return false;
+}
+
 Press single_press(const Recording& recording, std::size_t touch) {
   Press press{fmt::format("{}, touch {}", recording.path, touch), recording.object, {}};
   press.touches.push_back(recording.touch(touch));

@@ -22,6 +22,9 @@ struct Press {
   std::optional<Pose> T_object_robot = {};
 };
 
+/// Whether the robot knew where it touched: some touches of the recording are at different poses.
+bool has_poses(const Recording& recording);
+
 /// One touch as a press: its pose is unknown, so the robot frame is put where the middle of the
 /// array's elements is the origin and theta is 0.
 Press single_press(const Recording& recording, std::size_t touch);

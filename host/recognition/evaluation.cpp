@@ -161,6 +161,18 @@ std::optional<Median> median_of(std::span<const JudgedRecord> records,
 
 }  // namespace
 
+const char* name_of(KnownScore score) {
+  switch (score) {
+    case KnownScore::known:
+      return "known";
+    case KnownScore::none:
+      return "1 - none";
+    case KnownScore::fit:
+      break;
+  }
+  return "fit.z";
+}
+
 bool JudgedRecord::of_known_class() const {
   return truth != none_answer && identity.contains(truth);
 }

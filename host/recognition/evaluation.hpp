@@ -83,6 +83,9 @@ enum class KnownScore {
   fit     ///< JudgedRecord::fit_z
 };
 
+/// "known", "1 - none" or "fit.z", by the fields of a record.
+const char* name_of(KnownScore score);
+
 /// Area under the curve (ROC) of records of known against those of unknown classes: the probability
 /// that the one of the known class has the larger score; a tie counts half.
 struct KnownAgainstUnknown {

@@ -2,14 +2,23 @@
 
 #include <algorithm>
 #include <array>
+#include <chrono>
 #include <cmath>
+#include <filesystem>
 #include <numbers>
 #include <utility>
 
+#include <fmt/format.h>
+
+#include "io/input_file.hpp"
+#include "io/pose_table.hpp"
+#include "io/recording_rules.hpp"
 #include "model/bounding_box.hpp"
 #include "model/interpolated_map.hpp"
+#include "palpate/files.hpp"
 #include "palpate/occupancy_grid.hpp"
 #include "palpate/touch.hpp"
+#include "recognition/label_probability.hpp"
 
 namespace palpate {
 
@@ -84,7 +93,60 @@ class Reach {
   BoundingBox around_;               ///< all of them, in the robot frame
 };
 
+/// The elements of a touch that are alive.
+std::vector<glm::dvec2> living_elements(const Touch& touch, const std::string& recording) {
+  std::vector<glm::dvec2> living;
+  for (std::size_t e = 0; e < touch.elements_mm.size(); ++e) {
+    if (touch.valid.empty() || touch.valid[e] != 0) {
+      living.push_back(touch.elements_mm[e]);
+    }
+  }
+  if (living.empty()) {
+    refuse(recording, "valid: every element is dead; a touch would tell nothing");
+  }
+  return living;
+}
+
+/// The poses of a file: of a recording's touches, or the rows of a table.
+std::vector<Pose> read_candidates(const std::filesystem::path& path,
+                                  const std::function<void(const std::string&)>& tell) {
+  const std::string extension = path.extension().string();
+  if (extension == ".h5" || extension == ".hdf5") {
+    Recording recording = read_recording(path);
+    require_rows_of_touches(recording);
+    return std::move(recording.T_robot_sensor);
+  }
+  const PoseTable table = read_poses(path, {.may_name_poses = false}, false);
+  if (table.assumed_units) {
+    tell(
+        fmt::format("{}: poses taken to be in mm and rad; name the columns x_mm, y_mm, theta_deg "
+                    "for others",
+                    path.string()));
+  }
+  return table.T_robot_sensor;
+}
+
+/// What is unknown of the goal, nats.
+double unknown_nats(const Plan& plan) {
+  return plan.goal == PlanGoal::identity ? plan.identity_nats
+         : plan.goal == PlanGoal::pose   ? plan.both_nats - plan.identity_nats
+                                         : plan.both_nats;
+}
+
 }  // namespace
+
+PlanGoal parse_goal(const std::string& flag, const std::string& text) {
+  for (const PlanGoal goal : {PlanGoal::identity, PlanGoal::pose, PlanGoal::both}) {
+    if (text == goal_word(goal)) {
+      return goal;
+    }
+  }
+  refuse(fmt::format("{} {}", flag, text), "not known; use identity, pose or both");
+}
+
+std::string goal_word(PlanGoal goal) {
+  return goal == PlanGoal::identity ? "identity" : goal == PlanGoal::pose ? "pose" : "both";
+}
 
 double gain_for(const TouchGain& gain, PlanGoal goal) {
   return goal == PlanGoal::identity ? gain.identity
@@ -143,6 +205,101 @@ std::vector<Pose> candidate_grid(std::span<const PoseSample> samples, const Reco
     }
   }
   return candidates;
+}
+
+void require_reachable(const std::string& source, std::span<const Pose> candidates) {
+  constexpr std::size_t most = 1'000'000;
+  if (candidates.empty()) {
+    refuse(source, "holds no pose; write one for each candidate touch");
+  }
+  if (candidates.size() > most) {
+    refuse(source, "holds {} poses; give at most {}", candidates.size(), most);
+  }
+  for (std::size_t i = 0; i < candidates.size(); ++i) {
+    const Pose& pose = candidates[i];
+    if (!(std::abs(pose.translation_mm.x) <= farthest_mm &&
+          std::abs(pose.translation_mm.y) <= farthest_mm && std::isfinite(pose.theta_rad))) {
+      refuse(source, "pose {} (counted from 0) is unknown or out of reach; give x, y and theta", i);
+    }
+  }
+}
+
+PlanRequest plan_request(const std::string& goal, const std::string& candidates,
+                         std::size_t samples, std::uint64_t seed,
+                         const std::function<void(const std::string&)>& tell) {
+  constexpr std::size_t most_samples = 4096;
+  PlanRequest request{.goal = parse_goal("--goal", goal),
+                      .options = {.samples = samples, .seed = seed}};
+  if (samples < 2 || samples > most_samples) {
+    refuse(fmt::format("--samples {}", samples), "give 2 to {}", most_samples);
+  }
+  if (candidates != candidate_grid_word) {
+    request.candidates = read_candidates(candidates, tell);
+    require_reachable(candidates, request.candidates);
+  }
+  return request;
+}
+
+void require_histogram(const RecognitionTask& task) {
+  if (!traits_of(task.filter).every_bin) {
+    refuse("--filter particles", "{}; use --filter histogram, or leave it out", plan_needs);
+  }
+}
+
+Plan plan_touch(Recogniser& recogniser, const RecognitionTask& task, const Unknown& unknown,
+                const PlanRequest& request, const std::function<void(double)>& progress) {
+  if (unknown.touches.empty()) {
+    refuse(unknown.recording, "has no touches; give a recording with at least one");
+  }
+  Plan plan{.goal = request.goal,
+            .elements_mm = living_elements(unknown.touches.front(), unknown.recording),
+            .seed = request.options.seed};
+  plan.record = recognise(recogniser, task, unknown, false, progress);
+  plan.record.require_steps();
+  const auto start = std::chrono::steady_clock::now();
+  plan.samples = recogniser.sample(request.options.samples, request.options.seed);
+  const std::vector<Pose> candidates =
+      request.candidates.empty() ? candidate_grid(plan.samples, task, plan.elements_mm,
+                                                  unknown.touches.front().T_robot_sensor.theta_rad)
+                                 : request.candidates;
+  plan.ranked = rank_touches(*recogniser.histogram(), task, candidates, plan.elements_mm,
+                             request.goal, request.options);
+  plan.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  // Gains are of the belief before temperature and features.
+  plan.identity_nats = label_entropy(sums_by_label(recogniser.estimate(), task), task);
+  plan.both_nats = recogniser.histogram()->entropy();
+  return plan;
+}
+
+std::string limit_words(const Plan& plan) {
+  constexpr double near_nats = 0.5;
+  const double gain = gain_for(plan.ranked.front().gain, plan.goal);
+  const auto samples = plan.samples.size();
+  const double most = std::log(static_cast<double>(samples));
+  if (gain > most - near_nats) {
+    return fmt::format(
+        "{} samples cannot show more than {:.2f} nats, and the best gain is near that: the first "
+        "candidates may not be in order; give more --samples",
+        samples, most);
+  }
+  if (gain <= unknown_nats(plan) + least_gain_nats) {
+    return "";
+  }
+  return plan.goal == PlanGoal::identity
+             ? fmt::format(
+                   "the best gain is above what is unknown: {} samples stand for the belief only "
+                   "roughly; give more --samples",
+                   samples)
+             : "the best gain is above what is unknown, which is counted in bins: the touch tells "
+               "also where in its bin the pose is";
+}
+
+std::vector<std::string> warnings_of(const Plan& plan) {
+  std::vector<std::string> warnings = plan.record.last().warnings;
+  if (const std::string limit = limit_words(plan); !limit.empty()) {
+    warnings.push_back(limit);
+  }
+  return warnings;
 }
 
 double label_entropy(std::span<const double> identity, const RecognitionTask& task) {

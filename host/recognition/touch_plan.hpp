@@ -2,7 +2,9 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <span>
+#include <string>
 #include <vector>
 
 #include <glm/vec2.hpp>
@@ -11,12 +13,17 @@
 #include "palpate/plan.hpp"
 #include "palpate/pose.hpp"
 #include "palpate/pose_histogram.hpp"
+#include "recognition/recognition_record.hpp"
 #include "recognition/recognition_task.hpp"
 
 namespace palpate {
 
 /// What the next touch shall tell.
 enum class PlanGoal { identity, pose, both };
+/// "identity", "pose" or "both". Throws Error naming the flag.
+PlanGoal parse_goal(const std::string& flag, const std::string& text);
+/// The goal's word.
+std::string goal_word(PlanGoal goal);
 
 /// The part of a gain that the goal asks for, in nats.
 double gain_for(const TouchGain& gain, PlanGoal goal);
@@ -49,6 +56,56 @@ std::vector<PlannedTouch> rank_touches(const PoseHistogram& histogram, const Rec
 /// @param theta_rad the first of the angles, such as that of the touch before
 std::vector<Pose> candidate_grid(std::span<const PoseSample> samples, const RecognitionTask& task,
                                  std::span<const glm::dvec2> elements_mm, double theta_rad);
+
+/// What is asked of a plan.
+struct PlanRequest {
+  PlanGoal goal = PlanGoal::both;
+  std::vector<Pose> candidates = {};  ///< T_robot_sensor; none: candidate_grid()
+  PlanOptions options = {};
+};
+/// In the place of a file of candidates: candidate_grid().
+inline constexpr const char* candidate_grid_word = "grid";
+/// The request that words and numbers make.
+/// @param goal see parse_goal()
+/// @param candidates candidate_grid_word, a table of poses, or a recording whose touches' poses are
+/// taken
+/// @param tell called with what is worth saying of the table, in whole sentences
+/// @throws Error on another goal, samples out of range, and a file that is missing or as
+/// require_reachable()
+PlanRequest plan_request(const std::string& goal, const std::string& candidates,
+                         std::size_t samples, std::uint64_t seed,
+                         const std::function<void(const std::string&)>& tell);
+/// Requires candidates, at most a million, that a robot reaches.
+/// @throws Error naming their source
+void require_reachable(const std::string& source, std::span<const Pose> candidates);
+
+/// Why a plan has no other filter than the histogram.
+inline constexpr const char* plan_needs = "a plan needs the belief of all poses";
+/// Refuses a task with particles, which `plan_needs`.
+void require_histogram(const RecognitionTask& task);
+
+/// What was planned, and what is believed before the touch.
+struct Plan {
+  PlanGoal goal = PlanGoal::both;
+  RecognitionRecord record;
+  std::vector<glm::dvec2> elements_mm;  ///< living ones of the array that touches next
+  std::vector<PoseSample> samples;      ///< of the belief
+  double identity_nats = 0.0;           ///< entropy of the labels
+  double both_nats = 0.0;               ///< entropy of objects and bins
+  std::vector<PlannedTouch> ranked;     ///< see rank_touches()
+  std::uint64_t seed = 0;
+  double seconds = 0.0;  ///< wall time after the recognition
+};
+/// Recognises the unknown and ranks the touches that may come next.
+/// @param recogniser of the task, a histogram without touches
+/// @throws Error where the unknown has no touches or no living element, and as recognise() and
+/// PoseHistogram::expected_gain() do; what `progress` throws
+Plan plan_touch(Recogniser& recogniser, const RecognitionTask& task, const Unknown& unknown,
+                const PlanRequest& request, const std::function<void(double)>& progress = {});
+/// Why the gains are no more exact; "" where nothing is to be said.
+std::string limit_words(const Plan& plan);
+/// What looks wrong with the touches, then limit_words().
+std::vector<std::string> warnings_of(const Plan& plan);
 
 /// Entropy of the labels in nats, "(none)" left out.
 double label_entropy(std::span<const double> identity, const RecognitionTask& task);

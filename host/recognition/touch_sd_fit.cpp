@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 #include <glm/geometric.hpp>
 
+#include "io/input_file.hpp"
 #include "model/bounding_box.hpp"
 #include "palpate/error.hpp"
 #include "recognition/evidence_search.hpp"
@@ -180,6 +181,42 @@ std::vector<std::string> warnings_about(std::span<const TouchedObject> unknowns,
 }
 
 }  // namespace
+
+std::vector<TouchedObject> touched_objects(std::span<const Recording> recordings,
+                                           std::span<const Unknown> unknowns,
+                                           const RecognitionTask& task) {
+  std::vector<TouchedObject> objects;
+  for (std::size_t i = 0; i < unknowns.size(); ++i) {
+    const std::string& label = recordings[i].object;
+    const bool known = std::ranges::find(task.labels, label) != task.labels.end();
+    objects.push_back({unknowns[i].recording, unknowns[i].touches, known ? label : ""});
+  }
+  return objects;
+}
+
+void require_fittable(const RecognitionTask& task) {
+  if (!traits_of(task.filter).every_bin) {
+    refuse("--fit-touch-sd", "particles cannot fit it; use --filter histogram");
+  }
+  if (!task.touch_sd().none()) {
+    refuse("--fit-touch-sd",
+           "finds what --touch-sd-mm and --touch-sd-deg, the scene's touch_sd or the sensor model "
+           "say already; leave those out");
+  }
+  if (!task.slip_sd().none()) {
+    refuse("--fit-touch-sd",
+           "takes objects to rest between touches; leave out --slip-sd-mm and --slip-sd-deg, or "
+           "the scene's slip_sd");
+  }
+  if (task.contact().table) {
+    refuse("--fit-touch-sd", "learns a model of the sensor of its own; leave out the sensor model");
+  }
+  if (task.labels.back() == none_label) {
+    refuse("--fit-touch-sd",
+           "takes every unknown to be one of the maps' objects; leave out --none, or the scene's "
+           "none");
+  }
+}
 
 TouchSdFit fit_touch_sd(Device& device, const RecognitionTask& task,
                         std::span<const TouchedObject> unknowns, const TouchSdFitOptions& options,

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "palpate/displacement.hpp"
+#include "recognition/recognition_record.hpp"
 #include "recognition/recognition_task.hpp"
 
 namespace palpate {
@@ -19,6 +20,18 @@ struct TouchedObject {
   std::vector<Touch> touches;
   std::string label = {};  ///< of the object where it is known and has a map; "" otherwise
 };
+
+/// The unknowns as the fit takes them: a recording that names an object of the task has its label.
+/// @param recordings of which each is one of the unknowns
+std::vector<TouchedObject> touched_objects(std::span<const Recording> recordings,
+                                           std::span<const Unknown> unknowns,
+                                           const RecognitionTask& task);
+
+/// Why the fit has no other filter than the histogram.
+inline constexpr const char* touch_sd_fit_needs = "needs the belief of all poses";
+/// Throws Error where the task has particles, a touch_sd, a slip_sd, a sensor model's table or
+/// "none of these".
+void require_fittable(const RecognitionTask& task);
 
 struct TouchSdFitOptions {
   /// Where the search begins: with displacements so large that every pose which may explain the

@@ -19,5 +19,9 @@ void bind_sensors(nb::module_& module);
 void bind_request(nb::module_& module);
 void bind_recognition(nb::module_& module);
 void bind_batch(nb::module_& module);
+void bind_plan(nb::module_& module);
+void bind_evaluation(nb::module_& module);
+void bind_calibration(nb::module_& module);
+void bind_import(nb::module_& module);
 
 }  // namespace palpate::python

@@ -7,9 +7,15 @@
 
 #include "arrays.hpp"
 #include "palpate/estimate.hpp"
+#include "palpate/plan.hpp"
 #include "session.hpp"
 
 namespace palpate::python {
+
+/// Gains of every candidate.
+struct TouchGains {
+  std::vector<TouchGain> each;
+};
 
 /// Maps, as OccupancyGrid or Hypothesis.
 struct MapsLike : nb::object {

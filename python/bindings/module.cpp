@@ -51,5 +51,9 @@ NB_MODULE(_palpate, module) {
   bind_request(module);
   bind_recognition(module);
   bind_batch(module);
+  bind_plan(module);
+  bind_evaluation(module);
+  bind_calibration(module);
+  bind_import(module);
   Call::end_all_at_exit();
 }

@@ -62,17 +62,12 @@ Result<double, 1> of_each(const std::vector<TouchGain>& gains, const Number& num
   return owned(std::move(numbers), {gains.size()});
 }
 
-/// Gains of every candidate.
-struct TouchGains {
-  std::vector<TouchGain> each;
-
-  auto identity() const {
-    return of_each(each, [](const TouchGain& gain) { return gain.identity; });
-  }
-  auto pose() const {
-    return of_each(each, [](const TouchGain& gain) { return gain.pose; });
-  }
-};
+Result<double, 1> identity_of(const TouchGains& gains) {
+  return of_each(gains.each, [](const TouchGain& gain) { return gain.identity; });
+}
+Result<double, 1> pose_of_each(const TouchGains& gains) {
+  return of_each(gains.each, [](const TouchGain& gain) { return gain.pose; });
+}
 
 TouchGains expected_gain(const Histogram& self, const ArrayLike& T_robot_sensor,
                          const ArrayLike& elements_mm, std::size_t samples, std::uint64_t seed) {
@@ -88,8 +83,8 @@ void bind_gains(nb::module_& module) {
       module, "TouchGains",
       "What a touch at each of n candidate poses is expected to tell, in nats: estimates, none of\n"
       "them below 0, with standard errors. Unpacks into (identity, pose).")
-      .def_prop_ro("identity", &TouchGains::identity, "[n] about which object it is.")
-      .def_prop_ro("pose", &TouchGains::pose, "[n] about the pose, given the object.")
+      .def_prop_ro("identity", &identity_of, "[n] about which object it is.")
+      .def_prop_ro("pose", &pose_of_each, "[n] about the pose, given the object.")
       .def_prop_ro(
           "both",
           [](const TouchGains& self) {
@@ -118,7 +113,7 @@ void bind_gains(nb::module_& module) {
           },
           "[n] standard error of both.")
       .def("__iter__", [](const TouchGains& self) -> nb::typed<nb::iterator, Result<double, 1>> {
-        return nb::iter(nb::make_tuple(self.identity(), self.pose()));
+        return nb::iter(nb::make_tuple(identity_of(self), pose_of_each(self)));
       });
 }
 

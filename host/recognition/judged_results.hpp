@@ -8,7 +8,7 @@
 
 #include "recognition/evaluation.hpp"
 
-namespace palpate::cli {
+namespace palpate {
 
 /// What files of results say about unknowns of known truth.
 struct JudgedResults {
@@ -28,5 +28,18 @@ std::vector<std::filesystem::path> result_files(std::span<const std::string> arg
 /// field, where a file cannot be read, is not JSON or holds anything but records, where a value is
 /// of the wrong type or out of range, and where a record's probabilities do not sum to 1 +- 0.01
 JudgedResults read_results(std::span<const std::filesystem::path> files);
+/// Adds the records of such a file's text.
+/// @param file names the text in messages
+/// @throws Error as read_results()
+void add_records(const std::filesystem::path& file, const std::string& text,
+                 JudgedResults& results);
 
-}  // namespace palpate::cli
+/// Compares the records with the truth.
+/// @param source of the results, for the message
+/// @throws Error (Fault::input) where no record has a true label
+Evaluation evaluate(const JudgedResults& results, const std::filesystem::path& source);
+
+/// How many unknowns were left out because they could not be recognised; "" where none was.
+std::string failed_words(const JudgedResults& results);
+
+}  // namespace palpate

@@ -1,6 +1,7 @@
-#include "cli/imported_recording.hpp"
+#include "streaming/table_import.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numeric>
 #include <utility>
@@ -9,16 +10,95 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include "cli/options.hpp"
+#include "io/array_table.hpp"
 #include "io/file_identity.hpp"
 #include "io/npy_file.hpp"
 #include "io/pose_table.hpp"
 #include "io/pressure_table.hpp"
 #include "io/recording_rules.hpp"
+#include "io/table_columns.hpp"
+#include "model/number_text.hpp"
 
-namespace palpate::cli {
+namespace palpate {
 
 namespace {
+
+/// The array of --array: a grid, or a file.
+struct Array : ArrayTable {
+  std::size_t columns = 0;  ///< 0: not a grid
+  std::size_t rows = 0;
+};
+
+/// Splits the text into `count` parts, the first of which may hold the separator itself; no parts
+/// where there are fewer.
+std::vector<std::string> split_last(std::string text, char separator, std::size_t count) {
+  std::vector<std::string> parts;
+  for (std::size_t at = text.npos; parts.size() + 1 < count; text.resize(at)) {
+    at = text.rfind(separator);
+    if (at == text.npos) {
+      return {};
+    }
+    parts.insert(parts.begin(), text.substr(at + 1));
+  }
+  parts.insert(parts.begin(), text);
+  return parts;
+}
+
+std::optional<Unit> unit_named(std::span<const Unit> units, const std::string& name) {
+  const auto found = std::ranges::find(units, name, &Unit::name);
+  return found == units.end() ? std::nullopt : std::optional(*found);
+}
+
+TableOptions table_options(const ImportOptions& options) {
+  TableOptions table{.time_column = options.time_column,
+                     .pressure_columns = options.pressure_columns};
+  if (!options.time_unit.empty()) {
+    table.time_unit = unit_named(time_units, options.time_unit);
+    if (!table.time_unit) {
+      refuse(fmt::format("--time-unit {}", options.time_unit), "give s, ms, us or ns");
+    }
+  }
+  if (!options.pose_unit.empty()) {
+    const auto names = split_last(options.pose_unit, ',', 2);
+    table.length_unit = names.empty() ? std::nullopt : unit_named(length_units, names[0]);
+    table.angle_unit = names.empty() ? std::nullopt : unit_named(angle_units, names[1]);
+    if (!table.length_unit || !table.angle_unit) {
+      refuse(fmt::format("--pose-unit {}", options.pose_unit),
+             "give mm,rad or mm,deg or m,rad or m,deg");
+    }
+  }
+  if (!options.pose_columns.empty()) {
+    const auto names = split_last(options.pose_columns, ',', 3);
+    if (names.empty()) {
+      refuse(fmt::format("--pose-columns {}", options.pose_columns), "give three names, X,Y,THETA");
+    }
+    std::ranges::copy(names, table.pose_columns.begin());
+  }
+  return table;
+}
+
+Array array_of(const std::string& text) {
+  const auto parts = split_last(text, ':', 3);
+  const auto columns = parts.empty() ? std::nullopt : whole_number_of(parts[0]);
+  if (!columns) {
+    return {read_array(text)};
+  }
+  constexpr std::int64_t most = 1024;
+  const auto rows = whole_number_of(parts[1]);
+  const auto pitch_mm = number_of(parts[2]);
+  if (*columns < 1 || *columns > most || !rows || *rows < 1 || *rows > most || !pitch_mm ||
+      *pitch_mm < 1e-3 || *pitch_mm > 1e3) {
+    refuse(fmt::format("--array {}", text),
+           "give COLUMNS:ROWS:PITCH, with 1 to {} columns and rows and a pitch of 0.001 to "
+           "1000 mm, or a file",
+           most);
+  }
+  Array array;
+  array.columns = static_cast<std::size_t>(*columns);
+  array.rows = static_cast<std::size_t>(*rows);
+  array.elements_mm = grid_array(static_cast<int>(*columns), static_cast<int>(*rows), *pitch_mm);
+  return array;
+}
 
 PressureTable read_npy_pressures(const std::string& path, const Array& array) {
   NpyArray npy = read_npy(path);
@@ -191,8 +271,8 @@ void choose_rows(const ImportOptions& options, Recording& recording) {
   const std::size_t n = recording.pressure.size() / recording.elements_mm.size();
   if (options.rate_hz) {
     if (!recording.time_s.empty()) {
-      refuse_flag("--rate", *options.rate_hz, "{} has times; leave the flag out",
-                  options.pressures);
+      refuse(fmt::format("--rate {}", *options.rate_hz), "{} has times; leave the flag out",
+             options.pressures);
     }
     for (std::size_t i = 0; i < n; ++i) {
       recording.time_s.push_back(static_cast<double>(i) / *options.rate_hz);
@@ -203,7 +283,7 @@ void choose_rows(const ImportOptions& options, Recording& recording) {
     return;
   }
   if (options.rows != "touches" && options.rows != "frames") {
-    refuse_flag("--rows", options.rows, "give frames or touches");
+    refuse(fmt::format("--rows {}", options.rows), "give frames or touches");
   }
   if (options.rows == "frames" && recording.time_s.empty()) {
     refuse(options.pressures, "frames need times; add a column 'time', or give --rate");
@@ -211,22 +291,72 @@ void choose_rows(const ImportOptions& options, Recording& recording) {
   recording.rows = options.rows;
 }
 
+/// The label and the pose of --truth, whose numbers are still in the units of the tables.
+Truth truth_of(const std::string& text) {
+  const auto parts = split_last(text, ',', 4);
+  std::array<std::optional<double>, 3> pose;
+  for (std::size_t i = 0; i < 3; ++i) {
+    pose[i] = parts.empty() || parts[0].empty() ? std::nullopt : number_of(parts[i + 1]);
+    if (!pose[i]) {
+      refuse(fmt::format("--truth {}", text), "give LABEL,X,Y,THETA, in the units of the poses");
+    }
+  }
+  return {parts[0], {{*pose[0], *pose[1]}, *pose[2]}};
+}
+
+/// The pose of --truth in mm and rad.
+Pose truth_pose(const std::string& text, const Pose& in_units, const std::array<Unit, 3>& units) {
+  const Pose pose{
+      {units[0].convert(in_units.translation_mm.x), units[1].convert(in_units.translation_mm.y)},
+      units[2].convert(in_units.theta_rad)};
+  if (!is_robot_pose(pose)) {
+    refuse(fmt::format("--truth {}", text),
+           "is further than {:g} mm or turned by more than 1e9 rad; check the numbers and "
+           "their units, {}, {} and {}",
+           farthest_mm, units[0].name, units[1].name, units[2].name);
+  }
+  return pose;
+}
+
+void check_numbers(const ImportOptions& options) {
+  if (options.largest_gap_s &&
+      !(*options.largest_gap_s > 0.0 && std::isfinite(*options.largest_gap_s))) {
+    refuse(fmt::format("--largest-gap-s {}", *options.largest_gap_s), "must be above 0");
+  }
+  constexpr double slowest_hz = 1e-3;
+  constexpr double fastest_hz = 1e6;
+  if (options.rate_hz && !(*options.rate_hz >= slowest_hz && *options.rate_hz <= fastest_hz)) {
+    refuse(fmt::format("--rate {}", *options.rate_hz), "give {} to {} Hz", slowest_hz, fastest_hz);
+  }
+  if (options.pressure_unit != "kPa" && options.pressure_unit != "raw") {
+    refuse(fmt::format("--pressure-unit {}", options.pressure_unit), "give kPa or raw");
+  }
+  if (options.unposed && !options.poses.empty()) {
+    refuse("--unposed", "{} holds the poses; leave one of the flags out", options.poses);
+  }
+}
+
 }  // namespace
 
-ImportedRecording read_tables(const ImportOptions& options, const TableOptions& columns,
-                              Array array) {
+ImportedRecording import_tables(const ImportOptions& options) {
+  const TableOptions columns = table_options(options);
+  check_numbers(options);
+  auto truth = options.truth.empty() ? std::nullopt : std::optional(truth_of(options.truth));
+  Array array = options.elements_mm.empty() ? array_of(options.array)
+                                            : Array{{.elements_mm = options.elements_mm}};
   if (!options.time_column.empty() && !has_column(options.pressures, options.time_column) &&
       !has_column(options.poses, options.time_column)) {
-    refuse_flag("--time-column", options.time_column, "no table has this column; give its name");
+    refuse(fmt::format("--time-column {}", options.time_column),
+           "no table has this column; give its name");
   }
   PressureTable pressures =
       is_npy(options.pressures)
           ? read_npy_pressures(options.pressures, array)
           : read_pressures(options.pressures, array.elements_mm.size(), columns);
   ImportedRecording imported;
-  imported.pose_units[0] = columns.length_unit.value_or(length_units.front());
-  imported.pose_units[1] = imported.pose_units[0];
-  imported.pose_units[2] = columns.angle_unit.value_or(angle_units.front());
+  const Unit length_unit = columns.length_unit.value_or(length_units.front());
+  std::array<Unit, 3> pose_units{length_unit, length_unit,
+                                 columns.angle_unit.value_or(angle_units.front())};
   imported.holds_poses = pressures.holds_poses;
   Recording& recording = imported.recording;
   recording.pressure_unit = options.pressure_unit;
@@ -246,7 +376,7 @@ ImportedRecording read_tables(const ImportOptions& options, const TableOptions& 
   mark_unknown(options.pressures, recording);
   if (poses) {
     imported.assumed_units = poses->assumed_units;
-    imported.pose_units = poses->units;
+    pose_units = poses->units;
     join(std::move(*poses), options, imported);
   } else {
     const bool at_zero = options.unposed && recording.rows == "touches";
@@ -256,7 +386,12 @@ ImportedRecording read_tables(const ImportOptions& options, const TableOptions& 
   if (recording.rows == "touches" && !options.unposed) {
     require_touch_poses(options, imported);
   }
+  recording.object = options.object;
+  if (truth) {
+    truth->T_object_robot = truth_pose(options.truth, truth->T_object_robot, pose_units);
+    recording.truth = truth;
+  }
   return imported;
 }
 
-}  // namespace palpate::cli
+}  // namespace palpate

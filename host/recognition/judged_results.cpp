@@ -1,4 +1,4 @@
-#include "cli/results_file.hpp"
+#include "recognition/judged_results.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -12,11 +12,10 @@
 
 #include <nlohmann/json.hpp>
 
-#include "cli/batch/results_folder.hpp"
 #include "io/file_identity.hpp"
 #include "io/input_file.hpp"
 
-namespace palpate::cli {
+namespace palpate {
 
 namespace {
 
@@ -205,12 +204,13 @@ std::string read_bytes(const fs::path& file) {
   return bytes;
 }
 
-/// The chunks of a folder of palpate batch, or the *.json of another one, by name.
+/// The chunks of a folder of palpate batch, which has a task, or the *.json of another one, by
+/// name.
 std::vector<fs::path> files_of(const fs::path& results) {
-  const bool batch = is_results_folder(results);
-  const fs::path folder = batch ? ResultsFolder(results).chunks() : results;
-  const char* const extension = batch ? ".ndjson" : ".json";
   std::error_code error;
+  const bool batch = fs::is_regular_file(results / "task.ndjson", error);
+  const fs::path folder = batch ? results / "chunks" : results;
+  const char* const extension = batch ? ".ndjson" : ".json";
   const fs::directory_iterator entries(folder, error);
   if (error) {
     refuse(folder, "cannot be read: {}; check its permissions", error.message());
@@ -248,22 +248,44 @@ std::vector<fs::path> result_files(std::span<const std::string> arguments) {
   return files;
 }
 
+void add_records(const fs::path& file, const std::string& text, JudgedResults& results) {
+  const Json records = parse(file, text);
+  for (std::size_t i = 0; i < records.size(); ++i) {
+    const RecordReader reader(file, i, records[i]);
+    if (reader.failed()) {
+      ++results.failed;
+    } else if (auto judged = reader.read()) {
+      results.records.push_back(std::move(*judged));
+    } else {
+      ++results.without_truth;
+    }
+  }
+}
+
 JudgedResults read_results(std::span<const fs::path> files) {
   JudgedResults results;
   for (const fs::path& file : files) {
-    const Json records = parse(file, read_bytes(file));
-    for (std::size_t i = 0; i < records.size(); ++i) {
-      const RecordReader reader(file, i, records[i]);
-      if (reader.failed()) {
-        ++results.failed;
-      } else if (auto judged = reader.read()) {
-        results.records.push_back(std::move(*judged));
-      } else {
-        ++results.without_truth;
-      }
-    }
+    add_records(file, read_bytes(file), results);
   }
   return results;
 }
 
-}  // namespace palpate::cli
+Evaluation evaluate(const JudgedResults& results, const fs::path& source) {
+  if (results.records.empty()) {
+    refuse(source,
+           "none of {} record(s) has a true label ('truth'); name the object in the recordings "
+           "before palpate recognize, or give other results",
+           results.without_truth);
+  }
+  return evaluate(results.records);
+}
+
+std::string failed_words(const JudgedResults& results) {
+  return results.failed == 0
+             ? ""
+             : fmt::format(
+                   "{} unknown{} could not be recognised, and left out; their records say why",
+                   results.failed, results.failed == 1 ? "" : "s");
+}
+
+}  // namespace palpate

@@ -1,0 +1,50 @@
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <glm/vec2.hpp>
+
+#include "palpate/pose_track.hpp"
+#include "palpate/touch.hpp"
+
+namespace palpate {
+
+/// The tables of 'palpate import', and what they hold; texts are as its flags have them, "" where
+/// one is not given.
+struct ImportOptions {
+  std::string pressures;
+  std::string poses;
+  std::string array;                    ///< COLUMNS:ROWS:PITCH, or a file
+  std::vector<glm::dvec2> elements_mm;  ///< [e] of a program, in the place of `array`
+  std::string pressure_unit = "kPa";
+  std::string pose_unit;
+  std::string time_unit;
+  std::string time_column;
+  std::string pressure_columns;
+  std::string pose_columns;
+  std::optional<double> largest_gap_s;  ///< none: by the times of the poses
+  std::optional<double> rate_hz;
+  std::string rows;
+  std::string object;
+  std::string truth;     ///< LABEL,X,Y,THETA in the units of the poses
+  bool unposed = false;  ///< touches without poses get the pose 0
+};
+
+/// The recording that the tables make.
+struct ImportedRecording {
+  Recording recording;
+  bool assumed_units = false;  ///< nothing said that the poses are in mm and rad
+  bool holds_poses = false;    ///< the table of pressures has columns of poses
+  double largest_gap_s = 0.0;  ///< poses further apart in time were not interpolated
+  std::size_t in_gaps = 0;     ///< frames between two poses that are further apart
+};
+
+/// Reads the pressures and the poses and joins them.
+/// @throws Error, naming the flag and its value, or file and line or row, where the tables do not
+/// make a recording
+ImportedRecording import_tables(const ImportOptions& options);
+
+}  // namespace palpate

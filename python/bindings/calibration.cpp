@@ -1,0 +1,204 @@
+#include <array>
+#include <string>
+#include <tuple>
+#include <utility>
+#include <vector>
+
+#include <fmt/format.h>
+#include <nanobind/stl/optional.h>
+#include <nanobind/stl/shared_ptr.h>
+#include <nanobind/stl/tuple.h>
+#include <nanobind/stl/vector.h>
+
+#include "arrays.hpp"
+#include "bindings.hpp"
+#include "cli/map_files.hpp"
+#include "cli/recordings.hpp"
+#include "given_recordings.hpp"
+#include "learning/calibration_task.hpp"
+#include "palpate/files.hpp"
+#include "session.hpp"
+
+namespace palpate::python {
+
+using namespace nb::literals;
+
+namespace {
+
+std::vector<NamedMap> named_maps(const cli::RecognitionFlags& flags) {
+  std::vector<NamedMap> maps;
+  for (const cli::GivenMap& given : flags.given_maps) {
+    maps.push_back({given.name, given.hypothesis.map});
+  }
+  if (flags.given_maps.empty()) {
+    for (const std::string& argument : flags.maps) {
+      for (const std::filesystem::path& file : cli::map_files(argument)) {
+        maps.push_back({file.string(), read_map(file)});
+      }
+    }
+  }
+  return maps;
+}
+
+SensorCalibration calibrate(const GivenRecordings& given, const Request& request,
+                            CalibrationRequest wanted, std::shared_ptr<Session> session,
+                            Call& call) {
+  constexpr double calibrating = 0.5;  // of the time, where touches' poses are fitted
+  const std::vector<Recording> recordings = given.read();
+  const auto frames = cli::frames_of(request.unknowns);
+  std::vector<std::array<std::size_t, 2>> touches;
+  for (const Recording& recording : recordings) {
+    const auto [begin, end] = cli::select(recording, frames);
+    touches.push_back({begin, end});
+  }
+  if (!cli::infers_region(request.flags, {})) {
+    wanted.bins = {cli::given_lattice(request.flags, {}), cli::has_auto_pivot(request.flags, {})};
+  }
+  const CalibrationTask task =
+      calibration_task(wanted, recordings, touches, named_maps(request.flags));
+  const auto report = call.progress();
+  const double share = task.known_poses() ? calibrating : 1.0;
+  SensorCalibration calibration = calibrate_sensor(
+      task.presses, task.maps, task.options, [&](double fraction) { report(share * fraction); });
+  if (task.known_poses()) {
+    if (!session) {
+      session = std::make_shared<Session>(cli::open_device(request.flags, {}));
+    }
+    auto lock = session->lock(call);
+    add_touch_sd(lock.device(), task, calibration,
+                 [&](double fraction) { report(share + (1.0 - share) * fraction); });
+  }
+  return calibration;
+}
+
+SensorCalibration calibrate_python(const nb::list& recordings, const nb::list& maps,
+                                   Request request, const CalibrationRequest& wanted,
+                                   const std::shared_ptr<Session>& session,
+                                   const Progress& progress) {
+  const GivenRecordings given = given_recordings(recordings);
+  add_maps(maps, request.flags);
+  return run({}, progress,
+             [=](Call& call) { return calibrate(given, request, wanted, session, call); });
+}
+
+std::string layer_word(MapLayer layer) {
+  return layer == MapLayer::mean_level ? "mean_level" : "log_odds";
+}
+
+void bind_sensor(nb::module_& module) {
+  nb::class_<LearnedSensor>(module, "LearnedSensor",
+                            "What calibrate() learned about a sensor and the objects that it "
+                            "touched.")
+      .def_ro("pressure_unit", &LearnedSensor::pressure_unit, "\"kPa\" or \"raw\".")
+      .def_ro("noise", &LearnedSensor::noise,
+              "Standard deviation of an untouched element, in pressure_unit.")
+      .def_ro("classifier", &LearnedSensor::classifier, "Contact threshold and ratio (Eq. 3).")
+      .def_ro("gamma", &LearnedSensor::gamma, "Of Eq. 7.")
+      .def_ro("prior", &LearnedSensor::prior, "Of new maps.")
+      .def_ro("psf_mm", &LearnedSensor::psf_mm,
+              "Standard deviation of the point spread, mm; None for presses at unknown poses.")
+      .def_ro("spread_mm", &LearnedSensor::spread_mm, "Of new maps.")
+      .def_ro("touch_sd", &LearnedSensor::touch_sd,
+              "How far touches lie from their poses; 0 where that cannot be told.")
+      .def_ro("temperature", &LearnedSensor::temperature,
+              "A label's probability is its evidence to the power of 1 / temperature, normalised.")
+      .def_ro("temperature_growth", &LearnedSensor::temperature_growth,
+              "More of it for every touch after the first.")
+      .def_prop_ro(
+          "layer", [](const LearnedSensor& self) { return layer_word(self.table->layer.of); },
+          "What of a map readings are compared with: \"mean_level\" or \"log_odds\".")
+      .def_prop_ro(
+          "level_edges",
+          [](const LearnedSensor& self) {
+            const std::vector<double>& edges = self.table->level_edges;
+            return owned(std::vector<double>(edges), {edges.size()});
+          },
+          "[levels - 2] ascending pressures that part In Contact into levels.")
+      .def_prop_ro(
+          "log_likelihood",
+          [](const LearnedSensor& self) {
+            return owned(std::vector<double>(self.table->shared),
+                         {self.table->levels(), static_cast<std::size_t>(ReadingLayer::nodes)});
+          },
+          "[levels, nodes] log P(level | layer) in nats, of all objects together.")
+      .def(
+          "save",
+          [](const LearnedSensor& self, const PathLike& file) {
+            run([sensor = self, path = file.path()](Call&) { write_sensor_model(path, sensor); });
+          },
+          "path"_a,
+          "Writes the sensor model (YAML), which recognize() and the commands take. Raises Error\n"
+          "where it cannot be written.")
+      .def("__repr__", [](const LearnedSensor& self) {
+        return fmt::format(
+            "LearnedSensor(threshold={:.3g} {}, ratio={:.3g}, {} levels over {}, "
+            "temperature={:.3g})",
+            self.classifier.threshold, self.pressure_unit, self.classifier.ratio,
+            self.table->levels(), layer_word(self.table->layer.of), self.temperature);
+      });
+}
+
+}  // namespace
+
+void bind_calibration(nb::module_& module) {
+  bind_sensor(module);
+  nb::class_<GroupScores>(module, "GroupScores",
+                          "The cross-validation of several touches of one object at a time.")
+      .def_ro("touches", &GroupScores::touches, "Touches of a group.")
+      .def_ro("before", &GroupScores::before, "Eq. 7 with gamma 0.1, temperature 1.")
+      .def_ro("table", &GroupScores::table, "The table, temperature 1.")
+      .def_ro("after", &GroupScores::after, "The table and the temperature.");
+  nb::class_<SensorCalibration>(
+      module, "SensorCalibration",
+      "A learned sensor and how good it is on touches that it has not seen, by cross-validation.\n"
+      "With one object there is none to compare by, and `before` to `area_under_curve` are None.")
+      .def_ro("sensor", &SensorCalibration::sensor, "What was learned.")
+      .def_ro("touch_sd_fitted", &SensorCalibration::touch_sd_fitted,
+              "Whether sensor.touch_sd is the result of a fit.")
+      .def_ro("objects", &SensorCalibration::objects, "Number of objects.")
+      .def_prop_ro(
+          "tried",
+          [](const SensorCalibration& self) {
+            std::vector<std::tuple<std::string, std::size_t, double>> tried;
+            for (const TriedTable& table : self.tried) {
+              tried.emplace_back(layer_word(table.kind.layer), table.kind.levels, table.log_loss);
+            }
+            return tried;
+          },
+          "(layer, levels, log-loss in nats) of the tables that were tried.")
+      .def_ro("before", &SensorCalibration::before, "Eq. 7 with gamma 0.1, temperature 1.")
+      .def_ro("table", &SensorCalibration::table, "The table, temperature 1.")
+      .def_ro("after", &SensorCalibration::after, "The table, temperature and press features.")
+      .def_ro("groups", &SensorCalibration::groups,
+              "Several touches at a time; None at unknown poses, or for few touches.")
+      .def_ro("area_under_curve", &SensorCalibration::area_under_curve,
+              "Of touches of known objects against those of objects that were left out.")
+      .def_ro("warnings", &SensorCalibration::warnings, "What could not be learned, in sentences.")
+      .def("__repr__", [](const SensorCalibration& self) {
+        return fmt::format(
+            "SensorCalibration({} object{}{})", self.objects, self.objects == 1 ? "" : "s",
+            self.after
+                ? fmt::format(", {} of {} touches right", self.after->right, self.after->records)
+                : "");
+      });
+  nb::class_<CalibrationRequest>(module, "CalibrationFlags",
+                                 "The flags of `palpate calibrate` that recognition has not.")
+      .def(nb::init<>())
+      .def_rw("unposed", &CalibrationRequest::unposed)
+      .def_rw("threshold", &CalibrationRequest::threshold)
+      .def_rw("ratio", &CalibrationRequest::ratio)
+      .def_rw("layer", &CalibrationRequest::layer)
+      .def_rw("levels", &CalibrationRequest::levels)
+      .def_rw("max_maps", &CalibrationRequest::max_maps)
+      .def_rw("gives_bins", &CalibrationRequest::gives_bins);
+  module.def("calibrate_as_flagged", &calibrate_python, "recordings"_a, "maps"_a, "flags"_a,
+             "calibration"_a, "device"_a = nb::none(), "progress"_a = nb::none(),
+             nb::sig("def calibrate_as_flagged(recordings: list[Recording | str], maps: "
+                     "list[OccupancyGrid | Hypothesis | str], flags: RecognitionFlags, "
+                     "calibration: CalibrationFlags, device: Device | None = None, progress: "
+                     "collections.abc.Callable[[float], object] | None = None) -> "
+                     "SensorCalibration"),
+             "The calibration that flags ask for; of `flags` the maps, bins, frames and device.");
+}
+
+}  // namespace palpate::python

@@ -1,0 +1,347 @@
+"""`palpate import`, `calibrate`, `plan`, `evaluate` and `recognize --fit-touch-sd` as functions.
+
+They have the commands' rules, defaults and words.
+"""
+
+import inspect
+import json
+import os
+import warnings
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Literal, TypedDict, TypeVar
+
+from . import _palpate
+from ._palpate import (
+    Device,
+    Evaluation,
+    Hypothesis,
+    OccupancyGrid,
+    Recording,
+    SensorCalibration,
+    TouchGains,
+    TouchSdFit,
+    Truth,
+)
+from .many import Recognized
+from .recognition import Record, flags_of
+
+# The build writes the stubs by importing the package, where there is no NumPy.
+if TYPE_CHECKING:
+    import numpy
+    from numpy.typing import ArrayLike, NDArray
+    from typing_extensions import Unpack
+
+_Path = str | bytes | os.PathLike[str] | os.PathLike[bytes]
+_Pair = tuple[float, float]
+_Maps = OccupancyGrid | Hypothesis | _Path | Iterable[OccupancyGrid | Hypothesis | _Path]
+_Flags = TypeVar("_Flags")
+
+
+class RecognitionOptions(TypedDict, total=False):
+    """Options of recognize(), by their names, that plan() and fit_touch_sd() have, too."""
+
+    bins: tuple[int, int, int] | Literal["auto", "fine"]
+    x_mm: _Pair
+    y_mm: _Pair
+    theta_deg: _Pair
+    pivot_mm: _Pair | Literal["auto"]
+    scene: _Path
+    sensor_model: _Path
+    prior: float
+    gamma: float
+    threshold: float
+    ratio: float
+    touch_sd_mm: float
+    touch_sd_deg: float
+    slip_sd_mm: float
+    slip_sd_deg: float
+    none: float | Literal["auto"]
+    memory_mib: int
+    frames: tuple[int, int]
+    touches: int
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """Poses of the next touch, the best first: the n candidates of plan()."""
+
+    recording: str
+    """The file of the touches so far, or another name."""
+    touches: int
+    """How many touches were used."""
+    goal: str
+    """"identity", "pose" or "both"."""
+    believed: Record
+    """What is believed before the touch: the fields of a Record from `best` on."""
+    identity_nats: float
+    """What is unknown of the identity: the entropy of the labels, nats."""
+    pose_nats: float
+    """What is unknown of the pose once the object is known, counted in bins, nats."""
+    index: "NDArray[numpy.uint64]"
+    """[n] places of the candidates among those that were given, from 0."""
+    T_robot_sensor: "NDArray[numpy.float64]"
+    """[n, 3] (x_mm, y_mm, theta_rad)."""
+    gains: TouchGains
+    """[n] what each touch is expected to tell, nats."""
+    warnings: list[str]
+    """What looks wrong with the touches, and what limits the gains, in sentences."""
+    samples: int
+    """Objects and poses that stood for the belief."""
+    seed: int
+    """Of the samples and the readings that they simulate."""
+    seconds: float
+    """Wall time of the plan alone, s."""
+    device: str
+    """Name of the device."""
+
+
+def plan(
+    recording: Recording | _Path,
+    maps: _Maps = (),
+    *,
+    candidates: "Literal['grid'] | _Path | ArrayLike" = "grid",
+    goal: Literal["identity", "pose", "both"] = "both",
+    samples: int = 96,
+    plan_seed: int = 0,
+    device: Device | str | int | None = None,
+    progress: Callable[[float], object] | None = None,
+    **options: "Unpack[RecognitionOptions]",
+) -> Plan:
+    """Ranks poses for the next touch by what each is expected to tell, as `palpate plan` does.
+
+    recording: the touches so far; maps, device, progress and options: as for recognize(); candidates:
+    T_robot_sensor [n, 3] (x_mm, y_mm, theta_rad), a CSV file of such poses, a recording whose touches'
+    poses are taken, or "grid": 100 to 300 poses about the places where the object may be; goal: what
+    the touch shall tell; samples, 2 to 4096: objects and poses that stand for the belief; the time
+    grows with its square; plan_seed: of the samples.
+
+    Raises Error in the words of the command, also for particles, which have no belief of all poses.
+    What the command would say on standard error becomes a UserWarning.
+    """
+    if isinstance(candidates, (bytes, os.PathLike)):
+        candidates = os.fsdecode(candidates)
+    fields, sentences = _palpate.plan_as_flagged(
+        _recordings([recording]),
+        _maps_of(maps),
+        _recognition_flags("plan", options, device),
+        goal,
+        candidates,
+        samples,
+        plan_seed,
+        device if isinstance(device, Device) else None,
+        progress,
+    )
+    _warn(sentences)
+    return Plan(**{**fields, "believed": Record(json.loads(fields["believed"]))})
+
+
+def fit_touch_sd(
+    recordings: Recording | _Path | Iterable[Recording | _Path],
+    maps: _Maps = (),
+    *,
+    device: Device | str | int | None = None,
+    progress: Callable[[float], object] | None = None,
+    **options: "Unpack[RecognitionOptions]",
+) -> TouchSdFit:
+    """Finds how far touches lie from the poses that the robot reported, without knowing the objects.
+
+    As `palpate recognize --fit-touch-sd`, number for number: of each recording all touches are of one
+    object of the maps. recordings, maps, device, progress and options: as for recognize().
+
+    Raises Error in the words of the command, also beside touch_sd, slip_sd, none and a sensor model.
+    What the command would say on standard error becomes a UserWarning.
+    """
+    fit, sentences = _palpate.fit_as_flagged(
+        _recordings(recordings),
+        _maps_of(maps),
+        _recognition_flags("fit_touch_sd", options, device),
+        device if isinstance(device, Device) else None,
+        progress,
+    )
+    _warn(sentences)
+    return fit
+
+
+def calibrate(
+    recordings: Recording | _Path | Iterable[Recording | _Path],
+    *,
+    maps: _Maps = (),
+    unposed: bool = False,
+    threshold: float | None = None,
+    ratio: float | None = None,
+    layer: Literal["auto", "mean_level", "log_odds"] = "auto",
+    levels: int | None = None,
+    max_maps: int = 5,
+    bins: tuple[int, int, int] | None = None,
+    x_mm: _Pair | None = None,
+    y_mm: _Pair | None = None,
+    theta_deg: _Pair | None = None,
+    pivot_mm: _Pair | Literal["auto"] | None = None,
+    frames: tuple[int, int] | None = None,
+    device: Device | str | int | None = None,
+    progress: Callable[[float], object] | None = None,
+) -> SensorCalibration:
+    """Learns a sensor model from touches of known objects, as `palpate calibrate` does.
+
+    recordings: of touches, each with its `object`; where all touches of a recording are at one pose,
+    or with unposed, their poses count as unknown. Touches at known poses are at poses of the sensor in
+    the object's frame. maps: to compare touches with, built from other touches; none: maps of the
+    touches themselves, each compared with maps that were built without it. Other options are the flags
+    of `palpate calibrate`, with its defaults: threshold, in the recordings' pressure unit, and ratio
+    are learned where they are not given; bins, x_mm, y_mm, theta_deg and pivot_mm are those that
+    recognize() will be given, for touches at known poses; device: an open Device, or a name or index
+    as for Device.open(); touches at unknown poses use none.
+
+    Raises Error in the words of the command. What could not be learned is in the result's `warnings`.
+    """
+    if isinstance(bins, str):
+        raise TypeError(f"bins: {bins!r}; give counts, such as (25, 25, 16), or leave it out")
+    region = {"bins": bins, "x_mm": x_mm, "y_mm": y_mm, "theta_deg": theta_deg, "pivot_mm": pivot_mm}
+    flags = {
+        "unposed": unposed,
+        "threshold": threshold,
+        "ratio": ratio,
+        "layer": layer,
+        "levels": levels,
+        "max_maps": max_maps,
+        "gives_bins": any(value is not None for value in region.values()),
+    }
+    named = None if isinstance(device, Device) else device
+    return _palpate.calibrate_as_flagged(
+        _recordings(recordings),
+        _maps_of(maps),
+        flags_of({**region, "frames": frames, "device": named}),
+        _filled(_palpate.CalibrationFlags(), calibrate, flags),
+        device if isinstance(device, Device) else None,
+        progress,
+    )
+
+
+def evaluate(
+    results: Mapping[str, Any]
+    | Recognized
+    | _Path
+    | Iterable[Mapping[str, Any] | Recognized | _Path],
+) -> Evaluation:
+    """Compares what was recognised with the truth, as `palpate evaluate` does, number for number.
+
+    results: records of recognize(), results of recognize_many(), and files and folders as `palpate
+    evaluate` takes them. Records without a true label, and those with an error, are left out and
+    counted.
+
+    Raises Error where no record has a true label, and on what is no record.
+    """
+    if isinstance(results, (Mapping, Recognized, str, bytes, os.PathLike)):
+        results = [results]
+    paths: list[str] = []
+    records: list[Any] = []
+    for item in results:
+        if isinstance(item, (str, bytes, os.PathLike)):
+            paths.append(os.fsdecode(item))
+        else:
+            records.append(item.record if isinstance(item, Recognized) else item)
+    # As in the command's JSON, numbers that are not finite are null, and names need not be UTF-8.
+    finite = json.loads(json.dumps(records), parse_constant=lambda _: None)
+    text = json.dumps(finite, ensure_ascii=False).encode(errors="replace")
+    return _palpate.evaluate_results(paths, text)
+
+
+def import_tables(
+    pressures: _Path,
+    *,
+    array: "tuple[int, int, float] | _Path | ArrayLike",
+    poses: _Path | None = None,
+    unposed: bool = False,
+    rows: Literal["frames", "touches"] | None = None,
+    pressure_unit: Literal["kPa", "raw"] = "kPa",
+    pose_unit: tuple[Literal["mm", "m"], Literal["rad", "deg"]] | None = None,
+    time_unit: Literal["s", "ms", "us", "ns"] | None = None,
+    time_column: str | None = None,
+    pressure_columns: str | None = None,
+    pose_columns: tuple[str, str, str] | None = None,
+    largest_gap_s: float | None = None,
+    rate: float | None = None,
+    object: str = "",
+    truth: Truth | None = None,
+) -> Recording:
+    """Makes a recording from tables, as `palpate import` does; docs/files.md describes them.
+
+    pressures: a CSV file, or an array of numpy.save, [n, e] or [n, rows, columns]; array: (columns,
+    rows, pitch_mm), a CSV file, or the elements' centres [e, 2] in mm in the sensor frame; poses: a CSV
+    file of T_robot_sensor, in mm and rad where neither its columns' names nor pose_unit say otherwise;
+    rate: frames per second of pressures without times, Hz; object: label of what was touched; truth:
+    its true identity and pose. Other options are the flags of the command, with its defaults.
+
+    Raises Error in the words of the command, naming file and line or row. Frames without a pose
+    between two poses, columns of poses that were left out, and units that nothing gives become a
+    UserWarning.
+    """
+    text, elements_mm = "", None
+    if isinstance(array, (str, bytes, os.PathLike)):
+        text = os.fsdecode(array)
+    elif isinstance(array, tuple) and len(array) == 3 and isinstance(array[0], int):
+        text = ":".join(map(str, array))
+    else:
+        elements_mm = array
+    options = {
+        "pressures": os.fsdecode(pressures),
+        "array": text,
+        "poses": None if poses is None else os.fsdecode(poses),
+        "unposed": unposed,
+        "rows": rows,
+        "pressure_unit": pressure_unit,
+        "pose_unit": None if pose_unit is None else ",".join(pose_unit),
+        "time_unit": time_unit,
+        "time_column": time_column,
+        "pressure_columns": pressure_columns,
+        "pose_columns": None if pose_columns is None else ",".join(pose_columns),
+        "largest_gap_s": largest_gap_s,
+        "rate": rate,
+        "object": object,
+    }
+    flags = _filled(_palpate.ImportFlags(), import_tables, options)
+    recording, sentences = _palpate.import_as_flagged(flags, elements_mm)
+    recording.truth = truth
+    _warn(sentences)
+    return recording
+
+
+def _recordings(given: Recording | _Path | Iterable[Recording | _Path]) -> list[Recording | str]:
+    if isinstance(given, (Recording, str, bytes, os.PathLike)):
+        given = [given]
+    return [item if isinstance(item, Recording) else os.fsdecode(item) for item in given]
+
+
+def _maps_of(given: _Maps) -> list[OccupancyGrid | Hypothesis | str]:
+    if isinstance(given, (OccupancyGrid, Hypothesis, str, bytes, os.PathLike)):
+        given = [given]
+    return [
+        item if isinstance(item, (OccupancyGrid, Hypothesis)) else os.fsdecode(item) for item in given
+    ]
+
+
+def _recognition_flags(
+    function: str, options: RecognitionOptions, device: Device | str | int | None
+) -> _palpate.RecognitionFlags:
+    for name in options:
+        if name not in RecognitionOptions.__annotations__:
+            raise TypeError(f"{function}() got an unexpected keyword argument '{name}'")
+    return flags_of({**options, "device": None if isinstance(device, Device) else device})
+
+
+def _filled(flags: _Flags, function: Callable[..., Any], options: Mapping[str, Any]) -> _Flags:
+    """The flags with the options of a function; None leaves the default."""
+    for name, value in options.items():
+        if value is not None:
+            try:
+                setattr(flags, name, value)
+            except TypeError:
+                wanted = inspect.formatannotation(function.__annotations__[name])
+                raise TypeError(f"{name}: {value!r}; give {wanted}") from None
+    return flags
+
+
+def _warn(sentences: list[str]) -> None:
+    for sentence in sentences:
+        warnings.warn(sentence, stacklevel=3)
