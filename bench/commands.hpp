@@ -15,13 +15,6 @@ struct RunOptions {
   bool quick = false;  ///< small sizes and few trials, in less than a minute
 };
 
-struct ExperimentOptions : RunOptions {
-  std::string csv;             ///< folder for tables
-  std::string plots;           ///< folder for charts
-  std::optional<int> trials;   ///< per letter; by default 10, or 4 if quick
-  std::optional<int> touches;  ///< per trial; by default 50, or 12 if quick
-};
-
 struct FitOptions : RunOptions {
   std::optional<int> trials;  ///< per letter and shape; by default 20, or 2 if quick
 };
@@ -79,11 +72,6 @@ struct BinStepsOptions : RunOptions {
 
 /// Speed, memory and error of every kernel, beside two baselines and float64.
 void measure_kernels(const RunOptions& options, std::span<char* const> command_line);
-
-/// The experiments of Sec. IV on simulated letters: identity and pose against the number of
-/// touches, for both filters, beside the paper's claims. Beyond the paper: calibration, refined
-/// poses, and an array that is not quite where it is reported.
-void run_experiment(const ExperimentOptions& options, std::span<char* const> command_line);
 
 /// How well learned letters and shapes never learned fit, after some numbers of touches: how often
 /// the two are told apart, and their verdicts, of a small and a large array, on coarse bins and

@@ -62,20 +62,8 @@ int main(int argc, char** argv) try {
       "latency (ms), with errors in nats against float64",
       kernels, measure_kernels, command_line);
   constexpr const char* trials = "Trials per letter (default 10, or 4 with --quick)";
-  ExperimentOptions experiment;
-  CLI::App* command = add_command(
-      app, "experiment",
-      "Repeat Sec. IV of the paper on simulated letters: identity and pose error against the "
-      "number of touches, for histogram and particle filters; calibration; misplaced touches",
-      experiment, run_experiment, command_line);
-  command->add_option("--trials", experiment.trials, trials);
-  command->add_option("--touches", experiment.touches,
-                      "Touches per trial, at most 192 (default 50, or 12 with --quick)");
-  command->add_option("--csv", experiment.csv, "Write tables to this folder");
-  command->add_option("--plots", experiment.plots,
-                      "Draw the paper's figures in this folder, as PNG and SVG");
   FitOptions fit;
-  command = add_command(app, "fit",
+  CLI::App* command = add_command(app, "fit",
                         "Measure how well touches of learned letters and of shapes never learned "
                         "fit, in some minutes on two CPU cores: pairs told apart and verdicts, of "
                         "arrays of 6 x 6 and 16 x 16 elements",
