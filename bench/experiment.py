@@ -10,16 +10,11 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 import palpate
+from palpate._statistics import errors_over, mean
 
 from . import charts
 from .charts import Figure
-from .measures import (
-    calibration,
-    errors_over,
-    mean,
-    mean_interval,
-    wilson_interval,
-)
+from .measures import calibration, mean_interval, wilson_interval
 from .report import Json, Measurement, Report, Run, at_least_1, main, parser, write, write_json
 from .trials import VOWELS, Touching, letter_maps, make_trials
 

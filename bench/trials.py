@@ -193,7 +193,7 @@ def judged(
     mode, refined = estimate.mode, belief.refine(estimate.mode)
     none = estimate.none or 0.0
     best = int(numpy.argmax(estimate.identity))
-    right = maps[best].label == truth.object and estimate.identity[best] >= none
+    right = bool(maps[best].label == truth.object and estimate.identity[best] >= none)
     located = maps[mode.object]
     errors = [
         palpate.pose_error_mm(located, pose.T_object_robot, truth.T_object_robot)

@@ -217,14 +217,14 @@ void bind_batch(nb::module_& module) {
       .def_prop_ro(
           "maps",
           [](const Owned<OpenBatch>& self) {
-            std::vector<std::tuple<std::string, OccupancyGrid>> maps;
+            std::vector<std::tuple<std::string, Hypothesis>> maps;
             const RecognitionTask& recognition = self.constant().recognition;
             for (std::size_t i = 0; i < recognition.hypotheses.size(); ++i) {
-              maps.emplace_back(recognition.map_paths[i], recognition.hypotheses[i].map);
+              maps.emplace_back(recognition.map_paths[i], recognition.hypotheses[i]);
             }
             return maps;
           },
-          "The maps and their files, as a record's mode names them; symmetries are the task's.")
+          "The maps, by their files; symmetries and mirror images are the task's.")
       .def_prop_ro(
           "memory_bytes",
           [](const Owned<OpenBatch>& self) {
