@@ -8,10 +8,12 @@ from typing import Any
 import numpy
 from matplotlib.colors import LogNorm
 
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
 import palpate
 
 from . import charts
-from .charts import Axes, Figure
 from .measures import EXPECTED_NORMALISED_ERROR
 from .report import Json
 from .trials import VOWELS, Floats, Touching, judged, lattice_of, make_trials, truth_of

@@ -49,7 +49,8 @@ def in_steps(
         (axis.lower, axis.upper, math.ceil(axis.count * fine_step_mm / step_mm))
         for axis in (fine.x_mm, fine.y_mm, fine.theta_rad)
     ]
-    return palpate.PoseLattice(*axes)
+    x, y, theta = axes
+    return palpate.PoseLattice(x, y, theta)
 
 
 def refined_errors(
@@ -71,9 +72,9 @@ def refined_errors(
 
 def measure(device: palpate.Device, options: argparse.Namespace) -> list[Json]:
     """Prints every run once it is known; the finest step is what the others are compared with."""
-    cells_mm, touches, steps_mm = (0.5, 1.0), (9, 5, 3), (0.3, 0.45, 0.6, 0.75, 0.9, 1.2)
+    cells_mm, touches, steps_mm = [0.5, 1.0], [9, 5, 3], [0.3, 0.45, 0.6, 0.75, 0.9, 1.2]
     if options.quick:
-        cells_mm, touches, steps_mm = (0.5,), (5,), (0.3, 0.6)
+        cells_mm, touches, steps_mm = [0.5], [5], [0.3, 0.6]
     each = options.trials or (1 if options.quick else 20)
     trials = make_trials(VOWELS, each, max(touches), SEED, Touching(at_random_poses=True))
     reach_mm = float(numpy.hypot(*trials[0].elements_mm.T).max())

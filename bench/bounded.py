@@ -11,6 +11,7 @@ import time
 from typing import Any
 
 import numpy
+from matplotlib.figure import Figure
 
 import palpate
 from palpate._statistics import median
@@ -191,7 +192,7 @@ def _answer(belief: Any, touches: palpate.Recording) -> tuple[Any, float]:
     return estimate, 1e3 * (time.perf_counter() - start)
 
 
-def draw_growth(records: list[Json]) -> charts.Figure:
+def draw_growth(records: list[Json]) -> Figure:
     """Time against bins, by what `palpate-bench bounded` measured in its part "growth"."""
     figure, axes = charts.chart(
         "bins in all, five objects", "time of nine touches, to the posterior", log="xy"

@@ -9,11 +9,12 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
+from matplotlib.figure import Figure
+
 import palpate
 from palpate._statistics import errors_over, mean
 
 from . import charts
-from .charts import Figure
 from .measures import calibration, mean_interval, wilson_interval
 from .report import Json, Measurement, Report, Run, at_least_1, main, parser, write, write_json
 from .trials import VOWELS, Touching, letter_maps, make_trials
@@ -224,12 +225,8 @@ def ranges_of(touches: Sequence[int]) -> str:
 def standing(leads: Sequence[tuple[int, float]]) -> str:
     """Which of two is ahead after how many touches, by (touches, lead)."""
     told = []
-    for word, holds in (
-        ("ahead", lambda lead: lead > 0),
-        ("tied", lambda lead: lead == 0),
-        ("behind", lambda lead: lead < 0),
-    ):
-        if touches := [touches for touches, lead in leads if holds(lead)]:
+    for word, sign in (("ahead", 1), ("tied", 0), ("behind", -1)):
+        if touches := [touches for touches, lead in leads if (lead > 0) - (lead < 0) == sign]:
             told.append(f"{word} at touch {ranges_of(touches)}")
     return "; ".join(told)
 

@@ -51,8 +51,8 @@ def mean_interval(values: Sequence[float]) -> Interval:
 def told_apart(lower: ArrayLike, higher: ArrayLike) -> float:
     """Share of the pairs of both kinds in which the value of the lower kind is lower; ties count half."""
     ordered, low = numpy.sort(numpy.asarray(higher)), numpy.asarray(lower)
-    left, right = (numpy.searchsorted(ordered, low, side) for side in ("left", "right"))
-    return float(numpy.mean(len(ordered) - (left + right) / 2.0) / len(ordered))
+    middle = (numpy.searchsorted(ordered, low, "left") + numpy.searchsorted(ordered, low, "right")) / 2
+    return float(numpy.mean(1.0 - middle / len(ordered)))
 
 
 def told_apart_interval(lower: Sequence[float], higher: Sequence[float]) -> Interval:

@@ -55,21 +55,21 @@ class MersenneTwister:
 
     def draw(self, n: int) -> NDArray[numpy.uint64]:
         """The next n numbers, [n]."""
-        while len(self._left) < n:
-            self._left = numpy.concatenate([self._left, self._block()])
+        blocks = [self._block() for _ in range(-(-(n - len(self._left)) // _SIZE))]
+        self._left = numpy.concatenate([self._left, *blocks])
         drawn, self._left = self._left[:n], self._left[n:]
         return drawn
 
     def _block(self) -> NDArray[numpy.uint64]:
-        x = self._state
+        x: NDArray[numpy.uint64] = self._state
         # Each half needs only words that the other half has, but for the last, which needs the first.
         for begin in (0, _SHIFT):
-            here = numpy.arange(begin, begin + _SHIFT)
+            here: NDArray[numpy.int64] = numpy.arange(begin, begin + _SHIFT)
             for part in (here[:-1], here[-1:]):
-                y = (x[part] & _UPPER) | (x[(part + 1) % _SIZE] & _LOWER)
-                odd = (y & numpy.uint64(1)) * _TWIST
-                x[part] = x[(part + _SHIFT) % _SIZE] ^ (y >> numpy.uint64(1)) ^ odd
-        y = x.copy()
+                joined = (x[part] & _UPPER) | (x[(part + 1) % _SIZE] & _LOWER)
+                odd = (joined & numpy.uint64(1)) * _TWIST
+                x[part] = x[(part + _SHIFT) % _SIZE] ^ (joined >> numpy.uint64(1)) ^ odd
+        y: NDArray[numpy.uint64] = x.copy()
         y ^= (y >> numpy.uint64(29)) & numpy.uint64(0x5555555555555555)
         y ^= (y << numpy.uint64(17)) & numpy.uint64(0x71D67FFFEDA60000)
         y ^= (y << numpy.uint64(37)) & numpy.uint64(0xFFF7EEE000000000)

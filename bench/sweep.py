@@ -15,6 +15,7 @@ from typing import Any
 import numpy
 
 import palpate
+from palpate.sweep import errors_record
 from palpate._statistics import Errors, errors_over, mean, median
 from palpate import reference
 
@@ -84,7 +85,6 @@ class Plan:
 
     quick: bool
     trials_each: int  #: for every letter
-    most_bins: float
     cells: list[CellPlan]
     limits: list[Bins]
 
@@ -130,8 +130,8 @@ class Plan:
                          lattices([1e3, 3e3, 1e4, 2e4, 3e4, 1e5, 1e6, 1e7])),
                 CellPlan(0.25, lattices(decades)),
             ]  # fmt: skip
-        limits = [GOAL_BINS] if quick else [GOAL_BINS, scaled(3e5), scaled(3e6)]
-        return Plan(quick, options.trials or (4 if quick else 10), most, cells, limits)
+        limits = [scaled(1e5)] if quick else [GOAL_BINS, scaled(3e5), scaled(3e6)]
+        return Plan(quick, options.trials or (4 if quick else 10), cells, limits)
 
 
 @dataclass
@@ -192,12 +192,6 @@ def error_of(grid: palpate.OccupancyGrid, trial: palpate.Recording, pose: Any) -
     if pose is None or grid.label != truth.object:
         return None
     return palpate.pose_error_mm(grid, pose.T_object_robot, truth.T_object_robot)
-
-
-def errors_record(errors: Errors) -> Json | None:
-    """What errors are over trials; the 95th percentile is None for fewer than 20."""
-    over: Any = errors_over(errors)
-    return over and over | {"p95": over["p95"] if over["trials"] >= 20 else None}
 
 
 def set_errors(record: Json, modes_mm: Errors, refined_mm: Errors) -> None:
@@ -503,8 +497,8 @@ def variants_of(quick: bool) -> list[Variant]:
 def measure_limits(device: palpate.Device, plan: Plan) -> list[Json]:
     """Where the errors come from that more bins do not mend, in windows.
 
-    Every variant is compared with the first on the goal's lattice; arrays also run on the other
-    lattices, each compared with the same array on the goal's.
+    Every variant is compared with the first on the first of the plan's lattices; arrays also run on
+    the others, each compared with the same array on the first.
     """
     each = min(plan.trials_each, 2) if plan.quick else plan.trials_each
     limits: list[Json] = []
@@ -534,7 +528,7 @@ def measure_limits(device: palpate.Device, plan: Plan) -> list[Json]:
                 }
             )
             unchanged = unchanged or (variant.name, modes, refined)
-            if bins == GOAL_BINS:
+            if bins == plan.limits[0]:
                 against = (f"{count_text(product(bins))} bins", modes, refined)
     return limits
 

@@ -5,13 +5,15 @@ import pathlib
 import string
 import urllib.parse
 from collections.abc import Iterable, Sequence
-from typing import Any
+from typing import Any, ClassVar
 
 from palpate._statistics import LEAST_GAIN
 
 from . import charts
-from .charts import Axes, Figure
 from .report import Json
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
 from palpate._tables import (
     Column,
     count_text,
@@ -366,7 +368,7 @@ def _table(columns: Sequence[Column], records: Iterable[Json]) -> str:
 class _Template(string.Template):
     """The page's text, with a part in the place of every {{name}}."""
 
-    pattern = r"\{\{(?:(?P<named>[a-z_]+)|(?P<braced>\b\B)|(?P<escaped>\b\B)|(?P<invalid>\b\B))\}\}"
+    pattern: ClassVar[Any] = r"\{\{(?:(?P<named>[a-z_]+)|(?P<braced>\b\B)|(?P<escaped>\b\B)|(?P<invalid>\b\B))\}\}"
 
 
 def page_of(document: Json, figures: dict[str, tuple[Figure, Spots]]) -> str:

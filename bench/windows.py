@@ -46,7 +46,8 @@ def _places(lattice: palpate.PoseLattice, at: Placed, thetas: Floats) -> Floats:
     centroid_mm = at.body.centroid_mm
     p = palpate.transform(palpate.inverse(at.T_object_robot), [centroid_mm])[0] - lattice.pivot_mm
     c, s = numpy.cos(thetas), numpy.sin(thetas)
-    return centroid_mm - numpy.stack([c * p[0] - s * p[1], s * p[0] + c * p[1]], axis=1)
+    turned: Floats = numpy.stack([c * p[0] - s * p[1], s * p[0] + c * p[1]], axis=1)
+    return centroid_mm - turned
 
 
 def _index(axis: palpate.Axis, value: float) -> int:
@@ -72,7 +73,8 @@ def _window(
     for axis, values in ((lattice.x_mm, places[:, 0]), (lattice.y_mm, places[:, 1])):
         low, high = float(values.min()) - reach_mm, float(values.max()) + reach_mm
         axes.append(_part(axis, _nearest(axis, low), _nearest(axis, high) + 1))
-    return palpate.PoseLattice(*axes, _part(theta, first, end), lattice.pivot_mm)
+    x, y = axes
+    return palpate.PoseLattice(x, y, _part(theta, first, end), lattice.pivot_mm)
 
 
 def windows_about(
@@ -113,7 +115,7 @@ def nearest_bin_mm(lattice: palpate.PoseLattice, at: Placed) -> float:
         numpy.array([axis.centre(_nearest(axis, value)) - value for value in places[:, i].tolist()])
         for i, axis in enumerate((lattice.x_mm, lattice.y_mm))
     ]
-    turns = numpy.zeros(theta.count)
+    turns: Floats = numpy.zeros(theta.count)
     if at.symmetry > 0:
         period = 2.0 * math.pi / at.symmetry
         turns = numpy.array([wrapped(angle - at.T_object_robot[2], period) for angle in thetas])

@@ -167,7 +167,8 @@ def _lattices(fine: PoseLattice, most: int) -> list[PoseLattice]:
             (axis.lower, axis.upper, max(1, math.floor(factor * axis.count + 0.5)))
             for axis in (fine.x_mm, fine.y_mm, fine.theta_rad)
         ]
-        lattice = PoseLattice(*axes, fine.pivot_mm)
+        x, y, theta = axes
+        lattice = PoseLattice(x, y, theta, fine.pivot_mm)
         if not lattices or lattice.bins < lattices[-1].bins:
             lattices.append(lattice)
         count /= math.sqrt(10.0)
@@ -202,8 +203,10 @@ class _Run:
                     (of["mode"]["map"], of["mode"].get("mirrored", False)) for of in (record, other)
                 )
                 a, b = _pose(record, kind), _pose(other, kind)
-                both = here == there and a is not None and b is not None
-                distances.append(pose_error_mm(data.maps[here].map, a, b) if both else None)
+                if here != there or a is None or b is None:
+                    distances.append(None)
+                else:
+                    distances.append(pose_error_mm(data.maps[here].map, a, b))
             self.from_finest_mm[kind] = distances
             self.point[name] = errors_record(distances)
         same = sum(record["best"] == other["best"] for record, other in pairs)
@@ -218,8 +221,10 @@ class _Run:
 
 def errors_record(errors: Errors) -> Document | None:
     """What errors are over those that there are; the 95th percentile is None for fewer than 20."""
-    over: Any = errors_over(errors)
-    return over and over | {"p95": over["p95"] if over["trials"] >= 20 else None}
+    over = errors_over(errors)
+    if over is None:
+        return None
+    return over | {"p95": over["p95"] if over["trials"] >= 20 else None}
 
 
 def _measure(data: _Data, lattice: PoseLattice, dense: int) -> _Run:
@@ -306,11 +311,11 @@ def _rests(run: _Run, finest: _Run, kind: str) -> bool:
     distances = errors = 0.0
     for i, record in enumerate(finest.records):
         distance, error = run.from_finest_mm[kind][i], finest.errors_mm[kind][i]
-        sd = record["refined"]["sd"] if "refined" in record else None
-        if distance is None or (error if by_truth else sd) is None:
-            continue
-        distances += distance**2
-        errors += error**2 if by_truth and error is not None else sd[0] ** 2 + sd[1] ** 2
+        if not by_truth:
+            error = math.hypot(*record["refined"]["sd"][:2]) if "refined" in record else None
+        if distance is not None and error is not None:
+            distances += distance**2
+            errors += error**2
     return errors > 0.0 and math.sqrt(errors + distances) <= (1.0 + LEAST_GAIN) * math.sqrt(errors)
 
 

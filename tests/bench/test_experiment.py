@@ -8,7 +8,7 @@ from conftest import Program, run
 
 from bench.experiment import FIGURES, TABLES, ranges_of, standing
 
-TRIALS, TOUCHES = 15, 9
+TRIALS, TOUCHES = 10, 9
 
 
 @pytest.fixture(scope="module")
@@ -69,7 +69,7 @@ def test_tables_say_what_the_curves_say(experiment: Program) -> None:
             assert sum(right) / TRIALS == point["accuracy"]
     assert {path.name for path in (experiment.folder / "csv").iterdir()} == set(TABLES)
     experiment.expect_charts(*FIGURES)
-    assert "| **histogram 5x5x4** | trials: 15, touches: 9" in experiment.output
+    assert "| **histogram 5x5x4** | trials: 10, touches: 9" in experiment.output
 
 
 def test_what_cannot_be_is_refused(tmp_path: pathlib.Path) -> None:
