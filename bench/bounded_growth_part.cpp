@@ -7,8 +7,6 @@
 
 #include "bounded_answers.hpp"
 #include "bounded_parts.hpp"
-#include "chart_series.hpp"
-#include "command_run.hpp"
 #include "letters.hpp"
 
 namespace palpate::bench {
@@ -137,31 +135,6 @@ Json measure_bounded_growth(const BoundedInputs& inputs, Report& report) {
   }
   add_growth(records, report);
   return records;
-}
-
-void draw_growth(const Json& records, const std::filesystem::path& folder) {
-  Chart chart{
-      .x = {.label = "bins in all, five objects", .scale = Scale::logarithmic, .text = count_text},
-      .y = {.label = "time of nine touches, to the posterior",
-            .scale = Scale::logarithmic,
-            .text = seconds_text}};
-  for (const auto& [field, name] :
-       {std::pair("dense", "dense, every bin"), std::pair("bounded", "by bounds, proven to 1e-6"),
-        std::pair("one_thread", "by bounds, on one thread")}) {
-    ChartSeries series = series_like(chart.series.size(), name);
-    const std::string at = std::string("/") + field;
-    series.points = points_of(records, "/bins_in_all", (at + "/median").c_str());
-    const std::vector<ChartPoint> least =
-        points_of(records, "/bins_in_all", (at + "/least").c_str());
-    const std::vector<ChartPoint> most = points_of(records, "/bins_in_all", (at + "/most").c_str());
-    for (std::size_t i = 0; i < series.points.size(); ++i) {
-      series.points[i].low = least[i].y;
-      series.points[i].high = most[i].y;
-    }
-    series.line = Line::solid;
-    chart.series.push_back(std::move(series));
-  }
-  write_charts(std::span(&chart, 1), folder, std::array{growth_figure});
 }
 
 }  // namespace palpate::bench

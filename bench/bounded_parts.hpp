@@ -1,6 +1,5 @@
 #pragma once
 
-#include <filesystem>
 #include <vector>
 
 #include "commands.hpp"
@@ -31,15 +30,4 @@ Json measure_bounded_streaming(const BoundedInputs& inputs, Report& report);
 Json measure_bounded_large(const BoundedInputs& inputs, Report& report);
 /// Time over bins, from 10^4 to 10^9 in all, beside the dense engine.
 Json measure_bounded_growth(const BoundedInputs& inputs, Report& report);
-/// Certificates beside the distances from the posterior over all bins.
-Json measure_bounded_accuracy(const BoundedInputs& inputs, Report& report);
-/// Everyday objects from one press each, in a folder of recordings.
-/// @throws Error where the folder holds no recording, or one of another array
-Json measure_bounded_presses(const BoundedInputs& inputs, Report& report);
-
-/// The chart of measure_bounded_growth(), as PNG and SVG.
-inline constexpr const char* growth_figure = "bounded_growth";
-/// @throws Error where the disk refuses
-void draw_growth(const Json& records, const std::filesystem::path& folder);
-
 }  // namespace palpate::bench

@@ -63,34 +63,10 @@ void CommandRun::write(const std::string& path, const std::string& content) {
   }
 }
 
-void require_at_least(const char* flag, const std::optional<std::int64_t>& value,
-                      std::int64_t least) {
-  if (value && *value < least) {
-    throw Error(Fault::input, fmt::format("{} = {}: give {} or more", flag, *value, least));
-  }
-}
-
 void write_file(const std::filesystem::path& path, const std::string& content) {
   AtomicFile file(path);
   file.write(content);
   file.commit();
-}
-
-std::vector<std::string> chart_files(std::span<const char* const> names) {
-  std::vector<std::string> files;
-  for (const std::string name : names) {
-    files.insert(files.end(), {name + ".png", name + ".svg"});
-  }
-  return files;
-}
-
-void write_charts(std::span<const Chart> charts, const std::filesystem::path& folder,
-                  std::span<const char* const> names) {
-  for (std::size_t i = 0; i < charts.size(); ++i) {
-    const std::string name = names[i];
-    write_file(folder / (name + ".png"), draw_chart(charts[i], PictureFormat::png).bytes);
-    write_file(folder / (name + ".svg"), draw_chart(charts[i], PictureFormat::svg).bytes);
-  }
 }
 
 }  // namespace palpate::bench

@@ -1,16 +1,13 @@
 #pragma once
 
-#include <cstdint>
 #include <filesystem>
 #include <map>
 #include <memory>
-#include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "commands.hpp"
-#include "figures/chart.hpp"
 #include "io/atomic_file.hpp"
 #include "palpate/device.hpp"
 #include "table.hpp"
@@ -50,20 +47,8 @@ class CommandRun {
   Json facts_;
 };
 
-/// Refuses an option that is given and less.
-/// @throws Error (Fault::input)
-void require_at_least(const char* flag, const std::optional<std::int64_t>& value,
-                      std::int64_t least);
-
 /// Writes a file whole or not at all.
 /// @throws Error where the disk refuses
 void write_file(const std::filesystem::path& path, const std::string& content);
-
-/// NAME.png and NAME.svg for each of the charts.
-std::vector<std::string> chart_files(std::span<const char* const> names);
-/// Writes each of the charts into the folder as NAME.png and NAME.svg.
-/// @throws Error where the disk refuses
-void write_charts(std::span<const Chart> charts, const std::filesystem::path& folder,
-                  std::span<const char* const> names);
 
 }  // namespace palpate::bench

@@ -16,20 +16,6 @@ namespace palpate::bench {
 
 namespace {
 
-constexpr double z_975 = 1.959964;  ///< the standard normal's 97.5th percentile
-
-/// Student's t at 97.5 % by Cornish and Fisher's expansion (Abramowitz and Stegun 26.7.5): 3 % off
-/// for two degrees of freedom, 1 % for three.
-double t_975(double freedom) {
-  constexpr double z = z_975;
-  constexpr double z3 = z * z * z;
-  constexpr double z5 = z3 * z * z;
-  constexpr double z7 = z5 * z * z;
-  return z + (z3 + z) / (4.0 * freedom) +
-         (5.0 * z5 + 16.0 * z3 + 3.0 * z) / (96.0 * freedom * freedom) +
-         (3.0 * z7 + 19.0 * z5 + 17.0 * z3 - 15.0 * z) / (384.0 * freedom * freedom * freedom);
-}
-
 /// A field of /proc/self/status, which are in KiB; 0 where there is none.
 std::uint64_t status_bytes(std::string_view field) {
   std::ifstream status("/proc/self/status");
@@ -76,28 +62,6 @@ double quantile(std::span<const double> values, double fraction) {
 
 double mean(std::span<const double> values) {
   return std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
-}
-
-double standard_error(std::span<const double> values) {
-  const double centre = mean(values);
-  double squares = 0.0;
-  for (const double value : values) {
-    squares += (value - centre) * (value - centre);
-  }
-  const auto n = static_cast<double>(values.size());
-  return std::sqrt(squares / (n - 1.0) / n);
-}
-
-Interval mean_interval(std::span<const double> values) {
-  const double centre = mean(values);
-  const double half_width =
-      t_975(static_cast<double>(values.size()) - 1.0) * standard_error(values);
-  return {centre - half_width, centre + half_width};
-}
-
-Interval told_apart_interval(std::span<const double> lower, std::span<const double> higher) {
-  const std::size_t rarer = std::min(lower.size(), higher.size());
-  return wilson_interval(told_apart(lower, higher) * static_cast<double>(rarer), rarer);
 }
 
 std::uint64_t resident_bytes() { return status_bytes("VmRSS:"); }

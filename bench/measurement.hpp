@@ -10,7 +10,6 @@
 namespace palpate::bench {
 
 using palpate::Interval;
-using palpate::told_apart;
 using palpate::wilson_interval;
 
 /// Seconds that the call takes.
@@ -30,15 +29,6 @@ double quantile(std::span<const double> values, double fraction);
 
 /// Of at least one value.
 double mean(std::span<const double> values);
-/// Of the mean of at least two values.
-double standard_error(std::span<const double> values);
-/// The 95 % interval of the mean of what at least three values are drawn from, by Student's t.
-Interval mean_interval(std::span<const double> values);
-
-/// The 95 % interval of told_apart(): Wilson's, for as many trials as there are values of the rarer
-/// kind. The estimate varies no more than that (van Dantzig 1951).
-Interval told_apart_interval(std::span<const double> lower, std::span<const double> higher);
-
 /// Resident memory of the process. The peak is since the last restart_peak_memory(), or since the
 /// process began where the kernel does not allow that. restart_peak_memory() first gives memory
 /// that the process has freed back to the system: what is taken afterwards then shows.

@@ -206,6 +206,34 @@ void bind_batch(nb::module_& module) {
             return !cli::uses_device(self.constant().recognition);
           },
           "Whether bounds recognise, which compute on the host alone.")
+      .def_prop_ro(
+          "lattice",
+          [](const Owned<OpenBatch>& self) { return self.constant().recogniser.lattice(); },
+          "The bins, whose pivot is (0, 0) where it is automatic.")
+      .def_prop_ro(
+          "auto_pivot",
+          [](const Owned<OpenBatch>& self) { return self.constant().recognition.auto_pivot; },
+          "Whether theta turns about each unknown's first touch.")
+      .def_prop_ro(
+          "maps",
+          [](const Owned<OpenBatch>& self) {
+            std::vector<std::tuple<std::string, Hypothesis>> maps;
+            const RecognitionTask& recognition = self.constant().recognition;
+            for (std::size_t i = 0; i < recognition.hypotheses.size(); ++i) {
+              maps.emplace_back(recognition.map_paths[i], recognition.hypotheses[i]);
+            }
+            return maps;
+          },
+          "The maps, by their files; symmetries and mirror images are the task's.")
+      .def_prop_ro(
+          "memory_bytes",
+          [](const Owned<OpenBatch>& self) {
+            const Recogniser& recogniser = self.constant().recogniser;
+            const BoundedPosterior* bounded = recogniser.bounded();
+            return bounded != nullptr ? std::uint64_t{bounded->host_bytes()}
+                                      : recogniser.device_bytes();
+          },
+          "Memory held: the device's, or the host's where bounds recognise.")
       .def("recognize", &recognise_python, "entries"_a,
            nb::sig("def recognize(self, entries: list[bytes]) -> tuple[list[tuple[bytes, float]], "
                    "str]"),

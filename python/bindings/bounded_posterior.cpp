@@ -170,6 +170,12 @@ void bind_bounded_posterior(nb::module_& module) {
             return self.use([](BoundedPosterior& belief, Call&) { return belief.lattice(); });
           },
           "The bins.")
+      .def_prop_ro(
+          "host_bytes",
+          [](const Bounded& self) {
+            return self.use([](BoundedPosterior& belief, Call&) { return belief.host_bytes(); });
+          },
+          "Memory held.")
       .def("__repr__", [](const Bounded& self) {
         return fmt::format("BoundedPosterior({})", text_of(self.labels, self.session()));
       });

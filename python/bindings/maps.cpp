@@ -5,6 +5,8 @@
 #include "arrays.hpp"
 #include "bindings.hpp"
 #include "call.hpp"
+#include "estimate.hpp"
+#include "palpate/balanced_lattice.hpp"
 #include "palpate/error.hpp"
 #include "palpate/estimate.hpp"
 #include "palpate/files.hpp"
@@ -182,9 +184,40 @@ void bind_metric(nb::module_& module) {
       "cells are occupied.");
 }
 
+/// What bins are to resolve, by the name that --bins has for it.
+BinWidth width_of(const std::string& bins) {
+  if (bins != "auto" && bins != "fine") {
+    throw Error(Fault::input, fmt::format("bins '{}': give 'auto' or 'fine'", bins));
+  }
+  return bins == "fine" ? BinWidth::fine : BinWidth::automatic;
+}
+
+void bind_lattices(nb::module_& module) {
+  module.def(
+      "balanced_lattice",
+      [](const PoseLattice& region, const MapsLike& maps, const std::string& bins,
+         std::int64_t most_bins) {
+        return balanced_lattice(region, hypotheses_of(maps), most_bins, width_of(bins)).lattice;
+      },
+      "region"_a, "maps"_a, "bins"_a = "auto", "most_bins"_a = most_balanced_bins,
+      "The bins that `palpate recognize --bins auto` or fine chooses for a region, whose own "
+      "counts\n"
+      "are ignored: as wide as the maps resolve. most_bins: limit for all objects together.");
+  module.def(
+      "touch_region",
+      [](const MapsLike& maps, double reach_mm) {
+        return touch_region(hypotheses_of(maps), reach_mm).lattice;
+      },
+      "maps"_a, "reach_mm"_a,
+      "The poses of an object that an array touches, about the array's centre, as one bin. "
+      "reach_mm:\n"
+      "largest distance of an element from the array's centre.");
+}
+
 }  // namespace
 
 void bind_maps(nb::module_& module) {
+  bind_lattices(module);
   bind_map(module);
   bind_hypothesis(module);
   bind_metric(module);

@@ -110,6 +110,12 @@ void bind_particle_filter(nb::module_& module) {
       .def("particles", &particles,
            "All particles: objects [n], T_object_robot [n, 3] (x_mm, y_mm, theta_rad) and weights\n"
            "[n], which sum to 1.")
+      .def_prop_ro(
+          "device_bytes",
+          [](const Particles& self) {
+            return self.use([](ParticleFilter& filter, Call&) { return filter.device_bytes(); });
+          },
+          "Device memory held.")
       .def("__repr__", [](const Particles& self) {
         return fmt::format("ParticleFilter({})", text_of(self.labels, self.session()));
       });

@@ -20,13 +20,6 @@ inline int run_bench(const std::string& arguments, const std::string& environmen
   return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
 }
 
-/// Expects an XML file, such as a chart, that its parser takes.
-inline void expect_well_formed(const std::filesystem::path& file) {
-  const int status = std::system(("xmllint --noout " + file.string()).c_str());
-  ASSERT_NE(WEXITSTATUS(status), 127) << "xmllint is missing; install libxml2-utils";
-  EXPECT_EQ(status, 0) << file;
-}
-
 /// Expects that no file of the folder may be the run's --json as well, and that this is said before
 /// a device is opened.
 inline void expect_no_file_written_twice(const std::string& arguments,

@@ -27,9 +27,14 @@ Said DocumentTest::run(const std::string& page) const {
   EXPECT_NE(commands, "") << page << " has no commands";
   put_bytes(folder_ / "commands.sh", commands);
   const std::filesystem::path program = PALPATE_PROGRAM;
-  const std::string line = "cd '" + folder_.path().string() + "' && PATH='" +
-                           program.parent_path().string() +
-                           "':\"$PATH\" bash -euo pipefail commands.sh > said 2> complained";
+  std::string environment = "PATH='" + program.parent_path().string() + "':";
+#ifdef PALPATE_PYTHON
+  const std::filesystem::path python = PALPATE_PYTHON;
+  environment += "'" + python.parent_path().string() + "':";
+  environment = "PYTHONDONTWRITEBYTECODE=1 PYTHONPATH='" PALPATE_MODULE "' " + environment;
+#endif
+  const std::string line = "cd '" + folder_.path().string() + "' && " + environment +
+                           "\"$PATH\" bash -euo pipefail commands.sh > said 2> complained";
   Said said;
   EXPECT_EQ(std::system(line.c_str()), 0) << bytes_of(folder_ / "complained");
   said.out = bytes_of(folder_ / "said");

@@ -116,6 +116,7 @@ TEST_F(SitePages, MisplacedTouchesAreNoticedMeasuredAndAveraged) {
             exact["refined_error_mm"]["median"].get<double>());
 }
 
+#ifdef PALPATE_PYTHON  // the page runs the module
 TEST_F(SitePages, MoreBinsHelpTheModeOnly) {
   const auto [said, complained] = run("bins.md");
   EXPECT_EQ(complained, "");
@@ -146,6 +147,7 @@ TEST_F(SitePages, MoreBinsHelpTheModeOnly) {
   EXPECT_NEAR(mean("coarse.json", "refined_error_mm"), 0.96, 0.06);
   expect_named(said, {"2 maps, 62 x 71 x 200 bins each", "2 maps, 124 x 141 x 400 bins each"});
 }
+#endif
 
 TEST_F(SitePages, AProgramActsOnLinesOfTouches) {
   const auto [said, complained] = run("programs.md");

@@ -40,7 +40,8 @@ def test_types_are_strict() -> None:
     assert (package / "py.typed").exists()
     assert len(EXAMPLES) == 3
     # Of the package, the type stubs of the extension modules too.
-    for checked in ([*EXAMPLES, ROOT / "python" / "palpate_command.py"], ["-p", "palpate"]):
+    command = ROOT / "python" / "palpate_command.py"
+    for checked in ([*EXAMPLES, command], ["-p", "palpate"], ["-p", "bench"]):
         run = subprocess.run(
             [sys.executable, "-m", "mypy", "--strict", "--cache-dir", os.devnull, *checked],
             cwd=ROOT, capture_output=True, text=True, timeout=300,

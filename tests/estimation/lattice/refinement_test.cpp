@@ -291,7 +291,7 @@ TEST(RefinedPose, ErrsLessThanTheModeAndKnowsByHowMuch) {
         wrap_angle(pose.T_object_robot.theta_rad - unknown.truth.theta_rad, two_pi));
     normalised.push_back(glm::dot(error, glm::inverse(covariance) * error));
   });
-  // `palpate-bench sweep` measures 0.36 and 0.15 mm for touches anywhere.
+  // `./dev bench sweep` measures 0.36 and 0.15 mm for touches anywhere.
   EXPECT_LT(mean(refined), 0.2);
   EXPECT_LT(mean(refined), 0.8 * mean(modes));
   // 3 for a covariance that is exact, less for one that a bin's own variance makes safe.

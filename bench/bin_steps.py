@@ -1,0 +1,123 @@
+"""The refined pose's error against the step of the bins: what the bins of `--bins auto` were chosen by."""
+
+import argparse
+import math
+
+import numpy
+
+import palpate
+from palpate._statistics import Errors
+from palpate._tables import (
+    Column,
+    count_text,
+    difference_text,
+    mean_text,
+    number,
+    plain,
+    print_head,
+    print_row,
+)
+from palpate.sweep import errors_record
+
+from .measures import Paired
+from .report import Json, Run, at_least_1, main, parser, write_json
+from .trials import VOWELS, Touching, counts_of, letter_maps, make_trials
+from .windows import estimate_in_window
+
+SEED = 70_000  # unknowns of their own: the sweep's and the experiment's chose other constants
+
+COLUMNS: list[Column] = [
+    ("map cells, mm", "cell_mm", plain),
+    ("step, mm", "step_mm", plain),
+    ("bins per object", "bins", plain),
+    ("", "count", count_text),
+    ("touches", "touches", plain),
+    ("refined: mean error, mm", "refined_error_mm", mean_text),
+    ("median, mm", "refined_error_mm/median", number(".3f")),
+    ("over the finest, %", "excess", number("+.1f", 100.0)),
+    ("difference, mm", "difference_mm", difference_text),
+]
+
+
+def in_steps(
+    region: palpate.PoseLattice, maps: list[palpate.OccupancyGrid], step_mm: float
+) -> palpate.PoseLattice:
+    """The region in steps of at most this length; in theta, of what moves an object as far."""
+    fine = palpate.balanced_lattice(region, maps, "fine", 10**15)
+    fine_step_mm = 0.6 * max(maps[0].cell_mm, maps[0].spread_mm or 0.0)
+    axes = [
+        (axis.lower, axis.upper, math.ceil(axis.count * fine_step_mm / step_mm))
+        for axis in (fine.x_mm, fine.y_mm, fine.theta_rad)
+    ]
+    x, y, theta = axes
+    return palpate.PoseLattice(x, y, theta)
+
+
+def refined_errors(
+    device: palpate.Device,
+    maps: list[palpate.OccupancyGrid],
+    trials: list[palpate.Recording],
+    lattice: palpate.PoseLattice,
+    touches: int,
+) -> Errors:
+    """Of each trial after its first touches, on bins about the first of them."""
+    errors = []
+    for trial in trials:
+        about = palpate.PoseLattice(
+            lattice.x_mm, lattice.y_mm, lattice.theta_rad, trial.T_robot_sensor[0, :2]
+        )
+        errors.append(estimate_in_window(device, maps, trial[:touches], about).refined_error_mm)
+    return errors
+
+
+def measure(device: palpate.Device, options: argparse.Namespace) -> list[Json]:
+    """Prints every run once it is known; the finest step is what the others are compared with."""
+    cells_mm, touches, steps_mm = [0.5, 1.0], [9, 5, 3], [0.3, 0.45, 0.6, 0.75, 0.9, 1.2]
+    if options.quick:
+        cells_mm, touches, steps_mm = [0.5], [5], [0.3, 0.6]
+    each = options.trials or (1 if options.quick else 20)
+    trials = make_trials(VOWELS, each, max(touches), SEED, Touching(at_random_poses=True))
+    reach_mm = float(numpy.hypot(*trials[0].elements_mm.T).max())
+    runs: list[Json] = []
+    print_head(COLUMNS)
+    for cell_mm in cells_mm:
+        maps = letter_maps(device, cell_mm=cell_mm)
+        region = palpate.touch_region(maps, reach_mm)
+        for count in touches:
+            finest: Errors | None = None
+            for step_mm in steps_mm:
+                lattice = in_steps(region, maps, step_mm)
+                errors = refined_errors(device, maps, trials, lattice, count)
+                paired = Paired.of(errors, finest or errors)
+                runs.append(
+                    {
+                        "cell_mm": cell_mm,
+                        "step_mm": step_mm,
+                        "bins": list(counts_of(lattice)),
+                        "count": lattice.bins,
+                        "touches": count,
+                        "refined_error_mm": errors_record(errors),
+                        "excess": paired.first_mm / paired.second_mm - 1.0,
+                        "difference_mm": finest and paired.difference(),
+                    }
+                )
+                finest = finest or errors
+                print_row(COLUMNS, runs[-1])
+    return runs
+
+
+def program() -> None:
+    """Reads the flags and measures."""
+    flags = parser(
+        "bin-steps",
+        "Measures the refined pose's error against the step of the bins, after 3, 5 and 9 touches at "
+        "random poses, over windows about the truth.",
+    )
+    flags.add_argument("--trials", type=at_least_1, help="trials per letter [20, or 1 with --quick]")
+    options = flags.parse_args()
+    run = Run(options)
+    write_json(options.json, run.facts | {"runs": measure(run.device, options)})
+
+
+if __name__ == "__main__":
+    main(program)

@@ -1,0 +1,253 @@
+"""The posterior by bounds: its certificates against all bins, everyday objects, and its charts.
+
+Times are measured in C++, by `palpate-bench bounded`.
+"""
+
+import argparse
+import json
+import math
+import pathlib
+import time
+from typing import Any
+
+import numpy
+from matplotlib.figure import Figure
+
+import palpate
+from palpate._statistics import median
+
+from . import charts
+from .certificates import CertificateCheck, check_certificate, dense_posterior
+from .report import Json, Measurement, Report, Run, main, parser, share_of, write_json
+from palpate._tables import count_text, seconds_text
+from .trials import VOWELS, counts_of, lattice_of, letter_maps, make_trials, size_of
+
+SEED = 1_404_000_000
+TOLERANCE = 1e-6  # BoundedPosterior's
+CHART = "bounded_growth"
+
+
+def measure_accuracy(run: Run, quick: bool, report: Report) -> list[Json]:
+    """Certificates beside the distances from the posterior over all bins, after 3 and 9 touches."""
+    sizes = [(5, 5, 4), (10, 10, 10)]
+    if not quick:
+        sizes += [(25, 25, 16), (44, 44, 52), (100, 100, 100)]
+    maps = letter_maps(run.device)
+    trials = make_trials(VOWELS, 1 if quick else 10, 9, SEED)
+    records = []
+    for lattice in (lattice_of(*size) for size in sizes):
+        bounded = palpate.BoundedPosterior(run.device, maps, lattice)
+        histogram = palpate.PoseHistogram(run.device, maps, lattice)
+        checks: dict[int, list[CertificateCheck]] = {3: [], 9: []}
+        for trial in trials:
+            bounded.reset()
+            histogram.reset()
+            done = 0
+            for until, of_touch in checks.items():
+                for belief in (bounded, histogram):
+                    belief.update(trial[done:until])
+                done = until
+                dense = dense_posterior(histogram, maps, trial[:until])
+                of_touch.append(check_certificate(bounded, dense))
+        for after, of_touch in checks.items():
+            add_checks(report, f"accuracy {size_of(lattice)}, touch {after}", of_touch)
+            record: Json = {"bins": size_of(lattice), "touches": after}
+            for name in ("promised", "mass_outside", "total_variation", "identity_error", "same_mode",
+                         "holds"):  # fmt: skip
+                record[name] = [getattr(check, name) for check in of_touch]
+            records.append(record)
+    return records
+
+
+def add_checks(report: Report, name: str, checks: list[CertificateCheck]) -> None:
+    """What certificates promised and what was measured, over posteriors."""
+    broken = sum(not check.holds for check in checks)
+    report.add(
+        name,
+        {"posteriors": len(checks)},
+        [
+            Measurement("certificates broken", broken, "posteriors", at_most=0.0),
+            Measurement(
+                "certificate, largest", max(c.promised for c in checks), "mass", at_most=TOLERANCE
+            ),
+            Measurement("mass not counted, largest", max(c.mass_outside for c in checks), "mass"),
+            Measurement(
+                "total variation of marginals, largest",
+                max(c.total_variation for c in checks),
+                "mass",
+            ),
+            Measurement(
+                "identity error, largest",
+                max(c.identity_error for c in checks),
+                "probability",
+                at_most=TOLERANCE,
+            ),
+            share_of(
+                "the dense posterior's mode",
+                sum(c.same_mode for c in checks),
+                len(checks),
+                at_least=100.0,
+            ),
+        ],
+    )
+
+
+# Everyday objects: raw pressure, and a map from one press.
+CLASSIFIER = palpate.ContactClassifier(threshold=15.0, ratio=0.15)
+CONTACT = palpate.ContactModel(CLASSIFIER, gamma=0.2, prior=0.1)
+MOST_MS = 500.0
+DENSE_FRAMES = (1, 13)  # of every object that the dense engine answers, too, besides the map's
+
+
+def read_presses(folder: str) -> list[palpate.Recording]:
+    """All recordings of a folder, which are of one array."""
+    paths = sorted(pathlib.Path(folder).glob("*.h5"))
+    if not paths:
+        raise palpate.Error(f"--presses {folder}: holds no recording; give a folder of them (*.h5)")
+    recordings = [palpate.read_recording(path) for path in paths]
+    for recording in recordings:
+        if not numpy.array_equal(recording.elements_mm, recordings[0].elements_mm):
+            raise palpate.Error(
+                f"{recording.path}: elements: not the array of {recordings[0].path}; give a folder "
+                "of recordings by one array"
+            )
+    return recordings
+
+
+def measure_presses(run: Run, options: argparse.Namespace, report: Report) -> Json:
+    """Everyday objects from one press each, in a folder of recordings."""
+    recordings = read_presses(options.presses)
+    elements_mm = recordings[0].elements_mm
+    pitch_mm = float(numpy.hypot(*(elements_mm[1:] - elements_mm[0]).T).min())
+    builder = palpate.MapBuilder(
+        run.device,
+        cell_mm=0.5 * pitch_mm,
+        sensor=palpate.InverseSensorModel(spread_mm=0.6 * pitch_mm, prior=0.1),
+        classifier=CLASSIFIER,
+    )
+    maps = []
+    for recording in recordings:
+        builder.clear()
+        builder.add(recording[:1])
+        maps.append(builder.build(recording.object))
+    # Steps of half a pitch and 2.5 degrees.
+    step_mm = pitch_mm / 2.0 * (10.0 if options.quick else 1.0)
+    x, y = (
+        palpate.Axis(-extent, extent, math.floor(2.0 * extent / step_mm + 0.5))
+        for extent in (50.0, 31.0)
+    )
+    lattice = palpate.PoseLattice(x, y, (0.0, 2.0 * math.pi, 4 if options.quick else 144))
+    bounded = palpate.BoundedPosterior(run.device, maps, lattice, contact=CONTACT)
+    # All frames lie at one place: the dense engine evaluates what is in contact, and the rest once.
+    histogram = palpate.PoseHistogram(run.device, maps, lattice, contact=CONTACT, still_array=True)
+    answers: Json = {
+        name: [] for name in ("best", "milliseconds", "bins_evaluated", "blocks_bounded",
+                              "dropped_mass", "dense_ms")
+    }  # fmt: skip
+    right, certain, same = 0, 0, 0
+    for i, recording in enumerate(recordings):
+        for frame in range(1, min(len(recording), 2) if options.quick else len(recording)):
+            estimate, ms = _answer(bounded, recording[frame : frame + 1])
+            best = int(numpy.argmax(estimate.identity))
+            right += best == i
+            certificate = estimate.certificate
+            certain += certificate.mode_certain
+            answers["best"].append(maps[best].label)
+            answers["milliseconds"].append(ms)
+            for name in ("bins_evaluated", "blocks_bounded", "dropped_mass"):
+                answers[name].append(getattr(certificate, name))
+            if frame in DENSE_FRAMES:
+                dense, dense_ms = _answer(histogram, recording[frame : frame + 1])
+                answers["dense_ms"].append(dense_ms)
+                same += int(numpy.argmax(dense.identity)) == best
+    in_all = lattice.bins * len(maps)
+    frames, all_ms = len(answers["best"]), answers["milliseconds"]
+    evaluated = median(answers["bins_evaluated"])
+    facts = {"objects": len(maps), "elements": len(elements_mm), "bins in all": in_all, "frames": frames}
+    report.add(
+        f"presses {size_of(lattice)}",
+        facts,
+        [
+            Measurement("a frame, median", median(all_ms), "ms", at_most=MOST_MS),
+            Measurement("a frame, least", min(all_ms), "ms"),
+            Measurement("a frame, most", max(all_ms), "ms"),
+            Measurement("bins evaluated, median", evaluated, "bins"),
+            Measurement("of all bins", 100.0 * evaluated / in_all, "%"),
+            Measurement("certificate, largest", max(answers["dropped_mass"]), "mass"),
+            share_of("mode certain", certain, frames),
+            Measurement("dense engine, array at rest, median", median(answers["dense_ms"]), "ms"),
+            share_of("the dense engine's best label", same, len(answers["dense_ms"]), at_least=100.0),
+            share_of("label right", right, frames),
+        ],
+    )
+    return {"bins": counts_of(lattice), "bins_in_all": in_all, "host_bytes": bounded.host_bytes} | answers
+
+
+def _answer(belief: Any, touches: palpate.Recording) -> tuple[Any, float]:
+    """The belief in one unknown, and its milliseconds."""
+    belief.reset()
+    start = time.perf_counter()
+    belief.update(touches)
+    estimate = belief.estimate()
+    return estimate, 1e3 * (time.perf_counter() - start)
+
+
+def draw_growth(records: list[Json]) -> Figure:
+    """Time against bins, by what `palpate-bench bounded` measured in its part "growth"."""
+    figure, axes = charts.chart(
+        "bins in all, five objects", "time of nine touches, to the posterior", log="xy"
+    )
+    for i, (name, label) in enumerate(
+        (
+            ("dense", "dense, every bin"),
+            ("bounded", "by bounds, proven to 1e-6"),
+            ("one_thread", "by bounds, on one thread"),
+        )
+    ):
+        ends = (f"{name}/least", f"{name}/most")
+        look = charts.like(i) | {"linestyle": "-"}
+        charts.line(axes, records, "bins_in_all", f"{name}/median", interval=ends, label=label, **look)
+    charts.tick_text(axes, "x", count_text, decades=True)
+    charts.tick_text(axes, "y", seconds_text, decades=True)
+    charts.legend(axes)
+    return figure
+
+
+def measure(run: Run, options: argparse.Namespace) -> None:
+    """Measures the parts, and draws the chart of times where they are given."""
+    report = Report(run.facts)
+    records: Json = {}
+    if options.part in (None, "accuracy"):
+        records["accuracy"] = measure_accuracy(run, options.quick, report)
+    if options.presses:
+        records["presses"] = measure_presses(run, options, report)
+    write_json(options.json, report.document() | records)
+    if options.plots and options.times:
+        with open(options.times, encoding="utf-8") as file:
+            charts.save({CHART: draw_growth(json.load(file)["growth"])}, options.plots)
+
+
+def program() -> None:
+    """Reads the flags and measures."""
+    flags = parser(
+        "bounded",
+        "Holds the certificates of the posterior by bounds against all bins in float64, in some "
+        "minutes on two CPU cores, and recognises everyday objects from one press each. Times are "
+        "measured by build/palpate-bench bounded.",
+        plots="draw the chart of --times in this folder",
+    )
+    flags.add_argument("--part", choices=("accuracy", "presses"), help="measure only this part")
+    flags.add_argument("--presses", metavar="FOLDER", help="recordings of everyday objects")
+    flags.add_argument(
+        "--times", metavar="FILE", help="results of build/palpate-bench bounded --json FILE"
+    )
+    options = flags.parse_args()
+    if options.part == "presses" and not options.presses:
+        flags.error("--part presses: give the folder of recordings by --presses FOLDER")
+    if bool(options.plots) != bool(options.times):
+        flags.error("--plots and --times: give both, or neither")
+    measure(Run(options, {"plots": charts.files([CHART])}), options)
+
+
+if __name__ == "__main__":
+    main(program)

@@ -1,0 +1,225 @@
+"""Statistics over trials: intervals, errors, calibration, and what two runs gain on each other."""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy
+from numpy.typing import ArrayLike, NDArray
+
+import palpate
+from palpate._statistics import LEAST_GAIN, Errors, errors_over, mean, median, quantile, standard_error
+
+from .random_numbers import Random, Stream
+from .trials import Body
+
+Interval = tuple[float, float]
+
+_Z = 1.959964  # the standard normal's 97.5th percentile
+
+
+def wilson_interval(successes: float, trials: int) -> Interval:
+    """The 95 % score interval of a share (Wilson 1927)."""
+    share = successes / trials
+    shrink = 1.0 + _Z * _Z / trials
+    centre = (share + _Z * _Z / (2.0 * trials)) / shrink
+    half = _Z / shrink * math.sqrt(share * (1.0 - share) / trials + (_Z / trials) ** 2 / 4.0)
+    # Rounding must not leave the ends at 0 and 1 outside.
+    return (
+        0.0 if successes == 0 else centre - half,
+        1.0 if successes == trials else centre + half,
+    )
+
+
+def mean_interval(values: Sequence[float]) -> Interval:
+    """The 95 % interval of the mean of what at least three values are drawn from, by Student's t.
+
+    Student's t is Cornish and Fisher's expansion (Abramowitz and Stegun 26.7.5): 3 % off for two
+    degrees of freedom, 1 % for three.
+    """
+    v, z = len(values) - 1.0, _Z
+    t = (
+        z
+        + (z**3 + z) / (4 * v)
+        + (5 * z**5 + 16 * z**3 + 3 * z) / (96 * v**2)
+        + (3 * z**7 + 19 * z**5 + 17 * z**3 - 15 * z) / (384 * v**3)
+    )
+    half = t * standard_error(values)
+    return mean(values) - half, mean(values) + half
+
+
+def told_apart(lower: ArrayLike, higher: ArrayLike) -> float:
+    """Share of the pairs of both kinds in which the value of the lower kind is lower; ties count half."""
+    ordered, low = numpy.sort(numpy.asarray(higher)), numpy.asarray(lower)
+    middle = (numpy.searchsorted(ordered, low, "left") + numpy.searchsorted(ordered, low, "right")) / 2
+    return float(numpy.mean(1.0 - middle / len(ordered)))
+
+
+def told_apart_interval(lower: Sequence[float], higher: Sequence[float]) -> Interval:
+    """The 95 % interval of told_apart(): Wilson's for as many trials as the rarer kind has values.
+
+    The estimate varies no more than that (van Dantzig 1951).
+    """
+    rarer = min(len(lower), len(higher))
+    return wilson_interval(told_apart(lower, higher) * rarer, rarer)
+
+
+def bootstrap_interval(
+    trials: int, statistic: Callable[[NDArray[numpy.int64]], NDArray[numpy.float64]]
+) -> Interval:
+    """The 95 % interval of a statistic of trials: percentiles over 2,000 samples (Efron 1979).
+
+    statistic takes the samples as indices [2000, trials] and gives its values [2000]. The same input
+    gives the same interval.
+    """
+    samples = 2_000
+    uniforms = Random(20_260_101, Stream.TOUCH_ORDER).uniforms(samples * trials)
+    drawn = (uniforms * trials).astype(numpy.int64).reshape(samples, trials)
+    values = statistic(drawn).tolist()
+    return quantile(values, 0.025), quantile(values, 0.975)
+
+
+def bootstrap_mean_interval(values: ArrayLike) -> Interval:
+    """That of the mean of at least one value."""
+    all_values = numpy.asarray(values)
+    return bootstrap_interval(len(all_values), lambda drawn: all_values[drawn].mean(axis=1))
+
+
+def bootstrap_ratio_interval(numerators: ArrayLike, denominators: ArrayLike) -> Interval:
+    """That of mean(numerators) / mean(denominators), paired by index."""
+    above, below = numpy.asarray(numerators), numpy.asarray(denominators)
+    return bootstrap_interval(
+        len(above), lambda drawn: above[drawn].sum(axis=1) / below[drawn].sum(axis=1)
+    )
+
+
+def mean_record(values: Sequence[float]) -> dict[str, float]:
+    """The mean and its bootstrap interval."""
+    low, high = bootstrap_mean_interval(values)
+    return {"mean": mean(values), "low": low, "high": high}
+
+
+@dataclass(frozen=True)
+class Paired:
+    """Mean errors of two runs over the trials that have one in both."""
+
+    trials: int
+    first_mm: float
+    second_mm: float
+    standard_error_mm: float  #: of the mean difference
+
+    @staticmethod
+    def of(first: Errors, second: Errors) -> "Paired":
+        """Trial i of one run is trial i of the other."""
+        pairs = [
+            (a, b)
+            for a, b in zip(first, second, strict=True)
+            if a is not None and b is not None
+        ]
+        if not pairs:
+            return Paired(0, 0.0, 0.0, 0.0)
+        a_mm, b_mm = ([pair[i] for pair in pairs] for i in (0, 1))
+        less_mm = [a - b for a, b in pairs]
+        return Paired(len(pairs), mean(a_mm), mean(b_mm), standard_error(less_mm))
+
+    @property
+    def gain(self) -> bool:
+        """The second errs less by more than LEAST_GAIN and two standard errors; never of one trial."""
+        less_mm = self.first_mm - self.second_mm
+        enough = max(LEAST_GAIN * self.first_mm, 2.0 * self.standard_error_mm)
+        return self.trials > 1 and less_mm > enough
+
+    def difference(self) -> dict[str, float]:
+        """By how much the first run errs more."""
+        return {
+            "mean": self.first_mm - self.second_mm,
+            "standard_error": self.standard_error_mm,
+        }
+
+
+def knee_of(runs: Sequence[Errors]) -> int | None:
+    """Where more bins stop helping: the first of the runs that suffices, by rising count.
+
+    It locates every trial, and no finer run gains over it. None where only the last run would do,
+    which no finer run confirms, or where a finer run has no errors.
+    """
+    for i, run in enumerate(runs[:-1]):
+        finer = [Paired.of(run, other) for other in runs[i + 1 :]]
+        if None not in run and all(paired.trials and not paired.gain for paired in finer):
+            return i
+    return None
+
+
+def pareto_front(entries: Sequence[tuple[float, float]]) -> list[int]:
+    """Indices of the entries (cost, error) on the Pareto front, by rising cost; of equals the first."""
+    front: list[int] = []
+    for i in sorted(range(len(entries)), key=lambda i: entries[i]):
+        if not front or entries[i][1] < entries[front[-1]][1]:
+            front.append(i)
+    return front
+
+
+def calibration(confidences: Sequence[float], right: Sequence[bool]) -> dict[str, object]:
+    """How far the probability of the most probable object can be taken at its word.
+
+    Ten bins of equal width over [0, 1], the empty ones left out, and the expected error: the mean
+    distance between confidence and share right, bins weighted by their counts (Naeini, Cooper and
+    Hauskrecht 2015).
+    """
+    width = 10
+    told, was = numpy.asarray(confidences), numpy.asarray(right, numpy.float64)
+    of = numpy.minimum((told * width).astype(int), width - 1)
+    bins, expected = [], 0.0
+    for i in numpy.unique(of).tolist():
+        here = of == i
+        confidence, share = float(told[here].mean()), float(was[here].mean())
+        expected += abs(confidence - share) * int(here.sum()) / len(told)
+        bins.append(
+            {
+                "lower": i / width,
+                "count": int(here.sum()),
+                "mean_confidence": confidence,
+                "fraction_right": share,
+            }
+        )
+    return {"expected_error": expected, "bins": bins}
+
+
+#: What normalised_error() is on average where covariances are right: one for every coordinate.
+EXPECTED_NORMALISED_ERROR = 3.0
+
+
+def normalised_error(
+    grid: palpate.OccupancyGrid, refined: palpate.RefinedPose, truth: ArrayLike
+) -> float:
+    """The squared error of a refined pose over its covariance C, e' C^-1 e.
+
+    The normalised estimation error squared (NEES; Bar-Shalom, Li and Kirubarajan 2001). e is the
+    difference of (x, y, theta) of T_object_robot from the truth [3], of the poses that the map's
+    symmetry makes equal to it the nearest. An object of full symmetry has no angle: e is then the
+    difference of x and y of the object's centroid in the robot frame, C is carried over to it by the
+    Jacobian, and the result is taken times 3/2. So it is 3 on average for every object.
+    """
+    estimate, true = refined.T_object_robot, numpy.asarray(truth)
+    centroid_mm = Body.of(grid).centroid_mm
+    if grid.symmetry == 0:
+        places = [palpate.transform(palpate.inverse(pose), [centroid_mm])[0] for pose in (estimate, true)]
+        s, c = math.sin(-estimate[2]), math.cos(-estimate[2])
+        turn = numpy.array([[c, -s], [s, c]])
+        x, y = centroid_mm - estimate[:2]
+        jacobian = numpy.column_stack([-turn, turn @ (y, -x)])
+        error = places[0] - places[1]
+        covariance = jacobian @ refined.covariance @ jacobian.T
+        return EXPECTED_NORMALISED_ERROR / 2.0 * float(error @ numpy.linalg.solve(covariance, error))
+    turn_rad = estimate[2] - true[2]
+    turn_rad -= wrapped(turn_rad, 2.0 * math.pi / grid.symmetry)
+    s, c = math.sin(turn_rad), math.cos(turn_rad)
+    about = centroid_mm - numpy.array([[c, -s], [s, c]]) @ centroid_mm
+    error = estimate - palpate.compose([*about, turn_rad], true)
+    error[2] = wrapped(error[2], 2.0 * math.pi)
+    return float(error @ numpy.linalg.solve(refined.covariance, error))
+
+
+def wrapped(angle_rad: float, period_rad: float) -> float:
+    """The angle in [-period/2, period/2)."""
+    return (angle_rad + period_rad / 2.0) % period_rad - period_rad / 2.0

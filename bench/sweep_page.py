@@ -1,0 +1,396 @@
+"""The sweep's document as people read it: tables, charts, and a page that needs no network."""
+
+import html
+import pathlib
+import string
+import urllib.parse
+from collections.abc import Iterable, Sequence
+from typing import Any, ClassVar
+
+from palpate._statistics import LEAST_GAIN
+
+from . import charts
+from .report import Json
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from palpate._tables import (
+    Column,
+    count_text,
+    difference_text,
+    mean_text,
+    number,
+    plain,
+    print_head,
+    print_row,
+    print_table,
+    seconds_text,
+    texts,
+    value_of,
+)
+from .windows import REACH_MM
+
+#: The files of the charts, without their endings.
+CHARTS = ("sweep_front", "sweep_precision", "sweep_bins", "sweep_bounds")
+#: Under the pointer: where a mark stands in the chart, as shares of its width and height from the
+#: upper left, and what is told.
+Spots = list[tuple[float, float, str]]
+
+_MIB = number(".1f", 1.0 / (1 << 20))
+_MM = number(".3f")
+_NATS = number(".1e")
+_PERCENT = number(".0f", 100.0)
+
+RUNS: list[Column] = [
+    ("filter", "filter", plain),
+    ("map cells, mm", "cell_mm", plain),
+    ("bins per object, or particles", "count", count_text),
+    ("bins", "bins", plain),
+    ("trials", "trials", plain),
+    ("in full", "full_trials", plain),
+    ("time per touch", "seconds_per_touch", seconds_text),
+    ("per unknown", "seconds_per_unknown", seconds_text),
+    ("per refined pose", "seconds_refine", seconds_text),
+    ("memory, MiB", "device_bytes", _MIB),
+    ("recognised, %", "accuracy", _PERCENT),
+    ("calibration error", "expected_calibration_error", _MM),
+    ("located", "error_mm/trials", plain),
+    ("mode: mean error, mm", "error_mm", mean_text),
+    ("95 %", "error_mm/p95", _MM),
+    ("refined: mean error, mm", "refined_error_mm", mean_text),
+    ("95 %", "refined_error_mm/p95", _MM),
+    ("nearest bin, mm", "nearest_bin_mm", _MM),
+    ("largest deviation, nats", "deviation_nats/largest", _NATS),
+    ("RMS", "deviation_nats/rms", _NATS),
+    ("mode: median, mm", "error_mm/median", _MM),
+    ("refined: median, mm", "refined_error_mm/median", _MM),
+    ("least probability", "least_confidence", number(".6f")),
+]
+_PRINTED = RUNS[:20]  # the page has more
+PRECISIONS: list[Column] = [
+    ("evaluated by", "path", plain),
+    ("bins per object", "count", count_text),
+    ("ns per pose, element and touch", "nanoseconds", number(".2f")),
+    ("largest deviation, nats", "deviation_nats/largest", _NATS),
+    ("RMS", "deviation_nats/rms", _NATS),
+]
+BOUNDS: list[Column] = [
+    ("bins per object", "count", count_text),
+    ("bins in all", "bins_in_all", count_text),
+    ("trials", "trials", plain),
+    ("histogram, asked once", "histogram/once", seconds_text),
+    ("bounded", "bounded/once", seconds_text),
+    ("histogram, after each touch", "histogram/each_touch", seconds_text),
+    ("bounded", "bounded/each_touch", seconds_text),
+    ("bins evaluated", "bins_evaluated", count_text),
+    ("of all, %", "share_evaluated", number(".3g", 100.0)),
+    ("certificate", "certificate", _NATS),
+    ("measured error", "measured_error", _NATS),
+    ("certificates that hold", "certificates_hold", plain),
+    ("same mode", "same_modes", plain),
+    ("host memory, MiB", "host_bytes", _MIB),
+    ("--filter auto takes", "auto", plain),
+    ("the faster one", "auto_is_faster", plain),
+]
+LIMITS: list[Column] = [
+    ("what is changed", "name", plain),
+    ("elements", "elements", plain),
+    ("bins per object", "count", count_text),
+    ("mode: mean error, mm", "error_mm", mean_text),
+    ("refined: mean error, mm", "refined_error_mm", mean_text),
+    ("compared with", "against", plain),
+    ("mode: difference, mm", "difference_mm", difference_text),
+    ("refined: difference, mm", "refined_difference_mm", difference_text),
+]
+
+
+def _step_text(step: dict[str, float]) -> str:
+    change = 100.0 * (step["to"] / step["from"] - 1.0) if step["from"] > 0.0 else 0.0
+    return f"{step['from']:.3f} to {step['to']:.3f} ({change:+.0f} %)"
+
+
+STEPS: list[Column] = [
+    ("map cells, mm", "cell_mm", plain),
+    ("from bins", "from", count_text),
+    ("to bins", "to", count_text),
+    ("trials", "trials", plain),
+    ("mode: mean error, mm", "error_mm", _step_text),
+    ("difference, mm", "error_mm", difference_text),
+    ("refined: mean error, mm", "refined_error_mm", _step_text),
+    ("difference, mm", "refined_error_mm", difference_text),
+]
+VERDICTS: list[Column] = [
+    ("goal", "name", plain),
+    ("measured, mm", "value", _MM),
+    ("at most", "at_most", plain),
+    ("reached", "reached", plain),
+]
+
+
+def _steps_of(document: Json) -> list[Json]:
+    return [step for knee in document["knees"] for step in knee["steps"]]
+
+
+def print_point_head() -> None:
+    """The head of the table of all runs."""
+    print_head(_PRINTED)
+
+
+def print_point(point: Json) -> None:
+    """A run, as soon as it is known."""
+    print_row(_PRINTED, point)
+
+
+def print_document(document: Json) -> None:
+    """What follows the runs."""
+    print_table(PRECISIONS, document["precisions"])
+    print_table(BOUNDS, document["bounds"])
+    print(f"\n{document['auto_rule']['sentence']}")
+    print_table(LIMITS, document["limits"])
+    print()
+    for knee in document["knees"]:
+        print(f"- {knee['sentence']}")
+    print_table(STEPS, _steps_of(document))
+    print(f"\n{document['windows']}")
+    print_table(VERDICTS, document["verdicts"])
+
+
+class _Chart:
+    """A chart with logarithmic axes that knows where its marks stand."""
+
+    def __init__(self, x: str, y: str) -> None:
+        self.figure, self.axes = charts.chart(x, y, log="xy")
+        self._marks: list[tuple[float, float, str]] = []
+
+    def add(
+        self, records: Iterable[tuple[float, float, str, str]], label: str = "", **look: Any
+    ) -> None:
+        """A series of (x, y, label beside the mark, title under the pointer); nothing without any."""
+        points = list(records)
+        if not points:
+            return
+        self.axes.plot([p[0] for p in points], [p[1] for p in points], label=label or None, **look)
+        for x, y, beside, title in points:
+            if beside:
+                self.axes.annotate(
+                    beside, (x, y), (6, 3), textcoords="offset points", fontsize=8,
+                    color=look["color"],
+                )  # fmt: skip
+            if title:
+                self._marks.append((x, y, title))
+
+    def done(self) -> tuple[Figure, Spots]:
+        """The chart with its legend, and its spots."""
+        charts.legend(self.axes)
+        self.figure.draw_without_rendering()  # lays it out
+        to_share = self.axes.transData + self.figure.transFigure.inverted()
+        spots = []
+        for x, y, title in self._marks:
+            across, up = to_share.transform((x, y))
+            spots.append((float(across), 1.0 - float(up), title))
+        return self.figure, spots
+
+
+def _title(columns: Sequence[Column], record: Json) -> str:
+    """A line for every column that the record has."""
+    cells = zip(columns, texts(columns, record), strict=True)
+    return "\n".join(f"{head}: {text}" for (head, _, _), text in cells if text != "–")
+
+
+def _front(chart: _Chart, front: Sequence[Json]) -> None:
+    points = [(entry["cost"], entry["error"], "", "") for entry in front]
+    chart.add(points, "Pareto front", color=charts.GREY, linestyle="-", zorder=1)
+
+
+def _pose_chart(document: Json) -> tuple[Figure, Spots]:
+    chart = _Chart(
+        f"time per unknown of {document['touches']} touches, an estimate after each",
+        "mean pose error (mm)",
+    )
+    charts.tick_text(chart.axes, "x", seconds_text, decades=True)
+    _front(chart, document["fronts"]["seconds per unknown, mean error in mm"])
+    fills = {0.25: {"alpha": 0.4}, 0.5: {}, 1.0: charts.HOLLOW}
+    for i, (kind, pose, name, mark, labelled) in enumerate(
+        (
+            # The refined pose stands right below its mode, and particles by their like.
+            ("histogram", "mode", "histogram, mode", "o", False),
+            ("histogram", "refined", "histogram, refined", "s", True),
+            ("particles", "mode", "particles", "^", True),
+            ("augmented", "mode", "Augmented MCL", "D", False),
+            ("systematic", "mode", "systematic resampling", "^", False),
+        )
+    ):
+        field = "error_mm" if pose == "mode" else "refined_error_mm"
+        for cell_mm, fill in fills.items():
+            chart.add(
+                (
+                    (
+                        point["seconds_per_unknown"] + (0.0 if pose == "mode" else point["seconds_refine"]),
+                        point[field]["mean"],
+                        count_text(point["count"]) if labelled and cell_mm == 0.5 else "",
+                        f"{name}\n{_title(RUNS, point)}",
+                    )
+                    for point in document["points"]
+                    if (point["filter"], point["cell_mm"]) == (kind, cell_mm) and point[field]
+                ),
+                name if cell_mm == 0.5 else "",
+                linestyle="", marker=mark, color=charts.COLOURS[i], **fill,
+            )  # fmt: skip
+    return chart.done()
+
+
+def _precision_chart(document: Json) -> tuple[Figure, Spots]:
+    chart = _Chart("time per pose, element and touch (ns)", "largest deviation from float64 (nats)")
+    charts.tick_text(chart.axes, "y", lambda nats: f"{nats:.0e}")
+    _front(chart, document["fronts"]["ns per pose, element and touch, largest deviation in nats"])
+    families = (
+        ("register tiles", "register tiles", "s"),
+        ("runs", "runs of bins", "o"),
+        ("in logs", "in logs (gamma = 0)", "o"),
+        ("array at rest", "array at rest", "s"),
+        ("one-bin", "one-bin kernel", "^"),
+        ("CPU loop", "CPU loop", "D"),
+    )
+    for i, (path, name, mark) in enumerate(families):
+        chart.add(
+            (
+                (of["nanoseconds"], of["deviation_nats"]["largest"], count_text(of["count"]),
+                 _title(PRECISIONS, of))
+                for of in document["precisions"]
+                if of["path"].startswith(path)
+            ),
+            name, linestyle="", marker=mark, color=charts.COLOURS[i],
+        )  # fmt: skip
+    return chart.done()
+
+
+def _bounds_chart(document: Json) -> tuple[Figure, Spots]:
+    chart = _Chart("bins in all", f"time per unknown of {document['touches']} touches")
+    charts.tick_text(chart.axes, "x", count_text, decades=True)
+    charts.tick_text(chart.axes, "y", seconds_text, decades=True)
+    for colour, kind, name in zip(
+        charts.COLOURS, ("histogram", "bounded"), ("histogram", "by bounds"), strict=False
+    ):
+        for asked, words, look in (
+            ("once", "asked once", {"marker": "o", "linestyle": "-"}),
+            ("each_touch", "asked after each touch", {"marker": "s", "linestyle": "--"} | charts.HOLLOW),
+        ):
+            chart.add(
+                (
+                    (record["bins_in_all"], record[kind][asked], "", _title(BOUNDS, record))
+                    for record in document["bounds"]
+                ),
+                f"{name}, {words}", color=colour, **look,
+            )  # fmt: skip
+    charts.rule(chart.axes, document["auto_rule"]["rule"], "--filter auto", vertical=True)
+    return chart.done()
+
+
+def _knee_chart(document: Json) -> tuple[Figure, Spots]:
+    chart = _Chart("bins per object", "mean pose error (mm)")
+    charts.tick_text(chart.axes, "x", count_text, decades=True)
+    balanced = [point for point in document["points"] if point["balanced"]]
+    finest = max((point["count"] for point in balanced), default=0)
+    for colour, knee in zip(charts.COLOURS, document["knees"], strict=False):
+        cell_mm = knee["cell_mm"]
+        for field, name, look in (
+            ("error_mm", "mm cells, mode", {"marker": "o"}),
+            ("refined_error_mm", "mm, refined", {"marker": "s"} | charts.HOLLOW),
+        ):
+            chart.add(
+                (
+                    (point["count"], point[field]["mean"], "", _title(RUNS, point))
+                    for point in balanced
+                    if point["cell_mm"] == cell_mm and point[field]
+                ),
+                f"{cell_mm:g} {name}", color=colour, linestyle="-", **look,
+            )  # fmt: skip
+        if knee["balanced_count"] <= 2.0 * finest:
+            fine = f"fine, {cell_mm:g} mm"
+            charts.rule(chart.axes, knee["balanced_count"], fine, vertical=True, colour=colour)
+    nearest = [(p["count"], p["nearest_bin_mm"], "", "") for p in balanced if p["cell_mm"] == 0.5]
+    chart.add(nearest, "nearest bin", color=charts.GREY, linestyle="--")
+    floors = [knee["floor_mm"] for knee in document["knees"] if knee["floor_mm"]]
+    if floors:
+        least = min(floors, key=lambda floor: float(floor["mean"]))
+        words = f"least error {mean_text(least)} mm, {least['trials']} trials"
+        charts.rule(chart.axes, least["mean"], words)
+    return chart.done()
+
+
+def charts_of(document: Json) -> dict[str, tuple[Figure, Spots]]:
+    """All charts, each with what stands under the pointer."""
+    drawn = (_pose_chart, _precision_chart, _knee_chart, _bounds_chart)
+    return {name: draw(document) for name, draw in zip(CHARTS, drawn, strict=True)}
+
+
+def _figure(figure: Figure, spots: Spots) -> str:
+    """The chart as a picture in the page; invisible discs over its marks show their titles."""
+    width, height = 1000.0, 1000.0 * figure.get_figheight() / figure.get_figwidth()
+    axes: Axes = figure.axes[0]
+    alt = html.escape(f"{axes.get_ylabel()} against {axes.get_xlabel()}")
+    discs = "".join(
+        f'<circle cx="{width * x:.0f}" cy="{height * y:.0f}" r="8"><title>{html.escape(title)}'
+        "</title></circle>\n"
+        for x, y, title in spots
+    )
+    picture = urllib.parse.quote(charts.svg(figure), safe=" -.,;:/()")
+    return (
+        f'<div class="chart"><img alt="{alt}" src="data:image/svg+xml,{picture}"/>\n'
+        f'<svg viewBox="0 0 {width:.0f} {height:.0f}">\n{discs}</svg></div>'
+    )
+
+
+def _sort_key(value: Any, text: str) -> str:
+    """What a column is sorted by: a number, the mean of a record, or the text."""
+    value = value["mean"] if isinstance(value, dict) else value
+    if value is None:
+        return "inf"
+    return f"{value:.9g}" if isinstance(value, (int, float)) and not isinstance(value, bool) else text
+
+
+def _table(columns: Sequence[Column], records: Iterable[Json]) -> str:
+    heads = "".join(f'<th scope="col">{html.escape(head)}</th>' for head, _, _ in columns)
+    rows = ""
+    for record in records:
+        cells = ""
+        for (_, path, _), plain_text in zip(columns, texts(columns, record), strict=True):
+            value, text = value_of(record, path), html.escape(plain_text)
+            verdict = f' class="{text}"' if isinstance(value, bool) else ""
+            cells += f'<td{verdict} data-value="{_sort_key(value, text)}">{text}</td>'
+        rows += f"<tr>{cells}</tr>\n"
+    return (
+        f'<div class="wide"><table>\n<thead><tr>{heads}</tr></thead>\n<tbody>\n{rows}'
+        "</tbody></table></div>\n"
+    )
+
+
+class _Template(string.Template):
+    """The page's text, with a part in the place of every {{name}}."""
+
+    pattern: ClassVar[Any] = r"\{\{(?:(?P<named>[a-z_]+)|(?P<braced>\b\B)|(?P<escaped>\b\B)|(?P<invalid>\b\B))\}\}"
+
+
+def page_of(document: Json, figures: dict[str, tuple[Figure, Spots]]) -> str:
+    """The document as one self-contained page, by the template in sweep_page.html."""
+    facts = ("device", "host threads", "python", "data", "date", "command line", "seconds in all")
+    verdicts = document["verdicts"]
+    parts = {
+        "facts": "".join(f"<dt>{fact}</dt><dd>{html.escape(str(document[fact]))}</dd>\n" for fact in facts),
+        "goals": "<h2>Goals</h2>\n" + _table(VERDICTS, verdicts) if verdicts else "",
+        "trials": str(document["trials"]),
+        "limit_trials": str(document["limits"][0]["error_mm"]["trials"]),
+        "windows": html.escape(document["windows"]),
+        "sampled_bins": str(document["points"][0]["deviation_nats"]["samples"] // 5),
+        "least_gain": f"{100.0 * LEAST_GAIN:.0f}",
+        "window_reach": f"{REACH_MM:g}",
+        "auto_rule": html.escape(document["auto_rule"]["sentence"]),
+        "knees": "".join(f"<li>{html.escape(knee['sentence'])}</li>\n" for knee in document["knees"]),
+        "steps": _table(STEPS, _steps_of(document)),
+        "limits": _table(LIMITS, document["limits"]),
+        "runs": _table(RUNS, document["points"]),
+        "precisions": _table(PRECISIONS, document["precisions"]),
+        "bounds": _table(BOUNDS, document["bounds"]),
+    } | {name: _figure(*figure) for name, figure in figures.items()}
+    page = pathlib.Path(__file__).with_suffix(".html").read_text(encoding="utf-8")
+    return _Template(page).substitute(parts)

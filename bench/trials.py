@@ -1,0 +1,220 @@
+"""Simulated letters: what is learned, the unknowns, and a histogram's answers about them."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+
+import numpy
+from numpy.typing import ArrayLike, NDArray
+
+import palpate
+
+from .random_numbers import Random, Stream
+
+#: The objects of Sec. IV.
+VOWELS = ("A", "E", "I", "O", "U")
+#: Shapes that nobody learned.
+MISFITS = ("F", "H", "T", "X", "L", "C", "Z", "ring")
+SYMMETRY = {"I": 2, "O": 0}
+SEEDS_PER_SHAPE = 1_000_000  # more trials begin with the same ones
+
+Floats = NDArray[numpy.float64]
+
+
+@dataclass(frozen=True)
+class Touching:
+    """What unknowns are touched with, and how."""
+
+    #: Element centres in the sensor frame, [e, 2] in mm.
+    elements_mm: ArrayLike = field(default_factory=palpate.digitacts_array)
+    sensor: palpate.SensorModel = field(default_factory=palpate.SensorModel)
+    #: random_poses() in the place of the training set's poses.
+    at_random_poses: bool = False
+    #: Standard deviations of the pose that the robot reports for the array about the true one:
+    #: along x and y in mm, and about the array's centre in rad.
+    noise: tuple[float, float] = (0.0, 0.0)
+
+
+EXACT = Touching()
+
+
+def training_recordings(
+    touching: Touching = EXACT, poses: ArrayLike | None = None
+) -> list[palpate.Recording]:
+    """The vowels, touched at known poses T_object_sensor [n, 3], with the seeds 1 to 5."""
+    return [
+        palpate.simulate(
+            name, poses, elements_mm=touching.elements_mm, seed=seed, sensor=touching.sensor
+        )
+        for seed, name in enumerate(VOWELS, start=1)
+    ]
+
+
+def letter_maps(
+    device: palpate.Device,
+    training: Sequence[palpate.Recording] | None = None,
+    *,
+    cell_mm: float = 0.5,
+    spread_mm: float = 0.5,
+) -> list[palpate.OccupancyGrid]:
+    """The letters' maps, which share the prior that their touches give, with their symmetries."""
+    training = training_recordings() if training is None else training
+    touches = {recording.object: list(recording) for recording in training}
+    prior = palpate.estimate_prior(
+        device, touches, cell_mm=cell_mm, sensor=palpate.InverseSensorModel(spread_mm=spread_mm)
+    )
+    builder = palpate.MapBuilder(
+        device,
+        cell_mm=cell_mm,
+        sensor=palpate.InverseSensorModel(spread_mm=spread_mm, prior=prior),
+    )
+    maps = []
+    for label, of_letter in touches.items():
+        builder.clear()
+        builder.add(of_letter)
+        maps.append(builder.build(label))
+        maps[-1].symmetry = SYMMETRY.get(label, 1)
+    return maps
+
+
+def make_trials(
+    shapes: Iterable[str], each: int, touches: int, seed: int, touching: Touching = EXACT
+) -> list[palpate.Recording]:
+    """The trials of Sec. IV, `each` for every shape, shape by shape.
+
+    A shape has one test set: 192 readings, by default at the poses of the training set, but of another
+    sensor's gains and noise. A trial is a random T_object_robot, x and y uniform over [-10, 10] mm and
+    theta over the circle, and the first `touches` of the test set in a random order. More trials, or
+    more touches, begin with the same ones. The recordings carry the truth. With noise, each reading is
+    the same and its T_robot_sensor is off by normal numbers of its own.
+
+    Raises palpate.Error unless touches is from 1 to the test set's 192.
+    """
+    grid = palpate.training_grid()
+    if not 1 <= touches <= len(grid):
+        raise palpate.Error(
+            f"touches per trial = {touches}: give 1 to {len(grid)}, which is what there is to draw "
+            "from without replacement"
+        )
+    poses = palpate.random_poses(len(grid), seed) if touching.at_random_poses else grid
+    trials = []
+    for index, shape in enumerate(shapes):
+        own = seed + index * SEEDS_PER_SHAPE
+        test_set = palpate.simulate(
+            shape, poses, elements_mm=touching.elements_mm, seed=own, sensor=touching.sensor
+        )
+        trials += [_trial(test_set, touches, own + i, touching.noise) for i in range(each)]
+    return trials
+
+
+def _trial(
+    test_set: palpate.Recording, touches: int, seed: int, noise: tuple[float, float]
+) -> palpate.Recording:
+    """Touches of an object whose frame was the robot's, as a robot meets them at T_object_robot."""
+    order = Random(seed, Stream.TOUCH_ORDER).order(len(test_set))[:touches]
+    T_object_robot = palpate.random_object_pose(seed)
+    T_robot_object = palpate.inverse(T_object_robot)
+    off = Random(seed, Stream.POSE_NOISE).normals(3 * touches).reshape(touches, 3)
+    off *= (noise[0], noise[0], noise[1])
+    poses = [
+        palpate.compose(palpate.compose(T_robot_object, test_set.T_robot_sensor[i]), off[k])
+        for k, i in enumerate(order)
+    ]
+    return palpate.Recording(
+        test_set.pressure[order],
+        numpy.array(poses),
+        test_set.elements_mm,
+        truth=palpate.Truth(test_set.object, T_object_robot),
+    )
+
+
+def truth_of(trial: palpate.Recording) -> palpate.Truth:
+    """The truth, which a trial has."""
+    assert trial.truth is not None
+    return trial.truth
+
+
+def lattice_of(
+    nx: int, ny: int, ntheta: int, extent_mm: float = 10.0, pivot_mm: ArrayLike = (0.0, 0.0)
+) -> palpate.PoseLattice:
+    """Bins over x and y within the extent and the full circle (Sec. IV: 10 mm)."""
+    return palpate.PoseLattice(
+        (-extent_mm, extent_mm, nx),
+        (-extent_mm, extent_mm, ny),
+        (0.0, 2.0 * numpy.pi, ntheta),
+        pivot_mm,
+    )
+
+
+def counts_of(lattice: palpate.PoseLattice) -> tuple[int, int, int]:
+    """Bins along x, y and theta."""
+    return lattice.x_mm.count, lattice.y_mm.count, lattice.theta_rad.count
+
+
+def size_of(lattice: palpate.PoseLattice) -> str:
+    """Its numbers of bins, such as "25x25x16"."""
+    return "x".join(map(str, counts_of(lattice)))
+
+
+@dataclass(frozen=True)
+class Body:
+    """The cells with log odds above 0, of uniform density."""
+
+    centroid_mm: Floats  #: [2] in the object frame
+    inertia_mm2: float  #: mean squared distance from the centroid
+
+    @staticmethod
+    def of(grid: palpate.OccupancyGrid) -> "Body":
+        j, i = numpy.nonzero(grid.log_odds > 0)
+        cells_mm = grid.origin_mm + grid.cell_mm * numpy.stack([i, j], axis=1)
+        centroid_mm = cells_mm.mean(axis=0)
+        return Body(centroid_mm, float(((cells_mm - centroid_mm) ** 2).sum(axis=1).mean()))
+
+
+@dataclass(frozen=True)
+class Step:
+    """What a belief says of an unknown whose truth is known."""
+
+    #: Probability of every map.
+    identity: Floats
+    #: Probability of "none of these"; 0 where it was not asked for.
+    none: float
+    right: bool  #: whether the most probable answer is the true object
+    mode: palpate.Mode
+    refined: palpate.RefinedPose
+    error_mm: float | None  #: None where the mode has the wrong object
+    refined_error_mm: float | None
+
+
+def judged(
+    belief: palpate.PoseHistogram, maps: Sequence[palpate.OccupancyGrid], truth: palpate.Truth
+) -> Step:
+    """Estimate and refined pose of a belief beside the truth."""
+    estimate = belief.estimate()
+    mode, refined = estimate.mode, belief.refine(estimate.mode)
+    none = estimate.none or 0.0
+    best = int(numpy.argmax(estimate.identity))
+    right = bool(maps[best].label == truth.object and estimate.identity[best] >= none)
+    located = maps[mode.object]
+    errors = [
+        palpate.pose_error_mm(located, pose.T_object_robot, truth.T_object_robot)
+        if located.label == truth.object
+        else None
+        for pose in (mode, refined)
+    ]
+    return Step(numpy.array(estimate.identity), none, right, mode, refined, *errors)
+
+
+def steps_after(
+    belief: palpate.PoseHistogram,
+    maps: Sequence[palpate.OccupancyGrid],
+    trial: palpate.Recording,
+    touches: Iterable[int],
+) -> list[Step]:
+    """The belief in one unknown after each of these rising numbers of touches, from uniform on."""
+    belief.reset()
+    steps, done = [], 0
+    for until in touches:
+        belief.update(trial[done:until])
+        done = until
+        steps.append(judged(belief, maps, truth_of(trial)))
+    return steps

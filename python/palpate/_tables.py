@@ -1,0 +1,82 @@
+"""Markdown tables of records, and how their values are written."""
+
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any
+
+Text = Callable[[Any], str]
+
+
+def plain(value: Any) -> str:
+    """Numbers in their shortest form, truth as yes and no, lists of numbers such as 64x64x244."""
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, (list, tuple)):
+        return "x".join(map(plain, value))
+    return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def count_text(count: float) -> str:
+    """A count such as 100, 17.5 k, 1 M or 1 G."""
+    for size, prefix in ((1e9, " G"), (1e6, " M"), (1e3, " k")):
+        if count >= 0.9995 * size:
+            return f"{count / size:.3g}{prefix}"
+    return f"{count:.3g}"
+
+
+def seconds_text(seconds: float) -> str:
+    """Seconds with a unit and a prefix."""
+    if seconds >= 0.9995:
+        return f"{seconds:.3g} s"
+    return f"{1e3 * seconds:.3g} ms" if seconds >= 0.9995e-3 else f"{1e6 * seconds:.3g} us"
+
+
+def mean_text(errors: dict[str, float]) -> str:
+    """Such as "0.137 ± 0.011", of a mean and its standard error."""
+    return f"{errors['mean']:.3f} ± {errors['standard_error']:.3f}"
+
+
+def difference_text(errors: dict[str, float]) -> str:
+    """The same with the sign of the mean."""
+    return f"{errors['mean']:+.3f} ± {errors['standard_error']:.3f}"
+
+
+def number(form: str, factor: float = 1.0) -> Text:
+    """Writes `factor` times a number in a form such as ".3f"."""
+    return lambda value: format(factor * value, form)
+
+
+#: Its head, the path of its field in a record, such as "error_mm/mean", and how it is written.
+Column = tuple[str, str, Text]
+
+
+def value_of(record: Any, path: str) -> Any:
+    """What a path finds in a record, or None."""
+    for name in path.split("/"):
+        record = None if record is None else record.get(name)
+    return record
+
+
+def texts(columns: Sequence[Column], record: Any) -> list[str]:
+    """The cells of a row; a dash where there is nothing."""
+    values = [value_of(record, path) for _, path, _ in columns]
+    return ["–" if v is None else text(v) for v, (_, _, text) in zip(values, columns, strict=True)]
+
+
+def print_head(columns: Sequence[Column]) -> None:
+    """The head of a table, after an empty line."""
+    print(f"\n| {' | '.join(head for head, _, _ in columns)} |")
+    print("|:--|" + "--:|" * (len(columns) - 1))
+
+
+def print_row(columns: Sequence[Column], record: Any) -> None:
+    """One of its rows."""
+    print(f"| {' | '.join(texts(columns, record))} |", flush=True)
+
+
+def print_table(columns: Sequence[Column], records: Iterable[Any]) -> None:
+    """A whole table; nothing where there are no records."""
+    rows = list(records)
+    if rows:
+        print_head(columns)
+    for record in rows:
+        print_row(columns, record)

@@ -1,0 +1,91 @@
+"""The experiment keeps the paper's order, and its files say the same."""
+
+import csv
+import pathlib
+
+import pytest
+from conftest import Program, run
+
+from bench.experiment import FIGURES, TABLES, ranges_of, standing
+
+TRIALS, TOUCHES = 10, 9
+
+
+@pytest.fixture(scope="module")
+def experiment(tmp_path_factory: pytest.TempPathFactory) -> Program:
+    folder = tmp_path_factory.mktemp("experiment")
+    return Program(
+        folder, "bench.experiment", "--quick", "--trials", TRIALS // 5, "--touches", TOUCHES,
+        "--csv", folder / "csv", "--plots", folder / "plots",
+    )  # fmt: skip
+
+
+def test_curves_are_whole_and_touches_tell(experiment: Program) -> None:
+    filters = experiment.document["filters"]
+    assert len(filters) == 8
+    for run_of in filters:
+        curve = run_of["curve"]
+        assert [point["touches"] for point in curve] == list(range(1, TOUCHES + 1))
+        for point in curve:
+            assert 0 <= point["accuracy_low"] <= point["accuracy"] <= point["accuracy_high"] <= 1
+            assert point["located"] <= TRIALS
+            assert (point["error_mm"] is None) == (point["located"] == 0)
+            histogram = run_of["filter"] == "histogram" and point["located"] > 0
+            assert (point["refined_error_mm"] is not None) == histogram
+        assert curve[-1]["mean_confidence"] > curve[0]["mean_confidence"], "touches make sure"
+        estimates = sum(part["count"] for part in run_of["calibration"]["bins"])
+        assert estimates == TRIALS * TOUCHES
+
+
+def test_finer_bins_err_less_and_histograms_lead(experiment: Program) -> None:
+    last = {run_of["name"]: run_of["curve"][-1] for run_of in experiment.document["filters"]}
+    of_bins = [last[f"histogram {size}"] for size in ("5x5x4", "10x10x10", "25x25x16", "13x13x55")]
+    errors = [point["error_mm"]["mean"] for point in of_bins]
+    assert errors == sorted(errors, reverse=True), "balanced bins err least"
+    assert of_bins[-1]["accuracy"] == 1.0, "the paper's 10,000 bins know every letter after 9"
+    assert last["histogram 10x10x10"]["accuracy"] > last["particles 1000"]["accuracy"] + 0.1
+    refined = last["histogram 13x13x55"]["refined_error_mm"]["mean"]
+    assert refined < 0.7 * errors[-1], "a pose between the bins is nearer than the bin"
+
+
+def test_a_misplaced_array_costs_the_more_the_further(experiment: Program) -> None:
+    def error_mm(filters: list[dict[str, object]]) -> float:
+        balanced = next(of for of in filters if of["name"] == "histogram 25x25x16")
+        return float(balanced["curve"][-1]["error_mm"]["mean"])  # type: ignore[index]
+
+    levels = experiment.document["pose_noise"]
+    assert [level["translation_mm"] for level in levels] == [1.0, 2.0]
+    errors = [error_mm(of) for of in (experiment.document["filters"], *(l["filters"] for l in levels))]
+    assert errors[0] < errors[1] < errors[2]
+
+
+def test_tables_say_what_the_curves_say(experiment: Program) -> None:
+    rows = list(csv.DictReader((experiment.folder / "csv/trials.csv").open()))
+    assert len(rows) == 8 * TRIALS * TOUCHES
+    for run_of in experiment.document["filters"]:
+        own = [row for row in rows if (row["filter"], row["count"]) == (run_of["filter"], str(run_of["count"]))]
+        for point in run_of["curve"]:
+            right = [row["right"] == "1" for row in own if row["touches"] == str(point["touches"])]
+            assert sum(right) / TRIALS == point["accuracy"]
+    assert {path.name for path in (experiment.folder / "csv").iterdir()} == set(TABLES)
+    experiment.expect_charts(*FIGURES)
+    assert "| **histogram 5x5x4** | trials: 10, touches: 9" in experiment.output
+
+
+def test_what_cannot_be_is_refused(tmp_path: pathlib.Path) -> None:
+    same = tmp_path / "curves.csv"
+    for arguments, words in (
+        (("--trials", 0), "give 1 or more"),
+        (("--touches", 193), "give 1 to 192"),
+        (("--csv", tmp_path, "--json", same), "overwrite"),
+        (("--json", tmp_path / "missing" / "file"), "cannot be written"),
+    ):
+        done = run("bench.experiment", *arguments)
+        assert done.returncode == 2, arguments
+        assert words in done.stderr, done.stderr
+    assert not same.exists()
+
+
+def test_standings_name_the_touches() -> None:
+    assert ranges_of([1, 2, 3, 5, 8, 9]) == "1-3, 5, 8-9"
+    assert standing([(1, 2.0), (2, 0.0), (3, -1.0)]) == "ahead at touch 1; tied at touch 2; behind at touch 3"

@@ -1,0 +1,212 @@
+"""The other programs with small settings: their documents are whole, and keep what must hold."""
+
+import html.parser
+import math
+import pathlib
+from typing import Any
+
+import pytest
+from conftest import Program, run
+
+from bench.sweep import auto_rule_of
+
+
+def cases_of(program: Program) -> dict[str, dict[str, float]]:
+    """Every case's values by their names; all of them finite, with a unit."""
+    cases: dict[str, dict[str, float]] = {}
+    for case in program.document["cases"]:
+        assert case["name"] not in cases
+        cases[case["name"]] = {}
+        for measured in case["measurements"]:
+            assert math.isfinite(measured["value"]) and measured["unit"], measured
+            assert ("reached" in measured) == ("at_most" in measured or "at_least" in measured)
+            cases[case["name"]][measured["name"]] = measured["value"]
+    return cases
+
+
+def part(tmp_path: pathlib.Path, name: str, trials: int | None = None) -> Program:
+    some = () if trials is None else ("--trials", trials)
+    plots = ("--plots", tmp_path / "plots")
+    return Program(tmp_path, "bench.beliefs", "--quick", "--part", name, *some, *plots)
+
+
+def test_averaging_makes_misplaced_touches_honest(tmp_path: pathlib.Path) -> None:
+    beliefs = part(tmp_path, "misplaced", trials=1)
+    cases_of(beliefs)
+    records = beliefs.document["misplaced"]
+    assert len(records) == 2 * 4 * 2, "two displacements, four numbers of touches, two beliefs"
+    for level_mm in (1.0, 2.0):
+        nees = {
+            belief: sum(
+                record["normalised_error"]["mean"]
+                for record in records
+                if (record["noise_mm"], record["belief"]) == (level_mm, belief)
+            )
+            for belief in ("as if exact", "averaged")
+        }
+        assert nees["averaged"] < 0.7 * nees["as if exact"], "too sure"
+    beliefs.expect_charts("misplaced", "sureness")
+    assert (tmp_path / "plots/misplaced_unknown.png").stat().st_size > 10_000
+
+
+def test_touches_tell_how_far_they_are_misplaced(tmp_path: pathlib.Path) -> None:
+    (record,) = part(tmp_path, "touch-sd", trials=1).document["touch-sd"]
+    assert record["fitted"]["mm"] == pytest.approx(record["true"]["mm"], rel=0.4)
+    assert record["gain_nats"] > 50.0, "exact poses explain such touches much worse"
+
+
+def test_none_is_found(tmp_path: pathlib.Path) -> None:
+    beliefs = part(tmp_path, "none", trials=1)
+    cases_of(beliefs)
+    by = {(record["name"], record["touches"]): record for record in beliefs.document["none"]}
+    exact = by["exact, ±10 mm", 9]
+    assert exact["learned_called_none"] == 0.0
+    assert exact["unlearned_called_none"] > 0.5
+    assert exact["told_apart"] > 0.9 > by["exact, ±10 mm", 1]["told_apart"], "one touch cannot tell"
+    assert len(exact["unlearned_log_odds"]) == 8
+    beliefs.expect_charts("none")
+
+
+def test_a_belief_that_allows_for_slips_follows(tmp_path: pathlib.Path) -> None:
+    beliefs = part(tmp_path, "slip")
+    case = cases_of(beliefs)["slip 0.3 mm, 1 degree"]
+    late = "mode's error, second half of the touches"
+    assert case[f"with slip_sd: {late}"] < case[f"without: {late}"]
+    assert case["with slip_sd: touches at which the mode has the right letter"] > 80.0
+    beliefs.expect_charts("slip")
+
+
+def test_planned_touches_tell_more(tmp_path: pathlib.Path) -> None:
+    beliefs = part(tmp_path, "plan")
+    entropy = {
+        record["order"]: [point["entropy"]["mean"] for point in record["curve"]]
+        for record in beliefs.document["plan"]
+    }
+    assert entropy["planned"][0] == entropy["random"][0], "the same first touch"
+    assert sum(entropy["planned"]) < sum(entropy["random"])
+    for curve in entropy.values():
+        assert curve == sorted(curve, reverse=True), "touches tell"
+    beliefs.expect_charts("plan")
+
+
+def test_costs_are_counted(tmp_path: pathlib.Path) -> None:
+    cases = cases_of(Program(tmp_path, "bench.beliefs", "--quick", "--part", "cost"))
+    touch = cases["touch 30x30x113"]
+    assert 1.0 < touch["memory, uncertain over plain"] <= 2.0
+    assert len(cases) == 3
+
+
+def test_unlearned_shapes_fit_worse(tmp_path: pathlib.Path) -> None:
+    cases = cases_of(Program(tmp_path, "bench.fit", "--quick", "--trials", 1))
+    assert len(cases) == 8, "two arrays after 1, 3, 5 and 9 touches"
+    for name, case in cases.items():
+        assert case["learned: fits"] == 100.0, name
+    assert cases["6x6 array, touch 9"]["unlearned fit worse than learned"] > 90.0
+    assert cases["16x16 array, touch 9"]["never learned: does not fit"] == 100.0
+
+
+def test_finer_steps_err_less(tmp_path: pathlib.Path) -> None:
+    fine, coarse = Program(tmp_path, "bench.bin_steps", "--quick").document["runs"]
+    assert fine["count"] > 4 * coarse["count"]
+    assert fine["excess"] == 0.0 and fine["difference_mm"] is None
+    assert coarse["difference_mm"]["mean"] == pytest.approx(
+        coarse["refined_error_mm"]["mean"] - fine["refined_error_mm"]["mean"]
+    )
+
+
+def test_certificates_hold(tmp_path: pathlib.Path) -> None:
+    bounded = Program(tmp_path, "bench.bounded", "--quick")
+    cases_of(bounded)
+    assert len(bounded.document["accuracy"]) == 4, "two lattices after 3 and 9 touches"
+    for checks in bounded.document["accuracy"]:
+        assert checks["holds"] == checks["same_mode"] == [True] * 5
+        for name in ("mass_outside", "total_variation", "identity_error"):
+            for promised, measured in zip(checks["promised"], checks[name], strict=True):
+                assert measured <= promised + 1e-11 <= 1e-6 + 1e-11
+    missing = run("bench.bounded", "--part", "presses", "--presses", tmp_path / "missing")
+    assert missing.returncode == 2 and "holds no recording" in missing.stderr
+
+
+@pytest.fixture(scope="module")
+def sweep(tmp_path_factory: pytest.TempPathFactory) -> Program:
+    folder = tmp_path_factory.mktemp("sweep")
+    return Program(
+        folder, "bench.sweep", "--quick", "--trials", 2, "--max-bins", 30_000,
+        "--html", folder / "page.html", "--plots", folder / "plots",
+    )  # fmt: skip
+
+
+def test_a_sweep_is_whole_and_in_order(sweep: Program) -> None:
+    document = sweep.document
+    assert {point["filter"] for point in document["points"]} == {
+        "histogram", "particles", "systematic", "augmented",
+    }  # fmt: skip
+    for point in document["points"]:
+        assert point["trials"] == 10
+        assert 0.0 < point["seconds_per_touch"] < point["seconds_per_unknown"]
+        assert (point["seconds_refine"] is None) == (point["filter"] != "histogram")
+        assert point["error_mm"]["p95"] is None, "of so few trials it is the largest error"
+        deviation = point["deviation_nats"]
+        assert 0.0 < deviation["rms"] <= deviation["largest"] < 1e-4
+        assert deviation["samples"] == 1_000
+    for cell_mm in (0.5, 1.0):
+        runs = [p for p in document["points"] if p["balanced"] and p["cell_mm"] == cell_mm]
+        nearest = [run_of["nearest_bin_mm"] for run_of in runs]
+        assert nearest == sorted(nearest, reverse=True)
+        assert runs[-1]["refined_error_mm"]["mean"] < runs[-1]["error_mm"]["mean"] < runs[0]["error_mm"]["mean"]
+        assert runs[-1]["nearest_bin_mm"] < runs[-1]["error_mm"]["mean"]
+    for bounds in document["bounds"]:
+        assert bounds["certificates_hold"] == bounds["same_modes"] == bounds["trials"]
+        assert bounds["measured_error"] <= bounds["certificate"] + 1e-11 <= 1e-6 + 1e-11
+        assert bounds["auto"] == ("bounded" if bounds["bins_in_all"] > 100_000 else "histogram")
+    for knee in document["knees"]:
+        assert "--bins fine takes" in knee["sentence"]
+        for step in knee["steps"]:
+            assert step["to"] >= 5 * step["from"]
+            change = step["error_mm"]
+            assert change["mean"] == pytest.approx(change["to"] - change["from"])
+    assert document["limits"][1]["against"] == document["limits"][0]["name"]
+    for front in document["fronts"].values():
+        assert front, "something is best"
+        assert [entry["cost"] for entry in front] == sorted(entry["cost"] for entry in front)
+        assert [e["error"] for e in front] == sorted((e["error"] for e in front), reverse=True)
+
+
+class Page(html.parser.HTMLParser):
+    """Counts a page's elements, and what it would load."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.counts: dict[str, int] = {}
+        self.loads: list[str] = []
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.counts[tag] = self.counts.get(tag, 0) + 1
+        self.loads += [value or "" for name, value in attrs if name in ("src", "href")]
+
+
+def test_the_page_needs_no_network(sweep: Program) -> None:
+    text = (sweep.folder / "page.html").read_text()
+    page = Page()
+    page.feed(text)
+    assert all(source.startswith("data:image/svg+xml,") for source in page.loads)
+    assert page.counts["img"] == 4
+    document = sweep.document
+    rows = sum(len(document[name]) for name in ("points", "precisions", "bounds", "limits"))
+    steps = sum(len(knee["steps"]) for knee in document["knees"])
+    assert page.counts["tr"] == rows + steps + 5, "five tables with a head each"
+    assert page.counts["circle"] > len(document["points"])
+    assert "{{" not in text
+    sweep.expect_charts("sweep_front", "sweep_precision", "sweep_bins", "sweep_bounds")
+
+
+def test_the_rule_of_auto_is_held_against_the_times() -> None:
+    def at(bins: int, bounded: float) -> dict[str, Any]:
+        times = {"once": 1.0, "each_touch": 1.0}
+        return {"bins_in_all": bins, "histogram": times, "bounded": {name: bounded for name in times}}
+
+    rule = auto_rule_of([at(100, 10.0), at(10_000, 0.1)])
+    assert rule["once"] == pytest.approx(1_000.0), "half-way between the logarithms"
+    assert "from 1 k bins in all on" in rule["sentence"]
+    assert auto_rule_of([at(100, 0.5)])["once"] is None
+    assert "on none of these lattices" in auto_rule_of([at(100, 2.0)])["sentence"]

@@ -1,0 +1,114 @@
+"""`python -m palpate.sweep` over a user's own maps and recordings."""
+
+import json
+import pathlib
+import subprocess
+import sys
+from typing import Any
+
+import pytest
+from conftest import Files, command
+
+import palpate
+from palpate.sweep import CHARTS
+
+
+def sweep(*arguments: object) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-m", "palpate.sweep", "--device", "llvmpipe", *map(str, arguments)],
+        capture_output=True,
+        text=True,
+        timeout=300,
+    )
+
+
+def run(folder: pathlib.Path, *arguments: object) -> dict[str, Any]:
+    done = sweep("--json", folder / "sweep.json", *arguments)
+    assert done.returncode == 0, done.stderr
+    document: dict[str, Any] = json.loads((folder / "sweep.json").read_text())
+    assert document["advice"] in done.stdout
+    return document
+
+
+@pytest.fixture(scope="module")
+def unknowns(files: Files, tmp_path_factory: pytest.TempPathFactory) -> pathlib.Path:
+    """Three unknowns that know their pose."""
+    folder = tmp_path_factory.mktemp("unknowns")
+    for seed, letter in enumerate("AEA", start=21):
+        command(
+            "simulate", letter, "-o", folder / f"{seed}.h5", "--object-pose", "random", "--touches", 9,
+            "--seed", seed,
+        )  # fmt: skip
+    return folder
+
+
+def test_more_bins_err_less_until_they_do_not(
+    files: Files, unknowns: pathlib.Path, tmp_path: pathlib.Path
+) -> None:
+    document = run(
+        tmp_path, "--maps", files.maps, "--recordings", unknowns, "--x-mm=-10:10", "--y-mm=-10:10",
+        "--max-bins", 100_000, "--plots", tmp_path / "plots",
+    )  # fmt: skip
+    points = document["points"]
+    assert (document["maps"], document["recordings"], document["true_poses"]) == (2, 3, 3)
+    counts = [point["count"] for point in points]
+    assert counts == sorted(counts) and counts[-1] <= 110_000
+    assert points[-1]["error_mm"]["mean"] < points[0]["error_mm"]["mean"]
+    for point in points:
+        assert point["histogram_recordings"] == 3
+        assert point["accuracy"] == 1.0
+        assert min(point[name] for name in ("seconds_histogram", "seconds_bounds", "device_bytes")) > 0
+    assert points[-1]["refined_from_finest_mm"]["mean"] == 0.0
+    for name in CHARTS:
+        assert (tmp_path / f"plots/{name}.png").read_bytes().startswith(b"\x89PNG")
+        assert (tmp_path / f"plots/{name}.svg").exists()
+    # What it gives is what recognize() gives with the same bins.
+    nx, ny, ntheta = points[0]["bins"]
+    records = palpate.recognize(
+        sorted(unknowns.iterdir()), files.maps, bins=(nx, ny, ntheta), filter="bounded", device="llvmpipe",
+        x_mm=(-10, 10), y_mm=(-10, 10),
+    )  # fmt: skip
+    assert points[0]["errors_mm"] == [record.error_mm for record in records]
+
+
+def test_without_true_poses_it_tells_distances(
+    files: Files, unknowns: pathlib.Path, tmp_path: pathlib.Path
+) -> None:
+    recording = palpate.read_recording(unknowns / "21.h5")
+    recording.truth = None
+    recording.save(tmp_path / "unknown.h5")
+    document = run(tmp_path, "--maps", files.maps, "--recordings", tmp_path / "unknown.h5", "--quick")
+    assert document["true_poses"] == 0
+    for point in document["points"]:
+        assert point["accuracy"] is None and point["error_mm"] is None
+        assert point["from_finest_mm"]["mean"] >= 0.0
+        assert 0.0 <= point["same_object"] <= 1.0
+    assert "--pivot-mm auto" in document["advice"], "the region of recognize's defaults"
+    assert document["fine_count"] > document["auto_count"] > 0
+
+
+def test_the_histogram_answers_where_bounds_refuse(
+    files: Files, unknowns: pathlib.Path, tmp_path: pathlib.Path
+) -> None:
+    scene = tmp_path / "scene.yaml"
+    scene.write_text("touch_sd: {mm: 0.5, deg: 1}\n")
+    document = run(
+        tmp_path, "--maps", files.maps, "--recordings", unknowns / "21.h5", "--scene", scene,
+        "--x-mm=-10:10", "--y-mm=-10:10", "--max-bins", 3_000,
+    )  # fmt: skip
+    for point in document["points"]:
+        assert point["seconds_bounds"] is None and point["host_bytes"] is None
+        assert point["seconds_histogram"] > 0.0
+
+
+def test_what_cannot_be_is_refused(files: Files, tmp_path: pathlib.Path) -> None:
+    for arguments, words in (
+        (("--maps", files.maps, "--recordings", tmp_path / "none.h5"), "none.h5"),
+        (("--maps", tmp_path / "none", "--recordings", files.unknown), "none"),
+        (("--maps", files.maps, "--recordings", files.unknown, "--max-bins", 10), "give 1000 or more"),
+        (("--maps", files.maps, "--recordings", files.unknown, "--x-mm=5"), "LOWER:UPPER"),
+    ):
+        done = sweep("--json", tmp_path / "out.json", *arguments)
+        assert done.returncode == 2, done.stderr
+        assert words in done.stderr and done.stderr.count("\n") == 1
+    assert not list(tmp_path.iterdir()), "nothing is left half-written"
