@@ -27,7 +27,7 @@ namespace palpate::cli {
 
 namespace {
 
-struct Options {
+struct CalibrateArguments {
   std::vector<std::string> recordings;
   std::string output;
   std::vector<std::string> maps;
@@ -43,17 +43,18 @@ struct Options {
   std::string device;
 };
 
-struct Pictures {
+struct CalibrationPictures {
   std::filesystem::path table;
   std::filesystem::path reliability;
 };
 
-Pictures pictures_of(const Options& options) {
+CalibrationPictures pictures_of(const CalibrateArguments& options) {
   const std::filesystem::path folder = options.png;
   return {folder / "table.png", folder / "reliability.png"};
 }
 
-void check_outputs(const Options& options, const std::vector<std::filesystem::path>& maps) {
+void check_outputs(const CalibrateArguments& options,
+                   const std::vector<std::filesystem::path>& maps) {
   CommandFiles files;
   for (const std::string& recording : options.recordings) {
     files.reads("RECORDING", recording);
@@ -77,7 +78,7 @@ void check_outputs(const Options& options, const std::vector<std::filesystem::pa
 }
 
 /// The bins on which unknowns will be recognised; none where no flag gives them.
-std::optional<RecognitionBins> bins_of(const Options& options, bool known_poses) {
+std::optional<RecognitionBins> bins_of(const CalibrateArguments& options, bool known_poses) {
   const RecognitionFlags& flags = options.recognition;
   if (flags.bins == "auto" || flags.bins == "fine") {
     refuse_flag("--bins", flags.bins, "give counts, as 25x25x16, or leave it out");
@@ -99,7 +100,7 @@ std::optional<RecognitionBins> bins_of(const Options& options, bool known_poses)
 /// @param known_poses of the touches
 /// @param maps given to compare touches with; at unknown poses, where one lacks its mean level, the
 /// layer auto is log_odds
-SensorCalibrationOptions calibration_options(const Options& options, bool known_poses,
+SensorCalibrationOptions calibration_options(const CalibrateArguments& options, bool known_poses,
                                              const std::vector<OccupancyGrid>& maps,
                                              const std::string& unit) {
   SensorCalibrationOptions result{.pressure_unit = unit};
@@ -143,7 +144,7 @@ SensorCalibrationOptions calibration_options(const Options& options, bool known_
 }
 
 /// Throws Error where some recordings have poses and others have none.
-bool all_have_poses(const Options& options, const std::vector<Recording>& recordings) {
+bool all_have_poses(const CalibrateArguments& options, const std::vector<Recording>& recordings) {
   if (options.unposed) {
     return false;
   }
@@ -159,7 +160,8 @@ bool all_have_poses(const Options& options, const std::vector<Recording>& record
   return first;
 }
 
-std::vector<Press> presses_of(const Options& options, const std::vector<Recording>& recordings) {
+std::vector<Press> presses_of(const CalibrateArguments& options,
+                              const std::vector<Recording>& recordings) {
   std::optional<Frames> frames;
   if (!options.frames.empty()) {
     frames = parse_frames("--frames", options.frames);
@@ -179,7 +181,7 @@ std::vector<Press> presses_of(const Options& options, const std::vector<Recordin
   return presses;
 }
 
-std::vector<OccupancyGrid> read_maps(const Options& options, bool known_poses,
+std::vector<OccupancyGrid> read_maps(const CalibrateArguments& options, bool known_poses,
                                      const std::vector<std::filesystem::path>& files) {
   const bool needs_mean_level =
       options.layer == "mean_level" || (options.layer == "auto" && known_poses);
@@ -196,7 +198,7 @@ std::vector<OccupancyGrid> read_maps(const Options& options, bool known_poses,
 }
 
 /// Learns how far touches lie from their poses.
-void add_touch_sd(const Options& options, const std::vector<Press>& presses,
+void add_touch_sd(const CalibrateArguments& options, const std::vector<Press>& presses,
                   SensorCalibration& calibration) {
   Device device = Device::open(options.device);
   Progress progress("fitting the touches' poses");
@@ -207,7 +209,7 @@ void add_touch_sd(const Options& options, const std::vector<Press>& presses,
   calibration.sensor.touch_sd = sd.value_or(DisplacementSd{});
 }
 
-void calibrate(const Options& options) {
+void calibrate(const CalibrateArguments& options) {
   std::vector<std::filesystem::path> maps_read;
   for (const std::string& argument : options.maps) {
     const std::vector<std::filesystem::path> files = map_files(argument);
@@ -230,7 +232,7 @@ void calibrate(const Options& options) {
   if (known_poses) {
     add_touch_sd(options, presses, calibration);
   }
-  const Pictures pictures = pictures_of(options);
+  const CalibrationPictures pictures = pictures_of(options);
   std::string table;
   std::string reliability;
   if (!options.png.empty()) {
@@ -262,7 +264,7 @@ void add_calibrate(CLI::App& app) {
       "Learn a sensor model from touches of known objects: contact threshold, noise, what the "
       "elements read on and beside an object, and how sure to be. map, recognize, live and plan "
       "take it as --sensor-model");
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<CalibrateArguments>();
   command
       ->add_option("RECORDING", options->recordings,
                    "Recordings (HDF5) that name their object, best with 15 touches or more of each "

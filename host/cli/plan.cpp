@@ -28,7 +28,7 @@ namespace palpate::cli {
 
 namespace {
 
-struct Options {
+struct PlanArguments {
   std::string recording;
   std::string candidates;
   std::string goal = "both";
@@ -44,7 +44,7 @@ struct Options {
 constexpr const char* grid = "grid";
 
 /// The touches of the recording that the flags select.
-std::vector<Touch> select_touches(const Options& options, const Recording& recording) {
+std::vector<Touch> select_touches(const PlanArguments& options, const Recording& recording) {
   std::optional<Frames> frames;
   if (!options.frames.empty()) {
     frames = parse_frames("--frames", options.frames);
@@ -113,7 +113,7 @@ void check_candidates(const std::string& file, const std::vector<Pose>& candidat
 }
 
 /// Throws Error where an output cannot be written, before any work is done.
-void check_outputs(const Options& options, const Scene& scene, const RecognitionTask& task) {
+void check_outputs(const PlanArguments& options, const Scene& scene, const RecognitionTask& task) {
   CommandFiles files;
   files.reads("RECORDING", options.recording);
   if (options.candidates != grid && options.candidates != options.recording) {
@@ -134,7 +134,7 @@ void check_outputs(const Options& options, const Scene& scene, const Recognition
   }
 }
 
-void write_results(const Options& options, const Plan& plan, const Device& device) {
+void write_results(const PlanArguments& options, const Plan& plan, const Device& device) {
   // The path of a recording need not be UTF-8, as JSON must.
   const std::string json =
       to_json(plan, device.name())
@@ -155,7 +155,7 @@ void write_results(const Options& options, const Plan& plan, const Device& devic
              setup_words(device, plan.task));
 }
 
-void plan_touches(const Options& options) {
+void plan_touches(const PlanArguments& options) {
   const PlanGoal goal = parse_goal("--goal", options.goal);
   constexpr std::size_t most_samples = 4096;
   if (options.samples < 2 || options.samples > most_samples) {
@@ -227,7 +227,7 @@ void add_plan(CLI::App& app) {
       "Rank poses for the next touch by what each is expected to tell, in nats, given the touches "
       "of a recording: the mutual information between the touch's readings and the object and its "
       "pose. Prints the ten best poses T_robot_sensor, in the robot frame");
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<PlanArguments>();
   command->add_option("RECORDING", options->recording, "Recording of the touches so far (HDF5)")
       ->required();
   add_recognition_flags(*command, options->recognition);

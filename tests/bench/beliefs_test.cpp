@@ -7,8 +7,7 @@
 #include "bench_program.hpp"
 #include "io/scratch_folder.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::beliefs_test {
 
 nlohmann::json quick_run(const ScratchFolder& folder, const std::string& part) {
   const std::string file = (folder / (part + ".json")).string();
@@ -124,5 +123,4 @@ TEST(Beliefs, RefuseWhatCannotBe) {
   EXPECT_EQ(run_bench("beliefs --part nonsense 2>/dev/null"), 2);
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::beliefs_test

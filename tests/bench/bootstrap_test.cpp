@@ -7,8 +7,7 @@
 
 #include "model/random.hpp"
 
-namespace palpate::bench {
-namespace {
+namespace palpate::bench::bootstrap_test {
 
 std::vector<double> normal_values(int count, double centre, std::uint64_t seed) {
   Random random(seed, Stream::touch_order);
@@ -54,5 +53,4 @@ TEST(ToldApart, CountsPairsAndHalvesTies) {
   EXPECT_DOUBLE_EQ(told_apart(higher, lower), 1.0 - 3.5 / 6.0);
 }
 
-}  // namespace
-}  // namespace palpate::bench
+}  // namespace palpate::bench::bootstrap_test

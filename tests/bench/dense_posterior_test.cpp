@@ -8,8 +8,7 @@
 #include "letters.hpp"
 #include "trials.hpp"
 
-namespace palpate::bench {
-namespace {
+namespace palpate::bench::dense_posterior_test {
 
 /// Two letters on a small lattice, touched three times.
 class DensePosteriorTest : public testing::Test {
@@ -71,5 +70,4 @@ TEST_F(DensePosteriorTest, CertificateOfOtherTouchesDoesNot) {
   EXPECT_GT(check.total_variation, 1e-3);
 }
 
-}  // namespace
-}  // namespace palpate::bench
+}  // namespace palpate::bench::dense_posterior_test

@@ -15,8 +15,7 @@
 #include "bench_program.hpp"
 #include "io/scratch_folder.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::experiment_test {
 
 constexpr int touches = 12;  // of --quick
 constexpr int trials = 20;
@@ -233,5 +232,4 @@ TEST(Experiment, RefusesWhatCannotBe) {
   EXPECT_EQ(run_bench("experiment --csv " + (folder / "file").string() + " 2>/dev/null"), 2);
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::experiment_test

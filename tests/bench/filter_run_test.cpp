@@ -2,8 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace palpate::bench {
-namespace {
+namespace palpate::bench::filter_run_test {
 
 RecognitionStep step(bool right, double confidence, std::optional<double> error_mm = {},
                      std::optional<double> refined_error_mm = {}) {
@@ -127,5 +126,4 @@ TEST(Comparison, TakesBalancedBinsForAsMany) {
   EXPECT_FALSE(as_many(1'000, 10'000));
 }
 
-}  // namespace
-}  // namespace palpate::bench
+}  // namespace palpate::bench::filter_run_test

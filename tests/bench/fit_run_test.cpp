@@ -2,8 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace palpate::bench {
-namespace {
+namespace palpate::bench::fit_run_test {
 
 FitRun small_run() {
   FitRun run;
@@ -37,5 +36,4 @@ TEST(FitRun, IsAsSureAsItHasUnknownsOfTheRarerKind) {
   EXPECT_LT(run.told_apart_interval().low, 0.5) << "two unknowns say little";
 }
 
-}  // namespace
-}  // namespace palpate::bench
+}  // namespace palpate::bench::fit_run_test

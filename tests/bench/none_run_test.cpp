@@ -4,8 +4,7 @@
 
 #include <gtest/gtest.h>
 
-namespace palpate::bench {
-namespace {
+namespace palpate::bench::none_run_test {
 
 RecognitionStep step_of(std::vector<double> identity, std::size_t best) {
   RecognitionStep step;
@@ -42,5 +41,4 @@ TEST(NoneRun, TellsApartByTheOdds) {
   EXPECT_LT(run.told_apart_interval().low, 5.0 / 6.0);
 }
 
-}  // namespace
-}  // namespace palpate::bench
+}  // namespace palpate::bench::none_run_test

@@ -7,8 +7,7 @@
 #include "measurement.hpp"
 #include "model/random.hpp"
 
-namespace palpate::bench {
-namespace {
+namespace palpate::bench::normalised_error_test {
 
 /// A bar of 12 x 4 mm about (3, 2) mm.
 OccupancyGrid bar(int symmetry) {
@@ -101,5 +100,4 @@ TEST(NormalisedError, GrowsWithTheSquareOfTheError) {
   EXPECT_NEAR(normalised_error(map, refined, {{0.0, 0.0}, 0.2}), 4.0, 1e-12);
 }
 
-}  // namespace
-}  // namespace palpate::bench
+}  // namespace palpate::bench::normalised_error_test

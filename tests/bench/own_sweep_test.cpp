@@ -12,8 +12,7 @@
 #include "bench_program.hpp"
 #include "io/scratch_folder.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::own_sweep_test {
 
 /// Maps of two letters in maps/, and six unknowns with their truth in unknowns/.
 void make_own_data(const std::filesystem::path& folder) {
@@ -116,5 +115,4 @@ TEST(OwnSweep, RefusesWhatCannotBe) {
       << "a page of the letters";
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::own_sweep_test

@@ -9,8 +9,7 @@
 #include "palpate/pose_histogram.hpp"
 #include "trials.hpp"
 
-namespace palpate::bench {
-namespace {
+namespace palpate::bench::pose_window_test {
 
 const PoseLattice lattice = lattice_of(20, 24, 36);
 
@@ -93,5 +92,4 @@ TEST(PoseWindow, GivesThePosesOfTheFullPosterior) {
   }
 }
 
-}  // namespace
-}  // namespace palpate::bench
+}  // namespace palpate::bench::pose_window_test

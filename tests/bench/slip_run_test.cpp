@@ -6,8 +6,7 @@
 
 #include "palpate/pose_error.hpp"
 
-namespace palpate::bench {
-namespace {
+namespace palpate::bench::slip_run_test {
 
 const std::vector<std::string> letter = {"E"};
 constexpr glm::dvec2 centroid_mm{1.0, -2.0};
@@ -57,5 +56,4 @@ TEST(SlipRun, AveragesOverTheTouchesThatAreLocated) {
   EXPECT_DOUBLE_EQ(located(errors), 0.5);
 }
 
-}  // namespace
-}  // namespace palpate::bench
+}  // namespace palpate::bench::slip_run_test

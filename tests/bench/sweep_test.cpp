@@ -13,8 +13,7 @@
 #include "bench_program.hpp"
 #include "io/scratch_folder.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::sweep_test {
 
 void expect_sound(const nlohmann::json& point, int trials) {
   const std::string what = point.at("filter").get<std::string>() + " " + point.at("count").dump();
@@ -320,5 +319,4 @@ TEST(Sweep, RefusesWhatCannotBe) {
                                folder / "results");
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::sweep_test

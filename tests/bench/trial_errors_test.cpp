@@ -4,8 +4,7 @@
 
 #include <gtest/gtest.h>
 
-namespace palpate::bench {
-namespace {
+namespace palpate::bench::trial_errors_test {
 
 /// A run with these errors, trial by trial; below 0 where it located nothing.
 TrialErrors run_of(const std::vector<double>& errors_mm) {
@@ -72,5 +71,4 @@ TEST(Knee, IsTheFirstRunThatNoFinerOneGainsOver) {
   EXPECT_EQ(knee_of(missing), 1U) << "bins that miss a trial do not suffice";
 }
 
-}  // namespace
-}  // namespace palpate::bench
+}  // namespace palpate::bench::trial_errors_test

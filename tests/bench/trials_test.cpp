@@ -9,8 +9,7 @@
 #include "palpate/error.hpp"
 #include "palpate/simulation.hpp"
 
-namespace palpate::bench {
-namespace {
+namespace palpate::bench::trials_test {
 
 const std::vector<std::string> shapes = {"A", "O"};
 
@@ -119,5 +118,4 @@ TEST(Trials, RefuseMoreTouchesThanThereAreToDraw) {
   EXPECT_THROW(make_trials(shapes, 1, 0, 7), Error);
 }
 
-}  // namespace
-}  // namespace palpate::bench
+}  // namespace palpate::bench::trials_test

@@ -9,8 +9,7 @@
 #include "bounded/certified.hpp"
 #include "hard_case.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::bounded_test {
 
 BoundedOptions small_options() {
   BoundedOptions options;
@@ -430,5 +429,4 @@ TEST(BoundedHard, AThousandTouchesOfOneSpot) {
   hard.expect("certificate", seen.estimate.certificate->dropped_mass, options.tolerance);
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::bounded_test

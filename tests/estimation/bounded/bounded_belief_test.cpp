@@ -16,8 +16,7 @@
 #include "palpate/pose_histogram.hpp"
 #include "touched_shape.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::bounded_belief_test {
 
 const std::vector<Hypothesis>& two_shapes() {
   static const std::vector<Hypothesis> two{{map_of(on_letter_l, "L"), 1.0},
@@ -307,5 +306,4 @@ TEST(BoundedBelief, SaysHowItWasFound) {
   EXPECT_EQ(posterior.lattice().bins(), small_options().lattice.bins());
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::bounded_belief_test

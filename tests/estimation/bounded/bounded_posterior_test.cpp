@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
-#include <limits>
 #include <numeric>
 #include <optional>
 #include <stdexcept>
@@ -17,15 +16,12 @@
 #include <tbb/global_control.h>
 
 #include "bounded/certified.hpp"
+#include "limits.hpp"
 #include "palpate/error.hpp"
 #include "palpate/pose_histogram.hpp"
 #include "touched_shape.hpp"
 
-namespace palpate {
-namespace {
-
-constexpr double nan = std::numeric_limits<double>::quiet_NaN();
-constexpr double infinity = std::numeric_limits<double>::infinity();
+namespace palpate::bounded_posterior_test {
 
 const std::vector<Hypothesis>& two_shapes() {
   static const std::vector<Hypothesis> two{{map_of(on_letter_l, "L"), 1.0},
@@ -628,5 +624,4 @@ TEST(BoundedPosterior, LeavesObjectsWhereNoneTakesAllOfTheMass) {
   }
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::bounded_posterior_test

@@ -16,8 +16,7 @@
 #include "made_up_devices.hpp"
 #include "synthetic.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::device_bin_likelihood_test {
 
 std::size_t bins_of(const std::vector<BinBox>& boxes) {
   std::size_t bins = 0;
@@ -329,5 +328,4 @@ TEST(FasterBinLikelihood, StaysOnTheHostWhereTheDeviceFails) {
   EXPECT_NE(faster.path().find("bins on the host: map"), std::string::npos) << faster.path();
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::device_bin_likelihood_test

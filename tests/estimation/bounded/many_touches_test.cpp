@@ -5,8 +5,7 @@
 #include "bounded/certified.hpp"
 #include "touched_shape.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::many_touches_test {
 
 TEST(ManyTouches, AreAnsweredByFewBins) {
   Device device = Device::open();
@@ -36,5 +35,4 @@ TEST(ManyTouches, AreAnsweredByFewBins) {
   }
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::many_touches_test

@@ -14,8 +14,7 @@
 #include "estimation/bounded/faster_bin_likelihood.hpp"
 #include "synthetic.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::resting_array_test {
 
 using Seen = RestingArray::Seen;
 
@@ -203,5 +202,4 @@ TEST(BoundedPosterior, IsCertifiedForEveryFrameOfAnArrayAtRest) {
   }
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::resting_array_test

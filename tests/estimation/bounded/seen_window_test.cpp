@@ -16,8 +16,7 @@
 #include "estimation/bounded/faster_bin_likelihood.hpp"
 #include "estimation/bounded/reading_penalties.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::seen_window_test {
 
 /// Log-likelihood of the elements where all see the prior.
 double prior_log_likelihood(const BinCase& of, std::size_t object) {
@@ -270,5 +269,4 @@ TEST(BoundSearch, SettlesBinsOnTheTilesCornersOnce) {
   }
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::seen_window_test
