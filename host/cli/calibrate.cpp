@@ -27,7 +27,7 @@ namespace palpate::cli {
 
 namespace {
 
-struct Options {
+struct CalibrateArguments {
   std::vector<std::string> recordings;
   std::string output;
   std::vector<std::string> maps;
@@ -38,17 +38,18 @@ struct Options {
   std::string device;
 };
 
-struct Pictures {
+struct CalibrationPictures {
   std::filesystem::path table;
   std::filesystem::path reliability;
 };
 
-Pictures pictures_of(const Options& options) {
+CalibrationPictures pictures_of(const CalibrateArguments& options) {
   const std::filesystem::path folder = options.png;
   return {folder / "table.png", folder / "reliability.png"};
 }
 
-void check_outputs(const Options& options, const std::vector<std::filesystem::path>& maps) {
+void check_outputs(const CalibrateArguments& options,
+                   const std::vector<std::filesystem::path>& maps) {
   CommandFiles files;
   for (const std::string& recording : options.recordings) {
     files.reads("RECORDING", recording);
@@ -72,7 +73,7 @@ void check_outputs(const Options& options, const std::vector<std::filesystem::pa
 }
 
 /// What the flags ask for, with the bins on which unknowns will be recognised.
-CalibrationRequest request_of(const Options& options) {
+CalibrationRequest request_of(const CalibrateArguments& options) {
   const RecognitionFlags& flags = options.recognition;
   if (flags.bins == "auto" || flags.bins == "fine") {
     refuse_flag("--bins", flags.bins, "give counts, as 25x25x16, or leave it out");
@@ -86,7 +87,7 @@ CalibrationRequest request_of(const Options& options) {
   return request;
 }
 
-void calibrate(const Options& options) {
+void calibrate(const CalibrateArguments& options) {
   std::vector<std::filesystem::path> maps_read;
   for (const std::string& argument : options.maps) {
     const std::vector<std::filesystem::path> files = map_files(argument);
@@ -120,7 +121,7 @@ void calibrate(const Options& options) {
     Progress progress("fitting the touches' poses");
     add_touch_sd(device, task, calibration, [&](double fraction) { progress.show(fraction); });
   }
-  const Pictures pictures = pictures_of(options);
+  const CalibrationPictures pictures = pictures_of(options);
   std::string table;
   std::string reliability;
   if (!options.png.empty()) {
@@ -153,7 +154,7 @@ void add_calibrate(CLI::App& app) {
       "Learn a sensor model from touches of known objects: contact threshold, noise, what the "
       "elements read on and beside an object, and how sure to be. map, recognize, live and plan "
       "take it as --sensor-model");
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<CalibrateArguments>();
   command
       ->add_option("RECORDING", options->recordings,
                    "Recordings (HDF5) that name their object, best with 15 touches or more of each "

@@ -56,8 +56,6 @@ std::string values_table(const SensorCalibration& calibration, std::optional<int
   return table.text(columns);
 }
 
-std::string percent(double share) { return fmt::format("{:.1f} %", 100.0 * share); }
-
 std::string scores_table(const std::string& title, const char* records, const Scores& before,
                          const Scores& learned, const Scores& after, std::optional<int> columns) {
   TextTable table({{title, false}, {"Eq. 7", true}, {"table", true}, {"table, tempered", true}});

@@ -23,24 +23,25 @@ namespace palpate::cli {
 
 namespace {
 
-struct Options {
+struct EvaluateArguments {
   std::vector<std::string> results;
   std::string json;
   std::string png;
 };
 
-struct Pictures {
+struct EvaluationPictures {
   std::filesystem::path confusion;
   std::filesystem::path reliability;
 };
 
-Pictures pictures_of(const Options& options) {
+EvaluationPictures pictures_of(const EvaluateArguments& options) {
   const std::filesystem::path folder = options.png;
   return {folder / "confusion.png", folder / "reliability.png"};
 }
 
 /// Throws Error where an output cannot be written, before any file is.
-void check_outputs(const Options& options, const std::vector<std::filesystem::path>& read) {
+void check_outputs(const EvaluateArguments& options,
+                   const std::vector<std::filesystem::path>& read) {
   CommandFiles files;
   for (const std::filesystem::path& file : read) {
     files.reads("RESULTS", file);
@@ -83,7 +84,7 @@ void tell_missing(const std::string& results) {
   }
 }
 
-void evaluate_results(const Options& options) {
+void evaluate_results(const EvaluateArguments& options) {
   const std::vector<std::filesystem::path> files = result_files(options.results);
   check_outputs(options, files);
   const JudgedResults results = read_results(files);
@@ -128,7 +129,7 @@ void add_evaluate(CLI::App& app) {
       "from accuracy, and median pose errors. A class that no map has is an unknown class, whose "
       "right answer is \"(none)\"; the area under the curve says how well unknown classes are told "
       "from known ones");
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<EvaluateArguments>();
   command
       ->add_option("RESULTS", options->results,
                    "JSON files of palpate recognize, files with one such record a line, folders of "

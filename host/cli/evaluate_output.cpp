@@ -52,9 +52,7 @@ Json unknown_to_json(const Evaluation& evaluation) {
 
 Json to_json(const Median& median) { return {{"records", median.count}, {"median", median.value}}; }
 
-std::string percent(double share) { return fmt::format("{:.1f} %", 100.0 * share); }
-
-std::string percent(const Interval& interval) {
+std::string range_words(const Interval& interval) {
   return fmt::format("{:.1f} to {:.1f} %", 100.0 * interval.low, 100.0 * interval.high);
 }
 
@@ -72,7 +70,7 @@ std::string scores_table(const Evaluation& evaluation, std::optional<int> column
   add("records", [](const Scores& s) { return fmt::format("{}", s.records); });
   add("right", [](const Scores& s) { return fmt::format("{}", s.right); });
   add("accuracy", [](const Scores& s) { return percent(s.accuracy()); });
-  add("95 % interval", [](const Scores& s) { return percent(s.interval()); });
+  add("95 % interval", [](const Scores& s) { return range_words(s.interval()); });
   add("log-loss, nats", [](const Scores& s) { return fmt::format("{:.3f}", s.log_loss); });
   add("calibration error",
       [](const Scores& s) { return fmt::format("{:.3f}", s.calibration_error); });
@@ -89,7 +87,7 @@ std::string reliability_table(const Scores& scores, std::optional<int> columns) 
     if (bin.records > 0) {
       table.add({fmt::format("{:.1f} to {:.1f}", bin.lower, bin.upper),
                  fmt::format("{}", bin.records), percent(bin.mean_confidence),
-                 percent(bin.accuracy()), percent(bin.interval())});
+                 percent(bin.accuracy()), range_words(bin.interval())});
     }
   }
   return table.text(columns);
@@ -127,7 +125,7 @@ std::string class_table(const Evaluation& evaluation, std::optional<int> columns
   for (const ClassScores& scores : evaluation.classes) {
     table.add({class_name(scores), fmt::format("{}", scores.records),
                fmt::format("{}", scores.right), percent(scores.recall()),
-               percent(scores.interval()), taken_for(scores, evaluation.answers)});
+               range_words(scores.interval()), taken_for(scores, evaluation.answers)});
   }
   return table.text(columns);
 }
@@ -139,7 +137,7 @@ std::string unknown_words(const Evaluation& evaluation) {
   const Scores& unknown = *evaluation.unknown;
   std::string text = fmt::format(
       "unknown classes: {} of {} called \"(none)\" ({}, 95 % interval {})\n", unknown.right,
-      unknown.records, percent(unknown.accuracy()), percent(unknown.interval()));
+      unknown.records, percent(unknown.accuracy()), range_words(unknown.interval()));
   if (const auto& against = evaluation.known_against_unknown) {
     text += fmt::format(
         "area under the curve of known against unknown classes by {}: {:.3f} +- {:.3f} "
@@ -215,7 +213,7 @@ ConfusionFigure confusion_of(const Evaluation& evaluation) {
   ConfusionFigure figure;
   figure.title = fmt::format("{} of {} right ({}, 95 % interval {})", evaluation.all.right,
                              evaluation.all.records, percent(evaluation.all.accuracy()),
-                             percent(evaluation.all.interval()));
+                             range_words(evaluation.all.interval()));
   figure.columns = evaluation.answers;
   for (const ClassScores& scores : evaluation.classes) {
     const std::string right = scores.known ? scores.label : std::string(none_label);

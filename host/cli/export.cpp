@@ -17,7 +17,7 @@ namespace palpate::cli {
 
 namespace {
 
-struct Options {
+struct ExportArguments {
   std::string recording;
   std::string folder;
 };
@@ -54,7 +54,7 @@ std::string import_command(const std::filesystem::path& folder, const Recording&
   return command + " -o FILE.h5";
 }
 
-void export_tables(const Options& options) {
+void export_tables(const ExportArguments& options) {
   if (const std::string format = read_format(options.recording); format != "palpate.recording") {
     refuse(options.recording, "format '{}' has no tables; give a recording", format);
   }
@@ -83,7 +83,7 @@ void add_export(CLI::App& app) {
       "export",
       "Write a recording as CSV tables: pressures.csv, poses.csv and array.csv. The command also "
       "prints the 'palpate import' that makes the same recording from them");
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<ExportArguments>();
   command->add_option("FILE", options->recording, "Recording of touches or frames (HDF5)")
       ->required();
   command

@@ -18,12 +18,12 @@ namespace palpate::cli {
 
 namespace {
 
-struct Options : ImportOptions {
+struct ImportArguments : ImportOptions {
   std::string output;
 };
 
 /// The command that takes the recording.
-std::string next_command(const Options& options, const Recording& recording) {
+std::string next_command(const ImportArguments& options, const Recording& recording) {
   const bool raw = recording.pressure_unit == "raw";
   const char* unposed = options.unposed ? " --unposed" : "";
   if (recording.rows == "frames") {
@@ -42,7 +42,7 @@ std::string next_command(const Options& options, const Recording& recording) {
              : fmt::format("palpate map {} -o MAPS/{}{}", options.output, unposed, threshold);
 }
 
-void print_summary(const Options& options, const ImportedRecording& imported) {
+void print_summary(const ImportArguments& options, const ImportedRecording& imported) {
   const Recording& r = imported.recording;
   fmt::print("{}: {} {} of {} elements", options.output, r.size(), r.rows, r.elements());
   if (!r.time_s.empty()) {
@@ -76,7 +76,7 @@ void print_summary(const Options& options, const ImportedRecording& imported) {
   fmt::print("; next: {}\n", next_command(options, r));
 }
 
-void import_tables(const Options& options) {
+void import_tables(const ImportArguments& options) {
   CommandFiles files;
   files.reads("PRESSURES", options.pressures);
   if (!options.poses.empty()) {
@@ -100,7 +100,7 @@ void add_import(CLI::App& app) {
       "Write a recording (HDF5) from tables: pressures, poses and the positions of the elements. "
       "Tables are CSV files, with commas, semicolons, tabs or blanks between the cells; the "
       "pressures may also be an array of numpy.save. docs/files.md describes them");
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<ImportArguments>();
   command
       ->add_option("PRESSURES", options->pressures,
                    "CSV: a row for each frame or touch, with a column for each element (and time, "

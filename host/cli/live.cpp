@@ -32,7 +32,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-struct Options {
+struct LiveArguments {
   std::string sensor;
   std::string poses;
   RecognitionFlags recognition;
@@ -91,7 +91,7 @@ void warm_up(Recogniser& recogniser, const RecognitionTask& task, const SensorDe
   recogniser.reset();
 }
 
-void live(const Options& options) {
+void live(const LiveArguments& options) {
   if (options.reset_after_s) {
     require_above("--reset-after", *options.reset_after_s, 0.0);
   }
@@ -221,7 +221,7 @@ void add_live(CLI::App& app) {
       "one standard deviation, touch by touch, until Ctrl-C. A terminal shows the pressure, the "
       "identity and the array on the object's map; "
       "key r begins the next unknown object");
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<LiveArguments>();
   command->add_option("--sensor", options->sensor, sensor_help)->required();
   command->add_option(
       "--poses", options->poses,

@@ -22,7 +22,7 @@ namespace palpate::cli {
 
 namespace {
 
-struct Options {
+struct PlanArguments {
   std::string recording;
   std::string candidates;
   std::string goal = "both";
@@ -35,7 +35,7 @@ struct Options {
 };
 
 /// Throws Error where an output cannot be written, before any work is done.
-void check_outputs(const Options& options, const Scene& scene, const RecognitionTask& task) {
+void check_outputs(const PlanArguments& options, const Scene& scene, const RecognitionTask& task) {
   CommandFiles files;
   files.reads("RECORDING", options.recording);
   if (options.candidates != candidate_grid_word && options.candidates != options.recording) {
@@ -56,7 +56,7 @@ void check_outputs(const Options& options, const Scene& scene, const Recognition
   }
 }
 
-void write_results(const Options& options, const Plan& plan, const RecognitionTask& task,
+void write_results(const PlanArguments& options, const Plan& plan, const RecognitionTask& task,
                    std::span<const Touch> touches, const Device& device) {
   const std::string json = text_of(to_json(plan, task, device.name()), 2);
   // Files come first: printing fails where the reader of standard output has ended.
@@ -74,7 +74,7 @@ void write_results(const Options& options, const Plan& plan, const RecognitionTa
              setup_words(device, task));
 }
 
-void plan_touches(const Options& options) {
+void plan_touches(const PlanArguments& options) {
   const PlanRequest request = plan_request(options.goal, options.candidates, options.samples,
                                            options.seed, options.recognition.tell);
   const Scene scene = scene_of(options.recognition);
@@ -108,7 +108,7 @@ void add_plan(CLI::App& app) {
       "Rank poses for the next touch by what each is expected to tell, in nats, given the touches "
       "of a recording: the mutual information between the touch's readings and the object and its "
       "pose. Prints the ten best poses T_robot_sensor, in the robot frame");
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<PlanArguments>();
   command->add_option("RECORDING", options->recording, "Recording of the touches so far (HDF5)")
       ->required();
   add_recognition_flags(*command, options->recognition);

@@ -32,7 +32,7 @@ namespace palpate::cli {
 
 namespace {
 
-struct Options {
+struct RecognizeArguments {
   std::vector<std::string> recordings;
   UnknownFlags unknowns;
   RecognitionFlags recognition;
@@ -43,7 +43,7 @@ struct Options {
   bool fit_touch_sd = false;
 };
 
-HistogramNeed histogram_need(const Options& options) {
+HistogramNeed histogram_need(const RecognizeArguments& options) {
   if (options.fit_touch_sd) {
     return {"--fit-touch-sd", touch_sd_fit_needs};
   }
@@ -53,15 +53,15 @@ HistogramNeed histogram_need(const Options& options) {
   return {};
 }
 
-std::filesystem::path png_path(const Options& options, const Unknown& unknown) {
+std::filesystem::path png_path(const RecognizeArguments& options, const Unknown& unknown) {
   const std::string stem = std::filesystem::path(unknown.recording).stem().string();
   return std::filesystem::path(options.png) /
          (unknown.frame ? fmt::format("{}.{}.png", stem, *unknown.frame) : stem + ".png");
 }
 
 /// Throws Error where an output cannot be written, before any work is done.
-void check_outputs(const Options& options, const Scene& scene, const RecognitionTask& task,
-                   const std::vector<Unknown>& unknowns) {
+void check_outputs(const RecognizeArguments& options, const Scene& scene,
+                   const RecognitionTask& task, const std::vector<Unknown>& unknowns) {
   CommandFiles files;
   for (const std::string& recording : options.recordings) {
     files.reads("RECORDING", recording);
@@ -118,7 +118,7 @@ void export_posterior(const std::filesystem::path& path, const RecognitionTask& 
 }
 
 /// Writes posterior and JSON. The JSON appears only after the posterior.
-void write_results(const Options& options, const RecognitionTask& task,
+void write_results(const RecognizeArguments& options, const RecognitionTask& task,
                    const Recogniser& recogniser, const std::string& json) {
   std::optional<AtomicFile> json_file;
   if (!options.json.empty() && options.json != "-") {
@@ -134,8 +134,9 @@ void write_results(const Options& options, const RecognitionTask& task,
 }
 
 /// The whole command with --fit-touch-sd.
-void fit_touch_sd(const Options& options, const Scene& scene, const RecognitionTask& task,
-                  std::span<const Recording> recordings, std::span<const Unknown> unknowns) {
+void fit_touch_sd(const RecognizeArguments& options, const Scene& scene,
+                  const RecognitionTask& task, std::span<const Recording> recordings,
+                  std::span<const Unknown> unknowns) {
   Device device = open_device(options.recognition, scene);
   TouchSdFit fit;
   {
@@ -180,7 +181,7 @@ class UnknownsProgress {
   Progress line_{"recognising"};
 };
 
-void recognize(const Options& options) {
+void recognize(const RecognizeArguments& options) {
   const Scene scene = scene_of(options.recognition);
   std::vector<Recording> recordings = read_touch_recordings(options.recordings);
   for (Recording& recording : recordings) {
@@ -280,7 +281,7 @@ void add_recognize(CLI::App& app) {
       "Recognise the object of each recording among known maps and find its pose in the robot "
       "frame, T_robot_object: p_robot = R(theta) p_object + (x, y), with one standard deviation. "
       "The JSON file has T_object_robot as well");
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<RecognizeArguments>();
   command->add_option("RECORDING", options->recordings, "Recordings of unknown objects (HDF5)")
       ->required();
   add_recognition_flags(*command, options->recognition);

@@ -29,7 +29,7 @@ namespace {
 using Clock = std::chrono::steady_clock;
 using namespace std::chrono_literals;
 
-struct Options {
+struct RecordArguments {
   std::string sensor;
   std::string output;
   std::optional<double> seconds;
@@ -159,7 +159,7 @@ class RecordingUnderWay {
   std::optional<FrameRecorder> recorder_;
 };
 
-void record(const Options& options) {
+void record(const RecordArguments& options) {
   CommandFiles files;
   add_sensor_files(options.sensor, options.poses, files);
   files.writes("-o", options.output);
@@ -209,7 +209,7 @@ void add_record(CLI::App& app) {
       "record",
       "Record the frames of a sensor until Ctrl-C; 'palpate touches' finds the touches in them. A "
       "kill, a crash or a full disk costs at most the last second of the recording");
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<RecordArguments>();
   command->add_option("--sensor", options->sensor, sensor_help)->required();
   command
       ->add_option("-o,--output", options->output,

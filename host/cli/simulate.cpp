@@ -19,7 +19,7 @@ namespace palpate::cli {
 
 namespace {
 
-struct Options {
+struct SimulateArguments {
   std::string shape;
   std::string output;
   std::uint64_t seed = 1;
@@ -58,7 +58,7 @@ std::vector<Pose> draw(std::vector<Pose> poses, std::size_t n, std::uint64_t see
 }
 
 /// Throws Error where the recording could not be written, or would overwrite the shape.
-void check_output(const Options& options) {
+void check_output(const SimulateArguments& options) {
   CommandFiles files;
   if (!built_in_shape(options.shape)) {
     files.reads("SHAPE", options.shape);
@@ -68,7 +68,7 @@ void check_output(const Options& options) {
   require_writable(options.output);
 }
 
-void simulate(const Options& options) {
+void simulate(const SimulateArguments& options) {
   check_output(options);
   const Shape shape = make_shape(options.shape);
   const bool unknown = !options.object_pose.empty();
@@ -113,7 +113,7 @@ void simulate(const Options& options) {
 void add_simulate(CLI::App& app) {
   auto* command = app.add_subcommand(
       "simulate", "Simulate touches of a shape with a DigiTacts array and write a recording");
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<SimulateArguments>();
   command
       ->add_option("SHAPE", options->shape,
                    "A to Z, 0 to 9, ring, bar, or a polygon file with lines 'x y' in mm")

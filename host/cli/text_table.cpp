@@ -4,6 +4,8 @@
 #include <numeric>
 #include <utility>
 
+#include <fmt/format.h>
+
 #include "model/printable.hpp"
 
 namespace palpate::cli {
@@ -46,6 +48,8 @@ std::string shorten_middle(std::string_view text, std::size_t columns) {
   return std::string(head(text, kept - tail)) + std::string(ellipsis) +
          std::string(text.substr(tail_begin));
 }
+
+std::string percent(double share) { return fmt::format("{:.1f} %", 100.0 * share); }
 
 TextTable::TextTable(std::vector<Column> columns) : columns_(std::move(columns)) {}
 

@@ -11,6 +11,9 @@ namespace palpate::cli {
 /// character counts as one column.
 std::string shorten_middle(std::string_view text, std::size_t columns);
 
+/// A share as "12.3 %".
+std::string percent(double share);
+
 /// A table for people. Every column is as wide as its longest cell; a column without any content is
 /// left out.
 class TextTable {

@@ -28,7 +28,7 @@ namespace {
 /// Seconds of the tare where a recording has no baseline, as in `palpate record`.
 constexpr double usual_tare_s = 0.5;
 
-struct Options {
+struct TouchesArguments {
   std::string frames;
   std::string output;
   DetectorFlags detector;
@@ -38,7 +38,7 @@ struct Options {
 
 /// Returns the baseline: by --tare, else as the recording holds it, else by a tare as of `palpate
 /// record`.
-std::vector<double> baseline_for(const Options& options, Sensor& stream,
+std::vector<double> baseline_for(const TouchesArguments& options, Sensor& stream,
                                  const TouchDetectorOptions& detector) {
   const SensorDescription& sensor = stream.description();
   if (!options.tare_s && !sensor.baseline.empty()) {
@@ -105,7 +105,7 @@ void close_input(const std::string& frames) {
   }
 }
 
-void find_touches(const Options& options) {
+void find_touches(const TouchesArguments& options) {
   CommandFiles files;
   files.reads("FRAMES", options.frames);
   files.writes("-o", options.output);
@@ -192,7 +192,7 @@ void add_touches(CLI::App& app) {
       "touches",
       "Find the touches in a recording of frames and write them for 'palpate map' and 'palpate "
       "recognize'. A recording that was cut off is closed, as by 'palpate info --close'");
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<TouchesArguments>();
   command
       ->add_option("FRAMES", options->frames,
                    "Recording of frames, as 'palpate record' writes it (HDF5)")

@@ -2,15 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "recognition/label_probability.hpp"
 
 namespace palpate {
 
 namespace {
-
-constexpr double log_zero = -std::numeric_limits<double>::infinity();
 
 /// exp(a) / (exp(a) + exp(b)); 0 where both are 0
 double share(double a, double b) { return a == log_zero ? 0.0 : 1.0 / (1.0 + std::exp(b - a)); }

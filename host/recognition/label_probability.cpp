@@ -2,15 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 namespace palpate {
-
-namespace {
-
-constexpr double log_zero = -std::numeric_limits<double>::infinity();
-
-}  // namespace
 
 double log_sum(double a, double b) {
   const double most = std::max(a, b);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <limits>
 #include <optional>
 #include <span>
 #include <vector>
@@ -48,6 +49,9 @@ Tempering tempering_of(std::span<const TouchEvidence> touches, const Recognition
 std::vector<double> label_probabilities(const Estimate& estimate, const Tempering& tempering,
                                         const RecognitionTask& task,
                                         std::optional<double> known = {});
+
+/// The log of a probability of 0.
+inline constexpr double log_zero = -std::numeric_limits<double>::infinity();
 
 /// log(exp(a) + exp(b))
 double log_sum(double a, double b);

@@ -9,8 +9,7 @@
 #include "bench_program.hpp"
 #include "io/scratch_folder.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::bounded_test {
 
 nlohmann::json quick_run(const ScratchFolder& folder, const std::string& part,
                          const std::string& flags = "") {
@@ -117,5 +116,4 @@ TEST(Bounded, RefusesWhatCannotBe) {
   EXPECT_EQ(run_bench("bounded --part nonsense 2>/dev/null"), 2);
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::bounded_test

@@ -11,8 +11,7 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
-namespace palpate {
-namespace {
+namespace palpate::documents_test {
 
 std::vector<std::string> lines_of(const std::string& file) {
   std::ifstream stream(std::string(PALPATE_SOURCE_DIR "/") + file);
@@ -136,5 +135,4 @@ TEST(Documents, QuoteTheKernelsTableAsItIs) {
   }
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::documents_test

@@ -10,8 +10,7 @@
 
 #include "palpate/error.hpp"
 
-namespace palpate::bench {
-namespace {
+namespace palpate::bench::glyph_scene_test {
 
 double pressed(const Recording& recording) {
   return std::accumulate(recording.pressure.begin(), recording.pressure.end(), 0.0);
@@ -57,5 +56,4 @@ TEST(GlyphScene, RefusesMoreObjectsThanThereAre) {
   EXPECT_THROW(glyph_recordings(most_glyphs + 1), Error);
 }
 
-}  // namespace
-}  // namespace palpate::bench
+}  // namespace palpate::bench::glyph_scene_test

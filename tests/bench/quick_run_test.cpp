@@ -9,8 +9,7 @@
 #include "bench_program.hpp"
 #include "io/scratch_folder.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::quick_run_test {
 
 /// The value of a measurement, which must be there.
 double value_of(const nlohmann::json& measured, const std::string& name) {
@@ -113,5 +112,4 @@ TEST(PalpateBench, RefusesWhatItDoesNotKnow) {
   EXPECT_EQ(run_bench("2>/dev/null"), 2);
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::quick_run_test

@@ -7,8 +7,7 @@
 #include <limits>
 #include <random>
 
-namespace palpate::cli {
-namespace {
+namespace palpate::cli::array_picture_test {
 
 using Elements = std::vector<glm::dvec2>;
 
@@ -126,5 +125,4 @@ TEST(ArrayPicture, OfNothingIsEmpty) {
   EXPECT_EQ(ArrayPicture({{0.0, 0.0}, {0.0, 0.0}}).element_at({0.5, 0.5}), 0u);
 }
 
-}  // namespace
-}  // namespace palpate::cli
+}  // namespace palpate::cli::array_picture_test

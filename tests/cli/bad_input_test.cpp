@@ -4,14 +4,13 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <limits>
 
 #include "io/file_parts.hpp"
+#include "limits.hpp"
 #include "program.hpp"
 #include "sample_files.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::bad_input_test {
 
 using Arguments = std::vector<std::string>;
 
@@ -69,9 +68,6 @@ BadFile recording_with(const char* name, std::function<void(FileParts&)> spoil,
           },
           std::move(named)};
 }
-
-constexpr double nan = std::numeric_limits<double>::quiet_NaN();
-constexpr double infinity = std::numeric_limits<double>::infinity();
 
 INSTANTIATE_TEST_SUITE_P(
     All, BadRecording,
@@ -378,5 +374,4 @@ TEST_F(BadInput, ParticlesOutOfRange) {
   expect_refused(with(particles, {"--seed", "-1"}), {"--seed", "-1"});
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::bad_input_test

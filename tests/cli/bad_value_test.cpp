@@ -5,8 +5,7 @@
 #include "program.hpp"
 #include "sample_files.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::bad_value_test {
 
 using Arguments = std::vector<std::string>;
 
@@ -154,5 +153,4 @@ TEST_F(BadValue, SceneThatIsMissing) {
   expect_refused({"recognize", "u.h5", "--scene", "none.yaml"}, {"none.yaml", "no such file"});
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::bad_value_test

@@ -2,8 +2,7 @@
 
 #include "batch_folder.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::batch_files_test {
 
 namespace fs = std::filesystem;
 
@@ -131,5 +130,4 @@ TEST_F(BatchFiles, EvaluateCountsMissingChunksAtOnce) {
   EXPECT_NE(outcome.err.find("300000000 of 300000004 chunks"), outcome.err.npos) << outcome.err;
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::batch_files_test

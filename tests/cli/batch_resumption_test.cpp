@@ -13,8 +13,7 @@
 #include "cli/batch/results_folder.hpp"
 #include "cli/batch/slurm.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::batch_resumption_test {
 
 using BatchResumption = BatchTest;
 
@@ -370,5 +369,4 @@ TEST(LocalDevice, TasksOfAComputerTakeItsEqualDevicesInTurn) {
   EXPECT_EQ(cli::local_device(lone, "", 3), "");
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::batch_resumption_test

@@ -2,8 +2,7 @@
 
 #include "batch_folder.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::batch_test {
 
 using Batch = BatchTest;
 
@@ -227,5 +226,4 @@ TEST_F(Batch, EvaluateReadsTheFolderAndTheMergedFile) {
   EXPECT_NE(part.err.find("1 of 4 chunks are missing"), part.err.npos) << part.err;
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::batch_test

@@ -12,8 +12,7 @@
 #include "program.hpp"
 #include "sample_files.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::calibrate_test {
 
 using nlohmann::json;
 using testing::HasSubstr;
@@ -221,5 +220,4 @@ TEST_F(CalibrateCommand, RefusesToOverwriteWhatItReads) {
                  {"new/reliability.png", "-o"});
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::calibrate_test

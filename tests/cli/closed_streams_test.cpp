@@ -7,8 +7,7 @@
 #include "program.hpp"
 #include "sample_files.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::closed_streams_test {
 
 class ClosedStreams : public ProgramTest {
  protected:
@@ -82,5 +81,4 @@ TEST_F(ClosedStreams, KeepTheStatus) {
   EXPECT_EQ(palpate({"--version"}, {.closed = every}).status, 0);
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::closed_streams_test

@@ -6,8 +6,7 @@
 #include "program.hpp"
 #include "sample_files.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::damaged_file_test {
 
 class DamagedInput : public ProgramTest {
  protected:
@@ -63,5 +62,4 @@ TEST_F(DamagedInput, RecordingIsSurveyedOrRefused) { expect_robust("u.h5", {"inf
 
 TEST_F(DamagedInput, MapIsReadOrRefused) { expect_robust("A.map.h5", recognize_); }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::damaged_file_test

@@ -11,8 +11,7 @@
 #include "program.hpp"
 #include "sample_files.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::defaults_test {
 
 using nlohmann::json;
 using Arguments = std::vector<std::string>;
@@ -264,5 +263,4 @@ TEST_F(Defaults, RefuseAFirstTouchBeyondEveryRobot) {
                  {"beyond.h5", "first touch", "10000000000", "poses' unit"});
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::defaults_test

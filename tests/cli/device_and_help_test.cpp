@@ -4,8 +4,7 @@
 
 #include "program.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::device_and_help_test {
 
 using nlohmann::json;
 
@@ -169,5 +168,4 @@ TEST_F(ProgramHelp, ListsTheCommands) {
 
 TEST_F(ProgramHelp, VersionIsTheProjects) { EXPECT_EQ(done({"--version"}), PALPATE_VERSION "\n"); }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::device_and_help_test

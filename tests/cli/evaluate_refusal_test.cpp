@@ -6,8 +6,7 @@
 
 #include "program.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::evaluate_refusal_test {
 
 using nlohmann::json;
 
@@ -135,5 +134,4 @@ TEST_F(EvaluateRefuses, OutputsThatCannotBeWritten) {
   expect_refused({"evaluate", "r.json", "--png", "r.json"}, {"r.json", "folder"});
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::evaluate_refusal_test

@@ -8,8 +8,7 @@
 #include "program.hpp"
 #include "sample_files.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::evaluate_test {
 
 using nlohmann::json;
 using testing::HasSubstr;
@@ -160,5 +159,4 @@ TEST_F(EvaluateCommand, TakesWhatRecognizeWrites) {
   EXPECT_EQ(e["unknown_classes"]["area_under_curve"]["score"], "1 - none");
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::evaluate_test

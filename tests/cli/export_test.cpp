@@ -5,8 +5,7 @@
 #include "program.hpp"
 #include "sample_files.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::export_test {
 
 class ExportCommand : public ProgramTest {
  protected:
@@ -131,5 +130,4 @@ TEST_F(ExportCommand, AFullDiskLeavesOlderTables) {
   EXPECT_TRUE(content_of(folder_.path()) == before) << "the folder has changed";
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::export_test

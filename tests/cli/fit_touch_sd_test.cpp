@@ -3,8 +3,7 @@
 #include "program.hpp"
 #include "sample_files.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::fit_touch_sd_test {
 
 using nlohmann::json;
 
@@ -77,5 +76,4 @@ TEST_F(FitTouchSd, IsRefusedWhereTheSceneHasOtherUncertainties) {
   }
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::fit_touch_sd_test

@@ -3,8 +3,7 @@
 #include "program.hpp"
 #include "sample_files.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::full_disk_test {
 
 class FullDisk : public ProgramTest {
  protected:
@@ -116,5 +115,4 @@ TEST_F(FullDisk, StandardErrorThatCannotBeWrittenKeepsTheStatus) {
   EXPECT_EQ(palpate({"info", "missing.h5"}, {.standard_error = "/dev/full"}).status, 2);
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::full_disk_test

@@ -7,8 +7,7 @@
 // Cases of docs/hard_cases.md through the program: what the library says of them must survive
 // files, options and JSON.
 
-namespace palpate {
-namespace {
+namespace palpate::hard_case_test {
 
 using nlohmann::json;
 
@@ -82,5 +81,4 @@ TEST_F(HardCaseOnTheCommandLine, EvidenceAgainstEveryObjectIsNoMissingNumber) {
   EXPECT_EQ(r["identity"]["I"], 0.5);
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::hard_case_test

@@ -1,7 +1,6 @@
 #include "import_command.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::import_refusal_test {
 
 /// A table that makes no recording, and what is said of it.
 struct Case {
@@ -227,5 +226,4 @@ TEST_F(ImportCommand, FlagsNameTheirForm) {
               "--time-column stmap: no table has this column; give its name");
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::import_refusal_test

@@ -7,8 +7,7 @@
 
 #include "import_command.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::import_test {
 
 void expect_pose(const Pose& pose, const Pose& expected) {
   // Interpolation rounds a few times.
@@ -264,5 +263,4 @@ TEST_F(ImportCommand, ALongTableTakesTheMemoryThatIsChecked) {
   EXPECT_LT(largest_kib() - before, checked_kib);
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::import_test

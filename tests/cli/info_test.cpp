@@ -6,8 +6,7 @@
 #include "program.hpp"
 #include "sample_files.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::info_test {
 
 class InfoCommand : public ProgramTest {
  protected:
@@ -144,5 +143,4 @@ TEST_F(InfoCommand, SensorModel) {
                "learned on bins   0.8 x 0.4 mm x 22.5 deg", "z of learned objects -4.5 +- 12.25"});
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::info_test

@@ -5,8 +5,7 @@
 #include "program.hpp"
 #include "sample_files.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::live_terminal_test {
 
 const std::map<std::string, std::string> utf8_colours{
     {"TERM", "xterm-256color"}, {"COLORTERM", "truecolor"}, {"LC_ALL", "C.UTF-8"}};
@@ -98,5 +97,4 @@ TEST_F(LiveTerminal, KeepsJsonApart) {
   EXPECT_EQ(nlohmann::json::parse(outcome.out.substr(0, outcome.out.find('\n'))).at("touch"), 0u);
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::live_terminal_test

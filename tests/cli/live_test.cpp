@@ -21,8 +21,7 @@
 #include "program.hpp"
 #include "sample_files.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::live_test {
 
 using Arguments = std::vector<std::string>;
 
@@ -344,5 +343,4 @@ TEST_F(Live, SaysWhereALineCannotBeWritten) {
   EXPECT_NE(outcome.err.find("/dev/full"), std::string::npos) << outcome.err;
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::live_test

@@ -9,8 +9,7 @@
 
 #include "sample_files.hpp"
 
-namespace palpate::cli {
-namespace {
+namespace palpate::cli::live_view_test {
 
 LiveView sample_view(const OccupancyGrid& map) {
   LiveView view;
@@ -228,5 +227,4 @@ TEST(LiveView, ColoursAreTheTerminalsOwn) {
   }
 }
 
-}  // namespace
-}  // namespace palpate::cli
+}  // namespace palpate::cli::live_view_test

@@ -5,8 +5,7 @@
 #include "program.hpp"
 #include "sample_files.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::map_test {
 
 class MapCommand : public ProgramTest {
  protected:
@@ -190,5 +189,4 @@ TEST_F(MapCommand, RefusesTheLabelOfObjectsThatWereNeverLearned) {
   EXPECT_EQ(map_of_a({"--label", "A"}).label, "A");
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::map_test

@@ -5,8 +5,7 @@
 #include "program.hpp"
 #include "sample_files.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::map_unposed_test {
 
 /// Presses of an array of 16 x 16 elements, 2 mm apart, that sees a letter whole.
 Recording sample_presses(const std::string& shape, int presses, std::uint64_t seed) {
@@ -133,5 +132,4 @@ TEST_F(MapWithSensorModel, RefusesAnotherPressureUnit) {
                  {"raw.yaml", "pressure_unit is raw", "A.h5 has kPa"});
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::map_unposed_test

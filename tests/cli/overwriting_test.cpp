@@ -5,8 +5,7 @@
 #include "program.hpp"
 #include "sample_files.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::overwriting_test {
 
 using Arguments = std::vector<std::string>;
 
@@ -215,5 +214,4 @@ TEST_F(Overwriting, DevicesMayBeReadAndWritten) {
       {"--json ./fifo", "--poses reads"});
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::overwriting_test

@@ -7,8 +7,7 @@
 #include "program.hpp"
 #include "sample_files.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::plan_test {
 
 using nlohmann::json;
 
@@ -254,5 +253,4 @@ TEST_F(PlanCommand, LiveShowsTheNextTouch) {
                  {"--plan both", "histogram"});
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::plan_test

@@ -14,8 +14,7 @@
 #include "program.hpp"
 #include "sample_files.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::progress_test {
 
 using namespace std::chrono_literals;
 
@@ -151,5 +150,4 @@ TEST_F(ProgressOfTheProgram, ShowsAnUnknownThatIsSearchedUntilCtrlC) {
   EXPECT_EQ(outcome.out.find('{'), std::string::npos) << "JSON comes whole or not at all";
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::progress_test

@@ -9,8 +9,7 @@
 #include "program.hpp"
 #include "sample_files.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::recognize_bounded_filter_test {
 
 using nlohmann::json;
 using testing::HasSubstr;
@@ -385,5 +384,4 @@ TEST_F(BoundedFilter, RecognisesLive) {
   EXPECT_EQ(trace.size(), 4u);
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::recognize_bounded_filter_test

@@ -3,8 +3,7 @@
 #include "program.hpp"
 #include "sample_files.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::recognize_bounds_test {
 
 class RecognizeBounds : public ProgramTest {
  protected:
@@ -48,5 +47,4 @@ TEST_F(RecognizeBounds, TheLabelOfObjectsThatWereNeverLearnedIsRefused) {
   }
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::recognize_bounds_test

@@ -5,8 +5,7 @@
 #include "program.hpp"
 #include "sample_files.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::recognize_doubt_test {
 
 using nlohmann::json;
 
@@ -109,5 +108,4 @@ TEST_F(RecognizeDoubt, HelpSaysWhatTheWeightMeans) {
   EXPECT_NE(help.find("never learned"), std::string::npos) << help;
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::recognize_doubt_test

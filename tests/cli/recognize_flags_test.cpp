@@ -7,8 +7,7 @@
 #include "program.hpp"
 #include "sample_files.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::recognize_flags_test {
 
 using nlohmann::json;
 
@@ -214,5 +213,4 @@ TEST_F(RecognizeFlags, TableShowsWhatWasTakenForWhat) {
   EXPECT_NE(table.find("taken for"), std::string::npos) << table;
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::recognize_flags_test

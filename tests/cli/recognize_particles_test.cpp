@@ -3,8 +3,7 @@
 #include "program.hpp"
 #include "sample_files.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::recognize_particles_test {
 
 using nlohmann::json;
 
@@ -83,5 +82,4 @@ TEST_F(RecognizeParticles, AreDrawn) {
       << "a picture of three panels";
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::recognize_particles_test

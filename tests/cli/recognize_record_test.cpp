@@ -12,8 +12,7 @@
 #include "program.hpp"
 #include "sample_files.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::recognize_record_test {
 
 using nlohmann::json;
 
@@ -371,5 +370,4 @@ TEST_F(RecognizeRecord, TheSameCallGivesTheSameRecord) {
   EXPECT_EQ(first, second);
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::recognize_record_test

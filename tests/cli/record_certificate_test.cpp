@@ -10,8 +10,7 @@
 #include "cli/step_words.hpp"
 #include "sample_files.hpp"
 
-namespace palpate::cli {
-namespace {
+namespace palpate::cli::record_certificate_test {
 
 using testing::HasSubstr;
 using testing::Not;
@@ -117,5 +116,4 @@ TEST(Certificate, IsInTheJson) {
   EXPECT_FALSE(to_json(record.last(), task).contains("dropped_mass"));
 }
 
-}  // namespace
-}  // namespace palpate::cli
+}  // namespace palpate::cli::record_certificate_test

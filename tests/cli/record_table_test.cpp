@@ -15,8 +15,7 @@
 #include "palpate/pose_error.hpp"
 #include "sample_files.hpp"
 
-namespace palpate::cli {
-namespace {
+namespace palpate::cli::record_table_test {
 
 using testing::HasSubstr;
 using testing::Not;
@@ -299,5 +298,4 @@ TEST(RecordOutput, AWrongObjectIsRedOnTheSheet) {
   EXPECT_FALSE(sheet.truth);
 }
 
-}  // namespace
-}  // namespace palpate::cli
+}  // namespace palpate::cli::record_table_test

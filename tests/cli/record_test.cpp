@@ -12,8 +12,7 @@
 #include "palpate/files.hpp"
 #include "program.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::record_test {
 
 using namespace std::chrono_literals;
 
@@ -372,5 +371,4 @@ TEST_F(RecordCommand, RefusesWhatCannotBeRecorded) {
   expect_refused({"record", "-o", "s.h5"}, {"--sensor"});
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::record_test

@@ -5,8 +5,7 @@
 #include "program.hpp"
 #include "sample_files.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::scene_test {
 
 using nlohmann::json;
 
@@ -181,5 +180,4 @@ TEST_F(SceneArray, TakesThePlaceOfTheRecordings) {
   }
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::scene_test

@@ -8,8 +8,7 @@
 #include "program.hpp"
 #include "sample_files.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::sensor_model_flag_test {
 
 using nlohmann::json;
 using Arguments = std::vector<std::string>;
@@ -197,5 +196,4 @@ TEST_F(SensorModelFlag, MirroredObjectsAreFound) {
   EXPECT_FALSE(record(region)["mode"].contains("mirrored"));
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::sensor_model_flag_test

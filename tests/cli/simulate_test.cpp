@@ -7,8 +7,7 @@
 #include "palpate/simulation.hpp"
 #include "program.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::simulate_test {
 
 class SimulateCommand : public ProgramTest {
  protected:
@@ -133,5 +132,4 @@ TEST_F(SimulateCommand, PolygonFileIsAShape) {
   EXPECT_EQ(simulate("t.h5", {"tile.txt", "--touches", "3"}).object, "tile");
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::simulate_test

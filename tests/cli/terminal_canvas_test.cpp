@@ -1,11 +1,9 @@
 #include "cli/terminal_canvas.hpp"
+#include "limits.hpp"
 
 #include <gtest/gtest.h>
 
-#include <limits>
-
-namespace palpate::cli {
-namespace {
+namespace palpate::cli::terminal_canvas_test {
 
 /// The line of a canvas of one row.
 std::string line_of(const TerminalCanvas& canvas, TerminalColours colours) {
@@ -47,7 +45,6 @@ TEST(TerminalCanvas, TakesTheNearestOfAPaletteOf256Colours) {
 }
 
 TEST(TerminalCanvas, NotANumberIsBlankAndBlack) {
-  constexpr double nan = std::numeric_limits<double>::quiet_NaN();
   TerminalCanvas canvas(3, 1);
   canvas.pixel(0, 0, {.colour = {nan, nan, nan}, .shade = nan});
   canvas.pixel(1, 0, {.shade = 1.0});
@@ -60,5 +57,4 @@ TEST(TerminalCanvas, NotANumberIsBlankAndBlack) {
   EXPECT_EQ(line_of(bar, TerminalColours::none), "");
 }
 
-}  // namespace
-}  // namespace palpate::cli
+}  // namespace palpate::cli::terminal_canvas_test

@@ -2,8 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace palpate::cli {
-namespace {
+namespace palpate::cli::text_table_test {
 
 TEST(ShortenMiddle, KeepsBothEndsOfALongName) {
   EXPECT_EQ(shorten_middle("mug.h5", 6), "mug.h5");
@@ -63,5 +62,4 @@ TEST(TextTable, ShowsNoControlCharacter) {
   EXPECT_EQ(table.text({}), "name\na?[2J?b\n");
 }
 
-}  // namespace
-}  // namespace palpate::cli
+}  // namespace palpate::cli::text_table_test

@@ -10,8 +10,7 @@
 #include "palpate/simulation.hpp"
 #include "program.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::touches_test {
 
 using nlohmann::json;
 
@@ -290,5 +289,4 @@ TEST_F(TouchesCommand, RefusesWhatHoldsNoTouches) {
   expect_refused({"touches", "missing.h5", "-o", "t.h5"}, {"missing.h5"});
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::touches_test

@@ -5,8 +5,7 @@
 #include "program.hpp"
 #include "sample_files.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::uncertainty_flags_test {
 
 using nlohmann::json;
 using Arguments = std::vector<std::string>;
@@ -200,5 +199,4 @@ TEST_F(UncertaintyFlags, TheSurpriseStandsInTheRecordAndInTheTrace) {
   EXPECT_FALSE(record_with({"--touches", "1"}).contains("surprise"));
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::uncertainty_flags_test

@@ -2,8 +2,7 @@
 
 #include "document.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::batch_test {
 
 using BatchDocument = DocumentTest;
 
@@ -18,5 +17,4 @@ TEST_F(BatchDocument, ItsCommandsRecogniseAndMerge) {
   expect_written({"all.ndjson", "shared.ndjson", "results/runs/000002.json"});
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::batch_test

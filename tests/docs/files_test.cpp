@@ -5,8 +5,7 @@
 #include "document.hpp"
 #include "palpate/files.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::files_test {
 
 using FilesDocument = ProgramTest;
 
@@ -32,5 +31,4 @@ TEST_F(FilesDocument, ItsProgramWritesARecording) {
   EXPECT_NEAR(area_mm2, 201.0, 50.0);
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::files_test

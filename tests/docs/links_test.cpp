@@ -11,8 +11,7 @@
 
 #include "document.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::links_test {
 
 namespace fs = std::filesystem;
 
@@ -120,5 +119,4 @@ TEST(Reference, HasEveryPublicHeader) {
   }
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::links_test

@@ -8,8 +8,7 @@
 
 #include "document.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::own_sensor_test {
 
 using OwnSensorDocument = DocumentTest;
 
@@ -81,5 +80,4 @@ TEST_F(OwnSensorDocument, PressesAtUnknownPosesMakeARecogniser) {
   EXPECT_GT(found["unknown_classes"]["area_under_curve"]["area"].get<double>(), 0.85);
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::own_sensor_test

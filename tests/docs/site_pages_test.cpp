@@ -9,8 +9,7 @@
 
 #include "document.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::site_pages_test {
 
 using SitePages = DocumentTest;
 using Words = std::vector<std::string>;
@@ -159,5 +158,4 @@ TEST_F(SitePages, AProgramActsOnLinesOfTouches) {
   EXPECT_TRUE(json("result.json")[0].contains("none"));
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::site_pages_test

@@ -12,8 +12,7 @@
 
 #include "fake_takktile.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::fake_usb_device_test {
 
 /// A device file that a program has open.
 class OpenedFile {
@@ -118,5 +117,4 @@ TEST_F(FakeUsbDeviceFile, HoldsItsInterfacesAgainstOthers) {
   EXPECT_EQ(other.claim(), EBUSY);
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::fake_usb_device_test

@@ -8,8 +8,7 @@
 
 #include "streamed.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::frame_queue_test {
 
 using std::chrono::milliseconds;
 
@@ -57,5 +56,4 @@ TEST(FrameQueueTest, WaitsAsLongAsATimeCanBe) {
   EXPECT_EQ(queue.pop(milliseconds::min()), std::nullopt);
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::frame_queue_test

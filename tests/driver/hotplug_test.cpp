@@ -6,8 +6,7 @@
 #include "palpate/error.hpp"
 #include "streamed.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::hotplug_test {
 
 using testing::HasSubstr;
 
@@ -179,5 +178,4 @@ TEST_F(Hotplug, TwoBoardsStreamAtOnce) {
   EXPECT_FALSE(l->gone());
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::hotplug_test

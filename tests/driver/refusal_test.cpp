@@ -13,8 +13,7 @@
 #include "palpate/driver.hpp"
 #include "palpate/error.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::refusal_test {
 
 using testing::AllOf;
 using testing::HasSubstr;
@@ -173,5 +172,4 @@ TEST_F(Refusal, ABoardWithoutCells) {
   EXPECT_FALSE(list_boards().at(0).usable);
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::refusal_test

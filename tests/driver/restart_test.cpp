@@ -13,8 +13,7 @@
 #include "parsing/sent_frame.hpp"
 #include "streamed.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::restart_test {
 
 using testing::AllOf;
 using testing::HasSubstr;
@@ -234,5 +233,4 @@ INSTANTIATE_TEST_SUITE_P(Descriptors, SerialRestart,
                                       : "WithControlInterface";
                          });
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::restart_test

@@ -6,8 +6,7 @@
 #include "fake_serial_board.hpp"
 #include "fake_takktile.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::sensors_command_test {
 
 using nlohmann::json;
 using testing::HasSubstr;
@@ -68,5 +67,4 @@ TEST_F(SensorsCommand, DoesNotPassOnWhatADeviceWouldSayToATerminal) {
   EXPECT_EQ(json::parse(done({"sensors", "--json"})).size(), 1U);
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::sensors_command_test

@@ -16,8 +16,7 @@
 #include "parsing/sent_frame.hpp"
 #include "streamed.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::serial_board_test {
 
 using testing::AllOf;
 using testing::HasSubstr;
@@ -245,5 +244,4 @@ TEST_F(SerialBoards, HaveProfilesOfTheUsersOwn) {
   EXPECT_THROW(open_board(path + ":C3"), Error);
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::serial_board_test

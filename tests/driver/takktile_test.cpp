@@ -5,8 +5,7 @@
 #include "palpate/error.hpp"
 #include "streamed.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::takktile_test {
 
 class Takktile : public testing::Test {
  protected:
@@ -128,5 +127,4 @@ TEST_F(Takktile, FramesOfWholePacketsEndWithAnEmptyOne) {
   }
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::takktile_test

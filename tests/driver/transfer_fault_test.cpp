@@ -5,8 +5,7 @@
 #include "palpate/driver.hpp"
 #include "streamed.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::transfer_fault_test {
 
 using Fault = FakeUsbDevice::Fault;
 
@@ -160,5 +159,4 @@ TEST_F(TransferFault, StopsAndStartsAnew) {
   }
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::transfer_fault_test

@@ -11,8 +11,7 @@
 #include "streamed.hpp"
 #include "without_memory.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::transfer_ring_test {
 
 using Completion = TransferRing::Completion;
 
@@ -132,5 +131,4 @@ TEST_F(Ring, OfADeviceThatIsGoneDoesNotBegin) {
                Error);
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::transfer_ring_test

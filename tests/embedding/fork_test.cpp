@@ -13,8 +13,7 @@
 
 #include "letters.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::fork_test {
 
 /// Whether the work throws the Error of an object of the parent.
 bool is_refused(const std::function<void()>& work) {
@@ -96,5 +95,4 @@ TEST(Fork, LetsAChildOpenADeviceWhereItsParentHasClosedAll) {
             0);
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::fork_test

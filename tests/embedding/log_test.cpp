@@ -12,8 +12,7 @@
 #include "letters.hpp"
 #include "model/log_message.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::log_test {
 
 using Messages = std::vector<std::pair<LogLevel, std::string>>;
 
@@ -115,5 +114,4 @@ TEST(LibraryDeathTest, AMessageOfValidationEndsTheProgramAndIsLogged) {
       "logged: Vulkan validation: a fence was never destroyed");
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::log_test

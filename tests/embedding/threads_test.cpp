@@ -14,8 +14,7 @@
 
 #include "letters.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::threads_test {
 
 constexpr int threads = 4;
 
@@ -138,5 +137,4 @@ TEST(Log, TakesTheMessagesOfAllThreadsOneAtATime) {
   EXPECT_EQ(messages, threads);
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::threads_test

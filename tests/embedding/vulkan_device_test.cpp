@@ -13,8 +13,7 @@
 #include "gpu/selection.hpp"
 #include "letters.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::vulkan_device_test {
 
 /// A program's own Vulkan device, with the validation layer, whose messages end the test.
 class Program {
@@ -127,5 +126,4 @@ TEST(SharedDevice, RefusesHandlesThatCannotCompute) {
   expect_refused(handles, "queue_family = 4294967295");
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::vulkan_device_test

@@ -16,8 +16,7 @@
 #include "palpate/pose_histogram.hpp"
 #include "synthetic.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::all_or_nothing_test {
 
 void expect_refused(const std::function<void()>& call, const std::string& says) {
   try {
@@ -279,5 +278,4 @@ TEST(MovedFrom, DevicesAreNotComputedOn) {
 }
 // NOLINTEND(bugprone-use-after-move)
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::all_or_nothing_test

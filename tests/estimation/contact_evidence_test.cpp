@@ -10,8 +10,7 @@
 
 #include "synthetic.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::contact_evidence_test {
 
 constexpr std::size_t segment_elements = 5;
 
@@ -144,5 +143,4 @@ TEST(RotateEvidence, IsAllElementsForEveryThetaInCells) {
   }
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::contact_evidence_test

@@ -8,8 +8,7 @@
 
 #include "palpate/error.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::displacement_check_test {
 
 constexpr PoseLattice region{
     .x_mm = {-10.0, 10.0, 5}, .y_mm = {-4.0, 4.0, 5}, .theta_rad = {0.0, 1.0, 5}};
@@ -83,5 +82,4 @@ TEST(UnresolvedDisplacement, LiesFarFromThePivot) {
   EXPECT_EQ(said(1000.0, {.mm = 1.0}), "") << "no angle is blurred";
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::displacement_check_test

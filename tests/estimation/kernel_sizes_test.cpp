@@ -7,8 +7,7 @@
 #include "made_up_devices.hpp"
 #include "shaders/interface.h"
 
-namespace palpate {
-namespace {
+namespace palpate::kernel_sizes_test {
 
 constexpr std::int64_t counts[] = {1,      2,         7,          63,         64,           65,
                                    10'000, 1'000'000, 10'000'000, 50'000'000, 2'000'000'000};
@@ -99,5 +98,4 @@ TEST_P(KernelSizes, FillTheDeviceAsFarAsTheBinsAllow) {
 
 INSTANTIATE_TEST_SUITE_P(Devices, KernelSizes, testing::ValuesIn(made_up_devices));
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::kernel_sizes_test

@@ -11,8 +11,7 @@
 #include "particles/weighed_particles.hpp"
 #include "synthetic.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::learned_layer_test {
 
 /// A map of which patches were sensed, with counts and mean levels.
 OccupancyGrid sensed_in_part(const std::string& label, int nx, int ny, double cell_mm,
@@ -156,5 +155,4 @@ INSTANTIATE_TEST_SUITE_P(OfBoth, LearnedLayer,
                            return each.param == MapLayer::log_odds ? "LogOdds" : "MeanLevel";
                          });
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::learned_layer_test

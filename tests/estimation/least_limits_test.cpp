@@ -13,8 +13,7 @@
 #include "particles/weighed_particles.hpp"
 #include "synthetic.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::least_limits_test {
 
 Device least_device() {
   Device device = Device::open();
@@ -121,5 +120,4 @@ TEST_F(LeastLimits, BlurFarAlongThetaAsTheReferenceDoes) {
   EXPECT_LT(likelihood_error(histogram, expected_posterior(options, touches)), per_mean);
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::least_limits_test

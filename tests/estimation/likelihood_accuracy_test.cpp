@@ -5,8 +5,7 @@
 #include "palpate/pose_histogram.hpp"
 #include "synthetic.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::likelihood_accuracy_test {
 
 HistogramOptions small_options() {
   HistogramOptions options;
@@ -122,5 +121,4 @@ TEST(Accuracy, DoesNotDependOnWhereTheRobotsOriginLies) {
   EXPECT_LT(largest_difference(at_origin.log_likelihood(0), far_away.log_likelihood(0)), per_touch);
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::likelihood_accuracy_test

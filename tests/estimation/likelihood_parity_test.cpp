@@ -6,8 +6,7 @@
 #include "palpate/pose_histogram.hpp"
 #include "synthetic.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::likelihood_parity_test {
 
 // As steep as maps of some hundred touches are from cell to cell.
 constexpr double steepness = 12.0;
@@ -149,5 +148,4 @@ TEST(Likelihood, OfTouchesOffTheMapIsThePriors) {
   }
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::likelihood_parity_test

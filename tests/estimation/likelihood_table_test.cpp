@@ -14,8 +14,7 @@
 #include "particles/weighed_particles.hpp"
 #include "synthetic.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::likelihood_table_test {
 
 // What the method allows a log-likelihood to differ from float64, in nats per touch of 36 elements.
 constexpr double per_touch = 1e-4;
@@ -248,5 +247,4 @@ TEST_F(EveryWay, RefusesATableOfOtherObjectsOrTooLargeForTheDevice) {
   refuse(learned(3), "use fewer nodes");
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::likelihood_table_test

@@ -7,8 +7,7 @@
 // More elements in one call than a device loops over in one dispatch: llvmpipe silently ends an
 // invocation's loops after 65,535 turns.
 
-namespace palpate {
-namespace {
+namespace palpate::many_touches_test {
 
 TEST(ManyTouches, AtOnceCountAsMuchAsOneByOne) {
   const Hypothesis hypothesis{random_map(31, 27, 0.5, 12.0, 141), 1.0};
@@ -49,5 +48,4 @@ TEST(ManyTouches, OfOneSpotAllCountInTheMap) {
   }
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::many_touches_test

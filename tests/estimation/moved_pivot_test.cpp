@@ -9,8 +9,7 @@
 #include "palpate/pose_histogram.hpp"
 #include "synthetic.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::moved_pivot_test {
 
 const glm::dvec2 pivot_mm{400.0, 200.0};
 
@@ -122,5 +121,4 @@ TEST(MovedPivot, CarriesTheParticlesWithIt) {
   }
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::moved_pivot_test

@@ -7,16 +7,14 @@
 
 #include <gtest/gtest.h>
 
+#include "limits.hpp"
 #include "palpate/error.hpp"
 #include "palpate/particle_filter.hpp"
 #include "palpate/pose_histogram.hpp"
 #include "synthetic.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::none_test {
 
-constexpr double nan = std::numeric_limits<double>::quiet_NaN();
-constexpr double infinity = std::numeric_limits<double>::infinity();
 /// What the method allows a mean likelihood to differ from float64, in nats per touch.
 constexpr double per_mean = 1e-3;
 
@@ -265,5 +263,4 @@ TEST(Contradiction, IsSaidByParticlesWhereTheReferenceSaysSo) {
   EXPECT_EQ(said(1000.0, 0.1), 0) << "readings may be random";
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::none_test

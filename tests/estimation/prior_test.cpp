@@ -6,8 +6,7 @@
 #include "palpate/map_builder.hpp"
 #include "synthetic.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::prior_test {
 
 /// One touch of a 20 x 20 mm array of 0.5 mm pitch; a disc about its centre is in contact.
 Recording touch_of_disc(double radius_mm) {
@@ -76,5 +75,4 @@ TEST(EstimatePrior, StaysBetweenZeroAndOne) {
   EXPECT_LT(estimate({none}), 0.01);
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::prior_test

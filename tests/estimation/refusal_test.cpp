@@ -1,10 +1,10 @@
 #include <functional>
-#include <limits>
 #include <string>
 #include <tuple>
 
 #include <gtest/gtest.h>
 
+#include "limits.hpp"
 #include "palpate/balanced_lattice.hpp"
 #include "palpate/error.hpp"
 #include "palpate/map_builder.hpp"
@@ -12,11 +12,7 @@
 #include "palpate/pose_histogram.hpp"
 #include "synthetic.hpp"
 
-namespace palpate {
-namespace {
-
-constexpr double nan = std::numeric_limits<double>::quiet_NaN();
-constexpr double infinity = std::numeric_limits<double>::infinity();
+namespace palpate::refusal_test {
 
 void expect_refused(const std::function<void()>& call, const std::string& says) {
   try {
@@ -181,5 +177,4 @@ TEST_F(HistogramInput, WithALatticeOutOfRangeIsRefused) {
   refuse("y_mm");
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::refusal_test

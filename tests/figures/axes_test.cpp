@@ -4,8 +4,7 @@
 
 #include "picture.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::axes_test {
 
 std::vector<std::string> labels(const std::vector<Tick>& ticks) {
   std::vector<std::string> result;
@@ -75,5 +74,4 @@ TEST(DrawAxes, KeepTheLabelClearOfWideTicks) {
   EXPECT_LT(label.right, ticks_left);
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::axes_test

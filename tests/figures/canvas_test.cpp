@@ -8,8 +8,7 @@
 #include "palpate/error.hpp"
 #include "picture.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::canvas_test {
 
 TEST(Canvas, IsWhiteAndOfTheSizeAskedFor) {
   const Picture picture = decode(Canvas(31, 17).encode());
@@ -95,5 +94,4 @@ TEST(Canvas, GoesOnAfterTextThatIsNotUtf8) {
   EXPECT_EQ(decode(canvas.encode()).at(20, 30), 0u);
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::canvas_test

@@ -6,8 +6,7 @@
 
 #include <gtest/gtest.h>
 
-namespace palpate {
-namespace {
+namespace palpate::chart_axis_test {
 
 using Labels = std::vector<std::string>;
 
@@ -90,5 +89,4 @@ TEST(Axis, WritesTicksByItsOwnText) {
   EXPECT_EQ(labels(linear({0.0, 2.0}, axis)).front(), "0 s");
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::chart_axis_test

@@ -7,8 +7,7 @@
 
 #include "picture.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::chart_test {
 
 const Colour red{1.0, 0.0, 0.0};
 const Colour blue{0.0, 0.0, 1.0};
@@ -189,5 +188,4 @@ TEST(Chart, IsTheSamePictureAsSvg) {
   EXPECT_EQ(svg.spots.at(0).at_px, png.spots.at(0).at_px);
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::chart_test

@@ -8,8 +8,7 @@
 #include "palpate/error.hpp"
 #include "picture.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::confusion_figure_test {
 
 ConfusionFigure example() {
   return {
@@ -75,5 +74,4 @@ TEST(ConfusionFigure, RefusesWhatItCannotDraw) {
   EXPECT_THROW(draw_confusion(counts), Error);
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::confusion_figure_test

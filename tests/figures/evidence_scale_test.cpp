@@ -4,8 +4,7 @@
 
 #include <limits>
 
-namespace palpate {
-namespace {
+namespace palpate::evidence_scale_test {
 
 /// A row of cells with this evidence, in nats over a prior of one half.
 OccupancyGrid row_of(const std::vector<float>& evidence) {
@@ -44,5 +43,4 @@ TEST(EvidenceScale, CellsWithoutEvidenceDoNotCount) {
   EXPECT_EQ(range_of(evidence), 6.0);
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::evidence_scale_test

@@ -11,8 +11,7 @@
 #include "palpate/pose.hpp"
 #include "palpate/touch.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::footprint_test {
 
 double area(const std::vector<glm::dvec2>& polygon) {
   double twice = 0.0;
@@ -139,5 +138,4 @@ TEST(Footprint, OfNothingIsEmpty) {
   EXPECT_TRUE(f.outline.empty());
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::footprint_test

@@ -10,8 +10,7 @@
 #include "palpate/error.hpp"
 #include "picture.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::map_figure_test {
 
 OccupancyGrid unseen(const std::string& label, int nx, int ny) {
   OccupancyGrid map{
@@ -123,5 +122,4 @@ TEST(DrawMaps, RefusesWhatItCannotDraw) {
   EXPECT_THROW(draw(short_of_values), Error);
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::map_figure_test

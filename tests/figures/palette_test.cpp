@@ -8,8 +8,7 @@
 
 #include "picture.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::palette_test {
 
 /// Relative luminance of an sRGB colour (IEC 61966-2-1).
 double luminance(const Colour& c) {
@@ -81,5 +80,4 @@ TEST(Palette, SeriesColoursDifferAndShowOnWhite) {
   }
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::palette_test

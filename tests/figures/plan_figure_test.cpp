@@ -9,8 +9,7 @@
 #include "palpate/touch.hpp"
 #include "picture.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::plan_figure_test {
 
 /// 60 x 40 mm, an object in the left half, three candidates.
 PlanFigure example() {
@@ -99,5 +98,4 @@ TEST(PlanFigure, RefusesWhatItCannotDraw) {
   EXPECT_THROW(draw_plan(cells), Error);
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::plan_figure_test

@@ -7,8 +7,7 @@
 #include "palpate/error.hpp"
 #include "picture.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::presses_figure_test {
 
 /// A map whose middle cell is occupied, with two presses.
 DrawnPresses example() {
@@ -48,5 +47,4 @@ TEST(PressesFigure, DrawsPressesWithoutAMap) {
 
 TEST(PressesFigure, RefusesNothingToDraw) { EXPECT_THROW(draw_presses({}), Error); }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::presses_figure_test

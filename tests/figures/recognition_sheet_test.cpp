@@ -11,8 +11,7 @@
 #include "palpate/touch.hpp"
 #include "picture.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::recognition_sheet_test {
 
 /// A bar from (-5, 0) to (6, 1), touched twice at a pivot far from the robot's origin.
 RecognitionSheet example() {
@@ -219,5 +218,4 @@ TEST(RecognitionSheet, RefusesArraysOfTheWrongSize) {
   EXPECT_THROW(draw_recognition(sheet), Error);
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::recognition_sheet_test

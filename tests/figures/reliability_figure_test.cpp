@@ -7,8 +7,7 @@
 #include "figures/palette.hpp"
 #include "picture.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::reliability_figure_test {
 
 ReliabilityFigure example() {
   return {.curves = {
@@ -48,5 +47,4 @@ TEST(ReliabilityFigure, CurvesHaveColoursOfTheirOwn) {
   EXPECT_GT(second(figure), 100);
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::reliability_figure_test

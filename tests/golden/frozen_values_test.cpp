@@ -14,8 +14,7 @@
 #include "palpate/pose_histogram.hpp"
 #include "reference/reference.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::frozen_values_test {
 
 constexpr double digits = 1e-9;     // the numbers have ten digits
 constexpr double per_touch = 1e-4;  // error allowed for a log-likelihood, in nats
@@ -298,5 +297,4 @@ TEST(FrozenValues, OfThePoseError) {
   }
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::frozen_values_test

@@ -6,8 +6,7 @@
 #include "golden_values.hpp"
 #include "palpate/pose_error.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::golden_test {
 
 constexpr double map_tolerance = 1e-3;  // error allowed for a map, in nats per cell
 constexpr double per_touch = 1e-4;      // error allowed for a log-likelihood, in nats per touch
@@ -110,5 +109,4 @@ TEST(Golden, RecognitionIsWithinItsTolerance) {
   }
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::golden_test

@@ -13,8 +13,7 @@
 #include "palpate/pose_error.hpp"
 #include "palpate/pose_histogram.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::shared_golden_test {
 
 using nlohmann::json;
 
@@ -148,5 +147,4 @@ TEST_F(SharedGolden, PoseErrorsAgree) {
   }
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::shared_golden_test

@@ -10,8 +10,7 @@
 #include "palpate/error.hpp"
 #include "scale_and_add_kernel.hpp"
 
-namespace palpate::gpu {
-namespace {
+namespace palpate::gpu::buffer_test {
 
 static_assert(!std::is_copy_constructible_v<Buffer> && !std::is_copy_assignable_v<Buffer>);
 
@@ -149,5 +148,4 @@ TEST(Transfers, ReadTheValuesAtOnceAndOnlyThose) {
   EXPECT_EQ(all, (std::vector<std::uint8_t>{0x11, 0x11, 1, 2, 3, 0x11, 0x11, 0x11}));
 }
 
-}  // namespace
-}  // namespace palpate::gpu
+}  // namespace palpate::gpu::buffer_test

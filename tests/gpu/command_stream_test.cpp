@@ -9,8 +9,7 @@
 #include "palpate/error.hpp"
 #include "scale_and_add_kernel.hpp"
 
-namespace palpate::gpu {
-namespace {
+namespace palpate::gpu::command_stream_test {
 
 using Words = std::vector<std::uint32_t>;
 
@@ -212,5 +211,4 @@ TEST_F(Refusal, OfATransferThatNoStagingMemoryHolds) {
   EXPECT_THROW(fresh.upload(large, std::span(words)), Error);
 }
 
-}  // namespace
-}  // namespace palpate::gpu
+}  // namespace palpate::gpu::command_stream_test

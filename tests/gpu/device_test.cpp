@@ -11,8 +11,7 @@
 #include "gpu/context.hpp"
 #include "palpate/error.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::device_test {
 
 TEST(Device, ListTellsWhichOneOpens) {
   const std::vector<DeviceInfo> infos = Device::list();
@@ -120,5 +119,4 @@ TEST(Context, AMemoryTypeThatDoesNotExistIsAnError) {
   EXPECT_THROW(device.context().memory_type(0, 0, 0), Error);
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::device_test

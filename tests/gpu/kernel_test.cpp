@@ -7,8 +7,7 @@
 #include "palpate/error.hpp"
 #include "scale_and_add_kernel.hpp"
 
-namespace palpate::gpu {
-namespace {
+namespace palpate::gpu::kernel_test {
 
 static_assert(!std::is_copy_constructible_v<Kernel> && !std::is_copy_assignable_v<Kernel>);
 
@@ -66,5 +65,4 @@ TEST(Kernel, NeedingMoreThanTheDeviceHasIsRefusedByName) {
   expect_refused(1000, 8);
 }
 
-}  // namespace
-}  // namespace palpate::gpu
+}  // namespace palpate::gpu::kernel_test

@@ -6,8 +6,7 @@
 
 #include "palpate/error.hpp"
 
-namespace palpate::gpu {
-namespace {
+namespace palpate::gpu::result_test {
 
 std::string message_of(VkResult result) {
   try {
@@ -46,5 +45,4 @@ TEST(Result, WhatAUserCanMendComesWithTheRemedy) {
   says(VK_ERROR_FORMAT_NOT_SUPPORTED, "-11");
 }
 
-}  // namespace
-}  // namespace palpate::gpu
+}  // namespace palpate::gpu::result_test

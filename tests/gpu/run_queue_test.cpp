@@ -11,8 +11,7 @@
 #include "gpu/submitter.hpp"
 #include "scale_and_add_kernel.hpp"
 
-namespace palpate::gpu {
-namespace {
+namespace palpate::gpu::run_queue_test {
 
 using Words = std::vector<std::uint32_t>;
 
@@ -161,5 +160,4 @@ TEST(RunQueue, EveryThreadGetsItsOwnResults) {
   EXPECT_EQ(wrong, std::vector<std::uint32_t>(threads, 0));
 }
 
-}  // namespace
-}  // namespace palpate::gpu
+}  // namespace palpate::gpu::run_queue_test

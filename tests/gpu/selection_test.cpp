@@ -7,8 +7,7 @@
 
 #include "palpate/error.hpp"
 
-namespace palpate::gpu {
-namespace {
+namespace palpate::gpu::selection_test {
 
 // The ranks of the Vulkan device types.
 enum Rank { discrete, integrated, virtual_gpu, cpu };
@@ -171,5 +170,4 @@ TEST(Wished, IsTheEnvironmentsWhereNothingIsNamed) {
   before == nullptr ? unsetenv("PALPATE_DEVICE") : setenv("PALPATE_DEVICE", kept.c_str(), 1);
 }
 
-}  // namespace
-}  // namespace palpate::gpu
+}  // namespace palpate::gpu::selection_test

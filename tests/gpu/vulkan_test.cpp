@@ -7,8 +7,7 @@
 #include "palpate/device.hpp"
 #include "palpate/error.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::vulkan_test {
 
 /// Opens devices in a process that has not loaded Vulkan; ends it with 3 where each attempt fails
 /// as the machine's fault, and says why.
@@ -57,5 +56,4 @@ TEST_F(VulkanDeathTest, ALaterCallTriesAgain) {
   EXPECT_EXIT(open_twice(), testing::ExitedWithCode(3), "");
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::vulkan_test

@@ -8,8 +8,7 @@
 
 #include "bounded_case.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::bounded_test {
 
 TEST(BoundedHard, CertainMapsWithoutGamma) {
   HardCase hard("bounds: gamma = 0 on maps at log odds of +-1,000",
@@ -184,5 +183,4 @@ TEST(BoundedHard, IdenticalObjectsAndSymmetricOnes) {
                      recording);
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::bounded_test

@@ -10,8 +10,7 @@
 
 #include "bounded_case.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::bounded_touches_test {
 
 TEST(BoundedHard, PivotsAndObjectsFarAway) {
   HardCase hard("bounds: pivots 1e5 mm away, with and without the touches",
@@ -213,5 +212,4 @@ TEST(BoundedHard, AThousandTouchesOfOneSpot) {
   hard.expect("certificate", seen.estimate.certificate->dropped_mass, options.tolerance);
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::bounded_touches_test

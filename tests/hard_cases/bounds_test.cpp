@@ -7,8 +7,7 @@
 #include "palpate/balanced_lattice.hpp"
 #include "palpate/particle_filter.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::bounds_test {
 
 constexpr double most_finite = std::numeric_limits<double>::max();
 
@@ -116,5 +115,4 @@ TEST(Bounds, WhatLiesBeyondThemOnBothSidesDoesNotMeet) {
   hard.expect("identity of particles off the map", std::abs(estimate.identity[0] - 0.5), 1e-5);
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::bounds_test

@@ -4,8 +4,7 @@
 
 #include "hard_case.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::contradiction_test {
 
 /// A map without doubt: the log odds of every cell are +1,000 or -1,000.
 OccupancyGrid certain_map(std::uint64_t seed) {
@@ -155,5 +154,4 @@ TEST(Contradiction, AFloorThatNoFloatHolds) {
   }
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::contradiction_test

@@ -4,8 +4,7 @@
 
 #include "hard_case.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::far_place_test {
 
 /// Bins of 0.1 mm.
 HistogramOptions fine_options() {
@@ -82,5 +81,4 @@ TEST(FarPlace, AnglesOfAMillionTurns) {
               largest_difference(histogram.log_likelihood(0), unturned.log_likelihood(0)), 1e-5);
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::far_place_test

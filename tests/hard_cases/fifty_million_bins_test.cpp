@@ -6,8 +6,7 @@
 
 #include "hard_case.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::fifty_million_bins_test {
 
 // The belief takes 400 MB on the device, in several bindings if one binding cannot hold it.
 constexpr PoseLattice fifty_million() {
@@ -110,5 +109,4 @@ TEST(FiftyMillionBins, OfWhichOneOrAllHoldTheMass) {
   }
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::fifty_million_bins_test

@@ -2,8 +2,7 @@
 
 #include "hard_case.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::long_run_test {
 
 /// Errors add up over a run, by 3e-6 to 5e-6 nats per touch: where touches repeat, the logarithm of
 /// eight factors always rounds the same way. Near the top, all bins err alike, and what remains is
@@ -90,5 +89,4 @@ TEST(LongRun, TouchesOneByOneOfAStillArray) {
                                     long_run(still_touches, 0.01, 5e-3));  // 2.9e-3 seen
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::long_run_test

@@ -7,8 +7,7 @@
 #include "hard_case.hpp"
 #include "io/scratch_folder.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::map_test {
 
 TEST(Map, AMillionTouchesOfOneSpot) {
   HardCase hard("a map of 1e6 touches of one spot, and recognition with it",
@@ -151,5 +150,4 @@ TEST(Map, PriorsAndPeaksAtTheirEnds) {
   }
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::map_test

@@ -6,8 +6,7 @@
 #include "hard_case.hpp"
 #include "palpate/particle_filter.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::particle_test {
 
 ParticleOptions two_thousand() {
   ParticleOptions options;
@@ -184,5 +183,4 @@ TEST(Particles, OfExtremelyUnequalWeights) {
   EXPECT_NEAR(first_identity(5e-324, 5e-324), 0.5, 1e-12);
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::particle_test

@@ -7,8 +7,7 @@
 #include "hard_case.hpp"
 #include "io/scratch_folder.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::silent_touch_test {
 
 constexpr double subnormal = std::numeric_limits<double>::denorm_min();
 
@@ -157,5 +156,4 @@ TEST(SilentTouch, SubnormalPressures) {
   hard.expect_map(device, all_touches(tiny), map_options);
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::silent_touch_test

@@ -3,8 +3,7 @@
 
 #include "hard_case.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::size_test {
 
 HistogramOptions small_options() {
   HistogramOptions options;
@@ -98,5 +97,4 @@ TEST(Size, FourThousandElements) {
   hard.expect_map(device, recording.touches(0, 1), {.cell_mm = 1.0});
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::size_test

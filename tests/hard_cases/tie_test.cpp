@@ -6,8 +6,7 @@
 
 #include "hard_case.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::tie_test {
 
 HistogramOptions symmetric_options() {
   HistogramOptions options;
@@ -170,5 +169,4 @@ TEST(Tie, FullSymmetryTouchedAtTheMiddle) {
   }
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::tie_test

@@ -4,8 +4,7 @@
 
 #include "hard_case.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::weight_test {
 
 HistogramOptions small_options() {
   HistogramOptions options;
@@ -67,5 +66,4 @@ TEST(Weight, AtTheEndsOfFloat64) {
   hard.expect("identity", std::abs(both.estimate().identity[1] - 1.0), 1e-12);
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::weight_test

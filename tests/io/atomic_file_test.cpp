@@ -8,8 +8,7 @@
 #include "palpate/files.hpp"
 #include "scratch_folder.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::atomic_file_test {
 
 std::size_t files_in(const ScratchFolder& folder) {
   return static_cast<std::size_t>(
@@ -139,5 +138,4 @@ TEST(AtomicFile, LeavesNeitherOfAPairWhereTheDiskIsFull) {
   EXPECT_EQ(files_in(folder), 0u);
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::atomic_file_test

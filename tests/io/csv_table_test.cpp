@@ -6,8 +6,7 @@
 
 #include "scratch_folder.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::csv_table_test {
 
 using Rows = std::vector<std::vector<std::optional<double>>>;
 
@@ -149,5 +148,4 @@ TEST_F(Csv, LongTablesAreReadWhole) {
   EXPECT_EQ(sum, 300'000.0 * 299'999.0 / 2.0 + 150'000.0);
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::csv_table_test

@@ -11,8 +11,7 @@
 #include "palpate/frame_recorder.hpp"
 #include "scratch_folder.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::daemon_test {
 
 // Prints on standard output and error, whatever they are, as libraries and drivers do.
 bool print_anything() {
@@ -81,5 +80,4 @@ TEST_F(Daemon, NothingPrintedGetsIntoARecording) {
   EXPECT_EQ(read_recording(path_).size(), 10u);
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::daemon_test

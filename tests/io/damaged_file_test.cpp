@@ -11,8 +11,7 @@
 #include "palpate/scene.hpp"
 #include "scratch_folder.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::damaged_file_test {
 
 using Read = std::function<void(const std::filesystem::path&)>;
 
@@ -88,5 +87,4 @@ TEST(DamagedFile, SceneIsReadOrRefused) {
       [](const auto& path) { read_scene(path); });
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::damaged_file_test

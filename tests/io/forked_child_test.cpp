@@ -11,8 +11,7 @@
 
 #include "scratch_folder.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::forked_child_test {
 
 using namespace std::chrono_literals;
 
@@ -156,5 +155,4 @@ TEST_F(Forked, NeedsNoStandardDescriptors) {
   EXPECT_EQ(status, 0);
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::forked_child_test

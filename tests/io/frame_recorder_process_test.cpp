@@ -20,8 +20,7 @@
 #include "palpate/frame_recorder.hpp"
 #include "scratch_folder.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::frame_recorder_process_test {
 
 using namespace std::chrono_literals;
 
@@ -197,5 +196,4 @@ TEST_F(FrameRecorderProcess, FullDiskIsOneErrorAndLeavesWhatWasSaved) {
   EXPECT_GE(partial, 20);
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::frame_recorder_process_test

@@ -9,8 +9,7 @@
 #include "palpate/files.hpp"
 #include "scratch_folder.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::frame_recorder_test {
 
 class FrameRecorderFile : public testing::Test {
  protected:
@@ -184,5 +183,4 @@ TEST_F(FrameRecorderFile, RefusesWhatDoesNotFit) {
   expect_named(input_error([&] { FrameRecorder(path_, {}); }), {"0 elements"});
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::frame_recorder_test

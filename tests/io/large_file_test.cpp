@@ -16,8 +16,7 @@
 #include "palpate/files.hpp"
 #include "scratch_folder.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::large_file_test {
 
 constexpr std::uint64_t mib = 1 << 20;
 
@@ -227,5 +226,4 @@ TEST_F(LargeFile, PiecesComeInOrderWhateverTheChunks) {
   }
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::large_file_test

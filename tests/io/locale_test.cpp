@@ -9,8 +9,7 @@
 #include "palpate/simulation.hpp"
 #include "scratch_folder.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::locale_test {
 
 class HostWithDecimalCommas : public testing::Test {
  protected:
@@ -93,5 +92,4 @@ TEST_F(HostWithDecimalCommas, DecimalCommasAreRefused) {
   expect_named(input_error([&] { read_elements(folder_ / "e.txt"); }), {"line 1"});
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::locale_test

@@ -8,8 +8,7 @@
 #include "palpate/files.hpp"
 #include "scratch_folder.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::map_test {
 
 OccupancyGrid small_map() {
   OccupancyGrid map;
@@ -167,5 +166,4 @@ TEST_F(MapFile, WantsAYamlNameForMapServer) {
                {"A.pgm", ".yaml"});
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::map_test

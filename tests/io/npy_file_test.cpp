@@ -17,8 +17,7 @@
 #include "io/descriptor.hpp"
 #include "scratch_folder.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::npy_file_test {
 
 class Npy : public testing::Test {
  protected:
@@ -280,5 +279,4 @@ TEST_F(NpyInMemory, ForgedHeadersAreReadOrRefused) {
   EXPECT_GT(read, files / 10) << "few files get past the header";
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::npy_file_test

@@ -9,8 +9,7 @@
 #include "palpate/files.hpp"
 #include "scratch_folder.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::outside_file_test {
 
 constexpr H5Z_filter_t filter_id = 40000;  // of nobody
 
@@ -185,5 +184,4 @@ TEST_P(OutsideFile, ExternalLinksAndPluginsStayAllowedElsewhere) {
 INSTANTIATE_TEST_SUITE_P(Read, OutsideFile, testing::Bool(),
                          [](const auto& read) { return read.param ? "InAChild" : "Here"; });
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::outside_file_test

@@ -7,8 +7,7 @@
 #include "palpate/files.hpp"
 #include "scratch_folder.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::posterior_test {
 
 class PosteriorFile : public testing::Test {
  protected:
@@ -105,5 +104,4 @@ TEST_F(PosteriorFile, NamesWhatItCannotTake) {
   }
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::posterior_test

@@ -11,8 +11,7 @@
 #include "palpate/files.hpp"
 #include "scratch_folder.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::reading_here_test {
 
 // The tests of this program read as the command does, unless they say otherwise.
 const bool as_the_command = (read_hdf5_in_children(true), true);
@@ -106,5 +105,4 @@ TEST_F(ReadingHere, AnAbsurdShapeTakesNoMemory) {
   expect_same_refusal([&] { read_recording(path_); });
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::reading_here_test

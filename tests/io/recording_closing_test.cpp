@@ -19,8 +19,7 @@
 #include "palpate/frame_recorder.hpp"
 #include "scratch_folder.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::recording_closing_test {
 
 constexpr std::size_t elements = 36;
 
@@ -231,5 +230,4 @@ TEST_F(RecordingClosing, NeedsTheRightToWrite) {
   expect_frames(300);
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::recording_closing_test

@@ -9,8 +9,7 @@
 #include "palpate/files.hpp"
 #include "scratch_folder.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::recording_reader_test {
 
 std::atomic<int> forks{0};
 const int counted = ::pthread_atfork([] { ++forks; }, nullptr, nullptr);
@@ -85,5 +84,4 @@ TEST_F(RecordingReading, InAnotherProgramsProcessNothingForks) {
   read_hdf5_in_children(true);
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::recording_reader_test

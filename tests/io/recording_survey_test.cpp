@@ -9,14 +9,12 @@
 
 #include "file_parts.hpp"
 #include "io/recording_suspicions.hpp"
+#include "limits.hpp"
 #include "palpate/files.hpp"
 #include "palpate/simulation.hpp"
 #include "scratch_folder.hpp"
 
-namespace palpate {
-namespace {
-
-constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+namespace palpate::recording_survey_test {
 
 class RecordingSurveyed : public testing::Test {
  protected:
@@ -314,5 +312,4 @@ TEST_F(RecordingSurveyed, ElementsThatReadNothingOrAreAlwaysTouched) {
   expect_suspicion(r, {"Element 20 reads more than 2 kPa above the baseline in every frame"});
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::recording_survey_test

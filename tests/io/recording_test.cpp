@@ -2,17 +2,13 @@
 #include <unistd.h>
 
 #include <cmath>
-#include <limits>
 
 #include "file_parts.hpp"
+#include "limits.hpp"
 #include "palpate/files.hpp"
 #include "scratch_folder.hpp"
 
-namespace palpate {
-namespace {
-
-constexpr double nan = std::numeric_limits<double>::quiet_NaN();
-constexpr double infinity = std::numeric_limits<double>::infinity();
+namespace palpate::recording_test {
 
 Recording small_recording() {
   Recording recording;
@@ -356,5 +352,4 @@ TEST_F(RecordingFile, IsNotWrittenWhereItCouldNotBeRead) {
   EXPECT_TRUE(std::filesystem::is_empty(folder_.path()));
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::recording_test

@@ -9,16 +9,13 @@
 #include <random>
 
 #include "io/recording_rules.hpp"
+#include "limits.hpp"
 #include "model/lost_count.hpp"
 #include "palpate/files.hpp"
 #include "palpate/frame_recorder.hpp"
 #include "scratch_folder.hpp"
 
-namespace palpate {
-namespace {
-
-constexpr double nan = std::numeric_limits<double>::quiet_NaN();
-constexpr double infinity = std::numeric_limits<double>::infinity();
+namespace palpate::round_trip_test {
 
 // Draws values most of which are usual; the others are what nobody expects.
 class Hostile {
@@ -343,5 +340,4 @@ TEST_F(RoundTrip, StreamOfFrames) {
   expect_both_outcomes();
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::round_trip_test

@@ -5,8 +5,7 @@
 #include "palpate/touch.hpp"
 #include "scratch_folder.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::scene_test {
 
 class SceneFile : public testing::Test {
  protected:
@@ -188,5 +187,4 @@ TEST_F(SceneFile, NamesTheLineThatIsNoYaml) {
   expect_named(input_error([&] { read_scene(folder_ / "no.yaml"); }), {"no.yaml", "no such file"});
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::scene_test

@@ -3,8 +3,7 @@
 #include "palpate/learned_sensor.hpp"
 #include "scratch_folder.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::sensor_model_file_test {
 
 LearnedSensor full_sensor() {
   LearnedSensor sensor{
@@ -140,5 +139,4 @@ TEST_F(SensorModelFile, SaysWhatIsWrong) {
   expect_named(input_error([&] { read_sensor_model(path_); }), {"line", "YAML"});
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::sensor_model_file_test

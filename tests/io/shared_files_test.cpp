@@ -6,8 +6,7 @@
 
 #include "palpate/files.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::shared_files_test {
 
 const std::filesystem::path shared = std::filesystem::path(PALPATE_SOURCE_DIR) / ".." / "shared";
 
@@ -45,5 +44,4 @@ TEST(SharedFiles, RealPressesAreRead) {
   }
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::shared_files_test

@@ -12,8 +12,7 @@
 #include "palpate/error.hpp"
 #include "synthetic.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::contact_learning_test {
 
 double normal(Uniform& random) {
   return std::sqrt(-2.0 * std::log(random(1e-12, 1.0))) * std::cos(two_pi * random(0.0, 1.0));
@@ -233,5 +232,4 @@ TEST(ShareInContact, StaysWithinBounds) {
   EXPECT_EQ(share_in_contact(all.presses[0].touches, {}), 0.5);
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::contact_learning_test

@@ -11,8 +11,7 @@
 #include "simulated_presses.hpp"
 #include "synthetic.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::cross_validation_test {
 
 MapOptions map_options() { return {.cell_mm = 0.75, .sensor = {.spread_mm = 0.75, .prior = 0.2}}; }
 
@@ -196,5 +195,4 @@ TEST(CrossValidation, RefusesWhatItCannotTry) {
   EXPECT_THROW(tried(simulated.presses, {"L", "disc"}, {.maps_per_object = 0}), Error);
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::cross_validation_test

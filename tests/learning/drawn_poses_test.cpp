@@ -8,8 +8,7 @@
 #include "simulated_presses.hpp"
 #include "synthetic.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::drawn_poses_test {
 
 /// Where an element lies in the object frame.
 glm::dvec2 place_of(const Press& press, std::size_t touch, std::size_t element) {
@@ -95,5 +94,4 @@ TEST_F(DrawnPoses, OfSeveralPressesTogetherKeepAllPlaces) {
   }
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::drawn_poses_test

@@ -8,8 +8,7 @@
 #include "palpate/error.hpp"
 #include "synthetic.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::familiarity_fit_test {
 
 TEST(Familiarity, RecoversALogisticModel) {
   Uniform random(1);
@@ -78,5 +77,4 @@ TEST(AreaUnderCurve, OfAFoldIsByTheRegressionOfTheOthers) {
   EXPECT_FALSE(area_under_curve(std::vector<FamiliarityScores>{{high, {}}, {high, low}}, 0));
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::familiarity_fit_test

@@ -8,8 +8,7 @@
 
 #include "palpate/error.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::feature_learning_test {
 
 LabelledFeatures press(const char* label, double value) {
   return {label, {{value, 2.0 * value, 7.0}}};
@@ -88,5 +87,4 @@ TEST(FeatureLearning, OfOnePressIsFinite) {
   EXPECT_THROW(learn_features({}), Error);
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::feature_learning_test

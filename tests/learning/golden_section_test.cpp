@@ -4,8 +4,7 @@
 
 #include <gtest/gtest.h>
 
-namespace palpate {
-namespace {
+namespace palpate::golden_section_test {
 
 TEST(GoldenSection, FindsTheLargestValue) {
   int calls = 0;
@@ -27,5 +26,4 @@ TEST(GoldenSection, OfEqualValuesTakesTheLowest) {
   EXPECT_NEAR(largest_at(0.0, 2.0, 1e-4, [](double) { return 3.0; }), 0.0, 1e-4);
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::golden_section_test

@@ -13,8 +13,7 @@
 #include "simulated_presses.hpp"
 #include "synthetic.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::held_out_calibration_test {
 
 /// Presses of random pressures, of labels that say nothing of them.
 struct Noise {
@@ -128,5 +127,4 @@ TEST_P(NoiseCalibration, JudgesAFoldByWhatTheOtherFoldsSayAlone) {
 INSTANTIATE_TEST_SUITE_P(AtPoses, NoiseCalibration, testing::Bool(),
                          [](const auto& test) { return test.param ? "Known" : "Unknown"; });
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::held_out_calibration_test

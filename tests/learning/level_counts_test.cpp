@@ -7,8 +7,7 @@
 
 #include "palpate/error.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::level_counts_test {
 
 /// The node whose value this is.
 int node_of(double value) { return static_cast<int>(std::lround((value + 16.0) * 2.0)); }
@@ -109,5 +108,4 @@ TEST(ShrunkTable, HasAFloor) {
   EXPECT_DOUBLE_EQ(table[49 + static_cast<std::size_t>(node_of(0.0))], std::log(1e-6));
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::level_counts_test

@@ -10,8 +10,7 @@
 #include "palpate/error.hpp"
 #include "synthetic.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::observed_map_test {
 
 /// One touch of a row of elements 2 mm apart, the first at (0, 0).
 Recording row_of(std::vector<double> pressure) {
@@ -141,5 +140,4 @@ TEST(ObservedMap, RefusesTouchesThatSayNothing) {
   EXPECT_THROW(observed_map(std::span(&sound, 1), {.sensor = {.prior = 0.0}}, "A"), Error);
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::observed_map_test

@@ -6,8 +6,7 @@
 
 #include "simulated_presses.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::point_spread_test {
 
 constexpr ContactClassifier classifier{.threshold = 2.0, .ratio = 0.3};
 
@@ -71,5 +70,4 @@ TEST(PointSpread, IsNoneOfASensorWithoutEdges) {
   EXPECT_FALSE(learn_point_spread(letters.presses, classifier).has_value());
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::point_spread_test

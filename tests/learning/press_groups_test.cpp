@@ -2,8 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace palpate {
-namespace {
+namespace palpate::press_groups_test {
 
 /// Presses 0 to 2 are alike, 3 and 4 are, 5 is like none.
 FitTable sample_table() {
@@ -29,5 +28,4 @@ TEST(NextMap, NoneWhereAllPressesFit) {
   EXPECT_FALSE(next_map(sample_table(), std::vector<double>(6, 0.5), 0.5));
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::press_groups_test

@@ -11,8 +11,7 @@
 #include "simulated_presses.hpp"
 #include "synthetic.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::press_placement_test {
 
 struct Exhaustive {
   double best = -INFINITY;
@@ -108,5 +107,4 @@ TEST(PressPlacer, RefusesWhatIsTooFarAway) {
   EXPECT_THROW(placer.place(simulated.presses[0]), Error);
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::press_placement_test

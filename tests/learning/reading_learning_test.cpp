@@ -8,8 +8,7 @@
 #include "simulated_presses.hpp"
 #include "synthetic.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::reading_learning_test {
 
 TEST(LevelEdges, PartContactsIntoEqualShares) {
   Recording recording;
@@ -45,5 +44,4 @@ TEST(Readings, OfNoiseAloneMakeNoContact) {
       << "as given";
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::reading_learning_test

@@ -12,8 +12,7 @@
 #include "palpate/error.hpp"
 #include "simulated_presses.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::sensor_calibration_degenerate_test {
 
 constexpr std::size_t elements = 36;
 
@@ -245,5 +244,4 @@ TEST(DegenerateCalibration, OnMapsOfOtherObjectsIsRefused) {
   }
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::sensor_calibration_degenerate_test

@@ -11,8 +11,7 @@
 #include "palpate/error.hpp"
 #include "simulated_presses.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::sensor_calibration_test {
 
 SensorCalibrationOptions options() {
   return {.threshold = 2.0, .ratio = 0.3, .tables = {{MapLayer::log_odds, 2}}, .folds = 2};
@@ -236,5 +235,4 @@ TEST(SensorCalibration, TakesTheThresholdAndRatioGiven) {
   EXPECT_EQ(classifier({.ratio = 0.2, .spacing_mm = 1.9}).ratio, 0.2);
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::sensor_calibration_test

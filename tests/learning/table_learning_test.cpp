@@ -13,8 +13,7 @@
 #include "simulated_presses.hpp"
 #include "synthetic.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::table_learning_test {
 
 MapOptions map_options() { return {.cell_mm = 0.75, .sensor = {.spread_mm = 0.75, .prior = 0.2}}; }
 
@@ -268,5 +267,4 @@ TEST(TableLearning, OfOneFoldHasNoMapsOfOthers) {
   EXPECT_THROW(learn_table(presses, {}, {.contact = {.prior = 0.2}}), Error);
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::table_learning_test

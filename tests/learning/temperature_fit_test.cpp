@@ -9,8 +9,7 @@
 #include "palpate/error.hpp"
 #include "synthetic.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::temperature_fit_test {
 
 double normal(Uniform& random) {
   return std::sqrt(-2.0 * std::log(random(1e-12, 1.0))) * std::cos(two_pi * random(0.0, 1.0));
@@ -308,5 +307,4 @@ TEST(ClearlyLess, IsByMoreThanTwoStandardErrors) {
   EXPECT_FALSE(is_clearly_less(same, same));
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::temperature_fit_test

@@ -14,8 +14,7 @@
 #include "simulated_presses.hpp"
 #include "synthetic.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::training_maps_test {
 
 MapOptions map_options() { return {.cell_mm = 0.75, .sensor = {.spread_mm = 0.75, .prior = 0.2}}; }
 
@@ -141,5 +140,4 @@ TEST(Presses, ThatSayNothingAreRefusedByName) {
   }
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::training_maps_test

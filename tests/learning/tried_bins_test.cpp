@@ -8,8 +8,7 @@
 #include "simulated_presses.hpp"
 #include "synthetic.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::tried_bins_test {
 
 constexpr double spacing_mm = 1.9;
 constexpr ContactClassifier classifier{.threshold = 2.0, .ratio = 0.3};
@@ -98,5 +97,4 @@ TEST_F(TriedBins, AreRefusedWhereEvenWideOnesAreTooMany) {
   EXPECT_FALSE(takes_too_long(square(0.5, 1, 360), static_cast<std::size_t>(5 / minutes_per_map)));
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::tried_bins_test

@@ -11,8 +11,7 @@
 #include "palpate/error.hpp"
 #include "palpate/simulation.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::unposed_maps_test {
 
 /// Presses of an array of 16 x 16 elements, 2 mm apart, that sees a letter whole.
 Recording presses_of(const std::string& shape, int presses, std::uint64_t seed) {
@@ -179,5 +178,4 @@ TEST(UnposedMaps, RefusesWhatCannotBePlaced) {
             std::string::npos);
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::unposed_maps_test

@@ -2,8 +2,7 @@
 
 #include "palpate/touch.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::array_test {
 
 TEST(DigitactsArray, HasTheGeometryOfTwoPadsSideBySide) {
   const std::vector<glm::dvec2> elements = digitacts_array();
@@ -70,5 +69,4 @@ TEST(Recording, ViewsARangeOfTouches) {
   EXPECT_EQ(Recording{}.elements(), 0U);
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::array_test

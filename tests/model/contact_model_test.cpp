@@ -1,22 +1,19 @@
 #include "palpate/contact_model.hpp"
 
 #include <cmath>
-#include <limits>
 #include <string>
 #include <vector>
 
 #include <gtest/gtest.h>
 
+#include "limits.hpp"
 #include "palpate/error.hpp"
 #include "reference/reference.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::contact_model_test {
 
 constexpr Reading in = Reading::in_contact;
 constexpr Reading no = Reading::no_contact;
-constexpr double nan = std::numeric_limits<double>::quiet_NaN();
-constexpr double infinity = std::numeric_limits<double>::infinity();
 
 TEST(ContactModel, IsEquation7) {
   for (const double gamma : {0.0, 1e-6, 0.1, 0.5, 0.99}) {
@@ -181,5 +178,4 @@ TEST(LikelihoodTable, HasUpToEightLevels) {
   EXPECT_EQ(model.log_likelihood(contact_level(6), {0.5}), -1.0);
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::contact_model_test

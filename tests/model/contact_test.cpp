@@ -9,8 +9,7 @@
 #include "palpate/error.hpp"
 #include "reference/reference.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::contact_test {
 
 constexpr Reading in = Reading::in_contact;
 constexpr Reading no = Reading::no_contact;
@@ -134,5 +133,4 @@ TEST(KnownReadings, AreInTheRobotFrameWithoutTheUnknown) {
   EXPECT_NEAR(known[1].position_mm.y, 203.0, 1e-12);
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::contact_test

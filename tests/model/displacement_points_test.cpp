@@ -4,8 +4,7 @@
 
 #include <gtest/gtest.h>
 
-namespace palpate {
-namespace {
+namespace palpate::displacement_points_test {
 
 TEST(NormalQuantile, InvertsTheDistributionFunction) {
   for (const double x : {-6.0, -2.5, -1.0, -0.1, 0.0, 0.3, 1.7, 4.0}) {
@@ -62,5 +61,4 @@ TEST(Slipped, TurnsTheObjectAboutItsCentroidAndMovesIt) {
   EXPECT_NEAR(after.theta_rad, 1.1, 1e-12);
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::displacement_points_test

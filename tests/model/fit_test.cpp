@@ -13,8 +13,7 @@
 #include "synthetic.hpp"
 #include "touched_shape.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::fit_test {
 
 constexpr Pose T_object_robot{{1.5, -0.8}, 0.7};
 
@@ -295,5 +294,4 @@ TEST(FitScale, IsWhatTouchesOfTheirOwnObjectShow) {
   EXPECT_EQ(FitScale{}.of({.z = -3.5}, 9).z, -3.5);
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::fit_test

@@ -7,11 +7,11 @@
 
 #include <gtest/gtest.h>
 
+#include "limits.hpp"
 #include "palpate/error.hpp"
 #include "reference/reference.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::lattice_test {
 
 // Float64 rounding of coordinates below 1e4 mm.
 constexpr double rounding = 1e-11;
@@ -90,8 +90,6 @@ void expect_refused(const PoseLattice& lattice, const std::string& field) {
 }
 
 TEST(PoseLattice, RefusesWhatIsNoLattice) {
-  constexpr double nan = std::numeric_limits<double>::quiet_NaN();
-  constexpr double infinity = std::numeric_limits<double>::infinity();
   PoseLattice().validate();
   expect_refused({.x_mm = {-1.0, 1.0, 0}}, "x_mm");
   expect_refused({.y_mm = {-1.0, 1.0, -3}}, "y_mm");
@@ -152,7 +150,6 @@ TEST(PoseLattice, BinOfAPoseOutsideIsTheNearest) {
   EXPECT_EQ(bin_of(5.0, 1e12, 1.0), 2 * 12 + 2 * 4 + 3);
   EXPECT_EQ(bin_of(0.1, 0.0, 2.5), 4 * 12 + 0 * 4 + 2);
   EXPECT_EQ(bin_of(0.1, 0.0, -0.5), 0 * 12 + 0 * 4 + 2);
-  constexpr double infinity = std::numeric_limits<double>::infinity();
   EXPECT_THROW(bin_of(infinity, 0.0, 0.0), Error);
   EXPECT_THROW(bin_of(0.0, 0.0, std::numeric_limits<double>::quiet_NaN()), Error);
 }
@@ -169,5 +166,4 @@ TEST(PoseLattice, RefusesPlacesOfWhichFloat64KeepsNoDigits) {
   }
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::lattice_test

@@ -7,8 +7,7 @@
 
 #include "palpate/error.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::learned_sensor_test {
 
 OccupancyGrid map_of(const std::string& label) {
   return {.label = label,
@@ -148,5 +147,4 @@ TEST(Familiarity, ScoresATouchBesideItsOwnFrequencies) {
   EXPECT_DOUBLE_EQ(FamiliarityScore::of(readings, -5.0, apart).lead, std::log(101.0));
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::learned_sensor_test

@@ -1,18 +1,15 @@
 #include "model/mixture_kernel.hpp"
 
 #include <cmath>
-#include <limits>
 #include <string>
 #include <vector>
 
 #include <gtest/gtest.h>
 
 #include "every_set_of_instructions.hpp"
+#include "limits.hpp"
 
-namespace palpate {
-namespace {
-
-constexpr double infinity = std::numeric_limits<double>::infinity();
+namespace palpate::mixture_kernel_test {
 
 /// What the functions give for one set of instructions, or for the machine's best.
 struct Answers {
@@ -86,5 +83,4 @@ TEST(MixtureKernel, EverySetOfInstructionsGivesTheSameBits) {
       [&](const std::string& name) { EXPECT_EQ(answers(), best) << name; });
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::mixture_kernel_test

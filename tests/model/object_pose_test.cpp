@@ -10,8 +10,7 @@
 
 #include "palpate/estimate.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::object_pose_test {
 
 std::array<double, 9> rows_of(const glm::dmat3& matrix) {
   std::array<double, 9> rows{};
@@ -115,5 +114,4 @@ TEST(ObjectPose, AFarRobotOriginDoesNotBlurTheObject) {
   }
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::object_pose_test

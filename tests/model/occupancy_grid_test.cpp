@@ -6,13 +6,10 @@
 
 #include <gtest/gtest.h>
 
+#include "limits.hpp"
 #include "palpate/pose.hpp"
 
-namespace palpate {
-namespace {
-
-constexpr double nan = std::numeric_limits<double>::quiet_NaN();
-constexpr double infinity = std::numeric_limits<double>::infinity();
+namespace palpate::occupancy_grid_test {
 
 OccupancyGrid sound_map() {
   return {.label = "A", .origin_mm = {1.0, 2.0}, .nx = 3, .ny = 2, .log_odds = {1, 2, 3, 4, 5, 6}};
@@ -79,5 +76,4 @@ TEST(FaultOfAMap, NamesCellsThatDoNotAgreeOrAreTooMany) {
                "at most 1073741824");
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::occupancy_grid_test

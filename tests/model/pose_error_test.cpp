@@ -10,8 +10,7 @@
 #include "palpate/error.hpp"
 #include "reference/reference.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::pose_error_test {
 
 constexpr double pi = std::numbers::pi;
 
@@ -173,5 +172,4 @@ TEST(PoseError, OfATruthThatIsAbsurdlyFarAwayIsFinite) {
   EXPECT_NEAR(pose_error_mm(body, 1, {}, {{1e200, 0.0}, 0.0}) / 1e200, 1.0, 1e-12);
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::pose_error_test

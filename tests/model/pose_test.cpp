@@ -8,8 +8,7 @@
 #include <gtest/gtest.h>
 #include <glm/geometric.hpp>
 
-namespace palpate {
-namespace {
+namespace palpate::pose_test {
 
 constexpr double pi = std::numbers::pi;
 
@@ -91,5 +90,4 @@ TEST(WrapAngle, LandsInTheHalfOpenPeriodAndKeepsTheAngle) {
   }
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::pose_test

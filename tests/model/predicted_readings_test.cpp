@@ -8,8 +8,7 @@
 #include "palpate/touch.hpp"
 #include "synthetic.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::predicted_readings_test {
 
 TEST(PredictedReadings, AreTheContactModels) {
   const Pose T_object_sensor{{1.0, -2.0}, 0.4};
@@ -32,5 +31,4 @@ TEST(PredictedReadings, AreTheContactModels) {
   }
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::predicted_readings_test

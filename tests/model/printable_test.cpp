@@ -2,8 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace palpate {
-namespace {
+namespace palpate::printable_test {
 
 TEST(Printable, KeepsWellFormedText) {
   for (const char* text : {"", "A.unknown.h5", "Schlüssel", "€", "−10 ≤ θ", "鍵", "🔑"}) {
@@ -29,5 +28,4 @@ TEST(Printable, ReplacesEveryByteOfWhatIsNotUtf8) {
   EXPECT_EQ(printable("\xF8\x88\x80\x80\x80"), "?????");  // five bytes
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::printable_test

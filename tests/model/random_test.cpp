@@ -6,8 +6,7 @@
 
 #include <gtest/gtest.h>
 
-namespace palpate {
-namespace {
+namespace palpate::random_test {
 
 constexpr int draws = 1'000'000;
 
@@ -87,5 +86,4 @@ TEST(Random, StreamsAndSeedsDiffer) {
   EXPECT_NE(Random(5 + (std::uint64_t{1} << 32), Stream::sensor).uniform(), reference);
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::random_test

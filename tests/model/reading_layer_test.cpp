@@ -8,8 +8,7 @@
 
 #include "palpate/error.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::reading_layer_test {
 
 /// A map in which a share of the cells was sensed.
 OccupancyGrid sparse_map(int nx, int ny, double share, unsigned seed) {
@@ -110,5 +109,4 @@ TEST(ReadingLayer, RefusesWhatCannotBe) {
   }
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::reading_layer_test

@@ -7,8 +7,7 @@
 
 #include "palpate/fit.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::reading_mixture_test {
 
 constexpr Reading no = Reading::no_contact;
 constexpr Reading yes = Reading::in_contact;
@@ -135,5 +134,4 @@ TEST(Moments, CountDeviations) {
   EXPECT_EQ(sure.deviations(2.0), -largest_fit_z);
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::reading_mixture_test

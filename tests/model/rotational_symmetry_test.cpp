@@ -7,8 +7,7 @@
 
 #include "palpate/simulation.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::rotational_symmetry_test {
 
 /// The map of a shape that is turned about a point off its middle: 4 nats on the shape and -4
 /// beside it, within 17 mm of the origin.
@@ -120,5 +119,4 @@ TEST(RotationalSymmetry, ComparesOnlyWhatWasSeen) {
   EXPECT_EQ(suggested(bare), 1);
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::rotational_symmetry_test

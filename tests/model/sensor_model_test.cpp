@@ -6,16 +6,15 @@
 
 #include <gtest/gtest.h>
 
+#include "limits.hpp"
 #include "palpate/error.hpp"
 #include "palpate/occupancy_grid.hpp"
 #include "reference/reference.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::sensor_model_test {
 
 constexpr Reading in = Reading::in_contact;
 constexpr Reading no = Reading::no_contact;
-constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 
 TEST(LogOdds, AndProbabilityAreInverse) {
   EXPECT_EQ(log_odds_from_probability(0.5), 0.0);
@@ -116,5 +115,4 @@ TEST(InverseSensorModel, RefusesWhatIsOutOfRange) {
   }
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::sensor_model_test

@@ -2,8 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace palpate {
-namespace {
+namespace palpate::touch_test {
 
 TEST(SamePlacement, IsOfPoseAndElementsAndNotOfReadings) {
   const std::vector<glm::dvec2> elements_mm{{0.0, 1.0}, {2.0, 3.0}};
@@ -35,5 +34,4 @@ TEST(SamePlacement, IsOfPoseAndElementsAndNotOfReadings) {
   EXPECT_FALSE(same_placement(touch, fewer));
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::touch_test

@@ -9,8 +9,7 @@
 #include "letters.hpp"
 #include "model/displacement_points.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::contradiction_warning_test {
 
 using testing::HasSubstr;
 
@@ -121,5 +120,4 @@ TEST_F(ContradictionWarning, IsNotOfTouchesThatFitNowhere) {
   EXPECT_FALSE(said(recording, step, std::vector<double>(3, 9.0)));
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::contradiction_warning_test

@@ -4,8 +4,7 @@
 
 #include <gmock/gmock.h>
 
-namespace palpate {
-namespace {
+namespace palpate::evaluation_test {
 
 using testing::ElementsAre;
 
@@ -176,5 +175,4 @@ TEST(Evaluation, MediansAreOverTheRecordsThatHaveAnError) {
   EXPECT_DOUBLE_EQ(e.refined_error_mm->value, 0.25);
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::evaluation_test

@@ -12,8 +12,7 @@
 #include "shapes.hpp"
 #include "synthetic.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::label_bounds_test {
 
 /// Maps of L, disc and L again: labels L and disc, and with a weight "(none)".
 RecognitionTask three_maps(std::optional<double> none_weight) {
@@ -163,5 +162,4 @@ TEST(LabelBounds, AreOfBoundsAlone) {
   }
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::label_bounds_test

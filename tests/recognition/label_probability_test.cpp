@@ -11,8 +11,7 @@
 #include "recognition/recognition_record.hpp"
 #include "shapes.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::label_probability_test {
 
 /// Maps of L, disc and L again.
 RecognitionTask three_maps(const FilterOptions& filter = HistogramOptions{}) {
@@ -273,5 +272,4 @@ TEST(WiderBins, AreToldOfWhereTheSensorModelWasLearnedOnNarrowerOnes) {
   EXPECT_EQ(wider_bins_sentence(task), "") << "particles have none";
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::label_probability_test

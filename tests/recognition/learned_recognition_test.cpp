@@ -13,8 +13,7 @@
 #include "synthetic.hpp"
 #include "touched_shape.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::learned_recognition_test {
 
 /// A table that holds Eq. 7 at its nodes.
 LearnedSensor equation_7() {
@@ -252,5 +251,4 @@ TEST(LearnedSensor, TellsTheSameByBoundsAsByTheHistogram) {
   }
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::learned_recognition_test

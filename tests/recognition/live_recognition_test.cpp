@@ -7,8 +7,7 @@
 #include "palpate/virtual_sensor.hpp"
 #include "shapes.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::live_recognition_test {
 
 TEST(LiveRecognition, BelievesOfAStreamWhatRecogniseDoesOfItsTouches) {
   Device device = Device::open();
@@ -48,5 +47,4 @@ TEST(LiveRecognition, BelievesOfAStreamWhatRecogniseDoesOfItsTouches) {
   }
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::live_recognition_test

@@ -4,8 +4,7 @@
 
 #include <gtest/gtest.h>
 
-namespace palpate {
-namespace {
+namespace palpate::marginal_grid_test {
 
 PoseLattice lattice_of(int nx, int ny, int ntheta) {
   return {{-10.0, 10.0, nx}, {-20.0, 25.0, ny}, {0.0, 6.283185307179586, ntheta}, {3.0, 4.0}};
@@ -46,5 +45,4 @@ TEST(MarginalGrid, OfTheLargestRegionIsSound) {
   EXPECT_NO_THROW(marginal_grid(lattice).validate());
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::marginal_grid_test

@@ -5,8 +5,7 @@
 #include "synthetic.hpp"
 #include "touched_shape.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::nearby_fit_test {
 
 TEST(NearbyFit, IsAsGoodAsThatOfTheTruePoseHalfAStepAway) {
   const OccupancyGrid map = map_of(on_letter_l, "L");
@@ -23,5 +22,4 @@ TEST(NearbyFit, IsAsGoodAsThatOfTheTruePoseHalfAStepAway) {
   }
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::nearby_fit_test

@@ -5,8 +5,7 @@
 
 #include <gtest/gtest.h>
 
-namespace palpate {
-namespace {
+namespace palpate::proportion_test {
 
 TEST(WilsonInterval, HasThePublishedEnds) {
   // Newcombe 1998, table I: 81 of 263 and 0 of 20, to four digits.
@@ -37,5 +36,4 @@ TEST(ToldApart, HasTheErrorOfHanleyAndMcNeil) {
   EXPECT_NEAR(told_apart_error(0.5, 1, 1), 0.5, 1e-12);
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::proportion_test

@@ -11,8 +11,7 @@
 #include "shapes.hpp"
 #include "synthetic.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::recogniser_test {
 
 void expect_same(const Estimate& actual, const Estimate& expected) {
   EXPECT_EQ(actual.identity, expected.identity);
@@ -385,5 +384,4 @@ TEST(AutomaticPivot, WaitsForAResetAfterAnUpdateWasBrokenOff) {
   }
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::recogniser_test

@@ -13,8 +13,7 @@
 #include "synthetic.hpp"
 #include "touched_shape.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::recognition_record_test {
 
 Estimate estimate_of(std::vector<double> identity, int object, const Pose& T_object_robot,
                      double none = 0.0) {
@@ -296,5 +295,4 @@ TEST(ArrayIsStill, ForPressesOfOneLargeArrayInOnePlace) {
   EXPECT_FALSE(array_is_still(std::vector<Unknown>(3, small)));
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::recognition_record_test

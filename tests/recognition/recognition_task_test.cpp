@@ -5,8 +5,7 @@
 #include "palpate/balanced_lattice.hpp"
 #include "shapes.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::recognition_task_test {
 
 TEST(RecognitionTask, NamesEachLabelOnceAndNoneLast) {
   std::vector<Hypothesis> three = shapes();
@@ -135,5 +134,4 @@ TEST(RecognitionTask, CountsBinsBeyondEveryInteger) {
   EXPECT_GT(task.bins_in_all(), 1'000'000'000'000'000'000);
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::recognition_task_test

@@ -6,8 +6,7 @@
 
 #include "synthetic.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::smooth_occupancy_test {
 
 TEST(SmoothOccupancy, BlursAnEdgeByTheSensorsSpread) {
   // Surely occupied where x < 0, empty elsewhere; the edge lies between two cells.
@@ -34,5 +33,4 @@ TEST(SmoothOccupancy, BlursAnEdgeByTheSensorsSpread) {
   }
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::smooth_occupancy_test

@@ -15,8 +15,7 @@
 #include "recognition/recognition_record.hpp"
 #include "shapes.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::surprise_test {
 
 /// Mean and standard deviation of numbers.
 struct Spread {
@@ -274,5 +273,4 @@ TEST(Surprise, OfTheFirstTouchInContactIsNotKnownEitherAboutAnAutomaticPivot) {
   EXPECT_TRUE(record.trace[2].surprise);
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::surprise_test

@@ -7,8 +7,7 @@
 
 #include "shapes.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::touch_plan_test {
 
 TEST(CandidateGrid, HasPlacesThatATenthOfTheBeliefTouches) {
   const RecognitionTask task(shapes(), HistogramOptions{});
@@ -28,5 +27,4 @@ TEST(CandidateGrid, HasPlacesThatATenthOfTheBeliefTouches) {
   }
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::touch_plan_test

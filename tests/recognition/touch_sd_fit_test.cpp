@@ -12,8 +12,7 @@
 #include "palpate/simulation.hpp"
 #include "recognition/displacement_population.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::touch_sd_fit_test {
 
 /// Touches of letters in turn, each reported beside where it was.
 std::vector<Recording> misplaced_letters(int count, int touches, const DisplacementSd& sd) {
@@ -223,5 +222,4 @@ TEST(DisplacementPopulation, FollowsTheEvidenceOfDenseSums) {
   EXPECT_NEAR(population.reweigh(sd, next), evidence(next) - middle, 0.2);
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::touch_sd_fit_test

@@ -4,8 +4,7 @@
 #include "palpate/rotational_symmetry.hpp"
 #include "recognition/recognition_record.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::turn_warning_test {
 
 using testing::AllOf;
 using testing::ElementsAre;
@@ -91,5 +90,4 @@ TEST_F(TurnWarning, IsSilentWhereTheMapKnowsItsSymmetryOrHasNone) {
   EXPECT_THAT(warnings("A", 1, 1, true), IsEmpty());
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::turn_warning_test

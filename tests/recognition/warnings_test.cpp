@@ -12,8 +12,7 @@
 #include "letters.hpp"
 #include "recognition/recognition_record.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::warnings_test {
 
 using testing::AllOf;
 using testing::ElementsAre;
@@ -349,5 +348,4 @@ TEST_F(Warnings, ATouchOrTwoMayMissTheObject) {
   EXPECT_THAT(warnings(recording), IsEmpty()) << "where all readings are Unknown by Eq. 3";
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::warnings_test

@@ -8,8 +8,7 @@
 #include "palpate/error.hpp"
 #include "palpate/simulation.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::polygon_file_test {
 
 class PolygonFile : public testing::Test {
  protected:
@@ -82,5 +81,4 @@ TEST_F(PolygonFile, RefusesAFileWithoutPolygons) {
   expect_refused("# nothing\n\n", "", "no polygon");
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::polygon_file_test

@@ -8,8 +8,7 @@
 #include "palpate/contact.hpp"
 #include "palpate/simulation.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::sensor_response_test {
 
 /// No randomness: what is left is the displacement field and the element's area.
 SensorModel exact(double psf_mm) {
@@ -134,5 +133,4 @@ TEST(SensorResponse, ClassifierIsRightAboutNineTimesInTen) {
   EXPECT_GT(known, 0.8 * 5 * 192 * 36);
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::sensor_response_test

@@ -12,8 +12,7 @@
 #include "palpate/pose.hpp"
 #include "palpate/simulation.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::shape_test {
 
 constexpr double half_box_mm = 12.5;
 
@@ -188,5 +187,4 @@ TEST(Shape, OverlappingPolygonsCancelAndStrokesUnite) {
   EXPECT_FALSE(shape.contains({0.5, 0.5}));
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::shape_test

@@ -7,13 +7,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "limits.hpp"
 #include "palpate/error.hpp"
 #include "palpate/simulation.hpp"
 
-namespace palpate {
-namespace {
-
-constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+namespace palpate::simulator_test {
 
 /// A plate that every element of an array near its centre lies on entirely.
 Shape plate() {
@@ -187,5 +185,4 @@ TEST(Simulator, ThatWasMovedFromSaysSo) {
   EXPECT_THROW(first.touch({Pose{}}, {}), Error);  // NOLINT(bugprone-use-after-move): on purpose
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::simulator_test

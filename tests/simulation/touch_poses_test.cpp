@@ -8,8 +8,7 @@
 #include "palpate/error.hpp"
 #include "palpate/simulation.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::touch_poses_test {
 
 TEST(TouchPoses, TrainingGridHasTwelveAnglesAtSixteenPositions) {
   const std::vector<Pose> poses = training_grid();
@@ -103,5 +102,4 @@ TEST(TouchPoses, RandomObjectPosesAreUniformAndIndependentOfTheTouches) {
   EXPECT_NEAR(correlation, 0.0, 5.0 / std::sqrt(n));  // five standard errors
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::touch_poses_test

@@ -5,8 +5,7 @@
 #include "io/scratch_folder.hpp"
 #include "press.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::baseline_test {
 
 SensorDescription two_elements() {
   SensorDescription sensor;
@@ -52,5 +51,4 @@ TEST(Baseline, RefusesNothingToGoBy) {
   expect_named(input_error([&] { baseline_of(frames, two_elements(), 2.0); }), {"element 0"});
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::baseline_test

@@ -1,16 +1,14 @@
 #include "streaming/frame_smoother.hpp"
+#include "limits.hpp"
 
 #include <gtest/gtest.h>
 
 #include <cfloat>
 #include <cmath>
-#include <limits>
 #include <random>
 
-namespace palpate {
-namespace {
+namespace palpate::frame_smoother_test {
 
-constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 constexpr double smooth_s = 0.05;
 constexpr double gap_s = 0.5;
 constexpr double period_s = 0.01;
@@ -140,5 +138,4 @@ TEST(FrameSmoother, TimesThatStandStillKeepABoundedWindow) {
   EXPECT_EQ(smoother.add(1.0, {1.0})[0], 1.0);
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::frame_smoother_test

@@ -2,15 +2,10 @@
 
 #include <gtest/gtest.h>
 
-#include <limits>
-
+#include "limits.hpp"
 #include "palpate/pose_track.hpp"
 
-namespace palpate {
-namespace {
-
-constexpr double nan = std::numeric_limits<double>::quiet_NaN();
-constexpr double infinity = std::numeric_limits<double>::infinity();
+namespace palpate::pose_order_test {
 
 // Poses 10 ms apart, x = their index.
 double time_of(int i) { return 1.7e9 + 0.01 * i; }
@@ -160,5 +155,4 @@ TEST(PoseOrder, TakesNoPoseThatNoRobotHas) {
   EXPECT_TRUE(track.add(1.0, {{1e9, -1e9}, 1e9})) << "the bound itself";
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::pose_order_test

@@ -15,8 +15,7 @@
 #include "io/scratch_folder.hpp"
 #include "palpate/pose_track.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::pose_source_test {
 
 using namespace std::chrono_literals;
 
@@ -319,5 +318,4 @@ TEST_F(PoseSource, PosesAheadOfASilentBoardWaitInTheFifo) {
   EXPECT_EQ(posed_frames(sensor), 60000u) << "none of them is lost";
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::pose_source_test

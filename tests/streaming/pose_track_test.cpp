@@ -4,8 +4,7 @@
 
 #include <numbers>
 
-namespace palpate {
-namespace {
+namespace palpate::pose_track_test {
 
 constexpr double pi = std::numbers::pi;
 
@@ -66,5 +65,4 @@ TEST(PoseTrack, ForgettingKeepsWhatIsStillAskedFor) {
   EXPECT_EQ(track.last_s(), 49.5);
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::pose_track_test

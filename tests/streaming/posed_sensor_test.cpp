@@ -12,8 +12,7 @@
 #include "io/scratch_folder.hpp"
 #include "palpate/pose_track.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::posed_sensor_test {
 
 using namespace std::chrono_literals;
 
@@ -180,5 +179,4 @@ TEST_F(PosedSensorSource, FifoIsReadAsItComes) {
   expect_named(sensor.poses().first_refused, {"poses, line 2", "JSON"});
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::posed_sensor_test

@@ -8,13 +8,12 @@
 #include <utility>
 
 #include "io/scratch_folder.hpp"
+#include "limits.hpp"
 #include "palpate/error.hpp"
 #include "press.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::touch_detector_test {
 
-constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 const std::vector<double> pattern = {12.0, 6.0, 0.0, 3.0};
 const Pressures presses = presses_of(pattern);
 
@@ -322,5 +321,4 @@ TEST(TouchDetector, ThatWasMovedFromSaysSo) {
   // NOLINTEND(bugprone-use-after-move)
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::touch_detector_test

@@ -4,18 +4,15 @@
 
 #include <cfloat>
 #include <cmath>
-#include <limits>
 
 #include "io/scratch_folder.hpp"
+#include "limits.hpp"
 #include "palpate/baseline.hpp"
 #include "palpate/touch_detector.hpp"
 #include "press.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::unknown_reading_test {
 
-constexpr double nan = std::numeric_limits<double>::quiet_NaN();
-constexpr double infinity = std::numeric_limits<double>::infinity();
 const std::vector<double> pattern = {20.0, 6.0, 0.0, 3.0};
 const Pressures presses = presses_of(pattern);
 
@@ -251,5 +248,4 @@ TEST(UnknownReading, TareIsTakenAndJudgedByTheKnownReadings) {
   expect_named(input_error([&] { baseline_of(frames, sensor, 2.0); }), {"1 values", "2 elements"});
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::unknown_reading_test

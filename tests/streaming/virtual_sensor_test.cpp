@@ -4,21 +4,18 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <numbers>
 
 #include "io/scratch_folder.hpp"
+#include "limits.hpp"
 #include "palpate/baseline.hpp"
 #include "palpate/files.hpp"
 #include "palpate/simulation.hpp"
 #include "palpate/touch_detector.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::virtual_sensor_test {
 
 using namespace std::chrono_literals;
-
-constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 
 std::vector<Frame> frames_of(Sensor& sensor) {
   std::vector<Frame> frames;
@@ -310,5 +307,4 @@ TEST(VirtualSensor, RefusesNamesThatSayNothing) {
   EXPECT_FALSE(is_virtual_sensor("takktile"));
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::virtual_sensor_test

@@ -20,7 +20,7 @@ namespace palpate::cli {
 
 namespace {
 
-struct Options {
+struct BatchArguments {
   std::vector<std::string> inputs;
   std::string results;
   UnknownFlags unknowns;
@@ -105,7 +105,7 @@ BatchCounts compute(const BatchRun& run, const Chunks& chunks, SettledBatch& set
       });
 }
 
-std::string summary(const Options& options, const Shard& shard, const Chunks& chunks,
+std::string summary(const BatchArguments& options, const Shard& shard, const Chunks& chunks,
                     const BatchCounts& now, double seconds) {
   const std::size_t failed = chunks.finished.failed + now.failed;
   std::string text = fmt::format("{}: {} unknown{}", options.results, chunks.unknowns,
@@ -132,7 +132,7 @@ Device open_device_in_step(RecognitionFlags flags, const Scene& scene) {
   return open_device(flags, scene);
 }
 
-int batch(const Options& options, const CLI::App& command) {
+int batch(const BatchArguments& options, const CLI::App& command) {
   refuse_budget(options.recognition);
   if (options.chunk < 1) {
     refuse_flag("--chunk", options.chunk, "give at least 1");
@@ -189,7 +189,7 @@ void add_batch(CLI::App& app, int& status) {
       "command goes on where it was, and its results are the same, byte for byte. A recording "
       "that cannot be recognised becomes a record with its error, and the exit status is 3. "
       "Several processes or machines share the work by --shard; palpate merge joins the results");
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<BatchArguments>();
   command
       ->add_option("INPUT", options->inputs,
                    "Manifests (*.csv with the columns path, frames and label, of which path alone "

@@ -18,7 +18,7 @@ namespace palpate::cli {
 
 namespace {
 
-struct Options {
+struct MergeArguments {
   std::string results;
   std::string output = "-";
   bool partial = false;
@@ -45,7 +45,7 @@ std::string missing_unknowns(const std::vector<std::size_t>& there, const BatchT
 }
 
 /// Refuses to write over what is merged, or beside the chunks, where evaluate would read it too.
-void require_distinct(const Options& options, const ResultsFolder& folder,
+void require_distinct(const MergeArguments& options, const ResultsFolder& folder,
                       const std::vector<std::size_t>& there) {
   CommandFiles files;
   files.reads("RESULTS", folder.task());
@@ -60,7 +60,7 @@ void require_distinct(const Options& options, const ResultsFolder& folder,
   }
 }
 
-void merge(const Options& options) {
+void merge(const MergeArguments& options) {
   const ResultsFolder folder(options.results);
   if (!folder.has_task()) {
     refuse(folder.path(), "is no folder of results; give the one that palpate batch -o names");
@@ -112,7 +112,7 @@ void add_merge(CLI::App& app) {
       app.add_subcommand("merge",
                          "Join the results of palpate batch: one record a line (NDJSON), in the "
                          "order of the inputs. Says what is missing");
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<MergeArguments>();
   command->add_option("RESULTS", options->results, "Folder of results of palpate batch")
       ->required();
   command->add_option("-o,--output", options->output,

@@ -23,7 +23,7 @@ constexpr double soon = 1e-2;
 constexpr double closely_drawn_bins = 1e6;
 /// Bounds of "none of these" need not be so close that identities move by less.
 constexpr double least_identity_change = 1e-6;
-constexpr double infinity = std::numeric_limits<double>::infinity();
+constexpr double unbounded = std::numeric_limits<double>::infinity();
 
 }  // namespace
 
@@ -256,7 +256,7 @@ double BoundedBelief::allowed_none_width(const LogInterval& none) const {
   const double low = probability(none.low);
   const double high = probability(none.high);
   if (high - low <= allowed) {
-    return infinity;
+    return unbounded;
   }
   // The probability changes by at most so much a nat.
   const double p = std::clamp(0.5, low, high);
@@ -264,8 +264,8 @@ double BoundedBelief::allowed_none_width(const LogInterval& none) const {
 }
 
 LogInterval BoundedBelief::bound_none(const Deadline& deadline) {
-  double width = goal().evidence_nats.value_or(infinity);
-  for (LogInterval last{-infinity, infinity};;) {
+  double width = goal().evidence_nats.value_or(unbounded);
+  for (LogInterval last{-unbounded, unbounded};;) {
     const LogInterval bounds = arena_.execute([&] { return none_->bounds(width, deadline); });
     const LogInterval weighted{none_log_weight_ + bounds.low, none_log_weight_ + bounds.high};
     width = std::min(width, allowed_none_width(weighted));
@@ -278,7 +278,7 @@ LogInterval BoundedBelief::bound_none(const Deadline& deadline) {
 }
 
 LogInterval BoundedBelief::none_log_evidence() const {
-  return found_ && found_->none ? *found_->none : LogInterval{-infinity, -infinity};
+  return found_ && found_->none ? *found_->none : LogInterval{-unbounded, -unbounded};
 }
 
 }  // namespace palpate

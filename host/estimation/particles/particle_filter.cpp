@@ -32,9 +32,6 @@ namespace {
 
 using gpu::Access;
 
-double half(const Axis& axis) { return (axis.upper - axis.lower) / 2.0; }
-double centre(const Axis& axis) { return axis.lower + half(axis); }
-
 }  // namespace
 
 struct ParticleFilter::Impl {

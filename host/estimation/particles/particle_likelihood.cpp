@@ -84,8 +84,6 @@ std::vector<std::uint32_t> constants_of(const gpu::Limits& limits, const Contact
   return constants;
 }
 
-double centre(const Axis& axis) { return axis.lower + (axis.upper - axis.lower) / 2.0; }
-
 }  // namespace
 
 ParticleLikelihood::ParticleLikelihood(gpu::Context& context, gpu::CommandStream& stream,

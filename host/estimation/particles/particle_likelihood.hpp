@@ -12,6 +12,10 @@
 
 namespace palpate {
 
+/// Half the width and the middle of a range.
+inline double half(const Axis& axis) { return (axis.upper - axis.lower) / 2.0; }
+inline double centre(const Axis& axis) { return axis.lower + half(axis); }
+
 /// The log-likelihood of a touch (Eq. 7) at particles that each have an object and a pose of their
 /// own. All maps stand in one buffer, so that one dispatch weighs all particles.
 class ParticleLikelihood {

@@ -11,8 +11,7 @@
 #include "receiver.hpp"
 #include "sent_frame.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::board_protocol_test {
 
 TEST(Wts, DropsAPacketWithAWrongChecksumAndCountsIt) {
   std::mt19937 random(3);
@@ -328,5 +327,4 @@ TEST(OwnBoard, OfTheDocumentsWorksAsPrinted) {
   EXPECT_DOUBLE_EQ(receiver.frames()[0].values[12], 12.0);  // 20 * 12 = 240 fits a byte
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::board_protocol_test

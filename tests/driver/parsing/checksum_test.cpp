@@ -7,8 +7,7 @@
 #include <string_view>
 #include <vector>
 
-namespace palpate {
-namespace {
+namespace palpate::checksum_test {
 
 using Kind = Checksum::Kind;
 
@@ -111,5 +110,4 @@ TEST(Checksum, OfNothingIsItsBeginning) {
   EXPECT_EQ(of({.kind = Kind::sum, .bytes = 1}, ""), 0u);
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::checksum_test

@@ -9,8 +9,7 @@
 #include "driver/without_memory.hpp"
 #include "receiver.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::deframer_work_test {
 
 constexpr const char* largest = R"(
 name: largest
@@ -89,5 +88,4 @@ TEST(EndlessGarbage, NeedsNoMoreMemoryThanItsFirstBytes) {
   EXPECT_EQ(deframer->counters().garbage_bytes, pieces * piece.size());
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::deframer_work_test

@@ -12,8 +12,7 @@
 #include "palpate/error.hpp"
 #include "sent_frame.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::mutated_stream_test {
 
 /// Damages bytes in one of the ways in which a line or a board may damage them.
 void mutate(Bytes& bytes, std::mt19937& random) {
@@ -241,5 +240,4 @@ TEST(MutatedProfile, IsReadOrRefusedInOneLine) {
   EXPECT_GT(read, 500) << "too few get as far as a deframer";
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::mutated_stream_test

@@ -8,8 +8,7 @@
 #include "receiver.hpp"
 #include "sent_frame.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::packet_deframer_test {
 
 class ShippedBoard : public testing::TestWithParam<const char*> {
  protected:
@@ -140,5 +139,4 @@ TEST_P(ShippedBoard, ForgetsItsPartOfAFrameAtReset) {
 INSTANTIATE_TEST_SUITE_P(All, ShippedBoard, testing::Values("tsf85", "wts", "flexitac", "anyskin"),
                          [](const auto& board) { return std::string(board.param); });
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::packet_deframer_test

@@ -5,8 +5,7 @@
 #include "io/host_locale.hpp"
 #include "io/scratch_folder.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::serial_profile_test {
 
 TEST(ShippedProfiles, AreFoundByName) {
   EXPECT_EQ(shipped_profiles(), (std::vector<std::string>{"anyskin", "flexitac", "tsf85", "wts"}));
@@ -216,5 +215,4 @@ TEST_F(ProfileFile, WholeNumbersAreDecimalOrHexadecimal) {
   expect_refused(with("line: {baud: 0x}"), {"baud", "0x", "whole number"});
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::serial_profile_test

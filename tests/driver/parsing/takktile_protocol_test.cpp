@@ -6,8 +6,7 @@
 
 #include "palpate/error.hpp"
 
-namespace palpate::takktile {
-namespace {
+namespace palpate::takktile::takktile_protocol_test {
 
 using Bytes = std::vector<std::uint8_t>;
 
@@ -200,5 +199,4 @@ TEST_P(TakkTileFrames, DoNotComeOfEmptyPackets) {
 // Numbers of cells: one; just below, at and above the 16 of a packet; two packets; a whole board.
 INSTANTIATE_TEST_SUITE_P(Cells, TakkTileFrames, testing::Values(1, 15, 16, 17, 32, 40));
 
-}  // namespace
-}  // namespace palpate::takktile
+}  // namespace palpate::takktile::takktile_protocol_test

@@ -9,8 +9,7 @@
 
 #include "synthetic.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::array_overlap_test {
 
 /// Expects every bin to be counted where the reference says that rectangles meet there.
 /// @returns the number of such bins
@@ -127,5 +126,4 @@ TEST(ArrayOverlap, OfAnArrayBeyondAllMeasureIsEverywhere) {
   }
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::array_overlap_test

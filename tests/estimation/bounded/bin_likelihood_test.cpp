@@ -15,8 +15,7 @@
 #include "palpate/error.hpp"
 #include "synthetic.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::bin_likelihood_test {
 
 BinLikelihood likelihood_of(const BinCase& of) {
   const Hypothesis hypothesis{of.map, 1.0};
@@ -373,5 +372,4 @@ TEST(BinLikelihood, CountsTheMemoryOfItsNodes) {
   EXPECT_GE(likelihood_of(of).bytes(), std::uint64_t{39 * 35 * 4 * sizeof(float)});
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::bin_likelihood_test

@@ -16,8 +16,7 @@
 #include "palpate/pose_histogram.hpp"
 #include "touched_shape.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::bounded_belief_test {
 
 TEST(BoundedBelief, HasTheEntropyOfTheDenseOne) {
   Device device = Device::open();
@@ -278,5 +277,4 @@ TEST(BoundedBelief, SaysHowItWasFound) {
   EXPECT_EQ(posterior.lattice().bins(), small_options().lattice.bins());
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::bounded_belief_test

@@ -14,8 +14,7 @@
 #include "bounded_set_up.hpp"
 #include "palpate/bounded_posterior.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::bounded_laws_test {
 
 TEST(BoundedPosterior, DoesNotDependOnTheOrderOfTouchesNorOnWhenOneAsked) {
   for (const bool none : {false, true}) {
@@ -250,5 +249,4 @@ TEST(BoundedPosterior, RefusesWhatItCannotDo) {
   expect_refused([&] { posterior.refine({.object = 0, .bin = 1'000'000}); }, "bin");
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::bounded_laws_test

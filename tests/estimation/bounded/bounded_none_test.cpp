@@ -9,8 +9,7 @@
 #include "palpate/bounded_posterior.hpp"
 #include "palpate/pose_histogram.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::bounded_none_test {
 
 TEST(BoundedPosterior, KnowsNoneOfThese) {
   Device device = Device::open();
@@ -144,5 +143,4 @@ TEST(BoundedPosterior, LeavesObjectsWhereNoneTakesAllOfTheMass) {
   }
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::bounded_none_test

@@ -12,8 +12,7 @@
 #include "bounded_set_up.hpp"
 #include "palpate/pose_histogram.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::bounded_posterior_test {
 
 TEST(BoundedPosterior, AgreesWithTheDenseHistogram) {
   Device device = Device::open();
@@ -184,5 +183,4 @@ TEST(BoundedPosterior, IsContradictedWhereTheDenseOneIs) {
   }
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::bounded_posterior_test

@@ -4,8 +4,7 @@
 
 #include "bounded/certificate_trials.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::certificate_law_slow_test {
 
 // The float64 posterior of all bins is what takes long, ten times as long under sanitizers.
 #ifdef __SANITIZE_ADDRESS__
@@ -24,5 +23,4 @@ TEST(CertificateLaw, HoldsOverUnknownsOfSixtyThousandBins) {
   expect_trials({45, 44, 30}, 10 / fewer, 922);
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::certificate_law_slow_test

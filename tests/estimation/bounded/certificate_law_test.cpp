@@ -8,8 +8,7 @@
 
 #include "bounded/certificate_trials.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::certificate_law_test {
 
 TEST(CertificateLaw, HoldsOverFiftyUnknownsOfAHundredBins) { expect_trials({7, 5, 3}, 50, 901); }
 TEST(CertificateLaw, HoldsOverFiftyUnknownsOfBinsCellsApart) {
@@ -132,5 +131,4 @@ TEST(CertificateLaw, KeepsEveryTolerance) {
   }
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::certificate_law_test

@@ -12,8 +12,7 @@
 #include "palpate/bounded_posterior.hpp"
 #include "synthetic.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::evaluated_bins_test {
 
 struct Kept {
   BinBox box;
@@ -132,5 +131,4 @@ TEST(EvaluatedBins, BeyondTheirMemoryAreSearchedForAgain) {
   EXPECT_LE(largest_difference(drawn, theta), 5.0 * std::sqrt(1.0 / 48.0 / 20'000.0));
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::evaluated_bins_test

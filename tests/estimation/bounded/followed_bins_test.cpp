@@ -7,8 +7,7 @@
 
 #include "synthetic.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::followed_bins_test {
 
 TEST(FollowedBins, BoundWhatLiesOutsideThroughFurtherTouches) {
   const std::vector<Hypothesis> two{{random_map(9, 9, 0.5, 3.0, 841), 1.0},
@@ -36,5 +35,4 @@ TEST(FollowedBins, BoundWhatLiesOutsideThroughFurtherTouches) {
               1e-12);
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::followed_bins_test

@@ -11,8 +11,7 @@
 #include "estimation/bounded/leaves/bin_likelihood.hpp"
 #include "every_set_of_instructions.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::instruction_sets_test {
 
 /// All that a posterior tells after each of some touches, the counts of its search included.
 std::vector<std::vector<double>> told_after_each(const Trial& trial) {
@@ -63,5 +62,4 @@ TEST(InstructionSets, GiveThePosteriorTheSameBitsWithNoneOfThese) {
   expect_same_bits(trial);
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::instruction_sets_test

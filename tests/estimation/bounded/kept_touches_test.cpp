@@ -9,8 +9,7 @@
 #include "palpate/error.hpp"
 #include "synthetic.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::kept_touches_test {
 
 const glm::dvec2 pivot_mm{3.0, -2.0};
 
@@ -62,5 +61,4 @@ TEST(KeptTouches, KeepsNoneWhereOneIsNotSound) {
   expect_equal(kept.all(), {sound});
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::kept_touches_test

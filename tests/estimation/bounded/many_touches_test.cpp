@@ -5,8 +5,7 @@
 #include "bounded/certified.hpp"
 #include "touched_shape.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::many_touches_test {
 
 TEST(ManyTouches, AreAnsweredByFewBins) {
   const std::vector<Hypothesis> shapes{{map_of(on_letter_l, "L"), 1.0},
@@ -35,5 +34,4 @@ TEST(ManyTouches, AreAnsweredByFewBins) {
   }
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::many_touches_test

@@ -8,8 +8,7 @@
 
 #include <gtest/gtest.h>
 
-namespace palpate {
-namespace {
+namespace palpate::marginal_sums_test {
 
 constexpr PoseLattice bins{.x_mm = {-10.0, 10.0, 23},
                            .y_mm = {-7.0, 11.0, 17},
@@ -79,5 +78,4 @@ TEST(MarginalSums, OfOneLikelihoodTakeTheTimeOfTheGrid) {
   EXPECT_NEAR(marginals.theta[0], 1.0, 1e-12);
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::marginal_sums_test

@@ -1,15 +1,13 @@
 #include "estimation/bounded/search/mass_account.hpp"
+#include "limits.hpp"
 
 #include <array>
 #include <cmath>
-#include <limits>
 
 #include <gtest/gtest.h>
 
-namespace palpate {
-namespace {
+namespace palpate::mass_account_test {
 
-constexpr double infinity = std::numeric_limits<double>::infinity();
 const std::array<double, 2> log_weight{std::log(0.25), std::log(0.75)};
 const std::array<std::size_t, 2> label_of{0, 1};
 
@@ -76,5 +74,4 @@ TEST(MassAccount, TheModeIsCertainWhereNoDroppedBinMayBeat) {
   }
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::mass_account_test

@@ -12,12 +12,11 @@
 
 #include "bins_by_definition.hpp"
 #include "estimation/hypotheses.hpp"
+#include "limits.hpp"
 #include "synthetic.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::none_evidence_test {
 
-constexpr double infinity = std::numeric_limits<double>::infinity();
 /// Rounding of the definition's float64 sums over some 100,000 bins of some hundred nats.
 constexpr double rounding = 1e-9;
 /// Width of a touch's first bounds in nats: a tolerance of 0.01, with the rounding of float32.
@@ -225,5 +224,4 @@ TEST(NoneEvidence, HoldsItsDefinitionWhereverADeadlineEndsIt) {
   expect_holds(none.bounds(1e-6), none.expected(touches), 1e-6);
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::none_evidence_test

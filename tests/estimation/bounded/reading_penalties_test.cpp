@@ -2,20 +2,17 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <vector>
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include "bins_by_definition.hpp"
+#include "limits.hpp"
 #include "model/interpolated_map.hpp"
 #include "synthetic.hpp"
 
-namespace palpate {
-namespace {
-
-constexpr double infinity = std::numeric_limits<double>::infinity();
+namespace palpate::reading_penalties_test {
 
 /// A square of a map: a rectangle.
 struct Square {
@@ -207,5 +204,4 @@ TEST(ReadingPenalties, OfAMapOfThePriorAreNone) {
   EXPECT_EQ(std::count(penalties.least.begin(), penalties.least.end(), 0), 14 * 14);
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::reading_penalties_test

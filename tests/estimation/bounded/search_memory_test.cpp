@@ -10,8 +10,7 @@
 #include "bounded_set_up.hpp"
 #include "palpate/error.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::search_memory_test {
 
 using testing::AllOf;
 using testing::HasSubstr;
@@ -126,5 +125,4 @@ TEST(SearchMemory, AbsurdLatticesAreRefusedBeforeAnyIsTaken) {
   EXPECT_EQ(refusal(square(10.0, 100, 100), 2), "");
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::search_memory_test

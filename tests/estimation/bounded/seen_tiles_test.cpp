@@ -15,8 +15,7 @@
 #include "estimation/bounded/search/bound_search.hpp"
 #include "estimation/bounded/tables/reading_penalties.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::seen_window_test {
 
 /// Log-likelihood of the elements where all see the prior.
 double prior_log_likelihood(const BinCase& of, std::size_t object) {
@@ -267,5 +266,4 @@ TEST(BoundSearch, SettlesBinsOnTheTilesCornersOnce) {
   }
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::seen_window_test

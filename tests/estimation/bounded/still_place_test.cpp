@@ -12,8 +12,7 @@
 #include "bounded/certified.hpp"
 #include "synthetic.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::resting_array_test {
 
 using Seen = StillPlace::Seen;
 
@@ -194,5 +193,4 @@ TEST(BoundedPosterior, IsCertifiedForEveryFrameOfAStillArray) {
   }
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::resting_array_test

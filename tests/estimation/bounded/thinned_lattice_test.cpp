@@ -9,8 +9,7 @@
 #include "synthetic.hpp"
 #include "touched_shape.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::thinned_lattice_test {
 
 constexpr double rounding_mm = 1e-9;
 
@@ -90,5 +89,4 @@ TEST(ThinnedLattice, RefinedPosesLieInTheRegion) {
   }
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::thinned_lattice_test

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <numeric>
 #include <vector>
 
@@ -14,11 +13,9 @@
 #include "bound_cases.hpp"
 #include "estimation/bounded/leaves/bin_likelihood.hpp"
 #include "estimation/bounded/tables/reading_penalties.hpp"
+#include "limits.hpp"
 
-namespace palpate {
-namespace {
-
-constexpr double infinity = std::numeric_limits<double>::infinity();
+namespace palpate::tile_bounds_test {
 
 /// What checking the tiles of cases found.
 struct Checked {
@@ -280,5 +277,4 @@ TEST(TileLevels, AreSoLargeThatTheLargestTilesFitMemory) {
   }
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::tile_bounds_test

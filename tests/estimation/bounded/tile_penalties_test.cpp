@@ -11,8 +11,7 @@
 #include "random_penalties.hpp"
 #include "synthetic.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::tile_penalties_test {
 
 /// Elements over squares of a table, the batches of tiles and the sums before them.
 struct BatchCase {
@@ -175,5 +174,4 @@ TEST(TilePenalties, OfVeryManyElementsAreTheirSum) {
   expect_sums(random_batch(300000, 1, 4000, 98));
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::tile_penalties_test

@@ -2,18 +2,16 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <vector>
 
 #include <gtest/gtest.h>
 
 #include "estimation/bounded/log_sum.hpp"
+#include "limits.hpp"
 #include "synthetic.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::unsettled_mass_test {
 
-constexpr double infinity = std::numeric_limits<double>::infinity();
 constexpr double slot_nats = 1.0 / 16.0;
 /// Rounding of sums of logs of some hundred nats.
 constexpr double rounding = 1e-9;
@@ -235,5 +233,4 @@ TEST(LogSum, AddsAndSubtractsLogs) {
   EXPECT_EQ(log_subtract(-infinity, -infinity), -infinity);
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::unsettled_mass_test

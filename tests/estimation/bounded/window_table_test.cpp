@@ -8,8 +8,7 @@
 
 #include "random_penalties.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::window_table_test {
 
 TEST(WindowTable, HoldsTheLeastPenaltyOfEveryWindow) {
   for (const glm::ivec2 squares : {glm::ivec2(2, 2), {7, 5}, {16, 9}, {33, 1}}) {
@@ -102,5 +101,4 @@ TEST(WindowTable, EndsInBatchesThatSeeOnlyThePrior) {
   }
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::window_table_test

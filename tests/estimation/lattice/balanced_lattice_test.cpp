@@ -12,8 +12,7 @@
 #include "palpate/touch.hpp"
 #include "synthetic.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::balanced_lattice_test {
 
 /// A letter as it is, on cells of 0.5 mm.
 Hypothesis letter(const char* name) {
@@ -260,5 +259,4 @@ TEST(TouchRegion, RefusesAnArrayThatCannotBe) {
   }
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::balanced_lattice_test

@@ -8,8 +8,7 @@
 #include "palpate/pose_histogram.hpp"
 #include "synthetic.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::dense_belief_test {
 
 /// 1,560 bins in a plane, 7 planes.
 HistogramOptions options() {
@@ -164,5 +163,4 @@ TEST(DenseBelief, MoreBinsThanMemoryIsRefusedBeforeAnyIsTaken) {
   expect_refused();
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::dense_belief_test

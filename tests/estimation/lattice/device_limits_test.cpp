@@ -11,8 +11,7 @@
 #include "shaders/interface.h"
 #include "synthetic.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::device_limits_test {
 
 std::vector<Hypothesis> two_objects() {
   return {{random_map(31, 27, 0.5, 12.0, 141), 1.0}, {random_map(23, 29, 0.5, 12.0, 142), 2.0}};
@@ -196,5 +195,4 @@ TEST(LargeMap, ThatNoBufferHoldsIsRefusedByItsLabel) {
   }
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::device_limits_test

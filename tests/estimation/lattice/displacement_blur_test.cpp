@@ -11,8 +11,7 @@
 #include "palpate/pose_histogram.hpp"
 #include "synthetic.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::displacement_blur_test {
 
 constexpr int nx = 17;
 constexpr int ny = 9;
@@ -113,5 +112,4 @@ TEST(DisplacementBlur, ReachesFarAlongFineBins) {
   }
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::displacement_blur_test

@@ -12,8 +12,7 @@
 #include "palpate/pose_histogram.hpp"
 #include "synthetic.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::expected_gain_test {
 
 // Few enough elements that all 64 readings can be listed.
 const std::vector<glm::dvec2> elements{{-2.0, -1.0}, {0.0, -1.2}, {2.1, -1.0},
@@ -314,5 +313,4 @@ TEST(ExpectedGain, RefusesWhatItCannotRank) {
   EXPECT_THROW(histogram.expected_gain(one, elements, {.label_of = {0, 1}}), Error);
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::expected_gain_test

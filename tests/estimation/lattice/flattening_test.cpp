@@ -5,8 +5,7 @@
 
 #include <gtest/gtest.h>
 
-namespace palpate {
-namespace {
+namespace palpate::flattening_test {
 
 constexpr double least = 8.0;
 
@@ -52,5 +51,4 @@ TEST(FlatteningRoot, OfOneBinOrOneThatHasItAllIsFinite) {
   EXPECT_TRUE(std::isfinite(flattening_root(certain, least)));
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::flattening_test

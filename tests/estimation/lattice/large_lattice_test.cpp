@@ -7,8 +7,7 @@
 #include "palpate/pose_histogram.hpp"
 #include "synthetic.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::large_lattice_test {
 
 TEST(LargeLattice, FiveMillionBinsAreAsGoodAsTenThousand) {
   std::vector<Hypothesis> objects;
@@ -61,5 +60,4 @@ TEST(LargeLattice, FiveMillionBinsAreAsGoodAsTenThousand) {
   EXPECT_EQ(estimate.mode.log_likelihood, best);
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::large_lattice_test

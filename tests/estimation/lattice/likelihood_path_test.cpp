@@ -9,8 +9,7 @@
 #include "palpate/pose_histogram.hpp"
 #include "synthetic.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::likelihood_path_test {
 
 constexpr double cell_mm = 0.5;
 
@@ -135,5 +134,4 @@ TEST(LikelihoodPaths, AgreeAtTheMapsEdgeAndBeyond) {
   }
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::likelihood_path_test

@@ -11,8 +11,7 @@
 #include "palpate/pose_histogram.hpp"
 #include "synthetic.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::memory_limit_test {
 
 constexpr std::uint64_t mib = 1 << 20;
 
@@ -193,5 +192,4 @@ TEST(Histogram, GivesTheSameBitsHoweverTouchesAreGrouped) {
   }
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::memory_limit_test

@@ -9,8 +9,7 @@
 
 #include "touch_by_touch_data.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::none_evidence_test {
 
 using NoneEvidence = TouchByTouch;
 
@@ -106,5 +105,4 @@ TEST_F(NoneEvidence, TakesAllBinsWhereTheArrayMeetsNoObject) {
   EXPECT_NEAR(histogram.estimate().none, 0.5, 1e-6);
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::none_evidence_test

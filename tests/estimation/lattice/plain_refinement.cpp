@@ -3,15 +3,13 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numbers>
 
 #include "reference/reference.hpp"
+#include "synthetic.hpp"
 
 namespace palpate {
 
 namespace {
-
-constexpr double two_pi = 2.0 * std::numbers::pi;
 
 bool is_circle(const Axis& theta_rad) {
   return std::abs(theta_rad.upper - theta_rad.lower - two_pi) < 1e-9;

@@ -10,8 +10,7 @@
 #include "palpate/pose.hpp"
 #include "synthetic.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::pose_histogram_test {
 
 HistogramOptions small_options() {
   HistogramOptions options;
@@ -364,5 +363,4 @@ TEST(PoseHistogram, MovesWithItsBelief) {
   EXPECT_EQ(all_bins(second, 3), all_bins(whole, 3));
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::pose_histogram_test

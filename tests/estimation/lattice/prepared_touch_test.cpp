@@ -7,8 +7,7 @@
 #include "palpate/pose_histogram.hpp"
 #include "synthetic.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::prepared_touch_test {
 
 const std::vector<Hypothesis>& objects() {
   static const std::vector<Hypothesis> two{{random_map(31, 27, 0.5, 12.0, 162), 1.0},
@@ -127,5 +126,4 @@ TEST_F(PreparedTouch, StaysWithinTheMemoryLimit) {
   }
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::prepared_touch_test

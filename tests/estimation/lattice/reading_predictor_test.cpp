@@ -8,8 +8,7 @@
 #include "model/predicted_readings.hpp"
 #include "synthetic.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::reading_predictor_test {
 
 /// Largest difference in nats from the normalised log-likelihoods, over random poses.
 double largest_error(std::span<const Hypothesis> objects, const ContactModel& contact) {
@@ -71,5 +70,4 @@ TEST(ReadingPredictor, KnowsTheLevelsOfATableAndItsObjects) {
   EXPECT_LT(largest_error(objects, {.prior = 0.2, .table = table}), 2e-3);
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::reading_predictor_test

@@ -14,8 +14,7 @@
 #include "palpate/pose.hpp"
 #include "synthetic.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::refined_truth_test {
 
 constexpr double spin_mm = 8.0;  // a radian moves the object by so much
 
@@ -123,5 +122,4 @@ TEST(RefinedPose, OfAFullCircleLiesOnItWhereverItBegins) {
   }
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::refined_truth_test

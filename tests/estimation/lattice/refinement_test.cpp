@@ -17,8 +17,7 @@
 #include "plain_refinement.hpp"
 #include "synthetic.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::refinement_test {
 
 /// `lever_mm` is how far from the robot's origin, where a turn shows, the poses are compared.
 void expect_near(const RefinedPose& a, const RefinedPose& b, double lever_mm = 0.0) {
@@ -347,5 +346,4 @@ TEST(RefinedPose, OfAMapWithoutAnOccupiedCellIsFinite) {
   EXPECT_GE(refined.covariance[0], 0.8 * 0.8 / 12.0);
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::refinement_test

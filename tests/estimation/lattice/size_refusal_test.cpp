@@ -14,8 +14,7 @@
 #include "palpate/pose_histogram.hpp"
 #include "synthetic.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::size_refusal_test {
 
 /// A device with less than it has.
 struct Less {
@@ -151,5 +150,4 @@ INSTANTIATE_TEST_SUITE_P(Devices, Sizes, testing::ValuesIn(devices), [](const au
   return name;
 });
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::size_refusal_test

@@ -5,8 +5,7 @@
 #include "palpate/pose_histogram.hpp"
 #include "synthetic.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::still_array_test {
 
 /// Presses of one array that stays where it is: readings differ, poses and elements do not.
 Recording presses(std::size_t count, std::size_t elements) {
@@ -117,5 +116,4 @@ TEST(StillArray, ThatMovesAfterAllIsEvaluatedAnew) {
             4e-4 * 4);
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::still_array_test

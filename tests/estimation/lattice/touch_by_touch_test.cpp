@@ -8,8 +8,7 @@
 #include "palpate/error.hpp"
 #include "touch_by_touch_data.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::touch_by_touch_test {
 
 struct Case {
   const char* name;
@@ -239,5 +238,4 @@ TEST_F(TouchByTouch, RefusesWhatALatticeDoesNotTake) {
   refuse({.mm = 30.0});
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::touch_by_touch_test

@@ -8,8 +8,7 @@
 #include "palpate/error.hpp"
 #include "synthetic.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::map_builder_test {
 
 // What the method allows a map with a finite support to differ from the uncut sum, in nats.
 constexpr double map_tolerance = 1e-3;
@@ -252,5 +251,4 @@ TEST(MapBuilder, TouchesWithoutAKnownElementMakeNoMap) {
   }
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::map_builder_test

@@ -4,8 +4,7 @@
 
 #include <gtest/gtest.h>
 
-namespace palpate {
-namespace {
+namespace palpate::likelihood_averages_test {
 
 TEST(LikelihoodAverages, InjectWhereTheFastFallsBelowTheSlow) {
   LikelihoodAverages averages(0.1, 0.5);
@@ -33,5 +32,4 @@ TEST(LikelihoodAverages, StandAThousandElementsAndATouchOfNoLikelihood) {
   EXPECT_EQ(none.injected(), 0.0) << "0 / 0";
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::likelihood_averages_test

@@ -7,8 +7,7 @@
 #include "palpate/particle_filter.hpp"
 #include "synthetic.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::particle_drawing_test {
 
 /// How often every particle was drawn, and what the law expects: without motion a particle keeps
 /// its ancestor's pose.
@@ -103,5 +102,4 @@ TEST(ParticleDrawing, EveryTouchDrawsAnew) {
   EXPECT_NE(one.copies, other.copies);
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::particle_drawing_test

@@ -3,19 +3,18 @@
 #include <array>
 #include <cmath>
 #include <functional>
-#include <limits>
 #include <numbers>
 #include <string>
 
 #include <gtest/gtest.h>
 #include <glm/vec3.hpp>
 
+#include "limits.hpp"
 #include "palpate/error.hpp"
 #include "synthetic.hpp"
 #include "weighed_particles.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::particle_filter_test {
 
 Recording says_nothing() {
   Recording recording = random_recording(1, 36, 431);
@@ -203,7 +202,6 @@ TEST(ParticleFilter, MemoryCountsWhatAnEstimateTakes) {
 }
 
 TEST(ParticleFilter, OptionsOutOfRangeAreRefused) {
-  constexpr double nan = std::numeric_limits<double>::quiet_NaN();
   Device device = Device::open();
   const auto refuse = [&](const std::function<void(ParticleOptions&)>& change,
                           const std::string& says) {
@@ -235,5 +233,4 @@ TEST(ParticleFilter, OptionsOutOfRangeAreRefused) {
   refuse([](ParticleOptions& o) { o.region.x_mm = {1.0, -1.0, 1}; }, "x_mm = ");
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::particle_filter_test

@@ -9,8 +9,7 @@
 #include "synthetic.hpp"
 #include "touched_shape.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::particle_tracking_test {
 
 std::vector<Hypothesis> letter_and_disc() {
   return {{map_of(on_letter_l, "L"), 1.0}, {map_of(on_disc, "disc"), 1.0}};
@@ -97,5 +96,4 @@ TEST(ParticleTracking, RandomParticlesFindAnObjectThatWasTakenElsewhere) {
   }
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::particle_tracking_test

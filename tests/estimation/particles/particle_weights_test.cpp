@@ -7,8 +7,7 @@
 #include "synthetic.hpp"
 #include "weighed_particles.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::particle_weights_test {
 
 TEST(ParticleWeights, WeighsAsTheReferenceDoesAtTheParticlesOwnPoses) {
   const std::vector<Hypothesis> objects = three_objects();
@@ -156,5 +155,4 @@ TEST(ParticleWeights, WeightsSumToOneHoweverUnlikelyTheTouch) {
   }
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::particle_weights_test

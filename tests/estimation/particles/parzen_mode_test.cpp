@@ -9,8 +9,7 @@
 #include "palpate/pose.hpp"
 #include "synthetic.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::parzen_mode_test {
 
 struct Cloud {
   std::vector<shaders::Particle> particles;
@@ -120,5 +119,4 @@ TEST(ParzenMode, OfManyParticlesInOnePlaceIsTheirWeight) {
   EXPECT_NEAR(maximum.density, 1.0, 1e-9) << "float64 rounding";
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::parzen_mode_test

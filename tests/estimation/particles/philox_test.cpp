@@ -8,8 +8,7 @@
 #include "philox_words.hpp"
 #include "synthetic.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::philox_test {
 
 using Words = std::array<std::uint32_t, 4>;
 
@@ -64,5 +63,4 @@ TEST(Philox, IsTheSameOnTheDeviceAndTheHost) {
   EXPECT_EQ(on_device(inputs), expected);
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::philox_test

@@ -6,8 +6,7 @@
 
 #include "synthetic.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::weight_blocks_test {
 
 /// Blocks whose largest weights differ by orders.
 std::vector<shaders::WeightBlock> random_blocks(std::size_t count, std::uint64_t seed) {
@@ -108,5 +107,4 @@ TEST(WeightBlocks, OfNoWeightAreNeverDrawnFrom) {
   EXPECT_FLOAT_EQ(systematic.back().last, 1024.0F * (1.0F - 0.5F / 5120.0F));
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::weight_blocks_test
