@@ -133,7 +133,7 @@ void mark_unknown(const std::string& path, Recording& recording) {
   for (std::size_t i = 0; i < e; ++i) {
     read[i] = recording.valid.empty() ? read[i] : read[i] & recording.valid[i];
   }
-  if (std::ranges::count(read, 0) == static_cast<std::ptrdiff_t>(e)) {
+  if (e == 0 || std::ranges::count(read, 0) == static_cast<std::ptrdiff_t>(e)) {
     refuse(path, "holds no reading of a living element; write the pressures");
   }
   for (std::size_t k = 0; k < recording.pressure.size(); ++k) {
@@ -342,8 +342,11 @@ ImportedRecording import_tables(const ImportOptions& options) {
   const TableOptions columns = table_options(options);
   check_numbers(options);
   auto truth = options.truth.empty() ? std::nullopt : std::optional(truth_of(options.truth));
-  Array array = options.elements_mm.empty() ? array_of(options.array)
-                                            : Array{{.elements_mm = options.elements_mm}};
+  Array array =
+      options.elements_mm ? Array{{.elements_mm = *options.elements_mm}} : array_of(options.array);
+  if (array.elements_mm.empty()) {
+    refuse("array", "has no element; give centres [e, 2] in mm, e at least 1");
+  }
   if (!options.time_column.empty() && !has_column(options.pressures, options.time_column) &&
       !has_column(options.poses, options.time_column)) {
     refuse(fmt::format("--time-column {}", options.time_column),

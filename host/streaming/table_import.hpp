@@ -17,8 +17,9 @@ namespace palpate {
 struct ImportOptions {
   std::string pressures;
   std::string poses;
-  std::string array;                    ///< COLUMNS:ROWS:PITCH, or a file
-  std::vector<glm::dvec2> elements_mm;  ///< [e] of a program, in the place of `array`
+  std::string array;  ///< COLUMNS:ROWS:PITCH, or a file
+  /// [e] of a program, in the place of `array`
+  std::optional<std::vector<glm::dvec2>> elements_mm;
   std::string pressure_unit = "kPa";
   std::string pose_unit;
   std::string time_unit;

@@ -85,7 +85,7 @@ std::string layer_word(MapLayer layer) {
   return layer == MapLayer::mean_level ? "mean_level" : "log_odds";
 }
 
-void bind_sensor(nb::module_& module) {
+void bind_learned_sensor(nb::module_& module) {
   nb::class_<LearnedSensor>(module, "LearnedSensor",
                             "What calibrate() learned about a sensor and the objects that it "
                             "touched.")
@@ -141,7 +141,7 @@ void bind_sensor(nb::module_& module) {
 }  // namespace
 
 void bind_calibration(nb::module_& module) {
-  bind_sensor(module);
+  bind_learned_sensor(module);
   nb::class_<GroupScores>(module, "GroupScores",
                           "The cross-validation of several touches of one object at a time.")
       .def_ro("touches", &GroupScores::touches, "Touches of a group.")

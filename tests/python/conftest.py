@@ -2,6 +2,7 @@ import json
 import os
 import pathlib
 import subprocess
+from collections.abc import Callable
 from typing import Any
 
 import pytest
@@ -47,6 +48,22 @@ def command(*arguments: object) -> str:
     if run.returncode != 0:
         raise RuntimeError(run.stderr.removeprefix("palpate: ").rstrip("\n"))
     return run.stdout
+
+
+def refusal(*arguments: object) -> str:
+    """What the command says of input that it refuses."""
+    run = subprocess.run(
+        [os.environ["PALPATE_COMMAND"], *map(str, arguments)], capture_output=True, text=True
+    )
+    assert run.returncode == 2, run.stderr
+    return run.stderr.removeprefix("palpate: ").rstrip("\n")
+
+
+def expect_refused(call: Callable[[], object], *arguments: object) -> None:
+    with pytest.raises(palpate.Error) as refused:
+        call()
+    assert str(refused.value) == refusal(*arguments)
+    assert refused.value.fault == "input"
 
 
 class Files:

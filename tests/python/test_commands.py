@@ -2,120 +2,17 @@
 
 import json
 import math
-import os
 import pathlib
 import re
-import subprocess
-import warnings
-from collections.abc import Callable
 from typing import Any
 
 import numpy
 import pytest
-from conftest import Files, command
+from conftest import Files, command, expect_refused
 
 import palpate
 
 SMALL = ["--bins", "10x10x8"]
-
-
-def refusal(*arguments: object) -> str:
-    """What the command says of input that it refuses."""
-    run = subprocess.run(
-        [os.environ["PALPATE_COMMAND"], *map(str, arguments)], capture_output=True, text=True
-    )
-    assert run.returncode == 2, run.stderr
-    return run.stderr.removeprefix("palpate: ").rstrip("\n")
-
-
-def expect_refused(call: Callable[[], object], *arguments: object) -> None:
-    with pytest.raises(palpate.Error) as refused:
-        call()
-    assert str(refused.value) == refusal(*arguments)
-    assert refused.value.fault == "input"
-
-
-# Tables
-
-
-@pytest.fixture
-def tables(tmp_path: pathlib.Path) -> pathlib.Path:
-    """Pressures of 2 x 2 elements and poses, each by time; an array of pressures; elements."""
-    (tmp_path / "pressures.csv").write_text("time_ms,a,b,c,d\n0,1,2,3,4\n50,5,,7,8\n1900,9,10,11,12\n")
-    (tmp_path / "poses.csv").write_text("time,px,py,yaw\n0,1,2,0\n0.1,2,3,10\n2,4,5,20\n")
-    numpy.save(tmp_path / "pressures.npy", numpy.arange(12.0).reshape(3, 2, 2))
-    (tmp_path / "array.csv").write_text("x,y\n0,0\n1,0\n0,1\n1,1\n")
-    return tmp_path
-
-
-def test_an_import_has_the_rows_of_the_command(tables: pathlib.Path) -> None:
-    pressures, poses = tables / "pressures.csv", tables / "poses.csv"
-    command(
-        "import", pressures, "--poses", poses, "--array", "2:2:1.5", "-o", tables / "f.h5",
-        "--pose-columns", "px,py,yaw", "--pose-unit", "m,deg", "--largest-gap-s", 1,
-        "--object", "mug",
-    )  # fmt: skip
-    with pytest.warns(UserWarning, match="1 of its frames have no pose"):
-        given = palpate.import_tables(
-            pressures, poses=poses, array=(2, 2, 1.5), pose_columns=("px", "py", "yaw"),
-            pose_unit=("m", "deg"), largest_gap_s=1, object="mug",
-        )  # fmt: skip
-    expected = palpate.read_recording(tables / "f.h5")
-    assert (given.rows, given.object, len(given)) == ("frames", "mug", 3)
-    for name in ("pressure", "T_robot_sensor", "elements_mm", "time_s"):
-        assert numpy.array_equal(getattr(given, name), getattr(expected, name), equal_nan=True), name
-    assert given.T_robot_sensor[1].tolist() == [1500, 2500, math.radians(5)]
-    assert numpy.isnan(given.pressure[1, 1]) and numpy.isnan(given.T_robot_sensor[2]).all()
-
-
-def test_an_array_of_pressures_is_imported(tables: pathlib.Path) -> None:
-    elements = numpy.array([[0.0, 0], [1, 0], [0, 1], [1, 1]])
-    truth = palpate.Truth("mug", (1, 2, 0.5))
-    for array in (elements, tables / "array.csv"):
-        with warnings.catch_warnings():
-            warnings.simplefilter("error")
-            given = palpate.import_tables(
-                tables / "pressures.npy", array=array, unposed=True, pressure_unit="raw", truth=truth
-            )
-        assert given.pressure.tolist() == numpy.arange(12.0).reshape(3, 4).tolist()
-        assert (given.rows, given.pressure_unit) == ("touches", "raw")
-        assert numpy.array_equal(given.elements_mm, elements)
-        assert given.truth is not None and given.truth.object == "mug"
-    given.save(tables / "r.h5")
-    assert palpate.import_tables(tables / "pressures.npy", array=(2, 2, 1), rate=10).rows == "frames"
-
-
-@pytest.mark.parametrize(
-    ("flags", "options"),
-    [
-        (["--rate", 0], {"rate": 0}),
-        (["--rate", 10], {"rate": 10}),
-        (["--time-unit", "h"], {"time_unit": "h"}),
-        (["--pose-unit", "m,turn"], {"pose_unit": ("m", "turn")}),
-        (["--rows", "lines"], {"rows": "lines"}),
-        (["--largest-gap-s", 0], {"largest_gap_s": 0}),
-        (["--poses", "none.csv"], {"poses": pathlib.Path("none.csv")}),
-        (["--pressure-unit", "psi"], {"pressure_unit": "psi"}),
-    ],
-)
-def test_tables_are_refused_in_the_words_of_the_command(
-    tables: pathlib.Path, flags: list[Any], options: dict[str, Any]
-) -> None:
-    path = tables / "pressures.csv"
-    expect_refused(
-        lambda: palpate.import_tables(path, array=(2, 2, 1), **options),
-        "import", path, "--array", "2:2:1", "-o", tables / "o.h5", *flags,
-    )  # fmt: skip
-
-
-def test_arrays_that_no_table_can_have_are_refused(tables: pathlib.Path) -> None:
-    path = tables / "pressures.csv"
-    with pytest.raises(palpate.Error, match="--array 2:0:1"):
-        palpate.import_tables(path, array=(2, 0, 1))
-    with pytest.raises(palpate.Error, match=re.escape("array: shape (4, 3)")):
-        palpate.import_tables(path, array=numpy.zeros((4, 3)))
-    with pytest.raises(TypeError, match="rate: 'fast'; give float"):
-        palpate.import_tables(path, array=(2, 2, 1), rate="fast")  # type: ignore[arg-type]
 
 
 # Evaluation
@@ -427,7 +324,7 @@ def test_a_calibration_can_be_given_up(presses: list[pathlib.Path]) -> None:
 
 
 def test_the_programs_of_the_guide_run(
-    files: Files, tables: pathlib.Path, tmp_path: pathlib.Path, monkeypatch: pytest.MonkeyPatch
+    files: Files, tmp_path: pathlib.Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     page = (pathlib.Path(__file__).parents[2] / "docs" / "python.md").read_text()
     [section] = re.findall(r"\n## From tables to the next touch\n(.*?)\n## ", page, re.DOTALL)
