@@ -86,7 +86,7 @@ void measure_bounded(const BoundedRunOptions& options, std::span<char* const> co
     }
     if (part == streaming && !options.plots.empty()) {
       write_file(std::filesystem::path(options.plots) / picture_name,
-                 draw_refined_blocks(run.device(), letters, picture_lattice(options.quick)));
+                 draw_refined_blocks(letters, picture_lattice(options.quick)));
     }
   }
   Json document = report.document();

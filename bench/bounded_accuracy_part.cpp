@@ -72,7 +72,7 @@ Json measure_bounded_accuracy(const BoundedInputs& inputs, Report& report) {
       make_trials(vowels, inputs.options.quick ? 1 : 10, touches.back(), seed);
   Json records = Json::array();
   for (const PoseLattice& lattice : lattices) {
-    BoundedPosterior bounded(inputs.device, inputs.letters, {.lattice = lattice});
+    BoundedPosterior bounded(inputs.letters, {.lattice = lattice});
     PoseHistogram histogram(inputs.device, inputs.letters, {.lattice = lattice});
     std::array<Checks, touches.size()> checks;
     for (const Recording& trial : trials) {

@@ -82,14 +82,14 @@ int same_modes(const BoundedAnswers& bounded, const DenseAnswers& dense) {
   return same;
 }
 
-double table_seconds(Device& device, std::span<const Hypothesis> objects,
-                     const BoundedOptions& options, const Recording& unknown, int repeats) {
+double table_seconds(std::span<const Hypothesis> objects, const BoundedOptions& options,
+                     const Recording& unknown, int repeats) {
   const std::vector<Touch> touches = all_touches(unknown);
   std::vector<double> seconds;
   for (int i = 0; i < repeats; ++i) {
     std::optional<BoundedPosterior> posterior;
     const double first = seconds_of([&] {
-      posterior.emplace(device, objects, options);
+      posterior.emplace(objects, options);
       answer(*posterior, touches);
     });
     posterior->reset();

@@ -50,8 +50,8 @@ int same_modes(const BoundedAnswers& bounded, const DenseAnswers& dense);
 
 /// Median seconds by which a new posterior's first answer takes longer than the same answer after
 /// reset(): what the tables cost, whenever they are built.
-double table_seconds(Device& device, std::span<const Hypothesis> objects,
-                     const BoundedOptions& options, const Recording& unknown, int repeats);
+double table_seconds(std::span<const Hypothesis> objects, const BoundedOptions& options,
+                     const Recording& unknown, int repeats);
 
 /// Rows of times, bins evaluated and certificate. `name` begins the names of the times.
 std::vector<Measurement> measurements_of(const BoundedAnswers& answers, const std::string& name,

@@ -60,12 +60,12 @@ Json measure_bins(const BoundedInputs& inputs, double bins_in_all,
   BoundedOptions options{.lattice = lattice};
   restart_peak_memory();
   const std::uint64_t before = resident_bytes();
-  std::optional<BoundedPosterior> posterior(std::in_place, inputs.device, inputs.letters, options);
+  std::optional<BoundedPosterior> posterior(std::in_place, inputs.letters, options);
   const BoundedAnswers all = answer_each(*posterior, unknowns);
   const std::uint64_t peak = peak_resident_bytes() - before;
   const std::uint64_t held = posterior->host_bytes();
   options.threads = 1;
-  posterior.emplace(inputs.device, inputs.letters, options);
+  posterior.emplace(inputs.letters, options);
   const BoundedAnswers one = answer_each(*posterior, unknowns);
   posterior.reset();
   DenseAnswers dense;

@@ -41,8 +41,8 @@ Json measure_scene(const BoundedInputs& inputs, const LargeScene& scene, bool ab
   restart_peak_memory();
   const std::uint64_t before = resident_bytes();
   std::optional<BoundedPosterior> posterior;
-  const double seconds = seconds_of(
-      [&] { posterior.emplace(inputs.device, objects, BoundedOptions{.lattice = lattice}); });
+  const double seconds =
+      seconds_of([&] { posterior.emplace(objects, BoundedOptions{.lattice = lattice}); });
   BoundedAnswers answers;
   int right = 0;
   for (const Recording& unknown : unknowns) {

@@ -5,6 +5,7 @@
 
 #include "commands.hpp"
 #include "palpate/bounded_posterior.hpp"
+#include "palpate/device.hpp"
 #include "report.hpp"
 
 namespace palpate::bench {

@@ -43,7 +43,7 @@ Json measure_bounded_presses(const BoundedInputs& inputs, Report& report) {
   const PoseLattice lattice = lattice_of(objects, quick);
   const auto bins = lattice.bins() * static_cast<std::int64_t>(objects.maps.size());
   const BoundedOptions options{.lattice = lattice, .contact = objects.contact};
-  BoundedPosterior posterior(inputs.device, objects.maps, options);
+  BoundedPosterior posterior(objects.maps, options);
   // All frames lie at one place: the dense engine evaluates what is in contact, and the rest once.
   PoseHistogram histogram(inputs.device, objects.maps,
                           {.lattice = lattice, .contact = objects.contact, .still_array = true});

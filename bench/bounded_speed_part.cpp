@@ -36,10 +36,9 @@ Json measure_size(const BoundedInputs& inputs, const Size& size,
   BoundedOptions one_thread = options;
   one_thread.threads = 1;
   const auto bins = size.lattice.bins() * static_cast<std::int64_t>(inputs.letters.size());
-  const double tables =
-      table_seconds(inputs.device, inputs.letters, options, unknowns.front(), table_repeats);
-  BoundedPosterior threaded(inputs.device, inputs.letters, options);
-  BoundedPosterior single(inputs.device, inputs.letters, one_thread);
+  const double tables = table_seconds(inputs.letters, options, unknowns.front(), table_repeats);
+  BoundedPosterior threaded(inputs.letters, options);
+  BoundedPosterior single(inputs.letters, one_thread);
   const BoundedAnswers all = answer_each(threaded, unknowns);
   const BoundedAnswers one = answer_each(single, unknowns);
   PoseHistogram histogram(inputs.device, inputs.letters, {.lattice = size.lattice});
@@ -95,10 +94,10 @@ Json measure_bounded_mode(const BoundedInputs& inputs, Report& report) {
   Json records = Json::array();
   for (const double tolerance : {BoundedOptions{}.tolerance, 0.1}) {
     const BoundedOptions options{.lattice = lattice, .tolerance = tolerance};
-    BoundedPosterior posterior(inputs.device, inputs.letters, options);
+    BoundedPosterior posterior(inputs.letters, options);
     const BoundedAnswers answers = answer_each(posterior, unknowns);
-    const double tables_ms = 1e3 * table_seconds(inputs.device, inputs.letters, options,
-                                                 unknowns.front(), table_repeats);
+    const double tables_ms =
+        1e3 * table_seconds(inputs.letters, options, unknowns.front(), table_repeats);
     const double ms = median(answers.milliseconds());
     Case measured{.name = fmt::format("mode {}, tolerance {}", size_of(lattice), tolerance),
                   .facts = {{"objects", inputs.letters.size()},

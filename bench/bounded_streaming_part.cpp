@@ -43,8 +43,7 @@ Json measure_bounded_streaming(const BoundedInputs& inputs, Report& report) {
   const PoseLattice lattice =
       inputs.options.quick ? lattice_of(10, 10, 8) : lattice_of(200, 200, 250);
   const auto bins = lattice.bins() * static_cast<std::int64_t>(inputs.letters.size());
-  BoundedPosterior posterior(inputs.device, inputs.letters,
-                             {.lattice = lattice, .budget_s = budget_s});
+  BoundedPosterior posterior(inputs.letters, {.lattice = lattice, .budget_s = budget_s});
   std::vector<BoundedAnswers> after(touches_per_unknown);  // [touch]
   bool warm = false;
   for (const Recording& unknown :

@@ -180,7 +180,7 @@ std::string draw_search(const std::vector<SearchPanel>& panels, int object,
   return canvas.encode();
 }
 
-std::string draw_refined_blocks(Device& device, const std::vector<Hypothesis>& letters,
+std::string draw_refined_blocks(const std::vector<Hypothesis>& letters,
                                 const PoseLattice& bins_about_touch) {
   // An unknown whose first touch meets an edge of the letter.
   constexpr std::uint64_t seed = 1'405'000'018;
@@ -189,7 +189,7 @@ std::string draw_refined_blocks(Device& device, const std::vector<Hypothesis>& l
   // As --pivot-mm auto: x and y are where the first touch lies on the letter.
   PoseLattice lattice = bins_about_touch;
   lattice.pivot_mm = unknown.T_robot_sensor.front().translation_mm;
-  BoundedPosterior posterior(device, letters, {.lattice = lattice});
+  BoundedPosterior posterior(letters, {.lattice = lattice});
   const double bins = static_cast<double>(lattice.bins()) * static_cast<double>(letters.size());
   std::vector<SearchPanel> panels;
   std::size_t done = 0;

@@ -25,8 +25,8 @@ std::string draw_search(const std::vector<SearchPanel>& panels, int object,
 
 /// Draws the search for one unknown letter after 1, 3 and 9 touches, over bins about the place of
 /// the first touch: x and y are where it lies on the letter.
-/// @throws Error if the device or Cairo fails
-std::string draw_refined_blocks(Device& device, const std::vector<Hypothesis>& letters,
+/// @throws Error if Cairo fails
+std::string draw_refined_blocks(const std::vector<Hypothesis>& letters,
                                 const PoseLattice& bins_about_touch);
 
 }  // namespace palpate::bench

@@ -78,7 +78,7 @@ std::string crossing_text(const Json& bounds, const std::string& field) {
 Json measure_bounds(Device& device, const std::vector<Hypothesis>& letters,
                     std::span<const Recording> trials, const BinCounts& bins) {
   const PoseLattice lattice = lattice_with(bins);
-  BoundedPosterior bounded(device, letters, {.lattice = lattice});
+  BoundedPosterior bounded(letters, {.lattice = lattice});
   PoseHistogram histogram(device, letters, {.lattice = lattice});
   UnknownSeconds of_bounded;
   UnknownSeconds of_histogram;

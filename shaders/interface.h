@@ -128,26 +128,6 @@ struct LikelihoodPush {
   uint object_first;  // first object of the dispatch, in the table of places
 };
 
-// A box of bins of one object and theta, and where its data begin in the tables of a dispatch.
-struct BoxPlace {
-  int first_node;        // of its map
-  int map_width;         // in nodes, with border
-  int map_height;        // in nodes, with border
-  int first_table_node;  // index of its object's first node in the contact table
-  uint first_element;    // rotated by its theta
-  uint x_axis;           // its first bin's x among the axes, in cells of its map
-  uint y_axis;
-  uint x_count;
-  uint first_run;  // of the dispatch's runs of bins
-  uint first_bin;  // among the results, [y, x]
-};
-
-struct BoxPush {
-  uint runs;
-  uint boxes;
-  uint segments;
-};
-
 // Result of one workgroup of reduce_belief.
 struct Partial {
   float max_high;
@@ -395,8 +375,7 @@ struct ConePush {
 static_assert(sizeof(TileReading) == 16 && sizeof(Tile) == 20 && sizeof(EvidencePush) == 16);
 static_assert(sizeof(RotatedElement) == 16 && sizeof(Segment) == 16 && sizeof(TableNode) == 8);
 static_assert(sizeof(Corners) == 16 && sizeof(ObjectPlace) == 24);
-static_assert(sizeof(LikelihoodPush) == 28 && sizeof(BoxPlace) == 40 && sizeof(BoxPush) == 12 &&
-              sizeof(Partial) == 16);
+static_assert(sizeof(LikelihoodPush) == 28 && sizeof(Partial) == 16);
 static_assert(sizeof(ReducePush) == 12 && sizeof(AddPush) == 8 && sizeof(MarginalPush) == 20);
 static_assert(sizeof(TurnPush) == 52 && sizeof(Turn) == 64);
 static_assert(sizeof(ArrayAtTheta) == 16 && sizeof(ObjectBox) == 16);

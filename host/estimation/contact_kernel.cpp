@@ -50,10 +50,6 @@ void append_set(std::vector<shaders::TableNode>& nodes, const LikelihoodTable& t
 
 }  // namespace
 
-bool evaluates_products(const ContactModel& model) {
-  return model.gamma * model.prior.value() >= least_product_floor;
-}
-
 std::vector<std::uint32_t> contact_constants(const gpu::Limits& limits, const ContactModel& model) {
   const std::uint32_t lanes = independent_lanes(limits);
   if (const auto& table = model.table) {
@@ -69,7 +65,7 @@ std::vector<std::uint32_t> contact_constants(const gpu::Limits& limits, const Co
             static_cast<std::uint32_t>(table->levels())};
   }
   const double floor = model.gamma * model.prior.value();
-  const bool as_logs = !evaluates_products(model);
+  const bool as_logs = !(floor >= least_product_floor);
   // A product of two small numbers may be 0 where both logarithms are sound.
   const double log_floor =
       model.gamma > 0.0 ? std::log(model.gamma) + std::log(*model.prior) : shaders::NO_FLOOR;

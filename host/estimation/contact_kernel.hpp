@@ -8,9 +8,6 @@
 
 namespace palpate {
 
-/// True where kernels evaluate Eq. 7 as products of likelihood ratios, false where in logs.
-bool evaluates_products(const ContactModel& model);
-
 /// The specialization constants 0 to 7 of the kernels that evaluate the contact model: the
 /// lanes of a workgroup, then those of shaders/contact_likelihood.glsl. The model's prior must be
 /// set.

@@ -20,7 +20,7 @@ namespace palpate {
 class Recogniser {
  public:
   Recogniser(Device& device, const RecognitionTask& task) : Recogniser(&device, task) {}
-  /// By bounds on the host, without a device.
+  /// By bounds, which need no device.
   explicit Recogniser(const RecognitionTask& task) : Recogniser(nullptr, task) {}
 
   /// Forgets all touches, for the next unknown. Particles start from the same places again; bounds

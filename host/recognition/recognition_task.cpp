@@ -7,7 +7,7 @@
 
 #include <fmt/format.h>
 
-#include "estimation/bounded/search_memory.hpp"
+#include "estimation/bounded/search/search_memory.hpp"
 
 namespace palpate {
 

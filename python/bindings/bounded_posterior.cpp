@@ -53,13 +53,13 @@ Bounded make_bounded(const std::shared_ptr<Session>& session, nb::handle maps,
       (*working)->check();
     }
   };
-  return {
-      {make_owned<BoundedPosterior>({}, session,
-                                    [hypotheses = std::move(hypotheses), options](Device& device) {
-                                      return BoundedPosterior(device, hypotheses, options);
-                                    }),
-       std::move(labels)},
-      working};
+  return {{make_owned<BoundedPosterior>(
+               {}, session,
+               [hypotheses = std::move(hypotheses), options](Device& /*device*/) {
+                 return BoundedPosterior(hypotheses, options);
+               }),
+           std::move(labels)},
+          working};
 }
 
 void update(const Bounded& self, const TouchesLike& touches, const Progress& progress) {

@@ -28,7 +28,7 @@ class DensePosteriorTest : public testing::Test {
   Recording trial_ = make_trials(vowels, 1, 3, 7)[1];
   PoseLattice lattice_ = lattice_of(7, 6, 8);
   PoseHistogram histogram_{device_, letters_, {.lattice = lattice_}};
-  BoundedPosterior bounded_{device_, letters_, {.lattice = lattice_}};
+  BoundedPosterior bounded_{letters_, {.lattice = lattice_}};
 };
 
 TEST_F(DensePosteriorTest, IsTheHistogramsUpToItsRounding) {

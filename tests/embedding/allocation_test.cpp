@@ -142,8 +142,7 @@ TEST_F(Updates, OfAParticleFilterAllocateNothingAfterTheFirst) {
 
 TEST_F(Updates, OfASearchByBoundsAllocateNothingAfterTheFirst) {
   for (const std::optional<double> none_weight : {std::optional<double>(), std::optional(1.0)}) {
-    BoundedPosterior filter(device_, maps_,
-                            {.lattice = small_lattice(), .none_weight = none_weight});
+    BoundedPosterior filter(maps_, {.lattice = small_lattice(), .none_weight = none_weight});
     expect_none_after_the_first(filter);
     filter.reset();
     EXPECT_EQ(allocations_of([&] { filter.update(unknown_.touch(2)); }), 0U) << "after a reset";

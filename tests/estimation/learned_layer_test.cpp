@@ -129,8 +129,7 @@ TEST_P(LearnedLayer, KeepsTheCertificateOfBounds) {
     if (seed % 3 == 0) {
       options.evidence_nats = 0.1;
     }
-    const Certified seen =
-        expect_certified(device_, of.objects, options, all_touches(recording), 1e-9);
+    const Certified seen = expect_certified(of.objects, options, all_touches(recording), 1e-9);
     ASSERT_TRUE(seen.estimate.certificate);
     dropped = std::max(dropped, seen.estimate.certificate->dropped_mass);
 

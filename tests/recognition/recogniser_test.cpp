@@ -82,7 +82,7 @@ TEST(Recogniser, OfBoundsTellsWhatTheBoundedPosteriorTells) {
   Recogniser recogniser(device, task);
   recogniser.prepare(recording.touch(0));
   recogniser.update(all_touches(recording));
-  BoundedPosterior bounded(device, task.hypotheses, options);
+  BoundedPosterior bounded(task.hypotheses, options);
   bounded.update(all_touches(recording));
 
   const Estimate estimate = bounded.estimate();

@@ -38,8 +38,7 @@ void settle_recognition(BatchTask& task, RecognitionTask& recognition,
 /// The same with the bins that the task has been settled with.
 void settle_as_before(const BatchTask& task, RecognitionTask& recognition);
 
-/// Whether the filter computes on a device. Bounds do not: a GPU would take their bins over at a
-/// moment that depends on the clock.
+/// Whether the filter computes on a device. Bounds do not.
 bool uses_device(const RecognitionTask& recognition);
 
 /// Has bounds take so many host threads.

@@ -5,15 +5,15 @@
 #include <span>
 #include <vector>
 
-#include "estimation/bounded/bin_likelihood.hpp"
+#include "estimation/bin_box.hpp"
 #include "model/random.hpp"
 #include "palpate/estimate.hpp"
 #include "palpate/lattice.hpp"
 
 namespace palpate {
 
-/// Draws poses from a belief whose bins come box by box. Takes one draw in each of `count` equal
-/// parts of the belief, which has less variance than independent draws.
+/// Draws poses from a belief whose bins come box by box, one in each of `count` equal parts of the
+/// belief.
 class BeliefDraws {
  public:
   /// @param lattice,log_weight outlive this object; log_weight is [hypothesis], the log of its
@@ -37,8 +37,6 @@ class BeliefDraws {
   bool is_due(double reached) const {
     return draws_.size() < targets_.size() && targets_[draws_.size()] < reached;
   }
-  /// The i-th bin of a box.
-  Draw draw_of(const BinBox& box, std::int64_t i) const;
 
   const PoseLattice& lattice_;
   std::span<const double> log_weight_;

@@ -27,8 +27,7 @@ constexpr double infinity = std::numeric_limits<double>::infinity();
 
 }  // namespace
 
-BoundedBelief::BoundedBelief(Device* device, std::span<const Hypothesis> hypotheses,
-                             const BoundedOptions& options)
+BoundedBelief::BoundedBelief(std::span<const Hypothesis> hypotheses, const BoundedOptions& options)
     : options_(options),
       hypotheses_(hypotheses.begin(), hypotheses.end()),
       // More threads than cores gain nothing.
@@ -36,13 +35,10 @@ BoundedBelief::BoundedBelief(Device* device, std::span<const Hypothesis> hypothe
                                    : tbb::info::default_concurrency()),
       arena_(threads_),
       likelihood_(hypotheses_, options_.contact, options_.lattice),
-      batches_(likelihood_, device != nullptr ? &device->context() : nullptr, hypotheses_,
-               options_.contact, options_.lattice,
-               device != nullptr ? BinPlace::measured : BinPlace::host),
       space_(arena_.execute([&] { return SearchSpace(hypotheses_, options_); })),
-      search_(space_, options_, likelihood_, batches_) {
+      search_(space_, options_, likelihood_) {
   if (options_.none_weight) {
-    none_.emplace(space_, options_, likelihood_, batches_);
+    none_.emplace(space_, options_, likelihood_);
     none_log_weight_ = std::log(*options_.none_weight) - log_total_weight(hypotheses_) +
                        std::log(static_cast<double>(options_.lattice.bins()));
   }
@@ -51,11 +47,11 @@ BoundedBelief::BoundedBelief(Device* device, std::span<const Hypothesis> hypothe
 void BoundedBelief::reset() {
   half_done_.forget();
   kept_.clear();
+  touches_.clear();
   elements_ = {};
-  touches_ = 0;
-  not_added_.clear();
-  search_.reset();
-  result_.reset();
+  search_.largest().reset();
+  searched_ = 0;
+  found_.reset();
   followed_.reset();
   if (none_) {
     none_->reset();
@@ -63,17 +59,15 @@ void BoundedBelief::reset() {
 }
 
 void BoundedBelief::move_pivot(const glm::dvec2& pivot_mm) {
-  options_.lattice = with_pivot(options_.lattice, pivot_mm, "bounded posterior", touches_ > 0);
+  options_.lattice = with_pivot(options_.lattice, pivot_mm, "bounded posterior", !touches_.empty());
   likelihood_.move_pivot(pivot_mm);
-  batches_.move_pivot(pivot_mm);
-  result_.reset();
+  found_.reset();
   followed_.reset();
 }
 
 void BoundedBelief::add(std::span<const Touch> touches) {
   half_done_.refuse();
   kept_.add(touches, options_.contact, options_.lattice.pivot_mm);
-  touches_ += touches.size();
 }
 
 void BoundedBelief::take_in() {
@@ -82,15 +76,20 @@ void BoundedBelief::take_in() {
     return;
   }
   half_done_.change([&] {
+    if (found_ && found_->bins.complete() &&
+        found_->bins.values().size() <= FollowedBins::most_bins) {
+      followed_.emplace(found_->bins, found_->result, space_.log_weight);
+      followed_touches_ = touches_.size();
+    }
+    found_.reset();
     const std::vector<ArrayReadings> touches = kept_.all();
     std::vector<KnownElements> all;
     for (const ArrayReadings& touch : touches) {
       all.push_back(known_elements(touch));
     }
-    follow(all);
     all.push_back(std::move(elements_));
     elements_ = merged(all);
-    not_added_.insert(not_added_.end(), touches.begin(), touches.end());
+    touches_.insert(touches_.end(), touches.begin(), touches.end());
     if (none_) {
       none_->add(touches);
     }
@@ -99,23 +98,19 @@ void BoundedBelief::take_in() {
 }
 
 std::string BoundedBelief::path() const {
-  return fmt::format("{} on {} thread{}, {}", likelihood_.instructions(), threads_,
-                     threads_ == 1 ? "" : "s", batches_.path());
+  return fmt::format("{} on {} thread{}", likelihood_.instructions(), threads_,
+                     threads_ == 1 ? "" : "s");
 }
 
 std::uint64_t BoundedBelief::bytes() const {
-  std::uint64_t bytes = likelihood_.bytes() + space_.bytes() + search_.bytes() + bins_.bytes();
-  return none_ ? bytes + none_->bytes() : bytes;
-}
-
-Deadline BoundedBelief::until(const std::optional<double>& budget_s) const {
-  return Deadline(budget_s, &options_.cancel_point);
+  return likelihood_.bytes() + space_.bytes() + search_.largest().bytes() +
+         (found_ ? found_->bins.bytes() : 0) + (none_ ? none_->bytes() : 0);
 }
 
 SearchGoal BoundedBelief::goal() const {
   SearchGoal goal{options_.tolerance, options_.evidence_nats, options_.evidence_range_nats};
-  if (goal.evidence_nats && touches_ > 1) {
-    const double grown = 1.0 + options_.evidence_growth * static_cast<double>(touches_ - 1);
+  if (goal.evidence_nats && touches_.size() > 1) {
+    const double grown = 1.0 + options_.evidence_growth * static_cast<double>(touches_.size() - 1);
     *goal.evidence_nats *= grown;
     goal.evidence_range_nats *= grown;
   }
@@ -134,17 +129,17 @@ SearchGoal BoundedBelief::rough_goal() const {
 
 const SearchResult& BoundedBelief::found() {
   const Deadline deadline = until(options_.budget_s);
-  if (!result_ || rough_) {
-    result_.reset();
-    rough_ = false;
-    none_log_evidence_.reset();
-    result_ = search();
+  if (!found_ || found_->rough) {
+    found_.reset();
+    found_ = search();
   }
-  bound_none(deadline);
-  return *result_;
+  if (none_ && !found_->none) {
+    found_->none = bound_none(deadline);
+  }
+  return found_->result;
 }
 
-SearchResult BoundedBelief::search() {
+BoundedBelief::Found BoundedBelief::search() {
   // "None of these" has the rest of a budget, which is half of it at least.
   std::optional<double> budget_s = options_.budget_s;
   if (none_ && budget_s) {
@@ -156,83 +151,55 @@ SearchResult BoundedBelief::search() {
     // What is proven soon comes first: a search that is cut short proves little.
     first.tolerance = std::max(first.tolerance, soon);
   }
-  SearchResult best = run(first, deadline, bins_);
+  Found best = run(first, deadline);
   if (first.tolerance > options_.tolerance && !deadline.passed()) {
-    EvaluatedBins more(true);
-    SearchResult better = run(goal(), deadline, more);
-    if (better.uncertain() < best.uncertain()) {
+    Found better = run(goal(), deadline);
+    if (better.result.uncertain() < best.result.uncertain()) {
       best = std::move(better);
-      bins_ = std::move(more);
     }
   }
   return best;
 }
 
-void BoundedBelief::find_roughly() {
-  if (!result_) {
-    Deadline deadline = until(options_.budget_s);
-    result_ = run(rough_goal(), deadline, bins_);
-    rough_ = true;
-  }
+BoundedBelief::Found BoundedBelief::run(const SearchGoal& goal, Deadline& deadline) {
+  EvaluatedBins bins(deadline.exists());
+  SearchResult result =
+      run(goal, deadline, [&](const BinBox& box, std::span<const double> log_likelihood) {
+        bins.add(box, log_likelihood);
+        if (bins.full()) {
+          // With a budget, bins are evaluated as long as there is room for them: another search
+          // could not evaluate the same.
+          deadline.end();
+        }
+      });
+  return {std::move(result), std::move(bins)};
 }
 
-SearchResult BoundedBelief::run(const SearchGoal& goal, Deadline& deadline,
-                                EvaluatedBins& evaluated) {
-  evaluated.clear();
-  add_to_search();
+SearchResult BoundedBelief::run(const SearchGoal& goal, const Deadline& deadline,
+                                const BinVisitor& visitor, std::vector<PoseBlock>* refined) {
   return arena_.execute([&] {
-    return search_.run(elements_, goal, deadline,
-                       [&](const BinBox& box, std::span<const double> log_likelihood) {
-                         evaluated.add(box, log_likelihood);
-                         if (evaluated.full()) {
-                           // With a budget, bins are evaluated as long as there is room for them:
-                           // another search could not evaluate the same.
-                           deadline.end();
-                         }
-                       });
+    if (searched_ < touches_.size()) {
+      half_done_.change([&] { search_.largest().add(std::span(touches_).subspan(searched_)); });
+      searched_ = touches_.size();
+    }
+    return search_.run(elements_, goal, deadline, visitor, refined);
   });
 }
 
-void BoundedBelief::add_to_search() {
-  if (!not_added_.empty()) {
-    half_done_.change([&] { arena_.execute([&] { search_.add(not_added_); }); });
-    not_added_.clear();
-  }
-}
-
 void BoundedBelief::visit(const BinVisitor& visitor) {
-  if (bins_.complete()) {
-    bins_.visit(visitor);
+  if (found_->bins.complete()) {
+    found_->bins.visit(visitor);
   } else {
-    arena_.execute(
-        [&] { search_.run(elements_, rough_ ? rough_goal() : goal(), until({}), visitor); });
+    run(found_->rough ? rough_goal() : goal(), until({}), visitor);
   }
-}
-
-double BoundedBelief::log_total() const {
-  LogSum total;
-  for (const HypothesisEvidence& evidence : result_->evidence) {
-    total.add(evidence.evaluated);
-  }
-  return total.log();
-}
-
-void BoundedBelief::follow(std::span<const KnownElements> touches) {
-  if (result_ && bins_.complete() && bins_.values() <= FollowedBins::most_bins) {
-    followed_.emplace(bins_, *result_, space_.log_weight);
-    not_followed_.clear();
-  }
-  if (followed_) {
-    not_followed_.insert(not_followed_.end(), touches.begin(), touches.end());
-  }
-  result_.reset();
 }
 
 const FollowedBins* BoundedBelief::followed_bins() {
-  if (result_ || !followed_) {
+  if (found_ || !followed_) {
     return nullptr;
   }
-  for (const KnownElements& touch : std::exchange(not_followed_, {})) {
+  for (; followed_touches_ < touches_.size(); ++followed_touches_) {
+    const KnownElements touch = known_elements(touches_[followed_touches_]);
     std::vector<double> most;
     for (const TileBounds& bounds : space_.bounds) {
       most.push_back(bounds.best(bounds.levels().size() - 1, touch));
@@ -248,8 +215,10 @@ const FollowedBins* BoundedBelief::followed_bins() {
 
 std::vector<PoseSample> BoundedBelief::sample(std::size_t count, std::uint64_t seed) {
   const FollowedBins* followed = followed_bins();
-  if (followed == nullptr) {
-    find_roughly();
+  if (followed == nullptr && !found_) {
+    Deadline deadline = until(options_.budget_s);
+    found_ = run(rough_goal(), deadline);
+    found_->rough = true;
   }
   BeliefDraws draws(count, seed, options_.lattice, space_.log_weight,
                     followed != nullptr ? followed->log_total() : log_total());
@@ -265,21 +234,15 @@ std::vector<PoseSample> BoundedBelief::sample(std::size_t count, std::uint64_t s
 }
 
 std::vector<PoseBlock> BoundedBelief::refined_blocks() {
-  add_to_search();
+  const std::size_t finest = space_.bounds.front().levels().size() - 1;
   std::vector<PoseBlock> blocks;
   std::vector<PoseBlock> evaluated;
   const auto note = [&](const BinBox& box, std::span<const double> log_likelihoods) {
     if (static_cast<std::int64_t>(log_likelihoods.size()) == box.bins()) {
-      evaluated.push_back({.object = box.object,
-                           .level = search_.finest_level(),
-                           .theta = box.theta,
-                           .x_first = box.x_first,
-                           .x_count = box.x_count,
-                           .y_first = box.y_first,
-                           .y_count = box.y_count});
+      evaluated.push_back(block_of(box, finest));
     }
   };
-  arena_.execute([&] { search_.run(elements_, goal(), until({}), note, &blocks); });
+  run(goal(), until({}), note, &blocks);
   blocks.insert(blocks.end(), evaluated.begin(), evaluated.end());
   return blocks;
 }
@@ -300,10 +263,7 @@ double BoundedBelief::allowed_none_width(const LogInterval& none) const {
   return allowed / (p * (1.0 - p));
 }
 
-void BoundedBelief::bound_none(const Deadline& deadline) {
-  if (!none_ || none_log_evidence_) {
-    return;
-  }
+LogInterval BoundedBelief::bound_none(const Deadline& deadline) {
   double width = goal().evidence_nats.value_or(infinity);
   for (LogInterval last{-infinity, infinity};;) {
     const LogInterval bounds = arena_.execute([&] { return none_->bounds(width, deadline); });
@@ -312,14 +272,13 @@ void BoundedBelief::bound_none(const Deadline& deadline) {
     const bool narrowed = bounds.high - bounds.low < last.high - last.low;
     last = bounds;
     if (bounds.high - bounds.low <= width || !narrowed || deadline.passed()) {
-      none_log_evidence_ = weighted;
-      return;
+      return weighted;
     }
   }
 }
 
 LogInterval BoundedBelief::none_log_evidence() const {
-  return none_log_evidence_.value_or(LogInterval{-infinity, -infinity});
+  return found_ && found_->none ? *found_->none : LogInterval{-infinity, -infinity};
 }
 
 }  // namespace palpate

@@ -9,28 +9,25 @@
 
 #include <tbb/task_arena.h>
 
-#include "estimation/bounded/bin_likelihood.hpp"
-#include "estimation/bounded/bound_search.hpp"
 #include "estimation/bounded/evaluated_bins.hpp"
-#include "estimation/bounded/faster_bin_likelihood.hpp"
-#include "estimation/bounded/followed_bins.hpp"
 #include "estimation/bounded/kept_touches.hpp"
 #include "estimation/bounded/known_elements.hpp"
+#include "estimation/bounded/leaves/bin_likelihood.hpp"
 #include "estimation/bounded/none_evidence.hpp"
-#include "estimation/bounded/search_space.hpp"
+#include "estimation/bounded/search/bound_search.hpp"
+#include "estimation/bounded/search/search_space.hpp"
 #include "estimation/half_done.hpp"
 #include "palpate/bounded_posterior.hpp"
 
 namespace palpate {
 
-/// What a BoundedPosterior believes: the touches so far, and what the last search has found of
-/// them. Searches where it is asked for more than is known.
+/// What a BoundedPosterior believes: the touches so far, and what searches have found of them. All
+/// touches stand in one list, and each part of the belief knows how many of them it has taken in:
+/// it takes in the others once it is asked.
 class BoundedBelief {
  public:
-  /// @param device that may evaluate bins; null leaves them to the host
   /// @param options checked, with a resolved contact model
-  BoundedBelief(Device* device, std::span<const Hypothesis> hypotheses,
-                const BoundedOptions& options);
+  BoundedBelief(std::span<const Hypothesis> hypotheses, const BoundedOptions& options);
 
   void reset();
   void move_pivot(const glm::dvec2& pivot_mm);
@@ -61,7 +58,7 @@ class BoundedBelief {
   /// them.
   void visit(const BinVisitor& visitor);
   /// Log of the summed likelihood of these bins, with prior weights.
-  double log_total() const;
+  double log_total() const { return found_->result.all().evaluated; }
   /// Draws from bins that hold nearly all of the belief.
   std::vector<PoseSample> sample(std::size_t count, std::uint64_t seed);
   /// The blocks that a search divides or evaluates.
@@ -69,53 +66,55 @@ class BoundedBelief {
 
   /// Whether the options ask for "none of these".
   bool has_none() const { return none_.has_value(); }
-  /// Bounds of the log evidence of "none of these" with its prior weight, as SearchResult::evidence
+  /// Bounds of the log evidence of "none of these" with its prior weight, as SearchResult::mass
   /// has that of the hypotheses: so close that no identity can move by more than the tolerance or
   /// 1e-6, whichever is larger, or as far as the budget reaches. -infinity where it is left out.
   /// To be asked for after found().
   LogInterval none_log_evidence() const;
 
  private:
+  /// What a search found of all touches.
+  struct Found {
+    SearchResult result;
+    EvaluatedBins bins;
+    bool rough = false;                    ///< only good enough to draw samples
+    std::optional<LogInterval> none = {};  ///< none_log_evidence(), once it is bounded
+  };
+
   SearchGoal goal() const;
   /// What a search for samples is to reach.
   SearchGoal rough_goal() const;
-  /// Sees to it that there is a last search's result, of a quick search if need be.
-  void find_roughly();
   /// What found() returns.
-  SearchResult search();
-  SearchResult run(const SearchGoal& goal, Deadline& deadline, EvaluatedBins& evaluated);
-  /// The search takes in its touches.
-  void add_to_search();
+  Found search();
+  Found run(const SearchGoal& goal, Deadline& deadline);
+  SearchResult run(const SearchGoal& goal, const Deadline& deadline, const BinVisitor& visitor,
+                   std::vector<PoseBlock>* refined = nullptr);
   /// Narrows the bounds of "none of these" as far as needed beside what was found.
-  void bound_none(const Deadline& deadline);
+  LogInterval bound_none(const Deadline& deadline);
   /// How wide these may be, given what they are.
   double allowed_none_width(const LogInterval& none) const;
-  /// More touches come: keeps what the last search found of the belief before them.
-  void follow(std::span<const KnownElements> touches);
   /// The followed bins after all touches; nullptr where they may not hold enough to draw samples.
   const FollowedBins* followed_bins();
-  Deadline until(const std::optional<double>& budget_s) const;
+  Deadline until(const std::optional<double>& budget_s) const {
+    return Deadline(budget_s, &options_.cancel_point);
+  }
 
   BoundedOptions options_;
   std::vector<Hypothesis> hypotheses_;
   int threads_;
   mutable tbb::task_arena arena_;
   BinLikelihood likelihood_;
-  FasterBinLikelihood batches_;
   SearchSpace space_;
+  KeptTouches kept_;                    ///< before take_in()
+  std::vector<ArrayReadings> touches_;  ///< that were taken in
+  KnownElements elements_;              ///< of all these
   BoundSearch search_;
-  KeptTouches kept_;
-  KnownElements elements_;
-  std::size_t touches_ = 0;
-  std::vector<ArrayReadings> not_added_;  ///< touches that the search has not yet taken in
-  std::optional<SearchResult> result_;
-  bool rough_ = false;  ///< result_ is find_roughly()'s
-  EvaluatedBins bins_{options_.budget_s.has_value()};
-  std::optional<FollowedBins> followed_;
-  std::vector<KnownElements> not_followed_;  ///< touches that followed_ has not yet taken in
-  std::optional<NoneEvidence> none_;         ///< where the options ask for it
-  double none_log_weight_ = 0.0;             ///< log of its prior weight times the number of bins
-  std::optional<LogInterval> none_log_evidence_;  ///< bounded beside result_
+  std::size_t searched_ = 0;              ///< touches that search_ has taken in
+  std::optional<Found> found_;            ///< nothing where a touch came after the search
+  std::optional<FollowedBins> followed_;  ///< through the touches since an earlier search
+  std::size_t followed_touches_ = 0;      ///< that followed_ has taken in
+  std::optional<NoneEvidence> none_;      ///< where the options ask for it
+  double none_log_weight_ = 0.0;          ///< log of its prior weight times the number of bins
   HalfDone half_done_{"bounded posterior: memory ended in the middle of an update; call reset()"};
 };
 

@@ -11,7 +11,7 @@
 #include "estimation/bounded/log_sum.hpp"
 #include "estimation/bounded/marginal_sums.hpp"
 #include "estimation/bounded/parallel_for.hpp"
-#include "estimation/bounded/search_memory.hpp"
+#include "estimation/bounded/search/search_memory.hpp"
 #include "estimation/bounded/thinned_lattice.hpp"
 #include "estimation/hypotheses.hpp"
 #include "estimation/lattice/refinement.hpp"
@@ -69,8 +69,8 @@ BoundedOptions checked(const BoundedOptions& options, std::span<const Hypothesis
 }  // namespace
 
 struct BoundedPosterior::Impl {
-  Impl(Device* device, std::span<const Hypothesis> hypotheses, const BoundedOptions& options)
-      : belief(device, hypotheses, options) {
+  Impl(std::span<const Hypothesis> hypotheses, const BoundedOptions& options)
+      : belief(hypotheses, options) {
     for (const Hypothesis& hypothesis : hypotheses) {
       bodies.push_back(displaced_body(hypothesis.map));
     }
@@ -90,11 +90,7 @@ struct BoundedPosterior::Impl {
 
 BoundedPosterior::BoundedPosterior(std::span<const Hypothesis> hypotheses,
                                    const BoundedOptions& options)
-    : impl_(std::make_unique<Impl>(nullptr, hypotheses, checked(options, hypotheses))) {}
-
-BoundedPosterior::BoundedPosterior(Device& device, std::span<const Hypothesis> hypotheses,
-                                   const BoundedOptions& options)
-    : impl_(std::make_unique<Impl>(&device, hypotheses, checked(options, hypotheses))) {}
+    : impl_(std::make_unique<Impl>(hypotheses, checked(options, hypotheses))) {}
 
 BoundedPosterior::~BoundedPosterior() { replace_held(impl_); }
 BoundedPosterior::BoundedPosterior(BoundedPosterior&&) noexcept = default;
@@ -132,22 +128,15 @@ Estimate BoundedPosterior::estimate() const {
   BoundedBelief& belief = whole().belief;
   const SearchResult& found = belief.found();
   Estimate estimate;
-  LogSum evaluated;
-  LogSum uncertain;
   std::vector<double> logs;
   std::vector<LogInterval> bounds;
-  LogSum all_low;
-  LogSum all_high;
-  for (const HypothesisEvidence& evidence : found.evidence) {
-    logs.push_back(evidence.evaluated);
-    evaluated.add(evidence.evaluated);
-    uncertain.add(evidence.rounding);
-    uncertain.add(evidence.dropped);
-    bounds.push_back({log_subtract(evidence.evaluated, evidence.rounding),
-                      log_add(log_add(evidence.evaluated, evidence.rounding), evidence.dropped)});
+  for (const HypothesisMass& mass : found.mass) {
+    logs.push_back(mass.evaluated);
+    bounds.push_back({log_subtract(mass.evaluated, mass.rounding),
+                      log_add(log_add(mass.evaluated, mass.rounding), mass.dropped)});
   }
   // Dropped and rounding mass over the whole that they are part of.
-  const double dropped = std::exp(uncertain.log() - evaluated.log());
+  const double dropped = found.uncertain();
   Certificate certificate{.dropped_mass = std::isfinite(dropped) ? dropped / (1.0 + dropped) : 1.0,
                           .log_evidence = bounds,
                           .mode_certain = found.mode_certain,
@@ -211,17 +200,10 @@ RefinedPose BoundedPosterior::refine(const Mode& mode) const {
     }
   }
   const BinLikelihood& likelihood = thin ? *of_thin : belief.likelihood();
-  const auto log_likelihood = [&](std::span<const BinWindow> windows) {
-    const int thetas = fit.theta_rad.count;
-    std::vector<BinBox> boxes;
+  const auto log_likelihood = [&](std::span<const BinBox> boxes) {
     std::vector<std::size_t> firsts{0};  // each box's first bin, and the end
-    for (const BinWindow& window : windows) {
-      for (int t = 0; t < window.theta_count; ++t) {
-        boxes.push_back({mode.object, ((window.theta_first + t) % thetas + thetas) % thetas,
-                         window.row_first, window.row_count, window.column_first,
-                         window.column_count});
-        firsts.push_back(firsts.back() + static_cast<std::size_t>(boxes.back().bins()));
-      }
+    for (const BinBox& box : boxes) {
+      firsts.push_back(firsts.back() + static_cast<std::size_t>(box.bins()));
     }
     std::vector<float> logs(firsts.back());
     belief.on_threads([&] {

@@ -5,7 +5,8 @@
 #include <span>
 #include <vector>
 
-#include "estimation/bounded/leaf_evaluator.hpp"
+#include "estimation/bounded/leaves/bin_likelihood.hpp"
+#include "estimation/bounded/search/search_goal.hpp"
 
 namespace palpate {
 
@@ -22,8 +23,10 @@ class EvaluatedBins {
   /// There is no room for more.
   bool full() const { return bytes_used() > most_bytes; }
   void visit(const BinVisitor& visit) const;
-  /// Number of log-likelihoods that are kept.
-  std::size_t values() const { return values_.size(); }
+  std::span<const BinBox> boxes() const { return boxes_; }
+  /// The log-likelihoods that are kept, box after box.
+  std::span<double> values() { return values_; }
+  std::span<const double> values() const { return values_; }
 
   std::uint64_t bytes() const {
     return boxes_.capacity() * sizeof(BinBox) + values_.capacity() * sizeof(double) +
@@ -44,6 +47,38 @@ class EvaluatedBins {
   std::vector<std::uint32_t> value_counts_;  ///< [box]
   std::vector<double> values_;
   bool complete_ = true;
+};
+
+/// The bins that held nearly all of a belief, followed through more touches without a search: after
+/// a touch that surprises nobody they still do.
+class FollowedBins {
+ public:
+  /// More bins would take longer than a search.
+  static constexpr std::size_t most_bins = 1 << 14;
+
+  /// @param bins,found of one search; all bins that it evaluated
+  /// @param log_weight [hypothesis] log of its prior weight
+  FollowedBins(const EvaluatedBins& bins, const SearchResult& found,
+               std::span<const double> log_weight);
+
+  /// Takes in the elements of more touches.
+  /// @param most [hypothesis] log-likelihood that no pose exceeds, in nats
+  void add(const KnownElements& elements, const BinLikelihood& likelihood,
+           std::span<const double> most);
+
+  /// Bound of the mass of all other bins, relative to that of these.
+  double share_outside() const;
+  /// Log of the summed likelihood of the bins, with prior weights.
+  double log_total() const { return log_total_; }
+  void visit(const BinVisitor& visit) const { bins_.visit(visit); }
+
+ private:
+  void add_up();
+
+  std::vector<double> log_weight_;
+  EvaluatedBins bins_{true};
+  std::vector<double> outside_;  ///< [hypothesis] log of the bound, with the prior weight
+  double log_total_ = 0.0;
 };
 
 }  // namespace palpate

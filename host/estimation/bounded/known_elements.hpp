@@ -6,7 +6,7 @@
 
 #include <glm/vec2.hpp>
 
-#include "estimation/bounded/array_overlap.hpp"
+#include "estimation/bounded/touch_overlap.hpp"
 #include "palpate/contact_model.hpp"
 
 namespace palpate {

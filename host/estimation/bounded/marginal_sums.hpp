@@ -5,7 +5,7 @@
 #include <utility>
 #include <vector>
 
-#include "estimation/bounded/bin_likelihood.hpp"
+#include "estimation/bin_box.hpp"
 #include "palpate/estimate.hpp"
 
 namespace palpate {

@@ -21,8 +21,8 @@ double width(const LogInterval& of) { return of.high - of.low; }
 }  // namespace
 
 NoneEvidence::NoneEvidence(SearchSpace& space, const BoundedOptions& options,
-                           const BinLikelihood& likelihood, FasterBinLikelihood& batches)
-    : space_(space), options_(options), search_(space, options, likelihood, batches) {}
+                           const BinLikelihood& likelihood)
+    : space_(space), options_(options), search_(space, options, likelihood) {}
 
 void NoneEvidence::add(std::span<const ArrayReadings> touches) {
   std::vector<TouchMean> added;
@@ -47,23 +47,16 @@ LogInterval NoneEvidence::search(TouchMean& mean, double tolerance, const Deadli
     }
   }
   const KnownElements elements = known_elements(mean.touch);
-  search_.reset();
-  search_.add(elements);
+  search_.largest().reset();
+  search_.largest().add(elements);
   const SearchResult found = search_.run(
       elements, {.tolerance = tolerance, .mode = false, .counted = everywhere ? nullptr : &overlap},
       deadline, [](const BinBox& /*box*/, std::span<const double> /*log_likelihood*/) {});
-  LogSum evaluated;
-  LogSum rounding;
-  LogSum dropped;
-  for (const HypothesisEvidence& evidence : found.evidence) {
-    evaluated.add(evidence.evaluated);
-    rounding.add(evidence.rounding);
-    dropped.add(evidence.dropped);
-  }
+  const HypothesisMass all = found.all();
   const double log_bins = std::log(bins);
   mean.log_share = log_bins - std::log(static_cast<double>(options_.lattice.bins()));
-  return {log_subtract(evaluated.log(), rounding.log()) - log_bins,
-          log_add(log_add(evaluated.log(), rounding.log()), dropped.log()) - log_bins};
+  return {log_subtract(all.evaluated, all.rounding) - log_bins,
+          log_add(log_add(all.evaluated, all.rounding), all.dropped) - log_bins};
 }
 
 void NoneEvidence::narrow(TouchMean& mean, double width_nats, const Deadline& deadline) {

@@ -8,9 +8,9 @@
 #include <span>
 #include <vector>
 
-#include "estimation/bounded/bound_search.hpp"
 #include "estimation/bounded/known_elements.hpp"
-#include "estimation/bounded/search_space.hpp"
+#include "estimation/bounded/search/bound_search.hpp"
+#include "estimation/bounded/search/search_space.hpp"
 #include "palpate/estimate.hpp"
 
 namespace palpate {
@@ -26,9 +26,8 @@ namespace palpate {
 class NoneEvidence {
  public:
   /// @param options checked, with a resolved contact model
-  /// @param likelihood,batches evaluate bins; all of these outlive this object
-  NoneEvidence(SearchSpace& space, const BoundedOptions& options, const BinLikelihood& likelihood,
-               FasterBinLikelihood& batches);
+  /// @param likelihood evaluates bins; all of these outlive this object
+  NoneEvidence(SearchSpace& space, const BoundedOptions& options, const BinLikelihood& likelihood);
 
   void reset() { means_.clear(); }
   /// Takes in touches; those without a known element say nothing. All of them, or none where memory
@@ -44,7 +43,7 @@ class NoneEvidence {
   LogInterval bounds(double width_nats, const Deadline& deadline);
 
   /// Host memory, in bytes.
-  std::uint64_t bytes() const { return search_.bytes(); }
+  std::uint64_t bytes() const { return search_.largest().bytes(); }
 
  private:
   static constexpr double infinity = std::numeric_limits<double>::infinity();

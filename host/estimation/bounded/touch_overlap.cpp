@@ -3,12 +3,62 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 
 #include "estimation/bounded/parallel_for.hpp"
 
 namespace palpate {
 
 namespace {
+
+// Rectangles that come as close count as overlapping, as in sum_overlap.comp.glsl.
+constexpr double touching_mm = 1e-3;
+
+constexpr double infinity = std::numeric_limits<double>::infinity();
+
+/// A length or place of which products stay finite. No region reaches so far.
+glm::dvec2 within_reach(const glm::dvec2& mm) {
+  static constexpr double far_mm = 1e30;
+  const auto limit = [](double v) {
+    return std::isnan(v) ? far_mm : std::clamp(v, -far_mm, far_mm);
+  };
+  return {limit(mm.x), limit(mm.y)};
+}
+
+/// An interval of reals.
+struct Interval {
+  double low = -infinity;
+  double high = infinity;
+
+  void cut(const Interval& other) {
+    low = std::max(low, other.low);
+    high = std::min(high, other.high);
+  }
+};
+
+/// The u with |slope u + offset| <= reach.
+Interval within(double slope, double offset, double reach) {
+  if (slope == 0.0) {
+    return std::abs(offset) <= reach ? Interval{} : Interval{infinity, -infinity};
+  }
+  const double a = (-reach - offset) / slope;
+  const double b = (reach - offset) / slope;
+  return {std::min(a, b), std::max(a, b)};
+}
+
+/// The bins of an axis whose centres lie in an interval.
+OverlapPlane::Bins bins_within(const Axis& axis, const Interval& interval) {
+  const double step = axis.step();
+  const double first_centre = axis.centre(0);
+  if (!(step > 0.0)) {
+    return {0, interval.low <= first_centre && first_centre <= interval.high ? axis.count : 0};
+  }
+  const double last = axis.count - 1.0;
+  const double from = std::max(0.0, std::ceil((interval.low - first_centre) / step));
+  const double to = std::min(last, std::floor((interval.high - first_centre) / step));
+  return from <= to ? OverlapPlane::Bins{static_cast<int>(from), static_cast<int>(to - from) + 1}
+                    : OverlapPlane::Bins{};
+}
 
 /// Bins of a box's row y that a plane holds, counted from the box's first.
 OverlapPlane::Bins in_row(const OverlapPlane& plane, const BinBox& box, int y) {
@@ -19,6 +69,80 @@ OverlapPlane::Bins in_row(const OverlapPlane& plane, const BinBox& box, int y) {
 }
 
 }  // namespace
+
+ArrayRectangle array_rectangle(const Touch& touch, const glm::dvec2& pivot_mm) {
+  const BoundingBox box = bounding_box(touch.elements_mm);
+  return {.from_pivot_mm = within_reach(touch.T_robot_sensor * box.middle() - pivot_mm),
+          .half_mm = within_reach(box.extent() / 2.0),
+          .direction_rad = touch.T_robot_sensor.theta_rad};
+}
+
+OverlapPlane::OverlapPlane(const ArrayRectangle& array, const BoundingBox& object,
+                           const PoseLattice& lattice, int theta)
+    : x_mm_(lattice.x_mm), y_mm_(lattice.y_mm) {
+  const double theta_rad = lattice.theta_rad.centre(theta);
+  apart_mm_ = rotate(theta_rad, array.from_pivot_mm) - object.middle();
+  cos_ = std::cos(theta_rad + array.direction_rad);
+  sin_ = std::sin(theta_rad + array.direction_rad);
+  const double c = std::abs(cos_);
+  const double s = std::abs(sin_);
+  const glm::dvec2 half = object.extent() / 2.0;
+  reach_mm_ = half +
+              glm::dvec2(c * array.half_mm.x + s * array.half_mm.y,
+                         s * array.half_mm.x + c * array.half_mm.y) +
+              touching_mm;
+  turned_reach_mm_ =
+      array.half_mm + glm::dvec2(c * half.x + s * half.y, s * half.x + c * half.y) + touching_mm;
+  // So far the turned rectangle of offsets reaches; rounding must not lose a bin.
+  constexpr double rounding = 1.0 + 1e-9;
+  const glm::dvec2 turned = rounding * glm::dvec2(c * turned_reach_mm_.x + s * turned_reach_mm_.y,
+                                                  s * turned_reach_mm_.x + c * turned_reach_mm_.y);
+  columns_ = bins_within(x_mm_, within(1.0, apart_mm_.x, std::min(reach_mm_.x, turned.x)));
+  rows_ = bins_within(y_mm_, within(1.0, apart_mm_.y, std::min(reach_mm_.y, turned.y)));
+}
+
+OverlapPlane::Bins OverlapPlane::row(int y) const {
+  if (y < rows_.first || y >= rows_.first + rows_.count) {
+    return {};
+  }
+  const double apart_y = apart_mm_.y + y_mm_.centre(y);
+  Interval apart_x{-reach_mm_.x, reach_mm_.x};
+  apart_x.cut(within(cos_, sin_ * apart_y, turned_reach_mm_.x));
+  apart_x.cut(within(-sin_, cos_ * apart_y, turned_reach_mm_.y));
+  return bins_within(x_mm_, {apart_x.low - apart_mm_.x, apart_x.high - apart_mm_.x});
+}
+
+bool OverlapPlane::may_overlap(const Bins& x, const Bins& y) const {
+  // The box of offsets, cut to what overlaps along the object's axes, against the turned rectangle.
+  const auto cut = [](const Axis& axis, const Bins& bins, const Bins& to) {
+    const int first = std::max(bins.first, to.first);
+    const int last = std::min(bins.first + bins.count, to.first + to.count) - 1;
+    return first <= last ? Interval{axis.centre(first), axis.centre(last)}
+                         : Interval{infinity, -infinity};
+  };
+  const Interval of_x = cut(x_mm_, x, columns_);
+  const Interval of_y = cut(y_mm_, y, rows_);
+  if (!(of_x.low <= of_x.high && of_y.low <= of_y.high)) {
+    return false;
+  }
+  const glm::dvec2 half(std::midpoint(-of_x.low, of_x.high), std::midpoint(-of_y.low, of_y.high));
+  const glm::dvec2 apart = apart_mm_ + glm::dvec2(std::midpoint(of_x.low, of_x.high),
+                                                  std::midpoint(of_y.low, of_y.high));
+  const double c = std::abs(cos_);
+  const double s = std::abs(sin_);
+  return std::abs(cos_ * apart.x + sin_ * apart.y) <=
+             turned_reach_mm_.x + c * half.x + s * half.y + touching_mm &&
+         std::abs(cos_ * apart.y - sin_ * apart.x) <=
+             turned_reach_mm_.y + s * half.x + c * half.y + touching_mm;
+}
+
+std::int64_t OverlapPlane::bins() const {
+  std::int64_t sum = 0;
+  for (int y = rows_.first; y < rows_.first + rows_.count; ++y) {
+    sum += row(y).count;
+  }
+  return sum;
+}
 
 TouchOverlap::TouchOverlap(const ArrayRectangle& array, std::span<const BoundingBox> boxes,
                            const PoseLattice& lattice)

@@ -4,12 +4,59 @@
 #include <span>
 #include <vector>
 
-#include "estimation/bounded/array_overlap.hpp"
-#include "estimation/bounded/bin_likelihood.hpp"
+#include "estimation/bin_box.hpp"
 #include "model/bounding_box.hpp"
 #include "palpate/lattice.hpp"
+#include "palpate/touch.hpp"
 
 namespace palpate {
+
+/// The rectangle around a touch's elements, parallel to the sensor's axes. Lengths in mm.
+struct ArrayRectangle {
+  glm::dvec2 from_pivot_mm{};  ///< of its centre, in the robot frame
+  glm::dvec2 half_mm{};        ///< half its sides
+  double direction_rad = 0.0;  ///< of the sensor's x axis, in the robot frame
+};
+
+ArrayRectangle array_rectangle(const Touch& touch, const glm::dvec2& pivot_mm);
+
+/// The bins of one theta at which the array overlaps an object: at which its rectangle meets the
+/// box around the object's cells, as OverlapMean and reference::overlaps() have it. Whether two
+/// rectangles meet is decided by their shadows on the four axes of both, and each shadow bounds x
+/// in a row of bins from both sides: the overlapping bins of a row are neighbours.
+class OverlapPlane {
+ public:
+  /// Neighbouring bins of a row.
+  struct Bins {
+    int first = 0;
+    int count = 0;
+  };
+
+  /// @param object around the object's occupied cells, in the object frame
+  OverlapPlane(const ArrayRectangle& array, const BoundingBox& object, const PoseLattice& lattice,
+               int theta);
+
+  /// The rows and the columns that may hold overlapping bins.
+  Bins rows() const { return rows_; }
+  Bins columns() const { return columns_; }
+  /// The overlapping bins of any row.
+  Bins row(int y) const;
+  /// Number of overlapping bins.
+  std::int64_t bins() const;
+  /// False only where none of the bins of these rows and columns overlaps.
+  bool may_overlap(const Bins& x, const Bins& y) const;
+
+ private:
+  Axis x_mm_;
+  Axis y_mm_;
+  glm::dvec2 apart_mm_{};         ///< from the object's middle to the array's, at x = y = 0
+  glm::dvec2 reach_mm_{};         ///< of |apart| along the object's axes
+  glm::dvec2 turned_reach_mm_{};  ///< of |apart| along the array's axes
+  double cos_ = 1.0;              ///< of the array's direction in the object frame
+  double sin_ = 0.0;
+  Bins rows_;
+  Bins columns_;
+};
 
 /// The bins at which a touch's array overlaps the objects: those over which "none of these" takes
 /// the mean of the touch's likelihood.

@@ -55,16 +55,17 @@ Range bins_within(int centre, double first, double last, const Axis& axis) {
                  centre + static_cast<int>(std::floor(steps(last / axis.step()) + rounding)), axis);
 }
 
-/// For each theta, a block that holds the window's bins.
-std::vector<BinWindow> blocks_around(const PoseLattice& lattice, const Body& body,
-                                     const BinIndex& centre, const BodyMotion& motion,
-                                     double radius_mm) {
+/// For each theta, a box that holds the window's bins. Thetas continue beyond the ends of the
+/// circle.
+std::vector<BinBox> boxes_around(const PoseLattice& lattice, int object, const Body& body,
+                                 const BinIndex& centre, const BodyMotion& motion,
+                                 double radius_mm) {
   const int most_steps = steps_within(radius_mm / spin_mm(body), lattice.theta_rad);
   const Range thetas =
       lattice.full_circle()
           ? around_circle(centre.theta, most_steps, lattice.theta_rad)
           : clipped(centre.theta - most_steps, centre.theta + most_steps, lattice.theta_rad);
-  std::vector<BinWindow> blocks;
+  std::vector<BinBox> boxes;
   for (int theta = thetas.first; theta < thetas.first + thetas.count; ++theta) {
     const int steps = theta - centre.theta;
     const glm::dvec3 turned_mm = motion.by({0.0, 0.0, steps * lattice.theta_rad.step()});
@@ -84,10 +85,10 @@ std::vector<BinWindow> blocks_around(const PoseLattice& lattice, const Body& bod
     const Range y = range(centre.y, turned_mm.y, lattice.y_mm);
     const Range x = range(centre.x, turned_mm.x, lattice.x_mm);
     if (y.count > 0 && x.count > 0) {
-      blocks.push_back({theta, 1, y.first, y.count, x.first, x.count});
+      boxes.push_back({object, theta, y.first, y.count, x.first, x.count});
     }
   }
-  return blocks;
+  return boxes;
 }
 
 }  // namespace
@@ -108,24 +109,29 @@ glm::dvec3 BodyMotion::change_for(const glm::dvec3& moved_mm) const {
   return {glm::dvec2(moved_mm) - swing_mm(turn_rad), turn_rad};
 }
 
-BodyWindow body_window(const WindowLogLikelihood& log_likelihood, const PoseLattice& lattice,
-                       const Body& body, const BinIndex& centre, double radius_mm) {
+BodyWindow body_window(const BoxLogLikelihood& log_likelihood, const PoseLattice& lattice,
+                       int object, const Body& body, const BinIndex& centre, double radius_mm) {
   BodyWindow window{.centre = {lattice.x_mm.centre(centre.x), lattice.y_mm.centre(centre.y),
                                lattice.theta_rad.centre(centre.theta)},
                     .bins = {},
                     .largest = -std::numeric_limits<double>::infinity()};
   const BodyMotion motion(body, window.centre);
-  const std::vector<BinWindow> blocks = blocks_around(lattice, body, centre, motion, radius_mm);
-  const std::vector<double> logs = log_likelihood(blocks);
+  const std::vector<BinBox> boxes = boxes_around(lattice, object, body, centre, motion, radius_mm);
+  std::vector<BinBox> on_lattice = boxes;
+  for (BinBox& box : on_lattice) {
+    const int thetas = lattice.theta_rad.count;
+    box.theta = (box.theta % thetas + thetas) % thetas;
+  }
+  const std::vector<double> logs = log_likelihood(on_lattice);
   std::size_t k = 0;
-  for (const BinWindow& block : blocks) {
-    const int theta_steps = block.theta_first - centre.theta;
+  for (const BinBox& box : boxes) {
+    const int theta_steps = box.theta - centre.theta;
     const glm::dvec3 turn(0.0, 0.0, theta_steps * lattice.theta_rad.step());
     const glm::dvec3 turned_mm = motion.by(turn);
-    for (int j = 0; j < block.row_count; ++j) {
-      for (int i = 0; i < block.column_count; ++i, ++k) {
-        const int x_steps = block.column_first + i - centre.x;
-        const int y_steps = block.row_first + j - centre.y;
+    for (int j = 0; j < box.y_count; ++j) {
+      for (int i = 0; i < box.x_count; ++i, ++k) {
+        const int x_steps = box.x_first + i - centre.x;
+        const int y_steps = box.y_first + j - centre.y;
         const glm::dvec3 shift(x_steps * lattice.x_mm.step(), y_steps * lattice.y_mm.step(), 0.0);
         const glm::dvec3 moved_mm = shift + turned_mm;
         const bool neighbour =

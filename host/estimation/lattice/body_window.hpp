@@ -5,7 +5,7 @@
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 
-#include "estimation/lattice/bin_window.hpp"
+#include "estimation/bin_box.hpp"
 #include "palpate/lattice.hpp"
 #include "palpate/pose_error.hpp"
 
@@ -40,23 +40,23 @@ class BodyMotion {
   double spin_mm_;       ///< root mean square distance of the body from its centroid
 };
 
-/// A bin of a window.
-struct WindowBin {
-  glm::dvec3 offset{0.0};    ///< from the centre bin, in (x_mm, y_mm, theta_rad)
-  glm::dvec3 moved_mm{0.0};  ///< how far the body moves from the centre bin: BodyMotion::by(offset)
-  double log_likelihood = 0.0;
-  bool within_radius = false;  ///< otherwise the bin is only a neighbour of the centre bin
-};
-
 /// The bins around a centre bin that move the body by at most a radius, and the centre bin's
 /// neighbours.
 struct BodyWindow {
+  struct Bin {
+    glm::dvec3 offset{0.0};    ///< from the centre bin, in (x_mm, y_mm, theta_rad)
+    glm::dvec3 moved_mm{0.0};  ///< how far the body moves: BodyMotion::by(offset)
+    double log_likelihood = 0.0;
+    bool within_radius = false;  ///< otherwise the bin is only a neighbour of the centre bin
+  };
+
   glm::dvec3 centre{0.0};  ///< of the centre bin, in (x_mm, y_mm, theta_rad)
-  std::vector<WindowBin> bins;
+  std::vector<Bin> bins;
   double largest = 0.0;  ///< log-likelihood of the best of the bins
 };
 
-BodyWindow body_window(const WindowLogLikelihood& log_likelihood, const PoseLattice& lattice,
-                       const Body& body, const BinIndex& centre, double radius_mm);
+/// @param object of the bins that `log_likelihood` is asked for
+BodyWindow body_window(const BoxLogLikelihood& log_likelihood, const PoseLattice& lattice,
+                       int object, const Body& body, const BinIndex& centre, double radius_mm);
 
 }  // namespace palpate

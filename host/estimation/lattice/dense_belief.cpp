@@ -327,46 +327,42 @@ Marginals DenseBelief::marginals(std::size_t object, TwoFloat max, double of_lar
   return sums;
 }
 
-std::vector<double> DenseBelief::download(std::size_t object,
-                                          std::span<const BinWindow> windows) const {
-  const int thetas = lattice_.theta_rad.count;
+std::vector<double> DenseBelief::download(std::span<const BinBox> boxes) const {
   const auto nx = static_cast<std::size_t>(lattice_.x_mm.count);
   std::size_t rows = 0;
-  for (const BinWindow& window : windows) {
-    rows += window.rows();
+  for (const BinBox& box : boxes) {
+    rows += static_cast<std::size_t>(box.y_count);
   }
   std::vector<TwoFloat> raw(rows * nx);  // whole rows: they are contiguous
   std::size_t row_in_raw = 0;
-  for (const BinWindow& window : windows) {
-    const int row_end = window.row_first + window.row_count;
-    for (int t = 0; t < window.theta_count; ++t, row_in_raw += window.row_count) {
-      const int theta = ((window.theta_first + t) % thetas + thetas) % thetas;
-      for (const Slab& slab : slabs_) {
-        const int slab_theta = theta - static_cast<int>(slab.theta_first);
-        const int slab_row = static_cast<int>(slab.row_first);
-        const int slab_end = slab_row + static_cast<int>(slab.row_count);
-        const int begin = std::max(window.row_first, slab_row);
-        const int end = std::min(row_end, slab_end);
-        if (!slab.holds(object) || slab_theta < 0 ||
-            slab_theta >= static_cast<int>(slab.theta_count) || begin >= end) {
-          continue;
-        }
-        const std::size_t row_in_slab =
-            static_cast<std::size_t>(slab_theta) * slab.row_count + (begin - slab_row);
-        stream_.download(slab.log_likelihood,
-                         std::span(raw).subspan((row_in_raw + (begin - window.row_first)) * nx,
-                                                (end - begin) * nx),
-                         (slab.first_bin(object) + row_in_slab * nx) * sizeof(TwoFloat));
+  for (const BinBox& box : boxes) {
+    for (const Slab& slab : slabs_) {
+      const int slab_theta = box.theta - static_cast<int>(slab.theta_first);
+      const int slab_row = static_cast<int>(slab.row_first);
+      const int slab_end = slab_row + static_cast<int>(slab.row_count);
+      const int begin = std::max(box.y_first, slab_row);
+      const int end = std::min(box.y_first + box.y_count, slab_end);
+      const auto object = static_cast<std::size_t>(box.object);
+      if (!slab.holds(object) || slab_theta < 0 ||
+          slab_theta >= static_cast<int>(slab.theta_count) || begin >= end) {
+        continue;
       }
+      const std::size_t row_in_slab =
+          static_cast<std::size_t>(slab_theta) * slab.row_count + (begin - slab_row);
+      stream_.download(
+          slab.log_likelihood,
+          std::span(raw).subspan((row_in_raw + (begin - box.y_first)) * nx, (end - begin) * nx),
+          (slab.first_bin(object) + row_in_slab * nx) * sizeof(TwoFloat));
     }
+    row_in_raw += static_cast<std::size_t>(box.y_count);
   }
   stream_.run();
   std::vector<double> values;
   const TwoFloat* row = raw.data();
-  for (const BinWindow& window : windows) {
-    for (std::size_t i = 0; i < window.rows(); ++i, row += nx) {
-      const TwoFloat* const first = row + window.column_first;
-      std::transform(first, first + window.column_count, std::back_inserter(values),
+  for (const BinBox& box : boxes) {
+    for (int i = 0; i < box.y_count; ++i, row += nx) {
+      const TwoFloat* const first = row + box.x_first;
+      std::transform(first, first + box.x_count, std::back_inserter(values),
                      [](const TwoFloat& nats) { return nats.value(); });
     }
   }

@@ -4,8 +4,8 @@
 #include <span>
 #include <vector>
 
+#include "estimation/bin_box.hpp"
 #include "estimation/kernel_sizes.hpp"
-#include "estimation/lattice/bin_window.hpp"
 #include "estimation/lattice/slab.hpp"
 #include "estimation/two_float.hpp"
 #include "gpu/command_stream.hpp"
@@ -68,8 +68,8 @@ class DenseBelief {
   /// Entropy of one object's bins by themselves, in nats, within 1e-4. Reads only the blocks that
   /// hold a part of it.
   double entropy(std::size_t object, const BeliefSummary& summary) const;
-  /// One object's log-likelihoods in windows, one after another, each [theta, y, x].
-  std::vector<double> download(std::size_t object, std::span<const BinWindow> windows) const;
+  /// The log-likelihoods of boxes of bins, one after another, each [y, x].
+  std::vector<double> download(std::span<const BinBox> boxes) const;
 
  private:
   gpu::Context& context_;

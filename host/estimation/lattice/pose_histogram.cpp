@@ -22,6 +22,7 @@
 #include "estimation/lattice/still_array.hpp"
 #include "estimation/lattice/touch_by_touch.hpp"
 #include "estimation/moved_pivot.hpp"
+#include "estimation/pose_draws.hpp"
 #include "gpu/command_stream.hpp"
 #include "model/own_process.hpp"
 #include "model/random.hpp"
@@ -298,10 +299,9 @@ Estimate PoseHistogram::estimate() const {
 RefinedPose PoseHistogram::refine(const Mode& mode) const {
   Impl& histogram = whole();
   histogram.require_object(mode.object);
-  const auto log_likelihood = [&](std::span<const BinWindow> windows) {
-    return histogram.belief.download(static_cast<std::size_t>(mode.object), windows);
-  };
-  return palpate::refine(log_likelihood, lattice(), histogram.bodies[mode.object], mode);
+  return palpate::refine(
+      [&](std::span<const BinBox> boxes) { return histogram.belief.download(boxes); }, lattice(),
+      histogram.bodies[mode.object], mode);
 }
 
 Marginals PoseHistogram::marginals(int object) const {
@@ -318,11 +318,11 @@ Marginals PoseHistogram::marginals(int object) const {
 std::vector<double> PoseHistogram::log_likelihood(int object) const {
   Impl& histogram = whole();
   histogram.require_object(object);
-  const BinWindow all{.theta_count = lattice().theta_rad.count,
-                      .row_count = lattice().y_mm.count,
-                      .column_count = lattice().x_mm.count};
-  std::vector<double> logs =
-      histogram.belief.download(static_cast<std::size_t>(object), std::span(&all, 1));
+  std::vector<BinBox> all;
+  for (int theta = 0; theta < lattice().theta_rad.count; ++theta) {
+    all.push_back(whole_plane(lattice(), theta, object));
+  }
+  std::vector<double> logs = histogram.belief.download(all);
   if (const double lost = histogram.lost_mass(static_cast<std::size_t>(object)); lost != 0.0) {
     for (double& log_likelihood : logs) {
       log_likelihood += lost;
@@ -349,12 +349,10 @@ std::vector<PoseSample> PoseHistogram::sample(std::size_t count, std::uint64_t s
   Random random(seed, Stream::belief);
   const std::vector<double> identity = normalised(histogram.log_evidence());
   const std::size_t objects = identity.size();
-  // One draw in each of `count` equal parts of the belief: less variance than independent draws.
   std::vector<std::vector<double>> parts(objects);
   double before = 0.0;
   std::size_t object = 0;
-  for (std::size_t i = 0; i < count; ++i) {
-    const double at = (static_cast<double>(i) + random.uniform()) / static_cast<double>(count);
+  for (const double at : one_in_each_part(count, random)) {
     while (object + 1 < objects && before + identity[object] <= at) {
       before += identity[object++];
     }
@@ -362,19 +360,12 @@ std::vector<PoseSample> PoseHistogram::sample(std::size_t count, std::uint64_t s
   }
   std::vector<PoseSample> samples;
   samples.reserve(count);
-  const PoseLattice& in = histogram.options.lattice;
-  const auto within = [&](const Axis& axis, std::int64_t bin) {
-    return axis.centre(static_cast<int>(bin)) + random.uniform(-0.5, 0.5) * axis.step();
-  };
   for (std::size_t i = 0; i < objects; ++i) {
     if (parts[i].empty()) {
       continue;
     }
     for (const std::int64_t bin : histogram.belief.bins_at(i, histogram.summaries()[i], parts[i])) {
-      const double x = within(in.x_mm, bin % in.x_mm.count);
-      const double y = within(in.y_mm, bin % in.plane() / in.x_mm.count);
-      const double theta = within(in.theta_rad, bin / in.plane());
-      samples.push_back({static_cast<int>(i), in.T_object_robot(x, y, theta)});
+      samples.push_back({static_cast<int>(i), draw_within(bin, histogram.options.lattice, random)});
     }
   }
   return samples;

@@ -59,7 +59,7 @@ BinIndex bin_at(const PoseLattice& lattice, const BinIndex& from, const glm::dve
 /// The n of the weights belief^(1/n).
 double root_of(const BodyWindow& window) {
   std::vector<DisplacedBin> bins;
-  for (const WindowBin& bin : window.bins) {
+  for (const BodyWindow::Bin& bin : window.bins) {
     if (bin.within_radius) {
       bins.push_back({bin.moved_mm, bin.log_likelihood});
     }
@@ -71,7 +71,7 @@ double root_of(const BodyWindow& window) {
 glm::dvec3 weighted_mean(const BodyWindow& window, double root) {
   glm::dvec3 sum{0.0};
   double total = 0.0;
-  for (const WindowBin& bin : window.bins) {
+  for (const BodyWindow::Bin& bin : window.bins) {
     const double weight = std::exp((bin.log_likelihood - window.largest) / root);
     sum += weight * bin.offset;
     total += weight;
@@ -87,7 +87,7 @@ std::optional<glm::dvec3> peak_near(const BodyWindow& window, const PoseLattice&
   const BodyMotion motion(body, window.centre + mean);
   std::vector<WeightedValue> values;
   double farthest_rad = 0.0;
-  for (const WindowBin& bin : window.bins) {
+  for (const BodyWindow::Bin& bin : window.bins) {
     if (!bin.within_radius) {
       continue;
     }
@@ -129,7 +129,7 @@ glm::dmat3 second_moment(const BodyWindow& window, const PoseLattice& lattice,
                          const glm::dvec3& about) {
   glm::dmat3 moment{0.0};
   double total = 0.0;
-  for (const WindowBin& bin : window.bins) {
+  for (const BodyWindow::Bin& bin : window.bins) {
     const double weight = std::exp(bin.log_likelihood - window.largest);
     const glm::dvec3 d = bin.offset - about;
     moment += weight * glm::outerProduct(d, d);
@@ -180,14 +180,14 @@ Body displaced_body(const OccupancyGrid& map) {
               (static_cast<double>(map.nx) * map.nx + static_cast<double>(map.ny) * map.ny) / 12.0};
 }
 
-RefinedPose refine(const WindowLogLikelihood& log_likelihood, const PoseLattice& lattice,
+RefinedPose refine(const BoxLogLikelihood& log_likelihood, const PoseLattice& lattice,
                    const Body& body, const Mode& mode) {
   BodyWindow window;
   double root = 0.0;
   glm::dvec3 mean{0.0};
   BinIndex centre = bin_of(lattice, mode);
   for (int pass = 1; pass <= passes; ++pass) {
-    window = body_window(log_likelihood, lattice, body, centre, radius_mm);
+    window = body_window(log_likelihood, lattice, mode.object, body, centre, radius_mm);
     root = root_of(window);
     mean = weighted_mean(window, root);
     const BinIndex nearest = bin_at(lattice, centre, mean);

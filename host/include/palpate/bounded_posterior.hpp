@@ -12,7 +12,6 @@
 
 #include "palpate/api.hpp"
 #include "palpate/contact_model.hpp"
-#include "palpate/device.hpp"
 #include "palpate/estimate.hpp"
 #include "palpate/lattice.hpp"
 
@@ -73,21 +72,16 @@ struct PoseBlock {
 /// at its place from touch to touch, also across reset(), costs less from the third touch on: only
 /// elements that are not in No Contact are looked up. The result does not depend on the order of
 /// touches (but that "none of these" counts the first one's place), on the number of threads or on
-/// the processor's vector width, unless a budget ends the search or a GPU evaluates bins faster
-/// than the host. An object that was moved from throws Error on every call.
+/// the processor's vector width, unless a budget ends the search. An object that was moved from
+/// throws Error on every call.
 class PALPATE_API BoundedPosterior {
  public:
-  /// Builds the window tables of the maps. Evaluates bins on the host, with equal bits on every
-  /// run.
+  /// Builds the window tables of the maps.
   /// @throws Error on an empty list, a map that is not sound, maps of different priors where the
   /// options give none, a weight that is not positive and finite, a lattice, contact model or
   /// option out of range, a table for another number of objects, or a lattice whose tiles and
   /// tables would take more than a quarter of the machine's memory
   BoundedPosterior(std::span<const Hypothesis> hypotheses, const BoundedOptions& options);
-  /// The same with a device. A GPU takes the bins once it was measured to be faster than the host,
-  /// and its rounding then depends on when that was.
-  BoundedPosterior(Device& device, std::span<const Hypothesis> hypotheses,
-                   const BoundedOptions& options);
   ~BoundedPosterior();
   BoundedPosterior(BoundedPosterior&&) noexcept;
   BoundedPosterior& operator=(BoundedPosterior&&) noexcept;
@@ -135,7 +129,7 @@ class PALPATE_API BoundedPosterior {
   std::vector<PoseBlock> refined_blocks() const;
 
   const PoseLattice& lattice() const;
-  /// How blocks are bounded and bins evaluated, and why: vector instructions, threads, device.
+  /// How blocks are bounded and bins evaluated: vector instructions and threads.
   std::string path() const;
   /// Host memory that tables, penalties and evaluated bins hold, in bytes.
   std::uint64_t host_bytes() const;

@@ -1,4 +1,4 @@
-#include "estimation/bounded/bin_likelihood.hpp"
+#include "estimation/bounded/leaves/bin_likelihood.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -66,6 +66,22 @@ std::vector<BinBox> planes(const PoseLattice& lattice) {
     boxes.push_back(whole_plane(lattice, t));
   }
   return boxes;
+}
+
+TEST(BinLikelihood, HasTheSameBitsOnThreads) {
+  const BinCase of = letter_case();
+  const BinLikelihood likelihood = likelihood_of(of);
+  // Planes are larger than a thread's task, the small boxes between them smaller.
+  std::vector<BinBox> boxes = planes(of.lattice);
+  for (int i = 0; i < 300; ++i) {
+    const BinBox small{
+        .theta = i % 3, .y_first = i % 24, .y_count = 1 + i % 7, .x_first = i % 58, .x_count = 5};
+    boxes.insert(boxes.end() - 1, small);
+  }
+  const std::vector<float> plain = evaluated<float>(likelihood, of, boxes);
+  std::vector<float> on_threads(plain.size());
+  likelihood.evaluate_on_threads(boxes, of.elements, on_threads);
+  EXPECT_EQ(on_threads, plain);
 }
 
 class BinsAlongAxes : public testing::TestWithParam<int> {};

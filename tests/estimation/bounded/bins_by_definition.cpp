@@ -102,10 +102,6 @@ LikelihoodTable crooked_table() {
   return table;
 }
 
-BinBox whole_plane(const PoseLattice& lattice, int theta) {
-  return {.theta = theta, .y_count = lattice.y_mm.count, .x_count = lattice.x_mm.count};
-}
-
 std::vector<long double> by_definition(const BinCase& of, const std::vector<BinBox>& boxes) {
   const Real prior = log_odds_from_probability(*of.contact.prior);
   std::vector<Real> logs;

@@ -2,7 +2,7 @@
 
 #include <vector>
 
-#include "estimation/bounded/bin_likelihood.hpp"
+#include "estimation/bounded/leaves/bin_likelihood.hpp"
 #include "palpate/contact_model.hpp"
 #include "palpate/occupancy_grid.hpp"
 
@@ -29,9 +29,6 @@ ArrayReadings readings_of(const KnownElements& elements);
 
 /// A table of four levels that is not monotone, the last level steeper than any map.
 LikelihoodTable crooked_table();
-
-/// All bins of a theta.
-BinBox whole_plane(const PoseLattice& lattice, int theta);
 
 /// Log-likelihood of the elements at every bin of the boxes, in nats: the definition in long
 /// double.

@@ -3,7 +3,7 @@
 #include <vector>
 
 #include "bins_by_definition.hpp"
-#include "estimation/bounded/tile_bounds.hpp"
+#include "estimation/bounded/tables/tile_bounds.hpp"
 #include "synthetic.hpp"
 
 namespace palpate {

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <numeric>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -11,6 +10,7 @@
 #include <glm/vec3.hpp>
 
 #include "bounded/certified.hpp"
+#include "bounded_set_up.hpp"
 #include "estimation/bounded/bounded_belief.hpp"
 #include "estimation/hypotheses.hpp"
 #include "palpate/pose_histogram.hpp"
@@ -18,29 +18,6 @@
 
 namespace palpate {
 namespace {
-
-const std::vector<Hypothesis>& two_shapes() {
-  static const std::vector<Hypothesis> two{{map_of(on_letter_l, "L"), 1.0},
-                                           {map_of(on_disc, "disc"), 2.0}};
-  return two;
-}
-
-BoundedOptions small_options() {
-  BoundedOptions options;
-  options.lattice = {.x_mm = {-6.0, 6.0, 13},
-                     .y_mm = {-5.0, 6.0, 12},
-                     .theta_rad = {0, two_pi, 16},
-                     .pivot_mm = {2.0, -1.0}};
-  return options;
-}
-
-Recording touches_of_l(std::size_t touches, std::uint64_t seed) {
-  return touches_of(on_letter_l, {{1.3, -0.8}, 0.7}, touches, seed);
-}
-
-double sum(std::span<const double> values) {
-  return std::accumulate(values.begin(), values.end(), 0.0);
-}
 
 TEST(BoundedBelief, HasTheEntropyOfTheDenseOne) {
   Device device = Device::open();
@@ -50,7 +27,7 @@ TEST(BoundedBelief, HasTheEntropyOfTheDenseOne) {
     if (none) {
       options.none_weight = dense_options.none_weight = 5.0;
     }
-    BoundedPosterior bounded(device, two_shapes(), options);
+    BoundedPosterior bounded(two_shapes(), options);
     PoseHistogram dense(device, two_shapes(), dense_options);
     const Recording recording = touches_of_l(4, 821);
     for (std::size_t n = 0; n <= recording.size(); ++n) {
@@ -65,13 +42,12 @@ TEST(BoundedBelief, HasTheEntropyOfTheDenseOne) {
 }
 
 TEST(BoundedBelief, IsDrawnFromInProportion) {
-  Device device = Device::open();
   for (const bool none : {false, true}) {
     BoundedOptions options = small_options();
     if (none) {
       options.none_weight = 5.0;  // which draws leave out
     }
-    BoundedPosterior posterior(device, two_shapes(), options);
+    BoundedPosterior posterior(two_shapes(), options);
     for (const std::size_t touches : {0U, 1U, 3U}) {
       SCOPED_TRACE(::testing::Message() << touches << " touches");
       posterior.reset();
@@ -126,12 +102,11 @@ TEST(BoundedBelief, IsDrawnFromInProportion) {
 // Draws after one more touch may come from the bins that were found before it. A touch of another
 // object, after which other bins count, must not be drawn from these.
 TEST(BoundedBelief, IsDrawnFromInProportionAfterFurtherTouches) {
-  Device device = Device::open();
   const Recording of_l = touches_of_l(4, 826);
   const Recording of_disc = touches_of(on_disc, {{-2.0, 1.5}, 0.0}, 4, 827);
   for (const Recording* last : {&of_l, &of_disc}) {
     SCOPED_TRACE(last == &of_l ? "a touch like the others" : "a touch of the other object");
-    BoundedPosterior posterior(device, two_shapes(), small_options());
+    BoundedPosterior posterior(two_shapes(), small_options());
     posterior.update(of_l.touches(0, 2));
     for (std::size_t next = 2; next < 4; ++next) {
       posterior.sample(10, 1);
@@ -140,7 +115,7 @@ TEST(BoundedBelief, IsDrawnFromInProportionAfterFurtherTouches) {
       for (std::size_t i = 2; i <= next; ++i) {
         all.push_back(last->touch(i));
       }
-      BoundedPosterior fresh(device, two_shapes(), small_options());
+      BoundedPosterior fresh(two_shapes(), small_options());
       fresh.update(all);
       const Estimate exact = fresh.estimate();
       constexpr std::size_t count = 4000;
@@ -163,7 +138,7 @@ TEST(BoundedBelief, IsDrawnFromInProportionAfterFurtherTouches) {
     }
     // What was drawn changes nothing of what is estimated.
     posterior.update(of_l.touch(3));
-    BoundedPosterior fresh(device, two_shapes(), small_options());
+    BoundedPosterior fresh(two_shapes(), small_options());
     fresh.update(of_l.touches(0, 2));
     for (const Touch& touch : {last->touch(2), last->touch(3), of_l.touch(3)}) {
       fresh.update(touch);
@@ -178,8 +153,7 @@ TEST(BoundedBelief, IsDrawnFromInProportionAfterFurtherTouches) {
 }
 
 TEST(BoundedBelief, IsDrawnFromEverywhereWhereNoTouchSeesAMap) {
-  Device device = Device::open();
-  BoundedPosterior posterior(device, two_shapes(), small_options());
+  BoundedPosterior posterior(two_shapes(), small_options());
   Recording recording = touches_of_l(3, 829);
   for (Pose& pose : recording.T_robot_sensor) {
     pose.translation_mm += glm::dvec2(1e3, 0.0);
@@ -223,15 +197,14 @@ TEST(BoundedBelief, IsDrawnFromAllOverTheBins) {
 }
 
 TEST(BoundedBelief, DrawnFromBeforeAnEstimateTellsTheSameAfterwards) {
-  Device device = Device::open();
-  BoundedPosterior asked(device, two_shapes(), small_options());
+  BoundedPosterior asked(two_shapes(), small_options());
   const Recording recording = touches_of_l(2, 823);
   for (const int what : {0, 1, 2}) {  // that is asked after the draws
     SCOPED_TRACE(what);
     asked.reset();
     asked.update(recording.touches(0, 2));
     const Estimate exact = asked.estimate();
-    BoundedPosterior drawn(device, two_shapes(), small_options());
+    BoundedPosterior drawn(two_shapes(), small_options());
     drawn.update(recording.touches(0, 2));
     constexpr std::size_t count = 4000;
     double of_the_first = 0.0;
@@ -258,7 +231,7 @@ TEST(BoundedBelief, DrawsOfManyBinsLeaveOutAHundredthAtMost) {
   options.lattice = {
       .x_mm = {-16.0, 16.0, 120}, .y_mm = {-16.0, 16.0, 120}, .theta_rad = {0, two_pi, 40}};
   options.contact = resolve(options.contact, two_shapes());
-  BoundedBelief belief(nullptr, two_shapes(), options);
+  BoundedBelief belief(two_shapes(), options);
   const Recording recording = touches_of_l(1, 826);
   Touch touch = recording.touch(0);
   std::vector<std::uint8_t> valid(touch.elements_mm.size());
@@ -276,11 +249,10 @@ TEST(BoundedBelief, DrawsOfManyBinsLeaveOutAHundredthAtMost) {
 }
 
 TEST(BoundedBelief, OfAHundredMillionBinsBeforeAnyTouchIsFlat) {
-  Device device = Device::open();
   BoundedOptions options;
   options.lattice = {
       .x_mm = {-50.0, 50.0, 600}, .y_mm = {-50.0, 50.0, 500}, .theta_rad = {0, two_pi, 180}};
-  BoundedPosterior posterior(device, two_shapes(), options);
+  BoundedPosterior posterior(two_shapes(), options);
   const Estimate estimate = posterior.estimate();
   EXPECT_NEAR(estimate.identity[0], 1.0 / 3.0, 1e-6);
   EXPECT_EQ(estimate.mode.log_likelihood, 0.0);
@@ -299,8 +271,7 @@ TEST(BoundedBelief, OfAHundredMillionBinsBeforeAnyTouchIsFlat) {
 }
 
 TEST(BoundedBelief, SaysHowItWasFound) {
-  Device device = Device::open();
-  BoundedPosterior posterior(device, two_shapes(), small_options());
+  BoundedPosterior posterior(two_shapes(), small_options());
   EXPECT_FALSE(posterior.path().empty());
   EXPECT_EQ(posterior.path().find('\n'), std::string::npos);
   EXPECT_GT(posterior.host_bytes(), 0U);

@@ -20,14 +20,13 @@ TEST(CertificateLaw, HoldsOverFiftyUnknownsOfATwoThousandBins) {
   expect_trials({12, 12, 16}, 50, 902);
 }
 TEST(CertificateLaw, HoldsWithinAnyBudget) {
-  Device device = Device::open();
   Trial trial = make_trial({15, 14, 12}, 904);
   const reference::Posterior truth =
       reference_posterior(trial.objects, trial.options, all_touches(trial.recording));
   for (const double budget_s : {1e-9, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 0.1, 10.0}) {
     SCOPED_TRACE(::testing::Message() << budget_s << " s");
     trial.options.budget_s = budget_s;
-    BoundedPosterior posterior(device, trial.objects, trial.options);
+    BoundedPosterior posterior(trial.objects, trial.options);
     for (std::size_t i = 0; i < trial.recording.size(); ++i) {
       posterior.update(trial.recording.touch(i));
       posterior.estimate();
@@ -38,20 +37,18 @@ TEST(CertificateLaw, HoldsWithinAnyBudget) {
 
 TEST(CertificateLaw, HoldsWithinAnyBudgetAfterOneTouch) {
   // Nearly every bin matters: the budget leaves most of them out.
-  Device device = Device::open();
   for (const double budget_s : {1e-9, 1e-5, 1e-4, 1e-3}) {
     for (std::uint64_t seed = 905; seed < 910; ++seed) {
       SCOPED_TRACE(::testing::Message() << budget_s << " s, seed " << seed);
       Trial trial = make_trial({15, 14, 12}, seed);
       trial.recording = first_touches(trial.recording, 1);
       trial.options.budget_s = budget_s;
-      expect_certified(device, trial.objects, trial.options, all_touches(trial.recording));
+      expect_certified(trial.objects, trial.options, all_touches(trial.recording));
     }
   }
 }
 
 TEST(CertificateLaw, BoundsEveryLogEvidenceWithinTheNatsAskedFor) {
-  Device device = Device::open();
   for (const double nats : {3.0, 0.3, 0.01}) {
     for (const double tolerance : {1e-6, 0.3}) {
       Trial trial = make_trial({15, 14, 12}, 911);
@@ -64,14 +61,13 @@ TEST(CertificateLaw, BoundsEveryLogEvidenceWithinTheNatsAskedFor) {
       trial.options.tolerance = tolerance;
       trial.options.evidence_nats = nats;
       const Certified seen =
-          expect_certified(device, trial.objects, trial.options, all_touches(trial.recording));
+          expect_certified(trial.objects, trial.options, all_touches(trial.recording));
       EXPECT_LE(seen.widest_nats, nats);
     }
   }
 }
 
 TEST(CertificateLaw, BoundsLabelsBelowTheRangeNoCloserThanThat) {
-  Device device = Device::open();
   Trial trial = make_trial({15, 14, 12}, 911);
   for (std::size_t i = 0; i < trial.objects.size(); ++i) {
     trial.objects[i].map.label = i == 1 ? "B" : "A";
@@ -81,7 +77,7 @@ TEST(CertificateLaw, BoundsLabelsBelowTheRangeNoCloserThanThat) {
   const auto bins_evaluated = [&](double range_nats) {
     trial.options.evidence_range_nats = range_nats;
     const Certified seen =
-        expect_certified(device, trial.objects, trial.options, all_touches(trial.recording));
+        expect_certified(trial.objects, trial.options, all_touches(trial.recording));
     const Certificate& certificate = *seen.estimate.certificate;
     const double largest =
         std::max(certificate.log_evidence[0].low, certificate.log_evidence[2].low);
@@ -92,7 +88,6 @@ TEST(CertificateLaw, BoundsLabelsBelowTheRangeNoCloserThanThat) {
 }
 
 TEST(CertificateLaw, BoundsEvidenceLessCloselyWithEveryTouchWhereAskedTo) {
-  Device device = Device::open();
   Trial trial = make_trial({15, 14, 12}, 911);
   for (std::size_t i = 0; i < trial.objects.size(); ++i) {
     trial.objects[i].map.label = i == 1 ? "B" : "A";
@@ -103,7 +98,7 @@ TEST(CertificateLaw, BoundsEvidenceLessCloselyWithEveryTouchWhereAskedTo) {
   ASSERT_GT(touches.size(), 1U);
   const auto seen_with = [&](double growth) {
     trial.options.evidence_growth = growth;
-    return expect_certified(device, trial.objects, trial.options, touches);
+    return expect_certified(trial.objects, trial.options, touches);
   };
   const Certified same = seen_with(0.0);
   const Certified grown = seen_with(500.0);
@@ -112,7 +107,7 @@ TEST(CertificateLaw, BoundsEvidenceLessCloselyWithEveryTouchWhereAskedTo) {
   EXPECT_LT(grown.estimate.certificate->bins_evaluated, same.estimate.certificate->bins_evaluated);
 
   // Touches count one by one, and no more after a reset.
-  BoundedPosterior posterior(device, trial.objects, trial.options);
+  BoundedPosterior posterior(trial.objects, trial.options);
   for (const Touch& touch : touches) {
     posterior.update(std::span(&touch, 1));
   }
@@ -129,12 +124,11 @@ TEST(CertificateLaw, BoundsEvidenceLessCloselyWithEveryTouchWhereAskedTo) {
 
 TEST(CertificateLaw, KeepsEveryTolerance) {
   // No sum of float64 is certain to 1e-15: such a tolerance is met as far as rounding lets it.
-  Device device = Device::open();
   for (const double tolerance : {1e-15, 1e-12, 1e-9, 1e-3, 0.1, 0.9}) {
     SCOPED_TRACE(::testing::Message() << tolerance);
     Trial trial = make_trial({15, 14, 12}, 912);
     trial.options.tolerance = tolerance;
-    expect_certified(device, trial.objects, trial.options, all_touches(trial.recording));
+    expect_certified(trial.objects, trial.options, all_touches(trial.recording));
   }
 }
 

@@ -55,7 +55,6 @@ Trial make_trial(const std::array<int, 3>& bins, std::uint64_t seed) {
 }
 
 void expect_trials(const std::array<int, 3>& bins, int trials, std::uint64_t seed) {
-  Device device = Device::open();
   double variation = 0.0;
   double dropped = 0.0;
   double evaluated = 0.0;
@@ -64,7 +63,7 @@ void expect_trials(const std::array<int, 3>& bins, int trials, std::uint64_t see
     const Trial trial = make_trial(bins, 1000 * seed + static_cast<std::uint64_t>(i));
     // Log odds of 12 at gamma = 0 sum to some thousand nats, and float64 keeps 16 digits of them.
     const Certified seen =
-        expect_certified(device, trial.objects, trial.options, all_touches(trial.recording), 1e-9);
+        expect_certified(trial.objects, trial.options, all_touches(trial.recording), 1e-9);
     if (!seen.estimate.certificate) {
       continue;
     }

@@ -174,10 +174,9 @@ Certified expect_certified(const BoundedPosterior& posterior, std::span<const Hy
   return seen;
 }
 
-Certified expect_certified(Device& device, std::span<const Hypothesis> objects,
-                           const BoundedOptions& options, std::span<const Touch> touches,
-                           double nats) {
-  BoundedPosterior posterior(device, objects, options);
+Certified expect_certified(std::span<const Hypothesis> objects, const BoundedOptions& options,
+                           std::span<const Touch> touches, double nats) {
+  BoundedPosterior posterior(objects, options);
   posterior.update(touches);
   BoundedOptions grown = options;  // what the options ask for after these touches
   if (options.evidence_nats && touches.size() > 1) {

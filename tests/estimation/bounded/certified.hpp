@@ -35,9 +35,8 @@ Certified expect_certified(const BoundedPosterior& posterior, std::span<const Hy
                            double nats = 1e-9);
 
 /// The same of a new posterior after the touches.
-Certified expect_certified(Device& device, std::span<const Hypothesis> objects,
-                           const BoundedOptions& options, std::span<const Touch> touches,
-                           double nats = 1e-9);
+Certified expect_certified(std::span<const Hypothesis> objects, const BoundedOptions& options,
+                           std::span<const Touch> touches, double nats = 1e-9);
 
 /// All numbers that a posterior tells, but the counts of its search and what a budget decides.
 std::vector<std::vector<double>> told_by(const BoundedPosterior& posterior, std::size_t objects);

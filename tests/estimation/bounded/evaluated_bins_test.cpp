@@ -85,8 +85,7 @@ TEST(EvaluatedBins, BeyondTheirMemoryAreSearchedForAgain) {
   const std::vector<glm::dvec2> elements_mm{{-1.0, 0.0}, {0.3, 0.9}, {2.0, -1.0}};
   const std::vector<double> pressure{10.0, 0.0, 9.0};
   const Touch touch{.T_robot_sensor = {}, .elements_mm = elements_mm, .pressure = pressure};
-  Device device = Device::open();
-  BoundedPosterior posterior(device, objects, options);
+  BoundedPosterior posterior(objects, options);
   posterior.update(touch);
   const Certificate certificate = posterior.estimate().certificate.value();
   ASSERT_GT(certificate.bins_evaluated, 10'600'000) << "80 MiB would hold them";

@@ -1,4 +1,4 @@
-#include "estimation/bounded/followed_bins.hpp"
+#include "estimation/bounded/evaluated_bins.hpp"
 
 #include <array>
 #include <cmath>
@@ -21,7 +21,7 @@ TEST(FollowedBins, BoundWhatLiesOutsideThroughFurtherTouches) {
   // One number stands for six bins that saw the prior alone.
   bins.add({.object = 1, .theta = 2, .y_count = 2, .x_count = 3}, std::array{-6.0});
   SearchResult found;
-  found.evidence = {{.dropped = -9.0}, {.dropped = -7.0}};
+  found.mass = {{.dropped = -9.0}, {.dropped = -7.0}};
   FollowedBins followed(bins, found, log_weight);
   const double inside = 0.25 * (std::exp(-1.0) + std::exp(-2.0));
   const double seen_by_prior = 0.75 * 6.0 * std::exp(-6.0);

@@ -8,7 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "bounded/certificate_trials.hpp"
-#include "estimation/bounded/bin_likelihood.hpp"
+#include "estimation/bounded/leaves/bin_likelihood.hpp"
 #include "every_set_of_instructions.hpp"
 
 namespace palpate {
@@ -16,8 +16,7 @@ namespace {
 
 /// All that a posterior tells after each of some touches, the counts of its search included.
 std::vector<std::vector<double>> told_after_each(const Trial& trial) {
-  Device device = Device::open();
-  BoundedPosterior posterior(device, trial.objects, trial.options);
+  BoundedPosterior posterior(trial.objects, trial.options);
   std::vector<std::vector<double>> told;
   for (std::size_t i = 0; i < trial.recording.size(); i += 3) {
     posterior.update(trial.recording.touches(i, std::min(i + 3, trial.recording.size())));

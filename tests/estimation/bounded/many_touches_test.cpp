@@ -9,7 +9,6 @@ namespace palpate {
 namespace {
 
 TEST(ManyTouches, AreAnsweredByFewBins) {
-  Device device = Device::open();
   const std::vector<Hypothesis> shapes{{map_of(on_letter_l, "L"), 1.0},
                                        {map_of(on_disc, "disc"), 2.0}};
   BoundedOptions options;
@@ -29,7 +28,7 @@ TEST(ManyTouches, AreAnsweredByFewBins) {
       options.evidence_nats = 0.05;
       options.evidence_range_nats = 100.0;
     }
-    BoundedPosterior posterior(device, shapes, options);
+    BoundedPosterior posterior(shapes, options);
     posterior.update(recording.touches(0, most));
     const Certified certified = expect_certified(posterior, shapes, options, truth, 1e-8);
     EXPECT_LT(certified.estimate.certificate->bins_evaluated, options.lattice.bins() / 10);

@@ -1,4 +1,4 @@
-#include "estimation/bounded/mass_account.hpp"
+#include "estimation/bounded/search/mass_account.hpp"
 
 #include <array>
 #include <cmath>
@@ -23,9 +23,9 @@ TEST(MassAccount, CountsTheRoundingOfSumsOfExactBins) {
   for (const std::int64_t bins : {std::int64_t{1}, std::int64_t{1'000'000}}) {
     Account of;
     of.account.settle(0, bins, -300.0, -310.0, 0.0);
-    const HypothesisEvidence evidence = of.account.result().evidence[0];
-    EXPECT_NEAR(evidence.evaluated, log_weight[0] - 300.0, 1e-12);
-    const double share = std::exp(evidence.rounding - evidence.evaluated);
+    const HypothesisMass mass = of.account.result().mass[0];
+    EXPECT_NEAR(mass.evaluated, log_weight[0] - 300.0, 1e-12);
+    const double share = std::exp(mass.rounding - mass.evaluated);
     // Sequential additions round by half a unit each, and an exponential by at least as much.
     EXPECT_GE(share, static_cast<double>(bins) * 0x1p-53);
     EXPECT_LE(share, static_cast<double>(bins) * 16.0 * 0x1p-53);
@@ -36,11 +36,11 @@ TEST(MassAccount, AddsTheErrorsOfBinsToTheirRounding) {
   Account of;
   of.account.settle(1, 100, -7.0, -9.0, 1e-3);
   of.account.settle(1, 100, -8.0, -9.0, 2e-3);
-  const HypothesisEvidence evidence = of.account.result().evidence[1];
+  const HypothesisMass mass = of.account.result().mass[1];
   const double error =
       0.75 * (std::exp(-7.0) * std::expm1(1e-3) + std::exp(-8.0) * std::expm1(2e-3));
-  EXPECT_NEAR(std::exp(evidence.rounding), error, 1e-9 * error);
-  EXPECT_EQ(of.account.result().evidence[0].rounding, -infinity) << "of which nothing is settled";
+  EXPECT_NEAR(std::exp(mass.rounding), error, 1e-9 * error);
+  EXPECT_EQ(of.account.result().mass[0].rounding, -infinity) << "of which nothing is settled";
 }
 
 TEST(MassAccount, TakesOnlyWhatIsCertainForTheTotalAndTheBest) {
@@ -72,7 +72,7 @@ TEST(MassAccount, TheModeIsCertainWhereNoDroppedBinMayBeat) {
     EXPECT_EQ(result.best_bin, (2 * 10 + 3 + 1) * 10 + 4 + 1);
     EXPECT_NEAR(result.best_log_likelihood, -5.0, 1e-12);
     EXPECT_EQ(result.mode_certain, largest < -5.0);
-    EXPECT_GE(result.evidence[1].dropped, log_weight[1] + largest + std::log(7.0) - 1e-9);
+    EXPECT_GE(result.mass[1].dropped, log_weight[1] + largest + std::log(7.0) - 1e-9);
   }
 }
 

@@ -34,9 +34,8 @@ class NoneByBounds {
       : objects(std::move(hypotheses)),
         options{.lattice = lattice, .contact = resolve(contact, objects)},
         likelihood(objects, options.contact, lattice),
-        batches(likelihood, nullptr, objects, options.contact, lattice, BinPlace::host),
         space(objects, options),
-        none(space, options, likelihood, batches) {}
+        none(space, options, likelihood) {}
 
   void add(std::span<const Touch> touches) {
     std::vector<ArrayReadings> arrays;
@@ -68,7 +67,6 @@ class NoneByBounds {
   std::vector<Hypothesis> objects;
   BoundedOptions options;
   BinLikelihood likelihood;
-  FasterBinLikelihood batches;
   SearchSpace space;
   NoneEvidence none;
 };

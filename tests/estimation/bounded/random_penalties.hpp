@@ -2,7 +2,7 @@
 
 #include <cstdint>
 
-#include "estimation/bounded/reading_penalties.hpp"
+#include "estimation/bounded/tables/reading_penalties.hpp"
 
 namespace palpate {
 

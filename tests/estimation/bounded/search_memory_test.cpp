@@ -1,14 +1,14 @@
 // How much memory a search by bounds takes, and lattices that no memory holds.
 
-#include "estimation/bounded/search_memory.hpp"
+#include "estimation/bounded/search/search_memory.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <functional>
 
+#include "bounded_set_up.hpp"
 #include "palpate/error.hpp"
-#include "touched_shape.hpp"
 
 namespace palpate {
 namespace {
@@ -17,10 +17,6 @@ using testing::AllOf;
 using testing::HasSubstr;
 
 constexpr double mib = 1 << 20;
-
-std::vector<Hypothesis> two_shapes() {
-  return {{map_of(on_letter_l, "L"), 1.0}, {map_of(on_disc, "disc"), 2.0}};
-}
 
 BoundedOptions options_of(const PoseLattice& lattice) {
   BoundedOptions options{.lattice = lattice};
@@ -44,7 +40,6 @@ std::string refusal_of(const std::function<void()>& act) {
 }
 
 TEST(SearchMemory, IsWhatTheSearchHolds) {
-  Device device = Device::open();
   const std::vector<Hypothesis> maps = two_shapes();
   for (const PoseLattice& lattice :
        {square(10.0, 12, 16), square(50.0, 60, 36), square(10.0, 200, 250), square(300.0, 3000, 90),
@@ -52,7 +47,7 @@ TEST(SearchMemory, IsWhatTheSearchHolds) {
         PoseLattice{{0.0, 0.0, 1}, {-50.0, 9.0, 7}, {0.5, 0.5, 1}, {}}}) {
     const BoundedOptions options = options_of(lattice);
     const SearchMemory memory = search_memory(maps, options);
-    const auto held = static_cast<double>(BoundedPosterior(device, maps, options).host_bytes());
+    const auto held = static_cast<double>(BoundedPosterior(maps, options).host_bytes());
     // Before a search: the sums of the largest tiles, 4 bytes of 28 a tile, and the tables.
     EXPECT_LE(held, memory.tables + memory.tiles);
     EXPECT_GE(1.01 * held + 0.1 * mib, memory.tables + memory.tiles / 7.0);
@@ -60,7 +55,6 @@ TEST(SearchMemory, IsWhatTheSearchHolds) {
 }
 
 TEST(SearchMemory, IsWhatAnArrayAtRestHolds) {
-  Device device = Device::open();
   const std::vector<Hypothesis> maps = two_shapes();
   const std::vector<glm::dvec2> elements = grid_array(20, 20, 1.0);
   std::vector<double> pressure(elements.size(), 0.1);
@@ -68,7 +62,7 @@ TEST(SearchMemory, IsWhatAnArrayAtRestHolds) {
   const Touch touch{.T_robot_sensor = {}, .elements_mm = elements, .pressure = pressure};
   for (const PoseLattice& lattice : {square(50.0, 60, 36), square(10.0, 200, 250)}) {
     const BoundedOptions options = options_of(lattice);
-    BoundedPosterior posterior(device, maps, options);
+    BoundedPosterior posterior(maps, options);
     const auto before = static_cast<double>(posterior.host_bytes());
     for (int i = 0; i < 2; ++i) {
       posterior.update(touch);
@@ -113,7 +107,6 @@ TEST(SearchMemory, TheMachineHasSome) {
 }
 
 TEST(SearchMemory, AbsurdLatticesAreRefusedBeforeAnyIsTaken) {
-  Device device = Device::open();
   constexpr int many = 2'000'000'000;
   const PoseLattice fine{{-10.0, 10.0, many}, {-10.0, 10.0, many}, {0.0, 0.0, 1}, {}};
   const PoseLattice line{{-1e9, 1e9, many}, {0.0, 0.0, 1}, {0.0, 1.0, many}, {}};
@@ -122,7 +115,7 @@ TEST(SearchMemory, AbsurdLatticesAreRefusedBeforeAnyIsTaken) {
     for (std::size_t i = 0; i < copies; ++i) {
       maps.push_back(two_shapes()[0]);
     }
-    return refusal_of([&] { BoundedPosterior(device, maps, {.lattice = lattice}); });
+    return refusal_of([&] { BoundedPosterior(maps, {.lattice = lattice}); });
   };
   EXPECT_THAT(refusal(fine, 1), AllOf(HasSubstr("lattice"), HasSubstr("bins along x and y")));
   EXPECT_THAT(refusal(square(10.0, many, many), 1), HasSubstr("use fewer bins"));

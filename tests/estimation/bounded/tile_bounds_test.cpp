@@ -1,6 +1,6 @@
 // The bounds of tiles against the likelihood of every bin in them: what a certificate rests on.
 
-#include "estimation/bounded/tile_bounds.hpp"
+#include "estimation/bounded/tables/tile_bounds.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -12,8 +12,8 @@
 #include <gtest/gtest.h>
 
 #include "bound_cases.hpp"
-#include "estimation/bounded/bin_likelihood.hpp"
-#include "estimation/bounded/reading_penalties.hpp"
+#include "estimation/bounded/leaves/bin_likelihood.hpp"
+#include "estimation/bounded/tables/reading_penalties.hpp"
 
 namespace palpate {
 namespace {

@@ -1,4 +1,4 @@
-#include "estimation/bounded/tile_penalties.hpp"
+#include "estimation/bounded/tables/tile_penalties.hpp"
 
 #include <algorithm>
 #include <cmath>

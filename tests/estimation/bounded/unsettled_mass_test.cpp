@@ -1,4 +1,4 @@
-#include "estimation/bounded/unsettled_mass.hpp"
+#include "estimation/bounded/search/unsettled_mass.hpp"
 
 #include <algorithm>
 #include <cmath>

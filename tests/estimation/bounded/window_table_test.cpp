@@ -1,4 +1,4 @@
-#include "estimation/bounded/window_table.hpp"
+#include "estimation/bounded/tables/window_table.hpp"
 
 #include <algorithm>
 #include <limits>

@@ -29,17 +29,11 @@ RefinedPose refined(const PoseLattice& lattice, const glm::dvec2& centroid_mm,
     const Pose pose = lattice.T_object_robot(bin);
     return log_belief({pose * lattice.pivot_mm, pose.theta_rad});
   };
-  const auto in_windows = [&](std::span<const BinWindow> windows) {
-    const int thetas = lattice.theta_rad.count;
+  const auto in_boxes = [&](std::span<const BinBox> boxes) {
     std::vector<double> values;
-    for (const BinWindow& window : windows) {
-      for (int t = 0; t < window.theta_count; ++t) {
-        const std::int64_t theta = (window.theta_first + t + thetas) % thetas;
-        for (int j = window.row_first; j < window.row_first + window.row_count; ++j) {
-          for (int i = window.column_first; i < window.column_first + window.column_count; ++i) {
-            values.push_back(at_bin((theta * lattice.y_mm.count + j) * lattice.x_mm.count + i));
-          }
-        }
+    for (const BinBox& box : boxes) {
+      for (std::int64_t i = 0; i < box.bins(); ++i) {
+        values.push_back(at_bin(box.bin(i, lattice)));
       }
     }
     return values;
@@ -48,7 +42,7 @@ RefinedPose refined(const PoseLattice& lattice, const glm::dvec2& centroid_mm,
   for (std::int64_t bin = 1; bin < lattice.bins(); ++bin) {
     best = at_bin(bin) > at_bin(best) ? bin : best;
   }
-  return refine(in_windows, lattice, {.centroid_mm = centroid_mm, .inertia_mm2 = spin_mm * spin_mm},
+  return refine(in_boxes, lattice, {.centroid_mm = centroid_mm, .inertia_mm2 = spin_mm * spin_mm},
                 {.bin = best});
 }
 

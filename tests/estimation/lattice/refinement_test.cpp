@@ -34,19 +34,13 @@ void expect_near(const RefinedPose& a, const RefinedPose& b, double lever_mm = 0
   }
 }
 
-/// Windows of one object's bins, as a belief gives them.
+/// Boxes of one object's bins, as a belief gives them.
 std::vector<double> bins_of(const std::vector<double>& logs, const PoseLattice& lattice,
-                            std::span<const BinWindow> windows) {
-  const int thetas = lattice.theta_rad.count;
+                            std::span<const BinBox> boxes) {
   std::vector<double> values;
-  for (const BinWindow& window : windows) {
-    for (int t = 0; t < window.theta_count; ++t) {
-      const int theta = (window.theta_first + t + thetas) % thetas;
-      for (int j = window.row_first; j < window.row_first + window.row_count; ++j) {
-        const std::int64_t row = theta * lattice.plane() + std::int64_t{j} * lattice.x_mm.count;
-        const auto first = logs.begin() + row + window.column_first;
-        values.insert(values.end(), first, first + window.column_count);
-      }
+  for (const BinBox& box : boxes) {
+    for (std::int64_t i = 0; i < box.bins(); ++i) {
+      values.push_back(logs[static_cast<std::size_t>(box.bin(i, lattice))]);
     }
   }
   return values;
@@ -73,8 +67,8 @@ TEST_P(Refinement, IsThePlainPeakAndCovarianceOfTheReferencesBelief) {
   const reference::Posterior expected =
       reference_posterior(std::span(&object, 1), {.lattice = lattice}, all_touches(recording));
   // The reference's belief refines as the device's does.
-  const auto reference_windows = [&](std::span<const BinWindow> windows) {
-    return bins_of(expected.log_likelihood[0], lattice, windows);
+  const auto reference_boxes = [&](std::span<const BinBox> boxes) {
+    return bins_of(expected.log_likelihood[0], lattice, boxes);
   };
   Mode mode = histogram.estimate().mode;
   const std::int64_t n = lattice.bins();
@@ -86,7 +80,7 @@ TEST_P(Refinement, IsThePlainPeakAndCovarianceOfTheReferencesBelief) {
     const RefinedPose plain =
         plain_refinement(expected.log_likelihood[0], lattice, object.map, bin);
     expect_near(histogram.refine(mode), plain, lever_mm);
-    expect_near(refine(reference_windows, lattice, displaced_body(object.map), mode), plain,
+    expect_near(refine(reference_boxes, lattice, displaced_body(object.map), mode), plain,
                 lever_mm);
     const RefinedPose from_pose =
         histogram.refine({.bin = {}, .T_object_robot = lattice.T_object_robot(bin)});

@@ -1,0 +1,41 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <span>
+#include <vector>
+
+#include "palpate/lattice.hpp"
+
+namespace palpate {
+
+/// Neighbouring bins of one object and theta.
+struct BinBox {
+  std::int32_t object = 0;
+  std::int32_t theta = 0;
+  std::int32_t y_first = 0;
+  std::int32_t y_count = 0;
+  std::int32_t x_first = 0;
+  std::int32_t x_count = 0;
+
+  std::int64_t bins() const { return std::int64_t{y_count} * x_count; }
+  /// The lattice's index of the i-th bin, [y, x].
+  std::int64_t bin(std::int64_t i, const PoseLattice& lattice) const {
+    const std::int64_t row = std::int64_t{theta} * lattice.y_mm.count + y_first + i / x_count;
+    return row * lattice.x_mm.count + x_first + i % x_count;
+  }
+};
+
+/// All bins of an object at one theta.
+inline BinBox whole_plane(const PoseLattice& lattice, int theta, int object = 0) {
+  return {.object = object,
+          .theta = theta,
+          .y_count = lattice.y_mm.count,
+          .x_count = lattice.x_mm.count};
+}
+
+/// The log-likelihoods of bins in nats, box after box, each [y, x]: read from a dense belief or
+/// evaluated on demand.
+using BoxLogLikelihood = std::function<std::vector<double>(std::span<const BinBox>)>;
+
+}  // namespace palpate

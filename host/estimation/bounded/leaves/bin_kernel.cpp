@@ -1,0 +1,243 @@
+// Highway compiles this file once for every set of vector instructions. Products and sums are never
+// fused and lanes never mixed, so that every set gives the same bits.
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "estimation/bounded/leaves/bin_kernel.cpp"
+#define HWY_COMPILE_ALL_ATTAINABLE
+#define HWY_DISABLED_TARGETS (HWY_SVE | HWY_SVE2 | HWY_SVE_256 | HWY_SVE2_128 | HWY_RVV)
+#include <hwy/foreach_target.h>
+#include <hwy/highway.h>
+
+#include <algorithm>
+#include <type_traits>
+
+#include "estimation/bounded/leaves/bin_kernel.hpp"
+#include "estimation/bounded/leaves/patch_interpolation-inl.hpp"
+#include "estimation/bounded/leaves/reading_products-inl.hpp"
+#include "estimation/bounded/leaves/table_look_up-inl.hpp"
+#include "model/vector_math-inl.hpp"
+
+HWY_BEFORE_NAMESPACE();
+namespace palpate {
+namespace HWY_NAMESPACE {
+
+template <class D>
+void place(D d, const double* xy_mm, double cos_by_cell, double sin_by_cell, double reach,
+           double rounder, double* x, double* y) {
+  hn::Vec<D> px;
+  hn::Vec<D> py;
+  hn::LoadInterleaved2(d, xy_mm, px, py);
+  const auto c = hn::Set(d, cos_by_cell);
+  const auto s = hn::Set(d, sin_by_cell);
+  const auto limit = hn::Set(d, reach);
+  const auto round = hn::Set(d, rounder);
+  const auto rounded = [&](auto v) HWY_ATTR {
+    const auto clamped = hn::Max(hn::Neg(limit), hn::Min(v, limit));
+    return hn::Sub(hn::Add(clamped, round), round);
+  };
+  hn::StoreU(rounded(hn::Sub(hn::Mul(c, px), hn::Mul(s, py))), d, x);
+  hn::StoreU(rounded(hn::Add(hn::Mul(s, px), hn::Mul(c, py))), d, y);
+}
+
+void PlaceElements(const double* xy_mm, std::size_t count, double cos_by_cell, double sin_by_cell,
+                   double reach, double rounder, double* x, double* y) {
+  const hn::ScalableTag<double> d;
+  const std::size_t lanes = hn::Lanes(d);
+  std::size_t e = 0;
+  for (; e + lanes <= count; e += lanes) {
+    place(d, xy_mm + 2 * e, cos_by_cell, sin_by_cell, reach, rounder, x + e, y + e);
+  }
+  if (e < count) {
+    double rest[2 * most_lanes] = {};
+    std::copy(xy_mm + 2 * e, xy_mm + 2 * count, rest);
+    place(d, rest, cos_by_cell, sin_by_cell, reach, rounder, x + e, y + e);
+  }
+}
+
+template <class D>
+void store_as(D d, hn::Vec<D> v, double* to) {
+  hn::StoreU(v, d, to);
+}
+
+template <class D>
+void store_as(D /*d*/, hn::Vec<D> v, float* to) {
+  const hn::Rebind<float, D> df;
+  hn::StoreU(hn::DemoteTo(df, v), df, to);
+}
+
+/// Finds each element's patch. The index is clamped so that elements beyond the map see a patch of
+/// the border, whose nodes are all equal. For float64, patches with nodes of the border have their
+/// index's bits flipped.
+template <typename Lane>
+void find_patches(const BinBlock& block, const MapPatches& map, const PlacedElements& placed,
+                  ElementPatches<Lane>& found) {
+  const hn::ScalableTag<double> d;
+  const hn::Rebind<std::int32_t, decltype(d)> di;
+  const auto first_x = hn::Set(d, block.x);
+  const auto first_y = hn::Set(d, block.y);
+  const auto last_x = hn::Set(d, static_cast<double>(map.width() - MapPatches::side));
+  const auto last_y = hn::Set(d, static_cast<double>(map.height() - MapPatches::side));
+  const auto width = hn::Set(d, static_cast<double>(map.width()));
+  [[maybe_unused]] const auto border = hn::Set(d, static_cast<double>(MapPatches::border));
+  for (std::size_t e = 0; e < found.patch.size(); e += hn::Lanes(d)) {
+    const auto x = hn::Add(hn::LoadU(d, placed.x.data() + e), first_x);
+    const auto y = hn::Add(hn::LoadU(d, placed.y.data() + e), first_y);
+    const auto whole_x = hn::Floor(x);
+    const auto whole_y = hn::Floor(y);
+    store_as(d, hn::Sub(x, whole_x), found.x.data() + e);
+    store_as(d, hn::Sub(y, whole_y), found.y.data() + e);
+    const auto column = hn::Max(hn::Zero(d), hn::Min(whole_x, last_x));
+    const auto row = hn::Max(hn::Zero(d), hn::Min(whole_y, last_y));
+    auto patch = hn::Add(hn::Mul(row, width), column);
+    if constexpr (sizeof(Lane) == 8) {
+      const auto x_off = hn::Or(hn::Lt(column, border), hn::Gt(column, hn::Sub(last_x, border)));
+      const auto y_off = hn::Or(hn::Lt(row, border), hn::Gt(row, hn::Sub(last_y, border)));
+      const auto flipped = hn::Sub(hn::Set(d, -1.0), patch);
+      patch = hn::IfThenElse(hn::Or(x_off, y_off), flipped, patch);
+    }
+    hn::StoreU(hn::DemoteTo(di, patch), di, found.patch.data() + e);
+  }
+}
+
+/// The bins of one vector, by the model's form.
+/// @param log_odds_at (element): in every lane
+template <class D, class LogOddsAt>
+void evaluate_vector(D d, const LogOddsAt& log_odds_at, const BinTask<hn::TFromD<D>>& task,
+                     double* log_likelihood) {
+  const ReadingForm& form = task.form;
+  if (form.kind == ReadingForm::Kind::products) {
+    evaluate_lanes<ReadingForm::Kind::products>(d, log_odds_at, task.runs, form, log_likelihood);
+  } else if (form.kind == ReadingForm::Kind::sums) {
+    evaluate_lanes<ReadingForm::Kind::sums>(d, log_odds_at, task.runs, form, log_likelihood);
+  } else if constexpr (sizeof(hn::TFromD<D>) == 8) {
+    look_up_lanes(d, log_odds_at, task.object, task.runs, form, log_likelihood);
+  }
+}
+
+/// Fills vectors with the bins of as many blocks as fit wholly, or with a part of one block's.
+/// @param patches [block] memory
+template <typename Lane>
+void evaluate(const BinTask<Lane>& task, std::vector<ElementPatches<Lane>>& patches,
+              double* log_likelihood) {
+  const BinList<Lane>& bins = task.bins;
+  const std::vector<BinBlock>& blocks = bins.blocks;
+  for (std::size_t i = 0; i < blocks.size(); ++i) {
+    find_patches(blocks[i], task.map, task.placed, patches[i]);
+  }
+  using D = hn::ScalableTag<Lane>;
+  const D d;
+  const std::size_t lanes = hn::Lanes(d);
+  if constexpr (sizeof(Lane) == 8) {
+    // Bins that stand alone share no element's patch: vectors hold the elements of each.
+    if (task.form.kind == ReadingForm::Kind::table && blocks.size() == bins.bins()) {
+      for (std::size_t i = 0; i < blocks.size(); ++i) {
+        look_up_elements(d, task.map, task.object, patches[i], task.runs, task.form,
+                         log_likelihood + i);
+      }
+      return;
+    }
+  }
+  HWY_ALIGN Lane x_offset[most_lanes] = {};
+  HWY_ALIGN Lane y_offset[most_lanes] = {};
+  HWY_ALIGN double out[most_lanes];
+  LanesOfBlock<D> parts[most_lanes];
+  std::size_t block = 0;
+  for (std::size_t first = 0, end = 0; first < bins.bins(); first = end) {
+    std::size_t count = 0;  // of parts: blocks in this vector
+    for (end = first; block < blocks.size() && (count == 0 || blocks[block].end <= first + lanes);
+         ++block) {
+      // All lanes from here on: the next block takes its own.
+      const std::size_t before = end - first;
+      parts[count++] = {&patches[block], hn::Not(hn::FirstN(d, before)),
+                        hn::Not(hn::FirstN(hn::Rebind<float, D>(), before))};
+      end = std::min(blocks[block].end, first + lanes);
+      if (end < blocks[block].end) {
+        break;
+      }
+    }
+    std::copy(bins.x_offset.begin() + first, bins.x_offset.begin() + end, x_offset);
+    std::copy(bins.y_offset.begin() + first, bins.y_offset.begin() + end, y_offset);
+    const auto x = hn::Load(d, x_offset);
+    const auto y = hn::Load(d, y_offset);
+    const auto fill = [&](auto of_parts) HWY_ATTR {
+      evaluate_vector(
+          d,
+          [&](std::size_t e) HWY_ATTR { return log_odds(d, task.map, parts, of_parts, e, x, y); },
+          task, out);
+    };
+    if (count == 1) {
+      fill(std::integral_constant<std::size_t, 1>());
+    } else {
+      fill(count);
+    }
+    std::copy(out, out + (end - first), log_likelihood + first);
+  }
+}
+
+void EvaluateFloat(const BinTask<float>& task, std::vector<ElementPatches<float>>& patches,
+                   double* log_likelihood) {
+  evaluate(task, patches, log_likelihood);
+}
+
+void EvaluateDouble(const BinTask<double>& task, std::vector<ElementPatches<double>>& patches,
+                    double* log_likelihood) {
+  evaluate(task, patches, log_likelihood);
+}
+
+std::int64_t Target() { return HWY_TARGET; }
+
+}  // namespace HWY_NAMESPACE
+}  // namespace palpate
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+
+#include <cmath>
+
+namespace palpate {
+
+HWY_EXPORT(PlaceElements);
+HWY_EXPORT(EvaluateFloat);
+HWY_EXPORT(EvaluateDouble);
+HWY_EXPORT(Target);
+
+PositionGrid::PositionGrid(double reach_cells, double finest)
+    : step_(std::max(finest, std::exp2(std::ceil(std::log2(2.0 * reach_cells)) - 51.0))) {}
+
+void place_elements(std::span<const glm::dvec2> from_pivot_mm, double theta_rad, double cell_mm,
+                    double reach_cells, const PositionGrid& grid, PlacedElements& placed) {
+  placed.x.assign(padded(from_pivot_mm.size()), 0.0);
+  placed.y.assign(padded(from_pivot_mm.size()), 0.0);
+  if (!from_pivot_mm.empty()) {
+    HWY_DYNAMIC_DISPATCH(PlaceElements)
+    (&from_pivot_mm.front().x, from_pivot_mm.size(), std::cos(theta_rad) / cell_mm,
+     std::sin(theta_rad) / cell_mm, reach_cells, grid.rounder(), placed.x.data(), placed.y.data());
+  }
+}
+
+template <typename Lane>
+void evaluate_bins(const BinTask<Lane>& task, std::vector<ElementPatches<Lane>>& scratch,
+                   std::span<double> log_likelihood) {
+  const std::size_t elements = task.placed.x.size();
+  scratch.resize(std::max(scratch.size(), task.bins.blocks.size()));
+  for (ElementPatches<Lane>& patches : scratch) {
+    patches.patch.resize(elements);
+    patches.x.resize(elements);
+    patches.y.resize(elements);
+  }
+  if constexpr (sizeof(Lane) == 4) {
+    HWY_DYNAMIC_DISPATCH(EvaluateFloat)(task, scratch, log_likelihood.data());
+  } else {
+    HWY_DYNAMIC_DISPATCH(EvaluateDouble)(task, scratch, log_likelihood.data());
+  }
+}
+
+template void evaluate_bins(const BinTask<float>&, std::vector<ElementPatches<float>>&,
+                            std::span<double>);
+template void evaluate_bins(const BinTask<double>&, std::vector<ElementPatches<double>>&,
+                            std::span<double>);
+
+std::string vector_instructions() { return hwy::TargetName(HWY_DYNAMIC_DISPATCH(Target)()); }
+
+}  // namespace palpate
+
+#endif  // HWY_ONCE

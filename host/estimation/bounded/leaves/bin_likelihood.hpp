@@ -1,0 +1,94 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "estimation/bin_box.hpp"
+#include "estimation/bounded/known_elements.hpp"
+#include "estimation/bounded/leaves/bin_kernel.hpp"
+#include "estimation/bounded/leaves/map_patches.hpp"
+#include "estimation/bounded/leaves/reading_form.hpp"
+#include "palpate/contact_model.hpp"
+#include "palpate/estimate.hpp"
+#include "palpate/lattice.hpp"
+
+namespace palpate {
+
+/// What bounds the rounding of log odds that are interpolated on a map under a lattice's bins.
+struct MapExtent {
+  MapExtent(const OccupancyGrid& map, double prior_log_odds, const PoseLattice& lattice);
+
+  // Over all nodes of the map and the prior beyond.
+  double largest = 0.0;   ///< magnitude
+  double range = 0.0;     ///< largest less smallest
+  double steepest = 0.0;  ///< difference between neighbours along an axis
+
+  double cell_mm = 0.0;
+  double lattice_cells = 0.0;  ///< no bin nor node is farther from the frames' origins
+  double reach_cells = 0.0;    ///< elements farther from the pivot are off the map at every bin
+
+  /// Bound, in cells along an axis, of the float64 rounding of an element's place at a bin.
+  double place_error(const KnownElements& elements) const;
+  /// Bound of the change of log odds where a place is wrong by so many cells along both axes.
+  double change(double place_cells) const;
+};
+
+/// Evaluates the log-likelihood (Eq. 7, 13) of bins on the host, by vector instructions chosen at
+/// run time. A bin has the same bits with every set of instructions and in every box. Calls from
+/// several threads may run at once.
+class BinLikelihood {
+ public:
+  /// @param contact resolved: with its prior
+  /// @throws Error where a map has too many cells
+  BinLikelihood(std::span<const Hypothesis> hypotheses, const ContactModel& contact,
+                const PoseLattice& lattice);
+  void move_pivot(const glm::dvec2& pivot_mm);
+
+  /// Log-likelihood of the elements at every bin in nats, boxes one after another, [y, x] in each.
+  /// In float32 arithmetic, and in float64. Fastest where boxes of one object and theta stand
+  /// together. A table (ContactModel::table) takes float64 arithmetic in both.
+  void evaluate(std::span<const BinBox> boxes, const KnownElements& elements,
+                std::span<float> log_likelihood) const;
+  void evaluate(std::span<const BinBox> boxes, const KnownElements& elements,
+                std::span<double> log_likelihood) const;
+  /// Float32 as above, of many boxes, on the threads of the TBB arena that it is called in.
+  void evaluate_on_threads(std::span<const BinBox> boxes, const KnownElements& elements,
+                           std::span<float> log_likelihood) const;
+
+  /// Proven bound, in nats, of the error of evaluate() at any bin of an object.
+  double float32_error(std::size_t object, const KnownElements& elements) const;
+  double float64_error(std::size_t object, const KnownElements& elements) const;
+
+  /// Host memory that the maps' nodes and the table hold.
+  std::uint64_t bytes() const;
+  /// The vector instructions in use, such as "AVX3".
+  static std::string instructions() { return vector_instructions(); }
+
+ private:
+  /// A map, and how the lattice's bins lie on it.
+  struct Placement {
+    MapPatches nodes;
+    MapExtent extent;
+    double cell_mm;
+    glm::dvec2 origin_mm;
+    double reach_cells;  ///< no bin's position is larger; from farther elements all bins are off
+    PositionGrid float_grid;
+    PositionGrid double_grid;
+  };
+
+  static Placement placement_of(const OccupancyGrid& map, double prior, const PoseLattice& lattice);
+  template <typename Lane, typename Result>
+  void evaluate_in(std::span<const BinBox> boxes, const KnownElements& elements,
+                   std::span<Result> log_likelihood) const;
+  template <typename Lane>
+  double error(std::size_t object, const KnownElements& elements) const;
+
+  std::vector<Placement> placements_;  ///< [object]
+  ReadingForm form_;
+  PoseLattice lattice_;
+};
+
+}  // namespace palpate

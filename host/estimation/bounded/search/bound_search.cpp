@@ -1,0 +1,359 @@
+#include "estimation/bounded/search/bound_search.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+#include <tuple>
+
+#include "estimation/bounded/search/leaf_evaluator.hpp"
+#include "estimation/bounded/search/leaf_pass.hpp"
+#include "estimation/bounded/search/mass_account.hpp"
+#include "estimation/bounded/search/tile_division.hpp"
+#include "estimation/contradiction.hpp"
+
+namespace palpate {
+
+namespace {
+
+/// Part of the tolerance that dropped tiles may use up; the rest is for rounding.
+constexpr double search_share = 0.75;
+/// Tiles that are followed down to the bins, to know early how much mass there is at least.
+constexpr std::size_t beam_tiles = 64;
+/// The same where all tiles of a level are looked at first.
+constexpr std::size_t surveyed_tiles = 1024;
+/// Of these, so many of the smallest have their bins evaluated.
+constexpr std::size_t probed_tiles = 16;
+/// Tiles that are divided together: bounds the memory for their parts.
+constexpr std::size_t most_together = 16384;
+
+bool larger_first(const Tile& a, const Tile& b) {
+  return a.bound != b.bound ? a.bound > b.bound : stands_before(a, b);
+}
+
+/// Keeps the tiles of the largest bounds.
+void keep_best(std::vector<Tile>& tiles, std::size_t count) {
+  if (tiles.size() > count) {
+    std::nth_element(tiles.begin(), tiles.begin() + static_cast<std::ptrdiff_t>(count), tiles.end(),
+                     larger_first);
+    tiles.resize(count);
+  }
+}
+
+bool is_part(const Tile& part, const Tile& of) {
+  return part.object == of.object && part.theta == of.theta && part.x / batch_side == of.x &&
+         part.y / batch_side == of.y;
+}
+
+/// One run of a search, from the largest tiles to their bins.
+class SearchRun {
+ public:
+  SearchRun(const SearchSpace& space, const BoundedOptions& options,
+            const BinLikelihood& likelihood, const LargestTiles& largest,
+            const KnownElements& elements, const SearchGoal& goal, const Deadline& deadline,
+            const BinVisitor& visit, std::vector<PoseBlock>* refined)
+      : space_(space),
+        contact_(options.contact),
+        likelihood_(likelihood),
+        elements_(elements),
+        goal_(goal),
+        deadline_(deadline),
+        visit_(visit),
+        refined_(refined),
+        finest_(space.bounds.front().levels().size() - 1),
+        division_(space, largest, elements, goal.counted),
+        account_(space.log_weight, space.label_of, options.lattice, goal_),
+        evaluator_(likelihood, space.log_weight, goal_, elements, visit, deadline_, account_),
+        leaves_(space.bounds, space.turns.size(), elements.from_pivot_mm.size(), deadline_,
+                account_, evaluator_) {
+    for (std::size_t i = 0; i < space_.bounds.size(); ++i) {
+      double prior = 0.0;
+      for (const ReadingRun& run : elements.runs) {
+        prior +=
+            static_cast<double>(run.end - run.begin) *
+            contact_.log_likelihood(run.reading, {log_odds_from_probability(*contact_.prior)}, i);
+      }
+      prior_log_likelihoods_.push_back(prior);
+    }
+  }
+
+  SearchResult result() {
+    settle_unseen();
+    const std::vector<Tile> best = division_.best_of_largest();
+    if (!best.empty()) {
+      raise(best, 0);
+      const double largest = std::ranges::min_element(best, larger_first)->bound;
+      UnsettledMass unsettled(space_.bounds.size(), largest, account_.slot_nats(largest));
+      division_.count_largest(unsettled);
+      const double share = goal_.tolerance * search_share;
+      // One part for every level that drops tiles, and one for the bins.
+      const double part = share / static_cast<double>(std::max<std::size_t>(finest_, 1) + 1);
+      std::vector<Tile> kept =
+          division_.take_largest(account_.droppable_from(unsettled, part), unsettled);
+      account_.drop(unsettled);
+      divide(std::move(kept), 0, share - used_of(part, 0.0));
+    }
+    const bool contradicts = goal_.mode && contradicted(best);
+    evaluator_.flush();
+    SearchResult result = account_.result();
+    result.contradicted = contradicts;
+    result.blocks_bounded = division_.bounded();
+    result.bins_evaluated = evaluator_.bins();
+    return result;
+  }
+
+ private:
+  /// Settles the bins of all largest tiles in which every element sees the prior.
+  void settle_unseen() {
+    const std::size_t thetas = space_.turns.size();
+    for (std::size_t row = 0; row < space_.bounds.size() * thetas; ++row) {
+      const std::size_t object = row / thetas;
+      const std::size_t theta = row % thetas;
+      const TileLevel& level = space_.bounds[object].levels().front();
+      const TileRange& seen = division_.seen(object, theta);
+      const int nx = level.x.tiles();
+      for (const TileRange& unseen :
+           {TileRange{0, nx, 0, seen.y_first}, TileRange{0, seen.x_first, seen.y_first, seen.y_end},
+            TileRange{seen.x_end, nx, seen.y_first, seen.y_end},
+            TileRange{0, nx, seen.y_end, level.y.tiles()}}) {
+        settle_unseen(level.box_of(static_cast<std::int32_t>(object),
+                                   static_cast<std::int32_t>(theta), unseen));
+      }
+    }
+    account_.raise_totals(std::vector<LogSum>(space_.bounds.size()));
+  }
+
+  /// Settles bins at which every element sees the prior.
+  void settle_unseen(const BinBox& box) {
+    const std::int64_t bins = goal_.counted != nullptr ? goal_.counted->bins(box) : box.bins();
+    if (bins == 0) {
+      return;
+    }
+    const auto object = static_cast<std::size_t>(box.object);
+    const double value = prior_log_likelihoods_[object];
+    account_.settle(box.object, 1, value + std::log(static_cast<double>(bins)), value,
+                    likelihood_.float64_error(object, elements_));
+    account_.note_best(box, 0, value);
+    visit_(box, std::span(&value, 1));
+  }
+
+  /// Whether the prior explains the elements far better than the best bin of every hypothesis.
+  /// @param best the largest tile of the largest bound of every object and theta
+  bool contradicted(const std::vector<Tile>& best) {
+    double prior = 0.0;
+    for (const ReadingRun& run : elements_.runs) {
+      prior +=
+          static_cast<double>(run.end - run.begin) * prior_log_likelihood(run.reading, contact_);
+    }
+    const double least = prior - contradiction_nats;
+    const std::size_t objects = space_.bounds.size();
+    const auto explains = [&](std::size_t i) { return account_.best_of(i) >= least; };
+    for (std::size_t i = 0; i < objects; ++i) {
+      if (explains(i)) {
+        return false;
+      }
+    }
+    for (std::size_t i = 0; i < objects; ++i) {
+      if (account_.largest_dropped_of(i) >= least) {
+        // Too light a hypothesis to have been looked at.
+        std::vector<Tile> own;
+        std::ranges::copy_if(best, std::back_inserter(own), [&](const Tile& tile) {
+          return tile.object == static_cast<std::int32_t>(i);
+        });
+        for (const BinBox& box : leaves_.boxes_of(best_of_beam(std::move(own), 0, beam_tiles))) {
+          evaluator_.look(box);
+        }
+      }
+      if (explains(i)) {
+        return false;
+      }
+    }
+    return true;
+  }
+
+  /// Raises the lower bound of the total: follows the best tiles down to their bins.
+  /// @param width so many tiles at first
+  void raise(std::vector<Tile> tiles, std::size_t level, std::size_t width = beam_tiles) {
+    if (!goal_.evidence_nats) {
+      leaves_.probe(best_of_beam(std::move(tiles), level, width));
+      return;
+    }
+    // Every label's own total is wanted, too.
+    std::vector<std::vector<Tile>> own(space_.bounds.size());
+    for (const Tile& tile : tiles) {
+      own[space_.label_of[tile.object]].push_back(tile);
+    }
+    std::vector<Tile> best;
+    for (std::vector<Tile>& of_label : own) {
+      const std::vector<Tile> found = best_of_beam(std::move(of_label), level, width);
+      best.insert(best.end(), found.begin(), found.end());
+    }
+    leaves_.probe(std::move(best));
+  }
+
+  /// Follows tiles down to the smallest ones, the best of each level.
+  std::vector<Tile> best_of_beam(std::vector<Tile> tiles, std::size_t level, std::size_t width) {
+    for (; level < finest_; ++level) {
+      deadline_.cancel_point();
+      keep_best(tiles, width);
+      std::ranges::sort(tiles, stands_before);
+      tiles = division_.parts_of(tiles, level);
+      width = beam_tiles;
+    }
+    keep_best(tiles, probed_tiles);
+    return tiles;
+  }
+
+  /// Divides tiles of a level until their bins are evaluated or dropped.
+  /// @param tolerance part of the total that may be dropped
+  void divide(std::vector<Tile> tiles, std::size_t level, double tolerance) {
+    if (level == finest_) {
+      leaves_.evaluate(tiles, tolerance);
+      return;
+    }
+    if (tiles.size() > most_together && !deadline_.passed()) {
+      // Tiles are divided one lot after another: the total must be known well before the first.
+      survey(tiles, level);
+      tolerance -= drop(tiles, level, tolerance / static_cast<double>(finest_ - level + 1));
+      std::ranges::sort(tiles, larger_first);
+    }
+    double known_total = account_.log_total();
+    for (std::size_t begin = 0; begin < tiles.size();) {
+      if (account_.log_total() > known_total + 1.0) {
+        tiles.erase(tiles.begin(), tiles.begin() + static_cast<std::ptrdiff_t>(begin));
+        begin = 0;
+        known_total = account_.log_total();
+        tolerance -= drop(tiles, level, tolerance / 2.0);
+        continue;
+      }
+      const std::size_t left = tiles.size() - begin;
+      const auto first = tiles.begin() + static_cast<std::ptrdiff_t>(begin);
+      if (deadline_.passed()) {
+        account_.drop(unsettled({first, tiles.end()}, level, space_.bounds, account_));
+        return;
+      }
+      const std::size_t count = std::min(most_together, left);
+      // What tiles do not use up is left for those after them.
+      tolerance -= divide_lot({first, first + static_cast<std::ptrdiff_t>(count)}, level,
+                              tolerance * static_cast<double>(count) / static_cast<double>(left));
+      begin += count;
+    }
+  }
+
+  /// Divides so many tiles that their parts fit the memory for them.
+  /// @returns the part of the total that was dropped
+  double divide_lot(std::vector<Tile> tiles, std::size_t level, double tolerance) {
+    if (refined_ != nullptr) {
+      for (const Tile& tile : tiles) {
+        refined_->push_back(
+            block_of(space_.bounds[tile.object].levels()[level].box_of(tile), level));
+      }
+    }
+    std::ranges::sort(tiles, stands_before);
+    std::vector<Tile> unseen;
+    std::vector<Tile> parts = division_.parts_of(tiles, level, &unseen);
+    for (const Tile& tile : unseen) {
+      settle_unseen(space_.bounds[tile.object].levels()[level + 1].box_of(tile));
+    }
+    const double dropped = account_.dropped_share();
+    double used = 0.0;
+    if (level + 1 < finest_) {
+      raise(parts, level + 1);
+      used = drop(parts, level + 1, tolerance / static_cast<double>(finest_ - level));
+    }
+    divide(std::move(parts), level + 1, std::max(tolerance - used, 0.0));
+    return used_of(tolerance, dropped);
+  }
+
+  /// Lowers the bounds of tiles to those of their parts, and follows the best parts down to their
+  /// bins.
+  void survey(std::vector<Tile>& tiles, std::size_t level) {
+    std::ranges::sort(tiles, stands_before);
+    std::vector<Tile> best;
+    for (std::size_t begin = 0; begin < tiles.size(); begin += most_together) {
+      const auto lot =
+          std::span(tiles).subspan(begin, std::min(most_together, tiles.size() - begin));
+      deadline_.cancel_point();
+      std::vector<Tile> parts = division_.parts_of(lot, level);
+      std::size_t next = 0;
+      for (Tile& tile : lot) {
+        double largest = space_.log_weight[tile.object] + prior_log_likelihoods_[tile.object];
+        for (; next < parts.size() && is_part(parts[next], tile); ++next) {
+          largest = std::max(largest, parts[next].bound);
+        }
+        tile.bound = std::min(tile.bound, largest);
+      }
+      keep_best(parts, surveyed_tiles);
+      best.insert(best.end(), parts.begin(), parts.end());
+      keep_best(best, surveyed_tiles);
+    }
+    raise(std::move(best), level + 1, surveyed_tiles);
+  }
+
+  /// Drops tiles that hold at most this part of the total together.
+  /// @returns the part of the total that was dropped
+  double drop(std::vector<Tile>& tiles, std::size_t level, double tolerance) {
+    const double dropped = account_.dropped_share();
+    UnsettledMass mass = unsettled(tiles, level, space_.bounds, account_);
+    const std::vector<std::size_t> from = account_.droppable_from(mass, tolerance);
+    std::erase_if(tiles,
+                  [&](const Tile& tile) { return mass.slot(tile.bound) >= from[tile.object]; });
+    for (const Tile& tile : tiles) {
+      mass.remove(static_cast<std::size_t>(tile.object), tile.bound,
+                  space_.bounds[tile.object].bins(level, tile));
+    }
+    account_.drop(mass);
+    return used_of(tolerance, dropped);
+  }
+
+  /// What dropping tiles used up of a tolerance, given what was dropped before.
+  double used_of(double tolerance, double dropped_before) const {
+    // Where each hypothesis has its own share, a light one may have used it up.
+    return goal_.evidence_nats
+               ? tolerance
+               : std::clamp(account_.dropped_share() - dropped_before, 0.0, tolerance);
+  }
+
+  const SearchSpace& space_;
+  const ContactModel& contact_;
+  const BinLikelihood& likelihood_;
+  const KnownElements& elements_;
+  SearchGoal goal_;
+  const Deadline& deadline_;
+  const BinVisitor& visit_;
+  std::vector<PoseBlock>* refined_;
+  std::size_t finest_;                         ///< level
+  std::vector<double> prior_log_likelihoods_;  ///< [object] of all elements
+  TileDivision division_;
+  MassAccount account_;
+  LeafEvaluator evaluator_;
+  LeafPass leaves_;
+};
+
+}  // namespace
+
+SearchResult BoundSearch::run(const KnownElements& elements, const SearchGoal& goal,
+                              const Deadline& deadline, const BinVisitor& visit,
+                              std::vector<PoseBlock>* refined) const {
+  // Evaluating all in float64 would leave so much rounding; the rest may be used up.
+  double least_error = 0.0;
+  for (std::size_t i = 0; i < space_.bounds.size(); ++i) {
+    least_error = std::max(least_error, likelihood_.float64_error(i, elements));
+  }
+  SearchGoal reachable = goal;
+  reachable.tolerance = std::max(goal.tolerance - 1.1 * least_error, goal.tolerance / 4.0);
+  return SearchRun(space_, options_, likelihood_, largest_, elements, reachable, deadline, visit,
+                   refined)
+      .result();
+}
+
+PoseBlock block_of(const BinBox& box, std::size_t level) {
+  return {.object = box.object,
+          .level = static_cast<int>(level),
+          .theta = box.theta,
+          .x_first = box.x_first,
+          .x_count = box.x_count,
+          .y_first = box.y_first,
+          .y_count = box.y_count};
+}
+
+}  // namespace palpate

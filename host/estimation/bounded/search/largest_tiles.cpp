@@ -1,0 +1,187 @@
+#include "estimation/bounded/search/largest_tiles.hpp"
+
+#include <algorithm>
+
+#include "estimation/bounded/parallel_for.hpp"
+#include "estimation/bounded/search/seen_tiles.hpp"
+
+namespace palpate {
+
+namespace {
+
+/// Batches of the largest tiles at one theta that make a region small.
+constexpr int few_batches = 16;
+
+/// So many elements' penalties never add up to the largest sum, nor do half as many's changes,
+/// which may be twice as large.
+constexpr std::size_t most_elements = largest_sum / largest_penalty;
+
+/// Whether most elements are in No Contact.
+bool mostly_no_contact(const ArrayReadings& touch) {
+  const auto none = static_cast<std::size_t>(
+      std::count(touch.readings.begin(), touch.readings.end(), Reading::no_contact));
+  return 2 * none > touch.readings.size();
+}
+
+}  // namespace
+
+StillPlace::Seen StillPlace::look(const ArrayReadings& touch) {
+  const bool stays = touch.from_pivot_mm == last_;
+  if (!stays) {
+    last_ = touch.from_pivot_mm;
+  }
+  if (touch.readings.size() > most_elements || !mostly_no_contact(touch)) {
+    return Seen::moving;
+  }
+  if (touch.from_pivot_mm == kept_) {
+    return Seen::still;
+  }
+  if (!stays) {
+    return Seen::moving;
+  }
+  kept_.clear();
+  return Seen::stopped;
+}
+
+LargestTiles::LargestTiles(SearchSpace& space) : space_(space), unseen_(space.bounds.size()) {
+  for (const TileBounds& bounds : space.bounds) {
+    const TileLevel& level = bounds.levels().front();
+    sums_.emplace_back(space.turns.size() * level.batches_x() * level.batches_y() * batch_tiles);
+  }
+}
+
+void LargestTiles::reset() {
+  for (std::vector<std::int32_t>& sums : sums_) {
+    std::fill(sums.begin(), sums.end(), 0);
+  }
+  std::fill(unseen_.begin(), unseen_.end(), 0);
+}
+
+void LargestTiles::add(std::span<const ArrayReadings> touches) {
+  const TileLevel& level = space_.bounds.front().levels().front();
+  // A single touch sees little of a large region; in a small one, fewer rounds are faster.
+  if (touches.size() == 1 || level.batches_x() * level.batches_y() > few_batches) {
+    for (const ArrayReadings& touch : touches) {
+      add_touch(touch);
+    }
+    return;
+  }
+  std::vector<KnownElements> known;
+  for (const ArrayReadings& touch : touches) {
+    known.push_back(known_elements(touch));
+  }
+  add(merged(known));
+}
+
+void LargestTiles::add_touch(const ArrayReadings& touch) {
+  const StillPlace::Seen seen = still_.look(touch);
+  if (seen == StillPlace::Seen::moving) {
+    add(known_elements(touch));
+    return;
+  }
+  if (seen == StillPlace::Seen::stopped) {
+    ArrayReadings no_contact = touch;
+    std::fill(no_contact.readings.begin(), no_contact.readings.end(), Reading::no_contact);
+    keep_still(known_elements(no_contact));
+    still_.keep();
+  }
+  const KnownElements changed = changed_elements(touch);
+  add_sums(known_elements(touch), changed, [&](const Strip& of, std::uint32_t* sums) {
+    const auto still = still_sums_[of.object].begin() + static_cast<std::ptrdiff_t>(of.first);
+    std::copy(still, still + std::ptrdiff_t{batch_tiles} * of.batches, sums);
+    space_.bounds[of.object].add_changes(changed, of.placed, of.x, of.y, sums, of.batches);
+  });
+}
+
+void LargestTiles::add(const KnownElements& elements) {
+  add_sums(elements, elements, [&](const Strip& of, std::uint32_t* sums) {
+    space_.bounds[of.object].add(0, elements, of.placed, of.x, of.y, sums, of.batches);
+  });
+}
+
+void LargestTiles::keep_still(const KnownElements& no_contact) {
+  still_sums_.resize(space_.bounds.size());
+  parallel_for(space_.bounds.size(), [&](std::size_t i) {
+    space_.bounds[i].make_change_tables();
+    still_sums_[i].resize(sums_[i].size());
+  });
+  for_seen(no_contact, no_contact, [&](const Strip& of) {
+    std::uint32_t* sums = still_sums_[of.object].data() + of.first;
+    std::fill(sums, sums + std::ptrdiff_t{batch_tiles} * of.batches, 0);
+    space_.bounds[of.object].add(0, no_contact, of.placed, of.x, of.y, sums, of.batches);
+  });
+}
+
+template <typename Sum>
+void LargestTiles::add_sums(const KnownElements& known, const KnownElements& placed,
+                            const Sum& sum_of) {
+  // Most tiles of a large region do not see the map: sums count from what such a tile would have.
+  std::vector<std::int64_t> offsets;
+  for (std::size_t i = 0; i < space_.bounds.size(); ++i) {
+    offsets.push_back(std::min<std::int64_t>(space_.bounds[i].penalty_beyond(0, known),
+                                             largest_sum - unseen_[i]));
+  }
+  for_seen(known, placed, [&](const Strip& of) {
+    std::uint32_t added[most_strip * batch_tiles] = {};
+    sum_of(of, added);
+    std::int32_t* sums = sums_[of.object].data() + of.first;
+    for (int i = 0; i < of.batches * batch_tiles; ++i) {
+      const std::int64_t sum = std::int64_t{sums[i]} + added[i] - offsets[of.object];
+      sums[i] = static_cast<std::int32_t>(std::min<std::int64_t>(sum, largest_sum));
+    }
+  });
+  for (std::size_t i = 0; i < offsets.size(); ++i) {
+    unseen_[i] += offsets[i];
+  }
+}
+
+template <typename Visit>
+void LargestTiles::for_seen(const KnownElements& known, const KnownElements& placed,
+                            const Visit& visit) const {
+  const std::vector<BoundingBox> reaches = reaches_of(known, space_.turns);
+  const std::size_t thetas = space_.turns.size();
+  parallel_for(space_.bounds.size() * thetas, [&](std::size_t row) {
+    thread_local WindowPlaces places;
+    const std::size_t object = row / thetas;
+    const std::size_t theta = row % thetas;
+    const TileBounds& bounds = space_.bounds[object];
+    const TileLevel& level = bounds.levels().front();
+    const TileRange seen = seen_tiles(reaches[theta], space_.maps[object], level);
+    bounds.place(0, space_.turns[theta], placed, places);
+    const std::size_t plane = theta * static_cast<std::size_t>(level.batches_y());
+    for (int y = seen.y_first / batch_side; y * batch_side < seen.y_end; ++y) {
+      const std::size_t first =
+          (plane + static_cast<std::size_t>(y)) * static_cast<std::size_t>(level.batches_x());
+      const int x_end = (seen.x_end + batch_side - 1) / batch_side;
+      for (int x = seen.x_first / batch_side; x < x_end; x += most_strip) {
+        visit({.object = object,
+               .first = (first + static_cast<std::size_t>(x)) * batch_tiles,
+               .x = x * batch_side,
+               .y = y * batch_side,
+               .batches = std::min(most_strip, x_end - x),
+               .placed = places});
+      }
+    }
+  });
+}
+
+std::vector<std::int64_t> LargestTiles::whole_sums(std::size_t hypothesis) const {
+  std::vector<std::int64_t> sums(sums_[hypothesis].begin(), sums_[hypothesis].end());
+  for (std::int64_t& sum : sums) {
+    sum += unseen_[hypothesis];
+  }
+  return sums;
+}
+
+std::uint64_t LargestTiles::bytes() const {
+  std::uint64_t bytes = 0;
+  for (const std::vector<std::int32_t>& sums : sums_) {
+    bytes += sums.capacity() * sizeof(std::int32_t);
+  }
+  for (const std::vector<std::uint32_t>& sums : still_sums_) {
+    bytes += sums.capacity() * sizeof(std::uint32_t);
+  }
+  return bytes;
+}
+
+}  // namespace palpate

@@ -1,0 +1,119 @@
+#pragma once
+
+#include <chrono>
+#include <cmath>
+#include <cstdint>
+#include <functional>
+#include <limits>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "estimation/bin_box.hpp"
+#include "estimation/bounded/log_sum.hpp"
+
+namespace palpate {
+
+class TouchOverlap;
+
+/// Takes bins that were evaluated, one box after another, with their log-likelihoods [y, x] in
+/// nats; a single number stands for all bins of its box.
+using BinVisitor = std::function<void(const BinBox&, std::span<const double>)>;
+
+/// What a search is to reach; as BoundedOptions.
+struct SearchGoal {
+  double tolerance = 1e-6;
+  std::optional<double> evidence_nats = {};
+  double evidence_range_nats = std::numeric_limits<double>::infinity();
+  /// Bins that hold much of the mass are evaluated once more in float64.
+  bool exact = true;
+  /// The most probable bin is evaluated, whatever the tolerance.
+  bool mode = true;
+  /// The bins that count; null where all do.
+  const TouchOverlap* counted = nullptr;
+};
+
+/// When a search must end; never, where there is no budget. Whoever looks at it also gives the
+/// caller of the search an opportunity to cancel it.
+class Deadline {
+ public:
+  /// @param cancel_point of BoundedOptions; outlives the deadline
+  explicit Deadline(const std::optional<double>& budget_s,
+                    const std::function<void()>* cancel_point = nullptr)
+      : cancel_point_(cancel_point) {
+    if (budget_s) {
+      at_ = Clock::now() +
+            std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(*budget_s));
+    }
+  }
+  bool exists() const { return at_.has_value(); }
+  /// @throws what the cancel point throws
+  bool passed() const {
+    cancel_point();
+    return at_ && Clock::now() >= *at_;
+  }
+  /// @throws what the cancel point throws
+  void cancel_point() const {
+    if (cancel_point_ != nullptr && *cancel_point_) {
+      (*cancel_point_)();
+    }
+  }
+  /// Lets it pass now, where there is a budget.
+  void end() {
+    if (at_) {
+      at_ = Clock::time_point::min();
+    }
+  }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+
+  std::optional<Clock::time_point> at_;
+  const std::function<void()>* cancel_point_;
+};
+
+/// The summed likelihood of one hypothesis's bins: logs in nats, with its prior weight.
+struct HypothesisMass {
+  double evaluated = 0.0;  ///< of the bins that were evaluated
+  double rounding = 0.0;   ///< bound of that sum's error
+  double dropped = 0.0;    ///< bound of the sum over all other bins
+};
+
+/// What a search by bounds returns.
+struct SearchResult {
+  std::vector<HypothesisMass> mass;  ///< [hypothesis]
+  std::int32_t best_object = 0;
+  std::int64_t best_bin = 0;
+  double best_log_likelihood = 0.0;  ///< of the best bin, without prior weights
+  bool mode_certain = false;
+  /// The prior explains the elements far better than the best bin of any hypothesis.
+  bool contradicted = false;
+  std::int64_t blocks_bounded = 0;
+  std::int64_t bins_evaluated = 0;
+
+  /// Bound of the mass that is not known, relative to that which is.
+  double uncertain() const {
+    LogSum evaluated;
+    LogSum unknown;
+    for (const HypothesisMass& of : mass) {
+      evaluated.add(of.evaluated);
+      unknown.add(of.rounding);
+      unknown.add(of.dropped);
+    }
+    return std::exp(unknown.log() - evaluated.log());
+  }
+  /// The masses of all hypotheses together.
+  HypothesisMass all() const {
+    LogSum evaluated;
+    LogSum rounding;
+    LogSum dropped;
+    for (const HypothesisMass& of : mass) {
+      evaluated.add(of.evaluated);
+      rounding.add(of.rounding);
+      dropped.add(of.dropped);
+    }
+    return {evaluated.log(), rounding.log(), dropped.log()};
+  }
+};
+
+}  // namespace palpate

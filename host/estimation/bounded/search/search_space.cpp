@@ -1,0 +1,49 @@
+#include "estimation/bounded/search/search_space.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <optional>
+#include <string>
+
+#include "estimation/bounded/parallel_for.hpp"
+#include "estimation/hypotheses.hpp"
+
+namespace palpate {
+
+SearchSpace::SearchSpace(std::span<const Hypothesis> hypotheses, const BoundedOptions& options)
+    : log_weight(log_weights(hypotheses)) {
+  for (int theta = 0; theta < options.lattice.theta_rad.count; ++theta) {
+    const double theta_rad = options.lattice.theta_rad.centre(theta);
+    turns.emplace_back(std::cos(theta_rad), std::sin(theta_rad));
+  }
+  double least_cell_mm = std::numeric_limits<double>::infinity();
+  std::map<std::string, std::size_t> labels;
+  for (const Hypothesis& hypothesis : hypotheses) {
+    least_cell_mm = std::min(least_cell_mm, hypothesis.compared().cell_mm);
+    label_of.push_back(labels.try_emplace(hypothesis.map.label, labels.size()).first->second);
+    boxes.push_back(occupied_box(hypothesis.map));
+    OccupancyGrid shape = hypothesis.compared();
+    shape.log_odds = {};
+    maps.push_back(std::move(shape));
+  }
+  const std::vector<TileSize> sizes = tile_sizes(options.lattice, least_cell_mm, hypotheses.size());
+  std::vector<std::optional<TileBounds>> built(hypotheses.size());
+  parallel_for(hypotheses.size(), [&](std::size_t i) {
+    built[i].emplace(hypotheses[i].compared(), options.contact, i, options.lattice, sizes);
+  });
+  for (std::optional<TileBounds>& of : built) {
+    bounds.push_back(*std::move(of));
+  }
+}
+
+std::uint64_t SearchSpace::bytes() const {
+  std::uint64_t bytes = 0;
+  for (const TileBounds& of : bounds) {
+    bytes += of.bytes();
+  }
+  return bytes;
+}
+
+}  // namespace palpate

@@ -1,0 +1,35 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include <glm/vec2.hpp>
+
+#include "estimation/bounded/tables/tile_bounds.hpp"
+#include "model/bounding_box.hpp"
+#include "palpate/bounded_posterior.hpp"
+#include "palpate/estimate.hpp"
+#include "palpate/occupancy_grid.hpp"
+
+namespace palpate {
+
+/// What searches through the poses of the same objects share: the levels of tiles, and the window
+/// tables that bound the likelihood over them.
+struct SearchSpace {
+  /// @param options checked, with a resolved contact model
+  SearchSpace(std::span<const Hypothesis> hypotheses, const BoundedOptions& options);
+
+  /// Host memory, in bytes.
+  std::uint64_t bytes() const;
+
+  std::vector<double> log_weight;     ///< [hypothesis] log of its prior weight, over their sum
+  std::vector<std::size_t> label_of;  ///< [hypothesis] index of its label
+  std::vector<glm::dvec2> turns;      ///< [theta] cosine and sine
+  std::vector<OccupancyGrid> maps;    ///< [hypothesis] without their cells
+  std::vector<BoundingBox> boxes;     ///< [hypothesis] around its occupied cells
+  std::vector<TileBounds> bounds;     ///< [hypothesis]
+};
+
+}  // namespace palpate

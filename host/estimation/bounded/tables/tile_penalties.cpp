@@ -1,0 +1,233 @@
+// Highway compiles this file once for every set of vector instructions. Products and sums are never
+// fused, so that every set gives the same bits.
+#include "estimation/bounded/tables/tile_penalties.hpp"
+
+#include <algorithm>
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "estimation/bounded/tables/tile_penalties.cpp"
+#define HWY_COMPILE_ALL_ATTAINABLE
+#define HWY_DISABLED_TARGETS (HWY_SVE | HWY_SVE2 | HWY_SVE_256 | HWY_SVE2_128 | HWY_RVV)
+#include <hwy/foreach_target.h>  // IWYU pragma: keep
+#include <hwy/highway.h>
+
+HWY_BEFORE_NAMESPACE();
+namespace palpate::HWY_NAMESPACE {
+
+namespace hn = hwy::HWY_NAMESPACE;
+
+void PlaceElements(const glm::dvec2* from_pivot_mm, std::size_t count, const TilePlace& place,
+                   const WindowTable& shape, std::int32_t* plane, std::int32_t* column,
+                   std::int32_t* row) {
+  const hn::ScalableTag<double> d;
+  const hn::Rebind<std::int32_t, decltype(d)> di;
+  // Squares that are told apart; farther elements see only the prior as well.
+  const auto farthest = hn::Set(d, static_cast<double>(1 << 28));
+  const auto nearest = hn::Set(d, -static_cast<double>(1 << 28));
+  const glm::dvec2& square = place.square_mm;
+  const auto cx = hn::Set(d, place.turn.x / square.x);
+  const auto sx = hn::Set(d, place.turn.y / square.x);
+  const auto cy = hn::Set(d, place.turn.x / square.y);
+  const auto sy = hn::Set(d, place.turn.y / square.y);
+  const auto x0 = hn::Set(d, place.corner_mm.x / square.x);
+  const auto y0 = hn::Set(d, place.corner_mm.y / square.y);
+  const auto mask = hn::Set(di, shape.side - 1);
+  const auto margin = hn::Set(di, WindowTable::margin);
+  const auto phases = hn::Set(di, shape.side);
+  const auto entries = hn::Set(di, shape.columns * shape.rows * batch_side);
+  HWY_ALIGN double x_mm[hn::MaxLanes(d)] = {};
+  HWY_ALIGN double y_mm[hn::MaxLanes(d)] = {};
+  const std::size_t step = hn::Lanes(d);
+  for (std::size_t i = 0; i < count; i += step) {
+    for (std::size_t lane = 0; lane < std::min(step, count - i); ++lane) {
+      x_mm[lane] = from_pivot_mm[i + lane].x;
+      y_mm[lane] = from_pivot_mm[i + lane].y;
+    }
+    const auto px = hn::Load(d, x_mm);
+    const auto py = hn::Load(d, y_mm);
+    const auto at = [&](auto coordinate) {
+      return hn::DemoteTo(di, hn::Min(hn::Max(hn::Floor(coordinate), nearest), farthest));
+    };
+    const auto kx = at(hn::Add(hn::Sub(hn::Mul(cx, px), hn::Mul(sx, py)), x0));
+    const auto ky = at(hn::Add(hn::Add(hn::Mul(sy, px), hn::Mul(cy, py)), y0));
+    const auto phase = hn::Add(hn::Mul(hn::And(ky, mask), phases), hn::And(kx, mask));
+    hn::StoreU(hn::Mul(phase, entries), di, plane + i);
+    hn::StoreU(hn::Add(hn::ShiftRightSame(kx, shape.side_log2), margin), di, column + i);
+    hn::StoreU(hn::Add(hn::ShiftRightSame(ky, shape.side_log2), margin), di, row + i);
+  }
+}
+
+/// Elements of a run whose penalties 16 bits hold for certain.
+HWY_INLINE std::size_t most_elements(const WindowTable& table, std::size_t count) {
+  return table.largest == 0 ? count : std::size_t{65535} / std::size_t{table.largest};
+}
+
+/// Adds penalties of 16 bits to sums.
+HWY_INLINE void add_part(const std::uint16_t* part, std::size_t count, std::uint32_t* sums) {
+  const hn::CappedTag<std::uint32_t, batch_tiles> d32;
+  const hn::Rebind<std::uint16_t, decltype(d32)> narrow;
+  const auto most_sum = hn::Set(d32, largest_sum);
+  for (std::size_t i = 0; i < count; i += hn::MaxLanes(d32)) {
+    const auto wide = hn::PromoteTo(d32, hn::LoadU(narrow, part + i));
+    hn::StoreU(hn::Min(hn::Add(wide, hn::LoadU(d32, sums + i)), most_sum), d32, sums + i);
+  }
+}
+
+/// Sums the penalties of one run over one batch.
+/// @param entry scratch of at least `count` rounded up to whole vectors
+void AddRun(const WindowTable& table, const std::int32_t* plane, const std::int32_t* column,
+            const std::int32_t* row, std::size_t count, int first_x, int first_y,
+            std::int32_t* entry, std::uint32_t* sums) {
+  const hn::ScalableTag<std::int32_t> di;
+  const auto zero = hn::Zero(di);
+  const auto x = hn::Set(di, first_x);
+  const auto y = hn::Set(di, first_y);
+  const auto last_column = hn::Set(di, table.columns - batch_side);
+  const auto last_row = hn::Set(di, table.rows - batch_side);
+  const auto columns = hn::Set(di, table.columns);
+  for (std::size_t i = 0; i < count; i += hn::Lanes(di)) {
+    const auto at_column =
+        hn::Min(hn::Max(hn::Add(hn::LoadU(di, column + i), x), zero), last_column);
+    const auto at_row = hn::Min(hn::Max(hn::Add(hn::LoadU(di, row + i), y), zero), last_row);
+    const auto of_plane = hn::Add(hn::Mul(at_row, columns), at_column);
+    hn::StoreU(hn::Add(hn::ShiftLeft<2>(of_plane), hn::LoadU(di, plane + i)), di, entry + i);
+  }
+  const hn::CappedTag<std::uint16_t, batch_tiles> d16;
+  constexpr std::size_t lanes = hn::MaxLanes(d16);
+  constexpr std::size_t vectors = batch_tiles / lanes;
+  const std::size_t most = most_elements(table, count);
+  const std::uint16_t* entries = table.entries.data();
+  HWY_ALIGN std::uint16_t part[batch_tiles];
+  for (std::size_t begin = 0; begin < count; begin += most) {
+    const std::size_t end = std::min(begin + most, count);
+    for (std::size_t v = 0; v < vectors; ++v) {
+      auto sum = hn::Zero(d16);
+      auto other = hn::Zero(d16);
+      std::size_t i = begin;
+      for (; i + 2 <= end; i += 2) {
+        sum = hn::Add(sum, hn::LoadU(d16, entries + entry[i] + v * lanes));
+        other = hn::Add(other, hn::LoadU(d16, entries + entry[i + 1] + v * lanes));
+      }
+      if (i < end) {
+        sum = hn::Add(sum, hn::LoadU(d16, entries + entry[i] + v * lanes));
+      }
+      hn::Store(hn::Add(sum, other), d16, part + v * lanes);
+    }
+    add_part(part, batch_tiles, sums);
+  }
+}
+
+/// The same over several batches: an element's entries for neighbouring batches stand together, and
+/// batches that see only the prior have a constant.
+/// @param scratch three times as long
+void AddStrip(const WindowTable& table, const std::int32_t* plane, const std::int32_t* column,
+              const std::int32_t* row, std::size_t count, int first_x, int first_y, int batches,
+              std::int32_t* scratch, std::uint32_t* sums) {
+  const hn::ScalableTag<std::int32_t> di;
+  const std::size_t padded = count + hn::Lanes(di);
+  std::int32_t* const entry = scratch;  // of the first batch that sees the map
+  std::int32_t* const first = scratch + padded;
+  std::int32_t* const batches_seen = first + padded;
+  const auto zero = hn::Zero(di);
+  const auto one = hn::Set(di, 1);
+  const auto x = hn::Set(di, first_x);
+  const auto y = hn::Set(di, first_y);
+  const auto last_column = hn::Set(di, table.columns - batch_side);
+  const auto last_row = hn::Set(di, table.rows - batch_side);
+  const auto columns = hn::Set(di, table.columns);
+  const auto all = hn::Set(di, batches);
+  for (std::size_t i = 0; i < count; i += hn::Lanes(di)) {
+    const auto at_column = hn::Add(hn::LoadU(di, column + i), x);
+    const auto at_row = hn::Add(hn::LoadU(di, row + i), y);
+    const auto begin = hn::IfThenZeroElse(hn::Gt(at_column, zero),
+                                          hn::Add(hn::ShiftRight<2>(hn::Neg(at_column)), one));
+    const auto end = hn::Min(
+        all, hn::Add(hn::ShiftRight<2>(hn::Sub(hn::Sub(last_column, one), at_column)), one));
+    const auto on_map = hn::And(hn::Gt(at_row, zero), hn::Lt(at_row, last_row));
+    const auto of_plane =
+        hn::Add(hn::Add(hn::Mul(at_row, columns), at_column), hn::ShiftLeft<2>(begin));
+    hn::StoreU(hn::Add(hn::ShiftLeft<2>(of_plane), hn::LoadU(di, plane + i)), di, entry + i);
+    hn::StoreU(begin, di, first + i);
+    hn::StoreU(hn::IfThenElseZero(on_map, hn::Sub(end, begin)), di, batches_seen + i);
+  }
+  const hn::CappedTag<std::uint16_t, 2 * batch_tiles> d16;
+  constexpr std::size_t lanes = hn::MaxLanes(d16);
+  const auto beyond = hn::Set(d16, table.beyond);
+  const std::uint16_t* entries = table.entries.data();
+  const std::size_t tiles = static_cast<std::size_t>(batches) * batch_tiles;
+  // A vector may reach a batch further: into what is not read, or into entries of the prior.
+  HWY_ALIGN std::uint16_t part[(most_strip + 1) * batch_tiles];
+  const std::size_t most = most_elements(table, count);
+  for (std::size_t begin = 0; begin < count; begin += most) {
+    const std::size_t end = std::min(begin + most, count);
+    // Modulo 2^16, which the sums are below.
+    const auto of_prior = static_cast<std::uint16_t>((end - begin) * table.beyond);
+    std::fill(part, part + tiles, of_prior);
+    for (std::size_t i = begin; i < end; ++i) {
+      if (batches_seen[i] <= 0) {
+        continue;
+      }
+      const std::uint16_t* from = entries + entry[i];
+      std::uint16_t* to = part + first[i] * batch_tiles;
+      const std::uint16_t* const to_end = to + batches_seen[i] * batch_tiles;
+      for (; to < to_end; to += lanes, from += lanes) {
+        const auto more = hn::Sub(hn::LoadU(d16, from), beyond);
+        hn::StoreU(hn::Add(hn::LoadU(d16, to), more), d16, to);
+      }
+    }
+    add_part(part, tiles, sums);
+  }
+}
+
+}  // namespace palpate::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace palpate {
+
+HWY_EXPORT(PlaceElements);
+HWY_EXPORT(AddRun);
+HWY_EXPORT(AddStrip);
+
+namespace {
+
+/// Room for the last vector of a list.
+constexpr std::size_t slack = 64;
+/// Batches from which on sums in memory are faster than a batch's after another's in registers.
+constexpr int least_strip = 4;
+
+}  // namespace
+
+void place_elements(const KnownElements& elements, const TilePlace& place, const WindowTable& shape,
+                    WindowPlaces& placed) {
+  const std::size_t count = elements.from_pivot_mm.size();
+  for (std::vector<std::int32_t>* list : {&placed.plane, &placed.column, &placed.row}) {
+    list->resize(count + slack);
+  }
+  HWY_DYNAMIC_DISPATCH(PlaceElements)
+  (elements.from_pivot_mm.data(), count, place, shape, placed.plane.data(), placed.column.data(),
+   placed.row.data());
+}
+
+void add_penalties(const WindowPlaces& placed, const ReadingRun& run, const WindowTable& table,
+                   int first_x, int first_y, int batches, std::uint32_t* sums) {
+  thread_local std::vector<std::int32_t> scratch;
+  const std::size_t count = run.end - run.begin;
+  scratch.resize(std::max(scratch.size(), 3 * (count + slack)));
+  const std::int32_t* plane = placed.plane.data() + run.begin;
+  const std::int32_t* column = placed.column.data() + run.begin;
+  const std::int32_t* row = placed.row.data() + run.begin;
+  if (batches < least_strip) {
+    for (int i = 0; i < batches; ++i) {
+      HWY_DYNAMIC_DISPATCH(AddRun)
+      (table, plane, column, row, count, first_x + i * batch_side, first_y, scratch.data(),
+       sums + std::ptrdiff_t{i} * batch_tiles);
+    }
+  } else {
+    HWY_DYNAMIC_DISPATCH(AddStrip)
+    (table, plane, column, row, count, first_x, first_y, batches, scratch.data(), sums);
+  }
+}
+
+}  // namespace palpate
+#endif  // HWY_ONCE

@@ -1,0 +1,48 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "estimation/bounded/known_elements.hpp"
+#include "estimation/bounded/tables/window_table.hpp"
+#include "palpate/pose.hpp"
+
+namespace palpate {
+
+/// The elements of a level's tiles at one theta: for every element the plane of its phase and the
+/// place in it for the first tile.
+struct WindowPlaces {
+  std::vector<std::int32_t> plane;  ///< index of the plane's first entry
+  std::vector<std::int32_t> column;
+  std::vector<std::int32_t> row;
+};
+
+/// Where tiles lie on a map: the first tile's corner, in mm from the map's square 0.
+struct TilePlace {
+  glm::dvec2 turn{1.0, 0.0};  ///< cosine and sine of theta
+  glm::dvec2 corner_mm{0.0};
+  glm::dvec2 square_mm{1.0};
+};
+
+/// Rotates the elements and finds their places in tables of this shape.
+void place_elements(const KnownElements& elements, const TilePlace& place, const WindowTable& shape,
+                    WindowPlaces& placed);
+
+/// Sums of penalties do not grow beyond: so large a sum says all that there is to say.
+inline constexpr std::uint32_t largest_sum = std::uint32_t{1} << 30;
+
+/// Most batches whose sums add_penalties() finds together.
+inline constexpr int most_strip = 16;
+
+/// Sums the penalties of one run of elements over the 4 x 4 tiles of neighbouring batches along x,
+/// and adds them to `sums`, where the sum of tile (i, j) of a batch stands at 4 i + j.
+/// @param first_x, first_y tile at the first batch's corner
+/// @param batches up to most_strip
+/// @param sums [batch, tile]
+void add_penalties(const WindowPlaces& placed, const ReadingRun& run, const WindowTable& table,
+                   int first_x, int first_y, int batches, std::uint32_t* sums);
+
+}  // namespace palpate
