@@ -192,7 +192,7 @@ void plan_touches(const Options& options) {
   const RecognitionRecord record = recognise(recogniser, task, unknown, false);
   record.require_steps();
   if (const auto words = unresolved_words(task, recogniser.lattice(), touches); !words.empty()) {
-    fmt::print(stderr, "palpate: {}\n", words);
+    tell_on_stderr(words);
   }
 
   const auto start = std::chrono::steady_clock::now();

@@ -95,7 +95,7 @@ nlohmann::ordered_json to_json(const Plan& plan, const std::string& device) {
   for (const PlannedTouch& touch : plan.ranked) {
     json["candidates"].push_back(to_json(touch));
   }
-  std::vector<std::string> warnings = plan.record.last().warnings;
+  std::vector<std::string> warnings = warning_words(plan.record.last());
   if (const std::string limit = limit_words(plan); !limit.empty()) {
     warnings.push_back(limit);
   }
