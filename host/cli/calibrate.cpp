@@ -2,6 +2,7 @@
 
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <filesystem>
 #include <memory>
@@ -132,9 +133,7 @@ void calibrate(const CalibrateArguments& options) {
   write_sensor_model(options.output, calibration.sensor);
   fmt::print("{}",
              calibration_text(calibration, task.presses.size(), terminal_columns(STDOUT_FILENO)));
-  for (const std::string& warning : calibration.warnings) {
-    fmt::print(stderr, "palpate: {}\n", warning);
-  }
+  std::ranges::for_each(calibration.warnings, tell_on_stderr);
   fmt::print("{}\n", options.output);
   if (!options.png.empty()) {
     write_file(pictures.table, table);

@@ -82,7 +82,7 @@ std::string summary(const LiveState& state, std::vector<double> latencies_ms,
     std::vector<std::string> more{truth_words(step, task), unproven_sentence(step, task),
                                   misfit_sentence(step, state.touches, task),
                                   single_touch_words(task, state.touches)};
-    more.insert(more.end(), step.warnings.begin(), step.warnings.end());
+    std::ranges::move(warning_words(step), std::back_inserter(more));
     for (const std::string& words : more) {
       text += words.empty() ? "" : printable(words) + "\n";
     }

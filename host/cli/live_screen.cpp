@@ -117,7 +117,7 @@ void LiveScreen::describe(const LiveState& state) {
   if (auto words = single_touch_words(task_, state.touches); !words.empty()) {
     view_.notes.push_back(std::move(words));
   }
-  view_.notes.insert(view_.notes.end(), step.warnings.begin(), step.warnings.end());
+  std::ranges::move(warning_words(step), std::back_inserter(view_.notes));
   view_.identity = step.identity;
   view_.map = &task_.hypotheses[step.mode.object].map;
   view_.T_object_robot = step.pose();

@@ -12,6 +12,7 @@
 #include "cli/own_font.hpp"
 #include "io/hdf5_process.hpp"
 #include "io/standard_streams.hpp"
+#include "model/option_words.hpp"
 #include "palpate/error.hpp"
 
 namespace {
@@ -20,8 +21,10 @@ namespace {
 constexpr int wrong_input = 2;
 constexpr int failed = 1;
 
-/// Prints the message as one line, without control characters, and returns the status.
+/// Prints the message as one line, without control characters, its options as flags, and returns
+/// the status.
 int complain(int status, std::string message) {
+  message = palpate::in_flags(message);
   std::replace_if(
       message.begin(), message.end(), [](unsigned char c) { return c < ' '; }, ' ');
   // Not fmt::print, which throws where standard error cannot be written.

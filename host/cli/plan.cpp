@@ -92,7 +92,7 @@ void plan_touches(const PlanArguments& options) {
   const Plan plan = plan_touch(recogniser, task, unknown, request);
   if (const auto words = unresolved_words(task, recogniser.lattice(), unknown.touches);
       !words.empty()) {
-    fmt::print(stderr, "palpate: {}\n", words);
+    tell_on_stderr(words);
   }
   write_results(options, plan, task, unknown.touches, device);
   if (options.recognition.verbose) {

@@ -65,7 +65,8 @@ nlohmann::ordered_json to_json(const Plan& plan, const RecognitionTask& task,
   for (const PlannedTouch& touch : plan.ranked) {
     json["candidates"].push_back(to_json(touch));
   }
-  const std::vector<std::string> warnings = warnings_of(plan);
+  std::vector<std::string> warnings = warnings_of(plan);
+  std::ranges::transform(warnings, warnings.begin(), in_flags);
   if (!warnings.empty()) {
     json["warnings"] = warnings;
   }

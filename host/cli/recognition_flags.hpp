@@ -17,7 +17,7 @@ class App;
 
 namespace palpate::cli {
 
-/// Says a sentence to the user, on standard error.
+/// Says a sentence to the user, on standard error, its options as flags.
 void tell_on_stderr(const std::string& sentence);
 
 /// A map in memory, and its name for messages.

@@ -131,7 +131,8 @@ nlohmann::ordered_json truth_to_json(const GroundTruth& truth) {
   return json;
 }
 
-nlohmann::ordered_json to_json(const RecognitionStep& step, const RecognitionTask& task) {
+nlohmann::ordered_json to_json(const RecognitionStep& step, const RecognitionTask& task,
+                               OptionWords words) {
   nlohmann::ordered_json json{{"best", task.labels[step.best]}};
   if (step.refined) {
     json["refined"] = to_json(step, *step.refined);
@@ -173,8 +174,8 @@ nlohmann::ordered_json to_json(const RecognitionStep& step, const RecognitionTas
   if (step.certificate) {
     add_certificate(json, step, task);
   }
-  if (!step.warnings.empty()) {
-    json["warnings"] = step.warnings;
+  for (const std::string& warning : step.warnings) {
+    json["warnings"].push_back(words(warning));
   }
   if (step.contradicted) {
     json["contradicted"] = true;
@@ -186,7 +187,8 @@ nlohmann::ordered_json to_json(const RecognitionStep& step, const RecognitionTas
 }
 
 nlohmann::ordered_json to_json(const RecognitionRecord& record, const RecognitionTask& task,
-                               const std::optional<std::string>& device, bool with_trace) {
+                               const std::optional<std::string>& device, bool with_trace,
+                               OptionWords words) {
   nlohmann::ordered_json json{{"recording", record.recording}};
   if (record.frame) {
     json["frame"] = *record.frame;
@@ -196,10 +198,10 @@ nlohmann::ordered_json to_json(const RecognitionRecord& record, const Recognitio
     if (!record.true_label.empty()) {
       json["truth"] = truth_to_json({record.true_label, {}});
     }
-    json["error"] = record.error;
+    json["error"] = words(record.error);
     return json;
   }
-  json.update(to_json(record.last(), task));
+  json.update(to_json(record.last(), task, words));
   if (!record.true_label.empty()) {
     json["truth"] = truth_to_json(record.last().truth);
   }
@@ -210,7 +212,7 @@ nlohmann::ordered_json to_json(const RecognitionRecord& record, const Recognitio
   if (with_trace) {
     auto trace = nlohmann::ordered_json::array();
     for (const RecognitionStep& step : record.trace) {
-      trace.push_back(to_json(step, task));
+      trace.push_back(to_json(step, task, words));
     }
     json["trace"] = trace;
   }

@@ -59,7 +59,7 @@ std::string warnings(const std::vector<RecognitionRecord>& records) {
   constexpr std::size_t most_names = 3;
   std::vector<std::pair<std::string, std::vector<std::string>>> names_of;  // by warning
   for (const RecognitionRecord& record : records) {
-    for (const std::string& warning : record.last().warnings) {
+    for (const std::string& warning : warning_words(record.last())) {
       auto known = std::ranges::find(names_of, warning, &decltype(names_of)::value_type::first);
       if (known == names_of.end()) {
         known = names_of.insert(names_of.end(), {warning, {}});

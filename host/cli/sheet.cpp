@@ -55,9 +55,9 @@ std::vector<RecognitionSheet::Caption> captions(const RecognitionRecord& record,
     add(fmt::format("known {:.2f}: the probability that the object was learned", *last.known),
         *last.known < 0.5);
   }
-  if (!last.warnings.empty()) {
-    const std::size_t more = last.warnings.size() - 1;
-    add((more > 0 ? fmt::format("(1 of {}) ", more + 1) : "") + last.warnings.front(), true);
+  if (const std::vector<std::string> warnings = warning_words(last); !warnings.empty()) {
+    const std::size_t more = warnings.size() - 1;
+    add((more > 0 ? fmt::format("(1 of {}) ", more + 1) : "") + warnings.front(), true);
   }
   return lines;
 }

@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 
 #include "cli/options.hpp"
+#include "model/option_words.hpp"
 #include "model/printable.hpp"
 
 namespace palpate::cli {
@@ -119,6 +120,14 @@ std::string misfit_sentence(const RecognitionStep& step, std::size_t touches,
   return fmt::format("unlike {}: its {} {:.0f} standard deviations worse than touches of {} do",
                      label, touches == 1 ? "touch fits" : fmt::format("{} touches fit", touches),
                      -step.fit->z, label);
+}
+
+std::vector<std::string> warning_words(const RecognitionStep& step) {
+  std::vector<std::string> words;
+  for (const std::string& warning : step.warnings) {
+    words.push_back(in_flags(warning));
+  }
+  return words;
 }
 
 std::string single_touch_words(const RecognitionTask& task, std::size_t touches) {

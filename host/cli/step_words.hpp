@@ -4,6 +4,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "recognition/recognition_record.hpp"
 
@@ -48,6 +49,9 @@ std::string fit_words(const RecognitionStep& step);
 /// A sentence on touches that do not fit; "" where they fit or are doubtful.
 std::string misfit_sentence(const RecognitionStep& step, std::size_t touches,
                             const RecognitionTask& task);
+
+/// RecognitionStep::warnings, their options as flags.
+std::vector<std::string> warning_words(const RecognitionStep& step);
 
 /// What to say where "(none)" was asked for, an unknown was touched once only, and no sensor model
 /// tells what one touch says of it; else "".

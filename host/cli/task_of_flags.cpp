@@ -14,6 +14,7 @@
 #include "cli/recordings.hpp"
 #include "cli/sensor_model_flag.hpp"
 #include "io/file_identity.hpp"
+#include "model/option_words.hpp"
 #include "palpate/balanced_lattice.hpp"
 #include "palpate/files.hpp"
 
@@ -183,7 +184,9 @@ WantedLattice lattice_of(const RecognitionFlags& flags, const Scene& scene,
 
 }  // namespace
 
-void tell_on_stderr(const std::string& sentence) { fmt::print(stderr, "palpate: {}\n", sentence); }
+void tell_on_stderr(const std::string& sentence) {
+  fmt::print(stderr, "palpate: {}\n", in_flags(sentence));
+}
 
 bool infers_region(const RecognitionFlags& flags, const Scene& scene) {
   const bool has_range = !flags.x_mm.empty() || !flags.y_mm.empty() || !flags.theta_deg.empty() ||

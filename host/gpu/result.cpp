@@ -12,7 +12,7 @@ std::string meaning(VkResult result) {
   switch (result) {
     case VK_ERROR_DEVICE_LOST:
       return "the device was lost (a driver reset, or a command that ran too long); start again, "
-             "and if it happens again use fewer bins or another --device";
+             "and if it happens again use fewer bins or another `device`";
     case VK_ERROR_OUT_OF_DEVICE_MEMORY:
       return "out of device memory; use fewer bins, objects or cells";
     case VK_ERROR_OUT_OF_HOST_MEMORY:

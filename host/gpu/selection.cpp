@@ -205,7 +205,7 @@ const Candidate& chosen(std::span<const Candidate> candidates, std::string_view 
   if (candidates.empty()) {
     throw Error(Fault::system,
                 "no Vulkan device; on Debian, install libvulkan1 and mesa-vulkan-drivers, and see "
-                "`palpate devices`");
+                "'palpate devices'");
   }
   std::string reasons;
   for (const Candidate& candidate : candidates) {
@@ -216,7 +216,7 @@ const Candidate& chosen(std::span<const Candidate> candidates, std::string_view 
   if (name_or_index.empty()) {
     throw Error(Fault::system, fmt::format("no usable Vulkan device: {}", reasons));
   }
-  throw Error(Fault::input, fmt::format("device '{}': none fits: {}; see `palpate devices`",
+  throw Error(Fault::input, fmt::format("device '{}': none fits: {}; see 'palpate devices'",
                                         name_or_index, reasons));
 }
 

@@ -17,7 +17,7 @@ UnitColumn find_axis(const CsvTable& table, std::size_t axis) {
   if (!table.has_header() && table.columns().size() == 2) {
     return {.index = axis, .unit = length_units.front()};
   }
-  const auto column = find_column(table, {axis_names[axis], length_units, "--array"}, "", {});
+  const auto column = find_column(table, {axis_names[axis], length_units, "array"}, "", {});
   if (!column) {
     table.refuse("no column is called '{}'; write a row 'x y' in mm for each element",
                  axis_names[axis][0]);

@@ -15,7 +15,7 @@ struct Kind {
 
 constexpr Kind kinds[] = {
     {recording_format, "recording", "'palpate map' and 'palpate recognize' take it"},
-    {map_format, "map", "'palpate recognize' takes it after --maps"},
+    {map_format, "map", "'palpate recognize' takes it after `maps`"},
     {posterior_format, "posterior", "'palpate info' shows it"},
 };
 

@@ -51,7 +51,7 @@ PoseColumns find_columns(const CsvTable& table, const TableOptions& options) {
   table.refuse("has no columns '{}', '{}' and '{}'; rename its columns{}",
                printable(x.empty() ? "x" : x), printable(y.empty() ? "y" : y),
                printable(theta.empty() ? "theta" : theta),
-               options.may_name_poses ? ", or give --pose-columns X,Y,THETA" : "");
+               options.may_name_poses ? ", or give `pose-columns X,Y,THETA`" : "");
 }
 
 Pose pose_in(const CsvTable& table, const std::array<UnitColumn, 3>& columns) {

@@ -86,14 +86,14 @@ std::vector<std::size_t> columns_named(const CsvTable& table, const std::string&
       continue;
     }
     if (*last < *first) {
-      table.refuse("column '{}' comes before '{}'; give --pressure-columns FIRST:LAST",
+      table.refuse("column '{}' comes before '{}'; give `pressure-columns FIRST:LAST`",
                    printable(table.columns()[*last]), printable(table.columns()[*first]));
     }
     for (std::size_t i = *first; i <= *last; ++i) {
       if (std::ranges::find(taken, i) != taken.end()) {
         table.refuse(
             "column '{}', between '{}' and '{}', holds no pressures; correct "
-            "--pressure-columns FIRST:LAST",
+            "`pressure-columns FIRST:LAST`",
             printable(table.columns()[i]), printable(table.columns()[*first]),
             printable(table.columns()[*last]));
       }
@@ -109,7 +109,7 @@ std::vector<std::size_t> columns_named(const CsvTable& table, const std::string&
   }
   if (columns.empty()) {
     table.refuse(
-        "no column is called or begins with '{}'; give --pressure-columns a prefix of "
+        "no column is called or begins with '{}'; give `pressure-columns` a prefix of "
         "the columns' names, or FIRST:LAST",
         printable(names));
   }
@@ -134,8 +134,8 @@ class WideTable {
                    : columns_named(table, options.pressure_columns, taken);
     if (columns_.size() != elements) {
       table.refuse(
-          "{} columns of pressure{} for an array of {} elements; correct --array, or name "
-          "the columns by --pressure-columns",
+          "{} columns of pressure{} for an array of {} elements; correct `array`, or name "
+          "the columns by `pressure-columns`",
           columns_.size(), span_of_names(), elements);
     }
     require_counting_names(table, columns_);
@@ -226,7 +226,7 @@ class LongTable {
     if (!time_ && !frame_) {
       table_.refuse(
           "a table with a row for each reading needs a column 'time' or 'frame'; add it, "
-          "or name it by --time-column");
+          "or name it by `time-column`");
     }
     PressureTable all;
     reserve(table_, time_ ? "frames, one for each time," : "frames", count_frames(), elements_,

@@ -16,10 +16,10 @@ constexpr std::string_view x_names[] = {"x"};
 constexpr std::string_view y_names[] = {"y"};
 constexpr std::string_view theta_names[] = {"theta", "yaw"};
 
-constexpr Quantity time{time_names, time_units, "--time-unit"};
-constexpr Quantity pose[] = {{x_names, length_units, "--pose-unit"},
-                             {y_names, length_units, "--pose-unit"},
-                             {theta_names, angle_units, "--pose-unit"}};
+constexpr Quantity time{time_names, time_units, "time-unit"};
+constexpr Quantity pose[] = {{x_names, length_units, "pose-unit"},
+                             {y_names, length_units, "pose-unit"},
+                             {theta_names, angle_units, "pose-unit"}};
 
 // The year 5138; a time in ms is larger.
 constexpr double latest_s = 1e11;
@@ -61,8 +61,8 @@ std::optional<UnitColumn> find_column(const CsvTable& table, const Quantity& qua
   const std::string& found = table.columns()[*index];
   const std::optional<Unit> named = unit_of(found, quantity.units);
   if (named && unit && named->name != unit->name) {
-    table.refuse("column '{}' is in {} by its name, in {} by {}; make them agree", printable(found),
-                 named->name, unit->name, quantity.flag);
+    table.refuse("column '{}' is in {} by its name, in {} by `{}`; make them agree",
+                 printable(found), named->name, unit->name, quantity.option);
   }
   return UnitColumn{.index = *index,
                     .unit = named.value_or(unit.value_or(quantity.units.front())),
@@ -79,7 +79,7 @@ double time_in(const CsvTable& table, const UnitColumn& column, double last_s, b
   const double time_s = column.unit.convert(number);
   const std::string name = printable(table.columns()[column.index]);
   if (std::abs(time_s) > latest_s) {
-    table.refuse("column '{}': {} {} is no time; give the unit by --time-unit ms, us or ns", name,
+    table.refuse("column '{}': {} {} is no time; give the unit by `time-unit` ms, us or ns", name,
                  number, column.unit.name);
   }
   if (time_s < last_s || (later && time_s == last_s)) {

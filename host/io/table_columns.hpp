@@ -33,7 +33,7 @@ struct TableOptions {
   std::string time_column;                  ///< "": the usual names
   std::string pressure_columns;             ///< prefix or FIRST:LAST; "": all that are left
   std::array<std::string, 3> pose_columns;  ///< of x, y and theta; "": the usual names
-  bool may_name_poses = true;               ///< the command has --pose-columns
+  bool may_name_poses = true;               ///< there is an option `pose-columns`
   std::optional<Unit> time_unit;            ///< none: by the column's name, else s
   std::optional<Unit> length_unit;          ///< none: by the column's name, else mm
   std::optional<Unit> angle_unit;           ///< none: by the column's name, else rad
@@ -43,14 +43,14 @@ struct TableOptions {
 struct UnitColumn {
   std::size_t index = 0;
   Unit unit;
-  bool assumed = false;  ///< neither the name nor the command line gives the unit
+  bool assumed = false;  ///< neither the name nor an option gives the unit
 };
 
 /// A quantity that columns hold, with its usual names and its units.
 struct Quantity {
   std::span<const std::string_view> names;
   std::span<const Unit> units;
-  const char* flag;  ///< that gives its unit
+  const char* option;  ///< that gives its unit
 };
 
 /// Finds the column of this name or, where it is "", of a usual name. A name may end with its unit,

@@ -86,7 +86,7 @@ double learned_threshold(const std::vector<Press>& presses) {
                 logs.empty() ? "no pressure is above 0: no touch touched anything; check the "
                                "pressure's unit and sign"
                              : fmt::format("all pressures above 0 are {:g}, which tells no contact "
-                                           "threshold; give --threshold",
+                                           "threshold; give `threshold`",
                                            std::exp(logs.front())));
   }
   return std::exp(otsu_threshold(logs));

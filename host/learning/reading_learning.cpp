@@ -35,7 +35,7 @@ LearnedReadings learn_readings(const std::vector<Press>& presses, const ReadingO
   if (contact_pressures(presses, readings.classifier).empty()) {
     throw Error(Fault::input,
                 fmt::format("no pressure is above the contact threshold, {:g} {}; give a lower "
-                            "--threshold",
+                            "`threshold`",
                             readings.classifier.threshold, options.pressure_unit));
   }
   std::vector<Touch> touches;

@@ -76,7 +76,7 @@ void require_within(const std::vector<Press>& presses, const PoseLattice& lattic
           Fault::input,
           fmt::format(
               "{}: the array's centre is at {:g}, {:g} mm, beyond the bins' {:g}:{:g} and "
-              "{:g}:{:g} mm; with an automatic pivot, widen --x-mm and --y-mm to all places "
+              "{:g}:{:g} mm; with an automatic pivot, widen `x-mm` and `y-mm` to all places "
               "that are touched",
               press.name, centre_mm.x, centre_mm.y, lattice.x_mm.lower, lattice.x_mm.upper,
               lattice.y_mm.lower, lattice.y_mm.upper));
@@ -101,8 +101,8 @@ PoseLattice affordable_lattice(PoseLattice lattice, const std::vector<Press>& pr
     throw Error(
         Fault::input,
         fmt::format("to try {} touches on bins over {:g} x {:g} mm would take too long; give "
-                    "--bins with the --x-mm and --y-mm where an unknown may lie, or fewer "
-                    "--frames",
+                    "`bins` with the `x-mm` and `y-mm` where an unknown may lie, or fewer "
+                    "`frames`",
                     presses.size(), lattice.x_mm.upper - lattice.x_mm.lower,
                     lattice.y_mm.upper - lattice.y_mm.lower));
   }

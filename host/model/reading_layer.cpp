@@ -105,7 +105,7 @@ OccupancyGrid reading_layer(const OccupancyGrid& map, const ReadingLayer& how) {
   if (how.of == MapLayer::mean_level && map.mean_level.empty()) {
     throw Error(Fault::input,
                 fmt::format("map '{}': no mean level, which the sensor model compares readings "
-                            "with; build it with palpate map --sensor-model",
+                            "with; build it with palpate map `sensor-model`",
                             map.label));
   }
   const auto border = static_cast<std::int64_t>(std::ceil(how.far_mm / map.cell_mm)) + 1;

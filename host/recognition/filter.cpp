@@ -139,9 +139,7 @@ std::unique_ptr<Filter> make_filter(Device* device, std::span<const Hypothesis> 
              return std::make_unique<HistogramFilter>(PoseHistogram(*device, hypotheses, one));
            },
            [&](const BoundedOptions& one) -> Made {
-             return std::make_unique<BoundedFilter>(device != nullptr
-                                                        ? BoundedPosterior(*device, hypotheses, one)
-                                                        : BoundedPosterior(hypotheses, one));
+             return std::make_unique<BoundedFilter>(BoundedPosterior(hypotheses, one));
            },
            [&](const ParticleOptions& one) -> Made {
              return std::make_unique<Particles>(ParticleFilter(*device, hypotheses, one));

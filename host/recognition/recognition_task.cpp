@@ -131,7 +131,7 @@ std::string wider_bins_sentence(const RecognitionTask& task) {
   return fmt::format(
       "bins are {:.3g} x {:.3g} mm x {:.3g} degrees wide, wider than the {:.3g} x {:.3g} mm x "
       "{:.3g} degrees that the sensor model is for: probabilities are too sure; calibrate with "
-      "--bins {}x{}x{} and this region, or take more bins",
+      "`bins {}x{}x{}` and this region, or take more bins",
       x_mm, y_mm, degrees * theta_rad, learned.x_mm, learned.y_mm, degrees * learned.theta_rad,
       lattice.x_mm.count, lattice.y_mm.count, lattice.theta_rad.count);
 }

@@ -94,7 +94,7 @@ std::optional<std::string> positions_in_metres(std::span<const TouchEvidence> to
   }
   return fmt::format(
       "the sensor's positions span {:.2g} mm over {}, which differ in angle or in what they feel: "
-      "are the positions in metres? Palpate takes millimetres; import them with --pose-unit m,rad, "
+      "are the positions in metres? Palpate takes millimetres; import them with `pose-unit m,rad`, "
       "or multiply x and y of sensor_pose by 1000",
       span, touches_in_words(touches.size()));
 }
@@ -112,7 +112,7 @@ std::optional<std::string> angles_in_degrees(std::span<const TouchEvidence> touc
   const auto largest = most_rad > -least_rad ? most : least;
   return fmt::format(
       "the sensor's angle is {:.4g} rad at touch {}, beyond a full turn of 6.283 rad: are the "
-      "angles in degrees? Palpate takes radians; import them with --pose-unit mm,deg, or multiply "
+      "angles in degrees? Palpate takes radians; import them with `pose-unit mm,deg`, or multiply "
       "theta of sensor_pose by 0.0174533",
       largest->T_robot_sensor.theta_rad, largest - touches.begin() + 1);
 }
@@ -178,15 +178,15 @@ std::optional<std::string> nothing_felt(std::span<const TouchEvidence> touches, 
   if (!contact && !none) {
     return fmt::format(
         "no element is known to be in contact or out of contact {}: {}; choose a "
-        "--threshold within that range, and a --ratio above 0",
+        "`threshold` within that range, and a `ratio` above 0",
         over, evidence);
   }
   return contact ? fmt::format(
-                       "no element is ever out of contact {}: {}; choose a --threshold "
+                       "no element is ever out of contact {}: {}; choose a `threshold` "
                        "above the pressure of an untouched element, or tare the sensor",
                        over, evidence)
                  : fmt::format(
-                       "no element is ever in contact {}: {}; choose a --threshold below "
+                       "no element is ever in contact {}: {}; choose a `threshold` below "
                        "the pressure of a touched element, or touch the object",
                        over, evidence);
 }
@@ -244,11 +244,11 @@ std::optional<std::string> out_of_reach(std::span<const TouchEvidence> touches,
   const std::string ranges =
       gap_mm({0.0, 0.0}, array_mm, cells, region) <= 0.0
           ? ""
-          : fmt::format(" --x-mm={:.1f}:{:.1f} --y-mm={:.1f}:{:.1f}", cells.lower.x, cells.upper.x,
+          : fmt::format(" `x-mm={:.1f}:{:.1f}` `y-mm={:.1f}:{:.1f}`", cells.lower.x, cells.upper.x,
                         cells.lower.y, cells.upper.y);
   return fmt::format(
       "{}: the array is on average {:.1f} mm from the pivot at {:g},{:g} mm; give "
-      "--pivot-mm={:.1f},{:.1f}{}, near the touches",
+      "`pivot-mm={:.1f},{:.1f}`{}, near the touches",
       evidence, glm::distance(middle_mm, region.pivot_mm), region.pivot_mm.x, region.pivot_mm.y,
       middle_mm.x, middle_mm.y, ranges);
 }

@@ -59,7 +59,7 @@ std::optional<std::string> turned_alike(const Recogniser& recogniser, const Reco
     }
     evidence = fmt::format("{:.0f} % of its belief lies at other such turns", 100.0 * share);
   }
-  return fmt::format("{} looks the same after {}, and {}; build its map with --symmetry {}",
+  return fmt::format("{} looks the same after {}, and {}; build its map with `symmetry {}`",
                      map.label, n == 0 ? "any turn" : fmt::format("every 1/{} of a turn", n),
                      evidence, n);
 }

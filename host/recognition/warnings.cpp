@@ -97,8 +97,8 @@ std::optional<std::string> coarse_bins(const RecognitionTask& task, const PoseLa
     return {};
   }
   return fmt::format(
-      "the pose's standard deviation is only the width of a bin: {}; give --bins {}x{}x{} or more, "
-      "or --bins auto",
+      "the pose's standard deviation is only the width of a bin: {}; give `bins {}x{}x{}` or more, "
+      "or `bins auto`",
       fmt::join(coarse, ", "), counts[0], counts[1], counts[2]);
 }
 
@@ -116,7 +116,7 @@ std::optional<std::string> at_the_edge(std::span<const TouchEvidence> touches,
   const Place place = place_of(*step.refined, lattice);
   const Place variances = variances_of(*step.refined, lattice);
   constexpr std::array names{"x", "y", "theta"};
-  constexpr std::array flags{"--x-mm", "--y-mm", "--theta-deg"};
+  constexpr std::array options{"x-mm", "y-mm", "theta-deg"};
   for (int i = 0; i < 3; ++i) {
     const Axis& axis = *axes_of(lattice)[i];
     if (axis.count < 3 || (i == 2 && lattice.full_circle())) {
@@ -136,7 +136,7 @@ std::optional<std::string> at_the_edge(std::span<const TouchEvidence> touches,
     const std::string remedy =
         task.auto_pivot
             ? "the region surrounds the first touch in contact; begin with a touch of the object"
-            : fmt::format("widen the region, such as with {}={:.4g}:{:.4g}", flags[i],
+            : fmt::format("widen the region, such as with `{}={:.4g}:{:.4g}`", options[i],
                           (axis.lower - (first ? more : 0.0)) * unit,
                           (axis.upper + (first ? 0.0 : more)) * unit);
     return fmt::format(

@@ -48,7 +48,9 @@ Settled settle(const std::vector<std::string>& inputs, Request request, const De
                    .chunk_unknowns = 1,  // chunks are of recordings, whoever makes them
                    .each_frame = request.unknowns.each_frame},
                   {}};
-  request.flags.tell = [&](const std::string& sentence) { settled.sentences.push_back(sentence); };
+  request.flags.tell = [&](const std::string& sentence) {
+    settled.sentences.push_back(in_keywords(sentence));
+  };
   cli::refuse_budget(request.flags);
   const cli::InputRules rules = rules_of(request);
   for (cli::BatchInput& input : cli::list_inputs(inputs)) {

@@ -2,6 +2,7 @@
 
 #include "bindings.hpp"
 #include "call.hpp"
+#include "model/option_words.hpp"
 #include "palpate/error.hpp"
 
 namespace palpate::python {
@@ -21,7 +22,7 @@ void add_error() {
         try {
           std::rethrow_exception(thrown);
         } catch (const Error& error) {
-          const nb::object value = nb::borrow(error_class)(std::string(error.what()));
+          const nb::object value = nb::borrow(error_class)(in_keywords(error.what()));
           value.attr("fault") = error.fault() == Fault::input ? "input" : "system";
           PyErr_SetObject(error_class, value.ptr());
         }

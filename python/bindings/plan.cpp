@@ -1,5 +1,6 @@
 // `palpate plan` and `palpate recognize --fit-touch-sd`, for palpate/commands.py.
 
+#include <algorithm>
 #include <cmath>
 #include <string>
 #include <utility>
@@ -15,6 +16,7 @@
 #include "cli/record_output.hpp"
 #include "estimate.hpp"
 #include "given_recordings.hpp"
+#include "model/option_words.hpp"
 #include "recognition/touch_plan.hpp"
 #include "recognition/touch_sd_fit.hpp"
 
@@ -109,7 +111,9 @@ nb::tuple plan_python(const nb::list& recordings, const nb::list& maps, Request 
   result["index"] = owned(std::move(index), {n});
   result["T_robot_sensor"] = to_array(poses);
   result["gains"] = nb::cast(std::move(gains));
-  result["warnings"] = warnings_of(plan);
+  std::vector<std::string> warnings = warnings_of(plan);
+  std::ranges::transform(warnings, warnings.begin(), in_keywords);
+  result["warnings"] = warnings;
   result["samples"] = plan.samples.size();
   result["seed"] = plan.seed;
   result["seconds"] = plan.seconds;

@@ -104,7 +104,9 @@ Answer recognize(const Recordings& wanted, const Request& request, Device& devic
   const std::function<void(double)> progress = call.progress();
   Answer answer;
   cli::RecognitionFlags flags = request.flags;
-  flags.tell = [&](const std::string& sentence) { answer.sentences.push_back(sentence); };
+  flags.tell = [&](const std::string& sentence) {
+    answer.sentences.push_back(in_keywords(sentence));
+  };
   std::vector<Recording> recordings = read(wanted);
   for (Recording& recording : recordings) {
     cli::replace_array(scene, flags.scene, recording.path, recording.elements(),
@@ -129,10 +131,10 @@ Answer recognize(const Recordings& wanted, const Request& request, Device& devic
     if (unresolved.empty()) {
       unresolved = cli::unresolved_words(task, recogniser.lattice(), unknowns[i].touches);
     }
-    answer.records.push_back(cli::to_json(record, task, device.name(), request.trace));
+    answer.records.push_back(cli::to_json(record, task, device.name(), request.trace, in_keywords));
   }
   if (!unresolved.empty()) {
-    answer.sentences.push_back(unresolved);
+    answer.sentences.push_back(in_keywords(unresolved));
   }
   return answer;
 }

@@ -233,7 +233,7 @@ TEST_F(RecordingFile, NamesAttributesItCannotTake) {
   expect_named(spoilt("object", 7), {"'object'", "string"});
   expect_named(spoilt("object", "a\nb"), {"'object'", "printable"});
   expect_named(spoilt("object", "\xff"), {"'object'", "UTF-8"});
-  expect_named(spoilt("format", "palpate.map"), {"'palpate.map'", "a map", "--maps", "recording"});
+  expect_named(spoilt("format", "palpate.map"), {"'palpate.map'", "a map", "`maps`", "recording"});
   expect_named(spoilt("format", "palpate.posterior"), {"a posterior", "palpate info"});
   expect_named(spoilt("format", "palpate.video"), {"'palpate.video'", "unknown"});
 }

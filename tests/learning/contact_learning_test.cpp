@@ -115,7 +115,7 @@ TEST(ContactClassifierOfPresses, RefusesPressuresThatTellNothing) {
     return std::string();
   };
   EXPECT_NE(refusal({7.0, 7.0, 0.0}).find("all pressures above 0 are 7"), std::string::npos);
-  EXPECT_NE(refusal({7.0, 0.0, 0.0}).find("give --threshold"), std::string::npos);
+  EXPECT_NE(refusal({7.0, 0.0, 0.0}).find("give `threshold`"), std::string::npos);
   EXPECT_NE(refusal({0.0, 0.0, -1.0}).find("no pressure is above 0"), std::string::npos);
 }
 

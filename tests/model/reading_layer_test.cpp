@@ -105,7 +105,7 @@ TEST(ReadingLayer, RefusesWhatCannotBe) {
     reading_layer(map, {.of = MapLayer::mean_level});
     FAIL() << "a map without mean levels was taken";
   } catch (const Error& error) {
-    EXPECT_NE(std::string(error.what()).find("palpate map --sensor-model"), std::string::npos);
+    EXPECT_NE(std::string(error.what()).find("palpate map `sensor-model`"), std::string::npos);
   }
 }
 

@@ -72,10 +72,10 @@ TEST_F(TurnWarning, SaysThatTheBeliefSpreadsOverTurnsThatLookAlike) {
   EXPECT_THAT(warnings("O", 0, 1, false),
               ElementsAre(AllOf(HasSubstr("O looks the same after any turn"),
                                 HasSubstr(" % of its belief lies at other such turns"),
-                                HasSubstr("with --symmetry 0"))));
+                                HasSubstr("with `symmetry 0`"))));
   EXPECT_THAT(warnings("I", 2, 1, false),
               ElementsAre(AllOf(HasSubstr("I looks the same after every 1/2 of a turn"),
-                                HasSubstr("with --symmetry 2"))));
+                                HasSubstr("with `symmetry 2`"))));
 }
 
 TEST_F(TurnWarning, SaysThatAnErrorIsSuchATurn) {

@@ -112,10 +112,10 @@ TEST_F(Warnings, TouchesFarFromThePivotMissEveryMap) {
   const std::vector<std::string> said = warnings(recording);
   ASSERT_THAT(said, ElementsAre(AllOf(HasSubstr("no pose of the region brings 9 of 9 touches in"),
                                       HasSubstr("from the pivot at 0,0 mm"),
-                                      HasSubstr("; give --pivot-mm="), Not(HasSubstr("--x-mm")))));
+                                      HasSubstr("; give `pivot-mm="), Not(HasSubstr("`x-mm")))));
   HistogramOptions remedied;
   const std::string& text = said.front();
-  const std::string flag = "--pivot-mm=";
+  const std::string flag = "`pivot-mm=";
   ASSERT_EQ(std::sscanf(text.c_str() + text.find(flag) + flag.size(), "%lf,%lf",
                         &remedied.lattice.pivot_mm.x, &remedied.lattice.pivot_mm.y),
             2);
@@ -138,18 +138,17 @@ TEST_F(Warnings, MostTouchesMissTheMapsAboutAnAutomaticPivot) {
   EXPECT_THAT(record_of(task, unknown_of(recording)).last().warnings,
               Not(testing::Contains(HasSubstr("no pose of the region"))));
   move(8);
-  EXPECT_THAT(
-      record_of(task, unknown_of(recording)).last().warnings,
-      ElementsAre(AllOf(HasSubstr("brings 5 of 9 touches in contact"),
-                        HasSubstr("one object that lay still"), Not(HasSubstr("--pivot")))));
+  EXPECT_THAT(record_of(task, unknown_of(recording)).last().warnings,
+              ElementsAre(AllOf(HasSubstr("brings 5 of 9 touches in contact"),
+                                HasSubstr("one object that lay still"), Not(HasSubstr("`pivot")))));
 }
 
 TEST_F(Warnings, ARegionBesideEveryMapIsNamedWithOneThatMeetsThem) {
   HistogramOptions options;
   options.lattice.x_mm = {100.0, 120.0, 25};
   EXPECT_THAT(warnings(letter_touches("A", 3, 1), options),
-              ElementsAre(AllOf(HasSubstr("no pose of the region"), HasSubstr("--pivot-mm="),
-                                HasSubstr(" --x-mm=-"), HasSubstr(" --y-mm=-"))));
+              ElementsAre(AllOf(HasSubstr("no pose of the region"), HasSubstr("`pivot-mm="),
+                                HasSubstr(" `x-mm=-"), HasSubstr(" `y-mm=-"))));
 }
 
 TEST_F(Warnings, AnObjectOutsideTheRegionIsAtItsEdge) {
@@ -163,15 +162,15 @@ TEST_F(Warnings, AnObjectOutsideTheRegionIsAtItsEdge) {
   EXPECT_THAT(warnings(recording, x),
               ElementsAre(AllOf(HasSubstr("at the edge of the region, x = "),
                                 HasSubstr(fmt::format("of {:.4g} to ", x.lattice.x_mm.lower)),
-                                HasSubstr("with --x-mm="))));
+                                HasSubstr("with `x-mm="))));
   HistogramOptions y;
   y.lattice.y_mm = beside(truth.translation_mm.y, 8.0, 10);
-  EXPECT_THAT(warnings(recording, y), ElementsAre(HasSubstr("with --y-mm=")));
+  EXPECT_THAT(warnings(recording, y), ElementsAre(HasSubstr("with `y-mm=")));
   HistogramOptions theta;
   theta.lattice.theta_rad = beside(truth.theta_rad, 1.5, 12);
   EXPECT_THAT(warnings(recording, theta),
               ElementsAre(AllOf(HasSubstr("region, theta = "), HasSubstr(" degrees of "),
-                                HasSubstr("with --theta-deg="))));
+                                HasSubstr("with `theta-deg="))));
 }
 
 TEST_F(Warnings, AnAxisWithoutChoiceHasNoEdge) {
@@ -306,10 +305,10 @@ TEST_F(Warnings, BinsThatAreTooCoarse) {
   const std::vector<std::string> said = warnings(letter_touches("A", 9, 8), options);
   // The cells of A are 8.5 mm from its middle, root mean square: 36 degrees turn them by 5.4 mm,
   // and 54 bins by at most 1 mm.
-  ASSERT_THAT(
-      said, ElementsAre(AllOf(
-                HasSubstr("is only the width of a bin: "), HasSubstr("theta in bins of 36 degrees"),
-                HasSubstr("turn the object by 5.4 mm"), HasSubstr("x54 or more, or --bins auto"))));
+  ASSERT_THAT(said, ElementsAre(AllOf(HasSubstr("is only the width of a bin: "),
+                                      HasSubstr("theta in bins of 36 degrees"),
+                                      HasSubstr("turn the object by 5.4 mm"),
+                                      HasSubstr("x54` or more, or `bins auto`"))));
   options.lattice.pivot_mm = {30.0, -20.0};
   Recording moved = letter_touches("A", 9, 8);
   for (Pose& pose : moved.T_robot_sensor) {
@@ -328,13 +327,13 @@ TEST_F(Warnings, ThresholdsThatLeaveNothingKnown) {
   EXPECT_THAT(with(1000.0, 0.3), ElementsAre(AllOf(HasSubstr("ever in contact in 9 touches"),
                                                    HasSubstr("pressures range from 0 to "),
                                                    HasSubstr("threshold is 1e+03"),
-                                                   HasSubstr("a --threshold below"))));
+                                                   HasSubstr("a `threshold` below"))));
   EXPECT_THAT(with(0.0, 0.3),
               ElementsAre(AllOf(HasSubstr("ever out of contact in 9 touches"),
-                                HasSubstr("threshold is 0"), HasSubstr("a --threshold above"))));
+                                HasSubstr("threshold is 0"), HasSubstr("a `threshold` above"))));
   EXPECT_THAT(with(1000.0, 0.0),
               ElementsAre(AllOf(HasSubstr("no element is known to be in contact or out of contact"),
-                                HasSubstr("a --ratio above 0"))));
+                                HasSubstr("a `ratio` above 0"))));
   recording.valid.assign(recording.elements(), 0);
   EXPECT_THAT(with(2.0, 0.3), ElementsAre(HasSubstr("no element is alive")));
 }

@@ -44,10 +44,9 @@ MapPatches::MapPatches(const OccupancyGrid& map, double prior)
   const std::int64_t width = std::int64_t{map.nx} + 2 * border;
   const std::int64_t height = std::int64_t{map.ny} + 2 * border;
   if (width * height > std::numeric_limits<std::int32_t>::max()) {
-    throw Error(Fault::input,
-                fmt::format("map \"{}\": {} x {} cells and a border are too many for --filter "
-                            "bounded; use larger cells",
-                            map.label, map.nx, map.ny));
+    throw Error(Fault::input, fmt::format("map \"{}\": {} x {} cells and a border are too many for "
+                                          "`filter bounded`; use larger cells",
+                                          map.label, map.nx, map.ny));
   }
   width_ = static_cast<int>(width);
   height_ = static_cast<int>(height);

@@ -42,7 +42,7 @@ WindowTable window_table(const SquarePenalties& penalties, int side, int window)
   if (entries > std::numeric_limits<std::int32_t>::max()) {
     throw Error(Fault::input,
                 fmt::format("a map of {} x {} squares is too large for bounds; use PoseHistogram "
-                            "(--filter histogram), or larger cells",
+                            "(`filter histogram`), or larger cells",
                             penalties.nx, penalties.ny));
   }
   // The squares, with what lies beyond on all sides: windows of the last rows' batches reach

@@ -1,0 +1,26 @@
+#include "model/option_words.hpp"
+
+#include <gtest/gtest.h>
+
+namespace palpate {
+namespace {
+
+TEST(OptionWords, EachFaceSaysAnOptionInItsOwnWords) {
+  const char* const message =
+      "give `bins 25x25x16`, `x-mm=-5.5:5` or `filter bounded`; not `prior`";
+  EXPECT_EQ(in_flags(message),
+            "give --bins 25x25x16, --x-mm=-5.5:5 or --filter bounded; not --prior");
+  EXPECT_EQ(in_keywords(message),
+            "give bins=(25, 25, 16), x_mm=(-5.5, 5) or filter='bounded'; not prior=");
+  EXPECT_EQ(in_keywords("`gamma 1.5`: must be below 1"), "gamma=1.5: must be below 1");
+}
+
+TEST(OptionWords, OtherTextBetweenBackticksStays) {
+  for (const char* const text : {"", "`", "``", "`A.h5`", "a `B`", "`/tmp/a b`: no such file"}) {
+    EXPECT_EQ(in_flags(text), text);
+    EXPECT_EQ(in_keywords(text), text);
+  }
+}
+
+}  // namespace
+}  // namespace palpate
