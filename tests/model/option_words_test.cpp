@@ -2,8 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace palpate {
-namespace {
+namespace palpate::option_words_test {
 
 TEST(OptionWords, EachFaceSaysAnOptionInItsOwnWords) {
   const char* const message =
@@ -22,5 +21,4 @@ TEST(OptionWords, OtherTextBetweenBackticksStays) {
   }
 }
 
-}  // namespace
-}  // namespace palpate
+}  // namespace palpate::option_words_test
