@@ -1,4 +1,4 @@
-"""The refined pose's error against the step of the bins: what the bins of `--bins auto` were chosen by."""
+"""The refined pose's error against the step of the bins, by which `--bins auto` was chosen."""
 
 import argparse
 import math
@@ -113,7 +113,9 @@ def program() -> None:
         "Measures the refined pose's error against the step of the bins, after 3, 5 and 9 touches at "
         "random poses, over windows about the truth.",
     )
-    flags.add_argument("--trials", type=at_least_1, help="trials per letter [20, or 1 with --quick]")
+    flags.add_argument(
+        "--trials", type=at_least_1, help="trials per letter [20, or 1 with --quick]"
+    )
     options = flags.parse_args()
     run = Run(options)
     write_json(options.json, run.facts | {"runs": measure(run.device, options)})

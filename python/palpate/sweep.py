@@ -14,22 +14,25 @@ import sys
 import time
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
-
-import numpy
+from typing import Any
 
 from . import __version__, _palpate
 from ._error import Error
 from ._palpate import Device, Hypothesis, PoseLattice, pose_error_mm
 from ._statistics import LEAST_GAIN, Errors, errors_over, median, present
-from ._tables import Column, count_text, mean_text, number, plain, print_head, print_row, seconds_text
+from ._sweep_charts import draw
+from ._tables import (
+    Column,
+    count_text,
+    mean_text,
+    number,
+    plain,
+    print_head,
+    print_row,
+    seconds_text,
+)
 from .recognition import Record, flags_of
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-#: The files of --plots, without their endings.
-CHARTS = ("sweep_own_bins", "sweep_own_time")
 _FEWEST_BINS = 1e3  # of the coarsest lattice; of a small region, a thirtieth of the finest one's
 _LEAST_TRUE_POSES = 3  # by which errors are judged
 _MOST_HISTOGRAM = 100_000_000  # bins of all objects
@@ -73,7 +76,9 @@ def sweep(
     lattices = _lattices(fine, max_bins or (100_000 if quick else 10_000_000))
     dense = 1 if quick else 3
     finest = _measure(data, lattices[-1], dense)
-    truth_known = any("truth" in record and record["truth"].get("T_robot_object") for record in finest.records)
+    truth_known = any(
+        "truth" in record and record["truth"].get("T_robot_object") for record in finest.records
+    )
     columns = _columns(truth_known)
     print_head(columns)
     runs = []
@@ -116,7 +121,9 @@ class _Data:
         """The batch of all recordings, as `palpate batch` settles it."""
         flags = flags_of(self.options | options)
         threads = len(os.sched_getaffinity(0))
-        head, self.entries, _ = _palpate.settle_batch(self.paths, self.map_paths, flags, self.device, threads)
+        head, self.entries, _ = _palpate.settle_batch(
+            self.paths, self.map_paths, flags, self.device, threads
+        )
         return _palpate.OpenBatch.open(head, self.map_paths, flags, self.device, threads)
 
     def on(self, lattice: PoseLattice, filter: str) -> "_palpate.OpenBatch":
@@ -161,7 +168,9 @@ def _lattices(fine: PoseLattice, most: int) -> list[PoseLattice]:
     free = max(1, sum(count > 1 for count in _counts(fine)))
     lattices: list[PoseLattice] = []
     count = finest
-    while count >= 0.9 * min(_FEWEST_BINS, finest / 30.0):  # counts of bins are near to what is asked for
+    while count >= 0.9 * min(
+        _FEWEST_BINS, finest / 30.0
+    ):  # counts of bins are near to what is asked for
         factor = (count / fine.bins) ** (1.0 / free)
         axes = [
             (axis.lower, axis.upper, max(1, math.floor(factor * axis.count + 0.5)))
@@ -360,7 +369,9 @@ def _advice(
     advised = refined or finest
     count, flags = count_text(advised.point["count"]), _flags(advised.lattice, data.auto_pivot)
     if refined:
-        needs = f"needs {count_text(mode.point['count'])}" if mode else "gains up to the finest bins"
+        needs = (
+            f"needs {count_text(mode.point['count'])}" if mode else "gains up to the finest bins"
+        )
         words = (
             f"Beyond {count} bins per object ({flags}) neither recognition nor the refined pose "
             f"improves; the mode {needs}."
@@ -382,62 +393,6 @@ def _advice(
     )
 
 
-def draw(document: Document) -> "dict[str, Figure]":
-    """The charts of a sweep: error and time against bins. Raises Error without Matplotlib."""
-    try:
-        from matplotlib.figure import Figure
-        from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
-    except ImportError as missing:
-        raise Error("--plots: Matplotlib is missing; pip install 'palpate[plot]'") from missing
-    points = document["points"]
-    truth_known = document["true_poses"] > 0
-    counts = [point["count"] for point in points]
-
-    def chart(y: str) -> tuple[Any, Any]:
-        figure = Figure(figsize=(9.6, 5.4), layout="constrained")
-        axes = figure.add_subplot(xlabel="bins per object", ylabel=y, xscale="log", yscale="log")
-        axes.grid(color="#d6d6d6")
-        axes.xaxis.set_major_formatter(FuncFormatter(lambda count, _: count_text(count)))
-        axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0), numticks=20))
-        axes.yaxis.set_minor_formatter(NullFormatter())
-        return figure, axes
-
-    def line(axes: Any, path: str, label: str, **look: Any) -> None:
-        first, _, then = path.partition("/")
-        values = [point[first] and (point[first][then] if then else point[first]) for point in points]
-        axes.plot(counts, [numpy.nan if value is None else value for value in values], label=label, **look)
-
-    blue: Any = {"color": "#0072b2", "marker": "o"}
-    red: Any = {"color": "#d55e00", "marker": "s", "linestyle": "--"}
-    error_chart, axes = chart(
-        "mean pose error (mm)"
-        if truth_known
-        else "mean distance from the pose of the finest bins (mm)"
-    )
-    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    field_of = "error_mm" if truth_known else "from_finest_mm"
-    line(axes, f"{field_of}/mean", "mode", **blue)
-    line(axes, f"refined_{field_of}/mean", "refined pose", **red)
-    line(axes, "sd_mm", "standard deviation of x and y, median", color="#616161", linestyle=":")
-    for name, label, colour in (
-        ("auto_count", "--bins auto", "#616161"),
-        ("fine_count", "--bins fine", "#616161"),
-        ("refined_count", "enough", "black"),
-    ):
-        at = document[name]
-        if at is not None and counts[0] <= at <= counts[-1]:
-            axes.axvline(at, color=colour, linestyle=":")
-            axes.text(at, 0.98, label + " ", color=colour, rotation=90, ha="right", va="top",
-                      transform=axes.get_xaxis_transform())  # fmt: skip
-    time_chart, time_axes = chart("time per unknown")
-    time_axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: seconds_text(value)))
-    line(time_axes, "seconds_histogram", "histogram", **blue)
-    line(time_axes, "seconds_bounds", "by bounds", **red)
-    for each in (axes, time_axes):
-        each.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3, frameon=False)
-    return dict(zip(CHARTS, (error_chart, time_chart), strict=True))
-
-
 def _flag_parser() -> argparse.ArgumentParser:
     flags = argparse.ArgumentParser(
         "python -m palpate.sweep",
@@ -445,7 +400,13 @@ def _flag_parser() -> argparse.ArgumentParser:
         "objects need, and what bins cost on this device.",
     )
     add = flags.add_argument
-    add("--maps", nargs="+", default=[], metavar="MAP", help="maps of your objects, or folders of maps")
+    add(
+        "--maps",
+        nargs="+",
+        default=[],
+        metavar="MAP",
+        help="maps of your objects, or folders of maps",
+    )
     add("--recordings", nargs="+", required=True, metavar="RECORDING",
         help="recordings of unknowns, folders of them, or manifests as of palpate batch; where they know "
         "the object or its pose, the sweep tells accuracy and errors")  # fmt: skip
@@ -458,7 +419,12 @@ def _flag_parser() -> argparse.ArgumentParser:
     add("--pivot-mm", metavar="X,Y|auto", help="point about which theta turns")
     add("--threshold", type=float, help="contact threshold, in the recordings' unit")
     add("--ratio", type=float, help="threshold as a fraction of the largest pressure")
-    add("--max-bins", type=int, metavar="N", help="most bins per object [10000000, or 100000 with --quick]")
+    add(
+        "--max-bins",
+        type=int,
+        metavar="N",
+        help="most bins per object [10000000, or 100000 with --quick]",
+    )
     add("--quick", action="store_true", help="at most 100,000 bins per object")
     add("--device", default="", help="Vulkan device, by a part of its name or index")
     add("--json", metavar="FILE", help="write the results to this file")
@@ -472,7 +438,16 @@ def _run(arguments: argparse.Namespace) -> None:
     given = vars(arguments)
     options = {
         name: given[name]
-        for name in ("scene", "sensor_model", "x_mm", "y_mm", "theta_deg", "pivot_mm", "threshold", "ratio")
+        for name in (
+            "scene",
+            "sensor_model",
+            "x_mm",
+            "y_mm",
+            "theta_deg",
+            "pivot_mm",
+            "threshold",
+            "ratio",
+        )
     }
     # What cannot be written is known before the minutes of work.
     if arguments.plots:
