@@ -131,7 +131,7 @@ def test_certificates_hold(tmp_path: pathlib.Path) -> None:
 def sweep(tmp_path_factory: pytest.TempPathFactory) -> Program:
     folder = tmp_path_factory.mktemp("sweep")
     return Program(
-        folder, "bench.sweep", "--quick", "--trials", 2, "--max-bins", 30_000,
+        folder, "bench.sweep", "--quick", "--trials", 1, "--max-bins", 30_000,
         "--html", folder / "page.html", "--plots", folder / "plots",
     )  # fmt: skip
 
@@ -142,7 +142,7 @@ def test_a_sweep_is_whole_and_in_order(sweep: Program) -> None:
         "histogram", "particles", "systematic", "augmented",
     }  # fmt: skip
     for point in document["points"]:
-        assert point["trials"] == 10
+        assert point["trials"] == 5
         assert 0.0 < point["seconds_per_touch"] < point["seconds_per_unknown"]
         assert (point["seconds_refine"] is None) == (point["filter"] != "histogram")
         assert point["error_mm"]["p95"] is None, "of so few trials it is the largest error"
