@@ -50,9 +50,7 @@ def main(run: Callable[[], None]) -> None:
 class Run:
     """A run of a program: its device, the facts that explain its numbers, and its files."""
 
-    def __init__(
-        self, options: argparse.Namespace, folders: Json | None = None, data: str = ""
-    ) -> None:
+    def __init__(self, options: argparse.Namespace, folders: Json | None = None) -> None:
         """Opens the device, and prints the facts.
 
         folders: by flag, the names of the files that go to the flag's folder. What cannot be written is
@@ -72,7 +70,7 @@ class Run:
             "device": self.device.name,
             "host threads": os.cpu_count(),
             "python": platform.python_version(),
-            "data": data or "simulated letters and sensor; the paper's recordings are not public",
+            "data": "simulated letters and sensor; the paper's recordings are not public",
             "date": now.strftime("%Y-%m-%dT%H:%M:%SZ"),
             "command line": shlex.join(sys.argv),
         }
