@@ -7,6 +7,7 @@ import numpy
 
 import palpate
 from palpate._statistics import Errors
+from palpate._sweep_runs import errors_record
 from palpate._tables import (
     Column,
     count_text,
@@ -17,7 +18,6 @@ from palpate._tables import (
     print_head,
     print_row,
 )
-from palpate.sweep import errors_record
 
 from .measures import Paired
 from .report import Json, Run, at_least_1, main, parser, write_json

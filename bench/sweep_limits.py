@@ -6,8 +6,8 @@ import numpy
 
 import palpate
 from palpate._statistics import Errors
+from palpate._sweep_runs import errors_record
 from palpate._tables import count_text
-from palpate.sweep import errors_record
 
 from .measures import Paired
 from .report import Json

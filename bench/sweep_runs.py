@@ -11,7 +11,7 @@ import numpy
 import palpate
 from palpate import reference
 from palpate._statistics import Errors, mean, median
-from palpate.sweep import errors_record
+from palpate._sweep_runs import errors_record
 
 from .certificates import check_certificate, dense_posterior
 from .measures import calibration
