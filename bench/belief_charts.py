@@ -6,9 +6,8 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy
-from matplotlib.colors import LogNorm
-
 from matplotlib.axes import Axes
+from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 
 import palpate
@@ -31,8 +30,12 @@ PICTURE = "misplaced_unknown.png"
 def draw(part: str, records: list[Json]) -> dict[str, Figure]:
     """A part's charts from its records; none of a part without charts."""
     if part == "misplaced":
-        refined = _misplaced(records, "refined_mm", "mean error of refined poses with the right letter (mm)")
-        sureness = _misplaced(records, "normalised_error", "squared pose error over covariance (NEES)")
+        refined = _misplaced(
+            records, "refined_mm", "mean error of refined poses with the right letter (mm)"
+        )
+        sureness = _misplaced(
+            records, "normalised_error", "squared pose error over covariance (NEES)"
+        )
         charts.rule(sureness.axes[0], EXPECTED_NORMALISED_ERROR, "3 where covariances are right")
         return {"misplaced": refined, "sureness": sureness}
     drawers = {"none": _none, "slip": _slip, "plan": _plan}
@@ -54,9 +57,15 @@ def _misplaced(records: list[Json], field: str, y: str) -> Figure:
             ("as if exact", {"marker": "s", "linestyle": "--"} | charts.HOLLOW),
             ("averaged", {"marker": "o", "linestyle": "-"} | charts.EDGE),
         ):
-            own = [r for r in records if (r["noise_mm"], r["noise_rad"], r["belief"]) == (*level, belief)]
-            charts.line(axes, own, "touches", f"{field}/mean", interval=(f"{field}/low", f"{field}/high"),
-                        label=f"{level[0]:g} mm, {level[1]:g} rad, {belief}", color=colour, **look)  # fmt: skip
+            own = [
+                r
+                for r in records
+                if (r["noise_mm"], r["noise_rad"], r["belief"]) == (*level, belief)
+            ]
+            name = f"{level[0]:g} mm, {level[1]:g} rad, {belief}"
+            ends = (f"{field}/low", f"{field}/high")
+            charts.line(axes, own, "touches", f"{field}/mean", interval=ends, label=name, color=colour,
+                        **look)  # fmt: skip
     _to_the_most(axes, records)
     charts.legend(axes)
     return figure
@@ -73,7 +82,11 @@ def _none(records: list[Json]) -> Figure:
     for colour, name in zip(charts.COLOURS, shown, strict=False):
         own = [record for record in records if record["name"] == name]
         for who, field, look in (
-            ("never learned", "unlearned_called_none", {"marker": "o", "linestyle": "-"} | charts.EDGE),
+            (
+                "never learned",
+                "unlearned_called_none",
+                {"marker": "o", "linestyle": "-"} | charts.EDGE,
+            ),
             ("learned", "learned_called_none", {"marker": "s", "linestyle": "--"} | charts.HOLLOW),
         ):
             charts.line(axes, own, "touches", field, scale=100.0, label=f"{name}: {who}", color=colour,
@@ -85,7 +98,9 @@ def _none(records: list[Json]) -> Figure:
 
 
 def _slip(records: list[Json]) -> Figure:
-    figure, axes = charts.chart("touches", "mean error of modes with the right letter (mm)", log="y")
+    figure, axes = charts.chart(
+        "touches", "mean error of modes with the right letter (mm)", log="y"
+    )
     for i, record in enumerate(records):
         charts.line(axes, record["curve"], "touches", "mode_mm", label=record["belief"], markevery=5,
                     **charts.like(i))  # fmt: skip
@@ -125,7 +140,9 @@ def draw_misplaced_unknown(
     """
     noise = (1.0, 0.05)
     trial = make_trials(VOWELS, 1, 5, seed, Touching(at_random_poses=True, noise=noise))[4]
-    pivot_mm = trial.T_robot_sensor[0, :2]  # as --pivot-mm auto: x and y then hardly depend on the angle
+    pivot_mm = trial.T_robot_sensor[
+        0, :2
+    ]  # as --pivot-mm auto: x and y then hardly depend on the angle
     true_mm = palpate.transform(truth_of(trial).T_object_robot, [pivot_mm])[0]
     figure = Figure(figsize=(12.0, 6.4), layout="constrained")
     panels: Any = figure.subplots(1, 2)
@@ -146,20 +163,28 @@ def draw_misplaced_unknown(
         )  # fmt: skip
         circle = numpy.linspace(0.0, 2.0 * math.pi, 73)
         # The Cholesky factor carries the circle to the ellipse.
-        ellipse = place_mm + 2.0 * numpy.stack([numpy.cos(circle), numpy.sin(circle)], 1) @ numpy.linalg.cholesky(covariance).T
+        ellipse = (
+            place_mm
+            + 2.0
+            * numpy.stack([numpy.cos(circle), numpy.sin(circle)], 1)
+            @ numpy.linalg.cholesky(covariance).T
+        )
         axes.plot(*ellipse.T, color="white", linewidth=3.5)
         axes.plot(*ellipse.T, color="black", linewidth=1.8,
                   label="refined pose, two standard deviations")  # fmt: skip
         axes.plot(*true_mm, "x", color="#d55e00", markersize=12, markeredgewidth=3, label="true")
         sd = numpy.sqrt(numpy.diag(covariance))
-        error = f"error {step.refined_error_mm:.1f} mm; standard deviations {sd[0]:.1f} and {sd[1]:.1f} mm"
+        error = f"error {step.refined_error_mm:.1f} mm; "
+        error += f"standard deviations {sd[0]:.1f} and {sd[1]:.1f} mm"
         axes.set_title(f"{title}\n", loc="left", fontsize=13)
         axes.text(0.0, 1.02, error, transform=axes.transAxes, fontsize=10)
         axes.set(xlim=true_mm[0] + (-4.0, 4.0), ylim=true_mm[1] + (-4.0, 4.0))
         axes.set(xlabel="x of the first touch in the object frame, mm", ylabel="y, mm")
         axes.grid(visible=False)
     panels[0].legend(loc="lower left", frameon=True, fontsize=9)
-    figure.colorbar(image, ax=panels, shrink=0.8, label="probability relative to the largest, all angles")
+    figure.colorbar(
+        image, ax=panels, shrink=0.8, label="probability relative to the largest, all angles"
+    )
     drawn = io.BytesIO()
     figure.savefig(drawn, format="png", dpi=100)
     return drawn.getvalue()

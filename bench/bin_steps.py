@@ -1,4 +1,4 @@
-"""The refined pose's error against the step of the bins: what the bins of `--bins auto` were chosen by."""
+"""The refined pose's error against the step of the bins, by which `--bins auto` was chosen."""
 
 import argparse
 import math
@@ -7,6 +7,7 @@ import numpy
 
 import palpate
 from palpate._statistics import Errors
+from palpate._sweep_runs import errors_record
 from palpate._tables import (
     Column,
     count_text,
@@ -17,7 +18,6 @@ from palpate._tables import (
     print_head,
     print_row,
 )
-from palpate.sweep import errors_record
 
 from .measures import Paired
 from .report import Json, Run, at_least_1, main, parser, write_json
@@ -113,7 +113,9 @@ def program() -> None:
         "Measures the refined pose's error against the step of the bins, after 3, 5 and 9 touches at "
         "random poses, over windows about the truth.",
     )
-    flags.add_argument("--trials", type=at_least_1, help="trials per letter [20, or 1 with --quick]")
+    flags.add_argument(
+        "--trials", type=at_least_1, help="trials per letter [20, or 1 with --quick]"
+    )
     options = flags.parse_args()
     run = Run(options)
     write_json(options.json, run.facts | {"runs": measure(run.device, options)})

@@ -15,11 +15,11 @@ from matplotlib.figure import Figure
 
 import palpate
 from palpate._statistics import median
+from palpate._tables import count_text, seconds_text
 
 from . import charts
 from .certificates import CertificateCheck, check_certificate, dense_posterior
 from .report import Json, Measurement, Report, Run, main, parser, share_of, write_json
-from palpate._tables import count_text, seconds_text
 from .trials import VOWELS, counts_of, lattice_of, letter_maps, make_trials, size_of
 
 SEED = 1_404_000_000
@@ -163,7 +163,12 @@ def measure_presses(run: Run, options: argparse.Namespace, report: Report) -> Js
     in_all = lattice.bins * len(maps)
     frames, all_ms = len(answers["best"]), answers["milliseconds"]
     evaluated = median(answers["bins_evaluated"])
-    facts = {"objects": len(maps), "elements": len(elements_mm), "bins in all": in_all, "frames": frames}
+    facts = {
+        "objects": len(maps),
+        "elements": len(elements_mm),
+        "bins in all": in_all,
+        "frames": frames,
+    }
     report.add(
         f"presses {size_of(lattice)}",
         facts,
@@ -176,11 +181,17 @@ def measure_presses(run: Run, options: argparse.Namespace, report: Report) -> Js
             Measurement("certificate, largest", max(answers["dropped_mass"]), "mass"),
             share_of("mode certain", certain, frames),
             Measurement("dense engine, array at rest, median", median(answers["dense_ms"]), "ms"),
-            share_of("the dense engine's best label", same, len(answers["dense_ms"]), at_least=100.0),
+            share_of(
+                "the dense engine's best label", same, len(answers["dense_ms"]), at_least=100.0
+            ),
             share_of("label right", right, frames),
         ],
     )
-    return {"bins": counts_of(lattice), "bins_in_all": in_all, "host_bytes": bounded.host_bytes} | answers
+    return {
+        "bins": counts_of(lattice),
+        "bins_in_all": in_all,
+        "host_bytes": bounded.host_bytes,
+    } | answers
 
 
 def _answer(belief: Any, touches: palpate.Recording) -> tuple[Any, float]:
@@ -206,7 +217,9 @@ def draw_growth(records: list[Json]) -> Figure:
     ):
         ends = (f"{name}/least", f"{name}/most")
         look = charts.like(i) | {"linestyle": "-"}
-        charts.line(axes, records, "bins_in_all", f"{name}/median", interval=ends, label=label, **look)
+        charts.line(
+            axes, records, "bins_in_all", f"{name}/median", interval=ends, label=label, **look
+        )
     charts.tick_text(axes, "x", count_text, decades=True)
     charts.tick_text(axes, "y", seconds_text, decades=True)
     charts.legend(axes)

@@ -1,4 +1,4 @@
-"""The posterior over all bins in float64, which the certificates of a posterior by bounds hold against."""
+"""The posterior over all bins in float64, which certificates of a search by bounds are held against."""
 
 import math
 from collections.abc import Sequence

@@ -8,7 +8,7 @@ from typing import Any
 import matplotlib
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 
 from .report import write
 
@@ -40,6 +40,8 @@ def chart(x: str, y: str, *, title: str = "", log: str = "") -> tuple[Figure, Ax
     figure = Figure(figsize=(9.6, 5.4), layout="constrained")
     axes = figure.add_subplot(xlabel=x, ylabel=y)
     axes.set_title(title, fontsize=10, loc="left")
+    if x == "touches":
+        axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     for axis, scale in ((axes.xaxis, "x"), (axes.yaxis, "y")):
         if scale in log:
             getattr(axes, f"set_{scale}scale")("log")
@@ -49,7 +51,9 @@ def chart(x: str, y: str, *, title: str = "", log: str = "") -> tuple[Figure, Ax
     return figure, axes
 
 
-def tick_text(axes: Axes, which: str, text: Callable[[float], str], *, decades: bool = False) -> None:
+def tick_text(
+    axes: Axes, which: str, text: Callable[[float], str], *, decades: bool = False
+) -> None:
     """Writes the ticks of an axis by a function; decades: only the powers of ten have one."""
     axis = getattr(axes, f"{which}axis")
     if decades:
@@ -121,7 +125,7 @@ def rule(axes: Axes, at: float, label: str, *, vertical: bool = False, colour: s
 def legend(axes: Axes, columns: int = 3) -> None:
     """The series' names above the chart, and the title above them."""
     names = axes.get_legend_handles_labels()[1]
-    if any(len(name) > 34 for name in names):
+    if any(len(name) > 30 for name in names):
         columns = 2
     axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=columns, borderaxespad=0.2)
     rows = -(-len(names) // columns)

@@ -8,7 +8,13 @@ import numpy
 from numpy.typing import ArrayLike, NDArray
 
 import palpate
-from palpate._statistics import LEAST_GAIN, Errors, errors_over, mean, median, quantile, standard_error
+from palpate._statistics import (
+    LEAST_GAIN,
+    Errors,
+    mean,
+    quantile,
+    standard_error,
+)
 
 from .random_numbers import Random, Stream
 from .trials import Body
@@ -49,9 +55,11 @@ def mean_interval(values: Sequence[float]) -> Interval:
 
 
 def told_apart(lower: ArrayLike, higher: ArrayLike) -> float:
-    """Share of the pairs of both kinds in which the value of the lower kind is lower; ties count half."""
+    """Share of the pairs of both kinds in which the lower kind's value is lower; ties count half."""
     ordered, low = numpy.sort(numpy.asarray(higher)), numpy.asarray(lower)
-    middle = (numpy.searchsorted(ordered, low, "left") + numpy.searchsorted(ordered, low, "right")) / 2
+    middle = (
+        numpy.searchsorted(ordered, low, "left") + numpy.searchsorted(ordered, low, "right")
+    ) / 2
     return float(numpy.mean(1.0 - middle / len(ordered)))
 
 
@@ -112,9 +120,7 @@ class Paired:
     def of(first: Errors, second: Errors) -> "Paired":
         """Trial i of one run is trial i of the other."""
         pairs = [
-            (a, b)
-            for a, b in zip(first, second, strict=True)
-            if a is not None and b is not None
+            (a, b) for a, b in zip(first, second, strict=True) if a is not None and b is not None
         ]
         if not pairs:
             return Paired(0, 0.0, 0.0, 0.0)
@@ -203,14 +209,18 @@ def normalised_error(
     estimate, true = refined.T_object_robot, numpy.asarray(truth)
     centroid_mm = Body.of(grid).centroid_mm
     if grid.symmetry == 0:
-        places = [palpate.transform(palpate.inverse(pose), [centroid_mm])[0] for pose in (estimate, true)]
+        places = [
+            palpate.transform(palpate.inverse(pose), [centroid_mm])[0] for pose in (estimate, true)
+        ]
         s, c = math.sin(-estimate[2]), math.cos(-estimate[2])
         turn = numpy.array([[c, -s], [s, c]])
         x, y = centroid_mm - estimate[:2]
         jacobian = numpy.column_stack([-turn, turn @ (y, -x)])
         error = places[0] - places[1]
         covariance = jacobian @ refined.covariance @ jacobian.T
-        return EXPECTED_NORMALISED_ERROR / 2.0 * float(error @ numpy.linalg.solve(covariance, error))
+        return (
+            EXPECTED_NORMALISED_ERROR / 2.0 * float(error @ numpy.linalg.solve(covariance, error))
+        )
     turn_rad = estimate[2] - true[2]
     turn_rad -= wrapped(turn_rad, 2.0 * math.pi / grid.symmetry)
     s, c = math.sin(turn_rad), math.cos(turn_rad)

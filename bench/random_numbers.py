@@ -51,7 +51,7 @@ class MersenneTwister:
 
     def __init__(self, state: NDArray[numpy.uint64]) -> None:
         self._state = state
-        self._left = numpy.empty(0, numpy.uint64)
+        self._left: NDArray[numpy.uint64] = numpy.empty(0, numpy.uint64)
 
     def draw(self, n: int) -> NDArray[numpy.uint64]:
         """The next n numbers, [n]."""
@@ -69,7 +69,7 @@ class MersenneTwister:
                 joined = (x[part] & _UPPER) | (x[(part + 1) % _SIZE] & _LOWER)
                 odd = (joined & numpy.uint64(1)) * _TWIST
                 x[part] = x[(part + _SHIFT) % _SIZE] ^ (joined >> numpy.uint64(1)) ^ odd
-        y: NDArray[numpy.uint64] = x.copy()
+        y: NDArray[numpy.uint64] = numpy.array(x)
         y ^= (y >> numpy.uint64(29)) & numpy.uint64(0x5555555555555555)
         y ^= (y << numpy.uint64(17)) & numpy.uint64(0x71D67FFFEDA60000)
         y ^= (y << numpy.uint64(37)) & numpy.uint64(0xFFF7EEE000000000)

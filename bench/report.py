@@ -50,7 +50,7 @@ def main(run: Callable[[], None]) -> None:
 class Run:
     """A run of a program: its device, the facts that explain its numbers, and its files."""
 
-    def __init__(self, options: argparse.Namespace, folders: Json | None = None, data: str = "") -> None:
+    def __init__(self, options: argparse.Namespace, folders: Json | None = None) -> None:
         """Opens the device, and prints the facts.
 
         folders: by flag, the names of the files that go to the flag's folder. What cannot be written is
@@ -70,7 +70,7 @@ class Run:
             "device": self.device.name,
             "host threads": os.cpu_count(),
             "python": platform.python_version(),
-            "data": data or "simulated letters and sensor; the paper's recordings are not public",
+            "data": "simulated letters and sensor; the paper's recordings are not public",
             "date": now.strftime("%Y-%m-%dT%H:%M:%SZ"),
             "command line": shlex.join(sys.argv),
         }
@@ -92,7 +92,9 @@ def _require_writable(files: Sequence[str]) -> None:
     for file in files:
         path = os.path.realpath(file)
         if path in seen:
-            raise palpate.Error(f"{file}: two outputs would overwrite each other; give another name")
+            raise palpate.Error(
+                f"{file}: two outputs would overwrite each other; give another name"
+            )
         seen.add(path)
         if os.path.isdir(path) or not os.access(os.path.dirname(path), os.W_OK):
             raise palpate.Error(f"{file}: cannot be written; give a file in a folder that can")
@@ -181,7 +183,9 @@ class Report:
     cases: list[Json] = field(default_factory=list)
 
     def __post_init__(self) -> None:
-        print(f"\n| {'case':<28} | {'measured':<46} | {'value':<28} | {'goal':<8} | {'reached':<7} |")
+        print(
+            f"\n| {'case':<28} | {'measured':<46} | {'value':<28} | {'goal':<8} | {'reached':<7} |"
+        )
         print("|:--|:--|--:|:--|:--|", flush=True)
 
     def add(self, name: str, facts: Json, measurements: Iterable[Measurement]) -> None:

@@ -7,13 +7,10 @@ import urllib.parse
 from collections.abc import Iterable, Sequence
 from typing import Any, ClassVar
 
-from palpate._statistics import LEAST_GAIN
-
-from . import charts
-from .report import Json
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from palpate._statistics import LEAST_GAIN
 from palpate._tables import (
     Column,
     count_text,
@@ -28,6 +25,9 @@ from palpate._tables import (
     texts,
     value_of,
 )
+
+from . import charts
+from .report import Json
 from .windows import REACH_MM
 
 #: The files of the charts, without their endings.
@@ -273,7 +273,11 @@ def _bounds_chart(document: Json) -> tuple[Figure, Spots]:
     ):
         for asked, words, look in (
             ("once", "asked once", {"marker": "o", "linestyle": "-"}),
-            ("each_touch", "asked after each touch", {"marker": "s", "linestyle": "--"} | charts.HOLLOW),
+            (
+                "each_touch",
+                "asked after each touch",
+                {"marker": "s", "linestyle": "--"} | charts.HOLLOW,
+            ),
         ):
             chart.add(
                 (
@@ -346,7 +350,9 @@ def _sort_key(value: Any, text: str) -> str:
     value = value["mean"] if isinstance(value, dict) else value
     if value is None:
         return "inf"
-    return f"{value:.9g}" if isinstance(value, (int, float)) and not isinstance(value, bool) else text
+    return (
+        f"{value:.9g}" if isinstance(value, (int, float)) and not isinstance(value, bool) else text
+    )
 
 
 def _table(columns: Sequence[Column], records: Iterable[Json]) -> str:
@@ -368,7 +374,9 @@ def _table(columns: Sequence[Column], records: Iterable[Json]) -> str:
 class _Template(string.Template):
     """The page's text, with a part in the place of every {{name}}."""
 
-    pattern: ClassVar[Any] = r"\{\{(?:(?P<named>[a-z_]+)|(?P<braced>\b\B)|(?P<escaped>\b\B)|(?P<invalid>\b\B))\}\}"
+    pattern: ClassVar[Any] = (
+        r"\{\{(?:(?P<named>[a-z_]+)|(?P<braced>\b\B)|(?P<escaped>\b\B)|(?P<invalid>\b\B))\}\}"
+    )
 
 
 def page_of(document: Json, figures: dict[str, tuple[Figure, Spots]]) -> str:
@@ -376,7 +384,9 @@ def page_of(document: Json, figures: dict[str, tuple[Figure, Spots]]) -> str:
     facts = ("device", "host threads", "python", "data", "date", "command line", "seconds in all")
     verdicts = document["verdicts"]
     parts = {
-        "facts": "".join(f"<dt>{fact}</dt><dd>{html.escape(str(document[fact]))}</dd>\n" for fact in facts),
+        "facts": "".join(
+            f"<dt>{fact}</dt><dd>{html.escape(str(document[fact]))}</dd>\n" for fact in facts
+        ),
         "goals": "<h2>Goals</h2>\n" + _table(VERDICTS, verdicts) if verdicts else "",
         "trials": str(document["trials"]),
         "limit_trials": str(document["limits"][0]["error_mm"]["trials"]),
@@ -385,7 +395,9 @@ def page_of(document: Json, figures: dict[str, tuple[Figure, Spots]]) -> str:
         "least_gain": f"{100.0 * LEAST_GAIN:.0f}",
         "window_reach": f"{REACH_MM:g}",
         "auto_rule": html.escape(document["auto_rule"]["sentence"]),
-        "knees": "".join(f"<li>{html.escape(knee['sentence'])}</li>\n" for knee in document["knees"]),
+        "knees": "".join(
+            f"<li>{html.escape(knee['sentence'])}</li>\n" for knee in document["knees"]
+        ),
         "steps": _table(STEPS, _steps_of(document)),
         "limits": _table(LIMITS, document["limits"]),
         "runs": _table(RUNS, document["points"]),

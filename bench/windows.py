@@ -30,7 +30,9 @@ class Placed:
     T_object_robot: Floats
 
 
-def map_of(maps: Sequence[palpate.OccupancyGrid], trial: palpate.Recording) -> palpate.OccupancyGrid:
+def map_of(
+    maps: Sequence[palpate.OccupancyGrid], trial: palpate.Recording
+) -> palpate.OccupancyGrid:
     """The map of the letter that a trial is of."""
     return next(grid for grid in maps if grid.label == truth_of(trial).object)
 

@@ -196,7 +196,7 @@ std::string draw_table(const LearnedSensor& sensor) {
   comparison.line = Line::dotted;
   chart.series.push_back(std::move(comparison));
   chart.rules.push_back({.vertical = true, .at = -9.0, .colour = comparison_grey, .label = ""});
-  return draw_chart(chart, PictureFormat::png).bytes;
+  return draw_chart(chart);
 }
 
 ReliabilityFigure reliability_of(const SensorCalibration& calibration) {

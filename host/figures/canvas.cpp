@@ -7,7 +7,6 @@
 #include <numbers>
 #include <vector>
 
-#include <cairo-svg.h>
 #include <fmt/format.h>
 
 #include "model/printable.hpp"
@@ -48,21 +47,10 @@ cairo_status_t append(void* bytes, const unsigned char* data, unsigned int size)
   return CAIRO_STATUS_SUCCESS;
 }
 
-cairo_surface_t* svg_surface(std::string* bytes, int width_px, int height_px) {
-  cairo_surface_t* surface =
-      cairo_svg_surface_create_for_stream(append, bytes, width_px, height_px);
-  cairo_svg_surface_set_document_unit(surface, CAIRO_SVG_UNIT_PX);
-  return surface;
-}
-
 }  // namespace
 
-Canvas::Canvas(int width_px, int height_px, PictureFormat format)
-    : format_(format),
-      svg_(std::make_unique<std::string>()),
-      surface_(format == PictureFormat::svg
-                   ? svg_surface(svg_.get(), width_px, height_px)
-                   : cairo_image_surface_create(CAIRO_FORMAT_RGB24, width_px, height_px)),
+Canvas::Canvas(int width_px, int height_px)
+    : surface_(cairo_image_surface_create(CAIRO_FORMAT_RGB24, width_px, height_px)),
       context_(cairo_create(surface_.get())) {
   cairo_t* context = context_.get();
   const std::string what = fmt::format("picture of {} x {} pixels", width_px, height_px);
@@ -232,11 +220,6 @@ Canvas::Clip::~Clip() { cairo_restore(context_); }
 
 std::string Canvas::encode() {
   require(cairo_status(context_.get()), "picture");
-  if (format_ == PictureFormat::svg) {
-    cairo_surface_finish(surface_.get());
-    require(cairo_surface_status(surface_.get()), "picture");
-    return *svg_;
-  }
   std::string bytes;
   require(cairo_surface_write_to_png_stream(surface_.get(), append, &bytes), "picture");
   return bytes;

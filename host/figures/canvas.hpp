@@ -10,7 +10,6 @@
 #include <glm/vec2.hpp>
 
 #include "figures/palette.hpp"
-#include "figures/picture_format.hpp"
 
 namespace palpate {
 
@@ -45,7 +44,7 @@ struct Pen {
 class Canvas {
  public:
   /// @throws Error (Fault::system) if there is no memory for that many pixels.
-  Canvas(int width_px, int height_px, PictureFormat format = PictureFormat::png);
+  Canvas(int width_px, int height_px);
 
   /// Writes text whose baseline has its left end, centre or right end at `at`. Bytes that are not
   /// UTF-8 and control characters show as '?'.
@@ -78,7 +77,7 @@ class Canvas {
     cairo_t* context_;
   };
 
-  /// Returns the canvas as the bytes of a file. After an SVG file, nothing more can be drawn.
+  /// Returns the canvas as the bytes of a PNG file.
   /// @throws Error (Fault::system) if anything drawn so far failed.
   std::string encode();
 
@@ -92,8 +91,6 @@ class Canvas {
   void show(const std::string& text, Align align, const Colour& colour);
   void stroke(const Pen& pen);
 
-  PictureFormat format_;
-  std::unique_ptr<std::string> svg_;  ///< outlives the surface, which writes to it
   std::unique_ptr<cairo_surface_t, Destroy> surface_;
   std::unique_ptr<cairo_t, Destroy> context_;
 };

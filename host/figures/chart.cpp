@@ -20,11 +20,6 @@ constexpr double row_px = 32.0;  // of the legend
 constexpr double sample_px = 64.0;
 constexpr double radius_px = 7.5;
 
-Colour paler(const Colour& colour, double share) {
-  const auto mix = [&](double part) { return share * part + (1.0 - share); };
-  return {mix(colour.red), mix(colour.green), mix(colour.blue)};
-}
-
 /// Returns the corners of a mark's outline; none for a circle.
 std::vector<glm::dvec2> corners_of(Mark mark, glm::dvec2 at) {
   const double r = radius_px;
@@ -44,24 +39,14 @@ std::vector<glm::dvec2> corners_of(Mark mark, glm::dvec2 at) {
 }
 
 void draw_mark(Canvas& canvas, const ChartSeries& series, glm::dvec2 at) {
-  const Colour inside = series.fill == MarkFill::solid  ? series.colour
-                        : series.fill == MarkFill::pale ? paler(series.colour, 0.4)
-                                                        : white;
-  // A white edge separates solid marks that overlap.
-  const Pen edge{.colour = series.fill == MarkFill::solid ? white : series.colour,
-                 .width_px = series.fill == MarkFill::solid ? 1.5 : 2.2};
+  // A white edge separates marks that overlap.
+  const Pen edge{.colour = white, .width_px = 1.5};
   if (series.mark == Mark::circle) {
-    canvas.disc(at, radius_px, inside);
+    canvas.disc(at, radius_px, series.colour);
     canvas.circle(at, radius_px, edge);
-  } else if (series.mark == Mark::cross) {
-    const double arm = 1.6 * radius_px;
-    canvas.line(std::array{at - glm::dvec2(arm, 0.0), at + glm::dvec2(arm, 0.0)},
-                {.colour = series.colour, .width_px = 3.0});
-    canvas.line(std::array{at - glm::dvec2(0.0, arm), at + glm::dvec2(0.0, arm)},
-                {.colour = series.colour, .width_px = 3.0});
   } else if (series.mark != Mark::none) {
     const std::vector<glm::dvec2> corners = corners_of(series.mark, at);
-    canvas.fill(corners, inside);
+    canvas.fill(corners, series.colour);
     canvas.polygon(corners, edge);
   }
 }
@@ -134,22 +119,18 @@ class Plot {
   const View& view() const { return view_; }
 
   void grid() {
-    const auto lines = [&](const AxisSpan& axis, bool vertical) {
-      for (const double place : axis.fine) {
-        rule(place, vertical, {.colour = {0.93, 0.93, 0.93}, .width_px = 1.0});
-      }
-      for (const Tick& tick : axis.ticks) {
-        rule(tick.value, vertical, {.colour = {0.84, 0.84, 0.84}, .width_px = 1.5});
-      }
-    };
-    lines(x_, true);
-    lines(y_, false);
+    const Pen pen{.colour = {0.84, 0.84, 0.84}, .width_px = 1.5};
+    for (const Tick& tick : x_.ticks) {
+      rule(tick.value, true, pen);
+    }
+    for (const Tick& tick : y_.ticks) {
+      rule(tick.value, false, pen);
+    }
   }
 
   void rules(const std::vector<ChartRule>& rules) {
     for (const ChartRule& each : rules) {
-      const AxisSpan& axis = each.vertical ? x_ : y_;
-      const double place = axis.place(each.at);
+      const double place = each.at;
       rule(place, each.vertical, {.colour = each.colour, .width_px = 2.2, .dotted = true});
       const double text_px = canvas_.text_width(each.label, small);
       const Box& box = view_.box;
@@ -173,20 +154,18 @@ class Plot {
   }
 
   void intervals(const ChartSeries& series) {
-    // Interval ends of consecutive points: a band has the gaps of its line.
-    std::vector<std::array<glm::dvec2, 2>> run;
+    const Pen pen{.colour = series.colour, .width_px = 2.0};
+    constexpr glm::dvec2 half_cap(5.0, 0.0);
     for (const ChartPoint& point : series.points) {
-      if (drawn(point) && y_.has(point.high) && point.low <= point.high) {
-        // On a logarithmic axis, an interval that reaches 0 ends at the axis.
-        const double x = x_.place(point.x);
-        run.push_back({view_.pixel({x, y_.has(point.low) ? y_.place(point.low) : y_.lower}),
-                       view_.pixel({x, y_.place(point.high)})});
-      } else {
-        draw_intervals(series, run);
-        run.clear();
+      if (drawn(point) && point.low <= point.high) {
+        const std::array ends{view_.pixel({point.x, point.low}),
+                              view_.pixel({point.x, point.high})};
+        canvas_.line(ends, pen);
+        for (const glm::dvec2& end : ends) {
+          canvas_.line(std::array{end - half_cap, end + half_cap}, pen);
+        }
       }
     }
-    draw_intervals(series, run);
   }
 
   void line(const ChartSeries& series) {
@@ -208,16 +187,12 @@ class Plot {
   }
 
   void marks(const ChartSeries& series) {
-    for (std::size_t i = 0; i < series.points.size(); i += series.mark_every) {
-      const ChartPoint& point = series.points[i];
-      if (!drawn(point) || !view_.contains({x_.place(point.x), y_.place(point.y)})) {
+    for (const ChartPoint& point : series.points) {
+      if (!drawn(point) || !view_.contains({point.x, point.y})) {
         continue;
       }
       const glm::dvec2 at = pixel(point);
       draw_mark(canvas_, series, at);
-      if (!point.title.empty()) {
-        spots_.push_back({at, point.title});
-      }
       if (series.mark != Mark::none) {
         taken_.push_back({at.x - radius_px, at.y - radius_px, 2.0 * radius_px, 2.0 * radius_px});
       }
@@ -232,13 +207,11 @@ class Plot {
     }
   }
 
-  std::vector<ChartSpot> spots() { return std::move(spots_); }
-
  private:
-  bool drawn(const ChartPoint& point) const { return x_.has(point.x) && y_.has(point.y); }
-  glm::dvec2 pixel(const ChartPoint& point) const {
-    return view_.pixel({x_.place(point.x), y_.place(point.y)});
+  static bool drawn(const ChartPoint& point) {
+    return std::isfinite(point.x) && std::isfinite(point.y);
   }
+  glm::dvec2 pixel(const ChartPoint& point) const { return view_.pixel({point.x, point.y}); }
 
   void rule(double place, bool vertical, const Pen& pen) {
     const Box& box = view_.box;
@@ -246,29 +219,6 @@ class Plot {
     canvas_.line(vertical ? std::array{glm::dvec2(at.x, box.top), glm::dvec2(at.x, box.bottom())}
                           : std::array{glm::dvec2(box.left, at.y), glm::dvec2(box.right(), at.y)},
                  pen);
-  }
-
-  void draw_intervals(const ChartSeries& series,
-                      const std::vector<std::array<glm::dvec2, 2>>& run) {
-    if (series.interval == IntervalShape::band) {
-      std::vector<glm::dvec2> outline;
-      for (const auto& ends : run) {
-        outline.push_back(ends[1]);
-      }
-      for (auto ends = run.rbegin(); ends != run.rend(); ++ends) {
-        outline.push_back((*ends)[0]);
-      }
-      canvas_.fill(outline, {series.colour.red, series.colour.green, series.colour.blue, 0.12});
-      return;
-    }
-    const Pen pen{.colour = series.colour, .width_px = 2.0};
-    constexpr glm::dvec2 half_cap(5.0, 0.0);
-    for (const auto& ends : run) {
-      canvas_.line(ends, pen);
-      for (const glm::dvec2& end : ends) {
-        canvas_.line(std::array{end - half_cap, end + half_cap}, pen);
-      }
-    }
   }
 
   /// Writes the text beside the point where it covers no mark and no other label, or not at all.
@@ -299,7 +249,6 @@ class Plot {
   const AxisSpan& y_;
   View view_;
   std::vector<Box> taken_;  ///< boxes of marks and text
-  std::vector<ChartSpot> spots_;
 };
 
 AxisSpan span_of_axis(const Chart& chart, bool along_x) {
@@ -323,7 +272,7 @@ AxisSpan span_of_axis(const Chart& chart, bool along_x) {
 
 }  // namespace
 
-ChartPicture draw_chart(const Chart& chart, PictureFormat format) {
+std::string draw_chart(const Chart& chart) {
   const AxisSpan x = span_of_axis(chart, true);
   const AxisSpan y = span_of_axis(chart, false);
   Canvas ruler(1, 1);  // measures text before the picture's size is known
@@ -338,7 +287,7 @@ ChartPicture draw_chart(const Chart& chart, PictureFormat format) {
   const double top_px = 16.0 + title_px + legend.height_px() + 12.0;
 
   const int height = static_cast<int>(top_px + plot_height_px + below_px);
-  Canvas canvas(static_cast<int>(width_px), height, format);
+  Canvas canvas(static_cast<int>(width_px), height);
   if (!chart.title.empty()) {
     canvas.text(chart.title, {left_px, 16.0 + heading.size_px}, heading);
   }
@@ -362,10 +311,7 @@ ChartPicture draw_chart(const Chart& chart, PictureFormat format) {
   for (const ChartSeries& series : chart.series) {
     plot.labels(series);
   }
-  return {.bytes = canvas.encode(),
-          .width_px = static_cast<int>(width_px),
-          .height_px = height,
-          .spots = plot.spots()};
+  return canvas.encode();
 }
 
 }  // namespace palpate

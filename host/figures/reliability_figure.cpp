@@ -35,7 +35,7 @@ std::string draw_reliability(const ReliabilityFigure& figure) {
     }
     chart.series.push_back(std::move(series));
   }
-  return draw_chart(chart, PictureFormat::png).bytes;
+  return draw_chart(chart);
 }
 
 }  // namespace palpate

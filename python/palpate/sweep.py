@@ -13,28 +13,27 @@ import shlex
 import sys
 import time
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-import numpy
-
-from . import __version__, _palpate
+from . import __version__
 from ._error import Error
-from ._palpate import Device, Hypothesis, PoseLattice, pose_error_mm
-from ._statistics import LEAST_GAIN, Errors, errors_over, median, present
-from ._tables import Column, count_text, mean_text, number, plain, print_head, print_row, seconds_text
-from .recognition import Record, flags_of
+from ._palpate import Device, PoseLattice
+from ._statistics import LEAST_GAIN, present
+from ._sweep_charts import draw
+from ._sweep_runs import Data, Document, Run, counts_of, lattices_of, measure
+from ._tables import (
+    Column,
+    count_text,
+    mean_text,
+    number,
+    plain,
+    print_head,
+    print_row,
+    seconds_text,
+)
+from .recognition import Record
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-#: The files of --plots, without their endings.
-CHARTS = ("sweep_own_bins", "sweep_own_time")
-_FEWEST_BINS = 1e3  # of the coarsest lattice; of a small region, a thirtieth of the finest one's
 _LEAST_TRUE_POSES = 3  # by which errors are judged
-_MOST_HISTOGRAM = 100_000_000  # bins of all objects
-
-Document = dict[str, Any]
 
 
 def sweep(
@@ -58,7 +57,7 @@ def sweep(
     improves (None where only the finest would do), and `advice`. Raises Error in the words of the
     command.
     """
-    data = _Data(
+    data = Data(
         [os.fspath(path) for path in recordings],
         [os.fspath(path) for path in maps],
         device or Device.open(),
@@ -70,15 +69,17 @@ def sweep(
     data.maps = {(name, given.mirrored): given for name, given in batch.maps}
     data.auto_pivot = batch.auto_pivot
     del batch  # gives its memory back
-    lattices = _lattices(fine, max_bins or (100_000 if quick else 10_000_000))
+    lattices = lattices_of(fine, max_bins or (100_000 if quick else 10_000_000))
     dense = 1 if quick else 3
-    finest = _measure(data, lattices[-1], dense)
-    truth_known = any("truth" in record and record["truth"].get("T_robot_object") for record in finest.records)
+    finest = measure(data, lattices[-1], dense)
+    truth_known = any(
+        "truth" in record and record["truth"].get("T_robot_object") for record in finest.records
+    )
     columns = _columns(truth_known)
     print_head(columns)
     runs = []
     for lattice in lattices:
-        run = finest if lattice is lattices[-1] else _measure(data, lattice, dense)
+        run = finest if lattice is lattices[-1] else measure(data, lattice, dense)
         run.compare_with(finest, data)
         print_row(columns, run.point)
         runs.append(run)
@@ -98,178 +99,6 @@ def sweep(
 
 def _true_pose(record: Record) -> bool:
     return record.get("truth", {}).get("T_robot_object") is not None
-
-
-@dataclass
-class _Data:
-    """A user's own maps and recordings."""
-
-    paths: list[str]
-    map_paths: list[str]
-    device: Device
-    options: dict[str, Any]
-    maps: dict[tuple[str, bool], Hypothesis] = field(default_factory=dict)
-    auto_pivot: bool = False
-    entries: list[tuple[bytes, int]] = field(default_factory=list)
-
-    def open(self, **options: Any) -> "_palpate.OpenBatch":
-        """The batch of all recordings, as `palpate batch` settles it."""
-        flags = flags_of(self.options | options)
-        threads = len(os.sched_getaffinity(0))
-        head, self.entries, _ = _palpate.settle_batch(self.paths, self.map_paths, flags, self.device, threads)
-        return _palpate.OpenBatch.open(head, self.map_paths, flags, self.device, threads)
-
-    def on(self, lattice: PoseLattice, filter: str) -> "_palpate.OpenBatch":
-        """The same on given bins."""
-        x, y, theta = lattice.x_mm, lattice.y_mm, lattice.theta_rad
-        return self.open(
-            bins=_counts(lattice),
-            x_mm=(x.lower, x.upper),
-            y_mm=(y.lower, y.upper),
-            theta_deg=(math.degrees(theta.lower), math.degrees(theta.upper)),
-            pivot_mm="auto" if self.auto_pivot else tuple(lattice.pivot_mm.tolist()),
-            filter=filter,
-        )
-
-    def recognize(self, batch: "_palpate.OpenBatch", unknowns: int) -> tuple[list[Record], float]:
-        """The first unknowns' records, and the median of their seconds.
-
-        The first recording is recognised once more before, which does not count: it warms up.
-        """
-        lines: list[tuple[bytes, float]] = []
-        batch.recognize([self.entries[0][0]])
-        for entry, _ in self.entries:
-            if len(lines) < unknowns:
-                lines += batch.recognize([entry])[0]
-        records = [Record(json.loads(line)) for line, _ in lines[:unknowns]]
-        for record in records:
-            if "error" in record:
-                raise Error(record["error"])
-        return records, median([seconds for _, seconds in lines[:unknowns]])
-
-
-def _counts(lattice: PoseLattice) -> tuple[int, int, int]:
-    return lattice.x_mm.count, lattice.y_mm.count, lattice.theta_rad.count
-
-
-def _lattices(fine: PoseLattice, most: int) -> list[PoseLattice]:
-    """Lattices of the region in the proportions of `fine`, by rising count.
-
-    Up to three times as many bins; each has about three times as many as the one before.
-    """
-    finest = min(3.0 * fine.bins, float(most))
-    free = max(1, sum(count > 1 for count in _counts(fine)))
-    lattices: list[PoseLattice] = []
-    count = finest
-    while count >= 0.9 * min(_FEWEST_BINS, finest / 30.0):  # counts of bins are near to what is asked for
-        factor = (count / fine.bins) ** (1.0 / free)
-        axes = [
-            (axis.lower, axis.upper, max(1, math.floor(factor * axis.count + 0.5)))
-            for axis in (fine.x_mm, fine.y_mm, fine.theta_rad)
-        ]
-        x, y, theta = axes
-        lattice = PoseLattice(x, y, theta, fine.pivot_mm)
-        if not lattices or lattice.bins < lattices[-1].bins:
-            lattices.append(lattice)
-        count /= math.sqrt(10.0)
-    return lattices[::-1]
-
-
-def _pose(record: Record, kind: str) -> list[float] | None:
-    """T_object_robot of the mode or of the refined pose."""
-    pose = record.get(kind)
-    return pose and [pose["x_mm"], pose["y_mm"], pose["theta_rad"]]
-
-
-@dataclass
-class _Run:
-    """What one lattice is worth and what it costs."""
-
-    lattice: PoseLattice
-    records: list[Record]  #: [unknown] after all touches
-    point: Document  #: for the table, the charts and the document
-    #: By "mode" and "refined": errors where the truth is known and the object is right, and distances
-    #: from the finest run by the pose error, None where that has another object.
-    errors_mm: dict[str, Errors] = field(default_factory=dict)
-    from_finest_mm: dict[str, Errors] = field(default_factory=dict)
-
-    def compare_with(self, finest: "_Run", data: _Data) -> None:
-        """Says how far the poses lie from those of the finest run."""
-        pairs = list(zip(self.records, finest.records, strict=True))
-        for kind, name in (("mode", "from_finest_mm"), ("refined", "refined_from_finest_mm")):
-            distances: list[float | None] = []
-            for record, other in pairs:
-                here, there = (
-                    (of["mode"]["map"], of["mode"].get("mirrored", False)) for of in (record, other)
-                )
-                a, b = _pose(record, kind), _pose(other, kind)
-                if here != there or a is None or b is None:
-                    distances.append(None)
-                else:
-                    distances.append(pose_error_mm(data.maps[here].map, a, b))
-            self.from_finest_mm[kind] = distances
-            self.point[name] = errors_record(distances)
-        same = sum(record["best"] == other["best"] for record, other in pairs)
-        self.point["same_object"] = same / len(pairs)
-
-    @property
-    def recognised(self) -> float:
-        """Share that is right or, where no label is known, as the finest run has it."""
-        accuracy = self.point["accuracy"]
-        return float(self.point["same_object"] if accuracy is None else accuracy)
-
-
-def errors_record(errors: Errors) -> Document | None:
-    """What errors are over those that there are; the 95th percentile is None for fewer than 20."""
-    over = errors_over(errors)
-    if over is None:
-        return None
-    return over | {"p95": over["p95"] if over["trials"] >= 20 else None}
-
-
-def _measure(data: _Data, lattice: PoseLattice, dense: int) -> _Run:
-    """Recognises all unknowns by bounds, and some by the histogram.
-
-    All by the histogram where bounds do not allow for what the options ask.
-    """
-    unknowns = sum(count for _, count in data.entries)
-    in_all = lattice.bins * len(data.maps)
-    point: Document = {
-        "count": lattice.bins,
-        "bins": list(_counts(lattice)),
-        "bins_in_all": in_all,
-        "step_mm": max(lattice.x_mm.step, lattice.y_mm.step),
-        "recordings": unknowns,
-        "histogram_recordings": 0,
-        **dict.fromkeys(("seconds_histogram", "seconds_bounds", "device_bytes", "host_bytes")),
-    }
-    records: list[Record] = []
-    try:
-        bounds = data.on(lattice, "bounded")
-    except Error:
-        bounds = None
-    # Half of the device's memory, as --bins auto has it.
-    if in_all <= min(_MOST_HISTOGRAM, data.device.memory_bytes // 16) or bounds is None:
-        histogram = data.on(lattice, "histogram")
-        count = unknowns if bounds is None else min(dense, unknowns)
-        records, point["seconds_histogram"] = data.recognize(histogram, count)
-        point |= {"histogram_recordings": count, "device_bytes": histogram.memory_bytes}
-        del histogram
-    if bounds is not None:
-        records, point["seconds_bounds"] = data.recognize(bounds, unknowns)
-        point["host_bytes"] = bounds.memory_bytes
-    run = _Run(lattice, records, point)
-    known = [record["right"] for record in records if record.get("right") is not None]
-    point |= {"labelled": len(known), "accuracy": sum(known) / len(known) if known else None}
-    point["trials"] = len(records)
-    for kind, name in (("mode", "error"), ("refined", "refined_error")):
-        errors = [record.get(f"{name}_mm") for record in records]
-        run.errors_mm[kind] = errors
-        point |= {f"{name}_mm": errors_record(errors), f"{name}s_mm": errors}
-    sd = [record["refined"]["sd"] for record in records if "refined" in record]
-    point["sd_mm"] = median([math.hypot(x, y) for x, y, _ in sd]) if sd else None
-    point["sd_deg"] = median([math.degrees(theta) for _, _, theta in sd]) if sd else None
-    return run
 
 
 def _columns(truth_known: bool) -> list[Column]:
@@ -301,7 +130,7 @@ def _columns(truth_known: bool) -> list[Column]:
     ]
 
 
-def _rests(run: _Run, finest: _Run, kind: str) -> bool:
+def _rests(run: Run, finest: Run, kind: str) -> bool:
     """Whether a run's poses rest where those of the finest run are.
 
     An error e and a distance d make sqrt(e^2 + d^2) together; e is the finest run's error by the truth
@@ -319,7 +148,7 @@ def _rests(run: _Run, finest: _Run, kind: str) -> bool:
     return errors > 0.0 and math.sqrt(errors + distances) <= (1.0 + LEAST_GAIN) * math.sqrt(errors)
 
 
-def _first_that_suffices(runs: Sequence[_Run], kind: str) -> _Run | None:
+def _first_that_suffices(runs: Sequence[Run], kind: str) -> Run | None:
     """The first run from which on none recognises more and all poses rest.
 
     None where only the finest run would do, which no finer run confirms.
@@ -339,7 +168,7 @@ def _flags(lattice: PoseLattice, auto_pivot: bool) -> str:
         return f" {flag}={lower:.6g}:{upper:.6g}"
 
     x, y, theta = lattice.x_mm, lattice.y_mm, lattice.theta_rad
-    text = f"--bins {plain(_counts(lattice))}"
+    text = f"--bins {plain(counts_of(lattice))}"
     text += range_of("--x-mm", x.lower, x.upper) + range_of("--y-mm", y.lower, y.upper)
     if theta.upper - theta.lower < 2.0 * math.pi - 1e-9:
         text += range_of("--theta-deg", math.degrees(theta.lower), math.degrees(theta.upper))
@@ -350,17 +179,19 @@ def _flags(lattice: PoseLattice, auto_pivot: bool) -> str:
 
 
 def _advice(
-    mode: _Run | None,
-    refined: _Run | None,
-    finest: _Run,
-    data: _Data,
+    mode: Run | None,
+    refined: Run | None,
+    finest: Run,
+    data: Data,
     automatic: PoseLattice,
     fine: PoseLattice,
 ) -> str:
     advised = refined or finest
     count, flags = count_text(advised.point["count"]), _flags(advised.lattice, data.auto_pivot)
     if refined:
-        needs = f"needs {count_text(mode.point['count'])}" if mode else "gains up to the finest bins"
+        needs = (
+            f"needs {count_text(mode.point['count'])}" if mode else "gains up to the finest bins"
+        )
         words = (
             f"Beyond {count} bins per object ({flags}) neither recognition nor the refined pose "
             f"improves; the mode {needs}."
@@ -377,65 +208,9 @@ def _advice(
     ]
     return (
         f"{words}\nAn unknown then costs {' and '.join(costs)}. --bins auto takes "
-        f"{plain(_counts(automatic))} = {count_text(automatic.bins)}, and --bins fine "
-        f"{plain(_counts(fine))} = {count_text(fine.bins)}."
+        f"{plain(counts_of(automatic))} = {count_text(automatic.bins)}, and --bins fine "
+        f"{plain(counts_of(fine))} = {count_text(fine.bins)}."
     )
-
-
-def draw(document: Document) -> "dict[str, Figure]":
-    """The charts of a sweep: error and time against bins. Raises Error without Matplotlib."""
-    try:
-        from matplotlib.figure import Figure
-        from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
-    except ImportError as missing:
-        raise Error("--plots: Matplotlib is missing; pip install 'palpate[plot]'") from missing
-    points = document["points"]
-    truth_known = document["true_poses"] > 0
-    counts = [point["count"] for point in points]
-
-    def chart(y: str) -> tuple[Any, Any]:
-        figure = Figure(figsize=(9.6, 5.4), layout="constrained")
-        axes = figure.add_subplot(xlabel="bins per object", ylabel=y, xscale="log", yscale="log")
-        axes.grid(color="#d6d6d6")
-        axes.xaxis.set_major_formatter(FuncFormatter(lambda count, _: count_text(count)))
-        axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0), numticks=20))
-        axes.yaxis.set_minor_formatter(NullFormatter())
-        return figure, axes
-
-    def line(axes: Any, path: str, label: str, **look: Any) -> None:
-        first, _, then = path.partition("/")
-        values = [point[first] and (point[first][then] if then else point[first]) for point in points]
-        axes.plot(counts, [numpy.nan if value is None else value for value in values], label=label, **look)
-
-    blue: Any = {"color": "#0072b2", "marker": "o"}
-    red: Any = {"color": "#d55e00", "marker": "s", "linestyle": "--"}
-    error_chart, axes = chart(
-        "mean pose error (mm)"
-        if truth_known
-        else "mean distance from the pose of the finest bins (mm)"
-    )
-    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    field_of = "error_mm" if truth_known else "from_finest_mm"
-    line(axes, f"{field_of}/mean", "mode", **blue)
-    line(axes, f"refined_{field_of}/mean", "refined pose", **red)
-    line(axes, "sd_mm", "standard deviation of x and y, median", color="#616161", linestyle=":")
-    for name, label, colour in (
-        ("auto_count", "--bins auto", "#616161"),
-        ("fine_count", "--bins fine", "#616161"),
-        ("refined_count", "enough", "black"),
-    ):
-        at = document[name]
-        if at is not None and counts[0] <= at <= counts[-1]:
-            axes.axvline(at, color=colour, linestyle=":")
-            axes.text(at, 0.98, label + " ", color=colour, rotation=90, ha="right", va="top",
-                      transform=axes.get_xaxis_transform())  # fmt: skip
-    time_chart, time_axes = chart("time per unknown")
-    time_axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: seconds_text(value)))
-    line(time_axes, "seconds_histogram", "histogram", **blue)
-    line(time_axes, "seconds_bounds", "by bounds", **red)
-    for each in (axes, time_axes):
-        each.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3, frameon=False)
-    return dict(zip(CHARTS, (error_chart, time_chart), strict=True))
 
 
 def _flag_parser() -> argparse.ArgumentParser:
@@ -445,7 +220,13 @@ def _flag_parser() -> argparse.ArgumentParser:
         "objects need, and what bins cost on this device.",
     )
     add = flags.add_argument
-    add("--maps", nargs="+", default=[], metavar="MAP", help="maps of your objects, or folders of maps")
+    add(
+        "--maps",
+        nargs="+",
+        default=[],
+        metavar="MAP",
+        help="maps of your objects, or folders of maps",
+    )
     add("--recordings", nargs="+", required=True, metavar="RECORDING",
         help="recordings of unknowns, folders of them, or manifests as of palpate batch; where they know "
         "the object or its pose, the sweep tells accuracy and errors")  # fmt: skip
@@ -458,7 +239,12 @@ def _flag_parser() -> argparse.ArgumentParser:
     add("--pivot-mm", metavar="X,Y|auto", help="point about which theta turns")
     add("--threshold", type=float, help="contact threshold, in the recordings' unit")
     add("--ratio", type=float, help="threshold as a fraction of the largest pressure")
-    add("--max-bins", type=int, metavar="N", help="most bins per object [10000000, or 100000 with --quick]")
+    add(
+        "--max-bins",
+        type=int,
+        metavar="N",
+        help="most bins per object [10000000, or 100000 with --quick]",
+    )
     add("--quick", action="store_true", help="at most 100,000 bins per object")
     add("--device", default="", help="Vulkan device, by a part of its name or index")
     add("--json", metavar="FILE", help="write the results to this file")
@@ -472,7 +258,16 @@ def _run(arguments: argparse.Namespace) -> None:
     given = vars(arguments)
     options = {
         name: given[name]
-        for name in ("scene", "sensor_model", "x_mm", "y_mm", "theta_deg", "pivot_mm", "threshold", "ratio")
+        for name in (
+            "scene",
+            "sensor_model",
+            "x_mm",
+            "y_mm",
+            "theta_deg",
+            "pivot_mm",
+            "threshold",
+            "ratio",
+        )
     }
     # What cannot be written is known before the minutes of work.
     if arguments.plots:

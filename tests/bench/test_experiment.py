@@ -6,7 +6,8 @@ import pathlib
 import pytest
 from conftest import Program, run
 
-from bench.experiment import FIGURES, TABLES, ranges_of, standing
+from bench.experiment import ranges_of, standing
+from bench.experiment_files import FIGURES, TABLES
 
 TRIALS, TOUCHES = 10, 9
 
@@ -55,7 +56,9 @@ def test_a_misplaced_array_costs_the_more_the_further(experiment: Program) -> No
 
     levels = experiment.document["pose_noise"]
     assert [level["translation_mm"] for level in levels] == [1.0, 2.0]
-    errors = [error_mm(of) for of in (experiment.document["filters"], *(l["filters"] for l in levels))]
+    errors = [
+        error_mm(of) for of in (experiment.document["filters"], *(l["filters"] for l in levels))
+    ]
     assert errors[0] < errors[1] < errors[2]
 
 
@@ -63,7 +66,11 @@ def test_tables_say_what_the_curves_say(experiment: Program) -> None:
     rows = list(csv.DictReader((experiment.folder / "csv/trials.csv").open()))
     assert len(rows) == 8 * TRIALS * TOUCHES
     for run_of in experiment.document["filters"]:
-        own = [row for row in rows if (row["filter"], row["count"]) == (run_of["filter"], str(run_of["count"]))]
+        own = [
+            row
+            for row in rows
+            if (row["filter"], row["count"]) == (run_of["filter"], str(run_of["count"]))
+        ]
         for point in run_of["curve"]:
             right = [row["right"] == "1" for row in own if row["touches"] == str(point["touches"])]
             assert sum(right) / TRIALS == point["accuracy"]
@@ -88,4 +95,7 @@ def test_what_cannot_be_is_refused(tmp_path: pathlib.Path) -> None:
 
 def test_standings_name_the_touches() -> None:
     assert ranges_of([1, 2, 3, 5, 8, 9]) == "1-3, 5, 8-9"
-    assert standing([(1, 2.0), (2, 0.0), (3, -1.0)]) == "ahead at touch 1; tied at touch 2; behind at touch 3"
+    assert (
+        standing([(1, 2.0), (2, 0.0), (3, -1.0)])
+        == "ahead at touch 1; tied at touch 2; behind at touch 3"
+    )

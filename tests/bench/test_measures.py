@@ -86,7 +86,9 @@ def test_intervals() -> None:
     low, high = bootstrap_mean_interval(many)
     assert high - low == pytest.approx(2 * 1.96 * many.std() / 20, rel=0.1)
     assert low < many.mean() < high
-    assert bootstrap_ratio_interval(2.0 * numpy.abs(many), numpy.abs(many)) == pytest.approx((2.0, 2.0))
+    assert bootstrap_ratio_interval(2.0 * numpy.abs(many), numpy.abs(many)) == pytest.approx(
+        (2.0, 2.0)
+    )
 
 
 def test_pairs_told_apart() -> None:

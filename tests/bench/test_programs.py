@@ -131,7 +131,7 @@ def test_certificates_hold(tmp_path: pathlib.Path) -> None:
 def sweep(tmp_path_factory: pytest.TempPathFactory) -> Program:
     folder = tmp_path_factory.mktemp("sweep")
     return Program(
-        folder, "bench.sweep", "--quick", "--trials", 2, "--max-bins", 30_000,
+        folder, "bench.sweep", "--quick", "--trials", 1, "--max-bins", 30_000,
         "--html", folder / "page.html", "--plots", folder / "plots",
     )  # fmt: skip
 
@@ -142,7 +142,7 @@ def test_a_sweep_is_whole_and_in_order(sweep: Program) -> None:
         "histogram", "particles", "systematic", "augmented",
     }  # fmt: skip
     for point in document["points"]:
-        assert point["trials"] == 10
+        assert point["trials"] == 5
         assert 0.0 < point["seconds_per_touch"] < point["seconds_per_unknown"]
         assert (point["seconds_refine"] is None) == (point["filter"] != "histogram")
         assert point["error_mm"]["p95"] is None, "of so few trials it is the largest error"
@@ -153,7 +153,11 @@ def test_a_sweep_is_whole_and_in_order(sweep: Program) -> None:
         runs = [p for p in document["points"] if p["balanced"] and p["cell_mm"] == cell_mm]
         nearest = [run_of["nearest_bin_mm"] for run_of in runs]
         assert nearest == sorted(nearest, reverse=True)
-        assert runs[-1]["refined_error_mm"]["mean"] < runs[-1]["error_mm"]["mean"] < runs[0]["error_mm"]["mean"]
+        assert (
+            runs[-1]["refined_error_mm"]["mean"]
+            < runs[-1]["error_mm"]["mean"]
+            < runs[0]["error_mm"]["mean"]
+        )
         assert runs[-1]["nearest_bin_mm"] < runs[-1]["error_mm"]["mean"]
     for bounds in document["bounds"]:
         assert bounds["certificates_hold"] == bounds["same_modes"] == bounds["trials"]
@@ -203,7 +207,11 @@ def test_the_page_needs_no_network(sweep: Program) -> None:
 def test_the_rule_of_auto_is_held_against_the_times() -> None:
     def at(bins: int, bounded: float) -> dict[str, Any]:
         times = {"once": 1.0, "each_touch": 1.0}
-        return {"bins_in_all": bins, "histogram": times, "bounded": {name: bounded for name in times}}
+        return {
+            "bins_in_all": bins,
+            "histogram": times,
+            "bounded": {name: bounded for name in times},
+        }
 
     rule = auto_rule_of([at(100, 10.0), at(10_000, 0.1)])
     assert rule["once"] == pytest.approx(1_000.0), "half-way between the logarithms"

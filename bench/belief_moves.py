@@ -1,0 +1,286 @@
+"""Objects that slip, planned touches, and what all beliefs cost."""
+
+import math
+import time
+from collections.abc import Callable
+
+import numpy
+
+import palpate
+from palpate._statistics import Errors, mean, median, present, quantile
+
+from .belief_inputs import Inputs, Sd, mean_of
+from .measures import mean_interval, mean_record
+from .random_numbers import Random, Stream
+from .report import Json, Measurement
+from .trials import (
+    VOWELS,
+    Body,
+    Floats,
+    Touching,
+    judged,
+    lattice_of,
+    make_trials,
+    size_of,
+    truth_of,
+)
+
+SLIP_SEED = 800_000_000
+WALK_SEED = 850_000_000
+COST_SEED = 900_000_000
+PLAN_SEED = 950_000_000
+
+
+# Objects that move between touches.
+
+
+def slipping(
+    trial: palpate.Recording, centroid_mm: Floats, step: Sd, seed: int
+) -> tuple[palpate.Recording, list[palpate.Truth]]:
+    """A trial whose object takes a step of a random walk before every touch but the first.
+
+    A turn about its centroid and a translation, of these standard deviations. The walk begins at 3/10
+    of the trial's distance from the robot frame's origin, within 3 mm along x and y, so that few walks
+    of 50 steps of 0.3 mm leave a region of +-8 mm. The readings stay as they are. Returns the touches
+    as the robot reports them, and the truth at each.
+    """
+    at_rest = truth_of(trial).T_object_robot
+    here = at_rest * (0.3, 0.3, 1.0)
+    normals = iter(Random(seed, Stream.OBJECT_POSE).normals(3 * len(trial)).tolist())
+    poses, truths = [], []
+    for i in range(len(trial)):
+        if i > 0:
+            dx, dy, turn = step[0] * next(normals), step[0] * next(normals), step[1] * next(normals)
+            about = centroid_mm - palpate.transform((0.0, 0.0, turn), [centroid_mm])[0]
+            here = palpate.compose((dx + about[0], dy + about[1], turn), here)
+        on_object = palpate.compose(at_rest, trial.T_robot_sensor[i])
+        poses.append(palpate.compose(palpate.inverse(here), on_object))
+        truths.append(palpate.Truth(truth_of(trial).object, here))
+    return palpate.Recording(trial.pressure, numpy.array(poses), trial.elements_mm), truths
+
+
+def measure_slip(inputs: Inputs) -> list[Json]:
+    """Unknowns that slip, as believed with and without slip_sd."""
+    step = (0.3, math.pi / 180.0)
+    # Steps of 0.5 mm and 2 degrees resolve such slips.
+    lattice = lattice_of(20, 20, 75, 8.0) if inputs.quick else lattice_of(32, 32, 180, 8.0)
+    each, touches = inputs.each(5, 1), 12 if inputs.quick else 50
+    walks = [
+        slipping(trial, Body.of(inputs.maps[i // each]).centroid_mm, step, WALK_SEED + i)
+        for i, trial in enumerate(make_trials(VOWELS, each, touches, SLIP_SEED))
+    ]
+    rows, records = [], []
+    for name, slip_sd, most in (("with slip_sd", step, 1.0), ("without", (0.0, 0.0), None)):
+        belief = inputs.histogram(lattice, slip_sd=slip_sd)
+        errors: list[Errors] = []  # [unknown][touch]
+        for walk, truths in walks:
+            belief.reset()
+            of_walk = []
+            for i, truth in enumerate(truths):
+                belief.update(walk[i])
+                of_walk.append(judged(belief, inputs.maps, truth).error_mm)
+            errors.append(of_walk)
+        for words, first, goal in (
+            ("mean over touches", 0, most),
+            ("second half of the touches", touches // 2, None),
+        ):
+            means = [mean(there) for of in errors if (there := present(of[first:]))]
+            interval = mean_interval(means) if len(means) > 2 else None
+            rows.append(
+                Measurement(
+                    f"{name}: mode's error, {words}", mean(means), "mm", goal, interval=interval
+                )
+            )
+        by_touch = [present([of[i] for of in errors]) for i in range(touches)]
+        share = 100.0 * sum(map(len, by_touch)) / (touches * len(walks))
+        rows.append(
+            Measurement(f"{name}: touches at which the mode has the right letter", share, "%")
+        )
+        curve = [
+            {"touches": i, "located": len(of), "mode_mm": mean(of) if of else None}
+            for i, of in enumerate(by_touch, start=1)
+        ]
+        records.append({"belief": name, "curve": curve})
+    facts = {"unknowns": len(walks), "touches": touches, "bins": size_of(lattice)}
+    inputs.report.add("slip 0.3 mm, 1 degree", facts, rows)
+    return records
+
+
+# Touches chosen by what they are expected to tell, beside random ones.
+
+
+def measure_plan(inputs: Inputs) -> list[Json]:
+    """Touches every unknown twice, beginning with the same random touch.
+
+    In random order, and each time where the most is expected to be told about object and pose.
+    Candidates are the poses of the test set that were not touched yet.
+    """
+    lattice, touches = lattice_of(13, 13, 55), 4 if inputs.quick else 7
+    belief = inputs.histogram(lattice)
+    labels = [grid.label for grid in inputs.maps]
+    milliseconds: list[float] = []
+    told: dict[str, list[list[tuple[float, float]]]] = {"random": [], "planned": []}
+    whole = len(palpate.training_grid())
+    for number, test_set in enumerate(make_trials(VOWELS, inputs.each(20, 1), whole, PLAN_SEED)):
+        label = labels.index(truth_of(test_set).object)
+        for order, of_order in told.items():
+            belief.reset()
+            left, following = list(range(whole)), 0  # the first touch is the random one
+            of_order.append([])
+            for touch in range(touches):
+                if order == "planned" and touch > 0:
+                    start = time.perf_counter()
+                    gains = belief.expected_gain(
+                        test_set.T_robot_sensor[left],
+                        test_set.elements_mm,
+                        seed=1 + number * whole + touch,
+                    )
+                    following = int(numpy.argmax(gains.both))
+                    milliseconds.append(1e3 * (time.perf_counter() - start))
+                belief.update(test_set[left.pop(following)])
+                probability = max(float(belief.estimate().identity[label]), numpy.finfo(float).tiny)
+                of_order[-1].append((belief.entropy(), -math.log(probability)))
+    after = {
+        (order, touch): [of[touch - 1][0] for of in all_of]
+        for order, all_of in told.items()
+        for touch in range(1, touches + 1)
+    }
+    rows = [
+        mean_of(f"entropy, {order}, touch {touch}", after[order, touch], "nats")
+        for touch in range(1, touches + 1)
+        for order in told
+    ]
+    for planned, random in ((3, 4), (4, 6), (5, 7)):
+        if random <= touches:
+            pairs = zip(after["planned", planned], after["random", random], strict=True)
+            name = f"{planned} planned above {random} random"
+            rows.append(mean_of(name, [a - b for a, b in pairs], "nats", 0.1))
+    rows.append(Measurement("plan, median", median(milliseconds), "ms"))
+    facts = {"unknowns": len(told["random"]), "bins": size_of(lattice)}
+    inputs.report.add("planned touches", facts, rows)
+    return [
+        {
+            "order": order,
+            "curve": [
+                {
+                    "touches": touch,
+                    "entropy": mean_record(after[order, touch]),
+                    "log_loss": mean_record([of[touch - 1][1] for of in all_of]),
+                }
+                for touch in range(1, touches + 1)
+            ],
+        }
+        for order, all_of in told.items()
+    ]
+
+
+# Time and memory of all these.
+
+COST_SD: Sd = (1.0, 0.05)
+
+
+def median_ms(call: Callable[[], object], repeats: int) -> float:
+    """Median milliseconds of some calls, after one that is not counted."""
+    call()
+    return median([_ms(call) for _ in range(repeats)])
+
+
+def _ms(call: Callable[[], object]) -> float:
+    start = time.perf_counter()
+    call()
+    return 1e3 * (time.perf_counter() - start)
+
+
+def measure_costs(inputs: Inputs) -> list[Json]:
+    """Contenders meet the same touches in the same order, in turn."""
+    unknowns = make_trials(VOWELS, 1, 9, COST_SEED, Touching(at_random_poses=True))
+    touches = [touch for unknown in unknowns for touch in unknown]
+    sizes = {"objects": len(inputs.maps), "touch_sd": "1 mm, 0.05 rad"}
+    lattice = lattice_of(30, 30, 113) if inputs.quick else lattice_of(100, 100, 100)
+    repeats = 3 if inputs.quick else 9
+    beliefs = [
+        inputs.histogram(lattice, **options)
+        for options in (
+            {},
+            {"touch_sd": COST_SD},
+            {"slip_sd": (0.3, math.pi / 180.0)},
+            {"none_weight": float(len(inputs.maps))},
+        )
+    ]
+    taken: list[list[float]] = [[] for _ in beliefs]
+    for i in range(repeats + 1):  # the first touch warms up; the object slips before the second
+        for belief, milliseconds in zip(beliefs, taken, strict=True):
+            spent = _ms(lambda belief=belief, i=i: belief.update(touches[i % len(touches)]))  # type: ignore[misc]
+            milliseconds += [spent] if i > 0 else []
+    ms = [median(each) for each in taken]
+    memory = [belief.device_bytes / beliefs[0].device_bytes for belief in beliefs]
+    inputs.report.add(
+        f"touch {size_of(lattice)}",
+        sizes | {"slip_sd": "0.3 mm, 1 degree", "repeats": repeats},
+        [
+            Measurement("plain touch, median", ms[0], "ms"),
+            Measurement("uncertain touch, median", ms[1], "ms"),
+            Measurement("uncertain over plain", ms[1] / ms[0], "times", at_most=2.5),
+            Measurement("touch after a slip over plain", ms[2] / ms[0], "times"),
+            Measurement("touch with none of these over plain", ms[3] / ms[0], "times"),
+            Measurement("memory, uncertain over plain", memory[1], "times", at_most=2.0),
+            Measurement("memory, slip over plain", memory[2], "times", at_most=2.0),
+            Measurement("memory, none of these over plain", memory[3], "times", at_most=2.0),
+        ],
+    )
+    del beliefs
+    small, repeats = lattice_of(25, 25, 16), 20 if inputs.quick else 300
+    latencies: dict[Sd, list[float]] = {(0.0, 0.0): [], COST_SD: []}
+    for sd, milliseconds in latencies.items():
+        belief = inputs.histogram(small, touch_sd=sd)
+        for i in range(repeats + 1):
+            touch = touches[i % len(touches)]
+            start = time.perf_counter()
+            belief.update(touch)
+            belief.estimate()
+            spent = 1e3 * (time.perf_counter() - start)
+            milliseconds += [spent] if i > 0 else []
+    plain, uncertain = latencies.values()
+    inputs.report.add(
+        f"latency {size_of(small)}, uncertain",
+        sizes | {"repeats": repeats},
+        [
+            Measurement("touch to estimate, median", median(uncertain), "ms", at_most=8.0),
+            Measurement("95th percentile", quantile(uncertain, 0.95), "ms"),
+            Measurement("plain touch to estimate, median", median(plain), "ms"),
+        ],
+    )
+    # Places all over the unknown, which the robot could press next.
+    T_robot_object = palpate.inverse(truth_of(unknowns[0]).T_object_robot)
+    places = [
+        palpate.compose(T_robot_object, pose) for pose in palpate.random_poses(200, COST_SEED)
+    ]
+    candidates, repeats, plans = numpy.array(places), 2 if inputs.quick else 15, []
+    for sd in ((0.0, 0.0), COST_SD):
+        belief = inputs.histogram(small, touch_sd=sd)
+        belief.update(unknowns[0][:3])
+        plans.append(
+            median_ms(lambda: belief.expected_gain(candidates, unknowns[0].elements_mm), repeats)
+        )
+    inputs.report.add(
+        f"plan {size_of(small)}",
+        {"objects": len(inputs.maps), "candidates": len(candidates), "repeats": repeats},
+        [
+            Measurement("exact touches, median", plans[0], "ms", at_most=150.0),
+            Measurement("uncertain touches, median", plans[1], "ms"),
+        ],
+    )
+    if not inputs.quick:
+        large = lattice_of(200, 200, 250)
+        belief = inputs.histogram(large, touch_sd=COST_SD)
+        seconds = _ms(lambda: belief.update(touches[0])) / 1e3
+        mib = belief.device_bytes / (1 << 20)
+        inputs.report.add(
+            f"touch {size_of(large)}",
+            sizes,
+            [
+                Measurement("device memory", mib, "MiB", at_most=2048.0),
+                Measurement("uncertain touch", seconds, "s"),
+            ],
+        )
+    return []

@@ -1,7 +1,0 @@
-#pragma once
-
-namespace palpate {
-
-enum class PictureFormat { png, svg };
-
-}  // namespace palpate

@@ -1,0 +1,194 @@
+"""What palpate.sweep measures of one lattice."""
+
+import json
+import math
+import os
+from dataclasses import dataclass, field
+from typing import Any
+
+from . import _palpate
+from ._error import Error
+from ._palpate import Device, Hypothesis, PoseLattice, pose_error_mm
+from ._statistics import Errors, errors_over, median
+from .recognition import Record, flags_of
+
+_FEWEST_BINS = 1e3  # of the coarsest lattice; of a small region, a thirtieth of the finest one's
+_MOST_HISTOGRAM = 100_000_000  # bins of all objects
+
+Document = dict[str, Any]
+
+
+@dataclass
+class Data:
+    """A user's own maps and recordings."""
+
+    paths: list[str]
+    map_paths: list[str]
+    device: Device
+    options: dict[str, Any]
+    maps: dict[tuple[str, bool], Hypothesis] = field(default_factory=dict)
+    auto_pivot: bool = False
+    entries: list[tuple[bytes, int]] = field(default_factory=list)
+
+    def open(self, **options: Any) -> "_palpate.OpenBatch":
+        """The batch of all recordings, as `palpate batch` settles it."""
+        flags = flags_of(self.options | options)
+        threads = len(os.sched_getaffinity(0))
+        head, self.entries, _ = _palpate.settle_batch(
+            self.paths, self.map_paths, flags, self.device, threads
+        )
+        return _palpate.OpenBatch.open(head, self.map_paths, flags, self.device, threads)
+
+    def on(self, lattice: PoseLattice, filter: str) -> "_palpate.OpenBatch":
+        """The same on given bins."""
+        x, y, theta = lattice.x_mm, lattice.y_mm, lattice.theta_rad
+        return self.open(
+            bins=counts_of(lattice),
+            x_mm=(x.lower, x.upper),
+            y_mm=(y.lower, y.upper),
+            theta_deg=(math.degrees(theta.lower), math.degrees(theta.upper)),
+            pivot_mm="auto" if self.auto_pivot else tuple(lattice.pivot_mm.tolist()),
+            filter=filter,
+        )
+
+    def recognize(self, batch: "_palpate.OpenBatch", unknowns: int) -> tuple[list[Record], float]:
+        """The first unknowns' records, and the median of their seconds.
+
+        The first recording is recognised once more before, which does not count: it warms up.
+        """
+        lines: list[tuple[bytes, float]] = []
+        batch.recognize([self.entries[0][0]])
+        for entry, _ in self.entries:
+            if len(lines) < unknowns:
+                lines += batch.recognize([entry])[0]
+        records = [Record(json.loads(line)) for line, _ in lines[:unknowns]]
+        for record in records:
+            if "error" in record:
+                raise Error(record["error"])
+        return records, median([seconds for _, seconds in lines[:unknowns]])
+
+
+def counts_of(lattice: PoseLattice) -> tuple[int, int, int]:
+    return lattice.x_mm.count, lattice.y_mm.count, lattice.theta_rad.count
+
+
+def lattices_of(fine: PoseLattice, most: int) -> list[PoseLattice]:
+    """Lattices of the region in the proportions of `fine`, by rising count.
+
+    Up to three times as many bins; each has about three times as many as the one before.
+    """
+    finest = min(3.0 * fine.bins, float(most))
+    free = max(1, sum(count > 1 for count in counts_of(fine)))
+    lattices: list[PoseLattice] = []
+    count = finest
+    while count >= 0.9 * min(
+        _FEWEST_BINS, finest / 30.0
+    ):  # counts of bins are near to what is asked for
+        factor = (count / fine.bins) ** (1.0 / free)
+        axes = [
+            (axis.lower, axis.upper, max(1, math.floor(factor * axis.count + 0.5)))
+            for axis in (fine.x_mm, fine.y_mm, fine.theta_rad)
+        ]
+        x, y, theta = axes
+        lattice = PoseLattice(x, y, theta, fine.pivot_mm)
+        if not lattices or lattice.bins < lattices[-1].bins:
+            lattices.append(lattice)
+        count /= math.sqrt(10.0)
+    return lattices[::-1]
+
+
+def _pose(record: Record, kind: str) -> list[float] | None:
+    """T_object_robot of the mode or of the refined pose."""
+    pose = record.get(kind)
+    return pose and [pose["x_mm"], pose["y_mm"], pose["theta_rad"]]
+
+
+@dataclass
+class Run:
+    """What one lattice is worth and what it costs."""
+
+    lattice: PoseLattice
+    records: list[Record]  #: [unknown] after all touches
+    point: Document  #: for the table, the charts and the document
+    #: By "mode" and "refined": errors where the truth is known and the object is right, and distances
+    #: from the finest run by the pose error, None where that has another object.
+    errors_mm: dict[str, Errors] = field(default_factory=dict)
+    from_finest_mm: dict[str, Errors] = field(default_factory=dict)
+
+    def compare_with(self, finest: "Run", data: Data) -> None:
+        """Says how far the poses lie from those of the finest run."""
+        pairs = list(zip(self.records, finest.records, strict=True))
+        for kind, name in (("mode", "from_finest_mm"), ("refined", "refined_from_finest_mm")):
+            distances: list[float | None] = []
+            for record, other in pairs:
+                here, there = (
+                    (of["mode"]["map"], of["mode"].get("mirrored", False)) for of in (record, other)
+                )
+                a, b = _pose(record, kind), _pose(other, kind)
+                if here != there or a is None or b is None:
+                    distances.append(None)
+                else:
+                    distances.append(pose_error_mm(data.maps[here].map, a, b))
+            self.from_finest_mm[kind] = distances
+            self.point[name] = errors_record(distances)
+        same = sum(record["best"] == other["best"] for record, other in pairs)
+        self.point["same_object"] = same / len(pairs)
+
+    @property
+    def recognised(self) -> float:
+        """Share that is right or, where no label is known, as the finest run has it."""
+        accuracy = self.point["accuracy"]
+        return float(self.point["same_object"] if accuracy is None else accuracy)
+
+
+def errors_record(errors: Errors) -> Document | None:
+    """What errors are over those that there are; the 95th percentile is None for fewer than 20."""
+    over = errors_over(errors)
+    if over is None:
+        return None
+    return over | {"p95": over["p95"] if over["trials"] >= 20 else None}
+
+
+def measure(data: Data, lattice: PoseLattice, dense: int) -> Run:
+    """Recognises all unknowns by bounds, and some by the histogram.
+
+    All by the histogram where bounds do not allow for what the options ask.
+    """
+    unknowns = sum(count for _, count in data.entries)
+    in_all = lattice.bins * len(data.maps)
+    point: Document = {
+        "count": lattice.bins,
+        "bins": list(counts_of(lattice)),
+        "bins_in_all": in_all,
+        "step_mm": max(lattice.x_mm.step, lattice.y_mm.step),
+        "recordings": unknowns,
+        "histogram_recordings": 0,
+        **dict.fromkeys(("seconds_histogram", "seconds_bounds", "device_bytes", "host_bytes")),
+    }
+    records: list[Record] = []
+    try:
+        bounds = data.on(lattice, "bounded")
+    except Error:
+        bounds = None
+    # Half of the device's memory, as --bins auto has it.
+    if in_all <= min(_MOST_HISTOGRAM, data.device.memory_bytes // 16) or bounds is None:
+        histogram = data.on(lattice, "histogram")
+        count = unknowns if bounds is None else min(dense, unknowns)
+        records, point["seconds_histogram"] = data.recognize(histogram, count)
+        point |= {"histogram_recordings": count, "device_bytes": histogram.memory_bytes}
+        del histogram
+    if bounds is not None:
+        records, point["seconds_bounds"] = data.recognize(bounds, unknowns)
+        point["host_bytes"] = bounds.memory_bytes
+    run = Run(lattice, records, point)
+    known = [record["right"] for record in records if record.get("right") is not None]
+    point |= {"labelled": len(known), "accuracy": sum(known) / len(known) if known else None}
+    point["trials"] = len(records)
+    for kind, name in (("mode", "error"), ("refined", "refined_error")):
+        errors = [record.get(f"{name}_mm") for record in records]
+        run.errors_mm[kind] = errors
+        point |= {f"{name}_mm": errors_record(errors), f"{name}s_mm": errors}
+    sd = [record["refined"]["sd"] for record in records if "refined" in record]
+    point["sd_mm"] = median([math.hypot(x, y) for x, y, _ in sd]) if sd else None
+    point["sd_deg"] = median([math.degrees(theta) for _, _, theta in sd]) if sd else None
+    return run
