@@ -13,7 +13,7 @@ namespace palpate::bench {
 
 namespace {
 
-constexpr std::uint64_t seed = 1'403'000'000;
+constexpr std::uint64_t growth_seed = 1'403'000'000;
 constexpr double most_growth = 10.0;       ///< in time, for a thousand times the bins
 constexpr double most_memory_mib = 256.0;  ///< of 10^9 bins
 
@@ -128,7 +128,7 @@ Json measure_bounded_growth(const BoundedInputs& inputs, Report& report) {
                                          ? std::vector{10.0, 1e2, 1e3, 1e4}
                                          : std::vector{1e4, 1e5, 1e6, 1e7, 1e8, 1e9};
   const std::vector<Recording> unknowns =
-      unknown_recordings(inputs.unknowns(), touches_per_unknown, seed);
+      unknown_recordings(inputs.unknowns(), touches_per_unknown, growth_seed);
   Json records = Json::array();
   for (const double total : totals) {
     records.push_back(measure_bins(inputs, total, unknowns, report));

@@ -12,7 +12,7 @@ namespace palpate::bench {
 
 namespace {
 
-constexpr std::uint64_t seed = 1'402'000'000;
+constexpr std::uint64_t large_seed = 1'402'000'000;
 
 double mib(std::uint64_t bytes) { return static_cast<double>(bytes) / (1 << 20); }
 
@@ -36,7 +36,7 @@ Json measure_scene(const BoundedInputs& inputs, const LargeScene& scene, bool ab
   const double extent_mm = inputs.options.quick ? 20.0 : 100.0;
   const PoseLattice lattice = lattice_over(extent_mm, inputs.options.quick);
   const std::vector<Recording> unknowns =
-      glyph_unknowns(scene.objects, inputs.unknowns(), touches_per_unknown, extent_mm, seed);
+      glyph_unknowns(scene.objects, inputs.unknowns(), touches_per_unknown, extent_mm, large_seed);
   const auto bins = lattice.bins() * static_cast<std::int64_t>(objects.size());
   restart_peak_memory();
   const std::uint64_t before = resident_bytes();

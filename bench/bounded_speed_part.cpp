@@ -10,7 +10,7 @@ namespace palpate::bench {
 
 namespace {
 
-constexpr std::uint64_t seed = 1'400'000'000;
+constexpr std::uint64_t speed_seed = 1'400'000'000;
 constexpr int table_repeats = 5;
 
 struct Size {
@@ -74,7 +74,7 @@ Json measure_size(const BoundedInputs& inputs, const Size& size,
 
 Json measure_bounded_speed(const BoundedInputs& inputs, Report& report) {
   const std::vector<Recording> unknowns =
-      unknown_recordings(inputs.unknowns(), touches_per_unknown, seed);
+      unknown_recordings(inputs.unknowns(), touches_per_unknown, speed_seed);
   Json records = Json::array();
   for (const Size& size : sizes_of(inputs)) {
     records.push_back(measure_size(inputs, size, unknowns, report));
@@ -89,7 +89,7 @@ Json measure_bounded_mode(const BoundedInputs& inputs, Report& report) {
   const PoseLattice lattice =
       inputs.options.quick ? lattice_of(10, 10, 12) : lattice_of(40, 40, 360);
   const std::vector<Recording> unknowns =
-      unknown_recordings(inputs.unknowns(), touches_per_unknown, seed);
+      unknown_recordings(inputs.unknowns(), touches_per_unknown, speed_seed);
   const auto bins = lattice.bins() * static_cast<std::int64_t>(inputs.letters.size());
   Json records = Json::array();
   for (const double tolerance : {BoundedOptions{}.tolerance, 0.1}) {

@@ -10,7 +10,7 @@ namespace palpate::bench {
 
 namespace {
 
-constexpr std::uint64_t seed = 1'401'000'000;
+constexpr std::uint64_t streaming_seed = 1'401'000'000;
 constexpr double budget_s = 0.1;
 constexpr double most_dropped_first = 1e-2;
 
@@ -47,7 +47,7 @@ Json measure_bounded_streaming(const BoundedInputs& inputs, Report& report) {
   std::vector<BoundedAnswers> after(touches_per_unknown);  // [touch]
   bool warm = false;
   for (const Recording& unknown :
-       unknown_recordings(inputs.unknowns(), touches_per_unknown, seed)) {
+       unknown_recordings(inputs.unknowns(), touches_per_unknown, streaming_seed)) {
     if (!warm) {
       answer(posterior, all_touches(unknown));
       warm = true;

@@ -17,9 +17,10 @@ from . import charts
 from .measures import Paired, knee_of, pareto_front
 from .report import Json, Measurement, Run, at_least_1, main, parser, write, write_json
 from .sweep_limits import measure_limits
-from .sweep_page import CHARTS, charts_of, page_of, print_document, print_point, print_point_head
+from .sweep_page import CHARTS, charts_of, page_of
 from .sweep_plan import AUTO_RULE, GOAL_BINS, GOAL_CELL_MM, TOUCHES, Plan, product
 from .sweep_runs import measure_bounds, measure_histogram, measure_particles
+from .sweep_tables import print_document, print_point, print_point_head
 from .trials import Bins, lattice_of, letter_maps
 
 GOALS_MM = {

@@ -231,9 +231,7 @@ void bind_batch(nb::module_& module) {
           "memory_bytes",
           [](const Owned<OpenBatch>& self) {
             const Recogniser& recogniser = self.constant().recogniser;
-            const BoundedPosterior* bounded = recogniser.bounded();
-            return bounded != nullptr ? std::uint64_t{bounded->host_bytes()}
-                                      : recogniser.device_bytes();
+            return recogniser.device_bytes() + recogniser.host_bytes();
           },
           "Memory held: the device's, or the host's where bounds recognise.")
       .def("recognize", &recognise_python, "entries"_a,

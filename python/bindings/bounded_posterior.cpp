@@ -62,7 +62,7 @@ Bounded make_bounded(const std::shared_ptr<Session>& session, nb::handle maps,
           working};
 }
 
-void update(const Bounded& self, const TouchesLike& touches, const Progress& progress) {
+void update_bounded(const Bounded& self, const TouchesLike& touches, const Progress& progress) {
   TouchViews views = views_of(touches);
   self.use(std::move(views.kept), progress,
            [all = std::move(views.touches)](BoundedPosterior& belief, Call& call) {
@@ -104,7 +104,7 @@ void bind_bounded_posterior(nb::module_& module) {
           "every map's log evidence, too; threads: 0 for as many as the machine has cores.\n\n"
           "Raises Error as PoseHistogram does.")
       .def(
-          "update", &update, "touches"_a, "progress"_a = nb::none(),
+          "update", &update_bounded, "touches"_a, "progress"_a = nb::none(),
           "Multiplies the belief by the likelihood of these touches (Eq. 7, 13); takes in none of\n"
           "them after Ctrl-C or where progress(fraction) raises. Raises Error on a touch that is\n"
           "not sound.")

@@ -14,7 +14,7 @@ namespace {
 
 using Name = std::variant<int, std::string>;
 
-std::string text_of(const Name& name) {
+std::string device_name(const Name& name) {
   const int* index = std::get_if<int>(&name);
   return index != nullptr ? std::to_string(*index) : std::get<std::string>(name);
 }
@@ -45,7 +45,7 @@ void bind_device(nb::module_& module) {
       .def_static(
           "open",
           [](const Name& name) {
-            return run([name = text_of(name)](Call&) {
+            return run([name = device_name(name)](Call&) {
               return std::make_shared<Session>(Device::open(name));
             });
           },
@@ -56,7 +56,7 @@ void bind_device(nb::module_& module) {
       .def_static(
           "list",
           [](const Name& name) {
-            return run([name = text_of(name)](Call&) { return Device::list(name); });
+            return run([name = device_name(name)](Call&) { return Device::list(name); });
           },
           "name_or_index"_a = "", "Every device, in Vulkan's order.")
       .def_prop_ro("name", &Session::name, "As Vulkan reports it.")

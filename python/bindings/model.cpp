@@ -30,7 +30,7 @@ Axis axis_of(const AxisLike& axis, const char* name) {
                                           name));
 }
 
-std::string text_of(const Axis& axis) {
+std::string axis_text(const Axis& axis) {
   return fmt::format("({:g}, {:g}, {})", axis.lower, axis.upper, axis.count);
 }
 
@@ -50,7 +50,7 @@ void bind_lattice(nb::module_& module) {
       .def_rw("count", &Axis::count, "Number of bins.")
       .def_prop_ro("step", &Axis::step, "Width of a bin.")
       .def("centre", &Axis::centre, "i"_a, "Centre of bin i.")
-      .def("__repr__", [](const Axis& self) { return "Axis" + text_of(self); });
+      .def("__repr__", [](const Axis& self) { return "Axis" + axis_text(self); });
   nb::implicitly_convertible<std::tuple<double, double, int>, Axis>();
 
   nb::class_<PoseLattice>(
@@ -217,7 +217,7 @@ void bind_poses(nb::module_& module) {
 
 std::string text_of(const PoseLattice& lattice) {
   return fmt::format("PoseLattice(x_mm={}, y_mm={}, theta_rad={}, pivot_mm=({:g}, {:g}))",
-                     text_of(lattice.x_mm), text_of(lattice.y_mm), text_of(lattice.theta_rad),
+                     axis_text(lattice.x_mm), axis_text(lattice.y_mm), axis_text(lattice.theta_rad),
                      lattice.pivot_mm.x, lattice.pivot_mm.y);
 }
 

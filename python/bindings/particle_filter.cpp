@@ -15,7 +15,7 @@ namespace {
 
 using Particles = Named<ParticleFilter>;
 
-void update(const Particles& self, const TouchesLike& touches, const Progress& progress) {
+void update_particles(const Particles& self, const TouchesLike& touches, const Progress& progress) {
   TouchViews views = views_of(touches);
   self.use(std::move(views.kept), progress,
            [all = std::move(views.touches)](ParticleFilter& filter, Call& call) {
@@ -83,7 +83,7 @@ void bind_particle_filter(nb::module_& module) {
           "motion_rad: standard deviations of the noise at each touch; augmented: adds random\n"
           "particles while touches fit worse than before (Augmented MCL).\n\n"
           "Raises Error as PoseHistogram does.")
-      .def("update", &update, "touches"_a, "progress"_a = nb::none(),
+      .def("update", &update_particles, "touches"_a, "progress"_a = nb::none(),
            "Resamples, moves and weighs the particles by each touch in turn (Eq. 7-8).\n\n"
            "After Ctrl-C, or where progress(fraction) raises, call reset(). Raises Error on a "
            "touch\n"

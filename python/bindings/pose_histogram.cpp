@@ -34,7 +34,7 @@ Histogram make_histogram(const std::shared_ptr<Session>& session, nb::handle map
           std::move(labels)};
 }
 
-void update(const Histogram& self, const TouchesLike& touches, const Progress& progress) {
+void update_histogram(const Histogram& self, const TouchesLike& touches, const Progress& progress) {
   TouchViews views = views_of(touches);
   self.use(std::move(views.kept), progress,
            [all = std::move(views.touches)](PoseHistogram& belief, Call& call) {
@@ -200,7 +200,7 @@ void bind_pose_histogram(nb::module_& module) {
           "Raises Error on maps that are not sound or differ in their prior, on options out of\n"
           "range, and where the device has too little memory.")
       .def(
-          "update", &update, "touches"_a, "progress"_a = nb::none(),
+          "update", &update_histogram, "touches"_a, "progress"_a = nb::none(),
           "Multiplies the belief by the likelihood of these touches (Eq. 7, 13).\n\n"
           "progress(fraction) is called up to 50 times a second. After Ctrl-C, or where progress\n"
           "raises, the belief is left half-way: call reset(). Raises Error on a touch that is not\n"

@@ -3,17 +3,15 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
-#include <limits>
 #include <span>
 #include <string>
 #include <vector>
 
+#include "limits.hpp"
 #include "palpate/bounded_posterior.hpp"
 #include "synthetic.hpp"
 
 namespace palpate {
-
-inline constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 
 /// The shape of an L, and a disc of twice its weight.
 const std::vector<Hypothesis>& two_shapes();
