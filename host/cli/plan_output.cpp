@@ -78,7 +78,7 @@ nlohmann::ordered_json to_json(const Plan& plan, const RecognitionTask& task,
 }
 
 std::string plan_text(const Plan& plan, const RecognitionTask& task, std::optional<int> columns) {
-  const std::string limit = limit_words(plan);
+  const std::string limit = in_flags(limit_words(plan));
   return fmt::format(
       "{}\n{}\n\n{}{}{}\n{}, {} {} in {:.0f} ms\n", result_words(plan.record.last(), task),
       believed_words(plan), table_of(plan, columns), complaints({plan.record}, task),

@@ -83,10 +83,10 @@ LikelihoodTable table_of(const LearnedTable& table, std::vector<double> log_like
 }
 
 PressFeatures press_features(const Touch& touch, const ContactClassifier& classifier) {
-  return press_features(TouchEvidence(touch, {.classifier = classifier}), classifier.threshold);
+  return features_of(TouchEvidence(touch, {.classifier = classifier}), classifier.threshold);
 }
 
-PressFeatures press_features(const TouchEvidence& touch, double threshold) {
+PressFeatures features_of(const TouchEvidence& touch, double threshold) {
   if (!(threshold > 0.0)) {
     throw Error(Fault::input, "threshold = 0: press features need one above 0");
   }

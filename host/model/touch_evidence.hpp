@@ -45,7 +45,7 @@ std::vector<TouchEvidence> evidence_of(std::span<const Touch> touches, const Con
 
 /// press_features() of a touch that is classified.
 /// @param threshold of the classifier
-PressFeatures press_features(const TouchEvidence& touch, double threshold);
+PressFeatures features_of(const TouchEvidence& touch, double threshold);
 
 /// fit_of() of touches that are classified by `contact`.
 std::optional<Fit> evidence_fit(std::span<const TouchEvidence> touches, const Pose& T_object_robot,

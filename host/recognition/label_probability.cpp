@@ -18,7 +18,7 @@ std::vector<double> feature_nats(std::span<const TouchEvidence> touches,
   }
   const LearnedFeatures& learned = *task.features;
   for (const TouchEvidence& touch : touches) {
-    const PressFeatures features = press_features(touch, task.classifier().threshold);
+    const PressFeatures features = features_of(touch, task.classifier().threshold);
     if (features.values[0] == 0.0) {  // the log of 1 + no element
       continue;
     }

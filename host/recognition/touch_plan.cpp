@@ -279,7 +279,7 @@ std::string limit_words(const Plan& plan) {
   if (gain > most - near_nats) {
     return fmt::format(
         "{} samples cannot show more than {:.2f} nats, and the best gain is near that: the first "
-        "candidates may not be in order; give more --samples",
+        "candidates may not be in order; give more `samples`",
         samples, most);
   }
   if (gain <= unknown_nats(plan) + least_gain_nats) {
@@ -288,7 +288,7 @@ std::string limit_words(const Plan& plan) {
   return plan.goal == PlanGoal::identity
              ? fmt::format(
                    "the best gain is above what is unknown: {} samples stand for the belief only "
-                   "roughly; give more --samples",
+                   "roughly; give more `samples`",
                    samples)
              : "the best gain is above what is unknown, which is counted in bins: the touch tells "
                "also where in its bin the pose is";

@@ -81,7 +81,8 @@ class Recognized:
 
     #: Place of the unknown among all, in the order of the recordings.
     index: int
-    #: The record; of a recording that cannot be recognised, one with its `error`.
+    #: The record, whose warnings name options as flags; of a recording that cannot be recognised, one
+    #: with its `error`.
     record: Record
     #: The record as a line of JSON: the bytes that `palpate batch` writes.
     line: bytes

@@ -1,6 +1,7 @@
 """The module gives the numbers of the command, bit for bit."""
 
 import pathlib
+import re
 from typing import Any
 
 import h5py
@@ -13,8 +14,15 @@ import palpate
 SMALL = ["--bins", "10x10x8"]
 
 
-def without_times(record: dict[str, Any]) -> dict[str, Any]:
-    return {key: value for key, value in record.items() if key != "seconds"}
+OPTION = re.compile(r"--[a-z-]+(?:[ =](?:auto|-?[0-9][^ ,;]*))?|[a-z_]+=(?:'\w+'|\([^)]*\)|[-0-9.]+)")
+
+
+def comparable(record: dict[str, Any]) -> dict[str, Any]:
+    """Without times; in warnings, each face names options in its own words."""
+    record = {key: value for key, value in record.items() if key != "seconds"}
+    for step in (record, *record.get("trace", ())):
+        step.update({"warnings": [OPTION.sub("OPTION", text) for text in step.get("warnings", ())]})
+    return record
 
 
 @pytest.mark.parametrize(
@@ -38,7 +46,7 @@ def test_recognize_gives_the_records_of_the_command(
 ) -> None:
     expected = files.recognized(*flags)
     given = palpate.recognize(files.unknown, files.maps, **options)
-    assert [without_times(record) for record in given] == [without_times(r) for r in expected]
+    assert [comparable(record) for record in given] == [comparable(r) for r in expected]
     assert given[0].best == given[0]["best"] == expected[0]["best"]
 
 
@@ -48,7 +56,7 @@ def test_recordings_and_maps_in_memory_give_the_same_record(files: Files) -> Non
     [given] = palpate.recognize(palpate.read_recording(files.unknown), maps, bins=(10, 10, 8))
     assert given.mode.pop("map") == "map 'E'"
     expected["mode"].pop("map")
-    assert without_times(given) == without_times(expected)
+    assert comparable(given) == comparable(expected)
 
 
 def test_a_map_has_the_cells_of_the_command(files: Files, device: palpate.Device) -> None:
