@@ -120,6 +120,9 @@ template <typename... Functions>
 struct Each : Functions... {
   using Functions::operator()...;
 };
+// Clang 14, which the linter is made of, deduces the arguments of no aggregate by itself.
+template <typename... Functions>
+Each(Functions...) -> Each<Functions...>;
 
 }  // namespace
 
