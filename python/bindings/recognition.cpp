@@ -1,5 +1,3 @@
-#include <map>
-
 #include <nanobind/stl/shared_ptr.h>
 #include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
@@ -9,11 +7,9 @@
 #include "cli/recognition_flags.hpp"
 #include "cli/record_output.hpp"
 #include "cli/recordings.hpp"
-#include "cli/unknowns.hpp"
-#include "estimate.hpp"
+#include "given_recordings.hpp"
 #include "request.hpp"
 #include "session.hpp"
-#include "touches.hpp"
 
 namespace palpate::python {
 
@@ -57,70 +53,27 @@ nb::object to_python(const Json& json) {
   }
 }
 
-/// Files, or recordings in memory, which `given` holds by their place among all.
-struct Recordings {
-  std::vector<std::string> files;
-  std::map<std::size_t, Recording> given;
-  std::size_t size = 0;
-};
-
-Recordings recordings_of(const nb::list& items) {
-  Recordings recordings;
-  for (const nb::handle item : items) {
-    const ArrayRecording* recording = nullptr;
-    if (nb::try_cast(item, recording) && recording != nullptr) {
-      Recording copy = recording->copied();
-      if (copy.path.empty()) {
-        copy.path = fmt::format("recordings[{}]", recordings.size);
-      }
-      recordings.given.emplace(recordings.size, std::move(copy));
-    } else {
-      recordings.files.push_back(nb::borrow<PathLike>(item).text());
-    }
-    ++recordings.size;
-  }
-  return recordings;
-}
-
-std::vector<Recording> read(const Recordings& wanted) {
-  std::vector<Recording> files = cli::read_touch_recordings(wanted.files);
-  std::vector<Recording> all;
-  auto file = files.begin();
-  for (std::size_t i = 0; i < wanted.size; ++i) {
-    const auto given = wanted.given.find(i);
-    all.push_back(given == wanted.given.end() ? std::move(*file++) : given->second);
-    cli::require_touches(all.back(), all.front());
-  }
-  return all;
-}
-
 struct Answer {
   Json records = Json::array();
   std::vector<std::string> sentences;  ///< what is worth a warning
 };
 
-Answer recognize(const Recordings& wanted, const Request& request, Device& device,
-                 const Scene& scene, Call& call) {
+Answer recognize(const Subject& subject, const Request& request, Device& device, Call& call) {
   const std::function<void(double)> progress = call.progress();
   Answer answer;
   cli::RecognitionFlags flags = request.flags;
   flags.tell = [&](const std::string& sentence) {
     answer.sentences.push_back(in_keywords(sentence));
   };
-  std::vector<Recording> recordings = read(wanted);
-  for (Recording& recording : recordings) {
-    cli::replace_array(scene, flags.scene, recording.path, recording.elements(),
-                       recording.elements_mm);
-  }
-  const std::vector<Unknown> unknowns = cli::list_unknowns(request.unknowns, recordings);
-  const Recording& first = recordings.front();
-  RecognitionTask task =
-      cli::task_of(flags, scene, first.pressure_unit, first.path, cli::reach_mm(recordings));
+  const std::vector<Unknown>& unknowns = subject.unknowns;
+  const Recording& first = subject.recordings.front();
+  RecognitionTask task = cli::task_of(flags, subject.scene, first.pressure_unit, first.path,
+                                      cli::reach_mm(subject.recordings));
   task.cancel_point = [&call] { call.check(); };
   if (auto* histogram = std::get_if<HistogramOptions>(&task.filter)) {
     histogram->still_array = array_is_still(unknowns);
   }
-  Recogniser recogniser = cli::open_recogniser(flags, scene, device, task);
+  Recogniser recogniser = cli::open_recogniser(flags, subject.scene, device, task);
   std::string unresolved;
   for (std::size_t i = 0; i < unknowns.size(); ++i) {
     const auto show = [&](double fraction) {
@@ -142,19 +95,17 @@ Answer recognize(const Recordings& wanted, const Request& request, Device& devic
 std::tuple<nb::object, std::vector<std::string>> recognize_python(
     const nb::list& recordings, const nb::list& maps, Request request,
     const std::shared_ptr<Session>& session, const Progress& progress) {
-  Recordings wanted = recordings_of(recordings);
-  if (wanted.size == 0) {
-    throw Error(Fault::input, "recordings: none; give a Recording or a file");
-  }
+  GivenRecordings wanted = given_recordings(recordings);
   add_maps(maps, request.flags);
   const Answer answer =
       run({}, progress, [wanted = std::move(wanted), request, session](Call& call) {
-        const Scene scene = cli::scene_of(request.flags);
+        const Subject subject = subject_of(wanted, request);
         // A device of its own is nobody else's.
         const auto used =
-            session ? session : std::make_shared<Session>(cli::open_device(request.flags, scene));
+            session ? session
+                    : std::make_shared<Session>(cli::open_device(request.flags, subject.scene));
         auto lock = used->lock(call);
-        return recognize(wanted, request, lock.device(), scene, call);
+        return recognize(subject, request, lock.device(), call);
       });
   return {to_python(answer.records), answer.sentences};
 }

@@ -74,7 +74,6 @@ from ._palpate import (
 )
 from .commands import (
     Plan,
-    RecognitionOptions,
     calibrate,
     evaluate,
     fit_touch_sd,
@@ -82,7 +81,7 @@ from .commands import (
     plan,
 )
 from .many import Recognized, Task, recognize_many
-from .recognition import Record, recognize
+from .recognition import RecognitionOptions, Record, recognize
 from .streams import touches
 
 try:

@@ -9,7 +9,7 @@ import os
 import warnings
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal, TypedDict, TypeVar
+from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
 from . import _palpate
 from ._palpate import (
@@ -24,7 +24,7 @@ from ._palpate import (
     Truth,
 )
 from .many import Recognized
-from .recognition import Record, flags_of
+from .recognition import RecognitionOptions, Record, flags_of
 
 # The build writes the stubs by importing the package, where there is no NumPy.
 if TYPE_CHECKING:
@@ -36,30 +36,6 @@ _Path = str | bytes | os.PathLike[str] | os.PathLike[bytes]
 _Pair = tuple[float, float]
 _Maps = OccupancyGrid | Hypothesis | _Path | Iterable[OccupancyGrid | Hypothesis | _Path]
 _Flags = TypeVar("_Flags")
-
-
-class RecognitionOptions(TypedDict, total=False):
-    """Options of recognize(), by their names, that plan() and fit_touch_sd() have, too."""
-
-    bins: tuple[int, int, int] | Literal["auto", "fine"]
-    x_mm: _Pair
-    y_mm: _Pair
-    theta_deg: _Pair
-    pivot_mm: _Pair | Literal["auto"]
-    scene: _Path
-    sensor_model: _Path
-    prior: float
-    gamma: float
-    threshold: float
-    ratio: float
-    touch_sd_mm: float
-    touch_sd_deg: float
-    slip_sd_mm: float
-    slip_sd_deg: float
-    none: float | Literal["auto"]
-    memory_mib: int
-    frames: tuple[int, int]
-    touches: int
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,21 +17,20 @@ import warnings
 from collections.abc import Callable, Generator, Iterable, Sequence
 from contextlib import AbstractContextManager, closing, nullcontext
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal, TypedDict, cast
+from typing import TYPE_CHECKING, Any, Literal, cast
 
 from . import _palpate
 from ._error import Error
 from ._palpate import Device, DeviceInfo
-from .recognition import Record, flags_of
+from .recognition import RecognitionOptions, Record, flags_of
 
 if TYPE_CHECKING:
     from distributed import Client
 
 _Path = str | bytes | os.PathLike[str] | os.PathLike[bytes]
-_Pair = tuple[float, float]
 
 
-class Task(TypedDict, total=False):
+class Task(RecognitionOptions, total=False):
     """What recognize_many() recognises, and how: arguments of recognize() by their names.
 
     `recognize(path, **task)` gives the records of one recording. Maps are files or folders, which all
@@ -40,22 +39,6 @@ class Task(TypedDict, total=False):
     """
 
     maps: _Path | Sequence[_Path]
-    bins: tuple[int, int, int] | Literal["auto", "fine"]
-    x_mm: _Pair
-    y_mm: _Pair
-    theta_deg: _Pair
-    pivot_mm: _Pair | Literal["auto"]
-    scene: _Path
-    sensor_model: _Path
-    prior: float
-    gamma: float
-    threshold: float
-    ratio: float
-    touch_sd_mm: float
-    touch_sd_deg: float
-    slip_sd_mm: float
-    slip_sd_deg: float
-    none: float | Literal["auto"]
     filter: Literal["auto", "histogram", "bounded", "particles"]
     tolerance: float
     evidence_nats: float
@@ -63,9 +46,6 @@ class Task(TypedDict, total=False):
     resampling: Literal["multinomial", "systematic"]
     augmented: bool
     seed: int
-    memory_mib: int
-    frames: tuple[int, int]
-    touches: int
     each_frame: bool
     trace: bool
     device: str | int

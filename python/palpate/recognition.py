@@ -4,13 +4,37 @@ import inspect
 import os
 import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Any, Literal, cast
+from typing import Any, Literal, TypedDict, cast
 
 from . import _palpate
 from ._palpate import Device, Hypothesis, OccupancyGrid, Recording
 
 _Path = str | bytes | os.PathLike[str] | os.PathLike[bytes]
 _Pair = tuple[float, float]
+
+
+class RecognitionOptions(TypedDict, total=False):
+    """Options of recognize(), by their names, that plan(), fit_touch_sd() and Task have, too."""
+
+    bins: tuple[int, int, int] | Literal["auto", "fine"]
+    x_mm: _Pair
+    y_mm: _Pair
+    theta_deg: _Pair
+    pivot_mm: _Pair | Literal["auto"]
+    scene: _Path
+    sensor_model: _Path
+    prior: float
+    gamma: float
+    threshold: float
+    ratio: float
+    touch_sd_mm: float
+    touch_sd_deg: float
+    slip_sd_mm: float
+    slip_sd_deg: float
+    none: float | Literal["auto"]
+    memory_mib: int
+    frames: tuple[int, int]
+    touches: int
 
 
 class Record(dict[str, Any]):

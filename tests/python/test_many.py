@@ -229,7 +229,7 @@ def test_errors_of_workers_arrive(
 @pytest.mark.parametrize(
     ("task", "arguments", "message"),
     [
-        ({"bin": 3}, {}, "task: 'bin' is not known; give maps, bins"),
+        ({"bin": 3}, {}, "task: 'bin' is not known; give bins, x_mm"),
         ({"budget_ms": 3.0}, {}, "task: 'budget_ms' is not known"),
         ({}, {"chunk": 0}, "chunk 0: give at least 1"),
         ({}, {"paths": []}, "paths: none"),
