@@ -1,0 +1,96 @@
+#!/usr/bin/env python3
+"""The list of sources to lint holds what changed within a day of the newest commit, and what includes
+it. The argument is the program that prints the list."""
+
+import os
+import pathlib
+import subprocess
+import sys
+import tempfile
+import unittest
+
+PROGRAM = pathlib.Path(sys.argv.pop())
+DAY_S = 86400
+
+
+class ChangedSources(unittest.TestCase):
+    def setUp(self) -> None:
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.root = pathlib.Path(folder.name)
+        self.git("init", "-q")
+        self.write("host/model/pose.hpp", "")
+        self.write("host/io/file.hpp", '#include "model/pose.hpp"\n')
+        self.write("host/io/file.cpp", '#include "io/file.hpp"\n')
+        self.write("host/io/other.cpp", "#include <vector>\n")
+        self.write("driver/board.cpp", '#include "palpate/touch.hpp"\n')
+        self.write("host/include/palpate/touch.hpp", "")
+        self.write("tests/file_test.cpp", '#include "io/file.hpp"\n')
+        self.write(".clang-tidy", "Checks: bugprone-*\n")
+
+    def write(self, name: str, text: str) -> None:
+        file = self.root / name
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_text(text)
+
+    def git(self, *arguments: str, at_s: int = 0) -> None:
+        stamp = f"{1_700_000_000 + at_s} +0000"
+        who = {"GIT_AUTHOR_NAME": "a", "GIT_AUTHOR_EMAIL": "a@b"}
+        who |= {"GIT_COMMITTER_NAME": "a", "GIT_COMMITTER_EMAIL": "a@b"}
+        dates = {"GIT_AUTHOR_DATE": stamp, "GIT_COMMITTER_DATE": stamp}
+        environment = {**os.environ, **who, **dates}
+        subprocess.run(["git", *arguments], cwd=self.root, env=environment, check=True)
+
+    def commit(self, at_s: int) -> None:
+        self.git("add", "-A")
+        self.git("commit", "-q", "-m", "a step", at_s=at_s)
+
+    def listed(self) -> list[str]:
+        run = subprocess.run([PROGRAM], cwd=self.root, check=True, capture_output=True, text=True)
+        return run.stdout.split()
+
+    def test_a_header_brings_what_includes_it_through_others(self) -> None:
+        self.commit(0)
+        self.write("host/model/pose.hpp", "// changed\n")
+        self.commit(2 * DAY_S)
+        self.assertEqual(self.listed(), ["host/io/file.cpp"])
+
+    def test_a_public_header_brings_the_driver(self) -> None:
+        self.commit(0)
+        self.write("host/include/palpate/touch.hpp", "// changed\n")
+        self.commit(2 * DAY_S)
+        self.assertEqual(self.listed(), ["driver/board.cpp"])
+
+    def test_commits_of_a_day_count_together(self) -> None:
+        self.commit(0)
+        self.write("host/io/other.cpp", "// changed\n")
+        self.commit(2 * DAY_S)
+        self.write("README.md", "changed")
+        self.commit(2 * DAY_S + 3600)
+        self.assertEqual(self.listed(), ["host/io/other.cpp"])
+
+    def test_files_that_git_does_not_know_yet_count(self) -> None:
+        self.commit(0)
+        self.write("README.md", "changed")
+        self.commit(2 * DAY_S)
+        self.assertEqual(self.listed(), [])
+        self.write("host/io/new.cpp", '#include "io/file.hpp"\n')
+        self.assertEqual(self.listed(), ["host/io/new.cpp"])
+
+    def test_a_file_that_went_is_not_listed(self) -> None:
+        self.commit(0)
+        (self.root / "host/io/other.cpp").unlink()
+        self.commit(2 * DAY_S)
+        self.assertEqual(self.listed(), [])
+
+    def test_all_are_listed_where_the_rules_changed_or_all_is_young(self) -> None:
+        everything = ["driver/board.cpp", "host/io/file.cpp", "host/io/other.cpp"]
+        self.commit(0)
+        self.assertEqual(self.listed(), everything)
+        self.write(".clang-tidy", "Checks: performance-*\n")
+        self.commit(2 * DAY_S)
+        self.assertEqual(self.listed(), everything)
+
+
+if __name__ == "__main__":
+    unittest.main()
