@@ -5,31 +5,40 @@
 
 #include <fmt/format.h>
 
-#include "cli/batch/input_reading.hpp"
-#include "cli/recognition_flags.hpp"
-#include "cli/recordings.hpp"
 #include "io/input_file.hpp"
 #include "letters.hpp"
 #include "palpate/balanced_lattice.hpp"
+#include "recognition/batch/input_reading.hpp"
+#include "recognition/option_text.hpp"
+#include "recognition/recordings.hpp"
+#include "recognition/resolve.hpp"
+#include "recognition/unknowns.hpp"
 
 namespace palpate::bench {
 
 namespace {
 
-cli::RecognitionFlags flags_of(const OwnDataOptions& options) {
-  cli::RecognitionFlags flags;
-  flags.maps = options.maps;
-  flags.scene = options.scene;
-  flags.bins = "fine";
-  flags.x_mm = options.x_mm;
-  flags.y_mm = options.y_mm;
-  flags.theta_deg = options.theta_deg;
-  flags.pivot_mm = options.pivot_mm;
-  flags.sensor_model = options.sensor_model;
-  flags.threshold = options.threshold;
-  flags.ratio = options.ratio;
-  flags.filter.filter = "auto";
-  return flags;
+Request request_of(const OwnDataOptions& options) {
+  Request request;
+  request.maps = options.maps;
+  request.scene = options.scene;
+  request.bins = BinWidth::fine;
+  const auto range = [](const char* flag, const std::string& text) {
+    return text.empty() ? std::nullopt : std::optional(parse_range(flag, text));
+  };
+  request.x_mm = range("--x-mm", options.x_mm);
+  request.y_mm = range("--y-mm", options.y_mm);
+  request.theta_deg = range("--theta-deg", options.theta_deg);
+  if (options.pivot_mm == "auto") {
+    request.pivot_mm = Automatic{};
+  } else if (!options.pivot_mm.empty()) {
+    request.pivot_mm = parse_point("--pivot-mm", options.pivot_mm);
+  }
+  request.sensor_model = options.sensor_model;
+  request.threshold = options.threshold;
+  request.ratio = options.ratio;
+  request.filter = FilterKind::automatic;
+  return complete(std::move(request));
 }
 
 }  // namespace
@@ -38,26 +47,25 @@ OwnData read_own_data(const OwnDataOptions& options) {
   if (options.recordings.empty()) {
     refuse("--recordings", "missing; give recordings of unknowns, or a folder of them");
   }
-  const cli::RecognitionFlags flags = flags_of(options);
-  cli::InputRules rules;
-  rules.scene = cli::scene_of(flags);
-  rules.scene_file = flags.scene;
+  const Request request = request_of(options);
   std::vector<std::shared_ptr<const Recording>> recordings;
   std::vector<Unknown> unknowns;
-  cli::BatchInference like;
+  BatchInference like;
   double reach_mm = 0.0;
   RecordingReader reader;
-  for (const cli::BatchInput& input : cli::list_inputs(options.recordings)) {
-    cli::ReadInput read =
-        cli::read_input(reader, input, rules, recordings.empty() ? nullptr : &like);
+  for (const BatchInput& input : list_inputs(options.recordings)) {
+    ReadInput read = read_input(reader, input, request, recordings.empty() ? nullptr : &like);
     like.pressure_unit = read.recording->pressure_unit;
     like.unit_from = recordings.empty() ? input.path : like.unit_from;
-    reach_mm = std::max(reach_mm, cli::reach_mm(std::span(read.recording.get(), 1)));
+    reach_mm = std::max(reach_mm, largest_reach_mm(std::span(read.recording.get(), 1)));
     std::ranges::move(read.unknowns, std::back_inserter(unknowns));
     recordings.push_back(std::move(read.recording));
   }
   RecognitionTask task =
-      cli::task_of(flags, rules.scene, like.pressure_unit, like.unit_from, reach_mm);
+      resolve(request, {.pressure_unit = like.pressure_unit,
+                        .source = like.unit_from,
+                        .reach_mm = reach_mm,
+                        .counts = std::array{1, 1, 1}});  // the counts are chosen below
   const auto balanced = [&](BinWidth width) {
     return balanced_lattice(task.lattice(), task.hypotheses, most_bounded_bins, width).lattice;
   };

@@ -12,16 +12,16 @@
 #include <CLI/CLI.hpp>
 
 #include "cli/calibrate_output.hpp"
-#include "cli/map_files.hpp"
 #include "cli/options.hpp"
 #include "cli/progress.hpp"
 #include "cli/recognition_flags.hpp"
-#include "cli/recordings.hpp"
 #include "cli/terminal.hpp"
 #include "io/command_files.hpp"
 #include "learning/sensor_calibration.hpp"
 #include "learning/touch_sd_learning.hpp"
 #include "palpate/files.hpp"
+#include "recognition/map_files.hpp"
+#include "recognition/recordings.hpp"
 
 namespace palpate::cli {
 
@@ -37,8 +37,7 @@ struct Options {
   std::string layer = "auto";
   std::optional<int> levels;
   int max_maps = 5;
-  RecognitionFlags recognition;  ///< bins and region alone
-  std::string frames;
+  Request request;  ///< bins, region and frames alone
   std::string png;
   std::string device;
 };
@@ -78,22 +77,23 @@ void check_outputs(const Options& options, const std::vector<std::filesystem::pa
 
 /// The bins on which unknowns will be recognised; none where no flag gives them.
 std::optional<RecognitionBins> bins_of(const Options& options, bool known_poses) {
-  const RecognitionFlags& flags = options.recognition;
-  if (flags.bins == "auto" || flags.bins == "fine") {
-    refuse_flag("--bins", flags.bins, "give counts, as 25x25x16, or leave it out");
+  const Request& request = options.request;
+  if (const auto* width = request.bins ? std::get_if<BinWidth>(&*request.bins) : nullptr) {
+    refuse_flag("--bins", *width == BinWidth::fine ? "fine" : "auto",
+                "give counts, as 25x25x16, or leave it out");
   }
-  const bool given = !flags.bins.empty() || !flags.x_mm.empty() || !flags.y_mm.empty() ||
-                     !flags.theta_deg.empty() || !flags.pivot_mm.empty();
+  const bool given =
+      request.bins || request.x_mm || request.y_mm || request.theta_deg || request.pivot_mm;
   if (given && !known_poses) {
     throw Error(
         Fault::input,
         "--bins, --x-mm, --y-mm, --theta-deg and --pivot-mm are for touches at known poses; "
         "leave them out: where the others lie is found on bins one element wide");
   }
-  if (infers_region(flags, {})) {
+  if (infers_region(request)) {
     return {};
   }
-  return RecognitionBins{given_lattice(flags, {}), has_auto_pivot(flags, {})};
+  return RecognitionBins{given_lattice(request), has_auto_pivot(request)};
 }
 
 /// @param known_poses of the touches
@@ -160,10 +160,6 @@ bool all_have_poses(const Options& options, const std::vector<Recording>& record
 }
 
 std::vector<Press> presses_of(const Options& options, const std::vector<Recording>& recordings) {
-  std::optional<Frames> frames;
-  if (!options.frames.empty()) {
-    frames = parse_frames("--frames", options.frames);
-  }
   const bool posed = all_have_poses(options, recordings);
   std::vector<Press> presses;
   for (const Recording& recording : recordings) {
@@ -171,7 +167,7 @@ std::vector<Press> presses_of(const Options& options, const std::vector<Recordin
       refuse(recording.path,
              "attribute 'object' is empty; a calibration needs to know what was touched");
     }
-    const auto [begin, end] = select(recording, frames);
+    const auto [begin, end] = selected_touches(recording, options.request.frames);
     for (std::size_t touch = begin; touch < end; ++touch) {
       presses.push_back(posed ? posed_press(recording, touch) : single_press(recording, touch));
     }
@@ -297,23 +293,23 @@ void add_calibrate(CLI::App& app) {
                    "about as many as you will recognize with. More take longer")
       ->check(require_whole_number)
       ->capture_default_str();
-  command->add_option(
-      "--bins", options->recognition.bins,
+  add_bins_flag(
+      *command, options->request,
       "Pose bins that recognize will be given, as 25x25x16; for touches at known poses. Unknowns "
       "lie between bins, and fit the worse the wider bins are: calibrate learns by how much "
       "[default: bins half the elements' spacing and 5 degrees wide where the touches are; "
       "25x25x16 where a range or X,Y is given]");
-  command->add_option("--x-mm", options->recognition.x_mm,
-                      "Range of these bins, mm, as recognize will be given it [default: -10:10 "
-                      "beside --bins]");
-  command->add_option("--y-mm", options->recognition.y_mm, "The same along y, mm");
-  command->add_option("--theta-deg", options->recognition.theta_deg,
-                      "The same of theta, degrees [default: 0:360]");
-  command->add_option("--pivot-mm", options->recognition.pivot_mm,
-                      "Pivot of these bins, mm, as recognize will be given it: X,Y or auto "
-                      "[default: 0,0 beside --bins]");
-  command->add_option("--frames", options->frames,
-                      "Use the touches A to B - 1 of every recording, counted from 0, as A:B");
+  add_range_flag(*command, "--x-mm", options->request.x_mm,
+                 "Range of these bins, mm, as recognize will be given it [default: -10:10 "
+                 "beside --bins]");
+  add_range_flag(*command, "--y-mm", options->request.y_mm, "The same along y, mm");
+  add_range_flag(*command, "--theta-deg", options->request.theta_deg,
+                 "The same of theta, degrees [default: 0:360]");
+  add_pivot_flag(*command, options->request,
+                 "Pivot of these bins, mm, as recognize will be given it: X,Y or auto "
+                 "[default: 0,0 beside --bins]");
+  add_frames_flag(*command, options->request.frames,
+                  "Use the touches A to B - 1 of every recording, counted from 0, as A:B");
   command->add_option("--png", options->png,
                       "Folder for pictures: table.png, what elements read, and reliability.png, "
                       "accuracy over confidence before and after");

@@ -10,7 +10,6 @@
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
-#include "cli/batch/batch_task.hpp"
 #include "cli/batch/results_folder.hpp"
 #include "cli/evaluate_output.hpp"
 #include "cli/options.hpp"
@@ -18,6 +17,7 @@
 #include "cli/results_file.hpp"
 #include "cli/terminal.hpp"
 #include "io/command_files.hpp"
+#include "recognition/batch/batch_task.hpp"
 
 namespace palpate::cli {
 

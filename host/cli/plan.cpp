@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cmath>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -12,17 +13,18 @@
 #include <CLI/CLI.hpp>
 
 #include "cli/commands.hpp"
+#include "cli/engine_words.hpp"
 #include "cli/options.hpp"
 #include "cli/plan_output.hpp"
 #include "cli/planned_touch.hpp"
 #include "cli/recognition_flags.hpp"
-#include "cli/record_output.hpp"
-#include "cli/recordings.hpp"
 #include "cli/terminal.hpp"
 #include "io/command_files.hpp"
 #include "io/pose_table.hpp"
 #include "palpate/files.hpp"
 #include "recognition/label_probability.hpp"
+#include "recognition/recordings.hpp"
+#include "recognition/unknowns.hpp"
 
 namespace palpate::cli {
 
@@ -32,36 +34,23 @@ struct Options {
   std::string recording;
   std::string candidates;
   std::string goal = "both";
-  std::string frames;
-  std::optional<int> touches;
   std::size_t samples = PlanOptions{}.samples;
   std::uint64_t seed = 0;
-  RecognitionFlags recognition;
+  Request request;
+  bool verbose = false;
   std::string json;
   std::string png;
 };
 
 constexpr const char* grid = "grid";
 
-/// The touches of the recording that the flags select.
-std::vector<Touch> select_touches(const Options& options, const Recording& recording) {
-  std::optional<Frames> frames;
-  if (!options.frames.empty()) {
-    frames = parse_frames("--frames", options.frames);
-  }
-  if (options.touches && *options.touches < 1) {
-    refuse_flag("--touches", *options.touches, "give at least 1");
-  }
-  auto [begin, end] = select(recording, frames);
-  if (options.touches && static_cast<std::size_t>(*options.touches) > end - begin) {
-    refuse(recording.path, "has {} touches; --touches {} is too many", end - begin,
-           *options.touches);
-  }
-  end = options.touches ? begin + static_cast<std::size_t>(*options.touches) : end;
-  if (begin == end) {
+/// The touches of the recording that the request selects, as one unknown.
+Unknown select_touches(const Request& request, const Recording& recording) {
+  Unknown unknown = list_unknowns(request, std::span(&recording, 1)).front();
+  if (unknown.touches.empty()) {
     refuse(recording.path, "has no touches; give a recording with at least one");
   }
-  return recording.touches(begin, end);
+  return unknown;
 }
 
 /// The elements of a touch that are alive.
@@ -113,13 +102,13 @@ void check_candidates(const std::string& file, const std::vector<Pose>& candidat
 }
 
 /// Throws Error where an output cannot be written, before any work is done.
-void check_outputs(const Options& options, const Scene& scene, const RecognitionTask& task) {
+void check_outputs(const Options& options, const Request& request) {
   CommandFiles files;
   files.reads("RECORDING", options.recording);
   if (options.candidates != grid && options.candidates != options.recording) {
     files.reads("--candidates", options.candidates);
   }
-  add_recognition_files(options.recognition, scene, task, files);
+  add_recognition_files(request, files);
   if (!options.json.empty()) {
     files.writes("--json", options.json, CommandFiles::Dash::stream);
   }
@@ -161,12 +150,12 @@ void plan_touches(const Options& options) {
   if (options.samples < 2 || options.samples > most_samples) {
     refuse_flag("--samples", options.samples, "give 2 to {}", most_samples);
   }
-  const Scene scene = scene_of(options.recognition);
+  const Request request = complete(options.request);
   std::vector<Recording> recordings = read_touch_recordings({options.recording});
   Recording& recording = recordings.front();
-  replace_array(scene, options.recognition.scene, recording.path, recording.elements(),
-                recording.elements_mm);
-  const std::vector<Touch> touches = select_touches(options, recording);
+  replace_array(request, recording.path, recording.elements(), recording.elements_mm);
+  const Unknown unknown = select_touches(request, recording);
+  const std::vector<Touch>& touches = unknown.touches;
   const std::vector<glm::dvec2> elements_mm = living_elements(touches.front(), recording.path);
   std::vector<Pose> candidates;
   if (options.candidates != grid) {
@@ -177,18 +166,18 @@ void plan_touches(const Options& options) {
   for (const Touch& touch : touches) {  // the array may change between touches
     reach_mm = std::max(reach_mm, array_reach_mm(touch.elements_mm));
   }
-  RecognitionTask task = task_of(options.recognition, scene, recording.pressure_unit,
-                                 recording.path, reach_mm, {.why = plan_needs});
+  DeviceInWaiting device_in_waiting(request.device);
+  const RecognitionTask task = resolve(request, {.pressure_unit = recording.pressure_unit,
+                                                 .source = recording.path,
+                                                 .reach_mm = reach_mm,
+                                                 .need = {.why = plan_needs},
+                                                 .device = std::ref(device_in_waiting)});
   if (!traits_of(task.filter).every_bin) {
     refuse("--filter particles", "{}; use --filter histogram, or leave it out", plan_needs);
   }
-  check_outputs(options, scene, task);
-  Device device = open_device(options.recognition, scene);
-  Recogniser recogniser = open_recogniser(options.recognition, scene, device, task);
-  const Unknown unknown{.recording = recording.path,
-                        .frame = {},
-                        .touches = touches,
-                        .truth = ground_truth(recording.object, recording.truth)};
+  check_outputs(options, request);
+  Device& device = device_in_waiting();
+  Recogniser recogniser = open_telling(device, task);
   const RecognitionRecord record = recognise(recogniser, task, unknown, false);
   record.require_steps();
   if (const auto words = unresolved_words(task, recogniser.lattice(), touches); !words.empty()) {
@@ -214,7 +203,7 @@ void plan_touches(const Options& options) {
   plan.identity_nats = label_entropy(sums_by_label(recogniser.estimate(), task), task);
   plan.both_nats = recogniser.histogram()->entropy();
   write_results(options, plan, device);
-  if (options.recognition.verbose) {
+  if (options.verbose) {
     print_engine(&device, recogniser, task);
   }
 }
@@ -230,7 +219,7 @@ void add_plan(CLI::App& app) {
   const auto options = std::make_shared<Options>();
   command->add_option("RECORDING", options->recording, "Recording of the touches so far (HDF5)")
       ->required();
-  add_recognition_flags(*command, options->recognition);
+  add_recognition_flags(*command, options->request, options->verbose);
   hide_other_filters(*command);
   command
       ->add_option(
@@ -244,10 +233,10 @@ void add_plan(CLI::App& app) {
       ->add_option("--goal", options->goal,
                    "What the touch shall tell: identity, pose (once the object is known) or both")
       ->capture_default_str();
-  command->add_option("--frames", options->frames,
-                      "Use the touches A to B - 1 of the recording, counted from 0, as A:B");
+  add_frames_flag(*command, options->request.frames,
+                  "Use the touches A to B - 1 of the recording, counted from 0, as A:B");
   command
-      ->add_option("--touches", options->touches,
+      ->add_option("--touches", options->request.touches,
                    "Use the first N touches of the recording [default: all]")
       ->check(require_whole_number);
   command

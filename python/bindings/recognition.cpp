@@ -1,3 +1,5 @@
+#include <algorithm>
+#include <iterator>
 #include <map>
 
 #include <nanobind/stl/shared_ptr.h>
@@ -6,11 +8,11 @@
 #include <nlohmann/json.hpp>
 
 #include "bindings.hpp"
-#include "cli/recognition_flags.hpp"
-#include "cli/record_output.hpp"
-#include "cli/recordings.hpp"
-#include "cli/unknowns.hpp"
 #include "estimate.hpp"
+#include "recognition/record_json.hpp"
+#include "recognition/recordings.hpp"
+#include "recognition/resolve.hpp"
+#include "recognition/unknowns.hpp"
 #include "request.hpp"
 #include "session.hpp"
 #include "touches.hpp"
@@ -83,13 +85,13 @@ Recordings recordings_of(const nb::list& items) {
 }
 
 std::vector<Recording> read(const Recordings& wanted) {
-  std::vector<Recording> files = cli::read_touch_recordings(wanted.files);
+  std::vector<Recording> files = read_touch_recordings(wanted.files);
   std::vector<Recording> all;
   auto file = files.begin();
   for (std::size_t i = 0; i < wanted.size; ++i) {
     const auto given = wanted.given.find(i);
     all.push_back(given == wanted.given.end() ? std::move(*file++) : given->second);
-    cli::require_touches(all.back(), all.front());
+    require_touches(all.back(), all.front());
   }
   return all;
 }
@@ -99,28 +101,24 @@ struct Answer {
   std::vector<std::string> sentences;  ///< what is worth a warning
 };
 
-Answer recognize(const Recordings& wanted, const Request& request, Device& device,
-                 const Scene& scene, Call& call) {
+Answer recognize(const Recordings& wanted, const Request& request, Device& device, Call& call) {
   const std::function<void(double)> progress = call.progress();
   Answer answer;
-  cli::RecognitionFlags flags = request.flags;
-  flags.tell = [&](const std::string& sentence) {
-    answer.sentences.push_back(in_keywords(sentence));
-  };
   std::vector<Recording> recordings = read(wanted);
   for (Recording& recording : recordings) {
-    cli::replace_array(scene, flags.scene, recording.path, recording.elements(),
-                       recording.elements_mm);
+    replace_array(request, recording.path, recording.elements(), recording.elements_mm);
   }
-  const std::vector<Unknown> unknowns = cli::list_unknowns(request.unknowns, recordings);
+  const std::vector<Unknown> unknowns = list_unknowns(request, recordings);
   const Recording& first = recordings.front();
-  RecognitionTask task =
-      cli::task_of(flags, scene, first.pressure_unit, first.path, cli::reach_mm(recordings));
-  task.cancel_point = [&call] { call.check(); };
-  if (auto* histogram = std::get_if<HistogramOptions>(&task.filter)) {
-    histogram->still_array = array_is_still(unknowns);
-  }
-  Recogniser recogniser = cli::open_recogniser(flags, scene, device, task);
+  const RecognitionTask task =
+      resolve(request, {.pressure_unit = first.pressure_unit,
+                        .source = first.path,
+                        .reach_mm = largest_reach_mm(recordings),
+                        .still_array = array_is_still(unknowns),
+                        .cancel_point = [&call] { call.check(); },
+                        .device = [&device]() -> const Device& { return device; }});
+  Recogniser recogniser = open_recogniser(device, task);
+  std::ranges::transform(task.remarks, std::back_inserter(answer.sentences), in_keywords);
   std::string unresolved;
   for (std::size_t i = 0; i < unknowns.size(); ++i) {
     const auto show = [&](double fraction) {
@@ -129,9 +127,9 @@ Answer recognize(const Recordings& wanted, const Request& request, Device& devic
     const RecognitionRecord record = recognise(recogniser, task, unknowns[i], request.trace, show);
     record.require_steps();
     if (unresolved.empty()) {
-      unresolved = cli::unresolved_words(task, recogniser.lattice(), unknowns[i].touches);
+      unresolved = unresolved_words(task, recogniser.lattice(), unknowns[i].touches);
     }
-    answer.records.push_back(cli::to_json(record, task, device.name(), request.trace, in_keywords));
+    answer.records.push_back(to_json(record, task, device.name(), request.trace, in_keywords));
   }
   if (!unresolved.empty()) {
     answer.sentences.push_back(in_keywords(unresolved));
@@ -140,32 +138,30 @@ Answer recognize(const Recordings& wanted, const Request& request, Device& devic
 }
 
 std::tuple<nb::object, std::vector<std::string>> recognize_python(
-    const nb::list& recordings, const nb::list& maps, Request request,
+    const nb::list& recordings, const nb::list& maps, Request given,
     const std::shared_ptr<Session>& session, const Progress& progress) {
   Recordings wanted = recordings_of(recordings);
   if (wanted.size == 0) {
     throw Error(Fault::input, "recordings: none; give a Recording or a file");
   }
-  add_maps(maps, request.flags);
-  const Answer answer =
-      run({}, progress, [wanted = std::move(wanted), request, session](Call& call) {
-        const Scene scene = cli::scene_of(request.flags);
-        // A device of its own is nobody else's.
-        const auto used =
-            session ? session : std::make_shared<Session>(cli::open_device(request.flags, scene));
-        auto lock = used->lock(call);
-        return recognize(wanted, request, lock.device(), scene, call);
-      });
+  add_maps(maps, given);
+  const Answer answer = run({}, progress, [wanted = std::move(wanted), given, session](Call& call) {
+    const Request request = complete(given);
+    // A device of its own is nobody else's.
+    const auto used = session ? session : std::make_shared<Session>(Device::open(request.device));
+    auto lock = used->lock(call);
+    return recognize(wanted, request, lock.device(), call);
+  });
   return {to_python(answer.records), answer.sentences};
 }
 
 }  // namespace
 
 void bind_recognition(nb::module_& module) {
-  module.def("recognize_as_flagged", &recognize_python, "recordings"_a, "maps"_a, "flags"_a,
+  module.def("recognize", &recognize_python, "recordings"_a, "maps"_a, "request"_a,
              "device"_a = nb::none(), "progress"_a = nb::none(),
-             nb::sig("def recognize_as_flagged(recordings: list[Recording | str], maps: "
-                     "list[OccupancyGrid | Hypothesis | str], flags: RecognitionFlags, device: "
+             nb::sig("def recognize(recordings: list[Recording | str], maps: "
+                     "list[OccupancyGrid | Hypothesis | str], request: Request, device: "
                      "Device | None = None, progress: collections.abc.Callable[[float], object] | "
                      "None = None) -> tuple[list[dict[str, typing.Any]], list[str]]"),
              "Records as in the JSON of `palpate recognize`, and what is worth a warning.");
