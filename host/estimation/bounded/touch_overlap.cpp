@@ -14,7 +14,7 @@ namespace {
 // Rectangles that come as close count as overlapping, as in sum_overlap.comp.glsl.
 constexpr double touching_mm = 1e-3;
 
-constexpr double infinity = std::numeric_limits<double>::infinity();
+constexpr double unbounded = std::numeric_limits<double>::infinity();
 
 /// A length or place of which products stay finite. No region reaches so far.
 glm::dvec2 within_reach(const glm::dvec2& mm) {
@@ -27,8 +27,8 @@ glm::dvec2 within_reach(const glm::dvec2& mm) {
 
 /// An interval of reals.
 struct Interval {
-  double low = -infinity;
-  double high = infinity;
+  double low = -unbounded;
+  double high = unbounded;
 
   void cut(const Interval& other) {
     low = std::max(low, other.low);
@@ -39,7 +39,7 @@ struct Interval {
 /// The u with |slope u + offset| <= reach.
 Interval within(double slope, double offset, double reach) {
   if (slope == 0.0) {
-    return std::abs(offset) <= reach ? Interval{} : Interval{infinity, -infinity};
+    return std::abs(offset) <= reach ? Interval{} : Interval{unbounded, -unbounded};
   }
   const double a = (-reach - offset) / slope;
   const double b = (reach - offset) / slope;
@@ -118,7 +118,7 @@ bool OverlapPlane::may_overlap(const Bins& x, const Bins& y) const {
     const int first = std::max(bins.first, to.first);
     const int last = std::min(bins.first + bins.count, to.first + to.count) - 1;
     return first <= last ? Interval{axis.centre(first), axis.centre(last)}
-                         : Interval{infinity, -infinity};
+                         : Interval{unbounded, -unbounded};
   };
   const Interval of_x = cut(x_mm_, x, columns_);
   const Interval of_y = cut(y_mm_, y, rows_);

@@ -14,7 +14,7 @@ constexpr int few_batches = 16;
 
 /// So many elements' penalties never add up to the largest sum, nor do half as many's changes,
 /// which may be twice as large.
-constexpr std::size_t most_elements = largest_sum / largest_penalty;
+constexpr std::size_t most_still_elements = largest_sum / largest_penalty;
 
 /// Whether most elements are in No Contact.
 bool mostly_no_contact(const ArrayReadings& touch) {
@@ -30,7 +30,7 @@ StillPlace::Seen StillPlace::look(const ArrayReadings& touch) {
   if (!stays) {
     last_ = touch.from_pivot_mm;
   }
-  if (touch.readings.size() > most_elements || !mostly_no_contact(touch)) {
+  if (touch.readings.size() > most_still_elements || !mostly_no_contact(touch)) {
     return Seen::moving;
   }
   if (touch.from_pivot_mm == kept_) {

@@ -92,7 +92,7 @@ SearchMemory search_memory(std::span<const Hypothesis> hypotheses, const Bounded
     // "None of these" searches on sums of its own.
     const double sums = options.none_weight ? 2.0 : 1.0;
     memory.tiles += (sums * sizeof(std::int32_t) + sizeof(Tile)) * largest_tiles;
-    memory.rest += tables_of(sizes.front()) + sizeof(std::uint32_t) * largest_tiles;
+    memory.still += tables_of(sizes.front()) + sizeof(std::uint32_t) * largest_tiles;
     const double family_mm = batch_side * sizes.back().cells() * map.cell_mm;
     memory.largest_family = std::max(
         memory.largest_family, sizes.back().single_bin ? 1.0
@@ -139,7 +139,7 @@ std::string why_no_room(std::span<const Hypothesis> hypotheses, const BoundedOpt
   };
   const std::array<Part, 4> parts{
       {{memory.tables, "use fewer maps, maps of fewer cells, or a narrower region"},
-       {memory.tiles + memory.rest, "use fewer thetas or maps, or narrow the region"},
+       {memory.tiles + memory.still, "use fewer thetas or maps, or narrow the region"},
        {memory.thetas, "use fewer thetas or maps"},
        {memory.leaves, "use fewer bins along x and y"}}};
   const Part& largest = *std::max_element(

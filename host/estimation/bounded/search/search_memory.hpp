@@ -13,12 +13,12 @@ namespace palpate {
 struct SearchMemory {
   double tables = 0.0;  ///< of the maps: penalties of windows, nodes
   double tiles = 0.0;   ///< the largest tiles: their sums, and their places in a search
-  double rest = 0.0;    ///< of an array at rest: its sums, and how readings change them
+  double still = 0.0;   ///< of an array at rest: its sums, and how readings change them
   double thetas = 0.0;  ///< what every theta of the lattice has
   double leaves = 0.0;  ///< bins that are evaluated together
 
   double largest_family = 0.0;  ///< bins that the smallest tiles of one larger tile hold
-  double total() const { return tables + tiles + rest + thetas + leaves; }
+  double total() const { return tables + tiles + still + thetas + leaves; }
 };
 
 /// Allocates nothing. What the search takes while it divides tiles is not foreseen.
