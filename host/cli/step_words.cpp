@@ -142,11 +142,9 @@ std::string dropped_text(const RecognitionStep& step) {
 }
 
 std::string unproven_sentence(const RecognitionStep& step, const RecognitionTask& task) {
-  if (!step.certificate) {
-    return "";
-  }
-  const auto& bounded = std::get<BoundedOptions>(task.filter);
-  if (step.certificate->dropped_mass <= bounded.tolerance) {
+  const auto* bounded = std::get_if<BoundedOptions>(&task.filter);
+  if (bounded == nullptr || !step.certificate ||
+      step.certificate->dropped_mass <= bounded->tolerance) {
     return "";
   }
   const auto [low, high] = step.identity_bounds[step.best];
@@ -157,8 +155,8 @@ std::string unproven_sentence(const RecognitionStep& step, const RecognitionTask
       "unproven",
       object_words(step, task), 100.0 * step.confidence(), std::floor(1000.0 * low) / 10.0,
       std::ceil(1000.0 * high) / 10.0,
-      bounded.budget_s ? fmt::format("the budget of {:g} ms", 1e3 * *bounded.budget_s)
-                       : fmt::format("rounding"),
+      bounded->budget_s ? fmt::format("the budget of {:g} ms", 1e3 * *bounded->budget_s)
+                        : fmt::format("rounding"),
       unproven >= 9.95 ? fmt::format("{:.0f}", unproven) : fmt::format("{:.2g}", unproven));
 }
 
