@@ -14,15 +14,15 @@
 #include <CLI/CLI.hpp>
 
 #include "cli/calibrate_output.hpp"
-#include "cli/map_files.hpp"
 #include "cli/options.hpp"
 #include "cli/progress.hpp"
 #include "cli/recognition_flags.hpp"
-#include "cli/recordings.hpp"
 #include "cli/terminal.hpp"
 #include "io/command_files.hpp"
 #include "learning/calibration_task.hpp"
 #include "palpate/files.hpp"
+#include "recognition/map_files.hpp"
+#include "recognition/recordings.hpp"
 
 namespace palpate::cli {
 
@@ -33,8 +33,7 @@ struct CalibrateArguments {
   std::string output;
   std::vector<std::string> maps;
   CalibrationRequest request;
-  RecognitionFlags recognition;  ///< bins and region alone
-  std::string frames;
+  Request recognition;  ///< bins, region and frames alone
   std::string png;
   std::string device;
 };
@@ -75,15 +74,15 @@ void check_outputs(const CalibrateArguments& options,
 
 /// What the flags ask for, with the bins on which unknowns will be recognised.
 CalibrationRequest request_of(const CalibrateArguments& options) {
-  const RecognitionFlags& flags = options.recognition;
-  if (flags.bins == "auto" || flags.bins == "fine") {
-    refuse_flag("--bins", flags.bins, "give counts, as 25x25x16, or leave it out");
+  const Request& bins = options.recognition;
+  if (const auto* width = bins.bins ? std::get_if<BinWidth>(&*bins.bins) : nullptr) {
+    refuse_flag("--bins", *width == BinWidth::fine ? "fine" : "auto",
+                "give counts, as 25x25x16, or leave it out");
   }
   CalibrationRequest request = options.request;
-  request.gives_bins = !flags.bins.empty() || !flags.x_mm.empty() || !flags.y_mm.empty() ||
-                       !flags.theta_deg.empty() || !flags.pivot_mm.empty();
-  if (!infers_region(flags, {})) {
-    request.bins = {given_lattice(flags, {}), has_auto_pivot(flags, {})};
+  request.gives_bins = bins.bins || bins.x_mm || bins.y_mm || bins.theta_deg || bins.pivot_mm;
+  if (!infers_region(bins)) {
+    request.bins = {given_lattice(bins), has_auto_pivot(bins)};
   }
   return request;
 }
@@ -96,13 +95,9 @@ void calibrate(const CalibrateArguments& options) {
   }
   check_outputs(options, maps_read);
   const std::vector<Recording> recordings = read_touch_recordings(options.recordings);
-  std::optional<Frames> frames;
-  if (!options.frames.empty()) {
-    frames = parse_frames("--frames", options.frames);
-  }
   std::vector<std::array<std::size_t, 2>> touches;
   for (const Recording& recording : recordings) {
-    const auto [begin, end] = select(recording, frames);
+    const auto [begin, end] = selected_touches(recording, options.recognition.frames);
     touches.push_back({begin, end});
   }
   std::vector<NamedMap> maps;
@@ -190,23 +185,23 @@ void add_calibrate(CLI::App& app) {
                    "about as many as you will recognize with. More take longer")
       ->check(require_whole_number)
       ->capture_default_str();
-  command->add_option(
-      "--bins", options->recognition.bins,
+  add_bins_flag(
+      *command, options->recognition,
       "Pose bins that recognize will be given, as 25x25x16; for touches at known poses. Unknowns "
       "lie between bins, and fit the worse the wider bins are: calibrate learns by how much "
       "[default: bins half the elements' spacing and 5 degrees wide where the touches are; "
       "25x25x16 where a range or X,Y is given]");
-  command->add_option("--x-mm", options->recognition.x_mm,
-                      "Range of these bins, mm, as recognize will be given it [default: -10:10 "
-                      "beside --bins]");
-  command->add_option("--y-mm", options->recognition.y_mm, "The same along y, mm");
-  command->add_option("--theta-deg", options->recognition.theta_deg,
-                      "The same of theta, degrees [default: 0:360]");
-  command->add_option("--pivot-mm", options->recognition.pivot_mm,
-                      "Pivot of these bins, mm, as recognize will be given it: X,Y or auto "
-                      "[default: 0,0 beside --bins]");
-  command->add_option("--frames", options->frames,
-                      "Use the touches A to B - 1 of every recording, counted from 0, as A:B");
+  add_range_flag(*command, "--x-mm", options->recognition.x_mm,
+                 "Range of these bins, mm, as recognize will be given it [default: -10:10 "
+                 "beside --bins]");
+  add_range_flag(*command, "--y-mm", options->recognition.y_mm, "The same along y, mm");
+  add_range_flag(*command, "--theta-deg", options->recognition.theta_deg,
+                 "The same of theta, degrees [default: 0:360]");
+  add_pivot_flag(*command, options->recognition,
+                 "Pivot of these bins, mm, as recognize will be given it: X,Y or auto "
+                 "[default: 0,0 beside --bins]");
+  add_frames_flag(*command, options->recognition.frames,
+                  "Use the touches A to B - 1 of every recording, counted from 0, as A:B");
   command->add_option("--png", options->png,
                       "Folder for pictures: table.png, what elements read, and reliability.png, "
                       "accuracy over confidence before and after");

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <csignal>
+#include <functional>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -13,13 +14,13 @@
 
 #include "cli/commands.hpp"
 #include "cli/detector_flags.hpp"
+#include "cli/engine_words.hpp"
 #include "cli/interruption.hpp"
 #include "cli/live_record.hpp"
 #include "cli/live_screen.hpp"
 #include "cli/options.hpp"
 #include "cli/planned_touch.hpp"
 #include "cli/recognition_flags.hpp"
-#include "cli/record_output.hpp"
 #include "cli/sensor_option.hpp"
 #include "io/command_files.hpp"
 #include "palpate/pose_track.hpp"
@@ -35,7 +36,8 @@ using namespace std::chrono_literals;
 struct LiveArguments {
   std::string sensor;
   std::string poses;
-  RecognitionFlags recognition;
+  Request request;
+  bool verbose = false;
   DetectorFlags detector;
   double tare_s = 0.5;
   std::optional<double> reset_after_s;
@@ -100,7 +102,7 @@ void live(const LiveArguments& options) {
     goal = parse_goal("--plan", options.plan);
   }
   require_above("--tare", options.tare_s, 0.0, true);
-  const Scene scene = scene_of(options.recognition);
+  const Request request = complete(options.request);
   if (options.poses.empty() && !is_virtual_sensor(options.sensor)) {
     refuse(
         "--poses",
@@ -115,26 +117,30 @@ void live(const LiveArguments& options) {
   const SensorDescription& description = opened.sensor->description();
   std::vector<glm::dvec2> elements_mm = description.elements_mm;
   const std::string source = "sensor " + options.sensor;
-  replace_array(scene, options.recognition.scene, source, elements_mm.size(), elements_mm);
+  replace_array(request, source, elements_mm.size(), elements_mm);
   const TouchDetectorOptions detector =
       detector_options(options.detector, description.pressure_unit, source);
-  RecognitionTask task = task_of(options.recognition, scene, description.pressure_unit, source,
-                                 array_reach_mm(elements_mm),
-                                 goal ? HistogramNeed{"--plan", plan_needs} : HistogramNeed{});
+  DeviceInWaiting device_in_waiting(request.device);
+  const RecognitionTask task =
+      resolve(request, {.pressure_unit = description.pressure_unit,
+                        .source = source,
+                        .reach_mm = array_reach_mm(elements_mm),
+                        .need = goal ? HistogramNeed{"plan", plan_needs} : HistogramNeed{},
+                        .device = std::ref(device_in_waiting)});
   if (goal && !traits_of(task.filter).every_bin) {
     refuse_flag("--plan", options.plan, "{}; use --filter histogram, or leave it out", plan_needs);
   }
   CommandFiles files;
   add_sensor_files(options.sensor, options.poses, files);
-  add_recognition_files(options.recognition, scene, task, files);
+  add_recognition_files(request, files);
   if (!options.json.empty()) {
     files.writes("--json", options.json, CommandFiles::Dash::stream);
   }
   files.require_distinct();
-  Device device = open_device(options.recognition, scene);
-  Recogniser recogniser = open_recogniser(options.recognition, scene, device, task);
+  Device& device = device_in_waiting();
+  Recogniser recogniser = open_telling(device, task);
   warm_up(recogniser, task, description, elements_mm);
-  if (options.recognition.verbose) {
+  if (options.verbose) {
     print_engine(&device, recogniser, task);
   }
   std::optional<LineFile> json;
@@ -226,7 +232,7 @@ void add_live(CLI::App& app) {
   command->add_option(
       "--poses", options->poses,
       std::string(poses_help) + " [default: the poses of the replay or simulation]");
-  add_recognition_flags(*command, options->recognition);
+  add_recognition_flags(*command, options->request, options->verbose);
   add_detector_flags(*command, options->detector);
   command
       ->add_option(

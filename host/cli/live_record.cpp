@@ -8,10 +8,10 @@
 
 #include "cli/options.hpp"
 #include "cli/planned_touch.hpp"
-#include "cli/record_output.hpp"
 #include "cli/step_words.hpp"
 #include "model/printable.hpp"
 #include "palpate/error.hpp"
+#include "recognition/record_json.hpp"
 
 namespace palpate::cli {
 

@@ -14,13 +14,13 @@
 #include "cli/map_flags.hpp"
 #include "cli/options.hpp"
 #include "cli/progress.hpp"
-#include "cli/recordings.hpp"
 #include "figures/figures.hpp"
 #include "learning/observed_map.hpp"
 #include "learning/press.hpp"
 #include "palpate/files.hpp"
 #include "palpate/map_builder.hpp"
 #include "palpate/rotational_symmetry.hpp"
+#include "recognition/recordings.hpp"
 
 namespace palpate::cli {
 

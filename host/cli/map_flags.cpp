@@ -5,10 +5,11 @@
 #include <CLI/CLI.hpp>
 
 #include "cli/options.hpp"
-#include "cli/recordings.hpp"
+#include "cli/recognition_flags.hpp"
 #include "io/command_files.hpp"
 #include "model/number_text.hpp"
 #include "model/printable.hpp"
+#include "recognition/recordings.hpp"
 
 namespace palpate::cli {
 
@@ -82,8 +83,8 @@ void add_map_flags(CLI::App& command, MapFlags& flags) {
                      "Sensor model (YAML) whose threshold, ratio, spread and prior are the "
                      "defaults; the maps then also hold the number of touches and the mean "
                      "pressure at each cell");
-  command.add_option("--frames", flags.frames,
-                     "Use the touches A to B - 1 of every recording, counted from 0, as A:B");
+  add_frames_flag(command, flags.frames,
+                  "Use the touches A to B - 1 of every recording, counted from 0, as A:B");
   command
       .add_option("--symmetry", flags.symmetry,
                   "n-fold rotational symmetry of the object; 1: none, 0: any rotation")
@@ -191,10 +192,6 @@ std::optional<double> given_prior(const MapFlags& flags,
 
 GroupedTouches group_by_label(const MapFlags& flags, const std::vector<Recording>& recordings,
                               const ContactClassifier& classifier) {
-  std::optional<Frames> frames;
-  if (!flags.frames.empty()) {
-    frames = parse_frames("--frames", flags.frames);
-  }
   struct Group {
     std::vector<Touch> touches;
     std::vector<TouchSource> sources;
@@ -203,7 +200,7 @@ GroupedTouches group_by_label(const MapFlags& flags, const std::vector<Recording
   for (const Recording& recording : recordings) {
     const std::string& label = flags.label.empty() ? recording.object : flags.label;
     require_name(recording.path, label);
-    const auto [begin, end] = select(recording, frames);
+    const auto [begin, end] = selected_touches(recording, flags.frames);
     Group& group = groups[label];
     for (std::size_t i = begin; i < end; ++i) {
       Touch touch = recording.touch(i);

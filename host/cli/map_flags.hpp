@@ -9,6 +9,7 @@
 #include "palpate/learned_sensor.hpp"
 #include "palpate/map_builder.hpp"
 #include "palpate/touch.hpp"
+#include "recognition/request.hpp"
 
 namespace CLI {
 class App;
@@ -31,7 +32,7 @@ struct MapFlags {
   std::optional<double> threshold;
   std::optional<double> ratio;
   std::string sensor_model;
-  std::string frames;
+  std::optional<Frames> frames;
   int symmetry = 1;
   bool mirror = false;
   std::string label;

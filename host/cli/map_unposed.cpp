@@ -11,12 +11,12 @@
 #include "cli/map_flags.hpp"
 #include "cli/options.hpp"
 #include "cli/progress.hpp"
-#include "cli/recordings.hpp"
 #include "figures/presses_figure.hpp"
 #include "learning/contact_learning.hpp"
 #include "learning/unposed_maps.hpp"
 #include "palpate/files.hpp"
 #include "palpate/rotational_symmetry.hpp"
+#include "recognition/recordings.hpp"
 
 namespace palpate::cli {
 

@@ -1,14 +1,11 @@
 #pragma once
 
-#include <array>
-#include <cstddef>
 #include <filesystem>
 #include <string>
 #include <string_view>
 
 #include "io/atomic_file.hpp"
 #include "io/input_file.hpp"
-#include "palpate/pose.hpp"
 
 namespace palpate::cli {
 
@@ -18,25 +15,6 @@ template <typename Value, typename... Parts>
                               fmt::format_string<const Parts&...> message, const Parts&... parts) {
   throw Error(Fault::input, fmt::format("{} {}: {}", flag, value, fmt::format(message, parts...)));
 }
-
-// Each function parses the value of a flag. Throws Error naming flag, value and the form wanted.
-
-/// "A:B" with A <= B
-std::array<double, 2> parse_range(const std::string& flag, const std::string& text);
-/// "X,Y"
-glm::dvec2 parse_point(const std::string& flag, const std::string& text);
-/// "X,Y,DEG"
-Pose parse_pose(const std::string& flag, const std::string& text);
-/// "25x25x16", each at least 1
-std::array<int, 3> parse_bins(const std::string& flag, const std::string& text);
-
-/// Touches [begin, end) of a recording.
-struct Frames {
-  std::size_t begin = 0;
-  std::size_t end = 0;
-};
-/// "A:B" with A < B
-Frames parse_frames(const std::string& flag, const std::string& text);
 
 /// The value. Throws Error unless it is finite and above `least`, or `inclusive` and equal to it.
 double require_above(const std::string& flag, double value, double least, bool inclusive = false);

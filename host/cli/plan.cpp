@@ -1,6 +1,7 @@
 #include <unistd.h>
 
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -9,14 +10,15 @@
 #include <CLI/CLI.hpp>
 
 #include "cli/commands.hpp"
+#include "cli/engine_words.hpp"
 #include "cli/options.hpp"
 #include "cli/plan_output.hpp"
 #include "cli/recognition_flags.hpp"
-#include "cli/record_output.hpp"
-#include "cli/recordings.hpp"
 #include "cli/terminal.hpp"
-#include "cli/unknowns.hpp"
 #include "io/command_files.hpp"
+#include "recognition/record_json.hpp"
+#include "recognition/recordings.hpp"
+#include "recognition/unknowns.hpp"
 
 namespace palpate::cli {
 
@@ -26,22 +28,22 @@ struct PlanArguments {
   std::string recording;
   std::string candidates;
   std::string goal = "both";
-  UnknownFlags touches;
   std::size_t samples = PlanOptions{}.samples;
   std::uint64_t seed = 0;
-  RecognitionFlags recognition;
+  Request request;
+  bool verbose = false;
   std::string json;
   std::string png;
 };
 
 /// Throws Error where an output cannot be written, before any work is done.
-void check_outputs(const PlanArguments& options, const Scene& scene, const RecognitionTask& task) {
+void check_outputs(const PlanArguments& options, const Request& request) {
   CommandFiles files;
   files.reads("RECORDING", options.recording);
   if (options.candidates != candidate_grid_word && options.candidates != options.recording) {
     files.reads("--candidates", options.candidates);
   }
-  add_recognition_files(options.recognition, scene, task, files);
+  add_recognition_files(request, files);
   if (!options.json.empty()) {
     files.writes("--json", options.json, CommandFiles::Dash::stream);
   }
@@ -75,27 +77,30 @@ void write_results(const PlanArguments& options, const Plan& plan, const Recogni
 }
 
 void plan_touches(const PlanArguments& options) {
-  const PlanRequest request = plan_request(options.goal, options.candidates, options.samples,
-                                           options.seed, options.recognition.tell);
-  const Scene scene = scene_of(options.recognition);
+  const PlanRequest wanted =
+      plan_request(options.goal, options.candidates, options.samples, options.seed, tell_on_stderr);
+  const Request request = complete(options.request);
   std::vector<Recording> recordings = read_touch_recordings({options.recording});
   Recording& recording = recordings.front();
-  replace_array(scene, options.recognition.scene, recording.path, recording.elements(),
-                recording.elements_mm);
-  const Unknown unknown = list_unknowns(options.touches, recordings).front();
-  RecognitionTask task = task_of(options.recognition, scene, recording.pressure_unit,
-                                 recording.path, reach_mm(unknown.touches), {.why = plan_needs});
+  replace_array(request, recording.path, recording.elements(), recording.elements_mm);
+  const Unknown unknown = list_unknowns(request, recordings).front();
+  DeviceInWaiting device_in_waiting(request.device);
+  const RecognitionTask task = resolve(request, {.pressure_unit = recording.pressure_unit,
+                                                 .source = recording.path,
+                                                 .reach_mm = largest_reach_mm(unknown.touches),
+                                                 .need = {.why = plan_needs},
+                                                 .device = std::ref(device_in_waiting)});
   require_histogram(task);
-  check_outputs(options, scene, task);
-  Device device = open_device(options.recognition, scene);
-  Recogniser recogniser = open_recogniser(options.recognition, scene, device, task);
-  const Plan plan = plan_touch(recogniser, task, unknown, request);
+  check_outputs(options, request);
+  Device& device = device_in_waiting();
+  Recogniser recogniser = open_telling(device, task);
+  const Plan plan = plan_touch(recogniser, task, unknown, wanted);
   if (const auto words = unresolved_words(task, recogniser.lattice(), unknown.touches);
       !words.empty()) {
     tell_on_stderr(words);
   }
   write_results(options, plan, task, unknown.touches, device);
-  if (options.recognition.verbose) {
+  if (options.verbose) {
     print_engine(&device, recogniser, task);
   }
 }
@@ -111,7 +116,7 @@ void add_plan(CLI::App& app) {
   const auto options = std::make_shared<PlanArguments>();
   command->add_option("RECORDING", options->recording, "Recording of the touches so far (HDF5)")
       ->required();
-  add_recognition_flags(*command, options->recognition);
+  add_recognition_flags(*command, options->request, options->verbose);
   hide_other_filters(*command);
   command
       ->add_option(
@@ -125,10 +130,10 @@ void add_plan(CLI::App& app) {
       ->add_option("--goal", options->goal,
                    "What the touch shall tell: identity, pose (once the object is known) or both")
       ->capture_default_str();
-  command->add_option("--frames", options->touches.frames,
-                      "Use the touches A to B - 1 of the recording, counted from 0, as A:B");
+  add_frames_flag(*command, options->request.frames,
+                  "Use the touches A to B - 1 of the recording, counted from 0, as A:B");
   command
-      ->add_option("--touches", options->touches.touches,
+      ->add_option("--touches", options->request.touches,
                    "Use the first N touches of the recording [default: all]")
       ->check(require_whole_number);
   command

@@ -8,12 +8,12 @@
 #include <fmt/format.h>
 
 #include "cli/planned_touch.hpp"
-#include "cli/record_output.hpp"
 #include "cli/record_table.hpp"
 #include "cli/sheet.hpp"
 #include "cli/step_words.hpp"
 #include "cli/text_table.hpp"
 #include "model/bounding_box.hpp"
+#include "recognition/record_json.hpp"
 
 namespace palpate::cli {
 

@@ -1,28 +1,120 @@
 #include "cli/recognition_flags.hpp"
 
+#include <algorithm>
+#include <utility>
+#include <variant>
+
+#include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
 #include "cli/options.hpp"
+#include "model/number_text.hpp"
+#include "model/option_words.hpp"
+#include "recognition/option_text.hpp"
 
 namespace palpate::cli {
 
-void add_recognition_flags(CLI::App& command, RecognitionFlags& flags) {
-  command.add_option("--maps", flags.maps, "Maps of the known objects, or folders of maps");
+namespace {
+
+std::variant<double, Automatic> none_of(const std::string& text) {
+  if (text == "auto") {
+    return Automatic{};
+  }
+  const std::optional<double> weight = number_of(text);
+  if (!weight || !(*weight > 0.0)) {
+    refuse_flag("--none", text,
+                "give a weight above 0, or no value; recordings stand before the flags");
+  }
+  return *weight;
+}
+
+void add_filter_flags(CLI::App& command, Request& request) {
+  command.add_option_function<std::string>(
+      "--filter", [&](const std::string& name) { request.filter = filter_named(name); },
+      fmt::format(
+          "histogram: evaluates every pose bin; bounded: the same bins, but evaluates only those "
+          "that matter and proves how little the others can; particles: the paper's particle "
+          "filter; auto: bounded for more than {} bins of all objects together, else histogram. "
+          "Bounded refuses --touch-sd-*, --slip-sd-*, --posterior, --memory-mib, --none with "
+          "--gamma "
+          "0, and plans; auto then takes the histogram [default: auto]",
+          most_histogram_bins));
+  command.add_option("--tolerance", request.tolerance,
+                     "With --filter bounded: largest share of the belief that may be left "
+                     "unproven; the search goes on until it is reached. Rounding, which counts as "
+                     "unproven, may exceed a tolerance below about 1e-8 [default: 1e-6]");
+  command.add_option("--budget-ms", request.budget_ms,
+                     "With --filter bounded: milliseconds after which each estimate's search ends "
+                     "and reports what it has proven by then [default: none]");
+  command.add_option("--evidence-nats", request.evidence_nats,
+                     "With --filter bounded: also bounds the log evidence of every object, however "
+                     "unlikely, within this many nats [default: only the tolerance counts]");
+  command
+      .add_option("--particles", request.particles,
+                  "Number of particles of all objects together, up to 1,000,000 [default: 10000]")
+      ->check(require_whole_number);
+  command.add_option_function<std::string>(
+      "--resampling", [&](const std::string& name) { request.resampling = resampling_named(name); },
+      "How particles are drawn: multinomial or systematic [default: multinomial]");
+  command.add_flag("--augmented", request.augmented,
+                   "Augmented MCL: add random particles while the touches fit worse than before");
+  command.add_option("--seed", request.seed, "Seed of the particles' random numbers [default: 0]")
+      ->check(require_whole_number);
+  command
+      .add_option(
+          "--memory-mib", request.memory_mib,
+          "Limit of the histogram's device memory, MiB; less memory costs time, no accuracy "
+          "[default: none]")
+      ->check(require_whole_number);
+}
+
+void add_uncertainty_flags(CLI::App& command, Request& request) {
+  command.add_option("--touch-sd-mm", request.touch_sd_mm,
+                     "The robot's repeatability: standard deviation of the sensor's true position "
+                     "about the reported one, along x and along y, mm. Independent from touch to "
+                     "touch [default: the sensor model's, with the histogram; else 0, exact]");
+  command.add_option("--touch-sd-deg", request.touch_sd_deg,
+                     "The same of the sensor's angle, degrees [default: as for --touch-sd-mm]");
+  command.add_option("--slip-sd-mm", request.slip_sd_mm,
+                     "Standard deviation of how far the object moves between two touches, along x "
+                     "and along y, mm; the motion noise of particles [default: 0, at rest; "
+                     "particles: 1]");
+  command.add_option("--slip-sd-deg", request.slip_sd_deg,
+                     "The same of how far the object turns about its middle, degrees [default: 0; "
+                     "particles: 5.73, which is 0.1 rad]");
+  command
+      .add_option_function<std::string>(
+          "--none", [&](const std::string& weight) { request.none = none_of(weight); },
+          "Adds \"(none)\", an object that was never learned, with prior weight W; a map "
+          "has the weight 1. Without W, (none) has the sum of the maps' weights: even odds "
+          "before the first touch. (none) explains each touch by a piece of some known "
+          "object; the pieces need not belong to one pose. One touch cannot tell: after it, "
+          "the odds are about the prior's, unless a sensor model has learned what a touch of no "
+          "known object is like [default: no (none)]")
+      ->type_name("W")
+      ->expected(0, 1)
+      ->default_str("auto");
+}
+
+}  // namespace
+
+void add_recognition_flags(CLI::App& command, Request& request, bool& verbose) {
+  command.add_option("--maps", request.maps, "Maps of the known objects, or folders of maps");
   command.add_option(
-      "--scene", flags.scene,
+      "--scene", request.scene,
       "Scene file (YAML); its keys are array, sensor_model, threshold, ratio, gamma, prior, "
       "touch_sd, slip_sd, none, objects, region, bins, filter and device, and a flag overrides its "
       "key");
   command.add_option(
-      "--sensor-model", flags.sensor_model,
+      "--sensor-model", request.sensor_model,
       "What 'palpate calibrate' learned about the sensor (YAML): the threshold, the ratio, gamma "
       "and the touches' standard deviations, which flags and scene keys override; a likelihood "
       "table in the place of gamma and prior; and how sure to be: the temperature, press features, "
       "and whether the object was learned at all. Without an own --filter, standard deviations "
       "above 0 take the histogram; --filter bounded and particles leave them out "
       "[default: no model]");
-  command.add_option(
-      "--bins", flags.bins,
+  add_bins_flag(
+      command, request,
       "Pose bins per object along x, y and theta, as 25x25x16; auto: as many as the refined pose "
       "needs, in steps of 0.6 times the maps' cell or 1.2 times the sensor's spread, whichever is "
       "larger; fine: also as the mode needs, in steps of 0.6 times the larger of both. Auto and "
@@ -31,39 +123,111 @@ void add_recognition_flags(CLI::App& command, RecognitionFlags& flags) {
       "pivot "
       "fits the largest array of all RECORDINGs [default: auto, or 25x25x16 where "
       "a range or a pivot is given]");
-  command.add_option("--x-mm", flags.x_mm,
-                     "Range of the pivot's x in the object frame, mm, as --x-mm=-10:10 [default: "
-                     "every place of an array that touches an object of the maps, or -10:10 where "
-                     "counts of --bins, another range or a pivot X,Y is given]");
-  command.add_option("--y-mm", flags.y_mm, "Range of the pivot's y [default: as for --x-mm]");
-  command.add_option(
-      "--theta-deg", flags.theta_deg,
+  add_range_flag(command, "--x-mm", request.x_mm,
+                 "Range of the pivot's x in the object frame, mm, as --x-mm=-10:10 [default: "
+                 "every place of an array that touches an object of the maps, or -10:10 where "
+                 "counts of --bins, another range or a pivot X,Y is given]");
+  add_range_flag(command, "--y-mm", request.y_mm,
+                 "Range of the pivot's y [default: as for --x-mm]");
+  add_range_flag(
+      command, "--theta-deg", request.theta_deg,
       "Range of theta, degrees, at most 360 wide [default: 0:360]; 30:30 fixes theta at 30");
-  command.add_option(
-      "--pivot-mm", flags.pivot_mm,
+  add_pivot_flag(
+      command, request,
       "Point X,Y in the robot frame, mm, about which theta turns; the bins' x and y are the "
       "point's coordinates in the object frame. auto: the array's centre at the first touch of "
       "each unknown with an element in contact [default: auto, or 0,0 where counts of --bins or a "
       "range is given]");
-  command.add_option("--prior", flags.prior,
+  command.add_option("--prior", request.prior,
                      "Probability that an unseen cell is occupied; refused beside a sensor model "
                      "with a table [default: the maps' own]");
-  command.add_option("--gamma", flags.gamma,
+  command.add_option("--gamma", request.gamma,
                      "Probability that an element's contact class is random; refused beside a "
                      "sensor model with a table [default: the sensor model's, or 0.1]");
-  add_uncertainty_flags(command, flags.uncertainty);
+  add_uncertainty_flags(command, request);
   command.add_option(
-      "--threshold", flags.threshold,
+      "--threshold", request.threshold,
       "Contact threshold, in the recording's pressure unit [default: the sensor model's, or 2 kPa; "
       "required for raw pressure without a model]");
-  command.add_option("--ratio", flags.ratio,
+  command.add_option("--ratio", request.ratio,
                      "Threshold as a fraction of the touch's largest pressure [default: the sensor "
                      "model's, or 0.3]");
-  add_filter_flags(command, flags.filter);
-  command.add_option("--device", flags.device, "Vulkan device, by index or a part of its name");
-  command.add_flag("--verbose", flags.verbose,
+  add_filter_flags(command, request);
+  command.add_option("--device", request.device, "Vulkan device, by index or a part of its name");
+  command.add_flag("--verbose", verbose,
                    "Say on standard error how the device works: its memory, the likelihood's path, "
                    "the lattice, the seconds it took");
+}
+
+void hide_other_filters(CLI::App& command) {
+  for (const char* flag : {"--filter", "--tolerance", "--budget-ms", "--evidence-nats",
+                           "--particles", "--resampling", "--augmented", "--seed"}) {
+    command.get_option(flag)->group("");
+  }
+}
+
+void add_unknown_flags(CLI::App& command, Request& request) {
+  add_frames_flag(command, request.frames,
+                  "Use the touches A to B - 1 of every recording, counted from 0, as A:B");
+  command
+      .add_option("--touches", request.touches,
+                  "Use the first N touches of every recording [default: all]")
+      ->check(require_whole_number);
+  command.add_flag("--each-frame", request.each_frame,
+                   "Recognise every touch by itself, as an unknown object of its own");
+}
+
+void add_bins_flag(CLI::App& command, Request& request, const std::string& help) {
+  command.add_option_function<std::string>(
+      "--bins",
+      [&](const std::string& text) {
+        if (text == "auto" || text == "fine") {
+          request.bins = text == "fine" ? BinWidth::fine : BinWidth::automatic;
+        } else {
+          request.bins = parse_bins("--bins", text);
+        }
+      },
+      help);
+}
+
+void add_range_flag(CLI::App& command, const std::string& flag,
+                    std::optional<std::array<double, 2>>& range, const std::string& help) {
+  command.add_option_function<std::string>(
+      flag, [flag, &range](const std::string& text) { range = parse_range(flag, text); }, help);
+}
+
+void add_pivot_flag(CLI::App& command, Request& request, const std::string& help) {
+  command.add_option_function<std::string>(
+      "--pivot-mm",
+      [&](const std::string& text) {
+        if (text == "auto") {
+          request.pivot_mm = Automatic{};
+        } else {
+          request.pivot_mm = parse_point("--pivot-mm", text);
+        }
+      },
+      help);
+}
+
+void add_frames_flag(CLI::App& command, std::optional<Frames>& frames, const std::string& help) {
+  command.add_option_function<std::string>(
+      "--frames", [&](const std::string& text) { frames = parse_frames("--frames", text); }, help);
+}
+
+void tell_on_stderr(const std::string& sentence) {
+  fmt::print(stderr, "palpate: {}\n", in_flags(sentence));
+}
+
+Recogniser open_telling(Device& device, const RecognitionTask& task) {
+  Recogniser recogniser = open_recogniser(device, task);
+  std::ranges::for_each(task.remarks, tell_on_stderr);
+  return recogniser;
+}
+
+void add_recognition_files(const Request& request, CommandFiles& files) {
+  for (const auto& [option, file] : files_of(request)) {
+    files.reads("--" + option, file);
+  }
 }
 
 }  // namespace palpate::cli

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <set>
@@ -14,19 +15,20 @@
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
+#include "cli/engine_words.hpp"
 #include "cli/options.hpp"
 #include "cli/progress.hpp"
 #include "cli/recognition_flags.hpp"
-#include "cli/record_output.hpp"
 #include "cli/record_table.hpp"
-#include "cli/recordings.hpp"
 #include "cli/sheet.hpp"
 #include "cli/terminal.hpp"
 #include "cli/touch_sd_output.hpp"
-#include "cli/unknowns.hpp"
 #include "io/atomic_file.hpp"
 #include "io/command_files.hpp"
 #include "palpate/files.hpp"
+#include "recognition/record_json.hpp"
+#include "recognition/recordings.hpp"
+#include "recognition/unknowns.hpp"
 
 namespace palpate::cli {
 
@@ -34,9 +36,8 @@ namespace {
 
 struct RecognizeArguments {
   std::vector<std::string> recordings;
-  UnknownFlags unknowns;
-  RecognitionFlags recognition;
-  bool trace = false;
+  Request request;
+  bool verbose = false;
   std::string json;
   std::string posterior;
   std::string png;
@@ -45,10 +46,10 @@ struct RecognizeArguments {
 
 HistogramNeed histogram_need(const RecognizeArguments& options) {
   if (options.fit_touch_sd) {
-    return {"--fit-touch-sd", touch_sd_fit_needs};
+    return {"fit-touch-sd", touch_sd_fit_needs};
   }
   if (!options.posterior.empty()) {
-    return {"--posterior", "holds the log-likelihood of every bin, and bounds evaluate few"};
+    return {"posterior", "holds the log-likelihood of every bin, and bounds evaluate few"};
   }
   return {};
 }
@@ -60,13 +61,13 @@ std::filesystem::path png_path(const RecognizeArguments& options, const Unknown&
 }
 
 /// Throws Error where an output cannot be written, before any work is done.
-void check_outputs(const RecognizeArguments& options, const Scene& scene,
+void check_outputs(const RecognizeArguments& options, const Request& request,
                    const RecognitionTask& task, const std::vector<Unknown>& unknowns) {
   CommandFiles files;
   for (const std::string& recording : options.recordings) {
     files.reads("RECORDING", recording);
   }
-  add_recognition_files(options.recognition, scene, task, files);
+  add_recognition_files(request, files);
   if (!options.posterior.empty()) {
     if (!traits_of(task.filter).every_bin) {
       refuse_flag("--posterior", options.posterior,
@@ -134,10 +135,8 @@ void write_results(const RecognizeArguments& options, const RecognitionTask& tas
 }
 
 /// The whole command with --fit-touch-sd.
-void fit_touch_sd(const RecognizeArguments& options, const Scene& scene,
-                  const RecognitionTask& task, std::span<const Recording> recordings,
-                  std::span<const Unknown> unknowns) {
-  Device device = open_device(options.recognition, scene);
+void fit_touch_sd(const RecognizeArguments& options, Device& device, const RecognitionTask& task,
+                  std::span<const Recording> recordings, std::span<const Unknown> unknowns) {
   TouchSdFit fit;
   {
     Progress progress("fitting touch-sd");
@@ -182,47 +181,51 @@ class UnknownsProgress {
 };
 
 void recognize(const RecognizeArguments& options) {
-  const Scene scene = scene_of(options.recognition);
+  const Request request = complete(options.request);
   std::vector<Recording> recordings = read_touch_recordings(options.recordings);
   for (Recording& recording : recordings) {
-    replace_array(scene, options.recognition.scene, recording.path, recording.elements(),
-                  recording.elements_mm);
+    replace_array(request, recording.path, recording.elements(), recording.elements_mm);
   }
-  const std::vector<Unknown> unknowns = list_unknowns(options.unknowns, recordings);
+  const std::vector<Unknown> unknowns = list_unknowns(request, recordings);
   const Recording& first = recordings.front();
-  RecognitionTask task = task_of(options.recognition, scene, first.pressure_unit, first.path,
-                                 reach_mm(recordings), histogram_need(options));
-  if (auto* histogram = std::get_if<HistogramOptions>(&task.filter)) {
-    histogram->still_array = array_is_still(unknowns);
-  }
+  std::optional<UnknownsProgress> progress;
+  DeviceInWaiting device_in_waiting(request.device);
+  const RecognitionTask task = resolve(request, {.pressure_unit = first.pressure_unit,
+                                                 .source = first.path,
+                                                 .reach_mm = largest_reach_mm(recordings),
+                                                 .still_array = array_is_still(unknowns),
+                                                 .need = histogram_need(options),
+                                                 // Between the steps of bounds' searches, which may
+                                                 // take minutes.
+                                                 .cancel_point =
+                                                     [&] {
+                                                       if (progress) {
+                                                         progress->show();
+                                                       }
+                                                     },
+                                                 .device = std::ref(device_in_waiting)});
   if (options.fit_touch_sd) {
-    refuse_beside_fit(std::array<OtherFlag, 4>{{{"--each-frame", options.unknowns.each_frame},
-                                                {"--trace", options.trace},
+    refuse_beside_fit(std::array<OtherFlag, 4>{{{"--each-frame", request.each_frame},
+                                                {"--trace", request.trace},
                                                 {"--posterior", !options.posterior.empty()},
                                                 {"--png", !options.png.empty()}}},
                       task);
   }
-  check_outputs(options, scene, task, unknowns);
+  check_outputs(options, request, task, unknowns);
+  Device& device = device_in_waiting();
   if (options.fit_touch_sd) {
-    fit_touch_sd(options, scene, task, recordings, unknowns);
+    fit_touch_sd(options, device, task, recordings, unknowns);
     return;
   }
-  Device device = open_device(options.recognition, scene);
   std::string unresolved;
-  std::optional<UnknownsProgress> progress(unknowns.size());
-  // Bounds call it between the steps of their searches, which may take minutes.
-  task.cancel_point = [&] {
-    if (progress) {
-      progress->show();
-    }
-  };
-  Recogniser recogniser = open_recogniser(options.recognition, scene, device, task);
+  progress.emplace(unknowns.size());
+  Recogniser recogniser = open_telling(device, task);
   if (!options.png.empty()) {
     make_folder(options.png);
   }
 
   // The picture shows the identity after every touch, so it needs the trace.
-  const bool trace = options.trace || !options.png.empty();
+  const bool trace = request.trace || !options.png.empty();
   std::vector<RecognitionRecord> records;
   auto json = nlohmann::ordered_json::array();
   for (const Unknown& unknown : unknowns) {
@@ -233,7 +236,7 @@ void recognize(const RecognizeArguments& options) {
       unresolved = unresolved_words(task, recogniser.lattice(), unknown.touches);
     }
     if (!options.json.empty()) {
-      json.push_back(to_json(records.back(), task, device.name(), options.trace));
+      json.push_back(to_json(records.back(), task, device.name(), request.trace));
     }
     if (!options.png.empty()) {
       write_file(
@@ -246,7 +249,7 @@ void recognize(const RecognizeArguments& options) {
   progress.reset();
 
   if (!unresolved.empty()) {
-    options.recognition.tell(unresolved);
+    tell_on_stderr(unresolved);
   }
 
   const std::string json_text = text_of(json, 2);
@@ -256,14 +259,14 @@ void recognize(const RecognizeArguments& options) {
     fmt::print("{}", json_text);
   } else {
     const std::optional<int> columns = terminal_columns(STDOUT_FILENO);
-    if (options.trace) {
+    if (request.trace) {
       for (const RecognitionRecord& record : records) {
         fmt::print("{}\n", trace_table(record, task, columns));
       }
     }
     fmt::print("{}{}\n", result_table(records, task, columns), setup_words(device, task));
   }
-  if (options.recognition.verbose) {
+  if (options.verbose) {
     double seconds = 0.0;
     for (const RecognitionRecord& record : records) {
       seconds += record.seconds;
@@ -284,9 +287,9 @@ void add_recognize(CLI::App& app) {
   const auto options = std::make_shared<RecognizeArguments>();
   command->add_option("RECORDING", options->recordings, "Recordings of unknown objects (HDF5)")
       ->required();
-  add_recognition_flags(*command, options->recognition);
-  add_unknown_flags(*command, options->unknowns);
-  command->add_flag("--trace", options->trace, "Show the estimate after every touch");
+  add_recognition_flags(*command, options->request, options->verbose);
+  add_unknown_flags(*command, options->request);
+  command->add_flag("--trace", options->request.trace, "Show the estimate after every touch");
   command->add_option("--json", options->json, "Write the records as JSON; - is standard output");
   command->add_option("--posterior", options->posterior,
                       "Write the log-likelihood of every bin (HDF5); for one recording or frame");

@@ -9,6 +9,7 @@
 #include "cli/record_table.hpp"
 #include "cli/step_words.hpp"
 #include "cli/text_table.hpp"
+#include "recognition/record_json.hpp"
 
 namespace palpate::cli {
 

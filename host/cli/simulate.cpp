@@ -14,6 +14,7 @@
 #include "io/command_files.hpp"
 #include "palpate/files.hpp"
 #include "palpate/simulation.hpp"
+#include "recognition/option_text.hpp"
 
 namespace palpate::cli {
 

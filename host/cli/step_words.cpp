@@ -8,6 +8,7 @@
 #include "cli/options.hpp"
 #include "model/option_words.hpp"
 #include "model/printable.hpp"
+#include "recognition/record_json.hpp"
 
 namespace palpate::cli {
 
@@ -86,18 +87,6 @@ std::string truth_words(const RecognitionStep& step, const RecognitionTask& task
                          error_text(step.pose_error_mm()));
   }
   return words;
-}
-
-std::string verdict_text(Verdict verdict) {
-  switch (verdict) {
-    case Verdict::fits:
-      return "fits";
-    case Verdict::doubtful:
-      return "doubtful";
-    case Verdict::does_not_fit:
-      break;
-  }
-  return "does not fit";
 }
 
 std::string fit_words(const RecognitionStep& step) {

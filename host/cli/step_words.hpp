@@ -40,8 +40,6 @@ std::string result_words(const RecognitionStep& step, const RecognitionTask& tas
 /// step's pose; "" where nothing is known.
 std::string truth_words(const RecognitionStep& step, const RecognitionTask& task);
 
-/// "fits", "doubtful" or "does not fit".
-std::string verdict_text(Verdict verdict);
 /// What a table says of the fit: "fits", "doubtful", "no fit" or "contradicted", and the
 /// probability that the object was learned where a touch tells it: "fits, known 0.83"; "" without a
 /// fit.

@@ -15,6 +15,7 @@ struct NamedOption {
   std::string_view name;
   std::string_view separator;  ///< between name and value: "", " " or "="
   std::string_view value;
+  bool heads;  ///< a colon follows: the message is about the option
 };
 
 /// The message with each option in the words of `say`; what stands between other backticks stays.
@@ -37,9 +38,9 @@ std::string with_options(std::string_view message,
       message.remove_prefix(1);
       continue;
     }
-    text +=
-        say({inside.substr(0, name), separator, inside.substr(std::min(name + 1, inside.size()))});
     message.remove_prefix(end + 1);
+    text += say({inside.substr(0, name), separator, inside.substr(name + separator.size()),
+                 message.starts_with(':')});
   }
   return text;
 }
@@ -71,7 +72,7 @@ std::string in_keywords(std::string_view message) {
   return with_options(message, [](const NamedOption& option) {
     std::string text(option.name);
     std::ranges::replace(text, '-', '_');
-    return text + "=" + python_value(option.value);
+    return option.heads && option.value.empty() ? text : text + "=" + python_value(option.value);
   });
 }
 

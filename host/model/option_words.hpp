@@ -11,7 +11,7 @@ namespace palpate {
 /// In flags of the command: --bins, --filter bounded, --x-mm=-5:5.
 std::string in_flags(std::string_view message);
 
-/// In keyword arguments of Python: bins=, filter='bounded', x_mm=(-5, 5).
+/// In keyword arguments of Python: bins=, filter='bounded', x_mm=(-5, 5); bins before a colon.
 std::string in_keywords(std::string_view message);
 
 using OptionWords = std::string (*)(std::string_view message);

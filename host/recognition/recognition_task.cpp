@@ -91,8 +91,7 @@ std::optional<BoundedOptions> bounded_instead(const HistogramOptions& histogram)
 }
 
 std::optional<CoarsenedBins> settle_bins(const Device& device, RecognitionTask& task) {
-  const std::optional<BinWidth> width = std::exchange(task.bin_width, {});
-  if (!width) {
+  if (!task.bin_width) {
     return {};
   }
   const auto* histogram = std::get_if<HistogramOptions>(&task.filter);
@@ -107,7 +106,8 @@ std::optional<CoarsenedBins> settle_bins(const Device& device, RecognitionTask& 
       most = std::max(most, static_cast<std::int64_t>(task.hypotheses.size()));
     }
   }
-  const BalancedLattice chosen = balanced_lattice(task.lattice(), task.hypotheses, most, *width);
+  const BalancedLattice chosen =
+      balanced_lattice(task.lattice(), task.hypotheses, most, *task.bin_width);
   task.lattice() = chosen.lattice;
   return chosen.coarsened ? std::optional(CoarsenedBins{chosen.step_mm, most}) : std::nullopt;
 }

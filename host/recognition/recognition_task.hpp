@@ -43,11 +43,11 @@ struct RecognitionTask {
   /// [hypothesis] the occupied cells of its map; none where no cell is.
   std::vector<std::optional<Body>> bodies;
   std::vector<std::string> map_paths = {};  ///< [hypothesis] file of the map; empty without files
-  /// By which settle_bins() chooses the lattice's counts; none where the counts are given.
+  /// By which settle_bins() chooses the lattice's counts; none where these are given.
   std::optional<BinWidth> bin_width = {};
   /// settle_filter() chooses between the histogram and bounds.
   bool auto_filter = false;
-  /// What asked for the filter, such as a flag; "" where nothing did.
+  /// What asked for the filter, such as an option; "" where nothing did.
   std::string filter_asked_for_by = {};
   /// The pivot is the array's centre at the first touch of each unknown with an element In Contact.
   bool auto_pivot = false;
@@ -59,6 +59,7 @@ struct RecognitionTask {
   std::optional<Familiarity> familiarity = {};
   FitScale fit_scale = {};                  ///< of RecognitionStep::fit
   std::function<void()> cancel_point = {};  ///< BoundedOptions::cancel_point, where bounds search
+  std::vector<std::string> remarks = {};    ///< sentences for the user, once the filter is open
 };
 
 /// What to say where the task's bins are more than 1.5 times as wide as those of the sensor model;

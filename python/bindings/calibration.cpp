@@ -12,11 +12,11 @@
 
 #include "arrays.hpp"
 #include "bindings.hpp"
-#include "cli/map_files.hpp"
-#include "cli/recordings.hpp"
 #include "given_recordings.hpp"
 #include "learning/calibration_task.hpp"
 #include "palpate/files.hpp"
+#include "recognition/map_files.hpp"
+#include "recognition/recordings.hpp"
 #include "session.hpp"
 
 namespace palpate::python {
@@ -25,14 +25,14 @@ using namespace nb::literals;
 
 namespace {
 
-std::vector<NamedMap> named_maps(const cli::RecognitionFlags& flags) {
+std::vector<NamedMap> named_maps(const Request& request) {
   std::vector<NamedMap> maps;
-  for (const cli::GivenMap& given : flags.given_maps) {
+  for (const GivenMap& given : request.given_maps) {
     maps.push_back({given.name, given.hypothesis.map});
   }
-  if (flags.given_maps.empty()) {
-    for (const std::string& argument : flags.maps) {
-      for (const std::filesystem::path& file : cli::map_files(argument)) {
+  if (request.given_maps.empty()) {
+    for (const std::string& argument : request.maps) {
+      for (const std::filesystem::path& file : map_files(argument)) {
         maps.push_back({file.string(), read_map(file)});
       }
     }
@@ -41,30 +41,26 @@ std::vector<NamedMap> named_maps(const cli::RecognitionFlags& flags) {
 }
 
 SensorCalibration calibrate(const GivenRecordings& given, const Request& request,
-                            CalibrationRequest wanted, std::shared_ptr<Session> session,
+                            CalibrationRequest wanted, const std::shared_ptr<Session>& session,
                             Call& call) {
   constexpr double calibrating = 0.5;  // of the time, where touches' poses are fitted
   const std::vector<Recording> recordings = given.read();
-  const auto frames = cli::frames_of(request.unknowns);
   std::vector<std::array<std::size_t, 2>> touches;
   for (const Recording& recording : recordings) {
-    const auto [begin, end] = cli::select(recording, frames);
+    const auto [begin, end] = selected_touches(recording, request.frames);
     touches.push_back({begin, end});
   }
-  if (!cli::infers_region(request.flags, {})) {
-    wanted.bins = {cli::given_lattice(request.flags, {}), cli::has_auto_pivot(request.flags, {})};
+  if (!infers_region(request)) {
+    wanted.bins = {given_lattice(request), has_auto_pivot(request)};
   }
-  const CalibrationTask task =
-      calibration_task(wanted, recordings, touches, named_maps(request.flags));
+  const CalibrationTask task = calibration_task(wanted, recordings, touches, named_maps(request));
   const auto report = call.progress();
   const double share = task.known_poses() ? calibrating : 1.0;
   SensorCalibration calibration = calibrate_sensor(
       task.presses, task.maps, task.options, [&](double fraction) { report(share * fraction); });
   if (task.known_poses()) {
-    if (!session) {
-      session = std::make_shared<Session>(cli::open_device(request.flags, {}));
-    }
-    auto lock = session->lock(call);
+    const auto used = session_on(session, request.device);
+    auto lock = used->lock(call);
     add_touch_sd(lock.device(), task, calibration,
                  [&](double fraction) { report(share + (1.0 - share) * fraction); });
   }
@@ -76,7 +72,7 @@ SensorCalibration calibrate_python(const nb::list& recordings, const nb::list& m
                                    const std::shared_ptr<Session>& session,
                                    const Progress& progress) {
   const GivenRecordings given = given_recordings(recordings);
-  add_maps(maps, request.flags);
+  add_maps(maps, request);
   return run({}, progress,
              [=](Call& call) { return calibrate(given, request, wanted, session, call); });
 }
@@ -181,8 +177,9 @@ void bind_calibration(nb::module_& module) {
                 ? fmt::format(", {} of {} touches right", self.after->right, self.after->records)
                 : "");
       });
-  nb::class_<CalibrationRequest>(module, "CalibrationFlags",
-                                 "The flags of `palpate calibrate` that recognition has not.")
+  nb::class_<CalibrationRequest>(
+      module, "CalibrationRequest",
+      "What is asked of a calibration beside a Request's maps, bins and frames.")
       .def(nb::init<>())
       .def_rw("unposed", &CalibrationRequest::unposed)
       .def_rw("threshold", &CalibrationRequest::threshold)
@@ -191,14 +188,14 @@ void bind_calibration(nb::module_& module) {
       .def_rw("levels", &CalibrationRequest::levels)
       .def_rw("max_maps", &CalibrationRequest::max_maps)
       .def_rw("gives_bins", &CalibrationRequest::gives_bins);
-  module.def("calibrate_as_flagged", &calibrate_python, "recordings"_a, "maps"_a, "flags"_a,
-             "calibration"_a, "device"_a = nb::none(), "progress"_a = nb::none(),
-             nb::sig("def calibrate_as_flagged(recordings: list[Recording | str], maps: "
-                     "list[OccupancyGrid | Hypothesis | str], flags: RecognitionFlags, "
-                     "calibration: CalibrationFlags, device: Device | None = None, progress: "
+  module.def("calibrate", &calibrate_python, "recordings"_a, "maps"_a, "request"_a, "calibration"_a,
+             "device"_a = nb::none(), "progress"_a = nb::none(),
+             nb::sig("def calibrate(recordings: list[Recording | str], maps: "
+                     "list[OccupancyGrid | Hypothesis | str], request: Request, "
+                     "calibration: CalibrationRequest, device: Device | None = None, progress: "
                      "collections.abc.Callable[[float], object] | None = None) -> "
                      "SensorCalibration"),
-             "The calibration that flags ask for; of `flags` the maps, bins, frames and device.");
+             "The calibration; of the request count the maps, bins, frames and device.");
 }
 
 }  // namespace palpate::python

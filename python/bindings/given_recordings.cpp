@@ -4,20 +4,21 @@
 
 #include <fmt/format.h>
 
-#include "cli/recordings.hpp"
 #include "palpate/error.hpp"
+#include "recognition/recordings.hpp"
+#include "recognition/unknowns.hpp"
 #include "touches.hpp"
 
 namespace palpate::python {
 
 std::vector<Recording> GivenRecordings::read() const {
-  std::vector<Recording> read_files = cli::read_touch_recordings(files);
+  std::vector<Recording> read_files = read_touch_recordings(files);
   std::vector<Recording> all;
   auto file = read_files.begin();
   for (std::size_t i = 0; i < size; ++i) {
     const auto given = in_memory.find(i);
     all.push_back(given == in_memory.end() ? std::move(*file++) : given->second);
-    cli::require_touches(all.back(), all.front());
+    require_touches(all.back(), all.front());
   }
   return all;
 }
@@ -43,13 +44,12 @@ GivenRecordings given_recordings(const nb::list& items) {
   return recordings;
 }
 
-Subject subject_of(const GivenRecordings& recordings, const Request& request) {
-  Subject subject{cli::scene_of(request.flags), recordings.read(), {}};
+Subject subject_of(const GivenRecordings& recordings, const Request& given) {
+  Subject subject{complete(given), recordings.read(), {}};
   for (Recording& recording : subject.recordings) {
-    cli::replace_array(subject.scene, request.flags.scene, recording.path, recording.elements(),
-                       recording.elements_mm);
+    replace_array(subject.request, recording.path, recording.elements(), recording.elements_mm);
   }
-  subject.unknowns = cli::list_unknowns(request.unknowns, subject.recordings);
+  subject.unknowns = list_unknowns(subject.request, subject.recordings);
   return subject;
 }
 

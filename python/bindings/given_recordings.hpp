@@ -5,7 +5,6 @@
 #include <string>
 #include <vector>
 
-#include "palpate/scene.hpp"
 #include "recognition/recognition_record.hpp"
 #include "request.hpp"
 
@@ -18,7 +17,7 @@ struct GivenRecordings {
   std::map<std::size_t, Recording> in_memory;
   std::size_t size = 0;
 
-  /// Throws Error as cli::read_touch_recordings() does.
+  /// Throws Error as read_touch_recordings() does.
   std::vector<Recording> read() const;
 };
 /// Throws Error where there are none.
@@ -26,12 +25,12 @@ GivenRecordings given_recordings(const nb::list& items);
 
 /// What a request is about.
 struct Subject {
-  Scene scene;
+  Request request;  ///< completed
   std::vector<Recording> recordings;
   std::vector<Unknown> unknowns;  ///< views into the recordings
 };
-/// Reads the scene and the recordings, with the scene's array, and selects the unknowns. Throws
-/// Error.
-Subject subject_of(const GivenRecordings& recordings, const Request& request);
+/// Completes the request, reads the recordings, with the scene's array, and selects the unknowns.
+/// Throws Error.
+Subject subject_of(const GivenRecordings& recordings, const Request& given);
 
 }  // namespace palpate::python

@@ -52,8 +52,8 @@ std::tuple<ArrayRecording, std::vector<std::string>> import_python(
 }  // namespace
 
 void bind_import(nb::module_& module) {
-  nb::class_<ImportOptions>(module, "ImportFlags",
-                            "The flags of `palpate import`, as texts and numbers.")
+  nb::class_<ImportOptions>(module, "ImportOptions",
+                            "What is asked of import_tables(), as texts and numbers.")
       .def(nb::init<>())
       .def_rw("pressures", &ImportOptions::pressures)
       .def_rw("poses", &ImportOptions::poses)
@@ -70,7 +70,7 @@ void bind_import(nb::module_& module) {
       .def_rw("object", &ImportOptions::object)
       .def_rw("unposed", &ImportOptions::unposed);
   module.def(
-      "import_as_flagged", &import_python, "flags"_a, "elements_mm"_a = nb::none(),
+      "import_tables", &import_python, "options"_a, "elements_mm"_a = nb::none(),
       "The recording, and what is worth a warning. elements_mm [e, 2] stands for the array.");
 }
 

@@ -13,12 +13,14 @@
 #include <nanobind/stl/vector.h>
 
 #include "bindings.hpp"
-#include "cli/record_output.hpp"
 #include "estimate.hpp"
 #include "given_recordings.hpp"
 #include "model/option_words.hpp"
+#include "recognition/record_json.hpp"
+#include "recognition/resolve.hpp"
 #include "recognition/touch_plan.hpp"
 #include "recognition/touch_sd_fit.hpp"
+#include "recognition/unknowns.hpp"
 
 namespace palpate::python {
 
@@ -45,34 +47,37 @@ struct PlanWish {
   std::uint64_t seed;
 };
 
-Planned plan_next(const GivenRecordings& given, Request request, const PlanWish& wish,
-                  std::shared_ptr<Session> session, Call& call) {
+Planned plan_next(const GivenRecordings& given, const Request& request, const PlanWish& wish,
+                  const std::shared_ptr<Session>& session, Call& call) {
   Planned planned;
-  request.flags.tell = [&](const std::string& sentence) { planned.told.push_back(sentence); };
-  PlanRequest wanted =
-      plan_request(wish.goal, wish.candidates, wish.samples, wish.seed, request.flags.tell);
+  const auto tell = [&](const std::string& sentence) {
+    planned.told.push_back(in_keywords(sentence));
+  };
+  PlanRequest wanted = plan_request(wish.goal, wish.candidates, wish.samples, wish.seed, tell);
   if (!wish.poses.empty()) {
     wanted.candidates = wish.poses;
   }
   const Subject subject = subject_of(given, request);
   const Unknown& unknown = subject.unknowns.front();
-  RecognitionTask task =
-      cli::task_of(request.flags, subject.scene, subject.recordings.front().pressure_unit,
-                   unknown.recording, cli::reach_mm(unknown.touches), {.why = plan_needs});
+  const auto used = session_on(session, subject.request.device);
+  auto lock = used->lock(call);
+  const RecognitionTask task =
+      resolve(subject.request, {.pressure_unit = subject.recordings.front().pressure_unit,
+                                .source = unknown.recording,
+                                .reach_mm = largest_reach_mm(unknown.touches),
+                                .need = {.why = plan_needs},
+                                .cancel_point = [&call] { call.check(); },
+                                .device = [&]() -> const Device& { return lock.device(); }});
   require_histogram(task);
-  task.cancel_point = [&call] { call.check(); };
-  if (!session) {
-    session = std::make_shared<Session>(cli::open_device(request.flags, subject.scene));
-  }
-  auto lock = session->lock(call);
-  Recogniser recogniser = cli::open_recogniser(request.flags, subject.scene, lock.device(), task);
+  Recogniser recogniser = open_recogniser(lock.device(), task);
+  std::ranges::for_each(task.remarks, tell);
   planned.plan = plan_touch(recogniser, task, unknown, wanted, call.progress());
-  if (std::string words = cli::unresolved_words(task, recogniser.lattice(), unknown.touches);
+  if (const std::string words = unresolved_words(task, recogniser.lattice(), unknown.touches);
       !words.empty()) {
-    planned.told.push_back(std::move(words));
+    tell(words);
   }
-  planned.believed = cli::text_of(cli::to_json(planned.plan.record.last(), task));
-  planned.device = session->name();
+  planned.believed = palpate::text_of(to_json(planned.plan.record.last(), task, in_keywords));
+  planned.device = used->name();
   return planned;
 }
 
@@ -81,7 +86,7 @@ nb::tuple plan_python(const nb::list& recordings, const nb::list& maps, Request 
                       std::uint64_t seed, const std::shared_ptr<Session>& session,
                       const Progress& progress) {
   const GivenRecordings given = given_recordings(recordings);
-  add_maps(maps, request.flags);
+  add_maps(maps, request);
   PlanWish wish{goal, candidate_grid_word, {}, samples, seed};
   if (nb::isinstance<nb::str>(candidates)) {
     wish.candidates = nb::cast<std::string>(candidates);
@@ -123,33 +128,32 @@ nb::tuple plan_python(const nb::list& recordings, const nb::list& maps, Request 
 
 using Fitted = std::tuple<TouchSdFit, Told>;
 
-Fitted fit_recordings(const GivenRecordings& given, Request request,
-                      std::shared_ptr<Session> session, Call& call) {
-  Told told;
-  request.flags.tell = [&](const std::string& sentence) { told.push_back(sentence); };
+Fitted fit_recordings(const GivenRecordings& given, const Request& request,
+                      const std::shared_ptr<Session>& session, Call& call) {
   const Subject subject = subject_of(given, request);
   const Recording& first = subject.recordings.front();
-  RecognitionTask task =
-      cli::task_of(request.flags, subject.scene, first.pressure_unit, first.path,
-                   cli::reach_mm(subject.recordings), {"--fit-touch-sd", touch_sd_fit_needs});
-  if (auto* histogram = std::get_if<HistogramOptions>(&task.filter)) {
-    histogram->still_array = array_is_still(subject.unknowns);
-  }
+  const auto used = session_on(session, subject.request.device);
+  auto lock = used->lock(call);
+  const RecognitionTask task =
+      resolve(subject.request, {.pressure_unit = first.pressure_unit,
+                                .source = first.path,
+                                .reach_mm = largest_reach_mm(subject.recordings),
+                                .still_array = array_is_still(subject.unknowns),
+                                .need = {"fit-touch-sd", touch_sd_fit_needs},
+                                .device = [&]() -> const Device& { return lock.device(); }});
   require_fittable(task);
-  if (!session) {
-    session = std::make_shared<Session>(cli::open_device(request.flags, subject.scene));
-  }
-  auto lock = session->lock(call);
   TouchSdFit fit =
       fit_touch_sd(lock.device(), task, touched_objects(subject.recordings, subject.unknowns, task),
                    {}, call.progress());
+  Told told;
+  std::ranges::transform(task.remarks, std::back_inserter(told), in_keywords);
   return {std::move(fit), std::move(told)};
 }
 
 Fitted fit_python(const nb::list& recordings, const nb::list& maps, Request request,
                   const std::shared_ptr<Session>& session, const Progress& progress) {
   const GivenRecordings given = given_recordings(recordings);
-  add_maps(maps, request.flags);
+  add_maps(maps, request);
   return run({}, progress,
              [=](Call& call) { return fit_recordings(given, request, session, call); });
 }
@@ -176,20 +180,19 @@ void bind_touch_sd_fit(nb::module_& module) {
 }  // namespace
 
 void bind_plan(nb::module_& module) {
-  module.def("plan_as_flagged", &plan_python, "recordings"_a, "maps"_a, "flags"_a, "goal"_a,
-             "candidates"_a, "samples"_a, "seed"_a, "device"_a = nb::none(),
-             "progress"_a = nb::none(),
-             nb::sig("def plan_as_flagged(recordings: list[Recording | str], maps: "
-                     "list[OccupancyGrid | Hypothesis | str], flags: RecognitionFlags, goal: str, "
+  module.def("plan", &plan_python, "recordings"_a, "maps"_a, "request"_a, "goal"_a, "candidates"_a,
+             "samples"_a, "seed"_a, "device"_a = nb::none(), "progress"_a = nb::none(),
+             nb::sig("def plan(recordings: list[Recording | str], maps: "
+                     "list[OccupancyGrid | Hypothesis | str], request: Request, goal: str, "
                      "candidates: object, samples: int, seed: int, device: Device | None = None, "
                      "progress: collections.abc.Callable[[float], object] | None = None) -> "
                      "tuple[dict[str, typing.Any], list[str]]"),
              "The fields of a plan, and what is worth a warning.");
   bind_touch_sd_fit(module);
-  module.def("fit_as_flagged", &fit_python, "recordings"_a, "maps"_a, "flags"_a,
+  module.def("fit_touch_sd", &fit_python, "recordings"_a, "maps"_a, "request"_a,
              "device"_a = nb::none(), "progress"_a = nb::none(),
-             nb::sig("def fit_as_flagged(recordings: list[Recording | str], maps: "
-                     "list[OccupancyGrid | Hypothesis | str], flags: RecognitionFlags, device: "
+             nb::sig("def fit_touch_sd(recordings: list[Recording | str], maps: "
+                     "list[OccupancyGrid | Hypothesis | str], request: Request, device: "
                      "Device | None = None, progress: collections.abc.Callable[[float], object] | "
                      "None = None) -> tuple[TouchSdFit, list[str]]"),
              "The fit, and what is worth a warning.");

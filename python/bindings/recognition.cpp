@@ -1,13 +1,16 @@
+#include <algorithm>
+#include <iterator>
+
 #include <nanobind/stl/shared_ptr.h>
 #include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
 #include <nlohmann/json.hpp>
 
 #include "bindings.hpp"
-#include "cli/recognition_flags.hpp"
-#include "cli/record_output.hpp"
-#include "cli/recordings.hpp"
 #include "given_recordings.hpp"
+#include "recognition/record_json.hpp"
+#include "recognition/resolve.hpp"
+#include "recognition/unknowns.hpp"
 #include "request.hpp"
 #include "session.hpp"
 
@@ -58,22 +61,21 @@ struct Answer {
   std::vector<std::string> sentences;  ///< what is worth a warning
 };
 
-Answer recognize(const Subject& subject, const Request& request, Device& device, Call& call) {
+Answer recognize(const Subject& subject, Device& device, Call& call) {
   const std::function<void(double)> progress = call.progress();
   Answer answer;
-  cli::RecognitionFlags flags = request.flags;
-  flags.tell = [&](const std::string& sentence) {
-    answer.sentences.push_back(in_keywords(sentence));
-  };
+  const Request& request = subject.request;
   const std::vector<Unknown>& unknowns = subject.unknowns;
   const Recording& first = subject.recordings.front();
-  RecognitionTask task = cli::task_of(flags, subject.scene, first.pressure_unit, first.path,
-                                      cli::reach_mm(subject.recordings));
-  task.cancel_point = [&call] { call.check(); };
-  if (auto* histogram = std::get_if<HistogramOptions>(&task.filter)) {
-    histogram->still_array = array_is_still(unknowns);
-  }
-  Recogniser recogniser = cli::open_recogniser(flags, subject.scene, device, task);
+  const RecognitionTask task =
+      resolve(request, {.pressure_unit = first.pressure_unit,
+                        .source = first.path,
+                        .reach_mm = largest_reach_mm(subject.recordings),
+                        .still_array = array_is_still(unknowns),
+                        .cancel_point = [&call] { call.check(); },
+                        .device = [&device]() -> const Device& { return device; }});
+  Recogniser recogniser = open_recogniser(device, task);
+  std::ranges::transform(task.remarks, std::back_inserter(answer.sentences), in_keywords);
   std::string unresolved;
   for (std::size_t i = 0; i < unknowns.size(); ++i) {
     const auto show = [&](double fraction) {
@@ -82,9 +84,9 @@ Answer recognize(const Subject& subject, const Request& request, Device& device,
     const RecognitionRecord record = recognise(recogniser, task, unknowns[i], request.trace, show);
     record.require_steps();
     if (unresolved.empty()) {
-      unresolved = cli::unresolved_words(task, recogniser.lattice(), unknowns[i].touches);
+      unresolved = unresolved_words(task, recogniser.lattice(), unknowns[i].touches);
     }
-    answer.records.push_back(cli::to_json(record, task, device.name(), request.trace, in_keywords));
+    answer.records.push_back(to_json(record, task, device.name(), request.trace, in_keywords));
   }
   if (!unresolved.empty()) {
     answer.sentences.push_back(in_keywords(unresolved));
@@ -93,30 +95,26 @@ Answer recognize(const Subject& subject, const Request& request, Device& device,
 }
 
 std::tuple<nb::object, std::vector<std::string>> recognize_python(
-    const nb::list& recordings, const nb::list& maps, Request request,
+    const nb::list& recordings, const nb::list& maps, Request given,
     const std::shared_ptr<Session>& session, const Progress& progress) {
   GivenRecordings wanted = given_recordings(recordings);
-  add_maps(maps, request.flags);
-  const Answer answer =
-      run({}, progress, [wanted = std::move(wanted), request, session](Call& call) {
-        const Subject subject = subject_of(wanted, request);
-        // A device of its own is nobody else's.
-        const auto used =
-            session ? session
-                    : std::make_shared<Session>(cli::open_device(request.flags, subject.scene));
-        auto lock = used->lock(call);
-        return recognize(subject, request, lock.device(), call);
-      });
+  add_maps(maps, given);
+  const Answer answer = run({}, progress, [wanted = std::move(wanted), given, session](Call& call) {
+    const Subject subject = subject_of(wanted, given);
+    const auto used = session_on(session, subject.request.device);
+    auto lock = used->lock(call);
+    return recognize(subject, lock.device(), call);
+  });
   return {to_python(answer.records), answer.sentences};
 }
 
 }  // namespace
 
 void bind_recognition(nb::module_& module) {
-  module.def("recognize_as_flagged", &recognize_python, "recordings"_a, "maps"_a, "flags"_a,
+  module.def("recognize", &recognize_python, "recordings"_a, "maps"_a, "request"_a,
              "device"_a = nb::none(), "progress"_a = nb::none(),
-             nb::sig("def recognize_as_flagged(recordings: list[Recording | str], maps: "
-                     "list[OccupancyGrid | Hypothesis | str], flags: RecognitionFlags, device: "
+             nb::sig("def recognize(recordings: list[Recording | str], maps: "
+                     "list[OccupancyGrid | Hypothesis | str], request: Request, device: "
                      "Device | None = None, progress: collections.abc.Callable[[float], object] | "
                      "None = None) -> tuple[list[dict[str, typing.Any]], list[str]]"),
              "Records as in the JSON of `palpate recognize`, and what is worth a warning.");

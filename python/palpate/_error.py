@@ -6,8 +6,8 @@ from typing import Literal
 class Error(RuntimeError):
     """The one exception of Palpate.
 
-    Its text is one line, in the words of the command line, that names the file, the field, the
-    value and the remedy.
+    Its text is one line that names the file, the field, the value and the remedy, with options as
+    keyword arguments: bins=(25, 25, 16).
     """
 
     fault: Literal["input", "system"] = "input"

@@ -10,7 +10,7 @@ from . import _palpate
 from ._error import Error
 from ._palpate import Device, Hypothesis, PoseLattice, pose_error_mm
 from ._statistics import Errors, errors_over, median
-from .recognition import Record, flags_of
+from .recognition import Record, request_of
 
 _FEWEST_BINS = 1e3  # of the coarsest lattice; of a small region, a thirtieth of the finest one's
 _MOST_HISTOGRAM = 100_000_000  # bins of all objects
@@ -32,12 +32,12 @@ class Data:
 
     def open(self, **options: Any) -> "_palpate.OpenBatch":
         """The batch of all recordings, as `palpate batch` settles it."""
-        flags = flags_of(self.options | options)
+        request = request_of(self.options | options)
         threads = len(os.sched_getaffinity(0))
         head, self.entries, _ = _palpate.settle_batch(
-            self.paths, self.map_paths, flags, self.device, threads
+            self.paths, self.map_paths, request, self.device, threads
         )
-        return _palpate.OpenBatch.open(head, self.map_paths, flags, self.device, threads)
+        return _palpate.OpenBatch.open(head, self.map_paths, request, self.device, threads)
 
     def on(self, lattice: PoseLattice, filter: str) -> "_palpate.OpenBatch":
         """The same on given bins."""
@@ -56,16 +56,16 @@ class Data:
 
         The first recording is recognised once more before, which does not count: it warms up.
         """
-        lines: list[tuple[bytes, float]] = []
+        lines: list[tuple[bytes, bytes, float]] = []
         batch.recognize([self.entries[0][0]])
         for entry, _ in self.entries:
             if len(lines) < unknowns:
                 lines += batch.recognize([entry])[0]
-        records = [Record(json.loads(line)) for line, _ in lines[:unknowns]]
+        records = [Record(json.loads(line)) for line, _, _ in lines[:unknowns]]
         for record in records:
             if "error" in record:
                 raise Error(record["error"])
-        return records, median([seconds for _, seconds in lines[:unknowns]])
+        return records, median([seconds for _, _, seconds in lines[:unknowns]])
 
 
 def counts_of(lattice: PoseLattice) -> tuple[int, int, int]:

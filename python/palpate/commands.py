@@ -24,7 +24,7 @@ from ._palpate import (
     Truth,
 )
 from .many import Recognized
-from .recognition import RecognitionOptions, Record, flags_of
+from .recognition import RecognitionOptions, Record, request_of
 
 # The build writes the stubs by importing the package, where there is no NumPy.
 if TYPE_CHECKING:
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 _Path = str | bytes | os.PathLike[str] | os.PathLike[bytes]
 _Pair = tuple[float, float]
 _Maps = OccupancyGrid | Hypothesis | _Path | Iterable[OccupancyGrid | Hypothesis | _Path]
-_Flags = TypeVar("_Flags")
+_Options = TypeVar("_Options")
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,10 +97,10 @@ def plan(
     """
     if isinstance(candidates, (bytes, os.PathLike)):
         candidates = os.fsdecode(candidates)
-    fields, sentences = _palpate.plan_as_flagged(
+    fields, sentences = _palpate.plan(
         _recordings([recording]),
         _maps_of(maps),
-        _recognition_flags("plan", options, device),
+        _request("plan", options, device),
         goal,
         candidates,
         samples,
@@ -128,10 +128,10 @@ def fit_touch_sd(
     Raises Error in the words of the command, also beside touch_sd, slip_sd, none and a sensor model.
     What the command would say on standard error becomes a UserWarning.
     """
-    fit, sentences = _palpate.fit_as_flagged(
+    fit, sentences = _palpate.fit_touch_sd(
         _recordings(recordings),
         _maps_of(maps),
-        _recognition_flags("fit_touch_sd", options, device),
+        _request("fit_touch_sd", options, device),
         device if isinstance(device, Device) else None,
         progress,
     )
@@ -174,7 +174,7 @@ def calibrate(
     if isinstance(bins, str):
         raise TypeError(f"bins: {bins!r}; give counts, such as (25, 25, 16), or leave it out")
     region = {"bins": bins, "x_mm": x_mm, "y_mm": y_mm, "theta_deg": theta_deg, "pivot_mm": pivot_mm}
-    flags = {
+    asked = {
         "unposed": unposed,
         "threshold": threshold,
         "ratio": ratio,
@@ -184,11 +184,11 @@ def calibrate(
         "gives_bins": any(value is not None for value in region.values()),
     }
     named = None if isinstance(device, Device) else device
-    return _palpate.calibrate_as_flagged(
+    return _palpate.calibrate(
         _recordings(recordings),
         _maps_of(maps),
-        flags_of({**region, "frames": frames, "device": named}),
-        _filled(_palpate.CalibrationFlags(), calibrate, flags),
+        request_of({**region, "frames": frames, "device": named}),
+        _filled(_palpate.CalibrationRequest(), calibrate, asked),
         device if isinstance(device, Device) else None,
         progress,
     )
@@ -276,8 +276,8 @@ def import_tables(
         "rate": rate,
         "object": object,
     }
-    flags = _filled(_palpate.ImportFlags(), import_tables, options)
-    recording, sentences = _palpate.import_as_flagged(flags, elements_mm)
+    request = _filled(_palpate.ImportOptions(), import_tables, options)
+    recording, sentences = _palpate.import_tables(request, elements_mm)
     recording.truth = truth
     _warn(sentences)
     return recording
@@ -297,25 +297,25 @@ def _maps_of(given: _Maps) -> list[OccupancyGrid | Hypothesis | str]:
     ]
 
 
-def _recognition_flags(
+def _request(
     function: str, options: RecognitionOptions, device: Device | str | int | None
-) -> _palpate.RecognitionFlags:
+) -> _palpate.Request:
     for name in options:
         if name not in RecognitionOptions.__annotations__:
             raise TypeError(f"{function}() got an unexpected keyword argument '{name}'")
-    return flags_of({**options, "device": None if isinstance(device, Device) else device})
+    return request_of({**options, "device": None if isinstance(device, Device) else device})
 
 
-def _filled(flags: _Flags, function: Callable[..., Any], options: Mapping[str, Any]) -> _Flags:
-    """The flags with the options of a function; None leaves the default."""
+def _filled(request: _Options, function: Callable[..., Any], options: Mapping[str, Any]) -> _Options:
+    """The request with the options of a function; None leaves the default."""
     for name, value in options.items():
         if value is not None:
             try:
-                setattr(flags, name, value)
+                setattr(request, name, value)
             except TypeError:
                 wanted = inspect.formatannotation(function.__annotations__[name])
                 raise TypeError(f"{name}: {value!r}; give {wanted}") from None
-    return flags
+    return request
 
 
 def _warn(sentences: list[str]) -> None:

@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING, Any, Literal, cast
 from . import _palpate
 from ._error import Error
 from ._palpate import Device, DeviceInfo
-from .recognition import RecognitionOptions, Record, flags_of
+from .recognition import RecognitionOptions, Record, request_of
 
 if TYPE_CHECKING:
     from distributed import Client
@@ -61,10 +61,9 @@ class Recognized:
 
     #: Place of the unknown among all, in the order of the recordings.
     index: int
-    #: The record, whose warnings name options as flags; of a recording that cannot be recognised, one
-    #: with its `error`.
+    #: The record; of a recording that cannot be recognised, one with its `error`.
     record: Record
-    #: The record as a line of JSON: the bytes that `palpate batch` writes.
+    #: The record as a line of JSON: the bytes that `palpate batch` writes, with options as flags.
     line: bytes
     #: Wall time, s.
     seconds: float
@@ -106,7 +105,7 @@ def recognize_many(
         raise Error(f"chunk {chunk}: give at least 1")
     recordings = _paths(paths)
     asked = _asked(recordings, task)
-    asked.flags()  # refuses here what no worker could read
+    asked.request()  # refuses here what no worker could read
     if client is None:
         batch, entries, sentences = _settle(recordings, asked, _cores())
     else:
@@ -131,8 +130,8 @@ class _Asked:
     def maps(self) -> list[str]:
         return _paths(self.task.get("maps", ()))
 
-    def flags(self) -> _palpate.RecognitionFlags:
-        return flags_of({name: value for name, value in self.task.items() if name != "maps"})
+    def request(self) -> _palpate.Request:
+        return request_of({name: value for name, value in self.task.items() if name != "maps"})
 
     def require_folder(self) -> None:
         """Refuses relative paths where they would lead elsewhere."""
@@ -171,7 +170,8 @@ class _Batch:
 
 
 _Entry = tuple[bytes, int]  # a recording, and how many unknowns it holds
-_Lines = tuple[list[tuple[bytes, float]], str, str, str]  # with seconds; a sentence, device, host
+#: Lines, again in Python's words where these differ, and seconds; a sentence, device, host.
+_Lines = tuple[list[tuple[bytes, bytes, float]], str, str, str]
 _Done = Generator[tuple[int, _Lines], None, None]  # chunks by their index
 
 
@@ -244,8 +244,8 @@ def _results(chunks: Sequence[list[_Entry]], done: _Done) -> Generator[Recognize
             if sentence and not told:
                 told = True
                 warnings.warn(sentence, stacklevel=2)
-            for i, (line, seconds) in enumerate(lines, start=first[index]):
-                yield Recognized(i, Record(json.loads(line)), line, seconds, device, host)
+            for i, (line, own, seconds) in enumerate(lines, start=first[index]):
+                yield Recognized(i, Record(json.loads(own or line)), line, seconds, device, host)
 
 
 # What follows runs in the workers.
@@ -262,11 +262,11 @@ def _settle(
     recordings: list[str], asked: _Asked, threads: int | None = None
 ) -> tuple[_Batch, list[_Entry], list[str]]:
     asked.require_folder()
-    flags = asked.flags()
+    request = asked.request()
     with _opening:
-        device = _open_device(_palpate.device_of(flags))
+        device = _open_device(_palpate.device_of(request))
     head, entries, sentences = _palpate.settle_batch(
-        recordings, asked.maps(), flags, device, threads or _threads()
+        recordings, asked.maps(), request, device, threads or _threads()
     )
     return _Batch(head, device.name, asked), entries, sentences
 
@@ -274,13 +274,13 @@ def _settle(
 def _recognize(entries: list[bytes], batch: _Batch, threads: int | None = None) -> _Lines:
     global _opened
     batch.asked.require_folder()
-    flags = batch.asked.flags()
+    request = batch.asked.request()
     with _opening:
-        device = _open_device(_palpate.device_of(flags))
+        device = _open_device(_palpate.device_of(request))
         if _opened is None or _opened[0] != batch:
             _opened = None  # gives its memory back first
             _opened = batch, _palpate.OpenBatch.open(
-                batch.head, batch.asked.maps(), flags, device, threads or _threads()
+                batch.head, batch.asked.maps(), request, device, threads or _threads()
             )
         opened = _opened[1]
     if device.name != batch.device and not opened.on_host:

@@ -3,8 +3,8 @@
 import inspect
 import os
 import warnings
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Any, Literal, TypedDict, cast
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any, Literal, TypedDict
 
 from . import _palpate
 from ._palpate import Device, Hypothesis, OccupancyGrid, Recording
@@ -111,54 +111,24 @@ def recognize(
     to b - 1; device: an open Device, or a name or index as for Device.open(). progress(fraction) is
     called up to 50 times a second.
 
-    Raises Error in the words of the command. What the command would say on standard error becomes a
-    UserWarning; what looks wrong with the touches is in the records' `warnings`.
+    Raises Error in the words of the command, with options as keyword arguments. What the command
+    would say on standard error becomes a UserWarning; what looks wrong with the touches is in the
+    records' `warnings`.
     """
-    flags = flags_of(
-        {
-            "bins": bins,
-            "x_mm": x_mm,
-            "y_mm": y_mm,
-            "theta_deg": theta_deg,
-            "pivot_mm": pivot_mm,
-            "scene": scene,
-            "sensor_model": sensor_model,
-            "prior": prior,
-            "gamma": gamma,
-            "threshold": threshold,
-            "ratio": ratio,
-            "touch_sd_mm": touch_sd_mm,
-            "touch_sd_deg": touch_sd_deg,
-            "slip_sd_mm": slip_sd_mm,
-            "slip_sd_deg": slip_sd_deg,
-            "none": none,
-            "filter": filter,
-            "tolerance": tolerance,
-            "budget_ms": budget_ms,
-            "evidence_nats": evidence_nats,
-            "particles": particles,
-            "resampling": resampling,
-            "augmented": augmented,
-            "seed": seed,
-            "memory_mib": memory_mib,
-            "frames": frames,
-            "touches": touches,
-            "each_frame": each_frame,
-            "trace": trace,
-            "device": None if isinstance(device, Device) else device,
-        }
-    )
+    options = {name: value for name, value in locals().items() if name not in _NO_OPTIONS}
+    if isinstance(device, Device):
+        options["device"] = None
     if isinstance(maps, (OccupancyGrid, Hypothesis, str, bytes, os.PathLike)):
         maps = [maps]
     if isinstance(recordings, (Recording, str, bytes, os.PathLike)):
         recordings = [recordings]
-    records, sentences = _palpate.recognize_as_flagged(
+    records, sentences = _palpate.recognize(
         [item if isinstance(item, Recording) else os.fsdecode(item) for item in recordings],
         [
             item if isinstance(item, (OccupancyGrid, Hypothesis)) else os.fsdecode(item)
             for item in maps
         ],
-        flags,
+        request_of(options),
         device if isinstance(device, Device) else None,
         progress,
     )
@@ -167,36 +137,17 @@ def recognize(
     return [Record(record) for record in records]
 
 
-def flags_of(options: Mapping[str, object]) -> _palpate.RecognitionFlags:
-    """The options of recognize() as the flags of the command; None leaves the default."""
-    flags = _palpate.RecognitionFlags()
+_NO_OPTIONS = ("recordings", "maps", "progress")
+
+
+def request_of(options: Mapping[str, object]) -> _palpate.Request:
+    """The options of recognize() as a request; None leaves the default."""
+    request = _palpate.Request()
     for name, value in options.items():
         if value is not None:
             try:
-                setattr(flags, name, _flag(name, value))
+                request.set(name, os.fsdecode(value) if isinstance(value, (bytes, os.PathLike)) else value)
             except TypeError:
                 wanted = inspect.formatannotation(recognize.__annotations__[name])
                 raise TypeError(f"{name}: {value!r}; give {wanted}") from None
-    return flags
-
-
-_SEPARATORS = {"bins": "x", "x_mm": ":", "y_mm": ":", "theta_deg": ":", "pivot_mm": ",", "frames": ":"}
-
-
-def _flag(name: str, value: object) -> object:
-    """The value as the flag of the command would have it; a float keeps all its digits."""
-    if name in _SEPARATORS:
-        return _joined(cast(Sequence[float] | str, value), _SEPARATORS[name])
-    if name == "none" and not isinstance(value, str):
-        return repr(float(cast(float, value)))
-    if name == "device":
-        return str(value)
-    return os.fsdecode(value) if isinstance(value, (bytes, os.PathLike)) else value
-
-
-def _joined(values: Sequence[float] | str, separator: str) -> str:
-    if isinstance(values, str):
-        return values
-    return separator.join(
-        str(value) if isinstance(value, int) else repr(float(value)) for value in values
-    )
+    return request

@@ -213,6 +213,18 @@ def _advice(
     )
 
 
+def _pair(flag: str, text: str | None) -> tuple[float, float] | str | None:
+    """LOWER:UPPER, or X,Y or auto of a pivot. Raises Error."""
+    pivot = flag == "--pivot-mm"
+    if text is None or (pivot and text == "auto"):
+        return text
+    try:
+        first, second = map(float, text.split("," if pivot else ":"))
+    except ValueError:
+        raise Error(f"{flag} {text}: give {'X,Y or auto' if pivot else 'LOWER:UPPER'}") from None
+    return first, second
+
+
 def _flag_parser() -> argparse.ArgumentParser:
     flags = argparse.ArgumentParser(
         "python -m palpate.sweep",
@@ -232,10 +244,10 @@ def _flag_parser() -> argparse.ArgumentParser:
         "the object or its pose, the sweep tells accuracy and errors")  # fmt: skip
     add("--scene", metavar="FILE", help="scene file (YAML), as of palpate recognize")
     add("--sensor-model", metavar="FILE", help="what palpate calibrate has learned")
-    add("--x-mm", metavar="A:B", help="range of x, as of palpate recognize [every place of an array that "
+    add("--x-mm", metavar="LOWER:UPPER", help="range of x, as of palpate recognize [every place of an array that "
         "touches an object of the maps]")  # fmt: skip
-    add("--y-mm", metavar="A:B", help="range of y")
-    add("--theta-deg", metavar="A:B", help="range of theta, degrees [0:360]")
+    add("--y-mm", metavar="LOWER:UPPER", help="range of y")
+    add("--theta-deg", metavar="LOWER:UPPER", help="range of theta, degrees [0:360]")
     add("--pivot-mm", metavar="X,Y|auto", help="point about which theta turns")
     add("--threshold", type=float, help="contact threshold, in the recordings' unit")
     add("--ratio", type=float, help="threshold as a fraction of the largest pressure")
@@ -256,19 +268,9 @@ def _run(arguments: argparse.Namespace) -> None:
     if arguments.max_bins is not None and arguments.max_bins < 1_000:
         raise Error(f"--max-bins = {arguments.max_bins}: give 1000 or more")
     given = vars(arguments)
-    options = {
-        name: given[name]
-        for name in (
-            "scene",
-            "sensor_model",
-            "x_mm",
-            "y_mm",
-            "theta_deg",
-            "pivot_mm",
-            "threshold",
-            "ratio",
-        )
-    }
+    options = {name: given[name] for name in ("scene", "sensor_model", "threshold", "ratio")}
+    for name in ("x_mm", "y_mm", "theta_deg", "pivot_mm"):
+        options[name] = _pair("--" + name.replace("_", "-"), given[name])
     # What cannot be written is known before the minutes of work.
     if arguments.plots:
         os.makedirs(arguments.plots, exist_ok=True)

@@ -4,10 +4,10 @@
 #include <gtest/gtest.h>
 
 #include "cli/live_record.hpp"
-#include "cli/record_output.hpp"
 #include "cli/record_table.hpp"
 #include "cli/sheet.hpp"
 #include "cli/step_words.hpp"
+#include "recognition/record_json.hpp"
 #include "sample_files.hpp"
 
 namespace palpate::cli::record_certificate_test {

@@ -9,10 +9,10 @@
 #include <numbers>
 
 #include "cli/live_record.hpp"
-#include "cli/record_output.hpp"
 #include "cli/sheet.hpp"
 #include "cli/step_words.hpp"
 #include "palpate/pose_error.hpp"
+#include "recognition/record_json.hpp"
 #include "sample_files.hpp"
 
 namespace palpate::cli::record_table_test {

@@ -12,6 +12,7 @@ TEST(OptionWords, EachFaceSaysAnOptionInItsOwnWords) {
   EXPECT_EQ(in_keywords(message),
             "give bins=(25, 25, 16), x_mm=(-5.5, 5) or filter='bounded'; not prior=");
   EXPECT_EQ(in_keywords("`gamma 1.5`: must be below 1"), "gamma=1.5: must be below 1");
+  EXPECT_EQ(in_keywords("`pivot-mm`: missing"), "pivot_mm: missing");
 }
 
 TEST(OptionWords, OtherTextBetweenBackticksStays) {

@@ -32,7 +32,6 @@ TEST(SettleBins, CountsTheBinsOnceWhereTheyAreLeftToTheMaps) {
             .lattice;
     EXPECT_EQ(task.lattice().x_mm.count, balanced.x_mm.count);
     EXPECT_EQ(task.lattice().theta_rad.count, balanced.theta_rad.count);
-    EXPECT_FALSE(task.bin_width);
   }
 }
 

@@ -11,10 +11,13 @@
 
 #include "cli/batch/batch_run.hpp"
 #include "cli/batch/batch_settling.hpp"
-#include "cli/batch/settled_task.hpp"
 #include "cli/batch/slurm.hpp"
 #include "cli/commands.hpp"
+#include "cli/options.hpp"
 #include "cli/progress.hpp"
+#include "cli/recognition_flags.hpp"
+#include "recognition/batch/batch_resolution.hpp"
+#include "recognition/unknowns.hpp"
 
 namespace palpate::cli {
 
@@ -23,9 +26,8 @@ namespace {
 struct BatchArguments {
   std::vector<std::string> inputs;
   std::string results;
-  UnknownFlags unknowns;
-  RecognitionFlags recognition;
-  bool trace = false;
+  Request request;
+  bool verbose = false;
   bool update = false;
   std::string shard;
   int chunk = 100;
@@ -124,27 +126,22 @@ std::string summary(const BatchArguments& options, const Shard& shard, const Chu
 }
 
 /// The device of this task among those that Slurm started on this computer.
-Device open_device_in_step(RecognitionFlags flags, const Scene& scene) {
-  if (const std::optional<std::size_t> rank = slurm_number("SLURM_LOCALID")) {
-    const std::string wished = device_of(flags, scene);
-    flags.device = local_device(Device::list(wished), wished, *rank);
-  }
-  return open_device(flags, scene);
+Device open_device_in_step(const std::string& wished) {
+  const std::optional<std::size_t> rank = slurm_number("SLURM_LOCALID");
+  return Device::open(rank ? local_device(Device::list(wished), wished, *rank) : wished);
 }
 
 int batch(const BatchArguments& options, const CLI::App& command) {
-  refuse_budget(options.recognition);
+  refuse_budget(options.request);
   if (options.chunk < 1) {
     refuse_flag("--chunk", options.chunk, "give at least 1");
   }
   const Shard shard = shard_of(options.shard);
-  const InputRules rules{.flags = options.unknowns,
-                         .frames = frames_of(options.unknowns),
-                         .scene = scene_of(options.recognition),
-                         .scene_file = options.recognition.scene};
+  require_selection(options.request);
+  const Request request = complete(options.request);
   BatchTask asked{.program = PALPATE_VERSION,
                   .chunk_unknowns = static_cast<std::size_t>(options.chunk),
-                  .each_frame = options.unknowns.each_frame,
+                  .each_frame = request.each_frame,
                   .flags = flags_of(command)};
   for (BatchInput& input : list_inputs(options.inputs)) {
     asked.inputs.push_back({std::move(input), {}, {}});
@@ -158,9 +155,9 @@ int batch(const BatchArguments& options, const CLI::App& command) {
   const FolderLock lock(folder, shard);
   const std::size_t threads =
       options.threads > 0 ? static_cast<std::size_t>(options.threads) : cores();
-  const auto open = [&] { return open_device_in_step(options.recognition, rules.scene); };
-  SettledBatch settled = settle_batch(folder, lock, std::move(asked), options.recognition, rules,
-                                      open, options.update, threads);
+  const auto open = [&] { return open_device_in_step(request.device); };
+  SettledBatch settled =
+      settle_batch(folder, lock, std::move(asked), request, open, options.update, threads);
   const Chunks chunks = chunks_of(folder, settled.task, shard);
   const auto begin = std::chrono::steady_clock::now();
   BatchCounts now;
@@ -168,12 +165,10 @@ int batch(const BatchArguments& options, const CLI::App& command) {
     now = compute({.folder = folder,
                    .task = settled.task,
                    .recognition = settled.recognition,
-                   .rules = rules,
+                   .request = request,
                    .wanted = chunks.wanted,
                    .threads = threads,
-                   .trace = options.trace,
-                   .verbose = options.recognition.verbose,
-                   .tell = options.recognition.tell},
+                   .verbose = options.verbose},
                   chunks, settled, open);
   }
   fmt::print("{}", summary(options, shard, chunks, now, seconds_since(begin)));
@@ -199,10 +194,10 @@ void add_batch(CLI::App& app, int& status) {
       ->add_option("-o,--output", options->results,
                    "Folder of results; made where it is missing, completed where it is not")
       ->required();
-  add_recognition_flags(*command, options->recognition);
+  add_recognition_flags(*command, options->request, options->verbose);
   command->get_option("--budget-ms")->group("");  // read still, to be refused with its reason
-  add_unknown_flags(*command, options->unknowns);
-  command->add_flag("--trace", options->trace, "Add the estimate after every touch");
+  add_unknown_flags(*command, options->request);
+  command->add_flag("--trace", options->request.trace, "Add the estimate after every touch");
   command->add_option("--shard", options->shard,
                       "Recognise only part I of N, from 0 to N - 1, as I/N [default: that of the "
                       "Slurm task, or all]");

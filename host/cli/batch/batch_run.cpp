@@ -12,12 +12,14 @@
 #include <utility>
 
 #include "cli/batch/bounded_queue.hpp"
-#include "cli/batch/settled_task.hpp"
-#include "cli/record_output.hpp"
-#include "cli/uncertainty_flags.hpp"
+#include "cli/engine_words.hpp"
+#include "cli/options.hpp"
+#include "cli/recognition_flags.hpp"
 #include "io/input_file.hpp"
 #include "palpate/error.hpp"
-#include "recognition/recognition_record.hpp"
+#include "recognition/batch/batch_resolution.hpp"
+#include "recognition/record_json.hpp"
+#include "recognition/resolve.hpp"
 
 namespace palpate::cli {
 
@@ -177,7 +179,7 @@ class Pipeline {
   void read(RecordingReader& reader) {
     for (std::size_t i = next_input_++; i < first_.size() && !failed_; i = next_input_++) {
       if (is_wanted(i)) {
-        push_unknowns(i, read_entry(reader, run_.task, run_.task.inputs[i], run_.rules));
+        push_unknowns(i, read_entry(reader, run_.task, run_.task.inputs[i], run_.request));
       }
     }
   }
@@ -200,11 +202,12 @@ class Pipeline {
       print_engine(device_, recogniser, task_);
     }
     while (const std::optional<Job> job = jobs_.pop()) {
-      const RecognitionRecord record = recognise(recogniser, task_, job->unknown, run_.trace);
+      const RecognitionRecord record =
+          recognise(recogniser, task_, job->unknown, run_.request.trace);
       if (record.error.empty()) {
         tell_once(unresolved_words(task_, recogniser.lattice(), job->unknown.touches));
       }
-      Line line{job->index, text_of(to_json(record, task_, std::nullopt, run_.trace)),
+      Line line{job->index, text_of(to_json(record, task_, std::nullopt, run_.request.trace)),
                 record.seconds, !record.error.empty()};
       const std::size_t bytes = line.text.size();
       if (!lines_.push(std::move(line), bytes)) {
@@ -215,7 +218,7 @@ class Pipeline {
 
   void tell_once(const std::string& sentence) {
     if (!sentence.empty() && !told_.exchange(true)) {
-      run_.tell(sentence);
+      tell_on_stderr(sentence);
     }
   }
 

@@ -5,9 +5,9 @@
 #include <string>
 #include <vector>
 
-#include "cli/batch/batch_task.hpp"
-#include "cli/batch/input_reading.hpp"
 #include "cli/batch/results_folder.hpp"
+#include "recognition/batch/batch_task.hpp"
+#include "recognition/batch/input_reading.hpp"
 #include "recognition/recognition_task.hpp"
 
 namespace palpate::cli {
@@ -23,12 +23,10 @@ struct BatchRun {
   const ResultsFolder& folder;
   const BatchTask& task;
   const RecognitionTask& recognition;  ///< settled
-  const InputRules& rules;
+  const Request& request;
   const std::vector<bool>& wanted;  ///< [chunk]
   std::size_t threads = 1;
-  bool trace = false;
   bool verbose = false;
-  std::function<void(const std::string&)> tell;  ///< says a sentence to the user
 };
 
 /// Recognises the unknowns of the wanted chunks and writes each chunk once it is whole. Recordings

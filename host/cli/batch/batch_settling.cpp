@@ -1,12 +1,14 @@
 #include "cli/batch/batch_settling.hpp"
 
-#include <filesystem>
+#include <algorithm>
 #include <unordered_map>
 #include <utility>
 
-#include "cli/batch/settled_task.hpp"
 #include "cli/progress.hpp"
-#include "palpate/error.hpp"
+#include "cli/recognition_flags.hpp"
+#include "io/input_file.hpp"
+#include "recognition/batch/batch_resolution.hpp"
+#include "recognition/batch/input_reading.hpp"
 
 namespace palpate::cli {
 
@@ -67,8 +69,8 @@ constexpr const char* recognise_changed =
 }  // namespace
 
 SettledBatch settle_batch(const ResultsFolder& folder, const FolderLock& lock, BatchTask now,
-                          const RecognitionFlags& flags, const InputRules& rules,
-                          const std::function<Device()>& open, bool update, std::size_t threads) {
+                          const Request& request, const std::function<Device()>& open, bool update,
+                          std::size_t threads) {
   const Settling settling(folder, lock);
   std::optional<BatchTask> before;
   if (folder.has_task()) {
@@ -88,27 +90,25 @@ SettledBatch settle_batch(const ResultsFolder& folder, const FolderLock& lock, B
   }
   {
     Progress progress("looking through the recordings");
-    survey(now, flags, rules, threads, [&](double done) { progress.show(done); });
+    survey(now, request, threads, [&](double done) { progress.show(done); });
   }
   const bool same_inputs = before && before->inputs == now.inputs;
-  now.inferred = same_inputs ? before->inferred : infer(now.inputs, rules);
-  RecognitionTask asked = recognition_of(now, flags, rules);
-  SettledBatch settled{std::move(now), std::move(asked), {}};
-  BatchTask& task = settled.task;
-  RecognitionTask& recognition = settled.recognition;
-  const std::string difference = before ? difference_of_tasks(*before, task) : "";
+  now.inferred = same_inputs ? before->inferred : infer(now.inputs, request);
+  hash_files(now, request);
+  const std::string difference = before ? difference_of_tasks(*before, now) : "";
   settling.require_equal(difference, update, recognise_all);
   const bool same_task = before && difference.empty();
   if (same_task) {
-    task.bins = before->bins;
-    settle_as_before(task, recognition);
-  } else {
-    if (recognition.bin_width) {
-      settled.device = open();
-    }
-    settle_recognition(task, recognition, flags, rules,
-                       settled.device ? &*settled.device : nullptr);
+    now.bins = before->bins;
   }
+  std::optional<Device> device;
+  RecognitionTask recognition =
+      resolve_batch(now, request, [&]() -> const Device& { return device.emplace(open()); });
+  if (!same_task) {
+    std::ranges::for_each(recognition.remarks, tell_on_stderr);
+  }
+  SettledBatch settled{std::move(now), std::move(recognition), std::move(device)};
+  const BatchTask& task = settled.task;
   if (same_task && same_inputs) {
     return settled;
   }

@@ -4,10 +4,10 @@
 #include <optional>
 #include <string>
 
-#include "cli/batch/batch_task.hpp"
-#include "cli/batch/input_reading.hpp"
 #include "cli/batch/results_folder.hpp"
-#include "cli/recognition_flags.hpp"
+#include "recognition/batch/batch_task.hpp"
+#include "recognition/recogniser.hpp"
+#include "recognition/request.hpp"
 
 namespace palpate::cli {
 
@@ -23,11 +23,12 @@ struct SettledBatch {
 /// the device at hand, is settled here, so that no chunk depends on who computes it.
 /// @param now what is asked for: program, chunk_unknowns, each_frame, flags, and inputs without
 /// stamps
+/// @param request completed
 /// @param open opens the device, where the bins follow from its memory
 /// @param update whether results of another task may be dropped, as far as they differ
 /// @throws Error (Fault::input) where the folder has results of another task
 SettledBatch settle_batch(const ResultsFolder& folder, const FolderLock& lock, BatchTask now,
-                          const RecognitionFlags& flags, const InputRules& rules,
-                          const std::function<Device()>& open, bool update, std::size_t threads);
+                          const Request& request, const std::function<Device()>& open, bool update,
+                          std::size_t threads);
 
 }  // namespace palpate::cli

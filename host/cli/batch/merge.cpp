@@ -5,7 +5,6 @@
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
-#include "cli/batch/batch_task.hpp"
 #include "cli/batch/results_folder.hpp"
 #include "cli/commands.hpp"
 #include "cli/options.hpp"
@@ -13,6 +12,7 @@
 #include "io/command_files.hpp"
 #include "io/file_identity.hpp"
 #include "io/input_file.hpp"
+#include "recognition/batch/batch_task.hpp"
 
 namespace palpate::cli {
 

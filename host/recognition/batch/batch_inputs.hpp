@@ -6,20 +6,17 @@
 #include <string>
 #include <vector>
 
-#include "cli/options.hpp"
+#include "recognition/request.hpp"
 
-namespace palpate::cli {
+namespace palpate {
 
-/// A recording of a batch, as its manifest or the command line names it.
+/// A recording of a batch, as its manifest or the caller names it.
 struct BatchInput {
   std::string path;
-  std::optional<Frames> frames;  ///< of the manifest; none: as the flags say
+  std::optional<Frames> frames;  ///< of the manifest; none: as the request says
   std::string label;             ///< of the manifest: the true label; "": the recording's own
 
-  friend bool operator==(const BatchInput& a, const BatchInput& b) {
-    return a.path == b.path && a.label == b.label && a.frames.has_value() == b.frames.has_value() &&
-           (!a.frames || (a.frames->begin == b.frames->begin && a.frames->end == b.frames->end));
-  }
+  friend bool operator==(const BatchInput&, const BatchInput&) = default;
 };
 
 /// The recordings that the arguments stand for, in order: of a *.csv, those of its rows, whose
@@ -29,4 +26,4 @@ struct BatchInput {
 /// a column of another name than path, frames and label, and where there is no recording at all
 std::vector<BatchInput> list_inputs(std::span<const std::string> arguments);
 
-}  // namespace palpate::cli
+}  // namespace palpate

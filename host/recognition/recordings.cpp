@@ -1,12 +1,14 @@
-#include "cli/recordings.hpp"
+#include "recognition/recordings.hpp"
 
+#include <cmath>
 #include <set>
 
 #include "io/file_identity.hpp"
 #include "io/recording_rules.hpp"
 #include "palpate/files.hpp"
+#include "recognition/refused_option.hpp"
 
-namespace palpate::cli {
+namespace palpate {
 
 std::vector<Recording> read_touch_recordings(const std::vector<std::string>& paths) {
   std::vector<Recording> recordings;
@@ -32,12 +34,12 @@ void require_touches(const Recording& recording, const Recording& first) {
   }
 }
 
-Frames select(const Recording& recording, const std::optional<Frames>& frames) {
+Frames selected_touches(const Recording& recording, const std::optional<Frames>& frames) {
   if (!frames) {
     return {0, recording.size()};
   }
   if (frames->end > recording.size()) {
-    refuse(recording.path, "has {} touches, --frames {}:{} reaches beyond; end at most at {}",
+    refuse(recording.path, "has {} touches, `frames {}:{}` reaches beyond; end at most at {}",
            recording.size(), frames->begin, frames->end, recording.size());
   }
   return *frames;
@@ -47,17 +49,20 @@ ContactClassifier make_classifier(const std::string& pressure_unit, const std::s
                                   std::optional<double> threshold, std::optional<double> ratio) {
   ContactClassifier classifier;
   if (threshold) {
-    classifier.threshold = require_above("--threshold", *threshold, 0.0, true);
+    if (!(*threshold >= 0.0 && std::isfinite(*threshold))) {
+      refuse_option("threshold", *threshold, "must be at least 0");
+    }
+    classifier.threshold = *threshold;
   } else if (pressure_unit == "raw") {
-    refuse(source, "pressure_unit = raw has no default threshold; give --threshold");
+    refuse(source, "pressure_unit = raw has no default threshold; give `threshold`");
   }
   if (ratio) {
     if (!(*ratio >= 0.0 && *ratio < 1.0)) {
-      refuse_flag("--ratio", *ratio, "must be at least 0 and below 1");
+      refuse_option("ratio", *ratio, "must be at least 0 and below 1");
     }
     classifier.ratio = *ratio;
   }
   return classifier;
 }
 
-}  // namespace palpate::cli
+}  // namespace palpate

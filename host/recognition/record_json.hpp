@@ -8,14 +8,10 @@
 #include "model/option_words.hpp"
 #include "recognition/recognition_record.hpp"
 
-namespace palpate::cli {
+namespace palpate {
 
-/// Maps, bins or particles, and device in a short line.
-std::string setup_words(const Device& device, const RecognitionTask& task);
-/// Prints on standard error how the device works: its memory, the filter with its paths through the
-/// likelihood, the lattice.
-/// @param device null where none is used
-void print_engine(const Device* device, const Recogniser& recogniser, const RecognitionTask& task);
+/// "fits", "doubtful" or "does not fit".
+std::string verdict_text(Verdict verdict);
 
 /// The truth as it was given: the object and, where it is known, T_robot_object [x, y, theta].
 nlohmann::ordered_json truth_to_json(const GroundTruth& truth);
@@ -33,4 +29,4 @@ nlohmann::ordered_json to_json(const RecognitionRecord& record, const Recognitio
 /// The text of a record or of an array of them. A path or a label need not be UTF-8, as JSON must.
 std::string text_of(const nlohmann::ordered_json& json, int indent = -1);
 
-}  // namespace palpate::cli
+}  // namespace palpate

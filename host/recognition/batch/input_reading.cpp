@@ -1,4 +1,4 @@
-#include "cli/batch/input_reading.hpp"
+#include "recognition/batch/input_reading.hpp"
 
 #include <algorithm>
 #include <atomic>
@@ -9,11 +9,11 @@
 #include <thread>
 #include <vector>
 
-#include "cli/recognition_flags.hpp"
-#include "cli/recordings.hpp"
+#include "io/input_file.hpp"
 #include "palpate/error.hpp"
+#include "recognition/recordings.hpp"
 
-namespace palpate::cli {
+namespace palpate {
 
 namespace {
 
@@ -36,18 +36,18 @@ std::string placement_of(std::span<const Unknown> unknowns) {
                  std::string(bytes_of(first.elements_mm)));
 }
 
-InputSurvey survey_of(RecordingReader& reader, const BatchEntry& entry, const InputRules& rules) {
+InputSurvey survey_of(RecordingReader& reader, const BatchEntry& entry, const Request& request) {
   try {
-    const ReadInput read = read_input(reader, entry.input, rules, nullptr);
+    const ReadInput read = read_input(reader, entry.input, request, nullptr);
     InputSurvey survey{.touches = 0,
-                       .reach_mm = reach_mm(std::span(read.recording.get(), 1)),
+                       .reach_mm = largest_reach_mm(std::span(read.recording.get(), 1)),
                        .pressure_unit = read.recording->pressure_unit,
                        .placement = ""};
     for (const Unknown& unknown : read.unknowns) {
       survey.touches += unknown.touches.size();
     }
     // Only single presses of large arrays are at rest to any use; see array_is_still().
-    if (array_is_still(read.unknowns) || (rules.flags.each_frame && read.unknowns.size() == 1)) {
+    if (array_is_still(read.unknowns) || (request.each_frame && read.unknowns.size() == 1)) {
       survey.placement = placement_of(read.unknowns);
     }
     return survey;
@@ -60,12 +60,12 @@ InputSurvey survey_of(RecordingReader& reader, const BatchEntry& entry, const In
 }
 
 /// As array_is_still() of all unknowns together.
-bool is_still(std::span<const BatchEntry> inputs, const InputRules& rules,
+bool is_still(std::span<const BatchEntry> inputs, const Request& request,
               const BatchInference& inferred) {
   // A broken recording has no array that could move.
   const auto broken = [](const BatchEntry& entry) { return entry.survey->pressure_unit.empty(); };
   const auto first = std::ranges::find_if_not(inputs, broken);
-  if (!rules.flags.each_frame || first == inputs.end() || first->survey->placement.empty() ||
+  if (!request.each_frame || first == inputs.end() || first->survey->placement.empty() ||
       first->survey->pressure_unit != inferred.pressure_unit) {
     return false;
   }
@@ -79,10 +79,10 @@ bool is_still(std::span<const BatchEntry> inputs, const InputRules& rules,
   return presses > 1;
 }
 
-constexpr const char* begin_again = "begin again, palpate batch with --update";
+constexpr const char* begin_again = "begin again, palpate batch with `update`";
 
 /// Unknowns that have the error of their recording.
-ReadInput broken_input(const BatchInput& input, std::size_t count, const InputRules& rules,
+ReadInput broken_input(const BatchInput& input, std::size_t count, const Request& request,
                        const std::string& error) {
   const Unknown unknown{.recording = input.path,
                         .frame = {},
@@ -90,7 +90,7 @@ ReadInput broken_input(const BatchInput& input, std::size_t count, const InputRu
                         .truth = {input.label, {}},
                         .error = error};
   ReadInput broken{nullptr, std::vector(count, unknown)};
-  const std::optional<Frames>& frames = input.frames ? input.frames : rules.frames;
+  const std::optional<Frames>& frames = input.frames ? input.frames : request.frames;
   for (std::size_t i = 0; count > 1 && i < count; ++i) {
     broken.unknowns[i].frame = (frames ? frames->begin : 0) + i;
   }
@@ -99,16 +99,15 @@ ReadInput broken_input(const BatchInput& input, std::size_t count, const InputRu
 
 }  // namespace
 
-ReadInput read_input(RecordingReader& reader, const BatchInput& input, const InputRules& rules,
+ReadInput read_input(RecordingReader& reader, const BatchInput& input, const Request& request,
                      const BatchInference* inferred) {
   const auto recording = std::make_shared<Recording>(reader.read(input.path));
   Recording like = inferred == nullptr ? Recording{} : Recording{.path = inferred->unit_from};
   like.pressure_unit = inferred == nullptr ? recording->pressure_unit : inferred->pressure_unit;
   require_touches(*recording, like);
-  replace_array(rules.scene, rules.scene_file, recording->path, recording->elements(),
-                recording->elements_mm);
+  replace_array(request, recording->path, recording->elements(), recording->elements_mm);
   ReadInput read{recording,
-                 unknowns_in(rules.flags, input.frames ? input.frames : rules.frames, *recording)};
+                 unknowns_in(request, input.frames ? input.frames : request.frames, *recording)};
   for (Unknown& unknown : read.unknowns) {
     if (!input.label.empty() && unknown.truth.label != input.label) {
       unknown.truth = {input.label, {}};
@@ -118,7 +117,7 @@ ReadInput read_input(RecordingReader& reader, const BatchInput& input, const Inp
 }
 
 ReadInput read_entry(RecordingReader& reader, const BatchTask& task, const BatchEntry& entry,
-                     const InputRules& rules) {
+                     const Request& request) {
   const BatchInput& input = entry.input;
   const std::size_t count = task.unknowns_of(entry);
   const auto require_unchanged = [&] {
@@ -129,13 +128,13 @@ ReadInput read_entry(RecordingReader& reader, const BatchTask& task, const Batch
   require_unchanged();
   ReadInput read;
   try {
-    read = read_input(reader, input, rules, &task.inferred);
+    read = read_input(reader, input, request, &task.inferred);
   } catch (const Error& error) {
     require_unchanged();
     if (error.fault() != Fault::input) {
       throw;
     }
-    return broken_input(input, count, rules, error.what());
+    return broken_input(input, count, request, error.what());
   }
   require_unchanged();
   if (read.unknowns.size() != count) {
@@ -145,7 +144,7 @@ ReadInput read_entry(RecordingReader& reader, const BatchTask& task, const Batch
   return read;
 }
 
-void survey_inputs(std::span<BatchEntry> inputs, const InputRules& rules, std::size_t threads,
+void survey_inputs(std::span<BatchEntry> inputs, const Request& request, std::size_t threads,
                    const std::function<void(double)>& progress) {
   std::atomic<std::size_t> next = 0;
   std::exception_ptr failure;
@@ -161,7 +160,7 @@ void survey_inputs(std::span<BatchEntry> inputs, const InputRules& rules, std::s
     try {
       for (std::size_t i = next++; i < inputs.size(); i = next++) {
         if (!inputs[i].survey) {
-          inputs[i].survey = survey_of(reader, inputs[i], rules);
+          inputs[i].survey = survey_of(reader, inputs[i], request);
         }
         if (shows) {
           progress(static_cast<double>(i) / static_cast<double>(inputs.size()));
@@ -185,11 +184,11 @@ void survey_inputs(std::span<BatchEntry> inputs, const InputRules& rules, std::s
   }
 }
 
-BatchInference infer(std::span<const BatchEntry> inputs, const InputRules& rules) {
+BatchInference infer(std::span<const BatchEntry> inputs, const Request& request) {
   BatchInference inferred;
   RecordingReader reader;
   const auto surveyed = [&](const BatchEntry& entry) {
-    return entry.survey ? *entry.survey : survey_of(reader, entry, rules);
+    return entry.survey ? *entry.survey : survey_of(reader, entry, request);
   };
   for (const BatchEntry& entry : inputs) {
     if (const InputSurvey survey = surveyed(entry); !survey.pressure_unit.empty()) {
@@ -202,9 +201,9 @@ BatchInference infer(std::span<const BatchEntry> inputs, const InputRules& rules
     for (const BatchEntry& entry : inputs) {
       inferred.reach_mm = std::max(inferred.reach_mm, entry.survey->reach_mm);
     }
-    inferred.still_array = is_still(inputs, rules, inferred);
+    inferred.still_array = is_still(inputs, request, inferred);
   }
   return inferred;
 }
 
-}  // namespace palpate::cli
+}  // namespace palpate

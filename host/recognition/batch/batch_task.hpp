@@ -12,9 +12,9 @@
 #include <string_view>
 #include <vector>
 
-#include "cli/batch/batch_inputs.hpp"
+#include "recognition/batch/batch_inputs.hpp"
 
-namespace palpate::cli {
+namespace palpate {
 
 /// Size and time of modification, by which a changed file is noticed.
 struct FileStamp {
@@ -98,4 +98,4 @@ std::string hash_of(std::string_view bytes);
 /// Hash of a file's content. @throws Error
 std::string hash_of_file(const std::filesystem::path& file);
 
-}  // namespace palpate::cli
+}  // namespace palpate

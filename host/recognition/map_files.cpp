@@ -1,4 +1,4 @@
-#include "cli/map_files.hpp"
+#include "recognition/map_files.hpp"
 
 #include <algorithm>
 #include <system_error>
@@ -6,7 +6,7 @@
 #include "io/input_file.hpp"
 #include "palpate/files.hpp"
 
-namespace palpate::cli {
+namespace palpate {
 
 std::vector<std::filesystem::path> map_files(const std::filesystem::path& argument) {
   std::error_code error;
@@ -33,4 +33,4 @@ std::vector<std::filesystem::path> map_files(const std::filesystem::path& argume
   return files;
 }
 
-}  // namespace palpate::cli
+}  // namespace palpate

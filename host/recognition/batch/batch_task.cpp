@@ -1,4 +1,4 @@
-#include "cli/batch/batch_task.hpp"
+#include "recognition/batch/batch_task.hpp"
 
 #include <sys/stat.h>
 
@@ -13,7 +13,7 @@
 #include "io/atomic_file.hpp"
 #include "io/input_file.hpp"
 
-namespace palpate::cli {
+namespace palpate {
 
 namespace {
 
@@ -374,4 +374,4 @@ std::string hash_of_file(const fs::path& file) {
   return hash_of(bytes);
 }
 
-}  // namespace palpate::cli
+}  // namespace palpate

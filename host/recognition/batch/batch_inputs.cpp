@@ -1,4 +1,4 @@
-#include "cli/batch/batch_inputs.hpp"
+#include "recognition/batch/batch_inputs.hpp"
 
 #include <glob.h>
 
@@ -7,9 +7,11 @@
 #include <system_error>
 
 #include "io/csv_table.hpp"
+#include "io/input_file.hpp"
 #include "model/printable.hpp"
+#include "recognition/option_text.hpp"
 
-namespace palpate::cli {
+namespace palpate {
 
 namespace {
 
@@ -113,4 +115,4 @@ std::vector<BatchInput> list_inputs(std::span<const std::string> arguments) {
   return inputs;
 }
 
-}  // namespace palpate::cli
+}  // namespace palpate

@@ -1,0 +1,267 @@
+#include "recognition/asked_filter.hpp"
+
+#include <cmath>
+#include <initializer_list>
+#include <numbers>
+#include <tuple>
+#include <utility>
+#include <vector>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "estimation/displacement_check.hpp"
+#include "recognition/refused_option.hpp"
+
+namespace palpate {
+
+namespace {
+
+/// What gave the option, in the middle of a sentence.
+std::string giver_of(const Request& request, const std::string& option) {
+  const auto key = request.keys.find(option);
+  return key == request.keys.end() ? fmt::format("`{}`", option)
+                                   : fmt::format("{} in {}", key->second, request.scene);
+}
+
+/// One standard deviation: its option and what is asked.
+struct AskedSd {
+  const char* option;
+  std::optional<double> value;
+};
+
+AskedSd touch_mm(const Request& request) { return {"touch-sd-mm", request.touch_sd_mm}; }
+AskedSd touch_deg(const Request& request) { return {"touch-sd-deg", request.touch_sd_deg}; }
+AskedSd slip_mm(const Request& request) { return {"slip-sd-mm", request.slip_sd_mm}; }
+AskedSd slip_deg(const Request& request) { return {"slip-sd-deg", request.slip_sd_deg}; }
+
+/// The standard deviation; 0 where it is not asked. Throws Error where it is none.
+double value_of(const AskedSd& sd) {
+  if (sd.value && !(*sd.value >= 0.0 && std::isfinite(*sd.value))) {
+    refuse_option(sd.option, *sd.value, "give a finite number from 0");
+  }
+  return sd.value.value_or(0.0);
+}
+
+/// Sets what is asked, and leaves the rest.
+void set_displacement(const AskedSd& asked_mm, const AskedSd& asked_deg, double& mm, double& rad) {
+  mm = asked_mm.value ? value_of(asked_mm) : mm;
+  rad = asked_deg.value ? value_of(asked_deg) * std::numbers::pi / 180.0 : rad;
+}
+
+/// What gives the first of these that is above 0; "" where none is.
+std::string giver_of(const Request& request, std::initializer_list<AskedSd> all) {
+  for (const AskedSd& sd : all) {
+    if (value_of(sd) > 0.0) {
+      return giver_of(request, sd.option);
+    }
+  }
+  return "";
+}
+
+std::optional<double> none_weight(const Request& request, std::span<const Hypothesis> hypotheses) {
+  if (!request.none) {
+    return {};
+  }
+  if (const auto* weight = std::get_if<double>(&*request.none)) {
+    if (!(*weight > 0.0 && std::isfinite(*weight))) {
+      refuse_option("none", *weight,
+                    "give a weight above 0, or no value; recordings stand before the flags");
+    }
+    return *weight;
+  }
+  double sum = 0.0;
+  for (const Hypothesis& hypothesis : hypotheses) {
+    sum += hypothesis.weight;
+  }
+  return sum;
+}
+
+const char* name_of(FilterKind kind) {
+  switch (kind) {
+    case FilterKind::histogram:
+      return "histogram";
+    case FilterKind::bounded:
+      return "bounded";
+    case FilterKind::particles:
+      return "particles";
+    case FilterKind::automatic:
+      break;
+  }
+  return "auto";
+}
+
+/// What bounds refuse and the histogram does not; each giver as a sentence names it.
+std::vector<HistogramNeed> all_needs(const Request& request, const HistogramNeed& of_caller,
+                                     const HistogramOptions& histogram) {
+  std::vector<HistogramNeed> needs;
+  if (!of_caller.why.empty()) {
+    needs.push_back(
+        {of_caller.option.empty() ? "" : fmt::format("`{}`", of_caller.option), of_caller.why});
+  }
+  if (const std::string slip = giver_of(request, {slip_mm(request), slip_deg(request)});
+      !slip.empty()) {
+    needs.push_back({slip, "bounds take the object to rest between touches"});
+  }
+  if (const std::string touch = giver_of(request, {touch_mm(request), touch_deg(request)});
+      !touch.empty() || !histogram.touch_sd.none()) {
+    needs.push_back({touch.empty() ? "touch_sd in " + request.sensor_model : touch,
+                     "bounds take every touch's pose to be exact"});
+  }
+  if (request.memory_mib) {
+    needs.push_back({"`memory-mib`", "has no effect on bounds, whose memory is the host's"});
+  }
+  return needs;
+}
+
+/// What would have to go for bounds to take the bins: "`a` and `b`"; "" where there is no way.
+std::string names_of(std::span<const HistogramNeed> needs) {
+  std::vector<std::string> names;
+  for (const HistogramNeed& need : needs) {
+    if (need.option.empty()) {
+      return "";
+    }
+    names.push_back(need.option);
+  }
+  return fmt::format("{}", fmt::join(names, " and "));
+}
+
+double require_above_0(const char* option, double value) {
+  if (!(value > 0.0 && std::isfinite(value))) {
+    refuse_option(option, value, "must be above 0");
+  }
+  return value;
+}
+
+BoundedOptions asked_bounds(const Request& request, const HistogramOptions& histogram) {
+  BoundedOptions bounded = bounded_instead(histogram).value();
+  if (request.tolerance) {
+    if (!(*request.tolerance > 0.0 && *request.tolerance < 1.0)) {
+      refuse_option("tolerance", *request.tolerance, "give a probability between 0 and 1");
+    }
+    bounded.tolerance = *request.tolerance;
+  }
+  if (request.budget_ms) {
+    bounded.budget_s = 1e-3 * require_above_0("budget-ms", *request.budget_ms);
+  }
+  if (request.evidence_nats) {
+    bounded.evidence_nats = require_above_0("evidence-nats", *request.evidence_nats);
+  }
+  return bounded;
+}
+
+/// Throws Error where the request has an option that a particle filter has no use for.
+ParticleOptions asked_particles(const Request& request, const HistogramOptions& histogram) {
+  ParticleOptions particles{
+      .region = histogram.lattice, .contact = histogram.contact, .augmented = request.augmented};
+  particles.particles = request.particles.value_or(particles.particles);
+  if (particles.particles < 1 || particles.particles > 1'000'000) {
+    refuse_option("particles", particles.particles, "give 1 to 1,000,000");
+  }
+  particles.resampling = request.resampling.value_or(particles.resampling);
+  particles.seed = request.seed.value_or(particles.seed);
+  for (const AskedSd& sd : {touch_mm(request), touch_deg(request)}) {
+    if (sd.value) {
+      refuse_given(request, sd.option,
+                   "particles take every touch's pose to be exact; use `filter histogram`, or "
+                   "`slip-sd-mm` and `slip-sd-deg`, their motion noise");
+    }
+  }
+  if (request.none) {
+    refuse_given(request, "none",
+                 "particles have no mean over all poses, which (none) needs; use `filter "
+                 "histogram`");
+  }
+  set_displacement(slip_mm(request), slip_deg(request), particles.motion_mm, particles.motion_rad);
+  return particles;
+}
+
+}  // namespace
+
+FilterWish filter_wish(const Request& request) {
+  const FilterKind kind = request.filter.value_or(FilterKind::automatic);
+  const std::string filter = name_of(kind);
+  const bool particles = kind == FilterKind::particles;
+  for (const auto& [option, given] :
+       {std::pair{"particles", request.particles.has_value()},
+        std::pair{"resampling", request.resampling.has_value()},
+        std::pair{"augmented", request.augmented}, std::pair{"seed", request.seed.has_value()}}) {
+    if (given && !particles) {
+      refuse_option(option,
+                    fmt::format("has no effect on `filter {}`; add `filter particles`", filter));
+    }
+  }
+  if (request.memory_mib && particles) {
+    refuse_option("memory-mib",
+                  "has no effect on `filter particles`; use `filter histogram`, or fewer "
+                  "`particles`");
+  }
+  for (const auto& [option, given] :
+       {std::pair{"tolerance", request.tolerance.has_value()},
+        std::pair{"budget-ms", request.budget_ms.has_value()},
+        std::pair{"evidence-nats", request.evidence_nats.has_value()}}) {
+    if (given && (particles || kind == FilterKind::histogram)) {
+      refuse_option(
+          option, fmt::format("has no effect on `filter {}`; use `filter bounded`, or leave it out",
+                              filter));
+    }
+    if (given && kind == FilterKind::automatic) {
+      return {FilterKind::bounded, giver_of(request, option)};
+    }
+  }
+  return {kind, request.keys.contains("filter") ? giver_of(request, "filter")
+                                                : fmt::format("`filter {}`", filter)};
+}
+
+ChosenFilter choose_filter(const FilterWish& wish, const Request& request,
+                           const HistogramNeed& of_caller, std::span<const Hypothesis> hypotheses,
+                           HistogramOptions histogram) {
+  if (wish.kind == FilterKind::particles) {
+    return {asked_particles(request, histogram), false, wish.by};
+  }
+  if (request.memory_mib) {
+    if (*request.memory_mib < 1) {
+      refuse_option("memory-mib", *request.memory_mib, "give at least 1");
+    }
+    histogram.memory_limit_bytes = static_cast<std::uint64_t>(*request.memory_mib) << 20;
+  }
+  set_displacement(touch_mm(request), touch_deg(request), histogram.touch_sd.mm,
+                   histogram.touch_sd.rad);
+  set_displacement(slip_mm(request), slip_deg(request), histogram.slip_sd.mm,
+                   histogram.slip_sd.rad);
+  histogram.none_weight = none_weight(request, hypotheses);
+  std::vector<HistogramNeed> needs = all_needs(request, of_caller, histogram);
+  if (wish.kind == FilterKind::bounded) {
+    if (!needs.empty()) {
+      const auto& [giver, why] = needs.front();
+      throw Error(Fault::input,
+                  giver.empty() ? fmt::format("{}: {}; leave it out", wish.by, why)
+                                : fmt::format("{}: {}; leave it out, or {}", giver, why, wish.by));
+    }
+    return {asked_bounds(request, histogram), false, wish.by};
+  }
+  if (wish.kind == FilterKind::histogram) {
+    needs.push_back({wish.by, "was asked for"});
+  }
+  return {histogram, needs.empty(), names_of(needs)};
+}
+
+void require_within_region(const Request& request, const PoseLattice& lattice) {
+  const DisplacementSd widest = widest_displacement(lattice);
+  const double widest_deg = widest.rad * 180.0 / std::numbers::pi;
+  for (const auto& [sd, most, unit] : {std::tuple{touch_mm(request), widest.mm, "mm"},
+                                       std::tuple{slip_mm(request), widest.mm, "mm"},
+                                       std::tuple{touch_deg(request), widest_deg, "deg"},
+                                       std::tuple{slip_deg(request), widest_deg, "deg"}}) {
+    if (const double value = value_of(sd); value > most) {
+      const std::string remedy =
+          fmt::format("wider than the region, {:g} {}; give less, or widen the region", most, unit);
+      if (const auto key = request.keys.find(sd.option); key != request.keys.end()) {
+        refuse(request.scene, "{} = {}: {}", key->second, value, remedy);
+      }
+      refuse_option(sd.option, value, "{}", remedy);
+    }
+  }
+}
+
+}  // namespace palpate

@@ -1,0 +1,73 @@
+#include "recognition/batch/batch_resolution.hpp"
+
+#include <algorithm>
+
+#include "recognition/batch/input_reading.hpp"
+#include "recognition/refused_option.hpp"
+#include "recognition/resolve.hpp"
+
+namespace palpate {
+
+void refuse_budget(const Request& request) {
+  if (request.budget_ms) {
+    refuse_option("budget-ms", *request.budget_ms,
+                  "its results depend on the clock, and a batch's are the same on every run; leave "
+                  "it out, or use palpate recognize");
+  }
+}
+
+void stamp_inputs(BatchTask& task) {
+  for (BatchEntry& entry : task.inputs) {
+    entry.stamp = stamp_of(entry.input.path);
+  }
+}
+
+void survey(BatchTask& task, const Request& request, std::size_t threads,
+            const std::function<void(double)>& progress) {
+  if (task.each_frame || infers_region(request)) {
+    survey_inputs(task.inputs, request, threads, progress);
+  }
+}
+
+void hash_files(BatchTask& task, const Request& request) {
+  task.files.clear();
+  for (const auto& [option, file] : files_of(request)) {
+    if (!task.files.contains(file.string())) {
+      task.files[file.string()] = hash_of_file(file);
+    }
+  }
+}
+
+RecognitionTask resolve_batch(BatchTask& task, const Request& request,
+                              const std::function<const Device&()>& device,
+                              const std::function<void()>& cancel_point) {
+  const BatchInference& inferred = task.inferred;
+  const bool settled = task.bins != std::array<int, 3>{};
+  RecognitionTask recognition =
+      resolve(request, {.pressure_unit = inferred.pressure_unit,
+                        .source = inferred.unit_from,
+                        .reach_mm = inferred.reach_mm,
+                        .still_array = inferred.still_array,
+                        .cancel_point = cancel_point,
+                        .device = device,
+                        .counts = settled ? std::optional(task.bins) : std::nullopt});
+  const PoseLattice& lattice = recognition.lattice();
+  task.bins = {lattice.x_mm.count, lattice.y_mm.count, lattice.theta_rad.count};
+  return recognition;
+}
+
+bool uses_device(const RecognitionTask& recognition) {
+  return !traits_of(recognition.filter).certificate;
+}
+
+void take_threads(RecognitionTask& recognition, std::size_t threads) {
+  if (auto* bounded = std::get_if<BoundedOptions>(&recognition.filter)) {
+    bounded->threads = static_cast<int>(std::max<std::size_t>(1, threads));
+  }
+}
+
+Recogniser open_batch_filter(Device* device, const RecognitionTask& recognition) {
+  return uses_device(recognition) ? open_recogniser(*device, recognition) : Recogniser(recognition);
+}
+
+}  // namespace palpate

@@ -1,0 +1,48 @@
+#pragma once
+
+#include <cstddef>
+#include <functional>
+
+#include "recognition/batch/batch_task.hpp"
+#include "recognition/recogniser.hpp"
+#include "recognition/request.hpp"
+
+namespace palpate {
+
+// How a batch's request becomes a task, once, before anyone recognises a part of it: everything
+// that follows from all inputs together, or from the device at hand, so that no record depends on
+// who computes it. Requests are completed.
+
+/// Refuses budget_ms, whose results depend on the clock. @throws Error
+void refuse_budget(const Request& request);
+
+/// Stamps the inputs.
+void stamp_inputs(BatchTask& task);
+
+/// Reads the inputs that lack a survey, where the task needs surveys; see survey_inputs().
+void survey(BatchTask& task, const Request& request, std::size_t threads,
+            const std::function<void(double)>& progress);
+
+/// Puts the hashes of the files that the recognition depends on into the task. @throws Error
+void hash_files(BatchTask& task, const Request& request);
+
+/// The recognition that a task with its inference asks for, on the task's bins. Where the task has
+/// none yet, settles them and puts them there.
+/// @param device as Circumstances::device
+/// @param cancel_point as RecognitionTask::cancel_point
+/// @throws Error
+RecognitionTask resolve_batch(BatchTask& task, const Request& request,
+                              const std::function<const Device&()>& device,
+                              const std::function<void()>& cancel_point = {});
+
+/// Whether the filter computes on a device. Bounds do not: a GPU would take their bins over at a
+/// moment that depends on the clock.
+bool uses_device(const RecognitionTask& recognition);
+
+/// Has bounds take so many host threads.
+void take_threads(RecognitionTask& recognition, std::size_t threads);
+
+/// Opens the filter. @param device may be null where uses_device() is false
+Recogniser open_batch_filter(Device* device, const RecognitionTask& recognition);
+
+}  // namespace palpate

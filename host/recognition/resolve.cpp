@@ -1,0 +1,252 @@
+#include "recognition/resolve.hpp"
+
+#include <set>
+#include <utility>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "estimation/displacement_check.hpp"
+#include "io/file_identity.hpp"
+#include "palpate/files.hpp"
+#include "recognition/asked_filter.hpp"
+#include "recognition/recordings.hpp"
+#include "recognition/refused_option.hpp"
+
+namespace palpate {
+
+namespace {
+
+std::vector<Hypothesis> hypotheses_of(const Request& request,
+                                      const std::vector<Scene::Object>& objects) {
+  std::vector<Hypothesis> hypotheses;
+  for (const GivenMap& given : request.given_maps) {
+    hypotheses.push_back(given.hypothesis);
+  }
+  if (!hypotheses.empty()) {
+    return hypotheses;
+  }
+  std::set<std::optional<FileIdentity>> seen;
+  for (const Scene::Object& object : objects) {
+    OccupancyGrid map = read_map(object.map);
+    if (!seen.insert(identity_of(object.map)).second) {
+      refuse(object.map,
+             "the map is given twice; leave one out, or give the object a weight in a scene file");
+    }
+    map.label = object.label.value_or(map.label);
+    if (map.label == none_label) {
+      refuse(object.map,
+             "label {} stands for objects that were never learned; give the map another label in "
+             "the scene file",
+             none_label);
+    }
+    map.symmetry = object.symmetry.value_or(map.symmetry);
+    map.mirror = object.mirror.value_or(map.mirror);
+    hypotheses.push_back({std::move(map), object.weight});
+  }
+  return hypotheses;
+}
+
+/// The prior that was given, if any. Throws Error where none was and the maps' own differ.
+std::optional<double> prior_of(const std::vector<Scene::Object>& objects,
+                               const std::vector<Hypothesis>& hypotheses,
+                               std::optional<double> given) {
+  if (given && !(*given > 0.0 && *given < 1.0)) {
+    refuse_option("prior", *given, "give a probability between 0 and 1");
+  }
+  if (const auto other = given ? std::nullopt : differing_prior(hypotheses)) {
+    refuse(objects[*other].map,
+           "prior {} differs from {} of {}; build the maps in one call of palpate map, or say "
+           "which prior to use with `prior`",
+           hypotheses[*other].map.prior, hypotheses.front().map.prior,
+           objects.front().map.string());
+  }
+  return given;
+}
+
+/// The file of every hypothesis's map; a mirror image has that of the object before it.
+std::vector<std::string> paths_of(const std::vector<Scene::Object>& objects,
+                                  const std::vector<Hypothesis>& hypotheses) {
+  std::vector<std::string> paths;
+  auto object = objects.begin();
+  for (const Hypothesis& hypothesis : hypotheses) {
+    paths.push_back(hypothesis.mirrored ? paths.back() : (object++)->map.string());
+  }
+  return paths;
+}
+
+std::optional<LearnedSensor> sensor_of(const Request& request, const Circumstances& of) {
+  const std::string& file = request.sensor_model;
+  if (file.empty()) {
+    return {};
+  }
+  LearnedSensor sensor = read_sensor_model(file);
+  if (sensor.pressure_unit != of.pressure_unit) {
+    refuse(file, "pressure_unit = {}, but {} has pressures in {}; calibrate from recordings in {}",
+           sensor.pressure_unit, of.source, of.pressure_unit, of.pressure_unit);
+  }
+  for (const auto& [option, given] :
+       {std::pair{"gamma", request.gamma}, std::pair{"prior", request.prior}}) {
+    if (sensor.table && given) {
+      refuse_given(request, option, "the table of {} takes its place; leave it out", file);
+    }
+  }
+  return sensor;
+}
+
+/// The classifier of Eq. 3 and gamma of Eq. 7: the request overrides what the sensor model learned.
+std::pair<ContactClassifier, double> contact_rules(const Request& request, const Circumstances& of,
+                                                   const std::optional<LearnedSensor>& sensor) {
+  constexpr double usual_gamma = 0.1;
+  std::optional<double> threshold = request.threshold;
+  std::optional<double> ratio = request.ratio;
+  if (sensor) {
+    threshold = threshold.value_or(sensor->classifier.threshold);
+    ratio = ratio.value_or(sensor->classifier.ratio);
+  }
+  const double gamma = request.gamma.value_or(sensor ? sensor->gamma : usual_gamma);
+  if (!(gamma >= 0.0 && gamma < 1.0)) {
+    refuse_option("gamma", gamma, "must be at least 0 and below 1");
+  }
+  return {make_classifier(of.pressure_unit, of.source, threshold, ratio), gamma};
+}
+
+/// Where neither counts nor any part of a region are given, all of the lattice follows from the
+/// maps and the array, about the first touch in contact.
+PoseLattice automatic_lattice(std::span<const Hypothesis> hypotheses, double reach_mm,
+                              std::vector<std::string>& remarks) {
+  // As many times the bins that the objects themselves need.
+  constexpr double much = 2.0;
+  const TouchRegion region = touch_region(hypotheses, reach_mm);
+  if (region.excess > much) {
+    remarks.push_back(fmt::format(
+        "the objects lie far apart in the frames of their maps; the bins cover {:.0f} times the "
+        "area that the objects need. Learn each object near its frame's origin, or give `x-mm` "
+        "and `y-mm`",
+        region.excess));
+  }
+  return region.lattice;
+}
+
+std::optional<BinWidth> bin_width_of(const Request& request) {
+  if (const auto* width = request.bins ? std::get_if<BinWidth>(&*request.bins) : nullptr) {
+    return *width;
+  }
+  return infers_region(request) ? std::optional(BinWidth::automatic) : std::nullopt;
+}
+
+void set_counts(const std::array<int, 3>& counts, PoseLattice& lattice) {
+  lattice.x_mm.count = counts[0];
+  lattice.y_mm.count = counts[1];
+  lattice.theta_rad.count = counts[2];
+}
+
+/// Settles what follows from the lattice: its counts, the filter, and the evidence that it finds.
+void settle(const Request& request, const Circumstances& of, RecognitionTask& task) {
+  if (of.counts) {
+    set_counts(*of.counts, task.lattice());
+  } else if (task.bin_width) {
+    if (const std::optional<CoarsenedBins> bins = settle_bins(of.device(), task)) {
+      task.remarks.push_back(fmt::format(
+          "`bins {}`: steps of {:.2f} mm, wider than the maps resolve, keep to {} bins in all; "
+          "narrow the region, or give `bins`",
+          task.bin_width == BinWidth::fine ? "fine" : "auto", bins->step_mm, bins->most_bins));
+    }
+  }
+  settle_filter(task);
+  settle_evidence(task);
+  require_within_region(request, task.lattice());
+  if (const std::string wider = wider_bins_sentence(task); !wider.empty()) {
+    task.remarks.push_back(wider);
+  }
+}
+
+}  // namespace
+
+RecognitionTask resolve(const Request& request, const Circumstances& of) {
+  const FilterWish wish = filter_wish(request);
+  const std::optional<LearnedSensor> sensor = sensor_of(request, of);
+  HistogramOptions histogram{.still_array = of.still_array};
+  ContactModel& contact = histogram.contact;
+  const auto [classifier, gamma] = contact_rules(request, of, sensor);
+  const std::vector<Scene::Object> objects = objects_of(request);
+  std::vector<Hypothesis> hypotheses = hypotheses_of(request, objects);
+  if (!sensor || !sensor->table) {
+    contact.prior = prior_of(objects, hypotheses, request.prior);
+  }
+  add_mirror_images(hypotheses);
+  if (sensor) {
+    apply(*sensor, hypotheses, contact);
+    const bool exact = wish.kind == FilterKind::bounded || wish.kind == FilterKind::particles;
+    histogram.touch_sd = exact ? DisplacementSd{} : sensor->touch_sd;
+  }
+  contact.classifier = classifier;
+  contact.gamma = gamma;
+  std::vector<std::string> remarks;
+  const bool inferred = infers_region(request);
+  histogram.lattice =
+      inferred ? automatic_lattice(hypotheses, of.reach_mm, remarks) : given_lattice(request);
+  const std::optional<BinWidth> bin_width = bin_width_of(request);
+  const ChosenFilter filter = choose_filter(wish, request, of.need, hypotheses, histogram);
+  if (!bin_width) {
+    require_within_region(request, histogram.lattice);
+  }
+  RecognitionTask task(std::move(hypotheses), filter.options);
+  task.map_paths = paths_of(objects, task.hypotheses);
+  if (sensor) {
+    task.temperature = sensor->temperature;
+    task.temperature_growth = sensor->temperature_growth;
+    task.learned_bins = sensor->bins;
+    task.features = sensor->features;
+    task.familiarity = sensor->familiarity;
+    task.fit_scale = sensor->fit_scale.value_or(FitScale{});
+  }
+  task.bin_width = bin_width;
+  task.auto_filter = filter.automatic;
+  task.filter_asked_for_by = filter.asked_for_by;
+  task.auto_pivot = inferred || has_auto_pivot(request);
+  task.cancel_point = of.cancel_point;
+  task.remarks = std::move(remarks);
+  settle(request, of, task);
+  return task;
+}
+
+Recogniser open_recogniser(Device& device, const RecognitionTask& task) {
+  try {
+    return {device, task};
+  } catch (const Error& error) {
+    // A resolved task is sound: only the bins' memory can be refused.
+    if (error.fault() == Fault::input && traits_of(task.filter).every_bin &&
+        !task.filter_asked_for_by.empty() && bounds_have_room(task)) {
+      throw Error(Fault::input,
+                  fmt::format("{}, or leave out {}: `filter bounded` needs no device memory",
+                              error.what(), task.filter_asked_for_by));
+    }
+    throw;
+  }
+}
+
+std::string unresolved_words(const RecognitionTask& task, const PoseLattice& lattice,
+                             std::span<const Pose> T_robot_sensor) {
+  std::optional<std::string> fault = unresolved_by_steps(task.touch_sd(), lattice, "touch-sd");
+  if (!fault) {
+    fault = unresolved_by_steps(task.slip_sd(), lattice, "slip-sd");
+  }
+  for (const Pose& pose : T_robot_sensor) {
+    if (!fault) {
+      fault = unresolved_at(pose, task.touch_sd(), lattice, "touch-sd");
+    }
+  }
+  return fault.value_or("");
+}
+
+std::string unresolved_words(const RecognitionTask& task, const PoseLattice& lattice,
+                             std::span<const Touch> touches) {
+  std::vector<Pose> T_robot_sensor;
+  for (const Touch& touch : touches) {
+    T_robot_sensor.push_back(touch.T_robot_sensor);
+  }
+  return unresolved_words(task, lattice, T_robot_sensor);
+}
+
+}  // namespace palpate

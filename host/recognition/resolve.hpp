@@ -1,0 +1,54 @@
+#pragma once
+
+#include <array>
+#include <functional>
+#include <optional>
+#include <span>
+#include <string>
+
+#include "recognition/recogniser.hpp"
+#include "recognition/request.hpp"
+
+namespace palpate {
+
+/// Why a caller needs the histogram, beside what the request says.
+struct HistogramNeed {
+  std::string option = {};  ///< that asks for what needs it; "" where the caller always does
+  std::string why = {};     ///< "" where every filter will do
+};
+
+/// What a task follows from beside its request.
+struct Circumstances {
+  std::string pressure_unit;  ///< of the touches to come
+  std::string source;         ///< that gives them, for messages
+  double reach_mm = 0.0;      ///< of the largest array that touches; see array_reach_mm()
+  bool still_array = false;   ///< HistogramOptions::still_array
+  HistogramNeed need = {};
+  std::function<void()> cancel_point = {};  ///< RecognitionTask::cancel_point
+  /// Gives the device that recognises. Called where counts of bins follow from its memory.
+  std::function<const Device&()> device = {};
+  /// Counts of x, y and theta that were settled before, in the place of those that the request
+  /// leaves open.
+  std::optional<std::array<int, 3>> counts = {};
+};
+
+/// The task that a completed request asks for: reads the maps and the sensor model, settles the
+/// lattice, the filter, and how closely bounds find the evidence.
+/// @throws Error where a file cannot be read, and naming the option, or the scene file and its key,
+/// whose value cannot be meant
+RecognitionTask resolve(const Request& request, const Circumstances& circumstances);
+
+/// Opens the task's filter. @throws Error; where the device has no memory for the histogram's bins,
+/// it names the options without which bounds would take them
+Recogniser open_recogniser(Device& device, const RecognitionTask& task);
+
+/// What to say where the lattice does not resolve the task's touch_sd or slip_sd at one of these
+/// poses of the sensor; else "".
+/// @param lattice the task's, about the pivot in use
+std::string unresolved_words(const RecognitionTask& task, const PoseLattice& lattice,
+                             std::span<const Pose> T_robot_sensor);
+/// As above, at these touches' poses.
+std::string unresolved_words(const RecognitionTask& task, const PoseLattice& lattice,
+                             std::span<const Touch> touches);
+
+}  // namespace palpate

@@ -1,0 +1,137 @@
+// A request, its scene file, and the task that it resolves to. None of these tasks needs a device.
+
+#include "recognition/resolve.hpp"
+
+#include <filesystem>
+#include <fstream>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "palpate/error.hpp"
+#include "shapes.hpp"
+
+namespace palpate {
+namespace {
+
+using testing::HasSubstr;
+
+Request request_of_shapes() {
+  Request request;
+  for (const Hypothesis& shape : shapes()) {
+    request.given_maps.push_back({shape.map.label, shape});
+  }
+  request.bins = std::array{6, 5, 4};
+  return request;
+}
+
+RecognitionTask task_of(const Request& request) {
+  return resolve(request, {.pressure_unit = "kPa", .source = "a test", .reach_mm = 8.0});
+}
+
+std::string refusal(const Request& request) {
+  try {
+    task_of(request);
+  } catch (const Error& error) {
+    EXPECT_EQ(error.fault(), Fault::input);
+    return error.what();
+  }
+  return "";
+}
+
+class SceneFile {
+ public:
+  explicit SceneFile(const std::string& text) { std::ofstream(path_) << text; }
+  ~SceneFile() { std::filesystem::remove(path_); }
+  const std::string& path() const { return path_; }
+
+ private:
+  std::string path_ = std::filesystem::path(testing::TempDir()) / "resolve_test.yaml";
+};
+
+TEST(Resolve, WhatIsNotAskedIsThePapers) {
+  const RecognitionTask task = task_of(request_of_shapes());
+  const auto& histogram = std::get<HistogramOptions>(task.filter);
+  EXPECT_EQ(histogram.contact.gamma, 0.1);
+  EXPECT_EQ(histogram.contact.classifier.threshold, 2.0);
+  EXPECT_EQ(histogram.contact.classifier.ratio, 0.3);
+  EXPECT_EQ(task.lattice().x_mm.lower, -10.0);
+  EXPECT_EQ(task.lattice().y_mm.count, 5);
+  EXPECT_FALSE(task.auto_pivot);
+  EXPECT_TRUE(task.auto_filter);
+}
+
+TEST(Resolve, AnOptionOfBoundsAsksForBounds) {
+  Request request = request_of_shapes();
+  request.tolerance = 1e-3;
+  const RecognitionTask task = task_of(request);
+  EXPECT_EQ(std::get<BoundedOptions>(task.filter).tolerance, 1e-3);
+  EXPECT_EQ(task.filter_asked_for_by, "`tolerance`");
+  request.touch_sd_deg = 2.0;
+  EXPECT_THAT(refusal(request), HasSubstr("`touch-sd-deg`: bounds take every touch's pose to be "
+                                          "exact; leave it out, or `tolerance`"));
+}
+
+TEST(Resolve, CountsThatWereSettledBeforeStand) {
+  Request request = request_of_shapes();
+  request.bins = BinWidth::automatic;
+  const RecognitionTask task = resolve(
+      request,
+      {.pressure_unit = "kPa", .source = "a test", .reach_mm = 8.0, .counts = std::array{7, 8, 9}});
+  EXPECT_TRUE(task.auto_pivot);
+  EXPECT_EQ(task.lattice().x_mm.count, 7);
+  EXPECT_EQ(task.lattice().theta_rad.count, 9);
+}
+
+TEST(Request, ASceneGivesWhatIsNotAsked) {
+  const SceneFile scene("{gamma: 0.2, ratio: 0.4, bins: [3, 3, 3], none: auto, slip_sd: {mm: 1}}");
+  Request request = request_of_shapes();
+  request.scene = scene.path();
+  request.gamma = 0.05;
+  const RecognitionTask task = task_of(complete(request));
+  const auto& histogram = std::get<HistogramOptions>(task.filter);
+  EXPECT_EQ(histogram.contact.gamma, 0.05) << "as asked";
+  EXPECT_EQ(histogram.contact.classifier.ratio, 0.4) << "as in the scene";
+  EXPECT_EQ(task.lattice().x_mm.count, 6) << "as asked";
+  EXPECT_EQ(histogram.slip_sd.mm, 1.0);
+  EXPECT_EQ(histogram.none_weight, 2.0) << "the weights of both maps";
+}
+
+TEST(Request, ARefusalNamesTheOptionOrTheScenesKey) {
+  const SceneFile scene("{filter: bounded, slip_sd: {deg: 2}}");
+  Request request = request_of_shapes();
+  request.scene = scene.path();
+  EXPECT_EQ(refusal(complete(request)),
+            "slip_sd deg in " + scene.path() +
+                ": bounds take the object to rest between touches; leave it out, or filter: "
+                "bounded in " +
+                scene.path());
+  request.filter = FilterKind::particles;
+  request.none = Automatic{};
+  EXPECT_THAT(refusal(complete(request)), HasSubstr("`none`: particles have no mean"));
+}
+
+TEST(Request, ValuesThatCannotBeMeantAreRefused) {
+  const auto refused = [](auto&& change) {
+    Request request = request_of_shapes();
+    change(request);
+    return refusal(request);
+  };
+  EXPECT_THAT(refused([](Request& r) { r.bins = std::array{0, 1, 1}; }), HasSubstr("`bins 0x1x1`"));
+  EXPECT_THAT(refused([](Request& r) {
+                r.x_mm = {5.0, -5.0};
+              }),
+              HasSubstr("`x-mm 5:-5`: the range"));
+  EXPECT_THAT(refused([](Request& r) { r.theta_deg = {0.0, 400.0}; }), HasSubstr("full circle"));
+  EXPECT_THAT(refused([](Request& r) { r.pivot_mm = glm::dvec2(1e10, 0.0); }),
+              HasSubstr("`pivot-mm 1"));
+  EXPECT_THAT(refused([](Request& r) { r.gamma = 1.0; }), HasSubstr("`gamma 1`"));
+  EXPECT_THAT(refused([](Request& r) { r.none = 0.0; }), HasSubstr("`none 0`"));
+  EXPECT_THAT(refused([](Request& r) { r.touch_sd_mm = 500.0; }),
+              HasSubstr("`touch-sd-mm 500`: wider than the region, 20 mm"));
+  EXPECT_THAT(refused([](Request& r) { r.particles = 10; }), HasSubstr("add `filter particles`"));
+  EXPECT_THAT(refused([](Request& r) { r.given_maps.clear(); }), HasSubstr("`maps`: missing"));
+}
+
+}  // namespace
+}  // namespace palpate
