@@ -8,7 +8,6 @@
 #include <CLI/CLI.hpp>
 
 #include "cli/options.hpp"
-#include "model/number_text.hpp"
 #include "model/option_words.hpp"
 #include "recognition/option_text.hpp"
 
@@ -16,21 +15,17 @@ namespace palpate::cli {
 
 namespace {
 
-std::variant<double, Automatic> none_of(const std::string& text) {
-  if (text == "auto") {
-    return Automatic{};
-  }
-  const std::optional<double> weight = number_of(text);
-  if (!weight || !(*weight > 0.0)) {
-    refuse_flag("--none", text,
-                "give a weight above 0, or no value; recordings stand before the flags");
-  }
-  return *weight;
+/// Adds a flag whose text read_option() reads into the value.
+template <typename Value>
+CLI::Option* add_text_flag(CLI::App& command, const std::string& flag, Value& value,
+                           const std::string& help) {
+  return command.add_option_function<std::string>(
+      flag, [flag, &value](const std::string& text) { read_option(flag, text, value); }, help);
 }
 
 void add_filter_flags(CLI::App& command, Request& request) {
-  command.add_option_function<std::string>(
-      "--filter", [&](const std::string& name) { request.filter = filter_named(name); },
+  add_text_flag(
+      command, "--filter", request.filter,
       fmt::format(
           "histogram: evaluates every pose bin; bounded: the same bins, but evaluates only those "
           "that matter and proves how little the others can; particles: the paper's particle "
@@ -53,9 +48,8 @@ void add_filter_flags(CLI::App& command, Request& request) {
       .add_option("--particles", request.particles,
                   "Number of particles of all objects together, up to 1,000,000 [default: 10000]")
       ->check(require_whole_number);
-  command.add_option_function<std::string>(
-      "--resampling", [&](const std::string& name) { request.resampling = resampling_named(name); },
-      "How particles are drawn: multinomial or systematic [default: multinomial]");
+  add_text_flag(command, "--resampling", request.resampling,
+                "How particles are drawn: multinomial or systematic [default: multinomial]");
   command.add_flag("--augmented", request.augmented,
                    "Augmented MCL: add random particles while the touches fit worse than before");
   command.add_option("--seed", request.seed, "Seed of the particles' random numbers [default: 0]")
@@ -82,15 +76,14 @@ void add_uncertainty_flags(CLI::App& command, Request& request) {
   command.add_option("--slip-sd-deg", request.slip_sd_deg,
                      "The same of how far the object turns about its middle, degrees [default: 0; "
                      "particles: 5.73, which is 0.1 rad]");
-  command
-      .add_option_function<std::string>(
-          "--none", [&](const std::string& weight) { request.none = none_of(weight); },
-          "Adds \"(none)\", an object that was never learned, with prior weight W; a map "
-          "has the weight 1. Without W, (none) has the sum of the maps' weights: even odds "
-          "before the first touch. (none) explains each touch by a piece of some known "
-          "object; the pieces need not belong to one pose. One touch cannot tell: after it, "
-          "the odds are about the prior's, unless a sensor model has learned what a touch of no "
-          "known object is like [default: no (none)]")
+  add_text_flag(
+      command, "--none", request.none,
+      "Adds \"(none)\", an object that was never learned, with prior weight W; a map "
+      "has the weight 1. Without W, (none) has the sum of the maps' weights: even odds "
+      "before the first touch. (none) explains each touch by a piece of some known "
+      "object; the pieces need not belong to one pose. One touch cannot tell: after it, "
+      "the odds are about the prior's, unless a sensor model has learned what a touch of no "
+      "known object is like [default: no (none)]")
       ->type_name("W")
       ->expected(0, 1)
       ->default_str("auto");
@@ -178,40 +171,20 @@ void add_unknown_flags(CLI::App& command, Request& request) {
 }
 
 void add_bins_flag(CLI::App& command, Request& request, const std::string& help) {
-  command.add_option_function<std::string>(
-      "--bins",
-      [&](const std::string& text) {
-        if (text == "auto" || text == "fine") {
-          request.bins = text == "fine" ? BinWidth::fine : BinWidth::automatic;
-        } else {
-          request.bins = parse_bins("--bins", text);
-        }
-      },
-      help);
+  add_text_flag(command, "--bins", request.bins, help);
 }
 
 void add_range_flag(CLI::App& command, const std::string& flag,
                     std::optional<std::array<double, 2>>& range, const std::string& help) {
-  command.add_option_function<std::string>(
-      flag, [flag, &range](const std::string& text) { range = parse_range(flag, text); }, help);
+  add_text_flag(command, flag, range, help);
 }
 
 void add_pivot_flag(CLI::App& command, Request& request, const std::string& help) {
-  command.add_option_function<std::string>(
-      "--pivot-mm",
-      [&](const std::string& text) {
-        if (text == "auto") {
-          request.pivot_mm = Automatic{};
-        } else {
-          request.pivot_mm = parse_point("--pivot-mm", text);
-        }
-      },
-      help);
+  add_text_flag(command, "--pivot-mm", request.pivot_mm, help);
 }
 
 void add_frames_flag(CLI::App& command, std::optional<Frames>& frames, const std::string& help) {
-  command.add_option_function<std::string>(
-      "--frames", [&](const std::string& text) { frames = parse_frames("--frames", text); }, help);
+  add_text_flag(command, "--frames", frames, help);
 }
 
 void tell_on_stderr(const std::string& sentence) {

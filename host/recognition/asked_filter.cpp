@@ -77,20 +77,6 @@ std::optional<double> none_weight(const Request& request, std::span<const Hypoth
   return sum;
 }
 
-const char* name_of(FilterKind kind) {
-  switch (kind) {
-    case FilterKind::histogram:
-      return "histogram";
-    case FilterKind::bounded:
-      return "bounded";
-    case FilterKind::particles:
-      return "particles";
-    case FilterKind::automatic:
-      break;
-  }
-  return "auto";
-}
-
 /// What bounds refuse and the histogram does not; each giver as a sentence names it.
 std::vector<HistogramNeed> all_needs(const Request& request, const HistogramNeed& of_caller,
                                      const HistogramOptions& histogram) {

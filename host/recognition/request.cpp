@@ -1,5 +1,6 @@
 #include "recognition/request.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <set>
@@ -14,6 +15,12 @@ namespace palpate {
 namespace {
 
 constexpr double rad_per_deg = std::numbers::pi / 180.0;
+
+using FilterName = std::pair<FilterKind, const char*>;
+constexpr std::array<FilterName, 4> filter_names{{{FilterKind::automatic, "auto"},
+                                                  {FilterKind::histogram, "histogram"},
+                                                  {FilterKind::bounded, "bounded"},
+                                                  {FilterKind::particles, "particles"}}};
 
 /// Sets the axis to the range, if there is one.
 void set_range(const char* option, const std::optional<std::array<double, 2>>& range, double unit,
@@ -35,16 +42,16 @@ void set_range(const char* option, const std::optional<std::array<double, 2>>& r
 
 }  // namespace
 
+std::string name_of(FilterKind kind) {
+  return std::ranges::find(filter_names, kind, &FilterName::first)->second;
+}
+
 FilterKind filter_named(const std::string& name) {
-  static const std::map<std::string, FilterKind> filters{{"auto", FilterKind::automatic},
-                                                         {"histogram", FilterKind::histogram},
-                                                         {"bounded", FilterKind::bounded},
-                                                         {"particles", FilterKind::particles}};
-  const auto found = filters.find(name);
-  if (found == filters.end()) {
+  const auto* const found = std::ranges::find(filter_names, name, &FilterName::second);
+  if (found == filter_names.end()) {
     refuse_option("filter", name, "not known; use auto, histogram, bounded or particles");
   }
-  return found->second;
+  return found->first;
 }
 
 Resampling resampling_named(const std::string& name) {

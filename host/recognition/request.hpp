@@ -21,11 +21,16 @@ namespace palpate {
 struct Automatic {};
 
 enum class FilterKind { automatic, histogram, bounded, particles };
+std::string name_of(FilterKind kind);
 
 /// @throws Error where there is no such filter; "auto" is FilterKind::automatic
 FilterKind filter_named(const std::string& name);
 /// @throws Error where particles are not drawn so
 Resampling resampling_named(const std::string& name);
+
+using Bins = std::variant<std::array<int, 3>, BinWidth>;  ///< counts of x, y and theta
+using Pivot = std::variant<glm::dvec2, Automatic>;        ///< in the robot frame, mm
+using NoneWeight = std::variant<double, Automatic>;       ///< automatic: of all maps together
 
 /// Touches [begin, end) of a recording.
 struct Frames {
@@ -45,15 +50,15 @@ struct GivenMap {
 /// is empty. resolve() makes it a task and throws Error where a value cannot be meant. Messages
 /// name an option by its member here, with dashes: `x-mm`.
 struct Request {
-  std::vector<std::string> maps;                                   ///< files, and folders of them
-  std::vector<GivenMap> given_maps;                                ///< in the place of `maps`
-  std::string scene;                                               ///< a file; complete() reads it
-  std::string sensor_model;                                        ///< a file
-  std::optional<std::variant<std::array<int, 3>, BinWidth>> bins;  ///< counts of x, y and theta
-  std::optional<std::array<double, 2>> x_mm;                       ///< range
+  std::vector<std::string> maps;     ///< files, and folders of them
+  std::vector<GivenMap> given_maps;  ///< in the place of `maps`
+  std::string scene;                 ///< a file; complete() reads it
+  std::string sensor_model;          ///< a file
+  std::optional<Bins> bins;
+  std::optional<std::array<double, 2>> x_mm;  ///< range
   std::optional<std::array<double, 2>> y_mm;
   std::optional<std::array<double, 2>> theta_deg;
-  std::optional<std::variant<glm::dvec2, Automatic>> pivot_mm;  ///< in the robot frame
+  std::optional<Pivot> pivot_mm;
   std::optional<double> prior;
   std::optional<double> gamma;
   std::optional<double> threshold;
@@ -62,7 +67,7 @@ struct Request {
   std::optional<double> touch_sd_deg;
   std::optional<double> slip_sd_mm;
   std::optional<double> slip_sd_deg;
-  std::optional<std::variant<double, Automatic>> none;  ///< weight; automatic: of all maps together
+  std::optional<NoneWeight> none;
   std::optional<FilterKind> filter;
   std::optional<double> tolerance;
   std::optional<double> budget_ms;

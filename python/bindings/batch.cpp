@@ -46,7 +46,7 @@ Settled settle(const std::vector<std::string>& inputs, const Request& given, con
   const Request request = complete(given);
   Settled settled{{.program = PALPATE_VERSION,
                    .chunk_unknowns = 1,  // chunks are of recordings, whoever makes them
-                   .each_frame = request.each_frame},
+                   .request = given},
                   {}};
   for (BatchInput& input : list_inputs(inputs)) {
     settled.task.inputs.push_back({std::move(input), {}, {}});
@@ -89,10 +89,9 @@ struct OpenBatch {
   Recogniser recogniser;
 };
 
-OpenBatch open_batch(const std::string& head, const Request& given, Device& device,
-                     std::size_t threads) {
+OpenBatch open_batch(const std::string& head, Device& device, std::size_t threads) {
   BatchTask task = head_from(head);
-  Request request = complete(given);
+  Request request = complete(task.request);
   BatchTask own = task;
   own.program = PALPATE_VERSION;
   hash_files(own, request);
@@ -187,17 +186,14 @@ void bind_batch(nb::module_& module) {
                                "recordings. One thread at\na time recognises.")
       .def_static(
           "open",
-          [](const nb::bytes& head, const nb::list& maps, Request request,
-             const std::shared_ptr<Session>& session, int threads) {
-            add_maps(maps, request);
+          [](const nb::bytes& head, const std::shared_ptr<Session>& session, int threads) {
             return make_owned<OpenBatch>(
-                {}, session, [head = text_in(head), request, threads](Device& device) {
-                  return open_batch(head, request, device, static_cast<std::size_t>(threads));
+                {}, session, [head = text_in(head), threads](Device& device) {
+                  return open_batch(head, device, static_cast<std::size_t>(threads));
                 });
           },
-          "head"_a, "maps"_a, "request"_a, "device"_a, "threads"_a,
-          nb::sig("def open(head: bytes, maps: list[str], request: Request, device: "
-                  "Device, threads: int) -> OpenBatch"),
+          "head"_a, "device"_a, "threads"_a,
+          nb::sig("def open(head: bytes, device: Device, threads: int) -> OpenBatch"),
           "Raises Error where palpate, a map, the scene or the sensor model is not as it was when\n"
           "the batch was settled.")
       .def_prop_ro(

@@ -1,12 +1,14 @@
 #include "request.hpp"
 
+#include <algorithm>
 #include <array>
-#include <map>
+#include <initializer_list>
 #include <string>
-#include <utility>
+#include <string_view>
 #include <variant>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <nanobind/stl/array.h>
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/variant.h>
@@ -14,6 +16,7 @@
 #include "bindings.hpp"
 #include "palpate/files.hpp"
 #include "recognition/map_files.hpp"
+#include "recognition/option_text.hpp"
 #include "recognition/refused_option.hpp"
 
 namespace palpate::python {
@@ -32,103 +35,89 @@ Value typed(nb::handle value) {
   return result;
 }
 
-template <auto member>
-void set(Request& request, nb::handle value) {
-  request.*member = typed<std::remove_cvref_t<decltype(request.*member)>>(value);
-}
+// Each function takes an option's value from Python.
 
-void set_bins(Request& request, nb::handle value) {
-  const auto bins = typed<std::variant<std::array<int, 3>, std::string>>(value);
-  if (const auto* counts = std::get_if<std::array<int, 3>>(&bins)) {
-    request.bins = *counts;
-    return;
-  }
-  const auto& word = std::get<std::string>(bins);
-  if (word != "auto" && word != "fine") {
-    refuse_option("bins", word, "give counts of x, y and theta, or 'auto', or 'fine'");
-  }
-  request.bins = word == "fine" ? BinWidth::fine : BinWidth::automatic;
-}
-
-/// Takes "auto" for Automatic.
 template <typename Value>
-std::variant<Value, Automatic> or_automatic(const char* option, nb::handle value) {
-  const auto given = typed<std::variant<Value, std::string>>(value);
-  if (const auto* word = std::get_if<std::string>(&given)) {
-    if (*word != "auto") {
-      refuse_option(option, *word, "not known; give numbers, or 'auto'");
+void take(const char* /*option*/, nb::handle given, Value& value) {
+  value = typed<Value>(given);
+}
+
+/// Numbers, or a word that the option has.
+template <typename Numbers>
+std::variant<Numbers, std::string> numbers_or_word(const char* option, nb::handle given,
+                                                   std::initializer_list<std::string_view> words) {
+  auto value = typed<std::variant<Numbers, std::string>>(given);
+  if (const auto* word = std::get_if<std::string>(&value)) {
+    if (std::ranges::find(words, *word) == words.end()) {
+      refuse_option(option, *word, "not known; give numbers, or {}",
+                    fmt::format("'{}'", fmt::join(words.begin(), words.end(), "' or '")));
     }
-    return Automatic{};
   }
-  return std::get<Value>(given);
+  return value;
 }
 
-void set_pivot(Request& request, nb::handle value) {
-  const auto pivot = or_automatic<std::array<double, 2>>("pivot-mm", value);
-  if (const auto* xy = std::get_if<std::array<double, 2>>(&pivot)) {
-    request.pivot_mm = glm::dvec2((*xy)[0], (*xy)[1]);
+void take(const char* option, nb::handle given, Bins& value) {
+  const auto bins = numbers_or_word<std::array<int, 3>>(option, given, {"auto", "fine"});
+  if (const auto* counts = std::get_if<std::array<int, 3>>(&bins)) {
+    value = *counts;
   } else {
-    request.pivot_mm = Automatic{};
+    value = std::get<std::string>(bins) == "fine" ? BinWidth::fine : BinWidth::automatic;
   }
 }
 
-void set_frames(Request& request, nb::handle value) {
-  const auto [begin, end] = typed<std::array<std::int64_t, 2>>(value);
+void take(const char* option, nb::handle given, Pivot& value) {
+  const auto pivot = numbers_or_word<std::array<double, 2>>(option, given, {"auto"});
+  if (const auto* xy = std::get_if<std::array<double, 2>>(&pivot)) {
+    value = glm::dvec2((*xy)[0], (*xy)[1]);
+  } else {
+    value = Automatic{};
+  }
+}
+
+void take(const char* option, nb::handle given, NoneWeight& value) {
+  const auto weight = numbers_or_word<double>(option, given, {"auto"});
+  if (const auto* number = std::get_if<double>(&weight)) {
+    value = *number;
+  } else {
+    value = Automatic{};
+  }
+}
+
+void take(const char* option, nb::handle given, Frames& value) {
+  const auto [begin, end] = typed<std::array<std::int64_t, 2>>(given);
   if (begin < 0 || end < 0) {
-    refuse_option("frames", fmt::format("{}:{}", begin, end),
+    refuse_option(option, fmt::format("{}:{}", begin, end),
                   "touches are counted from 0; give none below");
   }
-  request.frames = {static_cast<std::size_t>(begin), static_cast<std::size_t>(end)};
+  value = {static_cast<std::size_t>(begin), static_cast<std::size_t>(end)};
 }
 
-void set_device(Request& request, nb::handle value) {
-  const auto device = typed<std::variant<std::int64_t, std::string>>(value);
-  const auto* index = std::get_if<std::int64_t>(&device);
-  request.device = index != nullptr ? std::to_string(*index) : std::get<std::string>(device);
+void take(const char* /*option*/, nb::handle given, FilterKind& value) {
+  value = filter_named(typed<std::string>(given));
 }
 
-using Set = void (*)(Request&, nb::handle);
+void take(const char* /*option*/, nb::handle given, Resampling& value) {
+  value = resampling_named(typed<std::string>(given));
+}
 
-const std::map<std::string, Set>& options() {
-  static const std::map<std::string, Set> all{
-      {"scene", set<&Request::scene>},
-      {"sensor_model", set<&Request::sensor_model>},
-      {"bins", set_bins},
-      {"x_mm", set<&Request::x_mm>},
-      {"y_mm", set<&Request::y_mm>},
-      {"theta_deg", set<&Request::theta_deg>},
-      {"pivot_mm", set_pivot},
-      {"prior", set<&Request::prior>},
-      {"gamma", set<&Request::gamma>},
-      {"threshold", set<&Request::threshold>},
-      {"ratio", set<&Request::ratio>},
-      {"touch_sd_mm", set<&Request::touch_sd_mm>},
-      {"touch_sd_deg", set<&Request::touch_sd_deg>},
-      {"slip_sd_mm", set<&Request::slip_sd_mm>},
-      {"slip_sd_deg", set<&Request::slip_sd_deg>},
-      {"none", [](Request& request,
-                  nb::handle value) { request.none = or_automatic<double>("none", value); }},
-      {"filter",
-       [](Request& request, nb::handle value) {
-         request.filter = filter_named(typed<std::string>(value));
-       }},
-      {"tolerance", set<&Request::tolerance>},
-      {"budget_ms", set<&Request::budget_ms>},
-      {"evidence_nats", set<&Request::evidence_nats>},
-      {"particles", set<&Request::particles>},
-      {"resampling",
-       [](Request& request, nb::handle value) {
-         request.resampling = resampling_named(typed<std::string>(value));
-       }},
-      {"augmented", set<&Request::augmented>},
-      {"seed", set<&Request::seed>},
-      {"memory_mib", set<&Request::memory_mib>},
-      {"device", set_device},
-      {"frames", set_frames},
-      {"touches", set<&Request::touches>},
-      {"each_frame", set<&Request::each_frame>},
-      {"trace", set<&Request::trace>}};
-  return all;
+template <typename Value>
+void take(const char* option, nb::handle given, std::optional<Value>& value) {
+  take(option, given, value.emplace());
+}
+
+void set_option(Request& request, std::string option, nb::handle given) {
+  if (option == "device") {
+    const auto device = typed<std::variant<std::int64_t, std::string>>(given);
+    const auto* index = std::get_if<std::int64_t>(&device);
+    request.device = index != nullptr ? std::to_string(*index) : std::get<std::string>(device);
+    return;
+  }
+  std::ranges::replace(option, '_', '-');
+  visit_options(request, [&](const char* name, auto& value) {
+    if (option == name) {
+      take(name, given, value);
+    }
+  });
 }
 
 }  // namespace
@@ -158,13 +147,8 @@ void add_maps(const nb::list& items, Request& request) {
 void bind_request(nb::module_& module) {
   nb::class_<Request>(module, "Request", "What is asked of a recognition.")
       .def(nb::init<>())
-      .def(
-          "set",
-          [](Request& self, const std::string& option, nb::handle value) {
-            options().at(option)(self, value);
-          },
-          "option"_a, "value"_a,
-          "Sets an option of recognize(). Raises TypeError where the value is of another type.");
+      .def("set", &set_option, "option"_a, "value"_a,
+           "Sets an option of recognize(). Raises TypeError where the value is of another type.");
 }
 
 }  // namespace palpate::python

@@ -37,7 +37,7 @@ class Data:
         head, self.entries, _ = _palpate.settle_batch(
             self.paths, self.map_paths, request, self.device, threads
         )
-        return _palpate.OpenBatch.open(head, self.map_paths, request, self.device, threads)
+        return _palpate.OpenBatch.open(head, self.device, threads)
 
     def on(self, lattice: PoseLattice, filter: str) -> "_palpate.OpenBatch":
         """The same on given bins."""

@@ -274,14 +274,11 @@ def _settle(
 def _recognize(entries: list[bytes], batch: _Batch, threads: int | None = None) -> _Lines:
     global _opened
     batch.asked.require_folder()
-    request = batch.asked.request()
     with _opening:
-        device = _open_device(_palpate.device_of(request))
+        device = _open_device(_palpate.device_of(batch.asked.request()))
         if _opened is None or _opened[0] != batch:
             _opened = None  # gives its memory back first
-            _opened = batch, _palpate.OpenBatch.open(
-                batch.head, batch.asked.maps(), request, device, threads or _threads()
-            )
+            _opened = batch, _palpate.OpenBatch.open(batch.head, device, threads or _threads())
         opened = _opened[1]
     if device.name != batch.device and not opened.on_host:
         raise Error(

@@ -12,8 +12,8 @@ class BatchFiles : public BatchTest {
   void make_task(const std::string& head, const std::string& input) const {
     fs::create_directories(folder_ / "r/chunks");
     put_bytes(folder_ / "r/task.ndjson",
-              fmt::format(R"({{"format":"palpate.batch","version":1,"program":"0","inputs":1,)"
-                          R"("unknowns":1,{},"flags":{{}},"files":{{}},"pressure_unit":"kPa",)"
+              fmt::format(R"({{"format":"palpate.batch","version":2,"program":"0","inputs":1,)"
+                          R"("unknowns":1,{},"maps":[],"files":{{}},"pressure_unit":"kPa",)"
                           R"("unit_from":"","reach_mm":1,"still_array":false,"bins":[1,1,1]}})"
                           "\n{}\n",
                           head, input));
@@ -92,12 +92,30 @@ TEST_F(BatchFiles, MergeAndEvaluateKeepWhatTheyRead) {
   EXPECT_EQ(palpate({"merge", "r", "--partial", "-o", "r/all.ndjson"}).status, 0);
 }
 
+TEST_F(BatchFiles, ATaskOfAnotherVersionOrWithUnknownOptionsIsRefused) {
+  palpate(batch("r"));
+  const std::string task = bytes_of(folder_ / "r/task.ndjson");
+  const auto with = [&](const std::string& old, const std::string& text) {
+    std::string changed = task;
+    changed.replace(changed.find(old), old.size(), text);
+    put_bytes(folder_ / "r/task.ndjson", changed);
+  };
+  with("\"version\":2", "\"version\":1");
+  expect_refused({"merge", "r"}, {"r/task.ndjson", "of an older palpate", "remove the folder"});
+  with("\"version\":2", "\"version\":3");
+  expect_refused({"merge", "r"}, {"r/task.ndjson", "use a newer palpate"});
+  for (const char* option : {"\"speed\":\"1\",", "\"x-mm\":\"1\",", "\"trace\":\"yes\","}) {
+    with("\"options\":{", std::string("\"options\":{") + option);
+    expect_refused({"merge", "r"}, {"r/task.ndjson", "is damaged"});
+  }
+}
+
 // As many chunks as touches: neither command may look for each of them.
 TEST_F(BatchFiles, ATaskOfVeryManyChunksTakesNoTime) {
   const auto input = [](const std::string& touches) {
     return R"({"path":"u.h5","survey":[)" + touches + R"(,1,"kPa",""]})";
   };
-  const std::string head = R"("chunk_unknowns":1,"each_frame":true)";
+  const std::string head = R"("chunk_unknowns":1,"options":{"each-frame":"true"})";
   make_task(head, input("1000000000"));
   put_bytes(folder_ / "r/chunks/000007.ndjson", R"({"error":"u.h5: no such file"})"
                                                 "\n");
@@ -114,15 +132,15 @@ TEST_F(BatchFiles, ATaskOfVeryManyChunksTakesNoTime) {
     make_task(head, input(touches));
     expect_refused({"merge", "r"}, {"r/task.ndjson", "is damaged"});
   }
-  make_task(R"("chunk_unknowns":18446744073709551615,"each_frame":true)", input("9"));
+  make_task(R"("chunk_unknowns":18446744073709551615,"options":{"each-frame":"true"})", input("9"));
   expect_refused({"merge", "r"}, {"1 of 1 chunks are missing", "0 to 8"});
 }
 
 TEST_F(BatchFiles, EvaluateCountsMissingChunksAtOnce) {
   palpate(batch("r"));
   std::string task = bytes_of(folder_ / "r/task.ndjson");
-  const std::string each = "\"each_frame\":false";
-  task.replace(task.find(each), each.size(), "\"each_frame\":true");
+  const std::string options = "\"options\":{";
+  task.replace(task.find(options), options.size(), options + "\"each-frame\":\"true\",");
   task.replace(task.rfind('}'), 1, ",\"survey\":[900000000,1,\"kPa\",\"\"]}");
   put_bytes(folder_ / "r/task.ndjson", task);
   const Outcome outcome = palpate({"evaluate", "r"});

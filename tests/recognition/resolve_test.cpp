@@ -9,10 +9,10 @@
 #include <gtest/gtest.h>
 
 #include "palpate/error.hpp"
+#include "recognition/option_text.hpp"
 #include "shapes.hpp"
 
-namespace palpate {
-namespace {
+namespace palpate::resolve_test {
 
 using testing::HasSubstr;
 
@@ -133,5 +133,55 @@ TEST(Request, ValuesThatCannotBeMeantAreRefused) {
   EXPECT_THAT(refused([](Request& r) { r.given_maps.clear(); }), HasSubstr("`maps`: missing"));
 }
 
-}  // namespace
-}  // namespace palpate
+TEST(OptionText, EveryOptionIsReadAsItWasWritten) {
+  EXPECT_THAT(option_texts({}), testing::IsEmpty());
+  const std::map<std::string, std::string> texts{{"scene", "a b.yaml"},
+                                                 {"sensor-model", "s.yaml"},
+                                                 {"bins", "6x5x4"},
+                                                 {"x-mm", "-10:0.1"},
+                                                 {"y-mm", "1e-07:2"},
+                                                 {"theta-deg", "0:360"},
+                                                 {"pivot-mm", "1.5,-2"},
+                                                 {"prior", "0.25"},
+                                                 {"gamma", "0.1"},
+                                                 {"threshold", "2"},
+                                                 {"ratio", "0.3"},
+                                                 {"touch-sd-mm", "1"},
+                                                 {"touch-sd-deg", "2"},
+                                                 {"slip-sd-mm", "3"},
+                                                 {"slip-sd-deg", "4"},
+                                                 {"none", "0.5"},
+                                                 {"filter", "particles"},
+                                                 {"tolerance", "1e-06"},
+                                                 {"budget-ms", "5"},
+                                                 {"evidence-nats", "0.01"},
+                                                 {"particles", "100"},
+                                                 {"augmented", "true"},
+                                                 {"seed", "18446744073709551615"},
+                                                 {"memory-mib", "64"},
+                                                 {"frames", "2:7"},
+                                                 {"touches", "3"},
+                                                 {"each-frame", "true"},
+                                                 {"trace", "true"},
+                                                 {"resampling", "systematic"}};
+  std::size_t options = 0;
+  const Request none;
+  visit_options(none, [&](const char* option, const auto& /*value*/) {
+    EXPECT_TRUE(texts.contains(option)) << option;
+    ++options;
+  });
+  EXPECT_EQ(options, texts.size());
+  EXPECT_EQ(option_texts(request_with(texts)), texts);
+  const std::map<std::string, std::string> words{
+      {"bins", "fine"}, {"pivot-mm", "auto"}, {"none", "auto"}, {"filter", "auto"}};
+  EXPECT_EQ(option_texts(request_with(words)), words);
+}
+
+TEST(OptionText, WhatIsNoOptionOrNoValueIsRefused) {
+  EXPECT_THROW(request_with({{"speed", "1"}}), Error);
+  EXPECT_THROW(request_with({{"trace", "yes"}}), Error);
+  EXPECT_THROW(request_with({{"bins", "6x5"}}), Error);
+  EXPECT_THROW(request_with({{"frames", "3:2"}}), Error);
+}
+
+}  // namespace palpate::resolve_test

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <chrono>
 #include <memory>
-#include <set>
 #include <thread>
 
 #include <fmt/format.h>
@@ -44,19 +43,6 @@ std::size_t cores() {
   const int count = ::sched_getaffinity(0, sizeof set, &set) == 0 ? CPU_COUNT(&set) : 0;
   return count > 0 ? static_cast<std::size_t>(count)
                    : std::max(1U, std::thread::hardware_concurrency());
-}
-
-/// The flags that change results, as given.
-std::map<std::string, std::vector<std::string>> flags_of(const CLI::App& command) {
-  const std::set<std::string> others{"--output", "--shard",   "--threads", "--device",
-                                     "--update", "--verbose", "--chunk"};
-  std::map<std::string, std::vector<std::string>> flags;
-  for (const CLI::Option* option : command.get_options()) {
-    if (option->count() > 0 && !option->get_positional() && !others.contains(option->get_name())) {
-      flags[option->get_name()] = option->results();
-    }
-  }
-  return flags;
 }
 
 /// The chunks of a shard.
@@ -131,7 +117,7 @@ Device open_device_in_step(const std::string& wished) {
   return Device::open(rank ? local_device(Device::list(wished), wished, *rank) : wished);
 }
 
-int batch(const BatchArguments& options, const CLI::App& command) {
+int batch(const BatchArguments& options) {
   refuse_budget(options.request);
   if (options.chunk < 1) {
     refuse_flag("--chunk", options.chunk, "give at least 1");
@@ -141,8 +127,7 @@ int batch(const BatchArguments& options, const CLI::App& command) {
   const Request request = complete(options.request);
   BatchTask asked{.program = PALPATE_VERSION,
                   .chunk_unknowns = static_cast<std::size_t>(options.chunk),
-                  .each_frame = request.each_frame,
-                  .flags = flags_of(command)};
+                  .request = options.request};
   for (BatchInput& input : list_inputs(options.inputs)) {
     asked.inputs.push_back({std::move(input), {}, {}});
   }
@@ -212,7 +197,7 @@ void add_batch(CLI::App& app, int& status) {
       ->add_option("--threads", options->threads,
                    "Host threads; results do not depend on them [default: the cores at hand]")
       ->check(require_whole_number);
-  command->callback([options, command, &status] { status = batch(*options, *command); });
+  command->callback([options, &status] { status = batch(*options); });
 }
 
 }  // namespace palpate::cli

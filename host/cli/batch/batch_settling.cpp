@@ -79,8 +79,8 @@ SettledBatch settle_batch(const ResultsFolder& folder, const FolderLock& lock, B
         difference_of_tasks(
             {.program = before->program,
              .chunk_unknowns = before->chunk_unknowns,
-             .flags = before->flags},
-            {.program = now.program, .chunk_unknowns = now.chunk_unknowns, .flags = now.flags}),
+             .request = before->request},
+            {.program = now.program, .chunk_unknowns = now.chunk_unknowns, .request = now.request}),
         update, recognise_all);
   }
   stamp_inputs(now);

@@ -45,7 +45,7 @@ void read_manifest(const fs::path& manifest, std::vector<BatchInput>& inputs) {
     input.path = (manifest.parent_path() / fs::path(table.text(*path))).string();
     if (frames && !table.text(*frames).empty()) {
       try {
-        input.frames = parse_frames("column 'frames':", std::string(table.text(*frames)));
+        read_option("column 'frames':", std::string(table.text(*frames)), input.frames);
       } catch (const Error& error) {
         table.refuse("{}", error.what());
       }

@@ -24,7 +24,7 @@ void stamp_inputs(BatchTask& task) {
 
 void survey(BatchTask& task, const Request& request, std::size_t threads,
             const std::function<void(double)>& progress) {
-  if (task.each_frame || infers_region(request)) {
+  if (request.each_frame || infers_region(request)) {
     survey_inputs(task.inputs, request, threads, progress);
   }
 }

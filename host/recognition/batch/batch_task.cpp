@@ -12,6 +12,7 @@
 
 #include "io/atomic_file.hpp"
 #include "io/input_file.hpp"
+#include "recognition/option_text.hpp"
 
 namespace palpate {
 
@@ -21,7 +22,7 @@ using Json = nlohmann::ordered_json;
 namespace fs = std::filesystem;
 
 constexpr const char* format = "palpate.batch";
-constexpr int version = 1;
+constexpr int version = 2;
 /// Far more than anyone recognises, and few enough to count and to keep a bit for each.
 constexpr std::size_t most_unknowns = 1'000'000'000;
 
@@ -95,11 +96,13 @@ BatchEntry entry_of(const Json& json) {
 }
 
 Json head_to_json(const BatchTask& task) {
-  Json flags = Json::object();
-  for (const auto& [flag, values] : task.flags) {
-    for (const std::string& value : values) {
-      flags[flag].push_back(to_utf8(value));
-    }
+  Json maps = Json::array();
+  for (const std::string& map : task.request.maps) {
+    maps.push_back(to_utf8(map));
+  }
+  Json options = Json::object();
+  for (const auto& [option, text] : option_texts(task.request)) {
+    options[option] = to_utf8(text);
   }
   Json files = Json::object();
   for (const auto& [file, hash] : task.files) {
@@ -112,8 +115,8 @@ Json head_to_json(const BatchTask& task) {
           {"inputs", task.inputs.size()},
           {"unknowns", task.unknowns()},
           {"chunk_unknowns", task.chunk_unknowns},
-          {"each_frame", task.each_frame},
-          {"flags", flags},
+          {"maps", maps},
+          {"options", options},
           {"files", files},
           {"pressure_unit", inferred.pressure_unit},
           {"unit_from", to_utf8(inferred.unit_from)},
@@ -126,11 +129,17 @@ BatchTask head_of(const Json& json) {
   BatchTask task;
   task.program = json.at("program");
   task.chunk_unknowns = std::max<std::size_t>(count_of(json.at("chunk_unknowns")), 1);
-  task.each_frame = json.at("each_frame");
-  for (const auto& [flag, values] : json.at("flags").items()) {
-    for (const Json& value : values) {
-      task.flags[flag].push_back(from_utf8(value));
-    }
+  std::map<std::string, std::string> options;
+  for (const auto& [option, text] : json.at("options").items()) {
+    options[option] = from_utf8(text);
+  }
+  try {
+    task.request = request_with(options);
+  } catch (const Error& error) {
+    throw Json::other_error::create(501, error.what(), nullptr);
+  }
+  for (const Json& map : json.at("maps")) {
+    task.request.maps.push_back(from_utf8(map));
   }
   for (const auto& [file, hash] : json.at("files").items()) {
     task.files[from_utf8(file)] = hash;
@@ -141,10 +150,18 @@ BatchTask head_of(const Json& json) {
   return task;
 }
 
-std::string values_of(const BatchTask& task, const std::string& flag) {
-  const auto found = task.flags.find(flag);
-  return found == task.flags.end() ? "not given"
-                                   : fmt::format("'{}'", fmt::join(found->second, " "));
+/// What two tasks' requests may differ in, as texts.
+std::map<std::string, std::string> asked_of(const BatchTask& task) {
+  std::map<std::string, std::string> texts = option_texts(task.request);
+  if (!task.request.maps.empty()) {
+    texts["maps"] = fmt::format("{}", fmt::join(task.request.maps, " "));
+  }
+  return texts;
+}
+
+std::string value_of(const std::map<std::string, std::string>& texts, const std::string& option) {
+  const auto found = texts.find(option);
+  return found == texts.end() ? "not given" : fmt::format("'{}'", found->second);
 }
 
 /// The first key at which two maps differ; none where they are equal.
@@ -192,7 +209,7 @@ std::vector<std::vector<Part>> parts_of_chunks(const BatchTask& task) {
   return chunks;
 }
 
-/// Reads the first line of a task file. @throws Error where it is of no task, or of a newer one
+/// Reads the first line of a task file. @throws Error where it is of no task, or of another version
 Json read_head(const fs::path& file, std::istream& stream) {
   std::string line;
   std::getline(stream, line);
@@ -203,6 +220,9 @@ Json read_head(const fs::path& file, std::istream& stream) {
   if (head.value("version", version) > version) {
     refuse(file, "has version {}, this program reads {}; use a newer palpate",
            head.at("version").get<int>(), version);
+  }
+  if (head.value("version", version) < version) {
+    refuse(file, "is of an older palpate; remove the folder, or give another");
   }
   return head;
 }
@@ -233,7 +253,7 @@ std::optional<FileStamp> stamp_of(const std::string& path) {
 }
 
 std::size_t BatchTask::unknowns_of(const BatchEntry& entry) const {
-  return each_frame && entry.survey ? entry.survey->touches : 1;
+  return request.each_frame && entry.survey ? entry.survey->touches : 1;
 }
 
 std::size_t BatchTask::unknowns() const {
@@ -303,9 +323,10 @@ std::string difference_of_tasks(const BatchTask& before, const BatchTask& now) {
   if (before.program != now.program) {
     return fmt::format("palpate is {}, its results are of {}", now.program, before.program);
   }
-  if (const auto flag = first_difference(before.flags, now.flags)) {
-    return fmt::format("{} is {}, its results are of {}", *flag, values_of(now, *flag),
-                       values_of(before, *flag));
+  const auto [old, asked] = std::pair(asked_of(before), asked_of(now));
+  if (const auto option = first_difference(old, asked)) {
+    return fmt::format("`{}` is {}, its results are of {}", *option, value_of(asked, *option),
+                       value_of(old, *option));
   }
   if (before.chunk_unknowns != now.chunk_unknowns) {
     return fmt::format("chunks of {} unknowns are asked for, its results have {}",

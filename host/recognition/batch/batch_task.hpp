@@ -57,10 +57,9 @@ struct BatchInference {
 /// What a results folder computes: the content of its task file, in whose absence nothing is
 /// computed. Two equal tasks have equal results.
 struct BatchTask {
-  std::string program;             ///< version
-  std::size_t chunk_unknowns = 0;  ///< in each chunk but the last
-  bool each_frame = false;
-  std::map<std::string, std::vector<std::string>> flags;  ///< that change results, as given
+  std::string program;                       ///< version
+  std::size_t chunk_unknowns = 0;            ///< in each chunk but the last
+  Request request;                           ///< as asked; its device does not count
   std::map<std::string, std::string> files;  ///< maps, sensor model, scene: hashes of their content
   BatchInference inferred;
   std::array<int, 3> bins{};  ///< of the lattice; those of --bins auto follow from the device
@@ -85,8 +84,8 @@ BatchTask read_batch_task(const std::filesystem::path& file);
 void require_batch_task(const std::filesystem::path& file);
 void write_batch_task(const std::filesystem::path& file, const BatchTask& task);
 
-/// Why all results of `before` are no results of `now`, naming the flag or the file; "" where only
-/// inputs may differ.
+/// Why all results of `before` are no results of `now`, naming the option or the file; "" where
+/// only inputs may differ.
 std::string difference_of_tasks(const BatchTask& before, const BatchTask& now);
 /// The first input that differs, in words; "" where none does.
 std::string difference_of_inputs(const BatchTask& before, const BatchTask& now);
