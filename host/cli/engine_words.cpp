@@ -7,6 +7,7 @@
 
 #include "cli/options.hpp"
 #include "model/option_words.hpp"
+#include "recognition/filter_choice.hpp"
 
 namespace palpate::cli {
 
@@ -48,13 +49,14 @@ void print_engine(const Device* device, const Recogniser& recogniser, const Reco
     return fmt::format("{} {:g} to {:g} {}, {} bins in steps of {:.4g}", name, axis.lower * unit,
                        axis.upper * unit, unit_name, axis.count, axis.step() * unit);
   };
+  const FilterOptions opened = opened_filter(task);
   std::string filter;
-  if (const auto* particles = std::get_if<ParticleOptions>(&task.filter)) {
+  if (const auto* particles = std::get_if<ParticleOptions>(&opened)) {
     filter =
         fmt::format("{} particles, {} resampling{}, seed {}", particles->particles,
                     particles->resampling == Resampling::multinomial ? "multinomial" : "systematic",
                     particles->augmented ? ", random particles added" : "", particles->seed);
-  } else if (const auto* bounded = std::get_if<BoundedOptions>(&task.filter)) {
+  } else if (const auto* bounded = std::get_if<BoundedOptions>(&opened)) {
     filter = fmt::format(
         "bounded, {}; {:.1f} MiB of the host's memory\n        tolerance {:g}", recogniser.path(),
         static_cast<double>(recogniser.host_bytes()) / (1 << 20), bounded->tolerance);

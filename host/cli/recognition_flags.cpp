@@ -9,6 +9,7 @@
 
 #include "cli/options.hpp"
 #include "model/option_words.hpp"
+#include "recognition/filter_choice.hpp"
 #include "recognition/option_text.hpp"
 
 namespace palpate::cli {

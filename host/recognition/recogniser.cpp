@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
-#include <variant>
 
 #include <fmt/format.h>
 
@@ -11,25 +10,12 @@
 
 namespace palpate {
 
-namespace {
-
-FilterOptions with_cancel_point(const RecognitionTask& task) {
-  FilterOptions options = task.filter;
-  auto* bounded = std::get_if<BoundedOptions>(&options);
-  if (bounded != nullptr && task.cancel_point) {
-    bounded->cancel_point = task.cancel_point;
-  }
-  return options;
-}
-
-}  // namespace
-
 Recogniser::Recogniser(Device* device, const RecognitionTask& task)
     : traits_(traits_of(task.filter)),
       lattice_(task.lattice()),
       contact_(task.contact()),
       auto_pivot_(task.auto_pivot),
-      filter_(make_filter(device, task.hypotheses, with_cancel_point(task))) {}
+      filter_(make_filter(device, task.hypotheses, opened_filter(task))) {}
 
 void Recogniser::reset() {
   filter_->reset();

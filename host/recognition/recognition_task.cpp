@@ -7,8 +7,6 @@
 
 #include <fmt/format.h>
 
-#include "estimation/bounded/search/search_memory.hpp"
-
 namespace palpate {
 
 namespace {
@@ -24,6 +22,23 @@ auto& lattice_in(Options& options) {
 }
 
 }  // namespace
+
+const PoseLattice& lattice_of(const FilterOptions& filter) {
+  return std::visit([](const auto& one) -> const PoseLattice& { return lattice_in(one); }, filter);
+}
+
+std::int64_t bins_in_all(std::size_t objects, const PoseLattice& lattice) {
+  // In float64, as counts of three axes may exceed an integer.
+  const double all = static_cast<double>(objects) * lattice.x_mm.count * lattice.y_mm.count *
+                     lattice.theta_rad.count;
+  constexpr double most = 9e18;
+  return static_cast<std::int64_t>(std::min(all, most));
+}
+
+FilterOptions with_lattice(FilterOptions filter, const PoseLattice& lattice) {
+  std::visit([&](auto& one) { lattice_in(one) = lattice; }, filter);
+  return filter;
+}
 
 RecognitionTask::RecognitionTask(std::vector<Hypothesis> objects, const FilterOptions& options)
     : hypotheses(std::move(objects)), filter(options) {
@@ -50,14 +65,6 @@ RecognitionTask::RecognitionTask(std::vector<Hypothesis> objects, const FilterOp
   }
 }
 
-const PoseLattice& RecognitionTask::lattice() const {
-  return std::visit([](const auto& one) -> const PoseLattice& { return lattice_in(one); }, filter);
-}
-
-PoseLattice& RecognitionTask::lattice() {
-  return std::visit([](auto& one) -> PoseLattice& { return lattice_in(one); }, filter);
-}
-
 const ContactModel& RecognitionTask::contact() const {
   return std::visit([](const auto& one) -> const ContactModel& { return one.contact; }, filter);
 }
@@ -72,44 +79,26 @@ DisplacementSd RecognitionTask::slip_sd() const {
   return histogram != nullptr ? histogram->slip_sd : DisplacementSd{};
 }
 
-std::int64_t RecognitionTask::bins_in_all() const {
-  // In float64, as counts of three axes may exceed an integer.
-  const PoseLattice& bins = lattice();
-  const double all = static_cast<double>(hypotheses.size()) * bins.x_mm.count * bins.y_mm.count *
-                     bins.theta_rad.count;
-  constexpr double most = 9e18;
-  return static_cast<std::int64_t>(std::min(all, most));
-}
-
-std::optional<BoundedOptions> bounded_instead(const HistogramOptions& histogram) {
-  if (!histogram.touch_sd.none() || !histogram.slip_sd.none() || histogram.memory_limit_bytes) {
-    return {};
+FilterOptions opened_filter(const RecognitionTask& task) {
+  constexpr double share = 0.05;
+  constexpr double negligible = 1e-4;
+  FilterOptions filter = task.filter;
+  auto* bounded = std::get_if<BoundedOptions>(&filter);
+  if (bounded == nullptr) {
+    return filter;
   }
-  return BoundedOptions{.lattice = histogram.lattice,
-                        .contact = histogram.contact,
-                        .none_weight = histogram.none_weight};
-}
-
-std::optional<CoarsenedBins> settle_bins(const Device& device, RecognitionTask& task) {
-  if (!task.bin_width) {
-    return {};
+  if (task.cancel_point) {
+    bounded->cancel_point = task.cancel_point;
   }
-  const auto* histogram = std::get_if<HistogramOptions>(&task.filter);
-  std::int64_t most = most_bins_on(device, false);
-  if (traits_of(task.filter).certificate ||
-      (histogram != nullptr && task.auto_filter && bounded_instead(*histogram))) {
-    most = most_bounded_bins;
-  } else if (histogram != nullptr) {
-    most = most_bins_on(device, histogram->still_array, histogram->memory_limit_bytes);
-    if (histogram->memory_limit_bytes) {
-      // One bin an object may still exceed the limit: the histogram says how much memory it needs.
-      most = std::max(most, static_cast<std::int64_t>(task.hypotheses.size()));
-    }
+  const bool tempered = task.temperature > 1.0 || task.temperature_growth > 0.0;
+  if ((tempered || task.features || task.familiarity) && !bounded->evidence_nats) {
+    bounded->evidence_nats = share * task.temperature;
+    bounded->evidence_range_nats =
+        std::max(-std::log(negligible) * task.temperature,
+                 task.familiarity ? FamiliarityScore::most_lead_nats : 0.0);
+    bounded->evidence_growth = task.temperature_growth / task.temperature;
   }
-  const BalancedLattice chosen =
-      balanced_lattice(task.lattice(), task.hypotheses, most, *task.bin_width);
-  task.lattice() = chosen.lattice;
-  return chosen.coarsened ? std::optional(CoarsenedBins{chosen.step_mm, most}) : std::nullopt;
+  return filter;
 }
 
 std::string wider_bins_sentence(const RecognitionTask& task) {
@@ -138,38 +127,6 @@ std::string wider_bins_sentence(const RecognitionTask& task) {
 
 bool tells_known(const RecognitionTask& task) {
   return task.familiarity && traits_of(task.filter).bins;
-}
-
-void settle_evidence(RecognitionTask& task) {
-  constexpr double share = 0.05;
-  constexpr double negligible = 1e-4;
-  auto* bounded = std::get_if<BoundedOptions>(&task.filter);
-  const bool tempered = task.temperature > 1.0 || task.temperature_growth > 0.0;
-  if (bounded != nullptr && (tempered || task.features || task.familiarity) &&
-      !bounded->evidence_nats) {
-    bounded->evidence_nats = share * task.temperature;
-    bounded->evidence_range_nats =
-        std::max(-std::log(negligible) * task.temperature,
-                 task.familiarity ? FamiliarityScore::most_lead_nats : 0.0);
-    bounded->evidence_growth = task.temperature_growth / task.temperature;
-  }
-}
-
-void settle_filter(RecognitionTask& task) {
-  const auto* histogram = std::get_if<HistogramOptions>(&task.filter);
-  if (!task.auto_filter || histogram == nullptr || task.bins_in_all() <= most_histogram_bins) {
-    return;
-  }
-  const std::optional<BoundedOptions> bounded = bounded_instead(*histogram);
-  if (bounded && bounds_have_room(task)) {
-    task.filter = *bounded;
-  }
-}
-
-bool bounds_have_room(const RecognitionTask& task) {
-  BoundedOptions options{.lattice = task.lattice(), .contact = task.contact()};
-  options.lattice.collapse_fixed().validate();
-  return why_no_room(task.hypotheses, options, memory_for_search()).empty();
 }
 
 }  // namespace palpate

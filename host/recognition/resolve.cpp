@@ -9,7 +9,7 @@
 #include "estimation/displacement_check.hpp"
 #include "io/file_identity.hpp"
 #include "palpate/files.hpp"
-#include "recognition/asked_filter.hpp"
+#include "recognition/filter_choice.hpp"
 #include "recognition/recordings.hpp"
 #include "recognition/refused_option.hpp"
 
@@ -135,30 +135,34 @@ std::optional<BinWidth> bin_width_of(const Request& request) {
   return infers_region(request) ? std::optional(BinWidth::automatic) : std::nullopt;
 }
 
-void set_counts(const std::array<int, 3>& counts, PoseLattice& lattice) {
+PoseLattice with_counts(PoseLattice lattice, const std::array<int, 3>& counts) {
   lattice.x_mm.count = counts[0];
   lattice.y_mm.count = counts[1];
   lattice.theta_rad.count = counts[2];
+  return lattice;
 }
 
-/// Settles what follows from the lattice: its counts, the filter, and the evidence that it finds.
-void settle(const Request& request, const Circumstances& of, RecognitionTask& task) {
+/// The filter on the bins that are used: those settled before, chosen, or given.
+FilterOptions settled_filter(const Request& request, const Circumstances& of, ChosenFilter filter,
+                             std::span<const Hypothesis> hypotheses,
+                             const std::optional<BinWidth>& width,
+                             std::vector<std::string>& remarks) {
   if (of.counts) {
-    set_counts(*of.counts, task.lattice());
-  } else if (task.bin_width) {
-    if (const std::optional<CoarsenedBins> bins = settle_bins(of.device(), task)) {
-      task.remarks.push_back(fmt::format(
+    filter.options =
+        with_lattice(filter.options, with_counts(lattice_of(filter.options), *of.counts));
+  } else if (width) {
+    const auto [bins, most] = chosen_bins(of.device(), hypotheses, filter, *width);
+    filter.options = with_lattice(filter.options, bins.lattice);
+    if (bins.coarsened) {
+      remarks.push_back(fmt::format(
           "`bins {}`: steps of {:.2f} mm, wider than the maps resolve, keep to {} bins in all; "
           "narrow the region, or give `bins`",
-          task.bin_width == BinWidth::fine ? "fine" : "auto", bins->step_mm, bins->most_bins));
+          *width == BinWidth::fine ? "fine" : "auto", bins.step_mm, most));
     }
   }
-  settle_filter(task);
-  settle_evidence(task);
-  require_within_region(request, task.lattice());
-  if (const std::string wider = wider_bins_sentence(task); !wider.empty()) {
-    task.remarks.push_back(wider);
-  }
+  require_within_region(request, lattice_of(filter.options));
+  return filter.automatic ? filter_for_bins(hypotheses, std::get<HistogramOptions>(filter.options))
+                          : filter.options;
 }
 
 }  // namespace
@@ -188,10 +192,8 @@ RecognitionTask resolve(const Request& request, const Circumstances& of) {
       inferred ? automatic_lattice(hypotheses, of.reach_mm, remarks) : given_lattice(request);
   const std::optional<BinWidth> bin_width = bin_width_of(request);
   const ChosenFilter filter = choose_filter(wish, request, of.need, hypotheses, histogram);
-  if (!bin_width) {
-    require_within_region(request, histogram.lattice);
-  }
-  RecognitionTask task(std::move(hypotheses), filter.options);
+  const FilterOptions settled = settled_filter(request, of, filter, hypotheses, bin_width, remarks);
+  RecognitionTask task(std::move(hypotheses), settled);
   task.map_paths = paths_of(objects, task.hypotheses);
   if (sensor) {
     task.temperature = sensor->temperature;
@@ -206,8 +208,10 @@ RecognitionTask resolve(const Request& request, const Circumstances& of) {
   task.filter_asked_for_by = filter.asked_for_by;
   task.auto_pivot = inferred || has_auto_pivot(request);
   task.cancel_point = of.cancel_point;
+  if (std::string wider = wider_bins_sentence(task); !wider.empty()) {
+    remarks.push_back(std::move(wider));
+  }
   task.remarks = std::move(remarks);
-  settle(request, of, task);
   return task;
 }
 
@@ -217,7 +221,8 @@ Recogniser open_recogniser(Device& device, const RecognitionTask& task) {
   } catch (const Error& error) {
     // A resolved task is sound: only the bins' memory can be refused.
     if (error.fault() == Fault::input && traits_of(task.filter).every_bin &&
-        !task.filter_asked_for_by.empty() && bounds_have_room(task)) {
+        !task.filter_asked_for_by.empty() &&
+        bounds_have_room(task.hypotheses, task.lattice(), task.contact())) {
       throw Error(Fault::input,
                   fmt::format("{}, or leave out {}: `filter bounded` needs no device memory",
                               error.what(), task.filter_asked_for_by));

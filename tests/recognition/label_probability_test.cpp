@@ -220,31 +220,29 @@ TEST(LabelBounds, FollowTheTemperatureAndTheFeatures) {
   EXPECT_NEAR(with.identity_bounds[1].high, 2.0 / (2.0 + 2.0 * times), 1e-14);
 }
 
-TEST(SettleEvidence, HasBoundsFindTheEvidenceThatATemperatureNeeds) {
+TEST(OpenedFilter, HasBoundsFindTheEvidenceThatATemperatureNeeds) {
+  const auto bounds = [](const RecognitionTask& task) {
+    return std::get<BoundedOptions>(opened_filter(task));
+  };
   RecognitionTask task = three_maps(BoundedOptions{});
-  settle_evidence(task);
-  EXPECT_FALSE(std::get<BoundedOptions>(task.filter).evidence_nats) << "at temperature 1";
+  EXPECT_FALSE(bounds(task).evidence_nats) << "at temperature 1";
   task.temperature = 30.0;
-  settle_evidence(task);
-  EXPECT_EQ(std::get<BoundedOptions>(task.filter).evidence_nats, 0.05 * 30.0);
-  std::get<BoundedOptions>(task.filter).evidence_nats = 0.1;
-  settle_evidence(task);
-  EXPECT_EQ(std::get<BoundedOptions>(task.filter).evidence_nats, 0.1) << "as given";
-  EXPECT_EQ(std::get<BoundedOptions>(task.filter).evidence_growth, 0.0);
+  EXPECT_EQ(bounds(task).evidence_nats, 0.05 * 30.0);
+  EXPECT_EQ(bounds(task).evidence_growth, 0.0);
+  RecognitionTask given = three_maps(BoundedOptions{.evidence_nats = 0.1});
+  given.temperature = 30.0;
+  EXPECT_EQ(bounds(given).evidence_nats, 0.1);
   RecognitionTask growing = three_maps(BoundedOptions{});
   growing.temperature = 0.8;
   growing.temperature_growth = 0.2;
-  settle_evidence(growing);
-  EXPECT_EQ(std::get<BoundedOptions>(growing.filter).evidence_nats, 0.05 * 0.8);
-  EXPECT_EQ(std::get<BoundedOptions>(growing.filter).evidence_growth, 0.25);
+  EXPECT_EQ(bounds(growing).evidence_nats, 0.05 * 0.8);
+  EXPECT_EQ(bounds(growing).evidence_growth, 0.25);
   RecognitionTask featured = three_maps(BoundedOptions{});
   featured.features = features_of_the_letter();
-  settle_evidence(featured);
-  EXPECT_EQ(std::get<BoundedOptions>(featured.filter).evidence_nats, 0.05);
+  EXPECT_EQ(bounds(featured).evidence_nats, 0.05);
   RecognitionTask dense = three_maps();
   dense.temperature = 30.0;
-  settle_evidence(dense);
-  EXPECT_TRUE(std::holds_alternative<HistogramOptions>(dense.filter));
+  EXPECT_TRUE(std::holds_alternative<HistogramOptions>(opened_filter(dense)));
 }
 
 TEST(WiderBins, AreToldOfWhereTheSensorModelWasLearnedOnNarrowerOnes) {
@@ -262,10 +260,13 @@ TEST(WiderBins, AreToldOfWhereTheSensorModelWasLearnedOnNarrowerOnes) {
   task.learned_bins = BinSteps{1.0, 1.0, 0.0};
   EXPECT_NE(wider_bins_sentence(task), "") << "learned at a fixed angle";
   task.learned_bins = BinSteps{1.0, 1.0, 0.5};
-  task.lattice().theta_rad = {0.0, 6.0, 1};
+  PoseLattice lattice = task.lattice();
+  lattice.theta_rad = {0.0, 6.0, 1};
+  task.filter = with_lattice(task.filter, lattice);
   EXPECT_NE(wider_bins_sentence(task), "") << "one bin is as wide as the region";
   task.learned_bins = BinSteps{1.0, 1.0, 0.06};
-  task.lattice().theta_rad = {1.0, 1.0, 1};
+  lattice.theta_rad = {1.0, 1.0, 1};
+  task.filter = with_lattice(task.filter, lattice);
   EXPECT_EQ(wider_bins_sentence(task), "") << "a fixed angle has no bins";
   task.learned_bins = BinSteps{0.6, 0.6, 0.0};
   task.filter = ParticleOptions{};

@@ -187,7 +187,6 @@ TEST(Temperature, LeavesPosesAndTellsTheSameByBoundsAsByTheHistogram) {
   for (const std::size_t filter : {0U, 2U}) {
     RecognitionTask task(shapes(), every_filter()[filter]);
     task.temperature = 8.0;
-    settle_evidence(task);
     Recogniser recogniser(device, task);
     steps.push_back(recognise(recogniser, task, unknown_of(recording), false).last());
     task.temperature = 1.0;
@@ -231,7 +230,6 @@ TEST(LearnedSensor, TellsTheSameByBoundsAsByTheHistogram) {
       RecognitionTask task(learned, options);
       task.temperature = 4.0;
       task.features = features;
-      settle_evidence(task);
       Recogniser recogniser(device, task);
       records.push_back(recognise(recogniser, task, unknown_of(recording), true));
     }

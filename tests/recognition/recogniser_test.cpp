@@ -189,7 +189,9 @@ std::vector<RecognitionTask> automatic_tasks() {
 /// The same task about this pivot.
 RecognitionTask about(RecognitionTask task, const glm::dvec2& pivot_mm) {
   task.auto_pivot = false;
-  task.lattice().pivot_mm = pivot_mm;
+  PoseLattice lattice = task.lattice();
+  lattice.pivot_mm = pivot_mm;
+  task.filter = with_lattice(task.filter, lattice);
   return task;
 }
 

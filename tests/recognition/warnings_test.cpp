@@ -10,6 +10,7 @@
 #include <gmock/gmock.h>
 
 #include "letters.hpp"
+#include "recognition/filter_choice.hpp"
 #include "recognition/recognition_record.hpp"
 
 namespace palpate::warnings_test {
@@ -77,9 +78,9 @@ TEST_F(Warnings, GoodTouchesGiveNoneOnBinsThatSuitTheMaps) {
     const Recording recording = letter_touches(letter, 3, 50);
     HistogramOptions options;
     options.lattice.pivot_mm = recording.T_robot_sensor.front().translation_mm;
-    RecognitionTask task(*letters_, options);
-    task.bin_width = BinWidth::fine;
-    settle_bins(*device_, task);
+    options.lattice =
+        chosen_bins(*device_, *letters_, {options, false, ""}, BinWidth::fine).balanced.lattice;
+    const RecognitionTask task(*letters_, options);
     expect_silence(task, letter, 3, 50);
   }
 }

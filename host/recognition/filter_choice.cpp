@@ -1,5 +1,6 @@
-#include "recognition/asked_filter.hpp"
+#include "recognition/filter_choice.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <initializer_list>
 #include <numbers>
@@ -10,6 +11,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include "estimation/bounded/search/search_memory.hpp"
 #include "estimation/displacement_check.hpp"
 #include "recognition/refused_option.hpp"
 
@@ -248,6 +250,50 @@ void require_within_region(const Request& request, const PoseLattice& lattice) {
       refuse_option(sd.option, value, "{}", remedy);
     }
   }
+}
+
+std::optional<BoundedOptions> bounded_instead(const HistogramOptions& histogram) {
+  if (!histogram.touch_sd.none() || !histogram.slip_sd.none() || histogram.memory_limit_bytes) {
+    return {};
+  }
+  return BoundedOptions{.lattice = histogram.lattice,
+                        .contact = histogram.contact,
+                        .none_weight = histogram.none_weight};
+}
+
+ChosenBins chosen_bins(const Device& device, std::span<const Hypothesis> hypotheses,
+                       const ChosenFilter& filter, BinWidth width) {
+  const auto* histogram = std::get_if<HistogramOptions>(&filter.options);
+  std::int64_t most = most_bins_on(device, false);
+  if (traits_of(filter.options).certificate ||
+      (histogram != nullptr && filter.automatic && bounded_instead(*histogram))) {
+    most = most_bounded_bins;
+  } else if (histogram != nullptr) {
+    most = most_bins_on(device, histogram->still_array, histogram->memory_limit_bytes);
+    if (histogram->memory_limit_bytes) {
+      // One bin an object may still exceed the limit: the histogram says how much memory it needs.
+      most = std::max(most, static_cast<std::int64_t>(hypotheses.size()));
+    }
+  }
+  return {balanced_lattice(lattice_of(filter.options), hypotheses, most, width), most};
+}
+
+FilterOptions filter_for_bins(std::span<const Hypothesis> hypotheses,
+                              const HistogramOptions& histogram) {
+  if (bins_in_all(hypotheses.size(), histogram.lattice) > most_histogram_bins) {
+    const std::optional<BoundedOptions> bounded = bounded_instead(histogram);
+    if (bounded && bounds_have_room(hypotheses, histogram.lattice, histogram.contact)) {
+      return *bounded;
+    }
+  }
+  return histogram;
+}
+
+bool bounds_have_room(std::span<const Hypothesis> hypotheses, const PoseLattice& lattice,
+                      const ContactModel& contact) {
+  BoundedOptions options{.lattice = lattice, .contact = contact};
+  options.lattice.collapse_fixed().validate();
+  return why_no_room(hypotheses, options, memory_for_search()).empty();
 }
 
 }  // namespace palpate

@@ -1,0 +1,78 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+
+#include "recognition/resolve.hpp"
+
+namespace palpate {
+
+// The part of resolve() that chooses the filter and its bins, and says how far touches may be
+// displaced.
+
+/// The filter that is asked for.
+struct FilterWish {
+  FilterKind kind = FilterKind::automatic;
+  std::string by;  ///< what names it, such as "`filter bounded`" or "filter: bounded in a.yaml"
+};
+
+/// @throws Error on options that only another filter reads
+FilterWish filter_wish(const Request& request);
+
+struct ChosenFilter {
+  FilterOptions options;
+  bool automatic = false;    ///< RecognitionTask::auto_filter
+  std::string asked_for_by;  ///< RecognitionTask::filter_asked_for_by
+};
+
+/// The options of the filter that is wished for. Leaves the choice between histogram and bounds to
+/// filter_for_bins() where neither is wished for and nothing needs the histogram.
+/// @param histogram with the lattice, the contact model, and the sensor model's touch_sd
+/// @throws Error on values out of range, and where the filter has no use for an option
+ChosenFilter choose_filter(const FilterWish& wish, const Request& request,
+                           const HistogramNeed& of_caller, std::span<const Hypothesis> hypotheses,
+                           HistogramOptions histogram);
+
+/// An axis of one bin limits nothing.
+/// @param lattice with the counts that are used, or with one bin where these are not known yet
+/// @throws Error where a standard deviation is wider than the region
+void require_within_region(const Request& request, const PoseLattice& lattice);
+
+/// Most bins, of all objects together, for which `auto` takes the histogram: up to here it answers
+/// quickly, and takes no longer where nothing fits. Above it, bounds answer much sooner where
+/// something does.
+inline constexpr std::int64_t most_histogram_bins = 100'000;
+
+/// Most bins, of all objects together, that chosen_bins() gives to bounds.
+inline constexpr std::int64_t most_bounded_bins = 1'000'000'000;
+
+/// The options of a bounded posterior of the same bins; none where the histogram allows for
+/// something that bounds do not: touch_sd, slip_sd, a limit of its memory, or none_weight with
+/// gamma 0.
+std::optional<BoundedOptions> bounded_instead(const HistogramOptions& histogram);
+
+/// Bins that balanced_lattice() chose.
+struct ChosenBins {
+  BalancedLattice balanced;
+  std::int64_t most_bins = 0;  ///< limit of all objects' bins together
+};
+/// As many bins as the device's memory holds, or most_bounded_bins where bounds are or may become
+/// the filter.
+/// @throws Error as balanced_lattice() does
+ChosenBins chosen_bins(const Device& device, std::span<const Hypothesis> hypotheses,
+                       const ChosenFilter& filter, BinWidth width);
+
+/// Bounds in the place of a histogram of more than most_histogram_bins bins in all, unless
+/// bounded_instead() has none or bounds have no room.
+/// @throws Error on a lattice out of range
+FilterOptions filter_for_bins(std::span<const Hypothesis> hypotheses,
+                              const HistogramOptions& histogram);
+
+/// Whether the machine has room for so many bins by bounds.
+/// @throws Error on a lattice out of range
+bool bounds_have_room(std::span<const Hypothesis> hypotheses, const PoseLattice& lattice,
+                      const ContactModel& contact);
+
+}  // namespace palpate
