@@ -18,7 +18,6 @@
 #include "io/command_files.hpp"
 #include "recognition/record_json.hpp"
 #include "recognition/recordings.hpp"
-#include "recognition/unknowns.hpp"
 
 namespace palpate::cli {
 

@@ -28,7 +28,6 @@
 #include "palpate/files.hpp"
 #include "recognition/record_json.hpp"
 #include "recognition/recordings.hpp"
-#include "recognition/unknowns.hpp"
 
 namespace palpate::cli {
 

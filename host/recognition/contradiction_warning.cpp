@@ -1,4 +1,4 @@
-#include "recognition/contradiction_warning.hpp"
+#include "recognition/warnings.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -10,9 +10,7 @@
 #include "palpate/displacement.hpp"
 #include "palpate/estimate.hpp"
 #include "palpate/lattice.hpp"
-#include "recognition/living_elements.hpp"
 #include "recognition/reading_model.hpp"
-#include "recognition/smooth_occupancy.hpp"
 
 namespace palpate {
 

@@ -11,6 +11,7 @@
 
 #include "palpate/bounded_posterior.hpp"
 #include "palpate/device.hpp"
+#include "palpate/lattice.hpp"
 #include "palpate/particle_filter.hpp"
 #include "palpate/pose_histogram.hpp"
 
@@ -68,5 +69,11 @@ class Filter {
 /// @param device may be null where FilterTraits::certificate is true
 std::unique_ptr<Filter> make_filter(Device* device, std::span<const Hypothesis> hypotheses,
                                     const FilterOptions& options);
+
+/// The lattice, or where it is finer than a picture shows a coarser grid of the same poses: at most
+/// 400 bins along x and along y and 360 along theta. Bins along x and y are a whole number of the
+/// lattice's wide, so that a picture of them shows no stripes; the last of them may reach beyond
+/// the region.
+PoseLattice marginal_grid(const PoseLattice& lattice);
 
 }  // namespace palpate

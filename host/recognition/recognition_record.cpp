@@ -9,12 +9,9 @@
 
 #include "palpate/error.hpp"
 #include "palpate/pose_error.hpp"
-#include "recognition/contradiction_warning.hpp"
-#include "recognition/label_bounds.hpp"
 #include "recognition/label_probability.hpp"
 #include "recognition/nearby_fit.hpp"
 #include "recognition/surprise.hpp"
-#include "recognition/turn_warning.hpp"
 #include "recognition/warnings.hpp"
 
 namespace palpate {

@@ -1,4 +1,4 @@
-#include "recognition/turn_warning.hpp"
+#include "recognition/warnings.hpp"
 
 #include <cmath>
 #include <cstddef>

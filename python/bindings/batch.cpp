@@ -18,8 +18,8 @@
 #include "recognition/batch/batch_resolution.hpp"
 #include "recognition/batch/input_reading.hpp"
 #include "recognition/record_json.hpp"
+#include "recognition/recordings.hpp"
 #include "recognition/resolve.hpp"
-#include "recognition/unknowns.hpp"
 #include "request.hpp"
 #include "session.hpp"
 

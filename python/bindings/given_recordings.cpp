@@ -6,7 +6,6 @@
 
 #include "palpate/error.hpp"
 #include "recognition/recordings.hpp"
-#include "recognition/unknowns.hpp"
 #include "touches.hpp"
 
 namespace palpate::python {

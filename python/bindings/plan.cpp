@@ -17,10 +17,10 @@
 #include "given_recordings.hpp"
 #include "model/option_words.hpp"
 #include "recognition/record_json.hpp"
+#include "recognition/recordings.hpp"
 #include "recognition/resolve.hpp"
 #include "recognition/touch_plan.hpp"
 #include "recognition/touch_sd_fit.hpp"
-#include "recognition/unknowns.hpp"
 
 namespace palpate::python {
 

@@ -9,8 +9,8 @@
 #include "bindings.hpp"
 #include "given_recordings.hpp"
 #include "recognition/record_json.hpp"
+#include "recognition/recordings.hpp"
 #include "recognition/resolve.hpp"
-#include "recognition/unknowns.hpp"
 #include "request.hpp"
 #include "session.hpp"
 

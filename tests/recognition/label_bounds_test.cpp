@@ -1,6 +1,6 @@
 // The bounds of labels from the bounds of their hypotheses' evidence.
 
-#include "recognition/label_bounds.hpp"
+#include "recognition/label_probability.hpp"
 
 #include <gtest/gtest.h>
 

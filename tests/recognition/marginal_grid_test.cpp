@@ -1,4 +1,4 @@
-#include "recognition/marginal_grid.hpp"
+#include "recognition/filter.hpp"
 
 #include <cmath>
 

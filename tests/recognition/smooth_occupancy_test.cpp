@@ -1,4 +1,4 @@
-#include "recognition/smooth_occupancy.hpp"
+#include "recognition/reading_model.hpp"
 
 #include <cmath>
 

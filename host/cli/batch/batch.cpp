@@ -16,7 +16,7 @@
 #include "cli/progress.hpp"
 #include "cli/recognition_flags.hpp"
 #include "recognition/batch/batch_resolution.hpp"
-#include "recognition/unknowns.hpp"
+#include "recognition/recordings.hpp"
 
 namespace palpate::cli {
 

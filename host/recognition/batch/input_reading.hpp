@@ -9,7 +9,7 @@
 
 #include "io/recording_reader.hpp"
 #include "recognition/batch/batch_task.hpp"
-#include "recognition/unknowns.hpp"
+#include "recognition/recordings.hpp"
 
 namespace palpate {
 
