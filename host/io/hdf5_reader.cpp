@@ -144,9 +144,8 @@ Hdf5Reader::Hdf5Reader(const std::filesystem::path& path, std::uint64_t file_byt
   }
 }
 
-bool Hdf5Reader::read(const std::string& dataset, std::uint64_t first, std::uint64_t count,
-                      const Hdf5Rows::Take& take) {
-  return rows_.at(dataset).read(first, count, take);
+bool Hdf5Reader::read(const std::string& dataset, std::uint64_t rows, const Hdf5Rows::Take& take) {
+  return rows_.at(dataset).read(rows, take);
 }
 
 }  // namespace palpate

@@ -34,8 +34,7 @@ class Hdf5Reader {
   const std::map<std::string, Hdf5Value>& datasets() const { return datasets_; }
 
   /// Hdf5Rows::read() of a dataset in datasets().
-  bool read(const std::string& dataset, std::uint64_t first, std::uint64_t count,
-            const Hdf5Rows::Take& take);
+  bool read(const std::string& dataset, std::uint64_t rows, const Hdf5Rows::Take& take);
 
  private:
   Hdf5Handle file_;

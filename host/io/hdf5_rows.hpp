@@ -35,9 +35,9 @@ class Hdf5Rows {
   const std::string& problem() const { return problem_; }  ///< why it cannot be read; "": it can
   const std::vector<std::uint64_t>& shape() const { return shape_; }
 
-  /// Reads rows [first, first + count) in row-major order, in pieces of 1 to hdf5_piece numbers;
-  /// false where they cannot be read.
-  bool read(std::uint64_t first, std::uint64_t count, const Take& take);
+  /// Reads the first rows in row-major order, in pieces of 1 to hdf5_piece numbers; false where
+  /// they cannot be read.
+  bool read(std::uint64_t rows, const Take& take);
 
  private:
   bool reopen_with_cache(hid_t file, const std::string& name, hid_t creation, std::size_t width);

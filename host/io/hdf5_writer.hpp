@@ -1,20 +1,32 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
+#include <cstdlib>
 #include <filesystem>
 #include <functional>
+#include <memory>
 #include <span>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "io/hdf5_handle.hpp"
-#include "io/hdf5_image.hpp"
 
 namespace palpate {
 
 /// Sets a file access property list up for `appendable` files: see Hdf5Writer::Layout.
 void set_appendable(hid_t access);
+
+/// The bytes of an HDF5 file made in memory. H5Fget_file_image() would not do: HDF5 1.10 spoils a
+/// checksum in the image of a file with SWMR.
+struct Hdf5Image {
+  struct Free {
+    void operator()(char* memory) const { std::free(memory); }
+  };
+  std::unique_ptr<char, Free> bytes;  ///< HDF5's own, once the file is closed
+  std::size_t capacity = 0;           ///< in bytes; free space follows the file's end
+};
 
 /// Builds an HDF5 file in memory and saves it in one piece, so that a failing disk is met by
 /// AtomicFile, not in the middle of HDF5's caches. The same content gives the same bytes. Every

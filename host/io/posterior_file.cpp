@@ -1,13 +1,14 @@
-#include "io/posterior_file.hpp"
-
 #include <cmath>
+#include <functional>
 #include <limits>
+#include <span>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
 #include "io/available_memory.hpp"
 #include "io/file_format.hpp"
+#include "io/file_summary.hpp"
 #include "io/hdf5_contents.hpp"
 #include "io/hdf5_rows.hpp"
 #include "io/hdf5_writer.hpp"
@@ -58,8 +59,9 @@ std::vector<std::uint64_t> shape_of(std::size_t objects, const PoseLattice& latt
           static_cast<std::uint64_t>(lattice.x_mm.count)};
 }
 
-}  // namespace
-
+/// Reads and checks a posterior's file, holding a few MB of it at a time.
+/// @param head called with the posterior without log-likelihoods
+/// @param log_likelihood called with the log-likelihoods, object by object, in pieces
 void scan_posterior(const std::filesystem::path& path,
                     const std::function<void(const Posterior&)>& head,
                     const std::function<void(std::span<const double>)>& log_likelihood) {
@@ -87,6 +89,31 @@ void scan_posterior(const std::filesystem::path& path,
     require_log_likelihoods(path, values);
     log_likelihood(values);
   });
+}
+
+}  // namespace
+
+PosteriorSummary summarize_posterior(const std::filesystem::path& path) {
+  PosteriorSummary summary;
+  std::size_t bins = 0;
+  std::size_t k = 0;
+  scan_posterior(
+      path,
+      [&](const Posterior& head) {
+        summary.head = head;
+        bins = static_cast<std::size_t>(head.lattice.bins());
+        summary.peaks.assign(head.objects.size(), {-std::numeric_limits<double>::infinity(), 0});
+      },
+      [&](std::span<const double> values) {
+        for (const double value : values) {
+          PosteriorSummary::Peak& peak = summary.peaks[k / bins];
+          if (value > peak.log_likelihood) {
+            peak = {value, static_cast<std::int64_t>(k % bins)};
+          }
+          ++k;
+        }
+      });
+  return summary;
 }
 
 Posterior read_posterior(const std::filesystem::path& path) {

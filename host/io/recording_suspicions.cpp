@@ -1,5 +1,3 @@
-#include "io/recording_suspicions.hpp"
-
 #include <algorithm>
 #include <cmath>
 #include <functional>
@@ -7,6 +5,7 @@
 
 #include <fmt/format.h>
 
+#include "io/recording_survey.hpp"
 #include "model/angle_unit.hpp"
 #include "model/elements_that.hpp"
 

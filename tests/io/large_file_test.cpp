@@ -12,7 +12,7 @@
 #include "io/file_summary.hpp"
 #include "io/hdf5_rows.hpp"
 #include "io/pressure_table.hpp"
-#include "io/recording_suspicions.hpp"
+#include "io/recording_survey.hpp"
 #include "palpate/files.hpp"
 #include "scratch_folder.hpp"
 
