@@ -7,17 +7,101 @@
 #include <span>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include <fmt/format.h>
 
 #include "driver/serial_profile.hpp"
-#include "driver/takktile_board.hpp"
+#include "driver/takktile_protocol.hpp"
 #include "driver/usb_interfaces.hpp"
 #include "palpate/error.hpp"
 
 namespace palpate {
 
 namespace {
+
+// wIndex starts and stops the stream. The firmware ANDs it with the bits 0x06 of its timer's clock
+// source: a wIndex of 1 would stop the timer.
+constexpr std::uint16_t start_index = 0xff;
+constexpr std::uint16_t stop_index = 0;
+
+// A transfer is longer than any frame, so that a frame's short packet ends every transfer.
+constexpr std::size_t transfer_packets = 8;
+static_assert(transfer_packets * takktile::packet_bytes > 4 * takktile::rows * takktile::columns);
+
+ControlRequest vendor_request(std::uint8_t request, std::uint16_t value = 0,
+                              std::uint16_t index = 0) {
+  return {.type = takktile::request_type, .request = request, .value = value, .index = index};
+}
+
+/// A TakkTile: barometers under rubber, in strips of five, which answer USB vendor requests.
+class TakktileBoard final : public Board {
+ public:
+  const std::string& name() const override { return takktile_kind; }
+
+  bool fits(const UsbDevice& device) const override {
+    return device.vendor == takktile::vendor_id && device.product == takktile::product_id;
+  }
+
+  StreamSource source(const UsbDevice& device) const override {
+    const BulkInterface stream = find_interface(device, LIBUSB_CLASS_VENDOR_SPEC);
+    return {.interfaces = {stream.number},
+            .endpoint = stream.in_endpoint,
+            .transfer_bytes = transfer_packets * takktile::packet_bytes};
+  }
+
+  SensorDescription configure(UsbHandle& handle) override {
+    const std::vector<takktile::Cell> cells = takktile::parse_alive_map(handle.control_in(
+        vendor_request(takktile::request_alive_map), takktile::alive_map_request_bytes));
+    std::vector<takktile::Calibration> calibrations;
+    for (const takktile::Cell& cell : cells) {
+      const auto request =
+          vendor_request(takktile::request_calibration, static_cast<std::uint16_t>(cell.column),
+                         static_cast<std::uint16_t>(cell.row));
+      calibrations.push_back(
+          takktile::parse_calibration(handle.control_in(request, takktile::calibration_bytes)));
+    }
+    deframer_ = std::make_unique<takktile::Deframer>(std::move(calibrations));
+    // The rate is unknown: the period begins only after all cells are read, which takes longer.
+    return {.name = "TakkTile",
+            .serial = {},
+            .pressure_unit = "kPa",
+            .elements_mm = takktile::element_positions(cells)};
+  }
+
+  void start(UsbHandle& handle) override {
+    handle.control_in(
+        vendor_request(takktile::request_stream, takktile::default_period_ticks, start_index),
+        takktile::stream_reply_bytes);
+  }
+
+  void stop(UsbHandle& handle) override {
+    handle.control_in(vendor_request(takktile::request_stream, 0, stop_index),
+                      takktile::stream_reply_bytes);
+  }
+
+  Deframer& deframer() override { return *deframer_; }
+  std::uint64_t parse(const TransferRing::Completion& completion,
+                      std::vector<ParsedFrame>& frames) override {
+    const std::size_t before = frames.size();
+    // The deframer takes single packets. A transfer that ended early behind full packets alone
+    // ended with an empty packet.
+    std::span<const std::uint8_t> rest = completion.bytes;
+    while (rest.size() >= takktile::packet_bytes) {
+      deframer_->push(rest.first(takktile::packet_bytes), frames);
+      rest = rest.subspan(takktile::packet_bytes);
+    }
+    if (completion.ended || !rest.empty()) {
+      deframer_->push(rest, frames);
+    }
+    // A transfer that ended without a frame had too few cells or too many.
+    const bool spoiled = completion.ended && !completion.bytes.empty() && frames.size() == before;
+    return spoiled ? 1 : 0;
+  }
+
+ private:
+  std::unique_ptr<takktile::Deframer> deframer_;
+};
 
 // CDC PSTN 1.2, 6.3: class requests to the control interface.
 constexpr std::uint8_t class_request_out = 0x21;
@@ -60,6 +144,7 @@ class SerialBoard final : public Board {
 
   const std::string& name() const override { return name_; }
   bool has_ids() const override { return !profile_.usb.empty(); }
+
   bool fits(const UsbDevice& device) const override {
     return std::ranges::find(profile_.usb, UsbId{device.vendor, device.product}) !=
            profile_.usb.end();
@@ -134,12 +219,12 @@ std::uint64_t Board::parse(const TransferRing::Completion& completion,
 }
 
 std::unique_ptr<Board> make_board(const std::string& name) {
-  if (name == TakktileBoard::kind) {
+  if (name == takktile_kind) {
     return std::make_unique<TakktileBoard>();
   }
   std::vector<std::string> known = shipped_profiles();
   if (!is_profile_path(name) && std::ranges::find(known, name) == known.end()) {
-    known.insert(known.begin(), TakktileBoard::kind);
+    known.insert(known.begin(), takktile_kind);
     throw Error(Fault::input,
                 fmt::format("sensor '{}': no such board; give one of {}, or the path of a profile "
                             "that ends in .yaml",

@@ -5,7 +5,6 @@
 #include "driver/board.hpp"
 #include "driver/board_choice.hpp"
 #include "driver/serial_profile.hpp"
-#include "driver/takktile_board.hpp"
 #include "driver/usb_device.hpp"
 #include "driver/usb_fault.hpp"
 #include "driver/usb_handle.hpp"
@@ -69,7 +68,7 @@ std::vector<BoardInfo> list_boards() {
 
 std::optional<std::filesystem::path> board_file(const std::string& name) {
   const std::string kind = parse_board_name(name).kind;
-  return kind == TakktileBoard::kind ? std::nullopt : std::optional(profile_path(kind));
+  return kind == takktile_kind ? std::nullopt : std::optional(profile_path(kind));
 }
 
 }  // namespace palpate

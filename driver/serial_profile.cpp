@@ -10,7 +10,6 @@
 #include <fmt/ranges.h>
 
 #include "driver/data_folder.hpp"
-#include "driver/packet_deframer.hpp"
 #include "driver/profile_packet.hpp"
 #include "palpate/error.hpp"
 
@@ -212,10 +211,6 @@ SerialProfile parse_serial_profile(const std::string& yaml, const std::filesyste
   } catch (const YAML::Exception& error) {
     refuse(path, fmt::format("line {}: {}; correct the YAML", line_of(error.mark), error.msg));
   }
-}
-
-std::unique_ptr<Deframer> make_deframer(const SerialProfile& profile) {
-  return std::make_unique<PacketDeframer>(profile.packet);
 }
 
 }  // namespace palpate

@@ -138,6 +138,7 @@ class UsbSensor final : public Sensor {
   UsbSensor& operator=(const UsbSensor&) = delete;
 
   const SensorDescription& description() const override { return description_; }
+
   void start() override {
     stop();
     queue_.clear();
@@ -157,6 +158,7 @@ class UsbSensor final : public Sensor {
   }
 
   bool gone() const override { return gone_; }
+
   void stop() override {
     if (thread_.joinable()) {
       stopping_ = true;

@@ -212,11 +212,96 @@ struct TouchDetector::Impl {
         smoother(options.smooth_s, options.largest_gap_s),
         phase(options) {}
 
-  std::optional<DetectedTouch> add(const Frame& frame);
-  bool take(const Frame& frame);
-  void follow_drift(const std::vector<double>& smooth, double elapsed_s);
-  void end_phase();
-  std::optional<DetectedTouch> end_touch();
+  std::optional<DetectedTouch> add(const Frame& frame) {
+    if (!take(frame)) {
+      return {};
+    }
+    const double time_s = frame.host_time_s;
+    std::optional<DetectedTouch> ended;
+    const double elapsed_s = last_s ? time_s - *last_s : 0.0;
+    if (elapsed_s > options.largest_gap_s || elapsed_s < 0.0) {
+      ended = end_touch();
+      released_s = time_s;
+      smoother.reset();
+    }
+    last_s = time_s;
+
+    const std::vector<double>& smooth = smoother.add(time_s, pressure);
+    double largest = 0.0;
+    double load = 0.0;
+    for (const double p : smooth) {
+      largest = std::max(largest, p);
+      load += std::max(0.0, p - options.release);
+    }
+    if (!touching && largest <= options.onset) {
+      if (largest < options.release && (!released_s || time_s - *released_s > rest_s)) {
+        follow_drift(smooth, elapsed_s);
+      }
+      return ended;
+    }
+    if (touching && largest < options.release) {
+      released_s = time_s;
+      return end_touch();  // `ended` is none: a gap leaves nothing touched
+    }
+    touching = true;
+    const std::optional<Pose> pose = frame.T_robot_sensor && is_robot_pose(*frame.T_robot_sensor)
+                                         ? frame.T_robot_sensor
+                                         : std::nullopt;
+    if (!phase.fits(load, pose)) {
+      end_phase();
+    }
+    phase.add(time_s, load, pressure, pose);
+    return ended;
+  }
+
+  // Subtracts the baseline. Returns false for a frame without a known reading or a finite time.
+  bool take(const Frame& frame) {
+    const std::size_t e = frame.values.size();
+    if (baseline.empty()) {
+      baseline.assign(e, 0.0);
+    }
+    if (e != baseline.size() || (!valid.empty() && valid.size() != e)) {
+      throw Error(Fault::input, fmt::format("a frame has {} values where {} are expected; feed the "
+                                            "touch detector the frames of one array",
+                                            e, baseline.size()));
+    }
+    pressure.resize(e);
+    bool any_known = false;
+    for (std::size_t i = 0; i < e; ++i) {
+      const bool known = (valid.empty() || valid[i] != 0) && is_known(frame.values[i]);
+      pressure[i] =
+          known ? frame.values[i] - baseline[i] : std::numeric_limits<double>::quiet_NaN();
+      any_known = any_known || known;
+    }
+    return any_known && std::isfinite(frame.host_time_s);
+  }
+
+  void follow_drift(const std::vector<double>& smooth, double elapsed_s) {
+    if (options.drift_s <= 0.0) {
+      return;
+    }
+    const double part = std::clamp(elapsed_s / options.drift_s, 0.0, 1.0);
+    for (std::size_t i = 0; i < baseline.size(); ++i) {
+      // The bound keeps two frames of -1e38 from becoming the baseline.
+      baseline[i] += part * std::max(smooth[i], -options.onset);
+    }
+  }
+
+  void end_phase() {
+    const auto duration = [](const DetectedTouch& touch) { return touch.end_s - touch.begin_s; };
+    if (std::optional<DetectedTouch> touch = phase.touch()) {
+      if (!best || duration(*touch) > duration(*best)) {
+        best = std::move(touch);
+      }
+    }
+    phase.clear();
+  }
+
+  std::optional<DetectedTouch> end_touch() {
+    end_phase();
+    touching = false;
+    return std::exchange(best, std::nullopt);
+  }
 
   TouchDetectorOptions options;
   std::vector<double> baseline;
@@ -229,96 +314,6 @@ struct TouchDetector::Impl {
   std::optional<double> released_s;   // end of the last touch
   bool touching = false;
 };
-
-// Subtracts the baseline. Returns false for a frame without a known reading or a finite time.
-bool TouchDetector::Impl::take(const Frame& frame) {
-  const std::size_t e = frame.values.size();
-  if (baseline.empty()) {
-    baseline.assign(e, 0.0);
-  }
-  if (e != baseline.size() || (!valid.empty() && valid.size() != e)) {
-    throw Error(Fault::input, fmt::format("a frame has {} values where {} are expected; feed the "
-                                          "touch detector the frames of one array",
-                                          e, baseline.size()));
-  }
-  pressure.resize(e);
-  bool any_known = false;
-  for (std::size_t i = 0; i < e; ++i) {
-    const bool known = (valid.empty() || valid[i] != 0) && is_known(frame.values[i]);
-    pressure[i] = known ? frame.values[i] - baseline[i] : std::numeric_limits<double>::quiet_NaN();
-    any_known = any_known || known;
-  }
-  return any_known && std::isfinite(frame.host_time_s);
-}
-
-std::optional<DetectedTouch> TouchDetector::Impl::add(const Frame& frame) {
-  if (!take(frame)) {
-    return {};
-  }
-  const double time_s = frame.host_time_s;
-  std::optional<DetectedTouch> ended;
-  const double elapsed_s = last_s ? time_s - *last_s : 0.0;
-  if (elapsed_s > options.largest_gap_s || elapsed_s < 0.0) {
-    ended = end_touch();
-    released_s = time_s;
-    smoother.reset();
-  }
-  last_s = time_s;
-
-  const std::vector<double>& smooth = smoother.add(time_s, pressure);
-  double largest = 0.0;
-  double load = 0.0;
-  for (const double p : smooth) {
-    largest = std::max(largest, p);
-    load += std::max(0.0, p - options.release);
-  }
-  if (!touching && largest <= options.onset) {
-    if (largest < options.release && (!released_s || time_s - *released_s > rest_s)) {
-      follow_drift(smooth, elapsed_s);
-    }
-    return ended;
-  }
-  if (touching && largest < options.release) {
-    released_s = time_s;
-    return end_touch();  // `ended` is none: a gap leaves nothing touched
-  }
-  touching = true;
-  const std::optional<Pose> pose = frame.T_robot_sensor && is_robot_pose(*frame.T_robot_sensor)
-                                       ? frame.T_robot_sensor
-                                       : std::nullopt;
-  if (!phase.fits(load, pose)) {
-    end_phase();
-  }
-  phase.add(time_s, load, pressure, pose);
-  return ended;
-}
-
-void TouchDetector::Impl::follow_drift(const std::vector<double>& smooth, double elapsed_s) {
-  if (options.drift_s <= 0.0) {
-    return;
-  }
-  const double part = std::clamp(elapsed_s / options.drift_s, 0.0, 1.0);
-  for (std::size_t i = 0; i < baseline.size(); ++i) {
-    // The bound keeps two frames of -1e38 from becoming the baseline.
-    baseline[i] += part * std::max(smooth[i], -options.onset);
-  }
-}
-
-void TouchDetector::Impl::end_phase() {
-  const auto duration = [](const DetectedTouch& touch) { return touch.end_s - touch.begin_s; };
-  if (std::optional<DetectedTouch> touch = phase.touch()) {
-    if (!best || duration(*touch) > duration(*best)) {
-      best = std::move(touch);
-    }
-  }
-  phase.clear();
-}
-
-std::optional<DetectedTouch> TouchDetector::Impl::end_touch() {
-  end_phase();
-  touching = false;
-  return std::exchange(best, std::nullopt);
-}
 
 TouchDetector::TouchDetector(const TouchDetectorOptions& options, std::vector<double> baseline,
                              std::vector<std::uint8_t> valid)

@@ -78,6 +78,7 @@ class ReplayedSensor : public Sensor {
   }
 
   const SensorDescription& description() const override { return description_; }
+
   void start() override {
     at_ = 0;
     counters_ = {};
@@ -292,7 +293,7 @@ std::unique_ptr<Sensor> open_virtual_sensor(const std::string& name) {
     throw Error(Fault::input, fmt::format("sensor {}: write replay:FILE or simulate:SHAPE", name));
   }
   const SourceName source(name, simulate, simulate_keys);
-  return std::make_unique<SimulatedSensor>(source.what(), options_of(source));
+  return make_simulated_sensor(source.what(), options_of(source));
 }
 
 }  // namespace palpate
