@@ -34,6 +34,14 @@ Box View::pixels(glm::dvec2 data_lower, glm::dvec2 data_upper) const {
   return {bottom_left.x, top_right.y, top_right.x - bottom_left.x, bottom_left.y - top_right.y};
 }
 
+std::vector<glm::dvec2> View::pixels(std::span<const glm::dvec2> data) const {
+  std::vector<glm::dvec2> points;
+  for (const glm::dvec2& p : data) {
+    points.push_back(pixel(p));
+  }
+  return points;
+}
+
 bool View::contains(glm::dvec2 data) const {
   return data.x >= lower.x && data.x <= upper.x && data.y >= lower.y && data.y <= upper.y;
 }

@@ -1,5 +1,3 @@
-#include "figures/confusion_figure.hpp"
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -8,6 +6,7 @@
 #include <fmt/format.h>
 
 #include "figures/axes.hpp"
+#include "figures/figures.hpp"
 #include "palpate/error.hpp"
 
 namespace palpate {

@@ -1,5 +1,3 @@
-#include "figures/plan_figure.hpp"
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -9,6 +7,7 @@
 #include <glm/common.hpp>
 
 #include "figures/axes.hpp"
+#include "figures/figures.hpp"
 #include "figures/footprint.hpp"
 #include "palpate/error.hpp"
 #include "palpate/touch.hpp"
@@ -57,14 +56,6 @@ View view_of(const PlanFigure& figure) {
   return {.box = {margin_px + axis_px, top_px, px_per_mm * extent.x, px_per_mm * extent.y},
           .lower = figure.lower_mm,
           .upper = figure.lower_mm + extent};
-}
-
-std::vector<glm::dvec2> pixels(const View& view, std::span<const glm::dvec2> points) {
-  std::vector<glm::dvec2> result;
-  for (const glm::dvec2& p : points) {
-    result.push_back(view.pixel(p));
-  }
-  return result;
 }
 
 std::vector<glm::dvec2> placed(std::span<const glm::dvec2> elements_mm,
@@ -151,7 +142,7 @@ std::string draw_plan(const PlanFigure& figure) {
       return occupancy_colour(figure.occupied[static_cast<std::size_t>(j) * figure.nx + i]);
     });
     for (const std::vector<glm::dvec2>& touch : figure.touches_mm) {
-      canvas.polygon(pixels(view, footprint(touch, figure.element_mm).outline), touch_pen);
+      canvas.polygon(view.pixels(footprint(touch, figure.element_mm).outline), touch_pen);
     }
     // The best come last, on top.
     for (std::size_t i = figure.candidates.size(); i-- > 0;) {
@@ -162,9 +153,9 @@ std::string draw_plan(const PlanFigure& figure) {
     const Footprint array =
         footprint(placed(figure.elements_mm, best.T_robot_sensor), figure.element_mm);
     for (const auto& square : array.elements) {
-      canvas.polygon(pixels(view, square), {.colour = {0.80, 0.05, 0.30, 0.45}, .width_px = 1.0});
+      canvas.polygon(view.pixels(square), {.colour = {0.80, 0.05, 0.30, 0.45}, .width_px = 1.0});
     }
-    canvas.polygon(pixels(view, array.outline), best_pen);
+    canvas.polygon(view.pixels(array.outline), best_pen);
   }
   draw_axes(canvas, view, even_ticks(view.lower.x, view.upper.x, 8),
             even_ticks(view.lower.y, view.upper.y, 8), "x in the robot frame, mm", "y, mm");

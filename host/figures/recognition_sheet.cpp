@@ -5,7 +5,6 @@
 #include <initializer_list>
 #include <numbers>
 #include <optional>
-#include <ranges>
 #include <span>
 #include <string>
 #include <string_view>
@@ -143,15 +142,6 @@ std::vector<Footprint> footprints(const RecognitionSheet& sheet, const Pose& T_o
   return result;
 }
 
-template <std::ranges::range Points>
-std::vector<glm::dvec2> pixels(const View& view, const Points& points) {
-  std::vector<glm::dvec2> result;
-  for (const glm::dvec2& p : points) {
-    result.push_back(view.pixel(p));
-  }
-  return result;
-}
-
 /// Returns the view of a square of the object frame that holds the map and all touches.
 View view_around(const Box& box, const OccupancyGrid& map,
                  std::initializer_list<const std::vector<Footprint>*> touches) {
@@ -185,16 +175,15 @@ void draw_touches(Canvas& canvas, const RecognitionSheet& sheet) {
     for (const Footprint& f : estimated) {
       if (element_px >= smallest_element_px) {
         for (const auto& square : f.elements) {
-          canvas.polygon(pixels(view, square),
-                         {.colour = {0.0, 0.0, 0.0, alpha}, .width_px = 0.75});
+          canvas.polygon(view.pixels(square), {.colour = {0.0, 0.0, 0.0, alpha}, .width_px = 0.75});
         }
       }
     }
     for (const Footprint& f : estimated) {
-      canvas.polygon(pixels(view, f.outline), estimate_pen);
+      canvas.polygon(view.pixels(f.outline), estimate_pen);
     }
     for (const Footprint& f : actual) {
-      canvas.polygon(pixels(view, f.outline), truth_pen);
+      canvas.polygon(view.pixels(f.outline), truth_pen);
     }
   }
   draw_axes(canvas, view, even_ticks(view.lower.x, view.upper.x, 7),

@@ -73,7 +73,7 @@ void require_counting_names(const CsvTable& table, const std::vector<std::size_t
   }
 }
 
-/// The columns that --pressure-columns names.
+/// The columns that `pressure-columns` names.
 /// @param taken columns of times, poses and what else is no pressure
 std::vector<std::size_t> columns_named(const CsvTable& table, const std::string& names,
                                        const std::vector<std::size_t>& taken) {
