@@ -3,10 +3,8 @@
 #include <algorithm>
 
 #include "driver/board.hpp"
-#include "driver/board_choice.hpp"
 #include "driver/serial_profile.hpp"
 #include "driver/usb_device.hpp"
-#include "driver/usb_fault.hpp"
 #include "driver/usb_handle.hpp"
 #include "palpate/error.hpp"
 

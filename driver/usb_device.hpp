@@ -1,11 +1,15 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include <libusb.h>
+
+#include "palpate/error.hpp"
 
 namespace palpate {
 
@@ -47,5 +51,28 @@ std::vector<UsbDevice> usb_devices(const UsbContext& context);
 
 /// The kernel driver that holds the interface: "usbfs" if a program claimed it, "" for none.
 std::string interface_driver(const UsbDevice& device, int interface);
+
+/// The error of a libusb call that returned `code`. Its message names the device, what was tried,
+/// why it failed, and the remedy: for missing permission, how to install the udev rule; for an
+/// interface in use, the program to end, if /proc shows it.
+Error usb_fault(const UsbDevice& device, const std::string& what, int code);
+
+/// Says which program uses the device, and to end it.
+std::string in_use(const UsbDevice& device);
+
+/// An interface with a bulk endpoint towards the host.
+struct BulkInterface {
+  int number = 0;
+  std::uint8_t in_endpoint = 0;
+  std::optional<std::uint8_t> out_endpoint = {};
+  std::size_t packet_bytes = 0;  ///< the largest packet towards the host
+};
+
+/// Finds the first interface of this class that has a bulk endpoint towards the host. @throws Error
+BulkInterface find_interface(const UsbDevice& device, std::uint8_t interface_class);
+
+/// Finds the control interface of a CDC data interface by its union descriptor (CDC 1.2, 5.2.3.2);
+/// without such a descriptor, the nearest control interface before the data interface, if any.
+std::optional<int> find_control_interface(const UsbDevice& device, int data_interface);
 
 }  // namespace palpate

@@ -4,7 +4,7 @@
 
 #include <fmt/format.h>
 
-#include "driver/usb_fault.hpp"
+#include "driver/usb_device.hpp"
 
 namespace palpate {
 

@@ -14,7 +14,6 @@
 #include <fmt/format.h>
 
 #include "driver/board.hpp"
-#include "driver/board_choice.hpp"
 #include "driver/frame_queue.hpp"
 #include "driver/transfer_ring.hpp"
 #include "driver/usb_device.hpp"
