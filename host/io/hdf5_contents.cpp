@@ -8,7 +8,7 @@
 #include <fmt/format.h>
 
 #include "io/hdf5_handle.hpp"
-#include "io/hdf5_rows.hpp"
+#include "io/hdf5_reader.hpp"
 #include "io/recording_state.hpp"
 #include "model/printable.hpp"
 

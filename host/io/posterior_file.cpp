@@ -10,7 +10,7 @@
 #include "io/file_format.hpp"
 #include "io/file_summary.hpp"
 #include "io/hdf5_contents.hpp"
-#include "io/hdf5_rows.hpp"
+#include "io/hdf5_reader.hpp"
 #include "io/hdf5_writer.hpp"
 #include "io/input_file.hpp"
 #include "io/recording_rules.hpp"

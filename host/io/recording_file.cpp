@@ -5,7 +5,7 @@
 
 #include "io/available_memory.hpp"
 #include "io/file_format.hpp"
-#include "io/hdf5_rows.hpp"
+#include "io/hdf5_reader.hpp"
 #include "io/hdf5_writer.hpp"
 #include "io/input_file.hpp"
 #include "io/recording_rules.hpp"

@@ -10,7 +10,6 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include "io/array_table.hpp"
 #include "io/file_identity.hpp"
 #include "io/npy_file.hpp"
 #include "io/pose_table.hpp"
