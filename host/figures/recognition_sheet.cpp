@@ -11,12 +11,12 @@
 #include <vector>
 
 #include <fmt/format.h>
-#include <glm/common.hpp>
 
 #include "figures/figures.hpp"
 #include "figures/footprint.hpp"
 #include "figures/identity_panel.hpp"
 #include "figures/map_layer.hpp"
+#include "model/bounding_box.hpp"
 #include "palpate/error.hpp"
 #include "palpate/pose_error.hpp"
 
@@ -145,19 +145,16 @@ std::vector<Footprint> footprints(const RecognitionSheet& sheet, const Pose& T_o
 /// Returns the view of a square of the object frame that holds the map and all touches.
 View view_around(const Box& box, const OccupancyGrid& map,
                  std::initializer_list<const std::vector<Footprint>*> touches) {
-  glm::dvec2 lower = lower_edge_mm(map);
-  glm::dvec2 upper = upper_edge_mm(map);
+  BoundingBox part{lower_edge_mm(map), upper_edge_mm(map)};
   for (const std::vector<Footprint>* footprints : touches) {
     for (const Footprint& f : *footprints) {
       for (const glm::dvec2& corner : f.outline) {
-        lower = glm::min(lower, corner);
-        upper = glm::max(upper, corner);
+        part.take_in(corner);
       }
     }
   }
-  const glm::dvec2 centre = 0.5 * (lower + upper);
-  const glm::dvec2 half(0.51 * std::max(upper.x - lower.x, upper.y - lower.y));
-  return {.box = box, .lower = centre - half, .upper = centre + half};
+  const glm::dvec2 half(0.51 * std::max(part.extent().x, part.extent().y));
+  return {.box = box, .lower = part.middle() - half, .upper = part.middle() + half};
 }
 
 void draw_touches(Canvas& canvas, const RecognitionSheet& sheet) {

@@ -9,9 +9,9 @@
 #include <vector>
 
 #include <fmt/format.h>
-#include <glm/common.hpp>
 #include <glm/trigonometric.hpp>
 
+#include "model/bounding_box.hpp"
 #include "model/number_text.hpp"
 #include "model/printable.hpp"
 #include "palpate/error.hpp"
@@ -93,17 +93,15 @@ const std::map<char, std::vector<CentreLine>> centre_lines = {
 
 /// Moves the middle of the bounding box to the origin.
 void centre(std::vector<Shape::Stroke>& strokes) {
-  glm::dvec2 lower = strokes.front().points_mm.front();
-  glm::dvec2 upper = lower;
+  BoundingBox box;
   for (const Shape::Stroke& stroke : strokes) {
     for (const glm::dvec2& p : stroke.points_mm) {
-      lower = glm::min(lower, p);
-      upper = glm::max(upper, p);
+      box.take_in(p);
     }
   }
   for (Shape::Stroke& stroke : strokes) {
     for (glm::dvec2& p : stroke.points_mm) {
-      p -= (lower + upper) / 2.0;
+      p -= box.middle();
     }
   }
 }
