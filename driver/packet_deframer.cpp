@@ -340,7 +340,7 @@ class PacketDeframer final : public Deframer {
   PacketFormat format_;
   PacketShape shape_;
   const std::vector<PacketFormat::Field>& fields_;  // the format's
-  // Of a packet with values, without counted Parts:
+  // The layout of a packet with values, without counted Parts:
   std::vector<std::size_t> offsets_;  // [field]
   std::size_t whole_bytes_ = 0;
   std::size_t shifted_from_;  // the first field that keeps its distance from the packet's end

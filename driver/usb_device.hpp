@@ -28,7 +28,7 @@ class UsbContext {
   std::unique_ptr<libusb_context, Exit> context_;
 };
 
-/// What is known of a USB device without opening it. Must not outlive its context.
+/// What is known of a USB device that is not opened. It must not outlive its context.
 struct UsbDevice {
   std::shared_ptr<libusb_device> device;
   int bus = 0;

@@ -12,7 +12,7 @@ namespace {
 
 constexpr unsigned patience_ms = 1000;
 
-/// What a libusb call returned; throws where it failed.
+/// Returns what a libusb call returned; throws Error where the call failed.
 int checked(const UsbDevice& device, const std::string& what, int code) {
   if (code < 0) {
     throw usb_fault(device, what, code);

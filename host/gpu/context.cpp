@@ -34,7 +34,7 @@ bool validation_wanted() {
 struct VulkanUses {
   std::mutex mutex;
   int count = 0;
-  OwnProcess process;  ///< that they are of, where there are any
+  OwnProcess process;  ///< the process that uses Vulkan, where one does
 };
 
 VulkanUses& vulkan_uses() {

@@ -63,7 +63,7 @@ class ForkedChild {
   pid_t pid_ = -1;
   Descriptor socket_;
   std::vector<char> received_;  ///< what was received together with what was asked for
-  std::size_t next_ = 0;        ///< of these, the first that was not asked for yet
+  std::size_t next_ = 0;        ///< the first byte of these that was not asked for yet
   std::chrono::milliseconds silence_;
   bool fell_silent_ = false;
 };

@@ -86,7 +86,8 @@ struct FrameRecorder::Impl {
 
   bool due() const {
     return pending.pressure.size() >= most_pending_values ||
-           // Also by the stream's own time: a late reader catches up faster than the clock runs.
+           // The stream's own time counts, too: a late reader catches up faster than the clock
+           // runs.
            std::abs(pending.time_s.back() - pending.time_s.front()) >= flush_interval_s ||
            std::chrono::duration<double>(Clock::now() - oldest_pending).count() >= flush_interval_s;
   }

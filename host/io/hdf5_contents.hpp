@@ -87,7 +87,8 @@ class Hdf5Contents {
   bool closed_ = true;
   std::map<std::string, Hdf5Value> attributes_;
   std::map<std::string, Hdf5Value> datasets_;
-  std::optional<ForkedChild> child_;  ///< that reads the file, or else:
+  // One of the two reads the file.
+  std::optional<ForkedChild> child_;
   std::unique_ptr<Hdf5Reader> reader_;
 };
 

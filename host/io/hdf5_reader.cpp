@@ -293,7 +293,7 @@ bool Hdf5Rows::reopen_with_cache(hid_t file, const std::string& name, hid_t crea
     return false;
   }
   const std::uint64_t needed = band_bytes_ + copies_of_a_chunk * chunk_bytes;
-  // Or a child's limit would count as what is available.
+  // Otherwise a child's own limit would count as what is available.
   confinement_.memory_bytes(UINT64_MAX);
   const std::uint64_t available = available_memory_bytes();
   confinement_.memory_bytes(base_bytes);

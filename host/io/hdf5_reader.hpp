@@ -15,7 +15,7 @@ namespace palpate {
 /// Most numbers in one piece of a dataset.
 inline constexpr std::uint64_t hdf5_piece = 1 << 17;
 
-/// What reading may do, by the process that reads.
+/// What the process that reads a file allows.
 struct Hdf5Confinement {
   /// Links within the file are followed. Only where HDF5 can follow none to another file.
   bool follows_links = false;

@@ -26,7 +26,7 @@ void require_sound(const std::filesystem::path& path, const std::optional<std::s
   }
 }
 
-/// Opens a map file with what it says besides its cells.
+/// Opens a map file.
 Hdf5Contents open_map(const std::filesystem::path& path) {
   return {path,
           {"format", "version", "label", "cell_mm", "origin_mm", "prior", "symmetry", "spread_mm",

@@ -25,7 +25,7 @@ Axis read_axis(const Hdf5Contents& file, const char* range, const char* bins) {
   return {ends[0], ends[1], file.integer(bins, 1)};
 }
 
-// What holds for every posterior, read or about to be written, without its log-likelihoods.
+// Checks the labels and the lattice of a posterior that is read or about to be written.
 void validate(const std::filesystem::path& path, const std::vector<std::string>& objects,
               const PoseLattice& lattice) {
   // HDF5 keeps an attribute of at most 64 KiB, 16 bytes for each text.

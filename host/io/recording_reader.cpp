@@ -130,7 +130,8 @@ void RecordingReader::fork_child() {
   initialise_hdf5();
   child_ = std::make_unique<ForkedChild>(
       serve,
-      ForkedLimits{.cpu_seconds = file_cpu_seconds, .memory_bytes = child_bytes, .silence = silence},
+      ForkedLimits{
+          .cpu_seconds = file_cpu_seconds, .memory_bytes = child_bytes, .silence = silence},
       hdf5_mutex);
 }
 

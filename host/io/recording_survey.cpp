@@ -120,7 +120,7 @@ class Survey {
   std::uint64_t place_ = 0;            ///< index of the next place
   StreamTime time_;
   std::optional<double> last_s_;
-  std::uint64_t row_ = 0;  ///< of the next time
+  std::uint64_t row_ = 0;  ///< row of the next time
 };
 
 }  // namespace

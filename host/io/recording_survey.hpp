@@ -68,7 +68,7 @@ class PressureSurvey {
   /// Extremes of the known readings of living elements; none where there are no such readings.
   const std::optional<Extremes>& range() const { return range_; }
   std::uint64_t unknown() const { return unknown_; }        ///< NaN readings of living elements
-  std::uint64_t in_contact() const { return in_contact_; }  ///< rows
+  std::uint64_t in_contact() const { return in_contact_; }  ///< rows in contact
   std::uint64_t at_most() const { return at_most_; }  ///< readings equal to the largest reading
   /// Separate times at which the array reads the largest reading. Frames that follow each other are
   /// one time; each touch is a time of its own.
@@ -90,7 +90,7 @@ class PressureSurvey {
   std::uint64_t row_ = 0;
   std::size_t element_ = 0;            ///< index of the next pressure in its row
   std::optional<double> strongest_;    ///< largest pressure above the baseline in this row
-  std::size_t strongest_element_ = 0;  ///< that has it
+  std::size_t strongest_element_ = 0;  ///< the element that reads it
 };
 
 /// What a recording holds.

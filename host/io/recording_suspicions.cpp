@@ -16,7 +16,7 @@ namespace {
 // With fewer rows, an element that reads the same in all of them says nothing.
 constexpr std::uint64_t least_rows = 20;
 
-// One in a million: the chance to suspect a sound element, in nats.
+// A sound element is suspected with a chance of one in a million, in nats.
 constexpr double sure_nats = 14.0;
 
 class Suspicions {

@@ -175,10 +175,9 @@ void read_bins(const Entry& entry, Scene& scene) {
 Scene read_scene(const std::filesystem::path& path) {
   require_readable(path);
   Scene scene;
-  try {
-    const Entry root{path, "the scene", only_document(std::ifstream(path), path)};
+  read_document(std::ifstream(path), path, "the scene", [&](const Entry& root) {
     if (root.node.IsNull()) {
-      return scene;  // comments alone: everything is left out
+      return;  // comments alone: everything is left out
     }
     const auto number = [](std::optional<double>& key, bool (*fits)(double), const char* remedy) {
       return [&key, fits, remedy](const Entry& e) { key = e.number(fits, remedy); };
@@ -208,9 +207,7 @@ Scene read_scene(const std::filesystem::path& path) {
                                                         {"particles", "particles"}});
                 }},
                {"device", [&](const Entry& e) { scene.device = e.text(); }}});
-  } catch (const YAML::Exception& error) {
-    refuse(path, "line {}: {}; correct the YAML", line_of(error.mark), error.msg);
-  }
+  });
   return scene;
 }
 

@@ -221,8 +221,7 @@ LearnedSensor read_sensor_model(const std::filesystem::path& path) {
   require_readable(path);
   LearnedSensor sensor;
   bool has_format = false;
-  try {
-    const Entry root{path, "the sensor model", only_document(std::ifstream(path), path)};
+  read_document(std::ifstream(path), path, "the sensor model", [&](const Entry& root) {
     const auto number = [](double& value) {
       return [&value](const Entry& e) { value = e.number(); };
     };
@@ -256,9 +255,7 @@ LearnedSensor read_sensor_model(const std::filesystem::path& path) {
                {"features", [&](const Entry& e) { sensor.features = read_learned_features(e); }},
                {"familiarity", [&](const Entry& e) { sensor.familiarity = read_familiarity(e); }},
                {"fit_scale", [&](const Entry& e) { sensor.fit_scale = read_fit_scale(e); }}});
-  } catch (const YAML::Exception& error) {
-    refuse(path, "line {}: {}; correct the YAML", line_of(error.mark), error.msg);
-  }
+  });
   if (!has_format) {
     refuse(path, "key 'format' is missing: not a sensor model; make one with palpate calibrate");
   }

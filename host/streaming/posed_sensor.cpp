@@ -25,7 +25,7 @@ namespace palpate {
 
 namespace {
 
-// Far longer than any pose; what never ends a line must not fill the memory.
+// No pose has so long a line; a stream that never ends its line must not fill the memory.
 constexpr std::size_t longest_line = 4096;
 // One read() takes at most this many bytes, and PoseReader::read() this many blocks.
 constexpr std::size_t block_bytes = 1 << 14;

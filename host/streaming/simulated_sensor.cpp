@@ -165,7 +165,7 @@ class SimulatedSensor : public Sensor {
   std::optional<Random> noise_;
   std::vector<Pose> poses_;  ///< T_object_sensor still to be tried, the last first
   std::uint64_t batches_ = 0;
-  std::uint64_t presses_ = 0;  ///< begun
+  std::uint64_t presses_ = 0;  ///< presses that have begun
   Press before_;
   Press press_;
   double start_s_ = 0.0;  ///< Unix time of frame 0

@@ -136,9 +136,11 @@ constexpr std::array<std::string_view, 7> simulate_keys{"rate",  "array",  "seed
 class SourceName {
  public:
   // A path may hold commas and equals signs, so that only a known key ends it.
-  SourceName(const std::string& name, std::string_view scheme,
-             std::span<const std::string_view> keys)
-      : name_(name) {
+  explicit SourceName(const std::string& name) : name_(name) {
+    const bool replays = name.starts_with(replay);
+    const std::string_view scheme = replays ? replay : simulate;
+    const std::span<const std::string_view> keys =
+        replays ? std::span<const std::string_view>(replay_keys) : simulate_keys;
     std::string_view rest = std::string_view(name_).substr(scheme.size());
     for (;;) {
       const std::size_t comma = rest.rfind(',');
@@ -148,7 +150,7 @@ class SourceName {
       const std::string_view option = rest.substr(comma + 1);
       const std::string_view key = option.substr(0, option.find('='));
       if (std::find(keys.begin(), keys.end(), key) == keys.end()) {
-        if (scheme == simulate) {
+        if (!replays) {
           refuse(key, fmt::format("is no option; the options are {}", fmt::join(keys, ", ")));
         }
         break;
@@ -261,9 +263,9 @@ bool is_virtual_sensor(std::string_view name) {
 
 std::optional<std::filesystem::path> virtual_sensor_file(const std::string& name) {
   if (name.starts_with(replay)) {
-    return SourceName(name, replay, replay_keys).what();
+    return SourceName(name).what();
   }
-  const std::string shape = SourceName(name, simulate, simulate_keys).what();
+  const std::string shape = SourceName(name).what();
   return built_in_shape(shape) ? std::nullopt : std::optional<std::filesystem::path>(shape);
 }
 
@@ -271,7 +273,7 @@ bool is_endless_flood(const std::string& name) {
   if (!name.starts_with(simulate)) {
     return false;
   }
-  const SimulatedSensorOptions options = options_of(SourceName(name, simulate, simulate_keys));
+  const SimulatedSensorOptions options = options_of(SourceName(name));
   // 6 GB in ten minutes: such a recording, if forgotten, still fits on most disks. The DigiTacts
   // array gives 1.8 MB/s at 100 Hz and 100 times real time.
   constexpr double most_bytes_per_s = 10e6;
@@ -286,13 +288,13 @@ bool is_endless_flood(const std::string& name) {
 
 std::unique_ptr<Sensor> open_virtual_sensor(const std::string& name) {
   if (name.starts_with(replay)) {
-    const SourceName source(name, replay, replay_keys);
+    const SourceName source(name);
     return std::make_unique<ReplayedSensor>(source.what(), source.speed());
   }
   if (!name.starts_with(simulate)) {
     throw Error(Fault::input, fmt::format("sensor {}: write replay:FILE or simulate:SHAPE", name));
   }
-  const SourceName source(name, simulate, simulate_keys);
+  const SourceName source(name);
   return make_simulated_sensor(source.what(), options_of(source));
 }
 
