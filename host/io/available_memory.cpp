@@ -88,6 +88,16 @@ std::uint64_t available_memory_bytes() {
                    limit_bytes(RLIMIT_DATA, "VmData:")});
 }
 
+std::uint64_t stored_bytes(std::span<const std::uint64_t> shape, std::uint64_t width) {
+  std::uint64_t bytes = width;
+  for (const std::uint64_t extent : shape) {
+    if (__builtin_mul_overflow(bytes, extent, &bytes)) {
+      return UINT64_MAX;
+    }
+  }
+  return bytes;
+}
+
 void require_memory(const std::filesystem::path& path, std::string_view what, std::uint64_t bytes) {
   constexpr std::uint64_t small = 1 << 20;
   if (bytes <= small) {

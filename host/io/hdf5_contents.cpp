@@ -7,8 +7,8 @@
 
 #include <fmt/format.h>
 
+#include "io/available_memory.hpp"
 #include "io/hdf5_handle.hpp"
-#include "io/hdf5_reader.hpp"
 #include "io/recording_state.hpp"
 #include "model/printable.hpp"
 
@@ -271,7 +271,7 @@ const std::vector<std::uint64_t>& Hdf5Contents::shape(const std::string& name,
 }
 
 std::uint64_t Hdf5Contents::count(const std::string& name) const {
-  return hdf5_stored_bytes(shape(name), 1);
+  return stored_bytes(shape(name), 1);
 }
 
 void Hdf5Contents::read(const std::string& name, const Take& take, std::uint64_t rows) {

@@ -57,7 +57,7 @@ Hdf5Value read_attribute(hid_t attribute, std::uint64_t file_bytes) {
     value.problem = "has a type that Palpate does not read; store numbers or strings";
     return value;
   }
-  const std::uint64_t bytes = hdf5_stored_bytes(value.shape, width);
+  const std::uint64_t bytes = stored_bytes(value.shape, width);
   if (bytes > file_bytes) {
     value.problem = hdf5_damaged;
     return value;
@@ -197,16 +197,6 @@ bool Hdf5Reader::read(const std::string& dataset, std::uint64_t rows, const Hdf5
   return rows_.at(dataset).read(rows, take);
 }
 
-std::uint64_t hdf5_stored_bytes(std::span<const std::uint64_t> shape, std::uint64_t width) {
-  std::uint64_t bytes = width;
-  for (const std::uint64_t extent : shape) {
-    if (__builtin_mul_overflow(bytes, extent, &bytes)) {
-      return UINT64_MAX;
-    }
-  }
-  return bytes;
-}
-
 bool hdf5_shape(hid_t space, std::vector<std::uint64_t>& shape) {
   const int rank = space >= 0 ? H5Sget_simple_extent_ndims(space) : -1;
   if (rank < 0) {
@@ -256,7 +246,7 @@ Hdf5Rows::Hdf5Rows(hid_t file, const std::string& name, std::uint64_t file_bytes
     problem_ = "holds strings; store numbers";
   } else if (kind != H5T_INTEGER && kind != H5T_FLOAT && kind != H5T_ENUM) {
     problem_ = "has a type that Palpate does not read; store numbers";
-  } else if (hdf5_stored_bytes(shape_, width) >
+  } else if (stored_bytes(shape_, width) >
              largest_dataset(dataset_.get(), creation.get(), file_bytes)) {
     problem_ = fmt::format(
         "has the shape {}, more than is stored of it: it is damaged or was never written; copy or "
@@ -288,7 +278,7 @@ bool Hdf5Rows::reopen_with_cache(hid_t file, const std::string& name, hid_t crea
     chunks *= shape_[axis] / chunk[axis] + 1;
   }
   const std::uint64_t chunk_bytes =
-      hdf5_stored_bytes(std::vector<std::uint64_t>(chunk.begin(), chunk.end()), width);
+      stored_bytes(std::vector<std::uint64_t>(chunk.begin(), chunk.end()), width);
   if (__builtin_mul_overflow(chunk_bytes, chunks, &band_bytes_)) {
     return false;
   }

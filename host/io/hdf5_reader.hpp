@@ -61,9 +61,6 @@ inline constexpr const char* hdf5_damaged =
 /// Reads the shape of a dataspace, which may be invalid; false where the file is damaged.
 bool hdf5_shape(hid_t space, std::vector<std::uint64_t>& shape);
 
-/// Returns the bytes of values of this shape and width; UINT64_MAX on overflow.
-std::uint64_t hdf5_stored_bytes(std::span<const std::uint64_t> shape, std::uint64_t width);
-
 /// Value of an attribute (numbers or strings in row-major order), or shape of a dataset.
 struct Hdf5Value {
   std::vector<std::uint64_t> shape;  ///< empty for a scalar

@@ -1,6 +1,7 @@
 #include "io/npy_file.hpp"
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cstdint>
 #include <cstring>
@@ -157,24 +158,16 @@ NpyArray read_npy(const std::filesystem::path& path) {
   const std::string text = read_header(file, path);
   const Header header = header_of(path, text);
   const NumberType& type = type_of(path, header.descr);
-  std::uint64_t bytes = type.width;
-  for (const std::size_t extent : header.shape) {
-    if (__builtin_mul_overflow(bytes, extent, &bytes)) {
-      bytes = UINT64_MAX;
-      break;
-    }
-  }
+  const std::uint64_t bytes = stored_bytes(header.shape, type.width);
   const auto begin = static_cast<std::uintmax_t>(file.tellg());
   if (bytes != file_bytes - begin) {
     refuse(path, "holds {} bytes of numbers, its shape ({}) makes {}; save the array again",
            file_bytes - begin, fmt::format("{}", fmt::join(header.shape, ", ")), bytes);
   }
   const std::size_t count = bytes / type.width;
-  std::uint64_t needed = 0;  // a sparse file's count may be any
-  if (__builtin_mul_overflow(count, (header.fortran_order ? 2 : 1) * sizeof(double), &needed)) {
-    needed = UINT64_MAX;
-  }
-  require_memory(path, fmt::format("an array of {} numbers", count), needed);
+  // A sparse file's count may be any.
+  require_memory(path, fmt::format("an array of {} numbers", count),
+                 stored_bytes(std::array{count}, (header.fortran_order ? 2 : 1) * sizeof(double)));
   NpyArray array{.shape = header.shape, .values = std::vector<double>(count)};
   constexpr std::size_t piece = 1 << 16;
   std::vector<char> stored(piece * type.width);

@@ -10,7 +10,6 @@
 #include "io/file_format.hpp"
 #include "io/file_summary.hpp"
 #include "io/hdf5_contents.hpp"
-#include "io/hdf5_reader.hpp"
 #include "io/hdf5_writer.hpp"
 #include "io/input_file.hpp"
 #include "io/recording_rules.hpp"
@@ -125,8 +124,8 @@ Posterior read_posterior(const std::filesystem::path& path) {
         const std::vector<std::uint64_t> shape =
             shape_of(posterior.objects.size(), posterior.lattice);
         require_memory(path, fmt::format("a posterior of {} bins", fmt::join(shape, " x ")),
-                       hdf5_stored_bytes(shape, sizeof(double)));
-        posterior.log_likelihood.reserve(hdf5_stored_bytes(shape, 1));
+                       stored_bytes(shape, sizeof(double)));
+        posterior.log_likelihood.reserve(stored_bytes(shape, 1));
       },
       [&](std::span<const double> values) {
         posterior.log_likelihood.insert(posterior.log_likelihood.end(), values.begin(),
@@ -151,7 +150,7 @@ void write_posterior(const std::filesystem::path& path, const std::vector<std::s
   file.attribute("theta_rad", {lattice.theta_rad.lower, lattice.theta_rad.upper});
   file.attribute("pivot_mm", {lattice.pivot_mm.x, lattice.pivot_mm.y});
   const std::vector<std::uint64_t> shape = shape_of(objects.size(), lattice);
-  const std::uint64_t bins = hdf5_stored_bytes(shape_of(1, lattice), 1);
+  const std::uint64_t bins = stored_bytes(shape_of(1, lattice), 1);
   file.dataset(
       "log_likelihood", {shape.begin(), shape.end()},
       [&](std::size_t object) {
@@ -170,7 +169,7 @@ void write_posterior(const std::filesystem::path& path, const std::vector<std::s
 void write_posterior(const std::filesystem::path& path, const Posterior& posterior) {
   const auto& [objects, lattice, logs] = posterior;
   validate(path, objects, lattice);
-  if (logs.size() != hdf5_stored_bytes(shape_of(objects.size(), lattice), 1)) {
+  if (logs.size() != stored_bytes(shape_of(objects.size(), lattice), 1)) {
     refuse(path, "a posterior of {} bins and {} log-likelihoods cannot be written; make them agree",
            fmt::format("{}", fmt::join(shape_of(objects.size(), lattice), " x ")), logs.size());
   }

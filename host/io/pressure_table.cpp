@@ -1,6 +1,7 @@
 #include "io/pressure_table.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 
@@ -46,10 +47,7 @@ void reserve(const CsvTable& table, const char* frames, std::uint64_t count, std
              PressureTable& pressures) {
   constexpr std::size_t of_reading = sizeof(double) + sizeof(std::uint8_t) + sizeof(float);
   constexpr std::size_t of_frame = 3 * sizeof(Pose) + 2 * sizeof(double);
-  std::uint64_t bytes = 0;
-  if (__builtin_mul_overflow(count, elements * of_reading + of_frame, &bytes)) {
-    bytes = UINT64_MAX;
-  }
+  const std::uint64_t bytes = stored_bytes(std::array{count}, elements * of_reading + of_frame);
   require_memory(table.path(),
                  fmt::format("a table of {} {} by {} elements", count, frames, elements), bytes);
   pressures.pressure.reserve(count * elements);
