@@ -96,7 +96,7 @@ struct Legend {
                                                   row_px * (static_cast<double>(row) + 0.5));
       const glm::dvec2 right = left + glm::dvec2(sample_px, 0.0);
       if (series.line != Line::none) {
-        canvas.line(std::array{left, right}, pen_of(series));
+        canvas.segment(left, right, pen_of(series));
       }
       draw_mark(canvas, series, 0.5 * (left + right));
       canvas.text(series.name, right + glm::dvec2(12.0, 7.0), body);
@@ -140,7 +140,7 @@ class Plot {
                               view_.pixel({point.x, point.high})};
         canvas_.line(ends, pen);
         for (const glm::dvec2& end : ends) {
-          canvas_.line(std::array{end - half_cap, end + half_cap}, pen);
+          canvas_.segment(end - half_cap, end + half_cap, pen);
         }
       }
     }

@@ -1,5 +1,4 @@
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <span>
 
@@ -86,8 +85,8 @@ void draw_needle(Canvas& canvas, const View& view, const PlanFigure& figure,
   const glm::dvec2 centre =
       view.pixel(candidate.T_robot_sensor * array_centre_mm(figure.elements_mm));
   const double theta = candidate.T_robot_sensor.theta_rad;
-  const std::array ends{centre, centre + needle_px * glm::dvec2(std::cos(theta), -std::sin(theta))};
-  canvas.line(ends, {.colour = colour, .width_px = 4.0, .halo_px = 0.75});
+  canvas.segment(centre, centre + needle_px * glm::dvec2(std::cos(theta), -std::sin(theta)),
+                 {.colour = colour, .width_px = 4.0, .halo_px = 0.75});
   canvas.disc(centre, 3.0, colour);
 }
 
@@ -98,8 +97,7 @@ void draw_legend(Canvas& canvas, double baseline) {
     x += canvas.text_width(words, small) + 22.0;
   };
   const auto stroke = [&](const Pen& pen) {
-    const std::array ends{glm::dvec2(x, baseline - 6.0), glm::dvec2(x + 30.0, baseline - 6.0)};
-    canvas.line(ends, pen);
+    canvas.segment(glm::dvec2(x, baseline - 6.0), glm::dvec2(x + 30.0, baseline - 6.0), pen);
     x += 38.0;
   };
   stroke(best_pen);
@@ -108,8 +106,8 @@ void draw_legend(Canvas& canvas, double baseline) {
   meaning("touches so far");
   const Colour shade = sequential(0.6);
   canvas.disc({x + 4.0, baseline - 6.0}, 3.0, shade);
-  const std::array ends{glm::dvec2(x + 4.0, baseline - 6.0), glm::dvec2(x + 19.0, baseline - 6.0)};
-  canvas.line(ends, {.colour = shade, .width_px = 4.0});
+  canvas.segment(glm::dvec2(x + 4.0, baseline - 6.0), glm::dvec2(x + 19.0, baseline - 6.0),
+                 {.colour = shade, .width_px = 4.0});
   x += 28.0;
   meaning("candidates, along x");
   const Box box{x, baseline - 14.0, 26.0, 16.0};

@@ -191,8 +191,7 @@ void draw_touches(Canvas& canvas, const RecognitionSheet& sheet) {
   Legend legend(canvas, view.box);
   const auto sample = [&](const Pen& pen) {
     return [&canvas, &pen](glm::dvec2 at) {
-      const std::array ends{at - glm::dvec2(18.0, 0.0), at + glm::dvec2(18.0, 0.0)};
-      canvas.line(ends, pen);
+      canvas.segment(at - glm::dvec2(18.0, 0.0), at + glm::dvec2(18.0, 0.0), pen);
     };
   };
   legend.add(36.0, sample(estimate_pen), "estimated pose");
@@ -207,8 +206,7 @@ void draw_cross(Canvas& canvas, glm::dvec2 at) {
   Pen pen = truth_pen;
   pen.dashed = false;
   for (const glm::dvec2& arm : {glm::dvec2(7.0, 7.0), glm::dvec2(7.0, -7.0)}) {
-    const std::array ends{at - arm, at + arm};
-    canvas.line(ends, pen);
+    canvas.segment(at - arm, at + arm, pen);
   }
 }
 
