@@ -9,7 +9,6 @@
 #include "driver/deframer.hpp"
 #include "driver/transfer_ring.hpp"
 #include "driver/usb_device.hpp"
-#include "driver/usb_handle.hpp"
 #include "palpate/sensor.hpp"
 
 namespace palpate {

@@ -5,7 +5,6 @@
 #include "driver/board.hpp"
 #include "driver/serial_profile.hpp"
 #include "driver/usb_device.hpp"
-#include "driver/usb_handle.hpp"
 #include "palpate/error.hpp"
 
 namespace palpate {

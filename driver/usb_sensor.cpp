@@ -17,7 +17,6 @@
 #include "driver/frame_queue.hpp"
 #include "driver/transfer_ring.hpp"
 #include "driver/usb_device.hpp"
-#include "driver/usb_handle.hpp"
 #include "palpate/driver.hpp"
 #include "palpate/error.hpp"
 #include "palpate/sensor.hpp"

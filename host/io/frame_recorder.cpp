@@ -14,7 +14,6 @@
 
 #include "io/descriptor.hpp"
 #include "io/file_format.hpp"
-#include "io/hdf5_failure.hpp"
 #include "io/hdf5_writer.hpp"
 #include "io/input_file.hpp"
 #include "io/recording_rules.hpp"

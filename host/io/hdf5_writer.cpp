@@ -4,21 +4,16 @@
 #include <cstdlib>
 #include <cstring>
 #include <limits>
+#include <string_view>
 
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include "io/atomic_file.hpp"
+#include "io/descriptor.hpp"
 #include "palpate/error.hpp"
 
 namespace palpate {
-
-void set_appendable(hid_t access) {
-  H5Pset_libver_bounds(access, H5F_LIBVER_V110, H5F_LIBVER_V110);
-  // Metadata starts on pages: a process can be killed between two pages of one write, and a
-  // checksum would not survive half of its metadata.
-  constexpr hsize_t page = 4096;
-  H5Pset_alignment(access, 1, page);
-}
 
 namespace {
 
@@ -112,6 +107,14 @@ std::vector<hsize_t> chunk_of(const Hdf5Writer::Shape& shape) {
 }
 
 }  // namespace
+
+void set_appendable(hid_t access) {
+  H5Pset_libver_bounds(access, H5F_LIBVER_V110, H5F_LIBVER_V110);
+  // Metadata starts on pages: a process can be killed between two pages of one write, and a
+  // checksum would not survive half of its metadata.
+  constexpr hsize_t page = 4096;
+  H5Pset_alignment(access, 1, page);
+}
 
 Hdf5Writer::Hdf5Writer(std::filesystem::path path, Layout layout)
     : path_(std::move(path)), file_(file_in_memory(image_, layout)) {
@@ -234,6 +237,35 @@ void Hdf5Writer::require(bool done, std::string_view what) const {
   if (!done) {
     throw Error(Fault::system, fmt::format("{}: HDF5 cannot write {}; free memory and try again",
                                            path_.string(), what));
+  }
+}
+
+std::string hdf5_failure() {
+  std::string reason = "HDF5 failed";
+  H5Ewalk2(
+      H5E_DEFAULT, H5E_WALK_UPWARD,
+      [](unsigned, const H5E_error2_t* error, void* text) -> herr_t {
+        const std::string_view said = error->desc == nullptr ? "" : error->desc;
+        const std::string_view key = "error message = '";
+        if (const std::size_t at = said.find(key); at != std::string_view::npos) {
+          const std::string_view rest = said.substr(at + key.size());
+          *static_cast<std::string*>(text) = rest.substr(0, rest.find('\''));
+          return 1;
+        }
+        return 0;
+      },
+      &reason);
+  return reason;
+}
+
+void give_up_hdf5_file(hid_t file) {
+  void* descriptor = nullptr;
+  if (H5Fget_vfd_handle(file, H5P_DEFAULT, &descriptor) < 0) {
+    return;
+  }
+  // The file's remaining writes go to /dev/null.
+  if (const Descriptor nowhere("/dev/null", O_RDWR); nowhere.valid()) {
+    ::dup3(nowhere.get(), *static_cast<int*>(descriptor), O_CLOEXEC);
   }
 }
 

@@ -11,6 +11,8 @@
 #include <string_view>
 #include <vector>
 
+#include <hdf5.h>
+
 #include "io/hdf5_handle.hpp"
 
 namespace palpate {
@@ -85,5 +87,13 @@ class Hdf5Writer {
   Hdf5Image image_;
   Hdf5Handle file_;  ///< until save()
 };
+
+/// Returns why HDF5's last call on this thread failed, in the words of the operating system, such
+/// as "No space left on device"; "HDF5 failed" where the system was not the cause.
+std::string hdf5_failure();
+
+/// Gives up a file that could not be written: it stays as if the program had been killed now, and
+/// H5Fclose() succeeds. Without this, HDF5 1.10 crashes at exit where a file has unsaved parts.
+void give_up_hdf5_file(hid_t file);
 
 }  // namespace palpate

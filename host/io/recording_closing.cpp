@@ -5,7 +5,6 @@
 #include <cstring>
 
 #include "io/forked_child.hpp"
-#include "io/hdf5_failure.hpp"
 #include "io/hdf5_handle.hpp"
 #include "io/hdf5_process.hpp"
 #include "io/hdf5_writer.hpp"
