@@ -8,7 +8,7 @@
 
 #include "driver/deframer.hpp"
 #include "driver/transfer_ring.hpp"
-#include "driver/usb_handle.hpp"
+#include "driver/usb_device.hpp"
 #include "palpate/sensor.hpp"
 
 namespace palpate {
@@ -50,11 +50,36 @@ class Board {
                               std::vector<ParsedFrame>& frames);
 };
 
+/// The name of the board that has no profile.
+inline const std::string takktile_kind = "takktile";
+
 /// Makes the board of a name without serial number: "takktile", a shipped profile's name, or the
 /// path of a profile. @throws Error (Fault::input)
 std::unique_ptr<Board> make_board(const std::string& name);
 
 /// One board of each kind that Palpate ships: the TakkTile and all shipped profiles.
 std::vector<std::unique_ptr<Board>> known_boards();
+
+/// The two parts of a board's name, such as "takktile:0012".
+struct BoardName {
+  std::string kind;   ///< "takktile", or the name or path of a profile
+  std::string which;  ///< serial number or port of one board out of several, or ""
+};
+/// Splits a name at the colon behind its kind. @throws Error (Fault::input) for an empty part
+BoardName parse_board_name(const std::string& name);
+
+/// What tells the device from others of its kind: its serial number, or its port if it has no
+/// serial number or another such device bears the same serial number.
+std::string distinction(const Board& board, const UsbDevice& device,
+                        const std::vector<UsbDevice>& devices);
+
+/// The name that opens exactly this device out of `devices`.
+std::string full_name(const Board& board, const UsbDevice& device,
+                      const std::vector<UsbDevice>& devices);
+
+/// Finds the one device of this kind whose serial number or port is `which`; "" fits every device.
+/// @throws Error (Fault::input) if none or several fit, or a board without USB ids lacks `which`
+UsbDevice choose_device(const std::vector<UsbDevice>& devices, const Board& board,
+                        const std::string& which);
 
 }  // namespace palpate

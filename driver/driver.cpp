@@ -3,13 +3,8 @@
 #include <algorithm>
 
 #include "driver/board.hpp"
-#include "driver/board_choice.hpp"
 #include "driver/serial_profile.hpp"
-#include "driver/takktile_board.hpp"
 #include "driver/usb_device.hpp"
-#include "driver/usb_fault.hpp"
-#include "driver/usb_handle.hpp"
-#include "driver/usb_sensor.hpp"
 #include "palpate/error.hpp"
 
 namespace palpate {
@@ -70,12 +65,7 @@ std::vector<BoardInfo> list_boards() {
 
 std::optional<std::filesystem::path> board_file(const std::string& name) {
   const std::string kind = parse_board_name(name).kind;
-  return kind == TakktileBoard::kind ? std::nullopt : std::optional(profile_path(kind));
-}
-
-std::unique_ptr<Sensor> open_board(const std::string& name) {
-  const BoardName parsed = parse_board_name(name);
-  return std::make_unique<UsbSensor>(make_board(parsed.kind), parsed.which);
+  return kind == takktile_kind ? std::nullopt : std::optional(profile_path(kind));
 }
 
 }  // namespace palpate

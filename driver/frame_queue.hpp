@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <chrono>
 #include <condition_variable>
 #include <cstddef>
@@ -8,6 +9,7 @@
 #include <exception>
 #include <mutex>
 #include <optional>
+#include <utility>
 
 #include "palpate/sensor.hpp"
 
@@ -20,18 +22,64 @@ class FrameQueue {
   /// Most frames held: 1 s of the fastest boards.
   static constexpr std::size_t capacity = 1024;
 
-  void push(Frame frame);
+  void push(Frame frame) {
+    {
+      const std::lock_guard lock(mutex_);
+      frames_.push_back(std::move(frame));
+      ++counters_.pushed;
+      if (frames_.size() > capacity) {
+        const std::uint64_t missing = frames_.front().lost_before + 1;
+        frames_.pop_front();
+        frames_.front().lost_before += missing;
+        ++counters_.dropped;
+      }
+    }
+    changed_.notify_one();
+  }
+
   /// Takes the oldest frame, or none if none comes in time. @throws fail()'s reason when empty
-  std::optional<Frame> pop(std::chrono::milliseconds timeout);
+  std::optional<Frame> pop(std::chrono::milliseconds timeout) {
+    // wait_for() adds the timeout to the clock's time: the sum must not overflow.
+    constexpr std::chrono::milliseconds longest = std::chrono::hours(24 * 365);
+    std::unique_lock lock(mutex_);
+    changed_.wait_for(lock, std::clamp(timeout, std::chrono::milliseconds(0), longest),
+                      [this] { return !frames_.empty() || failure_; });
+    if (!frames_.empty()) {
+      Frame frame = std::move(frames_.front());
+      frames_.pop_front();
+      return frame;
+    }
+    if (failure_) {
+      std::rethrow_exception(failure_);
+    }
+    return std::nullopt;
+  }
+
   /// Declares that no further frame will come, and why.
-  void fail(std::exception_ptr reason);
-  void clear();
+  void fail(std::exception_ptr reason) {
+    {
+      const std::lock_guard lock(mutex_);
+      failure_ = std::move(reason);
+    }
+    changed_.notify_one();
+  }
+
+  void clear() {
+    const std::lock_guard lock(mutex_);
+    frames_.clear();
+    failure_ = nullptr;
+    counters_ = {};
+  }
 
   struct Counters {
     std::uint64_t pushed = 0;
     std::uint64_t dropped = 0;
   };
-  Counters counters() const;
+
+  Counters counters() const {
+    const std::lock_guard lock(mutex_);
+    return counters_;
+  }
 
  private:
   mutable std::mutex mutex_;

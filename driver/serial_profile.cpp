@@ -10,7 +10,6 @@
 #include <fmt/ranges.h>
 
 #include "driver/data_folder.hpp"
-#include "driver/packet_deframer.hpp"
 #include "driver/profile_packet.hpp"
 #include "palpate/error.hpp"
 
@@ -207,15 +206,10 @@ SerialProfile read_serial_profile(const std::string& name_or_path) {
 }
 
 SerialProfile parse_serial_profile(const std::string& yaml, const std::filesystem::path& path) {
-  try {
-    return read_root({path, "the profile", only_document(std::istringstream(yaml), path)});
-  } catch (const YAML::Exception& error) {
-    refuse(path, fmt::format("line {}: {}; correct the YAML", line_of(error.mark), error.msg));
-  }
-}
-
-std::unique_ptr<Deframer> make_deframer(const SerialProfile& profile) {
-  return std::make_unique<PacketDeframer>(profile.packet);
+  SerialProfile profile;
+  read_document(std::istringstream(yaml), path, "the profile",
+                [&](const Entry& root) { profile = read_root(root); });
+  return profile;
 }
 
 }  // namespace palpate

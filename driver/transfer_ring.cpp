@@ -5,7 +5,7 @@
 #include <new>
 #include <utility>
 
-#include "driver/usb_fault.hpp"
+#include "driver/usb_device.hpp"
 
 namespace palpate {
 

@@ -5,7 +5,7 @@
 #include <memory>
 #include <vector>
 
-#include "driver/usb_handle.hpp"
+#include "driver/usb_device.hpp"
 
 namespace palpate {
 

@@ -1,17 +1,89 @@
-#include "driver/usb_sensor.hpp"
-
 #include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <cstdint>
 #include <exception>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <thread>
 #include <utility>
+#include <vector>
 
 #include <fmt/format.h>
 
-#include "driver/board_choice.hpp"
+#include "driver/board.hpp"
+#include "driver/frame_queue.hpp"
+#include "driver/transfer_ring.hpp"
+#include "driver/usb_device.hpp"
+#include "palpate/driver.hpp"
 #include "palpate/error.hpp"
+#include "palpate/sensor.hpp"
 
 namespace palpate {
 
 namespace {
+
+/// An open board: its interfaces are claimed, its calibration is read. Between begin() and end()
+/// the link holds the board's stream.
+class BoardLink {
+ public:
+  /// The references must outlive the link. @throws Error
+  BoardLink(const UsbContext& context, Board& board, UsbDevice device,
+            TransferRing::Counters& counters)
+      : context_(context),
+        board_(board),
+        counters_(counters),
+        handle_(std::move(device)),
+        source_(board.source(handle_.device())) {
+    for (const int interface : source_.interfaces) {
+      handle_.claim(interface);
+    }
+    description_ = board_.configure(handle_);
+    description_.serial = handle_.device().serial;
+  }
+
+  const SensorDescription& description() const { return description_; }
+
+  /// Starts the stream. @throws Error
+  void begin() {
+    board_.deframer().reset();
+    // The ring must be ready before the board sends.
+    ring_.emplace(context_, handle_, source_.endpoint, source_.transfer_bytes, counters_);
+    try {
+      board_.start(handle_);
+    } catch (...) {
+      ring_.reset();
+      throw;
+    }
+  }
+
+  /// Ends the stream and frees the ring. Returns the transfers not yet taken from the ring.
+  std::vector<TransferRing::Completion> end() {
+    try {
+      board_.stop(handle_);
+    } catch (const Error&) {
+      // The board may be unplugged; the transfers and interfaces are released either way.
+    }
+    ring_->drain();
+    std::vector<TransferRing::Completion> last = ring_->completed();
+    ring_.reset();
+    return last;
+  }
+
+  /// The ring of the running stream.
+  TransferRing& ring() { return *ring_; }
+
+ private:
+  const UsbContext& context_;
+  Board& board_;
+  TransferRing::Counters& counters_;
+  UsbHandle handle_;
+  StreamSource source_;
+  SensorDescription description_;
+  std::optional<TransferRing> ring_;
+};
 
 using std::chrono::duration_cast;
 using std::chrono::microseconds;
@@ -41,187 +113,232 @@ int on_arrival(libusb_context*, libusb_device*, libusb_hotplug_event, void* arri
   return 0;  // stay registered
 }
 
+/// A sensor that streams from a USB board, also after the board was unplugged and plugged in again.
+///
+/// Between start() and stop(), a thread of the sensor's own uses the device: it handles libusb's
+/// events, decodes transfers, ends stalls and waits for an unplugged board. It passes frames to
+/// next() through a queue.
+class UsbSensor final : public Sensor {
+ public:
+  /// @param which serial number or port of the board; "" if only one is plugged in. @throws Error
+  UsbSensor(std::unique_ptr<Board> board, const std::string& which) : board_(std::move(board)) {
+    const std::vector<UsbDevice> devices = usb_devices(context_);
+    const UsbDevice device = choose_device(devices, *board_, which);
+    which_ = distinction(*board_, device, devices);
+    link_ = std::make_unique<BoardLink>(context_, *board_, device, transfer_counters_);
+    description_ = link_->description();
+    watch_arrivals();
+  }
+
+  ~UsbSensor() override { stop(); }
+
+  UsbSensor(const UsbSensor&) = delete;
+  UsbSensor& operator=(const UsbSensor&) = delete;
+
+  const SensorDescription& description() const override { return description_; }
+
+  void start() override {
+    stop();
+    queue_.clear();
+    transfer_counters_ = {};
+    tally_ = {};
+    lost_before_next_ = 0;
+    publish();
+    begin();
+    gone_ = false;
+    stopping_ = false;
+    back_off_ = first_back_off;
+    thread_ = std::thread([this] { run(); });
+  }
+
+  std::optional<Frame> next(std::chrono::milliseconds timeout) override {
+    return queue_.pop(timeout);
+  }
+
+  bool gone() const override { return gone_; }
+
+  void stop() override {
+    if (thread_.joinable()) {
+      stopping_ = true;
+      libusb_interrupt_event_handler(context_.get());
+      thread_.join();
+    }
+  }
+
+  SensorCounters counters() const override {
+    const FrameQueue::Counters queue = queue_.counters();
+    const std::lock_guard lock(mutex_);
+    SensorCounters counters = published_;
+    counters.frames = queue.pushed - queue.dropped;
+    counters.lost += queue.dropped;
+    return counters;
+  }
+
+ private:
+  void watch_arrivals() {
+    // Without hotplug events, wait_for_return() finds the board by looking at intervals.
+    if (libusb_has_capability(LIBUSB_CAP_HAS_HOTPLUG) != 0) {
+      libusb_hotplug_register_callback(context_.get(), LIBUSB_HOTPLUG_EVENT_DEVICE_ARRIVED,
+                                       LIBUSB_HOTPLUG_NO_FLAGS, LIBUSB_HOTPLUG_MATCH_ANY,
+                                       LIBUSB_HOTPLUG_MATCH_ANY, LIBUSB_HOTPLUG_MATCH_ANY,
+                                       on_arrival, &arrived_, nullptr);
+    }
+  }
+
+  void begin() {
+    if (link_) {
+      try {
+        link_->begin();
+        return;
+      } catch (const Error&) {
+        // A board that was unplugged since is a new device to the kernel, and must be opened again.
+        link_.reset();
+      }
+    }
+    reconnect();
+  }
+
+  void run() {
+    try {
+      while (!stopping_) {
+        if (link_) {
+          stream();
+        } else {
+          wait_for_return();
+        }
+        publish();
+      }
+      if (link_) {
+        deliver(link_->end());
+        publish();
+      }
+    } catch (...) {
+      link_.reset();
+      queue_.fail(std::current_exception());
+    }
+  }
+
+  void stream() {
+    handle_events(context_, event_patience);
+    TransferRing& ring = link_->ring();
+    std::vector<TransferRing::Completion> completions = ring.completed();
+    deliver(completions);
+    ring.recycle(std::move(completions));
+    if (ring.lost()) {
+      lose();
+    } else if (ring.halted()) {
+      try {
+        ring.recover();
+      } catch (const Error&) {
+        lose();
+      }
+    }
+  }
+
+  void lose() {
+    link_.reset();
+    gone_ = true;
+  }
+
+  void wait_for_return() {
+    const auto end = steady_clock::now() + back_off_;
+    for (auto now = steady_clock::now(); !stopping_ && !arrived_ && now < end;
+         now = steady_clock::now()) {
+      handle_events(context_,
+                    std::min<microseconds>(duration_cast<microseconds>(end - now), event_patience));
+    }
+    back_off_ =
+        arrived_.exchange(false) ? first_back_off : std::min(2 * back_off_, longest_back_off);
+    if (stopping_) {
+      return;
+    }
+    try {
+      reconnect();
+    } catch (const OtherElements&) {
+      throw;
+    } catch (const Error&) {
+      return;  // not plugged in yet, or udev has not given permission yet, or gone again
+    }
+    ++tally_.reconnects;
+    gone_ = false;
+  }
+
+  void reconnect() {
+    const UsbDevice device = choose_device(usb_devices(context_), *board_, which_);
+    auto link = std::make_unique<BoardLink>(context_, *board_, device, transfer_counters_);
+    const std::size_t elements = link->description().elements_mm.size();
+    if (link->description().elements_mm != description_.elements_mm) {
+      throw OtherElements(
+          Fault::system,
+          fmt::format(
+              "{}: came back with {} elements instead of {}, or at other positions; open it again",
+              device.place(), elements, description_.elements_mm.size()));
+    }
+    link->begin();
+    link_ = std::move(link);
+  }
+
+  void deliver(const std::vector<TransferRing::Completion>& completions) {
+    Deframer& deframer = board_->deframer();
+    for (const TransferRing::Completion& completion : completions) {
+      if (completion.missing > 0) {
+        // A lower bound: each missing transfer held at least part of a frame.
+        deframer.reset();
+        lost_before_next_ += completion.missing;
+        tally_.lost += completion.missing;
+      }
+      const DeframerCounters before = deframer.counters();
+      parsed_.clear();
+      const std::uint64_t spoiled = board_->parse(completion, parsed_);
+      tally_.checksum_errors += deframer.counters().checksum_errors - before.checksum_errors;
+      tally_.garbage_bytes += deframer.counters().garbage_bytes - before.garbage_bytes;
+      tally_.lost += spoiled;
+      lost_before_next_ += spoiled;
+      for (ParsedFrame& frame : parsed_) {
+        queue_.push({.host_time_s = completion.host_time_s,
+                     .device_time_s = frame.device_time_s,
+                     .values = std::move(frame.values),
+                     .lost_before = std::exchange(lost_before_next_, 0)});
+        back_off_ = first_back_off;
+      }
+    }
+  }
+
+  void publish() {
+    const std::lock_guard lock(mutex_);
+    published_ = tally_;
+    published_.timeouts = transfer_counters_.timeouts;
+    published_.stalls = transfer_counters_.stalls;
+    published_.overflows = transfer_counters_.overflows;
+  }
+
+  UsbContext context_;
+  std::unique_ptr<Board> board_;
+  std::string which_;  // serial number or port, by which a board that comes back is known
+  std::atomic<bool> arrived_ = false;  // a device was plugged in
+
+  // Between start() and stop(), only the sensor's thread uses these.
+  TransferRing::Counters transfer_counters_;
+  SensorCounters tally_;
+  std::unique_ptr<BoardLink> link_;  // none while the board is gone
+  std::vector<ParsedFrame> parsed_;
+  std::uint64_t lost_before_next_ = 0;
+  std::chrono::milliseconds back_off_ = {};
+
+  SensorDescription description_;
+  std::thread thread_;
+  std::atomic<bool> stopping_ = false;
+  std::atomic<bool> gone_ = false;
+  FrameQueue queue_;
+  mutable std::mutex mutex_;
+  SensorCounters published_;  // copy of tally_ for counters(), guarded by mutex_
+};
+
 }  // namespace
 
-UsbSensor::UsbSensor(std::unique_ptr<Board> board, const std::string& which)
-    : board_(std::move(board)) {
-  const std::vector<UsbDevice> devices = usb_devices(context_);
-  const UsbDevice device = choose_device(devices, *board_, which);
-  which_ = distinction(*board_, device, devices);
-  link_ = std::make_unique<BoardLink>(context_, *board_, device, transfer_counters_);
-  description_ = link_->description();
-  watch_arrivals();
-}
-
-UsbSensor::~UsbSensor() { stop(); }
-
-void UsbSensor::watch_arrivals() {
-  // Without hotplug events, wait_for_return() finds the board by looking at intervals.
-  if (libusb_has_capability(LIBUSB_CAP_HAS_HOTPLUG) != 0) {
-    libusb_hotplug_register_callback(context_.get(), LIBUSB_HOTPLUG_EVENT_DEVICE_ARRIVED,
-                                     LIBUSB_HOTPLUG_NO_FLAGS, LIBUSB_HOTPLUG_MATCH_ANY,
-                                     LIBUSB_HOTPLUG_MATCH_ANY, LIBUSB_HOTPLUG_MATCH_ANY, on_arrival,
-                                     &arrived_, nullptr);
-  }
-}
-
-void UsbSensor::start() {
-  stop();
-  queue_.clear();
-  transfer_counters_ = {};
-  tally_ = {};
-  lost_before_next_ = 0;
-  publish();
-  begin();
-  gone_ = false;
-  stopping_ = false;
-  back_off_ = first_back_off;
-  thread_ = std::thread([this] { run(); });
-}
-
-void UsbSensor::begin() {
-  if (link_) {
-    try {
-      link_->begin();
-      return;
-    } catch (const Error&) {
-      // A board that was unplugged since is a new device to the kernel, and must be opened again.
-      link_.reset();
-    }
-  }
-  reconnect();
-}
-
-std::optional<Frame> UsbSensor::next(milliseconds timeout) { return queue_.pop(timeout); }
-
-void UsbSensor::stop() {
-  if (thread_.joinable()) {
-    stopping_ = true;
-    libusb_interrupt_event_handler(context_.get());
-    thread_.join();
-  }
-}
-
-SensorCounters UsbSensor::counters() const {
-  const FrameQueue::Counters queue = queue_.counters();
-  const std::lock_guard lock(mutex_);
-  SensorCounters counters = published_;
-  counters.frames = queue.pushed - queue.dropped;
-  counters.lost += queue.dropped;
-  return counters;
-}
-
-void UsbSensor::run() {
-  try {
-    while (!stopping_) {
-      if (link_) {
-        stream();
-      } else {
-        wait_for_return();
-      }
-      publish();
-    }
-    if (link_) {
-      deliver(link_->end());
-      publish();
-    }
-  } catch (...) {
-    link_.reset();
-    queue_.fail(std::current_exception());
-  }
-}
-
-void UsbSensor::stream() {
-  handle_events(context_, event_patience);
-  TransferRing& ring = link_->ring();
-  std::vector<TransferRing::Completion> completions = ring.completed();
-  deliver(completions);
-  ring.recycle(std::move(completions));
-  if (ring.lost()) {
-    lose();
-  } else if (ring.halted()) {
-    try {
-      ring.recover();
-    } catch (const Error&) {
-      lose();
-    }
-  }
-}
-
-void UsbSensor::lose() {
-  link_.reset();
-  gone_ = true;
-}
-
-void UsbSensor::wait_for_return() {
-  const auto end = steady_clock::now() + back_off_;
-  for (auto now = steady_clock::now(); !stopping_ && !arrived_ && now < end;
-       now = steady_clock::now()) {
-    handle_events(context_,
-                  std::min<microseconds>(duration_cast<microseconds>(end - now), event_patience));
-  }
-  back_off_ = arrived_.exchange(false) ? first_back_off : std::min(2 * back_off_, longest_back_off);
-  if (stopping_) {
-    return;
-  }
-  try {
-    reconnect();
-  } catch (const OtherElements&) {
-    throw;
-  } catch (const Error&) {
-    return;  // not plugged in yet, or udev has not given permission yet, or gone again
-  }
-  ++tally_.reconnects;
-  gone_ = false;
-}
-
-void UsbSensor::reconnect() {
-  const UsbDevice device = choose_device(usb_devices(context_), *board_, which_);
-  auto link = std::make_unique<BoardLink>(context_, *board_, device, transfer_counters_);
-  const std::size_t elements = link->description().elements_mm.size();
-  if (link->description().elements_mm != description_.elements_mm) {
-    throw OtherElements(
-        Fault::system,
-        fmt::format(
-            "{}: came back with {} elements instead of {}, or at other positions; open it again",
-            device.place(), elements, description_.elements_mm.size()));
-  }
-  link->begin();
-  link_ = std::move(link);
-}
-
-void UsbSensor::deliver(const std::vector<TransferRing::Completion>& completions) {
-  Deframer& deframer = board_->deframer();
-  for (const TransferRing::Completion& completion : completions) {
-    if (completion.missing > 0) {
-      // A lower bound: each missing transfer held at least part of a frame.
-      deframer.reset();
-      lost_before_next_ += completion.missing;
-      tally_.lost += completion.missing;
-    }
-    const DeframerCounters before = deframer.counters();
-    parsed_.clear();
-    const std::uint64_t spoiled = board_->parse(completion, parsed_);
-    tally_.checksum_errors += deframer.counters().checksum_errors - before.checksum_errors;
-    tally_.garbage_bytes += deframer.counters().garbage_bytes - before.garbage_bytes;
-    tally_.lost += spoiled;
-    lost_before_next_ += spoiled;
-    for (ParsedFrame& frame : parsed_) {
-      queue_.push({.host_time_s = completion.host_time_s,
-                   .device_time_s = frame.device_time_s,
-                   .values = std::move(frame.values),
-                   .lost_before = std::exchange(lost_before_next_, 0)});
-      back_off_ = first_back_off;
-    }
-  }
-}
-
-void UsbSensor::publish() {
-  const std::lock_guard lock(mutex_);
-  published_ = tally_;
-  published_.timeouts = transfer_counters_.timeouts;
-  published_.stalls = transfer_counters_.stalls;
-  published_.overflows = transfer_counters_.overflows;
+std::unique_ptr<Sensor> open_board(const std::string& name) {
+  const BoardName parsed = parse_board_name(name);
+  return std::make_unique<UsbSensor>(make_board(parsed.kind), parsed.which);
 }
 
 }  // namespace palpate

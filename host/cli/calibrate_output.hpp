@@ -4,7 +4,7 @@
 #include <optional>
 #include <string>
 
-#include "figures/reliability_figure.hpp"
+#include "figures/figures.hpp"
 #include "learning/sensor_calibration.hpp"
 
 namespace palpate::cli {

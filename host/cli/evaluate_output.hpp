@@ -6,8 +6,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "figures/confusion_figure.hpp"
-#include "figures/reliability_figure.hpp"
+#include "figures/figures.hpp"
 #include "recognition/evaluation.hpp"
 
 namespace palpate::cli {

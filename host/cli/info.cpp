@@ -14,7 +14,6 @@
 #include "io/file_summary.hpp"
 #include "io/recording_state.hpp"
 #include "io/recording_survey.hpp"
-#include "io/recording_suspicions.hpp"
 #include "palpate/files.hpp"
 #include "palpate/learned_sensor.hpp"
 

@@ -11,7 +11,7 @@
 #include "cli/map_flags.hpp"
 #include "cli/options.hpp"
 #include "cli/progress.hpp"
-#include "figures/presses_figure.hpp"
+#include "figures/figures.hpp"
 #include "learning/contact_learning.hpp"
 #include "learning/unposed_maps.hpp"
 #include "palpate/files.hpp"

@@ -6,7 +6,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "figures/plan_figure.hpp"
+#include "figures/figures.hpp"
 #include "recognition/touch_plan.hpp"
 
 namespace palpate::cli {

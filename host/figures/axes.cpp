@@ -1,7 +1,6 @@
 #include "figures/axes.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 
 #include <fmt/format.h>
@@ -12,14 +11,6 @@ namespace {
 
 constexpr double tick_px = 6.0;
 constexpr Pen axis_pen{.colour = ink, .width_px = 1.5};
-
-/// Distance from the middle of a line of text down to its baseline, in pixels.
-double half_height(const Font& font) { return 0.36 * font.size_px; }
-
-void draw_segment(Canvas& canvas, glm::dvec2 from, glm::dvec2 to) {
-  const std::array ends{from, to};
-  canvas.line(ends, axis_pen);
-}
 
 }  // namespace
 
@@ -32,6 +23,14 @@ Box View::pixels(glm::dvec2 data_lower, glm::dvec2 data_upper) const {
   const glm::dvec2 bottom_left = pixel(data_lower);
   const glm::dvec2 top_right = pixel(data_upper);
   return {bottom_left.x, top_right.y, top_right.x - bottom_left.x, bottom_left.y - top_right.y};
+}
+
+std::vector<glm::dvec2> View::pixels(std::span<const glm::dvec2> data) const {
+  std::vector<glm::dvec2> points;
+  for (const glm::dvec2& p : data) {
+    points.push_back(pixel(p));
+  }
+  return points;
 }
 
 bool View::contains(glm::dvec2 data) const {
@@ -75,15 +74,15 @@ void draw_axes(Canvas& canvas, const View& view, const std::vector<Tick>& x_tick
   canvas.frame(box, axis_pen);
   for (const Tick& tick : x_ticks) {
     const double x = view.pixel({tick.value, view.lower.y}).x;
-    draw_segment(canvas, {x, box.bottom()}, {x, box.bottom() + tick_px});
+    canvas.segment({x, box.bottom()}, {x, box.bottom() + tick_px}, axis_pen);
     canvas.text(tick.label, {x, box.bottom() + tick_px + small.size_px}, small, Align::centre);
   }
   double widest = 0.0;
   for (const Tick& tick : y_ticks) {
     widest = std::max(widest, canvas.text_width(tick.label, small));
     const double y = view.pixel({view.lower.x, tick.value}).y;
-    draw_segment(canvas, {box.left - tick_px, y}, {box.left, y});
-    canvas.text(tick.label, {box.left - tick_px - 4.0, y + half_height(small)}, small,
+    canvas.segment({box.left - tick_px, y}, {box.left, y}, axis_pen);
+    canvas.text(tick.label, {box.left - tick_px - 4.0, y + small.half_height_px()}, small,
                 Align::right);
   }
   canvas.text(x_label, {box.left + box.width / 2, box.bottom() + 54.0}, body, Align::centre);
@@ -100,7 +99,7 @@ void draw_colour_bar(Canvas& canvas, const Box& box, double lower, double upper,
   canvas.frame(box, axis_pen);
   for (const Tick& tick : ticks) {
     const double x = box.left + box.width * (tick.value - lower) / (upper - lower);
-    draw_segment(canvas, {x, box.bottom()}, {x, box.bottom() + tick_px});
+    canvas.segment({x, box.bottom()}, {x, box.bottom() + tick_px}, axis_pen);
     canvas.text(tick.label, {x, box.bottom() + tick_px + small.size_px}, small, Align::centre);
   }
   canvas.text(caption, {box.left + box.width / 2, box.bottom() + 52.0}, body, Align::centre);

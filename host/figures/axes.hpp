@@ -1,6 +1,7 @@
 #pragma once
 
 #include <functional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -20,6 +21,8 @@ struct View {
   glm::dvec2 pixel(glm::dvec2 data) const;
   /// Returns the box in pixels of a rectangle of data.
   Box pixels(glm::dvec2 data_lower, glm::dvec2 data_upper) const;
+  /// Returns the pixels of points of data.
+  std::vector<glm::dvec2> pixels(std::span<const glm::dvec2> data) const;
   bool contains(glm::dvec2 data) const;
 };
 
@@ -39,6 +42,19 @@ std::string number(double value);
 /// Returns at most `count` + 1 ticks within [lower, upper]. Their step is 1, 2 or 5 times a power
 /// of ten and at least `smallest_step`.
 std::vector<Tick> even_ticks(double lower, double upper, int count, double smallest_step = 0.0);
+
+struct ChartAxis;
+
+/// Extent and ticks of an axis.
+struct AxisSpan {
+  double lower = 0.0;
+  double upper = 1.0;
+  std::vector<Tick> ticks = {};
+};
+
+/// Fits an axis to the data.
+/// @param values values to show, of which those that are not finite are ignored; may be empty
+AxisSpan span_of(const ChartAxis& axis, std::span<const double> values);
 
 /// Draws a frame around the view, with ticks and axis labels on its left and below it. They take 60
 /// pixels below, and on the left 84 or as many as the widest tick label needs.

@@ -147,6 +147,11 @@ void Canvas::line(std::span<const glm::dvec2> points, const Pen& pen) {
   stroke(pen);
 }
 
+void Canvas::segment(glm::dvec2 from, glm::dvec2 to, const Pen& pen) {
+  const glm::dvec2 ends[] = {from, to};
+  line(ends, pen);
+}
+
 void Canvas::polygon(std::span<const glm::dvec2> corners, const Pen& pen) {
   trace(context_.get(), corners);
   cairo_close_path(context_.get());

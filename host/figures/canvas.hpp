@@ -27,6 +27,9 @@ struct Box {
 struct Font {
   double size_px = 20.0;
   bool bold = false;
+
+  /// Distance from the middle of a line of text down to its baseline.
+  double half_height_px() const { return 0.36 * size_px; }
 };
 
 enum class Align { left, centre, right };
@@ -57,6 +60,7 @@ class Canvas {
   std::string fit(std::string_view text, double width_px, const Font& font);
 
   void line(std::span<const glm::dvec2> points, const Pen& pen);
+  void segment(glm::dvec2 from, glm::dvec2 to, const Pen& pen);
   void polygon(std::span<const glm::dvec2> corners, const Pen& pen);
   void fill(std::span<const glm::dvec2> corners, const Colour& colour);
   void circle(glm::dvec2 centre, double radius_px, const Pen& pen);

@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 
 #include "figures/axes.hpp"
 #include "figures/canvas.hpp"
-#include "figures/chart_axis.hpp"
 
 namespace palpate {
 
@@ -52,10 +52,7 @@ void draw_mark(Canvas& canvas, const ChartSeries& series, glm::dvec2 at) {
 }
 
 Pen pen_of(const ChartSeries& series) {
-  return {.colour = series.colour,
-          .width_px = 3.0,
-          .dashed = series.line == Line::dashed,
-          .dotted = series.line == Line::dotted};
+  return {.colour = series.colour, .width_px = 3.0, .dotted = series.line == Line::dotted};
 }
 
 bool meet(const Box& a, const Box& b) {
@@ -99,7 +96,7 @@ struct Legend {
                                                   row_px * (static_cast<double>(row) + 0.5));
       const glm::dvec2 right = left + glm::dvec2(sample_px, 0.0);
       if (series.line != Line::none) {
-        canvas.line(std::array{left, right}, pen_of(series));
+        canvas.segment(left, right, pen_of(series));
       }
       draw_mark(canvas, series, 0.5 * (left + right));
       canvas.text(series.name, right + glm::dvec2(12.0, 7.0), body);
@@ -130,26 +127,7 @@ class Plot {
 
   void rules(const std::vector<ChartRule>& rules) {
     for (const ChartRule& each : rules) {
-      const double place = each.at;
-      rule(place, each.vertical, {.colour = each.colour, .width_px = 2.2, .dotted = true});
-      const double text_px = canvas_.text_width(each.label, small);
-      const Box& box = view_.box;
-      Box label{.left = box.left + 8.0, .top = 0.0, .width = text_px, .height = 22.0};
-      if (each.vertical) {
-        const double x = view_.pixel({place, y_.lower}).x;
-        label.left = x + 6.0 + text_px > box.right() ? x - 6.0 - text_px : x + 6.0;
-        label.top = box.top + 6.0;
-      } else {
-        label.top = view_.pixel({x_.lower, place}).y - 26.0;
-      }
-      while (!free_of(label, taken_)) {
-        label.top += 24.0;
-      }
-      if (label.bottom() > box.bottom()) {
-        continue;  // no room within the frame
-      }
-      taken_.push_back(label);
-      canvas_.text(each.label, {label.left, label.top + 17.0}, small, Align::left, each.colour);
+      rule(each.at, true, {.colour = each.colour, .width_px = 2.2, .dotted = true});
     }
   }
 
@@ -162,7 +140,7 @@ class Plot {
                               view_.pixel({point.x, point.high})};
         canvas_.line(ends, pen);
         for (const glm::dvec2& end : ends) {
-          canvas_.line(std::array{end - half_cap, end + half_cap}, pen);
+          canvas_.segment(end - half_cap, end + half_cap, pen);
         }
       }
     }
@@ -251,6 +229,25 @@ class Plot {
   std::vector<Box> taken_;  ///< boxes of marks and text
 };
 
+constexpr int most_ticks = 7;
+
+std::string text_of(const ChartAxis& axis, double value) {
+  return axis.text ? axis.text(value) : number(value);
+}
+
+/// Ends the axis at whole ticks, so that no curve meets the frame between two ticks.
+void set_ticks(const ChartAxis& axis, AxisSpan& span) {
+  const std::vector<Tick> within = even_ticks(span.lower, span.upper, most_ticks);
+  const double step = within.size() > 1 ? within[1].value - within[0].value : 0.0;
+  if (step > 0.0) {
+    span.lower = axis.lower.value_or(step * std::floor(span.lower / step + 1e-9));
+    span.upper = axis.upper.value_or(step * std::ceil(span.upper / step - 1e-9));
+  }
+  for (const Tick& tick : even_ticks(span.lower, span.upper, most_ticks + 2, step)) {
+    span.ticks.push_back({tick.value, text_of(axis, tick.value)});
+  }
+}
+
 AxisSpan span_of_axis(const Chart& chart, bool along_x) {
   std::vector<double> values;
   for (const ChartSeries& series : chart.series) {
@@ -263,7 +260,7 @@ AxisSpan span_of_axis(const Chart& chart, bool along_x) {
     }
   }
   for (const ChartRule& rule : chart.rules) {
-    if (rule.vertical == along_x) {
+    if (along_x) {
       values.push_back(rule.at);
     }
   }
@@ -271,6 +268,27 @@ AxisSpan span_of_axis(const Chart& chart, bool along_x) {
 }
 
 }  // namespace
+
+AxisSpan span_of(const ChartAxis& axis, std::span<const double> values) {
+  AxisSpan span{.lower = std::numeric_limits<double>::infinity(),
+                .upper = -std::numeric_limits<double>::infinity()};
+  for (const double value : values) {
+    if (std::isfinite(value)) {
+      span.lower = std::min(span.lower, value);
+      span.upper = std::max(span.upper, value);
+    }
+  }
+  if (span.lower > span.upper) {
+    span.lower = span.upper = 0.0;
+  }
+  span.lower = axis.lower.value_or(span.lower);
+  span.upper = axis.upper.value_or(span.upper);
+  if (!(span.lower < span.upper)) {
+    span.upper = span.lower + 1.0;
+  }
+  set_ticks(axis, span);
+  return span;
+}
 
 std::string draw_chart(const Chart& chart) {
   const AxisSpan x = span_of_axis(chart, true);

@@ -22,7 +22,7 @@ struct ChartAxis {
 };
 
 enum class Mark { none, circle, square, triangle, diamond };
-enum class Line { none, solid, dashed, dotted };
+enum class Line { none, solid, dotted };
 
 /// A point, drawn where both coordinates are finite. A point that is not drawn leaves a gap in its
 /// line; a point beyond the ends of an axis has no mark.
@@ -42,12 +42,10 @@ struct ChartSeries {
   std::vector<ChartPoint> points = {};
 };
 
-/// A dotted line across the chart at one value of x (`vertical`) or of y.
+/// A dotted vertical line through the chart.
 struct ChartRule {
-  bool vertical = false;
-  double at = 0.0;
+  double at = 0.0;  ///< along x
   Colour colour = ink;
-  std::string label;
 };
 
 /// Series of points in one pair of axes, with a legend above.

@@ -1,13 +1,11 @@
-#include "figures/confusion_figure.hpp"
-
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <numeric>
 
 #include <fmt/format.h>
 
 #include "figures/axes.hpp"
+#include "figures/figures.hpp"
 #include "palpate/error.hpp"
 
 namespace palpate {
@@ -85,8 +83,6 @@ struct Layout {
     return {box.left + cell * (static_cast<double>(column) + 0.5),
             box.top + cell * (static_cast<double>(row) + 0.5)};
   }
-  /// From the middle of a line of text down to its baseline.
-  static double half_height(const Font& font) { return 0.36 * font.size_px; }
 };
 
 /// Blue for the right answer, red for others; white for a share of 0.
@@ -95,16 +91,16 @@ double place_of(double share, bool right) { return right ? -share : share; }
 void draw_labels(Canvas& canvas, const Layout& layout, const ConfusionFigure& figure) {
   for (std::size_t j = 0; j < figure.rows.size(); j += layout.every) {
     const std::string text = canvas.fit(figure.rows[j].name, longest_label_px, layout.label);
-    canvas.text(
-        text, {layout.box.left - gap_px, layout.centre(j, 0).y + Layout::half_height(layout.label)},
-        layout.label, Align::right);
+    canvas.text(text,
+                {layout.box.left - gap_px, layout.centre(j, 0).y + layout.label.half_height_px()},
+                layout.label, Align::right);
   }
   for (std::size_t i = 0; i < figure.columns.size(); i += layout.every) {
     const std::string text = canvas.fit(figure.columns[i], longest_label_px, layout.label);
     const glm::dvec2 at(layout.centre(0, i).x, layout.box.top - gap_px);
     if (layout.upright) {
-      canvas.text_upwards(text, at + glm::dvec2(Layout::half_height(layout.label), 0.0),
-                          layout.label, Align::left);
+      canvas.text_upwards(text, at + glm::dvec2(layout.label.half_height_px(), 0.0), layout.label,
+                          Align::left);
     } else {
       canvas.text(text, at, layout.label, Align::centre);
     }
@@ -140,7 +136,7 @@ void draw_cells(Canvas& canvas, const Layout& layout, const ConfusionFigure& fig
       if (figure.rows[j].counts[i] > 0) {
         constexpr double dark = 0.55;
         canvas.text(fmt::format("{}", figure.rows[j].counts[i]),
-                    {centre.x, centre.y + Layout::half_height(layout.count)}, layout.count,
+                    {centre.x, centre.y + layout.count.half_height_px()}, layout.count,
                     Align::centre, share(j, i) > dark ? white : ink);
       }
     }

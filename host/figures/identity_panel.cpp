@@ -1,7 +1,6 @@
 #include "figures/identity_panel.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <unordered_map>
 
@@ -110,9 +109,8 @@ void draw_labels(Canvas& canvas, const Box& plot, std::vector<Label> labels) {
     widest = std::max(widest, canvas.text_width(label.text, body));
   }
   for (const Label& label : labels) {
-    const std::array leader{glm::dvec2(plot.right() + 3.0, label.end_px),
-                            glm::dvec2(plot.right() + leader_px, label.row_px)};
-    canvas.line(leader, {.colour = label.colour, .width_px = 1.5});
+    canvas.segment({plot.right() + 3.0, label.end_px}, {plot.right() + leader_px, label.row_px},
+                   {.colour = label.colour, .width_px = 1.5});
     const double baseline = label.row_px + 7.0;
     canvas.text(label.text, {left, baseline}, body, Align::left, label.colour);
     canvas.text(fmt::format("{:.1f} %", 100.0 * label.probability),

@@ -1,5 +1,4 @@
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <string>
 
@@ -69,8 +68,7 @@ void draw_tile(Canvas& canvas, const Box& tile, double px_per_mm, const Occupanc
 void draw_scale_bar(Canvas& canvas, glm::dvec2 left_px, double px_per_mm) {
   const double length_mm = std::pow(10.0, std::floor(std::log10(longest_scale_bar_px / px_per_mm)));
   const double length_px = length_mm * px_per_mm;
-  const std::array bar{left_px, left_px + glm::dvec2(length_px, 0.0)};
-  canvas.line(bar, {.width_px = 5.0});
+  canvas.segment(left_px, left_px + glm::dvec2(length_px, 0.0), {.width_px = 5.0});
   canvas.text(number(length_mm) + " mm", left_px + glm::dvec2(0.0, 28.0), body);
 }
 

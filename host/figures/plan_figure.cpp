@@ -1,7 +1,4 @@
-#include "figures/plan_figure.hpp"
-
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <span>
 
@@ -9,6 +6,7 @@
 #include <glm/common.hpp>
 
 #include "figures/axes.hpp"
+#include "figures/figures.hpp"
 #include "figures/footprint.hpp"
 #include "palpate/error.hpp"
 #include "palpate/touch.hpp"
@@ -59,14 +57,6 @@ View view_of(const PlanFigure& figure) {
           .upper = figure.lower_mm + extent};
 }
 
-std::vector<glm::dvec2> pixels(const View& view, std::span<const glm::dvec2> points) {
-  std::vector<glm::dvec2> result;
-  for (const glm::dvec2& p : points) {
-    result.push_back(view.pixel(p));
-  }
-  return result;
-}
-
 std::vector<glm::dvec2> placed(std::span<const glm::dvec2> elements_mm,
                                const Pose& T_robot_sensor) {
   std::vector<glm::dvec2> result;
@@ -95,8 +85,8 @@ void draw_needle(Canvas& canvas, const View& view, const PlanFigure& figure,
   const glm::dvec2 centre =
       view.pixel(candidate.T_robot_sensor * array_centre_mm(figure.elements_mm));
   const double theta = candidate.T_robot_sensor.theta_rad;
-  const std::array ends{centre, centre + needle_px * glm::dvec2(std::cos(theta), -std::sin(theta))};
-  canvas.line(ends, {.colour = colour, .width_px = 4.0, .halo_px = 0.75});
+  canvas.segment(centre, centre + needle_px * glm::dvec2(std::cos(theta), -std::sin(theta)),
+                 {.colour = colour, .width_px = 4.0, .halo_px = 0.75});
   canvas.disc(centre, 3.0, colour);
 }
 
@@ -107,8 +97,7 @@ void draw_legend(Canvas& canvas, double baseline) {
     x += canvas.text_width(words, small) + 22.0;
   };
   const auto stroke = [&](const Pen& pen) {
-    const std::array ends{glm::dvec2(x, baseline - 6.0), glm::dvec2(x + 30.0, baseline - 6.0)};
-    canvas.line(ends, pen);
+    canvas.segment(glm::dvec2(x, baseline - 6.0), glm::dvec2(x + 30.0, baseline - 6.0), pen);
     x += 38.0;
   };
   stroke(best_pen);
@@ -117,8 +106,8 @@ void draw_legend(Canvas& canvas, double baseline) {
   meaning("touches so far");
   const Colour shade = sequential(0.6);
   canvas.disc({x + 4.0, baseline - 6.0}, 3.0, shade);
-  const std::array ends{glm::dvec2(x + 4.0, baseline - 6.0), glm::dvec2(x + 19.0, baseline - 6.0)};
-  canvas.line(ends, {.colour = shade, .width_px = 4.0});
+  canvas.segment(glm::dvec2(x + 4.0, baseline - 6.0), glm::dvec2(x + 19.0, baseline - 6.0),
+                 {.colour = shade, .width_px = 4.0});
   x += 28.0;
   meaning("candidates, along x");
   const Box box{x, baseline - 14.0, 26.0, 16.0};
@@ -151,7 +140,7 @@ std::string draw_plan(const PlanFigure& figure) {
       return occupancy_colour(figure.occupied[static_cast<std::size_t>(j) * figure.nx + i]);
     });
     for (const std::vector<glm::dvec2>& touch : figure.touches_mm) {
-      canvas.polygon(pixels(view, footprint(touch, figure.element_mm).outline), touch_pen);
+      canvas.polygon(view.pixels(footprint(touch, figure.element_mm).outline), touch_pen);
     }
     // The best come last, on top.
     for (std::size_t i = figure.candidates.size(); i-- > 0;) {
@@ -162,9 +151,9 @@ std::string draw_plan(const PlanFigure& figure) {
     const Footprint array =
         footprint(placed(figure.elements_mm, best.T_robot_sensor), figure.element_mm);
     for (const auto& square : array.elements) {
-      canvas.polygon(pixels(view, square), {.colour = {0.80, 0.05, 0.30, 0.45}, .width_px = 1.0});
+      canvas.polygon(view.pixels(square), {.colour = {0.80, 0.05, 0.30, 0.45}, .width_px = 1.0});
     }
-    canvas.polygon(pixels(view, array.outline), best_pen);
+    canvas.polygon(view.pixels(array.outline), best_pen);
   }
   draw_axes(canvas, view, even_ticks(view.lower.x, view.upper.x, 8),
             even_ticks(view.lower.y, view.upper.y, 8), "x in the robot frame, mm", "y, mm");

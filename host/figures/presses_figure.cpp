@@ -1,11 +1,10 @@
-#include "figures/presses_figure.hpp"
-
 #include <algorithm>
 #include <array>
 #include <cmath>
 
 #include <glm/common.hpp>
 
+#include "figures/figures.hpp"
 #include "figures/map_layer.hpp"
 #include "model/bounding_box.hpp"
 #include "palpate/error.hpp"

@@ -5,19 +5,18 @@
 #include <initializer_list>
 #include <numbers>
 #include <optional>
-#include <ranges>
 #include <span>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include <fmt/format.h>
-#include <glm/common.hpp>
 
 #include "figures/figures.hpp"
 #include "figures/footprint.hpp"
 #include "figures/identity_panel.hpp"
 #include "figures/map_layer.hpp"
+#include "model/bounding_box.hpp"
 #include "palpate/error.hpp"
 #include "palpate/pose_error.hpp"
 
@@ -143,31 +142,19 @@ std::vector<Footprint> footprints(const RecognitionSheet& sheet, const Pose& T_o
   return result;
 }
 
-template <std::ranges::range Points>
-std::vector<glm::dvec2> pixels(const View& view, const Points& points) {
-  std::vector<glm::dvec2> result;
-  for (const glm::dvec2& p : points) {
-    result.push_back(view.pixel(p));
-  }
-  return result;
-}
-
 /// Returns the view of a square of the object frame that holds the map and all touches.
 View view_around(const Box& box, const OccupancyGrid& map,
                  std::initializer_list<const std::vector<Footprint>*> touches) {
-  glm::dvec2 lower = lower_edge_mm(map);
-  glm::dvec2 upper = upper_edge_mm(map);
+  BoundingBox part{lower_edge_mm(map), upper_edge_mm(map)};
   for (const std::vector<Footprint>* footprints : touches) {
     for (const Footprint& f : *footprints) {
       for (const glm::dvec2& corner : f.outline) {
-        lower = glm::min(lower, corner);
-        upper = glm::max(upper, corner);
+        part.take_in(corner);
       }
     }
   }
-  const glm::dvec2 centre = 0.5 * (lower + upper);
-  const glm::dvec2 half(0.51 * std::max(upper.x - lower.x, upper.y - lower.y));
-  return {.box = box, .lower = centre - half, .upper = centre + half};
+  const glm::dvec2 half(0.51 * std::max(part.extent().x, part.extent().y));
+  return {.box = box, .lower = part.middle() - half, .upper = part.middle() + half};
 }
 
 void draw_touches(Canvas& canvas, const RecognitionSheet& sheet) {
@@ -185,16 +172,15 @@ void draw_touches(Canvas& canvas, const RecognitionSheet& sheet) {
     for (const Footprint& f : estimated) {
       if (element_px >= smallest_element_px) {
         for (const auto& square : f.elements) {
-          canvas.polygon(pixels(view, square),
-                         {.colour = {0.0, 0.0, 0.0, alpha}, .width_px = 0.75});
+          canvas.polygon(view.pixels(square), {.colour = {0.0, 0.0, 0.0, alpha}, .width_px = 0.75});
         }
       }
     }
     for (const Footprint& f : estimated) {
-      canvas.polygon(pixels(view, f.outline), estimate_pen);
+      canvas.polygon(view.pixels(f.outline), estimate_pen);
     }
     for (const Footprint& f : actual) {
-      canvas.polygon(pixels(view, f.outline), truth_pen);
+      canvas.polygon(view.pixels(f.outline), truth_pen);
     }
   }
   draw_axes(canvas, view, even_ticks(view.lower.x, view.upper.x, 7),
@@ -205,8 +191,7 @@ void draw_touches(Canvas& canvas, const RecognitionSheet& sheet) {
   Legend legend(canvas, view.box);
   const auto sample = [&](const Pen& pen) {
     return [&canvas, &pen](glm::dvec2 at) {
-      const std::array ends{at - glm::dvec2(18.0, 0.0), at + glm::dvec2(18.0, 0.0)};
-      canvas.line(ends, pen);
+      canvas.segment(at - glm::dvec2(18.0, 0.0), at + glm::dvec2(18.0, 0.0), pen);
     };
   };
   legend.add(36.0, sample(estimate_pen), "estimated pose");
@@ -221,8 +206,7 @@ void draw_cross(Canvas& canvas, glm::dvec2 at) {
   Pen pen = truth_pen;
   pen.dashed = false;
   for (const glm::dvec2& arm : {glm::dvec2(7.0, 7.0), glm::dvec2(7.0, -7.0)}) {
-    const std::array ends{at - arm, at + arm};
-    canvas.line(ends, pen);
+    canvas.segment(at - arm, at + arm, pen);
   }
 }
 

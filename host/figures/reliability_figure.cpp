@@ -1,10 +1,9 @@
-#include "figures/reliability_figure.hpp"
-
 #include <array>
 
 #include <fmt/format.h>
 
 #include "figures/chart.hpp"
+#include "figures/figures.hpp"
 
 namespace palpate {
 

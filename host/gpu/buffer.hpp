@@ -52,7 +52,7 @@ class Buffer {
     void operator()(Context* context) const { context->give_memory(bytes); }
   };
 
-  std::unique_ptr<Context, GiveBack> counted_;  ///< what the context counts of it
+  std::unique_ptr<Context, GiveBack> counted_;  ///< counts the buffer's memory
   Owned<VkDeviceMemory> memory_;
   Owned<VkBuffer> buffer_;
   Owned<VkBufferView> table_;

@@ -97,7 +97,7 @@ class CommandStream {
   void rewind();
   void drop();
   VkDescriptorSet descriptor_set(const Kernel& kernel, std::span<const Buffer* const> buffers);
-  /// What is bound where no buffer is read, because Vulkan wants one.
+  /// Returns the buffer for bindings that a kernel does not read, where Vulkan wants one, too.
   const Buffer& unread();
 
   Context& context_;

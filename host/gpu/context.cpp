@@ -8,7 +8,7 @@
 
 #include <fmt/format.h>
 
-#include "gpu/result.hpp"
+#include "gpu/owned.hpp"
 #include "gpu/selection.hpp"
 #include "gpu/vulkan.hpp"
 #include "model/log_message.hpp"
@@ -34,7 +34,7 @@ bool validation_wanted() {
 struct VulkanUses {
   std::mutex mutex;
   int count = 0;
-  OwnProcess process;  ///< that they are of, where there are any
+  OwnProcess process;  ///< the process that uses Vulkan, where one does
 };
 
 VulkanUses& vulkan_uses() {

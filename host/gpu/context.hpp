@@ -28,8 +28,9 @@ class ValidationLog {
   std::vector<std::string> messages_;
 };
 
-/// That Vulkan is in use. Drivers keep threads, for which even the end of a child of fork() would
-/// wait once it has started others: where the parent used Vulkan at the fork, its child cannot.
+/// Counts as a use of Vulkan while it lives. Drivers keep threads, for which even the end of a
+/// child of fork() would wait once it has started others: where the parent used Vulkan at the fork,
+/// its child cannot.
 class VulkanUse {
  public:
   /// @throws Error in such a child, and where Vulkan is missing
@@ -100,13 +101,13 @@ class Context {
   VkDevice device() const { return device_; }
   /// Submits to the queue; the commands of several threads take turns.
   VkResult submit(const VkSubmitInfo& info, VkFence fence);
-  /// Where command streams queue up for the device.
+  /// The queue in which command streams wait for the device.
   RunQueue& runs() { return runs_; }
   std::uint32_t queue_family() const { return queue_family_; }
   const std::string& name() const { return name_; }
   const Limits& limits() const { return limits_; }
   /// Stays empty on a device that was handed in: the program gets the messages of its instance.
-  ValidationLog& validation() { return instance_ ? instance_->validation() : nothing_said_; }
+  ValidationLog& validation() { return instance_ ? instance_->validation() : no_messages_; }
   /// Lowers the device's own limits to these, where they are lower, so that a test on any device
   /// reaches the cases of much smaller devices and much larger problems.
   void lower_limits(const Limits& limits);
@@ -127,7 +128,7 @@ class Context {
 
   VulkanUse use_;
   std::optional<Instance> instance_;  ///< none where the device was handed in
-  ValidationLog nothing_said_;
+  ValidationLog no_messages_;
   VkPhysicalDevice physical_ = VK_NULL_HANDLE;
   VkDevice device_ = VK_NULL_HANDLE;
   VkQueue queue_ = VK_NULL_HANDLE;

@@ -4,9 +4,13 @@
 #include <string_view>
 #include <type_traits>
 
-#include "gpu/result.hpp"
+#include <vulkan/vulkan_core.h>
 
 namespace palpate::gpu {
+
+/// @param doing what was tried, for the message
+/// @throws Error (Fault::system) unless the result is VK_SUCCESS
+void check(VkResult result, std::string_view doing);
 
 void destroy(VkDevice device, VkBuffer object);
 void destroy(VkDevice device, VkBufferView object);

@@ -14,7 +14,7 @@ class Submitter;
 /// How a submission went.
 struct RunOutcome {
   VkResult result = VK_SUCCESS;
-  double seconds = 0.0;  ///< that the device took
+  double seconds = 0.0;  ///< time that the device took
 };
 
 /// A recording that its thread waits for.
@@ -45,14 +45,14 @@ class WaitingLine {
 class RunQueue {
  public:
   /// Runs a recording and waits for it.
-  /// @param own what its thread submits with
+  /// @param own the submitter of the calling thread
   RunOutcome run(const Recording& recording, Submitter& own);
 
  private:
   std::mutex mutex_;
   std::condition_variable changed_;
   WaitingLine line_;
-  int submitted_ = 0;  ///< that the device has not finished
+  int submitted_ = 0;  ///< submissions that the device has not finished
 };
 
 }  // namespace palpate::gpu

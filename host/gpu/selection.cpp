@@ -8,7 +8,7 @@
 
 #include <fmt/format.h>
 
-#include "gpu/result.hpp"
+#include "gpu/owned.hpp"
 #include "gpu/vulkan.hpp"
 #include "palpate/error.hpp"
 

@@ -6,7 +6,7 @@
 
 namespace palpate::gpu {
 
-/// What a thread submits recordings with: a command buffer, a fence and timestamps.
+/// Submits the recordings of one thread; owns its command buffer, fence and timestamps.
 class Submitter {
  public:
   /// @throws Error if the device fails

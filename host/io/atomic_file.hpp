@@ -48,7 +48,7 @@ class OlderFile {
   /// @throws Error (Fault::input) where the older file cannot be kept, as on a file system without
   /// hard links
   explicit OlderFile(const std::filesystem::path& target);
-  /// As let_go().
+  /// Does what let_go() does.
   ~OlderFile();
   OlderFile(const OlderFile&) = delete;
   OlderFile& operator=(const OlderFile&) = delete;

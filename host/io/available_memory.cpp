@@ -46,7 +46,7 @@ std::uint64_t left_of(std::uint64_t most, std::uint64_t used) {
 }
 
 /// Memory of the machine: what it gives without swapping, and its free swap.
-std::uint64_t of_machine() {
+std::uint64_t machine_bytes() {
   const std::string text = text_of("/proc/meminfo");
   const auto available = number_after(text, "MemAvailable:");
   const auto swap = number_after(text, "SwapFree:");
@@ -54,7 +54,7 @@ std::uint64_t of_machine() {
 }
 
 /// Memory that the control group leaves, as a container sees its own (versions 2 and 1).
-std::uint64_t of_control_group() {
+std::uint64_t control_group_bytes() {
   constexpr const char* files[][3] = {
       {"/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory.current", "/sys/fs/cgroup/memory.stat"},
       {"/sys/fs/cgroup/memory/memory.limit_in_bytes", "/sys/fs/cgroup/memory/memory.usage_in_bytes",
@@ -72,7 +72,7 @@ std::uint64_t of_control_group() {
 }
 
 /// Memory that a limit of this process leaves; the field of its status says how much is used.
-std::uint64_t of_limit(__rlimit_resource resource, const char* status_key) {
+std::uint64_t limit_bytes(__rlimit_resource resource, const char* status_key) {
   rlimit present{};
   if (::getrlimit(resource, &present) != 0 || present.rlim_cur == RLIM_INFINITY) {
     return UINT64_MAX;
@@ -84,8 +84,18 @@ std::uint64_t of_limit(__rlimit_resource resource, const char* status_key) {
 }  // namespace
 
 std::uint64_t available_memory_bytes() {
-  return std::min({of_machine(), of_control_group(), of_limit(RLIMIT_AS, "VmSize:"),
-                   of_limit(RLIMIT_DATA, "VmData:")});
+  return std::min({machine_bytes(), control_group_bytes(), limit_bytes(RLIMIT_AS, "VmSize:"),
+                   limit_bytes(RLIMIT_DATA, "VmData:")});
+}
+
+std::uint64_t stored_bytes(std::span<const std::uint64_t> shape, std::uint64_t width) {
+  std::uint64_t bytes = width;
+  for (const std::uint64_t extent : shape) {
+    if (__builtin_mul_overflow(bytes, extent, &bytes)) {
+      return UINT64_MAX;
+    }
+  }
+  return bytes;
 }
 
 void require_memory(const std::filesystem::path& path, std::string_view what, std::uint64_t bytes) {

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <span>
 #include <string_view>
 
 namespace palpate {
@@ -9,6 +10,9 @@ namespace palpate {
 /// Returns the memory in bytes that this process can still get: the least of what the machine (swap
 /// included), its control group and its own limits leave.
 std::uint64_t available_memory_bytes();
+
+/// Returns the bytes of values of this shape and width; UINT64_MAX on overflow.
+std::uint64_t stored_bytes(std::span<const std::uint64_t> shape, std::uint64_t width);
 
 /// Throws Error (Fault::system), "<path>: <what> needs ... GB of memory", where fewer than `bytes`
 /// are available. Call it before allocating: where memory is overcommitted, no allocation fails,

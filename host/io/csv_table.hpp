@@ -44,7 +44,7 @@ class CsvTable {
   /// Returns the number in a cell of the row; none where the cell is empty or NaN.
   /// @throws Error where the cell holds anything else than a finite number
   std::optional<double> number(std::size_t column) const;
-  /// As number(), for a cell that may not be empty.
+  /// Returns what number() does; the cell may not be empty.
   double require_number(std::size_t column) const;
 
   /// Returns the text of a cell of the row, without the quotes around it; valid until next().
@@ -72,7 +72,7 @@ class CsvTable {
   std::filesystem::path path_;
   Descriptor file_;
   std::string block_;      ///< bytes read, from the present line on
-  std::size_t begin_ = 0;  ///< of the next line in block_
+  std::size_t begin_ = 0;  ///< where the next line begins in block_
   bool at_end_ = false;    ///< the whole file is in block_
   std::string_view line_;
   std::uint64_t line_number_ = 0;

@@ -39,6 +39,18 @@ class ForkedChild {
 
   /// Reads exactly this many bytes; false where the child has ended or been silent for too long.
   bool read(void* data, std::size_t bytes);
+  /// Reads what ForkedSender::list() sends; false where read() fails or the list takes more than
+  /// `most_bytes`.
+  template <class List>
+  bool list(List& values, std::uint64_t most_bytes) {
+    constexpr std::uint64_t width = sizeof(typename List::value_type);
+    std::uint64_t count = 0;
+    if (!read(&count, sizeof count) || count > most_bytes / width) {
+      return false;
+    }
+    values.resize(count);
+    return read(values.data(), count * width);
+  }
   /// True where read() gave up a child that was silent for too long.
   bool fell_silent() const { return fell_silent_; }
   /// Sends a request; false where the child has ended.
@@ -51,7 +63,7 @@ class ForkedChild {
   pid_t pid_ = -1;
   Descriptor socket_;
   std::vector<char> received_;  ///< what was received together with what was asked for
-  std::size_t next_ = 0;        ///< of these, the first that was not asked for yet
+  std::size_t next_ = 0;        ///< the first byte of these that was not asked for yet
   std::chrono::milliseconds silence_;
   bool fell_silent_ = false;
 };

@@ -14,7 +14,6 @@
 
 #include "io/descriptor.hpp"
 #include "io/file_format.hpp"
-#include "io/hdf5_failure.hpp"
 #include "io/hdf5_writer.hpp"
 #include "io/input_file.hpp"
 #include "io/recording_rules.hpp"
@@ -72,15 +71,179 @@ struct FrameRecorder::Impl {
       : path(std::move(file_path)), sensor(std::move(description)) {}
 
   bool alive(std::size_t element) const { return sensor.valid.empty() || sensor.valid[element]; }
-  void require_recordable() const;
-  bool due() const;
-  void save();
-  void create();
-  void open(const std::filesystem::path& finished);
-  void append();
-  void append(std::string_view name, hid_t type, std::size_t width, const void* values);
-  [[noreturn]] void fail();
-  void close();
+
+  void require_recordable() const {
+    const std::size_t e = sensor.elements_mm.size();
+    const auto fits = [&](const auto& list) { return list.empty() || list.size() == e; };
+    if (e == 0 || !fits(sensor.valid) || !fits(sensor.baseline)) {
+      refuse(path, "sensor '{}' has {} elements, {} valid and {} baseline values; make them agree",
+             printable(sensor.name), e, sensor.valid.size(), sensor.baseline.size());
+    }
+    require_head(path, head_of(sensor), e);
+    require_elements(path, 0, sensor.elements_mm);
+  }
+
+  bool due() const {
+    return pending.pressure.size() >= most_pending_values ||
+           // The stream's own time counts, too: a late reader catches up faster than the clock
+           // runs.
+           std::abs(pending.time_s.back() - pending.time_s.front()) >= flush_interval_s ||
+           std::chrono::duration<double>(Clock::now() - oldest_pending).count() >= flush_interval_s;
+  }
+
+  void save() {
+    if (pending.size() == 0) {
+      return;
+    }
+    const std::size_t rows = pending.size();
+    if (saved == 0) {
+      create();
+    } else {
+      append();
+      saved += rows;
+    }
+    pending.clear();
+  }
+
+  // Writes the first rows as a whole file, opens it for more, and then gives it its name: whenever
+  // the recorder is killed, there is no file or a readable one, and a reader can always tell that
+  // the file is being recorded.
+  void create() {
+    const std::size_t n = pending.size();
+    const std::size_t e = sensor.elements_mm.size();
+    has_device_time = std::isfinite(pending.device_time_s.front());
+    {
+      Hdf5Writer out(path, Hdf5Writer::Layout::appendable);
+      out.attribute("format", recording_format);
+      out.attribute("version", format_version);
+      out.attribute("object", sensor.object);
+      out.attribute("pressure_unit", sensor.pressure_unit);
+      out.attribute("length_unit", "mm");
+      out.attribute("rows", "frames");
+      const Recording head = head_of(sensor);
+      out.attribute("sensor", head.sensor);
+      out.attribute("serial", head.serial);
+      if (sensor.truth) {
+        const Pose& T = sensor.truth->T_object_robot;
+        out.attribute("true_object", sensor.truth->object);
+        out.attribute("true_T_object_robot",
+                      std::vector<double>{T.translation_mm.x, T.translation_mm.y, T.theta_rad});
+      }
+      std::vector<double> elements;
+      for (const glm::dvec2& element : sensor.elements_mm) {
+        elements.insert(elements.end(), {element.x, element.y});
+      }
+      out.dataset("elements", {e, 2}, elements);
+      if (!sensor.valid.empty()) {
+        out.dataset("valid", {e}, sensor.valid);
+      }
+      has_baseline = baseline_follows || !sensor.baseline.empty();
+      if (!sensor.baseline.empty()) {
+        out.dataset("baseline", {e}, sensor.baseline);
+      } else if (has_baseline) {
+        out.dataset("baseline", {e}, std::vector<double>(e, unknown));
+      }
+      constexpr auto growing = Hdf5Writer::Storage::growing;
+      out.dataset("pressure", {n, e}, pending.pressure, growing);
+      out.dataset("sensor_pose", {n, 3}, pending.sensor_pose, growing);
+      if (has_device_time) {
+        out.dataset("device_time", {n}, pending.device_time_s, growing);
+      }
+      out.dataset("lost_before", {n}, pending.lost_before, growing);
+      out.dataset("time", {n}, pending.time_s, growing);
+      try {
+        out.save([&](const std::filesystem::path& finished) { open(finished); });
+      } catch (...) {
+        // The file never appears.
+        if (file.valid()) {
+          give_up_hdf5_file(file.get());
+        }
+        close();
+        throw;
+      }
+    }
+    saved = n;
+  }
+
+  void open(const std::filesystem::path& finished) {
+    const Hdf5Handle access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose);
+    set_appendable(access.get());
+    H5Pset_file_locking(access.get(), true, true);  // some network file systems have no locks
+    {
+      const StandardDescriptorsTaken taken;
+      file = {H5Fopen(finished.c_str(), H5F_ACC_RDWR | H5F_ACC_SWMR_WRITE, access.get()), H5Fclose};
+    }
+    // HDF5 locks a file with SWMR only while it opens it.
+    if (void* descriptor = nullptr; H5Fget_vfd_handle(file.get(), H5P_DEFAULT, &descriptor) >= 0) {
+      mark_as_being_recorded(*static_cast<int*>(descriptor));
+    }
+    bool open = file.valid();
+    for (const char* name : {"pressure", "sensor_pose", "device_time", "lost_before", "time"}) {
+      if (has_device_time || std::string_view(name) != "device_time") {
+        Hdf5Handle dataset(H5Dopen2(file.get(), name, H5P_DEFAULT), H5Dclose);
+        open = open && dataset.valid();
+        datasets.emplace(name, std::move(dataset));
+      }
+    }
+    if (!open) {
+      throw Error(Fault::system,
+                  fmt::format("{}: cannot be written: {}; free or repair the disk and try again",
+                              path.string(), hdf5_failure()));
+    }
+  }
+
+  void append() {
+    if (!file.valid()) {
+      throw Error(Fault::system,
+                  fmt::format("{}: is closed; record to another file", path.string()));
+    }
+    const Hdf5Session session;
+    append("pressure", H5T_NATIVE_FLOAT, sensor.elements_mm.size(), pending.pressure.data());
+    append("sensor_pose", H5T_NATIVE_DOUBLE, 3, pending.sensor_pose.data());
+    append("lost_before", H5T_NATIVE_UINT64, 1, pending.lost_before.data());
+    if (has_device_time) {
+      append("device_time", H5T_NATIVE_DOUBLE, 1, pending.device_time_s.data());
+    }
+    // `time` comes last: a row that has its time is complete.
+    append("time", H5T_NATIVE_DOUBLE, 1, pending.time_s.data());
+  }
+
+  void append(std::string_view name, hid_t type, std::size_t width, const void* values) {
+    const hid_t dataset = datasets.at(name).get();
+    const int rank = width == 1 ? 1 : 2;
+    const hsize_t begin[] = {saved, 0};
+    const hsize_t count[] = {pending.size(), width};
+    const hsize_t extent[] = {saved + pending.size(), width};
+    bool done = H5Dset_extent(dataset, extent) >= 0;
+    const Hdf5Handle there(H5Dget_space(dataset), H5Sclose);
+    const Hdf5Handle here(H5Screate_simple(rank, count, nullptr), H5Sclose);
+    done = done &&
+           H5Sselect_hyperslab(there.get(), H5S_SELECT_SET, begin, nullptr, count, nullptr) >= 0 &&
+           H5Dwrite(dataset, type, here.get(), there.get(), H5P_DEFAULT, values) >= 0 &&
+           H5Dflush(dataset) >= 0;
+    if (!done) {
+      fail();
+    }
+  }
+
+  [[noreturn]] void fail() {
+    const std::string reason = hdf5_failure();
+    failed = true;
+    if (file.valid()) {
+      give_up_hdf5_file(file.get());
+    }
+    close();
+    throw Error(
+        Fault::system,
+        fmt::format("{}: cannot be written: {}; it holds {} frames and can be read; free or "
+                    "repair the disk and record to another file",
+                    path.string(), reason, saved));
+  }
+
+  void close() {
+    datasets.clear();
+    const Hdf5Handle closing = std::exchange(file, Hdf5Handle(H5I_INVALID_HID, H5Fclose));
+  }
 
   std::filesystem::path path;
   SensorDescription sensor;
@@ -102,177 +265,6 @@ struct FrameRecorder::Impl {
   Hdf5Handle file{H5I_INVALID_HID, H5Fclose};
   std::map<std::string_view, Hdf5Handle> datasets;
 };
-
-void FrameRecorder::Impl::require_recordable() const {
-  const std::size_t e = sensor.elements_mm.size();
-  const auto fits = [&](const auto& list) { return list.empty() || list.size() == e; };
-  if (e == 0 || !fits(sensor.valid) || !fits(sensor.baseline)) {
-    refuse(path, "sensor '{}' has {} elements, {} valid and {} baseline values; make them agree",
-           printable(sensor.name), e, sensor.valid.size(), sensor.baseline.size());
-  }
-  require_head(path, head_of(sensor), e);
-  require_elements(path, 0, sensor.elements_mm);
-}
-
-bool FrameRecorder::Impl::due() const {
-  return pending.pressure.size() >= most_pending_values ||
-         // Also by the stream's own time: a late reader catches up faster than the clock runs.
-         std::abs(pending.time_s.back() - pending.time_s.front()) >= flush_interval_s ||
-         std::chrono::duration<double>(Clock::now() - oldest_pending).count() >= flush_interval_s;
-}
-
-void FrameRecorder::Impl::save() {
-  if (pending.size() == 0) {
-    return;
-  }
-  const std::size_t rows = pending.size();
-  if (saved == 0) {
-    create();
-  } else {
-    append();
-    saved += rows;
-  }
-  pending.clear();
-}
-
-// Writes the first rows as a whole file, opens it for more, and then gives it its name: whenever
-// the recorder is killed, there is no file or a readable one, and a reader can always tell that the
-// file is being recorded.
-void FrameRecorder::Impl::create() {
-  const std::size_t n = pending.size();
-  const std::size_t e = sensor.elements_mm.size();
-  has_device_time = std::isfinite(pending.device_time_s.front());
-  {
-    Hdf5Writer out(path, Hdf5Writer::Layout::appendable);
-    out.attribute("format", recording_format);
-    out.attribute("version", format_version);
-    out.attribute("object", sensor.object);
-    out.attribute("pressure_unit", sensor.pressure_unit);
-    out.attribute("length_unit", "mm");
-    out.attribute("rows", "frames");
-    const Recording head = head_of(sensor);
-    out.attribute("sensor", head.sensor);
-    out.attribute("serial", head.serial);
-    if (sensor.truth) {
-      const Pose& T = sensor.truth->T_object_robot;
-      out.attribute("true_object", sensor.truth->object);
-      out.attribute("true_T_object_robot",
-                    std::vector<double>{T.translation_mm.x, T.translation_mm.y, T.theta_rad});
-    }
-    std::vector<double> elements;
-    for (const glm::dvec2& element : sensor.elements_mm) {
-      elements.insert(elements.end(), {element.x, element.y});
-    }
-    out.dataset("elements", {e, 2}, elements);
-    if (!sensor.valid.empty()) {
-      out.dataset("valid", {e}, sensor.valid);
-    }
-    has_baseline = baseline_follows || !sensor.baseline.empty();
-    if (!sensor.baseline.empty()) {
-      out.dataset("baseline", {e}, sensor.baseline);
-    } else if (has_baseline) {
-      out.dataset("baseline", {e}, std::vector<double>(e, unknown));
-    }
-    constexpr auto growing = Hdf5Writer::Storage::growing;
-    out.dataset("pressure", {n, e}, pending.pressure, growing);
-    out.dataset("sensor_pose", {n, 3}, pending.sensor_pose, growing);
-    if (has_device_time) {
-      out.dataset("device_time", {n}, pending.device_time_s, growing);
-    }
-    out.dataset("lost_before", {n}, pending.lost_before, growing);
-    out.dataset("time", {n}, pending.time_s, growing);
-    try {
-      out.save([&](const std::filesystem::path& finished) { open(finished); });
-    } catch (...) {
-      // The file never appears.
-      if (file.valid()) {
-        give_up_hdf5_file(file.get());
-      }
-      close();
-      throw;
-    }
-  }
-  saved = n;
-}
-
-void FrameRecorder::Impl::open(const std::filesystem::path& finished) {
-  const Hdf5Handle access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose);
-  set_appendable(access.get());
-  H5Pset_file_locking(access.get(), true, true);  // some network file systems have no locks
-  {
-    const StandardDescriptorsTaken taken;
-    file = {H5Fopen(finished.c_str(), H5F_ACC_RDWR | H5F_ACC_SWMR_WRITE, access.get()), H5Fclose};
-  }
-  // HDF5 locks a file with SWMR only while it opens it.
-  if (void* descriptor = nullptr; H5Fget_vfd_handle(file.get(), H5P_DEFAULT, &descriptor) >= 0) {
-    mark_as_being_recorded(*static_cast<int*>(descriptor));
-  }
-  bool open = file.valid();
-  for (const char* name : {"pressure", "sensor_pose", "device_time", "lost_before", "time"}) {
-    if (has_device_time || std::string_view(name) != "device_time") {
-      Hdf5Handle dataset(H5Dopen2(file.get(), name, H5P_DEFAULT), H5Dclose);
-      open = open && dataset.valid();
-      datasets.emplace(name, std::move(dataset));
-    }
-  }
-  if (!open) {
-    throw Error(Fault::system,
-                fmt::format("{}: cannot be written: {}; free or repair the disk and try again",
-                            path.string(), hdf5_failure()));
-  }
-}
-
-void FrameRecorder::Impl::append() {
-  if (!file.valid()) {
-    throw Error(Fault::system, fmt::format("{}: is closed; record to another file", path.string()));
-  }
-  const Hdf5Session session;
-  append("pressure", H5T_NATIVE_FLOAT, sensor.elements_mm.size(), pending.pressure.data());
-  append("sensor_pose", H5T_NATIVE_DOUBLE, 3, pending.sensor_pose.data());
-  append("lost_before", H5T_NATIVE_UINT64, 1, pending.lost_before.data());
-  if (has_device_time) {
-    append("device_time", H5T_NATIVE_DOUBLE, 1, pending.device_time_s.data());
-  }
-  // `time` comes last: a row that has its time is complete.
-  append("time", H5T_NATIVE_DOUBLE, 1, pending.time_s.data());
-}
-
-void FrameRecorder::Impl::append(std::string_view name, hid_t type, std::size_t width,
-                                 const void* values) {
-  const hid_t dataset = datasets.at(name).get();
-  const int rank = width == 1 ? 1 : 2;
-  const hsize_t begin[] = {saved, 0};
-  const hsize_t count[] = {pending.size(), width};
-  const hsize_t extent[] = {saved + pending.size(), width};
-  bool done = H5Dset_extent(dataset, extent) >= 0;
-  const Hdf5Handle there(H5Dget_space(dataset), H5Sclose);
-  const Hdf5Handle here(H5Screate_simple(rank, count, nullptr), H5Sclose);
-  done = done &&
-         H5Sselect_hyperslab(there.get(), H5S_SELECT_SET, begin, nullptr, count, nullptr) >= 0 &&
-         H5Dwrite(dataset, type, here.get(), there.get(), H5P_DEFAULT, values) >= 0 &&
-         H5Dflush(dataset) >= 0;
-  if (!done) {
-    fail();
-  }
-}
-
-void FrameRecorder::Impl::fail() {
-  const std::string reason = hdf5_failure();
-  failed = true;
-  if (file.valid()) {
-    give_up_hdf5_file(file.get());
-  }
-  close();
-  throw Error(Fault::system,
-              fmt::format("{}: cannot be written: {}; it holds {} frames and can be read; free or "
-                          "repair the disk and record to another file",
-                          path.string(), reason, saved));
-}
-
-void FrameRecorder::Impl::close() {
-  datasets.clear();
-  const Hdf5Handle closing = std::exchange(file, Hdf5Handle(H5I_INVALID_HID, H5Fclose));
-}
 
 FrameRecorder::FrameRecorder(std::filesystem::path path, SensorDescription sensor)
     : impl_(std::make_unique<Impl>(std::move(path), std::move(sensor))) {

@@ -7,9 +7,8 @@
 
 #include <fmt/format.h>
 
-#include "io/hdf5_child.hpp"
+#include "io/available_memory.hpp"
 #include "io/hdf5_handle.hpp"
-#include "io/hdf5_rows.hpp"
 #include "io/recording_state.hpp"
 #include "model/printable.hpp"
 
@@ -20,7 +19,7 @@ namespace {
 using namespace std::chrono_literals;
 
 // Opening a file takes milliseconds; a child that takes this long loops.
-constexpr std::uint64_t cpu_seconds = 2;
+constexpr std::uint64_t opening_cpu_seconds = 2;
 // Enough for metadata and a piece of the numbers.
 constexpr std::uint64_t memory_bytes = 256 << 20;
 // Rate of the slowest disk that is worth waiting for.
@@ -44,59 +43,87 @@ class ConfinedSession {
   unsigned plugins_ = 0;
 };
 
-// Parses the first answer of serve_hdf5(). Nothing in the answer is trusted: a damaged file may
-// have corrupted the child's memory. Once a length does not fit, every further value is empty.
-class Receiver {
- public:
-  explicit Receiver(ForkedChild& child) : child_(child) {}
+/// Kinds of records in the first answer of serve_hdf5().
+enum class Hdf5Record : char { attribute = 'a', dataset = 'd', refused = 'r', end = 'e' };
 
-  bool intact() const { return intact_; }
-
-  Hdf5Record kind() {
-    Hdf5Record value{};
-    copy(&value, sizeof value);
-    return value;
-  }
-
-  template <class List>
-  void list(List& values) {
-    constexpr std::size_t width = sizeof(typename List::value_type);
-    const std::uint64_t count = size();
-    // No child had the memory for more.
-    if (count > memory_bytes / width) {
-      intact_ = false;
-      return;
-    }
-    values.resize(count);
-    copy(values.data(), count * width);
-  }
-
-  void value(Hdf5Value& value) {
-    list(value.problem);
-    list(value.shape);
-    list(value.numbers);
-    for (std::uint64_t left = size(); left > 0 && intact_; --left) {
-      list(value.strings.emplace_back());
-    }
-  }
-
- private:
-  std::uint64_t size() {
-    std::uint64_t value = 0;
-    copy(&value, sizeof value);
-    return value;
-  }
-
-  void copy(void* values, std::size_t bytes) {
-    intact_ = intact_ && child_.read(values, bytes);
-    if (!intact_) {
-      std::fill_n(static_cast<char*>(values), bytes, '\0');
-    }
-  }
-
-  ForkedChild& child_;
-  bool intact_ = true;
+/// Asks for the first rows of a dataset.
+struct Hdf5Request {
+  std::uint64_t dataset;  ///< its index among the names
+  std::uint64_t rows;     ///< along the first axis
 };
+
+void send(ForkedSender& sender, Hdf5Record kind, const std::string& name, const Hdf5Value& value) {
+  sender.value(kind);
+  sender.list(name);
+  sender.list(value.problem);
+  sender.list(value.shape);
+  sender.list(value.numbers);
+  sender.value(std::uint64_t{value.strings.size()});
+  for (const std::string& text : value.strings) {
+    sender.list(text);
+  }
+}
+
+/// Opens the file and answers on the socket, in a child of ForkedChild.
+///
+/// First it sends one record for each named attribute and dataset that exists: its kind, then name,
+/// problem, shape, numbers and strings of Hdf5Value, each after its length as a 64-bit integer.
+/// Numbers of datasets are left out. A file that cannot be opened gives one record `refused`, whose
+/// problem says why. The last record, `end`, has a kind alone.
+///
+/// Then it answers each Hdf5Request with the rows' numbers in row-major order, in pieces: a 64-bit
+/// count from 1 to hdf5_piece and as many doubles. A count of 0 means that the rows cannot be read.
+///
+/// It opens no other file, whatever links and storage this file names.
+void serve_hdf5(int socket, const std::filesystem::path& path, std::uint64_t file_bytes,
+                const std::vector<std::string>& attributes,
+                const std::vector<std::string>& datasets) {
+  ForkedSender sender(socket);
+  H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
+  H5PLset_loading_state(0);          // a file's filters must not load code
+  H5Lunregister(H5L_TYPE_EXTERNAL);  // nor its links open other files, which may be FIFOs
+  Hdf5Reader reader(path, file_bytes, attributes, datasets,
+                    {.follows_links = true,
+                     .memory_bytes = allow_memory_bytes,
+                     .cpu_seconds = allow_cpu_seconds});
+  if (!reader.problem().empty()) {
+    Hdf5Value refused;
+    refused.problem = reader.problem();
+    send(sender, Hdf5Record::refused, "", refused);
+    sender.value(Hdf5Record::end);
+    sender.flush();
+    return;
+  }
+  for (const auto& [name, value] : reader.attributes()) {
+    send(sender, Hdf5Record::attribute, name, value);
+  }
+  for (const auto& [name, value] : reader.datasets()) {
+    send(sender, Hdf5Record::dataset, name, value);
+  }
+  sender.value(Hdf5Record::end);
+  sender.flush();
+  for (;;) {
+    Hdf5Request request{};
+    forked_read(socket, &request, sizeof request);  // ends the child after the last request
+    const auto send_rows = [&](std::span<const double> numbers) { sender.list(numbers); };
+    if (!reader.read(datasets.at(request.dataset), request.rows, send_rows)) {
+      send_rows({});
+    }
+    sender.flush();
+  }
+}
+
+// Receives what send() sends after a name; false where the child fails. Nothing is trusted: a
+// damaged file may have corrupted the child's memory. No child had the memory for longer lists.
+bool receive(ForkedChild& child, Hdf5Value& value) {
+  std::uint64_t strings = 0;
+  bool intact = child.list(value.problem, memory_bytes) && child.list(value.shape, memory_bytes) &&
+                child.list(value.numbers, memory_bytes) && child.read(&strings, sizeof strings);
+  for (; intact && strings > 0; --strings) {
+    intact = child.list(value.strings.emplace_back(), memory_bytes);
+  }
+  return intact;
+}
 
 }  // namespace
 
@@ -106,7 +133,7 @@ bool reads_hdf5_in_children() { return in_children; }
 Hdf5Contents::Hdf5Contents(const std::filesystem::path& path,
                            const std::vector<std::string>& attributes,
                            const std::vector<std::string>& datasets)
-    : path_(path) {
+    : path_(path), dataset_names_(datasets) {
   const std::uint64_t file_bytes = require_readable(path);
   if (file_bytes == 0) {
     refuse("is empty; copy or record it again");
@@ -120,11 +147,11 @@ Hdf5Contents::Hdf5Contents(const std::filesystem::path& path,
   initialise_hdf5();
   child_.emplace(
       [&](int socket) { serve_hdf5(socket, path, file_bytes, attributes, datasets); },
-      ForkedLimits{.cpu_seconds = cpu_seconds,
+      ForkedLimits{.cpu_seconds = opening_cpu_seconds,
                    .memory_bytes = memory_bytes,
                    .silence = 1min + std::chrono::seconds(file_bytes / bytes_per_second)},
       hdf5_mutex);
-  receive(datasets);
+  receive();
 }
 
 Hdf5Contents::~Hdf5Contents() {
@@ -144,7 +171,7 @@ void Hdf5Contents::open_here(std::uint64_t file_bytes, const std::vector<std::st
     problem = reader_->problem();
     attributes_ = reader_->attributes();
     for (const auto& [name, value] : reader_->datasets()) {
-      datasets_[name] = {value};
+      datasets_[name] = value;
     }
     if (!problem.empty()) {
       reader_.reset();
@@ -155,32 +182,24 @@ void Hdf5Contents::open_here(std::uint64_t file_bytes, const std::vector<std::st
   }
 }
 
-void Hdf5Contents::receive(const std::vector<std::string>& datasets) {
-  Receiver receiver(*child_);
+void Hdf5Contents::receive() {
   for (;;) {
-    const Hdf5Record kind = receiver.kind();
-    if (kind == Hdf5Record::end && receiver.intact()) {
-      return;
-    }
+    Hdf5Record kind{};
     std::string name;
     Hdf5Value value;
-    receiver.list(name);
-    receiver.value(value);
-    if (!receiver.intact()) {
+    if (!child_->read(&kind, sizeof kind)) {
+      refuse_damaged();
+    }
+    if (kind == Hdf5Record::end) {
+      return;
+    }
+    if (!child_->list(name, memory_bytes) || !palpate::receive(*child_, value)) {
       refuse_damaged();
     }
     if (kind == Hdf5Record::refused) {
       refuse("{}", value.problem);
     }
-    if (kind == Hdf5Record::attribute) {
-      attributes_[name] = std::move(value);
-      continue;
-    }
-    const auto found = std::find(datasets.begin(), datasets.end(), name);
-    if (found == datasets.end()) {
-      refuse_damaged();
-    }
-    datasets_[name] = {std::move(value), static_cast<std::uint64_t>(found - datasets.begin())};
+    (kind == Hdf5Record::attribute ? attributes_ : datasets_)[name] = std::move(value);
   }
 }
 
@@ -252,12 +271,11 @@ const std::vector<std::uint64_t>& Hdf5Contents::shape(const std::string& name,
 }
 
 std::uint64_t Hdf5Contents::count(const std::string& name) const {
-  return hdf5_stored_bytes(shape(name), 1);
+  return stored_bytes(shape(name), 1);
 }
 
 void Hdf5Contents::read(const std::string& name, const Take& take, std::uint64_t rows) {
-  const Dataset& found = dataset(name);
-  const std::vector<std::uint64_t>& shape = found.shape;
+  const std::vector<std::uint64_t>& shape = dataset(name).shape;
   std::uint64_t total = 1;
   for (std::size_t axis = 0; axis < shape.size(); ++axis) {
     total *= axis == 0 ? std::min(rows, shape[0]) : shape[axis];
@@ -265,18 +283,18 @@ void Hdf5Contents::read(const std::string& name, const Take& take, std::uint64_t
   if (total == 0) {
     return;
   }
-  const Hdf5Request request{found.index, 0, shape.empty() ? 1 : std::min(rows, shape[0])};
+  rows = shape.empty() ? 1 : std::min(rows, shape[0]);
   if (reader_) {
-    read_here(name, request.count, take);
+    read_here(name, rows, take);
   } else {
-    read_from_child(request, name, total, take);
+    read_from_child(name, rows, total, take);
   }
 }
 
 void Hdf5Contents::read_here(const std::string& name, std::uint64_t rows, const Take& take) {
   std::uint64_t first = 0;
   const ConfinedSession session;
-  const bool read = reader_->read(name, 0, rows, [&](std::span<const double> piece) {
+  const bool read = reader_->read(name, rows, [&](std::span<const double> piece) {
     take(first, piece);
     first += piece.size();
   });
@@ -285,8 +303,10 @@ void Hdf5Contents::read_here(const std::string& name, std::uint64_t rows, const 
   }
 }
 
-void Hdf5Contents::read_from_child(const Hdf5Request& request, const std::string& name,
-                                   std::uint64_t total, const Take& take) {
+void Hdf5Contents::read_from_child(const std::string& name, std::uint64_t rows, std::uint64_t total,
+                                   const Take& take) {
+  const auto index = std::ranges::find(dataset_names_, name) - dataset_names_.begin();
+  const Hdf5Request request{static_cast<std::uint64_t>(index), rows};
   std::vector<double> piece;
   bool intact = child_->write(&request, sizeof request);
   for (std::uint64_t first = 0; intact && first < total; first += piece.size()) {
@@ -307,9 +327,8 @@ void Hdf5Contents::read_from_child(const Hdf5Request& request, const std::string
   }
 }
 
-template <typename Field>
-const Field& Hdf5Contents::find(const std::map<std::string, Field>& fields, const char* kind,
-                                const std::string& name) const {
+const Hdf5Value& Hdf5Contents::find(const std::map<std::string, Hdf5Value>& fields,
+                                    const char* kind, const std::string& name) const {
   const auto found = fields.find(name);
   if (found == fields.end()) {
     refuse("{} '{}' is missing; add it", kind, name);
@@ -324,7 +343,7 @@ const Hdf5Value& Hdf5Contents::attribute(const std::string& name) const {
   return find(attributes_, "attribute", name);
 }
 
-const Hdf5Contents::Dataset& Hdf5Contents::dataset(const std::string& name) const {
+const Hdf5Value& Hdf5Contents::dataset(const std::string& name) const {
   return find(datasets_, "dataset", name);
 }
 

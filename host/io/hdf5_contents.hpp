@@ -17,8 +17,6 @@
 
 namespace palpate {
 
-struct Hdf5Request;
-
 /// The named attributes and datasets that exist in an HDF5 file's root group.
 ///
 /// What a file claims is checked before memory is taken for it. Numbers of datasets come in pieces,
@@ -72,28 +70,25 @@ class Hdf5Contents {
   }
 
  private:
-  struct Dataset : Hdf5Value {
-    std::uint64_t index = 0;  ///< among the names
-  };
-
   void open_here(std::uint64_t file_bytes, const std::vector<std::string>& attributes,
                  const std::vector<std::string>& datasets);
-  void receive(const std::vector<std::string>& datasets);
+  void receive();
   void read_here(const std::string& dataset, std::uint64_t rows, const Take& take);
-  void read_from_child(const Hdf5Request& request, const std::string& dataset, std::uint64_t total,
+  void read_from_child(const std::string& dataset, std::uint64_t rows, std::uint64_t total,
                        const Take& take);
   [[noreturn]] void refuse_damaged() const;
   const Hdf5Value& attribute(const std::string& name) const;
-  const Dataset& dataset(const std::string& name) const;
-  template <typename Field>
-  const Field& find(const std::map<std::string, Field>& fields, const char* kind,
-                    const std::string& name) const;
+  const Hdf5Value& dataset(const std::string& name) const;
+  const Hdf5Value& find(const std::map<std::string, Hdf5Value>& fields, const char* kind,
+                        const std::string& name) const;
 
   std::filesystem::path path_;
+  std::vector<std::string> dataset_names_;
   bool closed_ = true;
   std::map<std::string, Hdf5Value> attributes_;
-  std::map<std::string, Dataset> datasets_;
-  std::optional<ForkedChild> child_;  ///< that reads the file, or else:
+  std::map<std::string, Hdf5Value> datasets_;
+  // One of the two reads the file.
+  std::optional<ForkedChild> child_;
   std::unique_ptr<Hdf5Reader> reader_;
 };
 

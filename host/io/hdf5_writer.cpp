@@ -1,28 +1,67 @@
 #include "io/hdf5_writer.hpp"
 
 #include <algorithm>
+#include <cstdlib>
+#include <cstring>
 #include <limits>
+#include <string_view>
 
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include "io/atomic_file.hpp"
+#include "io/descriptor.hpp"
 #include "palpate/error.hpp"
 
 namespace palpate {
 
-void set_appendable(hid_t access) {
-  H5Pset_libver_bounds(access, H5F_LIBVER_V110, H5F_LIBVER_V110);
-  // Metadata starts on pages: a process can be killed between two pages of one write, and a
-  // checksum would not survive half of its metadata.
-  constexpr hsize_t page = 4096;
-  H5Pset_alignment(access, 1, page);
-}
-
 namespace {
 
+// Callbacks by which HDF5 manages a file's memory.
+
+void* allocate(std::size_t size, H5FD_file_image_op_t, void* image) {
+  static_cast<Hdf5Image*>(image)->capacity = size;
+  return std::calloc(1, size);
+}
+
+void* copy(void* to, const void* from, std::size_t size, H5FD_file_image_op_t, void*) {
+  return std::memcpy(to, from, size);
+}
+
+void* grow(void* memory, std::size_t size, H5FD_file_image_op_t, void* user) {
+  auto& image = *static_cast<Hdf5Image*>(user);
+  char* grown = static_cast<char*>(std::realloc(memory, size));
+  if (grown != nullptr) {
+    if (size > image.capacity) {
+      // Zeros, so that the same content gives the same bytes.
+      std::memset(grown + image.capacity, 0, size - image.capacity);
+    }
+    image.capacity = size;
+  }
+  return grown;
+}
+
+herr_t take(void* memory, H5FD_file_image_op_t operation, void* user) {
+  auto& image = *static_cast<Hdf5Image*>(user);
+  if (operation == H5FD_FILE_IMAGE_OP_FILE_CLOSE) {
+    image.bytes.reset(static_cast<char*>(memory));
+  } else {
+    std::free(memory);
+  }
+  return 0;
+}
+
+void* share(void* image) { return image; }
+
+herr_t keep(void*) { return 0; }
+
+// Makes a file that lives in memory; closing it leaves its bytes to `image`.
 Hdf5Handle file_in_memory(Hdf5Image& image, Hdf5Writer::Layout layout) {
   const Hdf5Handle access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose);
-  set_in_memory(access.get(), image);
+  constexpr std::size_t growth = 1 << 20;
+  H5FD_file_image_callbacks_t callbacks{allocate, copy, grow, take, share, keep, &image};
+  H5Pset_fapl_core(access.get(), growth, false);
+  H5Pset_file_image_callbacks(access.get(), &callbacks);
   if (layout == Hdf5Writer::Layout::appendable) {
     set_appendable(access.get());
   }
@@ -68,6 +107,14 @@ std::vector<hsize_t> chunk_of(const Hdf5Writer::Shape& shape) {
 }
 
 }  // namespace
+
+void set_appendable(hid_t access) {
+  H5Pset_libver_bounds(access, H5F_LIBVER_V110, H5F_LIBVER_V110);
+  // Metadata starts on pages: a process can be killed between two pages of one write, and a
+  // checksum would not survive half of its metadata.
+  constexpr hsize_t page = 4096;
+  H5Pset_alignment(access, 1, page);
+}
 
 Hdf5Writer::Hdf5Writer(std::filesystem::path path, Layout layout)
     : path_(std::move(path)), file_(file_in_memory(image_, layout)) {
@@ -190,6 +237,35 @@ void Hdf5Writer::require(bool done, std::string_view what) const {
   if (!done) {
     throw Error(Fault::system, fmt::format("{}: HDF5 cannot write {}; free memory and try again",
                                            path_.string(), what));
+  }
+}
+
+std::string hdf5_failure() {
+  std::string reason = "HDF5 failed";
+  H5Ewalk2(
+      H5E_DEFAULT, H5E_WALK_UPWARD,
+      [](unsigned, const H5E_error2_t* error, void* text) -> herr_t {
+        const std::string_view said = error->desc == nullptr ? "" : error->desc;
+        const std::string_view key = "error message = '";
+        if (const std::size_t at = said.find(key); at != std::string_view::npos) {
+          const std::string_view rest = said.substr(at + key.size());
+          *static_cast<std::string*>(text) = rest.substr(0, rest.find('\''));
+          return 1;
+        }
+        return 0;
+      },
+      &reason);
+  return reason;
+}
+
+void give_up_hdf5_file(hid_t file) {
+  void* descriptor = nullptr;
+  if (H5Fget_vfd_handle(file, H5P_DEFAULT, &descriptor) < 0) {
+    return;
+  }
+  // The file's remaining writes go to /dev/null.
+  if (const Descriptor nowhere("/dev/null", O_RDWR); nowhere.valid()) {
+    ::dup3(nowhere.get(), *static_cast<int*>(descriptor), O_CLOEXEC);
   }
 }
 

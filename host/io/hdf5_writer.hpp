@@ -1,20 +1,34 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
+#include <cstdlib>
 #include <filesystem>
 #include <functional>
+#include <memory>
 #include <span>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include <hdf5.h>
+
 #include "io/hdf5_handle.hpp"
-#include "io/hdf5_image.hpp"
 
 namespace palpate {
 
 /// Sets a file access property list up for `appendable` files: see Hdf5Writer::Layout.
 void set_appendable(hid_t access);
+
+/// The bytes of an HDF5 file made in memory. H5Fget_file_image() would not do: HDF5 1.10 spoils a
+/// checksum in the image of a file with SWMR.
+struct Hdf5Image {
+  struct Free {
+    void operator()(char* memory) const { std::free(memory); }
+  };
+  std::unique_ptr<char, Free> bytes;  ///< HDF5's own, once the file is closed
+  std::size_t capacity = 0;           ///< in bytes; free space follows the file's end
+};
 
 /// Builds an HDF5 file in memory and saves it in one piece, so that a failing disk is met by
 /// AtomicFile, not in the middle of HDF5's caches. The same content gives the same bytes. Every
@@ -73,5 +87,13 @@ class Hdf5Writer {
   Hdf5Image image_;
   Hdf5Handle file_;  ///< until save()
 };
+
+/// Returns why HDF5's last call on this thread failed, in the words of the operating system, such
+/// as "No space left on device"; "HDF5 failed" where the system was not the cause.
+std::string hdf5_failure();
+
+/// Gives up a file that could not be written: it stays as if the program had been killed now, and
+/// H5Fclose() succeeds. Without this, HDF5 1.10 crashes at exit where a file has unsaved parts.
+void give_up_hdf5_file(hid_t file);
 
 }  // namespace palpate

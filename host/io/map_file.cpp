@@ -1,13 +1,15 @@
-#include "io/map_file.hpp"
-
 #include <algorithm>
+#include <functional>
 #include <limits>
+#include <optional>
+#include <span>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
 #include "io/available_memory.hpp"
 #include "io/file_format.hpp"
+#include "io/file_summary.hpp"
 #include "io/hdf5_contents.hpp"
 #include "io/hdf5_writer.hpp"
 #include "io/input_file.hpp"
@@ -24,7 +26,7 @@ void require_sound(const std::filesystem::path& path, const std::optional<std::s
   }
 }
 
-/// Opens a map file with what it says besides its cells.
+/// Opens a map file.
 Hdf5Contents open_map(const std::filesystem::path& path) {
   return {path,
           {"format", "version", "label", "cell_mm", "origin_mm", "prior", "symmetry", "spread_mm",
@@ -32,7 +34,9 @@ Hdf5Contents open_map(const std::filesystem::path& path) {
           {"log_odds", "observations", "mean_level"}};
 }
 
-/// scan_map() of an open file.
+/// Reads and checks an open map file, holding a few MB of it at a time.
+/// @param head called with the map without cells
+/// @param cells called with the log odds in row-major order, in pieces
 void scan(const std::filesystem::path& path, Hdf5Contents& file,
           const std::function<void(const OccupancyGrid&)>& head,
           const std::function<void(std::span<const float>)>& cells) {
@@ -90,11 +94,20 @@ std::vector<float> read_layer(Hdf5Contents& file, const char* name, const Occupa
 
 }  // namespace
 
-void scan_map(const std::filesystem::path& path,
-              const std::function<void(const OccupancyGrid&)>& head,
-              const std::function<void(std::span<const float>)>& cells) {
+MapSummary summarize_map(const std::filesystem::path& path) {
+  MapSummary summary;
+  std::optional<Extremes> log_odds;
   Hdf5Contents file = open_map(path);
-  scan(path, file, head, cells);
+  scan(
+      path, file, [&](const OccupancyGrid& head) { summary.head = head; },
+      [&](std::span<const float> cells) {
+        for (const float cell : cells) {
+          widen(log_odds, cell);
+          summary.occupied += cell > 0.0F ? 1 : 0;
+        }
+      });
+  summary.log_odds = log_odds.value();  // no map is without cells
+  return summary;
 }
 
 OccupancyGrid read_map(const std::filesystem::path& path) {

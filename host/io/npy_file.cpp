@@ -1,22 +1,20 @@
 #include "io/npy_file.hpp"
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cstdint>
 #include <cstring>
 #include <fstream>
-#include <functional>
-#include <numeric>
-#include <optional>
 #include <string>
 #include <string_view>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <nlohmann/json.hpp>
 
 #include "io/available_memory.hpp"
 #include "io/input_file.hpp"
-#include "model/number_text.hpp"
 #include "model/printable.hpp"
 
 namespace palpate {
@@ -50,104 +48,50 @@ constexpr NumberType types[] = {{"<f4", 4, widen<float>},        {"<f8", 8, wide
                                 {"<i4", 4, widen<std::int32_t>}, {"<u4", 4, widen<std::uint32_t>},
                                 {"<i8", 8, widen<std::int64_t>}, {"<u8", 8, widen<std::uint64_t>}};
 
-/// The header's dictionary, which has exactly three keys: a literal of Python such as
-/// {'descr': '<f4', 'fortran_order': False, 'shape': (3, 4), }
-class Header {
- public:
-  Header(const std::filesystem::path& path, std::string_view text) : path_(path), rest_(text) {
-    skip("{");
-    for (int key = 0; key < 3; ++key) {
-      read_entry();
-      if (!try_skip(",")) {
-        break;
-      }
-    }
-    skip("}");
-    if (!descr_ || !fortran_order_ || !shape_ || !rest_.empty()) {
-      refuse_header();
-    }
-  }
-
-  const std::string& descr() const { return *descr_; }
-  bool fortran_order() const { return *fortran_order_; }
-  const std::vector<std::size_t>& shape() const { return *shape_; }
-
- private:
-  void read_entry() {
-    const std::string key = quoted();
-    skip(":");
-    if (key == "descr" && !descr_) {
-      if (rest_.starts_with('[')) {
-        refuse(path_, "holds records with named fields; save one array of numbers");
-      }
-      descr_ = quoted();
-    } else if (key == "fortran_order" && !fortran_order_) {
-      fortran_order_ = try_skip("True");
-      if (!*fortran_order_) {
-        skip("False");
-      }
-    } else if (key == "shape" && !shape_) {
-      read_shape();
-    } else {
-      refuse_header();
-    }
-  }
-
-  void read_shape() {
-    shape_.emplace();
-    skip("(");
-    while (!try_skip(")")) {
-      const std::size_t digits = std::min(rest_.find_first_not_of("0123456789"), rest_.size());
-      const auto extent = whole_number_of(rest_.substr(0, digits));
-      if (!extent) {
-        refuse_header();
-      }
-      shape_->push_back(static_cast<std::size_t>(*extent));
-      rest_.remove_prefix(digits);
-      if (!try_skip(",")) {
-        skip(")");
-        return;
-      }
-    }
-  }
-
-  std::string quoted() {
-    skip("'");
-    const std::size_t end = rest_.find('\'');
-    if (end == rest_.npos) {
-      refuse_header();
-    }
-    std::string text(rest_.substr(0, end));
-    rest_.remove_prefix(end);
-    skip("'");
-    return text;
-  }
-
-  bool try_skip(std::string_view token) {
-    if (!rest_.starts_with(token)) {
-      return false;
-    }
-    rest_.remove_prefix(token.size());
-    rest_.remove_prefix(std::min(rest_.find_first_not_of(" \n"), rest_.size()));
-    return true;
-  }
-
-  void skip(std::string_view token) {
-    if (!try_skip(token)) {
-      refuse_header();
-    }
-  }
-
-  [[noreturn]] void refuse_header() const {
-    refuse(path_, "its NPY header is damaged; save the array again with numpy.save");
-  }
-
-  const std::filesystem::path& path_;
-  std::string_view rest_;
-  std::optional<std::string> descr_;
-  std::optional<bool> fortran_order_;
-  std::optional<std::vector<std::size_t>> shape_;
+/// What the header says of the numbers.
+struct Header {
+  std::string descr;
+  bool fortran_order = false;
+  std::vector<std::size_t> shape;
 };
+
+/// The header's dictionary as JSON. It is a literal of Python such as
+/// {'descr': '<f4', 'fortran_order': False, 'shape': (3, 4), }
+nlohmann::json dictionary_of(std::string_view text) {
+  std::string json;
+  bool quoted = false;
+  for (const char c : text) {
+    quoted = quoted != (c == '\'');
+    if (!quoted && (c == ')' || c == '}')) {
+      json.erase(json.find_last_not_of(" \n") + 1);
+      if (json.ends_with(',') && !json.ends_with("[,")) {
+        json.pop_back();  // Python allows a comma after the last item
+      }
+    }
+    const bool stays = quoted && c != '\'';
+    const std::size_t bare = stays ? std::string_view::npos : std::string_view("'()TF").find(c);
+    json += bare == std::string_view::npos ? c : "\"[]tf"[bare];
+  }
+  return nlohmann::json::parse(json, nullptr, false);
+}
+
+Header header_of(const std::filesystem::path& path, std::string_view text) {
+  const nlohmann::json all = dictionary_of(text);
+  const auto item = [&](const char* key) {
+    return all.is_object() ? all.value(key, nlohmann::json()) : nlohmann::json();
+  };
+  const nlohmann::json descr = item("descr");
+  const nlohmann::json fortran_order = item("fortran_order");
+  const nlohmann::json shape = item("shape");
+  if (descr.is_array()) {
+    refuse(path, "holds records with named fields; save one array of numbers");
+  }
+  if (all.size() != 3 || !descr.is_string() || !fortran_order.is_boolean() || !shape.is_array() ||
+      !std::ranges::all_of(shape, &nlohmann::json::is_number_unsigned)) {
+    refuse(path, "its NPY header is damaged; save the array again with numpy.save");
+  }
+  return {descr, fortran_order, shape};
+}
 
 /// Reads the header's text, up to the numbers.
 std::string read_header(std::ifstream& file, const std::filesystem::path& path) {
@@ -212,27 +156,19 @@ NpyArray read_npy(const std::filesystem::path& path) {
   const std::uintmax_t file_bytes = require_readable(path);
   std::ifstream file(path, std::ios::binary);
   const std::string text = read_header(file, path);
-  const Header header(path, text);
-  const NumberType& type = type_of(path, header.descr());
-  std::uint64_t bytes = type.width;
-  for (const std::size_t extent : header.shape()) {
-    if (__builtin_mul_overflow(bytes, extent, &bytes)) {
-      bytes = UINT64_MAX;
-      break;
-    }
-  }
+  const Header header = header_of(path, text);
+  const NumberType& type = type_of(path, header.descr);
+  const std::uint64_t bytes = stored_bytes(header.shape, type.width);
   const auto begin = static_cast<std::uintmax_t>(file.tellg());
   if (bytes != file_bytes - begin) {
     refuse(path, "holds {} bytes of numbers, its shape ({}) makes {}; save the array again",
-           file_bytes - begin, fmt::format("{}", fmt::join(header.shape(), ", ")), bytes);
+           file_bytes - begin, fmt::format("{}", fmt::join(header.shape, ", ")), bytes);
   }
   const std::size_t count = bytes / type.width;
-  std::uint64_t needed = 0;  // a sparse file's count may be any
-  if (__builtin_mul_overflow(count, (header.fortran_order() ? 2 : 1) * sizeof(double), &needed)) {
-    needed = UINT64_MAX;
-  }
-  require_memory(path, fmt::format("an array of {} numbers", count), needed);
-  NpyArray array{.shape = header.shape(), .values = std::vector<double>(count)};
+  // A sparse file's count may be any.
+  require_memory(path, fmt::format("an array of {} numbers", count),
+                 stored_bytes(std::array{count}, (header.fortran_order ? 2 : 1) * sizeof(double)));
+  NpyArray array{.shape = header.shape, .values = std::vector<double>(count)};
   constexpr std::size_t piece = 1 << 16;
   std::vector<char> stored(piece * type.width);
   for (std::size_t first = 0; first < count; first += piece) {
@@ -242,7 +178,7 @@ NpyArray read_npy(const std::filesystem::path& path) {
     }
     type.widen(stored.data(), some, array.values.data() + first);
   }
-  if (header.fortran_order()) {
+  if (header.fortran_order) {
     array.values = from_fortran_order(array.values, array.shape);
   }
   return array;

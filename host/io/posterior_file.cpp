@@ -1,15 +1,15 @@
-#include "io/posterior_file.hpp"
-
 #include <cmath>
+#include <functional>
 #include <limits>
+#include <span>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
 #include "io/available_memory.hpp"
 #include "io/file_format.hpp"
+#include "io/file_summary.hpp"
 #include "io/hdf5_contents.hpp"
-#include "io/hdf5_rows.hpp"
 #include "io/hdf5_writer.hpp"
 #include "io/input_file.hpp"
 #include "io/recording_rules.hpp"
@@ -24,7 +24,7 @@ Axis read_axis(const Hdf5Contents& file, const char* range, const char* bins) {
   return {ends[0], ends[1], file.integer(bins, 1)};
 }
 
-// What holds for every posterior, read or about to be written, without its log-likelihoods.
+// Checks the labels and the lattice of a posterior that is read or about to be written.
 void validate(const std::filesystem::path& path, const std::vector<std::string>& objects,
               const PoseLattice& lattice) {
   // HDF5 keeps an attribute of at most 64 KiB, 16 bytes for each text.
@@ -58,8 +58,9 @@ std::vector<std::uint64_t> shape_of(std::size_t objects, const PoseLattice& latt
           static_cast<std::uint64_t>(lattice.x_mm.count)};
 }
 
-}  // namespace
-
+/// Reads and checks a posterior's file, holding a few MB of it at a time.
+/// @param head called with the posterior without log-likelihoods
+/// @param log_likelihood called with the log-likelihoods, object by object, in pieces
 void scan_posterior(const std::filesystem::path& path,
                     const std::function<void(const Posterior&)>& head,
                     const std::function<void(std::span<const double>)>& log_likelihood) {
@@ -89,6 +90,31 @@ void scan_posterior(const std::filesystem::path& path,
   });
 }
 
+}  // namespace
+
+PosteriorSummary summarize_posterior(const std::filesystem::path& path) {
+  PosteriorSummary summary;
+  std::size_t bins = 0;
+  std::size_t k = 0;
+  scan_posterior(
+      path,
+      [&](const Posterior& head) {
+        summary.head = head;
+        bins = static_cast<std::size_t>(head.lattice.bins());
+        summary.peaks.assign(head.objects.size(), {-std::numeric_limits<double>::infinity(), 0});
+      },
+      [&](std::span<const double> values) {
+        for (const double value : values) {
+          PosteriorSummary::Peak& peak = summary.peaks[k / bins];
+          if (value > peak.log_likelihood) {
+            peak = {value, static_cast<std::int64_t>(k % bins)};
+          }
+          ++k;
+        }
+      });
+  return summary;
+}
+
 Posterior read_posterior(const std::filesystem::path& path) {
   Posterior posterior;
   scan_posterior(
@@ -98,8 +124,8 @@ Posterior read_posterior(const std::filesystem::path& path) {
         const std::vector<std::uint64_t> shape =
             shape_of(posterior.objects.size(), posterior.lattice);
         require_memory(path, fmt::format("a posterior of {} bins", fmt::join(shape, " x ")),
-                       hdf5_stored_bytes(shape, sizeof(double)));
-        posterior.log_likelihood.reserve(hdf5_stored_bytes(shape, 1));
+                       stored_bytes(shape, sizeof(double)));
+        posterior.log_likelihood.reserve(stored_bytes(shape, 1));
       },
       [&](std::span<const double> values) {
         posterior.log_likelihood.insert(posterior.log_likelihood.end(), values.begin(),
@@ -124,7 +150,7 @@ void write_posterior(const std::filesystem::path& path, const std::vector<std::s
   file.attribute("theta_rad", {lattice.theta_rad.lower, lattice.theta_rad.upper});
   file.attribute("pivot_mm", {lattice.pivot_mm.x, lattice.pivot_mm.y});
   const std::vector<std::uint64_t> shape = shape_of(objects.size(), lattice);
-  const std::uint64_t bins = hdf5_stored_bytes(shape_of(1, lattice), 1);
+  const std::uint64_t bins = stored_bytes(shape_of(1, lattice), 1);
   file.dataset(
       "log_likelihood", {shape.begin(), shape.end()},
       [&](std::size_t object) {
@@ -143,7 +169,7 @@ void write_posterior(const std::filesystem::path& path, const std::vector<std::s
 void write_posterior(const std::filesystem::path& path, const Posterior& posterior) {
   const auto& [objects, lattice, logs] = posterior;
   validate(path, objects, lattice);
-  if (logs.size() != hdf5_stored_bytes(shape_of(objects.size(), lattice), 1)) {
+  if (logs.size() != stored_bytes(shape_of(objects.size(), lattice), 1)) {
     refuse(path, "a posterior of {} bins and {} log-likelihoods cannot be written; make them agree",
            fmt::format("{}", fmt::join(shape_of(objects.size(), lattice), " x ")), logs.size());
   }

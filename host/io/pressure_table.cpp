@@ -1,10 +1,12 @@
 #include "io/pressure_table.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 
 #include "io/available_memory.hpp"
+#include "io/table_columns.hpp"
 #include "model/lost_count.hpp"
 #include "model/number_text.hpp"
 #include "model/printable.hpp"
@@ -45,10 +47,7 @@ void reserve(const CsvTable& table, const char* frames, std::uint64_t count, std
              PressureTable& pressures) {
   constexpr std::size_t of_reading = sizeof(double) + sizeof(std::uint8_t) + sizeof(float);
   constexpr std::size_t of_frame = 3 * sizeof(Pose) + 2 * sizeof(double);
-  std::uint64_t bytes = 0;
-  if (__builtin_mul_overflow(count, elements * of_reading + of_frame, &bytes)) {
-    bytes = UINT64_MAX;
-  }
+  const std::uint64_t bytes = stored_bytes(std::array{count}, elements * of_reading + of_frame);
   require_memory(table.path(),
                  fmt::format("a table of {} {} by {} elements", count, frames, elements), bytes);
   pressures.pressure.reserve(count * elements);
@@ -73,7 +72,7 @@ void require_counting_names(const CsvTable& table, const std::vector<std::size_t
   }
 }
 
-/// The columns that --pressure-columns names.
+/// The columns that `pressure-columns` names.
 /// @param taken columns of times, poses and what else is no pressure
 std::vector<std::size_t> columns_named(const CsvTable& table, const std::string& names,
                                        const std::vector<std::size_t>& taken) {
@@ -290,6 +289,29 @@ class LongTable {
   std::optional<std::size_t> frame_;
 };
 
+constexpr std::string_view axis_names[][1] = {{"x"}, {"y"}};
+
+UnitColumn find_axis(const CsvTable& table, std::size_t axis) {
+  if (!table.has_header() && table.columns().size() == 2) {
+    return {.index = axis, .unit = length_units.front()};
+  }
+  const auto column = find_column(table, {axis_names[axis], length_units, "array"}, "", {});
+  if (!column) {
+    table.refuse("no column is called '{}'; write a row 'x y' in mm for each element",
+                 axis_names[axis][0]);
+  }
+  return *column;
+}
+
+double coordinate(const CsvTable& table, const UnitColumn& column) {
+  const double mm = column.unit.convert(table.require_number(column.index));
+  if (std::abs(mm) > farthest_mm) {
+    table.refuse("column '{}': {} mm is no place on an array; check the number",
+                 printable(table.columns()[column.index]), mm);
+  }
+  return mm;
+}
+
 }  // namespace
 
 PressureTable read_pressures(const std::filesystem::path& path, std::size_t elements,
@@ -302,6 +324,31 @@ PressureTable read_pressures(const std::filesystem::path& path, std::size_t elem
     refuse(path, "holds a header and no row; write a row for each frame");
   }
   return pressures;
+}
+
+ArrayTable read_array(const std::filesystem::path& path) {
+  CsvTable table(path);
+  const UnitColumn x = find_axis(table, 0);
+  const UnitColumn y = find_axis(table, 1);
+  const auto valid = table.find("valid");
+  const auto baseline = table.find("baseline");
+  ArrayTable array;
+  while (table.next()) {
+    array.elements_mm.emplace_back(coordinate(table, x), coordinate(table, y));
+    if (valid) {
+      array.valid.push_back(table.require_number(*valid) != 0.0 ? 1 : 0);
+    }
+    if (baseline) {
+      const bool dead = valid && array.valid.back() == 0;
+      array.baseline.push_back(
+          dead ? table.number(*baseline).value_or(std::numeric_limits<double>::quiet_NaN())
+               : table.require_number(*baseline));
+    }
+  }
+  if (array.elements_mm.empty()) {
+    refuse(path, "holds no element; write a row 'x y' in mm for each");
+  }
+  return array;
 }
 
 }  // namespace palpate

@@ -5,7 +5,6 @@
 #include <cstring>
 
 #include "io/forked_child.hpp"
-#include "io/hdf5_failure.hpp"
 #include "io/hdf5_handle.hpp"
 #include "io/hdf5_process.hpp"
 #include "io/hdf5_writer.hpp"
@@ -92,15 +91,8 @@ std::string failure_of_child(const std::filesystem::path& path, std::uint64_t ro
         sender.flush();
       },
       {.cpu_seconds = 10, .memory_bytes = memory_bytes, .silence = 1min}, hdf5_mutex);
-  std::uint64_t size = 0;
-  std::string reason = "HDF5 failed";
-  if (child.read(&size, sizeof size) && size < memory_bytes) {
-    reason.resize(size);
-    if (!child.read(reason.data(), size)) {
-      reason = "HDF5 failed";
-    }
-  }
-  return reason;
+  std::string reason;
+  return child.list(reason, memory_bytes) ? reason : "HDF5 failed";
 }
 
 }  // namespace

@@ -1,11 +1,11 @@
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include <fmt/format.h>
 
 #include "io/available_memory.hpp"
 #include "io/file_format.hpp"
-#include "io/hdf5_rows.hpp"
 #include "io/hdf5_writer.hpp"
 #include "io/input_file.hpp"
 #include "io/recording_rules.hpp"
@@ -24,18 +24,13 @@ void append(std::vector<Value>& list, std::span<const Value> more) {
 void reserve(const std::filesystem::path& path, const RecordingHead& head, Recording& recording) {
   const std::uint64_t n = head.rows;
   const std::uint64_t e = head.elements;
-  const std::uint64_t places = head.array_changes ? hdf5_stored_bytes(std::vector{n, e}, 1) : e;
+  const std::uint64_t places = head.array_changes ? stored_bytes(std::vector{n, e}, 1) : e;
   std::uint64_t bytes = 0;
-  for (const auto& [count, width] :
-       {std::pair{hdf5_stored_bytes(std::vector{n, e}, 1), sizeof(double)},
-        {places, sizeof(glm::dvec2)},
-        {n, sizeof(Pose) + 3 * sizeof(double)}}) {
-    std::uint64_t some = 0;
-    if (__builtin_mul_overflow(count, width, &some) ||
-        __builtin_add_overflow(bytes, some, &bytes)) {
-      bytes = UINT64_MAX;
-      break;
-    }
+  for (const auto& [count, width] : {std::pair{stored_bytes(std::vector{n, e}, 1), sizeof(double)},
+                                     {places, sizeof(glm::dvec2)},
+                                     {n, sizeof(Pose) + 3 * sizeof(double)}}) {
+    const std::uint64_t some = stored_bytes(std::array{count}, width);
+    bytes = some < UINT64_MAX - bytes ? bytes + some : UINT64_MAX;
   }
   require_memory(path, fmt::format("a recording of {} rows by {} elements", n, e), bytes);
   recording.pressure.reserve(n * e);

@@ -25,7 +25,7 @@ using namespace std::chrono_literals;
 constexpr std::uint64_t most_file_bytes = 16 << 20;
 constexpr std::uint64_t child_bytes = 512 << 20;
 /// CPU time for one file, whose reading takes milliseconds.
-constexpr std::uint64_t cpu_seconds = 5;
+constexpr std::uint64_t file_cpu_seconds = 5;
 /// At 1 MB/s, the rate of the slowest disk that is worth waiting for, the largest file takes 16 s.
 constexpr auto silence = 90s;
 /// A path, a label or a unit is shorter.
@@ -34,26 +34,6 @@ constexpr std::uint64_t most_text_bytes = 1 << 20;
 static_assert(std::is_trivially_copyable_v<Pose> && std::is_trivially_copyable_v<glm::dvec2>);
 
 enum class Answer : std::uint8_t { recording, input_fault, system_fault };
-
-/// Receives lists. Nothing is trusted: a damaged file may have corrupted the child's memory.
-class Receiver {
- public:
-  explicit Receiver(ForkedChild& child) : child_(child) {}
-
-  template <class List>
-  bool list(List& values, std::uint64_t most_bytes = child_bytes) {
-    std::uint64_t count = 0;
-    if (!child_.read(&count, sizeof count) ||
-        count > most_bytes / sizeof(typename List::value_type)) {
-      return false;
-    }
-    values.resize(count);
-    return child_.read(values.data(), count * sizeof(typename List::value_type));
-  }
-
- private:
-  ForkedChild& child_;
-};
 
 void send(ForkedSender& sender, const Recording& recording) {
   const bool known = recording.truth.has_value();
@@ -101,7 +81,7 @@ void serve(int socket) {
     forked_read(socket, &size, sizeof size);  // ends the child after the last path
     std::string path(size, '\0');
     forked_read(socket, path.data(), size);
-    allow_cpu_seconds(cpu_seconds);
+    allow_cpu_seconds(file_cpu_seconds);
     ForkedSender sender(socket);
     try {
       const Recording recording = read_twice(path);
@@ -116,17 +96,20 @@ void serve(int socket) {
   }
 }
 
-/// Receives a recording without its path; false where the child fails.
-bool receive(Receiver& receiver, Recording& recording) {
+/// Receives a recording without its path; false where the child fails. Nothing is trusted: a
+/// damaged file may have corrupted the child's memory.
+bool receive(ForkedChild& child, Recording& recording) {
   std::string true_object;
   std::vector<Pose> true_pose;
-  const bool received =
-      receiver.list(recording.object, most_text_bytes) &&
-      receiver.list(recording.pressure_unit, most_text_bytes) &&
-      receiver.list(recording.rows, most_text_bytes) && receiver.list(recording.T_robot_sensor) &&
-      receiver.list(recording.pressure) && receiver.list(recording.elements_mm) &&
-      receiver.list(recording.valid) && receiver.list(true_object, most_text_bytes) &&
-      receiver.list(true_pose) && true_pose.size() <= 1;
+  const bool received = child.list(recording.object, most_text_bytes) &&
+                        child.list(recording.pressure_unit, most_text_bytes) &&
+                        child.list(recording.rows, most_text_bytes) &&
+                        child.list(recording.T_robot_sensor, child_bytes) &&
+                        child.list(recording.pressure, child_bytes) &&
+                        child.list(recording.elements_mm, child_bytes) &&
+                        child.list(recording.valid, child_bytes) &&
+                        child.list(true_object, most_text_bytes) &&
+                        child.list(true_pose, child_bytes) && true_pose.size() <= 1;
   if (received && !true_pose.empty()) {
     recording.truth = Truth{std::move(true_object), true_pose.front()};
   }
@@ -147,7 +130,8 @@ void RecordingReader::fork_child() {
   initialise_hdf5();
   child_ = std::make_unique<ForkedChild>(
       serve,
-      ForkedLimits{.cpu_seconds = cpu_seconds, .memory_bytes = child_bytes, .silence = silence},
+      ForkedLimits{
+          .cpu_seconds = file_cpu_seconds, .memory_bytes = child_bytes, .silence = silence},
       hdf5_mutex);
 }
 
@@ -176,19 +160,18 @@ std::optional<Recording> RecordingReader::read_in_child(const std::filesystem::p
   if (!child_->write(request.data(), request.size()) || !child_->read(&answer, sizeof answer)) {
     return {};
   }
-  Receiver receiver(*child_);
   Recording recording;
   std::string problem;
   switch (answer) {
     case Answer::recording:
-      if (receive(receiver, recording)) {
+      if (receive(*child_, recording)) {
         recording.path = path.string();
         return recording;
       }
       break;
     case Answer::input_fault:
     case Answer::system_fault:
-      if (receiver.list(problem, most_text_bytes) && is_printable(problem)) {
+      if (child_->list(problem, most_text_bytes) && is_printable(problem)) {
         throw Error(answer == Answer::input_fault ? Fault::input : Fault::system, problem);
       }
   }

@@ -1,6 +1,10 @@
 #include "io/recording_survey.hpp"
 
+#include <algorithm>
+#include <bit>
 #include <cmath>
+#include <limits>
+#include <numeric>
 #include <utility>
 #include <vector>
 
@@ -16,42 +20,33 @@ namespace palpate {
 
 namespace {
 
+constexpr std::uint32_t sign = 0x80000000;
+
 class Survey {
  public:
   explicit Survey(const std::filesystem::path& path) : path_(path) {}
 
   RecordingSurvey run() {
-    scan_recording(path_, {.head = [&](const RecordingHead& head) { begin(head); },
-                           .pressure =
-                               [&](std::span<const double> values) {
-                                 result_.pressure.add(result_.head.recording, values);
-                               },
-                           .T_robot_sensor =
-                               [&](std::span<const Pose> poses) {
-                                 for (const Pose& pose : poses) {
-                                   take(pose);
-                                 }
-                               },
-                           .elements_mm =
-                               [&](std::span<const glm::dvec2> places) {
-                                 for (const glm::dvec2& place : places) {
-                                   take(place);
-                                 }
-                               },
-                           .time_s =
-                               [&](std::span<const double> times) {
-                                 for (const double time_s : times) {
-                                   take_time(time_s);
-                                 }
-                               },
-                           .device_time_s = [](std::span<const double>) {},
-                           .lost_before =
-                               [&](std::span<const std::uint64_t> counts) {
-                                 result_.lost = result_.lost.value_or(0);
-                                 for (const std::uint64_t count : counts) {
-                                   count_lost(*result_.lost, count);
-                                 }
-                               }});
+    const auto each = [this](const auto& values) {
+      for (const auto& value : values) {
+        take(value);
+      }
+    };
+    scan_recording(
+        path_,
+        {.head = [&](const RecordingHead& head) { begin(head); },
+         .pressure = [&](auto values) { result_.pressure.add(result_.head.recording, values); },
+         .T_robot_sensor = each,
+         .elements_mm = each,
+         .time_s = each,
+         .device_time_s = [](std::span<const double>) {},
+         .lost_before =
+             [&](auto counts) {
+               result_.lost = result_.lost.value_or(0);
+               for (const std::uint64_t count : counts) {
+                 count_lost(*result_.lost, count);
+               }
+             }});
     result_.spacing = spacing_of(places_mm_);
     if (result_.spacing) {
       for (std::size_t& element : result_.spacing->closest) {
@@ -107,7 +102,7 @@ class Survey {
     }
   }
 
-  void take_time(double time_s) {
+  void take(double time_s) {
     const double before_s = last_s_.value_or(time_s);
     if (time_s < before_s && result_.times_back++ == 0) {
       result_.first_back = row_;
@@ -125,10 +120,118 @@ class Survey {
   std::uint64_t place_ = 0;            ///< index of the next place
   StreamTime time_;
   std::optional<double> last_s_;
-  std::uint64_t row_ = 0;  ///< of the next time
+  std::uint64_t row_ = 0;  ///< row of the next time
 };
 
 }  // namespace
+
+ReadingHistogram::ReadingHistogram() : counts_(1 << 16, 0) {}
+
+// The bits of floats, read as whole numbers, have the floats' order where the sign bit is flipped
+// and the other bits of negative numbers are flipped too.
+std::size_t ReadingHistogram::bin_of(double reading) {
+  constexpr double largest = std::numeric_limits<float>::max();
+  const auto number = static_cast<float>(std::clamp(reading, -largest, largest));
+  const auto bits = std::bit_cast<std::uint32_t>(number + 0.0F);  // 0 for -0
+  return ((bits & sign) != 0 ? ~bits : bits | sign) >> 16;
+}
+
+double ReadingHistogram::edge_of(std::size_t bin) {
+  const auto key = static_cast<std::uint32_t>(bin) << 16;
+  return std::bit_cast<float>((key & sign) != 0 ? key ^ sign : ~key & 0xFFFF0000);
+}
+
+double ReadingHistogram::quantile(double part) const {
+  const std::uint64_t all = std::accumulate(counts_.begin(), counts_.end(), std::uint64_t{0});
+  const double below = std::max(1.0, std::ceil(part * static_cast<double>(all)));
+  std::uint64_t passed = 0;
+  for (std::size_t bin = 0; bin < counts_.size(); ++bin) {
+    passed += counts_[bin];
+    if (static_cast<double>(passed) >= below) {
+      return edge_of(bin);
+    }
+  }
+  return edge_of(counts_.size() - 1);
+}
+
+std::uint64_t ReadingHistogram::count(double low, double high) const {
+  std::uint64_t sum = 0;
+  for (std::size_t bin = bin_of(low); bin <= bin_of(high); ++bin) {
+    sum += counts_[bin];
+  }
+  return sum;
+}
+
+std::uint64_t ReadingHistogram::occupied(double low, double high) const {
+  std::uint64_t bins = 0;
+  for (std::size_t bin = bin_of(low); bin <= bin_of(high); ++bin) {
+    bins += counts_[bin] > 0 ? 1 : 0;
+  }
+  return bins;
+}
+
+void PressureSurvey::begin(std::size_t elements, std::optional<double> threshold) {
+  threshold_ = threshold;
+  elements_.resize(elements);
+}
+
+void PressureSurvey::add(const Recording& head, std::span<const double> pressures) {
+  const std::vector<std::uint8_t>& valid = head.valid;
+  const std::size_t e = elements_.size();
+  const bool valid_by_row = valid.size() > e;
+  for (const double pressure : pressures) {
+    if (valid.empty() || valid[(valid_by_row ? row_ * e : 0) + element_] != 0) {
+      take(head, pressure);
+    }
+    if (++element_ == e) {
+      end_row();
+    }
+  }
+}
+
+void PressureSurvey::take(const Recording& head, double reading) {
+  ElementSurvey& element = elements_[element_];
+  ++element.alive;
+  if (std::isnan(reading)) {
+    ++unknown_;
+    return;
+  }
+  element.changes += element.known > 0 && reading != element.last ? 1 : 0;
+  ++element.known;
+  element.zeros += reading == 0.0 ? 1 : 0;
+  element.last = reading;
+  readings_.add(reading);
+  if (!range_ || reading > range_->most) {
+    at_most_ = 0;
+    times_at_most_ = 0;
+  }
+  widen(range_, reading);
+  if (reading == range_->most) {
+    const std::uint64_t apart = head.rows == "frames" ? 2 : 1;
+    if (at_most_ == 0 || row_ >= last_at_most_ + apart) {
+      ++times_at_most_;
+    }
+    ++at_most_;
+    last_at_most_ = row_;
+  }
+  const std::vector<double>& baseline = head.baseline;
+  const double pressure = baseline.empty() ? reading : reading - baseline[element_];
+  element.contacts += threshold_ && pressure > *threshold_ ? 1 : 0;
+  if (!strongest_ || pressure > *strongest_) {
+    strongest_ = pressure;
+    strongest_element_ = element_;
+  }
+}
+
+void PressureSurvey::end_row() {
+  if (strongest_ && (!threshold_ || *strongest_ > *threshold_)) {
+    ++in_contact_;
+    ++elements_[strongest_element_].strongest;
+  }
+  strongest_.reset();
+  element_ = 0;
+  ++row_;
+}
 
 RecordingSurvey survey_recording(const std::filesystem::path& path) { return Survey(path).run(); }
 

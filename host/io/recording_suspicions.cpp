@@ -1,5 +1,3 @@
-#include "io/recording_suspicions.hpp"
-
 #include <algorithm>
 #include <cmath>
 #include <functional>
@@ -7,6 +5,7 @@
 
 #include <fmt/format.h>
 
+#include "io/recording_survey.hpp"
 #include "model/angle_unit.hpp"
 #include "model/elements_that.hpp"
 
@@ -17,7 +16,7 @@ namespace {
 // With fewer rows, an element that reads the same in all of them says nothing.
 constexpr std::uint64_t least_rows = 20;
 
-// One in a million: the chance to suspect a sound element, in nats.
+// A sound element is suspected with a chance of one in a million, in nats.
 constexpr double sure_nats = 14.0;
 
 class Suspicions {

@@ -1,6 +1,7 @@
 #include "io/recording_tables.hpp"
 
 #include <cmath>
+#include <functional>
 #include <iterator>
 #include <memory>
 
@@ -17,122 +18,80 @@ constexpr const char* pressures_name = "pressures.csv";
 constexpr const char* array_name = "array.csv";
 constexpr const char* poses_name = "poses.csv";
 
-/// A CSV file that grows row by row.
-class Table {
- public:
-  Table(const std::filesystem::path& path, const std::vector<std::string>& names) : file_(path) {
-    for (const std::string& name : names) {
-      begin_cell();
-      text_ += name;
-    }
-    end_row();
-  }
-
-  /// A number with as many digits as needed; an empty cell where it is not finite.
-  void add(double value) {
-    begin_cell();
-    if (std::isfinite(value)) {
-      fmt::format_to(std::back_inserter(text_), "{}", value);
-    }
-  }
-  void add_empty() { begin_cell(); }
-  void end_row() {
-    constexpr std::size_t piece = 1 << 20;
-    text_ += '\n';
-    row_is_new_ = true;
-    if (text_.size() >= piece) {
-      flush();
-    }
-  }
-  void flush() {
-    file_.append(text_);
-    text_.clear();
-  }
-  void commit() { file_.commit(); }
-
- private:
-  void begin_cell() {
-    if (!row_is_new_) {
-      text_ += ',';
-    }
-    row_is_new_ = false;
-  }
-
-  AtomicFile file_;
-  std::string text_;  ///< not yet in the file
-  bool row_is_new_ = true;
+/// A column of a table; a value that is not finite is an empty cell.
+struct Column {
+  std::string name;
+  std::function<double(std::size_t row)> value;
 };
 
-std::unique_ptr<Table> pressures_of(const Recording& r, const std::filesystem::path& path) {
-  const std::size_t e = r.elements();
-  std::vector<std::string> names;
-  for (const auto& [name, there] : {std::pair{"time", !r.time_s.empty()},
-                                    {"device_time", !r.device_time_s.empty()},
-                                    {"lost_before", !r.lost_before.empty()}}) {
-    if (there) {
-      names.emplace_back(name);
-    }
+/// Writes a CSV file, whose numbers have as many digits as needed; it appears once it is committed.
+std::unique_ptr<AtomicFile> table_of(const std::filesystem::path& path,
+                                     const std::vector<Column>& columns, std::size_t rows) {
+  constexpr std::size_t piece = 1 << 20;
+  auto file = std::make_unique<AtomicFile>(path);
+  std::string text;
+  for (const Column& column : columns) {
+    text.append(text.empty() ? "" : ",").append(column.name);
   }
-  for (std::size_t i = 0; i < e; ++i) {
-    names.push_back(fmt::format("p{}", i));
-  }
-  auto table = std::make_unique<Table>(path, names);
-  const bool valid_by_row = r.valid.size() > e;
-  for (std::size_t i = 0; i < r.size(); ++i) {
-    if (!r.time_s.empty()) {
-      table->add(r.time_s[i]);
-    }
-    if (!r.device_time_s.empty()) {
-      table->add(r.device_time_s[i]);
-    }
-    if (!r.lost_before.empty()) {
-      table->add(static_cast<double>(r.lost_before[i]));
-    }
-    for (std::size_t k = i * e; k < (i + 1) * e; ++k) {
-      if (valid_by_row && r.valid[k] == 0) {
-        table->add_empty();
-      } else {
-        table->add(r.pressure[k]);
+  text += '\n';
+  for (std::size_t row = 0; row < rows; ++row) {
+    for (const Column& column : columns) {
+      if (&column != &columns.front()) {
+        text += ',';
+      }
+      if (const double value = column.value(row); std::isfinite(value)) {
+        fmt::format_to(std::back_inserter(text), "{}", value);
       }
     }
-    table->end_row();
+    text += '\n';
+    if (text.size() >= piece) {
+      file->append(text);
+      text.clear();
+    }
   }
-  return table;
+  file->append(text);
+  return file;
 }
 
-std::unique_ptr<Table> poses_of(const Recording& r, const std::filesystem::path& path) {
-  auto table = std::make_unique<Table>(path, std::vector<std::string>{"x_mm", "y_mm", "theta_rad"});
-  for (const Pose& pose : r.T_robot_sensor) {
-    table->add(pose.translation_mm.x);
-    table->add(pose.translation_mm.y);
-    table->add(pose.theta_rad);
-    table->end_row();
+std::vector<Column> pressure_columns(const Recording& r) {
+  const std::size_t e = r.elements();
+  std::vector<Column> columns;
+  if (!r.time_s.empty()) {
+    columns.push_back({"time", [&r](std::size_t row) { return r.time_s[row]; }});
   }
-  return table;
+  if (!r.device_time_s.empty()) {
+    columns.push_back({"device_time", [&r](std::size_t row) { return r.device_time_s[row]; }});
+  }
+  if (!r.lost_before.empty()) {
+    columns.push_back(
+        {"lost_before", [&r](std::size_t row) { return static_cast<double>(r.lost_before[row]); }});
+  }
+  const bool valid_by_row = r.valid.size() > e;
+  for (std::size_t i = 0; i < e; ++i) {
+    columns.push_back({fmt::format("p{}", i), [=, &r](std::size_t row) {
+                         const std::size_t k = row * e + i;
+                         return valid_by_row && r.valid[k] == 0 ? std::nan("") : r.pressure[k];
+                       }});
+  }
+  return columns;
 }
 
-std::unique_ptr<Table> array_of(const Recording& r, const std::filesystem::path& path) {
-  const bool has_valid = r.valid.size() == r.elements();
-  std::vector<std::string> names{"x_mm", "y_mm"};
-  if (has_valid) {
-    names.emplace_back("valid");
+std::vector<Column> pose_columns(const Recording& r) {
+  return {{"x_mm", [&r](std::size_t row) { return r.T_robot_sensor[row].translation_mm.x; }},
+          {"y_mm", [&r](std::size_t row) { return r.T_robot_sensor[row].translation_mm.y; }},
+          {"theta_rad", [&r](std::size_t row) { return r.T_robot_sensor[row].theta_rad; }}};
+}
+
+std::vector<Column> array_columns(const Recording& r) {
+  std::vector<Column> columns{{"x_mm", [&r](std::size_t i) { return r.elements_mm[i].x; }},
+                              {"y_mm", [&r](std::size_t i) { return r.elements_mm[i].y; }}};
+  if (r.valid.size() == r.elements()) {
+    columns.push_back({"valid", [&r](std::size_t i) { return r.valid[i] != 0 ? 1.0 : 0.0; }});
   }
   if (!r.baseline.empty()) {
-    names.emplace_back("baseline");
+    columns.push_back({"baseline", [&r](std::size_t i) { return r.baseline[i]; }});
   }
-  auto table = std::make_unique<Table>(path, names);
-  for (std::size_t i = 0; i < r.elements(); ++i) {
-    table->add(r.elements_mm[i].x);
-    table->add(r.elements_mm[i].y);
-    if (has_valid) {
-      table->add(r.valid[i] != 0 ? 1.0 : 0.0);
-    }
-    if (!r.baseline.empty()) {
-      table->add(r.baseline[i]);
-    }
-    table->end_row();
-  }
-  return table;
+  return columns;
 }
 
 }  // namespace
@@ -143,15 +102,12 @@ void write_tables(const std::filesystem::path& folder, const Recording& recordin
            "dataset 'elements' changes from row to row, which tables cannot hold; read the file "
            "with h5py");
   }
-  std::vector<std::unique_ptr<Table>> tables;
-  tables.push_back(pressures_of(recording, folder / pressures_name));
-  tables.push_back(array_of(recording, folder / array_name));
-  tables.push_back(poses_of(recording, folder / poses_name));
-  for (const auto& table : tables) {
-    table->flush();
-  }
-  for (const auto& table : tables) {
-    table->commit();
+  const std::unique_ptr<AtomicFile> files[] = {
+      table_of(folder / pressures_name, pressure_columns(recording), recording.size()),
+      table_of(folder / array_name, array_columns(recording), recording.elements()),
+      table_of(folder / poses_name, pose_columns(recording), recording.size())};
+  for (const auto& file : files) {
+    file->commit();
   }
 }
 

@@ -1,14 +1,16 @@
 #include "palpate/scene.hpp"
 
+#include <algorithm>
 #include <array>
 #include <fstream>
 #include <numbers>
+#include <string>
 #include <utility>
 
 #include <fmt/format.h>
 
-#include "io/element_file.hpp"
 #include "io/input_file.hpp"
+#include "model/number_text.hpp"
 #include "palpate/lattice.hpp"
 #include "palpate/touch.hpp"
 #include "yaml/yaml_entry.hpp"
@@ -47,6 +49,31 @@ std::array<double, 2> read_angles_deg(const Entry& entry) {
 glm::dvec2 read_point(const Entry& entry) {
   const std::array<double, 2> xy = read_pair(entry, "give [x, y]");
   return {xy[0], xy[1]};
+}
+
+/// Reads the element centres of an array, in mm, from a text file: a line "x y" for each; '#'
+/// starts a comment.
+/// @throws Error naming the file and the line.
+std::vector<glm::dvec2> read_elements(const std::filesystem::path& path) {
+  require_readable(path);
+  std::ifstream file(path);
+  std::vector<glm::dvec2> elements;
+  std::string line;
+  for (int number = 1; std::getline(file, line); ++number) {
+    line.resize(std::min(line.find('#'), line.size()));
+    if (line.find_first_not_of(" \t\r\v\f") == std::string::npos) {
+      continue;
+    }
+    const auto xy = two_numbers_of(line);
+    if (!xy) {
+      refuse(path, "line {} is not a position; write 'x y' in mm", number);
+    }
+    elements.emplace_back((*xy)[0], (*xy)[1]);
+  }
+  if (elements.empty()) {
+    refuse(path, "holds no element; write a line 'x y' in mm for each");
+  }
+  return elements;
 }
 
 void read_array(const Entry& array, Scene& scene) {
@@ -148,10 +175,9 @@ void read_bins(const Entry& entry, Scene& scene) {
 Scene read_scene(const std::filesystem::path& path) {
   require_readable(path);
   Scene scene;
-  try {
-    const Entry root{path, "the scene", only_document(std::ifstream(path), path)};
+  read_document(std::ifstream(path), path, "the scene", [&](const Entry& root) {
     if (root.node.IsNull()) {
-      return scene;  // comments alone: everything is left out
+      return;  // comments alone: everything is left out
     }
     const auto number = [](std::optional<double>& key, bool (*fits)(double), const char* remedy) {
       return [&key, fits, remedy](const Entry& e) { key = e.number(fits, remedy); };
@@ -181,9 +207,7 @@ Scene read_scene(const std::filesystem::path& path) {
                                                         {"particles", "particles"}});
                 }},
                {"device", [&](const Entry& e) { scene.device = e.text(); }}});
-  } catch (const YAML::Exception& error) {
-    refuse(path, "line {}: {}; correct the YAML", line_of(error.mark), error.msg);
-  }
+  });
   return scene;
 }
 

@@ -113,35 +113,30 @@ LearnedFeatures read_learned_features(const Entry& entry) {
   return features;
 }
 
-Familiarity read_familiarity(const Entry& entry) {
-  Familiarity familiarity;
-  read_keys(entry,
-            {{"offset", [&](const Entry& e) { familiarity.offset = e.number(); }},
-             {"explained_slope", [&](const Entry& e) { familiarity.explained_slope = e.number(); }},
-             {"lead_slope", [&](const Entry& e) { familiarity.lead_slope = e.number(); }}});
-  return familiarity;
+/// Reads a section of numbers alone.
+void read_section(const Entry& entry, const std::vector<std::pair<const char*, double*>>& numbers) {
+  YamlKeys keys;
+  for (const auto& [key, value] : numbers) {
+    keys.emplace_back(key, [number = value](const Entry& e) { *number = e.number(); });
+  }
+  read_keys(entry, keys);
 }
 
-FitScale read_fit_scale(const Entry& entry) {
-  FitScale scale;
-  read_keys(entry, {{"mean", [&](const Entry& e) { scale.mean = e.number(); }},
-                    {"sd", [&](const Entry& e) { scale.sd = e.number(); }}});
-  return scale;
+YAML::Emitter& emit_key(YAML::Emitter& out, const char* key) {
+  return out << YAML::Key << key << YAML::Value;
 }
 
-DisplacementSd read_sd(const Entry& entry) {
-  DisplacementSd sd;
-  read_keys(entry, {{"mm", [&](const Entry& e) { sd.mm = e.number(); }},
-                    {"rad", [&](const Entry& e) { sd.rad = e.number(); }}});
-  return sd;
+void emit(YAML::Emitter& out, const char* key, double number) {
+  emit_key(out, key) << fmt::format("{:.10g}", number);
 }
 
-BinSteps read_steps(const Entry& entry) {
-  BinSteps steps;
-  read_keys(entry, {{"x_mm", [&](const Entry& e) { steps.x_mm = e.number(); }},
-                    {"y_mm", [&](const Entry& e) { steps.y_mm = e.number(); }},
-                    {"theta_rad", [&](const Entry& e) { steps.theta_rad = e.number(); }}});
-  return steps;
+void emit_section(YAML::Emitter& out, const char* key,
+                  const std::vector<std::pair<const char*, double>>& numbers) {
+  emit_key(out, key) << YAML::Flow << YAML::BeginMap;
+  for (const auto& [name, number] : numbers) {
+    emit(out, name, number);
+  }
+  out << YAML::EndMap;
 }
 
 void emit(YAML::Emitter& out, const std::vector<double>& numbers) {
@@ -162,56 +157,52 @@ void emit_levels(YAML::Emitter& out, const std::vector<double>& numbers) {
 }
 
 void emit(YAML::Emitter& out, const FeatureDistribution& distribution) {
-  out << YAML::Flow << YAML::BeginMap << YAML::Key << "mean" << YAML::Value;
+  out << YAML::Flow << YAML::BeginMap;
+  emit_key(out, "mean");
   emit(out, {distribution.mean.begin(), distribution.mean.end()});
-  out << YAML::Key << "sd" << YAML::Value;
+  emit_key(out, "sd");
   emit(out, {distribution.sd.begin(), distribution.sd.end()});
-  out << YAML::Key << "correlation" << YAML::Value;
+  emit_key(out, "correlation");
   emit(out, {distribution.correlation.begin(), distribution.correlation.end()});
   out << YAML::EndMap;
 }
 
-void emit_table(YAML::Emitter& out, const LearnedTable& table) {
-  const auto key = [&](const char* name) -> YAML::Emitter& {
-    return out << YAML::Key << name << YAML::Value;
-  };
-  const auto number = [&](const char* name, double value) {
-    key(name) << fmt::format("{:.10g}", value);
-  };
-  key("table") << YAML::BeginMap;
-  key("layer") << (table.layer.of == MapLayer::log_odds ? "log_odds" : "mean_level");
-  number("near_mm", table.layer.near_mm);
-  number("far_mm", table.layer.far_mm);
-  number("unit_level", table.layer.unit_level);
-  number("full_level", table.layer.full_level);
-  key("level_edges");
-  emit(out, table.level_edges);
-  key("all");
-  emit_levels(out, table.shared);
-  if (!table.objects.empty()) {
-    key("objects") << YAML::BeginMap;
-    for (const auto& [label, numbers] : table.objects) {
-      out << YAML::Key << YAML::DoubleQuoted << label << YAML::Value;
-      emit_levels(out, numbers);
-    }
-    out << YAML::EndMap;
+/// Emits what every label of a map has; nothing without a label.
+template <typename Value, typename Emit>
+void emit_by_label(YAML::Emitter& out, const std::map<std::string, Value>& values,
+                   const Emit& emit_value) {
+  if (values.empty()) {
+    return;
+  }
+  emit_key(out, "objects") << YAML::BeginMap;
+  for (const auto& [label, value] : values) {
+    out << YAML::Key << YAML::DoubleQuoted << label << YAML::Value;
+    emit_value(value);
   }
   out << YAML::EndMap;
 }
 
+void emit_table(YAML::Emitter& out, const LearnedTable& table) {
+  emit_key(out, "table") << YAML::BeginMap;
+  emit_key(out, "layer") << (table.layer.of == MapLayer::log_odds ? "log_odds" : "mean_level");
+  emit(out, "near_mm", table.layer.near_mm);
+  emit(out, "far_mm", table.layer.far_mm);
+  emit(out, "unit_level", table.layer.unit_level);
+  emit(out, "full_level", table.layer.full_level);
+  emit_key(out, "level_edges");
+  emit(out, table.level_edges);
+  emit_key(out, "all");
+  emit_levels(out, table.shared);
+  emit_by_label(out, table.objects, [&](const auto& numbers) { emit_levels(out, numbers); });
+  out << YAML::EndMap;
+}
+
 void emit_features(YAML::Emitter& out, const LearnedFeatures& features) {
-  out << YAML::Key << "features" << YAML::Value << YAML::BeginMap << YAML::Key << "weight"
-      << YAML::Value << fmt::format("{:.10g}", features.weight) << YAML::Key << "any"
-      << YAML::Value;
+  emit_key(out, "features") << YAML::BeginMap;
+  emit(out, "weight", features.weight);
+  emit_key(out, "any");
   emit(out, features.any);
-  if (!features.objects.empty()) {
-    out << YAML::Key << "objects" << YAML::Value << YAML::BeginMap;
-    for (const auto& [label, own] : features.objects) {
-      out << YAML::Key << YAML::DoubleQuoted << label << YAML::Value;
-      emit(out, own);
-    }
-    out << YAML::EndMap;
-  }
+  emit_by_label(out, features.objects, [&](const auto& own) { emit(out, own); });
   out << YAML::EndMap;
 }
 
@@ -221,44 +212,59 @@ LearnedSensor read_sensor_model(const std::filesystem::path& path) {
   require_readable(path);
   LearnedSensor sensor;
   bool has_format = false;
-  try {
-    const Entry root{path, "the sensor model", only_document(std::ifstream(path), path)};
+  read_document(std::ifstream(path), path, "the sensor model", [&](const Entry& root) {
     const auto number = [](double& value) {
       return [&value](const Entry& e) { value = e.number(); };
     };
-    read_keys(root,
-              {{"format",
-                [&](const Entry& e) {
-                  has_format = e.text() == file_format;
-                  if (!has_format) {
-                    e.refuse(fmt::format("give {}, as palpate calibrate writes it", file_format));
-                  }
-                }},
-               {"version",
-                [&](const Entry& e) {
-                  if (e.integer(1) > 1) {
-                    e.refuse("this palpate reads version 1; update palpate");
-                  }
-                }},
-               {"pressure_unit", [&](const Entry& e) { sensor.pressure_unit = e.text(); }},
-               {"noise", number(sensor.noise)},
-               {"threshold", number(sensor.classifier.threshold)},
-               {"ratio", number(sensor.classifier.ratio)},
-               {"gamma", number(sensor.gamma)},
-               {"prior", number(sensor.prior)},
-               {"psf_mm", [&](const Entry& e) { sensor.psf_mm = e.number(); }},
-               {"spread_mm", number(sensor.spread_mm)},
-               {"touch_sd", [&](const Entry& e) { sensor.touch_sd = read_sd(e); }},
-               {"temperature", number(sensor.temperature)},
-               {"temperature_growth", number(sensor.temperature_growth)},
-               {"bins", [&](const Entry& e) { sensor.bins = read_steps(e); }},
-               {"table", [&](const Entry& e) { sensor.table = read_table(e); }},
-               {"features", [&](const Entry& e) { sensor.features = read_learned_features(e); }},
-               {"familiarity", [&](const Entry& e) { sensor.familiarity = read_familiarity(e); }},
-               {"fit_scale", [&](const Entry& e) { sensor.fit_scale = read_fit_scale(e); }}});
-  } catch (const YAML::Exception& error) {
-    refuse(path, "line {}: {}; correct the YAML", line_of(error.mark), error.msg);
-  }
+    read_keys(
+        root,
+        {{"format",
+          [&](const Entry& e) {
+            has_format = e.text() == file_format;
+            if (!has_format) {
+              e.refuse(fmt::format("give {}, as palpate calibrate writes it", file_format));
+            }
+          }},
+         {"version",
+          [&](const Entry& e) {
+            if (e.integer(1) > 1) {
+              e.refuse("this palpate reads version 1; update palpate");
+            }
+          }},
+         {"pressure_unit", [&](const Entry& e) { sensor.pressure_unit = e.text(); }},
+         {"noise", number(sensor.noise)},
+         {"threshold", number(sensor.classifier.threshold)},
+         {"ratio", number(sensor.classifier.ratio)},
+         {"gamma", number(sensor.gamma)},
+         {"prior", number(sensor.prior)},
+         {"psf_mm", [&](const Entry& e) { sensor.psf_mm = e.number(); }},
+         {"spread_mm", number(sensor.spread_mm)},
+         {"touch_sd",
+          [&](const Entry& e) {
+            read_section(e, {{"mm", &sensor.touch_sd.mm}, {"rad", &sensor.touch_sd.rad}});
+          }},
+         {"temperature", number(sensor.temperature)},
+         {"temperature_growth", number(sensor.temperature_growth)},
+         {"bins",
+          [&](const Entry& e) {
+            BinSteps& steps = sensor.bins.emplace();
+            read_section(
+                e, {{"x_mm", &steps.x_mm}, {"y_mm", &steps.y_mm}, {"theta_rad", &steps.theta_rad}});
+          }},
+         {"table", [&](const Entry& e) { sensor.table = read_table(e); }},
+         {"features", [&](const Entry& e) { sensor.features = read_learned_features(e); }},
+         {"familiarity",
+          [&](const Entry& e) {
+            Familiarity& familiarity = sensor.familiarity.emplace();
+            read_section(e, {{"offset", &familiarity.offset},
+                             {"explained_slope", &familiarity.explained_slope},
+                             {"lead_slope", &familiarity.lead_slope}});
+          }},
+         {"fit_scale", [&](const Entry& e) {
+            FitScale& scale = sensor.fit_scale.emplace();
+            read_section(e, {{"mean", &scale.mean}, {"sd", &scale.sd}});
+          }}});
+  });
   if (!has_format) {
     refuse(path, "key 'format' is missing: not a sensor model; make one with palpate calibrate");
   }
@@ -273,54 +279,38 @@ LearnedSensor read_sensor_model(const std::filesystem::path& path) {
 void write_sensor_model(const std::filesystem::path& path, const LearnedSensor& sensor) {
   sensor.validate();
   YAML::Emitter out;
-  const auto key = [&](const char* name) -> YAML::Emitter& {
-    return out << YAML::Key << name << YAML::Value;
-  };
-  const auto number = [&](const char* name, double value) {
-    key(name) << fmt::format("{:.10g}", value);
-  };
   out << YAML::BeginMap;
-  key("format") << file_format;
-  key("version") << 1;
-  key("pressure_unit") << sensor.pressure_unit;
-  number("noise", sensor.noise);
-  number("threshold", sensor.classifier.threshold);
-  number("ratio", sensor.classifier.ratio);
-  number("gamma", sensor.gamma);
-  number("prior", sensor.prior);
+  emit_key(out, "format") << file_format;
+  emit_key(out, "version") << 1;
+  emit_key(out, "pressure_unit") << sensor.pressure_unit;
+  emit(out, "noise", sensor.noise);
+  emit(out, "threshold", sensor.classifier.threshold);
+  emit(out, "ratio", sensor.classifier.ratio);
+  emit(out, "gamma", sensor.gamma);
+  emit(out, "prior", sensor.prior);
   if (sensor.psf_mm) {
-    number("psf_mm", *sensor.psf_mm);
+    emit(out, "psf_mm", *sensor.psf_mm);
   }
-  number("spread_mm", sensor.spread_mm);
+  emit(out, "spread_mm", sensor.spread_mm);
   if (!sensor.touch_sd.none()) {
-    key("touch_sd") << YAML::Flow << YAML::BeginMap;
-    number("mm", sensor.touch_sd.mm);
-    number("rad", sensor.touch_sd.rad);
-    out << YAML::EndMap;
+    emit_section(out, "touch_sd", {{"mm", sensor.touch_sd.mm}, {"rad", sensor.touch_sd.rad}});
   }
-  number("temperature", sensor.temperature);
+  emit(out, "temperature", sensor.temperature);
   if (sensor.temperature_growth > 0.0) {
-    number("temperature_growth", sensor.temperature_growth);
+    emit(out, "temperature_growth", sensor.temperature_growth);
   }
-  if (sensor.bins) {
-    key("bins") << YAML::Flow << YAML::BeginMap;
-    number("x_mm", sensor.bins->x_mm);
-    number("y_mm", sensor.bins->y_mm);
-    number("theta_rad", sensor.bins->theta_rad);
-    out << YAML::EndMap;
+  if (const auto& steps = sensor.bins) {
+    emit_section(out, "bins",
+                 {{"x_mm", steps->x_mm}, {"y_mm", steps->y_mm}, {"theta_rad", steps->theta_rad}});
   }
-  if (sensor.familiarity) {
-    key("familiarity") << YAML::Flow << YAML::BeginMap;
-    number("offset", sensor.familiarity->offset);
-    number("explained_slope", sensor.familiarity->explained_slope);
-    number("lead_slope", sensor.familiarity->lead_slope);
-    out << YAML::EndMap;
+  if (const auto& familiarity = sensor.familiarity) {
+    emit_section(out, "familiarity",
+                 {{"offset", familiarity->offset},
+                  {"explained_slope", familiarity->explained_slope},
+                  {"lead_slope", familiarity->lead_slope}});
   }
-  if (sensor.fit_scale) {
-    key("fit_scale") << YAML::Flow << YAML::BeginMap;
-    number("mean", sensor.fit_scale->mean);
-    number("sd", sensor.fit_scale->sd);
-    out << YAML::EndMap;
+  if (const auto& scale = sensor.fit_scale) {
+    emit_section(out, "fit_scale", {{"mean", scale->mean}, {"sd", scale->sd}});
   }
   if (sensor.features) {
     emit_features(out, *sensor.features);

@@ -28,7 +28,7 @@ inline constexpr std::array<Unit, 4> time_units{
 inline constexpr std::array<Unit, 2> length_units{{{"mm"}, {"m", 1e3, 1.0}}};
 inline constexpr std::array<Unit, 2> angle_units{{{"rad"}, {"deg", std::numbers::pi, 180.0}}};
 
-/// What the command line says about the columns and units of tables.
+/// What the options say about the columns and units of tables.
 struct TableOptions {
   std::string time_column;                  ///< "": the usual names
   std::string pressure_columns;             ///< prefix or FIRST:LAST; "": all that are left
@@ -55,7 +55,7 @@ struct Quantity {
 
 /// Finds the column of this name or, where it is "", of a usual name. A name may end with its unit,
 /// such as time_ms. None where there is no such column.
-/// @throws Error where the column's name and the command line give different units
+/// @throws Error where the column's name and `unit` differ
 std::optional<UnitColumn> find_column(const CsvTable& table, const Quantity& quantity,
                                       const std::string& name, const std::optional<Unit>& unit);
 

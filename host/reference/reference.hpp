@@ -165,7 +165,7 @@ bool overlaps(const Touch& touch, const Pose& T_object_robot, const OccupancyGri
 /// Log evidence of "none of these" without its weight: log s + the sum over touches of the log of
 /// the touch's mean likelihood, over the hypotheses by prior weight and over the bins at which the
 /// array overlaps the object. s is the share of such bins at the first touch with a known element.
-/// Where a touch has no such bin all bins count.
+/// All bins count where a touch has no such bin.
 /// @param log_likelihood [touch][object][bin], averaged where touches are uncertain
 double none_log_evidence(std::span<const Touch> touches, const PoseLattice& lattice,
                          std::span<const Hypothesis> hypotheses,

@@ -1,23 +1,141 @@
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <fstream>
+#include <map>
 #include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include <fmt/format.h>
+#include <glm/trigonometric.hpp>
 
+#include "model/bounding_box.hpp"
 #include "model/number_text.hpp"
 #include "model/printable.hpp"
 #include "palpate/error.hpp"
 #include "palpate/simulation.hpp"
-#include "simulation/glyphs.hpp"
 #include "simulation/spans.hpp"
 
 namespace palpate {
 
 namespace {
+
+/// Returns the strokes of 'A'..'Z' or '0'..'9', 25 mm high and 4.5 mm wide, with the glyph's
+/// bounding box centred on the origin; none for any other character.
+std::vector<Shape::Stroke> glyph_strokes(char character);
+
+/// Returns an elliptical arc as a polyline, counter-clockwise where to_deg > from_deg.
+std::vector<glm::dvec2> arc(const glm::dvec2& centre_mm, const glm::dvec2& radii_mm,
+                            double from_deg, double to_deg);
+
+constexpr double width_mm = 4.5;
+/// Half the height between the centre lines of the top and the bottom stroke.
+constexpr double h = (25.0 - width_mm) / 2.0;
+
+/// A piece of a centre line: a point, or with radii an elliptical arc around it. In mm.
+struct Piece {
+  double x;
+  double y;
+  double rx = 0.0;
+  double ry = 0.0;
+  double from_deg = 0.0;
+  double to_deg = 0.0;
+};
+using CentreLine = std::vector<Piece>;
+
+// Bold capitals as in a child's alphabet. No glyph is a rotated copy of another: W has slanted
+// sides where M has upright ones, 9 has a straight stem where 6 is curved, 0 is narrower than O, 1
+// has a flag and a base. Absolute x does not matter, as glyph_strokes() centres each glyph.
+// clang-format off
+const std::map<char, std::vector<CentreLine>> centre_lines = {
+    {'A', {{{-8.5, -h}, {0, h}, {8.5, -h}}, {{-6, -4.5}, {6, -4.5}}}},
+    {'B', {{{-6, 0}, {-6, h}, {0.5, h}, {0.5, 5.125, 5.125, 5.125, 90, -90}, {-6, 0}},
+           {{-6, 0}, {-6, -h}, {1.5, -h}, {1.5, -5.125, 5.125, 5.125, -90, 90}}}},
+    {'C', {{{0, 0, h, h, 48, 312}}}},
+    {'D', {{{-7.5, -h}, {-7.5, h}, {-2, h}, {-2, 0, h, h, 90, -90}, {-7.5, -h}}}},
+    {'E', {{{6.5, h}, {-6.5, h}, {-6.5, -h}, {6.5, -h}}, {{-6.5, 0}, {4.5, 0}}}},
+    {'F', {{{6.5, h}, {-6.5, h}, {-6.5, -h}}, {{-6.5, 0}, {4.5, 0}}}},
+    {'G', {{{0, 0, h, h, 48, 360}, {3, 0}}}},
+    {'H', {{{-7, -h}, {-7, h}}, {{7, -h}, {7, h}}, {{-7, 0}, {7, 0}}}},
+    {'I', {{{0, -h}, {0, h}}}},
+    {'J', {{{5, h}, {5, -4.5}, {-1, -4.5, 6, 5.75, 0, -165}}}},
+    {'K', {{{-6, -h}, {-6, h}}, {{7, h}, {-6, -1.5}}, {{-1.5, 2.57}, {7.5, -h}}}},
+    {'L', {{{-6, h}, {-6, -h}, {6, -h}}}},
+    {'M', {{{-9, -h}, {-9, h}, {0, -4}, {9, h}, {9, -h}}}},
+    {'N', {{{-7.5, -h}, {-7.5, h}, {7.5, -h}, {7.5, h}}}},
+    {'O', {{{0, 0, h, h, 0, 360}}}},
+    {'P', {{{-6, -h}, {-6, h}, {0.5, h}, {0.5, 4.75, 5.5, 5.5, 90, -90}, {-6, -0.75}}}},
+    {'Q', {{{0, 0, h, h, 0, 360}}, {{3, -3}, {10, -10}}}},
+    {'R', {{{-6, -h}, {-6, h}, {0.5, h}, {0.5, 4.75, 5.5, 5.5, 90, -90}, {-6, -0.75}},
+           {{0, -0.75}, {7, -h}}}},
+    {'S', {{{0, 5.125, 6.5, 5.125, 25, 270}, {0, -5.125, 6.5, 5.125, 90, -155}}}},
+    {'T', {{{-8.5, h}, {8.5, h}}, {{0, h}, {0, -h}}}},
+    {'U', {{{-7.5, h}, {0, -2.75, 7.5, 7.5, 180, 360}, {7.5, h}}}},
+    {'V', {{{-8.5, h}, {0, -h}, {8.5, h}}}},
+    {'W', {{{-h, h}, {-5.5, -h}, {0, 5}, {5.5, -h}, {h, h}}}},
+    {'X', {{{-8, -h}, {8, h}}, {{-8, h}, {8, -h}}}},
+    {'Y', {{{-8.5, h}, {0, -0.5}, {8.5, h}}, {{0, -0.5}, {0, -h}}}},
+    {'Z', {{{-7, h}, {7, h}, {-7, -h}, {7, -h}}}},
+    {'0', {{{0, 0, 6.75, h, 0, 360}}}},
+    {'1', {{{-5, 6}, {0, h}, {0, -h}}, {{-5, -h}, {5, -h}}}},
+    {'2', {{{0, 4.25, 6, 6, 165, -40}, {-6.5, -h}, {6.5, -h}}}},
+    {'3', {{{0, 5.25, 5.5, 5, 155, -90}, {0, -5, 6.5, 5.25, 90, -155}}}},
+    {'4', {{{3, -h}, {3, h}, {-7.5, -4.5}, {7.5, -4.5}}}},
+    {'5', {{{5.5, h}, {-4.5, h}, {-0.25, -3.9, 6.35, 6.35, 140, -150}}}},
+    {'6', {{{0, -4, 6.25, 6.25, 0, 360}}, {{4.75, -4, 11, 14.25, 180, 90}}}},
+    {'7', {{{-7, h}, {7, h}, {-2.5, -h}}}},
+    {'8', {{{0, 5.25, 5.4, 5, 0, 360}}, {{0, -5, 6.6, 5.25, 0, 360}}}},
+    {'9', {{{0, 4, 6.25, 6.25, 0, 360}}, {{6.25, 4}, {6.25, -h}}}},
+};
+// clang-format on
+
+/// Moves the middle of the bounding box to the origin.
+void centre(std::vector<Shape::Stroke>& strokes) {
+  BoundingBox box;
+  for (const Shape::Stroke& stroke : strokes) {
+    for (const glm::dvec2& p : stroke.points_mm) {
+      box.take_in(p);
+    }
+  }
+  for (Shape::Stroke& stroke : strokes) {
+    for (glm::dvec2& p : stroke.points_mm) {
+      p -= box.middle();
+    }
+  }
+}
+
+std::vector<glm::dvec2> arc(const glm::dvec2& centre_mm, const glm::dvec2& radii_mm,
+                            double from_deg, double to_deg) {
+  // Chords of 2 degrees lie within 0.002 mm of the largest glyph's circle.
+  const int chords = static_cast<int>(std::ceil(std::abs(to_deg - from_deg) / 2.0));
+  std::vector<glm::dvec2> points;
+  for (int k = 0; k <= chords; ++k) {
+    const double a = glm::radians(from_deg + (to_deg - from_deg) * k / std::max(chords, 1));
+    points.push_back(centre_mm + radii_mm * glm::dvec2(std::cos(a), std::sin(a)));
+  }
+  return points;
+}
+
+std::vector<Shape::Stroke> glyph_strokes(char character) {
+  const auto glyph = centre_lines.find(character);
+  if (glyph == centre_lines.end()) {
+    return {};
+  }
+  std::vector<Shape::Stroke> strokes;
+  for (const CentreLine& line : glyph->second) {
+    Shape::Stroke& stroke =
+        strokes.emplace_back(Shape::Stroke{.points_mm = {}, .width_mm = width_mm});
+    for (const Piece& piece : line) {
+      const std::vector<glm::dvec2> points =
+          arc({piece.x, piece.y}, {piece.rx, piece.ry}, piece.from_deg, piece.to_deg);
+      stroke.points_mm.insert(stroke.points_mm.end(), points.begin(), points.end());
+    }
+  }
+  centre(strokes);
+  return strokes;
+}
 
 [[noreturn]] void refuse(const std::filesystem::path& path, int line, const std::string& why) {
   throw Error(Fault::input, fmt::format("{}:{}: {}", path.string(), line, why));

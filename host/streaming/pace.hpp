@@ -1,7 +1,9 @@
 #pragma once
 
+#include <algorithm>
 #include <chrono>
 #include <optional>
+#include <thread>
 
 namespace palpate {
 
@@ -13,16 +15,40 @@ class Pace {
   explicit Pace(std::optional<double> speed) : speed_(speed) {}
 
   /// Starts the stream now, at `stream_s` of its own time.
-  void start(double stream_s);
+  void start(double stream_s) {
+    last_s_ = stream_s;
+    elapsed_s_ = 0.0;
+    start_ = Clock::now();
+  }
+
   /// Waits until a frame of time `stream_s` is due, at most for `timeout`. Returns false where it
   /// is not yet due: ask again.
-  bool wait(double stream_s, std::chrono::milliseconds timeout);
+  bool wait(double stream_s, std::chrono::milliseconds timeout) {
+    if (!speed_) {
+      return true;
+    }
+    const double elapsed_s = elapsed_s_ + std::max(0.0, stream_s - last_s_);
+    const std::chrono::duration<double> from_start(elapsed_s / *speed_);
+    const std::chrono::duration<double> left = from_start - (Clock::now() - start_);
+    if (left > timeout) {
+      std::this_thread::sleep_for(timeout);
+      return false;
+    }
+    if (left.count() > 0.0) {
+      std::this_thread::sleep_for(left);
+    }
+    last_s_ = stream_s;
+    elapsed_s_ = elapsed_s;
+    return true;
+  }
 
  private:
+  using Clock = std::chrono::steady_clock;
+
   std::optional<double> speed_;
   double last_s_ = 0.0;     ///< time of the last frame that was due
   double elapsed_s_ = 0.0;  ///< stream time up to that frame
-  std::chrono::steady_clock::time_point start_;
+  Clock::time_point start_;
 };
 
 }  // namespace palpate

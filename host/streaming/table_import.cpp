@@ -10,7 +10,6 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include "io/array_table.hpp"
 #include "io/file_identity.hpp"
 #include "io/npy_file.hpp"
 #include "io/pose_table.hpp"
@@ -23,7 +22,7 @@ namespace palpate {
 
 namespace {
 
-/// The array of --array: a grid, or a file.
+/// The array of `array`: a grid, or a file.
 struct Array : ArrayTable {
   std::size_t columns = 0;  ///< 0: not a grid
   std::size_t rows = 0;
@@ -55,7 +54,7 @@ TableOptions table_options(const ImportOptions& options) {
   if (!options.time_unit.empty()) {
     table.time_unit = unit_named(time_units, options.time_unit);
     if (!table.time_unit) {
-      refuse(fmt::format("--time-unit {}", options.time_unit), "give s, ms, us or ns");
+      refuse(fmt::format("`time-unit {}`", options.time_unit), "give s, ms, us or ns");
     }
   }
   if (!options.pose_unit.empty()) {
@@ -63,14 +62,14 @@ TableOptions table_options(const ImportOptions& options) {
     table.length_unit = names.empty() ? std::nullopt : unit_named(length_units, names[0]);
     table.angle_unit = names.empty() ? std::nullopt : unit_named(angle_units, names[1]);
     if (!table.length_unit || !table.angle_unit) {
-      refuse(fmt::format("--pose-unit {}", options.pose_unit),
+      refuse(fmt::format("`pose-unit {}`", options.pose_unit),
              "give mm,rad or mm,deg or m,rad or m,deg");
     }
   }
   if (!options.pose_columns.empty()) {
     const auto names = split_last(options.pose_columns, ',', 3);
     if (names.empty()) {
-      refuse(fmt::format("--pose-columns {}", options.pose_columns), "give three names, X,Y,THETA");
+      refuse(fmt::format("`pose-columns {}`", options.pose_columns), "give three names, X,Y,THETA");
     }
     std::ranges::copy(names, table.pose_columns.begin());
   }
@@ -88,7 +87,7 @@ Array array_of(const std::string& text) {
   const auto pitch_mm = number_of(parts[2]);
   if (*columns < 1 || *columns > most || !rows || *rows < 1 || *rows > most || !pitch_mm ||
       *pitch_mm < 1e-3 || *pitch_mm > 1e3) {
-    refuse(fmt::format("--array {}", text),
+    refuse(fmt::format("`array {}`", text),
            "give COLUMNS:ROWS:PITCH, with 1 to {} columns and rows and a pitch of 0.001 to "
            "1000 mm, or a file",
            most);
@@ -108,7 +107,7 @@ PressureTable read_npy_pressures(const std::string& path, const Array& array) {
                     (shape.size() == 3 && shape[1] * shape[2] == elements &&
                      (array.columns == 0 || shape[2] == array.columns));
   if (!fits || shape[0] == 0) {
-    refuse(path, "has the shape ({}); save [n, {}]{}, n at least 1, or correct --array",
+    refuse(path, "has the shape ({}); save [n, {}]{}, n at least 1, or correct `array`",
            fmt::format("{}", fmt::join(shape, ", ")), elements,
            array.columns == 0 ? "" : fmt::format(" or [n, {}, {}]", array.rows, array.columns));
   }
@@ -194,7 +193,7 @@ void join_by_time(const PoseTable& poses, ImportedRecording& imported) {
   }
 }
 
-/// True where --poses is the table of the pressures, under this or another path.
+/// True where `poses` is the table of the pressures, under this or another path.
 bool in_one_file(const ImportOptions& options) {
   return identity_of(std::filesystem::path(options.poses)) ==
          identity_of(std::filesystem::path(options.pressures));
@@ -208,7 +207,7 @@ void join(PoseTable poses, const ImportOptions& options, ImportedRecording& impo
   if (!same_rows && recording.time_s.empty()) {
     refuse(options.poses,
            "has times, {} has none; give both a column 'time' or neither, or give the frames' "
-           "--rate",
+           "`rate`",
            options.pressures);
   }
   if (!same_rows) {
@@ -221,7 +220,7 @@ void join(PoseTable poses, const ImportOptions& options, ImportedRecording& impo
     if (std::ranges::none_of(recording.T_robot_sensor, is_finite)) {
       refuse(options.poses,
              "no row of {} finds a pose: its times are {} to {} s, the poses' are {} to {} s; "
-             "check clocks and units, or raise --largest-gap-s",
+             "check clocks and units, or raise `largest-gap-s`",
              options.pressures, recording.time_s.front(), recording.time_s.back(),
              poses.time_s.front(), poses.time_s.back());
     }
@@ -247,15 +246,15 @@ void require_touch_poses(const ImportOptions& options, const ImportedRecording& 
   const Recording& recording = imported.recording;
   if (options.poses.empty()) {
     refuse(options.pressures,
-           "its rows are touches, and each needs a pose; give --poses{}, or --unposed where the "
-           "poses are unknown, or for a stream of frames a column 'time' or --rate",
+           "its rows are touches, and each needs a pose; give `poses{}`, or `unposed` where the "
+           "poses are unknown, or for a stream of frames a column 'time' or `rate`",
            imported.holds_poses ? " " + options.pressures : "");
   }
   for (std::size_t i = 0; i < recording.size(); ++i) {
     if (!is_finite(recording.T_robot_sensor[i])) {
       refuse(options.poses,
              "has no pose for row {} of {}, counted from 0{}, and a touch needs one; add it, or "
-             "give --rows frames",
+             "give `rows frames`",
              i, options.pressures,
              recording.time_s.empty() ? "" : fmt::format(", at {} s", recording.time_s[i]));
     }
@@ -271,7 +270,7 @@ void choose_rows(const ImportOptions& options, Recording& recording) {
   const std::size_t n = recording.pressure.size() / recording.elements_mm.size();
   if (options.rate_hz) {
     if (!recording.time_s.empty()) {
-      refuse(fmt::format("--rate {}", *options.rate_hz), "{} has times; leave the flag out",
+      refuse(fmt::format("`rate {}`", *options.rate_hz), "{} has times; leave the flag out",
              options.pressures);
     }
     for (std::size_t i = 0; i < n; ++i) {
@@ -283,34 +282,34 @@ void choose_rows(const ImportOptions& options, Recording& recording) {
     return;
   }
   if (options.rows != "touches" && options.rows != "frames") {
-    refuse(fmt::format("--rows {}", options.rows), "give frames or touches");
+    refuse(fmt::format("`rows {}`", options.rows), "give frames or touches");
   }
   if (options.rows == "frames" && recording.time_s.empty()) {
-    refuse(options.pressures, "frames need times; add a column 'time', or give --rate");
+    refuse(options.pressures, "frames need times; add a column 'time', or give `rate`");
   }
   recording.rows = options.rows;
 }
 
-/// The label and the pose of --truth, whose numbers are still in the units of the tables.
+/// The label and the pose of `truth`, whose numbers are still in the units of the tables.
 Truth truth_of(const std::string& text) {
   const auto parts = split_last(text, ',', 4);
   std::array<std::optional<double>, 3> pose;
   for (std::size_t i = 0; i < 3; ++i) {
     pose[i] = parts.empty() || parts[0].empty() ? std::nullopt : number_of(parts[i + 1]);
     if (!pose[i]) {
-      refuse(fmt::format("--truth {}", text), "give LABEL,X,Y,THETA, in the units of the poses");
+      refuse(fmt::format("`truth {}`", text), "give LABEL,X,Y,THETA, in the units of the poses");
     }
   }
   return {parts[0], {{*pose[0], *pose[1]}, *pose[2]}};
 }
 
-/// The pose of --truth in mm and rad.
+/// The pose of `truth` in mm and rad.
 Pose truth_pose(const std::string& text, const Pose& in_units, const std::array<Unit, 3>& units) {
   const Pose pose{
       {units[0].convert(in_units.translation_mm.x), units[1].convert(in_units.translation_mm.y)},
       units[2].convert(in_units.theta_rad)};
   if (!is_robot_pose(pose)) {
-    refuse(fmt::format("--truth {}", text),
+    refuse(fmt::format("`truth {}`", text),
            "is further than {:g} mm or turned by more than 1e9 rad; check the numbers and "
            "their units, {}, {} and {}",
            farthest_mm, units[0].name, units[1].name, units[2].name);
@@ -321,18 +320,18 @@ Pose truth_pose(const std::string& text, const Pose& in_units, const std::array<
 void check_numbers(const ImportOptions& options) {
   if (options.largest_gap_s &&
       !(*options.largest_gap_s > 0.0 && std::isfinite(*options.largest_gap_s))) {
-    refuse(fmt::format("--largest-gap-s {}", *options.largest_gap_s), "must be above 0");
+    refuse(fmt::format("`largest-gap-s {}`", *options.largest_gap_s), "must be above 0");
   }
   constexpr double slowest_hz = 1e-3;
   constexpr double fastest_hz = 1e6;
   if (options.rate_hz && !(*options.rate_hz >= slowest_hz && *options.rate_hz <= fastest_hz)) {
-    refuse(fmt::format("--rate {}", *options.rate_hz), "give {} to {} Hz", slowest_hz, fastest_hz);
+    refuse(fmt::format("`rate {}`", *options.rate_hz), "give {} to {} Hz", slowest_hz, fastest_hz);
   }
   if (options.pressure_unit != "kPa" && options.pressure_unit != "raw") {
-    refuse(fmt::format("--pressure-unit {}", options.pressure_unit), "give kPa or raw");
+    refuse(fmt::format("`pressure-unit {}`", options.pressure_unit), "give kPa or raw");
   }
   if (options.unposed && !options.poses.empty()) {
-    refuse("--unposed", "{} holds the poses; leave one of the flags out", options.poses);
+    refuse("`unposed`", "{} holds the poses; leave one of the flags out", options.poses);
   }
 }
 
@@ -349,7 +348,7 @@ ImportedRecording import_tables(const ImportOptions& options) {
   }
   if (!options.time_column.empty() && !has_column(options.pressures, options.time_column) &&
       !has_column(options.poses, options.time_column)) {
-    refuse(fmt::format("--time-column {}", options.time_column),
+    refuse(fmt::format("`time-column {}`", options.time_column),
            "no table has this column; give its name");
   }
   PressureTable pressures =

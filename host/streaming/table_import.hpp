@@ -12,7 +12,7 @@
 
 namespace palpate {
 
-/// The tables of 'palpate import', and what they hold; texts are as its flags have them, "" where
+/// The tables of 'palpate import', and what they hold; texts are as its options have them, "" where
 /// one is not given.
 struct ImportOptions {
   std::string pressures;
@@ -44,7 +44,7 @@ struct ImportedRecording {
 };
 
 /// Reads the pressures and the poses and joins them.
-/// @throws Error, naming the flag and its value, or file and line or row, where the tables do not
+/// @throws Error, naming the option and its value, or file and line or row, where the tables do not
 /// make a recording
 ImportedRecording import_tables(const ImportOptions& options);
 

@@ -4,22 +4,127 @@
 #include <array>
 #include <charconv>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <numbers>
+#include <optional>
 #include <span>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include "model/lost_count.hpp"
+#include "model/stream_time.hpp"
 #include "palpate/error.hpp"
+#include "palpate/files.hpp"
+#include "palpate/sensor.hpp"
 #include "palpate/simulation.hpp"
-#include "streaming/replayed_sensor.hpp"
+#include "palpate/touch.hpp"
+#include "streaming/pace.hpp"
 #include "streaming/simulated_sensor.hpp"
 
 namespace palpate {
 
 namespace {
+
+/// Plays a recording of frames: see open_virtual_sensor().
+class ReplayedSensor : public Sensor {
+ public:
+  /// @throws Error where the file is no recording of frames with times
+  ReplayedSensor(const std::string& path, std::optional<double> speed)
+      : recording_(read_recording(path)), pace_(speed) {
+    const auto refuse = [&](const char* message) {
+      throw Error(Fault::input, fmt::format("{}: {}", path, message));
+    };
+    const Recording& r = recording_;
+    if (r.rows != "frames") {
+      refuse(
+          "attribute 'rows' = 'touches' means single readings; give a stream of frames, or "
+          "recognise "
+          "the touches: palpate recognize");
+    }
+    if (r.time_s.empty()) {
+      refuse("dataset 'time' is missing; a replay needs the times of the frames");
+    }
+    const std::size_t e = r.elements();
+    if (r.elements_mm.size() != e) {
+      refuse("dataset 'elements' changes from frame to frame; record each array to its own file");
+    }
+    description_.name = r.sensor;
+    description_.serial = r.serial;
+    description_.pressure_unit = r.pressure_unit;
+    description_.elements_mm = r.elements_mm;
+    // An element that is valid in no frame is dead.
+    description_.valid.assign(r.valid.empty() ? 0 : e, 0);
+    for (std::size_t i = 0; i < r.size(); ++i) {
+      const Touch frame = r.touch(i);
+      for (std::size_t k = 0; k < frame.valid.size(); ++k) {
+        description_.valid[k] |= frame.valid[k];
+      }
+    }
+    description_.baseline = r.baseline;
+    description_.object = r.object;
+    description_.truth = r.truth;
+    StreamTime time;
+    for (const double time_s : r.time_s) {
+      time.advance(time_s);
+    }
+    if (time.elapsed_s() > 0.0) {
+      description_.rate_hz = static_cast<double>(r.size() - 1) / time.elapsed_s();
+    }
+  }
+
+  const SensorDescription& description() const override { return description_; }
+
+  void start() override {
+    at_ = 0;
+    counters_ = {};
+    pace_.start(recording_.time_s.front());
+  }
+
+  std::optional<Frame> next(std::chrono::milliseconds timeout) override {
+    if (ended() || !pace_.wait(recording_.time_s[at_], timeout)) {
+      return {};
+    }
+    const Recording& r = recording_;
+    const std::size_t i = at_++;
+    const Touch touch = r.touch(i);
+    std::vector<double> values(touch.pressure.begin(), touch.pressure.end());
+    if (r.valid.size() != r.elements()) {
+      for (std::size_t k = 0; k < touch.valid.size(); ++k) {
+        if (touch.valid[k] == 0) {
+          values[k] = std::numeric_limits<double>::quiet_NaN();  // Unknown in this frame
+        }
+      }
+    }
+    Frame frame{.host_time_s = r.time_s[i],
+                .values = std::move(values),
+                .lost_before = r.lost_before.empty() ? 0 : r.lost_before[i]};
+    if (!r.device_time_s.empty() && !std::isnan(r.device_time_s[i])) {
+      frame.device_time_s = r.device_time_s[i];
+    }
+    if (!std::isnan(touch.T_robot_sensor.theta_rad)) {
+      frame.T_robot_sensor = touch.T_robot_sensor;
+    }
+    ++counters_.frames;
+    count_lost(counters_.lost, frame.lost_before);
+    return frame;
+  }
+
+  bool ended() const override { return at_ == recording_.size(); }
+  void stop() override {}
+  SensorCounters counters() const override { return counters_; }
+
+ private:
+  Recording recording_;
+  SensorDescription description_;
+  Pace pace_;
+  std::size_t at_ = 0;  ///< index of the next frame
+  SensorCounters counters_;
+};
 
 constexpr std::string_view replay = "replay:";
 constexpr std::string_view simulate = "simulate:";
@@ -31,9 +136,11 @@ constexpr std::array<std::string_view, 7> simulate_keys{"rate",  "array",  "seed
 class SourceName {
  public:
   // A path may hold commas and equals signs, so that only a known key ends it.
-  SourceName(const std::string& name, std::string_view scheme,
-             std::span<const std::string_view> keys)
-      : name_(name) {
+  explicit SourceName(const std::string& name) : name_(name) {
+    const bool replays = name.starts_with(replay);
+    const std::string_view scheme = replays ? replay : simulate;
+    const std::span<const std::string_view> keys =
+        replays ? std::span<const std::string_view>(replay_keys) : simulate_keys;
     std::string_view rest = std::string_view(name_).substr(scheme.size());
     for (;;) {
       const std::size_t comma = rest.rfind(',');
@@ -43,7 +150,7 @@ class SourceName {
       const std::string_view option = rest.substr(comma + 1);
       const std::string_view key = option.substr(0, option.find('='));
       if (std::find(keys.begin(), keys.end(), key) == keys.end()) {
-        if (scheme == simulate) {
+        if (!replays) {
           refuse(key, fmt::format("is no option; the options are {}", fmt::join(keys, ", ")));
         }
         break;
@@ -156,9 +263,9 @@ bool is_virtual_sensor(std::string_view name) {
 
 std::optional<std::filesystem::path> virtual_sensor_file(const std::string& name) {
   if (name.starts_with(replay)) {
-    return SourceName(name, replay, replay_keys).what();
+    return SourceName(name).what();
   }
-  const std::string shape = SourceName(name, simulate, simulate_keys).what();
+  const std::string shape = SourceName(name).what();
   return built_in_shape(shape) ? std::nullopt : std::optional<std::filesystem::path>(shape);
 }
 
@@ -166,7 +273,7 @@ bool is_endless_flood(const std::string& name) {
   if (!name.starts_with(simulate)) {
     return false;
   }
-  const SimulatedSensorOptions options = options_of(SourceName(name, simulate, simulate_keys));
+  const SimulatedSensorOptions options = options_of(SourceName(name));
   // 6 GB in ten minutes: such a recording, if forgotten, still fits on most disks. The DigiTacts
   // array gives 1.8 MB/s at 100 Hz and 100 times real time.
   constexpr double most_bytes_per_s = 10e6;
@@ -181,14 +288,14 @@ bool is_endless_flood(const std::string& name) {
 
 std::unique_ptr<Sensor> open_virtual_sensor(const std::string& name) {
   if (name.starts_with(replay)) {
-    const SourceName source(name, replay, replay_keys);
+    const SourceName source(name);
     return std::make_unique<ReplayedSensor>(source.what(), source.speed());
   }
   if (!name.starts_with(simulate)) {
     throw Error(Fault::input, fmt::format("sensor {}: write replay:FILE or simulate:SHAPE", name));
   }
-  const SourceName source(name, simulate, simulate_keys);
-  return std::make_unique<SimulatedSensor>(source.what(), options_of(source));
+  const SourceName source(name);
+  return make_simulated_sensor(source.what(), options_of(source));
 }
 
 }  // namespace palpate

@@ -15,9 +15,10 @@
 
 namespace palpate {
 
-int line_of(const YAML::Mark& mark) { return std::max(mark.line, 0) + 1; }
-
 namespace {
+
+/// Counted from 1, also where there is no mark, as in an empty file.
+int line_of(const YAML::Mark& mark) { return std::max(mark.line, 0) + 1; }
 
 /// Notes where a document begins.
 struct DocumentStart : YAML::EventHandler {
@@ -39,21 +40,26 @@ struct DocumentStart : YAML::EventHandler {
 
 }  // namespace
 
-YAML::Node only_document(std::istream&& yaml, const std::filesystem::path& file) {
+void read_document(std::istream&& yaml, const std::filesystem::path& file, const std::string& key,
+                   const std::function<void(const YamlEntry&)>& read) {
   std::stringstream text;
   text << yaml.rdbuf();
-  const YAML::Node document = YAML::Load(text.str());
-  // YAML::LoadAll() finds documents without end in some text that is no YAML.
-  DocumentStart second;
-  YAML::Parser parser(text);
-  if (parser.HandleNextDocument(second) && parser.HandleNextDocument(second)) {
-    throw Error(
-        Fault::input,
-        fmt::format("{}: line {}: a second document, of which nothing would be read; leave one, "
-                    "without --- after it",
-                    file.string(), line_of(second.at)));
+  try {
+    const YAML::Node document = YAML::Load(text.str());
+    // YAML::LoadAll() finds documents without end in some text that is no YAML.
+    DocumentStart second;
+    YAML::Parser parser(text);
+    if (parser.HandleNextDocument(second) && parser.HandleNextDocument(second)) {
+      throw Error(Fault::input,
+                  fmt::format("{}: line {}: a second document, of which nothing would "
+                              "be read; leave one, without --- after it",
+                              file.string(), line_of(second.at)));
+    }
+    read({file, key, document});
+  } catch (const YAML::Exception& error) {
+    throw Error(Fault::input, fmt::format("{}: line {}: {}; correct the YAML", file.string(),
+                                          line_of(error.mark), error.msg));
   }
-  return document;
 }
 
 void YamlEntry::refuse(std::string_view remedy) const {
@@ -72,7 +78,7 @@ std::string YamlEntry::text() const {
 }
 
 double YamlEntry::number(const std::function<bool(double)>& fits, std::string_view remedy) const {
-  // Not yaml-cpp's conversion, which reads 1.500 as 1500 where the locale has decimal commas.
+  // yaml-cpp's own conversion reads 1.500 as 1500 where the locale has decimal commas.
   const std::optional<double> value = node.IsScalar() ? number_of(node.Scalar()) : std::nullopt;
   if (!value || !fits(*value)) {
     refuse(remedy);
@@ -90,7 +96,7 @@ double YamlEntry::number() const {
 }
 
 std::int64_t YamlEntry::whole_number(std::int64_t least, std::int64_t most, Digits digits) const {
-  // Not yaml-cpp's conversion either, which reads 010 as 8.
+  // yaml-cpp's own conversion reads 010 as 8.
   const std::string text = node.IsScalar() ? node.Scalar() : "";
   const bool hexadecimal = digits == Digits::also_hexadecimal && text.starts_with("0x") &&
                            text.find_first_of("+-") == std::string::npos;

@@ -15,14 +15,6 @@
 
 namespace palpate {
 
-/// Counted from 1, also where there is no mark, as in an empty file.
-int line_of(const YAML::Mark& mark);
-
-/// The document of a YAML file; null where the file has none.
-/// @throws Error (Fault::input) on a second document, naming its line; YAML::Exception on text that
-/// is no YAML
-YAML::Node only_document(std::istream&& yaml, const std::filesystem::path& file);
-
 /// A node of a YAML file with what a message about it has to name. What reads its value throws
 /// Error (Fault::input): file, line, key, value, remedy.
 struct YamlEntry {
@@ -64,6 +56,12 @@ struct YamlEntry {
  private:
   std::int64_t whole_number(std::int64_t least, std::int64_t most, Digits digits) const;
 };
+
+/// Hands the document of a YAML file to `read`; its node is null where the file has none.
+/// @param key names the document in messages
+/// @throws Error (Fault::input), naming the line, on a second document and on text that is no YAML
+void read_document(std::istream&& yaml, const std::filesystem::path& file, const std::string& key,
+                   const std::function<void(const YamlEntry&)>& read);
 
 using YamlKeys = std::vector<std::pair<std::string_view, std::function<void(const YamlEntry&)>>>;
 

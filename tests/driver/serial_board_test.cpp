@@ -8,7 +8,6 @@
 
 #include "driver/data_folder.hpp"
 #include "driver/usb_device.hpp"
-#include "driver/usb_interfaces.hpp"
 #include "fake_serial_board.hpp"
 #include "io/scratch_folder.hpp"
 #include "palpate/driver.hpp"

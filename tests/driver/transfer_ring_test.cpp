@@ -5,7 +5,6 @@
 #include <optional>
 
 #include "driver/usb_device.hpp"
-#include "driver/usb_handle.hpp"
 #include "fake_takktile.hpp"
 #include "palpate/error.hpp"
 #include "streamed.hpp"

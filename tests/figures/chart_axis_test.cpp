@@ -1,10 +1,11 @@
-#include "figures/chart_axis.hpp"
-
 #include <cmath>
 #include <string>
 #include <vector>
 
 #include <gtest/gtest.h>
+
+#include "figures/axes.hpp"
+#include "figures/chart.hpp"
 
 namespace palpate::chart_axis_test {
 

@@ -99,14 +99,14 @@ TEST(Chart, LabelsDoNotCoverEachOther) {
   EXPECT_LE(many, 6.2 * one) << "there are six places around a point";
 }
 
-TEST(Chart, DrawsRulesAcross) {
+TEST(Chart, DrawsRulesFromBottomToTop) {
   Chart chart = chart_of({.name = "", .points = {}});
-  chart.rules = {{.at = 5.0, .colour = red, .label = ""},
-                 {.vertical = true, .at = 5.0, .colour = blue, .label = ""}};
+  chart.rules = {{.at = 2.5, .colour = red}, {.at = 7.5, .colour = blue}};
   const Picture picture = drawn(chart);
   // Dots of a third of the way, less their blurred ends.
-  EXPECT_GT(count_of(picture, red), 200);
+  EXPECT_GT(count_of(picture, red), 100);
   EXPECT_GT(count_of(picture, blue), 100);
+  EXPECT_LT(middle_of(picture, red).x, middle_of(picture, blue).x);
 }
 
 TEST(Chart, WithoutAnythingToShowHasAxes) {

@@ -1,4 +1,4 @@
-#include "figures/confusion_figure.hpp"
+#include "figures/figures.hpp"
 
 #include <algorithm>
 

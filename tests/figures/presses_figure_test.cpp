@@ -1,4 +1,4 @@
-#include "figures/presses_figure.hpp"
+#include "figures/figures.hpp"
 
 #include <vector>
 

@@ -1,4 +1,4 @@
-#include "figures/reliability_figure.hpp"
+#include "figures/figures.hpp"
 
 #include <algorithm>
 

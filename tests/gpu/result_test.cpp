@@ -1,4 +1,4 @@
-#include "gpu/result.hpp"
+#include "gpu/owned.hpp"
 
 #include <string>
 

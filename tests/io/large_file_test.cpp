@@ -10,9 +10,9 @@
 
 #include "file_parts.hpp"
 #include "io/file_summary.hpp"
-#include "io/hdf5_rows.hpp"
+#include "io/hdf5_reader.hpp"
 #include "io/pressure_table.hpp"
-#include "io/recording_suspicions.hpp"
+#include "io/recording_survey.hpp"
 #include "palpate/files.hpp"
 #include "scratch_folder.hpp"
 

@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 
 #include "host_locale.hpp"
-#include "io/element_file.hpp"
 #include "palpate/files.hpp"
 #include "palpate/scene.hpp"
 #include "palpate/simulation.hpp"
@@ -64,7 +63,8 @@ TEST_F(HostWithDecimalCommas, ReadsTheSameElementsAndPolygons) {
   put_bytes(folder_ / "e.txt", "1.125 -2.250 # one\n\n\t+1.500\t3e0 \r\n");
   put_bytes(folder_ / "p.txt", "0 0\n1.500 0\n0 2.125\n");
   const HostLocale locale;
-  EXPECT_EQ(read_elements(folder_ / "e.txt"),
+  put_bytes(folder_ / "s.yaml", "array: e.txt\n");
+  EXPECT_EQ(read_scene(folder_ / "s.yaml").array_mm,
             (std::vector<glm::dvec2>{{1.125, -2.25}, {1.5, 3.0}}));
   EXPECT_EQ(make_shape((folder_ / "p.txt").string()).polygons.at(0),
             (std::vector<glm::dvec2>{{0.0, 0.0}, {1.5, 0.0}, {0.0, 2.125}}));
@@ -89,7 +89,8 @@ TEST_F(HostWithDecimalCommas, DecimalCommasAreRefused) {
     expect_named(input_error([&] { read_scene(folder_ / "s.yaml"); }), {"line 1", "give a"});
   }
   put_bytes(folder_ / "e.txt", "1,5 2\n");
-  expect_named(input_error([&] { read_elements(folder_ / "e.txt"); }), {"line 1"});
+  put_bytes(folder_ / "s.yaml", "array: e.txt\n");
+  expect_named(input_error([&] { read_scene(folder_ / "s.yaml"); }), {"e.txt", "line 1"});
 }
 
 }  // namespace palpate::locale_test

@@ -7,7 +7,7 @@
 
 #include "file_parts.hpp"
 #include "io/hdf5_process.hpp"
-#include "io/hdf5_rows.hpp"
+#include "io/hdf5_reader.hpp"
 #include "palpate/files.hpp"
 #include "scratch_folder.hpp"
 

@@ -8,7 +8,6 @@
 #include <numbers>
 
 #include "file_parts.hpp"
-#include "io/recording_suspicions.hpp"
 #include "limits.hpp"
 #include "palpate/files.hpp"
 #include "palpate/simulation.hpp"

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy
 import pytest
-from conftest import command, expect_refused
+from conftest import command, refusal
 
 import palpate
 
@@ -61,31 +61,33 @@ def test_an_array_of_pressures_is_imported(tables: pathlib.Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("flags", "options"),
+    ("flags", "options", "said"),
     [
-        (["--rate", 0], {"rate": 0}),
-        (["--rate", 10], {"rate": 10}),
-        (["--time-unit", "h"], {"time_unit": "h"}),
-        (["--pose-unit", "m,turn"], {"pose_unit": ("m", "turn")}),
-        (["--rows", "lines"], {"rows": "lines"}),
-        (["--largest-gap-s", 0], {"largest_gap_s": 0}),
-        (["--poses", "none.csv"], {"poses": pathlib.Path("none.csv")}),
-        (["--pressure-unit", "psi"], {"pressure_unit": "psi"}),
+        (["--rate", 0], {"rate": 0}, "rate=0: "),
+        (["--rate", 10], {"rate": 10}, "rate=10: "),
+        (["--time-unit", "h"], {"time_unit": "h"}, "time_unit='h': "),
+        (["--pose-unit", "m,turn"], {"pose_unit": ("m", "turn")}, "pose_unit='m,turn': "),
+        (["--rows", "lines"], {"rows": "lines"}, "rows='lines': "),
+        (["--largest-gap-s", 0], {"largest_gap_s": 0}, "largest_gap_s=0: "),
+        (["--poses", "none.csv"], {"poses": pathlib.Path("none.csv")}, "none.csv: "),
+        (["--pressure-unit", "psi"], {"pressure_unit": "psi"}, "pressure_unit='psi': "),
     ],
 )
 def test_tables_are_refused_in_the_words_of_the_command(
-    tables: pathlib.Path, flags: list[Any], options: dict[str, Any]
+    tables: pathlib.Path, flags: list[Any], options: dict[str, Any], said: str
 ) -> None:
     path = tables / "pressures.csv"
-    expect_refused(
-        lambda: palpate.import_tables(path, array=(2, 2, 1), **options),
-        "import", path, "--array", "2:2:1", "-o", tables / "o.h5", *flags,
-    )  # fmt: skip
+    refused = refusal("import", path, "--array", "2:2:1", "-o", tables / "o.h5", *flags)
+    named, problem = refused.split(": ", 1)
+    assert named in (" ".join(map(str, flags)), "none.csv")
+    # Each face names the option in its own words.
+    with pytest.raises(palpate.Error, match=f"^{re.escape(said + problem)}$"):
+        palpate.import_tables(path, array=(2, 2, 1), **options)
 
 
 def test_arrays_that_no_table_can_have_are_refused(tables: pathlib.Path) -> None:
     path = tables / "pressures.csv"
-    with pytest.raises(palpate.Error, match="--array 2:0:1"):
+    with pytest.raises(palpate.Error, match=re.escape("array=(2, 0, 1)")):
         palpate.import_tables(path, array=(2, 0, 1))
     with pytest.raises(palpate.Error, match=re.escape("array: shape (4, 3)")):
         palpate.import_tables(path, array=numpy.zeros((4, 3)))

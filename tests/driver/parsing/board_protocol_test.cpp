@@ -4,7 +4,6 @@
 #include <cmath>
 #include <random>
 
-#include "driver/packet_deframer.hpp"
 #include "driver/serial_profile.hpp"
 #include "io/scratch_folder.hpp"
 #include "palpate/error.hpp"

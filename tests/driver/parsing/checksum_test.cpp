@@ -1,4 +1,4 @@
-#include "driver/checksum.hpp"
+#include "driver/packet_format.hpp"
 
 #include <gtest/gtest.h>
 

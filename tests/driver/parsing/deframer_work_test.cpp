@@ -4,7 +4,7 @@
 
 #include <string>
 
-#include "driver/checksum.hpp"
+#include "driver/packet_format.hpp"
 #include "driver/serial_profile.hpp"
 #include "driver/without_memory.hpp"
 #include "receiver.hpp"

@@ -1,5 +1,3 @@
-#include "driver/packet_deframer.hpp"
-
 #include <gtest/gtest.h>
 
 #include <random>

@@ -7,7 +7,6 @@
 #include <memory>
 #include <vector>
 
-#include "driver/packet_deframer.hpp"
 #include "driver/serial_profile.hpp"
 #include "sent_frame.hpp"
 
