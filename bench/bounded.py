@@ -8,19 +8,20 @@ import json
 import math
 import pathlib
 import time
+from statistics import median_low
 from typing import Any
 
 import numpy
 from matplotlib.figure import Figure
 
 import palpate
-from palpate._statistics import median
+from palpate._sweep_runs import counts_of
 from palpate._tables import count_text, seconds_text
 
 from . import charts
 from .certificates import CertificateCheck, check_certificate, dense_posterior
 from .report import Json, Measurement, Report, Run, main, parser, share_of, write_json
-from .trials import VOWELS, counts_of, lattice_of, letter_maps, make_trials, size_of
+from .trials import VOWELS, lattice_of, letter_maps, make_trials, size_of
 
 SEED = 1_404_000_000
 TOLERANCE = 1e-6  # BoundedPosterior's
@@ -162,7 +163,7 @@ def measure_presses(run: Run, options: argparse.Namespace, report: Report) -> Js
                 same += int(numpy.argmax(dense.identity)) == best
     in_all = lattice.bins * len(maps)
     frames, all_ms = len(answers["best"]), answers["milliseconds"]
-    evaluated = median(answers["bins_evaluated"])
+    evaluated = median_low(answers["bins_evaluated"])
     facts = {
         "objects": len(maps),
         "elements": len(elements_mm),
@@ -173,14 +174,16 @@ def measure_presses(run: Run, options: argparse.Namespace, report: Report) -> Js
         f"presses {size_of(lattice)}",
         facts,
         [
-            Measurement("a frame, median", median(all_ms), "ms", at_most=MOST_MS),
+            Measurement("a frame, median", median_low(all_ms), "ms", at_most=MOST_MS),
             Measurement("a frame, least", min(all_ms), "ms"),
             Measurement("a frame, most", max(all_ms), "ms"),
             Measurement("bins evaluated, median", evaluated, "bins"),
             Measurement("of all bins", 100.0 * evaluated / in_all, "%"),
             Measurement("certificate, largest", max(answers["dropped_mass"]), "mass"),
             share_of("mode certain", certain, frames),
-            Measurement("dense engine, array at rest, median", median(answers["dense_ms"]), "ms"),
+            Measurement(
+                "dense engine, array at rest, median", median_low(answers["dense_ms"]), "ms"
+            ),
             share_of(
                 "the dense engine's best label", same, len(answers["dense_ms"]), at_least=100.0
             ),
@@ -220,10 +223,9 @@ def draw_growth(records: list[Json]) -> Figure:
         charts.line(
             axes, records, "bins_in_all", f"{name}/median", interval=ends, label=label, **look
         )
-    charts.tick_text(axes, "x", count_text, decades=True)
-    charts.tick_text(axes, "y", seconds_text, decades=True)
-    charts.legend(axes)
-    return figure
+    charts.log_ticks(axes, "x", count_text)
+    charts.log_ticks(axes, "y", seconds_text)
+    return charts.legend(figure)
 
 
 def measure(run: Run, options: argparse.Namespace) -> None:
