@@ -167,11 +167,14 @@ class Report:
         print("\n" + _ROW.format("case", "measured", "value", "goal", "reached"))
         print("|:--|:--|--:|:--|:--|", flush=True)
 
-    def add(self, name: str, facts: Json, measurements: Iterable[Measurement]) -> None:
-        """A case: `facts` are its sizes and whatever else explains the numbers."""
+    def add(self, name: str, facts: Json, measurements: Iterable[tuple[Any, ...]]) -> None:
+        """A case: `facts` are its sizes and whatever else explains the numbers.
+
+        measurements: a Measurement each, or a tuple of its first fields.
+        """
         told = ", ".join(f"{fact}: {value}" for fact, value in facts.items())
         print(f"| **{name}** | {told} | | | |")
-        records = [measurement.record() for measurement in measurements]
+        records = [Measurement(*measurement).record() for measurement in measurements]
         for record in records:
             value = f"{record['value']:>10.4g} {record['unit']}"
             if "low" in record:
