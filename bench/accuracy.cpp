@@ -1,5 +1,3 @@
-#include "accuracy.hpp"
-
 #include <random>
 
 #include <fmt/format.h>

@@ -67,8 +67,7 @@ def _misplaced(records: list[Json], field: str, y: str) -> Figure:
             charts.line(axes, own, "touches", f"{field}/mean", interval=ends, label=name, color=colour,
                         **look)  # fmt: skip
     _to_the_most(axes, records)
-    charts.legend(axes)
-    return figure
+    return charts.legend(figure)
 
 
 def _none(records: list[Json]) -> Figure:
@@ -91,10 +90,9 @@ def _none(records: list[Json]) -> Figure:
         ):
             charts.line(axes, own, "touches", field, scale=100.0, label=f"{name}: {who}", color=colour,
                         **look)  # fmt: skip
-    charts.percent(axes)
+    axes.set_ylim(0.0, 105.0)
     _to_the_most(axes, records)
-    charts.legend(axes)
-    return figure
+    return charts.legend(figure)
 
 
 def _slip(records: list[Json]) -> Figure:
@@ -104,9 +102,7 @@ def _slip(records: list[Json]) -> Figure:
     for i, record in enumerate(records):
         charts.line(axes, record["curve"], "touches", "mode_mm", label=record["belief"], markevery=5,
                     **charts.like(i))  # fmt: skip
-    axes.set_xlim(left=0.0)
-    charts.legend(axes)
-    return figure
+    return charts.legend(figure)
 
 
 def _plan(records: list[Json]) -> Figure:
@@ -116,8 +112,7 @@ def _plan(records: list[Json]) -> Figure:
                     interval=("entropy/low", "entropy/high"), **charts.like(i))  # fmt: skip
     axes.set_ylim(bottom=0.0)
     _to_the_most(axes, records[0]["curve"])
-    charts.legend(axes)
-    return figure
+    return charts.legend(figure)
 
 
 def _place(refined: palpate.RefinedPose, pivot_mm: Floats) -> tuple[Floats, Floats]:

@@ -3,13 +3,15 @@
 import math
 import time
 from collections.abc import Callable
+from statistics import fmean, median_low
+from typing import Any
 
 import numpy
 
 import palpate
-from palpate._statistics import Errors, mean, median, present, quantile
+from palpate._statistics import Errors, present, quantile
 
-from .belief_inputs import Inputs, Sd, mean_of
+from .belief_touches import Inputs, Sd, mean_of
 from .measures import mean_interval, mean_record
 from .random_numbers import Random, Stream
 from .report import Json, Measurement
@@ -84,20 +86,16 @@ def measure_slip(inputs: Inputs) -> list[Json]:
             ("mean over touches", 0, most),
             ("second half of the touches", touches // 2, None),
         ):
-            means = [mean(there) for of in errors if (there := present(of[first:]))]
-            interval = mean_interval(means) if len(means) > 2 else None
-            rows.append(
-                Measurement(
-                    f"{name}: mode's error, {words}", mean(means), "mm", goal, interval=interval
-                )
-            )
+            means = [fmean(there) for of in errors if (there := present(of[first:]))]
+            name_of, interval = f"{name}: mode's error, {words}", mean_interval(means)
+            rows.append(Measurement(name_of, fmean(means), "mm", goal, interval=interval))
         by_touch = [present([of[i] for of in errors]) for i in range(touches)]
         share = 100.0 * sum(map(len, by_touch)) / (touches * len(walks))
         rows.append(
             Measurement(f"{name}: touches at which the mode has the right letter", share, "%")
         )
         curve = [
-            {"touches": i, "located": len(of), "mode_mm": mean(of) if of else None}
+            {"touches": i, "located": len(of), "mode_mm": fmean(of) if of else None}
             for i, of in enumerate(by_touch, start=1)
         ]
         records.append({"belief": name, "curve": curve})
@@ -155,7 +153,7 @@ def measure_plan(inputs: Inputs) -> list[Json]:
             pairs = zip(after["planned", planned], after["random", random], strict=True)
             name = f"{planned} planned above {random} random"
             rows.append(mean_of(name, [a - b for a, b in pairs], "nats", 0.1))
-    rows.append(Measurement("plan, median", median(milliseconds), "ms"))
+    rows.append(Measurement("plan, median", median_low(milliseconds), "ms"))
     facts = {"unknowns": len(told["random"]), "bins": size_of(lattice)}
     inputs.report.add("planned touches", facts, rows)
     return [
@@ -179,15 +177,10 @@ def measure_plan(inputs: Inputs) -> list[Json]:
 COST_SD: Sd = (1.0, 0.05)
 
 
-def median_ms(call: Callable[[], object], repeats: int) -> float:
-    """Median milliseconds of some calls, after one that is not counted."""
-    call()
-    return median([_ms(call) for _ in range(repeats)])
-
-
-def _ms(call: Callable[[], object]) -> float:
+def _ms(call: Callable[..., object], *arguments: Any) -> float:
+    """Milliseconds of a call."""
     start = time.perf_counter()
-    call()
+    call(*arguments)
     return 1e3 * (time.perf_counter() - start)
 
 
@@ -210,9 +203,8 @@ def measure_costs(inputs: Inputs) -> list[Json]:
     taken: list[list[float]] = [[] for _ in beliefs]
     for i in range(repeats + 1):  # the first touch warms up; the object slips before the second
         for belief, milliseconds in zip(beliefs, taken, strict=True):
-            spent = _ms(lambda belief=belief, i=i: belief.update(touches[i % len(touches)]))  # type: ignore[misc]
-            milliseconds += [spent] if i > 0 else []
-    ms = [median(each) for each in taken]
+            milliseconds.append(_ms(belief.update, touches[i % len(touches)]))
+    ms = [median_low(each[1:]) for each in taken]
     memory = [belief.device_bytes / beliefs[0].device_bytes for belief in beliefs]
     inputs.report.add(
         f"touch {size_of(lattice)}",
@@ -230,24 +222,23 @@ def measure_costs(inputs: Inputs) -> list[Json]:
     )
     del beliefs
     small, repeats = lattice_of(25, 25, 16), 20 if inputs.quick else 300
-    latencies: dict[Sd, list[float]] = {(0.0, 0.0): [], COST_SD: []}
-    for sd, milliseconds in latencies.items():
+    latencies: list[list[float]] = []
+    for sd in ((0.0, 0.0), COST_SD):
         belief = inputs.histogram(small, touch_sd=sd)
-        for i in range(repeats + 1):
-            touch = touches[i % len(touches)]
-            start = time.perf_counter()
-            belief.update(touch)
+
+        def ask(i: int, belief: palpate.PoseHistogram = belief) -> None:
+            belief.update(touches[i % len(touches)])
             belief.estimate()
-            spent = 1e3 * (time.perf_counter() - start)
-            milliseconds += [spent] if i > 0 else []
-    plain, uncertain = latencies.values()
+
+        latencies.append([_ms(ask, i) for i in range(repeats + 1)][1:])
+    plain, uncertain = latencies
     inputs.report.add(
         f"latency {size_of(small)}, uncertain",
         sizes | {"repeats": repeats},
         [
-            Measurement("touch to estimate, median", median(uncertain), "ms", at_most=8.0),
+            Measurement("touch to estimate, median", median_low(uncertain), "ms", at_most=8.0),
             Measurement("95th percentile", quantile(uncertain, 0.95), "ms"),
-            Measurement("plain touch to estimate, median", median(plain), "ms"),
+            Measurement("plain touch to estimate, median", median_low(plain), "ms"),
         ],
     )
     # Places all over the unknown, which the robot could press next.
@@ -259,9 +250,9 @@ def measure_costs(inputs: Inputs) -> list[Json]:
     for sd in ((0.0, 0.0), COST_SD):
         belief = inputs.histogram(small, touch_sd=sd)
         belief.update(unknowns[0][:3])
-        plans.append(
-            median_ms(lambda: belief.expected_gain(candidates, unknowns[0].elements_mm), repeats)
-        )
+        elements_mm = unknowns[0].elements_mm
+        taken_ms = [_ms(belief.expected_gain, candidates, elements_mm) for _ in range(repeats + 1)]
+        plans.append(median_low(taken_ms[1:]))
     inputs.report.add(
         f"plan {size_of(small)}",
         {"objects": len(inputs.maps), "candidates": len(candidates), "repeats": repeats},
@@ -273,7 +264,7 @@ def measure_costs(inputs: Inputs) -> list[Json]:
     if not inputs.quick:
         large = lattice_of(200, 200, 250)
         belief = inputs.histogram(large, touch_sd=COST_SD)
-        seconds = _ms(lambda: belief.update(touches[0])) / 1e3
+        seconds = _ms(belief.update, touches[0]) / 1e3
         mib = belief.device_bytes / (1 << 20)
         inputs.report.add(
             f"touch {size_of(large)}",

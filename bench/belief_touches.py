@@ -8,20 +8,20 @@ import subprocess
 import tempfile
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
+from statistics import fmean, median_low
+from typing import Any, NamedTuple
 
 import numpy
 
 import palpate
-from palpate._statistics import mean, median, present
+from palpate._statistics import present
 
-from .belief_inputs import Inputs, Sd, mean_of
 from .measures import (
+    bootstrap_mean_interval,
     bootstrap_ratio_interval,
     mean_record,
     normalised_error,
     told_apart,
-    told_apart_interval,
 )
 from .report import Json, Measurement, Report, share_of
 from .trials import (
@@ -40,6 +40,34 @@ MISPLACED_SEED = 500_000_000
 LEARNED_SEED = 600_000_000
 UNLEARNED_SEED = 700_000_000
 TOUCH_SD_SEED = 970_000_000
+
+
+Sd = tuple[float, float]  # in mm and rad
+
+
+class Inputs(NamedTuple):
+    """What the parts work on."""
+
+    device: palpate.Device
+    maps: list[palpate.OccupancyGrid]
+    quick: bool
+    trials: int | None
+    report: Report
+
+    def each(self, usual: int, quick: int) -> int:
+        """Unknowns of every letter and shape: what the flags say, else by size of the run."""
+        return self.trials or (quick if self.quick else usual)
+
+    def histogram(self, lattice: palpate.PoseLattice, **options: Any) -> palpate.PoseHistogram:
+        """A belief in the letters."""
+        return palpate.PoseHistogram(self.device, self.maps, lattice, **options)
+
+
+def mean_of(
+    name: str, values: Sequence[float], unit: str, most: float | None = None
+) -> Measurement:
+    """The mean of some values and its bootstrap interval."""
+    return Measurement(name, fmean(values), unit, most, interval=bootstrap_mean_interval(values))
 
 
 # Touches that lie beside the reported poses, as if exact and averaged.
@@ -61,12 +89,10 @@ def misplaced_errors(
         "refined_mm": [step.refined_error_mm for step in steps],
     }
     errors["normalised_error"] = [
-        normalised_error(
-            inputs.maps[step.mode.object], step.refined, truth_of(trial).T_object_robot
-        )
-        if step.error_mm is not None
-        else None
-        for step, trial in zip(steps, trials, strict=True)
+        None
+        if step.error_mm is None
+        else normalised_error(inputs.maps[step.mode.object], step.refined, truth.T_object_robot)
+        for step, truth in zip(steps, map(truth_of, trials), strict=True)
     ]
     return errors
 
@@ -85,8 +111,8 @@ def misplaced_rows(belief: str, errors: Json, touches: int, goals: bool) -> list
     ]  # fmt: skip
     if late:
         name = f"{belief}: the same, at least"
-        rows.append(Measurement(name, mean(normalised), "of 3", at_least=2.0))
-    return [*rows, Measurement(f"{belief}: the same, median", median(normalised), "of 2.4")]
+        rows.append(Measurement(name, fmean(normalised), "of 3", at_least=2.0))
+    return [*rows, Measurement(f"{belief}: the same, median", median_low(normalised), "of 2.4")]
 
 
 def measure_misplaced(inputs: Inputs) -> list[Json]:
@@ -120,7 +146,7 @@ def measure_misplaced(inputs: Inputs) -> list[Json]:
             rows.append(
                 Measurement(
                     "refined error, averaged over as if exact",
-                    mean(above) / mean(below),
+                    fmean(above) / fmean(below),
                     "times",
                     0.85 if goals and touches >= 9 else None,
                     interval=bootstrap_ratio_interval(above, below),
@@ -202,8 +228,7 @@ def measure_touch_sd(inputs: Inputs) -> list[Json]:
 # "None of these", with exact and with misplaced touches.
 
 
-@dataclass(frozen=True)
-class NoneSetting:
+class NoneSetting(NamedTuple):
     """How unknowns are touched and believed."""
 
     name: str
@@ -272,8 +297,7 @@ def add_none(
         for who, steps in after.items()
     }
     learned, unlearned = odds["learned"], odds["never learned"]
-    low, high = told_apart_interval(learned, unlearned)
-    apart = told_apart(learned, unlearned)
+    apart, (low, high) = told_apart(learned, unlearned)
     least = {3: 55.0, 9: 88.0, 15: 95.0}.get(touches) if setting.exact else None
     rows = [
         share_of("learned called none", called["learned"], len(learned),

@@ -4,10 +4,15 @@ import pathlib
 from collections.abc import Callable
 
 from . import belief_charts, charts
-from .belief_inputs import Inputs
 from .belief_moves import measure_costs, measure_plan, measure_slip
-from .belief_touches import MISPLACED_SEED, measure_misplaced, measure_none, measure_touch_sd
-from .report import Json, Report, Run, at_least_1, main, parser, write, write_json
+from .belief_touches import (
+    MISPLACED_SEED,
+    Inputs,
+    measure_misplaced,
+    measure_none,
+    measure_touch_sd,
+)
+from .report import Json, Report, Run, main, parser, write, write_json
 from .trials import letter_maps
 
 PARTS: dict[str, Callable[[Inputs], list[Json]]] = {
@@ -28,11 +33,9 @@ def program() -> None:
         "well touches tell how far they are misplaced, objects never learned, objects that slip, planned "
         "touches, and what each costs.",
         plots="draw charts in this folder",
+        trials="unknowns per letter and shape [each part's own]",
     )
     flags.add_argument("--part", choices=PARTS, help="measure only this part")
-    flags.add_argument(
-        "--trials", type=at_least_1, help="unknowns per letter and shape [each part's own]"
-    )
     options = flags.parse_args()
     parts = [options.part] if options.part else list(PARTS)
     names = [name for part in parts for name in belief_charts.FIGURES.get(part, ())]

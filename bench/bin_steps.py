@@ -6,8 +6,8 @@ import math
 import numpy
 
 import palpate
-from palpate._statistics import Errors
-from palpate._sweep_runs import errors_record
+from palpate._statistics import Errors, errors_over
+from palpate._sweep_runs import counts_of
 from palpate._tables import (
     Column,
     count_text,
@@ -19,9 +19,9 @@ from palpate._tables import (
     print_row,
 )
 
-from .measures import Paired
-from .report import Json, Run, at_least_1, main, parser, write_json
-from .trials import VOWELS, Touching, counts_of, letter_maps, make_trials
+from .measures import differences
+from .report import Json, Run, main, parser, write_json
+from .trials import VOWELS, Touching, letter_maps, make_trials
 from .windows import estimate_in_window
 
 SEED = 70_000  # unknowns of their own: the sweep's and the experiment's chose other constants
@@ -88,7 +88,8 @@ def measure(device: palpate.Device, options: argparse.Namespace) -> list[Json]:
             for step_mm in steps_mm:
                 lattice = in_steps(region, maps, step_mm)
                 errors = refined_errors(device, maps, trials, lattice, count)
-                paired = Paired.of(errors, finest or errors)
+                paired = differences(errors, finest or errors)
+                assert paired is not None  # a window is of the right letter
                 runs.append(
                     {
                         "cell_mm": cell_mm,
@@ -96,9 +97,9 @@ def measure(device: palpate.Device, options: argparse.Namespace) -> list[Json]:
                         "bins": list(counts_of(lattice)),
                         "count": lattice.bins,
                         "touches": count,
-                        "refined_error_mm": errors_record(errors),
-                        "excess": paired.first_mm / paired.second_mm - 1.0,
-                        "difference_mm": finest and paired.difference(),
+                        "refined_error_mm": errors_over(errors, 20),
+                        "excess": paired["to"] / paired["from"] - 1.0,
+                        "difference_mm": finest and paired,
                     }
                 )
                 finest = finest or errors
@@ -112,9 +113,7 @@ def program() -> None:
         "bin-steps",
         "Measures the refined pose's error against the step of the bins, after 3, 5 and 9 touches at "
         "random poses, over windows about the truth.",
-    )
-    flags.add_argument(
-        "--trials", type=at_least_1, help="trials per letter [20, or 1 with --quick]"
+        trials="trials per letter [20, or 1 with --quick]",
     )
     options = flags.parse_args()
     run = Run(options)

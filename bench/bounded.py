@@ -8,23 +8,30 @@ import json
 import math
 import pathlib
 import time
+from statistics import median_low
 from typing import Any
 
 import numpy
+from matplotlib.artist import Artist
+from matplotlib.collections import PatchCollection
 from matplotlib.figure import Figure
+from matplotlib.patches import Patch, Rectangle
 
 import palpate
-from palpate._statistics import median
+from palpate._sweep_runs import counts_of
 from palpate._tables import count_text, seconds_text
 
 from . import charts
 from .certificates import CertificateCheck, check_certificate, dense_posterior
-from .report import Json, Measurement, Report, Run, main, parser, share_of, write_json
-from .trials import VOWELS, counts_of, lattice_of, letter_maps, make_trials, size_of
+from .report import Json, Measurement, Report, Run, main, parser, share_of, write, write_json
+from .trials import VOWELS, lattice_of, letter_maps, make_trials, size_of
 
 SEED = 1_404_000_000
 TOLERANCE = 1e-6  # BoundedPosterior's
-CHART = "bounded_growth"
+CHART, PICTURE = "bounded_growth", "bounded_search.png"
+#: Of large and smaller blocks that a search goes into, and of bins that it evaluates: the colour, and
+#: its opacity at the fewest and at all thetas.
+LEVELS = (("#a8ccf0", 0.05, 0.26), ("#1a66b8", 0.05, 0.26), ("#e65c0d", 0.4, 0.95))
 
 
 def measure_accuracy(run: Run, quick: bool, report: Report) -> list[Json]:
@@ -62,34 +69,20 @@ def measure_accuracy(run: Run, quick: bool, report: Report) -> list[Json]:
 def add_checks(report: Report, name: str, checks: list[CertificateCheck]) -> None:
     """What certificates promised and what was measured, over posteriors."""
     broken = sum(not check.holds for check in checks)
-    report.add(
-        name,
-        {"posteriors": len(checks)},
-        [
-            Measurement("certificates broken", broken, "posteriors", at_most=0.0),
-            Measurement(
-                "certificate, largest", max(c.promised for c in checks), "mass", at_most=TOLERANCE
-            ),
-            Measurement("mass not counted, largest", max(c.mass_outside for c in checks), "mass"),
-            Measurement(
-                "total variation of marginals, largest",
-                max(c.total_variation for c in checks),
-                "mass",
-            ),
-            Measurement(
-                "identity error, largest",
-                max(c.identity_error for c in checks),
-                "probability",
-                at_most=TOLERANCE,
-            ),
-            share_of(
-                "the dense posterior's mode",
-                sum(c.same_mode for c in checks),
-                len(checks),
-                at_least=100.0,
-            ),
-        ],
+    promised, outside, variation, identity = (
+        max(getattr(check, field) for check in checks)
+        for field in ("promised", "mass_outside", "total_variation", "identity_error")
     )
+    same = sum(check.same_mode for check in checks)
+    rows: list[tuple[Any, ...]] = [
+        ("certificates broken", broken, "posteriors", 0.0),
+        ("certificate, largest", promised, "mass", TOLERANCE),
+        ("mass not counted, largest", outside, "mass"),
+        ("total variation of marginals, largest", variation, "mass"),
+        ("identity error, largest", identity, "probability", TOLERANCE),
+        share_of("the dense posterior's mode", same, len(checks), at_least=100.0),
+    ]
+    report.add(name, {"posteriors": len(checks)}, rows)
 
 
 # Everyday objects: raw pressure, and a map from one press.
@@ -157,36 +150,26 @@ def measure_presses(run: Run, options: argparse.Namespace, report: Report) -> Js
             for name in ("bins_evaluated", "blocks_bounded", "dropped_mass"):
                 answers[name].append(getattr(certificate, name))
             if frame in DENSE_FRAMES:
-                dense, dense_ms = _answer(histogram, recording[frame : frame + 1])
-                answers["dense_ms"].append(dense_ms)
+                dense, ms = _answer(histogram, recording[frame : frame + 1])
+                answers["dense_ms"].append(ms)
                 same += int(numpy.argmax(dense.identity)) == best
     in_all = lattice.bins * len(maps)
     frames, all_ms = len(answers["best"]), answers["milliseconds"]
-    evaluated = median(answers["bins_evaluated"])
-    facts = {
-        "objects": len(maps),
-        "elements": len(elements_mm),
-        "bins in all": in_all,
-        "frames": frames,
-    }
-    report.add(
-        f"presses {size_of(lattice)}",
-        facts,
-        [
-            Measurement("a frame, median", median(all_ms), "ms", at_most=MOST_MS),
-            Measurement("a frame, least", min(all_ms), "ms"),
-            Measurement("a frame, most", max(all_ms), "ms"),
-            Measurement("bins evaluated, median", evaluated, "bins"),
-            Measurement("of all bins", 100.0 * evaluated / in_all, "%"),
-            Measurement("certificate, largest", max(answers["dropped_mass"]), "mass"),
-            share_of("mode certain", certain, frames),
-            Measurement("dense engine, array at rest, median", median(answers["dense_ms"]), "ms"),
-            share_of(
-                "the dense engine's best label", same, len(answers["dense_ms"]), at_least=100.0
-            ),
-            share_of("label right", right, frames),
-        ],
-    )
+    evaluated, dense_ms = median_low(answers["bins_evaluated"]), answers["dense_ms"]
+    facts = {"objects": len(maps), "elements": len(elements_mm), "bins in all": in_all}
+    rows: list[tuple[Any, ...]] = [
+        ("a frame, median", median_low(all_ms), "ms", MOST_MS),
+        ("a frame, least", min(all_ms), "ms"),
+        ("a frame, most", max(all_ms), "ms"),
+        ("bins evaluated, median", evaluated, "bins"),
+        ("of all bins", 100.0 * evaluated / in_all, "%"),
+        ("certificate, largest", max(answers["dropped_mass"]), "mass"),
+        share_of("mode certain", certain, frames),
+        ("dense engine, array at rest, median", median_low(dense_ms), "ms"),
+        share_of("the dense engine's best label", same, len(dense_ms), at_least=100.0),
+        share_of("label right", right, frames),
+    ]
+    report.add(f"presses {size_of(lattice)}", facts | {"frames": frames}, rows)
     return {
         "bins": counts_of(lattice),
         "bins_in_all": in_all,
@@ -220,14 +203,70 @@ def draw_growth(records: list[Json]) -> Figure:
         charts.line(
             axes, records, "bins_in_all", f"{name}/median", interval=ends, label=label, **look
         )
-    charts.tick_text(axes, "x", count_text, decades=True)
-    charts.tick_text(axes, "y", seconds_text, decades=True)
-    charts.legend(axes)
+    charts.log_ticks(axes, "x", count_text)
+    charts.log_ticks(axes, "y", seconds_text)
+    return charts.legend(figure)
+
+
+def draw_search(search: Json, grid: palpate.OccupancyGrid) -> Figure:
+    """The blocks of poses that a search goes into, after some touches each, over the object's map.
+
+    By what `palpate-bench bounded` measured in its part "search". A block is drawn where the search
+    went into it at any theta, in the colour of its level, and the fuller the more thetas.
+    """
+    (nx, ny, thetas), extent_mm, stages = search["bins"], search["extent_mm"], search["stages"]
+    step_mm = 2.0 * extent_mm / numpy.array([nx, ny])
+    left, bottom = grid.origin_mm - grid.cell_mm / 2.0
+    cells = (left, left + grid.nx * grid.cell_mm, bottom, bottom + grid.ny * grid.cell_mm)
+    last = max(block[0] for stage in stages for block in stage["blocks"])
+    figure = Figure(figsize=(17.9, 7.5))
+    for axes, stage in zip(figure.subplots(1, len(stages)), stages, strict=True):
+        occupied = 1.0 / (1.0 + numpy.exp(-grid.log_odds))
+        axes.imshow(occupied, extent=cells, origin="lower", cmap="Greys", vmin=0.0, vmax=3.0)
+        for level in range(last + 1):
+            blocks = numpy.array([block for block in stage["blocks"] if block[0] == level])
+            colour, least, most = LEVELS[-1 if level == last else min(level, 1)]
+            boxes = [
+                Rectangle(step_mm * (x, y) - extent_mm, *step_mm * (width, height))
+                for _, x, width, y, height, _ in blocks
+            ]
+            # Few thetas of hundreds are to be seen, too.
+            full = (blocks[:, 5] / thetas) ** 0.25 if boxes else numpy.zeros(0)
+            faces = [(colour, alpha) for alpha in least + (most - least) * full]
+            edges = "none" if level == last else colour
+            axes.add_collection(PatchCollection(boxes, facecolors=faces, edgecolors=edges))
+        axes.plot(*search["place_mm"], "P", color="black", markersize=12, markeredgecolor="white")
+        touches, count, in_all = stage["touches"], stage["bins_evaluated"], search["bins_in_all"]
+        share = f"{count_text(count)} of {count_text(in_all)} bins: {100.0 * count / in_all:.2g} %"
+        axes.set_title(f"After {touches} touch{'es' if touches > 1 else ''}\n{share}", fontsize=14)
+        axes.set(xlim=(-extent_mm, extent_mm), ylim=(-extent_mm, extent_mm))
+        axes.set(xlabel="x on the letter, mm", ylabel="y, mm")
+        axes.grid(visible=False)
+    names = ("large block, looked into", "smaller block, looked into", "bins evaluated")
+    marks: list[Artist] = [
+        Patch(facecolor=(colour, most), edgecolor=colour, label=name)
+        for (colour, _, most), name in zip(LEVELS, names, strict=True)
+    ]
+    marks += axes.plot([], [], "P", color="black", label="where the first touch truly was")
+    figure.legend(handles=marks, loc="outside lower left", ncols=4)
     return figure
 
 
+def read_times(path: str) -> Json:
+    """What `palpate-bench bounded` measured. Raises palpate.Error where the charts' parts are missing."""
+    try:
+        times: Json = json.loads(pathlib.Path(path).read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise palpate.Error(f"--times {path}: {error}") from error
+    for part in ("growth", "search"):
+        if part not in times:
+            raise palpate.Error(f"--times {path}: holds no {part}; measure without --part")
+    return times
+
+
 def measure(run: Run, options: argparse.Namespace) -> None:
-    """Measures the parts, and draws the chart of times where they are given."""
+    """Measures the parts, and draws the charts of times where they are given."""
+    times = read_times(options.times) if options.times else None
     report = Report(run.facts)
     records: Json = {}
     if options.part in (None, "accuracy"):
@@ -235,9 +274,10 @@ def measure(run: Run, options: argparse.Namespace) -> None:
     if options.presses:
         records["presses"] = measure_presses(run, options, report)
     write_json(options.json, report.document() | records)
-    if options.plots and options.times:
-        with open(options.times, encoding="utf-8") as file:
-            charts.save({CHART: draw_growth(json.load(file)["growth"])}, options.plots)
+    if times:
+        charts.save({CHART: draw_growth(times["growth"])}, options.plots)
+        picture = draw_search(times["search"], letter_maps(run.device)[0])
+        write(pathlib.Path(options.plots, PICTURE), charts.image(picture, "png", dpi=100))
 
 
 def program() -> None:
@@ -247,7 +287,7 @@ def program() -> None:
         "Holds the certificates of the posterior by bounds against all bins in float64, in some "
         "minutes on two CPU cores, and recognises everyday objects from one press each. Times are "
         "measured by build/palpate-bench bounded.",
-        plots="draw the chart of --times in this folder",
+        plots="draw the charts of --times in this folder",
     )
     flags.add_argument("--part", choices=("accuracy", "presses"), help="measure only this part")
     flags.add_argument("--presses", metavar="FOLDER", help="recordings of everyday objects")
@@ -259,7 +299,7 @@ def program() -> None:
         flags.error("--part presses: give the folder of recordings by --presses FOLDER")
     if bool(options.plots) != bool(options.times):
         flags.error("--plots and --times: give both, or neither")
-    measure(Run(options, {"plots": charts.files([CHART])}), options)
+    measure(Run(options, {"plots": [*charts.files([CHART]), PICTURE]}), options)
 
 
 if __name__ == "__main__":

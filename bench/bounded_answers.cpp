@@ -1,58 +1,52 @@
-#include "bounded_answers.hpp"
-
 #include <algorithm>
-#include <cmath>
 
+#include "bounded.hpp"
 #include "letters.hpp"
 
 namespace palpate::bench {
 
-namespace {
-
-template <typename Field>
-std::vector<double> each(const std::vector<BoundedAnswer>& answers, Field field) {
-  std::vector<double> values;
-  for (const BoundedAnswer& answer : answers) {
-    values.push_back(static_cast<double>(field(answer)));
-  }
-  return values;
+Estimate BoundedAnswers::ask(BoundedPosterior& posterior, std::span<const Touch> touches) {
+  Estimate estimate;
+  milliseconds.push_back(1e3 * seconds_of([&] {
+                           posterior.update(touches);
+                           estimate = posterior.estimate();
+                         }));
+  const Certificate& certificate = *estimate.certificate;
+  bins_evaluated.push_back(static_cast<double>(certificate.bins_evaluated));
+  blocks_bounded.push_back(static_cast<std::int64_t>(certificate.blocks_bounded));
+  dropped_mass.push_back(certificate.dropped_mass);
+  mode_certain += certificate.mode_certain ? 1 : 0;
+  modes.push_back(estimate.mode);
+  return estimate;
 }
 
-}  // namespace
-
-BoundedAnswer answer(BoundedPosterior& posterior, std::span<const Touch> touches) {
-  BoundedAnswer answer;
-  answer.seconds = seconds_of([&] {
-    posterior.update(touches);
-    answer.estimate = posterior.estimate();
-  });
-  return answer;
+void BoundedAnswers::add(const BoundedAnswers& others) {
+  const auto append = [](auto& to, const auto& from) {
+    to.insert(to.end(), from.begin(), from.end());
+  };
+  append(milliseconds, others.milliseconds);
+  append(bins_evaluated, others.bins_evaluated);
+  append(blocks_bounded, others.blocks_bounded);
+  append(dropped_mass, others.dropped_mass);
+  append(modes, others.modes);
+  mode_certain += others.mode_certain;
 }
 
-std::vector<double> BoundedAnswers::milliseconds() const {
-  return each(all, [](const BoundedAnswer& answer) { return 1e3 * answer.seconds; });
-}
-
-std::vector<double> BoundedAnswers::bins_evaluated() const {
-  return each(all, [](const BoundedAnswer& answer) { return answer.certificate().bins_evaluated; });
-}
-
-std::vector<double> BoundedAnswers::dropped_masses() const {
-  return each(all, [](const BoundedAnswer& answer) { return answer.certificate().dropped_mass; });
-}
-
-int BoundedAnswers::with_certain_mode() const {
-  return static_cast<int>(std::ranges::count_if(
-      all, [](const BoundedAnswer& answer) { return answer.certificate().mode_certain; }));
+Json BoundedAnswers::record() const {
+  return {{"milliseconds", milliseconds},
+          {"bins_evaluated", bins_evaluated},
+          {"blocks_bounded", blocks_bounded},
+          {"dropped_mass", dropped_mass},
+          {"mode_certain", mode_certain}};
 }
 
 BoundedAnswers answer_each(BoundedPosterior& posterior, std::span<const Recording> unknowns) {
-  BoundedAnswers answers;
   posterior.reset();
-  answer(posterior, all_touches(unknowns.front()));
+  BoundedAnswers().ask(posterior, all_touches(unknowns.front()));
+  BoundedAnswers answers;
   for (const Recording& unknown : unknowns) {
     posterior.reset();
-    answers.all.push_back(answer(posterior, all_touches(unknown)));
+    answers.ask(posterior, all_touches(unknown));
   }
   return answers;
 }
@@ -70,57 +64,17 @@ DenseAnswers answer_each(PoseHistogram& histogram, std::span<const Recording> un
   return answers;
 }
 
-int same_modes(const BoundedAnswers& bounded, const DenseAnswers& dense) {
-  constexpr double one_likelihood = 1e-3;
-  int same = 0;
-  for (std::size_t i = 0; i < dense.modes.size(); ++i) {
-    const Mode& a = bounded.all[i].estimate.mode;
-    const Mode& b = dense.modes[i];
-    const bool one_bin = a.object == b.object && a.bin == b.bin;
-    same += one_bin || std::abs(a.log_likelihood - b.log_likelihood) < one_likelihood ? 1 : 0;
-  }
-  return same;
-}
-
-double table_seconds(std::span<const Hypothesis> objects, const BoundedOptions& options,
-                     const Recording& unknown, int repeats) {
-  const std::vector<Touch> touches = all_touches(unknown);
-  std::vector<double> seconds;
-  for (int i = 0; i < repeats; ++i) {
-    std::optional<BoundedPosterior> posterior;
-    const double first = seconds_of([&] {
-      posterior.emplace(objects, options);
-      answer(*posterior, touches);
-    });
-    posterior->reset();
-    seconds.push_back(first - answer(*posterior, touches).seconds);
-  }
-  return median(seconds);
-}
-
 std::vector<Measurement> measurements_of(const BoundedAnswers& answers, const std::string& name,
                                          std::int64_t bins_in_all, std::optional<Goal> median_ms) {
-  const std::vector<double> ms = answers.milliseconds();
-  const double evaluated = median(answers.bins_evaluated());
+  const std::vector<double>& ms = answers.milliseconds;
+  const double evaluated = median(answers.bins_evaluated);
   return {{name + ", median", median(ms), "ms", median_ms},
           {name + ", least", std::ranges::min(ms), "ms"},
           {name + ", most", std::ranges::max(ms), "ms"},
           {"bins evaluated, median", evaluated, "bins"},
           {"of all bins", 100.0 * evaluated / static_cast<double>(bins_in_all), "%"},
-          {"certificate, largest", std::ranges::max(answers.dropped_masses()), "mass"},
-          share_of("mode certain", answers.with_certain_mode(), answers.all.size())};
-}
-
-Json record_of(const BoundedAnswers& answers) {
-  Json blocks = Json::array();
-  for (const BoundedAnswer& answer : answers.all) {
-    blocks.push_back(answer.certificate().blocks_bounded);
-  }
-  return {{"milliseconds", answers.milliseconds()},
-          {"bins_evaluated", answers.bins_evaluated()},
-          {"blocks_bounded", blocks},
-          {"dropped_mass", answers.dropped_masses()},
-          {"mode_certain", answers.with_certain_mode()}};
+          {"certificate, largest", std::ranges::max(answers.dropped_mass), "mass"},
+          share_of("mode certain", answers.mode_certain, ms.size())};
 }
 
 }  // namespace palpate::bench

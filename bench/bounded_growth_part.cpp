@@ -1,12 +1,10 @@
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <optional>
 
 #include <fmt/format.h>
 
-#include "bounded_answers.hpp"
-#include "bounded_parts.hpp"
+#include "bounded.hpp"
 #include "letters.hpp"
 
 namespace palpate::bench {
@@ -34,27 +32,20 @@ int dense_unknowns(double bins_in_all, int unknowns) {
                               : 0;
 }
 
-Json times_of(const std::vector<double>& seconds) {
-  return seconds.empty() ? Json(nullptr)
-                         : Json{{"median", median(seconds)},
-                                {"least", std::ranges::min(seconds)},
-                                {"most", std::ranges::max(seconds)},
-                                {"unknowns", seconds.size()}};
-}
-
-std::vector<double> seconds_of_all(const BoundedAnswers& answers) {
-  std::vector<double> seconds = answers.milliseconds();
-  for (double& value : seconds) {
-    value /= 1e3;
-  }
-  return seconds;
+/// In seconds, of times in a unit of so many.
+Json times_of(const std::vector<double>& times, double unit) {
+  return times.empty() ? Json(nullptr)
+                       : Json{{"median", unit * median(times)},
+                              {"least", unit * std::ranges::min(times)},
+                              {"most", unit * std::ranges::max(times)},
+                              {"unknowns", times.size()}};
 }
 
 Json measure_bins(const BoundedInputs& inputs, double bins_in_all,
                   const std::vector<Recording>& unknowns, Report& report) {
   const PoseLattice lattice =
       lattice_of_bins(bins_in_all / static_cast<double>(inputs.letters.size()));
-  const auto bins = lattice.bins() * static_cast<std::int64_t>(inputs.letters.size());
+  const std::int64_t bins = inputs.bins_in_all(lattice);
   BoundedOptions options{.lattice = lattice};
   restart_peak_memory();
   const std::uint64_t before = resident_bytes();
@@ -81,7 +72,7 @@ Json measure_bins(const BoundedInputs& inputs, double bins_in_all,
                           {"touches", touches_per_unknown},
                           {"unknowns", unknowns.size()}},
                 .measurements = measurements_of(all, "all threads", bins)};
-  measured.measurements.push_back({"one thread, median", median(one.milliseconds()), "ms"});
+  measured.measurements.push_back({"one thread, median", median(one.milliseconds), "ms"});
   measured.measurements.push_back(
       {"peak of the process above before", peak_mib, "MiB",
        largest ? std::optional(at_most(most_memory_mib)) : std::nullopt});
@@ -93,11 +84,11 @@ Json measure_bins(const BoundedInputs& inputs, double bins_in_all,
   report.add(measured);
   return {{"bins_in_all", bins},
           {"bins", size_of(lattice)},
-          {"bounded", times_of(seconds_of_all(all))},
-          {"one_thread", times_of(seconds_of_all(one))},
-          {"dense", times_of(dense.seconds)},
-          {"bins_evaluated", median(all.bins_evaluated())},
-          {"dropped_mass", std::ranges::max(all.dropped_masses())},
+          {"bounded", times_of(all.milliseconds, 1e-3)},
+          {"one_thread", times_of(one.milliseconds, 1e-3)},
+          {"dense", times_of(dense.seconds, 1.0)},
+          {"bins_evaluated", median(all.bins_evaluated)},
+          {"dropped_mass", std::ranges::max(all.dropped_mass)},
           {"host_bytes", held},
           {"peak_bytes", peak}};
 }
@@ -124,9 +115,8 @@ void add_growth(const Json& records, Report& report) {
 }  // namespace
 
 Json measure_bounded_growth(const BoundedInputs& inputs, Report& report) {
-  const std::vector<double> totals = inputs.options.quick
-                                         ? std::vector{10.0, 1e2, 1e3, 1e4}
-                                         : std::vector{1e4, 1e5, 1e6, 1e7, 1e8, 1e9};
+  const std::vector<double> totals =
+      inputs.quick ? std::vector{10.0, 1e2, 1e3, 1e4} : std::vector{1e4, 1e5, 1e6, 1e7, 1e8, 1e9};
   const std::vector<Recording> unknowns =
       unknown_recordings(inputs.unknowns(), touches_per_unknown, growth_seed);
   Json records = Json::array();

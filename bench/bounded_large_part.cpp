@@ -4,9 +4,8 @@
 
 #include <fmt/format.h>
 
-#include "bounded_answers.hpp"
-#include "bounded_parts.hpp"
-#include "glyph_scene.hpp"
+#include "bounded.hpp"
+#include "letters.hpp"
 
 namespace palpate::bench {
 
@@ -33,8 +32,8 @@ PoseLattice lattice_over(double extent_mm, bool quick) {
 /// frame's origin, which then lies as far away as the region reaches.
 Json measure_scene(const BoundedInputs& inputs, const LargeScene& scene, bool about_touches,
                    const std::vector<Hypothesis>& objects, Report& report) {
-  const double extent_mm = inputs.options.quick ? 20.0 : 100.0;
-  const PoseLattice lattice = lattice_over(extent_mm, inputs.options.quick);
+  const double extent_mm = inputs.quick ? 20.0 : 100.0;
+  const PoseLattice lattice = lattice_over(extent_mm, inputs.quick);
   const std::vector<Recording> unknowns =
       glyph_unknowns(scene.objects, inputs.unknowns(), touches_per_unknown, extent_mm, large_seed);
   const auto bins = lattice.bins() * static_cast<std::int64_t>(objects.size());
@@ -50,8 +49,7 @@ Json measure_scene(const BoundedInputs& inputs, const LargeScene& scene, bool ab
     if (about_touches) {
       posterior->move_pivot(unknown.T_robot_sensor.front().translation_mm);
     }
-    answers.all.push_back(answer(*posterior, all_touches(unknown)));
-    const std::vector<double>& identity = answers.all.back().estimate.identity;
+    const std::vector<double> identity = answers.ask(*posterior, all_touches(unknown)).identity;
     const auto best = std::ranges::max_element(identity) - identity.begin();
     right += objects[static_cast<std::size_t>(best)].map.label == unknown.object ? 1 : 0;
   }
@@ -74,19 +72,19 @@ Json measure_scene(const BoundedInputs& inputs, const LargeScene& scene, bool ab
   report.add(measured);
   return {{"objects", objects.size()}, {"pivot", pivot},
           {"bins_in_all", bins},       {"host_bytes", posterior->host_bytes()},
-          {"peak_bytes", peak},        {"answers", record_of(answers)}};
+          {"peak_bytes", peak},        {"answers", answers.record()}};
 }
 
 }  // namespace
 
 Json measure_bounded_large(const BoundedInputs& inputs, Report& report) {
   const std::vector<LargeScene> scenes =
-      inputs.options.quick ? std::vector<LargeScene>{{3, 120.0, 200.0}}
-                           : std::vector<LargeScene>{{20, 120.0, 200.0}, {100, 600.0}};
+      inputs.quick ? std::vector<LargeScene>{{3, 120.0, 200.0}}
+                   : std::vector<LargeScene>{{20, 120.0, 200.0}, {100, 600.0}};
   Json records = Json::array();
   for (const LargeScene& scene : scenes) {
     const std::vector<Hypothesis> objects =
-        letter_maps(inputs.device, glyph_recordings(scene.objects), MapOptions{});
+        letter_maps(inputs.device, glyph_recordings(scene.objects));
     for (const bool about_touches : {false, true}) {
       records.push_back(measure_scene(inputs, scene, about_touches, objects, report));
     }

@@ -2,8 +2,7 @@
 
 #include <fmt/format.h>
 
-#include "bounded_answers.hpp"
-#include "bounded_parts.hpp"
+#include "bounded.hpp"
 #include "letters.hpp"
 
 namespace palpate::bench {
@@ -19,10 +18,10 @@ constexpr double least_share_first = 80.0;
 
 void add_case(const BoundedAnswers& answers, const std::string& touches, std::int64_t bins,
               const std::optional<Goal>& median_ms, bool first, Report& report) {
-  const std::vector<double> dropped = answers.dropped_masses();
+  const std::vector<double>& dropped = answers.dropped_mass;
   Case measured{
       .name = "streaming, " + touches,
-      .facts = {{"bins in all", bins}, {"answers", answers.all.size()}},
+      .facts = {{"bins in all", bins}, {"answers", dropped.size()}},
       .measurements = measurements_of(answers, "from touch to estimate", bins, median_ms)};
   measured.measurements.push_back({"dropped mass, median", median(dropped), "mass"});
   const auto small = [&](double most) {
@@ -40,26 +39,22 @@ void add_case(const BoundedAnswers& answers, const std::string& touches, std::in
 }  // namespace
 
 Json measure_bounded_streaming(const BoundedInputs& inputs, Report& report) {
-  const PoseLattice lattice =
-      inputs.options.quick ? lattice_of(10, 10, 8) : lattice_of(200, 200, 250);
-  const auto bins = lattice.bins() * static_cast<std::int64_t>(inputs.letters.size());
+  const PoseLattice lattice = inputs.quick ? lattice_of(10, 10, 8) : lattice_of(200, 200, 250);
+  const std::int64_t bins = inputs.bins_in_all(lattice);
   BoundedPosterior posterior(inputs.letters, {.lattice = lattice, .budget_s = budget_s});
   std::vector<BoundedAnswers> after(touches_per_unknown);  // [touch]
-  bool warm = false;
-  for (const Recording& unknown :
-       unknown_recordings(inputs.unknowns(), touches_per_unknown, streaming_seed)) {
-    if (!warm) {
-      answer(posterior, all_touches(unknown));
-      warm = true;
-    }
+  const std::vector<Recording> unknowns =
+      unknown_recordings(inputs.unknowns(), touches_per_unknown, streaming_seed);
+  BoundedAnswers().ask(posterior, all_touches(unknowns.front()));  // warms up
+  for (const Recording& unknown : unknowns) {
     posterior.reset();
     for (std::size_t i = 0; i < after.size(); ++i) {
-      after[i].all.push_back(answer(posterior, unknown.touches(i, i + 1)));
+      after[i].ask(posterior, unknown.touches(i, i + 1));
     }
   }
   BoundedAnswers later;
   for (std::size_t i = 2; i < after.size(); ++i) {
-    later.all.insert(later.all.end(), after[i].all.begin(), after[i].all.end());
+    later.add(after[i]);
   }
   // The budget is for the search. The touch is taken in before.
   add_case(after[0], "touch 1", bins, at_most(1.1e3 * budget_s), true, report);
@@ -68,7 +63,7 @@ Json measure_bounded_streaming(const BoundedInputs& inputs, Report& report) {
   Json records = Json::array();
   for (std::size_t i = 0; i < after.size(); ++i) {
     Json record{{"touch", i + 1}, {"bins_in_all", bins}, {"budget_s", budget_s}};
-    record.update(record_of(after[i]));
+    record.update(after[i].record());
     records.push_back(std::move(record));
   }
   return records;

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <functional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -19,6 +21,13 @@ struct Inputs {
   ContactModel model;               ///< that of the letters' histograms
   std::vector<Recording> unknowns;  ///< of touches_per_unknown touches
 };
+
+/// Difference in nats between the log-likelihoods of some bins of every object, drawn with a fixed
+/// seed, and the float64 reference of the touches. `log_likelihood` gives all bins of an object.
+ErrorStatistics likelihood_errors(
+    std::span<const Hypothesis> objects, const ContactModel& model, const PoseLattice& lattice,
+    std::span<const Touch> touches, int bins_per_object,
+    const std::function<std::vector<double>(int object)>& log_likelihood);
 
 /// An empty histogram of the letters.
 PoseHistogram letter_histogram(const Inputs& inputs, const PoseLattice& lattice);

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy
 
@@ -24,8 +24,7 @@ def log_sum_exp(logs: Floats) -> float:
     return most + math.log(float(numpy.exp(logs - most).sum()))
 
 
-@dataclass(frozen=True)
-class DensePosterior:
+class DensePosterior(NamedTuple):
     """The posterior over all bins of a lattice."""
 
     log_evidence: Floats  #: [object] prior weight times summed likelihood, in nats
@@ -70,8 +69,7 @@ def dense_posterior(
     return DensePosterior(evidence, numpy.exp(evidence - total), xy, theta, mode)
 
 
-@dataclass(frozen=True)
-class CertificateCheck:
+class CertificateCheck(NamedTuple):
     """What a certificate promised and how far the answer really was from the dense posterior."""
 
     promised: float  #: dropped_mass

@@ -1,30 +1,26 @@
 #pragma once
 
-#include <cstdint>
-#include <optional>
 #include <span>
 #include <string>
-#include <vector>
 
 namespace palpate::bench {
 
-/// What all commands take. Files and folders that are empty are not written.
+/// What all commands take.
 struct RunOptions {
   std::string device;  ///< a device's name or index; empty for the best
-  std::string json;    ///< file for the results
+  std::string json;    ///< file for the results; none where it is empty
   bool quick = false;  ///< small sizes and few trials, in less than a minute
 };
 
 struct BoundedRunOptions : RunOptions {
-  std::string part;   ///< the only part to measure; empty for all
-  std::string plots;  ///< folder for the picture
+  std::string part;  ///< the only part to measure; empty for all
 };
 /// Names of the parts, in order.
-inline constexpr const char* bounded_parts[] = {"speed", "mode", "streaming", "large", "growth"};
+inline constexpr const char* bounded_parts[] = {"speed", "mode",   "streaming",
+                                                "large", "growth", "search"};
 
-// Each prints its results as Markdown tables and writes the files that its options name.
-// They throw Error where an option is out of range, or the device, a file or a folder cannot be
-// opened.
+// Each prints its results as Markdown tables and writes them to the file that its options name.
+// They throw Error where the device or the file cannot be opened.
 
 /// Speed, memory and error of every kernel, beside two baselines and float64.
 void measure_kernels(const RunOptions& options, std::span<char* const> command_line);
@@ -36,7 +32,7 @@ void measure_kernels(const RunOptions& options, std::span<char* const> command_l
 void compare_paths(const RunOptions& options, std::span<char* const> command_line);
 
 /// The posterior by bounds: its time for nine touches at rising numbers of bins, touch by touch and
-/// in large scenes, and its memory.
+/// in large scenes, its memory, and where it searches.
 void measure_bounded(const BoundedRunOptions& options, std::span<char* const> command_line);
 
 }  // namespace palpate::bench

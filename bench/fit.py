@@ -6,8 +6,8 @@ from typing import Any
 
 import palpate
 
-from .measures import told_apart, told_apart_interval
-from .report import Json, Measurement, Report, Run, at_least_1, main, parser, share_of, write_json
+from .measures import told_apart
+from .report import Json, Measurement, Report, Run, main, parser, share_of, write_json
 from .trials import MISFITS, VOWELS, Touching, letter_maps, make_trials, training_recordings
 
 LEARNED_SEED = 200_000_000
@@ -30,10 +30,9 @@ def add_fits(report: Report, name: str, fits: dict[str, list[Any]]) -> Json:
     """The fits of learned and unlearned unknowns after a number of touches, {"z", "verdict"} each."""
     z = {who: [fit["z"] for fit in of] for who, of in fits.items()}
     learned, unlearned = z["learned"], z["never learned"]
-    low, high = told_apart_interval(unlearned, learned)
-    apart = 100.0 * told_apart(unlearned, learned)
-    interval = (100.0 * low, 100.0 * high)
-    rows = [Measurement("unlearned fit worse than learned", apart, "% of pairs", interval=interval)]
+    apart, (low, high) = told_apart(unlearned, learned)
+    name_of, interval = "unlearned fit worse than learned", (100.0 * low, 100.0 * high)
+    rows = [Measurement(name_of, 100.0 * apart, "% of pairs", interval=interval)]
     for who, of in fits.items():
         for verdict in VERDICTS:
             count = sum(fit["verdict"] == verdict for fit in of)
@@ -73,9 +72,7 @@ def program() -> None:
         "fit",
         "Measures how well touches of learned letters and of shapes never learned fit, in some minutes "
         "on two CPU cores: pairs told apart and verdicts, of arrays of 6 x 6 and 16 x 16 elements.",
-    )
-    flags.add_argument(
-        "--trials", type=at_least_1, help="trials per letter and shape [20, or 2 with --quick]"
+        trials="trials per letter and shape [20, or 2 with --quick]",
     )
     options = flags.parse_args()
     write_json(options.json, measure(Run(options), options))

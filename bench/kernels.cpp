@@ -1,5 +1,4 @@
 #include "cases.hpp"
-#include "command_run.hpp"
 #include "letters.hpp"
 #include "measurement.hpp"
 
@@ -14,7 +13,7 @@ Inputs make_inputs(Device& device, const RunOptions& options) {
       .quick = options.quick,
       .training = training_recordings(),
       .unknowns = unknown_recordings(options.quick ? 50 : 1000, touches_per_unknown, 100)};
-  inputs.letters = letter_maps(device, inputs.training, MapOptions{.cell_mm = 0.5});
+  inputs.letters = letter_maps(device, inputs.training);
   inputs.model.prior = inputs.letters.front().map.prior;
   return inputs;
 }
@@ -26,10 +25,9 @@ PoseHistogram letter_histogram(const Inputs& inputs, const PoseLattice& lattice)
 }
 
 void measure_kernels(const RunOptions& options, std::span<char* const> command_line) {
-  CommandRun run(options, {{"--json", options.json}}, command_line);
+  Report report(options, command_line);
   const bool quick = options.quick;
-  const Inputs inputs = make_inputs(run.device(), options);
-  Report report(run.facts());
+  const Inputs inputs = make_inputs(report.device(), options);
   const PoseLattice fine = lattice_of(200, 200, quick ? 4 : 250);
   const PoseLattice middle = lattice_of(100, 100, quick ? 4 : 100);
   for (const auto& [lattice, goal_ns] :
@@ -48,7 +46,7 @@ void measure_kernels(const RunOptions& options, std::span<char* const> command_l
   report.add(map_stream_case(inputs, false));
   report.add(many_unknowns_case(inputs));
   report.add(latency_case(inputs));
-  run.write(options.json, report.document().dump(2) + "\n");
+  report.write();
 }
 
 }  // namespace palpate::bench

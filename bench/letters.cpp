@@ -1,67 +1,122 @@
 #include "letters.hpp"
 
+#include <array>
 #include <numbers>
 #include <string>
 
 #include <fmt/format.h>
 
+#include "palpate/error.hpp"
+
 namespace palpate::bench {
 
 namespace {
 
-int symmetry_of(const std::string& letter) { return letter == "I" ? 2 : letter == "O" ? 0 : 1; }
+constexpr std::string_view vowels = "AEIOU";
+constexpr std::string_view characters = "ABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789";
+constexpr std::array scales{1.0, 0.8, 1.2};
+static_assert(characters.size() * scales.size() == most_glyphs);
 
-Simulator simulator_of(const std::string& name, const TouchingSensor& sensor, std::uint64_t seed) {
-  return {make_shape(name), sensor.model, sensor.elements_mm, seed};
+constexpr double drawn_within_mm = 10.0;  ///< by random_object_pose()
+
+Simulator simulator_of(const Shape& shape, std::uint64_t seed) {
+  return {shape, SensorModel{}, digitacts_array(), seed};
+}
+
+Simulator letter_simulator(char letter, std::uint64_t seed) {
+  return simulator_of(make_shape(std::string(1, letter)), seed);
+}
+
+Simulator glyph_simulator(int i, std::uint64_t seed) {
+  const auto at = static_cast<std::size_t>(i);
+  const double scale = scales[at / characters.size()];
+  Shape shape = make_shape(std::string(1, characters[at % characters.size()]));
+  for (Shape::Stroke& stroke : shape.strokes) {
+    stroke.width_mm *= scale;
+    for (glm::dvec2& point_mm : stroke.points_mm) {
+      point_mm *= scale;
+    }
+  }
+  if (scale != 1.0) {
+    shape.label += fmt::format(" x {}", scale);
+  }
+  return simulator_of(shape, seed);
+}
+
+/// An unknown at a random pose, x and y within `extent_mm` of 0, touched at random poses about it,
+/// with the truth. Draws from the two seeds after `seed`, which it leaves at the last.
+Recording touched_at_random(Simulator& simulator, int touches, double extent_mm,
+                            std::uint64_t& seed) {
+  Pose T_object_robot = random_object_pose(++seed);
+  T_object_robot.translation_mm *= extent_mm / drawn_within_mm;
+  std::vector<Pose> poses = random_poses(touches, ++seed);
+  for (Pose& pose : poses) {
+    pose = inverse(T_object_robot) * pose;  // T_robot_sensor from T_object_sensor
+  }
+  Recording recording = simulator.touch(poses, T_object_robot);
+  recording.truth = {.object = recording.object, .T_object_robot = T_object_robot};
+  return recording;
 }
 
 }  // namespace
 
-std::vector<Recording> training_recordings(const TouchingSensor& sensor,
-                                           const std::vector<Pose>& poses) {
+std::vector<Recording> training_recordings() {
   std::vector<Recording> recordings;
-  std::uint64_t seed = 1;
-  for (const std::string& name : vowels) {
-    recordings.push_back(simulator_of(name, sensor, seed++).touch(poses, Pose{}));
+  for (const char letter : vowels) {
+    recordings.push_back(
+        letter_simulator(letter, recordings.size() + 1).touch(training_grid(), Pose{}));
   }
   return recordings;
 }
 
-std::vector<Hypothesis> letter_maps(Device& device, const std::vector<Recording>& training,
-                                    const MapOptions& options) {
+std::vector<Hypothesis> letter_maps(Device& device, const std::vector<Recording>& training) {
   std::vector<ObjectTouches> letters;
   for (const Recording& recording : training) {
     letters.push_back({recording.object, all_touches(recording)});
   }
-  MapOptions with_prior = options;
-  with_prior.sensor.prior = estimate_prior(device, letters, options);
-  MapBuilder builder(device, with_prior);
+  MapOptions options;
+  options.sensor.prior = estimate_prior(device, letters, options);
+  MapBuilder builder(device, options);
   std::vector<Hypothesis> hypotheses;
   for (const ObjectTouches& letter : letters) {
     builder.clear();
     builder.add(letter.touches);
-    Hypothesis& hypothesis =
-        hypotheses.emplace_back(Hypothesis{.map = builder.build(letter.label)});
-    hypothesis.map.symmetry = symmetry_of(letter.label);
+    OccupancyGrid& map = hypotheses.emplace_back(Hypothesis{builder.build(letter.label)}).map;
+    map.symmetry = letter.label == "I" ? 2 : letter.label == "O" ? 0 : 1;
   }
   return hypotheses;
 }
 
 std::vector<Recording> unknown_recordings(int count, int touches, std::uint64_t seed) {
   std::vector<Simulator> simulators;
-  for (const std::string& name : vowels) {
-    simulators.push_back(simulator_of(name, {}, ++seed));
+  for (const char letter : vowels) {
+    simulators.push_back(letter_simulator(letter, ++seed));
   }
   std::vector<Recording> recordings;
   for (int i = 0; i < count; ++i) {
-    const std::size_t letter = static_cast<std::size_t>(i) % simulators.size();
-    const Pose T_object_robot = random_object_pose(++seed);
-    std::vector<Pose> poses = random_poses(touches, ++seed);
-    for (Pose& pose : poses) {
-      pose = inverse(T_object_robot) * pose;  // T_robot_sensor from T_object_sensor
-    }
-    recordings.push_back(simulators[letter].touch(poses, T_object_robot));
-    recordings.back().truth = {.object = vowels[letter], .T_object_robot = T_object_robot};
+    Simulator& simulator = simulators[static_cast<std::size_t>(i) % simulators.size()];
+    recordings.push_back(touched_at_random(simulator, touches, drawn_within_mm, seed));
+  }
+  return recordings;
+}
+
+std::vector<Recording> glyph_recordings(int count) {
+  if (count < 1 || count > most_glyphs) {
+    throw Error(Fault::input, fmt::format("objects = {}: give 1 to {}", count, most_glyphs));
+  }
+  std::vector<Recording> recordings;
+  for (int i = 0; i < count; ++i) {
+    recordings.push_back(glyph_simulator(i, recordings.size() + 1).touch(training_grid(), Pose{}));
+  }
+  return recordings;
+}
+
+std::vector<Recording> glyph_unknowns(int count, int unknowns, int touches, double extent_mm,
+                                      std::uint64_t seed) {
+  std::vector<Recording> recordings;
+  for (int i = 0; i < unknowns; ++i) {
+    Simulator simulator = glyph_simulator(i % count, ++seed);
+    recordings.push_back(touched_at_random(simulator, touches, extent_mm, seed));
   }
   return recordings;
 }

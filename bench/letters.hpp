@@ -13,26 +13,28 @@ namespace palpate::bench {
 
 inline constexpr int touches_per_unknown = 9;  // after which the paper knows every letter
 
-/// What letters are touched with.
-struct TouchingSensor {
-  SensorModel model = {};
-  std::vector<glm::dvec2> elements_mm = digitacts_array();
-};
+/// The objects of Sec. IV: A, E, I, O and U, touched at known poses, with fixed seeds.
+std::vector<Recording> training_recordings();
 
-/// The objects of Sec. IV.
-inline const std::vector<std::string> vowels = {"A", "E", "I", "O", "U"};
-
-/// The vowels, touched at known poses T_object_sensor, with fixed seeds.
-std::vector<Recording> training_recordings(const TouchingSensor& sensor = {},
-                                           const std::vector<Pose>& poses = training_grid());
-
-/// The letters' maps, which share the prior that their training touches give, with the symmetries
-/// of Eq. 18-20: 2 for I, 0 (full) for O, 1 for the others.
-std::vector<Hypothesis> letter_maps(Device& device, const std::vector<Recording>& training,
-                                    const MapOptions& options);
+/// Maps of 0.5 mm cells, which share the prior that their training touches give, with the
+/// symmetries of Eq. 18-20: 2 for I, 0 (full) for O, 1 for the others.
+std::vector<Hypothesis> letter_maps(Device& device, const std::vector<Recording>& training);
 
 /// Recordings of letters in random poses within the lattice, A to U in turn, with the truth.
 std::vector<Recording> unknown_recordings(int count, int touches, std::uint64_t seed);
+
+/// Most objects that glyph_recordings() makes.
+inline constexpr int most_glyphs = 108;
+
+/// `count` objects, touched at the training poses: the letters A to Z, then the digits, then both
+/// at 0.8 and at 1.2 times the size.
+/// @throws Error unless count is from 1 to most_glyphs
+std::vector<Recording> glyph_recordings(int count);
+
+/// Unknowns among the first `count` glyphs, in turn, at random poses T_object_robot: x and y within
+/// `extent_mm` of 0, any angle. The touches are at random poses about the object.
+std::vector<Recording> glyph_unknowns(int count, int unknowns, int touches, double extent_mm,
+                                      std::uint64_t seed);
 
 /// Every touch of a recording.
 std::vector<Touch> all_touches(const Recording& recording);

@@ -2,7 +2,6 @@
 #include <functional>
 #include <thread>
 
-#include "accuracy.hpp"
 #include "cases.hpp"
 #include "cpu_loop.hpp"
 #include "letters.hpp"

@@ -59,8 +59,6 @@ int main(int argc, char** argv) try {
   command->add_option("--part", bounded.part, "Measure only this part")
       ->check(CLI::IsMember(
           std::vector<std::string>(std::begin(bounded_parts), std::end(bounded_parts))));
-  command->add_option("--plots", bounded.plots,
-                      "Draw the search of one unknown in this folder, as PNG");
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

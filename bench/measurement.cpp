@@ -8,7 +8,6 @@
 #include <chrono>
 #include <cmath>
 #include <fstream>
-#include <numeric>
 #include <string>
 #include <string_view>
 
@@ -58,10 +57,6 @@ double quantile(std::span<const double> values, double fraction) {
   std::sort(sorted.begin(), sorted.end());
   const double rank = std::ceil(fraction * static_cast<double>(sorted.size()));
   return sorted[static_cast<std::size_t>(std::max(rank, 1.0)) - 1];
-}
-
-double mean(std::span<const double> values) {
-  return std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
 }
 
 std::uint64_t resident_bytes() { return status_bytes("VmRSS:"); }

@@ -27,8 +27,6 @@ double median(std::span<const double> values);
 /// The smallest value that at least this fraction of the values does not exceed.
 double quantile(std::span<const double> values, double fraction);
 
-/// Of at least one value.
-double mean(std::span<const double> values);
 /// Resident memory of the process. The peak is since the last restart_peak_memory(), or since the
 /// process began where the kernel does not allow that. restart_peak_memory() first gives memory
 /// that the process has freed back to the system: what is taken afterwards then shows.

@@ -2,19 +2,14 @@
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from statistics import fmean
+from typing import Any
 
 import numpy
 from numpy.typing import ArrayLike, NDArray
 
 import palpate
-from palpate._statistics import (
-    LEAST_GAIN,
-    Errors,
-    mean,
-    quantile,
-    standard_error,
-)
+from palpate._statistics import LEAST_GAIN, Errors, quantile, standard_error
 
 from .random_numbers import Random, Stream
 from .trials import Body
@@ -31,19 +26,19 @@ def wilson_interval(successes: float, trials: int) -> Interval:
     centre = (share + _Z * _Z / (2.0 * trials)) / shrink
     half = _Z / shrink * math.sqrt(share * (1.0 - share) / trials + (_Z / trials) ** 2 / 4.0)
     # Rounding must not leave the ends at 0 and 1 outside.
-    return (
-        0.0 if successes == 0 else centre - half,
-        1.0 if successes == trials else centre + half,
-    )
+    low = 0.0 if successes == 0 else centre - half
+    return low, 1.0 if successes == trials else centre + half
 
 
-def mean_interval(values: Sequence[float]) -> Interval:
-    """The 95 % interval of the mean of what at least three values are drawn from, by Student's t.
+def mean_interval(values: Sequence[float]) -> Interval | None:
+    """The 95 % interval of the mean of what the values are drawn from, by Student's t.
 
-    Student's t is Cornish and Fisher's expansion (Abramowitz and Stegun 26.7.5): 3 % off for two
-    degrees of freedom, 1 % for three.
+    None for fewer than three values. Student's t is Cornish and Fisher's expansion (Abramowitz and
+    Stegun 26.7.5): 3 % off for two degrees of freedom, 1 % for three.
     """
     v, z = len(values) - 1.0, _Z
+    if v < 2.0:
+        return None
     t = (
         z
         + (z**3 + z) / (4 * v)
@@ -51,25 +46,19 @@ def mean_interval(values: Sequence[float]) -> Interval:
         + (3 * z**7 + 19 * z**5 + 17 * z**3 - 15 * z) / (384 * v**3)
     )
     half = t * standard_error(values)
-    return mean(values) - half, mean(values) + half
+    return fmean(values) - half, fmean(values) + half
 
 
-def told_apart(lower: ArrayLike, higher: ArrayLike) -> float:
-    """Share of the pairs of both kinds in which the lower kind's value is lower; ties count half."""
-    ordered, low = numpy.sort(numpy.asarray(higher)), numpy.asarray(lower)
-    middle = (
-        numpy.searchsorted(ordered, low, "left") + numpy.searchsorted(ordered, low, "right")
-    ) / 2
-    return float(numpy.mean(1.0 - middle / len(ordered)))
+def told_apart(lower: ArrayLike, higher: ArrayLike) -> tuple[float, Interval]:
+    """Share of the pairs of both kinds in which the lower kind's value is lower; ties count half.
 
-
-def told_apart_interval(lower: Sequence[float], higher: Sequence[float]) -> Interval:
-    """The 95 % interval of told_apart(): Wilson's for as many trials as the rarer kind has values.
-
-    The estimate varies no more than that (van Dantzig 1951).
+    Its 95 % interval is Wilson's for as many trials as the rarer kind has values: the estimate varies
+    no more than that (van Dantzig 1951).
     """
-    rarer = min(len(lower), len(higher))
-    return wilson_interval(told_apart(lower, higher) * rarer, rarer)
+    low, high = numpy.asarray(lower)[:, None], numpy.asarray(higher)
+    share = float(numpy.mean(low < high) + numpy.mean(low == high) / 2.0)
+    rarer = min(len(low), len(high))
+    return share, wilson_interval(share * rarer, rarer)
 
 
 def bootstrap_interval(
@@ -104,43 +93,38 @@ def bootstrap_ratio_interval(numerators: ArrayLike, denominators: ArrayLike) -> 
 def mean_record(values: Sequence[float]) -> dict[str, float]:
     """The mean and its bootstrap interval."""
     low, high = bootstrap_mean_interval(values)
-    return {"mean": mean(values), "low": low, "high": high}
+    return {"mean": fmean(values), "low": low, "high": high}
 
 
-@dataclass(frozen=True)
-class Paired:
-    """Mean errors of two runs over the trials that have one in both."""
+def differences(first: Errors, second: Errors) -> dict[str, float] | None:
+    """What one run errs less than another, over the trials that have an error in both.
 
-    trials: int
-    first_mm: float
-    second_mm: float
-    standard_error_mm: float  #: of the mean difference
+    Trial i of one run is trial i of the other. `from` and `to` are the mean errors of the second and
+    the first run, `mean` is by how much the first errs more; None where no trial has both.
+    """
+    pairs = [(a, b) for a, b in zip(first, second, strict=True) if a is not None and b is not None]
+    if not pairs:
+        return None
+    to, from_ = (fmean(errors) for errors in zip(*pairs, strict=True))
+    error = standard_error([a - b for a, b in pairs])
+    return {
+        "trials": len(pairs),
+        "from": from_,
+        "to": to,
+        "mean": to - from_,
+        "standard_error": error,
+    }
 
-    @staticmethod
-    def of(first: Errors, second: Errors) -> "Paired":
-        """Trial i of one run is trial i of the other."""
-        pairs = [
-            (a, b) for a, b in zip(first, second, strict=True) if a is not None and b is not None
-        ]
-        if not pairs:
-            return Paired(0, 0.0, 0.0, 0.0)
-        a_mm, b_mm = ([pair[i] for pair in pairs] for i in (0, 1))
-        less_mm = [a - b for a, b in pairs]
-        return Paired(len(pairs), mean(a_mm), mean(b_mm), standard_error(less_mm))
 
-    @property
-    def gain(self) -> bool:
-        """The second errs less by more than LEAST_GAIN and two standard errors; never of one trial."""
-        less_mm = self.first_mm - self.second_mm
-        enough = max(LEAST_GAIN * self.first_mm, 2.0 * self.standard_error_mm)
-        return self.trials > 1 and less_mm > enough
+def gains(first: Errors, second: Errors) -> bool:
+    """Whether the second run errs less by more than LEAST_GAIN and two standard errors.
 
-    def difference(self) -> dict[str, float]:
-        """By how much the first run errs more."""
-        return {
-            "mean": self.first_mm - self.second_mm,
-            "standard_error": self.standard_error_mm,
-        }
+    One trial never tells.
+    """
+    paired = differences(first, second)
+    if paired is None or paired["trials"] < 2:
+        return False
+    return paired["mean"] > max(LEAST_GAIN * paired["to"], 2.0 * paired["standard_error"])
 
 
 def knee_of(runs: Sequence[Errors]) -> int | None:
@@ -150,45 +134,43 @@ def knee_of(runs: Sequence[Errors]) -> int | None:
     which no finer run confirms, or where a finer run has no errors.
     """
     for i, run in enumerate(runs[:-1]):
-        finer = [Paired.of(run, other) for other in runs[i + 1 :]]
-        if None not in run and all(paired.trials and not paired.gain for paired in finer):
+        finer = runs[i + 1 :]
+        if None not in run and not any(
+            gains(run, to) or differences(run, to) is None for to in finer
+        ):
             return i
     return None
 
 
-def pareto_front(entries: Sequence[tuple[float, float]]) -> list[int]:
-    """Indices of the entries (cost, error) on the Pareto front, by rising cost; of equals the first."""
-    front: list[int] = []
-    for i in sorted(range(len(entries)), key=lambda i: entries[i]):
-        if not front or entries[i][1] < entries[front[-1]][1]:
-            front.append(i)
+def pareto_front(entries: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
+    """The entries on the Pareto front of `cost` and `error`, by rising cost; of equals the first."""
+    front: list[dict[str, Any]] = []
+    for entry in sorted(entries, key=lambda entry: (entry["cost"], entry["error"])):
+        if not front or entry["error"] < front[-1]["error"]:
+            front.append(entry)
     return front
 
 
-def calibration(confidences: Sequence[float], right: Sequence[bool]) -> dict[str, object]:
+def calibration(confidences: Sequence[float], right: Sequence[bool]) -> dict[str, Any]:
     """How far the probability of the most probable object can be taken at its word.
 
     Ten bins of equal width over [0, 1], the empty ones left out, and the expected error: the mean
     distance between confidence and share right, bins weighted by their counts (Naeini, Cooper and
     Hauskrecht 2015).
     """
-    width = 10
     told, was = numpy.asarray(confidences), numpy.asarray(right, numpy.float64)
-    of = numpy.minimum((told * width).astype(int), width - 1)
-    bins, expected = [], 0.0
-    for i in numpy.unique(of).tolist():
-        here = of == i
-        confidence, share = float(told[here].mean()), float(was[here].mean())
-        expected += abs(confidence - share) * int(here.sum()) / len(told)
-        bins.append(
-            {
-                "lower": i / width,
-                "count": int(here.sum()),
-                "mean_confidence": confidence,
-                "fraction_right": share,
-            }
-        )
-    return {"expected_error": expected, "bins": bins}
+    of = numpy.minimum((told * 10).astype(int), 9)
+    bins = [
+        {
+            "lower": i / 10,
+            "count": int((of == i).sum()),
+            "mean_confidence": float(told[of == i].mean()),
+            "fraction_right": float(was[of == i].mean()),
+        }
+        for i in numpy.unique(of).tolist()
+    ]
+    off = [abs(each["mean_confidence"] - each["fraction_right"]) * each["count"] for each in bins]
+    return {"expected_error": sum(off) / len(told), "bins": bins}
 
 
 #: What normalised_error() is on average where covariances are right: one for every coordinate.
@@ -212,8 +194,7 @@ def normalised_error(
         places = [
             palpate.transform(palpate.inverse(pose), [centroid_mm])[0] for pose in (estimate, true)
         ]
-        s, c = math.sin(-estimate[2]), math.cos(-estimate[2])
-        turn = numpy.array([[c, -s], [s, c]])
+        turn = turning(-estimate[2])
         x, y = centroid_mm - estimate[:2]
         jacobian = numpy.column_stack([-turn, turn @ (y, -x)])
         error = places[0] - places[1]
@@ -223,11 +204,16 @@ def normalised_error(
         )
     turn_rad = estimate[2] - true[2]
     turn_rad -= wrapped(turn_rad, 2.0 * math.pi / grid.symmetry)
-    s, c = math.sin(turn_rad), math.cos(turn_rad)
-    about = centroid_mm - numpy.array([[c, -s], [s, c]]) @ centroid_mm
+    about = centroid_mm - turning(turn_rad) @ centroid_mm
     error = estimate - palpate.compose([*about, turn_rad], true)
     error[2] = wrapped(error[2], 2.0 * math.pi)
     return float(error @ numpy.linalg.solve(refined.covariance, error))
+
+
+def turning(angle_rad: float) -> NDArray[numpy.float64]:
+    """The matrix [2, 2] that turns by an angle."""
+    c, s = math.cos(angle_rad), math.sin(angle_rad)
+    return numpy.array([[c, -s], [s, c]])
 
 
 def wrapped(angle_rad: float, period_rad: float) -> float:

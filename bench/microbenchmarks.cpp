@@ -15,7 +15,7 @@ class LetterBelief {
  public:
   explicit LetterBelief(const PoseLattice& lattice)
       : unknown_(unknown_recordings(1, touches_per_unknown, 100).front()),
-        maps_(letter_maps(device_, training_recordings(), MapOptions{})),
+        maps_(letter_maps(device_, training_recordings())),
         stream_(device_.context()),
         belief_(device_.context(), stream_, lattice, 1),
         likelihood_(device_.context(), stream_, belief_, std::span(maps_).first(1), lattice,

@@ -3,8 +3,7 @@
 
 #include <fmt/format.h>
 
-#include "accuracy.hpp"
-#include "command_run.hpp"
+#include "cases.hpp"
 #include "cpu_loop.hpp"
 #include "letters.hpp"
 #include "one_bin_kernel.hpp"
@@ -110,9 +109,8 @@ Json compare_ways(Device& device, std::span<const Hypothesis> letters, const Rec
 }  // namespace
 
 void compare_paths(const RunOptions& options, std::span<char* const> command_line) {
-  CommandRun run(options, {{"--json", options.json}}, command_line);
-  const std::vector<Hypothesis> letters =
-      letter_maps(run.device(), training_recordings(), MapOptions{});
+  Report report(options, command_line);
+  const std::vector<Hypothesis> letters = letter_maps(report.device(), training_recordings());
   const Recording unknown = unknown_recordings(1, touches_in_all, seed).front();
   std::vector<PoseLattice> lattices = {lattice_of(25, 25, 16), lattice_of(50, 50, 40),
                                        lattice_of(100, 100, 10), lattice_of(200, 200, 4)};
@@ -122,18 +120,17 @@ void compare_paths(const RunOptions& options, std::span<char* const> command_lin
   fmt::print(
       "\n| evaluated by | bins per object | ns per pose, element and touch | largest deviation, "
       "nats | RMS |\n|:--|--:|--:|--:|--:|\n");
-  Json document = run.facts();
-  document["precisions"] = Json::array();
+  Json& precisions = report.document()["precisions"] = Json::array();
   for (const PoseLattice& lattice : lattices) {
-    for (const Json& way : compare_ways(run.device(), letters, unknown, lattice)) {
+    for (const Json& way : compare_ways(report.device(), letters, unknown, lattice)) {
       const Json& deviation = way.at("deviation_nats");
       fmt::print("| {} | {} | {:.2f} | {:.1e} | {:.1e} |\n", plain_text(way.at("path")),
                  count_text(way.at("count")), way.at("nanoseconds").get<double>(),
                  deviation.at("largest").get<double>(), deviation.at("rms").get<double>());
-      document["precisions"].push_back(way);
+      precisions.push_back(way);
     }
   }
-  run.write(options.json, document.dump(2) + "\n");
+  report.write();
 }
 
 }  // namespace palpate::bench

@@ -1,79 +1,103 @@
 #include "report.hpp"
 
+#include <chrono>
 #include <cstdio>
+#include <thread>
 
+#include <fmt/chrono.h>
 #include <fmt/format.h>
 
 namespace palpate::bench {
 
 namespace {
 
-std::string row(const std::string& name, const Measurement& m) {
-  std::string goal;
-  std::string reached;
-  if (m.goal) {
-    goal = fmt::format("{} {:.4g}", m.goal->kind == Goal::Kind::at_most ? "≤" : "≥", m.goal->value);
-    reached = m.reached() ? "yes" : "no";
-  }
-  const std::string unit =
-      m.interval ? fmt::format("{} ({:.4g} to {:.4g})", m.unit, m.interval->low, m.interval->high)
-                 : m.unit;
-  return fmt::format("| {:<28} | {:<46} | {:>10.4g} {:<17} | {:<8} | {:<7} |", name, m.name,
-                     m.value, unit, goal, reached);
-}
+constexpr const char* row = "| {:<28} | {:<46} | {:<28} | {:<8} | {:<7} |\n";
 
 }  // namespace
 
-bool Measurement::reached() const {
-  return !goal || (goal->kind == Goal::Kind::at_most ? value <= goal->value : value >= goal->value);
+std::string plain_text(const Json& value) {
+  if (value.is_array()) {
+    return fmt::format("{}", fmt::join(value.get<std::vector<std::string>>(), "; "));
+  }
+  return value.is_string()         ? value.get<std::string>()
+         : value.is_number_float() ? fmt::format("{}", value.get<double>())
+                                   : value.dump();
+}
+
+std::string count_text(double count) {
+  return count >= 0.9995e9   ? fmt::format("{:.3g} G", count / 1e9)
+         : count >= 0.9995e6 ? fmt::format("{:.3g} M", count / 1e6)
+         : count >= 0.9995e3 ? fmt::format("{:.3g} k", count / 1e3)
+                             : fmt::format("{:.3g}", count);
 }
 
 Measurement share_of(const std::string& name, int count, std::size_t trials,
                      std::optional<Goal> goal) {
-  const auto of = static_cast<int>(trials);
-  const Interval interval = wilson_interval(count, of);
+  const auto [low, high] = wilson_interval(count, trials);
   return {.name = name,
-          .value = 100.0 * count / of,
+          .value = 100.0 * count / static_cast<double>(trials),
           .unit = "%",
           .goal = goal,
-          .interval = Interval{100.0 * interval.low, 100.0 * interval.high}};
+          .interval = Interval{100.0 * low, 100.0 * high}};
 }
 
-Json record_of(const Measurement& m) {
-  Json record{{"name", m.name}, {"value", m.value}, {"unit", m.unit}};
-  if (m.goal) {
-    record[m.goal->kind == Goal::Kind::at_most ? "at_most" : "at_least"] = m.goal->value;
-    record["reached"] = m.reached();
+Report::Report(const RunOptions& options, std::span<char* const> command_line)
+    : file_(options.json.empty() ? std::nullopt
+                                 : std::optional<AtomicFile>(std::in_place, options.json)),
+      device_(Device::open(options.device)) {
+  const auto now = std::chrono::floor<std::chrono::seconds>(std::chrono::system_clock::now());
+  document_ = {{"device", device_.name()},
+               {"host threads", std::thread::hardware_concurrency()},
+               {"compiler", PALPATE_COMPILER},
+               {"data", "simulated letters and sensor; the paper's recordings are not public"},
+               {"date", fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", now)},
+               {"command line", fmt::format("{}", fmt::join(command_line, " "))}};
+  for (const auto& [name, value] : document_.items()) {
+    fmt::print("{}: {}  \n", name, plain_text(value));
   }
-  if (m.interval) {
-    record["low"] = m.interval->low;
-    record["high"] = m.interval->high;
-  }
-  return record;
-}
-
-Report::Report(Json facts) : document_(std::move(facts)) {
-  document_["cases"] = Json::array();
-  fmt::print("\n| {:<28} | {:<46} | {:<28} | {:<8} | {:<7} |\n|:--|:--|--:|:--|:--|\n", "case",
-             "measured", "value", "goal", "reached");
-  std::fflush(stdout);
 }
 
 void Report::add(const Case& measured) {
+  if (!document_.contains("cases")) {
+    fmt::print("\n");
+    fmt::print(fmt::runtime(row), "case", "measured", "value", "goal", "reached");
+    fmt::print("|:--|:--|--:|:--|:--|\n");
+  }
   Json record{{"name", measured.name}};
-  std::string facts;
+  std::vector<std::string> facts;
   for (const auto& [name, value] : measured.facts.items()) {
     record[name] = value;
-    facts += fmt::format("{}{}: {}", facts.empty() ? "" : ", ", name, plain_text(value));
+    facts.push_back(fmt::format("{}: {}", name, plain_text(value)));
   }
-  record["measurements"] = Json::array();
-  fmt::print("| **{}** | {} | | | |\n", measured.name, facts);
+  fmt::print("| **{}** | {} | | | |\n", measured.name, fmt::join(facts, ", "));
   for (const Measurement& m : measured.measurements) {
-    fmt::print("{}\n", row(measured.name, m));
-    record["measurements"].push_back(record_of(m));
+    Json& of = record["measurements"].emplace_back(
+        Json{{"name", m.name}, {"value", m.value}, {"unit", m.unit}});
+    std::string value = fmt::format("{:>10.4g} {}", m.value, m.unit);
+    std::string goal;
+    if (m.goal) {
+      const bool most = m.goal->kind == Goal::Kind::at_most;
+      of[most ? "at_most" : "at_least"] = m.goal->value;
+      of["reached"] = most ? m.value <= m.goal->value : m.value >= m.goal->value;
+      goal = fmt::format("{} {:.4g}", most ? "≤" : "≥", m.goal->value);
+    }
+    if (m.interval) {
+      of["low"] = m.interval->low;
+      of["high"] = m.interval->high;
+      value += fmt::format(" ({:.4g} to {:.4g})", m.interval->low, m.interval->high);
+    }
+    const char* reached = !m.goal ? "" : of["reached"] ? "yes" : "no";
+    fmt::print(fmt::runtime(row), measured.name, m.name, value, goal, reached);
   }
   std::fflush(stdout);
   document_["cases"].push_back(std::move(record));
+}
+
+void Report::write() {
+  if (file_) {
+    file_->write(document_.dump(2) + "\n");
+    file_->commit();
+  }
 }
 
 }  // namespace palpate::bench

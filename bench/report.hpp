@@ -1,13 +1,25 @@
 #pragma once
 
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
+#include <nlohmann/json.hpp>
+
+#include "commands.hpp"
+#include "io/atomic_file.hpp"
 #include "measurement.hpp"
-#include "table.hpp"
+#include "palpate/device.hpp"
 
 namespace palpate::bench {
+
+using Json = nlohmann::ordered_json;
+
+/// Strings as they are, numbers in their shortest form, lists joined by "; ".
+std::string plain_text(const Json& value);
+/// A count such as 100, 17.5 k, 1 M or 1 G.
+std::string count_text(double count);
 
 /// What a measured value is held against.
 struct Goal {
@@ -23,14 +35,10 @@ struct Measurement {
   std::string unit;
   std::optional<Goal> goal = {};
   std::optional<Interval> interval = {};  ///< of the value, 95 %
-
-  bool reached() const;
 };
 /// `count` of `trials` in percent, with its 95 % score interval (Wilson).
 Measurement share_of(const std::string& name, int count, std::size_t trials,
                      std::optional<Goal> goal = {});
-/// Name, value and unit; the goal, and whether it is reached; the interval.
-Json record_of(const Measurement& measurement);
 
 /// What was measured in one case. `facts` are its sizes and whatever else explains the numbers.
 struct Case {
@@ -39,17 +47,26 @@ struct Case {
   std::vector<Measurement> measurements = {};
 };
 
-/// Prints every case as rows of one Markdown table, as soon as it is known, and keeps all of them.
+/// A run of a command: its device, and its results, which begin with the facts that explain them.
 class Report {
  public:
-  /// Prints the table's head.
-  explicit Report(Json facts);
+  /// Opens the file of the results, then the device, and prints the facts: what cannot be opened is
+  /// known before the minutes of work.
+  /// @throws Error where the file or the device cannot be opened
+  Report(const RunOptions& options, std::span<char* const> command_line);
 
+  Device& device() { return device_; }
+  /// Device, host threads, compiler, data, date and command line; then the results.
+  Json& document() { return document_; }
+  /// Prints a case as rows of one Markdown table, and adds it to the document's `cases`.
   void add(const Case& measured);
-  /// The facts, and `cases`.
-  const Json& document() const { return document_; }
+  /// Writes the document, where a file is asked for.
+  /// @throws Error where the disk refuses
+  void write();
 
  private:
+  std::optional<AtomicFile> file_;
+  Device device_;
   Json document_;
 };
 

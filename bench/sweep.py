@@ -11,22 +11,34 @@ import time
 from collections.abc import Sequence
 
 import palpate
-from palpate._tables import count_text, plain
+from palpate._sweep_runs import counts_of
+from palpate._tables import count_text, plain, print_head, print_row
 
 from . import charts
-from .measures import Paired, knee_of, pareto_front
-from .report import Json, Measurement, Run, at_least_1, main, parser, write, write_json
+from .measures import differences, knee_of, pareto_front
+from .report import Json, Measurement, Run, at_least, main, parser, write, write_json
 from .sweep_limits import measure_limits
 from .sweep_page import CHARTS, charts_of, page_of
-from .sweep_plan import AUTO_RULE, GOAL_BINS, GOAL_CELL_MM, TOUCHES, Plan, product
-from .sweep_runs import measure_bounds, measure_histogram, measure_particles
-from .sweep_tables import print_document, print_point, print_point_head
-from .trials import Bins, lattice_of, letter_maps
+from .sweep_runs import AUTO_RULE, first_each, measure_bounds, measure_histogram, measure_particles
+from .sweep_tables import PRINTED, print_document
+from .trials import TABLE_1, VOWELS, Bins, lattice_of, letter_maps, make_trials
 
+SEED = 1_000  # the experiment's
+TOUCHES = 15
+#: The goal's lattice: balanced, about a million bins.
+GOAL_BINS: Bins = (64, 64, 244)
+GOAL_CELL_MM = 0.5
 GOALS_MM = {
     "error_mm": ("mean error by the mode", 0.3),
     "refined_error_mm": ("mean error refined", 0.2),
 }
+
+
+def scaled(count: float) -> Bins:
+    """A lattice of some number of bins in the proportions of the goal's."""
+    factor = (count / math.prod(GOAL_BINS)) ** (1.0 / 3.0)
+    x, y, theta = (max(1, math.floor(factor * n + 0.5)) for n in GOAL_BINS)
+    return x, y, theta
 
 
 def auto_rule_of(bounds: Sequence[Json]) -> Json:
@@ -36,16 +48,14 @@ def auto_rule_of(bounds: Sequence[Json]) -> Json:
     of bins and times.
     """
 
-    def excess(record: Json, asked: str) -> float:
-        return math.log(record["bounded"][asked] / record["histogram"][asked])
-
     def crossing(asked: str) -> tuple[float | None, str]:
+        excess = [math.log(of["bounded"][asked] / of["histogram"][asked]) for of in bounds]
         first = len(bounds)
-        while first > 0 and excess(bounds[first - 1], asked) < 0.0:
+        while first > 0 and excess[first - 1] < 0.0:
             first -= 1
         if first in (0, len(bounds)):
             return None, "on all of these lattices" if first == 0 else "on none of these lattices"
-        above, below = excess(bounds[first - 1], asked), excess(bounds[first], asked)
+        above, below = excess[first - 1], excess[first]
         lower, upper = (math.log(bounds[i]["bins_in_all"]) for i in (first - 1, first))
         at = math.exp(lower + above / (above - below) * (upper - lower))
         return at, f"from {count_text(at)} bins in all on"
@@ -79,27 +89,22 @@ def knee_record(points: Sequence[Json], cell_mm: float, fine: Bins) -> Json:
 
     steps = []
     for to in runs:
-        coarser = [run for run in runs if 5 * run["count"] <= to["count"]]
-        if coarser:
-            step: Json = {"cell_mm": cell_mm, "from": coarser[-1]["count"], "to": to["count"]}
+        for coarser in [run for run in runs if 5 * run["count"] <= to["count"]][-1:]:
+            step: Json = {"cell_mm": cell_mm, "from": coarser["count"], "to": to["count"]}
             for name in ("error", "refined_error"):
-                paired = Paired.of(to[f"{name}s_mm"], coarser[-1][f"{name}s_mm"])
-                step.setdefault("trials", paired.trials)
-                step[f"{name}_mm"] = {
-                    "from": paired.second_mm,
-                    "to": paired.first_mm,
-                } | paired.difference()
+                step[f"{name}_mm"] = differences(to[f"{name}s_mm"], coarser[f"{name}s_mm"])
+            step["trials"] = step["error_mm"] and step["error_mm"]["trials"]
             steps.append(step)
     return {
         "cell_mm": cell_mm,
         "balanced_bins": list(fine),
-        "balanced_count": product(fine),
+        "balanced_count": math.prod(fine),
         "mode_knee": knees["errors_mm"],
         "refined_knee": knees["refined_errors_mm"],
         "floor_mm": runs[-1]["refined_error_mm"],
         "sentence": f"Maps with cells of {cell_mm:g} mm need {text(knees['errors_mm'])} bins for the mode "
         f"and {text(knees['refined_errors_mm'])} for the refined pose; --bins fine takes {plain(fine)} = "
-        f"{count_text(product(fine))}.",
+        f"{count_text(math.prod(fine))}.",
         "steps": steps,
     }
 
@@ -107,10 +112,10 @@ def knee_record(points: Sequence[Json], cell_mm: float, fine: Bins) -> Json:
 def compare_paths(options: argparse.Namespace) -> list[Json]:
     """The ways to evaluate the likelihood, which `palpate-bench paths` times in C++."""
     program = os.environ.get("PALPATE_BENCH", "build/palpate-bench")
+    flags = ["--quick"] if options.quick else []
+    flags += ["--device", options.device] if options.device else []
     with tempfile.TemporaryDirectory() as folder:
         file = pathlib.Path(folder, "paths.json")
-        flags = ["--quick"] if options.quick else []
-        flags += ["--device", options.device] if options.device else []
         subprocess.run(
             [program, "paths", "--json", file, *flags], check=True, stdout=subprocess.DEVNULL
         )
@@ -123,34 +128,30 @@ def fronts_of(document: Json) -> Json:
 
     The poses are of runs that recognise and locate all trials, as errors over some would flatter.
     """
-    poses = []
-    for point in document["points"]:
-        for pose, name, more_s in (
+    poses = [
+        {name: point[name] for name in ("filter", "cell_mm", "count", "full_trials", "accuracy")}
+        | {
+            "pose": pose,
+            "standard_error": point[name]["standard_error"],
+            "cost": point["seconds_per_unknown"] + (refine_s or 0.0),
+            "error": point[name]["mean"],
+        }
+        for point in document["points"]
+        for pose, name, refine_s in (
             ("mode", "error_mm", 0.0),
             ("refined", "refined_error_mm", point["seconds_refine"]),
-        ):
-            error = point[name]
-            if error and point["accuracy"] == 1.0 and error["trials"] == document["trials"]:
-                same = {
-                    key: point[key]
-                    for key in ("filter", "cell_mm", "count", "full_trials", "accuracy")
-                }
-                costs = {"cost": point["seconds_per_unknown"] + more_s, "error": error["mean"]}
-                poses.append(
-                    {"pose": pose, "standard_error": error["standard_error"]} | same | costs
-                )
+        )
+        if point[name] and point["accuracy"] == 1.0
+        if point[name]["trials"] == document["trials"]
+    ]
     paths = [
-        {"path": path["path"], "count": path["count"], "cost": path["nanoseconds"],
-         "error": path["deviation_nats"]["largest"]}
+        {"path": path["path"], "count": path["count"], "cost": path["nanoseconds"]}
+        | {"error": path["deviation_nats"]["largest"]}
         for path in document["precisions"]
-    ]  # fmt: skip
-
-    def front(entries: list[Json]) -> list[Json]:
-        return [entries[i] for i in pareto_front([(e["cost"], e["error"]) for e in entries])]
-
+    ]
     return {
-        "seconds per unknown, mean error in mm": front(poses),
-        "ns per pose, element and touch, largest deviation in nats": front(paths),
+        "seconds per unknown, mean error in mm": pareto_front(poses),
+        "ns per pose, element and touch, largest deviation in nats": pareto_front(paths),
     }
 
 
@@ -185,47 +186,51 @@ def verdicts_of(points: Sequence[Json]) -> list[Json]:
 
 def measure(run: Run, options: argparse.Namespace) -> Json:
     """Runs everything, and prints every run of a filter once it is known."""
-    plan, device = Plan.of(options), run.device
+    start, quick, device = time.perf_counter(), options.quick, run.device
+    trials = make_trials(VOWELS, options.trials or (4 if quick else 10), TOUCHES, SEED)
+    # Counts are those nearest to what was asked for.
+    most = 1.1 * (options.max_bins or (100_000 if quick else 10_000_000))
+
+    def lattices(counts: Sequence[float], others: Sequence[Bins] = ()) -> list[Bins]:
+        some = [bins for bins in (*map(scaled, counts), *others) if math.prod(bins) <= most]
+        return sorted(some, key=math.prod)
+
+    # What gets the full posterior: all trials of a letter, two of them, or one.
+    most_full, most_twice = (50_000, 50_000) if quick else (320_000, 1_200_000)
+    decades = [1e3, 1e4, 1e5] if quick else [1e2, 1e3, 1e4, 1e5, 1e6, 1e7]
+    counts = [1e2, 1e3, 1e4, 1e5] if quick else [1e2, 1e3, 1e4, 3e4, 1e5, 3e5, 1e6, 3e6, 1e7]
+    particles = [1_000, 10_000] if quick else [100, 1_000, 10_000, 100_000, 1_000_000]
+    bounded = counts if quick else [1e3, 3e3, 1e4, 2e4, 3e4, 1e5, 1e6, 1e7]
     points: list[Json] = []
     bounds: list[Json] = []
     knees: list[Json] = []
-    trials = plan.trials(plan.trials_each)
 
     def add(point: Json) -> None:
-        print_point(point)
+        print_row(PRINTED, point)
         points.append(point)
 
-    start = time.perf_counter()
-    print_point_head()
-    for cells in plan.cells:
-        maps = letter_maps(device, cell_mm=cells.cell_mm)
-        for bins in cells.lattices:
-            full_each = plan.full_each(cells.cell_mm, bins)
-            add(measure_histogram(device, maps, trials, full_each, bins))
-        multinomial, systematic = palpate.Resampling.multinomial, palpate.Resampling.systematic
-        for resampling, augmented in (
-            (multinomial, False),
-            (systematic, False),
-            (multinomial, True),
-        ):
-            for particles in cells.particles:
-                some = plan.trials(1) if particles > 300_000 else trials
-                add(
-                    measure_particles(
-                        device,
-                        maps,
-                        some,
-                        particles=particles,
-                        resampling=resampling,
-                        augmented=augmented,
-                    )
-                )
-        for bins in cells.bounded:
-            bounds.append(measure_bounds(device, maps, plan.trials(plan.bounded_each(bins)), bins))
-        if cells.lattices:
+    print_head(PRINTED)
+    for cell_mm in (1.0, GOAL_CELL_MM) if quick else (1.0, GOAL_CELL_MM, 0.25):
+        maps = letter_maps(device, cell_mm=cell_mm)
+        goal = cell_mm == GOAL_CELL_MM
+        of_cells = lattices(counts, TABLE_1) if goal else lattices(decades)
+        for bins in of_cells:
+            size = math.prod(bins)
+            few = 2 if size <= most_twice else 1
+            full = len(trials) if size <= most_full or (goal and bins == GOAL_BINS) else few
+            add(measure_histogram(device, maps, trials, full, bins))
+        for kind in ("particles", "systematic", "augmented") if goal else ():
+            for count in particles:
+                some = first_each(trials, 1) if count > 300_000 else trials
+                add(measure_particles(device, maps, some, kind, count))
+        for bins in lattices(bounded) if goal else ():
+            some = first_each(trials, 1 if quick or math.prod(bins) > 1_200_000 else 4)
+            bounds.append(measure_bounds(device, maps, some, bins))
+        if of_cells:
             fine = palpate.balanced_lattice(lattice_of(*GOAL_BINS), maps, "fine")
-            counts = (fine.x_mm.count, fine.y_mm.count, fine.theta_rad.count)
-            knees.append(knee_record(points, cells.cell_mm, counts))
+            knees.append(knee_record(points, cell_mm, counts_of(fine)))
+    limits = [scaled(1e5)] if quick else [GOAL_BINS, scaled(3e5), scaled(3e6)]
+    each = min(len(trials) // len(VOWELS), 2 if quick else len(trials))
     document = run.facts | {
         "touches": TOUCHES,
         "trials": len(trials),
@@ -235,19 +240,11 @@ def measure(run: Run, options: argparse.Namespace) -> Json:
         "bounds": bounds,
         "auto_rule": auto_rule_of(bounds),
         "knees": knees,
-        "limits": measure_limits(device, plan),
+        "limits": measure_limits(device, quick, limits, each, TOUCHES, SEED),
         "verdicts": verdicts_of(points),
     }
     document["fronts"] = fronts_of(document)
     return document | {"seconds in all": round(time.perf_counter() - start, 1)}
-
-
-def at_least_1000(text: str) -> int:
-    """A number of bins."""
-    value = int(text)
-    if value < 1_000:
-        raise argparse.ArgumentTypeError(f"{value}: give 1000 or more")
-    return value
 
 
 def program() -> None:
@@ -258,15 +255,17 @@ def program() -> None:
         "filter, from 100 to 10,000,000 bins per object, on maps of several cell sizes. The same of "
         "your own objects: python -m palpate.sweep.",
         plots="draw the page's charts in this folder",
+        trials="trials per letter [10, or 4 with --quick]",
     )
     flags.add_argument(
         "--html", metavar="FILE", help="write the results as a page with charts and tables"
     )
     flags.add_argument(
-        "--trials", type=at_least_1, help="trials per letter [10, or 4 with --quick]"
+        "--max-bins",
+        type=at_least(1_000),
+        metavar="N",
+        help="most bins per object [10000000, or 100000 with --quick]",
     )
-    flags.add_argument("--max-bins", type=at_least_1000, metavar="N",
-                       help="most bins per object [10000000, or 100000 with --quick]")  # fmt: skip
     options = flags.parse_args()
     document = measure(Run(options, {"plots": charts.files(CHARTS)}), options)
     print_document(document)

@@ -3,102 +3,93 @@
 import math
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass, field
-from typing import Any
+from statistics import fmean, median_low
+from typing import Any, TypeVar
 
 import numpy
 
 import palpate
 from palpate import reference
-from palpate._statistics import Errors, mean, median
-from palpate._sweep_runs import errors_record
+from palpate._statistics import Errors, errors_over
 
 from .certificates import check_certificate, dense_posterior
 from .measures import calibration
 from .report import Json
-from .sweep_plan import AUTO_RULE, SAMPLED, TOUCHES, Maps, Trials
-from .trials import TABLE_1, Bins, Step, lattice_of, truth_of
+from .trials import TABLE_1, VOWELS, Bins, Step, error_of, lattice_of, truth_of
 from .windows import estimate_in_window, map_of, nearest_bin_mm, placed
 
+Maps = Sequence[palpate.OccupancyGrid]
+Trials = Sequence[palpate.Recording]
+T = TypeVar("T")
 
-@dataclass
-class Costs:
-    """What a filter takes over some trials, and what it says."""
-
-    touch_s: list[float] = field(default_factory=list)  #: from a touch to its estimate
-    unknown_s: list[float] = field(default_factory=list)  #: of all touches, an estimate each
-    refine_s: list[float] = field(default_factory=list)
-    confidences: list[float] = field(default_factory=list)  #: over all touches
-    right: list[bool] = field(default_factory=list)
-    last: list[Json] = field(default_factory=list)  #: what is said of each trial in the end
-
-    def run(self, belief: Any, maps: Maps, trial: palpate.Recording) -> None:
-        """Asks a belief after each touch of one more trial."""
-        truth = truth_of(trial)
-        seconds = []
-        for i in range(len(trial)):
-            start = time.perf_counter()
-            belief.update(trial[i])
-            estimate = belief.estimate()
-            seconds.append(time.perf_counter() - start)
-            best = int(numpy.argmax(estimate.identity))
-            self.confidences.append(float(estimate.identity[best]))
-            self.right.append(maps[best].label == truth.object)
-        self.touch_s += seconds
-        self.unknown_s.append(sum(seconds))
-        self.last.append({"mode": estimate.mode, "refined": None})
-        if isinstance(belief, palpate.PoseHistogram):
-            start = time.perf_counter()
-            self.last[-1]["refined"] = belief.refine(estimate.mode)
-            self.refine_s.append(time.perf_counter() - start)
-
-    def record(self, kind: str, cell_mm: float, count: int, device_bytes: int) -> Json:
-        """What a run cost, as medians, and how well it knows the objects."""
-        ends = slice(TOUCHES - 1, None, TOUCHES)
-        return {
-            "filter": kind,
-            "cell_mm": cell_mm,
-            "count": count,
-            "bins": None,
-            "balanced": False,
-            "full_trials": len(self.last),
-            "seconds_per_touch": median(self.touch_s),
-            "seconds_per_unknown": median(self.unknown_s),
-            "seconds_refine": median(self.refine_s) if self.refine_s else None,
-            "device_bytes": device_bytes,
-            "accuracy": mean(self.right[ends]),
-            "least_confidence": min(self.confidences[ends]),
-            "expected_calibration_error": calibration(self.confidences, self.right)[
-                "expected_error"
-            ],
-            "windows": None,
-        }
+#: Bins of every object, or particles for each, whose log-likelihood is held against float64.
+SAMPLED = 200
+#: Bins of all objects above which --filter auto takes bounds.
+AUTO_RULE = 100_000
 
 
-def error_of(grid: palpate.OccupancyGrid, trial: palpate.Recording, pose: Any) -> float | None:
-    """The pose error; None where the pose is of another object, or missing."""
-    truth = truth_of(trial)
-    if pose is None or grid.label != truth.object:
-        return None
-    return palpate.pose_error_mm(grid, pose.T_object_robot, truth.T_object_robot)
+def first_each(of_trials: Sequence[T], each: int) -> list[T]:
+    """What belongs to the first trials of every letter, of what belongs to all of them."""
+    of_letter = len(of_trials) // len(VOWELS)
+    return [of_trial for i, of_trial in enumerate(of_trials) if i % of_letter < each]
 
 
-def set_errors(record: Json, modes_mm: Errors, refined_mm: Errors) -> None:
-    """Puts pose errors into the record of a run: those of each trial, and what they are over all."""
-    record["trials"] = len(modes_mm)
+def follow(belief: Any, maps: Maps, trial: palpate.Recording) -> Json:
+    """Asks a belief after each touch of a trial: times in s, what it says, its poses in the end."""
+    asked: Json = {"touch_s": [], "refine_s": [], "confidence": [], "right": [], "refined": None}
+    for touch in trial:
+        start = time.perf_counter()
+        belief.update(touch)
+        estimate = belief.estimate()
+        asked["touch_s"].append(time.perf_counter() - start)
+        best = int(numpy.argmax(estimate.identity))
+        asked["confidence"].append(float(estimate.identity[best]))
+        asked["right"].append(maps[best].label == truth_of(trial).object)
+    asked["mode"], asked["grid"] = estimate.mode, maps[estimate.mode.object]
+    if isinstance(belief, palpate.PoseHistogram):
+        start = time.perf_counter()
+        asked["refined"] = belief.refine(estimate.mode)
+        asked["refine_s"].append(time.perf_counter() - start)
+    return asked
+
+
+def costs_record(kind: str, cell_mm: float, count: int, device_bytes: int, of: list[Json]) -> Json:
+    """What a run over some trials cost, as medians, and how well it knows the objects."""
+    touch_s, refine_s, confidence, right = (
+        [value for asked in of for value in asked[name]]
+        for name in ("touch_s", "refine_s", "confidence", "right")
+    )
+    return {
+        "filter": kind,
+        "cell_mm": cell_mm,
+        "count": count,
+        "bins": None,
+        "balanced": False,
+        "full_trials": len(of),
+        "seconds_per_touch": median_low(touch_s),
+        "seconds_per_unknown": median_low([sum(asked["touch_s"]) for asked in of]),
+        "seconds_refine": median_low(refine_s) if refine_s else None,
+        "device_bytes": device_bytes,
+        "accuracy": fmean(asked["right"][-1] for asked in of),
+        "least_confidence": min(asked["confidence"][-1] for asked in of),
+        "expected_calibration_error": calibration(confidence, right)["expected_error"],
+        "windows": None,
+    }
+
+
+def errors_of(modes_mm: Errors, refined_mm: Errors) -> Json:
+    """Pose errors in the record of a run: those of each trial, and what they are over all."""
+    record: Json = {"trials": len(modes_mm)}
     for name, errors in (("error", modes_mm), ("refined_error", refined_mm)):
-        record[f"{name}_mm"] = errors_record(errors)
-        record[f"{name}s_mm"] = list(errors)
+        record |= {f"{name}_mm": errors_over(errors, 20), f"{name}s_mm": list(errors)}
+    return record
 
 
 def deviation_record(deviations: Sequence[float]) -> Json:
     """How far log-likelihoods are from float64, in nats."""
     off = numpy.abs(deviations)
-    return {
-        "largest": float(off.max()),
-        "rms": float(numpy.sqrt(numpy.mean(off**2))),
-        "samples": len(off),
-    }
+    rms = float(numpy.sqrt(numpy.mean(off**2)))
+    return {"largest": float(off.max()), "rms": rms, "samples": len(off)}
 
 
 def measure_histogram(
@@ -110,32 +101,28 @@ def measure_histogram(
     """
     lattice = lattice_of(*bins)
     belief = palpate.PoseHistogram(device, maps, lattice)
-    each = len(trials) // len(maps)
-    full = [trial for i, trial in enumerate(trials) if i % each < full_each]
-    costs = Costs()
+    full = first_each(trials, full_each)
+    ends = []
     for trial in full:
         belief.reset()
-        costs.run(belief, maps, trial)
-    record = costs.record("histogram", maps[0].cell_mm, lattice.bins, belief.device_bytes)
+        ends.append(follow(belief, maps, trial))
+    record = costs_record("histogram", maps[0].cell_mm, lattice.bins, belief.device_bytes, ends)
     record |= {"bins": list(bins), "balanced": bins not in TABLE_1}
-    located = [maps[end["mode"].object] for end in costs.last]
-    if full_each == each:
-        errors = [
+    if len(full) == len(trials):
+        modes, refined = (
             [
-                error_of(grid, trial, end[pose])
-                for grid, trial, end in zip(located, full, costs.last, strict=True)
+                error_of(end["grid"], truth_of(trial), end[pose])
+                for trial, end in zip(full, ends, strict=True)
             ]
             for pose in ("mode", "refined")
-        ]
+        )
     else:
         steps = [estimate_in_window(device, maps, trial, lattice) for trial in trials]
-        errors = [[step.error_mm for step in steps], [step.refined_error_mm for step in steps]]
-        first = [step for i, step in enumerate(steps) if i % each < full_each]
-        record["windows"] = windows_record(maps, full, costs.last, first)
-    set_errors(record, *errors)
-    record["nearest_bin_mm"] = mean(
-        [nearest_bin_mm(lattice, placed(maps, trial)) for trial in trials]
-    )
+        modes, refined = [s.error_mm for s in steps], [s.refined_error_mm for s in steps]
+        record["windows"] = windows_record(maps, full, ends, first_each(steps, full_each))
+    record |= errors_of(modes, refined)
+    nearest_mm = [nearest_bin_mm(lattice, placed(maps, trial)) for trial in trials]
+    record["nearest_bin_mm"] = fmean(nearest_mm)
     belief.reset()
     belief.update(trials[0][0])
     record["deviation_nats"] = deviation_record(bin_deviations(belief, maps, trials[0][0]))
@@ -147,7 +134,7 @@ def windows_record(maps: Maps, full: Trials, ends: Sequence[Json], steps: Sequen
     apart: dict[str, list[float]] = {"mode": [], "refined": []}
     for trial, end, step in zip(full, ends, steps, strict=True):
         grid = map_of(maps, trial)
-        if maps[end["mode"].object].label == grid.label:
+        if end["grid"].label == grid.label:
             whole = palpate.OccupancyGrid(
                 grid.label, grid.log_odds, cell_mm=grid.cell_mm, origin_mm=grid.origin_mm
             )  # without symmetry
@@ -170,38 +157,45 @@ def bin_deviations(belief: palpate.PoseHistogram, maps: Maps, touch: palpate.Tou
         logs = belief.log_likelihood(i).reshape(-1)
         for bin_ in random.integers(len(logs), size=SAMPLED).tolist():
             pose = belief.lattice.T_object_robot(bin_)
-            deviations.append(
-                float(logs[bin_]) - reference.log_likelihood(touch, pose, grid, contact)
-            )
+            expected = reference.log_likelihood(touch, pose, grid, contact)
+            deviations.append(float(logs[bin_]) - expected)
     return deviations
 
 
-def measure_particles(device: palpate.Device, maps: Maps, trials: Trials, **options: Any) -> Json:
-    """The same of the particle filter or Augmented MCL over all trials; trial i has the seed 1 + i.
+def measure_particles(
+    device: palpate.Device, maps: Maps, trials: Trials, kind: str, particles: int
+) -> Json:
+    """The same of a particle filter over all trials; trial i has the seed 1 + i.
 
-    The deviation is that of the weights after one touch, which nothing has resampled yet. Weights are
-    relative, so both sides are taken relative to the heaviest particle.
+    kind: "particles", "systematic" or "augmented". The deviation is that of the weights after one
+    touch, which nothing has resampled yet. Weights are relative, so both sides are taken relative to
+    the heaviest particle.
     """
-    costs = Costs()
-    most_bytes = 0
-    for seed, trial in enumerate([*trials, trials[0]], start=1):
-        belief = palpate.ParticleFilter(device, maps, lattice_of(1, 1, 1), seed=seed, **options)
-        if seed <= len(trials):
-            costs.run(belief, maps, trial)
-            most_bytes = max(most_bytes, belief.device_bytes)
-    augmented, systematic = (
-        options["augmented"],
-        options["resampling"] == palpate.Resampling.systematic,
-    )
-    kind = "augmented" if augmented else "systematic" if systematic else "particles"
-    record = costs.record(kind, maps[0].cell_mm, options["particles"], most_bytes)
+    resampling = "systematic" if kind == "systematic" else "multinomial"
+
+    def filter_of(seed: int) -> palpate.ParticleFilter:
+        return palpate.ParticleFilter(
+            device,
+            maps,
+            lattice_of(1, 1, 1),
+            seed=seed,
+            particles=particles,
+            resampling=palpate.Resampling[resampling],
+            augmented=kind == "augmented",
+        )
+
+    ends, most_bytes = [], 0
+    for seed, trial in enumerate(trials, start=1):
+        belief = filter_of(seed)
+        ends.append(follow(belief, maps, trial))
+        most_bytes = max(most_bytes, belief.device_bytes)
+    record = costs_record(kind, maps[0].cell_mm, particles, most_bytes, ends)
     modes_mm = [
-        error_of(maps[end["mode"].object], trial, end["mode"])
-        for trial, end in zip(trials, costs.last, strict=True)
+        error_of(end["grid"], truth_of(trial), end["mode"])
+        for trial, end in zip(trials, ends, strict=True)
     ]
-    set_errors(record, modes_mm, [None] * len(trials))
-    record["nearest_bin_mm"] = None
-    touch = trials[0][0]
+    record |= errors_of(modes_mm, [None] * len(trials)) | {"nearest_bin_mm": None}
+    touch, belief = trials[0][0], filter_of(len(trials) + 1)
     belief.update(touch)
     objects, poses, weights = belief.particles()
     contact = palpate.ContactModel(prior=maps[0].prior)
@@ -210,13 +204,10 @@ def measure_particles(device: palpate.Device, maps: Maps, trials: Trials, **opti
         return reference.log_likelihood(touch, poses[i], maps[objects[i]], contact)
 
     heaviest = int(numpy.argmax(weights))
+    expected = log_likelihood(heaviest)
     drawn = numpy.random.default_rng(7).integers(len(weights), size=SAMPLED * len(maps)).tolist()
     record["deviation_nats"] = deviation_record(
-        [
-            math.log(weights[i] / weights[heaviest])
-            - (log_likelihood(i) - log_likelihood(heaviest))
-            for i in drawn
-        ]
+        [math.log(weights[i] / weights[heaviest]) - (log_likelihood(i) - expected) for i in drawn]
     )
     return record
 
@@ -231,9 +222,6 @@ def measure_bounds(device: palpate.Device, maps: Maps, trials: Trials, bins: Bin
     lattice = lattice_of(*bins)
     bounded = palpate.BoundedPosterior(device, maps, lattice)
     histogram = palpate.PoseHistogram(device, maps, lattice)
-    seconds: dict[str, dict[str, list[float]]] = {
-        name: {"once": [], "each_touch": []} for name in ("histogram", "bounded")
-    }
 
     def ask(belief: Any, parts: Sequence[palpate.Recording]) -> float:
         belief.reset()
@@ -243,12 +231,14 @@ def measure_bounds(device: palpate.Device, maps: Maps, trials: Trials, bins: Bin
             belief.estimate()
         return time.perf_counter() - start
 
+    beliefs = {"bounded": bounded, "histogram": histogram}
+    seconds: dict[str, Json] = {name: {"once": [], "each_touch": []} for name in beliefs}
     checks, evaluated = [], []
-    for belief in (bounded, histogram):
+    for belief in beliefs.values():
         ask(belief, [trials[0]])  # warms up
     for trial in trials:
-        for name, belief in (("bounded", bounded), ("histogram", histogram)):
-            one_by_one = [trial[i : i + 1] for i in range(len(trial))]
+        one_by_one = [trial[i : i + 1] for i in range(len(trial))]
+        for name, belief in beliefs.items():
             seconds[name]["each_touch"].append(ask(belief, one_by_one))
             seconds[name]["once"].append(ask(belief, [trial]))
         checks.append(check_certificate(bounded, dense_posterior(histogram, maps, trial)))
@@ -256,7 +246,8 @@ def measure_bounds(device: palpate.Device, maps: Maps, trials: Trials, bins: Bin
         assert certificate is not None
         evaluated.append(certificate.bins_evaluated)
     times = {
-        name: {asked: median(of) for asked, of in both.items()} for name, both in seconds.items()
+        name: {asked: median_low(of) for asked, of in both.items()}
+        for name, both in seconds.items()
     }
     in_all = lattice.bins * len(maps)
     faster = times["bounded"]["once"] < times["histogram"]["once"]
@@ -267,8 +258,8 @@ def measure_bounds(device: palpate.Device, maps: Maps, trials: Trials, bins: Bin
         "bins_in_all": in_all,
         "trials": len(trials),
         **times,
-        "bins_evaluated": median(evaluated),
-        "share_evaluated": median(evaluated) / in_all,
+        "bins_evaluated": median_low(evaluated),
+        "share_evaluated": median_low(evaluated) / in_all,
         "certificate": max(check.promised for check in checks),
         "measured_error": max(check.measured for check in checks),
         "certificates_hold": sum(check.holds for check in checks),

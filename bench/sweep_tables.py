@@ -7,8 +7,6 @@ from palpate._tables import (
     mean_text,
     number,
     plain,
-    print_head,
-    print_row,
     print_table,
     seconds_text,
 )
@@ -45,7 +43,7 @@ RUNS: list[Column] = [
     ("refined: median, mm", "refined_error_mm/median", _MM),
     ("least probability", "least_confidence", number(".6f")),
 ]
-_PRINTED = RUNS[:20]  # the page has more
+PRINTED = RUNS[:20]  # the page has more
 PRECISIONS: list[Column] = [
     ("evaluated by", "path", plain),
     ("bins per object", "count", count_text),
@@ -109,16 +107,6 @@ VERDICTS: list[Column] = [
 def steps_of(document: Json) -> list[Json]:
     """What every doubling of the bins changed, of all knees."""
     return [step for knee in document["knees"] for step in knee["steps"]]
-
-
-def print_point_head() -> None:
-    """The head of the table of all runs."""
-    print_head(_PRINTED)
-
-
-def print_point(point: Json) -> None:
-    """A run, as soon as it is known."""
-    print_row(_PRINTED, point)
 
 
 def print_document(document: Json) -> None:

@@ -2,11 +2,14 @@
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
+from typing import Any, NamedTuple
 
 import numpy
 from numpy.typing import ArrayLike, NDArray
 
 import palpate
+from palpate._sweep_runs import counts_of
+from palpate._tables import plain
 
 from .random_numbers import Random, Stream
 
@@ -62,14 +65,10 @@ def letter_maps(
     """The letters' maps, which share the prior that their touches give, with their symmetries."""
     training = training_recordings() if training is None else training
     touches = {recording.object: list(recording) for recording in training}
-    prior = palpate.estimate_prior(
-        device, touches, cell_mm=cell_mm, sensor=palpate.InverseSensorModel(spread_mm=spread_mm)
-    )
-    builder = palpate.MapBuilder(
-        device,
-        cell_mm=cell_mm,
-        sensor=palpate.InverseSensorModel(spread_mm=spread_mm, prior=prior),
-    )
+    sensor = palpate.InverseSensorModel(spread_mm=spread_mm)
+    prior = palpate.estimate_prior(device, touches, cell_mm=cell_mm, sensor=sensor)
+    sensor = palpate.InverseSensorModel(spread_mm=spread_mm, prior=prior)
+    builder = palpate.MapBuilder(device, cell_mm=cell_mm, sensor=sensor)
     maps = []
     for label, of_letter in touches.items():
         builder.clear()
@@ -148,18 +147,12 @@ def lattice_of(
     )
 
 
-def counts_of(lattice: palpate.PoseLattice) -> tuple[int, int, int]:
-    """Bins along x, y and theta."""
-    return lattice.x_mm.count, lattice.y_mm.count, lattice.theta_rad.count
-
-
 def size_of(lattice: palpate.PoseLattice) -> str:
     """Its numbers of bins, such as "25x25x16"."""
-    return "x".join(map(str, counts_of(lattice)))
+    return plain(counts_of(lattice))
 
 
-@dataclass(frozen=True)
-class Body:
+class Body(NamedTuple):
     """The cells with log odds above 0, of uniform density."""
 
     centroid_mm: Floats  #: [2] in the object frame
@@ -173,8 +166,7 @@ class Body:
         return Body(centroid_mm, float(((cells_mm - centroid_mm) ** 2).sum(axis=1).mean()))
 
 
-@dataclass(frozen=True)
-class Step:
+class Step(NamedTuple):
     """What a belief says of an unknown whose truth is known."""
 
     #: Probability of every map.
@@ -188,6 +180,13 @@ class Step:
     refined_error_mm: float | None
 
 
+def error_of(grid: palpate.OccupancyGrid, truth: palpate.Truth, pose: Any) -> float | None:
+    """The error of a mode or a refined pose on a map; None where the map is of another object."""
+    if pose is None or grid.label != truth.object:
+        return None
+    return palpate.pose_error_mm(grid, pose.T_object_robot, truth.T_object_robot)
+
+
 def judged(
     belief: palpate.PoseHistogram, maps: Sequence[palpate.OccupancyGrid], truth: palpate.Truth
 ) -> Step:
@@ -197,13 +196,7 @@ def judged(
     none = estimate.none or 0.0
     best = int(numpy.argmax(estimate.identity))
     right = bool(maps[best].label == truth.object and estimate.identity[best] >= none)
-    located = maps[mode.object]
-    errors = [
-        palpate.pose_error_mm(located, pose.T_object_robot, truth.T_object_robot)
-        if located.label == truth.object
-        else None
-        for pose in (mode, refined)
-    ]
+    errors = [error_of(maps[mode.object], truth, pose) for pose in (mode, refined)]
     return Step(numpy.array(estimate.identity), none, right, mode, refined, *errors)
 
 

@@ -2,8 +2,8 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy
 
@@ -21,8 +21,7 @@ _REFINED_REACH_MM = 4.0
 _SECTORS = 8
 
 
-@dataclass(frozen=True)
-class Placed:
+class Placed(NamedTuple):
     """An object and where it is."""
 
     body: Body

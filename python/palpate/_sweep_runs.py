@@ -4,12 +4,13 @@ import json
 import math
 import os
 from dataclasses import dataclass, field
+from statistics import median_low
 from typing import Any
 
 from . import _palpate
 from ._error import Error
 from ._palpate import Device, Hypothesis, PoseLattice, pose_error_mm
-from ._statistics import Errors, errors_over, median
+from ._statistics import Errors, errors_over
 from .recognition import Record, request_of
 
 _FEWEST_BINS = 1e3  # of the coarsest lattice; of a small region, a thirtieth of the finest one's
@@ -65,7 +66,7 @@ class Data:
         for record in records:
             if "error" in record:
                 raise Error(record["error"])
-        return records, median([seconds for _, _, seconds in lines[:unknowns]])
+        return records, median_low([seconds for _, _, seconds in lines[:unknowns]])
 
 
 def counts_of(lattice: PoseLattice) -> tuple[int, int, int]:
@@ -130,7 +131,7 @@ class Run:
                 else:
                     distances.append(pose_error_mm(data.maps[here].map, a, b))
             self.from_finest_mm[kind] = distances
-            self.point[name] = errors_record(distances)
+            self.point[name] = errors_over(distances, 20)
         same = sum(record["best"] == other["best"] for record, other in pairs)
         self.point["same_object"] = same / len(pairs)
 
@@ -139,14 +140,6 @@ class Run:
         """Share that is right or, where no label is known, as the finest run has it."""
         accuracy = self.point["accuracy"]
         return float(self.point["same_object"] if accuracy is None else accuracy)
-
-
-def errors_record(errors: Errors) -> Document | None:
-    """What errors are over those that there are; the 95th percentile is None for fewer than 20."""
-    over = errors_over(errors)
-    if over is None:
-        return None
-    return over | {"p95": over["p95"] if over["trials"] >= 20 else None}
 
 
 def measure(data: Data, lattice: PoseLattice, dense: int) -> Run:
@@ -187,8 +180,8 @@ def measure(data: Data, lattice: PoseLattice, dense: int) -> Run:
     for kind, name in (("mode", "error"), ("refined", "refined_error")):
         errors = [record.get(f"{name}_mm") for record in records]
         run.errors_mm[kind] = errors
-        point |= {f"{name}_mm": errors_record(errors), f"{name}s_mm": errors}
+        point |= {f"{name}_mm": errors_over(errors, 20), f"{name}s_mm": errors}
     sd = [record["refined"]["sd"] for record in records if "refined" in record]
-    point["sd_mm"] = median([math.hypot(x, y) for x, y, _ in sd]) if sd else None
-    point["sd_deg"] = median([math.degrees(theta) for _, _, theta in sd]) if sd else None
+    point["sd_mm"] = median_low([math.hypot(x, y) for x, y, _ in sd]) if sd else None
+    point["sd_deg"] = median_low([math.degrees(theta) for _, _, theta in sd]) if sd else None
     return run

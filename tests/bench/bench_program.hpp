@@ -3,12 +3,7 @@
 #include <sys/wait.h>
 
 #include <cstdlib>
-#include <filesystem>
 #include <string>
-
-#include <gtest/gtest.h>
-
-#include "io/scratch_folder.hpp"
 
 namespace palpate {
 
@@ -18,26 +13,6 @@ inline int run_bench(const std::string& arguments, const std::string& environmen
   const int status =
       std::system((environment + "'" PALPATE_BENCH "' " + arguments + " >/dev/null").c_str());
   return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
-}
-
-/// Expects that no file of the folder may be the run's --json as well, and that this is said before
-/// a device is opened.
-inline void expect_no_file_written_twice(const std::string& arguments,
-                                         const std::filesystem::path& folder) {
-  const ScratchFolder scratch;
-  const std::string messages = (scratch / "messages").string();
-  int files = 0;
-  for (const auto& entry : std::filesystem::directory_iterator(folder)) {
-    SCOPED_TRACE(entry.path().string());
-    const std::string before = bytes_of(entry.path());
-    EXPECT_EQ(run_bench(arguments + " --device nowhere --json " + entry.path().string() + " 2>" +
-                        messages),
-              2);
-    EXPECT_NE(bytes_of(messages).find("overwrite"), std::string::npos) << bytes_of(messages);
-    EXPECT_EQ(bytes_of(entry.path()), before);
-    ++files;
-  }
-  EXPECT_GT(files, 0);
 }
 
 }  // namespace palpate

@@ -6,8 +6,8 @@ import pathlib
 import pytest
 from conftest import Program, run
 
-from bench.experiment import ranges_of, standing
-from bench.experiment_files import FIGURES, TABLES
+from bench.experiment import TABLES, ranges_of, standing
+from bench.experiment_charts import FIGURES
 
 TRIALS, TOUCHES = 10, 9
 

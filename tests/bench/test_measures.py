@@ -8,22 +8,22 @@ import pytest
 import palpate
 from bench.certificates import log_sum_exp
 from bench.measures import (
-    Paired,
     bootstrap_mean_interval,
     bootstrap_ratio_interval,
     calibration,
+    differences,
+    gains,
     knee_of,
     mean_interval,
     normalised_error,
     pareto_front,
     told_apart,
-    told_apart_interval,
     wilson_interval,
 )
 from bench.random_numbers import MersenneTwister, Random, Stream, seed_sequence
 from bench.trials import Body, Touching, lattice_of, letter_maps, make_trials, truth_of
 from bench.windows import estimate_in_window, nearest_bin_mm, placed, windows_about
-from palpate._statistics import errors_over, median, quantile
+from palpate._statistics import errors_over, quantile
 
 
 def test_random_numbers_are_those_of_cpp() -> None:
@@ -65,10 +65,13 @@ def test_more_trials_and_touches_begin_with_the_same() -> None:
 
 def test_quantiles_and_errors() -> None:
     values = [5.0, 1.0, 4.0, 2.0, 3.0]
-    assert (median(values), quantile(values, 0.95), quantile(values, 0.2)) == (3.0, 5.0, 1.0)
+    assert (quantile(values, 0.5), quantile(values, 0.95), quantile(values, 0.2)) == (3.0, 5.0, 1.0)
+    assert quantile([2.0, 1.0], 0.5) == 1.0, "the lower of two"
     errors = errors_over([1.0, None, 3.0])
     assert errors is not None
     assert (errors["trials"], errors["mean"], errors["standard_error"]) == (2, 2.0, 1.0)
+    assert errors["p95"] == 3.0 and errors["median"] == 1.0
+    assert errors_over([1.0, 3.0], 20) == errors | {"p95": None}, "too few for a percentile"
     assert errors_over([None]) is None
 
 
@@ -78,7 +81,9 @@ def test_intervals() -> None:
     assert wilson_interval(0, 10) == pytest.approx((0.0, 0.27753), abs=1e-5)
     # Student's t for nine degrees of freedom is 2.262.
     values = [float(i) for i in range(10)]
-    low, high = mean_interval(values)
+    interval = mean_interval(values)
+    assert interval is not None and mean_interval([1.0, 2.0]) is None
+    low, high = interval
     assert (high - low) / 2 == pytest.approx(2.262 * math.sqrt(82.5 / 9 / 10), rel=1e-3)
     assert (low + high) / 2 == pytest.approx(4.5)
     # Of many values the bootstrap's interval is the normal one.
@@ -92,16 +97,16 @@ def test_intervals() -> None:
 
 
 def test_pairs_told_apart() -> None:
-    assert told_apart([0.0, 1.0], [2.0, 3.0]) == 1.0
-    assert told_apart([1.0], [1.0]) == 0.5
-    assert told_apart([0.0, 2.0], [1.0]) == 0.5
-    assert told_apart_interval([0.0] * 50, [1.0] * 90) == wilson_interval(50, 50)
+    assert told_apart([0.0, 1.0], [2.0, 3.0])[0] == 1.0
+    assert told_apart([1.0], [1.0])[0] == 0.5
+    assert told_apart([0.0, 2.0], [1.0])[0] == 0.5
+    assert told_apart([0.0] * 50, [1.0] * 90) == (1.0, wilson_interval(50, 50))
 
 
 def test_calibration_weighs_bins_by_their_counts() -> None:
     told = calibration([0.95, 0.95, 0.95, 0.55], [True, True, False, True])
     assert told["expected_error"] == pytest.approx(0.75 * (0.95 - 2 / 3) + 0.25 * 0.45)
-    assert [part["count"] for part in told["bins"]] == [1, 3]  # type: ignore[attr-defined]
+    assert [part["count"] for part in told["bins"]] == [1, 3]
 
 
 def test_knees_and_fronts() -> None:
@@ -109,9 +114,18 @@ def test_knees_and_fronts() -> None:
     assert knee_of([coarse, fine, fine]) == 1
     assert knee_of([coarse, fine]) is None, "no finer run confirms the last"
     assert knee_of([[None, 0.5, 0.5], fine, fine]) == 1, "one trial is not located"
-    assert Paired.of(coarse, fine).gain and not Paired.of(fine, coarse).gain
-    assert not Paired.of([1.0], [0.1]).gain, "a single trial tells nothing"
-    assert pareto_front([(3.0, 1.0), (1.0, 3.0), (2.0, 3.0), (2.0, 2.0)]) == [1, 3, 0]
+    assert gains(coarse, fine) and not gains(fine, coarse)
+    assert not gains([1.0], [0.1]), "a single trial tells nothing"
+    paired = differences([0.5, None, 0.7], [1.0, 1.1, 0.8])
+    assert paired is not None and paired["trials"] == 2, "trials that both locate"
+    assert (paired["from"], paired["to"]) == pytest.approx((0.9, 0.6))
+    assert paired["mean"] == pytest.approx(-0.3)
+    assert differences([None], [1.0]) is None
+    entries = [
+        {"cost": cost, "error": error}
+        for cost, error in ((3.0, 1.0), (1.0, 3.0), (2.0, 3.0), (2.0, 2.0))
+    ]
+    assert pareto_front(entries) == [entries[1], entries[3], entries[0]]
 
 
 def test_log_sum_exp_neither_overflows_nor_loses() -> None:

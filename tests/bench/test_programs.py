@@ -1,13 +1,17 @@
 """The other programs with small settings: their documents are whole, and keep what must hold."""
 
 import html.parser
+import json
 import math
+import os
 import pathlib
+import subprocess
 from typing import Any
 
 import pytest
 from conftest import Program, run
 
+import palpate
 from bench.sweep import auto_rule_of
 
 
@@ -125,6 +129,22 @@ def test_certificates_hold(tmp_path: pathlib.Path) -> None:
                 assert measured <= promised + 1e-11 <= 1e-6 + 1e-11
     missing = run("bench.bounded", "--part", "presses", "--presses", tmp_path / "missing")
     assert missing.returncode == 2 and "holds no recording" in missing.stderr
+
+
+def test_times_become_charts(tmp_path: pathlib.Path, device: palpate.Device) -> None:
+    times = {}
+    for part in ("growth", "search"):
+        file = tmp_path / f"{part}.json"
+        flags = ["--quick", "--part", part, "--json", str(file), "--device", device.name]
+        subprocess.run([os.environ["PALPATE_BENCH"], "bounded", *flags], check=True, timeout=300)
+        times[part] = json.loads(file.read_text())[part]
+    file = tmp_path / "times.json"
+    file.write_text(json.dumps(times))
+    drawn = ("--quick", "--plots", tmp_path / "plots", "--times")
+    Program(tmp_path, "bench.bounded", *drawn, file).expect_charts("bounded_growth")
+    assert (tmp_path / "plots/bounded_search.png").stat().st_size > 10_000
+    partial = run("bench.bounded", *drawn, tmp_path / "growth.json")
+    assert partial.returncode == 2 and "holds no search" in partial.stderr
 
 
 @pytest.fixture(scope="module")

@@ -1,4 +1,4 @@
-#include "glyph_scene.hpp"
+#include "letters.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -10,7 +10,7 @@
 
 #include "palpate/error.hpp"
 
-namespace palpate::bench::glyph_scene_test {
+namespace palpate::bench::letters_test {
 
 double pressed(const Recording& recording) {
   return std::accumulate(recording.pressure.begin(), recording.pressure.end(), 0.0);
@@ -56,4 +56,4 @@ TEST(GlyphScene, RefusesMoreObjectsThanThereAre) {
   EXPECT_THROW(glyph_recordings(most_glyphs + 1), Error);
 }
 
-}  // namespace palpate::bench::glyph_scene_test
+}  // namespace palpate::bench::letters_test
