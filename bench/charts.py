@@ -39,7 +39,7 @@ matplotlib.rcParams.update(
 #: Marks stand out from lines and from each other.
 EDGE: dict[str, Any] = {"markeredgecolor": "white"}
 HOLLOW: dict[str, Any] = {"markerfacecolor": "white"}
-#: Two of a kind, which share a colour.
+#: Looks of two series that share a colour.
 SOLID: dict[str, Any] = {"marker": "o", "linestyle": "-"} | EDGE
 DASHED: dict[str, Any] = {"marker": "s", "linestyle": "--"} | HOLLOW
 

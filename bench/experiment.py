@@ -88,6 +88,7 @@ class Filters(NamedTuple):
 def _run(
     kind: str, size: str, count: int, records: Sequence[palpate.Record], start: float
 ) -> FilterRun:
+    """The run whose filter, with its size, gave the records of all trials since the start."""
     steps: list[list[Json]] = [record["trace"] for record in records]
     every = [step for of_trial in steps for step in of_trial]
     record = {

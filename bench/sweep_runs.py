@@ -29,7 +29,7 @@ AUTO_RULE = 100_000
 
 
 def first_each(of_trials: Sequence[T], each: int) -> list[T]:
-    """What belongs to the first trials of every letter, of what belongs to all of them."""
+    """Picks what belongs to the first `each` trials of every letter, of all trials in order."""
     of_letter = len(of_trials) // len(VOWELS)
     return [of_trial for i, of_trial in enumerate(of_trials) if i % of_letter < each]
 
@@ -162,7 +162,7 @@ def bin_deviations(belief: palpate.PoseHistogram, maps: Maps, touch: palpate.Tou
 def measure_particles(
     device: palpate.Device, maps: Maps, trials: Trials, kind: str, particles: int
 ) -> Json:
-    """The same of a particle filter over all trials; trial i has the seed 1 + i.
+    """What a particle filter costs and what it is worth over all trials; trial i has the seed 1 + i.
 
     kind: "particles", "systematic" or "augmented". The deviation is that of the weights after one
     touch, which nothing has resampled yet. Weights are relative, so both sides are taken relative to

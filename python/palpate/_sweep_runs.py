@@ -41,7 +41,7 @@ class Data:
         return _palpate.OpenBatch.open(head, self.device, threads)
 
     def on(self, lattice: PoseLattice, filter: str) -> "_palpate.OpenBatch":
-        """The same on given bins."""
+        """The batch of all recordings on given bins."""
         x, y, theta = lattice.x_mm, lattice.y_mm, lattice.theta_rad
         return self.open(
             bins=counts_of(lattice),
