@@ -71,7 +71,8 @@ def measure_slip(inputs: Inputs) -> list[Json]:
         slipping(trial, Body.of(inputs.maps[i // each]).centroid_mm, step, WALK_SEED + i)
         for i, trial in enumerate(make_trials(VOWELS, each, touches, SLIP_SEED))
     ]
-    rows, records = [], []
+    rows: list[tuple[Any, ...]] = []
+    records = []
     for name, slip_sd, most in (("with slip_sd", step, 1.0), ("without", (0.0, 0.0), None)):
         belief = inputs.histogram(lattice, slip_sd=slip_sd)
         errors: list[Errors] = []  # [unknown][touch]
@@ -91,9 +92,7 @@ def measure_slip(inputs: Inputs) -> list[Json]:
             rows.append(Measurement(name_of, fmean(means), "mm", goal, interval=interval))
         by_touch = [present([of[i] for of in errors]) for i in range(touches)]
         share = 100.0 * sum(map(len, by_touch)) / (touches * len(walks))
-        rows.append(
-            Measurement(f"{name}: touches at which the mode has the right letter", share, "%")
-        )
+        rows.append((f"{name}: touches at which the mode has the right letter", share, "%"))
         curve = [
             {"touches": i, "located": len(of), "mode_mm": fmean(of) if of else None}
             for i, of in enumerate(by_touch, start=1)
@@ -138,38 +137,34 @@ def measure_plan(inputs: Inputs) -> list[Json]:
                 belief.update(test_set[left.pop(following)])
                 probability = max(float(belief.estimate().identity[label]), numpy.finfo(float).tiny)
                 of_order[-1].append((belief.entropy(), -math.log(probability)))
-    after = {
-        (order, touch): [of[touch - 1][0] for of in all_of]
-        for order, all_of in told.items()
-        for touch in range(1, touches + 1)
-    }
-    rows = [
-        mean_of(f"entropy, {order}, touch {touch}", after[order, touch], "nats")
-        for touch in range(1, touches + 1)
+    # [order][touch] of every unknown
+    entropy, loss = (
+        {order: list(zip(*[[both[i] for both in of] for of in all_of], strict=True))
+         for order, all_of in told.items()}
+        for i in (0, 1)
+    )  # fmt: skip
+    rows: list[tuple[Any, ...]] = [
+        mean_of(f"entropy, {order}, touch {touch + 1}", entropy[order][touch], "nats")
+        for touch in range(touches)
         for order in told
     ]
     for planned, random in ((3, 4), (4, 6), (5, 7)):
         if random <= touches:
-            pairs = zip(after["planned", planned], after["random", random], strict=True)
+            pairs = zip(entropy["planned"][planned - 1], entropy["random"][random - 1], strict=True)
             name = f"{planned} planned above {random} random"
             rows.append(mean_of(name, [a - b for a, b in pairs], "nats", 0.1))
-    rows.append(Measurement("plan, median", median_low(milliseconds), "ms"))
+    rows.append(("plan, median", median_low(milliseconds), "ms"))
     facts = {"unknowns": len(told["random"]), "bins": size_of(lattice)}
     inputs.report.add("planned touches", facts, rows)
-    return [
-        {
-            "order": order,
-            "curve": [
-                {
-                    "touches": touch,
-                    "entropy": mean_record(after[order, touch]),
-                    "log_loss": mean_record([of[touch - 1][1] for of in all_of]),
-                }
-                for touch in range(1, touches + 1)
-            ],
-        }
-        for order, all_of in told.items()
-    ]
+    records: list[Json] = []
+    for order in told:
+        of_touches = zip(entropy[order], loss[order], strict=True)
+        curve = [
+            {"touches": touch, "entropy": mean_record(nats), "log_loss": mean_record(lost)}
+            for touch, (nats, lost) in enumerate(of_touches, start=1)
+        ]
+        records.append({"order": order, "curve": curve})
+    return records
 
 
 # Time and memory of all these.
@@ -192,37 +187,33 @@ def measure_costs(inputs: Inputs) -> list[Json]:
     lattice = lattice_of(30, 30, 113) if inputs.quick else lattice_of(100, 100, 100)
     repeats = 3 if inputs.quick else 9
     beliefs = [
-        inputs.histogram(lattice, **options)
-        for options in (
-            {},
-            {"touch_sd": COST_SD},
-            {"slip_sd": (0.3, math.pi / 180.0)},
-            {"none_weight": float(len(inputs.maps))},
-        )
+        inputs.histogram(lattice),
+        inputs.histogram(lattice, touch_sd=COST_SD),
+        inputs.histogram(lattice, slip_sd=(0.3, math.pi / 180.0)),
+        inputs.histogram(lattice, none_weight=float(len(inputs.maps))),
     ]
-    taken: list[list[float]] = [[] for _ in beliefs]
-    for i in range(repeats + 1):  # the first touch warms up; the object slips before the second
-        for belief, milliseconds in zip(beliefs, taken, strict=True):
-            milliseconds.append(_ms(belief.update, touches[i % len(touches)]))
-    ms = [median_low(each[1:]) for each in taken]
+    # The first touch warms up; the object slips before the second.
+    taken = [
+        [_ms(belief.update, touches[i % len(touches)]) for belief in beliefs]
+        for i in range(repeats + 1)
+    ]
+    ms = [median_low(of) for of in zip(*taken[1:], strict=True)]
     memory = [belief.device_bytes / beliefs[0].device_bytes for belief in beliefs]
-    inputs.report.add(
-        f"touch {size_of(lattice)}",
-        sizes | {"slip_sd": "0.3 mm, 1 degree", "repeats": repeats},
-        [
-            Measurement("plain touch, median", ms[0], "ms"),
-            Measurement("uncertain touch, median", ms[1], "ms"),
-            Measurement("uncertain over plain", ms[1] / ms[0], "times", at_most=2.5),
-            Measurement("touch after a slip over plain", ms[2] / ms[0], "times"),
-            Measurement("touch with none of these over plain", ms[3] / ms[0], "times"),
-            Measurement("memory, uncertain over plain", memory[1], "times", at_most=2.0),
-            Measurement("memory, slip over plain", memory[2], "times", at_most=2.0),
-            Measurement("memory, none of these over plain", memory[3], "times", at_most=2.0),
-        ],
-    )
+    rows: list[tuple[Any, ...]] = [
+        ("plain touch, median", ms[0], "ms"),
+        ("uncertain touch, median", ms[1], "ms"),
+        ("uncertain over plain", ms[1] / ms[0], "times", 2.5),
+        ("touch after a slip over plain", ms[2] / ms[0], "times"),
+        ("touch with none of these over plain", ms[3] / ms[0], "times"),
+        ("memory, uncertain over plain", memory[1], "times", 2.0),
+        ("memory, slip over plain", memory[2], "times", 2.0),
+        ("memory, none of these over plain", memory[3], "times", 2.0),
+    ]
+    facts = sizes | {"slip_sd": "0.3 mm, 1 degree", "repeats": repeats}
+    inputs.report.add(f"touch {size_of(lattice)}", facts, rows)
     del beliefs
     small, repeats = lattice_of(25, 25, 16), 20 if inputs.quick else 300
-    latencies: list[list[float]] = []
+    latencies = []
     for sd in ((0.0, 0.0), COST_SD):
         belief = inputs.histogram(small, touch_sd=sd)
 
@@ -232,46 +223,35 @@ def measure_costs(inputs: Inputs) -> list[Json]:
 
         latencies.append([_ms(ask, i) for i in range(repeats + 1)][1:])
     plain, uncertain = latencies
-    inputs.report.add(
-        f"latency {size_of(small)}, uncertain",
-        sizes | {"repeats": repeats},
-        [
-            Measurement("touch to estimate, median", median_low(uncertain), "ms", at_most=8.0),
-            Measurement("95th percentile", quantile(uncertain, 0.95), "ms"),
-            Measurement("plain touch to estimate, median", median_low(plain), "ms"),
-        ],
-    )
+    rows = [
+        ("touch to estimate, median", median_low(uncertain), "ms", 8.0),
+        ("95th percentile", quantile(uncertain, 0.95), "ms"),
+        ("plain touch to estimate, median", median_low(plain), "ms"),
+    ]
+    name = f"latency {size_of(small)}, uncertain"
+    inputs.report.add(name, sizes | {"repeats": repeats}, rows)
     # Places all over the unknown, which the robot could press next.
     T_robot_object = palpate.inverse(truth_of(unknowns[0]).T_object_robot)
-    places = [
-        palpate.compose(T_robot_object, pose) for pose in palpate.random_poses(200, COST_SEED)
-    ]
-    candidates, repeats, plans = numpy.array(places), 2 if inputs.quick else 15, []
+    candidates = numpy.array(
+        [palpate.compose(T_robot_object, pose) for pose in palpate.random_poses(200, COST_SEED)]
+    )
+    repeats, elements_mm, plans = 2 if inputs.quick else 15, unknowns[0].elements_mm, []
     for sd in ((0.0, 0.0), COST_SD):
         belief = inputs.histogram(small, touch_sd=sd)
         belief.update(unknowns[0][:3])
-        elements_mm = unknowns[0].elements_mm
-        taken_ms = [_ms(belief.expected_gain, candidates, elements_mm) for _ in range(repeats + 1)]
-        plans.append(median_low(taken_ms[1:]))
-    inputs.report.add(
-        f"plan {size_of(small)}",
-        {"objects": len(inputs.maps), "candidates": len(candidates), "repeats": repeats},
-        [
-            Measurement("exact touches, median", plans[0], "ms", at_most=150.0),
-            Measurement("uncertain touches, median", plans[1], "ms"),
-        ],
-    )
+        plan_ms = [_ms(belief.expected_gain, candidates, elements_mm) for _ in range(repeats + 1)]
+        plans.append(median_low(plan_ms[1:]))
+    rows = [
+        ("exact touches, median", plans[0], "ms", 150.0),
+        ("uncertain touches, median", plans[1], "ms"),
+    ]
+    facts = {"objects": len(inputs.maps), "candidates": len(candidates), "repeats": repeats}
+    inputs.report.add(f"plan {size_of(small)}", facts, rows)
     if not inputs.quick:
         large = lattice_of(200, 200, 250)
         belief = inputs.histogram(large, touch_sd=COST_SD)
         seconds = _ms(belief.update, touches[0]) / 1e3
         mib = belief.device_bytes / (1 << 20)
-        inputs.report.add(
-            f"touch {size_of(large)}",
-            sizes,
-            [
-                Measurement("device memory", mib, "MiB", at_most=2048.0),
-                Measurement("uncertain touch", seconds, "s"),
-            ],
-        )
+        rows = [("device memory", mib, "MiB", 2048.0), ("uncertain touch", seconds, "s")]
+        inputs.report.add(f"touch {size_of(large)}", sizes, rows)
     return []

@@ -78,41 +78,18 @@ def misplaced_errors(
 ) -> Json:
     """[unknown] How well a belief knows its unknowns, and how well it knows that."""
     labels = [grid.label for grid in inputs.maps]
-    errors: Json = {
-        "right": [step.right for step in steps],
+    errors: Json = {"log_loss": [], "normalised_error": []}
+    for step, truth in zip(steps, map(truth_of, trials), strict=True):
         # -log of the true letter's probability; a double still has it at full precision.
-        "log_loss": [
-            -math.log(max(float(step.identity[labels.index(truth_of(trial).object)]), 1e-300))
-            for step, trial in zip(steps, trials, strict=True)
-        ],
+        probability = float(step.identity[labels.index(truth.object)])
+        errors["log_loss"].append(-math.log(max(probability, 1e-300)))
+        if step.error_mm is not None:
+            located, pose = inputs.maps[step.mode.object], truth.T_object_robot
+            errors["normalised_error"].append(normalised_error(located, step.refined, pose))
+    return errors | {
         "mode_mm": [step.error_mm for step in steps],
         "refined_mm": [step.refined_error_mm for step in steps],
     }
-    errors["normalised_error"] = [
-        None
-        if step.error_mm is None
-        else normalised_error(inputs.maps[step.mode.object], step.refined, truth.T_object_robot)
-        for step, truth in zip(steps, map(truth_of, trials), strict=True)
-    ]
-    return errors
-
-
-def misplaced_rows(belief: str, errors: Json, touches: int, goals: bool) -> list[Measurement]:
-    """A belief's errors; goals: whether they are held to goals."""
-    right, normalised = errors["right"], present(errors["normalised_error"])
-    late = goals and touches >= 5
-    rows = [
-        share_of(f"{belief}: right", sum(right), len(right)),
-        mean_of(f"{belief}: log-loss of identity", errors["log_loss"], "nats",
-                0.02 if goals and touches == 5 else None),
-        mean_of(f"{belief}: mode's error", present(errors["mode_mm"]), "mm"),
-        mean_of(f"{belief}: refined error", present(errors["refined_mm"]), "mm"),
-        mean_of(f"{belief}: squared error over covariance", normalised, "of 3", 4.0 if late else None),
-    ]  # fmt: skip
-    if late:
-        name = f"{belief}: the same, at least"
-        rows.append(Measurement(name, fmean(normalised), "of 3", at_least=2.0))
-    return [*rows, Measurement(f"{belief}: the same, median", median_low(normalised), "of 2.4")]
 
 
 def measure_misplaced(inputs: Inputs) -> list[Json]:
@@ -128,34 +105,41 @@ def measure_misplaced(inputs: Inputs) -> list[Json]:
             belief = inputs.histogram(lattice, touch_sd=touch_sd)
             steps[name] = [steps_after(belief, inputs.maps, trial, counts) for trial in trials]
         for i, touches in enumerate(counts):
-            goals = noise[0] == 1.0
-            rows: list[Measurement] = []
-            both: dict[str, Json] = {}
+            rows: list[tuple[Any, ...]] = []
+            refined_mm = {}
             for name, of in steps.items():
-                errors = both[name] = misplaced_errors(inputs, [each[i] for each in of], trials)
-                rows += misplaced_rows(name, errors, touches, goals and name == "averaged")
+                after = [each[i] for each in of]
+                right = sum(step.right for step in after)
+                errors = misplaced_errors(inputs, after, trials)
+                refined_mm[name] = errors["refined_mm"]
+                goals = noise[0] == 1.0 and name == "averaged"
+                loss, nees = errors["log_loss"], errors["normalised_error"]
+                most, least = (4.0, 2.0) if goals and touches >= 5 else (None, None)
+                rows += [
+                    share_of(f"{name}: right", right, len(trials)),
+                    mean_of(f"{name}: log-loss of identity", loss, "nats",
+                            0.02 if goals and touches == 5 else None),
+                    mean_of(f"{name}: mode's error", present(errors["mode_mm"]), "mm"),
+                    mean_of(f"{name}: refined error", present(refined_mm[name]), "mm"),
+                    mean_of(f"{name}: squared error over covariance", nees, "of 3", most),
+                ]  # fmt: skip
+                if least:
+                    rows.append((f"{name}: the same, at least", fmean(nees), "of 3", None, least))
+                rows.append((f"{name}: the same, median", median_low(nees), "of 2.4"))
                 records.append(
-                    {"noise_mm": noise[0], "noise_rad": noise[1], "touches": touches, "belief": name,
-                     "right": sum(errors["right"]), "unknowns": len(trials)}
-                    | {key: mean_record(present(errors[key]))
-                       for key in ("log_loss", "mode_mm", "refined_mm", "normalised_error")}
-                )  # fmt: skip
-            exact, averaged = (both[name]["refined_mm"] for name in ("as if exact", "averaged"))
-            pairs = [(a, b) for a, b in zip(averaged, exact, strict=True) if None not in (a, b)]
-            above, below = [a for a, _ in pairs], [b for _, b in pairs]
-            rows.append(
-                Measurement(
-                    "refined error, averaged over as if exact",
-                    fmean(above) / fmean(below),
-                    "times",
-                    0.85 if goals and touches >= 9 else None,
-                    interval=bootstrap_ratio_interval(above, below),
+                    {"noise_mm": noise[0], "noise_rad": noise[1], "touches": touches}
+                    | {"belief": name, "right": right, "unknowns": len(trials)}
+                    | {key: mean_record(present(of_key)) for key, of_key in errors.items()}
                 )
-            )
+            both = zip(refined_mm["averaged"], refined_mm["as if exact"], strict=True)
+            above, below = zip(*[pair for pair in both if None not in pair], strict=True)
+            name, ratio = "refined error, averaged over as if exact", fmean(above) / fmean(below)
+            most = 0.85 if noise[0] == 1.0 and touches >= 9 else None
+            interval = bootstrap_ratio_interval(above, below)
+            rows.append(Measurement(name, ratio, "times", most, interval=interval))
             facts = {"unknowns": len(trials), "bins": size_of(lattice)}
-            inputs.report.add(
-                f"off by {noise[0]:g} mm, {noise[1]:g} rad, touch {touches}", facts, rows
-            )
+            name = f"off by {noise[0]:g} mm, {noise[1]:g} rad, touch {touches}"
+            inputs.report.add(name, facts, rows)
     return records
 
 
@@ -203,19 +187,16 @@ def measure_touch_sd(inputs: Inputs) -> list[Json]:
             {"mm": fit[name]["mm"], "rad": math.radians(fit[name]["deg"])}
             for name in ("touch_sd", "standard_error")
         )
-        rows = []
+        rows: list[tuple[Any, ...]] = []
         for name, unit in (("along x and y", "mm"), ("angle", "rad")):
-            rows.append(Measurement(f"{name}, fitted", found[unit], unit))
-            rows.append(Measurement(f"{name}, standard error", error[unit], unit))
+            rows.append((f"{name}, fitted", found[unit], unit))
+            rows.append((f"{name}, standard error", error[unit], unit))
             if mm > 0.0:
                 share = found[unit] / sd[unit]
-                rows.append(Measurement(f"{name}, fitted over true", share, "of 1"))
-                off = 100.0 * abs(share - 1.0)
-                rows.append(Measurement(f"{name}, off by", off, "%", at_most=20.0))
-        rows.append(
-            Measurement("log evidence above exact poses'", fit["log_evidence_gain"], "nats")
-        )
-        rows.append(Measurement("time", seconds, "s"))
+                rows.append((f"{name}, fitted over true", share, "of 1"))
+                rows.append((f"{name}, off by", 100.0 * abs(share - 1.0), "%", 20.0))
+        rows.append(("log evidence above exact poses'", fit["log_evidence_gain"], "nats"))
+        rows.append(("time", seconds, "s"))
         facts = {"unknowns": len(trials), "touches": touches, "bins": bins}
         inputs.report.add(f"fit of touch-sd, true {mm:g} mm, {sd['rad']:g} rad", facts, rows)
         records.append(
@@ -285,39 +266,42 @@ def add_none(
 ) -> Json:
     """What "none of these" makes of the unknowns after some number of touches."""
     tiny = numpy.finfo(float).tiny
-    odds = {
-        who: [
-            math.log(max(step.none, tiny)) - math.log(max(float(step.identity.sum()), tiny))
-            for step in steps
-        ]
-        for who, steps in after.items()
-    }
-    called = {
-        who: sum(step.none > float(step.identity.max()) for step in steps)
-        for who, steps in after.items()
-    }
-    learned, unlearned = odds["learned"], odds["never learned"]
+
+    def log(probability: float) -> float:
+        return math.log(max(float(probability), tiny))
+
+    def called(steps: Sequence[Step]) -> int:
+        return sum(step.none > float(step.identity.max()) for step in steps)
+
+    learned, unlearned = (
+        [log(step.none) - log(step.identity.sum()) for step in steps] for steps in after.values()
+    )
+    learned_none, unlearned_none = map(called, after.values())
     apart, (low, high) = told_apart(learned, unlearned)
     least = {3: 55.0, 9: 88.0, 15: 95.0}.get(touches) if setting.exact else None
+    most = 1.0 if setting.judged and touches > 1 else None
+    least_apart = 97.0 if setting.judged and touches >= 5 else None
+    interval = (100.0 * low, 100.0 * high)
     rows = [
-        share_of("learned called none", called["learned"], len(learned),
-                 at_most=1.0 if setting.judged and touches > 1 else None),
-        share_of("never learned called none", called["never learned"], len(unlearned), at_least=least),
-        Measurement("never learned told from learned", 100.0 * apart, "% of pairs",
-                    at_least=97.0 if setting.judged and touches >= 5 else None,
-                    interval=(100.0 * low, 100.0 * high)),
-    ]  # fmt: skip
-    facts = {
-        "learned": len(learned),
-        "never learned": len(unlearned),
-        "bins": size_of(setting.lattice),
-    }
+        share_of("learned called none", learned_none, len(learned), at_most=most),
+        share_of("never learned called none", unlearned_none, len(unlearned), at_least=least),
+        (
+            "never learned told from learned",
+            100.0 * apart,
+            "% of pairs",
+            None,
+            least_apart,
+            interval,
+        ),
+    ]
+    facts: Json = {"learned": len(learned), "never learned": len(unlearned)}
+    facts["bins"] = size_of(setting.lattice)
     report.add(f"{setting.name}, touch {touches}", facts, rows)
     return {
         "name": setting.name,
         "touches": touches,
-        "learned_called_none": called["learned"] / len(learned),
-        "unlearned_called_none": called["never learned"] / len(unlearned),
+        "learned_called_none": learned_none / len(learned),
+        "unlearned_called_none": unlearned_none / len(unlearned),
         "told_apart": apart,
         "learned_log_odds": learned,
         "unlearned_log_odds": unlearned,

@@ -45,12 +45,12 @@ def in_steps(
     """The region in steps of at most this length; in theta, of what moves an object as far."""
     fine = palpate.balanced_lattice(region, maps, "fine", 10**15)
     fine_step_mm = 0.6 * max(maps[0].cell_mm, maps[0].spread_mm or 0.0)
-    axes = [
-        (axis.lower, axis.upper, math.ceil(axis.count * fine_step_mm / step_mm))
-        for axis in (fine.x_mm, fine.y_mm, fine.theta_rad)
-    ]
-    x, y, theta = axes
-    return palpate.PoseLattice(x, y, theta)
+    return palpate.PoseLattice(
+        *(
+            (axis.lower, axis.upper, math.ceil(axis.count * fine_step_mm / step_mm))
+            for axis in (fine.x_mm, fine.y_mm, fine.theta_rad)
+        )
+    )
 
 
 def refined_errors(

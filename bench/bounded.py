@@ -23,7 +23,7 @@ from palpate._tables import count_text, seconds_text
 
 from . import charts
 from .certificates import CertificateCheck, check_certificate, dense_posterior
-from .report import Json, Measurement, Report, Run, main, parser, share_of, write, write_json
+from .report import Json, Report, Run, main, parser, share_of, write, write_json
 from .trials import VOWELS, lattice_of, letter_maps, make_trials, size_of
 
 SEED = 1_404_000_000

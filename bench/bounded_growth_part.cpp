@@ -32,7 +32,7 @@ int dense_unknowns(double bins_in_all, int unknowns) {
                               : 0;
 }
 
-/// In seconds, of times in a unit of so many.
+/// Median, least and most of some times in seconds; `unit` is the seconds that a 1 stands for.
 Json times_of(const std::vector<double>& times, double unit) {
   return times.empty() ? Json(nullptr)
                        : Json{{"median", unit * median(times)},

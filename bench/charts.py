@@ -39,6 +39,9 @@ matplotlib.rcParams.update(
 #: Marks stand out from lines and from each other.
 EDGE: dict[str, Any] = {"markeredgecolor": "white"}
 HOLLOW: dict[str, Any] = {"markerfacecolor": "white"}
+#: Looks of two series that share a colour.
+SOLID: dict[str, Any] = {"marker": "o", "linestyle": "-"} | EDGE
+DASHED: dict[str, Any] = {"marker": "s", "linestyle": "--"} | HOLLOW
 
 
 def chart(x: str, y: str, *, title: str = "", log: str = "") -> tuple[Figure, Axes]:
@@ -47,7 +50,6 @@ def chart(x: str, y: str, *, title: str = "", log: str = "") -> tuple[Figure, Ax
     axes = figure.add_subplot(xlabel=x, ylabel=y, title=title)
     if x == "touches":
         axes.xaxis.set_major_locator(MaxNLocator(integer=True))
-        axes.set_xlim(left=0.0)
     for scale in log:
         axes.set(**{f"{scale}scale": "log"})
         log_ticks(axes, scale, "{:g}".format, (1.0, 2.0, 5.0))
@@ -80,15 +82,18 @@ def line(
     y: str,
     *,
     scale: float = 1.0,
+    where: Mapping[str, Any] | None = None,
     interval: tuple[str, str] | None = None,
     band: bool = False,
     **look: Any,
 ) -> None:
     """Draws a field of records over another; a gap where a record has none.
 
-    x, y and interval are paths such as "error_mm/mean"; interval: the ends of each point's interval,
-    as error bars or, for a band, as a shade along the series.
+    x, y and interval are paths such as "error_mm/mean"; where: the fields by which records are chosen;
+    interval: the ends of each point's interval, as error bars or, for a band, as a shade along the
+    series.
     """
+    records = [record for record in records if (where or {}).items() <= record.items()]
 
     def of(path: str) -> list[float]:
         values = [value_of(record, path) for record in records]
@@ -117,8 +122,11 @@ def rule(axes: Axes, at: float, label: str, *, vertical: bool = False, colour: s
 
 
 def legend(figure: Figure) -> Figure:
-    """Puts the series' names above the chart."""
-    names = figure.axes[0].get_legend_handles_labels()[1]
+    """Puts the series' names above the finished chart; touches are counted from 0 on."""
+    axes = figure.axes[0]
+    if axes.get_xlabel() == "touches":
+        axes.set_xlim(left=0.0)
+    names = axes.get_legend_handles_labels()[1]
     columns = 2 if any(len(name) > 30 for name in names) else 3
     figure.legend(loc="outside upper left", ncols=columns)
     return figure

@@ -3,6 +3,7 @@
 import argparse
 import csv
 import io
+import math
 import pathlib
 import time
 from collections.abc import Callable, Sequence
@@ -31,7 +32,6 @@ PARTICLE_SEED = 1
 #: Nearly as many bins as Table I's, balanced so that a turn by a bin moves a letter as far as a shift
 #: by one.
 BALANCED: Bins = (13, 13, 55)
-REGION: dict[str, Any] = {"x_mm": (-10, 10), "y_mm": (-10, 10), "pivot_mm": (0, 0)}
 TABLES = ("curves.csv", "calibration.csv", "pose_noise.csv", "trials.csv")
 
 
@@ -49,7 +49,12 @@ class FilterRun(NamedTuple):
         return str(self.record["name"])
 
 
-class Inputs(NamedTuple):
+def confidence(step: Json) -> float:
+    """Probability of the most probable object."""
+    return float(step["identity"][step["best"]])
+
+
+class Filters(NamedTuple):
     """What the filters work on."""
 
     device: palpate.Device
@@ -58,55 +63,37 @@ class Inputs(NamedTuple):
     def histogram(self, bins: Bins, trials: Sequence[palpate.Recording]) -> FilterRun:
         """The histogram filter over the trials, with a step after every touch."""
         start = time.perf_counter()
-        records = palpate.recognize(
-            trials,
-            self.maps,
-            bins=bins,
-            filter="histogram",
-            trace=True,
-            device=self.device,
-            **REGION,
-        )
-        name = f"histogram {plain(bins)}"
-        return filter_run("histogram", name, bins[0] * bins[1] * bins[2], records, start)
+        records = self._recognize(trials, bins=bins, filter="histogram")
+        return _run("histogram", plain(bins), math.prod(bins), records, start)
 
     def particles(
-        self, count: int, trials: Sequence[palpate.Recording], *, augmented: bool = False
+        self, count: int, trials: Sequence[palpate.Recording], kind: str = "particles"
     ) -> FilterRun:
-        """The particle filter over the trials; each trial has a seed of its own."""
+        """The particle filter, or "augmented" MCL, over the trials; each has a seed of its own."""
         start = time.perf_counter()
+        options = {"filter": "particles", "particles": count, "augmented": kind == "augmented"}
         records = [
-            palpate.recognize(
-                trial,
-                self.maps,
-                filter="particles",
-                particles=count,
-                seed=seed,
-                augmented=augmented,
-                trace=True,
-                device=self.device,
-                **REGION,
-            )[0]
+            self._recognize([trial], seed=seed, **options)[0]
             for seed, trial in enumerate(trials, start=PARTICLE_SEED)
         ]
-        kind, name = ("augmented", "augmented MCL") if augmented else ("particles", "particles")
-        return filter_run(kind, f"{name} {count}", count, records, start)
+        return _run(kind, str(count), count, records, start)
+
+    def _recognize(self, trials: Sequence[palpate.Recording], **options: Any) -> list[Any]:
+        region: Any = {"x_mm": (-10, 10), "y_mm": (-10, 10), "pivot_mm": (0, 0)}
+        return palpate.recognize(
+            trials, self.maps, trace=True, device=self.device, **region, **options
+        )
 
 
-def confidence(step: Json) -> float:
-    """Probability of the most probable object."""
-    return float(step["identity"][step["best"]])
-
-
-def filter_run(
-    kind: str, name: str, count: int, records: Sequence[palpate.Record], start: float
+def _run(
+    kind: str, size: str, count: int, records: Sequence[palpate.Record], start: float
 ) -> FilterRun:
-    """The run of what a filter, which started at a time, says of the trials."""
+    """The run whose filter, with its size, gave the records of all trials since the start."""
     steps: list[list[Json]] = [record["trace"] for record in records]
     every = [step for of_trial in steps for step in of_trial]
     record = {
         "filter": kind,
-        "name": name,
+        "name": f"{'augmented MCL' if kind == 'augmented' else kind} {size}",
         "count": count,
         "seconds": time.perf_counter() - start,
         "curve": [point_of(touch, of) for touch, of in enumerate(zip(*steps, strict=True), 1)],
@@ -214,7 +201,7 @@ def add_run(report: Report, run: FilterRun) -> None:
     """What a run reached beside what the paper reports of its filter."""
     record, curve = run.record, run.record["curve"]
     histogram, count, last = record["filter"] == "histogram", record["count"], curve[-1]
-    rows = [accuracy_of("accuracy at the end", last)]
+    rows: list[tuple[Any, ...]] = [accuracy_of("accuracy at the end", last)]
     rows += holds_from("right in every trial from", curve, lambda point: point["accuracy"] == 1.0)
     known_after = PUBLISHED_BINS_KNOW_AFTER.get(count, 0) if histogram else 0
     if 0 < known_after <= len(curve):
@@ -222,15 +209,15 @@ def add_run(report: Report, run: FilterRun) -> None:
         rows.append(accuracy_of(f"least accuracy from touch {known_after} on", least, 100.0))
     if error := last["error_mm"]:
         most = PUBLISHED_ERROR_MM if histogram and count == 10_000 else None
-        rows.append(Measurement("mean error at the end", error["mean"], "mm", most))
-        rows.append(Measurement("median error at the end", error["median"], "mm"))
-        rows.append(Measurement("95th percentile of the error at the end", error["p95"], "mm"))
+        rows.append(("mean error at the end", error["mean"], "mm", most))
+        rows.append(("median error at the end", error["median"], "mm"))
+        rows.append(("95th percentile of the error at the end", error["p95"], "mm"))
     if refined := last["refined_error_mm"]:
-        rows.append(Measurement("mean error at the end, refined", refined["mean"], "mm"))
-        rows.append(Measurement("95th percentile at the end, refined", refined["p95"], "mm"))
+        rows.append(("mean error at the end, refined", refined["mean"], "mm"))
+        rows.append(("95th percentile at the end, refined", refined["p95"], "mm"))
         rows += holds_from("refined poses err less than modes from", curve, refined_errs_less)
     expected = 100.0 * record["calibration"]["expected_error"]
-    rows.append(Measurement("expected calibration error", expected, "%"))
+    rows.append(("expected calibration error", expected, "%"))
     facts = {
         "trials": len(run.steps),
         "touches": len(curve),
@@ -246,13 +233,13 @@ def add_comparison(report: Report, histogram: FilterRun, particles: FilterRun) -
     located = [(touches, fmean(of)) for touches, (_, of) in enumerate(points, start=1) if of]
     per_cent = 100.0 / len(histogram.steps)
     ahead = per_cent * fmean(lead for _, lead in right)
-    rows = [
-        Measurement("accuracy ahead, mean over touches", ahead, "% points"),
-        Measurement("accuracy ahead at the end", per_cent * right[-1][1], "% points"),
+    rows: list[tuple[Any, ...]] = [
+        ("accuracy ahead, mean over touches", ahead, "% points"),
+        ("accuracy ahead at the end", per_cent * right[-1][1], "% points"),
     ]
     if located:
         over = fmean(lead for _, lead in located)
-        rows.append(Measurement("error less where both locate, over touches", over, "mm"))
+        rows.append(("error less where both locate, over touches", over, "mm"))
     rows += lead_of("error less where both locate, at the end", points[-1][1])
     facts = {
         "equal count": f"{histogram.record['count']} bins for every object; "
@@ -265,12 +252,12 @@ def add_comparison(report: Report, histogram: FilterRun, particles: FilterRun) -
 
 def add_noise(report: Report, noise: tuple[float, float], runs: Sequence[FilterRun]) -> None:
     """Filters over trials in which the array is not quite where the robot reports it."""
-    rows = []
+    rows: list[tuple[Any, ...]] = []
     for run in runs:
         last = run.record["curve"][-1]
         rows.append(accuracy_of(f"{run.name}: accuracy at the end", last))
         if error := last["error_mm"]:
-            rows.append(Measurement(f"{run.name}: mean error at the end", error["mean"], "mm"))
+            rows.append((f"{run.name}: mean error at the end", error["mean"], "mm"))
     for histogram, particles in equal_counts(runs):
         name = (
             f"{histogram.name}: error less than of {particles.name}, where both locate, at the end"
@@ -306,34 +293,18 @@ def write_tables(
         for trial, steps in enumerate(run.steps)
         for touches, step in enumerate(steps, start=1)
     ]
-    run_columns = {"filter": "run/filter", "count": "run/count"}
+    of_run = {"filter": "run/filter", "count": "run/count"}
     shares = ("touches", "accuracy", "accuracy_low", "accuracy_high", "mean_confidence", "located")
-    curve_columns = run_columns | {name: f"point/{name}" for name in shares}
-    for kind in ("error", "refined"):
-        field = "error_mm" if kind == "error" else "refined_error_mm"
-        curve_columns |= {
-            f"{kind}_{of}_mm": f"point/{field}/{of}" for of in ("mean", "median", "p95")
-        }
-    bin_columns = {
-        "confidence_from": "bin/lower",
-        "estimates": "bin/count",
-        "mean_confidence": "bin/mean_confidence",
-        "fraction_right": "bin/fraction_right",
-    }
-    noise_columns = {"noise_mm": "noise/translation_mm", "noise_rad": "noise/rotation_rad"}
-    trial_columns = {of: of for of in ("trial", "object", "touches", "right", "confidence")}
-    trial_columns |= {of: f"step/{of}" for of in ("error_mm", "refined_error_mm")}
-    for name, columns, rows in zip(
-        TABLES,
-        (
-            curve_columns,
-            run_columns | bin_columns,
-            noise_columns | curve_columns,
-            run_columns | trial_columns,
-        ),
-        (points, bins, noisy, trials),
-        strict=True,
-    ):
+    curve = of_run | {name: f"point/{name}" for name in shares}
+    for kind, field in (("error", "error_mm"), ("refined", "refined_error_mm")):
+        curve |= {f"{kind}_{of}_mm": f"point/{field}/{of}" for of in ("mean", "median", "p95")}
+    of_bin = {"confidence_from": "bin/lower", "estimates": "bin/count"}
+    of_bin |= {name: f"bin/{name}" for name in ("mean_confidence", "fraction_right")}
+    of_noise = {"noise_mm": "noise/translation_mm", "noise_rad": "noise/rotation_rad"}
+    of_trial = {of: of for of in ("trial", "object", "touches", "right", "confidence")}
+    of_trial |= {of: f"step/{of}" for of in ("error_mm", "refined_error_mm")}
+    columns_of = (curve, of_run | of_bin, of_noise | curve, of_run | of_trial)
+    for name, columns, rows in zip(TABLES, columns_of, (points, bins, noisy, trials), strict=True):
         text = io.StringIO()
         table = csv.writer(text, lineterminator="\n")
         table.writerow(columns)
@@ -348,23 +319,23 @@ def measure(run: Run, options: argparse.Namespace) -> None:
     trials_each = options.trials or (4 if options.quick else 10)
     touches = options.touches or (12 if options.quick else 50)
     trials = make_trials(VOWELS, trials_each, touches, SEED)
-    inputs = Inputs(run.device, letter_maps(run.device))
+    filters = Filters(run.device, letter_maps(run.device))
     report = Report(run.facts)
     runs: list[FilterRun] = []
     for bins in (*TABLE_1, BALANCED):
-        runs.append(inputs.histogram(bins, trials))
+        runs.append(filters.histogram(bins, trials))
         add_run(report, runs[-1])
-    for augmented in (False, True):
+    for kind in ("particles", "augmented"):
         for count in (1_000, MOST_PARTICLES) if options.quick else (100, 1_000, MOST_PARTICLES):
-            runs.append(inputs.particles(count, trials, augmented=augmented))
+            runs.append(filters.particles(count, trials, kind))
             add_run(report, runs[-1])
     for pair in equal_counts(runs):
         add_comparison(report, *pair)
     levels = []
     for noise in ((1.0, 0.05), (2.0, 0.1)):
         noisy = make_trials(VOWELS, trials_each, min(touches, 20), SEED, Touching(noise=noise))
-        of_level = [inputs.histogram(bins, noisy) for bins in TABLE_1[1:]]
-        of_level.append(inputs.particles(MOST_PARTICLES, noisy))
+        of_level = [filters.histogram(bins, noisy) for bins in TABLE_1[1:]]
+        of_level.append(filters.particles(MOST_PARTICLES, noisy))
         add_noise(report, noise, of_level)
         level = {"translation_mm": noise[0], "rotation_rad": noise[1]}
         levels.append(level | {"filters": [one.record for one in of_level]})

@@ -106,8 +106,8 @@ def _noise(document: Json, most: int) -> Figure:
     figure, axes = charts.chart("touches", MEAN_ERROR, title=title, log="y")
     exact = {"translation_mm": 0.0, "rotation_rad": 0.0, "filters": document["filters"]}
     for kind, count, look in (
-        ("histogram", most, {"marker": "o"} | charts.EDGE),
-        ("particles", MOST_PARTICLES, {"marker": "s", "linestyle": "--"} | charts.HOLLOW),
+        ("histogram", most, charts.SOLID),
+        ("particles", MOST_PARTICLES, charts.DASHED),
     ):
         for colour, level in zip(charts.COLOURS, [exact, *document["pose_noise"]], strict=False):
             for run in level["filters"]:
@@ -115,7 +115,7 @@ def _noise(document: Json, most: int) -> Figure:
                     off = f"{level['translation_mm']:g} mm, {level['rotation_rad']:g} rad"
                     name = f"{run['name']}, {off}"
                     _curve(axes, run, "error_mm/mean", name, color=colour, **look)
-    axes.set_xlim(0.0, len(document["pose_noise"][0]["filters"][0]["curve"]) + 0.5)
+    axes.set_xlim(right=len(document["pose_noise"][0]["filters"][0]["curve"]) + 0.5)
     return figure
 
 

@@ -73,13 +73,13 @@ class ProgramWithFiles {
  public:
   ProgramWithFiles(const Inputs& inputs, std::filesystem::path program)
       : program_(std::move(program)), device_name_(inputs.device_name) {
-    std::filesystem::create_directory(maps());
+    std::filesystem::create_directory(maps_);
     for (const Hypothesis& letter : inputs.letters) {
-      write_map(maps() / (letter.map.label + ".map.h5"), letter.map);
+      write_map(maps_ / (letter.map.label + ".map.h5"), letter.map);
     }
-    std::filesystem::create_directory(unknowns());
+    std::filesystem::create_directory(unknowns_);
     for (const Recording& unknown : inputs.unknowns) {
-      recordings_.push_back(unknowns() / fmt::format("{:04}.h5", recordings_.size()));
+      recordings_.push_back(unknowns_ / fmt::format("{:04}.h5", recordings_.size()));
       write_recording(recordings_.back(), unknown);
     }
   }
@@ -99,19 +99,16 @@ class ProgramWithFiles {
     std::vector<double> seconds;
     for (int run = 0; run < batch_runs; ++run) {
       std::filesystem::remove_all(results);
-      seconds.push_back(seconds_of({"batch", unknowns(), "-o", results, "--filter", "bounded"}));
+      seconds.push_back(seconds_of({"batch", unknowns_, "-o", results, "--filter", "bounded"}));
     }
     return median(seconds);
   }
 
  private:
-  std::filesystem::path maps() const { return folder_.path() / "maps"; }
-  std::filesystem::path unknowns() const { return folder_.path() / "unknowns"; }
-
   double seconds_of(std::vector<std::string> arguments) const {
     arguments.insert(arguments.begin(), program_);
     arguments.insert(arguments.end(),
-                     {"--maps", maps(), "--bins", "25x25x16", "--x-mm=-10:10", "--y-mm=-10:10"});
+                     {"--maps", maps_, "--bins", "25x25x16", "--x-mm=-10:10", "--y-mm=-10:10"});
     if (!device_name_.empty()) {
       arguments.insert(arguments.end(), {"--device", device_name_});
     }
@@ -121,6 +118,8 @@ class ProgramWithFiles {
   std::filesystem::path program_;
   std::string device_name_;
   ScratchFolder folder_;
+  std::filesystem::path maps_ = folder_.path() / "maps";
+  std::filesystem::path unknowns_ = folder_.path() / "unknowns";
   std::vector<std::filesystem::path> recordings_;
 };
 

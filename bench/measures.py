@@ -77,13 +77,13 @@ def bootstrap_interval(
 
 
 def bootstrap_mean_interval(values: ArrayLike) -> Interval:
-    """That of the mean of at least one value."""
+    """The 95 % interval of the mean of at least one value, by bootstrap."""
     all_values = numpy.asarray(values)
     return bootstrap_interval(len(all_values), lambda drawn: all_values[drawn].mean(axis=1))
 
 
 def bootstrap_ratio_interval(numerators: ArrayLike, denominators: ArrayLike) -> Interval:
-    """That of mean(numerators) / mean(denominators), paired by index."""
+    """The 95 % interval of mean(numerators) / mean(denominators), paired by index, by bootstrap."""
     above, below = numpy.asarray(numerators), numpy.asarray(denominators)
     return bootstrap_interval(
         len(above), lambda drawn: above[drawn].sum(axis=1) / below[drawn].sum(axis=1)
@@ -97,10 +97,10 @@ def mean_record(values: Sequence[float]) -> dict[str, float]:
 
 
 def differences(first: Errors, second: Errors) -> dict[str, float] | None:
-    """What one run errs less than another, over the trials that have an error in both.
+    """By how much the first run errs more than the second, over the trials that have an error in both.
 
-    Trial i of one run is trial i of the other. `from` and `to` are the mean errors of the second and
-    the first run, `mean` is by how much the first errs more; None where no trial has both.
+    Trial i of one run is trial i of the other. `to` and `from` are the mean errors of the first and the
+    second run in mm, `mean` is their difference, with its standard error. None where no trial has both.
     """
     pairs = [(a, b) for a, b in zip(first, second, strict=True) if a is not None and b is not None]
     if not pairs:

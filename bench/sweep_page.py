@@ -168,11 +168,10 @@ def _bounds_chart(document: Json) -> tuple[Figure, Spots]:
         charts.COLOURS, ("histogram", "bounded"), ("histogram", "by bounds"), strict=False
     ):
         for asked, words, look in (
-            ("once", "asked once", {"marker": "o"}),
-            ("each_touch", "asked after each touch", {"marker": "s", "linestyle": "--"} | charts.HOLLOW),
-        ):  # fmt: skip
-            label = f"{name}, {words}"
-            y = f"{kind}/{asked}"
+            ("once", "asked once", charts.SOLID),
+            ("each_touch", "asked after each touch", charts.DASHED),
+        ):
+            y, label = f"{kind}/{asked}", f"{name}, {words}"
             chart.add(document["bounds"], "bins_in_all", y, label, BOUNDS, color=colour, **look)
     charts.rule(chart.axes, document["auto_rule"]["rule"], "--filter auto", vertical=True)
     return chart.done()

@@ -10,12 +10,12 @@ import numpy
 
 import palpate
 from palpate import reference
-from palpate._statistics import Errors, errors_over
+from palpate._statistics import errors_over
 
 from .certificates import check_certificate, dense_posterior
 from .measures import calibration
 from .report import Json
-from .trials import TABLE_1, VOWELS, Bins, Step, error_of, lattice_of, truth_of
+from .trials import TABLE_1, VOWELS, Bins, error_of, lattice_of, truth_of
 from .windows import estimate_in_window, map_of, nearest_bin_mm, placed
 
 Maps = Sequence[palpate.OccupancyGrid]
@@ -29,7 +29,7 @@ AUTO_RULE = 100_000
 
 
 def first_each(of_trials: Sequence[T], each: int) -> list[T]:
-    """What belongs to the first trials of every letter, of what belongs to all of them."""
+    """Picks what belongs to the first `each` trials of every letter, of all trials in order."""
     of_letter = len(of_trials) // len(VOWELS)
     return [of_trial for i, of_trial in enumerate(of_trials) if i % of_letter < each]
 
@@ -37,6 +37,7 @@ def first_each(of_trials: Sequence[T], each: int) -> list[T]:
 def follow(belief: Any, maps: Maps, trial: palpate.Recording) -> Json:
     """Asks a belief after each touch of a trial: times in s, what it says, its poses in the end."""
     asked: Json = {"touch_s": [], "refine_s": [], "confidence": [], "right": [], "refined": None}
+    truth = truth_of(trial)
     for touch in trial:
         start = time.perf_counter()
         belief.update(touch)
@@ -44,12 +45,14 @@ def follow(belief: Any, maps: Maps, trial: palpate.Recording) -> Json:
         asked["touch_s"].append(time.perf_counter() - start)
         best = int(numpy.argmax(estimate.identity))
         asked["confidence"].append(float(estimate.identity[best]))
-        asked["right"].append(maps[best].label == truth_of(trial).object)
-    asked["mode"], asked["grid"] = estimate.mode, maps[estimate.mode.object]
+        asked["right"].append(maps[best].label == truth.object)
+    grid, asked["mode"] = maps[estimate.mode.object], estimate.mode
     if isinstance(belief, palpate.PoseHistogram):
         start = time.perf_counter()
         asked["refined"] = belief.refine(estimate.mode)
         asked["refine_s"].append(time.perf_counter() - start)
+    asked["error_mm"] = error_of(grid, truth, asked["mode"])
+    asked["refined_error_mm"] = error_of(grid, truth, asked["refined"])
     return asked
 
 
@@ -77,11 +80,12 @@ def costs_record(kind: str, cell_mm: float, count: int, device_bytes: int, of: l
     }
 
 
-def errors_of(modes_mm: Errors, refined_mm: Errors) -> Json:
+def errors_of(steps: Sequence[Json]) -> Json:
     """Pose errors in the record of a run: those of each trial, and what they are over all."""
-    record: Json = {"trials": len(modes_mm)}
-    for name, errors in (("error", modes_mm), ("refined_error", refined_mm)):
-        record |= {f"{name}_mm": errors_over(errors, 20), f"{name}s_mm": list(errors)}
+    record: Json = {"trials": len(steps)}
+    for name in ("error", "refined_error"):
+        errors = [step[f"{name}_mm"] for step in steps]
+        record |= {f"{name}_mm": errors_over(errors, 20), f"{name}s_mm": errors}
     return record
 
 
@@ -108,19 +112,12 @@ def measure_histogram(
         ends.append(follow(belief, maps, trial))
     record = costs_record("histogram", maps[0].cell_mm, lattice.bins, belief.device_bytes, ends)
     record |= {"bins": list(bins), "balanced": bins not in TABLE_1}
-    if len(full) == len(trials):
-        modes, refined = (
-            [
-                error_of(end["grid"], truth_of(trial), end[pose])
-                for trial, end in zip(full, ends, strict=True)
-            ]
-            for pose in ("mode", "refined")
-        )
-    else:
-        steps = [estimate_in_window(device, maps, trial, lattice) for trial in trials]
-        modes, refined = [s.error_mm for s in steps], [s.refined_error_mm for s in steps]
+    steps = ends
+    if len(full) < len(trials):
+        found = [estimate_in_window(device, maps, trial, lattice) for trial in trials]
+        steps = [step._asdict() for step in found]
         record["windows"] = windows_record(maps, full, ends, first_each(steps, full_each))
-    record |= errors_of(modes, refined)
+    record |= errors_of(steps)
     nearest_mm = [nearest_bin_mm(lattice, placed(maps, trial)) for trial in trials]
     record["nearest_bin_mm"] = fmean(nearest_mm)
     belief.reset()
@@ -129,17 +126,17 @@ def measure_histogram(
     return record
 
 
-def windows_record(maps: Maps, full: Trials, ends: Sequence[Json], steps: Sequence[Step]) -> Json:
+def windows_record(maps: Maps, full: Trials, ends: Sequence[Json], steps: Sequence[Json]) -> Json:
     """How far apart the two poses of a trial lie at the most, by the full posterior and in a window."""
     apart: dict[str, list[float]] = {"mode": [], "refined": []}
     for trial, end, step in zip(full, ends, steps, strict=True):
         grid = map_of(maps, trial)
-        if end["grid"].label == grid.label:
+        if end["error_mm"] is not None:
             whole = palpate.OccupancyGrid(
                 grid.label, grid.log_odds, cell_mm=grid.cell_mm, origin_mm=grid.origin_mm
             )  # without symmetry
             for pose, distances in apart.items():
-                a, b = end[pose].T_object_robot, getattr(step, pose).T_object_robot
+                a, b = end[pose].T_object_robot, step[pose].T_object_robot
                 distances.append(palpate.pose_error_mm(whole, a, b))
     return {
         "compared_trials": len(apart["mode"]),
@@ -165,7 +162,7 @@ def bin_deviations(belief: palpate.PoseHistogram, maps: Maps, touch: palpate.Tou
 def measure_particles(
     device: palpate.Device, maps: Maps, trials: Trials, kind: str, particles: int
 ) -> Json:
-    """The same of a particle filter over all trials; trial i has the seed 1 + i.
+    """What a particle filter costs and what it is worth over all trials; trial i has the seed 1 + i.
 
     kind: "particles", "systematic" or "augmented". The deviation is that of the weights after one
     touch, which nothing has resampled yet. Weights are relative, so both sides are taken relative to
@@ -190,11 +187,7 @@ def measure_particles(
         ends.append(follow(belief, maps, trial))
         most_bytes = max(most_bytes, belief.device_bytes)
     record = costs_record(kind, maps[0].cell_mm, particles, most_bytes, ends)
-    modes_mm = [
-        error_of(end["grid"], truth_of(trial), end["mode"])
-        for trial, end in zip(trials, ends, strict=True)
-    ]
-    record |= errors_of(modes_mm, [None] * len(trials)) | {"nearest_bin_mm": None}
+    record |= errors_of(ends) | {"nearest_bin_mm": None}
     touch, belief = trials[0][0], filter_of(len(trials) + 1)
     belief.update(touch)
     objects, poses, weights = belief.particles()

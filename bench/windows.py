@@ -52,7 +52,7 @@ def _places(lattice: palpate.PoseLattice, at: Placed, thetas: Floats) -> Floats:
 
 
 def _index(axis: palpate.Axis, value: float) -> int:
-    """Of the bin that holds a value, which may lie beyond the axis."""
+    """Index of the bin that holds a value, which may lie beyond the axis."""
     return math.floor((value - axis.lower) / axis.step)
 
 

@@ -41,7 +41,7 @@ class Data:
         return _palpate.OpenBatch.open(head, self.device, threads)
 
     def on(self, lattice: PoseLattice, filter: str) -> "_palpate.OpenBatch":
-        """The same on given bins."""
+        """The batch of all recordings on given bins."""
         x, y, theta = lattice.x_mm, lattice.y_mm, lattice.theta_rad
         return self.open(
             bins=counts_of(lattice),
@@ -98,10 +98,13 @@ def lattices_of(fine: PoseLattice, most: int) -> list[PoseLattice]:
     return lattices[::-1]
 
 
-def _pose(record: Record, kind: str) -> list[float] | None:
-    """T_object_robot of the mode or of the refined pose."""
-    pose = record.get(kind)
-    return pose and [pose["x_mm"], pose["y_mm"], pose["theta_rad"]]
+def _distance_mm(data: Data, kind: str, record: Record, other: Record) -> float | None:
+    """How far the modes or the refined poses of two records lie apart; None for other objects."""
+    here, there = ((of["mode"]["map"], of["mode"].get("mirrored", False)) for of in (record, other))
+    if here != there or kind not in record or kind not in other:
+        return None
+    a, b = ([of[kind][name] for name in ("x_mm", "y_mm", "theta_rad")] for of in (record, other))
+    return float(pose_error_mm(data.maps[here].map, a, b))
 
 
 @dataclass
@@ -111,25 +114,15 @@ class Run:
     lattice: PoseLattice
     records: list[Record]  #: [unknown] after all touches
     point: Document  #: for the table, the charts and the document
-    #: By "mode" and "refined": errors where the truth is known and the object is right, and distances
-    #: from the finest run by the pose error, None where that has another object.
-    errors_mm: dict[str, Errors] = field(default_factory=dict)
+    #: By "mode" and "refined": distances from the finest run by the pose error, None where that has
+    #: another object.
     from_finest_mm: dict[str, Errors] = field(default_factory=dict)
 
     def compare_with(self, finest: "Run", data: Data) -> None:
         """Says how far the poses lie from those of the finest run."""
         pairs = list(zip(self.records, finest.records, strict=True))
         for kind, name in (("mode", "from_finest_mm"), ("refined", "refined_from_finest_mm")):
-            distances: list[float | None] = []
-            for record, other in pairs:
-                here, there = (
-                    (of["mode"]["map"], of["mode"].get("mirrored", False)) for of in (record, other)
-                )
-                a, b = _pose(record, kind), _pose(other, kind)
-                if here != there or a is None or b is None:
-                    distances.append(None)
-                else:
-                    distances.append(pose_error_mm(data.maps[here].map, a, b))
+            distances = [_distance_mm(data, kind, record, other) for record, other in pairs]
             self.from_finest_mm[kind] = distances
             self.point[name] = errors_over(distances, 20)
         same = sum(record["best"] == other["best"] for record, other in pairs)
@@ -173,15 +166,13 @@ def measure(data: Data, lattice: PoseLattice, dense: int) -> Run:
     if bounds is not None:
         records, point["seconds_bounds"] = data.recognize(bounds, unknowns)
         point["host_bytes"] = bounds.memory_bytes
-    run = Run(lattice, records, point)
     known = [record["right"] for record in records if record.get("right") is not None]
     point |= {"labelled": len(known), "accuracy": sum(known) / len(known) if known else None}
     point["trials"] = len(records)
-    for kind, name in (("mode", "error"), ("refined", "refined_error")):
+    for name in ("error", "refined_error"):
         errors = [record.get(f"{name}_mm") for record in records]
-        run.errors_mm[kind] = errors
         point |= {f"{name}_mm": errors_over(errors, 20), f"{name}s_mm": errors}
     sd = [record["refined"]["sd"] for record in records if "refined" in record]
     point["sd_mm"] = median_low([math.hypot(x, y) for x, y, _ in sd]) if sd else None
     point["sd_deg"] = median_low([math.degrees(theta) for _, _, theta in sd]) if sd else None
-    return run
+    return Run(lattice, records, point)

@@ -36,7 +36,7 @@ def mean_text(errors: dict[str, float]) -> str:
 
 
 def difference_text(errors: dict[str, float]) -> str:
-    """The same with the sign of the mean."""
+    """Such as "-0.015 ± 0.005": a mean with its sign, and its standard error."""
     return f"{errors['mean']:+.3f} ± {errors['standard_error']:.3f}"
 
 

@@ -104,12 +104,11 @@ def _true_pose(record: Record) -> bool:
 def _columns(truth_known: bool) -> list[Column]:
     """Errors where the truth is known, else distances from the finest run."""
     mib, mm = number(".1f", 1.0 / (1 << 20)), number(".3f")
-    if truth_known:
-        errors: list[Column] = [
-            ("mode: mean error, mm", "error_mm", mean_text),
-            ("refined: mean error, mm", "refined_error_mm", mean_text),
-        ]
-    else:
+    errors: list[Column] = [
+        ("mode: mean error, mm", "error_mm", mean_text),
+        ("refined: mean error, mm", "refined_error_mm", mean_text),
+    ]
+    if not truth_known:
         errors = [
             ("mode: from the finest, mm", "from_finest_mm/mean", mm),
             ("refined: from the finest, mm", "refined_from_finest_mm/mean", mm),
@@ -136,10 +135,11 @@ def _rests(run: Run, finest: Run, kind: str) -> bool:
     An error e and a distance d make sqrt(e^2 + d^2) together; e is the finest run's error by the truth
     or, where too few true poses are known, its standard deviation.
     """
-    by_truth = len(present(finest.errors_mm["mode"])) >= _LEAST_TRUE_POSES
+    by_truth = len(present(finest.point["errors_mm"])) >= _LEAST_TRUE_POSES
+    errors_mm = finest.point["errors_mm" if kind == "mode" else "refined_errors_mm"]
     distances = errors = 0.0
     for i, record in enumerate(finest.records):
-        distance, error = run.from_finest_mm[kind][i], finest.errors_mm[kind][i]
+        distance, error = run.from_finest_mm[kind][i], errors_mm[i]
         if not by_truth:
             error = math.hypot(*record["refined"]["sd"][:2]) if "refined" in record else None
         if distance is not None and error is not None:
