@@ -22,7 +22,7 @@ BELOW = {
     "host/cli": [*LIBRARY, "recognition", "learning", "figures"],
     "driver": ["model", "yaml"],
     "python": [*LIBRARY, "recognition", "learning", "reference"],
-    "bench": [*LIBRARY, "recognition", "learning", "reference", "figures"],
+    "bench": [*LIBRARY, "recognition", "learning", "reference"],
 }
 
 
