@@ -13,6 +13,7 @@
 #include <nanobind/ndarray.h>
 #include <glm/vec2.hpp>
 
+#include "palpate/lattice.hpp"
 #include "palpate/pose.hpp"
 #include "types.hpp"
 
@@ -106,6 +107,18 @@ Result<Value, rank> owned(std::vector<Value> values, const std::size_t (&shape)[
   const nb::capsule owner(kept, [](void* p) noexcept { delete static_cast<decltype(kept)>(p); });
   return {kept->data(), shape, owner};
 }
+template <typename Value>
+Result<Value, 1> owned(std::vector<Value> values) {
+  const std::size_t n = values.size();
+  return owned(std::move(values), {n});
+}
+/// [ntheta, ny, nx] of what every bin of a lattice has.
+inline Result<double, 3> owned(std::vector<double> bins, const PoseLattice& lattice) {
+  const auto [ntheta, ny, nx] =
+      std::array{lattice.theta_rad.count, lattice.y_mm.count, lattice.x_mm.count};
+  return owned(std::move(bins), {static_cast<std::size_t>(ntheta), static_cast<std::size_t>(ny),
+                                 static_cast<std::size_t>(nx)});
+}
 /// A read-only array over memory of an object of Python, which it keeps alive.
 template <typename Value, std::size_t rank>
 Result<const Value, rank> view(const Value* data, const std::size_t (&shape)[rank],
@@ -121,5 +134,21 @@ Result<double, 2> to_array(std::span<const glm::dvec2> points);
 /// [3, 3] of a covariance.
 Result<double, 2> to_array(const std::array<double, 9>& covariance);
 Result<double, 1> to_array(const std::array<double, 3>& values);
+
+// Properties by the member that holds their values.
+
+/// The member as an array of its own.
+template <typename Class, typename Value>
+auto array_of(Value Class::*member) {
+  return [member](const Class& self) { return to_array(self.*member); };
+}
+/// [n], a view of the member.
+template <typename Class, typename Value>
+auto view_of(std::vector<Value> Class::*member) {
+  return [member](nb::handle_t<Class> self) {
+    const std::vector<Value>& values = nb::cast<const Class&>(self).*member;
+    return view<Value, 1>(values.data(), {values.size()}, self);
+  };
+}
 
 }  // namespace palpate::python

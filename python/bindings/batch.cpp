@@ -85,11 +85,11 @@ struct OpenBatch {
   BatchTask task;
   Request request;  ///< completed
   RecognitionTask recognition;
-  std::shared_ptr<const Call*> current;  ///< the call at work, which sets it, for bounds' search
   Recogniser recogniser;
 };
 
-OpenBatch open_batch(const std::string& head, Device& device, std::size_t threads) {
+OpenBatch open_batch(const std::string& head, const Session& session, Device& device,
+                     std::size_t threads) {
   BatchTask task = head_from(head);
   Request request = complete(task.request);
   BatchTask own = task;
@@ -100,18 +100,12 @@ OpenBatch open_batch(const std::string& head, Device& device, std::size_t thread
                 fmt::format("{}; give all workers the same palpate, maps, scene and sensor model",
                             difference));
   }
-  const auto current = std::make_shared<const Call*>(nullptr);
   RecognitionTask recognition = resolve_batch(
       task, request, [&device]() -> const Device& { return device; },
-      [current] {
-        if (*current != nullptr) {
-          (*current)->check();
-        }
-      });
+      [&session] { session.check(); });  // which the open batch keeps
   take_threads(recognition, threads);
   Recogniser recogniser = open_batch_filter(&device, recognition);
-  return {std::move(task), std::move(request), std::move(recognition), current,
-          std::move(recogniser)};
+  return {std::move(task), std::move(request), std::move(recognition), std::move(recogniser)};
 }
 
 struct Line {
@@ -127,7 +121,6 @@ struct Chunk {
 
 Chunk recognise_entries(OpenBatch& batch, const std::vector<std::string>& entries,
                         const Call& call) {
-  *batch.current = &call;
   Chunk chunk;
   RecordingReader reader;
   for (const std::string& entry : entries) {
@@ -188,8 +181,8 @@ void bind_batch(nb::module_& module) {
           "open",
           [](const nb::bytes& head, const std::shared_ptr<Session>& session, int threads) {
             return make_owned<OpenBatch>(
-                {}, session, [head = text_in(head), threads](Device& device) {
-                  return open_batch(head, device, static_cast<std::size_t>(threads));
+                session, [head = text_in(head), &on = *session, threads](Device& device) {
+                  return open_batch(head, on, device, static_cast<std::size_t>(threads));
                 });
           },
           "head"_a, "device"_a, "threads"_a,

@@ -65,7 +65,7 @@ void bind_map_builder(nb::module_& module) {
              const InverseSensorModel& sensor, const ContactClassifier& classifier) {
             const MapOptions options = options_of(cell_mm, sensor, classifier);
             new (self) Builder(make_owned<MapBuilder>(
-                {}, device, [options](Device& on) { return MapBuilder(on, options); }));
+                device, [options](Device& on) { return MapBuilder(on, options); }));
           },
           "device"_a, nb::kw_only(), "cell_mm"_a = MapOptions{}.cell_mm,
           "sensor"_a = InverseSensorModel{}, "classifier"_a = ContactClassifier{},
@@ -74,21 +74,12 @@ void bind_map_builder(nb::module_& module) {
            "Adds the evidence of these touches.\n\n"
            "progress(fraction) is called up to 50 times a second. Ctrl-C stops the call after a\n"
            "part of the touches. Raises Error on a touch that is not sound.")
-      .def(
-          "build",
-          [](const Builder& self, const std::string& label) {
-            return self.use([label](MapBuilder& builder, Call&) { return builder.build(label); });
-          },
-          "label"_a,
-          "The map of all touches so far. Raises Error if no element of any touch was In Contact "
-          "or\n"
-          "No Contact.")
-      .def(
-          "clear",
-          [](const Builder& self) {
-            self.use([](MapBuilder& builder, Call&) { builder.clear(); });
-          },
-          "Forgets all touches, for the next object.")
+      .def("build", on_device<Builder>(&MapBuilder::build), "label"_a,
+           "The map of all touches so far. Raises Error if no element of any touch was In Contact "
+           "or\n"
+           "No Contact.")
+      .def("clear", on_device<Builder>(&MapBuilder::clear),
+           "Forgets all touches, for the next object.")
       .def("__repr__", [](const Builder& self) {
         return fmt::format("MapBuilder(on '{}')", self.session().name());
       });

@@ -91,9 +91,8 @@ void bind_map(nb::module_& module) {
           "sound.")
       .def_ro("label", &OccupancyGrid::label, "Name of the object.")
       .def_ro("cell_mm", &OccupancyGrid::cell_mm, "Edge of a cell.")
-      .def_prop_ro(
-          "origin_mm", [](const OccupancyGrid& self) { return to_array(self.origin_mm); },
-          "[2], the centre of cell (0, 0) in the object frame.")
+      .def_prop_ro("origin_mm", array_of(&OccupancyGrid::origin_mm),
+                   "[2], the centre of cell (0, 0) in the object frame.")
       .def_ro("prior", &OccupancyGrid::prior, "Probability that an unseen place is occupied.")
       .def_rw("symmetry", &OccupancyGrid::symmetry,
               "n-fold rotational symmetry; 0 = full, that of a disc.")

@@ -76,9 +76,7 @@ void bind_lattice(nb::module_& module) {
       .def_ro("x_mm", &PoseLattice::x_mm, "In the object frame.")
       .def_ro("y_mm", &PoseLattice::y_mm, "In the object frame.")
       .def_ro("theta_rad", &PoseLattice::theta_rad, "Angle of T_object_robot.")
-      .def_prop_ro(
-          "pivot_mm", [](const PoseLattice& self) { return to_array(self.pivot_mm); },
-          "[2] in the robot frame, mm.")
+      .def_prop_ro("pivot_mm", array_of(&PoseLattice::pivot_mm), "[2] in the robot frame, mm.")
       .def_prop_ro("bins", &PoseLattice::bins, "Number of bins of one object.")
       .def_prop_ro(
           "shape",

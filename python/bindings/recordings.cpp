@@ -216,9 +216,8 @@ void bind_recording(nb::module_& module) {
           },
           "object"_a, "T_object_robot"_a, "T_object_robot [3] (x_mm, y_mm, theta_rad).")
       .def_ro("object", &Truth::object, "The label of the object.")
-      .def_prop_ro(
-          "T_object_robot", [](const Truth& self) { return to_array(self.T_object_robot); },
-          "[3] (x_mm, y_mm, theta_rad).")
+      .def_prop_ro("T_object_robot", array_of(&Truth::T_object_robot),
+                   "[3] (x_mm, y_mm, theta_rad).")
       .def("__repr__", [](const Truth& self) {
         return fmt::format("Truth('{}', {})", self.object, text_of(self.T_object_robot));
       });

@@ -9,6 +9,7 @@ Session::Lock::Lock(Session& session, const Call& call) : session_(session) {
   while (!session_.working_.try_lock_for(20ms)) {
     call.check();
   }
+  session_.working_call_ = &call;
 }
 
 Session::Lock::~Lock() {
