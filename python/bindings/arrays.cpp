@@ -68,11 +68,8 @@ void refuse_masked(nb::handle object, const char* name) {
   }
 }
 
-std::string wanted_shape(ArrayReader::Shape shape) {
-  return fmt::format("({}{})", fmt::join(shape, ", "), shape.size() == 1 ? "," : "");
-}
-
-std::string given_shape(const std::vector<std::size_t>& shape) {
+template <typename Shape>
+std::string shape_text(const Shape& shape) {
   return fmt::format("({}{})", fmt::join(shape, ", "), shape.size() == 1 ? "," : "");
 }
 
@@ -96,12 +93,24 @@ std::span<const Pose> as_poses(const Floats& array) { return rows<Pose>(array); 
 std::span<const glm::dvec2> as_points(const Floats& array) { return rows<glm::dvec2>(array); }
 
 template <typename Value>
-Array<Value> ArrayReader::checked(const nb::object& array, const char* name, Shape shape) {
-  Array<Value> result;
-  result.object = array;
-  for (const nb::handle extent : array.attr("shape")) {
-    result.shape.push_back(nb::cast<std::size_t>(extent));
+Array<Value> in_place(nb::object array) {
+  Py_buffer buffer{};
+  if (PyObject_GetBuffer(array.ptr(), &buffer, PyBUF_C_CONTIGUOUS) != 0) {
+    throw nb::python_error();
   }
+  Array<Value> result{std::move(array),
+                      static_cast<const Value*>(buffer.buf),
+                      {buffer.shape, buffer.shape + buffer.ndim}};
+  PyBuffer_Release(&buffer);  // the array keeps the memory
+  return result;
+}
+template Floats in_place<double>(nb::object);
+template Bytes in_place<std::uint8_t>(nb::object);
+template Counts in_place<std::uint64_t>(nb::object);
+
+template <typename Value>
+Array<Value> ArrayReader::checked(const nb::object& array, const char* name, Shape shape) {
+  Array<Value> result = in_place<Value>(array);
   bool fits = result.shape.size() == shape.size();
   std::string known;
   std::map<std::string, Extent> extents = extents_;
@@ -121,16 +130,10 @@ Array<Value> ArrayReader::checked(const nb::object& array, const char* name, Sha
     }
   }
   if (!fits) {
-    refuse(name, fmt::format("shape {}; give {}{}", given_shape(result.shape), wanted_shape(shape),
-                             known));
+    refuse(name,
+           fmt::format("shape {}; give {}{}", shape_text(result.shape), shape_text(shape), known));
   }
   extents_ = std::move(extents);
-  Py_buffer buffer{};
-  if (PyObject_GetBuffer(array.ptr(), &buffer, PyBUF_C_CONTIGUOUS) != 0) {
-    throw nb::python_error();
-  }
-  result.data = static_cast<const Value*>(buffer.buf);
-  PyBuffer_Release(&buffer);  // the array keeps the memory
   return result;
 }
 
@@ -202,6 +205,9 @@ Result<double, 2> to_array(std::span<const Pose> poses) {
 }
 Result<double, 2> to_array(std::span<const glm::dvec2> points) {
   return copied(reinterpret_cast<const double*>(points.data()), {points.size(), 2});
+}
+std::optional<FloatArray> to_array(const std::optional<Pose>& pose) {
+  return pose ? std::optional(nb::borrow<FloatArray>(to_array(*pose))) : std::nullopt;
 }
 Result<double, 2> to_array(const std::array<double, 9>& covariance) {
   return copied(covariance.data(), {3, 3});

@@ -43,6 +43,10 @@ using Floats = Array<double>;
 using Bytes = Array<std::uint8_t>;
 using Counts = Array<std::uint64_t>;
 
+/// The array as C++ reads it. Of another layout than C's, it has no such memory.
+template <typename Value>
+Array<Value> in_place(nb::object array);
+
 /// Poses [n, 3] as rows of x_mm, y_mm and theta_rad, and points [n, 2] in mm.
 std::span<const Pose> as_poses(const Floats& array);
 std::span<const glm::dvec2> as_points(const Floats& array);
@@ -131,6 +135,7 @@ Result<double, 1> to_array(const Pose& pose);
 Result<double, 1> to_array(const glm::dvec2& point);
 Result<double, 2> to_array(std::span<const Pose> poses);
 Result<double, 2> to_array(std::span<const glm::dvec2> points);
+std::optional<FloatArray> to_array(const std::optional<Pose>& pose);
 /// [3, 3] of a covariance.
 Result<double, 2> to_array(const std::array<double, 9>& covariance);
 Result<double, 1> to_array(const std::array<double, 3>& values);

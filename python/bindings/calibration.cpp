@@ -106,8 +106,7 @@ void bind_learned_sensor(nb::module_& module) {
       .def_prop_ro(
           "level_edges",
           [](const LearnedSensor& self) {
-            const std::vector<double>& edges = self.table->level_edges;
-            return owned(std::vector<double>(edges), {edges.size()});
+            return owned(std::vector<double>(self.table->level_edges));
           },
           "[levels - 2] ascending pressures that part In Contact into levels.")
       .def_prop_ro(

@@ -54,14 +54,15 @@ OccupancyGrid make_map(const std::string& label, const ArrayLike& log_odds, doub
   return map;
 }
 
-/// A view of cells [ny, nx]; None where there are none.
-nb::object cells_view(const OccupancyGrid& map, const std::vector<float>& cells) {
-  if (cells.empty()) {
-    return nb::none();
-  }
+/// [ny, nx], a view of cells of the map.
+Result<const float, 2> view_cells(const OccupancyGrid& map, const std::vector<float>& cells) {
   return view<float, 2>(cells.data(),
                         {static_cast<std::size_t>(map.ny), static_cast<std::size_t>(map.nx)},
                         nb::find(map));
+}
+
+nb::object cells_or_none(const OccupancyGrid& map, const std::vector<float>& cells) {
+  return cells.empty() ? nb::none() : nb::object(view_cells(map, cells));
 }
 
 void bind_map(nb::module_& module) {
@@ -104,21 +105,16 @@ void bind_map(nb::module_& module) {
       .def_ro("nx", &OccupancyGrid::nx, "Cells along x.")
       .def_ro("ny", &OccupancyGrid::ny, "Cells along y.")
       .def_prop_ro(
-          "log_odds",
-          [](nb::handle_t<OccupancyGrid> self) {
-            const auto& map = nb::cast<const OccupancyGrid&>(self);
-            return view<float, 2>(
-                map.log_odds.data(),
-                {static_cast<std::size_t>(map.ny), static_cast<std::size_t>(map.nx)}, self);
-          },
+          "log_odds", [](const OccupancyGrid& self) { return view_cells(self, self.log_odds); },
           "[ny, nx] in nats: a read-only view, not a copy.")
       .def_prop_ro(
           "observations",
-          [](const OccupancyGrid& self) { return cells_view(self, self.observations); },
+          [](const OccupancyGrid& self) { return cells_or_none(self, self.observations); },
           nb::sig("def observations(self) -> numpy.typing.NDArray[numpy.float32] | None"),
           "Touches that sensed each cell, [ny, nx], or None.")
       .def_prop_ro(
-          "mean_level", [](const OccupancyGrid& self) { return cells_view(self, self.mean_level); },
+          "mean_level",
+          [](const OccupancyGrid& self) { return cells_or_none(self, self.mean_level); },
           nb::sig("def mean_level(self) -> numpy.typing.NDArray[numpy.float32] | None"),
           "Mean pressure at each cell, [ny, nx], or None.")
       .def(

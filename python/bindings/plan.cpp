@@ -105,7 +105,6 @@ nb::tuple plan_python(const nb::list& recordings, const nb::list& maps, Request 
     index.push_back(touch.index);
     poses.push_back(touch.T_robot_sensor);
   }
-  const std::size_t n = index.size();
   nb::dict result;
   result["recording"] = plan.record.recording;
   result["touches"] = plan.record.touches;
@@ -113,7 +112,7 @@ nb::tuple plan_python(const nb::list& recordings, const nb::list& maps, Request 
   result["believed"] = nb::bytes(planned.believed.data(), planned.believed.size());
   result["identity_nats"] = plan.identity_nats;
   result["pose_nats"] = plan.both_nats - plan.identity_nats;
-  result["index"] = owned(std::move(index), {n});
+  result["index"] = owned(std::move(index));
   result["T_robot_sensor"] = to_array(poses);
   result["gains"] = nb::cast(std::move(gains));
   std::vector<std::string> warnings = warnings_of(plan);
