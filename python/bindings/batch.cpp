@@ -21,7 +21,6 @@
 #include "recognition/resolve.hpp"
 #include "recognition/unknowns.hpp"
 #include "request.hpp"
-#include "session.hpp"
 
 namespace palpate::python {
 
@@ -29,14 +28,12 @@ using namespace nb::literals;
 
 namespace {
 
-using Sentences = std::vector<std::string>;
-
 nb::bytes bytes_of(const std::string& text) { return nb::bytes(text.data(), text.size()); }
 std::string text_in(const nb::bytes& bytes) { return {bytes.c_str(), bytes.size()}; }
 
 struct Settled {
   BatchTask task;
-  Sentences sentences;  ///< what is worth a warning
+  Sentences sentences;
 };
 
 Settled settle(const std::vector<std::string>& inputs, const Request& given, const Device& device,
@@ -61,23 +58,26 @@ Settled settle(const std::vector<std::string>& inputs, const Request& given, con
   return settled;
 }
 
-nb::tuple settle_python(const std::vector<std::string>& inputs, const nb::list& maps,
-                        Request request, const std::shared_ptr<Session>& session, int threads) {
+using Entries = std::vector<std::tuple<nb::bytes, std::size_t>>;
+
+std::tuple<nb::bytes, Entries, Sentences> settle_python(const std::vector<std::string>& inputs,
+                                                        nb::handle maps, PythonRequest request,
+                                                        const std::shared_ptr<Session>& session,
+                                                        std::size_t threads) {
   if (inputs.empty()) {
     throw Error(Fault::input, "paths: none; give recordings, a folder of them or a manifest");
   }
   add_maps(maps, request);
-  const Settled settled = run([=](Call& call) {
+  Settled settled = run([=](Call& call) {
     auto lock = session->lock(call);
-    return settle(inputs, request, lock.device(), static_cast<std::size_t>(threads), call);
+    return settle(inputs, request, lock.device(), threads, call);
   });
-  nb::list entries;
+  Entries entries;
   for (const BatchEntry& entry : settled.task.inputs) {
-    entries.append(nb::make_tuple(bytes_of(entry_text(entry)), settled.task.unknowns_of(entry)));
+    entries.emplace_back(bytes_of(entry_text(entry)), settled.task.unknowns_of(entry));
   }
-  BatchTask head = settled.task;
-  head.inputs.clear();
-  return nb::make_tuple(bytes_of(head_text(head)), entries, settled.sentences);
+  settled.task.inputs.clear();
+  return {bytes_of(head_text(settled.task)), std::move(entries), std::move(settled.sentences)};
 }
 
 /// A settled batch on a device, ready to recognise any of its recordings.
@@ -143,21 +143,22 @@ Chunk recognise_entries(OpenBatch& batch, const std::vector<std::string>& entrie
   return chunk;
 }
 
-nb::tuple recognise_python(const Owned<OpenBatch>& batch, const nb::list& entries) {
+using Lines = std::vector<std::tuple<nb::bytes, nb::bytes, double>>;
+
+std::tuple<Lines, std::string> recognise_python(const Owned<OpenBatch>& batch,
+                                                const std::vector<nb::bytes>& entries) {
   std::vector<std::string> texts;
-  for (const nb::handle entry : entries) {
-    texts.push_back(text_in(value_of<nb::bytes>(entry, "entries: give bytes of settle_batch()")));
-  }
+  std::ranges::transform(entries, std::back_inserter(texts), text_in);
   const Chunk chunk = batch.use([texts = std::move(texts)](OpenBatch& open, Call& call) {
     return recognise_entries(open, texts, call);
   });
-  nb::list lines;
+  Lines lines;
   for (const Line& line : chunk.lines) {
-    lines.append(nb::make_tuple(bytes_of(line.text),
-                                bytes_of(line.python_text == line.text ? "" : line.python_text),
-                                line.seconds));
+    lines.emplace_back(bytes_of(line.text),
+                       bytes_of(line.python_text == line.text ? "" : line.python_text),
+                       line.seconds);
   }
-  return nb::make_tuple(lines, in_keywords(chunk.unresolved));
+  return {std::move(lines), in_keywords(chunk.unresolved)};
 }
 
 }  // namespace
@@ -165,28 +166,24 @@ nb::tuple recognise_python(const Owned<OpenBatch>& batch, const nb::list& entrie
 void bind_batch(nb::module_& module) {
   module.def("settle_batch", &settle_python, "paths"_a, "maps"_a, "request"_a, "device"_a,
              "threads"_a,
-             nb::sig("def settle_batch(paths: collections.abc.Sequence[str], maps: list[str], "
-                     "request: Request, device: Device, threads: int) -> tuple[bytes, "
-                     "list[tuple[bytes, int]], list[str]]"),
              "What follows from all recordings together, as `palpate batch` settles it: the head\n"
              "of the task, an entry for each recording with the number of its unknowns, and what\n"
              "is worth a warning.");
   module.def(
-      "device_of", [](const Request& request) { return complete(request).device; }, "request"_a,
-      "The device that the request or its scene names, or \"\".");
+      "device_of", [](const PythonRequest& request) { return complete(request).device; },
+      "request"_a, "The device that the request or its scene names, or \"\".");
   nb::class_<Owned<OpenBatch>>(module, "OpenBatch",
                                "A settled batch on a device, ready to recognise any of its "
                                "recordings. One thread at\na time recognises.")
       .def_static(
           "open",
-          [](const nb::bytes& head, const std::shared_ptr<Session>& session, int threads) {
+          [](const nb::bytes& head, const std::shared_ptr<Session>& session, std::size_t threads) {
             return make_owned<OpenBatch>(
                 session, [head = text_in(head), &on = *session, threads](Device& device) {
-                  return open_batch(head, on, device, static_cast<std::size_t>(threads));
+                  return open_batch(head, on, device, threads);
                 });
           },
           "head"_a, "device"_a, "threads"_a,
-          nb::sig("def open(head: bytes, device: Device, threads: int) -> OpenBatch"),
           "Raises Error where palpate, a map, the scene or the sensor model is not as it was when\n"
           "the batch was settled.")
       .def_prop_ro(
@@ -221,8 +218,6 @@ void bind_batch(nb::module_& module) {
           "Memory held: the device's, or the host's where bounds recognise.")
       .def(
           "recognize", &recognise_python, "entries"_a,
-          nb::sig("def recognize(self, entries: list[bytes]) -> tuple[list[tuple[bytes, bytes, "
-                  "float]], str]"),
           "The record of each unknown as a line of JSON, as `palpate batch` writes it; again,\n"
           "with options in the words of Python, or b\"\" where that is the same; and its seconds.\n"
           "Then what is worth a warning, or \"\". A recording that cannot be recognised has a\n"

@@ -146,21 +146,27 @@ void bind_marginals(nb::module_& module) {
 
 }  // namespace
 
+std::optional<Hypothesis> hypothesis_in(nb::handle item) {
+  const OccupancyGrid* map = nullptr;
+  const Hypothesis* hypothesis = nullptr;
+  if (nb::try_cast(item, map) && map != nullptr) {
+    return Hypothesis{.map = *map};
+  }
+  return nb::try_cast(item, hypothesis) && hypothesis != nullptr ? std::optional(*hypothesis)
+                                                                 : std::nullopt;
+}
+
 std::vector<Hypothesis> hypotheses_of(nb::handle maps) {
   std::vector<Hypothesis> hypotheses;
   const nb::object all = call("builtins", "list", maps);
   for (const nb::handle item : all) {
-    const OccupancyGrid* map = nullptr;
-    const Hypothesis* hypothesis = nullptr;
-    if (nb::try_cast(item, map) && map != nullptr) {
-      hypotheses.push_back({.map = *map});
-    } else if (nb::try_cast(item, hypothesis) && hypothesis != nullptr) {
-      hypotheses.push_back(*hypothesis);
-    } else {
+    const auto hypothesis = hypothesis_in(item);
+    if (!hypothesis) {
       throw Error(Fault::input, fmt::format("maps: item {} is a {}; give OccupancyGrid or "
                                             "Hypothesis, such as of read_map()",
                                             hypotheses.size(), nb::inst_name(item).c_str()));
     }
+    hypotheses.push_back(*hypothesis);
   }
   return hypotheses;
 }

@@ -28,6 +28,8 @@ struct MapsLike : nb::object {
                     any_object)
 };
 std::vector<Hypothesis> hypotheses_of(nb::handle maps);
+/// Of an OccupancyGrid or a Hypothesis; none of anything else.
+std::optional<Hypothesis> hypothesis_in(nb::handle item);
 
 /// A filter over object and pose.
 template <typename Filter>

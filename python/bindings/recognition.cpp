@@ -1,18 +1,15 @@
 #include <algorithm>
 #include <iterator>
 
-#include <nanobind/stl/shared_ptr.h>
 #include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
 #include <nlohmann/json.hpp>
 
 #include "bindings.hpp"
-#include "given_recordings.hpp"
 #include "recognition/record_json.hpp"
 #include "recognition/resolve.hpp"
 #include "recognition/unknowns.hpp"
 #include "request.hpp"
-#include "session.hpp"
 
 namespace palpate::python {
 
@@ -58,7 +55,7 @@ nb::object to_python(const Json& json) {
 
 struct Answer {
   Json records = Json::array();
-  std::vector<std::string> sentences;  ///< what is worth a warning
+  Sentences sentences;
 };
 
 Answer recognize(const Subject& subject, Device& device, Call& call) {
@@ -94,29 +91,18 @@ Answer recognize(const Subject& subject, Device& device, Call& call) {
   return answer;
 }
 
-std::tuple<nb::object, std::vector<std::string>> recognize_python(
-    const nb::list& recordings, const nb::list& maps, Request given,
-    const std::shared_ptr<Session>& session, const Progress& progress) {
-  GivenRecordings wanted = given_recordings(recordings);
-  add_maps(maps, given);
-  const Answer answer = run({}, progress, [wanted = std::move(wanted), given, session](Call& call) {
-    const Subject subject = subject_of(wanted, given);
-    const auto used = session_on(session, subject.request.device);
-    auto lock = used->lock(call);
-    return recognize(subject, lock.device(), call);
-  });
-  return {to_python(answer.records), answer.sentences};
+using Records = nb::typed<nb::list, nb::typed<nb::dict, nb::str, nb::any>>;
+
+std::tuple<Records, Sentences> recognize_python(nb::handle recordings, const PythonRequest& request,
+                                                const Progress& progress) {
+  const Answer answer = run_on_subject(recordings, request, progress, &recognize);
+  return {nb::borrow<Records>(to_python(answer.records)), answer.sentences};
 }
 
 }  // namespace
 
 void bind_recognition(nb::module_& module) {
-  module.def("recognize", &recognize_python, "recordings"_a, "maps"_a, "request"_a,
-             "device"_a = nb::none(), "progress"_a = nb::none(),
-             nb::sig("def recognize(recordings: list[Recording | str], maps: "
-                     "list[OccupancyGrid | Hypothesis | str], request: Request, device: "
-                     "Device | None = None, progress: collections.abc.Callable[[float], object] | "
-                     "None = None) -> tuple[list[dict[str, typing.Any]], list[str]]"),
+  module.def("recognize", &recognize_python, "recordings"_a, "request"_a, "progress"_a = nb::none(),
              "Records as in the JSON of `palpate recognize`, and what is worth a warning.");
 }
 

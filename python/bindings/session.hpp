@@ -52,13 +52,6 @@ class Session {
   std::vector<std::shared_ptr<void>> unwanted_;
 };
 
-/// The session, or where there is none, one that is nobody else's: of the device of this name, see
-/// Device::open(). Throws Error.
-inline std::shared_ptr<Session> session_on(const std::shared_ptr<Session>& session,
-                                           const std::string& name) {
-  return session ? session : std::make_shared<Session>(Device::open(name));
-}
-
 /// An object of a device: keeps it open, and is destroyed while no thread works on the device.
 template <typename Object>
 class Owned {
